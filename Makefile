@@ -1,0 +1,59 @@
+# Every target that needs the virtual environment makes it first, and remakes it when pyproject.toml or
+# constraints.txt changed. Nothing outside this folder is touched.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+PACKAGES := common autopilot sim policies mission
+
+.DEFAULT_GOAL := help
+.PHONY: help setup fly test test-all check tune bench format lock clean
+
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
+
+setup: $(STAMP) ## Make the virtual environment in .venv (the other targets do so by themselves)
+
+$(STAMP): pyproject.toml constraints.txt
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "Python 3.11 or newer is needed: make PYTHON=/path/to/python3.11"; exit 2; }
+	@test -x $(BIN)/python || "$(PYTHON)" -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
+	@touch $@
+
+fly: $(STAMP) ## Fly the default mission; flags: make fly ARGS="--once --speed max --wind 5"
+	@$(BIN)/honeyguide fly $(ARGS)
+
+# loadfile keeps a test file's kernels in one process, so that each is compiled once.
+test: $(STAMP) ## Run the tests that take seconds; flags: make test ARGS="-k plan"
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow" tests $(ARGS)
+
+test-all: $(STAMP) ## Run every test, the slow ones too
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile tests $(ARGS)
+
+check: $(STAMP) ## Check format, lint, types and layers, as CI does before the tests
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy $(PACKAGES)
+	$(BIN)/lint-imports
+
+tune: $(STAMP) ## Print the designed gains with their gain, phase and disk margins
+	@$(BIN)/python -m autopilot.tuning $(ARGS)
+
+bench: $(STAMP) ## Measure speed and write bench/results.json
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[bench]"
+	@$(BIN)/python -m bench $(ARGS)
+
+format: $(STAMP) ## Format the code and mend what lint can mend
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lock: $(STAMP) ## Pin the installed versions in constraints.txt
+	@{ sed '/^[^#]/,$$d' constraints.txt; $(BIN)/python -m pip freeze --exclude-editable; } > constraints.txt.part
+	@mv constraints.txt.part constraints.txt
+	@touch $(STAMP)
+
+clean: ## Remove the virtual environment, caches and build leftovers
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find $(PACKAGES) tests bench -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""The flight controller: ports, estimator, control, commander, navigator and MAVLink."""

@@ -1,0 +1,37 @@
+"""One tick of the flight controller's kernel part: samples in, motor commands out, at 250 Hz.
+
+This is the same code on every rig: inside the simulator's fused launch (sim/advance.py), or alone, on samples from a
+recorded flight or an outside simulator.
+"""
+
+import warp as wp
+
+from autopilot.control.airframe import ControlAirframe
+from autopilot.control.control import control_tick
+from autopilot.control.params import ControlParams
+from autopilot.control.state import ControlState
+from autopilot.estimator.ekf import Ekf, estimator_tick
+from autopilot.ports import Samples, Setpoint
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Autopilot:
+    """Everything the kernel part keeps; each array has one row per vehicle."""
+
+    ekf: Ekf
+    control: wp.array(dtype=ControlState)
+    control_params: wp.array(dtype=ControlParams)
+    airframe: wp.array(dtype=ControlAirframe)
+    setpoint: wp.array(dtype=Setpoint)  # written by the Python part
+
+
+@wp.kernel(enable_backward=False)
+def estimate_samples(ekf: Ekf, samples: wp.array2d(dtype=Samples), tick_count: int):
+    """Runs the estimator alone over recorded samples, one column per tick."""
+    i = wp.tid()
+    state = ekf.rows[i]
+    for tick in range(tick_count):
+        state = estimator_tick(ekf, i, state, samples[i, tick])
+    ekf.rows[i] = state

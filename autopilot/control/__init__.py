@@ -1,0 +1,1 @@
+"""The cascade from setpoint to motor commands: trajectory, position, velocity, attitude, rate, allocation."""

@@ -1,0 +1,78 @@
+"""What the controller knows of its airframe: mass, inertia, allocation matrices and the motor curve.
+
+Built once on the host from the airframe file; read-only in kernels.
+"""
+
+import numpy as np
+import warp as wp
+
+from common.airframe import Airframe
+from common.kernels import MAX_ROTORS, vec8
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class ControlAirframe:
+    rotor_count: int
+    mass_kg: float
+    inertia_kg_m2: wp.vec3  # principal moments about frd
+    arm_roll_m: vec8  # torque about frd x per rotor thrust
+    arm_pitch_m: vec8
+    arm_yaw_m: vec8
+    mix_thrust: vec8  # rotor thrust per newton of collective thrust
+    mix_roll: vec8  # [N] per N m
+    mix_pitch: vec8
+    mix_yaw: vec8
+    thrust_n_s2: float  # rotor thrust per squared speed
+    max_speed_rad_s: float  # at full command and full battery
+    command_curve: float  # a in speed share = a u + (1 - a) sqrt(u)
+    idle_command: float
+    motor_time_s: float  # first-order lag, mean of rise and fall
+    full_voltage_v: float
+
+
+def effectiveness(airframe: Airframe) -> np.ndarray:
+    """Roll, pitch, yaw torque [N m] and collective thrust [N] per newton of each rotor, shape (4, rotors).
+
+    A rotor pushes along -z of frd; a rotor turning counter-clockwise seen from above (spin +1) drags the body
+    clockwise, which is positive yaw in frd.
+    """
+    yaw_arm = airframe.rotor_model.torque_n_m_s2 / airframe.rotor_model.thrust_n_s2
+    columns = [(-rotor.y_m, rotor.x_m, rotor.spin * yaw_arm, 1.0) for rotor in airframe.rotors]
+    return np.array(columns, dtype=np.float64).T
+
+
+def mixing(airframe: Airframe) -> np.ndarray:
+    """Rotor thrusts [N] per unit of roll, pitch, yaw torque and collective thrust, shape (rotors, 4).
+
+    The least-effort inverse. Where the rotors cannot make all four (three rotors), yaw is left out.
+    """
+    forward = effectiveness(airframe)
+    inverse = np.zeros((forward.shape[1], 4))
+    rows = [0, 1, 2, 3] if np.linalg.matrix_rank(forward, tol=1.0e-6) == 4 else [0, 1, 3]
+    inverse[:, rows] = np.linalg.pinv(forward[rows])
+    return inverse
+
+
+def _vec8(values: np.ndarray) -> vec8:
+    return vec8(*np.concatenate([values, np.zeros(MAX_ROTORS - len(values))]).astype(float).tolist())
+
+
+def control_airframe(airframe: Airframe) -> ControlAirframe:
+    """The controller's view of an airframe file."""
+    forward, inverse = effectiveness(airframe), mixing(airframe)
+    body, rotor = airframe.body, airframe.rotor_model
+    row = ControlAirframe()
+    row.rotor_count = len(airframe.rotors)
+    row.mass_kg = body.mass_kg
+    row.inertia_kg_m2 = wp.vec3(body.inertia_xx_kg_m2, body.inertia_yy_kg_m2, body.inertia_zz_kg_m2)
+    row.arm_roll_m, row.arm_pitch_m, row.arm_yaw_m = (_vec8(forward[k]) for k in range(3))
+    row.mix_roll, row.mix_pitch, row.mix_yaw, row.mix_thrust = (_vec8(inverse[:, k]) for k in range(4))
+    row.thrust_n_s2 = rotor.thrust_n_s2
+    row.max_speed_rad_s = rotor.max_speed_rad_s
+    row.command_curve = rotor.command_curve
+    row.idle_command = rotor.idle_command
+    row.motor_time_s = 0.5 * (rotor.spin_up_time_s + rotor.spin_down_time_s)
+    row.full_voltage_v = airframe.battery.cells * airframe.battery.full_cell_v
+    return row

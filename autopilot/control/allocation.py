@@ -1,0 +1,116 @@
+"""Control allocation: torque and collective thrust to motor commands, and what could not be achieved, 250 Hz.
+
+Where a rotor would leave its range, yaw gives way first, then collective thrust, roll and pitch last.
+"""
+
+import warp as wp
+
+from autopilot.control.airframe import ControlAirframe
+from common.kernels import vec8
+
+wp.set_module_options({"enable_backward": False})
+
+_TINY = wp.constant(1.0e-9)
+_BIG = wp.constant(1.0e9)
+
+
+@wp.struct
+class Allocation:
+    thrust_n: vec8  # per rotor
+    collective_n: float  # achieved
+    torque_frd: wp.vec3  # [N m] achieved
+    collective_short_n: float  # asked minus achieved
+    torque_short_frd: wp.vec3
+
+
+@wp.func
+def speed_share(command: float, curve: float) -> float:
+    """Rotor speed over greatest speed at a motor command [0..1]."""
+    return curve * command + (1.0 - curve) * wp.sqrt(command)
+
+
+@wp.func
+def command_for_speed(share: float, curve: float) -> float:
+    """Motor command for a rotor speed over greatest speed: the inverse of `speed_share`."""
+    straight = 1.0 - curve
+    root = 2.0 * share / wp.max(straight + wp.sqrt(straight * straight + 4.0 * curve * share), _TINY)
+    return root * root
+
+
+@wp.func
+def tilt_thrusts(airframe: ControlAirframe, torque_frd: wp.vec3, span: float) -> vec8:
+    """Rotor thrusts [N] for roll and pitch torque, scaled down so that they differ by at most `span`."""
+    thrusts = airframe.mix_roll * torque_frd[0] + airframe.mix_pitch * torque_frd[1]
+    low = float(_BIG)
+    high = float(-_BIG)
+    for i in range(airframe.rotor_count):
+        low = wp.min(low, thrusts[i])
+        high = wp.max(high, thrusts[i])
+    if high - low > span:
+        thrusts = thrusts * (span / (high - low))
+    return thrusts
+
+
+@wp.func
+def fitting_collective(airframe: ControlAirframe, thrusts: vec8, collective_n: float, low: float, high: float) -> float:
+    """The collective thrust nearest to the asked one that keeps every rotor within [low, high]."""
+    least = float(-_BIG)
+    most = float(_BIG)
+    for i in range(airframe.rotor_count):
+        share = wp.max(airframe.mix_thrust[i], _TINY)
+        least = wp.max(least, (low - thrusts[i]) / share)
+        most = wp.min(most, (high - thrusts[i]) / share)
+    return wp.min(wp.max(collective_n, least), most)
+
+
+@wp.func
+def fitting_share(airframe: ControlAirframe, thrusts: vec8, change: vec8, low: float, high: float) -> float:
+    """The greatest share [0..1] of `change` that keeps every rotor within [low, high]."""
+    share = float(1.0)
+    for i in range(airframe.rotor_count):
+        if change[i] > _TINY:
+            share = wp.min(share, (high - thrusts[i]) / change[i])
+        if change[i] < -_TINY:
+            share = wp.min(share, (low - thrusts[i]) / change[i])
+    return wp.clamp(share, 0.0, 1.0)
+
+
+@wp.func
+def allocate(
+    airframe: ControlAirframe, torque_frd: wp.vec3, collective_n: float, thrust_low_n: float, thrust_high_n: float
+) -> Allocation:
+    """Rotor thrusts within [thrust_low_n, thrust_high_n], and exactly what they achieve and leave."""
+    thrusts = tilt_thrusts(airframe, torque_frd, thrust_high_n - thrust_low_n)
+    collective = fitting_collective(airframe, thrusts, collective_n, thrust_low_n, thrust_high_n)
+    thrusts = thrusts + airframe.mix_thrust * collective
+    turn = airframe.mix_yaw * torque_frd[2]
+    thrusts = thrusts + turn * fitting_share(airframe, thrusts, turn, thrust_low_n, thrust_high_n)
+    result = Allocation()
+    roll = float(0.0)
+    pitch = float(0.0)
+    yaw = float(0.0)
+    total = float(0.0)
+    for i in range(airframe.rotor_count):
+        thrust = wp.clamp(thrusts[i], thrust_low_n, thrust_high_n)
+        result.thrust_n[i] = thrust
+        roll += airframe.arm_roll_m[i] * thrust
+        pitch += airframe.arm_pitch_m[i] * thrust
+        yaw += airframe.arm_yaw_m[i] * thrust
+        total += thrust
+    result.collective_n = total
+    result.torque_frd = wp.vec3(roll, pitch, yaw)
+    result.collective_short_n = collective_n - total
+    result.torque_short_frd = torque_frd - result.torque_frd
+    return result
+
+
+@wp.func
+def motor_commands(airframe: ControlAirframe, thrusts_n: vec8, voltage_share: float) -> vec8:
+    """Motor commands [0..1] for rotor thrusts at a battery voltage over the full one."""
+    commands = vec8()
+    top = airframe.max_speed_rad_s * voltage_share
+    for i in range(airframe.rotor_count):
+        speed = wp.sqrt(wp.max(thrusts_n[i], 0.0) / airframe.thrust_n_s2)
+        command = command_for_speed(wp.min(speed / top, 1.0), airframe.command_curve)
+        commands[i] = wp.clamp(command, airframe.idle_command, 1.0)
+    return commands

@@ -1,0 +1,120 @@
+"""The delayed horizon: rings in which samples wait until the horizon passes them, and the output predictor.
+
+Fusing at a horizon that lies behind the latest sensor lets every measurement meet the state of its own time. The
+output predictor carries the state from the horizon to the newest IMU sample.
+"""
+
+import warp as wp
+
+from autopilot.estimator.params import EstimatorParams
+from autopilot.estimator.predict import delta_velocity_ned
+from autopilot.estimator.state import IMU_RING, Inbox, Nominal, Output, OutputSample
+from autopilot.ports import ImuSample
+from common.kernels import GRAVITY_M_S2
+from common.rotation import quat_from_rotvec
+
+wp.set_module_options({"enable_backward": False})
+
+_MIN_DT_S = wp.constant(1.0e-4)
+_MAX_DT_S = wp.constant(0.1)  # a longer gap in a log would be integrated with a rate that is no longer true
+_TAU_ATT_S = wp.constant(0.1)  # guess: short against the controller's attitude loop seen by it as a disturbance
+
+
+@wp.func
+def bounded_sample(imu: ImuSample) -> ImuSample:
+    """The sample with a usable interval."""
+    imu.dt_s = wp.clamp(imu.dt_s, _MIN_DT_S, _MAX_DT_S)
+    return imu
+
+
+@wp.func
+def receive(inbox: Inbox, time_us: wp.int64, ring_size: int, is_equal: bool, is_live: bool, stuck_after: int) -> Inbox:
+    """The inbox after a new sample, which the caller puts into slot `head % ring_size` first.
+
+    Args:
+        inbox: of the sensor.
+        time_us: of the sample.
+        ring_size: slots; the oldest waiting sample is dropped when all are taken.
+        is_equal: the sample repeats the value of the one before.
+        is_live: False where equal values prove nothing: an ideal sensor on a vehicle at rest.
+        stuck_after: equal values in a row that mean stuck; a stuck sensor's waiting samples are dropped.
+    """
+    inbox.arrived_time_us = time_us
+    inbox.head += 1
+    if inbox.head - inbox.tail > ring_size:
+        inbox.tail = inbox.head - ring_size
+    if is_equal:
+        if is_live:
+            inbox.repeat_count += 1
+    else:
+        inbox.repeat_count = 0
+        inbox.is_stuck = 0
+    if inbox.repeat_count + 1 >= stuck_after:
+        inbox.is_stuck = 1
+    if inbox.is_stuck == 1:
+        inbox.tail = inbox.head
+    return inbox
+
+
+@wp.func
+def due_count(
+    imu_ring: wp.array2d(dtype=ImuSample), i: int, head: int, tail: int, horizon_time_us: wp.int64, at_most: int
+) -> int:
+    """IMU samples that the horizon has reached."""
+    count = int(0)
+    for k in range(at_most):
+        if tail + k < head:
+            if imu_ring[i, (tail + k) % IMU_RING].time_us <= horizon_time_us:
+                count = k + 1
+    return count
+
+
+@wp.func
+def output_attitude(output: Output) -> wp.quat:
+    """Attitude at the newest IMU sample."""
+    return wp.normalize(output.q_correction * output.q_raw)
+
+
+@wp.func
+def integrate_output(output: Output, nominal: Nominal, imu: ImuSample) -> Output:
+    """The integrals after the newest IMU sample, with the biases as now known."""
+    delta_angle_frd = (imu.gyro_frd - nominal.gyro_bias_frd) * imu.dt_s
+    delta_vel_frd = (imu.accel_frd - nominal.accel_bias_frd) * imu.dt_s
+    delta_vel_ned = delta_velocity_ned(output_attitude(output), delta_angle_frd, delta_vel_frd)
+    vel_before_ned = output.vel_raw_ned
+    output.vel_raw_ned = vel_before_ned + delta_vel_ned + wp.vec3(0.0, 0.0, GRAVITY_M_S2 * imu.dt_s)
+    mean_vel_ned = 0.5 * (vel_before_ned + output.vel_raw_ned) + output.vel_correction_ned
+    output.pos_raw_ned = output.pos_raw_ned + mean_vel_ned * imu.dt_s
+    output.q_raw = wp.normalize(output.q_raw * quat_from_rotvec(delta_angle_frd))
+    return output
+
+
+@wp.func
+def correct_output(
+    params: EstimatorParams, output: Output, at_horizon: OutputSample, nominal: Nominal, dt_s: float
+) -> Output:
+    """The corrections after they moved towards the state at the horizon, with the time constants of the parameters."""
+    q_then = output.q_correction * at_horizon.q_raw
+    q_error = nominal.q_ned_from_frd * wp.quat_inverse(q_then)
+    sign = 2.0
+    if q_error[3] < 0.0:
+        sign = -2.0
+    # twice the vector part is the rotation vector to third order; resets do not pass through here
+    att_error_ned = wp.vec3(q_error[0], q_error[1], q_error[2]) * sign
+    step = att_error_ned * wp.min(dt_s / _TAU_ATT_S, 1.0)
+    output.q_correction = wp.normalize(quat_from_rotvec(step) * output.q_correction)
+    vel_error_ned = nominal.vel_ned - (at_horizon.vel_raw_ned + output.vel_correction_ned)
+    pos_error_ned = nominal.pos_ned - (at_horizon.pos_raw_ned + output.pos_correction_ned)
+    output.vel_correction_ned = output.vel_correction_ned + vel_error_ned * wp.min(dt_s / params.tau_vel_s, 1.0)
+    output.pos_correction_ned = output.pos_correction_ned + pos_error_ned * wp.min(dt_s / params.tau_pos_s, 1.0)
+    return output
+
+
+@wp.func
+def jump_output(output: Output, nominal: Nominal) -> Output:
+    """The corrections after a reset of the nominal state: the output jumps with it."""
+    output.pos_correction_ned = output.pos_correction_ned + nominal.pos_jump_ned
+    output.vel_correction_ned = output.vel_correction_ned + nominal.vel_jump_ned
+    yaw = quat_from_rotvec(wp.vec3(0.0, 0.0, nominal.yaw_jump))
+    output.q_correction = wp.normalize(yaw * output.q_correction)
+    return output

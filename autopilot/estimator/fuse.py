@@ -1,0 +1,171 @@
+"""Scalar measurement updates: the only code that lowers the covariance or corrects the nominal state.
+
+In: P H' and H P H' + R of one scalar, and its innovation. Each update subtracts an exactly symmetric product, which
+keeps a float32 covariance symmetric and positive where P - K H P does not.
+"""
+
+import warp as wp
+
+from autopilot.estimator.params import EstimatorParams
+from autopilot.estimator.state import (
+    ACCEL_BIAS,
+    ATT,
+    BODY,
+    EARTH,
+    GYRO_BIAS,
+    POS,
+    TERRAIN,
+    VEL,
+    WIND,
+    Aid,
+    Nominal,
+)
+from common.kernels import ERROR_STATES, vec24
+from common.rotation import quat_from_rotvec
+
+wp.set_module_options({"enable_backward": False})
+
+_RATIO_LPF_GAIN = wp.constant(0.1)  # per sample
+
+
+@wp.func
+def part3(error: vec24, first: int) -> wp.vec3:
+    """Three neighbouring elements of an error state."""
+    return wp.vec3(error[first], error[first + 1], error[first + 2])
+
+
+@wp.func
+def clamp3(value: wp.vec3, limit: float) -> wp.vec3:
+    """Each element limited to ± limit."""
+    return wp.vec3(
+        wp.clamp(value[0], -limit, limit), wp.clamp(value[1], -limit, limit), wp.clamp(value[2], -limit, limit)
+    )
+
+
+@wp.func
+def inject(params: EstimatorParams, nominal: Nominal, error: vec24) -> Nominal:
+    """The nominal state corrected by an error estimate.
+
+    The covariance is not turned into the new tangent space: the change is of second order in the correction.
+    """
+    nominal.q_ned_from_frd = wp.normalize(quat_from_rotvec(part3(error, ATT)) * nominal.q_ned_from_frd)
+    nominal.vel_ned = nominal.vel_ned + part3(error, VEL)
+    nominal.pos_ned = nominal.pos_ned + part3(error, POS)
+    nominal.gyro_bias_frd = clamp3(nominal.gyro_bias_frd + part3(error, GYRO_BIAS), params.gyro_bias_limit)
+    nominal.accel_bias_frd = clamp3(nominal.accel_bias_frd + part3(error, ACCEL_BIAS), params.accel_bias_limit)
+    nominal.earth_field_ned = nominal.earth_field_ned + part3(error, EARTH)
+    nominal.body_field_frd = nominal.body_field_frd + part3(error, BODY)
+    nominal.wind_ned = nominal.wind_ned + wp.vec3(error[WIND], error[WIND + 1], 0.0)
+    nominal.terrain_d = nominal.terrain_d + error[TERRAIN]
+    return nominal
+
+
+@wp.func
+def fuse(
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    ph: vec24,
+    innov: float,
+    innov_var: float,
+) -> Nominal:
+    """Kalman update with one scalar: P -= w w', w = P H' / sqrt(S)."""
+    inv_root = 1.0 / wp.sqrt(innov_var)
+    w = ph * inv_root
+    for r in range(ERROR_STATES):
+        cov[i, r] = cov[i, r] - w[r] * w
+    return inject(params, nominal, w * (innov * inv_root))
+
+
+@wp.func
+def fuse_state(
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    k: int,
+    innov: float,
+    obs_var: float,
+) -> Nominal:
+    """Kalman update with a direct measurement of error k."""
+    ph = cov[i, k]
+    return fuse(params, cov, i, nominal, ph, innov, ph[k] + obs_var)
+
+
+@wp.func
+def fuse_part(
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    ph: vec24,
+    innov: float,
+    innov_var: float,
+    first: int,
+    count: int,
+) -> Nominal:
+    """Update of `count` states from `first` on; the others are considered, not corrected (Schmidt 1966).
+
+    With K zero elsewhere, P - K H P - P H' K' + K S K' stays positive, whatever K is.
+    """
+    gain = vec24()
+    for r in range(first, first + count):
+        gain[r] = ph[r] / innov_var
+    scaled = gain * wp.sqrt(innov_var)
+    for r in range(ERROR_STATES):
+        cov[i, r] = cov[i, r] - (ph[r] * gain + gain[r] * ph) + scaled[r] * scaled
+    return inject(params, nominal, gain * innov)
+
+
+@wp.func
+def set_variance(cov: wp.array2d(dtype=vec24), i: int, k: int, variance: float) -> None:
+    """Forgets what is known of error k: its correlations vanish and its variance is set."""
+    for r in range(ERROR_STATES):
+        row = cov[i, r]
+        row[k] = 0.0
+        cov[i, r] = row
+    row_k = vec24()
+    row_k[k] = variance
+    cov[i, k] = row_k
+
+
+@wp.func
+def judge(aid: Aid, time_us: wp.int64, innov: wp.vec3, innov_var: wp.vec3, gate_sigma: float) -> Aid:
+    """The aid with its innovations and test ratio; unused components have innovation 0 and variance 1."""
+    aid.judged_time_us = time_us
+    aid.innov = innov
+    aid.innov_var = innov_var
+    squared = wp.cw_div(wp.cw_mul(innov, innov), innov_var)
+    aid.test_ratio = wp.max(squared[0], wp.max(squared[1], squared[2])) / (gate_sigma * gate_sigma)
+    aid.test_ratio_lpf = aid.test_ratio_lpf + _RATIO_LPF_GAIN * (aid.test_ratio - aid.test_ratio_lpf)
+    if aid.test_ratio > 1.0:
+        aid.reject_count += 1
+    else:
+        aid.reject_count = 0
+    return aid
+
+
+@wp.func
+def mark_fused(aid: Aid) -> Aid:
+    """The aid after its judged sample was fused."""
+    aid.fused_time_us = aid.judged_time_us
+    aid.fuse_count += 1
+    return aid
+
+
+@wp.func
+def mark_reset(aid: Aid) -> Aid:
+    """The aid after the state was set to its judged sample."""
+    aid.fused_time_us = aid.judged_time_us
+    aid.reset_count += 1
+    aid.reject_count = 0
+    return aid
+
+
+@wp.func
+def seconds_since(now_us: wp.int64, then_us: wp.int64) -> float:
+    """Seconds between two times; a million where `then` never was."""
+    if then_us == wp.int64(0):
+        return 1.0e6
+    return float(now_us - then_us) * 1.0e-6

@@ -1,0 +1,117 @@
+"""Health: which parts of the estimate may be used, how sure they are, and what to do with a broken covariance.
+
+In: the state after a horizon step. Out: `Estimate.flags` and standard deviations, and aids switched off when their
+sensor fell silent or froze.
+"""
+
+import warp as wp
+
+from autopilot.estimator.fuse import seconds_since
+from autopilot.estimator.params import EstimatorParams
+from autopilot.estimator.state import (
+    ATT,
+    PHASE_RUNNING,
+    POS,
+    TERRAIN,
+    VEL,
+    WIND,
+    Aid,
+    EstimatorState,
+    Inbox,
+)
+from autopilot.ports import (
+    DEAD_RECKONING,
+    HEIGHT_VALID,
+    POSITION_VALID,
+    TERRAIN_VALID,
+    TILT_ALIGNED,
+    VELOCITY_VALID,
+    WIND_VALID,
+    YAW_ALIGNED,
+    Estimate,
+)
+from common.kernels import ERROR_STATES, vec24
+
+wp.set_module_options({"enable_backward": False})
+
+_SILENT_AFTER_S = wp.constant(1.0)  # five samples of the slowest source
+_DEAD_RECKONING_AFTER_S = wp.constant(1.0)
+_TERRAIN_AFTER_S = wp.constant(2.0)
+_MAX_TILT_VAR = wp.constant(0.01)  # rad²: 6 deg
+_MAX_YAW_VAR = wp.constant(0.07)  # rad²: 15 deg
+_MAX_WIND_VAR = wp.constant(9.0)  # (3 m/s)²
+_MAX_POS_VAR = wp.constant(2500.0)  # (50 m)²
+_MIN_VAR = wp.constant(1.0e-12)
+_MAX_VAR = wp.constant(1.0e8)
+
+
+@wp.func
+def listen(aid: Aid, inbox: Inbox, horizon_time_us: wp.int64) -> Aid:
+    """The aid, inactive once its sensor froze or its samples stopped coming."""
+    if inbox.is_stuck == 1 or seconds_since(horizon_time_us, aid.judged_time_us) > _SILENT_AFTER_S:
+        aid.is_active = 0
+    return aid
+
+
+@wp.func
+def is_sound(cov: wp.array2d(dtype=vec24), i: int) -> bool:
+    """Every variance is a positive, finite number."""
+    is_good = bool(True)
+    for r in range(ERROR_STATES):
+        variance = cov[i, r][r]
+        # written so that a NaN fails
+        if not (variance > _MIN_VAR and variance < _MAX_VAR):
+            is_good = False
+    return is_good
+
+
+@wp.func
+def lift_variances(cov: wp.array2d(dtype=vec24), i: int) -> None:
+    """Adds to variances that rounding brought below a floor; adding to the diagonal keeps the matrix positive."""
+    for r in range(ERROR_STATES):
+        row = cov[i, r]
+        if row[r] < 10.0 * _MIN_VAR:
+            row[r] = 10.0 * _MIN_VAR
+            cov[i, r] = row
+
+
+@wp.func
+def with_deviations(cov: wp.array2d(dtype=vec24), i: int, estimate: Estimate) -> Estimate:
+    """The estimate with its standard deviations; horizontal ones are those of the worse axis."""
+    estimate.tilt_std = wp.sqrt(cov[i, ATT][ATT] + cov[i, ATT + 1][ATT + 1])
+    estimate.yaw_std = wp.sqrt(cov[i, ATT + 2][ATT + 2])
+    estimate.vel_std = wp.sqrt(wp.max(cov[i, VEL][VEL], cov[i, VEL + 1][VEL + 1]))
+    estimate.pos_h_std = wp.sqrt(wp.max(cov[i, POS][POS], cov[i, POS + 1][POS + 1]))
+    estimate.pos_v_std = wp.sqrt(cov[i, POS + 2][POS + 2])
+    return estimate
+
+
+@wp.func
+def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: EstimatorState) -> int:
+    """Bits of `Estimate.flags`."""
+    bits = int(0)
+    if state.phase == PHASE_RUNNING:
+        now_us = state.horizon_time_us
+        tilt_var = cov[i, ATT][ATT] + cov[i, ATT + 1][ATT + 1]
+        if tilt_var < _MAX_TILT_VAR:
+            bits = bits | TILT_ALIGNED
+        if state.is_yaw_aligned == 1 and cov[i, ATT + 2][ATT + 2] < _MAX_YAW_VAR:
+            bits = bits | YAW_ALIGNED
+        pos_s = seconds_since(now_us, state.gnss_pos.fused_time_us)
+        vel_s = wp.min(pos_s, seconds_since(now_us, state.gnss_vel.fused_time_us))
+        if pos_s < params.no_aid_s and cov[i, POS][POS] < _MAX_POS_VAR:
+            bits = bits | POSITION_VALID
+        if vel_s < params.no_aid_s:
+            bits = bits | VELOCITY_VALID
+        if vel_s > _DEAD_RECKONING_AFTER_S:
+            bits = bits | DEAD_RECKONING
+        height_s = seconds_since(now_us, state.baro.fused_time_us)
+        if state.baro.is_active == 0:
+            height_s = seconds_since(now_us, state.gnss_height.fused_time_us)
+        if height_s < params.no_aid_s:
+            bits = bits | HEIGHT_VALID
+        if state.range.is_active == 1 and seconds_since(now_us, state.range.fused_time_us) < _TERRAIN_AFTER_S:
+            bits = bits | TERRAIN_VALID
+        if state.drag.is_active == 1 and cov[i, WIND][WIND] + cov[i, WIND + 1][WIND + 1] < _MAX_WIND_VAR:
+            bits = bits | WIND_VALID
+    return bits

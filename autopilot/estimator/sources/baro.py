@@ -1,0 +1,66 @@
+"""Barometer: height above the origin by the standard atmosphere (ISO 2533:1975), fused as down position.
+
+Starts with a reference height such that nothing jumps. Stops when its value freezes or it falls silent; GNSS height
+takes over then. When its samples were rejected for long, the reference is moved if GNSS height agrees with the
+estimate, and the height is set otherwise.
+"""
+
+import warp as wp
+
+from autopilot.estimator.fuse import fuse_state, judge, mark_fused, mark_reset, seconds_since, set_variance
+from autopilot.estimator.params import EstimatorParams
+from autopilot.estimator.state import POS, Aid, Nominal
+from autopilot.ports import BaroSample
+from common.kernels import vec24
+
+wp.set_module_options({"enable_backward": False})
+
+BARO_STUCK_AFTER = wp.constant(12)  # equal values in a row; 0.24 s at 50 Hz
+_RESET_AFTER_S = wp.constant(5.0)
+_HEIGHT_SCALE_M = wp.constant(44330.77)  # T0 / L = 288.15 K / 0.0065 K/m
+_SEA_LEVEL_PA = wp.constant(101325.0)
+_EXPONENT = wp.constant(0.19026324)  # R L / (g M)
+
+
+@wp.func
+def baro_height(pressure_pa: float) -> float:
+    """[m] height in the standard atmosphere; single precision resolves 3 mm."""
+    return _HEIGHT_SCALE_M * (1.0 - wp.pow(wp.max(pressure_pa, 1.0) / _SEA_LEVEL_PA, _EXPONENT))
+
+
+@wp.func
+def fuse_baro(
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    aid: Aid,
+    origin_height: float,
+    sample: BaroSample,
+    age_s: float,
+    is_gnss_height_good: bool,
+):  # type: ignore[no-untyped-def]
+    """Down position, against the standard-atmosphere height `origin_height` [m] of the origin."""
+    var = params.baro_noise * params.baro_noise
+    height = baro_height(sample.pressure_pa)
+    if aid.is_active == 0:
+        origin_height = height + nominal.pos_ned[2]
+        aid.is_active = 1
+    pos_d = origin_height - height + nominal.vel_ned[2] * age_s
+    innov = pos_d - nominal.pos_ned[2]
+    innov_var = cov[i, POS + 2][POS + 2] + var
+    starved_s = seconds_since(sample.time_us, aid.fused_time_us)
+    aid = judge(aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), params.baro_gate)
+    if aid.test_ratio <= 1.0:
+        nominal = fuse_state(params, cov, i, nominal, POS + 2, innov, var)
+        aid = mark_fused(aid)
+    elif starved_s > _RESET_AFTER_S:
+        if is_gnss_height_good:
+            origin_height = origin_height - innov
+        else:
+            nominal.pos_jump_ned = nominal.pos_jump_ned + wp.vec3(0.0, 0.0, innov)
+            nominal.pos_ned = nominal.pos_ned + wp.vec3(0.0, 0.0, innov)
+            nominal.reset_count += 1
+            set_variance(cov, i, POS + 2, var)
+        aid = mark_reset(aid)
+    return nominal, aid, origin_height

@@ -1,0 +1,95 @@
+"""Drag: the specific force across a multirotor's thrust axis is air drag, and so observes the wind.
+
+In: specific force averaged over 40 ms. Model: -(m u + rho / (2 b) |u| u) along body x and y, u the speed through the air
+(PX4 names: m rotor drag EKF2_MCOEF, b ballistic coefficient EKF2_BCOEF_X, _Y). Only wind is corrected, unless
+EKF2_DRAG_CTRL is 2 and nothing else measures velocity. Runs in the air only.
+"""
+
+import warp as wp
+
+from autopilot.estimator.fuse import fuse, fuse_part, judge, mark_fused
+from autopilot.estimator.generated import drag_products
+from autopilot.estimator.params import EstimatorParams
+from autopilot.estimator.sources.mag import body_axis_ned
+from autopilot.estimator.state import WIND, Aid, DragSum, Nominal
+from common.kernels import vec24
+
+wp.set_module_options({"enable_backward": False})
+
+_PERIOD_S = wp.constant(0.0399)  # ten samples of 4 ms
+_AIR_DENSITY = wp.constant(1.225)  # kg/m³, ISO 2533 sea level
+_GATE_SIGMA = wp.constant(5.0)
+_AIRBORNE_HEIGHT_M = wp.constant(1.0)  # above the last place of rest
+_AIRBORNE_SPEED = wp.constant(2.0)  # [m/s]
+
+
+@wp.func
+def drag_is_due(drag: DragSum) -> bool:
+    """An average is complete."""
+    return drag.time_s > _PERIOD_S
+
+
+@wp.func
+def is_airborne(drag: DragSum, nominal: Nominal) -> bool:
+    """The vehicle has left the place where it last stood still."""
+    return (
+        nominal.pos_ned[2] < drag.ground_d - _AIRBORNE_HEIGHT_M
+        or wp.length_sq(nominal.vel_ned) > _AIRBORNE_SPEED * _AIRBORNE_SPEED
+    )
+
+
+@wp.func
+def fuse_drag(
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    aid: Aid,
+    drag: DragSum,
+    time_us: wp.int64,
+    corrects_velocity: bool,
+):  # type: ignore[no-untyped-def]
+    """Body x and y, which pass or fail together."""
+    var = params.drag_noise * params.drag_noise
+    accel_frd = drag.accel_frd / drag.time_s
+    rot = wp.quat_to_matrix(nominal.q_ned_from_frd)
+    innov = wp.vec3()
+    innov_var = wp.vec3(1.0, 1.0, 1.0)
+    for axis in range(2):
+        square = drag_square(params, axis)
+        axis_ned = body_axis_ned(rot, axis)
+        vel_air_ned = nominal.vel_ned - nominal.wind_ned
+        speed = wp.dot(axis_ned, vel_air_ned)
+        predicted = nominal.accel_bias_frd[axis] - (params.drag_linear + square * wp.abs(speed)) * speed
+        _ph, hph = drag_products(cov, i, axis_ned, axis, vel_air_ned, params.drag_linear, square, wp.abs(speed))
+        innov[axis] = accel_frd[axis] - predicted
+        innov_var[axis] = hph + var
+    aid = judge(aid, time_us, innov, innov_var, _GATE_SIGMA)
+    aid.is_active = 1
+    if aid.test_ratio <= 1.0:
+        for axis in range(2):
+            square = drag_square(params, axis)
+            axis_ned = body_axis_ned(wp.quat_to_matrix(nominal.q_ned_from_frd), axis)
+            vel_air_ned = nominal.vel_ned - nominal.wind_ned
+            speed = wp.dot(axis_ned, vel_air_ned)
+            ph, hph = drag_products(cov, i, axis_ned, axis, vel_air_ned, params.drag_linear, square, wp.abs(speed))
+            predicted = nominal.accel_bias_frd[axis] - (params.drag_linear + square * wp.abs(speed)) * speed
+            axis_innov = accel_frd[axis] - predicted
+            if corrects_velocity:
+                nominal = fuse(params, cov, i, nominal, ph, axis_innov, hph + var)
+            else:
+                nominal = fuse_part(params, cov, i, nominal, ph, axis_innov, hph + var, WIND, 2)
+        aid = mark_fused(aid)
+    return nominal, aid
+
+
+@wp.func
+def drag_square(params: EstimatorParams, axis: int) -> float:
+    """[1/m] factor of |u| u along body x (0) or y (1)."""
+    ballistic = params.drag_ballistic_x
+    if axis == 1:
+        ballistic = params.drag_ballistic_y
+    square = float(0.0)
+    if ballistic > 1.0:
+        square = 0.5 * _AIR_DENSITY / ballistic
+    return square

@@ -1,0 +1,112 @@
+"""Magnetometer: three body axes, observing heading, the earth field and the field of the body (hard iron).
+
+Starts with heading from the levelled field and the declination of the world model. Stops when its values freeze or it
+falls silent; the gyro then carries heading, which GNSS velocity holds while the vehicle accelerates. When its samples
+were rejected for long, the field of the body is learned anew from the attitude.
+"""
+
+import warp as wp
+
+from autopilot.estimator.generated import mag_products
+from autopilot.estimator.fuse import fuse, judge, mark_fused, mark_reset, seconds_since, set_variance
+from autopilot.estimator.params import EstimatorParams
+from autopilot.estimator.state import ATT, BODY, EARTH, Aid, Nominal
+from autopilot.ports import MagSample
+from common.kernels import vec24
+from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
+
+wp.set_module_options({"enable_backward": False})
+
+MAG_STUCK_AFTER = wp.constant(5)  # equal vectors in a row; at 25 Hz known before the first of them is fused
+_RESET_AFTER_S = wp.constant(5.0)
+# World Magnetic Model 2025, error model of its technical report: 131 to 145 nT per component at one deviation
+_WORLD_MODEL_STD_GAUSS = wp.constant(1.4e-3)
+_UNKNOWN_FIELD_STD_GAUSS = wp.constant(0.1)
+_HEADING_INIT_STD = wp.constant(0.5)  # [rad] before the first fusion, which knows how wrong the field can be
+
+
+@wp.func
+def has_field_model(params: EstimatorParams) -> bool:
+    """The host knows the earth field at the origin."""
+    return wp.length_sq(params.earth_field_ned_gauss) > 1.0e-4
+
+
+@wp.func
+def mag_heading(params: EstimatorParams, q_ned_from_frd: wp.quat, field_frd: wp.vec3) -> float:
+    """[rad] heading that a field implies, given the tilt of an attitude."""
+    tilt = quat_from_yaw(-yaw_from_quat(q_ned_from_frd)) * q_ned_from_frd
+    level = wp.quat_rotate(tilt, field_frd)
+    declination = float(0.0)
+    if has_field_model(params):
+        declination = wp.atan2(params.earth_field_ned_gauss[1], params.earth_field_ned_gauss[0])
+    return wrap_pi(declination - wp.atan2(level[1], level[0]))
+
+
+@wp.func
+def start_mag(
+    params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, nominal: Nominal, field_frd: wp.vec3
+) -> Nominal:
+    """The nominal state with heading and field states set from one (mean) field; heading jumps."""
+    yaw_before = yaw_from_quat(nominal.q_ned_from_frd)
+    yaw = mag_heading(params, nominal.q_ned_from_frd, field_frd)
+    nominal.yaw_jump = nominal.yaw_jump + wrap_pi(yaw - yaw_before)
+    nominal.reset_count += 1
+    nominal.q_ned_from_frd = wp.normalize(quat_from_yaw(wrap_pi(yaw - yaw_before)) * nominal.q_ned_from_frd)
+    earth_std = _WORLD_MODEL_STD_GAUSS
+    nominal.earth_field_ned = params.earth_field_ned_gauss
+    if not has_field_model(params):
+        earth_std = _UNKNOWN_FIELD_STD_GAUSS
+        nominal.earth_field_ned = wp.quat_rotate(nominal.q_ned_from_frd, field_frd)
+    nominal.body_field_frd = wp.vec3(0.0, 0.0, 0.0)
+    set_variance(cov, i, ATT + 2, _HEADING_INIT_STD * _HEADING_INIT_STD)
+    for axis in range(3):
+        set_variance(cov, i, EARTH + axis, earth_std * earth_std)
+        set_variance(cov, i, BODY + axis, params.body_field_init * params.body_field_init)
+    return nominal
+
+
+@wp.func
+def body_axis_ned(rot: wp.mat33, axis: int) -> wp.vec3:
+    """Direction of a body axis in ned: a column of the rotation matrix."""
+    return wp.vec3(rot[0, axis], rot[1, axis], rot[2, axis])
+
+
+@wp.func
+def fuse_mag(
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    aid: Aid,
+    sample: MagSample,
+    omega_frd: wp.vec3,
+    age_s: float,
+):  # type: ignore[no-untyped-def]
+    """The field in three axes, which pass or fail together; the vehicle has turned by omega * age since the sample."""
+    var = params.mag_noise * params.mag_noise
+    field_frd = sample.field_frd_gauss
+    earth_part = field_frd - nominal.body_field_frd
+    field_frd = field_frd - wp.cross(omega_frd, earth_part) * age_s
+    rot = wp.quat_to_matrix(nominal.q_ned_from_frd)
+    innov = field_frd - wp.quat_rotate_inv(nominal.q_ned_from_frd, nominal.earth_field_ned) - nominal.body_field_frd
+    innov_var = wp.vec3()
+    for axis in range(3):
+        _ph, hph = mag_products(cov, i, body_axis_ned(rot, axis), axis, nominal.earth_field_ned)
+        innov_var[axis] = hph + var
+    starved_s = seconds_since(sample.time_us, aid.fused_time_us)
+    aid = judge(aid, sample.time_us, innov, innov_var, params.mag_gate)
+    aid.is_active = 1
+    if aid.test_ratio <= 1.0:
+        for axis in range(3):
+            rot = wp.quat_to_matrix(nominal.q_ned_from_frd)
+            axis_ned = body_axis_ned(rot, axis)
+            ph, hph = mag_products(cov, i, axis_ned, axis, nominal.earth_field_ned)
+            predicted = wp.dot(axis_ned, nominal.earth_field_ned) + nominal.body_field_frd[axis]
+            nominal = fuse(params, cov, i, nominal, ph, field_frd[axis] - predicted, hph + var)
+        aid = mark_fused(aid)
+    elif starved_s > _RESET_AFTER_S:
+        nominal.body_field_frd = nominal.body_field_frd + innov
+        for axis in range(3):
+            set_variance(cov, i, BODY + axis, params.body_field_init * params.body_field_init + var)
+        aid = mark_reset(aid)
+    return nominal, aid

@@ -1,0 +1,54 @@
+"""Range finder: the distance along body down observes the height of the terrain, and nothing else.
+
+Only the terrain state is corrected: unknown ground must not move the vehicle's height. Starts by setting the terrain,
+and sets it again when several samples in a row do not fit: the edge of a crown, of a roof, of a bank.
+"""
+
+import warp as wp
+
+from autopilot.estimator.fuse import fuse_part, judge, mark_fused, mark_reset, seconds_since, set_variance
+from autopilot.estimator.generated import range_products
+from autopilot.estimator.params import EstimatorParams
+from autopilot.estimator.state import TERRAIN, Aid, Nominal
+from autopilot.ports import RangeSample
+from common.kernels import vec24
+
+wp.set_module_options({"enable_backward": False})
+
+RANGE_STUCK_AFTER = wp.constant(12)
+_RESET_AFTER_REJECTS = wp.constant(5)
+_MIN_DOWN = wp.constant(0.7)  # cosine of the largest tilt, 45 deg: beyond it the beam meets ground that is elsewhere
+_RESTART_AFTER_S = wp.constant(5.0)
+
+
+@wp.func
+def fuse_range(
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    aid: Aid,
+    sample: RangeSample,
+):  # type: ignore[no-untyped-def]
+    """The terrain's down coordinate."""
+    down_ned = wp.quat_rotate(nominal.q_ned_from_frd, wp.vec3(0.0, 0.0, 1.0))
+    if sample.is_valid == 1 and down_ned[2] > _MIN_DOWN:
+        std = wp.max(params.range_noise, params.range_noise_share * sample.distance_m)
+        var = std * std
+        measured_d = nominal.pos_ned[2] + sample.distance_m * down_ned[2]
+        if seconds_since(sample.time_us, aid.fused_time_us) > _RESTART_AFTER_S:
+            aid.is_active = 0
+        height = nominal.terrain_d - nominal.pos_ned[2]
+        ph, hph = range_products(cov, i, down_ned, height)
+        innov = sample.distance_m - height / down_ned[2]
+        innov_var = hph + var
+        aid = judge(aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), params.range_gate)
+        if aid.is_active == 0 or aid.reject_count >= _RESET_AFTER_REJECTS:
+            nominal.terrain_d = measured_d
+            set_variance(cov, i, TERRAIN, var)
+            aid = mark_reset(aid)
+            aid.is_active = 1
+        elif aid.test_ratio <= 1.0:
+            nominal = fuse_part(params, cov, i, nominal, ph, innov, innov_var, TERRAIN, 1)
+            aid = mark_fused(aid)
+    return nominal, aid

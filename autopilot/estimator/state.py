@@ -1,0 +1,205 @@
+"""The estimator's state: what it believes, how sure it is, and how each source of measurements is doing.
+
+One `EstimatorState` per vehicle lives in `Ekf.rows`; the covariance and the rings of waiting samples are arrays of
+their own, because they are indexed. All of it is written by `estimator_tick` alone; the host reads.
+
+Error state and covariance order: attitude (rotation vector in ned) 0-2, velocity 3-5, position 6-8, gyro bias 9-11,
+accelerometer bias 12-14, earth field 15-17, body field 18-20, wind north and east 21-22, terrain 23.
+"""
+
+import warp as wp
+
+from autopilot.estimator.params import EstimatorParams
+from autopilot.ports import BaroSample, Estimate, GnssSample, ImuSample, MagSample, RangeSample
+from common.kernels import vec24
+
+wp.set_module_options({"enable_backward": False})
+
+ATT = wp.constant(0)
+VEL = wp.constant(3)
+POS = wp.constant(6)
+GYRO_BIAS = wp.constant(9)
+ACCEL_BIAS = wp.constant(12)
+EARTH = wp.constant(15)
+BODY = wp.constant(18)
+WIND = wp.constant(21)
+TERRAIN = wp.constant(23)
+
+# Ring sizes are powers of two, so that a running count modulo the size stays cheap.
+IMU_RING = wp.constant(64)  # 256 ms at 250 Hz
+GNSS_RING = wp.constant(4)
+BARO_RING = wp.constant(16)
+MAG_RING = wp.constant(16)
+RANGE_RING = wp.constant(16)
+
+PHASE_ALIGNING = wp.constant(0)
+PHASE_RUNNING = wp.constant(1)
+
+
+@wp.struct
+class Nominal:
+    """The nominal state at the delayed horizon."""
+
+    q_ned_from_frd: wp.quat
+    vel_ned: wp.vec3  # [m/s]
+    pos_ned: wp.vec3  # [m]
+    gyro_bias_frd: wp.vec3  # [rad/s]
+    accel_bias_frd: wp.vec3  # [m/s²]
+    earth_field_ned: wp.vec3  # [gauss]
+    body_field_frd: wp.vec3  # [gauss] hard iron
+    wind_ned: wp.vec3  # [m/s] down component 0
+    terrain_d: float  # [m] ned down coordinate of the ground below
+    reset_count: int  # grows when position, velocity or heading is set instead of corrected
+    pos_jump_ned: wp.vec3  # [m] of the resets in this step
+    vel_jump_ned: wp.vec3  # [m/s]
+    yaw_jump: float  # [rad]
+
+
+@wp.struct
+class Inbox:
+    """The samples of one sensor that wait for the horizon, and whether the sensor still lives."""
+
+    arrived_time_us: wp.int64  # validity time of the newest sample
+    head: int  # samples put into the ring so far
+    tail: int  # samples taken out of it so far
+    repeat_count: int  # equal values in a row
+    is_stuck: int  # the value no longer changes
+
+
+@wp.struct
+class Aid:
+    """How one source of measurements is doing. Times are those of validity of the samples, not of their arrival."""
+
+    innov: wp.vec3  # measured minus predicted, before fusion
+    innov_var: wp.vec3
+    judged_time_us: wp.int64  # last sample whose innovation was computed
+    fused_time_us: wp.int64  # last sample that passed its gate and was fused, 0: never
+    is_active: int
+    reject_count: int  # rejected samples in a row
+    fuse_count: int
+    reset_count: int
+    test_ratio: float  # largest innov² / (gate² innov_var) of the last sample; above 1 is rejected
+    test_ratio_lpf: float
+
+
+@wp.struct
+class Alignment:
+    """Sums over the time in which attitude, field and pressure are averaged."""
+
+    waited_s: float  # since power-on
+    is_moving: int  # the newest IMU sample is not one of a vehicle at rest
+    time_s: float  # averaged
+    accel_frd: wp.vec3  # [m/s² s] integral
+    gyro_frd: wp.vec3  # [rad] integral
+    mag_frd: wp.vec3  # [gauss] sum
+    mag_count: int
+    mag_time_us: wp.int64
+    baro_height: float  # [m] sum
+    baro_count: int
+    baro_time_us: wp.int64
+
+
+@wp.struct
+class Stillness:
+    """Is the vehicle at rest, by the look of its IMU alone?"""
+
+    gyro_mean_frd: wp.vec3  # [rad/s]
+    accel_mean_frd: wp.vec3  # [m/s²]
+    gyro_var: float  # [(rad/s)²] about the mean, the three axes together
+    accel_var: float  # [(m/s²)²]
+    still_s: float  # for how long
+    is_still: int
+    is_noise_free: int  # an ideal IMU: equal values in a row say nothing then
+
+
+@wp.struct
+class Output:
+    """The output predictor: integrals of the IMU without any correction, and the correction that is added to them.
+
+    Adding a correction to all past states at once is the same as adding it to the integrals as they are read, so the
+    ring of past states never has to be rewritten.
+    """
+
+    q_raw: wp.quat
+    vel_raw_ned: wp.vec3
+    pos_raw_ned: wp.vec3
+    q_correction: wp.quat
+    vel_correction_ned: wp.vec3
+    pos_correction_ned: wp.vec3
+
+
+@wp.struct
+class OutputSample:
+    """The raw integrals just after one IMU sample."""
+
+    q_raw: wp.quat
+    vel_raw_ned: wp.vec3
+    pos_raw_ned: wp.vec3
+
+
+@wp.struct
+class GnssHeightBias:
+    """GNSS down minus estimated down, tracked while the barometer is the height reference."""
+
+    bias_m: float
+    var_m2: float
+    is_known: int
+
+
+@wp.struct
+class DragSum:
+    """Specific force integrated since the last drag fusion."""
+
+    accel_frd: wp.vec3  # [m/s² s]
+    time_s: float
+    ground_d: float  # [m] down coordinate where the vehicle last stood still
+
+
+@wp.struct
+class EstimatorState:
+    """The estimator of one vehicle, without its covariance and rings."""
+
+    phase: int  # PHASE_*
+    time_us: wp.int64  # of the newest IMU sample
+    horizon_time_us: wp.int64  # of the nominal state
+    imu_head: int  # IMU samples put into the ring so far; the newest is (imu_head - 1) % IMU_RING
+    imu_tail: int  # IMU samples taken out of it so far
+    nominal: Nominal
+    step_dt_s: float  # since the last covariance prediction
+    step_delta_vel_ned: wp.vec3  # [m/s] specific force integrated since then
+    output: Output
+    alignment: Alignment
+    stillness: Stillness
+    gnss_inbox: Inbox
+    baro_inbox: Inbox
+    mag_inbox: Inbox
+    range_inbox: Inbox
+    gnss_pos: Aid  # north, east [m]
+    gnss_vel: Aid  # north, east, down [m/s]
+    gnss_height: Aid  # down [m]
+    baro: Aid  # down [m]
+    mag: Aid  # x, y, z [gauss]
+    range: Aid  # along body down [m]
+    drag: Aid  # x, y [m/s²]
+    rest: Aid  # zero velocity while the vehicle stands still [m/s]
+    gnss_bias: GnssHeightBias
+    drag_sum: DragSum
+    is_yaw_aligned: int
+    origin_baro_height: float  # [m] standard-atmosphere height of the ned origin
+    fault_count: int  # times the covariance lost its shape and was started anew
+    estimate: Estimate
+
+
+@wp.struct
+class Ekf:
+    """Everything the estimator keeps, one row per vehicle."""
+
+    rows: wp.array(dtype=EstimatorState)
+    params: wp.array(dtype=EstimatorParams)
+    covariance: wp.array2d(dtype=vec24)  # row r of vehicle i is covariance[i, r]
+    imu_ring: wp.array2d(dtype=ImuSample)
+    output_ring: wp.array2d(dtype=OutputSample)
+    gnss_ring: wp.array2d(dtype=GnssSample)
+    baro_ring: wp.array2d(dtype=BaroSample)
+    mag_ring: wp.array2d(dtype=MagSample)
+    range_ring: wp.array2d(dtype=RangeSample)

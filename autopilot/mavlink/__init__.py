@@ -1,0 +1,1 @@
+"""The vehicle's MAVLink side: codec, links, and one file per protocol service."""

@@ -1,0 +1,76 @@
+"""PX4's numbers: modes as main and sub mode, integer parameters as bit patterns."""
+
+import struct
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot.mavlink.dialects import UnknownModeError
+from autopilot.vehicle import Mode
+from common.params import Parameter
+
+AUTO = 4
+OFFBOARD = 6
+
+# (main, sub) of px4_custom_mode.h
+MODE_NUMBERS: dict[Mode, tuple[int, int]] = {
+    Mode.TAKEOFF: (AUTO, 2),
+    Mode.HOLD: (AUTO, 3),
+    Mode.MISSION: (AUTO, 4),
+    Mode.RETURN: (AUTO, 5),
+    Mode.LAND: (AUTO, 6),
+    Mode.OFFBOARD: (OFFBOARD, 0),
+}
+_MODES = {numbers: mode for mode, numbers in MODE_NUMBERS.items()}
+
+_STICK_MODES = {1: "Manual", 2: "Altitude", 3: "Position", 5: "Acro", 7: "Stabilized", 8: "Rattitude"}
+_AUTO_MODES = {1: "Ready", 8: "Follow", 9: "Precision land", 10: "VTOL takeoff"}
+
+
+class Px4Dialect:
+    """A PX4 multicopter, as far as clients can tell."""
+
+    name = "px4"
+    autopilot = mavlink.MAV_AUTOPILOT_PX4
+    vehicle_type = mavlink.MAV_TYPE_QUADROTOR
+    capabilities = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    # PX4 1.18.0, a development version: newer than any release, so that QGroundControl neither calls it too old nor
+    # asks for an update. It names the interface we are compatible with; our own version is the custom version.
+    flight_sw_version = 1 << 24 | 18 << 16 | 0 << 8 | mavlink.FIRMWARE_VERSION_TYPE_DEV
+
+    def custom_mode(self, mode: Mode) -> int:
+        main, sub = MODE_NUMBERS[mode]
+        return main << 16 | sub << 24
+
+    def mode_from_custom(self, custom_mode: int) -> Mode:
+        return self.mode_from_command(custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF)
+
+    def mode_from_command(self, main_mode: int, sub_mode: int) -> Mode:
+        mode = _MODES.get((main_mode, 0 if main_mode == OFFBOARD else sub_mode))
+        if mode is not None:
+            return mode
+        if main_mode in _STICK_MODES:
+            raise UnknownModeError(f"{_STICK_MODES[main_mode]} needs a pilot's sticks, which are not supported")
+        if main_mode == AUTO and sub_mode in _AUTO_MODES:
+            raise UnknownModeError(f"{_AUTO_MODES[sub_mode]} is not supported")
+        raise UnknownModeError(f"there is no mode {main_mode}/{sub_mode}")
+
+    def custom_version(self, text: str) -> bytes:
+        """PX4 sends the bytes of its git hash in reverse order, and clients turn them round."""
+        return text.encode("ascii")[:8].ljust(8, b"\0")[::-1]
+
+    def parameter_type(self, declaration: Parameter) -> int:
+        return int(mavlink.MAV_PARAM_TYPE_INT32 if declaration.is_integer else mavlink.MAV_PARAM_TYPE_REAL32)
+
+    def parameter_bits(self, declaration: Parameter, value: float) -> int:
+        packed = struct.pack("<i", int(value)) if declaration.is_integer else struct.pack("<f", value)
+        return int.from_bytes(packed, "little")
+
+    def parameter_value(self, declaration: Parameter, bits: int, param_type: int) -> float | None:
+        if param_type != self.parameter_type(declaration):
+            return None
+        packed = bits.to_bytes(4, "little")
+        value: float = struct.unpack("<i" if declaration.is_integer else "<f", packed)[0]
+        return value
+
+
+PX4 = Px4Dialect()

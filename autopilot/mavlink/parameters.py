@@ -1,0 +1,111 @@
+"""The parameter protocol: list, read, set.
+
+In: requests of clients, and changes made inside the vehicle. Out: PARAM_VALUE. The list is sent a few values per
+frame, per channel, and starts again when it is asked for again.
+"""
+
+import zlib
+from typing import Any
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot.mavlink.channel import Channel, Endpoint, Sender
+from autopilot.mavlink.codec import known_type
+from autopilot.vehicle import Severity
+from common.params import Parameter
+
+VALUES_PER_FRAME = 20  # 1000 values/s per channel; guess at what a client's receive buffer takes
+NOT_IN_LIST = 65_535  # index of a value nobody asked for
+HASH_NAME = "_HASH_CHECK"
+
+_PARAM_VALUE = known_type("PARAM_VALUE")
+_PARAM_ERROR = known_type("PARAM_ERROR")
+
+
+class ParameterService:
+    """Serves the vehicle's parameter table."""
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self._endpoint = endpoint
+        self._table = endpoint.vehicle.params
+        self._indices = {name: i for i, name in enumerate(self._table.names)}
+        self._next_index: dict[Channel, int] = {}  # lists under way
+        self._is_setting = False  # the answer tells of this change
+        self._table.on_change(self._changed)
+
+    def list_requested(self, sender: Sender, _: Any) -> None:
+        self._next_index[sender.channel] = 0
+
+    def frame(self) -> None:
+        """Sends the next values of the lists under way."""
+        for channel, first in list(self._next_index.items()):
+            last = min(first + VALUES_PER_FRAME, len(self._table))
+            for i in range(first, last):
+                self._endpoint.reply(Sender(channel, 0, 0), _PARAM_VALUE, self._value(self._table.names[i], i))
+            if last == len(self._table):
+                del self._next_index[channel]
+            else:
+                self._next_index[channel] = last
+
+    def read_requested(self, sender: Sender, fields: Any) -> None:
+        name = fields.param_id
+        if fields.param_index >= 0:
+            if fields.param_index >= len(self._table):
+                self._refuse(sender, "", fields.param_index, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+                return
+            name = self._table.names[fields.param_index]
+        if name == HASH_NAME:
+            self._endpoint.reply(sender, _PARAM_VALUE, self._hash_value())
+        elif name not in self._table:
+            self._refuse(sender, name, -1, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+        else:
+            self._endpoint.reply(sender, _PARAM_VALUE, self._value(name, self._indices[name]))
+
+    def set_requested(self, sender: Sender, fields: Any) -> None:
+        name = fields.param_id
+        if name == HASH_NAME:  # the client has these values already: the list may stop
+            self._next_index.pop(sender.channel, None)
+            return
+        if name not in self._table:
+            self._refuse(sender, name, -1, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            self._endpoint.text_once(Severity.WARNING, f"Parameter {name}: there is none of this name")
+            return
+        declaration = self._table.declarations[name]
+        asked = self._endpoint.dialect.parameter_value(declaration, fields.param_value, fields.param_type)
+        if asked is None:
+            kind = "an integer" if declaration.is_integer else "a real number"
+            self._endpoint.text(Severity.WARNING, f"Parameter {name}: not set, it is {kind}")
+        else:
+            self._is_setting = True
+            stored = self._table.set(name, asked)
+            self._is_setting = False
+            if stored != asked:
+                bounds = f"{declaration.minimum:g} to {declaration.maximum:g}"
+                self._endpoint.text(Severity.NOTICE, f"Parameter {name}: {stored:g}, it may be {bounds}")
+        self._endpoint.broadcast(_PARAM_VALUE, self._value(name, self._indices[name]))
+
+    def _changed(self, declaration: Parameter) -> None:
+        """Tells every client of a change that none of them asked for."""
+        if not self._is_setting:
+            self._endpoint.broadcast(_PARAM_VALUE, self._value(declaration.name, NOT_IN_LIST))
+
+    def _value(self, name: str, index: int) -> bytes:
+        declaration = self._table.declarations[name]
+        dialect = self._endpoint.dialect
+        bits = dialect.parameter_bits(declaration, self._table[name])
+        return _PARAM_VALUE.pack(name, bits, dialect.parameter_type(declaration), len(self._table), index)
+
+    def _hash_value(self) -> bytes:
+        """PX4's checksum over names and values, with which a client finds out whether its copy is still true."""
+        checksum = 0xFFFFFFFF  # zlib inverts at both ends; PX4's sum starts at 0 and is not inverted
+        for name in self._table:
+            declaration = self._table.declarations[name]
+            bits = self._endpoint.dialect.parameter_bits(declaration, self._table[name])
+            checksum = zlib.crc32(bits.to_bytes(4, "little"), zlib.crc32(name.encode("ascii"), checksum))
+        return _PARAM_VALUE.pack(
+            HASH_NAME, checksum ^ 0xFFFFFFFF, mavlink.MAV_PARAM_TYPE_UINT32, len(self._table), NOT_IN_LIST
+        )
+
+    def _refuse(self, sender: Sender, name: str, index: int, error: int) -> None:
+        payload = _PARAM_ERROR.pack(sender.sysid, sender.compid, name, index, error)
+        self._endpoint.reply(sender, _PARAM_ERROR, payload)

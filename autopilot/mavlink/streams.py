@@ -1,0 +1,163 @@
+"""Which message goes out when: one table of default rates, and each link's own schedule.
+
+In: the vehicle's state, at each frame. Out: frames on one link. Requests change one link's schedule only.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from heapq import heapify, heapreplace
+
+from autopilot.mavlink.codec import MessageType, known_type
+from autopilot.mavlink.dialects import Dialect
+from autopilot.mavlink.identity import autopilot_version
+from autopilot.mavlink.links import LinkRole
+from autopilot.mavlink.telemetry import motion, sensors, status
+from autopilot.vehicle import VehicleState
+
+Builder = Callable[[VehicleState], bytes | None]
+Send = Callable[[MessageType, bytes], None]
+
+FRAME_US = 20_000  # nothing is sent more often than the server runs
+SPREAD = 8  # streams start at different eighths of their interval, so that no frame has to send them all
+NEVER_US = 1 << 62
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """One message and how often it is sent unasked; 0: on request only."""
+
+    name: str
+    build: Builder
+    ground_hz: float
+    onboard_hz: float
+
+
+STREAMS: tuple[Stream, ...] = (
+    Stream("SYS_STATUS", status.sys_status, 2, 2),
+    Stream("SYSTEM_TIME", status.system_time, 1, 1),
+    Stream("BATTERY_STATUS", status.battery_status, 1, 1),
+    Stream("HOME_POSITION", status.home_position, 0.5, 0.5),
+    Stream("GPS_GLOBAL_ORIGIN", status.gps_global_origin, 0.2, 0.2),
+    Stream("EXTENDED_SYS_STATE", status.extended_sys_state, 5, 5),
+    Stream("MISSION_CURRENT", status.mission_current, 1, 1),
+    Stream("ATTITUDE", motion.attitude, 20, 50),
+    Stream("ATTITUDE_QUATERNION", motion.attitude_quaternion, 10, 50),
+    Stream("GLOBAL_POSITION_INT", motion.global_position_int, 10, 20),
+    Stream("LOCAL_POSITION_NED", motion.local_position_ned, 10, 30),
+    Stream("VFR_HUD", motion.vfr_hud, 4, 10),
+    Stream("ALTITUDE", motion.altitude, 4, 10),
+    Stream("WIND_COV", motion.wind_cov, 1, 2),
+    Stream("ODOMETRY", motion.odometry, 0, 0),
+    Stream("POSITION_TARGET_LOCAL_NED", motion.position_target_local_ned, 4, 10),
+    Stream("POSITION_TARGET_GLOBAL_INT", motion.position_target_global_int, 2, 5),
+    Stream("ATTITUDE_TARGET", motion.attitude_target, 4, 10),
+    Stream("GPS_RAW_INT", sensors.gps_raw_int, 5, 5),
+    Stream("HIGHRES_IMU", sensors.highres_imu, 0, 10),
+    Stream("SCALED_IMU", sensors.scaled_imu, 0, 0),
+    Stream("SCALED_PRESSURE", sensors.scaled_pressure, 1, 1),
+    Stream("DISTANCE_SENSOR", sensors.distance_sensor, 4, 10),
+    Stream("SERVO_OUTPUT_RAW", sensors.servo_output_raw, 2, 2),
+    Stream("ACTUATOR_OUTPUT_STATUS", sensors.actuator_output_status, 0, 0),
+    Stream("VIBRATION", sensors.vibration, 1, 1),
+    Stream("ESTIMATOR_STATUS", sensors.estimator_status, 1, 2),
+)
+
+# REQUEST_DATA_STREAM: old requests name a group of messages (MAV_DATA_STREAM).
+GROUPS: dict[int, tuple[str, ...]] = {
+    1: ("HIGHRES_IMU", "SCALED_IMU", "SCALED_PRESSURE"),  # RAW_SENSORS
+    2: ("SYS_STATUS", "GPS_RAW_INT", "MISSION_CURRENT", "EXTENDED_SYS_STATE"),  # EXTENDED_STATUS
+    3: ("SERVO_OUTPUT_RAW",),  # RC_CHANNELS
+    4: ("ATTITUDE_TARGET",),  # RAW_CONTROLLER
+    6: ("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"),  # POSITION
+    10: ("ATTITUDE", "ATTITUDE_QUATERNION"),  # EXTRA1
+    11: ("VFR_HUD", "ALTITUDE"),  # EXTRA2
+    12: ("BATTERY_STATUS", "VIBRATION", "ESTIMATOR_STATUS", "DISTANCE_SENSOR", "WIND_COV"),  # EXTRA3
+}
+GROUP_ALL = 0
+
+
+class Telemetry:
+    """Every message the vehicle can be asked for, by id."""
+
+    def __init__(self, dialect: Dialect, sysid: int) -> None:
+        def heartbeat(state: VehicleState) -> bytes:
+            return status.heartbeat(state, dialect)
+
+        def version(_: VehicleState) -> bytes:
+            return autopilot_version(dialect, sysid)
+
+        streams = (Stream("HEARTBEAT", heartbeat, 1, 1), *STREAMS, Stream("AUTOPILOT_VERSION", version, 0, 0))
+        self.types: dict[int, MessageType] = {}
+        self.builders: dict[int, Builder] = {}
+        self.default_interval_us: dict[LinkRole, dict[int, int]] = {role: {} for role in LinkRole}
+        for stream in streams:
+            kind = known_type(stream.name)
+            self.types[kind.msg_id] = kind
+            self.builders[kind.msg_id] = stream.build
+            self.default_interval_us[LinkRole.GROUND][kind.msg_id] = _interval_us(stream.ground_hz)
+            self.default_interval_us[LinkRole.ONBOARD][kind.msg_id] = _interval_us(stream.onboard_hz)
+
+
+def _interval_us(rate_hz: float) -> int:
+    """0 for a rate of 0: not sent."""
+    return max(round(1.0e6 / rate_hz), FRAME_US) if rate_hz > 0.0 else 0
+
+
+class StreamSchedule:
+    """When each message is due on one link."""
+
+    def __init__(self, telemetry: Telemetry, role: LinkRole) -> None:
+        self._telemetry = telemetry
+        self._defaults = telemetry.default_interval_us[role]
+        self.interval_us = dict(self._defaults)  # by message id; 0: not sent
+        self._queue: list[tuple[int, int]] = []  # (due time, message id), a heap
+        self._is_planned = False
+
+    def set_interval(self, msg_id: int, interval_us: int) -> None:
+        """Sends a message every `interval_us`, rounded up to a frame; 0: default interval; negative: never."""
+        if interval_us == 0:
+            self._change(msg_id, self._defaults[msg_id])
+        else:
+            self._change(msg_id, max(interval_us, FRAME_US) if interval_us > 0 else 0)
+
+    def set_group(self, group: int, rate_hz: float) -> None:
+        """Sets the rate of every message of a MAV_DATA_STREAM group; 0 stops them."""
+        groups = GROUPS if group == GROUP_ALL else {group: GROUPS.get(group, ())}
+        for names in groups.values():
+            for name in names:
+                self._change(known_type(name).msg_id, _interval_us(rate_hz))
+
+    def _change(self, msg_id: int, interval_us: int) -> None:
+        """The other streams keep their times: clients repeat their requests often."""
+        if interval_us == self.interval_us[msg_id]:
+            return
+        self.interval_us[msg_id] = interval_us
+        if self._is_planned:
+            self._queue = [entry for entry in self._queue if entry[1] != msg_id]
+            if interval_us:
+                self._queue.append((0, msg_id))
+            heapify(self._queue)
+
+    def _plan(self, now_us: int) -> None:
+        """Starts every stream, spread over its interval."""
+        active = [(msg_id, interval_us) for msg_id, interval_us in self.interval_us.items() if interval_us]
+        self._queue = [
+            (now_us + interval_us * (i % SPREAD) // SPREAD, msg_id) for i, (msg_id, interval_us) in enumerate(active)
+        ]
+        self._queue.append((NEVER_US, -1))
+        heapify(self._queue)
+        self._is_planned = True
+
+    def send_due(self, now_us: int, state: VehicleState, send: Send) -> None:
+        """Sends what is due now."""
+        if not self._is_planned:
+            self._plan(now_us)
+        queue = self._queue
+        builders, types, interval_us = self._telemetry.builders, self._telemetry.types, self.interval_us
+        while queue[0][0] <= now_us:
+            due_us, msg_id = queue[0]
+            next_us = due_us + interval_us[msg_id]
+            heapreplace(queue, (next_us if next_us > now_us else now_us + interval_us[msg_id], msg_id))
+            payload = builders[msg_id](state)
+            if payload is not None:
+                send(types[msg_id], payload)

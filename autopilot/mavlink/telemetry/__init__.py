@@ -1,0 +1,1 @@
+"""The payload of each telemetry message, from the vehicle's state; None where there is nothing true to say yet."""

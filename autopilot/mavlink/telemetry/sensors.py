@@ -1,0 +1,200 @@
+"""Telemetry of sensors, motors and the estimator's health."""
+
+from math import atan2, hypot, isfinite
+from typing import Any
+
+from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.convert import (
+    INT16_MAX,
+    UINT16_MAX,
+    bounded_int,
+    degrees_e7,
+    heading_centideg,
+    i16,
+    i32,
+    u16,
+    u32,
+)
+from autopilot.mavlink.telemetry.motion import boot_ms
+from autopilot.ports import (
+    HEIGHT_VALID,
+    POSITION_VALID,
+    TERRAIN_VALID,
+    TILT_ALIGNED,
+    VELOCITY_VALID,
+)
+from autopilot.vehicle import VehicleState
+from common.geodesy import geodetic_from_ned
+from common.kernels import GRAVITY_M_S2
+
+_gps_raw_int = known_type("GPS_RAW_INT").pack
+_highres_imu = known_type("HIGHRES_IMU").pack
+_scaled_imu = known_type("SCALED_IMU").pack
+_scaled_pressure = known_type("SCALED_PRESSURE").pack
+_distance_sensor = known_type("DISTANCE_SENSOR").pack
+_servo_output_raw = known_type("SERVO_OUTPUT_RAW").pack
+_actuator_output_status = known_type("ACTUATOR_OUTPUT_STATUS").pack
+_vibration = known_type("VIBRATION").pack
+_estimator_status = known_type("ESTIMATOR_STATUS").pack
+
+PULSE_IDLE_US = 1000  # servo pulse at command 0; 2000 at command 1
+MOTOR_COUNT_MAX = 8
+MOVING_M_S = 0.5  # below this speed the course over ground is noise; guess
+FIX_3D = 3  # GPS_FIX_TYPE
+LOOKS_DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
+LASER = 0  # MAV_DISTANCE_SENSOR
+COVARIANCE_UNKNOWN = 255
+NO_RETURN_CM = UINT16_MAX
+
+# Bits of HIGHRES_IMU_UPDATED_FLAGS
+_ACCEL_GYRO_BITS = 0x3F
+_MAG_BITS = 0x1C0
+_PRESSURE_BITS = 0x200 | 0x800 | 0x1000
+
+# ESTIMATOR_STATUS_FLAGS of our Estimate.flags
+_ESTIMATOR_BITS = (
+    (TILT_ALIGNED, 1),  # attitude
+    (VELOCITY_VALID, 2 | 4),  # horizontal, vertical velocity
+    (POSITION_VALID, 8 | 16 | 256 | 512),  # relative, absolute, and both predicted
+    (HEIGHT_VALID, 32),  # absolute height
+    (TERRAIN_VALID, 64),  # height above ground
+)
+
+
+def pressure_altitude_m(pressure_pa: float) -> float:
+    """Height in the standard atmosphere (ICAO Doc 7488, troposphere)."""
+    return float(44_330.77 * (1.0 - (max(pressure_pa, 0.0) / 101_325.0) ** 0.190263))
+
+
+def gps_raw_int(state: VehicleState) -> bytes | None:
+    gnss = state.samples.gnss
+    if gnss.time_us == 0:
+        return None
+    north, east, down = gnss.pos_ned
+    if not (isfinite(north) and isfinite(east) and isfinite(down)):
+        return None
+    lat_deg, lon_deg, alt_amsl_m = geodetic_from_ned(north, east, down, state.origin)
+    vel_north, vel_east, _ = gnss.vel_ned
+    speed = hypot(vel_north, vel_east)
+    return _gps_raw_int(
+        gnss.time_us,
+        gnss.fix_type,
+        degrees_e7(lat_deg),
+        degrees_e7(lon_deg),
+        i32(alt_amsl_m * 1000.0),
+        # The receiver gives accuracies, not dilutions: hundredths of the dilution for a range error of 1 m.
+        u16(gnss.pos_h_std * 100.0, UINT16_MAX),
+        u16(gnss.pos_v_std * 100.0, UINT16_MAX),
+        u16(speed * 100.0, UINT16_MAX),
+        heading_centideg(atan2(vel_east, vel_north)) if speed > MOVING_M_S else UINT16_MAX,
+        bounded_int(gnss.satellites, 0, 255),
+        i32(alt_amsl_m * 1000.0),  # no geoid undulation, see common.geodesy
+        u32(gnss.pos_h_std * 1000.0),
+        u32(gnss.pos_v_std * 1000.0),
+        u32(gnss.vel_std * 1000.0),
+    )
+
+
+def highres_imu(state: VehicleState) -> bytes:
+    samples = state.samples
+    baro = samples.baro
+    updated = (
+        _ACCEL_GYRO_BITS | (_MAG_BITS if samples.mag.time_us else 0) | (_PRESSURE_BITS if samples.baro.time_us else 0)
+    )
+    return _highres_imu(
+        samples.imu.time_us,
+        *samples.imu.accel_frd,
+        *samples.imu.gyro_frd,
+        *samples.mag.field_frd_gauss,
+        baro.pressure_pa / 100.0,
+        0.0,
+        pressure_altitude_m(baro.pressure_pa),
+        baro.temperature_c,
+        updated,
+    )
+
+
+def scaled_imu(state: VehicleState) -> bytes:
+    samples = state.samples
+    milli_g = 1000.0 / GRAVITY_M_S2
+    return _scaled_imu(
+        boot_ms(state.time_us),
+        *(i16(value * milli_g) for value in samples.imu.accel_frd),
+        *(i16(value * 1000.0) for value in samples.imu.gyro_frd),
+        *(i16(value * 1000.0) for value in samples.mag.field_frd_gauss),
+    )
+
+
+def scaled_pressure(state: VehicleState) -> bytes | None:
+    baro = state.samples.baro
+    if baro.time_us == 0:
+        return None
+    return _scaled_pressure(boot_ms(state.time_us), baro.pressure_pa / 100.0, 0.0, i16(baro.temperature_c * 100.0))
+
+
+def distance_sensor(state: VehicleState) -> bytes | None:
+    """Limits are sent as 0 and the largest value: the driver's sample does not carry them."""
+    sample = state.samples.range
+    if sample.time_us == 0:
+        return None
+    return _distance_sensor(
+        boot_ms(state.time_us),
+        0,
+        NO_RETURN_CM - 1,
+        u16(sample.distance_m * 100.0, NO_RETURN_CM) if sample.is_valid else NO_RETURN_CM,
+        LASER,
+        0,
+        LOOKS_DOWN,
+        COVARIANCE_UNKNOWN,
+        signal_quality=100 if sample.is_valid else 1,
+    )
+
+
+def servo_output_raw(state: VehicleState) -> bytes:
+    pulses = (PULSE_IDLE_US + u16(command * 1000.0) for command in state.actuators.command)
+    return _servo_output_raw(state.time_us & 0xFFFFFFFF, 0, *pulses)
+
+
+def actuator_output_status(state: VehicleState) -> bytes:
+    commands = tuple(state.actuators.command)
+    active = sum(1 << i for i, command in enumerate(commands) if command > 0.0)
+    return _actuator_output_status(state.time_us, active, commands + (0.0,) * (32 - len(commands)))
+
+
+def vibration(state: VehicleState) -> bytes | None:
+    """The level is the estimator's deviation of the specific force from its mean, the same figure for the three axes."""
+    health = state.health
+    if health is None:
+        return None
+    level = (max(health.stillness.accel_var, 0.0) / 3.0) ** 0.5
+    return _vibration(state.time_us, level, level, level)
+
+
+def estimator_status(state: VehicleState) -> bytes:
+    estimate = state.estimate
+    flags = sum(bits for ours, bits in _ESTIMATOR_BITS if estimate.flags & ours)
+    gnss, baro, mag, range_finder = _test_ratios(state.health)
+    return _estimator_status(
+        state.time_us,
+        flags,
+        gnss,
+        gnss,
+        baro,
+        mag,
+        range_finder,
+        0.0,
+        estimate.pos_h_std,
+        estimate.pos_v_std,
+    )
+
+
+def _test_ratios(health: Any) -> tuple[float, float, float, float]:
+    """Smoothed innovation test ratios of GNSS, barometer, magnetometer and range finder; above 1 is rejected."""
+    if health is None:
+        return 0.0, 0.0, 0.0, 0.0
+    return (
+        health.gnss.test_ratio_lpf,
+        health.baro.test_ratio_lpf,
+        health.mag.test_ratio_lpf,
+        health.range.test_ratio_lpf,
+    )

@@ -1,0 +1,184 @@
+"""Telemetry of the vehicle as a whole: mode, health, battery, home, mission."""
+
+from math import cos, isfinite, nan, sin
+from typing import Any
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.convert import INT16_MAX, UINT16_MAX, bounded_int, degrees_e7, i16, i32, u16
+from autopilot.mavlink.dialects import Dialect
+from autopilot.mavlink.telemetry.motion import boot_ms
+from autopilot.ports import POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
+from autopilot.vehicle import LandedState, VehicleState
+
+_heartbeat = known_type("HEARTBEAT").pack
+_sys_status = known_type("SYS_STATUS").pack
+_battery_status = known_type("BATTERY_STATUS").pack
+_home_position = known_type("HOME_POSITION").pack
+_gps_global_origin = known_type("GPS_GLOBAL_ORIGIN").pack
+_extended_sys_state = known_type("EXTENDED_SYS_STATE").pack
+_mission_current = known_type("MISSION_CURRENT").pack
+_system_time = known_type("SYSTEM_TIME").pack
+
+MAVLINK_VERSION = 3  # of the HEARTBEAT message
+# Every mode flies itself: stabilised, guided and automatic, with a custom mode.
+_BASE_MODE = (
+    mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
+    | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
+    | mavlink.MAV_MODE_FLAG_AUTO_ENABLED
+)
+_ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+_GYRO_ACCEL = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+_MAG = mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+_BARO = mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+_RANGE = mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION
+_BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+_AHRS = mavlink.MAV_SYS_STATUS_AHRS
+_ATTITUDE_CONTROL = (
+    mavlink.MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | mavlink.MAV_SYS_STATUS_SENSOR_YAW_POSITION
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+)
+_POSITION_CONTROL = (
+    mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+)
+_PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+# Always present and never enabled: without it MAVProxy announces a breach of a fence nobody has set.
+_GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
+_ALWAYS = _GYRO_ACCEL | _MAG | _BARO | _GPS | _BATTERY | _AHRS | _ATTITUDE_CONTROL | _POSITION_CONTROL | _PREARM
+
+FRESH_IMU_US = 100_000  # older samples mean a dead sensor; several periods of each sensor
+FRESH_US = 1_000_000
+FIX_3D = 3  # GPS_FIX_TYPE
+WHOLE_PACK_ONLY = (UINT16_MAX,) * 9  # cell voltages are not measured
+
+
+def heartbeat(state: VehicleState, dialect: Dialect) -> bytes:
+    return _heartbeat(
+        dialect.vehicle_type,
+        dialect.autopilot,
+        _BASE_MODE | _ARMED if state.is_armed else _BASE_MODE,
+        dialect.custom_mode(state.mode),
+        system_status(state),
+        MAVLINK_VERSION,
+    )
+
+
+def system_status(state: VehicleState) -> int:
+    """MAV_STATE: standby on the ground, active or critical in the air."""
+    if state.landed_state in (LandedState.ON_GROUND, LandedState.UNDEFINED):
+        return int(mavlink.MAV_STATE_STANDBY)
+    return int(mavlink.MAV_STATE_CRITICAL if state.is_failsafe else mavlink.MAV_STATE_ACTIVE)
+
+
+def sys_status(state: VehicleState) -> bytes:
+    present = _ALWAYS | (_RANGE if state.samples.range.time_us else 0)
+    battery = state.samples.battery
+    return _sys_status(
+        present | _GEOFENCE,
+        present,
+        healthy_sensors(state) & present | _GEOFENCE,
+        u16(state.load * 1000.0),
+        u16(battery.voltage_v * 1000.0, UINT16_MAX),
+        i16(battery.current_a * 100.0, -1),
+        _percent(state.battery_remaining),
+    )
+
+
+def healthy_sensors(state: VehicleState) -> int:
+    """MAV_SYS_STATUS_SENSOR bits of all that works now."""
+    now_us, samples, flags, health = state.time_us, state.samples, state.estimate.flags, state.health
+    bits = 0
+    if now_us - samples.imu.time_us < FRESH_IMU_US:
+        bits |= _GYRO_ACCEL
+    if _works(samples.mag, health and health.mag, now_us):
+        bits |= _MAG
+    if _works(samples.baro, health and health.baro, now_us):
+        bits |= _BARO
+    if _works(samples.range, health and health.range, now_us):
+        bits |= _RANGE
+    has_fix = samples.gnss.fix_type >= FIX_3D and _works(samples.gnss, health and health.gnss, now_us)
+    if has_fix and flags & POSITION_VALID:
+        bits |= _GPS
+    if samples.battery.time_us and now_us - samples.battery.time_us < FRESH_US:
+        bits |= _BATTERY
+    if flags & TILT_ALIGNED and flags & YAW_ALIGNED:
+        bits |= _AHRS | _ATTITUDE_CONTROL
+    if flags & VELOCITY_VALID and flags & POSITION_VALID:
+        bits |= _POSITION_CONTROL
+    if state.is_ready_to_arm or state.is_armed:
+        bits |= _PREARM
+    return bits
+
+
+def _works(sample: Any, source: Any, now_us: int) -> bool:
+    """Whether a sensor delivers samples that change."""
+    is_fresh = sample.time_us != 0 and now_us - sample.time_us < FRESH_US
+    return is_fresh and not (source and source.is_stuck)
+
+
+def _percent(share: float) -> int:
+    """[%], -1 if unknown."""
+    return bounded_int(share * 100.0, 0, 100) if isfinite(share) else -1
+
+
+def battery_status(state: VehicleState) -> bytes | None:
+    battery = state.samples.battery
+    if battery.time_us == 0:
+        return None
+    return _battery_status(
+        0,
+        mavlink.MAV_BATTERY_FUNCTION_ALL,
+        mavlink.MAV_BATTERY_TYPE_LIPO,
+        INT16_MAX,  # temperature not measured
+        (u16(battery.voltage_v * 1000.0, UINT16_MAX), *WHOLE_PACK_ONLY),
+        i16(battery.current_a * 100.0, -1),
+        i32(state.battery_used_mah, -1),
+        -1,
+        _percent(state.battery_remaining),
+        0,
+        mavlink.MAV_BATTERY_CHARGE_STATE_OK if state.battery_remaining > 0.0 else 0,
+    )
+
+
+def home_position(state: VehicleState) -> bytes | None:
+    home = state.home
+    if home is None:
+        return None
+    half = 0.5 * state.home_yaw_rad
+    return _home_position(
+        degrees_e7(home.lat_deg),
+        degrees_e7(home.lon_deg),
+        i32(home.alt_m * 1000.0),
+        *state.home_ned,
+        (cos(half), 0.0, 0.0, sin(half)),
+        nan,
+        nan,
+        nan,
+        state.time_us,
+    )
+
+
+def gps_global_origin(state: VehicleState) -> bytes:
+    origin = state.origin
+    return _gps_global_origin(
+        degrees_e7(origin.lat_deg), degrees_e7(origin.lon_deg), i32(origin.alt_m * 1000.0), state.time_us
+    )
+
+
+def extended_sys_state(state: VehicleState) -> bytes:
+    return _extended_sys_state(mavlink.MAV_VTOL_STATE_UNDEFINED, state.landed_state)
+
+
+def mission_current(state: VehicleState) -> bytes:
+    return _mission_current(u16(state.mission_current), u16(state.mission_count), state.mission_state)
+
+
+def system_time(state: VehicleState) -> bytes:
+    """The date is unknown (0): simulated time counts from power-on."""
+    return _system_time(0, boot_ms(state.time_us))

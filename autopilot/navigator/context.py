@@ -1,0 +1,148 @@
+"""What every navigator mode works with: the vehicle's state, the setpoint, and what it tells the commander."""
+
+from math import atan2, hypot, isfinite, nan, sqrt
+
+from autopilot.navigator.setpoint import SetpointPort, Vector
+from autopilot.ports import HEIGHT_VALID, TERRAIN_VALID
+from autopilot.vehicle import Announcer, LandedState, Mode, VehicleState
+from common.geodesy import ned_from_geodetic
+from common.params import Parameter, ParameterTable
+
+
+class NavContext:
+    """Shared by the modes of one vehicle.
+
+    Args:
+        state: the vehicle as of this frame.
+        params: its parameters.
+        announcer: where texts and mission progress go.
+        setpoint: the port to the control part.
+        hover_thrust: [0..1] collective thrust that carries the vehicle.
+    """
+
+    __slots__ = (
+        "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "has_position", "hover_thrust",
+        "is_landing", "next_hold", "params", "setpoint", "state", "wants_lift", "wish",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        state: VehicleState,
+        params: ParameterTable,
+        announcer: Announcer,
+        setpoint: SetpointPort,
+        hover_thrust: float,
+    ) -> None:
+        self.state = state
+        self.params = params
+        self.announcer = announcer
+        self.setpoint = setpoint
+        self.hover_thrust = hover_thrust
+        self.has_position = False  # the commander's judgement, with its delay
+        self.wants_lift = False  # the mode asks to leave the ground
+        self.is_landing = False  # the mode is on its last descent
+        self.wish: Mode | None = None  # the mode that shall follow this one
+        self.next_hold: tuple[Vector, float] | None = None  # place and heading for the next hold
+        self.cruise_speed = nan  # [m/s] asked for by DO_CHANGE_SPEED; NaN: the parameter
+        self.climb_speed = nan
+        self.descend_speed = nan
+        self._numbers = {name: float(params[name]) for name in params}
+        params.on_change(self._on_parameter)
+
+    def number(self, name: str) -> float:
+        """The value of a parameter in its own unit."""
+        return self._numbers[name]
+
+    @property
+    def is_on_ground(self) -> bool:
+        return self.state.landed_state is LandedState.ON_GROUND
+
+    @property
+    def has_height(self) -> bool:
+        return bool(self.state.estimate.flags & HEIGHT_VALID)
+
+    def reset_speeds(self) -> None:
+        """Forgets the speeds asked for by commands and mission items."""
+        self.cruise_speed = self.climb_speed = self.descend_speed = nan
+
+    def pos_ned_of(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Vector:
+        """A geodetic position in the ned frame [m]."""
+        return ned_from_geodetic(lat_deg, lon_deg, alt_amsl_m, self.state.origin)
+
+    def down_of(self, alt_amsl_m: float) -> float:
+        """Down coordinate [m] of an altitude above the present place."""
+        position = self.state.position
+        return ned_from_geodetic(position.lat_deg, position.lon_deg, alt_amsl_m, self.state.origin)[2]
+
+    def fly_to(self, pos_ned: Vector, yaw: float, path_start_ned: Vector | None = None, exit_speed: float = 0.0) -> None:
+        """Asks for a position with the speeds asked for; along a straight line if its start is given and not near."""
+        if path_start_ned is not None and distance(path_start_ned, pos_ned) > 0.5:  # below that a line means nothing
+            self.setpoint.fly_to(
+                pos_ned,
+                yaw,
+                path_start_ned=path_start_ned,
+                cruise_speed=self.cruise_speed,
+                climb_speed=self.climb_speed,
+                descend_speed=self.descend_speed,
+                exit_speed=exit_speed,
+            )
+        else:
+            self.setpoint.fly_to(
+                pos_ned,
+                yaw,
+                cruise_speed=self.cruise_speed,
+                climb_speed=self.climb_speed,
+                descend_speed=self.descend_speed,
+            )
+
+    def stop_point(self) -> Vector:
+        """Where the vehicle comes to rest [m] if it brakes now."""
+        estimate = self.state.estimate
+        north, east, down = estimate.pos_ned
+        vel_north, vel_east, vel_down = estimate.vel_ned
+        numbers = self._numbers
+        jerk = numbers["MPC_JERK_MAX"]
+        speed = hypot(vel_north, vel_east)
+        if speed > 0.1:  # below that it is noise
+            reach = braking_distance(speed, numbers["MPC_ACC_HOR"], jerk) / speed
+            north += vel_north * reach
+            east += vel_east * reach
+        if abs(vel_down) > 0.1:
+            accel = numbers["MPC_ACC_UP_MAX" if vel_down > 0.0 else "MPC_ACC_DOWN_MAX"]
+            reach = braking_distance(abs(vel_down), accel, jerk)
+            down += reach if vel_down > 0.0 else -reach
+        return north, east, down
+
+    def height_above_ground(self) -> tuple[float, bool]:
+        """Height [m], and whether it is measured by the range finder rather than counted from home."""
+        estimate = self.state.estimate
+        if estimate.flags & TERRAIN_VALID:
+            return estimate.terrain_d - estimate.pos_ned[2], True
+        return self.state.home_ned[2] - estimate.pos_ned[2], False
+
+    def heading_to(self, start_ned: Vector, target_ned: Vector, asked: float) -> float:
+        """The heading asked for [rad]; NaN: towards the target, or unchanged if that is near."""
+        if isfinite(asked):
+            return asked
+        north = target_ned[0] - start_ned[0]
+        east = target_ned[1] - start_ned[1]
+        return atan2(east, north) if hypot(north, east) > 1.0 else self.state.yaw_rad
+
+    def hold_next(self, pos_ned: Vector, yaw: float) -> None:
+        """Goes over to Hold, at the given place."""
+        self.next_hold = (pos_ned, yaw)
+        self.wish = Mode.HOLD
+
+    def _on_parameter(self, parameter: Parameter) -> None:
+        self._numbers[parameter.name] = float(self.params[parameter.name])
+
+
+def distance(a: Vector, b: Vector) -> float:
+    """Distance between two points [m]."""
+    return sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+
+
+def braking_distance(speed: float, accel: float, jerk: float) -> float:
+    """Way [m] from a speed to rest with limited acceleration and jerk, starting without acceleration."""
+    peak = min(accel, sqrt(speed * jerk))
+    return speed * (0.5 * speed / peak + 0.5 * peak / jerk)

@@ -1,0 +1,47 @@
+"""Goto: a client sends the vehicle to a place, a height or a heading, where it holds."""
+
+from math import hypot, isfinite
+
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.hold import Hold
+from autopilot.navigator.setpoint import Vector
+from autopilot.vehicle import ACCEPTED, Mode, Reply, Verdict
+
+
+def reposition_target(
+    context: NavContext, hold: Hold, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw: float
+) -> tuple[Vector, float] | Reply:
+    """Place and heading that are asked for, or why not.
+
+    What is NaN stays as it is: the place being held, or the place where the vehicle can stop.
+    """
+    state = context.state
+    base = hold.target_ned if state.mode is Mode.HOLD else context.stop_point()
+    if isfinite(lat_deg) != isfinite(lon_deg):
+        return Reply(Verdict.DENIED, "Goto needs both latitude and longitude")
+    if isfinite(lat_deg):
+        if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+            return Reply(Verdict.DENIED, f"Goto position {lat_deg:.4f}, {lon_deg:.4f} is not on earth")
+        alt_m = alt_amsl_m if isfinite(alt_amsl_m) else state.position.alt_m
+        target = context.pos_ned_of(lat_deg, lon_deg, alt_m)
+        if not isfinite(alt_amsl_m):
+            target = (target[0], target[1], base[2])
+    elif isfinite(alt_amsl_m):
+        target = (base[0], base[1], context.down_of(alt_amsl_m))
+    else:
+        target = base
+    refusal = _range_refusal(context, target)
+    if refusal is not ACCEPTED:
+        return refusal
+    return target, context.heading_to(state.estimate.pos_ned, target, yaw)
+
+
+def _range_refusal(context: NavContext, target: Vector) -> Reply:
+    here = context.state.estimate.pos_ned
+    way_m = hypot(target[0] - here[0], target[1] - here[1])
+    longest_m = context.number("MIS_DIST_1WP")
+    if 0.0 <= longest_m < way_m:
+        return Reply(Verdict.DENIED, f"Goto target is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed")
+    if abs(target[2]) > 10_000.0:
+        return Reply(Verdict.DENIED, "Goto altitude is out of range")
+    return ACCEPTED

@@ -1,0 +1,115 @@
+"""Landing: straight down over one place, slower near the ground; blind if the position is lost."""
+
+from math import hypot, isfinite, nan
+
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.setpoint import Vector
+
+_BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against rotor inflow and drag; guess
+_NEAR_HOME_M = 30.0  # home's ground level is trusted this far around it; guess
+_SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, far from home; guess
+
+
+class Landing:
+    """The last descent, until the landing detector ends it."""
+
+    __slots__ = ("_context", "_east", "_is_blind", "_north", "_yaw")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._north = self._east = self._yaw = 0.0
+        self._is_blind = False
+
+    def start(self, north: float, east: float, yaw: float) -> None:
+        """Descends over a place [m] with a heading [rad], NaN: the present one."""
+        self._north, self._east = north, east
+        self._yaw = yaw if isfinite(yaw) else self._context.state.yaw_rad
+        self._is_blind = False
+
+    def frame(self) -> None:
+        context = self._context
+        if context.is_on_ground:
+            return
+        context.is_landing = True
+        if context.has_position:
+            if self._is_blind:  # the position is back: land here
+                self._is_blind = False
+                self._north, self._east, _ = context.stop_point()
+            context.setpoint.descend_at(self._north, self._east, self._speed(), self._yaw, context.cruise_speed)
+            return
+        self._is_blind = True
+        if context.has_height:
+            context.setpoint.descend_level(context.number("MPC_LAND_SPEED"), self._yaw)
+        else:
+            context.setpoint.hang_level(context.hover_thrust * _BLIND_THRUST_SHARE, self._yaw)
+
+    def _speed(self) -> float:
+        """Descent speed [m/s]: MPC_Z_V_AUTO_DN high up, MPC_LAND_SPEED low, the crawl speed just above the ground."""
+        context = self._context
+        slow = context.number("MPC_LAND_SPEED")
+        fast = context.number("MPC_Z_V_AUTO_DN")
+        height, is_measured = context.height_above_ground()
+        if not is_measured:
+            home = context.state.home_ned
+            is_known_ground = hypot(self._north - home[0], self._east - home[1]) < _NEAR_HOME_M
+            return slow if height < _SLOW_BELOW_M and not is_known_ground else _blend(context, height, slow, fast)
+        if height < context.number("MPC_LAND_ALT3"):
+            return min(slow, context.number("MPC_LAND_CRWL"))
+        return _blend(context, height, slow, fast)
+
+
+def _blend(context: NavContext, height: float, slow: float, fast: float) -> float:
+    """Speed between MPC_LAND_ALT2 (slow) and MPC_LAND_ALT1 (fast), in steps of 0.05 m/s."""
+    high = context.number("MPC_LAND_ALT1")
+    low = context.number("MPC_LAND_ALT2")
+    if height >= high:
+        return max(slow, fast)
+    if height <= low or fast <= slow:
+        return slow
+    return round((slow + (fast - slow) * (height - low) / (high - low)) * 20.0) / 20.0
+
+
+class Land:
+    """Mode Land: at a given place if one was asked for, otherwise here."""
+
+    __slots__ = ("_context", "_landing", "_place", "_yaw")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._landing = Landing(context)
+        self._place: Vector | None = None  # still to be reached
+        self._yaw = nan
+
+    def request(self, place_ned: Vector | None, yaw: float) -> None:
+        """Sets place [m] and heading [rad] of the next landing; None: where the vehicle can stop."""
+        self._place = place_ned
+        self._yaw = yaw
+
+    def start(self) -> None:
+        context = self._context
+        place, yaw = self._place, self._yaw
+        if place is not None and context.has_position:
+            start = context.stop_point()
+            self._place = (place[0], place[1], start[2])
+            context.fly_to(self._place, context.heading_to(start, self._place, yaw), start)
+            return
+        self._place = None
+        self._yaw = nan
+        if context.has_position:
+            north, east, _ = context.stop_point()
+        else:
+            north, east, _ = context.state.estimate.pos_ned
+        self._landing.start(north, east, yaw)
+
+    def frame(self) -> None:
+        place = self._place
+        if place is None:
+            self._landing.frame()
+            return
+        here = self._context.state.estimate.pos_ned
+        is_there = hypot(here[0] - place[0], here[1] - place[1]) < 0.5 * self._context.number("NAV_ACC_RAD")
+        if is_there or not self._context.has_position:
+            self._place = None
+            self._landing.start(place[0], place[1], self._yaw)
+            self._yaw = nan
+            self._landing.frame()

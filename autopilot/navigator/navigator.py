@@ -1,0 +1,119 @@
+"""The navigator: one object per vehicle that turns the flight mode into setpoints, at 50 Hz."""
+
+from math import isfinite, nan
+
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.goto import reposition_target
+from autopilot.navigator.hold import Hold
+from autopilot.navigator.land import Land
+from autopilot.navigator.mission import Mission
+from autopilot.navigator.offboard import STREAM_PERIOD_US, Offboard
+from autopilot.navigator.rtl import Return
+from autopilot.navigator.takeoff import Takeoff
+from autopilot.vehicle import ACCEPTED, Mode, OffboardSetpoint, Reply, Verdict
+
+
+class Navigator:
+    """The flight modes of one vehicle.
+
+    Args:
+        context: state, parameters, setpoint; shared by the modes.
+        mission: the stored mission, which is mode Mission.
+    """
+
+    __slots__ = ("_active", "_modes", "context", "hold", "land", "mission", "offboard", "takeoff")
+
+    def __init__(self, context: NavContext, mission: Mission) -> None:
+        self.context = context
+        self.hold = Hold(context)
+        self.takeoff = Takeoff(context)
+        self.mission = mission
+        self.land = Land(context)
+        self.offboard = Offboard(context)
+        self._modes: dict[Mode, Hold | Takeoff | Mission | Return | Land | Offboard] = {
+            Mode.HOLD: self.hold,
+            Mode.TAKEOFF: self.takeoff,
+            Mode.MISSION: mission,
+            Mode.RETURN: Return(context),
+            Mode.LAND: self.land,
+            Mode.OFFBOARD: self.offboard,
+        }
+        self._active = self._modes[Mode.HOLD]
+
+    def refusal(self, mode: Mode) -> str:
+        """Why a mode cannot be flown now, as far as the navigator knows; empty if it can."""
+        if mode is Mode.MISSION:
+            return self.mission.refusal()
+        if mode is Mode.OFFBOARD and self.offboard.age_us(self.context.state.time_us) > STREAM_PERIOD_US:
+            return "Offboard needs setpoints faster than 2 Hz before the switch"
+        return ""
+
+    def enter(self, mode: Mode) -> None:
+        """Changes to a mode: at once in flight, when armed otherwise."""
+        if self._active is self.mission and mode is not Mode.MISSION:
+            self.mission.leave()
+        self._active = self._modes[mode]
+        if self.context.state.is_armed:
+            self._active.start()
+
+    def on_armed(self) -> None:
+        """Starts the mode that was chosen before."""
+        self.context.reset_speeds()
+        self.context.next_hold = None
+        self._active.start()
+
+    def frame(self) -> Mode | None:
+        """Renews the setpoint and returns the mode that shall follow, if the present one is done."""
+        context = self.context
+        state = context.state
+        context.wants_lift = False
+        context.is_landing = False
+        setpoint = context.setpoint
+        wish: Mode | None = None
+        if state.is_armed:
+            self._active.frame()
+            wish = context.wish
+            context.wish = None
+            if context.is_on_ground:
+                setpoint.idle()
+        else:
+            setpoint.idle()
+        setpoint.set_flags(is_armed=state.is_armed, is_landed=context.is_on_ground)
+        return wish
+
+    # ---- what clients ask for ----
+
+    def set_offboard(self, setpoint: OffboardSetpoint) -> None:
+        self.offboard.receive(setpoint)
+
+    def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw: float, speed_m_s: float) -> Reply:
+        """Chooses the next place to hold; the caller changes to Hold."""
+        context = self.context
+        if not (isfinite(lat_deg) or isfinite(lon_deg) or isfinite(alt_amsl_m) or isfinite(yaw)):
+            context.next_hold = None if context.state.mode is not Mode.HOLD else (context.stop_point(), context.state.yaw_rad)
+        else:
+            target = reposition_target(context, self.hold, lat_deg, lon_deg, alt_amsl_m, yaw)
+            if isinstance(target, Reply):
+                return target
+            context.next_hold = target
+        if isfinite(speed_m_s) and speed_m_s > 0.0:
+            context.cruise_speed = speed_m_s
+        return ACCEPTED
+
+    def change_speed(self, speed_m_s: float) -> Reply:
+        """Horizontal speed from now on; the control part bounds it by MPC_XY_VEL_MAX."""
+        if not 0.0 < speed_m_s <= 100.0:
+            return Reply(Verdict.DENIED, f"Speed {speed_m_s:.1f} m/s is out of range")
+        self.context.cruise_speed = speed_m_s
+        self.context.setpoint.set_cruise_speed(speed_m_s)
+        return ACCEPTED
+
+    def request_landing(self, lat_deg: float, lon_deg: float, yaw: float) -> Reply:
+        """Chooses where the next landing shall be; the caller changes to Land."""
+        if isfinite(lat_deg) != isfinite(lon_deg) or abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+            return Reply(Verdict.DENIED, "Landing position is not on earth")
+        place = None
+        if isfinite(lat_deg) and not (lat_deg == 0.0 and lon_deg == 0.0):
+            place = self.context.pos_ned_of(lat_deg, lon_deg, self.context.state.position.alt_m)
+        self.land.request(place, yaw if isfinite(yaw) else nan)
+        return ACCEPTED

@@ -1,0 +1,153 @@
+"""The setpoint row: the one place where missions, offboard clients and failsafes say what the vehicle shall do.
+
+In: calls of the navigator's modes. Out: the live kernel row `Setpoint` (autopilot.ports), packed at once per frame and
+only if something changed. The control part limits and smooths what is asked here.
+"""
+
+import struct
+from math import cos, nan, sin
+from typing import Any
+
+import numpy as np
+
+from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_TRAJECTORY
+from autopilot.vehicle import OffboardSetpoint
+
+Vector = tuple[float, float, float]
+FREE: Vector = (nan, nan, nan)
+_LEVEL_NORTH = (0.0, 0.0, 0.0, 1.0)
+_LAYOUT = "<3i26f"  # kind, is_armed, is_landed, then every float in the order of autopilot.ports.Setpoint
+_FIELDS = (
+    "kind", "is_armed", "is_landed", "pos_ned", "vel_ned", "accel_ned", "yaw", "yaw_rate", "path_start_ned",
+    "cruise_speed", "climb_speed", "descend_speed", "exit_speed", "q_ned_from_frd", "omega_frd", "thrust",
+)  # fmt: skip
+
+
+class SetpointPort:
+    """One vehicle's setpoint; `write` copies it to the kernel row.
+
+    Args:
+        row: live structured view of length 1 of the kernel's `Setpoint` rows.
+    """
+
+    __slots__ = (
+        "_buffer", "_is_changed", "_pack_into", "accel_ned", "climb_speed", "cruise_speed", "descend_speed",
+        "exit_speed", "is_armed", "is_landed", "kind", "omega_frd", "path_start_ned", "pos_ned", "q_ned_from_frd",
+        "thrust", "vel_ned", "yaw", "yaw_rate",
+    )  # fmt: skip
+
+    def __init__(self, row: np.ndarray[Any, Any]) -> None:
+        layout = struct.Struct(_LAYOUT)
+        if row.shape != (1,) or row.dtype.names != _FIELDS or row.dtype.itemsize != layout.size:
+            raise ValueError("the setpoint must be a view of one row of autopilot.ports.Setpoint")
+        self._buffer = memoryview(row.view(np.uint8).reshape(-1))
+        self._pack_into = layout.pack_into
+        self._is_changed = True
+        self.is_armed = False
+        self.is_landed = True
+        self.kind = SETPOINT_IDLE
+        self._free_all()
+
+    def set_flags(self, *, is_armed: bool, is_landed: bool) -> None:
+        """Tells the control part whether to turn the rotors, and whether to keep its integrators reset."""
+        if is_armed is not self.is_armed or is_landed is not self.is_landed:
+            self.is_armed = is_armed
+            self.is_landed = is_landed
+            self._is_changed = True
+
+    def idle(self) -> None:
+        """Asks for nothing: rotors at idle when armed."""
+        if self.kind != SETPOINT_IDLE:
+            self._free_all()
+            self.kind = SETPOINT_IDLE
+
+    def fly_to(
+        self,
+        pos_ned: Vector,
+        yaw: float,
+        *,
+        path_start_ned: Vector = FREE,
+        cruise_speed: float = nan,
+        climb_speed: float = nan,
+        descend_speed: float = nan,
+        exit_speed: float = 0.0,
+    ) -> None:
+        """Asks for a position [m]: on the straight line from `path_start_ned` if that is finite."""
+        self._free_all()
+        self.kind = SETPOINT_TRAJECTORY
+        self.pos_ned = pos_ned
+        self.yaw = yaw
+        self.path_start_ned = path_start_ned
+        self.cruise_speed = cruise_speed
+        self.climb_speed = climb_speed
+        self.descend_speed = descend_speed
+        self.exit_speed = exit_speed
+
+    def descend_at(self, north: float, east: float, speed_down: float, yaw: float, cruise_speed: float = nan) -> None:
+        """Asks for a vertical speed [m/s] over a place [m]."""
+        if (
+            self.kind == SETPOINT_TRAJECTORY
+            and self.vel_ned[2] == speed_down
+            and self.pos_ned[0] == north
+            and self.pos_ned[1] == east
+            and (self.yaw == yaw or yaw != yaw)
+        ):
+            return
+        self._free_all()
+        self.kind = SETPOINT_TRAJECTORY
+        self.pos_ned = (north, east, nan)
+        self.vel_ned = (nan, nan, speed_down)
+        self.yaw = yaw
+        self.cruise_speed = cruise_speed
+
+    def descend_level(self, speed_down: float, yaw: float) -> None:
+        """Asks for a vertical speed [m/s] with level attitude: what remains when the position is not known."""
+        self._free_all()
+        self.kind = SETPOINT_TRAJECTORY
+        self.vel_ned = (nan, nan, speed_down)
+        self.accel_ned = (0.0, 0.0, nan)
+        self.yaw = yaw
+
+    def hang_level(self, thrust: float, yaw: float) -> None:
+        """Asks for level attitude and a collective thrust [0..1]: what remains when the height is not known either."""
+        self._free_all()
+        self.kind = SETPOINT_ATTITUDE
+        self.q_ned_from_frd = (0.0, 0.0, sin(0.5 * yaw), cos(0.5 * yaw))
+        self.thrust = thrust
+
+    def follow(self, setpoint: OffboardSetpoint, cruise_speed: float) -> None:
+        """Asks for what an external client sent."""
+        self._free_all()
+        self.kind = setpoint.kind
+        self.pos_ned = setpoint.pos_ned
+        self.vel_ned = setpoint.vel_ned
+        self.accel_ned = setpoint.accel_ned
+        self.yaw = setpoint.yaw
+        self.yaw_rate = setpoint.yaw_rate
+        self.q_ned_from_frd = setpoint.q_ned_from_frd
+        self.omega_frd = setpoint.omega_frd
+        self.thrust = setpoint.thrust
+        self.cruise_speed = cruise_speed
+
+    def set_cruise_speed(self, speed: float) -> None:
+        """Changes the horizontal speed [m/s] of the setpoint being flown."""
+        self.cruise_speed = speed
+        self._is_changed = True
+
+    def write(self) -> None:
+        """Copies the setpoint to the kernel row if it changed."""
+        if not self._is_changed:
+            return
+        self._is_changed = False
+        self._pack_into(
+            self._buffer, 0, self.kind, self.is_armed, self.is_landed, *self.pos_ned, *self.vel_ned, *self.accel_ned,
+            self.yaw, self.yaw_rate, *self.path_start_ned, self.cruise_speed, self.climb_speed, self.descend_speed,
+            self.exit_speed, *self.q_ned_from_frd, *self.omega_frd, self.thrust,
+        )  # fmt: skip
+
+    def _free_all(self) -> None:
+        self._is_changed = True
+        self.pos_ned = self.vel_ned = self.accel_ned = self.path_start_ned = self.omega_frd = FREE
+        self.q_ned_from_frd = _LEVEL_NORTH
+        self.yaw = self.yaw_rate = self.cruise_speed = self.climb_speed = self.descend_speed = self.thrust = nan
+        self.exit_speed = 0.0

@@ -1,0 +1,91 @@
+"""Take-off: a vertical climb over the place where it began."""
+
+from math import isfinite, nan
+
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.setpoint import Vector
+from autopilot.vehicle import Reply, Severity, Verdict
+
+REACHED_M = 0.3  # height error at which a climb ends; half of what PX4's tests allow
+_SETTLED_M_S = 0.5
+
+
+class Climb:
+    """A vertical climb to a height; from the ground it first waits for the commander's release."""
+
+    __slots__ = ("_context", "_is_climbing", "_target_d", "_yaw", "target_ned", "yaw")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._is_climbing = False
+        self._target_d = 0.0
+        self._yaw = nan
+        self.target_ned: Vector = (0.0, 0.0, 0.0)
+        self.yaw = 0.0  # [rad] flown
+
+    def start(self, target_d: float, yaw: float) -> None:
+        """Prepares a climb to the down coordinate `target_d` [m]; NaN yaw keeps the heading."""
+        self._target_d = target_d
+        self._yaw = yaw
+        self._is_climbing = False
+
+    def frame(self) -> bool:
+        """Climbs; true once the height is reached. A vehicle above it stays where it is."""
+        context = self._context
+        if context.is_on_ground:
+            context.wants_lift = True
+            return False
+        if not self._is_climbing:
+            self._is_climbing = True
+            north, east, down = context.stop_point()
+            self.target_ned = (north, east, min(self._target_d, down))
+            self.yaw = self._yaw if isfinite(self._yaw) else context.state.yaw_rad
+            context.setpoint.fly_to(self.target_ned, self.yaw, climb_speed=context.number("MPC_TKO_SPEED"))
+            return False
+        estimate = context.state.estimate
+        is_near: bool = abs(estimate.pos_ned[2] - self.target_ned[2]) < REACHED_M
+        return is_near and abs(estimate.vel_ned[2]) < _SETTLED_M_S
+
+
+class Takeoff:
+    """Mode Takeoff: climbs, then holds."""
+
+    __slots__ = ("_alt_amsl_m", "_climb", "_context", "_yaw")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._climb = Climb(context)
+        self._alt_amsl_m = nan
+        self._yaw = nan
+
+    def request(self, alt_amsl_m: float, yaw: float) -> Reply:
+        """Sets the target for the next take-off; NaN: MIS_TAKEOFF_ALT above home."""
+        if alt_amsl_m > self._base_alt_m() + 10_000.0:
+            return Reply(Verdict.DENIED, f"Takeoff altitude {alt_amsl_m:.0f} m is out of range")
+        self._alt_amsl_m = alt_amsl_m
+        self._yaw = yaw
+        self._target_alt_m(is_told=True)
+        return Reply(Verdict.ACCEPTED)
+
+    def start(self) -> None:
+        context = self._context
+        self._climb.start(context.down_of(self._target_alt_m(is_told=False)), self._yaw)
+
+    def frame(self) -> None:
+        if self._climb.frame():
+            self._alt_amsl_m = self._yaw = nan
+            self._context.hold_next(self._climb.target_ned, self._climb.yaw)
+
+    def _base_alt_m(self) -> float:
+        state = self._context.state
+        return (state.home or state.position).alt_m
+
+    def _target_alt_m(self, *, is_told: bool) -> float:
+        """The altitude to climb to: never less than MIS_TAKEOFF_ALT above home."""
+        lowest = self._base_alt_m() + self._context.number("MIS_TAKEOFF_ALT")
+        if not isfinite(self._alt_amsl_m):
+            return lowest
+        if self._alt_amsl_m < lowest - 0.05 and is_told:
+            height = self._context.number("MIS_TAKEOFF_ALT")
+            self._context.announcer.statustext(Severity.INFO, f"Takeoff altitude raised to {height:.1f} m above home")
+        return max(self._alt_amsl_m, lowest)

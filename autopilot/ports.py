@@ -1,0 +1,160 @@
+"""The flight controller's connectors: what goes in, what comes out.
+
+In: `Samples` from sensor drivers (a simulator, a log or a board) at each tick, `Setpoint` from the Python part at
+each frame. Out: `Estimate`, and `Actuators` at each tick. Each is one row per vehicle. Frames are ned (local tangent
+plane whose origin is the home the vehicle boots at) and frd; units SI unless the name says otherwise.
+A sample is new when its `time_us` differs from that of the last one used; 0 means never measured.
+"""
+
+import warp as wp
+
+from common.kernels import vec8
+
+wp.set_module_options({"enable_backward": False})
+
+# Setpoint.kind
+SETPOINT_IDLE = wp.constant(0)  # rotors stopped when disarmed, at idle when armed
+SETPOINT_TRAJECTORY = wp.constant(1)  # position, velocity, acceleration, yaw; smoothed by the trajectory generator
+SETPOINT_ATTITUDE = wp.constant(2)  # attitude (yaw by rate where yaw_rate is finite) and collective thrust
+SETPOINT_RATE = wp.constant(3)  # body rates and collective thrust
+
+# Estimate.flags
+TILT_ALIGNED = wp.constant(1)
+YAW_ALIGNED = wp.constant(2)
+VELOCITY_VALID = wp.constant(4)
+POSITION_VALID = wp.constant(8)  # horizontal
+HEIGHT_VALID = wp.constant(16)
+TERRAIN_VALID = wp.constant(32)
+WIND_VALID = wp.constant(64)
+DEAD_RECKONING = wp.constant(128)
+
+
+@wp.struct
+class ImuSample:
+    """Mean angular rate and specific force over the last `dt_s`."""
+
+    time_us: wp.int64
+    dt_s: float
+    gyro_frd: wp.vec3  # [rad/s]
+    accel_frd: wp.vec3  # [m/s²], specific force: (0, 0, -9.8) at rest and level
+
+
+@wp.struct
+class GnssSample:
+    """A navigation solution, projected by the driver on the tangent plane of the boot home."""
+
+    time_us: wp.int64  # time of validity; the sample arrives later
+    fix_type: int  # as MAVLink GPS_FIX_TYPE: 0 no receiver, 1 no fix, 3 3-D
+    satellites: int
+    pos_ned: wp.vec3  # [m]
+    vel_ned: wp.vec3  # [m/s]
+    pos_h_std: float  # [m] receiver's own accuracy figures
+    pos_v_std: float  # [m]
+    vel_std: float  # [m/s]
+
+
+@wp.struct
+class BaroSample:
+    time_us: wp.int64
+    pressure_pa: float
+    temperature_c: float
+
+
+@wp.struct
+class MagSample:
+    time_us: wp.int64
+    field_frd_gauss: wp.vec3
+
+
+@wp.struct
+class RangeSample:
+    """Distance along body down."""
+
+    time_us: wp.int64
+    distance_m: float
+    is_valid: int  # 0: out of range or no return
+
+
+@wp.struct
+class BatterySample:
+    time_us: wp.int64
+    voltage_v: float
+    current_a: float
+
+
+@wp.struct
+class Samples:
+    """The latest sample of every sensor."""
+
+    imu: ImuSample
+    gnss: GnssSample
+    baro: BaroSample
+    mag: MagSample
+    range: RangeSample
+    battery: BatterySample
+
+
+@wp.struct
+class Setpoint:
+    """What the vehicle shall do. NaN frees an element, as in PX4's trajectory_setpoint."""
+
+    kind: int  # SETPOINT_*
+    is_armed: int
+    is_landed: int  # landed: integrators stay reset and the trajectory stays at the estimate
+    pos_ned: wp.vec3  # [m]
+    vel_ned: wp.vec3  # [m/s]
+    accel_ned: wp.vec3  # [m/s²]
+    yaw: float  # [rad]
+    yaw_rate: float  # [rad/s]
+    path_start_ned: wp.vec3  # [m] finite: keep to the straight line from here to pos_ned
+    cruise_speed: float  # [m/s] horizontal, NaN: MPC_XY_CRUISE
+    climb_speed: float  # [m/s] up, NaN: MPC_Z_V_AUTO_UP
+    descend_speed: float  # [m/s] down, NaN: MPC_Z_V_AUTO_DN
+    exit_speed: float  # [m/s] speed with which pos_ned may be passed, 0: stop there
+    q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE
+    omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE
+    thrust: float  # [0..1] collective, share of the maximum thrust
+
+
+@wp.struct
+class Estimate:
+    """The estimator's answer, predicted to the latest IMU sample."""
+
+    time_us: wp.int64
+    flags: int
+    q_ned_from_frd: wp.quat
+    omega_frd: wp.vec3  # [rad/s] bias removed
+    accel_frd: wp.vec3  # [m/s²] specific force, bias removed
+    vel_ned: wp.vec3  # [m/s]
+    pos_ned: wp.vec3  # [m]
+    accel_ned: wp.vec3  # [m/s²] gravity removed
+    gyro_bias_frd: wp.vec3  # [rad/s]
+    accel_bias_frd: wp.vec3  # [m/s²]
+    wind_ned: wp.vec3  # [m/s] air over ground, down component 0
+    terrain_d: float  # [m] ned down coordinate of the ground below
+    pos_h_std: float  # [m]
+    pos_v_std: float  # [m]
+    vel_std: float  # [m/s]
+    tilt_std: float  # [rad]
+    yaw_std: float  # [rad]
+    reset_count: int  # grows when position, velocity or heading jumps
+    pos_reset_ned: wp.vec3  # [m] the last jump
+    vel_reset_ned: wp.vec3  # [m/s]
+    yaw_reset: float  # [rad]
+
+
+@wp.struct
+class Actuators:
+    """Motor commands, and the setpoints actually flown (for telemetry and logs)."""
+
+    command: vec8  # [0..1] per rotor, what an ESC receives
+    traj_pos_ned: wp.vec3
+    traj_vel_ned: wp.vec3
+    traj_accel_ned: wp.vec3
+    traj_yaw: float
+    traj_yaw_rate: float
+    q_sp_ned_from_frd: wp.quat
+    omega_sp_frd: wp.vec3
+    thrust_sp: float  # [0..1] collective
+    torque_sp_frd: wp.vec3  # [N m]
+    torque_unallocated_frd: wp.vec3  # [N m] asked for and not achieved

@@ -1,0 +1,163 @@
+"""Designs the gains of the cascade and prints their margins: `python -m autopilot.tuning [--airframe NAME]`.
+
+The model is the airframe hovering: torque to body rate is an integrator behind the motors' first-order lag and the
+loop's delay; each outer loop sees the closed inner one. Gains are set from the inside out, each loop as fast as the
+design margins allow. The disturbance observer subtracts nothing the model knows of, so it appears only where the
+rotors push more or less than modelled: the rows with 25 % more thrust.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import control
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from autopilot.control.params import CONTROL_PARAMETERS
+from common.airframe import Airframe, AirframeError, load_airframe
+from common.kernels import FRAME_TICKS, TICK_S
+from common.params import ParameterTable
+
+PHASE_REQUIRED_DEG = 45.0
+GAIN_REQUIRED_DB = 6.0
+PHASE_DESIGN_DEG = 60.0
+"""Room above what is required for airframes and batteries that differ from their file."""
+GAIN_DESIGN_DB = 8.0
+
+FAST_DELAY_S = 1.5 * TICK_S
+"""IMU averaging (half a tick), holding the command (half), and half a tick for transport and computing."""
+SLOW_DELAY_S = 0.5 * FRAME_TICKS * TICK_S
+"""Holding the outer loops' output between 50 Hz frames."""
+PADE_ORDER = 3
+OMEGA = np.logspace(-2, 3, 1200)  # [rad/s]
+
+Gains = dict[str, float]
+"""Fields of ControlParams and their values in SI."""
+System = Any
+"""A python-control state-space system; the package has no type hints."""
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """What one loop can bear before it oscillates."""
+
+    loop: str
+    gain_db: float
+    phase_deg: float
+    disk_gain_db: float
+    disk_phase_deg: float
+    crossover_rad_s: float
+
+    @property
+    def is_sufficient(self) -> bool:
+        return self.gain_db >= GAIN_REQUIRED_DB and self.phase_deg >= PHASE_REQUIRED_DEG
+
+
+def _fraction(numerator: list[float], denominator: list[float]) -> System:
+    return control.ss(control.tf(numerator, denominator))
+
+
+def _delay(seconds: float) -> System:
+    return control.ss(control.tf(*control.pade(seconds, PADE_ORDER)))
+
+
+def _lag(seconds: float) -> System:
+    return _fraction([1.0], [seconds, 1.0])
+
+
+def _low_pass(cutoff_hz: float) -> System:
+    return _lag(1.0 / (2.0 * np.pi * cutoff_hz))
+
+
+def _pi(gain_p: float, gain_i: float) -> System:
+    return _fraction([gain_p, gain_i], [1.0, 0.0]) if gain_i > 0.0 else control.ss(_fraction([gain_p], [1.0]))
+
+
+_INTEGRATOR = _fraction([1.0], [1.0, 0.0])
+
+
+def motor_time_s(airframe: Airframe) -> float:
+    """Mean of the lags of rising and falling speed."""
+    return 0.5 * (airframe.rotor_model.spin_up_time_s + airframe.rotor_model.spin_down_time_s)
+
+
+class Cascade:
+    """The open loops of an airframe with given gains, each with the loops inside it closed."""
+
+    def __init__(self, airframe: Airframe, gains: Mapping[str, float]) -> None:
+        self.gains = gains
+        self.actuator = _lag(motor_time_s(airframe)) * _delay(FAST_DELAY_S)
+
+    def _rate(self, axis: str) -> tuple[System, System]:
+        """Open rate loop, and closed from rate setpoint to rate; the derivative acts on the measurement only."""
+        gains = self.gains
+        gyro = _low_pass(gains["gyro_cutoff_hz"])
+        plant = self.actuator * _INTEGRATOR
+        forward = _pi(gains[f"rate_p_{axis}"], gains[f"rate_i_{axis}"])
+        cutoff = gains["gyro_rate_cutoff_hz"] * 2.0 * np.pi
+        derivative = _fraction([gains[f"rate_d_{axis}"] * cutoff, 0.0], [1.0, cutoff])
+        back = (forward + derivative) * gyro
+        return plant * back, control.feedback(plant, back) * forward
+
+    def _attitude(self, axis: str) -> tuple[System, System]:
+        gain = self.gains["att_p_roll" if axis == "tilt" else "att_p_yaw"]
+        loop = gain * self._rate(axis)[1] * _INTEGRATOR
+        return loop, control.feedback(loop, 1)
+
+    def _acceleration(self, axis: str, thrust: float) -> System:
+        """From acceleration setpoint to acceleration, with the disturbance observer, `thrust` times the modelled."""
+        inner = self._attitude("tilt")[1] if axis == "xy" else self.actuator
+        inner = inner * _delay(SLOW_DELAY_S)
+        if thrust == 1.0 or self.gains["disturbance_cutoff_hz"] == 0.0:
+            return thrust * inner
+        seen = (thrust - 1.0) * inner * _low_pass(self.gains["disturbance_cutoff_hz"])
+        return thrust * inner * control.feedback(control.ss([], [], [], [[1.0]]), seen)
+
+    def _velocity(self, axis: str, thrust: float = 1.0) -> tuple[System, System]:
+        gains = self.gains
+        inner = self._acceleration(axis, thrust)
+        forward = _pi(gains[f"vel_p_{axis}"], gains[f"vel_i_{axis}"])
+        damping = gains[f"vel_d_{axis}"] * _low_pass(gains["accel_cutoff_hz"])
+        loop = inner * (forward * _INTEGRATOR + damping)
+        closed = control.feedback(inner, forward * _INTEGRATOR + damping) * forward * _INTEGRATOR
+        return loop, closed
+
+    def _position(self, axis: str, thrust: float = 1.0) -> System:
+        return self.gains[f"pos_p_{axis}"] * self._velocity(axis, thrust)[1] * _INTEGRATOR
+
+    def loops(self) -> dict[str, Callable[[], System]]:
+        """Open loops by name, from the inside out."""
+        return {
+            "rate roll pitch": lambda: self._rate("tilt")[0],
+            "rate yaw": lambda: self._rate("yaw")[0],
+            "attitude roll pitch": lambda: self._attitude("tilt")[0],
+            "attitude yaw": lambda: self._attitude("yaw")[0],
+            "velocity xy": lambda: self._velocity("xy")[0],
+            "velocity z": lambda: self._velocity("z")[0],
+            "velocity xy, 25 % more thrust": lambda: self._velocity("xy", 1.25)[0],
+            "velocity z, 25 % more thrust": lambda: self._velocity("z", 1.25)[0],
+            "position xy": lambda: self._position("xy"),
+            "position z": lambda: self._position("z"),
+        }
+
+    def margins(self, loop: str) -> Margins:
+        """Gain, phase and disk margins of one loop."""
+        system = self.loops()[loop]()
+        gain, phase_deg, _, crossover = control.margin(system)
+        _, disk_gain_db, disk_phase_deg = control.disk_margins(system, OMEGA)
+        gain_db = 20.0 * np.log10(gain) if np.isfinite(gain) else np.inf
+        return Margins(loop, float(gain_db), float(phase_deg), float(disk_gain_db), float(disk_phase_deg), float(crossover))
+
+
+def default_gains() -> Gains:
+    """The declared defaults in SI."""
+    return ParameterTable(CONTROL_PARAMETERS).fields(CONTROL_PARAMETERS)
+
+
+def all_margins(airframe: Airframe, gains: Mapping[str, float] | None = None) -> list[Margins]:
+    """Margins of every loop with the given gains, or the defaults."""
+    cascade = Cascade(airframe, default_gains() if gains is None else gains)
+    return [cascade.margins(loop) for loop in cascade.loops()]

@@ -1,0 +1,206 @@
+"""What the MAVLink part and the commander say to each other.
+
+`VehicleState` is the vehicle as every telemetry stream, check and navigator mode reads it, renewed once per frame.
+`Vehicle` is what a command handler may ask for; each answer is a `Reply` whose reason the ground station is shown.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from math import nan
+from typing import Any, Protocol
+
+from common.geodesy import GeoPoint
+from common.params import ParameterTable
+
+
+class Mode(IntEnum):
+    """Flight modes; a dialect maps them to its numbers."""
+
+    HOLD = 0
+    TAKEOFF = 1
+    MISSION = 2
+    RETURN = 3
+    LAND = 4
+    OFFBOARD = 5
+
+
+class Verdict(IntEnum):
+    """Answer to a request, numbered as MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
+
+
+class LandedState(IntEnum):
+    """Numbered as MAV_LANDED_STATE."""
+
+    UNDEFINED = 0
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKEOFF = 3
+    LANDING = 4
+
+
+class Severity(IntEnum):
+    """Numbered as MAV_SEVERITY."""
+
+    EMERGENCY = 0
+    ALERT = 1
+    CRITICAL = 2
+    ERROR = 3
+    WARNING = 4
+    NOTICE = 5
+    INFO = 6
+    DEBUG = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """A verdict, with the reason whenever it is a refusal."""
+
+    verdict: Verdict
+    reason: str = ""
+
+
+ACCEPTED = Reply(Verdict.ACCEPTED)
+
+
+@dataclass(frozen=True, slots=True)
+class MissionItem:
+    """One mission item as the protocol carries it; x and y are degrees (or metres in a local frame)."""
+
+    seq: int
+    frame: int  # MAV_FRAME
+    command: int  # MAV_CMD
+    params: tuple[float, float, float, float]
+    x: float  # [deg] latitude
+    y: float  # [deg] longitude
+    z: float  # [m] in the item's frame
+    autocontinue: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class ItemRefusal:
+    """Why a mission was not taken: the item and the MAV_MISSION_RESULT to answer with."""
+
+    seq: int
+    result: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class OffboardSetpoint:
+    """An external setpoint in our frames; NaN frees an element. `kind` is a SETPOINT_* of autopilot.ports."""
+
+    time_us: int
+    kind: int
+    pos_ned: tuple[float, float, float] = (nan, nan, nan)
+    vel_ned: tuple[float, float, float] = (nan, nan, nan)
+    accel_ned: tuple[float, float, float] = (nan, nan, nan)
+    yaw: float = nan
+    yaw_rate: float = nan
+    q_ned_from_frd: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
+    omega_frd: tuple[float, float, float] = (nan, nan, nan)
+    thrust: float = nan
+
+
+@dataclass(slots=True)
+class VehicleState:
+    """The vehicle as of this frame. The four records are rows of the kernel structs of the same name
+    (autopilot.ports, autopilot.estimator.state) as named tuples: `state.estimate.pos_ned[2]`."""
+
+    time_us: int = 0
+    estimate: Any = None  # Estimate
+    samples: Any = None  # Samples
+    actuators: Any = None  # Actuators
+    health: Any = None  # EstimatorState, renewed at 5 Hz
+    origin: GeoPoint = field(default_factory=lambda: GeoPoint(0.0, 0.0, 0.0))  # of the ned frame
+    position: GeoPoint = field(default_factory=lambda: GeoPoint(0.0, 0.0, 0.0))  # lat_deg, lon_deg, alt_m AMSL
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rad: float = 0.0
+    home: GeoPoint | None = None
+    home_ned: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    home_yaw_rad: float = 0.0
+    mode: Mode = Mode.HOLD
+    is_armed: bool = False
+    landed_state: LandedState = LandedState.ON_GROUND
+    is_ready_to_arm: bool = False
+    is_failsafe: bool = False
+    armed_since_us: int = 0
+    battery_remaining: float = nan  # [0..1]
+    battery_used_mah: float = 0.0
+    load: float = 0.0  # [0..1] share of the frame time the Python part took; 0 in lockstep
+    mission_count: int = 0
+    mission_current: int = 0  # seq
+    mission_state: int = 0  # MISSION_STATE
+
+
+class Announcer(Protocol):
+    """Where the vehicle's parts report events; the MAVLink server sends them to every link."""
+
+    def statustext(self, severity: Severity, text: str) -> None: ...
+
+    def mission_item_reached(self, seq: int) -> None: ...
+
+    def mission_current_changed(self, seq: int) -> None: ...
+
+    def home_changed(self) -> None: ...
+
+    def heartbeat_now(self) -> None:
+        """Mode or arming changed: send a heartbeat in this frame."""
+        ...
+
+
+class Vehicle(Protocol):
+    """What may be asked of the vehicle. Altitudes are AMSL [m], angles radians, NaN means default."""
+
+    state: VehicleState
+    params: ParameterTable
+
+    def arm(self, *, force: bool) -> Reply: ...
+
+    def disarm(self, *, force: bool) -> Reply: ...
+
+    def check_arming(self) -> list[str]:
+        """Reasons why the vehicle may not be armed now; empty when ready."""
+        ...
+
+    def set_mode(self, mode: Mode) -> Reply: ...
+
+    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply: ...
+
+    def land(self, lat_deg: float, lon_deg: float, yaw_rad: float) -> Reply: ...
+
+    def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
+        """Goes there and holds (mode HOLD); all NaN: hold here (pause)."""
+        ...
+
+    def change_speed(self, speed_m_s: float) -> Reply: ...
+
+    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
+        """All NaN: home is here."""
+        ...
+
+    def set_offboard(self, setpoint: OffboardSetpoint) -> None: ...
+
+    def pause_mission(self) -> Reply: ...
+
+    def start_mission(self, first: int) -> Reply:
+        """Mode MISSION from item `first` (-1: where it stands)."""
+        ...
+
+    def set_current_item(self, seq: int) -> Reply: ...
+
+    def mission_items(self) -> Sequence[MissionItem]: ...
+
+    def load_mission(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
+        """Replaces the mission as a whole, or refuses it as a whole and keeps the old one."""
+        ...
+
+    def reboot(self) -> Reply: ...

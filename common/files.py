@@ -1,0 +1,67 @@
+"""Files written whole: the bytes go to `NAME.part` beside the target, which is renamed when they are complete.
+
+A target is either the old file or the new one, never half of it; what a killed process had written stays in the .part.
+"""
+
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Self
+
+BUFFER_BYTES = 1 << 16
+
+
+class PartFile:
+    """A growing file that takes its name at `close`; an in-memory stream may stand in for the path."""
+
+    def __init__(self, target: Path | str | BinaryIO) -> None:
+        """Opens the part file.
+
+        Raises:
+            OSError: the folder is missing or may not be written.
+        """
+        self._target: Path | None = None
+        if isinstance(target, str | Path):
+            self._target = Path(target)
+            self.stream: BinaryIO = part_path(self._target).open("wb", buffering=BUFFER_BYTES)
+        else:
+            self.stream = target
+        self.write = self.stream.write
+
+    def close(self) -> None:
+        """Completes the file; a stream given by the caller stays open. A second call does nothing."""
+        if self._target is None:
+            self.stream.flush()
+        elif not self.stream.closed:
+            self.stream.close()
+            part_path(self._target).replace(self._target)
+
+    def leave_part(self) -> None:
+        """Gives up: what was written stays in the part file, and the target stays as it was."""
+        if self._target is not None:
+            self.stream.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.leave_part()
+
+
+def part_path(target: Path) -> Path:
+    """Where the bytes of `target` are collected until it is complete."""
+    return target.with_name(target.name + ".part")
+
+
+def write_whole(target: Path | str, content: bytes) -> None:
+    """Writes the file in one go.
+
+    Raises:
+        OSError: the folder is missing or may not be written; an existing file is as it was.
+    """
+    with PartFile(target) as file:
+        file.write(content)

@@ -1,0 +1,30 @@
+"""Vector types, time constants and launch helpers shared by every kernel module.
+
+One tick is one IMU sample and one pass of the flight controller; a frame is one pass of the Python part.
+Array rows are `wp.struct`s: one row per vehicle, one field per physical quantity. On the CPU
+`array.numpy()["pos_ned"]` is a live view of that field.
+"""
+
+import warp as wp
+
+MAX_ROTORS = 8
+ERROR_STATES = 24
+
+vec8 = wp.types.vector(length=MAX_ROTORS, dtype=wp.float32)
+vec24 = wp.types.vector(length=ERROR_STATES, dtype=wp.float32)
+
+TICK_US = 4_000
+TICK_S = 0.004
+SUBSTEPS = 4  # body steps of 1 ms in a tick
+FRAME_TICKS = 5  # ticks in a 50 Hz frame of commander, navigator and MAVLink
+FRAME_US = TICK_US * FRAME_TICKS
+
+GRAVITY_M_S2 = 9.80665  # standard gravity, CGPM 1901
+
+wp.config.quiet = True
+wp.set_module_options({"enable_backward": False})
+
+
+def use_forward_only() -> None:
+    """Compiles the calling module without adjoint code (training never differentiates through kernels here)."""
+    wp.set_module_options({"enable_backward": False})

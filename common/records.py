@@ -1,0 +1,61 @@
+"""Kernel rows as Python records: one `struct` unpack instead of one NumPy access per number.
+
+A row of an array of structs becomes a named tuple whose vectors are tuples, with the field names of the struct.
+"""
+
+import struct
+from collections import namedtuple
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+_CODES = {"f4": "f", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f8": "d", "i2": "h", "u2": "H", "i1": "b", "u1": "B"}
+
+
+def record_reader(dtype: np.dtype[Any], name: str) -> Callable[[Any, int], Any]:
+    """A function `read(buffer, offset)` that returns one row as a named tuple.
+
+    Args:
+        dtype: structured type of the row, as `array.numpy().dtype` of a Warp array of structs gives it.
+        name: name of the record type.
+    """
+    leaves: list[tuple[int, int, str]] = []  # byte offset, count, code
+    scope: dict[str, Any] = {}
+    expression = _record_expression(dtype, name, 0, leaves, scope)
+    layout = "<"
+    position = 0
+    for offset, count, code in leaves:
+        layout += f"{offset - position}x{count}{code}"
+        position = offset + struct.calcsize(f"<{count}{code}")
+    unpack = struct.Struct(layout).unpack_from
+    maker = eval(f"lambda v: {expression}", scope)  # noqa: S307  (the text is built from field names alone)
+    return lambda buffer, offset: maker(unpack(buffer, offset))
+
+
+def row_reader(rows: np.ndarray[Any, Any], i_row: int, name: str) -> Callable[[], Any]:
+    """A function that returns the present content of row `i_row` of a live structured view."""
+    read = record_reader(rows.dtype, name)
+    buffer = memoryview(rows.view(np.uint8).reshape(-1))
+    offset = i_row * rows.dtype.itemsize
+    return lambda: read(buffer, offset)
+
+
+def _record_expression(
+    dtype: np.dtype[Any], name: str, start: int, leaves: list[tuple[int, int, str]], scope: dict[str, Any]
+) -> str:
+    """Python text that builds the record of `dtype` from the unpacked values `v`; fills `leaves` and `scope`."""
+    if dtype.names is None or dtype.fields is None:
+        raise TypeError(f"{name} is not a structured type")
+    arguments = []
+    for field in dtype.names:
+        field_type, offset = dtype.fields[field][:2]
+        if field_type.names is not None:
+            arguments.append(_record_expression(field_type, f"{name}_{field}", start + offset, leaves, scope))
+            continue
+        i_value = sum(count for _, count, _ in leaves)
+        count = int(np.prod(field_type.shape)) if field_type.shape else 1
+        leaves.append((start + offset, count, _CODES[field_type.base.str[1:]]))
+        arguments.append(f"v[{i_value}:{i_value + count}]" if field_type.shape else f"v[{i_value}]")
+    scope[name] = namedtuple(name, dtype.names)  # type: ignore[misc]  # noqa: PYI024
+    return f"{name}({', '.join(arguments)})"

@@ -1,0 +1,1 @@
+"""Flights, scripts, reports and the command line: the composition root."""

@@ -1,0 +1,88 @@
+"""The command line: `honeyguide fly` and `honeyguide estimate`.
+
+A wrong argument, file or port gives one sentence on standard error and exit code 2; a mission that failed gives 1.
+"""
+
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+from rich.console import Console
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Fly a simulated drone and its flight controller over MAVLink.",
+)
+_ERRORS = Console(stderr=True, soft_wrap=True, highlight=False)
+
+
+def main() -> None:
+    """Entry point of the console command."""
+    app()
+
+
+@app.callback()
+def _root() -> None:
+    """Fly a simulated drone and its flight controller over MAVLink."""
+
+
+@app.command()
+def fly(
+    plan: Annotated[
+        Path | None, typer.Option(help="A QGroundControl .plan or QGC WPL 110 file. Default: a tour of the hills.")
+    ] = None,
+    idle: Annotated[bool, typer.Option("--idle", help="Fly no plan: wait for a ground station.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End with the mission; exit code 0 only if it succeeded.")] = False,
+    speed: Annotated[str, typer.Option(help="Times real time, or 'max': lockstep, without network links.")] = "1",
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this much simulated time.")] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of sensor noise and turbulence.")] = 0,
+    wind: Annotated[float, typer.Option(min=0.0, max=30.0, help="Wind speed [m/s], with turbulence and gusts.")] = 0.0,
+    wind_from: Annotated[float, typer.Option(min=0.0, max=360.0, help="Where the wind comes from [deg].")] = 270.0,
+    noise: Annotated[float, typer.Option(min=0.0, max=10.0, help="Scale of all sensor noise.")] = 1.0,
+    airframe: Annotated[str, typer.Option(help="Airframe name or TOML file.")] = "x500",
+    home: Annotated[str, typer.Option(help="Latitude,longitude[,altitude AMSL].")] = "47.397742,8.545594,488",
+    world_seed: Annotated[int, typer.Option(min=0, help="Seed of hills and trees.")] = 1,
+    trees: Annotated[float, typer.Option(min=0.0, max=1000.0, help="Trees per hectare.")] = 60.0,
+    hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m].")] = 12.0,
+    walls: Annotated[bool, typer.Option("--walls", help="Walls along the edges of the map.")] = False,
+    host: Annotated[str, typer.Option(help="Address ground stations are sent to.")] = "127.0.0.1",
+    gcs_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of ground stations.")] = 14550,
+    api_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of the offboard API.")] = 14540,
+    run_folder: Annotated[Path | None, typer.Option(help="Where logs go. Default: runs/DATE.")] = None,
+) -> None:
+    """Fly: world, vehicle, flight controller and MAVLink links, in real time or faster."""
+    from mission.session import FlightOptions, UserError, fly_session  # noqa: PLC0415  (Warp loads only to fly)
+
+    try:
+        exit_code = fly_session(
+            FlightOptions(
+                plan=plan, is_idle=idle, once=once, speed=speed, seconds=seconds, seed=seed, wind_m_s=wind,
+                wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
+                trees_per_ha=trees, hill_height_m=hills, has_walls=walls, host=host, gcs_port=gcs_port,
+                api_port=api_port, run_folder=run_folder,
+            )
+        )  # fmt: skip
+    except UserError as error:
+        _fail(str(error))
+    raise typer.Exit(exit_code)
+
+
+@app.command()
+def estimate(
+    log: Annotated[Path, typer.Argument(help="A PX4 ULog (.ulg), or a sensor CSV (docs/estimate.md).")],
+    output: Annotated[Path | None, typer.Option(help="Folder for the results. Default: beside the log.")] = None,
+) -> None:
+    """Run the estimator alone over the sensors recorded in a log."""
+    from mission.estimate import EstimateError, estimate_log  # noqa: PLC0415
+
+    try:
+        estimate_log(log, output, Console())
+    except EstimateError as error:
+        _fail(str(error))
+
+
+def _fail(sentence: str) -> NoReturn:
+    _ERRORS.print(f"honeyguide: {sentence}", markup=False)
+    raise typer.Exit(2)

@@ -1,0 +1,372 @@
+"""The protocol half of the scripting client: frames, commands, missions and parameters, in simulated time.
+
+In: bytes from a transport, once per frame. Out: heartbeats at 1 Hz, the offboard setpoint at 20 Hz, requests and
+their re-sends. Coroutines wait for messages by letting frames pass; nothing sleeps and nothing reads a wall clock.
+"""
+
+import struct
+from collections import deque
+from collections.abc import Callable, Coroutine, Generator, Iterable, Sequence
+from math import isnan
+from types import TracebackType, coroutine
+from typing import Any, Protocol
+
+from autopilot.mavlink.codec import Frame, FrameReader, Message, decode, encode, message_id
+from mission.plan import PlanItem
+
+CLIENT_SYSTEM_ID = 245
+CLIENT_COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as MAVSDK uses
+OFFBOARD_PERIOD_US = 50_000
+HEARTBEAT_PERIOD_US = 1_000_000
+COMMAND_TIMEOUT_S = 1.5
+COMMAND_TRIES = 3
+TRANSFER_TIMEOUT_S = 1.5
+PARAMETER_IS_INTEGER = 6  # MAV_PARAM_TYPE_INT32
+
+
+class ScriptError(RuntimeError):
+    """The script cannot go on."""
+
+
+class ScriptTimeout(ScriptError):
+    """Something awaited did not happen in time."""
+
+
+class CommandRefused(ScriptError):
+    """The vehicle refused a command; `result` is the MAV_RESULT and the message carries its reason."""
+
+    def __init__(self, name: str, result: int, reason: str) -> None:
+        super().__init__(f"{name} refused (result {result}): {reason or 'no reason given'}")
+        self.result = result
+        self.reason = reason
+
+
+class MissionRefused(ScriptError):
+    """The vehicle did not take the mission; `result` is the MAV_MISSION_RESULT."""
+
+    def __init__(self, result: int, reason: str) -> None:
+        super().__init__(f"mission refused (result {result}): {reason or 'no reason given'}")
+        self.result = result
+
+
+class Transport(Protocol):
+    """A byte pipe to the vehicle."""
+
+    def send(self, data: bytes) -> None: ...
+
+    def receive(self) -> Sequence[bytes]:
+        """What has arrived since the last call."""
+        ...
+
+
+@coroutine
+def next_frame() -> Generator[None, None, None]:
+    """Lets one frame of the simulation pass."""
+    yield
+
+
+class Running:
+    """A script under way."""
+
+    def __init__(self, script: Coroutine[Any, Any, Any]) -> None:
+        self._script = script
+        self.is_done = False
+        self.result: Any = None
+        self.error: ScriptError | None = None
+
+    def step(self) -> None:
+        """Runs the script to its next wait."""
+        if self.is_done:
+            return
+        try:
+            self._script.send(None)
+        except StopIteration as stop:
+            self.is_done, self.result = True, stop.value
+        except ScriptError as error:
+            self.is_done, self.error = True, error
+
+    def cancel(self) -> None:
+        self._script.close()
+        self.is_done = True
+
+
+class Inbox:
+    """Messages of some kinds, in order, while the `with` block lasts."""
+
+    def __init__(self, client: "Client", names: Iterable[str]) -> None:
+        self._client = client
+        self._ids = {message_id(name) for name in names}
+        self._queue: deque[Message] = deque()
+
+    def __enter__(self) -> "Inbox":
+        self._client._inboxes.append((self._ids, self._queue))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._client._inboxes.remove((self._ids, self._queue))
+
+    async def next(self, timeout_s: float, what: str) -> Any:
+        """The fields of the next message; as `next_message`."""
+        return (await self.next_message(timeout_s, what)).fields
+
+    async def next_message(self, timeout_s: float, what: str) -> Message:
+        """The next message.
+
+        Raises:
+            ScriptTimeout: none came in time.
+        """
+        await self._client.until(lambda: bool(self._queue), timeout_s, what)
+        return self._queue.popleft()
+
+
+class Client:
+    """The vehicle at the other end of a transport.
+
+    Args:
+        transport: bytes to and from the vehicle.
+        system_id: of the vehicle.
+    """
+
+    def __init__(self, transport: Transport, *, system_id: int = 1) -> None:
+        self.time_us = 0
+        self.system_id = system_id
+        self.texts: list[str] = []
+        self.reached: list[int] = []
+        self._transport = transport
+        self._reader = FrameReader()
+        self._seq = 0
+        self._latest: dict[int, Frame] = {}
+        self._inboxes: list[tuple[set[int], deque[Message]]] = []
+        self._scripts: list[Running] = []
+        self._next_heartbeat_us = 0
+        self._next_offboard_us = 0
+        self._offboard: Callable[[int], bytes] | None = None
+
+    def frame(self, time_us: int) -> None:
+        """Takes in what has arrived, sends what is due and runs the scripts to their next wait."""
+        self.time_us = time_us
+        self._receive()
+        if time_us >= self._next_heartbeat_us:
+            self._next_heartbeat_us = time_us + HEARTBEAT_PERIOD_US
+            self.send("HEARTBEAT", type=6, autopilot=8, base_mode=0, custom_mode=0, system_status=4, mavlink_version=3)
+        if self._offboard is not None and time_us >= self._next_offboard_us:
+            self._next_offboard_us = time_us + OFFBOARD_PERIOD_US
+            self._transport.send(self._offboard(time_us // 1000))
+        for running in self._scripts:
+            running.step()
+        self._scripts = [running for running in self._scripts if not running.is_done]
+
+    def start(self, script: Coroutine[Any, Any, Any]) -> Running:
+        """Starts a script; it runs on as `frame` is called."""
+        running = Running(script)
+        self._scripts.append(running)
+        return running
+
+    async def until(self, condition: Callable[[], bool], timeout_s: float, what: str) -> None:
+        """Returns when the condition holds.
+
+        Raises:
+            ScriptTimeout: it did not hold within `timeout_s` of the vehicle's time.
+        """
+        deadline_us = self.time_us + int(timeout_s * 1e6)
+        while not condition():
+            if self.time_us >= deadline_us:
+                raise ScriptTimeout(f"{what}: nothing within {timeout_s:g} s")
+            await next_frame()
+
+    async def sleep(self, seconds: float) -> None:
+        """Lets simulated time pass."""
+        wake_us = self.time_us + int(seconds * 1e6)
+        while self.time_us < wake_us:
+            await next_frame()
+
+    def latest(self, name: str) -> Any:
+        """The fields of the last message of a kind, or None; decoded only when asked for."""
+        frame = self._latest.get(message_id(name))
+        return None if frame is None else frame.kind.unpack(frame.payload)
+
+    def send(self, name: str, **fields: Any) -> None:
+        """Sends one message."""
+        self._transport.send(self.encode(name, **fields))
+
+    def encode(self, name: str, **fields: Any) -> bytes:
+        """The next frame of this client."""
+        self._seq = (self._seq + 1) & 0xFF
+        return encode(name, CLIENT_SYSTEM_ID, CLIENT_COMPONENT_ID, self._seq, **fields)
+
+    def subscribe(self, *names: str) -> Inbox:
+        """Collects messages of these kinds for the length of a `with` block."""
+        return Inbox(self, names)
+
+    async def command(self, command: int, *params: float, name: str = "", timeout_s: float = COMMAND_TIMEOUT_S) -> Any:
+        """Sends a COMMAND_LONG and returns its accepting COMMAND_ACK.
+
+        Raises:
+            CommandRefused: any other answer.
+            ScriptTimeout: no answer after three tries.
+        """
+        values = (*params, *([0.0] * (7 - len(params))))
+        fields = {f"param{k + 1}": float(value) for k, value in enumerate(values)}
+        return await self._command("COMMAND_LONG", command, fields, name or f"command {command}", timeout_s)
+
+    async def command_int(
+        self, command: int, frame: int, params: Sequence[float], x: int, y: int, z: float, *, name: str = ""
+    ) -> Any:
+        """As `command`, with a position: x and y are 1e7 degrees (or 1e4 metres in local frames)."""
+        fields: dict[str, Any] = {f"param{k + 1}": float(value) for k, value in enumerate(params)}
+        fields |= {"frame": frame, "current": 0, "autocontinue": 0, "x": x, "y": y, "z": z}
+        return await self._command("COMMAND_INT", command, fields, name or f"command {command}", COMMAND_TIMEOUT_S)
+
+    async def _command(
+        self, message: str, command: int, fields: dict[str, Any], name: str, timeout_s: float
+    ) -> Any:
+        first_text = len(self.texts)
+        with self.subscribe("COMMAND_ACK") as inbox:
+            for attempt in range(COMMAND_TRIES):
+                extra = {"confirmation": attempt} if message == "COMMAND_LONG" else {}
+                self.send(
+                    message, target_system=self.system_id, target_component=1, command=command, **fields, **extra
+                )
+                try:
+                    ack = await inbox.next(timeout_s, name)
+                    while ack.command != command or ack.result == 5:  # another command's, or IN_PROGRESS
+                        ack = await inbox.next(timeout_s, name)
+                except ScriptTimeout:
+                    continue
+                if ack.result != 0:
+                    await next_frame()
+                    raise CommandRefused(name, ack.result, "; ".join(self.texts[first_text:]))
+                return ack
+        raise ScriptTimeout(f"{name}: no answer after {COMMAND_TRIES} tries")
+
+    async def upload(self, items: Sequence[PlanItem]) -> None:
+        """Replaces the vehicle's mission.
+
+        Raises:
+            MissionRefused: the vehicle did not take it and keeps its old one.
+        """
+        first_text = len(self.texts)
+        target = {"target_system": self.system_id, "target_component": 1, "mission_type": 0}
+        with self.subscribe("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK") as inbox:
+            self.send("MISSION_COUNT", **target, count=len(items))
+            while True:
+                message = await inbox.next_message(6 * TRANSFER_TIMEOUT_S, "mission upload")
+                request = message.fields
+                if message.name == "MISSION_ACK":
+                    if request.type != 0:
+                        await next_frame()
+                        raise MissionRefused(request.type, "; ".join(self.texts[first_text:]))
+                    return
+                if request.seq < len(items):
+                    self.send("MISSION_ITEM_INT", **target, **_item_fields(items[request.seq]))
+
+    async def download(self) -> list[PlanItem]:
+        """The vehicle's mission."""
+        target = {"target_system": self.system_id, "target_component": 1, "mission_type": 0}
+        with self.subscribe("MISSION_COUNT", "MISSION_ITEM_INT") as inbox:
+            self.send("MISSION_REQUEST_LIST", **target)
+            count = (await inbox.next(TRANSFER_TIMEOUT_S, "mission count")).count
+            items: list[PlanItem] = []
+            while len(items) < count:
+                self.send("MISSION_REQUEST_INT", **target, seq=len(items))
+                message = await inbox.next_message(TRANSFER_TIMEOUT_S, f"mission item {len(items)}")
+                if message.name == "MISSION_ITEM_INT" and message.fields.seq == len(items):
+                    items.append(_plan_item(message.fields))
+            self.send("MISSION_ACK", **target, type=0)
+            return items
+
+    async def set_parameter(self, name: str, value: float) -> float:
+        """Sets a parameter and returns the value the vehicle stored."""
+        current = await self._read_parameter(name)
+        with self.subscribe("PARAM_VALUE") as inbox:
+            self.send(
+                "PARAM_SET",
+                target_system=self.system_id,
+                target_component=1,
+                param_id=name,
+                param_value=parameter_to_wire(value, current.param_type),
+                param_type=current.param_type,
+            )
+            return parameter_from_wire(await self._parameter_named(inbox, name))
+
+    async def get_parameter(self, name: str) -> float:
+        """The value of a parameter."""
+        return parameter_from_wire(await self._read_parameter(name))
+
+    async def _read_parameter(self, name: str) -> Any:
+        with self.subscribe("PARAM_VALUE") as inbox:
+            self.send(
+                "PARAM_REQUEST_READ", target_system=self.system_id, target_component=1, param_id=name, param_index=-1
+            )
+            return await self._parameter_named(inbox, name)
+
+    async def _parameter_named(self, inbox: Inbox, name: str) -> Any:
+        while True:
+            message = await inbox.next(TRANSFER_TIMEOUT_S, f"parameter {name}")
+            if message.param_id == name:
+                return message
+
+    def _receive(self) -> None:
+        for data in self._transport.receive():
+            for frame in self._reader.feed(data):
+                if frame.sysid == self.system_id:
+                    self._take(frame)
+
+    def _take(self, frame: Frame) -> None:
+        msg_id = frame.kind.msg_id
+        self._latest[msg_id] = frame
+        if msg_id in _NOTED:
+            self._note(decode(frame))
+        for ids, queue in self._inboxes:
+            if msg_id in ids:
+                queue.append(decode(frame))
+
+    def _note(self, message: Message) -> None:
+        if message.name == "STATUSTEXT":
+            self.texts.append(message.fields.text)
+        else:
+            self.reached.append(message.fields.seq)
+
+
+_NOTED = {message_id("STATUSTEXT"), message_id("MISSION_ITEM_REACHED")}
+
+
+def parameter_to_wire(value: float, param_type: int) -> int:
+    """The bit pattern of a value in PX4's encoding, where an integer's bits travel in the float field."""
+    bits = struct.pack("<i", int(value)) if param_type == PARAMETER_IS_INTEGER else struct.pack("<f", value)
+    return int.from_bytes(bits, "little")
+
+
+def parameter_from_wire(message: Any) -> float:
+    """The value in the fields of a PARAM_VALUE of PX4's encoding."""
+    bits = message.param_value.to_bytes(4, "little")
+    return float(struct.unpack("<i" if message.param_type == PARAMETER_IS_INTEGER else "<f", bits)[0])
+
+
+def _item_fields(item: PlanItem) -> dict[str, Any]:
+    fields = {f"param{k + 1}": value for k, value in enumerate(item.params)}
+    return fields | {
+        "seq": item.seq,
+        "frame": item.frame,
+        "command": item.command,
+        "current": int(item.seq == 0),
+        "autocontinue": int(item.autocontinue),
+        "x": 0 if isnan(item.x) else round(item.x * 1e7),
+        "y": 0 if isnan(item.y) else round(item.y * 1e7),
+        "z": item.z,
+    }
+
+
+def _plan_item(message: Any) -> PlanItem:
+    return PlanItem(
+        seq=message.seq,
+        frame=message.frame,
+        command=message.command,
+        params=(message.param1, message.param2, message.param3, message.param4),
+        x=message.x * 1e-7,
+        y=message.y * 1e-7,
+        z=message.z,
+        autocontinue=bool(message.autocontinue),
+    )

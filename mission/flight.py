@@ -1,0 +1,152 @@
+"""One flight: world, vehicle, flight controller, links, client and recorder, advanced frame by frame.
+
+Each frame is 20 ms of simulated time: five ticks of the kernels, then the Python part of the flight controller, then
+the scripting client, then the recorder. With the memory link alone it is a pure function of its configuration.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from autopilot.mavlink.links import Link, memory_pair
+from autopilot.mavlink.server import MavlinkServer
+from autopilot.node import FlightController, HostPorts
+from autopilot.params import all_parameters
+from common.airframe import Airframe, load_airframe
+from common.clock import Pacer
+from common.geodesy import GeoPoint
+from common.kernels import FRAME_TICKS, FRAME_US
+from common.params import ParameterTable
+from common.records import row_reader
+from common.tlog import TlogWriter
+from mission.client import Running
+from mission.recorder import History, Recorder
+from mission.script import Drone, Script
+from sim.rig import Rig
+from sim.sensors.sensors import sensor_model
+from sim.wind import wind_model
+from sim.world.world import WorldConfig, WorldMap, build_world
+
+DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
+TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
+GUST_SHARE = 0.3  # guess: a gust adds up to this share of the mean wind
+
+
+class FlightConfig(BaseModel):
+    """What a flight is made from."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    airframe: str = "x500"
+    """Name of an airframe, or path of an airframe file."""
+    home: GeoPoint = DEFAULT_HOME
+    """Where the vehicle boots."""
+    seed: int = Field(default=0, ge=0, le=2**31 - 1)
+    """Seeds sensor noise and turbulence."""
+    wind_m_s: float = Field(default=0.0, ge=0.0, le=30.0)
+    """Mean wind speed 6 m above the ground; above 0 it is turbulent and has gusts."""
+    wind_from_deg: float = Field(default=270.0, ge=0.0, le=360.0)
+    """Where the wind comes from, clockwise from north."""
+    noise: float = Field(default=1.0, ge=0.0, le=10.0)
+    """Scales every sensor's noise; 0 makes them perfect."""
+    world: WorldConfig = WorldConfig()
+    """The ground."""
+
+
+class Flight:
+    """A vehicle in the air, or about to be.
+
+    Args:
+        config: what it is made from.
+        links: besides the memory link to `drone`, for ground stations.
+        folder: where `flight.ulg` and `flight.tlog` are written; None writes nothing.
+    """
+
+    def __init__(self, config: FlightConfig, *, links: list[Link] | None = None, folder: Path | None = None) -> None:
+        self.config = config
+        self.airframe: Airframe = load_airframe(config.airframe)
+        self.world: WorldMap = build_world(config.world)
+        self.rig = Rig(
+            self.airframe,
+            self.world,
+            sensor_model(noise_scale=config.noise, home=config.home),
+            wind_model(config.wind_m_s, config.wind_from_deg, TURBULENCE, GUST_SHARE * config.wind_m_s),
+            home=config.home,
+            seed=config.seed,
+        )
+        self.time_us = 0
+        self.params = ParameterTable(all_parameters())
+        self.rig.load_parameters(self.params)
+        self.params.on_change(lambda _: self.rig.load_parameters(self.params))
+        self.controller = FlightController(host_ports(self.rig), self.params, self.airframe, config.home)
+        vehicle_end, client_end = memory_pair()
+        self.server = MavlinkServer(self.controller, [vehicle_end, *(links or [])])
+        self.controller.attach(self.server)
+        self.drone = Drone(client_end)
+        self._tlog = None
+        if folder is not None:
+            self._tlog = TlogWriter(folder / "flight.tlog")
+            self.server.on_frame = self._tlog.frame
+        self.recorder = Recorder(
+            None if folder is None else folder / "flight.ulg", self.rig, self.controller, self.airframe
+        )
+        self.server.on_text = self.recorder.text
+
+    def frame(self) -> None:
+        """Advances by 20 ms."""
+        self.rig.advance(FRAME_TICKS)
+        self.time_us += FRAME_US
+        self.controller.frame(self.time_us)
+        self.drone.frame(self.time_us)
+        self.recorder.frame()
+
+    def run(
+        self,
+        is_over: Callable[[Self], bool],
+        *,
+        speed: float | None = None,
+        on_frame: Callable[[Self], None] | None = None,
+    ) -> None:
+        """Advances until `is_over(self)`.
+
+        Args:
+            is_over: asked after each frame.
+            speed: simulated seconds per second; None runs as fast as possible.
+            on_frame: called after each frame, for progress displays.
+        """
+        pacer = Pacer(speed)
+        while not is_over(self):
+            pacer.wait_until(self.time_us)
+            self.frame()
+            if on_frame is not None:
+                on_frame(self)
+
+    def fly(self, script: Script, *, seconds: float = 3600.0) -> Running:
+        """Runs a script to its end in lockstep, for at most `seconds` of simulated time."""
+        running = self.drone.start(script(self.drone))
+        end_us = self.time_us + int(seconds * 1e6)
+        self.run(lambda _: running.is_done or self.time_us >= end_us)
+        running.cancel()
+        return running
+
+    def close(self) -> History:
+        """Completes the logs, closes the links and returns the history."""
+        self.server.close()
+        if self._tlog is not None:
+            self._tlog.close()
+        return self.recorder.close()
+
+
+def host_ports(rig: Rig, i_vehicle: int = 0) -> HostPorts:
+    """The connectors of one vehicle's flight controller, on the live rows of a rig."""
+    autopilot = rig.arrays.autopilot
+    estimator = autopilot.ekf.rows.numpy()
+    return HostPorts(
+        read_estimate=row_reader(estimator["estimate"], i_vehicle, "Estimate"),
+        read_samples=row_reader(rig.arrays.sensors.numpy()["samples"], i_vehicle, "Samples"),
+        read_actuators=row_reader(autopilot.control.numpy()["actuators"], i_vehicle, "Actuators"),
+        read_health=row_reader(estimator, i_vehicle, "EstimatorState"),
+        setpoint=autopilot.setpoint.numpy()[i_vehicle : i_vehicle + 1],
+    )

@@ -1,0 +1,98 @@
+"""Pictures of a flight: the track from above and from the side, and the estimator's errors over time."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+
+from mission.recorder import History
+from sim.world.world import WorldMap
+
+mpl.use("Agg")
+from matplotlib.axes import Axes  # noqa: E402  (after the backend is chosen)
+from matplotlib.figure import Figure  # noqa: E402
+
+Rows = npt.NDArray[Any]
+TRUE_COLOUR = "#0b7285"
+ESTIMATE_COLOUR = "#e8590c"
+PLAN_COLOUR = "#495057"
+
+
+def plot_flight(
+    history: History, world: WorldMap, path_ned: Sequence[tuple[int, Rows]], title: str, target: Path
+) -> None:
+    """Writes the picture of a flight as PNG."""
+    figure = Figure(figsize=(12, 8), layout="constrained")
+    figure.suptitle(title)
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
+    _track(figure.add_subplot(grid[:2, 0]), history, world, path_ned)
+    _profile(figure.add_subplot(grid[2, 0]), history, world)
+    time_s = history.time_us * 1e-6
+    pos_error = history.pos_ned_est.astype(float) - history.pos_ned_true
+    vel_error = history.vel_ned_est.astype(float) - history.vel_ned_true
+    _errors(figure.add_subplot(grid[0, 1]), time_s, pos_error, "position error [m]")
+    _errors(figure.add_subplot(grid[1, 1]), time_s, vel_error, "velocity error [m/s]")
+    attitude = figure.add_subplot(grid[2, 1])
+    _errors(attitude, time_s, _euler_error_deg(history), "attitude error [deg]", ("roll", "pitch", "yaw"))
+    attitude.set_xlabel("time [s]")
+    figure.savefig(target, dpi=90)
+
+
+def _track(axes: Axes, history: History, world: WorldMap, path_ned: Sequence[tuple[int, Rows]]) -> None:
+    north, east = history.pos_ned_true[:, 0], history.pos_ned_true[:, 1]
+    reach = max(30.0, float(np.abs(history.pos_ned_true[:, :2]).max()) + 15.0)
+    line = np.linspace(-reach, reach, 160)
+    heights = world.height(*np.meshgrid(line, line, indexing="ij"))
+    shade = axes.pcolormesh(line, line, heights, cmap="Greens_r", alpha=0.55, shading="auto")
+    axes.figure.colorbar(shade, ax=axes, label="ground [m]", shrink=0.8)
+    trees = world.trees
+    near = (np.abs(trees["north"]) < reach) & (np.abs(trees["east"]) < reach)
+    axes.scatter(trees["east"][near], trees["north"][near], s=6, c="#2b8a3e", alpha=0.5, label="trees")
+    if len(path_ned) > 1:
+        points = np.array([point for _, point in path_ned])
+        axes.plot(points[:, 1], points[:, 0], "--", color=PLAN_COLOUR, lw=1, label="plan")
+    axes.plot(history.pos_ned_est[:, 1], history.pos_ned_est[:, 0], color=ESTIMATE_COLOUR, lw=1, label="estimate")
+    axes.plot(east, north, color=TRUE_COLOUR, lw=1.5, label="true")
+    axes.set(xlabel="east [m]", ylabel="north [m]", aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _profile(axes: Axes, history: History, world: WorldMap) -> None:
+    time_s = history.time_us * 1e-6
+    axes.plot(time_s, -history.pos_ned_est[:, 2], color=ESTIMATE_COLOUR, lw=1, label="estimate")
+    axes.plot(time_s, -history.pos_ned_true[:, 2], color=TRUE_COLOUR, lw=1.5, label="true")
+    ground = world.height(history.pos_ned_true[:, 0].astype(float), history.pos_ned_true[:, 1].astype(float))
+    axes.fill_between(time_s, ground, min(0.0, float(ground.min())) - 1.0, color="#2b8a3e", alpha=0.4, label="ground")
+    axes.set(xlabel="time [s]", ylabel="height above home [m]")
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _errors(
+    axes: Axes, time_s: Rows, errors: Rows, label: str, names: Sequence[str] = ("north", "east", "down")
+) -> None:
+    for name, column in zip(names, errors.T, strict=True):
+        axes.plot(time_s, column, lw=0.9, label=name)
+    axes.axhline(0.0, color="black", lw=0.5)
+    axes.set_ylabel(label)
+    axes.legend(loc="upper right", fontsize=8, ncols=3)
+
+
+def _euler_error_deg(history: History) -> Rows:
+    estimated, true = _euler(history.q_est), _euler(history.q_true)
+    return np.degrees((estimated - true + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def _euler(quaternions: Rows) -> Rows:
+    """Roll, pitch, yaw [rad], ZYX, of (x, y, z, w) rows."""
+    x, y, z, w = quaternions.astype(float).T
+    return np.stack(
+        [
+            np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
+            np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        ],
+        axis=1,
+    )

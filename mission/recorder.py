@@ -1,0 +1,222 @@
+"""Records a flight: the ULog, and the history that the summary and the plots are made from.
+
+In: the live kernel rows, copied raw once per frame. Out: columns, written once per simulated second, so that logging
+costs a flight faster than real time almost nothing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from autopilot.node import FlightController
+from autopilot.vehicle import Severity
+from common.airframe import Airframe
+from common.kernels import FRAME_TICKS
+from common.ulog import UlogTopic, UlogWriter
+from mission.topics import TOPICS, Batch
+from sim.rig import Rig
+
+FLUSH_FRAMES = 50
+NAVIGATION_STATES = {0: 4, 1: 17, 2: 3, 3: 5, 4: 18, 5: 14}  # Mode -> vehicle_status.nav_state of PX4
+
+Rows = npt.NDArray[Any]
+
+
+@dataclass(slots=True)
+class History:
+    """What the summary needs of each frame; arrays of shape (frames,) or (frames, 3 or 4)."""
+
+    time_us: Rows
+    pos_ned_true: Rows
+    vel_ned_true: Rows
+    q_true: Rows
+    pos_ned_est: Rows
+    vel_ned_est: Rows
+    q_est: Rows
+    is_armed: Rows
+    mode: Rows
+    mission_seq: Rows
+    battery_remaining: Rows
+
+
+class _RawRow:
+    """Copies of the first row of a live structured view."""
+
+    def __init__(self, rows: Rows) -> None:
+        self._dtype = rows.dtype
+        self._buffer = memoryview(rows[0].view(np.uint8).reshape(-1) if rows.ndim > 1 else rows[:1].view(np.uint8))
+        self._copies: list[bytes] = []
+
+    def copy(self) -> None:
+        self._copies.append(self._buffer.tobytes())
+
+    def take(self) -> Rows:
+        """The copies since the last call."""
+        rows = np.frombuffer(b"".join(self._copies), dtype=self._dtype)
+        self._copies.clear()
+        return rows
+
+
+class Recorder:
+    """Logs vehicle 0 of a rig.
+
+    Args:
+        path: of the ULog; None keeps only the history.
+        rig: the simulation.
+        controller: the flight controller of vehicle 0.
+        airframe: for the log's header.
+    """
+
+    def __init__(self, path: Path | None, rig: Rig, controller: FlightController, airframe: Airframe) -> None:
+        autopilot = rig.arrays.autopilot
+        self._controller = controller
+        self._time_us: list[int] = []
+        self._status: list[tuple[int, bool, int, int, float]] = []
+        self._body = _RawRow(rig.arrays.body.numpy())
+        self._sensors = _RawRow(rig.arrays.sensors.numpy())
+        self._control = _RawRow(autopilot.control.numpy())
+        self._estimator = _RawRow(autopilot.ekf.rows.numpy())
+        self._imu_ring = _RawRow(autopilot.ekf.imu_ring.numpy())
+        self._imu_time_us = 0
+        self._samples_before = np.zeros(1, dtype=rig.arrays.sensors.numpy()["samples"].dtype)
+        self._history: list[History] = []
+        self._log = None if path is None else _open_log(path, controller, airframe)
+        self._topics: list[tuple[UlogTopic, Callable[[Batch], Any]]] = []
+        if self._log is not None:
+            self._topics = [(self._log.add_topic(topic.name, topic.fields), topic.columns) for topic in TOPICS]
+            self._imu_topic = self._log.add_topic("sensor_combined", _IMU_FIELDS)
+            self._status_topic = self._log.add_topic("vehicle_status", _STATUS_FIELDS)
+            self._landed_topic = self._log.add_topic("vehicle_land_detected", _LANDED_FIELDS)
+            self._mission_topic = self._log.add_topic("mission_result", _MISSION_FIELDS)
+
+    def frame(self) -> None:
+        """Notes the frame that has just ended."""
+        state = self._controller.state
+        self._time_us.append(state.time_us)
+        self._status.append(
+            (int(state.mode), state.is_armed, int(state.landed_state), state.mission_current, state.battery_remaining)
+        )
+        for rows in (self._body, self._sensors, self._control, self._estimator, self._imu_ring):
+            rows.copy()
+        if len(self._time_us) >= FLUSH_FRAMES:
+            self.flush()
+
+    def text(self, time_us: int, severity: Severity, text: str) -> None:
+        """Logs a text the vehicle sent."""
+        if self._log is not None:
+            self.flush()
+            self._log.message(time_us, int(severity), text)
+
+    def flush(self) -> None:
+        """Writes what has been noted since the last flush."""
+        if not self._time_us:
+            return
+        estimator = self._estimator.take()
+        samples = self._sensors.take()["samples"]
+        batch = Batch(
+            time_us=np.array(self._time_us, dtype=np.uint64),
+            estimate=estimator["estimate"],
+            samples=samples,
+            samples_before=self._samples_before,
+            actuators=self._control.take()["actuators"],
+            health=estimator,
+            body=self._body.take(),
+            origin=self._controller.state.origin,
+        )
+        status = np.array(self._status, dtype=float)
+        self._time_us.clear()
+        self._status.clear()
+        self._samples_before = samples[-1:].copy()
+        self._history.append(_history(batch, status))
+        imu = self._imu_ring.take()
+        if self._log is not None:
+            self._write(batch, status, imu)
+
+    def close(self) -> History:
+        """Completes the log and returns the whole flight's history."""
+        self.flush()
+        if self._log is not None:
+            self._log.close()
+        return History(
+            *(
+                np.concatenate([getattr(part, name) for part in self._history])
+                for name in History.__dataclass_fields__
+            )
+        )
+
+    def _write(self, batch: Batch, status: Rows, imu_rings: Rows) -> None:
+        for topic, columns in self._topics:
+            topic.write(columns(batch))
+        times, first = np.unique(imu_rings["time_us"], return_index=True)
+        imu = imu_rings[first[times > self._imu_time_us]]
+        if len(imu):
+            self._imu_time_us = int(imu["time_us"][-1])
+            self._imu_topic.write(_imu_columns(imu))
+        for index in np.flatnonzero(batch.time_us % 500_000 == 0):
+            mode, is_armed, landed, seq, _ = (int(value) if value == value else 0 for value in status[index])
+            time_us = int(batch.time_us[index])
+            self._status_topic.write_row(time_us, 2 if is_armed else 1, NAVIGATION_STATES[mode], 2, 1, 1)
+            self._landed_topic.write_row(time_us, landed == 1, landed == 1, landed == 1)
+            self._mission_topic.write_row(time_us, seq, self._controller.state.mission_count, True, False, False)
+
+
+_IMU_FIELDS = {
+    "gyro_rad": "float[3]",
+    "gyro_integral_dt": "uint32_t",
+    "accelerometer_timestamp_relative": "int32_t",
+    "accelerometer_m_s2": "float[3]",
+    "accelerometer_integral_dt": "uint32_t",
+    "accelerometer_clipping": "uint8_t",
+}
+_STATUS_FIELDS = dict.fromkeys("arming_state nav_state vehicle_type system_type system_id".split(), "uint8_t")
+_LANDED_FIELDS = dict.fromkeys("ground_contact maybe_landed landed".split(), "bool")
+_MISSION_FIELDS = {
+    "seq_current": "uint16_t",
+    "seq_total": "uint16_t",
+    **dict.fromkeys("valid finished failure".split(), "bool"),
+}
+
+
+def _imu_columns(imu: Rows) -> dict[str, Any]:
+    period_us = np.round(imu["dt_s"] * 1e6).astype(np.uint32)
+    return {
+        "timestamp": imu["time_us"],
+        "gyro_rad": imu["gyro_frd"],
+        "gyro_integral_dt": period_us,
+        "accelerometer_timestamp_relative": 0,
+        "accelerometer_m_s2": imu["accel_frd"],
+        "accelerometer_integral_dt": period_us,
+        "accelerometer_clipping": 0,
+    }
+
+
+def _history(batch: Batch, status: Rows) -> History:
+    estimate, body = batch.estimate, batch.body
+    return History(
+        time_us=batch.time_us,
+        pos_ned_true=body["pos_ned"],
+        vel_ned_true=body["vel_ned"],
+        q_true=body["q_ned_from_frd"],
+        pos_ned_est=estimate["pos_ned"],
+        vel_ned_est=estimate["vel_ned"],
+        q_est=estimate["q_ned_from_frd"],
+        is_armed=status[:, 1] > 0,
+        mode=status[:, 0].astype(int),
+        mission_seq=status[:, 3].astype(int),
+        battery_remaining=status[:, 4],
+    )
+
+
+def _open_log(path: Path, controller: FlightController, airframe: Airframe) -> UlogWriter:
+    table = controller.params
+    return UlogWriter(
+        path,
+        0,
+        {"sys_name": "Honeyguide", "ver_hw": "SIMULATED", "ver_sw": "0.1.0", "airframe": airframe.name},
+        {name: table[name] for name in table},
+        {name: table.declarations[name].default for name in table},
+    )

@@ -1,0 +1,308 @@
+"""`honeyguide fly`: options to a flight, live progress, summary table and run folder."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from autopilot.mavlink.links import Link, LinkError, LinkRole, UdpLink
+from autopilot.vehicle import Mode
+from common.airframe import AirframeError
+from common.clock import wall_date_text, wall_time_s
+from common.files import write_whole
+from common.geodesy import GeoPoint, ned_from_geodetic
+from common.kernels import FRAME_US
+from mission.client import Running
+from mission.flight import Flight, FlightConfig
+from mission.plan import Plan, PlanError, read_plan
+from mission.plots import plot_flight
+from mission.script import Drone
+from mission.summary import Summary, summarise
+from sim.world.world import WorldConfig
+
+DEFAULT_PLAN = Path(__file__).parent / "default.plan"
+PROGRESS_PERIOD_S = 0.2
+GROUND_LOCAL_PORT = 18570  # the vehicle's own ports, PX4's
+API_LOCAL_PORT = 14580
+CMD_LAND, CMD_RETURN = 21, 20
+
+
+class UserError(ValueError):
+    """Something the user gave is wrong; the message is one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightOptions:
+    """The options of `honeyguide fly`, as given."""
+
+    plan: Path | None
+    is_idle: bool
+    once: bool
+    speed: str
+    seconds: float | None
+    seed: int
+    wind_m_s: float
+    wind_from_deg: float
+    noise: float
+    airframe: str
+    home: str
+    world_seed: int
+    trees_per_ha: float
+    hill_height_m: float
+    has_walls: bool
+    host: str
+    gcs_port: int
+    api_port: int
+    run_folder: Path | None
+
+
+async def fly_plan(drone: Drone, plan: Plan) -> None:
+    """Uploads a plan, flies it and, if it ends on the ground, waits until the motors stop."""
+    await drone.wait_ready()
+    await drone.upload(plan.items)
+    await drone.start_mission()
+    last = plan.items[-1]
+    if last.command in (CMD_LAND, CMD_RETURN):
+        await drone.wait_disarmed(timeout_s=3600.0)
+    else:
+        await drone.wait_mission_finished(last.seq, timeout_s=3600.0)
+
+
+def fly_session(options: FlightOptions) -> int:
+    """Flies as asked and returns the exit code.
+
+    Raises:
+        UserError: an option, file, port or folder is wrong; nothing has been written.
+    """
+    console = Console()
+    speed = _speed(options.speed)
+    config = _config(options)
+    plan = None if options.is_idle else _plan(options.plan)
+    folder = _new_folder(options.run_folder)
+    links = [] if speed is None else _links(options)
+    try:
+        flight = Flight(config, links=links, folder=folder)
+    except AirframeError as error:
+        raise UserError(str(error)) from error
+    running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
+    _run(flight, running, options, speed, console)
+    return _finish(flight, running, plan, folder, console)
+
+
+def _speed(text: str) -> float | None:
+    if text == "max":
+        return None
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = -1.0
+    if not 0.0 < speed <= 1000.0:
+        raise UserError(f"--speed {text}: must be a number above 0, or 'max'")
+    return speed
+
+
+def _config(options: FlightOptions) -> FlightConfig:
+    try:
+        return FlightConfig(
+            airframe=options.airframe,
+            home=_home(options.home),
+            seed=options.seed,
+            wind_m_s=options.wind_m_s,
+            wind_from_deg=options.wind_from_deg,
+            noise=options.noise,
+            world=WorldConfig(
+                seed=options.world_seed,
+                trees_per_ha=options.trees_per_ha,
+                hill_height_m=options.hill_height_m,
+                has_walls=options.has_walls,
+            ),
+        )
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise UserError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def _home(text: str) -> GeoPoint:
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in (2, 3) or not abs(values[0]) <= 89.0 or not abs(values[1]) <= 180.0:
+        raise UserError(f"--home {text}: must be latitude,longitude or latitude,longitude,altitude")
+    return GeoPoint(values[0], values[1], values[2] if len(values) == 3 else 488.0)
+
+
+def _plan(path: Path | None) -> Plan:
+    try:
+        plan = read_plan(path or DEFAULT_PLAN)
+    except PlanError as error:
+        raise UserError(str(error)) from error
+    if not plan.items:
+        raise UserError(f"{path}: the plan has no mission items")
+    return plan
+
+
+def _new_folder(folder: Path | None) -> Path:
+    """Makes the run folder; one that already holds a flight is left alone."""
+    if folder is None:
+        stem = Path("runs") / wall_date_text()
+        folder = next(path for path in _candidates(stem) if not path.exists())
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any((folder / name).exists() for name in ("flight.ulg", "flight.tlog", "summary.json")):
+            raise UserError(f"{folder}: already holds a flight; name another --run-folder")
+        write_whole(folder / "flight.tlog", b"")
+        (folder / "flight.tlog").unlink()
+    except OSError as error:
+        raise UserError(f"{folder}: cannot write there: {error.strerror}") from error
+    return folder
+
+
+def _candidates(stem: Path) -> Any:
+    yield stem
+    number = 2
+    while True:
+        yield stem.with_name(f"{stem.name}-{number}")
+        number += 1
+
+
+def _links(options: FlightOptions) -> list[Link]:
+    links: list[Link] = []
+    try:
+        links.append(UdpLink(options.gcs_port, LinkRole.GROUND, options.host, local_port=GROUND_LOCAL_PORT))
+        links.append(UdpLink(options.api_port, LinkRole.ONBOARD, options.host, local_port=API_LOCAL_PORT))
+    except LinkError as error:
+        for link in links:
+            link.close()
+        raise UserError(str(error)) from error
+    return links
+
+
+def _run(flight: Flight, running: Running | None, options: FlightOptions, speed: float | None, console: Console) -> None:
+    """Advances the flight until it is over or the user stops it."""
+    end_us = int(options.seconds * 1e6) if options.seconds is not None else None
+    ends_with_script = options.once or (speed is None and end_us is None)
+
+    def is_over(flight: Flight) -> bool:
+        if end_us is not None and flight.time_us >= end_us:
+            return True
+        return ends_with_script and (running is None or running.is_done)
+
+    progress = _Progress(flight, running)
+    with Live(console=console, transient=True, auto_refresh=False) as live:
+
+        def on_frame(_: Flight) -> None:
+            if progress.is_due():
+                live.update(progress.table(), refresh=True)
+
+        try:
+            flight.run(is_over, speed=speed, on_frame=on_frame)
+        except KeyboardInterrupt:
+            console.print("stopped by the user")
+
+
+class _Progress:
+    """The line of figures shown while flying."""
+
+    def __init__(self, flight: Flight, running: Running | None) -> None:
+        self._flight = flight
+        self._running = running
+        self._frames = 0
+        self._shown_wall_s = wall_time_s()
+        self._shown_us = 0
+
+    def is_due(self) -> bool:
+        self._frames += 1
+        return self._frames % 5 == 0 and wall_time_s() - self._shown_wall_s >= PROGRESS_PERIOD_S
+
+    def table(self) -> Table:
+        now_s = wall_time_s()
+        state = self._flight.controller.state
+        rate = (self._flight.time_us - self._shown_us) * 1e-6 / max(now_s - self._shown_wall_s, 1e-6)
+        self._shown_wall_s, self._shown_us = now_s, self._flight.time_us
+        north, east, down = state.estimate.pos_ned
+        velocity = state.estimate.vel_ned
+        table = Table(show_edge=False, pad_edge=False)
+        for heading in ("time", "mode", "armed", "item", "north", "east", "height", "speed", "battery", "pace"):
+            table.add_column(heading, justify="right")
+        table.add_row(
+            f"{self._flight.time_us * 1e-6:.1f} s",
+            Mode(state.mode).name,
+            "yes" if state.is_armed else "no",
+            f"{state.mission_current}/{max(state.mission_count - 1, 0)}",
+            f"{north:.1f}",
+            f"{east:.1f}",
+            f"{-down:.1f}",
+            f"{float(np.hypot(velocity[0], velocity[1])):.1f} m/s",
+            f"{100.0 * state.battery_remaining:.0f} %",
+            f"{rate:.1f} x",
+        )
+        return table
+
+
+def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: Path, console: Console) -> int:
+    """Writes the run folder and prints the summary; returns the exit code."""
+    texts = list(flight.drone.texts)
+    history = flight.close()
+    path_ned = [] if plan is None else planned_path(plan, flight)
+    summary = summarise(flight, history, running, path_ned)
+    write_whole(folder / "summary.json", (json.dumps(summary.as_json(), indent=2) + "\n").encode())
+    title = f"{flight.airframe.name}, wind {flight.config.wind_m_s:g} m/s, seed {flight.config.seed}: {summary.result}"
+    plot_flight(history, flight.world, path_ned, title, folder / "flight.png")
+    console.print(_summary_table(summary))
+    if not summary.is_success and running is not None:
+        console.print(f"last words of the vehicle: {texts[-1] if texts else 'none'}", markup=False)
+    console.print(f"logs, summary and picture: {folder}", markup=False)
+    return 0 if summary.is_success or running is None else 1
+
+
+def planned_path(plan: Plan, flight: Flight) -> list[tuple[int, Any]]:
+    """(seq, ned point) of each item with a position, behind the take-off point."""
+    origin = flight.config.home
+    path: list[tuple[int, Any]] = [(-1, np.zeros(3))]
+    for item in plan.items:
+        ned = item_ned(item, origin, path[-1][1])
+        if ned is not None:
+            path.append((item.seq, ned))
+    return path
+
+
+def item_ned(item: Any, origin: GeoPoint, previous: Any) -> Any:
+    """Where an item leads [m], or None for items that are no place."""
+    if item.command not in (16, 17, 19, CMD_LAND, 22):
+        return None
+    alt_amsl_m = item.z + (origin.alt_m if item.frame in (3, 6) else 0.0)
+    has_place = np.isfinite(item.x) and np.isfinite(item.y) and (item.x, item.y) != (0.0, 0.0)
+    north, east, down = ned_from_geodetic(
+        item.x if has_place else origin.lat_deg, item.y if has_place else origin.lon_deg, alt_amsl_m, origin
+    )
+    if item.command == 22 or not has_place:  # climbs and lands where it is
+        north, east = previous[:2] if not has_place else (north, east)
+    if item.command == CMD_LAND:
+        down = min(down, 0.0)
+    return np.array([north, east, down])
+
+
+def _summary_table(summary: Summary) -> Table:
+    table = Table("figure", "value", title="flight", title_justify="left")
+    rows = [
+        ("result", summary.result),
+        ("simulated / armed", f"{summary.simulated_s:.1f} s / {summary.armed_s:.1f} s"),
+        ("power-on to ready", f"{summary.ready_s:.1f} s"),
+        ("cross-track, 95 %", f"{summary.cross_track_p95_m:.2f} m"),
+        ("landing error, true / by estimate", f"{summary.landing_error_true_m:.2f} / {summary.landing_error_est_m:.2f} m"),
+        ("estimator error RMS, horizontal axis / vertical", f"{summary.pos_h_rms_m:.2f} / {summary.pos_v_rms_m:.2f} m"),
+        ("velocity RMS, worst axis", f"{summary.vel_rms_m_s:.3f} m/s"),
+        ("tilt / yaw RMS", f"{summary.tilt_rms_deg:.2f} / {summary.yaw_rms_deg:.2f} deg"),
+        ("least clearance", f"{summary.clearance_min_m:.1f} m"),
+        ("battery left", f"{100.0 * summary.battery_remaining:.0f} %"),
+    ]
+    for row in rows:
+        table.add_row(*row)
+    return table

@@ -1,0 +1,171 @@
+"""A flight judged after it: mission result, path and estimator errors, clearance and battery.
+
+Everything here may look at the truth: nothing of it goes back into the flight.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from autopilot.vehicle import Mode
+from mission.recorder import History
+from sim.world.world import WorldMap
+
+Rows = npt.NDArray[Any]
+CLEARANCE_EVERY_FRAMES = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The figures of one flight; NaN where the flight had none. `p95` is the 95th percentile."""
+
+    result: str
+    is_success: bool
+    simulated_s: float
+    armed_s: float
+    ready_s: float  # power-on to ready to arm
+    cross_track_p95_m: float  # truth to the planned path, in mode MISSION
+    landing_error_true_m: float  # horizontal, to the planned landing point
+    landing_error_est_m: float
+    pos_h_rms_m: float  # estimator error per horizontal axis, while armed
+    pos_v_rms_m: float
+    vel_rms_m_s: float  # worst axis
+    tilt_rms_deg: float
+    yaw_rms_deg: float
+    clearance_min_m: float  # in flight, to trunk, crown, wall or ground
+    battery_remaining: float
+    innovations_in_band: dict[str, float]  # share of normalised innovations within 1.96 sigma, per source
+
+    def as_json(self) -> dict[str, Any]:
+        """JSON values; NaN as null."""
+        return {key: None if value != value else value for key, value in asdict(self).items()}
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorErrors:
+    """RMS errors over the given frames."""
+
+    pos_ned_m: tuple[float, float, float]
+    vel_ned_m_s: tuple[float, float, float]
+    tilt_deg: float
+    yaw_deg: float
+
+
+def estimator_errors(history: History, frames: Rows) -> EstimatorErrors:
+    """RMS of estimate minus truth, over the frames where `frames` is True."""
+    pos = history.pos_ned_est[frames].astype(float) - history.pos_ned_true[frames]
+    vel = history.vel_ned_est[frames].astype(float) - history.vel_ned_true[frames]
+    error_ned = _rotation_error_ned(history.q_est[frames].astype(float), history.q_true[frames].astype(float))
+    return EstimatorErrors(
+        tuple(_rms(pos)),
+        tuple(_rms(vel)),
+        float(np.degrees(np.sqrt(np.mean(np.sum(error_ned[:, :2] ** 2, axis=1))))) if frames.any() else np.nan,
+        float(np.degrees(_rms(error_ned[:, 2]))) if frames.any() else np.nan,
+    )
+
+
+def cross_track_m(pos_ned: Rows, seq: Rows, path_ned: Sequence[tuple[int, Rows]]) -> Rows:
+    """Distance of each position to the legs flown then: the leg that ends at the current item, and the one before.
+
+    Args:
+        pos_ned: [m], shape (frames, 3).
+        seq: current item, shape (frames,).
+        path_ned: (seq, point) of each item with a position, in order, beginning with the take-off point.
+    """
+    distance = np.full(len(pos_ned), np.nan)
+    seqs = [item_seq for item_seq, _ in path_ned]
+    for index in range(1, len(path_ned)):
+        frames = seq == seqs[index]
+        if not frames.any():
+            continue
+        legs = [segment_distance_m(pos_ned[frames], path_ned[index - 1][1], path_ned[index][1])]
+        if index >= 2:
+            legs.append(segment_distance_m(pos_ned[frames], path_ned[index - 2][1], path_ned[index - 1][1]))
+        distance[frames] = np.min(legs, axis=0)
+    return distance
+
+
+def segment_distance_m(points: Rows, start: Rows, end: Rows) -> Rows:
+    """Distance of points, shape (n, 3), to the segment from start to end."""
+    leg = np.asarray(end, float) - start
+    length_sq = float(leg @ leg)
+    share = np.clip((points - start) @ leg / length_sq, 0.0, 1.0) if length_sq > 0.0 else np.zeros(len(points))
+    distance: Rows = np.linalg.norm(points - (start + share[:, None] * leg), axis=1)
+    return distance
+
+
+def clearance_min_m(history: History, world: WorldMap) -> float:
+    """Least distance to anything while airborne, sampled at 5 Hz from 3 m above the take-off point on."""
+    flying = history.is_armed & (history.pos_ned_true[:, 2] < -3.0) & (history.mode != Mode.LAND)
+    points = history.pos_ned_true[flying][::CLEARANCE_EVERY_FRAMES]
+    return min((float(world.clearance(point)) for point in points.astype(float)), default=float("nan"))
+
+
+def _rms(errors: Rows) -> Any:
+    return np.sqrt(np.mean(np.square(errors), axis=0))
+
+
+def _rotation_error_ned(q_est: Rows, q_true: Rows) -> Rows:
+    """Rotation vectors [rad] in ned that turn the true attitude into the estimated one; (x, y, z, w) rows."""
+    ex, ey, ez, ew = q_est.T
+    tx, ty, tz, tw = (-q_true[:, 0], -q_true[:, 1], -q_true[:, 2], q_true[:, 3])
+    vector = np.stack(
+        [
+            ew * tx + ex * tw + ey * tz - ez * ty,
+            ew * ty - ex * tz + ey * tw + ez * tx,
+            ew * tz + ex * ty - ey * tx + ez * tw,
+        ],
+        axis=1,
+    )
+    scalar = ew * tw - ex * tx - ey * ty - ez * tz
+    result: Rows = 2.0 * vector * np.where(scalar < 0.0, -1.0, 1.0)[:, None]
+    return result
+
+
+def summarise(flight: Any, history: History, running: Any, path_ned: Sequence[tuple[int, Rows]]) -> Summary:
+    """Judges a finished flight.
+
+    Args:
+        flight: the `mission.flight.Flight`.
+        history: its recorder's history.
+        running: the script that flew, or None.
+        path_ned: the planned path, as `cross_track_m` takes it; empty when there was no plan.
+    """
+    armed = history.is_armed
+    in_mission = armed & (history.mode == Mode.MISSION)
+    cross = cross_track_m(history.pos_ned_true[in_mission], history.mission_seq[in_mission], path_ned)
+    errors = estimator_errors(history, armed)
+    result, is_success = _result(flight, running)
+    end_true, end_est = history.pos_ned_true[-1], history.pos_ned_est[-1]
+    target = path_ned[-1][1] if path_ned else np.full(3, np.nan)
+    return Summary(
+        result=result,
+        is_success=is_success,
+        simulated_s=float(history.time_us[-1] * 1e-6),
+        armed_s=float(armed.mean() * history.time_us[-1] * 1e-6),
+        ready_s=flight.ready_s,
+        cross_track_p95_m=float(np.nanpercentile(cross, 95.0)) if np.isfinite(cross).any() else np.nan,
+        landing_error_true_m=float(np.hypot(*(end_true - target)[:2])),
+        landing_error_est_m=float(np.hypot(*(end_est - target)[:2])),
+        pos_h_rms_m=max(errors.pos_ned_m[:2]),
+        pos_v_rms_m=errors.pos_ned_m[2],
+        vel_rms_m_s=max(errors.vel_ned_m_s),
+        tilt_rms_deg=errors.tilt_deg,
+        yaw_rms_deg=errors.yaw_deg,
+        clearance_min_m=clearance_min_m(history, flight.world),
+        battery_remaining=float(history.battery_remaining[-1]),
+        innovations_in_band=flight.recorder.innovations_in_band(),
+    )
+
+
+def _result(flight: Any, running: Any) -> tuple[str, bool]:
+    if bool(flight.rig.arrays.body.numpy()["is_crashed"][0]):
+        return "crashed", False
+    if running is None:
+        return "no mission", True
+    if running.error is not None:
+        return f"failed: {running.error}", False
+    return ("mission completed", True) if running.is_done else ("mission not finished", False)

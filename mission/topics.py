@@ -1,0 +1,365 @@
+"""The flight log's topics: PX4's names and fields, filled from rows of the kernel structs.
+
+Each builder turns a batch of rows, one per 20 ms frame, into the columns of one topic. Quaternions leave as
+(w, x, y, z). A sensor's rows are those frames in which a new sample had arrived.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import nan
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from common.geodesy import GeoPoint, geodetic_from_ned
+
+Rows = npt.NDArray[Any]
+Columns = dict[str, npt.ArrayLike]
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Rows of some consecutive frames."""
+
+    time_us: Rows  # (frames,)
+    estimate: Rows  # Estimate
+    samples: Rows  # Samples
+    samples_before: Rows  # Samples of the frame before the first, one row
+    actuators: Rows  # Actuators
+    health: Rows  # EstimatorState
+    body: Rows  # BodyState, the truth
+    origin: GeoPoint
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One topic: its ULog fields and how a batch fills them."""
+
+    name: str
+    fields: dict[str, str]
+    columns: Callable[[Batch], Columns]
+
+
+def wxyz(quaternions: Rows) -> Rows:
+    """Warp's (x, y, z, w) as ULog's (w, x, y, z); shape (rows, 4)."""
+    return quaternions[:, [3, 0, 1, 2]]
+
+
+def fresh(batch: Batch, sensor: str) -> Rows:
+    """The rows in which a sample of this sensor is new: its time differs from the row before and is not 0."""
+    samples = batch.samples[sensor]
+    times = samples["time_us"]
+    times_before = np.concatenate([batch.samples_before[sensor]["time_us"], times[:-1]])
+    return samples[(times != times_before) & (times > 0)]
+
+
+def _axes(names: str, vectors: Rows) -> Columns:
+    return dict(zip(names.split(), vectors.T, strict=True))
+
+
+def _attitude(batch: Batch) -> Columns:
+    estimate = batch.estimate
+    return {"timestamp": batch.time_us, "timestamp_sample": estimate["time_us"], "q": wxyz(estimate["q_ned_from_frd"])}
+
+
+def _attitude_true(batch: Batch) -> Columns:
+    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "q": wxyz(batch.body["q_ned_from_frd"])}
+
+
+def _rates(batch: Batch) -> Columns:
+    estimate = batch.estimate
+    return {"timestamp": batch.time_us, "timestamp_sample": estimate["time_us"], "xyz": estimate["omega_frd"]}
+
+
+def _rates_true(batch: Batch) -> Columns:
+    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "xyz": batch.body["omega_frd"]}
+
+
+LOCAL_POSITION_FIELDS = {
+    "timestamp_sample": "uint64_t",
+    **dict.fromkeys("x y z vx vy vz ax ay az heading eph epv evh evv".split(), "float"),
+    "ref_timestamp": "uint64_t",
+    "ref_lat": "double",
+    "ref_lon": "double",
+    "ref_alt": "float",
+    "dist_bottom": "float",
+    **dict.fromkeys("xy_valid z_valid v_xy_valid v_z_valid xy_global z_global dist_bottom_valid".split(), "bool"),
+}
+
+
+def yaw_of(quaternions: Rows) -> Rows:
+    """Heading [rad] of (x, y, z, w) rows."""
+    x, y, z, w = quaternions.T
+    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def _local_position(batch: Batch) -> Columns:
+    estimate = batch.estimate
+    flags = estimate["flags"]
+    position_valid = (flags & 8) != 0
+    height_valid = (flags & 16) != 0
+    return {
+        "timestamp": batch.time_us,
+        "timestamp_sample": estimate["time_us"],
+        **_axes("x y z", estimate["pos_ned"]),
+        **_axes("vx vy vz", estimate["vel_ned"]),
+        **_axes("ax ay az", estimate["accel_ned"]),
+        "heading": yaw_of(estimate["q_ned_from_frd"]),
+        "eph": estimate["pos_h_std"],
+        "epv": estimate["pos_v_std"],
+        "evh": estimate["vel_std"],
+        "evv": estimate["vel_std"],
+        **_reference(batch.origin),
+        "dist_bottom": estimate["terrain_d"] - estimate["pos_ned"][:, 2],
+        "xy_valid": position_valid,
+        "z_valid": height_valid,
+        "v_xy_valid": (flags & 4) != 0,
+        "v_z_valid": (flags & 4) != 0,
+        "xy_global": position_valid,
+        "z_global": height_valid,
+        "dist_bottom_valid": (flags & 32) != 0,
+    }
+
+
+def _local_position_true(batch: Batch) -> Columns:
+    body = batch.body
+    valid = dict.fromkeys("xy_valid z_valid v_xy_valid v_z_valid xy_global z_global".split(), True)
+    return {
+        "timestamp": batch.time_us,
+        "timestamp_sample": batch.time_us,
+        **_axes("x y z", body["pos_ned"]),
+        **_axes("vx vy vz", body["vel_ned"]),
+        **dict.fromkeys("ax ay az dist_bottom".split(), nan),
+        "heading": yaw_of(body["q_ned_from_frd"]),
+        **dict.fromkeys("eph epv evh evv".split(), 0.0),
+        **_reference(batch.origin),
+        **valid,
+        "dist_bottom_valid": False,
+    }
+
+
+def _reference(origin: GeoPoint) -> Columns:
+    return {"ref_timestamp": 0, "ref_lat": origin.lat_deg, "ref_lon": origin.lon_deg, "ref_alt": origin.alt_m}
+
+
+def _global_position(batch: Batch) -> Columns:
+    estimate = batch.estimate
+    points = np.array([geodetic_from_ned(*pos, batch.origin) for pos in estimate["pos_ned"].astype(float)])
+    return {
+        "timestamp": batch.time_us,
+        "timestamp_sample": estimate["time_us"],
+        "lat": points[:, 0],
+        "lon": points[:, 1],
+        "alt": points[:, 2],
+        "eph": estimate["pos_h_std"],
+        "epv": estimate["pos_v_std"],
+        "terrain_alt": batch.origin.alt_m - estimate["terrain_d"],
+        "terrain_alt_valid": (estimate["flags"] & 32) != 0,
+    }
+
+
+def _gps(batch: Batch) -> Columns:
+    gnss = fresh(batch, "gnss")
+    points = np.array([geodetic_from_ned(*pos, batch.origin) for pos in gnss["pos_ned"].astype(float)]).reshape(-1, 3)
+    velocity = gnss["vel_ned"]
+    return {
+        "timestamp": gnss["time_us"],
+        "latitude_deg": points[:, 0],
+        "longitude_deg": points[:, 1],
+        "altitude_msl_m": points[:, 2],
+        "altitude_ellipsoid_m": points[:, 2],
+        "fix_type": gnss["fix_type"],
+        "satellites_used": gnss["satellites"],
+        "eph": gnss["pos_h_std"],
+        "epv": gnss["pos_v_std"],
+        "s_variance_m_s": gnss["vel_std"],
+        "c_variance_rad": nan,
+        **dict.fromkeys("hdop vdop".split(), 0.7),
+        "vel_m_s": np.hypot(velocity[:, 0], velocity[:, 1]),
+        **_axes("vel_n_m_s vel_e_m_s vel_d_m_s", velocity),
+        "cog_rad": np.arctan2(velocity[:, 1], velocity[:, 0]),
+        "vel_ned_valid": True,
+    }
+
+
+def _baro(batch: Batch) -> Columns:
+    baro = fresh(batch, "baro")
+    return {
+        "timestamp": baro["time_us"],
+        "timestamp_sample": baro["time_us"],
+        "device_id": 1,
+        "pressure": baro["pressure_pa"],
+        "temperature": baro["temperature_c"],
+        "error_count": 0,
+    }
+
+
+def _mag(batch: Batch) -> Columns:
+    mag = fresh(batch, "mag")
+    return {
+        "timestamp": mag["time_us"],
+        "timestamp_sample": mag["time_us"],
+        "device_id": 1,
+        "magnetometer_ga": mag["field_frd_gauss"],
+        "calibration_count": 0,
+    }
+
+
+def _range(batch: Batch) -> Columns:
+    ranges = fresh(batch, "range")
+    return {
+        "timestamp": ranges["time_us"],
+        "device_id": 1,
+        "min_distance": 0.1,
+        "max_distance": 40.0,
+        "current_distance": ranges["distance_m"],
+        "variance": 0.0,
+        "signal_quality": np.where(ranges["is_valid"] != 0, 100, 0),
+        "type": 0,
+        "orientation": 25,
+    }
+
+
+def _battery(batch: Batch) -> Columns:
+    battery = fresh(batch, "battery")
+    return {
+        "timestamp": battery["time_us"],
+        "voltage_v": battery["voltage_v"],
+        "current_a": battery["current_a"],
+        "connected": True,
+    }
+
+
+def _motors(batch: Batch) -> Columns:
+    command = batch.actuators["command"]
+    control = np.full((len(command), 12), nan, dtype=np.float32)
+    control[:, : command.shape[1]] = command
+    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "reversible_flags": 0, "control": control}
+
+
+def _attitude_setpoint(batch: Batch) -> Columns:
+    actuators = batch.actuators
+    thrust = np.zeros((len(actuators), 3), dtype=np.float32)
+    thrust[:, 2] = -actuators["thrust_sp"]
+    return {
+        "timestamp": batch.time_us,
+        "yaw_sp_move_rate": actuators["traj_yaw_rate"],
+        "q_d": wxyz(actuators["q_sp_ned_from_frd"]),
+        "thrust_body": thrust,
+    }
+
+
+def _rates_setpoint(batch: Batch) -> Columns:
+    return {"timestamp": batch.time_us, **_axes("roll pitch yaw", batch.actuators["omega_sp_frd"])}
+
+
+def _local_setpoint(batch: Batch) -> Columns:
+    actuators = batch.actuators
+    return {
+        "timestamp": batch.time_us,
+        **_axes("x y z", actuators["traj_pos_ned"]),
+        **_axes("vx vy vz", actuators["traj_vel_ned"]),
+        "acceleration": actuators["traj_accel_ned"],
+        "yaw": actuators["traj_yaw"],
+        "yawspeed": actuators["traj_yaw_rate"],
+    }
+
+
+def _wind(batch: Batch) -> Columns:
+    wind = batch.estimate["wind_ned"]
+    return {
+        "timestamp": batch.time_us,
+        "timestamp_sample": batch.estimate["time_us"],
+        "windspeed_north": wind[:, 0],
+        "windspeed_east": wind[:, 1],
+    }
+
+
+def _biases(batch: Batch) -> Columns:
+    estimate = batch.estimate
+    return {
+        "timestamp": batch.time_us,
+        "timestamp_sample": estimate["time_us"],
+        "gyro_bias": estimate["gyro_bias_frd"],
+        "accel_bias": estimate["accel_bias_frd"],
+        "gyro_bias_valid": True,
+        "accel_bias_valid": True,
+    }
+
+
+_SAMPLED = {"timestamp_sample": "uint64_t"}
+_DEVICE = {**_SAMPLED, "device_id": "uint32_t"}
+
+TOPICS = [
+    Topic("vehicle_attitude", {**_SAMPLED, "q": "float[4]"}, _attitude),
+    Topic("vehicle_attitude_groundtruth", {**_SAMPLED, "q": "float[4]"}, _attitude_true),
+    Topic("vehicle_angular_velocity", {**_SAMPLED, "xyz": "float[3]"}, _rates),
+    Topic("vehicle_angular_velocity_groundtruth", {**_SAMPLED, "xyz": "float[3]"}, _rates_true),
+    Topic("vehicle_local_position", LOCAL_POSITION_FIELDS, _local_position),
+    Topic("vehicle_local_position_groundtruth", LOCAL_POSITION_FIELDS, _local_position_true),
+    Topic(
+        "vehicle_global_position",
+        {
+            **_SAMPLED,
+            "lat": "double",
+            "lon": "double",
+            **dict.fromkeys("alt eph epv terrain_alt".split(), "float"),
+            "terrain_alt_valid": "bool",
+        },
+        _global_position,
+    ),
+    Topic(
+        "vehicle_gps_position",
+        {
+            **dict.fromkeys("latitude_deg longitude_deg altitude_msl_m altitude_ellipsoid_m".split(), "double"),
+            **dict.fromkeys(
+                "s_variance_m_s c_variance_rad eph epv hdop vdop vel_m_s vel_n_m_s vel_e_m_s vel_d_m_s cog_rad".split(),
+                "float",
+            ),
+            **dict.fromkeys("fix_type satellites_used".split(), "uint8_t"),
+            "vel_ned_valid": "bool",
+        },
+        _gps,
+    ),
+    Topic("sensor_baro", {**_DEVICE, "pressure": "float", "temperature": "float", "error_count": "uint32_t"}, _baro),
+    Topic("vehicle_magnetometer", {**_DEVICE, "magnetometer_ga": "float[3]", "calibration_count": "uint8_t"}, _mag),
+    Topic(
+        "distance_sensor",
+        {
+            "device_id": "uint32_t",
+            **dict.fromkeys("min_distance max_distance current_distance variance".split(), "float"),
+            "signal_quality": "int8_t",
+            **dict.fromkeys("type orientation".split(), "uint8_t"),
+        },
+        _range,
+    ),
+    Topic("battery_status", {"voltage_v": "float", "current_a": "float", "connected": "bool"}, _battery),
+    Topic("actuator_motors", {**_SAMPLED, "control": "float[12]", "reversible_flags": "uint16_t"}, _motors),
+    Topic(
+        "vehicle_attitude_setpoint",
+        {"yaw_sp_move_rate": "float", "q_d": "float[4]", "thrust_body": "float[3]"},
+        _attitude_setpoint,
+    ),
+    Topic("vehicle_rates_setpoint", dict.fromkeys("roll pitch yaw".split(), "float"), _rates_setpoint),
+    Topic(
+        "vehicle_local_position_setpoint",
+        {
+            **dict.fromkeys("x y z yaw yawspeed vx vy vz".split(), "float"),
+            "acceleration": "float[3]",
+        },
+        _local_setpoint,
+    ),
+    Topic("wind", {**_SAMPLED, "windspeed_north": "float", "windspeed_east": "float"}, _wind),
+    Topic(
+        "estimator_sensor_bias",
+        {
+            **_SAMPLED,
+            "gyro_bias": "float[3]",
+            "accel_bias": "float[3]",
+            "gyro_bias_valid": "bool",
+            "accel_bias_valid": "bool",
+        },
+        _biases,
+    ),
+]

@@ -1,0 +1,1 @@
+"""Tasks, learning and trained policies."""

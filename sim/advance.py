@@ -1,0 +1,132 @@
+"""The loop: from motor commands to the true state, to samples, to the estimate, to motor commands, at 250 Hz.
+
+One launch advances every vehicle by any number of ticks of 4 ms. Read the kernel `advance` first: it is the whole simulator, in
+time order. With `has_estimator` False the flight controller is given the true state instead of an estimate: a
+shortcut for training, never used in a flight.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from autopilot.advance import Autopilot
+from autopilot.control.control import control_tick
+from autopilot.control.state import ControlState
+from autopilot.estimator.ekf import estimator_reset, estimator_tick
+from autopilot.ports import (
+    HEIGHT_VALID,
+    POSITION_VALID,
+    TILT_ALIGNED,
+    VELOCITY_VALID,
+    YAW_ALIGNED,
+    BatterySample,
+    Estimate,
+    Setpoint,
+)
+from common.kernels import GRAVITY_M_S2, TICK_S, TICK_US
+from sim.bodies.multirotor import BodyState, MultirotorModel, body_at_rest, body_tick
+from sim.faults import Faults
+from sim.sensors.sensors import SensorModel, SensorState, sense
+from sim.wind import WindModel, WindState, wind_step
+from sim.world.world import World, ground_height
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class RigArrays:
+    """The vehicles, their surroundings and their flight controllers; arrays have one row per vehicle."""
+
+    world: World
+    tick: wp.array(dtype=int)  # ticks since power-on
+    seed: wp.array(dtype=int)
+    model: wp.array(dtype=MultirotorModel)
+    body: wp.array(dtype=BodyState)
+    wind_model: wp.array(dtype=WindModel)
+    wind: wp.array(dtype=WindState)
+    sensor_model: wp.array(dtype=SensorModel)
+    sensors: wp.array(dtype=SensorState)
+    faults: wp.array(dtype=Faults)
+    autopilot: Autopilot
+
+
+@wp.func
+def true_estimate(body: BodyState, tick: int) -> Estimate:
+    """The true state in the place of an estimate."""
+    estimate = Estimate()
+    estimate.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    estimate.flags = TILT_ALIGNED | YAW_ALIGNED | VELOCITY_VALID | POSITION_VALID | HEIGHT_VALID
+    estimate.q_ned_from_frd = body.q_ned_from_frd
+    estimate.omega_frd = body.omega_frd
+    estimate.accel_frd = body.accel_frd
+    estimate.vel_ned = body.vel_ned
+    estimate.pos_ned = body.pos_ned
+    estimate.accel_ned = wp.quat_rotate(body.q_ned_from_frd, body.accel_frd) + wp.vec3(0.0, 0.0, GRAVITY_M_S2)
+    return estimate
+
+
+@wp.func
+def true_battery(body: BodyState, tick: int) -> BatterySample:
+    """The true battery in the place of a sample."""
+    battery = BatterySample()
+    battery.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    battery.voltage_v = body.battery_voltage_v
+    battery.current_a = body.battery_current_a
+    return battery
+
+
+@wp.kernel(enable_backward=False)
+def boot(rig: RigArrays, chosen: wp.array(dtype=int)):
+    """Powers the chosen vehicles on, at rest on the ground at home."""
+    i = wp.tid()
+    if chosen[i] == 0:
+        return
+    foot = rig.model[i].contact.leg_z_m
+    rig.body[i] = body_at_rest(rig.model[i], wp.vec3(0.0, 0.0, -ground_height(rig.world, 0.0, 0.0) - foot), 0.0)
+    rig.wind[i] = WindState()
+    rig.sensors[i] = SensorState()
+    rig.autopilot.control[i] = ControlState()
+    rig.autopilot.setpoint[i] = Setpoint()
+    estimator_reset(rig.autopilot.ekf, i)
+
+
+def make_advance(has_estimator: bool) -> Any:
+    """The advance kernel, with the estimator and the sensors or without (a training run must not pay for them)."""
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def advance(rig: RigArrays, first_vehicle: int, tick_count: int):
+        i = first_vehicle + wp.tid()
+        seed = rig.seed[i]
+        tick = rig.tick[i]
+        model = rig.model[i]
+        wind_model = rig.wind_model[i]
+        params = rig.autopilot.control_params[i]
+        airframe = rig.autopilot.airframe[i]
+        setpoint = rig.autopilot.setpoint[i]
+        body = rig.body[i]
+        wind = rig.wind[i]
+        sensors = rig.sensors[i]
+        estimator = rig.autopilot.ekf.rows[i]
+        control = rig.autopilot.control[i]
+        for _ in range(tick_count):
+            height = -body.pos_ned[2] - ground_height(rig.world, body.pos_ned[0], body.pos_ned[1])
+            wind = wind_step(wind_model, wind, body.pos_ned, body.vel_ned, height, seed, i, tick, TICK_S)
+            body = body_tick(model, body, control.actuators.command, wind.wind_ned, rig.world)
+            if wp.static(has_estimator):
+                sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, rig.world, seed, i, tick)
+                estimator = estimator_tick(rig.autopilot.ekf, i, estimator, sensors.samples)
+                estimate = estimator.estimate
+            else:
+                sensors.samples.battery = true_battery(body, tick)
+                estimate = true_estimate(body, tick)
+            control = control_tick(params, airframe, control, estimate, setpoint, sensors.samples.battery, tick)
+            tick += 1
+        rig.tick[i] = tick
+        rig.body[i] = body
+        rig.wind[i] = wind
+        rig.sensors[i] = sensors
+        rig.autopilot.control[i] = control
+        if wp.static(has_estimator):
+            rig.autopilot.ekf.rows[i] = estimator
+
+    return advance

@@ -1,0 +1,390 @@
+"""A multirotor's body: motors, rotors, rigid body and contact, 1,000 steps a second.
+
+In: motor commands [0..1], the wind at the vehicle, the world. Out: true position, velocity, attitude, rates, what an
+ideal IMU would measure, battery. `body_tick` is one 4 ms tick of four substeps; `body_step` one substep.
+Left out: blade flapping torque, rotor wakes on the body and on each other, vortex ring state, frame flexibility, ground
+effect on tilt.
+"""
+
+import warp as wp
+
+from common.airframe import Airframe
+from common.kernels import GRAVITY_M_S2, SUBSTEPS, TICK_S, vec8
+from common.rotation import quat_from_yaw
+from sim.battery import BatteryModel, battery_current, battery_model, open_circuit_voltage
+from sim.contact import (
+    ContactForce,
+    ContactModel,
+    FootSlip,
+    Surroundings,
+    contact_model,
+    ground_contact,
+    look_around,
+    obstacle_force,
+)
+from sim.world.world import World
+
+wp.set_module_options({"enable_backward": False})
+
+_GRAVITY_NED = wp.constant(wp.vec3(0.0, 0.0, GRAVITY_M_S2))
+_SEA_LEVEL_DENSITY_KG_M3 = wp.constant(1.225)  # ISO 2533 standard atmosphere
+_DENSITY_LAPSE_PER_M = wp.constant(9.6e-5)  # ISO 2533: relative change of density per metre near sea level
+_HOME_ALT_AMSL_M = 488.0
+_SUBSTEP_S = wp.constant(TICK_S / SUBSTEPS)
+_SUBSTEP_COUNT = wp.constant(SUBSTEPS)
+_UNROLLED_ROTORS = 4
+
+
+@wp.struct
+class MultirotorModel:
+    """Constants of one airframe at one place."""
+
+    mass_kg: float
+    mass_inv: float  # [1/kg] divisions are dear at 1 kHz
+    inertia_frd: wp.vec3  # [kg m²] diagonal
+    inertia_inv_frd: wp.vec3  # [1/(kg m²)]
+    drag_area_frd: wp.vec3  # [m²] c_d A along each axis
+    angular_drag_n_m_s2: float
+    rotor_count: int
+    rotor_x: vec8  # [m] hubs, frd
+    rotor_y: vec8  # [m]
+    rotor_z: vec8  # [m]
+    rotor_spin: vec8  # +1 counter-clockwise seen from above
+    rotor_radius_m: float
+    rotor_height_m: float  # mean height of the hubs over the centre of gravity
+    thrust_n_s2: float
+    torque_n_m_s2: float
+    inflow_n_s2_m: float
+    rotor_drag_n_s2_m: float
+    max_speed_rad_s: float
+    command_curve: float
+    spin_up_time_s: float
+    spin_down_time_s: float
+    rotor_inertia_kg_m2: float
+    home_density_ratio: float  # air density at home over that at sea level
+    battery: BatteryModel
+    contact: ContactModel
+
+
+@wp.struct
+class BodyState:
+    """Truth about one vehicle."""
+
+    pos_ned: wp.vec3  # [m]
+    vel_ned: wp.vec3  # [m/s]
+    q_ned_from_frd: wp.quat
+    omega_frd: wp.vec3  # [rad/s]
+    rotor_speed: vec8  # [rad/s], not negative
+    accel_frd: wp.vec3  # [m/s²] specific force, mean over the last tick
+    gyro_frd: wp.vec3  # [rad/s] mean over the last tick
+    height_agl_m: float  # of the centre of gravity over the ground below
+    battery_charge_c: float  # [C] left
+    battery_voltage_v: float
+    battery_current_a: float
+    is_on_ground: int  # a foot touches
+    is_crashed: int  # for good: struck something too fast, or a turning rotor struck the ground
+    impact_speed: float  # [m/s] largest speed along a contact normal so far
+    foot_slip: FootSlip
+
+
+@wp.struct
+class StepInputs:
+    """What acts on a body over the substeps of a tick."""
+
+    rotor_target: vec8  # [rad/s] speeds the commands ask for
+    gain_up: float  # share of the way to its target a rotor goes in one substep
+    gain_down: float
+    density_ratio: float  # of the air, over that at sea level
+    lift_ratio: float  # factor on thrust from ground effect; 0: broken rotors
+    wind_ned: wp.vec3  # [m/s]
+    around: Surroundings
+    rotor_inertia_rate: float  # [kg m²/s] rotor inertia over dt
+    dt: float  # [s] substep
+
+
+@wp.struct
+class RotorWrench:
+    """What all rotors together do to the body."""
+
+    force_frd: wp.vec3  # [N]
+    torque_frd: wp.vec3  # [N m]
+    momentum_z: float  # [N m s] angular momentum of the rotors along body z
+    speed: vec8  # [rad/s] at the end of the step
+
+
+@wp.func
+def rotor_targets(model: MultirotorModel, command: vec8, voltage_v: float) -> vec8:
+    """Speeds [rad/s] the commands ask for: omega = omega_max (a u + (1 - a) sqrt(u)) V / V_full."""
+    target = vec8()
+    top = model.max_speed_rad_s * voltage_v / model.battery.full_v
+    for r in range(model.rotor_count):
+        u = wp.clamp(command[r], 0.0, 1.0)
+        target[r] = top * (model.command_curve * u + (1.0 - model.command_curve) * wp.sqrt(u))
+    return target
+
+
+@wp.func
+def ground_effect(radius_m: float, height_m: float) -> float:
+    """Thrust over thrust far from the ground: 1 / (1 - (R / 4 z)²).
+
+    I. C. Cheeseman, W. E. Bennett, "The effect of the ground on a helicopter rotor in forward flight", ARC R&M 3021,
+    1955. Below half a radius, where it no longer holds, it stays as it is there.
+    """
+    share = radius_m / (4.0 * wp.max(height_m, 0.5 * radius_m))
+    return 1.0 / (1.0 - share * share)
+
+
+@wp.func
+def density_ratio(model: MultirotorModel, down_m: float) -> float:
+    """Air density over that at sea level: linear in height from home."""
+    return model.home_density_ratio * (1.0 + _DENSITY_LAPSE_PER_M * down_m)
+
+
+@wp.func
+def lag_gain(time_constant_s: float, dt: float) -> float:
+    """Share of the way to its target a first-order lag goes in dt: the bilinear form of 1 - exp(-dt / tau)."""
+    return 2.0 * dt / (2.0 * time_constant_s + dt)
+
+
+@wp.func
+def add_rotor(
+    model: MultirotorModel,
+    inputs: StepInputs,
+    wrench: RotorWrench,
+    rotor: int,
+    air_vel_frd: wp.vec3,
+    omega_frd: wp.vec3,
+) -> RotorWrench:
+    """Advances one rotor and adds its force and torque to a wrench.
+
+    Thrust k w² minus axial inflow; in-plane drag; reaction torque spin (k_q w² + J dw/dt). In each, the mean speed
+    over the step counts. `air_vel_frd` [m/s] is the velocity of the centre of gravity through the air.
+    """
+    x = model.rotor_x[rotor]
+    y = model.rotor_y[rotor]
+    z = model.rotor_z[rotor]
+    spin = model.rotor_spin[rotor]
+    error = inputs.rotor_target[rotor] - wrench.speed[rotor]
+    change = inputs.gain_down * error
+    if error > 0.0:
+        change = inputs.gain_up * error
+    w = wrench.speed[rotor] + 0.5 * change
+    hub_vx = air_vel_frd[0] + omega_frd[1] * z - omega_frd[2] * y
+    hub_vy = air_vel_frd[1] + omega_frd[2] * x - omega_frd[0] * z
+    hub_vz = air_vel_frd[2] + omega_frd[0] * y - omega_frd[1] * x
+    dense = inputs.density_ratio * w
+    thrust = wp.max(dense * inputs.lift_ratio * (model.thrust_n_s2 * w + model.inflow_n_s2_m * hub_vz), 0.0)
+    fx = -model.rotor_drag_n_s2_m * dense * hub_vx
+    fy = -model.rotor_drag_n_s2_m * dense * hub_vy
+    reaction = spin * (model.torque_n_m_s2 * dense * w + inputs.rotor_inertia_rate * change)
+    wrench.force_frd += wp.vec3(fx, fy, -thrust)
+    wrench.torque_frd += wp.vec3(-y * thrust - z * fy, z * fx + x * thrust, x * fy - y * fx + reaction)
+    wrench.momentum_z -= model.rotor_inertia_kg_m2 * spin * w
+    wrench.speed[rotor] = wrench.speed[rotor] + change
+    return wrench
+
+
+@wp.func
+def rotor_wrench(
+    model: MultirotorModel, inputs: StepInputs, speed: vec8, air_vel_frd: wp.vec3, omega_frd: wp.vec3
+) -> RotorWrench:
+    """Advances all rotors and sums their forces and torques.
+
+    A rotor the vehicle lacks stands still and adds nothing, so the first four are unrolled: constant indices save a
+    sixth of the whole body's time.
+    """
+    wrench = RotorWrench()
+    wrench.speed = speed
+    for rotor in range(_UNROLLED_ROTORS):
+        wrench = add_rotor(model, inputs, wrench, rotor, air_vel_frd, omega_frd)
+    for rotor in range(_UNROLLED_ROTORS, model.rotor_count):
+        wrench = add_rotor(model, inputs, wrench, rotor, air_vel_frd, omega_frd)
+    return wrench
+
+
+@wp.func
+def body_drag(model: MultirotorModel, air_vel_frd: wp.vec3, density: float) -> wp.vec3:
+    """Force [N] on the hull: -½ rho (c_d A) |v| v along each axis."""
+    pressure = -0.5 * _SEA_LEVEL_DENSITY_KG_M3 * density * wp.length(air_vel_frd)
+    return pressure * wp.cw_mul(model.drag_area_frd, air_vel_frd)
+
+
+@wp.func
+def angular_accel(model: MultirotorModel, omega_frd: wp.vec3, torque_frd: wp.vec3, momentum_z: float) -> wp.vec3:
+    """Euler's equation with the rotors' momentum: I dw/dt = torque - w x (I w + h) [rad/s²]."""
+    momentum = wp.cw_mul(model.inertia_frd, omega_frd) + wp.vec3(0.0, 0.0, momentum_z)
+    return wp.cw_mul(torque_frd - wp.cross(omega_frd, momentum), model.inertia_inv_frd)
+
+
+@wp.func
+def turned_by(q_ned_from_frd: wp.quat, rotvec_frd: wp.vec3) -> wp.quat:
+    """Attitude after a body rotation vector of less than 0.1 rad: series of the exponential, exact to float32."""
+    square = wp.dot(rotvec_frd, rotvec_frd)
+    half_sinc = 0.5 - square / 48.0
+    turn = wp.quat(
+        half_sinc * rotvec_frd[0], half_sinc * rotvec_frd[1], half_sinc * rotvec_frd[2], 1.0 - 0.125 * square
+    )
+    return wp.normalize(q_ned_from_frd * turn)
+
+
+@wp.func
+def _contact(
+    model: ContactModel, body: BodyState, around: Surroundings, r_ned_from_frd: wp.mat33, dt: float
+) -> ContactForce:
+    """Force of whatever is near."""
+    contact = ContactForce()
+    if around.is_near_ground == 1:
+        contact = ground_contact(
+            model, around, body.pos_ned, body.vel_ned, r_ned_from_frd, body.omega_frd, body.foot_slip, dt
+        )
+    if around.is_near_obstacle == 1:
+        contact = obstacle_force(model, around, contact, body.pos_ned, body.vel_ned)
+    return contact
+
+
+@wp.func
+def _substep(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> BodyState:
+    """One step of motion.
+
+    Rates take a midpoint step; position and attitude move by the mean of old and new velocity and rate: free fall is
+    exact and a tumbling body keeps its angular momentum.
+    """
+    dt = inputs.dt
+    around = inputs.around
+    r_ned_from_frd = wp.quat_to_matrix(body.q_ned_from_frd)
+    r_frd_from_ned = wp.transpose(r_ned_from_frd)
+    omega = body.omega_frd
+    air_vel_frd = r_frd_from_ned * (body.vel_ned - inputs.wind_ned)
+    wrench = rotor_wrench(model, inputs, body.rotor_speed, air_vel_frd, omega)
+    force_frd = wrench.force_frd + body_drag(model, air_vel_frd, inputs.density_ratio)
+    torque_frd = wrench.torque_frd - model.angular_drag_n_m_s2 * wp.cw_mul(wp.abs(omega), omega)
+    if around.is_near_ground + around.is_near_obstacle > 0:
+        contact = _contact(model.contact, body, around, r_ned_from_frd, dt)
+        force_frd += r_frd_from_ned * contact.force_ned
+        torque_frd += contact.torque_frd
+        body.foot_slip = contact.foot_slip
+        body.is_on_ground = contact.is_on_ground
+        body.impact_speed = wp.max(body.impact_speed, contact.impact_speed_m_s)
+        if contact.impact_speed_m_s > model.contact.crash_speed_m_s or contact.is_rotor_strike == 1:
+            body.is_crashed = 1
+    body.rotor_speed = wrench.speed
+    body.accel_frd = force_frd * model.mass_inv
+    accel_ned = r_ned_from_frd * body.accel_frd + _GRAVITY_NED
+    body.pos_ned = body.pos_ned + dt * (body.vel_ned + (0.5 * dt) * accel_ned)
+    body.vel_ned = body.vel_ned + dt * accel_ned
+    middle = omega + (0.5 * dt) * angular_accel(model, omega, torque_frd, wrench.momentum_z)
+    body.omega_frd = omega + dt * angular_accel(model, middle, torque_frd, wrench.momentum_z)
+    body.gyro_frd = 0.5 * (omega + body.omega_frd)
+    body.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.gyro_frd * dt)
+    return body
+
+
+@wp.func
+def step_inputs(
+    model: MultirotorModel, body: BodyState, command: vec8, wind_ned: wp.vec3, world: World, dt: float
+) -> StepInputs:
+    """All that stays the same over the substeps of a tick."""
+    inputs = StepInputs()
+    inputs.dt = dt
+    inputs.wind_ned = wind_ned
+    inputs.around = look_around(world, model.contact, body.pos_ned)
+    inputs.density_ratio = density_ratio(model, body.pos_ned[2])
+    inputs.rotor_inertia_rate = model.rotor_inertia_kg_m2 / dt
+    inputs.gain_up = lag_gain(model.spin_up_time_s, dt)
+    inputs.gain_down = lag_gain(model.spin_down_time_s, dt)
+    if body.is_crashed == 0:
+        inputs.rotor_target = rotor_targets(model, command, body.battery_voltage_v)
+        inputs.lift_ratio = ground_effect(model.rotor_radius_m, inputs.around.height_agl_m + model.rotor_height_m)
+    return inputs
+
+
+@wp.func
+def body_step(
+    model: MultirotorModel, body: BodyState, command: vec8, wind_ned: wp.vec3, world: World, dt: float
+) -> BodyState:
+    """One substep of dt [s] with its own look at the world; the battery is left as it is.
+
+    accel_frd and gyro_frd come out as the means over this step.
+    """
+    inputs = step_inputs(model, body, command, wind_ned, world, dt)
+    body.height_agl_m = inputs.around.height_agl_m
+    body.is_on_ground = 0
+    return _substep(model, body, inputs)
+
+
+@wp.func
+def drain_battery(model: MultirotorModel, body: BodyState, density: float, dt: float) -> BodyState:
+    """Voltage, current and charge after dt [s] of the rotors' aerodynamic power and the avionics'."""
+    cubes = float(0.0)
+    for r in range(model.rotor_count):
+        w = body.rotor_speed[r]
+        cubes += w * w * w
+    power_w = model.battery.avionics_w + density * model.torque_n_m_s2 * cubes / model.battery.motor_efficiency
+    open_v = open_circuit_voltage(model.battery, body.battery_charge_c)
+    body.battery_current_a = battery_current(model.battery, open_v, power_w)
+    body.battery_voltage_v = open_v - model.battery.resistance_ohm * body.battery_current_a
+    body.battery_charge_c = body.battery_charge_c - body.battery_current_a * dt
+    return body
+
+
+@wp.func
+def body_tick(model: MultirotorModel, body: BodyState, command: vec8, wind_ned: wp.vec3, world: World) -> BodyState:
+    """One tick: four substeps, accel_frd and gyro_frd as means over them, then the battery."""
+    inputs = step_inputs(model, body, command, wind_ned, world, _SUBSTEP_S)
+    body.height_agl_m = inputs.around.height_agl_m
+    body.is_on_ground = 0
+    accel_sum = wp.vec3()
+    gyro_sum = wp.vec3()
+    substeps = int(_SUBSTEP_COUNT)  # a dynamic loop: unrolled it is a tenth slower
+    for _step in range(substeps):
+        body = _substep(model, body, inputs)
+        accel_sum += body.accel_frd
+        gyro_sum += body.gyro_frd
+    body.accel_frd = accel_sum / float(_SUBSTEP_COUNT)
+    body.gyro_frd = gyro_sum / float(_SUBSTEP_COUNT)
+    return drain_battery(model, body, inputs.density_ratio, TICK_S)
+
+
+@wp.func
+def body_at_rest(model: MultirotorModel, pos_ned: wp.vec3, yaw_rad: float) -> BodyState:
+    """A vehicle level and still at pos_ned, rotors stopped, battery full."""
+    body = BodyState()
+    body.pos_ned = pos_ned
+    body.q_ned_from_frd = quat_from_yaw(yaw_rad)
+    body.accel_frd = -_GRAVITY_NED
+    body.battery_charge_c = model.battery.capacity_c
+    body.battery_voltage_v = model.battery.full_v
+    return body
+
+
+def multirotor_model(airframe: Airframe, home_alt_amsl_m: float = _HOME_ALT_AMSL_M) -> MultirotorModel:
+    """Constants of an airframe whose home lies home_alt_amsl_m above sea level."""
+    body, rotor = airframe.body, airframe.rotor_model
+    model = MultirotorModel()
+    model.mass_kg = body.mass_kg
+    model.mass_inv = 1.0 / body.mass_kg
+    model.inertia_frd = wp.vec3(body.inertia_xx_kg_m2, body.inertia_yy_kg_m2, body.inertia_zz_kg_m2)
+    model.inertia_inv_frd = wp.vec3(*(1.0 / moment for moment in model.inertia_frd))
+    model.drag_area_frd = wp.vec3(body.drag_area_x_m2, body.drag_area_y_m2, body.drag_area_z_m2)
+    model.angular_drag_n_m_s2 = body.angular_drag_n_m_s2
+    model.rotor_count = len(airframe.rotors)
+    for i, hub in enumerate(airframe.rotors):
+        model.rotor_x[i] = hub.x_m
+        model.rotor_y[i] = hub.y_m
+        model.rotor_z[i] = hub.z_m
+        model.rotor_spin[i] = hub.spin
+    model.rotor_radius_m = rotor.radius_m
+    model.rotor_height_m = -sum(hub.z_m for hub in airframe.rotors) / len(airframe.rotors)
+    model.thrust_n_s2 = rotor.thrust_n_s2
+    model.torque_n_m_s2 = rotor.torque_n_m_s2
+    model.inflow_n_s2_m = rotor.inflow_n_s2_m
+    model.rotor_drag_n_s2_m = rotor.drag_n_s2_m
+    model.max_speed_rad_s = rotor.max_speed_rad_s
+    model.command_curve = rotor.command_curve
+    model.spin_up_time_s = rotor.spin_up_time_s
+    model.spin_down_time_s = rotor.spin_down_time_s
+    model.rotor_inertia_kg_m2 = rotor.inertia_kg_m2
+    model.home_density_ratio = (1.0 - 2.25577e-5 * home_alt_amsl_m) ** 4.25588  # ISO 2533, troposphere
+    model.battery = battery_model(airframe)
+    model.contact = contact_model(airframe)
+    return model

@@ -1,0 +1,154 @@
+"""The test rig: world, vehicles and their flight controllers' kernel part, advanced together.
+
+In: setpoints, written into the rows of `arrays.autopilot.setpoint`. Out: the true state, the samples and the estimates,
+as rows of the other arrays. One call of `advance` is one launch per thread, for one vehicle or thousands.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from autopilot.advance import Autopilot
+from autopilot.control.airframe import ControlAirframe, control_airframe
+from autopilot.control.params import CONTROL_PARAMETERS, ControlParams, control_params
+from autopilot.control.state import ControlState
+from autopilot.estimator.ekf import make_ekf
+from autopilot.estimator.params import estimator_fields
+from autopilot.ports import Setpoint
+from common.airframe import Airframe
+from common.geodesy import GeoPoint
+from common.geomagnetic import field_ned_gauss
+from common.params import ParameterTable
+from sim.advance import RigArrays, boot, make_advance
+from sim.bodies.multirotor import BodyState, MultirotorModel, multirotor_model
+from sim.faults import Faults
+from sim.sensors.sensors import SensorModel, SensorState
+from sim.wind import WindModel, WindState
+from sim.world.world import WorldMap
+
+Rows = np.ndarray[Any, Any]
+
+
+class Rig:
+    """Vehicles of one airframe in one world.
+
+    Args:
+        airframe: the vehicle.
+        world: the ground they fly over; its origin is the home they boot at.
+        sensor_model: noise and delays of the sensors.
+        wind_model: the air.
+        home: where the vehicles boot; the origin of ned.
+        vehicle_count: rows of every array.
+        seed: seeds all noise; vehicle i draws from the stream (seed, i).
+        has_estimator: False gives the controller the true state (training only).
+        threads: the vehicles are split into as many launches; the results do not depend on it.
+        device: a Warp device.
+    """
+
+    def __init__(
+        self,
+        airframe: Airframe,
+        world: WorldMap,
+        sensor_model: SensorModel,
+        wind_model: WindModel,
+        *,
+        home: GeoPoint,
+        vehicle_count: int = 1,
+        seed: int = 0,
+        has_estimator: bool = True,
+        threads: int = 1,
+        device: str = "cpu",
+    ) -> None:
+        self.vehicle_count = vehicle_count
+        self.device = device
+        self.arrays = RigArrays()
+        self.arrays.world = world.kernel
+        self.arrays.tick = wp.zeros(vehicle_count, dtype=int, device=device)
+        self.arrays.seed = wp.full(vehicle_count, seed, dtype=int, device=device)
+        model = multirotor_model(airframe, home.alt_m)
+        self.arrays.model = self._rows(MultirotorModel, model)
+        self.arrays.body = self._rows(BodyState, BodyState())
+        self.arrays.wind_model = self._rows(WindModel, wind_model)
+        self.arrays.wind = self._rows(WindState, WindState())
+        self.arrays.sensor_model = self._rows(SensorModel, sensor_model)
+        self.arrays.sensors = self._rows(SensorState, SensorState())
+        self.arrays.faults = self._rows(Faults, Faults())
+        self.arrays.autopilot = self._autopilot(airframe)
+        self._home = home
+        self._commands: dict[int, list[Any]] = {}
+        self._kernel = _advance_kernel(has_estimator)
+        self._chunks = _chunks(vehicle_count, threads)
+        self.boot()
+        self._pool = ThreadPoolExecutor(len(self._chunks)) if len(self._chunks) > 1 else None
+
+    def advance(self, tick_count: int) -> None:
+        """Advances every vehicle by `tick_count` ticks of 4 ms."""
+        commands = self._commands.get(tick_count)
+        if commands is None:
+            commands = self._commands[tick_count] = self._record(tick_count)
+        if self._pool is None:
+            commands[0].launch()
+        else:
+            list(self._pool.map(_launch, commands))
+
+    def boot(self, chosen: Rows | None = None) -> None:
+        """Powers vehicles on, on the ground at home; `chosen` marks them, shape (vehicles,), None for all."""
+        mask = np.ones(self.vehicle_count, dtype=np.int32) if chosen is None else chosen.astype(np.int32)
+        marks = wp.array(mask, dtype=int, device=self.device)
+        wp.launch(boot, dim=self.vehicle_count, inputs=[self.arrays, marks], device=self.device)
+
+    def load_parameters(self, table: ParameterTable) -> None:
+        """Gives every flight controller the values of a parameter table, and the magnetic field of the place."""
+        field = field_ned_gauss(self._home.lat_deg, self._home.lon_deg, self._home.alt_m)
+        estimator = estimator_fields(table) | {"earth_field_ned_gauss": field}
+        self._write_rows(self.arrays.autopilot.ekf.params, estimator)
+        self._write_rows(self.arrays.autopilot.control_params, table.fields(CONTROL_PARAMETERS))
+
+    def _write_rows(self, array: Any, fields: dict[str, Any]) -> None:
+        rows = array.numpy()
+        for name, value in fields.items():
+            rows[name] = value
+        if array.device.is_cuda:
+            array.assign(rows)
+
+    def _record(self, tick_count: int) -> list[Any]:
+        return [
+            wp.launch(
+                self._kernel,
+                dim=count,
+                inputs=[self.arrays, first, tick_count],
+                device=self.device,
+                record_cmd=True,
+            )
+            for first, count in self._chunks
+        ]
+
+    def _rows(self, struct_type: Any, value: Any) -> Any:
+        return wp.array([value] * self.vehicle_count, dtype=struct_type, device=self.device)
+
+    def _autopilot(self, airframe: Airframe) -> Autopilot:
+        autopilot = Autopilot()
+        autopilot.ekf = make_ekf(self.vehicle_count, self.device)
+        autopilot.control = self._rows(ControlState, ControlState())
+        autopilot.control_params = self._rows(ControlParams, control_params())
+        autopilot.airframe = self._rows(ControlAirframe, control_airframe(airframe))
+        autopilot.setpoint = self._rows(Setpoint, Setpoint())
+        return autopilot
+
+
+@cache
+def _advance_kernel(has_estimator: bool) -> Any:
+    return make_advance(has_estimator)
+
+
+def _launch(command: Any) -> None:
+    command.launch()
+
+
+def _chunks(vehicle_count: int, threads: int) -> list[tuple[int, int]]:
+    """Splits the vehicles into (first, count) parts of nearly equal size."""
+    bounds = [vehicle_count * k // threads for k in range(threads + 1)]
+    return [(low, high - low) for low, high in zip(bounds, bounds[1:], strict=False) if high > low]

@@ -1,0 +1,69 @@
+"""Range finder looking along body down from the centre of gravity, 25 Hz, without delay.
+
+Defaults are a Benewake TF02-Pro (data sheet SJ-PM-TF02-Pro: 0.1 to 40 m, ±6 cm to 6 m, ±1 % beyond). Errors: white
+noise. Left out: beam width, reflectivity and sunlight.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from autopilot.ports import RangeSample
+from common.kernels import TICK_US
+from common.rng import normal
+from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
+from sim.streams import RANGE_WHITE
+
+wp.set_module_options({"enable_backward": False})
+
+RANGE_PERIOD_TICKS = 10  # 25 Hz
+MIN_DISTANCE_M = 0.1  # TF02-Pro
+MAX_DISTANCE_M = 40.0  # TF02-Pro, 90 % reflectivity
+NEAR_STD_M = 0.02  # TF02-Pro: ±6 cm, read as three standard deviations
+FAR_STD_SHARE = 0.01 / 3.0  # TF02-Pro: ±1 % of the distance, read as three standard deviations
+
+
+@wp.struct
+class RangeModel:
+    period_ticks: int
+    min_distance: float  # [m]
+    max_distance: float  # [m]
+    near_std: float  # [m]
+    far_std_share: float  # standard deviation over distance
+
+
+def range_model(noise_scale: float = 1.0) -> Any:
+    """The default range finder with its noise multiplied by `noise_scale`."""
+    model = RangeModel()
+    model.period_ticks = RANGE_PERIOD_TICKS
+    model.min_distance = MIN_DISTANCE_M
+    model.max_distance = MAX_DISTANCE_M
+    model.near_std = noise_scale * NEAR_STD_M
+    model.far_std_share = noise_scale * FAR_STD_SHARE
+    return model
+
+
+@wp.func
+def range_sample(
+    model: RangeModel,
+    held: RangeSample,
+    distance_m: float,
+    fault: SensorFault,
+    seed: int,
+    i: int,
+    tick: int,
+) -> RangeSample:
+    """What the driver reads when the ray along body down meets something after `distance_m` [m].
+
+    Out of range it reports the nearer limit and `is_valid` 0.
+    """
+    sample = held
+    sample.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    if fault.mode != FAULT_STUCK or held.time_us == wp.int64(0):
+        std = noise_gain(fault) * wp.max(model.near_std, model.far_std_share * distance_m)
+        distance = distance_m + std * normal(seed, i, tick, RANGE_WHITE) + fault_bias(fault)
+        sample.is_valid = 0
+        if distance >= model.min_distance and distance_m < model.max_distance:
+            sample.is_valid = 1
+        sample.distance_m = wp.clamp(distance, model.min_distance, model.max_distance)
+    return sample

@@ -1,0 +1,34 @@
+"""Names of the random streams of the simulator: one number per use, never one for two uses.
+
+A stream is the last counter of a draw (see `common/rng.py`). 1 to 9 belong to the wind, 10 to 49 to the sensors.
+"""
+
+import warp as wp
+
+IMU_WHITE = wp.constant(10)
+GYRO_TURN_ON = wp.constant(11)
+ACCEL_TURN_ON = wp.constant(12)
+GYRO_DRIFT = wp.constant(13)
+ACCEL_DRIFT = wp.constant(14)
+GYRO_DRIFT_START = wp.constant(15)
+ACCEL_DRIFT_START = wp.constant(16)
+
+GNSS_POSITION = wp.constant(20)
+GNSS_VELOCITY = wp.constant(21)
+GNSS_CORRELATED = wp.constant(22)
+GNSS_CORRELATED_START = wp.constant(23)
+
+BARO_WHITE = wp.constant(30)
+BARO_DRIFT = wp.constant(31)
+BARO_DRIFT_START = wp.constant(32)
+BARO_OFFSET = wp.constant(33)
+
+MAG_WHITE = wp.constant(36)
+MAG_HARD_IRON = wp.constant(37)
+MAG_SOFT_IRON_DIAGONAL = wp.constant(38)
+MAG_SOFT_IRON_CROSS = wp.constant(39)
+
+RANGE_WHITE = wp.constant(42)
+
+BATTERY_VOLTAGE = wp.constant(45)
+BATTERY_CURRENT = wp.constant(46)
