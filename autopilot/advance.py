@@ -9,7 +9,7 @@ import warp as wp
 from autopilot.control.airframe import ControlAirframe
 from autopilot.control.control import control_tick
 from autopilot.control.params import ControlParams
-from autopilot.control.state import ControlState
+from autopilot.control.control import ControlState
 from autopilot.estimator.ekf import Ekf, estimator_tick
 from autopilot.ports import Samples, Setpoint
 

@@ -23,9 +23,8 @@ from common.params import ParameterTable
 
 PHASE_REQUIRED_DEG = 45.0
 GAIN_REQUIRED_DB = 6.0
-PHASE_DESIGN_DEG = 60.0
-"""Room above what is required for airframes and batteries that differ from their file."""
 GAIN_DESIGN_DB = 8.0
+"""Room above what is required for airframes and batteries that differ from their file."""
 
 FAST_DELAY_S = 1.5 * TICK_S
 """IMU averaging (half a tick), holding the command (half), and half a tick for transport and computing."""
@@ -146,7 +145,7 @@ class Cascade:
     def margins(self, loop: str) -> Margins:
         """Gain, phase and disk margins of one loop."""
         system = self.loops()[loop]()
-        gain, phase_deg, _, crossover = control.margin(system)
+        gain, phase_deg, _, crossover = control.margin(control.frd(system, OMEGA))
         _, disk_gain_db, disk_phase_deg = control.disk_margins(system, OMEGA)
         gain_db = 20.0 * np.log10(gain) if np.isfinite(gain) else np.inf
         return Margins(loop, float(gain_db), float(phase_deg), float(disk_gain_db), float(disk_phase_deg), float(crossover))
@@ -161,3 +160,107 @@ def all_margins(airframe: Airframe, gains: Mapping[str, float] | None = None) ->
     """Margins of every loop with the given gains, or the defaults."""
     cascade = Cascade(airframe, default_gains() if gains is None else gains)
     return [cascade.margins(loop) for loop in cascade.loops()]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """How one loop is designed: the greatest gain with this phase margin, its other gains in proportion to it."""
+
+    loop: str
+    gain: str
+    phase_deg: float
+    integral_per_s: float = 0.0
+    derivative_s: float = 0.0
+    derivative_lags: float = 0.0
+    """Derivative over proportional gain, in motor lags: 1 would cancel the lag."""
+
+
+# Phase margins above the required ones, so that slower motors and other loads stay within those. Inner loops get
+# more, since every loop round them builds on theirs.
+RULES = [
+    Rule("rate roll pitch", "rate_p_tilt", 65.0, integral_per_s=2.5, derivative_lags=0.7),
+    Rule("rate yaw", "rate_p_yaw", 69.0, integral_per_s=1.0),
+    Rule("attitude roll pitch", "att_p_roll", 63.0),
+    Rule("attitude yaw", "att_p_yaw", 72.0),
+    Rule("velocity xy", "vel_p_xy", 60.0, integral_per_s=0.33, derivative_s=0.025),
+    Rule("velocity z", "vel_p_z", 75.0, integral_per_s=0.33),
+    Rule("position xy", "pos_p_xy", 56.0),
+    Rule("position z", "pos_p_z", 67.0),
+]
+
+
+def _two_digits(value: float) -> float:
+    return float(f"{value:.2g}")
+
+
+def greatest_gain(loop: System, phase_deg: float, gain_db: float) -> float:
+    """The factor by which an open loop may be multiplied to be left with these margins."""
+    response = np.asarray(control.frd(loop, OMEGA).frdata[0, 0])
+    phase = np.degrees(np.unwrap(np.angle(response)))
+    phase -= 360.0 * np.round((phase[len(phase) // 2] + 120.0) / 360.0)  # near crossover it lies round -120 deg
+    size = np.abs(response)
+    last_ok = int(np.flatnonzero(phase >= phase_deg - 180.0)[-1])
+    reversal = int(np.flatnonzero(phase >= -180.0)[-1])
+    return float(min(1.0 / size[last_ok], 10.0 ** (-gain_db / 20.0) / size[reversal]))
+
+
+def design(airframe: Airframe) -> Gains:
+    """Gains for an airframe, from the inside out; what no rule names keeps its default."""
+    gains = default_gains()
+    for rule in RULES:
+        stem, _, axis = rule.gain.partition("_p_")
+        unit = {rule.gain: 1.0}
+        if f"{stem}_i_{axis}" in gains:
+            unit[f"{stem}_i_{axis}"] = rule.integral_per_s
+            unit[f"{stem}_d_{axis}"] = rule.derivative_s + rule.derivative_lags * motor_time_s(airframe)
+        if rule.gain == "att_p_roll":
+            unit["att_p_pitch"] = 1.0
+        loop = Cascade(airframe, {**gains, **unit}).loops()[rule.loop]()
+        factor = greatest_gain(loop, rule.phase_deg, GAIN_DESIGN_DB)
+        gains.update({name: _two_digits(factor * value) for name, value in unit.items()})
+    return gains
+
+
+def _margin_table(airframe: Airframe, rows: list[Margins]) -> Table:
+    table = Table(title=f"{airframe.name}: margins with the default gains")
+    for heading in ("loop", "crossover rad/s", "gain dB", "phase deg", "disk gain dB", "disk phase deg", "enough"):
+        table.add_column(heading, justify="left" if heading == "loop" else "right")
+    for row in rows:
+        figures = (row.crossover_rad_s, row.gain_db, row.phase_deg, row.disk_gain_db, row.disk_phase_deg)
+        verdict = "yes" if row.is_sufficient else "[red]no[/red]"
+        table.add_row(row.loop, *(f"{figure:.1f}" for figure in figures), verdict)
+    return table
+
+
+def _gain_table(airframe: Airframe, designed: Mapping[str, float]) -> Table:
+    table = Table(title=f"{airframe.name}: gains")
+    for heading in ("parameter", "default", "designed for this airframe"):
+        table.add_column(heading, justify="left" if heading == "parameter" else "right")
+    ruled = {rule.gain.partition("_p_")[0] for rule in RULES}
+    for item in CONTROL_PARAMETERS:
+        stem = item.field[:-6] if item.field.startswith("att_p_") else item.field[: item.field.rfind("_", 0, -4)]
+        if item.source.startswith("python -m") and stem.split("_")[0] in {name.split("_")[0] for name in ruled}:
+            table.add_row(item.name, f"{item.default:g}", f"{designed[item.field]:g}")
+    return table
+
+
+def main(
+    airframe: Annotated[str, typer.Option(help="Name of an airframe, or path of its TOML file.")] = "x500",
+) -> None:
+    """Prints the margins of every loop and the gains that the design rules give; exit code 1 if a margin is too small."""
+    console = Console()
+    try:
+        frame = load_airframe(airframe)
+    except AirframeError as error:
+        console.print(str(error), style="red", highlight=False)
+        raise typer.Exit(2) from error
+    rows = all_margins(frame)
+    console.print(_margin_table(frame, rows))
+    console.print(_gain_table(frame, design(frame)))
+    console.print(f"Required: {PHASE_REQUIRED_DEG:.0f} deg and {GAIN_REQUIRED_DB:.0f} dB.")
+    if not all(row.is_sufficient for row in rows):
+        raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -41,7 +41,7 @@ class Body(_Section):
     drag_area_y_m2: Sourced
     drag_area_z_m2: Sourced
     angular_drag_n_m_s2: Sourced
-    """Torque per squared body rate opposing rotation."""
+    """Torque per squared body rate opposing rotation about each axis, at sea-level density."""
 
 
 class Rotor(_Section):

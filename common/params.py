@@ -84,7 +84,8 @@ class ParameterTable:
 
     def si(self, name: str) -> float:
         """The value in SI: degrees as radians, milliseconds as seconds, per cent as a share."""
-        return self._values[name] * SCALE_TO_SI.get(self.declarations[name].unit, 1.0)
+        scale = SCALE_TO_SI.get(self.declarations[name].unit)
+        return self._values[name] if scale is None else self._values[name] * scale
 
     def fields(self, declarations: Iterable[Parameter]) -> dict[str, float]:
         """Kernel struct fields and their SI values, for those of `declarations` that name a field."""

@@ -10,8 +10,7 @@ from typing import Any
 import warp as wp
 
 from autopilot.advance import Autopilot
-from autopilot.control.control import control_tick
-from autopilot.control.state import ControlState
+from autopilot.control.control import ControlState, control_tick
 from autopilot.estimator.ekf import estimator_reset, estimator_tick
 from autopilot.ports import (
     HEIGHT_VALID,
@@ -81,8 +80,9 @@ def boot(rig: RigArrays, chosen: wp.array(dtype=int)):
     i = wp.tid()
     if chosen[i] == 0:
         return
-    foot = rig.model[i].contact.leg_z_m
-    rig.body[i] = body_at_rest(rig.model[i], wp.vec3(0.0, 0.0, -ground_height(rig.world, 0.0, 0.0) - foot), 0.0)
+    model = rig.model[i]
+    down = -ground_height(rig.world, 0.0, 0.0) - model.contact.leg_frd[2]
+    rig.body[i] = body_at_rest(model, wp.vec3(0.0, 0.0, down), 0.0)
     rig.wind[i] = WindState()
     rig.sensors[i] = SensorState()
     rig.autopilot.control[i] = ControlState()

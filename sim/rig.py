@@ -14,7 +14,7 @@ import warp as wp
 from autopilot.advance import Autopilot
 from autopilot.control.airframe import ControlAirframe, control_airframe
 from autopilot.control.params import CONTROL_PARAMETERS, ControlParams, control_params
-from autopilot.control.state import ControlState
+from autopilot.control.control import ControlState
 from autopilot.estimator.ekf import make_ekf
 from autopilot.estimator.params import estimator_fields
 from autopilot.ports import Setpoint

@@ -7,7 +7,6 @@ predictor carries its state to now. `estimator_tick` is the whole filter in time
 
 from typing import Any
 
-import numpy as np
 import warp as wp
 
 from autopilot.estimator.align import aligned_nominal, average, is_aligned, start_output
@@ -266,7 +265,8 @@ def start(ekf: Ekf, i: int, params: EstimatorParams, state: EstimatorState) -> E
     """From alignment to running; what waits in the rings is older than the start and is dropped."""
     state.phase = PHASE_RUNNING
     state.nominal = aligned_nominal(params, ekf.covariance, i, state.alignment)
-    state.is_yaw_aligned = int(state.nominal.reset_count > 0)
+    state.is_yaw_aligned = state.nominal.reset_count  # 1 if the magnetometer set heading
+    state.nominal.reset_count = 0
     if state.alignment.baro_count > 0:
         state.origin_baro_height = state.alignment.baro_height / float(state.alignment.baro_count)
         state.baro.is_active = 1
@@ -413,10 +413,10 @@ def make_ekf(vehicle_count: int, device: str = "cpu", params: Any = None) -> Ekf
         device: a Warp device.
         params: one `EstimatorParams` for all rows; None gives the defaults without a world magnetic field.
     """
-    row = np.array([(params or estimator_params()).numpy_value()], dtype=EstimatorParams.numpy_dtype())
+    row = params if params is not None else estimator_params()
     ekf = Ekf()
     ekf.rows = wp.zeros(vehicle_count, dtype=EstimatorState, device=device)
-    ekf.params = wp.array(np.repeat(row, vehicle_count), dtype=EstimatorParams, device=device)
+    ekf.params = wp.array([row] * vehicle_count, dtype=EstimatorParams, device=device)
     ekf.covariance = wp.zeros((vehicle_count, ERROR_STATES), dtype=vec24, device=device)
     ekf.imu_ring = wp.zeros((vehicle_count, IMU_RING), dtype=ImuSample, device=device)
     ekf.output_ring = wp.zeros((vehicle_count, IMU_RING), dtype=OutputSample, device=device)

@@ -47,18 +47,14 @@ class Upload:
     retry_at_us: int = 0
 
 
-def _key(sender: Sender) -> tuple[int, int, int]:
-    return id(sender.channel), sender.sysid, sender.compid
-
-
 class MissionService:
     """Serves the vehicle's mission."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
         self._upload: Upload | None = None
-        self._last_upload: tuple[tuple[int, int, int], int, int] | None = None  # sender, last seq, result
-        self._downloads: dict[tuple[int, int, int], tuple[MissionItem, ...]] = {}
+        self._last_upload: tuple[Sender, int, int] | None = None  # sender, last seq, result
+        self._downloads: dict[Sender, tuple[MissionItem, ...]] = {}
 
     # Upload
 
@@ -66,7 +62,7 @@ class MissionService:
         """A client wants to upload."""
         if fields.mission_type != PLAN:
             self._answer_empty_type(sender, fields.mission_type, is_clear=fields.count == 0)
-        elif self._upload is not None and _key(self._upload.sender) != _key(sender):
+        elif self._upload is not None and self._upload.sender != sender:
             self._refuse(sender, mavlink.MAV_MISSION_DENIED, "another client is uploading")
         elif fields.count > ITEMS_MAX:
             self._refuse(sender, mavlink.MAV_MISSION_NO_SPACE, f"{fields.count} items are more than {ITEMS_MAX}")
@@ -85,7 +81,7 @@ class MissionService:
             self._answer_empty_type(sender, fields.mission_type, is_clear=False)
         elif upload is None:
             self._late_item(sender, fields.seq)
-        elif _key(upload.sender) != _key(sender):
+        elif upload.sender != sender:
             self._refuse(sender, mavlink.MAV_MISSION_DENIED, "another client is uploading")
         elif fields.seq > len(upload.items):
             self._upload = None
@@ -99,11 +95,11 @@ class MissionService:
             else:
                 self._upload = None
                 result = self._load(sender, upload.items)
-                self._last_upload = (_key(sender), fields.seq, result)
+                self._last_upload = (sender, fields.seq, result)
 
     def _late_item(self, sender: Sender, seq: int) -> None:
         """An item while no upload runs: perhaps our acknowledgement of the last one was lost."""
-        if self._last_upload is not None and self._last_upload[:2] == (_key(sender), seq):
+        if self._last_upload is not None and self._last_upload[:2] == (sender, seq):
             self._ack(sender, self._last_upload[2])
         else:
             self._refuse(sender, mavlink.MAV_MISSION_INVALID_SEQUENCE, f"item {seq} came without an upload")
@@ -147,7 +143,7 @@ class MissionService:
         if fields.mission_type == PLAN:
             if len(self._downloads) >= DOWNLOADS_MAX:
                 self._downloads.clear()
-            self._downloads[_key(sender)] = items
+            self._downloads[sender] = items
         payload = _MISSION_COUNT.pack(sender.sysid, sender.compid, len(items), fields.mission_type)
         self._endpoint.reply(sender, _MISSION_COUNT, payload)
 
@@ -163,7 +159,7 @@ class MissionService:
             self._reply_item(sender, _MISSION_ITEM, item, item.x, item.y)
 
     def _requested_item(self, sender: Sender, fields: Any) -> MissionItem | None:
-        items = self._downloads.get(_key(sender))
+        items = self._downloads.get(sender)
         if items is None:
             items = tuple(self._endpoint.vehicle.mission_items())
         if fields.mission_type == PLAN and fields.seq < len(items):
@@ -192,8 +188,8 @@ class MissionService:
 
     def ack_received(self, sender: Sender, fields: Any) -> None:
         """The client has its download, or gives up its upload."""
-        self._downloads.pop(_key(sender), None)
-        if self._upload is not None and _key(self._upload.sender) == _key(sender) and fields.type != ACCEPTED:
+        self._downloads.pop(sender, None)
+        if self._upload is not None and self._upload.sender == sender and fields.type != ACCEPTED:
             self._upload = None
 
     # The rest

@@ -42,7 +42,7 @@ class NavContext:
         self.wants_lift = False  # the mode asks to leave the ground
         self.is_landing = False  # the mode is on its last descent
         self.wish: Mode | None = None  # the mode that shall follow this one
-        self.next_hold: tuple[Vector, float] | None = None  # place and heading for the next hold
+        self.next_hold: tuple[Vector, float, bool] | None = None  # place, heading, whether to go there in a line
         self.cruise_speed = nan  # [m/s] asked for by DO_CHANGE_SPEED; NaN: the parameter
         self.climb_speed = nan
         self.descend_speed = nan
@@ -130,7 +130,7 @@ class NavContext:
 
     def hold_next(self, pos_ned: Vector, yaw: float) -> None:
         """Goes over to Hold, at the given place."""
-        self.next_hold = (pos_ned, yaw)
+        self.next_hold = (pos_ned, yaw, False)
         self.wish = Mode.HOLD
 
     def _on_parameter(self, parameter: Parameter) -> None:

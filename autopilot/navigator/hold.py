@@ -7,29 +7,24 @@ from autopilot.navigator.setpoint import Vector
 class Hold:
     """Mode Hold: the place is where the mode before ended, where a client sent the vehicle, or where it can stop."""
 
-    __slots__ = ("_context", "_is_flown", "target_ned", "yaw")
+    __slots__ = ("_context", "_is_flown", "_is_goto", "target_ned", "yaw")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
         self._is_flown = False
+        self._is_goto = False  # on a straight line to the place
         self.target_ned: Vector = (0.0, 0.0, 0.0)  # [m]
         self.yaw = 0.0  # [rad]
 
     def start(self) -> None:
         context = self._context
         if context.next_hold is not None:
-            self.target_ned, self.yaw = context.next_hold
+            self.target_ned, self.yaw, self._is_goto = context.next_hold
             context.next_hold = None
         else:
+            self._is_goto = False
             self.target_ned, self.yaw = context.stop_point(), context.state.yaw_rad
         self._is_flown = False
-
-    def go(self, target_ned: Vector, yaw: float) -> None:
-        """Flies straight to a place [m] and stays there."""
-        context = self._context
-        self.target_ned, self.yaw = target_ned, yaw
-        context.fly_to(target_ned, yaw, context.state.estimate.pos_ned)
-        self._is_flown = True
 
     def frame(self) -> None:
         context = self._context
@@ -37,4 +32,4 @@ class Hold:
             self._is_flown = False
         elif not self._is_flown:
             self._is_flown = True
-            context.fly_to(self.target_ned, self.yaw)
+            context.fly_to(self.target_ned, self.yaw, context.state.estimate.pos_ned if self._is_goto else None)

@@ -73,6 +73,7 @@ class Mission:
         state = self._context.state
         self.items = tuple(items)
         self._index = 0
+        self._stage = _Stage.IDLE
         self._jumps_left.clear()
         state.mission_count = len(self.items)
         is_flying_it = state.mission_state == MissionState.ACTIVE and state.is_armed and state.mode is Mode.MISSION
@@ -157,8 +158,10 @@ class Mission:
 
     def _begin(self, index: int, start: Vector | None = None) -> None:
         """Makes `index` current and starts it; `start` is where its leg begins, None: where the vehicle is."""
-        # Each jump either uses up a count or, checked at load, leads through an item that takes time.
-        while index < len(self.items):
+        for _ in range(len(self.items) + 1):  # a chain longer than that repeats itself
+            if index >= len(self.items):
+                self._complete()
+                return
             self._index = index
             item = self.items[index]
             if item.command in NAV_COMMANDS:
@@ -170,6 +173,7 @@ class Mission:
             if following >= len(self.items):
                 self._announce_current(index)
             index = following
+        self._context.announcer.statustext(Severity.ERROR, f"Mission item {self._index} jumps in a circle")
         self._complete()
 
     def _begin_nav(self, item: MissionItem, start: Vector | None) -> None:
@@ -183,7 +187,7 @@ class Mission:
         elif command == Command.DELAY:
             self._wait(hold_time_s(item))
         elif command == Command.LAND and context.is_on_ground:
-            self._advance()
+            self._wait(0.0)
         elif command == Command.TAKEOFF:
             self._stage = _Stage.CLIMB
             self._climb.start(self._down_of(item), radians(item.params[3]))
@@ -234,7 +238,7 @@ class Mission:
         target = self._target
         if item.command == Command.LAND and target is not None:
             self._stage = _Stage.LAND
-            self._landing.start(target[0], target[1], self._yaw if not isfinite(item.params[3]) else radians(item.params[3]))
+            self._landing.start(target[0], target[1], self._yaw)
             self._landing.frame()
         elif item.command == Command.LOITER_UNLIMITED:
             self._stage = _Stage.STAY

@@ -90,12 +90,12 @@ class Navigator:
         """Chooses the next place to hold; the caller changes to Hold."""
         context = self.context
         if not (isfinite(lat_deg) or isfinite(lon_deg) or isfinite(alt_amsl_m) or isfinite(yaw)):
-            context.next_hold = None if context.state.mode is not Mode.HOLD else (context.stop_point(), context.state.yaw_rad)
+            context.next_hold = (context.stop_point(), context.state.yaw_rad, False)
         else:
             target = reposition_target(context, self.hold, lat_deg, lon_deg, alt_amsl_m, yaw)
             if isinstance(target, Reply):
                 return target
-            context.next_hold = target
+            context.next_hold = (*target, True)
         if isfinite(speed_m_s) and speed_m_s > 0.0:
             context.cruise_speed = speed_m_s
         return ACCEPTED

@@ -1,0 +1,115 @@
+"""Arming checks: everything that must be right before the rotors may turn, each with the reason it gives.
+
+In: the vehicle's state. Out: reasons, most important first; empty means ready. Run at 5 Hz while disarmed.
+"""
+
+from collections.abc import Callable
+from math import hypot, radians
+
+from autopilot.ports import HEIGHT_VALID, POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
+from autopilot.vehicle import VehicleState
+from common.params import ParameterTable
+
+_STALE_US = 1_000_000  # a sensor that has been silent for longer is off
+_GNSS_STALE_US = 2_000_000
+_STILL_RAD_S = 0.2  # faster than hands, wind or noise turn a vehicle that stands; guess
+_UPRIGHT_RAD = radians(45.0)  # PX4 and ArduPilot refuse a steeper stand
+
+
+def arming_reasons(state: VehicleState, params: ParameterTable, *, needs_position: bool) -> list[str]:
+    """Why the vehicle may not be armed.
+
+    Args:
+        state: the vehicle as of this frame.
+        params: its parameters.
+        needs_position: whether the mode it would be armed in needs a position.
+    """
+    if state.estimate is None or state.samples is None:
+        return ["no data from the sensors yet"]
+    checks = (*_ALWAYS, *_POSITION) if needs_position else _ALWAYS
+    return [reason for check in checks if (reason := check(state, params))]
+
+
+def _imu(state: VehicleState, _: ParameterTable) -> str:
+    return "IMU: no data" if _is_stale(state, state.samples.imu.time_us, _STALE_US) else ""
+
+
+def _barometer(state: VehicleState, _: ParameterTable) -> str:
+    return "barometer: no data" if _is_stale(state, state.samples.baro.time_us, _STALE_US) else ""
+
+
+def _magnetometer(state: VehicleState, _: ParameterTable) -> str:
+    return "magnetometer: no data" if _is_stale(state, state.samples.mag.time_us, _STALE_US) else ""
+
+
+def _alignment(state: VehicleState, _: ParameterTable) -> str:
+    flags = state.estimate.flags
+    if not flags & TILT_ALIGNED:
+        return "estimator: attitude not aligned"
+    return "" if flags & YAW_ALIGNED else "estimator: heading not aligned"
+
+
+def _height(state: VehicleState, _: ParameterTable) -> str:
+    return "" if state.estimate.flags & HEIGHT_VALID else "estimator: no valid height"
+
+
+def _still(state: VehicleState, _: ParameterTable) -> str:
+    p, q, r = state.estimate.omega_frd
+    return "vehicle is moving" if p * p + q * q + r * r > _STILL_RAD_S * _STILL_RAD_S else ""
+
+
+def _upright(state: VehicleState, _: ParameterTable) -> str:
+    return "vehicle is not upright" if hypot(state.roll_rad, state.pitch_rad) > _UPRIGHT_RAD else ""
+
+
+def _biases(state: VehicleState, params: ParameterTable) -> str:
+    estimate = state.estimate
+    if max(map(abs, estimate.gyro_bias_frd)) > radians(float(params["COM_ARM_GYR_BIAS"])):
+        return "gyro bias is high"
+    if max(map(abs, estimate.accel_bias_frd)) > params["COM_ARM_ACC_BIAS"]:
+        return "accelerometer bias is high"
+    return ""
+
+
+def _battery(state: VehicleState, params: ParameterTable) -> str:
+    remaining = state.battery_remaining
+    if remaining != remaining or _is_stale(state, state.samples.battery.time_us, _GNSS_STALE_US):
+        return "battery: no data"
+    lowest = float(params["BAT_LOW_THR"])
+    return f"battery: {remaining:.0%} left, {lowest:.0%} needed" if remaining < lowest else ""
+
+
+def _gnss(state: VehicleState, params: ParameterTable) -> str:
+    gnss = state.samples.gnss
+    if _is_stale(state, gnss.time_us, _GNSS_STALE_US):
+        return "GNSS: no data"
+    if gnss.fix_type < 3:
+        return "GNSS: no 3-D fix"
+    needed = int(params["COM_ARM_SAT_MIN"])
+    return f"GNSS: {gnss.satellites} satellites, {needed} needed" if gnss.satellites < needed else ""
+
+
+def _position(state: VehicleState, params: ParameterTable) -> str:
+    estimate = state.estimate
+    if not estimate.flags & POSITION_VALID:
+        return "estimator: no valid position"
+    if not estimate.flags & VELOCITY_VALID:
+        return "estimator: no valid velocity"
+    for std, name, word in (
+        (estimate.pos_h_std, "COM_POS_FS_EPH", "horizontal"),
+        (estimate.pos_v_std, "COM_ARM_EPV", "vertical"),
+    ):
+        if not std <= params[name]:
+            return f"estimator: {word} accuracy {std:.1f} m, {params[name]:.1f} m needed"
+    return ""
+
+
+def _is_stale(state: VehicleState, sample_us: int, limit_us: int) -> bool:
+    return sample_us == 0 or state.time_us - sample_us > limit_us
+
+
+_Check = Callable[[VehicleState, ParameterTable], str]
+_ALWAYS: tuple[_Check, ...] = (
+    _imu, _barometer, _magnetometer, _alignment, _height, _upright, _still, _biases, _battery,
+)  # fmt: skip
+_POSITION: tuple[_Check, ...] = (_gnss, _position)

@@ -1,0 +1,70 @@
+"""Failsafes: which failure leads to which action, most urgent first, with what the pilot is told."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+from autopilot.vehicle import Mode, Severity
+from common.params import ParameterTable
+
+
+class Failure(IntFlag):
+    """What can be wrong at the same time."""
+
+    NONE = 0
+    POSITION_LOST = 1  # in a mode that needs it
+    BATTERY_EMERGENCY = 2
+    BATTERY_CRITICAL = 4
+    OFFBOARD_LOST = 8
+    BATTERY_LOW = 16
+
+
+class Action(IntEnum):
+    """What to do, in rising order: a failsafe never replaces a stronger one."""
+
+    WARN = 0
+    HOLD = 1
+    RETURN = 2
+    LAND = 3  # blind if the position is lost
+
+
+ACTION_MODES = {Action.HOLD: Mode.HOLD, Action.RETURN: Mode.RETURN, Action.LAND: Mode.LAND}
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One row of the table."""
+
+    failure: Failure
+    action: Callable[[ParameterTable], Action]
+    severity: Severity
+    text: str
+
+
+def _battery_critical(params: ParameterTable) -> Action:
+    return {2: Action.LAND, 3: Action.RETURN}.get(int(params["COM_LOW_BAT_ACT"]), Action.WARN)
+
+
+def _battery_emergency(params: ParameterTable) -> Action:
+    return Action.LAND if int(params["COM_LOW_BAT_ACT"]) >= 2 else Action.WARN
+
+
+def _offboard_lost(params: ParameterTable) -> Action:
+    return {3: Action.RETURN, 4: Action.LAND}.get(int(params["COM_OBL_RC_ACT"]), Action.HOLD)
+
+
+def _land(_: ParameterTable) -> Action:
+    return Action.LAND
+
+
+def _warn(_: ParameterTable) -> Action:
+    return Action.WARN
+
+
+RULES: tuple[Rule, ...] = (
+    Rule(Failure.POSITION_LOST, _land, Severity.CRITICAL, "Position lost"),
+    Rule(Failure.BATTERY_EMERGENCY, _battery_emergency, Severity.EMERGENCY, "Battery nearly empty"),
+    Rule(Failure.BATTERY_CRITICAL, _battery_critical, Severity.CRITICAL, "Battery critical"),
+    Rule(Failure.OFFBOARD_LOST, _offboard_lost, Severity.CRITICAL, "Offboard setpoints lost"),
+    Rule(Failure.BATTERY_LOW, _warn, Severity.WARNING, "Battery low"),
+)

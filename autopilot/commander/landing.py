@@ -1,0 +1,94 @@
+"""Landing detection: ground contact, then perhaps landed, then landed (the three stages of PX4's detector).
+
+In: estimate and collective thrust, each frame of a flight. Out: whether the vehicle stands. A vehicle in the air cannot
+pass: with less than a third of its hover thrust it gathers a speed of LNDMC_Z_VEL_MAX within 0.04 s, while each stage
+needs a third of LNDMC_TRIG_TIME. A range finder that sees air below only delays the answer, in case it is stuck.
+"""
+
+from math import radians
+from typing import Any
+
+from autopilot.ports import TERRAIN_VALID, VELOCITY_VALID
+from common.kernels import GRAVITY_M_S2
+from common.params import Parameter, ParameterTable
+
+_CONTACT_SHARE = 0.3  # of the way from least to hover thrust (PX4: MulticopterLandDetector)
+_LANDED_SHARE = 0.15  # PX4 has 0.1; the thrust floor of the control part is approached slowly
+_AIR_BELOW_M = 1.0  # range finder reading that speaks against a landing; guess
+_AIR_BELOW_FACTOR = 5.0  # by which such a reading stretches the time needed
+
+
+class LandingDetector:
+    """Landing detection of one vehicle.
+
+    Args:
+        params: LNDMC_* and MPC_THR_MIN.
+        hover_thrust: [0..1] collective thrust that carries the vehicle.
+    """
+
+    __slots__ = (
+        "_contact_thrust", "_hover_thrust", "_landed_thrust", "_params", "_rate_max_sq", "_speed_xy_max_sq",
+        "_speed_z_max", "_stage_s", "_time_s", "is_landed",
+    )  # fmt: skip
+
+    def __init__(self, params: ParameterTable, hover_thrust: float) -> None:
+        self._params = params
+        self._hover_thrust = hover_thrust
+        self._time_s = 0.0  # for which it has looked landed, stage after stage
+        self.is_landed = False
+        self._load()
+        params.on_change(self._on_parameter)
+
+    def reset(self) -> None:
+        """The vehicle is about to leave the ground."""
+        self._time_s = 0.0
+        self.is_landed = False
+
+    def update(self, estimate: Any, thrust: float, dt_s: float) -> bool:
+        """Takes one frame and returns whether the vehicle stands on the ground.
+
+        Args:
+            estimate: the Estimate record.
+            thrust: [0..1] collective thrust setpoint.
+            dt_s: [s] since the last frame.
+        """
+        if thrust >= self._contact_thrust or not self._is_supported(estimate):
+            self._time_s = 0.0
+            return False
+        stage_s = self._stage_s
+        time_s = self._time_s + dt_s
+        if time_s > stage_s and (thrust >= self._landed_thrust or self._is_turning(estimate)):
+            time_s = stage_s  # contact, but not yet perhaps landed
+        self._time_s = time_s
+        needed_s = 3.0 * stage_s
+        if estimate.flags & TERRAIN_VALID and estimate.terrain_d - estimate.pos_ned[2] > _AIR_BELOW_M:
+            needed_s *= _AIR_BELOW_FACTOR
+        self.is_landed = time_s >= needed_s
+        return self.is_landed
+
+    def _is_supported(self, estimate: Any) -> bool:
+        """Whether something else than the rotors carries the vehicle."""
+        if estimate.flags & VELOCITY_VALID:
+            north, east, down = estimate.vel_ned
+            return bool(abs(down) < self._speed_z_max and north * north + east * east < self._speed_xy_max_sq)
+        # Without a velocity: rotors alone at this thrust would be felt as less than a third of gravity.
+        x, y, z = estimate.accel_frd
+        return bool(x * x + y * y + z * z > (0.7 * GRAVITY_M_S2) ** 2)
+
+    def _is_turning(self, estimate: Any) -> bool:
+        p, q, r = estimate.omega_frd
+        return bool(p * p + q * q + r * r > self._rate_max_sq)
+
+    def _load(self) -> None:
+        params = self._params
+        least = float(params["MPC_THR_MIN"])
+        self._contact_thrust = least + _CONTACT_SHARE * (self._hover_thrust - least)
+        self._landed_thrust = least + _LANDED_SHARE * (self._hover_thrust - least)
+        self._rate_max_sq = radians(float(params["LNDMC_ROT_MAX"])) ** 2
+        self._speed_z_max = float(params["LNDMC_Z_VEL_MAX"])
+        self._speed_xy_max_sq = float(params["LNDMC_XY_VEL_MAX"]) ** 2
+        self._stage_s = float(params["LNDMC_TRIG_TIME"]) / 3.0
+
+    def _on_parameter(self, parameter: Parameter) -> None:
+        if parameter.name.startswith("LNDMC_") or parameter.name == "MPC_THR_MIN":
+            self._load()

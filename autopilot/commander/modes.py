@@ -1,0 +1,47 @@
+"""The mode machine's table: what each flight mode needs, and the reasons for which it is refused."""
+
+from dataclasses import dataclass
+
+from autopilot.vehicle import Mode
+
+
+@dataclass(frozen=True, slots=True)
+class ModeRule:
+    """Conditions of one mode."""
+
+    needs_position: bool  # valid horizontal position, velocity and height
+    needs_home: bool
+    may_arm: bool  # the vehicle may be armed in it
+    on_ground: bool  # may be chosen while standing on the ground
+
+
+MODE_RULES: dict[Mode, ModeRule] = {
+    Mode.HOLD: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True),
+    Mode.TAKEOFF: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True),
+    Mode.MISSION: ModeRule(needs_position=True, needs_home=True, may_arm=True, on_ground=True),
+    Mode.RETURN: ModeRule(needs_position=True, needs_home=True, may_arm=False, on_ground=False),
+    Mode.LAND: ModeRule(needs_position=False, needs_home=False, may_arm=False, on_ground=False),
+    # Offboard setpoints of attitude or rate need no position: the commander asks the navigator.
+    Mode.OFFBOARD: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True),
+}
+
+
+def mode_refusal(mode: Mode, *, has_position: bool, has_home: bool, is_on_ground: bool, needs_position: bool) -> str:
+    """Why the mode cannot be entered now; empty if it can.
+
+    Args:
+        mode: the mode asked for.
+        has_position: horizontal position, velocity and height are valid.
+        has_home: home is known.
+        is_on_ground: the vehicle stands on the ground.
+        needs_position: as the table says, except in Offboard, where the setpoint decides.
+    """
+    rule = MODE_RULES[mode]
+    if is_on_ground and not rule.on_ground:
+        return f"Mode {mode.name} refused: on the ground already"
+    # Hold is where every vehicle boots: it may be chosen before there is a position, and flown only with one.
+    if needs_position and not has_position and not (mode is Mode.HOLD and is_on_ground):
+        return f"Mode {mode.name} refused: no valid position"
+    if rule.needs_home and not has_home:
+        return f"Mode {mode.name} refused: no home"
+    return ""

@@ -1,0 +1,76 @@
+"""Runs the estimator over recorded samples and keeps what it answered at each tick."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from autopilot.estimator.ekf import Ekf, estimator_tick, make_ekf
+from autopilot.estimator.params import ESTIMATOR_PARAMETERS, estimator_params
+from autopilot.estimator.state import EstimatorState
+from autopilot.ports import Samples
+from common.params import ParameterTable
+from tests.unit.autopilot.estimator.flights import FIELD_NED_GAUSS, Flight, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel(enable_backward=False)
+def run_samples(
+    ekf: Ekf, samples: wp.array2d(dtype=Samples), first: int, count: int, trace: wp.array2d(dtype=EstimatorState)
+):
+    i = wp.tid()
+    state = ekf.rows[i]
+    for k in range(count):
+        state = estimator_tick(ekf, i, state, samples[i, first + k])
+        if trace.shape[1] > 0:
+            trace[i, k] = state
+    ekf.rows[i] = state
+
+
+def default_ekf(vehicle_count: int = 1, **changes: float) -> Ekf:
+    """Estimators at power-on with some parameters changed."""
+    table = ParameterTable(ESTIMATOR_PARAMETERS)
+    for name, value in changes.items():
+        table.set(name, value)
+    return make_ekf(vehicle_count, "cpu", estimator_params(table, FIELD_NED_GAUSS))
+
+
+def run(ekf: Ekf, samples: Any, *, keep_trace: bool = True) -> Any:
+    """The states after each tick, shape (vehicles, ticks), for samples of that shape (or of one vehicle)."""
+    rows = np.atleast_2d(samples)
+    device_samples = wp.array(rows, dtype=Samples, device="cpu")
+    trace = wp.zeros((rows.shape[0], rows.shape[1] if keep_trace else 0), dtype=EstimatorState, device="cpu")
+    wp.launch(run_samples, rows.shape[0], inputs=[ekf, device_samples, 0, rows.shape[1], trace], device="cpu")
+    return trace.numpy()
+
+
+@dataclass
+class Errors:
+    """Estimate minus truth at each tick."""
+
+    pos: Any
+    vel: Any
+    tilt_deg: Any
+    yaw_deg: Any
+
+
+def errors(flight: Flight, trace: Any) -> Errors:
+    """Errors of one vehicle's trace."""
+    estimate = trace["estimate"]
+    turn = rotvec_from_quat(quat_multiply(estimate["q_ned_from_frd"].astype(float), quat_conjugate(flight.q)))
+    return Errors(
+        estimate["pos_ned"] - flight.pos_ned,
+        estimate["vel_ned"] - flight.vel_ned,
+        np.degrees(np.hypot(turn[:, 0], turn[:, 1])),
+        np.degrees(turn[:, 2]),
+    )
+
+
+def share_in_band(trace: Any, aid: str, components: int, from_tick: int) -> Any:
+    """Share of normalised innovations inside ±1.96 per component, over the samples judged after `from_tick`."""
+    column = trace[aid][from_tick:]
+    is_new = np.flatnonzero(np.diff(column["judged_time_us"]) > 0) + 1
+    ratio = column["innov"][is_new, :components] ** 2 / column["innov_var"][is_new, :components]
+    return np.mean(ratio < 1.96**2, axis=0)
