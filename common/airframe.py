@@ -50,7 +50,10 @@ class Rotor(_Section):
     y_m: Sourced
     z_m: Sourced
     spin: SourcedCount
-    """+1 turns counter-clockwise seen from above, -1 clockwise; the reaction torque on the body is spin * torque about +z (frd down)."""
+    """+1 turns counter-clockwise seen from above, -1 clockwise.
+
+    The reaction torque on the body is spin * torque about +z (frd down).
+    """
 
 
 class RotorModel(_Section):

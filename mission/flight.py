@@ -5,12 +5,13 @@ the scripting client, then the recorder. With the memory link alone it is a pure
 """
 
 from collections.abc import Callable
+from math import isnan, nan
 from pathlib import Path
 from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from autopilot.mavlink.links import Link, memory_pair
+from autopilot.mavlink.links import Link, LinkRole, memory_pair
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.node import FlightController, HostPorts
 from autopilot.params import all_parameters
@@ -25,11 +26,10 @@ from mission.client import Running
 from mission.recorder import History, Recorder
 from mission.script import Drone, Script
 from sim.rig import Rig
-from sim.sensors.sensors import sensor_model
+from sim.sensors.sensors import DEFAULT_HOME, sensor_model
 from sim.wind import wind_model
 from sim.world.world import WorldConfig, WorldMap, build_world
 
-DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
 TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
 GUST_SHARE = 0.3  # guess: a gust adds up to this share of the mean wind
 
@@ -77,22 +77,22 @@ class Flight:
             seed=config.seed,
         )
         self.time_us = 0
+        self.ready_s = nan  # power-on to ready to arm
         self.params = ParameterTable(all_parameters())
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
-        self.controller = FlightController(host_ports(self.rig), self.params, self.airframe, config.home)
-        vehicle_end, client_end = memory_pair()
-        self.server = MavlinkServer(self.controller, [vehicle_end, *(links or [])])
-        self.controller.attach(self.server)
-        self.drone = Drone(client_end)
-        self._tlog = None
-        if folder is not None:
-            self._tlog = TlogWriter(folder / "flight.tlog")
-            self.server.on_frame = self._tlog.frame
-        self.recorder = Recorder(
-            None if folder is None else folder / "flight.ulg", self.rig, self.controller, self.airframe
+        self.controller = FlightController(
+            host_ports(self.rig), self.params, self.airframe, config.home, on_reboot=self.rig.boot
         )
-        self.server.on_text = self.recorder.text
+        vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
+        self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
+        on_frame = None if self._tlog is None else self._tlog.frame
+        self._server = MavlinkServer(self.controller, [vehicle_end, *(links or [])], on_frame=on_frame)
+        self.drone = Drone(client_end)
+        log = None if folder is None else folder / "flight.ulg"
+        self.recorder = Recorder(log, self.rig, self.controller, self.airframe)
+        self.controller.attach(self._server)
+        self.controller.attach(self.recorder)
 
     def frame(self) -> None:
         """Advances by 20 ms."""
@@ -100,7 +100,8 @@ class Flight:
         self.time_us += FRAME_US
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
-        self.recorder.frame()
+        if isnan(self.ready_s) and self.controller.state.is_ready_to_arm:
+            self.ready_s = self.time_us * 1e-6
 
     def run(
         self,
@@ -133,7 +134,7 @@ class Flight:
 
     def close(self) -> History:
         """Completes the logs, closes the links and returns the history."""
-        self.server.close()
+        self._server.close()
         if self._tlog is not None:
             self._tlog.close()
         return self.recorder.close()

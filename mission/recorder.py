@@ -21,6 +21,8 @@ from mission.topics import TOPICS, Batch
 from sim.rig import Rig
 
 FLUSH_FRAMES = 50
+AIDS = {"gnss_pos": 2, "gnss_vel": 3, "gnss_height": 1, "baro": 1, "mag": 3, "range": 1}  # and their components
+BAND_SIGMA = 1.959964  # 95 % of a normal distribution lie within
 NAVIGATION_STATES = {0: 4, 1: 17, 2: 3, 3: 5, 4: 18, 5: 14}  # Mode -> vehicle_status.nav_state of PX4
 
 Rows = npt.NDArray[Any]
@@ -62,7 +64,7 @@ class _RawRow:
 
 
 class Recorder:
-    """Logs vehicle 0 of a rig.
+    """Logs vehicle 0 of a rig; attached to its flight controller, as a MAVLink server is.
 
     Args:
         path: of the ULog; None keeps only the history.
@@ -83,6 +85,8 @@ class Recorder:
         self._imu_ring = _RawRow(autopilot.ekf.imu_ring.numpy())
         self._imu_time_us = 0
         self._samples_before = np.zeros(1, dtype=rig.arrays.sensors.numpy()["samples"].dtype)
+        self._health_before = np.zeros(1, dtype=autopilot.ekf.rows.numpy().dtype)
+        self._in_band = {name: [0, 0] for name in AIDS}
         self._history: list[History] = []
         self._log = None if path is None else _open_log(path, controller, airframe)
         self._topics: list[tuple[UlogTopic, Callable[[Batch], Any]]] = []
@@ -93,10 +97,10 @@ class Recorder:
             self._landed_topic = self._log.add_topic("vehicle_land_detected", _LANDED_FIELDS)
             self._mission_topic = self._log.add_topic("mission_result", _MISSION_FIELDS)
 
-    def frame(self) -> None:
-        """Notes the frame that has just ended."""
+    def frame(self, time_us: int) -> None:
+        """Notes the frame that is ending."""
         state = self._controller.state
-        self._time_us.append(state.time_us)
+        self._time_us.append(time_us)
         self._status.append(
             (int(state.mode), state.is_armed, int(state.landed_state), state.mission_current, state.battery_remaining)
         )
@@ -105,11 +109,23 @@ class Recorder:
         if len(self._time_us) >= FLUSH_FRAMES:
             self.flush()
 
-    def text(self, time_us: int, severity: Severity, text: str) -> None:
-        """Logs a text the vehicle sent."""
+    def statustext(self, severity: Severity, text: str) -> None:
+        """Logs a text of the vehicle."""
         if self._log is not None:
             self.flush()
-            self._log.message(time_us, int(severity), text)
+            self._log.message(self._controller.state.time_us, int(severity), text)
+
+    def mission_item_reached(self, seq: int) -> None:
+        """Logged with the mission's progress."""
+
+    def mission_current_changed(self, seq: int) -> None:
+        """Logged with the mission's progress."""
+
+    def home_changed(self) -> None:
+        """Is in the vehicle's texts."""
+
+    def heartbeat_now(self) -> None:
+        """Mode and arming are logged each frame."""
 
     def flush(self) -> None:
         """Writes what has been noted since the last flush."""
@@ -131,10 +147,25 @@ class Recorder:
         self._time_us.clear()
         self._status.clear()
         self._samples_before = samples[-1:].copy()
+        self._count_innovations(estimator, status[:, 1] > 0)
         self._history.append(_history(batch, status))
         imu = self._imu_ring.take()
         if self._log is not None:
             self._write(batch, status, imu)
+
+    def innovations_in_band(self) -> dict[str, float]:
+        """Share of normalised innovations within their 95 % band while armed, per source; NaN where none came."""
+        return {name: inside / total if total else float("nan") for name, (inside, total) in self._in_band.items()}
+
+    def _count_innovations(self, health: Rows, is_armed: Rows) -> None:
+        before = np.concatenate([self._health_before, health[:-1]])
+        self._health_before = health[-1:].copy()
+        for name, components in AIDS.items():
+            is_new = is_armed & (health[name]["judged_time_us"] != before[name]["judged_time_us"])
+            innov = health[name]["innov"][is_new, :components]
+            innov_std = np.sqrt(health[name]["innov_var"][is_new, :components])
+            self._in_band[name][0] += int(np.count_nonzero(np.abs(innov) <= BAND_SIGMA * innov_std))
+            self._in_band[name][1] += innov.size
 
     def close(self) -> History:
         """Completes the log and returns the whole flight's history."""

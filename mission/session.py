@@ -20,13 +20,13 @@ from common.geodesy import GeoPoint, ned_from_geodetic
 from common.kernels import FRAME_US
 from mission.client import Running
 from mission.flight import Flight, FlightConfig
-from mission.plan import Plan, PlanError, read_plan
+from mission.plan import DEFAULT_PLAN, Plan, PlanError, read_plan
 from mission.plots import plot_flight
 from mission.script import Drone
 from mission.summary import Summary, summarise
 from sim.world.world import WorldConfig
 
-DEFAULT_PLAN = Path(__file__).parent / "default.plan"
+
 PROGRESS_PERIOD_S = 0.2
 GROUND_LOCAL_PORT = 18570  # the vehicle's own ports, PX4's
 API_LOCAL_PORT = 14580

@@ -145,7 +145,7 @@ def _reference(origin: GeoPoint) -> Columns:
 
 def _global_position(batch: Batch) -> Columns:
     estimate = batch.estimate
-    points = np.array([geodetic_from_ned(*pos, batch.origin) for pos in estimate["pos_ned"].astype(float)])
+    points = np.array([geodetic_from_ned(*pos, batch.origin) for pos in estimate["pos_ned"].tolist()])
     return {
         "timestamp": batch.time_us,
         "timestamp_sample": estimate["time_us"],
@@ -161,7 +161,7 @@ def _global_position(batch: Batch) -> Columns:
 
 def _gps(batch: Batch) -> Columns:
     gnss = fresh(batch, "gnss")
-    points = np.array([geodetic_from_ned(*pos, batch.origin) for pos in gnss["pos_ned"].astype(float)]).reshape(-1, 3)
+    points = np.array([geodetic_from_ned(*pos, batch.origin) for pos in gnss["pos_ned"].tolist()]).reshape(-1, 3)
     velocity = gnss["vel_ned"]
     return {
         "timestamp": gnss["time_us"],
@@ -288,6 +288,43 @@ def _biases(batch: Batch) -> Columns:
     }
 
 
+INNOVATION_FIELDS = {
+    "timestamp_sample": "uint64_t",
+    "gps_hvel": "float[2]",
+    "gps_vvel": "float",
+    "gps_hpos": "float[2]",
+    "gps_vpos": "float",
+    "baro_vpos": "float",
+    "rng_vpos": "float",
+    "mag_field": "float[3]",
+    "drag": "float[2]",
+}
+
+
+def _innovation_columns(batch: Batch, field: str) -> Columns:
+    health = batch.health
+    return {
+        "timestamp": batch.time_us,
+        "timestamp_sample": health["horizon_time_us"],
+        "gps_hvel": health["gnss_vel"][field][:, :2],
+        "gps_vvel": health["gnss_vel"][field][:, 2],
+        "gps_hpos": health["gnss_pos"][field][:, :2],
+        "gps_vpos": health["gnss_height"][field][:, 0],
+        "baro_vpos": health["baro"][field][:, 0],
+        "rng_vpos": health["range"][field][:, 0],
+        "mag_field": health["mag"][field],
+        "drag": health["drag"][field][:, :2],
+    }
+
+
+def _innovations(batch: Batch) -> Columns:
+    return _innovation_columns(batch, "innov")
+
+
+def _innovation_variances(batch: Batch) -> Columns:
+    return _innovation_columns(batch, "innov_var")
+
+
 _SAMPLED = {"timestamp_sample": "uint64_t"}
 _DEVICE = {**_SAMPLED, "device_id": "uint32_t"}
 
@@ -350,6 +387,8 @@ TOPICS = [
         },
         _local_setpoint,
     ),
+    Topic("estimator_innovations", INNOVATION_FIELDS, _innovations),
+    Topic("estimator_innovation_variances", INNOVATION_FIELDS, _innovation_variances),
     Topic("wind", {**_SAMPLED, "windspeed_north": "float", "windspeed_east": "float"}, _wind),
     Topic(
         "estimator_sensor_bias",

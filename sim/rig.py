@@ -30,6 +30,8 @@ from sim.wind import WindModel, WindState
 from sim.world.world import WorldMap
 
 Rows = np.ndarray[Any, Any]
+Snapshot = list[Rows]
+"""A copy of every array that has a row per vehicle."""
 
 
 class Rig:
@@ -99,6 +101,26 @@ class Rig:
         mask = np.ones(self.vehicle_count, dtype=np.int32) if chosen is None else chosen.astype(np.int32)
         marks = wp.array(mask, dtype=int, device=self.device)
         wp.launch(boot, dim=self.vehicle_count, inputs=[self.arrays, marks], device=self.device)
+
+    def snapshot(self) -> Snapshot:
+        """A copy of all rows, to be restored in this rig or in another with the same world."""
+        return [array.numpy().copy() for array in _row_arrays(self.arrays)]
+
+    def restore(self, snapshot: Snapshot, rows: Rows, sources: Rows, seeds: Rows) -> None:
+        """Puts vehicles where the snapshot found others (or themselves), to fly on with noise of their own.
+
+        Args:
+            snapshot: of this rig or of another.
+            rows: indices of the vehicles, shape (n,).
+            sources: the rows of the snapshot they take, shape (n,).
+            seeds: of their noise from now on, shape (n,).
+        """
+        for array, copies in zip(_row_arrays(self.arrays), snapshot, strict=True):
+            live = array.numpy()
+            live[rows] = copies[sources]
+            if array.device.is_cuda:
+                array.assign(live)
+        self._write_rows(self.arrays.seed, {}) if False else None
 
     def load_parameters(self, table: ParameterTable) -> None:
         """Gives every flight controller the values of a parameter table, and the magnetic field of the place."""

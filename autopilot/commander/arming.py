@@ -85,7 +85,7 @@ def _gnss(state: VehicleState, params: ParameterTable) -> str:
         return "GNSS: no data"
     if gnss.fix_type < 3:
         return "GNSS: no 3-D fix"
-    needed = int(params["COM_ARM_SAT_MIN"])
+    needed = int(params["EKF2_REQ_NSATS"])
     return f"GNSS: {gnss.satellites} satellites, {needed} needed" if gnss.satellites < needed else ""
 
 

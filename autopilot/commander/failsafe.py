@@ -2,21 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 
 from autopilot.vehicle import Mode, Severity
 from common.params import ParameterTable
 
-
-class Failure(IntFlag):
-    """What can be wrong at the same time."""
-
-    NONE = 0
-    POSITION_LOST = 1  # in a mode that needs it
-    BATTERY_EMERGENCY = 2
-    BATTERY_CRITICAL = 4
-    OFFBOARD_LOST = 8
-    BATTERY_LOW = 16
+# What can be wrong at the same time, as bits.
+POSITION_LOST = 1  # in a mode that needs it
+BATTERY_EMERGENCY = 2
+BATTERY_CRITICAL = 4
+OFFBOARD_LOST = 8
+BATTERY_LOW = 16
 
 
 class Action(IntEnum):
@@ -35,7 +31,7 @@ ACTION_MODES = {Action.HOLD: Mode.HOLD, Action.RETURN: Mode.RETURN, Action.LAND:
 class Rule:
     """One row of the table."""
 
-    failure: Failure
+    failure: int  # one of the bits
     action: Callable[[ParameterTable], Action]
     severity: Severity
     text: str
@@ -62,9 +58,9 @@ def _warn(_: ParameterTable) -> Action:
 
 
 RULES: tuple[Rule, ...] = (
-    Rule(Failure.POSITION_LOST, _land, Severity.CRITICAL, "Position lost"),
-    Rule(Failure.BATTERY_EMERGENCY, _battery_emergency, Severity.EMERGENCY, "Battery nearly empty"),
-    Rule(Failure.BATTERY_CRITICAL, _battery_critical, Severity.CRITICAL, "Battery critical"),
-    Rule(Failure.OFFBOARD_LOST, _offboard_lost, Severity.CRITICAL, "Offboard setpoints lost"),
-    Rule(Failure.BATTERY_LOW, _warn, Severity.WARNING, "Battery low"),
+    Rule(POSITION_LOST, _land, Severity.CRITICAL, "Position lost"),
+    Rule(BATTERY_EMERGENCY, _battery_emergency, Severity.EMERGENCY, "Battery nearly empty"),
+    Rule(BATTERY_CRITICAL, _battery_critical, Severity.CRITICAL, "Battery critical"),
+    Rule(OFFBOARD_LOST, _offboard_lost, Severity.CRITICAL, "Offboard setpoints lost"),
+    Rule(BATTERY_LOW, _warn, Severity.WARNING, "Battery low"),
 )

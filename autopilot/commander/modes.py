@@ -38,10 +38,10 @@ def mode_refusal(mode: Mode, *, has_position: bool, has_home: bool, is_on_ground
     """
     rule = MODE_RULES[mode]
     if is_on_ground and not rule.on_ground:
-        return f"Mode {mode.name} refused: on the ground already"
+        return "on the ground already"
     # Hold is where every vehicle boots: it may be chosen before there is a position, and flown only with one.
     if needs_position and not has_position and not (mode is Mode.HOLD and is_on_ground):
-        return f"Mode {mode.name} refused: no valid position"
+        return "no valid position"
     if rule.needs_home and not has_home:
-        return f"Mode {mode.name} refused: no home"
+        return "no home position"
     return ""

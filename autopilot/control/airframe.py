@@ -28,6 +28,7 @@ class ControlAirframe:
     max_speed_rad_s: float  # at full command and full battery
     command_curve: float  # a in speed share = a u + (1 - a) sqrt(u)
     idle_command: float
+    idle_speed_share: float  # speed at that command over the greatest
     motor_time_s: float  # first-order lag, mean of rise and fall
     full_voltage_v: float
 
@@ -73,6 +74,8 @@ def control_airframe(airframe: Airframe) -> ControlAirframe:
     row.max_speed_rad_s = rotor.max_speed_rad_s
     row.command_curve = rotor.command_curve
     row.idle_command = rotor.idle_command
+    curve = rotor.command_curve
+    row.idle_speed_share = curve * rotor.idle_command + (1.0 - curve) * rotor.idle_command**0.5
     row.motor_time_s = 0.5 * (rotor.spin_up_time_s + rotor.spin_down_time_s)
     row.full_voltage_v = airframe.battery.cells * airframe.battery.full_cell_v
     return row

@@ -76,27 +76,45 @@ def fitting_share(airframe: ControlAirframe, thrusts: vec8, change: vec8, low: f
 
 
 @wp.func
+def desaturate(
+    airframe: ControlAirframe, torque_frd: wp.vec3, collective_n: float, low: float, high: float
+) -> vec8:
+    """Rotor thrusts [N] within [low, high] that give up yaw, then collective thrust, then roll and pitch."""
+    thrusts = tilt_thrusts(airframe, torque_frd, high - low)
+    thrusts = thrusts + airframe.mix_thrust * fitting_collective(airframe, thrusts, collective_n, low, high)
+    turn = airframe.mix_yaw * torque_frd[2]
+    thrusts = thrusts + turn * fitting_share(airframe, thrusts, turn, low, high)
+    for i in range(airframe.rotor_count):
+        thrusts[i] = wp.clamp(thrusts[i], low, high)
+    return thrusts
+
+
+@wp.func
 def allocate(
     airframe: ControlAirframe, torque_frd: wp.vec3, collective_n: float, thrust_low_n: float, thrust_high_n: float
 ) -> Allocation:
     """Rotor thrusts within [thrust_low_n, thrust_high_n], and exactly what they achieve and leave."""
-    thrusts = tilt_thrusts(airframe, torque_frd, thrust_high_n - thrust_low_n)
-    collective = fitting_collective(airframe, thrusts, collective_n, thrust_low_n, thrust_high_n)
-    thrusts = thrusts + airframe.mix_thrust * collective
-    turn = airframe.mix_yaw * torque_frd[2]
-    thrusts = thrusts + turn * fitting_share(airframe, thrusts, turn, thrust_low_n, thrust_high_n)
-    result = Allocation()
+    thrusts = airframe.mix_roll * torque_frd[0] + airframe.mix_pitch * torque_frd[1]
+    thrusts = thrusts + airframe.mix_yaw * torque_frd[2] + airframe.mix_thrust * collective_n
+    least = float(_BIG)
+    most = float(-_BIG)
+    for i in range(airframe.rotor_count):
+        least = wp.min(least, thrusts[i])
+        most = wp.max(most, thrusts[i])
+    if least < thrust_low_n or most > thrust_high_n:
+        thrusts = desaturate(airframe, torque_frd, collective_n, thrust_low_n, thrust_high_n)
     roll = float(0.0)
     pitch = float(0.0)
     yaw = float(0.0)
     total = float(0.0)
     for i in range(airframe.rotor_count):
-        thrust = wp.clamp(thrusts[i], thrust_low_n, thrust_high_n)
-        result.thrust_n[i] = thrust
+        thrust = thrusts[i]
         roll += airframe.arm_roll_m[i] * thrust
         pitch += airframe.arm_pitch_m[i] * thrust
         yaw += airframe.arm_yaw_m[i] * thrust
         total += thrust
+    result = Allocation()
+    result.thrust_n = thrusts
     result.collective_n = total
     result.torque_frd = wp.vec3(roll, pitch, yaw)
     result.collective_short_n = collective_n - total
@@ -109,8 +127,9 @@ def motor_commands(airframe: ControlAirframe, thrusts_n: vec8, voltage_share: fl
     """Motor commands [0..1] for rotor thrusts at a battery voltage over the full one."""
     commands = vec8()
     top = airframe.max_speed_rad_s * voltage_share
+    per_newton = 1.0 / (airframe.thrust_n_s2 * top * top)
     for i in range(airframe.rotor_count):
-        speed = wp.sqrt(wp.max(thrusts_n[i], 0.0) / airframe.thrust_n_s2)
-        command = command_for_speed(wp.min(speed / top, 1.0), airframe.command_curve)
+        share = wp.sqrt(wp.clamp(thrusts_n[i] * per_newton, 0.0, 1.0))
+        command = command_for_speed(share, airframe.command_curve)
         commands[i] = wp.clamp(command, airframe.idle_command, 1.0)
     return commands

@@ -3,8 +3,8 @@
 import warp as wp
 
 from autopilot.control.airframe import ControlAirframe
-from autopilot.control.allocation import allocate, motor_commands, speed_share
-from autopilot.control.attitude import attitude_from_thrust, rate_setpoint, thrust_turn_rate
+from autopilot.control.allocation import allocate, motor_commands
+from autopilot.control.attitude import attitude_from_thrust, rate_setpoint, thrust_turn_rate, turned
 from autopilot.control.params import ControlParams
 from autopilot.control.position import velocity_setpoint
 from autopilot.control.rate import RateState, filter_rates, rate_step, rate_torque
@@ -21,7 +21,7 @@ from autopilot.ports import (
     Setpoint,
 )
 from common.kernels import FRAME_TICKS, GRAVITY_M_S2, TICK_S, vec8
-from common.rotation import quat_from_rotvec, quat_from_yaw, wrap_pi, yaw_from_quat
+from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
 
 wp.set_module_options({"enable_backward": False})
 
@@ -65,9 +65,9 @@ def voltage_step(state: ControlState, airframe: ControlAirframe, battery: Batter
 
 
 @wp.func
-def rotor_thrust(airframe: ControlAirframe, command: float, voltage_share: float) -> float:
-    """Thrust [N] of one rotor at a command and battery voltage share."""
-    speed = airframe.max_speed_rad_s * voltage_share * speed_share(command, airframe.command_curve)
+def rotor_thrust(airframe: ControlAirframe, share: float, voltage_share: float) -> float:
+    """Thrust [N] of one rotor at a share of its greatest speed and of the full battery voltage."""
+    speed = airframe.max_speed_rad_s * voltage_share * share
     return airframe.thrust_n_s2 * speed * speed
 
 
@@ -83,7 +83,8 @@ def rest(state: ControlState, airframe: ControlAirframe, est: Estimate, is_armed
     if is_armed == 1:
         for i in range(airframe.rotor_count):
             command[i] = airframe.idle_command
-            total += rotor_thrust(airframe, airframe.idle_command, state.voltage_share)
+        idle_n = rotor_thrust(airframe, airframe.idle_speed_share, state.voltage_share)
+        total = float(airframe.rotor_count) * idle_n
     still.collective_n = total
     still.velocity.thrust_model_n = total
     still.actuators.command = command
@@ -109,7 +110,11 @@ def begin(state: ControlState, airframe: ControlAirframe, est: Estimate) -> Cont
 
 @wp.func
 def guide(
-    params: ControlParams, airframe: ControlAirframe, state: ControlState, est: Estimate, sp: Setpoint,
+    params: ControlParams,
+    airframe: ControlAirframe,
+    state: ControlState,
+    est: Estimate,
+    sp: Setpoint,
     thrust_max_n: float,
 ) -> ControlState:
     """The state with trajectory, velocity loop and attitude setpoint advanced by one 50 Hz frame."""
@@ -155,8 +160,13 @@ def attitude_setpoint(state: ControlState, sp: Setpoint) -> ControlState:
 
 @wp.func
 def actuate(
-    params: ControlParams, airframe: ControlAirframe, state: ControlState, omega_sp_frd: wp.vec3,
-    collective_n: float, rotor_max_n: float, is_landed: int,
+    params: ControlParams,
+    airframe: ControlAirframe,
+    state: ControlState,
+    omega_sp_frd: wp.vec3,
+    collective_n: float,
+    rotor_max_n: float,
+    is_landed: int,
 ) -> ControlState:
     """The state with rate loop, allocation and motor commands of this tick."""
     done = state
@@ -164,7 +174,7 @@ def actuate(
     if is_landed == 0:
         done.rate = rate_step(params, state.rate, omega_sp_frd, shortfall, _TICK_S)
     torque = rate_torque(params, done.rate, omega_sp_frd, airframe.inertia_kg_m2)
-    rotor_min_n = rotor_thrust(airframe, airframe.idle_command, state.voltage_share)
+    rotor_min_n = rotor_thrust(airframe, airframe.idle_speed_share, state.voltage_share)
     result = allocate(airframe, torque, collective_n, rotor_min_n, rotor_max_n)
     done.collective_n = result.collective_n
     done.actuators.command = motor_commands(airframe, result.thrust_n, state.voltage_share)
@@ -187,8 +197,13 @@ def actuate(
 
 @wp.func
 def control_tick(
-    params: ControlParams, airframe: ControlAirframe, state: ControlState, est: Estimate, sp: Setpoint,
-    battery: BatterySample, tick: int,
+    params: ControlParams,
+    airframe: ControlAirframe,
+    state: ControlState,
+    est: Estimate,
+    sp: Setpoint,
+    battery: BatterySample,
+    tick: int,
 ) -> ControlState:
     """The controller's state, with `actuators`, after one 4 ms tick."""
     now = state
@@ -214,7 +229,7 @@ def control_tick(
         if tick % _FRAME_TICKS == 0 or is_start:
             now = guide(params, airframe, now, est, sp, thrust_max_n)
         else:
-            now.q_sp_ned_from_frd = quat_from_rotvec(now.omega_feed_ned * _TICK_S) * now.q_sp_ned_from_frd
+            now.q_sp_ned_from_frd = turned(now.q_sp_ned_from_frd, now.omega_feed_ned, _TICK_S)
         collective = upright_collective(airframe, now.velocity.thrust_sp_ned, est)
     else:
         collective = wp.clamp(sp.thrust, 0.0, 1.0) * thrust_max_n

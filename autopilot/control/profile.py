@@ -233,11 +233,7 @@ def step_to_position(
     """
     at_goal = Motion()
     at_goal.moved = distance
-    if (
-        wp.abs(distance) < _ARRIVED_M
-        and wp.abs(vel) < _ARRIVED_M_S
-        and wp.abs(accel) < _ARRIVED_M_S2
-    ):
+    if wp.abs(distance) < _ARRIVED_M and wp.abs(vel) < _ARRIVED_M_S and wp.abs(accel) < _ARRIVED_M_S2:
         return at_goal
     pass_speed = float(0.0)
     if distance > 0.0:

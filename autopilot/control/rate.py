@@ -47,9 +47,7 @@ def rate_step(
 
 
 @wp.func
-def rate_torque(
-    params: ControlParams, state: RateState, omega_sp_frd: wp.vec3, inertia_kg_m2: wp.vec3
-) -> wp.vec3:
+def rate_torque(params: ControlParams, state: RateState, omega_sp_frd: wp.vec3, inertia_kg_m2: wp.vec3) -> wp.vec3:
     """Torque [N m], frd: inertia times the PID's angular acceleration, plus the gyroscopic term."""
     gain_p = wp.vec3(params.rate_p_tilt, params.rate_p_tilt, params.rate_p_yaw)
     gain_d = wp.vec3(params.rate_d_tilt, params.rate_d_tilt, params.rate_d_yaw)

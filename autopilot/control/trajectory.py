@@ -127,8 +127,15 @@ def axis_limits(params: ControlParams, sp: Setpoint, axis_ned: wp.vec3, is_cruis
 
 @wp.func
 def move_along(
-    params: ControlParams, sp: Setpoint, state: TrajectoryState, axis_ned: wp.vec3, mode: int, goal_vel_ned: wp.vec3,
-    vel_exit: float, jerk: float, dt_s: float,
+    params: ControlParams,
+    sp: Setpoint,
+    state: TrajectoryState,
+    axis_ned: wp.vec3,
+    mode: int,
+    goal_vel_ned: wp.vec3,
+    vel_exit: float,
+    jerk: float,
+    dt_s: float,
 ) -> Motion:
     """One step of the motion along an axis; a moving goal is approached in its own frame."""
     vel = wp.dot(state.vel_ned, axis_ned)

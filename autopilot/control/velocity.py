@@ -36,7 +36,11 @@ class VelocityState:
 
 @wp.func
 def observe(
-    params: ControlParams, airframe: ControlAirframe, state: VelocityState, est: Estimate, collective_n: float,
+    params: ControlParams,
+    airframe: ControlAirframe,
+    state: VelocityState,
+    est: Estimate,
+    collective_n: float,
     dt_s: float,
 ) -> VelocityState:
     """The state with acceleration and disturbance observed, each tick; `collective_n` is what the rotors make."""
@@ -81,8 +85,15 @@ def limit_thrust(thrust_ned: wp.vec3, lean_max: float, least: float, most: float
 
 @wp.func
 def velocity_step(
-    params: ControlParams, airframe: ControlAirframe, state: VelocityState, trajectory: TrajectoryState,
-    est: Estimate, vel_sp_ned: wp.vec3, thrust_max_n: float, is_ramping: bool, dt_s: float,
+    params: ControlParams,
+    airframe: ControlAirframe,
+    state: VelocityState,
+    trajectory: TrajectoryState,
+    est: Estimate,
+    vel_sp_ned: wp.vec3,
+    thrust_max_n: float,
+    is_ramping: bool,
+    dt_s: float,
 ) -> VelocityState:
     """The state with a new thrust setpoint; the integral stops where the limits take something away."""
     error = vel_sp_ned - est.vel_ned

@@ -40,7 +40,7 @@ _VEL_STD = wp.constant(0.3)  # [m/s] aligned at rest
 _MOVING_VEL_STD = wp.constant(10.0)  # [m/s]
 _POS_STD = wp.constant(0.1)  # [m] the origin is where it stands
 _WIND_STD = wp.constant(5.0)  # [m/s] guess
-_TERRAIN_STD = wp.constant(1.0)  # [m] feet and slope below the boot position
+_TERRAIN_STD = wp.constant(0.1)  # [m] it stands there
 
 
 @wp.func
@@ -111,9 +111,10 @@ def start_covariance(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: i
 
 @wp.func
 def aligned_nominal(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, align: Alignment) -> Nominal:
-    """The first nominal state, at the origin."""
+    """The first nominal state: at the origin, on its feet."""
     nominal = Nominal()
     nominal.q_ned_from_frd = level_attitude(align.accel_frd)
+    nominal.pos_ned = wp.vec3(0.0, 0.0, -params.rest_height)
     if align.is_moving == 0:
         nominal.gyro_bias_frd = align.gyro_frd / align.time_s
     start_covariance(params, cov, i, align)
@@ -127,5 +128,6 @@ def start_output(nominal: Nominal) -> Output:
     """An output predictor that agrees with the nominal state."""
     output = Output()
     output.q_raw = nominal.q_ned_from_frd
+    output.pos_raw_ned = nominal.pos_ned
     output.q_correction = wp.quat_identity()
     return output

@@ -28,12 +28,12 @@ from autopilot.estimator.sources.baro import BARO_STUCK_AFTER, fuse_baro
 from autopilot.estimator.sources.drag import drag_is_due, fuse_drag, is_airborne
 from autopilot.estimator.sources.gnss import (
     GNSS_STUCK_AFTER,
-    VERTICAL_FACTOR,
     fuse_gnss_height,
     fuse_gnss_pos,
     fuse_gnss_vel,
     gnss_is_good,
     gnss_repeats,
+    propagate_wander,
 )
 from autopilot.estimator.sources.mag import MAG_STUCK_AFTER, fuse_mag, start_mag
 from autopilot.estimator.sources.range import RANGE_STUCK_AFTER, fuse_range
@@ -112,26 +112,29 @@ def fuse_gnss_step(ekf: Ekf, i: int, params: EstimatorParams, state: EstimatorSt
     state.gnss_inbox.tail += 1
     age_s = seconds_since(state.horizon_time_us, sample.time_us)
     if gnss_is_good(params, sample) and age_s < _MAX_AGE_S:
+        wander = propagate_wander(params, state.gnss_wander, sample)
         if state.is_yaw_aligned == 1:
             nominal, aid = fuse_gnss_vel(params, ekf.covariance, i, state.nominal, state.gnss_vel, sample)
             state.gnss_vel = aid
-            nominal, aid = fuse_gnss_pos(params, ekf.covariance, i, nominal, state.gnss_pos, sample, age_s)
+            nominal, aid, wander = fuse_gnss_pos(
+                params, ekf.covariance, i, nominal, state.gnss_pos, wander, sample, age_s
+            )
             state.gnss_pos = aid
             state.nominal = nominal
-        nominal, aid, bias = fuse_gnss_height(
+        nominal, aid, wander = fuse_gnss_height(
             params,
             ekf.covariance,
             i,
             state.nominal,
             state.gnss_height,
-            state.gnss_bias,
+            wander,
             sample,
             age_s,
             state.baro.is_active == 0,
         )
         state.nominal = nominal
         state.gnss_height = aid
-        state.gnss_bias = bias
+        state.gnss_wander = wander
     return state
 
 
@@ -248,15 +251,12 @@ def predict_step(ekf: Ekf, i: int, params: EstimatorParams, state: EstimatorStat
     state.step_delta_vel_ned = state.step_delta_vel_ned + state.nominal.vel_ned - vel_before_ned - gravity_ned
     state.step_dt_s = state.step_dt_s + imu.dt_s
     if state.step_dt_s > params.predict_s - 0.5 * imu.dt_s:
-        height_walk = params.baro_walk
-        if state.baro.is_active == 0:
-            height_walk = VERTICAL_FACTOR * params.gnss_pos_walk
-        added_var = process_variance(params, ekf.covariance, i, state.nominal.vel_ned, height_walk, state.step_dt_s)
+        added_var = process_variance(params, ekf.covariance, i, state.nominal.vel_ned, state.step_dt_s)
         rot = wp.quat_to_matrix(state.nominal.q_ned_from_frd)
         predict_covariance(ekf.covariance, i, rot, state.step_delta_vel_ned, state.step_dt_s, added_var)
         state.step_dt_s = 0.0
         state.step_delta_vel_ned = wp.vec3()
-        state.estimate = with_deviations(ekf.covariance, i, state.estimate)
+        state.estimate = with_deviations(ekf.covariance, i, state.gnss_wander, state.estimate)
     return state
 
 
@@ -269,10 +269,12 @@ def start(ekf: Ekf, i: int, params: EstimatorParams, state: EstimatorState) -> E
     state.nominal.reset_count = 0
     if state.alignment.baro_count > 0:
         state.origin_baro_height = state.alignment.baro_height / float(state.alignment.baro_count)
+        state.origin_baro_height = state.origin_baro_height + state.nominal.pos_ned[2]
         state.baro.is_active = 1
     state.output = start_output(state.nominal)
     past = OutputSample()
     past.q_raw = state.output.q_raw
+    past.pos_raw_ned = state.output.pos_raw_ned
     for k in range(IMU_RING):
         ekf.output_ring[i, k] = past
     state.gnss_inbox.tail = state.gnss_inbox.head
@@ -322,7 +324,7 @@ def watch(ekf: Ekf, i: int, params: EstimatorParams, state: EstimatorState) -> E
         lift_variances(ekf.covariance, i)
         if not is_sound(ekf.covariance, i):
             faults = state.fault_count + 1
-            state = estimator_reset(ekf, i)
+            state = at_boot(ekf, i)
             state.fault_count = faults
     return state
 
@@ -386,7 +388,7 @@ def estimator_tick(ekf: Ekf, i: int, state: EstimatorState, samples: Samples) ->
 
 
 @wp.func
-def estimator_reset(ekf: Ekf, i: int) -> EstimatorState:
+def at_boot(ekf: Ekf, i: int) -> EstimatorState:
     """The state at power-on of vehicle i; its covariance is set by the alignment that follows."""
     state = EstimatorState()
     state.nominal.q_ned_from_frd = wp.quat_identity()
@@ -399,10 +401,15 @@ def estimator_reset(ekf: Ekf, i: int) -> EstimatorState:
     return state
 
 
+@wp.func
+def estimator_reset(ekf: Ekf, i: int) -> None:
+    """Powers the estimator of vehicle i on anew."""
+    ekf.rows[i] = at_boot(ekf, i)
+
+
 @wp.kernel(enable_backward=False)
 def reset_rows(ekf: Ekf):
-    i = wp.tid()
-    ekf.rows[i] = estimator_reset(ekf, i)
+    estimator_reset(ekf, wp.tid())
 
 
 def make_ekf(vehicle_count: int, device: str = "cpu", params: Any = None) -> Ekf:

@@ -17,6 +17,7 @@ from autopilot.estimator.state import (
     WIND,
     Aid,
     EstimatorState,
+    GnssWander,
     Inbox,
 )
 from autopilot.ports import (
@@ -76,12 +77,16 @@ def lift_variances(cov: wp.array2d(dtype=vec24), i: int) -> None:
 
 
 @wp.func
-def with_deviations(cov: wp.array2d(dtype=vec24), i: int, estimate: Estimate) -> Estimate:
-    """The estimate with its standard deviations; horizontal ones are those of the worse axis."""
+def with_deviations(cov: wp.array2d(dtype=vec24), i: int, wander: GnssWander, estimate: Estimate) -> Estimate:
+    """The estimate with its standard deviations; horizontal ones are those of the worse axis.
+
+    What the filter takes the GNSS wander to be is uncertain by as much as position is.
+    """
     estimate.tilt_std = wp.sqrt(cov[i, ATT][ATT] + cov[i, ATT + 1][ATT + 1])
     estimate.yaw_std = wp.sqrt(cov[i, ATT + 2][ATT + 2])
     estimate.vel_std = wp.sqrt(wp.max(cov[i, VEL][VEL], cov[i, VEL + 1][VEL + 1]))
-    estimate.pos_h_std = wp.sqrt(wp.max(cov[i, POS][POS], cov[i, POS + 1][POS + 1]))
+    pos_var = wp.max(cov[i, POS][POS] + wander.var_ned[0], cov[i, POS + 1][POS + 1] + wander.var_ned[1])
+    estimate.pos_h_std = wp.sqrt(pos_var)
     estimate.pos_v_std = wp.sqrt(cov[i, POS + 2][POS + 2])
     return estimate
 

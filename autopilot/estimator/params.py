@@ -4,11 +4,14 @@ Names are PX4's where the meaning is. Defaults describe the default sensors: an 
 a shaking airframe, and a receiver, barometer, magnetometer and range finder as in the projects' airframe files.
 """
 
+from math import sqrt
 from typing import Any
 
 import numpy as np
 import warp as wp
 
+from common.airframe import Airframe
+from common.kernels import GRAVITY_M_S2
 from common.params import Parameter, ParameterTable
 
 wp.set_module_options({"enable_backward": False})
@@ -47,7 +50,8 @@ class EstimatorParams:
     gnss_vel_noise: float
     gnss_pos_gate: float
     gnss_vel_gate: float
-    gnss_pos_walk: float
+    gnss_wander: float
+    gnss_wander_time: float
     gnss_min_fix: int
     gnss_min_satellites: int
     gnss_max_pos_h_std: float
@@ -63,6 +67,7 @@ class EstimatorParams:
     earth_field_walk: float
     body_field_walk: float
     body_field_init: float
+    rest_height: float
     range_ctrl: int
     range_noise: float
     range_noise_share: float
@@ -102,7 +107,8 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
     Parameter("EKF2_GPS_V_NOISE", 0.1, 0.01, 5.0, "m/s", "GNSS velocity noise per axis", "receiver model", "gnss_vel_noise"),
     Parameter("EKF2_GPS_P_GATE", 5.0, 1.0, 50.0, "SD", "GNSS position gate", _PX4, "gnss_pos_gate"),
     Parameter("EKF2_GPS_V_GATE", 5.0, 1.0, 50.0, "SD", "GNSS velocity gate", _PX4, "gnss_vel_gate"),
-    Parameter("EKF2_GPS_WALK", 0.11, 0.0, 1.0, "m/sqrt(s)", "Wander of GNSS positions that the position follows; vertical 1.5 times", "receiver model: 0.6 m sqrt(2 / 60 s)", "gnss_pos_walk"),
+    Parameter("EKF2_GPS_CORR", 0.6, 0.0, 10.0, "m", "GNSS position wander per horizontal axis; vertical 1.5 times", "receiver model: correlated part", "gnss_wander"),
+    Parameter("EKF2_GPS_CORR_T", 60.0, 1.0, 3600.0, "s", "Time constant of the GNSS position wander", "receiver model: correlated part", "gnss_wander_time"),
     Parameter("EKF2_REQ_FIX", 3, 0, 6, "", "Least GNSS fix type", _PX4, "gnss_min_fix"),
     Parameter("EKF2_REQ_NSATS", 6, 4, 12, "", "Least number of satellites", _PX4, "gnss_min_satellites"),
     Parameter("EKF2_REQ_EPH", 3.0, 0.5, 100.0, "m", "Largest horizontal accuracy figure", _PX4, "gnss_max_pos_h_std"),
@@ -113,11 +119,12 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
     Parameter("EKF2_BARO_WALK", 0.03, 0.0, 1.0, "m/sqrt(s)", "Wander of the barometer's height that the height follows", "barometer model: 0.35 m sqrt(2 / 300 s)", "baro_walk"),
     Parameter("EKF2_BARO_GATE", 5.0, 1.0, 50.0, "SD", "Barometer gate", _PX4, "baro_gate"),
     Parameter("EKF2_MAG_TYPE", 0, 0, 5, "", "Magnetometer use: 0 field states and heading, 5 none", _PX4, "mag_type"),
-    Parameter("EKF2_MAG_NOISE", 5.0e-4, 1.0e-4, 1.0, "gauss", "Magnetometer noise", _TUNED, "mag_noise"),
+    Parameter("EKF2_MAG_NOISE", 1.5e-4, 1.0e-5, 1.0, "gauss", "Magnetometer noise", "RM3100 data sheet: 15 nT", "mag_noise"),
     Parameter("EKF2_MAG_GATE", 5.0, 1.0, 50.0, "SD", "Magnetometer gate", "3 in PX4, whose noise is wider", "mag_gate"),
     Parameter("EKF2_MAG_E_NOISE", 1.0e-5, 0.0, 0.1, "gauss/sqrt(s)", "Random walk of the earth field", "1e-5 gauss per kilometre of flight", "earth_field_walk"),
-    Parameter("EKF2_MAG_B_NOISE", 1.0e-4, 0.0, 0.1, "gauss/sqrt(s)", "Random walk of the body field", _TUNED, "body_field_walk"),
+    Parameter("EKF2_MAG_B_NOISE", 3.0e-4, 0.0, 0.1, "gauss/sqrt(s)", "Random walk of the body field", _TUNED, "body_field_walk"),
     Parameter("EKF2_MAG_B_INIT", 5.0e-3, 0.0, 0.3, "gauss", "Body field left after calibration", "guess: hard iron 3e-3, soft iron 3e-3 of the field", "body_field_init"),
+    Parameter("EKF2_MIN_RNG", 0.2, 0.0, 2.0, "m", "Height above the ground while it stands there: of the origin at boot, and of the terrain", "landing gear of the airframe", "rest_height"),
     Parameter("EKF2_RNG_CTRL", 1, 0, 1, "", "Range finder use: 0 off, 1 terrain height", _PX4, "range_ctrl"),
     Parameter("EKF2_RNG_NOISE", 0.02, 0.01, 5.0, "m", "Range finder noise", "TF02-Pro data sheet: 6 cm, three deviations", "range_noise"),
     Parameter("EKF2_RNG_SFE", 0.0033, 0.0, 0.2, "m/m", "Range finder noise per distance", "TF02-Pro data sheet: 1 %, three deviations", "range_noise_share"),
@@ -126,11 +133,24 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
     Parameter("EKF2_TERR_GRAD", 0.1, 0.0, 5.0, "m/m", "Slope of the terrain", _TUNED, "terrain_gradient"),
     Parameter("EKF2_DRAG_CTRL", 1, 0, 2, "", "Drag fusion: 0 off, 1 wind only, 2 also velocity while nothing else measures it", "measured: harmless to the other states", "drag_ctrl"),
     Parameter("EKF2_DRAG_NOISE", 0.5, 0.05, 10.0, "m/s^2", "Noise of the drag acceleration averaged over 40 ms", _TUNED, "drag_noise"),
-    Parameter("EKF2_MCOEF", 0.15, 0.0, 1.0, "1/s", "Rotor drag per airspeed", _PX4, "drag_linear"),
-    Parameter("EKF2_BCOEF_X", 100.0, 0.0, 200.0, "kg/m^2", "Ballistic coefficient along x, 0: none", _PX4, "drag_ballistic_x"),
-    Parameter("EKF2_BCOEF_Y", 100.0, 0.0, 200.0, "kg/m^2", "Ballistic coefficient along y, 0: none", _PX4, "drag_ballistic_y"),
+    Parameter("EKF2_MCOEF", 0.14, 0.0, 1.0, "1/s", "Rotor drag per airspeed", "x500 airframe: rotor drag at hover over mass", "drag_linear"),
+    Parameter("EKF2_BCOEF_X", 75.0, 0.0, 200.0, "kg/m^2", "Ballistic coefficient along x, 0: none", "x500 airframe: mass over drag area", "drag_ballistic_x"),
+    Parameter("EKF2_BCOEF_Y", 75.0, 0.0, 200.0, "kg/m^2", "Ballistic coefficient along y, 0: none", "x500 airframe: mass over drag area", "drag_ballistic_y"),
     Parameter("EKF2_WIND_NSD", 0.1, 0.0, 1.0, "m/s/sqrt(s)", "Random walk of the wind", "guess: gusts", "wind_walk"),
 ]  # fmt: skip
+
+
+def airframe_parameters(airframe: Airframe) -> dict[str, float]:
+    """Parameters that follow from the airframe: landing gear and drag."""
+    mass = airframe.body.mass_kg
+    thrust = mass * GRAVITY_M_S2 / len(airframe.rotors)
+    hover_speed = sqrt(thrust / airframe.rotor_model.thrust_n_s2)
+    return {
+        "EKF2_MIN_RNG": airframe.contact.leg_z_m,
+        "EKF2_MCOEF": len(airframe.rotors) * airframe.rotor_model.drag_n_s2_m * hover_speed / mass,
+        "EKF2_BCOEF_X": mass / airframe.body.drag_area_x_m2,
+        "EKF2_BCOEF_Y": mass / airframe.body.drag_area_y_m2,
+    }
 
 
 def estimator_fields(table: ParameterTable) -> dict[str, float]:

@@ -40,13 +40,12 @@ def predict_nominal(nominal: Nominal, imu: ImuSample) -> Nominal:
 
 @wp.func
 def process_variance(
-    params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, vel_ned: wp.vec3, height_walk: float, dt_s: float
+    params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, vel_ned: wp.vec3, dt_s: float
 ) -> vec24:
     """Variance that each error gains in `dt_s`; noises of one 4 ms sample act as white noise of that density."""
     added = vec24()
     gyro_var = params.gyro_noise * params.gyro_noise * TICK_S * dt_s
     accel_var = params.accel_noise * params.accel_noise * TICK_S * dt_s
-    pos_var = params.gnss_pos_walk * params.gnss_pos_walk * dt_s
     gyro_bias_var = params.gyro_bias_walk * params.gyro_bias_walk * dt_s
     accel_bias_var = params.accel_bias_walk * params.accel_bias_walk * dt_s
     earth_var = params.earth_field_walk * params.earth_field_walk * dt_s
@@ -54,12 +53,11 @@ def process_variance(
     for axis in range(3):
         added[ATT + axis] = gyro_var
         added[VEL + axis] = accel_var
-        added[POS + axis] = pos_var
         added[GYRO_BIAS + axis] = gyro_bias_var
         added[ACCEL_BIAS + axis] = accel_bias_var
         added[EARTH + axis] = earth_var
         added[BODY + axis] = body_var
-    added[POS + 2] = height_walk * height_walk * dt_s
+    added[POS + 2] = params.baro_walk * params.baro_walk * dt_s
     if cov[i, WIND][WIND] < _MAX_WIND_VAR:
         added[WIND] = params.wind_walk * params.wind_walk * dt_s
         added[WIND + 1] = added[WIND]

@@ -138,12 +138,12 @@ class OutputSample:
 
 
 @wp.struct
-class GnssHeightBias:
-    """GNSS down minus estimated down, tracked while the barometer is the height reference."""
+class GnssWander:
+    """The slow error of GNSS positions: ionosphere, ephemeris, multipath."""
 
-    bias_m: float
-    var_m2: float
-    is_known: int
+    offset_ned: wp.vec3  # [m]
+    var_ned: wp.vec3  # [m²]
+    time_us: wp.int64
 
 
 @wp.struct
@@ -182,7 +182,7 @@ class EstimatorState:
     range: Aid  # along body down [m]
     drag: Aid  # x, y [m/s²]
     rest: Aid  # zero velocity while the vehicle stands still [m/s]
-    gnss_bias: GnssHeightBias
+    gnss_wander: GnssWander
     drag_sum: DragSum
     is_yaw_aligned: int
     origin_baro_height: float  # [m] standard-atmosphere height of the ned origin

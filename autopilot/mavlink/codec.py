@@ -21,7 +21,9 @@ MAGIC_V2 = 0xFD
 SIGNED_FLAG = 0x01
 SIGNATURE_LENGTH = 13
 
-_HEADER_V2 = struct.Struct("<BBBBBBHB")  # length, incompatible flags, compatible flags, seq, sysid, compid, id, id >> 16
+_HEADER_V2 = struct.Struct(
+    "<BBBBBBHB"
+)  # length, incompatible flags, compatible flags, seq, sysid, compid, id, id >> 16
 _MAGIC = re.compile(rb"[\xfd\xfe]")
 
 # These fields carry the bit pattern of the value, because an integer's bytes may be a signalling NaN, which
@@ -109,7 +111,7 @@ def frame_bytes(kind: MessageType, payload: bytes, seq: int, sysid: int, compid:
     return b"\xfd" + checked + mcrf4xx(checked + kind.crc_extra).to_bytes(2, "little")
 
 
-def encode(key: int | str, sysid: int, compid: int, seq: int, *values: Any, **fields: Any) -> bytes:
+def encode(key: int | str, sysid: int, compid: int, seq: int, /, *values: Any, **fields: Any) -> bytes:
     """A frame from field values, in the order of the specification or by name; fields left out are 0.
 
     Raises:
@@ -221,7 +223,9 @@ def _compile(definition: Any) -> tuple[Callable[..., bytes], Callable[[bytes], A
         span = f"v[{i_value}:{i_value + count}]" if is_array else f"v[{i_value}]"
         positions[name] = f"_text({span})" if code.endswith("s") else span
         values.append(f"*{name}" if is_array else f"_chars({name})" if code.endswith("s") else name)
-        arguments[name] = f"{name}={(0,) * count!r}" if is_array else f"{name}=b''" if code.endswith("s") else f"{name}=0"
+        arguments[name] = (
+            f"{name}={(0,) * count!r}" if is_array else f"{name}=b''" if code.endswith("s") else f"{name}=0"
+        )
         i_value += count
     parameters = ", ".join(arguments[name] for name in definition.fieldnames)
     packer = eval(f"lambda {parameters}: _pack({', '.join(values)})", scope)  # noqa: S307  (text made of field names)

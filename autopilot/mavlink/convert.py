@@ -5,7 +5,7 @@ saturate, and a number that is not finite becomes the given default, so that tel
 """
 
 from collections.abc import Sequence
-from math import inf, isfinite, nan, pi
+from math import isfinite, isnan, nan, pi
 
 INT16_MAX = 32_767
 INT32_MAX = 2_147_483_647
@@ -38,7 +38,7 @@ def bounded_int(value: float, low: int, high: int, default: int = 0) -> int:
     """The nearest integer inside [low, high]; `default` if `value` is not finite."""
     if low <= value <= high:
         return round(value)
-    if value != value or value in (inf, -inf):  # noqa: PLR0124  (NaN)
+    if not isfinite(value):
         return default
     return low if value < low else high
 
@@ -81,6 +81,6 @@ def whole(value: float, default: int) -> int:
 
 def is_position(lat_deg: float, lon_deg: float) -> bool:
     """Whether latitude and longitude exist on earth, or are both left free (NaN)."""
-    if lat_deg != lat_deg and lon_deg != lon_deg:  # noqa: PLR0124  (NaN)
+    if isnan(lat_deg) and isnan(lon_deg):
         return True
     return -90.0 <= lat_deg <= 90.0 and -180.0 <= lon_deg <= 180.0

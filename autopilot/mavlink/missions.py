@@ -162,9 +162,10 @@ class MissionService:
         items = self._downloads.get(sender)
         if items is None:
             items = tuple(self._endpoint.vehicle.mission_items())
-        if fields.mission_type == PLAN and fields.seq < len(items):
-            return items[fields.seq]
-        reason = f"there is no item {fields.seq}"
+        seq: int = fields.seq
+        if fields.mission_type == PLAN and seq < len(items):
+            return items[seq]
+        reason = f"there is no item {seq}"
         self._refuse(sender, mavlink.MAV_MISSION_INVALID_SEQUENCE, reason, fields.mission_type)
         return None
 
@@ -268,7 +269,7 @@ def _unscaled(value: int, frame: int) -> float:
 
 
 def scaled_position(item: MissionItem) -> tuple[int, int]:
-    """x and y of MISSION_ITEM_INT."""
+    """The integers x and y of MISSION_ITEM_INT."""
     scale = _scale(item.frame)
     return (
         bounded_int(item.x * scale, -INT32_MAX - 1, INT32_MAX, INT32_MAX),

@@ -195,10 +195,11 @@ def attitude_setpoint(fields: Any, time_us: int) -> OffboardSetpoint:
         RefusedSetpointError: thrust is missing, or neither the attitude nor all three body rates are given.
     """
     mask = fields.type_mask
-    thrust = -fields.thrust_body[2] if mask & THRUST_BODY_BIT and hasattr(fields, "thrust_body") else fields.thrust
-    if mask & THROTTLE_BIT or not isfinite(thrust):
+    if mask & THRUST_BODY_BIT:
+        raise RefusedSetpointError("a thrust vector is not supported")
+    if mask & THROTTLE_BIT or not isfinite(fields.thrust):
         raise RefusedSetpointError("an attitude needs a thrust")
-    thrust = min(max(thrust, 0.0), 1.0)
+    thrust = min(max(fields.thrust, 0.0), 1.0)
     given = (fields.body_roll_rate, fields.body_pitch_rate, fields.body_yaw_rate)
     rates = [nan if mask & bit else rate for rate, bit in zip(given, BODY_RATE_BITS, strict=True)]
     if any(isinf(rate) for rate in rates):

@@ -15,7 +15,7 @@ from autopilot.mavlink.telemetry import motion, sensors, status
 from autopilot.vehicle import VehicleState
 
 Builder = Callable[[VehicleState], bytes | None]
-Send = Callable[[MessageType, bytes], None]
+Send = Callable[[MessageType, bytes], object]
 
 FRAME_US = 20_000  # nothing is sent more often than the server runs
 SPREAD = 8  # streams start at different eighths of their interval, so that no frame has to send them all

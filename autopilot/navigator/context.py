@@ -74,7 +74,9 @@ class NavContext:
         position = self.state.position
         return ned_from_geodetic(position.lat_deg, position.lon_deg, alt_amsl_m, self.state.origin)[2]
 
-    def fly_to(self, pos_ned: Vector, yaw: float, path_start_ned: Vector | None = None, exit_speed: float = 0.0) -> None:
+    def fly_to(
+        self, pos_ned: Vector, yaw: float, path_start_ned: Vector | None = None, exit_speed: float = 0.0
+    ) -> None:
         """Asks for a position with the speeds asked for; along a straight line if its start is given and not near."""
         if path_start_ned is not None and distance(path_start_ned, pos_ned) > 0.5:  # below that a line means nothing
             self.setpoint.fly_to(

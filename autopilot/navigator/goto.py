@@ -18,10 +18,10 @@ def reposition_target(
     state = context.state
     base = hold.target_ned if state.mode is Mode.HOLD else context.stop_point()
     if isfinite(lat_deg) != isfinite(lon_deg):
-        return Reply(Verdict.DENIED, "Goto needs both latitude and longitude")
+        return Reply(Verdict.DENIED, "needs both latitude and longitude")
     if isfinite(lat_deg):
         if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
-            return Reply(Verdict.DENIED, f"Goto position {lat_deg:.4f}, {lon_deg:.4f} is not on earth")
+            return Reply(Verdict.DENIED, "there is no such latitude and longitude")
         alt_m = alt_amsl_m if isfinite(alt_amsl_m) else state.position.alt_m
         target = context.pos_ned_of(lat_deg, lon_deg, alt_m)
         if not isfinite(alt_amsl_m):
@@ -41,7 +41,7 @@ def _range_refusal(context: NavContext, target: Vector) -> Reply:
     way_m = hypot(target[0] - here[0], target[1] - here[1])
     longest_m = context.number("MIS_DIST_1WP")
     if 0.0 <= longest_m < way_m:
-        return Reply(Verdict.DENIED, f"Goto target is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed")
+        return Reply(Verdict.DENIED, f"target is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed")
     if abs(target[2]) > 10_000.0:
-        return Reply(Verdict.DENIED, "Goto altitude is out of range")
+        return Reply(Verdict.DENIED, "altitude is out of range")
     return ACCEPTED

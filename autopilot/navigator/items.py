@@ -78,12 +78,12 @@ def hold_time_s(item: MissionItem) -> float:
 def refuse_items(items: Sequence[MissionItem]) -> ItemRefusal | None:
     """The first reason not to take a mission, naming the item; None if all of it can be flown."""
     if len(items) > MAX_ITEMS:
-        reason = f"item {MAX_ITEMS}: a mission has at most {MAX_ITEMS} items"
+        reason = f"a mission has at most {MAX_ITEMS} items"
         return ItemRefusal(MAX_ITEMS, Result.NO_SPACE, reason)
     for i_item, item in enumerate(items):
         problem = _sequence_problem(i_item, item) or _item_problem(item, items)
         if problem is not None:
-            return ItemRefusal(i_item, int(problem[0]), f"item {i_item}: {problem[1]}")
+            return ItemRefusal(i_item, int(problem[0]), problem[1])
     return None
 
 
@@ -130,7 +130,7 @@ def _time_problem(item: MissionItem, what: str) -> _Problem | None:
 
 
 def _check_waypoint(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None:
-    _, acceptance_m, pass_m, yaw_deg = item.params
+    acceptance_m, pass_m, yaw_deg = item.params[1:]
     if acceptance_m < 0.0 or acceptance_m > 1_000.0:
         return Result.PARAM2, f"acceptance radius {acceptance_m} m is out of range"
     if abs(pass_m) > 1_000.0:

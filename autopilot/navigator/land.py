@@ -6,6 +6,7 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 
 _BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against rotor inflow and drag; guess
+_TOUCHING_US = 700_000  # longer than it takes to begin a descent; guess
 _NEAR_HOME_M = 30.0  # home's ground level is trusted this far around it; guess
 _SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, far from home; guess
 
@@ -13,18 +14,20 @@ _SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, fa
 class Landing:
     """The last descent, until the landing detector ends it."""
 
-    __slots__ = ("_context", "_east", "_is_blind", "_north", "_yaw")
+    __slots__ = ("_context", "_east", "_is_blind", "_moving_us", "_north", "_yaw")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
         self._north = self._east = self._yaw = 0.0
         self._is_blind = False
+        self._moving_us = 0  # when it last really descended
 
     def start(self, north: float, east: float, yaw: float) -> None:
         """Descends over a place [m] with a heading [rad], NaN: the present one."""
         self._north, self._east = north, east
         self._yaw = yaw if isfinite(yaw) else self._context.state.yaw_rad
         self._is_blind = False
+        self._moving_us = self._context.state.time_us
 
     def frame(self) -> None:
         context = self._context
@@ -35,13 +38,22 @@ class Landing:
             if self._is_blind:  # the position is back: land here
                 self._is_blind = False
                 self._north, self._east, _ = context.stop_point()
-            context.setpoint.descend_at(self._north, self._east, self._speed(), self._yaw, context.cruise_speed)
+            speed = self._pushed(self._speed())
+            context.setpoint.descend_at(self._north, self._east, speed, self._yaw, context.cruise_speed)
             return
         self._is_blind = True
         if context.has_height:
             context.setpoint.descend_level(context.number("MPC_LAND_SPEED"), self._yaw)
         else:
             context.setpoint.hang_level(context.hover_thrust * _BLIND_THRUST_SHARE, self._yaw)
+
+    def _pushed(self, speed: float) -> float:
+        """The speed, or more of it once the vehicle no longer sinks: on the ground the thrust falls at once then."""
+        context = self._context
+        if context.state.estimate.vel_ned[2] > 0.3 * speed:
+            self._moving_us = context.state.time_us
+        is_touching = context.state.time_us - self._moving_us > _TOUCHING_US
+        return max(speed, context.number("MPC_Z_V_AUTO_DN")) if is_touching else speed
 
     def _speed(self) -> float:
         """Descent speed [m/s]: MPC_Z_V_AUTO_DN high up, MPC_LAND_SPEED low, the crawl speed just above the ground."""

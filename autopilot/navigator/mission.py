@@ -90,7 +90,7 @@ class Mission:
     def set_current(self, seq: int) -> Reply:
         """Makes an item the current one; flies to it at once in mode Mission."""
         if not 0 <= seq < len(self.items):
-            return Reply(Verdict.DENIED, f"Mission has no item {seq}")
+            return Reply(Verdict.DENIED, f"there is no item {seq}")
         state = self._context.state
         if seq == 0:
             self._jumps_left.clear()
@@ -105,7 +105,7 @@ class Mission:
     def refusal(self) -> str:
         """Why the mission cannot be flown now; empty if it can."""
         if not self.items:
-            return "No mission is loaded"
+            return "no mission is loaded"
         longest_m = self._context.number("MIS_DIST_1WP")
         first = next((item for item in self.items if item.command == Command.WAYPOINT), None)
         if first is not None and longest_m >= 0.0:
@@ -113,7 +113,7 @@ class Mission:
             place = self._place_of(first)
             way_m = hypot(place[0] - here[0], place[1] - here[1])
             if way_m > longest_m:
-                return f"First waypoint is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed"
+                return f"first waypoint is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed"
         return ""
 
     # ---- flying ----

@@ -45,8 +45,29 @@ class Navigator:
         if mode is Mode.MISSION:
             return self.mission.refusal()
         if mode is Mode.OFFBOARD and self.offboard.age_us(self.context.state.time_us) > STREAM_PERIOD_US:
-            return "Offboard needs setpoints faster than 2 Hz before the switch"
+            return "needs setpoints faster than 2 Hz before the switch"
         return ""
+
+    @property
+    def wants_lift(self) -> bool:
+        """Whether the mode asks to leave the ground."""
+        return self.context.wants_lift
+
+    @property
+    def is_landing(self) -> bool:
+        """Whether the mode is on its last descent."""
+        return self.context.is_landing
+
+    @property
+    def offboard_needs_position(self) -> bool:
+        return self.offboard.needs_position
+
+    def offboard_age_us(self, time_us: int) -> int:
+        return self.offboard.age_us(time_us)
+
+    def tell_position(self, *, is_valid: bool) -> None:
+        """The commander's judgement of the position estimate."""
+        self.context.has_position = is_valid
 
     def enter(self, mode: Mode) -> None:
         """Changes to a mode: at once in flight, when armed otherwise."""
@@ -101,9 +122,9 @@ class Navigator:
         return ACCEPTED
 
     def change_speed(self, speed_m_s: float) -> Reply:
-        """Horizontal speed from now on; the control part bounds it by MPC_XY_VEL_MAX."""
-        if not 0.0 < speed_m_s <= 100.0:
-            return Reply(Verdict.DENIED, f"Speed {speed_m_s:.1f} m/s is out of range")
+        """Horizontal speed from now on, NaN: the default; the control part bounds it by MPC_XY_VEL_MAX."""
+        if speed_m_s <= 0.0 or speed_m_s > 100.0:
+            return Reply(Verdict.DENIED, f"{speed_m_s:.1f} m/s is out of range")
         self.context.cruise_speed = speed_m_s
         self.context.setpoint.set_cruise_speed(speed_m_s)
         return ACCEPTED
@@ -111,7 +132,7 @@ class Navigator:
     def request_landing(self, lat_deg: float, lon_deg: float, yaw: float) -> Reply:
         """Chooses where the next landing shall be; the caller changes to Land."""
         if isfinite(lat_deg) != isfinite(lon_deg) or abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
-            return Reply(Verdict.DENIED, "Landing position is not on earth")
+            return Reply(Verdict.DENIED, "there is no such latitude and longitude")
         place = None
         if isfinite(lat_deg) and not (lat_deg == 0.0 and lon_deg == 0.0):
             place = self.context.pos_ned_of(lat_deg, lon_deg, self.context.state.position.alt_m)

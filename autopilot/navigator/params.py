@@ -10,7 +10,7 @@ NAVIGATOR_PARAMETERS: list[Parameter] = [
               "longest way to a mission's first waypoint, negative: any", _PX4),
     Parameter("MPC_TKO_SPEED", 1.5, 0.5, 5.0, "m/s", "climb speed of a take-off", _PX4),
     Parameter("MPC_LAND_SPEED", 0.7, 0.3, 3.0, "m/s", "descent speed from MPC_LAND_ALT2 down", _PX4),
-    Parameter("MPC_LAND_CRWL", 0.3, 0.1, 3.0, "m/s", "descent speed from MPC_LAND_ALT3 down, range finder needed", _PX4),
+    Parameter("MPC_LAND_CRWL", 0.3, 0.1, 3.0, "m/s", "descent speed from MPC_LAND_ALT3 down, by range finder", _PX4),
     Parameter("MPC_LAND_ALT1", 10.0, 0.0, 122.0, "m", "height above ground from which a descent slows down", _PX4),
     Parameter("MPC_LAND_ALT2", 5.0, 0.0, 122.0, "m", "height above ground at which MPC_LAND_SPEED is reached", _PX4),
     Parameter("MPC_LAND_ALT3", 1.0, 0.0, 122.0, "m", "height above ground of the slow last part", _PX4),

@@ -40,12 +40,14 @@ class SetpointPort:
         layout = struct.Struct(_LAYOUT)
         if row.shape != (1,) or row.dtype.names != _FIELDS or row.dtype.itemsize != layout.size:
             raise ValueError("the setpoint must be a view of one row of autopilot.ports.Setpoint")
-        self._buffer = memoryview(row.view(np.uint8).reshape(-1))
+        self._buffer: Any = row.view(np.uint8).reshape(-1)
         self._pack_into = layout.pack_into
         self._is_changed = True
         self.is_armed = False
         self.is_landed = True
         self.kind = SETPOINT_IDLE
+        self.pos_ned: Vector = FREE
+        self.vel_ned: Vector = FREE
         self._free_all()
 
     def set_flags(self, *, is_armed: bool, is_landed: bool) -> None:

@@ -61,7 +61,7 @@ class Takeoff:
     def request(self, alt_amsl_m: float, yaw: float) -> Reply:
         """Sets the target for the next take-off; NaN: MIS_TAKEOFF_ALT above home."""
         if alt_amsl_m > self._base_alt_m() + 10_000.0:
-            return Reply(Verdict.DENIED, f"Takeoff altitude {alt_amsl_m:.0f} m is out of range")
+            return Reply(Verdict.DENIED, f"altitude {alt_amsl_m:.0f} m is out of range")
         self._alt_amsl_m = alt_amsl_m
         self._yaw = yaw
         self._target_alt_m(is_told=True)

@@ -247,8 +247,8 @@ def _contact(
 def _substep(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> BodyState:
     """One step of motion.
 
-    Rates take a midpoint step; position and attitude move by the mean of old and new velocity and rate: free fall is
-    exact and a tumbling body keeps its angular momentum.
+    Rates take a midpoint step, forces act along the attitude in mid-step, position and attitude move by the mean of
+    old and new velocity and rate: free fall is exact and a tumbling body keeps its angular momentum.
     """
     dt = inputs.dt
     around = inputs.around
@@ -271,7 +271,8 @@ def _substep(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> Bod
             body.is_crashed = 1
     body.rotor_speed = wrench.speed
     body.accel_frd = force_frd * model.mass_inv
-    accel_ned = r_ned_from_frd * body.accel_frd + _GRAVITY_NED
+    middle_accel_frd = body.accel_frd + wp.cross((0.5 * dt) * omega, body.accel_frd)  # the body turns meanwhile
+    accel_ned = r_ned_from_frd * middle_accel_frd + _GRAVITY_NED
     body.pos_ned = body.pos_ned + dt * (body.vel_ned + (0.5 * dt) * accel_ned)
     body.vel_ned = body.vel_ned + dt * accel_ned
     middle = omega + (0.5 * dt) * angular_accel(model, omega, torque_frd, wrench.momentum_z)

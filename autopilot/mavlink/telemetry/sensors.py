@@ -5,7 +5,6 @@ from typing import Any
 
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.convert import (
-    INT16_MAX,
     UINT16_MAX,
     bounded_int,
     degrees_e7,
@@ -162,7 +161,7 @@ def actuator_output_status(state: VehicleState) -> bytes:
 
 
 def vibration(state: VehicleState) -> bytes | None:
-    """The level is the estimator's deviation of the specific force from its mean, the same figure for the three axes."""
+    """The estimator's deviation of the specific force from its mean, the same figure for the three axes."""
     health = state.health
     if health is None:
         return None
@@ -173,12 +172,12 @@ def vibration(state: VehicleState) -> bytes | None:
 def estimator_status(state: VehicleState) -> bytes:
     estimate = state.estimate
     flags = sum(bits for ours, bits in _ESTIMATOR_BITS if estimate.flags & ours)
-    gnss, baro, mag, range_finder = _test_ratios(state.health)
+    gnss_vel, gnss_pos, baro, mag, range_finder = _test_ratios(state.health)
     return _estimator_status(
         state.time_us,
         flags,
-        gnss,
-        gnss,
+        gnss_vel,
+        gnss_pos,
         baro,
         mag,
         range_finder,
@@ -188,12 +187,13 @@ def estimator_status(state: VehicleState) -> bytes:
     )
 
 
-def _test_ratios(health: Any) -> tuple[float, float, float, float]:
-    """Smoothed innovation test ratios of GNSS, barometer, magnetometer and range finder; above 1 is rejected."""
+def _test_ratios(health: Any) -> tuple[float, float, float, float, float]:
+    """Smoothed test ratios of GNSS velocity, GNSS position, barometer, magnetometer, range finder; above 1 is rejected."""
     if health is None:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0
     return (
-        health.gnss.test_ratio_lpf,
+        health.gnss_vel.test_ratio_lpf,
+        health.gnss_pos.test_ratio_lpf,
         health.baro.test_ratio_lpf,
         health.mag.test_ratio_lpf,
         health.range.test_ratio_lpf,

@@ -44,9 +44,7 @@ _ATTITUDE_CONTROL = (
     | mavlink.MAV_SYS_STATUS_SENSOR_YAW_POSITION
     | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 )
-_POSITION_CONTROL = (
-    mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
-)
+_POSITION_CONTROL = mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 # Always present and never enabled: without it MAVProxy announces a breach of a fence nobody has set.
 _GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
@@ -96,13 +94,13 @@ def healthy_sensors(state: VehicleState) -> int:
     bits = 0
     if now_us - samples.imu.time_us < FRESH_IMU_US:
         bits |= _GYRO_ACCEL
-    if _works(samples.mag, health and health.mag, now_us):
+    if _works(samples.mag, health and health.mag_inbox, now_us):
         bits |= _MAG
-    if _works(samples.baro, health and health.baro, now_us):
+    if _works(samples.baro, health and health.baro_inbox, now_us):
         bits |= _BARO
-    if _works(samples.range, health and health.range, now_us):
+    if _works(samples.range, health and health.range_inbox, now_us):
         bits |= _RANGE
-    has_fix = samples.gnss.fix_type >= FIX_3D and _works(samples.gnss, health and health.gnss, now_us)
+    has_fix = samples.gnss.fix_type >= FIX_3D and _works(samples.gnss, health and health.gnss_inbox, now_us)
     if has_fix and flags & POSITION_VALID:
         bits |= _GPS
     if samples.battery.time_us and now_us - samples.battery.time_us < FRESH_US:
@@ -116,10 +114,10 @@ def healthy_sensors(state: VehicleState) -> int:
     return bits
 
 
-def _works(sample: Any, source: Any, now_us: int) -> bool:
+def _works(sample: Any, inbox: Any, now_us: int) -> bool:
     """Whether a sensor delivers samples that change."""
     is_fresh = sample.time_us != 0 and now_us - sample.time_us < FRESH_US
-    return is_fresh and not (source and source.is_stuck)
+    return is_fresh and not (inbox and inbox.is_stuck)
 
 
 def _percent(share: float) -> int:

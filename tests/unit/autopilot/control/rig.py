@@ -166,17 +166,32 @@ class Rig:
         """Sets all setpoints: the fields given, NaN or zero for the others."""
         rows = self.setpoints.numpy()
         nan3 = (np.nan,) * 3
-        free = {"kind": SETPOINT_TRAJECTORY, "is_armed": 1, "is_landed": 0, "pos_ned": nan3, "vel_ned": nan3,
-                "accel_ned": nan3, "yaw": np.nan, "yaw_rate": np.nan, "path_start_ned": nan3, "cruise_speed": np.nan,
-                "climb_speed": np.nan, "descend_speed": np.nan, "exit_speed": 0.0,
-                "q_ned_from_frd": (0.0, 0.0, 0.0, 1.0), "omega_frd": (0.0, 0.0, 0.0), "thrust": 0.0}
+        free = {
+            "kind": SETPOINT_TRAJECTORY,
+            "is_armed": 1,
+            "is_landed": 0,
+            "pos_ned": nan3,
+            "vel_ned": nan3,
+            "accel_ned": nan3,
+            "yaw": np.nan,
+            "yaw_rate": np.nan,
+            "path_start_ned": nan3,
+            "cruise_speed": np.nan,
+            "climb_speed": np.nan,
+            "descend_speed": np.nan,
+            "exit_speed": 0.0,
+            "q_ned_from_frd": (0.0, 0.0, 0.0, 1.0),
+            "omega_frd": (0.0, 0.0, 0.0),
+            "thrust": 0.0,
+        }
         for name, value in {**free, **fields}.items():
             rows[name] = value
 
     def blow(self, wind_ned: npt.NDArray[np.float64]) -> None:
         """Wind [m/s] per tick, shape (ticks, 3), the same for all vehicles, repeated."""
-        self.wind = wp.array(np.tile(wind_ned[None], (self.vehicle_count, 1, 1)).astype(np.float32), dtype=wp.vec3,
-                             device="cpu")
+        self.wind = wp.array(
+            np.tile(wind_ned[None], (self.vehicle_count, 1, 1)).astype(np.float32), dtype=wp.vec3, device="cpu"
+        )
 
     def run(self, seconds: float) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """Flies on; returns bodies and controller states per tick, each of shape (vehicles, ticks)."""
@@ -184,18 +199,28 @@ class Rig:
         log = wp.zeros((self.vehicle_count, ticks), dtype=RigBody, device="cpu")
         state_log = wp.zeros((self.vehicle_count, ticks), dtype=ControlState, device="cpu")
         wp.launch(
-            rig_kernel, dim=self.vehicle_count,
-            inputs=[self.control_params, self.airframes, self.model, self.setpoints, self.bodies, self.states,
-                    self.wind, self.tick, ticks, log, state_log],
+            rig_kernel,
+            dim=self.vehicle_count,
+            inputs=[
+                self.control_params,
+                self.airframes,
+                self.model,
+                self.setpoints,
+                self.bodies,
+                self.states,
+                self.wind,
+                self.tick,
+                ticks,
+                log,
+                state_log,
+            ],
             device="cpu",
         )
         self.tick += ticks
         return log.numpy().copy(), state_log.numpy().copy()
 
 
-def turbulence(
-    seconds: float, mean_m_s: float, seed: int, height_m: float = 10.0
-) -> npt.NDArray[np.float64]:
+def turbulence(seconds: float, mean_m_s: float, seed: int, height_m: float = 10.0) -> npt.NDArray[np.float64]:
     """Low-altitude Dryden turbulence (MIL-F-8785C) on a mean wind from the west, per tick, shape (ticks, 3)."""
     rng = np.random.default_rng(seed)
     feet = height_m / 0.3048

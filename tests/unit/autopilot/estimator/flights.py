@@ -234,3 +234,11 @@ def freeze(column: Any, from_tick: int, fields: tuple[str, ...]) -> None:
 def silence(column: Any, from_tick: int, to_tick: int | None = None) -> None:
     """A sensor that is off: the last sample stays."""
     column[from_tick:to_tick] = column[from_tick]
+
+
+def stacked(flights: list[Flight]) -> Any:
+    """The samples of several flights of equal length, one row each."""
+    rows = np.empty((len(flights), len(flights[0].samples)), dtype=SAMPLES)
+    for row, flight in zip(rows, flights, strict=True):
+        row[:] = flight.samples
+    return rows

@@ -169,7 +169,8 @@ def test_the_imu_means_are_the_changes_of_velocity_and_attitude():
     after = fleet.state[0]
     middle = (before["q_ned_from_frd"] + after["q_ned_from_frd"]).astype(float)
     middle /= np.linalg.norm(middle)
-    accel_ned = rotated(middle, after["accel_frd"]) + [0.0, 0.0, GRAVITY_M_S2]
+    gravity_ned = np.array([0.0, 0.0, GRAVITY_M_S2])
+    accel_ned = rotated(middle, after["accel_frd"]) + gravity_ned
     np.testing.assert_allclose((after["vel_ned"] - before["vel_ned"]) / TICK_S, accel_ned, atol=0.02)
     axis = np.array(before["q_ned_from_frd"], float) * [-1, -1, -1, 1]
     x, y, z, w = axis

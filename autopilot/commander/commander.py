@@ -1,0 +1,376 @@
+"""The commander: arming, modes, home, landed state, battery and failsafes of one vehicle, once per 50 Hz frame.
+
+In: the vehicle's state and what clients ask for. Out: mode, arming and landed state, texts. It tells the navigator
+which mode to fly through `Flying`, and asks it what it alone can know.
+"""
+
+from math import isfinite
+from typing import Protocol
+
+from autopilot.commander.arming import arming_reasons
+from autopilot.commander.battery import BatteryEstimator
+from autopilot.commander.failsafe import (
+    ACTION_MODES,
+    BATTERY_CRITICAL,
+    BATTERY_EMERGENCY,
+    BATTERY_LOW,
+    OFFBOARD_LOST,
+    POSITION_LOST,
+    RULES,
+    Action,
+)
+from autopilot.commander.landing import LandingDetector
+from autopilot.commander.modes import MODE_RULES, mode_refusal
+from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID
+from autopilot.vehicle import ACCEPTED, Announcer, LandedState, Mode, Reply, Severity, VehicleState, Verdict
+from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
+from common.params import Parameter, ParameterTable
+
+_POSITION_FLAGS = POSITION_VALID | VELOCITY_VALID | HEIGHT_VALID
+_EPH_FLIGHT_FACTOR = 2.5  # in flight the position may be this much worse than for arming (PX4)
+_CHECK_PERIOD_US = 200_000
+_TEXT_PERIOD_US = 30_000_000  # "PreArm:" texts, as ground stations expect them
+_FIRST_TEXT_US = 10_000_000  # until then the estimator may still be aligning
+_AIRBORNE_M = 0.5  # height over the take-off place from which the vehicle is in the air
+_LIFT_TIMEOUT_US = 10_000_000  # a take-off that has not left the ground by then has failed
+_FRAME_LONGEST_S = 0.1  # longer gaps do not count as landed time
+
+
+class Flying(Protocol):
+    """What the commander needs of the navigator."""
+
+    def refusal(self, mode: Mode) -> str: ...
+
+    def enter(self, mode: Mode) -> None: ...
+
+    def on_armed(self) -> None: ...
+
+    @property
+    def wants_lift(self) -> bool: ...
+
+    @property
+    def is_landing(self) -> bool: ...
+
+    @property
+    def offboard_needs_position(self) -> bool: ...
+
+    def offboard_age_us(self, time_us: int) -> int: ...
+
+    def tell_position(self, *, is_valid: bool) -> None: ...
+
+
+class Commander:
+    """The authority over one vehicle.
+
+    Args:
+        state: written here: mode, arming, landed state, home, battery.
+        params: the vehicle's parameters.
+        announcer: where texts and events go.
+        battery: the charge estimator.
+        landing: the landing detector.
+    """
+
+    def __init__(
+        self,
+        state: VehicleState,
+        params: ParameterTable,
+        announcer: Announcer,
+        battery: BatteryEstimator,
+        landing: LandingDetector,
+    ) -> None:
+        self.state = state
+        self.params = params
+        self.announcer = announcer
+        self.has_position = False
+        self._battery = battery
+        self._landing = landing
+        self._flying: Flying
+        self._position_seen_us = -1  # when the position was last valid
+        self._next_check_us = 0
+        self._next_text_us = _FIRST_TEXT_US
+        self._landed_since_us = 0
+        self._lift_since_us = 0
+        self._lift_d = 0.0
+        self._has_flown = False  # since arming
+        self._is_home_given = False  # by a client: arming does not move it
+        self._failures = 0
+        self._action = Action.WARN  # of the failsafe in progress
+        self._load()
+        params.on_change(self._on_parameter)
+
+    def connect(self, flying: Flying) -> None:
+        """Names the navigator; once, before the first frame."""
+        self._flying = flying
+
+    # ---- each frame ----
+
+    def frame(self, dt_s: float) -> None:
+        """Renews everything the commander decides."""
+        state = self.state
+        self._judge_position()
+        battery = self._battery
+        sample = state.samples.battery
+        battery.update(sample.time_us, sample.voltage_v, sample.current_a)
+        state.battery_remaining = battery.remaining
+        state.battery_used_mah = battery.used_mah
+        if state.home is None and self.has_position and state.estimate.pos_h_std <= self._eph:
+            self._set_home_here()
+        if state.landed_state is LandedState.ON_GROUND:
+            if state.is_armed:
+                self._stand()
+        else:
+            self._fly(dt_s)
+        if state.is_armed:
+            self._watch_failures()
+        elif state.time_us >= self._next_check_us:
+            self._next_check_us = state.time_us + _CHECK_PERIOD_US
+            self._check_before_arming()
+
+    def change_mode(self, mode: Mode) -> None:
+        """Changes the mode without asking; for the navigator's wishes and for failsafes."""
+        if mode is not self.state.mode:
+            self.state.mode = mode
+            self._flying.enter(mode)
+            self.announcer.heartbeat_now()
+
+    # ---- what clients ask for ----
+
+    def arm(self, *, force: bool) -> Reply:
+        state = self.state
+        if state.is_armed:
+            return ACCEPTED
+        if not force:
+            reasons = self.check_arming()
+            if reasons:
+                return Reply(Verdict.TEMPORARILY_REJECTED, reasons[0])
+        if self.has_position and not self._is_home_given:
+            self._set_home_here()
+        state.is_armed = True
+        state.armed_since_us = self._landed_since_us = state.time_us
+        self._lift_since_us = 0
+        self._has_flown = False
+        self._failures = 0
+        self._clear_failsafe()
+        self._flying.on_armed()
+        self.announcer.heartbeat_now()
+        self.announcer.statustext(Severity.INFO, "Armed")
+        return ACCEPTED
+
+    def disarm(self, *, force: bool) -> Reply:
+        state = self.state
+        if not state.is_armed:
+            return ACCEPTED
+        if not force and state.landed_state is not LandedState.ON_GROUND:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "in the air")
+        self._disarm("Disarmed by command")
+        return ACCEPTED
+
+    def check_arming(self) -> list[str]:
+        """Reasons why the vehicle may not be armed now; empty when ready."""
+        state = self.state
+        mode = state.mode
+        reasons = arming_reasons(state, self.params, needs_position=self._needs_position(mode))
+        if not MODE_RULES[mode].may_arm:
+            reasons.append(f"mode {mode.name} does not allow arming")
+        if state.landed_state is not LandedState.ON_GROUND:
+            reasons.append("not on the ground")
+        refusal = self._flying.refusal(mode)
+        if refusal:
+            reasons.append(refusal)
+        return reasons
+
+    def request_mode(self, mode: Mode) -> Reply:
+        """Changes the mode for a client, or says why not."""
+        reason = self.refusal(mode)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
+        self._clear_failsafe()
+        self.change_mode(mode)
+        return ACCEPTED
+
+    def refusal(self, mode: Mode) -> str:
+        """Why a mode cannot be entered now; empty if it can. The present mode always can."""
+        state = self.state
+        if mode is state.mode:
+            return ""
+        return mode_refusal(
+            mode,
+            has_position=self.has_position,
+            has_home=state.home is not None,
+            is_on_ground=state.landed_state is LandedState.ON_GROUND,
+            needs_position=self._needs_position(mode),
+        ) or self._flying.refusal(mode)
+
+    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
+        """Sets home; all NaN: here."""
+        state = self.state
+        if not (isfinite(lat_deg) and isfinite(lon_deg)):
+            if isfinite(lat_deg) or isfinite(lon_deg):
+                return Reply(Verdict.DENIED, "needs both latitude and longitude")
+            if not self.has_position:
+                return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
+            self._set_home_here()
+        else:
+            if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+                return Reply(Verdict.DENIED, "there is no such latitude and longitude")
+            alt_m = alt_amsl_m if isfinite(alt_amsl_m) else (state.home or state.position).alt_m
+            state.home = GeoPoint(lat_deg, lon_deg, alt_m)
+            state.home_ned = ned_from_geodetic(lat_deg, lon_deg, alt_m, state.origin)
+            self.announcer.home_changed()
+        self._is_home_given = True
+        return ACCEPTED
+
+    def _set_home_here(self) -> None:
+        state = self.state
+        state.home_ned = state.estimate.pos_ned
+        state.home = GeoPoint(*geodetic_from_ned(*state.home_ned, state.origin))
+        state.home_yaw_rad = state.yaw_rad
+        self.announcer.home_changed()
+
+    # ---- on the ground and in the air ----
+
+    def _stand(self) -> None:
+        """Armed on the ground: releases a take-off, or disarms in time."""
+        state = self.state
+        now_us = state.time_us
+        if self._flying.wants_lift:
+            if now_us - state.armed_since_us >= self._spool_up_us:
+                state.landed_state = LandedState.TAKEOFF
+                self._landing.reset()
+                self._lift_since_us = now_us
+                self._lift_d = state.estimate.pos_ned[2]
+            return
+        is_done = self._has_flown or not MODE_RULES[state.mode].may_arm
+        limit_us = self._disarm_landed_us if is_done else self._disarm_preflight_us
+        if 0 <= limit_us <= now_us - self._landed_since_us:
+            self._disarm("Disarmed after landing" if is_done else "Disarmed: no take-off")
+
+    def _fly(self, dt_s: float) -> None:
+        """Off the ground: landed state, landing detection."""
+        state = self.state
+        if state.landed_state is LandedState.TAKEOFF and not self._has_flown:
+            self._lift()
+            return
+        thrust = state.actuators.thrust_sp if state.is_armed else 0.0
+        if self._landing.update(state.estimate, thrust, min(dt_s, _FRAME_LONGEST_S)):
+            self._touch_down()
+            self.announcer.statustext(Severity.INFO, "Landed")
+        elif state.landed_state is not LandedState.TAKEOFF or state.mode is not Mode.TAKEOFF:
+            state.landed_state = LandedState.LANDING if self._flying.is_landing else LandedState.IN_AIR
+
+    def _lift(self) -> None:
+        """Released from the ground, but not yet off it."""
+        state = self.state
+        if self._lift_d - state.estimate.pos_ned[2] > _AIRBORNE_M:
+            self._has_flown = True
+        elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
+            self.announcer.statustext(Severity.CRITICAL, "Takeoff failed: still on the ground")
+            self._touch_down()
+            if state.is_armed:
+                self._disarm("Disarmed: no take-off")
+
+    def _touch_down(self) -> None:
+        self.state.landed_state = LandedState.ON_GROUND
+        self._landed_since_us = self.state.time_us
+
+    def _disarm(self, text: str) -> None:
+        state = self.state
+        state.is_armed = False
+        self._clear_failsafe()
+        self._next_check_us = 0
+        self.change_mode(Mode.HOLD)
+        self.announcer.heartbeat_now()
+        self.announcer.statustext(Severity.INFO, text)
+
+    # ---- checks and failsafes ----
+
+    def _judge_position(self) -> None:
+        """Valid at once, lost after COM_POS_FS_DELAY."""
+        state = self.state
+        estimate = state.estimate
+        eph = self._eph * _EPH_FLIGHT_FACTOR if state.is_armed else self._eph
+        if estimate.flags & _POSITION_FLAGS == _POSITION_FLAGS and estimate.pos_h_std <= eph:
+            self._position_seen_us = state.time_us
+            if not self.has_position:
+                self.has_position = True
+                self._flying.tell_position(is_valid=True)
+        elif self.has_position and state.time_us - self._position_seen_us > self._position_delay_us:
+            self.has_position = False
+            self._flying.tell_position(is_valid=False)
+
+    def _needs_position(self, mode: Mode) -> bool:
+        if mode is Mode.OFFBOARD:
+            return self._flying.offboard_needs_position
+        return MODE_RULES[mode].needs_position
+
+    def _check_before_arming(self) -> None:
+        state = self.state
+        reasons = self.check_arming()
+        state.is_ready_to_arm = not reasons
+        if reasons and state.time_us >= self._next_text_us:
+            self._next_text_us = state.time_us + _TEXT_PERIOD_US
+            self.announcer.statustext(Severity.CRITICAL, f"PreArm: {reasons[0]}")
+
+    def _watch_failures(self) -> None:
+        state = self.state
+        mode = state.mode
+        failures = 0
+        if not self.has_position and self._needs_position(mode):
+            failures |= POSITION_LOST
+        if mode is Mode.OFFBOARD and self._flying.offboard_age_us(state.time_us) > self._offboard_loss_us:
+            failures |= OFFBOARD_LOST
+        remaining = self._battery.remaining
+        if remaining < self._battery_low:
+            failures |= BATTERY_LOW
+            if remaining < self._battery_critical:
+                failures |= BATTERY_CRITICAL
+            if remaining < self._battery_emergency:
+                failures |= BATTERY_EMERGENCY
+        if failures != self._failures:
+            new = failures & ~self._failures
+            self._failures = failures
+            if new:
+                self._act(new)
+
+    def _act(self, new: int) -> None:
+        """Takes the strongest action of the failures that are new; announces each of them."""
+        state = self.state
+        strongest = Action.WARN
+        for rule in RULES:
+            if not rule.failure & new:
+                continue
+            action = rule.action(self.params)
+            if action is Action.RETURN and self.refusal(Mode.RETURN):
+                action = Action.LAND
+            strongest = max(strongest, action)
+            outcome = f": {ACTION_MODES[action].name.lower()}" if action in ACTION_MODES else ""
+            self.announcer.statustext(rule.severity, rule.text + outcome)
+        if strongest is Action.WARN:
+            return
+        if state.landed_state is LandedState.ON_GROUND:
+            self._disarm("Disarmed by failsafe on the ground")
+            return
+        state.is_failsafe = True
+        if strongest > self._action and state.mode is not Mode.LAND:
+            self._action = strongest
+            self.change_mode(ACTION_MODES[strongest])
+
+    def _clear_failsafe(self) -> None:
+        self.state.is_failsafe = False
+        self._action = Action.WARN
+
+    def _load(self) -> None:
+        params = self.params
+        self._eph = float(params["COM_POS_FS_EPH"])
+        self._position_delay_us = int(params["COM_POS_FS_DELAY"] * 1e6)
+        self._spool_up_us = int(params["COM_SPOOLUP_TIME"] * 1e6)
+        self._disarm_landed_us = int(params["COM_DISARM_LAND"] * 1e6)
+        self._disarm_preflight_us = int(params["COM_DISARM_PRFLT"] * 1e6)
+        self._offboard_loss_us = int(params["COM_OF_LOSS_T"] * 1e6)
+        self._battery_low = float(params["BAT_LOW_THR"])
+        self._battery_critical = float(params["BAT_CRIT_THR"])
+        self._battery_emergency = float(params["BAT_EMERGEN_THR"])
+
+    def _on_parameter(self, parameter: Parameter) -> None:
+        if parameter.name.startswith(("COM_", "BAT_")):
+            self._load()

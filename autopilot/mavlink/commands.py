@@ -1,0 +1,335 @@
+"""The command protocol: COMMAND_LONG and COMMAND_INT in, one COMMAND_ACK out, and a text with the reason of a refusal.
+
+A table maps each command to its handler; a command that is not in it is answered UNSUPPORTED at once. In a command NaN
+means default and 0 is a value.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite, isinf, isnan, nan, radians
+from typing import Any
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot.mavlink.channel import Endpoint, Sender
+from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.convert import (
+    GLOBAL_FRAMES,
+    INT32_MAX,
+    LATLON_FRAMES,
+    RELATIVE_FRAMES,
+    TERRAIN_FRAMES,
+    bounded_int,
+    degrees_from_e7,
+    is_position,
+    whole,
+)
+from autopilot.mavlink.dialects import UnknownModeError
+from autopilot.ports import TERRAIN_VALID
+from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
+
+FORCE = 21196  # param2 of COMPONENT_ARM_DISARM
+REBOOT = 1  # param1 of PREFLIGHT_REBOOT_SHUTDOWN
+UNCHANGED = -1.0
+BY_DEFAULT = -2.0
+
+_COMMAND_ACK = known_type("COMMAND_ACK")
+_MESSAGE_INTERVAL = known_type("MESSAGE_INTERVAL")
+_HEARTBEAT_ID = known_type("HEARTBEAT").msg_id
+_HOME_POSITION_ID = known_type("HOME_POSITION").msg_id
+_AUTOPILOT_VERSION_ID = known_type("AUTOPILOT_VERSION").msg_id
+
+_SHORT_NAMES = {
+    mavlink.MAV_CMD_COMPONENT_ARM_DISARM: "Arm",
+    mavlink.MAV_CMD_NAV_TAKEOFF: "Takeoff",
+    mavlink.MAV_CMD_NAV_LAND: "Land",
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "Return",
+    mavlink.MAV_CMD_DO_SET_MODE: "Mode",
+    mavlink.MAV_CMD_DO_REPOSITION: "Goto",
+    mavlink.MAV_CMD_DO_CHANGE_SPEED: "Speed",
+    mavlink.MAV_CMD_DO_SET_HOME: "Home",
+    mavlink.MAV_CMD_MISSION_START: "Mission",
+    mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: "Mission",
+    mavlink.MAV_CMD_DO_PAUSE_CONTINUE: "Pause",
+    mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "Reboot",
+}
+# Refusals of these are shown quietly: clients ask for messages again and again.
+_QUIET = {
+    mavlink.MAV_CMD_REQUEST_MESSAGE,
+    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+    mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
+    mavlink.MAV_CMD_GET_HOME_POSITION,
+}
+
+
+@dataclass(slots=True)
+class Command:
+    """A command in either form; `x` and `y` are degrees in global frames."""
+
+    command: int
+    frame: int  # MAV_FRAME
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    x: float  # param5
+    y: float  # param6
+    z: float  # param7
+    sender: Sender
+
+
+Handler = Callable[[Command], Reply | None]
+
+
+def denied(reason: str) -> Reply:
+    return Reply(Verdict.DENIED, reason)
+
+
+class CommandService:
+    """Carries commands out by asking the vehicle; a handler that returns None has sent its own acknowledgement."""
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self._endpoint = endpoint
+        self._handlers: dict[int, Handler] = {
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
+            mavlink.MAV_CMD_NAV_TAKEOFF: self._takeoff,
+            mavlink.MAV_CMD_NAV_LAND: self._land,
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,
+            mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
+            mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
+            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+            mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
+            mavlink.MAV_CMD_GET_HOME_POSITION: self._get_home,
+            mavlink.MAV_CMD_DO_PAUSE_CONTINUE: self._pause_continue,
+            mavlink.MAV_CMD_MISSION_START: self._mission_start,
+            mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_current_item,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
+            mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._request_capabilities,
+            mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_prearm_checks,
+            mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+        }
+
+    def long_received(self, sender: Sender, f: Any) -> None:
+        """COMMAND_LONG: positions are AMSL."""
+        self._execute(
+            Command(f.command, 0, f.param1, f.param2, f.param3, f.param4, f.param5, f.param6, f.param7, sender)
+        )
+
+    def int_received(self, sender: Sender, f: Any) -> None:
+        """COMMAND_INT: latitude and longitude as 1e7 integers, altitude in the frame given."""
+        is_global = f.frame in LATLON_FRAMES
+        x = degrees_from_e7(f.x) if is_global else float(f.x)
+        y = degrees_from_e7(f.y) if is_global else float(f.y)
+        self._execute(Command(f.command, f.frame, f.param1, f.param2, f.param3, f.param4, x, y, f.z, sender))
+
+    def set_mode_received(self, _: Sender, fields: Any) -> None:
+        """SET_MODE has no acknowledgement: the heartbeat is the answer."""
+        try:
+            mode = self._endpoint.dialect.mode_from_custom(fields.custom_mode)
+        except UnknownModeError as unknown:
+            self._endpoint.text_once(Severity.WARNING, f"Mode: {unknown}")
+            return
+        reply = self._endpoint.vehicle.set_mode(mode)
+        if reply.verdict != Verdict.ACCEPTED:
+            self._endpoint.text(Severity.WARNING, f"Mode: {reply.reason}")
+
+    def _execute(self, command: Command) -> None:
+        handler = self._handlers.get(command.command)
+        if handler is None:
+            self._ack(command, Verdict.UNSUPPORTED)
+            self._endpoint.text_once(Severity.NOTICE, f"{_name(command.command)} is not supported")
+            return
+        if any(isinf(p) for p in (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)):
+            reply: Reply | None = denied("a parameter is infinite")
+        else:
+            reply = handler(command)
+        if reply is None:
+            return
+        self._ack(command, reply.verdict)
+        if reply.verdict not in (Verdict.ACCEPTED, Verdict.IN_PROGRESS):
+            self._tell(command, reply)
+
+    def _ack(self, command: Command, verdict: Verdict) -> None:
+        payload = _COMMAND_ACK.pack(command.command, verdict, 0, 0, command.sender.sysid, command.sender.compid)
+        self._endpoint.reply(command.sender, _COMMAND_ACK, payload)
+
+    def _tell(self, command: Command, reply: Reply) -> None:
+        """Shows the reason of a refusal."""
+        name = _name(command.command)
+        text = f"{name}: {reply.reason or reply.verdict.name.lower().replace('_', ' ')}"
+        if command.command in _QUIET:
+            self._endpoint.text_once(Severity.NOTICE, text)
+        elif command.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+            self._endpoint.text(Severity.CRITICAL, text if command.p1 else f"Disarm: {reply.reason}")
+        else:
+            self._endpoint.text(Severity.WARNING, text)
+
+    # Flight
+
+    def _arm_disarm(self, command: Command) -> Reply:
+        is_forced = command.p2 == FORCE
+        if command.p1 == 1.0:
+            return self._endpoint.vehicle.arm(force=is_forced)
+        if command.p1 == 0.0:
+            return self._endpoint.vehicle.disarm(force=is_forced)
+        return denied("parameter 1 must be 0 (disarm) or 1 (arm)")
+
+    def _takeoff(self, command: Command) -> Reply:
+        alt_amsl_m, reply = self._alt_amsl_m(command)
+        return reply or self._endpoint.vehicle.takeoff(alt_amsl_m, radians(command.p4))
+
+    def _land(self, command: Command) -> Reply:
+        lat_deg, lon_deg = command.x, command.y
+        if lat_deg == 0.0 and lon_deg == 0.0:  # what scripts that leave them out send; landing there is never meant
+            lat_deg = lon_deg = nan
+        if not is_position(lat_deg, lon_deg):
+            return denied("there is no such latitude and longitude")
+        return self._endpoint.vehicle.land(lat_deg, lon_deg, radians(command.p4))
+
+    def _return(self, _: Command) -> Reply:
+        return self._endpoint.vehicle.set_mode(Mode.RETURN)
+
+    def _set_mode(self, command: Command) -> Reply:
+        if not whole(command.p1, 0) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            return denied("parameter 1 must have the custom mode flag")
+        try:
+            mode = self._endpoint.dialect.mode_from_command(whole(command.p2, -1), whole(command.p3, 0))
+        except UnknownModeError as unknown:
+            return denied(str(unknown))
+        return self._endpoint.vehicle.set_mode(mode)
+
+    def _reposition(self, command: Command) -> Reply:
+        vehicle = self._endpoint.vehicle
+        may_change_mode = whole(command.p2, 0) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+        if not may_change_mode and vehicle.state.mode != Mode.HOLD:
+            return denied("needs mode Hold, or the flag that changes to it")
+        if not is_position(command.x, command.y):
+            return denied("there is no such latitude and longitude")
+        alt_amsl_m, reply = self._alt_amsl_m(command)
+        speed_m_s = command.p1 if command.p1 > 0.0 else nan
+        return reply or vehicle.reposition(command.x, command.y, alt_amsl_m, command.p4, speed_m_s)
+
+    def _change_speed(self, command: Command) -> Reply:
+        if whole(command.p1, -1) not in (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED):
+            return denied("only the ground speed can be changed")
+        if command.p2 == UNCHANGED or isnan(command.p2):
+            return ACCEPTED
+        if command.p2 == BY_DEFAULT:
+            return self._endpoint.vehicle.change_speed(nan)
+        if command.p2 < 0.0:
+            return denied("a speed cannot be negative")
+        return self._endpoint.vehicle.change_speed(command.p2)
+
+    def _pause_continue(self, command: Command) -> Reply:
+        if command.p1 == 0.0:
+            return self._endpoint.vehicle.pause_mission()
+        if command.p1 == 1.0:
+            return self._endpoint.vehicle.start_mission(-1)
+        return denied("parameter 1 must be 0 (pause) or 1 (continue)")
+
+    def _mission_start(self, command: Command) -> Reply:
+        return self._endpoint.vehicle.start_mission(whole(command.p1, -1))
+
+    def _set_current_item(self, command: Command) -> Reply:
+        seq = whole(command.p1, -1)
+        if seq < 0:
+            return denied("parameter 1 must be an item's number")
+        return self._endpoint.vehicle.set_current_item(seq)
+
+    # Home
+
+    def _set_home(self, command: Command) -> Reply:
+        if command.p1 == 1.0:
+            return self._endpoint.vehicle.set_home(nan, nan, nan)
+        alt_amsl_m, reply = self._alt_amsl_m(command)
+        if reply is not None:
+            return reply
+        if isnan(command.x) or isnan(alt_amsl_m) or not is_position(command.x, command.y):
+            return denied("needs latitude, longitude and altitude, or parameter 1 = 1 for here")
+        return self._endpoint.vehicle.set_home(command.x, command.y, alt_amsl_m)
+
+    def _get_home(self, command: Command) -> Reply | None:
+        return self._send_requested(command, _HOME_POSITION_ID)
+
+    def _alt_amsl_m(self, command: Command) -> tuple[float, Reply | None]:
+        """The command's altitude above sea level (NaN if free), or why there is none."""
+        state = self._endpoint.vehicle.state
+        if command.frame in GLOBAL_FRAMES or (isnan(command.z) and command.frame in LATLON_FRAMES):
+            return command.z, None
+        if command.frame in RELATIVE_FRAMES:
+            if state.home is None:
+                return nan, Reply(Verdict.TEMPORARILY_REJECTED, "an altitude above home needs a home position")
+            return state.home.alt_m + command.z, None
+        if command.frame in TERRAIN_FRAMES:
+            if not state.estimate.flags & TERRAIN_VALID:
+                return nan, Reply(Verdict.TEMPORARILY_REJECTED, "the height above ground is not known")
+            return state.origin.alt_m - state.estimate.terrain_d + command.z, None
+        return nan, denied(f"frame {command.frame} is not supported")
+
+    # Messages
+
+    def _set_message_interval(self, command: Command) -> Reply:
+        msg_id = whole(command.p1, -1)
+        if msg_id not in self._endpoint.telemetry.builders:
+            return Reply(Verdict.UNSUPPORTED, f"message {command.p1:g} is not sent by this vehicle")
+        if not isfinite(command.p2):
+            return denied("the interval is not a number")
+        if msg_id == _HEARTBEAT_ID and command.p2 != 0.0:
+            return denied("the heartbeat's interval is fixed")
+        interval_us = bounded_int(command.p2, -1, INT32_MAX)
+        command.sender.channel.schedule.set_interval(msg_id, interval_us)
+        return ACCEPTED
+
+    def _get_message_interval(self, command: Command) -> Reply | None:
+        msg_id = whole(command.p1, -1)
+        interval_us = command.sender.channel.schedule.interval_us.get(msg_id)
+        if interval_us is None:
+            return Reply(Verdict.UNSUPPORTED, f"message {command.p1:g} is not sent by this vehicle")
+        self._ack(command, Verdict.ACCEPTED)
+        payload = _MESSAGE_INTERVAL.pack(msg_id, interval_us or -1)
+        self._endpoint.reply(command.sender, _MESSAGE_INTERVAL, payload)
+        return None
+
+    def _request_message(self, command: Command) -> Reply | None:
+        return self._send_requested(command, whole(command.p1, -1))
+
+    def _request_capabilities(self, command: Command) -> Reply | None:
+        return self._send_requested(command, _AUTOPILOT_VERSION_ID)
+
+    def _send_requested(self, command: Command, msg_id: int) -> Reply | None:
+        """Acknowledges, then sends the message: clients wait for both, in this order."""
+        telemetry = self._endpoint.telemetry
+        build = telemetry.builders.get(msg_id)
+        if build is None:
+            return Reply(Verdict.UNSUPPORTED, f"message {msg_id} is not sent by this vehicle")
+        payload = build(self._endpoint.vehicle.state)
+        if payload is None:
+            return Reply(Verdict.TEMPORARILY_REJECTED, f"{telemetry.types[msg_id].name} is not known yet")
+        self._ack(command, Verdict.ACCEPTED)
+        self._endpoint.reply(command.sender, telemetry.types[msg_id], payload)
+        return None
+
+    # The rest
+
+    def _run_prearm_checks(self, _: Command) -> Reply:
+        vehicle = self._endpoint.vehicle
+        if vehicle.state.is_armed:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "the vehicle is armed")
+        for reason in vehicle.check_arming():
+            self._endpoint.text(Severity.CRITICAL, f"PreArm: {reason}")
+        return ACCEPTED
+
+    def _reboot(self, command: Command) -> Reply:
+        if command.p1 != REBOOT:
+            return Reply(Verdict.UNSUPPORTED, "only a reboot of the autopilot is supported")
+        return self._endpoint.vehicle.reboot()
+
+
+def _name(command_id: int) -> str:
+    """What a command is called in texts."""
+    if command_id in _SHORT_NAMES:
+        return _SHORT_NAMES[command_id]
+    entry = mavlink.enums["MAV_CMD"].get(command_id)
+    return entry.name.removeprefix("MAV_CMD_") if entry else f"Command {command_id}"

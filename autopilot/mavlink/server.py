@@ -1,0 +1,184 @@
+"""The vehicle's MAVLink server: reads every link, answers, and sends telemetry, once per frame (50 Hz).
+
+In: bytes from the links, events from the vehicle (`Announcer`). Out: bytes to the links. Time is the simulated time
+that `frame` is given. Nothing that arrives on a link can stop it: what is no frame is skipped, what is not known is
+refused or ignored.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from autopilot.mavlink.absent import AbsentServices
+from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Channel, Endpoint, OnFrame, Sender
+from autopilot.mavlink.codec import Frame, known_type
+from autopilot.mavlink.commands import CommandService
+from autopilot.mavlink.dialects import Dialect
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.identity import banner
+from autopilot.mavlink.links import Link
+from autopilot.mavlink.missions import MissionService
+from autopilot.mavlink.offboard import OffboardService
+from autopilot.mavlink.parameters import ParameterService
+from autopilot.vehicle import Severity, Vehicle
+
+Handler = Callable[[Sender, Any], None]
+
+_HEARTBEAT = known_type("HEARTBEAT")
+_HOME_POSITION = known_type("HOME_POSITION")
+_MISSION_CURRENT = known_type("MISSION_CURRENT")
+_MISSION_ITEM_REACHED = known_type("MISSION_ITEM_REACHED")
+_PING = known_type("PING")
+_TIMESYNC = known_type("TIMESYNC")
+
+SYSID_PARAMETER = "MAV_SYS_ID"
+
+
+class MavlinkServer:
+    """Everything the vehicle says and answers over MAVLink."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        links: Sequence[Link],
+        dialect: Dialect = PX4,
+        on_frame: OnFrame | None = None,
+    ) -> None:
+        """Connects the services.
+
+        Args:
+            vehicle: what is asked and reported; its parameter MAV_SYS_ID becomes the system id.
+            links: where clients are.
+            dialect: which autopilot's numbers to use.
+            on_frame: gets the time and the bytes of each frame received, and of each frame sent on the first link
+                or in answer to somebody.
+        """
+        sysid = int(vehicle.params[SYSID_PARAMETER])
+        self._endpoint = Endpoint(vehicle, links, dialect, sysid, on_frame)
+        self._parameters = ParameterService(self._endpoint)
+        self._missions = MissionService(self._endpoint)
+        self._is_heartbeat_due = False
+        self._handlers = {known_type(name).msg_id: handler for name, handler in self._message_table().items()}
+
+    def _message_table(self) -> dict[str, Handler]:
+        commands = CommandService(self._endpoint)
+        offboard = OffboardService(self._endpoint)
+        absent = AbsentServices(self._endpoint)
+        parameters, missions = self._parameters, self._missions
+        return {
+            "HEARTBEAT": self._heartbeat_received,
+            "PING": self._ping_received,
+            "TIMESYNC": self._timesync_received,
+            "REQUEST_DATA_STREAM": self._data_stream_requested,
+            "COMMAND_LONG": commands.long_received,
+            "COMMAND_INT": commands.int_received,
+            "SET_MODE": commands.set_mode_received,
+            "PARAM_REQUEST_LIST": parameters.list_requested,
+            "PARAM_REQUEST_READ": parameters.read_requested,
+            "PARAM_SET": parameters.set_requested,
+            "MISSION_COUNT": missions.count_received,
+            "MISSION_ITEM": missions.item_received,
+            "MISSION_ITEM_INT": missions.item_received,
+            "MISSION_REQUEST_LIST": missions.list_requested,
+            "MISSION_REQUEST_INT": missions.item_int_requested,
+            "MISSION_REQUEST": missions.item_float_requested,
+            "MISSION_REQUEST_PARTIAL_LIST": missions.partial_list_requested,
+            "MISSION_WRITE_PARTIAL_LIST": missions.partial_list_requested,
+            "MISSION_ACK": missions.ack_received,
+            "MISSION_CLEAR_ALL": missions.clear_requested,
+            "MISSION_SET_CURRENT": missions.set_current_requested,
+            "SET_POSITION_TARGET_LOCAL_NED": offboard.local_received,
+            "SET_POSITION_TARGET_GLOBAL_INT": offboard.global_received,
+            "SET_ATTITUDE_TARGET": offboard.attitude_received,
+            "SET_ACTUATOR_CONTROL_TARGET": offboard.actuators_received,
+            "FILE_TRANSFER_PROTOCOL": absent.file_requested,
+            "LOG_REQUEST_LIST": absent.logs_requested,
+            "LOG_REQUEST_DATA": absent.log_data_requested,
+            "SET_GPS_GLOBAL_ORIGIN": absent.origin_received,
+        }
+
+    def frame(self, time_us: int) -> None:
+        """Receives, answers, and sends what is due.
+
+        Args:
+            time_us: simulated time; never goes back.
+        """
+        endpoint = self._endpoint
+        endpoint.time_us = time_us
+        for channel in endpoint.channels:
+            for data in channel.link.receive():
+                for frame in channel.reader.feed(data, is_whole=channel.link.keeps_datagrams):
+                    self._handle(channel, frame)
+        self._parameters.frame()
+        self._missions.frame()
+        if self._is_heartbeat_due:
+            self._is_heartbeat_due = False
+            self._broadcast_telemetry(_HEARTBEAT.msg_id)
+        endpoint.send_streams()
+
+    def _handle(self, channel: Channel, frame: Frame) -> None:
+        """Hands a frame to its service if it is addressed to us."""
+        endpoint = self._endpoint
+        endpoint.received(frame.raw)
+        handler = self._handlers.get(frame.kind.msg_id)
+        is_echo = frame.sysid == endpoint.sysid and frame.compid == AUTOPILOT_COMPONENT
+        if handler is None or is_echo:
+            return
+        fields = frame.kind.unpack(frame.payload)
+        target_system = getattr(fields, "target_system", 0)
+        if endpoint.is_for_us(target_system, getattr(fields, "target_component", 0)):
+            handler(Sender(channel, frame.sysid, frame.compid), fields)
+
+    def close(self) -> None:
+        """Closes the links."""
+        for channel in self._endpoint.channels:
+            channel.link.close()
+
+    # Messages that belong to no service
+
+    def _heartbeat_received(self, sender: Sender, _: Any) -> None:
+        """Greets a client that is new on its channel."""
+        client = (sender.sysid, sender.compid)
+        if client not in sender.channel.clients:
+            sender.channel.clients.add(client)
+            self._endpoint.text(Severity.INFO, banner(self._endpoint.dialect), to=sender)
+
+    def _ping_received(self, sender: Sender, fields: Any) -> None:
+        """Answers a request; a message with a target is itself an answer."""
+        if fields.target_system == 0 and fields.target_component == 0:
+            payload = _PING.pack(fields.time_usec, fields.seq, sender.sysid, sender.compid)
+            self._endpoint.reply(sender, _PING, payload)
+
+    def _timesync_received(self, sender: Sender, fields: Any) -> None:
+        """Answers a request with simulated time; tc1 other than 0 is itself an answer."""
+        if fields.tc1 == 0:
+            self._endpoint.reply(sender, _TIMESYNC, _TIMESYNC.pack(max(self._endpoint.time_us, 1) * 1000, fields.ts1))
+
+    def _data_stream_requested(self, sender: Sender, fields: Any) -> None:
+        rate_hz = float(fields.req_message_rate) if fields.start_stop else 0.0
+        sender.channel.schedule.set_group(fields.req_stream_id, rate_hz)
+
+    # Announcer
+
+    def statustext(self, severity: Severity, text: str) -> None:
+        self._endpoint.text(severity, text)
+
+    def mission_item_reached(self, seq: int) -> None:
+        self._endpoint.broadcast(_MISSION_ITEM_REACHED, _MISSION_ITEM_REACHED.pack(seq))
+
+    def mission_current_changed(self, seq: int) -> None:
+        state = self._endpoint.vehicle.state
+        payload = _MISSION_CURRENT.pack(seq, state.mission_count, state.mission_state)
+        self._endpoint.broadcast(_MISSION_CURRENT, payload)
+
+    def home_changed(self) -> None:
+        self._broadcast_telemetry(_HOME_POSITION.msg_id)
+
+    def heartbeat_now(self) -> None:
+        """Sends a heartbeat in this frame, after the mode or arming has changed."""
+        self._is_heartbeat_due = True
+
+    def _broadcast_telemetry(self, msg_id: int) -> None:
+        telemetry = self._endpoint.telemetry
+        payload = telemetry.builders[msg_id](self._endpoint.vehicle.state)
+        if payload is not None:
+            self._endpoint.broadcast(telemetry.types[msg_id], payload)

@@ -1,0 +1,263 @@
+"""The Python part of one vehicle's flight controller: commander, navigator and MAVLink server, one `frame` at 50 Hz.
+
+In: estimate, samples, actuators and estimator health, read from the kernel rows; requests of MAVLink clients.
+Out: the setpoint row; telemetry through the attached servers. Time is the simulated time it is given.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import asin, atan2
+from typing import Any, Protocol
+
+import numpy as np
+
+from autopilot.commander.battery import BatteryEstimator
+from autopilot.commander.commander import Commander
+from autopilot.commander.landing import LandingDetector
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.mission import Mission
+from autopilot.navigator.navigator import Navigator
+from autopilot.navigator.setpoint import SetpointPort
+from autopilot.vehicle import (
+    ACCEPTED,
+    Announcer,
+    ItemRefusal,
+    LandedState,
+    MissionItem,
+    Mode,
+    OffboardSetpoint,
+    Reply,
+    Severity,
+    VehicleState,
+    Verdict,
+)
+from common.airframe import Airframe
+from common.geodesy import GeoPoint, geodetic_from_ned
+from common.kernels import GRAVITY_M_S2
+from common.params import ParameterTable
+
+_HEALTH_PERIOD_US = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class HostPorts:
+    """The kernel rows of one vehicle, as common.records.row_reader reads them."""
+
+    read_estimate: Callable[[], Any]  # Estimate
+    read_samples: Callable[[], Any]  # Samples
+    read_actuators: Callable[[], Any]  # Actuators
+    read_health: Callable[[], Any]  # EstimatorState
+    setpoint: np.ndarray[Any, Any]  # live structured view, shape (1,), of the Setpoint row
+
+
+class Server(Announcer, Protocol):
+    """A MAVLink server: hears of events, and has its own part of the frame."""
+
+    def frame(self, time_us: int) -> None: ...
+
+
+class _Relay:
+    """Passes events on to every attached server."""
+
+    def __init__(self) -> None:
+        self.targets: list[Announcer] = []
+
+    def statustext(self, severity: Severity, text: str) -> None:
+        for target in self.targets:
+            target.statustext(severity, text)
+
+    def mission_item_reached(self, seq: int) -> None:
+        for target in self.targets:
+            target.mission_item_reached(seq)
+
+    def mission_current_changed(self, seq: int) -> None:
+        for target in self.targets:
+            target.mission_current_changed(seq)
+
+    def home_changed(self) -> None:
+        for target in self.targets:
+            target.home_changed()
+
+    def heartbeat_now(self) -> None:
+        for target in self.targets:
+            target.heartbeat_now()
+
+
+class FlightController:
+    """One vehicle as MAVLink handlers and scripts see it (autopilot.vehicle.Vehicle).
+
+    Args:
+        ports: its kernel rows.
+        params: its parameters.
+        airframe: its data: battery, hover thrust.
+        origin: the geodetic origin of the ned frame.
+        announcer: hears of events besides the attached servers (a log, a test).
+        on_reboot: restarts the vehicle; None where there is nothing to restart.
+    """
+
+    def __init__(
+        self,
+        ports: HostPorts,
+        params: ParameterTable,
+        airframe: Airframe,
+        origin: GeoPoint,
+        announcer: Announcer | None = None,
+        on_reboot: Callable[[], None] | None = None,
+    ) -> None:
+        self.params = params
+        self.state = VehicleState(origin=origin, position=origin)
+        self._read_estimate = ports.read_estimate
+        self._read_samples = ports.read_samples
+        self._read_actuators = ports.read_actuators
+        self._read_health = ports.read_health
+        self._next_health_us = 0
+        self._relay = _Relay()
+        if announcer is not None:
+            self._relay.targets.append(announcer)
+        self._servers: list[Server] = []
+        self._on_reboot = on_reboot
+        self._setpoint = SetpointPort(ports.setpoint)
+        hover = hover_thrust(airframe)
+        self.commander = Commander(
+            self.state, params, self._relay, BatteryEstimator(airframe.battery), LandingDetector(params, hover)
+        )
+        context = NavContext(self.state, params, self._relay, self._setpoint, hover)
+        self.navigator = Navigator(context, Mission(context, self.commander.set_home))
+        self.commander.connect(self.navigator)
+        self._setpoint.write()
+
+    def attach(self, server: Server) -> None:
+        """Adds a MAVLink server: it hears of events, and its frame is run at the end of each frame."""
+        self._relay.targets.append(server)
+        self._servers.append(server)
+
+    def frame(self, time_us: int) -> None:
+        """Runs one frame of the Python part at `time_us`: reads, decides, writes the setpoint, serves links."""
+        dt_s = (time_us - self.state.time_us) * 1e-6
+        self._read(time_us)
+        self.commander.frame(dt_s)
+        wish = self.navigator.frame()
+        if wish is not None:
+            self._follow_wish(wish)
+        self._setpoint.write()
+        for server in self._servers:
+            server.frame(time_us)
+
+    def _read(self, time_us: int) -> None:
+        """Renews the vehicle state from the kernel rows."""
+        state = self.state
+        state.time_us = time_us
+        estimate = state.estimate = self._read_estimate()
+        state.samples = self._read_samples()
+        state.actuators = self._read_actuators()
+        if time_us >= self._next_health_us:
+            self._next_health_us = time_us + _HEALTH_PERIOD_US
+            state.health = self._read_health()
+        x, y, z, w = estimate.q_ned_from_frd
+        state.roll_rad = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        sine = 2.0 * (w * y - z * x)
+        state.pitch_rad = asin(1.0 if sine > 1.0 else -1.0 if sine < -1.0 else sine)
+        state.yaw_rad = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        north, east, down = estimate.pos_ned
+        state.position = GeoPoint(*geodetic_from_ned(north, east, down, state.origin))
+
+    def _follow_wish(self, mode: Mode) -> None:
+        """A mode is done: goes over to the next, or lands if that cannot be flown."""
+        if self.commander.refusal(mode):
+            mode = Mode.LAND
+        self.commander.change_mode(mode)
+
+    # ---- autopilot.vehicle.Vehicle ----
+
+    def arm(self, *, force: bool) -> Reply:
+        return self.commander.arm(force=force)
+
+    def disarm(self, *, force: bool) -> Reply:
+        return self.commander.disarm(force=force)
+
+    def check_arming(self) -> list[str]:
+        return self.commander.check_arming()
+
+    def set_mode(self, mode: Mode) -> Reply:
+        return self.commander.request_mode(mode)
+
+    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
+        reason = self.commander.refusal(Mode.TAKEOFF)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
+        reply = self.navigator.takeoff.request(alt_amsl_m, yaw_rad)
+        if reply.verdict is not Verdict.ACCEPTED:
+            return reply
+        return self._enter_anew(Mode.TAKEOFF)
+
+    def land(self, lat_deg: float, lon_deg: float, yaw_rad: float) -> Reply:
+        reason = self.commander.refusal(Mode.LAND)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
+        reply = self.navigator.request_landing(lat_deg, lon_deg, yaw_rad)
+        if reply.verdict is not Verdict.ACCEPTED:
+            return reply
+        return self._enter_anew(Mode.LAND)
+
+    def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
+        state = self.state
+        if not state.is_armed or state.landed_state is LandedState.ON_GROUND:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
+        if not self.commander.has_position:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
+        reply = self.navigator.reposition(lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
+        if reply.verdict is not Verdict.ACCEPTED:
+            return reply
+        return self._enter_anew(Mode.HOLD)
+
+    def change_speed(self, speed_m_s: float) -> Reply:
+        return self.navigator.change_speed(speed_m_s)
+
+    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
+        return self.commander.set_home(lat_deg, lon_deg, alt_amsl_m)
+
+    def set_offboard(self, setpoint: OffboardSetpoint) -> None:
+        self.navigator.set_offboard(setpoint)
+
+    def pause_mission(self) -> Reply:
+        if self.state.mode is not Mode.MISSION:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "no mission is being flown")
+        return self.commander.request_mode(Mode.HOLD)
+
+    def start_mission(self, first: int) -> Reply:
+        if first >= 0:
+            reply = self.navigator.mission.set_current(first)
+            if reply.verdict is not Verdict.ACCEPTED:
+                return reply
+        return self.commander.request_mode(Mode.MISSION)
+
+    def set_current_item(self, seq: int) -> Reply:
+        return self.navigator.mission.set_current(seq)
+
+    def mission_items(self) -> Sequence[MissionItem]:
+        return self.navigator.mission.items
+
+    def load_mission(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
+        return self.navigator.mission.load(items)
+
+    def reboot(self) -> Reply:
+        if self.state.is_armed:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "armed")
+        if self._on_reboot is None:
+            return Reply(Verdict.UNSUPPORTED, "there is nothing to restart")
+        self._on_reboot()
+        return ACCEPTED
+
+    def _enter_anew(self, mode: Mode) -> Reply:
+        """Enters a mode, also if it is the present one, whose target is a new one then."""
+        if self.state.mode is mode:
+            self.navigator.enter(mode)
+            return ACCEPTED
+        return self.commander.request_mode(mode)
+
+
+def hover_thrust(airframe: Airframe) -> float:
+    """Share [0..1] of the maximum collective thrust that carries the vehicle, at full battery and sea level."""
+    model = airframe.rotor_model
+    thrust_max_n = len(airframe.rotors) * model.thrust_n_s2 * model.max_speed_rad_s**2
+    return airframe.body.mass_kg * GRAVITY_M_S2 / thrust_max_n

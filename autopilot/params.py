@@ -1,0 +1,73 @@
+"""The whole parameter table: what the parts declare, and what a ground station looks for.
+
+Ground stations that speak PX4 ask for certain names when they connect and open their setup pages for what they miss.
+Those without a meaning here are constants (minimum = maximum): they can be read, and setting them changes nothing.
+"""
+
+from autopilot.commander.params import COMMANDER_PARAMETERS
+from autopilot.control.params import CONTROL_PARAMETERS
+from autopilot.estimator.params import ESTIMATOR_PARAMETERS
+from autopilot.navigator.params import NAVIGATOR_PARAMETERS
+from common.params import Parameter, ParameterTable
+
+_CLIENTS = "what ground stations expect of a PX4 vehicle"
+
+
+def _constant(name: str, value: int | float, meaning: str) -> Parameter:
+    return Parameter(name, value, value, value, "", f"{meaning}; constant", _CLIENTS)
+
+
+SYSTEM_PARAMETERS: list[Parameter] = [
+    Parameter("MAV_SYS_ID", 1, 1, 250, "", "MAVLink system id, read at power-on", "PX4 default"),
+    _constant("SYS_AUTOSTART", 4001, "airframe: generic quadrotor"),
+    _constant("SYS_AUTOCONFIG", 0, "do not reset parameters"),
+    _constant("SYS_FAILURE_EN", 0, "failures cannot be injected over MAVLink"),
+    _constant("COM_RC_IN_MODE", 1, "no radio control, joystick only"),
+    _constant("COM_RC_LOSS_T", 0.5, "no radio control"),
+    _constant("COM_FLTMODE1", -1, "no mode switch"),
+    _constant("COM_FLTMODE2", -1, "no mode switch"),
+    _constant("COM_FLTMODE3", -1, "no mode switch"),
+    _constant("COM_FLTMODE4", -1, "no mode switch"),
+    _constant("COM_FLTMODE5", -1, "no mode switch"),
+    _constant("COM_FLTMODE6", -1, "no mode switch"),
+    _constant("NAV_DLL_ACT", 0, "the loss of the ground station changes nothing"),
+    _constant("NAV_RCL_ACT", 0, "no radio control"),
+    _constant("RC_MAP_ROLL", 0, "no radio control"),
+    _constant("RC_MAP_PITCH", 0, "no radio control"),
+    _constant("RC_MAP_YAW", 0, "no radio control"),
+    _constant("RC_MAP_THROTTLE", 0, "no radio control"),
+    _constant("RC_MAP_AUX1", 0, "no radio control"),
+    _constant("RC_MAP_AUX2", 0, "no radio control"),
+    _constant("RC_MAP_FLAPS", 0, "no radio control"),
+    _constant("CAL_GYRO0_ID", 1, "a gyroscope, calibrated"),
+    _constant("CAL_ACC0_ID", 1, "an accelerometer, calibrated"),
+    _constant("CAL_MAG0_ID", 1, "a magnetometer, calibrated"),
+    _constant("CAL_MAG1_ID", 0, "no second magnetometer"),
+    _constant("CAL_MAG2_ID", 0, "no third magnetometer"),
+    _constant("SENS_BOARD_X_OFF", 0.0, "the board is level"),
+    _constant("SENS_BOARD_Y_OFF", 0.0, "the board is level"),
+    _constant("SENS_BOARD_Z_OFF", 0.0, "the board points forward"),
+    _constant("BAT1_SOURCE", 0, "battery measured by the power module"),
+    _constant("BAT1_N_CELLS", 4, "cells of the battery"),
+    _constant("BAT1_V_CHARGED", 4.2, "voltage of a full cell"),
+    _constant("BAT1_V_EMPTY", 3.6, "voltage of an empty cell"),
+    _constant("GF_ACTION", 0, "no geofence"),
+    _constant("GF_MAX_HOR_DIST", 0.0, "no geofence"),
+    _constant("GF_MAX_VER_DIST", 0.0, "no geofence"),
+]
+
+
+def all_parameters() -> list[Parameter]:
+    """Every declaration of the flight controller."""
+    return [
+        *SYSTEM_PARAMETERS,
+        *ESTIMATOR_PARAMETERS,
+        *CONTROL_PARAMETERS,
+        *COMMANDER_PARAMETERS,
+        *NAVIGATOR_PARAMETERS,
+    ]
+
+
+def parameter_table() -> ParameterTable:
+    """A vehicle's table, at its defaults."""
+    return ParameterTable(all_parameters())

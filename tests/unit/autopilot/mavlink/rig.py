@@ -1,0 +1,273 @@
+"""A vehicle that records what it is asked, and a client at the other end of a memory link."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from autopilot.estimator.state import EstimatorState
+from autopilot.mavlink.codec import FrameReader, Message, decode, encode
+from autopilot.mavlink.links import Link, LinkRole, memory_pair
+from autopilot.mavlink.server import MavlinkServer
+from autopilot.params import parameter_table
+from autopilot.ports import (
+    HEIGHT_VALID,
+    POSITION_VALID,
+    TERRAIN_VALID,
+    TILT_ALIGNED,
+    VELOCITY_VALID,
+    WIND_VALID,
+    YAW_ALIGNED,
+    Actuators,
+    Estimate,
+    Samples,
+)
+from autopilot.vehicle import (
+    ACCEPTED,
+    ItemRefusal,
+    Mode,
+    MissionItem,
+    OffboardSetpoint,
+    Reply,
+    VehicleState,
+)
+from common.geodesy import GeoPoint
+from common.records import row_reader
+
+FRAME_US = 20_000
+HOME = GeoPoint(47.397742, 8.545594, 488.0)
+CLIENT_SYSID, CLIENT_COMPID = 255, 190
+ALL_VALID = TILT_ALIGNED | YAW_ALIGNED | VELOCITY_VALID | POSITION_VALID | HEIGHT_VALID | TERRAIN_VALID | WIND_VALID
+
+
+def record(struct_type: Any, name: str, **values: Any) -> Any:
+    """A row of a kernel struct as the vehicle's state carries it; `a__b` names field b of struct a."""
+    rows = np.zeros(1, dtype=struct_type.numpy_dtype())
+    for path, value in values.items():
+        *outer, last = path.split("__")
+        target = rows
+        for part in outer:
+            target = target[part]
+        target[last] = value
+    return row_reader(rows, 0, name)()
+
+
+def flying_state() -> VehicleState:
+    """In the air over home, everything known."""
+    return VehicleState(
+        time_us=5_000_000,
+        estimate=record(
+            Estimate,
+            "Estimate",
+            flags=ALL_VALID,
+            q_ned_from_frd=(0.0, 0.0, 0.6, 0.8),
+            omega_frd=(0.1, 0.2, 0.3),
+            vel_ned=(1.0, 2.0, -0.5),
+            pos_ned=(10.0, 20.0, -30.0),
+            wind_ned=(3.0, -4.0, 0.0),
+            terrain_d=-1.0,
+            pos_h_std=0.4,
+            pos_v_std=0.3,
+        ),
+        samples=record(
+            Samples,
+            "Samples",
+            imu__time_us=4_996_000,
+            imu__accel_frd=(0.0, 0.0, -9.81),
+            gnss__time_us=4_880_000,
+            gnss__fix_type=3,
+            gnss__satellites=14,
+            gnss__pos_ned=(10.1, 20.1, -30.2),
+            gnss__vel_ned=(1.0, 2.0, -0.5),
+            gnss__pos_h_std=0.7,
+            gnss__pos_v_std=1.0,
+            baro__time_us=4_980_000,
+            baro__pressure_pa=95_000.0,
+            baro__temperature_c=21.5,
+            mag__time_us=4_980_000,
+            mag__field_frd_gauss=(0.2, 0.0, 0.4),
+            range__time_us=4_960_000,
+            range__distance_m=29.0,
+            range__is_valid=1,
+            battery__time_us=4_990_000,
+            battery__voltage_v=15.8,
+            battery__current_a=12.5,
+        ),
+        actuators=record(
+            Actuators,
+            "Actuators",
+            command=(0.5, 0.6, 0.5, 0.6, 0.0, 0.0, 0.0, 0.0),
+            traj_pos_ned=(10.0, 20.0, -30.0),
+            traj_yaw=0.5,
+            traj_yaw_rate=nan,
+            q_sp_ned_from_frd=(0.0, 0.0, 0.0, 1.0),
+            thrust_sp=0.42,
+        ),
+        health=record(EstimatorState, "EstimatorState", gnss_pos__test_ratio_lpf=0.1, stillness__accel_var=0.3),
+        origin=HOME,
+        position=GeoPoint(47.397832, 8.545859, 518.0),
+        roll_rad=0.05,
+        pitch_rad=-0.02,
+        yaw_rad=1.2,
+        home=HOME,
+        mode=Mode.HOLD,
+        is_armed=True,
+        landed_state=2,
+        is_ready_to_arm=True,
+        battery_remaining=0.8,
+        battery_used_mah=400.0,
+        mission_count=2,
+        mission_current=1,
+    )
+
+
+class RecordingVehicle:
+    """Answers every request with `reply` and keeps a list of them."""
+
+    def __init__(self) -> None:
+        self.state = flying_state()
+        self.params = parameter_table()
+        self.reply = ACCEPTED
+        self.item_refusal: ItemRefusal | None = None
+        self.arming_problems: list[str] = []
+        self.calls: list[tuple[Any, ...]] = []
+        self.setpoints: list[OffboardSetpoint] = []
+        self.items: list[MissionItem] = []
+
+    def _record(self, *call: Any) -> Reply:
+        self.calls.append(call)
+        return self.reply
+
+    def arm(self, *, force: bool) -> Reply:
+        return self._record("arm", force)
+
+    def disarm(self, *, force: bool) -> Reply:
+        return self._record("disarm", force)
+
+    def check_arming(self) -> list[str]:
+        return self.arming_problems
+
+    def set_mode(self, mode: Mode) -> Reply:
+        return self._record("set_mode", mode)
+
+    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
+        return self._record("takeoff", alt_amsl_m, yaw_rad)
+
+    def land(self, lat_deg: float, lon_deg: float, yaw_rad: float) -> Reply:
+        return self._record("land", lat_deg, lon_deg, yaw_rad)
+
+    def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
+        return self._record("reposition", lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
+
+    def change_speed(self, speed_m_s: float) -> Reply:
+        return self._record("change_speed", speed_m_s)
+
+    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
+        return self._record("set_home", lat_deg, lon_deg, alt_amsl_m)
+
+    def set_offboard(self, setpoint: OffboardSetpoint) -> None:
+        self.setpoints.append(setpoint)
+
+    def pause_mission(self) -> Reply:
+        return self._record("pause_mission")
+
+    def start_mission(self, first: int) -> Reply:
+        return self._record("start_mission", first)
+
+    def set_current_item(self, seq: int) -> Reply:
+        return self._record("set_current_item", seq)
+
+    def mission_items(self) -> Sequence[MissionItem]:
+        return self.items
+
+    def load_mission(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
+        if self.item_refusal is None:
+            self.items = list(items)
+        return self.item_refusal
+
+    def reboot(self) -> Reply:
+        return self._record("reboot")
+
+
+class Client:
+    """A client's end of a link."""
+
+    def __init__(self, link: Link, sysid: int = CLIENT_SYSID, compid: int = CLIENT_COMPID) -> None:
+        self.link = link
+        self.sysid = sysid
+        self.compid = compid
+        self._reader = FrameReader()
+        self._seq = 0
+
+    def send(self, name: str, **fields: Any) -> None:
+        if name not in ("HEARTBEAT", "PING", "TIMESYNC"):
+            fields = {"target_system": 1} | fields
+        self.link.send(encode(name, self.sysid, self.compid, self._seq, **fields))
+        self._seq += 1
+
+    def command(self, command: int, *params: float) -> None:
+        """COMMAND_LONG; parameters left out are NaN."""
+        values = (*params, *(nan,) * (7 - len(params)))
+        self.send("COMMAND_LONG", command=command, **{f"param{i + 1}": value for i, value in enumerate(values)})
+
+    def received(self) -> list[Message]:
+        return [decode(frame) for data in self.link.receive() for frame in self._reader.feed(data)]
+
+
+class Rig:
+    """Server and client in simulated time."""
+
+    def __init__(self, role: LinkRole = LinkRole.GROUND) -> None:
+        self.vehicle = RecordingVehicle()
+        vehicle_end, client_end = memory_pair(role)
+        second_vehicle_end, second_client_end = memory_pair(LinkRole.ONBOARD)
+        self.client = Client(client_end)
+        self.second_client = Client(second_client_end, 245, 191)
+        self.log: list[tuple[int, bytes]] = []
+        self.server = MavlinkServer(
+            self.vehicle,
+            [vehicle_end, second_vehicle_end],
+            on_frame=lambda time_us, data: self.log.append((time_us, data)),
+        )
+        self.time_us = 5_000_000
+
+    def frame(self, count: int = 1) -> list[Message]:
+        """What the first client received in the next frames."""
+        messages: list[Message] = []
+        for _ in range(count):
+            self.time_us += FRAME_US
+            self.vehicle.state.time_us = self.time_us
+            self.server.frame(self.time_us)
+            messages += self.client.received()
+        return messages
+
+    def only(self, name: str, count: int = 1) -> Any:
+        """The fields of the only message of this name in the next frames."""
+        (fields,) = self.all(name, count)
+        return fields
+
+    def all(self, name: str, count: int = 1) -> list[Any]:
+        return [message.fields for message in self.frame(count) if message.name == name]
+
+    def ack(self, command: int, *params: float) -> Any:
+        """The acknowledgement of a COMMAND_LONG, in the frame after it."""
+        self.client.command(command, *params)
+        return self.only("COMMAND_ACK")
+
+    def update(self, **values: Any) -> None:
+        """Changes fields of the vehicle's state."""
+        self.vehicle.state = replace(self.vehicle.state, **values)
+
+
+def texts(messages: list[Message]) -> list[str]:
+    """The texts in order, chunks put together."""
+    whole: list[str] = []
+    for message in messages:
+        if message.name == "STATUSTEXT":
+            if message.fields.chunk_seq:
+                whole[-1] += message.fields.text
+            else:
+                whole.append(message.fields.text)
+    return whole
