@@ -11,6 +11,7 @@ from autopilot.control.control import control_tick
 from autopilot.control.params import ControlParams
 from autopilot.control.control import ControlState
 from autopilot.estimator.ekf import Ekf, estimator_tick
+from autopilot.estimator.state import EstimatorState
 from autopilot.ports import Samples, Setpoint
 
 wp.set_module_options({"enable_backward": False})
@@ -28,10 +29,13 @@ class Autopilot:
 
 
 @wp.kernel(enable_backward=False)
-def estimate_samples(ekf: Ekf, samples: wp.array2d(dtype=Samples), tick_count: int):
-    """Runs the estimator alone over recorded samples, one column per tick."""
+def estimate_samples(
+    ekf: Ekf, samples: wp.array2d(dtype=Samples), states: wp.array2d(dtype=EstimatorState), tick_count: int
+):
+    """Runs the estimator alone over recorded samples, one column per tick, and keeps its state after each tick."""
     i = wp.tid()
     state = ekf.rows[i]
     for tick in range(tick_count):
         state = estimator_tick(ekf, i, state, samples[i, tick])
+        states[i, tick] = state
     ekf.rows[i] = state

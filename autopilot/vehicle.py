@@ -130,6 +130,7 @@ class VehicleState:
     mode: Mode = Mode.HOLD
     is_armed: bool = False
     landed_state: LandedState = LandedState.ON_GROUND
+    has_ground_contact: bool = False  # stands on something, though perhaps not landed yet
     is_ready_to_arm: bool = False
     is_failsafe: bool = False
     armed_since_us: int = 0

@@ -5,7 +5,7 @@ as rows of the other arrays. One call of `advance` is one launch per thread, for
 """
 
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -104,7 +104,7 @@ class Rig:
 
     def snapshot(self) -> Snapshot:
         """A copy of all rows, to be restored in this rig or in another with the same world."""
-        return [array.numpy().copy() for array in _row_arrays(self.arrays)]
+        return [array.numpy().copy() for array, _ in self._row_views]
 
     def restore(self, snapshot: Snapshot, rows: Rows, sources: Rows, seeds: Rows) -> None:
         """Puts vehicles where the snapshot found others (or themselves), to fly on with noise of their own.
@@ -115,12 +115,14 @@ class Rig:
             sources: the rows of the snapshot they take, shape (n,).
             seeds: of their noise from now on, shape (n,).
         """
-        for array, copies in zip(_row_arrays(self.arrays), snapshot, strict=True):
-            live = array.numpy()
-            live[rows] = copies[sources]
-            if array.device.is_cuda:
-                array.assign(live)
-        self._write_rows(self.arrays.seed, {}) if False else None
+        for (array, view), copies in zip(self._row_views, snapshot, strict=True):
+            _put(array, view, rows, copies[sources])
+        _put(self.arrays.seed, self.arrays.seed.numpy(), rows, seeds)
+
+    @cached_property
+    def _row_views(self) -> list[tuple[Any, Rows]]:
+        """Each array that has a row per vehicle, and its view: making the views of large structs takes milliseconds."""
+        return [(array, array.numpy()) for array in _row_arrays(self.arrays)]
 
     def load_parameters(self, table: ParameterTable) -> None:
         """Gives every flight controller the values of a parameter table, and the magnetic field of the place."""
@@ -159,6 +161,27 @@ class Rig:
         autopilot.airframe = self._rows(ControlAirframe, control_airframe(airframe))
         autopilot.setpoint = self._rows(Setpoint, Setpoint())
         return autopilot
+
+
+def _row_arrays(arrays: Any) -> list[Any]:
+    """Every array of a struct and of the structs in it that has a row per vehicle, in the order of declaration."""
+    found = []
+    for name in arrays.cls.__annotations__:
+        member = getattr(arrays, name)
+        if isinstance(member, wp.array):
+            found.append(member)
+        elif name != "world":  # the same for all
+            found.extend(_row_arrays(member))
+    return found
+
+
+def _put(array: Any, view: Rows, rows: Rows, values: Rows) -> None:
+    """Writes chosen rows of a Warp array, of which `view` is the live view (on a GPU: any array of its type)."""
+    if array.device.is_cuda:
+        view[...] = array.numpy()
+    view[rows] = values
+    if array.device.is_cuda:
+        array.assign(view)
 
 
 @cache

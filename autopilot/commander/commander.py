@@ -252,7 +252,9 @@ class Commander:
             self._lift()
             return
         thrust = state.actuators.thrust_sp if state.is_armed else 0.0
-        if self._landing.update(state.estimate, thrust, min(dt_s, _FRAME_LONGEST_S)):
+        is_landed = self._landing.update(state.estimate, thrust, min(dt_s, _FRAME_LONGEST_S))
+        state.has_ground_contact = self._landing.has_contact
+        if is_landed:
             self._touch_down()
             self.announcer.statustext(Severity.INFO, "Landed")
         elif state.landed_state is not LandedState.TAKEOFF or state.mode is not Mode.TAKEOFF:

@@ -44,6 +44,11 @@ class LandingDetector:
         self._time_s = 0.0
         self.is_landed = False
 
+    @property
+    def has_contact(self) -> bool:
+        """Whether something else than the rotors has carried the vehicle for the first stage."""
+        return self._time_s >= self._stage_s
+
     def update(self, estimate: Any, thrust: float, dt_s: float) -> bool:
         """Takes one frame and returns whether the vehicle stands on the ground.
 

@@ -76,9 +76,7 @@ def fitting_share(airframe: ControlAirframe, thrusts: vec8, change: vec8, low: f
 
 
 @wp.func
-def desaturate(
-    airframe: ControlAirframe, torque_frd: wp.vec3, collective_n: float, low: float, high: float
-) -> vec8:
+def desaturate(airframe: ControlAirframe, torque_frd: wp.vec3, collective_n: float, low: float, high: float) -> vec8:
     """Rotor thrusts [N] within [low, high] that give up yaw, then collective thrust, then roll and pitch."""
     thrusts = tilt_thrusts(airframe, torque_frd, high - low)
     thrusts = thrusts + airframe.mix_thrust * fitting_collective(airframe, thrusts, collective_n, low, high)

@@ -122,7 +122,7 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
     Parameter("EKF2_MAG_NOISE", 1.5e-4, 1.0e-5, 1.0, "gauss", "Magnetometer noise", "RM3100 data sheet: 15 nT", "mag_noise"),
     Parameter("EKF2_MAG_GATE", 5.0, 1.0, 50.0, "SD", "Magnetometer gate", "3 in PX4, whose noise is wider", "mag_gate"),
     Parameter("EKF2_MAG_E_NOISE", 1.0e-5, 0.0, 0.1, "gauss/sqrt(s)", "Random walk of the earth field", "1e-5 gauss per kilometre of flight", "earth_field_walk"),
-    Parameter("EKF2_MAG_B_NOISE", 3.0e-4, 0.0, 0.1, "gauss/sqrt(s)", "Random walk of the body field", _TUNED, "body_field_walk"),
+    Parameter("EKF2_MAG_B_NOISE", 4.0e-4, 0.0, 0.1, "gauss/sqrt(s)", "Random walk of the body field", _TUNED, "body_field_walk"),
     Parameter("EKF2_MAG_B_INIT", 5.0e-3, 0.0, 0.3, "gauss", "Body field left after calibration", "guess: hard iron 3e-3, soft iron 3e-3 of the field", "body_field_init"),
     Parameter("EKF2_MIN_RNG", 0.2, 0.0, 2.0, "m", "Height above the ground while it stands there: of the origin at boot, and of the terrain", "landing gear of the airframe", "rest_height"),
     Parameter("EKF2_RNG_CTRL", 1, 0, 1, "", "Range finder use: 0 off, 1 terrain height", _PX4, "range_ctrl"),

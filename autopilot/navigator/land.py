@@ -34,6 +34,9 @@ class Landing:
         if context.is_on_ground:
             return
         context.is_landing = True
+        if context.state.has_ground_contact:
+            context.setpoint.idle()  # attitude control against the ground would only tip the vehicle over
+            return
         if context.has_position:
             if self._is_blind:  # the position is back: land here
                 self._is_blind = False
@@ -50,7 +53,7 @@ class Landing:
     def _pushed(self, speed: float) -> float:
         """The speed, or more of it once the vehicle no longer sinks: on the ground the thrust falls at once then."""
         context = self._context
-        if context.state.estimate.vel_ned[2] > 0.3 * speed:
+        if context.state.estimate.vel_ned[2] > 0.5 * speed:
             self._moving_us = context.state.time_us
         is_touching = context.state.time_us - self._moving_us > _TOUCHING_US
         return max(speed, context.number("MPC_Z_V_AUTO_DN")) if is_touching else speed

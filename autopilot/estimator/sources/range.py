@@ -16,7 +16,7 @@ from common.kernels import vec24
 wp.set_module_options({"enable_backward": False})
 
 RANGE_STUCK_AFTER = wp.constant(12)
-_RESET_AFTER_REJECTS = wp.constant(5)
+_RESET_AFTER_REJECTS = wp.constant(2)
 _MIN_DOWN = wp.constant(0.7)  # cosine of the largest tilt, 45 deg: beyond it the beam meets ground that is elsewhere
 _RESTART_AFTER_S = wp.constant(5.0)
 

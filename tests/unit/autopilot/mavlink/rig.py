@@ -27,8 +27,8 @@ from autopilot.ports import (
 from autopilot.vehicle import (
     ACCEPTED,
     ItemRefusal,
-    Mode,
     MissionItem,
+    Mode,
     OffboardSetpoint,
     Reply,
     VehicleState,

@@ -1,0 +1,251 @@
+"""Recorded sensors, made ready for the estimator: sorted, without gaps, in the tangent plane of the first good fix.
+
+In: the tables of one log, as `sensor_ulog` and `sensor_csv` read them. Out: rows of the kernels' sample structs, one
+array per sensor, and the stretches of IMU samples that hold together.
+"""
+
+from dataclasses import dataclass, field
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from autopilot.ports import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
+from common.geodesy import GeoPoint, ned_from_geodetic
+from common.params import ParameterTable
+
+Rows = npt.NDArray[Any]
+
+IMU_DTYPE = np.dtype(ImuSample.numpy_dtype())
+GNSS_DTYPE = np.dtype(GnssSample.numpy_dtype())
+BARO_DTYPE = np.dtype(BaroSample.numpy_dtype())
+MAG_DTYPE = np.dtype(MagSample.numpy_dtype())
+RANGE_DTYPE = np.dtype(RangeSample.numpy_dtype())
+FIX_DTYPE = np.dtype(
+    [
+        ("time_us", "<i8"),
+        ("lat_deg", "<f8"),
+        ("lon_deg", "<f8"),
+        ("alt_m", "<f8"),  # above mean sea level
+        ("vel_ned", "<f4", (3,)),
+        ("pos_h_std", "<f4"),
+        ("pos_v_std", "<f4"),
+        ("vel_std", "<f4"),
+        ("fix_type", "<i4"),
+        ("satellites", "<i4"),
+    ]
+)
+
+MIN_IMU_RATE_HZ = 40.0  # guess: below it a multirotor's attitude cannot be integrated
+MIN_DURATION_S = 1.0
+IMU_PERIOD_S = 0.004  # the estimator's tick: faster samples are merged to about that
+HELD_GAP_S = 0.1  # up to here the last rate holds; the estimator integrates no longer interval
+FILLED_GAP_S = 1.0  # up to here samples are interpolated; a longer gap starts the estimator anew
+# The estimator's rings hold 16 samples (4 of GNSS) of the last 0.2 s: faster ones would be lost before their turn.
+MIN_INTERVAL_S = 0.015
+MIN_GNSS_INTERVAL_S = 0.045
+
+
+class SensorLogError(ValueError):
+    """The log cannot be used; the message is one sentence that names it."""
+
+
+@dataclass(slots=True)
+class Recording:
+    """The tables of one log as read; times in microseconds, of validity."""
+
+    path: Path
+    imu: Rows  # IMU_DTYPE; dt_s is the integration time of the sample, 0: unknown
+    fixes: Rows  # FIX_DTYPE
+    baro: Rows  # BARO_DTYPE
+    mag: Rows  # MAG_DTYPE
+    range: Rows  # RANGE_DTYPE
+    is_own: bool = False  # written by this project: its parameters mean what they mean here
+    parameters: dict[str, float] = field(default_factory=dict)
+    gnss_delay_s: float = 0.0  # subtracted from the receiver's times already
+    tracks: list["Track"] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)  # what the reader of the results should know
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """Somebody else's answer to the same flight: the log's own estimate, or the truth of a simulator."""
+
+    name: str
+    ref: GeoPoint | None  # origin of its pos_ned
+    pos_time_us: Rows  # (rows,)
+    pos_ned: Rows  # [m], (rows, 3)
+    vel_ned: Rows  # [m/s], (rows, 3)
+    q_time_us: Rows  # (rows,)
+    q_ned_from_frd: Rows  # x, y, z, w, (rows, 4)
+
+
+@dataclass(frozen=True, slots=True)
+class SensorLog:
+    """Samples ready for the estimator; times are positive and strictly increasing."""
+
+    recording: Recording
+    origin: GeoPoint | None  # of ned; None without any fix
+    imu: Rows
+    gnss: Rows
+    baro: Rows
+    mag: Rows
+    range: Rows
+    stretches: list[tuple[int, int]]  # first and last + 1 IMU sample of each part without a long gap
+
+    @property
+    def duration_s(self) -> float:
+        return float(self.imu["time_us"][-1] - self.imu["time_us"][0]) * 1e-6
+
+
+def empty(dtype: np.dtype[Any]) -> Rows:
+    return np.zeros(0, dtype=dtype)
+
+
+def prepare(recording: Recording, table: ParameterTable) -> SensorLog:
+    """The samples of a recording, cleaned; what was changed or is missing is added to its notes.
+
+    Args:
+        recording: as read.
+        table: the estimator's parameters: which fix is good enough to be the origin.
+
+    Raises:
+        SensorLogError: the IMU samples are too few or too slow.
+    """
+    notes = recording.notes
+    imu = _prepare_imu(recording)
+    fixes = _thinned(_sorted(recording.fixes, "GNSS", notes), MIN_GNSS_INTERVAL_S)
+    origin = _origin(fixes, table, notes)
+    slow = {
+        name: _thinned(_sorted(getattr(recording, name), label, notes), MIN_INTERVAL_S)
+        for name, label in (("baro", "barometer"), ("mag", "magnetometer"), ("range", "range finder"))
+    }
+    for name, label in (("baro", "barometer"), ("mag", "magnetometer")):
+        if not len(slow[name]):
+            notes.append(f"no {label} samples")
+    breaks = np.flatnonzero(np.diff(imu["time_us"]) > FILLED_GAP_S * 1e6) + 1
+    bounds = [0, *breaks.tolist(), len(imu)]
+    stretches = list(zip(bounds, bounds[1:], strict=False))
+    if len(stretches) > 1:
+        notes.append(f"{len(stretches) - 1} gap(s) above {FILLED_GAP_S:g} s: the estimator started anew after each")
+    return SensorLog(recording, origin, imu, _projected(fixes, origin), **slow, stretches=stretches)
+
+
+def _prepare_imu(recording: Recording) -> Rows:
+    """IMU samples of at most about 250 Hz, their gaps filled as far as they may be."""
+    imu = _sorted(recording.imu, "IMU", recording.notes)
+    span_s = float(imu["time_us"][-1] - imu["time_us"][0]) * 1e-6 if len(imu) else 0.0
+    if span_s < MIN_DURATION_S:
+        raise SensorLogError(f"{recording.path}: {span_s:.1f} s of IMU samples, at least {MIN_DURATION_S:g} s are needed")
+    period_s = float(np.median(np.diff(imu["time_us"]))) * 1e-6
+    if period_s > 1.0 / MIN_IMU_RATE_HZ:
+        raise SensorLogError(
+            f"{recording.path}: the IMU was recorded at {1.0 / period_s:.0f} Hz, at least {MIN_IMU_RATE_HZ:g} Hz are needed"
+        )
+    imu["dt_s"] = _intervals(imu, period_s)
+    group = round(IMU_PERIOD_S / period_s)
+    if group > 1:
+        imu = _merged(imu, group)
+        period_s *= group
+    return _filled(imu, period_s, recording.notes)
+
+
+def _intervals(imu: Rows, period_s: float) -> Rows:
+    """[s] the interval each sample stands for: its integration time, or, after lost samples, the time since the last."""
+    since_s = np.diff(imu["time_us"], prepend=imu["time_us"][0] - round(period_s * 1e6)) * 1e-6
+    dt_s = imu["dt_s"].astype(float)
+    dt_s = np.where((dt_s > 0.0) & (dt_s < HELD_GAP_S), dt_s, period_s)
+    is_held = (since_s > 1.5 * dt_s) & (since_s <= HELD_GAP_S)
+    return np.where(is_held, since_s, dt_s)
+
+
+def _merged(imu: Rows, group: int) -> Rows:
+    """Every `group` samples as one: mean rate and force over their time, valid at the last."""
+    starts = np.arange(0, len(imu) - group + 1, group)
+    imu = imu[: len(starts) * group]
+    merged = imu[starts + group - 1].copy()
+    dt_s = imu["dt_s"].astype(float)
+    merged["dt_s"] = np.add.reduceat(dt_s, starts)
+    for name in ("gyro_frd", "accel_frd"):
+        merged[name] = np.add.reduceat(imu[name] * dt_s[:, None], starts) / np.add.reduceat(dt_s, starts)[:, None]
+    return merged
+
+
+def _filled(imu: Rows, period_s: float, notes: list[str]) -> Rows:
+    """The samples with others interpolated into their gaps."""
+    since_s = np.diff(imu["time_us"]) * 1e-6
+    gaps = np.flatnonzero(since_s - imu["dt_s"][1:] > HELD_GAP_S / 2)
+    if not len(gaps):
+        return imu
+    notes.append(
+        f"{len(gaps)} gap(s) in the IMU samples, {since_s[gaps].sum():.2f} s together, the longest {since_s[gaps].max():.2f} s"
+    )
+    times = []
+    for first in gaps[since_s[gaps] <= FILLED_GAP_S]:
+        start, end = imu["time_us"][first], imu["time_us"][first + 1] - round(float(imu["dt_s"][first + 1]) * 1e6)
+        times.append(np.linspace(start, end, max(2, ceil((end - start) * 1e-6 / period_s) + 1))[1:].astype(np.int64))
+    if not times:
+        return imu
+    filler = np.zeros(sum(map(len, times)), dtype=IMU_DTYPE)
+    filler["time_us"] = np.concatenate(times)
+    filler["dt_s"] = np.concatenate([np.full(len(part), part[1] - part[0] if len(part) > 1 else 0) for part in times]) * 1e-6
+    filler["dt_s"][filler["dt_s"] == 0.0] = period_s
+    for name in ("gyro_frd", "accel_frd"):
+        for axis in range(3):
+            filler[name][:, axis] = np.interp(filler["time_us"], imu["time_us"], imu[name][:, axis])
+    both = np.concatenate([imu, filler])
+    return both[np.unique(both["time_us"], return_index=True)[1]]
+
+
+def _sorted(rows: Rows, label: str, notes: list[str]) -> Rows:
+    """Rows of finite numbers, by time, one per time; a time of 0 would mean `never measured`."""
+    is_good = rows["time_us"] > 0
+    for name in rows.dtype.names or ():
+        finite = np.isfinite(rows[name])
+        is_good &= finite if finite.ndim == 1 else finite.all(axis=1)
+    if not is_good.all():
+        notes.append(f"{np.count_nonzero(~is_good)} {label} sample(s) without a usable time or value were left out")
+    rows = rows[is_good]
+    return rows[np.unique(rows["time_us"], return_index=True)[1]].copy()
+
+
+def _thinned(rows: Rows, min_interval_s: float) -> Rows:
+    """Every k-th row, so that they are not closer than the estimator's rings allow."""
+    if len(rows) < 3:
+        return rows
+    interval_s = float(np.median(np.diff(rows["time_us"]))) * 1e-6
+    return rows[:: max(1, ceil(min_interval_s / interval_s - 0.01))]
+
+
+def _origin(fixes: Rows, table: ParameterTable, notes: list[str]) -> GeoPoint | None:
+    """The first fix the estimator would use; failing that, the first 3-D fix."""
+    has_fix = fixes["fix_type"] >= table["EKF2_REQ_FIX"]
+    is_good = (
+        has_fix
+        & (fixes["satellites"] >= table["EKF2_REQ_NSATS"])
+        & (fixes["pos_h_std"] <= table["EKF2_REQ_EPH"])
+        & (fixes["pos_v_std"] <= table["EKF2_REQ_EPV"])
+        & (fixes["vel_std"] <= table["EKF2_REQ_SACC"])
+    )
+    if not has_fix.any():
+        notes.append("no GNSS fix: position and velocity are dead reckoning, magnetic declination is taken as 0")
+        return None
+    if not is_good.any():
+        notes.append("no GNSS fix is accurate enough to be used: position and velocity are dead reckoning")
+    first = fixes[np.flatnonzero(is_good if is_good.any() else has_fix)[0]]
+    return GeoPoint(float(first["lat_deg"]), float(first["lon_deg"]), float(first["alt_m"]))
+
+
+def _projected(fixes: Rows, origin: GeoPoint | None) -> Rows:
+    """The fixes in the tangent plane of the origin."""
+    if origin is None:
+        return empty(GNSS_DTYPE)
+    gnss = np.zeros(len(fixes), dtype=GNSS_DTYPE)
+    for name in ("time_us", "fix_type", "satellites", "vel_ned", "pos_h_std", "pos_v_std", "vel_std"):
+        gnss[name] = fixes[name]
+    places = zip(fixes["lat_deg"].tolist(), fixes["lon_deg"].tolist(), fixes["alt_m"].tolist(), strict=True)
+    for index, place in enumerate(places):
+        gnss["pos_ned"][index] = ned_from_geodetic(*place, origin)
+    return gnss

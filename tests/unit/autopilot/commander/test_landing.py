@@ -1,0 +1,78 @@
+"""Landing detection: quick on the ground, never in the air."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from autopilot.commander.landing import LandingDetector
+from autopilot.commander.params import COMMANDER_PARAMETERS
+from autopilot.control.params import CONTROL_PARAMETERS
+from autopilot.ports import TERRAIN_VALID, VELOCITY_VALID
+from common.params import ParameterTable
+
+HOVER = 0.43
+DT_S = 0.02
+
+
+def detector():
+    return LandingDetector(ParameterTable([*COMMANDER_PARAMETERS, *CONTROL_PARAMETERS]), HOVER)
+
+
+def estimate(vel=(0.0, 0.0, 0.0), omega=(0.0, 0.0, 0.0), flags=VELOCITY_VALID, down=0.0, accel_z=-9.8):
+    return SimpleNamespace(
+        vel_ned=vel,
+        omega_frd=omega,
+        flags=flags,
+        pos_ned=(0.0, 0.0, down),
+        terrain_d=0.0,
+        accel_frd=(0.0, 0.0, accel_z),
+    )
+
+
+def seconds_until_landed(landing, thrust, limit_s=20.0, **kwargs):
+    for i in range(round(limit_s / DT_S)):
+        if landing.update(estimate(**kwargs), thrust, DT_S):
+            return (i + 1) * DT_S
+    return None
+
+
+def test_resting_vehicle_with_low_thrust_is_landed_after_the_trigger_time():
+    assert seconds_until_landed(detector(), 0.09) == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("thrust", "kwargs"),
+    [
+        (0.40, {}),
+        (0.17, {}),  # contact, but not low enough to be landed
+        (0.09, {"vel": (0.0, 0.0, 0.4)}),
+        (0.09, {"vel": (2.0, 0.0, 0.0)}),
+        (0.09, {"omega": (0.5, 0.0, 0.0)}),
+        (0.09, {"flags": 0, "accel_z": -2.0}),
+    ],
+)
+def test_vehicle_that_moves_or_carries_itself_is_not_landed(thrust, kwargs):
+    assert seconds_until_landed(detector(), thrust, **kwargs) is None
+
+
+def test_without_velocity_the_ground_is_felt_by_the_accelerometer():
+    assert seconds_until_landed(detector(), 0.09, flags=0) == pytest.approx(1.0, abs=0.05)
+
+
+def test_range_finder_that_sees_air_delays_the_answer_only():
+    flags = VELOCITY_VALID | TERRAIN_VALID
+    assert seconds_until_landed(detector(), 0.09, flags=flags, down=-3.0) == pytest.approx(5.0, abs=0.1)
+
+
+def test_descent_in_strong_turbulence_is_never_taken_for_a_landing():
+    """Thrust and velocity of a point mass in vertical gusts of 3 m/s, braked and dropped by an aggressive pilot."""
+    rng = np.random.default_rng(4)
+    landing = detector()
+    vel_d, gust, thrust = 0.7, 0.0, HOVER
+    for _ in range(50 * 3600):
+        gust += (-gust * DT_S / 1.0) + 3.0 * np.sqrt(2.0 * DT_S) * rng.standard_normal()
+        wanted = np.clip(HOVER * (1.0 + (vel_d - 0.7) * 0.6), 0.08, 1.0)
+        thrust += (wanted - thrust) * DT_S / 0.1
+        vel_d += (9.8 * (1.0 - thrust / HOVER) - 0.4 * (vel_d + gust)) * DT_S
+        assert not landing.update(estimate(vel=(0.0, 0.0, vel_d), down=-20.0), thrust, DT_S)

@@ -1,0 +1,56 @@
+import pytest
+from pymavlink import mavutil
+
+from autopilot.mavlink.dialects import UnknownModeError
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.vehicle import Mode
+from common.params import Parameter
+
+PYMAVLINK_NAMES = {
+    Mode.HOLD: "LOITER",
+    Mode.TAKEOFF: "TAKEOFF",
+    Mode.MISSION: "MISSION",
+    Mode.RETURN: "RTL",
+    Mode.LAND: "LAND",
+    Mode.OFFBOARD: "OFFBOARD",
+}
+INTEGER = Parameter("I", 3, -5, 5, "", "", "")
+REAL = Parameter("R", 3.0, -5.0, 5.0, "", "", "")
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_modes_are_those_pymavlink_knows(mode):
+    assert mavutil.interpret_px4_mode(157, PX4.custom_mode(mode)) == PYMAVLINK_NAMES[mode]
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_mode_survives_the_round_trip(mode):
+    assert PX4.mode_from_custom(PX4.custom_mode(mode)) == mode
+
+
+@pytest.mark.parametrize(("main", "sub"), [(3, 0), (1, 0), (4, 8), (4, 99), (200, 0), (-1, 0)])
+def test_unknown_mode_is_refused_with_a_reason(main, sub):
+    with pytest.raises(UnknownModeError, match=r"\w+"):
+        PX4.mode_from_command(main, sub)
+
+
+def test_stick_modes_are_named_in_the_refusal():
+    with pytest.raises(UnknownModeError, match="Position"):
+        PX4.mode_from_custom(0x00030000)
+
+
+def test_integers_travel_as_bit_patterns():
+    assert PX4.parameter_bits(INTEGER, -2) == 0xFFFFFFFE
+    assert PX4.parameter_value(INTEGER, 0xFFFFFFFE, 6) == -2
+    assert PX4.parameter_bits(REAL, 1.0) == 0x3F800000
+    assert PX4.parameter_value(REAL, 0x3F800000, 9) == 1.0
+
+
+def test_wrong_parameter_type_is_noticed():
+    assert PX4.parameter_value(INTEGER, 0x3F800000, 9) is None
+
+
+def test_custom_version_is_reversed_and_8_bytes():
+    assert PX4.custom_version("HG-0.1.0") == b"0.1.0-GH"
+    assert len(PX4.custom_version("HG-0.10.11")) == 8
+    assert PX4.custom_version("A") == bytes(7) + b"A"
