@@ -17,9 +17,11 @@ from typing import Any
 
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from mission.client import Client, ScriptError, ScriptTimeout
+from mission.plan import Plan
 
 FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM that skips the checks
 
+CMD_RETURN_TO_LAUNCH = 20
 CMD_LAND = 21
 CMD_TAKEOFF = 22
 CMD_SET_MODE = 176
@@ -288,6 +290,18 @@ class Drone(Client):
         return GeoPoint(lat_deg, lon_deg, home.alt_m + message.z)
 
 
+async def fly_plan(drone: Drone, plan: Plan) -> None:
+    """Uploads a plan, flies it and, if it ends on the ground, waits until the motors stop."""
+    await drone.wait_ready()
+    await drone.upload(plan.items)
+    await drone.start_mission()
+    last = plan.items[-1]
+    if last.command in (CMD_LAND, CMD_RETURN_TO_LAUNCH):
+        await drone.wait_disarmed(timeout_s=3600.0)
+    else:
+        await drone.wait_mission_finished(last.seq, timeout_s=3600.0)
+
+
 Script = Callable[[Drone], Coroutine[Any, Any, Any]]
 
-__all__ = ["Drone", "Script", "ScriptError", "ScriptTimeout"]
+__all__ = ["Drone", "Script", "ScriptError", "ScriptTimeout", "fly_plan"]

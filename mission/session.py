@@ -16,21 +16,20 @@ from autopilot.vehicle import Mode
 from common.airframe import AirframeError
 from common.clock import wall_date_text, wall_time_s
 from common.files import write_whole
-from common.geodesy import GeoPoint, ned_from_geodetic
+from common.geodesy import GeoPoint
 from common.kernels import FRAME_US
 from mission.client import Running
 from mission.flight import Flight, FlightConfig
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, read_plan
 from mission.plots import plot_flight
-from mission.script import Drone
-from mission.summary import Summary, summarise
+from mission.script import fly_plan
+from mission.summary import Summary, planned_path, summarise
 from sim.world.world import WorldConfig
 
 
 PROGRESS_PERIOD_S = 0.2
 GROUND_LOCAL_PORT = 18570  # the vehicle's own ports, PX4's
 API_LOCAL_PORT = 14580
-CMD_LAND, CMD_RETURN = 21, 20
 
 
 class UserError(ValueError):
@@ -60,18 +59,6 @@ class FlightOptions:
     gcs_port: int
     api_port: int
     run_folder: Path | None
-
-
-async def fly_plan(drone: Drone, plan: Plan) -> None:
-    """Uploads a plan, flies it and, if it ends on the ground, waits until the motors stop."""
-    await drone.wait_ready()
-    await drone.upload(plan.items)
-    await drone.start_mission()
-    last = plan.items[-1]
-    if last.command in (CMD_LAND, CMD_RETURN):
-        await drone.wait_disarmed(timeout_s=3600.0)
-    else:
-        await drone.wait_mission_finished(last.seq, timeout_s=3600.0)
 
 
 def fly_session(options: FlightOptions) -> int:
@@ -250,7 +237,7 @@ def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: 
     """Writes the run folder and prints the summary; returns the exit code."""
     texts = list(flight.drone.texts)
     history = flight.close()
-    path_ned = [] if plan is None else planned_path(plan, flight)
+    path_ned = [] if plan is None else planned_path(plan, flight.config.home)
     summary = summarise(flight, history, running, path_ned)
     write_whole(folder / "summary.json", (json.dumps(summary.as_json(), indent=2) + "\n").encode())
     title = f"{flight.airframe.name}, wind {flight.config.wind_m_s:g} m/s, seed {flight.config.seed}: {summary.result}"
@@ -260,33 +247,6 @@ def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: 
         console.print(f"last words of the vehicle: {texts[-1] if texts else 'none'}", markup=False)
     console.print(f"logs, summary and picture: {folder}", markup=False)
     return 0 if summary.is_success or running is None else 1
-
-
-def planned_path(plan: Plan, flight: Flight) -> list[tuple[int, Any]]:
-    """(seq, ned point) of each item with a position, behind the take-off point."""
-    origin = flight.config.home
-    path: list[tuple[int, Any]] = [(-1, np.zeros(3))]
-    for item in plan.items:
-        ned = item_ned(item, origin, path[-1][1])
-        if ned is not None:
-            path.append((item.seq, ned))
-    return path
-
-
-def item_ned(item: Any, origin: GeoPoint, previous: Any) -> Any:
-    """Where an item leads [m], or None for items that are no place."""
-    if item.command not in (16, 17, 19, CMD_LAND, 22):
-        return None
-    alt_amsl_m = item.z + (origin.alt_m if item.frame in (3, 6) else 0.0)
-    has_place = np.isfinite(item.x) and np.isfinite(item.y) and (item.x, item.y) != (0.0, 0.0)
-    north, east, down = ned_from_geodetic(
-        item.x if has_place else origin.lat_deg, item.y if has_place else origin.lon_deg, alt_amsl_m, origin
-    )
-    if item.command == 22 or not has_place:  # climbs and lands where it is
-        north, east = previous[:2] if not has_place else (north, east)
-    if item.command == CMD_LAND:
-        down = min(down, 0.0)
-    return np.array([north, east, down])
 
 
 def _summary_table(summary: Summary) -> Table:

@@ -11,11 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from autopilot.vehicle import Mode
+from common.geodesy import GeoPoint, ned_from_geodetic
+from mission.plan import Plan
 from mission.recorder import History
 from sim.world.world import WorldMap
 
 Rows = npt.NDArray[Any]
 CLEARANCE_EVERY_FRAMES = 10
+CMD_LAND, CMD_TAKEOFF = 21, 22
+PLACES = (16, 17, 19, CMD_LAND, CMD_TAKEOFF)  # mission commands that lead to a place
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +127,32 @@ def _rotation_error_ned(q_est: Rows, q_true: Rows) -> Rows:
     scalar = ew * tw - ex * tx - ey * ty - ez * tz
     result: Rows = 2.0 * vector * np.where(scalar < 0.0, -1.0, 1.0)[:, None]
     return result
+
+
+def planned_path(plan: Plan, home: GeoPoint) -> list[tuple[int, Any]]:
+    """(seq, ned point) of each item with a position, behind the take-off point."""
+    path: list[tuple[int, Any]] = [(-1, np.zeros(3))]
+    for item in plan.items:
+        ned = item_ned(item, home, path[-1][1])
+        if ned is not None:
+            path.append((item.seq, ned))
+    return path
+
+
+def item_ned(item: Any, origin: GeoPoint, previous: Any) -> Any:
+    """Where an item leads [m], or None for items that are no place."""
+    if item.command not in PLACES:
+        return None
+    alt_amsl_m = item.z + (origin.alt_m if item.frame in (3, 6) else 0.0)
+    has_place = np.isfinite(item.x) and np.isfinite(item.y) and (item.x, item.y) != (0.0, 0.0)
+    north, east, down = ned_from_geodetic(
+        item.x if has_place else origin.lat_deg, item.y if has_place else origin.lon_deg, alt_amsl_m, origin
+    )
+    if item.command == CMD_TAKEOFF or not has_place:  # climbs and lands where it is
+        north, east = previous[:2] if not has_place else (north, east)
+    if item.command == CMD_LAND:
+        down = min(down, 0.0)
+    return np.array([north, east, down])
 
 
 def summarise(flight: Any, history: History, running: Any, path_ned: Sequence[tuple[int, Rows]]) -> Summary:

@@ -6,7 +6,6 @@ from autopilot.control.airframe import ControlAirframe
 from autopilot.control.allocation import Allocation, allocate, motor_commands
 from autopilot.control.attitude import attitude_from_thrust, rate_setpoint, thrust_turn_rate, turned
 from autopilot.control.params import ControlParams
-from autopilot.control.pid import finite_or
 from autopilot.control.position import velocity_setpoint
 from autopilot.control.rate import RateState, filter_rates, rate_step, rate_torque
 from autopilot.control.trajectory import TrajectoryState, trajectory_at_estimate, trajectory_step
@@ -37,6 +36,15 @@ _SLACK = wp.constant(1.0e-4)  # share of the asked torque below which a remainde
 
 
 @wp.struct
+class Aim:
+    """What the attitude loop follows."""
+
+    q_ned_from_frd: wp.quat
+    omega_ned: wp.vec3  # [rad/s] rate at which the attitude itself turns
+    yaw: float  # [rad] heading carried on by attitude setpoints with a yaw rate
+
+
+@wp.struct
 class ControlState:
     """All the controller remembers between ticks; all zero is the state after power-on."""
 
@@ -47,9 +55,7 @@ class ControlState:
     trajectory: TrajectoryState
     velocity: VelocityState
     rate: RateState
-    q_sp_ned_from_frd: wp.quat
-    omega_feed_ned: wp.vec3  # [rad/s] turn rate of the attitude setpoint
-    yaw_sp: float  # [rad] of attitude setpoints with a yaw rate
+    aim: Aim
     collective_n: float  # achieved in the last tick
     actuators: Actuators
 
@@ -104,10 +110,27 @@ def upright_collective(airframe: ControlAirframe, thrust_ned: wp.vec3, est: Esti
 
 
 @wp.func
-def with_heading(q_ned_from_frd: wp.quat, yaw: float) -> wp.quat:
-    """The attitude turned about the vertical to another heading [rad]."""
-    lean = quat_from_yaw(-yaw_from_quat(q_ned_from_frd)) * q_ned_from_frd
-    return quat_from_yaw(yaw) * lean
+def aim_of_thrust(thrust_ned: wp.vec3, trajectory: TrajectoryState) -> Aim:
+    """The attitude that points a thrust setpoint, turning as the trajectory's jerk and yaw rate turn it."""
+    aim = Aim()
+    aim.q_ned_from_frd = attitude_from_thrust(thrust_ned, trajectory.yaw)
+    aim.omega_ned = thrust_turn_rate(thrust_ned, trajectory.jerk_ned) + wp.vec3(0.0, 0.0, trajectory.yaw_rate)
+    aim.yaw = trajectory.yaw
+    return aim
+
+
+@wp.func
+def aim_of_attitude(yaw: float, sp: Setpoint) -> Aim:
+    """The attitude of the setpoint; with a finite yaw rate its heading is `yaw` [rad] carried on at that rate."""
+    aim = Aim()
+    aim.q_ned_from_frd = wp.normalize(sp.q_ned_from_frd)
+    aim.yaw = yaw_from_quat(aim.q_ned_from_frd)
+    if wp.isfinite(sp.yaw_rate):
+        lean = quat_from_yaw(-aim.yaw) * aim.q_ned_from_frd
+        aim.yaw = wrap_pi(yaw + sp.yaw_rate * _TICK_S)
+        aim.q_ned_from_frd = quat_from_yaw(aim.yaw) * lean
+        aim.omega_ned = wp.vec3(0.0, 0.0, sp.yaw_rate)
+    return aim
 
 
 @wp.func
@@ -138,6 +161,75 @@ def actuators_of(
 
 
 @wp.func
+def started(
+    airframe: ControlAirframe, state: ControlState, est: Estimate, sp: Setpoint, voltage_share: float
+) -> ControlState:
+    """The state at the beginning of an active tick: the trajectory starts afresh where control of a kind begins."""
+    now = state
+    now.voltage_share = voltage_share
+    now.kind = sp.kind
+    now.was_landed = sp.is_landed
+    if sp.kind != state.kind or state.was_landed == 1:
+        now.trajectory = trajectory_at_estimate(est, 1 - state.was_landed)
+        now.aim.yaw = now.trajectory.yaw
+    if state.kind == SETPOINT_IDLE and state.was_landed == 0:  # power-on in the air: a simulation started there
+        now.ramp = 1.0
+        now.collective_n = airframe.mass_kg * _GRAVITY
+        now.velocity.thrust_model_n = now.collective_n
+    return now
+
+
+@wp.func
+def outer_loops(
+    params: ControlParams,
+    airframe: ControlAirframe,
+    state: ControlState,
+    est: Estimate,
+    sp: Setpoint,
+    thrust_max_n: float,
+) -> ControlState:
+    """The state with trajectory, position and velocity loop advanced by a 50 Hz frame."""
+    now = state
+    if now.ramp * thrust_max_n < airframe.mass_kg * _GRAVITY:  # not yet light: the trajectory does not run ahead
+        now.trajectory = trajectory_at_estimate(est, 0)
+    now.trajectory = trajectory_step(params, now.trajectory, est, sp, _FRAME_S)
+    vel_sp_ned = velocity_setpoint(params, now.trajectory, est)
+    now.velocity = velocity_step(
+        params, airframe, now.velocity, now.trajectory, est, vel_sp_ned, thrust_max_n, now.ramp < 1.0, _FRAME_S
+    )
+    now.aim = aim_of_thrust(now.velocity.thrust_sp_ned, now.trajectory)
+    return now
+
+
+@wp.func
+def inner_loops(
+    params: ControlParams,
+    airframe: ControlAirframe,
+    state: ControlState,
+    est: Estimate,
+    sp: Setpoint,
+    collective_n: float,
+    rotor_max_n: float,
+) -> ControlState:
+    """The state with attitude and rate loop, allocation and motor commands of this tick."""
+    now = state
+    omega_sp_frd = sp.omega_frd
+    if sp.kind != SETPOINT_RATE:
+        omega_sp_frd = rate_setpoint(params, est.q_ned_from_frd, now.aim.q_ned_from_frd, now.aim.omega_ned)
+    if sp.is_landed == 0:
+        now.rate = rate_step(params, now.rate, omega_sp_frd, now.actuators.torque_unallocated_frd, _TICK_S)
+    torque_frd = rate_torque(params, now.rate, omega_sp_frd, airframe.inertia_kg_m2)
+    rotor_min_n = rotor_thrust(airframe, airframe.idle_speed_share, now.voltage_share)
+    result = allocate(airframe, torque_frd, collective_n, rotor_min_n, rotor_max_n)
+    now.collective_n = result.collective_n
+    thrust_share = collective_n / (float(airframe.rotor_count) * rotor_max_n)
+    now.actuators = actuators_of(airframe, now.trajectory, torque_frd, thrust_share, result, now.voltage_share)
+    now.actuators.omega_sp_frd = omega_sp_frd
+    now.actuators.q_sp_ned_from_frd = now.aim.q_ned_from_frd
+    return now
+
+
+@wp.func
 def control_tick(
     params: ControlParams,
     airframe: ControlAirframe,
@@ -149,7 +241,7 @@ def control_tick(
 ) -> ControlState:
     """The controller's state, with `actuators`, after one 4 ms tick.
 
-    The state is changed field by field: Warp copies a whole struct where a branch assigns it.
+    Inside branches the state is changed field by field: Warp copies a whole struct where a branch assigns it.
     """
     voltage_share = voltage_step(state.voltage_share, airframe, battery)
     is_direct = sp.kind == SETPOINT_ATTITUDE or sp.kind == SETPOINT_RATE
@@ -157,68 +249,28 @@ def control_tick(
     if is_idle or (sp.is_landed == 1 and (not is_direct or sp.thrust <= 0.0)):
         return rest(voltage_share, airframe, est, sp.is_armed)
 
-    now = state
-    now.voltage_share = voltage_share
-    now.kind = sp.kind
-    now.was_landed = sp.is_landed
     rotor_max_n = rotor_thrust(airframe, 1.0, voltage_share)
     thrust_max_n = float(airframe.rotor_count) * rotor_max_n
-    weight_n = airframe.mass_kg * _GRAVITY
-    is_start = sp.kind != state.kind or state.was_landed == 1
-    if is_start:
-        now.trajectory = trajectory_at_estimate(est, 1 - state.was_landed)
-        now.yaw_sp = now.trajectory.yaw
-        now.omega_feed_ned = wp.vec3(0.0, 0.0, 0.0)
-    if state.kind == SETPOINT_IDLE and state.was_landed == 0:  # power-on in the air: a simulation started there
-        now.ramp = 1.0
-        now.collective_n = weight_n
-        now.velocity.thrust_model_n = weight_n
-
+    now = started(airframe, state, est, sp, voltage_share)
     now.rate = filter_rates(params, now.rate, est.omega_frd, _TICK_S)
     if now.ramp >= 1.0:
         now.velocity = observe(params, airframe, now.velocity, est, now.collective_n, _TICK_S)
     else:
         now.ramp = wp.min(now.ramp + _TICK_S / wp.max(params.takeoff_ramp_s, _TICK_S), 1.0)
 
-    collective = wp.clamp(sp.thrust, 0.0, 1.0) * thrust_max_n
+    collective_n = wp.clamp(sp.thrust, 0.0, 1.0) * thrust_max_n
     if sp.kind == SETPOINT_TRAJECTORY:
-        if tick % _FRAME_TICKS == 0 or is_start:
-            if now.ramp * thrust_max_n < weight_n:  # not yet light: the trajectory does not run ahead
-                now.trajectory = trajectory_at_estimate(est, 0)
-            now.trajectory = trajectory_step(params, now.trajectory, est, sp, _FRAME_S)
-            vel_sp_ned = velocity_setpoint(params, now.trajectory, est)
-            now.velocity = velocity_step(
-                params, airframe, now.velocity, now.trajectory, est, vel_sp_ned, thrust_max_n, now.ramp < 1.0, _FRAME_S
-            )
-            now.q_sp_ned_from_frd = attitude_from_thrust(now.velocity.thrust_sp_ned, now.trajectory.yaw)
-            now.omega_feed_ned = thrust_turn_rate(now.velocity.thrust_sp_ned, now.trajectory.jerk_ned) + wp.vec3(
-                0.0, 0.0, now.trajectory.yaw_rate
-            )
+        if tick % _FRAME_TICKS == 0 or sp.kind != state.kind or state.was_landed == 1:
+            outer = outer_loops(params, airframe, now, est, sp, thrust_max_n)
+            now.trajectory = outer.trajectory
+            now.velocity = outer.velocity
+            now.aim = outer.aim
         else:
-            now.q_sp_ned_from_frd = turned(now.q_sp_ned_from_frd, now.omega_feed_ned, _TICK_S)
-        collective = upright_collective(airframe, now.velocity.thrust_sp_ned, est)
+            now.aim.q_ned_from_frd = turned(now.aim.q_ned_from_frd, now.aim.omega_ned, _TICK_S)
+        collective_n = upright_collective(airframe, now.velocity.thrust_sp_ned, est)
     elif sp.kind == SETPOINT_ATTITUDE:
-        now.q_sp_ned_from_frd = wp.normalize(sp.q_ned_from_frd)
-        now.omega_feed_ned = wp.vec3(0.0, 0.0, finite_or(sp.yaw_rate, 0.0))
-        if wp.isfinite(sp.yaw_rate):
-            now.yaw_sp = wrap_pi(now.yaw_sp + sp.yaw_rate * _TICK_S)
-            now.q_sp_ned_from_frd = with_heading(now.q_sp_ned_from_frd, now.yaw_sp)
-        else:
-            now.yaw_sp = yaw_from_quat(now.q_sp_ned_from_frd)
+        now.aim = aim_of_attitude(now.aim.yaw, sp)
     else:
-        now.q_sp_ned_from_frd = est.q_ned_from_frd
-
-    omega_sp_frd = sp.omega_frd
-    if sp.kind != SETPOINT_RATE:
-        omega_sp_frd = rate_setpoint(params, est.q_ned_from_frd, now.q_sp_ned_from_frd, now.omega_feed_ned)
-    if sp.is_landed == 0:
-        now.rate = rate_step(params, now.rate, omega_sp_frd, now.actuators.torque_unallocated_frd, _TICK_S)
-    torque_frd = rate_torque(params, now.rate, omega_sp_frd, airframe.inertia_kg_m2)
-    collective = wp.min(collective, now.ramp * thrust_max_n)
-    rotor_min_n = rotor_thrust(airframe, airframe.idle_speed_share, voltage_share)
-    result = allocate(airframe, torque_frd, collective, rotor_min_n, rotor_max_n)
-    now.collective_n = result.collective_n
-    now.actuators = actuators_of(airframe, now.trajectory, torque_frd, collective / thrust_max_n, result, voltage_share)
-    now.actuators.omega_sp_frd = omega_sp_frd
-    now.actuators.q_sp_ned_from_frd = now.q_sp_ned_from_frd
-    return now
+        now.aim.q_ned_from_frd = est.q_ned_from_frd
+    collective_n = wp.min(collective_n, now.ramp * thrust_max_n)
+    return inner_loops(params, airframe, now, est, sp, collective_n, rotor_max_n)

@@ -237,7 +237,7 @@ def _compile(definition: Any) -> tuple[Callable[..., bytes], Callable[[bytes], A
 
 def _wire_codes(definition: Any) -> dict[str, str]:
     """`struct` codes of the fields in wire order."""
-    codes = re.findall(r"\d*[a-zA-Z]", definition.unpacker.format[1:])
+    codes = ["1s" if code == "c" else code for code in re.findall(r"\d*[a-zA-Z]", definition.unpacker.format[1:])]
     named = dict(zip(definition.ordered_fieldnames, codes, strict=True))
     for message_name, field in _BIT_PATTERN_FIELDS:
         if message_name == definition.msgname:

@@ -116,9 +116,8 @@ class HoverBatch:
 
     def reset(self, rows: NDArray[np.int64], rng: np.random.Generator) -> None:
         """Starts episodes: chosen vehicles, shape (n,), from hovers drawn at random."""
-        sources = rng.integers(START_COUNT, size=rows.size)
-        seeds = rng.integers(2**31, size=rows.size)
-        self.rig.restore(_starts(), rows, sources, seeds)
+        draws = rng.integers([START_COUNT, 2**31], size=(rows.size, 2))  # by row: a batch's first is a single vehicle's
+        self.rig.restore(_starts(), rows, draws[:, 0], draws[:, 1])
         self.actions[rows] = 0.0
         self.step_counts[rows] = 0
         self._observe.launch()

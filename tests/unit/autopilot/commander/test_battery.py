@@ -28,9 +28,9 @@ def test_current_is_counted():
     battery.update(1_000_000, voltage, 0.0)
     start = battery.remaining
     for i in range(1, 361):
-        battery.update(1_000_000 + i * 100_000, voltage, 10.0)
+        battery.update(1_000_000 + i * 100_000, voltage - 10.0 * BATTERY.internal_resistance_ohm, 10.0)
     assert battery.used_mah == pytest.approx(100.0, rel=1e-6)
-    assert battery.remaining < start
+    assert start - 100.0 / BATTERY.capacity_mah <= battery.remaining < start
 
 
 def test_no_voltage_is_no_sample():

@@ -1,0 +1,246 @@
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot.mavlink.codec import encode, known_type
+from autopilot.vehicle import LandedState, Mode, Severity
+from tests.unit.autopilot.mavlink.rig import HOME, Rig, texts
+
+FRAMES_IN_100_MS = 5
+
+
+def test_heartbeat_comes_at_1_hz():
+    rig = Rig()
+    assert len(rig.all("HEARTBEAT", 500)) == 10
+
+
+def test_first_frame_has_a_heartbeat():
+    heartbeat = Rig().only("HEARTBEAT")
+    assert heartbeat.autopilot == mavlink.MAV_AUTOPILOT_PX4
+    assert heartbeat.type == mavlink.MAV_TYPE_QUADROTOR
+    assert heartbeat.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    assert heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert heartbeat.custom_mode == 0x03040000
+    assert heartbeat.mavlink_version == 3
+
+
+def test_heartbeat_follows_a_change_in_the_same_frame():
+    rig = Rig()
+    rig.frame(10)
+    rig.update(mode=Mode.LAND, is_armed=False)
+    rig.server.heartbeat_now()
+    heartbeat = rig.only("HEARTBEAT")
+    assert heartbeat.custom_mode == 0x06040000
+    assert not heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def test_system_status_is_in_step_with_the_landed_state():
+    rig = Rig()
+    for landed_state, is_failsafe, expected in (
+        (LandedState.ON_GROUND, False, mavlink.MAV_STATE_STANDBY),
+        (LandedState.IN_AIR, False, mavlink.MAV_STATE_ACTIVE),
+        (LandedState.LANDING, False, mavlink.MAV_STATE_ACTIVE),
+        (LandedState.IN_AIR, True, mavlink.MAV_STATE_CRITICAL),
+    ):
+        rig.update(landed_state=landed_state, is_failsafe=is_failsafe)
+        rig.server.heartbeat_now()
+        assert rig.all("HEARTBEAT")[-1].system_status == expected
+
+
+def test_ground_station_connects_without_silence():
+    """QGroundControl's sequence: each request is answered within 100 ms, ack before message."""
+    rig = Rig()
+    rig.client.send("HEARTBEAT", type=mavlink.MAV_TYPE_GCS, autopilot=mavlink.MAV_AUTOPILOT_INVALID)
+    assert any("Honeyguide" in text for text in texts(rig.frame()))
+
+    rig.client.command(mavlink.MAV_CMD_REQUEST_MESSAGE, 148)
+    names = [message.name for message in rig.frame(FRAMES_IN_100_MS)]
+    assert names.index("COMMAND_ACK") < names.index("AUTOPILOT_VERSION")
+    rig.client.command(mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, 1)
+    names = [message.name for message in rig.frame(FRAMES_IN_100_MS)]
+    assert names.index("COMMAND_ACK") < names.index("AUTOPILOT_VERSION")
+
+    for msg_id in (300, 435, 397, 395, 280, 259):  # protocol, modes, metadata, gimbal, camera
+        rig.client.command(mavlink.MAV_CMD_REQUEST_MESSAGE, msg_id, 0)
+        ack = rig.only("COMMAND_ACK", FRAMES_IN_100_MS)
+        assert (ack.command, ack.result) == (512, mavlink.MAV_RESULT_UNSUPPORTED)
+    for command in (519, 521, 2510):
+        rig.client.command(command)
+        assert rig.only("COMMAND_ACK", FRAMES_IN_100_MS).result == mavlink.MAV_RESULT_UNSUPPORTED
+
+    rig.client.send("PARAM_REQUEST_LIST")
+    assert len(rig.all("PARAM_VALUE", FRAMES_IN_100_MS)) > 50
+    for mission_type in (0, 1, 2):
+        rig.client.send("MISSION_REQUEST_LIST", target_component=1, mission_type=mission_type)
+        assert rig.only("MISSION_COUNT", FRAMES_IN_100_MS)[2:] == (0, mission_type)
+
+
+def test_autopilot_version_says_who_we_are():
+    rig = Rig()
+    rig.client.command(mavlink.MAV_CMD_REQUEST_MESSAGE, 148)
+    version = rig.only("AUTOPILOT_VERSION")
+    assert version.flight_sw_version >> 16 > 0x0104  # QGroundControl calls PX4 before 1.4.1 too old
+    assert bytes(version.flight_custom_version)[::-1].startswith(b"HG-")
+    for bit in (
+        mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2,
+        mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT,
+        mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT,
+        mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE,
+    ):
+        assert version.capabilities & bit
+    for bit in (mavlink.MAV_PROTOCOL_CAPABILITY_FTP, mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE):
+        assert not version.capabilities & bit
+    assert version.uid != 0
+
+
+def test_system_id_is_the_parameter():
+    rig = Rig()
+    rig.vehicle.params.set("MAV_SYS_ID", 7)
+    second = Rig()
+    second.vehicle.params = rig.vehicle.params
+    from autopilot.mavlink.links import memory_pair
+    from autopilot.mavlink.server import MavlinkServer
+    from tests.unit.autopilot.mavlink.rig import Client
+
+    vehicle_end, client_end = memory_pair()
+    MavlinkServer(rig.vehicle, [vehicle_end]).frame(20_000)
+    assert {message.sysid for message in Client(client_end).received()} == {7}
+
+
+def test_message_for_another_vehicle_gets_no_answer():
+    rig = Rig()
+    rig.client.send("COMMAND_LONG", target_system=2, command=400, param1=1.0)
+    rig.client.send("COMMAND_LONG", target_component=100, command=400, param1=1.0)
+    assert rig.all("COMMAND_ACK", 5) == []
+    assert rig.vehicle.calls == []
+
+
+def test_answer_carries_the_senders_ids_and_stays_on_its_link():
+    rig = Rig()
+    rig.second_client.command(9999)
+    assert rig.all("COMMAND_ACK", 2) == []
+    (ack,) = [message for message in rig.second_client.received() if message.name == "COMMAND_ACK"]
+    assert (ack.fields.target_system, ack.fields.target_component) == (245, 191)
+
+
+def test_own_frames_that_come_back_are_ignored():
+    rig = Rig()
+    rig.client.link.send(encode("COMMAND_LONG", 1, 1, 0, target_system=1, command=400, param1=1.0))
+    rig.frame()
+    assert rig.vehicle.calls == []
+
+
+def test_companion_with_our_system_id_is_heard():
+    rig = Rig()
+    rig.client.link.send(encode("COMMAND_LONG", 1, 191, 0, target_system=1, command=400, param1=1.0))
+    rig.frame()
+    assert rig.vehicle.calls == [("arm", False)]
+
+
+def test_ping_request_is_answered_and_an_answer_is_not():
+    rig = Rig()
+    rig.client.send("PING", time_usec=77, seq=5)
+    ping = rig.only("PING")
+    assert (ping.time_usec, ping.seq, ping.target_system) == (77, 5, 255)
+    rig.client.send("PING", time_usec=77, seq=6, target_system=1, target_component=1)
+    assert rig.all("PING") == []
+
+
+def test_timesync_request_is_answered_in_simulated_time():
+    rig = Rig()
+    rig.client.send("TIMESYNC", tc1=0, ts1=123)
+    answer = rig.only("TIMESYNC")
+    assert (answer.tc1, answer.ts1) == (rig.time_us * 1000, 123)
+    rig.client.send("TIMESYNC", tc1=5, ts1=123)
+    assert rig.all("TIMESYNC") == []
+
+
+def test_long_text_is_sent_in_chunks():
+    rig = Rig()
+    text = "PreArm: " + "too few satellites, " * 8
+    rig.server.statustext(Severity.CRITICAL, text)
+    messages = rig.frame()
+    chunks = [message.fields for message in messages if message.name == "STATUSTEXT"]
+    assert [chunk.chunk_seq for chunk in chunks] == [0, 1, 2, 3]
+    assert len({chunk.id for chunk in chunks}) == 1
+    assert chunks[0].id != 0
+    assert texts(messages) == [text]
+
+
+def test_short_text_is_one_message():
+    rig = Rig()
+    rig.server.statustext(Severity.INFO, "x" * 50)
+    chunk = rig.only("STATUSTEXT")
+    assert (chunk.severity, chunk.id, chunk.chunk_seq, chunk.text) == (6, 0, 0, "x" * 50)
+
+
+def test_events_are_announced_on_every_link():
+    rig = Rig()
+    rig.frame(3)
+    rig.second_client.received()
+    rig.server.mission_item_reached(3)
+    rig.server.mission_current_changed(4)
+    rig.server.home_changed()
+    for messages in (rig.frame(), rig.second_client.received()):
+        events = {message.name: message.fields for message in messages}
+        assert events["MISSION_ITEM_REACHED"].seq == 3
+        assert events["MISSION_CURRENT"].seq == 4
+        assert events["HOME_POSITION"].altitude == HOME.alt_m * 1000
+
+
+def test_log_gets_received_frames_answers_and_the_first_links_streams():
+    rig = Rig()
+    rig.frame(50)
+    names = [known_type_of(data) for _, data in rig.log]
+    assert names.count("ATTITUDE") == 20
+    rig.log.clear()
+    rig.second_client.command(9999)
+    rig.frame()
+    names = [known_type_of(data) for _, data in rig.log]
+    assert "COMMAND_LONG" in names
+    assert "COMMAND_ACK" in names
+    assert {time_us for time_us, _ in rig.log} == {rig.time_us}
+
+
+def known_type_of(frame: bytes) -> str:
+    msg_id = int.from_bytes(frame[7:10], "little")
+    return next(
+        name
+        for name in ("ATTITUDE", "COMMAND_LONG", "COMMAND_ACK", "")
+        if not name or known_type(name).msg_id == msg_id
+    )
+
+
+def test_absent_services_answer_at_once():
+    rig = Rig()
+    rig.client.send("LOG_REQUEST_LIST", target_component=1, start=0, end=0xFFFF)
+    assert rig.only("LOG_ENTRY").num_logs == 0
+    rig.client.send("LOG_REQUEST_DATA", target_component=1, id=3, ofs=90, count=90)
+    assert rig.only("LOG_DATA")[:3] == (3, 90, 0)
+    rig.client.send("SET_GPS_GLOBAL_ORIGIN", latitude=1, longitude=2, altitude=3)
+    assert rig.all("GPS_GLOBAL_ORIGIN")[-1].latitude == round(HOME.lat_deg * 1e7)
+
+
+def test_file_transfer_is_refused():
+    rig = Rig()
+    for opcode, error in ((4, 10), (3, 7), (1, 7)):
+        request = bytes([9, 1, 2, opcode]).ljust(251, b"\0")
+        rig.client.send("FILE_TRANSFER_PROTOCOL", target_component=1, payload=tuple(request))
+        answer = bytes(rig.only("FILE_TRANSFER_PROTOCOL").payload)
+        assert int.from_bytes(answer[:2], "little") == 0x0109 + 1
+        assert answer[2:6] == bytes([2, 129, 1, opcode])
+        assert answer[12] == error
+
+
+def test_closing_closes_the_links():
+    closed = []
+
+    class Door:
+        role = Rig().client.link.role
+        keeps_datagrams = True
+
+        def close(self) -> None:
+            closed.append(self)
+
+    from autopilot.mavlink.server import MavlinkServer
+
+    MavlinkServer(Rig().vehicle, [Door()]).close()
+    assert len(closed) == 1
