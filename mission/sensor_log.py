@@ -5,6 +5,7 @@ array per sensor, and the stretches of IMU samples that hold together.
 """
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,17 @@ from common.params import ParameterTable
 
 Rows = npt.NDArray[Any]
 
-IMU_DTYPE = np.dtype(ImuSample.numpy_dtype())
-GNSS_DTYPE = np.dtype(GnssSample.numpy_dtype())
-BARO_DTYPE = np.dtype(BaroSample.numpy_dtype())
-MAG_DTYPE = np.dtype(MagSample.numpy_dtype())
-RANGE_DTYPE = np.dtype(RangeSample.numpy_dtype())
+
+def row_dtype(struct: Any) -> np.dtype[Any]:
+    """NumPy's type of the rows of a kernel struct."""
+    return np.dtype(struct.numpy_dtype())
+
+
+IMU_DTYPE = row_dtype(ImuSample)
+GNSS_DTYPE = row_dtype(GnssSample)
+BARO_DTYPE = row_dtype(BaroSample)
+MAG_DTYPE = row_dtype(MagSample)
+RANGE_DTYPE = row_dtype(RangeSample)
 FIX_DTYPE = np.dtype(
     [
         ("time_us", "<i8"),
@@ -127,7 +134,7 @@ def prepare(recording: Recording, table: ParameterTable) -> SensorLog:
             notes.append(f"no {label} samples")
     breaks = np.flatnonzero(np.diff(imu["time_us"]) > FILLED_GAP_S * 1e6) + 1
     bounds = [0, *breaks.tolist(), len(imu)]
-    stretches = list(zip(bounds, bounds[1:], strict=False))
+    stretches = list(pairwise(bounds))
     if len(stretches) > 1:
         notes.append(f"{len(stretches) - 1} gap(s) above {FILLED_GAP_S:g} s: the estimator started anew after each")
     return SensorLog(recording, origin, imu, _projected(fixes, origin), **slow, stretches=stretches)
@@ -138,11 +145,14 @@ def _prepare_imu(recording: Recording) -> Rows:
     imu = _sorted(recording.imu, "IMU", recording.notes)
     span_s = float(imu["time_us"][-1] - imu["time_us"][0]) * 1e-6 if len(imu) else 0.0
     if span_s < MIN_DURATION_S:
-        raise SensorLogError(f"{recording.path}: {span_s:.1f} s of IMU samples, at least {MIN_DURATION_S:g} s are needed")
+        raise SensorLogError(
+            f"{recording.path}: {span_s:.1f} s of IMU samples, at least {MIN_DURATION_S:g} s are needed"
+        )
     period_s = float(np.median(np.diff(imu["time_us"]))) * 1e-6
     if period_s > 1.0 / MIN_IMU_RATE_HZ:
         raise SensorLogError(
-            f"{recording.path}: the IMU was recorded at {1.0 / period_s:.0f} Hz, at least {MIN_IMU_RATE_HZ:g} Hz are needed"
+            f"{recording.path}: the IMU was recorded at {1.0 / period_s:.0f} Hz, "
+            f"at least {MIN_IMU_RATE_HZ:g} Hz are needed"
         )
     imu["dt_s"] = _intervals(imu, period_s)
     group = round(IMU_PERIOD_S / period_s)
@@ -153,7 +163,7 @@ def _prepare_imu(recording: Recording) -> Rows:
 
 
 def _intervals(imu: Rows, period_s: float) -> Rows:
-    """[s] the interval each sample stands for: its integration time, or, after lost samples, the time since the last."""
+    """[s] what each sample stands for: its integration time or, after lost samples, the time since the last."""
     since_s = np.diff(imu["time_us"], prepend=imu["time_us"][0] - round(period_s * 1e6)) * 1e-6
     dt_s = imu["dt_s"].astype(float)
     dt_s = np.where((dt_s > 0.0) & (dt_s < HELD_GAP_S), dt_s, period_s)
@@ -180,7 +190,8 @@ def _filled(imu: Rows, period_s: float, notes: list[str]) -> Rows:
     if not len(gaps):
         return imu
     notes.append(
-        f"{len(gaps)} gap(s) in the IMU samples, {since_s[gaps].sum():.2f} s together, the longest {since_s[gaps].max():.2f} s"
+        f"{len(gaps)} gap(s) in the IMU samples, {since_s[gaps].sum():.2f} s together, "
+        f"the longest {since_s[gaps].max():.2f} s"
     )
     times = []
     for first in gaps[since_s[gaps] <= FILLED_GAP_S]:
@@ -190,7 +201,9 @@ def _filled(imu: Rows, period_s: float, notes: list[str]) -> Rows:
         return imu
     filler = np.zeros(sum(map(len, times)), dtype=IMU_DTYPE)
     filler["time_us"] = np.concatenate(times)
-    filler["dt_s"] = np.concatenate([np.full(len(part), part[1] - part[0] if len(part) > 1 else 0) for part in times]) * 1e-6
+    filler["dt_s"] = (
+        np.concatenate([np.full(len(part), part[1] - part[0] if len(part) > 1 else 0) for part in times]) * 1e-6
+    )
     filler["dt_s"][filler["dt_s"] == 0.0] = period_s
     for name in ("gyro_frd", "accel_frd"):
         for axis in range(3):

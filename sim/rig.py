@@ -6,6 +6,7 @@ as rows of the other arrays. One call of `advance` is one launch per thread, for
 
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,8 @@ import warp as wp
 
 from autopilot.advance import Autopilot
 from autopilot.control.airframe import ControlAirframe, control_airframe
-from autopilot.control.params import CONTROL_PARAMETERS, ControlParams, control_params
 from autopilot.control.control import ControlState
+from autopilot.control.params import CONTROL_PARAMETERS, ControlParams, control_params
 from autopilot.estimator.ekf import make_ekf
 from autopilot.estimator.params import estimator_fields
 from autopilot.ports import Setpoint
@@ -196,4 +197,4 @@ def _launch(command: Any) -> None:
 def _chunks(vehicle_count: int, threads: int) -> list[tuple[int, int]]:
     """Splits the vehicles into (first, count) parts of nearly equal size."""
     bounds = [vehicle_count * k // threads for k in range(threads + 1)]
-    return [(low, high - low) for low, high in zip(bounds, bounds[1:], strict=False) if high > low]
+    return [(low, high - low) for low, high in pairwise(bounds) if high > low]

@@ -9,6 +9,8 @@ COMMANDER_PARAMETERS: list[Parameter] = [
     Parameter("COM_DISARM_PRFLT", 10.0, -1.0, 60.0, "s", "time from arming to disarming without take-off", _PX4),
     Parameter("COM_SPOOLUP_TIME", 1.0, 0.0, 30.0, "s", "time at idle from arming to take-off", _PX4),
     Parameter("COM_POS_FS_EPH", 5.0, 0.5, 100.0, "m", "horizontal accuracy (1 sigma) needed for position modes", _PX4),
+    Parameter("COM_VEL_FS_EVH", 1.0, 0.1, 20.0, "m/s",
+              "velocity accuracy (1 sigma) up to which a vehicle without position still brakes over ground", _PX4),
     Parameter("COM_ARM_EPV", 5.0, 0.5, 100.0, "m", "vertical accuracy (1 sigma) needed for arming", "guess"),
     Parameter("COM_ARM_GYR_BIAS", 3.0, 0.1, 20.0, "deg/s", "largest gyro bias for arming", "guess"),
     Parameter("COM_ARM_ACC_BIAS", 1.0, 0.1, 5.0, "m/s^2", "largest accelerometer bias for arming", "guess"),

@@ -308,9 +308,10 @@ def trajectory_step(
     exit_speed = float(0.0)
     if is_path(sp):
         along = wp.normalize(sp.pos_ned - sp.path_start_ned)
-        across = wp.vec3(1.0, 0.0, 0.0)
-        if wp.abs(along[2]) < 0.999:
-            across = wp.normalize(wp.vec3(-along[1], along[0], 0.0))
+        aside = wp.vec3(0.0, 0.0, 1.0)
+        if wp.abs(along[2]) > 0.999:  # straight up or down
+            aside = wp.vec3(0.0, 1.0, 0.0)
+        across = wp.normalize(wp.cross(aside, along))
         third = wp.cross(along, across)
         jerk = params.jerk_path
         exit_speed = wp.max(finite_or(sp.exit_speed, 0.0), 0.0)

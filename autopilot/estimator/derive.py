@@ -75,7 +75,7 @@ def _stacked(errors: dict[str, sp.Matrix]) -> sp.Matrix:
 
 
 def _at_zero(expr: sp.Matrix, errors: sp.Matrix) -> sp.Matrix:
-    return expr.subs({symbol: 0 for symbol in errors})
+    return expr.subs(dict.fromkeys(errors, 0))
 
 
 def attitude_error_rate(gyro_bias_error: sp.Matrix) -> sp.Matrix:

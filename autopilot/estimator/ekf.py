@@ -46,7 +46,6 @@ from autopilot.estimator.state import (
     PHASE_ALIGNING,
     PHASE_RUNNING,
     RANGE_RING,
-    DragSum,
     Ekf,
     EstimatorState,
     OutputSample,

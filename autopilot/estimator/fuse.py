@@ -26,6 +26,10 @@ from common.rotation import quat_from_rotvec
 wp.set_module_options({"enable_backward": False})
 
 _RATIO_LPF_GAIN = wp.constant(0.1)  # per sample
+_NOISE_GAIN = wp.constant(0.05)  # per sample: e-fold in 20 samples of twice the expected variance
+_FAIR_EXCESS = wp.constant(1.4)  # mean 1 if the parameters are right; the margin keeps the scale at 1 then
+_MAX_EXCESS = wp.constant(10.0)  # a single outlier counts no more than that
+_MAX_NOISE_SCALE = wp.constant(1.0e4)
 
 
 @wp.func
@@ -131,8 +135,25 @@ def set_variance(cov: wp.array2d(dtype=vec24), i: int, k: int, variance: float) 
 
 
 @wp.func
-def judge(aid: Aid, time_us: wp.int64, innov: wp.vec3, innov_var: wp.vec3, gate_sigma: float) -> Aid:
-    """The aid with its innovations and test ratio; unused components have innovation 0 and variance 1."""
+def judge(aid: Aid, time_us: wp.int64, innov: wp.vec3, innov_var: wp.vec3, components: int, gate_sigma: float) -> Aid:
+    """The aid with its innovations, test ratio and noise scale.
+
+    The variance of a source that has become noisier than its parameter says is learned from differences of successive
+    innovations, which a bias or a jump leaves alone (after Mehra 1970, "On the identification of variances").
+
+    Args:
+        aid: of the source.
+        time_us: of the sample.
+        innov: measured minus predicted; 0 in components that the source lacks.
+        innov_var: with the noise scale applied; 1 in components that the source lacks.
+        components: that the source has.
+        gate_sigma: standard deviations beyond which a sample is rejected.
+    """
+    change = innov - aid.innov
+    novelty = wp.cw_div(wp.cw_mul(change, change), innov_var)
+    excess = wp.min((novelty[0] + novelty[1] + novelty[2]) / (2.0 * float(components)), _MAX_EXCESS) - _FAIR_EXCESS
+    if aid.judged_time_us != wp.int64(0):
+        aid.noise_scale = wp.clamp(aid.noise_scale * wp.exp(_NOISE_GAIN * excess), 1.0, _MAX_NOISE_SCALE)
     aid.judged_time_us = time_us
     aid.innov = innov
     aid.innov_var = innov_var
@@ -144,6 +165,12 @@ def judge(aid: Aid, time_us: wp.int64, innov: wp.vec3, innov_var: wp.vec3, gate_
     else:
         aid.reject_count = 0
     return aid
+
+
+@wp.func
+def noise_variance(aid: Aid, std: float) -> float:
+    """Variance of a source's noise: the square of `std`, times the scale learned."""
+    return std * std * wp.max(aid.noise_scale, 1.0)
 
 
 @wp.func

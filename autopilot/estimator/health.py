@@ -12,7 +12,6 @@ from autopilot.estimator.state import (
     ATT,
     PHASE_RUNNING,
     POS,
-    TERRAIN,
     VEL,
     WIND,
     Aid,

@@ -80,6 +80,7 @@ class Aid:
     reset_count: int
     test_ratio: float  # largest innov² / (gate² innov_var) of the last sample; above 1 is rejected
     test_ratio_lpf: float
+    noise_scale: float  # by which the source's noise variance exceeds its parameter, from 1
 
 
 @wp.struct

@@ -45,7 +45,9 @@ class Landing:
             context.setpoint.descend_at(self._north, self._east, speed, self._yaw, context.cruise_speed)
             return
         self._is_blind = True
-        if context.has_height:
+        if context.has_height and context.state.estimate.vel_std < context.number("COM_VEL_FS_EVH"):
+            context.setpoint.descend_braking(context.number("MPC_LAND_SPEED"), self._yaw)
+        elif context.has_height:
             context.setpoint.descend_level(context.number("MPC_LAND_SPEED"), self._yaw)
         else:
             context.setpoint.hang_level(context.hover_thrust * _BLIND_THRUST_SHARE, self._yaw)

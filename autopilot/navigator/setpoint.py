@@ -102,6 +102,13 @@ class SetpointPort:
         self.yaw = yaw
         self.cruise_speed = cruise_speed
 
+    def descend_braking(self, speed_down: float, yaw: float) -> None:
+        """Asks for a vertical speed [m/s] without moving over ground: the position is lost, the velocity is not."""
+        self._free_all()
+        self.kind = SETPOINT_TRAJECTORY
+        self.vel_ned = (0.0, 0.0, speed_down)
+        self.yaw = yaw
+
     def descend_level(self, speed_down: float, yaw: float) -> None:
         """Asks for a vertical speed [m/s] with level attitude: what remains when the position is not known."""
         self._free_all()

@@ -61,14 +61,14 @@ def rate_setpoint(action: wp.vec4) -> Setpoint:
 
 
 @wp.kernel(enable_backward=False)
-def act(actions: wp.array(dtype=wp.vec4), setpoints: wp.array(dtype=Setpoint)):
+def act(actions: wp.array(dtype=wp.vec4), setpoints: wp.array(dtype=Setpoint)) -> None:
     """Turns actions into setpoints."""
     i = wp.tid()
     setpoints[i] = rate_setpoint(actions[i])
 
 
 @wp.kernel(enable_backward=False)
-def observe(rig: RigArrays, actions: wp.array(dtype=wp.vec4), observations: wp.array2d(dtype=float)):
+def observe(rig: RigArrays, actions: wp.array(dtype=wp.vec4), observations: wp.array2d(dtype=float)) -> None:
     """What the policy may know: the estimate and its own last action."""
     i = wp.tid()
     estimate = rig.autopilot.ekf.rows[i].estimate
@@ -86,7 +86,7 @@ def observe(rig: RigArrays, actions: wp.array(dtype=wp.vec4), observations: wp.a
 
 
 @wp.kernel(enable_backward=False)
-def judge(rig: RigArrays, rewards: wp.array(dtype=float), is_lost: wp.array(dtype=wp.bool)):
+def judge(rig: RigArrays, rewards: wp.array(dtype=float), is_lost: wp.array(dtype=wp.bool)) -> None:
     """How well the vehicle stays at the point, 1 at best, and whether it left the ball or touched the ground."""
     i = wp.tid()
     body = rig.body[i]

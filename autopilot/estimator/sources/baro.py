@@ -7,7 +7,15 @@ estimate, and the height is set otherwise.
 
 import warp as wp
 
-from autopilot.estimator.fuse import fuse_state, judge, mark_fused, mark_reset, seconds_since, set_variance
+from autopilot.estimator.fuse import (
+    fuse_state,
+    judge,
+    mark_fused,
+    mark_reset,
+    noise_variance,
+    seconds_since,
+    set_variance,
+)
 from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.state import POS, Aid, Nominal
 from autopilot.ports import BaroSample
@@ -41,7 +49,7 @@ def fuse_baro(
     is_gnss_height_good: bool,
 ):  # type: ignore[no-untyped-def]
     """Down position, against the standard-atmosphere height `origin_height` [m] of the origin."""
-    var = params.baro_noise * params.baro_noise
+    var = noise_variance(aid, params.baro_noise)
     height = baro_height(sample.pressure_pa)
     if aid.is_active == 0:
         origin_height = height + nominal.pos_ned[2]
@@ -50,7 +58,7 @@ def fuse_baro(
     innov = pos_d - nominal.pos_ned[2]
     innov_var = cov[i, POS + 2][POS + 2] + var
     starved_s = seconds_since(sample.time_us, aid.fused_time_us)
-    aid = judge(aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), params.baro_gate)
+    aid = judge(aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), 1, params.baro_gate)
     if aid.test_ratio <= 1.0:
         nominal = fuse_state(params, cov, i, nominal, POS + 2, innov, var)
         aid = mark_fused(aid)

@@ -64,7 +64,7 @@ def fuse_drag(
         _ph, hph = drag_products(cov, i, axis_ned, axis, vel_air_ned, params.drag_linear, square, wp.abs(speed))
         innov[axis] = accel_frd[axis] - predicted
         innov_var[axis] = hph + var
-    aid = judge(aid, time_us, innov, innov_var, _GATE_SIGMA)
+    aid = judge(aid, time_us, innov, innov_var, 2, _GATE_SIGMA)
     aid.is_active = 1
     if aid.test_ratio <= 1.0:
         for axis in range(2):

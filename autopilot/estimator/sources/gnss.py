@@ -10,7 +10,16 @@ is far off or nothing passed the gate for a while.
 
 import warp as wp
 
-from autopilot.estimator.fuse import fuse, fuse_state, judge, mark_fused, mark_reset, seconds_since, set_variance
+from autopilot.estimator.fuse import (
+    fuse,
+    fuse_state,
+    judge,
+    mark_fused,
+    mark_reset,
+    noise_variance,
+    seconds_since,
+    set_variance,
+)
 from autopilot.estimator.params import GPS_CTRL_HEIGHT, GPS_CTRL_POS, GPS_CTRL_VEL, EstimatorParams
 from autopilot.estimator.state import POS, VEL, Aid, GnssWander, Nominal
 from autopilot.ports import GnssSample
@@ -67,13 +76,12 @@ def fuse_gnss_vel(
     sample: GnssSample,
 ):  # type: ignore[no-untyped-def]
     """Velocity: three axes that pass or fail together."""
-    std = gnss_vel_std(params, sample)
-    var = std * std
+    var = noise_variance(aid, gnss_vel_std(params, sample))
     if (params.gnss_ctrl & GPS_CTRL_VEL) != 0:
         innov = sample.vel_ned - nominal.vel_ned
         innov_var = wp.vec3(cov[i, VEL][VEL] + var, cov[i, VEL + 1][VEL + 1] + var, cov[i, VEL + 2][VEL + 2] + var)
         starved_s = seconds_since(sample.time_us, aid.fused_time_us)
-        aid = judge(aid, sample.time_us, innov, innov_var, params.gnss_vel_gate)
+        aid = judge(aid, sample.time_us, innov, innov_var, 3, params.gnss_vel_gate)
         aid.is_active = 1
         if aid.test_ratio <= 1.0:
             for axis in range(3):
@@ -144,8 +152,7 @@ def fuse_gnss_pos(
     age_s: float,
 ):  # type: ignore[no-untyped-def]
     """Horizontal position: two axes that pass or fail together."""
-    std = gnss_pos_std(params, sample)
-    var = std * std
+    var = noise_variance(aid, gnss_pos_std(params, sample))
     if (params.gnss_ctrl & GPS_CTRL_POS) != 0:
         pos_ned = sample.pos_ned + nominal.vel_ned * age_s
         innov = pos_ned - nominal.pos_ned - wander.offset_ned
@@ -154,7 +161,7 @@ def fuse_gnss_pos(
             cov[i, POS][POS] + wander.var_ned[0] + var, cov[i, POS + 1][POS + 1] + wander.var_ned[1] + var, 1.0
         )
         starved_s = seconds_since(sample.time_us, aid.fused_time_us)
-        aid = judge(aid, sample.time_us, innov, innov_var, params.gnss_pos_gate)
+        aid = judge(aid, sample.time_us, innov, innov_var, 2, params.gnss_pos_gate)
         aid.is_active = 1
         if aid.test_ratio <= 1.0:
             for axis in range(2):
@@ -188,14 +195,15 @@ def fuse_gnss_height(
     is_reference: bool,
 ):  # type: ignore[no-untyped-def]
     """Height. Nothing fits for long: the state is set if this is the height reference, else the wander is."""
-    std = VERTICAL_FACTOR * gnss_pos_std(params, sample)
-    var = std * std
+    var = noise_variance(aid, VERTICAL_FACTOR * gnss_pos_std(params, sample))
     if (params.gnss_ctrl & GPS_CTRL_HEIGHT) != 0:
         pos_d = sample.pos_ned[2] + nominal.vel_ned[2] * age_s
         innov = pos_d - wander.offset_ned[2] - nominal.pos_ned[2]
         innov_var = cov[i, POS + 2][POS + 2] + wander.var_ned[2] + var
         starved_s = seconds_since(sample.time_us, aid.fused_time_us)
-        aid = judge(aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), params.gnss_pos_gate)
+        aid = judge(
+            aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), 1, params.gnss_pos_gate
+        )
         aid.is_active = 1
         if aid.test_ratio <= 1.0:
             nominal, wander = fuse_gnss_axis(params, cov, i, nominal, wander, 2, pos_d, var)

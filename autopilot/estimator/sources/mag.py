@@ -7,8 +7,8 @@ were rejected for long, the field of the body is learned anew from the attitude.
 
 import warp as wp
 
+from autopilot.estimator.fuse import fuse, judge, mark_fused, mark_reset, noise_variance, seconds_since, set_variance
 from autopilot.estimator.generated import mag_products
-from autopilot.estimator.fuse import fuse, judge, mark_fused, mark_reset, seconds_since, set_variance
 from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.state import ATT, BODY, EARTH, Aid, Nominal
 from autopilot.ports import MagSample
@@ -83,7 +83,7 @@ def fuse_mag(
     age_s: float,
 ):  # type: ignore[no-untyped-def]
     """The field in three axes, which pass or fail together; the vehicle has turned by omega * age since the sample."""
-    var = params.mag_noise * params.mag_noise
+    var = noise_variance(aid, params.mag_noise)
     field_frd = sample.field_frd_gauss
     earth_part = field_frd - nominal.body_field_frd
     field_frd = field_frd - wp.cross(omega_frd, earth_part) * age_s
@@ -94,7 +94,7 @@ def fuse_mag(
         _ph, hph = mag_products(cov, i, body_axis_ned(rot, axis), axis, nominal.earth_field_ned)
         innov_var[axis] = hph + var
     starved_s = seconds_since(sample.time_us, aid.fused_time_us)
-    aid = judge(aid, sample.time_us, innov, innov_var, params.mag_gate)
+    aid = judge(aid, sample.time_us, innov, innov_var, 3, params.mag_gate)
     aid.is_active = 1
     if aid.test_ratio <= 1.0:
         for axis in range(3):

@@ -42,7 +42,7 @@ def fuse_range(
         ph, hph = range_products(cov, i, down_ned, height)
         innov = sample.distance_m - height / down_ned[2]
         innov_var = hph + var
-        aid = judge(aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), params.range_gate)
+        aid = judge(aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), 1, params.range_gate)
         if aid.is_active == 0 or aid.reject_count >= _RESET_AFTER_REJECTS:
             nominal.terrain_d = measured_d
             set_variance(cov, i, TERRAIN, var)

@@ -30,7 +30,7 @@ _NOISE_FREE_ACCEL_VAR = wp.constant(1.0e-6)  # a thousandth of what the quietest
 @wp.func
 def observe_stillness(still: Stillness, imu: ImuSample) -> Stillness:
     """Running means and variances of the IMU, and what they say."""
-    if still.gyro_var == 0.0 and still.accel_var == 0.0:
+    if wp.length_sq(still.accel_mean_frd) == 0.0:
         still.gyro_mean_frd = imu.gyro_frd
         still.accel_mean_frd = imu.accel_frd
     gain = wp.min(imu.dt_s / _AVERAGE_S, 1.0)
@@ -77,7 +77,7 @@ def fuse_rest(
     var = _STD * _STD
     innov = -nominal.vel_ned
     innov_var = wp.vec3(cov[i, VEL][VEL] + var, cov[i, VEL + 1][VEL + 1] + var, cov[i, VEL + 2][VEL + 2] + var)
-    aid = judge(aid, time_us, innov, innov_var, _GATE_SIGMA)
+    aid = judge(aid, time_us, innov, innov_var, 3, _GATE_SIGMA)
     aid.is_active = 1
     if aid.test_ratio <= 1.0:
         for axis in range(3):
