@@ -10,7 +10,6 @@ from math import nan
 from pathlib import Path
 
 import numpy as np
-import warp as wp
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
@@ -57,7 +56,6 @@ def estimate_log(log: Path, output: Path | None, console: Console) -> None:
     """
     folder = output if output is not None else log.with_name(f"{log.stem}-estimate")
     _check_folder(folder)
-    wp.config.quiet = True
     try:
         recording = _read(log)
         table = estimator_table(recording)

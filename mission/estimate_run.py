@@ -40,6 +40,7 @@ REAL_SENSORS: dict[str, float] = {
     "EKF2_BARO_WALK": 0.1,  # guess
     "EKF2_MAG_NOISE": 0.05,  # PX4 default
     "EKF2_MAG_B_INIT": 0.05,  # guess: what a field calibration leaves
+    "EKF2_MIN_RNG": 0.0,  # the origin is where the receiver stands
     "EKF2_RNG_NOISE": 0.1,  # PX4 default
     "EKF2_RNG_SFE": 0.05,  # PX4 default
     "EKF2_TERR_GRAD": 0.5,  # PX4 default

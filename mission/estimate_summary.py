@@ -119,9 +119,8 @@ def difference(estimate: Rows, track: Track, origin: GeoPoint | None) -> Differe
     else:
         rms = [nan] * 6
     ours, theirs = _matched(estimate["time_us"], (estimate["flags"] & YAW_ALIGNED) != 0, track.q_time_us)
-    return Difference(
-        *rms, *_attitude_rms(estimate["q_ned_from_frd"][ours].astype(float), track.q_ned_from_frd[theirs])
-    )
+    tilt, yaw = _attitude_rms(estimate["q_ned_from_frd"][ours].astype(float), track.q_ned_from_frd[theirs])
+    return Difference(rms[0], rms[1], rms[2], rms[3], rms[4], rms[5], tilt, yaw)
 
 
 def track_pos_ned(track: Track, origin: GeoPoint | None) -> Rows:
@@ -129,7 +128,9 @@ def track_pos_ned(track: Track, origin: GeoPoint | None) -> Rows:
     if track.ref is None or origin is None:
         return track.pos_ned
     # Tangent planes some 100 m apart are parallel to 1e-5: the shift of the origin is enough.
-    return track.pos_ned + np.array(ned_from_geodetic(track.ref.lat_deg, track.ref.lon_deg, track.ref.alt_m, origin))
+    shift_ned = ned_from_geodetic(track.ref.lat_deg, track.ref.lon_deg, track.ref.alt_m, origin)
+    pos_ned: Rows = track.pos_ned + np.array(shift_ned)
+    return pos_ned
 
 
 def _matched(time_us: Rows, is_valid: Rows, other_time_us: Rows) -> tuple[Rows, Rows]:

@@ -1,4 +1,4 @@
-"""Recorded sensors, made ready for the estimator: sorted, without gaps, in the tangent plane of the first good fix.
+"""Recorded sensors, made ready for the estimator: sorted, without gaps, in the tangent plane of the place of the first good fix.
 
 In: the tables of one log, as `sensor_ulog` and `sensor_csv` read them. Out: rows of the kernels' sample structs, one
 array per sensor, and the stretches of IMU samples that hold together.
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from autopilot.ports import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
-from common.geodesy import GeoPoint, ned_from_geodetic
+from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from common.params import ParameterTable
 
 Rows = npt.NDArray[Any]
@@ -22,7 +22,8 @@ Rows = npt.NDArray[Any]
 
 def row_dtype(struct: Any) -> np.dtype[Any]:
     """NumPy's type of the rows of a kernel struct."""
-    return np.dtype(struct.numpy_dtype())
+    dtype: np.dtype[Any] = np.dtype(struct.numpy_dtype())
+    return dtype
 
 
 IMU_DTYPE = row_dtype(ImuSample)
@@ -47,6 +48,8 @@ FIX_DTYPE = np.dtype(
 
 MIN_IMU_RATE_HZ = 40.0  # guess: below it a multirotor's attitude cannot be integrated
 MIN_DURATION_S = 1.0
+STANDING_SPEED_M_S = 0.5  # guess: several deviations of a receiver's velocity at rest
+STANDING_S = 10.0  # later fixes share the slow error of the first: averaging more of them gains little
 IMU_PERIOD_S = 0.004  # the estimator's tick: faster samples are merged to about that
 HELD_GAP_S = 0.1  # up to here the last rate holds; the estimator integrates no longer interval
 FILLED_GAP_S = 1.0  # up to here samples are interpolated; a longer gap starts the estimator anew
@@ -123,8 +126,9 @@ def prepare(recording: Recording, table: ParameterTable) -> SensorLog:
     """
     notes = recording.notes
     imu = _prepare_imu(recording)
-    fixes = _thinned(_sorted(recording.fixes, "GNSS", notes), MIN_GNSS_INTERVAL_S)
-    origin = _origin(fixes, table, notes)
+    on_globe = (np.abs(recording.fixes["lat_deg"]) <= 90.0) & (np.abs(recording.fixes["lon_deg"]) <= 180.0)
+    fixes = _thinned(_sorted(recording.fixes[on_globe], "GNSS", notes), MIN_GNSS_INTERVAL_S)
+    origin = _own_origin(recording) or _origin(fixes, table, notes)
     slow = {
         name: _thinned(_sorted(getattr(recording, name), label, notes), MIN_INTERVAL_S)
         for name, label in (("baro", "barometer"), ("mag", "magnetometer"), ("range", "range finder"))
@@ -232,8 +236,16 @@ def _thinned(rows: Rows, min_interval_s: float) -> Rows:
     return rows[:: max(1, ceil(min_interval_s / interval_s - 0.01))]
 
 
+def _own_origin(recording: Recording) -> GeoPoint | None:
+    """The origin that this project's estimator used in flight."""
+    return recording.tracks[0].ref if recording.is_own and recording.tracks else None
+
+
 def _origin(fixes: Rows, table: ParameterTable, notes: list[str]) -> GeoPoint | None:
-    """The first fix the estimator would use; failing that, the first 3-D fix."""
+    """The first place known: the mean of the good fixes from the first on, as long as the vehicle stands there.
+
+    The estimator takes the place where it is aligned for the origin; one fix alone may lie a metre from there.
+    """
     has_fix = fixes["fix_type"] >= table["EKF2_REQ_FIX"]
     is_good = (
         has_fix
@@ -247,8 +259,13 @@ def _origin(fixes: Rows, table: ParameterTable, notes: list[str]) -> GeoPoint | 
         return None
     if not is_good.any():
         notes.append("no GNSS fix is accurate enough to be used: position and velocity are dead reckoning")
-    first = fixes[np.flatnonzero(is_good if is_good.any() else has_fix)[0]]
-    return GeoPoint(float(first["lat_deg"]), float(first["lon_deg"]), float(first["alt_m"]))
+    chosen = fixes[is_good if is_good.any() else has_fix]
+    first = GeoPoint(float(chosen["lat_deg"][0]), float(chosen["lon_deg"][0]), float(chosen["alt_m"][0]))
+    is_away = np.linalg.norm(chosen["vel_ned"], axis=1) > STANDING_SPEED_M_S
+    is_away |= chosen["time_us"] - chosen["time_us"][0] > STANDING_S * 1e6
+    standing = chosen[: max(1, int(np.argmax(is_away)) if is_away.any() else len(chosen))]
+    north, east, down = _projected(standing, first)["pos_ned"].astype(float).mean(axis=0).tolist()
+    return GeoPoint(*geodetic_from_ned(north, east, down, first))
 
 
 def _projected(fixes: Rows, origin: GeoPoint | None) -> Rows:

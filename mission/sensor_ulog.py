@@ -252,7 +252,8 @@ def _range(log: _Log) -> Rows:
                 & (distance <= sensor.get("max_distance", np.inf))
                 & (sensor.get("signal_quality", -1) != 0)
             )
-            return ranges[faces_down]
+            downward: Rows = ranges[faces_down]
+            return downward
     return empty(RANGE_DTYPE)
 
 

@@ -237,6 +237,7 @@ class Commander:
             if now_us - state.armed_since_us >= self._spool_up_us:
                 state.landed_state = LandedState.TAKEOFF
                 self._landing.reset()
+                state.has_ground_contact = False
                 self._lift_since_us = now_us
                 self._lift_d = state.estimate.pos_ned[2]
             return
@@ -252,7 +253,8 @@ class Commander:
             self._lift()
             return
         thrust = state.actuators.thrust_sp if state.is_armed else 0.0
-        is_landed = self._landing.update(state.estimate, thrust, min(dt_s, _FRAME_LONGEST_S))
+        descent_sp = state.actuators.traj_vel_ned[2]
+        is_landed = self._landing.update(state.estimate, thrust, descent_sp, min(dt_s, _FRAME_LONGEST_S))
         state.has_ground_contact = self._landing.has_contact
         if is_landed:
             self._touch_down()
@@ -263,7 +265,7 @@ class Commander:
     def _lift(self) -> None:
         """Released from the ground, but not yet off it."""
         state = self.state
-        if self._lift_d - state.estimate.pos_ned[2] > _AIRBORNE_M:
+        if self._lift_d - state.estimate.pos_ned[2] > _AIRBORNE_M or self._flying.is_landing:
             self._has_flown = True
         elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
             self.announcer.statustext(Severity.CRITICAL, "Takeoff failed: still on the ground")

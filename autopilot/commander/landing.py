@@ -5,7 +5,7 @@ pass: with less than a third of its hover thrust it gathers a speed of LNDMC_Z_V
 needs a third of LNDMC_TRIG_TIME. A range finder that sees air below only delays the answer, in case it is stuck.
 """
 
-from math import radians
+from math import nan, radians
 from typing import Any
 
 from autopilot.ports import TERRAIN_VALID, VELOCITY_VALID
@@ -14,6 +14,10 @@ from common.params import Parameter, ParameterTable
 
 _CONTACT_SHARE = 0.3  # of the way from least to hover thrust (PX4: MulticopterLandDetector)
 _LANDED_SHARE = 0.15  # PX4 has 0.1; the thrust floor of the control part is approached slowly
+_TOUCH_HEIGHT_M = 0.1  # above standing height, as measured, from which a descent that stalls is a touch; guess
+_TOUCH_SINK_SHARE = 0.5  # of the wanted descent below which it stalls
+_TOUCH_DESCENT_M_S = 0.1  # a slower descent is a hover
+_TOUCH_S = 0.1  # a gust near the ground stalls a descent for less than that, or it does no harm to stop there
 _AIR_BELOW_M = 1.0  # range finder reading that speaks against a landing; guess
 _AIR_BELOW_FACTOR = 5.0  # by which such a reading stretches the time needed
 
@@ -24,16 +28,19 @@ class LandingDetector:
     Args:
         params: LNDMC_* and MPC_THR_MIN.
         hover_thrust: [0..1] collective thrust that carries the vehicle.
+        standing_height_m: of the vehicle's centre over level ground, NaN: not known, and a touch is felt later.
     """
 
     __slots__ = (
         "_contact_thrust", "_hover_thrust", "_landed_thrust", "_params", "_rate_max_sq", "_speed_xy_max_sq",
-        "_speed_z_max", "_stage_s", "_time_s", "is_landed",
+        "_speed_z_max", "_stage_s", "_time_s", "_touch_height", "_touch_s", "is_landed",
     )  # fmt: skip
 
-    def __init__(self, params: ParameterTable, hover_thrust: float) -> None:
+    def __init__(self, params: ParameterTable, hover_thrust: float, standing_height_m: float = nan) -> None:
         self._params = params
         self._hover_thrust = hover_thrust
+        self._touch_height = standing_height_m + _TOUCH_HEIGHT_M
+        self._touch_s = 0.0  # for which a descent has stalled just above the ground
         self._time_s = 0.0  # for which it has looked landed, stage after stage
         self.is_landed = False
         self._load()
@@ -41,7 +48,7 @@ class LandingDetector:
 
     def reset(self) -> None:
         """The vehicle is about to leave the ground."""
-        self._time_s = 0.0
+        self._time_s = self._touch_s = 0.0
         self.is_landed = False
 
     @property
@@ -49,14 +56,18 @@ class LandingDetector:
         """Whether something else than the rotors has carried the vehicle for the first stage."""
         return self._time_s >= self._stage_s
 
-    def update(self, estimate: Any, thrust: float, dt_s: float) -> bool:
+    def update(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:
         """Takes one frame and returns whether the vehicle stands on the ground.
 
         Args:
             estimate: the Estimate record.
             thrust: [0..1] collective thrust setpoint.
+            descent_sp: [m/s] downward speed asked for.
             dt_s: [s] since the last frame.
         """
+        if self._touches(estimate, descent_sp, dt_s):
+            self._time_s = max(self._time_s, self._stage_s)
+            return False
         if thrust >= self._contact_thrust or not self._is_supported(estimate):
             self._time_s = 0.0
             return False
@@ -70,6 +81,17 @@ class LandingDetector:
             needed_s *= _AIR_BELOW_FACTOR
         self.is_landed = time_s >= needed_s
         return self.is_landed
+
+    def _touches(self, estimate: Any, descent_sp: float, dt_s: float) -> bool:
+        """Whether a descent stalls where the range finder sees the ground: felt before the thrust has faded."""
+        is_stalled = (
+            descent_sp > _TOUCH_DESCENT_M_S
+            and estimate.flags & TERRAIN_VALID
+            and estimate.terrain_d - estimate.pos_ned[2] < self._touch_height
+            and estimate.vel_ned[2] < _TOUCH_SINK_SHARE * descent_sp
+        )
+        self._touch_s = self._touch_s + dt_s if is_stalled else 0.0
+        return self._touch_s >= _TOUCH_S
 
     def _is_supported(self, estimate: Any) -> bool:
         """Whether something else than the rotors carries the vehicle."""

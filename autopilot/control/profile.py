@@ -14,7 +14,6 @@ wp.set_module_options({"enable_backward": False})
 _SOLVER_STEPS = wp.constant(24)  # regula falsi converges in about 8
 _ARRIVED_M = wp.constant(5.0e-4)
 _ARRIVED_M_S = wp.constant(1.0e-2)
-_ARRIVED_M_S2 = wp.constant(0.2)
 
 
 @wp.struct
@@ -233,7 +232,7 @@ def step_to_position(
     """
     at_goal = Motion()
     at_goal.moved = distance
-    if wp.abs(distance) < _ARRIVED_M and wp.abs(vel) < _ARRIVED_M_S and wp.abs(accel) < _ARRIVED_M_S2:
+    if wp.abs(distance) < _ARRIVED_M and wp.abs(vel) < _ARRIVED_M_S and wp.abs(accel) < limits.jerk * dt_s:
         return at_goal
     pass_speed = float(0.0)
     if distance > 0.0:

@@ -32,6 +32,7 @@ _GOAL_MOVED = wp.constant(1.0e-3)  # [m] or [m/s]
 _STOPPED_M_S = wp.constant(0.3)  # slower than this a braked vehicle takes its place as the position to hold
 _DIRECTION_MIN = wp.constant(0.05)  # [m] or [m/s] below which the old direction of motion is kept
 _PATH_MIN_M = wp.constant(0.1)
+_RAD_PER_DEG = wp.constant(0.0174532925)
 
 
 @wp.struct
@@ -270,18 +271,26 @@ def time_share(state: TrajectoryState, est: Estimate, lag_max_m: float) -> float
 
 
 @wp.func
+def braking_speed(distance: float, decel: float, gain: float) -> float:
+    """The speed from which a constant deceleration, and near the goal a linear approach, ends at the goal."""
+    near = decel / (gain * gain)
+    if distance < near:
+        return gain * distance
+    return wp.sqrt(2.0 * decel * (distance - 0.5 * near))
+
+
+@wp.func
 def yaw_step(params: ControlParams, state: TrajectoryState, sp: Setpoint, dt_s: float) -> TrajectoryState:
     """The yaw setpoint turned towards its goal the short way, within rate and acceleration."""
     turned = state
     feed = finite_or(sp.yaw_rate, 0.0)
     rate_max = wp.max(params.yaw_rate_auto, wp.abs(feed))
-    accel = params.yaw_accel_auto
+    accel = params.yaw_accel_auto_deg * _RAD_PER_DEG
     rate = feed
     if wp.isfinite(sp.yaw) or not wp.isfinite(sp.yaw_rate):
         turned.yaw_goal = finite_or(sp.yaw, state.yaw_goal)
         away = wrap_pi(turned.yaw_goal - state.yaw)
-        # braking at 0.8 of the limit leaves room for the time step; near the goal a linear law ends without chatter
-        speed = wp.min(wp.sqrt(1.6 * accel * wp.abs(away)), wp.abs(away) / (4.0 * dt_s))
+        speed = braking_speed(wp.abs(away), 0.8 * accel, 0.2 / dt_s)  # room for the time step
         rate = feed + wp.sign(away) * speed
     rate = wp.clamp(rate, -rate_max, rate_max)
     turned.yaw_rate = state.yaw_rate + wp.clamp(rate - state.yaw_rate, -accel * dt_s, accel * dt_s)

@@ -6,6 +6,8 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 
 _BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against rotor inflow and drag; guess
+_BLIND_STEADY_S = 20.0  # after that the thrust falls further, so that a vehicle that already stands notices it; guess
+_BLIND_FALL_1_S = 0.02  # share of the hover thrust per second; guess
 _TOUCHING_US = 700_000  # longer than it takes to begin a descent; guess
 _NEAR_HOME_M = 30.0  # home's ground level is trusted this far around it; guess
 _SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, far from home; guess
@@ -14,13 +16,14 @@ _SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, fa
 class Landing:
     """The last descent, until the landing detector ends it."""
 
-    __slots__ = ("_context", "_east", "_is_blind", "_moving_us", "_north", "_yaw")
+    __slots__ = ("_blind_since_us", "_context", "_east", "_is_blind", "_moving_us", "_north", "_yaw")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
         self._north = self._east = self._yaw = 0.0
         self._is_blind = False
         self._moving_us = 0  # when it last really descended
+        self._blind_since_us = 0
 
     def start(self, north: float, east: float, yaw: float) -> None:
         """Descends over a place [m] with a heading [rad], NaN: the present one."""
@@ -44,13 +47,20 @@ class Landing:
             speed = self._pushed(self._speed())
             context.setpoint.descend_at(self._north, self._east, speed, self._yaw, context.cruise_speed)
             return
-        self._is_blind = True
+        if not self._is_blind:
+            self._is_blind = True
+            self._blind_since_us = context.state.time_us
         if context.has_height and context.state.estimate.vel_std < context.number("COM_VEL_FS_EVH"):
             context.setpoint.descend_braking(context.number("MPC_LAND_SPEED"), self._yaw)
         elif context.has_height:
             context.setpoint.descend_level(context.number("MPC_LAND_SPEED"), self._yaw)
         else:
-            context.setpoint.hang_level(context.hover_thrust * _BLIND_THRUST_SHARE, self._yaw)
+            context.setpoint.hang_level(context.hover_thrust * self._blind_thrust_share(), self._yaw)
+
+    def _blind_thrust_share(self) -> float:
+        """Share of the hover thrust for sinking without knowing the height."""
+        blind_s = (self._context.state.time_us - self._blind_since_us) * 1e-6
+        return max(_BLIND_THRUST_SHARE - _BLIND_FALL_1_S * max(blind_s - _BLIND_STEADY_S, 0.0), 0.0)
 
     def _pushed(self, speed: float) -> float:
         """The speed, or more of it once the vehicle no longer sinks: on the ground the thrust falls at once then."""

@@ -7,7 +7,7 @@ every estimator has converged, and flies on with noise of its own.
 """
 
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -135,7 +135,7 @@ class HoverBatch:
 class HoverEnv(gymnasium.Env[Floats, Floats]):
     """One vehicle."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (as Gymnasium declares it)
 
     def __init__(self) -> None:
         self.observation_space = _observation_space()
@@ -159,7 +159,10 @@ class HoverEnv(gymnasium.Env[Floats, Floats]):
 class HoverVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
     """Many vehicles in one launch. An episode that ends is followed by the next in the same step."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
+    metadata: dict[str, Any] = {  # noqa: RUF012  (as Gymnasium declares it)
+        "render_modes": [],
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
 
     def __init__(self, num_envs: int = 1) -> None:
         self.num_envs = num_envs
@@ -190,11 +193,11 @@ class HoverVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         return batch.observations.copy(), rewards, is_lost, is_truncated, info
 
 
-def _observation_space() -> Box:
+def _observation_space() -> Any:
     return Box(-np.inf, np.inf, shape=(OBSERVATION_SIZE,), dtype=np.float32)
 
 
-def _action_space() -> Box:
+def _action_space() -> Any:
     return Box(-1.0, 1.0, shape=(4,), dtype=np.float32)
 
 

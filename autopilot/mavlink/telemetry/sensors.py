@@ -188,7 +188,7 @@ def estimator_status(state: VehicleState) -> bytes:
 
 
 def _test_ratios(health: Any) -> tuple[float, float, float, float, float]:
-    """Smoothed test ratios of GNSS velocity and position, barometer, magnetometer, range finder; above 1 is rejected."""
+    """Smoothed test ratios of GNSS velocity and position, barometer, magnetometer, range; above 1 is rejected."""
     if health is None:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     return (

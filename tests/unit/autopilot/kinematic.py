@@ -90,6 +90,7 @@ class Kinematic:
         self.setpoint = rows_of(Setpoint)
         self.flags = ALL_VALID
         self.has_gnss = True
+        self.vel_std = 0.1  # [m/s]
         self.battery_v = 16.6
         self.battery_a = 10.0
         self.gust_ned = np.zeros(3)
@@ -220,6 +221,7 @@ class Kinematic:
         lift = GRAVITY_M_S2 if self.pos[2] >= 0.0 else GRAVITY_M_S2 * self.thrust / self.hover
         estimate["accel_frd"] = (0.0, 0.0, -lift)
         estimate["pos_h_std"] = estimate["pos_v_std"] = 0.5
+        estimate["vel_std"] = self.vel_std
         samples = self.samples
         for name in ("imu", "baro", "mag", "battery"):
             samples[name]["time_us"] = self.time_us or 1

@@ -1,5 +1,6 @@
 """Which mission items are taken, and the reason and number with which the others are refused."""
 
+from dataclasses import replace
 from math import inf, nan
 
 import pytest
@@ -10,13 +11,11 @@ from tests.unit.autopilot.kinematic import Kinematic, do, item
 GOOD = item(0, 16, 10.0)
 
 
-@pytest.mark.parametrize(
-    "command", sorted(set(range(0, 300)) - SUPPORTED_COMMANDS) + [1000, 1001, 2000, 2500, 5001, 42600]
-)
-def test_unsupported_command_is_refused_with_its_number(command):
-    refusal = refuse_items([GOOD, item(1, command)])
-    assert (refusal.seq, refusal.result) == (1, 3)
-    assert str(command) in refusal.reason
+def test_every_unsupported_command_is_refused_with_its_number():
+    for command in set(range(50_000)) - SUPPORTED_COMMANDS:
+        refusal = refuse_items([GOOD, replace(GOOD, seq=1, command=command)])
+        assert (refusal.seq, refusal.result) == (1, 3)
+        assert refusal.reason == f"command {command} is not supported"
 
 
 @pytest.mark.parametrize("frame", [1, 2, 4, 7, 8, 9, 10, 11, 12, 99])

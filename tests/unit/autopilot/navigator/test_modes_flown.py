@@ -158,8 +158,6 @@ def test_landing_slows_down_near_the_ground():
     assert rig.sp("vel_ned")[2] == pytest.approx(1.5)
     rig.run_until(lambda: rig.pos[2] > -4.5)
     assert rig.sp("vel_ned")[2] == pytest.approx(0.7)
-    rig.flags &= ~0  # the range finder stays
-    rig.estimate["terrain_d"] = 0.0
     rig.run_until(lambda: rig.pos[2] > -0.9)
     assert rig.sp("vel_ned")[2] == pytest.approx(0.3)
     rig.disarmed()
@@ -173,9 +171,19 @@ def test_land_command_with_a_place_goes_there_first():
     assert rig.pos[:2] == pytest.approx((30.0, -20.0), abs=0.4)
 
 
+def test_landing_without_position_brakes_while_the_velocity_is_good():
+    rig = Kinematic().flying(10.0)
+    rig.flags &= ~POSITION_VALID
+    rig.run(1.0)
+    assert rig.state.mode is Mode.LAND
+    assert rig.sp("vel_ned") == pytest.approx([0.0, 0.0, 0.7])
+    rig.disarmed()
+
+
 def test_blind_landing_is_level_and_ends_on_the_ground():
     rig = Kinematic().flying(10.0)
     rig.flags &= ~(POSITION_VALID | VELOCITY_VALID)
+    rig.vel_std = 3.0
     rig.run_until(lambda: rig.state.mode is Mode.LAND, 1.0)
     rig.run(0.1)
     assert rig.state.is_failsafe
@@ -193,6 +201,29 @@ def test_blind_landing_without_height_hangs_level_below_hover_thrust():
     assert rig.sp("kind") == SETPOINT_ATTITUDE
     assert 0.8 * rig.hover < rig.sp("thrust") < rig.hover
     assert rig.sp("q_ned_from_frd")[:2] == [0.0, 0.0]
+    rig.disarmed(120.0)
+    assert rig.pos[2] == 0.0
+
+
+def test_landing_asked_for_before_the_vehicle_has_lifted_ends_at_once():
+    rig = Kinematic().ready()
+    rig.fc.takeoff(nan, nan)
+    rig.fc.arm(force=False)
+    rig.run_until(lambda: rig.state.landed_state is LandedState.TAKEOFF)
+    rig.frame()
+    assert rig.fc.set_mode(Mode.LAND).verdict is Verdict.ACCEPTED
+    assert rig.disarmed() < 5.0
+    assert not rig.recorder.has_text("failed")
+
+
+def test_takeoff_that_does_not_leave_the_ground_is_given_up():
+    rig = Kinematic(MPC_TKO_SPEED=0.5, MPC_Z_V_AUTO_UP=0.5)
+    rig.ready()
+    rig.gust_ned[2] = 5.0
+    rig.fc.takeoff(nan, nan)
+    rig.fc.arm(force=False)
+    assert rig.disarmed() == pytest.approx(11.0, abs=0.2)
+    assert rig.recorder.has_text("Takeoff failed")
 
 
 def test_position_found_again_during_a_blind_landing_is_held():

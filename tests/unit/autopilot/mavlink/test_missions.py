@@ -1,0 +1,279 @@
+from math import isnan
+
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot.mavlink.missions import RETRIES_MAX, item_from_fields, scaled_position
+from autopilot.vehicle import ItemRefusal, MissionItem, Reply, Verdict
+from tests.unit.autopilot.mavlink.rig import FRAME_US, Client, Rig, texts
+
+ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
+OLD_PLAN = [MissionItem(0, 6, 16, (0.0, 1.0, 0.0, 0.0), 47.0, 8.0, 10.0)]
+PLAN = [
+    MissionItem(0, 6, 22, (0.0, 0.0, 0.0, 0.0), 47.397742, 8.545594, 10.0),
+    MissionItem(1, 6, 16, (1.0, 2.0, 0.0, 0.5), 47.398, 8.546, 20.0, autocontinue=False),
+    MissionItem(2, 2, 20, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0),
+]
+FRAMES_PER_RETRY = 1_500_000 // FRAME_US
+
+
+def send_item(client: Client, item: MissionItem, **changes: int) -> None:
+    x, y = scaled_position(item)
+    fields = {f"param{i + 1}": value for i, value in enumerate(item.params)}
+    fields |= {"seq": item.seq, "frame": item.frame, "command": item.command, "x": x, "y": y, "z": item.z}
+    client.send("MISSION_ITEM_INT", target_component=1, autocontinue=int(item.autocontinue), **(fields | changes))
+
+
+def start(rig: Rig, count: int) -> None:
+    rig.client.send("MISSION_COUNT", target_component=1, count=count)
+    assert rig.only("MISSION_REQUEST_INT").seq == 0
+
+
+def upload(rig: Rig, plan: list[MissionItem]) -> int:
+    """The result of a whole upload."""
+    start(rig, len(plan))
+    for item in plan[:-1]:
+        send_item(rig.client, item)
+        assert rig.only("MISSION_REQUEST_INT").seq == item.seq + 1
+    send_item(rig.client, plan[-1])
+    ack = rig.only("MISSION_ACK")
+    assert (ack.target_system, ack.target_component, ack.mission_type) == (255, 190, 0)
+    return int(ack.type)
+
+
+def download(rig: Rig) -> list[MissionItem]:
+    rig.client.send("MISSION_REQUEST_LIST", target_component=1)
+    count = rig.only("MISSION_COUNT").count
+    items = []
+    for seq in range(count):
+        rig.client.send("MISSION_REQUEST_INT", target_component=1, seq=seq)
+        items.append(item_from_fields(rig.only("MISSION_ITEM_INT")))
+    rig.client.send("MISSION_ACK", target_component=1, type=ACCEPTED)
+    return items
+
+
+def test_plan_comes_back_as_it_was_sent():
+    rig = Rig()
+    assert upload(rig, PLAN) == ACCEPTED
+    assert rig.vehicle.items == PLAN
+    assert download(rig) == PLAN
+
+
+def test_refused_item_leaves_the_old_plan_and_is_named():
+    rig = Rig()
+    rig.vehicle.items = OLD_PLAN
+    rig.vehicle.item_refusal = ItemRefusal(1, mavlink.MAV_MISSION_UNSUPPORTED, "command 93 is not supported")
+    start(rig, 1)
+    send_item(rig.client, PLAN[0])
+    messages = rig.frame()
+    assert [m.fields.type for m in messages if m.name == "MISSION_ACK"] == [mavlink.MAV_MISSION_UNSUPPORTED]
+    assert texts(messages) == ["Mission: item 1: command 93 is not supported"]
+    assert rig.vehicle.items == OLD_PLAN
+
+
+def test_unfinished_upload_leaves_the_old_plan():
+    rig = Rig()
+    rig.vehicle.items = OLD_PLAN
+    start(rig, 3)
+    send_item(rig.client, PLAN[0])
+    rig.frame()
+    assert download(rig) == OLD_PLAN
+
+
+def test_item_that_does_not_come_is_asked_for_again_and_then_given_up():
+    rig = Rig()
+    start(rig, 3)
+    send_item(rig.client, PLAN[0])
+    assert rig.only("MISSION_REQUEST_INT").seq == 1
+    for _ in range(RETRIES_MAX):
+        assert rig.all("MISSION_REQUEST_INT", FRAMES_PER_RETRY - 1) == []
+        assert rig.only("MISSION_REQUEST_INT").seq == 1
+    assert rig.only("MISSION_ACK", FRAMES_PER_RETRY).type == mavlink.MAV_MISSION_OPERATION_CANCELLED
+    assert rig.all("MISSION_REQUEST_INT", 5 * FRAMES_PER_RETRY) == []
+
+
+def test_upload_over_a_lossy_link_succeeds():
+    rig = Rig()
+    start(rig, 3)
+    for item in PLAN:
+        rig.frame(FRAMES_PER_RETRY)  # the first answer was lost: the item is asked for again
+        send_item(rig.client, item)
+    rig.frame(2)
+    assert rig.vehicle.items == PLAN
+
+
+def test_repeated_item_is_not_appended():
+    rig = Rig()
+    start(rig, 3)
+    for item in (PLAN[0], PLAN[0], PLAN[1], PLAN[0], PLAN[1], PLAN[2]):
+        send_item(rig.client, item)
+    assert rig.only("MISSION_ACK").type == ACCEPTED
+    assert rig.vehicle.items == PLAN
+
+
+def test_last_item_again_gets_the_same_answer_again():
+    rig = Rig()
+    upload(rig, PLAN)
+    send_item(rig.client, PLAN[2])
+    assert rig.only("MISSION_ACK").type == ACCEPTED
+
+
+def test_item_out_of_sequence_ends_the_upload():
+    rig = Rig()
+    rig.vehicle.items = OLD_PLAN
+    start(rig, 3)
+    send_item(rig.client, PLAN[2])
+    assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_SEQUENCE
+    send_item(rig.client, PLAN[0])
+    assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_SEQUENCE
+    assert rig.vehicle.items == OLD_PLAN
+
+
+def test_second_uploader_is_denied_and_the_first_finishes():
+    rig = Rig()
+    start(rig, 3)
+    rig.second_client.send("MISSION_COUNT", target_component=1, count=1)
+    send_item(rig.second_client, PLAN[0])
+    rig.frame()
+    acks = [message.fields.type for message in rig.second_client.received() if message.name == "MISSION_ACK"]
+    assert acks == [mavlink.MAV_MISSION_DENIED] * 2
+    for item in PLAN:
+        send_item(rig.client, item)
+    assert rig.only("MISSION_ACK").type == ACCEPTED
+
+
+def test_new_count_of_the_same_client_starts_again():
+    rig = Rig()
+    start(rig, 3)
+    send_item(rig.client, OLD_PLAN[0])
+    rig.frame()
+    assert upload(rig, PLAN) == ACCEPTED
+    assert rig.vehicle.items == PLAN
+
+
+def test_client_can_give_up_its_upload():
+    rig = Rig()
+    start(rig, 3)
+    rig.client.send("MISSION_ACK", target_component=1, type=mavlink.MAV_MISSION_OPERATION_CANCELLED)
+    assert rig.all("MISSION_REQUEST_INT", 3 * FRAMES_PER_RETRY) == []
+
+
+def test_count_0_and_clear_both_clear():
+    rig = Rig()
+    for request in (
+        ("MISSION_COUNT", {"count": 0}),
+        ("MISSION_CLEAR_ALL", {}),
+        ("MISSION_CLEAR_ALL", {"mission_type": 255}),
+    ):
+        rig.vehicle.items = OLD_PLAN
+        rig.client.send(request[0], target_component=1, **request[1])
+        assert rig.only("MISSION_ACK").type == ACCEPTED
+        assert rig.vehicle.items == []
+
+
+def test_plan_may_not_be_cleared_while_another_is_uploaded():
+    rig = Rig()
+    start(rig, 3)
+    rig.second_client.send("MISSION_CLEAR_ALL", target_component=1)
+    rig.frame()
+    (ack,) = [m.fields for m in rig.second_client.received() if m.name == "MISSION_ACK"]
+    assert ack.type == mavlink.MAV_MISSION_DENIED
+
+
+def test_too_many_items_are_refused():
+    rig = Rig()
+    rig.client.send("MISSION_COUNT", target_component=1, count=65_535)
+    assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_NO_SPACE
+
+
+@pytest.mark.parametrize("mission_type", [1, 2])
+def test_fences_and_rally_points_are_empty_and_cannot_be_stored(mission_type):
+    rig = Rig()
+    of_type = {"target_component": 1, "mission_type": mission_type}
+    rig.client.send("MISSION_REQUEST_LIST", **of_type)
+    assert rig.only("MISSION_COUNT")[2:] == (0, mission_type)
+    rig.client.send("MISSION_CLEAR_ALL", **of_type)
+    assert rig.only("MISSION_ACK")[2:] == (ACCEPTED, mission_type)
+    rig.client.send("MISSION_COUNT", count=0, **of_type)
+    assert rig.only("MISSION_ACK")[2:] == (ACCEPTED, mission_type)
+    rig.client.send("MISSION_COUNT", count=3, **of_type)
+    assert rig.only("MISSION_ACK")[2:] == (mavlink.MAV_MISSION_UNSUPPORTED, mission_type)
+    rig.client.send("MISSION_REQUEST_INT", seq=0, **of_type)
+    assert rig.only("MISSION_ACK")[2:] == (mavlink.MAV_MISSION_INVALID_SEQUENCE, mission_type)
+    send_item(rig.client, PLAN[0], mission_type=mission_type)
+    assert rig.only("MISSION_ACK")[2:] == (mavlink.MAV_MISSION_UNSUPPORTED, mission_type)
+
+
+def test_list_that_does_not_exist_is_refused():
+    rig = Rig()
+    for name in ("MISSION_REQUEST_LIST", "MISSION_CLEAR_ALL", "MISSION_COUNT"):
+        rig.client.send(name, target_component=1, mission_type=77)
+        assert rig.only("MISSION_ACK")[2:] == (mavlink.MAV_MISSION_UNSUPPORTED, 77)
+
+
+def test_partial_lists_are_refused():
+    rig = Rig()
+    rig.client.send("MISSION_WRITE_PARTIAL_LIST", target_component=1, start_index=0, end_index=1)
+    assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_UNSUPPORTED
+    rig.client.send("MISSION_REQUEST_PARTIAL_LIST", target_component=1, start_index=0, end_index=1)
+    assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_UNSUPPORTED
+
+
+def test_items_are_served_in_any_order_and_repeatedly():
+    rig = Rig()
+    rig.vehicle.items = PLAN
+    for seq in (2, 0, 2, 1):
+        rig.client.send("MISSION_REQUEST_INT", target_component=1, seq=seq)
+        assert rig.only("MISSION_ITEM_INT").seq == seq
+    rig.client.send("MISSION_REQUEST_INT", target_component=1, seq=3)
+    assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_SEQUENCE
+
+
+def test_download_is_not_torn_by_an_upload():
+    rig = Rig()
+    rig.vehicle.items = OLD_PLAN
+    rig.client.send("MISSION_REQUEST_LIST", target_component=1)
+    rig.frame()
+    rig.vehicle.items = PLAN
+    rig.client.send("MISSION_REQUEST_INT", target_component=1, seq=0)
+    assert item_from_fields(rig.only("MISSION_ITEM_INT")) == OLD_PLAN[0]
+    assert download(rig) == PLAN
+
+
+def test_float_items_are_still_served_and_taken():
+    rig = Rig()
+    rig.vehicle.items = PLAN
+    rig.client.send("MISSION_REQUEST", target_component=1, seq=1)
+    item = rig.only("MISSION_ITEM")
+    assert (item.x, item.z) == (pytest.approx(47.398, abs=1e-5), 20.0)
+    start(rig, 1)
+    rig.client.send("MISSION_ITEM", **(item._asdict() | {"seq": 0, "target_system": 1, "target_component": 1}))
+    assert rig.only("MISSION_ACK").type == ACCEPTED
+    assert rig.vehicle.items[0].x == pytest.approx(47.398, abs=1e-5)
+
+
+def test_positions_are_scaled_by_their_frame():
+    local = MissionItem(0, 1, 16, (0.0,) * 4, 12.5, -3.25, -10.0)
+    assert scaled_position(local) == (125_000, -32_500)
+    assert scaled_position(MissionItem(0, 2, 177, (0.0,) * 4, 3.0, 4.0, 0.0)) == (3, 4)
+    unset = MissionItem(0, 6, 16, (0.0,) * 4, float("nan"), float("nan"), 0.0)
+    assert scaled_position(unset) == (2**31 - 1, 2**31 - 1)
+
+
+def test_unset_position_is_nan():
+    rig = Rig()
+    start(rig, 1)
+    send_item(rig.client, PLAN[0], x=2**31 - 1, y=2**31 - 1)
+    rig.frame()
+    assert isnan(rig.vehicle.items[0].x)
+
+
+def test_set_current_is_answered_by_the_current_item():
+    rig = Rig()
+    rig.frame(2)
+    rig.client.send("MISSION_SET_CURRENT", target_component=1, seq=1)
+    assert len(rig.all("MISSION_CURRENT")) == 1
+    assert rig.vehicle.calls == [("set_current_item", 1)]
+    rig.vehicle.reply = Reply(Verdict.DENIED, "there is no item 9")
+    rig.client.send("MISSION_SET_CURRENT", target_component=1, seq=9)
+    assert texts(rig.frame()) == ["Mission: there is no item 9"]
