@@ -39,7 +39,7 @@ class Summary:
     vel_rms_m_s: float  # worst axis
     tilt_rms_deg: float
     yaw_rms_deg: float
-    clearance_min_m: float  # in flight, to trunk, crown, wall or ground
+    clearance_min_m: float  # to trees and walls
     battery_remaining: float
     innovations_in_band: dict[str, float]  # share of normalised innovations within 1.96 sigma, per source
 
@@ -102,10 +102,9 @@ def segment_distance_m(points: Rows, start: Rows, end: Rows) -> Rows:
 
 
 def clearance_min_m(history: History, world: WorldMap) -> float:
-    """Least distance to anything while airborne, sampled at 5 Hz from 3 m above the take-off point on."""
-    flying = history.is_armed & (history.pos_ned_true[:, 2] < -3.0) & (history.mode != Mode.LAND)
-    points = history.pos_ned_true[flying][::CLEARANCE_EVERY_FRAMES]
-    return min((float(world.clearance(point)) for point in points.astype(float)), default=float("nan"))
+    """Least distance to a tree or wall [m] while armed, sampled at 5 Hz; infinite in an empty world."""
+    points = history.pos_ned_true[history.is_armed][::CLEARANCE_EVERY_FRAMES]
+    return float(np.min(world.obstacle_distance(points.astype(float)))) if len(points) else float("nan")
 
 
 def _rms(errors: Rows) -> Any:

@@ -32,7 +32,7 @@ def estimate(vel=(0.0, 0.0, 0.0), omega=(0.0, 0.0, 0.0), flags=VELOCITY_VALID, d
 
 def seconds_until_landed(landing, thrust, limit_s=20.0, **kwargs):
     for i in range(round(limit_s / DT_S)):
-        if landing.update(estimate(**kwargs), thrust, DT_S):
+        if landing.update(estimate(**kwargs), thrust, 0.3, DT_S):
             return (i + 1) * DT_S
     return None
 
@@ -75,4 +75,24 @@ def test_descent_in_strong_turbulence_is_never_taken_for_a_landing():
         wanted = np.clip(HOVER * (1.0 + (vel_d - 0.7) * 0.6), 0.08, 1.0)
         thrust += (wanted - thrust) * DT_S / 0.1
         vel_d += (9.8 * (1.0 - thrust / HOVER) - 0.4 * (vel_d + gust)) * DT_S
-        assert not landing.update(estimate(vel=(0.0, 0.0, vel_d), down=-20.0), thrust, DT_S)
+        assert not landing.update(estimate(vel=(0.0, 0.0, vel_d), down=-20.0), thrust, 0.7, DT_S)
+
+
+@pytest.mark.parametrize(
+    ("height", "sink", "descent_sp", "is_felt"),
+    [
+        (0.25, 0.0, 0.3, True),
+        (0.25, 0.3, 0.3, False),  # still sinking
+        (0.60, 0.0, 0.3, False),  # stalled by a gust, well above the ground
+        (0.25, 0.0, 0.0, False),  # a low hover
+    ],
+)
+def test_descent_that_stalls_just_above_the_ground_is_contact_though_the_thrust_is_still_high(
+    height, sink, descent_sp, is_felt
+):
+    landing = LandingDetector(ParameterTable([*COMMANDER_PARAMETERS, *CONTROL_PARAMETERS]), HOVER, 0.22)
+    row = estimate(vel=(0.0, 0.0, sink), flags=VELOCITY_VALID | TERRAIN_VALID, down=-height)
+    for _ in range(10):
+        landing.update(row, HOVER, descent_sp, DT_S)
+    assert landing.has_contact == is_felt
+    assert not landing.is_landed

@@ -1,4 +1,4 @@
-"""A small closed loop for tests of the controller: a rigid body with motor lag and drag, no sensors, no ground.
+"""A small closed loop for tests of the controller: a rigid body with motor lag and drag, no sensors.
 
 Independent of `sim`: the estimate is the truth, the command reaches the motors one tick later.
 """
@@ -43,6 +43,9 @@ class RigModel:
     drag_square: float  # [1/m]
     thrust_scale: float  # true over modelled thrust
     voltage_share: float
+    has_ground: int  # a floor at height 0 that carries but does not rub
+    estimate_offset_ned: wp.vec3
+    reset_count: int
 
 
 @wp.func
@@ -63,18 +66,21 @@ def rig_substep(airframe: ControlAirframe, model: RigModel, body: RigBody, wind_
     drag = -air * (model.drag_linear + model.drag_square * wp.length(air))
     lift = wp.quat_rotate(body.q_ned_from_frd, wp.vec3(0.0, 0.0, -collective / airframe.mass_kg))
     accel = lift + drag
+    if model.has_ground == 1 and body.pos_ned[2] >= 0.0 and accel[2] + _GRAVITY > 0.0:
+        accel[2] = -_GRAVITY
+        after.vel_ned[2] = wp.min(body.vel_ned[2], 0.0)
     momentum = wp.cw_mul(airframe.inertia_kg_m2, body.omega_frd)
     turn = wp.cw_div(torque - wp.cross(body.omega_frd, momentum), airframe.inertia_kg_m2)
     after.omega_frd = body.omega_frd + turn * dt
     after.q_ned_from_frd = wp.normalize(body.q_ned_from_frd * quat_from_rotvec(after.omega_frd * dt))
-    after.vel_ned = body.vel_ned + (accel + wp.vec3(0.0, 0.0, _GRAVITY)) * dt
+    after.vel_ned = after.vel_ned + (accel + wp.vec3(0.0, 0.0, _GRAVITY)) * dt
     after.pos_ned = body.pos_ned + 0.5 * (body.vel_ned + after.vel_ned) * dt
     after.accel_frd = wp.quat_rotate_inv(body.q_ned_from_frd, accel)
     return after
 
 
 @wp.func
-def rig_estimate(body: RigBody, tick: int) -> Estimate:
+def rig_estimate(model: RigModel, body: RigBody, tick: int) -> Estimate:
     est = Estimate()
     est.time_us = wp.int64(tick + 1) * wp.int64(4000)
     est.flags = 31
@@ -82,7 +88,9 @@ def rig_estimate(body: RigBody, tick: int) -> Estimate:
     est.omega_frd = body.omega_frd
     est.accel_frd = body.accel_frd
     est.vel_ned = body.vel_ned
-    est.pos_ned = body.pos_ned
+    est.pos_ned = body.pos_ned + model.estimate_offset_ned
+    est.pos_reset_ned = model.estimate_offset_ned
+    est.reset_count = model.reset_count
     est.accel_ned = wp.quat_rotate(body.q_ned_from_frd, body.accel_frd) + wp.vec3(0.0, 0.0, _GRAVITY)
     return est
 
@@ -112,7 +120,7 @@ def rig_kernel(
         wind = wind_ned[i, tick % wind_ned.shape[1]]
         for _sub in range(4):
             body = rig_substep(airframe, model, body, wind, 0.001)
-        state = control_tick(params[0], airframe, state, rig_estimate(body, tick), setpoints[i], battery, tick)
+        state = control_tick(params[0], airframe, state, rig_estimate(model, body, tick), setpoints[i], battery, tick)
         body.command = state.actuators.command
         if log.shape[0] > 0:
             log[i, step] = body
@@ -132,6 +140,7 @@ class Rig:
     drag_square: float = 0.02
     thrust_scale: float = 1.0
     voltage_share: float = 1.0
+    has_ground: bool = False
     start_ned: tuple[float, float, float] = (0.0, 0.0, -10.0)
 
     def __post_init__(self) -> None:
@@ -142,6 +151,7 @@ class Rig:
         self.model.fall_s = data.rotor_model.spin_down_time_s
         self.model.drag_linear, self.model.drag_square = self.drag_linear, self.drag_square
         self.model.thrust_scale, self.model.voltage_share = self.thrust_scale, self.voltage_share
+        self.model.has_ground = int(self.has_ground)
         self.control_params = wp.array([control_params(self.params)], dtype=ControlParams, device="cpu")
         self.airframes = wp.array([airframe], dtype=ControlAirframe, device="cpu")
         count = self.vehicle_count
@@ -158,6 +168,8 @@ class Rig:
         root = 2.0 * share / (straight + np.sqrt(straight**2 + 4.0 * airframe.command_curve * share))
         rows["command"][:, : airframe.rotor_count] = root**2
         rows["accel_frd"] = (0.0, 0.0, -GRAVITY_M_S2)
+        self.idle_command = data.rotor_model.idle_command
+        self.hover_share = thrust / (airframe.thrust_n_s2 * airframe.max_speed_rad_s**2)
         self.wind = wp.zeros((count, 1), dtype=wp.vec3, device="cpu")
         self.tick = 0
         self.set(kind=SETPOINT_TRAJECTORY, is_armed=1, pos_ned=self.start_ned)
@@ -186,6 +198,11 @@ class Rig:
         }
         for name, value in {**free, **fields}.items():
             rows[name] = value
+
+    def jump_estimate(self, offset_ned: tuple[float, float, float]) -> None:
+        """Lets the estimated position jump once by `offset_ned` [m]."""
+        self.model.estimate_offset_ned = wp.vec3(*offset_ned)
+        self.model.reset_count += 1
 
     def blow(self, wind_ned: npt.NDArray[np.float64]) -> None:
         """Wind [m/s] per tick, shape (ticks, 3), the same for all vehicles, repeated."""
