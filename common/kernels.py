@@ -5,6 +5,10 @@ Array rows are `wp.struct`s: one row per vehicle, one field per physical quantit
 `array.numpy()["pos_ned"]` is a live view of that field.
 """
 
+import os
+import sys
+import tempfile
+
 import warp as wp
 
 MAX_ROTORS = 8
@@ -21,10 +25,25 @@ FRAME_US = TICK_US * FRAME_TICKS
 
 GRAVITY_M_S2 = 9.80665  # standard gravity, CGPM 1901
 
-wp.config.quiet = True
-wp.set_module_options({"enable_backward": False})
 
 
-def use_forward_only() -> None:
-    """Compiles the calling module without adjoint code (training never differentiates through kernels here)."""
-    wp.set_module_options({"enable_backward": False})
+def _start_warp() -> None:
+    """Initialises Warp without its greeting, and without its native warning that there is no CUDA driver."""
+    wp.config.log_level = wp.LOG_WARNING
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as captured:
+        os.dup2(captured.fileno(), 2)
+        try:
+            wp.init()
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+        captured.seek(0)
+        lines = captured.read().decode(errors="replace").splitlines()
+    for line in lines:
+        if "NVIDIA CUDA driver" not in line:
+            sys.stderr.write(line + "\n")
+
+
+_start_warp()

@@ -76,6 +76,7 @@ class Flight:
             home=config.home,
             seed=config.seed,
         )
+        self.rig.prepare(FRAME_TICKS)
         self.time_us = 0
         self.ready_s = nan  # power-on to ready to arm
         self.params = ParameterTable(all_parameters())

@@ -74,7 +74,8 @@ def fly_session(options: FlightOptions) -> int:
     folder = _new_folder(options.run_folder)
     links = [] if speed is None else _links(options)
     try:
-        flight = Flight(config, links=links, folder=folder)
+        with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
+            flight = Flight(config, links=links, folder=folder)
     except AirframeError as error:
         raise UserError(str(error)) from error
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))

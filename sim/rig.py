@@ -89,13 +89,18 @@ class Rig:
 
     def advance(self, tick_count: int) -> None:
         """Advances every vehicle by `tick_count` ticks of 4 ms."""
-        commands = self._commands.get(tick_count)
-        if commands is None:
-            commands = self._commands[tick_count] = self._record(tick_count)
+        commands = self.prepare(tick_count)
         if self._pool is None:
             commands[0].launch()
         else:
             list(self._pool.map(_launch, commands))
+
+    def prepare(self, tick_count: int) -> list[Any]:
+        """Compiles or loads the kernel for `advance(tick_count)`, so that the first advance takes no longer."""
+        commands = self._commands.get(tick_count)
+        if commands is None:
+            commands = self._commands[tick_count] = self._record(tick_count)
+        return commands
 
     def boot(self, chosen: Rows | None = None) -> None:
         """Powers vehicles on, on the ground at home; `chosen` marks them, shape (vehicles,), None for all."""

@@ -23,7 +23,6 @@ from autopilot.estimator.state import (
     WIND,
     Alignment,
     Nominal,
-    Output,
     Stillness,
 )
 from autopilot.ports import ImuSample, Samples
@@ -36,7 +35,7 @@ _PATIENCE_S = wp.constant(2.0)  # for rest, and for a first sample of barometer 
 _MAG_SAMPLES = wp.constant(5)
 _BARO_SAMPLES = wp.constant(5)
 _MOVING_TILT_STD = wp.constant(0.3)  # [rad] guess: aligned in motion
-_VEL_STD = wp.constant(0.3)  # [m/s] aligned at rest
+_VEL_STD = wp.constant(0.1)  # [m/s] aligned at rest
 _MOVING_VEL_STD = wp.constant(10.0)  # [m/s]
 _POS_STD = wp.constant(0.1)  # [m] the origin is where it stands
 _WIND_STD = wp.constant(5.0)  # [m/s] guess
@@ -121,13 +120,3 @@ def aligned_nominal(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: in
     if align.mag_count >= _MAG_SAMPLES and params.mag_type != MAG_TYPE_NONE:
         nominal = start_mag(params, cov, i, nominal, align.mag_frd / float(align.mag_count))
     return nominal
-
-
-@wp.func
-def start_output(nominal: Nominal) -> Output:
-    """An output predictor that agrees with the nominal state."""
-    output = Output()
-    output.q_raw = nominal.q_ned_from_frd
-    output.pos_raw_ned = nominal.pos_ned
-    output.q_correction = wp.quat_identity()
-    return output

@@ -9,12 +9,13 @@ import warp as wp
 from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.predict import delta_velocity_ned
 from autopilot.estimator.state import IMU_RING, Inbox, Nominal, Output, OutputSample
-from autopilot.ports import ImuSample
+from autopilot.ports import Estimate, ImuSample
 from common.kernels import GRAVITY_M_S2
 from common.rotation import quat_from_rotvec
 
 wp.set_module_options({"enable_backward": False})
 
+_MAX_STEPS = wp.constant(3)  # horizon steps per tick: catches up after a gap
 _MIN_DT_S = wp.constant(1.0e-4)
 _MAX_DT_S = wp.constant(0.1)  # a longer gap in a log would be integrated with a rate that is no longer true
 _TAU_ATT_S = wp.constant(0.1)  # guess: short against the controller's attitude loop seen by it as a disturbance
@@ -28,24 +29,22 @@ def bounded_sample(imu: ImuSample) -> ImuSample:
 
 
 @wp.func
-def receive(inbox: Inbox, time_us: wp.int64, ring_size: int, is_equal: bool, is_live: bool, stuck_after: int) -> Inbox:
+def receive(inbox: Inbox, time_us: wp.int64, ring_size: int, is_repeat: bool, stuck_after: int) -> Inbox:
     """The inbox after a new sample, which the caller puts into slot `head % ring_size` first.
 
     Args:
         inbox: of the sensor.
         time_us: of the sample.
         ring_size: slots; the oldest waiting sample is dropped when all are taken.
-        is_equal: the sample repeats the value of the one before.
-        is_live: False where equal values prove nothing: an ideal sensor on a vehicle at rest.
+        is_repeat: the sample repeats the value of the one before, and a live sensor would not.
         stuck_after: equal values in a row that mean stuck; a stuck sensor's waiting samples are dropped.
     """
     inbox.arrived_time_us = time_us
     inbox.head += 1
     if inbox.head - inbox.tail > ring_size:
         inbox.tail = inbox.head - ring_size
-    if is_equal:
-        if is_live:
-            inbox.repeat_count += 1
+    if is_repeat:
+        inbox.repeat_count += 1
     else:
         inbox.repeat_count = 0
         inbox.is_stuck = 0
@@ -57,13 +56,17 @@ def receive(inbox: Inbox, time_us: wp.int64, ring_size: int, is_equal: bool, is_
 
 
 @wp.func
-def due_count(
-    imu_ring: wp.array2d(dtype=ImuSample), i: int, head: int, tail: int, horizon_time_us: wp.int64, at_most: int
-) -> int:
-    """IMU samples that the horizon has reached."""
+def is_waiting(inbox: Inbox) -> bool:
+    """At least one sample waits."""
+    return inbox.tail < inbox.head
+
+
+@wp.func
+def due_count(imu_ring: wp.array2d(dtype=ImuSample), i: int, head: int, tail: int, horizon_time_us: wp.int64) -> int:
+    """IMU samples that the horizon has reached, at most _MAX_STEPS."""
     count = int(0)
-    for k in range(at_most):
-        if tail + k < head:
+    for k in range(_MAX_STEPS):
+        if count == k and tail + k < head:
             if imu_ring[i, (tail + k) % IMU_RING].time_us <= horizon_time_us:
                 count = k + 1
     return count
@@ -118,3 +121,63 @@ def jump_output(output: Output, nominal: Nominal) -> Output:
     yaw = quat_from_rotvec(wp.vec3(0.0, 0.0, nominal.yaw_jump))
     output.q_correction = wp.normalize(yaw * output.q_correction)
     return output
+
+
+@wp.func
+def start_output(nominal: Nominal) -> Output:
+    """An output predictor that agrees with the nominal state."""
+    output = Output()
+    output.q_raw = nominal.q_ned_from_frd
+    output.vel_raw_ned = nominal.vel_ned
+    output.pos_raw_ned = nominal.pos_ned
+    output.q_correction = wp.quat_identity()
+    return output
+
+
+@wp.func
+def output_sample(output: Output) -> OutputSample:
+    """The raw integrals, for the ring."""
+    sample = OutputSample()
+    sample.q_raw = output.q_raw
+    sample.vel_raw_ned = output.vel_raw_ned
+    sample.pos_raw_ned = output.pos_raw_ned
+    return sample
+
+
+@wp.func
+def with_jump(estimate: Estimate, nominal: Nominal) -> Estimate:
+    """The estimate with the jumps of the latest reset."""
+    estimate.pos_reset_ned = nominal.pos_jump_ned
+    estimate.vel_reset_ned = nominal.vel_jump_ned
+    estimate.yaw_reset = nominal.yaw_jump
+    return estimate
+
+
+@wp.func
+def predicted_estimate(estimate: Estimate, nominal: Nominal, output: Output, imu: ImuSample) -> Estimate:
+    """The estimate at the newest IMU sample; flags, deviations and jumps stay."""
+    estimate.time_us = imu.time_us
+    estimate.omega_frd = imu.gyro_frd - nominal.gyro_bias_frd
+    estimate.accel_frd = imu.accel_frd - nominal.accel_bias_frd
+    estimate.q_ned_from_frd = output_attitude(output)
+    estimate.vel_ned = output.vel_raw_ned + output.vel_correction_ned
+    estimate.pos_ned = output.pos_raw_ned + output.pos_correction_ned
+    gravity_ned = wp.vec3(0.0, 0.0, GRAVITY_M_S2)
+    estimate.accel_ned = wp.quat_rotate(estimate.q_ned_from_frd, estimate.accel_frd) + gravity_ned
+    estimate.gyro_bias_frd = nominal.gyro_bias_frd
+    estimate.accel_bias_frd = nominal.accel_bias_frd
+    estimate.wind_ned = nominal.wind_ned
+    estimate.terrain_d = nominal.terrain_d
+    estimate.reset_count = nominal.reset_count
+    return estimate
+
+
+@wp.func
+def raw_estimate(imu: ImuSample) -> Estimate:
+    """What is known before alignment: the IMU itself."""
+    estimate = Estimate()
+    estimate.time_us = imu.time_us
+    estimate.omega_frd = imu.gyro_frd
+    estimate.accel_frd = imu.accel_frd
+    estimate.q_ned_from_frd = wp.quat_identity()
+    return estimate

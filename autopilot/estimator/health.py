@@ -18,6 +18,7 @@ from autopilot.estimator.state import (
     EstimatorState,
     GnssWander,
     Inbox,
+    Nominal,
 )
 from autopilot.ports import (
     DEAD_RECKONING,
@@ -35,7 +36,7 @@ from common.kernels import ERROR_STATES, vec24
 wp.set_module_options({"enable_backward": False})
 
 _SILENT_AFTER_S = wp.constant(1.0)  # five samples of the slowest source
-_DEAD_RECKONING_AFTER_S = wp.constant(1.0)
+DEAD_RECKONING_AFTER_S = wp.constant(1.0)
 _TERRAIN_AFTER_S = wp.constant(2.0)
 _MAX_TILT_VAR = wp.constant(0.01)  # rad²: 6 deg
 _MAX_YAW_VAR = wp.constant(0.07)  # rad²: 15 deg
@@ -54,25 +55,27 @@ def listen(aid: Aid, inbox: Inbox, horizon_time_us: wp.int64) -> Aid:
 
 
 @wp.func
-def is_sound(cov: wp.array2d(dtype=vec24), i: int) -> bool:
-    """Every variance is a positive, finite number."""
-    is_good = bool(True)
-    for r in range(ERROR_STATES):
-        variance = cov[i, r][r]
-        # written so that a NaN fails
-        if not (variance > _MIN_VAR and variance < _MAX_VAR):
-            is_good = False
-    return is_good
+def is_healthy(aid: Aid) -> bool:
+    """The source is in use and agrees with the estimate."""
+    return aid.is_active == 1 and aid.test_ratio_lpf < 1.0
 
 
 @wp.func
-def lift_variances(cov: wp.array2d(dtype=vec24), i: int) -> None:
-    """Adds to variances that rounding brought below a floor; adding to the diagonal keeps the matrix positive."""
+def is_sound(cov: wp.array2d(dtype=vec24), i: int, nominal: Nominal) -> bool:
+    """Every variance is a positive, finite number, after those that rounding brought below a floor were lifted.
+
+    Lifting is safe: adding to the diagonal keeps a matrix positive.
+    """
+    is_good = wp.isfinite(nominal.q_ned_from_frd) and wp.isfinite(nominal.vel_ned) and wp.isfinite(nominal.pos_ned)
     for r in range(ERROR_STATES):
         row = cov[i, r]
-        if row[r] < 10.0 * _MIN_VAR:
-            row[r] = 10.0 * _MIN_VAR
+        if row[r] < _MIN_VAR and row[r] > -_MIN_VAR:
+            row[r] = _MIN_VAR
             cov[i, r] = row
+        # written so that a NaN fails
+        if not (row[r] > 0.0 and row[r] < _MAX_VAR):
+            is_good = False
+    return is_good
 
 
 @wp.func
@@ -107,7 +110,7 @@ def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: 
             bits = bits | POSITION_VALID
         if vel_s < params.no_aid_s:
             bits = bits | VELOCITY_VALID
-        if vel_s > _DEAD_RECKONING_AFTER_S:
+        if vel_s > DEAD_RECKONING_AFTER_S:
             bits = bits | DEAD_RECKONING
         height_s = seconds_since(now_us, state.baro.fused_time_us)
         if state.baro.is_active == 0:

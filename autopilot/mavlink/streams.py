@@ -13,11 +13,12 @@ from autopilot.mavlink.identity import autopilot_version
 from autopilot.mavlink.links import LinkRole
 from autopilot.mavlink.telemetry import motion, sensors, status
 from autopilot.vehicle import VehicleState
+from common.kernels import FRAME_US
 
 Builder = Callable[[VehicleState], bytes | None]
 Send = Callable[[MessageType, bytes], object]
 
-FRAME_US = 20_000  # nothing is sent more often than the server runs
+
 SPREAD = 8  # streams start at different eighths of their interval, so that no frame has to send them all
 NEVER_US = 1 << 62
 
@@ -114,7 +115,7 @@ class StreamSchedule:
         self._is_planned = False
 
     def set_interval(self, msg_id: int, interval_us: int) -> None:
-        """Sends a message every `interval_us`, rounded up to a frame; 0: default interval; negative: never."""
+        """Sends a message every `interval_us`, but at most once per frame; 0: default interval; negative: never."""
         if interval_us == 0:
             self._change(msg_id, self._defaults[msg_id])
         else:

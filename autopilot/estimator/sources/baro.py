@@ -37,6 +37,12 @@ def baro_height(pressure_pa: float) -> float:
 
 
 @wp.func
+def baro_repeats(sample: BaroSample, previous: BaroSample) -> bool:
+    """Both samples hold the same pressure."""
+    return sample.pressure_pa == previous.pressure_pa
+
+
+@wp.func
 def fuse_baro(
     params: EstimatorParams,
     cov: wp.array2d(dtype=vec24),

@@ -66,6 +66,12 @@ def start_mag(
 
 
 @wp.func
+def mag_repeats(sample: MagSample, previous: MagSample) -> bool:
+    """Both samples hold the same field."""
+    return sample.field_frd_gauss == previous.field_frd_gauss
+
+
+@wp.func
 def body_axis_ned(rot: wp.mat33, axis: int) -> wp.vec3:
     """Direction of a body axis in ned: a column of the rotation matrix."""
     return wp.vec3(rot[0, axis], rot[1, axis], rot[2, axis])

@@ -22,6 +22,12 @@ _RESTART_AFTER_S = wp.constant(5.0)
 
 
 @wp.func
+def range_repeats(sample: RangeSample, previous: RangeSample) -> bool:
+    """Both samples hold the same distance; out of range, a live sensor repeats its limit."""
+    return sample.is_valid == 1 and sample.distance_m == previous.distance_m
+
+
+@wp.func
 def fuse_range(
     params: EstimatorParams,
     cov: wp.array2d(dtype=vec24),

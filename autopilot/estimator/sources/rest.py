@@ -60,11 +60,10 @@ def observe_stillness(still: Stillness, imu: ImuSample) -> Stillness:
 
 
 @wp.func
-def rest_is_due(aid: Aid, still: Stillness, nominal: Nominal, time_us: wp.int64) -> bool:
-    """The vehicle rests and the last zero-velocity update is a while ago."""
+def rest_is_due(aid: Aid, nominal: Nominal, time_us: wp.int64) -> bool:
+    """The estimate does not speak against rest, and the last zero-velocity update is a while ago."""
     return (
-        still.is_still == 1
-        and wp.length_sq(nominal.vel_ned) < _MAX_SPEED * _MAX_SPEED
+        wp.length_sq(nominal.vel_ned) < _MAX_SPEED * _MAX_SPEED
         and seconds_since(time_us, aid.judged_time_us) > _PERIOD_S
     )
 

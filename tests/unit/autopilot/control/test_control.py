@@ -158,7 +158,8 @@ def test_landed_vehicle_idles_and_take_off_ramps_up_without_a_jump() -> None:
     rig.set(pos_ned=(0.0, 0.0, -2.5))
     bodies, states = rig.run(5.0)
     thrust = states["actuators"]["thrust_sp"][0]
-    assert np.diff(thrust).max() < 0.012  # 0.6 s from nothing to all, in ticks of 4 ms
+    assert np.diff(thrust).max() < 0.05  # of the greatest; the velocity loop steps at 50 Hz
+    assert np.diff(thrust[:50]).max() < 0.007  # 0.6 s from nothing to all, in ticks of 4 ms
     lift_off_s = np.flatnonzero(bodies["pos_ned"][0, :, 2] < -0.01)[0] * 0.004
     assert lift_off_s < 0.8
     accel = bodies["accel_frd"][0]
@@ -172,9 +173,9 @@ def test_integrals_do_not_wind_up_against_a_wind_that_is_too_strong() -> None:
     rig.set(pos_ned=rig.start_ned)
     calm = rig.wind
     rig.blow(np.array([[40.0, 0.0, 0.0]]))
-    rig.run(6.0)
+    rig.run(3.0)
     rig.wind = calm
-    back, _ = rig.run(25.0)
+    back, _ = rig.run(40.0)
     pos = back["pos_ned"][0]
     assert pos[0, 0] > 5.0  # it was blown away
     assert pos[:, 0].min() > -1.0  # and does not shoot past the place on its return

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from autopilot.estimator.ekf import Ekf, estimator_tick, make_ekf
+from autopilot.estimator.ekf import Ekf, estimator_step, make_ekf
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS, estimator_params
 from autopilot.estimator.state import EstimatorState
 from autopilot.ports import Samples
@@ -21,12 +21,10 @@ def run_samples(
     ekf: Ekf, samples: wp.array2d(dtype=Samples), first: int, count: int, trace: wp.array2d(dtype=EstimatorState)
 ):
     i = wp.tid()
-    state = ekf.rows[i]
     for k in range(count):
-        state = estimator_tick(ekf, i, state, samples[i, first + k])
+        estimator_step(ekf, i, samples[i, first + k])
         if trace.shape[1] > 0:
-            trace[i, k] = state
-    ekf.rows[i] = state
+            trace[i, k] = ekf.rows[i]
 
 
 def default_ekf(vehicle_count: int = 1, **changes: float) -> Ekf:

@@ -1,0 +1,88 @@
+"""Vehicles that hover in wind, for the benchmarks of the batch: what they are, and whether they fly as they should."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from autopilot.navigator.setpoint import SetpointPort
+from autopilot.params import parameter_table
+from bench.row import require
+from common.airframe import load_airframe
+from sim.rig import Rig, Snapshot
+from sim.sensors.sensors import DEFAULT_HOME, sensor_model
+from sim.wind import wind_model
+from sim.world.world import build_world
+
+HEIGHT_M = 10.0
+_SEED_COUNT = 128  # vehicles flown from power-on; larger fleets are copies with noise of their own
+_ALIGN_TICKS = 2000
+_CLIMB_TICKS = 2000
+
+
+def hovering(vehicle_count: int, *, has_estimator: bool = True, threads: int = 1) -> Rig:
+    """X500s 10 m over home in 5 m/s of turbulent wind with gusts, default noise, the default world below."""
+    rig = _rig(vehicle_count, has_estimator, threads)
+    rows = np.arange(vehicle_count)
+    rig.restore(_hovers(has_estimator), rows, rows % _SEED_COUNT, rows + 1)
+    rig.advance(250)
+    check(rig, has_estimator=has_estimator)
+    return rig
+
+
+def check(rig: Rig, *, has_estimator: bool) -> None:
+    """Every vehicle holds its place in truth, and by its own estimate where it has one.
+
+    Raises:
+        WrongResult: one does not.
+    """
+    target = np.array([0.0, 0.0, -HEIGHT_M])
+    body = rig.arrays.body.numpy()
+    require(not body["is_crashed"].any(), "a vehicle has crashed")
+    error = np.linalg.norm(body["pos_ned"] - target, axis=1)
+    require(error.max() < (5.0 if has_estimator else 0.5), f"a vehicle is {error.max():.2f} m from its place")
+    if has_estimator:
+        estimate = rig.arrays.autopilot.ekf.rows.numpy()["estimate"]["pos_ned"]
+        error = np.linalg.norm(estimate - target, axis=1)
+        require(error.max() < 1.0, f"a vehicle is {error.max():.2f} m from its place by its own estimate")
+
+
+def same_bits(first: Snapshot, second: Snapshot) -> bool:
+    """Equal to the bit, NaN too; the padding inside rows is left out."""
+    pairs = zip(first, second, strict=True)
+    return all(a.tobytes() == b.tobytes() for x, y in pairs for a, b in zip(_leaves(x), _leaves(y), strict=True))
+
+
+def _leaves(rows: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:
+    if rows.dtype.names is None:
+        return [rows]
+    return [leaf for name in rows.dtype.names for leaf in _leaves(rows[name])]
+
+
+def _rig(vehicle_count: int, has_estimator: bool, threads: int) -> Rig:
+    rig = Rig(
+        load_airframe("x500"),
+        build_world(),
+        sensor_model(home=DEFAULT_HOME),
+        wind_model(5.0, 270.0, 1.0, 1.5),
+        home=DEFAULT_HOME,
+        vehicle_count=vehicle_count,
+        has_estimator=has_estimator,
+        threads=threads,
+    )
+    rig.load_parameters(parameter_table())
+    return rig
+
+
+@cache
+def _hovers(has_estimator: bool) -> Snapshot:
+    rig = _rig(_SEED_COUNT, has_estimator, 1)
+    rig.advance(_ALIGN_TICKS)
+    rows = rig.arrays.autopilot.setpoint.numpy()
+    for i in range(_SEED_COUNT):
+        port = SetpointPort(rows[i : i + 1])
+        port.set_flags(is_armed=True, is_landed=False)
+        port.fly_to((0.0, 0.0, -HEIGHT_M), 0.0)
+        port.write()
+    rig.advance(_CLIMB_TICKS)
+    return rig.snapshot()

@@ -1,0 +1,77 @@
+"""How long is the first compile of everything, and how long is it from the command to the first heartbeat?"""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from bench.row import Row, best_of, require
+
+HEARTBEAT_ID = 0
+MAVLINK_2 = 0xFD
+TIMEOUT_S = 120.0
+COMMAND = "python -m bench startup"
+EVERYTHING = """
+import gymnasium
+import policies
+from bench.fleet import hovering
+from mission.flight import Flight, FlightConfig
+Flight(FlightConfig()).frame()
+gymnasium.make("honeyguide/Hover-v0").reset(seed=0)
+hovering(1, has_estimator=False)
+"""
+
+
+def measure() -> list[Row]:
+    return [
+        Row("first compile of everything", _compile_s(), "s", "lower", 60.0, COMMAND),
+        Row("warm start: command to first heartbeat", _heartbeat_s(), "s", "lower", 3.0, COMMAND),
+    ]
+
+
+def _compile_s() -> float:
+    """A process that flies each kind of rig a little, with an empty kernel cache."""
+    with TemporaryDirectory() as cache:
+        environment = os.environ | {"WARP_CACHE_PATH": cache}
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-c", EVERYTHING], env=environment, check=True, stdout=subprocess.DEVNULL)
+        spent = time.perf_counter() - start
+        require(any(Path(cache).rglob("*.o")), "nothing was compiled")
+    return spent
+
+
+def _heartbeat_s() -> float:
+    _first_heartbeat_s()  # fills the kernel cache where it is empty
+    return best_of(3, _first_heartbeat_s)
+
+
+def _first_heartbeat_s() -> float:
+    """Starts `honeyguide fly --idle`, waits for a MAVLink heartbeat on the ground station's port and stops it."""
+    program = Path(sys.executable).with_name("honeyguide")
+    with TemporaryDirectory() as folder, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.bind(("127.0.0.1", 0))
+        station.settimeout(TIMEOUT_S)
+        command = [program, "fly", "--idle", "--gcs-port", str(station.getsockname()[1]), "--run-folder", folder]
+        start = time.perf_counter()
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        try:
+            while not _is_heartbeat(station.recv(2048)):
+                pass
+            return time.perf_counter() - start
+        except TimeoutError:
+            process.kill()
+            text = process.communicate()[1].decode()
+            require(False, f"no heartbeat in {TIMEOUT_S:.0f} s: {text}")  # noqa: FBT003
+            raise
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(TIMEOUT_S)
+
+
+def _is_heartbeat(datagram: bytes) -> bool:
+    """MAVLink 2 frame whose 24-bit message id is that of HEARTBEAT."""
+    return len(datagram) >= 10 and datagram[0] == MAVLINK_2 and int.from_bytes(datagram[7:10], "little") == HEARTBEAT_ID
