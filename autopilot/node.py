@@ -119,7 +119,11 @@ class FlightController:
         self._setpoint = SetpointPort(ports.setpoint)
         hover = hover_thrust(airframe)
         self.commander = Commander(
-            self.state, params, self._relay, BatteryEstimator(airframe.battery), LandingDetector(params, hover, airframe.contact.leg_z_m)
+            self.state,
+            params,
+            self._relay,
+            BatteryEstimator(airframe.battery),
+            LandingDetector(params, hover, airframe.contact.leg_z_m),
         )
         context = NavContext(self.state, params, self._relay, self._setpoint, hover)
         self.navigator = Navigator(context, Mission(context, self.commander.set_home))

@@ -2,9 +2,8 @@
 
 The model is the airframe hovering: torque to body rate is an integrator behind the motors' first-order lag and the
 loop's delay; each outer loop sees the closed inner one. Gains are set from the inside out, each loop as fast as the
-design margins allow. The disturbance observer subtracts nothing the model knows of, so it appears only where the
-rotors push more or less than modelled: the rows +25 %, where the
-rotors push that much more.
+design margins allow. The disturbance observer subtracts nothing that the model knows of, so it appears only in the
+rows "+25 %", where the rotors push that much more than modelled.
 """
 
 from collections.abc import Callable, Mapping
@@ -145,13 +144,15 @@ class Cascade:
 
     def margins(self, loop: str) -> Margins:
         """Gain, phase and disk margins of one loop."""
-        system = self.loops()[loop]()
-        gain, phase_deg, _, crossover = control.margin(control.frd(system, OMEGA))
-        _, disk_gain_db, disk_phase_deg = control.disk_margins(system, OMEGA)
-        gain_db = 20.0 * np.log10(gain) if np.isfinite(gain) else np.inf
-        return Margins(
-            loop, float(gain_db), float(phase_deg), float(disk_gain_db), float(disk_phase_deg), float(crossover)
-        )
+        return margins_of(loop, self.loops()[loop]())
+
+
+def margins_of(loop: str, system: System) -> Margins:
+    """Gain, phase and disk margins of an open loop."""
+    gain, phase_deg, _, crossover = control.margin(control.frd(system, OMEGA))
+    _, disk_gain_db, disk_phase_deg = control.disk_margins(system, OMEGA)
+    gain_db = 20.0 * np.log10(gain) if np.isfinite(gain) else np.inf
+    return Margins(loop, float(gain_db), float(phase_deg), float(disk_gain_db), float(disk_phase_deg), float(crossover))
 
 
 def default_gains() -> Gains:
@@ -246,6 +247,10 @@ def _gain_table(airframe: Airframe, designed: Mapping[str, float]) -> Table:
     return table
 
 
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
 def main(
     airframe: Annotated[str, typer.Option(help="Name of an airframe, or path of its TOML file.")] = "x500",
 ) -> None:
@@ -265,4 +270,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    app()

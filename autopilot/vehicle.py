@@ -111,8 +111,11 @@ class OffboardSetpoint:
 
 @dataclass(slots=True)
 class VehicleState:
-    """The vehicle as of this frame. The four records are rows of the kernel structs of the same name
-    (autopilot.ports, autopilot.estimator.state) as named tuples: `state.estimate.pos_ned[2]`."""
+    """The vehicle as of this frame.
+
+    The four records are rows of the kernel structs of the same name (autopilot.ports, autopilot.estimator.state) as
+    named tuples: `state.estimate.pos_ned[2]`.
+    """
 
     time_us: int = 0
     estimate: Any = None  # Estimate

@@ -105,8 +105,6 @@ def _seconds(function: Callable[[], Any]) -> float:
 
 def _peer() -> Any:
     """PyFlyt's hover task, in the version that is installed."""
-    import PyFlyt.gym_envs
-
     return gymnasium.make(max(name for name in gymnasium.registry if name.startswith(PEER)))
 
 

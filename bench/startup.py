@@ -65,7 +65,7 @@ def _first_heartbeat_s() -> float:
         except TimeoutError:
             process.kill()
             text = process.communicate()[1].decode()
-            require(False, f"no heartbeat in {TIMEOUT_S:.0f} s: {text}")  # noqa: FBT003
+            require(False, f"no heartbeat in {TIMEOUT_S:.0f} s: {text}")
             raise
         finally:
             process.send_signal(signal.SIGINT)

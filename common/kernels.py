@@ -26,7 +26,6 @@ FRAME_US = TICK_US * FRAME_TICKS
 GRAVITY_M_S2 = 9.80665  # standard gravity, CGPM 1901
 
 
-
 def _start_warp() -> None:
     """Initialises Warp without its greeting, and without its native warning that there is no CUDA driver."""
     wp.config.log_level = wp.LOG_WARNING

@@ -36,7 +36,7 @@ def record_reader(dtype: np.dtype[Any], name: str) -> Callable[[Any, int], Any]:
 def row_reader(rows: np.ndarray[Any, Any], i_row: int, name: str) -> Callable[[], Any]:
     """A function that returns the present content of row `i_row` of a live structured view."""
     read = record_reader(rows.dtype, name)
-    buffer = memoryview(rows.view(np.uint8).reshape(-1))
+    buffer = rows.view(np.uint8).reshape(-1).data
     offset = i_row * rows.dtype.itemsize
     return lambda: read(buffer, offset)
 
@@ -57,5 +57,5 @@ def _record_expression(
         count = int(np.prod(field_type.shape)) if field_type.shape else 1
         leaves.append((start + offset, count, _CODES[field_type.base.str[1:]]))
         arguments.append(f"v[{i_value}:{i_value + count}]" if field_type.shape else f"v[{i_value}]")
-    scope[name] = namedtuple(name, dtype.names)  # type: ignore[misc]  # noqa: PYI024
+    scope[name] = namedtuple(name, dtype.names)  # noqa: PYI024
     return f"{name}({', '.join(arguments)})"

@@ -34,7 +34,9 @@ def fly(
         Path | None, typer.Option(help="A QGroundControl .plan or QGC WPL 110 file. Default: a tour of the hills.")
     ] = None,
     idle: Annotated[bool, typer.Option("--idle", help="Fly no plan: wait for a ground station.")] = False,
-    once: Annotated[bool, typer.Option("--once", help="End with the mission; exit code 0 only if it succeeded.")] = False,
+    once: Annotated[
+        bool, typer.Option("--once", help="End with the mission; exit code 0 only if it succeeded.")
+    ] = False,
     speed: Annotated[str, typer.Option(help="Times real time, or 'max': lockstep, without network links.")] = "1",
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this much simulated time.")] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of sensor noise and turbulence.")] = 0,
@@ -53,7 +55,7 @@ def fly(
     run_folder: Annotated[Path | None, typer.Option(help="Where logs go. Default: runs/DATE.")] = None,
 ) -> None:
     """Fly: world, vehicle, flight controller and MAVLink links, in real time or faster."""
-    from mission.session import FlightOptions, UserError, fly_session  # noqa: PLC0415  (Warp loads only to fly)
+    from mission.session import FlightOptions, UserError, fly_session
 
     try:
         exit_code = fly_session(
@@ -75,7 +77,7 @@ def estimate(
     output: Annotated[Path | None, typer.Option(help="Folder for the results. Default: beside the log.")] = None,
 ) -> None:
     """Run the estimator alone over the sensors recorded in a log."""
-    from mission.estimate import EstimateError, estimate_log  # noqa: PLC0415
+    from mission.estimate import EstimateError, estimate_log
 
     try:
         estimate_log(log, output, Console())

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Coroutine, Generator, Iterable, Sequence
 from math import isnan
 from types import TracebackType, coroutine
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from autopilot.mavlink.codec import Frame, FrameReader, Message, decode, encode, message_id
 from mission.plan import PlanItem
@@ -98,7 +98,7 @@ class Inbox:
         self._ids = {message_id(name) for name in names}
         self._queue: deque[Message] = deque()
 
-    def __enter__(self) -> "Inbox":
+    def __enter__(self) -> Self:
         self._client._inboxes.append((self._ids, self._queue))
         return self
 
@@ -219,16 +219,12 @@ class Client:
         fields |= {"frame": frame, "current": 0, "autocontinue": 0, "x": x, "y": y, "z": z}
         return await self._command("COMMAND_INT", command, fields, name or f"command {command}", COMMAND_TIMEOUT_S)
 
-    async def _command(
-        self, message: str, command: int, fields: dict[str, Any], name: str, timeout_s: float
-    ) -> Any:
+    async def _command(self, message: str, command: int, fields: dict[str, Any], name: str, timeout_s: float) -> Any:
         first_text = len(self.texts)
         with self.subscribe("COMMAND_ACK") as inbox:
             for attempt in range(COMMAND_TRIES):
                 extra = {"confirmation": attempt} if message == "COMMAND_LONG" else {}
-                self.send(
-                    message, target_system=self.system_id, target_component=1, command=command, **fields, **extra
-                )
+                self.send(message, target_system=self.system_id, target_component=1, command=command, **fields, **extra)
                 try:
                     ack = await inbox.next(timeout_s, name)
                     while ack.command != command or ack.result == 5:  # another command's, or IN_PROGRESS

@@ -12,8 +12,8 @@ from mission.recorder import History
 from sim.world.world import WorldMap
 
 mpl.use("Agg")
-from matplotlib.axes import Axes  # noqa: E402  (after the backend is chosen)
-from matplotlib.figure import Figure  # noqa: E402
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 Rows = npt.NDArray[Any]
 TRUE_COLOUR = "#0b7285"

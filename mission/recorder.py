@@ -15,7 +15,6 @@ import numpy.typing as npt
 from autopilot.node import FlightController
 from autopilot.vehicle import Severity
 from common.airframe import Airframe
-from common.kernels import FRAME_TICKS
 from common.ulog import UlogTopic, UlogWriter
 from mission.topics import TOPICS, Batch
 from sim.rig import Rig
@@ -50,7 +49,8 @@ class _RawRow:
 
     def __init__(self, rows: Rows) -> None:
         self._dtype = rows.dtype
-        self._buffer = memoryview(rows[0].view(np.uint8).reshape(-1) if rows.ndim > 1 else rows[:1].view(np.uint8))
+        first = rows[0] if rows.ndim > 1 else rows[:1]
+        self._buffer = first.view(np.uint8).reshape(-1).data
         self._copies: list[bytes] = []
 
     def copy(self) -> None:
@@ -173,10 +173,7 @@ class Recorder:
         if self._log is not None:
             self._log.close()
         return History(
-            *(
-                np.concatenate([getattr(part, name) for part in self._history])
-                for name in History.__dataclass_fields__
-            )
+            *(np.concatenate([getattr(part, name) for part in self._history]) for name in History.__dataclass_fields__)
         )
 
     def _write(self, batch: Batch, status: Rows, imu_rings: Rows) -> None:

@@ -102,7 +102,7 @@ class Drone(Client):
 
     @property
     def vel_ned(self) -> tuple[float, float, float]:
-        """[m/s]"""
+        """[m/s] As `pos_ned`."""
         message = self.latest("LOCAL_POSITION_NED")
         return (nan, nan, nan) if message is None else (message.vx, message.vy, message.vz)
 
@@ -190,9 +190,7 @@ class Drone(Client):
 
     # -- offboard ---------------------------------------------------------------------------------------------------
 
-    def offboard_position(
-        self, north_m: float, east_m: float, down_m: float, yaw_rad: float = nan
-    ) -> None:
+    def offboard_position(self, north_m: float, east_m: float, down_m: float, yaw_rad: float = nan) -> None:
         """From now on streams this position of the local frame, at 20 Hz."""
         mask = FREE_VELOCITY | FREE_ACCELERATION | FREE_YAW_RATE | (FREE_YAW if isnan(yaw_rad) else 0)
         self._stream_local(mask, FRAME_LOCAL_NED, pos=(north_m, east_m, down_m), yaw_rad=yaw_rad)
@@ -265,9 +263,7 @@ class Drone(Client):
             **dict.fromkeys(("afx", "afy", "afz", "yaw_rate"), 0.0),
             "yaw": 0.0 if isnan(yaw_rad) else yaw_rad,
         }
-        self._offboard = lambda time_ms: self.encode(
-            "SET_POSITION_TARGET_LOCAL_NED", time_boot_ms=time_ms, **fields
-        )
+        self._offboard = lambda time_ms: self.encode("SET_POSITION_TARGET_LOCAL_NED", time_boot_ms=time_ms, **fields)
 
     # -- helpers ----------------------------------------------------------------------------------------------------
 

@@ -63,8 +63,8 @@ def read_csv(path: Path) -> Recording:
             lines["gnss"],
             FIX_DTYPE,
             {
-                **{"lat_deg": 0, "lon_deg": 1, "alt_m": 2, "vel_ned": slice(3, 6), "pos_h_std": 6, "pos_v_std": 7},
-                **{"vel_std": 8, "fix_type": 9, "satellites": 10},
+                "lat_deg": 0, "lon_deg": 1, "alt_m": 2, "vel_ned": slice(3, 6), "pos_h_std": 6, "pos_v_std": 7,
+                "vel_std": 8, "fix_type": 9, "satellites": 10,
             },
         ),
         baro=_table(lines["baro"], BARO_DTYPE, {"pressure_pa": 0, "temperature_c": 1}),

@@ -17,7 +17,6 @@ from common.airframe import AirframeError
 from common.clock import wall_date_text, wall_time_s
 from common.files import write_whole
 from common.geodesy import GeoPoint
-from common.kernels import FRAME_US
 from mission.client import Running
 from mission.flight import Flight, FlightConfig
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, read_plan
@@ -25,7 +24,6 @@ from mission.plots import plot_flight
 from mission.script import fly_plan
 from mission.summary import Summary, planned_path, summarise
 from sim.world.world import WorldConfig
-
 
 PROGRESS_PERIOD_S = 0.2
 GROUND_LOCAL_PORT = 18570  # the vehicle's own ports, PX4's
@@ -172,7 +170,9 @@ def _links(options: FlightOptions) -> list[Link]:
     return links
 
 
-def _run(flight: Flight, running: Running | None, options: FlightOptions, speed: float | None, console: Console) -> None:
+def _run(
+    flight: Flight, running: Running | None, options: FlightOptions, speed: float | None, console: Console
+) -> None:
     """Advances the flight until it is over or the user stops it."""
     end_us = int(options.seconds * 1e6) if options.seconds is not None else None
     ends_with_script = options.once or (speed is None and end_us is None)
@@ -257,7 +257,10 @@ def _summary_table(summary: Summary) -> Table:
         ("simulated / armed", f"{summary.simulated_s:.1f} s / {summary.armed_s:.1f} s"),
         ("power-on to ready", f"{summary.ready_s:.1f} s"),
         ("cross-track, 95 %", f"{summary.cross_track_p95_m:.2f} m"),
-        ("landing error, true / by estimate", f"{summary.landing_error_true_m:.2f} / {summary.landing_error_est_m:.2f} m"),
+        (
+            "landing error, true / by estimate",
+            f"{summary.landing_error_true_m:.2f} / {summary.landing_error_est_m:.2f} m",
+        ),
         ("estimator error RMS, horizontal axis / vertical", f"{summary.pos_h_rms_m:.2f} / {summary.pos_v_rms_m:.2f} m"),
         ("velocity RMS, worst axis", f"{summary.vel_rms_m_s:.3f} m/s"),
         ("tilt / yaw RMS", f"{summary.tilt_rms_deg:.2f} / {summary.yaw_rms_deg:.2f} deg"),

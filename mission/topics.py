@@ -43,7 +43,8 @@ class Topic:
 
 def wxyz(quaternions: Rows) -> Rows:
     """Warp's (x, y, z, w) as ULog's (w, x, y, z); shape (rows, 4)."""
-    return quaternions[:, [3, 0, 1, 2]]
+    reordered: Rows = quaternions[:, [3, 0, 1, 2]]
+    return reordered
 
 
 def fresh(batch: Batch, sensor: str) -> Rows:
@@ -91,7 +92,8 @@ LOCAL_POSITION_FIELDS = {
 def yaw_of(quaternions: Rows) -> Rows:
     """Heading [rad] of (x, y, z, w) rows."""
     x, y, z, w = quaternions.T
-    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    yaw: Rows = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return yaw
 
 
 def _local_position(batch: Batch) -> Columns:
@@ -145,7 +147,7 @@ def _reference(origin: GeoPoint) -> Columns:
 
 def _global_position(batch: Batch) -> Columns:
     estimate = batch.estimate
-    points = np.array([geodetic_from_ned(*pos, batch.origin) for pos in estimate["pos_ned"].tolist()])
+    points = np.array([geodetic_from_ned(north, east, down, batch.origin) for north, east, down in estimate["pos_ned"].tolist()])
     return {
         "timestamp": batch.time_us,
         "timestamp_sample": estimate["time_us"],
@@ -161,7 +163,7 @@ def _global_position(batch: Batch) -> Columns:
 
 def _gps(batch: Batch) -> Columns:
     gnss = fresh(batch, "gnss")
-    points = np.array([geodetic_from_ned(*pos, batch.origin) for pos in gnss["pos_ned"].tolist()]).reshape(-1, 3)
+    points = np.array([geodetic_from_ned(north, east, down, batch.origin) for north, east, down in gnss["pos_ned"].tolist()]).reshape(-1, 3)
     velocity = gnss["vel_ned"]
     return {
         "timestamp": gnss["time_us"],

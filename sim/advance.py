@@ -1,7 +1,7 @@
 """The loop: from motor commands to the true state, to samples, to the estimate, to motor commands, at 250 Hz.
 
-One launch advances every vehicle by any number of ticks of 4 ms. Read the kernel `advance` first: it is the whole simulator, in
-time order. With `has_estimator` False the flight controller is given the true state instead of an estimate: a
+One launch advances every vehicle by any number of ticks of 4 ms. Read the kernel `advance` first: it is the whole
+simulator, in time order. With `has_estimator` False the flight controller is given the true state instead of an estimate: a
 shortcut for training, never used in a flight.
 """
 
@@ -75,7 +75,7 @@ def true_battery(body: BodyState, tick: int) -> BatterySample:
 
 
 @wp.kernel(enable_backward=False)
-def boot(rig: RigArrays, chosen: wp.array(dtype=int)):
+def boot(rig: RigArrays, chosen: wp.array(dtype=int)) -> None:
     """Powers the chosen vehicles on, at rest on the ground at home."""
     i = wp.tid()
     if chosen[i] == 0:
@@ -94,7 +94,7 @@ def make_advance(has_estimator: bool) -> Any:
     """The advance kernel, with the estimator and the sensors or without (a training run must not pay for them)."""
 
     @wp.kernel(enable_backward=False, module="unique")
-    def advance(rig: RigArrays, first_vehicle: int, tick_count: int):
+    def advance(rig: RigArrays, first_vehicle: int, tick_count: int) -> None:
         i = first_vehicle + wp.tid()
         seed = rig.seed[i]
         tick = rig.tick[i]

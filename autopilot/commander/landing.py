@@ -18,6 +18,7 @@ _TOUCH_HEIGHT_M = 0.1  # above standing height, as measured, from which a descen
 _TOUCH_SINK_SHARE = 0.5  # of the wanted descent below which it stalls
 _TOUCH_DESCENT_M_S = 0.1  # a slower descent is a hover
 _TOUCH_S = 0.1  # a gust near the ground stalls a descent for less than that, or it does no harm to stop there
+_FALL_M_S = 1.0  # a vehicle that sinks faster than this after a contact is in the air again: a tenth of a second of fall
 _AIR_BELOW_M = 1.0  # range finder reading that speaks against a landing; guess
 _AIR_BELOW_FACTOR = 5.0  # by which such a reading stretches the time needed
 
@@ -33,7 +34,7 @@ class LandingDetector:
 
     __slots__ = (
         "_contact_thrust", "_hover_thrust", "_landed_thrust", "_params", "_rate_max_sq", "_speed_xy_max_sq",
-        "_speed_z_max", "_stage_s", "_time_s", "_touch_height", "_touch_s", "is_landed",
+        "_speed_z_max", "_stage_s", "_time_s", "_touch_height", "_touch_s", "has_contact", "is_landed",
     )  # fmt: skip
 
     def __init__(self, params: ParameterTable, hover_thrust: float, standing_height_m: float = nan) -> None:
@@ -42,6 +43,9 @@ class LandingDetector:
         self._touch_height = standing_height_m + _TOUCH_HEIGHT_M
         self._touch_s = 0.0  # for which a descent has stalled just above the ground
         self._time_s = 0.0  # for which it has looked landed, stage after stage
+        # Something else than the rotors has carried the vehicle. It stays so while the vehicle settles: control that
+        # came back at each bounce would tip it over.
+        self.has_contact = False
         self.is_landed = False
         self._load()
         params.on_change(self._on_parameter)
@@ -49,15 +53,10 @@ class LandingDetector:
     def reset(self) -> None:
         """The vehicle is about to leave the ground."""
         self._time_s = self._touch_s = 0.0
-        self.is_landed = False
-
-    @property
-    def has_contact(self) -> bool:
-        """Whether something else than the rotors has carried the vehicle for the first stage."""
-        return self._time_s >= self._stage_s
+        self.has_contact = self.is_landed = False
 
     def update(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:
-        """Takes one frame and returns whether the vehicle stands on the ground.
+        """Takes one frame and returns whether the vehicle stands on the ground; `has_contact` comes before that.
 
         Args:
             estimate: the Estimate record.
@@ -65,6 +64,15 @@ class LandingDetector:
             descent_sp: [m/s] downward speed asked for.
             dt_s: [s] since the last frame.
         """
+        self.is_landed = self._looks_landed(estimate, thrust, descent_sp, dt_s)
+        if self._time_s >= self._stage_s:
+            self.has_contact = True
+        elif estimate.vel_ned[2] > _FALL_M_S:
+            self.has_contact = False
+        return self.is_landed
+
+    def _looks_landed(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:
+        """Carries the time of the stages on; true at the end of the last."""
         if self._touches(estimate, descent_sp, dt_s):
             self._time_s = max(self._time_s, self._stage_s)
             return False
@@ -79,8 +87,7 @@ class LandingDetector:
         needed_s = 3.0 * stage_s
         if estimate.flags & TERRAIN_VALID and estimate.terrain_d - estimate.pos_ned[2] > _AIR_BELOW_M:
             needed_s *= _AIR_BELOW_FACTOR
-        self.is_landed = time_s >= needed_s
-        return self.is_landed
+        return time_s >= needed_s
 
     def _touches(self, estimate: Any, descent_sp: float, dt_s: float) -> bool:
         """Whether a descent stalls where the range finder sees the ground: felt before the thrust has faded."""

@@ -110,7 +110,7 @@ class Stillness:
     accel_var: float  # [(m/s²)²]
     still_s: float  # for how long
     is_still: int
-    is_noise_free: int  # an ideal IMU: equal values in a row say nothing then
+    is_noise_free: int  # an ideal IMU, as last seen at rest: equal values of other sensors prove nothing then
 
 
 @wp.struct

@@ -5,8 +5,9 @@ handed to the vehicle as a whole, so that a failed one leaves the old mission as
 fence and rally lists are always empty.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import nan
+from math import isinf, nan
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -14,7 +15,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.convert import INT32_MAX, LATLON_FRAMES, MISSION_FRAME, bounded_int
-from autopilot.vehicle import MissionItem, Severity
+from autopilot.vehicle import ItemRefusal, MissionItem, Severity
 
 ITEMS_MAX = 5_000  # guess: far above any plan, and a bound on memory
 RETRY_US = 1_500_000  # the MAVLink mission protocol's default time-out
@@ -125,7 +126,7 @@ class MissionService:
 
     def _load(self, sender: Sender, items: list[MissionItem]) -> int:
         """Hands a whole mission to the vehicle and answers; returns the MAV_MISSION_RESULT."""
-        refusal = self._endpoint.vehicle.load_mission(items)
+        refusal = infinite_element(items) or self._endpoint.vehicle.load_mission(items)
         if refusal is None:
             self._ack(sender, ACCEPTED)
             return int(ACCEPTED)
@@ -237,6 +238,16 @@ class MissionService:
         self._ack(sender, result, mission_type)
         subject = _TYPE_NAMES.get(mission_type, f"Mission type {mission_type}")
         self._endpoint.text_once(Severity.WARNING, f"{subject}: {reason}")
+
+
+def infinite_element(items: Sequence[MissionItem]) -> ItemRefusal | None:
+    """The first item with an infinite number, which means nothing in any command."""
+    for item in items:
+        for i, value in enumerate((*item.params, item.x, item.y, item.z)):
+            if isinf(value):
+                result = mavlink.MAV_MISSION_INVALID_PARAM1 + i
+                return ItemRefusal(item.seq, result, f"parameter {i + 1} is infinite")
+    return None
 
 
 def item_from_fields(fields: Any) -> MissionItem:

@@ -18,7 +18,6 @@ from common.kernels import FRAME_US
 Builder = Callable[[VehicleState], bytes | None]
 Send = Callable[[MessageType, bytes], object]
 
-
 SPREAD = 8  # streams start at different eighths of their interval, so that no frame has to send them all
 NEVER_US = 1 << 62
 

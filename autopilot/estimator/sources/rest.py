@@ -53,9 +53,11 @@ def observe_stillness(still: Stillness, imu: ImuSample) -> Stillness:
     still.is_still = 0
     if still.still_s > _STILL_AFTER_S:
         still.is_still = 1
-    still.is_noise_free = 0
-    if still.accel_var < _NOISE_FREE_ACCEL_VAR:
-        still.is_noise_free = 1
+    # judged at rest only: in flight an ideal IMU moves like a noisy one
+    if still.is_still == 1:
+        still.is_noise_free = 0
+        if still.accel_var < _NOISE_FREE_ACCEL_VAR:
+            still.is_noise_free = 1
     return still
 
 

@@ -11,7 +11,14 @@ from autopilot.estimator.params import ESTIMATOR_PARAMETERS, estimator_params
 from autopilot.estimator.state import EstimatorState
 from autopilot.ports import Samples
 from common.params import ParameterTable
-from tests.unit.autopilot.estimator.flights import FIELD_NED_GAUSS, Flight, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
+from tests.unit.autopilot.estimator.flights import (
+    FIELD_NED_GAUSS,
+    Flight,
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    rotvec_from_quat,
+)
 
 wp.set_module_options({"enable_backward": False})
 

@@ -17,7 +17,7 @@ PLAN = [
 FRAMES_PER_RETRY = 1_500_000 // FRAME_US
 
 
-def send_item(client: Client, item: MissionItem, **changes: int) -> None:
+def send_item(client: Client, item: MissionItem, **changes: float) -> None:
     x, y = scaled_position(item)
     fields = {f"param{i + 1}": value for i, value in enumerate(item.params)}
     fields |= {"seq": item.seq, "frame": item.frame, "command": item.command, "x": x, "y": y, "z": item.z}
@@ -68,6 +68,17 @@ def test_refused_item_leaves_the_old_plan_and_is_named():
     messages = rig.frame()
     assert [m.fields.type for m in messages if m.name == "MISSION_ACK"] == [mavlink.MAV_MISSION_UNSUPPORTED]
     assert texts(messages) == ["Mission: item 1: command 93 is not supported"]
+    assert rig.vehicle.items == OLD_PLAN
+
+
+def test_infinite_number_is_refused_by_its_place():
+    rig = Rig()
+    rig.vehicle.items = OLD_PLAN
+    for i, field in enumerate(("param1", "param2", "param3", "param4", None, None, "z")):
+        if field:
+            start(rig, 1)
+            send_item(rig.client, PLAN[0], **{field: float("inf")})
+            assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_PARAM1 + i
     assert rig.vehicle.items == OLD_PLAN
 
 
