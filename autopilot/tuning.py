@@ -127,6 +127,10 @@ class Cascade:
     def _position(self, axis: str, thrust: float = 1.0) -> System:
         return self.gains[f"pos_p_{axis}"] * self._velocity(axis, thrust)[1] * _INTEGRATOR
 
+    def closed_rate(self, axis: str) -> System:
+        """From rate setpoint to rate; `axis` is tilt or yaw."""
+        return self._rate(axis)[1]
+
     def loops(self) -> dict[str, Callable[[], System]]:
         """Open loops by name, from the inside out."""
         return {

@@ -52,7 +52,8 @@ def fresh(batch: Batch, sensor: str) -> Rows:
     samples = batch.samples[sensor]
     times = samples["time_us"]
     times_before = np.concatenate([batch.samples_before[sensor]["time_us"], times[:-1]])
-    return samples[(times != times_before) & (times > 0)]
+    new: Rows = samples[(times != times_before) & (times > 0)]
+    return new
 
 
 def _axes(names: str, vectors: Rows) -> Columns:
@@ -145,9 +146,15 @@ def _reference(origin: GeoPoint) -> Columns:
     return {"ref_timestamp": 0, "ref_lat": origin.lat_deg, "ref_lon": origin.lon_deg, "ref_alt": origin.alt_m}
 
 
+def _geodetic(pos_ned: Rows, origin: GeoPoint) -> Rows:
+    """Latitude [deg], longitude [deg] and altitude [m] of ned points; shape (rows, 3)."""
+    points = [geodetic_from_ned(north, east, down, origin) for north, east, down in pos_ned.tolist()]
+    return np.array(points, dtype=float).reshape(-1, 3)
+
+
 def _global_position(batch: Batch) -> Columns:
     estimate = batch.estimate
-    points = np.array([geodetic_from_ned(north, east, down, batch.origin) for north, east, down in estimate["pos_ned"].tolist()])
+    points = _geodetic(estimate["pos_ned"], batch.origin)
     return {
         "timestamp": batch.time_us,
         "timestamp_sample": estimate["time_us"],
@@ -163,7 +170,7 @@ def _global_position(batch: Batch) -> Columns:
 
 def _gps(batch: Batch) -> Columns:
     gnss = fresh(batch, "gnss")
-    points = np.array([geodetic_from_ned(north, east, down, batch.origin) for north, east, down in gnss["pos_ned"].tolist()]).reshape(-1, 3)
+    points = _geodetic(gnss["pos_ned"], batch.origin)
     velocity = gnss["vel_ned"]
     return {
         "timestamp": gnss["time_us"],

@@ -1,8 +1,8 @@
 """The loop: from motor commands to the true state, to samples, to the estimate, to motor commands, at 250 Hz.
 
 One launch advances every vehicle by any number of ticks of 4 ms. Read the kernel `advance` first: it is the whole
-simulator, in time order. With `has_estimator` False the flight controller is given the true state instead of an estimate: a
-shortcut for training, never used in a flight.
+simulator, in time order. With `has_estimator` False the flight controller is given the true state instead of an
+estimate: a shortcut for training, never used in a flight.
 """
 
 from typing import Any

@@ -59,7 +59,7 @@ def test_greatest_gain_is_limited_by_phase_or_by_gain() -> None:
     assert row.phase_deg == pytest.approx(60.0, abs=0.5)
     slow = control.ss(control.tf([1.0], [0.01, 0.21, 1.2, 1.0]))
     row = margins_of("slow", greatest_gain(slow, 5.0, 12.0) * slow)
-    assert row.gain_db == pytest.approx(12.0, abs=0.1)
+    assert row.gain_db == pytest.approx(12.0, abs=0.3)  # the frequency grid steps by 1 %
 
 
 def test_thrust_as_modelled_hides_the_disturbance_observer() -> None:
