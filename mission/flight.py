@@ -14,12 +14,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from autopilot.mavlink.links import Link, LinkRole, memory_pair
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.node import FlightController, HostPorts
-from autopilot.params import all_parameters
+from autopilot.params import parameter_table
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer
 from common.geodesy import GeoPoint
 from common.kernels import FRAME_TICKS, FRAME_US
-from common.params import ParameterTable
 from common.records import row_reader
 from common.tlog import TlogWriter
 from mission.client import Running
@@ -79,7 +78,7 @@ class Flight:
         self.rig.prepare(FRAME_TICKS)
         self.time_us = 0
         self.ready_s = nan  # power-on to ready to arm
-        self.params = ParameterTable(all_parameters())
+        self.params = parameter_table(self.airframe)
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
         self.controller = FlightController(

@@ -53,6 +53,8 @@ STANDING_S = 10.0  # later fixes share the slow error of the first: averaging mo
 IMU_PERIOD_S = 0.004  # the estimator's tick: faster samples are merged to about that
 HELD_GAP_S = 0.1  # up to here the last rate holds; the estimator integrates no longer interval
 FILLED_GAP_S = 1.0  # up to here samples are interpolated; a longer gap starts the estimator anew
+MAX_SPAN_US = 86_400_000_000  # times further than a day from the middle of a log, and
+MAX_VALUE = 1.0e6  # numbers of such size come from a damaged file
 # The estimator's rings hold 16 samples (4 of GNSS) of the last 0.2 s: faster ones would be lost before their turn.
 MIN_INTERVAL_S = 0.015
 MIN_GNSS_INTERVAL_S = 0.045
@@ -217,11 +219,13 @@ def _filled(imu: Rows, period_s: float, notes: list[str]) -> Rows:
 
 
 def _sorted(rows: Rows, label: str, notes: list[str]) -> Rows:
-    """Rows of finite numbers, by time, one per time; a time of 0 would mean `never measured`."""
-    is_good = rows["time_us"] > 0
+    """Rows of believable numbers, by time, one per time; a time of 0 would mean `never measured`."""
+    if not len(rows):
+        return rows
+    is_good = (rows["time_us"] > 0) & (np.abs(rows["time_us"] - np.median(rows["time_us"])) < MAX_SPAN_US)
     for name in rows.dtype.names or ():
-        finite = np.isfinite(rows[name])
-        is_good &= finite if finite.ndim == 1 else finite.all(axis=1)
+        believable = np.abs(rows[name]) < MAX_VALUE if name != "time_us" else is_good
+        is_good &= believable if believable.ndim == 1 else believable.all(axis=1)
     if not is_good.all():
         notes.append(f"{np.count_nonzero(~is_good)} {label} sample(s) without a usable time or value were left out")
     rows = rows[is_good]

@@ -108,9 +108,11 @@ class Stillness:
     accel_mean_frd: wp.vec3  # [m/s²]
     gyro_var: float  # [(rad/s)²] about the mean, the three axes together
     accel_var: float  # [(m/s²)²]
+    accel_last_frd: wp.vec3  # [m/s²]
+    accel_jitter: float  # [(m/s²)²] mean square of the change from sample to sample
     still_s: float  # for how long
     is_still: int
-    is_noise_free: int  # an ideal IMU, as last seen at rest: equal values of other sensors prove nothing then
+    is_noise_free: int  # an ideal IMU was seen at rest: equal values of other sensors prove nothing then
 
 
 @wp.struct

@@ -1,7 +1,7 @@
 """Laws of the controller: allocation gives back what it leaves, trajectories keep their limits and arrive."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from autopilot.control.airframe import effectiveness
@@ -36,7 +36,7 @@ def test_allocation_stays_within_limits_and_leaves_exactly_the_remainder(
 
 
 @LAWS
-@given(thrusts=st.lists(st.floats(0.3, 8.4, width=32), min_size=4, max_size=4))
+@given(thrusts=st.lists(st.floats(0.3, 8.4), min_size=4, max_size=4))
 def test_allocation_inverts_what_rotors_can_make(thrusts: list[float]) -> None:
     demand = effectiveness(X500) @ np.array(thrusts)
     result = mix(X500, [demand[:3]], [demand[3]], 0.2, 8.5)[0][0]
@@ -72,6 +72,7 @@ def test_trajectory_keeps_its_limits_and_reaches_its_goal(
 @LAWS
 @given(goal=offsets)
 def test_trajectory_from_rest_keeps_the_limits_of_its_way(goal: tuple[float, float, float]) -> None:
+    assume(np.hypot(goal[0], goal[1]) > 0.06)  # nearer goals keep the direction of the last way
     generator = Generator()
     generator.ask(pos_ned=goal)
     log = generator.run(45.0)[0]

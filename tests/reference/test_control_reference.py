@@ -1,5 +1,6 @@
 """The controller's kernels against plain NumPy and SciPy written from the equations."""
 
+import control
 import numpy as np
 import pytest
 import warp as wp
@@ -10,7 +11,7 @@ from autopilot.control.airframe import control_airframe, effectiveness
 from autopilot.control.allocation import command_for_speed, speed_share
 from autopilot.control.attitude import attitude_error
 from autopilot.control.profile import AxisLimits, distance_via, ramp_distance, ramp_to, step_to_position
-from autopilot.tuning import motor_time_s
+from autopilot.tuning import Cascade, default_gains, motor_time_s
 from common.airframe import load_airframe
 from tests.unit.autopilot.control.mixer import mix
 from tests.unit.autopilot.control.rig import Rig
@@ -45,8 +46,8 @@ def integrated_ramp(vel: float, accel: float, goal: float, row: AxisLimits) -> t
 def test_ramp_distance_is_the_integral_of_its_segments(vel: float, accel: float, goal: float) -> None:
     moved, end_vel, end_accel = integrated_ramp(vel, accel, goal, limits())
     assert ramp_distance(vel, accel, goal, limits()) == pytest.approx(moved, abs=1e-6)
-    assert end_vel == pytest.approx(goal, abs=1e-9)
-    assert end_accel == pytest.approx(0.0, abs=1e-9)
+    assert end_vel == pytest.approx(goal, abs=1e-6)  # square roots are float32
+    assert end_accel == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("distance", [0.02, 0.5, 3.0, 8.0])
@@ -109,11 +110,7 @@ def test_control_airframe_carries_the_file() -> None:
 
 
 def test_closed_loop_answers_a_small_step_as_the_linear_design_does() -> None:
-    """The rate loop flown agrees with the model behind the margins: peak time and overshoot of a roll rate step."""
-    import control  # noqa: PLC0415 - slow to load, used by this test only
-
-    from autopilot.tuning import Cascade, default_gains  # noqa: PLC0415
-
+    """The rate loop flown agrees with the model behind the margins, on a step of roll rate."""
     airframe = load_airframe("x500")
     rig = Rig()
     rig.run(0.4)
