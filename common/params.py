@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from math import isfinite, radians
 
-SCALE_TO_SI = {"deg": radians(1.0), "deg/s": radians(1.0), "ms": 1.0e-3, "%": 1.0e-2}
+SCALE_TO_SI = {"deg": radians(1.0), "deg/s": radians(1.0), "deg/s^2": radians(1.0), "ms": 1.0e-3, "%": 1.0e-2}
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,7 +85,7 @@ class Recorder:
         self._imu_ring = _RawRow(autopilot.ekf.imu_ring.numpy())
         self._imu_time_us = 0
         self._samples_before = np.zeros(1, dtype=rig.arrays.sensors.numpy()["samples"].dtype)
-        self._health_before = np.zeros(1, dtype=autopilot.ekf.rows.numpy().dtype)
+        self._judged_us = dict.fromkeys(AIDS, 0)
         self._in_band = {name: [0, 0] for name in AIDS}
         self._history: list[History] = []
         self._log = None if path is None else _open_log(path, controller, airframe)
@@ -158,10 +158,10 @@ class Recorder:
         return {name: inside / total if total else float("nan") for name, (inside, total) in self._in_band.items()}
 
     def _count_innovations(self, health: Rows, is_armed: Rows) -> None:
-        before = np.concatenate([self._health_before, health[:-1]])
-        self._health_before = health[-1:].copy()
         for name, components in AIDS.items():
-            is_new = is_armed & (health[name]["judged_time_us"] != before[name]["judged_time_us"])
+            judged_us = health[name]["judged_time_us"]
+            is_new = is_armed & (np.diff(judged_us, prepend=self._judged_us[name]) != 0)
+            self._judged_us[name] = int(judged_us[-1])
             innov = health[name]["innov"][is_new, :components]
             innov_std = np.sqrt(health[name]["innov_var"][is_new, :components])
             self._in_band[name][0] += int(np.count_nonzero(np.abs(innov) <= BAND_SIGMA * innov_std))

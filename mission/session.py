@@ -13,7 +13,7 @@ from rich.table import Table
 
 from autopilot.mavlink.links import Link, LinkError, LinkRole, UdpLink
 from autopilot.vehicle import Mode
-from common.airframe import AirframeError
+from common.airframe import AirframeError, load_airframe
 from common.clock import wall_date_text, wall_time_s
 from common.files import write_whole
 from common.geodesy import GeoPoint
@@ -26,8 +26,9 @@ from mission.summary import Summary, planned_path, summarise
 from sim.world.world import WorldConfig
 
 PROGRESS_PERIOD_S = 0.2
-GROUND_LOCAL_PORT = 18570  # the vehicle's own ports, PX4's
-API_LOCAL_PORT = 14580
+GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
+API_PORT_STEP = 14580 - 14540
+PORT_MAX = 65535
 
 
 class UserError(ValueError):
@@ -69,13 +70,14 @@ def fly_session(options: FlightOptions) -> int:
     speed = _speed(options.speed)
     config = _config(options)
     plan = None if options.is_idle else _plan(options.plan)
-    folder = _new_folder(options.run_folder)
-    links = [] if speed is None else _links(options)
     try:
-        with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
-            flight = Flight(config, links=links, folder=folder)
+        load_airframe(config.airframe)
     except AirframeError as error:
         raise UserError(str(error)) from error
+    links = [] if speed is None else _links(options)
+    folder = _new_folder(options.run_folder)
+    with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
+        flight = Flight(config, links=links, folder=folder)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
     _run(flight, running, options, speed, console)
     return _finish(flight, running, plan, folder, console)
@@ -161,8 +163,12 @@ def _candidates(stem: Path) -> Any:
 def _links(options: FlightOptions) -> list[Link]:
     links: list[Link] = []
     try:
-        links.append(UdpLink(options.gcs_port, LinkRole.GROUND, options.host, local_port=GROUND_LOCAL_PORT))
-        links.append(UdpLink(options.api_port, LinkRole.ONBOARD, options.host, local_port=API_LOCAL_PORT))
+        for role, port, step in (
+            (LinkRole.GROUND, options.gcs_port, GROUND_PORT_STEP),
+            (LinkRole.ONBOARD, options.api_port, API_PORT_STEP),
+        ):
+            own_port = port + step if port + step <= PORT_MAX else 0  # 0: any free one
+            links.append(UdpLink(port, role, options.host, local_port=own_port))
     except LinkError as error:
         for link in links:
             link.close()

@@ -42,7 +42,7 @@ class ControlParams:
     thrust_max: float
     takeoff_ramp_s: float
     yaw_rate_auto: float  # [rad/s]
-    yaw_accel_auto_deg: float  # [deg/s²]
+    yaw_accel_auto: float  # [rad/s²]
     att_p_roll: float  # [1/s]
     att_p_pitch: float
     att_p_yaw: float
@@ -111,7 +111,7 @@ CONTROL_PARAMETERS: list[Parameter] = [
         "deg/s^2",
         "yaw acceleration of the yaw setpoint",
         "guess",
-        "yaw_accel_auto_deg",
+        "yaw_accel_auto",
     ),
     Parameter("MC_ROLL_P", 8.0, 1.0, 20.0, "1/s", "attitude to rate, roll", _TUNED, "att_p_roll"),
     Parameter("MC_PITCH_P", 8.0, 1.0, 20.0, "1/s", "attitude to rate, pitch", _TUNED, "att_p_pitch"),

@@ -32,7 +32,6 @@ _GOAL_MOVED = wp.constant(1.0e-3)  # [m] or [m/s]
 _STOPPED_M_S = wp.constant(0.3)  # slower than this a braked vehicle takes its place as the position to hold
 _DIRECTION_MIN = wp.constant(0.05)  # [m] or [m/s] below which the old direction of motion is kept
 _PATH_MIN_M = wp.constant(0.1)
-_RAD_PER_DEG = wp.constant(0.0174532925)
 
 
 @wp.struct
@@ -285,7 +284,7 @@ def yaw_step(params: ControlParams, state: TrajectoryState, sp: Setpoint, dt_s: 
     turned = state
     feed = finite_or(sp.yaw_rate, 0.0)
     rate_max = wp.max(params.yaw_rate_auto, wp.abs(feed))
-    accel = params.yaw_accel_auto_deg * _RAD_PER_DEG
+    accel = params.yaw_accel_auto
     rate = feed
     if wp.isfinite(sp.yaw) or not wp.isfinite(sp.yaw_rate):
         turned.yaw_goal = finite_or(sp.yaw, state.yaw_goal)

@@ -76,7 +76,8 @@ WATCH_SAMPLES = wp.constant(4)  # flags and deviations are renewed at 62 Hz
 @wp.func
 def receive_samples(ekf: Ekf, i: int, samples: Samples) -> None:
     """New samples of the slow sensors are put into their rings."""
-    is_live = ekf.rows[i].stillness.is_noise_free == 0
+    # equal values prove a frozen sensor only if live ones would differ: not without noise, not on a parked vehicle
+    is_live = ekf.rows[i].stillness.is_noise_free == 0 and ekf.rows[i].stillness.is_still == 0
     if samples.gnss.time_us != ekf.rows[i].gnss_inbox.arrived_time_us:
         head = ekf.rows[i].gnss_inbox.head
         is_same_fix = head > 0 and gnss_repeats(samples.gnss, ekf.gnss_ring[i, (head - 1) % GNSS_RING])
@@ -101,14 +102,12 @@ def receive_samples(ekf: Ekf, i: int, samples: Samples) -> None:
     if samples.range.time_us != ekf.rows[i].range_inbox.arrived_time_us:
         head = ekf.rows[i].range_inbox.head
         is_same_range = head > 0 and range_repeats(samples.range, ekf.range_ring[i, (head - 1) % RANGE_RING])
-        # at rest a live sensor may repeat its quantum
-        is_moving = ekf.rows[i].stillness.is_still == 0
         ekf.range_ring[i, head % RANGE_RING] = samples.range
         ekf.rows[i].range_inbox = receive(
             ekf.rows[i].range_inbox,
             samples.range.time_us,
             RANGE_RING,
-            is_same_range and is_live and is_moving,
+            is_same_range and is_live,
             RANGE_STUCK_AFTER,
         )
 

@@ -15,6 +15,7 @@ from autopilot.vehicle import OffboardSetpoint
 
 Vector = tuple[float, float, float]
 FREE: Vector = (nan, nan, nan)
+_NOT_HOLDING_M_S = 0.01
 _LEVEL_NORTH = (0.0, 0.0, 0.0, 1.0)
 _LAYOUT = "<3i26f"  # kind, is_armed, is_landed, then every float in the order of autopilot.ports.Setpoint
 _FIELDS = (
@@ -103,10 +104,14 @@ class SetpointPort:
         self.cruise_speed = cruise_speed
 
     def descend_braking(self, speed_down: float, yaw: float) -> None:
-        """Asks for a vertical speed [m/s] without moving over ground: the position is lost, the velocity is not."""
+        """Asks for a vertical speed [m/s] without moving over ground: the position is lost, the velocity is not.
+
+        The horizontal speed is not quite zero: the control part would hold the place then, and chase a position that
+        jumps about by decimetres once nothing measures it.
+        """
         self._free_all()
         self.kind = SETPOINT_TRAJECTORY
-        self.vel_ned = (0.0, 0.0, speed_down)
+        self.vel_ned = (_NOT_HOLDING_M_S, _NOT_HOLDING_M_S, speed_down)
         self.yaw = yaw
 
     def descend_level(self, speed_down: float, yaw: float) -> None:

@@ -34,7 +34,7 @@ def observe_stillness(still: Stillness, imu: ImuSample) -> Stillness:
         still.gyro_mean_frd = imu.gyro_frd
         still.accel_mean_frd = imu.accel_frd
         still.accel_last_frd = imu.accel_frd
-        still.accel_jitter = 1.0
+        still.accel_jitter = 0.001
     gain = wp.min(imu.dt_s / _AVERAGE_S, 1.0)
     gyro_change = imu.gyro_frd - still.gyro_mean_frd
     accel_change = imu.accel_frd - still.accel_mean_frd
