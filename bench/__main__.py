@@ -11,7 +11,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import warp as wp
 from rich.console import Console
 from rich.table import Table
 
@@ -28,7 +27,6 @@ def main(names: list[str]) -> int:
     if unknown:
         Console(stderr=True).print(f"bench: no benchmark {unknown[0]}; there are {', '.join(SCRIPTS)}", markup=False)
         return 2
-    wp.config.quiet = True
     rows: list[Row] = []
     wrong: list[str] = []
     for name in names or SCRIPTS:
@@ -40,7 +38,7 @@ def main(names: list[str]) -> int:
     console.print(_table(rows))
     for sentence in wrong:
         console.print(f"[red]wrong result[/red]  {sentence}")
-    _write(rows)
+    _write(rows, kept=_earlier(names) if names else [])
     return 1 if wrong else 0
 
 
@@ -58,16 +56,17 @@ def _table(rows: list[Row]) -> Table:
     return table
 
 
-def _write(rows: list[Row]) -> None:
-    """Replaces the rows measured now; the order is that of the scripts."""
+def _earlier(names: list[str]) -> list[dict[str, Any]]:
+    """The rows in the file that are not of the named scripts."""
+    rows = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
+    return [row for row in rows if row["command"].split()[-1] not in names]
+
+
+def _write(rows: list[Row], kept: list[dict[str, Any]]) -> None:
+    """Writes the rows measured now and those kept, in the order of the scripts."""
     here = machine()
-    fresh: dict[str, dict[str, Any]] = {row.name: asdict(row) | {"machine": here} for row in rows}
-    kept = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
-    merged = {old["name"]: old for old in kept} | fresh
-    order = [f"python -m bench {name}" for name in SCRIPTS]
-    listed = sorted(
-        merged.values(), key=lambda row: order.index(row["command"]) if row["command"] in order else len(order)
-    )
+    listed = kept + [asdict(row) | {"machine": here} for row in rows]
+    listed.sort(key=lambda row: SCRIPTS.index(row["command"].split()[-1]))
     write_whole(RESULTS, (json.dumps(listed, indent=1, ensure_ascii=False) + "\n").encode())
 
 

@@ -31,6 +31,6 @@ def _rate(*, has_estimator: bool) -> float:
             rig.advance(LAUNCH_TICKS)
         return time.process_time() - start
 
-    rate = VEHICLES * LAUNCHES * LAUNCH_TICKS * TICK_S / best_of(6, cpu_s)
+    rate = VEHICLES * LAUNCHES * LAUNCH_TICKS * TICK_S / best_of(10, cpu_s)
     check(rig, has_estimator=has_estimator)
     return rate

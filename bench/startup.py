@@ -51,7 +51,7 @@ def _heartbeat_s() -> float:
 
 def _first_heartbeat_s() -> float:
     """Starts `honeyguide fly --idle`, waits for a MAVLink heartbeat on the ground station's port and stops it."""
-    program = Path(sys.executable).with_name("honeyguide")
+    program = str(Path(sys.executable).with_name("honeyguide"))
     with TemporaryDirectory() as folder, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
         station.bind(("127.0.0.1", 0))
         station.settimeout(TIMEOUT_S)

@@ -33,11 +33,22 @@ def record_reader(dtype: np.dtype[Any], name: str) -> Callable[[Any, int], Any]:
     return lambda buffer, offset: maker(unpack(buffer, offset))
 
 
-def row_reader(rows: np.ndarray[Any, Any], i_row: int, name: str) -> Callable[[], Any]:
-    """A function that returns the present content of row `i_row` of a live structured view."""
-    read = record_reader(rows.dtype, name)
-    buffer = rows.view(np.uint8).reshape(-1).data
-    offset = i_row * rows.dtype.itemsize
+def row_reader(rows: np.ndarray[Any, Any], i_row: int, name: str, field: str = "") -> Callable[[], Any]:
+    """A function that returns the present content of row `i_row` of a live structured view.
+
+    Args:
+        rows: a contiguous structured array, shape (rows,).
+        i_row: which row.
+        name: name of the record type.
+        field: reads only this nested struct of the row.
+    """
+    dtype, offset = rows.dtype, i_row * rows.dtype.itemsize
+    if field:
+        if dtype.fields is None:
+            raise TypeError(f"{name} is not a structured type")
+        dtype, offset = dtype.fields[field][0], offset + dtype.fields[field][1]
+    read = record_reader(dtype, name)
+    buffer = rows.view(np.uint8).data
     return lambda: read(buffer, offset)
 
 

@@ -145,9 +145,9 @@ def host_ports(rig: Rig, i_vehicle: int = 0) -> HostPorts:
     autopilot = rig.arrays.autopilot
     estimator = autopilot.ekf.rows.numpy()
     return HostPorts(
-        read_estimate=row_reader(estimator["estimate"], i_vehicle, "Estimate"),
-        read_samples=row_reader(rig.arrays.sensors.numpy()["samples"], i_vehicle, "Samples"),
-        read_actuators=row_reader(autopilot.control.numpy()["actuators"], i_vehicle, "Actuators"),
+        read_estimate=row_reader(estimator, i_vehicle, "Estimate", "estimate"),
+        read_samples=row_reader(rig.arrays.sensors.numpy(), i_vehicle, "Samples", "samples"),
+        read_actuators=row_reader(autopilot.control.numpy(), i_vehicle, "Actuators", "actuators"),
         read_health=row_reader(estimator, i_vehicle, "EstimatorState"),
         setpoint=autopilot.setpoint.numpy()[i_vehicle : i_vehicle + 1],
     )

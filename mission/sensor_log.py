@@ -1,4 +1,4 @@
-"""Recorded sensors, made ready for the estimator: sorted, without gaps, in the tangent plane of the place of the first good fix.
+"""Recorded sensors, made ready for the estimator: sorted, without gaps, in the tangent plane of the first good fix.
 
 In: the tables of one log, as `sensor_ulog` and `sensor_csv` read them. Out: rows of the kernels' sample structs, one
 array per sensor, and the stretches of IMU samples that hold together.
@@ -152,7 +152,7 @@ def _prepare_imu(recording: Recording) -> Rows:
     span_s = float(imu["time_us"][-1] - imu["time_us"][0]) * 1e-6 if len(imu) else 0.0
     if span_s < MIN_DURATION_S:
         raise SensorLogError(
-            f"{recording.path}: {span_s:.1f} s of IMU samples, at least {MIN_DURATION_S:g} s are needed"
+            f"{recording.path}: {span_s:.2f} s of IMU samples, at least {MIN_DURATION_S:g} s are needed"
         )
     period_s = float(np.median(np.diff(imu["time_us"]))) * 1e-6
     if period_s > 1.0 / MIN_IMU_RATE_HZ:

@@ -4,8 +4,9 @@ Sensors come from the topics PX4's own estimator reads, and from raw ones where 
 of validity: `timestamp_sample` where it is set, less the EKF2_*_DELAY of the log where it is not.
 """
 
+from collections import Counter
 from contextlib import redirect_stdout
-from io import StringIO
+from io import BytesIO, StringIO
 from math import isfinite
 from pathlib import Path
 from struct import error as struct_error
@@ -31,9 +32,12 @@ from mission.sensor_log import (
     empty,
 )
 
+_DAMAGE = (ULogException, struct_error, EOFError, ValueError, KeyError, IndexError, TypeError, OverflowError)
+MAX_VISITS = 100  # of one place in the file, by seeking
 MAGIC = b"ULog\x01\x12\x35"
 OWN_NAME = "Honeyguide"  # sys_name of this project's logs
 PX4_GPS_DELAY_MS = 110.0  # PX4's default of EKF2_GPS_DELAY
+MAX_DELAY_MS = 300.0  # PX4's maximum of the EKF2_*_DELAY
 RELATIVE_INVALID = 2**31 - 1  # PX4's RELATIVE_TIMESTAMP_INVALID
 FACING_DOWN = 25  # distance_sensor.orientation
 UNKNOWN_STD = 1.0e3  # accuracy of a velocity the receiver calls invalid
@@ -46,31 +50,49 @@ TOPICS = (
 ).split()
 
 
+class _AdvancingStream(BytesIO):
+    """The bytes of a log; refuses to be read in circles, as pyulog would read some damaged headers for ever."""
+
+    def __init__(self, content: bytes) -> None:
+        super().__init__(content)
+        self._visits: Counter[int] = Counter()
+
+    def seek(self, offset: int, whence: int = 0, /) -> int:
+        position = super().seek(offset, whence)
+        self._visits[position] += 1
+        if self._visits[position] > MAX_VISITS:
+            raise EOFError  # not among the errors that pyulog swallows
+        return position
+
+
 class _Columns:
     """One topic instance: its fields as arrays."""
 
-    def __init__(self, data: dict[str, npt.NDArray[Any]]) -> None:
+    def __init__(self, data: dict[str, npt.NDArray[Any]], place: str) -> None:
         self._data = data
+        self._place = place
 
     def __contains__(self, name: str) -> bool:
         return name in self._data
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        if name not in self._data:
+            raise SensorLogError(f"{self._place} has no field {name}")
         return self._data[name]
 
     def get(self, name: str, default: float) -> npt.NDArray[Any]:
         """The field, or its default where this version of the topic has none."""
-        return self._data[name] if name in self else np.full(len(self._data["timestamp"]), default)
+        return self[name] if name in self else np.full(len(self["timestamp"]), default)
 
     def vector(self, name: str, count: int = 3) -> npt.NDArray[Any]:
-        return np.stack([self._data[f"{name}[{axis}]"] for axis in range(count)], axis=1)
+        return np.stack([self[f"{name}[{axis}]"] for axis in range(count)], axis=1)
 
     def axes(self, names: str) -> npt.NDArray[Any]:
-        return np.stack([self._data[name] for name in names.split()], axis=1)
+        return np.stack([self[name] for name in names.split()], axis=1)
 
     def time_us(self, delay_s: float = 0.0) -> npt.NDArray[Any]:
         """Times of validity: `timestamp_sample`, or `timestamp` less the sensor's delay where it is not set."""
-        timestamp = self._data["timestamp"].astype(np.int64)
+        timestamp = self["timestamp"].astype(np.int64)
         sampled = self.get("timestamp_sample", 0).astype(np.int64)
         return np.where(sampled > 0, sampled, timestamp - round(delay_s * 1e6))
 
@@ -81,25 +103,30 @@ class _Log:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            with path.open("rb") as stream, redirect_stdout(StringIO()):  # pyulog prints what it finds damaged
-                self.ulog = ULog(stream, TOPICS)
-        except (ULogException, struct_error, ValueError, KeyError, IndexError, TypeError, OverflowError) as error:
-            raise SensorLogError(f"{path}: damaged, no ULog reader can follow it ({error})") from error
+            with redirect_stdout(StringIO()):  # pyulog prints what it finds damaged
+                self.ulog = ULog(_AdvancingStream(path.read_bytes()), TOPICS)
+        except _DAMAGE as error:
+            raise SensorLogError(f"{path}: damaged so that no ULog reader can follow it") from error
 
     def topic(self, name: str, *needed: str) -> _Columns | None:
         """The first instance of a topic, if it was logged with the needed fields."""
         instances = sorted((data for data in self.ulog.data_list if data.name == name), key=lambda data: data.multi_id)
-        columns = _Columns(instances[0].data) if instances else None
+        columns = self._columns(instances[0]) if instances else None
         return columns if columns is not None and all(field in columns for field in ("timestamp", *needed)) else None
 
     def instances(self, name: str) -> list[_Columns]:
-        return [_Columns(data.data) for data in self.ulog.data_list if data.name == name]
+        return [self._columns(data) for data in self.ulog.data_list if data.name == name]
+
+    def _columns(self, data: Any) -> _Columns:
+        return _Columns(data.data, f"{self.path}: topic {data.name}")
 
     def delay_s(self, name: str, default_ms: float = 0.0) -> float:
         """A delay parameter of the log."""
-        return float(self.ulog.initial_parameters.get(name, default_ms)) * 1e-3
+        value_ms = float(self.ulog.initial_parameters.get(name, default_ms))
+        return (value_ms if 0.0 <= value_ms <= MAX_DELAY_MS else default_ms) * 1e-3
 
 
+@np.errstate(invalid="ignore", over="ignore")  # numbers of a damaged log; `prepare` leaves them out
 def read_ulog(path: Path) -> Recording:
     """Reads the sensors of a PX4 log; one that was cut short is read as far as it goes.
 

@@ -11,7 +11,7 @@ import warp as wp
 
 from autopilot.advance import Autopilot
 from autopilot.control.control import ControlState, control_tick
-from autopilot.estimator.ekf import estimator_reset, estimator_tick
+from autopilot.estimator.ekf import estimator_reset, estimator_step
 from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
@@ -106,7 +106,6 @@ def make_advance(has_estimator: bool) -> Any:
         body = rig.body[i]
         wind = rig.wind[i]
         sensors = rig.sensors[i]
-        estimator = rig.autopilot.ekf.rows[i]
         control = rig.autopilot.control[i]
         for _ in range(tick_count):
             height = -body.pos_ned[2] - ground_height(rig.world, body.pos_ned[0], body.pos_ned[1])
@@ -114,8 +113,8 @@ def make_advance(has_estimator: bool) -> Any:
             body = body_tick(model, body, control.actuators.command, wind.wind_ned, rig.world)
             if wp.static(has_estimator):
                 sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, rig.world, seed, i, tick)
-                estimator = estimator_tick(rig.autopilot.ekf, i, estimator, sensors.samples)
-                estimate = estimator.estimate
+                estimator_step(rig.autopilot.ekf, i, sensors.samples)
+                estimate = rig.autopilot.ekf.rows[i].estimate
             else:
                 sensors.samples.battery = true_battery(body, tick)
                 estimate = true_estimate(body, tick)
@@ -126,7 +125,5 @@ def make_advance(has_estimator: bool) -> Any:
         rig.wind[i] = wind
         rig.sensors[i] = sensors
         rig.autopilot.control[i] = control
-        if wp.static(has_estimator):
-            rig.autopilot.ekf.rows[i] = estimator
 
     return advance

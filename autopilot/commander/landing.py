@@ -18,7 +18,9 @@ _TOUCH_HEIGHT_M = 0.1  # above standing height, as measured, from which a descen
 _TOUCH_SINK_SHARE = 0.5  # of the wanted descent below which it stalls
 _TOUCH_DESCENT_M_S = 0.1  # a slower descent is a hover
 _TOUCH_S = 0.1  # a gust near the ground stalls a descent for less than that, or it does no harm to stop there
-_FALL_M_S = 1.0  # a vehicle that sinks faster than this after a contact is in the air again: a tenth of a second of fall
+_FALL_M_S = (
+    1.0  # a vehicle that sinks faster than this after a contact is in the air again: a tenth of a second of fall
+)
 _AIR_BELOW_M = 1.0  # range finder reading that speaks against a landing; guess
 _AIR_BELOW_FACTOR = 5.0  # by which such a reading stretches the time needed
 
@@ -73,7 +75,7 @@ class LandingDetector:
 
     def _looks_landed(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:
         """Carries the time of the stages on; true at the end of the last."""
-        if self._touches(estimate, descent_sp, dt_s):
+        if not self.has_contact and self._touches(estimate, descent_sp, dt_s):
             self._time_s = max(self._time_s, self._stage_s)
             return False
         if thrust >= self._contact_thrust or not self._is_supported(estimate):

@@ -1,8 +1,8 @@
 """Alignment: from power-on to a first attitude, heading and height.
 
-Averages the accelerometer, gyro, magnetometer and barometer for half a second at rest. Tilt comes from the
-accelerometer, gyro bias from the mean rate, heading from the levelled field, the height reference from the pressure. A
-vehicle that will not stand still (a log that starts in flight) is aligned after a while all the same, with wider bounds.
+Averages accelerometer, gyro, magnetometer and barometer for half a second at rest. Tilt comes from the accelerometer,
+gyro bias from the mean rate, heading from the levelled field, the height reference from the pressure. A vehicle that
+will not stand still (a log that starts in flight) is aligned after a while all the same, with wider bounds.
 """
 
 import warp as wp

@@ -230,7 +230,8 @@ def prediction_code() -> list[str]:
         "",
         "@wp.func",
         "def predict_covariance(",
-        "    cov: wp.array2d(dtype=vec24), i: int, rot: wp.mat33, delta_vel_ned: wp.vec3, dt_s: float, added_var: vec24",
+        "    cov: wp.array2d(dtype=vec24), "
+        "i: int, rot: wp.mat33, delta_vel_ned: wp.vec3, dt_s: float, added_var: vec24",
         ") -> None:",
         '    """P = F P F\' + diag(added_var) over one step; rows 9 to 23 of F are those of the identity."""',
     ]

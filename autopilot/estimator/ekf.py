@@ -1,8 +1,8 @@
 """The estimator: an error-state Kalman filter (Solà 2017, "Quaternion kinematics for the error-state Kalman filter").
 
-In: the newest samples, each tick. Out: `EstimatorState.estimate`, predicted to the newest IMU sample, at 250 Hz. Inside:
-samples wait until the horizon, EKF2_DELAY_MAX behind, has passed their time; the filter runs there; the output
-predictor carries its state to now. `estimator_tick` is the whole filter in time order.
+In: the newest samples, each tick. Out: `EstimatorState.estimate`, predicted to the newest IMU sample, at 250 Hz.
+Inside: samples wait until the horizon, EKF2_DELAY_MAX behind, has passed their time; the filter runs there; the output
+predictor carries its state to now. `estimator_step` is the whole filter in time order.
 """
 
 from typing import Any
@@ -390,7 +390,7 @@ def estimator_reset(ekf: Ekf, i: int) -> None:
 
 
 @wp.kernel(enable_backward=False)
-def reset_rows(ekf: Ekf):
+def reset_rows(ekf: Ekf) -> None:
     estimator_reset(ekf, wp.tid())
 
 

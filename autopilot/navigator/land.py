@@ -8,6 +8,7 @@ from autopilot.navigator.setpoint import Vector
 _BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against rotor inflow and drag; guess
 _BLIND_STEADY_S = 20.0  # after that the thrust falls further, so that a vehicle that already stands notices it; guess
 _BLIND_FALL_1_S = 0.02  # share of the hover thrust per second; guess
+_SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
 _TOUCHING_US = 700_000  # longer than it takes to begin a descent; guess
 _NEAR_HOME_M = 30.0  # home's ground level is trusted this far around it; guess
 _SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, far from home; guess
@@ -38,7 +39,9 @@ class Landing:
             return
         context.is_landing = True
         if context.state.has_ground_contact:
-            context.setpoint.idle()  # attitude control against the ground would only tip the vehicle over
+            # Leaning into the wind against the ground would tip the vehicle over, and so would a sideways touch without
+            # any control.
+            context.setpoint.hang_level(_SETTLE_THRUST, context.state.yaw_rad)
             return
         if context.has_position:
             if self._is_blind:  # the position is back: land here
@@ -51,9 +54,9 @@ class Landing:
             self._is_blind = True
             self._blind_since_us = context.state.time_us
         if context.has_height and context.state.estimate.vel_std < context.number("COM_VEL_FS_EVH"):
-            context.setpoint.descend_braking(context.number("MPC_LAND_SPEED"), self._yaw)
+            context.setpoint.descend_braking(self._pushed(self._speed()), self._yaw)
         elif context.has_height:
-            context.setpoint.descend_level(context.number("MPC_LAND_SPEED"), self._yaw)
+            context.setpoint.descend_level(self._pushed(self._speed()), self._yaw)
         else:
             context.setpoint.hang_level(context.hover_thrust * self._blind_thrust_share(), self._yaw)
 

@@ -1,0 +1,1 @@
+"""Sources of measurements: one file each, with its start, stop and reset rules."""

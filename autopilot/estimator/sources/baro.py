@@ -53,7 +53,7 @@ def fuse_baro(
     sample: BaroSample,
     age_s: float,
     is_gnss_height_good: bool,
-):  # type: ignore[no-untyped-def]
+) -> tuple[Nominal, Aid, float]:
     """Down position, against the standard-atmosphere height `origin_height` [m] of the origin."""
     var = noise_variance(aid, params.baro_noise)
     height = baro_height(sample.pressure_pa)

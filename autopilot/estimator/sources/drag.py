@@ -1,6 +1,6 @@
 """Drag: the specific force across a multirotor's thrust axis is air drag, and so observes the wind.
 
-In: specific force averaged over 40 ms. Model: -(m u + rho / (2 b) |u| u) along body x and y, u the speed through the air
+In: specific force averaged over 40 ms. Model: -(m u + rho / (2 b) |u| u) along body x and y, u the speed through air
 (PX4 names: m rotor drag EKF2_MCOEF, b ballistic coefficient EKF2_BCOEF_X, _Y). Only wind is corrected, unless
 EKF2_DRAG_CTRL is 2 and nothing else measures velocity. Runs in the air only.
 """
@@ -48,7 +48,7 @@ def fuse_drag(
     drag: DragSum,
     time_us: wp.int64,
     corrects_velocity: bool,
-):  # type: ignore[no-untyped-def]
+) -> tuple[Nominal, Aid]:
     """Body x and y, which pass or fail together."""
     var = params.drag_noise * params.drag_noise
     accel_frd = drag.accel_frd / drag.time_s

@@ -87,7 +87,7 @@ def fuse_mag(
     sample: MagSample,
     omega_frd: wp.vec3,
     age_s: float,
-):  # type: ignore[no-untyped-def]
+) -> tuple[Nominal, Aid]:
     """The field in three axes, which pass or fail together; the vehicle has turned by omega * age since the sample."""
     var = noise_variance(aid, params.mag_noise)
     field_frd = sample.field_frd_gauss

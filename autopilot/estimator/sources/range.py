@@ -35,7 +35,7 @@ def fuse_range(
     nominal: Nominal,
     aid: Aid,
     sample: RangeSample,
-):  # type: ignore[no-untyped-def]
+) -> tuple[Nominal, Aid]:
     """The terrain's down coordinate."""
     down_ned = wp.quat_rotate(nominal.q_ned_from_frd, wp.vec3(0.0, 0.0, 1.0))
     if sample.is_valid == 1 and down_ned[2] > _MIN_DOWN:

@@ -1,6 +1,6 @@
 """Rest: while the IMU shows a vehicle that stands still, its velocity is zero.
 
-Holds tilt and biases together from alignment until GNSS takes over, and again after landing. Stops with the first motion.
+Holds tilt and biases together from alignment until GNSS takes over, and again after landing. Stops with motion.
 """
 
 import warp as wp
@@ -77,7 +77,7 @@ def rest_is_due(aid: Aid, nominal: Nominal, time_us: wp.int64) -> bool:
 @wp.func
 def fuse_rest(
     params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, nominal: Nominal, aid: Aid, time_us: wp.int64
-):  # type: ignore[no-untyped-def]
+) -> tuple[Nominal, Aid]:
     """Zero velocity in three axes."""
     var = _STD * _STD
     innov = -nominal.vel_ned

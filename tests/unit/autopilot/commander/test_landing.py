@@ -96,3 +96,13 @@ def test_descent_that_stalls_just_above_the_ground_is_contact_though_the_thrust_
         landing.update(row, HOVER, descent_sp, DT_S)
     assert landing.has_contact == is_felt
     assert not landing.is_landed
+
+
+def test_contact_outlasts_a_bounce_and_ends_with_a_fall():
+    landing = detector()
+    seconds_until_landed(landing, 0.09, limit_s=0.5)
+    assert landing.has_contact
+    landing.update(estimate(vel=(0.0, 0.0, -0.5)), 0.09, 0.0, DT_S)
+    assert landing.has_contact
+    landing.update(estimate(vel=(0.0, 0.0, 1.2)), 0.06, 0.0, DT_S)
+    assert not landing.has_contact

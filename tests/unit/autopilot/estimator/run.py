@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from autopilot.estimator.ekf import Ekf, estimator_step, make_ekf
+from autopilot.estimator.ekf import Ekf, estimator_reset, estimator_step, make_ekf
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS, estimator_params
 from autopilot.estimator.state import EstimatorState
 from autopilot.ports import Samples
@@ -16,7 +16,6 @@ from tests.unit.autopilot.estimator.flights import (
     Flight,
     quat_conjugate,
     quat_multiply,
-    quat_rotate,
     rotvec_from_quat,
 )
 
@@ -24,19 +23,23 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.kernel(enable_backward=False)
-def run_samples(
-    ekf: Ekf, samples: wp.array2d(dtype=Samples), first: int, count: int, trace: wp.array2d(dtype=EstimatorState)
-):
+def run_samples(ekf: Ekf, samples: wp.array2d(dtype=Samples), trace: wp.array2d(dtype=EstimatorState)):
     i = wp.tid()
-    for k in range(count):
-        estimator_step(ekf, i, samples[i, first + k])
-        if trace.shape[1] > 0:
+    for k in range(samples.shape[1]):
+        estimator_step(ekf, i, samples[i, k])
+        if k < trace.shape[1]:
             trace[i, k] = ekf.rows[i]
 
 
+@wp.kernel(enable_backward=False)
+def reset_one(ekf: Ekf, chosen: int):
+    estimator_reset(ekf, chosen)
+
+
 def default_ekf(vehicle_count: int = 1, **changes: float) -> Ekf:
-    """Estimators at power-on with some parameters changed."""
+    """Estimators at power-on in the field of the flights, on vehicles without legs, with some parameters changed."""
     table = ParameterTable(ESTIMATOR_PARAMETERS)
+    table.set("EKF2_MIN_RNG", 0.0)
     for name, value in changes.items():
         table.set(name, value)
     return make_ekf(vehicle_count, "cpu", estimator_params(table, FIELD_NED_GAUSS))
@@ -45,9 +48,9 @@ def default_ekf(vehicle_count: int = 1, **changes: float) -> Ekf:
 def run(ekf: Ekf, samples: Any, *, keep_trace: bool = True) -> Any:
     """The states after each tick, shape (vehicles, ticks), for samples of that shape (or of one vehicle)."""
     rows = np.atleast_2d(samples)
-    device_samples = wp.array(rows, dtype=Samples, device="cpu")
     trace = wp.zeros((rows.shape[0], rows.shape[1] if keep_trace else 0), dtype=EstimatorState, device="cpu")
-    wp.launch(run_samples, rows.shape[0], inputs=[ekf, device_samples, 0, rows.shape[1], trace], device="cpu")
+    device_samples = wp.array(rows, dtype=Samples, device="cpu")
+    wp.launch(run_samples, rows.shape[0], inputs=[ekf, device_samples, trace], device="cpu")
     return trace.numpy()
 
 
@@ -71,6 +74,11 @@ def errors(flight: Flight, trace: Any) -> Errors:
         np.degrees(np.hypot(turn[:, 0], turn[:, 1])),
         np.degrees(turn[:, 2]),
     )
+
+
+def rms(values: Any) -> Any:
+    """Root mean square over the first axis."""
+    return np.sqrt(np.mean(np.square(values), axis=0))
 
 
 def share_in_band(trace: Any, aid: str, components: int, from_tick: int) -> Any:

@@ -163,6 +163,17 @@ def test_landing_slows_down_near_the_ground():
     rig.disarmed()
 
 
+def test_vehicle_that_touches_the_ground_settles_level_under_little_thrust():
+    rig = Kinematic().flying(5.0)
+    rig.fc.set_mode(Mode.LAND)
+    rig.run_until(lambda: rig.state.has_ground_contact)
+    rig.frame()
+    assert rig.sp("kind") == SETPOINT_ATTITUDE
+    assert rig.sp("q_ned_from_frd")[:2] == [0.0, 0.0]
+    assert rig.sp("thrust") < 0.1
+    rig.disarmed()
+
+
 def test_land_command_with_a_place_goes_there_first():
     rig = Kinematic().flying(10.0)
     lat, lon, _ = geo(30.0, -20.0)
@@ -176,7 +187,11 @@ def test_landing_without_position_brakes_while_the_velocity_is_good():
     rig.flags &= ~POSITION_VALID
     rig.run(1.0)
     assert rig.state.mode is Mode.LAND
-    assert rig.sp("vel_ned") == pytest.approx([0.0, 0.0, 0.7])
+    assert [0.0 < abs(vel) < 0.05 for vel in rig.sp("vel_ned")[:2]] == [True, True]  # 0 would hold a place
+    assert rig.sp("vel_ned")[2] > 0.6
+    rig.run_until(lambda: rig.pos[2] > -0.9)
+    rig.frame()
+    assert rig.sp("vel_ned")[2] == pytest.approx(0.3)
     rig.disarmed()
 
 
@@ -188,7 +203,7 @@ def test_blind_landing_is_level_and_ends_on_the_ground():
     rig.run(0.1)
     assert rig.state.is_failsafe
     assert rig.sp("accel_ned")[:2] == [0.0, 0.0]
-    assert rig.sp("vel_ned")[2] == pytest.approx(0.7)
+    assert rig.sp("vel_ned")[2] > 0.6
     assert rig.recorder.has_text("Position lost: land")
     rig.disarmed()
     assert rig.pos[2] == 0.0
