@@ -5,12 +5,14 @@ Those without a meaning here are constants (minimum = maximum): they can be read
 """
 
 from dataclasses import replace
+from math import sqrt
 
 from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
-from autopilot.estimator.params import ESTIMATOR_PARAMETERS, airframe_parameters
+from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from common.airframe import Airframe
+from common.kernels import GRAVITY_M_S2
 from common.params import Parameter, ParameterTable
 
 _CLIENTS = "what ground stations expect of a PX4 vehicle"
@@ -72,13 +74,18 @@ def all_parameters() -> list[Parameter]:
 
 
 def airframe_defaults(airframe: Airframe) -> dict[str, int | float]:
-    """Parameters whose default is the airframe's own: battery, landing gear and drag."""
-    battery = airframe.battery
+    """Parameters whose default is the airframe's own: battery, landing gear, and drag as the wind estimator knows it."""
+    body, rotor, battery = airframe.body, airframe.rotor_model, airframe.battery
+    count = len(airframe.rotors)
+    hover_speed_rad_s = sqrt(body.mass_kg * GRAVITY_M_S2 / (count * rotor.thrust_n_s2))
     return {
         "BAT1_N_CELLS": battery.cells,
         "BAT1_V_CHARGED": battery.full_cell_v,
         "BAT1_V_EMPTY": battery.empty_cell_v,
-        **airframe_parameters(airframe),
+        "EKF2_MIN_RNG": airframe.contact.leg_z_m,
+        "EKF2_MCOEF": count * rotor.drag_n_s2_m * hover_speed_rad_s / body.mass_kg,
+        "EKF2_BCOEF_X": body.mass_kg / body.drag_area_x_m2,
+        "EKF2_BCOEF_Y": body.mass_kg / body.drag_area_y_m2,
     }
 
 

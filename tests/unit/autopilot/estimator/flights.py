@@ -123,7 +123,7 @@ def figure_of_eight(time_s: Array, rest_s: float, size_m: float, rate: float, ya
     return pos, yaw0 + blend * (yaw_rate * t + 0.8 * np.sin(0.2 * t))
 
 
-def make_flight(  # noqa: PLR0915
+def make_flight(
     seed: int = 0,
     duration_s: float = 60.0,
     rest_s: float = 6.0,

@@ -87,3 +87,21 @@ def share_in_band(trace: Any, aid: str, components: int, from_tick: int) -> Any:
     is_new = np.flatnonzero(np.diff(column["judged_time_us"]) > 0) + 1
     ratio = column["innov"][is_new, :components] ** 2 / column["innov_var"][is_new, :components]
     return np.mean(ratio < 1.96**2, axis=0)
+
+
+def fields(row: Any, prefix: str = "") -> dict[str, Any]:
+    """The leaves of a structured row by name: rows hold padding, so their bytes cannot be compared."""
+    leaves: dict[str, Any] = {}
+    for name in row.dtype.names:
+        if row[name].dtype.names:
+            leaves |= fields(row[name], f"{prefix}{name}.")
+        else:
+            leaves[prefix + name] = np.array(row[name])
+    return leaves
+
+
+def assert_same(row: Any, other: Any) -> None:
+    """Every field has the same bits."""
+    found = fields(other)
+    for name, value in fields(row).items():
+        np.testing.assert_array_equal(value, found[name], err_msg=name)

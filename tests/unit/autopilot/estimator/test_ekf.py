@@ -15,7 +15,7 @@ from autopilot.ports import (
     YAW_ALIGNED,
 )
 from tests.unit.autopilot.estimator.flights import Flight, SensorNoise, freeze, make_flight, silence, stacked
-from tests.unit.autopilot.estimator.run import default_ekf, errors, reset_one, rms, run, share_in_band
+from tests.unit.autopilot.estimator.run import assert_same, default_ekf, errors, reset_one, rms, run, share_in_band
 
 TICKS = 250  # per second
 ALL_VALID = TILT_ALIGNED | YAW_ALIGNED | POSITION_VALID | VELOCITY_VALID | HEIGHT_VALID
@@ -230,8 +230,8 @@ def test_one_vehicle_equals_its_row_among_sixteen() -> None:
     many, one = default_ekf(16), default_ekf(1)
     run(many, stacked(flights), keep_trace=False)
     run(one, flights[11].samples, keep_trace=False)
-    assert many.rows.numpy()[11].tobytes() == one.rows.numpy()[0].tobytes()
-    assert many.covariance.numpy()[11].tobytes() == one.covariance.numpy()[0].tobytes()
+    assert_same(many.rows.numpy()[11], one.rows.numpy()[0])
+    np.testing.assert_array_equal(many.covariance.numpy()[11], one.covariance.numpy()[0])
 
 
 def test_reset_touches_one_row() -> None:
@@ -241,12 +241,12 @@ def test_reset_touches_one_row() -> None:
     before = ekf.rows.numpy().copy()
     wp.launch(reset_one, 1, inputs=[ekf, 1], device="cpu")
     after = ekf.rows.numpy()
-    assert after[0].tobytes() == before[0].tobytes()
-    assert after[2].tobytes() == before[2].tobytes()
-    assert after[1].tobytes() == fresh.rows.numpy()[0].tobytes()
+    assert_same(after[0], before[0])
+    assert_same(after[2], before[2])
+    assert_same(after[1], fresh.rows.numpy()[0])
     run(ekf, stacked(flights), keep_trace=False)
     run(fresh, flights[1].samples, keep_trace=False)
-    assert ekf.rows.numpy()[1].tobytes() == fresh.rows.numpy()[0].tobytes()
+    assert_same(ekf.rows.numpy()[1], fresh.rows.numpy()[0])
 
 
 def test_heading_waits_for_a_magnetometer() -> None:

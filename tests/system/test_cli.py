@@ -1,0 +1,204 @@
+"""The console command: wrong input gives one sentence and exit code 2, a failed mission 1, a flown one 0."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import time
+
+import pytest
+from pyulog import ULog
+
+from mission.plan import DEFAULT_PLAN
+from tests.system.vehicle import HONEYGUIDE, ROOT, IdleVehicle, free_ports, honeyguide
+
+LOCKSTEP = ("--once", "--speed", "max")
+
+
+def assert_refused(result, pattern):
+    """Exit code 2 and one sentence, nothing else."""
+    assert result.returncode == 2, result.stderr
+    assert "Traceback" not in result.stderr
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == 1, result.stderr
+    assert re.search(pattern, lines[0]), lines[0]
+    assert lines[0].startswith("honeyguide: ")
+
+
+@pytest.fixture
+def fly(tmp_path):
+    """Runs a lockstep flight into a folder of the test."""
+
+    def run(*arguments):
+        folder = () if "--run-folder" in arguments else ("--run-folder", tmp_path / "flight")
+        return honeyguide("fly", *LOCKSTEP, *folder, *arguments)
+
+    return run
+
+
+def plan_with(item):
+    """The default plan with entries of its second item replaced."""
+    plan = json.loads(DEFAULT_PLAN.read_text())
+    plan["mission"]["items"][1] |= item
+    return json.dumps(plan)
+
+
+WRONG_PLANS = {
+    "empty": ("", r"is not valid JSON"),
+    "truncated": (DEFAULT_PLAN.read_text()[:400], r"line \d+ is not valid JSON .* complete\?"),
+    "another file": ('{"fileType": "Parameters"}', r"is neither a QGroundControl plan .* nor a QGC WPL 110 file"),
+    "no items": ('{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []}}', r"has no items"),
+    "wrong latitude": (plan_with({"params": [0, 0, 0, None, 147.4, 8.5, 10]}), r"mission: item 2: "),
+    "words for numbers": (plan_with({"params": [0, 0, 0, None, "north", 8.5, 10]}), r"mission: item 2: "),
+    "truncated waypoints": ("QGC WPL 110\n0\t1\t0\t16\t0\t0", r"line 2"),
+    "binary": ("\x00\x01\x02", r"is not valid JSON"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_PLANS)
+def test_wrong_plan_is_refused(fly, tmp_path, name):
+    text, pattern = WRONG_PLANS[name]
+    plan = tmp_path / "wrong.plan"
+    plan.write_text(text)
+    assert_refused(fly("--plan", plan), rf"wrong\.plan: .*{pattern}|wrong\.plan: {pattern}")
+    assert plan.read_text() == text
+    assert list(tmp_path.iterdir()) == [plan]
+
+
+def test_missing_plan_is_refused(fly, tmp_path):
+    assert_refused(fly("--plan", tmp_path / "none.plan"), r"none\.plan: No such file")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "pattern"),
+    [
+        (("--airframe", "zeppelin"), r"unknown airframe 'zeppelin'; known: f450, x500"),
+        (("--airframe", "/dev/null/x.toml"), r"unknown airframe"),
+        (("--speed", "0"), r"--speed 0: must be a number above 0, or 'max'"),
+        (("--speed", "fast"), r"--speed fast: must be"),
+        (("--speed", "nan"), r"--speed nan: must be"),
+        (("--home", "47.4"), r"--home 47\.4: must be latitude,longitude"),
+        (("--home", "north,east"), r"--home north,east: must be"),
+        (("--home", "91,0"), r"--home 91,0: must be"),
+        (("--home", "47,8,nan"), r"--home 47,8,nan: must be"),
+        (("--run-folder", "/dev/null/x"), r"/dev/null/x: cannot write there: Not a directory"),
+        (("--run-folder", DEFAULT_PLAN), r"default\.plan: cannot write there: "),
+    ],
+)
+def test_wrong_option_is_refused(fly, tmp_path, arguments, pattern):
+    assert_refused(fly(*arguments), pattern)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_wrong_airframe_file_is_refused(fly, tmp_path):
+    airframe = tmp_path / "mine.toml"
+    text = (ROOT / "sim/bodies/airframes/x500.toml").read_text()
+    airframe.write_text(text.replace("mass_kg = { value = 1.5,", "mass_kg = { value = -1.5,"))
+    assert_refused(fly("--airframe", airframe), r"mine\.toml: body\.mass_kg\.?.*: ")
+    airframe.write_text(text[:300])
+    assert_refused(fly("--airframe", airframe), r"mine\.toml: ")
+
+
+def test_option_out_of_range_is_refused(fly, tmp_path):
+    result = fly("--wind", "99")
+    assert result.returncode == 2
+    assert "Invalid value for '--wind'" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_port_in_use_is_refused(tmp_path):
+    gcs_port, api_port = free_ports()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", api_port + 40))
+        result = honeyguide(
+            "fly", "--idle", "--gcs-port", gcs_port, "--api-port", api_port, "--run-folder", tmp_path / "flight"
+        )
+    assert_refused(result, rf"UDP port {api_port + 40} is in use")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folder_with_a_flight_is_left_alone(fly, tmp_path):
+    log = tmp_path / "flight" / "flight.ulg"
+    log.parent.mkdir()
+    log.write_bytes(b"an earlier flight")
+    assert_refused(fly(), r"already holds a flight")
+    assert log.read_bytes() == b"an earlier flight"
+    assert list(log.parent.iterdir()) == [log]
+
+
+def test_flown_mission_gives_0_and_a_whole_run_folder(fly, tmp_path):
+    result = fly("--wind", "5")
+    assert result.returncode == 0, result.stderr
+    assert result.stderr == ""
+    assert "mission completed" in result.stdout
+    folder = tmp_path / "flight"
+    assert sorted(path.name for path in folder.iterdir()) == ["flight.png", "flight.tlog", "flight.ulg", "summary.json"]
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["is_success"] is True
+    assert summary["cross_track_p95_m"] < 1.5
+    assert (folder / "flight.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_mission_that_the_vehicle_refuses_gives_1(fly, tmp_path):
+    plan = tmp_path / "spline.plan"
+    plan.write_text(plan_with({"command": 82}))  # a spline waypoint is valid in a file and not flown here
+    result = fly("--plan", plan)
+    assert result.returncode == 1, result.stderr
+    assert "Traceback" not in result.stderr
+    summary = json.loads((tmp_path / "flight" / "summary.json").read_text())
+    assert not summary["is_success"]
+    assert "item 1" in summary["result"]
+    ULog(str(tmp_path / "flight" / "flight.ulg"))  # is whole
+
+
+def test_mission_far_away_gives_1(fly):
+    result = fly("--home", "-33.9,18.4,20")
+    assert result.returncode == 1, result.stderr
+    assert "km away" in result.stdout
+
+
+def test_flight_ends_when_its_time_is_over(fly, tmp_path):
+    result = fly("--seconds", "0.1")
+    assert result.returncode == 1
+    assert result.stderr == ""
+    assert "mission not finished" in result.stdout
+    assert json.loads((tmp_path / "flight" / "summary.json").read_text())["simulated_s"] == pytest.approx(0.1)
+
+
+def test_idle_vehicle_stops_on_interrupt_with_its_log_whole(tmp_path):
+    with IdleVehicle(tmp_path) as vehicle:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+            station.bind(("127.0.0.1", vehicle.gcs_port))
+            station.settimeout(120.0)
+            assert station.recv(1000)[0] == 0xFD  # MAVLink 2
+        exit_code, output = vehicle.stop()
+    assert exit_code == 0, output
+    assert "stopped by the user" in output
+    assert "Traceback" not in output
+    ULog(str(vehicle.folder / "flight.ulg"))
+
+
+def test_interrupt_while_starting_is_no_traceback(tmp_path):
+    ports = [str(port) for port in free_ports()]
+    process = subprocess.Popen(
+        [HONEYGUIDE, "fly", "--idle", "--gcs-port", ports[0], "--api-port", ports[1], "--run-folder", tmp_path / "f"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while not (tmp_path / "f").exists() and process.poll() is None:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60.0)
+    assert "Traceback" not in errors
+    assert process.returncode != 0
+
+
+def test_help_names_the_options():
+    result = honeyguide("fly", "--help")
+    assert result.returncode == 0
+    for option in ("--plan", "--once", "--speed", "--seconds", "--seed", "--wind", "--airframe", "--home"):
+        assert option in result.stdout
