@@ -14,6 +14,7 @@ from bench.row import Row, best_of, require
 HEARTBEAT_ID = 0
 MAVLINK_2 = 0xFD
 TIMEOUT_S = 120.0
+POLL_S = 0.2
 COMMAND = "python -m bench startup"
 EVERYTHING = """
 import gymnasium
@@ -54,22 +55,26 @@ def _first_heartbeat_s() -> float:
     program = str(Path(sys.executable).with_name("honeyguide"))
     with TemporaryDirectory() as folder, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
         station.bind(("127.0.0.1", 0))
-        station.settimeout(TIMEOUT_S)
+        station.settimeout(POLL_S)
         command = [program, "fly", "--idle", "--gcs-port", str(station.getsockname()[1]), "--run-folder", folder]
         start = time.perf_counter()
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         try:
-            while not _is_heartbeat(station.recv(2048)):
-                pass
+            while not _is_heartbeat(_received(station)):
+                require(process.poll() is None, "honeyguide fly ended before its first heartbeat")
+                require(time.perf_counter() - start < TIMEOUT_S, f"no heartbeat in {TIMEOUT_S:.0f} s")
             return time.perf_counter() - start
-        except TimeoutError:
-            process.kill()
-            text = process.communicate()[1].decode()
-            require(False, f"no heartbeat in {TIMEOUT_S:.0f} s: {text}")
-            raise
         finally:
             process.send_signal(signal.SIGINT)
-            process.wait(TIMEOUT_S)
+            process.communicate(timeout=TIMEOUT_S)
+
+
+def _received(station: socket.socket) -> bytes:
+    """The next datagram, or nothing for a while."""
+    try:
+        return station.recv(2048)
+    except TimeoutError:
+        return b""
 
 
 def _is_heartbeat(datagram: bytes) -> bool:
