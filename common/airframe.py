@@ -6,9 +6,11 @@ An airframe is a TOML file in which every number is `{ value = …, source = "�
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from common.kernels import GRAVITY_M_S2
 
 AIRFRAME_FOLDER = Path(__file__).resolve().parent.parent / "sim" / "bodies" / "airframes"
 
@@ -23,8 +25,13 @@ def _value_with_source(raw: Any) -> Any:
     return raw["value"]
 
 
-Sourced = Annotated[float, BeforeValidator(_value_with_source)]
-SourcedCount = Annotated[int, BeforeValidator(_value_with_source)]
+_SOURCED = BeforeValidator(_value_with_source)
+Number = Annotated[float, Field(allow_inf_nan=False), _SOURCED]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False), _SOURCED]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False), _SOURCED]
+Share = Annotated[float, Field(ge=0.0, le=1.0), _SOURCED]
+Count = Annotated[int, Field(gt=0), _SOURCED]
+Spin = Annotated[Literal[-1, 1], _SOURCED]
 
 
 class _Section(BaseModel):
@@ -32,24 +39,24 @@ class _Section(BaseModel):
 
 
 class Body(_Section):
-    mass_kg: Sourced
-    inertia_xx_kg_m2: Sourced
-    inertia_yy_kg_m2: Sourced
-    inertia_zz_kg_m2: Sourced
-    drag_area_x_m2: Sourced
+    mass_kg: Positive
+    inertia_xx_kg_m2: Positive
+    inertia_yy_kg_m2: Positive
+    inertia_zz_kg_m2: Positive
+    drag_area_x_m2: Positive
     """Drag coefficient times area seen along body x: force = -½ ρ (c_d A) |v| v."""
-    drag_area_y_m2: Sourced
-    drag_area_z_m2: Sourced
-    angular_drag_n_m_s2: Sourced
+    drag_area_y_m2: Positive
+    drag_area_z_m2: NotNegative
+    angular_drag_n_m_s2: NotNegative
     """Torque per squared body rate opposing rotation about each axis, at sea-level density."""
 
 
 class Rotor(_Section):
-    x_m: Sourced
+    x_m: Number
     """Position of the hub in frd, from the centre of gravity."""
-    y_m: Sourced
-    z_m: Sourced
-    spin: SourcedCount
+    y_m: Number
+    z_m: Number
+    spin: Spin
     """+1 turns counter-clockwise seen from above, -1 clockwise.
 
     The reaction torque on the body is spin * torque about +z (frd down).
@@ -57,48 +64,54 @@ class Rotor(_Section):
 
 
 class RotorModel(_Section):
-    radius_m: Sourced
-    thrust_n_s2: Sourced
+    radius_m: Positive
+    thrust_n_s2: Positive
     """Static thrust per squared speed: T = thrust_n_s2 * omega² at sea-level density."""
-    torque_n_m_s2: Sourced
+    torque_n_m_s2: Positive
     """Aerodynamic torque per squared speed."""
-    max_speed_rad_s: Sourced
+    max_speed_rad_s: Positive
     """Speed at full command and full battery."""
-    idle_command: Sourced
+    idle_command: Share
     """Command [0..1] at which an armed motor idles."""
-    command_curve: Sourced
+    command_curve: Share
     """a in omega / omega_max = a * u + (1 - a) * sqrt(u): 1 is a speed-linear ESC, 0 a thrust-linear one."""
-    spin_up_time_s: Sourced
+    spin_up_time_s: Positive
     """First-order lag of rising speed."""
-    spin_down_time_s: Sourced
-    inertia_kg_m2: Sourced
+    spin_down_time_s: Positive
+    inertia_kg_m2: Positive
     """Rotor and bell, about the spin axis."""
-    drag_n_s2_m: Sourced
+    drag_n_s2_m: NotNegative
     """In-plane rotor drag per rotor: force = -drag_n_s2_m * omega * v_in_plane."""
-    inflow_n_s2_m: Sourced
+    inflow_n_s2_m: NotNegative
     """Thrust lost per rotor to axial inflow: inflow_n_s2_m * omega * (speed of the hub through the air, up)."""
 
 
 class Battery(_Section):
-    cells: SourcedCount
-    capacity_mah: Sourced
-    internal_resistance_ohm: Sourced
+    cells: Count
+    capacity_mah: Positive
+    internal_resistance_ohm: NotNegative
     """Whole pack."""
-    full_cell_v: Sourced
-    empty_cell_v: Sourced
-    motor_efficiency: Sourced
+    full_cell_v: Positive
+    empty_cell_v: Positive
+    motor_efficiency: Annotated[float, Field(gt=0.0, le=1.0), _SOURCED]
     """Shaft power over electrical power, motor and ESC together."""
-    avionics_w: Sourced
+    avionics_w: NotNegative
+
+    @model_validator(mode="after")
+    def _full_is_above_empty(self) -> Self:
+        if self.full_cell_v <= self.empty_cell_v:
+            raise ValueError("full_cell_v must be above empty_cell_v")
+        return self
 
 
 class Contact(_Section):
-    leg_x_m: Sourced
+    leg_x_m: Positive
     """Feet at (±leg_x, ±leg_y, leg_z) in frd."""
-    leg_y_m: Sourced
-    leg_z_m: Sourced
-    hull_radius_m: Sourced
+    leg_y_m: Positive
+    leg_z_m: Positive
+    hull_radius_m: Positive
     """Sphere round the whole vehicle, for trunks, crowns and walls; the ground is met by feet and rotor tips."""
-    crash_speed_m_s: Sourced
+    crash_speed_m_s: Positive
     """Speed normal to the surface above which the vehicle breaks."""
 
 
@@ -112,6 +125,15 @@ class Airframe(_Section):
     rotors: Annotated[list[Rotor], Field(min_length=3, max_length=8)]
     battery: Battery
     contact: Contact
+
+    @model_validator(mode="after")
+    def _lifts_itself(self) -> Self:
+        rotor = self.rotor_model
+        thrust_n = len(self.rotors) * rotor.thrust_n_s2 * rotor.max_speed_rad_s**2
+        weight_n = self.body.mass_kg * GRAVITY_M_S2
+        if thrust_n <= weight_n:
+            raise ValueError(f"the rotors lift {thrust_n:.3g} N at most, the vehicle weighs {weight_n:.3g} N")
+        return self
 
 
 def airframe_names() -> list[str]:
@@ -130,9 +152,11 @@ def load_airframe(name_or_path: str) -> Airframe:
         raise AirframeError(f"unknown airframe '{name_or_path}'; known: {', '.join(airframe_names())}")
     try:
         return Airframe.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise AirframeError(f"{path}: not TOML: {error}") from error
+    except OSError as error:
+        raise AirframeError(f"{path}: {error.strerror}") from error
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise AirframeError(f"{path}: {place}: {first['msg']}") from error
+        place = "".join(f"{part}: " for part in [".".join(map(str, first["loc"]))] if part)
+        raise AirframeError(f"{path}: {place}{first['msg'].removeprefix('Value error, ')}") from error

@@ -8,7 +8,7 @@ from common.geodesy import ned_from_geodetic
 from common.params import ParameterTable
 from mission.sensor_csv import read_csv
 from mission.sensor_log import SensorLogError, prepare
-from mission.sensor_ulog import read_ulog
+from mission.sensor_ulog import MAGIC, read_ulog
 from tests.unit.mission.synthetic_log import (
     GPS_DELAY_US,
     HOME,
@@ -166,7 +166,14 @@ def test_a_truncated_log_is_read_as_far_as_it_goes(tmp_path, flight):
     assert 100 < len(recording.imu) < len(flight.time_us)
 
 
-def test_a_damaged_log_is_refused_or_read_but_never_read_for_ever(tmp_path):
+def test_a_log_that_pyulog_would_read_for_ever_is_refused(tmp_path):
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(MAGIC + b"\x01" + bytes(8) + b"\xff\x20\x00")  # a record of type 0, longer than the file
+    with pytest.raises(SensorLogError, match="damaged so that no ULog reader can follow it"):
+        read_ulog(path)
+
+
+def test_a_damaged_log_is_refused_or_read(tmp_path):
     path = tmp_path / "flight.ulg"
     write_ulog(path, px4_tables(Flight(3.0)))
     content = path.read_bytes()
