@@ -158,5 +158,6 @@ def load_airframe(name_or_path: str) -> Airframe:
         raise AirframeError(f"{path}: {error.strerror}") from error
     except ValidationError as error:
         first = error.errors()[0]
-        place = "".join(f"{part}: " for part in [".".join(map(str, first["loc"]))] if part)
-        raise AirframeError(f"{path}: {place}{first['msg'].removeprefix('Value error, ')}") from error
+        place = ".".join(map(str, first["loc"]))
+        parts = (str(path), place, first["msg"].removeprefix("Value error, "))
+        raise AirframeError(": ".join(part for part in parts if part)) from error

@@ -134,6 +134,7 @@ class Client:
         self.system_id = system_id
         self.texts: list[str] = []
         self.reached: list[int] = []
+        self._text_id = 0  # of the last text
         self._transport = transport
         self._reader = FrameReader()
         self._seq = 0
@@ -321,9 +322,17 @@ class Client:
 
     def _note(self, message: Message) -> None:
         if message.name == "STATUSTEXT":
-            self.texts.append(message.fields.text)
+            self._note_text(message.fields)
         else:
             self.reached.append(message.fields.seq)
+
+    def _note_text(self, fields: Any) -> None:
+        """A text longer than one message comes in chunks of the same id."""
+        if fields.id != 0 and fields.chunk_seq > 0 and fields.id == self._text_id:
+            self.texts[-1] += fields.text
+        else:
+            self.texts.append(fields.text)
+        self._text_id = fields.id
 
 
 _NOTED = {message_id("STATUSTEXT"), message_id("MISSION_ITEM_REACHED")}

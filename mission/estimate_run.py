@@ -39,7 +39,7 @@ REAL_SENSORS: dict[str, float] = {
     "EKF2_BARO_NOISE": 1.0,  # guess: propeller wash; PX4 has 3.5
     "EKF2_BARO_WALK": 0.1,  # guess
     "EKF2_MAG_NOISE": 0.05,  # PX4 default
-    "EKF2_MAG_B_INIT": 0.05,  # guess: what a field calibration leaves
+    "EKF2_MAG_B_INIT": 0.03,  # guess: what a field calibration leaves
     "EKF2_MIN_RNG": 0.0,  # the origin is where the receiver stands
     "EKF2_RNG_NOISE": 0.1,  # PX4 default
     "EKF2_RNG_SFE": 0.05,  # PX4 default
@@ -148,7 +148,7 @@ class _Collector:
 
     def take(self, states: Rows) -> None:
         """Keeps what is new in the states of consecutive ticks."""
-        is_running = states["phase"] == PHASE_RUNNING
+        is_running = (states["phase"] == PHASE_RUNNING) & (states["estimate"]["tilt_std"] > 0.0)
         slots = np.concatenate([self._before["time_us"], states["time_us"]]) // OUTPUT_PERIOD_US
         chosen = states[is_running & (np.diff(slots) > 0)]
         output = np.zeros(len(chosen), dtype=OUTPUT_DTYPE)
@@ -171,7 +171,8 @@ def _events(before: Rows, aids: Rows) -> Rows:
     """The ticks in which a source judged a sample."""
     judged = np.concatenate([before["judged_time_us"], aids["judged_time_us"]])
     resets = np.concatenate([before["reset_count"], aids["reset_count"]])
-    is_new = (np.diff(judged) != 0) & (judged[1:] != 0)
+    # A source that starts without an innovation notes the time of that sample, and no variance.
+    is_new = (np.diff(judged) != 0) & (aids["innov_var"][:, 0] > 0.0)
     chosen = aids[is_new]
     events = np.zeros(len(chosen), dtype=EVENT_DTYPE)
     events["time_us"] = chosen["judged_time_us"]

@@ -172,9 +172,10 @@ class Recorder:
         self.flush()
         if self._log is not None:
             self._log.close()
-        return History(
-            *(np.concatenate([getattr(part, name) for part in self._history]) for name in History.__dataclass_fields__)
-        )
+        names = History.__dataclass_fields__
+        if not self._history:
+            return History(*(np.empty(0) for _ in names))
+        return History(*(np.concatenate([getattr(part, name) for part in self._history]) for name in names))
 
     def _write(self, batch: Batch, status: Rows, imu_rings: Rows) -> None:
         for topic, columns in self._topics:

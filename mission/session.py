@@ -23,12 +23,14 @@ from mission.plan import DEFAULT_PLAN, Plan, PlanError, read_plan
 from mission.plots import plot_flight
 from mission.script import fly_plan
 from mission.summary import Summary, planned_path, summarise
+from sim.sensors.sensors import DEFAULT_HOME
 from sim.world.world import WorldConfig
 
 PROGRESS_PERIOD_S = 0.2
 GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
 API_PORT_STEP = 14580 - 14540
 PORT_MAX = 65535
+HOME_MOST = (89.0, 180.0, 6000.0)  # latitude and longitude [deg], altitude [m]: highest airfields
 
 
 class UserError(ValueError):
@@ -121,9 +123,11 @@ def _home(text: str) -> GeoPoint:
         values = [float(part) for part in text.split(",")]
     except ValueError:
         values = []
-    if len(values) not in (2, 3) or not abs(values[0]) <= 89.0 or not abs(values[1]) <= 180.0:
+    if len(values) == 2:
+        values.append(DEFAULT_HOME.alt_m)
+    if len(values) != 3 or not all(abs(value) <= most for value, most in zip(values, HOME_MOST, strict=True)):
         raise UserError(f"--home {text}: must be latitude,longitude or latitude,longitude,altitude")
-    return GeoPoint(values[0], values[1], values[2] if len(values) == 3 else 488.0)
+    return GeoPoint(*values)
 
 
 def _plan(path: Path | None) -> Plan:
@@ -244,6 +248,9 @@ def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: 
     """Writes the run folder and prints the summary; returns the exit code."""
     texts = list(flight.drone.texts)
     history = flight.close()
+    if len(history.time_us) == 0:
+        console.print("the flight ended before its first frame")
+        return 1
     path_ned = [] if plan is None else planned_path(plan, flight.config.home)
     summary = summarise(flight, history, running, path_ned)
     write_whole(folder / "summary.json", (json.dumps(summary.as_json(), indent=2) + "\n").encode())

@@ -59,15 +59,18 @@ class EstimatorErrors:
 
 
 def estimator_errors(history: History, frames: Rows) -> EstimatorErrors:
-    """RMS of estimate minus truth, over the frames where `frames` is True."""
+    """RMS of estimate minus truth, over the frames where `frames` is True; NaN where there is none."""
+    if not frames.any():
+        nan = float("nan")
+        return EstimatorErrors((nan, nan, nan), (nan, nan, nan), nan, nan)
     pos = history.pos_ned_est[frames].astype(float) - history.pos_ned_true[frames]
     vel = history.vel_ned_est[frames].astype(float) - history.vel_ned_true[frames]
     error_ned = _rotation_error_ned(history.q_est[frames].astype(float), history.q_true[frames].astype(float))
     return EstimatorErrors(
         tuple(_rms(pos)),
         tuple(_rms(vel)),
-        float(np.degrees(np.sqrt(np.mean(np.sum(error_ned[:, :2] ** 2, axis=1))))) if frames.any() else np.nan,
-        float(np.degrees(_rms(error_ned[:, 2]))) if frames.any() else np.nan,
+        float(np.degrees(np.sqrt(np.mean(np.sum(error_ned[:, :2] ** 2, axis=1))))),
+        float(np.degrees(_rms(error_ned[:, 2]))),
     )
 
 
@@ -169,7 +172,7 @@ def summarise(flight: Any, history: History, running: Any, path_ned: Sequence[tu
     errors = estimator_errors(history, armed)
     result, is_success = _result(flight, running)
     end_true, end_est = history.pos_ned_true[-1], history.pos_ned_est[-1]
-    target = path_ned[-1][1] if path_ned else np.full(3, np.nan)
+    target = path_ned[-1][1] if path_ned and armed.any() else np.full(3, np.nan)
     return Summary(
         result=result,
         is_success=is_success,

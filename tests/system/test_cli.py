@@ -11,7 +11,7 @@ import pytest
 from pyulog import ULog
 
 from mission.plan import DEFAULT_PLAN
-from tests.system.vehicle import HONEYGUIDE, ROOT, IdleVehicle, free_ports, honeyguide
+from tests.system.vehicle import HONEYGUIDE, IdleVehicle, free_ports, honeyguide
 
 LOCKSTEP = ("--once", "--speed", "max")
 
@@ -37,75 +37,15 @@ def fly(tmp_path):
     return run
 
 
-def plan_with(item):
-    """The default plan with entries of its second item replaced."""
+def plan_with_a_spline():
+    """The default plan with a spline waypoint: valid in a file, not flown here."""
     plan = json.loads(DEFAULT_PLAN.read_text())
-    plan["mission"]["items"][1] |= item
+    plan["mission"]["items"][1]["command"] = 82
     return json.dumps(plan)
-
-
-WRONG_PLANS = {
-    "empty": ("", r"is not valid JSON"),
-    "truncated": (DEFAULT_PLAN.read_text()[:400], r"line \d+ is not valid JSON .* complete\?"),
-    "another file": ('{"fileType": "Parameters"}', r"is neither a QGroundControl plan .* nor a QGC WPL 110 file"),
-    "no items": ('{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []}}', r"has no items"),
-    "wrong latitude": (plan_with({"params": [0, 0, 0, None, 147.4, 8.5, 10]}), r"mission: item 2: "),
-    "words for numbers": (plan_with({"params": [0, 0, 0, None, "north", 8.5, 10]}), r"mission: item 2: "),
-    "truncated waypoints": ("QGC WPL 110\n0\t1\t0\t16\t0\t0", r"line 2"),
-    "binary": ("\x00\x01\x02", r"is not valid JSON"),
-}
-
-
-@pytest.mark.parametrize("name", WRONG_PLANS)
-def test_wrong_plan_is_refused(fly, tmp_path, name):
-    text, pattern = WRONG_PLANS[name]
-    plan = tmp_path / "wrong.plan"
-    plan.write_text(text)
-    assert_refused(fly("--plan", plan), rf"wrong\.plan: .*{pattern}|wrong\.plan: {pattern}")
-    assert plan.read_text() == text
-    assert list(tmp_path.iterdir()) == [plan]
 
 
 def test_missing_plan_is_refused(fly, tmp_path):
     assert_refused(fly("--plan", tmp_path / "none.plan"), r"none\.plan: No such file")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "pattern"),
-    [
-        (("--airframe", "zeppelin"), r"unknown airframe 'zeppelin'; known: f450, x500"),
-        (("--airframe", "/dev/null/x.toml"), r"unknown airframe"),
-        (("--speed", "0"), r"--speed 0: must be a number above 0, or 'max'"),
-        (("--speed", "fast"), r"--speed fast: must be"),
-        (("--speed", "nan"), r"--speed nan: must be"),
-        (("--home", "47.4"), r"--home 47\.4: must be latitude,longitude"),
-        (("--home", "north,east"), r"--home north,east: must be"),
-        (("--home", "91,0"), r"--home 91,0: must be"),
-        (("--home", "47,8,nan"), r"--home 47,8,nan: must be"),
-        (("--run-folder", "/dev/null/x"), r"/dev/null/x: cannot write there: Not a directory"),
-        (("--run-folder", DEFAULT_PLAN), r"default\.plan: cannot write there: "),
-    ],
-)
-def test_wrong_option_is_refused(fly, tmp_path, arguments, pattern):
-    assert_refused(fly(*arguments), pattern)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_wrong_airframe_file_is_refused(fly, tmp_path):
-    airframe = tmp_path / "mine.toml"
-    text = (ROOT / "sim/bodies/airframes/x500.toml").read_text()
-    airframe.write_text(text.replace("mass_kg = { value = 1.5,", "mass_kg = { value = -1.5,"))
-    assert_refused(fly("--airframe", airframe), r"mine\.toml: body\.mass_kg\.?.*: ")
-    airframe.write_text(text[:300])
-    assert_refused(fly("--airframe", airframe), r"mine\.toml: ")
-
-
-def test_option_out_of_range_is_refused(fly, tmp_path):
-    result = fly("--wind", "99")
-    assert result.returncode == 2
-    assert "Invalid value for '--wind'" in result.stderr
-    assert "Traceback" not in result.stderr
     assert list(tmp_path.iterdir()) == []
 
 
@@ -144,7 +84,7 @@ def test_flown_mission_gives_0_and_a_whole_run_folder(fly, tmp_path):
 
 def test_mission_that_the_vehicle_refuses_gives_1(fly, tmp_path):
     plan = tmp_path / "spline.plan"
-    plan.write_text(plan_with({"command": 82}))  # a spline waypoint is valid in a file and not flown here
+    plan.write_text(plan_with_a_spline())
     result = fly("--plan", plan)
     assert result.returncode == 1, result.stderr
     assert "Traceback" not in result.stderr

@@ -204,7 +204,9 @@ def fly_mission(client):
     home_height_m = -client.telemetry.home().local_down_m
     for north, east, height in corners:
         # MAVSDK asks for an acceptance radius of 1 m, of 3 m where the item is flown through; PX4's corridor is 5 m
-        assert min(dist(pos, (north, east, height + home_height_m)) for pos in passed) < (3.0 if height == 12.0 else 1.0)
+        assert min(dist(pos, (north, east, height + home_height_m)) for pos in passed) < (
+            3.0 if height == 12.0 else 1.0
+        )
 
 
 def test_offboard_position_velocity_and_attitude(vehicle, client):
@@ -213,7 +215,13 @@ def test_offboard_position_velocity_and_attitude(vehicle, client):
     yaw_deg = 0.0
     offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -10.0, yaw_deg))
     client.start_offboard()
-    for north, east, down, yaw_deg in [(0, 0, -10, 0), (5, 0, -10, 90), (5, 5, -10, 180), (0, 5, -15, -90), (0, 0, -10, 0)]:
+    for north, east, down, yaw_deg in [
+        (0, 0, -10, 0),
+        (5, 0, -10, 90),
+        (5, 5, -10, 180),
+        (0, 5, -15, -90),
+        (0, 0, -10, 0),
+    ]:
         target = (float(north), float(east), float(down))
         offboard.set_position_ned(PositionNedYaw(*target, float(yaw_deg)))
         client.until(lambda target=target: dist(client.pos_ned, target) < 0.3, 10.0, f"at {target}")

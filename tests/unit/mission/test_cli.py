@@ -1,0 +1,107 @@
+"""`honeyguide fly` with wrong input: one sentence, exit code 2, and nothing is written."""
+
+import json
+import re
+
+import pytest
+from typer.testing import CliRunner
+
+from common.airframe import AIRFRAME_FOLDER
+from mission.cli import app
+from mission.plan import DEFAULT_PLAN
+
+
+@pytest.fixture
+def fly(tmp_path):
+    """Runs the command into a folder of the test."""
+
+    def run(*arguments):
+        folder = () if "--run-folder" in arguments else ("--run-folder", tmp_path / "flight")
+        words = ["fly", "--once", "--speed", "max", *folder, *arguments]
+        return CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+
+    return run
+
+
+def assert_refused(result, pattern):
+    """Exit code 2 and one sentence, nothing else."""
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == 1, result.stderr
+    assert lines[0].startswith("honeyguide: ")
+    assert re.search(pattern, lines[0]), lines[0]
+
+
+def plan_with(item):
+    """The default plan with entries of its second item replaced."""
+    plan = json.loads(DEFAULT_PLAN.read_text())
+    plan["mission"]["items"][1] |= item
+    return json.dumps(plan)
+
+
+WRONG_PLANS = {
+    "empty": ("", r"line 1 is not valid JSON"),
+    "truncated": (DEFAULT_PLAN.read_text()[:400], r"line \d+ is not valid JSON .* complete\?"),
+    "another file": ('{"fileType": "Parameters"}', r"is neither a QGroundControl plan .* nor a QGC WPL 110 file"),
+    "no items": ('{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []}}', r"has no items"),
+    "wrong latitude": (plan_with({"params": [0, 0, 0, None, 147.4, 8.5, 10]}), r"item 2: params: latitude 147\.4 is not within"),
+    "words for numbers": (plan_with({"params": [0, 0, 0, None, "north", 8.5, 10]}), r"item 2: params must be 7 numbers or null"),
+    "truncated waypoints": ("QGC WPL 110\n0\t1\t0\t16\t0\t0", r"item 0 \(line 2\): a line must have 12 columns, not 6"),
+    "binary": ("\x00\x01\x02", r"line 1 is not valid JSON"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_PLANS)
+def test_wrong_plan_is_refused(fly, tmp_path, name):
+    text, pattern = WRONG_PLANS[name]
+    plan = tmp_path / "wrong.plan"
+    plan.write_text(text)
+    assert_refused(fly("--plan", plan), rf"wrong\.plan: {pattern}")
+    assert plan.read_text() == text
+    assert list(tmp_path.iterdir()) == [plan]
+
+
+def test_missing_plan_is_refused(fly, tmp_path):
+    assert_refused(fly("--plan", tmp_path / "none.plan"), r"none\.plan: No such file")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "pattern"),
+    [
+        (("--airframe", "zeppelin"), r"unknown airframe 'zeppelin'; known: f450, x500"),
+        (("--airframe", "/dev/null/x.toml"), r"unknown airframe"),
+        (("--speed", "0"), r"--speed 0: must be a number above 0, or 'max'"),
+        (("--speed", "fast"), r"--speed fast: must be"),
+        (("--speed", "nan"), r"--speed nan: must be"),
+        (("--home", "47.4"), r"--home 47\.4: must be latitude,longitude"),
+        (("--home", "north,east"), r"--home north,east: must be"),
+        (("--home", "91,0"), r"--home 91,0: must be"),
+        (("--home", "47,8,nan"), r"--home 47,8,nan: must be"),
+        (("--run-folder", "/dev/null/x"), r"/dev/null/x: cannot write there: Not a directory"),
+        (("--run-folder", DEFAULT_PLAN), r"default\.plan: cannot write there: "),
+    ],
+)
+def test_wrong_option_is_refused(fly, tmp_path, arguments, pattern):
+    assert_refused(fly(*arguments), pattern)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_wrong_airframe_file_is_refused(fly, tmp_path):
+    airframe = tmp_path / "mine.toml"
+    text = (AIRFRAME_FOLDER / "x500.toml").read_text()
+    airframe.write_text(text.replace("mass_kg = { value = 1.5,", "mass_kg = { value = -1.5,"))
+    assert_refused(fly("--airframe", airframe), r"mine\.toml: body\.mass_kg: Input should be greater than 0")
+    airframe.write_text(text[:300])
+    assert_refused(fly("--airframe", airframe), r"mine\.toml: not TOML")
+
+
+def test_option_out_of_range_is_refused(fly, tmp_path):
+    result = fly("--wind", "99")
+    assert result.returncode == 2
+    assert "Invalid value for '--wind'" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
