@@ -7,11 +7,10 @@ recorded flight or an outside simulator.
 import warp as wp
 
 from autopilot.control.airframe import ControlAirframe
-from autopilot.control.control import control_tick
-from autopilot.control.params import ControlParams
 from autopilot.control.control import ControlState
-from autopilot.estimator.ekf import Ekf, estimator_tick
-from autopilot.estimator.state import EstimatorState
+from autopilot.control.params import ControlParams
+from autopilot.estimator.ekf import estimator_tick
+from autopilot.estimator.state import Ekf, EstimatorState
 from autopilot.ports import Samples, Setpoint
 
 wp.set_module_options({"enable_backward": False})
@@ -31,7 +30,7 @@ class Autopilot:
 @wp.kernel(enable_backward=False)
 def estimate_samples(
     ekf: Ekf, samples: wp.array2d(dtype=Samples), states: wp.array2d(dtype=EstimatorState), tick_count: int
-):
+) -> None:
     """Runs the estimator alone over recorded samples, one column per tick, and keeps its state after each tick."""
     i = wp.tid()
     state = ekf.rows[i]

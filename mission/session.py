@@ -250,7 +250,7 @@ def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: 
     history = flight.close()
     if len(history.time_us) == 0:
         console.print("the flight ended before its first frame")
-        return 1
+        return 0 if running is None else 1
     path_ned = [] if plan is None else planned_path(plan, flight.config.home)
     summary = summarise(flight, history, running, path_ned)
     write_whole(folder / "summary.json", (json.dumps(summary.as_json(), indent=2) + "\n").encode())

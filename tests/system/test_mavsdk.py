@@ -265,7 +265,7 @@ def test_on_the_ground_everything_is_answered(client):
 
     with pytest.raises(ActionError) as refused:
         client.action.goto_location(*client.place(10.0, 0.0), 500.0, 0.0)
-    print(refused.value.result)
+    assert refused.value.result == ActionResult.COMMAND_DENIED
     client.until(lambda: "Goto: not in the air" in client.texts, 2.0, "told why")
 
     nan_yaw = (0.0, 1.0, 0.0, nan)

@@ -1,4 +1,4 @@
-"""A `honeyguide fly` of its own for a test: the console command in a process, with ports and a run folder of its own."""
+"""The console command in a process, with UDP ports and a run folder of its own."""
 
 import signal
 import socket

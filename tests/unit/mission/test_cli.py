@@ -44,9 +44,9 @@ WRONG_PLANS = {
     "empty": ("", r"line 1 is not valid JSON"),
     "truncated": (DEFAULT_PLAN.read_text()[:400], r"line \d+ is not valid JSON .* complete\?"),
     "another file": ('{"fileType": "Parameters"}', r"is neither a QGroundControl plan .* nor a QGC WPL 110 file"),
-    "no items": ('{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []}}', r"has no items"),
-    "wrong latitude": (plan_with({"params": [0, 0, 0, None, 147.4, 8.5, 10]}), r"item 2: params: latitude 147\.4 is not within"),
-    "words for numbers": (plan_with({"params": [0, 0, 0, None, "north", 8.5, 10]}), r"item 2: params must be 7 numbers or null"),
+    "no items": ('{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []}}', r"the mission has no items"),
+    "latitude": (plan_with({"params": [0, 0, 0, None, 147.4, 8.5, 10]}), r"item 2: params: latitude 147\.4 is not"),
+    "words": (plan_with({"params": [0, 0, 0, None, "north", 8.5, 10]}), r"item 2: params must be 7 numbers or null"),
     "truncated waypoints": ("QGC WPL 110\n0\t1\t0\t16\t0\t0", r"item 0 \(line 2\): a line must have 12 columns, not 6"),
     "binary": ("\x00\x01\x02", r"line 1 is not valid JSON"),
 }
@@ -99,9 +99,8 @@ def test_wrong_airframe_file_is_refused(fly, tmp_path):
 
 def test_option_out_of_range_is_refused(fly, tmp_path):
     result = fly("--wind", "99")
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert "Invalid value for '--wind'" in result.stderr
-    assert "Traceback" not in result.stderr
     assert list(tmp_path.iterdir()) == []
 
 

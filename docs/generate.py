@@ -1,0 +1,51 @@
+"""Writes docs/parameters.md from the parameters' declarations: `python docs/generate.py`. A test keeps it current."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from autopilot.commander.params import COMMANDER_PARAMETERS
+from autopilot.control.params import CONTROL_PARAMETERS
+from autopilot.estimator.params import ESTIMATOR_PARAMETERS
+from autopilot.navigator.params import NAVIGATOR_PARAMETERS
+from autopilot.params import SYSTEM_PARAMETERS, parameter_table
+from common.airframe import load_airframe
+from common.files import write_whole
+from common.params import Parameter
+
+PARAMETERS_PATH = Path(__file__).with_name("parameters.md")
+SECTIONS = {
+    "Estimator": ESTIMATOR_PARAMETERS,
+    "Control": CONTROL_PARAMETERS,
+    "Arming, landing detection, failsafes": COMMANDER_PARAMETERS,
+    "Take-off, missions, return, landing": NAVIGATOR_PARAMETERS,
+    "System, and what ground stations ask for": SYSTEM_PARAMETERS,
+}
+HEADER = """# Parameters
+
+Written by `docs/generate.py` from the declarations: do not edit.
+
+Names are PX4's where the meaning is PX4's. Defaults are those of the x500; a source `airframe file` means that another
+airframe brings its own. They are read and set over MAVLink (PARAM_*), by a ground station or by a
+[script](script.md); a value out of range is set to the nearest bound, and the vehicle says so. `make tune` shows how
+the gains were designed.
+"""
+
+
+def parameters_text() -> str:
+    """The whole page."""
+    x500 = parameter_table(load_airframe("x500")).declarations
+    sections = [f"## {title}\n\n{_table(x500[item.name] for item in declared)}" for title, declared in SECTIONS.items()]
+    return "\n".join([HEADER, *sections])
+
+
+def _table(declarations: Iterable[Parameter]) -> str:
+    rows = ["| name | default | range | unit | meaning | source |", "|---|---|---|---|---|---|"]
+    for item in sorted(declarations, key=lambda parameter: parameter.name):
+        bounds = f"{item.minimum:g} … {item.maximum:g}" if item.minimum < item.maximum else "constant"
+        meaning = item.meaning.removesuffix("; constant")
+        rows.append(f"| {item.name} | {item.default:g} | {bounds} | {item.unit} | {meaning} | {item.source} |")
+    return "\n".join(rows) + "\n"
+
+
+if __name__ == "__main__":
+    write_whole(PARAMETERS_PATH, parameters_text().encode())
