@@ -18,9 +18,10 @@ from common.clock import wall_time_s
 from common.files import write_whole
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.ulog import UlogWriter
+from mission.angles import euler_rad
 from mission.estimate_plots import PLOTS
 from mission.estimate_run import SOURCES, Replay, estimator_table, run_estimator, time_s
-from mission.estimate_summary import EstimateSummary, euler_rad, summarise_replay
+from mission.estimate_summary import EstimateSummary, summarise_replay
 from mission.sensor_csv import HEADER, is_sensor_csv, read_csv
 from mission.sensor_log import Recording, SensorLog, SensorLogError, prepare
 from mission.sensor_ulog import MAGIC, read_ulog

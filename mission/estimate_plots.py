@@ -6,8 +6,9 @@ from io import BytesIO
 import matplotlib as mpl
 import numpy as np
 
+from mission.angles import euler_rad
 from mission.estimate_run import Replay, time_s
-from mission.estimate_summary import euler_rad, track_pos_ned
+from mission.estimate_summary import track_pos_ned
 from mission.sensor_log import Rows, SensorLog
 
 mpl.use("Agg")

@@ -8,6 +8,7 @@ import numpy as np
 
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID, YAW_ALIGNED
 from common.geodesy import GeoPoint, ned_from_geodetic
+from mission.angles import euler_rad
 from mission.estimate_run import SOURCES, Replay
 from mission.sensor_log import Rows, SensorLog, Track
 
@@ -155,19 +156,6 @@ def _down_frd(quaternions: Rows) -> Rows:
     """The ned down axis in the body."""
     x, y, z, w = quaternions.T
     return np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
-
-
-def euler_rad(quaternions: Rows) -> Rows:
-    """Roll, pitch, yaw [rad], ZYX, of (x, y, z, w) rows."""
-    x, y, z, w = quaternions.astype(float).T
-    return np.stack(
-        [
-            np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-            np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
-            np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-        ],
-        axis=1,
-    )
 
 
 def _without_nan(value: Any) -> Any:

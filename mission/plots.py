@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 
+from mission.angles import euler_rad
 from mission.recorder import History
 from sim.world.world import WorldMap
 
@@ -81,18 +82,5 @@ def _errors(
 
 
 def _euler_error_deg(history: History) -> Rows:
-    estimated, true = _euler(history.q_est), _euler(history.q_true)
+    estimated, true = euler_rad(history.q_est), euler_rad(history.q_true)
     return np.degrees((estimated - true + np.pi) % (2.0 * np.pi) - np.pi)
-
-
-def _euler(quaternions: Rows) -> Rows:
-    """Roll, pitch, yaw [rad], ZYX, of (x, y, z, w) rows."""
-    x, y, z, w = quaternions.astype(float).T
-    return np.stack(
-        [
-            np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-            np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
-            np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-        ],
-        axis=1,
-    )

@@ -163,9 +163,10 @@ class Recorder:
             is_new = is_armed & (np.diff(judged_us, prepend=self._judged_us[name]) != 0)
             self._judged_us[name] = int(judged_us[-1])
             innov = health[name]["innov"][is_new, :components]
-            innov_std = np.sqrt(health[name]["innov_var"][is_new, :components])
-            self._in_band[name][0] += int(np.count_nonzero(np.abs(innov) <= BAND_SIGMA * innov_std))
-            self._in_band[name][1] += innov.size
+            innov_var = health[name]["innov_var"][is_new, :components]
+            is_inside = np.abs(innov) <= BAND_SIGMA * np.sqrt(innov_var)
+            self._in_band[name][0] += int(np.count_nonzero(is_inside & (innov_var > 0.0)))
+            self._in_band[name][1] += int(np.count_nonzero(innov_var > 0.0))
 
     def close(self) -> History:
         """Completes the log and returns the whole flight's history."""

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from common.geodesy import GeoPoint, geodetic_from_ned
+from mission.angles import wxyz, yaw_rad
 
 Rows = npt.NDArray[Any]
 Columns = dict[str, npt.ArrayLike]
@@ -41,19 +42,18 @@ class Topic:
     columns: Callable[[Batch], Columns]
 
 
-def wxyz(quaternions: Rows) -> Rows:
-    """Warp's (x, y, z, w) as ULog's (w, x, y, z); shape (rows, 4)."""
-    reordered: Rows = quaternions[:, [3, 0, 1, 2]]
-    return reordered
+def is_fresh(batch: Batch, sensor: str) -> Rows:
+    """The frames in which a sample of this sensor is new: its time differs from the frame before and is not 0."""
+    times = batch.samples[sensor]["time_us"]
+    times_before = np.concatenate([batch.samples_before[sensor]["time_us"], times[:-1]])
+    new: Rows = (times != times_before) & (times > 0)
+    return new
 
 
 def fresh(batch: Batch, sensor: str) -> Rows:
-    """The rows in which a sample of this sensor is new: its time differs from the row before and is not 0."""
-    samples = batch.samples[sensor]
-    times = samples["time_us"]
-    times_before = np.concatenate([batch.samples_before[sensor]["time_us"], times[:-1]])
-    new: Rows = samples[(times != times_before) & (times > 0)]
-    return new
+    """The new samples of a sensor."""
+    rows: Rows = batch.samples[sensor][is_fresh(batch, sensor)]
+    return rows
 
 
 def _axes(names: str, vectors: Rows) -> Columns:
@@ -90,13 +90,6 @@ LOCAL_POSITION_FIELDS = {
 }
 
 
-def yaw_of(quaternions: Rows) -> Rows:
-    """Heading [rad] of (x, y, z, w) rows."""
-    x, y, z, w = quaternions.T
-    yaw: Rows = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return yaw
-
-
 def _local_position(batch: Batch) -> Columns:
     estimate = batch.estimate
     flags = estimate["flags"]
@@ -108,7 +101,7 @@ def _local_position(batch: Batch) -> Columns:
         **_axes("x y z", estimate["pos_ned"]),
         **_axes("vx vy vz", estimate["vel_ned"]),
         **_axes("ax ay az", estimate["accel_ned"]),
-        "heading": yaw_of(estimate["q_ned_from_frd"]),
+        "heading": yaw_rad(estimate["q_ned_from_frd"]),
         "eph": estimate["pos_h_std"],
         "epv": estimate["pos_v_std"],
         "evh": estimate["vel_std"],
@@ -134,7 +127,7 @@ def _local_position_true(batch: Batch) -> Columns:
         **_axes("x y z", body["pos_ned"]),
         **_axes("vx vy vz", body["vel_ned"]),
         **dict.fromkeys("ax ay az dist_bottom".split(), nan),
-        "heading": yaw_of(body["q_ned_from_frd"]),
+        "heading": yaw_rad(body["q_ned_from_frd"]),
         **dict.fromkeys("eph epv evh evv".split(), 0.0),
         **_reference(batch.origin),
         **valid,
@@ -173,7 +166,8 @@ def _gps(batch: Batch) -> Columns:
     points = _geodetic(gnss["pos_ned"], batch.origin)
     velocity = gnss["vel_ned"]
     return {
-        "timestamp": gnss["time_us"],
+        "timestamp": batch.time_us[is_fresh(batch, "gnss")],  # arrival
+        "timestamp_sample": gnss["time_us"],
         "latitude_deg": points[:, 0],
         "longitude_deg": points[:, 1],
         "altitude_msl_m": points[:, 2],
@@ -358,6 +352,7 @@ TOPICS = [
     Topic(
         "vehicle_gps_position",
         {
+            "timestamp_sample": "uint64_t",
             **dict.fromkeys("latitude_deg longitude_deg altitude_msl_m altitude_ellipsoid_m".split(), "double"),
             **dict.fromkeys(
                 "s_variance_m_s c_variance_rad eph epv hdop vdop vel_m_s vel_n_m_s vel_e_m_s vel_d_m_s cog_rad".split(),

@@ -164,7 +164,7 @@ def test_known_command_with_wrong_values_is_refused_once(holding, number, argume
         ({"command": mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT}, mavlink.MAV_MISSION_UNSUPPORTED),
         ({"command": 65_535}, mavlink.MAV_MISSION_UNSUPPORTED),
         ({"frame": 99}, mavlink.MAV_MISSION_UNSUPPORTED_FRAME),
-        ({"params": (nan, 0.0, 0.0, nan)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+        ({"params": (inf, 0.0, 0.0, nan)}, mavlink.MAV_MISSION_INVALID_PARAM1),
         ({"params": (0.0, -inf, 0.0, nan)}, mavlink.MAV_MISSION_INVALID_PARAM2),
         ({"x": 147.0}, mavlink.MAV_MISSION_INVALID_PARAM5_X),
         ({"z": nan}, mavlink.MAV_MISSION_INVALID_PARAM7),
