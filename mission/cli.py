@@ -12,6 +12,7 @@ from rich.console import Console
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
+    rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Fly a simulated drone and its flight controller over MAVLink.",
 )

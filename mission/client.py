@@ -86,8 +86,10 @@ class Running:
             self.is_done, self.error = True, error
 
     def cancel(self) -> None:
+        """Ends the script where it is; without effect once it is done."""
         self._script.close()
-        self.is_done = True
+        if not self.is_done:
+            self.is_done, self.error = True, ScriptError("stopped before its end")
 
 
 class Inbox:
@@ -133,7 +135,7 @@ class Client:
         self.time_us = 0
         self.system_id = system_id
         self.texts: list[str] = []
-        self.reached: list[int] = []
+        self.reached: list[int] = []  # items of the present mission
         self._text_id = 0  # of the last text
         self._transport = transport
         self._reader = FrameReader()
@@ -255,6 +257,7 @@ class Client:
                     if request.type != 0:
                         await next_frame()
                         raise MissionRefused(request.type, "; ".join(self.texts[first_text:]))
+                    self.reached.clear()
                     return
                 if request.seq < len(items):
                     self.send("MISSION_ITEM_INT", **target, **_item_fields(items[request.seq]))

@@ -40,6 +40,7 @@ AUTO_RTL = 5
 FRAME_GLOBAL = 0
 FRAME_LOCAL_NED = 1
 LANDED_ON_GROUND = 1
+MISSION_COMPLETE = 5
 
 # SET_POSITION_TARGET_LOCAL_NED type_mask: a set bit frees the element
 FREE_POSITION = 0b000_000_000_111
@@ -85,6 +86,12 @@ class Drone(Client):
     def is_landed(self) -> bool:
         state = self.latest("EXTENDED_SYS_STATE")
         return state is not None and state.landed_state == LANDED_ON_GROUND
+
+    @property
+    def is_mission_complete(self) -> bool:
+        """As the vehicle says; a mission that ends with a return is complete when the return begins."""
+        current = self.latest("MISSION_CURRENT")
+        return current is not None and current.mission_state == MISSION_COMPLETE
 
     @property
     def home(self) -> GeoPoint:
@@ -163,6 +170,7 @@ class Drone(Client):
 
     async def start_mission(self, first: int = 0) -> None:
         """Flies the mission from item `first`; the vehicle must be armed or is armed on the ground."""
+        self.reached.clear()
         await self.command(CMD_MISSION_START, float(first), 0.0, name="start mission")
         if not self.is_armed:
             await self.arm()
@@ -287,7 +295,11 @@ class Drone(Client):
 
 
 async def fly_plan(drone: Drone, plan: Plan) -> None:
-    """Uploads a plan, flies it and, if it ends on the ground, waits until the motors stop."""
+    """Uploads a plan, flies it and, if it ends on the ground, waits until the motors stop.
+
+    Raises:
+        ScriptError: the vehicle refused it, or did something else in the end.
+    """
     await drone.wait_ready()
     await drone.upload(plan.items)
     await drone.start_mission()
@@ -295,7 +307,9 @@ async def fly_plan(drone: Drone, plan: Plan) -> None:
     if last.command in (CMD_LAND, CMD_RETURN_TO_LAUNCH):
         await drone.wait_disarmed(timeout_s=3600.0)
     else:
-        await drone.wait_mission_finished(last.seq, timeout_s=3600.0)
+        await drone.until(lambda: last.seq in drone.reached or not drone.is_armed, 3600.0, "mission finished")
+    if last.seq not in drone.reached and not drone.is_mission_complete:
+        raise ScriptError("the flight ended before the mission did")
 
 
 Script = Callable[[Drone], Coroutine[Any, Any, Any]]

@@ -18,7 +18,7 @@ from sim.world.world import WorldMap
 
 Rows = npt.NDArray[Any]
 CLEARANCE_EVERY_FRAMES = 10
-CMD_LAND, CMD_TAKEOFF = 21, 22
+CMD_RETURN_TO_LAUNCH, CMD_LAND, CMD_TAKEOFF = 20, 21, 22
 PLACES = (16, 17, 19, CMD_LAND, CMD_TAKEOFF)  # mission commands that lead to a place
 
 
@@ -143,6 +143,8 @@ def planned_path(plan: Plan, home: GeoPoint) -> list[tuple[int, Any]]:
 
 def item_ned(item: Any, origin: GeoPoint, previous: Any) -> Any:
     """Where an item leads [m], or None for items that are no place."""
+    if item.command == CMD_RETURN_TO_LAUNCH:
+        return np.zeros(3)
     if item.command not in PLACES:
         return None
     alt_amsl_m = item.z + (origin.alt_m if item.frame in (3, 6) else 0.0)
@@ -172,7 +174,8 @@ def summarise(flight: Any, history: History, running: Any, path_ned: Sequence[tu
     errors = estimator_errors(history, armed)
     result, is_success = _result(flight, running)
     end_true, end_est = history.pos_ned_true[-1], history.pos_ned_est[-1]
-    target = path_ned[-1][1] if path_ned and armed.any() else np.full(3, np.nan)
+    has_landed = armed.any() and not armed[-1]
+    target = path_ned[-1][1] if path_ned and has_landed else np.full(3, np.nan)
     return Summary(
         result=result,
         is_success=is_success,

@@ -1,0 +1,114 @@
+"""The documentation tells the truth: folder maps, links, commands, examples and the parameter list."""
+
+import re
+import runpy
+import shlex
+
+import pytest
+from typer.testing import CliRunner
+
+from mission.cli import app
+from tests.documents import PACKAGES, ROOT, anchors, blocks, commands, links, pages
+
+PAGES = {page.relative_to(ROOT).as_posix(): page for page in pages()}
+HONEYGUIDE = ".venv/bin/honeyguide"
+# Run by continuous integration, by other tests, or too long for a test: what they are is checked, not run.
+NOT_RUN_HERE = {
+    "make fly": "the commands with ARGS run it",
+    "make test": "this is it",
+    'make tune ARGS="--airframe sim/bodies/airframes/f450.toml"': "tests/unit/autopilot/test_tuning.py",
+    ".venv/bin/python -m autopilot.estimator.derive": "tests/unit/autopilot/estimator/test_derive.py",
+}
+
+
+def modules():
+    return [
+        path.relative_to(ROOT)
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*.py")
+        if path.name not in {"__init__.py", "__main__.py"}
+    ]
+
+
+def is_named(module):
+    """Whether the README of the module's folder, or of one above it, names it by its path from there."""
+    for folder in module.parents[:-1]:
+        readme = ROOT / folder / "README.md"
+        if readme.exists() and f"`{module.relative_to(folder).as_posix()}`" in readme.read_text(encoding="utf-8"):
+            return True
+    return False
+
+
+def test_every_module_is_named_in_a_readme():
+    assert [module.as_posix() for module in modules() if not is_named(module)] == []
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_readme_names_no_file_that_is_not_there(package):
+    for readme in (ROOT / package).rglob("README.md"):
+        first_column = re.findall(r"^\| (`[^|]*`) \|", readme.read_text(encoding="utf-8"), re.MULTILINE)
+        for name in re.findall(r"`([\w/]+\.py)`", " ".join(first_column)):
+            assert (readme.parent / name).exists(), f"{readme.relative_to(ROOT)}: {name}"
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_links_lead_somewhere(name):
+    page = PAGES[name]
+    for target, anchor in links(page):
+        there = (page.parent / target).resolve() if target else page
+        assert there.exists(), target
+        assert there.is_relative_to(ROOT), target
+        if anchor:
+            assert anchor in anchors(there), f"{target}#{anchor}"
+
+
+def flight_arguments(line):
+    """The arguments of `honeyguide fly` in a command line; None if it is another command."""
+    words = shlex.split(line)
+    if words[:2] == ["make", "fly"] and len(words) == 3 and words[2].startswith("ARGS="):
+        return shlex.split(words[2].removeprefix("ARGS="))
+    if words[:2] == [HONEYGUIDE, "fly"]:
+        return words[2:]
+    return None
+
+
+@pytest.mark.parametrize(("page", "line"), commands())
+def test_command_works(page, line, tmp_path, monkeypatch):
+    if line in NOT_RUN_HERE:
+        return
+    arguments = flight_arguments(line)
+    assert arguments is not None, f"{page}: nobody runs this: {line}"
+    monkeypatch.chdir(ROOT)
+    is_whole = {"--once", "max"} <= set(arguments)
+    shortened = [] if is_whole else ["--speed", "max", "--seconds", "5"]  # the last one of an option counts
+    result = CliRunner().invoke(app, ["fly", *arguments, *shortened, "--run-folder", str(tmp_path / "flight")])
+    is_idle = "--idle" in arguments
+    assert result.exit_code == (0 if is_whole or is_idle else 1), result.output  # 1: shortened before its end
+    assert (tmp_path / "flight" / "summary.json").exists()
+
+
+def test_make_targets_that_are_shown_exist():
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    for page in PAGES.values():
+        shown = re.findall(r"`make ([a-z-]+)", page.read_text(encoding="utf-8"))
+        assert set(shown) <= targets, page
+
+
+@pytest.mark.parametrize("name", [name for name, page in PAGES.items() if blocks(page, "python")])
+def test_examples_run(name, tmp_path, monkeypatch):
+    """The blocks of a page, in order, as one program."""
+    monkeypatch.chdir(tmp_path)
+    program = "\n".join(blocks(PAGES[name], "python"))
+    exec(compile(program, name, "exec"), {"__name__": name})
+
+
+def test_parameter_list_is_current():
+    page = runpy.run_path(str(ROOT / "docs" / "generate.py"))
+    assert page["PARAMETERS_PATH"].read_text(encoding="utf-8") == page["parameters_text"](), "python docs/generate.py"
+
+
+def test_options_of_fly_are_all_described():
+    described = set(re.findall(r"^\| `(--[\w-]+)", PAGES["docs/flying.md"].read_text(encoding="utf-8"), re.MULTILINE))
+    fly = next(command for command in app.registered_commands if command.callback.__name__ == "fly")
+    names = {f"--{name.replace('_', '-')}" for name in fly.callback.__annotations__ if name != "return"}
+    assert described == names
