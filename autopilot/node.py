@@ -183,6 +183,8 @@ class FlightController:
         return self.commander.check_arming()
 
     def set_mode(self, mode: Mode) -> Reply:
+        if mode is Mode.HOLD and self.state.mode is mode and self.navigator.hold.is_underway:
+            return self._enter_anew(mode)  # hold here, not at the place it was sent to
         return self.commander.request_mode(mode)
 
     def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:

@@ -74,7 +74,7 @@ def all_parameters() -> list[Parameter]:
 
 
 def airframe_defaults(airframe: Airframe) -> dict[str, int | float]:
-    """Parameters whose default is the airframe's own: battery, landing gear, and drag as the wind estimator knows it."""
+    """Parameters whose default is the airframe's own: battery, landing gear, and drag for the wind estimate."""
     body, rotor, battery = airframe.body, airframe.rotor_model, airframe.battery
     count = len(airframe.rotors)
     hover_speed_rad_s = sqrt(body.mass_kg * GRAVITY_M_S2 / (count * rotor.thrust_n_s2))

@@ -41,8 +41,8 @@ def _missions() -> list[Row]:
             row
             for name, share in shares.items()
             for row in (
-                _row(f"innovations in 95 % band, {name}, least", float(np.mean(share)), "", BAND_MIN, "higher"),
-                _row(f"innovations in 95 % band, {name}, most", float(np.mean(share)), "", BAND_MAX),
+                _row(f"innovations inside their 95 % band, {name}", float(np.mean(share)), "", BAND_MIN, "higher"),
+                _row(f"innovations inside their 95 % band, {name}, at most", float(np.mean(share)), "", BAND_MAX),
             )
         ),
         _row("power-on to ready to arm, simulated, worst of 20", _worst(flights, "ready_s"), "s", 10.0),

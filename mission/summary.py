@@ -5,6 +5,7 @@ Everything here may look at the truth: nothing of it goes back into the flight.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -44,8 +45,14 @@ class Summary:
     innovations_in_band: dict[str, float]  # share of normalised innovations within 1.96 sigma, per source
 
     def as_json(self) -> dict[str, Any]:
-        """JSON values; NaN as null."""
-        return {key: None if value != value else value for key, value in asdict(self).items()}
+        """JSON values; null for what is not finite."""
+        figures = asdict(self)
+        figures["innovations_in_band"] = _finite(self.innovations_in_band)
+        return _finite(figures)
+
+
+def _finite(figures: dict[str, Any]) -> dict[str, Any]:
+    return {key: None if isinstance(value, float) and not isfinite(value) else value for key, value in figures.items()}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Hold: stays at one place, or goes to one and stays there."""
 
-from autopilot.navigator.context import NavContext
+from autopilot.navigator.context import NavContext, distance
 from autopilot.navigator.setpoint import Vector
 
 
@@ -15,6 +15,12 @@ class Hold:
         self._is_goto = False  # on a straight line to the place
         self.target_ned: Vector = (0.0, 0.0, 0.0)  # [m]
         self.yaw = 0.0  # [rad]
+
+    @property
+    def is_underway(self) -> bool:
+        """Whether the vehicle is still on its way to the place a client has sent it to."""
+        way_m = distance(self._context.state.estimate.pos_ned, self.target_ned)
+        return self._is_goto and way_m > self._context.number("NAV_ACC_RAD")
 
     def start(self) -> None:
         context = self._context

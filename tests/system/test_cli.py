@@ -82,6 +82,15 @@ def test_flown_mission_gives_0_and_a_whole_run_folder(fly, tmp_path):
     assert (folder / "flight.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_mission_is_flown_at_a_pace_too(tmp_path):
+    gcs_port, api_port = free_ports()
+    result = honeyguide(
+        "fly", "--once", "--speed", "50", "--gcs-port", gcs_port, "--api-port", api_port, "--run-folder", tmp_path / "f"
+    )
+    assert result.returncode == 0, result.stderr
+    assert "mission completed" in result.stdout
+
+
 def test_mission_that_the_vehicle_refuses_gives_1(fly, tmp_path):
     plan = tmp_path / "spline.plan"
     plan.write_text(plan_with_a_spline())

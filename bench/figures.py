@@ -1,0 +1,37 @@
+"""`python -m bench.figures`: puts bench/results.json into the README's table of figures."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from common.files import write_whole
+
+RESULTS = Path(__file__).parent / "results.json"
+README = Path(__file__).parent.parent / "README.md"
+BEGIN, END = "<!-- figures:begin -->\n", "<!-- figures:end -->\n"
+
+
+def with_figures(text: str, rows: list[dict[str, Any]]) -> str:
+    """The README's text with the given rows between its markers."""
+    head, rest = text.split(BEGIN)
+    tail = rest.split(END)[1]
+    lines = [f"On {row}:\n\n" for row in dict.fromkeys(row["machine"] for row in rows)]
+    lines.append("| figure | measured | target |\n|---|---|---|\n")
+    lines += [_line(row) for row in rows]
+    return head + BEGIN + "".join(lines) + END + tail
+
+
+def _line(row: dict[str, Any]) -> str:
+    value = f"{row['value']:,.3g}" if abs(row["value"]) < 1000.0 else f"{row['value']:,.0f}"
+    sign = "≥" if row["better"] == "higher" else "≤"
+    target = "" if row["target"] is None else f"{sign} {row['target']:g}"
+    return f"| {row['name']} | {value} {row['unit']} | {target} |\n".replace("  ", " ")
+
+
+def main() -> None:
+    rows = json.loads(RESULTS.read_text(encoding="utf-8"))
+    write_whole(README, with_figures(README.read_text(encoding="utf-8"), rows).encode())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,159 @@
+"""The flight log and the history: every topic says what the kernel rows said."""
+
+import numpy as np
+import pytest
+from pyulog import ULog
+
+from common.geodesy import geodetic_from_ned
+from mission.flight import Flight, FlightConfig
+from mission.recorder import NAVIGATION_STATES
+from mission.topics import TOPICS, wxyz
+from sim.sensors.sensors import DEFAULT_HOME
+
+SECONDS = 14.0
+FRAMES = round(SECONDS * 50)
+HOLD_NAV_STATE, TAKEOFF_NAV_STATE = 4, 17
+
+
+class Flown:
+    """A short flight with noise, recorded, and the rows as they were after its last frame."""
+
+    def __init__(self, folder):
+        flight = Flight(FlightConfig(seed=2, wind_m_s=3.0), folder=folder)
+        flight.fly(self._climb, seconds=SECONDS)
+        arrays = flight.rig.arrays
+        self.body = arrays.body.numpy()[0].copy()
+        self.samples = arrays.sensors.numpy()["samples"][0].copy()
+        self.estimate = arrays.autopilot.ekf.rows.numpy()["estimate"][0].copy()
+        self.actuators = arrays.autopilot.control.numpy()["actuators"][0].copy()
+        self.origin = flight.controller.state.origin
+        self.history = flight.close()
+        self.band = flight.recorder.innovations_in_band()
+        self.log = ULog(str(folder / "flight.ulg"))
+        self.topics = {data.name: data.data for data in self.log.data_list}
+
+    @staticmethod
+    async def _climb(drone):
+        await drone.wait_ready()
+        await drone.arm()
+        await drone.takeoff(5.0)
+        await drone.goto_ned(8.0, 3.0, -5.0)
+        await drone.sleep(60.0)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    return Flown(tmp_path_factory.mktemp("flight"))
+
+
+def last(topic, names):
+    return [topic[name][-1] for name in names.split()]
+
+
+def test_every_topic_has_rows(flown):
+    for topic in TOPICS:
+        assert len(flown.topics[topic.name]["timestamp"]) > 0, topic.name
+
+
+def test_each_frame_is_logged_once(flown):
+    for name in ("vehicle_attitude", "vehicle_local_position_groundtruth", "actuator_motors"):
+        np.testing.assert_array_equal(flown.topics[name]["timestamp"], np.arange(1, FRAMES + 1) * 20_000)
+
+
+def test_every_imu_sample_is_logged_once(flown):
+    imu = flown.topics["sensor_combined"]
+    np.testing.assert_array_equal(np.diff(imu["timestamp"]), 4_000)
+    assert imu["timestamp"][-1] == flown.samples["imu"]["time_us"]
+    assert last(imu, "gyro_rad[0] gyro_rad[1] gyro_rad[2]") == flown.samples["imu"]["gyro_frd"].tolist()
+    assert (imu["gyro_integral_dt"] == 4_000).all()
+
+
+@pytest.mark.parametrize(
+    ("topic", "sensor", "rate_hz"),
+    [("vehicle_gps_position", "gnss", 5.0), ("vehicle_magnetometer", "mag", None), ("sensor_baro", "baro", None)],
+)
+def test_each_sample_of_a_slower_sensor_is_logged_once(flown, topic, sensor, rate_hz):
+    times_us = flown.topics[topic]["timestamp_sample"].astype(np.int64)
+    assert (np.diff(times_us) > 0).all()
+    assert times_us[-1] == flown.samples[sensor]["time_us"]
+    if rate_hz is not None:
+        assert np.median(np.diff(times_us)) == pytest.approx(1e6 / rate_hz)
+
+
+def test_truth_and_estimate_are_the_rows(flown):
+    truth, estimate = (flown.topics[f"vehicle_local_position{suffix}"] for suffix in ("_groundtruth", ""))
+    assert last(truth, "x y z") == flown.body["pos_ned"].tolist()
+    assert last(truth, "vx vy vz") == flown.body["vel_ned"].tolist()
+    assert last(estimate, "x y z") == flown.estimate["pos_ned"].tolist()
+    assert last(estimate, "eph epv") == [flown.estimate["pos_h_std"], flown.estimate["pos_v_std"]]
+    assert estimate["xy_valid"][-1] == 1
+    assert estimate["xy_valid"][0] == 0  # at power-on
+
+
+def test_quaternions_are_logged_with_the_scalar_first(flown):
+    attitude = flown.topics["vehicle_attitude_groundtruth"]
+    x, y, z, w = flown.body["q_ned_from_frd"].tolist()
+    assert last(attitude, "q[0] q[1] q[2] q[3]") == [w, x, y, z]
+    assert wxyz(np.array([[1.0, 2.0, 3.0, 4.0]])).tolist() == [[4.0, 1.0, 2.0, 3.0]]
+
+
+def test_motors_and_setpoints_are_the_rows(flown):
+    motors = flown.topics["actuator_motors"]
+    assert last(motors, "control[0] control[3]") == flown.actuators["command"][[0, 3]].tolist()
+    assert np.isnan(motors["control[11]"]).all()
+    setpoint = flown.topics["vehicle_local_position_setpoint"]
+    assert last(setpoint, "x y z") == flown.actuators["traj_pos_ned"].tolist()
+
+
+def test_global_position_is_the_local_one_seen_from_home(flown):
+    latitude, longitude, altitude = geodetic_from_ned(*flown.estimate["pos_ned"].tolist(), flown.origin)
+    place = flown.topics["vehicle_global_position"]
+    assert last(place, "lat lon") == pytest.approx([latitude, longitude], abs=1e-9)
+    assert place["alt"][-1] == pytest.approx(altitude, abs=1e-3)
+    gnss = flown.topics["vehicle_gps_position"]
+    assert gnss["latitude_deg"][0] == pytest.approx(DEFAULT_HOME.lat_deg, abs=1e-4)
+    assert gnss["altitude_msl_m"][0] == pytest.approx(DEFAULT_HOME.alt_m, abs=5.0)
+
+
+def test_status_follows_mode_and_arming(flown):
+    status = flown.topics["vehicle_status"]
+    assert set(status["nav_state"]) <= set(NAVIGATION_STATES.values())
+    assert {HOLD_NAV_STATE, TAKEOFF_NAV_STATE} <= set(status["nav_state"])
+    assert (status["arming_state"][0], status["arming_state"][-1]) == (1, 2)
+    landed = flown.topics["vehicle_land_detected"]["landed"]
+    assert (landed[0], landed[-1]) == (1, 0)
+
+
+def test_parameters_and_texts_are_in_the_log(flown):
+    assert flown.log.initial_parameters["MIS_TAKEOFF_ALT"] == 2.5
+    assert flown.log.initial_parameters["SYS_AUTOSTART"] == 4001
+    assert [message.message for message in flown.log.logged_messages] == ["Armed"]
+    assert flown.log.msg_info_dict["airframe"] == "x500"
+
+
+def test_history_is_the_same_flight(flown):
+    history = flown.history
+    assert history.time_us.tolist() == (np.arange(1, FRAMES + 1) * 20_000).tolist()
+    assert history.pos_ned_true[-1].tolist() == flown.body["pos_ned"].tolist()
+    assert history.q_est.shape == (FRAMES, 4)
+    assert history.is_armed.dtype == bool
+    assert not history.is_armed[0]
+    assert history.is_armed[-1]
+
+
+def test_innovations_are_counted_per_source(flown):
+    assert set(flown.band) == {"gnss_pos", "gnss_vel", "gnss_height", "baro", "mag", "range"}
+    assert all(0.8 < share <= 1.0 for share in flown.band.values())
+
+
+def test_a_flight_without_a_folder_writes_nothing_and_still_has_a_history(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    flight = Flight(FlightConfig())
+    flight.fly(lambda drone: drone.sleep(1.5))
+    assert 75 <= len(flight.close().time_us) <= 76
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_flight_of_no_frames_has_an_empty_history_and_a_whole_log(tmp_path):
+    assert len(Flight(FlightConfig(), folder=tmp_path).close().time_us) == 0
+    assert ULog(str(tmp_path / "flight.ulg")).data_list == []
