@@ -11,6 +11,10 @@ from math import isfinite, radians
 SCALE_TO_SI = {"deg": radians(1.0), "deg/s": radians(1.0), "deg/s^2": radians(1.0), "ms": 1.0e-3, "%": 1.0e-2}
 
 
+class ParameterError(ValueError):
+    """A parameter that does not exist or a value it cannot have; the message is one sentence for the user."""
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """The declaration of one parameter; an int default makes it an INT32, a float default a REAL32."""
@@ -77,6 +81,23 @@ class ParameterTable:
                 for listener in self._listeners:
                     listener(declaration)
         return self._values[name]
+
+    def set_exactly(self, name: str, value: float) -> None:
+        """Stores a value as it is.
+
+        Raises:
+            ParameterError: no such parameter, or the value is out of its bounds or not whole.
+        """
+        declaration = self.declarations.get(name)
+        if declaration is None:
+            raise ParameterError(f"parameter {name}: there is none of that name")
+        if not declaration.minimum <= value <= declaration.maximum:
+            raise ParameterError(
+                f"parameter {name}: {value:g} is not between {declaration.minimum:g} and {declaration.maximum:g}"
+            )
+        if declaration.is_integer and value != int(value):
+            raise ParameterError(f"parameter {name}: {value:g} is not a whole number")
+        self.set(name, value)
 
     def on_change(self, listener: Callable[[Parameter], None]) -> None:
         """Calls `listener(declaration)` after each change."""

@@ -53,6 +53,9 @@ def fly(
     host: Annotated[str, typer.Option(help="Address ground stations are sent to.")] = "127.0.0.1",
     gcs_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of ground stations.")] = 14550,
     api_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of the offboard API.")] = 14540,
+    param: Annotated[
+        list[str] | None, typer.Option(help="Sets a parameter of the flight controller: NAME=VALUE. Repeatable.")
+    ] = None,
     run_folder: Annotated[Path | None, typer.Option(help="Where logs go. Default: runs/DATE.")] = None,
 ) -> None:
     """Fly: world, vehicle, flight controller and MAVLink links, in real time or faster."""
@@ -64,7 +67,7 @@ def fly(
                 plan=plan, is_idle=idle, once=once, speed=speed, seconds=seconds, seed=seed, wind_m_s=wind,
                 wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
                 trees_per_ha=trees, hill_height_m=hills, has_walls=walls, host=host, gcs_port=gcs_port,
-                api_port=api_port, run_folder=run_folder,
+                api_port=api_port, run_folder=run_folder, parameters=tuple(param or ()),
             )
         )  # fmt: skip
     except UserError as error:

@@ -19,6 +19,7 @@ from common.airframe import Airframe, load_airframe
 from common.clock import Pacer
 from common.geodesy import GeoPoint
 from common.kernels import FRAME_TICKS, FRAME_US
+from common.params import ParameterTable
 from common.records import row_reader
 from common.tlog import TlogWriter
 from mission.client import Running
@@ -50,6 +51,8 @@ class FlightConfig(BaseModel):
     """Where the wind comes from, clockwise from north."""
     noise: float = Field(default=1.0, ge=0.0, le=10.0)
     """Scales every sensor's noise; 0 makes them perfect."""
+    parameters: dict[str, float] = {}
+    """Values of the flight controller's parameters that differ from their defaults, by name."""
     world: WorldConfig = WorldConfig()
     """The ground."""
 
@@ -78,7 +81,7 @@ class Flight:
         self.rig.prepare(FRAME_TICKS)
         self.time_us = 0
         self.ready_s = nan  # power-on to ready to arm
-        self.params = parameter_table(self.airframe)
+        self.params = flight_parameters(config, self.airframe)
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
         self.controller = FlightController(
@@ -138,6 +141,18 @@ class Flight:
         if self._tlog is not None:
             self._tlog.close()
         return self.recorder.close()
+
+
+def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTable:
+    """The flight controller's parameters: the defaults of the airframe, and what the configuration says.
+
+    Raises:
+        ParameterError: an unknown name, or a value out of bounds.
+    """
+    table = parameter_table(airframe)
+    for name, value in config.parameters.items():
+        table.set_exactly(name, value)
+    return table
 
 
 def host_ports(rig: Rig, i_vehicle: int = 0) -> HostPorts:

@@ -17,8 +17,9 @@ from common.airframe import AirframeError, load_airframe
 from common.clock import wall_date_text, wall_time_s
 from common.files import write_whole
 from common.geodesy import GeoPoint
+from common.params import ParameterError
 from mission.client import Running
-from mission.flight import Flight, FlightConfig
+from mission.flight import Flight, FlightConfig, flight_parameters
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, read_plan
 from mission.plots import plot_flight
 from mission.script import fly_plan
@@ -60,6 +61,7 @@ class FlightOptions:
     gcs_port: int
     api_port: int
     run_folder: Path | None
+    parameters: tuple[str, ...] = ()  # NAME=VALUE
 
 
 def fly_session(options: FlightOptions) -> int:
@@ -73,8 +75,8 @@ def fly_session(options: FlightOptions) -> int:
     config = _config(options)
     plan = None if options.is_idle else _plan(options.plan)
     try:
-        load_airframe(config.airframe)
-    except AirframeError as error:
+        flight_parameters(config, load_airframe(config.airframe))
+    except (AirframeError, ParameterError) as error:
         raise UserError(str(error)) from error
     links = [] if speed is None else _links(options)
     folder = _new_folder(options.run_folder)
@@ -106,6 +108,7 @@ def _config(options: FlightOptions) -> FlightConfig:
             wind_m_s=options.wind_m_s,
             wind_from_deg=options.wind_from_deg,
             noise=options.noise,
+            parameters=dict(_parameter(text) for text in options.parameters),
             world=WorldConfig(
                 seed=options.world_seed,
                 trees_per_ha=options.trees_per_ha,
@@ -116,6 +119,14 @@ def _config(options: FlightOptions) -> FlightConfig:
     except ValidationError as error:
         first = error.errors()[0]
         raise UserError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def _parameter(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError as error:
+        raise UserError(f"--param {text}: must be NAME=VALUE, with a number") from error
 
 
 def _home(text: str) -> GeoPoint:

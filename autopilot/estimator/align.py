@@ -37,7 +37,6 @@ _BARO_SAMPLES = wp.constant(5)
 _MOVING_TILT_STD = wp.constant(0.3)  # [rad] guess: aligned in motion
 _VEL_STD = wp.constant(0.1)  # [m/s] aligned at rest
 _MOVING_VEL_STD = wp.constant(10.0)  # [m/s]
-_POS_STD = wp.constant(0.1)  # [m] the origin is where it stands
 _MOVING_POS_STD = wp.constant(1000.0)  # [m] powered on in flight, it may be anywhere; guess
 _WIND_STD = wp.constant(5.0)  # [m/s] guess
 _TERRAIN_STD = wp.constant(0.1)  # [m] it stands there
@@ -90,7 +89,7 @@ def start_covariance(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: i
     """Variances after alignment; heading and field are set when the magnetometer starts."""
     tilt_std = params.tilt_init
     vel_std = _VEL_STD
-    pos_std = _POS_STD
+    pos_std = params.boot_std
     gyro_bias_std = params.gyro_noise * wp.sqrt(TICK_S / align.time_s)
     if align.is_moving == 1:
         tilt_std = wp.max(tilt_std, _MOVING_TILT_STD)

@@ -65,6 +65,7 @@ class EstimatorParams:
     body_field_walk: float
     body_field_init: float
     rest_height: float
+    boot_std: float
     range_ctrl: int
     range_noise: float
     range_noise_share: float
@@ -230,6 +231,16 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
     ),
     Parameter(
         "EKF2_MIN_RNG", 0.2, 0.0, 2.0, "m", "height above ground at boot", "airframe: landing gear", "rest_height"
+    ),
+    Parameter(
+        "EKF2_BOOT_STD",
+        0.1,
+        0.01,
+        1000.0,
+        "m",
+        "how well the vehicle is known to boot at the origin of ned; large: not at all",
+        "a surveyed pad",
+        "boot_std",
     ),
     Parameter("EKF2_RNG_CTRL", 1, 0, 1, "", "range finder use: 0 off, 1 terrain height", _PX4, "range_ctrl"),
     Parameter("EKF2_RNG_NOISE", 0.02, 0.01, 5.0, "m", "range finder noise", "TF02-Pro data sheet: 6 cm", "range_noise"),
