@@ -85,7 +85,7 @@ class Flight:
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
         self.controller = FlightController(
-            host_ports(self.rig), self.params, self.airframe, config.home, on_reboot=self.rig.boot
+            host_ports(self.rig), self.params, self.airframe, config.home, on_reboot=self.rig.reboot
         )
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from autopilot.vehicle import MissionItem
 from common.files import write_whole
-from common.geodesy import GeoPoint
+from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from mission.plan_checks import COMMANDS_WITH_POSITION, DO_JUMP, Place, PlanError, check_item
 from mission.waypoints import HEADER_START, parse_waypoints, waypoints_text
 
@@ -28,6 +28,7 @@ __all__ = [
     "PlanItem",
     "parse_plan",
     "plan_text",
+    "moved_plan",
     "read_plan",
     "save_plan",
 ]
@@ -40,6 +41,7 @@ PlanItem = MissionItem  # the record that the vehicle keeps too
 DEFAULT_PLAN = Path(__file__).with_name("default.plan")
 MAV_AUTOPILOT_PX4 = 12
 MAV_TYPE_QUADROTOR = 2
+RELATIVE_FRAMES = (3, 6)  # MAV_FRAME_GLOBAL_RELATIVE_ALT and its _INT
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +82,27 @@ class Plan:
     cruise_speed_m_s: float = 15.0  # QGroundControl's default; in flight the vehicle's parameters count
     hover_speed_m_s: float = 5.0
     complex_items: tuple[ComplexItem, ...] = ()
+
+
+def moved_plan(plan: Plan, home: GeoPoint) -> Plan:
+    """The plan carried from its planned home to another, keeping distances, directions and heights above home.
+
+    Fence and rally points stay behind: they belong to the place.
+    """
+    if plan.home is None:
+        return plan
+    return replace(
+        plan, home=home, fence=(), rally=(), items=tuple(_moved(item, plan.home, home) for item in plan.items)
+    )
+
+
+def _moved(item: PlanItem, old: GeoPoint, new: GeoPoint) -> PlanItem:
+    if item.command not in COMMANDS_WITH_POSITION or isnan(item.x) or isnan(item.y):
+        return item
+    north, east, _ = ned_from_geodetic(item.x, item.y, old.alt_m, old)
+    lat_deg, lon_deg, _ = geodetic_from_ned(north, east, 0.0, new)
+    rise_m = 0.0 if item.frame in RELATIVE_FRAMES else new.alt_m - old.alt_m
+    return replace(item, x=lat_deg, y=lon_deg, z=item.z + rise_m)
 
 
 def read_plan(path: Path | str) -> Plan:

@@ -309,7 +309,9 @@ async def fly_plan(drone: Drone, plan: Plan) -> None:
     else:
         await drone.until(lambda: last.seq in drone.reached or not drone.is_armed, 3600.0, "mission finished")
     if last.seq not in drone.reached and not drone.is_mission_complete:
-        raise ScriptError("the flight ended before the mission did")
+        current = drone.latest("MISSION_CURRENT")
+        where = "" if current is None else f" at item {current.seq}"
+        raise ScriptError(f"the flight ended before the mission did{where}: {drone.texts[-1] if drone.texts else ''}")
 
 
 Script = Callable[[Drone], Coroutine[Any, Any, Any]]

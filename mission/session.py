@@ -73,7 +73,7 @@ def fly_session(options: FlightOptions) -> int:
     console = Console()
     speed = _speed(options.speed)
     config = _config(options)
-    plan = None if options.is_idle else _plan(options.plan)
+    plan = None if options.is_idle else _plan(options.plan, config.home)
     try:
         flight_parameters(config, load_airframe(config.airframe))
     except (AirframeError, ParameterError) as error:
@@ -141,9 +141,10 @@ def _home(text: str) -> GeoPoint:
     return GeoPoint(*values)
 
 
-def _plan(path: Path | None) -> Plan:
+def _plan(path: Path | None, home: GeoPoint) -> Plan:
+    """The user's plan as it is, or the default one at the vehicle's home."""
     try:
-        plan = read_plan(path or DEFAULT_PLAN)
+        return moved_plan(read_plan(DEFAULT_PLAN), home) if path is None else read_plan(path)
     except PlanError as error:
         raise UserError(str(error)) from error
     if not plan.items:

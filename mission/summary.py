@@ -18,6 +18,7 @@ from mission.recorder import History
 from sim.world.world import WorldMap
 
 Rows = npt.NDArray[Any]
+LEG_MIN_M = 1.0  # horizontally; a shorter way is a climb or a descent
 CLEARANCE_EVERY_FRAMES = 10
 CMD_RETURN_TO_LAUNCH, CMD_LAND, CMD_TAKEOFF = 20, 21, 22
 PLACES = (16, 17, 19, CMD_LAND, CMD_TAKEOFF)  # mission commands that lead to a place
@@ -84,6 +85,8 @@ def estimator_errors(history: History, frames: Rows) -> EstimatorErrors:
 def cross_track_m(pos_ned: Rows, seq: Rows, path_ned: Sequence[tuple[int, Rows]]) -> Rows:
     """Distance of each position to the legs flown then: the leg that ends at the current item, and the one before.
 
+    Take-off and landing are no legs: NaN there.
+
     Args:
         pos_ned: [m], shape (frames, 3).
         seq: current item, shape (frames,).
@@ -93,7 +96,8 @@ def cross_track_m(pos_ned: Rows, seq: Rows, path_ned: Sequence[tuple[int, Rows]]
     seqs = [item_seq for item_seq, _ in path_ned]
     for index in range(1, len(path_ned)):
         frames = seq == seqs[index]
-        if not frames.any():
+        span = np.asarray(path_ned[index][1]) - path_ned[index - 1][1]
+        if not frames.any() or np.hypot(span[0], span[1]) < LEG_MIN_M:
             continue
         legs = [segment_distance_m(pos_ned[frames], path_ned[index - 1][1], path_ned[index][1])]
         if index >= 2:

@@ -74,9 +74,18 @@ def true_battery(body: BodyState, tick: int) -> BatterySample:
     return battery
 
 
+@wp.func
+def power_on(rig: RigArrays, i: int) -> None:
+    """Sensors and flight controller as at power-on; all zero is their state then."""
+    rig.sensors[i] = SensorState()
+    rig.autopilot.control[i] = ControlState()
+    rig.autopilot.setpoint[i] = Setpoint()
+    estimator_reset(rig.autopilot.ekf, i)
+
+
 @wp.kernel(enable_backward=False)
 def boot(rig: RigArrays, chosen: wp.array(dtype=int)) -> None:
-    """Powers the chosen vehicles on, at rest on the ground at home."""
+    """Puts the chosen vehicles on the ground at home, at rest and with a full battery, and powers them on."""
     i = wp.tid()
     if chosen[i] == 0:
         return
@@ -84,10 +93,13 @@ def boot(rig: RigArrays, chosen: wp.array(dtype=int)) -> None:
     down = -ground_height(rig.world, 0.0, 0.0) - model.contact.leg_frd[2]
     rig.body[i] = body_at_rest(model, wp.vec3(0.0, 0.0, down), 0.0)
     rig.wind[i] = WindState()
-    rig.sensors[i] = SensorState()
-    rig.autopilot.control[i] = ControlState()
-    rig.autopilot.setpoint[i] = Setpoint()
-    estimator_reset(rig.autopilot.ekf, i)
+    power_on(rig, i)
+
+
+@wp.kernel(enable_backward=False)
+def reboot(rig: RigArrays, i_vehicle: int) -> None:
+    """Powers the sensors and the flight controller of one vehicle off and on, wherever it is."""
+    power_on(rig, i_vehicle)
 
 
 def make_advance(has_estimator: bool) -> Any:

@@ -23,7 +23,7 @@ from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.params import ParameterTable
-from sim.advance import RigArrays, boot, make_advance
+from sim.advance import RigArrays, boot, make_advance, reboot
 from sim.bodies.multirotor import BodyState, MultirotorModel, multirotor_model
 from sim.faults import Faults
 from sim.sensors.sensors import SensorModel, SensorState
@@ -129,6 +129,10 @@ class Rig:
     def _row_views(self) -> list[tuple[Any, Rows]]:
         """Each array that has a row per vehicle, and its view: making the views of large structs takes milliseconds."""
         return [(array, array.numpy()) for array in _row_arrays(self.arrays)]
+
+    def reboot(self, i_vehicle: int = 0) -> None:
+        """Powers the sensors and the flight controller of one vehicle off and on, wherever it is."""
+        wp.launch(reboot, dim=1, inputs=[self.arrays, i_vehicle], device=self.device)
 
     def load_parameters(self, table: ParameterTable) -> None:
         """Gives every flight controller the values of a parameter table, and the magnetic field of the place."""

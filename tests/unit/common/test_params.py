@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.params import all_parameters
-from common.params import Parameter, ParameterTable
+from common.params import Parameter, ParameterError, ParameterTable
 
 SPEED = Parameter("SPEED", 5.0, 0.5, 20.0, "m/s", "cruise speed", "guess", field="cruise_speed")
 COUNT = Parameter("COUNT", 3, 0, 9, "", "how many", "guess")
@@ -43,6 +43,23 @@ def test_integers_stay_integers(table):
     assert stored == 5
     assert isinstance(stored, int)
     assert table.set("COUNT", 99.0) == 9
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("NOPE", 1.0, "parameter NOPE: there is none of that name"),
+        ("SPEED", 21.0, "parameter SPEED: 21 is not between 0.5 and 20"),
+        ("SPEED", nan, "parameter SPEED: nan is not between"),
+        ("COUNT", 1.5, "parameter COUNT: 1.5 is not a whole number"),
+    ],
+)
+def test_exact_setting_refuses_what_it_would_have_to_change(table, name, value, message):
+    with pytest.raises(ParameterError, match=message):
+        table.set_exactly(name, value)
+    table.set_exactly("SPEED", 6.5)
+    table.set_exactly("COUNT", 4.0)
+    assert (table["SPEED"], table["COUNT"]) == (6.5, 4)
 
 
 @given(value=st.floats(width=32))

@@ -43,6 +43,11 @@ def test_reader_follows_the_live_row():
     assert before.pos_ned == (0.0, 0.0, 0.0)
 
 
+def test_part_of_a_row_is_read_by_its_path():
+    rows = rows_of(EstimatorState)
+    assert_same(row_reader(rows, 2, "Estimate", "estimate")(), rows["estimate"][2])
+
+
 def test_padding_between_fields_is_skipped():
     dtype = np.dtype([("flag", "i1"), ("value", "f8"), ("pair", "f4", (2,))], align=True)
     row = np.zeros(1, dtype)
