@@ -26,9 +26,9 @@ __all__ = [
     "Plan",
     "PlanError",
     "PlanItem",
+    "moved_plan",
     "parse_plan",
     "plan_text",
-    "moved_plan",
     "read_plan",
     "save_plan",
 ]

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from autopilot.vehicle import MissionItem
 from common.geodesy import GeoPoint
 
-FLOAT32_MAX = 3.4e38  # the protocol sends float32
+FLOAT32_MAX = 3.4028234663852886e38  # the protocol sends float32
 
 # MAV_FRAME
 FRAME_GLOBAL = 0

@@ -20,7 +20,7 @@ from common.geodesy import GeoPoint
 from common.params import ParameterError
 from mission.client import Running
 from mission.flight import Flight, FlightConfig, flight_parameters
-from mission.plan import DEFAULT_PLAN, Plan, PlanError, read_plan
+from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
 from mission.plots import plot_flight
 from mission.script import fly_plan
 from mission.summary import Summary, planned_path, summarise
@@ -147,9 +147,6 @@ def _plan(path: Path | None, home: GeoPoint) -> Plan:
         return moved_plan(read_plan(DEFAULT_PLAN), home) if path is None else read_plan(path)
     except PlanError as error:
         raise UserError(str(error)) from error
-    if not plan.items:
-        raise UserError(f"{path}: the plan has no mission items")
-    return plan
 
 
 def _new_folder(folder: Path | None) -> Path:

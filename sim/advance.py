@@ -121,7 +121,7 @@ def make_advance(has_estimator: bool) -> Any:
         control = rig.autopilot.control[i]
         for _ in range(tick_count):
             height = -body.pos_ned[2] - ground_height(rig.world, body.pos_ned[0], body.pos_ned[1])
-            wind = wind_step(wind_model, wind, body.pos_ned, body.vel_ned, height, seed, i, tick, TICK_S)
+            wind = wind_step(wind_model, wind, body.vel_ned, height, seed, i, tick, TICK_S)
             body = body_tick(model, body, control.actuators.command, wind.wind_ned, rig.world)
             if wp.static(has_estimator):
                 sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, rig.world, seed, i, tick)

@@ -1,8 +1,8 @@
 """Wind at a vehicle: steady wind, discrete gusts, Dryden turbulence; once a tick.
 
-In: where the vehicle is and how it moves through the air. Out: `WindState.wind_ned`, the velocity of the air there.
-Turbulence is frozen air flown through at the true airspeed, as MIL-F-8785C has it. Left out: gradients of the wind
-over the vehicle, terrain and tree shelter, thermals.
+In: the vehicle's height over ground and its velocity. Out: `WindState.wind_ned`, the velocity of the air there.
+Turbulence is frozen air flown through at the true airspeed, as MIL-F-8785C has it. Left out: growth of the
+mean with height, gradients over the vehicle, shelter by terrain and trees, thermals.
 """
 
 import math
@@ -17,7 +17,6 @@ wp.set_module_options({"enable_backward": False})
 _FEET_PER_M = wp.constant(1.0 / 0.3048)
 _LOWEST_FT = wp.constant(10.0)  # MIL-F-8785C, 3.7.3.1: the low-altitude model covers 10 to 1,000 ft
 _HIGHEST_FT = wp.constant(1000.0)
-_REFERENCE_HEIGHT_M = wp.constant(6.096)  # 20 ft, where MIL-F-8785C measures the wind
 _SLOWEST_M_S = wp.constant(0.5)  # guess: turbulence changes at least as if flown through at this speed
 _COARSEST_STEP = wp.constant(0.1)  # largest step over time constant; reached at 75 m/s near the ground
 _GUST_WINDOW_S = 12.0  # guess: one gust in each such window
@@ -35,9 +34,8 @@ _STREAM_GUST = wp.constant(104)
 class WindModel:
     """What the air does, the same over the whole world."""
 
-    mean_ned: wp.vec3  # [m/s] at 6 m over the ground
+    mean_ned: wp.vec3  # [m/s] at all heights
     along_ned: wp.vec3  # unit vector the wind blows towards
-    shear_exponent: float  # power law of the mean over height; 0: the same at all heights
     gust_m_s: float  # largest gust on top of the mean
     turbulence_w_std: float  # [m/s] standard deviation of the vertical component: 0.1 W20 in MIL-F-8785C
 
@@ -187,7 +185,6 @@ def gust_step(model: WindModel, state: WindState, seed: int, i_vehicle: int, tic
 def wind_step(
     model: WindModel,
     state: WindState,
-    pos_ned: wp.vec3,  # noqa: ARG001 - the same air everywhere, so far
     vel_ned: wp.vec3,
     height_agl_m: float,
     seed: int,
@@ -197,8 +194,6 @@ def wind_step(
 ) -> WindState:
     """The air at a vehicle after one more tick of dt [s]."""
     mean_ned = model.mean_ned
-    if model.shear_exponent > 0.0:
-        mean_ned = mean_ned * wp.pow(wp.max(height_agl_m, 0.5) / _REFERENCE_HEIGHT_M, model.shear_exponent)
     if model.gust_m_s > 0.0:
         state = gust_step(model, state, seed, i_vehicle, tick)
         mean_ned = mean_ned + state.gust_m_s * model.along_ned
@@ -220,22 +215,19 @@ def wind_model(
     direction_deg: float = 0.0,
     turbulence: float = 0.0,
     gust_m_s: float = 0.0,
-    shear_exponent: float = 0.0,
 ) -> WindModel:
     """Wind for a flight.
 
     Args:
-        speed_m_s: [m/s] mean, 6 m over the ground
+        speed_m_s: [m/s] mean at all heights; MIL-F-8785C's W20, the wind 20 ft over ground
         direction_deg: where it blows from, clockwise from north
         turbulence: intensity: vertical standard deviation over a tenth of the mean speed; 1 is MIL-F-8785C's
         gust_m_s: [m/s] largest gust on top of the mean; each is drawn between half of it and it
-        shear_exponent: power law of the mean over height; 0 none, 1/7 open country
     """
     towards_rad = math.radians(direction_deg + 180.0)
     model = WindModel()
     model.along_ned = wp.vec3(math.cos(towards_rad), math.sin(towards_rad), 0.0)
     model.mean_ned = model.along_ned * speed_m_s
-    model.shear_exponent = shear_exponent
     model.gust_m_s = gust_m_s
     model.turbulence_w_std = 0.1 * speed_m_s * turbulence
     return model

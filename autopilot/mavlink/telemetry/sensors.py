@@ -37,7 +37,6 @@ _vibration = known_type("VIBRATION").pack
 _estimator_status = known_type("ESTIMATOR_STATUS").pack
 
 PULSE_IDLE_US = 1000  # servo pulse at command 0; 2000 at command 1
-MOTOR_COUNT_MAX = 8
 MOVING_M_S = 0.5  # below this speed the course over ground is noise; guess
 FIX_3D = 3  # GPS_FIX_TYPE
 LOOKS_DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270

@@ -17,6 +17,7 @@ from mission.plan import (
     Plan,
     PlanError,
     PlanItem,
+    moved_plan,
     parse_plan,
     plan_text,
     read_plan,
@@ -323,3 +324,15 @@ def test_the_default_plan_flies_a_loop_and_lands_at_home():
     reach_m = [ned_from_geodetic(item.x, item.y, HOME.alt_m, HOME)[:2] for item in middle]
     assert 50.0 < max(north for north, _ in reach_m) - min(north for north, _ in reach_m) < 100.0
     assert all(item.z >= 12.0 for item in middle)
+
+
+def test_moved_plan_keeps_its_shape_and_heights_above_home():
+    plan = read_plan(DEFAULT_PLAN)
+    home = GeoPoint(-33.86, 151.2, 20.0)
+    moved = moved_plan(plan, home)
+    assert moved.home == home
+    for old, new in zip(plan.items, moved.items, strict=True):
+        assert (new.seq, new.command, new.frame, new.z) == (old.seq, old.command, old.frame, old.z)
+        there = ned_from_geodetic(old.x, old.y, plan.home.alt_m, plan.home)
+        here = ned_from_geodetic(new.x, new.y, home.alt_m, home)
+        assert here[:2] == pytest.approx(there[:2], abs=0.01)

@@ -67,7 +67,8 @@ def test_cross_track_is_measured_to_the_present_leg_and_the_one_before():
     path = [(-1, np.zeros(3)), (0, np.array([0.0, 0.0, -10.0])), (2, np.array([50.0, 0.0, -10.0]))]
     pos = np.array([[1.0, 0.0, -5.0], [25.0, 2.0, -10.0], [0.0, 1.5, -2.0], [99.0, 0.0, 0.0]])
     distances = cross_track_m(pos, np.array([0, 2, 2, 1]), path)
-    assert distances[:3] == pytest.approx([1.0, 2.0, 1.5])
+    assert distances[1:3] == pytest.approx([2.0, 1.5])
+    assert isnan(distances[0])  # the take-off is no leg
     assert isnan(distances[3])  # item 1 is no place
 
 

@@ -38,9 +38,7 @@ def _fly(
     body = bodies[i]
     air = airs[i]
     for k in range(ticks):
-        air = wind_step(
-            winds[i], air, body.pos_ned, body.vel_ned, body.height_agl_m, seeds[i], i, first_tick + k, TICK_S
-        )
+        air = wind_step(winds[i], air, body.vel_ned, body.height_agl_m, seeds[i], i, first_tick + k, TICK_S)
         body = body_tick(models[i], body, commands[i], air.wind_ned, world)
     bodies[i] = body
     airs[i] = air

@@ -168,5 +168,18 @@ def test_booting_one_vehicle_touches_only_that_one():
     assert abs(estimate["pos_ned"][2] - rig.arrays.body.numpy()["pos_ned"][1, 2]) < 1.0
 
 
+def test_reboot_restarts_the_controller_and_leaves_the_body_where_it_is():
+    rig = make_rig(2)
+    rig.advance(750)
+    climb(rig, 1.0)
+    body = rig.arrays.body.numpy()[0].copy()
+    neighbour = of_rows(rig.snapshot(), [1])
+    rig.reboot(0)
+    after = rig.arrays.body.numpy()[0]
+    assert all(np.array_equal(after[name], body[name]) for name in ("pos_ned", "vel_ned", "battery_charge_c"))
+    assert rig.arrays.autopilot.ekf.rows.numpy()["estimate"]["flags"][0] == 0
+    assert same_bits(of_rows(rig.snapshot(), [1]), neighbour)
+
+
 def fresh_body(snapshot):
     return next(rows for rows in snapshot if rows.dtype.names and "rotor_speed" in rows.dtype.names)

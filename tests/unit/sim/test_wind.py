@@ -26,16 +26,6 @@ def test_steady_wind_blows_from_its_direction(from_deg, towards):
     np.testing.assert_allclose(wind, np.broadcast_to(towards, wind.shape), atol=1e-5)
 
 
-def test_shear_follows_the_power_law_about_six_metres():
-    low, reference, high = (
-        np.linalg.norm(air_at(h, wind_model(8.0, 40.0, shear_exponent=1 / 7), 2, vehicles=1)[-1, 0])
-        for h in (2.0, 6.096, 40.0)
-    )
-    assert reference == pytest.approx(8.0, rel=1e-3)
-    assert low == pytest.approx(8.0 * (2.0 / 6.096) ** (1 / 7), rel=1e-3)
-    assert high == pytest.approx(8.0 * (40.0 / 6.096) ** (1 / 7), rel=1e-3)
-
-
 def test_gusts_rise_and_fall_smoothly_along_the_wind_and_stay_within_their_bound():
     wind = air_at(10.0, wind_model(8.0, 180.0, gust_m_s=4.0), 9000, vehicles=4)
     extra = wind[:, :, 0] - 8.0
