@@ -99,7 +99,4 @@ def _of_airframe(item: Parameter, value: int | float) -> Parameter:
 def parameter_table(airframe: Airframe | None = None) -> ParameterTable:
     """A vehicle's table, at the defaults of its airframe."""
     own = {} if airframe is None else airframe_defaults(airframe)
-    return ParameterTable(
-        _of_airframe(item, own[item.name]) if item.name in own else item
-        for item in all_parameters()
-    )
+    return ParameterTable(_of_airframe(item, own[item.name]) if item.name in own else item for item in all_parameters())

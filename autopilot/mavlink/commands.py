@@ -1,6 +1,6 @@
 """The command protocol: COMMAND_LONG and COMMAND_INT in, one COMMAND_ACK out, and a text with the reason of a refusal.
 
-A table maps each command to its handler; a command that is not in it is answered UNSUPPORTED at once. In a command NaN
+Requests for messages that the vehicle does not have are refused without a text: they are how clients find that out. A table maps each command to its handler; a command that is not in it is answered UNSUPPORTED at once. In a command NaN
 means default and 0 is a value.
 """
 
@@ -53,13 +53,13 @@ _SHORT_NAMES = {
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: "Pause",
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "Reboot",
 }
-# Refusals of these are shown quietly: clients ask for messages again and again.
-_QUIET = {
-    mavlink.MAV_CMD_REQUEST_MESSAGE,
-    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
-    mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
-    mavlink.MAV_CMD_GET_HOME_POSITION,
-}
+# Requests for information: REQUEST_MESSAGE and its many forerunners. Ground stations send them by the dozen when they
+# connect, to find out what the vehicle has, and again and again after that.
+_PROBES = {
+    number
+    for number, entry in mavlink.enums["MAV_CMD"].items()
+    if entry.name.startswith(("MAV_CMD_REQUEST_", "MAV_CMD_GET_"))
+} | {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}
 
 
 @dataclass(slots=True)
@@ -139,7 +139,8 @@ class CommandService:
         handler = self._handlers.get(command.command)
         if handler is None:
             self._ack(command, Verdict.UNSUPPORTED)
-            self._endpoint.text_once(Severity.NOTICE, f"{_name(command.command)} is not supported")
+            if command.command not in _PROBES:
+                self._endpoint.text_once(Severity.NOTICE, f"{_name(command.command)} is not supported")
             return
         if any(isinf(p) for p in (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)):
             reply: Reply | None = denied("a parameter is infinite")
@@ -156,10 +157,12 @@ class CommandService:
         self._endpoint.reply(command.sender, _COMMAND_ACK, payload)
 
     def _tell(self, command: Command, reply: Reply) -> None:
-        """Shows the reason of a refusal."""
+        """Shows the reason of a refusal; to a probe the acknowledgement says all there is to know."""
+        if command.command in _PROBES and reply.verdict != Verdict.DENIED:
+            return
         name = _name(command.command)
         text = f"{name}: {reply.reason or reply.verdict.name.lower().replace('_', ' ')}"
-        if command.command in _QUIET:
+        if command.command in _PROBES:
             self._endpoint.text_once(Severity.NOTICE, text)
         elif command.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             self._endpoint.text(Severity.CRITICAL, text if command.p1 else f"Disarm: {reply.reason}")
@@ -273,7 +276,7 @@ class CommandService:
     def _set_message_interval(self, command: Command) -> Reply:
         msg_id = whole(command.p1, -1)
         if msg_id not in self._endpoint.telemetry.builders:
-            return Reply(Verdict.UNSUPPORTED, f"message {command.p1:g} is not sent by this vehicle")
+            return Reply(Verdict.UNSUPPORTED)
         if not isfinite(command.p2):
             return denied("the interval is not a number")
         if msg_id == _HEARTBEAT_ID and command.p2 != 0.0:
@@ -286,7 +289,7 @@ class CommandService:
         msg_id = whole(command.p1, -1)
         interval_us = command.sender.channel.schedule.interval_us.get(msg_id)
         if interval_us is None:
-            return Reply(Verdict.UNSUPPORTED, f"message {command.p1:g} is not sent by this vehicle")
+            return Reply(Verdict.UNSUPPORTED)
         self._ack(command, Verdict.ACCEPTED)
         payload = _MESSAGE_INTERVAL.pack(msg_id, interval_us or -1)
         self._endpoint.reply(command.sender, _MESSAGE_INTERVAL, payload)
@@ -303,10 +306,10 @@ class CommandService:
         telemetry = self._endpoint.telemetry
         build = telemetry.builders.get(msg_id)
         if build is None:
-            return Reply(Verdict.UNSUPPORTED, f"message {msg_id} is not sent by this vehicle")
+            return Reply(Verdict.UNSUPPORTED)
         payload = build(self._endpoint.vehicle.state)
         if payload is None:
-            return Reply(Verdict.TEMPORARILY_REJECTED, f"{telemetry.types[msg_id].name} is not known yet")
+            return Reply(Verdict.TEMPORARILY_REJECTED)
         self._ack(command, Verdict.ACCEPTED)
         self._endpoint.reply(command.sender, telemetry.types[msg_id], payload)
         return None

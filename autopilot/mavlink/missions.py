@@ -15,9 +15,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.convert import INT32_MAX, LATLON_FRAMES, MISSION_FRAME, bounded_int
+from autopilot.navigator.items import MAX_ITEMS
 from autopilot.vehicle import ItemRefusal, MissionItem, Severity
 
-ITEMS_MAX = 5_000  # guess: far above any plan, and a bound on memory
 RETRY_US = 1_500_000  # the MAVLink mission protocol's default time-out
 RETRIES_MAX = 5
 DOWNLOADS_MAX = 16  # clients whose download is remembered
@@ -65,8 +65,8 @@ class MissionService:
             self._answer_empty_type(sender, fields.mission_type, is_clear=fields.count == 0)
         elif self._upload is not None and self._upload.sender != sender:
             self._refuse(sender, mavlink.MAV_MISSION_DENIED, "another client is uploading")
-        elif fields.count > ITEMS_MAX:
-            self._refuse(sender, mavlink.MAV_MISSION_NO_SPACE, f"{fields.count} items are more than {ITEMS_MAX}")
+        elif fields.count > MAX_ITEMS:
+            self._refuse(sender, mavlink.MAV_MISSION_NO_SPACE, f"{fields.count} items are more than {MAX_ITEMS}")
         elif fields.count == 0:
             self._upload = None
             self._load(sender, [])
@@ -201,9 +201,10 @@ class MissionService:
             self._answer_empty_type(sender, fields.mission_type, is_clear=True)
         elif fields.mission_type not in (PLAN, ALL):
             self._refuse(sender, mavlink.MAV_MISSION_UNSUPPORTED, "no such list", fields.mission_type)
-        elif self._upload is not None:
-            self._refuse(sender, mavlink.MAV_MISSION_DENIED, "an upload is under way", fields.mission_type)
+        elif self._upload is not None and self._upload.sender != sender:
+            self._refuse(sender, mavlink.MAV_MISSION_DENIED, "another client is uploading", fields.mission_type)
         else:
+            self._upload = None  # who clears has given up its own upload
             refusal = self._endpoint.vehicle.load_mission([])
             if refusal is None:
                 self._ack(sender, ACCEPTED, fields.mission_type)

@@ -19,6 +19,7 @@ from autopilot.mavlink.links import Link
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.parameters import ParameterService
+from autopilot.mavlink.telemetry.status import mission_mode
 from autopilot.vehicle import Severity, Vehicle
 
 Handler = Callable[[Sender, Any], None]
@@ -167,7 +168,7 @@ class MavlinkServer:
 
     def mission_current_changed(self, seq: int) -> None:
         state = self._endpoint.vehicle.state
-        payload = _MISSION_CURRENT.pack(seq, state.mission_count, state.mission_state)
+        payload = _MISSION_CURRENT.pack(seq, state.mission_count, state.mission_state, mission_mode(state))
         self._endpoint.broadcast(_MISSION_CURRENT, payload)
 
     def home_changed(self) -> None:

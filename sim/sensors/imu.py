@@ -16,7 +16,8 @@ import warp as wp
 
 from autopilot.ports import ImuSample
 from common.kernels import GRAVITY_M_S2, MAX_ROTORS, TICK_S, TICK_US, vec8
-from common.rng import draw_key, normal3
+from common.rng import normal3, normal6
+from common.vectors import clamp3
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias3, noise_gain
 from sim.streams import (
     ACCEL_DRIFT,
@@ -168,33 +169,6 @@ def imu_vibration(state: ImuState, rotor_speed: vec8, dt_s: float) -> ImuState:
 
 
 @wp.func
-def normal6(seed: int, i: int, tick: int, stream: int) -> tuple[wp.vec3, wp.vec3]:
-    """Six independent standard normal draws: three Box-Muller pairs, half the price of `normal3` twice."""
-    state = draw_key(seed, i, tick, stream)
-    u0 = wp.randf(state)
-    angle_0 = _TURN * wp.randf(state)
-    u1 = wp.randf(state)
-    angle_1 = _TURN * wp.randf(state)
-    u2 = wp.randf(state)
-    angle_2 = _TURN * wp.randf(state)
-    # 1 - u lies in (0, 1]: the logarithm is finite
-    radius_0 = wp.sqrt(-2.0 * wp.log(1.0 - u0))
-    radius_1 = wp.sqrt(-2.0 * wp.log(1.0 - u1))
-    radius_2 = wp.sqrt(-2.0 * wp.log(1.0 - u2))
-    first = wp.vec3(radius_0 * wp.cos(angle_0), radius_1 * wp.cos(angle_1), radius_2 * wp.cos(angle_2))
-    second = wp.vec3(radius_0 * wp.sin(angle_0), radius_1 * wp.sin(angle_1), radius_2 * wp.sin(angle_2))
-    return first, second
-
-
-@wp.func
-def clamp3(value: wp.vec3, limit: float) -> wp.vec3:
-    """Each component limited to ± limit: the sensor saturates per axis."""
-    return wp.vec3(
-        wp.clamp(value[0], -limit, limit), wp.clamp(value[1], -limit, limit), wp.clamp(value[2], -limit, limit)
-    )
-
-
-@wp.func
 def imu_sample(
     model: ImuModel,
     state: ImuState,
@@ -235,8 +209,8 @@ def imu_sample(
     sample = ImuSample()
     sample.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
     sample.dt_s = state.dt_s
-    sample.gyro_frd = clamp3(gyro + fault_bias3(gyro_fault), model.gyro_limit)
-    sample.accel_frd = clamp3(accel + fault_bias3(accel_fault), model.accel_limit)
+    sample.gyro_frd = clamp3(gyro + fault_bias3(gyro_fault), wp.vec3(model.gyro_limit))
+    sample.accel_frd = clamp3(accel + fault_bias3(accel_fault), wp.vec3(model.accel_limit))
     if held.time_us > wp.int64(0):
         if gyro_fault.mode == FAULT_STUCK:
             sample.gyro_frd = held.gyro_frd

@@ -10,7 +10,7 @@ from autopilot.mavlink.convert import INT16_MAX, UINT16_MAX, bounded_int, degree
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.ports import POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
-from autopilot.vehicle import LandedState, VehicleState
+from autopilot.vehicle import LandedState, Mode, VehicleState
 
 _heartbeat = known_type("HEARTBEAT").pack
 _sys_status = known_type("SYS_STATUS").pack
@@ -53,6 +53,7 @@ _ALWAYS = _GYRO_ACCEL | _MAG | _BARO | _GPS | _BATTERY | _AHRS | _ATTITUDE_CONTR
 FRESH_IMU_US = 100_000  # older samples mean a dead sensor; several periods of each sensor
 FRESH_US = 1_000_000
 FIX_3D = 3  # GPS_FIX_TYPE
+IN_MISSION_MODE, NOT_IN_MISSION_MODE = 1, 2  # MISSION_CURRENT.mission_mode; 0 is unknown
 WHOLE_PACK_ONLY = (UINT16_MAX,) * 9  # cell voltages are not measured
 
 
@@ -174,7 +175,14 @@ def extended_sys_state(state: VehicleState) -> bytes:
 
 
 def mission_current(state: VehicleState) -> bytes:
-    return _mission_current(u16(state.mission_current), u16(state.mission_count), state.mission_state)
+    return _mission_current(
+        u16(state.mission_current), u16(state.mission_count), state.mission_state, mission_mode(state)
+    )
+
+
+def mission_mode(state: VehicleState) -> int:
+    """MISSION_CURRENT.mission_mode: whether the mission is what is being flown."""
+    return IN_MISSION_MODE if state.mode is Mode.MISSION else NOT_IN_MISSION_MODE
 
 
 def system_time(state: VehicleState) -> bytes:
