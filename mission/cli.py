@@ -9,6 +9,8 @@ from typing import Annotated, NoReturn
 import typer
 from rich.console import Console
 
+from autopilot.mavlink.links import GROUND_STATION_PORT, OFFBOARD_PORT
+
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
@@ -41,7 +43,7 @@ def fly(
     speed: Annotated[str, typer.Option(help="Times real time, or 'max': lockstep, without network links.")] = "1",
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this much simulated time.")] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of sensor noise and turbulence.")] = 0,
-    wind: Annotated[float, typer.Option(min=0.0, max=30.0, help="Wind speed [m/s], with turbulence and gusts.")] = 0.0,
+    wind: Annotated[float, typer.Option(min=0.0, max=20.0, help="Wind speed [m/s], with turbulence and gusts.")] = 0.0,
     wind_from: Annotated[float, typer.Option(min=0.0, max=360.0, help="Where the wind comes from [deg].")] = 270.0,
     noise: Annotated[float, typer.Option(min=0.0, max=10.0, help="Scale of all sensor noise.")] = 1.0,
     airframe: Annotated[str, typer.Option(help="Airframe name or TOML file.")] = "x500",
@@ -51,8 +53,10 @@ def fly(
     hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m].")] = 12.0,
     walls: Annotated[bool, typer.Option("--walls", help="Walls along the edges of the map.")] = False,
     host: Annotated[str, typer.Option(help="Address ground stations are sent to.")] = "127.0.0.1",
-    gcs_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of ground stations.")] = 14550,
-    api_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of the offboard API.")] = 14540,
+    gcs_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of ground stations.")] = (
+        GROUND_STATION_PORT
+    ),
+    api_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of the offboard API.")] = OFFBOARD_PORT,
     param: Annotated[
         list[str] | None, typer.Option(help="Sets a parameter of the flight controller: NAME=VALUE. Repeatable.")
     ] = None,

@@ -123,6 +123,7 @@ def _ulog(log: SensorLog, replay: Replay, summary: EstimateSummary) -> bytes:
         actuators=output[:0],
         health=output,
         body=output[:0],
+        vehicle=output[:0],
         origin=log.origin or GeoPoint(nan, nan, nan),
     )
     stream = BytesIO()

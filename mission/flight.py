@@ -45,8 +45,8 @@ class FlightConfig(BaseModel):
     """Where the vehicle boots."""
     seed: int = Field(default=0, ge=0, le=2**31 - 1)
     """Seeds sensor noise and turbulence."""
-    wind_m_s: float = Field(default=0.0, ge=0.0, le=30.0)
-    """Mean wind speed 6 m above the ground; above 0 it is turbulent and has gusts."""
+    wind_m_s: float = Field(default=0.0, ge=0.0, le=20.0)
+    """Mean wind speed; above 0 it is turbulent and has gusts. More would blow a parked vehicle over."""
     wind_from_deg: float = Field(default=270.0, ge=0.0, le=360.0)
     """Where the wind comes from, clockwise from north."""
     noise: float = Field(default=1.0, ge=0.0, le=10.0)

@@ -302,6 +302,7 @@ async def fly_plan(drone: Drone, plan: Plan) -> None:
     """
     await drone.wait_ready()
     await drone.upload(plan.items)
+    first_text = len(drone.texts)
     await drone.start_mission()
     last = plan.items[-1]
     if last.command in (CMD_LAND, CMD_RETURN_TO_LAUNCH):
@@ -311,7 +312,7 @@ async def fly_plan(drone: Drone, plan: Plan) -> None:
     if last.seq not in drone.reached and not drone.is_mission_complete:
         current = drone.latest("MISSION_CURRENT")
         where = "" if current is None else f" at item {current.seq}"
-        raise ScriptError(f"the flight ended before the mission did{where}: {drone.texts[-1] if drone.texts else ''}")
+        raise ScriptError(f"the flight ended before the mission did{where} ({'; '.join(drone.texts[first_text:])})")
 
 
 Script = Callable[[Drone], Coroutine[Any, Any, Any]]

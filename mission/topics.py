@@ -1,7 +1,8 @@
 """The flight log's topics: PX4's names and fields, filled from rows of the kernel structs.
 
 Each builder turns a batch of rows, one per 20 ms frame, into the columns of one topic. Quaternions leave as
-(w, x, y, z). A sensor's rows are those frames in which a new sample had arrived.
+(w, x, y, z). A sensor's rows are those frames in which a new sample had arrived. PX4's fields that could only ever
+hold one value here are left out.
 """
 
 from collections.abc import Callable
@@ -12,11 +13,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from autopilot.ports import HEIGHT_VALID, POSITION_VALID, TERRAIN_VALID, VELOCITY_VALID
 from common.geodesy import GeoPoint, geodetic_from_ned
 from mission.angles import wxyz, yaw_rad
+from sim.sensors.range import MAX_DISTANCE_M, MIN_DISTANCE_M
 
 Rows = npt.NDArray[Any]
 Columns = dict[str, npt.ArrayLike]
+
+FIX_3D = 3  # fix_type
+LASER = 0  # distance_sensor.type
+FACING_DOWN = 25  # distance_sensor.orientation
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +37,7 @@ class Batch:
     actuators: Rows  # Actuators
     health: Rows  # EstimatorState
     body: Rows  # BodyState, the truth
+    vehicle: Rows  # STATUS_DTYPE of mission.recorder
     origin: GeoPoint
 
 
@@ -78,23 +86,26 @@ def _rates_true(batch: Batch) -> Columns:
     return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "xyz": batch.body["omega_frd"]}
 
 
+REFERENCE_FIELDS = {"ref_lat": "double", "ref_lon": "double", "ref_alt": "float"}
 LOCAL_POSITION_FIELDS = {
     "timestamp_sample": "uint64_t",
     **dict.fromkeys("x y z vx vy vz ax ay az heading eph epv evh evv".split(), "float"),
-    "ref_timestamp": "uint64_t",
-    "ref_lat": "double",
-    "ref_lon": "double",
-    "ref_alt": "float",
+    **REFERENCE_FIELDS,
     "dist_bottom": "float",
     **dict.fromkeys("xy_valid z_valid v_xy_valid v_z_valid xy_global z_global dist_bottom_valid".split(), "bool"),
+}
+TRUE_LOCAL_POSITION_FIELDS = {
+    "timestamp_sample": "uint64_t",
+    **dict.fromkeys("x y z vx vy vz heading dist_bottom".split(), "float"),
+    **REFERENCE_FIELDS,
 }
 
 
 def _local_position(batch: Batch) -> Columns:
     estimate = batch.estimate
     flags = estimate["flags"]
-    position_valid = (flags & 8) != 0
-    height_valid = (flags & 16) != 0
+    position_valid = (flags & POSITION_VALID) != 0
+    height_valid = (flags & HEIGHT_VALID) != 0
     return {
         "timestamp": batch.time_us,
         "timestamp_sample": estimate["time_us"],
@@ -110,33 +121,29 @@ def _local_position(batch: Batch) -> Columns:
         "dist_bottom": estimate["terrain_d"] - estimate["pos_ned"][:, 2],
         "xy_valid": position_valid,
         "z_valid": height_valid,
-        "v_xy_valid": (flags & 4) != 0,
-        "v_z_valid": (flags & 4) != 0,
+        "v_xy_valid": (flags & VELOCITY_VALID) != 0,
+        "v_z_valid": (flags & VELOCITY_VALID) != 0,
         "xy_global": position_valid,
         "z_global": height_valid,
-        "dist_bottom_valid": (flags & 32) != 0,
+        "dist_bottom_valid": (flags & TERRAIN_VALID) != 0,
     }
 
 
 def _local_position_true(batch: Batch) -> Columns:
     body = batch.body
-    valid = dict.fromkeys("xy_valid z_valid v_xy_valid v_z_valid xy_global z_global".split(), True)
     return {
         "timestamp": batch.time_us,
         "timestamp_sample": batch.time_us,
         **_axes("x y z", body["pos_ned"]),
         **_axes("vx vy vz", body["vel_ned"]),
-        **dict.fromkeys("ax ay az dist_bottom".split(), nan),
         "heading": yaw_rad(body["q_ned_from_frd"]),
-        **dict.fromkeys("eph epv evh evv".split(), 0.0),
+        "dist_bottom": body["height_agl_m"],
         **_reference(batch.origin),
-        **valid,
-        "dist_bottom_valid": False,
     }
 
 
 def _reference(origin: GeoPoint) -> Columns:
-    return {"ref_timestamp": 0, "ref_lat": origin.lat_deg, "ref_lon": origin.lon_deg, "ref_alt": origin.alt_m}
+    return {"ref_lat": origin.lat_deg, "ref_lon": origin.lon_deg, "ref_alt": origin.alt_m}
 
 
 def _geodetic(pos_ned: Rows, origin: GeoPoint) -> Rows:
@@ -157,7 +164,7 @@ def _global_position(batch: Batch) -> Columns:
         "eph": estimate["pos_h_std"],
         "epv": estimate["pos_v_std"],
         "terrain_alt": batch.origin.alt_m - estimate["terrain_d"],
-        "terrain_alt_valid": (estimate["flags"] & 32) != 0,
+        "terrain_alt_valid": (estimate["flags"] & TERRAIN_VALID) != 0,
     }
 
 
@@ -171,18 +178,15 @@ def _gps(batch: Batch) -> Columns:
         "latitude_deg": points[:, 0],
         "longitude_deg": points[:, 1],
         "altitude_msl_m": points[:, 2],
-        "altitude_ellipsoid_m": points[:, 2],
         "fix_type": gnss["fix_type"],
         "satellites_used": gnss["satellites"],
         "eph": gnss["pos_h_std"],
         "epv": gnss["pos_v_std"],
         "s_variance_m_s": gnss["vel_std"],
-        "c_variance_rad": nan,
-        **dict.fromkeys("hdop vdop".split(), 0.7),
         "vel_m_s": np.hypot(velocity[:, 0], velocity[:, 1]),
         **_axes("vel_n_m_s vel_e_m_s vel_d_m_s", velocity),
         "cog_rad": np.arctan2(velocity[:, 1], velocity[:, 0]),
-        "vel_ned_valid": True,
+        "vel_ned_valid": gnss["fix_type"] >= FIX_3D,
     }
 
 
@@ -191,10 +195,8 @@ def _baro(batch: Batch) -> Columns:
     return {
         "timestamp": baro["time_us"],
         "timestamp_sample": baro["time_us"],
-        "device_id": 1,
         "pressure": baro["pressure_pa"],
         "temperature": baro["temperature_c"],
-        "error_count": 0,
     }
 
 
@@ -203,9 +205,7 @@ def _mag(batch: Batch) -> Columns:
     return {
         "timestamp": mag["time_us"],
         "timestamp_sample": mag["time_us"],
-        "device_id": 1,
         "magnetometer_ga": mag["field_frd_gauss"],
-        "calibration_count": 0,
     }
 
 
@@ -213,24 +213,24 @@ def _range(batch: Batch) -> Columns:
     ranges = fresh(batch, "range")
     return {
         "timestamp": ranges["time_us"],
-        "device_id": 1,
-        "min_distance": 0.1,
-        "max_distance": 40.0,
+        "min_distance": MIN_DISTANCE_M,
+        "max_distance": MAX_DISTANCE_M,
         "current_distance": ranges["distance_m"],
-        "variance": 0.0,
         "signal_quality": np.where(ranges["is_valid"] != 0, 100, 0),
-        "type": 0,
-        "orientation": 25,
+        "type": LASER,
+        "orientation": FACING_DOWN,
     }
 
 
 def _battery(batch: Batch) -> Columns:
-    battery = fresh(batch, "battery")
+    is_new = is_fresh(batch, "battery")
+    battery = batch.samples["battery"][is_new]
     return {
         "timestamp": battery["time_us"],
         "voltage_v": battery["voltage_v"],
         "current_a": battery["current_a"],
-        "connected": True,
+        "discharged_mah": batch.vehicle["battery_used_mah"][is_new],
+        "remaining": batch.vehicle["battery_remaining"][is_new],
     }
 
 
@@ -238,7 +238,7 @@ def _motors(batch: Batch) -> Columns:
     command = batch.actuators["command"]
     control = np.full((len(command), 12), nan, dtype=np.float32)
     control[:, : command.shape[1]] = command
-    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "reversible_flags": 0, "control": control}
+    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "control": control}
 
 
 def _attitude_setpoint(batch: Batch) -> Columns:
@@ -286,8 +286,6 @@ def _biases(batch: Batch) -> Columns:
         "timestamp_sample": estimate["time_us"],
         "gyro_bias": estimate["gyro_bias_frd"],
         "accel_bias": estimate["accel_bias_frd"],
-        "gyro_bias_valid": True,
-        "accel_bias_valid": True,
     }
 
 
@@ -329,7 +327,6 @@ def _innovation_variances(batch: Batch) -> Columns:
 
 
 _SAMPLED = {"timestamp_sample": "uint64_t"}
-_DEVICE = {**_SAMPLED, "device_id": "uint32_t"}
 
 TOPICS = [
     Topic("vehicle_attitude", {**_SAMPLED, "q": "float[4]"}, _attitude),
@@ -337,7 +334,7 @@ TOPICS = [
     Topic("vehicle_angular_velocity", {**_SAMPLED, "xyz": "float[3]"}, _rates),
     Topic("vehicle_angular_velocity_groundtruth", {**_SAMPLED, "xyz": "float[3]"}, _rates_true),
     Topic("vehicle_local_position", LOCAL_POSITION_FIELDS, _local_position),
-    Topic("vehicle_local_position_groundtruth", LOCAL_POSITION_FIELDS, _local_position_true),
+    Topic("vehicle_local_position_groundtruth", TRUE_LOCAL_POSITION_FIELDS, _local_position_true),
     Topic(
         "vehicle_global_position",
         {
@@ -353,30 +350,26 @@ TOPICS = [
         "vehicle_gps_position",
         {
             "timestamp_sample": "uint64_t",
-            **dict.fromkeys("latitude_deg longitude_deg altitude_msl_m altitude_ellipsoid_m".split(), "double"),
-            **dict.fromkeys(
-                "s_variance_m_s c_variance_rad eph epv hdop vdop vel_m_s vel_n_m_s vel_e_m_s vel_d_m_s cog_rad".split(),
-                "float",
-            ),
+            **dict.fromkeys("latitude_deg longitude_deg altitude_msl_m".split(), "double"),
+            **dict.fromkeys("s_variance_m_s eph epv vel_m_s vel_n_m_s vel_e_m_s vel_d_m_s cog_rad".split(), "float"),
             **dict.fromkeys("fix_type satellites_used".split(), "uint8_t"),
             "vel_ned_valid": "bool",
         },
         _gps,
     ),
-    Topic("sensor_baro", {**_DEVICE, "pressure": "float", "temperature": "float", "error_count": "uint32_t"}, _baro),
-    Topic("vehicle_magnetometer", {**_DEVICE, "magnetometer_ga": "float[3]", "calibration_count": "uint8_t"}, _mag),
+    Topic("sensor_baro", {**_SAMPLED, "pressure": "float", "temperature": "float"}, _baro),
+    Topic("vehicle_magnetometer", {**_SAMPLED, "magnetometer_ga": "float[3]"}, _mag),
     Topic(
         "distance_sensor",
         {
-            "device_id": "uint32_t",
-            **dict.fromkeys("min_distance max_distance current_distance variance".split(), "float"),
+            **dict.fromkeys("min_distance max_distance current_distance".split(), "float"),
             "signal_quality": "int8_t",
             **dict.fromkeys("type orientation".split(), "uint8_t"),
         },
         _range,
     ),
-    Topic("battery_status", {"voltage_v": "float", "current_a": "float", "connected": "bool"}, _battery),
-    Topic("actuator_motors", {**_SAMPLED, "control": "float[12]", "reversible_flags": "uint16_t"}, _motors),
+    Topic("battery_status", dict.fromkeys("voltage_v current_a discharged_mah remaining".split(), "float"), _battery),
+    Topic("actuator_motors", {**_SAMPLED, "control": "float[12]"}, _motors),
     Topic(
         "vehicle_attitude_setpoint",
         {"yaw_sp_move_rate": "float", "q_d": "float[4]", "thrust_body": "float[3]"},
@@ -396,13 +389,7 @@ TOPICS = [
     Topic("wind", {**_SAMPLED, "windspeed_north": "float", "windspeed_east": "float"}, _wind),
     Topic(
         "estimator_sensor_bias",
-        {
-            **_SAMPLED,
-            "gyro_bias": "float[3]",
-            "accel_bias": "float[3]",
-            "gyro_bias_valid": "bool",
-            "accel_bias_valid": "bool",
-        },
+        {**_SAMPLED, "gyro_bias": "float[3]", "accel_bias": "float[3]"},
         _biases,
     ),
 ]

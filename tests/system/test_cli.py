@@ -104,7 +104,7 @@ def test_mission_that_the_vehicle_refuses_gives_1(fly, tmp_path):
 
 
 def test_mission_far_away_gives_1(fly):
-    result = fly("--home", "-33.9,18.4,20")
+    result = fly("--plan", str(DEFAULT_PLAN), "--home", "-33.9,18.4,20")
     assert result.returncode == 1, result.stderr
     assert "km away" in result.stdout
 

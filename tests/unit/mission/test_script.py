@@ -189,7 +189,8 @@ def test_plan_whose_flight_ends_elsewhere_has_failed(flight):
         return flying.error
 
     error = result_of(flight, script)
-    assert str(error) == "the flight ended before the mission did"
+    assert str(error).startswith("the flight ended before the mission did at item 1 (")
+    assert "Position lost" in str(error)
 
 
 def test_parameter_is_read_and_set(flight):

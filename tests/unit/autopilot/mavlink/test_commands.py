@@ -213,16 +213,40 @@ def test_home_is_sent_on_request():
     assert names.index("COMMAND_ACK") < names.index("HOME_POSITION")
 
 
-def test_home_that_is_not_known_is_refused_with_one_text():
+def test_home_that_is_not_known_is_refused():
     rig = Rig()
     rig.update(home=None)
-    told = []
-    for _ in range(10):
-        rig.client.command(512, 242)
-        messages = rig.frame(15)
-        assert [m.fields.result for m in messages if m.name == "COMMAND_ACK"] == [TEMPORARILY_REJECTED]
-        told += texts(messages)
-    assert len(told) == 1
+    assert rig.ack(512, 242).result == TEMPORARILY_REJECTED
+    assert rig.ack(410).result == TEMPORARILY_REJECTED
+
+
+@pytest.mark.parametrize(
+    "probe",
+    [
+        (512, 435),  # REQUEST_MESSAGE of AVAILABLE_MODES, which a ground station asks for when it connects
+        (512, 259),
+        (511, 9999, 1e6),
+        (510, 9999),
+        (519, 1.0),  # REQUEST_PROTOCOL_VERSION
+        (521, 1.0),  # REQUEST_CAMERA_INFORMATION
+        (2504, 0.0),  # REQUEST_VIDEO_STREAM_INFORMATION
+    ],
+)
+def test_probe_for_what_is_not_there_is_unsupported_without_a_text(probe):
+    rig = Rig()
+    rig.client.command(*probe)
+    messages = rig.frame()
+    assert [m.fields.result for m in messages if m.name == "COMMAND_ACK"] == [UNSUPPORTED]
+    assert texts(messages) == []
+
+
+def test_message_request_that_means_nothing_is_told_in_one_short_text():
+    for params in ((511, 0.0, -1.0), (511, 30.0, nan), (512, float("inf"))):
+        rig = Rig()
+        rig.client.command(*params)
+        told = [m.fields for m in rig.frame() if m.name == "STATUSTEXT"]
+        assert [text.chunk_seq for text in told] == [0]
+        assert told[0].severity == mavlink.MAV_SEVERITY_NOTICE
 
 
 def test_mission_commands():

@@ -4,6 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.missions import RETRIES_MAX, item_from_fields, scaled_position
+from autopilot.navigator.items import MAX_ITEMS
 from autopilot.vehicle import ItemRefusal, MissionItem, Reply, Verdict
 from tests.unit.autopilot.mavlink.rig import FRAME_US, Client, Rig, texts
 
@@ -191,10 +192,25 @@ def test_plan_may_not_be_cleared_while_another_is_uploaded():
     assert ack.type == mavlink.MAV_MISSION_DENIED
 
 
-def test_too_many_items_are_refused():
+def test_clearing_gives_up_an_upload_of_ones_own():
     rig = Rig()
-    rig.client.send("MISSION_COUNT", target_component=1, count=65_535)
+    rig.vehicle.items = OLD_PLAN
+    start(rig, 3)
+    send_item(rig.client, PLAN[0])
+    rig.frame()
+    rig.client.send("MISSION_CLEAR_ALL", target_component=1)
+    assert rig.only("MISSION_ACK").type == ACCEPTED
+    assert rig.vehicle.items == []
+    assert rig.all("MISSION_REQUEST_INT", 2 * FRAMES_PER_RETRY) == []
+    assert upload(rig, PLAN) == ACCEPTED
+
+
+@pytest.mark.parametrize("count", [MAX_ITEMS + 1, 65_535])
+def test_more_items_than_the_navigator_takes_are_refused_before_they_are_sent(count):
+    rig = Rig()
+    rig.client.send("MISSION_COUNT", target_component=1, count=count)
     assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_NO_SPACE
+    start(rig, MAX_ITEMS)
 
 
 @pytest.mark.parametrize("mission_type", [1, 2])

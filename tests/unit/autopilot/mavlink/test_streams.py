@@ -218,6 +218,9 @@ def test_mission_progress():
     rig.update(mission_state=mavlink.MISSION_STATE_ACTIVE)
     current = request(rig, "MISSION_CURRENT")
     assert (current.seq, current.total, current.mission_state) == (1, 2, mavlink.MISSION_STATE_ACTIVE)
+    assert current.mission_mode == 2  # something else is flown
+    rig.update(mode=Mode.MISSION)
+    assert request(rig, "MISSION_CURRENT").mission_mode == 1
 
 
 def test_motors():
