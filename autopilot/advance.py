@@ -9,7 +9,7 @@ import warp as wp
 from autopilot.control.airframe import ControlAirframe
 from autopilot.control.control import ControlState
 from autopilot.control.params import ControlParams
-from autopilot.estimator.ekf import estimator_tick
+from autopilot.estimator.ekf import estimator_step
 from autopilot.estimator.state import Ekf, EstimatorState
 from autopilot.ports import Samples, Setpoint
 
@@ -33,8 +33,6 @@ def estimate_samples(
 ) -> None:
     """Runs the estimator alone over recorded samples, one column per tick, and keeps its state after each tick."""
     i = wp.tid()
-    state = ekf.rows[i]
     for tick in range(tick_count):
-        state = estimator_tick(ekf, i, state, samples[i, tick])
-        states[i, tick] = state
-    ekf.rows[i] = state
+        estimator_step(ekf, i, samples[i, tick])
+        states[i, tick] = ekf.rows[i]

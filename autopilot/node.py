@@ -117,15 +117,15 @@ class FlightController:
         self._servers: list[Server] = []
         self._on_reboot = on_reboot
         self._setpoint = SetpointPort(ports.setpoint)
-        hover = hover_thrust(airframe)
+        hover, standing_m = hover_thrust(airframe), airframe.contact.leg_z_m
         self.commander = Commander(
             self.state,
             params,
             self._relay,
             BatteryEstimator(airframe.battery),
-            LandingDetector(params, hover, airframe.contact.leg_z_m),
+            LandingDetector(params, hover, standing_m),
         )
-        context = NavContext(self.state, params, self._relay, self._setpoint, hover)
+        context = NavContext(self.state, params, self._relay, self._setpoint, hover, standing_m)
         self.navigator = Navigator(context, Mission(context, self.commander.set_home))
         self.commander.connect(self.navigator)
         self._setpoint.write()

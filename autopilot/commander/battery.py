@@ -1,6 +1,7 @@
 """Charge left in the battery, counted from current and started and corrected by voltage.
 
-In: battery samples. Out: share of the capacity left and charge used. Left out: temperature and ageing.
+In: battery samples. Out: share of the capacity left and charge used. While the sensor is silent, or frozen, the last
+current is counted on. Left out: temperature and ageing.
 """
 
 from math import exp, nan
@@ -9,12 +10,16 @@ from common.airframe import Battery
 
 _CORRECTION_TIME_S = 120.0  # the count follows the voltage this slowly; guess, longer than any load transient
 _CURVE_POINTS = 201
+_SILENT_US = 5_000_000  # a sensor whose values have not changed for that long is not believed; guess
 
 
 class BatteryEstimator:
     """Charge of one battery. `remaining` is NaN until the first sample with a voltage."""
 
-    __slots__ = ("_curve_v", "_last_us", "_pack_mah", "_resistance_ohm", "remaining", "used_mah")
+    __slots__ = (
+        "_changed_us", "_counted_us", "_current_a", "_curve_v", "_pack_mah", "_resistance_ohm", "_sample_us",
+        "_voltage_v", "is_silent", "remaining", "used_mah",
+    )  # fmt: skip
 
     def __init__(self, battery: Battery) -> None:
         self._pack_mah = battery.capacity_mah
@@ -23,25 +28,47 @@ class BatteryEstimator:
         span_v = battery.cells * (battery.full_cell_v - battery.empty_cell_v)
         shares = [i / (_CURVE_POINTS - 1) for i in range(_CURVE_POINTS)]
         self._curve_v = [empty_v + span_v * _rest_voltage_share(share) for share in shares]
-        self._last_us = 0
+        self._sample_us = 0  # of the last sample
+        self._changed_us = 0  # when it last differed from the one before
+        self._counted_us = 0  # up to when charge has been counted
+        self._voltage_v = self._current_a = 0.0
+        self.is_silent = False
         self.remaining = nan  # [0..1]
         self.used_mah = 0.0
 
     def update(self, time_us: int, voltage_v: float, current_a: float) -> None:
         """Takes one sample."""
-        if voltage_v <= 0.0 or time_us == self._last_us:
+        if voltage_v <= 0.0 or time_us == self._sample_us:
+            return
+        self._sample_us = time_us
+        if voltage_v != self._voltage_v or current_a != self._current_a:
+            self._voltage_v, self._current_a = voltage_v, current_a
+            self._changed_us = time_us
+        elif time_us - self._changed_us > _SILENT_US:
+            self._count(time_us)  # frozen: the voltage says nothing about the charge
             return
         by_voltage = self._charge_at(voltage_v + current_a * self._resistance_ohm)
-        if self._last_us == 0:
+        if self._counted_us == 0:
             self.remaining = by_voltage
-        else:
-            dt_s = (time_us - self._last_us) * 1e-6
-            used_mah = max(current_a, 0.0) * dt_s / 3.6
-            self.used_mah += used_mah
-            counted = self.remaining - used_mah / self._pack_mah
-            corrected = counted + (by_voltage - counted) * min(dt_s / _CORRECTION_TIME_S, 1.0)
-            self.remaining = min(max(corrected, 0.0), 1.0)
-        self._last_us = time_us
+            self._counted_us = time_us
+            return
+        dt_s = max((time_us - self._counted_us) * 1e-6, 0.0)
+        self._count(time_us)
+        corrected = self.remaining + (by_voltage - self.remaining) * min(dt_s / _CORRECTION_TIME_S, 1.0)
+        self.remaining = min(max(corrected, 0.0), 1.0)
+
+    def count_on(self, now_us: int) -> None:
+        """Takes note of the time: the charge of a silent sensor is counted on with its last current."""
+        self.is_silent = self._counted_us != 0 and now_us - self._changed_us > _SILENT_US
+        if self.is_silent:
+            self._count(now_us)
+
+    def _count(self, time_us: int) -> None:
+        """Counts the current up to a time."""
+        used_mah = max(self._current_a, 0.0) * max(time_us - self._counted_us, 0) * 1e-6 / 3.6
+        self._counted_us = time_us
+        self.used_mah += used_mah
+        self.remaining = max(self.remaining - used_mah / self._pack_mah, 0.0)
 
     def _charge_at(self, rest_voltage_v: float) -> float:
         """Share of the capacity [0..1] at which the pack rests at this voltage."""

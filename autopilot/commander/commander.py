@@ -4,23 +4,28 @@ In: the vehicle's state and what clients ask for. Out: mode, arming and landed s
 which mode to fly through `Flying`, and asks it what it alone can know.
 """
 
-from math import isfinite
-from typing import Protocol
+from math import hypot, isfinite, pi, sqrt
 
 from autopilot.commander.arming import arming_reasons
 from autopilot.commander.battery import BatteryEstimator
+from autopilot.commander.crash import AttitudeWatch
 from autopilot.commander.failsafe import (
     ACTION_MODES,
     BATTERY_CRITICAL,
     BATTERY_EMERGENCY,
     BATTERY_LOW,
+    BATTERY_SILENT,
+    CRASHED,
     OFFBOARD_LOST,
+    OUTCOMES,
     POSITION_LOST,
     RULES,
     Action,
 )
+from autopilot.commander.flying import Flying
 from autopilot.commander.landing import LandingDetector
 from autopilot.commander.modes import MODE_RULES, mode_refusal
+from autopilot.navigator.ground import Ask
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID
 from autopilot.vehicle import ACCEPTED, Announcer, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
@@ -34,29 +39,9 @@ _FIRST_TEXT_US = 10_000_000  # until then the estimator may still be aligning
 _AIRBORNE_M = 0.5  # height over the take-off place from which the vehicle is in the air
 _LIFT_TIMEOUT_US = 10_000_000  # a take-off that has not left the ground by then has failed
 _FRAME_LONGEST_S = 0.1  # longer gaps do not count as landed time
-
-
-class Flying(Protocol):
-    """What the commander needs of the navigator."""
-
-    def refusal(self, mode: Mode) -> str: ...
-
-    def enter(self, mode: Mode) -> None: ...
-
-    def on_armed(self) -> None: ...
-
-    @property
-    def wants_lift(self) -> bool: ...
-
-    @property
-    def is_landing(self) -> bool: ...
-
-    @property
-    def offboard_needs_position(self) -> bool: ...
-
-    def offboard_age_us(self, time_us: int) -> int: ...
-
-    def tell_position(self, *, is_valid: bool) -> None: ...
+_ON_ITS_SIDE_RAD = 0.25 * pi  # lean from which a vehicle on the ground has not landed but crashed, as for arming
+_FALLEN_US = 10_000_000  # after its motors stopped in the air a vehicle is down, whatever the estimate says; guess
+_RESET_TOLD_M = 0.5  # smaller jumps of the position are not worth a text; guess
 
 
 class Commander:
@@ -83,12 +68,15 @@ class Commander:
         self.announcer = announcer
         self.has_position = False
         self._battery = battery
+        self._attitude = AttitudeWatch(params)
         self._landing = landing
         self._flying: Flying
         self._position_seen_us = -1  # when the position was last valid
         self._next_check_us = 0
         self._next_text_us = _FIRST_TEXT_US
         self._landed_since_us = 0
+        self._disarmed_us = 0
+        self._reset_count = 0  # of the estimate
         self._lift_since_us = 0
         self._lift_d = 0.0
         self._has_flown = False  # since arming
@@ -111,6 +99,7 @@ class Commander:
         battery = self._battery
         sample = state.samples.battery
         battery.update(sample.time_us, sample.voltage_v, sample.current_a)
+        battery.count_on(state.time_us)
         state.battery_remaining = battery.remaining
         state.battery_used_mah = battery.used_mah
         if state.home is None and self.has_position and state.estimate.pos_h_std <= self._eph:
@@ -120,8 +109,10 @@ class Commander:
                 self._stand()
         else:
             self._fly(dt_s)
+        if state.estimate.reset_count != self._reset_count:
+            self._tell_reset()
         if state.is_armed:
-            self._watch_failures()
+            self._watch_failures(min(dt_s, _FRAME_LONGEST_S))
         elif state.time_us >= self._next_check_us:
             self._next_check_us = state.time_us + _CHECK_PERIOD_US
             self._check_before_arming()
@@ -150,6 +141,7 @@ class Commander:
         self._lift_since_us = 0
         self._has_flown = False
         self._failures = 0
+        self._attitude.reset()
         self._clear_failsafe()
         self._flying.on_armed()
         self.announcer.heartbeat_now()
@@ -250,15 +242,27 @@ class Commander:
         """Off the ground: landed state, landing detection."""
         state = self.state
         if state.landed_state is LandedState.TAKEOFF and not self._has_flown:
-            self._lift()
+            if state.is_armed:
+                self._lift()
+            else:
+                self._touch_down()
             return
+        ask = self._flying.ask
         thrust = state.actuators.thrust_sp if state.is_armed else 0.0
-        descent_sp = state.actuators.traj_vel_ned[2]
+        descent_sp = state.actuators.traj_vel_ned[2] if ask is Ask.DOWN else 0.0
         is_landed = self._landing.update(state.estimate, thrust, descent_sp, min(dt_s, _FRAME_LONGEST_S))
+        if ask is Ask.UP and self._landing.has_contact:
+            self._landing.reset()  # off again
+            is_landed = False
         state.has_ground_contact = self._landing.has_contact
         if is_landed:
             self._touch_down()
-            self.announcer.statustext(Severity.INFO, "Landed")
+            if hypot(state.roll_rad, state.pitch_rad) < _ON_ITS_SIDE_RAD:
+                self.announcer.statustext(Severity.INFO, "Landed")
+            elif state.is_armed:
+                self._act(CRASHED)
+        elif not state.is_armed and state.time_us - self._disarmed_us > _FALLEN_US:
+            self._touch_down()
         elif state.landed_state is not LandedState.TAKEOFF or state.mode is not Mode.TAKEOFF:
             state.landed_state = LandedState.LANDING if self._flying.is_landing else LandedState.IN_AIR
 
@@ -270,8 +274,7 @@ class Commander:
         elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
             self.announcer.statustext(Severity.CRITICAL, "Takeoff failed: still on the ground")
             self._touch_down()
-            if state.is_armed:
-                self._disarm("Disarmed: no take-off")
+            self._disarm("Disarmed: no take-off")
 
     def _touch_down(self) -> None:
         self.state.landed_state = LandedState.ON_GROUND
@@ -280,6 +283,7 @@ class Commander:
     def _disarm(self, text: str) -> None:
         state = self.state
         state.is_armed = False
+        self._disarmed_us = state.time_us
         self._clear_failsafe()
         self._next_check_us = 0
         self.change_mode(Mode.HOLD)
@@ -315,10 +319,21 @@ class Commander:
             self._next_text_us = state.time_us + _TEXT_PERIOD_US
             self.announcer.statustext(Severity.CRITICAL, f"PreArm: {reasons[0]}")
 
-    def _watch_failures(self) -> None:
+    def _tell_reset(self) -> None:
+        """The estimator has set its position, velocity or heading anew."""
+        estimate = self.state.estimate
+        self._reset_count = estimate.reset_count
+        jump_m = sqrt(sum(axis * axis for axis in estimate.pos_reset_ned))
+        is_flying = self.state.is_armed and self.state.landed_state is not LandedState.ON_GROUND
+        if jump_m > _RESET_TOLD_M and is_flying:
+            self.announcer.statustext(Severity.NOTICE, f"Estimator: position reset by {jump_m:.1f} m")
+
+    def _watch_failures(self, dt_s: float) -> None:
         state = self.state
         mode = state.mode
-        failures = 0
+        failures = self._attitude.update(state, dt_s)
+        if self._battery.is_silent and state.landed_state is not LandedState.ON_GROUND:
+            failures |= BATTERY_SILENT
         if not self.has_position and self._needs_position(mode):
             failures |= POSITION_LOST
         if mode is Mode.OFFBOARD and self._flying.offboard_age_us(state.time_us) > self._offboard_loss_us:
@@ -347,9 +362,11 @@ class Commander:
             if action is Action.RETURN and self.refusal(Mode.RETURN):
                 action = Action.LAND
             strongest = max(strongest, action)
-            outcome = f": {ACTION_MODES[action].name.lower()}" if action in ACTION_MODES else ""
-            self.announcer.statustext(rule.severity, rule.text + outcome)
+            self.announcer.statustext(rule.severity, rule.text + OUTCOMES.get(action, ""))
         if strongest is Action.WARN:
+            return
+        if strongest is Action.TERMINATE:
+            self._disarm("Disarmed by failsafe")
             return
         if state.landed_state is LandedState.ON_GROUND:
             self._disarm("Disarmed by failsafe on the ground")

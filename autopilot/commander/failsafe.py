@@ -13,6 +13,9 @@ BATTERY_EMERGENCY = 2
 BATTERY_CRITICAL = 4
 OFFBOARD_LOST = 8
 BATTERY_LOW = 16
+BATTERY_SILENT = 32
+ATTITUDE_LOST = 64
+CRASHED = 128
 
 
 class Action(IntEnum):
@@ -22,9 +25,13 @@ class Action(IntEnum):
     HOLD = 1
     RETURN = 2
     LAND = 3  # blind if the position is lost
+    TERMINATE = 4  # motors stopped, wherever the vehicle is
 
 
 ACTION_MODES = {Action.HOLD: Mode.HOLD, Action.RETURN: Mode.RETURN, Action.LAND: Mode.LAND}
+OUTCOMES = {
+    Action.HOLD: ": hold", Action.RETURN: ": return", Action.LAND: ": land", Action.TERMINATE: ": motors stopped",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +60,21 @@ def _land(_: ParameterTable) -> Action:
     return Action.LAND
 
 
+def _terminate(_: ParameterTable) -> Action:
+    return Action.TERMINATE
+
+
 def _warn(_: ParameterTable) -> Action:
     return Action.WARN
 
 
 RULES: tuple[Rule, ...] = (
+    Rule(ATTITUDE_LOST, _terminate, Severity.EMERGENCY, "Attitude lost"),
+    Rule(CRASHED, _terminate, Severity.EMERGENCY, "Crash detected"),
     Rule(POSITION_LOST, _land, Severity.CRITICAL, "Position lost"),
     Rule(BATTERY_EMERGENCY, _battery_emergency, Severity.EMERGENCY, "Battery nearly empty"),
     Rule(BATTERY_CRITICAL, _battery_critical, Severity.CRITICAL, "Battery critical"),
     Rule(OFFBOARD_LOST, _offboard_lost, Severity.CRITICAL, "Offboard setpoints lost"),
     Rule(BATTERY_LOW, _warn, Severity.WARNING, "Battery low"),
+    Rule(BATTERY_SILENT, _warn, Severity.WARNING, "Battery sensor silent: charge is estimated"),
 )

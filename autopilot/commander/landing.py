@@ -21,6 +21,7 @@ _TOUCH_S = 0.1  # a gust near the ground stalls a descent for less than that, or
 _FALL_M_S = (
     1.0  # a vehicle that sinks faster than this after a contact is in the air again: a tenth of a second of fall
 )
+_FALLS_MAX = 3  # a range finder that told of ground so often where there is none lies; bounces are fewer; guess
 _AIR_BELOW_M = 1.0  # range finder reading that speaks against a landing; guess
 _AIR_BELOW_FACTOR = 5.0  # by which such a reading stretches the time needed
 
@@ -35,8 +36,9 @@ class LandingDetector:
     """
 
     __slots__ = (
-        "_contact_thrust", "_hover_thrust", "_landed_thrust", "_params", "_rate_max_sq", "_speed_xy_max_sq",
-        "_speed_z_max", "_stage_s", "_time_s", "_touch_height", "_touch_s", "has_contact", "is_landed",
+        "_contact_thrust", "_fall_count", "_hover_thrust", "_landed_thrust", "_params", "_rate_max_sq",
+        "_speed_xy_max_sq", "_speed_z_max", "_stage_s", "_time_s", "_touch_height", "_touch_s", "has_contact",
+        "is_landed",
     )  # fmt: skip
 
     def __init__(self, params: ParameterTable, hover_thrust: float, standing_height_m: float = nan) -> None:
@@ -44,6 +46,7 @@ class LandingDetector:
         self._hover_thrust = hover_thrust
         self._touch_height = standing_height_m + _TOUCH_HEIGHT_M
         self._touch_s = 0.0  # for which a descent has stalled just above the ground
+        self._fall_count = 0  # contacts after which the vehicle fell
         self._time_s = 0.0  # for which it has looked landed, stage after stage
         # Something else than the rotors has carried the vehicle. It stays so while the vehicle settles: control that
         # came back at each bounce would tip it over.
@@ -53,8 +56,9 @@ class LandingDetector:
         params.on_change(self._on_parameter)
 
     def reset(self) -> None:
-        """The vehicle is about to leave the ground."""
+        """The vehicle is on the ground and about to leave it."""
         self._time_s = self._touch_s = 0.0
+        self._fall_count = 0
         self.has_contact = self.is_landed = False
 
     def update(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:
@@ -63,14 +67,15 @@ class LandingDetector:
         Args:
             estimate: the Estimate record.
             thrust: [0..1] collective thrust setpoint.
-            descent_sp: [m/s] downward speed asked for.
+            descent_sp: [m/s] downward speed asked for, 0 if it shall not end on the ground.
             dt_s: [s] since the last frame.
         """
         self.is_landed = self._looks_landed(estimate, thrust, descent_sp, dt_s)
         if self._time_s >= self._stage_s:
             self.has_contact = True
-        elif estimate.vel_ned[2] > _FALL_M_S:
+        elif estimate.vel_ned[2] > _FALL_M_S and self.has_contact:
             self.has_contact = False
+            self._fall_count += 1
         return self.is_landed
 
     def _looks_landed(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:
@@ -94,7 +99,8 @@ class LandingDetector:
     def _touches(self, estimate: Any, descent_sp: float, dt_s: float) -> bool:
         """Whether a descent stalls where the range finder sees the ground: felt before the thrust has faded."""
         is_stalled = (
-            descent_sp > _TOUCH_DESCENT_M_S
+            self._fall_count < _FALLS_MAX
+            and descent_sp > _TOUCH_DESCENT_M_S
             and estimate.flags & TERRAIN_VALID
             and estimate.terrain_d - estimate.pos_ned[2] < self._touch_height
             and estimate.vel_ned[2] < _TOUCH_SINK_SHARE * descent_sp

@@ -8,7 +8,13 @@ from autopilot.control.attitude import attitude_from_thrust, rate_setpoint, thru
 from autopilot.control.params import ControlParams
 from autopilot.control.position import velocity_setpoint
 from autopilot.control.rate import RateState, filter_rates, rate_step, rate_torque
-from autopilot.control.trajectory import TrajectoryState, trajectory_at_estimate, trajectory_step
+from autopilot.control.trajectory import (
+    TrajectoryState,
+    flown_acceleration,
+    flown_velocity,
+    trajectory_at_estimate,
+    trajectory_step,
+)
 from autopilot.control.velocity import VelocityState, observe, velocity_step
 from autopilot.ports import (
     SETPOINT_ATTITUDE,
@@ -153,8 +159,8 @@ def actuators_of(
             short[k] = 0.0
     actuators.torque_unallocated_frd = short
     actuators.traj_pos_ned = trajectory.pos_ned
-    actuators.traj_vel_ned = trajectory.vel_ned
-    actuators.traj_accel_ned = trajectory.accel_ned
+    actuators.traj_vel_ned = flown_velocity(trajectory)
+    actuators.traj_accel_ned = flown_acceleration(trajectory)
     actuators.traj_yaw = trajectory.yaw
     actuators.traj_yaw_rate = trajectory.yaw_rate
     return actuators

@@ -4,7 +4,7 @@ import warp as wp
 
 from autopilot.control.params import ControlParams
 from autopilot.control.pid import clamp_horizontal
-from autopilot.control.trajectory import TrajectoryState, follows_position
+from autopilot.control.trajectory import TrajectoryState, flown_velocity, follows_position, within_speeds
 from autopilot.ports import Estimate
 
 wp.set_module_options({"enable_backward": False})
@@ -15,7 +15,10 @@ _CORRECTION_Z_M_S = wp.constant(2.0)  # guess
 
 @wp.func
 def velocity_setpoint(params: ControlParams, trajectory: TrajectoryState, est: Estimate) -> wp.vec3:
-    """Velocity [m/s], ned: the trajectory's plus the correction of its position error where position is controlled."""
+    """Velocity [m/s], ned: the trajectory's plus the correction of its position error where position is controlled.
+
+    A trajectory out of reach stands still, so that what remains points towards it.
+    """
     gain = wp.vec3(params.pos_p_xy, params.pos_p_xy, params.pos_p_z)
     correction = wp.vec3(0.0, 0.0, 0.0)
     for k in range(3):
@@ -23,4 +26,4 @@ def velocity_setpoint(params: ControlParams, trajectory: TrajectoryState, est: E
             correction[k] = gain[k] * (trajectory.pos_ned[k] - est.pos_ned[k])
     correction = clamp_horizontal(correction, _CORRECTION_XY_M_S)
     correction[2] = wp.clamp(correction[2], -_CORRECTION_Z_M_S, _CORRECTION_Z_M_S)
-    return trajectory.vel_ned + correction
+    return within_speeds(params, flown_velocity(trajectory) + correction)

@@ -4,12 +4,15 @@ NaN frees an element. Per axis: a finite position is a goal (with a finite veloc
 velocity is followed (zero: brake, then hold the place), else a finite acceleration; nothing finite means hold.
 A finite path start makes the way to the position a straight line. Motion is planned along and across the way,
 each within speed, acceleration and jerk limits; up and down have their own.
+
+Where the vehicle cannot follow, time on the trajectory slows down and stops; a vehicle carried further away than
+MPC_XY_ERR_MAX draws the trajectory along, and the way to the goal begins anew from there.
 """
 
 import warp as wp
 
 from autopilot.control.params import ControlParams
-from autopilot.control.pid import finite_or
+from autopilot.control.pid import clamp_horizontal, finite_or
 from autopilot.control.profile import (
     AxisLimits,
     Motion,
@@ -37,9 +40,10 @@ _PATH_MIN_M = wp.constant(0.1)
 @wp.struct
 class TrajectoryState:
     pos_ned: wp.vec3
-    vel_ned: wp.vec3
+    vel_ned: wp.vec3  # per time on the trajectory, as is the acceleration
     accel_ned: wp.vec3
-    jerk_ned: wp.vec3  # mean over the last step
+    time_share: wp.vec3  # share of time that passed on the trajectory in the last step, per ned axis
+    jerk_ned: wp.vec3  # per time of the vehicle, mean over the last step
     along_ned: wp.vec3  # horizontal direction of motion to the present goal
     goal_ned: wp.vec3  # the last goal asked for, each element a position, velocity or acceleration as `mode` says
     goal_now_ned: wp.vec3  # the same, a moving position carried on between setpoints
@@ -62,6 +66,7 @@ def trajectory_at_estimate(est: Estimate, is_moving: int) -> TrajectoryState:
     state.goal_now_ned = est.pos_ned
     if is_moving == 1:
         state.vel_ned = est.vel_ned
+    state.time_share = wp.vec3(1.0, 1.0, 1.0)
     state.along_ned = wp.vec3(1.0, 0.0, 0.0)
     state.yaw = yaw_from_quat(est.q_ned_from_frd)
     state.yaw_goal = state.yaw
@@ -70,12 +75,32 @@ def trajectory_at_estimate(est: Estimate, is_moving: int) -> TrajectoryState:
 
 
 @wp.func
-def shift_by_reset(state: TrajectoryState, est: Estimate) -> TrajectoryState:
+def flown_velocity(state: TrajectoryState) -> wp.vec3:
+    """Velocity [m/s], ned, of the trajectory per time of the vehicle."""
+    return wp.cw_mul(state.time_share, state.vel_ned)
+
+
+@wp.func
+def flown_acceleration(state: TrajectoryState) -> wp.vec3:
+    """Acceleration [m/s²], ned, of the trajectory per time of the vehicle, where the share of time does not change."""
+    return wp.cw_mul(state.time_share, wp.cw_mul(state.time_share, state.accel_ned))
+
+
+@wp.func
+def within_speeds(params: ControlParams, vel_ned: wp.vec3) -> wp.vec3:
+    """The velocity shortened to the vehicle's speed limits."""
+    limited = clamp_horizontal(vel_ned, params.speed_max_xy)
+    limited[2] = wp.clamp(limited[2], -params.speed_max_up, params.speed_max_down)
+    return limited
+
+
+@wp.func
+def shift_by_reset(params: ControlParams, state: TrajectoryState, est: Estimate) -> TrajectoryState:
     """The trajectory moved along with a jump of the estimate, so that the vehicle is not kicked."""
     moved = state
     if est.reset_count != state.reset_count:
         moved.pos_ned = state.pos_ned + est.pos_reset_ned
-        moved.vel_ned = state.vel_ned + est.vel_reset_ned
+        moved.vel_ned = within_speeds(params, state.vel_ned + est.vel_reset_ned)
         moved.yaw = wrap_pi(state.yaw + est.yaw_reset)
         moved.yaw_goal = wrap_pi(state.yaw_goal + est.yaw_reset)
         moved.reset_count = est.reset_count
@@ -260,13 +285,29 @@ def follows_position(state: TrajectoryState, axis: int) -> bool:
 
 
 @wp.func
-def time_share(state: TrajectoryState, est: Estimate, lag_max_m: float) -> float:
-    """Share of time that passes on the trajectory: it waits for a vehicle that cannot follow."""
+def waiting(state: TrajectoryState, est: Estimate, lag_max_m: float, is_one_way: bool) -> TrajectoryState:
+    """The state with its share of time, and drawn along by a vehicle further away than `lag_max_m`, at rest there.
+
+    Up and down wait for themselves, so that a vehicle blown aside at take-off still climbs; but a path is one way.
+    """
+    waits = state
     lag = wp.vec3(0.0, 0.0, 0.0)
     for k in range(3):
         if follows_position(state, k):
             lag[k] = state.pos_ned[k] - est.pos_ned[k]
-    return wp.clamp(2.0 - 2.0 * wp.length(lag) / lag_max_m, 0.0, 1.0)
+    level = wp.sqrt(lag[0] * lag[0] + lag[1] * lag[1])
+    away = wp.vec3(level, level, wp.abs(lag[2]))
+    if is_one_way:
+        away = wp.vec3(1.0, 1.0, 1.0) * wp.length(lag)
+    for k in range(3):
+        waits.time_share[k] = 1.0
+        if follows_position(state, k):
+            waits.time_share[k] = wp.clamp(2.0 - 2.0 * away[k] / lag_max_m, 0.0, 1.0)
+        if state.mode[k] == FOLLOW_POSITION and away[k] > lag_max_m:
+            waits.pos_ned[k] = est.pos_ned[k] + lag[k] * lag_max_m / away[k]
+            waits.vel_ned[k] = 0.0
+            waits.accel_ned[k] = 0.0
+    return waits
 
 
 @wp.func
@@ -304,10 +345,10 @@ def trajectory_step(
     params: ControlParams, state: TrajectoryState, est: Estimate, sp: Setpoint, frame_s: float
 ) -> TrajectoryState:
     """The trajectory `frame_s` later."""
-    now = shift_by_reset(state, est)
-    dt_s = frame_s * time_share(now, est, params.lag_max_m)
-    now = take_goal(now, sp, 0.9 * params.speed_max_xy, dt_s)
-    now = anchored(now, est)
+    now = shift_by_reset(params, state, est)
+    now = take_goal(now, sp, 0.9 * params.speed_max_xy, frame_s)
+    now = waiting(anchored(now, est), est, params.lag_max_m, is_path(sp))
+    dt_s = now.time_share * frame_s
     goal_vel = goal_velocity(sp, now.mode, now.goal_age_s, 0.9 * params.speed_max_xy)
     along = now.along_ned
     across = wp.vec3(-along[1], along[0], 0.0)
@@ -323,14 +364,13 @@ def trajectory_step(
         third = wp.cross(along, across)
         jerk = params.jerk_path
         exit_speed = wp.max(finite_or(sp.exit_speed, 0.0), 0.0)
-    first = move_along(params, sp, now, along, now.mode[0], goal_vel, exit_speed, jerk, dt_s)
-    second = move_along(params, sp, now, across, now.mode[1], goal_vel, 0.0, jerk, dt_s)
-    height = move_along(params, sp, now, third, now.mode[2], goal_vel, 0.0, jerk, dt_s)
+    first = move_along(params, sp, now, along, now.mode[0], goal_vel, exit_speed, jerk, dt_s[0])
+    second = move_along(params, sp, now, across, now.mode[1], goal_vel, 0.0, jerk, dt_s[1])
+    height = move_along(params, sp, now, third, now.mode[2], goal_vel, 0.0, jerk, dt_s[2])
     accel = along * first.accel + across * second.accel + third * height.accel
-    now.jerk_ned = wp.vec3(0.0, 0.0, 0.0)
-    if dt_s > 1.0e-4:
-        now.jerk_ned = (accel - now.accel_ned) / dt_s
+    before_ned = flown_acceleration(now)
     now.accel_ned = accel
+    now.jerk_ned = (flown_acceleration(now) - before_ned) / frame_s
     now.pos_ned = now.pos_ned + along * first.moved + across * second.moved + third * height.moved
     now.vel_ned = along * first.vel + across * second.vel + third * height.vel
     return yaw_step(params, now, sp, frame_s)

@@ -11,7 +11,7 @@ import warp as wp
 from autopilot.control.airframe import ControlAirframe
 from autopilot.control.params import ControlParams
 from autopilot.control.pid import clamp_horizontal, low_pass_share
-from autopilot.control.trajectory import FOLLOW_ACCEL, TrajectoryState
+from autopilot.control.trajectory import FOLLOW_ACCEL, TrajectoryState, flown_acceleration
 from autopilot.ports import Estimate
 from common.kernels import GRAVITY_M_S2
 
@@ -78,8 +78,8 @@ def limit_thrust(thrust_ned: wp.vec3, lean_max: float, least: float, most: float
     reserve = _HORIZONTAL_SHARE_MIN * most
     level = wp.sqrt(thrust_ned[0] * thrust_ned[0] + thrust_ned[1] * thrust_ned[1])
     if level_max < reserve and level > level_max:
-        up = wp.min(up, wp.sqrt(most * most - reserve * reserve))
-        level_max = wp.sqrt(most * most - up * up)
+        up = wp.min(up, wp.max(wp.sqrt(most * most - reserve * reserve), _GRAVITY))  # climbing gives way, not height
+        level_max = wp.sqrt(wp.max(most * most - up * up, 0.0))
     return clamp_horizontal(wp.vec3(thrust_ned[0], thrust_ned[1], -up), wp.min(level_max, lean_max * up))
 
 
@@ -103,7 +103,8 @@ def velocity_step(
     gain_p = wp.vec3(params.vel_p_xy, params.vel_p_xy, params.vel_p_z)
     gain_i = wp.vec3(params.vel_i_xy, params.vel_i_xy, params.vel_i_z)
     gain_d = wp.vec3(params.vel_d_xy, params.vel_d_xy, params.vel_d_z)
-    feed = trajectory.accel_ned + wp.cw_mul(gain_d, trajectory.accel_ned - state.accel_ned)
+    feed = flown_acceleration(trajectory)
+    feed = feed + wp.cw_mul(gain_d, feed - state.accel_ned)
     accel_sp = feed + wp.cw_mul(gain_p, error) + state.integral_ned - state.disturbance_ned
     wanted = accel_sp - wp.vec3(0.0, 0.0, _GRAVITY)
     most = params.thrust_max * thrust_max_n / airframe.mass_kg

@@ -18,6 +18,7 @@ wp.set_module_options({"enable_backward": False})
 _MAX_STEPS = wp.constant(3)  # horizon steps per tick: catches up after a gap
 _MIN_DT_S = wp.constant(1.0e-4)
 _MAX_DT_S = wp.constant(0.1)  # a longer gap in a log would be integrated with a rate that is no longer true
+_MAX_STEP_S = wp.constant(0.5)  # a longer silence says nothing about repeats
 _TAU_ATT_S = wp.constant(0.1)  # guess: short against the controller's attitude loop seen by it as a disturbance
 
 
@@ -29,26 +30,51 @@ def bounded_sample(imu: ImuSample) -> ImuSample:
 
 
 @wp.func
-def receive(inbox: Inbox, time_us: wp.int64, ring_size: int, is_repeat: bool, stuck_after: int) -> Inbox:
+def receive(
+    inbox: Inbox,
+    time_us: wp.int64,
+    ring_size: int,
+    is_repeat: bool,
+    is_still: bool,
+    rate: wp.vec3,
+    stuck_after: int,
+    stuck_moved: float,
+) -> Inbox:
     """The inbox after a new sample, which the caller puts into slot `head % ring_size` first.
+
+    Equal values in a row mean stuck in a sensor that showed its noise at rest. In one that did not (its resolution is
+    coarser than its noise, or it was not at rest since power-on) they mean stuck once the vehicle has moved on.
 
     Args:
         inbox: of the sensor.
         time_us: of the sample.
         ring_size: slots; the oldest waiting sample is dropped when all are taken.
-        is_repeat: the sample repeats the value of the one before, and a live sensor would not.
-        stuck_after: equal values in a row that mean stuck; a stuck sensor's waiting samples are dropped.
+        is_repeat: the sample repeats the value of the one before.
+        is_still: the vehicle stands still.
+        rate: per second, at which what the sensor sees now changes by the estimate.
+        stuck_after: equal values in a row that may mean stuck; a stuck sensor's waiting samples are dropped.
+        stuck_moved: integral of `rate` within which no sensor of use repeats its value.
     """
+    step_s = wp.clamp(float(time_us - inbox.arrived_time_us) * 1.0e-6, 0.0, _MAX_STEP_S)
     inbox.arrived_time_us = time_us
     inbox.head += 1
     if inbox.head - inbox.tail > ring_size:
         inbox.tail = inbox.head - ring_size
     if is_repeat:
         inbox.repeat_count += 1
+        inbox.change_count = 0
+        inbox.moved = inbox.moved + rate * step_s
     else:
         inbox.repeat_count = 0
+        inbox.change_count += 1
+        inbox.moved = wp.vec3()
         inbox.is_stuck = 0
-    if inbox.repeat_count + 1 >= stuck_after:
+    if not is_still:
+        inbox.change_count = 0
+    if inbox.change_count >= stuck_after:
+        inbox.resolves_noise = 1
+    has_moved = wp.length(inbox.moved) > stuck_moved
+    if inbox.repeat_count + 1 >= stuck_after and not is_still and (inbox.resolves_noise == 1 or has_moved):
         inbox.is_stuck = 1
     if inbox.is_stuck == 1:
         inbox.tail = inbox.head

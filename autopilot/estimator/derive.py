@@ -19,6 +19,7 @@ GENERATED_PATH = Path(__file__).with_name("generated.py")
 BLOCKS = {"att": 3, "vel": 3, "pos": 3, "gyro_bias": 3, "accel_bias": 3, "earth": 3, "body": 3, "wind": 2, "terrain": 1}
 COUNT = sum(BLOCKS.values())
 MOVING = 9  # attitude, velocity and position: the only errors that others flow into
+SLOW_COUNT = 4  # slow errors of sensors; their covariances with the error state stand in rows COUNT + j
 
 HEADER = '''"""Covariance prediction and observation products. Written by autopilot/estimator/derive.py: do not edit."""
 
@@ -142,7 +143,6 @@ def observations() -> dict[str, tuple[str, str, sp.Expr, str]]:
     # |u| u differentiated at u: 2 |u|; written with the nominal speed so that no derivative of |u| appears.
     speed_abs, speed = sp.symbols("speed_abs speed", real=True)
     drag = -(linear * airspeed + square * (2 * speed_abs * (airspeed - speed) + speed_abs * speed)) + picked
-    gravity = sp.Symbol("gravity", real=True)
     height = sp.Symbol("height") + errors["terrain"][0] - errors["pos"][2]
     down = _turned_axis(errors)[2]
     axis_args = "axis_ned: wp.vec3, i_axis: int"
@@ -157,12 +157,6 @@ def observations() -> dict[str, tuple[str, str, sp.Expr, str]]:
             f"{axis_args}, vel_air_ned: wp.vec3, linear: float, square: float, speed_abs: float",
             "drag along a body axis: -(linear u + square |u| u) + bias, u = axis . (velocity - wind)",
             drag,
-            "accel_bias",
-        ),
-        "gravity": (
-            f"{axis_args}, gravity: float",
-            "specific force at rest along a body axis: -axis . gravity + bias",
-            -axis[2] * gravity + picked,
             "accel_bias",
         ),
         "range": (
@@ -195,8 +189,8 @@ def observation_code(name: str) -> list[str]:
         "@wp.func",
         f"def {name}_products(",
         *[f"    {argument}," for argument in f"cov: wp.array2d(dtype=vec24), i: int, {arguments}".split(", ")],
-        ") -> tuple[vec24, float]:",
-        f'    """P H\' and H P H\' of the {meaning}."""',
+        ") -> tuple[vec24, wp.vec4, float]:",
+        f'    """P H\' (of the error state and of the slow errors) and H P H\' of the {meaning}."""',
     ]
     lines += [f"    {symbol} = {_code(value)}" for symbol, value in shared]
     lines += [f"    h{index} = {_code(value)}" for index, value in zip(entries, reduced, strict=True)]
@@ -209,7 +203,15 @@ def observation_code(name: str) -> list[str]:
     lines += [f"    ph = ph + {term}" for term in terms[1:]]
     lines.append(f"    hph = {sums[0]}")
     lines += [f"    hph = hph + {term}" for term in sums[1:]]
-    lines.append("    return ph, hph")
+    for slow in range(SLOW_COUNT):
+        lines.append(f"    c{slow} = cov[i, {COUNT + slow}]")
+        products = [f"h{index} * c{slow}[{index}]" for index in entries]
+        if base >= 0:
+            products.append(f"c{slow}[{base} + i_axis]")
+        lines.append(f"    s{slow} = {products[0]}")
+        lines += [f"    s{slow} = s{slow} + {product}" for product in products[1:]]
+    slows = ", ".join(f"s{slow}" for slow in range(SLOW_COUNT))
+    lines.append(f"    return ph, wp.vec4({slows}), hph")
     return lines
 
 
@@ -233,7 +235,7 @@ def prediction_code() -> list[str]:
         "    cov: wp.array2d(dtype=vec24), "
         "i: int, rot: wp.mat33, delta_vel_ned: wp.vec3, dt_s: float, added_var: vec24",
         ") -> None:",
-        '    """P = F P F\' + diag(added_var) over one step; rows 9 to 23 of F are those of the identity."""',
+        '    """P = F P F\' + diag(added_var) over one step; rows from 9 on of F are those of the identity."""',
     ]
     for value in cells.values():
         if value not in names:
@@ -257,6 +259,13 @@ def prediction_code() -> list[str]:
         lines += [f"    b{row}[{column}] = a{column}[{row}]" for column in range(MOVING)]
         lines.append(f"    b{row}[{row}] = b{row}[{row}] + added_var[{row}]")
         lines.append(f"    cov[i, {row}] = b{row}")
+    lines.append(f"    for j in range({SLOW_COUNT}):")
+    lines.append(f"        c = cov[i, {COUNT} + j]")
+    for row in range(MOVING):
+        terms = " + ".join(f"{name} * c[{column}]" for column, name in factors[row].items())
+        lines.append(f"        c{row} = c[{row}] + {terms}")
+    lines += [f"        c[{row}] = c{row}" for row in range(MOVING)]
+    lines.append(f"        cov[i, {COUNT} + j] = c")
     return lines
 
 

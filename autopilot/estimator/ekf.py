@@ -36,10 +36,11 @@ from autopilot.estimator.health import (
 )
 from autopilot.estimator.params import HEIGHT_REF_GNSS, MAG_TYPE_NONE, EstimatorParams, estimator_params
 from autopilot.estimator.predict import predict_nominal, process_variance
-from autopilot.estimator.sources.baro import BARO_STUCK_AFTER, baro_repeats, fuse_baro
+from autopilot.estimator.sources.baro import BARO_STUCK_AFTER, BARO_STUCK_MOVED, baro_repeats, fuse_baro, start_baro
 from autopilot.estimator.sources.drag import drag_is_due, fuse_drag, is_airborne
 from autopilot.estimator.sources.gnss import (
     GNSS_STUCK_AFTER,
+    GNSS_STUCK_MOVED,
     fuse_gnss_height,
     fuse_gnss_pos,
     fuse_gnss_vel,
@@ -47,11 +48,12 @@ from autopilot.estimator.sources.gnss import (
     gnss_repeats,
     propagate_wander,
 )
-from autopilot.estimator.sources.mag import MAG_STUCK_AFTER, fuse_mag, mag_repeats, start_mag
-from autopilot.estimator.sources.range import RANGE_STUCK_AFTER, fuse_range, range_repeats
+from autopilot.estimator.sources.mag import MAG_STUCK_AFTER, MAG_STUCK_MOVED, fuse_mag, mag_repeats, start_mag
+from autopilot.estimator.sources.range import RANGE_STUCK_AFTER, RANGE_STUCK_MOVED, fuse_range, range_repeats
 from autopilot.estimator.sources.rest import fuse_rest, observe_stillness, rest_is_due
 from autopilot.estimator.state import (
     BARO_RING,
+    COV_ROWS,
     GNSS_RING,
     IMU_RING,
     MAG_RING,
@@ -64,7 +66,7 @@ from autopilot.estimator.state import (
     OutputSample,
 )
 from autopilot.ports import BaroSample, GnssSample, ImuSample, MagSample, RangeSample, Samples
-from common.kernels import ERROR_STATES, GRAVITY_M_S2, vec24
+from common.kernels import GRAVITY_M_S2, vec24
 
 wp.set_module_options({"enable_backward": False})
 
@@ -76,28 +78,51 @@ WATCH_SAMPLES = wp.constant(4)  # flags and deviations are renewed at 62 Hz
 @wp.func
 def receive_samples(ekf: Ekf, i: int, samples: Samples) -> None:
     """New samples of the slow sensors are put into their rings."""
-    # equal values prove a frozen sensor only if live ones would differ: not without noise, not on a parked vehicle
-    is_live = ekf.rows[i].stillness.is_noise_free == 0 and ekf.rows[i].stillness.is_still == 0
+    is_still = ekf.rows[i].stillness.is_still == 1
+    vel_ned = ekf.rows[i].nominal.vel_ned
+    climb = wp.vec3(0.0, 0.0, vel_ned[2])
+    omega_frd = samples.imu.gyro_frd - ekf.rows[i].nominal.gyro_bias_frd
     if samples.gnss.time_us != ekf.rows[i].gnss_inbox.arrived_time_us:
         head = ekf.rows[i].gnss_inbox.head
         is_same_fix = head > 0 and gnss_repeats(samples.gnss, ekf.gnss_ring[i, (head - 1) % GNSS_RING])
         ekf.gnss_ring[i, head % GNSS_RING] = samples.gnss
         ekf.rows[i].gnss_inbox = receive(
-            ekf.rows[i].gnss_inbox, samples.gnss.time_us, GNSS_RING, is_same_fix and is_live, GNSS_STUCK_AFTER
+            ekf.rows[i].gnss_inbox,
+            samples.gnss.time_us,
+            GNSS_RING,
+            is_same_fix,
+            is_still,
+            vel_ned,
+            GNSS_STUCK_AFTER,
+            GNSS_STUCK_MOVED,
         )
     if samples.baro.time_us != ekf.rows[i].baro_inbox.arrived_time_us:
         head = ekf.rows[i].baro_inbox.head
         is_same_pressure = head > 0 and baro_repeats(samples.baro, ekf.baro_ring[i, (head - 1) % BARO_RING])
         ekf.baro_ring[i, head % BARO_RING] = samples.baro
         ekf.rows[i].baro_inbox = receive(
-            ekf.rows[i].baro_inbox, samples.baro.time_us, BARO_RING, is_same_pressure and is_live, BARO_STUCK_AFTER
+            ekf.rows[i].baro_inbox,
+            samples.baro.time_us,
+            BARO_RING,
+            is_same_pressure,
+            is_still,
+            climb,
+            BARO_STUCK_AFTER,
+            BARO_STUCK_MOVED,
         )
     if samples.mag.time_us != ekf.rows[i].mag_inbox.arrived_time_us:
         head = ekf.rows[i].mag_inbox.head
         is_same_field = head > 0 and mag_repeats(samples.mag, ekf.mag_ring[i, (head - 1) % MAG_RING])
         ekf.mag_ring[i, head % MAG_RING] = samples.mag
         ekf.rows[i].mag_inbox = receive(
-            ekf.rows[i].mag_inbox, samples.mag.time_us, MAG_RING, is_same_field and is_live, MAG_STUCK_AFTER
+            ekf.rows[i].mag_inbox,
+            samples.mag.time_us,
+            MAG_RING,
+            is_same_field,
+            is_still,
+            omega_frd,
+            MAG_STUCK_AFTER,
+            MAG_STUCK_MOVED,
         )
     if samples.range.time_us != ekf.rows[i].range_inbox.arrived_time_us:
         head = ekf.rows[i].range_inbox.head
@@ -107,8 +132,11 @@ def receive_samples(ekf: Ekf, i: int, samples: Samples) -> None:
             ekf.rows[i].range_inbox,
             samples.range.time_us,
             RANGE_RING,
-            is_same_range and is_live,
+            is_same_range,
+            is_still,
+            climb,
             RANGE_STUCK_AFTER,
+            RANGE_STUCK_MOVED,
         )
 
 
@@ -123,19 +151,18 @@ def take_gnss(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
     if age_s > MAX_AGE_S or not gnss_is_good(params, sample):
         return
     cov = ekf.covariance
-    nominal = ekf.rows[i].nominal
-    wander = propagate_wander(params, ekf.rows[i].gnss_wander, sample)
+    nominal = propagate_wander(params, cov, i, ekf.rows[i].nominal, sample, ekf.rows[i].wander_time_us)
+    ekf.rows[i].wander_time_us = sample.time_us
     if ekf.rows[i].is_yaw_aligned == 1:
         nominal, vel_aid = fuse_gnss_vel(params, cov, i, nominal, ekf.rows[i].gnss_vel, sample)
-        nominal, pos_aid, wander = fuse_gnss_pos(params, cov, i, nominal, ekf.rows[i].gnss_pos, wander, sample, age_s)
+        nominal, pos_aid = fuse_gnss_pos(params, cov, i, nominal, ekf.rows[i].gnss_pos, sample, age_s)
         ekf.rows[i].gnss_vel = vel_aid
         ekf.rows[i].gnss_pos = pos_aid
     is_reference = ekf.rows[i].baro.is_active == 0
-    nominal, height_aid, wander = fuse_gnss_height(
-        params, cov, i, nominal, ekf.rows[i].gnss_height, wander, sample, age_s, is_reference
+    nominal, height_aid = fuse_gnss_height(
+        params, cov, i, nominal, ekf.rows[i].gnss_height, sample, age_s, is_reference
     )
     ekf.rows[i].gnss_height = height_aid
-    ekf.rows[i].gnss_wander = wander
     ekf.rows[i].nominal = nominal
 
 
@@ -300,7 +327,7 @@ def watch(ekf: Ekf, i: int, params: EstimatorParams) -> None:
             ekf.rows[i].fault_count += 1
             ekf.rows[i].phase = PHASE_ALIGNING
             ekf.rows[i].alignment = Alignment()
-    ekf.rows[i].estimate = with_deviations(ekf.covariance, i, ekf.rows[i].gnss_wander, ekf.rows[i].estimate)
+    ekf.rows[i].estimate = with_deviations(ekf.covariance, i, ekf.rows[i].estimate)
     ekf.rows[i].estimate.flags = flags(params, ekf.covariance, i, ekf.rows[i])
 
 
@@ -315,12 +342,15 @@ def align(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample, samples: Sa
     ekf.rows[i].phase = PHASE_RUNNING
     ekf.rows[i].is_yaw_aligned = nominal.reset_count  # 1 if the magnetometer set heading
     nominal.reset_count = ekf.rows[i].nominal.reset_count
-    ekf.rows[i].nominal = nominal
+    ekf.rows[i].wander_time_us = wp.int64(0)
     if alignment.baro_count > 0:
-        height = alignment.baro_height / float(alignment.baro_count)
-        ekf.rows[i].origin_baro_height = height + nominal.pos_ned[2]
+        count = float(alignment.baro_count)
+        height_var = params.baro_noise * params.baro_noise / count
+        nominal, origin_height = start_baro(ekf.covariance, i, nominal, alignment.baro_height / count, height_var)
+        ekf.rows[i].origin_baro_height = origin_height
         ekf.rows[i].baro.is_active = 1
         ekf.rows[i].baro.judged_time_us = imu.time_us
+    ekf.rows[i].nominal = nominal
     output = start_output(nominal)
     ekf.rows[i].output = output
     for k in range(IMU_RING):
@@ -362,14 +392,6 @@ def estimator_step(ekf: Ekf, i: int, samples: Samples) -> None:
 
 
 @wp.func
-def estimator_tick(ekf: Ekf, i: int, state: EstimatorState, samples: Samples) -> EstimatorState:
-    """As `estimator_step`, for a caller that keeps the row in a variable; costs three copies of it."""
-    ekf.rows[i] = state
-    estimator_step(ekf, i, samples)
-    return ekf.rows[i]
-
-
-@wp.func
 def at_boot(ekf: Ekf, i: int) -> EstimatorState:
     """The state at power-on of vehicle i; its covariance is set by the alignment that follows."""
     state = EstimatorState()
@@ -378,7 +400,7 @@ def at_boot(ekf: Ekf, i: int) -> EstimatorState:
     state.output.q_correction = wp.quat_identity()
     state.estimate.q_ned_from_frd = wp.quat_identity()
     zero = vec24()
-    for r in range(ERROR_STATES):
+    for r in range(COV_ROWS):
         ekf.covariance[i, r] = zero
     return state
 
@@ -406,7 +428,7 @@ def make_ekf(vehicle_count: int, device: str = "cpu", params: Any = None) -> Ekf
     ekf = Ekf()
     ekf.rows = wp.zeros(vehicle_count, dtype=EstimatorState, device=device)
     ekf.params = wp.array([row] * vehicle_count, dtype=EstimatorParams, device=device)
-    ekf.covariance = wp.zeros((vehicle_count, ERROR_STATES), dtype=vec24, device=device)
+    ekf.covariance = wp.zeros((vehicle_count, COV_ROWS), dtype=vec24, device=device)
     ekf.imu_ring = wp.zeros((vehicle_count, IMU_RING), dtype=ImuSample, device=device)
     ekf.output_ring = wp.zeros((vehicle_count, IMU_RING), dtype=OutputSample, device=device)
     ekf.gnss_ring = wp.zeros((vehicle_count, GNSS_RING), dtype=GnssSample, device=device)

@@ -1,7 +1,8 @@
 """Scalar measurement updates: the only code that lowers the covariance or corrects the nominal state.
 
-In: P H' and H P H' + R of one scalar, and its innovation. Each update subtracts an exactly symmetric product, which
-keeps a float32 covariance symmetric and positive where P - K H P does not.
+In: P H' (`ph`, and `ph_slow` for the slow errors of sensors) and H P H' + R of one scalar, and its innovation. Each
+update subtracts an exactly symmetric product, which keeps a float32 covariance symmetric and positive where P - K H P
+does not.
 """
 
 import warp as wp
@@ -14,6 +15,9 @@ from autopilot.estimator.state import (
     EARTH,
     GYRO_BIAS,
     POS,
+    SLOW,
+    SLOW_COUNT,
+    SLOW_COV,
     TERRAIN,
     VEL,
     WIND,
@@ -47,7 +51,7 @@ def clamp3(value: wp.vec3, limit: float) -> wp.vec3:
 
 
 @wp.func
-def inject(params: EstimatorParams, nominal: Nominal, error: vec24) -> Nominal:
+def inject(params: EstimatorParams, nominal: Nominal, error: vec24, error_slow: wp.vec4) -> Nominal:
     """The nominal state corrected by an error estimate.
 
     The covariance is not turned into the new tangent space: the change is of second order in the correction.
@@ -61,7 +65,29 @@ def inject(params: EstimatorParams, nominal: Nominal, error: vec24) -> Nominal:
     nominal.body_field_frd = nominal.body_field_frd + part3(error, BODY)
     nominal.wind_ned = nominal.wind_ned + wp.vec3(error[WIND], error[WIND + 1], 0.0)
     nominal.terrain_d = nominal.terrain_d + error[TERRAIN]
+    nominal.slow = nominal.slow + error_slow
     return nominal
+
+
+@wp.func
+def state_slow(cov: wp.array2d(dtype=vec24), i: int, k: int) -> wp.vec4:
+    """Covariances of the slow errors with error k."""
+    return wp.vec4(cov[i, SLOW][k], cov[i, SLOW + 1][k], cov[i, SLOW + 2][k], cov[i, SLOW + 3][k])
+
+
+@wp.func
+def offset_products(cov: wp.array2d(dtype=vec24), i: int, k: int, j: int) -> tuple[vec24, wp.vec4, float]:
+    """P H' (of the error state and of the slow errors) and H P H' of error k plus slow error j.
+
+    Both may be large and cancel, so rounding could take H P H' below zero.
+    """
+    ph = cov[i, k] + cov[i, SLOW + j]
+    slow_row = cov[i, SLOW_COV]
+    first = SLOW_COUNT * j
+    ph_slow = state_slow(cov, i, k) + wp.vec4(
+        slow_row[first], slow_row[first + 1], slow_row[first + 2], slow_row[first + 3]
+    )
+    return ph, ph_slow, wp.max(ph[k] + ph_slow[j], 0.0)
 
 
 @wp.func
@@ -71,15 +97,23 @@ def fuse(
     i: int,
     nominal: Nominal,
     ph: vec24,
+    ph_slow: wp.vec4,
     innov: float,
     innov_var: float,
 ) -> Nominal:
     """Kalman update with one scalar: P -= w w', w = P H' / sqrt(S)."""
     inv_root = 1.0 / wp.sqrt(innov_var)
     w = ph * inv_root
+    w_slow = ph_slow * inv_root
     for r in range(ERROR_STATES):
         cov[i, r] = cov[i, r] - w[r] * w
-    return inject(params, nominal, w * (innov * inv_root))
+    slow_row = cov[i, SLOW_COV]
+    for j in range(SLOW_COUNT):
+        cov[i, SLOW + j] = cov[i, SLOW + j] - w_slow[j] * w
+        for k in range(SLOW_COUNT):
+            slow_row[SLOW_COUNT * j + k] = slow_row[SLOW_COUNT * j + k] - w_slow[j] * w_slow[k]
+    cov[i, SLOW_COV] = slow_row
+    return inject(params, nominal, w * (innov * inv_root), w_slow * (innov * inv_root))
 
 
 @wp.func
@@ -94,7 +128,7 @@ def fuse_state(
 ) -> Nominal:
     """Kalman update with a direct measurement of error k."""
     ph = cov[i, k]
-    return fuse(params, cov, i, nominal, ph, innov, ph[k] + obs_var)
+    return fuse(params, cov, i, nominal, ph, state_slow(cov, i, k), innov, ph[k] + obs_var)
 
 
 @wp.func
@@ -104,34 +138,111 @@ def fuse_part(
     i: int,
     nominal: Nominal,
     ph: vec24,
+    ph_slow: wp.vec4,
     innov: float,
     innov_var: float,
     first: int,
     count: int,
 ) -> Nominal:
-    """Update of `count` states from `first` on; the others are considered, not corrected (Schmidt 1966).
-
-    With K zero elsewhere, P - K H P - P H' K' + K S K' stays positive, whatever K is.
-    """
+    """Update of `count` states from `first` on; the others are considered, not corrected (Schmidt 1966)."""
     gain = vec24()
     for r in range(first, first + count):
         gain[r] = ph[r] / innov_var
+    return fuse_gain(params, cov, i, nominal, ph, ph_slow, gain, innov, innov_var)
+
+
+@wp.func
+def fuse_gain(
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    ph: vec24,
+    ph_slow: wp.vec4,
+    gain: vec24,
+    innov: float,
+    innov_var: float,
+) -> Nominal:
+    """Update with any gain on the error state and none on the slow errors.
+
+    P - K H P - P H' K' + K S K' stays positive, whatever K is.
+    """
     scaled = gain * wp.sqrt(innov_var)
     for r in range(ERROR_STATES):
         cov[i, r] = cov[i, r] - (ph[r] * gain + gain[r] * ph) + scaled[r] * scaled
-    return inject(params, nominal, gain * innov)
+    for j in range(SLOW_COUNT):
+        cov[i, SLOW + j] = cov[i, SLOW + j] - ph_slow[j] * gain
+    return inject(params, nominal, gain * innov, wp.vec4())
 
 
 @wp.func
 def set_variance(cov: wp.array2d(dtype=vec24), i: int, k: int, variance: float) -> None:
     """Forgets what is known of error k: its correlations vanish and its variance is set."""
-    for r in range(ERROR_STATES):
+    for r in range(SLOW_COV):
         row = cov[i, r]
         row[k] = 0.0
         cov[i, r] = row
     row_k = vec24()
     row_k[k] = variance
     cov[i, k] = row_k
+
+
+@wp.func
+def set_sum_variance(cov: wp.array2d(dtype=vec24), i: int, k: int, other: int, obs_var: float) -> None:
+    """Error k after its state was set to state `other` plus a measurement: it is wrong by what that one is wrong."""
+    row_k = cov[i, other]
+    row_k[k] = row_k[other] + obs_var
+    for r in range(SLOW_COV):
+        row = cov[i, r]
+        row[k] = row[other]
+        cov[i, r] = row
+    cov[i, k] = row_k
+
+
+@wp.func
+def set_slow_variance(cov: wp.array2d(dtype=vec24), i: int, j: int, variance: float) -> None:
+    """Forgets what is known of slow error j."""
+    cov[i, SLOW + j] = vec24()
+    slow_row = cov[i, SLOW_COV]
+    for k in range(SLOW_COUNT):
+        slow_row[SLOW_COUNT * j + k] = 0.0
+        slow_row[SLOW_COUNT * k + j] = 0.0
+    slow_row[(SLOW_COUNT + 1) * j] = variance
+    cov[i, SLOW_COV] = slow_row
+
+
+@wp.func
+def set_state_by_offset(cov: wp.array2d(dtype=vec24), i: int, k: int, j: int, obs_var: float) -> None:
+    """Error k after its state was set to a measurement minus slow error j: wrong by what that one is wrong."""
+    slow_row = cov[i, SLOW_COV]
+    set_variance(cov, i, k, slow_row[(SLOW_COUNT + 1) * j] + obs_var)
+    row_k = cov[i, k]
+    for r in range(ERROR_STATES):
+        if r != k:
+            row_k[r] = -cov[i, SLOW + j][r]
+            row = cov[i, r]
+            row[k] = row_k[r]
+            cov[i, r] = row
+    cov[i, k] = row_k
+    for m in range(SLOW_COUNT):
+        row = cov[i, SLOW + m]
+        row[k] = -slow_row[SLOW_COUNT * j + m]
+        cov[i, SLOW + m] = row
+
+
+@wp.func
+def set_offset_by_state(cov: wp.array2d(dtype=vec24), i: int, k: int, j: int, obs_var: float) -> None:
+    """Slow error j after it was set to a measurement minus state k: wrong by what that one is wrong."""
+    row_k = cov[i, k]
+    with_slow = state_slow(cov, i, k)
+    set_slow_variance(cov, i, j, row_k[k] + obs_var)
+    cov[i, SLOW + j] = -row_k
+    slow_row = cov[i, SLOW_COV]
+    for m in range(SLOW_COUNT):
+        if m != j:
+            slow_row[SLOW_COUNT * j + m] = -with_slow[m]
+            slow_row[SLOW_COUNT * m + j] = -with_slow[m]
+    cov[i, SLOW_COV] = slow_row
 
 
 @wp.func

@@ -11,7 +11,7 @@ wp.set_module_options({"enable_backward": False})
 def predict_covariance(
     cov: wp.array2d(dtype=vec24), i: int, rot: wp.mat33, delta_vel_ned: wp.vec3, dt_s: float, added_var: vec24
 ) -> None:
-    """P = F P F' + diag(added_var) over one step; rows 9 to 23 of F are those of the identity."""
+    """P = F P F' + diag(added_var) over one step; rows from 9 on of F are those of the identity."""
     f1 = -dt_s * rot[0, 0]
     f2 = -dt_s * rot[0, 1]
     f3 = -dt_s * rot[0, 2]
@@ -366,6 +366,27 @@ def predict_covariance(
     b23[8] = a8[23]
     b23[23] = b23[23] + added_var[23]
     cov[i, 23] = b23
+    for j in range(4):
+        c = cov[i, 24 + j]
+        c0 = c[0] + f1 * c[9] + f2 * c[10] + f3 * c[11]
+        c1 = c[1] + f4 * c[9] + f5 * c[10] + f6 * c[11]
+        c2 = c[2] + f7 * c[9] + f8 * c[10] + f9 * c[11]
+        c3 = c[3] + f10 * c[1] + f11 * c[2] + f1 * c[12] + f2 * c[13] + f3 * c[14]
+        c4 = c[4] + f12 * c[0] + f13 * c[2] + f4 * c[12] + f5 * c[13] + f6 * c[14]
+        c5 = c[5] + f14 * c[0] + f15 * c[1] + f7 * c[12] + f8 * c[13] + f9 * c[14]
+        c6 = c[6] + dt_s * c[3]
+        c7 = c[7] + dt_s * c[4]
+        c8 = c[8] + dt_s * c[5]
+        c[0] = c0
+        c[1] = c1
+        c[2] = c2
+        c[3] = c3
+        c[4] = c4
+        c[5] = c5
+        c[6] = c6
+        c[7] = c7
+        c[8] = c8
+        cov[i, 24 + j] = c
 
 
 @wp.func
@@ -375,8 +396,8 @@ def mag_products(
     axis_ned: wp.vec3,
     i_axis: int,
     earth_field_ned: wp.vec3,
-) -> tuple[vec24, float]:
-    """P H' and H P H' of the magnetic field along a body axis: axis . earth + body field."""
+) -> tuple[vec24, wp.vec4, float]:
+    """P H' (of the error state and of the slow errors) and H P H' of the magnetic field along a body axis: axis . earth + body field."""
     h0 = axis_ned[1] * earth_field_ned[2] - axis_ned[2] * earth_field_ned[1]
     h1 = -axis_ned[0] * earth_field_ned[2] + axis_ned[2] * earth_field_ned[0]
     h2 = axis_ned[0] * earth_field_ned[1] - axis_ned[1] * earth_field_ned[0]
@@ -397,7 +418,39 @@ def mag_products(
     hph = hph + h16 * ph[16]
     hph = hph + h17 * ph[17]
     hph = hph + ph[18 + i_axis]
-    return ph, hph
+    c0 = cov[i, 24]
+    s0 = h0 * c0[0]
+    s0 = s0 + h1 * c0[1]
+    s0 = s0 + h2 * c0[2]
+    s0 = s0 + h15 * c0[15]
+    s0 = s0 + h16 * c0[16]
+    s0 = s0 + h17 * c0[17]
+    s0 = s0 + c0[18 + i_axis]
+    c1 = cov[i, 25]
+    s1 = h0 * c1[0]
+    s1 = s1 + h1 * c1[1]
+    s1 = s1 + h2 * c1[2]
+    s1 = s1 + h15 * c1[15]
+    s1 = s1 + h16 * c1[16]
+    s1 = s1 + h17 * c1[17]
+    s1 = s1 + c1[18 + i_axis]
+    c2 = cov[i, 26]
+    s2 = h0 * c2[0]
+    s2 = s2 + h1 * c2[1]
+    s2 = s2 + h2 * c2[2]
+    s2 = s2 + h15 * c2[15]
+    s2 = s2 + h16 * c2[16]
+    s2 = s2 + h17 * c2[17]
+    s2 = s2 + c2[18 + i_axis]
+    c3 = cov[i, 27]
+    s3 = h0 * c3[0]
+    s3 = s3 + h1 * c3[1]
+    s3 = s3 + h2 * c3[2]
+    s3 = s3 + h15 * c3[15]
+    s3 = s3 + h16 * c3[16]
+    s3 = s3 + h17 * c3[17]
+    s3 = s3 + c3[18 + i_axis]
+    return ph, wp.vec4(s0, s1, s2, s3), hph
 
 
 @wp.func
@@ -410,8 +463,8 @@ def drag_products(
     linear: float,
     square: float,
     speed_abs: float,
-) -> tuple[vec24, float]:
-    """P H' and H P H' of the drag along a body axis: -(linear u + square |u| u) + bias, u = axis . (velocity - wind)."""
+) -> tuple[vec24, wp.vec4, float]:
+    """P H' (of the error state and of the slow errors) and H P H' of the drag along a body axis: -(linear u + square |u| u) + bias, u = axis . (velocity - wind)."""
     t0 = linear + 2.0 * speed_abs * square
     t1 = -t0
     h0 = t1 * (axis_ned[1] * vel_air_ned[2] - axis_ned[2] * vel_air_ned[1])
@@ -440,27 +493,47 @@ def drag_products(
     hph = hph + h21 * ph[21]
     hph = hph + h22 * ph[22]
     hph = hph + ph[12 + i_axis]
-    return ph, hph
-
-
-@wp.func
-def gravity_products(
-    cov: wp.array2d(dtype=vec24),
-    i: int,
-    axis_ned: wp.vec3,
-    i_axis: int,
-    gravity: float,
-) -> tuple[vec24, float]:
-    """P H' and H P H' of the specific force at rest along a body axis: -axis . gravity + bias."""
-    h0 = -axis_ned[1] * gravity
-    h1 = axis_ned[0] * gravity
-    ph = h0 * cov[i, 0]
-    ph = ph + h1 * cov[i, 1]
-    ph = ph + cov[i, 12 + i_axis]
-    hph = h0 * ph[0]
-    hph = hph + h1 * ph[1]
-    hph = hph + ph[12 + i_axis]
-    return ph, hph
+    c0 = cov[i, 24]
+    s0 = h0 * c0[0]
+    s0 = s0 + h1 * c0[1]
+    s0 = s0 + h2 * c0[2]
+    s0 = s0 + h3 * c0[3]
+    s0 = s0 + h4 * c0[4]
+    s0 = s0 + h5 * c0[5]
+    s0 = s0 + h21 * c0[21]
+    s0 = s0 + h22 * c0[22]
+    s0 = s0 + c0[12 + i_axis]
+    c1 = cov[i, 25]
+    s1 = h0 * c1[0]
+    s1 = s1 + h1 * c1[1]
+    s1 = s1 + h2 * c1[2]
+    s1 = s1 + h3 * c1[3]
+    s1 = s1 + h4 * c1[4]
+    s1 = s1 + h5 * c1[5]
+    s1 = s1 + h21 * c1[21]
+    s1 = s1 + h22 * c1[22]
+    s1 = s1 + c1[12 + i_axis]
+    c2 = cov[i, 26]
+    s2 = h0 * c2[0]
+    s2 = s2 + h1 * c2[1]
+    s2 = s2 + h2 * c2[2]
+    s2 = s2 + h3 * c2[3]
+    s2 = s2 + h4 * c2[4]
+    s2 = s2 + h5 * c2[5]
+    s2 = s2 + h21 * c2[21]
+    s2 = s2 + h22 * c2[22]
+    s2 = s2 + c2[12 + i_axis]
+    c3 = cov[i, 27]
+    s3 = h0 * c3[0]
+    s3 = s3 + h1 * c3[1]
+    s3 = s3 + h2 * c3[2]
+    s3 = s3 + h3 * c3[3]
+    s3 = s3 + h4 * c3[4]
+    s3 = s3 + h5 * c3[5]
+    s3 = s3 + h21 * c3[21]
+    s3 = s3 + h22 * c3[22]
+    s3 = s3 + c3[12 + i_axis]
+    return ph, wp.vec4(s0, s1, s2, s3), hph
 
 
 @wp.func
@@ -469,8 +542,8 @@ def range_products(
     i: int,
     axis_ned: wp.vec3,
     height: float,
-) -> tuple[vec24, float]:
-    """P H' and H P H' of the distance along body down: (terrain - position) / axis_d."""
+) -> tuple[vec24, wp.vec4, float]:
+    """P H' (of the error state and of the slow errors) and H P H' of the distance along body down: (terrain - position) / axis_d."""
     t0 = height / (axis_ned[2] * axis_ned[2])
     t1 = 1.0 / axis_ned[2]
     h0 = -axis_ned[1] * t0
@@ -485,4 +558,24 @@ def range_products(
     hph = hph + h1 * ph[1]
     hph = hph + h8 * ph[8]
     hph = hph + h23 * ph[23]
-    return ph, hph
+    c0 = cov[i, 24]
+    s0 = h0 * c0[0]
+    s0 = s0 + h1 * c0[1]
+    s0 = s0 + h8 * c0[8]
+    s0 = s0 + h23 * c0[23]
+    c1 = cov[i, 25]
+    s1 = h0 * c1[0]
+    s1 = s1 + h1 * c1[1]
+    s1 = s1 + h8 * c1[8]
+    s1 = s1 + h23 * c1[23]
+    c2 = cov[i, 26]
+    s2 = h0 * c2[0]
+    s2 = s2 + h1 * c2[1]
+    s2 = s2 + h8 * c2[8]
+    s2 = s2 + h23 * c2[23]
+    c3 = cov[i, 27]
+    s3 = h0 * c3[0]
+    s3 = s3 + h1 * c3[1]
+    s3 = s3 + h8 * c3[8]
+    s3 = s3 + h23 * c3[23]
+    return ph, wp.vec4(s0, s1, s2, s3), hph

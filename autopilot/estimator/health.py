@@ -12,11 +12,12 @@ from autopilot.estimator.state import (
     ATT,
     PHASE_RUNNING,
     POS,
+    SLOW_COUNT,
+    SLOW_COV,
     VEL,
     WIND,
     Aid,
     EstimatorState,
-    GnssWander,
     Inbox,
     Nominal,
 )
@@ -75,20 +76,23 @@ def is_sound(cov: wp.array2d(dtype=vec24), i: int, nominal: Nominal) -> bool:
         # written so that a NaN fails
         if not (row[r] > 0.0 and row[r] < _MAX_VAR):
             is_good = False
+    slow_row = cov[i, SLOW_COV]
+    for j in range(SLOW_COUNT):
+        variance = slow_row[(SLOW_COUNT + 1) * j]
+        slow_row[(SLOW_COUNT + 1) * j] = wp.max(variance, _MIN_VAR)
+        if not (variance > -_MIN_VAR and variance < _MAX_VAR):
+            is_good = False
+    cov[i, SLOW_COV] = slow_row
     return is_good
 
 
 @wp.func
-def with_deviations(cov: wp.array2d(dtype=vec24), i: int, wander: GnssWander, estimate: Estimate) -> Estimate:
-    """The estimate with its standard deviations; horizontal ones are those of the worse axis.
-
-    What the filter takes the GNSS wander to be is uncertain by as much as position is.
-    """
+def with_deviations(cov: wp.array2d(dtype=vec24), i: int, estimate: Estimate) -> Estimate:
+    """The estimate with its standard deviations; horizontal ones are those of the worse axis."""
     estimate.tilt_std = wp.sqrt(cov[i, ATT][ATT] + cov[i, ATT + 1][ATT + 1])
     estimate.yaw_std = wp.sqrt(cov[i, ATT + 2][ATT + 2])
     estimate.vel_std = wp.sqrt(wp.max(cov[i, VEL][VEL], cov[i, VEL + 1][VEL + 1]))
-    pos_var = wp.max(cov[i, POS][POS] + wander.var_ned[0], cov[i, POS + 1][POS + 1] + wander.var_ned[1])
-    estimate.pos_h_std = wp.sqrt(pos_var)
+    estimate.pos_h_std = wp.sqrt(wp.max(cov[i, POS][POS], cov[i, POS + 1][POS + 1]))
     estimate.pos_v_std = wp.sqrt(cov[i, POS + 2][POS + 2])
     return estimate
 

@@ -6,7 +6,6 @@ a shaking airframe, and a receiver, barometer, magnetometer and range finder as 
 
 from typing import Any
 
-import numpy as np
 import warp as wp
 
 from common.params import Parameter, ParameterTable
@@ -20,7 +19,6 @@ GPS_CTRL_VEL = wp.constant(4)
 
 MAG_TYPE_NONE = wp.constant(5)
 
-HEIGHT_REF_BARO = wp.constant(0)
 HEIGHT_REF_GNSS = wp.constant(1)
 
 
@@ -306,9 +304,3 @@ def estimator_params(
         setattr(params, name, value)
     params.earth_field_ned_gauss = wp.vec3(*earth_field_ned_gauss)
     return params
-
-
-def fill_params(rows: "np.ndarray[Any, Any]", table: ParameterTable) -> None:
-    """Writes the table into a live view of parameter rows (`ekf.params.numpy()`, or a slice of it); keeps the field."""
-    for name, value in estimator_fields(table).items():
-        rows[name] = value

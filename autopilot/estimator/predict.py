@@ -7,7 +7,7 @@ covariance step. Earth rotation is left out: 7e-5 rad/s, a hundredth of what the
 import warp as wp
 
 from autopilot.estimator.params import EstimatorParams
-from autopilot.estimator.state import ACCEL_BIAS, ATT, BODY, EARTH, GYRO_BIAS, POS, TERRAIN, VEL, WIND, Nominal
+from autopilot.estimator.state import ACCEL_BIAS, ATT, BODY, EARTH, GYRO_BIAS, TERRAIN, VEL, WIND, Nominal
 from autopilot.ports import ImuSample
 from common.kernels import GRAVITY_M_S2, TICK_S, vec24
 from common.rotation import quat_from_rotvec
@@ -57,7 +57,6 @@ def process_variance(
         added[ACCEL_BIAS + axis] = accel_bias_var
         added[EARTH + axis] = earth_var
         added[BODY + axis] = body_var
-    added[POS + 2] = params.baro_walk * params.baro_walk * dt_s
     if cov[i, WIND][WIND] < _MAX_WIND_VAR:
         added[WIND] = params.wind_walk * params.wind_walk * dt_s
         added[WIND + 1] = added[WIND]

@@ -1,10 +1,12 @@
 """The estimator's state: what it believes, how sure it is, and how each source of measurements is doing.
 
 One `EstimatorState` per vehicle lives in `Ekf.rows`; the covariance and the rings of waiting samples are arrays of
-their own, because they are indexed. All of it is written by `estimator_tick` alone; the host reads.
+their own, because they are indexed. All of it is written by `estimator_step` alone; the host reads.
 
 Error state and covariance order: attitude (rotation vector in ned) 0-2, velocity 3-5, position 6-8, gyro bias 9-11,
-accelerometer bias 12-14, earth field 15-17, body field 18-20, wind north and east 21-22, terrain 23.
+accelerometer bias 12-14, earth field 15-17, body field 18-20, wind north and east 21-22, terrain 23. Then four
+slow errors of sensors. No motion changes them, so they are kept at the border of the matrix: rows 24-27 are their
+covariances with the 24 errors, row 28 holds those among themselves, 4 x 4.
 """
 
 import warp as wp
@@ -24,6 +26,13 @@ EARTH = wp.constant(15)
 BODY = wp.constant(18)
 WIND = wp.constant(21)
 TERRAIN = wp.constant(23)
+
+# Slow errors: GNSS position north, east, down, and barometer height (down)
+SLOW_COUNT = wp.constant(4)
+SLOW_BARO = wp.constant(3)
+SLOW = wp.constant(24)  # row of the covariance: of slow error j with the error state, in row SLOW + j
+SLOW_COV = wp.constant(28)  # row of the covariance: of slow errors j and k, in element 4 j + k
+COV_ROWS = 29
 
 # Ring sizes are powers of two, so that a running count modulo the size stays cheap.
 IMU_RING = wp.constant(64)  # 256 ms at 250 Hz
@@ -49,6 +58,7 @@ class Nominal:
     body_field_frd: wp.vec3  # [gauss] hard iron
     wind_ned: wp.vec3  # [m/s] down component 0
     terrain_d: float  # [m] ned down coordinate of the ground below
+    slow: wp.vec4  # [m] slow errors: measured minus true
     reset_count: int  # grows when position, velocity or heading is set instead of corrected
     pos_jump_ned: wp.vec3  # [m] of the resets in this step
     vel_jump_ned: wp.vec3  # [m/s]
@@ -63,7 +73,10 @@ class Inbox:
     head: int  # samples put into the ring so far
     tail: int  # samples taken out of it so far
     repeat_count: int  # equal values in a row
-    is_stuck: int  # the value no longer changes
+    change_count: int  # differing values in a row, at rest
+    moved: wp.vec3  # what the estimate says the vehicle has moved since the value changed last
+    resolves_noise: int  # at rest each value differed from the one before: this sensor shows its noise
+    is_stuck: int  # the value no longer changes, and should
 
 
 @wp.struct
@@ -108,11 +121,8 @@ class Stillness:
     accel_mean_frd: wp.vec3  # [m/s²]
     gyro_var: float  # [(rad/s)²] about the mean, the three axes together
     accel_var: float  # [(m/s²)²]
-    accel_last_frd: wp.vec3  # [m/s²]
-    accel_jitter: float  # [(m/s²)²] mean square of the change from sample to sample
     still_s: float  # for how long
     is_still: int
-    is_noise_free: int  # an ideal IMU was seen at rest: equal values of other sensors prove nothing then
 
 
 @wp.struct
@@ -138,15 +148,6 @@ class OutputSample:
     q_raw: wp.quat
     vel_raw_ned: wp.vec3
     pos_raw_ned: wp.vec3
-
-
-@wp.struct
-class GnssWander:
-    """The slow error of GNSS positions: ionosphere, ephemeris, multipath."""
-
-    offset_ned: wp.vec3  # [m]
-    var_ned: wp.vec3  # [m²]
-    time_us: wp.int64
 
 
 @wp.struct
@@ -185,7 +186,7 @@ class EstimatorState:
     range: Aid  # along body down [m]
     drag: Aid  # x, y [m/s²]
     rest: Aid  # zero velocity while the vehicle stands still [m/s]
-    gnss_wander: GnssWander
+    wander_time_us: wp.int64  # to which the GNSS wander was propagated
     drag_sum: DragSum
     is_yaw_aligned: int
     origin_baro_height: float  # [m] standard-atmosphere height of the ned origin
@@ -199,7 +200,7 @@ class Ekf:
 
     rows: wp.array(dtype=EstimatorState)
     params: wp.array(dtype=EstimatorParams)
-    covariance: wp.array2d(dtype=vec24)  # row r of vehicle i is covariance[i, r]
+    covariance: wp.array2d(dtype=vec24)  # row r of vehicle i is covariance[i, r], COV_ROWS of them
     imu_ring: wp.array2d(dtype=ImuSample)
     output_ring: wp.array2d(dtype=OutputSample)
     gnss_ring: wp.array2d(dtype=GnssSample)

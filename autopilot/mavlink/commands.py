@@ -1,7 +1,8 @@
 """The command protocol: COMMAND_LONG and COMMAND_INT in, one COMMAND_ACK out, and a text with the reason of a refusal.
 
-Requests for messages that the vehicle does not have are refused without a text: they are how clients find that out. A table maps each command to its handler; a command that is not in it is answered UNSUPPORTED at once. In a command NaN
-means default and 0 is a value.
+A table maps each command to its handler; a command that is not in it is answered UNSUPPORTED at once. Requests for
+information are refused without a text: asking is how clients find out what there is. In a command NaN means default and
+0 is a value.
 """
 
 from collections.abc import Callable
@@ -280,7 +281,7 @@ class CommandService:
         if not isfinite(command.p2):
             return denied("the interval is not a number")
         if msg_id == _HEARTBEAT_ID and command.p2 != 0.0:
-            return denied("the heartbeat's interval is fixed")
+            return denied("the heartbeat is fixed")
         interval_us = bounded_int(command.p2, -1, INT32_MAX)
         command.sender.channel.schedule.set_interval(msg_id, interval_us)
         return ACCEPTED

@@ -18,11 +18,12 @@ class NavContext:
         announcer: where texts and mission progress go.
         setpoint: the port to the control part.
         hover_thrust: [0..1] collective thrust that carries the vehicle.
+        standing_height_m: of the vehicle's centre over level ground.
     """
 
     __slots__ = (
         "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "has_position", "hover_thrust",
-        "is_landing", "next_hold", "params", "setpoint", "state", "wants_lift", "wish",
+        "is_landing", "next_hold", "params", "setpoint", "standing_height_m", "state", "wants_lift", "wish",
     )  # fmt: skip
 
     def __init__(
@@ -32,12 +33,14 @@ class NavContext:
         announcer: Announcer,
         setpoint: SetpointPort,
         hover_thrust: float,
+        standing_height_m: float,
     ) -> None:
         self.state = state
         self.params = params
         self.announcer = announcer
         self.setpoint = setpoint
         self.hover_thrust = hover_thrust
+        self.standing_height_m = standing_height_m
         self.has_position = False  # the commander's judgement, with its delay
         self.wants_lift = False  # the mode asks to leave the ground
         self.is_landing = False  # the mode is on its last descent

@@ -5,7 +5,10 @@ from math import hypot, isfinite
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.hold import Hold
 from autopilot.navigator.setpoint import Vector
+from autopilot.ports import TERRAIN_VALID
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Verdict
+
+_BELOW_GROUND_M = 1.0  # below home and below the ground under the vehicle: more is a mistake, less an inaccuracy; guess
 
 
 def reposition_target(
@@ -30,13 +33,13 @@ def reposition_target(
         target = (base[0], base[1], context.down_of(alt_amsl_m))
     else:
         target = base
-    refusal = _range_refusal(context, target)
+    refusal = _refusal(context, target)
     if refusal is not ACCEPTED:
         return refusal
     return target, context.heading_to(state.estimate.pos_ned, target, yaw)
 
 
-def _range_refusal(context: NavContext, target: Vector) -> Reply:
+def _refusal(context: NavContext, target: Vector) -> Reply:
     here = context.state.estimate.pos_ned
     way_m = hypot(target[0] - here[0], target[1] - here[1])
     longest_m = context.number("MIS_DIST_1WP")
@@ -44,4 +47,9 @@ def _range_refusal(context: NavContext, target: Vector) -> Reply:
         return Reply(Verdict.DENIED, f"target is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed")
     if abs(target[2]) > 10_000.0:
         return Reply(Verdict.DENIED, "altitude is out of range")
+    ground_d = context.state.home_ned[2] + context.standing_height_m
+    if context.state.estimate.flags & TERRAIN_VALID:
+        ground_d = max(ground_d, context.state.estimate.terrain_d)
+    if target[2] > ground_d + _BELOW_GROUND_M:
+        return Reply(Verdict.DENIED, f"target is {target[2] - ground_d:.0f} m below the ground")
     return ACCEPTED

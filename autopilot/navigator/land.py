@@ -3,14 +3,13 @@
 from math import hypot, isfinite, nan
 
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.ground import NEAR_HOME_M
 from autopilot.navigator.setpoint import Vector
 
 _BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against rotor inflow and drag; guess
 _BLIND_STEADY_S = 20.0  # after that the thrust falls further, so that a vehicle that already stands notices it; guess
 _BLIND_FALL_1_S = 0.02  # share of the hover thrust per second; guess
-_SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
 _TOUCHING_US = 700_000  # longer than it takes to begin a descent; guess
-_NEAR_HOME_M = 30.0  # home's ground level is trusted this far around it; guess
 _SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, far from home; guess
 
 
@@ -38,11 +37,6 @@ class Landing:
         if context.is_on_ground:
             return
         context.is_landing = True
-        if context.state.has_ground_contact:
-            # Leaning into the wind against the ground would tip the vehicle over, and so would a sideways touch without
-            # any control.
-            context.setpoint.hang_level(_SETTLE_THRUST, context.state.yaw_rad)
-            return
         if context.has_position:
             if self._is_blind:  # the position is back: land here
                 self._is_blind = False
@@ -81,7 +75,7 @@ class Landing:
         height, is_measured = context.height_above_ground()
         if not is_measured:
             home = context.state.home_ned
-            is_known_ground = hypot(self._north - home[0], self._east - home[1]) < _NEAR_HOME_M
+            is_known_ground = hypot(self._north - home[0], self._east - home[1]) < NEAR_HOME_M
             return slow if height < _SLOW_BELOW_M and not is_known_ground else _blend(context, height, slow, fast)
         if height < context.number("MPC_LAND_ALT3"):
             return min(slow, context.number("MPC_LAND_CRWL"))

@@ -174,7 +174,8 @@ class Mission:
                 self._announce_current(index)
             index = following
         self._context.announcer.statustext(Severity.ERROR, f"Mission item {self._index} jumps in a circle")
-        self._complete()
+        self._context.state.mission_state = MissionState.PAUSED  # not complete: not every item was done
+        self._hold()
 
     def _begin_nav(self, item: MissionItem, start: Vector | None) -> None:
         context = self._context

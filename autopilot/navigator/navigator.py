@@ -4,13 +4,17 @@ from math import isfinite, nan
 
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.goto import reposition_target
+from autopilot.navigator.ground import Ask, standing_d, vertical_ask
 from autopilot.navigator.hold import Hold
 from autopilot.navigator.land import Land
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.offboard import STREAM_PERIOD_US, Offboard
 from autopilot.navigator.rtl import Return
 from autopilot.navigator.takeoff import Takeoff
+from autopilot.ports import TERRAIN_VALID
 from autopilot.vehicle import ACCEPTED, Mode, OffboardSetpoint, Reply, Verdict
+
+_SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
 
 
 class Navigator:
@@ -21,7 +25,7 @@ class Navigator:
         mission: the stored mission, which is mode Mission.
     """
 
-    __slots__ = ("_active", "_modes", "context", "hold", "land", "mission", "offboard", "takeoff")
+    __slots__ = ("_active", "_modes", "ask", "context", "hold", "land", "mission", "offboard", "takeoff")
 
     def __init__(self, context: NavContext, mission: Mission) -> None:
         self.context = context
@@ -39,6 +43,7 @@ class Navigator:
             Mode.OFFBOARD: self.offboard,
         }
         self._active = self._modes[Mode.HOLD]
+        self.ask = Ask.STAY  # of the setpoint flown
 
     def refusal(self, mode: Mode) -> str:
         """Why a mode cannot be flown now, as far as the navigator knows; empty if it can."""
@@ -95,12 +100,35 @@ class Navigator:
             self._active.frame()
             wish = context.wish
             context.wish = None
-            if context.is_on_ground:
-                setpoint.idle()
-        else:
+        if context.is_on_ground or not state.is_armed:
             setpoint.idle()
+            setpoint.as_asked()
+            self.ask = Ask.STAY
+        else:
+            self._respect_ground()
         setpoint.set_flags(is_armed=state.is_armed, is_landed=context.is_on_ground)
         return wish
+
+    def _respect_ground(self) -> None:
+        """Lets the vehicle settle where it touches the ground, and go down gently to a place on the ground.
+
+        Leaning into the wind against the ground would tip it over, and so would a sideways touch without any control.
+        """
+        context = self.context
+        state, setpoint = context.state, context.setpoint
+        stand_d = standing_d(state, context.standing_height_m)
+        ask = self.ask = vertical_ask(setpoint, state.estimate, stand_d, context.hover_thrust)
+        if state.has_ground_contact and ask is not Ask.UP:
+            setpoint.settle(_SETTLE_THRUST, state.yaw_rad)
+        elif (
+            ask is Ask.DOWN
+            and setpoint.pos_ned[2] == setpoint.pos_ned[2]
+            and stand_d - state.estimate.pos_ned[2] < context.number("MPC_LAND_ALT3")
+        ):
+            is_measured = state.estimate.flags & TERRAIN_VALID
+            setpoint.press(context.number("MPC_LAND_CRWL" if is_measured else "MPC_LAND_SPEED"))
+        else:
+            setpoint.as_asked()
 
     # ---- what clients ask for ----
 

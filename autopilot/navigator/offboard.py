@@ -1,12 +1,13 @@
 """Offboard: setpoints of an external client, passed on to the control part as they come."""
 
+from math import nan
+
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.ground import Ask, vertical_ask
 from autopilot.ports import SETPOINT_TRAJECTORY
 from autopilot.vehicle import OffboardSetpoint
 
 STREAM_PERIOD_US = 500_000  # setpoints must come faster than 2 Hz before the mode may be entered (PX4)
-_LIFT_M = 0.1  # a position this far above the vehicle asks to take off
-_LIFT_THRUST = 0.1  # a collective thrust above this asks to take off
 
 
 class Offboard:
@@ -42,18 +43,9 @@ class Offboard:
             return
         context = self._context
         if context.is_on_ground:
-            context.wants_lift = self._asks_to_lift(latest)
+            ask = vertical_ask(latest, context.state.estimate, nan, context.hover_thrust)
+            context.wants_lift = ask is Ask.UP
             self._flown = None
         elif latest is not self._flown:
             self._flown = latest
             context.setpoint.follow(latest, context.cruise_speed)
-
-    def _asks_to_lift(self, setpoint: OffboardSetpoint) -> bool:
-        if setpoint.kind != SETPOINT_TRAJECTORY:
-            return setpoint.thrust > _LIFT_THRUST
-        is_above: bool = setpoint.pos_ned[2] < self._context.state.estimate.pos_ned[2] - _LIFT_M
-        if setpoint.pos_ned[2] == setpoint.pos_ned[2]:
-            return is_above
-        return setpoint.vel_ned[2] < -0.05 or (
-            setpoint.vel_ned[2] != setpoint.vel_ned[2] and setpoint.accel_ned[2] < -0.05
-        )

@@ -32,9 +32,9 @@ class SetpointPort:
     """
 
     __slots__ = (
-        "_buffer", "_is_changed", "_pack_into", "accel_ned", "climb_speed", "cruise_speed", "descend_speed",
-        "exit_speed", "is_armed", "is_landed", "kind", "omega_frd", "path_start_ned", "pos_ned", "q_ned_from_frd",
-        "thrust", "vel_ned", "yaw", "yaw_rate",
+        "_buffer", "_is_changed", "_pack_into", "_press_speed", "_settling", "accel_ned", "climb_speed",
+        "cruise_speed", "descend_speed", "exit_speed", "is_armed", "is_landed", "kind", "omega_frd", "path_start_ned",
+        "pos_ned", "q_ned_from_frd", "thrust", "vel_ned", "yaw", "yaw_rate",
     )  # fmt: skip
 
     def __init__(self, row: np.ndarray[Any, Any]) -> None:
@@ -46,7 +46,9 @@ class SetpointPort:
         self._is_changed = True
         self.is_armed = False
         self.is_landed = True
-        self.kind = SETPOINT_IDLE
+        self._settling: tuple[float, float] | None = None  # thrust [0..1] and heading [rad]
+        self._press_speed = 0.0  # [m/s]
+        self.kind: int = SETPOINT_IDLE
         self.pos_ned: Vector = FREE
         self.vel_ned: Vector = FREE
         self._free_all()
@@ -143,6 +145,27 @@ class SetpointPort:
         self.thrust = setpoint.thrust
         self.cruise_speed = cruise_speed
 
+    # ---- near the ground, instead of what the mode asks; the mode's own setpoint is kept ----
+
+    def as_asked(self) -> None:
+        """From now on what the mode asks is written again."""
+        if self._settling or self._press_speed:
+            self._settling = None
+            self._press_speed = 0.0
+            self._is_changed = True
+
+    def settle(self, thrust: float, yaw: float) -> None:
+        """From now on: level attitude and a collective thrust [0..1] under which the vehicle settles on its feet."""
+        self._settling = (thrust, yaw)
+        self._is_changed = True
+
+    def press(self, speed_down: float) -> None:
+        """From now on: down to the ground with a speed [m/s], over the place that the mode asks for."""
+        if self._settling or self._press_speed != speed_down:
+            self._settling = None
+            self._press_speed = speed_down
+            self._is_changed = True
+
     def set_cruise_speed(self, speed: float) -> None:
         """Changes the horizontal speed [m/s] of the setpoint being flown."""
         self.cruise_speed = speed
@@ -153,10 +176,20 @@ class SetpointPort:
         if not self._is_changed:
             return
         self._is_changed = False
+        kind, q_ned_from_frd, thrust, yaw_rate = self.kind, self.q_ned_from_frd, self.thrust, self.yaw_rate
+        pos_ned, vel_ned, path_start_ned = self.pos_ned, self.vel_ned, self.path_start_ned
+        if self._settling:
+            kind = SETPOINT_ATTITUDE
+            thrust, yaw = self._settling
+            q_ned_from_frd, yaw_rate = (0.0, 0.0, sin(0.5 * yaw), cos(0.5 * yaw)), nan
+        elif self._press_speed:
+            pos_ned = (pos_ned[0], pos_ned[1], nan)
+            vel_ned = (vel_ned[0], vel_ned[1], self._press_speed)
+            path_start_ned = FREE
         self._pack_into(
-            self._buffer, 0, self.kind, self.is_armed, self.is_landed, *self.pos_ned, *self.vel_ned, *self.accel_ned,
-            self.yaw, self.yaw_rate, *self.path_start_ned, self.cruise_speed, self.climb_speed, self.descend_speed,
-            self.exit_speed, *self.q_ned_from_frd, *self.omega_frd, self.thrust,
+            self._buffer, 0, kind, self.is_armed, self.is_landed, *pos_ned, *vel_ned, *self.accel_ned, self.yaw,
+            yaw_rate, *path_start_ned, self.cruise_speed, self.climb_speed, self.descend_speed, self.exit_speed,
+            *q_ned_from_frd, *self.omega_frd, thrust,
         )  # fmt: skip
 
     def _free_all(self) -> None:

@@ -22,6 +22,7 @@ QUEUE_LENGTH = wp.constant(4)  # rows of the matrices below
 GNSS_PERIOD_TICKS = 50  # 5 Hz
 GNSS_DELAY_TICKS = 30  # 120 ms
 FIRST_FIX_S = 1.5  # u-blox M10 data sheet: hot start 1 s; half a second for its boot (guess)
+# Guess, and so is the delay: a good single-frequency receiver under open sky.
 POSITION_STD_M = 0.3  # horizontal axis, white
 CORRELATED_STD_M = 0.6  # horizontal axis
 CORRELATION_TIME_S = 60.0

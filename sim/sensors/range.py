@@ -1,6 +1,6 @@
 """Range finder looking along body down from the centre of gravity, 25 Hz, without delay.
 
-Defaults are a Benewake TF02-Pro (data sheet SJ-PM-TF02-Pro: 0.1 to 40 m, ±6 cm to 6 m, ±1 % beyond). Errors: white
+Defaults are a Benewake TF02-Pro: 0.1 to 40 m, ±6 cm to 6 m, ±1 % beyond (from memory of its data sheet). Errors: white
 noise. Left out: beam width, reflectivity and sunlight.
 """
 

@@ -85,6 +85,44 @@ def test_trajectory_from_rest_keeps_the_limits_of_its_way(goal: tuple[float, flo
 
 
 @LAWS
+@given(
+    goal=offsets,
+    after_s=st.floats(0.1, 6.0),
+    away=offsets,
+    jump=offsets,
+    cruise=st.floats(0.5, 12.0),
+    is_path=st.booleans(),
+)
+def test_velocity_points_back_to_a_trajectory_out_of_reach_within_the_speed_limits(
+    goal: tuple[float, float, float],
+    after_s: float,
+    away: tuple[float, float, float],
+    jump: tuple[float, float, float],
+    cruise: float,
+    is_path: bool,
+) -> None:
+    offset = np.array(away)
+    is_far_xy = is_far_z = np.linalg.norm(offset) > 2.1  # MPC_XY_ERR_MAX
+    if not is_path:
+        is_far_xy, is_far_z = np.hypot(*offset[:2]) > 2.1, abs(offset[2]) > 2.1
+    generator = Generator()
+    start = (0.0, 0.0, 0.0) if is_path else (np.nan,) * 3
+    generator.ask(pos_ned=goal, path_start_ned=start, cruise_speed=cruise)
+    generator.run(after_s)
+    estimates = generator.estimates.numpy()
+    estimates["pos_ned"] += offset
+    estimates["vel_reset_ned"] = jump
+    estimates["reset_count"] += 1
+    for _ in range(3):
+        command = generator.command()[0].astype(float)
+        back = generator.states.numpy()["pos_ned"][0] - estimates["pos_ned"][0]
+        assert not is_far_xy or command[:2] @ back[:2] > 0.0 or np.hypot(*offset[:2]) < 1.0e-3
+        assert not is_far_z or command[2] * back[2] > 0.0 or abs(offset[2]) < 1.0e-3
+        assert np.hypot(command[0], command[1]) <= 12.0 * ROUNDING  # MPC_XY_VEL_MAX
+        assert -SPEED_UP * ROUNDING <= command[2] <= SPEED_DOWN * ROUNDING
+
+
+@LAWS
 @given(start=offsets, way=offsets)
 def test_path_is_a_straight_line(start: tuple[float, float, float], way: tuple[float, float, float]) -> None:
     begin, end = np.array(start), np.array(start) + np.array(way)

@@ -1,30 +1,34 @@
 """Barometer: height above the origin by the standard atmosphere (ISO 2533:1975), fused as down position.
 
-Starts with a reference height such that nothing jumps. Stops when its value freezes or it falls silent; GNSS height
-takes over then. When its samples were rejected for long, the reference is moved if GNSS height agrees with the
-estimate, and the height is set otherwise.
+Its drift (weather, warm-up) is a slow error, a random walk. Starts with a reference height such that nothing jumps.
+Stops when its value freezes or it falls silent; GNSS height takes over then. When its samples were rejected for long,
+the reference is moved if GNSS height agrees with the estimate, and the height is set otherwise.
 """
 
 import warp as wp
 
 from autopilot.estimator.fuse import (
-    fuse_state,
+    fuse,
     judge,
     mark_fused,
     mark_reset,
     noise_variance,
+    offset_products,
     seconds_since,
-    set_variance,
+    set_offset_by_state,
+    set_state_by_offset,
 )
 from autopilot.estimator.params import EstimatorParams
-from autopilot.estimator.state import POS, Aid, Nominal
+from autopilot.estimator.state import POS, SLOW_BARO, SLOW_COUNT, SLOW_COV, Aid, Nominal
 from autopilot.ports import BaroSample
 from common.kernels import vec24
 
 wp.set_module_options({"enable_backward": False})
 
 BARO_STUCK_AFTER = wp.constant(12)  # equal values in a row; 0.24 s at 50 Hz
+BARO_STUCK_MOVED = wp.constant(1.0)  # [m]
 _RESET_AFTER_S = wp.constant(5.0)
+_MAX_STEP_S = wp.constant(1.0)
 _HEIGHT_SCALE_M = wp.constant(44330.77)  # T0 / L = 288.15 K / 0.0065 K/m
 _SEA_LEVEL_PA = wp.constant(101325.0)
 _EXPONENT = wp.constant(0.19026324)  # R L / (g M)
@@ -43,6 +47,25 @@ def baro_repeats(sample: BaroSample, previous: BaroSample) -> bool:
 
 
 @wp.func
+def drift_baro(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, dt_s: float) -> None:
+    """The variance of the drift after `dt_s`."""
+    slow_row = cov[i, SLOW_COV]
+    diagonal = (SLOW_COUNT + 1) * SLOW_BARO
+    slow_row[diagonal] = slow_row[diagonal] + params.baro_walk * params.baro_walk * dt_s
+    cov[i, SLOW_COV] = slow_row
+
+
+@wp.func
+def start_baro(
+    cov: wp.array2d(dtype=vec24), i: int, nominal: Nominal, height: float, var: float
+) -> tuple[Nominal, float]:
+    """The nominal state and the height of the origin with which a standard-atmosphere height fits the position."""
+    nominal.slow[SLOW_BARO] = 0.0
+    set_offset_by_state(cov, i, POS + 2, SLOW_BARO, var)
+    return nominal, height + nominal.pos_ned[2]
+
+
+@wp.func
 def fuse_baro(
     params: EstimatorParams,
     cov: wp.array2d(dtype=vec24),
@@ -58,23 +81,25 @@ def fuse_baro(
     var = noise_variance(aid, params.baro_noise)
     height = baro_height(sample.pressure_pa)
     if aid.is_active == 0:
-        origin_height = height + nominal.pos_ned[2]
+        nominal, origin_height = start_baro(cov, i, nominal, height, var)
         aid.is_active = 1
+    drift_baro(params, cov, i, wp.min(seconds_since(sample.time_us, aid.judged_time_us), _MAX_STEP_S))
     pos_d = origin_height - height + nominal.vel_ned[2] * age_s
-    innov = pos_d - nominal.pos_ned[2]
-    innov_var = cov[i, POS + 2][POS + 2] + var
+    innov = pos_d - nominal.pos_ned[2] - nominal.slow[SLOW_BARO]
+    ph, ph_slow, hph = offset_products(cov, i, POS + 2, SLOW_BARO)
+    innov_var = hph + var
     starved_s = seconds_since(sample.time_us, aid.fused_time_us)
     aid = judge(aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), 1, params.baro_gate)
     if aid.test_ratio <= 1.0:
-        nominal = fuse_state(params, cov, i, nominal, POS + 2, innov, var)
+        nominal = fuse(params, cov, i, nominal, ph, ph_slow, innov, innov_var)
         aid = mark_fused(aid)
     elif starved_s > _RESET_AFTER_S:
         if is_gnss_height_good:
-            origin_height = origin_height - innov
+            nominal, origin_height = start_baro(cov, i, nominal, height, var)
         else:
             nominal.pos_jump_ned = nominal.pos_jump_ned + wp.vec3(0.0, 0.0, innov)
             nominal.pos_ned = nominal.pos_ned + wp.vec3(0.0, 0.0, innov)
             nominal.reset_count += 1
-            set_variance(cov, i, POS + 2, var)
+            set_state_by_offset(cov, i, POS + 2, SLOW_BARO, var)
         aid = mark_reset(aid)
     return nominal, aid, origin_height

@@ -61,7 +61,9 @@ def fuse_drag(
         vel_air_ned = nominal.vel_ned - nominal.wind_ned
         speed = wp.dot(axis_ned, vel_air_ned)
         predicted = nominal.accel_bias_frd[axis] - (params.drag_linear + square * wp.abs(speed)) * speed
-        _ph, hph = drag_products(cov, i, axis_ned, axis, vel_air_ned, params.drag_linear, square, wp.abs(speed))
+        _ph, _ph_slow, hph = drag_products(
+            cov, i, axis_ned, axis, vel_air_ned, params.drag_linear, square, wp.abs(speed)
+        )
         innov[axis] = accel_frd[axis] - predicted
         innov_var[axis] = hph + var
     aid = judge(aid, time_us, innov, innov_var, 2, _GATE_SIGMA)
@@ -72,13 +74,15 @@ def fuse_drag(
             axis_ned = body_axis_ned(wp.quat_to_matrix(nominal.q_ned_from_frd), axis)
             vel_air_ned = nominal.vel_ned - nominal.wind_ned
             speed = wp.dot(axis_ned, vel_air_ned)
-            ph, hph = drag_products(cov, i, axis_ned, axis, vel_air_ned, params.drag_linear, square, wp.abs(speed))
+            ph, ph_slow, hph = drag_products(
+                cov, i, axis_ned, axis, vel_air_ned, params.drag_linear, square, wp.abs(speed)
+            )
             predicted = nominal.accel_bias_frd[axis] - (params.drag_linear + square * wp.abs(speed)) * speed
             axis_innov = accel_frd[axis] - predicted
             if corrects_velocity:
-                nominal = fuse(params, cov, i, nominal, ph, axis_innov, hph + var)
+                nominal = fuse(params, cov, i, nominal, ph, ph_slow, axis_innov, hph + var)
             else:
-                nominal = fuse_part(params, cov, i, nominal, ph, axis_innov, hph + var, WIND, 2)
+                nominal = fuse_part(params, cov, i, nominal, ph, ph_slow, axis_innov, hph + var, WIND, 2)
         aid = mark_fused(aid)
     return nominal, aid
 

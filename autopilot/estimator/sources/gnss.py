@@ -1,8 +1,8 @@
 """GNSS: horizontal position, height and velocity, fused as the horizon passes the time of validity.
 
-A position holds white noise and a wander that lasts minutes. The wander is estimated beside the filter, one scalar per
-axis, decoupled from it, which costs 5 % in accuracy against the joint filter and saves three states (one-dimensional
-Monte Carlo, 200 runs). So a vehicle that boots at the origin keeps its place though the receiver says otherwise.
+A position holds white noise and a wander that lasts a minute (ionosphere, ephemeris, multipath): a slow error per axis.
+So a vehicle that boots at the origin keeps its place though the receiver says otherwise, and one that does not know its
+place never takes the mean of many fixes for better than the wander they share.
 
 Starts with the first good fix once heading is known. Stops with the fix. Sets position and velocity when the first fix
 is far off or nothing passed the gate for a while.
@@ -17,11 +17,15 @@ from autopilot.estimator.fuse import (
     mark_fused,
     mark_reset,
     noise_variance,
+    offset_products,
     seconds_since,
+    set_offset_by_state,
+    set_slow_variance,
+    set_state_by_offset,
     set_variance,
 )
 from autopilot.estimator.params import GPS_CTRL_HEIGHT, GPS_CTRL_POS, GPS_CTRL_VEL, EstimatorParams
-from autopilot.estimator.state import POS, VEL, Aid, GnssWander, Nominal
+from autopilot.estimator.state import POS, SLOW, SLOW_COUNT, SLOW_COV, VEL, Aid, Nominal
 from autopilot.ports import GnssSample
 from common.kernels import vec24
 
@@ -33,6 +37,8 @@ VERTICAL_FACTOR = wp.constant(1.5)  # vertical over horizontal error, from satel
 _WHITE_SHARE_POS = wp.constant(0.3)
 _SLOW_SHARE_POS = wp.constant(0.6)
 _WHITE_SHARE_VEL = wp.constant(0.5)
+GNSS_STUCK_MOVED = wp.constant(3.0)  # [m]
+_LOST_VAR = wp.constant(1.1e4)  # [m²] beyond 100 m the place is set by a fix: float32 would not subtract well
 _RESET_AFTER_S = wp.constant(5.0)  # nothing passed for so long: believe the receiver rather than the dead reckoning
 
 
@@ -99,45 +105,58 @@ def fuse_gnss_vel(
 
 
 @wp.func
-def gnss_wander_std(params: EstimatorParams, sample: GnssSample) -> float:
-    """[m] slow error per horizontal axis."""
-    return wp.max(params.gnss_wander, _SLOW_SHARE_POS * sample.pos_h_std)
+def gnss_wander_var(params: EstimatorParams, sample: GnssSample, axis: int) -> float:
+    """[m²] variance of the slow error."""
+    std = wp.max(params.gnss_wander, _SLOW_SHARE_POS * sample.pos_h_std)
+    if axis == 2:
+        std = VERTICAL_FACTOR * std
+    return std * std
 
 
 @wp.func
-def propagate_wander(params: EstimatorParams, wander: GnssWander, sample: GnssSample) -> GnssWander:
-    """The wander at the time of the sample: a first-order Gauss-Markov process on each axis."""
-    std = gnss_wander_std(params, sample)
-    stationary = wp.vec3(std * std, std * std, VERTICAL_FACTOR * VERTICAL_FACTOR * std * std)
-    keep = float(0.0)
-    if wander.time_us != wp.int64(0):
-        keep = wp.exp(-seconds_since(sample.time_us, wander.time_us) / params.gnss_wander_time)
-    wander.offset_ned = wander.offset_ned * keep
-    wander.var_ned = stationary + (wander.var_ned - stationary) * (keep * keep)
-    wander.time_us = sample.time_us
-    return wander
-
-
-@wp.func
-def fuse_gnss_axis(
+def propagate_wander(
     params: EstimatorParams,
     cov: wp.array2d(dtype=vec24),
     i: int,
     nominal: Nominal,
-    wander: GnssWander,
+    sample: GnssSample,
+    then_us: wp.int64,
+) -> Nominal:
+    """The wander from `then_us` (0: never known) to the sample: a first-order Gauss-Markov process on each axis."""
+    keep = float(0.0)
+    if then_us != wp.int64(0):
+        keep = wp.exp(-seconds_since(sample.time_us, then_us) / params.gnss_wander_time)
+    slow_row = cov[i, SLOW_COV]
+    for j in range(3):
+        nominal.slow[j] = nominal.slow[j] * keep
+        cov[i, SLOW + j] = cov[i, SLOW + j] * keep
+        for k in range(SLOW_COUNT):
+            slow_row[SLOW_COUNT * j + k] = slow_row[SLOW_COUNT * j + k] * keep
+            slow_row[SLOW_COUNT * k + j] = slow_row[SLOW_COUNT * k + j] * keep
+        diagonal = (SLOW_COUNT + 1) * j
+        slow_row[diagonal] = slow_row[diagonal] + gnss_wander_var(params, sample, j) * (1.0 - keep * keep)
+    cov[i, SLOW_COV] = slow_row
+    return nominal
+
+
+@wp.func
+def set_gnss_axis(
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    sample: GnssSample,
     axis: int,
     measured: float,
     var: float,
-) -> tuple[Nominal, GnssWander]:
-    """One position axis: the innovation is shared between the state and the wander by their variances."""
-    ph = cov[i, POS + axis]
-    wander_var = wander.var_ned[axis]
-    innov = measured - nominal.pos_ned[axis] - wander.offset_ned[axis]
-    innov_var = ph[POS + axis] + wander_var + var
-    wander.offset_ned[axis] = wander.offset_ned[axis] + wander_var / innov_var * innov
-    wander.var_ned[axis] = wander_var - wander_var * wander_var / innov_var
-    nominal = fuse(params, cov, i, nominal, ph, innov, innov_var)
-    return nominal, wander
+) -> Nominal:
+    """One position axis set to the receiver's, whose wander is unknown then."""
+    nominal.pos_jump_ned[axis] = nominal.pos_jump_ned[axis] + measured - nominal.pos_ned[axis]
+    nominal.pos_ned[axis] = measured
+    nominal.slow[axis] = 0.0
+    set_slow_variance(cov, i, axis, gnss_wander_var(params, sample, axis))
+    set_state_by_offset(cov, i, POS + axis, axis, var)
+    return nominal
 
 
 @wp.func
@@ -147,39 +166,35 @@ def fuse_gnss_pos(
     i: int,
     nominal: Nominal,
     aid: Aid,
-    wander: GnssWander,
     sample: GnssSample,
     age_s: float,
-) -> tuple[Nominal, Aid, GnssWander]:
+) -> tuple[Nominal, Aid]:
     """Horizontal position: two axes that pass or fail together."""
     var = noise_variance(aid, gnss_pos_std(params, sample))
     if (params.gnss_ctrl & GPS_CTRL_POS) != 0:
         pos_ned = sample.pos_ned + nominal.vel_ned * age_s
-        innov = pos_ned - nominal.pos_ned - wander.offset_ned
-        innov[2] = 0.0
-        innov_var = wp.vec3(
-            cov[i, POS][POS] + wander.var_ned[0] + var, cov[i, POS + 1][POS + 1] + wander.var_ned[1] + var, 1.0
-        )
+        innov = wp.vec3()
+        innov_var = wp.vec3(1.0, 1.0, 1.0)
+        for axis in range(2):
+            _ph, _ph_slow, hph = offset_products(cov, i, POS + axis, axis)
+            innov[axis] = pos_ned[axis] - nominal.pos_ned[axis] - nominal.slow[axis]
+            innov_var[axis] = hph + var
         starved_s = seconds_since(sample.time_us, aid.fused_time_us)
         aid = judge(aid, sample.time_us, innov, innov_var, 2, params.gnss_pos_gate)
         aid.is_active = 1
-        if aid.test_ratio <= 1.0:
+        is_lost = cov[i, POS][POS] > _LOST_VAR
+        if aid.test_ratio <= 1.0 and not is_lost:
             for axis in range(2):
-                nominal, wander = fuse_gnss_axis(params, cov, i, nominal, wander, axis, pos_ned[axis], var)
+                ph, ph_slow, hph = offset_products(cov, i, POS + axis, axis)
+                axis_innov = pos_ned[axis] - nominal.pos_ned[axis] - nominal.slow[axis]
+                nominal = fuse(params, cov, i, nominal, ph, ph_slow, axis_innov, hph + var)
             aid = mark_fused(aid)
-        elif starved_s > _RESET_AFTER_S:
-            wander_std = gnss_wander_std(params, sample)
-            wander_var = wander_std * wander_std
-            jump = wp.vec3(pos_ned[0] - nominal.pos_ned[0], pos_ned[1] - nominal.pos_ned[1], 0.0)
-            nominal.pos_jump_ned = nominal.pos_jump_ned + jump
-            nominal.pos_ned = nominal.pos_ned + jump
+        elif is_lost or starved_s > _RESET_AFTER_S:
             nominal.reset_count += 1
-            set_variance(cov, i, POS, var + wander_var)
-            set_variance(cov, i, POS + 1, var + wander_var)
-            wander.offset_ned = wp.vec3(0.0, 0.0, wander.offset_ned[2])
-            wander.var_ned = wp.vec3(wander_var, wander_var, wander.var_ned[2])
+            for axis in range(2):
+                nominal = set_gnss_axis(params, cov, i, nominal, sample, axis, pos_ned[axis], var)
             aid = mark_reset(aid)
-    return nominal, aid, wander
+    return nominal, aid
 
 
 @wp.func
@@ -189,33 +204,31 @@ def fuse_gnss_height(
     i: int,
     nominal: Nominal,
     aid: Aid,
-    wander: GnssWander,
     sample: GnssSample,
     age_s: float,
     is_reference: bool,
-) -> tuple[Nominal, Aid, GnssWander]:
+) -> tuple[Nominal, Aid]:
     """Height. Nothing fits for long: the state is set if this is the height reference, else the wander is."""
     var = noise_variance(aid, VERTICAL_FACTOR * gnss_pos_std(params, sample))
     if (params.gnss_ctrl & GPS_CTRL_HEIGHT) != 0:
         pos_d = sample.pos_ned[2] + nominal.vel_ned[2] * age_s
-        innov = pos_d - wander.offset_ned[2] - nominal.pos_ned[2]
-        innov_var = cov[i, POS + 2][POS + 2] + wander.var_ned[2] + var
+        innov = pos_d - nominal.pos_ned[2] - nominal.slow[2]
+        ph, ph_slow, hph = offset_products(cov, i, POS + 2, 2)
+        innov_var = hph + var
         starved_s = seconds_since(sample.time_us, aid.fused_time_us)
         aid = judge(
             aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), 1, params.gnss_pos_gate
         )
         aid.is_active = 1
         if aid.test_ratio <= 1.0:
-            nominal, wander = fuse_gnss_axis(params, cov, i, nominal, wander, 2, pos_d, var)
+            nominal = fuse(params, cov, i, nominal, ph, ph_slow, innov, innov_var)
             aid = mark_fused(aid)
         elif starved_s > _RESET_AFTER_S:
             if is_reference:
-                jump = wp.vec3(0.0, 0.0, innov)
-                nominal.pos_jump_ned = nominal.pos_jump_ned + jump
-                nominal.pos_ned = nominal.pos_ned + jump
                 nominal.reset_count += 1
-                set_variance(cov, i, POS + 2, innov_var)
+                nominal = set_gnss_axis(params, cov, i, nominal, sample, 2, pos_d, var)
             else:
-                wander.offset_ned[2] = wander.offset_ned[2] + innov
+                nominal.slow[2] = nominal.slow[2] + innov
+                set_offset_by_state(cov, i, POS + 2, 2, var)
             aid = mark_reset(aid)
-    return nominal, aid, wander
+    return nominal, aid

@@ -17,6 +17,7 @@ from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
 
 wp.set_module_options({"enable_backward": False})
 
+MAG_STUCK_MOVED = wp.constant(0.2)  # [rad]
 MAG_STUCK_AFTER = wp.constant(5)  # equal vectors in a row; at 25 Hz known before the first of them is fused
 _RESET_AFTER_S = wp.constant(5.0)
 # World Magnetic Model 2025, error model of its technical report: 131 to 145 nT per component at one deviation
@@ -97,7 +98,7 @@ def fuse_mag(
     innov = field_frd - wp.quat_rotate_inv(nominal.q_ned_from_frd, nominal.earth_field_ned) - nominal.body_field_frd
     innov_var = wp.vec3()
     for axis in range(3):
-        _ph, hph = mag_products(cov, i, body_axis_ned(rot, axis), axis, nominal.earth_field_ned)
+        _ph, _ph_slow, hph = mag_products(cov, i, body_axis_ned(rot, axis), axis, nominal.earth_field_ned)
         innov_var[axis] = hph + var
     starved_s = seconds_since(sample.time_us, aid.fused_time_us)
     aid = judge(aid, sample.time_us, innov, innov_var, 3, params.mag_gate)
@@ -106,9 +107,9 @@ def fuse_mag(
         for axis in range(3):
             rot = wp.quat_to_matrix(nominal.q_ned_from_frd)
             axis_ned = body_axis_ned(rot, axis)
-            ph, hph = mag_products(cov, i, axis_ned, axis, nominal.earth_field_ned)
+            ph, ph_slow, hph = mag_products(cov, i, axis_ned, axis, nominal.earth_field_ned)
             predicted = wp.dot(axis_ned, nominal.earth_field_ned) + nominal.body_field_frd[axis]
-            nominal = fuse(params, cov, i, nominal, ph, field_frd[axis] - predicted, hph + var)
+            nominal = fuse(params, cov, i, nominal, ph, ph_slow, field_frd[axis] - predicted, hph + var)
         aid = mark_fused(aid)
     elif starved_s > _RESET_AFTER_S:
         nominal.body_field_frd = nominal.body_field_frd + innov

@@ -6,16 +6,17 @@ and sets it again when several samples in a row do not fit: the edge of a crown,
 
 import warp as wp
 
-from autopilot.estimator.fuse import fuse_part, judge, mark_fused, mark_reset, seconds_since, set_variance
+from autopilot.estimator.fuse import fuse_gain, judge, mark_fused, mark_reset, seconds_since, set_sum_variance
 from autopilot.estimator.generated import range_products
 from autopilot.estimator.params import EstimatorParams
-from autopilot.estimator.state import TERRAIN, Aid, Nominal
+from autopilot.estimator.state import POS, TERRAIN, Aid, Nominal
 from autopilot.ports import RangeSample
 from common.kernels import vec24
 
 wp.set_module_options({"enable_backward": False})
 
 RANGE_STUCK_AFTER = wp.constant(12)
+RANGE_STUCK_MOVED = wp.constant(1.0)  # [m]
 _RESET_AFTER_REJECTS = wp.constant(2)
 _MIN_DOWN = wp.constant(0.7)  # cosine of the largest tilt, 45 deg: beyond it the beam meets ground that is elsewhere
 _RESTART_AFTER_S = wp.constant(5.0)
@@ -45,16 +46,20 @@ def fuse_range(
         if seconds_since(sample.time_us, aid.fused_time_us) > _RESTART_AFTER_S:
             aid.is_active = 0
         height = nominal.terrain_d - nominal.pos_ned[2]
-        ph, hph = range_products(cov, i, down_ned, height)
+        ph, ph_slow, hph = range_products(cov, i, down_ned, height)
         innov = sample.distance_m - height / down_ned[2]
         innov_var = hph + var
         aid = judge(aid, sample.time_us, wp.vec3(innov, 0.0, 0.0), wp.vec3(innov_var, 1.0, 1.0), 1, params.range_gate)
         if aid.is_active == 0 or aid.reject_count >= _RESET_AFTER_REJECTS:
             nominal.terrain_d = measured_d
-            set_variance(cov, i, TERRAIN, var)
+            set_sum_variance(cov, i, TERRAIN, POS + 2, var)
             aid = mark_reset(aid)
             aid.is_active = 1
         elif aid.test_ratio <= 1.0:
-            nominal = fuse_part(params, cov, i, nominal, ph, innov, innov_var, TERRAIN, 1)
+            # The gain that is best for the height above ground: the best one for the terrain alone would keep it from
+            # following slow errors of the vehicle's own height.
+            gain = vec24()
+            gain[TERRAIN] = hph / innov_var * down_ned[2]
+            nominal = fuse_gain(params, cov, i, nominal, ph, ph_slow, gain, innov, innov_var)
             aid = mark_fused(aid)
     return nominal, aid

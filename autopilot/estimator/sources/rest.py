@@ -24,7 +24,6 @@ _MAX_GYRO_VAR = wp.constant(4.0e-4)  # [(rad/s)²]
 _MAX_ACCEL_VAR = wp.constant(0.02)  # [(m/s²)²]
 _MAX_RATE = wp.constant(0.05)  # [rad/s] bias included
 _MAX_GRAVITY_ERROR = wp.constant(0.5)  # [m/s²]
-_NOISE_FREE_JITTER = wp.constant(5.0e-5)  # [(m/s²)²] a hundredth of a BMI088; wind on a parked vehicle is smoother
 
 
 @wp.func
@@ -33,8 +32,6 @@ def observe_stillness(still: Stillness, imu: ImuSample) -> Stillness:
     if wp.length_sq(still.accel_mean_frd) == 0.0:
         still.gyro_mean_frd = imu.gyro_frd
         still.accel_mean_frd = imu.accel_frd
-        still.accel_last_frd = imu.accel_frd
-        still.accel_jitter = 0.001
     gain = wp.min(imu.dt_s / _AVERAGE_S, 1.0)
     gyro_change = imu.gyro_frd - still.gyro_mean_frd
     accel_change = imu.accel_frd - still.accel_mean_frd
@@ -42,10 +39,6 @@ def observe_stillness(still: Stillness, imu: ImuSample) -> Stillness:
     still.accel_mean_frd = still.accel_mean_frd + gain * accel_change
     still.gyro_var = still.gyro_var + gain * (wp.length_sq(gyro_change) - still.gyro_var)
     still.accel_var = still.accel_var + gain * (wp.length_sq(accel_change) - still.accel_var)
-    still.accel_jitter = still.accel_jitter + gain * (
-        wp.length_sq(imu.accel_frd - still.accel_last_frd) - still.accel_jitter
-    )
-    still.accel_last_frd = imu.accel_frd
     is_quiet = (
         still.gyro_var < _MAX_GYRO_VAR
         and still.accel_var < _MAX_ACCEL_VAR
@@ -59,9 +52,6 @@ def observe_stillness(still: Stillness, imu: ImuSample) -> Stillness:
     still.is_still = 0
     if still.still_s > _STILL_AFTER_S:
         still.is_still = 1
-    # once seen it stays so: in flight an ideal IMU moves like a noisy one, and a real one never shows this at rest
-    if still.is_still == 1 and still.accel_jitter < _NOISE_FREE_JITTER:
-        still.is_noise_free = 1
     return still
 
 

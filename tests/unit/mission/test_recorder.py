@@ -1,13 +1,17 @@
 """The flight log and the history: every topic says what the kernel rows said."""
 
+from itertools import groupby
+
 import numpy as np
 import pytest
 from pyulog import ULog
 
+from autopilot.vehicle import MissionItem
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from mission.recorder import NAVIGATION_STATES
 from mission.topics import TOPICS, wxyz
+from sim.faults import set_fault
 from sim.sensors.sensors import DEFAULT_HOME
 
 SECONDS = 14.0
@@ -120,8 +124,59 @@ def test_status_follows_mode_and_arming(flown):
     assert set(status["nav_state"]) <= set(NAVIGATION_STATES.values())
     assert {HOLD_NAV_STATE, TAKEOFF_NAV_STATE} <= set(status["nav_state"])
     assert (status["arming_state"][0], status["arming_state"][-1]) == (1, 2)
-    landed = flown.topics["vehicle_land_detected"]["landed"]
-    assert (landed[0], landed[-1]) == (1, 0)
+    assert status["pre_flight_checks_pass"][[0, -1]].tolist() == [0, 1]
+    armed_us = int(flown.history.time_us[np.argmax(flown.history.is_armed)])
+    assert armed_us in status["timestamp"]  # the change itself is logged
+    assert status["armed_time"].tolist() == np.where(status["arming_state"] == 2, armed_us, 0).tolist()
+    landed = flown.topics["vehicle_land_detected"]
+    assert landed["landed"][[0, -1]].tolist() == [1, 0]
+    assert landed["ground_contact"][[0, -1]].tolist() == [1, 0]
+
+
+def test_battery_is_logged_with_what_the_vehicle_thinks_is_left(flown):
+    battery = flown.topics["battery_status"]
+    assert battery["voltage_v"][-1] == flown.samples["battery"]["voltage_v"]
+    assert battery["remaining"][-1] == pytest.approx(flown.history.battery_remaining[-1], abs=1e-3)
+    assert battery["discharged_mah"][-1] > battery["discharged_mah"][10] > 0.0
+
+
+def test_mission_result_follows_the_mission_to_its_end(tmp_path):
+    here = (0.0, 0.0, 0.0, float("nan"))
+    plan = [MissionItem(0, 6, 22, here, 0.0, 0.0, 3.0), MissionItem(1, 6, 21, here, 0.0, 0.0, 0.0)]
+
+    async def fly(drone):
+        await drone.wait_ready()
+        await drone.upload(plan)
+        await drone.sleep(1.0)
+        await drone.arm()
+        await drone.start_mission()
+        await drone.wait_disarmed()
+
+    flight = Flight(FlightConfig(noise=0.0), folder=tmp_path)
+    assert flight.fly(fly, seconds=60.0).error is None
+    flight.close()
+    (result,) = ULog(str(tmp_path / "flight.ulg"), ["mission_result"]).data_list
+    columns = (result.data[name].tolist() for name in "seq_total seq_current seq_reached valid finished".split())
+    assert [row for row, _ in groupby(zip(*columns, strict=True))] == [
+        (0, 0, -1, 0, 0),
+        (2, 0, -1, 1, 0),
+        (2, 1, 0, 1, 0),
+        (2, 1, 1, 1, 1),
+    ]
+
+
+def test_saturated_axes_of_the_inertial_sensors_are_marked(tmp_path):
+    flight = Flight(FlightConfig(), folder=tmp_path)
+    flight.fly(lambda drone: drone.sleep(0.5))
+    set_fault(flight.rig.arrays.faults.numpy()[0], "accel", "biased", 240.0)  # up to 24 g, x and y; z is at -1 g
+    flight.fly(lambda drone: drone.sleep(0.5))
+    set_fault(flight.rig.arrays.faults.numpy()[0], "gyro", "biased", -40.0)
+    flight.fly(lambda drone: drone.sleep(0.5))
+    flight.close()
+    (imu,) = ULog(str(tmp_path / "flight.ulg"), ["sensor_combined"]).data_list
+    assert set(imu.data["accelerometer_clipping"].tolist()) == {0, 3}
+    assert imu.data["accelerometer_clipping"][[0, -1]].tolist() == [0, 3]
+    assert imu.data["gyro_clipping"][[0, -1]].tolist() == [0, 7]
 
 
 def test_parameters_and_texts_are_in_the_log(flown):

@@ -37,3 +37,29 @@ def test_no_voltage_is_no_sample():
     battery = BatteryEstimator(BATTERY)
     battery.update(1, 0.0, 0.0)
     assert battery.remaining != battery.remaining
+
+
+@pytest.mark.parametrize("is_frozen", [False, True])
+def test_silent_or_frozen_sensor_is_counted_on_with_its_last_current(is_frozen):
+    battery = BatteryEstimator(BATTERY)
+    battery.update(1_000_000, 16.0, 0.0)
+    battery.update(2_000_000, 15.8, 36.0)
+    start = battery.remaining
+    for i in range(1, 101):
+        now_us = 2_000_000 + i * 1_000_000
+        if is_frozen:
+            battery.update(now_us, 15.8, 36.0)
+        battery.count_on(now_us)
+        assert battery.is_silent == (i > 5)
+    assert battery.used_mah == pytest.approx(1010.0)  # from the first sample on
+    assert battery.remaining == pytest.approx(start - 1000.0 / BATTERY.capacity_mah, abs=0.02)
+
+
+def test_sensor_that_speaks_again_is_believed_again():
+    battery = BatteryEstimator(BATTERY)
+    battery.update(1_000_000, 16.0, 10.0)
+    battery.count_on(9_000_000)
+    battery.update(9_000_000, 15.9, 10.0)
+    battery.count_on(9_000_000)
+    assert not battery.is_silent
+    assert battery.used_mah == pytest.approx(10.0 * 8.0 / 3.6)

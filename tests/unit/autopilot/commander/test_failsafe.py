@@ -2,9 +2,10 @@
 
 import pytest
 
+from autopilot.navigator.mission import MissionState
 from autopilot.ports import POSITION_VALID
 from autopilot.vehicle import Mode, Severity, Verdict
-from tests.unit.autopilot.kinematic import Kinematic, geo
+from tests.unit.autopilot.kinematic import Kinematic, geo, item
 
 NAN = float("nan")
 
@@ -97,3 +98,32 @@ def test_position_modes_are_refused_while_it_is_lost():
     rig.run(1.0)
     assert rig.fc.set_mode(Mode.HOLD).reason == "no valid position"
     assert rig.fc.set_mode(Mode.RETURN).reason == "no valid position"
+
+
+def test_silent_battery_sensor_is_told_once_and_its_charge_still_falls():
+    rig = flying_away()
+    rig.battery_v = 0.0
+    before = rig.state.battery_remaining
+    rig.run(60.0)
+    assert sum("sensor silent" in text for _, text in rig.recorder.texts) == 1
+    assert rig.state.battery_remaining < before - 0.02
+
+
+def test_mission_that_a_failsafe_ended_is_not_complete():
+    rig = Kinematic().flying()
+    rig.fc.load_mission([item(0, 16, 50.0), item(1, 21, 50.0)])
+    rig.fc.start_mission(0)
+    rig.run(2.0)
+    drain_to(rig, 0.04)
+    rig.disarmed()
+    assert rig.recorder.reached == []
+    assert rig.state.mission_state == MissionState.PAUSED
+
+
+@pytest.mark.parametrize(("jump_m", "is_told"), [(5.2, True), (0.2, False)])
+def test_jump_of_the_position_is_told(jump_m, is_told):
+    rig = Kinematic().flying()
+    rig.estimate["pos_reset_ned"] = (0.0, jump_m, 0.0)
+    rig.estimate["reset_count"] += 1
+    rig.run(1.0)
+    assert rig.recorder.has_text(f"position reset by {jump_m} m") == is_told

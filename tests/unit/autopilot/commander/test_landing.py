@@ -106,3 +106,22 @@ def test_contact_outlasts_a_bounce_and_ends_with_a_fall():
     assert landing.has_contact
     landing.update(estimate(vel=(0.0, 0.0, 1.2)), 0.06, 0.0, DT_S)
     assert not landing.has_contact
+
+
+def test_range_finder_that_tells_of_ground_where_there_is_none_is_not_believed_for_long():
+    landing = LandingDetector(ParameterTable([*COMMANDER_PARAMETERS, *CONTROL_PARAMETERS]), HOVER, 0.22)
+    flags = VELOCITY_VALID | TERRAIN_VALID
+    stalled = estimate(flags=flags, down=-0.2)
+
+    def is_felt():
+        for _ in range(10):
+            landing.update(stalled, HOVER, 0.7, DT_S)
+        return landing.has_contact
+
+    for _ in range(3):
+        assert is_felt()
+        for _ in range(20):
+            landing.update(estimate(vel=(0.0, 0.0, 1.5), flags=flags, down=-0.2), 0.06, 0.7, DT_S)
+    assert not is_felt()
+    landing.reset()
+    assert is_felt()

@@ -5,6 +5,7 @@ import numpy.typing as npt
 import warp as wp
 
 from autopilot.control.params import ControlParams, control_params
+from autopilot.control.position import velocity_setpoint
 from autopilot.control.trajectory import TrajectoryState, trajectory_at_estimate, trajectory_step
 from autopilot.ports import Estimate, Setpoint
 
@@ -55,6 +56,20 @@ def generator_kernel(
     estimates[i] = est
 
 
+@wp.kernel(enable_backward=False)
+def command_kernel(
+    params: ControlParams,
+    setpoints: wp.array(dtype=Setpoint),
+    estimates: wp.array(dtype=Estimate),
+    states: wp.array(dtype=TrajectoryState),
+    vel_sp_ned: wp.array(dtype=wp.vec3),
+):
+    i = wp.tid()
+    state = trajectory_step(params, states[i], estimates[i], setpoints[i], 0.02)
+    vel_sp_ned[i] = velocity_setpoint(params, state, estimates[i])
+    states[i] = state
+
+
 class Generator:
     """The trajectory generator of `count` vehicles, starting at rest at the origin of ned."""
 
@@ -81,3 +96,10 @@ class Generator:
         wp.launch(generator_kernel, dim=self.count, inputs=inputs, device="cpu")
         self.is_started = True
         return log.numpy().copy()
+
+    def command(self) -> npt.NDArray[np.float32]:
+        """Velocity setpoints [m/s], ned, after one frame in which the estimate stays as it is, shape (count, 3)."""
+        vel_sp_ned = wp.zeros(self.count, dtype=wp.vec3, device="cpu")
+        inputs = [self.params, self.setpoints, self.estimates, self.states, vel_sp_ned]
+        wp.launch(command_kernel, dim=self.count, inputs=inputs, device="cpu")
+        return vel_sp_ned.numpy().copy()

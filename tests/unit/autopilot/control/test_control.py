@@ -182,6 +182,43 @@ def test_integrals_do_not_wind_up_against_a_wind_that_is_too_strong() -> None:
     np.testing.assert_allclose(pos[-1], rig.start_ned, atol=0.05)
 
 
+@pytest.mark.parametrize("push_ned", [(10.0, 0.0, 0.0), (-10.0, 0.0, 0.0), (0.0, 10.0, 0.0), (15.0, -5.0, 0.0)])
+def test_push_on_a_leg_is_recovered(push_ned: tuple[float, float, float]) -> None:
+    rig = blown_rig(NO_WIND)
+    leg = {"pos_ned": (150.0, 0.0, -10.0), "path_start_ned": (0.0, 0.0, -10.0), "cruise_speed": 8.0}
+    rig.set(**leg)
+    rig.run(6.0)
+    rig.bodies.numpy()["vel_ned"] += np.array(push_ned, dtype=np.float32)
+    bodies, states = rig.run(6.0)
+    pos = bodies["pos_ned"][0]
+    assert np.abs(pos[:, 1]).max() < 10.0
+    assert np.linalg.norm(pos - states["trajectory"]["pos_ned"][0], axis=1).max() < 2.5  # drawn along
+    assert np.abs(pos[-1] - states["trajectory"]["pos_ned"][0, -1]).max() < 0.3  # and back on it
+    bodies, _ = rig.run(25.0)
+    np.testing.assert_allclose(bodies["pos_ned"][0, -1], leg["pos_ned"], atol=0.1)
+
+
+def test_wind_beyond_the_limits_carries_the_vehicle_downwind_at_its_height() -> None:
+    rig = blown_rig(NO_WIND)
+    rig.set(pos_ned=rig.start_ned)
+    rig.blow(np.array([[25.0, 0.0, 0.0]]))  # 18.75 m/s² of drag
+    bodies, states = rig.run(10.0)
+    pos = bodies["pos_ned"][0]
+    assert (np.diff(pos[250:, 0]) > 0.0).all()
+    assert np.abs(pos[:, 2] + 10.0).max() < 0.5
+    assert np.linalg.norm(states["velocity"]["integral_ned"][0, :, :2], axis=1).max() <= 4.001
+    assert np.linalg.norm(states["velocity"]["disturbance_ned"][0, :, :2], axis=1).max() <= 6.001
+
+
+def test_height_is_kept_before_the_place_when_thrust_is_short() -> None:
+    rig = blown_rig(NO_WIND, voltage_share=0.665)  # greatest thrust 1.03 times the weight
+    rig.set(pos_ned=rig.start_ned)
+    rig.blow(np.array([[8.0, 0.0, 0.0]]))
+    bodies, _ = rig.run(10.0)
+    assert bodies["pos_ned"][0, -1, 0] > 5.0
+    assert np.abs(bodies["pos_ned"][0, :, 2] + 10.0).max() < 0.5
+
+
 def test_large_upset_is_recovered() -> None:
     rig = blown_rig(NO_WIND)
     rows = rig.bodies.numpy()

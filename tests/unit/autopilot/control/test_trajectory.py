@@ -157,14 +157,70 @@ def test_reset_of_the_estimate_shifts_the_trajectory_without_a_kick() -> None:
     assert after["yaw"][0, -1] == pytest.approx(before["yaw"][0, -1] + 0.3, abs=1e-3)
 
 
+def test_reset_of_the_estimate_keeps_the_trajectory_within_the_speed_limits() -> None:
+    generator = Generator()
+    generator.ask(pos_ned=(200.0, 0.0, 0.0))
+    generator.run(3.0)
+    for _ in range(3):
+        generator.estimates.numpy()["vel_reset_ned"] = (6.0, 5.0, -4.0)
+        generator.estimates.numpy()["reset_count"] += 1
+        log = generator.run(FRAME_S)
+    vel = log["vel_ned"][0, -1]
+    assert np.hypot(vel[0], vel[1]) < 12.1  # MPC_XY_VEL_MAX
+    assert vel[2] > -3.1  # MPC_Z_VEL_MAX_UP
+
+
 def test_trajectory_waits_for_a_vehicle_left_behind() -> None:
     generator = Generator()
     generator.ask(pos_ned=(30.0, 0.0, 0.0))
     generator.run(2.0)
-    generator.estimates.numpy()["pos_ned"][0, 0] -= 2.5
     first = generator.states.numpy()["pos_ned"][0].copy()
-    log = generator.run(FRAME_S)
-    np.testing.assert_array_equal(log["pos_ned"][0, -1], first)
+    generator.estimates.numpy()["pos_ned"][0, 0] = first[0] - 2.0
+    generator.command()
+    np.testing.assert_array_equal(generator.states.numpy()["pos_ned"][0], first)
+    generator.estimates.numpy()["pos_ned"][0, 0] = first[0] - 1.5
+    generator.command()
+    slow = generator.states.numpy()["pos_ned"][0] - first
+    generator.estimates.numpy()["pos_ned"][0, 0] = first[0]
+    generator.command()
+    quick = generator.states.numpy()["pos_ned"][0] - slow - first
+    assert slow[0] == pytest.approx(0.5 * quick[0], rel=0.05)
+
+
+def test_vehicle_blown_away_draws_the_trajectory_along_and_flies_on_from_there() -> None:
+    generator = Generator()
+    generator.ask(pos_ned=(40.0, 0.0, 0.0), path_start_ned=(0.0, 0.0, 0.0))
+    generator.run(3.0)
+    generator.estimates.numpy()["pos_ned"][0, 1] += 15.0
+    place = generator.estimates.numpy()["pos_ned"][0].copy()
+    generator.command()
+    drawn = generator.states.numpy()[0]
+    assert np.linalg.norm(drawn["pos_ned"] - place) == pytest.approx(2.0, abs=1e-3)  # MPC_XY_ERR_MAX
+    np.testing.assert_array_equal(drawn["vel_ned"], 0.0)
+    log = generator.run(20.0)
+    vel, accel = log["vel_ned"][0].astype(float), log["accel_ned"][0].astype(float)
+    assert np.linalg.norm(vel[0]) < 0.1  # from rest
+    assert np.linalg.norm(np.diff(accel, axis=0), axis=1).max() <= np.sqrt(2.0) * 8.0 * FRAME_S * 1.001  # MPC_JERK_AUTO
+    np.testing.assert_allclose(log["pos_ned"][0, -1], (40.0, 0.0, 0.0), atol=1e-4)
+
+
+def test_climb_goes_on_while_the_vehicle_is_blown_aside() -> None:
+    generator = Generator()
+    generator.ask(pos_ned=(0.0, 0.0, -10.0))
+    generator.run(2.0)
+    generator.estimates.numpy()["pos_ned"][0, 1] += 5.0
+    assert generator.command()[0, 2] == pytest.approx(-3.0, abs=0.01)
+
+
+def test_velocity_setpoint_is_obeyed_while_the_height_lags() -> None:
+    generator = Generator()
+    generator.ask(pos_ned=(NAN, NAN, -10.0), vel_ned=(4.0, 0.0, NAN))
+    generator.run(3.0)
+    generator.ask(pos_ned=(NAN, NAN, -10.0), vel_ned=(0.0, 0.0, NAN))
+    generator.estimates.numpy()["pos_ned"][0, 2] += 3.0
+    for _ in range(100):
+        command = generator.command()
+    np.testing.assert_allclose(command[0, :2], 0.0, atol=0.01)
 
 
 def test_yaw_turns_the_short_way_within_rate_and_acceleration() -> None:

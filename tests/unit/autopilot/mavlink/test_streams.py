@@ -8,7 +8,7 @@ from autopilot.mavlink.codec import message_id
 from autopilot.mavlink.links import LinkRole
 from autopilot.mavlink.streams import STREAMS
 from autopilot.ports import POSITION_VALID
-from autopilot.vehicle import LandedState
+from autopilot.vehicle import LandedState, Mode
 from tests.unit.autopilot.mavlink.rig import HOME, Rig
 
 

@@ -171,6 +171,7 @@ def test_jumps_in_a_circle_end_the_mission():
     rig.run(1.0)
     assert rig.state.mode is Mode.HOLD
     assert rig.recorder.has_text("jumps in a circle")
+    assert rig.state.mission_state == MissionState.PAUSED
 
 
 def test_landing_in_an_endless_loop_on_the_ground_does_not_hang():

@@ -4,7 +4,14 @@ from math import hypot, nan, pi, radians
 
 import pytest
 
-from autopilot.ports import HEIGHT_VALID, POSITION_VALID, SETPOINT_ATTITUDE, SETPOINT_IDLE, VELOCITY_VALID
+from autopilot.ports import (
+    HEIGHT_VALID,
+    POSITION_VALID,
+    SETPOINT_ATTITUDE,
+    SETPOINT_IDLE,
+    SETPOINT_TRAJECTORY,
+    VELOCITY_VALID,
+)
 from autopilot.vehicle import LandedState, Mode, OffboardSetpoint, Verdict
 from tests.unit.autopilot.kinematic import ORIGIN, Kinematic, geo, heading_error, position_setpoint
 
@@ -107,6 +114,7 @@ def test_goto_turns_to_its_target_and_keeps_what_is_nan():
         ((95.0, 8.0, 500.0), "no such latitude"),
         ((48.4, 8.5, 500.0), "km away"),
         ((nan, nan, 90_000.0), "altitude"),
+        ((nan, nan, ORIGIN.alt_m - 5.0), "below the ground"),
     ],
 )
 def test_goto_refuses_what_it_cannot_reach(place, reason):
@@ -333,3 +341,29 @@ def test_change_of_speed_applies_at_once_and_is_forgotten_by_default():
     rig.run(3.0)
     assert rig.vel[0] == pytest.approx(5.0, abs=0.1)
     assert rig.fc.change_speed(-3.0).verdict is Verdict.DENIED
+
+
+@pytest.mark.parametrize("down", [0.0, 0.8])
+def test_offboard_position_on_the_ground_is_a_landing(down):
+    rig = Kinematic().flying(3.0)
+    stream(rig, position_setpoint(0.0, 0.0, -3.0), 0.5)
+    rig.fc.set_mode(Mode.OFFBOARD)
+    stream(rig, position_setpoint(0.0, 0.0, down), 10.0)
+    assert not rig.state.is_armed
+    assert rig.recorder.has_text("Landed")
+
+
+def test_contact_gives_way_to_a_climb_at_once():
+    rig = Kinematic().flying(3.0)
+    stream(rig, position_setpoint(0.0, 0.0, -3.0), 0.5)
+    rig.fc.set_mode(Mode.OFFBOARD)
+    down = OffboardSetpoint(0, int(SETPOINT_TRAJECTORY), vel_ned=(0.0, 0.0, 1.0))
+    while not rig.state.has_ground_contact:
+        stream(rig, down, 0.1)
+    assert rig.sp("kind") == SETPOINT_ATTITUDE
+    stream(rig, position_setpoint(0.0, 0.0, -2.0), 0.1)
+    assert rig.sp("kind") == SETPOINT_TRAJECTORY
+    assert rig.sp("pos_ned") == pytest.approx([0.0, 0.0, -2.0])
+    stream(rig, position_setpoint(0.0, 0.0, -2.0), 5.0)
+    assert rig.pos[2] == pytest.approx(-2.0, abs=0.1)
+    assert not rig.state.has_ground_contact

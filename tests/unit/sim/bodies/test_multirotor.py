@@ -41,7 +41,7 @@ def test_shipped_airframes_are_known_and_others_refused():
 def test_a_number_without_source_is_refused(tmp_path):
     text = (load_airframe.__globals__["AIRFRAME_FOLDER"] / "x500.toml").read_text(encoding="utf-8")
     path = tmp_path / "bad.toml"
-    path.write_text(text.replace('{ value = 1.5, source = "take-off mass', '{ value = 1.5, src = "take-off mass'))
+    path.write_text(text.replace("mass_kg = { value = 1.5, source", "mass_kg = { value = 1.5, src"))
     with pytest.raises(AirframeError, match=r"bad.toml: body.mass_kg: .*source"):
         load_airframe(str(path))
 

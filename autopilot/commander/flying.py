@@ -1,0 +1,34 @@
+"""What the commander needs of the navigator."""
+
+from typing import Protocol
+
+from autopilot.navigator.ground import Ask
+from autopilot.vehicle import Mode
+
+
+class Flying(Protocol):
+    """The navigator, as the commander sees it."""
+
+    def refusal(self, mode: Mode) -> str: ...
+
+    def enter(self, mode: Mode) -> None: ...
+
+    def on_armed(self) -> None: ...
+
+    @property
+    def wants_lift(self) -> bool: ...
+
+    @property
+    def is_landing(self) -> bool: ...
+
+    @property
+    def ask(self) -> Ask:
+        """Vertically, what the setpoint being flown asks for."""
+        ...
+
+    @property
+    def offboard_needs_position(self) -> bool: ...
+
+    def offboard_age_us(self, time_us: int) -> int: ...
+
+    def tell_position(self, *, is_valid: bool) -> None: ...
