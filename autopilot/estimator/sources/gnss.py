@@ -5,7 +5,7 @@ So a vehicle that boots at the origin keeps its place though the receiver says o
 place never takes the mean of many fixes for better than the wander they share.
 
 Starts with the first good fix once heading is known. Stops with the fix. Sets position and velocity when the first fix
-is far off or nothing passed the gate for a while.
+is far off or nothing passed the gate for a while; a velocity that did not fit for so long puts heading in doubt too.
 """
 
 import warp as wp
@@ -25,7 +25,7 @@ from autopilot.estimator.fuse import (
     set_variance,
 )
 from autopilot.estimator.params import GPS_CTRL_HEIGHT, GPS_CTRL_POS, GPS_CTRL_VEL, EstimatorParams
-from autopilot.estimator.state import POS, SLOW, SLOW_COUNT, SLOW_COV, VEL, Aid, Nominal
+from autopilot.estimator.state import ATT, BODY, POS, SLOW, SLOW_COUNT, SLOW_COV, VEL, Aid, Nominal
 from autopilot.ports import GnssSample
 from common.kernels import vec24
 
@@ -38,6 +38,9 @@ _WHITE_SHARE_POS = wp.constant(0.3)
 _SLOW_SHARE_POS = wp.constant(0.6)
 _WHITE_SHARE_VEL = wp.constant(0.5)
 GNSS_STUCK_MOVED = wp.constant(3.0)  # [m]
+# Acceleration turned to ned with a wrong heading is the ordinary cause of a velocity that does not fit: guess
+_DOUBTED_HEADING_STD = wp.constant(0.2)  # [rad]
+_DOUBTED_BODY_SHARE = wp.constant(4.0)  # of the body field's deviation at the start
 _LOST_VAR = wp.constant(1.1e4)  # [m²] beyond 100 m the place is set by a fix: float32 would not subtract well
 _RESET_AFTER_S = wp.constant(5.0)  # nothing passed for so long: believe the receiver rather than the dead reckoning
 
@@ -100,6 +103,9 @@ def fuse_gnss_vel(
             nominal.reset_count += 1
             for axis in range(3):
                 set_variance(cov, i, VEL + axis, var)
+                body_std = _DOUBTED_BODY_SHARE * params.body_field_init
+                set_variance(cov, i, BODY + axis, body_std * body_std)
+            set_variance(cov, i, ATT + 2, _DOUBTED_HEADING_STD * _DOUBTED_HEADING_STD)
             aid = mark_reset(aid)
     return nominal, aid
 

@@ -258,6 +258,17 @@ def test_coarse_barometer_that_repeats_is_not_stuck() -> None:
     assert np.abs(errors(flight, trace).pos[AIRBORNE:, 2]).max() < 1.5
 
 
+def test_heading_taken_on_a_magnetic_pad_is_mended_by_gnss_velocity() -> None:
+    def disturb(samples: Any) -> None:
+        samples["mag"]["field_frd_gauss"][: int(6.5 * TICKS), 1] += 0.2  # steel under it until it has left the ground
+
+    flight, trace = flown(disturb, duration_s=90.0)
+    found = errors(flight, trace)
+    assert abs(found.yaw_deg[6 * TICKS]) > 45.0
+    assert np.abs(found.yaw_deg[60 * TICKS :]).max() < 3.0
+    assert np.abs(found.vel[60 * TICKS :]).max() < 0.4
+
+
 def test_noisy_source_is_trusted_less() -> None:
     rng = np.random.default_rng(0)
     at = 20 * TICKS
