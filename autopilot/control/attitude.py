@@ -7,7 +7,7 @@ control"), because tilt moves the vehicle and is fast, heading is neither.
 import warp as wp
 
 from autopilot.control.params import ControlParams
-from autopilot.control.pid import clamp3
+from common.vectors import clamp3
 
 wp.set_module_options({"enable_backward": False})
 

@@ -2,6 +2,8 @@
 
 import warp as wp
 
+from common.vectors import clamp3
+
 wp.set_module_options({"enable_backward": False})
 
 _TWO_PI = wp.constant(6.2831853)
@@ -12,16 +14,6 @@ def low_pass_share(cutoff_hz: float, dt_s: float) -> float:
     """Share of a new sample in a first-order low-pass (implicit Euler: stable for any cutoff)."""
     step = _TWO_PI * cutoff_hz * dt_s
     return step / (1.0 + step)
-
-
-@wp.func
-def clamp3(value: wp.vec3, limit: wp.vec3) -> wp.vec3:
-    """Each element within ±limit."""
-    return wp.vec3(
-        wp.clamp(value[0], -limit[0], limit[0]),
-        wp.clamp(value[1], -limit[1], limit[1]),
-        wp.clamp(value[2], -limit[2], limit[2]),
-    )
 
 
 @wp.func

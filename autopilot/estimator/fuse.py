@@ -26,6 +26,7 @@ from autopilot.estimator.state import (
 )
 from common.kernels import ERROR_STATES, vec24
 from common.rotation import quat_from_rotvec
+from common.vectors import clamp3
 
 wp.set_module_options({"enable_backward": False})
 
@@ -43,14 +44,6 @@ def part3(error: vec24, first: int) -> wp.vec3:
 
 
 @wp.func
-def clamp3(value: wp.vec3, limit: float) -> wp.vec3:
-    """Each element limited to ± limit."""
-    return wp.vec3(
-        wp.clamp(value[0], -limit, limit), wp.clamp(value[1], -limit, limit), wp.clamp(value[2], -limit, limit)
-    )
-
-
-@wp.func
 def inject(params: EstimatorParams, nominal: Nominal, error: vec24, error_slow: wp.vec4) -> Nominal:
     """The nominal state corrected by an error estimate.
 
@@ -59,8 +52,8 @@ def inject(params: EstimatorParams, nominal: Nominal, error: vec24, error_slow: 
     nominal.q_ned_from_frd = wp.normalize(quat_from_rotvec(part3(error, ATT)) * nominal.q_ned_from_frd)
     nominal.vel_ned = nominal.vel_ned + part3(error, VEL)
     nominal.pos_ned = nominal.pos_ned + part3(error, POS)
-    nominal.gyro_bias_frd = clamp3(nominal.gyro_bias_frd + part3(error, GYRO_BIAS), params.gyro_bias_limit)
-    nominal.accel_bias_frd = clamp3(nominal.accel_bias_frd + part3(error, ACCEL_BIAS), params.accel_bias_limit)
+    nominal.gyro_bias_frd = clamp3(nominal.gyro_bias_frd + part3(error, GYRO_BIAS), wp.vec3(params.gyro_bias_limit))
+    nominal.accel_bias_frd = clamp3(nominal.accel_bias_frd + part3(error, ACCEL_BIAS), wp.vec3(params.accel_bias_limit))
     nominal.earth_field_ned = nominal.earth_field_ned + part3(error, EARTH)
     nominal.body_field_frd = nominal.body_field_frd + part3(error, BODY)
     nominal.wind_ned = nominal.wind_ned + wp.vec3(error[WIND], error[WIND + 1], 0.0)

@@ -73,6 +73,14 @@ class Client:
     def height_m(self):
         return self.telemetry.position().relative_altitude_m
 
+    @property
+    def from_home_m(self):
+        """Horizontal distance; home is where it armed, by its own estimate, and near the local frame's origin only."""
+        here, home = self.telemetry.position(), self.telemetry.home()
+        north = (here.latitude_deg - home.latitude_deg) * METRES_PER_DEG
+        east = (here.longitude_deg - home.longitude_deg) * METRES_PER_DEG * cos(radians(home.latitude_deg))
+        return hypot(north, east)
+
     def until(self, condition, seconds, what):
         """Waits for a condition, at most so long by the vehicle's clock."""
         start_s, wall_s = self.time_s, time.monotonic()
@@ -259,7 +267,7 @@ def test_offboard_position_velocity_and_attitude(vehicle, client):
     client.until(lambda: hypot(*client.vel_ned) < 0.3, 8.0, "standing")
     latitude, longitude = client.place(0.0, 0.0)
     client.action.goto_location(latitude, longitude, client.telemetry.home().absolute_altitude_m + 5.0, nan)
-    client.until(lambda: dist(client.pos_ned[:2], (0.0, 0.0)) < 0.3 and client.height_m < 5.3, 30.0, "over home")
+    client.until(lambda: client.from_home_m < 0.3 and client.height_m < 5.3, 30.0, "over home")
     client.action.land()
     client.wait_landed()
     assert final_distance_m(vehicle) < 2.0
