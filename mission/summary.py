@@ -83,26 +83,27 @@ def estimator_errors(history: History, frames: Rows) -> EstimatorErrors:
 
 
 def cross_track_m(pos_ned: Rows, seq: Rows, path_ned: Sequence[tuple[int, Rows]]) -> Rows:
-    """Distance of each position to the legs flown then: the leg that ends at the current item, and the one before.
+    """Distance of each position to the legs flown then: the leg to the current item, and the one flown before.
 
-    Take-off and landing are no legs: NaN there.
+    A leg starts at the item that was current before: jumps are followed. Take-off and landing are no legs: NaN there.
 
     Args:
         pos_ned: [m], shape (frames, 3).
         seq: current item, shape (frames,).
-        path_ned: (seq, point) of each item with a position, in order, beginning with the take-off point.
+        path_ned: (seq, point) of each item with a position, beginning with the take-off point.
     """
     distance = np.full(len(pos_ned), np.nan)
-    seqs = [item_seq for item_seq, _ in path_ned]
-    for index in range(1, len(path_ned)):
-        frames = seq == seqs[index]
-        span = np.asarray(path_ned[index][1]) - path_ned[index - 1][1]
-        if not frames.any() or np.hypot(span[0], span[1]) < LEG_MIN_M:
+    places = dict(path_ned)
+    here, leg_before = path_ned[0][1] if path_ned else np.zeros(3), None
+    for frames in np.split(np.arange(len(seq)), np.flatnonzero(np.diff(seq)) + 1):
+        there = places.get(int(seq[frames[0]])) if len(frames) else None
+        if there is None:
             continue
-        legs = [segment_distance_m(pos_ned[frames], path_ned[index - 1][1], path_ned[index][1])]
-        if index >= 2:
-            legs.append(segment_distance_m(pos_ned[frames], path_ned[index - 2][1], path_ned[index - 1][1]))
-        distance[frames] = np.min(legs, axis=0)
+        leg = (here, there)
+        if np.hypot(*(there - here)[:2]) >= LEG_MIN_M:
+            legs = [leg] if leg_before is None else [leg, leg_before]
+            distance[frames] = np.min([segment_distance_m(pos_ned[frames], *ends) for ends in legs], axis=0)
+        here, leg_before = there, leg
     return distance
 
 

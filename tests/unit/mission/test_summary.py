@@ -72,6 +72,15 @@ def test_cross_track_is_measured_to_the_present_leg_and_the_one_before():
     assert isnan(distances[3])  # item 1 is no place
 
 
+def test_cross_track_follows_a_jump_back():
+    path = [(-1, np.zeros(3)), (1, np.array([0.0, 0.0, -10.0])), (2, np.array([50.0, 0.0, -10.0]))]
+    path.append((3, np.array([50.0, 50.0, -10.0])))
+    pos = np.zeros((5, 3))
+    pos[:, 2] = -10.0
+    pos[1:, :2] = [(25.0, 0.0), (50.0, 25.0), (50.0, 24.0), (50.0, 3.0)]
+    assert cross_track_m(pos, np.array([1, 2, 3, 2, 2]), path)[1:] == pytest.approx(np.zeros(4))
+
+
 def test_perfect_estimates_have_no_error():
     errors = estimator_errors(history_of(10), np.ones(10, bool))
     assert (*errors.pos_ned_m, *errors.vel_ned_m_s, errors.tilt_deg, errors.yaw_deg) == (0.0,) * 8
