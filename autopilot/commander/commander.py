@@ -261,7 +261,7 @@ class Commander:
                 self.announcer.statustext(Severity.INFO, "Landed")
             elif state.is_armed:
                 self._act(CRASHED)
-        elif not state.is_armed and state.time_us - self._disarmed_us > _FALLEN_US:
+        elif not state.is_armed and (self._landing.lies_still or state.time_us - self._disarmed_us > _FALLEN_US):
             self._touch_down()
         elif state.landed_state is not LandedState.TAKEOFF or state.mode is not Mode.TAKEOFF:
             state.landed_state = LandedState.LANDING if self._flying.is_landing else LandedState.IN_AIR

@@ -5,7 +5,7 @@ pass: with less than a third of its hover thrust it gathers a speed of LNDMC_Z_V
 needs a third of LNDMC_TRIG_TIME. A range finder that sees air below only delays the answer, in case it is stuck.
 """
 
-from math import nan, radians
+from math import nan, radians, sqrt
 from typing import Any
 
 from autopilot.ports import TERRAIN_VALID, VELOCITY_VALID
@@ -22,6 +22,11 @@ _FALL_M_S = (
     1.0  # a vehicle that sinks faster than this after a contact is in the air again: a tenth of a second of fall
 )
 _FALLS_MAX = 3  # a range finder that told of ground so often where there is none lies; bounces are fewer; guess
+# What lies still with its motors off is down, even if the impact has upset the estimate of its speed. In the air it
+# would feel 1 g only near its terminal velocity, which is well above this speed. Guesses.
+_STILL_M_S = 10.0
+_STILL_FORCE_SHARE = 0.2  # of gravity, by which the specific force may differ from it
+_STILL_S = 1.0
 _AIR_BELOW_M = 1.0  # range finder reading that speaks against a landing; guess
 _AIR_BELOW_FACTOR = 5.0  # by which such a reading stretches the time needed
 
@@ -37,8 +42,8 @@ class LandingDetector:
 
     __slots__ = (
         "_contact_thrust", "_fall_count", "_hover_thrust", "_landed_thrust", "_params", "_rate_max_sq",
-        "_speed_xy_max_sq", "_speed_z_max", "_stage_s", "_time_s", "_touch_height", "_touch_s", "has_contact",
-        "is_landed",
+        "_speed_xy_max_sq", "_speed_z_max", "_stage_s", "_still_s", "_time_s", "_touch_height", "_touch_s",
+        "has_contact", "is_landed",
     )  # fmt: skip
 
     def __init__(self, params: ParameterTable, hover_thrust: float, standing_height_m: float = nan) -> None:
@@ -48,6 +53,7 @@ class LandingDetector:
         self._touch_s = 0.0  # for which a descent has stalled just above the ground
         self._fall_count = 0  # contacts after which the vehicle fell
         self._time_s = 0.0  # for which it has looked landed, stage after stage
+        self._still_s = 0.0  # for which it has lain still without thrust
         # Something else than the rotors has carried the vehicle. It stays so while the vehicle settles: control that
         # came back at each bounce would tip it over.
         self.has_contact = False
@@ -57,7 +63,7 @@ class LandingDetector:
 
     def reset(self) -> None:
         """The vehicle is on the ground and about to leave it."""
-        self._time_s = self._touch_s = 0.0
+        self._time_s = self._touch_s = self._still_s = 0.0
         self._fall_count = 0
         self.has_contact = self.is_landed = False
 
@@ -76,7 +82,13 @@ class LandingDetector:
         elif estimate.vel_ned[2] > _FALL_M_S and self.has_contact:
             self.has_contact = False
             self._fall_count += 1
+        self._still_s = self._still_s + dt_s if thrust == 0.0 and self._is_still(estimate) else 0.0
         return self.is_landed
+
+    @property
+    def lies_still(self) -> bool:
+        """Whether a vehicle without thrust has lain still for a while; means nothing while it is armed."""
+        return self._still_s >= _STILL_S
 
     def _looks_landed(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:
         """Carries the time of the stages on; true at the end of the last."""
@@ -116,6 +128,16 @@ class LandingDetector:
         # Without a velocity: rotors alone at this thrust would be felt as less than a third of gravity.
         x, y, z = estimate.accel_frd
         return bool(x * x + y * y + z * z > (0.7 * GRAVITY_M_S2) ** 2)
+
+    def _is_still(self, estimate: Any) -> bool:
+        x, y, z = estimate.accel_frd
+        north, east, down = estimate.vel_ned
+        return bool(
+            estimate.flags & VELOCITY_VALID
+            and north * north + east * east + down * down < _STILL_M_S**2
+            and abs(sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) < _STILL_FORCE_SHARE * GRAVITY_M_S2
+            and not self._is_turning(estimate)
+        )
 
     def _is_turning(self, estimate: Any) -> bool:
         p, q, r = estimate.omega_frd

@@ -81,7 +81,7 @@ class ParameterService:
             self._is_setting = False
             if stored != asked:
                 bounds = f"{declaration.minimum:g} to {declaration.maximum:g}"
-                self._endpoint.text(Severity.NOTICE, f"Parameter {name}: {stored:g}, it may be {bounds}")
+                self._endpoint.text(Severity.NOTICE, f"Parameter {name}: {asked:g} asked, {stored:g} set ({bounds})")
         self._endpoint.broadcast(_PARAM_VALUE, self._value(name, self._indices[name]))
 
     def _changed(self, declaration: Parameter) -> None:

@@ -43,6 +43,7 @@ class Result(IntEnum):
     INVALID_SEQUENCE = 13
 
 
+_DEEP_M = 5.0  # below home, from which an item is worth a warning: the terrain there is not known; guess
 MISSION_FRAME = 2  # MAV_FRAME_MISSION: no position
 ABSOLUTE_FRAMES = (0, 5)  # altitude above sea level
 RELATIVE_FRAMES = (3, 6)  # altitude above home
@@ -85,6 +86,15 @@ def refuse_items(items: Sequence[MissionItem]) -> ItemRefusal | None:
         if problem is not None:
             return ItemRefusal(i_item, int(problem[0]), problem[1])
     return None
+
+
+def warning_of(items: Sequence[MissionItem]) -> str:
+    """What is odd about a mission that can be flown, naming the first such item; empty if nothing is."""
+    for item in items:
+        has_height = item.command in _PLACED or item.command == Command.TAKEOFF
+        if has_height and item.frame in RELATIVE_FRAMES and item.z < -_DEEP_M:
+            return f"item {item.seq} is {-item.z:.0f} m below home"
+    return ""
 
 
 def _sequence_problem(i_item: int, item: MissionItem) -> _Problem | None:

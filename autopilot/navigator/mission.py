@@ -9,7 +9,15 @@ from enum import IntEnum
 from math import hypot, inf, isfinite, nan, radians, sqrt
 
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.items import NAV_COMMANDS, RELATIVE_FRAMES, Command, hold_time_s, is_here, refuse_items
+from autopilot.navigator.items import (
+    NAV_COMMANDS,
+    RELATIVE_FRAMES,
+    Command,
+    hold_time_s,
+    is_here,
+    refuse_items,
+    warning_of,
+)
 from autopilot.navigator.land import Landing
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff import Climb
@@ -72,6 +80,9 @@ class Mission:
             return refusal
         state = self._context.state
         self.items = tuple(items)
+        warning = warning_of(items)
+        if warning:
+            self._context.announcer.statustext(Severity.WARNING, f"Mission: {warning}")
         self._index = 0
         self._stage = _Stage.IDLE
         self._jumps_left.clear()
@@ -270,11 +281,11 @@ class Mission:
         self._hold()
 
     def _complete(self) -> None:
-        self._context.announcer.statustext(Severity.INFO, "Mission complete")
         self._finish()
         self._hold()
 
     def _finish(self) -> None:
+        self._context.announcer.statustext(Severity.INFO, "Mission complete")
         self._stage = _Stage.IDLE
         self._context.state.mission_state = MissionState.COMPLETE
 

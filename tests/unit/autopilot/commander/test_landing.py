@@ -125,3 +125,23 @@ def test_range_finder_that_tells_of_ground_where_there_is_none_is_not_believed_f
     assert not is_felt()
     landing.reset()
     assert is_felt()
+
+
+@pytest.mark.parametrize(
+    ("accel_z", "sink", "roll_rate", "lies_still"),
+    [
+        (-9.8, 0.0, 0.0, True),
+        (9.8, 3.0, 0.0, True),  # on its back, and the impact has upset the estimate of its speed
+        (-1.0, 3.0, 0.0, False),  # falls
+        (-9.8, 15.0, 0.0, False),  # falls at its terminal velocity
+        (-9.8, 0.0, 1.0, False),  # rolls down a slope
+    ],
+)
+def test_vehicle_that_lies_still_without_thrust_is_down(accel_z, sink, roll_rate, lies_still):
+    landing = detector()
+    row = estimate(vel=(0.0, 0.0, sink), omega=(roll_rate, 0.0, 0.0), accel_z=accel_z)
+    for _ in range(52):
+        landing.update(row, 0.0, 0.0, DT_S)
+    assert landing.lies_still == lies_still
+    landing.update(row, 0.1, 0.0, DT_S)
+    assert not landing.lies_still

@@ -89,7 +89,7 @@ def test_value_out_of_bounds_is_clamped_and_told():
     rig.client.send("PARAM_SET", param_id="MIS_TAKEOFF_ALT", param_value=bits(5000.0), param_type=9)
     messages = rig.frame()
     assert [m.fields.param_value for m in messages if m.name == "PARAM_VALUE"] == [bits(80.0)]
-    assert texts(messages) == ["Parameter MIS_TAKEOFF_ALT: 80, it may be 0.5 to 80"]
+    assert texts(messages) == ["Parameter MIS_TAKEOFF_ALT: 5000 asked, 80 set (0.5 to 80)"]
 
 
 def test_constant_and_nan_change_nothing():

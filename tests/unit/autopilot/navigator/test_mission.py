@@ -289,3 +289,20 @@ def test_takeoff_item_elsewhere_climbs_then_goes_there():
     rig.run_until(lambda: rig.recorder.reached == [0])
     assert max(p[0] for p in rig.track if p[2] > -7.0) < 0.1
     assert rig.pos[0] > 12.5
+
+
+def test_mission_that_ends_with_a_return_is_announced_as_complete():
+    rig = started(Kinematic().flying(), item(0, WAYPOINT, 30.0, 0.0), do(1, RETURN))
+    rig.run_until(lambda: rig.state.mode is Mode.RETURN)
+    assert [text for _, text in rig.recorder.texts].count("Mission complete") == 1
+    assert rig.state.mission_state == MissionState.COMPLETE
+    assert rig.recorder.reached == [0]
+
+
+@pytest.mark.parametrize(
+    ("height", "command", "is_told"), [(-20.0, WAYPOINT, True), (-4.0, WAYPOINT, False), (-20.0, LAND, False)]
+)
+def test_item_far_below_home_is_taken_with_a_warning(height, command, is_told):
+    rig = Kinematic().ready()
+    assert rig.fc.load_mission([item(0, TAKEOFF), item(1, command, 30.0, 0.0, height)]) is None
+    assert rig.recorder.has_text("Mission: item 1 is 20 m below home") == is_told
