@@ -1,9 +1,12 @@
 """`honeyguide fly`: options to a flight, live progress, summary table and run folder."""
 
 import json
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from pydantic import ValidationError
@@ -28,9 +31,14 @@ from sim.sensors.sensors import DEFAULT_HOME
 from sim.world.world import WorldConfig
 
 PROGRESS_PERIOD_S = 0.2
+PROGRESS_HEADINGS = (
+    *("time\ns", "mode\n", "armed\n", "item\n", "north\nm", "east\nm"),
+    *("height\nm", "speed\nm/s", "battery\n%", "pace\nx"),
+)
 GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
 API_PORT_STEP = 14580 - 14540
 PORT_MAX = 65535
+WIND_EXPECTED_M_S = 13.0  # measured: an x500 finishes the default mission for 12 of 12 seeds; at 14 m/s for 10
 HOME_MOST = (89.0, 180.0, 6000.0)  # latitude and longitude [deg], altitude [m]: highest airfields
 
 
@@ -72,6 +80,7 @@ def fly_session(options: FlightOptions) -> int:
     """
     console = Console()
     speed = _speed(options.speed)
+    _check_end(options, speed)
     config = _config(options)
     plan = None if options.is_idle else _plan(options.plan, config.home)
     try:
@@ -83,7 +92,7 @@ def fly_session(options: FlightOptions) -> int:
     with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
         flight = Flight(config, links=links, folder=folder)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
-    _run(flight, running, options, speed, console)
+    _run(flight, running, options, speed, folder, console)
     return _finish(flight, running, plan, folder, console)
 
 
@@ -97,6 +106,16 @@ def _speed(text: str) -> float | None:
     if not 0.0 < speed <= 1000.0:
         raise UserError(f"--speed {text}: must be a number above 0, or 'max'")
     return speed
+
+
+def _check_end(options: FlightOptions, speed: float | None) -> None:
+    """Refuses options that leave nothing to fly, or nothing to wait for."""
+    if options.is_idle and options.plan is not None:
+        raise UserError("--plan and --idle: choose one, to fly a plan or to wait for a ground station")
+    if options.is_idle and options.once:
+        raise UserError("--idle and --once: without a plan there is no mission to end with; use --seconds to end")
+    if options.is_idle and speed is None and options.seconds is None:
+        raise UserError("--idle --speed max: nobody can connect, so give --seconds to say when it ends")
 
 
 def _config(options: FlightOptions) -> FlightConfig:
@@ -137,7 +156,11 @@ def _home(text: str) -> GeoPoint:
     if len(values) == 2:
         values.append(DEFAULT_HOME.alt_m)
     if len(values) != 3 or not all(abs(value) <= most for value, most in zip(values, HOME_MOST, strict=True)):
-        raise UserError(f"--home {text}: must be latitude,longitude or latitude,longitude,altitude")
+        latitude, longitude, altitude = HOME_MOST
+        raise UserError(
+            f"--home {text}: must be latitude,longitude or latitude,longitude,altitude, with the latitude within "
+            f"±{latitude:g}, the longitude within ±{longitude:g} and the altitude within ±{altitude:g} m"
+        )
     return GeoPoint(*values)
 
 
@@ -174,23 +197,40 @@ def _candidates(stem: Path) -> Any:
 
 
 def _links(options: FlightOptions) -> list[Link]:
+    _check_ports(options)
     links: list[Link] = []
     try:
         for role, port, step in (
             (LinkRole.GROUND, options.gcs_port, GROUND_PORT_STEP),
             (LinkRole.ONBOARD, options.api_port, API_PORT_STEP),
         ):
-            own_port = port + step if port + step <= PORT_MAX else 0  # 0: any free one
-            links.append(UdpLink(port, role, options.host, local_port=own_port))
+            links.append(UdpLink(port, role, options.host, local_port=port + step))
     except LinkError as error:
         for link in links:
             link.close()
-        raise UserError(str(error)) from error
+        hint = "; another flight may be running: choose --gcs-port or --api-port" if " is in use " in str(error) else ""
+        raise UserError(f"{str(error).rstrip('.')}{hint}") from error
     return links
 
 
+def _check_ports(options: FlightOptions) -> None:
+    """The clients' two ports and the vehicle's own two must exist and be four."""
+    gcs_port, api_port = options.gcs_port, options.api_port
+    for name, port, step in (("gcs", gcs_port, GROUND_PORT_STEP), ("api", api_port, API_PORT_STEP)):
+        if port + step > PORT_MAX:
+            raise UserError(
+                f"--{name}-port {port}: must be at most {PORT_MAX - step}: the vehicle's own is {step} above"
+            )
+    own = (gcs_port + GROUND_PORT_STEP, api_port + API_PORT_STEP)
+    if len({gcs_port, api_port, *own}) < 4:
+        raise UserError(
+            f"--gcs-port {gcs_port} and --api-port {api_port}: must differ, also from the vehicle's own ports "
+            f"{own[0]} and {own[1]}"
+        )
+
+
 def _run(
-    flight: Flight, running: Running | None, options: FlightOptions, speed: float | None, console: Console
+    flight: Flight, running: Running | None, options: FlightOptions, speed: float | None, folder: Path, console: Console
 ) -> None:
     """Advances the flight until it is over or the user stops it."""
     end_us = int(options.seconds * 1e6) if options.seconds is not None else None
@@ -201,21 +241,50 @@ def _run(
             return True
         return ends_with_script and (running is None or running.is_done)
 
-    progress = _Progress(flight, running)
-    with Live(console=console, transient=True, auto_refresh=False) as live:
+    progress = Progress(flight, running)
+    try:
+        with _sigterm_interrupts():
+            _print_start(options, speed, folder, console)
+            with Live(console=console, transient=True, auto_refresh=False) as live:
 
-        def on_frame(_: Flight) -> None:
-            if progress.is_due():
-                live.update(progress.table(), refresh=True)
+                def on_frame(_: Flight) -> None:
+                    if progress.is_due():
+                        live.update(progress.table(), refresh=True)
 
-        try:
-            flight.run(is_over, speed=speed, on_frame=on_frame)
-        except KeyboardInterrupt:
-            console.print("stopped by the user")
+                flight.run(is_over, speed=speed, on_frame=on_frame)
+    except KeyboardInterrupt:
+        console.print("stopped by the user")
 
 
-class _Progress:
-    """The line of figures shown while flying."""
+@contextmanager
+def _sigterm_interrupts() -> Iterator[None]:
+    """Inside, SIGTERM is what Ctrl-C is."""
+
+    def interrupt(*_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _print_start(options: FlightOptions, speed: float | None, folder: Path, console: Console) -> None:
+    ports = f"UDP {options.gcs_port} (ground stations), {options.api_port} (offboard API)"
+    where = "lockstep, without network links" if speed is None else ports
+    _print_line(console, f"flying: {where}; logs in {folder}")
+    if options.wind_m_s > WIND_EXPECTED_M_S:
+        _print_line(console, f"wind of {options.wind_m_s:g} m/s is more than an x500 can be relied on to fly")
+
+
+def _print_line(console: Console, text: str) -> None:
+    """One line however narrow the console is, at once also into a pipe: rich flushes."""
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+class Progress:
+    """The line of figures shown while flying; at most 80 columns wide."""
 
     def __init__(self, flight: Flight, running: Running | None) -> None:
         self._flight = flight
@@ -235,27 +304,27 @@ class _Progress:
         self._shown_wall_s, self._shown_us = now_s, self._flight.time_us
         north, east, down = state.estimate.pos_ned
         velocity = state.estimate.vel_ned
-        table = Table(show_edge=False, pad_edge=False)
-        for heading in ("time", "mode", "armed", "item", "north", "east", "height", "speed", "battery", "pace"):
-            table.add_column(heading, justify="right")
+        table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+        for heading in PROGRESS_HEADINGS:
+            table.add_column(heading, justify="right", no_wrap=True)
+        count = state.mission_count
         table.add_row(
-            f"{self._flight.time_us * 1e-6:.1f} s",
+            f"{self._flight.time_us * 1e-6:.1f}",
             Mode(state.mode).name,
             "yes" if state.is_armed else "no",
-            f"{state.mission_current}/{max(state.mission_count - 1, 0)}",
+            f"{min(state.mission_current + 1, count)} of {count}" if count else "none",
             f"{north:.1f}",
             f"{east:.1f}",
             f"{-down:.1f}",
-            f"{float(np.hypot(velocity[0], velocity[1])):.1f} m/s",
-            f"{100.0 * state.battery_remaining:.0f} %",
-            f"{rate:.1f} x",
+            f"{float(np.hypot(velocity[0], velocity[1])):.1f}",
+            f"{100.0 * state.battery_remaining:.0f}",
+            f"{rate:.1f}",
         )
         return table
 
 
 def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: Path, console: Console) -> int:
     """Writes the run folder and prints the summary; returns the exit code."""
-    texts = list(flight.drone.texts)
     history = flight.close()
     if len(history.time_us) == 0:
         console.print("the flight ended before its first frame")
@@ -265,10 +334,11 @@ def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: 
     write_whole(folder / "summary.json", (json.dumps(summary.as_json(), indent=2) + "\n").encode())
     title = f"{flight.airframe.name}, wind {flight.config.wind_m_s:g} m/s, seed {flight.config.seed}: {summary.result}"
     plot_flight(history, flight.world, path_ned, title, folder / "flight.png")
-    console.print(_summary_table(summary))
-    if not summary.is_success and running is not None:
-        console.print(f"last words of the vehicle: {texts[-1] if texts else 'none'}", markup=False)
-    console.print(f"logs, summary and picture: {folder}", markup=False)
+    if summary.armed_s > 0.0:
+        console.print(_summary_table(summary))
+    else:
+        _print_line(console, f"result: {summary.result}\nsimulated: {summary.simulated_s:.1f} s, never armed")
+    _print_line(console, f"logs, summary and picture: {folder}")
     return 0 if summary.is_success or running is None else 1
 
 

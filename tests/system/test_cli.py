@@ -56,7 +56,7 @@ def test_port_in_use_is_refused(tmp_path):
         result = honeyguide(
             "fly", "--idle", "--gcs-port", gcs_port, "--api-port", api_port, "--run-folder", tmp_path / "flight"
         )
-    assert_refused(result, rf"UDP port {api_port + 40} is in use")
+    assert_refused(result, rf"UDP port {api_port + 40} is in use .*: choose --gcs-port or --api-port$")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -113,7 +113,10 @@ def test_flight_ends_when_its_time_is_over(fly, tmp_path):
     result = fly("--seconds", "0.1")
     assert result.returncode == 1
     assert result.stderr == ""
-    assert "mission not finished" in result.stdout
+    lines = result.stdout.splitlines()
+    assert lines[0] == f"flying: lockstep, without network links; logs in {tmp_path / 'flight'}"
+    assert lines[1:3] == ["result: mission not finished", "simulated: 0.1 s, never armed"]
+    assert "nan" not in result.stdout
     assert json.loads((tmp_path / "flight" / "summary.json").read_text())["simulated_s"] == pytest.approx(0.1)
 
 
@@ -129,6 +132,27 @@ def test_idle_vehicle_stops_on_interrupt_with_its_log_whole(tmp_path):
     assert "stopped by the user" in output
     assert "Traceback" not in output
     ULog(str(vehicle.folder / "flight.ulg"))
+
+
+def test_sigterm_ends_a_flight_like_an_interrupt(tmp_path):
+    """The line that says where it flies comes at once, also into a pipe; a service manager's SIGTERM ends it whole."""
+    gcs_port, api_port = free_ports()
+    folder = tmp_path / "flight"
+    words = ["fly", "--idle", "--wind", 17, "--gcs-port", gcs_port, "--api-port", api_port, "--run-folder", folder]
+    process = subprocess.Popen(
+        [HONEYGUIDE, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    first = process.stdout.readline().strip()
+    assert first == f"flying: UDP {gcs_port} (ground stations), {api_port} (offboard API); logs in {folder}"
+    assert process.stdout.readline().strip() == "wind of 17 m/s is more than the x500 can be expected to fly"
+    time.sleep(0.5)
+    process.send_signal(signal.SIGTERM)
+    output, errors = process.communicate(timeout=60.0)
+    assert process.returncode == 0, errors
+    assert "stopped by the user" in output
+    assert errors == ""
+    assert sorted(path.name for path in folder.iterdir()) == ["flight.png", "flight.tlog", "flight.ulg", "summary.json"]
+    ULog(str(folder / "flight.ulg"))
 
 
 def test_interrupt_while_starting_is_no_traceback(tmp_path):

@@ -2,13 +2,18 @@
 
 import json
 import re
+from io import StringIO
+from types import SimpleNamespace
 
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
+from autopilot.vehicle import Mode
 from common.airframe import AIRFRAME_FOLDER
 from mission.cli import app
 from mission.plan import DEFAULT_PLAN
+from mission.session import Progress
 
 
 @pytest.fixture
@@ -77,7 +82,13 @@ def test_missing_plan_is_refused(fly, tmp_path):
         (("--speed", "nan"), r"--speed nan: must be"),
         (("--home", "47.4"), r"--home 47\.4: must be latitude,longitude"),
         (("--home", "north,east"), r"--home north,east: must be"),
-        (("--home", "91,0"), r"--home 91,0: must be"),
+        (("--home", "91,0"), r"--home 91,0: must be .* latitude within ±89, the longitude within ±180"),
+        (("--idle",), r"--idle and --once: without a plan"),
+        (("--idle", "--plan", DEFAULT_PLAN), r"--plan and --idle: choose one"),
+        (("--speed", "1", "--gcs-port", "61516"), r"--gcs-port 61516: must be at most 61515"),
+        (("--speed", "1", "--api-port", "65500"), r"--api-port 65500: must be at most 65495"),
+        (("--speed", "1", "--gcs-port", "30000", "--api-port", "30000"), r"--api-port 30000: must differ"),
+        (("--speed", "1", "--gcs-port", "30000", "--api-port", "34020"), r"ports 34020 and 34060"),
         (("--home", "47,8,nan"), r"--home 47,8,nan: must be"),
         (("--param", "NOPE=3"), r"parameter NOPE: there is none of that name"),
         (("--param", "MPC_XY_CRUISE=fast"), r"--param MPC_XY_CRUISE=fast: must be NAME=VALUE"),
@@ -100,6 +111,37 @@ def test_wrong_airframe_file_is_refused(fly, tmp_path):
     assert_refused(fly("--airframe", airframe), r"mine\.toml: body\.mass_kg: Input should be greater than 0")
     airframe.write_text(text[:300])
     assert_refused(fly("--airframe", airframe), r"mine\.toml: not TOML")
+
+
+def test_idle_in_lockstep_needs_an_end(tmp_path):
+    words = ["fly", "--idle", "--speed", "max", "--run-folder", str(tmp_path / "flight")]
+    assert_refused(CliRunner().invoke(app, words, catch_exceptions=False), r"--idle --speed max: .* give --seconds")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("count", "item"), [(0, "none"), (12, "12 of 12")])
+def test_progress_fits_80_columns(count, item):
+    """With figures as wide as they get."""
+    estimate = SimpleNamespace(pos_ned=(-1234.5, -1234.5, -1234.5), vel_ned=(-12.0, 12.0, 0.0))
+    widest_mode = max(Mode, key=lambda mode: len(mode.name))
+    state = SimpleNamespace(
+        estimate=estimate,
+        mode=widest_mode,
+        is_armed=True,
+        mission_current=11,
+        mission_count=count,
+        battery_remaining=1.0,
+    )
+    flight = SimpleNamespace(time_us=3_600_000_000, controller=SimpleNamespace(state=state))
+    console = Console(width=80, file=StringIO())
+    progress = Progress(flight, None)
+    progress.table()
+    console.print(progress.table())
+    text = console.file.getvalue()
+    assert len(text.splitlines()) == 3, text
+    assert "…" not in text
+    for part in ("3600.0", widest_mode.name, item, "-1234.5", "1234.5", "17.0", "100", "m/s"):
+        assert part in text
 
 
 def test_option_out_of_range_is_refused(fly, tmp_path):
