@@ -144,7 +144,7 @@ def test_sigterm_ends_a_flight_like_an_interrupt(tmp_path):
     )
     first = process.stdout.readline().strip()
     assert first == f"flying: UDP {gcs_port} (ground stations), {api_port} (offboard API); logs in {folder}"
-    assert process.stdout.readline().strip() == "wind of 17 m/s is more than the x500 can be expected to fly"
+    assert process.stdout.readline().strip() == "wind of 17 m/s is more than an x500 can be relied on to fly"
     time.sleep(0.5)
     process.send_signal(signal.SIGTERM)
     output, errors = process.communicate(timeout=60.0)
