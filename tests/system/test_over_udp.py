@@ -18,7 +18,7 @@ async def hop(drone):
 
 
 def test_script_flies_a_vehicle_at_its_own_speed(tmp_path):
-    with IdleVehicle(tmp_path, "--trees", 0, speed=8.0) as vehicle:
+    with IdleVehicle(tmp_path, "--trees", 0, speed=3.0) as vehicle:
         running = fly_over_udp(hop, port=vehicle.api_port, vehicle_port=vehicle.api_port + 40)
     assert running.error is None
     assert running.result > 3_000_000
