@@ -27,6 +27,10 @@ class GeoPoint:
     alt_m: float  # above mean sea level, except where the owner says otherwise
 
 
+# Zurich: the home of PX4's simulators, named by many scripts
+DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
+
+
 @lru_cache(maxsize=64)
 def _tangent_plane(origin: GeoPoint) -> tuple[float, float, float, float]:
     """Sine and cosine of the origin's latitude, its distance from the earth's axis [m] and above the equator [m]."""

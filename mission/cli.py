@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 
 from autopilot.mavlink.links import GROUND_STATION_PORT, OFFBOARD_PORT
+from common.geodesy import DEFAULT_HOME
 
 app = typer.Typer(
     add_completion=False,
@@ -18,6 +19,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Fly a simulated drone and its flight controller over MAVLink.",
 )
+_HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
 _ERRORS = Console(stderr=True, soft_wrap=True, highlight=False)
 
 
@@ -47,7 +49,7 @@ def fly(
     wind_from: Annotated[float, typer.Option(min=0.0, max=360.0, help="Where the wind comes from [deg].")] = 270.0,
     noise: Annotated[float, typer.Option(min=0.0, max=10.0, help="Scale of all sensor noise.")] = 1.0,
     airframe: Annotated[str, typer.Option(help="Airframe name or TOML file.")] = "x500",
-    home: Annotated[str, typer.Option(help="Latitude,longitude[,altitude AMSL].")] = "47.397742,8.545594,488",
+    home: Annotated[str, typer.Option(help="Latitude,longitude[,altitude AMSL].")] = _HOME,
     world_seed: Annotated[int, typer.Option(min=0, help="Seed of hills and trees.")] = 1,
     trees: Annotated[float, typer.Option(min=0.0, max=1000.0, help="Trees per hectare.")] = 60.0,
     hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m].")] = 12.0,

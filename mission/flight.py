@@ -17,7 +17,7 @@ from autopilot.node import FlightController, HostPorts
 from autopilot.params import parameter_table
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer
-from common.geodesy import GeoPoint
+from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.kernels import FRAME_TICKS, FRAME_US
 from common.params import ParameterTable
 from common.records import row_reader
@@ -26,7 +26,7 @@ from mission.client import Running
 from mission.recorder import History, Recorder
 from mission.script import Drone, Script
 from sim.rig import Rig
-from sim.sensors.sensors import DEFAULT_HOME, sensor_model
+from sim.sensors.sensors import sensor_model
 from sim.wind import wind_model
 from sim.world.world import WorldConfig, WorldMap, build_world
 

@@ -19,7 +19,7 @@ from autopilot.vehicle import Mode
 from common.airframe import AirframeError, load_airframe
 from common.clock import wall_date_text, wall_time_s
 from common.files import write_whole
-from common.geodesy import GeoPoint
+from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.params import ParameterError
 from mission.client import Running
 from mission.flight import Flight, FlightConfig, flight_parameters
@@ -27,7 +27,6 @@ from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
 from mission.plots import plot_flight
 from mission.script import fly_plan
 from mission.summary import Summary, planned_path, summarise
-from sim.sensors.sensors import DEFAULT_HOME
 from sim.world.world import WorldConfig
 
 PROGRESS_PERIOD_S = 0.2

@@ -21,10 +21,11 @@ from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import parameter_table
 from autopilot.ports import SETPOINT_RATE, Setpoint
 from common.airframe import load_airframe
+from common.geodesy import DEFAULT_HOME
 from common.kernels import FRAME_TICKS, TICK_S
 from sim.advance import RigArrays
 from sim.rig import Rig, Snapshot
-from sim.sensors.sensors import DEFAULT_HOME, sensor_model
+from sim.sensors.sensors import sensor_model
 from sim.wind import wind_model
 from sim.world.world import build_world
 

@@ -9,6 +9,7 @@ effect on tilt.
 import warp as wp
 
 from common.airframe import Airframe
+from common.geodesy import DEFAULT_HOME
 from common.kernels import GRAVITY_M_S2, SUBSTEPS, TICK_S, vec8
 from common.rotation import quat_from_yaw
 from sim.battery import BatteryModel, battery_current, battery_model, open_circuit_voltage
@@ -29,7 +30,6 @@ wp.set_module_options({"enable_backward": False})
 _GRAVITY_NED = wp.constant(wp.vec3(0.0, 0.0, GRAVITY_M_S2))
 _SEA_LEVEL_DENSITY_KG_M3 = wp.constant(1.225)  # ISO 2533 standard atmosphere
 _DENSITY_LAPSE_PER_M = wp.constant(9.6e-5)  # ISO 2533: relative change of density per metre near sea level
-_HOME_ALT_AMSL_M = 488.0
 _SUBSTEP_S = wp.constant(TICK_S / SUBSTEPS)
 _SUBSTEP_COUNT = wp.constant(SUBSTEPS)
 _UNROLLED_ROTORS = 4
@@ -364,7 +364,7 @@ def body_at_rest(model: MultirotorModel, pos_ned: wp.vec3, yaw_rad: float) -> Bo
     return body
 
 
-def multirotor_model(airframe: Airframe, home_alt_amsl_m: float = _HOME_ALT_AMSL_M) -> MultirotorModel:
+def multirotor_model(airframe: Airframe, home_alt_amsl_m: float = DEFAULT_HOME.alt_m) -> MultirotorModel:
     """Constants of an airframe whose home lies home_alt_amsl_m above sea level."""
     body, rotor = airframe.body, airframe.rotor_model
     model = MultirotorModel()

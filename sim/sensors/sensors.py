@@ -9,7 +9,7 @@ from typing import Any
 import warp as wp
 
 from autopilot.ports import Samples
-from common.geodesy import GeoPoint
+from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.kernels import TICK_S
 from sim.bodies.multirotor import BodyState
@@ -44,8 +44,6 @@ from sim.sensors.range import RangeModel, range_model, range_sample
 from sim.world.world import World, ray_hit
 
 wp.set_module_options({"enable_backward": False})
-
-DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)  # Zurich: the home of PX4's simulators, named by many scripts
 
 
 @wp.struct

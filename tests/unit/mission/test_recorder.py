@@ -7,12 +7,11 @@ import pytest
 from pyulog import ULog
 
 from autopilot.vehicle import MissionItem
-from common.geodesy import geodetic_from_ned
+from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from mission.recorder import NAVIGATION_STATES
 from mission.topics import TOPICS, wxyz
 from sim.faults import set_fault
-from sim.sensors.sensors import DEFAULT_HOME
 
 SECONDS = 14.0
 FRAMES = round(SECONDS * 50)

@@ -6,13 +6,12 @@ from math import hypot, nan, pi
 import pytest
 
 from autopilot.vehicle import Mode
-from common.geodesy import geodetic_from_ned
+from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 from mission.client import CommandRefused, ScriptError, ScriptTimeout
 from mission.flight import Flight, FlightConfig
 from mission.plan import Plan, PlanItem
 from mission.script import fly_plan
 from sim.faults import set_fault
-from sim.sensors.sensors import DEFAULT_HOME
 from sim.world.world import WorldConfig
 
 CONFIG = FlightConfig(noise=0.0, world=WorldConfig(trees_per_ha=0.0, hill_height_m=0.0))

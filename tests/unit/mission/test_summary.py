@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from autopilot.vehicle import Mode
-from common.geodesy import geodetic_from_ned
+from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 from mission.client import Running, ScriptError
 from mission.flight import Flight, FlightConfig
 from mission.plan import DEFAULT_PLAN, Plan, PlanItem, read_plan
@@ -20,7 +20,6 @@ from mission.summary import (
     segment_distance_m,
     summarise,
 )
-from sim.sensors.sensors import DEFAULT_HOME
 from sim.world.world import WorldConfig, build_world
 
 

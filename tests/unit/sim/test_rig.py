@@ -3,8 +3,9 @@ import numpy as np
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import parameter_table
 from common.airframe import load_airframe
+from common.geodesy import DEFAULT_HOME
 from sim.rig import Rig
-from sim.sensors.sensors import DEFAULT_HOME, sensor_model
+from sim.sensors.sensors import sensor_model
 from sim.wind import wind_model
 from sim.world.world import build_world
 

@@ -5,8 +5,8 @@ from math import atan2, cos, degrees, radians, sin
 import numpy as np
 import pytest
 
+from common.geodesy import DEFAULT_HOME
 from common.geomagnetic import field_ned_gauss
-from sim.sensors.sensors import DEFAULT_HOME
 from tests.unit.sim.sensors.recorder import Recorder, arrivals
 
 
