@@ -23,6 +23,18 @@ class Mode(IntEnum):
     RETURN = 3
     LAND = 4
     OFFBOARD = 5
+    MANUAL = 6
+    STABILIZED = 7
+    ACRO = 8
+    ALTITUDE = 9
+    POSITION = 10
+    PRECISION_LAND = 11
+    FOLLOW = 12
+    ORBIT = 13
+    BRAKE = 14
+    SMART_RETURN = 15  # back along the way it came
+    GUIDED = 16  # external commands and setpoints by ArduPilot's rules: no stream needed to enter
+    TERMINATION = 17
 
 
 class Verdict(IntEnum):

@@ -21,6 +21,18 @@ MODE_RULES: dict[Mode, ModeRule] = {
     Mode.MISSION: ModeRule(needs_position=True, needs_home=True, may_arm=True, on_ground=True),
     Mode.RETURN: ModeRule(needs_position=True, needs_home=True, may_arm=False, on_ground=False),
     Mode.LAND: ModeRule(needs_position=False, needs_home=False, may_arm=False, on_ground=False),
+    Mode.MANUAL: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True),
+    Mode.STABILIZED: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True),
+    Mode.ACRO: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True),
+    Mode.ALTITUDE: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True),
+    Mode.POSITION: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True),
+    Mode.PRECISION_LAND: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
+    Mode.FOLLOW: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
+    Mode.ORBIT: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
+    Mode.BRAKE: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
+    Mode.SMART_RETURN: ModeRule(needs_position=True, needs_home=True, may_arm=False, on_ground=False),
+    Mode.GUIDED: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True),
+    Mode.TERMINATION: ModeRule(needs_position=False, needs_home=False, may_arm=False, on_ground=True),
     # Offboard setpoints of attitude or rate need no position: the commander asks the navigator.
     Mode.OFFBOARD: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True),
 }

@@ -1,9 +1,11 @@
 """Services this vehicle does not have, and the answer that tells a client so at once."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.service import Handler, Service
 
 FTP_NAK = 129  # opcode
 FTP_UNKNOWN_COMMAND = 7
@@ -18,11 +20,19 @@ _LOG_DATA = known_type("LOG_DATA")
 _GPS_GLOBAL_ORIGIN_ID = known_type("GPS_GLOBAL_ORIGIN").msg_id
 
 
-class AbsentServices:
+class AbsentServices(Service):
     """Answers for file transfer, log download and a change of the local origin."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
+
+    def messages(self) -> Mapping[str, Handler]:
+        return {
+            "FILE_TRANSFER_PROTOCOL": self.file_requested,
+            "LOG_REQUEST_LIST": self.logs_requested,
+            "LOG_REQUEST_DATA": self.log_data_requested,
+            "SET_GPS_GLOBAL_ORIGIN": self.origin_received,
+        }
 
     def file_requested(self, sender: Sender, fields: Any) -> None:
         """A refusal: there are no files."""

@@ -5,8 +5,7 @@ information are refused without a text: asking is how clients find out what ther
 0 is a value.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Mapping
 from math import isfinite, isinf, isnan, nan, radians
 from typing import Any
 
@@ -26,6 +25,7 @@ from autopilot.mavlink.convert import (
     whole,
 )
 from autopilot.mavlink.dialects import UnknownModeError
+from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
 from autopilot.ports import TERRAIN_VALID
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
@@ -63,35 +63,12 @@ _PROBES = {
 } | {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}
 
 
-@dataclass(slots=True)
-class Command:
-    """A command in either form; `x` and `y` are degrees in global frames."""
-
-    command: int
-    frame: int  # MAV_FRAME
-    p1: float
-    p2: float
-    p3: float
-    p4: float
-    x: float  # param5
-    y: float  # param6
-    z: float  # param7
-    sender: Sender
-
-
-Handler = Callable[[Command], Reply | None]
-
-
-def denied(reason: str) -> Reply:
-    return Reply(Verdict.DENIED, reason)
-
-
-class CommandService:
-    """Carries commands out by asking the vehicle; a handler that returns None has sent its own acknowledgement."""
+class CommandService(Service):
+    """Carries commands out by asking the vehicle, or the service that knows the command."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
-        self._handlers: dict[int, Handler] = {
+        self._handlers: dict[int, CommandHandler] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_NAV_TAKEOFF: self._takeoff,
             mavlink.MAV_CMD_NAV_LAND: self._land,
@@ -111,6 +88,24 @@ class CommandService:
             mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_prearm_checks,
             mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
         }
+
+    def messages(self) -> Mapping[str, Handler]:
+        return {
+            "COMMAND_LONG": self.long_received,
+            "COMMAND_INT": self.int_received,
+            "SET_MODE": self.set_mode_received,
+        }
+
+    def add(self, handlers: Mapping[int, CommandHandler]) -> None:
+        """Adds the commands of another service.
+
+        Raises:
+            ValueError: a command has a handler already.
+        """
+        for number, handler in handlers.items():
+            if number in self._handlers:
+                raise ValueError(f"command {number} has two handlers")
+            self._handlers[number] = handler
 
     def long_received(self, sender: Sender, f: Any) -> None:
         """COMMAND_LONG: positions are AMSL."""

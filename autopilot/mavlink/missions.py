@@ -5,7 +5,7 @@ handed to the vehicle as a whole, so that a failed one leaves the old mission as
 fence and rally lists are always empty.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isinf, nan
 from typing import Any
@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.convert import INT32_MAX, LATLON_FRAMES, MISSION_FRAME, bounded_int
+from autopilot.mavlink.service import Handler, Service
 from autopilot.navigator.items import MAX_ITEMS
 from autopilot.vehicle import ItemRefusal, MissionItem, Severity
 
@@ -48,7 +49,7 @@ class Upload:
     retry_at_us: int = 0
 
 
-class MissionService:
+class MissionService(Service):
     """Serves the vehicle's mission."""
 
     def __init__(self, endpoint: Endpoint) -> None:
@@ -56,6 +57,21 @@ class MissionService:
         self._upload: Upload | None = None
         self._last_upload: tuple[Sender, int, int] | None = None  # sender, last seq, result
         self._downloads: dict[Sender, tuple[MissionItem, ...]] = {}
+
+    def messages(self) -> Mapping[str, Handler]:
+        return {
+            "MISSION_COUNT": self.count_received,
+            "MISSION_ITEM": self.item_received,
+            "MISSION_ITEM_INT": self.item_received,
+            "MISSION_REQUEST_LIST": self.list_requested,
+            "MISSION_REQUEST_INT": self.item_int_requested,
+            "MISSION_REQUEST": self.item_float_requested,
+            "MISSION_REQUEST_PARTIAL_LIST": self.partial_list_requested,
+            "MISSION_WRITE_PARTIAL_LIST": self.partial_list_requested,
+            "MISSION_ACK": self.ack_received,
+            "MISSION_CLEAR_ALL": self.clear_requested,
+            "MISSION_SET_CURRENT": self.set_current_requested,
+        }
 
     # Upload
 

@@ -4,6 +4,7 @@ In: MAVLink's frames and type masks (a bit set = ignore). Out: one setpoint in o
 that is NaN counts as ignored. What cannot be flown is refused with a text, at most every 10 s.
 """
 
+from collections.abc import Mapping
 from math import cos, isfinite, isinf, isnan, nan, sin
 from typing import Any
 
@@ -16,6 +17,7 @@ from autopilot.mavlink.convert import (
     is_position,
     quat_from_wxyz,
 )
+from autopilot.mavlink.service import Handler, Service
 from autopilot.ports import (
     POSITION_VALID,
     SETPOINT_ATTITUDE,
@@ -52,11 +54,19 @@ class RefusedSetpointError(Exception):
     """A setpoint that cannot be flown; the text says why."""
 
 
-class OffboardService:
+class OffboardService(Service):
     """Turns setpoint messages into the vehicle's setpoints."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
+
+    def messages(self) -> Mapping[str, Handler]:
+        return {
+            "SET_POSITION_TARGET_LOCAL_NED": self.local_received,
+            "SET_POSITION_TARGET_GLOBAL_INT": self.global_received,
+            "SET_ATTITUDE_TARGET": self.attitude_received,
+            "SET_ACTUATOR_CONTROL_TARGET": self.actuators_received,
+        }
 
     def local_received(self, _: Sender, fields: Any) -> None:
         try:

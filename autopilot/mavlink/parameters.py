@@ -5,12 +5,14 @@ frame, per channel, and starts again when it is asked for again.
 """
 
 import zlib
+from collections.abc import Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.channel import Channel, Endpoint, Sender
 from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import Severity
 from common.params import Parameter
 
@@ -22,7 +24,7 @@ _PARAM_VALUE = known_type("PARAM_VALUE")
 _PARAM_ERROR = known_type("PARAM_ERROR")
 
 
-class ParameterService:
+class ParameterService(Service):
     """Serves the vehicle's parameter table."""
 
     def __init__(self, endpoint: Endpoint) -> None:
@@ -32,6 +34,13 @@ class ParameterService:
         self._next_index: dict[Channel, int] = {}  # lists under way
         self._is_setting = False  # the answer tells of this change
         self._table.on_change(self._changed)
+
+    def messages(self) -> Mapping[str, Handler]:
+        return {
+            "PARAM_REQUEST_LIST": self.list_requested,
+            "PARAM_REQUEST_READ": self.read_requested,
+            "PARAM_SET": self.set_requested,
+        }
 
     def list_requested(self, sender: Sender, _: Any) -> None:
         self._next_index[sender.channel] = 0

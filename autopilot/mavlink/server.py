@@ -19,10 +19,9 @@ from autopilot.mavlink.links import Link
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.parameters import ParameterService
+from autopilot.mavlink.service import Handler, Service
 from autopilot.mavlink.telemetry.status import mission_mode
 from autopilot.vehicle import Severity, Vehicle
-
-Handler = Callable[[Sender, Any], None]
 
 _HEARTBEAT = known_type("HEARTBEAT")
 _HOME_POSITION = known_type("HOME_POSITION")
@@ -55,46 +54,41 @@ class MavlinkServer:
         """
         sysid = int(vehicle.params[SYSID_PARAMETER])
         self._endpoint = Endpoint(vehicle, links, dialect, sysid, on_frame)
-        self._parameters = ParameterService(self._endpoint)
-        self._missions = MissionService(self._endpoint)
         self._is_heartbeat_due = False
-        self._handlers = {known_type(name).msg_id: handler for name, handler in self._message_table().items()}
+        self._commands = CommandService(self._endpoint)
+        self._handlers: dict[int, Handler] = {}
+        self._frames: list[Callable[[], None]] = []  # of the services that have something to do each frame
+        for name, handler in self._own_messages().items():
+            self._handlers[known_type(name).msg_id] = handler
+        for service in self._services():
+            self._add(service)
 
-    def _message_table(self) -> dict[str, Handler]:
-        commands = CommandService(self._endpoint)
-        offboard = OffboardService(self._endpoint)
-        absent = AbsentServices(self._endpoint)
-        parameters, missions = self._parameters, self._missions
+    def _services(self) -> list[Service]:
+        endpoint = self._endpoint
+        return [
+            self._commands,
+            ParameterService(endpoint),
+            MissionService(endpoint),
+            OffboardService(endpoint),
+            AbsentServices(endpoint),
+        ]
+
+    def _add(self, service: Service) -> None:
+        for name, handler in service.messages().items():
+            msg_id = known_type(name).msg_id
+            if msg_id in self._handlers:
+                raise ValueError(f"message {name} has two handlers")
+            self._handlers[msg_id] = handler
+        self._commands.add(service.commands())
+        if type(service).frame is not Service.frame:
+            self._frames.append(service.frame)
+
+    def _own_messages(self) -> dict[str, Handler]:
         return {
             "HEARTBEAT": self._heartbeat_received,
             "PING": self._ping_received,
             "TIMESYNC": self._timesync_received,
             "REQUEST_DATA_STREAM": self._data_stream_requested,
-            "COMMAND_LONG": commands.long_received,
-            "COMMAND_INT": commands.int_received,
-            "SET_MODE": commands.set_mode_received,
-            "PARAM_REQUEST_LIST": parameters.list_requested,
-            "PARAM_REQUEST_READ": parameters.read_requested,
-            "PARAM_SET": parameters.set_requested,
-            "MISSION_COUNT": missions.count_received,
-            "MISSION_ITEM": missions.item_received,
-            "MISSION_ITEM_INT": missions.item_received,
-            "MISSION_REQUEST_LIST": missions.list_requested,
-            "MISSION_REQUEST_INT": missions.item_int_requested,
-            "MISSION_REQUEST": missions.item_float_requested,
-            "MISSION_REQUEST_PARTIAL_LIST": missions.partial_list_requested,
-            "MISSION_WRITE_PARTIAL_LIST": missions.partial_list_requested,
-            "MISSION_ACK": missions.ack_received,
-            "MISSION_CLEAR_ALL": missions.clear_requested,
-            "MISSION_SET_CURRENT": missions.set_current_requested,
-            "SET_POSITION_TARGET_LOCAL_NED": offboard.local_received,
-            "SET_POSITION_TARGET_GLOBAL_INT": offboard.global_received,
-            "SET_ATTITUDE_TARGET": offboard.attitude_received,
-            "SET_ACTUATOR_CONTROL_TARGET": offboard.actuators_received,
-            "FILE_TRANSFER_PROTOCOL": absent.file_requested,
-            "LOG_REQUEST_LIST": absent.logs_requested,
-            "LOG_REQUEST_DATA": absent.log_data_requested,
-            "SET_GPS_GLOBAL_ORIGIN": absent.origin_received,
         }
 
     def frame(self, time_us: int) -> None:
@@ -109,8 +103,8 @@ class MavlinkServer:
             for data in channel.link.receive():
                 for frame in channel.reader.feed(data, is_whole=channel.link.keeps_datagrams):
                     self._handle(channel, frame)
-        self._parameters.frame()
-        self._missions.frame()
+        for run in self._frames:
+            run()
         if self._is_heartbeat_due:
             self._is_heartbeat_due = False
             self._broadcast_telemetry(_HEARTBEAT.msg_id)

@@ -47,6 +47,8 @@ class Navigator:
 
     def refusal(self, mode: Mode) -> str:
         """Why a mode cannot be flown now, as far as the navigator knows; empty if it can."""
+        if mode not in self._modes:
+            return f"mode {mode.name} is not supported"
         if mode is Mode.MISSION:
             return self.mission.refusal()
         if mode is Mode.OFFBOARD and self.offboard.age_us(self.context.state.time_us) > STREAM_PERIOD_US:

@@ -8,8 +8,7 @@ from autopilot.mavlink.dialects import UnknownModeError
 from autopilot.vehicle import Mode
 from common.params import Parameter
 
-AUTO = 4
-OFFBOARD = 6
+MANUAL, ALTCTL, POSCTL, AUTO, ACRO, OFFBOARD, STABILIZED, TERMINATION = 1, 2, 3, 4, 5, 6, 7, 10
 
 # (main, sub) of px4_custom_mode.h
 MODE_NUMBERS: dict[Mode, tuple[int, int]] = {
@@ -18,12 +17,21 @@ MODE_NUMBERS: dict[Mode, tuple[int, int]] = {
     Mode.MISSION: (AUTO, 4),
     Mode.RETURN: (AUTO, 5),
     Mode.LAND: (AUTO, 6),
+    Mode.FOLLOW: (AUTO, 8),
+    Mode.PRECISION_LAND: (AUTO, 9),
     Mode.OFFBOARD: (OFFBOARD, 0),
+    Mode.MANUAL: (MANUAL, 0),
+    Mode.STABILIZED: (STABILIZED, 0),
+    Mode.ACRO: (ACRO, 0),
+    Mode.ALTITUDE: (ALTCTL, 0),
+    Mode.POSITION: (POSCTL, 0),
+    Mode.ORBIT: (POSCTL, 1),
+    Mode.TERMINATION: (TERMINATION, 0),
 }
+# Modes of ours that PX4 does not have, as the nearest of its own.
+SHOWN_AS = {Mode.BRAKE: Mode.HOLD, Mode.SMART_RETURN: Mode.RETURN, Mode.GUIDED: Mode.OFFBOARD}
 _MODES = {numbers: mode for mode, numbers in MODE_NUMBERS.items()}
-
-_STICK_MODES = {1: "Manual", 2: "Altitude", 3: "Position", 5: "Acro", 7: "Stabilized", 8: "Rattitude"}
-_AUTO_MODES = {1: "Ready", 8: "Follow", 9: "Precision land", 10: "VTOL takeoff"}
+_WITHOUT_SUB_MODES = frozenset({MANUAL, ALTCTL, ACRO, OFFBOARD, STABILIZED, TERMINATION})
 
 
 class Px4Dialect:
@@ -38,21 +46,17 @@ class Px4Dialect:
     flight_sw_version = 1 << 24 | 18 << 16 | 0 << 8 | mavlink.FIRMWARE_VERSION_TYPE_DEV
 
     def custom_mode(self, mode: Mode) -> int:
-        main, sub = MODE_NUMBERS[mode]
+        main, sub = MODE_NUMBERS[SHOWN_AS.get(mode, mode)]
         return main << 16 | sub << 24
 
     def mode_from_custom(self, custom_mode: int) -> Mode:
         return self.mode_from_command(custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF)
 
     def mode_from_command(self, main_mode: int, sub_mode: int) -> Mode:
-        mode = _MODES.get((main_mode, 0 if main_mode == OFFBOARD else sub_mode))
-        if mode is not None:
-            return mode
-        if main_mode in _STICK_MODES:
-            raise UnknownModeError(f"{_STICK_MODES[main_mode]} needs a pilot's sticks, which are not supported")
-        if main_mode == AUTO and sub_mode in _AUTO_MODES:
-            raise UnknownModeError(f"{_AUTO_MODES[sub_mode]} is not supported")
-        raise UnknownModeError(f"there is no mode {main_mode}/{sub_mode}")
+        mode = _MODES.get((main_mode, 0 if main_mode in _WITHOUT_SUB_MODES else sub_mode))
+        if mode is None:
+            raise UnknownModeError(f"there is no mode {main_mode}/{sub_mode}")
+        return mode
 
     def custom_version(self, text: str) -> bytes:
         """PX4 sends the bytes of its git hash in reverse order, and clients turn them round."""

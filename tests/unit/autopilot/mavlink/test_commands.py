@@ -119,7 +119,7 @@ def test_offboard_mode_needs_no_sub_mode():
     assert rig.vehicle.calls == [("set_mode", Mode.OFFBOARD)]
 
 
-@pytest.mark.parametrize("params", [(1.0, 3.0, 0.0), (0.0, 4.0, 4.0), (1.0, 4.0, 77.0), (1.0, nan, nan)])
+@pytest.mark.parametrize("params", [(1.0, 3.0, 9.0), (0.0, 4.0, 4.0), (1.0, 4.0, 77.0), (1.0, nan, nan)])
 def test_mode_we_do_not_have_is_denied(params):
     rig = Rig()
     rig.client.command(176, *params)
@@ -138,8 +138,8 @@ def test_set_mode_message_has_no_acknowledgement():
 
 def test_set_mode_message_tells_a_refusal():
     rig = Rig()
-    rig.client.send("SET_MODE", base_mode=1, custom_mode=0x00030000)
-    assert "Position" in texts(rig.frame())[0]
+    rig.client.send("SET_MODE", base_mode=1, custom_mode=0x00080000)
+    assert "no mode" in texts(rig.frame())[0]
     rig.vehicle.reply = Reply(Verdict.DENIED, "no mission")
     rig.client.send("SET_MODE", base_mode=1, custom_mode=0x04040000)
     assert texts(rig.frame()) == ["Mode: no mission"]

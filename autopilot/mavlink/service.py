@@ -1,0 +1,49 @@
+"""What every MAVLink service is: the messages and the commands it answers, and its share of the frame."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from autopilot.mavlink.channel import Sender
+from autopilot.vehicle import Reply, Verdict
+
+Handler = Callable[[Sender, Any], None]
+
+
+@dataclass(slots=True)
+class Command:
+    """A command in either form; `x` and `y` are degrees in global frames."""
+
+    command: int
+    frame: int  # MAV_FRAME
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    x: float  # param5
+    y: float  # param6
+    z: float  # param7
+    sender: Sender
+
+
+CommandHandler = Callable[[Command], Reply | None]
+"""Returns the acknowledgement; None: it has been sent already, or will be."""
+
+
+class Service:
+    """A part of the MAVLink server; what it does not override it does not do."""
+
+    def messages(self) -> Mapping[str, Handler]:
+        """Handlers of messages, by name."""
+        return {}
+
+    def commands(self) -> Mapping[int, CommandHandler]:
+        """Handlers of COMMAND_LONG and COMMAND_INT, by MAV_CMD."""
+        return {}
+
+    def frame(self) -> None:
+        """Called once per frame, after the messages that have come in; not at all if it is not overridden."""
+
+
+def denied(reason: str) -> Reply:
+    return Reply(Verdict.DENIED, reason)
