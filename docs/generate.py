@@ -1,7 +1,9 @@
-"""Writes docs/parameters.md from the parameters' declarations: `python docs/generate.py`. A test keeps it current."""
+"""Writes docs/parameters.md and docs/mavlink.md from the code: `python docs/generate.py`. A test keeps them current."""
 
 from collections.abc import Iterable
 from pathlib import Path
+
+from mavlink_page import mavlink_text
 
 from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
@@ -11,8 +13,10 @@ from autopilot.params import SYSTEM_PARAMETERS, parameter_table
 from common.airframe import load_airframe
 from common.files import write_whole
 from common.params import Parameter
+from mission.flight import Flight, FlightConfig
 
 PARAMETERS_PATH = Path(__file__).with_name("parameters.md")
+MAVLINK_PATH = Path(__file__).with_name("mavlink.md")
 SECTIONS = {
     "Estimator": ESTIMATOR_PARAMETERS,
     "Control": CONTROL_PARAMETERS,
@@ -47,5 +51,11 @@ def _table(declarations: Iterable[Parameter]) -> str:
     return "\n".join(rows) + "\n"
 
 
+def generated_pages() -> dict[Path, str]:
+    """The text of every generated page, by its path."""
+    return {PARAMETERS_PATH: parameters_text(), MAVLINK_PATH: mavlink_text(Flight(FlightConfig()).server)}
+
+
 if __name__ == "__main__":
-    write_whole(PARAMETERS_PATH, parameters_text().encode())
+    for path, text in generated_pages().items():
+        write_whole(path, text.encode())

@@ -90,11 +90,11 @@ class Flight:
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
         on_frame = None if self._tlog is None else self._tlog.frame
-        self._server = MavlinkServer(self.controller, [vehicle_end, *(links or [])], on_frame=on_frame)
+        self.server = MavlinkServer(self.controller, [vehicle_end, *(links or [])], on_frame=on_frame)
         self.drone = Drone(client_end)
         log = None if folder is None else folder / "flight.ulg"
         self.recorder = Recorder(log, self.rig, self.controller, self.airframe)
-        self.controller.attach(self._server)
+        self.controller.attach(self.server)
         self.controller.attach(self.recorder)
 
     def frame(self) -> None:
@@ -137,7 +137,7 @@ class Flight:
 
     def close(self) -> History:
         """Completes the logs, closes the links and returns the history."""
-        self._server.close()
+        self.server.close()
         if self._tlog is not None:
             self._tlog.close()
         return self.recorder.close()

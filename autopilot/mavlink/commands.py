@@ -68,7 +68,7 @@ class CommandService(Service):
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
-        self._handlers: dict[int, CommandHandler] = {
+        self.handlers: dict[int, CommandHandler] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_NAV_TAKEOFF: self._takeoff,
             mavlink.MAV_CMD_NAV_LAND: self._land,
@@ -103,25 +103,25 @@ class CommandService(Service):
             ValueError: a command has a handler already.
         """
         for number, handler in handlers.items():
-            if number in self._handlers:
+            if number in self.handlers:
                 raise ValueError(f"command {number} has two handlers")
-            self._handlers[number] = handler
+            self.handlers[number] = handler
 
     def long_received(self, sender: Sender, f: Any) -> None:
-        """COMMAND_LONG: positions are AMSL."""
+        """Carries a command out; an altitude in parameter 7 is above sea level."""
         self._execute(
             Command(f.command, 0, f.param1, f.param2, f.param3, f.param4, f.param5, f.param6, f.param7, sender)
         )
 
     def int_received(self, sender: Sender, f: Any) -> None:
-        """COMMAND_INT: latitude and longitude as 1e7 integers, altitude in the frame given."""
+        """Carries a command out; latitude and longitude as 1e7 integers, the altitude in the frame given."""
         is_global = f.frame in LATLON_FRAMES
         x = degrees_from_e7(f.x) if is_global else float(f.x)
         y = degrees_from_e7(f.y) if is_global else float(f.y)
         self._execute(Command(f.command, f.frame, f.param1, f.param2, f.param3, f.param4, x, y, f.z, sender))
 
     def set_mode_received(self, _: Sender, fields: Any) -> None:
-        """SET_MODE has no acknowledgement: the heartbeat is the answer."""
+        """Changes the flight mode; there is no acknowledgement, the heartbeat is the answer."""
         try:
             mode = self._endpoint.dialect.mode_from_custom(fields.custom_mode)
         except UnknownModeError as unknown:
@@ -132,7 +132,7 @@ class CommandService(Service):
             self._endpoint.text(Severity.WARNING, f"Mode: {reply.reason}")
 
     def _execute(self, command: Command) -> None:
-        handler = self._handlers.get(command.command)
+        handler = self.handlers.get(command.command)
         if handler is None:
             self._ack(command, Verdict.UNSUPPORTED)
             if command.command not in _PROBES:
@@ -168,6 +168,12 @@ class CommandService(Service):
     # Flight
 
     def _arm_disarm(self, command: Command) -> Reply:
+        """Arms or disarms.
+
+        Params: p1 1 arms, 0 disarms; p2 21196 forces it: arming without checks, disarming in the air.
+        Refused: TEMPORARILY_REJECTED while a check fails (the text names it), or when disarming in the air; DENIED for
+        another p1.
+        """
         is_forced = command.p2 == FORCE
         if command.p1 == 1.0:
             return self._endpoint.vehicle.arm(force=is_forced)
@@ -176,10 +182,21 @@ class CommandService(Service):
         return denied("parameter 1 must be 0 (disarm) or 1 (arm)")
 
     def _takeoff(self, command: Command) -> Reply:
+        """Climbs straight up, then holds.
+
+        Params: p4 heading [deg], NaN: as it is; p7 altitude, NaN: MIS_TAKEOFF_ALT above home. A lower altitude than
+        that is raised to it, with a text.
+        Refused: TEMPORARILY_REJECTED without a position; DENIED for an altitude out of range.
+        """
         alt_amsl_m, reply = self._alt_amsl_m(command)
         return reply or self._endpoint.vehicle.takeoff(alt_amsl_m, radians(command.p4))
 
     def _land(self, command: Command) -> Reply:
+        """Lands.
+
+        Params: p4 heading [deg], NaN: as it is; p5, p6 place, NaN or 0, 0: here.
+        Refused: TEMPORARILY_REJECTED on the ground; DENIED for a place that is not on earth.
+        """
         lat_deg, lon_deg = command.x, command.y
         if lat_deg == 0.0 and lon_deg == 0.0:  # what scripts that leave them out send; landing there is never meant
             lat_deg = lon_deg = nan
@@ -188,9 +205,18 @@ class CommandService(Service):
         return self._endpoint.vehicle.land(lat_deg, lon_deg, radians(command.p4))
 
     def _return(self, _: Command) -> Reply:
+        """Returns home, or to where RTL_TYPE says, and lands.
+
+        Refused: TEMPORARILY_REJECTED on the ground, without a position or without home.
+        """
         return self._endpoint.vehicle.set_mode(Mode.RETURN)
 
     def _set_mode(self, command: Command) -> Reply:
+        """Changes the flight mode.
+
+        Params: p1 must have the bit CUSTOM_MODE_ENABLED (1); p2, p3 the mode in the dialect's numbers.
+        Refused: DENIED for a mode there is not; TEMPORARILY_REJECTED for one that cannot be flown now.
+        """
         if not whole(command.p1, 0) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return denied("parameter 1 must have the custom mode flag")
         try:
@@ -200,6 +226,13 @@ class CommandService(Service):
         return self._endpoint.vehicle.set_mode(mode)
 
     def _reposition(self, command: Command) -> Reply:
+        """Goes to a place, height or heading and holds there.
+
+        Params: p1 ground speed [m/s], -1: as it is; p2 bit 1 allows the change of mode; p4 heading [rad], NaN: towards
+        the place; p5, p6 place, NaN: where it is; p7 altitude, NaN: as it is. All NaN: stops here.
+        Refused: TEMPORARILY_REJECTED on the ground or without a position; DENIED for a place that is out of reach or
+        below the ground, or if the mode may not be changed.
+        """
         vehicle = self._endpoint.vehicle
         may_change_mode = whole(command.p2, 0) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         if not may_change_mode and vehicle.state.mode != Mode.HOLD:
@@ -211,6 +244,11 @@ class CommandService(Service):
         return reply or vehicle.reposition(command.x, command.y, alt_amsl_m, command.p4, speed_m_s)
 
     def _change_speed(self, command: Command) -> Reply:
+        """Changes the ground speed of what is being flown, until the mode changes.
+
+        Params: p1 0 or 1: ground speed; p2 speed [m/s], -1: no change, -2: the default.
+        Refused: DENIED for another kind of speed or a negative one.
+        """
         if whole(command.p1, -1) not in (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED):
             return denied("only the ground speed can be changed")
         if command.p2 == UNCHANGED or isnan(command.p2):
@@ -222,6 +260,11 @@ class CommandService(Service):
         return self._endpoint.vehicle.change_speed(command.p2)
 
     def _pause_continue(self, command: Command) -> Reply:
+        """Pauses the mission, or continues it.
+
+        Params: p1 0 pauses, 1 continues.
+        Refused: TEMPORARILY_REJECTED without a mission to pause or to continue.
+        """
         if command.p1 == 0.0:
             return self._endpoint.vehicle.pause_mission()
         if command.p1 == 1.0:
@@ -229,9 +272,19 @@ class CommandService(Service):
         return denied("parameter 1 must be 0 (pause) or 1 (continue)")
 
     def _mission_start(self, command: Command) -> Reply:
+        """Flies the mission.
+
+        Params: p1 first item, -1: where it stands.
+        Refused: TEMPORARILY_REJECTED without a mission, position or home; DENIED for an item there is not.
+        """
         return self._endpoint.vehicle.start_mission(whole(command.p1, -1))
 
     def _set_current_item(self, command: Command) -> Reply:
+        """Makes a mission item the current one; in mode Mission the vehicle flies to it at once.
+
+        Params: p1 the item's number.
+        Refused: DENIED for an item there is not.
+        """
         seq = whole(command.p1, -1)
         if seq < 0:
             return denied("parameter 1 must be an item's number")
@@ -240,6 +293,11 @@ class CommandService(Service):
     # Home
 
     def _set_home(self, command: Command) -> Reply:
+        """Sets home.
+
+        Params: p1 1: here; otherwise p5, p6 place and p7 altitude.
+        Refused: TEMPORARILY_REJECTED without a position; DENIED for a place that is not on earth.
+        """
         if command.p1 == 1.0:
             return self._endpoint.vehicle.set_home(nan, nan, nan)
         alt_amsl_m, reply = self._alt_amsl_m(command)
@@ -250,6 +308,10 @@ class CommandService(Service):
         return self._endpoint.vehicle.set_home(command.x, command.y, alt_amsl_m)
 
     def _get_home(self, command: Command) -> Reply | None:
+        """Sends HOME_POSITION.
+
+        Refused: TEMPORARILY_REJECTED while there is no home.
+        """
         return self._send_requested(command, _HOME_POSITION_ID)
 
     def _alt_amsl_m(self, command: Command) -> tuple[float, Reply | None]:
@@ -270,6 +332,11 @@ class CommandService(Service):
     # Messages
 
     def _set_message_interval(self, command: Command) -> Reply:
+        """Sets how often a message is sent on this link.
+
+        Params: p1 message id; p2 interval [us], at least 20 ms; 0: the default, -1: never.
+        Refused: UNSUPPORTED for a message that is not sent; DENIED for the heartbeat.
+        """
         msg_id = whole(command.p1, -1)
         if msg_id not in self._endpoint.telemetry.builders:
             return Reply(Verdict.UNSUPPORTED)
@@ -282,6 +349,11 @@ class CommandService(Service):
         return ACCEPTED
 
     def _get_message_interval(self, command: Command) -> Reply | None:
+        """Sends MESSAGE_INTERVAL: the interval on this link, -1 for a message that is not streamed.
+
+        Params: p1 message id.
+        Refused: UNSUPPORTED for a message that is not sent.
+        """
         msg_id = whole(command.p1, -1)
         interval_us = command.sender.channel.schedule.interval_us.get(msg_id)
         if interval_us is None:
@@ -292,9 +364,15 @@ class CommandService(Service):
         return None
 
     def _request_message(self, command: Command) -> Reply | None:
+        """Sends a message once.
+
+        Params: p1 message id.
+        Refused: UNSUPPORTED for a message there is not; TEMPORARILY_REJECTED while it has nothing to say.
+        """
         return self._send_requested(command, whole(command.p1, -1))
 
     def _request_capabilities(self, command: Command) -> Reply | None:
+        """Sends AUTOPILOT_VERSION."""
         return self._send_requested(command, _AUTOPILOT_VERSION_ID)
 
     def _send_requested(self, command: Command, msg_id: int) -> Reply | None:
@@ -313,6 +391,10 @@ class CommandService(Service):
     # The rest
 
     def _run_prearm_checks(self, _: Command) -> Reply:
+        """Checks whether the vehicle may be armed, and names each reason against it in a text.
+
+        Refused: TEMPORARILY_REJECTED while armed.
+        """
         vehicle = self._endpoint.vehicle
         if vehicle.state.is_armed:
             return Reply(Verdict.TEMPORARILY_REJECTED, "the vehicle is armed")
@@ -321,6 +403,11 @@ class CommandService(Service):
         return ACCEPTED
 
     def _reboot(self, command: Command) -> Reply:
+        """Restarts the flight controller.
+
+        Params: p1 1: restart.
+        Refused: TEMPORARILY_REJECTED while armed; UNSUPPORTED for anything else than a restart.
+        """
         if command.p1 != REBOOT:
             return Reply(Verdict.UNSUPPORTED, "only a reboot of the autopilot is supported")
         return self._endpoint.vehicle.reboot()

@@ -69,6 +69,7 @@ class OffboardService(Service):
         }
 
     def local_received(self, _: Sender, fields: Any) -> None:
+        """Takes a setpoint in a local frame; flown in mode Offboard."""
         try:
             setpoint = self._local_setpoint(fields)
         except RefusedSetpointError as refusal:
@@ -77,6 +78,7 @@ class OffboardService(Service):
         self._endpoint.vehicle.set_offboard(setpoint)
 
     def global_received(self, _: Sender, fields: Any) -> None:
+        """Takes a setpoint in a global frame; flown in mode Offboard."""
         try:
             setpoint = self._global_setpoint(fields)
         except RefusedSetpointError as refusal:
@@ -85,6 +87,7 @@ class OffboardService(Service):
         self._endpoint.vehicle.set_offboard(setpoint)
 
     def attitude_received(self, _: Sender, fields: Any) -> None:
+        """Takes an attitude or body rates with a thrust; flown in mode Offboard."""
         try:
             setpoint = attitude_setpoint(fields, self._endpoint.time_us)
         except RefusedSetpointError as refusal:
@@ -93,7 +96,7 @@ class OffboardService(Service):
         self._endpoint.vehicle.set_offboard(setpoint)
 
     def actuators_received(self, _sender: Sender, _fields: Any) -> None:
-        """SET_ACTUATOR_CONTROL_TARGET."""
+        """Refused with a text: the motors belong to the control allocation."""
         self._endpoint.text_once(Severity.WARNING, "Offboard: direct actuator control is not supported")
 
     def _local_setpoint(self, fields: Any) -> OffboardSetpoint:

@@ -43,6 +43,7 @@ class ParameterService(Service):
         }
 
     def list_requested(self, sender: Sender, _: Any) -> None:
+        """Sends every parameter, a few per frame; asked again, it starts again."""
         self._next_index[sender.channel] = 0
 
     def frame(self) -> None:
@@ -57,6 +58,7 @@ class ParameterService(Service):
                 self._next_index[channel] = last
 
     def read_requested(self, sender: Sender, fields: Any) -> None:
+        """Sends one parameter, by name or by index; PARAM_ERROR if there is none."""
         name = fields.param_id
         if fields.param_index >= 0:
             if fields.param_index >= len(self._table):
@@ -71,6 +73,7 @@ class ParameterService(Service):
             self._endpoint.reply(sender, _PARAM_VALUE, self._value(name, self._indices[name]))
 
     def set_requested(self, sender: Sender, fields: Any) -> None:
+        """Sets a parameter to the nearest value it can have, and sends to everybody what it is now."""
         name = fields.param_id
         if name == HASH_NAME:  # the client has these values already: the list may stop
             self._next_index.pop(sender.channel, None)

@@ -5,7 +5,7 @@ that `frame` is given. Nothing that arrives on a link can stop it: what is no fr
 refused or ignored.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from autopilot.mavlink.absent import AbsentServices
@@ -19,7 +19,8 @@ from autopilot.mavlink.links import Link
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.parameters import ParameterService
-from autopilot.mavlink.service import Handler, Service
+from autopilot.mavlink.service import CommandHandler, Handler, Service
+from autopilot.mavlink.streams import Stream
 from autopilot.mavlink.telemetry.status import mission_mode
 from autopilot.vehicle import Severity, Vehicle
 
@@ -56,10 +57,10 @@ class MavlinkServer:
         self._endpoint = Endpoint(vehicle, links, dialect, sysid, on_frame)
         self._is_heartbeat_due = False
         self._commands = CommandService(self._endpoint)
-        self._handlers: dict[int, Handler] = {}
+        self._messages: dict[str, Handler] = {}
+        self._handlers: dict[int, Handler] = {}  # the same, by id
         self._frames: list[Callable[[], None]] = []  # of the services that have something to do each frame
-        for name, handler in self._own_messages().items():
-            self._handlers[known_type(name).msg_id] = handler
+        self._add_messages(self._own_messages())
         for service in self._services():
             self._add(service)
 
@@ -74,14 +75,32 @@ class MavlinkServer:
         ]
 
     def _add(self, service: Service) -> None:
-        for name, handler in service.messages().items():
-            msg_id = known_type(name).msg_id
-            if msg_id in self._handlers:
-                raise ValueError(f"message {name} has two handlers")
-            self._handlers[msg_id] = handler
+        self._add_messages(service.messages())
         self._commands.add(service.commands())
         if type(service).frame is not Service.frame:
             self._frames.append(service.frame)
+
+    def _add_messages(self, handlers: Mapping[str, Handler]) -> None:
+        for name, handler in handlers.items():
+            if name in self._messages:
+                raise ValueError(f"message {name} has two handlers")
+            self._messages[name] = handler
+            self._handlers[known_type(name).msg_id] = handler
+
+    # What the documentation is made from
+
+    @property
+    def streams(self) -> Sequence[Stream]:
+        """Every message that can be streamed or asked for, with its default rates."""
+        return self._endpoint.telemetry.streams
+
+    def message_handlers(self) -> Mapping[str, Handler]:
+        """Every message that is understood."""
+        return self._messages
+
+    def command_handlers(self) -> Mapping[int, CommandHandler]:
+        """Every command that is understood."""
+        return self._commands.handlers
 
     def _own_messages(self) -> dict[str, Handler]:
         return {
@@ -149,6 +168,7 @@ class MavlinkServer:
             self._endpoint.reply(sender, _TIMESYNC, _TIMESYNC.pack(max(self._endpoint.time_us, 1) * 1000, fields.ts1))
 
     def _data_stream_requested(self, sender: Sender, fields: Any) -> None:
+        """Sets the rate of a group of messages on this link (the old way)."""
         rate_hz = float(fields.req_message_rate) if fields.start_stop else 0.0
         sender.channel.schedule.set_group(fields.req_stream_id, rate_hz)
 

@@ -81,16 +81,18 @@ class Telemetry:
 
     def __init__(self, dialect: Dialect, sysid: int) -> None:
         def heartbeat(state: VehicleState) -> bytes:
+            """Mode, armed or not, state; also at once when one of them changes."""
             return status.heartbeat(state, dialect)
 
         def version(_: VehicleState) -> bytes:
+            """Capabilities, versions, identity."""
             return autopilot_version(dialect, sysid)
 
-        streams = (Stream("HEARTBEAT", heartbeat, 1, 1), *STREAMS, Stream("AUTOPILOT_VERSION", version, 0, 0))
+        self.streams = (Stream("HEARTBEAT", heartbeat, 1, 1), *STREAMS, Stream("AUTOPILOT_VERSION", version, 0, 0))
         self.types: dict[int, MessageType] = {}
         self.builders: dict[int, Builder] = {}
         self.default_interval_us: dict[LinkRole, dict[int, int]] = {role: {} for role in LinkRole}
-        for stream in streams:
+        for stream in self.streams:
             kind = known_type(stream.name)
             self.types[kind.msg_id] = kind
             self.builders[kind.msg_id] = stream.build

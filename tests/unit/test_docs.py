@@ -102,7 +102,8 @@ def test_examples_run(name, tmp_path, monkeypatch):
     exec(compile(program, name, "exec"), {"__name__": name})
 
 
-def test_parameter_list_is_current():
+def test_parameter_list_is_current(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
     page = runpy.run_path(str(ROOT / "docs" / "generate.py"))
     assert page["PARAMETERS_PATH"].read_text(encoding="utf-8") == page["parameters_text"](), "python docs/generate.py"
 

@@ -40,11 +40,13 @@ def boot_ms(time_us: int) -> int:
 
 
 def attitude(state: VehicleState) -> bytes:
+    """Roll, pitch, yaw and body rates."""
     p, q, r = state.estimate.omega_frd
     return _attitude(boot_ms(state.time_us), state.roll_rad, state.pitch_rad, state.yaw_rad, p, q, r)
 
 
 def attitude_quaternion(state: VehicleState) -> bytes:
+    """The attitude as a quaternion, and body rates."""
     estimate = state.estimate
     x, y, z, w = estimate.q_ned_from_frd
     p, q, r = estimate.omega_frd
@@ -52,6 +54,7 @@ def attitude_quaternion(state: VehicleState) -> bytes:
 
 
 def local_position_ned(state: VehicleState) -> bytes | None:
+    """Position and velocity in the local frame; not before there is a position."""
     estimate = state.estimate
     if not estimate.flags & POSITION_VALID:
         return None
@@ -59,6 +62,7 @@ def local_position_ned(state: VehicleState) -> bytes | None:
 
 
 def global_position_int(state: VehicleState) -> bytes | None:
+    """Latitude, longitude, altitude above sea level and above home, velocity, heading."""
     estimate = state.estimate
     if not estimate.flags & POSITION_VALID:
         return None
@@ -83,6 +87,7 @@ def height_above_home(state: VehicleState) -> float:
 
 
 def vfr_hud(state: VehicleState) -> bytes:
+    """Speed over ground, heading, altitude, climb rate, throttle."""
     estimate = state.estimate
     north, east, down = estimate.vel_ned
     ground_speed = hypot(north, east)
@@ -101,6 +106,7 @@ def vfr_hud(state: VehicleState) -> bytes:
 
 
 def altitude(state: VehicleState) -> bytes | None:
+    """Altitude above sea level, home and ground."""
     estimate = state.estimate
     if not estimate.flags & HEIGHT_VALID:
         return None
@@ -119,6 +125,7 @@ def altitude(state: VehicleState) -> bytes | None:
 
 
 def wind_cov(state: VehicleState) -> bytes | None:
+    """The estimated wind."""
     estimate = state.estimate
     if not estimate.flags & WIND_VALID:
         return None
@@ -127,6 +134,7 @@ def wind_cov(state: VehicleState) -> bytes | None:
 
 
 def odometry(state: VehicleState) -> bytes | None:
+    """Position, velocity in body axes, attitude, with their variances."""
     estimate = state.estimate
     if not estimate.flags & POSITION_VALID:
         return None
@@ -168,6 +176,7 @@ def _free_mask(state: VehicleState) -> int:
 
 
 def position_target_local_ned(state: VehicleState) -> bytes | None:
+    """The trajectory being flown, in the local frame."""
     if not state.is_armed:
         return None
     actuators = state.actuators
@@ -184,6 +193,7 @@ def position_target_local_ned(state: VehicleState) -> bytes | None:
 
 
 def position_target_global_int(state: VehicleState) -> bytes | None:
+    """The trajectory being flown, in global coordinates."""
     if not state.is_armed:
         return None
     actuators = state.actuators
@@ -207,6 +217,7 @@ def position_target_global_int(state: VehicleState) -> bytes | None:
 
 
 def attitude_target(state: VehicleState) -> bytes | None:
+    """Attitude, body rates and thrust being flown."""
     if not state.is_armed:
         return None
     actuators = state.actuators

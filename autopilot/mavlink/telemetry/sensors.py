@@ -65,6 +65,7 @@ def pressure_altitude_m(pressure_pa: float) -> float:
 
 
 def gps_raw_int(state: VehicleState) -> bytes | None:
+    """The receiver's own fix: position, accuracy, satellites."""
     gnss = state.samples.gnss
     if gnss.time_us == 0:
         return None
@@ -94,6 +95,7 @@ def gps_raw_int(state: VehicleState) -> bytes | None:
 
 
 def highres_imu(state: VehicleState) -> bytes:
+    """Gyroscope, accelerometer, magnetometer and barometer as they are."""
     samples = state.samples
     baro = samples.baro
     updated = (
@@ -113,6 +115,7 @@ def highres_imu(state: VehicleState) -> bytes:
 
 
 def scaled_imu(state: VehicleState) -> bytes:
+    """Gyroscope, accelerometer and magnetometer in milli-units."""
     samples = state.samples
     milli_g = 1000.0 / GRAVITY_M_S2
     return _scaled_imu(
@@ -124,6 +127,7 @@ def scaled_imu(state: VehicleState) -> bytes:
 
 
 def scaled_pressure(state: VehicleState) -> bytes | None:
+    """The barometer."""
     baro = state.samples.baro
     if baro.time_us == 0:
         return None
@@ -131,7 +135,10 @@ def scaled_pressure(state: VehicleState) -> bytes | None:
 
 
 def distance_sensor(state: VehicleState) -> bytes | None:
-    """Limits are sent as 0 and the largest value: the driver's sample does not carry them."""
+    """Height above ground by the range finder.
+
+    Limits are sent as 0 and the largest value: the driver's sample does not carry them.
+    """
     sample = state.samples.range
     if sample.time_us == 0:
         return None
@@ -149,11 +156,13 @@ def distance_sensor(state: VehicleState) -> bytes | None:
 
 
 def servo_output_raw(state: VehicleState) -> bytes:
+    """Motor commands as pulse widths."""
     pulses = (PULSE_IDLE_US + u16(command * 1000.0) for command in state.actuators.command)
     return _servo_output_raw(state.time_us & 0xFFFFFFFF, 0, *pulses)
 
 
 def actuator_output_status(state: VehicleState) -> bytes:
+    """Motor commands as shares of the greatest."""
     commands = tuple(state.actuators.command)
     active = sum(1 << i for i, command in enumerate(commands) if command > 0.0)
     return _actuator_output_status(state.time_us, active, commands + (0.0,) * (32 - len(commands)))
@@ -169,6 +178,7 @@ def vibration(state: VehicleState) -> bytes | None:
 
 
 def estimator_status(state: VehicleState) -> bytes:
+    """Which estimates are valid, innovation test ratios, accuracies."""
     estimate = state.estimate
     flags = sum(bits for ours, bits in _ESTIMATOR_BITS if estimate.flags & ours)
     gnss_vel, gnss_pos, baro, mag, range_finder = _test_ratios(state.health)

@@ -58,6 +58,7 @@ WHOLE_PACK_ONLY = (UINT16_MAX,) * 9  # cell voltages are not measured
 
 
 def heartbeat(state: VehicleState, dialect: Dialect) -> bytes:
+    """Mode, armed or not, state."""
     return _heartbeat(
         dialect.vehicle_type,
         dialect.autopilot,
@@ -76,6 +77,7 @@ def system_status(state: VehicleState) -> int:
 
 
 def sys_status(state: VehicleState) -> bytes:
+    """Which sensors work, whether it may be armed, battery, load."""
     present = _ALWAYS | (_RANGE if state.samples.range.time_us else 0)
     battery = state.samples.battery
     return _sys_status(
@@ -127,6 +129,7 @@ def _percent(share: float) -> int:
 
 
 def battery_status(state: VehicleState) -> bytes | None:
+    """Voltage, current, charge used and left."""
     battery = state.samples.battery
     if battery.time_us == 0:
         return None
@@ -146,6 +149,7 @@ def battery_status(state: VehicleState) -> bytes | None:
 
 
 def home_position(state: VehicleState) -> bytes | None:
+    """Home, once it is known."""
     home = state.home
     if home is None:
         return None
@@ -164,6 +168,7 @@ def home_position(state: VehicleState) -> bytes | None:
 
 
 def gps_global_origin(state: VehicleState) -> bytes:
+    """Where the local frame has its origin: the place of power-on."""
     origin = state.origin
     return _gps_global_origin(
         degrees_e7(origin.lat_deg), degrees_e7(origin.lon_deg), i32(origin.alt_m * 1000.0), state.time_us
@@ -171,10 +176,12 @@ def gps_global_origin(state: VehicleState) -> bytes:
 
 
 def extended_sys_state(state: VehicleState) -> bytes:
+    """On the ground, taking off, in the air, landing."""
     return _extended_sys_state(mavlink.MAV_VTOL_STATE_UNDEFINED, state.landed_state)
 
 
 def mission_current(state: VehicleState) -> bytes:
+    """The current mission item, of how many, and the mission's state."""
     return _mission_current(
         u16(state.mission_current), u16(state.mission_count), state.mission_state, mission_mode(state)
     )

@@ -1,0 +1,111 @@
+"""The text of docs/mavlink.md, made from the server's own tables and docstrings: what it says, understands, refuses."""
+
+import inspect
+import re
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from pymavlink.dialects.v20 import all as definitions
+
+from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.server import MavlinkServer
+from autopilot.mavlink.streams import Stream
+
+ROOT = Path(__file__).parents[1]
+HEADER = """\
+# MAVLink
+
+Written by `docs/generate.py` from the code: do not edit.
+
+What the vehicle says and understands. How to connect each ground station or library is in [flying](flying.md); the
+parameters are in [parameters](parameters.md). Time is simulated time everywhere: rates, intervals and time-outs count
+the vehicle's seconds, which pass faster than yours with `--speed` above 1.
+
+Rules that hold for everything below:
+
+- A command is acknowledged once, to who sent it, at once; while it takes time the acknowledgement says IN_PROGRESS and
+  a final one follows. A command that is not in the table is answered UNSUPPORTED. A STATUSTEXT explains each refusal.
+- In a command NaN means "default" and 0 is a value. An infinite parameter is refused.
+- Positions are latitude and longitude in degrees; COMMAND_INT carries them exactly, COMMAND_LONG to about a metre.
+- Every message with a rate can be asked for at another one (SET_MESSAGE_INTERVAL, for one link only) or once
+  (REQUEST_MESSAGE).
+"""
+
+
+def mavlink_text(server: MavlinkServer) -> str:
+    """The whole page."""
+    return "\n".join(
+        [
+            HEADER,
+            "## Messages sent\n",
+            *_table(
+                ("message", "id", "to ground stations", "to offboard clients", "contents"), _streams(server.streams)
+            ),
+            "\nRates in Hz; asked: only when it is asked for. In answer to something, or when something happens:\n",
+            *_table(("message", "id", "by"), _answers({stream.name for stream in server.streams})),
+            "\n## Messages understood\n",
+            *_table(("message", "id", "what is done with it"), _understood(server)),
+            "\n## Commands\n",
+            *_table(("command", "number", "what it does", "parameters", "refused"), _commands(server)),
+            "",
+        ]
+    )
+
+
+def _table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[str]:
+    titles = list(headings)
+    yield f"| {' | '.join(titles)} |"
+    yield "|" + "---|" * len(titles)
+    for row in rows:
+        yield f"| {' | '.join(str(cell).replace('|', ' or ') for cell in row)} |"
+
+
+def _streams(streams: Iterable[Stream]) -> Iterator[tuple[object, ...]]:
+    for stream in sorted(streams, key=lambda each: each.name):
+        rates = (f"{rate:g}" if rate else "asked" for rate in (stream.ground_hz, stream.onboard_hz))
+        yield stream.name, known_type(stream.name).msg_id, *rates, sections(stream.build)[""]
+
+
+def _answers(streamed: set[str]) -> Iterator[tuple[object, ...]]:
+    """Messages that the modules of the server name without streaming them."""
+    senders: dict[str, str] = {}
+    received = set()
+    for path in sorted((ROOT / "autopilot" / "mavlink").rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        module = path.relative_to(ROOT / "autopilot").as_posix()
+        for name in re.findall(r'^_\w+ = known_type\("(\w+)"\)(?!\.msg_id)', text, re.MULTILINE):
+            senders.setdefault(name, module)
+        received.update(re.findall(r'message_id\("(\w+)"\)', text))
+    for name in sorted(set(senders) - streamed - received):
+        yield name, known_type(name).msg_id, f"`{senders[name]}`"
+
+
+def _understood(server: MavlinkServer) -> Iterator[tuple[object, ...]]:
+    for name, handler in sorted(server.message_handlers().items()):
+        yield name, known_type(name).msg_id, sections(handler)[""]
+
+
+def _commands(server: MavlinkServer) -> Iterator[tuple[object, ...]]:
+    for number, handler in sorted(server.command_handlers().items()):
+        entry = definitions.enums["MAV_CMD"].get(number)
+        name = entry.name.removeprefix("MAV_CMD_") if entry else f"command {number}"
+        parts = sections(handler)
+        yield name, number, parts[""], parts.get("Params", ""), parts.get("Refused", "")
+
+
+def sections(function: Callable[..., Any]) -> dict[str, str]:
+    """The first line of a docstring under "", and its labelled paragraphs (`Params: …`) under their labels."""
+    lines = (inspect.getdoc(function) or "").splitlines()
+    parts = {"": lines[0].strip() if lines else ""}
+    label = ""
+    for line in lines[1:]:
+        match = re.match(r"(Params|Refused): *(.*)", line)
+        if match:
+            label = match[1]
+            parts[label] = match[2].strip()
+        elif not line.strip():
+            label = ""
+        elif label:
+            parts[label] += " " + line.strip()
+    return parts
