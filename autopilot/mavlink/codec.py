@@ -14,7 +14,8 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
-from pymavlink.dialects.v20 import all as definitions
+
+from autopilot.mavlink.definitions import DEFINITIONS
 
 MAGIC_V1 = 0xFE
 MAGIC_V2 = 0xFD
@@ -30,7 +31,7 @@ _MAGIC = re.compile(rb"[\xfd\xfe]")
 # a conversion to a Python float would alter.
 _BIT_PATTERN_FIELDS = {("PARAM_VALUE", "param_value"), ("PARAM_SET", "param_value")}
 
-_IDS_BY_NAME: dict[str, int] = {item.msgname: item.id for item in definitions.mavlink_map.values()}
+_IDS_BY_NAME: dict[str, int] = {item.msgname: item.id for item in DEFINITIONS.values()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +81,7 @@ def message_id(name: str) -> int:
 def message_type(key: int | str) -> MessageType | None:
     """The layout of a message by id or name, None if it is unknown."""
     msg_id = _IDS_BY_NAME.get(key) if isinstance(key, str) else key
-    definition = definitions.mavlink_map.get(msg_id)
+    definition = None if msg_id is None else DEFINITIONS.get(msg_id)
     if definition is None:
         return None
     if isinstance(key, str):
@@ -197,7 +198,7 @@ def _checked_frame(buffer: bytes, at: int, end: int) -> Frame | None:
             return None
         start, seq, sysid, compid = at + 10, buffer[at + 4], buffer[at + 5], buffer[at + 6]
         msg_id = int.from_bytes(buffer[at + 7 : at + 10], "little")
-    kind = message_type(msg_id) if msg_id in definitions.mavlink_map else None
+    kind = message_type(msg_id) if msg_id in DEFINITIONS else None
     if kind is None:
         return None
     stop = start + length
