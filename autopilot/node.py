@@ -18,6 +18,7 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.navigator import Navigator
 from autopilot.navigator.setpoint import SetpointPort
+from autopilot.payload import Payloads
 from autopilot.vehicle import (
     ACCEPTED,
     Announcer,
@@ -106,6 +107,7 @@ class FlightController:
     ) -> None:
         self.params = params
         self.state = VehicleState(origin=origin, position=origin)
+        self.payload = Payloads()
         self._read_estimate = ports.read_estimate
         self._read_samples = ports.read_samples
         self._read_actuators = ports.read_actuators
