@@ -14,9 +14,12 @@ import numpy as np
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.commander import Commander
 from autopilot.commander.landing import LandingDetector
+from autopilot.lists import ItemLists
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.fence import Fence
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.navigator import Navigator
+from autopilot.navigator.rally import RallyPoints
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.payload import Payloads
 from autopilot.vehicle import (
@@ -24,6 +27,7 @@ from autopilot.vehicle import (
     Announcer,
     ItemRefusal,
     LandedState,
+    ListKind,
     MissionItem,
     Mode,
     OffboardSetpoint,
@@ -128,7 +132,11 @@ class FlightController:
             LandingDetector(params, hover, standing_m),
         )
         context = NavContext(self.state, params, self._relay, self._setpoint, hover, standing_m)
-        self.navigator = Navigator(context, Mission(context, self.commander.set_home))
+        mission = Mission(context, self.commander.set_home)
+        self.navigator = Navigator(context, mission)
+        self.fence = Fence()
+        self.rally = RallyPoints()
+        self.lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
         self.commander.connect(self.navigator)
         self._setpoint.write()
 
@@ -242,11 +250,8 @@ class FlightController:
     def set_current_item(self, seq: int) -> Reply:
         return self.navigator.mission.set_current(seq)
 
-    def mission_items(self) -> Sequence[MissionItem]:
-        return self.navigator.mission.items
-
     def load_mission(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
-        return self.navigator.mission.load(items)
+        return self.lists.load(ListKind.MISSION, items)
 
     def reboot(self) -> Reply:
         if self.state.is_armed:

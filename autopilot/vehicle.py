@@ -4,7 +4,7 @@
 `Vehicle` is what a command handler may ask for; each answer is a `Reply` whose reason the ground station is shown.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from math import nan
@@ -105,6 +105,42 @@ class ItemRefusal:
     reason: str
 
 
+class ListKind(IntEnum):
+    """The lists of items that clients upload, numbered as MAV_MISSION_TYPE."""
+
+    MISSION = 0
+    FENCE = 1
+    RALLY = 2
+
+
+class ItemList(Protocol):
+    """One such list: checked and kept as a whole."""
+
+    @property
+    def items(self) -> Sequence[MissionItem]: ...
+
+    @property
+    def capacity(self) -> int:
+        """How many items it may have."""
+        ...
+
+    def load(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
+        """Replaces the list as a whole, or refuses it as a whole and keeps the old one."""
+        ...
+
+
+class StoredLists(Protocol):
+    """All of them, for those who upload, read back or keep them (autopilot.lists)."""
+
+    def items(self, kind: ListKind) -> Sequence[MissionItem]: ...
+
+    def capacity(self, kind: ListKind) -> int: ...
+
+    def load(self, kind: ListKind, items: Sequence[MissionItem]) -> ItemRefusal | None: ...
+
+    def on_change(self, listener: Callable[[ListKind], None]) -> None: ...
+
+
 @dataclass(frozen=True, slots=True)
 class OffboardSetpoint:
     """An external setpoint in our frames; NaN frees an element. `kind` is a SETPOINT_* of autopilot.ports."""
@@ -179,6 +215,11 @@ class Vehicle(Protocol):
     state: VehicleState
     params: ParameterTable
 
+    @property
+    def lists(self) -> StoredLists:
+        """Mission, fence and rally points."""
+        ...
+
     def arm(self, *, force: bool) -> Reply: ...
 
     def disarm(self, *, force: bool) -> Reply: ...
@@ -212,11 +253,5 @@ class Vehicle(Protocol):
         ...
 
     def set_current_item(self, seq: int) -> Reply: ...
-
-    def mission_items(self) -> Sequence[MissionItem]: ...
-
-    def load_mission(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
-        """Replaces the mission as a whole, or refuses it as a whole and keeps the old one."""
-        ...
 
     def reboot(self) -> Reply: ...

@@ -33,6 +33,7 @@ class Result(IntEnum):
     UNSUPPORTED_FRAME = 2
     UNSUPPORTED = 3
     NO_SPACE = 4
+    INVALID = 5
     PARAM1 = 6
     PARAM2 = 7
     PARAM3 = 8

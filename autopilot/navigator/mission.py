@@ -10,6 +10,7 @@ from math import hypot, inf, isfinite, nan, radians, sqrt
 
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.items import (
+    MAX_ITEMS,
     NAV_COMMANDS,
     RELATIVE_FRAMES,
     Command,
@@ -54,6 +55,8 @@ class Mission:
         context: what the navigator's modes share.
         set_home: sets home to latitude [deg], longitude [deg], altitude above sea level [m]; all NaN: here.
     """
+
+    capacity = MAX_ITEMS
 
     def __init__(self, context: NavContext, set_home: Callable[[float, float, float], Reply]) -> None:
         self.items: tuple[MissionItem, ...] = ()

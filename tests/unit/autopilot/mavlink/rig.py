@@ -8,9 +8,13 @@ from typing import Any
 import numpy as np
 
 from autopilot.estimator.state import EstimatorState
+from autopilot.lists import ItemLists
 from autopilot.mavlink.codec import FrameReader, Message, decode, encode
 from autopilot.mavlink.links import Link, LinkRole, memory_pair
 from autopilot.mavlink.server import MavlinkServer
+from autopilot.navigator.fence_items import MAX_FENCE_ITEMS
+from autopilot.navigator.items import MAX_ITEMS
+from autopilot.navigator.rally import MAX_RALLY_POINTS
 from autopilot.params import parameter_table
 from autopilot.ports import (
     HEIGHT_VALID,
@@ -27,6 +31,7 @@ from autopilot.ports import (
 from autopilot.vehicle import (
     ACCEPTED,
     ItemRefusal,
+    ListKind,
     MissionItem,
     Mode,
     OffboardSetpoint,
@@ -123,6 +128,20 @@ def flying_state() -> VehicleState:
     )
 
 
+class RecordingList:
+    """Takes every list, unless it is told to refuse."""
+
+    def __init__(self, capacity: int) -> None:
+        self.capacity = capacity
+        self.items: Sequence[MissionItem] = []
+        self.refusal: ItemRefusal | None = None
+
+    def load(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
+        if self.refusal is None:
+            self.items = list(items)
+        return self.refusal
+
+
 class RecordingVehicle:
     """Answers every request with `reply` and keeps a list of them."""
 
@@ -130,11 +149,15 @@ class RecordingVehicle:
         self.state = flying_state()
         self.params = parameter_table()
         self.reply = ACCEPTED
-        self.item_refusal: ItemRefusal | None = None
         self.arming_problems: list[str] = []
         self.calls: list[tuple[Any, ...]] = []
         self.setpoints: list[OffboardSetpoint] = []
-        self.items: list[MissionItem] = []
+        self.stored = {
+            ListKind.MISSION: RecordingList(MAX_ITEMS),
+            ListKind.FENCE: RecordingList(MAX_FENCE_ITEMS),
+            ListKind.RALLY: RecordingList(MAX_RALLY_POINTS),
+        }
+        self.lists = ItemLists(self.stored)
 
     def _record(self, *call: Any) -> Reply:
         self.calls.append(call)
@@ -178,14 +201,6 @@ class RecordingVehicle:
 
     def set_current_item(self, seq: int) -> Reply:
         return self._record("set_current_item", seq)
-
-    def mission_items(self) -> Sequence[MissionItem]:
-        return self.items
-
-    def load_mission(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
-        if self.item_refusal is None:
-            self.items = list(items)
-        return self.item_refusal
 
     def reboot(self) -> Reply:
         return self._record("reboot")

@@ -3,11 +3,13 @@ from math import isnan
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.mavlink.missions import RETRIES_MAX, item_from_fields, scaled_position
+from autopilot.mavlink.mission_items import item_from_fields, scaled_position
+from autopilot.mavlink.missions import DOWNLOAD_IDLE_US, RETRIES_MAX
 from autopilot.navigator.items import MAX_ITEMS
-from autopilot.vehicle import ItemRefusal, MissionItem, Reply, Verdict
+from autopilot.vehicle import ItemRefusal, ListKind, MissionItem, Reply, Verdict
 from tests.unit.autopilot.mavlink.rig import FRAME_US, Client, Rig, texts
 
+MISSION, FENCE, RALLY = ListKind
 ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
 OLD_PLAN = [MissionItem(0, 6, 16, (0.0, 1.0, 0.0, 0.0), 47.0, 8.0, 10.0)]
 PLAN = [
@@ -25,67 +27,73 @@ def send_item(client: Client, item: MissionItem, **changes: float) -> None:
     client.send("MISSION_ITEM_INT", target_component=1, autocontinue=int(item.autocontinue), **(fields | changes))
 
 
-def start(rig: Rig, count: int) -> None:
-    rig.client.send("MISSION_COUNT", target_component=1, count=count)
-    assert rig.only("MISSION_REQUEST_INT").seq == 0
+def start(rig: Rig, count: int, kind: ListKind = MISSION) -> None:
+    rig.client.send("MISSION_COUNT", target_component=1, count=count, mission_type=kind)
+    assert rig.only("MISSION_REQUEST_INT")[2:] == (0, kind)
 
 
-def upload(rig: Rig, plan: list[MissionItem]) -> int:
+def upload(rig: Rig, plan: list[MissionItem], kind: ListKind = MISSION) -> int:
     """The result of a whole upload."""
-    start(rig, len(plan))
+    start(rig, len(plan), kind)
     for item in plan[:-1]:
-        send_item(rig.client, item)
-        assert rig.only("MISSION_REQUEST_INT").seq == item.seq + 1
-    send_item(rig.client, plan[-1])
+        send_item(rig.client, item, mission_type=kind)
+        assert rig.only("MISSION_REQUEST_INT")[2:] == (item.seq + 1, kind)
+    send_item(rig.client, plan[-1], mission_type=kind)
     ack = rig.only("MISSION_ACK")
-    assert (ack.target_system, ack.target_component, ack.mission_type) == (255, 190, 0)
+    assert (ack.target_system, ack.target_component, ack.mission_type) == (255, 190, kind)
     return int(ack.type)
 
 
-def download(rig: Rig) -> list[MissionItem]:
-    rig.client.send("MISSION_REQUEST_LIST", target_component=1)
-    count = rig.only("MISSION_COUNT").count
+def download(rig: Rig, kind: ListKind = MISSION) -> list[MissionItem]:
+    rig.client.send("MISSION_REQUEST_LIST", target_component=1, mission_type=kind)
+    answer = rig.only("MISSION_COUNT")
+    assert answer.mission_type == kind
     items = []
-    for seq in range(count):
-        rig.client.send("MISSION_REQUEST_INT", target_component=1, seq=seq)
-        items.append(item_from_fields(rig.only("MISSION_ITEM_INT")))
-    rig.client.send("MISSION_ACK", target_component=1, type=ACCEPTED)
+    for seq in range(answer.count):
+        rig.client.send("MISSION_REQUEST_INT", target_component=1, seq=seq, mission_type=kind)
+        answer = rig.only("MISSION_ITEM_INT")
+        assert answer.mission_type == kind
+        items.append(item_from_fields(answer))
+    rig.client.send("MISSION_ACK", target_component=1, type=ACCEPTED, mission_type=kind)
     return items
 
 
-def test_plan_comes_back_as_it_was_sent():
+@pytest.mark.parametrize("kind", list(ListKind))
+def test_list_comes_back_as_it_was_sent(kind):
     rig = Rig()
-    assert upload(rig, PLAN) == ACCEPTED
-    assert rig.vehicle.items == PLAN
-    assert download(rig) == PLAN
+    assert upload(rig, PLAN, kind) == ACCEPTED
+    assert rig.vehicle.stored[kind].items == PLAN
+    assert download(rig, kind) == PLAN
+    for other in set(ListKind) - {kind}:
+        assert download(rig, other) == []
 
 
 def test_refused_item_leaves_the_old_plan_and_is_named():
     rig = Rig()
-    rig.vehicle.items = OLD_PLAN
-    rig.vehicle.item_refusal = ItemRefusal(1, mavlink.MAV_MISSION_UNSUPPORTED, "command 93 is not supported")
+    rig.vehicle.stored[MISSION].items = OLD_PLAN
+    rig.vehicle.stored[MISSION].refusal = ItemRefusal(1, mavlink.MAV_MISSION_UNSUPPORTED, "command 93 is not supported")
     start(rig, 1)
     send_item(rig.client, PLAN[0])
     messages = rig.frame()
     assert [m.fields.type for m in messages if m.name == "MISSION_ACK"] == [mavlink.MAV_MISSION_UNSUPPORTED]
     assert texts(messages) == ["Mission: item 1: command 93 is not supported"]
-    assert rig.vehicle.items == OLD_PLAN
+    assert rig.vehicle.stored[MISSION].items == OLD_PLAN
 
 
 def test_infinite_number_is_refused_by_its_place():
     rig = Rig()
-    rig.vehicle.items = OLD_PLAN
+    rig.vehicle.stored[MISSION].items = OLD_PLAN
     for i, field in enumerate(("param1", "param2", "param3", "param4", None, None, "z")):
         if field:
             start(rig, 1)
             send_item(rig.client, PLAN[0], **{field: float("inf")})
             assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_PARAM1 + i
-    assert rig.vehicle.items == OLD_PLAN
+    assert rig.vehicle.stored[MISSION].items == OLD_PLAN
 
 
 def test_unfinished_upload_leaves_the_old_plan():
     rig = Rig()
-    rig.vehicle.items = OLD_PLAN
+    rig.vehicle.stored[MISSION].items = OLD_PLAN
     start(rig, 3)
     send_item(rig.client, PLAN[0])
     rig.frame()
@@ -111,7 +119,7 @@ def test_upload_over_a_lossy_link_succeeds():
         rig.frame(FRAMES_PER_RETRY)  # the first answer was lost: the item is asked for again
         send_item(rig.client, item)
     rig.frame(2)
-    assert rig.vehicle.items == PLAN
+    assert rig.vehicle.stored[MISSION].items == PLAN
 
 
 def test_repeated_item_is_not_appended():
@@ -120,7 +128,7 @@ def test_repeated_item_is_not_appended():
     for item in (PLAN[0], PLAN[0], PLAN[1], PLAN[0], PLAN[1], PLAN[2]):
         send_item(rig.client, item)
     assert rig.only("MISSION_ACK").type == ACCEPTED
-    assert rig.vehicle.items == PLAN
+    assert rig.vehicle.stored[MISSION].items == PLAN
 
 
 def test_last_item_again_gets_the_same_answer_again():
@@ -132,13 +140,13 @@ def test_last_item_again_gets_the_same_answer_again():
 
 def test_item_out_of_sequence_ends_the_upload():
     rig = Rig()
-    rig.vehicle.items = OLD_PLAN
+    rig.vehicle.stored[MISSION].items = OLD_PLAN
     start(rig, 3)
     send_item(rig.client, PLAN[2])
     assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_SEQUENCE
     send_item(rig.client, PLAN[0])
     assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_SEQUENCE
-    assert rig.vehicle.items == OLD_PLAN
+    assert rig.vehicle.stored[MISSION].items == OLD_PLAN
 
 
 def test_second_uploader_is_denied_and_the_first_finishes():
@@ -160,7 +168,7 @@ def test_new_count_of_the_same_client_starts_again():
     send_item(rig.client, OLD_PLAN[0])
     rig.frame()
     assert upload(rig, PLAN) == ACCEPTED
-    assert rig.vehicle.items == PLAN
+    assert rig.vehicle.stored[MISSION].items == PLAN
 
 
 def test_client_can_give_up_its_upload():
@@ -177,10 +185,10 @@ def test_count_0_and_clear_both_clear():
         ("MISSION_CLEAR_ALL", {}),
         ("MISSION_CLEAR_ALL", {"mission_type": 255}),
     ):
-        rig.vehicle.items = OLD_PLAN
+        rig.vehicle.stored[MISSION].items = OLD_PLAN
         rig.client.send(request[0], target_component=1, **request[1])
         assert rig.only("MISSION_ACK").type == ACCEPTED
-        assert rig.vehicle.items == []
+        assert rig.vehicle.stored[MISSION].items == []
 
 
 def test_plan_may_not_be_cleared_while_another_is_uploaded():
@@ -194,13 +202,13 @@ def test_plan_may_not_be_cleared_while_another_is_uploaded():
 
 def test_clearing_gives_up_an_upload_of_ones_own():
     rig = Rig()
-    rig.vehicle.items = OLD_PLAN
+    rig.vehicle.stored[MISSION].items = OLD_PLAN
     start(rig, 3)
     send_item(rig.client, PLAN[0])
     rig.frame()
     rig.client.send("MISSION_CLEAR_ALL", target_component=1)
     assert rig.only("MISSION_ACK").type == ACCEPTED
-    assert rig.vehicle.items == []
+    assert rig.vehicle.stored[MISSION].items == []
     assert rig.all("MISSION_REQUEST_INT", 2 * FRAMES_PER_RETRY) == []
     assert upload(rig, PLAN) == ACCEPTED
 
@@ -213,22 +221,52 @@ def test_more_items_than_the_navigator_takes_are_refused_before_they_are_sent(co
     start(rig, MAX_ITEMS)
 
 
-@pytest.mark.parametrize("mission_type", [1, 2])
-def test_fences_and_rally_points_are_empty_and_cannot_be_stored(mission_type):
+@pytest.mark.parametrize("kind", [FENCE, RALLY])
+def test_each_list_is_cleared_alone_or_all_at_once(kind):
     rig = Rig()
-    of_type = {"target_component": 1, "mission_type": mission_type}
-    rig.client.send("MISSION_REQUEST_LIST", **of_type)
-    assert rig.only("MISSION_COUNT")[2:] == (0, mission_type)
-    rig.client.send("MISSION_CLEAR_ALL", **of_type)
-    assert rig.only("MISSION_ACK")[2:] == (ACCEPTED, mission_type)
-    rig.client.send("MISSION_COUNT", count=0, **of_type)
-    assert rig.only("MISSION_ACK")[2:] == (ACCEPTED, mission_type)
-    rig.client.send("MISSION_COUNT", count=3, **of_type)
-    assert rig.only("MISSION_ACK")[2:] == (mavlink.MAV_MISSION_UNSUPPORTED, mission_type)
-    rig.client.send("MISSION_REQUEST_INT", seq=0, **of_type)
-    assert rig.only("MISSION_ACK")[2:] == (mavlink.MAV_MISSION_INVALID_SEQUENCE, mission_type)
-    send_item(rig.client, PLAN[0], mission_type=mission_type)
-    assert rig.only("MISSION_ACK")[2:] == (mavlink.MAV_MISSION_UNSUPPORTED, mission_type)
+    of_kind = {"target_component": 1, "mission_type": kind}
+    for request, cleared in (
+        (("MISSION_COUNT", of_kind), {kind}),
+        (("MISSION_CLEAR_ALL", of_kind), {kind}),
+        (("MISSION_CLEAR_ALL", {"target_component": 1, "mission_type": 255}), set(ListKind)),
+    ):
+        for stored in rig.vehicle.stored.values():
+            stored.items = OLD_PLAN
+        rig.client.send(request[0], **request[1])
+        assert rig.only("MISSION_ACK")[2:] == (ACCEPTED, request[1]["mission_type"])
+        assert {k for k in ListKind if not rig.vehicle.stored[k].items} == cleared
+
+
+def test_two_clients_upload_different_lists_at_the_same_time():
+    rig = Rig()
+    start(rig, 1)
+    rig.second_client.send("MISSION_COUNT", target_component=1, count=1, mission_type=FENCE)
+    send_item(rig.second_client, PLAN[0], mission_type=FENCE)
+    send_item(rig.client, PLAN[0])
+    rig.frame()
+    assert rig.vehicle.stored[FENCE].items == rig.vehicle.stored[MISSION].items == [PLAN[0]]
+
+
+def test_refusal_of_a_fence_names_the_fence():
+    rig = Rig()
+    rig.vehicle.stored[FENCE].refusal = ItemRefusal(0, mavlink.MAV_MISSION_INVALID, "the polygon crosses itself")
+    start(rig, 1, FENCE)
+    send_item(rig.client, PLAN[0], mission_type=FENCE)
+    messages = rig.frame()
+    assert [m.fields[2:] for m in messages if m.name == "MISSION_ACK"] == [(mavlink.MAV_MISSION_INVALID, FENCE)]
+    assert texts(messages) == ["Fence: item 0: the polygon crosses itself"]
+
+
+def test_listeners_hear_of_a_new_list_and_not_of_a_refused_one():
+    rig = Rig()
+    heard = []
+    rig.vehicle.lists.on_change(heard.append)
+    upload(rig, PLAN, RALLY)
+    rig.vehicle.stored[FENCE].refusal = ItemRefusal(0, mavlink.MAV_MISSION_INVALID, "no")
+    upload(rig, PLAN, FENCE)
+    rig.client.send("MISSION_CLEAR_ALL", target_component=1)
+    rig.frame()
+    assert heard == [RALLY, MISSION]
 
 
 def test_list_that_does_not_exist_is_refused():
@@ -238,17 +276,46 @@ def test_list_that_does_not_exist_is_refused():
         assert rig.only("MISSION_ACK")[2:] == (mavlink.MAV_MISSION_UNSUPPORTED, 77)
 
 
-def test_partial_lists_are_refused():
+def test_part_of_a_stored_list_is_replaced():
     rig = Rig()
-    rig.client.send("MISSION_WRITE_PARTIAL_LIST", target_component=1, start_index=0, end_index=1)
-    assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_UNSUPPORTED
+    rig.vehicle.stored[MISSION].items = PLAN
+    changed = MissionItem(1, 6, 16, (0.0,) * 4, 47.399, 8.547, 30.0)
+    rig.client.send("MISSION_WRITE_PARTIAL_LIST", target_component=1, start_index=1, end_index=1)
+    assert rig.only("MISSION_REQUEST_INT").seq == 1
+    send_item(rig.client, changed)
+    assert rig.only("MISSION_ACK").type == ACCEPTED
+    assert rig.vehicle.stored[MISSION].items == [PLAN[0], changed, PLAN[2]]
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 3), (-1, 1), (2, 1)])
+def test_part_that_is_not_in_the_list_is_refused(first, last):
+    rig = Rig()
+    rig.vehicle.stored[MISSION].items = PLAN
+    rig.client.send("MISSION_WRITE_PARTIAL_LIST", target_component=1, start_index=first, end_index=last)
+    assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_INVALID_SEQUENCE
+    assert rig.vehicle.stored[MISSION].items == PLAN
+
+
+def test_part_of_a_list_is_not_read_at_once():
+    rig = Rig()
     rig.client.send("MISSION_REQUEST_PARTIAL_LIST", target_component=1, start_index=0, end_index=1)
     assert rig.only("MISSION_ACK").type == mavlink.MAV_MISSION_UNSUPPORTED
 
 
+def test_download_without_a_final_ack_ends_by_itself():
+    rig = Rig()
+    rig.vehicle.stored[MISSION].items = OLD_PLAN
+    rig.client.send("MISSION_REQUEST_LIST", target_component=1)
+    rig.frame()
+    rig.vehicle.stored[MISSION].items = PLAN
+    rig.frame(DOWNLOAD_IDLE_US // FRAME_US + 1)
+    rig.client.send("MISSION_REQUEST_INT", target_component=1, seq=2)
+    assert item_from_fields(rig.only("MISSION_ITEM_INT")) == PLAN[2]
+
+
 def test_items_are_served_in_any_order_and_repeatedly():
     rig = Rig()
-    rig.vehicle.items = PLAN
+    rig.vehicle.stored[MISSION].items = PLAN
     for seq in (2, 0, 2, 1):
         rig.client.send("MISSION_REQUEST_INT", target_component=1, seq=seq)
         assert rig.only("MISSION_ITEM_INT").seq == seq
@@ -258,10 +325,10 @@ def test_items_are_served_in_any_order_and_repeatedly():
 
 def test_download_is_not_torn_by_an_upload():
     rig = Rig()
-    rig.vehicle.items = OLD_PLAN
+    rig.vehicle.stored[MISSION].items = OLD_PLAN
     rig.client.send("MISSION_REQUEST_LIST", target_component=1)
     rig.frame()
-    rig.vehicle.items = PLAN
+    rig.vehicle.stored[MISSION].items = PLAN
     rig.client.send("MISSION_REQUEST_INT", target_component=1, seq=0)
     assert item_from_fields(rig.only("MISSION_ITEM_INT")) == OLD_PLAN[0]
     assert download(rig) == PLAN
@@ -269,14 +336,14 @@ def test_download_is_not_torn_by_an_upload():
 
 def test_float_items_are_still_served_and_taken():
     rig = Rig()
-    rig.vehicle.items = PLAN
+    rig.vehicle.stored[MISSION].items = PLAN
     rig.client.send("MISSION_REQUEST", target_component=1, seq=1)
     item = rig.only("MISSION_ITEM")
     assert (item.x, item.z) == (pytest.approx(47.398, abs=1e-5), 20.0)
     start(rig, 1)
     rig.client.send("MISSION_ITEM", **(item._asdict() | {"seq": 0, "target_system": 1, "target_component": 1}))
     assert rig.only("MISSION_ACK").type == ACCEPTED
-    assert rig.vehicle.items[0].x == pytest.approx(47.398, abs=1e-5)
+    assert rig.vehicle.stored[MISSION].items[0].x == pytest.approx(47.398, abs=1e-5)
 
 
 def test_positions_are_scaled_by_their_frame():
@@ -292,7 +359,7 @@ def test_unset_position_is_nan():
     start(rig, 1)
     send_item(rig.client, PLAN[0], x=2**31 - 1, y=2**31 - 1)
     rig.frame()
-    assert isnan(rig.vehicle.items[0].x)
+    assert isnan(rig.vehicle.stored[MISSION].items[0].x)
 
 
 def test_set_current_is_answered_by_the_current_item():

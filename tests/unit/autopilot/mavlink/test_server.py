@@ -85,11 +85,12 @@ def test_autopilot_version_says_who_we_are():
         mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2,
         mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT,
         mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT,
+        mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE,
+        mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY,
         mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE,
     ):
         assert version.capabilities & bit
-    for bit in (mavlink.MAV_PROTOCOL_CAPABILITY_FTP, mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE):
-        assert not version.capabilities & bit
+    assert not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_FTP
     assert version.uid != 0
 
 

@@ -85,5 +85,5 @@ def test_refused_mission_leaves_the_old_one():
     rig = Kinematic().ready()
     assert rig.fc.load_mission([GOOD]) is None
     assert rig.fc.load_mission([item(0, 16), item(1, 201)]).seq == 1
-    assert list(rig.fc.mission_items()) == [GOOD]
+    assert list(rig.fc.navigator.mission.items) == [GOOD]
     assert rig.state.mission_count == 1
