@@ -17,6 +17,7 @@ from mission.plan import PlanItem
 CLIENT_SYSTEM_ID = 245
 CLIENT_COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as MAVSDK uses
 OFFBOARD_PERIOD_US = 50_000
+AUTOPILOT_COMPONENT = 1
 HEARTBEAT_PERIOD_US = 1_000_000
 COMMAND_TIMEOUT_S = 1.5
 COMMAND_TRIES = 3
@@ -316,6 +317,8 @@ class Client:
 
     def _take(self, frame: Frame) -> None:
         msg_id = frame.kind.msg_id
+        if msg_id == _HEARTBEAT_ID and frame.compid != AUTOPILOT_COMPONENT:
+            return  # a camera's or gimbal's: it tells nothing of the vehicle
         self._latest[msg_id] = frame
         if msg_id in _NOTED:
             self._note(decode(frame))
@@ -338,6 +341,7 @@ class Client:
         self._text_id = fields.id
 
 
+_HEARTBEAT_ID = message_id("HEARTBEAT")
 _NOTED = {message_id("STATUSTEXT"), message_id("MISSION_ITEM_REACHED")}
 
 

@@ -29,11 +29,17 @@ class Channel:
         self.clients: set[tuple[int, int]] = set()  # (sysid, compid) that have sent a heartbeat
         self._sysid = sysid
         self._seq = 0
+        self._component_seqs: dict[int, int] = {}  # clients count losses per component
 
-    def send(self, kind: MessageType, payload: bytes) -> bytes:
+    def send(self, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> bytes:
         """Sends one message and returns its frame."""
-        frame = frame_bytes(kind, payload, self._seq, self._sysid, AUTOPILOT_COMPONENT)
-        self._seq = self._seq + 1 & 0xFF
+        if compid == AUTOPILOT_COMPONENT:
+            seq = self._seq
+            self._seq = seq + 1 & 0xFF
+        else:
+            seq = self._component_seqs.get(compid, 0)
+            self._component_seqs[compid] = seq + 1 & 0xFF
+        frame = frame_bytes(kind, payload, seq, self._sysid, compid)
         self.link.send(frame)
         return frame
 
@@ -57,22 +63,23 @@ class Endpoint:
         self.dialect = dialect
         self.sysid = sysid
         self.time_us = 0
+        self.compids = {AUTOPILOT_COMPONENT}  # the vehicle's components behind these links
         self.telemetry = Telemetry(dialect, sysid)
         self.channels = [Channel(link, sysid, StreamSchedule(self.telemetry, link.role)) for link in links]
         self._on_frame = on_frame
         self._text_id = 0
         self._texts_until_us: dict[str, int] = {}
 
-    def reply(self, sender: Sender, kind: MessageType, payload: bytes) -> None:
+    def reply(self, sender: Sender, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
         """Sends a message on the channel of `sender`."""
-        frame = sender.channel.send(kind, payload)
+        frame = sender.channel.send(kind, payload, compid)
         if self._on_frame is not None:
             self._on_frame(self.time_us, frame)
 
-    def broadcast(self, kind: MessageType, payload: bytes) -> None:
+    def broadcast(self, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
         """Sends a message on every channel; the frame log gets it once."""
         for i, channel in enumerate(self.channels):
-            frame = channel.send(kind, payload)
+            frame = channel.send(kind, payload, compid)
             if i == 0 and self._on_frame is not None:
                 self._on_frame(self.time_us, frame)
 
@@ -94,8 +101,8 @@ class Endpoint:
             self._on_frame(self.time_us, frame)
 
     def is_for_us(self, target_system: int, target_component: int) -> bool:
-        """Whether a message is addressed to us; 0 addresses all."""
-        return target_system in (0, self.sysid) and target_component in (0, AUTOPILOT_COMPONENT)
+        """Whether a message is addressed to one of our components; 0 addresses all."""
+        return target_system in (0, self.sysid) and (target_component == 0 or target_component in self.compids)
 
     def text(self, severity: Severity, text: str, to: Sender | None = None) -> None:
         """Sends a text to everyone, or to one sender; beyond 50 characters in several pieces."""

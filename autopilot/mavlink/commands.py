@@ -5,14 +5,15 @@ information are refused without a text: asking is how clients find out what ther
 0 is a value.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite, isinf, isnan, nan, radians
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.mavlink.channel import Endpoint, Sender
+from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Endpoint, Sender
 from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.component import Component
 from autopilot.mavlink.convert import (
     GLOBAL_FRAMES,
     INT32_MAX,
@@ -62,12 +63,19 @@ _PROBES = {
     if entry.name.startswith(("MAV_CMD_REQUEST_", "MAV_CMD_GET_"))
 } | {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}
 
+_ABOUT_MESSAGES = (
+    mavlink.MAV_CMD_REQUEST_MESSAGE,
+    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+    mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
+)
+
 
 class CommandService(Service):
     """Carries commands out by asking the vehicle, or the service that knows the command."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
+        self.components: Sequence[Component] = ()  # those behind the same links; they acknowledge for themselves
         self.handlers: dict[int, CommandHandler] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_NAV_TAKEOFF: self._takeoff,
@@ -109,16 +117,16 @@ class CommandService(Service):
 
     def long_received(self, sender: Sender, f: Any) -> None:
         """Carries a command out; an altitude in parameter 7 is above sea level."""
-        self._execute(
-            Command(f.command, 0, f.param1, f.param2, f.param3, f.param4, f.param5, f.param6, f.param7, sender)
-        )
+        command = Command(f.command, 0, f.param1, f.param2, f.param3, f.param4, f.param5, f.param6, f.param7, sender)
+        self._dispatch(command, f.target_component)
 
     def int_received(self, sender: Sender, f: Any) -> None:
         """Carries a command out; latitude and longitude as 1e7 integers, the altitude in the frame given."""
         is_global = f.frame in LATLON_FRAMES
         x = degrees_from_e7(f.x) if is_global else float(f.x)
         y = degrees_from_e7(f.y) if is_global else float(f.y)
-        self._execute(Command(f.command, f.frame, f.param1, f.param2, f.param3, f.param4, x, y, f.z, sender))
+        command = Command(f.command, f.frame, f.param1, f.param2, f.param3, f.param4, x, y, f.z, sender)
+        self._dispatch(command, f.target_component)
 
     def set_mode_received(self, _: Sender, fields: Any) -> None:
         """Changes the flight mode; there is no acknowledgement, the heartbeat is the answer."""
@@ -130,6 +138,21 @@ class CommandService(Service):
         reply = self._endpoint.vehicle.set_mode(mode)
         if reply.verdict != Verdict.ACCEPTED:
             self._endpoint.text(Severity.WARNING, f"Mode: {reply.reason}")
+
+    def _dispatch(self, command: Command, target: int) -> None:
+        """Hands a command to the component it names; one to all (0) to each that knows it, and each answers."""
+        is_taken = False
+        for component in self.components:
+            if target in (0, component.compid):
+                is_taken |= component.execute(command, is_addressed=target != 0)
+        if target == AUTOPILOT_COMPONENT or (target == 0 and not (is_taken and self._is_foreign(command))):
+            self._execute(command)
+
+    def _is_foreign(self, command: Command) -> bool:
+        """Whether the autopilot would answer a command to all that it is not supported."""
+        if command.command in _ABOUT_MESSAGES:
+            return whole(command.p1, -1) not in self._endpoint.telemetry.builders
+        return command.command not in self.handlers
 
     def _execute(self, command: Command) -> None:
         handler = self.handlers.get(command.command)

@@ -12,6 +12,7 @@ from autopilot.mavlink.absent import AbsentServices
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Channel, Endpoint, OnFrame, Sender
 from autopilot.mavlink.codec import Frame, known_type
 from autopilot.mavlink.commands import CommandService
+from autopilot.mavlink.component import Component
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.identity import banner
@@ -30,6 +31,8 @@ _MISSION_CURRENT = known_type("MISSION_CURRENT")
 _MISSION_ITEM_REACHED = known_type("MISSION_ITEM_REACHED")
 _PING = known_type("PING")
 _TIMESYNC = known_type("TIMESYNC")
+
+_COMMAND_IDS = (known_type("COMMAND_LONG").msg_id, known_type("COMMAND_INT").msg_id)  # handed on to components
 
 SYSID_PARAMETER = "MAV_SYS_ID"
 
@@ -63,6 +66,12 @@ class MavlinkServer:
         self._add_messages(self._own_messages())
         for service in self._services():
             self._add(service)
+        self._components = self._make_components()
+        endpoint = self._endpoint
+        for component in self._components:
+            endpoint.compids.add(component.compid)
+            self._frames.append(component.frame)
+        self._commands.components = self._components
 
     def _services(self) -> list[Service]:
         endpoint = self._endpoint
@@ -73,6 +82,10 @@ class MavlinkServer:
             OffboardService(endpoint),
             AbsentServices(endpoint),
         ]
+
+    def _make_components(self) -> list[Component]:
+        """The vehicle's components besides the autopilot."""
+        return []
 
     def _add(self, service: Service) -> None:
         self._add_messages(service.messages())
@@ -130,17 +143,25 @@ class MavlinkServer:
         endpoint.send_streams()
 
     def _handle(self, channel: Channel, frame: Frame) -> None:
-        """Hands a frame to its service if it is addressed to us."""
+        """Hands a frame to its service, or to the component it is addressed to, if that is one of ours."""
         endpoint = self._endpoint
         endpoint.received(frame.raw)
-        handler = self._handlers.get(frame.kind.msg_id)
-        is_echo = frame.sysid == endpoint.sysid and frame.compid == AUTOPILOT_COMPONENT
-        if handler is None or is_echo:
+        msg_id = frame.kind.msg_id
+        handler = self._handlers.get(msg_id)
+        listeners = [component for component in self._components if msg_id in component.handlers]
+        is_echo = frame.sysid == endpoint.sysid and frame.compid in endpoint.compids
+        if (handler is None and not listeners) or is_echo:
             return
         fields = frame.kind.unpack(frame.payload)
-        target_system = getattr(fields, "target_system", 0)
-        if endpoint.is_for_us(target_system, getattr(fields, "target_component", 0)):
-            handler(Sender(channel, frame.sysid, frame.compid), fields)
+        target = getattr(fields, "target_component", 0)
+        if not endpoint.is_for_us(getattr(fields, "target_system", 0), target):
+            return
+        sender = Sender(channel, frame.sysid, frame.compid)
+        if handler is not None and (target in (0, AUTOPILOT_COMPONENT) or msg_id in _COMMAND_IDS):
+            handler(sender, fields)
+        for component in listeners:
+            if target in (0, component.compid):
+                component.handlers[msg_id](sender, fields)
 
     def close(self) -> None:
         """Closes the links."""
