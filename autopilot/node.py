@@ -138,6 +138,7 @@ class FlightController:
         self.rally = RallyPoints()
         self.lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
         self.commander.connect(self.navigator)
+        self.station = self.commander.station
         self._setpoint.write()
 
     def attach(self, server: Server) -> None:
@@ -188,6 +189,9 @@ class FlightController:
 
     def disarm(self, *, force: bool) -> Reply:
         return self.commander.disarm(force=force)
+
+    def terminate(self) -> Reply:
+        return self.commander.terminate()
 
     def check_arming(self) -> list[str]:
         return self.commander.check_arming()

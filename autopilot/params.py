@@ -35,7 +35,6 @@ SYSTEM_PARAMETERS: list[Parameter] = [
     _constant("COM_FLTMODE4", -1, "no mode switch"),
     _constant("COM_FLTMODE5", -1, "no mode switch"),
     _constant("COM_FLTMODE6", -1, "no mode switch"),
-    _constant("NAV_DLL_ACT", 0, "the loss of the ground station changes nothing"),
     _constant("NAV_RCL_ACT", 0, "no radio control"),
     _constant("RC_MAP_ROLL", 0, "no radio control"),
     _constant("RC_MAP_PITCH", 0, "no radio control"),

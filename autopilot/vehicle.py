@@ -58,6 +58,16 @@ class LandedState(IntEnum):
     LANDING = 4
 
 
+class BatteryLevel(IntEnum):
+    """Numbered as MAV_BATTERY_CHARGE_STATE."""
+
+    UNDEFINED = 0
+    OK = 1
+    LOW = 2
+    CRITICAL = 3
+    EMERGENCY = 4
+
+
 class Severity(IntEnum):
     """Numbered as MAV_SEVERITY."""
 
@@ -187,6 +197,7 @@ class VehicleState:
     armed_since_us: int = 0
     battery_remaining: float = nan  # [0..1]
     battery_used_mah: float = 0.0
+    battery_level: BatteryLevel = BatteryLevel.UNDEFINED
     load: float = 0.0  # [0..1] share of the frame time the Python part took; 0 in lockstep
     mission_count: int = 0
     mission_current: int = 0  # seq
@@ -209,6 +220,14 @@ class Announcer(Protocol):
         ...
 
 
+class Station(Protocol):
+    """Whether a ground station is there."""
+
+    def heard(self, time_us: int) -> None:
+        """A heartbeat of a ground station has come in."""
+        ...
+
+
 class Vehicle(Protocol):
     """What may be asked of the vehicle. Altitudes are AMSL [m], angles radians, NaN means default."""
 
@@ -220,9 +239,16 @@ class Vehicle(Protocol):
         """Mission, fence and rally points."""
         ...
 
+    @property
+    def station(self) -> Station: ...
+
     def arm(self, *, force: bool) -> Reply: ...
 
     def disarm(self, *, force: bool) -> Reply: ...
+
+    def terminate(self) -> Reply:
+        """Stops the motors for good, wherever the vehicle is."""
+        ...
 
     def check_arming(self) -> list[str]:
         """Reasons why the vehicle may not be armed now; empty when ready."""

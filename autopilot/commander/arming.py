@@ -26,7 +26,10 @@ def arming_reasons(state: VehicleState, params: ParameterTable, *, needs_positio
     """
     if state.estimate is None or state.samples is None:
         return ["no data from the sensors yet"]
-    checks = (*_ALWAYS, *_POSITION) if needs_position else _ALWAYS
+    if needs_position:
+        checks = (*_ALWAYS, *_POSITION)
+    else:
+        checks = _ALWAYS if int(params["COM_ARM_WO_GPS"]) else (*_ALWAYS, _gnss)
     return [reason for check in checks if (reason := check(state, params))]
 
 

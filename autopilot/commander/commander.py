@@ -8,23 +8,12 @@ from math import hypot, isfinite, pi, sqrt
 
 from autopilot.commander.arming import arming_reasons
 from autopilot.commander.battery import BatteryEstimator
-from autopilot.commander.crash import AttitudeWatch
-from autopilot.commander.failsafe import (
-    ACTION_MODES,
-    BATTERY_CRITICAL,
-    BATTERY_EMERGENCY,
-    BATTERY_LOW,
-    BATTERY_SILENT,
-    CRASHED,
-    OFFBOARD_LOST,
-    OUTCOMES,
-    POSITION_LOST,
-    RULES,
-    Action,
-)
+from autopilot.commander.failsafe import CRASHED
 from autopilot.commander.flying import Flying
+from autopilot.commander.guard import Guard
 from autopilot.commander.landing import LandingDetector
 from autopilot.commander.modes import MODE_RULES, mode_refusal
+from autopilot.commander.watch import FailureWatch, StationLink
 from autopilot.navigator.ground import Ask
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID
 from autopilot.vehicle import ACCEPTED, Announcer, LandedState, Mode, Reply, Severity, VehicleState, Verdict
@@ -67,22 +56,22 @@ class Commander:
         self.params = params
         self.announcer = announcer
         self.has_position = False
+        self.station = StationLink()
+        self.guard = Guard(self)
         self._battery = battery
-        self._attitude = AttitudeWatch(params)
+        self._watch = FailureWatch(state, params, battery, self.station)
         self._landing = landing
         self._flying: Flying
         self._position_seen_us = -1  # when the position was last valid
         self._next_check_us = 0
         self._next_text_us = _FIRST_TEXT_US
         self._landed_since_us = 0
-        self._disarmed_us = 0
+        self._unpowered_us = 0
         self._reset_count = 0  # of the estimate
         self._lift_since_us = 0
         self._lift_d = 0.0
         self._has_flown = False  # since arming
         self._is_home_given = False  # by a client: arming does not move it
-        self._failures = 0
-        self._action = Action.WARN  # of the failsafe in progress
         self._load()
         params.on_change(self._on_parameter)
 
@@ -100,8 +89,7 @@ class Commander:
         sample = state.samples.battery
         battery.update(sample.time_us, sample.voltage_v, sample.current_a)
         battery.count_on(state.time_us)
-        state.battery_remaining = battery.remaining
-        state.battery_used_mah = battery.used_mah
+        self._watch.judge_battery()
         if state.home is None and self.has_position and state.estimate.pos_h_std <= self._eph:
             self._set_home_here()
         if state.landed_state is LandedState.ON_GROUND:
@@ -120,6 +108,8 @@ class Commander:
     def change_mode(self, mode: Mode) -> None:
         """Changes the mode without asking; for the navigator's wishes and for failsafes."""
         if mode is not self.state.mode:
+            if mode is Mode.TERMINATION:
+                self._unpowered_us = self.state.time_us
             self.state.mode = mode
             self._flying.enter(mode)
             self.announcer.heartbeat_now()
@@ -140,9 +130,8 @@ class Commander:
         state.armed_since_us = self._landed_since_us = state.time_us
         self._lift_since_us = 0
         self._has_flown = False
-        self._failures = 0
-        self._attitude.reset()
-        self._clear_failsafe()
+        self._watch.reset()
+        self.guard.reset()
         self._flying.on_armed()
         self.announcer.heartbeat_now()
         self.announcer.statustext(Severity.INFO, "Armed")
@@ -154,7 +143,7 @@ class Commander:
             return ACCEPTED
         if not force and state.landed_state is not LandedState.ON_GROUND:
             return Reply(Verdict.TEMPORARILY_REJECTED, "in the air")
-        self._disarm("Disarmed by command")
+        self.stop_motors("Disarmed by command")
         return ACCEPTED
 
     def check_arming(self) -> list[str]:
@@ -173,11 +162,33 @@ class Commander:
 
     def request_mode(self, mode: Mode) -> Reply:
         """Changes the mode for a client, or says why not."""
-        reason = self.refusal(mode)
+        reason = self._pilot_refusal(mode) or self.refusal(mode)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)
-        self._clear_failsafe()
+        self.guard.release()
         self.change_mode(mode)
+        return ACCEPTED
+
+    def _pilot_refusal(self, mode: Mode) -> str:
+        """Why a client may not choose a mode that could be flown; empty if it may."""
+        state = self.state
+        if state.mode is Mode.TERMINATION and mode is not state.mode:
+            return "the flight is terminated"
+        if mode is Mode.TERMINATION and state.mode is not mode:
+            return "a flight is terminated by command, not by a mode"
+        return self.guard.refusal(mode) if state.is_armed else ""
+
+    def terminate(self) -> Reply:
+        """Stops the motors for good, wherever the vehicle is."""
+        state = self.state
+        if not state.is_armed:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not armed")
+        self.announcer.statustext(Severity.EMERGENCY, "Flight terminated by command")
+        if state.landed_state is LandedState.ON_GROUND:
+            self.stop_motors("Disarmed by termination")
+        else:
+            state.is_failsafe = True
+            self.change_mode(Mode.TERMINATION)
         return ACCEPTED
 
     def refusal(self, mode: Mode) -> str:
@@ -233,10 +244,13 @@ class Commander:
                 self._lift_since_us = now_us
                 self._lift_d = state.estimate.pos_ned[2]
             return
+        if state.mode is Mode.TERMINATION:
+            self.stop_motors("Disarmed after termination")
+            return
         is_done = self._has_flown or not MODE_RULES[state.mode].may_arm
         limit_us = self._disarm_landed_us if is_done else self._disarm_preflight_us
         if 0 <= limit_us <= now_us - self._landed_since_us:
-            self._disarm("Disarmed after landing" if is_done else "Disarmed: no take-off")
+            self.stop_motors("Disarmed after landing" if is_done else "Disarmed: no take-off")
 
     def _fly(self, dt_s: float) -> None:
         """Off the ground: landed state, landing detection."""
@@ -248,7 +262,8 @@ class Commander:
                 self._touch_down()
             return
         ask = self._flying.ask
-        thrust = state.actuators.thrust_sp if state.is_armed else 0.0
+        is_powered = state.is_armed and state.mode is not Mode.TERMINATION
+        thrust = state.actuators.thrust_sp if is_powered else 0.0
         descent_sp = state.actuators.traj_vel_ned[2] if ask is Ask.DOWN else 0.0
         is_landed = self._landing.update(state.estimate, thrust, descent_sp, min(dt_s, _FRAME_LONGEST_S))
         if ask is Ask.UP and self._landing.has_contact:
@@ -259,9 +274,9 @@ class Commander:
             self._touch_down()
             if hypot(state.roll_rad, state.pitch_rad) < _ON_ITS_SIDE_RAD:
                 self.announcer.statustext(Severity.INFO, "Landed")
-            elif state.is_armed:
-                self._act(CRASHED)
-        elif not state.is_armed and (self._landing.lies_still or state.time_us - self._disarmed_us > _FALLEN_US):
+            elif is_powered:
+                self.guard.act(CRASHED)
+        elif not is_powered and (self._landing.lies_still or state.time_us - self._unpowered_us > _FALLEN_US):
             self._touch_down()
         elif state.landed_state is not LandedState.TAKEOFF or state.mode is not Mode.TAKEOFF:
             state.landed_state = LandedState.LANDING if self._flying.is_landing else LandedState.IN_AIR
@@ -274,17 +289,18 @@ class Commander:
         elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
             self.announcer.statustext(Severity.CRITICAL, "Takeoff failed: still on the ground")
             self._touch_down()
-            self._disarm("Disarmed: no take-off")
+            self.stop_motors("Disarmed: no take-off")
 
     def _touch_down(self) -> None:
         self.state.landed_state = LandedState.ON_GROUND
         self._landed_since_us = self.state.time_us
 
-    def _disarm(self, text: str) -> None:
+    def stop_motors(self, text: str) -> None:
+        """Disarms, whatever the vehicle is doing."""
         state = self.state
         state.is_armed = False
-        self._disarmed_us = state.time_us
-        self._clear_failsafe()
+        self._unpowered_us = state.time_us
+        self.guard.release()
         self._next_check_us = 0
         self.change_mode(Mode.HOLD)
         self.announcer.heartbeat_now()
@@ -329,56 +345,15 @@ class Commander:
             self.announcer.statustext(Severity.NOTICE, f"Estimator: position reset by {jump_m:.1f} m")
 
     def _watch_failures(self, dt_s: float) -> None:
-        state = self.state
-        mode = state.mode
-        failures = self._attitude.update(state, dt_s)
-        if self._battery.is_silent and state.landed_state is not LandedState.ON_GROUND:
-            failures |= BATTERY_SILENT
-        if not self.has_position and self._needs_position(mode):
-            failures |= POSITION_LOST
-        if mode is Mode.OFFBOARD and self._flying.offboard_age_us(state.time_us) > self._offboard_loss_us:
-            failures |= OFFBOARD_LOST
-        remaining = self._battery.remaining
-        if remaining < self._battery_low:
-            failures |= BATTERY_LOW
-            if remaining < self._battery_critical:
-                failures |= BATTERY_CRITICAL
-            if remaining < self._battery_emergency:
-                failures |= BATTERY_EMERGENCY
-        if failures != self._failures:
-            new = failures & ~self._failures
-            self._failures = failures
-            if new:
-                self._act(new)
-
-    def _act(self, new: int) -> None:
-        """Takes the strongest action of the failures that are new; announces each of them."""
-        state = self.state
-        strongest = Action.WARN
-        for rule in RULES:
-            if not rule.failure & new:
-                continue
-            action = rule.action(self.params)
-            if action is Action.RETURN and self.refusal(Mode.RETURN):
-                action = Action.LAND
-            strongest = max(strongest, action)
-            self.announcer.statustext(rule.severity, rule.text + OUTCOMES.get(action, ""))
-        if strongest is Action.WARN:
-            return
-        if strongest is Action.TERMINATE:
-            self._disarm("Disarmed by failsafe")
-            return
-        if state.landed_state is LandedState.ON_GROUND:
-            self._disarm("Disarmed by failsafe on the ground")
-            return
-        state.is_failsafe = True
-        if strongest > self._action and state.mode is not Mode.LAND:
-            self._action = strongest
-            self.change_mode(ACTION_MODES[strongest])
-
-    def _clear_failsafe(self) -> None:
-        self.state.is_failsafe = False
-        self._action = Action.WARN
+        if self.state.mode is Mode.TERMINATION:
+            return  # nothing more can be done
+        failures = self._watch.frame(
+            dt_s,
+            self._flying,
+            has_position=self.has_position,
+            needs_position=self._needs_position(self.state.mode),
+        )
+        self.guard.see(failures)
 
     def _load(self) -> None:
         params = self.params
@@ -387,11 +362,7 @@ class Commander:
         self._spool_up_us = int(params["COM_SPOOLUP_TIME"] * 1e6)
         self._disarm_landed_us = int(params["COM_DISARM_LAND"] * 1e6)
         self._disarm_preflight_us = int(params["COM_DISARM_PRFLT"] * 1e6)
-        self._offboard_loss_us = int(params["COM_OF_LOSS_T"] * 1e6)
-        self._battery_low = float(params["BAT_LOW_THR"])
-        self._battery_critical = float(params["BAT_CRIT_THR"])
-        self._battery_emergency = float(params["BAT_EMERGEN_THR"])
 
     def _on_parameter(self, parameter: Parameter) -> None:
-        if parameter.name.startswith(("COM_", "BAT_")):
+        if parameter.name.startswith("COM_"):
             self._load()

@@ -1,4 +1,7 @@
-"""Failsafes: which failure leads to which action, most urgent first, with what the pilot is told."""
+"""Failsafes: which failure leads to which action, most urgent first, with what the pilot is told.
+
+A new failsafe is a bit, a row of `RULES`, and a condition in `watch.py` that sets the bit.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,22 +19,73 @@ BATTERY_LOW = 16
 BATTERY_SILENT = 32
 ATTITUDE_LOST = 64
 CRASHED = 128
+STATION_LOST = 256
+HEIGHT_LOST = 512  # in a mode that needs the height, but no position
+WIND_HIGH = 1024
+WIND_STRONG = 2048
+FLIGHT_TIME_OVER = 4096
+FLIGHT_TIME_NEAR = 8192
+DEAD_RECKONING = 16384
+MOTOR_FAILED = 32768
+
+TERMINATION_BREAKER = 121212  # CBRK_FLIGHTTERM: the failure detector may not stop the motors
 
 
 class Action(IntEnum):
     """What to do, in rising order: a failsafe never replaces a stronger one."""
 
     WARN = 0
-    HOLD = 1
-    RETURN = 2
-    LAND = 3  # blind if the position is lost
-    TERMINATE = 4  # motors stopped, wherever the vehicle is
+    ALTITUDE = 1  # the pilot flies on without a position
+    HOLD = 2
+    RETURN = 3
+    LAND = 4  # blind if the position is lost
+    TERMINATE = 5  # motors stopped, wherever the vehicle is; disarmed once it lies on the ground
+    DISARM = 6  # at once
 
 
-ACTION_MODES = {Action.HOLD: Mode.HOLD, Action.RETURN: Mode.RETURN, Action.LAND: Mode.LAND}
+ACTION_MODES = {
+    Action.ALTITUDE: Mode.ALTITUDE,
+    Action.HOLD: Mode.HOLD,
+    Action.RETURN: Mode.RETURN,
+    Action.LAND: Mode.LAND,
+    Action.TERMINATE: Mode.TERMINATION,
+}
 OUTCOMES = {
-    Action.HOLD: ": hold", Action.RETURN: ": return", Action.LAND: ": land", Action.TERMINATE: ": motors stopped",
+    Action.ALTITUDE: ": altitude mode",
+    Action.HOLD: ": hold",
+    Action.RETURN: ": return",
+    Action.LAND: ": land",
+    Action.TERMINATE: ": flight terminated",
+    Action.DISARM: ": motors stopped",
+}
+MODE_STRENGTH = {
+    Mode.RETURN: Action.RETURN,
+    Mode.SMART_RETURN: Action.RETURN,
+    Mode.LAND: Action.LAND,
+    Mode.PRECISION_LAND: Action.LAND,
+    Mode.TERMINATION: Action.TERMINATE,
+}
+"""Modes that a weaker action, or the same one, does not end."""
+
+# PX4's numbers of actions, parameter by parameter.
+LINK_ACTIONS = {
+    0: Action.WARN, 1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND, 5: Action.TERMINATE, 6: Action.DISARM,
 }  # fmt: skip
+"""NAV_DLL_ACT and NAV_RCL_ACT."""
+MOTOR_ACTIONS = {0: Action.WARN, 1: Action.HOLD, 2: Action.LAND, 3: Action.RETURN, 4: Action.TERMINATE}
+"""COM_ACT_FAIL_ACT."""
+LIMIT_ACTIONS = {
+    0: Action.WARN, 1: Action.WARN, 2: Action.HOLD, 3: Action.RETURN, 4: Action.TERMINATE, 5: Action.LAND,
+}  # fmt: skip
+"""COM_WIND_MAX_ACT and GF_ACTION."""
+OFFBOARD_ACTIONS = {
+    3: Action.RETURN, 4: Action.LAND, 5: Action.HOLD, 6: Action.TERMINATE, 7: Action.DISARM,
+}  # fmt: skip
+"""COM_OBL_RC_ACT."""
+CRITICAL_BATTERY_ACTIONS = {2: Action.LAND, 3: Action.RETURN}
+EMERGENCY_BATTERY_ACTIONS = {2: Action.LAND, 3: Action.LAND}
+
+ActionChoice = Callable[[ParameterTable, Mode], Action]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,42 +93,50 @@ class Rule:
     """One row of the table."""
 
     failure: int  # one of the bits
-    action: Callable[[ParameterTable], Action]
+    action: ActionChoice
     severity: Severity
     text: str
+    recovery: str = ""  # what is told when the failure is over; the mode stays
 
 
-def _battery_critical(params: ParameterTable) -> Action:
-    return {2: Action.LAND, 3: Action.RETURN}.get(int(params["COM_LOW_BAT_ACT"]), Action.WARN)
+def always(action: Action) -> ActionChoice:
+    """The same action, whatever the parameters say."""
+    return lambda _params, _mode: action
 
 
-def _battery_emergency(params: ParameterTable) -> Action:
-    return Action.LAND if int(params["COM_LOW_BAT_ACT"]) >= 2 else Action.WARN
+def by(parameter: str, actions: dict[int, Action], otherwise: Action = Action.WARN) -> ActionChoice:
+    """The action that a parameter chooses."""
+    return lambda params, _mode: actions.get(int(params[parameter]), otherwise)
 
 
-def _offboard_lost(params: ParameterTable) -> Action:
-    return {3: Action.RETURN, 4: Action.LAND}.get(int(params["COM_OBL_RC_ACT"]), Action.HOLD)
+def _position_lost(params: ParameterTable, mode: Mode) -> Action:
+    """A pilot at the sticks may fly on without a position; what flies by itself lands."""
+    return Action.ALTITUDE if mode is Mode.POSITION and int(params["COM_POSCTL_NAVL"]) == 0 else Action.LAND
 
 
-def _land(_: ParameterTable) -> Action:
-    return Action.LAND
-
-
-def _terminate(_: ParameterTable) -> Action:
-    return Action.TERMINATE
-
-
-def _warn(_: ParameterTable) -> Action:
-    return Action.WARN
+def _control_lost(params: ParameterTable, _: Mode) -> Action:
+    return Action.WARN if int(params["CBRK_FLIGHTTERM"]) == TERMINATION_BREAKER else Action.DISARM
 
 
 RULES: tuple[Rule, ...] = (
-    Rule(ATTITUDE_LOST, _terminate, Severity.EMERGENCY, "Attitude lost"),
-    Rule(CRASHED, _terminate, Severity.EMERGENCY, "Crash detected"),
-    Rule(POSITION_LOST, _land, Severity.CRITICAL, "Position lost"),
-    Rule(BATTERY_EMERGENCY, _battery_emergency, Severity.EMERGENCY, "Battery nearly empty"),
-    Rule(BATTERY_CRITICAL, _battery_critical, Severity.CRITICAL, "Battery critical"),
-    Rule(OFFBOARD_LOST, _offboard_lost, Severity.CRITICAL, "Offboard setpoints lost"),
-    Rule(BATTERY_LOW, _warn, Severity.WARNING, "Battery low"),
-    Rule(BATTERY_SILENT, _warn, Severity.WARNING, "Battery sensor silent: charge is estimated"),
-)
+    Rule(ATTITUDE_LOST, _control_lost, Severity.EMERGENCY, "Attitude lost"),
+    Rule(CRASHED, _control_lost, Severity.EMERGENCY, "Crash detected"),
+    Rule(MOTOR_FAILED, by("COM_ACT_FAIL_ACT", MOTOR_ACTIONS), Severity.EMERGENCY, "Motor failure"),
+    Rule(POSITION_LOST, _position_lost, Severity.CRITICAL, "Position lost", "Position is valid again"),
+    Rule(HEIGHT_LOST, always(Action.LAND), Severity.CRITICAL, "Height lost", "Height is valid again"),
+    Rule(BATTERY_EMERGENCY, by("COM_LOW_BAT_ACT", EMERGENCY_BATTERY_ACTIONS), Severity.EMERGENCY,
+         "Battery nearly empty"),
+    Rule(BATTERY_CRITICAL, by("COM_LOW_BAT_ACT", CRITICAL_BATTERY_ACTIONS), Severity.CRITICAL, "Battery critical"),
+    Rule(FLIGHT_TIME_OVER, always(Action.RETURN), Severity.CRITICAL, "Flight time is over"),
+    Rule(WIND_HIGH, by("COM_WIND_MAX_ACT", LIMIT_ACTIONS), Severity.CRITICAL, "Wind above its limit",
+         "Wind is below its limit again"),
+    Rule(STATION_LOST, by("NAV_DLL_ACT", LINK_ACTIONS), Severity.WARNING, "Ground station lost",
+         "Ground station is back"),
+    Rule(OFFBOARD_LOST, by("COM_OBL_RC_ACT", OFFBOARD_ACTIONS, Action.HOLD), Severity.CRITICAL,
+         "Offboard setpoints lost"),
+    Rule(BATTERY_LOW, always(Action.WARN), Severity.WARNING, "Battery low"),
+    Rule(BATTERY_SILENT, always(Action.WARN), Severity.WARNING, "Battery sensor silent: charge is estimated"),
+    Rule(FLIGHT_TIME_NEAR, always(Action.WARN), Severity.WARNING, "Flight time is nearly over"),
+    Rule(WIND_STRONG, always(Action.WARN), Severity.WARNING, "Strong wind"),
+    Rule(DEAD_RECKONING, always(Action.WARN), Severity.WARNING, "GNSS lost: dead reckoning", "GNSS is used again"),
+)  # fmt: skip

@@ -20,6 +20,7 @@ from autopilot.mavlink.links import Link
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.parameters import ParameterService
+from autopilot.mavlink.safety import SafetyService
 from autopilot.mavlink.service import CommandHandler, Handler, Service
 from autopilot.mavlink.streams import Stream
 from autopilot.mavlink.telemetry.status import mission_mode
@@ -34,6 +35,7 @@ _TIMESYNC = known_type("TIMESYNC")
 
 _COMMAND_IDS = (known_type("COMMAND_LONG").msg_id, known_type("COMMAND_INT").msg_id)  # handed on to components
 
+MAV_TYPE_GCS = 6
 SYSID_PARAMETER = "MAV_SYS_ID"
 
 
@@ -80,6 +82,7 @@ class MavlinkServer:
             ParameterService(endpoint),
             MissionService(endpoint),
             OffboardService(endpoint),
+            SafetyService(endpoint),
             AbsentServices(endpoint),
         ]
 
@@ -170,8 +173,10 @@ class MavlinkServer:
 
     # Messages that belong to no service
 
-    def _heartbeat_received(self, sender: Sender, _: Any) -> None:
-        """Greets a client that is new on its channel."""
+    def _heartbeat_received(self, sender: Sender, fields: Any) -> None:
+        """Greets a client that is new on its channel; of a ground station: keeps the link alive (NAV_DLL_ACT)."""
+        if fields.type == MAV_TYPE_GCS:
+            self._endpoint.vehicle.station.heard(self._endpoint.time_us)
         client = (sender.sysid, sender.compid)
         if client not in sender.channel.clients:
             sender.channel.clients.add(client)

@@ -11,6 +11,7 @@ from autopilot.navigator.mission import Mission
 from autopilot.navigator.offboard import STREAM_PERIOD_US, Offboard
 from autopilot.navigator.rtl import Return
 from autopilot.navigator.takeoff import Takeoff
+from autopilot.navigator.termination import Termination
 from autopilot.ports import TERRAIN_VALID
 from autopilot.vehicle import ACCEPTED, Mode, OffboardSetpoint, Reply, Verdict
 
@@ -34,13 +35,14 @@ class Navigator:
         self.mission = mission
         self.land = Land(context)
         self.offboard = Offboard(context)
-        self._modes: dict[Mode, Hold | Takeoff | Mission | Return | Land | Offboard] = {
+        self._modes: dict[Mode, Hold | Takeoff | Mission | Return | Land | Offboard | Termination] = {
             Mode.HOLD: self.hold,
             Mode.TAKEOFF: self.takeoff,
             Mode.MISSION: mission,
             Mode.RETURN: Return(context),
             Mode.LAND: self.land,
             Mode.OFFBOARD: self.offboard,
+            Mode.TERMINATION: Termination(context),
         }
         self._active = self._modes[Mode.HOLD]
         self.ask = Ask.STAY  # of the setpoint flown
@@ -102,13 +104,14 @@ class Navigator:
             self._active.frame()
             wish = context.wish
             context.wish = None
-        if context.is_on_ground or not state.is_armed:
+        if context.is_on_ground or not state.is_armed or state.mode is Mode.TERMINATION:
             setpoint.idle()
             setpoint.as_asked()
             self.ask = Ask.STAY
         else:
             self._respect_ground()
-        setpoint.set_flags(is_armed=state.is_armed, is_landed=context.is_on_ground)
+        may_turn = state.is_armed and state.mode is not Mode.TERMINATION
+        setpoint.set_flags(is_armed=may_turn, is_landed=context.is_on_ground)
         return wish
 
     def _respect_ground(self) -> None:

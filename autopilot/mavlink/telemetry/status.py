@@ -73,6 +73,8 @@ def system_status(state: VehicleState) -> int:
     """MAV_STATE: standby on the ground, active or critical in the air."""
     if state.landed_state in (LandedState.ON_GROUND, LandedState.UNDEFINED):
         return int(mavlink.MAV_STATE_STANDBY)
+    if state.mode is Mode.TERMINATION:
+        return int(mavlink.MAV_STATE_FLIGHT_TERMINATION)
     return int(mavlink.MAV_STATE_CRITICAL if state.is_failsafe else mavlink.MAV_STATE_ACTIVE)
 
 
@@ -144,7 +146,7 @@ def battery_status(state: VehicleState) -> bytes | None:
         -1,
         _percent(state.battery_remaining),
         0,
-        mavlink.MAV_BATTERY_CHARGE_STATE_OK if state.battery_remaining > 0.0 else 0,
+        state.battery_level,
     )
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 from autopilot.navigator.mission import MissionState
-from autopilot.ports import POSITION_VALID
-from autopilot.vehicle import Mode, Severity, Verdict
+from autopilot.ports import DEAD_RECKONING, POSITION_VALID, WIND_VALID
+from autopilot.vehicle import BatteryLevel, LandedState, Mode, Severity, Verdict
 from tests.unit.autopilot.kinematic import Kinematic, geo, item
 
 NAN = float("nan")
@@ -127,3 +127,192 @@ def test_jump_of_the_position_is_told(jump_m, is_told):
     rig.estimate["reset_count"] += 1
     rig.run(1.0)
     assert rig.recorder.has_text(f"position reset by {jump_m} m") == is_told
+
+
+STATION_LOSS_S = 5.0
+
+
+def with_station(action, loss_s=STATION_LOSS_S, **params):
+    """A vehicle on its way, whose ground station has just sent its last heartbeat."""
+    rig = flying_away(NAV_DLL_ACT=action, COM_DL_LOSS_T=loss_s, **params)
+    rig.fc.station.heard(rig.time_us)
+    return rig
+
+
+@pytest.mark.parametrize(
+    ("action", "mode", "is_failsafe"),
+    [
+        (0, Mode.HOLD, False),
+        (1, Mode.HOLD, True),
+        (2, Mode.RETURN, True),
+        (3, Mode.LAND, True),
+        (5, Mode.TERMINATION, True),
+    ],
+)
+def test_loss_of_the_ground_station_leads_to_the_action_of_nav_dll_act(action, mode, is_failsafe):
+    rig = with_station(action)
+    rig.run(STATION_LOSS_S - 0.1)
+    assert rig.state.mode is Mode.HOLD
+    assert not rig.recorder.has_text("Ground station lost")
+    rig.run(0.5)
+    assert rig.state.mode is mode
+    assert rig.state.is_failsafe == is_failsafe
+    assert rig.recorder.has_text("Ground station lost")
+
+
+def test_loss_of_the_ground_station_can_disarm():
+    rig = with_station(6)
+    rig.run(STATION_LOSS_S + 0.5)
+    assert not rig.state.is_armed
+
+
+@pytest.mark.parametrize("loss_s", [5.0, 10.0])
+def test_ground_station_is_lost_after_its_time(loss_s):
+    rig = with_station(2, loss_s)
+    assert rig.run_until(lambda: rig.state.mode is Mode.RETURN) == pytest.approx(loss_s, abs=0.25)
+
+
+def test_ground_station_that_comes_back_does_not_change_the_mode():
+    rig = with_station(2)
+    rig.run(STATION_LOSS_S + 1.0)
+    rig.fc.station.heard(rig.time_us)
+    rig.run(1.0)
+    assert rig.recorder.has_text("Ground station is back")
+    assert rig.state.mode is Mode.RETURN
+    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    rig.run(STATION_LOSS_S + 1.0)  # lost again: acts again
+    assert rig.state.mode is Mode.RETURN
+
+
+def test_vehicle_that_never_heard_a_ground_station_flies_on():
+    rig = flying_away(NAV_DLL_ACT=2, COM_DL_LOSS_T=5.0)
+    rig.run(30.0)
+    assert rig.state.mode is Mode.HOLD
+    assert not rig.recorder.has_text("Ground station")
+
+
+def test_pilot_may_take_over_while_the_ground_station_is_still_lost():
+    rig = with_station(2)
+    rig.run(STATION_LOSS_S + 1.0)
+    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    rig.run(10.0)
+    assert rig.state.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize(("mode", "bits"), [(Mode.MISSION, 1), (Mode.HOLD, 2)])
+def test_excepted_modes_go_on_without_a_ground_station(mode, bits):
+    rig = with_station(2, COM_DLL_EXCEPT=bits)
+    if mode is Mode.MISSION:
+        rig.fc.load_mission([item(0, 16, 200.0)])
+        rig.fc.start_mission(0)
+    rig.run(STATION_LOSS_S + 2.0)
+    assert rig.state.mode is mode
+
+
+@pytest.mark.parametrize(("mode", "action"), [(Mode.LAND, 2), (Mode.RETURN, 1), (Mode.LAND, 1)])
+def test_weaker_action_does_not_end_a_return_or_a_landing(mode, action):
+    rig = with_station(action)
+    rig.fc.set_mode(mode)
+    rig.run(STATION_LOSS_S + 1.0)
+    assert rig.state.mode is mode
+
+
+def test_ground_station_lost_on_the_ground_disarms():
+    rig = Kinematic(NAV_DLL_ACT=2, COM_DL_LOSS_T=1.0).ready()
+    rig.fc.station.heard(rig.time_us)
+    rig.fc.arm(force=False)
+    rig.run(2.0)
+    assert not rig.state.is_armed
+
+
+def test_return_without_a_position_becomes_a_landing():
+    rig = with_station(2)
+    rig.flags &= ~POSITION_VALID
+    rig.run(STATION_LOSS_S + 1.0)
+    assert rig.state.mode is Mode.LAND
+
+
+@pytest.mark.parametrize(
+    ("action", "mode"),
+    [(0, Mode.HOLD), (1, Mode.HOLD), (3, Mode.RETURN), (5, Mode.LAND)],
+)
+def test_wind_above_its_limit_leads_to_its_action(action, mode):
+    rig = flying_away(COM_WIND_MAX=12.0, COM_WIND_MAX_ACT=action, COM_WIND_WARN=8.0)
+    rig.flags |= WIND_VALID
+    rig.estimate["wind_ned"] = (6.0, 8.0, 0.0)
+    rig.run(10.0)
+    assert rig.recorder.has_text("Strong wind")
+    assert rig.state.mode is Mode.HOLD
+    rig.estimate["wind_ned"] = (9.0, 12.0, 0.0)
+    rig.run(5.0)
+    assert rig.state.mode is mode
+    assert rig.recorder.has_text("Wind above its limit")
+    rig.estimate["wind_ned"] = (0.0, 0.0, 0.0)
+    rig.run(5.0)
+    assert rig.recorder.has_text("Wind is below its limit again")
+
+
+def test_wind_without_a_limit_or_a_valid_estimate_is_not_judged():
+    rig = flying_away()
+    rig.flags |= WIND_VALID
+    rig.estimate["wind_ned"] = (20.0, 0.0, 0.0)
+    rig.run(5.0)
+    assert not rig.recorder.has_text("ind")
+    rig = flying_away(COM_WIND_MAX=5.0, COM_WIND_MAX_ACT=3)
+    rig.estimate["wind_ned"] = (20.0, 0.0, 0.0)
+    rig.run(5.0)
+    assert rig.state.mode is Mode.HOLD
+
+
+def test_flight_time_is_told_and_then_ends_the_flight_at_home():
+    rig = Kinematic(COM_FLT_TIME_MAX=60.0).flying()
+    rig.fc.reposition(*geo(60.0, 0.0, 10.0), NAN, NAN)
+    rig.run_until(lambda: rig.recorder.has_text("Flight time is nearly over"), 60.0)
+    assert rig.state.mode is Mode.HOLD
+    rig.run_until(lambda: rig.state.mode is Mode.RETURN, 10.0)
+    assert "flight time" in rig.fc.set_mode(Mode.HOLD).reason
+    assert rig.fc.set_mode(Mode.LAND).verdict is Verdict.ACCEPTED
+    rig.disarmed()
+    rig.ready()  # the next flight has its own time
+
+
+def test_dead_reckoning_is_told_and_so_is_its_end():
+    rig = flying_away()
+    rig.flags |= DEAD_RECKONING
+    rig.run(1.0)
+    assert rig.recorder.has_text("GNSS lost: dead reckoning")
+    rig.flags &= ~DEAD_RECKONING
+    rig.run(1.0)
+    assert rig.recorder.has_text("GNSS is used again")
+    assert rig.state.mode is Mode.HOLD
+
+
+def test_terminated_flight_stops_its_motors_and_disarms_once_it_is_down():
+    rig = flying_away()
+    assert rig.fc.terminate().verdict is Verdict.ACCEPTED
+    rig.run(0.1)
+    assert rig.state.mode is Mode.TERMINATION
+    assert rig.state.is_armed
+    assert not rig.sp("is_armed")
+    assert rig.state.landed_state is not LandedState.ON_GROUND
+    assert rig.fc.set_mode(Mode.HOLD).reason == "the flight is terminated"
+    fall_s = (2.0 * 10.0 / 9.81) ** 0.5
+    assert rig.disarmed() < fall_s + 2.0
+    assert rig.state.mode is Mode.HOLD
+
+
+def test_termination_is_refused_on_the_ground_and_as_a_mode():
+    rig = Kinematic().ready()
+    assert rig.fc.terminate().reason == "not armed"
+    rig = flying_away()
+    assert "by command" in rig.fc.set_mode(Mode.TERMINATION).reason
+    assert rig.state.mode is Mode.HOLD
+
+
+def test_charge_level_is_known_before_and_after_arming():
+    rig = Kinematic().ready()
+    assert rig.state.battery_level is BatteryLevel.OK
+    for share, level in ((0.1, BatteryLevel.LOW), (0.06, BatteryLevel.CRITICAL), (0.04, BatteryLevel.EMERGENCY)):
+        drain_to(rig, share)
+        rig.run(0.1)
+        assert rig.state.battery_level is level

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from autopilot.commander.watch import StationLink
 from autopilot.estimator.state import EstimatorState
 from autopilot.lists import ItemLists
 from autopilot.mavlink.codec import FrameReader, Message, decode, encode
@@ -30,6 +31,7 @@ from autopilot.ports import (
 )
 from autopilot.vehicle import (
     ACCEPTED,
+    BatteryLevel,
     ItemRefusal,
     ListKind,
     MissionItem,
@@ -123,6 +125,7 @@ def flying_state() -> VehicleState:
         is_ready_to_arm=True,
         battery_remaining=0.8,
         battery_used_mah=400.0,
+        battery_level=BatteryLevel.OK,
         mission_count=2,
         mission_current=1,
     )
@@ -148,6 +151,7 @@ class RecordingVehicle:
     def __init__(self) -> None:
         self.state = flying_state()
         self.params = parameter_table()
+        self.station = StationLink()
         self.reply = ACCEPTED
         self.arming_problems: list[str] = []
         self.calls: list[tuple[Any, ...]] = []
@@ -168,6 +172,9 @@ class RecordingVehicle:
 
     def disarm(self, *, force: bool) -> Reply:
         return self._record("disarm", force)
+
+    def terminate(self) -> Reply:
+        return self._record("terminate")
 
     def check_arming(self) -> list[str]:
         return self.arming_problems

@@ -1,0 +1,104 @@
+"""The guard: acts on new failures, by the rules of `failsafe`, and tells the pilot; once per frame while armed.
+
+In: the bits that `watch` sees. Out: mode changes, texts, disarming, through the commander. A stronger action replaces a
+weaker one, never the other way round; a pilot who chooses a mode takes over, and only a new failure acts again.
+"""
+
+from typing import Protocol
+
+from autopilot.commander.failsafe import (
+    ACTION_MODES,
+    FLIGHT_TIME_OVER,
+    MODE_STRENGTH,
+    OUTCOMES,
+    RULES,
+    Action,
+)
+from autopilot.vehicle import Announcer, LandedState, Mode, Severity, VehicleState
+from common.params import ParameterTable
+
+
+class Authority(Protocol):
+    """The commander, as the guard sees it."""
+
+    state: VehicleState
+    params: ParameterTable
+    announcer: Announcer
+
+    def refusal(self, mode: Mode) -> str: ...
+
+    def change_mode(self, mode: Mode) -> None: ...
+
+    def stop_motors(self, text: str) -> None: ...
+
+
+class Guard:
+    """What has failed on one vehicle, and what is being done about it."""
+
+    __slots__ = ("_action", "_commander", "failures")
+
+    def __init__(self, commander: Authority) -> None:
+        self._commander = commander
+        self._action = Action.WARN  # of the failsafe in progress
+        self.failures = 0  # bits as of the last frame
+
+    def reset(self) -> None:
+        """The vehicle has just been armed."""
+        self.failures = 0
+        self.release()
+
+    def release(self) -> None:
+        """A pilot has taken over, or the flight is over."""
+        self._commander.state.is_failsafe = False
+        self._action = Action.WARN
+
+    def refusal(self, mode: Mode) -> str:
+        """Why a failure forbids a mode that a client asks for; empty if none does."""
+        if self.failures & FLIGHT_TIME_OVER and mode not in (Mode.RETURN, Mode.LAND, Mode.PRECISION_LAND):
+            return "the flight time is over: only Return and Land"
+        return ""
+
+    def see(self, failures: int) -> None:
+        """Takes what is wrong in this frame."""
+        if failures == self.failures:
+            return
+        new, over = failures & ~self.failures, self.failures & ~failures
+        self.failures = failures
+        if over:
+            for rule in RULES:
+                if rule.failure & over and rule.recovery:
+                    self._commander.announcer.statustext(Severity.NOTICE, rule.recovery)
+        if new:
+            self.act(new)
+
+    def act(self, new: int) -> None:
+        """Takes the strongest action of the failures that are new; announces each of them."""
+        commander = self._commander
+        state = commander.state
+        strongest = Action.WARN
+        for rule in RULES:
+            if not rule.failure & new:
+                continue
+            action = self._possible(rule.action(commander.params, state.mode))
+            strongest = max(strongest, action)
+            commander.announcer.statustext(rule.severity, rule.text + OUTCOMES.get(action, ""))
+        if strongest is Action.WARN:
+            return
+        if strongest is Action.DISARM:
+            commander.stop_motors("Disarmed by failsafe")
+            return
+        if state.landed_state is LandedState.ON_GROUND:
+            commander.stop_motors("Disarmed by failsafe on the ground")
+            return
+        state.is_failsafe = True
+        if strongest > max(self._action, MODE_STRENGTH.get(state.mode, Action.WARN)):
+            self._action = strongest
+            commander.change_mode(ACTION_MODES[strongest])
+
+    def _possible(self, action: Action) -> Action:
+        """The action, or the next stronger one that can be flown now."""
+        if action in (Action.ALTITUDE, Action.HOLD, Action.RETURN):
+            mode = ACTION_MODES[action]
+            if mode is not self._commander.state.mode and self._commander.refusal(mode):
+                return Action.LAND
+        return action
