@@ -14,6 +14,7 @@ import numpy as np
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.commander import Commander
 from autopilot.commander.landing import LandingDetector
+from autopilot.host import Host
 from autopilot.lists import ItemLists
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.fence import Fence
@@ -98,6 +99,7 @@ class FlightController:
         origin: the geodetic origin of the ned frame.
         announcer: hears of events besides the attached servers (a log, a test).
         on_reboot: restarts the vehicle; None where there is nothing to restart.
+        host: files, logs and storage, as far as there are any.
     """
 
     def __init__(
@@ -108,8 +110,10 @@ class FlightController:
         origin: GeoPoint,
         announcer: Announcer | None = None,
         on_reboot: Callable[[], None] | None = None,
+        host: Host | None = None,
     ) -> None:
         self.params = params
+        self.host = host or Host()
         self.state = VehicleState(origin=origin, position=origin)
         self.payload = Payloads()
         self._read_estimate = ports.read_estimate

@@ -10,6 +10,7 @@ from enum import IntEnum
 from math import nan
 from typing import Any, Protocol
 
+from autopilot.host import Host
 from common.geodesy import GeoPoint
 from common.params import ParameterTable
 
@@ -233,6 +234,7 @@ class Vehicle(Protocol):
 
     state: VehicleState
     params: ParameterTable
+    host: Host
 
     @property
     def lists(self) -> StoredLists:

@@ -13,7 +13,7 @@ from autopilot.mavlink.dialects import Dialect
 
 PROJECT = "Honeyguide"
 
-# What is really served; files come with their service.
+# What is really served.
 CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
@@ -21,6 +21,7 @@ CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FTP
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET

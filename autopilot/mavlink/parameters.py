@@ -5,13 +5,14 @@ frame, per channel, and starts again when it is asked for again.
 """
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.channel import Channel, Endpoint, Sender
 from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.param_file import ParamEntry
 from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import Severity
 from common.params import Parameter
@@ -95,6 +96,30 @@ class ParameterService(Service):
                 bounds = f"{declaration.minimum:g} to {declaration.maximum:g}"
                 self._endpoint.text(Severity.NOTICE, f"Parameter {name}: {asked:g} asked, {stored:g} set ({bounds})")
         self._endpoint.broadcast(_PARAM_VALUE, self._value(name, self._indices[name]))
+
+    def entries(self) -> list[ParamEntry]:
+        """The list as numbers: what the values of PARAM_VALUE say."""
+        return [self._entry(self._table.declarations[name]) for name in self._table]
+
+    def _entry(self, declaration: Parameter) -> ParamEntry:
+        dialect = self._endpoint.dialect
+        mav_type = dialect.parameter_type(declaration)
+        value, default = (
+            dialect.parameter_value(declaration, dialect.parameter_bits(declaration, number), mav_type)
+            for number in (self._table[declaration.name], declaration.default)
+        )
+        return ParamEntry(declaration.name, mav_type, value or 0.0, default or 0.0)
+
+    def set_uploaded(self, values: Iterable[tuple[str, int, float]]) -> None:
+        """Sets the parameters of a file: name, MAV_PARAM_TYPE and value; names it does not have are left out."""
+        unknown = 0
+        for name, _, value in values:
+            if name in self._table:
+                self._table.set(name, value)
+            else:
+                unknown += 1
+        if unknown:
+            self._endpoint.text(Severity.WARNING, f"Parameter file: {unknown} names are not known")
 
     def _changed(self, declaration: Parameter) -> None:
         """Tells every client of a change that none of them asked for."""

@@ -15,6 +15,7 @@ from autopilot.mavlink.commands import CommandService
 from autopilot.mavlink.component import Component
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.identity import banner
 from autopilot.mavlink.links import Link
 from autopilot.mavlink.missions import MissionService
@@ -77,12 +78,14 @@ class MavlinkServer:
 
     def _services(self) -> list[Service]:
         endpoint = self._endpoint
+        parameters = ParameterService(endpoint)
         return [
             self._commands,
-            ParameterService(endpoint),
+            parameters,
             MissionService(endpoint),
             OffboardService(endpoint),
             SafetyService(endpoint),
+            FtpService(endpoint, parameters),
             AbsentServices(endpoint),
         ]
 

@@ -1,18 +1,21 @@
 """Laws of the MAVLink side: nothing that comes in stops it, and what goes in comes out again."""
 
 from math import isnan
+from struct import pack
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as pymavlink_all
+from pymavlink.mavftp import MAVFTP
 
 from autopilot.mavlink.codec import FrameReader, decode, encode, frame_bytes, known_type, message_type
 from autopilot.mavlink.convert import degrees_e7, degrees_from_e7, quat_from_wxyz, wxyz_from_quat
 from autopilot.mavlink.missions import item_from_fields, scaled_position
 from autopilot.vehicle import MissionItem
 from tests.unit.autopilot.mavlink.rig import Rig
+from tests.unit.autopilot.mavlink.test_ftp import FtpClient
 
 HEARD = (
     "HEARTBEAT", "PING", "TIMESYNC", "REQUEST_DATA_STREAM", "COMMAND_LONG", "COMMAND_INT", "SET_MODE",
@@ -160,3 +163,30 @@ def test_mission_item_survives_the_round_trip(frame, command, params, x, y, z):
     assert isinstance(item, MissionItem)
     assert item.params == params
     assert isnan(item.x) == (x == 2**31 - 1)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(data=st.data())
+def test_parameter_file_is_the_parameter_list_bit_by_bit(data):
+    rig = Rig()
+    table = rig.vehicle.params
+    for name in data.draw(st.lists(st.sampled_from(table.names), max_size=20)):
+        declaration = table.declarations[name]
+        table.set(name, data.draw(st.floats(declaration.minimum, declaration.maximum)))
+    rig.frame()
+    rig.client.send("PARAM_REQUEST_LIST")
+    listed = [
+        (fields.param_id, fields.param_type, fields.param_value.to_bytes(4, "little"))
+        for fields in rig.all("PARAM_VALUE", 1 + len(table) // 20)
+    ]
+    ftp = FtpClient(rig)
+    packed = ftp.read("@PARAM/param.pck")
+    layouts = {3: (pymavlink_all.MAV_PARAM_TYPE_INT32, "<i"), 4: (pymavlink_all.MAV_PARAM_TYPE_REAL32, "<f")}
+    assert [
+        (name.decode(), layouts[own_type][0], pack(layouts[own_type][1], value))
+        for name, value, own_type in MAVFTP.ftp_param_decode(packed).params
+    ] == listed
+    with_defaults = MAVFTP.ftp_param_decode(ftp.read("@PARAM/param.pck?withdefaults=1"))
+    assert with_defaults.params == MAVFTP.ftp_param_decode(packed).params
+    defaults = {name.decode(): value for name, value, _ in with_defaults.defaults}
+    assert defaults == {name: float(np.float32(table.declarations[name].default)) for name in table}

@@ -9,6 +9,7 @@ import numpy as np
 
 from autopilot.commander.watch import StationLink
 from autopilot.estimator.state import EstimatorState
+from autopilot.host import Host
 from autopilot.lists import ItemLists
 from autopilot.mavlink.codec import FrameReader, Message, decode, encode
 from autopilot.mavlink.links import Link, LinkRole, memory_pair
@@ -152,6 +153,7 @@ class RecordingVehicle:
         self.state = flying_state()
         self.params = parameter_table()
         self.station = StationLink()
+        self.host = Host()
         self.reply = ACCEPTED
         self.arming_problems: list[str] = []
         self.calls: list[tuple[Any, ...]] = []

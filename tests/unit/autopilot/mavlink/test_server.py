@@ -88,9 +88,9 @@ def test_autopilot_version_says_who_we_are():
         mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE,
         mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY,
         mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE,
+        mavlink.MAV_PROTOCOL_CAPABILITY_FTP,
     ):
         assert version.capabilities & bit
-    assert not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_FTP
     assert version.uid != 0
 
 
@@ -205,17 +205,6 @@ def test_absent_services_answer_at_once():
     assert rig.only("LOG_DATA")[:3] == (3, 90, 0)
     rig.client.send("SET_GPS_GLOBAL_ORIGIN", latitude=1, longitude=2, altitude=3)
     assert rig.all("GPS_GLOBAL_ORIGIN")[-1].latitude == round(HOME.lat_deg * 1e7)
-
-
-def test_file_transfer_is_refused():
-    rig = Rig()
-    for opcode, error in ((4, 10), (3, 7), (1, 7)):
-        request = bytes([9, 1, 2, opcode]).ljust(251, b"\0")
-        rig.client.send("FILE_TRANSFER_PROTOCOL", target_component=1, payload=tuple(request))
-        answer = bytes(rig.only("FILE_TRANSFER_PROTOCOL").payload)
-        assert int.from_bytes(answer[:2], "little") == 0x0109 + 1
-        assert answer[2:6] == bytes([2, 129, 1, opcode])
-        assert answer[12] == error
 
 
 def test_closing_closes_the_links():

@@ -1,0 +1,226 @@
+"""What the names of MAVLink FTP stand for: files of the host's folder, or the parameter file made on demand."""
+
+import zlib
+from enum import IntEnum
+from typing import Protocol
+from urllib.parse import parse_qs
+
+from autopilot.mavlink.channel import Endpoint
+from autopilot.mavlink.param_file import UPLOAD_BYTES_MAX, ParamFileError, packed_parameters, unpacked_parameters
+from autopilot.mavlink.parameters import ParameterService
+from autopilot.vehicle import Severity
+from common.folder import ConfinedFolder
+
+PARAM_FOLDER = "@PARAM"
+PARAM_FILE = "param.pck"
+_READ_BYTES = 1 << 16
+
+
+class Nak(IntEnum):
+    """Why a request is refused."""
+
+    FAIL = 1
+    FAIL_ERRNO = 2
+    INVALID_DATA_SIZE = 3
+    INVALID_SESSION = 4
+    NO_SESSIONS = 5
+    EOF = 6
+    UNKNOWN_COMMAND = 7
+    FILE_EXISTS = 8
+    FILE_PROTECTED = 9
+    FILE_NOT_FOUND = 10
+
+
+class FtpError(Exception):
+    """A request that is refused."""
+
+    def __init__(self, code: Nak) -> None:
+        super().__init__(code.name)
+        self.code = code
+
+
+class OpenFile(Protocol):
+    """A file that a session has open."""
+
+    size: int  # [bytes] when it was opened
+
+    def read(self, offset: int, count: int) -> bytes:
+        """Bytes from `offset` on; none beyond the end."""
+        ...
+
+    def write(self, offset: int, data: bytes, /) -> None: ...
+
+    def close(self) -> None:
+        """The client is done with it."""
+        ...
+
+    def abandon(self) -> None:
+        """The client is gone."""
+        ...
+
+
+class _FolderFile:
+    """A file of the folder; it is open only while it is read or written, so nothing is left when clients vanish."""
+
+    def __init__(self, folder: ConfinedFolder, name: str, *, is_writable: bool) -> None:
+        self.size = folder.size(name)
+        self._folder = folder
+        self._name = name
+        self._is_writable = is_writable
+
+    def read(self, offset: int, count: int) -> bytes:
+        return self._folder.read(self._name, offset, count)
+
+    def write(self, offset: int, data: bytes) -> None:
+        if not self._is_writable:
+            raise FtpError(Nak.FILE_PROTECTED)
+        self._folder.write(self._name, offset, data)
+
+    def close(self) -> None:
+        """Everything is in the file already."""
+
+    abandon = close
+
+
+class _Snapshot:
+    """The parameter file as it was when it was opened."""
+
+    def __init__(self, content: bytes) -> None:
+        self.size = len(content)
+        self._content = content
+
+    def read(self, offset: int, count: int) -> bytes:
+        return self._content[offset : offset + count]
+
+    def write(self, _: int, __: bytes, /) -> None:
+        raise FtpError(Nak.FILE_PROTECTED)
+
+    def close(self) -> None:
+        """Nothing is kept."""
+
+    abandon = close
+
+
+class _ParameterUpload:
+    """Parameters on their way in; they are set when the client closes the file, all of them or none."""
+
+    size = 0
+
+    def __init__(self, endpoint: Endpoint, parameters: ParameterService) -> None:
+        self._endpoint = endpoint
+        self._parameters = parameters
+        self._content = bytearray()
+
+    def read(self, offset: int, count: int) -> bytes:
+        return bytes(self._content[offset : offset + count])
+
+    def write(self, offset: int, data: bytes) -> None:
+        end = offset + len(data)
+        if end > UPLOAD_BYTES_MAX:
+            raise FtpError(Nak.INVALID_DATA_SIZE)
+        self._content.extend(bytes(max(end - len(self._content), 0)))
+        self._content[offset:end] = data
+
+    def close(self) -> None:
+        if not self._content:
+            return
+        try:
+            entries = unpacked_parameters(bytes(self._content))
+        except ParamFileError as error:
+            self._endpoint.text(Severity.WARNING, f"Parameter file not taken: {error}")
+            raise FtpError(Nak.FAIL) from error
+        self._parameters.set_uploaded(entries)
+
+    def abandon(self) -> None:
+        """A file that is not complete sets nothing."""
+
+
+class FtpFiles:
+    """Finds what a name stands for."""
+
+    def __init__(self, endpoint: Endpoint, parameters: ParameterService) -> None:
+        self._endpoint = endpoint
+        self._parameters = parameters
+
+    @property
+    def _folder(self) -> ConfinedFolder:
+        folder = self._endpoint.vehicle.host.files
+        if folder is None:
+            raise FileNotFoundError
+        return folder
+
+    def open(self, name: str) -> OpenFile:
+        """Opens a file for reading."""
+        own = _own_name(name)
+        if own is None:
+            return _FolderFile(self._folder, name, is_writable=False)
+        file_name, _, query = own.partition("?")
+        if file_name != PARAM_FILE:
+            raise FileNotFoundError
+        return _Snapshot(self._parameter_file(query))
+
+    def _parameter_file(self, query: str) -> bytes:
+        options = {key: values[-1] for key, values in parse_qs(query).items()}
+        try:
+            start, count = int(options.get("start", 0)), int(options.get("count", 0))
+        except ValueError as error:
+            raise FtpError(Nak.FAIL) from error
+        entries = self._parameters.entries()
+        chosen = entries[max(start, 0) :]
+        if count > 0:
+            chosen = chosen[:count]
+        return packed_parameters(chosen, len(entries), with_defaults=options.get("withdefaults") == "1")
+
+    def open_to_write(self, name: str, *, is_new: bool) -> OpenFile:
+        """Opens a file for writing; a new one is empty, another keeps its content."""
+        own = _own_name(name)
+        if own is None:
+            folder = self.changeable(name)
+            if is_new:
+                folder.create(name)
+            return _FolderFile(folder, name, is_writable=True)
+        if own.partition("?")[0] != PARAM_FILE:
+            raise FtpError(Nak.FILE_PROTECTED)
+        return _ParameterUpload(self._endpoint, self._parameters)
+
+    def listing(self, name: str, *, with_times: bool) -> list[bytes]:
+        """The entries of a folder as the protocol writes them, each ended by a zero byte."""
+        own = _own_name(name)
+        if own is not None:
+            if own:
+                raise FileNotFoundError
+            size = len(self._parameter_file(""))
+            return [_entry("F", PARAM_FILE, size, 0, with_times=with_times)]
+        return [
+            _entry("D" if entry.is_folder else "F", entry.name, entry.size, entry.time_s, with_times=with_times)
+            for entry in self._folder.entries(name)
+        ]
+
+    def changeable(self, *names: str) -> ConfinedFolder:
+        """The folder in which files of these names may be changed."""
+        if any(_own_name(name) is not None for name in names) or self._endpoint.vehicle.host.files is None:
+            raise FtpError(Nak.FILE_PROTECTED)
+        return self._folder
+
+    def checksum(self, name: str) -> int:
+        """CRC32 without the inversions at both ends, as PX4 and MAVSDK compute it."""
+        file, checksum, offset = self.open(name), 0xFFFFFFFF, 0
+        while data := file.read(offset, _READ_BYTES):
+            checksum = zlib.crc32(data, checksum)
+            offset += len(data)
+        return checksum ^ 0xFFFFFFFF
+
+
+def _own_name(name: str) -> str | None:
+    """What follows `@PARAM/` in a name; None for a name of the folder."""
+    folder, _, rest = name.lstrip("/").partition("/")
+    return rest if folder == PARAM_FOLDER else None
+
+
+def _entry(kind: str, name: str, size: int, time_s: int, *, with_times: bool) -> bytes:
+    if with_times:
+        text = f"{kind}{name}\t{size}\t{time_s}"
+    else:
+        text = f"F{name}\t{size}" if kind == "F" else f"D{name}"
+    encoded = text.encode("utf-8", "replace") + b"\0"
+    return encoded if len(encoded) <= 239 else b"S\0"  # skip: it does not fit into a reply
