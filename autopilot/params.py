@@ -55,6 +55,7 @@ SYSTEM_PARAMETERS: list[Parameter] = [
     _constant("BAT1_N_CELLS", 4, "cells of the battery"),
     _constant("BAT1_V_CHARGED", 4.2, "voltage of a full cell"),
     _constant("BAT1_V_EMPTY", 3.6, "voltage of an empty cell"),
+    _constant("BAT1_CAPACITY", -1.0, "capacity of the battery [mAh], negative: not known"),
     _constant("GF_ACTION", 0, "no geofence"),
     _constant("GF_MAX_HOR_DIST", 0.0, "no geofence"),
     _constant("GF_MAX_VER_DIST", 0.0, "no geofence"),
@@ -79,6 +80,7 @@ def airframe_defaults(airframe: Airframe) -> dict[str, int | float]:
     hover_speed_rad_s = sqrt(body.mass_kg * GRAVITY_M_S2 / (count * rotor.thrust_n_s2))
     return {
         "BAT1_N_CELLS": battery.cells,
+        "BAT1_CAPACITY": battery.capacity_mah,
         "BAT1_V_CHARGED": battery.full_cell_v,
         "BAT1_V_EMPTY": battery.empty_cell_v,
         "EKF2_MIN_RNG": airframe.contact.leg_z_m,

@@ -8,6 +8,7 @@ from mavlink_page import mavlink_text
 from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
+from autopilot.mavlink.dialects.ardupilot_params import ALIASES, CONSTANTS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.params import SYSTEM_PARAMETERS, parameter_table
 from common.airframe import load_airframe
@@ -34,12 +35,19 @@ airframe brings its own. They are read and set over MAVLink (PARAM_*), by a grou
 the gains were designed.
 """
 
+ALIAS_HEADER = """## Names in the ArduPilot dialect
+
+With [`--dialect ardupilot`](flying.md#dialects) the vehicle has these names too. Those that stand for nothing can
+only be read.
+
+"""
+
 
 def parameters_text() -> str:
     """The whole page."""
     x500 = parameter_table(load_airframe("x500")).declarations
     sections = [f"## {title}\n\n{_table(x500[item.name] for item in declared)}" for title, declared in SECTIONS.items()]
-    return "\n".join([HEADER, *sections])
+    return "\n".join([HEADER, *sections, ALIAS_HEADER + _alias_table()])
 
 
 def _table(declarations: Iterable[Parameter]) -> str:
@@ -54,6 +62,24 @@ def _table(declarations: Iterable[Parameter]) -> str:
 def generated_pages() -> dict[Path, str]:
     """The text of every generated page, by its path."""
     return {PARAMETERS_PATH: parameters_text(), MAVLINK_PATH: mavlink_text(Flight(FlightConfig()).server)}
+
+
+def _alias_table() -> str:
+    rows = ["| name | stands for | in units of | value |", "|---|---|---|---|"]
+    lines = {}
+    for constant in CONSTANTS:
+        lines[constant.name] = f"| {constant.name} | | | {constant.value:g}: {constant.meaning} |"
+    known = parameter_table().declarations
+    for alias in ALIASES:
+        if alias.of not in known:
+            continue
+        if alias.numbers is None:
+            unit = f"1/{alias.scale:g} {known[alias.of].unit}" if alias.scale != 1.0 else known[alias.of].unit
+            lines[alias.name] = f"| {alias.name} | {alias.of} | {unit} | |"
+        else:
+            numbers = ", ".join(f"{theirs} = {ours}" for ours, theirs in alias.numbers.items())
+            lines[alias.name] = f"| {alias.name} | {alias.of} | | {numbers} |"
+    return "\n".join([*rows, *(lines[name] for name in sorted(lines))]) + "\n"
 
 
 if __name__ == "__main__":

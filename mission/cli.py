@@ -54,6 +54,7 @@ def fly(
     trees: Annotated[float, typer.Option(min=0.0, max=1000.0, help="Trees per hectare.")] = 60.0,
     hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m].")] = 12.0,
     walls: Annotated[bool, typer.Option("--walls", help="Walls along the edges of the map.")] = False,
+    dialect: Annotated[str, typer.Option(help="What ground stations take it for: px4 or ardupilot.")] = "px4",
     host: Annotated[str, typer.Option(help="Address ground stations are sent to.")] = "127.0.0.1",
     gcs_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of ground stations.")] = (
         GROUND_STATION_PORT
@@ -72,7 +73,7 @@ def fly(
             FlightOptions(
                 plan=plan, is_idle=idle, once=once, speed=speed, seconds=seconds, seed=seed, wind_m_s=wind,
                 wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
-                trees_per_ha=trees, hill_height_m=hills, has_walls=walls, host=host, gcs_port=gcs_port,
+                trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, gcs_port=gcs_port,
                 api_port=api_port, run_folder=run_folder, parameters=tuple(param or ()),
             )
         )  # fmt: skip

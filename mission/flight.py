@@ -7,10 +7,13 @@ the scripting client, then the recorder. With the memory link alone it is a pure
 from collections.abc import Callable
 from math import isnan, nan
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from autopilot.mavlink.dialects import Dialect
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.links import Link, LinkRole, memory_pair
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.node import FlightController, HostPorts
@@ -31,6 +34,7 @@ from sim.wind import wind_model
 from sim.world.world import WorldConfig, WorldMap, build_world
 
 TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
+DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (PX4, ARDUPILOT)}
 GUST_SHARE = 0.3  # guess: a gust adds up to this share of the mean wind
 
 
@@ -51,6 +55,8 @@ class FlightConfig(BaseModel):
     """Where the wind comes from, clockwise from north."""
     noise: float = Field(default=1.0, ge=0.0, le=10.0)
     """Scales every sensor's noise; 0 makes them perfect."""
+    dialect: Literal["px4", "ardupilot"] = "px4"
+    """Which autopilot's numbers ground stations get. The flight's own script always gets PX4's."""
     parameters: dict[str, float] = {}
     """Values of the flight controller's parameters that differ from their defaults, by name."""
     world: WorldConfig = WorldConfig()
@@ -90,11 +96,18 @@ class Flight:
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
         on_frame = None if self._tlog is None else self._tlog.frame
-        self.server = MavlinkServer(self.controller, [vehicle_end, *(links or [])], on_frame=on_frame)
+        dialect, outer_links = DIALECTS[config.dialect], links or []
+        if dialect is PX4:
+            self.server = MavlinkServer(self.controller, [vehicle_end, *outer_links], on_frame=on_frame)
+            self._servers = [self.server]
+        else:  # the script is not asked to know two languages: it has a server of its own
+            self.server = MavlinkServer(self.controller, outer_links, dialect, on_frame)
+            self._servers = [self.server, MavlinkServer(self.controller, [vehicle_end])]
         self.drone = Drone(client_end)
         log = None if folder is None else folder / "flight.ulg"
         self.recorder = Recorder(log, self.rig, self.controller, self.airframe)
-        self.controller.attach(self.server)
+        for server in self._servers:
+            self.controller.attach(server)
         self.controller.attach(self.recorder)
 
     def frame(self) -> None:
@@ -137,7 +150,8 @@ class Flight:
 
     def close(self) -> History:
         """Completes the logs, closes the links and returns the history."""
-        self.server.close()
+        for server in self._servers:
+            server.close()
         if self._tlog is not None:
             self._tlog.close()
         return self.recorder.close()

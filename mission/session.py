@@ -68,6 +68,7 @@ class FlightOptions:
     gcs_port: int
     api_port: int
     run_folder: Path | None
+    dialect: str = "px4"
     parameters: tuple[str, ...] = ()  # NAME=VALUE
 
 
@@ -126,6 +127,7 @@ def _config(options: FlightOptions) -> FlightConfig:
             wind_m_s=options.wind_m_s,
             wind_from_deg=options.wind_from_deg,
             noise=options.noise,
+            dialect=options.dialect,
             parameters=dict(_parameter(text) for text in options.parameters),
             world=WorldConfig(
                 seed=options.world_seed,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from autopilot.mavlink.codec import FrameReader, MessageType, frame_bytes, known_type
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.links import Link
+from autopilot.mavlink.parameter_view import ParameterView
 from autopilot.mavlink.streams import StreamSchedule, Telemetry
 from autopilot.vehicle import Severity, Vehicle
 
@@ -64,6 +65,7 @@ class Endpoint:
         self.sysid = sysid
         self.time_us = 0
         self.compids = {AUTOPILOT_COMPONENT}  # the vehicle's components behind these links
+        self.parameters = ParameterView(vehicle.params, dialect)
         self.telemetry = Telemetry(dialect, sysid)
         self.channels = [Channel(link, sysid, StreamSchedule(self.telemetry, link.role)) for link in links]
         self._on_frame = on_frame

@@ -6,13 +6,14 @@ other: one client may upload a fence while another uploads a mission.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.home_item import with_home, without_home
 from autopilot.mavlink.mission_items import infinite_element, item_from_fields, scaled_position
 from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import ItemRefusal, ListKind, MissionItem, Severity
@@ -89,13 +90,26 @@ class MissionService(Service):
             "MISSION_SET_CURRENT": self.set_current_requested,
         }
 
-    # The lists as clients see them: the only two places where a dialect's numbering would differ from ours
+    # The lists as clients see them: the places where a dialect's numbering differs from ours
+
+    def _first_seq(self, kind: ListKind) -> int:
+        """Number of our first item in the list that clients see: 1 where item 0 is home."""
+        return self._endpoint.dialect.first_seq if kind is ListKind.MISSION else 0
 
     def _served(self, kind: ListKind) -> Sequence[MissionItem]:
-        return self._endpoint.vehicle.lists.items(kind)
+        vehicle = self._endpoint.vehicle
+        items = vehicle.lists.items(kind)
+        return with_home(items, vehicle.state) if self._first_seq(kind) else items
 
     def _store(self, kind: ListKind, items: Sequence[MissionItem]) -> ItemRefusal | None:
-        return infinite_element(items) or self._endpoint.vehicle.lists.load(kind, items)
+        """Checks and stores a list that a client has sent; a refusal has the client's numbers."""
+        refusal = infinite_element(items)
+        if refusal is None:
+            first_seq = self._first_seq(kind)
+            refusal = self._endpoint.vehicle.lists.load(kind, without_home(items) if first_seq else items)
+            if refusal is not None and items:
+                refusal = replace(refusal, seq=refusal.seq + first_seq)
+        return refusal
 
     # Upload
 
@@ -104,7 +118,7 @@ class MissionService(Service):
         kind = self._kind(sender, fields)
         if kind is None or self._is_busy(sender, kind):
             return
-        capacity = self._endpoint.vehicle.lists.capacity(kind)
+        capacity = self._endpoint.vehicle.lists.capacity(kind) + self._first_seq(kind)
         if fields.count > capacity:
             self._refuse(sender, mavlink.MAV_MISSION_NO_SPACE, f"{fields.count} items are more than {capacity}", kind)
         elif fields.count == 0:
@@ -240,7 +254,8 @@ class MissionService(Service):
         return kind, None
 
     def _reply_item(self, sender: Sender, message: Any, kind: ListKind, item: MissionItem, x: float, y: float) -> None:
-        is_current = kind is ListKind.MISSION and item.seq == self._endpoint.vehicle.state.mission_current
+        current = self._endpoint.vehicle.state.mission_current + self._first_seq(kind)
+        is_current = kind is ListKind.MISSION and item.seq == current
         payload = message.pack(
             sender.sysid,
             sender.compid,
@@ -290,7 +305,7 @@ class MissionService(Service):
 
     def set_current_requested(self, sender: Sender, fields: Any) -> None:
         """Makes an item the current one; the answer is MISSION_CURRENT, whether it changed or not."""
-        reply = self._endpoint.vehicle.set_current_item(fields.seq)
+        reply = self._endpoint.vehicle.set_current_item(max(fields.seq - self._first_seq(ListKind.MISSION), 0))
         if reply.reason:
             self._endpoint.text(Severity.WARNING, f"Mission: {reply.reason}")
         telemetry = self._endpoint.telemetry

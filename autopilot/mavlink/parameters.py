@@ -15,7 +15,6 @@ from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.param_file import ParamEntry
 from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import Severity
-from common.params import Parameter
 
 VALUES_PER_FRAME = 20  # 1000 values/s per channel; guess at what a client's receive buffer takes
 NOT_IN_LIST = 65_535  # index of a value nobody asked for
@@ -30,11 +29,10 @@ class ParameterService(Service):
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
-        self._table = endpoint.vehicle.params
-        self._indices = {name: i for i, name in enumerate(self._table.names)}
+        self._view = endpoint.parameters
         self._next_index: dict[Channel, int] = {}  # lists under way
-        self._is_setting = False  # the answer tells of this change
-        self._table.on_change(self._changed)
+        self._setting = ""  # the answer tells of this change
+        self._view.on_change(self._changed)
 
     def messages(self) -> Mapping[str, Handler]:
         return {
@@ -50,10 +48,10 @@ class ParameterService(Service):
     def frame(self) -> None:
         """Sends the next values of the lists under way."""
         for channel, first in list(self._next_index.items()):
-            last = min(first + VALUES_PER_FRAME, len(self._table))
+            last = min(first + VALUES_PER_FRAME, len(self._view))
             for i in range(first, last):
-                self._endpoint.reply(Sender(channel, 0, 0), _PARAM_VALUE, self._value(self._table.names[i], i))
-            if last == len(self._table):
+                self._endpoint.reply(Sender(channel, 0, 0), _PARAM_VALUE, self._value(self._view.names[i], i))
+            if last == len(self._view):
                 del self._next_index[channel]
             else:
                 self._next_index[channel] = last
@@ -62,16 +60,16 @@ class ParameterService(Service):
         """Sends one parameter, by name or by index; PARAM_ERROR if there is none."""
         name = fields.param_id
         if fields.param_index >= 0:
-            if fields.param_index >= len(self._table):
+            if fields.param_index >= len(self._view):
                 self._refuse(sender, "", fields.param_index, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
                 return
-            name = self._table.names[fields.param_index]
+            name = self._view.names[fields.param_index]
         if name == HASH_NAME:
             self._endpoint.reply(sender, _PARAM_VALUE, self._hash_value())
-        elif name not in self._table:
+        elif name not in self._view:
             self._refuse(sender, name, -1, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
         else:
-            self._endpoint.reply(sender, _PARAM_VALUE, self._value(name, self._indices[name]))
+            self._endpoint.reply(sender, _PARAM_VALUE, self._value(name, self._view.indices[name]))
 
     def set_requested(self, sender: Sender, fields: Any) -> None:
         """Sets a parameter to the nearest value it can have, and sends to everybody what it is now."""
@@ -79,68 +77,66 @@ class ParameterService(Service):
         if name == HASH_NAME:  # the client has these values already: the list may stop
             self._next_index.pop(sender.channel, None)
             return
-        if name not in self._table:
+        if name not in self._view:
             self._refuse(sender, name, -1, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             self._endpoint.text_once(Severity.WARNING, f"Parameter {name}: there is none of this name")
             return
-        declaration = self._table.declarations[name]
-        asked = self._endpoint.dialect.parameter_value(declaration, fields.param_value, fields.param_type)
+        view = self._view
+        asked = view.value_in(name, fields.param_value, fields.param_type)
         if asked is None:
-            kind = "an integer" if declaration.is_integer else "a real number"
+            kind = "an integer" if view.is_integer(name) else "a real number"
             self._endpoint.text(Severity.WARNING, f"Parameter {name}: not set, it is {kind}")
         else:
-            self._is_setting = True
-            stored = self._table.set(name, asked)
-            self._is_setting = False
+            self._setting = name
+            stored = view.set(name, asked)
+            self._setting = ""
             if stored != asked:
-                bounds = f"{declaration.minimum:g} to {declaration.maximum:g}"
+                low, high = view.bounds(name)
+                bounds = f"{low:g} to {high:g}"
                 self._endpoint.text(Severity.NOTICE, f"Parameter {name}: {asked:g} asked, {stored:g} set ({bounds})")
-        self._endpoint.broadcast(_PARAM_VALUE, self._value(name, self._indices[name]))
+        self._endpoint.broadcast(_PARAM_VALUE, self._value(name, view.indices[name]))
 
     def entries(self) -> list[ParamEntry]:
         """The list as numbers: what the values of PARAM_VALUE say."""
-        return [self._entry(self._table.declarations[name]) for name in self._table]
+        return [self._entry(name) for name in self._view.names]
 
-    def _entry(self, declaration: Parameter) -> ParamEntry:
-        dialect = self._endpoint.dialect
-        mav_type = dialect.parameter_type(declaration)
+    def _entry(self, name: str) -> ParamEntry:
+        view, dialect = self._view, self._endpoint.dialect
+        mav_type = view.param_type(name)
         value, default = (
-            dialect.parameter_value(declaration, dialect.parameter_bits(declaration, number), mav_type)
-            for number in (self._table[declaration.name], declaration.default)
+            dialect.parameter_value(mav_type, dialect.parameter_bits(mav_type, number), mav_type)
+            for number in (view.value(name), view.default(name))
         )
-        return ParamEntry(declaration.name, mav_type, value or 0.0, default or 0.0)
+        return ParamEntry(name, mav_type, value or 0.0, default or 0.0)
 
     def set_uploaded(self, values: Iterable[tuple[str, int, float]]) -> None:
         """Sets the parameters of a file: name, MAV_PARAM_TYPE and value; names it does not have are left out."""
         unknown = 0
         for name, _, value in values:
-            if name in self._table:
-                self._table.set(name, value)
+            if name in self._view:
+                self._view.set(name, value)
             else:
                 unknown += 1
         if unknown:
             self._endpoint.text(Severity.WARNING, f"Parameter file: {unknown} names are not known")
 
-    def _changed(self, declaration: Parameter) -> None:
+    def _changed(self, name: str) -> None:
         """Tells every client of a change that none of them asked for."""
-        if not self._is_setting:
-            self._endpoint.broadcast(_PARAM_VALUE, self._value(declaration.name, NOT_IN_LIST))
+        if name != self._setting:
+            self._endpoint.broadcast(_PARAM_VALUE, self._value(name, NOT_IN_LIST))
 
     def _value(self, name: str, index: int) -> bytes:
-        declaration = self._table.declarations[name]
-        dialect = self._endpoint.dialect
-        bits = dialect.parameter_bits(declaration, self._table[name])
-        return _PARAM_VALUE.pack(name, bits, dialect.parameter_type(declaration), len(self._table), index)
+        view = self._view
+        return _PARAM_VALUE.pack(name, view.bits(name), view.param_type(name), len(view), index)
 
     def _hash_value(self) -> bytes:
         """PX4's checksum over names and values, with which a client finds out whether its copy is still true."""
+        view = self._view
         checksum = 0xFFFFFFFF  # zlib inverts at both ends; PX4's sum starts at 0 and is not inverted
-        for name in self._table:
-            declaration = self._table.declarations[name]
-            bits = self._endpoint.dialect.parameter_bits(declaration, self._table[name])
-            checksum = zlib.crc32(bits.to_bytes(4, "little"), zlib.crc32(name.encode("ascii"), checksum))
+        for name in view.names:
+            checksum = zlib.crc32(view.bits(name).to_bytes(4, "little"), zlib.crc32(name.encode("ascii"), checksum))
         return _PARAM_VALUE.pack(
-            HASH_NAME, checksum ^ 0xFFFFFFFF, mavlink.MAV_PARAM_TYPE_UINT32, len(self._table), NOT_IN_LIST
+            HASH_NAME, checksum ^ 0xFFFFFFFF, mavlink.MAV_PARAM_TYPE_UINT32, len(view), NOT_IN_LIST
         )
 
     def _refuse(self, sender: Sender, name: str, index: int, error: int) -> None:

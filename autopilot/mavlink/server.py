@@ -24,8 +24,7 @@ from autopilot.mavlink.parameters import ParameterService
 from autopilot.mavlink.safety import SafetyService
 from autopilot.mavlink.service import CommandHandler, Handler, Service
 from autopilot.mavlink.streams import Stream
-from autopilot.mavlink.targets import TargetService
-from autopilot.mavlink.telemetry.status import mission_mode
+from autopilot.mavlink.telemetry.status import mission_progress
 from autopilot.vehicle import Severity, Vehicle
 
 _HEARTBEAT = known_type("HEARTBEAT")
@@ -87,7 +86,6 @@ class MavlinkServer:
             OffboardService(endpoint),
             SafetyService(endpoint),
             FtpService(endpoint, parameters),
-            TargetService(endpoint),
             AbsentServices(endpoint),
         ]
 
@@ -209,12 +207,13 @@ class MavlinkServer:
         self._endpoint.text(severity, text)
 
     def mission_item_reached(self, seq: int) -> None:
-        self._endpoint.broadcast(_MISSION_ITEM_REACHED, _MISSION_ITEM_REACHED.pack(seq))
+        payload = _MISSION_ITEM_REACHED.pack(seq + self._endpoint.dialect.first_seq)
+        self._endpoint.broadcast(_MISSION_ITEM_REACHED, payload)
 
     def mission_current_changed(self, seq: int) -> None:
-        state = self._endpoint.vehicle.state
-        payload = _MISSION_CURRENT.pack(seq, state.mission_count, state.mission_state, mission_mode(state))
-        self._endpoint.broadcast(_MISSION_CURRENT, payload)
+        endpoint = self._endpoint
+        payload = mission_progress(endpoint.vehicle.state, seq + endpoint.dialect.first_seq)
+        endpoint.broadcast(_MISSION_CURRENT, payload)
 
     def home_changed(self) -> None:
         self._broadcast_telemetry(_HOME_POSITION.msg_id)

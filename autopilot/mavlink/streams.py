@@ -4,7 +4,7 @@ In: the vehicle's state, at each frame. Out: frames on one link. Requests change
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from heapq import heapify, heapreplace
 
 from autopilot.mavlink.codec import MessageType, known_type
@@ -51,7 +51,6 @@ STREAMS: tuple[Stream, ...] = (
     Stream("POSITION_TARGET_LOCAL_NED", motion.position_target_local_ned, 4, 10),
     Stream("POSITION_TARGET_GLOBAL_INT", motion.position_target_global_int, 2, 5),
     Stream("ATTITUDE_TARGET", motion.attitude_target, 4, 10),
-    Stream("ORBIT_EXECUTION_STATUS", motion.orbit_execution_status, 2, 2),
     Stream("GPS_RAW_INT", sensors.gps_raw_int, 5, 5),
     Stream("HIGHRES_IMU", sensors.highres_imu, 0, 10),
     Stream("SCALED_IMU", sensors.scaled_imu, 0, 0),
@@ -89,7 +88,15 @@ class Telemetry:
             """Capabilities, versions, identity."""
             return autopilot_version(dialect, sysid)
 
-        self.streams = (Stream("HEARTBEAT", heartbeat, 1, 1), *STREAMS, Stream("AUTOPILOT_VERSION", version, 0, 0))
+        def mission_current(state: VehicleState) -> bytes:
+            """The current mission item, of how many (home not counted), and the mission's state."""
+            first_seq = dialect.first_seq if state.mission_count else 0
+            return status.mission_progress(state, state.mission_current + first_seq)
+
+        streams = (Stream("HEARTBEAT", heartbeat, 1, 1), *STREAMS, Stream("AUTOPILOT_VERSION", version, 0, 0))
+        self.streams = tuple(
+            replace(stream, build=mission_current) if stream.name == "MISSION_CURRENT" else stream for stream in streams
+        )
         self.types: dict[int, MessageType] = {}
         self.builders: dict[int, Builder] = {}
         self.default_interval_us: dict[LinkRole, dict[int, int]] = {role: {} for role in LinkRole}

@@ -1,5 +1,7 @@
 """What differs between the autopilots that ground stations know; everything else is shared."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from autopilot.vehicle import Mode
@@ -10,6 +12,50 @@ class UnknownModeError(Exception):
     """A mode this vehicle does not have; the text is the reason shown to the pilot."""
 
 
+@dataclass(frozen=True, slots=True)
+class ModeRow:
+    """One flight mode as AVAILABLE_MODES lists it."""
+
+    mode: Mode
+    name: str  # what the autopilot's own users call it
+    standard_mode: int = 0  # MAV_STANDARD_MODE; 0: none
+    is_selectable: bool = True  # by a pilot; others are entered by a command
+    is_advanced: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Alias:
+    """A parameter of ours under the name and in the unit of another autopilot."""
+
+    name: str
+    of: str  # our name
+    param_type: int  # MAV_PARAM_TYPE
+    scale: float = 1.0  # our unit to theirs
+    numbers: Mapping[int, int] | None = None  # where the meaning is a number: ours to theirs
+
+    def shown(self, value: float) -> float:
+        """Our value as clients see it; a number of ours that they do not have becomes their lowest."""
+        if self.numbers is not None:
+            return self.numbers.get(round(value), min(self.numbers.values()))
+        return value * self.scale
+
+    def ours(self, shown: float) -> float | None:
+        """A client's value as we keep it; None: there is nothing of ours that means this."""
+        if self.numbers is None:
+            return shown / self.scale
+        return next((ours for ours, theirs in self.numbers.items() if theirs == shown), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A name that clients look for and that has no meaning here: it can be read, and setting it changes nothing."""
+
+    name: str
+    value: int | float
+    param_type: int  # MAV_PARAM_TYPE
+    meaning: str
+
+
 class Dialect(Protocol):
     """One autopilot's numbers."""
 
@@ -18,6 +64,12 @@ class Dialect(Protocol):
     vehicle_type: int  # MAV_TYPE
     capabilities: int  # MAV_PROTOCOL_CAPABILITY bits that only this dialect sets
     flight_sw_version: int  # of the autopilot this dialect is compatible with
+    modes: Sequence[ModeRow]  # that a client may ask for
+    goto_mode: Mode  # in which a place is held to which a client sends the vehicle
+    first_seq: int  # of a mission in the lists that clients see; 1 where item 0 is home
+    long_frames: Mapping[int, int]  # MAV_FRAME of the altitude in a COMMAND_LONG, by MAV_CMD; otherwise 0 (AMSL)
+    aliases: Sequence[Alias]
+    constants: Sequence[Constant]
 
     def custom_mode(self, mode: Mode) -> int:
         """HEARTBEAT.custom_mode of a mode."""
@@ -44,13 +96,13 @@ class Dialect(Protocol):
         ...
 
     def parameter_type(self, declaration: Parameter) -> int:
-        """MAV_PARAM_TYPE of a parameter."""
+        """MAV_PARAM_TYPE of a parameter of ours."""
         ...
 
-    def parameter_bits(self, declaration: Parameter, value: float) -> int:
+    def parameter_bits(self, param_type: int, value: float) -> int:
         """The value field of PARAM_VALUE, as its 32 bits."""
         ...
 
-    def parameter_value(self, declaration: Parameter, bits: int, param_type: int) -> float | None:
+    def parameter_value(self, param_type: int, bits: int, asked_type: int) -> float | None:
         """The value a PARAM_SET carries in its 32 bits; None if it is of the wrong type."""
         ...

@@ -1,10 +1,11 @@
 """PX4's numbers: modes as main and sub mode, integer parameters as bit patterns."""
 
 import struct
+from collections.abc import Mapping, Sequence
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.mavlink.dialects import UnknownModeError
+from autopilot.mavlink.dialects import Alias, Constant, ModeRow, UnknownModeError
 from autopilot.vehicle import Mode
 from common.params import Parameter
 
@@ -30,6 +31,23 @@ MODE_NUMBERS: dict[Mode, tuple[int, int]] = {
 }
 # Modes of ours that PX4 does not have, as the nearest of its own.
 SHOWN_AS = {Mode.BRAKE: Mode.HOLD, Mode.SMART_RETURN: Mode.RETURN, Mode.GUIDED: Mode.OFFBOARD}
+MODES = (
+    ModeRow(Mode.POSITION, "Position", mavlink.MAV_STANDARD_MODE_POSITION_HOLD),
+    ModeRow(Mode.ALTITUDE, "Altitude", mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD),
+    ModeRow(Mode.HOLD, "Hold"),
+    ModeRow(Mode.MISSION, "Mission", mavlink.MAV_STANDARD_MODE_MISSION),
+    ModeRow(Mode.RETURN, "Return", mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY),
+    ModeRow(Mode.LAND, "Land", mavlink.MAV_STANDARD_MODE_LAND),
+    ModeRow(Mode.PRECISION_LAND, "Precision Land"),
+    ModeRow(Mode.TAKEOFF, "Takeoff", mavlink.MAV_STANDARD_MODE_TAKEOFF),
+    ModeRow(Mode.OFFBOARD, "Offboard", is_advanced=True),
+    ModeRow(Mode.FOLLOW, "Follow Me"),
+    ModeRow(Mode.ORBIT, "Orbit", mavlink.MAV_STANDARD_MODE_ORBIT, is_selectable=False),
+    ModeRow(Mode.STABILIZED, "Stabilized", is_advanced=True),
+    ModeRow(Mode.MANUAL, "Manual", is_advanced=True),
+    ModeRow(Mode.ACRO, "Acro", is_advanced=True),
+    ModeRow(Mode.TERMINATION, "Termination", is_selectable=False),
+)
 _MODES = {numbers: mode for mode, numbers in MODE_NUMBERS.items()}
 _WITHOUT_SUB_MODES = frozenset({MANUAL, ALTCTL, ACRO, OFFBOARD, STABILIZED, TERMINATION})
 
@@ -44,6 +62,13 @@ class Px4Dialect:
     # PX4 1.18.0, a development version: newer than any release, so that QGroundControl neither calls it too old nor
     # asks for an update. It names the interface we are compatible with; our own version is the custom version.
     flight_sw_version = 1 << 24 | 18 << 16 | 0 << 8 | mavlink.FIRMWARE_VERSION_TYPE_DEV
+
+    modes: Sequence[ModeRow] = MODES
+    goto_mode = Mode.HOLD
+    first_seq = 0
+    long_frames: Mapping[int, int] = {}
+    aliases: Sequence[Alias] = ()
+    constants: Sequence[Constant] = ()
 
     def custom_mode(self, mode: Mode) -> int:
         main, sub = MODE_NUMBERS[SHOWN_AS.get(mode, mode)]
@@ -65,15 +90,15 @@ class Px4Dialect:
     def parameter_type(self, declaration: Parameter) -> int:
         return int(mavlink.MAV_PARAM_TYPE_INT32 if declaration.is_integer else mavlink.MAV_PARAM_TYPE_REAL32)
 
-    def parameter_bits(self, declaration: Parameter, value: float) -> int:
-        packed = struct.pack("<i", int(value)) if declaration.is_integer else struct.pack("<f", value)
-        return int.from_bytes(packed, "little")
+    def parameter_bits(self, param_type: int, value: float) -> int:
+        is_real = param_type == mavlink.MAV_PARAM_TYPE_REAL32
+        return int.from_bytes(struct.pack("<f", value) if is_real else struct.pack("<i", int(value)), "little")
 
-    def parameter_value(self, declaration: Parameter, bits: int, param_type: int) -> float | None:
-        if param_type != self.parameter_type(declaration):
+    def parameter_value(self, param_type: int, bits: int, asked_type: int) -> float | None:
+        if asked_type != param_type:
             return None
-        packed = bits.to_bytes(4, "little")
-        value: float = struct.unpack("<i" if declaration.is_integer else "<f", packed)[0]
+        is_real = param_type == mavlink.MAV_PARAM_TYPE_REAL32
+        value: float = struct.unpack("<f" if is_real else "<i", bits.to_bytes(4, "little"))[0]
         return value
 
 

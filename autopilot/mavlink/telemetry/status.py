@@ -183,15 +183,14 @@ def extended_sys_state(state: VehicleState) -> bytes:
 
 
 def mission_current(state: VehicleState) -> bytes:
-    """The current mission item, of how many, and the mission's state."""
-    return _mission_current(
-        u16(state.mission_current), u16(state.mission_count), state.mission_state, mission_mode(state)
-    )
+    """The current mission item, of how many (home not counted), and the mission's state."""
+    return mission_progress(state, state.mission_current)
 
 
-def mission_mode(state: VehicleState) -> int:
-    """MISSION_CURRENT.mission_mode: whether the mission is what is being flown."""
-    return IN_MISSION_MODE if state.mode is Mode.MISSION else NOT_IN_MISSION_MODE
+def mission_progress(state: VehicleState, seq: int) -> bytes:
+    """MISSION_CURRENT with the item's number as clients know it."""
+    mission_mode = IN_MISSION_MODE if state.mode is Mode.MISSION else NOT_IN_MISSION_MODE
+    return _mission_current(u16(seq), u16(state.mission_count), state.mission_state, mission_mode)
 
 
 def system_time(state: VehicleState) -> bytes:

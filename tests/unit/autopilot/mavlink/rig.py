@@ -12,6 +12,8 @@ from autopilot.estimator.state import EstimatorState
 from autopilot.host import Host
 from autopilot.lists import ItemLists
 from autopilot.mavlink.codec import FrameReader, Message, decode, encode
+from autopilot.mavlink.dialects import Dialect
+from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.links import Link, LinkRole, memory_pair
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.navigator.fence_items import MAX_FENCE_ITEMS
@@ -38,10 +40,7 @@ from autopilot.vehicle import (
     MissionItem,
     Mode,
     OffboardSetpoint,
-    OrbitRequest,
-    OrbitStatus,
     Reply,
-    TargetReport,
     VehicleState,
 )
 from common.geodesy import GeoPoint
@@ -69,7 +68,6 @@ def flying_state() -> VehicleState:
     """In the air over home, everything known."""
     return VehicleState(
         time_us=5_000_000,
-        orbit=OrbitStatus(20.0, 0, HOME),
         estimate=record(
             Estimate,
             "Estimate",
@@ -206,15 +204,6 @@ class RecordingVehicle:
     def set_offboard(self, setpoint: OffboardSetpoint) -> None:
         self.setpoints.append(setpoint)
 
-    def orbit(self, request: OrbitRequest) -> Reply:
-        return self._record("orbit", request)
-
-    def report_target(self, report: TargetReport) -> None:
-        self._record("report_target", report)
-
-    def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
-        self._record("report_landing_target", pos_ned)
-
     def pause_mission(self) -> Reply:
         return self._record("pause_mission")
 
@@ -256,7 +245,7 @@ class Client:
 class Rig:
     """Server and client in simulated time."""
 
-    def __init__(self, role: LinkRole = LinkRole.GROUND) -> None:
+    def __init__(self, role: LinkRole = LinkRole.GROUND, dialect: Dialect = PX4) -> None:
         self.vehicle = RecordingVehicle()
         vehicle_end, client_end = memory_pair(role)
         second_vehicle_end, second_client_end = memory_pair(LinkRole.ONBOARD)
@@ -266,6 +255,7 @@ class Rig:
         self.server = MavlinkServer(
             self.vehicle,
             [vehicle_end, second_vehicle_end],
+            dialect,
             on_frame=lambda time_us, data: self.log.append((time_us, data)),
         )
         self.time_us = 5_000_000

@@ -23,6 +23,7 @@ PYMAVLINK_NAMES = {
     Mode.SMART_RETURN: "RTL",
     Mode.GUIDED: "OFFBOARD",
 }
+INT32, REAL32 = 6, 9  # MAV_PARAM_TYPE
 INTEGER = Parameter("I", 3, -5, 5, "", "", "")
 REAL = Parameter("R", 3.0, -5.0, 5.0, "", "", "")
 
@@ -44,14 +45,19 @@ def test_unknown_mode_is_refused_with_a_reason(main, sub):
 
 
 def test_integers_travel_as_bit_patterns():
-    assert PX4.parameter_bits(INTEGER, -2) == 0xFFFFFFFE
-    assert PX4.parameter_value(INTEGER, 0xFFFFFFFE, 6) == -2
-    assert PX4.parameter_bits(REAL, 1.0) == 0x3F800000
-    assert PX4.parameter_value(REAL, 0x3F800000, 9) == 1.0
+    assert PX4.parameter_bits(INT32, -2) == 0xFFFFFFFE
+    assert PX4.parameter_value(INT32, 0xFFFFFFFE, INT32) == -2
+    assert PX4.parameter_bits(REAL32, 1.0) == 0x3F800000
+    assert PX4.parameter_value(REAL32, 0x3F800000, REAL32) == 1.0
+
+
+def test_parameters_are_int32_or_real32():
+    assert PX4.parameter_type(INTEGER) == INT32
+    assert PX4.parameter_type(REAL) == REAL32
 
 
 def test_wrong_parameter_type_is_noticed():
-    assert PX4.parameter_value(INTEGER, 0x3F800000, 9) is None
+    assert PX4.parameter_value(INT32, 0x3F800000, REAL32) is None
 
 
 def test_custom_version_is_reversed_and_8_bytes():

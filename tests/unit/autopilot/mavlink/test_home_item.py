@@ -1,0 +1,101 @@
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.home_item import with_home, without_home
+from autopilot.vehicle import ItemRefusal, ListKind, MissionItem
+from tests.unit.autopilot.mavlink.rig import Rig, flying_state, texts
+
+WAYPOINT, JUMP = 16, 177
+
+
+def item(seq: int, command: int = WAYPOINT, p1: float = 0.0) -> MissionItem:
+    return MissionItem(seq, 3, command, (p1, 0.0, 0.0, 0.0), 47.4, 8.5, 20.0)
+
+
+def upload(rig: Rig, items: list[MissionItem]):
+    """Uploads as a client does; returns the acknowledgement."""
+    rig.client.send("MISSION_COUNT", count=len(items))
+    for sent in items:
+        request = rig.only("MISSION_REQUEST_INT")
+        assert request.seq == sent.seq
+        rig.client.send(
+            "MISSION_ITEM_INT",
+            seq=sent.seq,
+            frame=sent.frame,
+            command=sent.command,
+            param1=sent.params[0],
+            x=int(sent.x * 1e7),
+            y=int(sent.y * 1e7),
+            z=sent.z,
+        )
+    return rig.only("MISSION_ACK")
+
+
+def test_home_comes_first_and_jumps_go_to_the_same_items():
+    state = flying_state()
+    shown = with_home([item(0), item(1), item(2, JUMP, 1.0)], state)
+    assert [each.seq for each in shown] == [0, 1, 2, 3]
+    assert (shown[0].frame, shown[0].command, shown[0].x, shown[0].z) == (0, WAYPOINT, state.home.lat_deg, 488.0)
+    assert shown[3].params[0] == 2.0
+    assert without_home(shown) == [item(0), item(1), item(2, JUMP, 1.0)]
+
+
+def test_empty_mission_stays_empty():
+    assert with_home([], flying_state()) == []
+    assert without_home([]) == []
+
+
+def test_upload_leaves_home_out():
+    rig = Rig(dialect=ARDUPILOT)
+    assert upload(rig, [item(0), item(1), item(2, JUMP, 1.0)]).type == 0
+    stored = rig.vehicle.lists.items(ListKind.MISSION)
+    assert [each.seq for each in stored] == [0, 1]
+    assert stored[1].params[0] == 0.0
+
+
+def test_upload_of_home_alone_clears():
+    rig = Rig(dialect=ARDUPILOT)
+    upload(rig, [item(0), item(1)])
+    assert upload(rig, [item(0)]).type == 0
+    assert list(rig.vehicle.lists.items(ListKind.MISSION)) == []
+
+
+def test_download_has_home_as_item_0():
+    rig = Rig(dialect=ARDUPILOT)
+    upload(rig, [item(0), item(1)])
+    rig.client.send("MISSION_REQUEST_LIST")
+    assert rig.only("MISSION_COUNT").count == 2
+    rig.client.send("MISSION_REQUEST_INT", seq=0)
+    home = rig.only("MISSION_ITEM_INT")
+    assert (home.seq, home.x, home.z) == (0, 473_977_420, 488.0)
+    rig.client.send("MISSION_REQUEST_INT", seq=1)
+    assert rig.only("MISSION_ITEM_INT").x == 474_000_000
+
+
+def test_numbers_of_current_and_reached_items_count_home():
+    rig = Rig(dialect=ARDUPILOT)
+    rig.update(mission_count=3, mission_current=1)
+    rig.client.command(512, 42.0)
+    current = rig.all("MISSION_CURRENT")[-1]
+    assert (current.seq, current.total) == (2, 3)
+    rig.server.mission_item_reached(1)
+    assert rig.only("MISSION_ITEM_REACHED").seq == 2
+
+
+def test_current_item_is_set_by_the_clients_number():
+    rig = Rig(dialect=ARDUPILOT)
+    rig.client.send("MISSION_SET_CURRENT", seq=2)
+    rig.frame()
+    rig.ack(224, 1.0)
+    rig.ack(300, 0.0, 0.0)
+    assert rig.vehicle.calls == [("set_current_item", 1), ("set_current_item", 0), ("start_mission", -1)]
+
+
+def test_refused_item_is_named_by_the_clients_number():
+    rig = Rig(dialect=ARDUPILOT)
+    rig.vehicle.stored[ListKind.MISSION].refusal = ItemRefusal(1, 3, "no such command")
+    rig.client.send("MISSION_COUNT", count=3)
+    for seq in range(3):
+        rig.frame()
+        rig.client.send("MISSION_ITEM_INT", seq=seq, frame=3, command=WAYPOINT)
+    messages = rig.frame()
+    assert [message.fields.type for message in messages if message.name == "MISSION_ACK"] == [3]
+    assert texts(messages) == ["Mission: item 2: no such command"]
