@@ -32,8 +32,10 @@ from autopilot.vehicle import (
     MissionItem,
     Mode,
     OffboardSetpoint,
+    OrbitRequest,
     Reply,
     Severity,
+    TargetReport,
     VehicleState,
     Verdict,
 )
@@ -242,6 +244,22 @@ class FlightController:
 
     def set_offboard(self, setpoint: OffboardSetpoint) -> None:
         self.navigator.set_offboard(setpoint)
+
+    def report_target(self, report: TargetReport) -> None:
+        self.navigator.follow.report(report)
+
+    def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
+        self.navigator.precision.seen(pos_ned)
+
+    def orbit(self, request: OrbitRequest) -> Reply:
+        state = self.state
+        if not state.is_armed or state.landed_state is LandedState.ON_GROUND:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
+        reason = self.commander.refusal(Mode.ORBIT)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
+        reply = self.navigator.orbit.request(request)
+        return reply if reply.verdict is not Verdict.ACCEPTED else self._enter_anew(Mode.ORBIT)
 
     def pause_mission(self) -> Reply:
         if self.state.mode is not Mode.MISSION:

@@ -168,6 +168,39 @@ class OffboardSetpoint:
     thrust: float = nan
 
 
+@dataclass(frozen=True, slots=True)
+class TargetReport:
+    """Where a target to follow says it is, when it said so."""
+
+    pos_ned: tuple[float, float, float]  # [m]
+    vel_ned: tuple[float, float, float] | None  # [m/s], None if not reported
+    pos_std: float  # [m] per axis
+    vel_std: float  # [m/s] per axis
+    course_rad: float = nan  # where its nose points, NaN if not reported
+
+
+@dataclass(frozen=True, slots=True)
+class OrbitRequest:
+    """A circle a client asks for; NaN is the default."""
+
+    radius_m: float = nan  # positive is clockwise
+    speed_m_s: float = nan  # negative turns the other way
+    yaw: int = 5  # ORBIT_YAW_BEHAVIOUR
+    turns_rad: float = 0.0  # 0: for ever
+    lat_deg: float = nan
+    lon_deg: float = nan
+    alt_amsl_m: float = nan
+
+
+@dataclass(frozen=True, slots=True)
+class OrbitStatus:
+    """The circle being flown."""
+
+    radius_m: float  # positive is clockwise
+    yaw: int  # ORBIT_YAW_BEHAVIOUR
+    centre: GeoPoint
+
+
 @dataclass(slots=True)
 class VehicleState:
     """The vehicle as of this frame.
@@ -203,6 +236,7 @@ class VehicleState:
     mission_count: int = 0
     mission_current: int = 0  # seq
     mission_state: int = 0  # MISSION_STATE
+    orbit: OrbitStatus | None = None  # while one is flown
 
 
 class Announcer(Protocol):
@@ -273,6 +307,18 @@ class Vehicle(Protocol):
         ...
 
     def set_offboard(self, setpoint: OffboardSetpoint) -> None: ...
+
+    def orbit(self, request: OrbitRequest) -> Reply:
+        """Flies round a point (mode ORBIT)."""
+        ...
+
+    def report_target(self, report: TargetReport) -> None:
+        """What mode FOLLOW follows."""
+        ...
+
+    def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
+        """Where mode PRECISION_LAND lands [m]."""
+        ...
 
     def pause_mission(self) -> Reply: ...
 

@@ -11,15 +11,13 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.mavlink.altitude import command_alt_amsl_m
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.component import Component
 from autopilot.mavlink.convert import (
-    GLOBAL_FRAMES,
     INT32_MAX,
     LATLON_FRAMES,
-    RELATIVE_FRAMES,
-    TERRAIN_FRAMES,
     bounded_int,
     degrees_from_e7,
     is_position,
@@ -27,7 +25,6 @@ from autopilot.mavlink.convert import (
 )
 from autopilot.mavlink.dialects import UnknownModeError
 from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
-from autopilot.ports import TERRAIN_VALID
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
 FORCE = 21196  # param2 of COMPONENT_ARM_DISARM
@@ -214,7 +211,7 @@ class CommandService(Service):
         that is raised to it, with a text.
         Refused: TEMPORARILY_REJECTED without a position; DENIED for an altitude out of range.
         """
-        alt_amsl_m, reply = self._alt_amsl_m(command)
+        alt_amsl_m, reply = command_alt_amsl_m(self._endpoint.vehicle.state, command)
         return reply or self._endpoint.vehicle.takeoff(alt_amsl_m, radians(command.p4))
 
     def _land(self, command: Command) -> Reply:
@@ -265,7 +262,7 @@ class CommandService(Service):
             return denied("needs mode Hold, or the flag that changes to it")
         if not is_position(command.x, command.y):
             return denied("there is no such latitude and longitude")
-        alt_amsl_m, reply = self._alt_amsl_m(command)
+        alt_amsl_m, reply = command_alt_amsl_m(self._endpoint.vehicle.state, command)
         speed_m_s = command.p1 if command.p1 > 0.0 else nan
         return reply or vehicle.reposition(command.x, command.y, alt_amsl_m, command.p4, speed_m_s)
 
@@ -326,7 +323,7 @@ class CommandService(Service):
         """
         if command.p1 == 1.0:
             return self._endpoint.vehicle.set_home(nan, nan, nan)
-        alt_amsl_m, reply = self._alt_amsl_m(command)
+        alt_amsl_m, reply = command_alt_amsl_m(self._endpoint.vehicle.state, command)
         if reply is not None:
             return reply
         if isnan(command.x) or isnan(alt_amsl_m) or not is_position(command.x, command.y):
@@ -339,21 +336,6 @@ class CommandService(Service):
         Refused: TEMPORARILY_REJECTED while there is no home.
         """
         return self._send_requested(command, _HOME_POSITION_ID)
-
-    def _alt_amsl_m(self, command: Command) -> tuple[float, Reply | None]:
-        """The command's altitude above sea level (NaN if free), or why there is none."""
-        state = self._endpoint.vehicle.state
-        if command.frame in GLOBAL_FRAMES or (isnan(command.z) and command.frame in LATLON_FRAMES):
-            return command.z, None
-        if command.frame in RELATIVE_FRAMES:
-            if state.home is None:
-                return nan, Reply(Verdict.TEMPORARILY_REJECTED, "an altitude above home needs a home position")
-            return state.home.alt_m + command.z, None
-        if command.frame in TERRAIN_FRAMES:
-            if not state.estimate.flags & TERRAIN_VALID:
-                return nan, Reply(Verdict.TEMPORARILY_REJECTED, "the height above ground is not known")
-            return state.origin.alt_m - state.estimate.terrain_d + command.z, None
-        return nan, denied(f"frame {command.frame} is not supported")
 
     # Messages
 

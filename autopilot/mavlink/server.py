@@ -24,6 +24,7 @@ from autopilot.mavlink.parameters import ParameterService
 from autopilot.mavlink.safety import SafetyService
 from autopilot.mavlink.service import CommandHandler, Handler, Service
 from autopilot.mavlink.streams import Stream
+from autopilot.mavlink.targets import TargetService
 from autopilot.mavlink.telemetry.status import mission_progress
 from autopilot.vehicle import Severity, Vehicle
 
@@ -86,6 +87,7 @@ class MavlinkServer:
             OffboardService(endpoint),
             SafetyService(endpoint),
             FtpService(endpoint, parameters),
+            TargetService(endpoint),
             AbsentServices(endpoint),
         ]
 

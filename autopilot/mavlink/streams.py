@@ -51,6 +51,7 @@ STREAMS: tuple[Stream, ...] = (
     Stream("POSITION_TARGET_LOCAL_NED", motion.position_target_local_ned, 4, 10),
     Stream("POSITION_TARGET_GLOBAL_INT", motion.position_target_global_int, 2, 5),
     Stream("ATTITUDE_TARGET", motion.attitude_target, 4, 10),
+    Stream("ORBIT_EXECUTION_STATUS", motion.orbit_execution_status, 2, 2),
     Stream("GPS_RAW_INT", sensors.gps_raw_int, 5, 5),
     Stream("HIGHRES_IMU", sensors.highres_imu, 0, 10),
     Stream("SCALED_IMU", sensors.scaled_imu, 0, 0),

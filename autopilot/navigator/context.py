@@ -5,7 +5,7 @@ from math import atan2, hypot, isfinite, nan, sqrt
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import HEIGHT_VALID, TERRAIN_VALID
 from autopilot.vehicle import Announcer, LandedState, Mode, VehicleState
-from common.geodesy import ned_from_geodetic
+from common.geodesy import geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
 
 
@@ -71,6 +71,10 @@ class NavContext:
     def pos_ned_of(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Vector:
         """A geodetic position in the ned frame [m]."""
         return ned_from_geodetic(lat_deg, lon_deg, alt_amsl_m, self.state.origin)
+
+    def geodetic_of(self, pos_ned: Vector) -> tuple[float, float, float]:
+        """Latitude [deg], longitude [deg] and altitude above sea level [m] of a place [m]."""
+        return geodetic_from_ned(*pos_ned, self.state.origin)
 
     def down_of(self, alt_amsl_m: float) -> float:
         """Down coordinate [m] of an altitude above the present place."""

@@ -1,14 +1,18 @@
 """The navigator: one object per vehicle that turns the flight mode into setpoints, at 50 Hz."""
 
 from math import isfinite, nan
+from typing import Protocol
 
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.follow import Follow
 from autopilot.navigator.goto import reposition_target
 from autopilot.navigator.ground import Ask, standing_d, vertical_ask
 from autopilot.navigator.hold import Hold
 from autopilot.navigator.land import Land
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.offboard import STREAM_PERIOD_US, Offboard
+from autopilot.navigator.orbit import Orbit
+from autopilot.navigator.precision import PrecisionLand
 from autopilot.navigator.rtl import Return
 from autopilot.navigator.takeoff import Takeoff
 from autopilot.navigator.termination import Termination
@@ -16,6 +20,18 @@ from autopilot.ports import TERRAIN_VALID
 from autopilot.vehicle import ACCEPTED, Mode, OffboardSetpoint, Reply, Verdict
 
 _SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
+
+
+class FlightMode(Protocol):
+    """What each mode is."""
+
+    def start(self) -> None:
+        """Entered while armed, or armed in it."""
+        ...
+
+    def frame(self) -> None:
+        """Renews the setpoint; called while armed."""
+        ...
 
 
 class Navigator:
@@ -26,7 +42,20 @@ class Navigator:
         mission: the stored mission, which is mode Mission.
     """
 
-    __slots__ = ("_active", "_modes", "ask", "context", "hold", "land", "mission", "offboard", "takeoff")
+    __slots__ = (
+        "_active",
+        "_modes",
+        "ask",
+        "context",
+        "follow",
+        "hold",
+        "land",
+        "mission",
+        "offboard",
+        "orbit",
+        "precision",
+        "takeoff",
+    )
 
     def __init__(self, context: NavContext, mission: Mission) -> None:
         self.context = context
@@ -35,7 +64,10 @@ class Navigator:
         self.mission = mission
         self.land = Land(context)
         self.offboard = Offboard(context)
-        self._modes: dict[Mode, Hold | Takeoff | Mission | Return | Land | Offboard | Termination] = {
+        self.follow = Follow(context)
+        self.orbit = Orbit(context)
+        self.precision = PrecisionLand(context)
+        self._modes: dict[Mode, FlightMode] = {
             Mode.HOLD: self.hold,
             Mode.TAKEOFF: self.takeoff,
             Mode.MISSION: mission,
@@ -43,8 +75,11 @@ class Navigator:
             Mode.LAND: self.land,
             Mode.OFFBOARD: self.offboard,
             Mode.TERMINATION: Termination(context),
+            Mode.FOLLOW: self.follow,
+            Mode.ORBIT: self.orbit,
+            Mode.PRECISION_LAND: self.precision,
         }
-        self._active = self._modes[Mode.HOLD]
+        self._active: FlightMode = self._modes[Mode.HOLD]
         self.ask = Ask.STAY  # of the setpoint flown
 
     def refusal(self, mode: Mode) -> str:
@@ -82,6 +117,8 @@ class Navigator:
         """Changes to a mode: at once in flight, when armed otherwise."""
         if self._active is self.mission and mode is not Mode.MISSION:
             self.mission.leave()
+        if self._active is self.orbit and mode is not Mode.ORBIT:
+            self.orbit.leave()
         self._active = self._modes[mode]
         if self.context.state.is_armed:
             self._active.start()

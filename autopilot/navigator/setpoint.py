@@ -88,6 +88,19 @@ class SetpointPort:
         self.descend_speed = descend_speed
         self.exit_speed = exit_speed
 
+    def track(self, pos_ned: Vector, vel_ned: Vector, yaw: float, yaw_rate: float = nan) -> None:
+        """Asks for a place [m] that moves with a velocity [m/s]; renewed each frame."""
+        self._free_all()
+        self.kind = SETPOINT_TRAJECTORY
+        self.pos_ned = pos_ned
+        self.vel_ned = vel_ned
+        self.yaw = yaw
+        self.yaw_rate = yaw_rate
+
+    def track_down(self, place: tuple[float, float], vel_ned: Vector, speed_down: float, yaw: float) -> None:
+        """Asks for a vertical speed [m/s] over a place [m] that moves with a velocity [m/s]; renewed each frame."""
+        self.track((place[0], place[1], nan), (vel_ned[0], vel_ned[1], speed_down), yaw)
+
     def descend_at(self, north: float, east: float, speed_down: float, yaw: float, cruise_speed: float = nan) -> None:
         """Asks for a vertical speed [m/s] over a place [m]."""
         if (

@@ -25,6 +25,7 @@ _odometry = known_type("ODOMETRY").pack
 _position_target_local_ned = known_type("POSITION_TARGET_LOCAL_NED").pack
 _position_target_global_int = known_type("POSITION_TARGET_GLOBAL_INT").pack
 _attitude_target = known_type("ATTITUDE_TARGET").pack
+_orbit_execution_status = known_type("ORBIT_EXECUTION_STATUS").pack
 _wind_cov = known_type("WIND_COV").pack
 
 LOCAL_NED = 1  # MAV_FRAME
@@ -227,4 +228,15 @@ def attitude_target(state: VehicleState) -> bytes | None:
         wxyz_from_quat(actuators.q_sp_ned_from_frd),
         *actuators.omega_sp_frd,
         actuators.thrust_sp,
+    )
+
+
+def orbit_execution_status(state: VehicleState) -> bytes | None:
+    """The circle of mode Orbit, while it is flown."""
+    orbit = state.orbit
+    if orbit is None:
+        return None
+    centre = orbit.centre
+    return _orbit_execution_status(
+        state.time_us, orbit.radius_m, 0, degrees_e7(centre.lat_deg), degrees_e7(centre.lon_deg), centre.alt_m
     )

@@ -40,7 +40,10 @@ from autopilot.vehicle import (
     MissionItem,
     Mode,
     OffboardSetpoint,
+    OrbitRequest,
+    OrbitStatus,
     Reply,
+    TargetReport,
     VehicleState,
 )
 from common.geodesy import GeoPoint
@@ -68,6 +71,7 @@ def flying_state() -> VehicleState:
     """In the air over home, everything known."""
     return VehicleState(
         time_us=5_000_000,
+        orbit=OrbitStatus(20.0, 0, HOME),
         estimate=record(
             Estimate,
             "Estimate",
@@ -203,6 +207,15 @@ class RecordingVehicle:
 
     def set_offboard(self, setpoint: OffboardSetpoint) -> None:
         self.setpoints.append(setpoint)
+
+    def orbit(self, request: OrbitRequest) -> Reply:
+        return self._record("orbit", request)
+
+    def report_target(self, report: TargetReport) -> None:
+        self._record("report_target", report)
+
+    def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
+        self._record("report_landing_target", pos_ned)
 
     def pause_mission(self) -> Reply:
         return self._record("pause_mission")

@@ -59,9 +59,9 @@ def test_value_is_read_by_name_and_by_index():
 
 def test_unknown_name_or_index_is_an_error():
     rig = Rig()
-    rig.client.send("PARAM_REQUEST_READ", param_id="FLW_TGT_HT", param_index=-1)
+    rig.client.send("PARAM_REQUEST_READ", param_id="NO_SUCH_NAME", param_index=-1)
     error = rig.only("PARAM_ERROR")
-    assert (error.param_id, error.error) == ("FLW_TGT_HT", mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+    assert (error.param_id, error.error) == ("NO_SUCH_NAME", mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
     rig.client.send("PARAM_REQUEST_READ", param_index=30_000)
     assert rig.only("PARAM_ERROR").param_index == 30_000
     rig.client.send("PARAM_SET", param_id="NOPE", param_value=0, param_type=9)

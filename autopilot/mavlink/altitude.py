@@ -1,0 +1,23 @@
+"""The altitude of a command above sea level, from the frame it comes in."""
+
+from math import isnan, nan
+
+from autopilot.mavlink.convert import GLOBAL_FRAMES, LATLON_FRAMES, RELATIVE_FRAMES, TERRAIN_FRAMES
+from autopilot.mavlink.service import Command, denied
+from autopilot.ports import TERRAIN_VALID
+from autopilot.vehicle import Reply, VehicleState, Verdict
+
+
+def command_alt_amsl_m(state: VehicleState, command: Command) -> tuple[float, Reply | None]:
+    """The altitude in parameter 7 above sea level [m] (NaN if free), or why there is none."""
+    if command.frame in GLOBAL_FRAMES or (isnan(command.z) and command.frame in LATLON_FRAMES):
+        return command.z, None
+    if command.frame in RELATIVE_FRAMES:
+        if state.home is None:
+            return nan, Reply(Verdict.TEMPORARILY_REJECTED, "an altitude above home needs a home position")
+        return state.home.alt_m + command.z, None
+    if command.frame in TERRAIN_FRAMES:
+        if not state.estimate.flags & TERRAIN_VALID:
+            return nan, Reply(Verdict.TEMPORARILY_REJECTED, "the height above ground is not known")
+        return state.origin.alt_m - state.estimate.terrain_d + command.z, None
+    return nan, denied(f"frame {command.frame} is not supported")

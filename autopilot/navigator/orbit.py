@@ -1,0 +1,147 @@
+"""Orbit: flies round a point until another mode is chosen, or for a number of turns."""
+
+from enum import IntEnum
+from math import cos, hypot, isfinite, nan, sin
+
+from autopilot.navigator.circle import Circle, speed_limit
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.setpoint import Vector
+from autopilot.vehicle import ACCEPTED, OrbitRequest, OrbitStatus, Reply, Verdict
+from common.geodesy import GeoPoint
+
+_RADIUS_MIN_M, _RADIUS_MAX_M = 1.0, 1000.0
+_NEAR_M = 1.0  # distance from the circle at which the orbit begins
+_DEFAULT_SPEED_M_S = 5.0  # unless the circle is too small for it; guess
+
+
+class OrbitYaw(IntEnum):
+    """Numbered as ORBIT_YAW_BEHAVIOUR."""
+
+    TO_CENTRE = 0
+    INITIAL = 1
+    FREE = 2
+    ALONG = 3
+    BY_STICKS = 4
+    UNCHANGED = 5
+
+
+class Orbit:
+    """Mode Orbit. Chosen without a request it circles a point ahead, at MC_ORBIT_RAD."""
+
+    __slots__ = ("_context", "_is_on_circle", "_request", "_start_yaw", "_time_us", "_turns_rad", "_yaw", "circle")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._request: OrbitRequest | None = None
+        self.circle: Circle | None = None  # being flown
+        self._is_on_circle = False
+        self._start_yaw = 0.0
+        self._yaw = OrbitYaw.TO_CENTRE
+        self._turns_rad = 0.0
+        self._time_us = 0
+
+    def request(self, request: OrbitRequest) -> Reply:
+        """Chooses the next orbit; the caller changes to the mode."""
+        radius_m = self._radius_of(request)
+        if not _RADIUS_MIN_M <= abs(radius_m) <= _RADIUS_MAX_M:
+            return _denied(f"a radius of {abs(radius_m):.1f} m is not between {_RADIUS_MIN_M:g} and {_RADIUS_MAX_M:g}")
+        if isfinite(request.lat_deg) != isfinite(request.lon_deg):
+            return _denied("needs both latitude and longitude")
+        fastest = self._fastest(radius_m)
+        if abs(request.speed_m_s) > fastest:
+            return _denied(f"{abs(request.speed_m_s):.1f} m/s is too fast for this circle: {fastest:.1f} m/s at most")
+        if request.speed_m_s == 0.0:
+            return _denied("an orbit needs a speed")
+        if request.turns_rad < 0.0:
+            return _denied("the number of turns cannot be negative")
+        self._request = request
+        return ACCEPTED
+
+    def start(self) -> None:
+        context = self._context
+        request, self._request = self._request or self._ahead(), None
+        radius_m = self._radius_of(request)
+        here = context.stop_point()
+        centre = self._centre_of(request, here)
+        speed = abs(request.speed_m_s)
+        if not isfinite(speed):
+            speed = min(_DEFAULT_SPEED_M_S, 0.7 * self._fastest(radius_m))
+        if request.speed_m_s < 0.0:
+            radius_m = -radius_m
+        if request.yaw != OrbitYaw.UNCHANGED:
+            self._yaw = OrbitYaw(request.yaw)
+        elif self.circle is None:
+            self._yaw = OrbitYaw(int(context.number("MC_ORBIT_YAW_MOD")))
+        self._turns_rad = request.turns_rad if isfinite(request.turns_rad) else 0.0
+        self.circle = Circle(centre, radius_m, speed, here)
+        context.state.orbit = OrbitStatus(
+            self.circle.direction * self.circle.radius_m, self._yaw, GeoPoint(*context.geodetic_of(centre))
+        )
+        self._is_on_circle = False
+        self._start_yaw = context.state.yaw_rad
+        self._time_us = context.state.time_us
+        context.fly_to(self.circle.pos_ned, self._heading(self.circle), context.state.estimate.pos_ned)
+
+    def leave(self) -> None:
+        """Another mode took over."""
+        self.circle = None
+        self._context.state.orbit = None
+
+    def frame(self) -> None:
+        context, circle = self._context, self.circle
+        if context.is_on_ground or circle is None:
+            return
+        now_us = context.state.time_us
+        dt_s = (now_us - self._time_us) * 1e-6
+        self._time_us = now_us
+        if not self._is_on_circle:
+            north, east, down = context.state.estimate.pos_ned
+            place = circle.pos_ned
+            self._is_on_circle = hypot(north - place[0], east - place[1]) < _NEAR_M and abs(
+                down - place[2]
+            ) < context.number("NAV_MC_ALT_RAD")
+            return
+        circle.advance(dt_s)
+        if 0.0 < self._turns_rad <= circle.turned_rad:
+            context.hold_next(context.stop_point(), context.state.yaw_rad)
+            return
+        turns = self._yaw in (OrbitYaw.TO_CENTRE, OrbitYaw.ALONG)
+        context.setpoint.track(circle.pos_ned, circle.vel_ned, self._heading(circle), circle.yaw_rate if turns else nan)
+
+    def _heading(self, circle: Circle) -> float:
+        if self._yaw is OrbitYaw.TO_CENTRE:
+            return circle.yaw_to_centre
+        if self._yaw is OrbitYaw.ALONG:
+            return circle.yaw_along
+        return nan if self._yaw is OrbitYaw.FREE else self._start_yaw
+
+    def _fastest(self, radius_m: float) -> float:
+        """The speed [m/s] with which a circle can be flown."""
+        number = self._context.number
+        return min(speed_limit(radius_m, number("MPC_ACC_HOR")), number("MPC_XY_VEL_MAX"))
+
+    def _radius_of(self, request: OrbitRequest) -> float:
+        return request.radius_m if isfinite(request.radius_m) else self._context.number("MC_ORBIT_RAD")
+
+    def _centre_of(self, request: OrbitRequest, here: Vector) -> Vector:
+        context = self._context
+        down = context.down_of(request.alt_amsl_m) if isfinite(request.alt_amsl_m) else here[2]
+        if isfinite(request.lat_deg):
+            north, east, _ = context.pos_ned_of(request.lat_deg, request.lon_deg, context.state.position.alt_m)
+            return north, east, down
+        if self.circle is not None:  # the same centre, another circle
+            return self.circle.centre_ned[0], self.circle.centre_ned[1], down
+        return here[0], here[1], down
+
+    def _ahead(self) -> OrbitRequest:
+        """An orbit round the point ahead of the vehicle, which then is on the circle already."""
+        context = self._context
+        radius_m = context.number("MC_ORBIT_RAD")
+        yaw = context.state.yaw_rad
+        north, east, _ = context.stop_point()
+        place = context.geodetic_of((north + radius_m * cos(yaw), east + radius_m * sin(yaw), 0.0))
+        return OrbitRequest(lat_deg=place[0], lon_deg=place[1])
+
+
+def _denied(reason: str) -> Reply:
+    return Reply(Verdict.DENIED, reason)
