@@ -14,6 +14,7 @@ import numpy as np
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.commander import Commander
 from autopilot.commander.landing import LandingDetector
+from autopilot.commander.pilot import Pilot
 from autopilot.host import Host
 from autopilot.lists import ItemLists
 from autopilot.navigator.context import NavContext
@@ -23,6 +24,7 @@ from autopilot.navigator.navigator import Navigator
 from autopilot.navigator.rally import RallyPoints
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.payload import Payloads
+from autopilot.sticks import Sticks
 from autopilot.vehicle import (
     ACCEPTED,
     Announcer,
@@ -116,7 +118,8 @@ class FlightController:
     ) -> None:
         self.params = params
         self.host = host or Host()
-        self.state = VehicleState(origin=origin, position=origin)
+        self.sticks = Sticks(params)
+        self.state = VehicleState(origin=origin, position=origin, sticks=self.sticks.input)
         self.payload = Payloads()
         self._read_estimate = ports.read_estimate
         self._read_samples = ports.read_samples
@@ -136,6 +139,7 @@ class FlightController:
             self._relay,
             BatteryEstimator(airframe.battery),
             LandingDetector(params, hover, standing_m),
+            Pilot(self.state, params, self.sticks),
         )
         context = NavContext(self.state, params, self._relay, self._setpoint, hover, standing_m)
         mission = Mission(context, self.commander.set_home)

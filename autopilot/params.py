@@ -11,6 +11,7 @@ from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
+from autopilot.stick_params import STICK_PARAMETERS
 from common.airframe import Airframe
 from common.kernels import GRAVITY_M_S2
 from common.params import Parameter, ParameterTable
@@ -27,19 +28,6 @@ SYSTEM_PARAMETERS: list[Parameter] = [
     _constant("SYS_AUTOSTART", 4001, "airframe: generic quadrotor"),
     _constant("SYS_AUTOCONFIG", 0, "do not reset parameters"),
     _constant("SYS_FAILURE_EN", 0, "failures cannot be injected over MAVLink"),
-    _constant("COM_RC_IN_MODE", 1, "no radio control, joystick only"),
-    _constant("COM_RC_LOSS_T", 0.5, "no radio control"),
-    _constant("COM_FLTMODE1", -1, "no mode switch"),
-    _constant("COM_FLTMODE2", -1, "no mode switch"),
-    _constant("COM_FLTMODE3", -1, "no mode switch"),
-    _constant("COM_FLTMODE4", -1, "no mode switch"),
-    _constant("COM_FLTMODE5", -1, "no mode switch"),
-    _constant("COM_FLTMODE6", -1, "no mode switch"),
-    _constant("NAV_RCL_ACT", 0, "no radio control"),
-    _constant("RC_MAP_ROLL", 0, "no radio control"),
-    _constant("RC_MAP_PITCH", 0, "no radio control"),
-    _constant("RC_MAP_YAW", 0, "no radio control"),
-    _constant("RC_MAP_THROTTLE", 0, "no radio control"),
     _constant("RC_MAP_AUX1", 0, "no radio control"),
     _constant("RC_MAP_AUX2", 0, "no radio control"),
     _constant("RC_MAP_FLAPS", 0, "no radio control"),
@@ -70,6 +58,7 @@ def all_parameters() -> list[Parameter]:
         *CONTROL_PARAMETERS,
         *COMMANDER_PARAMETERS,
         *NAVIGATOR_PARAMETERS,
+        *STICK_PARAMETERS,
     ]
 
 
@@ -85,6 +74,7 @@ def airframe_defaults(airframe: Airframe) -> dict[str, int | float]:
         "BAT1_V_EMPTY": battery.empty_cell_v,
         "EKF2_MIN_RNG": airframe.contact.leg_z_m,
         "EKF2_MCOEF": count * rotor.drag_n_s2_m * hover_speed_rad_s / body.mass_kg,
+        "MPC_THR_HOVER": body.mass_kg * GRAVITY_M_S2 / (count * rotor.thrust_n_s2 * rotor.max_speed_rad_s**2),
         "EKF2_BCOEF_X": body.mass_kg / body.drag_area_x_m2,
         "EKF2_BCOEF_Y": body.mass_kg / body.drag_area_y_m2,
     }

@@ -17,6 +17,7 @@ SETPOINT_IDLE = wp.constant(0)  # rotors stopped when disarmed, at idle when arm
 SETPOINT_TRAJECTORY = wp.constant(1)  # position, velocity, acceleration, yaw; smoothed by the trajectory generator
 SETPOINT_ATTITUDE = wp.constant(2)  # attitude (yaw by rate where yaw_rate is finite) and collective thrust
 SETPOINT_RATE = wp.constant(3)  # body rates and collective thrust
+SETPOINT_LEAN = wp.constant(4)  # roll and pitch as an attitude; yaw rate, height or climb rate by the trajectory
 
 # Estimate.flags
 TILT_ALIGNED = wp.constant(1)
@@ -111,7 +112,7 @@ class Setpoint:
     climb_speed: float  # [m/s] up, NaN: MPC_Z_V_AUTO_UP
     descend_speed: float  # [m/s] down, NaN: MPC_Z_V_AUTO_DN
     exit_speed: float  # [m/s] speed with which pos_ned may be passed, 0: stop there
-    q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE
+    q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE; SETPOINT_LEAN: its heading is not used
     omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE
     thrust: float  # [0..1] collective, share of the maximum thrust
 

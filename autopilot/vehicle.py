@@ -11,6 +11,7 @@ from math import nan
 from typing import Any, Protocol
 
 from autopilot.host import Host
+from autopilot.sticks import StickInput, Sticks
 from common.geodesy import GeoPoint
 from common.params import ParameterTable
 
@@ -237,6 +238,7 @@ class VehicleState:
     mission_current: int = 0  # seq
     mission_state: int = 0  # MISSION_STATE
     orbit: OrbitStatus | None = None  # while one is flown
+    sticks: StickInput = field(default_factory=StickInput)
 
 
 class Announcer(Protocol):
@@ -277,6 +279,8 @@ class Vehicle(Protocol):
 
     @property
     def station(self) -> Station: ...
+
+    sticks: Sticks
 
     def arm(self, *, force: bool) -> Reply: ...
 

@@ -11,6 +11,7 @@ from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.mavlink.dialects.ardupilot_params import ALIASES, CONSTANTS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.params import SYSTEM_PARAMETERS, parameter_table
+from autopilot.stick_params import STICK_PARAMETERS
 from common.airframe import load_airframe
 from common.files import write_whole
 from common.params import Parameter
@@ -23,6 +24,7 @@ SECTIONS = {
     "Control": CONTROL_PARAMETERS,
     "Arming, landing detection, failsafes": COMMANDER_PARAMETERS,
     "Take-off, missions, return, landing": NAVIGATOR_PARAMETERS,
+    "The pilot's sticks": STICK_PARAMETERS,
     "System, and what ground stations ask for": SYSTEM_PARAMETERS,
 }
 HEADER = """# Parameters

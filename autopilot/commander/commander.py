@@ -12,7 +12,8 @@ from autopilot.commander.failsafe import CRASHED
 from autopilot.commander.flying import Flying
 from autopilot.commander.guard import Guard
 from autopilot.commander.landing import LandingDetector
-from autopilot.commander.modes import MODE_RULES, mode_refusal
+from autopilot.commander.modes import MODE_RULES, NO_STICKS, mode_refusal
+from autopilot.commander.pilot import Pilot
 from autopilot.commander.watch import FailureWatch, StationLink
 from autopilot.navigator.ground import Ask
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID
@@ -42,6 +43,7 @@ class Commander:
         announcer: where texts and events go.
         battery: the charge estimator.
         landing: the landing detector.
+        pilot: what the pilot asks for by the sticks.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class Commander:
         announcer: Announcer,
         battery: BatteryEstimator,
         landing: LandingDetector,
+        pilot: Pilot,
     ) -> None:
         self.state = state
         self.params = params
@@ -61,6 +64,7 @@ class Commander:
         self._battery = battery
         self._watch = FailureWatch(state, params, battery, self.station)
         self._landing = landing
+        self._pilot = pilot
         self._flying: Flying
         self._position_seen_us = -1  # when the position was last valid
         self._next_check_us = 0
@@ -99,6 +103,7 @@ class Commander:
             self._fly(dt_s)
         if state.estimate.reset_count != self._reset_count:
             self._tell_reset()
+        self._pilot.frame(self)
         if state.is_armed:
             self._watch_failures(min(dt_s, _FRAME_LONGEST_S))
         elif state.time_us >= self._next_check_us:
@@ -132,6 +137,7 @@ class Commander:
         self._has_flown = False
         self._watch.reset()
         self.guard.reset()
+        self._pilot.on_armed()
         self._flying.on_armed()
         self.announcer.heartbeat_now()
         self.announcer.statustext(Severity.INFO, "Armed")
@@ -155,9 +161,9 @@ class Commander:
             reasons.append(f"mode {mode.name} does not allow arming")
         if state.landed_state is not LandedState.ON_GROUND:
             reasons.append("not on the ground")
-        refusal = self._flying.refusal(mode)
-        if refusal:
-            reasons.append(refusal)
+        if MODE_RULES[mode].needs_sticks and not self._pilot.is_heard:
+            reasons.append(NO_STICKS)
+        reasons += filter(None, (self._flying.refusal(mode), self._pilot.arming_reason(mode)))
         return reasons
 
     def request_mode(self, mode: Mode) -> Reply:
@@ -202,6 +208,7 @@ class Commander:
             has_home=state.home is not None,
             is_on_ground=state.landed_state is LandedState.ON_GROUND,
             needs_position=self._needs_position(mode),
+            has_sticks=self._pilot.is_heard,
         ) or self._flying.refusal(mode)
 
     def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
@@ -284,7 +291,8 @@ class Commander:
     def _lift(self) -> None:
         """Released from the ground, but not yet off it."""
         state = self.state
-        if self._lift_d - state.estimate.pos_ned[2] > _AIRBORNE_M or self._flying.is_landing:
+        is_put_down = MODE_RULES[state.mode].needs_sticks and self._flying.ask is Ask.DOWN
+        if self._lift_d - state.estimate.pos_ned[2] > _AIRBORNE_M or self._flying.is_landing or is_put_down:
             self._has_flown = True
         elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
             self.announcer.statustext(Severity.CRITICAL, "Takeoff failed: still on the ground")
@@ -302,7 +310,8 @@ class Commander:
         self._unpowered_us = state.time_us
         self.guard.release()
         self._next_check_us = 0
-        self.change_mode(Mode.HOLD)
+        if not MODE_RULES[state.mode].needs_sticks:  # a pilot may arm again in the same mode
+            self.change_mode(Mode.HOLD)
         self.announcer.heartbeat_now()
         self.announcer.statustext(Severity.INFO, text)
 
@@ -329,6 +338,8 @@ class Commander:
 
     def _check_before_arming(self) -> None:
         state = self.state
+        if MODE_RULES[state.mode].needs_sticks and not self._pilot.is_heard:
+            self.change_mode(Mode.HOLD)  # the pilot has gone: whoever comes next may need none
         reasons = self.check_arming()
         state.is_ready_to_arm = not reasons
         if reasons and state.time_us >= self._next_text_us:
@@ -353,7 +364,7 @@ class Commander:
             has_position=self.has_position,
             needs_position=self._needs_position(self.state.mode),
         )
-        self.guard.see(failures)
+        self.guard.see(failures | self._pilot.failures())
 
     def _load(self) -> None:
         params = self.params

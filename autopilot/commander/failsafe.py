@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
+from autopilot.commander.modes import MODE_RULES
 from autopilot.vehicle import Mode, Severity
 from common.params import ParameterTable
 
@@ -27,6 +28,7 @@ FLIGHT_TIME_OVER = 4096
 FLIGHT_TIME_NEAR = 8192
 DEAD_RECKONING = 16384
 MOTOR_FAILED = 32768
+STICKS_LOST = 1 << 16
 
 TERMINATION_BREAKER = 121212  # CBRK_FLIGHTTERM: the failure detector may not stop the motors
 
@@ -118,6 +120,12 @@ def _control_lost(params: ParameterTable, _: Mode) -> Action:
     return Action.WARN if int(params["CBRK_FLIGHTTERM"]) == TERMINATION_BREAKER else Action.DISARM
 
 
+def _sticks_lost(params: ParameterTable, mode: Mode) -> Action:
+    """A mode flown by sticks cannot go on without them."""
+    action = LINK_ACTIONS.get(int(params["NAV_RCL_ACT"]), Action.WARN)
+    return Action.RETURN if action is Action.WARN and MODE_RULES[mode].needs_sticks else action
+
+
 RULES: tuple[Rule, ...] = (
     Rule(ATTITUDE_LOST, _control_lost, Severity.EMERGENCY, "Attitude lost"),
     Rule(CRASHED, _control_lost, Severity.EMERGENCY, "Crash detected"),
@@ -132,6 +140,7 @@ RULES: tuple[Rule, ...] = (
          "Wind is below its limit again"),
     Rule(STATION_LOST, by("NAV_DLL_ACT", LINK_ACTIONS), Severity.WARNING, "Ground station lost",
          "Ground station is back"),
+    Rule(STICKS_LOST, _sticks_lost, Severity.CRITICAL, "Sticks lost", "Sticks are back"),
     Rule(OFFBOARD_LOST, by("COM_OBL_RC_ACT", OFFBOARD_ACTIONS, Action.HOLD), Severity.CRITICAL,
          "Offboard setpoints lost"),
     Rule(BATTERY_LOW, always(Action.WARN), Severity.WARNING, "Battery low"),

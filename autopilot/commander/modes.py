@@ -13,7 +13,10 @@ class ModeRule:
     needs_home: bool
     may_arm: bool  # the vehicle may be armed in it
     on_ground: bool  # may be chosen while standing on the ground
+    needs_sticks: bool = False  # flown by a pilot
 
+
+NO_STICKS = "needs a pilot's sticks"
 
 MODE_RULES: dict[Mode, ModeRule] = {
     Mode.HOLD: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True),
@@ -21,11 +24,11 @@ MODE_RULES: dict[Mode, ModeRule] = {
     Mode.MISSION: ModeRule(needs_position=True, needs_home=True, may_arm=True, on_ground=True),
     Mode.RETURN: ModeRule(needs_position=True, needs_home=True, may_arm=False, on_ground=False),
     Mode.LAND: ModeRule(needs_position=False, needs_home=False, may_arm=False, on_ground=False),
-    Mode.MANUAL: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True),
-    Mode.STABILIZED: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True),
-    Mode.ACRO: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True),
-    Mode.ALTITUDE: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True),
-    Mode.POSITION: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True),
+    Mode.MANUAL: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True, needs_sticks=True),
+    Mode.STABILIZED: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True, needs_sticks=True),
+    Mode.ACRO: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True, needs_sticks=True),
+    Mode.ALTITUDE: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True, needs_sticks=True),
+    Mode.POSITION: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True, needs_sticks=True),
     Mode.PRECISION_LAND: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
     Mode.FOLLOW: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
     Mode.ORBIT: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
@@ -38,7 +41,9 @@ MODE_RULES: dict[Mode, ModeRule] = {
 }
 
 
-def mode_refusal(mode: Mode, *, has_position: bool, has_home: bool, is_on_ground: bool, needs_position: bool) -> str:
+def mode_refusal(
+    mode: Mode, *, has_position: bool, has_home: bool, is_on_ground: bool, needs_position: bool, has_sticks: bool
+) -> str:
     """Why the mode cannot be entered now; empty if it can.
 
     Args:
@@ -47,10 +52,13 @@ def mode_refusal(mode: Mode, *, has_position: bool, has_home: bool, is_on_ground
         has_home: home is known.
         is_on_ground: the vehicle stands on the ground.
         needs_position: as the table says, except in Offboard, where the setpoint decides.
+        has_sticks: a pilot's sticks are heard.
     """
     rule = MODE_RULES[mode]
     if is_on_ground and not rule.on_ground:
         return "on the ground already"
+    if rule.needs_sticks and not has_sticks:
+        return NO_STICKS
     # Hold is where every vehicle boots: it may be chosen before there is a position, and flown only with one.
     if needs_position and not has_position and not (mode is Mode.HOLD and is_on_ground):
         return "no valid position"

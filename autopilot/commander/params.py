@@ -17,7 +17,7 @@ COMMANDER_PARAMETERS: list[Parameter] = [
     Parameter("COM_POS_FS_DELAY", 0.5, 0.0, 30.0, "s", "time until an invalid position counts as lost", "guess"),
     Parameter("COM_OF_LOSS_T", 1.0, 0.0, 60.0, "s", "time without setpoints until Offboard is lost", _PX4),
     Parameter("COM_OBL_RC_ACT", 5, 3, 7, "", "offboard loss: 3 return, 4 land, 5 hold, 6 terminate, 7 disarm",
-              "PX4's numbers; hold because there are no sticks"),
+              "PX4's numbers; its default needs sticks"),
     Parameter("COM_POSCTL_NAVL", 0, 0, 1, "", "position lost in Position mode: 0 altitude mode, 1 land",
               _PX4),
     Parameter("NAV_DLL_ACT", 0, 0, 6, "",

@@ -19,6 +19,7 @@ from autopilot.control.velocity import VelocityState, observe, velocity_step
 from autopilot.ports import (
     SETPOINT_ATTITUDE,
     SETPOINT_IDLE,
+    SETPOINT_LEAN,
     SETPOINT_RATE,
     SETPOINT_TRAJECTORY,
     Actuators,
@@ -140,6 +141,24 @@ def aim_of_attitude(yaw: float, sp: Setpoint) -> Aim:
 
 
 @wp.func
+def aim_of_lean(trajectory: TrajectoryState, sp: Setpoint) -> Aim:
+    """The lean of the setpoint at the heading of the trajectory."""
+    aim = Aim()
+    q = wp.normalize(sp.q_ned_from_frd)
+    aim.yaw = trajectory.yaw
+    aim.q_ned_from_frd = quat_from_yaw(aim.yaw) * quat_from_yaw(-yaw_from_quat(q)) * q
+    aim.omega_ned = wp.vec3(0.0, 0.0, trajectory.yaw_rate)
+    return aim
+
+
+@wp.func
+def thrust_along(q_ned_from_frd: wp.quat, up: float) -> wp.vec3:
+    """The thrust [m/s²] along body up, at an attitude, whose upward part is `up`."""
+    axis = wp.quat_rotate(q_ned_from_frd, wp.vec3(0.0, 0.0, -1.0))
+    return axis * (up / wp.max(-axis[2], _UPRIGHT_MIN))
+
+
+@wp.func
 def actuators_of(
     airframe: ControlAirframe,
     trajectory: TrajectoryState,
@@ -203,7 +222,11 @@ def outer_loops(
     now.velocity = velocity_step(
         params, airframe, now.velocity, now.trajectory, est, vel_sp_ned, thrust_max_n, now.ramp < 1.0, _FRAME_S
     )
-    now.aim = aim_of_thrust(now.velocity.thrust_sp_ned, now.trajectory)
+    if sp.kind == SETPOINT_LEAN:
+        now.aim = aim_of_lean(now.trajectory, sp)
+        now.velocity.thrust_sp_ned = thrust_along(now.aim.q_ned_from_frd, -now.velocity.thrust_sp_ned[2])
+    else:
+        now.aim = aim_of_thrust(now.velocity.thrust_sp_ned, now.trajectory)
     return now
 
 
@@ -265,7 +288,7 @@ def control_tick(
         now.ramp = wp.min(now.ramp + _TICK_S / wp.max(params.takeoff_ramp_s, _TICK_S), 1.0)
 
     collective_n = wp.clamp(sp.thrust, 0.0, 1.0) * thrust_max_n
-    if sp.kind == SETPOINT_TRAJECTORY:
+    if sp.kind == SETPOINT_TRAJECTORY or sp.kind == SETPOINT_LEAN:
         if tick % _FRAME_TICKS == 0 or sp.kind != state.kind or state.was_landed == 1:
             outer = outer_loops(params, airframe, now, est, sp, thrust_max_n)
             now.trajectory = outer.trajectory

@@ -18,6 +18,7 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.identity import banner
 from autopilot.mavlink.links import Link
+from autopilot.mavlink.manual import ManualService
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.parameters import ParameterService
@@ -88,6 +89,7 @@ class MavlinkServer:
             SafetyService(endpoint),
             FtpService(endpoint, parameters),
             TargetService(endpoint),
+            ManualService(endpoint),
             AbsentServices(endpoint),
         ]
 

@@ -11,7 +11,7 @@ from autopilot.mavlink.codec import MessageType, known_type
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.identity import autopilot_version
 from autopilot.mavlink.links import LinkRole
-from autopilot.mavlink.telemetry import motion, sensors, status
+from autopilot.mavlink.telemetry import motion, radio, sensors, status
 from autopilot.vehicle import VehicleState
 from common.kernels import FRAME_US
 
@@ -59,6 +59,9 @@ STREAMS: tuple[Stream, ...] = (
     Stream("DISTANCE_SENSOR", sensors.distance_sensor, 4, 10),
     Stream("SERVO_OUTPUT_RAW", sensors.servo_output_raw, 2, 2),
     Stream("ACTUATOR_OUTPUT_STATUS", sensors.actuator_output_status, 0, 0),
+    Stream("RC_CHANNELS", radio.rc_channels, 1, 1),
+    Stream("RC_CHANNELS_RAW", radio.rc_channels_raw, 0, 0),
+    Stream("MANUAL_CONTROL", radio.manual_control, 0, 0),
     Stream("VIBRATION", sensors.vibration, 1, 1),
     Stream("ESTIMATOR_STATUS", sensors.estimator_status, 1, 2),
 )
@@ -67,7 +70,7 @@ STREAMS: tuple[Stream, ...] = (
 GROUPS: dict[int, tuple[str, ...]] = {
     1: ("HIGHRES_IMU", "SCALED_IMU", "SCALED_PRESSURE"),  # RAW_SENSORS
     2: ("SYS_STATUS", "GPS_RAW_INT", "MISSION_CURRENT", "EXTENDED_SYS_STATE"),  # EXTENDED_STATUS
-    3: ("SERVO_OUTPUT_RAW",),  # RC_CHANNELS
+    3: ("SERVO_OUTPUT_RAW", "RC_CHANNELS"),  # RC_CHANNELS
     4: ("ATTITUDE_TARGET",),  # RAW_CONTROLLER
     6: ("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"),  # POSITION
     10: ("ATTITUDE", "ATTITUDE_QUATERNION"),  # EXTRA1

@@ -8,7 +8,7 @@ from math import hypot, nan
 from typing import Any, Protocol
 
 from autopilot.navigator.setpoint import Vector
-from autopilot.ports import SETPOINT_IDLE, SETPOINT_TRAJECTORY, TERRAIN_VALID
+from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_RATE, TERRAIN_VALID
 from autopilot.vehicle import VehicleState
 
 NEAR_HOME_M = 30.0  # home's ground level is trusted this far around it; guess
@@ -17,7 +17,7 @@ _STAND_M = 0.05  # a place lower than this above standing height is on the groun
 _LIFT_M = 0.1  # a place this far above the vehicle asks to climb
 _SPEED_M_S = 0.05  # vertical speed below which a setpoint asks to stay
 _NEAR_M = 2.0  # a place on the ground farther away than this is still to be reached; guess
-_LIFT_SHARE = 0.5  # of the hover thrust from which a thrust setpoint asks to climb; above LandingDetector's shares
+LIFT_SHARE = 0.5  # of the hover thrust from which a thrust setpoint asks to climb; above LandingDetector's shares
 
 
 class Ask(IntEnum):
@@ -67,8 +67,8 @@ def vertical_ask(wanted: Wanted, estimate: Any, stand_d: float, hover_thrust: fl
     """
     if wanted.kind == SETPOINT_IDLE:
         return Ask.STAY
-    if wanted.kind != SETPOINT_TRAJECTORY:
-        return Ask.UP if wanted.thrust > _LIFT_SHARE * hover_thrust else Ask.DOWN
+    if wanted.kind in (SETPOINT_ATTITUDE, SETPOINT_RATE):
+        return Ask.UP if wanted.thrust > LIFT_SHARE * hover_thrust else Ask.DOWN
     north, east, down = wanted.pos_ned
     if down == down:
         here = estimate.pos_ned

@@ -93,6 +93,15 @@ def _blend(context: NavContext, height: float, slow: float, fast: float) -> floa
     return round((slow + (fast - slow) * (height - low) / (high - low)) * 20.0) / 20.0
 
 
+def slowed_near_ground(context: NavContext, fast: float) -> float:
+    """[m/s] The greatest descent speed here, as in a landing; `fast` high up, and where the ground is not known."""
+    height, is_measured = context.height_above_ground()
+    home, here = context.state.home_ned, context.state.estimate.pos_ned
+    if not is_measured and (context.state.home is None or hypot(here[0] - home[0], here[1] - home[1]) > NEAR_HOME_M):
+        return fast
+    return _blend(context, height, min(context.number("MPC_LAND_SPEED"), fast), fast)
+
+
 class Land:
     """Mode Land: at a given place if one was asked for, otherwise here."""
 

@@ -9,6 +9,7 @@ from autopilot.navigator.goto import reposition_target
 from autopilot.navigator.ground import Ask, standing_d, vertical_ask
 from autopilot.navigator.hold import Hold
 from autopilot.navigator.land import Land
+from autopilot.navigator.manual import Acro, Altitude, Brake, Position, Stabilized
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.offboard import STREAM_PERIOD_US, Offboard
 from autopilot.navigator.orbit import Orbit
@@ -67,6 +68,7 @@ class Navigator:
         self.follow = Follow(context)
         self.orbit = Orbit(context)
         self.precision = PrecisionLand(context)
+        stabilized = Stabilized(context)
         self._modes: dict[Mode, FlightMode] = {
             Mode.HOLD: self.hold,
             Mode.TAKEOFF: self.takeoff,
@@ -78,6 +80,12 @@ class Navigator:
             Mode.FOLLOW: self.follow,
             Mode.ORBIT: self.orbit,
             Mode.PRECISION_LAND: self.precision,
+            Mode.MANUAL: stabilized,
+            Mode.STABILIZED: stabilized,
+            Mode.ACRO: Acro(context),
+            Mode.ALTITUDE: Altitude(context),
+            Mode.POSITION: Position(context),
+            Mode.BRAKE: Brake(context),
         }
         self._active: FlightMode = self._modes[Mode.HOLD]
         self.ask = Ask.STAY  # of the setpoint flown
@@ -88,6 +96,8 @@ class Navigator:
             return f"mode {mode.name} is not supported"
         if mode is Mode.MISSION:
             return self.mission.refusal()
+        if mode is Mode.ALTITUDE and not self.context.has_height:
+            return "no valid height"
         if mode is Mode.OFFBOARD and self.offboard.age_us(self.context.state.time_us) > STREAM_PERIOD_US:
             return "needs setpoints faster than 2 Hz before the switch"
         return ""

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_TRAJECTORY
+from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_LEAN, SETPOINT_RATE, SETPOINT_TRAJECTORY
 from autopilot.vehicle import OffboardSetpoint
 
 Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]  # x, y, z, w
 FREE: Vector = (nan, nan, nan)
 _NOT_HOLDING_M_S = 0.01
 _LEVEL_NORTH = (0.0, 0.0, 0.0, 1.0)
@@ -51,6 +52,8 @@ class SetpointPort:
         self.kind: int = SETPOINT_IDLE
         self.pos_ned: Vector = FREE
         self.vel_ned: Vector = FREE
+        self.omega_frd: Vector = FREE
+        self.yaw_rate = nan
         self._free_all()
 
     def set_flags(self, *, is_armed: bool, is_landed: bool) -> None:
@@ -142,6 +145,57 @@ class SetpointPort:
         self._free_all()
         self.kind = SETPOINT_ATTITUDE
         self.q_ned_from_frd = (0.0, 0.0, sin(0.5 * yaw), cos(0.5 * yaw))
+        self.thrust = thrust
+
+    # ---- what a pilot asks for: called each frame, written only if something changed ----
+
+    def move(self, vel_ned: Vector, yaw_rate: float) -> None:
+        """Asks for a velocity [m/s] and a yaw rate [rad/s]; the place is held where the velocity is zero."""
+        if self.kind == SETPOINT_TRAJECTORY and self.vel_ned == vel_ned and self.yaw_rate == yaw_rate:
+            return
+        self._free_all()
+        self.kind = SETPOINT_TRAJECTORY
+        self.vel_ned = vel_ned
+        self.yaw_rate = yaw_rate
+
+    def lean(self, q_level_from_frd: Quaternion, speed_down: float, yaw_rate: float) -> None:
+        """Asks for roll and pitch, a vertical speed [m/s] (0 holds the height) and a yaw rate [rad/s]."""
+        if (
+            self.kind == SETPOINT_LEAN
+            and self.q_ned_from_frd == q_level_from_frd
+            and self.vel_ned[2] == speed_down
+            and self.yaw_rate == yaw_rate
+        ):
+            return
+        self._free_all()
+        self.kind = SETPOINT_LEAN
+        self.q_ned_from_frd = q_level_from_frd
+        self.accel_ned = (0.0, 0.0, nan)  # over ground the trajectory goes along with the vehicle
+        self.vel_ned = (nan, nan, speed_down)
+        self.yaw_rate = yaw_rate
+
+    def tilt(self, q_level_from_frd: Quaternion, yaw_rate: float, thrust: float) -> None:
+        """Asks for roll and pitch, a yaw rate [rad/s] and a collective thrust [0..1]."""
+        if (
+            self.kind == SETPOINT_ATTITUDE
+            and self.q_ned_from_frd == q_level_from_frd
+            and self.yaw_rate == yaw_rate
+            and self.thrust == thrust
+        ):
+            return
+        self._free_all()
+        self.kind = SETPOINT_ATTITUDE
+        self.q_ned_from_frd = q_level_from_frd
+        self.yaw_rate = yaw_rate
+        self.thrust = thrust
+
+    def turn(self, omega_frd: Vector, thrust: float) -> None:
+        """Asks for body rates [rad/s] and a collective thrust [0..1]."""
+        if self.kind == SETPOINT_RATE and self.omega_frd == omega_frd and self.thrust == thrust:
+            return
+        self._free_all()
+        self.kind = SETPOINT_RATE
+        self.omega_frd = omega_frd
         self.thrust = thrust
 
     def follow(self, setpoint: OffboardSetpoint, cruise_speed: float) -> None:

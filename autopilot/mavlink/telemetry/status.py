@@ -22,13 +22,19 @@ _mission_current = known_type("MISSION_CURRENT").pack
 _system_time = known_type("SYSTEM_TIME").pack
 
 MAVLINK_VERSION = 3  # of the HEARTBEAT message
-# Every mode flies itself: stabilised, guided and automatic, with a custom mode.
+# Most modes fly themselves: stabilised, guided and automatic, with a custom mode. The others are flown by sticks.
 _BASE_MODE = (
     mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
     | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
     | mavlink.MAV_MODE_FLAG_AUTO_ENABLED
 )
+_STICKS_MODE = (
+    mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
+    | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+)
+_STICKS_MODES = frozenset({Mode.MANUAL, Mode.STABILIZED, Mode.ACRO, Mode.ALTITUDE, Mode.POSITION})
 _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 _GYRO_ACCEL = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
@@ -45,6 +51,7 @@ _ATTITUDE_CONTROL = (
     | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 )
 _POSITION_CONTROL = mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+_RC = mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER  # present once sticks were heard: most clients have none
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 # Always present and never enabled: without it MAVProxy announces a breach of a fence nobody has set.
 _GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
@@ -59,10 +66,11 @@ WHOLE_PACK_ONLY = (UINT16_MAX,) * 9  # cell voltages are not measured
 
 def heartbeat(state: VehicleState, dialect: Dialect) -> bytes:
     """Mode, armed or not, state."""
+    base_mode = _STICKS_MODE if state.mode in _STICKS_MODES else _BASE_MODE
     return _heartbeat(
         dialect.vehicle_type,
         dialect.autopilot,
-        _BASE_MODE | _ARMED if state.is_armed else _BASE_MODE,
+        base_mode | _ARMED if state.is_armed else base_mode,
         dialect.custom_mode(state.mode),
         system_status(state),
         MAVLINK_VERSION,
@@ -80,7 +88,7 @@ def system_status(state: VehicleState) -> int:
 
 def sys_status(state: VehicleState) -> bytes:
     """Which sensors work, whether it may be armed, battery, load."""
-    present = _ALWAYS | (_RANGE if state.samples.range.time_us else 0)
+    present = _ALWAYS | (_RANGE if state.samples.range.time_us else 0) | (_RC if state.sticks.heard_until_us else 0)
     battery = state.samples.battery
     return _sys_status(
         present | _GEOFENCE,
@@ -116,6 +124,8 @@ def healthy_sensors(state: VehicleState) -> int:
         bits |= _POSITION_CONTROL
     if state.is_ready_to_arm or state.is_armed:
         bits |= _PREARM
+    if now_us <= state.sticks.heard_until_us:
+        bits |= _RC
     return bits
 
 

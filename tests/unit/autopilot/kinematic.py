@@ -27,6 +27,7 @@ from autopilot.ports import (
     Samples,
     Setpoint,
 )
+from autopilot.stick_params import STICK_PARAMETERS
 from autopilot.vehicle import LandedState, MissionItem, Mode, OffboardSetpoint, Severity
 from common.airframe import load_airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
@@ -78,7 +79,13 @@ class Kinematic:
 
     def __init__(self, **params):
         self.table = ParameterTable(
-            [*COMMANDER_PARAMETERS, *NAVIGATOR_PARAMETERS, *CONTROL_PARAMETERS, *ESTIMATOR_PARAMETERS]
+            [
+                *COMMANDER_PARAMETERS,
+                *NAVIGATOR_PARAMETERS,
+                *CONTROL_PARAMETERS,
+                *ESTIMATOR_PARAMETERS,
+                *STICK_PARAMETERS,
+            ]
         )
         for name, value in params.items():
             self.table.set(name, value)

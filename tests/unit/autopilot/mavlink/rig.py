@@ -32,6 +32,7 @@ from autopilot.ports import (
     Estimate,
     Samples,
 )
+from autopilot.sticks import Sticks
 from autopilot.vehicle import (
     ACCEPTED,
     BatteryLevel,
@@ -160,6 +161,9 @@ class RecordingVehicle:
         self.params = parameter_table()
         self.station = StationLink()
         self.host = Host()
+        self.sticks = Sticks(self.params)
+        self.state.sticks = self.sticks.input
+        self.sticks.joystick_moved((CLIENT_SYSID, CLIENT_COMPID), 5_000_000, (0.0, 0.0, 0.0, 0.0), 0)
         self.reply = ACCEPTED
         self.arming_problems: list[str] = []
         self.calls: list[tuple[Any, ...]] = []

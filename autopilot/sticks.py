@@ -1,0 +1,252 @@
+"""The pilot's sticks: who moves them, where they are, and whether they are still heard.
+
+In: joystick positions (MANUAL_CONTROL) and overridden radio channels (RC_CHANNELS_OVERRIDE) as clients send them. Out:
+one `StickInput`, which the stick modes fly and telemetry shows. Nothing is computed until a message comes: whether the
+sticks are heard is one comparison with the time of this frame.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from common.params import Parameter, ParameterTable
+
+CHANNELS = 18  # of RC_CHANNELS
+CALIBRATED = 8  # channels with parameters of their own
+UNUSED = 0xFFFF  # in RC_CHANNELS: no such channel
+_RELEASED = 0  # no value: nobody overrides the channel
+_PULSES_US = (800, 2200)  # a pulse outside is none
+_MOVED_S = 0.1  # low-pass of a stick's speed (PX4: MovingDiff)
+_GAP_S = 1.0  # after a longer silence a stick has not moved but been found somewhere else; guess
+
+
+class InMode(IntEnum):
+    """COM_RC_IN_MODE: whose sticks count."""
+
+    RADIO = 0
+    JOYSTICK = 1
+    EITHER = 2  # another takes over when the one in control falls silent
+    FIRST = 3  # the kind that came first, until power-off
+    NONE = 4
+
+
+class Source(IntEnum):
+    """Kinds of senders."""
+
+    RADIO = 0
+    JOYSTICK = 1
+
+
+@dataclass(slots=True)
+class StickInput:
+    """Where the sticks are, each -1..1, and what a radio receiver would put out."""
+
+    roll: float = 0.0  # right is positive
+    pitch: float = 0.0  # forward is positive
+    yaw: float = 0.0  # clockwise is positive
+    throttle: float = 0.0  # up is positive, 0 is the middle
+    buttons: int = 0
+    channels: list[int] = field(default_factory=lambda: [_RELEASED] * CHANNELS)  # [us], 0: no value
+    count: int = 0  # of messages taken; grows with each
+    heard_until_us: int = 0  # the sticks are lost after that; 0: never heard
+    speed: float = 0.0  # [1/s] of the stick that moves fastest, low-passed
+
+
+class Sticks:
+    """The sticks of one vehicle.
+
+    Args:
+        params: COM_RC_*, RC_*.
+    """
+
+    __slots__ = (
+        "_calibration", "_first", "_heard_us", "_in_mode", "_joystick_us", "_map", "_override_us", "_params", "_sender",
+        "_speeds", "input", "is_cut", "is_forward_low", "takes_every_source",
+        "takes_over",
+    )  # fmt: skip
+
+    def __init__(self, params: ParameterTable) -> None:
+        self.input = StickInput()
+        self.is_cut = False  # a failure: nothing is heard
+        self.is_forward_low = False  # a pitch stick pushed forward is a short pulse (ArduPilot), not a long one (PX4)
+        self.takes_every_source = False  # whatever COM_RC_IN_MODE says: ArduPilot has no such setting
+        self.takes_over = True  # moving them may leave auto modes, as COM_RC_OVERRIDE says; not in ArduPilot
+        self._params = params
+        self._sender: tuple[Source, int, int] | None = None  # in control: kind, system and component id
+        self._first: Source | None = None  # kind that came first since power-on
+        self._heard_us = 0
+        self._speeds = [0.0, 0.0, 0.0, 0.0]  # [1/s]
+        self._load()
+        params.on_change(self._on_parameter)
+
+    # ---- what others ask ----
+
+    def is_heard(self, now_us: int) -> bool:
+        """Whether there are sticks."""
+        return now_us <= self.input.heard_until_us
+
+    def is_lost(self, now_us: int) -> bool:
+        """Whether there were sticks, and are none now."""
+        return 0 < self.input.heard_until_us < now_us
+
+    def forget(self, now_us: int) -> None:
+        """Sticks that are lost now count as never heard, until they are heard again."""
+        if self.is_lost(now_us):
+            self.input.heard_until_us = 0
+
+    # ---- what comes in ----
+
+    def joystick_moved(
+        self,
+        sender: tuple[int, int],
+        now_us: int,
+        axes: tuple[float | None, float | None, float | None, float | None],
+        buttons: int,
+    ) -> str:
+        """Takes a joystick's position; returns why it does not count, empty if it does.
+
+        Args:
+            sender: system and component id.
+            now_us: time.
+            axes: roll, pitch, yaw, throttle, each -1..1; None leaves one as it is.
+            buttons: bits.
+        """
+        refusal = self._take_control(Source.JOYSTICK, sender, now_us, self._joystick_us)
+        if refusal is not None:
+            return refusal
+        now = self.input
+        old = (now.roll, now.pitch, now.yaw, now.throttle)
+        roll, pitch, yaw, throttle = (was if axis is None else axis for was, axis in zip(old, axes, strict=True))
+        now.buttons = buttons
+        self._move(now_us, roll, pitch, yaw, throttle)
+        for stick, value in zip(self._map, (roll, pitch, yaw, throttle), strict=True):
+            if stick:
+                is_turned = stick == self._map[1] and self.is_forward_low
+                now.channels[stick - 1] = self._pulse_us(stick, -value if is_turned else value)
+        return ""
+
+    def channels_overridden(self, sender: tuple[int, int], now_us: int, pulses_us: Sequence[int | None]) -> str:
+        """Takes overridden radio channels; returns why they do not count, empty if they do.
+
+        Args:
+            sender: system and component id.
+            now_us: time.
+            pulses_us: of each channel [us]; 0 releases one, None leaves it as it is.
+        """
+        refusal = self._take_control(Source.RADIO, sender, now_us, self._override_us)
+        if refusal is not None:
+            return refusal
+        now = self.input
+        channels = now.channels
+        for i, pulse_us in enumerate(pulses_us[:CHANNELS]):
+            if pulse_us is not None:
+                channels[i] = pulse_us if _PULSES_US[0] <= pulse_us <= _PULSES_US[1] else _RELEASED
+        if not any(channels):  # all released: nobody flies any more
+            now.heard_until_us = now_us - 1
+            return ""
+        now.buttons = 0
+        roll, pitch, yaw, throttle = (self._deflection(stick) for stick in self._map)
+        self._move(now_us, roll, -pitch if self.is_forward_low else pitch, yaw, throttle)
+        return ""
+
+    def _take_control(self, source: Source, sender: tuple[int, int], now_us: int, silence_us: int) -> str | None:
+        """Gives the sender control for a while; returns None, or why not (empty if another is in control)."""
+        mode = self._in_mode
+        if self.is_cut:
+            return ""
+        is_wrong = mode is InMode.NONE or mode == 1 - source
+        if mode is InMode.FIRST:
+            is_wrong = self._first not in (None, source)
+        if is_wrong and not self.takes_every_source:
+            return f"COM_RC_IN_MODE {int(mode)} does not take a {source.name.lower()}"
+        who = (source, *sender)
+        if who != self._sender:
+            if self.is_heard(now_us):
+                return ""
+            self._sender = who
+            now = self.input
+            now.roll = now.pitch = now.yaw = now.throttle = 0.0
+            now.channels[:] = [_RELEASED] * CHANNELS
+            self._heard_us = 0
+        if self._first is None:
+            self._first = source
+        self.input.heard_until_us = now_us + silence_us
+        return None
+
+    def _move(self, now_us: int, roll: float, pitch: float, yaw: float, throttle: float) -> None:
+        """Sets the sticks, and how fast they move."""
+        now = self.input
+        dt_s = (now_us - self._heard_us) * 1e-6
+        if self._heard_us == 0 or dt_s > _GAP_S:
+            self._speeds = [0.0, 0.0, 0.0, 0.0]
+            now.speed = 0.0
+        elif dt_s > 0.0:
+            way = (roll - now.roll, pitch - now.pitch, yaw - now.yaw, throttle - now.throttle)
+            share = 1.0 / (dt_s + _MOVED_S)
+            self._speeds = [
+                speed * _MOVED_S * share + moved * share for speed, moved in zip(self._speeds, way, strict=True)
+            ]
+            now.speed = max(map(abs, self._speeds))
+        self._heard_us = now_us
+        now.roll, now.pitch, now.yaw, now.throttle = roll, pitch, yaw, throttle
+        now.count += 1
+
+    # ---- radio channels ----
+
+    def switch_position(self, channel: int, positions: int) -> int:
+        """Which of some positions (1..) a switch on a channel is in; 0: not known."""
+        if not 0 < channel <= CHANNELS or self.input.channels[channel - 1] == _RELEASED:
+            return 0
+        share = 0.5 * (self._deflection(channel) + 1.0)
+        return min(int(share * positions), positions - 1) + 1
+
+    def _deflection(self, channel: int) -> float:
+        """-1..1 of a channel by its calibration; 0 without a value."""
+        if channel == 0 or self.input.channels[channel - 1] == _RELEASED:
+            return 0.0
+        low, trim, high, sign, dead = self._calibration[channel - 1]
+        away = self.input.channels[channel - 1] - trim
+        if abs(away) <= dead:
+            return 0.0
+        span = high - trim - dead if away > 0.0 else trim - low - dead
+        value = (away - dead if away > 0.0 else away + dead) / max(span, 1.0)
+        return sign * min(max(value, -1.0), 1.0)
+
+    def _pulse_us(self, channel: int, value: float) -> int:
+        """The pulse that `_deflection` reads as this value."""
+        low, trim, high, sign, dead = self._calibration[channel - 1]
+        value *= sign
+        if value == 0.0:
+            return round(trim)
+        if value > 0.0:
+            return round(trim + dead + value * (high - trim - dead))
+        return round(trim - dead + value * (trim - low - dead))
+
+    def _load(self) -> None:
+        params = self._params
+        self._in_mode = InMode(int(params["COM_RC_IN_MODE"]))
+        self._joystick_us = round(float(params["COM_RC_LOSS_T"]) * 1e6)
+        self._override_us = round(float(params["RC_OVERRIDE_TIME"]) * 1e6)
+        names = ("RC_MAP_ROLL", "RC_MAP_PITCH", "RC_MAP_YAW", "RC_MAP_THROTTLE")
+        self._map = tuple(int(params[name]) for name in names)
+        self._calibration = [
+            tuple(float(params[f"RC{i}_{name}"]) for name in ("MIN", "TRIM", "MAX", "REV", "DZ"))
+            for i in range(1, CALIBRATED + 1)
+        ] + [(1000.0, 1500.0, 2000.0, 1.0, 0.0)] * (CHANNELS - CALIBRATED)
+
+    def _on_parameter(self, parameter: Parameter) -> None:
+        if parameter.name.startswith(("COM_RC_", "RC")):
+            self._load()
+
+
+def without_centre(value: float, dead: float) -> float:
+    """The value with a dead zone around 0, from -1 to 1 nevertheless."""
+    if abs(value) <= dead:
+        return 0.0
+    return (value - dead if value > 0.0 else value + dead) / (1.0 - dead)
+
+
+def curved(value: float, expo: float, super_expo: float = 0.0) -> float:
+    """The value [-1..1] on a cubic curve (PX4: expo), steeper at its ends with `super_expo` [0..1) (PX4: superexpo)."""
+    cubic = (1.0 - expo) * value + expo * value**3
+    return cubic * (1.0 - super_expo) / (1.0 - abs(value) * super_expo)
