@@ -16,6 +16,7 @@ from autopilot.commander.commander import Commander
 from autopilot.commander.landing import LandingDetector
 from autopilot.commander.pilot import Pilot
 from autopilot.host import Host
+from autopilot.injection import FailureInjector, failure_request, injection_refusal
 from autopilot.lists import ItemLists
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.fence import Fence
@@ -104,6 +105,7 @@ class FlightController:
         announcer: hears of events besides the attached servers (a log, a test).
         on_reboot: restarts the vehicle; None where there is nothing to restart.
         host: files, logs and storage, as far as there are any.
+        injector: breaks parts on request; None where nothing can be broken.
     """
 
     def __init__(
@@ -115,6 +117,7 @@ class FlightController:
         announcer: Announcer | None = None,
         on_reboot: Callable[[], None] | None = None,
         host: Host | None = None,
+        injector: FailureInjector | None = None,
     ) -> None:
         self.params = params
         self.host = host or Host()
@@ -131,6 +134,7 @@ class FlightController:
             self._relay.targets.append(announcer)
         self._servers: list[Server] = []
         self._on_reboot = on_reboot
+        self._injector = injector
         self._setpoint = SetpointPort(ports.setpoint)
         hover, standing_m = hover_thrust(airframe), airframe.contact.leg_z_m
         self.commander = Commander(
@@ -202,6 +206,17 @@ class FlightController:
 
     def terminate(self) -> Reply:
         return self.commander.terminate()
+
+    def inject_failure(self, unit: int, failure: int, instance: int) -> Reply:
+        request = failure_request(unit, failure)
+        if request is None:
+            return Reply(Verdict.DENIED, f"there is no failure {failure} of unit {unit}")
+        reply = injection_refusal(self.params, self.state, request[1])
+        if reply is not None:
+            return reply
+        if self._injector is None:
+            return Reply(Verdict.UNSUPPORTED, "nothing here can be made to fail")
+        return self._injector.inject(*request, instance)
 
     def check_arming(self) -> list[str]:
         return self.commander.check_arming()

@@ -27,7 +27,7 @@ SYSTEM_PARAMETERS: list[Parameter] = [
     Parameter("MAV_SYS_ID", 1, 1, 250, "", "MAVLink system id, read at power-on", "PX4 default"),
     _constant("SYS_AUTOSTART", 4001, "airframe: generic quadrotor"),
     _constant("SYS_AUTOCONFIG", 0, "do not reset parameters"),
-    _constant("SYS_FAILURE_EN", 0, "failures cannot be injected over MAVLink"),
+    Parameter("SYS_FAILURE_EN", 0, 0, 1, "", "1: clients may inject failures into an armed vehicle", "PX4 default"),
     _constant("RC_MAP_AUX1", 0, "no radio control"),
     _constant("RC_MAP_AUX2", 0, "no radio control"),
     _constant("RC_MAP_FLAPS", 0, "no radio control"),

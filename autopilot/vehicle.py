@@ -290,6 +290,10 @@ class Vehicle(Protocol):
         """Stops the motors for good, wherever the vehicle is."""
         ...
 
+    def inject_failure(self, unit: int, failure: int, instance: int) -> Reply:
+        """Breaks or repairs a part; numbers as FAILURE_UNIT and FAILURE_TYPE, instances from 1, 0: all."""
+        ...
+
     def check_arming(self) -> list[str]:
         """Reasons why the vehicle may not be armed now; empty when ready."""
         ...

@@ -26,6 +26,7 @@ from common.params import ParameterTable
 from common.records import row_reader
 from common.tlog import TlogWriter
 from mission.client import Running
+from mission.injection import RigInjector
 from mission.recorder import History, Recorder
 from mission.script import Drone, Script
 from sim.rig import Rig
@@ -90,8 +91,14 @@ class Flight:
         self.params = flight_parameters(config, self.airframe)
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
+        self._injector = RigInjector(self.rig, self.airframe, config.noise)
         self.controller = FlightController(
-            host_ports(self.rig), self.params, self.airframe, config.home, on_reboot=self.rig.reboot
+            host_ports(self.rig),
+            self.params,
+            self.airframe,
+            config.home,
+            on_reboot=self.rig.reboot,
+            injector=self._injector,
         )
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
@@ -112,6 +119,7 @@ class Flight:
 
     def frame(self) -> None:
         """Advances by 20 ms."""
+        self._injector.frame(self.time_us)
         self.rig.advance(FRAME_TICKS)
         self.time_us += FRAME_US
         self.controller.frame(self.time_us)

@@ -24,7 +24,7 @@ from autopilot.ports import (
 )
 from common.kernels import GRAVITY_M_S2, TICK_S, TICK_US
 from sim.bodies.multirotor import BodyState, MultirotorModel, body_at_rest, body_tick
-from sim.faults import Faults
+from sim.faults import Faults, weakened
 from sim.sensors.sensors import SensorModel, SensorState, sense
 from sim.wind import WindModel, WindState, wind_step
 from sim.world.world import World, ground_height
@@ -119,10 +119,12 @@ def make_advance(has_estimator: bool) -> Any:
         wind = rig.wind[i]
         sensors = rig.sensors[i]
         control = rig.autopilot.control[i]
+        motor_loss = rig.faults[i].motor_loss
         for _ in range(tick_count):
             height = -body.pos_ned[2] - ground_height(rig.world, body.pos_ned[0], body.pos_ned[1])
             wind = wind_step(wind_model, wind, body.vel_ned, height, seed, i, tick, TICK_S)
-            body = body_tick(model, body, control.actuators.command, wind.wind_ned, rig.world)
+            command = weakened(control.actuators.command, motor_loss)
+            body = body_tick(model, body, command, wind.wind_ned, rig.world)
             if wp.static(has_estimator):
                 sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, rig.world, seed, i, tick)
                 estimator_step(rig.autopilot.ekf, i, sensors.samples)

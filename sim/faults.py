@@ -1,6 +1,7 @@
-"""Sensor faults: what a test or a scenario may break, per vehicle and per sensor, at any tick.
+"""Faults of sensors and motors: what a test or a scenario may break, per vehicle and per sensor, at any tick.
 
-One `Faults` row per vehicle, written by the host (`set_fault`), read by `sim/sensors`. The magnitude means:
+One `Faults` row per vehicle, written by the host (`set_fault`), read by `sim/sensors` and `sim/advance`. The magnitude
+means:
 
 | mode   | effect                                                        | magnitude                                  |
 |--------|---------------------------------------------------------------|--------------------------------------------|
@@ -10,6 +11,8 @@ One `Faults` row per vehicle, written by the host (`set_fault`), read by `sim/se
 | noisy  | the white noise is multiplied by the magnitude                | factor                                     |
 | slow   | the period of the samples is multiplied by the magnitude      | factor, rounded down, at least 1           |
 
+A motor that fails loses a share of its command: 1 stops it, 0.4 leaves it weak (`set_motor_loss`).
+
 Gyro and accelerometer share a chip and a data-ready line: off or slow of one silences or slows both.
 """
 
@@ -17,6 +20,8 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+
+from common.kernels import vec8
 
 wp.set_module_options({"enable_backward": False})
 
@@ -58,6 +63,13 @@ class Faults:
     mag: SensorFault
     range: SensorFault
     battery: SensorFault
+    motor_loss: vec8  # [0..1] share of its command that each motor loses
+
+
+@wp.func
+def weakened(command: vec8, motor_loss: vec8) -> vec8:
+    """What arrives of the motor commands [0..1]."""
+    return wp.cw_mul(command, vec8(1.0) - motor_loss)
 
 
 @wp.func
@@ -128,3 +140,22 @@ def set_fault(row: Any, sensor: str, mode: str, magnitude: float = 0.0) -> None:
     fault.mode = FAULT_MODES[mode]
     fault.magnitude = magnitude
     setattr(row, sensor, fault)
+
+
+def set_motor_loss(row: Any, rotor: int, share: float) -> None:
+    """Sets what one motor loses of its command.
+
+    Args:
+        row: as for `set_fault`.
+        rotor: from 0.
+        share: [0..1], 0 repairs.
+
+    Raises:
+        ValueError: the share is out of range.
+    """
+    if not 0.0 <= share <= 1.0:
+        raise ValueError(f"motor loss is a share between 0 and 1, not {share}")
+    if isinstance(row, np.void | np.ndarray):
+        row["motor_loss"][rotor] = share
+    else:
+        row.motor_loss[rotor] = share

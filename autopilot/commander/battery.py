@@ -10,6 +10,10 @@ from common.airframe import Battery
 
 _CORRECTION_TIME_S = 120.0  # the count follows the voltage this slowly; guess, longer than any load transient
 _CURVE_POINTS = 201
+# A voltage that says much less than the count, for longer than any load transient, is believed: the pack was not full,
+# or it is failing. Guesses.
+_SHORTFALL = 0.2
+_SHORTFALL_US = 5_000_000
 _SILENT_US = 5_000_000  # a sensor whose values have not changed for that long is not believed; guess
 
 
@@ -17,8 +21,8 @@ class BatteryEstimator:
     """Charge of one battery. `remaining` is NaN until the first sample with a voltage."""
 
     __slots__ = (
-        "_changed_us", "_counted_us", "_current_a", "_curve_v", "_pack_mah", "_resistance_ohm", "_sample_us",
-        "_voltage_v", "is_silent", "remaining", "used_mah",
+        "_changed_us", "_counted_us", "_current_a", "_curve_v", "_pack_mah", "_plausible_us", "_resistance_ohm",
+        "_sample_us", "_voltage_v", "is_silent", "remaining", "used_mah",
     )  # fmt: skip
 
     def __init__(self, battery: Battery) -> None:
@@ -30,6 +34,7 @@ class BatteryEstimator:
         self._curve_v = [empty_v + span_v * _rest_voltage_share(share) for share in shares]
         self._sample_us = 0  # of the last sample
         self._changed_us = 0  # when it last differed from the one before
+        self._plausible_us = 0  # when voltage and count last agreed
         self._counted_us = 0  # up to when charge has been counted
         self._voltage_v = self._current_a = 0.0
         self.is_silent = False
@@ -50,10 +55,14 @@ class BatteryEstimator:
         by_voltage = self._charge_at(voltage_v + current_a * self._resistance_ohm)
         if self._counted_us == 0:
             self.remaining = by_voltage
-            self._counted_us = time_us
+            self._counted_us = self._plausible_us = time_us
             return
         dt_s = max((time_us - self._counted_us) * 1e-6, 0.0)
         self._count(time_us)
+        if by_voltage > self.remaining - _SHORTFALL:
+            self._plausible_us = time_us
+        elif time_us - self._plausible_us > _SHORTFALL_US:
+            self.remaining = by_voltage
         corrected = self.remaining + (by_voltage - self.remaining) * min(dt_s / _CORRECTION_TIME_S, 1.0)
         self.remaining = min(max(corrected, 0.0), 1.0)
 

@@ -283,7 +283,7 @@ class Commander:
                 self.announcer.statustext(Severity.INFO, "Landed")
             elif is_powered:
                 self.guard.act(CRASHED)
-        elif not is_powered and (self._landing.lies_still or state.time_us - self._unpowered_us > _FALLEN_US):
+        elif not is_powered and (self._landing.is_down or state.time_us - self._unpowered_us > _FALLEN_US):
             self._touch_down()
         elif state.landed_state is not LandedState.TAKEOFF or state.mode is not Mode.TAKEOFF:
             state.landed_state = LandedState.LANDING if self._flying.is_landing else LandedState.IN_AIR
@@ -352,6 +352,8 @@ class Commander:
         self._reset_count = estimate.reset_count
         jump_m = sqrt(sum(axis * axis for axis in estimate.pos_reset_ned))
         is_flying = self.state.is_armed and self.state.landed_state is not LandedState.ON_GROUND
+        if is_flying:
+            self._watch.note_reset(jump_m)
         if jump_m > _RESET_TOLD_M and is_flying:
             self.announcer.statustext(Severity.NOTICE, f"Estimator: position reset by {jump_m:.1f} m")
 

@@ -29,6 +29,7 @@ FLIGHT_TIME_NEAR = 8192
 DEAD_RECKONING = 16384
 MOTOR_FAILED = 32768
 STICKS_LOST = 1 << 16
+ESTIMATOR_FAILED = 1 << 17
 
 TERMINATION_BREAKER = 121212  # CBRK_FLIGHTTERM: the failure detector may not stop the motors
 
@@ -132,6 +133,7 @@ RULES: tuple[Rule, ...] = (
     Rule(MOTOR_FAILED, by("COM_ACT_FAIL_ACT", MOTOR_ACTIONS), Severity.EMERGENCY, "Motor failure"),
     Rule(POSITION_LOST, _position_lost, Severity.CRITICAL, "Position lost", "Position is valid again"),
     Rule(HEIGHT_LOST, always(Action.LAND), Severity.CRITICAL, "Height lost", "Height is valid again"),
+    Rule(ESTIMATOR_FAILED, always(Action.LAND), Severity.CRITICAL, "Estimator failure", "Estimator is steady again"),
     Rule(BATTERY_EMERGENCY, by("COM_LOW_BAT_ACT", EMERGENCY_BATTERY_ACTIONS), Severity.EMERGENCY,
          "Battery nearly empty"),
     Rule(BATTERY_CRITICAL, by("COM_LOW_BAT_ACT", CRITICAL_BATTERY_ACTIONS), Severity.CRITICAL, "Battery critical"),

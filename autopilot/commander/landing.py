@@ -27,6 +27,7 @@ _FALLS_MAX = 3  # a range finder that told of ground so often where there is non
 _STILL_M_S = 10.0
 _STILL_FORCE_SHARE = 0.2  # of gravity, by which the specific force may differ from it
 _STILL_S = 1.0
+_BLOW_M_S2 = 4.0 * GRAVITY_M_S2  # without thrust nothing in the air pushes that hard, drag at most as hard as gravity
 _AIR_BELOW_M = 1.0  # range finder reading that speaks against a landing; guess
 _AIR_BELOW_FACTOR = 5.0  # by which such a reading stretches the time needed
 
@@ -43,7 +44,7 @@ class LandingDetector:
     __slots__ = (
         "_contact_thrust", "_fall_count", "_hover_thrust", "_landed_thrust", "_params", "_rate_max_sq",
         "_speed_xy_max_sq", "_speed_z_max", "_stage_s", "_still_s", "_time_s", "_touch_height", "_touch_s",
-        "has_contact", "is_landed",
+        "has_contact", "has_struck", "is_landed",
     )  # fmt: skip
 
     def __init__(self, params: ParameterTable, hover_thrust: float, standing_height_m: float = nan) -> None:
@@ -57,6 +58,7 @@ class LandingDetector:
         # Something else than the rotors has carried the vehicle. It stays so while the vehicle settles: control that
         # came back at each bounce would tip it over.
         self.has_contact = False
+        self.has_struck = False  # something, while it fell without thrust
         self.is_landed = False
         self._load()
         params.on_change(self._on_parameter)
@@ -65,7 +67,7 @@ class LandingDetector:
         """The vehicle is on the ground and about to leave it."""
         self._time_s = self._touch_s = self._still_s = 0.0
         self._fall_count = 0
-        self.has_contact = self.is_landed = False
+        self.has_contact = self.has_struck = self.is_landed = False
 
     def update(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:
         """Takes one frame and returns whether the vehicle stands on the ground; `has_contact` comes before that.
@@ -82,13 +84,18 @@ class LandingDetector:
         elif estimate.vel_ned[2] > _FALL_M_S and self.has_contact:
             self.has_contact = False
             self._fall_count += 1
-        self._still_s = self._still_s + dt_s if thrust == 0.0 and self._is_still(estimate) else 0.0
+        if thrust == 0.0:
+            self._still_s = self._still_s + dt_s if self._is_still(estimate) else 0.0
+            x, y, z = estimate.accel_frd
+            self.has_struck = self.has_struck or x * x + y * y + z * z > _BLOW_M_S2**2
+        else:
+            self._still_s = 0.0
         return self.is_landed
 
     @property
-    def lies_still(self) -> bool:
-        """Whether a vehicle without thrust has lain still for a while; means nothing while it is armed."""
-        return self._still_s >= _STILL_S
+    def is_down(self) -> bool:
+        """Whether a vehicle without thrust has struck the ground or lies still; means nothing while it has thrust."""
+        return self.has_struck or self._still_s >= _STILL_S
 
     def _looks_landed(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:
         """Carries the time of the stages on; true at the end of the last."""

@@ -14,6 +14,7 @@ from autopilot.commander.failsafe import (
     BATTERY_LOW,
     BATTERY_SILENT,
     DEAD_RECKONING,
+    ESTIMATOR_FAILED,
     FLIGHT_TIME_NEAR,
     FLIGHT_TIME_OVER,
     HEIGHT_LOST,
@@ -33,6 +34,11 @@ _SLOW_PERIOD_US = 200_000
 _WIND_EASED = 0.8  # share of a limit below which the wind counts as over; gusts would toggle it otherwise; guess
 _WIND_TIME_S = 2.0  # gusts shorter than that do not count; guess
 _TIME_NEAR_SHARE = 0.9  # of COM_FLT_TIME_MAX, from which the pilot is told (PX4)
+_FIX_STEADY_US = 3_000_000  # after dead reckoning, GNSS counts as used again after so long; guess
+# An estimate that is set anew so often is not to be believed: a sensor contradicts the others. Guesses.
+_RESETS_MAX = 3
+_RESETS_WITHIN_US = 30_000_000
+_RESET_M = 3.0  # smaller jumps do no harm
 _HEIGHT_MODES = frozenset({Mode.ALTITUDE})
 # COM_DLL_EXCEPT: the bit that lets a mode go on without a ground station (PX4)
 EXCEPTION_BITS = {
@@ -68,8 +74,9 @@ class FailureWatch:
 
     __slots__ = (
         "_attitude", "_battery", "_battery_critical", "_battery_emergency", "_battery_low", "_except_bits",
-        "_next_slow_us", "_offboard_loss_us", "_params", "_slow", "_state", "_station", "_station_loss_us",
-        "_time_max_us", "_wind_max", "_wind_speed", "_wind_warn", "airborne_us",
+        "_is_position_lost", "_next_slow_us", "_offboard_loss_us", "_params", "_reckoning_us", "_resets_us", "_slow",
+        "_state", "_station", "_station_loss_us", "_time_max_us", "_wind_max", "_wind_speed", "_wind_warn",
+        "airborne_us",
     )  # fmt: skip
 
     def __init__(
@@ -89,9 +96,17 @@ class FailureWatch:
         """The vehicle has just been armed."""
         self._attitude.reset()
         self._next_slow_us = 0
+        self._reckoning_us = -_FIX_STEADY_US  # when GNSS was last missed
+        self._resets_us: list[int] = []  # when the estimate was last set anew
+        self._is_position_lost = False
         self._slow = 0  # bits of the slow checks
         self._wind_speed = 0.0
         self.airborne_us = -1  # when it left the ground; -1: it has not yet
+
+    def note_reset(self, jump_m: float) -> None:
+        """The estimate of a flying vehicle has jumped."""
+        if jump_m > _RESET_M:
+            self._resets_us = [*self._resets_us[1 - _RESETS_MAX :], self._state.time_us]
 
     def frame(self, dt_s: float, flying: Flying, *, has_position: bool, needs_position: bool) -> int:
         """All that is wrong now; for an armed vehicle."""
@@ -101,7 +116,9 @@ class FailureWatch:
         failures = self._attitude.update(state, dt_s)
         if is_flying and self._battery.is_silent:
             failures |= BATTERY_SILENT
-        if needs_position and not has_position:
+        # Once lost it stays so until it is back, although landing blindly needs none
+        self._is_position_lost = not has_position and (needs_position or self._is_position_lost)
+        if self._is_position_lost:
             failures |= POSITION_LOST
         if mode is Mode.OFFBOARD and flying.offboard_age_us(state.time_us) > self._offboard_loss_us:
             failures |= OFFBOARD_LOST
@@ -140,6 +157,10 @@ class FailureWatch:
         if heard_us >= 0 and state.time_us - heard_us > self._station_loss_us:
             if not EXCEPTION_BITS.get(state.mode, 0) & self._except_bits:
                 bits |= STATION_LOST
+        if state.estimate.flags & DEAD_RECKONING_FLAG and (is_flying or self._slow & DEAD_RECKONING):
+            self._reckoning_us = state.time_us
+        if state.time_us - self._reckoning_us < _FIX_STEADY_US:
+            bits |= DEAD_RECKONING
         if not is_flying:
             return bits
         if self.airborne_us < 0:
@@ -148,8 +169,8 @@ class FailureWatch:
         flown_us = state.time_us - self.airborne_us
         if self._time_max_us > 0 and flown_us > _TIME_NEAR_SHARE * self._time_max_us:
             bits |= FLIGHT_TIME_OVER | FLIGHT_TIME_NEAR if flown_us > self._time_max_us else FLIGHT_TIME_NEAR
-        if state.estimate.flags & DEAD_RECKONING_FLAG:
-            bits |= DEAD_RECKONING
+        if len(self._resets_us) == _RESETS_MAX and state.time_us - self._resets_us[0] < _RESETS_WITHIN_US:
+            bits |= ESTIMATOR_FAILED
         return bits
 
     def _wind_failures(self) -> int:

@@ -27,6 +27,7 @@ class Channel:
         self.link = link
         self.schedule = schedule
         self.reader = FrameReader()
+        self.is_mute = False  # sends nothing: a lost radio, on request
         self.clients: set[tuple[int, int]] = set()  # (sysid, compid) that have sent a heartbeat
         self._sysid = sysid
         self._seq = 0
@@ -41,7 +42,8 @@ class Channel:
             seq = self._component_seqs.get(compid, 0)
             self._component_seqs[compid] = seq + 1 & 0xFF
         frame = frame_bytes(kind, payload, seq, self._sysid, compid)
-        self.link.send(frame)
+        if not self.is_mute:
+            self.link.send(frame)
         return frame
 
 

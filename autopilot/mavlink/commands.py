@@ -51,6 +51,9 @@ _SHORT_NAMES = {
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: "Mission",
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: "Pause",
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "Reboot",
+    mavlink.MAV_CMD_DO_FLIGHTTERMINATION: "Termination",
+    mavlink.MAV_CMD_INJECT_FAILURE: "Failure injection",
+    mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: "Calibration",
 }
 # Requests for information: REQUEST_MESSAGE and its many forerunners. Ground stations send them by the dozen when they
 # connect, to find out what the vehicle has, and again and again after that.

@@ -1,22 +1,28 @@
-"""Commands for when things go wrong: the end of a flight."""
+"""Commands for when things go wrong, or shall: the end of a flight, and failures on request."""
 
 from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.injection import Failure, Unit, failure_request, injection_refusal
 from autopilot.mavlink.channel import Endpoint
+from autopilot.mavlink.convert import whole
 from autopilot.mavlink.service import Command, CommandHandler, Service, denied
-from autopilot.vehicle import Reply
+from autopilot.vehicle import ACCEPTED, Reply, Verdict
 
 
 class SafetyService(Service):
-    """Carries out DO_FLIGHTTERMINATION."""
+    """Carries out DO_FLIGHTTERMINATION and INJECT_FAILURE."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
+        self._mute_next = False
 
     def commands(self) -> Mapping[int, CommandHandler]:
-        return {mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate}
+        return {
+            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
+            mavlink.MAV_CMD_INJECT_FAILURE: self._inject_failure,
+        }
 
     def _terminate(self, command: Command) -> Reply:
         """Stops the motors in the air, for good; the vehicle is disarmed once it lies on the ground.
@@ -27,3 +33,39 @@ class SafetyService(Service):
         if not command.p1 > 0.5:
             return denied("parameter 1 must be 1; a termination cannot be taken back")
         return self._endpoint.vehicle.terminate()
+
+    def _inject_failure(self, command: Command) -> Reply:
+        """Breaks or repairs a sensor, the battery, a motor or the MAVLink signal, if SYS_FAILURE_EN is 1.
+
+        Params: p1 FAILURE_UNIT; p2 FAILURE_TYPE, 0 repairs; p3 instance from 1, 0 or NaN: all.
+        Refused: DENIED: SYS_FAILURE_EN is 0, the vehicle is not armed (repairs are always taken), or there is no such
+        unit, type or instance; UNSUPPORTED: this unit cannot fail like that here.
+        """
+        unit, failure, instance = whole(command.p1, -1), whole(command.p2, -1), whole(command.p3, 0)
+        if unit == Unit.MAVLINK_SIGNAL:
+            return self._inject_radio(command, failure)
+        return self._endpoint.vehicle.inject_failure(unit, failure, instance)
+
+    def _inject_radio(self, command: Command, failure: int) -> Reply:
+        """Mutes every link, or gives them their voice back; what comes in is still heard, but keeps no link alive."""
+        vehicle = self._endpoint.vehicle
+        request = failure_request(Unit.MAVLINK_SIGNAL, failure)
+        if request is None:
+            return denied(f"there is no failure {failure}")
+        reply = injection_refusal(vehicle.params, vehicle.state, request[1])
+        if reply is not None:
+            return reply
+        if request[1] not in (Failure.OK, Failure.OFF):
+            return Reply(Verdict.UNSUPPORTED, "the MAVLink signal can be off or on")
+        for channel in self._endpoint.channels:
+            channel.is_mute = request[1] is Failure.OFF
+        command.sender.channel.is_mute = False  # for the acknowledgement
+        self._mute_next = request[1] is Failure.OFF
+        return ACCEPTED
+
+    def frame(self) -> None:
+        """Mutes the link of the client that asked for it, once its acknowledgement is out."""
+        if self._mute_next:
+            self._mute_next = False
+            for channel in self._endpoint.channels:
+                channel.is_mute = True

@@ -182,7 +182,7 @@ class MavlinkServer:
 
     def _heartbeat_received(self, sender: Sender, fields: Any) -> None:
         """Greets a client that is new on its channel; of a ground station: keeps the link alive (NAV_DLL_ACT)."""
-        if fields.type == MAV_TYPE_GCS:
+        if fields.type == MAV_TYPE_GCS and not sender.channel.is_mute:
             self._endpoint.vehicle.station.heard(self._endpoint.time_us)
         client = (sender.sysid, sender.compid)
         if client not in sender.channel.clients:

@@ -7,12 +7,13 @@ from autopilot.navigator.setpoint import Vector
 class Hold:
     """Mode Hold: the place is where the mode before ended, where a client sent the vehicle, or where it can stop."""
 
-    __slots__ = ("_context", "_is_flown", "_is_goto", "target_ned", "yaw")
+    __slots__ = ("_context", "_is_flown", "_is_goto", "_reset_count", "target_ned", "yaw")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
         self._is_flown = False
         self._is_goto = False  # on a straight line to the place
+        self._reset_count = 0  # of the estimate
         self.target_ned: Vector = (0.0, 0.0, 0.0)  # [m]
         self.yaw = 0.0  # [rad]
 
@@ -31,11 +32,24 @@ class Hold:
             self._is_goto = False
             self.target_ned, self.yaw = context.stop_point(), context.state.yaw_rad
         self._is_flown = False
+        self._reset_count = context.state.estimate.reset_count
 
     def frame(self) -> None:
         context = self._context
+        if context.state.estimate.reset_count != self._reset_count:
+            self._follow_reset()
         if context.is_on_ground:
             self._is_flown = False
         elif not self._is_flown:
             self._is_flown = True
             context.fly_to(self.target_ned, self.yaw, context.state.estimate.pos_ned if self._is_goto else None)
+
+    def _follow_reset(self) -> None:
+        """The estimate has jumped: a vehicle that holds stays where it is, one that was sent still goes there."""
+        estimate = self._context.state.estimate
+        self._reset_count = estimate.reset_count
+        if not self._is_goto:
+            north, east, down = self.target_ned
+            jump = estimate.pos_reset_ned
+            self.target_ned = (north + jump[0], east + jump[1], down)
+            self._is_flown = False

@@ -63,3 +63,22 @@ def test_sensor_that_speaks_again_is_believed_again():
     battery.count_on(9_000_000)
     assert not battery.is_silent
     assert battery.used_mah == pytest.approx(10.0 * 8.0 / 3.6)
+
+
+def test_voltage_that_falls_far_below_the_count_is_believed_after_five_seconds():
+    battery = BatteryEstimator(BATTERY)
+    battery.update(1_000_000, BATTERY.cells * BATTERY.full_cell_v, 0.0)
+    low_v = BATTERY.cells * (BATTERY.empty_cell_v + 0.1)
+    for i in range(1, 80):
+        battery.update(1_000_000 + i * 100_000, low_v + 0.001 * (i % 2), 0.0)
+        assert (battery.remaining > 0.8) == (i <= 50), i
+    assert battery.remaining < 0.1
+
+
+def test_short_dip_of_the_voltage_is_not_believed():
+    battery = BatteryEstimator(BATTERY)
+    full_v = BATTERY.cells * BATTERY.full_cell_v
+    for i in range(100):
+        is_dip = 20 <= i < 60
+        battery.update(1_000_000 + i * 100_000, 12.5 + 0.001 * (i % 2) if is_dip else full_v, 0.0)
+    assert battery.remaining > 0.95

@@ -282,7 +282,7 @@ def test_dead_reckoning_is_told_and_so_is_its_end():
     rig.run(1.0)
     assert rig.recorder.has_text("GNSS lost: dead reckoning")
     rig.flags &= ~DEAD_RECKONING
-    rig.run(1.0)
+    rig.run(4.0)
     assert rig.recorder.has_text("GNSS is used again")
     assert rig.state.mode is Mode.HOLD
 
@@ -316,3 +316,30 @@ def test_charge_level_is_known_before_and_after_arming():
         drain_to(rig, share)
         rig.run(0.1)
         assert rig.state.battery_level is level
+
+
+def test_estimate_that_jumps_again_and_again_is_not_believed():
+    rig = flying_away()
+    rig.estimate["pos_reset_ned"] = (0.0, 10.0, 0.0)
+    for count in range(1, 4):
+        assert rig.state.mode is Mode.HOLD
+        rig.estimate["reset_count"] = count
+        rig.run(5.0)
+    assert rig.recorder.has_text("Estimator failure: land")
+    assert rig.state.mode is Mode.LAND
+
+
+def test_vehicle_that_holds_stays_where_it_is_when_the_estimate_jumps():
+    rig = Kinematic().flying()
+    before = rig.fc.navigator.hold.target_ned
+    rig.estimate["pos_reset_ned"] = (100.0, -50.0, 0.0)
+    rig.estimate["reset_count"] += 1
+    rig.frame()
+    after = rig.fc.navigator.hold.target_ned
+    assert after == pytest.approx((before[0] + 100.0, before[1] - 50.0, before[2]))
+    assert rig.sp("pos_ned")[:2] == pytest.approx(after[:2], abs=1e-3)
+    rig.fc.reposition(*geo(30.0, 0.0, 10.0), NAN, NAN)
+    sent_to = rig.fc.navigator.hold.target_ned
+    rig.estimate["reset_count"] += 1
+    rig.run(0.1)
+    assert rig.fc.navigator.hold.target_ned == sent_to

@@ -128,7 +128,7 @@ def test_range_finder_that_tells_of_ground_where_there_is_none_is_not_believed_f
 
 
 @pytest.mark.parametrize(
-    ("accel_z", "sink", "roll_rate", "lies_still"),
+    ("accel_z", "sink", "roll_rate", "is_down"),
     [
         (-9.8, 0.0, 0.0, True),
         (9.8, 3.0, 0.0, True),  # on its back, and the impact has upset the estimate of its speed
@@ -137,11 +137,11 @@ def test_range_finder_that_tells_of_ground_where_there_is_none_is_not_believed_f
         (-9.8, 0.0, 1.0, False),  # rolls down a slope
     ],
 )
-def test_vehicle_that_lies_still_without_thrust_is_down(accel_z, sink, roll_rate, lies_still):
+def test_vehicle_that_is_down_without_thrust_is_down(accel_z, sink, roll_rate, is_down):
     landing = detector()
     row = estimate(vel=(0.0, 0.0, sink), omega=(roll_rate, 0.0, 0.0), accel_z=accel_z)
     for _ in range(52):
         landing.update(row, 0.0, 0.0, DT_S)
-    assert landing.lies_still == lies_still
+    assert landing.is_down == is_down
     landing.update(row, 0.1, 0.0, DT_S)
-    assert not landing.lies_still
+    assert not landing.is_down

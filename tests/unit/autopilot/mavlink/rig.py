@@ -188,6 +188,9 @@ class RecordingVehicle:
     def terminate(self) -> Reply:
         return self._record("terminate")
 
+    def inject_failure(self, unit: int, failure: int, instance: int) -> Reply:
+        return self._record("inject_failure", unit, failure, instance)
+
     def check_arming(self) -> list[str]:
         return self.arming_problems
 

@@ -6,6 +6,9 @@ from autopilot.vehicle import Mode, Reply, Verdict
 from tests.unit.autopilot.mavlink.rig import Rig, texts
 
 TERMINATE = 185
+INJECT_FAILURE = 420
+GNSS, MAVLINK_SIGNAL = 4, 105  # FAILURE_UNIT
+OK, OFF, STUCK = 0, 1, 2  # FAILURE_TYPE
 GCS, ONBOARD_CONTROLLER = 6, 18
 FLIGHT_TERMINATION = 8  # MAV_STATE
 
@@ -42,3 +45,25 @@ def test_heartbeat_of_a_ground_station_keeps_its_link_alive(kind, is_station):
     rig.client.send("HEARTBEAT", type=kind, autopilot=8, mavlink_version=3)
     rig.frame()
     assert (rig.vehicle.station.heard_us == rig.time_us) == is_station
+
+
+def test_failure_is_asked_of_the_vehicle():
+    rig = Rig()
+    assert rig.ack(INJECT_FAILURE, GNSS, STUCK, 1.0).result == Verdict.ACCEPTED
+    assert rig.ack(INJECT_FAILURE, GNSS, OK).result == Verdict.ACCEPTED
+    assert rig.vehicle.calls == [("inject_failure", GNSS, STUCK, 1), ("inject_failure", GNSS, OK, 0)]
+
+
+def test_lost_radio_is_silent_and_its_heartbeats_keep_no_link_alive():
+    rig = Rig()
+    assert rig.ack(INJECT_FAILURE, MAVLINK_SIGNAL, OFF).result == Verdict.DENIED  # SYS_FAILURE_EN is 0
+    rig.vehicle.params.set("SYS_FAILURE_EN", 1)
+    assert rig.ack(INJECT_FAILURE, MAVLINK_SIGNAL, STUCK).result == Verdict.UNSUPPORTED
+    assert rig.ack(INJECT_FAILURE, MAVLINK_SIGNAL, OFF).result == Verdict.ACCEPTED
+    rig.second_client.received()
+    rig.client.send("HEARTBEAT", type=GCS, autopilot=8, mavlink_version=3)
+    assert rig.frame(100) == []
+    assert rig.second_client.received() == []
+    assert rig.vehicle.station.heard_us == -1
+    assert rig.ack(INJECT_FAILURE, MAVLINK_SIGNAL, OK).result == Verdict.ACCEPTED
+    assert rig.frame(100)
