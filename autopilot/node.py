@@ -146,7 +146,7 @@ class FlightController:
             Pilot(self.state, params, self.sticks),
         )
         context = NavContext(self.state, params, self._relay, self._setpoint, hover, standing_m)
-        mission = Mission(context, self.commander.set_home)
+        mission = Mission(context, self.payload, self.commander.set_home)
         self.navigator = Navigator(context, mission)
         self.fence = Fence()
         self.rally = RallyPoints()
@@ -255,8 +255,8 @@ class FlightController:
             return reply
         return self._enter_anew(Mode.HOLD)
 
-    def change_speed(self, speed_m_s: float) -> Reply:
-        return self.navigator.change_speed(speed_m_s)
+    def change_speed(self, speed_m_s: float, kind: int = 1) -> Reply:
+        return self.navigator.change_speed(speed_m_s, kind)
 
     def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
         return self.commander.set_home(lat_deg, lon_deg, alt_amsl_m)

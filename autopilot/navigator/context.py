@@ -2,11 +2,14 @@
 
 from math import atan2, hypot, isfinite, nan, sqrt
 
+from autopilot.navigator.heading import Heading
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import HEIGHT_VALID, TERRAIN_VALID
 from autopilot.vehicle import Announcer, LandedState, Mode, VehicleState
 from common.geodesy import geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
+
+CLIMB_SPEED, DESCEND_SPEED = 2, 3  # SPEED_TYPE
 
 
 class NavContext:
@@ -22,8 +25,9 @@ class NavContext:
     """
 
     __slots__ = (
-        "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "has_position", "hover_thrust",
-        "is_landing", "next_hold", "params", "setpoint", "standing_height_m", "state", "wants_lift", "wish",
+        "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "has_position", "heading",
+        "hover_thrust", "is_landing", "leg_yaw", "next_hold", "params", "setpoint", "standing_height_m", "state",
+        "wants_lift", "wish", "yaw_mode",
     )  # fmt: skip
 
     def __init__(
@@ -49,7 +53,10 @@ class NavContext:
         self.cruise_speed = nan  # [m/s] asked for by DO_CHANGE_SPEED; NaN: the parameter
         self.climb_speed = nan
         self.descend_speed = nan
+        self.leg_yaw = nan  # [rad] of the mission leg being flown
         self._numbers = {name: float(params[name]) for name in params}
+        self.yaw_mode = int(params["MPC_YAW_MODE"])
+        self.heading = Heading(self)
         params.on_change(self._on_parameter)
 
     def number(self, name: str) -> float:
@@ -67,6 +74,15 @@ class NavContext:
     def reset_speeds(self) -> None:
         """Forgets the speeds asked for by commands and mission items."""
         self.cruise_speed = self.climb_speed = self.descend_speed = nan
+
+    def set_speed(self, kind: int, speed_m_s: float) -> None:
+        """Changes a speed (numbered as SPEED_TYPE: 2 climb, 3 descent, else horizontal); NaN: the parameter's."""
+        if kind == CLIMB_SPEED:
+            self.climb_speed = speed_m_s
+        elif kind == DESCEND_SPEED:
+            self.descend_speed = speed_m_s
+        else:
+            self.cruise_speed = speed_m_s
 
     def pos_ned_of(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Vector:
         """A geodetic position in the ned frame [m]."""
@@ -144,6 +160,7 @@ class NavContext:
 
     def _on_parameter(self, parameter: Parameter) -> None:
         self._numbers[parameter.name] = float(self.params[parameter.name])
+        self.yaw_mode = int(self._numbers["MPC_YAW_MODE"])
 
 
 def distance(a: Vector, b: Vector) -> float:

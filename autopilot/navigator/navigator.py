@@ -130,6 +130,7 @@ class Navigator:
         if self._active is self.orbit and mode is not Mode.ORBIT:
             self.orbit.leave()
         self._active = self._modes[mode]
+        self.context.heading.end_turn()
         if self.context.state.is_armed:
             self._active.start()
 
@@ -137,6 +138,7 @@ class Navigator:
         """Starts the mode that was chosen before."""
         self.context.reset_speeds()
         self.context.next_hold = None
+        self.context.heading.reset()
         self._active.start()
 
     def frame(self) -> Mode | None:
@@ -149,6 +151,8 @@ class Navigator:
         wish: Mode | None = None
         if state.is_armed:
             self._active.frame()
+            if context.heading.is_active or context.yaw_mode:
+                context.heading.frame()
             wish = context.wish
             context.wish = None
         if context.is_on_ground or not state.is_armed or state.mode is Mode.TERMINATION:
@@ -201,12 +205,14 @@ class Navigator:
             context.cruise_speed = speed_m_s
         return ACCEPTED
 
-    def change_speed(self, speed_m_s: float) -> Reply:
-        """Horizontal speed from now on, NaN: the default; the control part bounds it by MPC_XY_VEL_MAX."""
+    def change_speed(self, speed_m_s: float, kind: int) -> Reply:
+        """A speed from now on (SPEED_TYPE), NaN: the default; the control part bounds it by its limits."""
         if speed_m_s <= 0.0 or speed_m_s > 100.0:
             return Reply(Verdict.DENIED, f"{speed_m_s:.1f} m/s is out of range")
-        self.context.cruise_speed = speed_m_s
-        self.context.setpoint.set_cruise_speed(speed_m_s)
+        context = self.context
+        context.set_speed(kind, speed_m_s)
+        context.setpoint.set_speeds(context.cruise_speed, context.climb_speed, context.descend_speed)
+        self.mission.renew_speeds()
         return ACCEPTED
 
     def request_landing(self, lat_deg: float, lon_deg: float, yaw: float) -> Reply:

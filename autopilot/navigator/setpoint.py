@@ -104,6 +104,14 @@ class SetpointPort:
         """Asks for a vertical speed [m/s] over a place [m] that moves with a velocity [m/s]; renewed each frame."""
         self.track((place[0], place[1], nan), (vel_ned[0], vel_ned[1], speed_down), yaw)
 
+    def drift(self, vel_north: float, vel_east: float, down: float, yaw: float) -> None:
+        """Asks for a horizontal velocity [m/s] and a height [m]."""
+        self._free_all()
+        self.kind = SETPOINT_TRAJECTORY
+        self.pos_ned = (nan, nan, down)
+        self.vel_ned = (vel_north, vel_east, nan)
+        self.yaw = yaw
+
     def descend_at(self, north: float, east: float, speed_down: float, yaw: float, cruise_speed: float = nan) -> None:
         """Asks for a vertical speed [m/s] over a place [m]."""
         if (
@@ -233,9 +241,14 @@ class SetpointPort:
             self._press_speed = speed_down
             self._is_changed = True
 
-    def set_cruise_speed(self, speed: float) -> None:
-        """Changes the horizontal speed [m/s] of the setpoint being flown."""
-        self.cruise_speed = speed
+    def set_yaw(self, yaw: float) -> None:
+        """Changes the heading [rad] of the setpoint being flown."""
+        self.yaw = yaw
+        self._is_changed = True
+
+    def set_speeds(self, cruise: float, climb: float, descend: float) -> None:
+        """Changes the speeds [m/s] of the setpoint being flown."""
+        self.cruise_speed, self.climb_speed, self.descend_speed = cruise, climb, descend
         self._is_changed = True
 
     def write(self) -> None:

@@ -5,17 +5,23 @@ from math import inf, nan
 
 import pytest
 
-from autopilot.navigator.items import MAX_ITEMS, SUPPORTED_COMMANDS, refuse_items
+from autopilot.navigator import item_checks
+from autopilot.navigator.item_checks import SUPPORTED_COMMANDS
+from autopilot.navigator.items import MAX_ITEMS
 from tests.unit.autopilot.kinematic import Kinematic, do, item
 
 GOOD = item(0, 16, 10.0)
+
+
+def refuse_items(items, payload=()):
+    return item_checks.refuse_items(items, lambda command: command in payload)
 
 
 def test_every_unsupported_command_is_refused_with_its_number():
     for command in set(range(50_000)) - SUPPORTED_COMMANDS:
         refusal = refuse_items([GOOD, replace(GOOD, seq=1, command=command)])
         assert (refusal.seq, refusal.result) == (1, 3)
-        assert refusal.reason == f"command {command} is not supported"
+        assert f"command {command}" in refusal.reason
 
 
 @pytest.mark.parametrize("frame", [1, 2, 4, 7, 8, 9, 10, 11, 12, 99])
@@ -84,6 +90,6 @@ def test_takeoff_and_landing_may_name_no_place():
 def test_refused_mission_leaves_the_old_one():
     rig = Kinematic().ready()
     assert rig.fc.load_mission([GOOD]) is None
-    assert rig.fc.load_mission([item(0, 16), item(1, 201)]).seq == 1
+    assert rig.fc.load_mission([item(0, 16), item(1, 211)]).seq == 1
     assert list(rig.fc.navigator.mission.items) == [GOOD]
     assert rig.state.mission_count == 1

@@ -7,7 +7,7 @@ import pytest
 
 from autopilot.navigator.mission import MissionState
 from autopilot.vehicle import LandedState, Mode, Verdict
-from tests.unit.autopilot.kinematic import Kinematic, do, heading_error, item
+from tests.unit.autopilot.kinematic import Kinematic, do, geo, heading_error, item
 
 WAYPOINT, LOITER, LOITER_TIME, RETURN, LAND, TAKEOFF, DELAY, JUMP, SPEED, HOME = (
     16,
@@ -196,7 +196,7 @@ def test_last_item_without_a_place_is_reached_too():
     assert rig.state.mission_current == 1
 
 
-def test_pause_holds_and_resume_goes_on_to_the_same_item_from_here():
+def test_pause_holds_and_resume_goes_on_along_the_same_leg():
     rig = started(
         Kinematic().flying(), item(0, WAYPOINT, 20.0), item(1, WAYPOINT, 100.0), item(2, WAYPOINT, 100.0, 20.0)
     )
@@ -210,9 +210,20 @@ def test_pause_holds_and_resume_goes_on_to_the_same_item_from_here():
     assert rig.fc.start_mission(-1).verdict is Verdict.ACCEPTED
     rig.frame()
     assert rig.state.mission_current == 1
-    assert rig.sp("path_start_ned") == pytest.approx(stopped.tolist(), abs=0.1)
+    assert rig.sp("path_start_ned") == pytest.approx([20.0, 0.0, -10.0], abs=0.1)
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
     assert rig.recorder.reached == [0, 1, 2]
+
+
+def test_resume_far_from_the_leg_goes_straight_to_the_item():
+    rig = started(Kinematic().flying(), item(0, WAYPOINT, 100.0), item(1, WAYPOINT, 100.0, 20.0))
+    rig.run_until(lambda: rig.pos[0] > 50.0)
+    lat, lon, _ = geo(50.0, 40.0)
+    assert rig.fc.reposition(lat, lon, nan, nan, nan).verdict is Verdict.ACCEPTED
+    rig.run(15.0)
+    assert rig.fc.start_mission(-1).verdict is Verdict.ACCEPTED
+    rig.frame()
+    assert rig.sp("path_start_ned") == pytest.approx([50.0, 40.0, -10.0], abs=0.2)
 
 
 def test_pause_without_a_mission_is_refused():
