@@ -20,7 +20,6 @@ from autopilot.navigator.items import (
 from autopilot.vehicle import ItemRefusal, MissionItem
 
 _DEEP_M = 5.0  # below home, from which an item is worth a warning: the terrain there is not known; guess
-_LANDS_PRECISELY = False  # whether a landing item may ask for a landing target (parameter 2)
 # Carried out by a payload only, as the refusal says: camera, gimbal, servos, relays, gripper, winch, parachute
 _PAYLOAD_COMMANDS = frozenset(
     (181, 182, 183, 184, 187, 203, 204, 205, 206, 208, 211, 214, 530, 531, 532, 1000, 1001, 2000, 2001, 2500, 2501)
@@ -154,8 +153,8 @@ def _check_change_alt(item: MissionItem, _: Sequence[MissionItem]) -> _Problem |
 
 
 def _check_land(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None:
-    if item.params[1] > 0.0 and not _LANDS_PRECISELY:
-        return Result.PARAM2, "precision landing is not supported"
+    if item.params[1] == item.params[1] and item.params[1] not in (0.0, 1.0, 2.0):
+        return Result.PARAM2, f"precision landing {item.params[1]} is not 0 (off), 1 (if seen) or 2 (with a search)"
     return _yaw_problem(item.params[3])
 
 

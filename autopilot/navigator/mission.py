@@ -14,6 +14,7 @@ from autopilot.navigator.items import MAX_ITEMS, NAV_COMMANDS, Command, is_same
 from autopilot.navigator.mission_actions import Actions
 from autopilot.navigator.mission_legs import Leg
 from autopilot.navigator.mission_route import Route
+from autopilot.navigator.precision import PrecisionLand
 from autopilot.payload import Payloads
 from autopilot.vehicle import ACCEPTED, ItemRefusal, MissionItem, Mode, Reply, Severity, Verdict
 from common.params import Parameter
@@ -49,7 +50,8 @@ class Mission:
         self._context = context
         self._payload = payload
         self._route = Route(context)
-        self._leg = Leg(context, self._route)
+        self.precision = PrecisionLand(context)
+        self._leg = Leg(context, self._route, self.precision)
         self._actions = Actions(context, self._route, self._leg, payload, set_home)
         self._index = 0
         self._is_flying = False

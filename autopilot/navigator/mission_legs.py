@@ -11,12 +11,14 @@ from autopilot.navigator.curve import Circle, Polyline, Runner, bearing, between
 from autopilot.navigator.items import WAYPOINTS, Command, hold_time_s, is_here, passes_through
 from autopilot.navigator.land import Landing
 from autopilot.navigator.mission_route import Route, distance_to_line
+from autopilot.navigator.precision import PrecisionLand
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff import Climb
 from autopilot.vehicle import MissionItem
 
 _ON_PATH_M = 5.0  # a vehicle paused this near its leg goes back to it rather than straight on; guess
 _LANDING_RADIUS_M = 1.0  # a descent begins this near its place
+_IF_SEEN, _WITH_SEARCH = 1.0, 2.0  # PRECISION_LAND_MODE
 _STANDING: Vector = (0.0, 0.0, 0.0)
 
 
@@ -34,13 +36,15 @@ class _Stage(IntEnum):
 class Leg:
     """The item being flown."""
 
-    def __init__(self, context: NavContext, route: Route) -> None:
+    def __init__(self, context: NavContext, route: Route, precision: PrecisionLand) -> None:
         self.target: Vector | None = None  # [m] place of the present leg or stay
         self.yaw = 0.0  # [rad]
         self._context = context
         self._route = route
         self._climb = Climb(context)
         self._landing = Landing(context)
+        self._precision = precision
+        self._is_precise = False  # the landing being flown
         self._stage = _Stage.IDLE
         self._item: MissionItem | None = None
         self._start: Vector = _STANDING  # [m] where the way to the target begins
@@ -118,7 +122,10 @@ class Leg:
                     self.target = None  # the next leg begins where the vehicle is
                 self._is_done = True
         elif stage is _Stage.LAND:
-            self._landing.frame()
+            if self._is_precise:
+                self._precision.frame()
+            else:
+                self._landing.frame()
             if context.is_on_ground:
                 self.target = None
                 return True
@@ -220,8 +227,7 @@ class Leg:
         command = item.command
         if command == Command.LAND:
             self._stage = _Stage.LAND
-            self._landing.start(target[0], target[1], self.yaw)
-            self._landing.frame()
+            self._begin_landing(item, target)
         elif command == Command.LOITER_UNLIMITED:
             self._stage = _Stage.STAY
         elif command == Command.LOITER_TURNS:
@@ -236,6 +242,17 @@ class Leg:
             self._wait(hold_time_s(item))
         else:
             self._is_done = True
+
+    def _begin_landing(self, item: MissionItem, target: Vector) -> None:
+        """Lands, on a target if the item asks for it: parameter 2 is 1 if it happens to be seen, 2 with a search."""
+        precision = self._precision
+        self._is_precise = item.params[1] == _WITH_SEARCH or (item.params[1] == _IF_SEEN and precision.sees_target)
+        if self._is_precise:
+            precision.start()
+            precision.frame()
+        else:
+            self._landing.start(target[0], target[1], self.yaw)
+            self._landing.frame()
 
     # ---- climbing, waiting, changing height ----
 

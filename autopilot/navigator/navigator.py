@@ -13,7 +13,6 @@ from autopilot.navigator.manual import Acro, Altitude, Brake, Position, Stabiliz
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.offboard import STREAM_PERIOD_US, Offboard
 from autopilot.navigator.orbit import Orbit
-from autopilot.navigator.precision import PrecisionLand
 from autopilot.navigator.rtl import Return
 from autopilot.navigator.takeoff import Takeoff
 from autopilot.navigator.termination import Termination
@@ -69,6 +68,7 @@ class Navigator:
         self.orbit = Orbit(context)
         self.precision = PrecisionLand(context)
         stabilized = Stabilized(context)
+        self.precision = mission.precision  # landing items use it too
         self._modes: dict[Mode, FlightMode] = {
             Mode.HOLD: self.hold,
             Mode.TAKEOFF: self.takeoff,

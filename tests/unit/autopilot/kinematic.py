@@ -195,7 +195,9 @@ class Kinematic:
         up = up if isfinite(up) else self.table["MPC_Z_V_AUTO_UP"]
         wanted = np.zeros(3)
         way = pos_sp - self.pos
-        if np.isfinite(way[:2]).all():
+        if np.isfinite(way[:2]).all() and np.isfinite(vel_sp[:2]).all():  # a place that moves
+            wanted[:2] = vel_sp[:2] + way[:2]
+        elif np.isfinite(way[:2]).all():
             distance = float(np.hypot(way[0], way[1]))
             speed = min(cruise, distance + self.sp("exit_speed"))
             wanted[:2] = way[:2] / max(distance, 1e-6) * speed

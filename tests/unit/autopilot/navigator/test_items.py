@@ -45,7 +45,7 @@ def test_global_frames_are_taken(frame):
         (item(1, 16, params=(0, 0, 0, 720)), 9),
         (item(1, 16, height=nan), 12),
         (item(1, 22, height=inf), 12),
-        (item(1, 21, params=(0, 2, 0, nan)), 7),
+        (item(1, 21, params=(0, 3, 0, nan)), 7),
         (do(1, 93, -1), 6),
         (do(1, 93, nan), 6),
         (do(1, 177, 9, 1), 6),
