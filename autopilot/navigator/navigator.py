@@ -66,9 +66,8 @@ class Navigator:
         self.offboard = Offboard(context)
         self.follow = Follow(context)
         self.orbit = Orbit(context)
-        self.precision = PrecisionLand(context)
-        stabilized = Stabilized(context)
         self.precision = mission.precision  # landing items use it too
+        stabilized = Stabilized(context)
         self._modes: dict[Mode, FlightMode] = {
             Mode.HOLD: self.hold,
             Mode.TAKEOFF: self.takeoff,
