@@ -19,10 +19,8 @@ from autopilot.host import Host
 from autopilot.injection import FailureInjector, failure_request, injection_refusal
 from autopilot.lists import ItemLists
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.fence import Fence
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.navigator import Navigator
-from autopilot.navigator.rally import RallyPoints
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.payload import Payloads
 from autopilot.sticks import Sticks
@@ -148,8 +146,7 @@ class FlightController:
         context = NavContext(self.state, params, self._relay, self._setpoint, hover, standing_m)
         mission = Mission(context, self.payload, self.commander.set_home)
         self.navigator = Navigator(context, mission)
-        self.fence = Fence()
-        self.rally = RallyPoints()
+        self.fence, self.rally = self.navigator.fence, self.navigator.rally
         self.lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
         self.commander.connect(self.navigator)
         self.station = self.commander.station
@@ -164,6 +161,7 @@ class FlightController:
         """Runs one frame of the Python part at `time_us`: reads, decides, writes the setpoint, serves links."""
         dt_s = (time_us - self.state.time_us) * 1e-6
         self._read(time_us)
+        self.fence.frame()
         self.commander.frame(dt_s)
         wish = self.navigator.frame()
         if wish is not None:
@@ -230,7 +228,7 @@ class FlightController:
         reason = self.commander.refusal(Mode.TAKEOFF)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)
-        reply = self.navigator.takeoff.request(alt_amsl_m, yaw_rad)
+        reply = self.navigator.request_takeoff(alt_amsl_m, yaw_rad)
         if reply.verdict is not Verdict.ACCEPTED:
             return reply
         return self._enter_anew(Mode.TAKEOFF)

@@ -44,9 +44,6 @@ SYSTEM_PARAMETERS: list[Parameter] = [
     _constant("BAT1_V_CHARGED", 4.2, "voltage of a full cell"),
     _constant("BAT1_V_EMPTY", 3.6, "voltage of an empty cell"),
     _constant("BAT1_CAPACITY", -1.0, "capacity of the battery [mAh], negative: not known"),
-    _constant("GF_ACTION", 0, "no geofence"),
-    _constant("GF_MAX_HOR_DIST", 0.0, "no geofence"),
-    _constant("GF_MAX_VER_DIST", 0.0, "no geofence"),
 ]
 
 

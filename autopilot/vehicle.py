@@ -6,7 +6,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import IntEnum, IntFlag
 from math import nan
 from typing import Any, Protocol
 
@@ -141,6 +141,14 @@ class ItemList(Protocol):
         ...
 
 
+class FenceSwitch(Protocol):
+    """What may be asked of the fence besides loading it; `limits` are bits of FenceLimit."""
+
+    def enable(self, limits: int) -> Reply: ...
+
+    def disable(self, limits: int) -> Reply: ...
+
+
 class StoredLists(Protocol):
     """All of them, for those who upload, read back or keep them (autopilot.lists)."""
 
@@ -202,6 +210,26 @@ class OrbitStatus:
     centre: GeoPoint
 
 
+class FenceLimit(IntFlag):
+    """The kinds of limits a fence may have, numbered as ArduPilot's fence types."""
+
+    CEILING = 1
+    RADIUS = 2  # around home
+    SHAPES = 4  # polygons and circles that clients upload
+    FLOOR = 8
+
+
+@dataclass(slots=True)
+class FenceState:
+    """What the fence's watch has found; limits are bits of FenceLimit."""
+
+    is_active: bool = False  # there are limits, and a breach has consequences
+    breached: int = 0
+    last_breach: int = 0
+    breach_count: int = 0  # since power-on
+    breach_time_us: int = 0
+
+
 @dataclass(slots=True)
 class VehicleState:
     """The vehicle as of this frame.
@@ -239,6 +267,7 @@ class VehicleState:
     mission_state: int = 0  # MISSION_STATE
     orbit: OrbitStatus | None = None  # while one is flown
     sticks: StickInput = field(default_factory=StickInput)
+    fence: FenceState = field(default_factory=FenceState)
 
 
 class Announcer(Protocol):
@@ -281,6 +310,9 @@ class Vehicle(Protocol):
     def station(self) -> Station: ...
 
     sticks: Sticks
+
+    @property
+    def fence(self) -> FenceSwitch: ...
 
     def arm(self, *, force: bool) -> Reply: ...
 

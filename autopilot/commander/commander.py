@@ -164,6 +164,7 @@ class Commander:
         if MODE_RULES[mode].needs_sticks and not self._pilot.is_heard:
             reasons.append(NO_STICKS)
         reasons += filter(None, (self._flying.refusal(mode), self._pilot.arming_reason(mode)))
+        reasons += filter(None, (self._flying.refusal(mode), self._flying.arming_reason()))
         return reasons
 
     def request_mode(self, mode: Mode) -> Reply:

@@ -30,6 +30,7 @@ DEAD_RECKONING = 16384
 MOTOR_FAILED = 32768
 STICKS_LOST = 1 << 16
 ESTIMATOR_FAILED = 1 << 17
+FENCE_BREACHED = 1 << 18
 
 TERMINATION_BREAKER = 121212  # CBRK_FLIGHTTERM: the failure detector may not stop the motors
 
@@ -140,6 +141,7 @@ RULES: tuple[Rule, ...] = (
     Rule(FLIGHT_TIME_OVER, always(Action.RETURN), Severity.CRITICAL, "Flight time is over"),
     Rule(WIND_HIGH, by("COM_WIND_MAX_ACT", LIMIT_ACTIONS), Severity.CRITICAL, "Wind above its limit",
          "Wind is below its limit again"),
+    Rule(FENCE_BREACHED, by("GF_ACTION", LIMIT_ACTIONS), Severity.CRITICAL, "Geofence breached"),
     Rule(STATION_LOST, by("NAV_DLL_ACT", LINK_ACTIONS), Severity.WARNING, "Ground station lost",
          "Ground station is back"),
     Rule(STICKS_LOST, _sticks_lost, Severity.CRITICAL, "Sticks lost", "Sticks are back"),

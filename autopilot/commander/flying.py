@@ -15,6 +15,10 @@ class Flying(Protocol):
 
     def on_armed(self) -> None: ...
 
+    def arming_reason(self) -> str:
+        """Why the vehicle may not take off here; empty if it may."""
+        ...
+
     @property
     def wants_lift(self) -> bool: ...
 

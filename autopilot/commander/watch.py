@@ -15,6 +15,7 @@ from autopilot.commander.failsafe import (
     BATTERY_SILENT,
     DEAD_RECKONING,
     ESTIMATOR_FAILED,
+    FENCE_BREACHED,
     FLIGHT_TIME_NEAR,
     FLIGHT_TIME_OVER,
     HEIGHT_LOST,
@@ -116,6 +117,8 @@ class FailureWatch:
         failures = self._attitude.update(state, dt_s)
         if is_flying and self._battery.is_silent:
             failures |= BATTERY_SILENT
+        if is_flying and state.fence.breached:
+            failures |= FENCE_BREACHED
         # Once lost it stays so until it is back, although landing blindly needs none
         self._is_position_lost = not has_position and (needs_position or self._is_position_lost)
         if self._is_position_lost:

@@ -15,6 +15,7 @@ from autopilot.mavlink.commands import CommandService
 from autopilot.mavlink.component import Component
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.identity import banner
 from autopilot.mavlink.links import Link
@@ -86,6 +87,7 @@ class MavlinkServer:
             parameters,
             MissionService(endpoint),
             OffboardService(endpoint),
+            FenceService(endpoint),
             SafetyService(endpoint),
             FtpService(endpoint, parameters),
             TargetService(endpoint),

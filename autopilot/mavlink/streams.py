@@ -40,6 +40,7 @@ STREAMS: tuple[Stream, ...] = (
     Stream("GPS_GLOBAL_ORIGIN", status.gps_global_origin, 0.2, 0.2),
     Stream("EXTENDED_SYS_STATE", status.extended_sys_state, 5, 5),
     Stream("MISSION_CURRENT", status.mission_current, 1, 1),
+    Stream("FENCE_STATUS", status.fence_status, 1, 1),
     Stream("ATTITUDE", motion.attitude, 20, 50),
     Stream("ATTITUDE_QUATERNION", motion.attitude_quaternion, 10, 50),
     Stream("GLOBAL_POSITION_INT", motion.global_position_int, 10, 20),
@@ -69,7 +70,7 @@ STREAMS: tuple[Stream, ...] = (
 # REQUEST_DATA_STREAM: old requests name a group of messages (MAV_DATA_STREAM).
 GROUPS: dict[int, tuple[str, ...]] = {
     1: ("HIGHRES_IMU", "SCALED_IMU", "SCALED_PRESSURE"),  # RAW_SENSORS
-    2: ("SYS_STATUS", "GPS_RAW_INT", "MISSION_CURRENT", "EXTENDED_SYS_STATE"),  # EXTENDED_STATUS
+    2: ("SYS_STATUS", "GPS_RAW_INT", "MISSION_CURRENT", "EXTENDED_SYS_STATE", "FENCE_STATUS"),  # EXTENDED_STATUS
     3: ("SERVO_OUTPUT_RAW", "RC_CHANNELS"),  # RC_CHANNELS
     4: ("ATTITUDE_TARGET",),  # RAW_CONTROLLER
     6: ("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"),  # POSITION

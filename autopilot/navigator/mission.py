@@ -4,17 +4,18 @@ In: items, checked when they were loaded. Out: the current item, each item reach
 `mission_legs`, what is done on the way `mission_actions`, which item follows which `mission_route`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 from math import hypot
 
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.item_checks import refuse_items, warning_of
-from autopilot.navigator.items import MAX_ITEMS, NAV_COMMANDS, Command, is_same
+from autopilot.navigator.items import MAX_ITEMS, NAV_COMMANDS, PLACED, PLACED_OR_HERE, Command, is_here, is_same
 from autopilot.navigator.mission_actions import Actions
 from autopilot.navigator.mission_legs import Leg
 from autopilot.navigator.mission_route import Route
 from autopilot.navigator.precision import PrecisionLand
+from autopilot.navigator.setpoint import Vector
 from autopilot.payload import Payloads
 from autopilot.vehicle import ACCEPTED, ItemRefusal, MissionItem, Mode, Reply, Severity, Verdict
 from common.params import Parameter
@@ -178,6 +179,14 @@ class Mission:
             if way_m > longest_m:
                 return f"first waypoint is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed"
         return ""
+
+    def places(self) -> Iterator[tuple[int, Vector]]:
+        """Number and place [m] of every item that the vehicle flies to."""
+        for item in self.items:
+            if item.command in PLACED | PLACED_OR_HERE and not is_here(item):
+                place = self._route.place_of(item)
+                home = self._context.state.home_ned
+                yield item.seq, (place[0], place[1], home[2]) if item.command == Command.LAND else place
 
     # ---- flying ----
 

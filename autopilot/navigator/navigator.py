@@ -4,6 +4,7 @@ from math import isfinite, nan
 from typing import Protocol
 
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.fence import Fence
 from autopilot.navigator.follow import Follow
 from autopilot.navigator.goto import reposition_target
 from autopilot.navigator.ground import Ask, standing_d, vertical_ask
@@ -13,6 +14,7 @@ from autopilot.navigator.manual import Acro, Altitude, Brake, Position, Stabiliz
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.offboard import STREAM_PERIOD_US, Offboard
 from autopilot.navigator.orbit import Orbit
+from autopilot.navigator.rally import RallyPoints
 from autopilot.navigator.rtl import Return
 from autopilot.navigator.takeoff import Takeoff
 from autopilot.navigator.termination import Termination
@@ -44,9 +46,12 @@ class Navigator:
 
     __slots__ = (
         "_active",
+        "_mission_checked",
+        "_mission_problem",
         "_modes",
         "ask",
         "context",
+        "fence",
         "follow",
         "hold",
         "land",
@@ -54,6 +59,7 @@ class Navigator:
         "offboard",
         "orbit",
         "precision",
+        "rally",
         "takeoff",
     )
 
@@ -62,6 +68,8 @@ class Navigator:
         self.hold = Hold(context)
         self.takeoff = Takeoff(context)
         self.mission = mission
+        self.fence = Fence(context)
+        self.rally = RallyPoints()
         self.land = Land(context)
         self.offboard = Offboard(context)
         self.follow = Follow(context)
@@ -88,18 +96,40 @@ class Navigator:
         }
         self._active: FlightMode = self._modes[Mode.HOLD]
         self.ask = Ask.STAY  # of the setpoint flown
+        self._mission_checked: object = None
+        self._mission_problem = ""
 
     def refusal(self, mode: Mode) -> str:
         """Why a mode cannot be flown now, as far as the navigator knows; empty if it can."""
         if mode not in self._modes:
             return f"mode {mode.name} is not supported"
         if mode is Mode.MISSION:
-            return self.mission.refusal()
+            return self.mission.refusal() or self._mission_outside()
         if mode is Mode.ALTITUDE and not self.context.has_height:
             return "no valid height"
         if mode is Mode.OFFBOARD and self.offboard.age_us(self.context.state.time_us) > STREAM_PERIOD_US:
             return "needs setpoints faster than 2 Hz before the switch"
         return ""
+
+    def _mission_outside(self) -> str:
+        """The first item of the mission that lies outside the fence; looked for again when either has changed."""
+        fence, mission = self.fence, self.mission
+        if not fence.is_active:
+            return ""
+        checked = (mission.items, fence.version, self.context.state.home_ned)
+        if checked != self._mission_checked:
+            self._mission_checked = checked
+            self._mission_problem = ""
+            for seq, place in mission.places():
+                reason = fence.refusal(place)
+                if reason:
+                    self._mission_problem = f"item {seq} is {reason}"
+                    break
+        return self._mission_problem
+
+    def arming_reason(self) -> str:
+        """Why the vehicle may not take off here; empty if it may."""
+        return self.fence.arming_reason()
 
     @property
     def wants_lift(self) -> bool:
@@ -199,6 +229,9 @@ class Navigator:
             target = reposition_target(context, self.hold, lat_deg, lon_deg, alt_amsl_m, yaw)
             if isinstance(target, Reply):
                 return target
+            refusal = self.fence.refusal(target[0])
+            if refusal:
+                return Reply(Verdict.DENIED, f"target is {refusal}")
             context.next_hold = (*target, True)
         if isfinite(speed_m_s) and speed_m_s > 0.0:
             context.cruise_speed = speed_m_s
@@ -214,6 +247,16 @@ class Navigator:
         self.mission.renew_speeds()
         return ACCEPTED
 
+    def request_takeoff(self, alt_amsl_m: float, yaw: float) -> Reply:
+        """Chooses the height of the next take-off; the caller changes to Takeoff."""
+        context = self.context
+        if isfinite(alt_amsl_m):
+            north, east, _ = context.state.estimate.pos_ned
+            refusal = self.fence.refusal((north, east, context.down_of(alt_amsl_m)))
+            if refusal:
+                return Reply(Verdict.DENIED, f"takeoff would end {refusal}")
+        return self.takeoff.request(alt_amsl_m, yaw)
+
     def request_landing(self, lat_deg: float, lon_deg: float, yaw: float) -> Reply:
         """Chooses where the next landing shall be; the caller changes to Land."""
         if isfinite(lat_deg) != isfinite(lon_deg) or abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
@@ -221,5 +264,8 @@ class Navigator:
         place = None
         if isfinite(lat_deg) and not (lat_deg == 0.0 and lon_deg == 0.0):
             place = self.context.pos_ned_of(lat_deg, lon_deg, self.context.state.position.alt_m)
+            refusal = self.fence.refusal(place)
+            if refusal:
+                return Reply(Verdict.DENIED, f"landing place is {refusal}")
         self.land.request(place, yaw if isfinite(yaw) else nan)
         return ACCEPTED

@@ -10,7 +10,7 @@ from autopilot.mavlink.convert import INT16_MAX, UINT16_MAX, bounded_int, degree
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.ports import POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
-from autopilot.vehicle import LandedState, Mode, VehicleState
+from autopilot.vehicle import FenceLimit, LandedState, Mode, VehicleState
 
 _heartbeat = known_type("HEARTBEAT").pack
 _sys_status = known_type("SYS_STATUS").pack
@@ -18,6 +18,7 @@ _battery_status = known_type("BATTERY_STATUS").pack
 _home_position = known_type("HOME_POSITION").pack
 _gps_global_origin = known_type("GPS_GLOBAL_ORIGIN").pack
 _extended_sys_state = known_type("EXTENDED_SYS_STATE").pack
+_fence_status = known_type("FENCE_STATUS").pack
 _mission_current = known_type("MISSION_CURRENT").pack
 _system_time = known_type("SYSTEM_TIME").pack
 
@@ -53,9 +54,16 @@ _ATTITUDE_CONTROL = (
 _POSITION_CONTROL = mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _RC = mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER  # present once sticks were heard: most clients have none
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-# Always present and never enabled: without it MAVProxy announces a breach of a fence nobody has set.
+# Always present, enabled while a fence is watched: without it MAVProxy announces a breach of a fence nobody has set.
 _GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
 _ALWAYS = _GYRO_ACCEL | _MAG | _BARO | _GPS | _BATTERY | _AHRS | _ATTITUDE_CONTROL | _POSITION_CONTROL | _PREARM
+
+_BREACH_KINDS = {
+    FenceLimit.SHAPES: mavlink.FENCE_BREACH_BOUNDARY,
+    FenceLimit.RADIUS: mavlink.FENCE_BREACH_BOUNDARY,
+    FenceLimit.CEILING: mavlink.FENCE_BREACH_MAXALT,
+    FenceLimit.FLOOR: mavlink.FENCE_BREACH_MINALT,
+}
 
 FRESH_IMU_US = 100_000  # older samples mean a dead sensor; several periods of each sensor
 FRESH_US = 1_000_000
@@ -89,11 +97,12 @@ def system_status(state: VehicleState) -> int:
 def sys_status(state: VehicleState) -> bytes:
     """Which sensors work, whether it may be armed, battery, load."""
     present = _ALWAYS | (_RANGE if state.samples.range.time_us else 0) | (_RC if state.sticks.heard_until_us else 0)
+    fence = state.fence
     battery = state.samples.battery
     return _sys_status(
         present | _GEOFENCE,
-        present,
-        healthy_sensors(state) & present | _GEOFENCE,
+        present | (_GEOFENCE if fence.is_active else 0),
+        healthy_sensors(state) & present | (0 if fence.breached else _GEOFENCE),
         u16(state.load * 1000.0),
         u16(battery.voltage_v * 1000.0, UINT16_MAX),
         i16(battery.current_a * 100.0, -1),
@@ -201,6 +210,18 @@ def mission_progress(state: VehicleState, seq: int) -> bytes:
     """MISSION_CURRENT with the item's number as clients know it."""
     mission_mode = IN_MISSION_MODE if state.mode is Mode.MISSION else NOT_IN_MISSION_MODE
     return _mission_current(u16(seq), u16(state.mission_count), state.mission_state, mission_mode)
+
+
+def fence_status(state: VehicleState) -> bytes:
+    """Whether the fence is breached, and the kind and the time of the last breach."""
+    fence = state.fence
+    return _fence_status(
+        int(fence.breached != 0),
+        u16(fence.breach_count),
+        next((kind for limit, kind in _BREACH_KINDS.items() if fence.last_breach & limit), 0),
+        boot_ms(fence.breach_time_us),
+        mavlink.FENCE_MITIGATE_NONE,
+    )
 
 
 def system_time(state: VehicleState) -> bytes:

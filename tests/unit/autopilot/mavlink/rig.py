@@ -175,6 +175,16 @@ class RecordingVehicle:
         }
         self.lists = ItemLists(self.stored)
 
+    @property
+    def fence(self) -> "RecordingVehicle":
+        return self
+
+    def enable(self, limits: int) -> Reply:
+        return self._record("fence.enable", limits)
+
+    def disable(self, limits: int) -> Reply:
+        return self._record("fence.disable", limits)
+
     def _record(self, *call: Any) -> Reply:
         self.calls.append(call)
         return self.reply

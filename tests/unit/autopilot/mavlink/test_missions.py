@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot.mavlink.mission_items import item_from_fields, scaled_position
 from autopilot.mavlink.missions import DOWNLOAD_IDLE_US, RETRIES_MAX
 from autopilot.navigator.items import MAX_ITEMS
-from autopilot.vehicle import ItemRefusal, ListKind, MissionItem, Reply, Verdict
+from autopilot.vehicle import FenceLimit, FenceState, ItemRefusal, ListKind, MissionItem, Reply, Verdict
 from tests.unit.autopilot.mavlink.rig import FRAME_US, Client, Rig, texts
 
 MISSION, FENCE, RALLY = ListKind
@@ -371,3 +371,39 @@ def test_set_current_is_answered_by_the_current_item():
     rig.vehicle.reply = Reply(Verdict.DENIED, "there is no item 9")
     rig.client.send("MISSION_SET_CURRENT", target_component=1, seq=9)
     assert texts(rig.frame()) == ["Mission: there is no item 9"]
+
+
+def test_fence_is_switched_by_command():
+    rig = Rig()
+    for params, call in (
+        ((1.0,), ("fence.enable", 15)),
+        ((0.0, 0.0), ("fence.disable", 15)),
+        ((1.0, 4.0), ("fence.enable", 4)),
+        ((2.0,), ("fence.disable", 8)),
+    ):
+        assert rig.ack(mavlink.MAV_CMD_DO_FENCE_ENABLE, *params).result == 0
+        assert rig.vehicle.calls[-1] == call
+    for params in ((3.0,), (1.0, 16.0), ()):
+        assert rig.ack(mavlink.MAV_CMD_DO_FENCE_ENABLE, *params).result == mavlink.MAV_RESULT_DENIED
+
+
+def test_breached_fence_is_reported():
+    rig = Rig()
+    geofence = mavlink.MAV_SYS_STATUS_GEOFENCE
+    for fence, is_enabled, is_healthy, kind in (
+        (FenceState(), False, True, mavlink.FENCE_BREACH_NONE),
+        (FenceState(is_active=True), True, True, mavlink.FENCE_BREACH_NONE),
+        (FenceState(True, FenceLimit.CEILING, FenceLimit.CEILING, 1, 4_000_000), True, False, 2),
+        (FenceState(True, 0, FenceLimit.SHAPES, 2, 4_000_000), True, True, mavlink.FENCE_BREACH_BOUNDARY),
+    ):
+        rig.update(fence=fence)
+        rig.client.command(mavlink.MAV_CMD_REQUEST_MESSAGE, 1)
+        rig.client.command(mavlink.MAV_CMD_REQUEST_MESSAGE, 162)
+        messages = rig.frame()
+        status = next(m.fields for m in messages if m.name == "SYS_STATUS")
+        assert bool(status.onboard_control_sensors_enabled & geofence) is is_enabled
+        assert bool(status.onboard_control_sensors_health & geofence) is is_healthy
+        answer = next(m.fields for m in messages if m.name == "FENCE_STATUS")
+        assert (answer.breach_status, answer.breach_count) == (int(fence.breached != 0), fence.breach_count)
+        assert answer.breach_type == kind
+        assert answer.breach_time == fence.breach_time_us // 1000
