@@ -56,6 +56,10 @@ def fly(
     walls: Annotated[bool, typer.Option("--walls", help="Walls along the edges of the map.")] = False,
     dialect: Annotated[str, typer.Option(help="What ground stations take it for: px4 or ardupilot.")] = "px4",
     host: Annotated[str, typer.Option(help="Address ground stations are sent to.")] = "127.0.0.1",
+    bind: Annotated[str, typer.Option(help="Address the vehicle's ports are open at. Default: loopback.")] = "",
+    tcp_port: Annotated[
+        int | None, typer.Option(min=1, max=65535, help="TCP port for clients that connect; ArduPilot's is 5760.")
+    ] = None,
     gcs_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of ground stations.")] = (
         GROUND_STATION_PORT
     ),
@@ -73,8 +77,9 @@ def fly(
             FlightOptions(
                 plan=plan, is_idle=idle, once=once, speed=speed, seconds=seconds, seed=seed, wind_m_s=wind,
                 wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
-                trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, gcs_port=gcs_port,
-                api_port=api_port, run_folder=run_folder, parameters=tuple(param or ()),
+                trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, bind=bind,
+                tcp_port=tcp_port, gcs_port=gcs_port, api_port=api_port, run_folder=run_folder,
+                parameters=tuple(param or ()),
             )
         )  # fmt: skip
     except UserError as error:

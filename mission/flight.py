@@ -4,7 +4,7 @@ Each frame is 20 ms of simulated time: five ticks of the kernels, then the Pytho
 the scripting client, then the recorder. With the memory link alone it is a pure function of its configuration.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import isnan, nan
 from pathlib import Path
 from typing import Literal, Self
@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.links import Link, LinkRole, memory_pair
+from autopilot.mavlink.links import Link, LinkRole, LinkSource, memory_pair
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.node import FlightController, HostPorts
 from autopilot.params import parameter_table
@@ -73,7 +73,9 @@ class Flight:
         folder: where `flight.ulg` and `flight.tlog` are written; None writes nothing.
     """
 
-    def __init__(self, config: FlightConfig, *, links: list[Link] | None = None, folder: Path | None = None) -> None:
+    def __init__(
+        self, config: FlightConfig, *, links: Sequence[Link | LinkSource] = (), folder: Path | None = None
+    ) -> None:
         self.config = config
         self.airframe: Airframe = load_airframe(config.airframe)
         self.world: WorldMap = build_world(config.world)
@@ -103,12 +105,12 @@ class Flight:
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
         on_frame = None if self._tlog is None else self._tlog.frame
-        dialect, outer_links = DIALECTS[config.dialect], links or []
+        dialect = DIALECTS[config.dialect]
         if dialect is PX4:
-            self.server = MavlinkServer(self.controller, [vehicle_end, *outer_links], on_frame=on_frame)
+            self.server = MavlinkServer(self.controller, [vehicle_end, *links], on_frame=on_frame)
             self._servers = [self.server]
         else:  # the script is not asked to know two languages: it has a server of its own
-            self.server = MavlinkServer(self.controller, outer_links, dialect, on_frame)
+            self.server = MavlinkServer(self.controller, links, dialect, on_frame)
             self._servers = [self.server, MavlinkServer(self.controller, [vehicle_end])]
         self.drone = Drone(client_end)
         log = None if folder is None else folder / "flight.ulg"

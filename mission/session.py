@@ -14,7 +14,9 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from autopilot.mavlink.links import Link, LinkError, LinkRole, UdpLink
+from autopilot.mavlink.links import LinkError, LinkRole, LinkSource
+from autopilot.mavlink.tcp import TcpPort
+from autopilot.mavlink.udp import SILENCE_US, UdpPort, address_towards
 from autopilot.vehicle import Mode
 from common.airframe import AirframeError, load_airframe
 from common.clock import wall_date_text, wall_time_s
@@ -65,6 +67,8 @@ class FlightOptions:
     hill_height_m: float
     has_walls: bool
     host: str
+    bind: str
+    tcp_port: int | None
     gcs_port: int
     api_port: int
     run_folder: Path | None
@@ -87,7 +91,7 @@ def fly_session(options: FlightOptions) -> int:
         flight_parameters(config, load_airframe(config.airframe))
     except (AirframeError, ParameterError) as error:
         raise UserError(str(error)) from error
-    links = [] if speed is None else _links(options)
+    links = [] if speed is None else _links(options, speed)
     folder = _new_folder(options.run_folder)
     with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
         flight = Flight(config, links=links, folder=folder)
@@ -197,19 +201,24 @@ def _candidates(stem: Path) -> Any:
         number += 1
 
 
-def _links(options: FlightOptions) -> list[Link]:
+def _links(options: FlightOptions, speed: float) -> list[LinkSource]:
     _check_ports(options)
-    links: list[Link] = []
+    links: list[LinkSource] = []
+    silence_us = int(SILENCE_US * max(speed, 1.0))  # clients' heartbeats follow the wall clock
     try:
+        bind = options.bind or address_towards(options.host)
         for role, port, step in (
             (LinkRole.GROUND, options.gcs_port, GROUND_PORT_STEP),
             (LinkRole.ONBOARD, options.api_port, API_PORT_STEP),
         ):
-            links.append(UdpLink(port, role, options.host, local_port=port + step))
+            links.append(UdpPort(port, role, options.host, local_port=port + step, bind=bind, silence_us=silence_us))
+        if options.tcp_port is not None:
+            links.append(TcpPort(options.tcp_port, bind=bind))
     except LinkError as error:
         for link in links:
             link.close()
-        hint = "; another flight may be running: choose --gcs-port or --api-port" if " is in use " in str(error) else ""
+        is_taken = " is in use " in str(error)
+        hint = "; another flight may be running: choose --gcs-port, --api-port or --tcp-port" if is_taken else ""
         raise UserError(f"{str(error).rstrip('.')}{hint}") from error
     return links
 
@@ -273,6 +282,8 @@ def _sigterm_interrupts() -> Iterator[None]:
 
 def _print_start(options: FlightOptions, speed: float | None, folder: Path, console: Console) -> None:
     ports = f"UDP {options.gcs_port} (ground stations), {options.api_port} (offboard API)"
+    if options.tcp_port is not None:
+        ports += f", TCP {options.tcp_port}"
     where = "lockstep, without network links" if speed is None else ports
     _print_line(console, f"flying: {where}; logs in {folder}")
     if options.wind_m_s > WIND_EXPECTED_M_S:

@@ -1,11 +1,16 @@
-"""What the services share: a channel per link, the sender of a message, and the vehicle's endpoint on all channels."""
+"""What the services share: a channel per client, the sender of a message, and the vehicle's endpoint on all channels.
+
+In: links, which come and go with the clients. Out: frames: an answer on the channel of who asked, an announcement on
+all of them.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from autopilot.mavlink.codec import FrameReader, MessageType, frame_bytes, known_type
+from autopilot.mavlink.codec import MessageType, frame_bytes, known_type
 from autopilot.mavlink.dialects import Dialect
-from autopilot.mavlink.links import Link
+from autopilot.mavlink.intake import Intake
+from autopilot.mavlink.links import FixedLinks, Link, LinkSource
 from autopilot.mavlink.parameter_view import ParameterView
 from autopilot.mavlink.streams import StreamSchedule, Telemetry
 from autopilot.vehicle import Severity, Vehicle
@@ -14,21 +19,51 @@ AUTOPILOT_COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1
 TEXT_LENGTH = 50  # characters of one STATUSTEXT
 TEXT_REPEAT_US = 10_000_000  # for texts that a polling client would repeat; stations hide repeats as long
 TEXTS_REMEMBERED_MAX = 100
+TEXT_PERIOD_US = 200_000  # texts to all that one client may cause in the long run,
+TEXT_BURST_US = 4_000_000  # and ahead of that; what is beyond goes to that client alone
+HEARD_MAX = 64  # systems and components per channel
+CLIENTS_MAX = 32  # greeted per channel
 
 OnFrame = Callable[[int, bytes], None]
 
 _STATUSTEXT = known_type("STATUSTEXT")
 
 
+class Heard:
+    """Who has been heard on a channel; of too many, the first is forgotten."""
+
+    def __init__(self) -> None:
+        self._sources: dict[tuple[int, int], None] = {}  # (sysid, compid)
+        self._last = (0, 0)
+
+    def note(self, sysid: int, compid: int) -> None:
+        source = (sysid, compid)
+        if source == self._last or sysid == 0:
+            return
+        self._last = source
+        self._sources[source] = None
+        if len(self._sources) > HEARD_MAX:
+            del self._sources[next(iter(self._sources))]
+
+    def has(self, sysid: int, compid: int) -> bool:
+        """Whether this system is there, and in it this component (0: any)."""
+        if compid == 0:
+            return any(source[0] == sysid for source in self._sources)
+        return (sysid, compid) in self._sources
+
+
 class Channel:
-    """One link with its sequence number, its reader and its telemetry schedule."""
+    """One client's end of a link: its sequence number, its queue and its telemetry schedule."""
 
     def __init__(self, link: Link, sysid: int, schedule: StreamSchedule) -> None:
         self.link = link
         self.schedule = schedule
-        self.reader = FrameReader()
+        self.intake = Intake(link)
+        self.heard = Heard()
+        self.is_open = True  # False once the client has gone; what is sent then is lost
         self.is_mute = False  # sends nothing: a lost radio, on request
-        self.clients: set[tuple[int, int]] = set()  # (sysid, compid) that have sent a heartbeat
+        self.clients: set[tuple[int, int]] = set()  # (sysid, compid) that have been greeted
+        self.texts_due_us = 0  # when the texts to all that it has caused will have been due at the allowed rate
         self._sysid = sysid
         self._seq = 0
         self._component_seqs: dict[int, int] = {}  # clients count losses per component
@@ -46,6 +81,11 @@ class Channel:
             self.link.send(frame)
         return frame
 
+    def pass_on(self, frame: bytes) -> None:
+        """Sends a frame of somebody else's, as it is."""
+        if not self.is_mute:
+            self.link.send(frame)
+
 
 @dataclass(frozen=True, slots=True)
 class Sender:
@@ -60,7 +100,12 @@ class Endpoint:
     """The vehicle on all its channels: one identity, one voice."""
 
     def __init__(
-        self, vehicle: Vehicle, links: Sequence[Link], dialect: Dialect, sysid: int, on_frame: OnFrame | None
+        self,
+        vehicle: Vehicle,
+        links: Sequence[Link | LinkSource],
+        dialect: Dialect,
+        sysid: int,
+        on_frame: OnFrame | None,
     ) -> None:
         self.vehicle = vehicle
         self.dialect = dialect
@@ -69,19 +114,49 @@ class Endpoint:
         self.compids = {AUTOPILOT_COMPONENT}  # the vehicle's components behind these links
         self.parameters = ParameterView(vehicle.params, dialect)
         self.telemetry = Telemetry(dialect, sysid)
-        self.channels = [Channel(link, sysid, StreamSchedule(self.telemetry, link.role)) for link in links]
+        self.sent_count = 0  # frames sent because of somebody's message, for the sharing of work
+        self.asker: Channel | None = None  # whose message is being handled
+        fixed = FixedLinks([link for link in links if not isinstance(link, LinkSource)])
+        self.sources: list[LinkSource] = [fixed, *(link for link in links if isinstance(link, LinkSource))]
+        self.channels: list[Channel] = []
+        self._links: list[Sequence[Link]] = []  # of each source, as it was when the channels were made
+        self._renew_channels()
         self._on_frame = on_frame
         self._text_id = 0
         self._texts_until_us: dict[str, int] = {}
 
+    def poll(self) -> None:
+        """Lets clients come and go."""
+        has_changed = False
+        for source, known in zip(self.sources, self._links, strict=True):
+            source.poll(self.time_us)
+            has_changed |= source.links is not known
+        if has_changed:
+            self._renew_channels()
+
+    def _renew_channels(self) -> None:
+        known = {id(channel.link): channel for channel in self.channels}
+        self._links = [source.links for source in self.sources]
+        links = [link for links in self._links for link in links]
+        self.channels = [known.pop(id(link)) if id(link) in known else self._open(link) for link in links]
+        for gone in known.values():
+            gone.is_open = False
+
+    def _open(self, link: Link) -> Channel:
+        channel = Channel(link, self.sysid, StreamSchedule(self.telemetry, link.role))
+        channel.is_mute = bool(self.channels) and all(other.is_mute for other in self.channels)
+        return channel
+
     def reply(self, sender: Sender, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
         """Sends a message on the channel of `sender`."""
         frame = sender.channel.send(kind, payload, compid)
+        self.sent_count += 1
         if self._on_frame is not None:
             self._on_frame(self.time_us, frame)
 
     def broadcast(self, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
         """Sends a message on every channel; the frame log gets it once."""
+        self.sent_count += len(self.channels)
         for i, channel in enumerate(self.channels):
             frame = channel.send(kind, payload, compid)
             if i == 0 and self._on_frame is not None:
@@ -109,7 +184,12 @@ class Endpoint:
         return target_system in (0, self.sysid) and (target_component == 0 or target_component in self.compids)
 
     def text(self, severity: Severity, text: str, to: Sender | None = None) -> None:
-        """Sends a text to everyone, or to one sender; beyond 50 characters in several pieces."""
+        """Sends a text to everyone, or to one sender; beyond 50 characters in several pieces.
+
+        A client that causes one text after another gets them alone.
+        """
+        if to is None and self.asker is not None and not self._may_tell_all(self.asker):
+            to = Sender(self.asker, 0, 0)
         encoded = text.encode("ascii", "replace")
         text_id = 0
         if len(encoded) > TEXT_LENGTH:
@@ -120,6 +200,12 @@ class Endpoint:
                 self.broadcast(_STATUSTEXT, payload)
             else:
                 self.reply(to, _STATUSTEXT, payload)
+
+    def _may_tell_all(self, asker: Channel) -> bool:
+        if asker.texts_due_us > self.time_us + TEXT_BURST_US:
+            return False
+        asker.texts_due_us = max(asker.texts_due_us, self.time_us) + TEXT_PERIOD_US
+        return True
 
     def text_once(self, severity: Severity, text: str) -> None:
         """Sends a text unless the same was sent in the last 10 s."""

@@ -26,6 +26,7 @@ _HEADER_V2 = struct.Struct(
     "<BBBBBBHB"
 )  # length, incompatible flags, compatible flags, seq, sysid, compid, id, id >> 16
 _MAGIC = re.compile(rb"[\xfd\xfe]")
+UNLIMITED = 1 << 62
 
 # These fields carry the bit pattern of the value, because an integer's bytes may be a signalling NaN, which
 # a conversion to a Python float would alter.
@@ -44,10 +45,12 @@ class MessageType:
     size: int  # bytes, extension fields included
     pack: Callable[..., bytes]  # field values in the order of the specification (0 if left out) -> payload
     unpack: Callable[[bytes], Any]  # payload, truncated or not -> named tuple of the fields
+    target_system_at: int = -1  # where in the payload the addressee is; -1: it addresses all
+    target_component_at: int = -1
 
 
 class Frame(NamedTuple):
-    """One frame whose checksum is right."""
+    """One frame whose checksum is right, or one of a kind we do not know, whose checksum nobody here can tell."""
 
     kind: MessageType
     sysid: int
@@ -55,6 +58,18 @@ class Frame(NamedTuple):
     seq: int
     payload: bytes
     raw: bytes
+
+    @property
+    def is_signed(self) -> bool:
+        return self.raw[0] == MAGIC_V2 and bool(self.raw[2] & SIGNED_FLAG)
+
+    def target(self) -> tuple[int, int]:
+        """System and component it is addressed to; 0: all."""
+        payload, kind = self.payload, self.kind
+        size = len(payload)  # trailing zeros are not sent
+        system_at, component_at = kind.target_system_at, kind.target_component_at
+        system = payload[system_at] if 0 <= system_at < size else 0
+        return system, payload[component_at] if 0 <= component_at < size else 0
 
 
 class Message(NamedTuple):
@@ -87,9 +102,9 @@ def message_type(key: int | str) -> MessageType | None:
     if isinstance(key, str):
         return message_type(definition.id)
     packer, unpacker, size = _compile(definition)
-    return MessageType(
-        definition.id, definition.msgname, bytes([definition.crc_extra]), size, pack=packer, unpack=unpacker
-    )
+    system_at, component_at = _target_positions(definition)
+    crc_extra = bytes([definition.crc_extra])
+    return MessageType(definition.id, definition.msgname, crc_extra, size, packer, unpacker, system_at, component_at)
 
 
 def known_type(name: str) -> MessageType:
@@ -104,11 +119,32 @@ def known_type(name: str) -> MessageType:
     return kind
 
 
-def frame_bytes(kind: MessageType, payload: bytes, seq: int, sysid: int, compid: int) -> bytes:
-    """A MAVLink 2 frame; trailing zeros of the payload are left out as the protocol asks."""
+def unknown_type(msg_id: int) -> MessageType:
+    """Stands for a message we have no definition of: it can be passed on, but not read."""
+
+    def unpack(_: bytes) -> Any:
+        return ()
+
+    def pack(*_: Any, **__: Any) -> bytes:
+        raise KeyError(msg_id)
+
+    return MessageType(msg_id, f"UNKNOWN_{msg_id}", b"", 0, pack, unpack)
+
+
+def frame_bytes(kind: MessageType, payload: bytes, seq: int, sysid: int, compid: int, flags: int = 0) -> bytes:
+    """A MAVLink 2 frame; trailing zeros of the payload are left out as the protocol asks.
+
+    Args:
+        kind: the message.
+        payload: its fields, packed.
+        seq: counts the sender's frames.
+        sysid: the sender's system.
+        compid: the sender's component.
+        flags: incompatible flags: SIGNED_FLAG announces a signature, which the caller appends.
+    """
     payload = payload.rstrip(b"\0") or b"\0"
     msg_id = kind.msg_id
-    checked = _HEADER_V2.pack(len(payload), 0, 0, seq, sysid, compid, msg_id & 0xFFFF, msg_id >> 16) + payload
+    checked = _HEADER_V2.pack(len(payload), flags, 0, seq, sysid, compid, msg_id & 0xFFFF, msg_id >> 16) + payload
     return b"\xfd" + checked + mcrf4xx(checked + kind.crc_extra).to_bytes(2, "little")
 
 
@@ -140,11 +176,20 @@ class FrameReader:
 
     After a bad byte it looks for the next frame start one byte further on, so that rubbish never hides the good frame
     behind it. It keeps at most one unfinished frame (280 bytes).
+
+    Args:
+        keeps_unknown: frames of unknown kinds are returned too. Their checksum cannot be told, so one counts only if
+            another frame, or the end of its datagram, follows right behind it.
+        false_starts_max: of one `feed`; the rest of the data is dropped after so many, because each costs as much as
+            a frame.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, keeps_unknown: bool = False, false_starts_max: int = UNLIMITED) -> None:
         self._rest = b""
+        self._keeps_unknown = keeps_unknown
+        self._false_starts_max = false_starts_max
         self.bad_byte_count = 0
+        self.false_start_count = 0
 
     def feed(self, data: bytes, *, is_whole: bool = False) -> list[Frame]:
         """The frames completed by `data`.
@@ -157,6 +202,7 @@ class FrameReader:
         frames: list[Frame] = []
         size = len(buffer)
         at = 0
+        false_starts_left = self._false_starts_max
         while at < size:
             if buffer[at] != MAGIC_V2 and buffer[at] != MAGIC_V1:
                 found = _MAGIC.search(buffer, at)
@@ -168,9 +214,19 @@ class FrameReader:
             if end > size and not is_whole:
                 break
             frame = _checked_frame(buffer, at, end) if end <= size else None
+            if frame is None and self._keeps_unknown and _may_be_unknown(buffer, at, end):
+                if end == size and not is_whole:
+                    break  # the byte behind it will tell
+                if end == size or buffer[end] in (MAGIC_V1, MAGIC_V2):
+                    frame = _unknown_frame(buffer, at, end)
             if frame is None:
                 self.bad_byte_count += 1
+                self.false_start_count += 1
                 at += 1
+                false_starts_left -= 1
+                if false_starts_left <= 0:
+                    self.bad_byte_count += size - at
+                    at = size
                 continue
             frames.append(frame)
             at = end
@@ -190,21 +246,38 @@ def _frame_end(buffer: bytes, at: int, size: int) -> int:
 
 def _checked_frame(buffer: bytes, at: int, end: int) -> Frame | None:
     """The frame in `buffer[at:end]`, None if it is of no known kind or its checksum is wrong."""
-    length = buffer[at + 1]
-    if buffer[at] == MAGIC_V1:
-        start, seq, sysid, compid, msg_id = at + 6, buffer[at + 2], buffer[at + 3], buffer[at + 4], buffer[at + 5]
-    else:
-        if buffer[at + 2] & ~SIGNED_FLAG:  # flags we do not know change how the frame is to be read
-            return None
-        start, seq, sysid, compid = at + 10, buffer[at + 4], buffer[at + 5], buffer[at + 6]
-        msg_id = int.from_bytes(buffer[at + 7 : at + 10], "little")
+    start, seq, sysid, compid, msg_id = _header(buffer, at)
+    if start == at + 10 and buffer[at + 2] & ~SIGNED_FLAG:  # flags we do not know change how it is to be read
+        return None
     kind = message_type(msg_id) if msg_id in DEFINITIONS else None
     if kind is None:
         return None
-    stop = start + length
+    stop = start + buffer[at + 1]
     if mcrf4xx(buffer[at + 1 : stop] + kind.crc_extra) != buffer[stop] | buffer[stop + 1] << 8:
         return None
     return Frame(kind, sysid, compid, seq, buffer[start:stop], buffer[at:end])
+
+
+def _header(buffer: bytes, at: int) -> tuple[int, int, int, int, int]:
+    """Where the payload starts; sequence number, system, component and message id."""
+    if buffer[at] == MAGIC_V1:
+        return at + 6, buffer[at + 2], buffer[at + 3], buffer[at + 4], buffer[at + 5]
+    msg_id = int.from_bytes(buffer[at + 7 : at + 10], "little")
+    return at + 10, buffer[at + 4], buffer[at + 5], buffer[at + 6], msg_id
+
+
+def _may_be_unknown(buffer: bytes, at: int, end: int) -> bool:
+    """Whether `buffer[at:end]` can be a frame of a kind without a definition."""
+    if end > len(buffer):
+        return False
+    start, _, sysid, _, msg_id = _header(buffer, at)
+    has_unknown_flags = start == at + 10 and (buffer[at + 2] & ~SIGNED_FLAG or buffer[at + 3])
+    return msg_id not in DEFINITIONS and sysid != 0 and not has_unknown_flags
+
+
+def _unknown_frame(buffer: bytes, at: int, end: int) -> Frame:
+    start, seq, sysid, compid, msg_id = _header(buffer, at)
+    return Frame(unknown_type(msg_id), sysid, compid, seq, buffer[start : start + buffer[at + 1]], buffer[at:end])
 
 
 def _compile(definition: Any) -> tuple[Callable[..., bytes], Callable[[bytes], Any], int]:
@@ -244,6 +317,19 @@ def _wire_codes(definition: Any) -> dict[str, str]:
         if message_name == definition.msgname:
             named[field] = "I"
     return named
+
+
+def _target_positions(definition: Any) -> tuple[int, int]:
+    """Where target_system and target_component are in the payload; -1: the message has no such field."""
+    positions = {"target_system": -1, "target_component": -1}
+    at = 0
+    for name, code in _wire_codes(definition).items():
+        # MANUAL_CONTROL calls the system it is for `target`
+        wanted = "target_system" if (definition.msgname, name) == ("MANUAL_CONTROL", "target") else name
+        if wanted in positions:
+            positions[wanted] = at
+        at += struct.calcsize("<" + code)
+    return positions["target_system"], positions["target_component"]
 
 
 def _chars(value: bytes | str) -> bytes:

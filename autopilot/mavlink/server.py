@@ -8,8 +8,10 @@ refused or ignored.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from autopilot.mavlink.absent import AbsentServices
-from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Channel, Endpoint, OnFrame, Sender
+from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, OnFrame, Sender
 from autopilot.mavlink.codec import Frame, known_type
 from autopilot.mavlink.commands import CommandService
 from autopilot.mavlink.component import Component
@@ -18,11 +20,13 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.identity import banner
-from autopilot.mavlink.links import Link
+from autopilot.mavlink.intake import share
+from autopilot.mavlink.links import Link, LinkSource
 from autopilot.mavlink.manual import ManualService
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.parameters import ParameterService
+from autopilot.mavlink.routing import Router
 from autopilot.mavlink.safety import SafetyService
 from autopilot.mavlink.service import CommandHandler, Handler, Service
 from autopilot.mavlink.streams import Stream
@@ -39,7 +43,14 @@ _TIMESYNC = known_type("TIMESYNC")
 
 _COMMAND_IDS = (known_type("COMMAND_LONG").msg_id, known_type("COMMAND_INT").msg_id)  # handed on to components
 
-MAV_TYPE_GCS = 6
+# What these say with a heartbeat is no client's first word: they want no greeting.
+_DEVICES = {
+    mavlink.MAV_TYPE_GIMBAL, mavlink.MAV_TYPE_ADSB, mavlink.MAV_TYPE_CAMERA, mavlink.MAV_TYPE_CHARGING_STATION,
+    mavlink.MAV_TYPE_FLARM, mavlink.MAV_TYPE_SERVO, mavlink.MAV_TYPE_ODID, mavlink.MAV_TYPE_BATTERY,
+    mavlink.MAV_TYPE_PARACHUTE, mavlink.MAV_TYPE_LOG, mavlink.MAV_TYPE_OSD, mavlink.MAV_TYPE_IMU,
+    mavlink.MAV_TYPE_GPS, mavlink.MAV_TYPE_WINCH,
+}  # fmt: skip
+
 SYSID_PARAMETER = "MAV_SYS_ID"
 
 
@@ -49,7 +60,7 @@ class MavlinkServer:
     def __init__(
         self,
         vehicle: Vehicle,
-        links: Sequence[Link],
+        links: Sequence[Link | LinkSource],
         dialect: Dialect = PX4,
         on_frame: OnFrame | None = None,
     ) -> None:
@@ -57,13 +68,15 @@ class MavlinkServer:
 
         Args:
             vehicle: what is asked and reported; its parameter MAV_SYS_ID becomes the system id.
-            links: where clients are.
+            links: where clients are, and where they come and go.
             dialect: which autopilot's numbers to use.
             on_frame: gets the time and the bytes of each frame received, and of each frame sent on the first link
                 or in answer to somebody.
         """
         sysid = int(vehicle.params[SYSID_PARAMETER])
         self._endpoint = Endpoint(vehicle, links, dialect, sysid, on_frame)
+        self._router = Router(self._endpoint)
+        self._turn = 0
         self._is_heartbeat_due = False
         self._commands = CommandService(self._endpoint)
         self._messages: dict[str, Handler] = {}
@@ -143,10 +156,10 @@ class MavlinkServer:
         """
         endpoint = self._endpoint
         endpoint.time_us = time_us
-        for channel in endpoint.channels:
-            for data in channel.link.receive():
-                for frame in channel.reader.feed(data, is_whole=channel.link.keeps_datagrams):
-                    self._handle(channel, frame)
+        endpoint.poll()
+        busy = [channel for channel in endpoint.channels if channel.intake.fill()]
+        if busy:
+            self._serve(busy)
         for run in self._frames:
             run()
         if self._is_heartbeat_due:
@@ -154,21 +167,34 @@ class MavlinkServer:
             self._broadcast_telemetry(_HEARTBEAT.msg_id)
         endpoint.send_streams()
 
+    def _serve(self, busy: list[Channel]) -> None:
+        """Handles what has come in, of each channel as much as its share allows; another is first each time."""
+        endpoint = self._endpoint
+        work_max = share(len(busy))
+        self._turn += 1
+        first = self._turn % len(busy)
+        for channel in busy[first:] + busy[:first]:
+            endpoint.asker, intake = channel, channel.intake
+            while (frame := intake.next(work_max)) is not None:
+                sent_before = endpoint.sent_count
+                self._handle(channel, frame)
+                intake.work += endpoint.sent_count - sent_before
+        endpoint.asker = None
+
     def _handle(self, channel: Channel, frame: Frame) -> None:
-        """Hands a frame to its service, or to the component it is addressed to, if that is one of ours."""
+        """Passes a frame on to whom else it concerns; hands it to its service, or to the component it is for."""
         endpoint = self._endpoint
         endpoint.received(frame.raw)
+        if frame.sysid == endpoint.sysid and frame.compid in endpoint.compids:
+            return  # our own, come back
+        target_system, target = frame.target()
+        self._router.route(channel, frame, target_system, target)
         msg_id = frame.kind.msg_id
         handler = self._handlers.get(msg_id)
         listeners = [component for component in self._components if msg_id in component.handlers]
-        is_echo = frame.sysid == endpoint.sysid and frame.compid in endpoint.compids
-        if (handler is None and not listeners) or is_echo:
+        if (handler is None and not listeners) or not endpoint.is_for_us(target_system, target):
             return
-        fields = frame.kind.unpack(frame.payload)
-        target = getattr(fields, "target_component", 0)
-        if not endpoint.is_for_us(getattr(fields, "target_system", 0), target):
-            return
-        sender = Sender(channel, frame.sysid, frame.compid)
+        fields, sender = frame.kind.unpack(frame.payload), Sender(channel, frame.sysid, frame.compid)
         if handler is not None and (target in (0, AUTOPILOT_COMPONENT) or msg_id in _COMMAND_IDS):
             handler(sender, fields)
         for component in listeners:
@@ -177,18 +203,19 @@ class MavlinkServer:
 
     def close(self) -> None:
         """Closes the links."""
-        for channel in self._endpoint.channels:
-            channel.link.close()
+        for source in self._endpoint.sources:
+            source.close()
 
     # Messages that belong to no service
 
     def _heartbeat_received(self, sender: Sender, fields: Any) -> None:
         """Greets a client that is new on its channel; of a ground station: keeps the link alive (NAV_DLL_ACT)."""
-        if fields.type == MAV_TYPE_GCS and not sender.channel.is_mute:
+        if fields.type == mavlink.MAV_TYPE_GCS and not sender.channel.is_mute:
             self._endpoint.vehicle.station.heard(self._endpoint.time_us)
-        client = (sender.sysid, sender.compid)
-        if client not in sender.channel.clients:
-            sender.channel.clients.add(client)
+        client, clients = (sender.sysid, sender.compid), sender.channel.clients
+        is_client = fields.type not in _DEVICES and sender.compid != AUTOPILOT_COMPONENT
+        if is_client and client not in clients and len(clients) < CLIENTS_MAX:
+            clients.add(client)
             self._endpoint.text(Severity.INFO, banner(self._endpoint.dialect), to=sender)
 
     def _ping_received(self, sender: Sender, fields: Any) -> None:
