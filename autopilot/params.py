@@ -25,6 +25,16 @@ def _constant(name: str, value: int | float, meaning: str) -> Parameter:
 
 SYSTEM_PARAMETERS: list[Parameter] = [
     Parameter("MAV_SYS_ID", 1, 1, 250, "", "MAVLink system id, read at power-on", "PX4 default"),
+    Parameter(
+        "SDLOG_MODE",
+        0,
+        -1,
+        2,
+        "",
+        "when a log of its own begins in the state folder: 0 armed to disarmed, 1 power-on to disarmed, 2 power-on to "
+        "the end, -1 never",
+        "PX4 default",
+    ),
     _constant("SYS_AUTOSTART", 4001, "airframe: generic quadrotor"),
     _constant("SYS_AUTOCONFIG", 0, "do not reset parameters"),
     Parameter("SYS_FAILURE_EN", 0, 0, 1, "", "1: clients may inject failures into an armed vehicle", "PX4 default"),

@@ -3,6 +3,7 @@
 A target is either the old file or the new one, never half of it; what a killed process had written stays in the .part.
 """
 
+import os
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self
@@ -65,3 +66,22 @@ def write_whole(target: Path | str, content: bytes) -> None:
     """
     with PartFile(target) as file:
         file.write(content)
+
+
+def write_durably(target: Path, content: bytes) -> None:
+    """Writes the file in one go, and returns when it would survive a loss of power.
+
+    Raises:
+        OSError: the folder is missing or may not be written; an existing file is as it was.
+    """
+    part = part_path(target)
+    with part.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(target)
+    folder = os.open(target.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)

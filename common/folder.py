@@ -24,10 +24,9 @@ class FolderEntry:
 
 
 class ConfinedFolder:
-    """Files below `root`, which is made if it is missing. Each method raises OSError as the file system does."""
+    """Files below `root`, which is made when something is put there. Methods raise OSError as the file system does."""
 
     def __init__(self, root: Path, quota_bytes: int = QUOTA_BYTES) -> None:
-        root.mkdir(parents=True, exist_ok=True)
         self.root = root.resolve()
         self.quota_bytes = quota_bytes
         self._used_bytes = 0
@@ -49,8 +48,11 @@ class ConfinedFolder:
 
     def entries(self, name: str) -> list[FolderEntry]:
         """What a folder holds, in the order of the names; without what leads outside."""
-        found = []
-        for path in sorted(self.path(name).iterdir()):
+        found: list[FolderEntry] = []
+        folder = self.path(name)
+        if folder == self.root and not folder.exists():
+            return found
+        for path in sorted(folder.iterdir()):
             if path.resolve().is_relative_to(self.root):
                 stat = path.stat()
                 is_folder = path.is_dir()
@@ -138,6 +140,7 @@ class ConfinedFolder:
     def _require_entry(self) -> None:
         if self._entries >= ENTRIES_MAX:
             raise OSError(errno.ENOSPC, "too many files")
+        self.root.mkdir(parents=True, exist_ok=True)
 
     def _measure(self) -> None:
         """Counts what is there; others may have changed it."""

@@ -5,7 +5,7 @@ message. Topics are declared first; the definitions go out with the first row. R
 time. Fields are aligned as a C compiler aligns them, by `_padding` fields that readers skip. Same calls, same bytes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from re import fullmatch
 from struct import Struct, calcsize, pack
@@ -67,6 +67,7 @@ class UlogTopic:
         self._header = (self._dtype.itemsize - _HEADER.size, ord("D"), topic_id)
         self._pack = Struct("<HBH" + struct_layout).pack
         self._writer = writer
+        self._last: npt.NDArray[Any] | None = None
 
     def write(self, rows: Columns) -> None:
         """Appends rows, given as a structured array or as columns by field name.
@@ -80,11 +81,18 @@ class UlogTopic:
             records["_size"], records["_kind"], records["_topic_id"] = self._header
             for name in self.field_names:
                 records[name] = rows[name]
+            self._last = records[-1:]
             self._writer.append(records.tobytes())
+
+    def latest(self) -> dict[str, Any] | None:
+        """The last row by field; None if none has been written."""
+        return None if self._last is None else {name: self._last[name][0] for name in self.field_names}
 
     def write_row(self, time_us: int, *values: float) -> None:
         """Appends one row; array fields are given element by element, in the order of declaration."""
-        self._writer.append(self._pack(*self._header, time_us, *values))
+        record = self._pack(*self._header, time_us, *values)
+        self._last = np.frombuffer(record, self._dtype)
+        self._writer.append(record)
 
 
 class UlogWriter(PartFile):
@@ -111,16 +119,12 @@ class UlogWriter(PartFile):
             OSError: the folder is missing or may not be written.
         """
         super().__init__(target)
-        self._preamble = [MAGIC + pack("<Q", start_us), _record("B", bytes(40))]
-        self._definitions: list[bytes] = []
-        for key, value in info.items():
-            self._definitions += _info_records(key, value)
-        self._definitions += [_record("P", _key_value(name, value)) for name, value in parameters.items()]
-        for name, default in (parameter_defaults or {}).items():
-            if default != parameters.get(name):
-                content = bytes((PARAMETER_DEFAULT_OF_SYSTEM,)) + _key_value(name, default)
-                self._definitions.append(_record("Q", content))
+        self._start_us = start_us
+        self._info = [record for key, value in info.items() for record in _info_records(key, value)]
+        self._parameters = dict(parameters)
+        self._defaults = dict(parameter_defaults or {})
         self._topics: list[UlogTopic] = []
+        self.listeners: list[Callable[[bytes], None]] = []  # each gets whole data records, many at a time
         self._has_data = False
         self._bytes_since_sync = 0
 
@@ -147,6 +151,7 @@ class UlogWriter(PartFile):
 
     def parameter(self, name: str, value: int | float) -> None:
         """Logs a parameter change, in force from the rows that follow."""
+        self._parameters[name] = value
         self.append(_record("P", _key_value(name, value)))
 
     def append(self, records: bytes) -> None:
@@ -154,6 +159,8 @@ class UlogWriter(PartFile):
         if not self._has_data:
             self._begin_data()
         self.write(records)
+        for listener in self.listeners:
+            listener(records)
         self._bytes_since_sync += len(records)
         if self._bytes_since_sync >= SYNC_EVERY_BYTES:
             self.write(_record("S", SYNC_MAGIC))
@@ -165,22 +172,29 @@ class UlogWriter(PartFile):
             self._begin_data()
         super().close()
 
-    def _begin_data(self) -> None:
-        self._has_data = True
+    def header(self, start_us: int) -> bytes:
+        """The log up to its data, with the parameters as they are now: a log of its own may follow from here."""
         formats = dict.fromkeys(topic.format_text for topic in self._topics)
+        changed = {name: value for name, value in self._defaults.items() if value != self._parameters.get(name)}
+        default = bytes((PARAMETER_DEFAULT_OF_SYSTEM,))
         subscriptions = (
             _record("A", pack("<BH", topic.multi_id, topic.topic_id) + topic.name.encode()) for topic in self._topics
         )
-        self.write(
-            b"".join(
-                (
-                    *self._preamble,
-                    *(_record("F", text.encode()) for text in formats),
-                    *self._definitions,
-                    *subscriptions,
-                )
+        return b"".join(
+            (
+                MAGIC + pack("<Q", start_us),
+                _record("B", bytes(40)),
+                *(_record("F", text.encode()) for text in formats),
+                *self._info,
+                *(_record("P", _key_value(name, value)) for name, value in self._parameters.items()),
+                *(_record("Q", default + _key_value(name, value)) for name, value in changed.items()),
+                *subscriptions,
             )
         )
+
+    def _begin_data(self) -> None:
+        self._has_data = True
+        self.write(self.header(self._start_us))
 
 
 def _record(kind: str, content: bytes) -> bytes:

@@ -11,6 +11,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from autopilot.host import Host
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
@@ -18,15 +19,20 @@ from autopilot.mavlink.links import Link, LinkRole, LinkSource, memory_pair
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.node import FlightController, HostPorts
 from autopilot.params import parameter_table
+from autopilot.persistence import Persistence
+from autopilot.vehicle import Severity
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer
+from common.folder import ConfinedFolder
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.kernels import FRAME_TICKS, FRAME_US
 from common.params import ParameterTable
 from common.records import row_reader
+from common.state_folder import StateFolder
 from common.tlog import TlogWriter
 from mission.client import Running
 from mission.injection import RigInjector
+from mission.log_shelf import FlightLogs, RunLog
 from mission.recorder import History, Recorder
 from mission.script import Drone, Script
 from sim.rig import Rig
@@ -71,10 +77,16 @@ class Flight:
         config: what it is made from.
         links: besides the memory link to `drone`, for ground stations.
         folder: where `flight.ulg` and `flight.tlog` are written; None writes nothing.
+        state: what outlives the flight; None: it begins with defaults and nothing is kept.
     """
 
     def __init__(
-        self, config: FlightConfig, *, links: Sequence[Link | LinkSource] = (), folder: Path | None = None
+        self,
+        config: FlightConfig,
+        *,
+        links: Sequence[Link | LinkSource] = (),
+        folder: Path | None = None,
+        state: StateFolder | None = None,
     ) -> None:
         self.config = config
         self.airframe: Airframe = load_airframe(config.airframe)
@@ -91,9 +103,11 @@ class Flight:
         self.time_us = 0
         self.ready_s = nan  # power-on to ready to arm
         self.params = flight_parameters(config, self.airframe)
+        self.persistence = None if state is None else Persistence(state, self.params, config.parameters)
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
         self._injector = RigInjector(self.rig, self.airframe, config.noise)
+        self.host = Host(files=host_files(folder, state))
         self.controller = FlightController(
             host_ports(self.rig),
             self.params,
@@ -101,6 +115,7 @@ class Flight:
             config.home,
             on_reboot=self.rig.reboot,
             injector=self._injector,
+            host=self.host,
         )
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
@@ -118,6 +133,19 @@ class Flight:
         for server in self._servers:
             self.controller.attach(server)
         self.controller.attach(self.recorder)
+        self._flight_logs: FlightLogs | None = None
+        self._connect_host(log, state)
+
+    def _connect_host(self, log: Path | None, state: StateFolder | None) -> None:
+        """Gives the flight controller the logs, and what it remembers of earlier flights."""
+        self.host.log_stream = self.recorder
+        if log is not None:
+            self.host.logs = RunLog(log, self.recorder)
+        if state is not None:
+            self.host.logs = self._flight_logs = FlightLogs(state.folder / "logs", self.recorder, self.params)
+        if self.persistence is not None:
+            self.persistence.keep_lists(self.controller.lists)
+            self.persistence.on_trouble = lambda text: self.server.statustext(Severity.WARNING, text)
 
     def frame(self) -> None:
         """Advances by 20 ms."""
@@ -126,6 +154,10 @@ class Flight:
         self.time_us += FRAME_US
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
+        if self._flight_logs is not None:
+            self._flight_logs.frame(is_armed=self.controller.state.is_armed)
+        if self.persistence is not None:
+            self.persistence.frame(self.time_us)
         if isnan(self.ready_s) and self.controller.state.is_ready_to_arm:
             self.ready_s = self.time_us * 1e-6
 
@@ -159,12 +191,22 @@ class Flight:
         return running
 
     def close(self) -> History:
-        """Completes the logs, closes the links and returns the history."""
+        """Completes the logs, closes the links and returns the history; a state folder stays the caller's to close."""
+        if self.persistence is not None:
+            self.persistence.write()
+        if self._flight_logs is not None:
+            self._flight_logs.end()
         for server in self._servers:
             server.close()
         if self._tlog is not None:
             self._tlog.close()
         return self.recorder.close()
+
+
+def host_files(folder: Path | None, state: StateFolder | None) -> ConfinedFolder | None:
+    """Where files of clients go: with the state, or else with the run."""
+    root = folder if state is None else state.folder
+    return None if root is None else ConfinedFolder(root / "files")
 
 
 def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTable:

@@ -4,7 +4,7 @@ In: the live kernel rows, copied raw once per frame. Out: columns, written once 
 costs a flight faster than real time almost nothing.
 """
 
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,40 +12,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from autopilot.mavlink.identity import project_version
+from autopilot.host import LogListener
 from autopilot.node import FlightController
-from autopilot.vehicle import LandedState, Severity
+from autopilot.vehicle import Severity
 from common.airframe import Airframe
-from common.ulog import UlogTopic, UlogWriter
-from mission.topics import TOPICS, Batch, Columns
+from common.params import Parameter
+from mission.flight_log import STATUS_DTYPE, FlightLog
+from mission.topics import Batch
 from sim.rig import Rig
 
 FLUSH_FRAMES = 50
 AIDS = {"gnss_pos": 2, "gnss_vel": 3, "gnss_height": 1, "baro": 1, "mag": 3, "range": 1}  # and their components
 BAND_SIGMA = 1.959964  # 95 % of a normal distribution lie within
-NAVIGATION_STATES = {0: 4, 1: 17, 2: 3, 3: 5, 4: 18, 5: 14}  # Mode -> vehicle_status.nav_state of PX4
-DISARMED, ARMED = 1, 2  # vehicle_status.arming_state
-NO_MISSION, NOT_STARTED, COMPLETE = 1, 2, 5  # MISSION_STATE
-STATUS_PERIOD_US = 500_000  # state is logged when it changes, and this often
-
-STATUS_DTYPE = np.dtype(
-    [
-        ("mode", "u1"),
-        ("is_armed", "?"),
-        ("is_failsafe", "?"),
-        ("is_ready_to_arm", "?"),
-        ("armed_since_us", "u8"),
-        ("landed_state", "u1"),
-        ("has_ground_contact", "?"),
-        ("mission_current", "u2"),
-        ("mission_reached", "i4"),  # -1: none
-        ("mission_count", "u2"),
-        ("mission_state", "u1"),
-        ("battery_remaining", "f8"),
-        ("battery_used_mah", "f8"),
-    ]
-)
-_CHANGES_SHOWN = [name for name in STATUS_DTYPE.names or () if not name.startswith("battery")]
+NO_MISSION, NOT_STARTED = 1, 2  # MISSION_STATE
 
 Rows = npt.NDArray[Any]
 
@@ -101,28 +80,26 @@ class Recorder:
         self._controller = controller
         self._time_us: list[int] = []
         self._status: list[tuple[int | float, ...]] = []
-        self._status_before = np.zeros(1, STATUS_DTYPE)
         self._mission_reached = -1
         self._body = _RawRow(rig.arrays.body.numpy())
         self._sensors = _RawRow(rig.arrays.sensors.numpy())
         self._control = _RawRow(autopilot.control.numpy())
         self._estimator = _RawRow(autopilot.ekf.rows.numpy())
         self._imu_ring = _RawRow(autopilot.ekf.imu_ring.numpy())
-        self._imu_time_us = 0
         imu_model = rig.arrays.sensor_model.numpy()["imu"][0]
-        self._imu_limits = (imu_model["gyro_limit"].copy(), imu_model["accel_limit"].copy())
+        self._imu_limits = (float(imu_model["gyro_limit"]), float(imu_model["accel_limit"]))
         self._samples_before = np.zeros(1, dtype=rig.arrays.sensors.numpy()["samples"].dtype)
         self._judged_us = dict.fromkeys(AIDS, 0)
         self._in_band = {name: [0, 0] for name in AIDS}
         self._history: list[History] = []
-        self._log = None if path is None else _open_log(path, controller, airframe)
-        self._topics: list[tuple[UlogTopic, Callable[[Batch], Any]]] = []
-        if self._log is not None:
-            self._topics = [(self._log.add_topic(topic.name, topic.fields), topic.columns) for topic in TOPICS]
-            self._imu_topic = self._log.add_topic("sensor_combined", _IMU_FIELDS)
-            self._status_topic = self._log.add_topic("vehicle_status", _STATUS_FIELDS)
-            self._landed_topic = self._log.add_topic("vehicle_land_detected", _LANDED_FIELDS)
-            self._mission_topic = self._log.add_topic("mission_result", _MISSION_FIELDS)
+        self._path = path
+        self._airframe = airframe
+        self._log: FlightLog | None = None if path is None else self._new_log()
+        self._changed: dict[str, int | float] = {}  # parameters, since the last flush
+        controller.params.on_change(self._parameter_changed)
+
+    def _new_log(self) -> FlightLog:
+        return FlightLog(self._path, self._airframe, self._controller.params, self._imu_limits)
 
     def frame(self, time_us: int) -> None:
         """Notes the frame that is ending."""
@@ -156,7 +133,7 @@ class Recorder:
         """Logs a text of the vehicle."""
         if self._log is not None:
             self.flush()
-            self._log.message(self._controller.state.time_us, int(severity), text)
+            self._log.text(self._controller.state.time_us, severity, text)
 
     def mission_item_reached(self, seq: int) -> None:
         """Logged with the mission's progress."""
@@ -196,7 +173,42 @@ class Recorder:
         self._history.append(_history(batch))
         imu = self._imu_ring.take()
         if self._log is not None:
-            self._write(batch, imu)
+            self._log.write(batch, imu)
+            for name, value in self._changed.items():
+                self._log.parameter(name, value)
+        self._changed.clear()
+
+    def _parameter_changed(self, declaration: Parameter) -> None:
+        self._changed[declaration.name] = self._controller.params[declaration.name]
+
+    # ---- autopilot.host.LogStream ----
+
+    def listen(self, listener: LogListener) -> bytes:
+        self.flush()
+        return self._stream().listen(listener, self._controller.state.time_us)
+
+    def stop_listening(self, listener: LogListener) -> None:
+        self.flush()
+        self._stream().stop_listening(listener)
+
+    def topics(self) -> Sequence[str]:
+        return self._stream().topics()
+
+    def latest(self, topic: str) -> Mapping[str, Any] | None:
+        self.flush()
+        return self._stream().latest(topic)
+
+    def _stream(self) -> FlightLog:
+        """The log; where no file is written it begins when somebody wants it."""
+        if self._log is None:
+            self._log = self._new_log()
+        return self._log
+
+    def flush_file(self) -> None:
+        """Hands everything up to now to the file system."""
+        self.flush()
+        if self._log is not None:
+            self._log.flush()
 
     def innovations_in_band(self) -> dict[str, float]:
         """Share of normalised innovations within their 95 % band while armed, per source; NaN where none came."""
@@ -223,99 +235,6 @@ class Recorder:
             return History(*(np.empty(0) for _ in names))
         return History(*(np.concatenate([getattr(part, name) for part in self._history]) for name in names))
 
-    def _write(self, batch: Batch, imu_rings: Rows) -> None:
-        for topic, columns in self._topics:
-            topic.write(columns(batch))
-        times, first = np.unique(imu_rings["time_us"], return_index=True)
-        imu = imu_rings[first[times > self._imu_time_us]]
-        if len(imu):
-            self._imu_time_us = int(imu["time_us"][-1])
-            self._imu_topic.write(_imu_columns(imu, *self._imu_limits))
-        self._write_status(batch)
-
-    def _write_status(self, batch: Batch) -> None:
-        """Vehicle state, landing and mission progress: when one of them changed, and twice a second."""
-        status = batch.vehicle
-        before = np.concatenate([self._status_before, status[:-1]])
-        self._status_before = status[-1:].copy()
-        is_logged = batch.time_us % STATUS_PERIOD_US == 0
-        for name in _CHANGES_SHOWN:
-            is_logged |= status[name] != before[name]
-        rows, time_us = status[is_logged], batch.time_us[is_logged]
-        for topic, columns in (
-            (self._status_topic, _status_columns(rows)),
-            (self._landed_topic, _landed_columns(rows)),
-            (self._mission_topic, _mission_columns(rows)),
-        ):
-            topic.write({"timestamp": time_us, **columns})
-
-
-_IMU_FIELDS = {
-    "gyro_rad": "float[3]",
-    "gyro_integral_dt": "uint32_t",
-    "accelerometer_timestamp_relative": "int32_t",
-    "accelerometer_m_s2": "float[3]",
-    "accelerometer_integral_dt": "uint32_t",
-    **dict.fromkeys("accelerometer_clipping gyro_clipping".split(), "uint8_t"),
-}
-_STATUS_FIELDS = {
-    "armed_time": "uint64_t",
-    **dict.fromkeys("arming_state nav_state".split(), "uint8_t"),
-    **dict.fromkeys("failsafe pre_flight_checks_pass".split(), "bool"),
-}
-_LANDED_FIELDS = dict.fromkeys("ground_contact landed".split(), "bool")
-_MISSION_FIELDS = {
-    "seq_reached": "int32_t",
-    **dict.fromkeys("seq_current seq_total".split(), "uint16_t"),
-    **dict.fromkeys("valid finished".split(), "bool"),
-}
-_NAVIGATION_STATE = np.array([NAVIGATION_STATES[mode] for mode in range(len(NAVIGATION_STATES))])
-
-
-def _status_columns(rows: Rows) -> Columns:
-    return {
-        "armed_time": np.where(rows["is_armed"], rows["armed_since_us"], 0),
-        "arming_state": np.where(rows["is_armed"], ARMED, DISARMED),
-        "nav_state": _NAVIGATION_STATE[rows["mode"]],
-        "failsafe": rows["is_failsafe"],
-        "pre_flight_checks_pass": rows["is_ready_to_arm"],
-    }
-
-
-def _landed_columns(rows: Rows) -> Columns:
-    is_landed = rows["landed_state"] == LandedState.ON_GROUND
-    return {"ground_contact": rows["has_ground_contact"] | is_landed, "landed": is_landed}
-
-
-def _mission_columns(rows: Rows) -> Columns:
-    return {
-        "seq_reached": rows["mission_reached"],
-        "seq_current": rows["mission_current"],
-        "seq_total": rows["mission_count"],
-        "valid": rows["mission_count"] > 0,
-        "finished": rows["mission_state"] == COMPLETE,
-    }
-
-
-def _imu_columns(imu: Rows, gyro_limit: float, accel_limit: float) -> Columns:
-    period_us = np.round(imu["dt_s"] * 1e6).astype(np.uint32)
-    return {
-        "timestamp": imu["time_us"],
-        "gyro_rad": imu["gyro_frd"],
-        "gyro_integral_dt": period_us,
-        "accelerometer_timestamp_relative": 0,
-        "accelerometer_m_s2": imu["accel_frd"],
-        "accelerometer_integral_dt": period_us,
-        "accelerometer_clipping": _clipped_axes(imu["accel_frd"], accel_limit),
-        "gyro_clipping": _clipped_axes(imu["gyro_frd"], gyro_limit),
-    }
-
-
-def _clipped_axes(samples: Rows, limit: float) -> Rows:
-    """Bit 0, 1, 2: x, y, z stands at the sensor's limit."""
-    bits: Rows = (np.abs(samples) >= limit) @ np.array([1, 2, 4])
-    return bits
-
 
 def _history(batch: Batch) -> History:
     estimate, body, status = batch.estimate, batch.body, batch.vehicle
@@ -331,15 +250,4 @@ def _history(batch: Batch) -> History:
         mode=status["mode"].astype(int),
         mission_seq=status["mission_current"].astype(int),
         battery_remaining=status["battery_remaining"],
-    )
-
-
-def _open_log(path: Path, controller: FlightController, airframe: Airframe) -> UlogWriter:
-    table = controller.params
-    return UlogWriter(
-        path,
-        0,
-        {"sys_name": "Honeyguide", "ver_hw": "SIMULATED", "ver_sw": project_version(), "airframe": airframe.name},
-        {name: table[name] for name in table},
-        {name: table.declarations[name].default for name in table},
     )

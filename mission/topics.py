@@ -37,7 +37,7 @@ class Batch:
     actuators: Rows  # Actuators
     health: Rows  # EstimatorState
     body: Rows  # BodyState, the truth
-    vehicle: Rows  # STATUS_DTYPE of mission.recorder
+    vehicle: Rows  # STATUS_DTYPE of mission.flight_log
     origin: GeoPoint
 
 

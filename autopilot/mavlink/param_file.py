@@ -54,11 +54,12 @@ def packed_parameters(entries: Sequence[ParamEntry], total: int, *, with_default
         layout = _LAYOUTS[own_type]
         shared = min(_shared_length(name_before, entry.name), SHARED_LENGTH_MAX, len(entry.name) - 1)
         rest = entry.name[shared:].encode("ascii")
-        has_default = with_defaults and entry.default != entry.value
+        value, default = _packed(layout, entry.value), _packed(layout, entry.default)
+        has_default = with_defaults and default != value
         flags = HAS_DEFAULT if has_default else 0
-        pieces += [bytes((own_type | flags << 4, shared | len(rest) - 1 << 4)), rest, _packed(layout, entry.value)]
+        pieces += [bytes((own_type | flags << 4, shared | len(rest) - 1 << 4)), rest, value]
         if has_default:
-            pieces.append(_packed(layout, entry.default))
+            pieces.append(default)
         name_before = entry.name
     return b"".join(pieces)
 

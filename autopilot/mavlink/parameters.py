@@ -98,16 +98,8 @@ class ParameterService(Service):
 
     def entries(self) -> list[ParamEntry]:
         """The list as numbers: what the values of PARAM_VALUE say."""
-        return [self._entry(name) for name in self._view.names]
-
-    def _entry(self, name: str) -> ParamEntry:
-        view, dialect = self._view, self._endpoint.dialect
-        mav_type = view.param_type(name)
-        value, default = (
-            dialect.parameter_value(mav_type, dialect.parameter_bits(mav_type, number), mav_type)
-            for number in (view.value(name), view.default(name))
-        )
-        return ParamEntry(name, mav_type, value or 0.0, default or 0.0)
+        view = self._view
+        return [ParamEntry(name, view.param_type(name), view.value(name), view.default(name)) for name in view.names]
 
     def set_uploaded(self, values: Iterable[tuple[str, int, float]]) -> None:
         """Sets the parameters of a file: name, MAV_PARAM_TYPE and value; names it does not have are left out."""

@@ -10,7 +10,6 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.mavlink.absent import AbsentServices
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, OnFrame, Sender
 from autopilot.mavlink.codec import Frame, known_type
 from autopilot.mavlink.commands import CommandService
@@ -22,9 +21,12 @@ from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.identity import banner
 from autopilot.mavlink.intake import share
 from autopilot.mavlink.links import Link, LinkSource
+from autopilot.mavlink.log_streaming import LogStreamingService
+from autopilot.mavlink.log_transfer import LogTransferService
 from autopilot.mavlink.manual import ManualService
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.offboard import OffboardService
+from autopilot.mavlink.origin import OriginService
 from autopilot.mavlink.parameters import ParameterService
 from autopilot.mavlink.routing import Router
 from autopilot.mavlink.safety import SafetyService
@@ -105,7 +107,9 @@ class MavlinkServer:
             FtpService(endpoint, parameters),
             TargetService(endpoint),
             ManualService(endpoint),
-            AbsentServices(endpoint),
+            LogTransferService(endpoint),
+            LogStreamingService(endpoint),
+            OriginService(endpoint),
         ]
 
     def _make_components(self) -> list[Component]:

@@ -1,9 +1,19 @@
 """MAVSDK's file plugins against the server, in this process."""
 
+from base64 import b64decode
+from io import BytesIO
+from time import monotonic, sleep
+
 import pytest
 from mavsdk.plugins.ftp import FilesystemEntry, Ftp, FtpError, FtpResult
+from mavsdk.plugins.log_files import LogFiles, LogFilesResult
+from mavsdk.plugins.log_streaming import LogStreaming
+from pyulog import ULog
 
 from common.folder import ConfinedFolder
+from common.state_folder import StateFolder
+from mission.flight import Flight, FlightConfig
+from sim.world.world import WorldConfig
 from tests.system.raw_mavsdk import Outcome, RawMavsdk, served
 from tests.unit.autopilot.mavlink.rig import RecordingVehicle
 
@@ -56,3 +66,57 @@ def test_files_go_up_and_down_and_are_managed(mavsdk, tmp_path):
         ftp.list_directory("../..")
     assert caught.value.result == FtpResult.FILE_PROTECTED
     assert list((tmp_path / "files").iterdir()) == []
+
+
+@pytest.fixture
+def flight(tmp_path):
+    """A flight that has stood on the ground for five seconds, with what two earlier ones have left."""
+    state = StateFolder(tmp_path / "state")
+    (tmp_path / "state/logs").mkdir()
+    (tmp_path / "state/logs/log_00007.ulg").write_bytes(LONG)
+    (tmp_path / "state/logs/log_00009.ulg").write_bytes(LONG[:90])
+    flights = []
+
+    def make_turn(link):
+        config = FlightConfig(parameters={"SDLOG_MODE": 2}, world=WorldConfig(trees_per_ha=0.0))
+        flights.append(Flight(config, links=[link], state=state))
+        flights[0].run(lambda flight: flight.time_us >= 5_000_000)
+        return flights[0].frame
+
+    with RawMavsdk(make_turn) as mavsdk:
+        yield mavsdk
+    flights[0].close()
+    state.close()
+
+
+def test_logs_are_listed_downloaded_and_erased(flight, tmp_path):
+    log_files = LogFiles(flight.system)
+    entries = log_files.get_entries()
+    assert [(entry.id, entry.size_bytes) for entry in entries[:2]] == [(0, len(LONG)), (1, 90)]
+    for i, name in ((0, "log_00007.ulg"), (2, "log_00010.ulg")):
+        download = Outcome(LogFilesResult.NEXT)
+        log_files.download_log_file_async(entries[i], str(tmp_path / name), download)
+        assert download.wait() == LogFilesResult.SUCCESS
+        stored = (tmp_path / "state/logs" / name).read_bytes()
+        assert (tmp_path / name).read_bytes() == stored[: entries[i].size_bytes]
+    ulog = ULog(str(tmp_path / "log_00010.ulg"))
+    assert ulog.get_dataset("vehicle_attitude").data["timestamp"][-1] >= 4_900_000
+    log_files.erase_all_log_files()
+    (left,) = log_files.get_entries()
+    assert left.size_bytes > entries[2].size_bytes
+
+
+def test_log_is_streamed(flight):
+    streaming = LogStreaming(flight.system)
+    pieces = []
+    streaming.subscribe_log_streaming_raw(lambda piece, _: pieces.append(b64decode(piece.data_base64)))
+    streaming.start_log_streaming()
+    deadline_s = monotonic() + 20.0
+    while sum(map(len, pieces)) < 200_000:
+        assert monotonic() < deadline_s, f"{sum(map(len, pieces))} bytes"
+        sleep(0.05)
+    streaming.stop_log_streaming()
+    ulog = ULog(BytesIO(b"".join(pieces)))
+    assert ulog.initial_parameters["SDLOG_MODE"] == 2
+    assert len(ulog.get_dataset("vehicle_attitude").data["timestamp"]) >= 50
+    assert not ulog.dropouts

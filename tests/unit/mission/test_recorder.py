@@ -9,7 +9,7 @@ from pyulog import ULog
 from autopilot.vehicle import MissionItem
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 from mission.flight import Flight, FlightConfig
-from mission.recorder import NAVIGATION_STATES
+from mission.flight_log import NAVIGATION_STATES
 from mission.topics import TOPICS, wxyz
 from sim.faults import set_fault
 

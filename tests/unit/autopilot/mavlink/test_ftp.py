@@ -90,7 +90,9 @@ class FtpClient:
 
 @pytest.fixture
 def root(tmp_path):
-    return tmp_path / "files"
+    root = tmp_path / "files"
+    root.mkdir()
+    return root
 
 
 @pytest.fixture
@@ -215,6 +217,15 @@ def test_listing_leaves_out_what_leads_outside(ftp, root, tmp_path):
 
 def test_size_beyond_the_payload_is_refused(ftp):
     assert ftp.ask(Opcode.OPEN_FILE_RO, "a", size=240).error == Nak.INVALID_DATA_SIZE
+
+
+def test_folder_is_made_when_something_is_put_there(ftp, root):
+    root.rmdir()
+    assert ftp.ask(Opcode.LIST_DIRECTORY, "/").error == Nak.EOF
+    assert ftp.ask(Opcode.OPEN_FILE_RO, "a").error == Nak.FILE_NOT_FOUND
+    assert not root.exists()
+    assert ftp.write("/a", b"content").opcode == Opcode.ACK
+    assert (root / "a").read_bytes() == b"content"
 
 
 def test_quota_is_kept_also_against_writing_far_behind_the_end(ftp, root):
