@@ -15,6 +15,7 @@ from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.commander import Commander
 from autopilot.commander.landing import LandingDetector
 from autopilot.commander.pilot import Pilot
+from autopilot.guidance import Guidance
 from autopilot.host import Host
 from autopilot.injection import FailureInjector, failure_request, injection_refusal
 from autopilot.lists import ItemLists
@@ -149,6 +150,7 @@ class FlightController:
         self.fence, self.rally = self.navigator.fence, self.navigator.rally
         self.lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
         self.commander.connect(self.navigator)
+        self.guidance = Guidance(self.commander, self.navigator, self.payload)
         self.station = self.commander.station
         self._setpoint.write()
 
@@ -278,20 +280,20 @@ class FlightController:
         reply = self.navigator.orbit.request(request)
         return reply if reply.verdict is not Verdict.ACCEPTED else self._enter_anew(Mode.ORBIT)
 
-    def pause_mission(self) -> Reply:
-        if self.state.mode is not Mode.MISSION:
-            return Reply(Verdict.TEMPORARILY_REJECTED, "no mission is being flown")
-        return self.commander.request_mode(Mode.HOLD)
-
-    def start_mission(self, first: int) -> Reply:
+    def start_mission(self, first: int, last: int = -1) -> Reply:
+        mission = self.navigator.mission
         if first >= 0:
-            reply = self.navigator.mission.set_current(first)
+            reply = mission.set_current(first)
+            if reply.verdict is not Verdict.ACCEPTED:
+                return reply
+        if last >= 0:
+            reply = mission.end_after(last)
             if reply.verdict is not Verdict.ACCEPTED:
                 return reply
         return self.commander.request_mode(Mode.MISSION)
 
-    def set_current_item(self, seq: int) -> Reply:
-        return self.navigator.mission.set_current(seq)
+    def set_current_item(self, seq: int, *, is_reset: bool = False) -> Reply:
+        return self.navigator.mission.set_current(seq, is_reset=is_reset)
 
     def load_mission(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
         return self.lists.load(ListKind.MISSION, items)

@@ -294,6 +294,36 @@ class Station(Protocol):
         ...
 
 
+class Guidance(Protocol):
+    """What may be asked of the flight besides a mode, a place or a mission (autopilot.guidance)."""
+
+    def look_at(self, command: int, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
+        """Nose and gimbal towards a place from now on; `command` is handed to the payload."""
+        ...
+
+    def look_ahead(self, command: int, offset_deg: float) -> Reply:
+        """Nose and gimbal as the mode has them, on mission legs turned by an offset."""
+        ...
+
+    def turn(self, angle_deg: float, rate_deg_s: float, direction: float, *, is_relative: bool) -> Reply: ...
+
+    def pause(self) -> Reply:
+        """Stops a mission or a client's setpoints, and holds."""
+        ...
+
+    def resume(self) -> Reply:
+        """Goes on with what was paused; with the mission if nothing was."""
+        ...
+
+    def fly_landing_sequence(self) -> Reply: ...
+
+    def fly_return_path(self) -> Reply: ...
+
+    def abort_landing(self, height_m: float) -> Reply:
+        """Climbs away from a landing, to a height above home at least, and holds."""
+        ...
+
+
 class Vehicle(Protocol):
     """What may be asked of the vehicle. Altitudes are AMSL [m], angles radians, NaN means default."""
 
@@ -313,6 +343,9 @@ class Vehicle(Protocol):
 
     @property
     def fence(self) -> FenceSwitch: ...
+
+    @property
+    def guidance(self) -> Guidance: ...
 
     def arm(self, *, force: bool) -> Reply: ...
 
@@ -340,7 +373,9 @@ class Vehicle(Protocol):
         """Goes there and holds (mode HOLD); all NaN: hold here (pause)."""
         ...
 
-    def change_speed(self, speed_m_s: float) -> Reply: ...
+    def change_speed(self, speed_m_s: float, kind: int) -> Reply:
+        """A speed from now on; `kind` as SPEED_TYPE: 2 climb, 3 descent, else over ground; NaN: the default."""
+        ...
 
     def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
         """All NaN: home is here."""
@@ -360,12 +395,12 @@ class Vehicle(Protocol):
         """Where mode PRECISION_LAND lands [m]."""
         ...
 
-    def pause_mission(self) -> Reply: ...
-
-    def start_mission(self, first: int) -> Reply:
-        """Mode MISSION from item `first` (-1: where it stands)."""
+    def start_mission(self, first: int, last: int) -> Reply:
+        """Mode MISSION from item `first` (-1: where it stands) to item `last` (-1: to its end)."""
         ...
 
-    def set_current_item(self, seq: int) -> Reply: ...
+    def set_current_item(self, seq: int, *, is_reset: bool = False) -> Reply:
+        """Reset: every jump counts from the beginning again."""
+        ...
 
     def reboot(self) -> Reply: ...

@@ -29,8 +29,6 @@ from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
 FORCE = 21196  # param2 of COMPONENT_ARM_DISARM
 REBOOT = 1  # param1 of PREFLIGHT_REBOOT_SHUTDOWN
-UNCHANGED = -1.0
-BY_DEFAULT = -2.0
 
 _COMMAND_ACK = known_type("COMMAND_ACK")
 _MESSAGE_INTERVAL = known_type("MESSAGE_INTERVAL")
@@ -50,6 +48,14 @@ _SHORT_NAMES = {
     mavlink.MAV_CMD_MISSION_START: "Mission",
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: "Mission",
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: "Pause",
+    mavlink.MAV_CMD_DO_LAND_START: "Landing",
+    mavlink.MAV_CMD_DO_RETURN_PATH_START: "Return",
+    mavlink.MAV_CMD_DO_GO_AROUND: "Abort landing",
+    mavlink.MAV_CMD_CONDITION_YAW: "Heading",
+    mavlink.MAV_CMD_DO_SET_ROI: "Region of interest",
+    mavlink.MAV_CMD_DO_SET_ROI_LOCATION: "Region of interest",
+    mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: "Region of interest",
+    mavlink.MAV_CMD_DO_SET_ROI_NONE: "Region of interest",
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: "Reboot",
     mavlink.MAV_CMD_DO_FLIGHTTERMINATION: "Termination",
     mavlink.MAV_CMD_INJECT_FAILURE: "Failure injection",
@@ -83,12 +89,8 @@ class CommandService(Service):
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,
             mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
             mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
-            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
             mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
             mavlink.MAV_CMD_GET_HOME_POSITION: self._get_home,
-            mavlink.MAV_CMD_DO_PAUSE_CONTINUE: self._pause_continue,
-            mavlink.MAV_CMD_MISSION_START: self._mission_start,
-            mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_current_item,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
             mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
             mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
@@ -268,53 +270,6 @@ class CommandService(Service):
         alt_amsl_m, reply = command_alt_amsl_m(self._endpoint.vehicle.state, command)
         speed_m_s = command.p1 if command.p1 > 0.0 else nan
         return reply or vehicle.reposition(command.x, command.y, alt_amsl_m, command.p4, speed_m_s)
-
-    def _change_speed(self, command: Command) -> Reply:
-        """Changes the ground speed of what is being flown, until the mode changes.
-
-        Params: p1 0 or 1: ground speed; p2 speed [m/s], -1: no change, -2: the default.
-        Refused: DENIED for another kind of speed or a negative one.
-        """
-        if whole(command.p1, -1) not in (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED):
-            return denied("only the ground speed can be changed")
-        if command.p2 == UNCHANGED or isnan(command.p2):
-            return ACCEPTED
-        if command.p2 == BY_DEFAULT:
-            return self._endpoint.vehicle.change_speed(nan)
-        if command.p2 < 0.0:
-            return denied("a speed cannot be negative")
-        return self._endpoint.vehicle.change_speed(command.p2)
-
-    def _pause_continue(self, command: Command) -> Reply:
-        """Pauses the mission, or continues it.
-
-        Params: p1 0 pauses, 1 continues.
-        Refused: TEMPORARILY_REJECTED without a mission to pause or to continue.
-        """
-        if command.p1 == 0.0:
-            return self._endpoint.vehicle.pause_mission()
-        if command.p1 == 1.0:
-            return self._endpoint.vehicle.start_mission(-1)
-        return denied("parameter 1 must be 0 (pause) or 1 (continue)")
-
-    def _mission_start(self, command: Command) -> Reply:
-        """Flies the mission.
-
-        Params: p1 first item, -1: where it stands.
-        Refused: TEMPORARILY_REJECTED without a mission, position or home; DENIED for an item there is not.
-        """
-        return self._endpoint.vehicle.start_mission(whole(command.p1, -1) - self._endpoint.dialect.first_seq)
-
-    def _set_current_item(self, command: Command) -> Reply:
-        """Makes a mission item the current one; in mode Mission the vehicle flies to it at once.
-
-        Params: p1 the item's number.
-        Refused: DENIED for an item there is not.
-        """
-        seq = whole(command.p1, -1)
-        if seq < 0:
-            return denied("parameter 1 must be an item's number")
-        return self._endpoint.vehicle.set_current_item(max(seq - self._endpoint.dialect.first_seq, 0))
 
     # Home
 

@@ -24,6 +24,7 @@ from autopilot.mavlink.links import Link, LinkSource
 from autopilot.mavlink.log_streaming import LogStreamingService
 from autopilot.mavlink.log_transfer import LogTransferService
 from autopilot.mavlink.manual import ManualService
+from autopilot.mavlink.mission_commands import MissionCommands
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.origin import OriginService
@@ -101,6 +102,7 @@ class MavlinkServer:
             self._commands,
             parameters,
             MissionService(endpoint),
+            MissionCommands(endpoint),
             OffboardService(endpoint),
             FenceService(endpoint),
             SafetyService(endpoint),

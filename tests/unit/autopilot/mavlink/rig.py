@@ -1,6 +1,6 @@
 """A vehicle that records what it is asked, and a client at the other end of a memory link."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import nan
 from typing import Any
@@ -153,6 +153,37 @@ class RecordingList:
         return self.refusal
 
 
+class RecordingGuidance:
+    """Passes what is asked on to its vehicle's list."""
+
+    def __init__(self, record: Callable[..., Reply]) -> None:
+        self._record = record
+
+    def look_at(self, command: int, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
+        return self._record("look_at", command, lat_deg, lon_deg, alt_amsl_m)
+
+    def look_ahead(self, command: int, offset_deg: float) -> Reply:
+        return self._record("look_ahead", command, offset_deg)
+
+    def turn(self, angle_deg: float, rate_deg_s: float, direction: float, *, is_relative: bool) -> Reply:
+        return self._record("turn", angle_deg, rate_deg_s, direction, is_relative)
+
+    def pause(self) -> Reply:
+        return self._record("pause")
+
+    def resume(self) -> Reply:
+        return self._record("resume")
+
+    def fly_landing_sequence(self) -> Reply:
+        return self._record("fly_landing_sequence")
+
+    def fly_return_path(self) -> Reply:
+        return self._record("fly_return_path")
+
+    def abort_landing(self, height_m: float) -> Reply:
+        return self._record("abort_landing", height_m)
+
+
 class RecordingVehicle:
     """Answers every request with `reply` and keeps a list of them."""
 
@@ -174,6 +205,7 @@ class RecordingVehicle:
             ListKind.RALLY: RecordingList(MAX_RALLY_POINTS),
         }
         self.lists = ItemLists(self.stored)
+        self.guidance = RecordingGuidance(self._record)
 
     @property
     def fence(self) -> "RecordingVehicle":
@@ -216,8 +248,8 @@ class RecordingVehicle:
     def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
         return self._record("reposition", lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
 
-    def change_speed(self, speed_m_s: float) -> Reply:
-        return self._record("change_speed", speed_m_s)
+    def change_speed(self, speed_m_s: float, kind: int) -> Reply:
+        return self._record("change_speed", speed_m_s, kind)
 
     def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
         return self._record("set_home", lat_deg, lon_deg, alt_amsl_m)
@@ -234,14 +266,11 @@ class RecordingVehicle:
     def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
         self._record("report_landing_target", pos_ned)
 
-    def pause_mission(self) -> Reply:
-        return self._record("pause_mission")
+    def start_mission(self, first: int, last: int) -> Reply:
+        return self._record("start_mission", first, last)
 
-    def start_mission(self, first: int) -> Reply:
-        return self._record("start_mission", first)
-
-    def set_current_item(self, seq: int) -> Reply:
-        return self._record("set_current_item", seq)
+    def set_current_item(self, seq: int, *, is_reset: bool = False) -> Reply:
+        return self._record("set_current_item", seq, *([is_reset] if is_reset else []))
 
     def reboot(self) -> Reply:
         return self._record("reboot")

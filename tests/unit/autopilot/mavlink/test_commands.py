@@ -184,18 +184,6 @@ def test_position_that_does_not_exist_is_denied(position):
     assert rig.vehicle.calls == []
 
 
-def test_speed():
-    rig = Rig()
-    assert rig.ack(178, 1.0, 4.0, -1.0).result == ACCEPTED
-    assert rig.ack(178, 1.0, -1.0, -1.0).result == ACCEPTED  # no change
-    assert rig.ack(178, 1.0, -2.0, -1.0).result == ACCEPTED  # default
-    assert rig.ack(178, 2.0, 4.0, -1.0).result == DENIED  # climb speed
-    assert rig.ack(178, 1.0, -5.0, -1.0).result == DENIED
-    assert rig.vehicle.calls[0] == ("change_speed", 4.0)
-    assert isnan(rig.vehicle.calls[1][1])
-    assert len(rig.vehicle.calls) == 2
-
-
 def test_home_here_and_there():
     rig = Rig()
     rig.ack(179, 1.0)
@@ -247,24 +235,6 @@ def test_message_request_that_means_nothing_is_told_in_one_short_text():
         told = [m.fields for m in rig.frame() if m.name == "STATUSTEXT"]
         assert [text.chunk_seq for text in told] == [0]
         assert told[0].severity == mavlink.MAV_SEVERITY_NOTICE
-
-
-def test_mission_commands():
-    rig = Rig()
-    rig.ack(300, 0.0, 0.0)
-    rig.ack(300)
-    rig.ack(193, 0.0)
-    rig.ack(193, 1.0)
-    rig.ack(224, 2.0)
-    assert rig.vehicle.calls == [
-        ("start_mission", 0),
-        ("start_mission", -1),
-        ("pause_mission",),
-        ("start_mission", -1),
-        ("set_current_item", 2),
-    ]
-    assert rig.ack(193, 5.0).result == DENIED
-    assert rig.ack(224, -1.0).result == DENIED
 
 
 def test_prearm_checks_on_request():

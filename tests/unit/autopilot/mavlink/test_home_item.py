@@ -86,7 +86,7 @@ def test_current_item_is_set_by_the_clients_number():
     rig.frame()
     rig.ack(224, 1.0)
     rig.ack(300, 0.0, 0.0)
-    assert rig.vehicle.calls == [("set_current_item", 1), ("set_current_item", 0), ("start_mission", -1)]
+    assert rig.vehicle.calls == [("set_current_item", 1), ("set_current_item", 0), ("start_mission", -1, -1)]
 
 
 def test_refused_item_is_named_by_the_clients_number():

@@ -201,7 +201,7 @@ def test_pause_holds_and_resume_goes_on_along_the_same_leg():
         Kinematic().flying(), item(0, WAYPOINT, 20.0), item(1, WAYPOINT, 100.0), item(2, WAYPOINT, 100.0, 20.0)
     )
     rig.run_until(lambda: rig.pos[0] > 50.0)
-    assert rig.fc.pause_mission().verdict is Verdict.ACCEPTED
+    assert rig.fc.guidance.pause().verdict is Verdict.ACCEPTED
     assert rig.state.mission_state == MissionState.PAUSED
     rig.run(8.0)
     stopped = rig.pos.copy()
@@ -228,7 +228,7 @@ def test_resume_far_from_the_leg_goes_straight_to_the_item():
 
 def test_pause_without_a_mission_is_refused():
     rig = Kinematic().flying()
-    assert rig.fc.pause_mission().verdict is Verdict.TEMPORARILY_REJECTED
+    assert rig.fc.guidance.pause().verdict is Verdict.TEMPORARILY_REJECTED
 
 
 def test_mission_starts_at_the_item_asked_for_and_a_complete_one_starts_again():

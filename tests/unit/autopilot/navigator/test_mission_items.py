@@ -176,7 +176,7 @@ def test_turn_keeps_its_rate_and_its_direction():
     assert rig.fc.navigator.context.heading.turn(90.0, 20.0, -1.0, is_relative=False) is ACCEPTED
     rig.run(6.0)
     assert heading_error(rig.yaw, before - radians(120.0)) < 0.2  # the rig lags behind
-    rig.run(8.0)
+    rig.run(10.0)
     assert heading_error(rig.yaw, radians(90.0)) < 0.02
 
 
