@@ -1,0 +1,260 @@
+"""A pilot's sticks over MAVLink in lockstep: what PX4's and ArduPilot's own flight tests ask of the modes flown by them.
+
+Distances are judged in truth where a comment does not say otherwise.
+"""
+
+from math import degrees, hypot
+
+import numpy as np
+import pytest
+
+from autopilot.vehicle import LandedState, Mode
+from mission.client import CommandRefused
+from mission.flight import Flight, FlightConfig
+from sim.faults import set_fault
+
+MAIN_MODES = {
+    Mode.MANUAL: 1, Mode.ALTITUDE: 2, Mode.POSITION: 3, Mode.ACRO: 5, Mode.OFFBOARD: 6, Mode.STABILIZED: 7,
+}  # fmt: skip
+CMD_SET_MODE = 176
+RATE_HZ = 50.0
+FORWARD, RIGHT = 1000, 1000
+MIDDLE, UP, DOWN = 500, 1000, 0  # of the throttle
+OFF = np.nan
+
+
+class Pilot:
+    """Moves the sticks of a flight's script client, from now on and until told otherwise."""
+
+    def __init__(self, flight):
+        self.flight = flight
+        self.drone = flight.drone
+        self.axes = {"x": 0, "y": 0, "z": MIDDLE, "r": 0}
+        self.is_sending = True
+        self.drone.start(self._send())
+
+    async def _send(self):
+        while True:
+            if self.is_sending:
+                self.drone.send("MANUAL_CONTROL", target=1, buttons=0, **self.axes)
+            await self.drone.sleep(1.0 / RATE_HZ)
+
+    def move(self, x=0, y=0, z=MIDDLE, r=0):
+        self.axes = {"x": x, "y": y, "z": z, "r": r}
+
+    async def hold(self, seconds, **axes):
+        """Holds the sticks there for a while."""
+        self.move(**axes)
+        await self.drone.sleep(seconds)
+
+    async def mode(self, mode):
+        await self.drone.sleep(0.1)
+        await self.drone.command(CMD_SET_MODE, 1.0, MAIN_MODES[mode], name="mode")
+
+    async def land(self, timeout_s=90.0):
+        """Throttle down, hands off the rest, until it has disarmed itself."""
+        self.move(z=DOWN)
+        await self.drone.until(lambda: not self.drone.is_armed, timeout_s, "disarmed")
+
+
+def fly(script, config=None, seconds=300.0, before=None):
+    """Flies `script(pilot)` to its end."""
+    flight = Flight(config or FlightConfig(seed=1))
+    if before is not None:
+        before(flight)
+    running = flight.fly(lambda drone: script(Pilot(flight)), seconds=seconds)
+    assert running.is_done, "the script did not end"
+    if running.error is not None:
+        raise running.error
+    return flight
+
+
+def body(flight):
+    """The true state."""
+    return flight.rig.arrays.body.numpy()[0]
+
+
+def place(flight):
+    return body(flight)["pos_ned"].copy()
+
+
+def speed(flight):
+    north, east, _ = body(flight)["vel_ned"]
+    return hypot(north, east)
+
+
+def height(flight):
+    return -float(body(flight)["pos_ned"][2])
+
+
+def tilt_deg(flight):
+    x, y, _, _ = body(flight)["q_ned_from_frd"]
+    return degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
+
+
+async def watched(pilot, seconds, figure):
+    """A figure of the flight, frame by frame, over some time."""
+    end_us = pilot.drone.time_us + int(seconds * 1e6)
+    values = []
+    while pilot.drone.time_us < end_us:
+        await pilot.drone.sleep(0.02)
+        values.append(figure(pilot.flight))
+    return np.array(values)
+
+
+async def airborne(pilot, mode, height_m=10.0):
+    """Takes off by itself, then hands over to the pilot."""
+    await pilot.drone.wait_ready()
+    await pilot.drone.arm()
+    await pilot.drone.takeoff(height_m)
+    await pilot.mode(mode)
+    await pilot.drone.sleep(1.0)
+
+
+@pytest.mark.parametrize("mode", [Mode.POSITION, Mode.ALTITUDE])
+def test_a_pilot_takes_off_flies_and_lands(mode):
+    """PX4's tests of manual control: 5 s full climb, 10 s half forward; it ends more than 5 m from home, disarmed."""
+    heights = []
+
+    async def script(pilot):
+        await pilot.drone.wait_ready()
+        await pilot.mode(mode)
+        await pilot.drone.arm()
+        await pilot.hold(5.0, z=UP)
+        heights.append(height(pilot.flight))
+        await pilot.hold(10.0, x=FORWARD // 2)
+        heights.append(height(pilot.flight))
+        await pilot.land()
+
+    flight = fly(script)
+    north, east, _ = place(flight)
+    assert heights[0] > 8.0
+    assert heights[1] == pytest.approx(heights[0], abs=3.0)  # it brakes its climb
+    assert hypot(north, east) > 5.0
+    assert flight.controller.state.mode is mode  # the pilot may arm again
+
+
+def gnss_off(flight):
+    set_fault(flight.rig.arrays.faults.numpy()[0], "gnss", "off")
+
+
+@pytest.mark.parametrize("mode", [Mode.STABILIZED, Mode.MANUAL])
+def test_stabilized_with_sticks_in_the_middle_stays_level_without_gnss(mode):
+    """PX4: the tilt error stays below 6 deg."""
+    tilts = []
+
+    async def script(pilot):
+        await pilot.drone.sleep(10.0)
+        pilot.move(z=DOWN)
+        await pilot.mode(mode)
+        await pilot.drone.arm()
+        await pilot.hold(3.0, z=650)
+        pilot.move()
+        tilts.extend(await watched(pilot, 20.0, tilt_deg))
+        await pilot.hold(1.0, z=400)
+        await pilot.land()
+
+    flight = fly(script, before=gnss_off)
+    assert max(tilts) < 6.0
+    assert tilt_deg(flight) < 3.0
+
+
+def test_stabilized_leans_and_turns_as_the_sticks_say():
+    seen = {}
+
+    async def script(pilot):
+        await airborne(pilot, Mode.STABILIZED, 30.0)
+        await pilot.hold(1.5, y=RIGHT // 2)
+        seen["roll"] = degrees(pilot.flight.controller.state.roll_rad)
+        await pilot.hold(1.5, x=FORWARD)
+        seen["pitch"] = degrees(pilot.flight.controller.state.pitch_rad)
+        yaw = pilot.flight.controller.state.yaw_rad
+        await pilot.hold(1.0, r=1000)
+        seen["yaw"] = degrees((pilot.flight.controller.state.yaw_rad - yaw) % (2 * np.pi))
+
+    fly(script)
+    assert seen["roll"] == pytest.approx(17.5, abs=1.5)
+    assert seen["pitch"] == pytest.approx(-35.0, abs=2.0)
+    assert seen["yaw"] == pytest.approx(150.0, abs=15.0)
+
+
+def test_acro_turns_at_the_rate_the_sticks_say_and_keeps_its_attitude_without_them():
+    seen = {}
+
+    async def script(pilot):
+        await airborne(pilot, Mode.ACRO, 60.0)
+        await pilot.hold(0.3, y=RIGHT // 2)
+        seen["rate"] = degrees(pilot.flight.controller.state.estimate.omega_frd[0])
+        await pilot.hold(0.5)
+        roll = pilot.flight.controller.state.roll_rad
+        await pilot.hold(0.5)
+        seen["drift"] = degrees(pilot.flight.controller.state.roll_rad - roll)
+        await pilot.mode(Mode.POSITION)
+        await pilot.hold(4.0)
+        seen["speed"] = speed(pilot.flight)
+
+    fly(script)
+    assert seen["rate"] == pytest.approx(50.0, abs=5.0)
+    assert abs(seen["drift"]) < 3.0
+    assert seen["speed"] < 0.5
+
+
+@pytest.mark.parametrize("mode", [Mode.ALTITUDE, Mode.POSITION])
+def test_height_is_held_with_full_roll_and_pitch(mode):
+    """ArduPilot: 9 to 11 m are kept."""
+    heights = []
+
+    async def script(pilot):
+        await airborne(pilot, mode)
+        for axes in ({"x": FORWARD}, {"x": -FORWARD}, {"y": RIGHT}, {"y": -RIGHT}, {"x": FORWARD, "y": RIGHT}, {}):
+            pilot.move(**axes)
+            heights.extend(await watched(pilot, 5.0, height))
+
+    fly(script, FlightConfig(noise=0.0))
+    assert min(heights) > 9.0
+    assert max(heights) < 11.0
+
+
+def test_position_is_held_after_a_dash():
+    """ArduPilot: after 50 m at full stick, 10 s within 5 m of altitude and position."""
+    places = []
+
+    async def script(pilot):
+        await airborne(pilot, Mode.POSITION)
+        start = place(pilot.flight)
+        pilot.move(x=FORWARD)
+        await pilot.drone.until(lambda: np.hypot(*(place(pilot.flight) - start)[:2]) > 50.0, 20.0, "dash")
+        await pilot.hold(5.0)
+        places.extend(await watched(pilot, 10.0, place))
+
+    fly(script)
+    away = np.array(places) - places[0]
+    assert np.abs(away).max() < 1.0
+
+
+def test_brake_stops_a_vehicle_whose_stick_is_held():
+    """ArduPilot: from more than 5 m/s to less than 1 m/s."""
+    speeds = []
+
+    async def script(pilot):
+        await airborne(pilot, Mode.POSITION)
+        pilot.move(x=FORWARD)
+        await pilot.drone.sleep(6.0)
+        speeds.append(speed(pilot.flight))
+        assert pilot.flight.controller.set_mode(Mode.BRAKE).verdict == 0
+        await pilot.drone.sleep(5.0)
+        speeds.extend(await watched(pilot, 5.0, speed))
+
+    fly(script)
+    assert speeds[0] > 5.0
+    assert max(speeds[1:]) < 1.0
+
+
+def test_a_stick_mode_needs_sticks():
+    async def script(pilot):
+        pilot.is_sending = False
+        await pilot.drone.wait_ready()
+        with pytest.raises(CommandRefused, match="needs a pilot's sticks"):
+            await pilot.mode(Mode.POSITION)
+
+    fly(script)
