@@ -17,7 +17,6 @@ UNUSED = 0xFFFF  # in RC_CHANNELS: no such channel
 _RELEASED = 0  # no value: nobody overrides the channel
 _PULSES_US = (800, 2200)  # a pulse outside is none
 _MOVED_S = 0.1  # low-pass of a stick's speed (PX4: MovingDiff)
-_GAP_S = 1.0  # after a longer silence a stick has not moved but been found somewhere else; guess
 
 
 class InMode(IntEnum):
@@ -167,9 +166,10 @@ class Sticks:
             now = self.input
             now.roll = now.pitch = now.yaw = now.throttle = 0.0
             now.channels[:] = [_RELEASED] * CHANNELS
-            self._heard_us = 0
         if self._first is None:
             self._first = source
+        if not self.is_heard(now_us):
+            self._heard_us = 0  # after a silence the sticks have not moved but been found somewhere else
         self.input.heard_until_us = now_us + silence_us
         return None
 
@@ -177,7 +177,7 @@ class Sticks:
         """Sets the sticks, and how fast they move."""
         now = self.input
         dt_s = (now_us - self._heard_us) * 1e-6
-        if self._heard_us == 0 or dt_s > _GAP_S:
+        if self._heard_us == 0:
             self._speeds = [0.0, 0.0, 0.0, 0.0]
             now.speed = 0.0
         elif dt_s > 0.0:

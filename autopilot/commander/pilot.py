@@ -53,7 +53,7 @@ class Pilot:
     """
 
     __slots__ = (
-        "_arm_hold_us", "_corner", "_corner_since_us", "_count", "_exceptions", "_has_gesture",
+        "_arm_hold_us", "_corner", "_corner_since_us", "_count", "_exceptions", "_has_gesture", "_is_done",
         "_override", "_params", "_speed_max", "_state", "_sticks", "_switch_channel", "_switch_position",
     )  # fmt: skip
 
@@ -62,7 +62,8 @@ class Pilot:
         self._params = params
         self._sticks = sticks
         self._count = 0  # of messages read
-        self._corner = 0  # the yaw stick with the throttle down: 1 right, -1 left; 2: has been acted on
+        self._corner = 0  # the yaw stick with the throttle down: 1 right, -1 left
+        self._is_done = False  # it has been acted on
         self._corner_since_us = 0
         self._switch_position = 0
         self._load()
@@ -126,19 +127,20 @@ class Pilot:
         corner = 0
         if abs(sticks.yaw) > _CORNER and abs(sticks.roll) < _CENTRE and abs(sticks.pitch) < _CENTRE:
             corner = 1 if sticks.yaw > 0.0 else -1
-        if corner == 0:
-            self._corner = 0
-        elif self._corner == 0:
+        if corner != self._corner:
             self._corner = corner
             self._corner_since_us = state.time_us
-        elif self._corner == corner and state.time_us - self._corner_since_us >= self._arm_hold_us:
-            self._corner = 2
-            if corner == -1:
-                _ask(commander, "Disarm", commander.disarm(force=False))
-            elif MODE_RULES[state.mode].needs_sticks:
-                _ask(commander, "Arm", commander.arm(force=False))
-            else:
-                commander.announcer.statustext(Severity.WARNING, "Arm: not in a mode flown by sticks")
+            self._is_done = False
+        is_due = corner != 0 and not self._is_done and state.time_us - self._corner_since_us >= self._arm_hold_us
+        if not is_due or state.landed_state is not LandedState.ON_GROUND:
+            return
+        self._is_done = True
+        if corner == -1:
+            _ask(commander, "Disarm", commander.disarm(force=False))
+        elif state.is_armed or MODE_RULES[state.mode].needs_sticks:
+            _ask(commander, "Arm", commander.arm(force=False))
+        else:
+            commander.announcer.statustext(Severity.WARNING, "Arm: not in a mode flown by sticks")
 
     def _read_switch(self, commander: Authority) -> None:
         """Changes the mode when the mode switch has come to another position that has one."""

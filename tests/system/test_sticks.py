@@ -1,4 +1,4 @@
-"""A pilot's sticks over MAVLink in lockstep: what PX4's and ArduPilot's own flight tests ask of the modes flown by them.
+"""A pilot's sticks over MAVLink in lockstep: what PX4's and ArduPilot's tests ask of the modes flown so.
 
 Distances are judged in truth where a comment does not say otherwise.
 """
@@ -8,7 +8,7 @@ from math import degrees, hypot
 import numpy as np
 import pytest
 
-from autopilot.vehicle import LandedState, Mode
+from autopilot.vehicle import Mode
 from mission.client import CommandRefused
 from mission.flight import Flight, FlightConfig
 from sim.faults import set_fault
@@ -20,7 +20,6 @@ CMD_SET_MODE = 176
 RATE_HZ = 50.0
 FORWARD, RIGHT = 1000, 1000
 MIDDLE, UP, DOWN = 500, 1000, 0  # of the throttle
-OFF = np.nan
 
 
 class Pilot:
@@ -62,7 +61,7 @@ def fly(script, config=None, seconds=300.0, before=None):
     flight = Flight(config or FlightConfig(seed=1))
     if before is not None:
         before(flight)
-    running = flight.fly(lambda drone: script(Pilot(flight)), seconds=seconds)
+    running = flight.fly(lambda _: script(Pilot(flight)), seconds=seconds)
     assert running.is_done, "the script did not end"
     if running.error is not None:
         raise running.error
@@ -248,6 +247,70 @@ def test_brake_stops_a_vehicle_whose_stick_is_held():
     fly(script)
     assert speeds[0] > 5.0
     assert max(speeds[1:]) < 1.0
+
+
+CMD_RETURN, CMD_LAND = 20, 21
+MAIN_AUTO, RTL = 4, 5
+
+
+def test_offboard_attitude_needs_no_position():
+    """PX4: thrust 0.8 up to 10 m, pitch -20 deg for 3 s, roll and pitch within 5 deg; it lands and disarms."""
+    seen = {}
+
+    async def script(pilot):
+        drone, state = pilot.drone, pilot.flight.controller.state
+        pilot.is_sending = False
+        await drone.sleep(10.0)
+        level = (1.0, 0.0, 0.0, 0.0)
+        drone.offboard_attitude(level, 0.1)
+        await drone.start_offboard()
+        await drone.arm()
+        drone.offboard_attitude(level, 0.8)
+        await drone.until(lambda: height(pilot.flight) > 10.0, 20.0, "10 m")
+        hover, half = pilot.flight.params["MPC_THR_HOVER"], np.radians(-10.0)
+        drone.offboard_attitude((np.cos(half), 0.0, np.sin(half), 0.0), hover / np.cos(2.0 * half))
+        await drone.sleep(3.0)
+        seen["roll"], seen["pitch"] = degrees(state.roll_rad), degrees(state.pitch_rad)
+        await drone.command(CMD_LAND, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, name="land")
+        await drone.until(lambda: not drone.is_armed, 120.0, "disarmed")
+
+    fly(script, before=gnss_off)
+    assert seen["roll"] == pytest.approx(0.0, abs=5.0)
+    assert seen["pitch"] == pytest.approx(-20.0, abs=5.0)
+
+
+@pytest.mark.parametrize("mode", [Mode.POSITION, Mode.ALTITUDE, Mode.STABILIZED, Mode.ACRO])
+def test_a_vehicle_whose_pilot_falls_silent_comes_home(mode):
+    """ArduPilot: throttle failsafe; recovery does not change the mode back."""
+
+    async def script(pilot):
+        await airborne(pilot, mode, 20.0)
+        await pilot.hold(1.5, x=FORWARD // 3)
+        pilot.is_sending = False
+        await pilot.drone.until(lambda: pilot.drone.px4_mode == (MAIN_AUTO, RTL), 2.0, "return")
+        pilot.is_sending = True
+        pilot.move()
+        await pilot.drone.sleep(3.0)
+        assert pilot.drone.px4_mode == (MAIN_AUTO, RTL)
+        await pilot.drone.until(lambda: not pilot.drone.is_armed, 180.0, "disarmed")
+
+    flight = fly(script)
+    assert np.hypot(*place(flight)[:2]) < 3.0
+    assert any("Sticks lost: return" in text for text in flight.drone.texts)
+
+
+def test_moving_a_stick_takes_over_from_a_return():
+    async def script(pilot):
+        await airborne(pilot, Mode.POSITION, 20.0)
+        await pilot.hold(8.0, x=FORWARD)
+        await pilot.hold(3.0)
+        await pilot.drone.command(CMD_RETURN, name="return")
+        await pilot.hold(2.0)
+        assert pilot.drone.px4_mode == (MAIN_AUTO, RTL)
+        await pilot.hold(0.5, r=300)
+        assert pilot.drone.px4_mode[0] == MAIN_MODES[Mode.POSITION]
+
+    fly(script)
 
 
 def test_a_stick_mode_needs_sticks():

@@ -17,6 +17,7 @@ from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
     SETPOINT_IDLE,
+    SETPOINT_LEAN,
     SETPOINT_TRAJECTORY,
     TERRAIN_VALID,
     TILT_ALIGNED,
@@ -163,6 +164,16 @@ class Kinematic:
         self.run_until(lambda: self.state.mode is Mode.HOLD)
         return self
 
+    def pilot(self, roll=0.0, pitch=0.0, yaw=0.0, throttle=0.0):
+        """Moves the sticks, once: they are lost after COM_RC_LOSS_T."""
+        self.fc.sticks.joystick_moved((255, 190), self.time_us, (roll, pitch, yaw, throttle), 0)
+
+    def piloted(self, seconds, **axes):
+        """Runs with the sticks held there."""
+        for _ in range(round(seconds / DT_S)):
+            self.pilot(**axes)
+            self.frame()
+
     def disarmed(self, seconds=300.0):
         return self.run_until(lambda: not self.state.is_armed, seconds)
 
@@ -174,7 +185,7 @@ class Kinematic:
 
     def _move(self):
         if self.sp("is_armed") and not self.sp("is_landed") and self.sp("kind") != SETPOINT_IDLE:
-            if self.sp("kind") == SETPOINT_TRAJECTORY:
+            if self.sp("kind") in (SETPOINT_TRAJECTORY, SETPOINT_LEAN):
                 self._follow_trajectory()
             else:
                 self._follow_thrust()
@@ -241,6 +252,7 @@ class Kinematic:
         samples["battery"]["voltage_v"] = self.battery_v
         samples["battery"]["current_a"] = self.battery_a
         self.actuators["thrust_sp"] = self.thrust
+        self.actuators["traj_yaw"] = self.yaw
 
 
 def geo(north, east, height=0.0):

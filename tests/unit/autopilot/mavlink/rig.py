@@ -287,7 +287,7 @@ class Client:
         self._seq = 0
 
     def send(self, name: str, **fields: Any) -> None:
-        if name not in ("HEARTBEAT", "PING", "TIMESYNC"):
+        if name not in ("HEARTBEAT", "PING", "TIMESYNC", "MANUAL_CONTROL"):
             fields = {"target_system": 1} | fields
         self.link.send(encode(name, self.sysid, self.compid, self._seq, **fields))
         self._seq += 1
