@@ -18,6 +18,11 @@ def wall_time_s() -> float:
     return time.perf_counter()
 
 
+def wall_unix_us() -> int:
+    """Unix time in microseconds; it steps when the machine's clock is set."""
+    return time.time_ns() // 1000
+
+
 def wall_date_text() -> str:
     """Date and time of day in UTC, for the names of run folders: 20260131-235959."""
     return datetime.now(UTC).strftime("%Y%m%d-%H%M%S")

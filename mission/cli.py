@@ -60,6 +60,9 @@ def fly(
     tcp_port: Annotated[
         int | None, typer.Option(min=1, max=65535, help="TCP port for clients that connect; ArduPilot's is 5760.")
     ] = None,
+    require_signing: Annotated[
+        bool, typer.Option("--require-signing", help="Refuse unsigned messages on this machine's links too.")
+    ] = False,
     gcs_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of ground stations.")] = (
         GROUND_STATION_PORT
     ),
@@ -78,8 +81,8 @@ def fly(
                 plan=plan, is_idle=idle, once=once, speed=speed, seconds=seconds, seed=seed, wind_m_s=wind,
                 wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
                 trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, bind=bind,
-                tcp_port=tcp_port, gcs_port=gcs_port, api_port=api_port, run_folder=run_folder,
-                parameters=tuple(param or ()),
+                tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
+                run_folder=run_folder, parameters=tuple(param or ()),
             )
         )  # fmt: skip
     except UserError as error:

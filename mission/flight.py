@@ -17,6 +17,7 @@ from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.links import Link, LinkRole, LinkSource, memory_pair
 from autopilot.mavlink.server import MavlinkServer
+from autopilot.mavlink.signing import SigningConfig
 from autopilot.node import FlightController, HostPorts
 from autopilot.params import parameter_table
 from autopilot.persistence import Persistence
@@ -76,6 +77,7 @@ class Flight:
     Args:
         config: what it is made from.
         links: besides the memory link to `drone`, for ground stations.
+        signing: where the key of MAVLink's signatures is kept, and whether they are required.
         folder: where `flight.ulg` and `flight.tlog` are written; None writes nothing.
         state: what outlives the flight; None: it begins with defaults and nothing is kept.
     """
@@ -87,6 +89,7 @@ class Flight:
         links: Sequence[Link | LinkSource] = (),
         folder: Path | None = None,
         state: StateFolder | None = None,
+        signing: SigningConfig | None = None,
     ) -> None:
         self.config = config
         self.airframe: Airframe = load_airframe(config.airframe)
@@ -122,10 +125,10 @@ class Flight:
         on_frame = None if self._tlog is None else self._tlog.frame
         dialect = DIALECTS[config.dialect]
         if dialect is PX4:
-            self.server = MavlinkServer(self.controller, [vehicle_end, *links], on_frame=on_frame)
+            self.server = MavlinkServer(self.controller, [vehicle_end, *links], on_frame=on_frame, signing=signing)
             self._servers = [self.server]
         else:  # the script is not asked to know two languages: it has a server of its own
-            self.server = MavlinkServer(self.controller, links, dialect, on_frame)
+            self.server = MavlinkServer(self.controller, links, dialect, on_frame, signing)
             self._servers = [self.server, MavlinkServer(self.controller, [vehicle_end])]
         self.drone = Drone(client_end)
         log = None if folder is None else folder / "flight.ulg"

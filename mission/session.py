@@ -15,11 +15,12 @@ from rich.live import Live
 from rich.table import Table
 
 from autopilot.mavlink.links import LinkError, LinkRole, LinkSource
+from autopilot.mavlink.signing import MemoryStore, SigningConfig
 from autopilot.mavlink.tcp import TcpPort
 from autopilot.mavlink.udp import SILENCE_US, UdpPort, address_towards
 from autopilot.vehicle import Mode
 from common.airframe import AirframeError, load_airframe
-from common.clock import wall_date_text, wall_time_s
+from common.clock import wall_date_text, wall_time_s, wall_unix_us
 from common.files import write_whole
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.params import ParameterError
@@ -69,6 +70,7 @@ class FlightOptions:
     host: str
     bind: str
     tcp_port: int | None
+    has_to_sign: bool
     gcs_port: int
     api_port: int
     run_folder: Path | None
@@ -94,7 +96,7 @@ def fly_session(options: FlightOptions) -> int:
     links = [] if speed is None else _links(options, speed)
     folder = _new_folder(options.run_folder)
     with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
-        flight = Flight(config, links=links, folder=folder)
+        flight = Flight(config, links=links, folder=folder, signing=_signing(options, speed))
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
     _run(flight, running, options, speed, folder, console)
     return _finish(flight, running, plan, folder, console)
@@ -221,6 +223,13 @@ def _links(options: FlightOptions, speed: float) -> list[LinkSource]:
         hint = "; another flight may be running: choose --gcs-port, --api-port or --tcp-port" if is_taken else ""
         raise UserError(f"{str(error).rstrip('.')}{hint}") from error
     return links
+
+
+def _signing(options: FlightOptions, speed: float | None) -> SigningConfig | None:
+    """Signatures follow the wall clock of the other end; in lockstep there is none, and the date is simulated."""
+    if speed is None:
+        return None
+    return SigningConfig(MemoryStore(), wall_unix_us, options.has_to_sign)
 
 
 def _check_ports(options: FlightOptions) -> None:

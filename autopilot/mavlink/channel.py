@@ -7,13 +7,15 @@ all of them.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from autopilot.mavlink.codec import MessageType, frame_bytes, known_type
+from autopilot.mavlink.codec import SIGNED_FLAG, MessageType, frame_bytes, known_type
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.intake import Intake
 from autopilot.mavlink.links import FixedLinks, Link, LinkSource
 from autopilot.mavlink.parameter_view import ParameterView
+from autopilot.mavlink.signing import MemoryStore, Signer, SigningConfig
 from autopilot.mavlink.streams import StreamSchedule, Telemetry
 from autopilot.vehicle import Severity, Vehicle
+from common.clock import SIMULATED_EPOCH_US
 
 AUTOPILOT_COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1
 TEXT_LENGTH = 50  # characters of one STATUSTEXT
@@ -55,8 +57,10 @@ class Heard:
 class Channel:
     """One client's end of a link: its sequence number, its queue and its telemetry schedule."""
 
-    def __init__(self, link: Link, sysid: int, schedule: StreamSchedule) -> None:
+    def __init__(self, link: Link, number: int, sysid: int, schedule: StreamSchedule) -> None:
         self.link = link
+        self.signer: Signer | None = None  # while there is a key
+        self._link_id = number & 0xFF
         self.schedule = schedule
         self.intake = Intake(link)
         self.heard = Heard()
@@ -76,7 +80,11 @@ class Channel:
         else:
             seq = self._component_seqs.get(compid, 0)
             self._component_seqs[compid] = seq + 1 & 0xFF
-        frame = frame_bytes(kind, payload, seq, self._sysid, compid)
+        if self.signer is None:
+            frame = frame_bytes(kind, payload, seq, self._sysid, compid)
+        else:
+            frame = frame_bytes(kind, payload, seq, self._sysid, compid, SIGNED_FLAG)
+            frame += self.signer.signature(frame, self._link_id)
         if not self.is_mute:
             self.link.send(frame)
         return frame
@@ -106,6 +114,7 @@ class Endpoint:
         dialect: Dialect,
         sysid: int,
         on_frame: OnFrame | None,
+        signing: SigningConfig | None = None,
     ) -> None:
         self.vehicle = vehicle
         self.dialect = dialect
@@ -118,6 +127,8 @@ class Endpoint:
         self.asker: Channel | None = None  # whose message is being handled
         fixed = FixedLinks([link for link in links if not isinstance(link, LinkSource)])
         self.sources: list[LinkSource] = [fixed, *(link for link in links if isinstance(link, LinkSource))]
+        self.signer = Signer(signing or SigningConfig(MemoryStore(), self._simulated_unix_us))
+        self._opened_count = 0
         self.channels: list[Channel] = []
         self._links: list[Sequence[Link]] = []  # of each source, as it was when the channels were made
         self._renew_channels()
@@ -143,9 +154,20 @@ class Endpoint:
             gone.is_open = False
 
     def _open(self, link: Link) -> Channel:
-        channel = Channel(link, self.sysid, StreamSchedule(self.telemetry, link.role))
+        channel = Channel(link, self._opened_count, self.sysid, StreamSchedule(self.telemetry, link.role))
+        self._opened_count += 1
+        channel.signer = self.signer if self.signer.has_key else None
         channel.is_mute = bool(self.channels) and all(other.is_mute for other in self.channels)
         return channel
+
+    def set_signing_key(self, key: bytes, timestamp: int) -> None:
+        """Signs with this key from now on; not at all if it is zero."""
+        self.signer.set_up(key, timestamp)
+        for channel in self.channels:
+            channel.signer = self.signer if self.signer.has_key else None
+
+    def _simulated_unix_us(self) -> int:
+        return SIMULATED_EPOCH_US + self.time_us
 
     def reply(self, sender: Sender, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
         """Sends a message on the channel of `sender`."""

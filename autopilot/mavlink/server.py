@@ -32,6 +32,8 @@ from autopilot.mavlink.parameters import ParameterService
 from autopilot.mavlink.routing import Router
 from autopilot.mavlink.safety import SafetyService
 from autopilot.mavlink.service import CommandHandler, Handler, Service
+from autopilot.mavlink.signing import Judgement, SigningConfig
+from autopilot.mavlink.signing_setup import SigningService
 from autopilot.mavlink.streams import Stream
 from autopilot.mavlink.targets import TargetService
 from autopilot.mavlink.telemetry.status import mission_progress
@@ -43,6 +45,7 @@ _MISSION_CURRENT = known_type("MISSION_CURRENT")
 _MISSION_ITEM_REACHED = known_type("MISSION_ITEM_REACHED")
 _PING = known_type("PING")
 _TIMESYNC = known_type("TIMESYNC")
+_SETUP_SIGNING_ID = known_type("SETUP_SIGNING").msg_id
 
 _COMMAND_IDS = (known_type("COMMAND_LONG").msg_id, known_type("COMMAND_INT").msg_id)  # handed on to components
 
@@ -66,6 +69,7 @@ class MavlinkServer:
         links: Sequence[Link | LinkSource],
         dialect: Dialect = PX4,
         on_frame: OnFrame | None = None,
+        signing: SigningConfig | None = None,
     ) -> None:
         """Connects the services.
 
@@ -75,9 +79,10 @@ class MavlinkServer:
             dialect: which autopilot's numbers to use.
             on_frame: gets the time and the bytes of each frame received, and of each frame sent on the first link
                 or in answer to somebody.
+            signing: where the key is kept, and whether unsigned frames are refused; None: in memory, and they are not.
         """
         sysid = int(vehicle.params[SYSID_PARAMETER])
-        self._endpoint = Endpoint(vehicle, links, dialect, sysid, on_frame)
+        self._endpoint = Endpoint(vehicle, links, dialect, sysid, on_frame, signing)
         self._router = Router(self._endpoint)
         self._turn = 0
         self._is_heartbeat_due = False
@@ -112,6 +117,7 @@ class MavlinkServer:
             LogTransferService(endpoint),
             LogStreamingService(endpoint),
             OriginService(endpoint),
+            SigningService(endpoint),
         ]
 
     def _make_components(self) -> list[Component]:
@@ -190,7 +196,10 @@ class MavlinkServer:
     def _handle(self, channel: Channel, frame: Frame) -> None:
         """Passes a frame on to whom else it concerns; hands it to its service, or to the component it is for."""
         endpoint = self._endpoint
-        endpoint.received(frame.raw)
+        if frame.kind.msg_id != _SETUP_SIGNING_ID:  # its key belongs into no log
+            endpoint.received(frame.raw)
+        if endpoint.signer.is_watching and not self._is_let_in(channel, frame):
+            return
         if frame.sysid == endpoint.sysid and frame.compid in endpoint.compids:
             return  # our own, come back
         target_system, target = frame.target()
@@ -207,8 +216,18 @@ class MavlinkServer:
             if target in (0, component.compid):
                 component.handlers[msg_id](sender, fields)
 
+    def _is_let_in(self, channel: Channel, frame: Frame) -> bool:
+        judgement = self._endpoint.signer.judge(frame, channel.link)
+        if judgement is Judgement.UNSIGNED:
+            self._endpoint.text_once(Severity.WARNING, "Signing: unsigned messages are refused")
+        elif judgement is Judgement.FORGED:
+            self._endpoint.text_once(Severity.WARNING, "Signing: messages with a wrong signature are refused")
+        return judgement is Judgement.TAKEN
+
     def close(self) -> None:
         """Closes the links."""
+        if self._endpoint.signer.has_key:
+            self._endpoint.signer.save()
         for source in self._endpoint.sources:
             source.close()
 
