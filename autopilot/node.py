@@ -149,6 +149,7 @@ class FlightController:
         self.navigator = Navigator(context, mission)
         self.fence, self.rally = self.navigator.fence, self.navigator.rally
         self.lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
+        self.guided = self.navigator.guided
         self.commander.connect(self.navigator)
         self.guidance = Guidance(self.commander, self.navigator, self.payload)
         self.station = self.commander.station
@@ -198,6 +199,9 @@ class FlightController:
 
     # ---- autopilot.vehicle.Vehicle ----
 
+    def has_mode(self, mode: Mode) -> bool:
+        return self.navigator.has_mode(mode)
+
     def arm(self, *, force: bool) -> Reply:
         return self.commander.arm(force=force)
 
@@ -227,6 +231,8 @@ class FlightController:
         return self.commander.request_mode(mode)
 
     def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
+        if self.state.mode is Mode.GUIDED:
+            return self.guided.takeoff(alt_amsl_m, yaw_rad)
         reason = self.commander.refusal(Mode.TAKEOFF)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)

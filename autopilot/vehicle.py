@@ -324,6 +324,18 @@ class Guidance(Protocol):
         ...
 
 
+class GuidedPort(Protocol):
+    """What may be asked of mode GUIDED; the caller changes to it."""
+
+    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply: ...
+
+    def goto(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply: ...
+
+    def forget_goto(self) -> None:
+        """The mode could not be entered."""
+        ...
+
+
 class Vehicle(Protocol):
     """What may be asked of the vehicle. Altitudes are AMSL [m], angles radians, NaN means default."""
 
@@ -346,6 +358,13 @@ class Vehicle(Protocol):
 
     @property
     def guidance(self) -> Guidance: ...
+
+    @property
+    def guided(self) -> GuidedPort: ...
+
+    def has_mode(self, mode: Mode) -> bool:
+        """Whether there is such a mode at all."""
+        ...
 
     def arm(self, *, force: bool) -> Reply: ...
 

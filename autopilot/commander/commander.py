@@ -311,7 +311,7 @@ class Commander:
         self._unpowered_us = state.time_us
         self.guard.release()
         self._next_check_us = 0
-        if not MODE_RULES[state.mode].needs_sticks:  # a pilot may arm again in the same mode
+        if not MODE_RULES[state.mode].needs_sticks and state.mode is not Mode.GUIDED:  # arming again in it is usual
             self.change_mode(Mode.HOLD)
         self.announcer.heartbeat_now()
         self.announcer.statustext(Severity.INFO, text)

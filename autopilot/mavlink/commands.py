@@ -88,7 +88,6 @@ class CommandService(Service):
             mavlink.MAV_CMD_NAV_LAND: self._land,
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,
             mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
-            mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
             mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
             mavlink.MAV_CMD_GET_HOME_POSITION: self._get_home,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
@@ -252,24 +251,6 @@ class CommandService(Service):
         except UnknownModeError as unknown:
             return denied(str(unknown))
         return self._endpoint.vehicle.set_mode(mode)
-
-    def _reposition(self, command: Command) -> Reply:
-        """Goes to a place, height or heading and holds there.
-
-        Params: p1 ground speed [m/s], -1: as it is; p2 bit 1 allows the change of mode; p4 heading [rad], NaN: towards
-        the place; p5, p6 place, NaN: where it is; p7 altitude, NaN: as it is. All NaN: stops here.
-        Refused: TEMPORARILY_REJECTED on the ground or without a position; DENIED for a place that is out of reach or
-        below the ground, or if the mode may not be changed.
-        """
-        vehicle = self._endpoint.vehicle
-        may_change_mode = whole(command.p2, 0) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
-        if not may_change_mode and vehicle.state.mode != Mode.HOLD:
-            return denied("needs mode Hold, or the flag that changes to it")
-        if not is_position(command.x, command.y):
-            return denied("there is no such latitude and longitude")
-        alt_amsl_m, reply = command_alt_amsl_m(self._endpoint.vehicle.state, command)
-        speed_m_s = command.p1 if command.p1 > 0.0 else nan
-        return reply or vehicle.reposition(command.x, command.y, alt_amsl_m, command.p4, speed_m_s)
 
     # Home
 

@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.goto import GotoService
 from autopilot.mavlink.home_item import with_home, without_home
 from autopilot.mavlink.mission_items import infinite_element, item_from_fields, scaled_position
 from autopilot.mavlink.service import Handler, Service
@@ -69,8 +70,9 @@ class Finished:
 class MissionService(Service):
     """Serves the vehicle's three lists."""
 
-    def __init__(self, endpoint: Endpoint) -> None:
+    def __init__(self, endpoint: Endpoint, goto: GotoService) -> None:
         self._endpoint = endpoint
+        self._goto = goto
         self._uploads: dict[ListKind, Upload] = {}
         self._finished: dict[ListKind, Finished] = {}
         self._downloads: dict[tuple[Sender, ListKind], Download] = {}
@@ -147,6 +149,9 @@ class MissionService(Service):
 
     def item_received(self, sender: Sender, fields: Any) -> None:
         """Takes the next item of an upload; the last one is answered by the result for the whole list."""
+        if self._goto.takes_item(fields):
+            self._ack(sender, self._goto.item_received(sender, fields), fields.mission_type)
+            return
         kind = self._kind(sender, fields)
         if kind is None or self._is_busy(sender, kind):
             return

@@ -18,6 +18,7 @@ from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.ftp import FtpService
+from autopilot.mavlink.goto import GotoService
 from autopilot.mavlink.identity import banner
 from autopilot.mavlink.intake import share
 from autopilot.mavlink.links import Link, LinkSource
@@ -102,12 +103,13 @@ class MavlinkServer:
 
     def _services(self) -> list[Service]:
         endpoint = self._endpoint
-        parameters = ParameterService(endpoint)
+        parameters, goto = ParameterService(endpoint), GotoService(endpoint)
         return [
             self._commands,
             parameters,
-            MissionService(endpoint),
             MissionCommands(endpoint),
+            goto,
+            MissionService(endpoint, goto),
             OffboardService(endpoint),
             FenceService(endpoint),
             SafetyService(endpoint),

@@ -3,23 +3,21 @@
 from math import hypot, isfinite
 
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.hold import Hold
 from autopilot.navigator.setpoint import Vector
 from autopilot.ports import TERRAIN_VALID
-from autopilot.vehicle import ACCEPTED, Mode, Reply, Verdict
+from autopilot.vehicle import ACCEPTED, Reply, Verdict
 
 _BELOW_GROUND_M = 1.0  # below home and below the ground under the vehicle: more is a mistake, less an inaccuracy; guess
 
 
 def reposition_target(
-    context: NavContext, hold: Hold, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw: float
+    context: NavContext, base: Vector, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw: float
 ) -> tuple[Vector, float] | Reply:
     """Place and heading that are asked for, or why not.
 
-    What is NaN stays as it is: the place being held, or the place where the vehicle can stop.
+    What is NaN stays as it is at `base` [m]: the place being held, or the place where the vehicle can stop.
     """
     state = context.state
-    base = hold.target_ned if state.mode is Mode.HOLD else context.stop_point()
     if isfinite(lat_deg) != isfinite(lon_deg):
         return Reply(Verdict.DENIED, "needs both latitude and longitude")
     if isfinite(lat_deg):

@@ -8,6 +8,7 @@ from autopilot.navigator.fence import Fence
 from autopilot.navigator.follow import Follow
 from autopilot.navigator.goto import reposition_target
 from autopilot.navigator.ground import Ask, standing_d, vertical_ask
+from autopilot.navigator.guided import Guided
 from autopilot.navigator.hold import Hold
 from autopilot.navigator.land import Land
 from autopilot.navigator.manual import Acro, Altitude, Brake, Position, Stabilized
@@ -53,6 +54,7 @@ class Navigator:
         "context",
         "fence",
         "follow",
+        "guided",
         "hold",
         "land",
         "mission",
@@ -75,6 +77,7 @@ class Navigator:
         self.follow = Follow(context)
         self.orbit = Orbit(context)
         self.precision = mission.precision  # landing items use it too
+        self.guided = Guided(context)
         stabilized = Stabilized(context)
         self._modes: dict[Mode, FlightMode] = {
             Mode.HOLD: self.hold,
@@ -86,6 +89,7 @@ class Navigator:
             Mode.TERMINATION: Termination(context),
             Mode.FOLLOW: self.follow,
             Mode.ORBIT: self.orbit,
+            Mode.GUIDED: self.guided,
             Mode.PRECISION_LAND: self.precision,
             Mode.MANUAL: stabilized,
             Mode.STABILIZED: stabilized,
@@ -98,6 +102,10 @@ class Navigator:
         self.ask = Ask.STAY  # of the setpoint flown
         self._mission_checked: object = None
         self._mission_problem = ""
+
+    def has_mode(self, mode: Mode) -> bool:
+        """Whether there is such a mode at all."""
+        return mode in self._modes
 
     def refusal(self, mode: Mode) -> str:
         """Why a mode cannot be flown now, as far as the navigator knows; empty if it can."""
@@ -156,6 +164,8 @@ class Navigator:
         """Changes to a mode: at once in flight, when armed otherwise."""
         if self._active is self.mission and mode is not Mode.MISSION:
             self.mission.leave()
+        if self._active is self.guided and mode is not Mode.GUIDED:
+            self.guided.leave()
         if self._active is self.orbit and mode is not Mode.ORBIT:
             self.orbit.leave()
         self._active = self._modes[mode]
@@ -219,6 +229,8 @@ class Navigator:
 
     def set_offboard(self, setpoint: OffboardSetpoint) -> None:
         self.offboard.receive(setpoint)
+        if self._active is self.guided:
+            self.guided.receive(setpoint)
 
     def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw: float, speed_m_s: float) -> Reply:
         """Chooses the next place to hold; the caller changes to Hold."""
@@ -226,7 +238,8 @@ class Navigator:
         if not (isfinite(lat_deg) or isfinite(lon_deg) or isfinite(alt_amsl_m) or isfinite(yaw)):
             context.next_hold = (context.stop_point(), context.state.yaw_rad, False)
         else:
-            target = reposition_target(context, self.hold, lat_deg, lon_deg, alt_amsl_m, yaw)
+            base = self.hold.target_ned if context.state.mode is Mode.HOLD else context.stop_point()
+            target = reposition_target(context, base, lat_deg, lon_deg, alt_amsl_m, yaw)
             if isinstance(target, Reply):
                 return target
             refusal = self.fence.refusal(target[0])

@@ -184,6 +184,22 @@ class RecordingGuidance:
         return self._record("abort_landing", height_m)
 
 
+class RecordingGuided:
+    """Mode Guided of a recording vehicle; its requests are in the vehicle's list."""
+
+    def __init__(self, record: Callable[..., Reply]) -> None:
+        self._record = record
+
+    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
+        return self._record("guided.takeoff", alt_amsl_m, yaw_rad)
+
+    def goto(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
+        return self._record("guided.goto", lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
+
+    def forget_goto(self) -> None:
+        self._record("guided.forget_goto")
+
+
 class RecordingVehicle:
     """Answers every request with `reply` and keeps a list of them."""
 
@@ -205,6 +221,8 @@ class RecordingVehicle:
             ListKind.RALLY: RecordingList(MAX_RALLY_POINTS),
         }
         self.lists = ItemLists(self.stored)
+        self.guided = RecordingGuided(self._record)
+        self.missing_modes: set[Mode] = set()
         self.guidance = RecordingGuidance(self._record)
 
     @property
@@ -220,6 +238,9 @@ class RecordingVehicle:
     def _record(self, *call: Any) -> Reply:
         self.calls.append(call)
         return self.reply
+
+    def has_mode(self, mode: Mode) -> bool:
+        return mode not in self.missing_modes
 
     def arm(self, *, force: bool) -> Reply:
         return self._record("arm", force)
