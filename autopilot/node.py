@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from autopilot.commander.battery import BatteryEstimator
+from autopilot.commander.calibration import Calibrator, Turntable
 from autopilot.commander.commander import Commander
 from autopilot.commander.landing import LandingDetector
 from autopilot.commander.pilot import Pilot
@@ -105,6 +106,7 @@ class FlightController:
         on_reboot: restarts the vehicle; None where there is nothing to restart.
         host: files, logs and storage, as far as there are any.
         injector: breaks parts on request; None where nothing can be broken.
+        turntable: turns the vehicle while its sensors are calibrated; None: a pilot does.
     """
 
     def __init__(
@@ -117,6 +119,7 @@ class FlightController:
         on_reboot: Callable[[], None] | None = None,
         host: Host | None = None,
         injector: FailureInjector | None = None,
+        turntable: Turntable | None = None,
     ) -> None:
         self.params = params
         self.host = host or Host()
@@ -153,6 +156,7 @@ class FlightController:
         self.commander.connect(self.navigator)
         self.guidance = Guidance(self.commander, self.navigator, self.payload)
         self.station = self.commander.station
+        self.calibration = Calibrator(self.state, params, self._relay, turntable)
         self._setpoint.write()
 
     def attach(self, server: Server) -> None:
@@ -166,6 +170,8 @@ class FlightController:
         self._read(time_us)
         self.fence.frame()
         self.commander.frame(dt_s)
+        if self.state.is_calibrating:
+            self.calibration.frame()
         wish = self.navigator.frame()
         if wish is not None:
             self._follow_wish(wish)

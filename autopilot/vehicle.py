@@ -6,7 +6,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum, IntFlag
+from enum import Enum, IntEnum, IntFlag
 from math import nan
 from typing import Any, Protocol
 
@@ -257,6 +257,7 @@ class VehicleState:
     has_ground_contact: bool = False  # stands on something, though perhaps not landed yet
     is_ready_to_arm: bool = False
     is_failsafe: bool = False
+    is_calibrating: bool = False
     armed_since_us: int = 0
     battery_remaining: float = nan  # [0..1]
     battery_used_mah: float = 0.0
@@ -283,6 +284,28 @@ class Announcer(Protocol):
 
     def heartbeat_now(self) -> None:
         """Mode or arming changed: send a heartbeat in this frame."""
+        ...
+
+
+class CalibrationKind(Enum):
+    """What is calibrated; the value is the first word of its name in texts."""
+
+    GYRO = "gyro"
+    MAG = "mag"
+    ACCEL = "accel"
+    ACCEL_SIMPLE = "accel simple"  # the vehicle stays level
+    LEVEL = "level"
+
+
+class Calibration(Protocol):
+    """The calibration of the sensors of a disarmed vehicle."""
+
+    def start(self, kind: CalibrationKind) -> Reply: ...
+
+    def cancel(self) -> Reply: ...
+
+    def set_offsets(self, sensor: str, offsets: tuple[float, float, float]) -> None:
+        """Writes the offsets of a sensor: GYRO, ACC or MAG."""
         ...
 
 
@@ -350,6 +373,9 @@ class Vehicle(Protocol):
 
     @property
     def station(self) -> Station: ...
+
+    @property
+    def calibration(self) -> Calibration: ...
 
     sticks: Sticks
 

@@ -38,6 +38,7 @@ from mission.recorder import History, Recorder
 from mission.script import Drone, Script
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
+from sim.turntable import Turntable
 from sim.wind import wind_model
 from sim.world.world import WorldConfig, WorldMap, build_world
 
@@ -119,6 +120,7 @@ class Flight:
             on_reboot=self.rig.reboot,
             injector=self._injector,
             host=self.host,
+            turntable=Turntable(self.rig.arrays.body.numpy()),
         )
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")

@@ -33,6 +33,10 @@ def arming_reasons(state: VehicleState, params: ParameterTable, *, needs_positio
     return [reason for check in checks if (reason := check(state, params))]
 
 
+def _calibration(state: VehicleState, _: ParameterTable) -> str:
+    return "a calibration is running" if state.is_calibrating else ""
+
+
 def _imu(state: VehicleState, _: ParameterTable) -> str:
     return "IMU: no data" if _is_stale(state, state.samples.imu.time_us, _STALE_US) else ""
 
@@ -113,6 +117,6 @@ def _is_stale(state: VehicleState, sample_us: int, limit_us: int) -> bool:
 
 _Check = Callable[[VehicleState, ParameterTable], str]
 _ALWAYS: tuple[_Check, ...] = (
-    _imu, _barometer, _magnetometer, _alignment, _height, _upright, _still, _biases, _battery,
+    _calibration, _imu, _barometer, _magnetometer, _alignment, _height, _upright, _still, _biases, _battery,
 )  # fmt: skip
 _POSITION: tuple[_Check, ...] = (_gnss, _position)

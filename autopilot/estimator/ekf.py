@@ -10,6 +10,7 @@ from typing import Any
 import warp as wp
 
 from autopilot.estimator.align import aligned_nominal, average, is_aligned
+from autopilot.estimator.calibration import calibrated
 from autopilot.estimator.delay import (
     bounded_sample,
     correct_output,
@@ -367,16 +368,17 @@ def estimator_step(ekf: Ekf, i: int, samples: Samples) -> None:
     if samples.imu.time_us == ekf.rows[i].time_us:
         return
     params = ekf.params[i]
-    imu = bounded_sample(samples.imu)
+    clean = calibrated(params, samples)
+    imu = bounded_sample(clean.imu)
     slot = ekf.rows[i].imu_head % IMU_RING
     ekf.imu_ring[i, slot] = imu
     ekf.rows[i].imu_head += 1
     ekf.rows[i].imu_tail = wp.max(ekf.rows[i].imu_tail, ekf.rows[i].imu_head - IMU_RING)
     ekf.rows[i].time_us = imu.time_us
     ekf.rows[i].stillness = observe_stillness(ekf.rows[i].stillness, imu)
-    receive_samples(ekf, i, samples)
+    receive_samples(ekf, i, clean)
     if ekf.rows[i].phase == PHASE_ALIGNING:
-        align(ekf, i, params, imu, samples)
+        align(ekf, i, params, imu, clean)
     else:
         ekf.rows[i].output = integrate_output(ekf.rows[i].output, ekf.rows[i].nominal, imu)
         ekf.output_ring[i, slot] = output_sample(ekf.rows[i].output)

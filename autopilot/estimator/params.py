@@ -25,6 +25,18 @@ HEIGHT_REF_GNSS = wp.constant(1)
 @wp.struct
 class EstimatorParams:
     earth_field_ned_gauss: wp.vec3  # world magnetic model at the origin; zero: unknown
+    gyro_offset_x: float
+    gyro_offset_y: float
+    gyro_offset_z: float
+    accel_offset_x: float
+    accel_offset_y: float
+    accel_offset_z: float
+    mag_offset_x: float
+    mag_offset_y: float
+    mag_offset_z: float
+    board_roll: float
+    board_pitch: float
+    board_yaw: float
     delay_s: float
     predict_s: float
     gyro_noise: float
@@ -83,7 +95,27 @@ _TUNED = "tuned on simulated flights: innovations inside their 95 % band"
 _RECEIVER = "receiver model: 0.3 m white, 0.6 m over 60 s, 0.1 m/s"
 _PX4 = "PX4 default"
 
+_CALIBRATED = "calibration"
+
+
+def _offset(sensor: str, axis: str, bound: float, unit: str, field: str) -> Parameter:
+    meaning = f"what the {field} reads too much along {axis.lower()}"
+    return Parameter(
+        f"CAL_{sensor}0_{axis}OFF", 0.0, -bound, bound, unit, meaning, _CALIBRATED, f"{field}_offset_{axis.lower()}"
+    )
+
+
 ESTIMATOR_PARAMETERS: list[Parameter] = [
+    *(_offset("GYRO", axis, 0.5, "rad/s", "gyro") for axis in "XYZ"),
+    *(_offset("ACC", axis, 5.0, "m/s^2", "accel") for axis in "XYZ"),
+    *(_offset("MAG", axis, 2.0, "gauss", "mag") for axis in "XYZ"),
+    Parameter(
+        "SENS_BOARD_X_OFF", 0.0, -45.0, 45.0, "deg", "roll of the board in the vehicle", _CALIBRATED, "board_roll"
+    ),
+    Parameter(
+        "SENS_BOARD_Y_OFF", 0.0, -45.0, 45.0, "deg", "pitch of the board in the vehicle", _CALIBRATED, "board_pitch"
+    ),
+    Parameter("SENS_BOARD_Z_OFF", 0.0, -45.0, 45.0, "deg", "yaw of the board in the vehicle", _CALIBRATED, "board_yaw"),
     Parameter(
         "EKF2_DELAY_MAX",
         140.0,

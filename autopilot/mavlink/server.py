@@ -10,6 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.mavlink.calibration import CalibrationService
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, OnFrame, Sender
 from autopilot.mavlink.codec import Frame, known_type
 from autopilot.mavlink.commands import CommandService
@@ -113,6 +114,7 @@ class MavlinkServer:
             OffboardService(endpoint),
             FenceService(endpoint),
             SafetyService(endpoint),
+            CalibrationService(endpoint),
             FtpService(endpoint, parameters),
             TargetService(endpoint),
             ManualService(endpoint),

@@ -86,6 +86,7 @@ class BodyState:
     is_crashed: int  # for good: struck something too fast, or a turning rotor struck the ground
     impact_speed: float  # [m/s] largest speed along a contact normal so far
     foot_slip: FootSlip
+    is_held: int  # in somebody's hands: stays in its place and turns with omega_frd alone
 
 
 @wp.struct
@@ -335,8 +336,21 @@ def drain_battery(model: MultirotorModel, body: BodyState, density: float, dt: f
 
 
 @wp.func
+def held_tick(body: BodyState) -> BodyState:
+    """A tick of a vehicle that is held in its place and turned at omega_frd, rotors stopped."""
+    out = body
+    out.vel_ned = wp.vec3()
+    out.gyro_frd = body.omega_frd
+    out.accel_frd = wp.quat_rotate_inv(body.q_ned_from_frd, -_GRAVITY_NED)
+    out.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.omega_frd * TICK_S)
+    return out
+
+
+@wp.func
 def body_tick(model: MultirotorModel, body: BodyState, command: vec8, wind_ned: wp.vec3, world: World) -> BodyState:
     """One tick: four substeps, accel_frd and gyro_frd as means over them, then the battery."""
+    if body.is_held == 1:
+        return held_tick(body)
     inputs = step_inputs(model, body, command, wind_ned, world, _SUBSTEP_S)
     body.height_agl_m = inputs.around.height_agl_m
     body.is_on_ground = 0

@@ -36,6 +36,7 @@ from autopilot.sticks import Sticks
 from autopilot.vehicle import (
     ACCEPTED,
     BatteryLevel,
+    CalibrationKind,
     ItemRefusal,
     ListKind,
     MissionItem,
@@ -200,6 +201,22 @@ class RecordingGuided:
         self._record("guided.forget_goto")
 
 
+class RecordedCalibration:
+    """The calibration of a recording vehicle."""
+
+    def __init__(self, vehicle: Any) -> None:
+        self._vehicle = vehicle
+
+    def start(self, kind: CalibrationKind) -> Reply:
+        return self._vehicle._record("calibrate", kind)
+
+    def cancel(self) -> Reply:
+        return self._vehicle._record("cancel_calibration")
+
+    def set_offsets(self, sensor: str, offsets: tuple[float, float, float]) -> None:
+        self._vehicle._record("set_offsets", sensor, offsets)
+
+
 class RecordingVehicle:
     """Answers every request with `reply` and keeps a list of them."""
 
@@ -207,6 +224,7 @@ class RecordingVehicle:
         self.state = flying_state()
         self.params = parameter_table()
         self.station = StationLink()
+        self.calibration = RecordedCalibration(self)
         self.host = Host()
         self.sticks = Sticks(self.params)
         self.state.sticks = self.sticks.input
