@@ -43,6 +43,7 @@ class Client:
         assert self._mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}") == ConnectionResult.SUCCESS
         system = self._mavsdk.first_autopilot(START_UP_S)
         assert system is not None, "no heartbeat"
+        self.system = system
         self.action = Action(system)
         self.telemetry = Telemetry(system)
         self.mission = Mission(system)

@@ -20,7 +20,7 @@ def sticks_of(rig):
 
 def request(rig, name):
     rig.client.command(REQUEST_MESSAGE, IDS[name])
-    return rig.only(name)
+    return rig.all(name)[0]  # it may be due in this frame anyway
 
 
 def override(rig, **channels):
