@@ -17,7 +17,7 @@ from autopilot.navigator.items import (
     Result,
     is_here,
 )
-from autopilot.vehicle import ItemRefusal, MissionItem
+from autopilot.vehicle import FenceLimit, ItemRefusal, MissionItem
 
 _DEEP_M = 5.0  # below home, from which an item is worth a warning: the terrain there is not known; guess
 # Carried out by a payload only, as the refusal says: camera, gimbal, servos, relays, gripper, winch, parachute
@@ -274,6 +274,15 @@ def _check_home(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None:
     return problem
 
 
+def _check_fence(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None:
+    switch, limits = item.params[:2]
+    if switch not in (0.0, 1.0, 2.0):
+        return Result.PARAM1, f"parameter 1 is {switch}, not 0 (off), 1 (on) or 2 (floor off)"
+    if limits == limits and not (0.0 <= limits <= sum(FenceLimit) and limits == int(limits)):
+        return Result.PARAM2, f"fence limits {limits} are no sum of 1, 2, 4 and 8"
+    return None
+
+
 def _check_roi(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None:
     if item.command == Command.ROI and item.params[0] in (ROI_BY_INDEX, ROI_OF_TARGET):
         return (
@@ -314,5 +323,6 @@ _CHECKS: dict[int, _Check] = {
     Command.ROI_NEXT_OFFSET: _nothing_to_check,
     Command.ROI_NONE: _nothing_to_check,
     Command.ROI: _check_roi,
+    Command.FENCE_ENABLE: _check_fence,
 }
 SUPPORTED_COMMANDS = frozenset(_CHECKS)

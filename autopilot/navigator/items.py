@@ -37,6 +37,7 @@ class Command(IntEnum):
     ROI_NEXT_OFFSET = 196
     ROI_NONE = 197
     ROI = 201
+    FENCE_ENABLE = 207
     JUMP_TAG = 600
     JUMP_TO_TAG = 601
     CONDITION_GATE = 4501

@@ -17,7 +17,7 @@ from autopilot.navigator.mission_route import Route
 from autopilot.navigator.precision import PrecisionLand
 from autopilot.navigator.setpoint import Vector
 from autopilot.payload import Payloads
-from autopilot.vehicle import ACCEPTED, ItemRefusal, MissionItem, Mode, Reply, Severity, Verdict
+from autopilot.vehicle import ACCEPTED, FenceSwitch, ItemRefusal, MissionItem, Mode, Reply, Severity, Verdict
 from common.params import Parameter
 
 _SPEED_PARAMETERS = frozenset(("MPC_XY_CRUISE", "MPC_Z_V_AUTO_UP", "MPC_Z_V_AUTO_DN", "MPC_XY_VEL_MAX"))
@@ -63,6 +63,10 @@ class Mission:
     @property
     def items(self) -> tuple[MissionItem, ...]:
         return self._route.items
+
+    def connect(self, fence: FenceSwitch) -> None:
+        """Names the fence that items switch on and off."""
+        self._actions.fence = fence
 
     # ---- what clients ask for ----
 

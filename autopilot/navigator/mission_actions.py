@@ -14,7 +14,7 @@ from autopilot.navigator.mission_legs import Leg
 from autopilot.navigator.mission_route import Route
 from autopilot.navigator.setpoint import Vector
 from autopilot.payload import Payloads
-from autopilot.vehicle import MissionItem, Reply, Severity, Verdict
+from autopilot.vehicle import FenceLimit, FenceSwitch, MissionItem, Reply, Severity, Verdict
 
 _ROI_NEXT = 1.0  # MAV_ROI_WPNEXT
 _ROI_COMMANDS = frozenset((Command.ROI, Command.ROI_LOCATION, Command.ROI_NEXT_OFFSET, Command.ROI_NONE))
@@ -46,6 +46,7 @@ class Actions:
         self._set_home = set_home
         self._delayed: deque[MissionItem] = deque()  # a condition first; at most one mission long
         self._until_us = 0
+        self.fence: FenceSwitch | None = None
 
     @property
     def is_waiting(self) -> bool:
@@ -132,14 +133,29 @@ class Actions:
                 self._set_home(nan, nan, nan)
             else:
                 self._set_home(item.x, item.y, item.z)
+        elif command == Command.FENCE_ENABLE and self.fence is not None:
+            self._switch_fence(item, self.fence)
         elif command in _ROI_COMMANDS:
             self._look(item)
         elif self._payload.takes(command):
             self._pay(item)
 
+    def _switch_fence(self, item: MissionItem, fence: FenceSwitch) -> None:
+        switch, limits = item.params[:2]
+        asked = int(limits) if limits > 0.0 else int(sum(FenceLimit))
+        if switch == 1.0:
+            reply = fence.enable(asked)
+        else:
+            reply = fence.disable(asked if switch == 0.0 else FenceLimit.FLOOR)
+        self._tell(item, reply)
+
     def _pay(self, item: MissionItem) -> None:
         """Hands the item to the payload; a mission goes on if that cannot do it."""
         reply = self._payload.run(item.command, item.params, item.x, item.y, self._alt_amsl_m(item))
+        self._tell(item, reply)
+
+    def _tell(self, item: MissionItem, reply: Reply) -> None:
+        """Says why an item could not be carried out."""
         if reply.verdict not in (Verdict.ACCEPTED, Verdict.IN_PROGRESS):
             text = f"Mission item {item.seq}: {reply.reason or reply.verdict.name.lower()}"
             self._context.announcer.statustext(Severity.WARNING, text)

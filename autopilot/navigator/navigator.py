@@ -71,6 +71,7 @@ class Navigator:
         self.takeoff = Takeoff(context)
         self.mission = mission
         self.fence = Fence(context)
+        mission.connect(self.fence)
         self.rally = RallyPoints()
         self.land = Land(context)
         self.offboard = Offboard(context)

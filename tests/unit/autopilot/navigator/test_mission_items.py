@@ -293,6 +293,19 @@ def test_mission_needs_the_ends_that_the_parameter_asks_for(asked, has_takeoff, 
     assert (lacks or "") in reply.reason
 
 
+def test_fence_is_switched_on_the_way():
+    rig = Kinematic(GF_MAX_HOR_DIST=500.0).flying()
+    fence = rig.fc.fence
+    assert fence.is_active
+    started(
+        rig, item(0, WAYPOINT, 10.0), do(1, 207, 0), item(2, WAYPOINT, 40.0), do(3, 207, 1), item(4, WAYPOINT, 60.0)
+    )
+    rig.run_until(lambda: rig.recorder.reached == [0, 1])
+    assert not fence.is_active
+    finished(rig)
+    assert fence.is_active
+
+
 def test_landing_item_lands_on_a_target_that_is_seen():
     rig = Kinematic().flying()
     land = item(1, LAND, 20.0, 0.0, 0.0, params=(0, 1, 0, nan))
