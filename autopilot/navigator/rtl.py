@@ -36,6 +36,8 @@ class Return:
     def start(self) -> None:
         context = self._context
         context.reset_speeds()
+        if context.number("RTL_SPEED") > 0.0:
+            context.cruise_speed = context.number("RTL_SPEED")
         state = context.state
         home = state.home_ned
         self._home_yaw = state.home_yaw_rad
