@@ -49,6 +49,7 @@ class StickInput:
     count: int = 0  # of messages taken; grows with each
     heard_until_us: int = 0  # the sticks are lost after that; 0: never heard
     speed: float = 0.0  # [1/s] of the stick that moves fastest, low-passed
+    steer_hold: bool = False  # the sticks are followed in Hold as they are in Position (ArduPilot's LOITER)
 
 
 class Sticks:
@@ -77,6 +78,13 @@ class Sticks:
         self._speeds = [0.0, 0.0, 0.0, 0.0]  # [1/s]
         self._load()
         params.on_change(self._on_parameter)
+
+    def follow_ardupilot(self) -> None:
+        """From now on the sticks are read as ArduPilot reads them."""
+        self.is_forward_low = True
+        self.takes_every_source = True
+        self.takes_over = False
+        self.input.steer_hold = True
 
     # ---- what others ask ----
 

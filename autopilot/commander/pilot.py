@@ -79,10 +79,12 @@ class Pilot:
 
     def arming_reason(self, mode: Mode) -> str:
         """Why the sticks forbid arming in a mode; empty if they do not."""
-        if not MODE_RULES[mode].needs_sticks or not self.is_heard:
-            return ""  # without sticks the mode itself is refused
-        throttle = self._state.sticks.throttle
-        if mode in _CLIMB_RATE_MODES:
+        sticks = self._state.sticks
+        is_steered_hold = mode is Mode.HOLD and sticks.steer_hold
+        if not (MODE_RULES[mode].needs_sticks or is_steered_hold) or not self.is_heard:
+            return ""  # without sticks the mode itself is refused, or needs none
+        throttle = sticks.throttle
+        if mode in _CLIMB_RATE_MODES or is_steered_hold:
             return "throttle above the middle" if throttle > _MIDDLE_THROTTLE else ""
         return "throttle is not low" if throttle > _LOW_THROTTLE else ""
 

@@ -29,8 +29,7 @@ class ManualService(Service):
         self._endpoint = endpoint
         self._sticks = endpoint.vehicle.sticks
         if endpoint.dialect.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA:
-            self._sticks.is_forward_low = self._sticks.takes_every_source = True
-            self._sticks.takes_over = False
+            self._sticks.follow_ardupilot()
 
     def messages(self) -> Mapping[str, Handler]:
         return {

@@ -1,18 +1,24 @@
 """Hold: stays at one place, or goes to one and stays there."""
 
 from autopilot.navigator.context import NavContext, distance
+from autopilot.navigator.manual import Position
 from autopilot.navigator.setpoint import Vector
 
 
 class Hold:
-    """Mode Hold: the place is where the mode before ended, where a client sent the vehicle, or where it can stop."""
+    """Mode Hold: the place is where the mode before ended, where a client sent the vehicle, or where it can stop.
 
-    __slots__ = ("_context", "_is_flown", "_is_goto", "_reset_count", "target_ned", "yaw")
+    Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as they are heard.
+    """
+
+    __slots__ = ("_context", "_is_flown", "_is_goto", "_is_steered", "_reset_count", "_steered", "target_ned", "yaw")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
         self._is_flown = False
         self._is_goto = False  # on a straight line to the place
+        self._steered = Position(context)
+        self._is_steered = False
         self._reset_count = 0  # of the estimate
         self.target_ned: Vector = (0.0, 0.0, 0.0)  # [m]
         self.yaw = 0.0  # [rad]
@@ -36,6 +42,8 @@ class Hold:
 
     def frame(self) -> None:
         context = self._context
+        if context.state.sticks.steer_hold and self._follow_sticks():
+            return
         if context.state.estimate.reset_count != self._reset_count:
             self._follow_reset()
         if context.is_on_ground:
@@ -43,6 +51,17 @@ class Hold:
         elif not self._is_flown:
             self._is_flown = True
             context.fly_to(self.target_ned, self.yaw, context.state.estimate.pos_ned if self._is_goto else None)
+
+    def _follow_sticks(self) -> bool:
+        """Flies as the sticks say and returns whether they are heard; once they are lost, it stops."""
+        state = self._context.state
+        if state.time_us <= state.sticks.heard_until_us:
+            self._is_steered = True
+            self._steered.frame()
+        elif self._is_steered:
+            self._is_steered = False
+            self.start()
+        return self._is_steered
 
     def _follow_reset(self) -> None:
         """The estimate has jumped: a vehicle that holds stays where it is, one that was sent still goes there."""

@@ -134,3 +134,4 @@ def test_in_ardupilot_overrides_count_as_a_joystick_does_and_forward_is_a_short_
     server.frame(20_000_000)
     assert (vehicle.sticks.input.pitch, vehicle.sticks.input.throttle) == pytest.approx((1.0, 1.0))
     assert not vehicle.sticks.takes_over
+    assert vehicle.sticks.input.steer_hold

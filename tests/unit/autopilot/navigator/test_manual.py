@@ -198,3 +198,38 @@ def test_brake_ignores_the_sticks():
     assert rig.sp("vel_ned") == [0.0, 0.0, 0.0]
     assert rig.state.mode is Mode.BRAKE
     assert radians(1.0) > abs(rig.sp("yaw_rate"))
+
+
+def test_hold_is_steered_by_sticks_in_ardupilot_and_stops_without_them():
+    rig = Kinematic(NAV_RCL_ACT=0)
+    rig.fc.sticks.follow_ardupilot()
+    rig.flying(20.0)
+    rig.run(2.0)
+    rig.piloted(3.0, pitch=1.0)
+    assert rig.state.mode is Mode.HOLD
+    assert hypot(*rig.vel[:2]) > 5.0
+    rig.run(8.0)
+    stopped_at = rig.pos.copy()
+    assert hypot(*rig.vel[:2]) < 0.1
+    rig.run(5.0)
+    assert rig.pos == pytest.approx(stopped_at, abs=0.1)
+
+
+def test_hold_takes_off_and_lands_by_throttle_in_ardupilot():
+    rig = Kinematic().ready()
+    rig.fc.sticks.follow_ardupilot()
+    rig.piloted(0.2, throttle=1.0)
+    assert rig.fc.arm(force=False).reason == "throttle above the middle"
+    rig.piloted(0.2, throttle=-1.0)
+    assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
+    rig.piloted(4.0, throttle=1.0)
+    assert rig.state.landed_state is LandedState.IN_AIR
+    rig.piloted(60.0, throttle=-1.0)
+    assert not rig.state.is_armed
+
+
+def test_hold_ignores_sticks_in_px4_where_they_may_not_take_over():
+    rig = Kinematic(COM_RC_OVERRIDE=0).flying(20.0)
+    place = rig.pos.copy()
+    rig.piloted(5.0, pitch=1.0, throttle=-1.0)
+    assert rig.pos == pytest.approx(place, abs=0.5)
