@@ -5,9 +5,10 @@ and whether a place may be flown to. What a breach leads to is the commander's t
 """
 
 from collections.abc import Sequence
-from math import hypot
+from math import hypot, inf
 
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.detour import Bounds
 from autopilot.navigator.fence_items import MAX_FENCE_ITEMS, FenceCommand, fence_shapes
 from autopilot.navigator.region import Region, region_of
 from autopilot.navigator.setpoint import Vector
@@ -17,6 +18,7 @@ from common.params import Parameter
 
 ALL_LIMITS = int(FenceLimit.CEILING | FenceLimit.RADIUS | FenceLimit.SHAPES | FenceLimit.FLOOR)
 _CEILING, _RADIUS, _SHAPES, _FLOOR = map(int, FenceLimit)  # plain numbers: this runs in every frame
+_ANYWHERE = Region((), ())
 _HYSTERESIS_M = 0.5  # further inside than this a breach is over; guess
 _FIX_3D = 3
 _SOURCE_GNSS = 1  # GF_SOURCE
@@ -91,6 +93,24 @@ class Fence:
         if limits & _SHAPES and self.region.clearance(place[0], place[1]) < 0.0:
             breached |= _SHAPES
         return f"outside fence: {_names(breached)}" if breached else ""
+
+    def bounds(self) -> Bounds:
+        """Where ways may lead that keep inside."""
+        limits, number = self._limits, self._context.number
+        north, east, _ = self._context.state.home_ned
+        return Bounds(
+            self.region if limits & _SHAPES else _ANYWHERE,
+            number("GF_MARGIN"),
+            (north, east),
+            number("GF_MAX_HOR_DIST") if limits & _RADIUS else inf,
+        )
+
+    def ceiling_d(self) -> float:
+        """Down coordinate [m] above which ways do not lead."""
+        if not self._limits & _CEILING:
+            return -inf
+        number = self._context.number
+        return self._context.state.home_ned[2] - max(number("GF_MAX_VER_DIST") - number("GF_MARGIN"), 0.0)
 
     def arming_reason(self) -> str:
         """Why the vehicle may not take off here; empty if it may."""

@@ -143,6 +143,17 @@ class Mission:
         """The next start goes on at the current item, whatever MIS_RESTART says."""
         self._is_chosen = True
 
+    @property
+    def is_begun(self) -> bool:
+        """Whether it has been flown, at least in part."""
+        state = self._context.state.mission_state
+        return state in (MissionState.ACTIVE, MissionState.PAUSED, MissionState.COMPLETE)
+
+    def place_after(self, first: int) -> Vector:
+        """The place [m] of the first item from `first` on that has one; the present one if none has."""
+        north, east, down = self._context.state.estimate.pos_ned
+        return next((place for seq, place in self.places() if seq >= first), (north, east, down))
+
     def landing_sequence(self) -> int | None:
         """Number of the nearest DO_LAND_START."""
         return self._route.nearest_after_marker(Command.LAND_START)

@@ -3,7 +3,9 @@
 from math import isfinite, nan
 from typing import Protocol
 
+from autopilot.navigator.breadcrumbs import Breadcrumbs
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.destination import Destinations
 from autopilot.navigator.fence import Fence
 from autopilot.navigator.follow import Follow
 from autopilot.navigator.goto import reposition_target
@@ -17,6 +19,7 @@ from autopilot.navigator.offboard import STREAM_PERIOD_US, Offboard
 from autopilot.navigator.orbit import Orbit
 from autopilot.navigator.rally import RallyPoints
 from autopilot.navigator.rtl import Return
+from autopilot.navigator.smart_return import SmartReturn
 from autopilot.navigator.takeoff import Takeoff
 from autopilot.navigator.termination import Termination
 from autopilot.ports import TERRAIN_VALID
@@ -52,10 +55,12 @@ class Navigator:
         "_modes",
         "ask",
         "context",
+        "crumbs",
         "fence",
         "follow",
         "guided",
         "hold",
+        "homing",
         "land",
         "mission",
         "offboard",
@@ -73,6 +78,8 @@ class Navigator:
         self.fence = Fence(context)
         mission.connect(self.fence)
         self.rally = RallyPoints()
+        self.crumbs = Breadcrumbs(context)
+        self.homing = Return(context, Destinations(context, self.rally, mission, self.fence), self.fence, mission)
         self.land = Land(context)
         self.offboard = Offboard(context)
         self.follow = Follow(context)
@@ -84,7 +91,8 @@ class Navigator:
             Mode.HOLD: self.hold,
             Mode.TAKEOFF: self.takeoff,
             Mode.MISSION: mission,
-            Mode.RETURN: Return(context),
+            Mode.RETURN: self.homing,
+            Mode.SMART_RETURN: SmartReturn(context, self.crumbs),
             Mode.LAND: self.land,
             Mode.OFFBOARD: self.offboard,
             Mode.TERMINATION: Termination(context),
@@ -116,6 +124,8 @@ class Navigator:
             return self.mission.refusal() or self._mission_outside()
         if mode is Mode.ALTITUDE and not self.context.has_height:
             return "no valid height"
+        if mode is Mode.SMART_RETURN:
+            return self.crumbs.refusal()
         if mode is Mode.OFFBOARD and self.offboard.age_us(self.context.state.time_us) > STREAM_PERIOD_US:
             return "needs setpoints faster than 2 Hz before the switch"
         return ""
@@ -167,6 +177,8 @@ class Navigator:
             self.mission.leave()
         if self._active is self.guided and mode is not Mode.GUIDED:
             self.guided.leave()
+        if mode is not Mode.MISSION and self._active in (self.mission, self.homing):
+            self.mission.leave()  # a return may end with its landing part
         if self._active is self.orbit and mode is not Mode.ORBIT:
             self.orbit.leave()
         self._active = self._modes[mode]
@@ -178,6 +190,7 @@ class Navigator:
         """Starts the mode that was chosen before."""
         self.context.reset_speeds()
         self.context.next_hold = None
+        self.crumbs.clear()
         self.context.heading.reset()
         self._active.start()
 
@@ -190,6 +203,7 @@ class Navigator:
         setpoint = context.setpoint
         wish: Mode | None = None
         if state.is_armed:
+            self.crumbs.frame()
             self._active.frame()
             if context.heading.is_active or context.yaw_mode:
                 context.heading.frame()

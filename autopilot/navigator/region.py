@@ -5,7 +5,7 @@ one array, so that the distance to the nearest border costs the same few microse
 """
 
 from collections.abc import Sequence
-from math import hypot, inf
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from autopilot.navigator.fence_items import GeoPolygon, GeoShape
 from common.geodesy import GeoPoint, ned_from_geodetic
 
 Point = tuple[float, float]  # [m] north, east
-_Array = NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 
 
 class Region:
@@ -56,39 +56,45 @@ class Region:
     def clearance(self, north: float, east: float) -> float:
         """Distance [m] to where this changes: positive inside the area, negative outside; never too far.
 
-        It changes by at most the distance moved, so that a vehicle need not ask again until it has moved that far.
+        Within that distance the vehicle stays on the same side, so that it need not ask again until it has moved that
+        far.
         """
-        included, excluded = -inf, inf
-        if len(self._starts):
-            signed = self._signed_distances(north, east)
-            inclusions = signed[self._is_inclusion]
-            exclusions = signed[~self._is_inclusion]
-            if len(inclusions):
-                included = float(inclusions.max())
-            if len(exclusions):
-                excluded = -float(exclusions.max())
-        for (centre_north, centre_east), radius, is_inclusion in self.circles:
-            inside = radius - hypot(north - centre_north, east - centre_east)
-            if is_inclusion:
-                included = max(included, inside)
-            else:
-                excluded = min(excluded, -inside)
-        return min(included, excluded) if self._can_include else excluded
+        return float(self.clearances(np.array([[north, east]]))[0])
 
-    def _signed_distances(self, north: float, east: float) -> _Array:
-        """Distance [m] to the border of each polygon, positive inside."""
+    def clearances(self, points: FloatArray) -> FloatArray:
+        """The clearance [m] of many points, shape (points, 2)."""
+        included = np.full(len(points), -inf)
+        excluded = np.full(len(points), inf)
+        if len(self._starts):
+            signed = self._signed_distances(points)
+            if self._is_inclusion.any():
+                included = signed[:, self._is_inclusion].max(axis=1)
+            if not self._is_inclusion.all():
+                excluded = -signed[:, ~self._is_inclusion].max(axis=1)
+        for (centre_north, centre_east), radius, is_inclusion in self.circles:
+            inside = radius - np.hypot(points[:, 0] - centre_north, points[:, 1] - centre_east)
+            if is_inclusion:
+                included = np.maximum(included, inside)
+            else:
+                excluded = np.minimum(excluded, -inside)
+        return np.minimum(included, excluded) if self._can_include else excluded
+
+    def _signed_distances(self, points: FloatArray) -> FloatArray:
+        """Distance [m] from each point to the border of each polygon, positive inside."""
+        north, east = points[:, :1], points[:, 1:]
         to_north, to_east = north - self._north, east - self._east
         share = (to_north * self._to_north + to_east * self._to_east) * self._inverse_length_sq
         share = np.minimum(np.maximum(share, 0.0), 1.0)
         off_north = to_north - share * self._to_north
         off_east = to_east - share * self._to_east
-        nearest = np.sqrt(np.minimum.reduceat(off_north * off_north + off_east * off_east, self._starts))
+        off_sq = off_north * off_north + off_east * off_east
+        nearest = np.sqrt(np.minimum.reduceat(off_sq, self._starts, axis=1))
         # An eastward ray crosses the border an odd number of times from inside.
         # Compared as they are: differences could round to a crossing of one edge at a corner and of none at the next.
         spans = (north >= self._north) != (north >= self._end_north)
         crosses = spans & (to_east < to_north * self._slope)
-        is_inside = np.add.reduceat(crosses.astype(np.int64), self._starts) & 1
-        signed: _Array = np.where(is_inside, nearest, -nearest)
+        is_inside = np.add.reduceat(crosses.astype(np.int64), self._starts, axis=1) & 1
+        signed: FloatArray = np.where(is_inside, nearest, -nearest)
         return signed
 
 

@@ -1,93 +1,146 @@
-"""Return: climb, fly home, descend, wait, land."""
+"""Return: climb, fly to where RTL_TYPE says around what the fence excludes, and land there."""
 
 from enum import IntEnum
-from math import hypot
+from math import hypot, isfinite, radians, tan
 
+from autopilot.navigator.arrival import Arrival
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.land import Landing
+from autopilot.navigator.destination import Destination, Destinations
+from autopilot.navigator.detour import detour
+from autopilot.navigator.fence import Fence
+from autopilot.navigator.mission import Mission
 from autopilot.navigator.setpoint import Vector
+from autopilot.navigator.way import Way
+from autopilot.vehicle import Mode, Severity
 
-_HEIGHT_M = 0.5  # height error at which a climb or descent of the return ends
-_HOME_M = 1.0  # distance from home at which the way home ends; the landing corrects the rest
+_HEIGHT_M = 0.5  # height error at which the climb ends
 
 
 class _Phase(IntEnum):
     CLIMB = 0
-    CRUISE = 1
-    DESCEND = 2
-    WAIT = 3
-    LAND = 4
+    WAY = 1
+    ARRIVED = 2
+    MISSION = 3  # flown from its landing part
 
 
 class Return:
-    """Mode Return. Nearer to home than RTL_MIN_DIST it does not climb first."""
+    """Mode Return. Nearer to its end than RTL_MIN_DIST it does not climb first.
 
-    __slots__ = ("_context", "_home_yaw", "_landing", "_phase", "_start", "_target", "_until_us")
+    Args:
+        context: what the navigator's modes share.
+        destinations: where it may lead.
+        fence: what to fly around.
+        mission: flown from its landing part, if that is where it leads.
+    """
 
-    def __init__(self, context: NavContext) -> None:
+    __slots__ = ("_arrival", "_back_d", "_context", "_destination", "_destinations", "_fence", "_mission", "_phase",
+                 "_start", "_way")  # fmt: skip
+
+    def __init__(self, context: NavContext, destinations: Destinations, fence: Fence, mission: Mission) -> None:
         self._context = context
-        self._landing = Landing(context)
+        self._destinations = destinations
+        self._fence = fence
+        self._mission = mission
+        self._way = Way(context)
+        self._arrival = Arrival(context)
         self._phase = _Phase.CLIMB
+        self._destination = Destination((0.0, 0.0, 0.0), "home")
         self._start: Vector = (0.0, 0.0, 0.0)
-        self._target: Vector = (0.0, 0.0, 0.0)  # home, at the height of the way back
-        self._home_yaw = 0.0
-        self._until_us = 0
+        self._back_d = 0.0  # [m] height of the way back
 
     def start(self) -> None:
         context = self._context
         context.reset_speeds()
-        if context.number("RTL_SPEED") > 0.0:
-            context.cruise_speed = context.number("RTL_SPEED")
-        state = context.state
-        home = state.home_ned
-        self._home_yaw = state.home_yaw_rad
+        speed = context.number("RTL_SPEED")
+        if speed > 0.0:
+            context.cruise_speed = speed
+        self._head_for(self._destinations.choose())
+
+    def _head_for(self, destination: Destination) -> None:
+        context = self._context
+        self._destination = destination
+        if destination.name != "home":
+            context.announcer.statustext(Severity.INFO, f"Return to {destination.name}")
         here = context.stop_point()
-        back_d = here[2]
-        if hypot(here[0] - home[0], here[1] - home[1]) > context.number("RTL_MIN_DIST"):
-            back_d = min(back_d, home[2] - context.number("RTL_RETURN_ALT"))
-        self._target = (home[0], home[1], back_d)
-        self._start = (here[0], here[1], back_d)
+        if destination.back:
+            self._fly_back(here)
+            return
+        self._back_d = max(min(here[2], self._return_d(here)), self._fence.ceiling_d())
+        self._start = (here[0], here[1], self._back_d)
         self._phase = _Phase.CLIMB
-        context.fly_to(self._start, state.yaw_rad)
+        context.fly_to(self._start, context.state.yaw_rad)
 
     def frame(self) -> None:
         context = self._context
-        if context.is_on_ground:
+        if context.is_on_ground and self._phase is not _Phase.MISSION:
             return
-        phase = self._phase
-        if phase is _Phase.LAND:
-            self._landing.frame()
-            return
-        pos = context.state.estimate.pos_ned
-        target = self._target
-        if phase is _Phase.CLIMB:
-            if pos[2] < target[2] + _HEIGHT_M:
-                self._phase = _Phase.CRUISE
-                yaw = context.heading_to(self._start, target, float("nan"))
-                context.fly_to(target, yaw, self._start)
-        elif phase is _Phase.CRUISE:
-            if hypot(pos[0] - target[0], pos[1] - target[1]) < _HOME_M:
+        if self._phase is _Phase.CLIMB:
+            if context.state.estimate.pos_ned[2] < self._back_d + _HEIGHT_M:
+                self._cruise()
+        elif self._phase is _Phase.WAY:
+            if self._way.frame():
                 self._arrive()
-        elif phase is _Phase.DESCEND:
-            if abs(pos[2] - target[2]) < _HEIGHT_M:
-                self._phase = _Phase.WAIT
-                delay_s = context.number("RTL_LAND_DELAY")
-                self._until_us = context.state.time_us + int(delay_s * 1e6) if delay_s >= 0.0 else -1
-        elif self._until_us >= 0 and context.state.time_us >= self._until_us:
-            self._land()
+        elif self._phase is _Phase.ARRIVED:
+            self._arrival.frame()
+        else:
+            self._mission.frame()
+            if context.wish is Mode.RETURN:  # its last item; it is this mode that is flown already
+                context.wish = None
+                self._head_for(self._destinations.home())
+
+    def _return_d(self, here: Vector) -> float:
+        """Down coordinate [m] of the way back, from the heights and the cone that the parameters give."""
+        context = self._context
+        destination = self._destination
+        way_m = hypot(here[0] - destination.place[0], here[1] - destination.place[1])
+        if way_m < context.number("RTL_MIN_DIST"):
+            return here[2]
+        height = context.number("RTL_RETURN_ALT")
+        cone_deg = context.number("RTL_CONE_ANG")
+        if cone_deg > 0.0:
+            lowest = min(context.number("RTL_DESCEND_ALT"), height)
+            height = max(min(height, way_m / tan(radians(min(cone_deg, 89.9)))), lowest)
+        home_d = context.state.home_ned[2]
+        down = (home_d if destination.landing_item is not None else destination.place[2]) - height
+        if destination.landing_item is not None:
+            down = min(down, destination.place[2])
+        if isfinite(destination.lowest_d):
+            down = min(down, destination.lowest_d)
+        return down
+
+    def _cruise(self) -> None:
+        """Flies to the destination, around what the fence excludes."""
+        place = self._destination.place
+        points = self._around(self._start, place)
+        self._phase = _Phase.WAY
+        self._way.start(self._start, [(north, east, self._back_d) for north, east in points])
+
+    def _around(self, start: Vector, place: Vector) -> list[tuple[float, float]]:
+        if not self._fence.is_active:
+            return [place[:2]]
+        say = self._context.announcer.statustext
+        points = detour(self._fence.bounds(), start[:2], place[:2])
+        if points is None:
+            say(Severity.WARNING, "No way back inside the fence: returning directly")
+            return [place[:2]]
+        if len(points) > 1:
+            say(Severity.INFO, f"Return around the fence, {len(points) - 1} corners")
+        return points
+
+    def _fly_back(self, here: Vector) -> None:
+        """Along the mission's places, at their heights."""
+        *_, last = self._destination.back
+        home = self._destination.place
+        self._back_d = last[2]
+        self._phase = _Phase.WAY
+        self._way.start(here, [*self._destination.back, (home[0], home[1], last[2])])
 
     def _arrive(self) -> None:
-        context = self._context
-        if context.number("RTL_LAND_DELAY") == 0.0:
-            self._land()
+        destination = self._destination
+        if destination.landing_item is None:
+            self._phase = _Phase.ARRIVED
+            self._arrival.start(destination.place, destination.yaw, self._back_d)
             return
-        north, east, back_d = self._target
-        wait_d = context.state.home_ned[2] - context.number("RTL_DESCEND_ALT")
-        self._target = (north, east, max(back_d, wait_d))
-        self._phase = _Phase.DESCEND
-        context.fly_to(self._target, self._home_yaw)
-
-    def _land(self) -> None:
-        self._phase = _Phase.LAND
-        self._landing.start(self._target[0], self._target[1], self._home_yaw)
-        self._landing.frame()
+        self._phase = _Phase.MISSION
+        self._mission.set_current(destination.landing_item)
+        self._mission.start()
