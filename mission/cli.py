@@ -49,7 +49,9 @@ def fly(
     wind_from: Annotated[float, typer.Option(min=0.0, max=360.0, help="Where the wind comes from [deg].")] = 270.0,
     noise: Annotated[float, typer.Option(min=0.0, max=10.0, help="Scale of all sensor noise.")] = 1.0,
     airframe: Annotated[str, typer.Option(help="Airframe name or TOML file.")] = "x500",
-    home: Annotated[str, typer.Option(help="Latitude,longitude[,altitude AMSL].")] = _HOME,
+    home: Annotated[
+        str | None, typer.Option(help="Latitude,longitude[,altitude AMSL].", show_default=f"{_HOME}, or as stored")
+    ] = None,
     world_seed: Annotated[int, typer.Option(min=0, help="Seed of hills and trees.")] = 1,
     trees: Annotated[float, typer.Option(min=0.0, max=1000.0, help="Trees per hectare.")] = 60.0,
     hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m].")] = 12.0,
@@ -71,6 +73,9 @@ def fly(
         list[str] | None, typer.Option(help="Sets a parameter of the flight controller: NAME=VALUE. Repeatable.")
     ] = None,
     run_folder: Annotated[Path | None, typer.Option(help="Where logs go. Default: runs/DATE.")] = None,
+    state: Annotated[
+        Path | None, typer.Option(help="Folder for what outlives the run: parameters, mission, fence, files, logs.")
+    ] = None,
 ) -> None:
     """Fly: world, vehicle, flight controller and MAVLink links, in real time or faster."""
     from mission.session import FlightOptions, UserError, fly_session
@@ -82,7 +87,7 @@ def fly(
                 wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
                 trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, bind=bind,
                 tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
-                run_folder=run_folder, parameters=tuple(param or ()),
+                run_folder=run_folder, parameters=tuple(param or ()), state=state,
             )
         )  # fmt: skip
     except UserError as error:

@@ -69,6 +69,8 @@ class _Nowhere:
     def write(self, data: bytes) -> int:
         return len(data)
 
+    closed = False
+
     def flush(self) -> None:
         """Nothing is kept."""
 
@@ -109,10 +111,10 @@ class FlightLog:
         """Logs a parameter change."""
         self._log.parameter(name, value)
 
-    def listen(self, listener: Callable[[bytes], None], time_us: int) -> bytes:
-        """The header of a log that begins now; the listener gets its data."""
+    def listen(self, listener: Callable[[bytes], None], start_us: int) -> bytes:
+        """The header of a log that begins at `start_us`; the listener gets its data."""
         self._log.listeners.append(listener)
-        return self._log.header(time_us)
+        return self._log.header(start_us)
 
     def stop_listening(self, listener: Callable[[bytes], None]) -> None:
         self._log.listeners.remove(listener)
@@ -129,8 +131,9 @@ class FlightLog:
         return self._by_name[topic].latest()
 
     def flush(self) -> None:
-        """Hands what has been written to the file system."""
-        self._log.stream.flush()
+        """Hands what has been written to the file system; not once the log is complete."""
+        if not self._log.stream.closed:
+            self._log.stream.flush()
 
     def close(self) -> None:
         """Completes the log."""

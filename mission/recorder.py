@@ -184,8 +184,9 @@ class Recorder:
     # ---- autopilot.host.LogStream ----
 
     def listen(self, listener: LogListener) -> bytes:
-        self.flush()
-        return self._stream().listen(listener, self._controller.state.time_us)
+        """What has been noted and not yet written is the listener's too: the moments before it began to listen."""
+        since_us = self._time_us[0] if self._time_us else self._controller.state.time_us
+        return self._stream().listen(listener, since_us)
 
     def stop_listening(self, listener: LogListener) -> None:
         self.flush()

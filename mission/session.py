@@ -3,40 +3,36 @@
 import json
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-import numpy as np
 from pydantic import ValidationError
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
 from autopilot.mavlink.links import LinkError, LinkRole, LinkSource
-from autopilot.mavlink.signing import MemoryStore, SigningConfig
+from autopilot.mavlink.signing import FileStore, MemoryStore, SigningConfig
 from autopilot.mavlink.tcp import TcpPort
 from autopilot.mavlink.udp import SILENCE_US, UdpPort, address_towards
-from autopilot.vehicle import Mode
 from common.airframe import AirframeError, load_airframe
-from common.clock import wall_date_text, wall_time_s, wall_unix_us
+from common.clock import wall_date_text, wall_unix_us
 from common.files import write_whole
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.params import ParameterError
+from common.state_folder import StateFolder
 from mission.client import Running
 from mission.flight import Flight, FlightConfig, flight_parameters
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
 from mission.plots import plot_flight
+from mission.progress import Progress
 from mission.script import fly_plan
+from mission.state import StateError, keep_home, open_state, stored_home
 from mission.summary import Summary, planned_path, summarise
 from sim.world.world import WorldConfig
 
-PROGRESS_PERIOD_S = 0.2
-PROGRESS_HEADINGS = (
-    *("time\ns", "mode\n", "armed\n", "item\n", "north\nm", "east\nm"),
-    *("height\nm", "speed\nm/s", "battery\n%", "pace\nx"),
-)
 GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
 API_PORT_STEP = 14580 - 14540
 PORT_MAX = 65535
@@ -62,7 +58,7 @@ class FlightOptions:
     wind_from_deg: float
     noise: float
     airframe: str
-    home: str
+    home: str | None  # None: the stored one, or else the default
     world_seed: int
     trees_per_ha: float
     hill_height_m: float
@@ -76,6 +72,7 @@ class FlightOptions:
     run_folder: Path | None
     dialect: str = "px4"
     parameters: tuple[str, ...] = ()  # NAME=VALUE
+    state: Path | None = None
 
 
 def fly_session(options: FlightOptions) -> int:
@@ -84,19 +81,36 @@ def fly_session(options: FlightOptions) -> int:
     Raises:
         UserError: an option, file, port or folder is wrong; nothing has been written.
     """
-    console = Console()
     speed = _speed(options.speed)
     _check_end(options, speed)
-    config = _config(options)
+    if options.state is None:
+        return _fly(options, speed, None)
+    try:
+        state = open_state(options.state)
+    except StateError as error:
+        raise UserError(str(error)) from error
+    with closing(state):
+        return _fly(options, speed, state)
+
+
+def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None) -> int:
+    console = Console()
+    config = _config(options, state)
     plan = None if options.is_idle else _plan(options.plan, config.home)
     try:
         flight_parameters(config, load_airframe(config.airframe))
     except (AirframeError, ParameterError) as error:
         raise UserError(str(error)) from error
+    signing = _signing(options, speed, state)
     links = [] if speed is None else _links(options, speed)
     folder = _new_folder(options.run_folder)
     with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
-        flight = Flight(config, links=links, folder=folder, signing=_signing(options, speed))
+        flight = Flight(config, links=links, folder=folder, signing=signing, state=state)
+    if state is not None:
+        if options.home is not None:
+            keep_home(state, config.home)
+        for problem in (*state.problems, *(flight.persistence.problems if flight.persistence else ())):
+            _print_line(console, problem)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
     _run(flight, running, options, speed, folder, console)
     return _finish(flight, running, plan, folder, console)
@@ -124,11 +138,12 @@ def _check_end(options: FlightOptions, speed: float | None) -> None:
         raise UserError("--idle --speed max: nobody can connect, so give --seconds to say when it ends")
 
 
-def _config(options: FlightOptions) -> FlightConfig:
+def _config(options: FlightOptions, state: StateFolder | None) -> FlightConfig:
+    home = stored_home(state) if options.home is None else _home(options.home)
     try:
         return FlightConfig(
             airframe=options.airframe,
-            home=_home(options.home),
+            home=home,
             seed=options.seed,
             wind_m_s=options.wind_m_s,
             wind_from_deg=options.wind_from_deg,
@@ -225,11 +240,16 @@ def _links(options: FlightOptions, speed: float) -> list[LinkSource]:
     return links
 
 
-def _signing(options: FlightOptions, speed: float | None) -> SigningConfig | None:
+def _signing(options: FlightOptions, speed: float | None, state: StateFolder | None) -> SigningConfig | None:
     """Signatures follow the wall clock of the other end; in lockstep there is none, and the date is simulated."""
     if speed is None:
         return None
-    return SigningConfig(MemoryStore(), wall_unix_us, options.has_to_sign)
+    store = MemoryStore() if state is None else FileStore(state.folder / "signing.json")
+    try:
+        store.load()
+    except ValueError as error:  # without its key the vehicle would obey anybody
+        raise UserError(f"{error}; remove it to fly without signing") from error
+    return SigningConfig(store, wall_unix_us, options.has_to_sign)
 
 
 def _check_ports(options: FlightOptions) -> None:
@@ -302,46 +322,6 @@ def _print_start(options: FlightOptions, speed: float | None, folder: Path, cons
 def _print_line(console: Console, text: str) -> None:
     """One line however narrow the console is, at once also into a pipe: rich flushes."""
     console.print(text, markup=False, highlight=False, soft_wrap=True)
-
-
-class Progress:
-    """The line of figures shown while flying; at most 80 columns wide."""
-
-    def __init__(self, flight: Flight, running: Running | None) -> None:
-        self._flight = flight
-        self._running = running
-        self._frames = 0
-        self._shown_wall_s = wall_time_s()
-        self._shown_us = 0
-
-    def is_due(self) -> bool:
-        self._frames += 1
-        return self._frames % 5 == 0 and wall_time_s() - self._shown_wall_s >= PROGRESS_PERIOD_S
-
-    def table(self) -> Table:
-        now_s = wall_time_s()
-        state = self._flight.controller.state
-        rate = (self._flight.time_us - self._shown_us) * 1e-6 / max(now_s - self._shown_wall_s, 1e-6)
-        self._shown_wall_s, self._shown_us = now_s, self._flight.time_us
-        north, east, down = state.estimate.pos_ned
-        velocity = state.estimate.vel_ned
-        table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
-        for heading in PROGRESS_HEADINGS:
-            table.add_column(heading, justify="right", no_wrap=True)
-        count = state.mission_count
-        table.add_row(
-            f"{self._flight.time_us * 1e-6:.1f}",
-            Mode(state.mode).name,
-            "yes" if state.is_armed else "no",
-            f"{min(state.mission_current + 1, count)} of {count}" if count else "none",
-            f"{north:.1f}",
-            f"{east:.1f}",
-            f"{-down:.1f}",
-            f"{float(np.hypot(velocity[0], velocity[1])):.1f}",
-            f"{100.0 * state.battery_remaining:.0f}",
-            f"{rate:.1f}",
-        )
-        return table
 
 
 def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: Path, console: Console) -> int:

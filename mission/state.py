@@ -1,0 +1,40 @@
+"""The state folder of `honeyguide fly --state`: opening it, and the home that it remembers."""
+
+from pathlib import Path
+
+from common.geodesy import DEFAULT_HOME, GeoPoint
+from common.state_folder import StateFolder
+
+HOME = "home"  # the record
+
+
+class StateError(ValueError):
+    """The folder cannot be used; the message is one sentence."""
+
+
+def open_state(folder: Path) -> StateFolder:
+    """Opens a state folder, or begins one.
+
+    Raises:
+        StateError: another flight has it, or it cannot be written.
+    """
+    try:
+        return StateFolder(folder)
+    except BlockingIOError as error:
+        raise StateError(f"--state {folder}: another flight is using it") from error
+    except OSError as error:
+        raise StateError(f"--state {folder}: cannot be used: {error.strerror}") from error
+
+
+def stored_home(state: StateFolder | None) -> GeoPoint:
+    """Where the vehicle boots if nothing else is said: the home given last, or the default."""
+    stored = {} if state is None else state.read(HOME)
+    try:
+        return GeoPoint(float(stored["lat_deg"]), float(stored["lon_deg"]), float(stored["alt_m"]))
+    except (KeyError, TypeError, ValueError):
+        return DEFAULT_HOME
+
+
+def keep_home(state: StateFolder, home: GeoPoint) -> None:
+    """Remembers a home that was given."""
+    state.write(HOME, {"lat_deg": home.lat_deg, "lon_deg": home.lon_deg, "alt_m": home.alt_m})

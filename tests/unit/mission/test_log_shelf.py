@@ -1,0 +1,126 @@
+"""Logs of flights: when they begin and end, what clients see of them."""
+
+import pytest
+from pyulog import ULog
+
+from autopilot.params import parameter_table
+from common.state_folder import StateFolder
+from mission.flight import Flight, FlightConfig
+from mission.log_shelf import LOGS_KEPT_MAX, FlightLogs
+from sim.world.world import WorldConfig
+
+BARE = WorldConfig(trees_per_ha=0.0)
+
+
+class Stream:
+    """A log that is only a header."""
+
+    def __init__(self):
+        self.listeners = []
+
+    def listen(self, listener):
+        self.listeners.append(listener)
+        return b"header"
+
+    def stop_listening(self, listener):
+        self.listeners.remove(listener)
+
+    def flush(self):
+        pass
+
+
+def shelf(folder, mode, stream=None):
+    params = parameter_table()
+    params.set("SDLOG_MODE", mode)
+    return FlightLogs(folder, stream or Stream(), params)
+
+
+def names(logs):
+    return [log.name for log in logs.logs()]
+
+
+@pytest.mark.parametrize(
+    ("mode", "after_boot", "armed_twice"),
+    [(-1, 0, 0), (0, 0, 2), (1, 1, 2), (2, 1, 1)],
+)
+def test_mode_says_when_logs_begin_and_end(tmp_path, mode, after_boot, armed_twice):
+    logs = shelf(tmp_path, mode)
+    assert len(names(logs)) == after_boot
+    for is_armed in (False, True, True, False, True, False):
+        logs.frame(is_armed=is_armed)
+    assert len(names(logs)) == armed_twice
+    logs.end()
+
+
+def test_names_count_on_over_runs(tmp_path):
+    for _ in range(2):
+        logs = shelf(tmp_path, 2)
+        logs.end()
+    assert names(logs) == ["log_00001.ulg", "log_00002.ulg"]
+
+
+def test_oldest_log_gives_way(tmp_path):
+    for i in range(1, LOGS_KEPT_MAX + 1):
+        (tmp_path / f"log_{i:05}.ulg").touch()
+    logs = shelf(tmp_path, 2)
+    assert len(names(logs)) == LOGS_KEPT_MAX
+    assert names(logs)[0] == "log_00002.ulg"
+    logs.end()
+
+
+def test_log_without_its_definitions_is_removed(tmp_path):
+    (tmp_path / "log_00003.ulg.part").write_bytes(b"hea")
+    logs = shelf(tmp_path, 0)
+    assert list(tmp_path.iterdir()) == []
+    assert names(logs) == []
+
+
+def test_erase_keeps_the_log_being_written_and_what_is_no_log(tmp_path):
+    (tmp_path / "log_00001.ulg").touch()
+    (tmp_path / "notes.txt").touch()
+    logs = shelf(tmp_path, 2)
+    assert logs.erase() == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["log_00002.ulg", "notes.txt"]
+    logs.end()
+    assert logs.erase() == 1
+    assert logs.read("log_00002.ulg", 0, 10) == b""
+
+
+def test_log_of_a_flight_in_the_state_folder_begins_and_ends_with_arming(tmp_path):
+    state = StateFolder(tmp_path)
+    flight = Flight(FlightConfig(world=BARE), state=state)
+    flight.run(lambda flight: flight.controller.state.is_ready_to_arm)
+    flight.controller.arm(force=False)
+    armed_us = flight.time_us
+    flight.run(lambda flight: flight.time_us >= armed_us + 2_000_000)
+    flight.controller.disarm(force=True)
+    flight.run(lambda flight: flight.time_us >= armed_us + 5_000_000)
+    flight.close()
+    state.close()
+    (path,) = (tmp_path / "logs").iterdir()
+    times = ULog(str(path)).get_dataset("vehicle_attitude").data["timestamp"]
+    assert armed_us - 1_000_000 <= times[0] <= armed_us + 20_000
+    assert armed_us + 2_000_000 <= times[-1] <= armed_us + 2_100_000
+
+
+def test_growing_log_of_the_run_is_what_the_file_will_begin_with(tmp_path):
+    flight = Flight(FlightConfig(world=BARE), folder=tmp_path)
+    flight.run(lambda flight: flight.time_us >= 1_500_000)
+    (log,) = flight.host.logs.logs()
+    content = flight.host.logs.read(log.name, 0, log.size)
+    assert flight.host.logs.erase() == 0
+    flight.close()
+    assert log.name == "flight.ulg"
+    assert len(content) == log.size > 10_000
+    assert (tmp_path / "flight.ulg").read_bytes()[: log.size] == content
+    assert flight.host.logs.logs()[0].size >= log.size
+
+
+def test_parameter_change_is_in_the_log(tmp_path):
+    flight = Flight(FlightConfig(world=BARE), folder=tmp_path)
+    flight.frame()
+    flight.params.set("MIS_TAKEOFF_ALT", 7.5)
+    flight.run(lambda flight: flight.time_us >= 1_500_000)
+    flight.close()
+    ulog = ULog(str(tmp_path / "flight.ulg"))
+    assert [(name, value) for _, name, value in ulog.changed_parameters] == [("MIS_TAKEOFF_ALT", 7.5)]
