@@ -13,7 +13,7 @@ from autopilot.vehicle import Mode
 from common.airframe import AIRFRAME_FOLDER
 from mission.cli import app
 from mission.plan import DEFAULT_PLAN
-from mission.session import Progress
+from mission.progress import Progress
 
 
 @pytest.fixture
