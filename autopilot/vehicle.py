@@ -259,6 +259,8 @@ class VehicleState:
     is_failsafe: bool = False
     is_calibrating: bool = False
     armed_since_us: int = 0
+    takeoff_us: int = 0  # when it last left the ground; 0: not since it was armed
+    flight_number: int = 0  # how often it has been armed since power-on
     battery_remaining: float = nan  # [0..1]
     battery_used_mah: float = 0.0
     battery_level: BatteryLevel = BatteryLevel.UNDEFINED

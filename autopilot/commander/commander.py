@@ -133,6 +133,8 @@ class Commander:
             self._set_home_here()
         state.is_armed = True
         state.armed_since_us = self._landed_since_us = state.time_us
+        state.takeoff_us = 0
+        state.flight_number += 1
         self._lift_since_us = 0
         self._has_flown = False
         self._watch.reset()
@@ -247,6 +249,7 @@ class Commander:
         if self._flying.wants_lift:
             if now_us - state.armed_since_us >= self._spool_up_us:
                 state.landed_state = LandedState.TAKEOFF
+                state.takeoff_us = now_us
                 self._landing.reset()
                 state.has_ground_contact = False
                 self._lift_since_us = now_us

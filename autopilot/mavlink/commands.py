@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.altitude import command_alt_amsl_m
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Endpoint, Sender
-from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.codec import MessageType, known_type
 from autopilot.mavlink.component import Component
 from autopilot.mavlink.convert import (
     INT32_MAX,
@@ -24,7 +24,7 @@ from autopilot.mavlink.convert import (
     whole,
 )
 from autopilot.mavlink.dialects import UnknownModeError
-from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
+from autopilot.mavlink.service import Command, CommandHandler, Handler, RequestHandler, Service, denied
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
 FORCE = 21196  # param2 of COMPONENT_ARM_DISARM
@@ -82,6 +82,9 @@ class CommandService(Service):
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
         self.components: Sequence[Component] = ()  # those behind the same links; they acknowledge for themselves
+        self._requests: dict[int, tuple[MessageType, RequestHandler]] = {
+            _MESSAGE_INTERVAL.msg_id: (_MESSAGE_INTERVAL, self._interval_requested)
+        }
         self.handlers: dict[int, CommandHandler] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_NAV_TAKEOFF: self._takeoff,
@@ -115,6 +118,12 @@ class CommandService(Service):
             if number in self.handlers:
                 raise ValueError(f"command {number} has two handlers")
             self.handlers[number] = handler
+
+    def add_requests(self, handlers: Mapping[str, RequestHandler]) -> None:
+        """Adds what another service sends on request."""
+        for name, handler in handlers.items():
+            kind = known_type(name)
+            self._requests[kind.msg_id] = (kind, handler)
 
     def long_received(self, sender: Sender, f: Any) -> None:
         """Carries a command out; an altitude in parameter 7 is above sea level unless the dialect knows better."""
@@ -313,10 +322,30 @@ class CommandService(Service):
     def _request_message(self, command: Command) -> Reply | None:
         """Sends a message once.
 
-        Params: p1 message id.
+        Params: p1 message id; p2 which one, where there are several (AVAILABLE_MODES: 0 all; MESSAGE_INTERVAL: of which
+        message).
         Refused: UNSUPPORTED for a message there is not; TEMPORARILY_REJECTED while it has nothing to say.
         """
-        return self._send_requested(command, whole(command.p1, -1))
+        msg_id = whole(command.p1, -1)
+        request = self._requests.get(msg_id)
+        if request is None:
+            return self._send_requested(command, msg_id)
+        kind, handler = request
+        payloads = handler(command)
+        if isinstance(payloads, Reply):
+            return payloads
+        self._ack(command, Verdict.ACCEPTED)
+        for payload in payloads:
+            self._endpoint.reply(command.sender, kind, payload)
+        return None
+
+    def _interval_requested(self, command: Command) -> Sequence[bytes] | Reply:
+        """MESSAGE_INTERVAL of the message whose id is in p2."""
+        msg_id = whole(command.p2, -1)
+        interval_us = command.sender.channel.schedule.interval_us.get(msg_id)
+        if interval_us is None:
+            return Reply(Verdict.UNSUPPORTED)
+        return [_MESSAGE_INTERVAL.pack(msg_id, interval_us or -1)]
 
     def _request_capabilities(self, command: Command) -> Reply | None:
         """Sends AUTOPILOT_VERSION."""

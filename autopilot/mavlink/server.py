@@ -28,6 +28,7 @@ from autopilot.mavlink.log_transfer import LogTransferService
 from autopilot.mavlink.manual import ManualService
 from autopilot.mavlink.mission_commands import MissionCommands
 from autopilot.mavlink.missions import MissionService
+from autopilot.mavlink.modes import ModeService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.origin import OriginService
 from autopilot.mavlink.parameters import ParameterService
@@ -109,6 +110,7 @@ class MavlinkServer:
             self._commands,
             parameters,
             MissionCommands(endpoint),
+            ModeService(endpoint),
             goto,
             MissionService(endpoint, goto),
             OffboardService(endpoint),
@@ -131,6 +133,7 @@ class MavlinkServer:
     def _add(self, service: Service) -> None:
         self._add_messages(service.messages())
         self._commands.add(service.commands())
+        self._commands.add_requests(service.requests())
         if type(service).frame is not Service.frame:
             self._frames.append(service.frame)
 

@@ -1,6 +1,6 @@
 """What every MAVLink service is: the messages and the commands it answers, and its share of the frame."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +29,9 @@ class Command:
 CommandHandler = Callable[[Command], Reply | None]
 """Returns the acknowledgement; None: it has been sent already, or will be."""
 
+RequestHandler = Callable[[Command], Sequence[bytes] | Reply]
+"""Answers REQUEST_MESSAGE for a message with parameters of its own: the payloads to send, or a refusal."""
+
 
 class Service:
     """A part of the MAVLink server; what it does not override it does not do."""
@@ -39,6 +42,10 @@ class Service:
 
     def commands(self) -> Mapping[int, CommandHandler]:
         """Handlers of COMMAND_LONG and COMMAND_INT, by MAV_CMD."""
+        return {}
+
+    def requests(self) -> Mapping[str, RequestHandler]:
+        """Messages that are sent on request only, in answer to the request's own parameters, by name."""
         return {}
 
     def frame(self) -> None:

@@ -11,7 +11,7 @@ from autopilot.mavlink.codec import MessageType, known_type
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.identity import autopilot_version
 from autopilot.mavlink.links import LinkRole
-from autopilot.mavlink.telemetry import motion, radio, sensors, status
+from autopilot.mavlink.telemetry import ardupilot, motion, radio, sensors, status
 from autopilot.vehicle import VehicleState
 from common.kernels import FRAME_US
 
@@ -30,6 +30,7 @@ class Stream:
     build: Builder
     ground_hz: float
     onboard_hz: float
+    ardupilot_hz: float = 0.0  # on every link, in that dialect
 
 
 STREAMS: tuple[Stream, ...] = (
@@ -65,6 +66,11 @@ STREAMS: tuple[Stream, ...] = (
     Stream("MANUAL_CONTROL", radio.manual_control, 0, 0),
     Stream("VIBRATION", sensors.vibration, 1, 1),
     Stream("ESTIMATOR_STATUS", sensors.estimator_status, 1, 2),
+    Stream("AVAILABLE_MODES_MONITOR", status.available_modes_monitor, 0.2, 0.2),
+    Stream("FLIGHT_INFORMATION", status.flight_information, 0, 0),
+    Stream("EKF_STATUS_REPORT", ardupilot.ekf_status_report, 0, 0, 1),
+    Stream("WIND", ardupilot.wind, 0, 0, 1),
+    Stream("RANGEFINDER", ardupilot.rangefinder, 0, 0, 2),
 )
 
 # REQUEST_DATA_STREAM: old requests name a group of messages (MAV_DATA_STREAM).
@@ -76,7 +82,10 @@ GROUPS: dict[int, tuple[str, ...]] = {
     6: ("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"),  # POSITION
     10: ("ATTITUDE", "ATTITUDE_QUATERNION"),  # EXTRA1
     11: ("VFR_HUD", "ALTITUDE"),  # EXTRA2
-    12: ("BATTERY_STATUS", "VIBRATION", "ESTIMATOR_STATUS", "DISTANCE_SENSOR", "WIND_COV"),  # EXTRA3
+    12: (
+        *("BATTERY_STATUS", "VIBRATION", "ESTIMATOR_STATUS", "DISTANCE_SENSOR", "WIND_COV"),
+        *("EKF_STATUS_REPORT", "WIND", "RANGEFINDER", "SYSTEM_TIME"),
+    ),  # EXTRA3
 }
 GROUP_ALL = 0
 
@@ -98,7 +107,17 @@ class Telemetry:
             first_seq = dialect.first_seq if state.mission_count else 0
             return status.mission_progress(state, state.mission_current + first_seq)
 
-        streams = (Stream("HEARTBEAT", heartbeat, 1, 1), *STREAMS, Stream("AUTOPILOT_VERSION", version, 0, 0))
+        def current_mode(state: VehicleState) -> bytes:
+            """The mode that is flown, and its standard number."""
+            return status.current_mode(state, dialect)
+
+        streams = (
+            Stream("HEARTBEAT", heartbeat, 1, 1),
+            *STREAMS,
+            Stream("AUTOPILOT_VERSION", version, 0, 0),
+            Stream("CURRENT_MODE", current_mode, 0.5, 0.5),
+        )
+        is_ardupilot = dialect.name == "ardupilot"
         self.streams = tuple(
             replace(stream, build=mission_current) if stream.name == "MISSION_CURRENT" else stream for stream in streams
         )
@@ -109,8 +128,9 @@ class Telemetry:
             kind = known_type(stream.name)
             self.types[kind.msg_id] = kind
             self.builders[kind.msg_id] = stream.build
-            self.default_interval_us[LinkRole.GROUND][kind.msg_id] = _interval_us(stream.ground_hz)
-            self.default_interval_us[LinkRole.ONBOARD][kind.msg_id] = _interval_us(stream.onboard_hz)
+            own_hz = stream.ardupilot_hz if is_ardupilot else 0.0
+            self.default_interval_us[LinkRole.GROUND][kind.msg_id] = _interval_us(max(stream.ground_hz, own_hz))
+            self.default_interval_us[LinkRole.ONBOARD][kind.msg_id] = _interval_us(max(stream.onboard_hz, own_hz))
 
 
 def _interval_us(rate_hz: float) -> int:

@@ -180,8 +180,8 @@ def vibration(state: VehicleState) -> bytes | None:
 def estimator_status(state: VehicleState) -> bytes:
     """Which estimates are valid, innovation test ratios, accuracies."""
     estimate = state.estimate
-    flags = sum(bits for ours, bits in _ESTIMATOR_BITS if estimate.flags & ours)
-    gnss_vel, gnss_pos, baro, mag, range_finder = _test_ratios(state.health)
+    flags = estimator_flags(state)
+    gnss_vel, gnss_pos, baro, mag, range_finder = test_ratios(state.health)
     return _estimator_status(
         state.time_us,
         flags,
@@ -196,7 +196,12 @@ def estimator_status(state: VehicleState) -> bytes:
     )
 
 
-def _test_ratios(health: Any) -> tuple[float, float, float, float, float]:
+def estimator_flags(state: VehicleState) -> int:
+    """ESTIMATOR_STATUS_FLAGS, which are those of EKF_STATUS_REPORT too."""
+    return sum(bits for ours, bits in _ESTIMATOR_BITS if state.estimate.flags & ours)
+
+
+def test_ratios(health: Any) -> tuple[float, float, float, float, float]:
     """Smoothed test ratios of GNSS velocity and position, barometer, magnetometer, range; above 1 is rejected."""
     if health is None:
         return 0.0, 0.0, 0.0, 0.0, 0.0

@@ -20,8 +20,12 @@ _gps_global_origin = known_type("GPS_GLOBAL_ORIGIN").pack
 _extended_sys_state = known_type("EXTENDED_SYS_STATE").pack
 _fence_status = known_type("FENCE_STATUS").pack
 _mission_current = known_type("MISSION_CURRENT").pack
+_current_mode = known_type("CURRENT_MODE").pack
+_available_modes_monitor = known_type("AVAILABLE_MODES_MONITOR").pack
+_flight_information = known_type("FLIGHT_INFORMATION").pack
 _system_time = known_type("SYSTEM_TIME").pack
 
+MODES_SEQUENCE = 1  # AVAILABLE_MODES_MONITOR.seq: the list of modes never changes while the vehicle runs
 MAVLINK_VERSION = 3  # of the HEARTBEAT message
 # Most modes fly themselves: stabilised, guided and automatic, with a custom mode. The others are flown by sticks.
 _BASE_MODE = (
@@ -227,3 +231,22 @@ def fence_status(state: VehicleState) -> bytes:
 def system_time(state: VehicleState) -> bytes:
     """The date is unknown (0): simulated time counts from power-on."""
     return _system_time(0, boot_ms(state.time_us))
+
+
+def current_mode(state: VehicleState, dialect: Dialect) -> bytes:
+    """CURRENT_MODE: the mode flown; the one asked for last is the same, since a mode is entered at once or not."""
+    custom_mode = dialect.custom_mode(state.mode)
+    standard = next((row.standard_mode for row in dialect.modes if row.mode is state.mode), 0)
+    return _current_mode(standard, custom_mode, custom_mode)
+
+
+def available_modes_monitor(_: VehicleState) -> bytes:
+    """A number that would change with the list of modes."""
+    return _available_modes_monitor(MODES_SEQUENCE)
+
+
+def flight_information(state: VehicleState) -> bytes:
+    """When it was armed and took off [us since power-on; the date is unknown], and the number of the flight."""
+    armed_us = state.armed_since_us if state.is_armed else 0
+    takeoff_us = state.takeoff_us if state.is_armed else 0
+    return _flight_information(boot_ms(state.time_us), armed_us, takeoff_us, state.flight_number)

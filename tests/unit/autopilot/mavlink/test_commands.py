@@ -211,7 +211,7 @@ def test_home_that_is_not_known_is_refused():
 @pytest.mark.parametrize(
     "probe",
     [
-        (512, 435),  # REQUEST_MESSAGE of AVAILABLE_MODES, which a ground station asks for when it connects
+        (512, 397),  # REQUEST_MESSAGE of COMPONENT_METADATA, which a ground station asks for when it connects
         (512, 259),
         (511, 9999, 1e6),
         (510, 9999),
