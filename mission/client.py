@@ -241,31 +241,34 @@ class Client:
                 return ack
         raise ScriptTimeout(f"{name}: no answer after {COMMAND_TRIES} tries")
 
-    async def upload(self, items: Sequence[PlanItem]) -> None:
-        """Replaces the vehicle's mission.
+    async def upload(self, items: Sequence[PlanItem], mission_type: int = 0) -> None:
+        """Replaces the vehicle's mission, its fence (type 1) or its rally points (type 2).
 
         Raises:
             MissionRefused: the vehicle did not take it and keeps its old one.
         """
         first_text = len(self.texts)
-        target = {"target_system": self.system_id, "target_component": 1, "mission_type": 0}
+        target = {"target_system": self.system_id, "target_component": 1, "mission_type": mission_type}
         with self.subscribe("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK") as inbox:
             self.send("MISSION_COUNT", **target, count=len(items))
             while True:
                 message = await inbox.next_message(6 * TRANSFER_TIMEOUT_S, "mission upload")
                 request = message.fields
+                if request.mission_type != mission_type:
+                    continue
                 if message.name == "MISSION_ACK":
                     if request.type != 0:
                         await next_frame()
                         raise MissionRefused(request.type, "; ".join(self.texts[first_text:]))
-                    self.reached.clear()
+                    if mission_type == 0:
+                        self.reached.clear()
                     return
                 if request.seq < len(items):
                     self.send("MISSION_ITEM_INT", **target, **_item_fields(items[request.seq]))
 
-    async def download(self) -> list[PlanItem]:
-        """The vehicle's mission."""
-        target = {"target_system": self.system_id, "target_component": 1, "mission_type": 0}
+    async def download(self, mission_type: int = 0) -> list[PlanItem]:
+        """The vehicle's mission, its fence (type 1) or its rally points (type 2)."""
+        target = {"target_system": self.system_id, "target_component": 1, "mission_type": mission_type}
         with self.subscribe("MISSION_COUNT", "MISSION_ITEM_INT") as inbox:
             self.send("MISSION_REQUEST_LIST", **target)
             count = (await inbox.next(TRANSFER_TIMEOUT_S, "mission count")).count

@@ -18,6 +18,7 @@ from typing import Any
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from mission.client import Client, ScriptError, ScriptTimeout
 from mission.plan import Plan
+from mission.plan_lists import FENCE_LIST, RALLY_LIST, fence_items, rally_items
 
 FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM that skips the checks
 
@@ -294,12 +295,18 @@ class Drone(Client):
 
 
 async def fly_plan(drone: Drone, plan: Plan) -> None:
-    """Uploads a plan, flies it and, if it ends on the ground, waits until the motors stop.
+    """Uploads a plan, with fence and rally points if it has any, and flies it.
+
+    If it ends on the ground, waits until the motors stop.
 
     Raises:
         ScriptError: the vehicle refused it, or did something else in the end.
     """
     await drone.wait_ready()
+    if plan.fence:
+        await drone.upload(fence_items(plan), FENCE_LIST)
+    if plan.rally:
+        await drone.upload(rally_items(plan), RALLY_LIST)
     await drone.upload(plan.items)
     first_text = len(drone.texts)
     await drone.start_mission()

@@ -84,14 +84,17 @@ class Fence:
     def is_active(self) -> bool:
         return self._limits != 0
 
-    def refusal(self, place: Vector) -> str:
-        """Why the vehicle may not go to a place [m]; empty if it may. The floor holds no landing back."""
+    def refusal(self, place: Vector, *, is_to_stay: bool = False) -> str:
+        """Why the vehicle may not go to a place [m]; empty if it may. The floor counts only if it is to stay there."""
         limits = self._limits
         if not limits:
             return ""
         breached = limits & self._beyond(place, 0.0)
         if limits & _SHAPES and self.region.clearance(place[0], place[1]) < 0.0:
             breached |= _SHAPES
+        height = self._context.state.home_ned[2] - place[2]
+        if is_to_stay and limits & _FLOOR and height < self._context.number("GF_MIN_ALT"):
+            breached |= _FLOOR
         return f"outside fence: {_names(breached)}" if breached else ""
 
     def bounds(self) -> Bounds:

@@ -257,7 +257,7 @@ class Navigator:
             target = reposition_target(context, base, lat_deg, lon_deg, alt_amsl_m, yaw)
             if isinstance(target, Reply):
                 return target
-            refusal = self.fence.refusal(target[0])
+            refusal = self.fence.refusal(target[0], is_to_stay=True)
             if refusal:
                 return Reply(Verdict.DENIED, f"target is {refusal}")
             context.next_hold = (*target, True)
