@@ -43,6 +43,7 @@ class ControlParams:
     takeoff_ramp_s: float
     yaw_rate_auto: float  # [rad/s]
     yaw_accel_auto: float  # [rad/s²]
+    yaw_rate_time_s: float
     att_p_roll: float  # [1/s]
     att_p_pitch: float
     att_p_yaw: float
@@ -113,6 +114,7 @@ CONTROL_PARAMETERS: list[Parameter] = [
         "guess",
         "yaw_accel_auto",
     ),
+    Parameter("MPC_MAN_Y_TAU", 0.08, 0.0, 5.0, "s", "time in which a yaw rate is taken up", _PX4, "yaw_rate_time_s"),
     Parameter("MC_ROLL_P", 8.0, 1.0, 20.0, "1/s", "attitude to rate, roll", _TUNED, "att_p_roll"),
     Parameter("MC_PITCH_P", 8.0, 1.0, 20.0, "1/s", "attitude to rate, pitch", _TUNED, "att_p_pitch"),
     Parameter("MC_YAW_P", 3.0, 0.5, 10.0, "1/s", "attitude to rate, yaw", _TUNED, "att_p_yaw"),

@@ -321,7 +321,7 @@ def braking_speed(distance: float, decel: float, gain: float) -> float:
 
 @wp.func
 def yaw_step(params: ControlParams, state: TrajectoryState, sp: Setpoint, dt_s: float) -> TrajectoryState:
-    """The yaw setpoint turned towards its goal the short way, within rate and acceleration."""
+    """The yaw setpoint turned towards its goal the short way, within rate and acceleration; or at a rate alone."""
     turned = state
     feed = finite_or(sp.yaw_rate, 0.0)
     rate_max = wp.max(params.yaw_rate_auto, wp.abs(feed))
@@ -334,6 +334,9 @@ def yaw_step(params: ControlParams, state: TrajectoryState, sp: Setpoint, dt_s: 
         rate = feed + wp.sign(away) * speed
     rate = wp.clamp(rate, -rate_max, rate_max)
     turned.yaw_rate = state.yaw_rate + wp.clamp(rate - state.yaw_rate, -accel * dt_s, accel * dt_s)
+    if not wp.isfinite(sp.yaw) and wp.isfinite(sp.yaw_rate):  # somebody steers: it starts and stops at once
+        share = dt_s / (dt_s + params.yaw_rate_time_s)
+        turned.yaw_rate = state.yaw_rate + (rate - state.yaw_rate) * share
     turned.yaw = wrap_pi(state.yaw + 0.5 * (state.yaw_rate + turned.yaw_rate) * dt_s)
     if not wp.isfinite(sp.yaw) and wp.isfinite(sp.yaw_rate):
         turned.yaw_goal = turned.yaw

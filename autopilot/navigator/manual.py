@@ -13,23 +13,63 @@ from autopilot.navigator.setpoint import Quaternion
 from autopilot.sticks import curved, without_centre
 
 _TAKEOFF_THROTTLE = 0.3  # of the way from the middle to the top, from which a vehicle on the ground takes off (PX4)
+_VOLTAGE_SHARE_MIN = 0.6  # as the control part
+_VOLTAGE_TIME_S = 1.0  # guess
 _LEVEL: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+class Throttle:
+    """The throttle stick as thrust.
+
+    Its middle carries the vehicle whatever charge the battery has left (PX4: MPC_USE_HTE): a thrust setpoint is a share
+    of what the rotors can do at the present voltage.
+    """
+
+    __slots__ = ("_context", "_time_us", "_voltage_share")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._voltage_share = 1.0  # of a full battery
+        self._time_us = 0
+
+    def thrust(self, least: float) -> float:
+        """Collective thrust [0..1] from `least` at throttle down to MPC_THR_MAX."""
+        context = self._context
+        throttle = context.state.sticks.throttle
+        most = context.number("MPC_THR_MAX")
+        if context.number("MPC_THR_CURVE"):
+            return least + 0.5 * (throttle + 1.0) * (most - least)
+        hover = min(context.number("MPC_THR_HOVER") / self._share() ** 2, most)
+        return hover + throttle * (most - hover if throttle > 0.0 else hover - least)
+
+    def _share(self) -> float:
+        """Voltage over that of the full battery, low-passed: the load's own ups and downs do not count."""
+        context = self._context
+        now_us, voltage_v = context.state.time_us, context.state.samples.battery.voltage_v
+        full_v = context.number("BAT1_N_CELLS") * context.number("BAT1_V_CHARGED")
+        if voltage_v > 0.0 and full_v > 0.0:
+            measured = min(max(voltage_v / full_v, _VOLTAGE_SHARE_MIN), 1.0)
+            dt_s = (now_us - self._time_us) * 1e-6  # long since it was last flown: begins anew
+            self._voltage_share += (measured - self._voltage_share) * min(dt_s / _VOLTAGE_TIME_S, 1.0)
+        self._time_us = now_us
+        return self._voltage_share
 
 
 class Stabilized:
     """Modes Stabilized and Manual: roll, pitch and yaw rate by sticks, the throttle stick is the thrust."""
 
-    __slots__ = ("_context",)
+    __slots__ = ("_context", "_throttle")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
+        self._throttle = Throttle(context)
 
     def start(self) -> None:
         """Nothing is remembered between frames."""
 
     def frame(self) -> None:
         context = self._context
-        thrust = thrust_of(context, context.number("MPC_MANTHR_MIN"))
+        thrust = self._throttle.thrust(context.number("MPC_MANTHR_MIN"))
         if context.is_on_ground:
             context.wants_lift = thrust > LIFT_SHARE * context.hover_thrust
         else:
@@ -39,17 +79,18 @@ class Stabilized:
 class Acro:
     """Mode Acro: body rates by sticks, the throttle stick is the thrust."""
 
-    __slots__ = ("_context",)
+    __slots__ = ("_context", "_throttle")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
+        self._throttle = Throttle(context)
 
     def start(self) -> None:
         """Nothing is remembered between frames."""
 
     def frame(self) -> None:
         context = self._context
-        thrust = thrust_of(context, 0.0)
+        thrust = self._throttle.thrust(0.0)
         if context.is_on_ground:
             context.wants_lift = thrust > LIFT_SHARE * context.hover_thrust
             return
@@ -137,16 +178,6 @@ def yaw_rate_of(context: NavContext) -> float:
     number = context.number
     stick = curved(without_centre(context.state.sticks.yaw, number("MAN_DEADZONE")), number("MPC_YAW_EXPO"))
     return radians(number("MPC_MAN_Y_MAX")) * stick
-
-
-def thrust_of(context: NavContext, least: float) -> float:
-    """Collective thrust [0..1] from `least` at throttle down to MPC_THR_MAX."""
-    throttle = context.state.sticks.throttle
-    most = context.number("MPC_THR_MAX")
-    if context.number("MPC_THR_CURVE"):
-        return least + 0.5 * (throttle + 1.0) * (most - least)
-    hover = context.number("MPC_THR_HOVER")
-    return hover + throttle * (most - hover if throttle > 0.0 else hover - least)
 
 
 def speed_down_of(context: NavContext) -> float:

@@ -13,6 +13,7 @@ from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.node import FlightController, HostPorts, hover_thrust
+from autopilot.params import SYSTEM_PARAMETERS
 from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
@@ -86,6 +87,7 @@ class Kinematic:
                 *CONTROL_PARAMETERS,
                 *ESTIMATOR_PARAMETERS,
                 *STICK_PARAMETERS,
+                *SYSTEM_PARAMETERS,
             ]
         )
         for name, value in params.items():

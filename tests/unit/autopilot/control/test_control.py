@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_RATE
+from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_LEAN, SETPOINT_RATE
 from common.kernels import GRAVITY_M_S2
 from tests.unit.autopilot.control.rig import Rig, turbulence
 
@@ -130,6 +130,46 @@ def test_attitude_setpoint_with_yaw_rate() -> None:
     assert tilt == pytest.approx(lean, abs=np.radians(0.5))
     assert bodies["omega_frd"][0, -1, 2] == pytest.approx(0.5 * np.cos(lean), abs=0.05)
     assert states["actuators"]["thrust_sp"][0, -1] == pytest.approx(hover / np.cos(lean), rel=1e-3)
+
+
+@pytest.mark.parametrize("lean_deg", [20.0, 45.0, 60.0])
+def test_lean_setpoint_holds_the_height_while_it_leans_and_turns(lean_deg: float) -> None:
+    rig = blown_rig(NO_WIND)
+    rig.set(vel_ned=(0.0, 0.0, 0.0))
+    rig.run(2.0)
+    half = np.radians(lean_deg) / 2.0
+    rig.set(
+        kind=SETPOINT_LEAN,
+        accel_ned=(0.0, 0.0, np.nan),
+        vel_ned=(np.nan, np.nan, 0.0),
+        q_ned_from_frd=(np.sin(half), 0.0, 0.0, np.cos(half)),
+        yaw_rate=0.5,
+    )
+    bodies, _ = rig.run(2.0)
+    q = bodies["q_ned_from_frd"][0, -1].astype(float)
+    tilt = np.arccos(1.0 - 2.0 * (q[0] ** 2 + q[1] ** 2))
+    assert np.degrees(tilt) == pytest.approx(lean_deg, abs=1.0)
+    roll = np.arctan2(2.0 * (q[3] * q[0] + q[1] * q[2]), 1.0 - 2.0 * (q[0] ** 2 + q[1] ** 2))
+    assert np.degrees(roll) == pytest.approx(lean_deg, abs=1.5)  # to the right, whatever the heading
+    yaw = np.arctan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2))
+    assert yaw == pytest.approx(0.5 * 2.0, abs=0.1)
+    assert np.abs(bodies["pos_ned"][0, :, 2] - bodies["pos_ned"][0, 0, 2]).max() < 0.5
+
+
+def test_lean_setpoint_climbs_at_the_rate_asked_for() -> None:
+    rig = blown_rig(NO_WIND)
+    rig.set(kind=SETPOINT_LEAN, accel_ned=(0.0, 0.0, np.nan), vel_ned=(np.nan, np.nan, -2.0), yaw_rate=0.0)
+    bodies, _ = rig.run(4.0)
+    assert bodies["vel_ned"][0, -1, 2] == pytest.approx(-2.0, abs=0.05)
+
+
+def test_level_lean_setpoint_drifts_with_the_wind_instead_of_leaning_against_it() -> None:
+    rig = blown_rig(WIND)
+    rig.set(kind=SETPOINT_LEAN, accel_ned=(0.0, 0.0, np.nan), vel_ned=(np.nan, np.nan, 0.0), yaw_rate=0.0)
+    bodies, _ = rig.run(5.0)
+    q = bodies["q_ned_from_frd"][0, -1].astype(float)
+    assert np.degrees(np.arccos(1.0 - 2.0 * (q[0] ** 2 + q[1] ** 2))) < 1.0
+    assert bodies["vel_ned"][0, -1, 1] > 0.5  # the wind comes from the west
 
 
 def test_rate_setpoint_is_flown() -> None:

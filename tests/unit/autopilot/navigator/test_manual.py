@@ -23,7 +23,9 @@ THRUST_MODES = STICK_MODES[:3]
 
 def flown(mode, height_m=20.0, **params):
     """In the air, in a mode flown by sticks."""
-    rig = Kinematic(**params).flying(height_m)
+    rig = Kinematic(**params)
+    rig.battery_v = 16.8
+    rig.flying(height_m)
     rig.piloted(0.1)
     assert rig.fc.set_mode(mode).verdict is Verdict.ACCEPTED
     rig.piloted(1.0)
@@ -97,6 +99,13 @@ def test_stabilized_asks_for_lean_yaw_rate_and_thrust():
     assert rig.sp("thrust") == pytest.approx(0.1)
     rig.piloted(0.1)
     assert rig.sp("thrust") == pytest.approx(0.4)
+
+
+def test_throttle_in_the_middle_carries_the_vehicle_on_a_battery_that_is_not_full():
+    rig = flown(Mode.STABILIZED, MPC_THR_HOVER=0.4)
+    rig.battery_v = 0.9 * 16.8
+    rig.piloted(8.0)
+    assert rig.sp("thrust") == pytest.approx(0.4 / 0.81, rel=1e-3)
 
 
 def test_straight_throttle_curve():
