@@ -81,6 +81,11 @@ _MISSING: dict[str, tuple[int, tuple[str, ...]]] = {
     ),
 }  # fmt: skip
 
+# Extension fields of common.xml that pymavlink does not have: they stand at the end, and the checksum leaves them out.
+_EXTENSIONS: dict[str, tuple[str, ...]] = {
+    "SERIAL_CONTROL": ("uint8_t target_system", "uint8_t target_component"),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Definition:
@@ -135,11 +140,27 @@ def _missing(name: str, msg_id: int, fields: tuple[str, ...]) -> Definition:
     )
 
 
+def _extended(known: Any, fields: tuple[str, ...]) -> Definition:
+    names = tuple(_split(field)[2] for field in fields)
+    return Definition(
+        known.id,
+        known.msgname,
+        (*known.fieldnames, *names),
+        (*known.ordered_fieldnames, *names),
+        struct.Struct(known.unpacker.format + "".join(_code(*_split(field)[:2]) for field in fields)),
+        known.crc_extra,
+    )
+
+
 def _all_definitions() -> dict[int, Any]:
     """Every message by its id; a newer pymavlink that has one of ours is believed."""
     known: dict[int, Any] = dict(pymavlink_all.mavlink_map)
     for name, (msg_id, fields) in _MISSING.items():
         known.setdefault(msg_id, _missing(name, msg_id, fields))
+    for definition in list(known.values()):
+        fields = _EXTENSIONS.get(definition.msgname, ())
+        if fields and _split(fields[0])[2] not in definition.fieldnames:
+            known[definition.id] = _extended(definition, fields)
     return known
 
 

@@ -35,6 +35,7 @@ from autopilot.mavlink.parameters import ParameterService
 from autopilot.mavlink.routing import Router
 from autopilot.mavlink.safety import SafetyService
 from autopilot.mavlink.service import CommandHandler, Handler, Service
+from autopilot.mavlink.shell import ShellService
 from autopilot.mavlink.signing import Judgement, SigningConfig
 from autopilot.mavlink.signing_setup import SigningService
 from autopilot.mavlink.streams import Stream
@@ -122,6 +123,7 @@ class MavlinkServer:
             ManualService(endpoint),
             LogTransferService(endpoint),
             LogStreamingService(endpoint),
+            ShellService(endpoint),
             OriginService(endpoint),
             SigningService(endpoint),
         ]

@@ -8,6 +8,7 @@ import pytest
 from mavsdk.plugins.ftp import FilesystemEntry, Ftp, FtpError, FtpResult
 from mavsdk.plugins.log_files import LogFiles, LogFilesResult
 from mavsdk.plugins.log_streaming import LogStreaming
+from mavsdk.plugins.shell import Device, Shell
 from pyulog import ULog
 
 from common.folder import ConfinedFolder
@@ -120,3 +121,22 @@ def test_log_is_streamed(flight):
     assert ulog.initial_parameters["SDLOG_MODE"] == 2
     assert len(ulog.get_dataset("vehicle_attitude").data["timestamp"]) >= 50
     assert not ulog.dropouts
+
+
+def test_shell_takes_commands_and_answers(flight):
+    shell = Shell(flight.system)
+    received = []
+    shell.subscribe_receive(lambda piece, _: received.append(piece.data))
+    for line, expected in (
+        ("ver all", "Honeyguide"),
+        ("param set MIS_TAKEOFF_ALT 4.5", "-> 4.5"),
+        ("listener vehicle_attitude", "    q: ["),
+        ("logger status", "3 logs"),
+    ):
+        received.clear()
+        shell.send(line + "\n", Device.SHELL)
+        deadline_s = monotonic() + 10.0
+        while not "".join(received).endswith("nsh> "):
+            assert monotonic() < deadline_s, "".join(received)
+            sleep(0.01)
+        assert expected in "".join(received)
