@@ -15,6 +15,7 @@ from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.calibration import Calibrator, Turntable
 from autopilot.commander.commander import Commander
 from autopilot.commander.landing import LandingDetector
+from autopilot.commander.motors import LeaveOut, MotorWatch, ReadSpeeds
 from autopilot.commander.pilot import Pilot
 from autopilot.guidance import Guidance
 from autopilot.host import Host
@@ -59,6 +60,8 @@ class HostPorts:
     read_actuators: Callable[[], Any]  # Actuators
     read_health: Callable[[], Any]  # EstimatorState
     setpoint: np.ndarray[Any, Any]  # live structured view, shape (1,), of the Setpoint row
+    read_rotor_speeds: ReadSpeeds | None = None  # ESC telemetry
+    leave_out: LeaveOut | None = None  # rotors that the control allocation shall not use
 
 
 class Server(Announcer, Protocol):
@@ -146,6 +149,7 @@ class FlightController:
             BatteryEstimator(airframe.battery),
             LandingDetector(params, hover, standing_m),
             Pilot(self.state, params, self.sticks),
+            MotorWatch(self.state, params, self._relay, airframe, ports.read_rotor_speeds, ports.leave_out),
         )
         context = NavContext(self.state, params, self._relay, self._setpoint, hover, standing_m)
         mission = Mission(context, self.payload, self.commander.set_home)

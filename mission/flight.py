@@ -11,6 +11,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from autopilot.control.airframe import rotors_leaver
 from autopilot.host import Host
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
@@ -37,6 +38,7 @@ from mission.log_shelf import FlightLogs, RunLog
 from mission.recorder import History, Recorder
 from mission.script import Drone, Script
 from sim.rig import Rig
+from sim.sensors.esc import esc_reader
 from sim.sensors.sensors import sensor_model
 from sim.turntable import Turntable
 from sim.wind import wind_model
@@ -113,7 +115,7 @@ class Flight:
         self._injector = RigInjector(self.rig, self.airframe, config.noise)
         self.host = Host(files=host_files(folder, state))
         self.controller = FlightController(
-            host_ports(self.rig),
+            host_ports(self.rig, self.airframe),
             self.params,
             self.airframe,
             config.home,
@@ -226,7 +228,7 @@ def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTabl
     return table
 
 
-def host_ports(rig: Rig, i_vehicle: int = 0) -> HostPorts:
+def host_ports(rig: Rig, airframe: Airframe, i_vehicle: int = 0) -> HostPorts:
     """The connectors of one vehicle's flight controller, on the live rows of a rig."""
     autopilot = rig.arrays.autopilot
     estimator = autopilot.ekf.rows.numpy()
@@ -236,4 +238,6 @@ def host_ports(rig: Rig, i_vehicle: int = 0) -> HostPorts:
         read_actuators=row_reader(autopilot.control.numpy(), i_vehicle, "Actuators", "actuators"),
         read_health=row_reader(estimator, i_vehicle, "EstimatorState"),
         setpoint=autopilot.setpoint.numpy()[i_vehicle : i_vehicle + 1],
+        read_rotor_speeds=esc_reader(rig.arrays.body.numpy(), i_vehicle),
+        leave_out=rotors_leaver(autopilot.airframe.numpy()[i_vehicle : i_vehicle + 1], airframe),
     )

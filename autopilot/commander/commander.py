@@ -13,6 +13,7 @@ from autopilot.commander.flying import Flying
 from autopilot.commander.guard import Guard
 from autopilot.commander.landing import LandingDetector
 from autopilot.commander.modes import MODE_RULES, NO_STICKS, mode_refusal
+from autopilot.commander.motors import MotorWatch
 from autopilot.commander.pilot import Pilot
 from autopilot.commander.watch import FailureWatch, StationLink
 from autopilot.navigator.ground import Ask
@@ -44,6 +45,7 @@ class Commander:
         battery: the charge estimator.
         landing: the landing detector.
         pilot: what the pilot asks for by the sticks.
+        motors: the motor watch.
     """
 
     def __init__(
@@ -54,6 +56,7 @@ class Commander:
         battery: BatteryEstimator,
         landing: LandingDetector,
         pilot: Pilot,
+        motors: MotorWatch,
     ) -> None:
         self.state = state
         self.params = params
@@ -62,7 +65,7 @@ class Commander:
         self.station = StationLink()
         self.guard = Guard(self)
         self._battery = battery
-        self._watch = FailureWatch(state, params, battery, self.station)
+        self._watch = FailureWatch(state, params, battery, self.station, motors)
         self._landing = landing
         self._pilot = pilot
         self._flying: Flying

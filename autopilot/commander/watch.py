@@ -19,6 +19,7 @@ from autopilot.commander.failsafe import (
     FLIGHT_TIME_NEAR,
     FLIGHT_TIME_OVER,
     HEIGHT_LOST,
+    MOTOR_FAILED,
     OFFBOARD_LOST,
     POSITION_LOST,
     STATION_LOST,
@@ -26,6 +27,7 @@ from autopilot.commander.failsafe import (
     WIND_STRONG,
 )
 from autopilot.commander.flying import Flying
+from autopilot.commander.motors import MotorWatch
 from autopilot.ports import DEAD_RECKONING as DEAD_RECKONING_FLAG
 from autopilot.ports import HEIGHT_VALID, WIND_VALID
 from autopilot.vehicle import BatteryLevel, LandedState, Mode, VehicleState
@@ -71,22 +73,29 @@ class FailureWatch:
         params: COM_*, BAT_*, FD_*.
         battery: the charge estimator.
         station: when a ground station was heard.
+        motors: the motor watch.
     """
 
     __slots__ = (
         "_attitude", "_battery", "_battery_critical", "_battery_emergency", "_battery_low", "_except_bits",
-        "_is_position_lost", "_next_slow_us", "_offboard_loss_us", "_params", "_reckoning_us", "_resets_us", "_slow",
-        "_state", "_station", "_station_loss_us", "_time_max_us", "_wind_max", "_wind_speed", "_wind_warn",
+        "_is_position_lost", "_motors", "_next_slow_us", "_offboard_loss_us", "_params", "_reckoning_us", "_resets_us",
+        "_slow", "_state", "_station", "_station_loss_us", "_time_max_us", "_wind_max", "_wind_speed", "_wind_warn",
         "airborne_us",
     )  # fmt: skip
 
     def __init__(
-        self, state: VehicleState, params: ParameterTable, battery: BatteryEstimator, station: StationLink
+        self,
+        state: VehicleState,
+        params: ParameterTable,
+        battery: BatteryEstimator,
+        station: StationLink,
+        motors: MotorWatch,
     ) -> None:
         self._state = state
         self._params = params
         self._battery = battery
         self._station = station
+        self._motors = motors
         self._attitude = AttitudeWatch(params)
         self._wind_speed = 0.0  # [m/s] low-passed
         self.reset()
@@ -96,6 +105,7 @@ class FailureWatch:
     def reset(self) -> None:
         """The vehicle has just been armed."""
         self._attitude.reset()
+        self._motors.reset()
         self._next_slow_us = 0
         self._reckoning_us = -_FIX_STEADY_US  # when GNSS was last missed
         self._resets_us: list[int] = []  # when the estimate was last set anew
@@ -115,6 +125,8 @@ class FailureWatch:
         mode = state.mode
         is_flying = state.landed_state is not LandedState.ON_GROUND
         failures = self._attitude.update(state, dt_s)
+        if self._motors.has_failure():
+            failures |= MOTOR_FAILED
         if is_flying and self._battery.is_silent:
             failures |= BATTERY_SILENT
         if is_flying and state.fence.breached:

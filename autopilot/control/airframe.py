@@ -3,6 +3,10 @@
 Built once on the host from the airframe file; read-only in kernels.
 """
 
+from collections.abc import Callable, Collection
+from math import hypot
+from typing import Any
+
 import numpy as np
 import warp as wp
 
@@ -31,6 +35,7 @@ class ControlAirframe:
     idle_speed_share: float  # speed at that command over the greatest
     motor_time_s: float  # first-order lag, mean of rise and fall
     full_voltage_v: float
+    left_out: int  # rotors not to be used, as bits; they stay at idle and count for nothing
 
 
 def effectiveness(airframe: Airframe) -> np.ndarray:
@@ -44,12 +49,14 @@ def effectiveness(airframe: Airframe) -> np.ndarray:
     return np.array(columns, dtype=np.float64).T
 
 
-def mixing(airframe: Airframe) -> np.ndarray:
+def mixing(airframe: Airframe, left_out: Collection[int] = ()) -> np.ndarray:
     """Rotor thrusts [N] per unit of roll, pitch, yaw torque and collective thrust, shape (rotors, 4).
 
-    The least-effort inverse. Where the rotors cannot make all four (three rotors), yaw is left out.
+    The least-effort inverse, without the rotors `left_out`. Where the rest cannot make all four (three rotors), yaw is
+    left to itself.
     """
     forward = effectiveness(airframe)
+    forward[:, list(left_out)] = 0.0
     inverse = np.zeros((forward.shape[1], 4))
     rows = [0, 1, 2, 3] if np.linalg.matrix_rank(forward, tol=1.0e-6) == 4 else [0, 1, 3]
     inverse[:, rows] = np.linalg.pinv(forward[rows])
@@ -60,9 +67,10 @@ def _vec8(values: np.ndarray) -> vec8:
     return vec8(*np.concatenate([values, np.zeros(MAX_ROTORS - len(values))]).astype(float).tolist())
 
 
-def control_airframe(airframe: Airframe) -> ControlAirframe:
-    """The controller's view of an airframe file."""
-    forward, inverse = effectiveness(airframe), mixing(airframe)
+def control_airframe(airframe: Airframe, left_out: Collection[int] = ()) -> ControlAirframe:
+    """The controller's view of an airframe file, whose rotors `left_out` (from 0) have failed."""
+    forward, inverse = effectiveness(airframe), mixing(airframe, left_out)
+    forward[:, list(left_out)] = 0.0
     body, rotor = airframe.body, airframe.rotor_model
     row = ControlAirframe()
     row.rotor_count = len(airframe.rotors)
@@ -77,5 +85,32 @@ def control_airframe(airframe: Airframe) -> ControlAirframe:
     curve = rotor.command_curve
     row.idle_speed_share = curve * rotor.idle_command + (1.0 - curve) * rotor.idle_command**0.5
     row.motor_time_s = 0.5 * (rotor.spin_up_time_s + rotor.spin_down_time_s)
+    row.left_out = sum(1 << rotor for rotor in left_out)
     row.full_voltage_v = airframe.battery.cells * airframe.battery.full_cell_v
     return row
+
+
+def opposite_rotor(airframe: Airframe, rotor: int) -> int:
+    """The rotor that is nearest to the other side of the centre: left out together, the rest stays balanced."""
+    hub = airframe.rotors[rotor]
+    return min(
+        range(len(airframe.rotors)),
+        key=lambda other: hypot(airframe.rotors[other].x_m + hub.x_m, airframe.rotors[other].y_m + hub.y_m),
+    )
+
+
+def rotors_leaver(rows: np.ndarray[Any, Any], airframe: Airframe) -> Callable[[Collection[int]], None]:
+    """A function that lets the control allocation of a vehicle do without some of its rotors.
+
+    Args:
+        rows: live structured view, shape (1,), of the vehicle's ControlAirframe row.
+        airframe: the vehicle.
+    """
+
+    def leave_out(rotors: Collection[int]) -> None:
+        row = control_airframe(airframe, sorted({*rotors, *(opposite_rotor(airframe, rotor) for rotor in rotors)}))
+        for name in ("arm_roll_m", "arm_pitch_m", "arm_yaw_m", "mix_thrust", "mix_roll", "mix_pitch", "mix_yaw"):
+            rows[name][0] = list(getattr(row, name))
+        rows["left_out"][0] = row.left_out
+
+    return leave_out

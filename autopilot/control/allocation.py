@@ -38,14 +38,21 @@ def command_for_speed(share: float, curve: float) -> float:
 
 
 @wp.func
+def is_used(airframe: ControlAirframe, rotor: int) -> bool:
+    """Whether a rotor takes part; one that has failed does not."""
+    return (airframe.left_out >> rotor) & 1 == 0
+
+
+@wp.func
 def tilt_thrusts(airframe: ControlAirframe, torque_frd: wp.vec3, span: float) -> vec8:
     """Rotor thrusts [N] for roll and pitch torque, scaled down so that they differ by at most `span`."""
     thrusts = airframe.mix_roll * torque_frd[0] + airframe.mix_pitch * torque_frd[1]
     low = float(_BIG)
     high = float(-_BIG)
     for i in range(airframe.rotor_count):
-        low = wp.min(low, thrusts[i])
-        high = wp.max(high, thrusts[i])
+        if is_used(airframe, i):
+            low = wp.min(low, thrusts[i])
+            high = wp.max(high, thrusts[i])
     if high - low > span:
         thrusts = thrusts * (span / (high - low))
     return thrusts
@@ -57,9 +64,10 @@ def fitting_collective(airframe: ControlAirframe, thrusts: vec8, collective_n: f
     least = float(-_BIG)
     most = float(_BIG)
     for i in range(airframe.rotor_count):
-        share = wp.max(airframe.mix_thrust[i], _TINY)
-        least = wp.max(least, (low - thrusts[i]) / share)
-        most = wp.min(most, (high - thrusts[i]) / share)
+        if is_used(airframe, i):
+            share = wp.max(airframe.mix_thrust[i], _TINY)
+            least = wp.max(least, (low - thrusts[i]) / share)
+            most = wp.min(most, (high - thrusts[i]) / share)
     return wp.min(wp.max(collective_n, least), most)
 
 
@@ -97,8 +105,9 @@ def allocate(
     least = float(_BIG)
     most = float(-_BIG)
     for i in range(airframe.rotor_count):
-        least = wp.min(least, thrusts[i])
-        most = wp.max(most, thrusts[i])
+        if is_used(airframe, i):
+            least = wp.min(least, thrusts[i])
+            most = wp.max(most, thrusts[i])
     if least < thrust_low_n or most > thrust_high_n:
         thrusts = desaturate(airframe, torque_frd, collective_n, thrust_low_n, thrust_high_n)
     roll = float(0.0)
@@ -110,7 +119,8 @@ def allocate(
         roll += airframe.arm_roll_m[i] * thrust
         pitch += airframe.arm_pitch_m[i] * thrust
         yaw += airframe.arm_yaw_m[i] * thrust
-        total += thrust
+        if is_used(airframe, i):
+            total += thrust
     result = Allocation()
     result.thrust_n = thrusts
     result.collective_n = total

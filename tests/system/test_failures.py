@@ -227,3 +227,23 @@ def test_injection_is_refused_with_a_reason(enabled, is_armed, request_, reason)
     assert len(refusals) == 1
     assert reason in refusals[0]
     assert not flight.rig.arrays.faults.numpy()["gnss"]["mode"][0]
+
+
+def test_quadrotor_without_a_motor_says_so_and_stops_the_others():
+    outcome = hovering(MOTOR, OFF, 1, seconds=5.0)
+    assert "Motor 1 has failed" in outcome.texts
+    assert outcome.said("Motor failure")
+    assert outcome.said("Crash detected: motors stopped")
+    assert outcome.disarmed_s < 1.5
+
+
+def test_motor_failure_can_terminate_the_flight():
+    height_m = 50.0
+    outcome = hovering(MOTOR, OFF, 1, seconds=15.0, height_m=height_m, COM_ACT_FAIL_ACT=4)
+    assert outcome.said("Motor failure: flight terminated")
+    assert outcome.disarmed_s < 2.0 + np.sqrt(2.0 * height_m / 10.0)
+
+
+def test_motor_watch_can_be_switched_off():
+    outcome = hovering(MOTOR, OFF, 1, seconds=3.0, FD_ACT_EN=0)
+    assert not outcome.said("Motor 1 has failed")

@@ -41,7 +41,7 @@ class Client:
     def __init__(self, port):
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
         assert self._mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}") == ConnectionResult.SUCCESS
-        system = self._mavsdk.first_autopilot(START_UP_S)
+        system = self.system = self._mavsdk.first_autopilot(START_UP_S)
         assert system is not None, "no heartbeat"
         self.system = system
         self.action = Action(system)

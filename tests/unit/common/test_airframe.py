@@ -76,5 +76,5 @@ def test_what_is_no_text_is_refused(tmp_path):
 
 @pytest.mark.parametrize("name", ["zeppelin", "", "none.toml", "/dev/null/x.toml"])
 def test_unknown_airframe_is_refused_with_the_known_ones(name):
-    with pytest.raises(AirframeError, match=r"unknown airframe '.*'; known: f450, x500"):
+    with pytest.raises(AirframeError, match=r"unknown airframe '.*'; known: f450, f550, x500"):
         load_airframe(name)
