@@ -98,7 +98,7 @@ class MotorWatch:
             has_failed = rotor in self.failed
             if is_slow == has_failed or (not has_failed and command < self._least_command):
                 self._since_us[rotor] = now_us
-            elif now_us - self._since_us[rotor] >= (_BACK_US if has_failed else self._patience_us):
+            elif now_us - self._since_us[rotor] > (_BACK_US if has_failed else self._patience_us):
                 failed ^= {rotor}
                 how = ("works again", Severity.NOTICE) if has_failed else ("has failed", Severity.EMERGENCY)
                 self._announcer.statustext(how[1], f"Motor {rotor + 1} {how[0]}")
