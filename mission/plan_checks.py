@@ -23,8 +23,8 @@ KNOWN_FRAMES = (FRAME_GLOBAL, FRAME_MISSION, FRAME_GLOBAL_RELATIVE_ALT, 5, 6, 10
 NAV_WAYPOINT = 16
 DO_JUMP = 177
 FENCE_AND_RALLY_COMMANDS = range(5000, 5101)
-# waypoint, loiters, land, takeoff, loiter to altitude, ROI, spline, set home, land start, ROI location
-COMMANDS_WITH_POSITION = frozenset({16, 17, 18, 19, 21, 22, 31, 80, 82, 179, 189, 195, 201})
+# waypoint, loiters, land, takeoff, loiter to altitude, ROI, spline, set home, return path, land start, ROI, gate
+COMMANDS_WITH_POSITION = frozenset({16, 17, 18, 19, 21, 22, 31, 80, 82, 179, 188, 189, 195, 201, 4501})
 COMMANDS_THAT_NEED_POSITION = frozenset({16, 17, 18, 19, 31, 82})
 
 

@@ -58,7 +58,7 @@ NAVIGATOR_PARAMETERS: list[Parameter] = [
     Parameter("RTL_DESCEND_ALT", 10.0, 0.0, 100.0, "m", "height above home to which to descend before RTL_LAND_DELAY",
               "guess; PX4 has 30 m"),
     Parameter("RTL_LAND_DELAY", 0.0, -1.0, 300.0, "s", "wait before the last descent, negative: do not land", _PX4),
-    Parameter("RTL_SPEED", 0.0, 0.0, 20.0, "m/s", "horizontal speed of a return, 0: MPC_XY_CRUISE",
+    Parameter("RTL_RETURN_SPD", 0.0, 0.0, 20.0, "m/s", "horizontal speed of a return, 0: MPC_XY_CRUISE",
               "ArduPilot's default, there in cm/s"),
     Parameter("RTL_MIN_DIST", 10.0, 0.5, 100.0, "m", "distance to home below which a return does not climb", _PX4),
     Parameter("FLW_TGT_HT", 8.0, 1.0, 200.0, "m", "height of mode Follow", _PX4),

@@ -28,7 +28,7 @@ class SmartReturn:
     def start(self) -> None:
         context = self._context
         context.reset_speeds()
-        speed = context.number("RTL_SPEED")
+        speed = context.number("RTL_RETURN_SPD")
         if speed > 0.0:
             context.cruise_speed = speed
         here = context.stop_point()

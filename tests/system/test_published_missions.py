@@ -370,7 +370,7 @@ def test_return_speed_and_mission_speed():
         await drone.sleep(8.0)
         assert np.abs(flown.speed(begin_s) - 7.0).max() < 0.4
 
-    fly(script, RTL_SPEED=7.0)
+    fly(script, RTL_RETURN_SPD=7.0)
 
 
 def test_mission_is_paused_and_gone_on_with_on_its_path():

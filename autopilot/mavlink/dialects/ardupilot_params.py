@@ -24,6 +24,8 @@ _FENCE_ACTIONS: Mapping[int, int] = {1: 0, 0: 0, 2: 4, 3: 1, 5: 2}
 _BATTERY_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 2}
 # Modes of a switch: PX4's COM_FLTMODE numbers to mode numbers of a copter.
 _SWITCH_MODES: Mapping[int, int] = {8: 0, 6: 1, 1: 2, 3: 3, 7: 4, 4: 5, 5: 6, 11: 9, 2: 16, 12: 23}
+# Heading on mission legs: towards the next waypoint, along the way.
+_YAW_MODES: Mapping[int, int] = {0: 1, 3: 3}
 
 ALIASES: tuple[Alias, ...] = (
     Alias("ACRO_Y_RATE", "MC_ACRO_Y_MAX", REAL32),
@@ -33,6 +35,7 @@ ALIASES: tuple[Alias, ...] = (
     Alias("ATC_RATE_Y_MAX", "MC_YAWRATE_MAX", REAL32),
     Alias("BATT_CAPACITY", "BAT1_CAPACITY", INT32),
     Alias("BATT_FS_CRT_ACT", "COM_LOW_BAT_ACT", INT8, numbers=_BATTERY_ACTIONS),
+    Alias("CIRCLE_RADIUS", "NAV_LOITER_RAD", REAL32, CM),
     Alias("DISARM_DELAY", "COM_DISARM_LAND", INT8),
     Alias("FENCE_ACTION", "GF_ACTION", INT8, numbers=_FENCE_ACTIONS),
     Alias("FENCE_ALT_MAX", "GF_MAX_VER_DIST", REAL32),
@@ -53,12 +56,14 @@ ALIASES: tuple[Alias, ...] = (
     Alias("RC_FS_TIMEOUT", "COM_RC_LOSS_T", REAL32),
     Alias("RTL_ALT", "RTL_RETURN_ALT", INT32, CM),
     Alias("RTL_LOIT_TIME", "RTL_LAND_DELAY", INT32, MS),
+    Alias("RTL_SPEED", "RTL_RETURN_SPD", INT16, CM),
     Alias("SYSID_THISMAV", "MAV_SYS_ID", INT16),
     Alias("WPNAV_ACCEL", "MPC_ACC_HOR", REAL32, CM),
     Alias("WPNAV_RADIUS", "NAV_ACC_RAD", REAL32, CM),
     Alias("WPNAV_SPEED", "MPC_XY_CRUISE", REAL32, CM),
     Alias("WPNAV_SPEED_DN", "MPC_Z_V_AUTO_DN", REAL32, CM),
     Alias("WPNAV_SPEED_UP", "MPC_Z_V_AUTO_UP", REAL32, CM),
+    Alias("WP_YAW_BEHAVIOR", "MPC_YAW_MODE", INT8, numbers=_YAW_MODES),
 )
 
 _AXES = "XYZ"

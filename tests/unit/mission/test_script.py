@@ -5,11 +5,11 @@ from math import hypot, nan, pi
 
 import pytest
 
-from autopilot.vehicle import Mode
-from common.geodesy import DEFAULT_HOME, geodetic_from_ned
+from autopilot.vehicle import ListKind, Mode
+from common.geodesy import DEFAULT_HOME, GeoPoint, geodetic_from_ned
 from mission.client import CommandRefused, ScriptError, ScriptTimeout
 from mission.flight import Flight, FlightConfig
-from mission.plan import Plan, PlanItem
+from mission.plan import FenceCircle, FencePolygon, Plan, PlanItem
 from mission.script import fly_plan
 from sim.faults import set_fault
 from sim.world.world import WorldConfig
@@ -159,6 +159,21 @@ def test_arming_before_the_vehicle_is_ready_is_refused_and_can_be_forced(flight)
         return True
 
     assert result_of(flight, script, 5.0)
+
+
+def test_fence_and_rally_points_of_a_plan_are_uploaded_with_it(flight):
+    plan = Plan(
+        (item(0, TAKEOFF), item(1, LAND, 0.0, 0.0, 0.0)),
+        fence=(
+            FenceCircle(DEFAULT_HOME.lat_deg, DEFAULT_HOME.lon_deg, 300.0, is_inclusion=True),
+            FencePolygon(((47.3, 8.5), (47.3, 8.51), (47.31, 8.5)), is_inclusion=False),
+        ),
+        rally=(GeoPoint(DEFAULT_HOME.lat_deg + 1e-4, DEFAULT_HOME.lon_deg, 20.0),),
+    )
+    result_of(flight, lambda drone: fly_plan(drone, plan))
+    lists = flight.controller.lists
+    assert [entry.command for entry in lists.items(ListKind.FENCE)] == [5003, 5002, 5002, 5002]
+    assert [(entry.frame, entry.z) for entry in lists.items(ListKind.RALLY)] == [(3, 20.0)]
 
 
 @pytest.mark.parametrize("last", [LAND, RETURN])

@@ -156,7 +156,7 @@ def test_way_back_stays_below_the_ceiling():
 
 
 def test_return_has_a_speed_of_its_own():
-    rig = at(60.0, 0.0, RTL_SPEED=3.0)
+    rig = at(60.0, 0.0, RTL_RETURN_SPD=3.0)
     rig.fc.set_mode(Mode.RETURN)
     rig.run_until(lambda: rig.pos[0] < 40.0)
     assert hypot(*rig.vel[:2]) == pytest.approx(3.0, abs=0.1)
