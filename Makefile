@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly test test-all check tune bench format lock clean
+.PHONY: help setup fly test test-all fuzz check tune bench format lock clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
@@ -31,6 +31,9 @@ test: $(STAMP) ## Run the tests that take seconds; flags: make test ARGS="-k pla
 
 test-all: $(STAMP) ## Run every test, the slow ones too
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile tests $(ARGS)
+
+fuzz: $(STAMP) ## Send a hovering vehicle 1,000,000 broken frames and 100,000 valid messages; flags: ARGS="--seed 7"
+	@$(BIN)/python -m tests.fuzz $(ARGS)
 
 check: $(STAMP) ## Check format, lint, types and layers, as CI does before the tests
 	$(BIN)/ruff format --check .

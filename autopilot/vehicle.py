@@ -251,6 +251,9 @@ class VehicleState:
     home: GeoPoint | None = None
     home_ned: tuple[float, float, float] = (0.0, 0.0, 0.0)
     home_yaw_rad: float = 0.0
+    stand_ned: tuple[float, float, float] | None = (
+        None  # where it last stood; home may be set anywhere, also in the air
+    )
     mode: Mode = Mode.HOLD
     is_armed: bool = False
     landed_state: LandedState = LandedState.ON_GROUND

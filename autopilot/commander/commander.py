@@ -132,8 +132,10 @@ class Commander:
             reasons = self.check_arming()
             if reasons:
                 return Reply(Verdict.TEMPORARILY_REJECTED, reasons[0])
-        if self.has_position and not self._is_home_given:
-            self._set_home_here()
+        if self.has_position:
+            state.stand_ned = state.estimate.pos_ned
+            if not self._is_home_given:
+                self._set_home_here()
         state.is_armed = True
         state.armed_since_us = self._landed_since_us = state.time_us
         state.takeoff_us = 0
@@ -239,6 +241,8 @@ class Commander:
     def _set_home_here(self) -> None:
         state = self.state
         state.home_ned = state.estimate.pos_ned
+        if state.landed_state is LandedState.ON_GROUND:
+            state.stand_ned = state.home_ned
         state.home = GeoPoint(*geodetic_from_ned(*state.home_ned, state.origin))
         state.home_yaw_rad = state.yaw_rad
         self.announcer.home_changed()

@@ -23,6 +23,7 @@ TICK_US = 10
 MINUTE_TICKS = 6_000_000
 STREAMS_MAX = 256  # (sysid, compid, link id) remembered against replays; no more are let in
 TIMESTAMP_MAX = (1 << 48) - 1
+TIMESTAMP_SANE_MAX = TIMESTAMP_MAX // 2  # the year 2059: a clock that starts later soon has nowhere to go
 
 _SETUP_SIGNING_ID = known_type("SETUP_SIGNING").msg_id
 _MAY_BE_UNSIGNED = {known_type(name).msg_id for name in ("RADIO_STATUS", "RADIO")}  # radios do not know the key
@@ -127,7 +128,8 @@ class Signer:
     def set_up(self, key: bytes, timestamp: int) -> None:
         """Takes a new key; one of zeros turns signing off."""
         self._key = b"" if not any(key) else key
-        self._timestamp = max(self._timestamp, min(timestamp, TIMESTAMP_MAX))
+        if timestamp <= TIMESTAMP_SANE_MAX:
+            self._timestamp = max(self._timestamp, timestamp)
         self._streams.clear()
         self.save()
 
@@ -138,7 +140,7 @@ class Signer:
 
     def signature(self, frame: bytes, link_id: int) -> bytes:
         """What goes behind a frame that announces a signature."""
-        self._timestamp = max(self._now(), self._timestamp + 1)
+        self._timestamp = min(max(self._now(), self._timestamp + 1), TIMESTAMP_MAX)
         if self._timestamp >= self._save_at:
             self.save()
         tail = bytes([link_id]) + self._timestamp.to_bytes(6, "little")

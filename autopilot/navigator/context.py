@@ -139,11 +139,12 @@ class NavContext:
         return north, east, down
 
     def height_above_ground(self) -> tuple[float, bool]:
-        """Height [m], and whether it is measured by the range finder rather than counted from home."""
+        """Height [m], and whether it is measured by the range finder rather than counted from where it last stood."""
         estimate = self.state.estimate
         if estimate.flags & TERRAIN_VALID:
             return estimate.terrain_d - estimate.pos_ned[2], True
-        return self.state.home_ned[2] - estimate.pos_ned[2], False
+        stand_ned = self.state.stand_ned or self.state.home_ned
+        return stand_ned[2] - estimate.pos_ned[2], False
 
     def heading_to(self, start_ned: Vector, target_ned: Vector, asked: float) -> float:
         """The heading asked for [rad]; NaN: towards the target, or unchanged if that is near."""

@@ -45,7 +45,8 @@ def _refusal(context: NavContext, target: Vector) -> Reply:
         return Reply(Verdict.DENIED, f"target is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed")
     if abs(target[2]) > 10_000.0:
         return Reply(Verdict.DENIED, "altitude is out of range")
-    ground_d = context.state.home_ned[2] + context.standing_height_m
+    stand_ned = context.state.stand_ned or context.state.home_ned
+    ground_d = stand_ned[2] + context.standing_height_m
     if context.state.estimate.flags & TERRAIN_VALID:
         ground_d = max(ground_d, context.state.estimate.terrain_d)
     if target[2] > ground_d + _BELOW_GROUND_M:

@@ -11,8 +11,8 @@ from autopilot.navigator.setpoint import Vector
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_RATE, TERRAIN_VALID
 from autopilot.vehicle import VehicleState
 
-NEAR_HOME_M = 30.0  # home's ground level is trusted this far around it; guess
-_ROUGH_M = 3.0  # ground farther above or below home than this is not believed near home: a range finder can lie; guess
+NEAR_START_M = 30.0  # the ground level where it last stood is trusted this far around; guess
+_ROUGH_M = 3.0  # ground farther above or below than this is not believed near there: a range finder can lie; guess
 _STAND_M = 0.05  # a place lower than this above standing height is on the ground; guess
 _LIFT_M = 0.1  # a place this far above the vehicle asks to climb
 _SPEED_M_S = 0.05  # vertical speed below which a setpoint asks to stay
@@ -46,14 +46,18 @@ class Wanted(Protocol):
 def standing_d(state: VehicleState, standing_height_m: float) -> float:
     """Down coordinate [m] at which the vehicle stands on the ground below; NaN: not known."""
     estimate = state.estimate
-    home = state.home_ned
-    home_d = home[2]
-    if state.home is None or hypot(estimate.pos_ned[0] - home[0], estimate.pos_ned[1] - home[1]) > NEAR_HOME_M:
-        home_d = nan
+    stand, here = state.stand_ned, estimate.pos_ned
+    known_d = stand[2] if stand is not None and is_near_start(state, here[0], here[1]) else nan
     if not estimate.flags & TERRAIN_VALID:
-        return home_d
+        return known_d
     measured_d: float = estimate.terrain_d - standing_height_m
-    return home_d if abs(measured_d - home_d) > _ROUGH_M else measured_d  # NaN: measured
+    return known_d if abs(measured_d - known_d) > _ROUGH_M else measured_d  # NaN: measured
+
+
+def is_near_start(state: VehicleState, north: float, east: float) -> bool:
+    """Whether the ground here is about as high as where the vehicle last stood."""
+    stand = state.stand_ned
+    return stand is not None and hypot(north - stand[0], east - stand[1]) <= NEAR_START_M
 
 
 def vertical_ask(wanted: Wanted, estimate: Any, stand_d: float, hover_thrust: float) -> Ask:

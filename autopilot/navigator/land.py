@@ -3,7 +3,7 @@
 from math import hypot, isfinite, nan
 
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.ground import NEAR_HOME_M
+from autopilot.navigator.ground import is_near_start
 from autopilot.navigator.setpoint import Vector
 
 _BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against rotor inflow and drag; guess
@@ -74,8 +74,7 @@ class Landing:
         fast = context.number("MPC_Z_V_AUTO_DN")
         height, is_measured = context.height_above_ground()
         if not is_measured:
-            home = context.state.home_ned
-            is_known_ground = hypot(self._north - home[0], self._east - home[1]) < NEAR_HOME_M
+            is_known_ground = is_near_start(context.state, self._north, self._east)
             return slow if height < _SLOW_BELOW_M and not is_known_ground else _blend(context, height, slow, fast)
         if height < context.number("MPC_LAND_ALT3"):
             return min(slow, context.number("MPC_LAND_CRWL"))
@@ -96,8 +95,8 @@ def _blend(context: NavContext, height: float, slow: float, fast: float) -> floa
 def slowed_near_ground(context: NavContext, fast: float) -> float:
     """[m/s] The greatest descent speed here, as in a landing; `fast` high up, and where the ground is not known."""
     height, is_measured = context.height_above_ground()
-    home, here = context.state.home_ned, context.state.estimate.pos_ned
-    if not is_measured and (context.state.home is None or hypot(here[0] - home[0], here[1] - home[1]) > NEAR_HOME_M):
+    here = context.state.estimate.pos_ned
+    if not is_measured and not is_near_start(context.state, here[0], here[1]):
         return fast
     return _blend(context, height, min(context.number("MPC_LAND_SPEED"), fast), fast)
 

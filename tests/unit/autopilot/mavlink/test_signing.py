@@ -115,6 +115,15 @@ def test_key_is_not_taken_from_another_machine_and_not_logged():
     assert not any(KEY in data for data in station.log)
 
 
+def test_key_with_an_absurd_time_works_all_the_same():
+    station = Station()
+    station.mav.setup_signing_send(1, 1, list(KEY), (1 << 64) - 1)
+    station.frame()
+    station.sign()
+    assert all(message.get_signed() for message in station.frame())
+    assert station.arms()
+
+
 def test_wrong_key_is_refused():
     station = Station(key=KEY)
     station.sign(key=bytes(31) + b"x")

@@ -7,7 +7,8 @@ import pytest
 
 from autopilot.navigator.ground import Ask, standing_d, vertical_ask
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_RATE, SETPOINT_TRAJECTORY, TERRAIN_VALID
-from autopilot.vehicle import OffboardSetpoint
+from autopilot.vehicle import OffboardSetpoint, Verdict
+from tests.unit.autopilot.kinematic import Kinematic
 
 HOVER = 0.43
 STANDING_M = 0.2
@@ -58,18 +59,27 @@ def test_without_known_ground_no_place_is_on_it():
     ("north", "flags", "terrain_d", "expected"),
     [
         (0.0, TERRAIN_VALID, 1.0, 0.8),  # measured
-        (0.0, TERRAIN_VALID, -5.0, 0.0),  # not believed: home
+        (0.0, TERRAIN_VALID, -5.0, 0.0),  # not believed: where it stood
         (50.0, TERRAIN_VALID, -5.0, -5.2),
         (0.0, 0, 0.0, 0.0),
         (50.0, 0, 0.0, nan),
     ],
 )
-def test_ground_is_where_it_is_measured_unless_that_contradicts_home(north, flags, terrain_d, expected):
+def test_ground_is_where_it_is_measured_unless_that_contradicts_where_it_stood(north, flags, terrain_d, expected):
     state = SimpleNamespace(
         estimate=SimpleNamespace(pos_ned=(north, 0.0, -5.0), flags=flags, terrain_d=terrain_d),
-        home=object(),
-        home_ned=(0.0, 0.0, 0.0),
+        stand_ned=(0.0, 0.0, 0.0),
     )
     found = standing_d(state, STANDING_M)
     assert found == pytest.approx(expected, nan_ok=True)
     assert isnan(found) == isnan(expected)
+
+
+def test_home_set_in_the_air_is_not_taken_for_the_ground():
+    """A held position at home's height would be one on the ground: the vehicle would sink to stand there."""
+    rig = Kinematic().flying(10.0)
+    rig.flags &= ~TERRAIN_VALID
+    assert rig.fc.set_home(nan, nan, nan).verdict is Verdict.ACCEPTED
+    rig.run(1.0)
+    assert rig.fc.navigator.ask is Ask.STAY
+    assert rig.state.home_ned[2] == pytest.approx(-10.0, abs=0.3)
