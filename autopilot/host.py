@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from autopilot.camera.ports import FrameSource, VideoStream
+from autopilot.camera.storage import MediaFolder
 from common.folder import ConfinedFolder
 
 LogListener = Callable[[bytes], None]
@@ -83,3 +85,6 @@ class Host:
     logs: LogShelf | None = None
     log_stream: LogStream | None = None
     storage: Storage | None = None
+    frames: FrameSource | None = None  # None: the vehicle carries no camera
+    media: MediaFolder | None = None  # None: there is no card in the camera
+    stream: VideoStream | None = None

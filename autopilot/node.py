@@ -11,12 +11,15 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from autopilot.camera.camera import Camera
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.calibration import Calibrator, Turntable
 from autopilot.commander.commander import Commander
 from autopilot.commander.landing import LandingDetector
 from autopilot.commander.motors import LeaveOut, MotorWatch, ReadSpeeds
 from autopilot.commander.pilot import Pilot
+from autopilot.gimbal.control import GimbalControl
+from autopilot.gimbal.gimbal import Gimbal
 from autopilot.guidance import Guidance
 from autopilot.host import Host
 from autopilot.injection import FailureInjector, failure_request, injection_refusal
@@ -129,6 +132,7 @@ class FlightController:
         self.sticks = Sticks(params)
         self.state = VehicleState(origin=origin, position=origin, sticks=self.sticks.input)
         self.payload = Payloads()
+        self.camera = self._mount_camera()
         self._read_estimate = ports.read_estimate
         self._read_samples = ports.read_samples
         self._read_actuators = ports.read_actuators
@@ -163,6 +167,18 @@ class FlightController:
         self.calibration = Calibrator(self.state, params, self._relay, turntable)
         self._setpoint.write()
 
+    def _mount_camera(self) -> Camera | None:
+        """Hangs the camera on its gimbal, if the host has one."""
+        frames = self.host.frames
+        if frames is None:
+            return None
+        gimbal = Gimbal(self.state)
+        self.state.gimbal = GimbalControl(gimbal, self.state)
+        camera = Camera(self.state, gimbal, frames, self.host.media)
+        self.payload.add(self.state.gimbal)
+        self.payload.add(camera)
+        return camera
+
     def attach(self, server: Server) -> None:
         """Adds a MAVLink server: it hears of events, and its frame is run at the end of each frame."""
         self._relay.targets.append(server)
@@ -180,6 +196,8 @@ class FlightController:
         if wish is not None:
             self._follow_wish(wish)
         self._setpoint.write()
+        if self.camera is not None and time_us >= self.camera.due_us:
+            self.camera.frame()
         for server in self._servers:
             server.frame(time_us)
 

@@ -8,12 +8,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum, IntFlag
 from math import nan
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from autopilot.host import Host
 from autopilot.sticks import StickInput, Sticks
 from common.geodesy import GeoPoint
 from common.params import ParameterTable
+
+if TYPE_CHECKING:  # they answer with the Reply below
+    from autopilot.camera.camera import Camera
+    from autopilot.gimbal.control import GimbalControl
 
 
 class Mode(IntEnum):
@@ -272,6 +276,7 @@ class VehicleState:
     mission_current: int = 0  # seq
     mission_state: int = 0  # MISSION_STATE
     orbit: OrbitStatus | None = None  # while one is flown
+    gimbal: "GimbalControl | None" = None  # None: the vehicle carries none
     sticks: StickInput = field(default_factory=StickInput)
     fence: FenceState = field(default_factory=FenceState)
 
@@ -370,6 +375,7 @@ class Vehicle(Protocol):
     state: VehicleState
     params: ParameterTable
     host: Host
+    camera: "Camera | None"
 
     @property
     def lists(self) -> StoredLists:

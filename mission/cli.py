@@ -69,6 +69,9 @@ def fly(
         GROUND_STATION_PORT
     ),
     api_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of the offboard API.")] = OFFBOARD_PORT,
+    stream_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="HTTP port of the camera's live picture; 0: none.")
+    ] = 0,
     param: Annotated[
         list[str] | None, typer.Option(help="Sets a parameter of the flight controller: NAME=VALUE. Repeatable.")
     ] = None,
@@ -87,7 +90,7 @@ def fly(
                 wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
                 trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, bind=bind,
                 tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
-                run_folder=run_folder, parameters=tuple(param or ()), state=state,
+                run_folder=run_folder, stream_port=stream_port, parameters=tuple(param or ()), state=state,
             )
         )  # fmt: skip
     except UserError as error:

@@ -11,6 +11,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from autopilot.camera.storage import MediaFolder
 from autopilot.control.airframe import rotors_leaver
 from autopilot.host import Host
 from autopilot.mavlink.dialects import Dialect
@@ -37,6 +38,8 @@ from mission.injection import RigInjector
 from mission.log_shelf import FlightLogs, RunLog
 from mission.recorder import History, Recorder
 from mission.script import Drone, Script
+from mission.stream import StreamServer
+from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.esc import esc_reader
 from sim.sensors.sensors import sensor_model
@@ -82,6 +85,8 @@ class Flight:
         links: besides the memory link to `drone`, for ground stations.
         signing: where the key of MAVLink's signatures is kept, and whether they are required.
         folder: where `flight.ulg` and `flight.tlog` are written; None writes nothing.
+        stream: serves the camera's live picture.
+        has_camera_thread: photos are rendered while the flight goes on, which is then no longer the same each time.
         state: what outlives the flight; None: it begins with defaults and nothing is kept.
     """
 
@@ -93,6 +98,8 @@ class Flight:
         folder: Path | None = None,
         state: StateFolder | None = None,
         signing: SigningConfig | None = None,
+        stream: StreamServer | None = None,
+        has_camera_thread: bool = False,
     ) -> None:
         self.config = config
         self.airframe: Airframe = load_airframe(config.airframe)
@@ -113,7 +120,9 @@ class Flight:
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
         self._injector = RigInjector(self.rig, self.airframe, config.noise)
-        self.host = Host(files=host_files(folder, state))
+        self._camera_rig = CameraRig(self.rig, self.world, has_thread=has_camera_thread)
+        media = None if folder is None else MediaFolder(folder / "media")
+        self.host = Host(files=host_files(folder, state), frames=self._camera_rig, media=media, stream=stream)
         self.controller = FlightController(
             host_ports(self.rig, self.airframe),
             self.params,
@@ -140,6 +149,10 @@ class Flight:
         for server in self._servers:
             self.controller.attach(server)
         self.controller.attach(self.recorder)
+        self.stream = stream
+        self._stream_rig = None if stream is None else CameraRig(self.rig, self.world, has_thread=True)
+        if stream is not None and self._stream_rig is not None and self.controller.camera is not None:
+            stream.start(self.controller.camera, self._stream_rig)
         self._flight_logs: FlightLogs | None = None
         self._connect_host(log, state)
 
@@ -161,6 +174,8 @@ class Flight:
         self.time_us += FRAME_US
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
+        if self.stream is not None:
+            self.stream.frame()
         if self._flight_logs is not None:
             self._flight_logs.frame(is_armed=self.controller.state.is_armed)
         if self.persistence is not None:
@@ -199,6 +214,13 @@ class Flight:
 
     def close(self) -> History:
         """Completes the logs, closes the links and returns the history; a state folder stays the caller's to close."""
+        if self.stream is not None:
+            self.stream.close()
+        if self.controller.camera is not None:
+            self.controller.camera.close()
+        for rig in (self._camera_rig, self._stream_rig):
+            if rig is not None:
+                rig.close()
         if self.persistence is not None:
             self.persistence.write()
         if self._flight_logs is not None:

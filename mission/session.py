@@ -30,6 +30,7 @@ from mission.plots import plot_flight
 from mission.progress import Progress
 from mission.script import fly_plan
 from mission.state import StateError, keep_home, open_state, stored_home
+from mission.stream import LOOPBACK, StreamServer
 from mission.summary import Summary, planned_path, summarise
 from sim.world.world import WorldConfig
 
@@ -71,6 +72,7 @@ class FlightOptions:
     api_port: int
     run_folder: Path | None
     dialect: str = "px4"
+    stream_port: int = 0
     parameters: tuple[str, ...] = ()  # NAME=VALUE
     state: Path | None = None
 
@@ -103,9 +105,18 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
         raise UserError(str(error)) from error
     signing = _signing(options, speed, state)
     links = [] if speed is None else _links(options, speed)
+    stream = _stream(options.stream_port)
     folder = _new_folder(options.run_folder)
     with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
-        flight = Flight(config, links=links, folder=folder, signing=signing, state=state)
+        flight = Flight(
+            config,
+            links=links,
+            folder=folder,
+            signing=signing,
+            state=state,
+            stream=stream,
+            has_camera_thread=speed is not None,
+        )
     if state is not None:
         if options.home is not None:
             keep_home(state, config.home)
@@ -114,6 +125,16 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
     _run(flight, running, options, speed, folder, console)
     return _finish(flight, running, plan, folder, console)
+
+
+def _stream(port: int) -> StreamServer | None:
+    """The camera's live picture, if it is asked for."""
+    if port == 0:
+        return None
+    try:
+        return StreamServer(port)
+    except OSError as error:
+        raise UserError(f"--stream-port {port}: {error.strerror}") from error
 
 
 def _speed(text: str) -> float | None:
@@ -315,6 +336,8 @@ def _print_start(options: FlightOptions, speed: float | None, folder: Path, cons
         ports += f", TCP {options.tcp_port}"
     where = "lockstep, without network links" if speed is None else ports
     _print_line(console, f"flying: {where}; logs in {folder}")
+    if options.stream_port:
+        _print_line(console, f"the camera's picture: http://{LOOPBACK}:{options.stream_port}/")
     if options.wind_m_s > WIND_EXPECTED_M_S:
         _print_line(console, f"wind of {options.wind_m_s:g} m/s is more than an x500 can be relied on to fly")
 

@@ -32,6 +32,9 @@ UNLIMITED = 1 << 62
 # a conversion to a Python float would alter.
 _BIT_PATTERN_FIELDS = {("PARAM_VALUE", "param_value"), ("PARAM_SET", "param_value")}
 
+# Declared as text, but it holds the bytes of a number.
+_BYTES_FIELDS = {(name, "param_value") for name in ("PARAM_EXT_VALUE", "PARAM_EXT_SET", "PARAM_EXT_ACK")}
+
 _IDS_BY_NAME: dict[str, int] = {item.msgname: item.id for item in DEFINITIONS.values()}
 
 
@@ -295,7 +298,8 @@ def _compile(definition: Any) -> tuple[Callable[..., bytes], Callable[[bytes], A
         count = 1 if code.endswith("s") else int(code[:-1] or 1)
         is_array = count > 1 and not code.endswith("s")
         span = f"v[{i_value}:{i_value + count}]" if is_array else f"v[{i_value}]"
-        positions[name] = f"_text({span})" if code.endswith("s") else span
+        is_text = code.endswith("s") and (definition.msgname, name) not in _BYTES_FIELDS
+        positions[name] = f"_text({span})" if is_text else span
         values.append(f"*{name}" if is_array else f"_chars({name})" if code.endswith("s") else name)
         arguments[name] = (
             f"{name}={(0,) * count!r}" if is_array else f"{name}=b''" if code.endswith("s") else f"{name}=0"

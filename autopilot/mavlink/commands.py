@@ -81,6 +81,7 @@ class CommandService(Service):
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
+        self.delegated: set[int] = set()  # commands to all that are left to the component that knows them
         self.components: Sequence[Component] = ()  # those behind the same links; they acknowledge for themselves
         self._requests: dict[int, tuple[MessageType, RequestHandler]] = {
             _MESSAGE_INTERVAL.msg_id: (_MESSAGE_INTERVAL, self._interval_requested)
@@ -165,7 +166,7 @@ class CommandService(Service):
         """Whether the autopilot would answer a command to all that it is not supported."""
         if command.command in _ABOUT_MESSAGES:
             return whole(command.p1, -1) not in self._endpoint.telemetry.builders
-        return command.command not in self.handlers
+        return command.command not in self.handlers or command.command in self.delegated
 
     def _execute(self, command: Command) -> None:
         handler = self.handlers.get(command.command)
@@ -362,6 +363,8 @@ class CommandService(Service):
             return Reply(Verdict.TEMPORARILY_REJECTED)
         self._ack(command, Verdict.ACCEPTED)
         self._endpoint.reply(command.sender, telemetry.types[msg_id], payload)
+        if msg_id in self._endpoint.on_request:
+            self._endpoint.on_request[msg_id](command.sender)
         return None
 
     # The rest

@@ -11,6 +11,7 @@ from typing import Any
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.calibration import CalibrationService
+from autopilot.mavlink.camera.component import AttachedCamera, CameraComponent
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, OnFrame, Sender
 from autopilot.mavlink.codec import Frame, known_type
 from autopilot.mavlink.commands import CommandService
@@ -20,6 +21,7 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.goto import GotoService
+from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
 from autopilot.mavlink.identity import banner
 from autopilot.mavlink.intake import share
 from autopilot.mavlink.links import Link, LinkSource
@@ -129,8 +131,19 @@ class MavlinkServer:
         ]
 
     def _make_components(self) -> list[Component]:
-        """The vehicle's components besides the autopilot."""
-        return []
+        """The vehicle's components besides the autopilot, and what the autopilot itself does for them."""
+        endpoint, vehicle = self._endpoint, self._endpoint.vehicle
+        components: list[Component] = []
+        if vehicle.state.gimbal is not None:
+            device = GimbalDevice(endpoint, vehicle.state.gimbal)
+            components.append(device)
+            self._add(GimbalManager(endpoint, vehicle.state.gimbal, device))
+        if vehicle.camera is not None:
+            camera = CameraComponent(endpoint, vehicle.camera, vehicle.host.stream)
+            components.append(camera)
+            self._add(AttachedCamera(camera))
+            self._commands.delegated.update(AttachedCamera(camera).commands())
+        return components
 
     def _add(self, service: Service) -> None:
         self._add_messages(service.messages())

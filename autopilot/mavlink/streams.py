@@ -12,6 +12,7 @@ from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.identity import autopilot_version
 from autopilot.mavlink.links import LinkRole
 from autopilot.mavlink.telemetry import ardupilot, motion, radio, sensors, status
+from autopilot.mavlink.telemetry import gimbal, motion, radio, sensors, status
 from autopilot.vehicle import VehicleState
 from common.kernels import FRAME_US
 
@@ -93,7 +94,7 @@ GROUP_ALL = 0
 class Telemetry:
     """Every message the vehicle can be asked for, by id."""
 
-    def __init__(self, dialect: Dialect, sysid: int) -> None:
+    def __init__(self, dialect: Dialect, sysid: int, *, has_gimbal: bool = False) -> None:
         def heartbeat(state: VehicleState) -> bytes:
             """Mode, armed or not, state; also at once when one of them changes."""
             return status.heartbeat(state, dialect)
@@ -118,6 +119,17 @@ class Telemetry:
             Stream("CURRENT_MODE", current_mode, 0.5, 0.5),
         )
         is_ardupilot = dialect.name == "ardupilot"
+        def manager_status(state: VehicleState) -> bytes | None:
+            """Who has control of the gimbal; at 5 Hz on links that have asked for its information."""
+            return gimbal.gimbal_manager_status(state, sysid)
+
+        streams = (Stream("HEARTBEAT", heartbeat, 1, 1), *STREAMS, Stream("AUTOPILOT_VERSION", version, 0, 0))
+        if has_gimbal:
+            streams += (
+                Stream("GIMBAL_MANAGER_INFORMATION", gimbal.gimbal_manager_information, 0, 0),
+                Stream("GIMBAL_MANAGER_STATUS", manager_status, 0, 0),
+                Stream("MOUNT_ORIENTATION", gimbal.mount_orientation, 0, 0),
+            )
         self.streams = tuple(
             replace(stream, build=mission_current) if stream.name == "MISSION_CURRENT" else stream for stream in streams
         )
@@ -143,7 +155,7 @@ class StreamSchedule:
 
     def __init__(self, telemetry: Telemetry, role: LinkRole) -> None:
         self._telemetry = telemetry
-        self._defaults = telemetry.default_interval_us[role]
+        self._defaults = dict(telemetry.default_interval_us[role])
         self.interval_us = dict(self._defaults)  # by message id; 0: not sent
         self._queue: list[tuple[int, int]] = []  # (due time, message id), a heap
         self._is_planned = False
@@ -154,6 +166,11 @@ class StreamSchedule:
             self._change(msg_id, self._defaults[msg_id])
         else:
             self._change(msg_id, max(interval_us, FRAME_US) if interval_us > 0 else 0)
+
+    def set_default(self, msg_id: int, interval_us: int) -> None:
+        """Makes an interval the default on this link, and sends the message so."""
+        self._defaults[msg_id] = interval_us
+        self.set_interval(msg_id, 0)
 
     def set_group(self, group: int, rate_hz: float) -> None:
         """Sets the rate of every message of a MAV_DATA_STREAM group; 0 stops them."""

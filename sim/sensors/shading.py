@@ -27,7 +27,7 @@ VISIBILITY_M = wp.constant(900.0)  # distance over which haze takes up 63 % of t
 
 _GRASS = wp.constant(wp.vec3(0.075, 0.135, 0.028))
 _MEADOW = wp.constant(wp.vec3(0.155, 0.185, 0.055))
-_EARTH = wp.constant(wp.vec3(0.200, 0.150, 0.095))
+_EARTH = wp.constant(wp.vec3(0.170, 0.135, 0.070))
 _ROCK = wp.constant(wp.vec3(0.230, 0.215, 0.195))
 _BARK = wp.constant(wp.vec3(0.115, 0.080, 0.055))
 _CONCRETE = wp.constant(wp.vec3(0.380, 0.370, 0.350))

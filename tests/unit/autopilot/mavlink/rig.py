@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from autopilot.camera.camera import Camera
 from autopilot.commander.watch import StationLink
 from autopilot.estimator.state import EstimatorState
 from autopilot.host import Host
@@ -226,6 +227,7 @@ class RecordingVehicle:
         self.station = StationLink()
         self.calibration = RecordedCalibration(self)
         self.host = Host()
+        self.camera: Camera | None = None
         self.sticks = Sticks(self.params)
         self.state.sticks = self.sticks.input
         self.sticks.joystick_moved((CLIENT_SYSID, CLIENT_COMPID), 5_000_000, (0.0, 0.0, 0.0, 0.0), 0)
@@ -343,8 +345,13 @@ class Client:
 class Rig:
     """Server and client in simulated time."""
 
-    def __init__(self, role: LinkRole = LinkRole.GROUND, dialect: Dialect = PX4) -> None:
-        self.vehicle = RecordingVehicle()
+    def __init__(
+        self,
+        role: LinkRole = LinkRole.GROUND,
+        dialect: Dialect = PX4,
+        vehicle: RecordingVehicle | None = None,
+    ) -> None:
+        self.vehicle = vehicle or RecordingVehicle()
         vehicle_end, client_end = memory_pair(role)
         second_vehicle_end, second_client_end = memory_pair(LinkRole.ONBOARD)
         self.client = Client(client_end)

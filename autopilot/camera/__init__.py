@@ -1,0 +1,1 @@
+"""The camera the vehicle carries: pictures, video, lens, storage."""

@@ -1,0 +1,1 @@
+"""The gimbal the camera hangs on."""

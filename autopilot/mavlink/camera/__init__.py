@@ -1,0 +1,1 @@
+"""The camera as a MAVLink component: commands, information, settings."""

@@ -1,0 +1,74 @@
+"""The light in front of a vehicle's camera: where the camera truly is, rendered (autopilot.camera.ports.FrameSource).
+
+In: views, which say where the lens points relative to the body. Out: frames of the true pose at that moment. In
+lockstep a frame is there at once; with a thread of its own the flight goes on while it is being rendered.
+"""
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cached_property
+
+from autopilot.camera.ports import RawFrame, View
+from autopilot.gimbal.gimbal import product
+from sim.rig import Rig
+from sim.sensors.camera import CameraPose, Renderer
+from sim.world.world import WorldMap
+
+Quat = tuple[float, float, float, float]  # x, y, z, w
+
+MOUNT_FRD = (0.10, 0.0, 0.06)  # [m] of the lens from the centre of gravity: under the nose; guess
+
+
+class CameraRig:
+    """The camera of one vehicle of a rig.
+
+    Args:
+        rig: where the truth is.
+        world: what is seen.
+        has_thread: frames are rendered while the flight goes on.
+        i_vehicle: which vehicle carries it.
+    """
+
+    def __init__(self, rig: Rig, world: WorldMap, *, has_thread: bool = False, i_vehicle: int = 0) -> None:
+        self._body = rig.arrays.body.numpy()  # the live rows
+        self._world = world
+        self._i_vehicle = i_vehicle
+        self._pool = ThreadPoolExecutor(1, "camera") if has_thread else None
+
+    @cached_property
+    def renderer(self) -> Renderer:
+        """Made when the first picture is taken."""
+        return Renderer(self._world)
+
+    def pose(self, view: View) -> CameraPose:
+        """Where the lens truly is now."""
+        row = self._body[self._i_vehicle]
+        x, y, z, w = (float(value) for value in row["q_ned_from_frd"])
+        q = (x, y, z, w)
+        north, east, down = (float(a) + b for a, b in zip(row["pos_ned"], _rotated(q, MOUNT_FRD), strict=True))
+        q_ned_from_rdf = product(q, view.q_frd_from_rdf)
+        return CameraPose((north, east, down), q_ned_from_rdf, view.hfov_deg, view.exposure, view.balance)
+
+    def capture(self, view: View) -> "Future[RawFrame]":
+        """The frame as of now."""
+        pose = self.pose(view)
+        if self._pool is not None:
+            return self._pool.submit(self._render, pose, view)
+        done: Future[RawFrame] = Future()
+        done.set_result(self._render(pose, view))
+        return done
+
+    def _render(self, pose: CameraPose, view: View) -> RawFrame:
+        pictures = self.renderer.pictures([pose], view.width, view.height, samples=2 if view.is_smooth else 1)
+        return RawFrame(pictures.rgb[0], pictures.depth_m[0])
+
+    def close(self) -> None:
+        """Ends the thread; frames that it has not begun are lost."""
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+
+
+def _rotated(q: Quat, v: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A vector turned by a unit quaternion."""
+    x, y, z, w = q
+    turned = product(product(q, (*v, 0.0)), (-x, -y, -z, w))
+    return turned[:3]
