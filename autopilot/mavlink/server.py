@@ -20,8 +20,8 @@ from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.ftp import FtpService
-from autopilot.mavlink.goto import GotoService
 from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
+from autopilot.mavlink.goto import GotoService
 from autopilot.mavlink.identity import banner
 from autopilot.mavlink.intake import share
 from autopilot.mavlink.links import Link, LinkSource
