@@ -119,6 +119,7 @@ class Telemetry:
             Stream("CURRENT_MODE", current_mode, 0.5, 0.5),
         )
         is_ardupilot = dialect.name == "ardupilot"
+
         def manager_status(state: VehicleState) -> bytes | None:
             """Who has control of the gimbal; at 5 Hz on links that have asked for its information."""
             return gimbal.gimbal_manager_status(state, sysid)
