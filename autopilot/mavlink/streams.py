@@ -11,8 +11,7 @@ from autopilot.mavlink.codec import MessageType, known_type
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.identity import autopilot_version
 from autopilot.mavlink.links import LinkRole
-from autopilot.mavlink.telemetry import ardupilot, motion, radio, sensors, status
-from autopilot.mavlink.telemetry import gimbal, motion, radio, sensors, status
+from autopilot.mavlink.telemetry import ardupilot, gimbal, motion, radio, sensors, status
 from autopilot.vehicle import VehicleState
 from common.kernels import FRAME_US
 
