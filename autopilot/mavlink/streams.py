@@ -111,19 +111,18 @@ class Telemetry:
             """The mode that is flown, and its standard number."""
             return status.current_mode(state, dialect)
 
-        streams = (
-            Stream("HEARTBEAT", heartbeat, 1, 1),
-            *STREAMS,
-            Stream("AUTOPILOT_VERSION", version, 0, 0),
-            Stream("CURRENT_MODE", current_mode, 0.5, 0.5),
-        )
         is_ardupilot = dialect.name == "ardupilot"
 
         def manager_status(state: VehicleState) -> bytes | None:
             """Who has control of the gimbal; at 5 Hz on links that have asked for its information."""
             return gimbal.gimbal_manager_status(state, sysid)
 
-        streams = (Stream("HEARTBEAT", heartbeat, 1, 1), *STREAMS, Stream("AUTOPILOT_VERSION", version, 0, 0))
+        streams: tuple[Stream, ...] = (
+            Stream("HEARTBEAT", heartbeat, 1, 1),
+            *STREAMS,
+            Stream("AUTOPILOT_VERSION", version, 0, 0),
+            Stream("CURRENT_MODE", current_mode, 0.5, 0.5),
+        )
         if has_gimbal:
             streams += (
                 Stream("GIMBAL_MANAGER_INFORMATION", gimbal.gimbal_manager_information, 0, 0),
