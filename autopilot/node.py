@@ -28,8 +28,10 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.navigator import Navigator
 from autopilot.navigator.setpoint import SetpointPort
+from autopilot.outputs import AuxOutputs
 from autopilot.payload import Payloads
 from autopilot.sticks import Sticks
+from autopilot.traffic import Traffic
 from autopilot.vehicle import (
     ACCEPTED,
     Announcer,
@@ -109,6 +111,7 @@ class FlightController:
         airframe: its data: battery, hover thrust.
         origin: the geodetic origin of the ned frame.
         announcer: hears of events besides the attached servers (a log, a test).
+        on_corrections: the GNSS receiver's input for RTCM corrections.
         on_reboot: restarts the vehicle; None where there is nothing to restart.
         host: files, logs and storage, as far as there are any.
         injector: breaks parts on request; None where nothing can be broken.
@@ -123,6 +126,7 @@ class FlightController:
         origin: GeoPoint,
         announcer: Announcer | None = None,
         on_reboot: Callable[[], None] | None = None,
+        on_corrections: Callable[[bytes], None] | None = None,
         host: Host | None = None,
         injector: FailureInjector | None = None,
         turntable: Turntable | None = None,
@@ -133,6 +137,8 @@ class FlightController:
         self.state = VehicleState(origin=origin, position=origin, sticks=self.sticks.input)
         self.payload = Payloads()
         self.camera = self._mount_camera()
+        self.payload.add(AuxOutputs(self.state))
+        self.traffic = Traffic(self.state, params)
         self._read_estimate = ports.read_estimate
         self._read_samples = ports.read_samples
         self._read_actuators = ports.read_actuators
@@ -144,6 +150,7 @@ class FlightController:
         self._servers: list[Server] = []
         self._on_reboot = on_reboot
         self._injector = injector
+        self._on_corrections = on_corrections
         self._setpoint = SetpointPort(ports.setpoint)
         hover, standing_m = hover_thrust(airframe), airframe.contact.leg_z_m
         self.commander = Commander(
@@ -303,6 +310,10 @@ class FlightController:
 
     def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
         self.navigator.precision.seen(pos_ned)
+
+    def give_corrections(self, rtcm: bytes) -> None:
+        if self._on_corrections is not None:
+            self._on_corrections(rtcm)
 
     def orbit(self, request: OrbitRequest) -> Reply:
         state = self.state

@@ -12,6 +12,7 @@ from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.stick_params import STICK_PARAMETERS
+from autopilot.traffic import TRAFFIC_PARAMETERS
 from common.airframe import Airframe
 from common.kernels import GRAVITY_M_S2
 from common.params import Parameter, ParameterTable
@@ -63,6 +64,7 @@ def all_parameters() -> list[Parameter]:
         *COMMANDER_PARAMETERS,
         *NAVIGATOR_PARAMETERS,
         *STICK_PARAMETERS,
+        *TRAFFIC_PARAMETERS,
     ]
 
 

@@ -206,6 +206,18 @@ class OrbitRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class WinchStatus:
+    """What a winch tells."""
+
+    length_m: float  # of line let out
+    rate_m_s: float  # positive lets line out
+    tension_kg: float
+    voltage_v: float
+    current_a: float
+    flags: int  # MAV_WINCH_STATUS_FLAG
+
+
+@dataclass(frozen=True, slots=True)
 class OrbitStatus:
     """The circle being flown."""
 
@@ -275,6 +287,12 @@ class VehicleState:
     mission_count: int = 0
     mission_current: int = 0  # seq
     mission_state: int = 0  # MISSION_STATE
+    aux_pulses_us: tuple[int, ...] = (0,) * 8  # of the outputs 9 to 16, 0: never set
+    traffic_conflict_us: int = 0  # until then an aircraft counts as near
+    nearest_aircraft: Any = None  # autopilot.traffic.Aircraft
+    read_truth: Callable[[], Any] | None = None  # the simulator's body state, for telemetry alone
+    read_winch: Callable[[], WinchStatus] | None = None  # asked when it is sent
+    relays: int = 0  # a bit for each that is on
     orbit: OrbitStatus | None = None  # while one is flown
     gimbal: "GimbalControl | None" = None  # None: the vehicle carries none
     sticks: StickInput = field(default_factory=StickInput)
@@ -369,6 +387,22 @@ class GuidedPort(Protocol):
         ...
 
 
+class PayloadPort(Protocol):
+    """What the vehicle carries (autopilot.payload)."""
+
+    def takes(self, command: int) -> bool: ...
+
+    def run(self, command: int, params: tuple[float, float, float, float], x: float, y: float, z: float) -> Reply: ...
+
+
+class TrafficPort(Protocol):
+    """Other aircraft (autopilot.traffic)."""
+
+    def report(self, aircraft: Any) -> None: ...
+
+    def known(self) -> Sequence[Any]: ...
+
+
 class Vehicle(Protocol):
     """What may be asked of the vehicle. Altitudes are AMSL [m], angles radians, NaN means default."""
 
@@ -395,6 +429,11 @@ class Vehicle(Protocol):
 
     @property
     def guidance(self) -> Guidance: ...
+    @property
+    def payload(self) -> PayloadPort: ...
+
+    @property
+    def traffic(self) -> TrafficPort: ...
 
     @property
     def guided(self) -> GuidedPort: ...
@@ -438,6 +477,10 @@ class Vehicle(Protocol):
         ...
 
     def set_offboard(self, setpoint: OffboardSetpoint) -> None: ...
+
+    def give_corrections(self, rtcm: bytes) -> None:
+        """Passes corrections on to the GNSS receiver."""
+        ...
 
     def orbit(self, request: OrbitRequest) -> Reply:
         """Flies round a point (mode ORBIT)."""

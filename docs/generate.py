@@ -12,6 +12,7 @@ from autopilot.mavlink.dialects.ardupilot_params import ALIASES, CONSTANTS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.params import SYSTEM_PARAMETERS, parameter_table
 from autopilot.stick_params import STICK_PARAMETERS
+from autopilot.traffic import TRAFFIC_PARAMETERS
 from common.airframe import load_airframe
 from common.files import write_whole
 from common.params import Parameter
@@ -25,6 +26,7 @@ SECTIONS = {
     "Arming, landing detection, failsafes": COMMANDER_PARAMETERS,
     "Take-off, missions, return, landing": NAVIGATOR_PARAMETERS,
     "The pilot's sticks": STICK_PARAMETERS,
+    "Other aircraft": TRAFFIC_PARAMETERS,
     "System, and what ground stations ask for": SYSTEM_PARAMETERS,
 }
 HEADER = """# Parameters

@@ -72,6 +72,7 @@ def fly(
     stream_port: Annotated[
         int, typer.Option(min=0, max=65535, help="HTTP port of the camera's live picture; 0: none.")
     ] = 0,
+    traffic: Annotated[int, typer.Option(min=0, max=50, help="Other aircraft that are heard by ADS-B.")] = 0,
     param: Annotated[
         list[str] | None, typer.Option(help="Sets a parameter of the flight controller: NAME=VALUE. Repeatable.")
     ] = None,
@@ -91,6 +92,7 @@ def fly(
                 trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, bind=bind,
                 tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
                 run_folder=run_folder, stream_port=stream_port, parameters=tuple(param or ()), state=state,
+                traffic_count=traffic,
             )
         )  # fmt: skip
     except UserError as error:

@@ -39,6 +39,7 @@ from mission.log_shelf import FlightLogs, RunLog
 from mission.recorder import History, Recorder
 from mission.script import Drone, Script
 from mission.stream import StreamServer
+from mission.surroundings import Surroundings
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.esc import esc_reader
@@ -71,6 +72,8 @@ class FlightConfig(BaseModel):
     """Scales every sensor's noise; 0 makes them perfect."""
     dialect: Literal["px4", "ardupilot"] = "px4"
     """Which autopilot's numbers ground stations get. The flight's own script always gets PX4's."""
+    traffic_count: int = Field(default=0, ge=0, le=50)
+    """Other aircraft that an ADS-B receiver on board hears."""
     parameters: dict[str, float] = {}
     """Values of the flight controller's parameters that differ from their defaults, by name."""
     world: WorldConfig = WorldConfig()
@@ -132,7 +135,9 @@ class Flight:
             injector=self._injector,
             host=self.host,
             turntable=Turntable(self.rig.arrays.body.numpy()),
+            on_corrections=lambda _: self._surroundings.receiver.correct(self.time_us),
         )
+        self._surroundings = Surroundings(self.controller, self.rig, config.traffic_count, config.home, config.seed)
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
         on_frame = None if self._tlog is None else self._tlog.frame
@@ -172,6 +177,7 @@ class Flight:
         self._injector.frame(self.time_us)
         self.rig.advance(FRAME_TICKS)
         self.time_us += FRAME_US
+        self._surroundings.frame(self.time_us)
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
         if self.stream is not None:

@@ -75,6 +75,7 @@ class FlightOptions:
     stream_port: int = 0
     parameters: tuple[str, ...] = ()  # NAME=VALUE
     state: Path | None = None
+    traffic_count: int = 0
 
 
 def fly_session(options: FlightOptions) -> int:
@@ -170,6 +171,7 @@ def _config(options: FlightOptions, state: StateFolder | None) -> FlightConfig:
             wind_from_deg=options.wind_from_deg,
             noise=options.noise,
             dialect=options.dialect,
+            traffic_count=options.traffic_count,
             parameters=dict(_parameter(text) for text in options.parameters),
             world=WorldConfig(
                 seed=options.world_seed,

@@ -31,6 +31,7 @@ MOTOR_FAILED = 32768
 STICKS_LOST = 1 << 16
 ESTIMATOR_FAILED = 1 << 17
 FENCE_BREACHED = 1 << 18
+TRAFFIC_NEAR = 1 << 20
 
 TERMINATION_BREAKER = 121212  # CBRK_FLIGHTTERM: the failure detector may not stop the motors
 
@@ -86,6 +87,8 @@ OFFBOARD_ACTIONS = {
     3: Action.RETURN, 4: Action.LAND, 5: Action.HOLD, 6: Action.TERMINATE, 7: Action.DISARM,
 }  # fmt: skip
 """COM_OBL_RC_ACT."""
+TRAFFIC_ACTIONS = {2: Action.RETURN, 3: Action.LAND, 4: Action.HOLD}
+"""NAV_TRAFF_AVOID; with 0 nobody looks."""
 CRITICAL_BATTERY_ACTIONS = {2: Action.LAND, 3: Action.RETURN}
 EMERGENCY_BATTERY_ACTIONS = {2: Action.LAND, 3: Action.LAND}
 
@@ -142,6 +145,8 @@ RULES: tuple[Rule, ...] = (
     Rule(WIND_HIGH, by("COM_WIND_MAX_ACT", LIMIT_ACTIONS), Severity.CRITICAL, "Wind above its limit",
          "Wind is below its limit again"),
     Rule(FENCE_BREACHED, by("GF_ACTION", LIMIT_ACTIONS), Severity.CRITICAL, "Geofence breached"),
+    Rule(TRAFFIC_NEAR, by("NAV_TRAFF_AVOID", TRAFFIC_ACTIONS), Severity.WARNING, "Aircraft near",
+         "Aircraft is no longer near"),
     Rule(STATION_LOST, by("NAV_DLL_ACT", LINK_ACTIONS), Severity.WARNING, "Ground station lost",
          "Ground station is back"),
     Rule(STICKS_LOST, _sticks_lost, Severity.CRITICAL, "Sticks lost", "Sticks are back"),

@@ -23,6 +23,7 @@ from autopilot.commander.failsafe import (
     OFFBOARD_LOST,
     POSITION_LOST,
     STATION_LOST,
+    TRAFFIC_NEAR,
     WIND_HIGH,
     WIND_STRONG,
 )
@@ -168,6 +169,8 @@ class FailureWatch:
     def _slow_failures(self, is_flying: bool) -> int:
         state = self._state
         bits = 0
+        if is_flying and state.traffic_conflict_us > state.time_us and self._params["NAV_TRAFF_AVOID"]:
+            bits |= TRAFFIC_NEAR
         heard_us = self._station.heard_us
         if heard_us >= 0 and state.time_us - heard_us > self._station_loss_us:
             if not EXCEPTION_BITS.get(state.mode, 0) & self._except_bits:

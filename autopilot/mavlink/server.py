@@ -16,6 +16,7 @@ from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel,
 from autopilot.mavlink.codec import Frame, known_type
 from autopilot.mavlink.commands import CommandService
 from autopilot.mavlink.component import Component
+from autopilot.mavlink.devices import DeviceService
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.fence import FenceService
@@ -43,6 +44,8 @@ from autopilot.mavlink.signing_setup import SigningService
 from autopilot.mavlink.streams import Stream
 from autopilot.mavlink.targets import TargetService
 from autopilot.mavlink.telemetry.status import mission_progress
+from autopilot.mavlink.traffic import TrafficService
+from autopilot.mavlink.winch import WinchComponent
 from autopilot.vehicle import Severity, Vehicle
 
 _HEARTBEAT = known_type("HEARTBEAT")
@@ -128,6 +131,8 @@ class MavlinkServer:
             ShellService(endpoint),
             OriginService(endpoint),
             SigningService(endpoint),
+            DeviceService(endpoint),
+            TrafficService(endpoint),
         ]
 
     def _make_components(self) -> list[Component]:
@@ -143,6 +148,8 @@ class MavlinkServer:
             components.append(camera)
             self._add(AttachedCamera(camera))
             self._commands.delegated.update(AttachedCamera(camera).commands())
+        if vehicle.state.read_winch is not None:
+            components.append(WinchComponent(self._endpoint))
         return components
 
     def _add(self, service: Service) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from heapq import heapify, heapreplace
 
+from autopilot.mavlink.aircraft import adsb_vehicle
 from autopilot.mavlink.codec import MessageType, known_type
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.identity import autopilot_version
@@ -57,6 +58,9 @@ STREAMS: tuple[Stream, ...] = (
     Stream("GPS_RAW_INT", sensors.gps_raw_int, 5, 5),
     Stream("HIGHRES_IMU", sensors.highres_imu, 0, 10),
     Stream("SCALED_IMU", sensors.scaled_imu, 0, 0),
+    Stream("RAW_IMU", sensors.raw_imu, 0, 0),
+    Stream("HIL_STATE_QUATERNION", sensors.hil_state_quaternion, 0, 0),
+    Stream("ADSB_VEHICLE", adsb_vehicle, 0, 0),
     Stream("SCALED_PRESSURE", sensors.scaled_pressure, 1, 1),
     Stream("DISTANCE_SENSOR", sensors.distance_sensor, 4, 10),
     Stream("SERVO_OUTPUT_RAW", sensors.servo_output_raw, 2, 2),

@@ -47,6 +47,7 @@ class GnssModel:
     pos_h_std: float  # [m] reported
     pos_v_std: float  # [m] reported
     reported_vel_std: float  # [m/s] reported
+    fix_type: int  # GPS_FIX_TYPE of its solutions
 
 
 @wp.struct
@@ -74,6 +75,7 @@ def gnss_model(noise_scale: float = 1.0) -> Any:
     model.pos_h_std = REPORTED_H_STD_M
     model.pos_v_std = REPORTED_V_STD_M
     model.reported_vel_std = REPORTED_VEL_STD_M_S
+    model.fix_type = 3
     return model
 
 
@@ -146,7 +148,7 @@ def gnss_delivered(model: GnssModel, state: GnssState, held: GnssSample, fault: 
     sample = held
     if fault.mode != FAULT_OFF:
         sample.time_us = wp.int64(state.queue_tick[state.queue_head] + 1) * wp.int64(TICK_US)
-        sample.fix_type = 3
+        sample.fix_type = model.fix_type
         sample.satellites = SATELLITES
         sample.pos_h_std = model.pos_h_std
         sample.pos_v_std = model.pos_v_std

@@ -13,6 +13,7 @@ from autopilot.mavlink.convert import (
     i32,
     u16,
     u32,
+    wxyz_from_quat,
 )
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.ports import (
@@ -33,6 +34,8 @@ _scaled_pressure = known_type("SCALED_PRESSURE").pack
 _distance_sensor = known_type("DISTANCE_SENSOR").pack
 _servo_output_raw = known_type("SERVO_OUTPUT_RAW").pack
 _actuator_output_status = known_type("ACTUATOR_OUTPUT_STATUS").pack
+_raw_imu = known_type("RAW_IMU").pack
+_hil_state_quaternion = known_type("HIL_STATE_QUATERNION").pack
 _vibration = known_type("VIBRATION").pack
 _estimator_status = known_type("ESTIMATOR_STATUS").pack
 
@@ -126,6 +129,38 @@ def scaled_imu(state: VehicleState) -> bytes:
     )
 
 
+def raw_imu(state: VehicleState) -> bytes:
+    """The IMU in the units of SCALED_IMU: its driver delivers no raw counts."""
+    imu, mag = state.samples.imu, state.samples.mag
+    return _raw_imu(
+        imu.time_us,
+        *(i16(axis * 1000.0 / GRAVITY_M_S2) for axis in imu.accel_frd),
+        *(i16(axis * 1000.0) for axis in imu.gyro_frd),
+        *(i16(axis * 1000.0) for axis in mag.field_frd_gauss),
+    )
+
+
+def hil_state_quaternion(state: VehicleState) -> bytes | None:
+    """The simulator's truth, for comparison; the flight controller does not know it."""
+    if state.read_truth is None:
+        return None
+    truth = state.read_truth()
+    north, east, down = truth.pos_ned
+    lat_deg, lon_deg, alt_m = geodetic_from_ned(north, east, down, state.origin)
+    return _hil_state_quaternion(
+        state.time_us,
+        wxyz_from_quat(truth.q_ned_from_frd),
+        *truth.omega_frd,
+        degrees_e7(lat_deg),
+        degrees_e7(lon_deg),
+        i32(alt_m * 1000.0),
+        *(i16(axis * 100.0) for axis in truth.vel_ned),
+        0,
+        0,
+        *(i16(axis * 1000.0 / GRAVITY_M_S2) for axis in truth.accel_frd),
+    )
+
+
 def scaled_pressure(state: VehicleState) -> bytes | None:
     """The barometer."""
     baro = state.samples.baro
@@ -156,9 +191,9 @@ def distance_sensor(state: VehicleState) -> bytes | None:
 
 
 def servo_output_raw(state: VehicleState) -> bytes:
-    """Motor commands as pulse widths."""
+    """Motor commands and auxiliary outputs as pulse widths."""
     pulses = (PULSE_IDLE_US + u16(command * 1000.0) for command in state.actuators.command)
-    return _servo_output_raw(state.time_us & 0xFFFFFFFF, 0, *pulses)
+    return _servo_output_raw(state.time_us & 0xFFFFFFFF, 0, *pulses, *state.aux_pulses_us)
 
 
 def actuator_output_status(state: VehicleState) -> bytes:

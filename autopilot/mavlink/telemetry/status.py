@@ -24,6 +24,7 @@ _current_mode = known_type("CURRENT_MODE").pack
 _available_modes_monitor = known_type("AVAILABLE_MODES_MONITOR").pack
 _flight_information = known_type("FLIGHT_INFORMATION").pack
 _system_time = known_type("SYSTEM_TIME").pack
+_winch_status = known_type("WINCH_STATUS").pack
 
 MODES_SEQUENCE = 1  # AVAILABLE_MODES_MONITOR.seq: the list of modes never changes while the vehicle runs
 MAVLINK_VERSION = 3  # of the HEARTBEAT message
@@ -250,3 +251,14 @@ def flight_information(state: VehicleState) -> bytes:
     armed_us = state.armed_since_us if state.is_armed else 0
     takeoff_us = state.takeoff_us if state.is_armed else 0
     return _flight_information(boot_ms(state.time_us), armed_us, takeoff_us, state.flight_number)
+
+
+def winch_status(state: VehicleState) -> bytes | None:
+    """Line out, speed, tension and state of the winch, where there is one."""
+    if state.read_winch is None:
+        return None
+    winch = state.read_winch()
+    return _winch_status(
+        state.time_us, winch.length_m, winch.rate_m_s, winch.tension_kg, winch.voltage_v, winch.current_a, INT16_MAX,
+        winch.flags,
+    )  # fmt: skip

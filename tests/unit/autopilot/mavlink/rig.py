@@ -12,7 +12,8 @@ from autopilot.commander.watch import StationLink
 from autopilot.estimator.state import EstimatorState
 from autopilot.host import Host
 from autopilot.lists import ItemLists
-from autopilot.mavlink.codec import FrameReader, Message, decode, encode
+from autopilot.mavlink.codec import FrameReader, Message, decode, encode, message_id
+from autopilot.mavlink.definitions import DEFINITIONS
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.links import Link, LinkRole, memory_pair
@@ -20,7 +21,9 @@ from autopilot.mavlink.server import MavlinkServer
 from autopilot.navigator.fence_items import MAX_FENCE_ITEMS
 from autopilot.navigator.items import MAX_ITEMS
 from autopilot.navigator.rally import MAX_RALLY_POINTS
+from autopilot.outputs import AuxOutputs
 from autopilot.params import parameter_table
+from autopilot.payload import Payloads
 from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
@@ -34,6 +37,7 @@ from autopilot.ports import (
     Samples,
 )
 from autopilot.sticks import Sticks
+from autopilot.traffic import Aircraft, Traffic
 from autopilot.vehicle import (
     ACCEPTED,
     BatteryLevel,
@@ -51,6 +55,7 @@ from autopilot.vehicle import (
 )
 from common.geodesy import GeoPoint
 from common.records import row_reader
+from sim.bodies.multirotor import BodyState
 
 FRAME_US = 20_000
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
@@ -218,6 +223,11 @@ class RecordedCalibration:
         self._vehicle._record("set_offsets", sensor, offsets)
 
 
+def record_of_body() -> Any:
+    """The simulator's truth: at rest."""
+    return record(BodyState, "BodyState", q_ned_from_frd=(0.0, 0.0, 0.0, 1.0))
+
+
 class RecordingVehicle:
     """Answers every request with `reply` and keeps a list of them."""
 
@@ -244,6 +254,11 @@ class RecordingVehicle:
         self.guided = RecordingGuided(self._record)
         self.missing_modes: set[Mode] = set()
         self.guidance = RecordingGuidance(self._record)
+        self.payload = Payloads()
+        self.payload.add(AuxOutputs(self.state))
+        self.traffic = Traffic(self.state, self.params)
+        self.state.read_truth = record_of_body
+        self.state.nearest_aircraft = Aircraft(1, "HB-ABC", 47.0, 8.0, 900.0, 1.0, 60.0, 0.0)
 
     @property
     def fence(self) -> "RecordingVehicle":
@@ -254,6 +269,9 @@ class RecordingVehicle:
 
     def disable(self, limits: int) -> Reply:
         return self._record("fence.disable", limits)
+
+    def give_corrections(self, rtcm: bytes) -> None:
+        self._record("give_corrections", rtcm)
 
     def _record(self, *call: Any) -> Reply:
         self.calls.append(call)
@@ -328,7 +346,8 @@ class Client:
         self._seq = 0
 
     def send(self, name: str, **fields: Any) -> None:
-        if name not in ("HEARTBEAT", "PING", "TIMESYNC", "MANUAL_CONTROL"):
+        fieldnames = DEFINITIONS[message_id(name)].fieldnames
+        if "target_system" in fieldnames and name not in ("PING", "TIMESYNC"):
             fields = {"target_system": 1} | fields
         self.link.send(encode(name, self.sysid, self.compid, self._seq, **fields))
         self._seq += 1

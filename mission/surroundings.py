@@ -1,0 +1,43 @@
+"""What is round the vehicle besides world and air: devices it carries, other aircraft, corrections for its receiver."""
+
+from autopilot.node import FlightController
+from common.geodesy import GeoPoint
+from common.records import row_reader
+from sim.devices import Gripper, Winch
+from sim.rig import Rig
+from sim.rtk import RtkReceiver
+from sim.traffic import SimulatedTraffic
+
+TRAFFIC_PERIOD_US = 1_000_000
+
+
+class Surroundings:
+    """Connects the simulation's devices and aircraft to the flight controller.
+
+    Args:
+        controller: gets them.
+        rig: its sensors.
+        traffic_count: aircraft in the sky.
+        home: the middle of their area.
+        seed: of their ways.
+    """
+
+    def __init__(self, controller: FlightController, rig: Rig, traffic_count: int, home: GeoPoint, seed: int) -> None:
+        state = controller.state
+        self._controller = controller
+        self._traffic = SimulatedTraffic(traffic_count, home, seed)
+        self._next_traffic_us = 0 if traffic_count else 1 << 62
+        self.receiver = RtkReceiver(rig)
+        winch = Winch(lambda: state.time_us)
+        controller.payload.add(Gripper())
+        controller.payload.add(winch)
+        state.read_winch = winch.status
+        state.read_truth = row_reader(rig.arrays.body.numpy(), 0, "BodyState")
+
+    def frame(self, time_us: int) -> None:
+        """What happens by itself; before the flight controller's frame."""
+        self.receiver.frame(time_us)
+        if time_us >= self._next_traffic_us:
+            self._next_traffic_us = time_us + TRAFFIC_PERIOD_US
+            for aircraft in self._traffic.heard(time_us):
+                self._controller.traffic.report(aircraft)
