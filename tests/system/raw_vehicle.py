@@ -37,6 +37,7 @@ class RawVehicle:
         self._speed = speed
         self._is_over = threading.Event()
         self._error = None
+        self._plugins = {}
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
         self._sending = self._mavsdk.subscribe_raw_bytes_to_be_sent(lambda data, *_: self._client_end.send(bytes(data)))
         self._mavsdk.add_any_connection("raw://")
@@ -58,6 +59,12 @@ class RawVehicle:
         except BaseException as error:
             self._error = error
             raise
+
+    def plugin(self, kind):
+        """MAVSDK's plugin of a kind for the vehicle; one, kept, because a plugin must not go while messages come."""
+        if kind not in self._plugins:
+            self._plugins[kind] = kind(self.system)
+        return self._plugins[kind]
 
     @property
     def state(self):
