@@ -22,7 +22,7 @@ from autopilot.gimbal.control import GimbalControl
 from autopilot.gimbal.gimbal import Gimbal
 from autopilot.guidance import Guidance
 from autopilot.host import Host
-from autopilot.injection import FailureInjector, failure_request, injection_refusal
+from autopilot.injection import Failure, FailureInjector, Unit, failure_request, injection_refusal
 from autopilot.lists import ItemLists
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission import Mission
@@ -253,9 +253,18 @@ class FlightController:
         reply = injection_refusal(self.params, self.state, request[1])
         if reply is not None:
             return reply
+        if request[0] is Unit.RC_SIGNAL:
+            return self._cut_sticks(request[1])
         if self._injector is None:
             return Reply(Verdict.UNSUPPORTED, "nothing here can be made to fail")
         return self._injector.inject(*request, instance)
+
+    def _cut_sticks(self, failure: Failure) -> Reply:
+        """Stops listening to the pilot's sticks, or listens again."""
+        if failure not in (Failure.OK, Failure.OFF):
+            return Reply(Verdict.UNSUPPORTED, f"the sticks cannot be made {failure.name.lower()}")
+        self.sticks.is_cut = failure is Failure.OFF
+        return ACCEPTED
 
     def check_arming(self) -> list[str]:
         return self.commander.check_arming()

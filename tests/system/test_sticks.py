@@ -249,7 +249,9 @@ def test_brake_stops_a_vehicle_whose_stick_is_held():
     assert max(speeds[1:]) < 1.0
 
 
-CMD_RETURN, CMD_LAND = 20, 21
+CMD_RETURN, CMD_LAND, CMD_INJECT_FAILURE = 20, 21, 420
+RC_SIGNAL = 104.0  # FAILURE_UNIT
+REPAIRED, OFF, STUCK = 0.0, 1.0, 2.0  # FAILURE_TYPE
 MAIN_AUTO, RTL = 4, 5
 
 
@@ -297,6 +299,20 @@ def test_a_vehicle_whose_pilot_falls_silent_comes_home(mode):
     flight = fly(script)
     assert np.hypot(*place(flight)[:2]) < 3.0
     assert any("Sticks lost: return" in text for text in flight.drone.texts)
+
+
+def test_a_failure_of_the_radio_can_be_injected_and_repaired():
+    async def script(pilot):
+        await airborne(pilot, Mode.POSITION, 20.0)
+        await pilot.drone.command(CMD_INJECT_FAILURE, RC_SIGNAL, OFF, name="fail")
+        await pilot.drone.until(lambda: pilot.drone.px4_mode == (MAIN_AUTO, RTL), 2.0, "return")
+        await pilot.drone.command(CMD_INJECT_FAILURE, RC_SIGNAL, REPAIRED, name="repair")
+        await pilot.drone.sleep(0.5)
+        await pilot.mode(Mode.POSITION)
+        with pytest.raises(CommandRefused, match="cannot be made stuck"):
+            await pilot.drone.command(CMD_INJECT_FAILURE, RC_SIGNAL, STUCK, name="stick")
+
+    fly(script, FlightConfig(parameters={"SYS_FAILURE_EN": 1}))
 
 
 def test_moving_a_stick_takes_over_from_a_return():
