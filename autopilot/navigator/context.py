@@ -1,5 +1,6 @@
 """What every navigator mode works with: the vehicle's state, the setpoint, and what it tells the commander."""
 
+from collections.abc import Callable
 from math import atan2, hypot, isfinite, nan, sqrt
 
 from autopilot.navigator.heading import Heading
@@ -26,8 +27,8 @@ class NavContext:
 
     __slots__ = (
         "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "has_position", "heading",
-        "hover_thrust", "is_landing", "leg_yaw", "next_hold", "params", "setpoint", "standing_height_m", "state",
-        "wants_lift", "wish", "yaw_mode",
+        "hover_thrust", "is_landing", "leg_yaw", "next_hold", "params", "place_refusal", "setpoint",
+        "standing_height_m", "state", "wants_lift", "wish", "yaw_mode",
     )  # fmt: skip
 
     def __init__(
@@ -48,6 +49,7 @@ class NavContext:
         self.has_position = False  # the commander's judgement, with its delay
         self.wants_lift = False  # the mode asks to leave the ground
         self.is_landing = False  # the mode is on its last descent
+        self.place_refusal: Callable[[Vector], str] = lambda _place: ""  # why the fence lets nobody stay at a place [m]
         self.wish: Mode | None = None  # the mode that shall follow this one
         self.next_hold: tuple[Vector, float, bool] | None = None  # place, heading, whether to go there in a line
         self.cruise_speed = nan  # [m/s] asked for by DO_CHANGE_SPEED; NaN: the parameter

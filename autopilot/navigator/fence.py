@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from math import hypot, inf
 
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.detour import Bounds
+from autopilot.navigator.detour import Bounds, detour
 from autopilot.navigator.fence_items import MAX_FENCE_ITEMS, FenceCommand, fence_shapes
 from autopilot.navigator.region import Region, region_of
 from autopilot.navigator.setpoint import Vector
@@ -51,6 +51,7 @@ class Fence:
         self._clearance = 0.0
         self._safe_sq = -1.0  # [m²] moves shorter than this change nothing
         context.params.on_change(self._on_parameter)
+        context.place_refusal = lambda place: self.refusal(place, is_to_stay=True)
         self._switch_by_parameter()
 
     # ---- what clients ask for ----
@@ -107,6 +108,13 @@ class Fence:
             (north, east),
             number("GF_MAX_HOR_DIST") if limits & _RADIUS else inf,
         )
+
+    def way(self, start: Vector, goal: Vector) -> list[Vector] | None:
+        """The points [m] of a way to the goal, at its height, that keeps inside; None if there is none."""
+        if not self._limits & _SHAPES:
+            return [goal]
+        points = detour(self.bounds(), start[:2], goal[:2])
+        return None if points is None else [(north, east, goal[2]) for north, east in points]
 
     def ceiling_d(self) -> float:
         """Down coordinate [m] above which ways do not lead."""

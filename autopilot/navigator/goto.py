@@ -51,4 +51,7 @@ def _refusal(context: NavContext, target: Vector) -> Reply:
         ground_d = max(ground_d, context.state.estimate.terrain_d)
     if target[2] > ground_d + _BELOW_GROUND_M:
         return Reply(Verdict.DENIED, f"target is {target[2] - ground_d:.0f} m below the ground")
+    reason = context.place_refusal(target)
+    if reason:
+        return Reply(Verdict.DENIED, f"target is {reason}")
     return ACCEPTED

@@ -3,6 +3,7 @@
 from autopilot.navigator.context import NavContext, distance
 from autopilot.navigator.manual import Position
 from autopilot.navigator.setpoint import Vector
+from autopilot.navigator.way import Way
 
 
 class Hold:
@@ -11,13 +12,16 @@ class Hold:
     Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as they are heard.
     """
 
-    __slots__ = ("_context", "_is_flown", "_is_goto", "_is_steered", "_reset_count", "_steered", "target_ned", "yaw")
+    __slots__ = ("_context", "_is_flown", "_is_goto", "_is_steered", "_reset_count", "_steered", "_way",
+                 "target_ned", "via", "yaw")  # fmt: skip
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
         self._is_flown = False
         self._is_goto = False  # on a straight line to the place
         self._steered = Position(context)
+        self._way = Way(context)
+        self.via: list[Vector] = []  # [m] points to go over on the next way to a place
         self._is_steered = False
         self._reset_count = 0  # of the estimate
         self.target_ned: Vector = (0.0, 0.0, 0.0)  # [m]
@@ -37,7 +41,12 @@ class Hold:
         else:
             self._is_goto = False
             self.target_ned, self.yaw = context.stop_point(), context.state.yaw_rad
-        self._is_flown = False
+        via, self.via = self.via if self._is_goto else [], []
+        self._is_flown = bool(via)
+        if via:
+            self._way.start(context.stop_point(), [*via, self.target_ned])
+        else:
+            self._way.stop()
         self._reset_count = context.state.estimate.reset_count
 
     def frame(self) -> None:
@@ -46,7 +55,9 @@ class Hold:
             return
         if context.state.estimate.reset_count != self._reset_count:
             self._follow_reset()
-        if context.is_on_ground:
+        if self._way.left:
+            self._is_flown = not self._way.frame()
+        elif context.is_on_ground:
             self._is_flown = False
         elif not self._is_flown:
             self._is_flown = True

@@ -257,9 +257,10 @@ class Navigator:
             target = reposition_target(context, base, lat_deg, lon_deg, alt_amsl_m, yaw)
             if isinstance(target, Reply):
                 return target
-            refusal = self.fence.refusal(target[0], is_to_stay=True)
-            if refusal:
-                return Reply(Verdict.DENIED, f"target is {refusal}")
+            points = self.fence.way(context.stop_point(), target[0])
+            if points is None:
+                return Reply(Verdict.DENIED, "there is no way to the target inside the fence")
+            self.hold.via = points[:-1]
             context.next_hold = (*target, True)
         if isfinite(speed_m_s) and speed_m_s > 0.0:
             context.cruise_speed = speed_m_s

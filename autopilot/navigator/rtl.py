@@ -6,7 +6,6 @@ from math import hypot, isfinite, radians, tan
 from autopilot.navigator.arrival import Arrival
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.destination import Destination, Destinations
-from autopilot.navigator.detour import detour
 from autopilot.navigator.fence import Fence
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.setpoint import Vector
@@ -111,21 +110,15 @@ class Return:
     def _cruise(self) -> None:
         """Flies to the destination, around what the fence excludes."""
         place = self._destination.place
-        points = self._around(self._start, place)
-        self._phase = _Phase.WAY
-        self._way.start(self._start, [(north, east, self._back_d) for north, east in points])
-
-    def _around(self, start: Vector, place: Vector) -> list[tuple[float, float]]:
-        if not self._fence.is_active:
-            return [place[:2]]
+        goal = (place[0], place[1], self._back_d)
+        points = self._fence.way(self._start, goal)
         say = self._context.announcer.statustext
-        points = detour(self._fence.bounds(), start[:2], place[:2])
         if points is None:
             say(Severity.WARNING, "No way back inside the fence: returning directly")
-            return [place[:2]]
-        if len(points) > 1:
+        elif len(points) > 1:
             say(Severity.INFO, f"Return around the fence, {len(points) - 1} corners")
-        return points
+        self._phase = _Phase.WAY
+        self._way.start(self._start, points or [goal])
 
     def _fly_back(self, here: Vector) -> None:
         """Along the mission's places, at their heights."""

@@ -42,6 +42,11 @@ class Way:
         self._from = start
         self._fly()
 
+    def stop(self) -> None:
+        """Forgets the way."""
+        self.points = []
+        self._i_point = 0
+
     def frame(self) -> bool:
         """Goes on to the next point when one is reached; true once the last one is."""
         if self._i_point >= len(self.points):

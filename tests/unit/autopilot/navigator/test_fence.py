@@ -1,6 +1,7 @@
 """The geofence in flight: what breaches it, what that leads to, and where it lets nobody go."""
 
 from math import nan
+from timeit import repeat
 
 import pytest
 
@@ -179,3 +180,14 @@ def test_lost_position_is_no_breach():
     rig.pos[0] = 60.0
     rig.frame()
     assert not rig.state.fence.breached
+
+
+def test_fence_costs_next_to_nothing_away_from_its_borders():
+    def cost_us(rig):
+        return min(repeat(rig.fc.fence.frame, number=1000, repeat=20)) * 1e3
+
+    rig = Kinematic().flying()
+    assert cost_us(rig) < 1.0  # 0.04 us measured: there is no fence
+    fenced(rig, polygon(SQUARE))
+    rig.run(0.1)
+    assert cost_us(rig) < 8.0  # 0.6 us measured, and 60 us where the distance is computed anew

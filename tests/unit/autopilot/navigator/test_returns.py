@@ -228,3 +228,40 @@ def test_figure_of_eight_is_cut_where_it_crosses():
     assert length < 75.0  # 161 m with the loop
     assert cut[0].tolist() == [0, 0, 0]
     assert cut[-1].tolist() == [0, 50, 0]
+
+
+# ---- goto ----
+
+
+def test_goto_goes_around_what_the_fence_excludes_and_holds_there():
+    rig = at(0.0, 0.0)
+    load_block(rig)
+    start = len(rig.track)
+    assert rig.fc.reposition(*geo(70.0, 0.0, 14.0), 1.0, nan).verdict is Verdict.ACCEPTED
+    rig.run_until(lambda: hypot(rig.pos[0] - 70.0, rig.pos[1]) < 0.3 and abs(rig.pos[2] + 14.0) < 0.3, 60.0)
+    rig.run(3.0)
+    assert nearest_m(np.array(rig.track[start:]), 30.0, 0.0) > 20.0
+    assert not rig.state.fence.breach_count
+    assert rig.yaw == pytest.approx(1.0, abs=0.05)
+    rig.fc.set_mode(Mode.HOLD)
+    rig.run(1.0)
+    assert rig.pos[:2] == pytest.approx((70.0, 0.0), abs=0.3)
+
+
+def test_goto_can_be_stopped_on_its_way_around():
+    rig = at(0.0, 0.0)
+    load_block(rig)
+    rig.fc.reposition(*geo(70.0, 0.0, 10.0), nan, nan)
+    rig.run(3.0)
+    assert rig.fc.reposition(nan, nan, nan, nan, nan).verdict is Verdict.ACCEPTED
+    rig.run(5.0)
+    assert hypot(*rig.vel[:2]) < 0.05
+    assert rig.pos[0] < 25.0
+
+
+def test_goto_without_a_way_is_refused():
+    rig = at(0.0, 0.0)
+    wall = [item(i, FenceCommand.INCLUSION_CIRCLE, 100.0 * i, 0.0, 0.0, (30.0, 0, 0, 0), 5) for i in range(2)]
+    assert rig.fc.lists.load(ListKind.FENCE, wall) is None
+    reply = rig.fc.reposition(*geo(100.0, 0.0, 10.0), nan, nan)
+    assert (reply.verdict, reply.reason) == (Verdict.DENIED, "there is no way to the target inside the fence")
