@@ -23,7 +23,7 @@ from autopilot.navigator.smart_return import SmartReturn
 from autopilot.navigator.takeoff import Takeoff
 from autopilot.navigator.termination import Termination
 from autopilot.ports import TERRAIN_VALID
-from autopilot.vehicle import ACCEPTED, Mode, OffboardSetpoint, Reply, Verdict
+from autopilot.vehicle import ACCEPTED, ListKind, Mode, OffboardSetpoint, Reply, Severity, Verdict
 
 _SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
 
@@ -145,6 +145,12 @@ class Navigator:
                     self._mission_problem = f"item {seq} is {reason}"
                     break
         return self._mission_problem
+
+    def warn_of_fence(self, _: ListKind) -> None:
+        """Says at once that a mission just loaded leaves the fence, or a fence just loaded excludes the mission."""
+        problem = self._mission_outside()
+        if problem:
+            self.context.announcer.statustext(Severity.WARNING, f"Mission: {problem}")
 
     def arming_reason(self) -> str:
         """Why the vehicle may not take off here; empty if it may."""
