@@ -23,6 +23,7 @@ _AVERAGE_FRAMES = 100  # 2 s
 _SIDE_TIMEOUT_FRAMES = 3000  # 60 s until somebody has turned the vehicle; guess
 _SETTLE_FRAMES = 25  # at rest on a side before it counts
 _SPIN_FRAMES = 300  # 6 s of turning on each side
+_CANCEL_FRAMES = 50  # until "cancelled" is told: MAVSDK hangs if it hears that before its command is acknowledged
 _SIDE_SHARE = 0.85  # of gravity along an axis, from which that side is down: 32 deg
 _GRAVITY_ERROR = 0.1  # share of gravity by which a side may differ
 _FIELD_GAUSS = (0.15, 0.8)  # of the Earth, with room
@@ -66,7 +67,7 @@ class Calibrator:
         turntable: turns the vehicle; None: a pilot has to.
     """
 
-    __slots__ = ("_announcer", "_flow", "_params", "_state", "_table")
+    __slots__ = ("_announcer", "_flow", "_is_cancelled", "_params", "_state", "_table")
 
     def __init__(
         self, state: VehicleState, params: ParameterTable, announcer: Announcer, turntable: Turntable | None
@@ -76,6 +77,7 @@ class Calibrator:
         self._announcer = announcer
         self._table = turntable
         self._flow: Flow | None = None
+        self._is_cancelled = False  # and about to end
 
     def start(self, kind: CalibrationKind) -> Reply:
         """Begins a calibration, which goes on for some frames."""
@@ -96,9 +98,10 @@ class Calibrator:
 
     def cancel(self) -> Reply:
         """Ends the calibration that is running, if there is one; what it has found is dropped."""
-        if self._flow is not None:
+        if self._flow is not None and not self._is_cancelled:
             self._flow.close()
-            self._end("cancelled")
+            self._flow = self._cancelled()
+            self._is_cancelled = True
         return ACCEPTED
 
     def set_offsets(self, sensor: str, offsets: Vector) -> None:
@@ -124,8 +127,16 @@ class Calibrator:
             self._progress(100)
             self._end(f"done: {name}")
 
+    def _cancelled(self) -> Flow:
+        for _ in range(_CANCEL_FRAMES):
+            if self._table is not None:
+                self._table.show(0.0, 0.0)
+            yield
+        self._end("cancelled")
+
     def _end(self, how: str) -> None:
         self._flow = None
+        self._is_cancelled = False
         self._state.is_calibrating = False
         if self._table is not None:
             self._table.release()

@@ -14,8 +14,11 @@ _ACCEL_KINDS = {1: CalibrationKind.ACCEL, 2: CalibrationKind.LEVEL, 4: Calibrati
 _OFFSET_SENSORS = {0: "GYRO", 1: "ACC", 2: "MAG"}
 
 
+LOAD, SAVE, RESET, RESET_CALIBRATION = 0, 1, 2, 3  # PREFLIGHT_STORAGE_PARAMETER_ACTION
+
+
 class CalibrationService(Service):
-    """Starts and cancels calibrations, and takes offsets that a client knows."""
+    """Starts and cancels calibrations, takes offsets that a client knows, and sets parameters back."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
@@ -24,6 +27,7 @@ class CalibrationService(Service):
         return {
             mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
             mavlink.MAV_CMD_PREFLIGHT_SET_SENSOR_OFFSETS: self._set_offsets,
+            mavlink.MAV_CMD_PREFLIGHT_STORAGE: self._store,
         }
 
     def _calibrate(self, command: Command) -> Reply:
@@ -67,4 +71,30 @@ class CalibrationService(Service):
         if not all(map(isfinite, offsets)):
             return denied("needs three offsets")
         vehicle.calibration.set_offsets(sensor, offsets)
+        return ACCEPTED
+
+    def _store(self, command: Command) -> Reply:
+        """Sets parameters back to their defaults; there is nothing to save, each change is kept as it is made.
+
+        Params: p1: 2 sets all parameters back, 3 only those of the calibration; 1 (save) and 0 (load) have nothing left
+        to do where the vehicle has a memory.
+        Refused: TEMPORARILY_REJECTED: armed; UNSUPPORTED: p1 is 0 or 1 and nothing outlives a restart, or p1 is another
+        number; DENIED: p2 is 2, missions are cleared by MISSION_CLEAR_ALL.
+        """
+        vehicle = self._endpoint.vehicle
+        action = whole(command.p1, -1)
+        if vehicle.state.is_armed:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "the vehicle is armed")
+        if command.p2 == RESET:
+            return denied("missions are cleared by MISSION_CLEAR_ALL")
+        if action in (LOAD, SAVE):
+            if vehicle.host.storage is None:
+                return Reply(Verdict.UNSUPPORTED, "nothing outlives a restart of this vehicle")
+            return ACCEPTED
+        if action not in (RESET, RESET_CALIBRATION):
+            return Reply(Verdict.UNSUPPORTED, "parameter 1 must be 0 to 3")
+        params = vehicle.params
+        for name in params.names:
+            if action == RESET or name.startswith(("CAL_", "SENS_BOARD_")):
+                params.set(name, params.declarations[name].default)
         return ACCEPTED

@@ -16,7 +16,7 @@ class SafetyService(Service):
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
-        self._mute_next = False
+        self._is_mute_due = False
 
     def commands(self) -> Mapping[int, CommandHandler]:
         return {
@@ -42,30 +42,36 @@ class SafetyService(Service):
         unit, type or instance; UNSUPPORTED: this unit cannot fail like that here.
         """
         unit, failure, instance = whole(command.p1, -1), whole(command.p2, -1), whole(command.p3, 0)
-        if unit == Unit.MAVLINK_SIGNAL:
-            return self._inject_radio(command, failure)
+        if unit in (Unit.MAVLINK_SIGNAL, Unit.RC_SIGNAL):
+            return self._inject_link(command, Unit(unit), failure)
         return self._endpoint.vehicle.inject_failure(unit, failure, instance)
 
-    def _inject_radio(self, command: Command, failure: int) -> Reply:
-        """Mutes every link, or gives them their voice back; what comes in is still heard, but keeps no link alive."""
+    def _inject_link(self, command: Command, unit: Unit, failure: int) -> Reply:
+        """Cuts the sticks or all links off, or gives them back.
+
+        On a cut link nothing goes out; what comes in is still heard, but keeps no link alive.
+        """
         vehicle = self._endpoint.vehicle
-        request = failure_request(Unit.MAVLINK_SIGNAL, failure)
+        request = failure_request(unit, failure)
         if request is None:
             return denied(f"there is no failure {failure}")
         reply = injection_refusal(vehicle.params, vehicle.state, request[1])
         if reply is not None:
             return reply
         if request[1] not in (Failure.OK, Failure.OFF):
-            return Reply(Verdict.UNSUPPORTED, "the MAVLink signal can be off or on")
+            return Reply(Verdict.UNSUPPORTED, "a signal can be off or on")
+        is_off = request[1] is Failure.OFF
+        if unit is Unit.RC_SIGNAL:
+            vehicle.sticks.is_cut = is_off
+            return ACCEPTED
         for channel in self._endpoint.channels:
-            channel.is_mute = request[1] is Failure.OFF
-        command.sender.channel.is_mute = False  # for the acknowledgement
-        self._mute_next = request[1] is Failure.OFF
+            channel.is_mute = is_off and channel is not command.sender.channel  # that one after the acknowledgement
+        self._is_mute_due = is_off
         return ACCEPTED
 
     def frame(self) -> None:
         """Mutes the link of the client that asked for it, once its acknowledgement is out."""
-        if self._mute_next:
-            self._mute_next = False
+        if self._is_mute_due:
+            self._is_mute_due = False
             for channel in self._endpoint.channels:
                 channel.is_mute = True

@@ -155,7 +155,7 @@ def test_cancelled_calibration_puts_the_vehicle_down_and_keeps_the_old_offsets()
             await start(drone, GYRO)
         await start(drone, (0, 0, 0, 0, 0))
         await start(drone, (0, 0, 0, 0, 0))  # clients send it twice
-        await drone.sleep(0.1)
+        await drone.sleep(2.0)
         return drone.texts
 
     texts = run(flight, script)

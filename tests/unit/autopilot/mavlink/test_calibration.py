@@ -5,7 +5,7 @@ import pytest
 from autopilot.vehicle import CalibrationKind, Verdict
 from tests.unit.autopilot.mavlink.rig import Rig, texts
 
-CALIBRATE, SET_OFFSETS = 241, 242
+CALIBRATE, SET_OFFSETS, STORAGE = 241, 242, 245
 
 
 @pytest.mark.parametrize(
@@ -58,3 +58,30 @@ def test_refused_offsets_change_nothing(is_armed, params, result):
     rig.update(is_armed=is_armed)
     assert rig.ack(SET_OFFSETS, *params).result == result
     assert rig.vehicle.calls == []
+
+
+@pytest.mark.parametrize(("action", "is_all"), [(2.0, True), (3.0, False)])
+def test_parameters_are_set_back(action, is_all):
+    rig = Rig()
+    rig.update(is_armed=False)
+    params = rig.vehicle.params
+    params.set("CAL_GYRO0_XOFF", 0.1)
+    params.set("MPC_XY_CRUISE", 3.0)
+    assert rig.ack(STORAGE, action, -1.0).result == Verdict.ACCEPTED
+    assert params["CAL_GYRO0_XOFF"] == 0.0
+    assert (params["MPC_XY_CRUISE"] != 3.0) == is_all
+
+
+@pytest.mark.parametrize(
+    ("is_armed", "params", "result"),
+    [
+        (True, (2.0,), Verdict.TEMPORARILY_REJECTED),
+        (False, (1.0,), Verdict.UNSUPPORTED),  # nothing outlives a restart here
+        (False, (4.0,), Verdict.UNSUPPORTED),
+        (False, (-1.0, 2.0), Verdict.DENIED),
+    ],
+)
+def test_storage_is_refused(is_armed, params, result):
+    rig = Rig()
+    rig.update(is_armed=is_armed)
+    assert rig.ack(STORAGE, *params).result == result

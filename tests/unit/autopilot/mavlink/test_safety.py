@@ -7,7 +7,7 @@ from tests.unit.autopilot.mavlink.rig import Rig, texts
 
 TERMINATE = 185
 INJECT_FAILURE = 420
-GNSS, MAVLINK_SIGNAL = 4, 105  # FAILURE_UNIT
+GNSS, RC_SIGNAL, MAVLINK_SIGNAL = 4, 104, 105  # FAILURE_UNIT
 OK, OFF, STUCK = 0, 1, 2  # FAILURE_TYPE
 GCS, ONBOARD_CONTROLLER = 6, 18
 FLIGHT_TERMINATION = 8  # MAV_STATE
@@ -67,3 +67,12 @@ def test_lost_radio_is_silent_and_its_heartbeats_keep_no_link_alive():
     assert rig.vehicle.station.heard_us == -1
     assert rig.ack(INJECT_FAILURE, MAVLINK_SIGNAL, OK).result == Verdict.ACCEPTED
     assert rig.frame(100)
+
+
+def test_sticks_are_cut_off_and_given_back():
+    rig = Rig()
+    rig.vehicle.params.set("SYS_FAILURE_EN", 1)
+    assert rig.ack(INJECT_FAILURE, RC_SIGNAL, OFF).result == Verdict.ACCEPTED
+    assert rig.vehicle.sticks.is_cut
+    assert rig.ack(INJECT_FAILURE, RC_SIGNAL, OK).result == Verdict.ACCEPTED
+    assert not rig.vehicle.sticks.is_cut
