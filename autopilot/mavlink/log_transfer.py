@@ -102,6 +102,8 @@ class LogTransferService(Service):
 
     def frame(self) -> None:
         """Sends the next entries and bins."""
+        if not self._lists and not self._transfers:
+            return
         for sender, entries in list(self._lists.items()):
             for _ in range(ENTRIES_PER_FRAME):
                 payload = next(entries, None)

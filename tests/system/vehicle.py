@@ -68,6 +68,11 @@ class IdleVehicle:
             self.stop()
         self._output.close()
 
+    def kill(self):
+        """Ends it as a loss of power would."""
+        self._process.kill()
+        self._process.wait(STOP_TIMEOUT_S)
+
     def stop(self):
         """Ctrl-C; returns the exit code and what was printed."""
         self._process.send_signal(signal.SIGINT)

@@ -3,6 +3,7 @@
 import pytest
 
 from autopilot.host import LogFile
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.log_transfer import BINS_PER_FRAME
 from tests.unit.autopilot.mavlink.rig import Rig, texts
 
@@ -136,3 +137,13 @@ def test_erase_keeps_the_log_being_written_and_says_how_many_went(rig):
     rig.client.send("LOG_ERASE")
     assert texts(rig.frame()) == ["3 logs erased"]
     assert list(rig.vehicle.host.logs.contents) == ["d"]
+
+
+def test_ardupilots_numbers_begin_with_one():
+    rig = Rig(dialect=ARDUPILOT)
+    rig.vehicle.host.logs = Shelf(a=b"first", b=b"second")
+    rig.client.send("LOG_REQUEST_LIST", start=0, end=0xFFFF)
+    entries = rig.all("LOG_ENTRY")
+    assert [(entry.id, entry.last_log_num, entry.size) for entry in entries] == [(1, 2, 5), (2, 2, 6)]
+    request_data(rig.client, 2, 0, 90)
+    assert joined(rig.all("LOG_DATA")) == b"second"
