@@ -31,7 +31,7 @@ from mission.progress import Progress
 from mission.script import fly_plan
 from mission.state import StateError, keep_home, open_state, stored_home
 from mission.stream import LOOPBACK, StreamServer
-from mission.summary import Summary, planned_path, summarise
+from mission.summary import Summary, curved_items, planned_path, summarise
 from sim.world.world import WorldConfig
 
 GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
@@ -356,7 +356,7 @@ def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: 
         console.print("the flight ended before its first frame")
         return 0 if running is None else 1
     path_ned = [] if plan is None else planned_path(plan, flight.config.home)
-    summary = summarise(flight, history, running, path_ned)
+    summary = summarise(flight, history, running, path_ned, curved_items(plan) if plan else frozenset())
     write_whole(folder / "summary.json", (json.dumps(summary.as_json(), indent=2) + "\n").encode())
     title = f"{flight.airframe.name}, wind {flight.config.wind_m_s:g} m/s, seed {flight.config.seed}: {summary.result}"
     plot_flight(history, flight.world, path_ned, title, folder / "flight.png")

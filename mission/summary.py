@@ -4,6 +4,7 @@ Everything here may look at the truth: nothing of it goes back into the flight.
 """
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
@@ -21,7 +22,8 @@ Rows = npt.NDArray[Any]
 LEG_MIN_M = 1.0  # horizontally; a shorter way is a climb or a descent
 CLEARANCE_EVERY_FRAMES = 10
 CMD_RETURN_TO_LAUNCH, CMD_LAND, CMD_TAKEOFF = 20, 21, 22
-PLACES = (16, 17, 19, CMD_LAND, CMD_TAKEOFF)  # mission commands that lead to a place
+PLACES = (16, 17, 18, 19, 31, 82, CMD_LAND, CMD_TAKEOFF)  # mission commands that lead to a place
+NOT_STRAIGHT = (18, 31, 82)  # of these, turns, changes of height, splines: no line to keep to
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +84,9 @@ def estimator_errors(history: History, frames: Rows) -> EstimatorErrors:
     )
 
 
-def cross_track_m(pos_ned: Rows, seq: Rows, path_ned: Sequence[tuple[int, Rows]]) -> Rows:
+def cross_track_m(
+    pos_ned: Rows, seq: Rows, path_ned: Sequence[tuple[int, Rows]], curved: AbstractSet[int] = frozenset()
+) -> Rows:
     """Distance of each position to the legs flown then: the leg to the current item, and the one flown before.
 
     A leg starts at the item that was current before: jumps are followed. Take-off and landing are no legs: NaN there.
@@ -91,6 +95,7 @@ def cross_track_m(pos_ned: Rows, seq: Rows, path_ned: Sequence[tuple[int, Rows]]
         pos_ned: [m], shape (frames, 3).
         seq: current item, shape (frames,).
         path_ned: (seq, point) of each item with a position, beginning with the take-off point.
+        curved: items that are not flown to in a straight line: NaN there.
     """
     distance = np.full(len(pos_ned), np.nan)
     places = dict(path_ned)
@@ -98,6 +103,9 @@ def cross_track_m(pos_ned: Rows, seq: Rows, path_ned: Sequence[tuple[int, Rows]]
     for frames in np.split(np.arange(len(seq)), np.flatnonzero(np.diff(seq)) + 1):
         there = places.get(int(seq[frames[0]])) if len(frames) else None
         if there is None:
+            continue
+        if int(seq[frames[0]]) in curved:
+            here, leg_before = there, None
             continue
         leg = (here, there)
         if np.hypot(*(there - here)[:2]) >= LEG_MIN_M:
@@ -153,6 +161,11 @@ def planned_path(plan: Plan, home: GeoPoint) -> list[tuple[int, Any]]:
     return path
 
 
+def curved_items(plan: Plan) -> frozenset[int]:
+    """Numbers of the items that are not flown to in a straight line."""
+    return frozenset(item.seq for item in plan.items if item.command in NOT_STRAIGHT)
+
+
 def item_ned(item: Any, origin: GeoPoint, previous: Any) -> Any:
     """Where an item leads [m], or None for items that are no place."""
     if item.command == CMD_RETURN_TO_LAUNCH:
@@ -171,7 +184,13 @@ def item_ned(item: Any, origin: GeoPoint, previous: Any) -> Any:
     return np.array([north, east, down])
 
 
-def summarise(flight: Any, history: History, running: Any, path_ned: Sequence[tuple[int, Rows]]) -> Summary:
+def summarise(
+    flight: Any,
+    history: History,
+    running: Any,
+    path_ned: Sequence[tuple[int, Rows]],
+    curved: AbstractSet[int] = frozenset(),
+) -> Summary:
     """Judges a finished flight.
 
     Args:
@@ -179,10 +198,11 @@ def summarise(flight: Any, history: History, running: Any, path_ned: Sequence[tu
         history: its recorder's history.
         running: the script that flew, or None.
         path_ned: the planned path, as `cross_track_m` takes it; empty when there was no plan.
+        curved: the same.
     """
     armed = history.is_armed
     in_mission = armed & (history.mode == Mode.MISSION)
-    cross = cross_track_m(history.pos_ned_true[in_mission], history.mission_seq[in_mission], path_ned)
+    cross = cross_track_m(history.pos_ned_true[in_mission], history.mission_seq[in_mission], path_ned, curved)
     errors = estimator_errors(history, armed)
     result, is_success = _result(flight, running)
     end_true, end_est = history.pos_ned_true[-1], history.pos_ned_est[-1]

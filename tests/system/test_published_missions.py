@@ -17,7 +17,7 @@ from mission.flight import Flight, FlightConfig
 from mission.summary import segment_distance_m
 from sim.world.world import WorldConfig
 
-WAYPOINT, RETURN, LAND, TAKEOFF, JUMP, SPEED = 16, 20, 21, 22, 177, 178
+WAYPOINT, TURNS, RETURN, LAND, TAKEOFF, SPLINE, JUMP, SPEED = 16, 18, 20, 21, 22, 82, 177, 178
 OPEN_GROUND = WorldConfig(trees_per_ha=0.0)
 GROUND_SPEED = 1.0
 
@@ -65,9 +65,9 @@ class Flown:
         return float(np.hypot(self.pos[0] - home[0], self.pos[1] - home[1]))
 
 
-def fly(script, seconds=600.0, **parameters):
+def fly(script, seconds=600.0, wind_m_s=0.0, **parameters):
     """Runs `script(drone, flown)` to its end."""
-    flown = Flown(Flight(FlightConfig(world=OPEN_GROUND, parameters=parameters)))
+    flown = Flown(Flight(FlightConfig(world=OPEN_GROUND, wind_m_s=wind_m_s, parameters=parameters)))
     running = flown.flight.drone.start(script(flown.flight.drone, flown))
     end_us = int(seconds * 1e6)
     flown.flight.run(lambda flight: running.is_done or flight.time_us > end_us, on_frame=flown.frame)
@@ -390,6 +390,53 @@ def test_mission_is_paused_and_gone_on_with_on_its_path():
         assert np.abs(flown.since(begin_s)[:, 2]).max() < 0.5
 
     fly(script)
+
+
+@pytest.mark.parametrize("wind_m_s", [0.0, 6.0])
+def test_spline_goes_smoothly_through_its_waypoints(wind_m_s):
+    """Not published with a tolerance; PX4 keeps missions in a corridor of 5 m, ArduPilot arrives within 2 m."""
+    corners = [(20.0, 0.0), (50.0, 20.0), (50.0, 60.0), (10.0, 60.0), (-20.0, 30.0)]
+
+    async def script(drone, flown):
+        await drone.wait_ready()
+        items = [item(flown, 0, TAKEOFF), item(flown, 1, WAYPOINT, *corners[0])]
+        items += [item(flown, 2 + k, SPLINE, *corner, 10.0 + 2.0 * (k % 2)) for k, corner in enumerate(corners[1:])]
+        await drone.upload(items)
+        await drone.start_mission()
+        await drone.until(lambda: 1 in drone.reached, 60.0, "first waypoint")
+        begin_s = flown.now_s
+        await drone.until(lambda: 4 in drone.reached, 120.0, "last but one")
+        rows = flown.since(begin_s)
+        for k, corner in enumerate(corners[1:4]):
+            assert np.linalg.norm(rows[:, 1:4] - (*corner, -10.0 - 2.0 * (k % 2)), axis=1).min() < 0.7
+        assert flown.speed(begin_s + 2.0).min() > 3.0  # no stop, no corner
+        assert flown.speed(begin_s).max() < 5.7
+        await drone.wait_mission_finished(5, 60.0)
+
+    fly(script, wind_m_s=wind_m_s)
+
+
+@pytest.mark.parametrize("wind_m_s", [0.0, 6.0])
+def test_turns_keep_their_radius(wind_m_s):
+    """Not published with a tolerance; a circle of 15 m at the speed that its bend allows."""
+
+    async def script(drone, flown):
+        await drone.wait_ready()
+        turns = item(flown, 1, TURNS, 30.0, 0.0, params=(2.0, 0.0, -15.0, nan))
+        await drone.upload([item(flown, 0, TAKEOFF), turns, item(flown, 2, LAND, 30.0, 0.0, 0.0)])
+        await drone.start_mission()
+        await drone.until(lambda: flown.pos[0] > 10.0, 60.0, "near the circle")
+        await drone.sleep(8.0)
+        begin_s = flown.now_s
+        await drone.sleep(25.0)
+        rows = flown.since(begin_s)
+        away = np.hypot(rows[:, 1] - 30.0, rows[:, 2])
+        assert np.abs(away - 15.0).max() < 0.6
+        angle = np.unwrap(np.arctan2(rows[:, 2], rows[:, 1] - 30.0))
+        assert angle[-1] < angle[0] - 6.0  # counter-clockwise
+        await drone.wait_disarmed(200.0)
+
+    fly(script, wind_m_s=wind_m_s)
 
 
 def test_velocity_setpoints_are_paused_and_gone_on_with():

@@ -71,6 +71,15 @@ def test_cross_track_is_measured_to_the_present_leg_and_the_one_before():
     assert isnan(distances[3])  # item 1 is no place
 
 
+def test_cross_track_is_not_measured_where_the_way_is_no_straight_line():
+    path = [(-1, np.zeros(3)), (0, np.array([0.0, 0.0, -10.0])), (1, np.array([50.0, 0.0, -10.0]))]
+    path.append((2, np.array([90.0, 0.0, -10.0])))
+    pos = np.array([[0.0, 0.0, -10.0], [25.0, 9.0, -10.0], [70.0, 1.0, -10.0]])
+    distances = cross_track_m(pos, np.array([0, 1, 2]), path, {1})
+    assert isnan(distances[1])
+    assert distances[2] == pytest.approx(1.0)
+
+
 def test_cross_track_follows_a_jump_back():
     path = [(-1, np.zeros(3)), (1, np.array([0.0, 0.0, -10.0])), (2, np.array([50.0, 0.0, -10.0]))]
     path.append((3, np.array([50.0, 50.0, -10.0])))
