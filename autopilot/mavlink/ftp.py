@@ -186,9 +186,11 @@ class FtpService(Service):
 
     def _open(self, sender: Sender, request: Request) -> Answer:
         own = sum(session.owner == sender for session in self._sessions.values())
-        number = next((i for i in range(SESSIONS_MAX) if i not in self._sessions), None)
-        if number is None or own >= SESSIONS_PER_CLIENT:
+        if len(self._sessions) >= SESSIONS_MAX or own >= SESSIONS_PER_CLIENT:
             raise FtpError(Nak.NO_SESSIONS)
+        number = request.session  # the client's own choice, as with ArduPilot: MAVProxy hears no other
+        if number == 0 or number in self._sessions:
+            number = next(i for i in range(SESSIONS_MAX) if i not in self._sessions)
         if request.opcode == Opcode.OPEN_FILE_RO:
             file = self._files.open(request.name)
         else:

@@ -267,6 +267,13 @@ def test_reply_of_somebody_is_not_answered(ftp):
     assert ftp.replies() == []
 
 
+def test_client_may_choose_the_number_of_its_session(rig, ftp, root):
+    (root / "a").write_bytes(b"a")
+    assert ftp.ask(Opcode.OPEN_FILE_RO, "a", session=221).session == 221
+    assert ftp.ask(Opcode.OPEN_FILE_RO, "a", session=221).session == 0  # taken
+    assert ftp.ask(Opcode.READ_FILE, session=221, size=1).data == b"a"
+
+
 def test_sessions_of_a_client_are_limited_and_reset_closes_its_own_only(rig, ftp, root):
     (root / "a").write_text("a")
     other = FtpClient(rig, rig.second_client)
