@@ -8,10 +8,10 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly test test-all fuzz check tune bench format lock clean
+.PHONY: help setup fly test test-all test-mavproxy fuzz check tune bench format lock clean
 
 help: ## List the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
 
 setup: $(STAMP) ## Make the virtual environment in .venv (the other targets do so by themselves)
 
@@ -34,6 +34,17 @@ test-all: $(STAMP) ## Run every test, the slow ones too
 
 fuzz: $(STAMP) ## Send a hovering vehicle 1,000,000 broken frames and 100,000 valid messages; flags: ARGS="--seed 7"
 	@$(BIN)/python -m tests.fuzz $(ARGS)
+
+MAVPROXY := .venv-mavproxy
+
+$(MAVPROXY)/.installed: tests/mavproxy/requirements.txt
+	@test -x $(MAVPROXY)/bin/python || "$(PYTHON)" -m venv $(MAVPROXY)
+	$(MAVPROXY)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
+		MAVProxy==1.8.75 -r tests/mavproxy/requirements.txt
+	@touch $@
+
+test-mavproxy: $(STAMP) $(MAVPROXY)/.installed ## Fly with MAVProxy, in an environment of its own (.venv-mavproxy)
+	$(MAVPROXY)/bin/python -m pytest -q -p no:cacheprovider tests/mavproxy $(ARGS)
 
 check: $(STAMP) ## Check format, lint, types and layers, as CI does before the tests
 	$(BIN)/ruff format --check .
@@ -58,5 +69,5 @@ lock: $(STAMP) ## Pin the installed versions in constraints.txt
 	@touch $(STAMP)
 
 clean: ## Remove the virtual environment, caches and build leftovers
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(MAVPROXY) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find $(PACKAGES) tests bench -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,93 @@
+"""MAVProxy 1.8.75 with a vehicle in ArduPilot's dialect: `make test-mavproxy`. The tests follow one another."""
+
+import pytest
+
+from common.clock import wall_time_s
+from tests.mavproxy.console import Console
+
+PLAN = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t47.397742\t8.545594\t488\t1
+1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t10\t1
+2\t0\t3\t16\t0\t0\t0\t0\t47.397942\t8.545594\t12\t1
+3\t0\t3\t16\t0\t0\t0\t0\t47.397942\t8.545794\t12\t1
+4\t0\t3\t20\t0\t0\t0\t0\t0\t0\t0\t1
+"""
+FENCE = """QGC WPL 110
+0\t0\t3\t5001\t4\t0\t0\t0\t47.3960\t8.5440\t0\t1
+1\t0\t3\t5001\t4\t0\t0\t0\t47.3990\t8.5440\t0\t1
+2\t0\t3\t5001\t4\t0\t0\t0\t47.3990\t8.5480\t0\t1
+3\t0\t3\t5001\t4\t0\t0\t0\t47.3960\t8.5480\t0\t1
+"""
+RALLY = """QGC WPL 110
+0\t0\t3\t5100\t0\t0\t0\t0\t47.3975\t8.5455\t20\t1
+"""
+
+
+@pytest.fixture(scope="module")
+def console(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("mavproxy")
+    for name, text in (("plan.txt", PLAN), ("fence.txt", FENCE), ("rally.txt", RALLY)):
+        (folder / name).write_text(text)
+    with Console(folder) as console:
+        yield console
+
+
+def test_connects_and_has_every_parameter_by_file_within_5_s(console):
+    console.expect("Detected vehicle 1:1")
+    heard_s = wall_time_s()
+    match = console.expect(r"Received (\d+) parameters( \(ftp\))?")
+    assert int(match[1]) > 300
+    assert match[2]
+    assert wall_time_s() - heard_s < 5.0
+
+
+def test_parameter_is_set_and_shown(console):
+    console.do("param set RTL_ALT 2500", "LOITER> ")
+    console.do("param show RTL_ALT", r"RTL_ALT +2500")
+    console.do("param show RTL_RETURN_ALT", r"RTL_RETURN_ALT +25\.0")
+
+
+@pytest.mark.parametrize(
+    ("module", "file", "kind", "listed"),
+    [
+        ("wp", "plan.txt", "MISSION", r"16 3 47\.397942.*\r\n20 3 "),
+        ("fence", "fence.txt", "FENCE", r"5001 3 47\.396\d+ 8\.544"),
+        ("rally", "rally.txt", "RALLY", r"5100 3 47\.3975"),
+    ],
+)
+def test_list_is_loaded_and_listed(console, module, file, kind, listed):
+    console.do(f"{module} load {file}", f"Got MISSION_ACK: TYPE_{kind}: ACCEPTED")
+    console.do(f"{module} list", listed)
+    console.expect("Saved")
+
+
+def test_modes_are_changed_by_name(console):
+    for name in ("STABILIZE", "ALT_HOLD", "POSHOLD"):  # need a pilot: the vehicle says so
+        console.do(f"mode {name}", r"DO_SET_MODE: (ACCEPTED|TEMPORARILY_REJECTED)")
+    console.do("mode LOITER", r"DO_SET_MODE: ACCEPTED")
+    console.do("mode GUIDED", "GUIDED> ")
+
+
+def test_guided_flight(console):
+    console.child.sendline("set altreadout 2")
+    console.do("arm throttle", "ARMED")
+    console.do("takeoff 8", "NAV_TAKEOFF: ACCEPTED")
+    console.expect("height [678]")
+    console.do("guided 47.397842 8.545694 12", "DO_REPOSITION: ACCEPTED")
+    console.do("setspeed 3", "DO_CHANGE_SPEED: ACCEPTED")
+    console.expect("height 1[012]")
+    console.do("mode BRAKE", "BRAKE> ")
+    console.do("mode LOITER", "LOITER> ")
+
+
+def test_mission_is_flown_and_the_vehicle_returns_and_disarms(console):
+    console.do("wp set 1", r"MISSION_CURRENT|ACCEPTED|waypoint 1|LOITER> ")
+    console.do("auto", "AUTO> ")
+    console.expect("waypoint 3", 60.0)
+    console.do("rtl", "RTL> ")
+    console.expect("AP: Landed", 120.0)
+    console.expect("DISARMED", 30.0)
+
+
+def test_unknown_command_number_is_refused_by_name(console):
+    console.do("long DO_PARACHUTE 2", "DO_PARACHUTE: (UNSUPPORTED|DENIED|FAILED)")
