@@ -257,8 +257,9 @@ def _links(options: FlightOptions, speed: float) -> list[LinkSource]:
     except LinkError as error:
         for link in links:
             link.close()
-        is_taken = " is in use " in str(error)
-        hint = "; another flight may be running: choose --gcs-port, --api-port or --tcp-port" if is_taken else ""
+        options_of = {"UDP": "--gcs-port or --api-port", "TCP": "--tcp-port"}
+        name = next((name for name in options_of if f"{name} port" in str(error) and " is in use " in str(error)), "")
+        hint = f"; another flight may be running: choose {options_of[name]}" if name else ""
         raise UserError(f"{str(error).rstrip('.')}{hint}") from error
     return links
 

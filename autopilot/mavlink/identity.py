@@ -4,6 +4,7 @@ The dialect's autopilot is what we are compatible with, not what we are: the pro
 custom version and in the hardware id.
 """
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -30,8 +31,12 @@ CAPABILITIES = (
 _AUTOPILOT_VERSION = known_type("AUTOPILOT_VERSION")
 
 
+@cache
 def project_version() -> str:
-    """The version of the installed distribution, 0.0.0 in a checkout that is not installed."""
+    """The version of the installed distribution, 0.0.0 in a checkout that is not installed.
+
+    It is read once: looking it up takes a hundred times as long as answering a request for it.
+    """
     try:
         return version("honeyguide")
     except PackageNotFoundError:
