@@ -11,7 +11,8 @@ from autopilot.payload import Params, Payloads
 from autopilot.vehicle import ACCEPTED, LandedState, Mode, Reply, Severity, Verdict
 
 _NOT_FLYING = Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
-_FREE: Params = (nan, nan, nan, nan)
+_AT_PLACE: Params = (3.0, 0.0, 0.0, 0.0)  # MAV_ROI_LOCATION in parameter 1, for the command's older form
+_NOWHERE: Params = (0.0, 0.0, 0.0, 0.0)
 _PAUSABLE = (Mode.MISSION, Mode.OFFBOARD, Mode.GUIDED)
 
 
@@ -49,7 +50,7 @@ class Guidance:
 
     def _aim(self, command: int, lat_deg: float, lon_deg: float, alt_m: float) -> Reply:
         if self._payload.takes(command):
-            return self._payload.run(command, _FREE, lat_deg, lon_deg, alt_m)
+            return self._payload.run(command, _AT_PLACE if isfinite(lat_deg) else _NOWHERE, lat_deg, lon_deg, alt_m)
         return ACCEPTED
 
     # ---- the way ----

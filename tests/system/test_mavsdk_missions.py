@@ -1,7 +1,7 @@
 """MAVSDK's Mission and MissionRaw plugins against a flight, in this process: what they send is flown, or refused."""
 
 import json
-from math import nan
+from math import degrees, nan
 from time import monotonic, sleep
 
 import pytest
@@ -10,7 +10,7 @@ from mavsdk.plugins.mission import Mission, MissionError, MissionItem, MissionPl
 from mavsdk.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.plugins.mission_raw import MissionRaw, MissionRawError, MissionRawResult
 
-from autopilot.vehicle import ACCEPTED, Mode
+from autopilot.vehicle import Mode
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from sim.world.world import WorldConfig
@@ -19,21 +19,6 @@ from tests.system.raw_mavsdk import RawMavsdk
 FRAMES = 4  # at once: 40 times real time
 PATIENCE_S = 30.0  # wall clock
 Camera, Vehicle = MissionItem.CameraAction, MissionItem.VehicleAction
-GIMBAL_AIM, GIMBAL_OWNER, PHOTO, PHOTO_STOP, VIDEO, PHOTO_BY_DISTANCE = 1000, 1001, 2000, 2001, 2500, 206
-
-
-class Payload:
-    """Takes camera and gimbal commands."""
-
-    def __init__(self):
-        self.done = []
-
-    def takes(self, command):
-        return command in (GIMBAL_AIM, GIMBAL_OWNER, PHOTO, PHOTO_STOP, VIDEO, 2501, PHOTO_BY_DISTANCE)
-
-    def run(self, command, params, x, y, z):
-        self.done.append((command, params, x, y, z))
-        return ACCEPTED
 
 
 class Session:
@@ -86,8 +71,8 @@ def raw(seq, command, north=nan, east=nan, params=(0.0, 0.0, 0.0, nan), frame=6,
 
 
 def test_mission_with_every_action_is_flown_to_its_return(session):
-    payload = Payload()
-    session.flight.controller.payload.add(payload)
+    shots = []
+    session.flight.controller.camera.on_shot(lambda shot, *_: shots.append(shot))
     mission = Mission(session.system)
     reports = []
     mission.subscribe_mission_progress(lambda progress, _: reports.append((progress.current, progress.total)))
@@ -107,17 +92,8 @@ def test_mission_with_every_action_is_flown_to_its_return(session):
     session.until(lambda: not session.state.is_armed, "landed at home")
     assert {current for current, _ in reports} == {0, 1, 2, 3, 4}
     assert {total for _, total in reports} == {4}
-    commands = [entry[0] for entry in payload.done]
-    assert [c for c in commands if c not in (GIMBAL_OWNER,)] == [GIMBAL_AIM, PHOTO, VIDEO, PHOTO_BY_DISTANCE]
-
-
-@pytest.mark.parametrize(
-    "kinds", [{"camera_action": Camera.TAKE_PHOTO}, {"gimbal_pitch_deg": -30.0, "gimbal_yaw_deg": 0.0}]
-)
-def test_item_for_a_payload_that_is_not_there_is_refused(session, kinds):
-    with pytest.raises(MissionError) as refused:
-        Mission(session.system).upload_mission(MissionPlan([waypoint(10.0, 0.0, **kinds)]))
-    assert refused.value.result == MissionResult.UNSUPPORTED
+    assert degrees(session.state.gimbal.gimbal.aim.pitch) == pytest.approx(-30.0, abs=1.0)
+    assert len(shots) >= 3  # one at its place, the others by distance
 
 
 def test_transition_of_a_vehicle_that_has_no_wings_is_refused(session):
@@ -153,7 +129,11 @@ def test_raw_mission_is_flown_from_the_item_chosen(session):
 def test_raw_item_that_is_not_flown_is_refused_and_the_old_mission_stays(session):
     mission = MissionRaw(session.system)
     mission.upload_mission([raw(0, 16, 10.0, 0.0)])
-    for bad in (raw(0, 84, 10.0, 0.0), raw(0, 176, params=(1.0, 4.0, 3.0, 0.0), frame=2)):
+    for bad in (
+        raw(0, 84, 10.0, 0.0),
+        raw(0, 208, params=(1.0, 0, 0, 0), frame=2),
+        raw(0, 176, params=(1.0, 4.0, 3.0, 0.0), frame=2),
+    ):
         with pytest.raises(MissionRawError) as refused:
             mission.upload_mission([bad])
         assert refused.value.result == MissionRawResult.UNSUPPORTED

@@ -4,7 +4,7 @@ from math import atan2, degrees, nan
 
 import pytest
 
-from autopilot.vehicle import Mode, Verdict
+from autopilot.vehicle import Mode, Reply, Verdict
 from tests.unit.autopilot.kinematic import Kinematic, do, geo, heading_error, item, position_setpoint
 
 WAYPOINT, LAND, RETURN_PATH, LAND_START = 16, 21, 188, 189
@@ -23,6 +23,26 @@ def test_region_of_interest_is_faced_while_holding_and_after_going_elsewhere():
     rig.fc.reposition(*geo(0.0, 0.0)[:2], nan, nan, nan)
     rig.run(10.0)
     assert heading_error(rig.yaw, atan2(0.0, -1.0)) < 0.05
+
+
+@pytest.mark.parametrize("command", [195, 201])
+def test_region_of_interest_is_handed_to_a_gimbal(command):
+    seen = []
+
+    class Gimbal:
+        def takes(self, number):
+            return number in (command, 197)
+
+        def run(self, number, params, x, y, z):
+            seen.append((number, params[0], x, y, z))
+            return Reply(Verdict.DENIED, "somebody else points it")
+
+    rig = Kinematic().flying()
+    rig.fc.payload.add(Gimbal())
+    reply = rig.fc.guidance.look_at(command, 47.0, 8.0, 500.0)
+    assert reply.reason == "somebody else points it"
+    assert rig.fc.guidance.look_ahead(196, 0.0).verdict is Verdict.ACCEPTED
+    assert seen == [(command, 3.0, 47.0, 8.0, 500.0)]
 
 
 def test_turn_is_refused_on_the_ground_and_ends_with_the_next_place():
