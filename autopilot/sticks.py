@@ -140,16 +140,18 @@ class Sticks:
             now_us: time.
             pulses_us: of each channel [us]; 0 releases one, None leaves it as it is.
         """
+        now = self.input
+        was_heard_us = now.heard_until_us
         refusal = self._take_control(Source.RADIO, sender, now_us, self._override_us)
         if refusal is not None:
             return refusal
-        now = self.input
         channels = now.channels
         for i, pulse_us in enumerate(pulses_us[:CHANNELS]):
             if pulse_us is not None:
                 channels[i] = pulse_us if _PULSES_US[0] <= pulse_us <= _PULSES_US[1] else _RELEASED
-        if not any(channels):  # all released: nobody flies any more
-            now.heard_until_us = now_us - 1
+        if not any(stick and channels[stick - 1] for stick in self._map):  # switches at most: nobody flies, or no more
+            now.heard_until_us = min(was_heard_us, now_us - 1)
+            now.count += 1
             return ""
         now.buttons = 0
         roll, pitch, yaw, throttle = (self._deflection(stick) for stick in self._map)

@@ -8,16 +8,19 @@ from math import degrees, hypot
 import numpy as np
 import pytest
 
+from autopilot.mavlink.links import LinkRole, memory_pair
 from autopilot.vehicle import Mode
-from mission.client import CommandRefused
+from mission.client import Client, CommandRefused
 from mission.flight import Flight, FlightConfig
 from sim.faults import set_fault
+from sim.world.world import WorldConfig
 
 MAIN_MODES = {
     Mode.MANUAL: 1, Mode.ALTITUDE: 2, Mode.POSITION: 3, Mode.ACRO: 5, Mode.OFFBOARD: 6, Mode.STABILIZED: 7,
 }  # fmt: skip
-CMD_SET_MODE = 176
+CMD_SET_MODE, CMD_ARM = 176, 400
 RATE_HZ = 50.0
+PLAIN = WorldConfig(trees_per_ha=0.0, hill_height_m=0.0)
 FORWARD, RIGHT = 1000, 1000
 MIDDLE, UP, DOWN = 500, 1000, 0  # of the throttle
 
@@ -58,7 +61,7 @@ class Pilot:
 
 def fly(script, config=None, seconds=300.0, before=None):
     """Flies `script(pilot)` to its end."""
-    flight = Flight(config or FlightConfig(seed=1))
+    flight = Flight(config or FlightConfig(seed=1, world=PLAIN))
     if before is not None:
         before(flight)
     running = flight.fly(lambda _: script(Pilot(flight)), seconds=seconds)
@@ -209,7 +212,7 @@ def test_height_is_held_with_full_roll_and_pitch(mode):
             pilot.move(**axes)
             heights.extend(await watched(pilot, 5.0, height))
 
-    fly(script, FlightConfig(noise=0.0))
+    fly(script, FlightConfig(noise=0.0, world=PLAIN))
     assert min(heights) > 9.0
     assert max(heights) < 11.0
 
@@ -312,7 +315,7 @@ def test_a_failure_of_the_radio_can_be_injected_and_repaired():
         with pytest.raises(CommandRefused, match="cannot be made stuck"):
             await pilot.drone.command(CMD_INJECT_FAILURE, RC_SIGNAL, STUCK, name="stick")
 
-    fly(script, FlightConfig(parameters={"SYS_FAILURE_EN": 1}))
+    fly(script, FlightConfig(world=PLAIN, parameters={"SYS_FAILURE_EN": 1}))
 
 
 def test_moving_a_stick_takes_over_from_a_return():
@@ -337,3 +340,91 @@ def test_a_stick_mode_needs_sticks():
             await pilot.mode(Mode.POSITION)
 
     fly(script)
+
+
+class Radio:
+    """A ground station that speaks ArduPilot's dialect and overrides radio channels, as MAVProxy does."""
+
+    def __init__(self):
+        self.vehicle_end, client_end = memory_pair(LinkRole.GROUND)
+        self.client = Client(client_end)
+        self.flight = Flight(FlightConfig(seed=1, dialect="ardupilot", world=PLAIN), links=[self.vehicle_end])
+        self.pulses = {}
+
+    def fly(self, script, seconds=300.0):
+        running = self.client.start(script(self))
+        self.client.start(self._send())
+        end_us = self.flight.time_us + int(seconds * 1e6)
+        self.flight.run(
+            lambda flight: running.is_done or flight.time_us > end_us,
+            on_frame=lambda flight: self.client.frame(flight.time_us),
+        )
+        assert running.is_done, "the script did not end"
+        if running.error is not None:
+            raise running.error
+
+    async def _send(self):
+        while True:
+            if self.pulses:
+                channels = {f"chan{i}_raw": self.pulses.get(i, 65535) for i in range(1, 9)}
+                self.client.send("RC_CHANNELS_OVERRIDE", target_system=1, target_component=1, **channels)
+            await self.client.sleep(0.1)
+
+    async def override(self, seconds, roll=1500, pitch=1500, throttle=1500, yaw=1500):
+        self.pulses = {1: roll, 2: pitch, 3: throttle, 4: yaw}
+        await self.client.sleep(seconds)
+
+    async def mode(self, number):
+        await self.client.command(CMD_SET_MODE, 1.0, number, name="mode")
+
+    @property
+    def mode_number(self):
+        return self.client.latest("HEARTBEAT").custom_mode
+
+
+def test_overridden_channels_fly_ardupilots_modes_and_lost_ones_bring_it_home():
+    """Alt Hold to take off, Loiter for a 50 m dash and 10 s within 5 m, Brake with the stick held, then radio loss."""
+    alt_hold, loiter, rtl, brake = 2, 5, 6, 17
+    seen = {}
+
+    async def script(radio):
+        flight, client = radio.flight, radio.client
+        await client.until(lambda: flight.controller.state.is_ready_to_arm, 60.0, "ready")
+        await radio.override(0.5, throttle=1000)
+        await radio.mode(alt_hold)
+        await client.command(CMD_ARM, 1.0, name="arm")
+        await radio.override(6.0, throttle=1900)
+        await radio.override(2.0)
+        seen["climbed"] = height(flight)
+        await radio.mode(loiter)
+        start = place(flight)
+        radio.pulses = {1: 1500, 2: 1000, 3: 1500, 4: 1500}  # forward is a short pulse
+        await client.until(lambda: np.hypot(*(place(flight) - start)[:2]) > 50.0, 20.0, "dash")
+        await radio.override(5.0)
+        stopped_at = place(flight)
+        await radio.override(10.0)
+        seen["drift"] = np.abs(place(flight) - stopped_at).max()
+        await radio.override(5.0, pitch=1000)
+        seen["fast"] = speed(flight)
+        await radio.mode(brake)
+        await client.sleep(5.0)
+        seen["slow"] = speed(flight)
+        await radio.mode(loiter)
+        await radio.override(1.0)
+        radio.pulses = {}
+        await client.sleep(2.5)
+        seen["held"] = radio.mode_number
+        await client.sleep(1.5)
+        seen["lost"] = radio.mode_number
+        await radio.override(2.0)
+        seen["back"] = radio.mode_number
+        await client.until(lambda: not flight.controller.state.is_armed, 180.0, "disarmed")
+
+    radio = Radio()
+    radio.fly(script)
+    assert seen["climbed"] > 8.0
+    assert seen["drift"] < 1.0
+    assert seen["fast"] > 5.0
+    assert seen["slow"] < 1.0
+    assert (seen["held"], seen["lost"], seen["back"]) == (loiter, rtl, rtl)
+    assert np.hypot(*place(radio.flight)[:2]) < 3.0

@@ -120,6 +120,14 @@ def test_channels_that_are_left_out_stay_and_released_ones_rest_in_the_middle():
     assert (sticks.input.roll, sticks.input.pitch, sticks.input.throttle) == (1.0, 0.0, -1.0)
 
 
+def test_a_switch_alone_is_no_pilot():
+    sticks = sticks_with(COM_RC_IN_MODE=0)
+    override(sticks, LEAVE, LEAVE, LEAVE, LEAVE, LEAVE, LEAVE, 1800)
+    assert not sticks.is_heard(START_US)
+    assert not sticks.is_lost(START_US + 10_000_000)
+    assert sticks.switch_position(7, 3) == 3
+
+
 def test_releasing_every_channel_leaves_no_pilot():
     sticks = sticks_with(COM_RC_IN_MODE=0)
     override(sticks, 1500, 1500)
