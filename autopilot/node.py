@@ -28,6 +28,7 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.navigator import Navigator
 from autopilot.navigator.setpoint import SetpointPort
+from autopilot.obstacles import Obstacles
 from autopilot.outputs import AuxOutputs
 from autopilot.payload import Payloads
 from autopilot.sticks import Sticks
@@ -139,6 +140,8 @@ class FlightController:
         self.camera = self._mount_camera()
         self.payload.add(AuxOutputs(self.state))
         self.traffic = Traffic(self.state, params)
+        self.obstacles = Obstacles(params)
+        self.state.obstacles = self.obstacles
         self._read_estimate = ports.read_estimate
         self._read_samples = ports.read_samples
         self._read_actuators = ports.read_actuators

@@ -11,6 +11,7 @@ from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
+from autopilot.obstacles import OBSTACLE_PARAMETERS
 from autopilot.stick_params import STICK_PARAMETERS
 from autopilot.traffic import TRAFFIC_PARAMETERS
 from common.airframe import Airframe
@@ -65,6 +66,7 @@ def all_parameters() -> list[Parameter]:
         *NAVIGATOR_PARAMETERS,
         *STICK_PARAMETERS,
         *TRAFFIC_PARAMETERS,
+        *OBSTACLE_PARAMETERS,
     ]
 
 

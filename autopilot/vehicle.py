@@ -292,6 +292,7 @@ class VehicleState:
     nearest_aircraft: Any = None  # autopilot.traffic.Aircraft
     read_truth: Callable[[], Any] | None = None  # the simulator's body state, for telemetry alone
     read_winch: Callable[[], WinchStatus] | None = None  # asked when it is sent
+    obstacles: Any = None  # autopilot.obstacles.Obstacles
     relays: int = 0  # a bit for each that is on
     orbit: OrbitStatus | None = None  # while one is flown
     gimbal: "GimbalControl | None" = None  # None: the vehicle carries none
@@ -395,6 +396,12 @@ class PayloadPort(Protocol):
     def run(self, command: int, params: tuple[float, float, float, float], x: float, y: float, z: float) -> Reply: ...
 
 
+class ObstaclePort(Protocol):
+    """What is round the vehicle (autopilot.obstacles)."""
+
+    def reported(self, time_us: int, distances_m: Sequence[float], first_rad: float, increment_rad: float) -> None: ...
+
+
 class TrafficPort(Protocol):
     """Other aircraft (autopilot.traffic)."""
 
@@ -434,6 +441,9 @@ class Vehicle(Protocol):
 
     @property
     def traffic(self) -> TrafficPort: ...
+
+    @property
+    def obstacles(self) -> ObstaclePort: ...
 
     @property
     def guided(self) -> GuidedPort: ...

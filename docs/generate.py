@@ -10,6 +10,7 @@ from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.mavlink.dialects.ardupilot_params import ALIASES, CONSTANTS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
+from autopilot.obstacles import OBSTACLE_PARAMETERS
 from autopilot.params import SYSTEM_PARAMETERS, parameter_table
 from autopilot.stick_params import STICK_PARAMETERS
 from autopilot.traffic import TRAFFIC_PARAMETERS
@@ -27,6 +28,7 @@ SECTIONS = {
     "Take-off, missions, return, landing": NAVIGATOR_PARAMETERS,
     "The pilot's sticks": STICK_PARAMETERS,
     "Other aircraft": TRAFFIC_PARAMETERS,
+    "Obstacles": OBSTACLE_PARAMETERS,
     "System, and what ground stations ask for": SYSTEM_PARAMETERS,
 }
 HEADER = """# Parameters

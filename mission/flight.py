@@ -43,6 +43,7 @@ from mission.surroundings import Surroundings
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.esc import esc_reader
+from sim.sensors.ring import RingSensor
 from sim.sensors.sensors import sensor_model
 from sim.turntable import Turntable
 from sim.wind import wind_model
@@ -74,6 +75,8 @@ class FlightConfig(BaseModel):
     """Which autopilot's numbers ground stations get. The flight's own script always gets PX4's."""
     traffic_count: int = Field(default=0, ge=0, le=50)
     """Other aircraft that an ADS-B receiver on board hears."""
+    has_lidar: bool = False
+    """A ring of range finders that looks round the vehicle."""
     parameters: dict[str, float] = {}
     """Values of the flight controller's parameters that differ from their defaults, by name."""
     world: WorldConfig = WorldConfig()
@@ -137,7 +140,10 @@ class Flight:
             turntable=Turntable(self.rig.arrays.body.numpy()),
             on_corrections=lambda _: self._surroundings.receiver.correct(self.time_us),
         )
-        self._surroundings = Surroundings(self.controller, self.rig, config.traffic_count, config.home, config.seed)
+        ring = RingSensor(self.rig, self.world, config.noise, config.seed) if config.has_lidar else None
+        self._surroundings = Surroundings(
+            self.controller, self.rig, config.traffic_count, ring, config.home, config.seed
+        )
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
         on_frame = None if self._tlog is None else self._tlog.frame

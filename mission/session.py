@@ -76,6 +76,7 @@ class FlightOptions:
     parameters: tuple[str, ...] = ()  # NAME=VALUE
     state: Path | None = None
     traffic_count: int = 0
+    has_lidar: bool = False
 
 
 def fly_session(options: FlightOptions) -> int:
@@ -172,6 +173,7 @@ def _config(options: FlightOptions, state: StateFolder | None) -> FlightConfig:
             noise=options.noise,
             dialect=options.dialect,
             traffic_count=options.traffic_count,
+            has_lidar=options.has_lidar,
             parameters=dict(_parameter(text) for text in options.parameters),
             world=WorldConfig(
                 seed=options.world_seed,

@@ -32,6 +32,7 @@ from autopilot.mavlink.manual import ManualService
 from autopilot.mavlink.mission_commands import MissionCommands
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.modes import ModeService
+from autopilot.mavlink.obstacles import ObstacleService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.origin import OriginService
 from autopilot.mavlink.parameters import ParameterService
@@ -133,6 +134,7 @@ class MavlinkServer:
             SigningService(endpoint),
             DeviceService(endpoint),
             TrafficService(endpoint),
+            ObstacleService(endpoint),
         ]
 
     def _make_components(self) -> list[Component]:

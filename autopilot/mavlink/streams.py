@@ -60,6 +60,7 @@ STREAMS: tuple[Stream, ...] = (
     Stream("SCALED_IMU", sensors.scaled_imu, 0, 0),
     Stream("RAW_IMU", sensors.raw_imu, 0, 0),
     Stream("HIL_STATE_QUATERNION", sensors.hil_state_quaternion, 0, 0),
+    Stream("OBSTACLE_DISTANCE", sensors.obstacle_distance, 5, 5),
     Stream("ADSB_VEHICLE", adsb_vehicle, 0, 0),
     Stream("SCALED_PRESSURE", sensors.scaled_pressure, 1, 1),
     Stream("DISTANCE_SENSOR", sensors.distance_sensor, 4, 10),

@@ -143,6 +143,9 @@ class Position:
             context.wants_lift = context.state.sticks.throttle > _TAKEOFF_THROTTLE
             return
         north, east = velocity_of(context)
+        obstacles = context.state.obstacles
+        if obstacles is not None and obstacles.is_limiting:
+            north, east = obstacles.limited(north, east, context.state.time_us)
         context.setpoint.move((north, east, speed_down_of(context)), yaw_rate_of(context))
 
 

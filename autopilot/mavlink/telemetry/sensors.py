@@ -34,6 +34,7 @@ _scaled_pressure = known_type("SCALED_PRESSURE").pack
 _distance_sensor = known_type("DISTANCE_SENSOR").pack
 _servo_output_raw = known_type("SERVO_OUTPUT_RAW").pack
 _actuator_output_status = known_type("ACTUATOR_OUTPUT_STATUS").pack
+_obstacle_distance = known_type("OBSTACLE_DISTANCE").pack
 _raw_imu = known_type("RAW_IMU").pack
 _hil_state_quaternion = known_type("HIL_STATE_QUATERNION").pack
 _vibration = known_type("VIBRATION").pack
@@ -45,6 +46,8 @@ FIX_3D = 3  # GPS_FIX_TYPE
 LOOKS_DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
 LASER = 0  # MAV_DISTANCE_SENSOR
 COVARIANCE_UNKNOWN = 255
+RING_LEAST_CM, RING_REACH_CM = 30, 3000  # of the driver of the ring sensor
+BODY_FRD = 12  # MAV_FRAME
 NO_RETURN_CM = UINT16_MAX
 
 # Bits of HIGHRES_IMU_UPDATED_FLAGS
@@ -126,6 +129,25 @@ def scaled_imu(state: VehicleState) -> bytes:
         *(i16(value * milli_g) for value in samples.imu.accel_frd),
         *(i16(value * 1000.0) for value in samples.imu.gyro_frd),
         *(i16(value * 1000.0) for value in samples.mag.field_frd_gauss),
+    )
+
+
+def obstacle_distance(state: VehicleState) -> bytes | None:
+    """Distances all round by the ring sensor on board, where there is one; clockwise from the nose."""
+    obstacles = state.obstacles
+    if obstacles is None or not obstacles.body_m:
+        return None
+    reach_cm = RING_REACH_CM + 1  # nothing within reach
+    return _obstacle_distance(
+        obstacles.sensed_us,
+        LASER,
+        tuple(min(u16(distance * 100.0, reach_cm), reach_cm) for distance in obstacles.body_m),
+        round(360.0 / len(obstacles.body_m)),
+        RING_LEAST_CM,
+        RING_REACH_CM,
+        360.0 / len(obstacles.body_m),
+        0.0,
+        BODY_FRD,
     )
 
 

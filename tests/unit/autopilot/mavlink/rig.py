@@ -21,6 +21,7 @@ from autopilot.mavlink.server import MavlinkServer
 from autopilot.navigator.fence_items import MAX_FENCE_ITEMS
 from autopilot.navigator.items import MAX_ITEMS
 from autopilot.navigator.rally import MAX_RALLY_POINTS
+from autopilot.obstacles import Obstacles
 from autopilot.outputs import AuxOutputs
 from autopilot.params import parameter_table
 from autopilot.payload import Payloads
@@ -257,6 +258,9 @@ class RecordingVehicle:
         self.payload = Payloads()
         self.payload.add(AuxOutputs(self.state))
         self.traffic = Traffic(self.state, self.params)
+        self.obstacles = Obstacles(self.params)
+        self.obstacles.sensed(self.state.time_us, [5.0] * 71 + [float("inf")], 0.0)
+        self.state.obstacles = self.obstacles
         self.state.read_truth = record_of_body
         self.state.nearest_aircraft = Aircraft(1, "HB-ABC", 47.0, 8.0, 900.0, 1.0, 60.0, 0.0)
 

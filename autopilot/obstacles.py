@@ -1,0 +1,106 @@
+"""What is round the vehicle, by a ring of range finders, and how fast it may go towards it (collision prevention).
+
+In: distances by bearing, from a sensor on board or from a client (OBSTACLE_DISTANCE). Out: a pilot's velocity, limited
+in mode Position so that the vehicle can stop before CP_DIST. PX4's collision prevention, without its guidance of the
+direction.
+"""
+
+from collections.abc import Sequence
+from math import cos, inf, isfinite, nan, pi, sin, sqrt
+
+from common.params import Parameter, ParameterTable
+
+BINS = 72
+FRESH_US = 500_000  # older distances say nothing (PX4: RANGE_STREAM_TIMEOUT)
+_BIN_RAD = 2.0 * pi / BINS
+_PX4 = "PX4 1.15 default"
+
+OBSTACLE_PARAMETERS: list[Parameter] = [
+    Parameter("CP_DIST", -1.0, -1.0, 15.0, "m", "distance kept to obstacles in mode Position, negative: no limit",
+              _PX4),
+    Parameter("CP_DELAY", 0.4, 0.0, 1.0, "s", "delay of sensor and vehicle that the limit allows for", _PX4),
+    Parameter("CP_GO_NO_DATA", 0, 0, 1, "", "move where no distance is known: 0 no, 1 yes", _PX4),
+]  # fmt: skip
+
+
+class Obstacles:
+    """Distances by bearing, in ned: bin i is centred at i · 5 degrees, clockwise from north.
+
+    Args:
+        params: CP_*, MPC_ACC_HOR.
+    """
+
+    __slots__ = ("_accel", "_delay_s", "_distance_m", "_params", "_seen_us", "body_m", "keep_m", "sensed_us")
+
+    def __init__(self, params: ParameterTable) -> None:
+        self._params = params
+        self._distance_m = [nan] * BINS
+        self._seen_us = [-FRESH_US - 1] * BINS
+        self.body_m: Sequence[float] = ()  # [m] of the sensor on board, clockwise from the nose; inf: nothing there
+        self.sensed_us = 0  # when it measured
+        self._load()
+        params.on_change(self._on_parameter)
+
+    @property
+    def is_limiting(self) -> bool:
+        """Whether the vehicle shall keep away from obstacles at all."""
+        return self.keep_m >= 0.0
+
+    def sensed(self, time_us: int, distances_m: Sequence[float], yaw_rad: float) -> None:
+        """The sensor on board has measured: distances evenly spaced, clockwise from the nose."""
+        self.body_m, self.sensed_us = distances_m, time_us
+        self.reported(time_us, distances_m, yaw_rad, 2.0 * pi / len(distances_m))
+
+    def reported(self, time_us: int, distances_m: Sequence[float], first_rad: float, increment_rad: float) -> None:
+        """Distances by bearing have come.
+
+        Args:
+            time_us: when.
+            distances_m: [m]; NaN: not known, inf: nothing within reach.
+            first_rad: bearing of the first one, clockwise from north.
+            increment_rad: between two; may be negative.
+        """
+        nearest: dict[int, float] = {}
+        for i, distance_m in enumerate(distances_m):
+            if distance_m == distance_m:
+                index = round((first_rad + i * increment_rad) / _BIN_RAD) % BINS
+                nearest[index] = min(distance_m, nearest.get(index, inf))
+        for index, distance_m in nearest.items():
+            self._distance_m[index] = distance_m
+            self._seen_us[index] = time_us
+
+    def limited(self, north: float, east: float, now_us: int) -> tuple[float, float]:
+        """A horizontal velocity [m/s] with which the vehicle can still stop `keep_m` before every obstacle."""
+        speed = sqrt(north * north + east * east)
+        if speed == 0.0 or (not self._params["CP_GO_NO_DATA"] and not self._knows_ahead(north, east, speed, now_us)):
+            return 0.0, 0.0
+        fresh = [i for i in range(BINS) if now_us - self._seen_us[i] <= FRESH_US and isfinite(self._distance_m[i])]
+        for i in sorted(fresh, key=self._distance_m.__getitem__):  # the nearest takes most; another order pushes back
+            bearing = i * _BIN_RAD
+            unit_north, unit_east = cos(bearing), sin(bearing)
+            excess = north * unit_north + east * unit_east - self._speed_towards(self._distance_m[i])
+            if excess > 0.0:
+                north -= excess * unit_north
+                east -= excess * unit_east
+        return north, east
+
+    def _knows_ahead(self, north: float, east: float, speed: float, now_us: int) -> bool:
+        index = max(range(BINS), key=lambda i: (north * cos(i * _BIN_RAD) + east * sin(i * _BIN_RAD)) / speed)
+        return now_us - self._seen_us[index] <= FRESH_US
+
+    def _speed_towards(self, distance_m: float) -> float:
+        """Speed [m/s] from which the vehicle stops in time, the delay included; 0 nearer than that."""
+        room_m = distance_m - self.keep_m
+        if room_m <= 0.0:
+            return 0.0
+        late = self._accel * self._delay_s
+        return sqrt(late * late + 2.0 * self._accel * room_m) - late
+
+    def _load(self) -> None:
+        self.keep_m = float(self._params["CP_DIST"])
+        self._delay_s = float(self._params["CP_DELAY"])
+        self._accel = float(self._params["MPC_ACC_HOR"])
+
+    def _on_parameter(self, parameter: Parameter) -> None:
+        if parameter.name.startswith("CP_") or parameter.name == "MPC_ACC_HOR":
+            self._load()
