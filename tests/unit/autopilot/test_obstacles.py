@@ -35,7 +35,7 @@ def test_speed_towards_a_wall_can_be_braked_in_time(bearing_deg, distance_m):
     speed = north * cos(bearing) + east * sin(bearing)
     accel = float(parameter_table()["MPC_ACC_HOR"])
     assert speed * 0.4 + 0.5 * speed**2 / accel <= distance_m - 2.0 + 0.05
-    assert speed >= -1e-9
+    assert speed >= -0.05  # bins are 5 degrees wide
 
 
 def test_moving_away_and_along_stays_free():
