@@ -8,12 +8,8 @@ from math import atan2, cos, exp, isfinite, nan, pi, sin
 
 import numpy as np
 
-from autopilot.commander.params import COMMANDER_PARAMETERS
-from autopilot.control.params import CONTROL_PARAMETERS
-from autopilot.estimator.params import ESTIMATOR_PARAMETERS
-from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.node import FlightController, HostPorts, hover_thrust
-from autopilot.params import SYSTEM_PARAMETERS
+from autopilot.params import all_parameters
 from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
@@ -29,7 +25,6 @@ from autopilot.ports import (
     Samples,
     Setpoint,
 )
-from autopilot.stick_params import STICK_PARAMETERS
 from autopilot.vehicle import LandedState, MissionItem, Mode, OffboardSetpoint, Severity
 from common.airframe import load_airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
@@ -80,16 +75,7 @@ class Kinematic:
     """One vehicle over flat ground at down = 0, and its flight controller."""
 
     def __init__(self, **params):
-        self.table = ParameterTable(
-            [
-                *COMMANDER_PARAMETERS,
-                *NAVIGATOR_PARAMETERS,
-                *CONTROL_PARAMETERS,
-                *ESTIMATOR_PARAMETERS,
-                *STICK_PARAMETERS,
-                *SYSTEM_PARAMETERS,
-            ]
-        )
+        self.table = ParameterTable(all_parameters())
         for name, value in params.items():
             self.table.set(name, value)
         self.airframe = load_airframe("x500")
