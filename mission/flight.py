@@ -127,6 +127,7 @@ class Flight:
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
         self._injector = RigInjector(self.rig, self.airframe, config.noise)
         self._camera_rig = CameraRig(self.rig, self.world, has_thread=has_camera_thread)
+        self._camera_rig.prepare()
         media = None if folder is None else MediaFolder(folder / "media")
         self.host = Host(files=host_files(folder, state), frames=self._camera_rig, media=media, stream=stream)
         self.controller = FlightController(

@@ -7,6 +7,7 @@ lockstep a frame is there at once; with a thread of its own the flight goes on w
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property
 
+from autopilot.camera import picture
 from autopilot.camera.ports import RawFrame, View
 from autopilot.gimbal.gimbal import product
 from sim.rig import Rig
@@ -38,6 +39,15 @@ class CameraRig:
     def renderer(self) -> Renderer:
         """Made when the first picture is taken."""
         return Renderer(self._world)
+
+    def prepare(self) -> None:
+        """Compiles or loads the kernel on the camera's thread, so that the first photo need not wait for it."""
+        if self._pool is not None:
+            self._pool.submit(self._warm_up)
+
+    def _warm_up(self) -> None:
+        picture.prepare()
+        self.renderer.prepare()
 
     def pose(self, view: View) -> CameraPose:
         """Where the lens truly is now."""

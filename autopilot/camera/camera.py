@@ -16,7 +16,7 @@ import numpy as np
 from autopilot.camera.lens import FOCUS_NEAR_M, Lens
 from autopilot.camera.picture import defocused, jpeg_bytes
 from autopilot.camera.ports import FrameSource, Quat, RawFrame, View
-from autopilot.camera.settings import Settings
+from autopilot.camera.settings import MODE, Settings
 from autopilot.camera.storage import MediaFolder
 from autopilot.camera.trigger import NEVER_US, Trigger
 from autopilot.camera.video import RATE_HZ, Recording
@@ -27,6 +27,7 @@ from common.geodesy import GeoPoint
 
 CAMERA_ID = 100  # MAV_COMP_ID_CAMERA
 SHUTTER_US = 200_000  # from one photo to the next at the earliest; guess
+PENDING_MAX = 2  # photos that wait for the host
 SHOTS_KEPT = 10_000
 VIDEO_BYTES_MIN = 1 << 20  # room a recording needs to begin
 
@@ -84,7 +85,6 @@ class Camera:
         self.lens = Lens()
         self.settings = Settings()
         self.trigger = Trigger()
-        self.mode = CameraMode.IMAGE
         self.media = media
         self.gimbal = gimbal
         self.shots: deque[Shot] = deque(maxlen=SHOTS_KEPT)
@@ -140,9 +140,10 @@ class Camera:
     def frame(self) -> None:
         """Takes and stores the photos and video frames that are due."""
         now_us = self._state.time_us
-        if self.trigger.is_active and self.trigger.is_due(now_us, self._state.estimate.pos_ned):
-            self._shoot()
         self._develop()
+        has_room = len(self._pending) < PENDING_MAX  # a slow host delays a series
+        if self.trigger.is_active and has_room and self.trigger.is_due(now_us, self._state.estimate.pos_ned):
+            self._shoot()
         recording = self.recording
         if recording is not None:
             while now_us >= recording.due_us:
@@ -341,9 +342,9 @@ class Camera:
         return ACCEPTED
 
     def stop_video(self) -> Reply:
-        """Completes the recording."""
+        """Completes the recording, if there is one: the command may be a repeat."""
         if self.recording is None:
-            return Reply(Verdict.TEMPORARILY_REJECTED, "nothing is being recorded")
+            return ACCEPTED
         self.recording.close()
         self.recording = None
         self._plan()
@@ -357,11 +358,15 @@ class Camera:
     def video_rate_hz(self) -> float:
         return RATE_HZ
 
+    @property
+    def mode(self) -> CameraMode:
+        return CameraMode(int(self.settings[MODE]))
+
     def set_mode(self, mode: float) -> Reply:
         """Image, video or survey; both kinds of picture can be taken in each."""
         if mode not in (0.0, 1.0, 2.0):
             return Reply(Verdict.DENIED, f"there is no camera mode {mode:g}")
-        self.mode = CameraMode(int(mode))
+        self.settings.set(MODE, mode)
         return ACCEPTED
 
     def _turn(self, motor: Callable[[int, float], Reply], params: Params) -> Reply:
@@ -376,7 +381,6 @@ class Camera:
             return Reply(Verdict.TEMPORARILY_REJECTED, "busy taking pictures")
         self.settings.reset()
         self.lens.reset()
-        self.mode = CameraMode.IMAGE
         return ACCEPTED
 
     def format_storage(self) -> Reply:

@@ -16,6 +16,13 @@ _BLUR_PIXELS = (1.5, 3.0, 6.0)  # diameters of the blurred copies that the pictu
 _SHARP_PIXELS = 0.75  # blur below it cannot be seen
 
 
+def prepare() -> None:
+    """Imports OpenCV, so that the first picture need not wait for it."""
+    import cv2
+
+    cv2.setNumThreads(1)  # small pictures: the other cores belong to the flight
+
+
 def defocused(frame: RawFrame, hfov_deg: float, zoom: float, focus_m: float) -> NDArray[np.uint8]:
     """The picture of a thin lens: what is not at the distance in focus becomes a disc of confusion.
 

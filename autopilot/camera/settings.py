@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+MODE = "CAM_MODE"  # a name that MAVSDK looks for
 UINT8, UINT32, REAL32 = 1, 5, 9  # MAV_PARAM_EXT_TYPE
 TYPE_NAMES = {UINT8: "uint8", UINT32: "uint32", REAL32: "float"}
 
@@ -35,6 +36,7 @@ def _numbered(*names: str) -> tuple[tuple[str, float], ...]:
 
 
 SETTINGS = (
+    Setting(MODE, UINT32, 0, "Mode", _numbered("Photo", "Video", "Survey")),
     Setting("CAM_PHOTORES", UINT32, 0, "Photo resolution", _sizes(PHOTO_SIZES)),
     Setting("CAM_VIDRES", UINT32, 0, "Video resolution", _sizes(VIDEO_SIZES)),
     Setting("CAM_EV", REAL32, 0.0, "Exposure compensation", tuple((f"{ev:+.1f}", ev) for ev in EXPOSURES_EV)),

@@ -57,11 +57,10 @@ class Recording:
             add_frame(self._writer, self._last)
 
     def close(self) -> None:
-        """Completes the file."""
-        if self._pending is not None:
-            self._last = self._pending.result().rgb
-            self._pending = None
-            add_frame(self._writer, self._last)
+        """Completes the file; a frame that has not been delivered is left out, so that nobody waits for it."""
+        if self._pending is not None and self._pending.done():
+            add_frame(self._writer, self._pending.result().rgb)
+        self._pending = None
         if self._writer is not None and self._part is not None:
             self._writer.release()
             self._writer = None

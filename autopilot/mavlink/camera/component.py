@@ -158,10 +158,9 @@ class CameraComponent(Component):
         return reply
 
     def _stop_video(self, command: Command) -> Reply:
-        """Completes the recording.
+        """Completes the recording, if there is one.
 
         Params: p1 stream (0 or 1); p2 camera.
-        Refused: TEMPORARILY_REJECTED: nothing is being recorded.
         """
         reply = self.run(command)
         if reply.verdict is Verdict.ACCEPTED:
