@@ -1,6 +1,6 @@
 """The camera in a flight: pictures of the world it flies in, a mission that takes them, and the live picture."""
 
-from math import isnan, nan
+from math import nan
 from threading import Event, Thread
 from urllib.request import urlopen
 
@@ -102,6 +102,7 @@ def frames_of(response, count):
 def test_browser_sees_the_live_picture_and_the_stored_ones(tmp_path):
     stream = StreamServer(0)
     flight = Flight(SMALL, folder=tmp_path, stream=stream)
+    flight.frame()
     assert flight.controller.camera.take_photo().reason == ""
     is_over, seen = Event(), {}
 
@@ -136,5 +137,4 @@ def test_nothing_is_rendered_while_nobody_watches(tmp_path):
     flight = Flight(SMALL, stream=stream)
     flight.run(lambda flight: flight.time_us > 2_000_000)
     assert stream.serial == 0
-    assert not isnan(flight.time_us)
     flight.close()
