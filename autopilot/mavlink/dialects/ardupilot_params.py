@@ -1,7 +1,7 @@
 """The names under which ArduPilot's users and ground stations look for parameters.
 
 An alias is one of our parameters under ArduPilot's name, in ArduPilot's unit: setting it sets ours. A constant is there
-to be read only. A name that is both is an alias wherever the vehicle has the parameter it stands for.
+to be read only. Names that are ArduPilot's and ours alike (RC1_MIN) are in neither list.
 """
 
 from collections.abc import Mapping
@@ -74,7 +74,6 @@ _AXES = "XYZ"
 CONSTANTS: tuple[Constant, ...] = (
     Constant("ARMING_CHECK", 1, INT32, "all checks; they cannot be switched off"),
     Constant("ARMING_REQUIRE", 1, INT8, "it must be armed before the rotors turn"),
-    Constant("BATT_CAPACITY", 0, INT32, "not known"),
     Constant("BATT_MONITOR", 4, INT8, "voltage and current"),
     Constant("COMPASS_DEV_ID", 97_539, INT32, "a magnetometer"),
     Constant("COMPASS_DEV_ID2", 0, INT32, "no second magnetometer"),
@@ -85,17 +84,16 @@ CONSTANTS: tuple[Constant, ...] = (
     *(Constant(f"COMPASS_OFS_{axis}", 1.0, REAL32, "calibrated") for axis in _AXES),
     *(Constant(f"COMPASS_OFS2_{axis}", 0.0, REAL32, "no second magnetometer") for axis in _AXES),
     *(Constant(f"COMPASS_OFS3_{axis}", 0.0, REAL32, "no third magnetometer") for axis in _AXES),
-    Constant("FOLL_ALT_TYPE", 0, INT8, "altitude above sea level"),
-    Constant("FOLL_DIST_MAX", 100.0, REAL32, "farther targets are not followed"),
-    Constant("FOLL_ENABLE", 0, INT8, "it does not follow"),
-    *(Constant(f"FOLL_OFS_{axis}", 0.0, REAL32, "no offset") for axis in _AXES),
-    Constant("FOLL_OFS_TYPE", 0, INT8, "offset to the north"),
-    Constant("FOLL_POS_P", 0.1, REAL32, "not used"),
+    Constant("FOLL_ALT_TYPE", 1, INT8, "height above home; see FLW_TGT_ALT_M"),
+    Constant("FOLL_DIST_MAX", 0.0, REAL32, "any distance"),
+    Constant("FOLL_ENABLE", 1, INT8, "mode Follow may be chosen"),
+    *(Constant(f"FOLL_OFS_{axis}", 0.0, REAL32, "see FLW_TGT_DST, _FA, _HT") for axis in _AXES),
+    Constant("FOLL_OFS_TYPE", 1, INT8, "relative to the course of the target"),
+    Constant("FOLL_POS_P", 0.1, REAL32, "see FLW_TGT_RS"),
     Constant("FOLL_SYSID", 0, INT16, "any target"),
     Constant("FOLL_YAW_BEHAVE", 1, INT8, "faces the target"),
     Constant("FRAME_CLASS", 1, INT8, "a quadrotor"),
     Constant("FRAME_TYPE", 1, INT8, "as an X"),
-    Constant("FS_GCS_ENABLE", 0, INT8, "the loss of the ground station changes nothing"),
     *(Constant(f"INS_ACCOFFS_{axis}", 0.001, REAL32, "calibrated") for axis in _AXES),
     *(Constant(f"INS_ACCSCAL_{axis}", 1.0, REAL32, "calibrated") for axis in _AXES),
     Constant("STAT_FLTTIME", 0, INT32, "flight time is not counted from one start to the next"),

@@ -4,6 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.ardupilot_params import ALIASES, CONSTANTS
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.parameter_view import ParameterView
 from autopilot.params import parameter_table
@@ -21,6 +22,7 @@ EXPECTED = {
         "RTL_RETURN_ALT", "NAV_DLL_ACT", "COM_RC_LOSS_T", "NAV_RCL_ACT", "COM_LOW_BAT_ACT", "MPC_XY_VEL_MAX",
         "GF_MAX_HOR_DIST", "COM_DISARM_LAND", "MIS_TAKEOFF_ALT", "SYS_FAILURE_EN", "SENS_BOARD_X_OFF",
         "SENS_BOARD_Y_OFF", "SENS_BOARD_Z_OFF",
+        *(f"FLW_TGT_{end}" for end in ("HT", "DST", "FA", "RS", "MAX_VEL", "ALT_M")),
     ],
     ARDUPILOT: [
         "FRAME_CLASS", "FRAME_TYPE", "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3", "COMPASS_USE",
@@ -61,6 +63,14 @@ def test_names_are_dense_and_short_and_values_fit_their_types(dialect):
         if view.param_type(name) in most:
             assert isinstance(view.value(name), int)
             assert abs(view.value(name)) <= most[view.param_type(name)]
+
+
+def test_every_alias_stands_for_a_parameter_and_has_no_other_meaning():
+    table = parameter_table()
+    assert [alias.name for alias in ALIASES if alias.of not in table or alias.name in table] == []
+    names = [alias.name for alias in ALIASES] + [constant.name for constant in CONSTANTS]
+    assert len(set(names)) == len(names)
+    assert [constant.name for constant in CONSTANTS if constant.name in table] == []
 
 
 def test_stations_find_nothing_to_complain_about():
