@@ -151,6 +151,7 @@ class Sticks:
                 channels[i] = pulse_us if _PULSES_US[0] <= pulse_us <= _PULSES_US[1] else _RELEASED
         if not any(stick and channels[stick - 1] for stick in self._map):  # switches at most: nobody flies, or no more
             now.heard_until_us = min(was_heard_us, now_us - 1)
+            now.speed = 0.0
             now.count += 1
             return ""
         now.buttons = 0

@@ -23,7 +23,7 @@ _AUTO = frozenset(
     {Mode.HOLD, Mode.TAKEOFF, Mode.MISSION, Mode.RETURN, Mode.LAND, Mode.PRECISION_LAND, Mode.SMART_RETURN}
 )
 _OUTSIDE = frozenset({Mode.OFFBOARD, Mode.GUIDED})
-_CLIMB_RATE_MODES = frozenset({Mode.ALTITUDE, Mode.POSITION})
+_CLIMB_RATE_MODES = frozenset({Mode.ALTITUDE, Mode.POSITION, Mode.HOLD})
 # Numbers of COM_FLTMODE1..6
 _SWITCHED = {
     0: Mode.MANUAL, 1: Mode.ALTITUDE, 2: Mode.POSITION, 3: Mode.MISSION, 4: Mode.HOLD, 5: Mode.RETURN, 6: Mode.ACRO,
@@ -79,14 +79,16 @@ class Pilot:
 
     def arming_reason(self, mode: Mode) -> str:
         """Why the sticks forbid arming in a mode; empty if they do not."""
-        sticks = self._state.sticks
-        is_steered_hold = mode is Mode.HOLD and sticks.steer_hold
-        if not (MODE_RULES[mode].needs_sticks or is_steered_hold) or not self.is_heard:
+        if not self._is_flown(mode) or not self.is_heard:
             return ""  # without sticks the mode itself is refused, or needs none
-        throttle = sticks.throttle
-        if mode in _CLIMB_RATE_MODES or is_steered_hold:
+        throttle = self._state.sticks.throttle
+        if mode in _CLIMB_RATE_MODES:
             return "throttle above the middle" if throttle > _MIDDLE_THROTTLE else ""
         return "throttle is not low" if throttle > _LOW_THROTTLE else ""
+
+    def _is_flown(self, mode: Mode) -> bool:
+        """Whether a mode follows the sticks."""
+        return MODE_RULES[mode].needs_sticks or (mode is Mode.HOLD and self._state.sticks.steer_hold)
 
     def failures(self) -> int:
         """STICKS_LOST, unless the present mode is excepted; otherwise 0."""
@@ -139,7 +141,7 @@ class Pilot:
         self._is_done = True
         if corner == -1:
             _ask(commander, "Disarm", commander.disarm(force=False))
-        elif state.is_armed or MODE_RULES[state.mode].needs_sticks:
+        elif state.is_armed or self._is_flown(state.mode):
             _ask(commander, "Arm", commander.arm(force=False))
         else:
             commander.announcer.statustext(Severity.WARNING, "Arm: not in a mode flown by sticks")

@@ -176,6 +176,28 @@ def test_the_gesture_arms_only_in_a_mode_flown_by_sticks():
     assert rig.recorder.has_text("Arm: not in a mode flown by sticks")
 
 
+def test_the_gesture_arms_in_hold_where_the_sticks_steer_it():
+    rig = Kinematic().ready()
+    rig.fc.sticks.follow_ardupilot()
+    rig.piloted(1.5, throttle=-1.0, yaw=1.0)
+    assert rig.state.is_armed
+
+
+def test_letting_the_channels_go_does_not_take_over():
+    rig = Kinematic(COM_RC_IN_MODE=0, NAV_RCL_ACT=0).flying(20.0)
+
+    def override(roll_us):
+        rig.fc.sticks.channels_overridden((255, 190), rig.time_us, (roll_us,))
+        rig.frame()
+
+    override(1500)
+    assert rig.fc.set_mode(Mode.POSITION).verdict is Verdict.ACCEPTED
+    override(1900)
+    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    override(0)
+    assert rig.state.mode is Mode.HOLD
+
+
 def test_the_gesture_does_not_disarm_in_the_air():
     rig = in_mode(Mode.POSITION)
     rig.piloted(1.5, throttle=-1.0, yaw=-1.0)

@@ -2,9 +2,11 @@
 
 import pytest
 
+from autopilot.commander.modes import MODE_RULES
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.links import LinkRole, memory_pair
 from autopilot.mavlink.server import MavlinkServer
+from autopilot.vehicle import Mode
 from tests.unit.autopilot.mavlink.rig import Client, RecordingVehicle, Rig, texts
 
 RC_RECEIVER = 65536  # MAV_SYS_STATUS_SENSOR
@@ -101,6 +103,16 @@ def test_telemetry_shows_the_sticks_and_the_channels_they_would_be():
     assert (fields.chan1_raw, fields.chan2_raw, fields.chan3_raw, fields.chan4_raw) == (1000, 2000, 1500, 1755)
     assert fields.chan5_raw == 65535
     assert request(rig, "RC_CHANNELS_RAW").chan2_raw == 2000
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_heartbeat_tells_modes_flown_by_sticks_from_those_that_fly_themselves(mode):
+    rig = Rig()
+    rig.update(mode=mode)
+    by_hand, by_itself = 64, 4  # MAV_MODE_FLAG: manual input, auto
+    base_mode = rig.all("HEARTBEAT", 60)[-1].base_mode
+    assert bool(base_mode & by_hand) is MODE_RULES[mode].needs_sticks
+    assert bool(base_mode & by_itself) is not MODE_RULES[mode].needs_sticks
 
 
 def test_status_has_a_radio_once_sticks_were_heard():
