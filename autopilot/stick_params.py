@@ -36,9 +36,9 @@ STICK_PARAMETERS: list[Parameter] = [
     Parameter("COM_RC_OVERRIDE", 1, 0, 3, "", "moving the sticks takes over: bit 0 in auto modes, bit 1 in offboard",
               _PX4),
     Parameter("COM_RC_STICK_OV", 30.0, 5.0, 80.0, "%", "movement of a stick per second that takes over", _PX4),
-    Parameter("NAV_RCL_ACT", 2, 0, 6, "",
-              "lost sticks: 0 nothing (if flown by them: return), 1 hold, 2 return, 3 land, 5 and 6 stop the motors",
-              _PX4),
+    Parameter("NAV_RCL_ACT", 2, 0, 7, "",
+              "lost sticks: 0 nothing (if flown by them: return), 1 hold, 2 return, 3 land, 5 and 6 stop the motors, "
+              "7 smart return", f"{_PX4}; it has no 7"),
     Parameter("COM_RCL_EXCEPT", 0, 0, 7, "",
               "where lost sticks change nothing: bit 0 mission, bit 1 other auto modes, bit 2 offboard", _PX4),
     Parameter("MAN_ARM_GESTURE", 1, 0, 1, "",

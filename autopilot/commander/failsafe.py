@@ -42,15 +42,17 @@ class Action(IntEnum):
     WARN = 0
     ALTITUDE = 1  # the pilot flies on without a position
     HOLD = 2
-    RETURN = 3
-    LAND = 4  # blind if the position is lost
-    TERMINATE = 5  # motors stopped, wherever the vehicle is; disarmed once it lies on the ground
-    DISARM = 6  # at once
+    SMART_RETURN = 3  # back along its own track; directly where that is not known
+    RETURN = 4
+    LAND = 5  # blind if the position is lost
+    TERMINATE = 6  # motors stopped, wherever the vehicle is; disarmed once it lies on the ground
+    DISARM = 7  # at once
 
 
 ACTION_MODES = {
     Action.ALTITUDE: Mode.ALTITUDE,
     Action.HOLD: Mode.HOLD,
+    Action.SMART_RETURN: Mode.SMART_RETURN,
     Action.RETURN: Mode.RETURN,
     Action.LAND: Mode.LAND,
     Action.TERMINATE: Mode.TERMINATION,
@@ -58,6 +60,7 @@ ACTION_MODES = {
 OUTCOMES = {
     Action.ALTITUDE: ": altitude mode",
     Action.HOLD: ": hold",
+    Action.SMART_RETURN: ": smart return",
     Action.RETURN: ": return",
     Action.LAND: ": land",
     Action.TERMINATE: ": flight terminated",
@@ -75,14 +78,17 @@ MODE_STRENGTH = {
 # PX4's numbers of actions, parameter by parameter.
 LINK_ACTIONS = {
     0: Action.WARN, 1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND, 5: Action.TERMINATE, 6: Action.DISARM,
+    7: Action.SMART_RETURN,
 }  # fmt: skip
-"""NAV_DLL_ACT and NAV_RCL_ACT."""
+"""NAV_DLL_ACT and NAV_RCL_ACT; PX4 has no 7."""
 MOTOR_ACTIONS = {0: Action.WARN, 1: Action.HOLD, 2: Action.LAND, 3: Action.RETURN, 4: Action.TERMINATE}
 """COM_ACT_FAIL_ACT."""
 LIMIT_ACTIONS = {
     0: Action.WARN, 1: Action.WARN, 2: Action.HOLD, 3: Action.RETURN, 4: Action.TERMINATE, 5: Action.LAND,
 }  # fmt: skip
-"""COM_WIND_MAX_ACT and GF_ACTION."""
+"""COM_WIND_MAX_ACT."""
+FENCE_ACTIONS = LIMIT_ACTIONS | {6: Action.SMART_RETURN}
+"""GF_ACTION; PX4 has no 6."""
 OFFBOARD_ACTIONS = {
     3: Action.RETURN, 4: Action.LAND, 5: Action.HOLD, 6: Action.TERMINATE, 7: Action.DISARM,
 }  # fmt: skip
@@ -144,7 +150,7 @@ RULES: tuple[Rule, ...] = (
     Rule(FLIGHT_TIME_OVER, always(Action.RETURN), Severity.CRITICAL, "Flight time is over"),
     Rule(WIND_HIGH, by("COM_WIND_MAX_ACT", LIMIT_ACTIONS), Severity.CRITICAL, "Wind above its limit",
          "Wind is below its limit again"),
-    Rule(FENCE_BREACHED, by("GF_ACTION", LIMIT_ACTIONS), Severity.CRITICAL, "Geofence breached"),
+    Rule(FENCE_BREACHED, by("GF_ACTION", FENCE_ACTIONS), Severity.CRITICAL, "Geofence breached"),
     Rule(TRAFFIC_NEAR, by("NAV_TRAFF_AVOID", TRAFFIC_ACTIONS), Severity.WARNING, "Aircraft near",
          "Aircraft is no longer near"),
     Rule(STATION_LOST, by("NAV_DLL_ACT", LINK_ACTIONS), Severity.WARNING, "Ground station lost",

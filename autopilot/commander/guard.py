@@ -97,6 +97,10 @@ class Guard:
 
     def _possible(self, action: Action) -> Action:
         """The action, or the next stronger one that can be flown now."""
+        if action is Action.SMART_RETURN:
+            if not self._commander.refusal(Mode.SMART_RETURN):
+                return action
+            action = Action.RETURN
         if action in (Action.ALTITUDE, Action.HOLD, Action.RETURN):
             mode = ACTION_MODES[action]
             if mode is not self._commander.state.mode and self._commander.refusal(mode):

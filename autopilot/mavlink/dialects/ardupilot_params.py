@@ -18,9 +18,9 @@ CM = 100.0  # per metre
 MS = 1000.0  # per second
 
 # Failsafe actions. Ours are PX4's: 0 none, 1 hold, 2 return, 3 land; for the fence 1 warn, 2 hold, 3 return, 5 land.
-_THROTTLE_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 3, 1: 7}
-_STATION_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 5, 1: 7}
-_FENCE_ACTIONS: Mapping[int, int] = {1: 0, 0: 0, 2: 4, 3: 1, 5: 2}
+_THROTTLE_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 3, 7: 4, 1: 7}
+_STATION_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 7: 3, 3: 5, 1: 7}
+_FENCE_ACTIONS: Mapping[int, int] = {1: 0, 0: 0, 2: 4, 3: 1, 5: 2, 6: 3}
 _BATTERY_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 2}
 # Modes of a switch: PX4's COM_FLTMODE numbers to mode numbers of a copter.
 _SWITCH_MODES: Mapping[int, int] = {8: 0, 6: 1, 1: 2, 3: 3, 7: 4, 4: 5, 5: 6, 11: 9, 2: 16, 12: 23}

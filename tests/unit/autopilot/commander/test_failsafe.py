@@ -343,3 +343,15 @@ def test_vehicle_that_holds_stays_where_it_is_when_the_estimate_jumps():
     rig.estimate["reset_count"] += 1
     rig.run(0.1)
     assert rig.fc.navigator.hold.target_ned == sent_to
+
+
+def test_lost_station_sends_the_vehicle_back_along_its_track_or_directly_where_none_is_known():
+    for is_known, mode in ((True, Mode.SMART_RETURN), (False, Mode.RETURN)):
+        rig = flying_away(NAV_DLL_ACT=7)
+        if not is_known:
+            rig.fc.navigator.crumbs.clear()
+            rig.fc.navigator.crumbs.points = []
+            rig.fc.navigator.crumbs._is_full = True
+        rig.fc.station.heard(rig.time_us)
+        rig.run(10.5)
+        assert rig.state.mode is mode

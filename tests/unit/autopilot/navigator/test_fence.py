@@ -25,7 +25,7 @@ def fenced(rig, items):
 
 @pytest.mark.parametrize(
     ("action", "mode"),
-    [(1, Mode.HOLD), (2, Mode.HOLD), (3, Mode.RETURN), (5, Mode.LAND), (4, Mode.TERMINATION)],
+    [(1, Mode.HOLD), (2, Mode.HOLD), (3, Mode.RETURN), (5, Mode.LAND), (4, Mode.TERMINATION), (6, Mode.SMART_RETURN)],
 )
 def test_breach_leads_to_the_action_that_is_set(action, mode):
     rig = fenced(Kinematic(GF_ACTION=action).flying(), polygon(SQUARE))
