@@ -37,10 +37,10 @@ def fly(tmp_path):
     return run
 
 
-def plan_with_a_spline():
-    """The default plan with a spline waypoint: valid in a file, not flown here."""
+def plan_with_a_vtol_takeoff():
+    """The default plan with a VTOL's take-off: valid in a file, not flown here."""
     plan = json.loads(DEFAULT_PLAN.read_text())
-    plan["mission"]["items"][1]["command"] = 82
+    plan["mission"]["items"][1]["command"] = 84
     return json.dumps(plan)
 
 
@@ -92,8 +92,8 @@ def test_mission_is_flown_at_a_pace_too(tmp_path):
 
 
 def test_mission_that_the_vehicle_refuses_gives_1(fly, tmp_path):
-    plan = tmp_path / "spline.plan"
-    plan.write_text(plan_with_a_spline())
+    plan = tmp_path / "vtol.plan"
+    plan.write_text(plan_with_a_vtol_takeoff())
     result = fly("--plan", plan)
     assert result.returncode == 1, result.stderr
     assert "Traceback" not in result.stderr
