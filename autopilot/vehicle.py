@@ -271,6 +271,7 @@ class VehicleState:
         None  # where it last stood; home may be set anywhere, also in the air
     )
     mode: Mode = Mode.HOLD
+    rotor_count: int = 4
     is_armed: bool = False
     landed_state: LandedState = LandedState.ON_GROUND
     has_ground_contact: bool = False  # stands on something, though perhaps not landed yet

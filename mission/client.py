@@ -154,7 +154,8 @@ class Client:
         self._receive()
         if time_us >= self._next_heartbeat_us:
             self._next_heartbeat_us = time_us + HEARTBEAT_PERIOD_US
-            self.send("HEARTBEAT", type=6, autopilot=8, base_mode=0, custom_mode=0, system_status=4, mavlink_version=3)
+            # An onboard computer: the loss of a script is no loss of the ground station
+            self.send("HEARTBEAT", type=18, autopilot=8, base_mode=0, custom_mode=0, system_status=4, mavlink_version=3)
         if self._offboard is not None and time_us >= self._next_offboard_us:
             self._next_offboard_us = time_us + OFFBOARD_PERIOD_US
             self._transport.send(self._offboard(time_us // 1000))

@@ -9,7 +9,9 @@ from math import nan
 import numpy as np
 import pytest
 
-from autopilot.vehicle import MissionItem
+from autopilot.mavlink.codec import encode
+from autopilot.mavlink.links import LinkRole, memory_pair
+from autopilot.vehicle import MissionItem, Mode
 from common.geodesy import geodetic_from_ned
 from mission.client import CommandRefused
 from mission.flight import Flight, FlightConfig
@@ -20,6 +22,7 @@ ABOVE_HOME = 6  # MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 GYRO, MAG, BARO, GNSS, BATTERY, MOTOR, RC_SIGNAL = 0, 2, 3, 4, 100, 101, 104  # FAILURE_UNIT
 OK, OFF, STUCK, WRONG, SLOW, DELAYED, INTERMITTENT = 0, 1, 2, 4, 5, 6, 7  # FAILURE_TYPE
 HEIGHT_M = 10.0
+GCS = 6  # MAV_TYPE
 
 
 @dataclass
@@ -247,3 +250,54 @@ def test_motor_failure_can_terminate_the_flight():
 def test_motor_watch_can_be_switched_off():
     outcome = hovering(MOTOR, OFF, 1, seconds=3.0, FD_ACT_EN=0)
     assert not outcome.said("Motor 1 has failed")
+
+
+def heartbeat(kind):
+    return encode("HEARTBEAT", 255, 190, 0, type=kind, autopilot=8, mavlink_version=3)
+
+
+def test_vehicle_returns_when_its_ground_station_falls_silent():
+    vehicle_end, station = memory_pair(LinkRole.GROUND)
+    flight = Flight(config(NAV_DLL_ACT=2, COM_DL_LOSS_T=5.0), links=[vehicle_end])
+    modes = []
+
+    async def script(drone):
+        await drone.wait_ready()
+        await drone.arm()
+        await drone.takeoff(HEIGHT_M)
+        await drone.goto_ned(30.0, 0.0, -HEIGHT_M)
+        for _ in range(20):
+            station.send(heartbeat(GCS))
+            await drone.sleep(1.0)
+        modes.append(flight.controller.state.mode)
+        await drone.sleep(4.5)
+        modes.append(flight.controller.state.mode)
+        await drone.wait_disarmed(120.0)
+
+    running = flight.fly(script, seconds=300.0)
+    assert running.error is None
+    assert modes == [Mode.HOLD, Mode.RETURN]
+    assert "Ground station lost: return" in flight.drone.texts
+    assert np.hypot(*flight.rig.arrays.body.numpy()["pos_ned"][0][:2]) < 2.0
+
+
+def test_vehicle_returns_from_wind_above_its_limit():
+    flight = Flight(
+        FlightConfig(
+            seed=1,
+            wind_m_s=10.0,
+            world=WorldConfig(trees_per_ha=0.0),
+            parameters={"COM_WIND_WARN": 4.0, "COM_WIND_MAX_ACT": 3},
+        )
+    )
+
+    async def script(drone):
+        await drone.wait_ready()
+        await drone.arm()
+        await drone.takeoff(20.0)
+        flight.params.set("COM_WIND_MAX", 7.0)
+        await drone.wait_disarmed(180.0)
+
+    assert flight.fly(script, seconds=300.0).error is None
+    assert "Strong wind" in flight.drone.texts
+    assert "Wind above its limit: return" in flight.drone.texts
