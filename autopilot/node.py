@@ -135,7 +135,9 @@ class FlightController:
         self.params = params
         self.host = host or Host()
         self.sticks = Sticks(params)
-        self.state = VehicleState(origin=origin, position=origin, sticks=self.sticks.input)
+        self.state = VehicleState(
+            origin=origin, position=origin, sticks=self.sticks.input, rotor_count=len(airframe.rotors)
+        )
         self.payload = Payloads()
         self.camera = self._mount_camera()
         self.payload.add(AuxOutputs(self.state))

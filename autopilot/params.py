@@ -18,6 +18,7 @@ from common.airframe import Airframe
 from common.kernels import GRAVITY_M_S2
 from common.params import Parameter, ParameterTable
 
+_AUTOSTART = {4: 4001, 6: 6001, 8: 8001}  # PX4's generic airframes by their number of rotors
 _CLIENTS = "what ground stations expect of a PX4 vehicle"
 
 
@@ -37,7 +38,7 @@ SYSTEM_PARAMETERS: list[Parameter] = [
         "the end, -1 never",
         "PX4 default",
     ),
-    _constant("SYS_AUTOSTART", 4001, "airframe: generic quadrotor"),
+    _constant("SYS_AUTOSTART", 4001, "airframe: PX4's generic one with as many rotors"),
     _constant("SYS_AUTOCONFIG", 0, "do not reset parameters"),
     Parameter("SYS_FAILURE_EN", 0, 0, 1, "", "1: clients may inject failures into an armed vehicle", "PX4 default"),
     _constant("RC_MAP_AUX1", 0, "no radio control"),
@@ -76,6 +77,7 @@ def airframe_defaults(airframe: Airframe) -> dict[str, int | float]:
     count = len(airframe.rotors)
     hover_speed_rad_s = sqrt(body.mass_kg * GRAVITY_M_S2 / (count * rotor.thrust_n_s2))
     return {
+        "SYS_AUTOSTART": _AUTOSTART.get(count, 4001),
         "BAT1_N_CELLS": battery.cells,
         "BAT1_CAPACITY": battery.capacity_mah,
         "BAT1_V_CHARGED": battery.full_cell_v,

@@ -76,3 +76,10 @@ def test_sticks_are_cut_off_and_given_back():
     assert rig.vehicle.sticks.is_cut
     assert rig.ack(INJECT_FAILURE, RC_SIGNAL, OK).result == Verdict.ACCEPTED
     assert not rig.vehicle.sticks.is_cut
+
+
+@pytest.mark.parametrize(("rotor_count", "kind"), [(4, 2), (6, 13), (8, 14)])
+def test_heartbeat_tells_the_number_of_rotors(rotor_count, kind):
+    rig = Rig()
+    rig.update(rotor_count=rotor_count)
+    assert rig.all("HEARTBEAT", 60)[0].type == kind
