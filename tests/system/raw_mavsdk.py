@@ -19,11 +19,12 @@ class RawMavsdk:
     """A context manager; `system` is what plugins are made from.
 
     Args:
-        vehicle: what `turn` of a served vehicle gets: called with the time [us] of each frame.
-        turn: runs one frame of the server, whose client end is `link`.
+        make_turn: gets the vehicle's end of the link and returns what runs one frame of the server.
+        is_lost: asked for every message to MAVSDK, by its bytes; True loses it.
     """
 
-    def __init__(self, make_turn):
+    def __init__(self, make_turn, is_lost=lambda _: False):
+        self._is_lost = is_lost
         vehicle_end, self._link = memory_pair(LinkRole.ONBOARD)
         self._turn = make_turn(vehicle_end)
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
@@ -38,6 +39,8 @@ class RawMavsdk:
             while not self._is_over:
                 self._turn()
                 for data in self._link.receive():
+                    if self._is_lost(data):
+                        continue
                     self._mavsdk.pass_received_raw_bytes(data)
                 sleep(FRAME_WALL_S)
         except BaseException as error:

@@ -4,6 +4,7 @@ from base64 import b64decode
 from io import BytesIO
 from time import monotonic, sleep
 
+import numpy as np
 import pytest
 from mavsdk.plugins.ftp import FilesystemEntry, Ftp, FtpError, FtpResult
 from mavsdk.plugins.log_files import LogFiles, LogFilesResult
@@ -19,6 +20,7 @@ from tests.system.raw_mavsdk import Outcome, RawMavsdk, served
 from tests.unit.autopilot.mavlink.rig import RecordingVehicle
 
 FILE, DIRECTORY = FilesystemEntry.EntryType.FILE, FilesystemEntry.EntryType.DIRECTORY
+FTP_ID = (110).to_bytes(3, "little")
 LONG = bytes(i * 7 % 251 for i in range(100_001))  # three bursts and a bit
 
 
@@ -67,6 +69,26 @@ def test_files_go_up_and_down_and_are_managed(mavsdk, tmp_path):
         ftp.list_directory("../..")
     assert caught.value.result == FtpResult.FILE_PROTECTED
     assert list((tmp_path / "files").iterdir()) == []
+
+
+def test_burst_with_holes_is_made_whole(vehicle, tmp_path):
+    (tmp_path / "files").mkdir()
+    (tmp_path / "files/long.bin").write_bytes(LONG)
+    rng = np.random.default_rng(5)
+    lost = []
+
+    def is_lost(data):
+        is_burst = data[7:10] == FTP_ID and len(data) > 200 and rng.random() < 0.03
+        lost.extend([data] * is_burst)
+        return is_burst
+
+    with RawMavsdk(served(vehicle), is_lost) as mavsdk:
+        ftp, download = Ftp(mavsdk.system), Outcome(FtpResult.NEXT)
+        (tmp_path / "down").mkdir()
+        ftp.download_async("/long.bin", str(tmp_path / "down"), True, download)
+        assert download.wait(60.0) == FtpResult.SUCCESS
+    assert len(lost) > 5
+    assert (tmp_path / "down/long.bin").read_bytes() == LONG
 
 
 @pytest.fixture
