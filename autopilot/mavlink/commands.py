@@ -52,6 +52,7 @@ _SHORT_NAMES = {
     mavlink.MAV_CMD_DO_RETURN_PATH_START: "Return",
     mavlink.MAV_CMD_DO_GO_AROUND: "Abort landing",
     mavlink.MAV_CMD_CONDITION_YAW: "Heading",
+    mavlink.MAV_CMD_NAV_ROI: "Region of interest",
     mavlink.MAV_CMD_DO_SET_ROI: "Region of interest",
     mavlink.MAV_CMD_DO_SET_ROI_LOCATION: "Region of interest",
     mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: "Region of interest",

@@ -35,6 +35,7 @@ class MissionCommands(Service):
             mavlink.MAV_CMD_DO_RETURN_PATH_START: self._return_path_start,
             mavlink.MAV_CMD_DO_GO_AROUND: self._go_around,
             mavlink.MAV_CMD_CONDITION_YAW: self._turn,
+            mavlink.MAV_CMD_NAV_ROI: self._roi,
             mavlink.MAV_CMD_DO_SET_ROI: self._roi,
             mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._roi_location,
             mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: self._roi_next,

@@ -11,6 +11,7 @@ from autopilot.navigator.items import (
     PLACED,
     PLACED_OR_HERE,
     RELATIVE_FRAMES,
+    ROI_AS_ASKED,
     ROI_BY_INDEX,
     ROI_OF_TARGET,
     Command,
@@ -284,12 +285,12 @@ def _check_fence(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None
 
 
 def _check_roi(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None:
-    if item.command == Command.ROI and item.params[0] in (ROI_BY_INDEX, ROI_OF_TARGET):
+    if item.command in ROI_AS_ASKED and item.params[0] in (ROI_BY_INDEX, ROI_OF_TARGET):
         return (
             Result.PARAM1,
             f"region of interest {item.params[0]:.0f} is not supported: a place or the next waypoint is",
         )
-    if is_here(item) and item.command == Command.ROI:
+    if is_here(item) and item.command in ROI_AS_ASKED:
         return None  # none from now on
     if item.frame == MISSION_FRAME:
         return Result.UNSUPPORTED_FRAME, "a region of interest needs a place"
@@ -323,6 +324,7 @@ _CHECKS: dict[int, _Check] = {
     Command.ROI_NEXT_OFFSET: _nothing_to_check,
     Command.ROI_NONE: _nothing_to_check,
     Command.ROI: _check_roi,
+    Command.NAV_ROI: _check_roi,
     Command.FENCE_ENABLE: _check_fence,
 }
 SUPPORTED_COMMANDS = frozenset(_CHECKS)

@@ -23,6 +23,7 @@ class Command(IntEnum):
     TAKEOFF = 22
     CONTINUE_AND_CHANGE_ALT = 30
     LOITER_TO_ALT = 31
+    NAV_ROI = 80  # the oldest form of ROI; nothing is flown for it
     SPLINE_WAYPOINT = 82
     DELAY = 93
     CONDITION_DELAY = 112
@@ -85,6 +86,7 @@ CONDITIONS = frozenset(
 WAYPOINTS = frozenset((Command.WAYPOINT, Command.SPLINE_WAYPOINT))
 PLACED = WAYPOINTS | {Command.LOITER_UNLIMITED, Command.LOITER_TURNS, Command.LOITER_TIME, Command.LOITER_TO_ALT}
 PLACED_OR_HERE = frozenset((Command.LAND, Command.TAKEOFF))
+ROI_AS_ASKED = frozenset((Command.ROI, Command.NAV_ROI))  # MAV_ROI in parameter 1
 ROI_BY_INDEX, ROI_OF_TARGET = 2.0, 4.0  # MAV_ROI of DO_SET_ROI that have no meaning here
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from math import isfinite, nan, radians
 
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.items import CONDITIONS, RELATIVE_FRAMES, Command, is_here
+from autopilot.navigator.items import CONDITIONS, RELATIVE_FRAMES, ROI_AS_ASKED, Command, is_here
 from autopilot.navigator.mission_legs import Leg
 from autopilot.navigator.mission_route import Route
 from autopilot.navigator.setpoint import Vector
@@ -17,7 +17,7 @@ from autopilot.payload import Payloads
 from autopilot.vehicle import FenceLimit, FenceSwitch, MissionItem, Reply, Severity, Verdict
 
 _ROI_NEXT = 1.0  # MAV_ROI_WPNEXT
-_ROI_COMMANDS = frozenset((Command.ROI, Command.ROI_LOCATION, Command.ROI_NEXT_OFFSET, Command.ROI_NONE))
+_ROI_COMMANDS = ROI_AS_ASKED | {Command.ROI_LOCATION, Command.ROI_NEXT_OFFSET, Command.ROI_NONE}
 
 
 class Actions:
@@ -176,8 +176,8 @@ class Actions:
 
     def _look(self, item: MissionItem) -> None:
         heading = self._context.heading
-        has_place = item.command in (Command.ROI, Command.ROI_LOCATION) and not is_here(item)
-        if item.command == Command.ROI and item.params[0] == _ROI_NEXT:
+        has_place = item.command in ROI_AS_ASKED | {Command.ROI_LOCATION} and not is_here(item)
+        if item.command in ROI_AS_ASKED and item.params[0] == _ROI_NEXT:
             heading.look_ahead()
         elif has_place:
             place: Vector = self._route.place_of(item)

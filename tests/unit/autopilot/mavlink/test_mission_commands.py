@@ -72,7 +72,7 @@ def test_heading():
     assert rig.vehicle.calls == [("turn", 90.0, 20.0, -1.0, False), ("turn", 30.0, 0.0, 1.0, True)]
 
 
-@pytest.mark.parametrize(("command", "p1"), [(195, nan), (201, 3.0), (201, 0.0)])
+@pytest.mark.parametrize(("command", "p1"), [(195, nan), (201, 3.0), (201, 0.0), (80, 3.0)])
 def test_region_of_interest_at_a_place(command, p1):
     rig = Rig()
     assert rig.ack(command, p1, 0.0, 0.0, 0.0, 47.5, 8.5, 500.0).result == ACCEPTED
