@@ -19,6 +19,7 @@ from autopilot.mavlink.component import Component
 from autopilot.mavlink.devices import DeviceService
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.events import EventService
 from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
@@ -113,11 +114,13 @@ class MavlinkServer:
     def _services(self) -> list[Service]:
         endpoint = self._endpoint
         parameters, goto = ParameterService(endpoint), GotoService(endpoint)
+        self._events = EventService(endpoint)
         return [
             self._commands,
             parameters,
             MissionCommands(endpoint),
             ModeService(endpoint),
+            self._events,
             goto,
             MissionService(endpoint, goto),
             OffboardService(endpoint),
@@ -294,6 +297,7 @@ class MavlinkServer:
 
     def statustext(self, severity: Severity, text: str) -> None:
         self._endpoint.text(severity, text)
+        self._events.text_told(severity, text)
 
     def mission_item_reached(self, seq: int) -> None:
         payload = _MISSION_ITEM_REACHED.pack(seq + self._endpoint.dialect.first_seq)
@@ -310,6 +314,7 @@ class MavlinkServer:
     def heartbeat_now(self) -> None:
         """Sends a heartbeat in this frame, after the mode or arming has changed."""
         self._is_heartbeat_due = True
+        self._events.state_changed()
 
     def _broadcast_telemetry(self, msg_id: int) -> None:
         telemetry = self._endpoint.telemetry
