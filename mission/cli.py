@@ -1,4 +1,4 @@
-"""The command line: `honeyguide fly` and `honeyguide estimate`.
+"""The command line: `honeyguide fly`, `honeyguide estimate` and `honeyguide picture`.
 
 A wrong argument, file or port gives one sentence on standard error and exit code 2; a mission that failed gives 1.
 """
@@ -112,6 +112,31 @@ def estimate(
     try:
         estimate_log(log, output, Console())
     except EstimateError as error:
+        _fail(str(error))
+
+
+@app.command()
+def picture(
+    output: Annotated[Path, typer.Argument(help="The JPEG to write.")],
+    north: Annotated[float, typer.Option(help="Place of the camera from home [m].")] = 0.0,
+    east: Annotated[float, typer.Option(help="Place of the camera from home [m].")] = 0.0,
+    up: Annotated[float, typer.Option(min=0.0, help="Height above the ground [m].")] = 20.0,
+    yaw: Annotated[float, typer.Option(help="Where it looks, clockwise from north [deg].")] = 0.0,
+    pitch: Annotated[float, typer.Option(min=-90.0, max=90.0, help="Up from the horizon [deg].")] = -10.0,
+    fov: Annotated[float, typer.Option(min=5.0, max=150.0, help="Horizontal field of view [deg].")] = 80.0,
+    size: Annotated[str, typer.Option(help="Width and height.")] = "1280x720",
+    world_seed: Annotated[int, typer.Option(min=0, help="Seed of hills and trees.")] = 1,
+    trees: Annotated[float, typer.Option(min=0.0, max=1000.0, help="Trees per hectare.")] = 60.0,
+    hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m].")] = 12.0,
+) -> None:
+    """Take a picture of the world from a place in it."""
+    from mission.picture import PictureError, Viewpoint, take_picture
+    from sim.world.world import WorldConfig
+
+    world = WorldConfig(seed=world_seed, trees_per_ha=trees, hill_height_m=hills)
+    try:
+        take_picture(output, world, Viewpoint(north, east, up, yaw, pitch, fov), size)
+    except PictureError as error:
         _fail(str(error))
 
 

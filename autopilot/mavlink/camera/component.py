@@ -267,4 +267,106 @@ class AttachedCamera(Service):
         self._component = component
 
     def commands(self) -> Mapping[int, CommandHandler]:
-        return {int(number): self._component.run for number in CameraCommand}
+        return {
+            CameraCommand.DIGICAM_CONTROL: self._digicam,
+            CameraCommand.TRIGGER_DISTANCE: self._trigger_distance,
+            CameraCommand.TRIGGER_INTERVAL: self._trigger_interval,
+            CameraCommand.TRIGGER_CONTROL: self._trigger_control,
+            CameraCommand.SET_MODE: self._set_mode,
+            CameraCommand.SET_ZOOM: self._set_zoom,
+            CameraCommand.SET_FOCUS: self._set_focus,
+            CameraCommand.START_PHOTOS: self._start_photos,
+            CameraCommand.STOP_PHOTOS: self._stop_photos,
+            CameraCommand.START_VIDEO: self._start_video,
+            CameraCommand.STOP_VIDEO: self._stop_video,
+        }
+
+    def _digicam(self, command: Command) -> Reply:
+        """Takes a photo, or steps the zoom (the older form).
+
+        Params: p3 zoom steps; p5 1: a photo.
+        Refused: TEMPORARILY_REJECTED: busy; FAILED: no storage, or it is full.
+        """
+        return self._component.run(command)
+
+    def _trigger_distance(self, command: Command) -> Reply:
+        """Takes a photo each so many metres of way, by estimate.
+
+        Params: p1 distance [m], 0: no more; p3 1: the first one here; p4 camera (0, 1 or 100).
+        Refused: DENIED: the distance is negative, or there is no such camera; FAILED: no storage, or it is full.
+        """
+        return self._component.run(command)
+
+    def _trigger_interval(self, command: Command) -> Reply:
+        """Takes a photo each so many milliseconds, from now on.
+
+        Params: p1 interval [ms], 0 or less: no more; p3 camera (0, 1 or 100).
+        Refused: DENIED: the interval is below 200 ms; FAILED: no storage, or it is full.
+        """
+        return self._component.run(command)
+
+    def _trigger_control(self, command: Command) -> Reply:
+        """Ends triggering, or counts photos from 0 again.
+
+        Params: p1 0: end; p2 1: count anew; p3 1: end; p4 camera (0, 1 or 100).
+        Refused: DENIED: it is to start, and neither a distance nor an interval has been given.
+        """
+        return self._component.run(command)
+
+    def _set_mode(self, command: Command) -> Reply:
+        """Sets the camera's mode; photos and videos can be taken in each.
+
+        Params: p1 camera (0, 1 or 100); p2 CAMERA_MODE.
+        Refused: DENIED: no such camera or mode.
+        """
+        return self._component.run(command)
+
+    def _set_zoom(self, command: Command) -> Reply:
+        """Zooms from 1 to 4.
+
+        Params: p1 CAMERA_ZOOM_TYPE: 0 steps, 1 rate, 2 percent, 3 focal length [mm], 4 field of view [deg]; p2 value;
+        p3 camera (0, 1 or 100).
+        Refused: DENIED: no such camera or type, or the value is out of range.
+        """
+        return self._component.run(command)
+
+    def _set_focus(self, command: Command) -> Reply:
+        """Focuses from 0.3 m to infinity.
+
+        Params: p1 SET_FOCUS_TYPE: 0 steps, 1 rate, 2 percent, 3 metres, 4 to 6 automatic; p2 value; p3 camera (0, 1 or
+        100).
+        Refused: DENIED: no such camera or type, or the value is out of range.
+        """
+        return self._component.run(command)
+
+    def _start_photos(self, command: Command) -> Reply:
+        """Takes one photo or a series.
+
+        Params: p1 camera (0, 1 or 100); p2 interval [s]; p3 number, 0 until stopped.
+        Refused: TEMPORARILY_REJECTED: busy; FAILED: no storage, or it is full; DENIED: the interval is below 0.2 s.
+        """
+        return self._component.run(command)
+
+    def _stop_photos(self, command: Command) -> Reply:
+        """Ends every series and trigger.
+
+        Params: p1 camera (0, 1 or 100).
+        Refused: DENIED: no such camera.
+        """
+        return self._component.run(command)
+
+    def _start_video(self, command: Command) -> Reply:
+        """Starts recording to a file.
+
+        Params: p3 camera (0, 1 or 100).
+        Refused: TEMPORARILY_REJECTED: already recording; FAILED: no storage, or it is full.
+        """
+        return self._component.run(command)
+
+    def _stop_video(self, command: Command) -> Reply:
+        """Completes the recording, if there is one.
+
+        Params: p2 camera (0, 1 or 100).
+        Refused: DENIED: no such camera.
+        """
+        return self._component.run(command)
