@@ -290,9 +290,9 @@ def test_on_the_ground_everything_is_answered(client):
     latitude, longitude = (round(degrees * 1e7) for degrees in client.place(10.0, 0.0))
     good = [RawItem(seq, 6, 16, int(seq == 0), 1, *nan_yaw, latitude, longitude, 10.0, 0) for seq in range(2)]
     client.mission_raw.upload_mission(good)
-    spline = RawItem(1, 6, 82, 0, 1, *nan_yaw, latitude, longitude, 10.0, 0)
+    vtol = RawItem(1, 6, 84, 0, 1, *nan_yaw, latitude, longitude, 10.0, 0)
     with pytest.raises(MissionRawError) as refused:
-        client.mission_raw.upload_mission([good[0], spline])
+        client.mission_raw.upload_mission([good[0], vtol])
     assert refused.value.result == MissionRawResult.UNSUPPORTED
     kept = client.mission_raw.download_mission()
     assert [(item.command, item.x, item.y) for item in kept] == [(16, latitude, longitude)] * 2
