@@ -218,6 +218,7 @@ class Component:
         if now_us >= self._next_heartbeat_us:
             self._next_heartbeat_us = now_us + HEARTBEAT_US
             self.broadcast(_HEARTBEAT, self._heartbeat)
+            self._intervals = [item for item in self._intervals if item.channel.is_open]  # clients come and go
         due_us = min(self._next_heartbeat_us, self.work())
         for item in self._intervals:
             if now_us >= item.due_us:
