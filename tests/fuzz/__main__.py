@@ -20,6 +20,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=1_000_000, help="broken frames")
     parser.add_argument("--messages", type=int, default=100_000, help="valid messages")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--dialect", choices=("px4", "ardupilot"), default="px4")
     options = parser.parse_args()
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns) as progress:
@@ -30,7 +31,7 @@ def main() -> None:
             task = progress.add_task(kind, total=total)
             for start in range(0, total, CHUNK):
                 folder = TemporaryDirectory()
-                hover = Hover([options.seed, start, kind == "valid"], Path(folder.name))
+                hover = Hover([options.seed, start, kind == "valid"], Path(folder.name), options.dialect)
                 begin_us, begin_s = hover.flight.time_us, perf_counter()
 
                 def show(sent: int, task: int = task, start: int = start) -> None:

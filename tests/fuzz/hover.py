@@ -26,18 +26,27 @@ class Hover:
     Args:
         seed: of the traffic.
         folder: an empty one for what the vehicle keeps: files, logs, parameters.
+        dialect: what the stations take it for.
     """
 
-    def __init__(self, seed, folder):
+    def __init__(self, seed, folder, dialect="px4"):
         pairs = [memory_pair(LinkRole.GROUND) for _ in range(STATIONS)]
         self.flight = Flight(
-            FlightConfig(noise=0.0), links=[vehicle_end for vehicle_end, _ in pairs], state=StateFolder(folder)
+            FlightConfig(noise=0.0, dialect=dialect),
+            links=[vehicle_end for vehicle_end, _ in pairs],
+            state=StateFolder(folder),
         )
         self.ends = [station_end for _, station_end in pairs]
         server = self.flight.server
         rng = np.random.default_rng(seed)
         self.messages = [
-            Messages(rng, server.message_handlers(), server.command_handlers(), self.flight.params, (255 - i, 190))
+            Messages(
+                rng,
+                server.message_handlers(),
+                server.command_handlers(),
+                server._endpoint.parameters.names,
+                (255 - i, 190),
+            )
             for i in range(STATIONS)
         ]
         self.sent = 0
