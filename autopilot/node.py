@@ -282,7 +282,8 @@ class FlightController:
 
     def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
         if self.state.mode is Mode.GUIDED:
-            return self.guided.takeoff(alt_amsl_m, yaw_rad)
+            refusal = self.navigator.takeoff_refusal(alt_amsl_m)
+            return Reply(Verdict.DENIED, refusal) if refusal else self.guided.takeoff(alt_amsl_m, yaw_rad)
         reason = self.commander.refusal(Mode.TAKEOFF)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)

@@ -12,6 +12,7 @@ from autopilot.navigator.goto import reposition_target
 from autopilot.navigator.ground import Ask, vertical_ask
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff import Climb
+from autopilot.navigator.way import Way
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_LEAN, SETPOINT_TRAJECTORY
 from autopilot.vehicle import ACCEPTED, LandedState, OffboardSetpoint, Reply, Severity, Verdict
 
@@ -31,7 +32,7 @@ class Guided:
 
     __slots__ = (
         "_climb", "_context", "_is_active", "_is_flown", "_is_line", "_is_told", "_next",
-        "_place", "_received_us", "_setpoint", "_task", "_yaw",
+        "_place", "_received_us", "_setpoint", "_task", "_way", "_yaw",
     )  # fmt: skip
 
     def __init__(self, context: NavContext) -> None:
@@ -44,6 +45,7 @@ class Guided:
         self._is_line = False  # on a straight line to the place
         self._is_flown = False  # what is asked for is in the setpoint
         self._is_told = False  # that it stands on the ground
+        self._way = Way(context)  # around what the fence excludes
         self._next: tuple[Vector, float] | None = None  # a place asked for before the mode was entered
         self._setpoint: OffboardSetpoint | None = None
         self._received_us = 0
@@ -76,6 +78,8 @@ class Guided:
             self._stand()
         elif self._task is _Task.SETPOINT:
             self._follow()
+        elif self._way.left:
+            self._is_flown = not self._way.frame()
         elif not self._is_flown:
             self._is_flown = True
             context.fly_to(self._place, self._yaw, context.state.estimate.pos_ned if self._is_line else None)
@@ -84,6 +88,12 @@ class Guided:
         self._task = _Task.PLACE
         self._place, self._yaw, self._is_line = place, yaw, is_line
         self._is_flown = False
+        self._way.stop()
+        here = self._context.stop_point() if is_line else place
+        points = self._context.find_way(here, place) if is_line else None
+        if points is not None and len(points) > 1:
+            self._way.start(here, points)
+            self._is_flown = True
 
     def _stand(self) -> None:
         """On the ground: an attitude with thrust leaves it, everything else needs a take-off first."""
@@ -146,6 +156,8 @@ class Guided:
         target = reposition_target(context, base, lat_deg, lon_deg, alt_amsl_m, yaw)
         if isinstance(target, Reply):
             return target
+        if context.find_way(context.stop_point(), target[0]) is None:
+            return Reply(Verdict.DENIED, "there is no way to the target inside the fence")
         if isfinite(speed_m_s) and speed_m_s > 0.0:
             context.cruise_speed = speed_m_s
         return self._take(target)

@@ -284,13 +284,17 @@ class Navigator:
 
     def request_takeoff(self, alt_amsl_m: float, yaw: float) -> Reply:
         """Chooses the height of the next take-off; the caller changes to Takeoff."""
+        refusal = self.takeoff_refusal(alt_amsl_m)
+        return Reply(Verdict.DENIED, refusal) if refusal else self.takeoff.request(alt_amsl_m, yaw)
+
+    def takeoff_refusal(self, alt_amsl_m: float) -> str:
+        """Why the fence lets no take-off end at an altitude here; empty if it does."""
+        if not isfinite(alt_amsl_m):
+            return ""
         context = self.context
-        if isfinite(alt_amsl_m):
-            north, east, _ = context.state.estimate.pos_ned
-            refusal = self.fence.refusal((north, east, context.down_of(alt_amsl_m)))
-            if refusal:
-                return Reply(Verdict.DENIED, f"takeoff would end {refusal}")
-        return self.takeoff.request(alt_amsl_m, yaw)
+        north, east, _ = context.state.estimate.pos_ned
+        refusal = self.fence.refusal((north, east, context.down_of(alt_amsl_m)))
+        return f"takeoff would end {refusal}" if refusal else ""
 
     def request_landing(self, lat_deg: float, lon_deg: float, yaw: float) -> Reply:
         """Chooses where the next landing shall be; the caller changes to Land."""

@@ -10,7 +10,7 @@ from autopilot.navigator.breadcrumbs import without_loops, without_straights
 from autopilot.navigator.fence_items import FenceCommand
 from autopilot.navigator.rally import RALLY_POINT
 from autopilot.vehicle import ListKind, Mode, Verdict
-from tests.unit.autopilot.kinematic import Kinematic, do, geo, item
+from tests.unit.autopilot.kinematic import Kinematic, do, geo, item, position_setpoint
 
 LAND_START, WAYPOINT, LAND, TAKEOFF = 189, 16, 21, 22
 BLOCK = ((20.0, -20.0), (20.0, 20.0), (40.0, 20.0), (40.0, -20.0))
@@ -265,3 +265,18 @@ def test_goto_without_a_way_is_refused():
     assert rig.fc.lists.load(ListKind.FENCE, wall) is None
     reply = rig.fc.reposition(*geo(100.0, 0.0, 10.0), nan, nan)
     assert (reply.verdict, reply.reason) == (Verdict.DENIED, "there is no way to the target inside the fence")
+
+
+def test_guided_goto_goes_around_what_the_fence_excludes():
+    rig = at(0.0, 0.0)
+    load_block(rig)
+    assert rig.fc.set_mode(Mode.GUIDED).verdict is Verdict.ACCEPTED
+    start = len(rig.track)
+    assert rig.fc.navigator.guided.goto(*geo(70.0, 0.0, 10.0), nan, nan).verdict is Verdict.ACCEPTED
+    rig.run_until(lambda: hypot(rig.pos[0] - 70.0, rig.pos[1]) < 0.3, 60.0)
+    assert nearest_m(np.array(rig.track[start:]), 30.0, 0.0) > 20.0
+    assert rig.fc.navigator.guided.goto(*geo(30.0, 0.0, 10.0), nan, nan).reason == "target is outside fence: shapes"
+    rig.fc.navigator.guided.goto(*geo(0.0, 0.0, 10.0), nan, nan)
+    rig.run(2.0)
+    rig.fc.set_offboard(position_setpoint(60.0, 10.0, -10.0))  # a stream takes over at once
+    rig.run_until(lambda: hypot(rig.pos[0] - 60.0, rig.pos[1] - 10.0) < 0.3, 30.0)
