@@ -129,7 +129,9 @@ class Flight:
         self._camera_rig = CameraRig(self.rig, self.world, has_thread=has_camera_thread)
         self._camera_rig.prepare()
         media = None if folder is None else MediaFolder(folder / "media")
-        self.host = Host(files=host_files(folder, state), frames=self._camera_rig, media=media, stream=stream)
+        self.host = Host(
+            files=host_files(folder, state), storage=state, frames=self._camera_rig, media=media, stream=stream
+        )
         self.controller = FlightController(
             host_ports(self.rig, self.airframe),
             self.params,

@@ -89,6 +89,7 @@ def test_erase_keeps_the_log_being_written_and_what_is_no_log(tmp_path):
 def test_log_of_a_flight_in_the_state_folder_begins_and_ends_with_arming(tmp_path):
     state = StateFolder(tmp_path)
     flight = Flight(FlightConfig(world=BARE), state=state)
+    assert flight.host.storage is state
     flight.run(lambda flight: flight.controller.state.is_ready_to_arm)
     flight.controller.arm(force=False)
     armed_us = flight.time_us
