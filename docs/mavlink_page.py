@@ -2,14 +2,16 @@
 
 import inspect
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from pymavlink.dialects.v20 import all as definitions
 
 from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.component import Component
 from autopilot.mavlink.server import MavlinkServer
+from autopilot.mavlink.service import CommandHandler
 from autopilot.mavlink.streams import Stream
 
 ROOT = Path(__file__).parents[1]
@@ -32,6 +34,8 @@ Rules that hold for everything below:
   (REQUEST_MESSAGE).
 """
 
+_COMMAND_HEADINGS = ("command", "number", "what it does", "parameters", "refused")
+
 
 def mavlink_text(server: MavlinkServer) -> str:
     """The whole page."""
@@ -47,8 +51,11 @@ def mavlink_text(server: MavlinkServer) -> str:
             "\n## Messages understood\n",
             *_table(("message", "id", "what is done with it"), _understood(server)),
             "\n## Commands\n",
-            *_table(("command", "number", "what it does", "parameters", "refused"), _commands(server)),
+            *_table(
+                ("command", "number", "what it does", "parameters", "refused"), _commands(server.command_handlers())
+            ),
             "",
+            *(line for component in server.components for line in _component(component)),
         ]
     )
 
@@ -86,8 +93,25 @@ def _understood(server: MavlinkServer) -> Iterator[tuple[object, ...]]:
         yield name, known_type(name).msg_id, sections(handler)[""]
 
 
-def _commands(server: MavlinkServer) -> Iterator[tuple[object, ...]]:
-    for number, handler in sorted(server.command_handlers().items()):
+def _component(component: Component) -> Iterator[str]:
+    """What a component besides the autopilot says and understands."""
+    yield f"## {component.title} (component {component.compid})\n"
+    payloads = sorted(component.payloads().items())
+    if payloads:
+        rows = ((name, known_type(name).msg_id, sections(payload)[""]) for name, payload in payloads)
+        yield from _table(("message, when it is asked for", "id", "contents"), rows)
+        yield ""
+    messages = sorted(component.messages().items())
+    if messages:
+        rows = ((name, known_type(name).msg_id, sections(handler)[""]) for name, handler in messages)
+        yield from _table(("message understood", "id", "what is done with it"), rows)
+        yield ""
+    yield from _table(_COMMAND_HEADINGS, _commands(component.known))
+    yield ""
+
+
+def _commands(handlers: Mapping[int, CommandHandler]) -> Iterator[tuple[object, ...]]:
+    for number, handler in sorted(handlers.items()):
         entry = definitions.enums["MAV_CMD"].get(number)
         name = entry.name.removeprefix("MAV_CMD_") if entry else f"command {number}"
         parts = sections(handler)
@@ -96,6 +120,7 @@ def _commands(server: MavlinkServer) -> Iterator[tuple[object, ...]]:
 
 def sections(function: Callable[..., Any]) -> dict[str, str]:
     """The first line of a docstring under "", and its labelled paragraphs (`Params: …`) under their labels."""
+    function = getattr(function, "func", function)  # what a partial calls
     lines = (inspect.getdoc(function) or "").splitlines()
     parts = {"": lines[0].strip() if lines else ""}
     label = ""

@@ -27,6 +27,7 @@ from common.geodesy import GeoPoint
 
 CAMERA_ID = 100  # MAV_COMP_ID_CAMERA
 SHUTTER_US = 200_000  # from one photo to the next at the earliest; guess
+INTERVAL_MAX_S = 86_400.0
 PENDING_MAX = 2  # photos that wait for the host
 SHOTS_KEPT = 10_000
 VIDEO_BYTES_MIN = 1 << 20  # room a recording needs to begin
@@ -197,6 +198,8 @@ class Camera:
             return self.take_photo()
         if not isfinite(interval_s) or interval_s * 1e6 < SHUTTER_US:
             return Reply(Verdict.DENIED, f"the interval must be at least {SHUTTER_US * 1e-6:g} s")
+        if interval_s > INTERVAL_MAX_S:
+            return Reply(Verdict.DENIED, "the interval must be a day at most")
         return self.start_photos(interval_s, int(count))
 
     def take_photo(self) -> Reply:
@@ -297,6 +300,8 @@ class Camera:
             return self.stop_photos()
         if interval_s * 1e6 < SHUTTER_US:
             return Reply(Verdict.DENIED, f"the interval must be at least {SHUTTER_US * 1e-6:g} s")
+        if interval_s > INTERVAL_MAX_S:
+            return Reply(Verdict.DENIED, "the interval must be a day at most")
         self.trigger.stop_series()
         refusal = self._refusal()
         if refusal is not None:

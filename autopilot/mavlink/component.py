@@ -51,7 +51,7 @@ class Component:
     def __init__(self, endpoint: Endpoint, compid: int, mav_type: int, title: str) -> None:
         self.endpoint = endpoint
         self.compid = compid
-        self._title = title
+        self.title = title
         self._intervals: list[_Interval] = []
         self._next_heartbeat_us = 0
         self._due_us = 0
@@ -60,7 +60,7 @@ class Component:
         self.handlers: dict[int, Handler] = {
             known_type(name).msg_id: handler for name, handler in self.messages().items()
         }
-        self._commands: dict[int, CommandHandler] = {
+        self.known: dict[int, CommandHandler] = {  # by MAV_CMD
             mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
             mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
@@ -110,7 +110,7 @@ class Component:
             command: what is asked.
             is_addressed: it names this component; one to all is left to others where we do not know it.
         """
-        handler = self._commands.get(command.command)
+        handler = self.known.get(command.command)
         if not is_addressed and (handler is None or not self._concerns(command)):
             return False
         reply: Reply | None
@@ -124,7 +124,7 @@ class Component:
             self.ack(command, reply.verdict)
             is_refusal = reply.verdict not in (Verdict.ACCEPTED, Verdict.IN_PROGRESS)
             if is_refusal and reply.reason and command.command not in _PROBES:
-                self.endpoint.text_once(Severity.NOTICE, f"{self._title}: {reply.reason}")
+                self.endpoint.text_once(Severity.NOTICE, f"{self.title}: {reply.reason}")
         return True
 
     def _concerns(self, command: Command) -> bool:

@@ -186,6 +186,11 @@ class MavlinkServer:
         """Every command that is understood."""
         return self._commands.handlers
 
+    @property
+    def components(self) -> Sequence[Component]:
+        """The vehicle's components besides the autopilot."""
+        return self._components
+
     def _own_messages(self) -> dict[str, Handler]:
         return {
             "HEARTBEAT": self._heartbeat_received,

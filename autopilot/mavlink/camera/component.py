@@ -22,6 +22,7 @@ _CAPTURE_STATUS_ID = known_type("CAMERA_CAPTURE_STATUS").msg_id
 _CAMERA_SETTINGS = known_type("CAMERA_SETTINGS")
 _CAMERA_TRIGGER = known_type("CAMERA_TRIGGER")
 _CAMERA_IMAGE_CAPTURED = known_type("CAMERA_IMAGE_CAPTURED")
+_CAMERA_FEEDBACK = known_type("CAMERA_FEEDBACK")
 _IMAGE_CAPTURED_ID = _CAMERA_IMAGE_CAPTURED.msg_id
 # Requests older than REQUEST_MESSAGE, and what they ask for.
 _OLD_REQUESTS = {
@@ -183,6 +184,8 @@ class CameraComponent(Component):
     def _shot_taken(self, shot: Shot) -> None:
         self.broadcast(_CAMERA_IMAGE_CAPTURED, self._messages.image_captured(shot))
         self.endpoint.broadcast(_CAMERA_TRIGGER, _CAMERA_TRIGGER.pack(shot.time_us, shot.index))
+        if self.endpoint.dialect.name == "ardupilot":  # what its clients draw photos from
+            self.endpoint.broadcast(_CAMERA_FEEDBACK, self._messages.feedback(shot))
 
     # Information
 

@@ -1,6 +1,6 @@
 """What the camera tells of itself: information, settings, storage, capture, stream and field of view."""
 
-from math import atan, degrees, isfinite, nan, radians, tan
+from math import asin, atan, atan2, degrees, isfinite, nan, radians, tan
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -29,6 +29,7 @@ _settings = known_type("CAMERA_SETTINGS").pack
 _storage = known_type("STORAGE_INFORMATION").pack
 _capture_status = known_type("CAMERA_CAPTURE_STATUS").pack
 _image_captured = known_type("CAMERA_IMAGE_CAPTURED").pack
+_feedback = known_type("CAMERA_FEEDBACK").pack
 _stream_information = known_type("VIDEO_STREAM_INFORMATION").pack
 _stream_status = known_type("VIDEO_STREAM_STATUS").pack
 _fov_status = known_type("CAMERA_FOV_STATUS").pack
@@ -136,6 +137,23 @@ class CameraMessages:
             image_index=shot.index,
             capture_result=int(shot.is_stored),
             file_url=url,
+        )
+
+    def feedback(self, shot: Shot) -> bytes:
+        """One photo, as ArduPilot reports it."""
+        x, y, z, w = shot.q_ned_from_frd
+        return _feedback(
+            time_usec=SIMULATED_EPOCH_US + shot.time_us,
+            img_idx=shot.index + 1 & 0xFFFF,
+            lat=degrees_e7(shot.place.lat_deg),
+            lng=degrees_e7(shot.place.lon_deg),
+            alt_msl=shot.place.alt_m,
+            alt_rel=shot.above_home_m,
+            pitch=degrees(asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))),
+            yaw=degrees(atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))) % 360.0,
+            foc_len=FOCAL_LENGTH_MM,
+            flags=mavlink.CAMERA_FEEDBACK_PHOTO,
+            completed_captures=shot.index + 1 & 0xFFFF,
         )
 
     def stream_information(self) -> bytes | None:

@@ -11,6 +11,7 @@ from autopilot.camera.storage import MediaFolder
 from autopilot.gimbal.control import GimbalControl
 from autopilot.gimbal.gimbal import Gimbal
 from autopilot.host import Host
+from autopilot.mavlink.dialects.px4 import PX4
 from tests.unit.autopilot.mavlink.rig import FRAME_US, RecordingVehicle, Rig, flying_state
 
 CAMERA, GIMBAL = 100, 154
@@ -76,8 +77,8 @@ class PayloadVehicle(RecordingVehicle):
 class PayloadRig(Rig):
     """Server and client; the camera's frame runs before the server's, as in the controller."""
 
-    def __init__(self, folder=None, stream=None):
-        super().__init__(vehicle=PayloadVehicle(folder, stream))
+    def __init__(self, folder=None, stream=None, dialect=PX4):
+        super().__init__(dialect=dialect, vehicle=PayloadVehicle(folder, stream))
         self.vehicle.camera.settings.set("CAM_SMOOTH", 0)
 
     def frame(self, count=1):

@@ -2,6 +2,7 @@
 
 import struct
 from itertools import pairwise
+from math import degrees
 from xml.etree import ElementTree as ET
 
 import cv2
@@ -10,6 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.camera.settings import SETTINGS
 from autopilot.mavlink.camera.definition import definition_xml
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.vehicle import Verdict
 from tests.unit.autopilot.mavlink.payload_rig import CAMERA, GIMBAL, PayloadRig, Stream
 from tests.unit.autopilot.mavlink.rig import texts
@@ -159,7 +161,7 @@ def test_endless_series_ends_when_it_is_stopped_and_refuses_another_photo(rig):
     assert rig.vehicle.camera.shot_count == count == 2
 
 
-@pytest.mark.parametrize("params", [(0, 0.01, 0), (0, float("nan"), 0), (0, 1.0, -1), (7, 1.0, 0)])
+@pytest.mark.parametrize("params", [(0, 0.01, 0), (0, 3.4e38, 0), (0, float("nan"), 0), (0, 1.0, -1), (7, 1.0, 0)])
 def test_impossible_series_is_denied(rig, params):
     assert rig.acks(CAMERA, START, *params) == [(CAMERA, DENIED)]
 
@@ -373,3 +375,15 @@ def test_recording_ends_without_waiting_for_a_frame(rig, tmp_path):
     rig.frame(10)
     assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == [(CAMERA, ACCEPTED)]
     assert rig.vehicle.camera.recording is None
+
+
+def test_ardupilot_s_clients_get_camera_feedback(tmp_path):
+    rig = PayloadRig(tmp_path / "media", dialect=ARDUPILOT)
+    rig.vehicle.state.gimbal.gimbal.point(-0.5, 0.0, is_yaw_locked=True)
+    rig.frame(100)
+    rig.to(1, START, 0, 0, 1, 1)
+    (feedback,) = [m.fields for m in rig.frame(2) if m.name == "CAMERA_FEEDBACK"]
+    assert feedback.img_idx == 1
+    assert feedback.alt_rel == pytest.approx(30.0)
+    assert feedback.pitch == pytest.approx(degrees(-0.5))
+    assert feedback.flags == mavlink.CAMERA_FEEDBACK_PHOTO
