@@ -13,7 +13,7 @@ WORSE_MAX = 1.2
 SETPOINT_FRAMES = 2  # 25 Hz
 
 
-def lockstep(flood_per_frame, frames=1_000):
+def lockstep(flood_per_frame, frames=500):
     """Frames to a command's acknowledgement, frames to a setpoint's arrival, and times of heartbeats [us]."""
     pairs = [memory_pair(LinkRole.GROUND) for _ in range(CLIENTS)]
     vehicle = RecordingVehicle()
@@ -50,9 +50,9 @@ def lockstep(flood_per_frame, frames=1_000):
 
 
 def test_in_lockstep_the_others_notice_nothing_at_all():
-    peace, flood = lockstep(0), lockstep(2_000)
+    peace, flood = lockstep(0), lockstep(500)
     for calm, disturbed in zip(peace, flood, strict=True):
-        assert len(calm) > 15
+        assert len(calm) > 7
         np.testing.assert_array_equal(calm, disturbed)
 
 

@@ -2,6 +2,7 @@
 
 import socket
 
+import pytest
 from pymavlink import mavutil
 
 from tests.system.vehicle import IdleVehicle
@@ -13,6 +14,7 @@ def free_tcp_port():
         return probe.getsockname()[1]
 
 
+@pytest.mark.slow  # a process, on the wall clock
 def test_client_connects_asks_and_is_answered(tmp_path):
     port = free_tcp_port()
     with IdleVehicle(tmp_path, "--trees", 0, "--tcp-port", port):
