@@ -49,7 +49,15 @@ def height_error_m(pos_ned):
     return float(np.abs(pos_ned[:, 2] - pos_ned[0, 2]).max())
 
 
-@pytest.mark.parametrize("motors", [(1,), (2,), (3,), (4,), (5,), (6,), (1, 2), (3, 4), (5, 6)])
+@pytest.mark.parametrize(
+    "motors",
+    [
+        (1,),
+        (3,),
+        (1, 2),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in [(2,), (4,), (5,), (6,), (3, 4), (5, 6)]),
+    ],
+)
 def test_hover_with_motors_out(motors):
     flight = make_flight()
     paths = []

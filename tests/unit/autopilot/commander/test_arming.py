@@ -5,7 +5,7 @@ from math import nan
 import pytest
 
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
-from autopilot.vehicle import LandedState, Mode, Severity, Verdict
+from autopilot.vehicle import CalibrationKind, LandedState, Mode, Severity, Verdict
 from tests.unit.autopilot.kinematic import ALL_VALID, ORIGIN, Kinematic, geo
 
 
@@ -216,3 +216,24 @@ def test_parameters_take_effect_in_flight():
     rig.fc.arm(force=False)
     rig.table.set("COM_DISARM_PRFLT", 3.0)
     assert rig.disarmed() < 3.1
+
+
+@pytest.mark.parametrize(("may_go_without", "reason"), [(1, ""), (0, "GNSS: no 3-D fix")])
+def test_modes_without_a_position_need_gnss_only_if_it_is_asked_for(may_go_without, reason):
+    rig = Kinematic(COM_ARM_WO_GPS=may_go_without).ready()
+    rig.fc.set_mode(Mode.ALTITUDE)
+    set_gnss("fix_type", 0)(rig)
+    rig.run(1.0)
+    reasons = rig.fc.check_arming()
+    assert any(each.startswith("GNSS") for each in reasons) == bool(reason)
+    assert not reason or reason in reasons
+
+
+def test_vehicle_that_is_being_calibrated_is_not_armed():
+    rig = Kinematic().ready()
+    assert rig.fc.calibration.start(CalibrationKind.GYRO).verdict is Verdict.ACCEPTED
+    assert rig.fc.arm(force=False).reason == "a calibration is running"
+    rig.run(3.0)
+    assert rig.recorder.has_text("[cal] calibration done: gyro")
+    assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
+    assert rig.fc.calibration.start(CalibrationKind.GYRO).reason == "the vehicle is armed"
