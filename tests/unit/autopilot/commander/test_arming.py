@@ -221,7 +221,7 @@ def test_parameters_take_effect_in_flight():
 @pytest.mark.parametrize(("may_go_without", "reason"), [(1, ""), (0, "GNSS: no 3-D fix")])
 def test_modes_without_a_position_need_gnss_only_if_it_is_asked_for(may_go_without, reason):
     rig = Kinematic(COM_ARM_WO_GPS=may_go_without).ready()
-    rig.fc.set_mode(Mode.ALTITUDE)
+    rig.fc.commander.change_mode(Mode.ALTITUDE)  # no sticks: a client may not choose it
     set_gnss("fix_type", 0)(rig)
     rig.run(1.0)
     reasons = rig.fc.check_arming()
