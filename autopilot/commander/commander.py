@@ -170,8 +170,8 @@ class Commander:
             reasons.append("not on the ground")
         if MODE_RULES[mode].needs_sticks and not self._pilot.is_heard:
             reasons.append(NO_STICKS)
-        reasons += filter(None, (self._flying.refusal(mode), self._pilot.arming_reason(mode)))
-        reasons += filter(None, (self._flying.refusal(mode), self._flying.arming_reason()))
+        others = self._flying.refusal(mode), self._pilot.arming_reason(mode), self._flying.arming_reason()
+        reasons += filter(None, others)
         return reasons
 
     def request_mode(self, mode: Mode) -> Reply:
