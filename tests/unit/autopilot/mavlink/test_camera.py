@@ -48,6 +48,14 @@ def test_each_component_has_a_heartbeat_of_its_own_once_a_second(rig):
     assert len(beats) == 6
 
 
+def test_whoever_begins_to_listen_hears_the_autopilot_first(rig):
+    beats = [m.compid for m in rig.frame(500) if m.name == "HEARTBEAT"]
+    assert beats == [1, GIMBAL, CAMERA] * 10
+    frames = [{m.compid for m in rig.frame() if m.name == "HEARTBEAT"} for _ in range(50)]
+    assert [compids for compids in frames if compids] == [{1}, {GIMBAL, CAMERA}]
+    assert frames.index({GIMBAL, CAMERA}) - frames.index({1}) == 2
+
+
 def test_sequence_numbers_count_per_component(rig):
     seqs = {}
     for message in rig.frame(200):
