@@ -279,6 +279,8 @@ class VehicleState:
     is_failsafe: bool = False
     is_calibrating: bool = False
     armed_since_us: int = 0
+    goal_ned: tuple[float, float, float] = (nan, nan, nan)  # [m] place flown to; NaN: free
+    path_start_ned: tuple[float, float, float] = (nan, nan, nan)  # [m] of the straight way there; NaN: none
     takeoff_us: int = 0  # when it last left the ground; 0: not since it was armed
     flight_number: int = 0  # how often it has been armed since power-on
     battery_remaining: float = nan  # [0..1]

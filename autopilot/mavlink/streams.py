@@ -12,7 +12,7 @@ from autopilot.mavlink.codec import MessageType, known_type
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.identity import autopilot_version
 from autopilot.mavlink.links import LinkRole
-from autopilot.mavlink.telemetry import ardupilot, gimbal, motion, radio, sensors, status
+from autopilot.mavlink.telemetry import ardupilot, gimbal, guidance, motion, radio, sensors, status
 from autopilot.vehicle import VehicleState
 from common.kernels import FRAME_US
 
@@ -73,6 +73,7 @@ STREAMS: tuple[Stream, ...] = (
     Stream("ESTIMATOR_STATUS", sensors.estimator_status, 1, 2),
     Stream("AVAILABLE_MODES_MONITOR", status.available_modes_monitor, 0.2, 0.2),
     Stream("FLIGHT_INFORMATION", status.flight_information, 0, 0),
+    Stream("NAV_CONTROLLER_OUTPUT", guidance.nav_controller_output, 2, 2),
     Stream("EKF_STATUS_REPORT", ardupilot.ekf_status_report, 0, 0, 1),
     Stream("WIND", ardupilot.wind, 0, 0, 1),
     Stream("RANGEFINDER", ardupilot.rangefinder, 0, 0, 2),
@@ -81,7 +82,14 @@ STREAMS: tuple[Stream, ...] = (
 # REQUEST_DATA_STREAM: old requests name a group of messages (MAV_DATA_STREAM).
 GROUPS: dict[int, tuple[str, ...]] = {
     1: ("HIGHRES_IMU", "SCALED_IMU", "SCALED_PRESSURE"),  # RAW_SENSORS
-    2: ("SYS_STATUS", "GPS_RAW_INT", "MISSION_CURRENT", "EXTENDED_SYS_STATE", "FENCE_STATUS"),  # EXTENDED_STATUS
+    2: (
+        "SYS_STATUS",
+        "GPS_RAW_INT",
+        "MISSION_CURRENT",
+        "EXTENDED_SYS_STATE",
+        "FENCE_STATUS",
+        "NAV_CONTROLLER_OUTPUT",
+    ),  # EXTENDED_STATUS
     3: ("SERVO_OUTPUT_RAW", "RC_CHANNELS"),  # RC_CHANNELS
     4: ("ATTITUDE_TARGET",),  # RAW_CONTROLLER
     6: ("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"),  # POSITION

@@ -221,6 +221,7 @@ class Navigator:
             self.ask = Ask.STAY
         else:
             self._respect_ground()
+        state.goal_ned, state.path_start_ned = setpoint.pos_ned, setpoint.path_start_ned
         may_turn = state.is_armed and state.mode is not Mode.TERMINATION
         setpoint.set_flags(is_armed=may_turn, is_landed=context.is_on_ground)
         return wish

@@ -142,6 +142,7 @@ def flying_state() -> VehicleState:
         battery_remaining=0.8,
         battery_used_mah=400.0,
         battery_level=BatteryLevel.OK,
+        goal_ned=(40.0, 20.0, -30.0),
         mission_count=2,
         mission_current=1,
     )
