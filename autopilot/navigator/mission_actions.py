@@ -151,7 +151,9 @@ class Actions:
 
     def _pay(self, item: MissionItem) -> None:
         """Hands the item to the payload; a mission goes on if that cannot do it."""
-        reply = self._payload.run(item.command, item.params, item.x, item.y, self._alt_amsl_m(item))
+        # parameter 7 is an altitude where there is a place; plans give other items a frame all the same
+        z = self._alt_amsl_m(item) if item.command in _ROI_COMMANDS else item.z
+        reply = self._payload.run(item.command, item.params, item.x, item.y, z)
         self._tell(item, reply)
 
     def _tell(self, item: MissionItem, reply: Reply) -> None:

@@ -1,6 +1,6 @@
 """The camera in a flight: pictures of the world it flies in, a mission that takes them, and the live picture."""
 
-from math import nan
+from math import nan, radians
 from threading import Event, Thread
 from urllib.request import urlopen
 
@@ -68,7 +68,7 @@ def test_mission_takes_photos_along_its_way(tmp_path):
         await drone.until(lambda: drone.is_ready, 30.0, "ready")
         items = [
             PlanItem(0, 3, 22, (0.0, 0.0, 0.0, nan), home.lat_deg, home.lon_deg, 20.0),
-            PlanItem(1, 2, 205, (-90.0, 0.0, 0.0, 0.0), 0.0, 0.0, 2.0),
+            PlanItem(1, 3, 205, (-90.0, 0.0, 0.0, 0.0), 0.0, 0.0, 2.0),
             PlanItem(2, 2, 206, (20.0, 0.0, 1.0, 0.0), 0.0, 0.0, 0.0),
             PlanItem(3, 3, 16, (0.0, 0.0, 0.0, nan), north, home.lon_deg, 20.0),
             PlanItem(4, 2, 206, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0),
@@ -79,6 +79,7 @@ def test_mission_takes_photos_along_its_way(tmp_path):
             await drone.command(300)
             shots = [await inbox.next(40.0, "a photo") for _ in range(3)]
         places = [(shot.lat * 1e-7 - home.lat_deg) * 111_195.0 for shot in shots]
+        assert flight.controller.state.gimbal.gimbal.pitch == pytest.approx(radians(-90.0))
         assert np.diff(places) == pytest.approx(20.0, abs=1.0)
 
     running = flight.fly(survey)
