@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly test test-all test-mavproxy fuzz check tune bench format lock clean
+.PHONY: help setup fly test test-all test-mavproxy test-mavsdk3 fuzz check tune bench format lock clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -46,6 +46,16 @@ $(MAVPROXY)/.installed: tests/mavproxy/requirements.txt
 test-mavproxy: $(STAMP) $(MAVPROXY)/.installed ## Fly with MAVProxy, in an environment of its own (.venv-mavproxy)
 	$(MAVPROXY)/bin/python -m pytest -q -p no:cacheprovider tests/mavproxy $(ARGS)
 
+MAVSDK3 := .venv-mavsdk3
+
+$(MAVSDK3)/.installed: tests/mavsdk3/requirements.txt
+	@test -x $(MAVSDK3)/bin/python || "$(PYTHON)" -m venv $(MAVSDK3)
+	$(MAVSDK3)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/mavsdk3/requirements.txt
+	@touch $@
+
+test-mavsdk3: $(STAMP) $(MAVSDK3)/.installed ## Fly with MAVSDK 3, in an environment of its own (.venv-mavsdk3)
+	$(MAVSDK3)/bin/python -m pytest -q -p no:cacheprovider -W ignore::DeprecationWarning tests/mavsdk3 $(ARGS)
+
 check: $(STAMP) ## Check format, lint, types and layers, as CI does before the tests
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -69,5 +79,5 @@ lock: $(STAMP) ## Pin the installed versions in constraints.txt
 	@touch $(STAMP)
 
 clean: ## Remove the virtual environment, caches and build leftovers
-	rm -rf $(VENV) $(MAVPROXY) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(MAVPROXY) $(MAVSDK3) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find $(PACKAGES) tests bench -name __pycache__ -type d -prune -exec rm -rf {} +
