@@ -11,7 +11,7 @@ PACKAGES := common autopilot sim policies mission
 .PHONY: help setup fly test test-all test-mavproxy test-mavsdk3 fuzz check tune bench format lock clean
 
 help: ## List the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
 
 setup: $(STAMP) ## Make the virtual environment in .venv (the other targets do so by themselves)
 
