@@ -103,8 +103,9 @@ def test_tree_has_a_crown_above_its_trunk_and_right_is_east(world, renderer):
     assert picture.depth_m[0, 120, column] == pytest.approx(6.0 - tree["trunk_radius"], abs=0.1)
 
 
-def test_walls_are_seen_at_the_edge(renderer):
-    picture = renderer.pictures([CameraPose((195.0, 0.0, -30.0), LEVEL_NORTH)], WIDTH, HEIGHT)
+def test_walls_are_seen_at_the_edge(world, renderer):
+    up = float(world.height(195.0, 0.0)) + 4.0
+    picture = renderer.pictures([CameraPose((195.0, 0.0, -up), LEVEL_NORTH)], WIDTH, HEIGHT)
     assert picture.kind[0, HEIGHT // 2 + 5, WIDTH // 2] == WALL
     assert picture.depth_m[0, HEIGHT // 2 + 5, WIDTH // 2] == pytest.approx(5.0, abs=1e-3)
 
