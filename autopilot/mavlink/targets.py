@@ -31,7 +31,7 @@ _VEL_STD_M_S = 0.3  # guess
 _POS_STD_MIN_M = 0.1
 _STATION_SILENT_US = 10_000_000  # a station's position is not used while another was used less than that ago
 _WIDEST_RAD = radians(80.0)  # at which a camera may see a landing target
-_YAW_BEHAVIOURS = (0, 1, 2, 3, 5)  # ORBIT_YAW_BEHAVIOUR; 4 is by sticks
+_YAW_BEHAVIOURS = range(6)  # ORBIT_YAW_BEHAVIOUR
 _LOCAL_NED, _BODY_FRAMES = 1, frozenset({8, 12, 20})  # LOCAL_NED; BODY_NED, BODY_FRD, LOCAL_FRD
 
 
@@ -143,11 +143,11 @@ class TargetService(Service):
         """Flies round a point until another mode is chosen, or for a number of turns.
 
         Params: p1 radius [m], positive is clockwise, NaN: MC_ORBIT_RAD; p2 speed [m/s], negative turns the other way,
-        NaN: 5 or what the circle allows; p3 heading: 0 to the centre, 1 as it was, 2 free, 3 along the circle, 5 as
-        before; p4 turns [rad], 0 or NaN: for ever; p5, p6 centre, NaN: here, or the present centre; p7 altitude, NaN:
-        as it is.
+        NaN: 5 or what the circle allows; p3 heading: 0 to the centre, 1 as it was, 2 free, 3 along the circle, 4 by the
+        yaw stick, 5 as before; p4 turns [rad], 0 or NaN: for ever; p5, p6 centre, NaN: here, or the present centre; p7
+        altitude, NaN: as it is.
         Refused: TEMPORARILY_REJECTED on the ground or without a position; DENIED for a radius or speed that cannot be
-        flown, and for a heading by sticks.
+        flown, and for a heading that is none of these.
         """
         if not is_position(command.x, command.y):
             return denied("there is no such latitude and longitude")

@@ -1,11 +1,17 @@
-"""Orbit: flies round a point until another mode is chosen, or for a number of turns."""
+"""Orbit: flies round a point until another mode is chosen, or for a number of turns.
+
+A pilot's sticks change it, as in PX4: forward flies a smaller circle, left flies faster clockwise, the throttle climbs;
+with the nose along the circle right flies a smaller one and forward flies faster.
+"""
 
 from enum import IntEnum
 from math import cos, hypot, isfinite, nan, sin
 
 from autopilot.navigator.circle import Circle, speed_limit
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.manual import speed_down_of, yaw_rate_of
 from autopilot.navigator.setpoint import Vector
+from autopilot.sticks import StickInput, curved, without_centre
 from autopilot.vehicle import ACCEPTED, OrbitRequest, OrbitStatus, Reply, Verdict
 from common.geodesy import GeoPoint
 
@@ -74,9 +80,7 @@ class Orbit:
             self._yaw = OrbitYaw(int(context.number("MC_ORBIT_YAW_MOD")))
         self._turns_rad = request.turns_rad if isfinite(request.turns_rad) else 0.0
         self.circle = Circle(centre, radius_m, speed, here)
-        context.state.orbit = OrbitStatus(
-            self.circle.direction * self.circle.radius_m, self._yaw, GeoPoint(*context.geodetic_of(centre))
-        )
+        self._tell(self.circle)
         self._is_on_circle = False
         self._start_yaw = context.state.yaw_rad
         self._time_us = context.state.time_us
@@ -101,19 +105,61 @@ class Orbit:
                 down - place[2]
             ) < context.number("NAV_MC_ALT_RAD")
             return
+        sticks = context.state.sticks
+        away_m_s, down_m_s = 0.0, 0.0
+        if now_us <= sticks.heard_until_us:
+            away_m_s, down_m_s = self._adjust(circle, sticks, dt_s)
         circle.advance(dt_s)
         if 0.0 < self._turns_rad <= circle.turned_rad:
             context.hold_next(context.stop_point(), context.state.yaw_rad)
             return
-        turns = self._yaw in (OrbitYaw.TO_CENTRE, OrbitYaw.ALONG)
-        context.setpoint.track(circle.pos_ned, circle.vel_ned, self._heading(circle), circle.yaw_rate if turns else nan)
+        north, east, _ = circle.vel_ned
+        vel_ned = (north + away_m_s * cos(circle.angle), east + away_m_s * sin(circle.angle), down_m_s)
+        context.setpoint.track(circle.pos_ned, vel_ned, self._heading(circle), self._yaw_rate(circle))
+
+    def _adjust(self, circle: Circle, sticks: StickInput, dt_s: float) -> tuple[float, float]:
+        """Lets the pilot change the circle; returns the speeds [m/s] outwards and down with which it changes."""
+        number = self._context.number
+        dead, expo = number("MAN_DEADZONE"), number("MPC_XY_MAN_EXPO")
+        forward = curved(without_centre(sticks.pitch, dead), expo)
+        right = curved(without_centre(sticks.roll, dead), expo)
+        down_m_s = speed_down_of(self._context)
+        if forward == right == down_m_s == 0.0:
+            return 0.0, 0.0
+        if self._yaw is OrbitYaw.ALONG:
+            inwards, faster = circle.direction * right, circle.direction * forward
+        else:
+            inwards, faster = forward, -right
+        away_m_s = -inwards * number("MPC_XY_CRUISE")
+        radius_m = circle.radius_m + away_m_s * dt_s
+        circle.radius_m = min(max(radius_m, _RADIUS_MIN_M), _RADIUS_MAX_M)
+        speed = circle.direction * circle.speed_m_s + faster * number("MPC_ACC_HOR") * dt_s  # clockwise
+        circle.speed_m_s = min(abs(speed), self._fastest(circle.radius_m))
+        if speed != 0.0 and self._yaw is not OrbitYaw.ALONG:
+            circle.direction = 1.0 if speed > 0.0 else -1.0
+        elif speed * circle.direction < 0.0:
+            circle.speed_m_s = 0.0  # it does not fly backwards
+        north, east, down = circle.centre_ned
+        circle.centre_ned = (north, east, down + down_m_s * dt_s)
+        self._tell(circle)
+        return away_m_s if circle.radius_m == radius_m else 0.0, down_m_s
+
+    def _tell(self, circle: Circle) -> None:
+        centre = GeoPoint(*self._context.geodetic_of(circle.centre_ned))
+        self._context.state.orbit = OrbitStatus(circle.direction * circle.radius_m, self._yaw, centre)
+
+    def _yaw_rate(self, circle: Circle) -> float:
+        if self._yaw is OrbitYaw.BY_STICKS:
+            is_heard = self._context.state.time_us <= self._context.state.sticks.heard_until_us
+            return yaw_rate_of(self._context) if is_heard else 0.0
+        return circle.yaw_rate if self._yaw in (OrbitYaw.TO_CENTRE, OrbitYaw.ALONG) else nan
 
     def _heading(self, circle: Circle) -> float:
         if self._yaw is OrbitYaw.TO_CENTRE:
             return circle.yaw_to_centre
         if self._yaw is OrbitYaw.ALONG:
             return circle.yaw_along
-        return nan if self._yaw is OrbitYaw.FREE else self._start_yaw
+        return nan if self._yaw in (OrbitYaw.FREE, OrbitYaw.BY_STICKS) else self._start_yaw
 
     def _fastest(self, radius_m: float) -> float:
         """The speed [m/s] with which a circle can be flown."""
