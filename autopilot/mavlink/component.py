@@ -17,8 +17,6 @@ from autopilot.mavlink.service import Command, CommandHandler, Handler, denied
 from autopilot.vehicle import ACCEPTED, Reply, Severity, Verdict
 from common.kernels import FRAME_US
 
-HEARTBEAT_US = 1_000_000
-AFTER_AUTOPILOT_US = 40_000  # clients take the first heartbeat they hear for the vehicle's
 NEVER_US = 1 << 62
 _PROBES = frozenset(
     number for number, entry in mavlink.enums["MAV_CMD"].items() if entry.name.startswith("MAV_CMD_REQUEST_")
@@ -54,7 +52,6 @@ class Component:
         self.compid = compid
         self.title = title
         self._intervals: list[_Interval] = []
-        self._next_heartbeat_us = NEVER_US  # not planned yet
         self._due_us = 0
         self._heartbeat = _HEARTBEAT.pack(mav_type, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3)
         self._payloads = {known_type(name).msg_id: payload for name, payload in self.payloads().items()}
@@ -207,22 +204,20 @@ class Component:
 
     # Time
 
+    def send_heartbeat(self) -> None:
+        """The server says when."""
+        self.broadcast(_HEARTBEAT, self._heartbeat)
+
     def wake(self) -> None:
         """Something has changed: look in the next frame what is due."""
         self._due_us = 0
 
     def frame(self) -> None:
-        """Heartbeat, messages at intervals, and the component's own work, when due."""
+        """Messages at intervals, and the component's own work, when due."""
         now_us = self.endpoint.time_us
         if now_us < self._due_us:
             return
-        if self._next_heartbeat_us == NEVER_US:
-            self._next_heartbeat_us = now_us + AFTER_AUTOPILOT_US
-        if now_us >= self._next_heartbeat_us:
-            self._next_heartbeat_us += HEARTBEAT_US
-            self.broadcast(_HEARTBEAT, self._heartbeat)
-            self._intervals = [item for item in self._intervals if item.channel.is_open]  # clients come and go
-        due_us = min(self._next_heartbeat_us, self.work())
+        due_us = self.work()
         for item in self._intervals:
             if now_us >= item.due_us:
                 item.due_us = max(item.due_us + item.interval_us, now_us + FRAME_US)

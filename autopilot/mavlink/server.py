@@ -50,6 +50,8 @@ from autopilot.mavlink.traffic import TrafficService
 from autopilot.mavlink.winch import WinchComponent
 from autopilot.vehicle import Severity, Vehicle
 
+HEARTBEAT_US = 1_000_000
+AFTER_AUTOPILOT_US = 40_000
 _HEARTBEAT = known_type("HEARTBEAT")
 _HOME_POSITION = known_type("HOME_POSITION")
 _MISSION_CURRENT = known_type("MISSION_CURRENT")
@@ -97,6 +99,7 @@ class MavlinkServer:
         self._router = Router(self._endpoint)
         self._turn = 0
         self._is_heartbeat_due = False
+        self._next_component_heartbeat_us = -1  # not planned yet
         self._commands = CommandService(self._endpoint)
         self._messages: dict[str, Handler] = {}
         self._handlers: dict[int, Handler] = {}  # the same, by id
@@ -213,6 +216,8 @@ class MavlinkServer:
             self._serve(busy)
         for run in self._frames:
             run()
+        if self._components and time_us >= self._next_component_heartbeat_us:
+            self._send_component_heartbeats(time_us)
         if self._is_heartbeat_due:
             self._is_heartbeat_due = False
             self._broadcast_telemetry(_HEARTBEAT.msg_id)
@@ -315,6 +320,20 @@ class MavlinkServer:
 
     def home_changed(self) -> None:
         self._broadcast_telemetry(_HOME_POSITION.msg_id)
+
+    def _send_component_heartbeats(self, time_us: int) -> None:
+        """Once a second, and the vehicle's right behind them.
+
+        Some clients (MAVSDK's FollowMe) read the flight mode from whichever heartbeat of the system came last; others
+        take the first one they ever hear for the vehicle's.
+        """
+        if self._next_component_heartbeat_us < 0:
+            self._next_component_heartbeat_us = time_us + AFTER_AUTOPILOT_US
+            return
+        self._next_component_heartbeat_us = time_us + HEARTBEAT_US
+        for component in self._components:
+            component.send_heartbeat()
+        self._is_heartbeat_due = True
 
     def heartbeat_now(self) -> None:
         """Sends a heartbeat in this frame, after the mode or arming has changed."""

@@ -21,9 +21,12 @@ class RawMavsdk:
     Args:
         make_turn: gets the vehicle's end of the link and returns what runs one frame of the server.
         is_lost: asked for every message to MAVSDK, by its bytes; True loses it.
+        frame_wall_s: wall-clock time between frames; MAVSDK's timers run on it.
     """
 
-    def __init__(self, make_turn, is_lost=lambda _: False):
+    def __init__(self, make_turn, is_lost=lambda _: False, frame_wall_s=FRAME_WALL_S):
+        self._frame_wall_s = frame_wall_s
+        self._plugins = {}
         self._is_lost = is_lost
         vehicle_end, self._link = memory_pair(LinkRole.ONBOARD)
         self._turn = make_turn(vehicle_end)
@@ -42,10 +45,16 @@ class RawMavsdk:
                     if self._is_lost(data):
                         continue
                     self._mavsdk.pass_received_raw_bytes(data)
-                sleep(FRAME_WALL_S)
+                sleep(self._frame_wall_s)
         except BaseException as error:
             self.failure = error
             raise
+
+    def plugin(self, kind):
+        """MAVSDK's plugin of a kind for the vehicle; one, kept, because a plugin must not go while messages come."""
+        if kind not in self._plugins:
+            self._plugins[kind] = kind(self.system)
+        return self._plugins[kind]
 
     def __enter__(self):
         self._thread.start()
