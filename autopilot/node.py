@@ -18,6 +18,7 @@ from autopilot.commander.commander import Commander
 from autopilot.commander.landing import LandingDetector
 from autopilot.commander.motors import LeaveOut, MotorWatch, ReadSpeeds
 from autopilot.commander.pilot import Pilot
+from autopilot.external import ExternalPositions
 from autopilot.gimbal.control import GimbalControl
 from autopilot.gimbal.gimbal import Gimbal
 from autopilot.guidance import Guidance
@@ -68,6 +69,7 @@ class HostPorts:
     setpoint: np.ndarray[Any, Any]  # live structured view, shape (1,), of the Setpoint row
     read_rotor_speeds: ReadSpeeds | None = None  # ESC telemetry
     leave_out: LeaveOut | None = None  # rotors that the control allocation shall not use
+    external: np.ndarray[Any, Any] | None = None  # live structured view, shape (1,), of the ExternalSample row
 
 
 class Server(Announcer, Protocol):
@@ -157,6 +159,10 @@ class FlightController:
         self._injector = injector
         self._on_corrections = on_corrections
         self._setpoint = SetpointPort(ports.setpoint)
+        state = self.state
+        self.external = ExternalPositions(
+            ports.external, params, lambda: state.time_us, lambda: (state.estimate, state.yaw_rad)
+        )
         hover, standing_m = hover_thrust(airframe), airframe.contact.leg_z_m
         self.commander = Commander(
             self.state,
@@ -213,6 +219,8 @@ class FlightController:
             self.camera.frame()
         for server in self._servers:
             server.frame(time_us)
+        if self.external.waiting:
+            self.external.write()
 
     def _read(self, time_us: int) -> None:
         """Renews the vehicle state from the kernel rows."""

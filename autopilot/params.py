@@ -10,6 +10,7 @@ from math import sqrt
 from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
+from autopilot.external import EXTERNAL_PARAMETERS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.obstacles import OBSTACLE_PARAMETERS
 from autopilot.stick_params import STICK_PARAMETERS
@@ -77,6 +78,7 @@ def all_parameters() -> list[Parameter]:
         *STICK_PARAMETERS,
         *TRAFFIC_PARAMETERS,
         *OBSTACLE_PARAMETERS,
+        *EXTERNAL_PARAMETERS,
     ]
 
 

@@ -1,8 +1,8 @@
 """The flight controller's connectors: what goes in, what comes out.
 
-In: `Samples` from sensor drivers (a simulator, a log or a board) at each tick, `Setpoint` from the Python part at
-each frame. Out: `Estimate`, and `Actuators` at each tick. Each is one row per vehicle. Frames are ned (local tangent
-plane whose origin is the home the vehicle boots at) and frd; units SI unless the name says otherwise.
+In: `Samples` from sensor drivers (a simulator, a log or a board) at each tick, `Setpoint` and `ExternalSample` from the
+Python part at each frame. Out: `Estimate`, and `Actuators` at each tick. Each is one row per vehicle. Frames are ned
+(local tangent plane whose origin is the home the vehicle boots at) and frd; units SI unless the name says otherwise.
 A sample is new when its `time_us` differs from that of the last one used; 0 means never measured.
 """
 
@@ -28,6 +28,13 @@ HEIGHT_VALID = wp.constant(16)
 TERRAIN_VALID = wp.constant(32)
 WIND_VALID = wp.constant(64)
 DEAD_RECKONING = wp.constant(128)
+EXTERNAL_POSITION = wp.constant(256)  # a client's horizontal position is being fused
+
+# ExternalSample.holds: the bits of EKF2_EV_CTRL
+EXTERNAL_HOLDS_POS = wp.constant(1)  # north and east
+EXTERNAL_HOLDS_HEIGHT = wp.constant(2)
+EXTERNAL_HOLDS_VEL = wp.constant(4)
+EXTERNAL_HOLDS_YAW = wp.constant(8)
 
 
 @wp.struct
@@ -74,6 +81,22 @@ class RangeSample:
     time_us: wp.int64
     distance_m: float
     is_valid: int  # 0: out of range or no return
+
+
+@wp.struct
+class ExternalSample:
+    """Where a client (motion capture, visual odometry) says that the vehicle is."""
+
+    time_us: wp.int64  # time of validity; the sample arrives later
+    holds: int  # EXTERNAL_HOLDS_* bits of what it tells; the rest is 0
+    reset_count: int  # grows when the client has set its answer anew
+    pos_ned: wp.vec3  # [m]
+    vel_ned: wp.vec3  # [m/s]
+    yaw: float  # [rad]
+    pos_h_std: float  # [m]
+    pos_v_std: float  # [m]
+    vel_std: float  # [m/s]
+    yaw_std: float  # [rad]
 
 
 @wp.struct

@@ -405,6 +405,12 @@ class ObstaclePort(Protocol):
     def reported(self, time_us: int, distances_m: Sequence[float], first_rad: float, increment_rad: float) -> None: ...
 
 
+class ExternalPort(Protocol):
+    """Positions from outside (autopilot.external)."""
+
+    def report(self, report: Any) -> str: ...
+
+
 class TrafficPort(Protocol):
     """Other aircraft (autopilot.traffic)."""
 
@@ -447,6 +453,9 @@ class Vehicle(Protocol):
 
     @property
     def obstacles(self) -> ObstaclePort: ...
+
+    @property
+    def external(self) -> ExternalPort: ...
 
     @property
     def guided(self) -> GuidedPort: ...

@@ -276,5 +276,6 @@ def host_ports(rig: Rig, airframe: Airframe, i_vehicle: int = 0) -> HostPorts:
         read_health=row_reader(estimator, i_vehicle, "EstimatorState"),
         setpoint=autopilot.setpoint.numpy()[i_vehicle : i_vehicle + 1],
         read_rotor_speeds=esc_reader(rig.arrays.body.numpy(), i_vehicle),
+        external=autopilot.ekf.external.numpy()[i_vehicle : i_vehicle + 1],
         leave_out=rotors_leaver(autopilot.airframe.numpy()[i_vehicle : i_vehicle + 1], airframe),
     )

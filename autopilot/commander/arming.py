@@ -6,7 +6,7 @@ In: the vehicle's state. Out: reasons, most important first; empty means ready. 
 from collections.abc import Callable
 from math import hypot, radians
 
-from autopilot.ports import HEIGHT_VALID, POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
+from autopilot.ports import EXTERNAL_POSITION, HEIGHT_VALID, POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
 from autopilot.vehicle import VehicleState
 from common.params import ParameterTable
 
@@ -87,6 +87,8 @@ def _battery(state: VehicleState, params: ParameterTable) -> str:
 
 
 def _gnss(state: VehicleState, params: ParameterTable) -> str:
+    if state.estimate.flags & EXTERNAL_POSITION:
+        return ""
     gnss = state.samples.gnss
     if _is_stale(state, gnss.time_us, _GNSS_STALE_US):
         return "GNSS: no data"

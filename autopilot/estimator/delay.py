@@ -15,6 +15,7 @@ from common.rotation import quat_from_rotvec
 
 wp.set_module_options({"enable_backward": False})
 
+MAX_AGE_S = wp.constant(0.3)  # a sample later than that behind the horizon is too old to be carried forward
 _MAX_STEPS = wp.constant(3)  # horizon steps per tick: catches up after a gap
 _MIN_DT_S = wp.constant(1.0e-4)
 _MAX_DT_S = wp.constant(0.1)  # a longer gap in a log would be integrated with a rate that is no longer true

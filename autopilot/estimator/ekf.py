@@ -12,6 +12,7 @@ import warp as wp
 from autopilot.estimator.align import aligned_nominal, average, is_aligned
 from autopilot.estimator.calibration import calibrated
 from autopilot.estimator.delay import (
+    MAX_AGE_S,
     bounded_sample,
     correct_output,
     due_count,
@@ -39,6 +40,7 @@ from autopilot.estimator.params import HEIGHT_REF_GNSS, MAG_TYPE_NONE, Estimator
 from autopilot.estimator.predict import predict_nominal, process_variance
 from autopilot.estimator.sources.baro import BARO_STUCK_AFTER, BARO_STUCK_MOVED, baro_repeats, fuse_baro, start_baro
 from autopilot.estimator.sources.drag import drag_is_due, fuse_drag, is_airborne
+from autopilot.estimator.sources.external import listen_external, receive_external, take_external
 from autopilot.estimator.sources.gnss import (
     GNSS_STUCK_AFTER,
     GNSS_STUCK_MOVED,
@@ -55,6 +57,7 @@ from autopilot.estimator.sources.rest import fuse_rest, observe_stillness, rest_
 from autopilot.estimator.state import (
     BARO_RING,
     COV_ROWS,
+    EXTERNAL_RING,
     GNSS_RING,
     IMU_RING,
     MAG_RING,
@@ -66,12 +69,19 @@ from autopilot.estimator.state import (
     EstimatorState,
     OutputSample,
 )
-from autopilot.ports import BaroSample, GnssSample, ImuSample, MagSample, RangeSample, Samples
+from autopilot.ports import (
+    BaroSample,
+    ExternalSample,
+    GnssSample,
+    ImuSample,
+    MagSample,
+    RangeSample,
+    Samples,
+)
 from common.kernels import GRAVITY_M_S2, vec24
 
 wp.set_module_options({"enable_backward": False})
 
-MAX_AGE_S = wp.constant(0.3)  # a sample later than that behind the horizon is too old to be carried forward
 SOUNDNESS_SAMPLES = wp.constant(256)  # the covariance is looked over once a second
 WATCH_SAMPLES = wp.constant(4)  # flags and deviations are renewed at 62 Hz
 
@@ -154,12 +164,13 @@ def take_gnss(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
     cov = ekf.covariance
     nominal = propagate_wander(params, cov, i, ekf.rows[i].nominal, sample, ekf.rows[i].wander_time_us)
     ekf.rows[i].wander_time_us = sample.time_us
+    may_reset = ekf.rows[i].external_pos.is_active == 0
     if ekf.rows[i].is_yaw_aligned == 1:
-        nominal, vel_aid = fuse_gnss_vel(params, cov, i, nominal, ekf.rows[i].gnss_vel, sample)
-        nominal, pos_aid = fuse_gnss_pos(params, cov, i, nominal, ekf.rows[i].gnss_pos, sample, age_s)
+        nominal, vel_aid = fuse_gnss_vel(params, cov, i, nominal, ekf.rows[i].gnss_vel, sample, may_reset)
+        nominal, pos_aid = fuse_gnss_pos(params, cov, i, nominal, ekf.rows[i].gnss_pos, sample, age_s, may_reset)
         ekf.rows[i].gnss_vel = vel_aid
         ekf.rows[i].gnss_pos = pos_aid
-    is_reference = ekf.rows[i].baro.is_active == 0
+    is_reference = ekf.rows[i].baro.is_active == 0 and ekf.rows[i].external_height.is_active == 0
     nominal, height_aid = fuse_gnss_height(
         params, cov, i, nominal, ekf.rows[i].gnss_height, sample, age_s, is_reference
     )
@@ -188,7 +199,7 @@ def take_baro(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
         ekf.rows[i].origin_baro_height,
         sample,
         age_s,
-        is_gnss_good,
+        is_gnss_good or is_healthy(ekf.rows[i].external_height),
     )
     ekf.rows[i].nominal = nominal
     ekf.rows[i].baro = aid
@@ -235,6 +246,8 @@ def take_drag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
         drag_sum.ground_d = ekf.rows[i].nominal.pos_ned[2]
     if is_airborne(drag_sum, ekf.rows[i].nominal):
         is_starved = seconds_since(now_us, ekf.rows[i].gnss_vel.fused_time_us) > DEAD_RECKONING_AFTER_S
+        if ekf.rows[i].external_pos.is_active == 1 or ekf.rows[i].external_vel.is_active == 1:
+            is_starved = False
         corrects_velocity = params.drag_ctrl == 2 and is_starved
         nominal, aid = fuse_drag(
             params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].drag, drag_sum, now_us, corrects_velocity
@@ -301,6 +314,8 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
         take_mag(ekf, i, params, now_us, imu.gyro_frd)
     if is_waiting(ekf.rows[i].range_inbox):
         take_range(ekf, i, params, now_us)
+    if is_waiting(ekf.rows[i].external_inbox):
+        take_external(ekf, i, params, now_us)
     if params.drag_ctrl > 0 and drag_is_due(ekf.rows[i].drag_sum):
         take_drag(ekf, i, params, now_us)
     if ekf.rows[i].stillness.is_still == 1:
@@ -323,6 +338,8 @@ def watch(ekf: Ekf, i: int, params: EstimatorParams) -> None:
     ekf.rows[i].baro = listen(ekf.rows[i].baro, ekf.rows[i].baro_inbox, now_us)
     ekf.rows[i].mag = listen(ekf.rows[i].mag, ekf.rows[i].mag_inbox, now_us)
     ekf.rows[i].range = listen(ekf.rows[i].range, ekf.rows[i].range_inbox, now_us)
+    if ekf.rows[i].external_inbox.head > 0:
+        listen_external(ekf, i, now_us)
     if ekf.rows[i].imu_tail % SOUNDNESS_SAMPLES == 0:
         if not is_sound(ekf.covariance, i, ekf.rows[i].nominal):
             ekf.rows[i].fault_count += 1
@@ -360,6 +377,7 @@ def align(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample, samples: Sa
     ekf.rows[i].baro_inbox.tail = ekf.rows[i].baro_inbox.head
     ekf.rows[i].mag_inbox.tail = ekf.rows[i].mag_inbox.head
     ekf.rows[i].range_inbox.tail = ekf.rows[i].range_inbox.head
+    ekf.rows[i].external_inbox.tail = ekf.rows[i].external_inbox.head
 
 
 @wp.func
@@ -377,6 +395,8 @@ def estimator_step(ekf: Ekf, i: int, samples: Samples) -> None:
     ekf.rows[i].time_us = imu.time_us
     ekf.rows[i].stillness = observe_stillness(ekf.rows[i].stillness, imu)
     receive_samples(ekf, i, clean)
+    if ekf.external[i].time_us != ekf.rows[i].external_inbox.arrived_time_us:
+        receive_external(ekf, i)
     if ekf.rows[i].phase == PHASE_ALIGNING:
         align(ekf, i, params, imu, clean)
     else:
@@ -411,6 +431,7 @@ def at_boot(ekf: Ekf, i: int) -> EstimatorState:
 def estimator_reset(ekf: Ekf, i: int) -> None:
     """Powers the estimator of vehicle i on anew."""
     ekf.rows[i] = at_boot(ekf, i)
+    ekf.external[i] = ExternalSample()
 
 
 @wp.kernel(enable_backward=False)
@@ -437,5 +458,7 @@ def make_ekf(vehicle_count: int, device: str = "cpu", params: Any = None) -> Ekf
     ekf.baro_ring = wp.zeros((vehicle_count, BARO_RING), dtype=BaroSample, device=device)
     ekf.mag_ring = wp.zeros((vehicle_count, MAG_RING), dtype=MagSample, device=device)
     ekf.range_ring = wp.zeros((vehicle_count, RANGE_RING), dtype=RangeSample, device=device)
+    ekf.external = wp.zeros(vehicle_count, dtype=ExternalSample, device=device)
+    ekf.external_ring = wp.zeros((vehicle_count, EXTERNAL_RING), dtype=ExternalSample, device=device)
     wp.launch(reset_rows, dim=vehicle_count, inputs=[ekf], device=device)
     return ekf

@@ -23,6 +23,7 @@ from autopilot.estimator.state import (
 )
 from autopilot.ports import (
     DEAD_RECKONING,
+    EXTERNAL_POSITION,
     HEIGHT_VALID,
     POSITION_VALID,
     TERRAIN_VALID,
@@ -109,7 +110,12 @@ def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: 
         if state.is_yaw_aligned == 1 and cov[i, ATT + 2][ATT + 2] < _MAX_YAW_VAR:
             bits = bits | YAW_ALIGNED
         pos_s = seconds_since(now_us, state.gnss_pos.fused_time_us)
+        external_pos_s = seconds_since(now_us, state.external_pos.fused_time_us)
+        if external_pos_s < DEAD_RECKONING_AFTER_S:
+            bits = bits | EXTERNAL_POSITION
+        pos_s = wp.min(pos_s, external_pos_s)
         vel_s = wp.min(pos_s, seconds_since(now_us, state.gnss_vel.fused_time_us))
+        vel_s = wp.min(vel_s, seconds_since(now_us, state.external_vel.fused_time_us))
         if pos_s < params.no_aid_s and cov[i, POS][POS] < _MAX_POS_VAR:
             bits = bits | POSITION_VALID
         if vel_s < params.no_aid_s:
@@ -119,6 +125,7 @@ def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: 
         height_s = seconds_since(now_us, state.baro.fused_time_us)
         if state.baro.is_active == 0:
             height_s = seconds_since(now_us, state.gnss_height.fused_time_us)
+        height_s = wp.min(height_s, seconds_since(now_us, state.external_height.fused_time_us))
         if height_s < params.no_aid_s:
             bits = bits | HEIGHT_VALID
         if state.range.is_active == 1 and seconds_since(now_us, state.range.fused_time_us) < _TERRAIN_AFTER_S:

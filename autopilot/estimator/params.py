@@ -88,6 +88,9 @@ class EstimatorParams:
     drag_ballistic_x: float
     drag_ballistic_y: float
     wind_walk: float
+    external_ctrl: int
+    external_pos_gate: float
+    external_vel_gate: float
 
 
 _BMI088 = "BMI088 data sheet and vibration of a 10-inch quadrotor (guess)"
@@ -316,6 +319,20 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
         "airframe: drag area",
         "drag_ballistic_y",
     ),
+    Parameter(
+        "EKF2_EV_CTRL",
+        0,
+        0,
+        15,
+        "",
+        "use of positions from outside: 1 horizontal position, 2 height, 4 velocity, 8 heading",
+        "15 in PX4: here nothing from outside is believed unasked",
+        "external_ctrl",
+    ),
+    Parameter(
+        "EKF2_EVP_GATE", 5.0, 1.0, 50.0, "SD", "gate of position and heading from outside", _PX4, "external_pos_gate"
+    ),
+    Parameter("EKF2_EVV_GATE", 3.0, 1.0, 50.0, "SD", "gate of velocity from outside", _PX4, "external_vel_gate"),
     Parameter("EKF2_WIND_NSD", 0.1, 0.0, 1.0, "m/s/sqrt(s)", "random walk of the wind", "guess: gusts", "wind_walk"),
 ]
 

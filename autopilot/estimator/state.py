@@ -1,7 +1,8 @@
 """The estimator's state: what it believes, how sure it is, and how each source of measurements is doing.
 
 One `EstimatorState` per vehicle lives in `Ekf.rows`; the covariance and the rings of waiting samples are arrays of
-their own, because they are indexed. All of it is written by `estimator_step` alone; the host reads.
+their own, because they are indexed. All of it is written by `estimator_step` alone, but for the newest external
+sample; the host reads.
 
 Error state and covariance order: attitude (rotation vector in ned) 0-2, velocity 3-5, position 6-8, gyro bias 9-11,
 accelerometer bias 12-14, earth field 15-17, body field 18-20, wind north and east 21-22, terrain 23. Then four
@@ -12,7 +13,7 @@ covariances with the 24 errors, row 28 holds those among themselves, 4 x 4.
 import warp as wp
 
 from autopilot.estimator.params import EstimatorParams
-from autopilot.ports import BaroSample, Estimate, GnssSample, ImuSample, MagSample, RangeSample
+from autopilot.ports import BaroSample, Estimate, ExternalSample, GnssSample, ImuSample, MagSample, RangeSample
 from common.kernels import vec24
 
 wp.set_module_options({"enable_backward": False})
@@ -40,6 +41,7 @@ GNSS_RING = wp.constant(4)
 BARO_RING = wp.constant(16)
 MAG_RING = wp.constant(16)
 RANGE_RING = wp.constant(16)
+EXTERNAL_RING = wp.constant(16)  # one in each 20 ms frame
 
 PHASE_ALIGNING = wp.constant(0)
 PHASE_RUNNING = wp.constant(1)
@@ -178,6 +180,7 @@ class EstimatorState:
     baro_inbox: Inbox
     mag_inbox: Inbox
     range_inbox: Inbox
+    external_inbox: Inbox
     gnss_pos: Aid  # north, east [m]
     gnss_vel: Aid  # north, east, down [m/s]
     gnss_height: Aid  # down [m]
@@ -186,6 +189,11 @@ class EstimatorState:
     range: Aid  # along body down [m]
     drag: Aid  # x, y [m/s²]
     rest: Aid  # zero velocity while the vehicle stands still [m/s]
+    external_pos: Aid  # north, east [m]
+    external_height: Aid  # down [m]
+    external_vel: Aid  # north, east, down [m/s]
+    external_yaw: Aid  # [rad]
+    external_reset_count: int  # of the last external sample used
     wander_time_us: wp.int64  # to which the GNSS wander was propagated
     drag_sum: DragSum
     is_yaw_aligned: int
@@ -207,3 +215,5 @@ class Ekf:
     baro_ring: wp.array2d(dtype=BaroSample)
     mag_ring: wp.array2d(dtype=MagSample)
     range_ring: wp.array2d(dtype=RangeSample)
+    external: wp.array(dtype=ExternalSample)  # the newest, written by the Python part
+    external_ring: wp.array2d(dtype=ExternalSample)

@@ -20,6 +20,7 @@ from autopilot.mavlink.devices import DeviceService
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.events import EventService
+from autopilot.mavlink.external import ExternalService
 from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
@@ -141,6 +142,7 @@ class MavlinkServer:
             DeviceService(endpoint),
             TrafficService(endpoint),
             ObstacleService(endpoint),
+            ExternalService(endpoint),
         ]
 
     def _make_components(self) -> list[Component]:

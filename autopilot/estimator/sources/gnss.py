@@ -6,6 +6,7 @@ place never takes the mean of many fixes for better than the wander they share.
 
 Starts with the first good fix once heading is known. Stops with the fix. Sets position and velocity when the first fix
 is far off or nothing passed the gate for a while; a velocity that did not fit for so long puts heading in doubt too.
+While a client's position is fused it sets nothing: two frames that differ would set the state in turn.
 """
 
 import warp as wp
@@ -83,6 +84,7 @@ def fuse_gnss_vel(
     nominal: Nominal,
     aid: Aid,
     sample: GnssSample,
+    may_reset: bool,
 ) -> tuple[Nominal, Aid]:
     """Velocity: three axes that pass or fail together."""
     var = noise_variance(aid, gnss_vel_std(params, sample))
@@ -97,7 +99,7 @@ def fuse_gnss_vel(
                 axis_innov = sample.vel_ned[axis] - nominal.vel_ned[axis]
                 nominal = fuse_state(params, cov, i, nominal, VEL + axis, axis_innov, var)
             aid = mark_fused(aid)
-        elif starved_s > _RESET_AFTER_S:
+        elif may_reset and starved_s > _RESET_AFTER_S:
             nominal.vel_jump_ned = nominal.vel_jump_ned + innov
             nominal.vel_ned = sample.vel_ned
             nominal.reset_count += 1
@@ -174,6 +176,7 @@ def fuse_gnss_pos(
     aid: Aid,
     sample: GnssSample,
     age_s: float,
+    may_reset: bool,
 ) -> tuple[Nominal, Aid]:
     """Horizontal position: two axes that pass or fail together."""
     var = noise_variance(aid, gnss_pos_std(params, sample))
@@ -195,7 +198,7 @@ def fuse_gnss_pos(
                 axis_innov = pos_ned[axis] - nominal.pos_ned[axis] - nominal.slow[axis]
                 nominal = fuse(params, cov, i, nominal, ph, ph_slow, axis_innov, hph + var)
             aid = mark_fused(aid)
-        elif is_lost or starved_s > _RESET_AFTER_S:
+        elif may_reset and (is_lost or starved_s > _RESET_AFTER_S):
             nominal.reset_count += 1
             for axis in range(2):
                 nominal = set_gnss_axis(params, cov, i, nominal, sample, axis, pos_ned[axis], var)

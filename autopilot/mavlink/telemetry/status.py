@@ -9,7 +9,7 @@ from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.convert import INT16_MAX, UINT16_MAX, bounded_int, degrees_e7, i16, i32, u16
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.telemetry.motion import boot_ms
-from autopilot.ports import POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
+from autopilot.ports import EXTERNAL_POSITION, POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
 from autopilot.vehicle import FenceLimit, LandedState, Mode, VehicleState
 
 _heartbeat = known_type("HEARTBEAT").pack
@@ -49,6 +49,7 @@ _MAG = mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
 _BARO = mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
 _GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
 _RANGE = mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION
+_VISION = mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION  # present once a client's position was used
 _BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
 _AHRS = mavlink.MAV_SYS_STATUS_AHRS
 _ATTITUDE_CONTROL = (
@@ -103,6 +104,8 @@ def system_status(state: VehicleState) -> int:
 def sys_status(state: VehicleState) -> bytes:
     """Which sensors work, whether it may be armed, battery, load."""
     present = _ALWAYS | (_RANGE if state.samples.range.time_us else 0) | (_RC if state.sticks.heard_until_us else 0)
+    if state.health and state.health.external_pos.fused_time_us:
+        present |= _VISION
     fence = state.fence
     battery = state.samples.battery
     return _sys_status(
@@ -131,6 +134,8 @@ def healthy_sensors(state: VehicleState) -> int:
     has_fix = samples.gnss.fix_type >= FIX_3D and _works(samples.gnss, health and health.gnss_inbox, now_us)
     if has_fix and flags & POSITION_VALID:
         bits |= _GPS
+    if flags & EXTERNAL_POSITION:
+        bits |= _VISION
     if samples.battery.time_us and now_us - samples.battery.time_us < FRESH_US:
         bits |= _BATTERY
     if flags & TILT_ALIGNED and flags & YAW_ALIGNED:

@@ -10,6 +10,7 @@ import numpy as np
 from autopilot.camera.camera import Camera
 from autopilot.commander.watch import StationLink
 from autopilot.estimator.state import EstimatorState
+from autopilot.external import ExternalPositions
 from autopilot.host import Host
 from autopilot.lists import ItemLists
 from autopilot.mavlink.codec import FrameReader, Message, decode, encode, message_id
@@ -35,6 +36,7 @@ from autopilot.ports import (
     YAW_ALIGNED,
     Actuators,
     Estimate,
+    ExternalSample,
     Samples,
 )
 from autopilot.sticks import Sticks
@@ -260,6 +262,13 @@ class RecordingVehicle:
         self.payload.add(AuxOutputs(self.state))
         self.traffic = Traffic(self.state, self.params)
         self.obstacles = Obstacles(self.params)
+        self.external_row = np.zeros(1, dtype=ExternalSample.numpy_dtype())
+        self.external = ExternalPositions(
+            self.external_row,
+            self.params,
+            lambda: self.state.time_us,
+            lambda: (self.state.estimate, self.state.yaw_rad),
+        )
         self.obstacles.sensed(self.state.time_us, [5.0] * 71 + [float("inf")], 0.0)
         self.state.obstacles = self.obstacles
         self.state.read_truth = record_of_body
