@@ -10,9 +10,13 @@ from pymavlink.dialects.v20 import all as definitions
 
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.component import Component
+from autopilot.mavlink.dialects import Alias, Dialect
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.service import CommandHandler
 from autopilot.mavlink.streams import Stream
+from autopilot.vehicle import Mode
 
 ROOT = Path(__file__).parents[1]
 HEADER = """\
@@ -20,7 +24,7 @@ HEADER = """\
 
 Written by `docs/generate.py` from the code: do not edit.
 
-What the vehicle says and understands. How to connect each ground station or library is in [flying](flying.md); the
+What the vehicle says and understands. How to connect each ground station or library is in [clients](clients.md); the
 parameters are in [parameters](parameters.md). Time is simulated time everywhere: rates, intervals and time-outs count
 the vehicle's seconds, which pass faster than yours with `--speed` above 1.
 
@@ -56,6 +60,17 @@ def mavlink_text(server: MavlinkServer) -> str:
             ),
             "",
             *(line for component in server.components for line in _component(component)),
+            "## Flight modes\n",
+            *_table(("mode", "PX4: name, main / sub mode", "ArduPilot: name, number"), _modes()),
+            "\nA mode without a name is shown as the one whose numbers stand there, and entered by a command or a "
+            "failsafe.\n",
+            "## ArduPilot's parameter names\n",
+            "With `--dialect ardupilot` these names stand for [parameters](parameters.md) of ours, in ArduPilot's "
+            "units; all other parameters keep their own names. Setting one sets ours.\n",
+            *_table(("ArduPilot", "ours", "ours to ArduPilot's"), _aliases()),
+            "\nThese can be read and are never changed:\n",
+            *_table(("name", "value", "meaning"), ((c.name, f"{c.value:g}", c.meaning) for c in ARDUPILOT.constants)),
+            "",
         ]
     )
 
@@ -134,3 +149,30 @@ def sections(function: Callable[..., Any]) -> dict[str, str]:
         elif label:
             parts[label] += " " + line.strip()
     return parts
+
+
+def _modes() -> Iterator[tuple[object, ...]]:
+    names = {dialect.name: {row.mode: row.name for row in dialect.modes} for dialect in (PX4, ARDUPILOT)}
+    for mode in Mode:
+        px4 = PX4.custom_mode(mode)
+        numbers = f"{px4 >> 16 & 0xFF} / {px4 >> 24 & 0xFF}", _number(ARDUPILOT, mode)
+        shown = (
+            f"{names[dialect.name].get(mode, '')} {number}".strip()
+            for dialect, number in zip((PX4, ARDUPILOT), numbers, strict=True)
+        )
+        yield mode.name, *shown
+
+
+def _number(dialect: Dialect, mode: Mode) -> str:
+    return str(dialect.custom_mode(mode))
+
+
+def _aliases() -> Iterator[tuple[object, ...]]:
+    for alias in sorted(ARDUPILOT.aliases, key=lambda each: each.name):
+        yield alias.name, alias.of, _conversion(alias)
+
+
+def _conversion(alias: Alias) -> str:
+    if alias.numbers is not None:
+        return ", ".join(f"{ours} is {theirs}" for ours, theirs in alias.numbers.items())
+    return "" if alias.scale == 1.0 else f"times {alias.scale:g}"

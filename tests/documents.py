@@ -9,6 +9,7 @@ NEEDS_VEHICLE = "<!-- vehicle -->"  # in front of an example that talks to a veh
 
 _FENCE = re.compile(r"^( *)(<!-- vehicle -->\n *)?```(\w*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+_REFERENCE = re.compile(r"^\[([^\]]+)\]: (\S+)$", re.MULTILINE)
 
 
 def pages():
@@ -29,8 +30,13 @@ def blocks(page, language, *, needs_vehicle=False):
 def links(page):
     """Targets of a page's links and pictures that point into the project, as (path, anchor)."""
     text = _FENCE.sub("", page.read_text(encoding="utf-8"))
-    targets = [target for target in _LINK.findall(text) if "://" not in target]
+    targets = [target for target in [*_LINK.findall(text), *references(page).values()] if "://" not in target]
     return [tuple(target.partition("#")[::2]) for target in targets]
+
+
+def references(page):
+    """Targets of a page's reference links, by name."""
+    return dict(_REFERENCE.findall(page.read_text(encoding="utf-8")))
 
 
 def anchors(page):

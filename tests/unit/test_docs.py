@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mission.cli import app
-from tests.documents import PACKAGES, ROOT, anchors, blocks, commands, links, pages
+from tests.documents import PACKAGES, ROOT, anchors, blocks, commands, links, pages, references
 
 PAGES = {page.relative_to(ROOT).as_posix(): page for page in pages()}
 HONEYGUIDE = ".venv/bin/honeyguide"
@@ -100,6 +100,24 @@ def test_examples_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     program = "\n".join(blocks(PAGES[name], "python"))
     exec(compile(program, name, "exec"), {"__name__": name})
+
+
+def test_tests_that_are_named_for_clients_exist():
+    page = PAGES["docs/clients.md"]
+    files = {name: (page.parent / target).read_text(encoding="utf-8") for name, target in references(page).items()}
+    rows = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("|")]
+    named = [(test, re.findall(r"\[([\w-]+)\]", row)) for row in rows for test in re.findall(r"`(test_\w+)`", row)]
+    assert len(named) > 20
+    for test, places in named:
+        assert any(f"def {test}(" in files[place] for place in places), test
+
+
+def test_reference_links_are_defined_and_used():
+    for page in PAGES.values():
+        text = page.read_text(encoding="utf-8")
+        used = set(re.findall(r"\[([\w-]+)\](?![:(\w])", re.sub(r"`[^`]*`", "", text)))
+        for name in references(page):
+            assert name in used, f"{page}: [{name}]"
 
 
 def test_parameter_list_is_current(monkeypatch):
