@@ -17,7 +17,7 @@ _PAUSABLE = (Mode.MISSION, Mode.OFFBOARD, Mode.GUIDED)
 
 
 class Guidance:
-    """One vehicle's (autopilot.vehicle.Guidance)."""
+    """One vehicle's (autopilot.abilities.Guidance)."""
 
     def __init__(self, commander: Commander, navigator: Navigator, payload: Payloads) -> None:
         self._commander = commander

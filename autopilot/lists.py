@@ -5,8 +5,57 @@ list from outside comes through here, so that listeners hear of every change.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
 
-from autopilot.vehicle import ItemList, ItemRefusal, ListKind, MissionItem
+
+@dataclass(frozen=True, slots=True)
+class MissionItem:
+    """One mission item as the protocol carries it; x and y are degrees (or metres in a local frame)."""
+
+    seq: int
+    frame: int  # MAV_FRAME
+    command: int  # MAV_CMD
+    params: tuple[float, float, float, float]
+    x: float  # [deg] latitude
+    y: float  # [deg] longitude
+    z: float  # [m] in the item's frame
+    autocontinue: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class ItemRefusal:
+    """Why a mission was not taken: the item and the MAV_MISSION_RESULT to answer with."""
+
+    seq: int
+    result: int
+    reason: str
+
+
+class ListKind(IntEnum):
+    """The lists of items that clients upload, numbered as MAV_MISSION_TYPE."""
+
+    MISSION = 0
+    FENCE = 1
+    RALLY = 2
+
+
+class ItemList(Protocol):
+    """One such list: checked and kept as a whole."""
+
+    @property
+    def items(self) -> Sequence[MissionItem]: ...
+
+    @property
+    def capacity(self) -> int:
+        """How many items it may have."""
+        ...
+
+    def load(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
+        """Replaces the list as a whole, or refuses it as a whole and keeps the old one."""
+        ...
+
 
 ListListener = Callable[[ListKind], None]
 

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from autopilot.abilities import Announcer
 from autopilot.camera.camera import Camera
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.calibration import Calibrator, Turntable
@@ -24,7 +25,7 @@ from autopilot.gimbal.gimbal import Gimbal
 from autopilot.guidance import Guidance
 from autopilot.host import Host
 from autopilot.injection import Failure, FailureInjector, Unit, failure_request, injection_refusal
-from autopilot.lists import ItemLists
+from autopilot.lists import ItemLists, ItemRefusal, ListKind, MissionItem
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.navigator import Navigator
@@ -32,24 +33,10 @@ from autopilot.navigator.setpoint import SetpointPort
 from autopilot.obstacles import Obstacles
 from autopilot.outputs import AuxOutputs
 from autopilot.payload import Payloads
+from autopilot.requests import OffboardSetpoint, OrbitRequest, TargetReport
 from autopilot.sticks import Sticks
 from autopilot.traffic import Traffic
-from autopilot.vehicle import (
-    ACCEPTED,
-    Announcer,
-    ItemRefusal,
-    LandedState,
-    ListKind,
-    MissionItem,
-    Mode,
-    OffboardSetpoint,
-    OrbitRequest,
-    Reply,
-    Severity,
-    TargetReport,
-    VehicleState,
-    Verdict,
-)
+from autopilot.vehicle import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from common.airframe import Airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import GRAVITY_M_S2
@@ -106,7 +93,7 @@ class _Relay:
 
 
 class FlightController:
-    """One vehicle as MAVLink handlers and scripts see it (autopilot.vehicle.Vehicle).
+    """One vehicle as MAVLink handlers and scripts see it (autopilot.abilities.Vehicle).
 
     Args:
         ports: its kernel rows.
@@ -246,7 +233,7 @@ class FlightController:
             mode = Mode.LAND
         self.commander.change_mode(mode)
 
-    # ---- autopilot.vehicle.Vehicle ----
+    # ---- autopilot.abilities.Vehicle ----
 
     def has_mode(self, mode: Mode) -> bool:
         return self.navigator.has_mode(mode)

@@ -8,8 +8,7 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from autopilot.host import Storage
-from autopilot.lists import ItemLists
-from autopilot.vehicle import ListKind, MissionItem
+from autopilot.lists import ItemLists, ListKind, MissionItem
 from common.params import Parameter, ParameterError, ParameterTable
 
 PARAMETERS = "parameters"

@@ -12,7 +12,7 @@ from math import isnan
 from pathlib import Path
 from typing import Any, TypeVar
 
-from autopilot.vehicle import MissionItem
+from autopilot.lists import MissionItem
 from common.files import write_whole
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from mission.plan_checks import COMMANDS_WITH_POSITION, DO_JUMP, Place, PlanError, check_item

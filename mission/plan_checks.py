@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import isfinite, isnan, nan
 from typing import Any, NoReturn
 
-from autopilot.vehicle import MissionItem
+from autopilot.lists import MissionItem
 from common.geodesy import GeoPoint
 
 FLOAT32_MAX = 3.4028234663852886e38  # the protocol sends float32

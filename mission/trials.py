@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from autopilot.vehicle import MissionItem
+from autopilot.lists import MissionItem
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from mission.plan import DEFAULT_PLAN, read_plan

@@ -6,7 +6,7 @@ Columns: number, current, frame, command, four parameters, x (latitude), y (long
 from dataclasses import replace
 from math import isnan, nan
 
-from autopilot.vehicle import MissionItem
+from autopilot.lists import MissionItem
 from common.geodesy import GeoPoint
 from mission.plan_checks import DO_JUMP, FLOAT32_MAX, FRAME_GLOBAL, NAV_WAYPOINT, Place, check_item
 

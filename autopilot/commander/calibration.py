@@ -11,7 +11,9 @@ from typing import Protocol
 
 import numpy as np
 
-from autopilot.vehicle import ACCEPTED, Announcer, CalibrationKind, Reply, Severity, VehicleState, Verdict
+from autopilot.abilities import Announcer
+from autopilot.requests import CalibrationKind
+from autopilot.vehicle import ACCEPTED, Reply, Severity, VehicleState, Verdict
 from common.kernels import GRAVITY_M_S2
 from common.params import ParameterTable
 

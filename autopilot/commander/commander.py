@@ -6,6 +6,7 @@ which mode to fly through `Flying`, and asks it what it alone can know.
 
 from math import hypot, isfinite, pi, sqrt
 
+from autopilot.abilities import Announcer
 from autopilot.commander.arming import arming_reasons
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.failsafe import CRASHED
@@ -18,7 +19,7 @@ from autopilot.commander.pilot import Pilot
 from autopilot.commander.watch import FailureWatch, StationLink
 from autopilot.navigator.ground import Ask
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID
-from autopilot.vehicle import ACCEPTED, Announcer, LandedState, Mode, Reply, Severity, VehicleState, Verdict
+from autopilot.vehicle import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
 

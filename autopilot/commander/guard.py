@@ -6,6 +6,7 @@ weaker one, never the other way round; a pilot who chooses a mode takes over, an
 
 from typing import Protocol
 
+from autopilot.abilities import Announcer
 from autopilot.commander.failsafe import (
     ACTION_MODES,
     FLIGHT_TIME_OVER,
@@ -14,7 +15,7 @@ from autopilot.commander.failsafe import (
     RULES,
     Action,
 )
-from autopilot.vehicle import Announcer, LandedState, Mode, Severity, VehicleState
+from autopilot.vehicle import LandedState, Mode, Severity, VehicleState
 from common.params import ParameterTable
 
 

@@ -7,7 +7,8 @@ told to do without them (CA_FAILURE_MODE). A failed motor is kept at idle, so th
 from collections.abc import Callable, Sequence
 from math import sqrt
 
-from autopilot.vehicle import Announcer, LandedState, Severity, VehicleState
+from autopilot.abilities import Announcer
+from autopilot.vehicle import LandedState, Severity, VehicleState
 from common.airframe import Airframe
 from common.params import Parameter, ParameterTable
 

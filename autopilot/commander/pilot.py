@@ -5,11 +5,12 @@ In: `state.sticks`, when a message came. Out: requests to the commander, as a cl
 
 from typing import Protocol
 
+from autopilot.abilities import Announcer
 from autopilot.commander.failsafe import STICKS_LOST
 from autopilot.commander.modes import MODE_RULES
 from autopilot.commander.watch import EXCEPTION_BITS
 from autopilot.sticks import Sticks
-from autopilot.vehicle import Announcer, LandedState, Mode, Reply, Severity, VehicleState, Verdict
+from autopilot.vehicle import LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from common.params import Parameter, ParameterTable
 
 _LOW_THROTTLE = -0.8  # of thrust modes, for arming (PX4)

@@ -8,7 +8,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot.mavlink.channel import Endpoint
 from autopilot.mavlink.convert import whole
 from autopilot.mavlink.service import Command, CommandHandler, Service, denied
-from autopilot.vehicle import ACCEPTED, CalibrationKind, Reply, Verdict
+from autopilot.requests import CalibrationKind
+from autopilot.vehicle import ACCEPTED, Reply, Verdict
 
 _ACCEL_KINDS = {1: CalibrationKind.ACCEL, 2: CalibrationKind.LEVEL, 4: CalibrationKind.ACCEL_SIMPLE}
 _OFFSET_SENSORS = {0: "GYRO", 1: "ACC", 2: "MAG"}

@@ -7,6 +7,7 @@ all of them.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from autopilot.abilities import Vehicle
 from autopilot.mavlink.codec import SIGNED_FLAG, MessageType, frame_bytes, known_type
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.intake import Intake
@@ -14,7 +15,7 @@ from autopilot.mavlink.links import FixedLinks, Link, LinkSource
 from autopilot.mavlink.parameter_view import ParameterView
 from autopilot.mavlink.signing import MemoryStore, Signer, SigningConfig
 from autopilot.mavlink.streams import StreamSchedule, Telemetry
-from autopilot.vehicle import Severity, Vehicle
+from autopilot.vehicle import Severity
 from common.clock import SIMULATED_EPOCH_US
 
 AUTOPILOT_COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.vehicle import MissionItem, VehicleState
+from autopilot.lists import MissionItem
+from autopilot.vehicle import VehicleState
 
 _JUMP = mavlink.MAV_CMD_DO_JUMP
 

@@ -6,8 +6,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.lists import ItemRefusal, MissionItem
 from autopilot.mavlink.convert import INT32_MAX, LATLON_FRAMES, MISSION_FRAME, bounded_int
-from autopilot.vehicle import ItemRefusal, MissionItem
 
 LOCAL_SCALE = 1.0e4  # local positions travel as 0.1 mm
 

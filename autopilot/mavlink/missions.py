@@ -11,13 +11,14 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.lists import ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.goto import GotoService
 from autopilot.mavlink.home_item import with_home, without_home
 from autopilot.mavlink.mission_items import infinite_element, item_from_fields, scaled_position
 from autopilot.mavlink.service import Handler, Service
-from autopilot.vehicle import ItemRefusal, ListKind, MissionItem, Severity
+from autopilot.vehicle import Severity
 
 RETRY_US = 1_500_000  # the MAVLink mission protocol's default time-out
 RETRIES_MAX = 5

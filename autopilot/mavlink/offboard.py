@@ -26,7 +26,8 @@ from autopilot.ports import (
     TERRAIN_VALID,
     YAW_ALIGNED,
 )
-from autopilot.vehicle import OffboardSetpoint, Severity
+from autopilot.requests import OffboardSetpoint
+from autopilot.vehicle import Severity
 from common.geodesy import ned_from_geodetic
 
 Triple = tuple[float, float, float]

@@ -10,6 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.abilities import Vehicle
 from autopilot.mavlink.calibration import CalibrationService
 from autopilot.mavlink.camera.component import AttachedCamera, CameraComponent
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, OnFrame, Sender
@@ -49,7 +50,7 @@ from autopilot.mavlink.targets import TargetService
 from autopilot.mavlink.telemetry.status import mission_progress
 from autopilot.mavlink.traffic import TrafficService
 from autopilot.mavlink.winch import WinchComponent
-from autopilot.vehicle import Severity, Vehicle
+from autopilot.vehicle import Severity
 
 HEARTBEAT_US = 1_000_000
 AFTER_AUTOPILOT_US = 40_000

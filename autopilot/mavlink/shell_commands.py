@@ -6,9 +6,10 @@ from fnmatch import fnmatchcase
 from math import degrees, isfinite, nan
 from typing import Any
 
+from autopilot.lists import ListKind
 from autopilot.mavlink.channel import Endpoint
 from autopilot.mavlink.identity import PROJECT, project_version
-from autopilot.vehicle import LandedState, ListKind, Mode, Reply, Verdict
+from autopilot.vehicle import LandedState, Mode, Reply, Verdict
 
 Lines = Iterable[str]
 

@@ -22,7 +22,8 @@ from autopilot.mavlink.convert import (
 )
 from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
 from autopilot.ports import POSITION_VALID
-from autopilot.vehicle import OrbitRequest, Reply, Severity, TargetReport
+from autopilot.requests import OrbitRequest, TargetReport
+from autopilot.vehicle import Reply, Severity
 from common.geodesy import ned_from_geodetic
 
 HAS_POSITION, HAS_VELOCITY, HAS_ATTITUDE = 1, 2, 8  # FOLLOW_TARGET.est_capabilities

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import hypot, nan
 
+from autopilot.lists import MissionItem
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.fence import Fence
 from autopilot.navigator.items import RELATIVE_FRAMES
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.rally import RallyPoints
 from autopilot.navigator.setpoint import Vector
-from autopilot.vehicle import MissionItem
 
 
 class ReturnType(IntEnum):

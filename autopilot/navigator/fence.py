@@ -7,13 +7,14 @@ and whether a place may be flown to. What a breach leads to is the commander's t
 from collections.abc import Sequence
 from math import hypot, inf
 
+from autopilot.lists import ItemRefusal, MissionItem
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.detour import Bounds, detour
 from autopilot.navigator.fence_items import MAX_FENCE_ITEMS, FenceCommand, fence_shapes
 from autopilot.navigator.region import Region, region_of
 from autopilot.navigator.setpoint import Vector
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID
-from autopilot.vehicle import ACCEPTED, FenceLimit, ItemRefusal, LandedState, MissionItem, Mode, Reply, Severity
+from autopilot.vehicle import ACCEPTED, FenceLimit, LandedState, Mode, Reply, Severity
 from common.params import Parameter
 
 ALL_LIMITS = int(FenceLimit.CEILING | FenceLimit.RADIUS | FenceLimit.SHAPES | FenceLimit.FLOOR)

@@ -11,8 +11,8 @@ from math import cos, isfinite, radians
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.lists import ItemRefusal, MissionItem
 from autopilot.navigator.items import Result
-from autopilot.vehicle import ItemRefusal, MissionItem
 
 MAX_FENCE_ITEMS = 500  # bounds memory, and the time of a check near a border
 MIN_VERTICES = 3

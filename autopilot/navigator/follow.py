@@ -11,8 +11,9 @@ from math import atan2, cos, hypot, isfinite, nan, pi, radians, sin
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.target import TargetFilter
+from autopilot.requests import TargetReport
 from autopilot.sticks import StickInput
-from autopilot.vehicle import Severity, TargetReport
+from autopilot.vehicle import Severity
 from common.params import Parameter
 
 LOST_US = 3_000_000  # a target not heard of for longer is waited for (ArduPilot's AP_FOLLOW_TIMEOUT_MS)

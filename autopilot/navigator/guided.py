@@ -14,7 +14,8 @@ from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff import Climb
 from autopilot.navigator.way import Way
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_LEAN, SETPOINT_TRAJECTORY
-from autopilot.vehicle import ACCEPTED, LandedState, OffboardSetpoint, Reply, Severity, Verdict
+from autopilot.requests import OffboardSetpoint
+from autopilot.vehicle import ACCEPTED, LandedState, Reply, Severity, Verdict
 
 THRUST_IS_THRUST = 8  # bit of GUID_OPTIONS
 _LEAST_TAKEOFF_M = 0.5  # above the place where it stands; guess

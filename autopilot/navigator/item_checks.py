@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from math import isfinite
 
+from autopilot.lists import ItemRefusal, MissionItem
 from autopilot.navigator.items import (
     ABSOLUTE_FRAMES,
     MAX_ITEMS,
@@ -18,7 +19,7 @@ from autopilot.navigator.items import (
     Result,
     is_here,
 )
-from autopilot.vehicle import FenceLimit, ItemRefusal, MissionItem
+from autopilot.vehicle import FenceLimit
 
 _DEEP_M = 5.0  # below home, from which an item is worth a warning: the terrain there is not known; guess
 # Carried out by a payload only, as the refusal says: camera, gimbal, servos, relays, gripper, winch, parachute

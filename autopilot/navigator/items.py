@@ -6,7 +6,7 @@ Numbers of commands, frames and results are MAVLink's; they are written here so 
 from enum import IntEnum
 from math import isfinite
 
-from autopilot.vehicle import MissionItem
+from autopilot.lists import MissionItem
 
 MAX_ITEMS = 2_000  # bounds memory and the time of a download
 

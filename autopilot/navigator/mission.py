@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 from math import hypot
 
+from autopilot.abilities import FenceSwitch
+from autopilot.lists import ItemRefusal, MissionItem
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.item_checks import refuse_items, warning_of
 from autopilot.navigator.items import MAX_ITEMS, NAV_COMMANDS, PLACED, PLACED_OR_HERE, Command, is_here, is_same
@@ -17,7 +19,7 @@ from autopilot.navigator.mission_route import Route
 from autopilot.navigator.precision import PrecisionLand
 from autopilot.navigator.setpoint import Vector
 from autopilot.payload import Payloads
-from autopilot.vehicle import ACCEPTED, FenceSwitch, ItemRefusal, MissionItem, Mode, Reply, Severity, Verdict
+from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 from common.params import Parameter
 
 _SPEED_PARAMETERS = frozenset(("MPC_XY_CRUISE", "MPC_Z_V_AUTO_UP", "MPC_Z_V_AUTO_DN", "MPC_XY_VEL_MAX"))

@@ -8,13 +8,15 @@ from collections import deque
 from collections.abc import Callable
 from math import isfinite, nan, radians
 
+from autopilot.abilities import FenceSwitch
+from autopilot.lists import MissionItem
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.items import CONDITIONS, RELATIVE_FRAMES, ROI_AS_ASKED, Command, is_here
 from autopilot.navigator.mission_legs import Leg
 from autopilot.navigator.mission_route import Route
 from autopilot.navigator.setpoint import Vector
 from autopilot.payload import Payloads
-from autopilot.vehicle import FenceLimit, FenceSwitch, MissionItem, Reply, Severity, Verdict
+from autopilot.vehicle import FenceLimit, Reply, Severity, Verdict
 
 _ROI_NEXT = 1.0  # MAV_ROI_WPNEXT
 _ROI_COMMANDS = ROI_AS_ASKED | {Command.ROI_LOCATION, Command.ROI_NEXT_OFFSET, Command.ROI_NONE}

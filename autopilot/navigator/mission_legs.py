@@ -6,6 +6,7 @@ In: an item and where its leg begins. Out: setpoints, and whether the item is do
 from enum import IntEnum
 from math import cos, hypot, isfinite, nan, pi, radians, sin
 
+from autopilot.lists import MissionItem
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.curve import Circle, Polyline, Runner, bearing, between, spline
 from autopilot.navigator.items import WAYPOINTS, Command, hold_time_s, is_here, passes_through
@@ -14,7 +15,6 @@ from autopilot.navigator.mission_route import Route, distance_to_line
 from autopilot.navigator.precision import PrecisionLand
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff import Climb
-from autopilot.vehicle import MissionItem
 
 _ON_PATH_M = 5.0  # a vehicle paused this near its leg goes back to it rather than straight on; guess
 _LANDING_RADIUS_M = 1.0  # a descent begins this near its place

@@ -6,6 +6,7 @@ In: the stored items. Out: which item follows which, where the flight goes on, h
 from collections.abc import Sequence
 from math import hypot, inf, isfinite, sqrt
 
+from autopilot.lists import MissionItem
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.curve import Pace, between
 from autopilot.navigator.item_checks import tagged_item
@@ -18,7 +19,6 @@ from autopilot.navigator.items import (
     passes_through,
 )
 from autopilot.navigator.setpoint import Vector
-from autopilot.vehicle import MissionItem
 
 CORNER_ACCEL_SHARE = 0.5  # of MPC_ACC_HOR, used to turn from one leg to the next; the rest keeps to the line: guess
 _SLOWEST_CORNER_M_S = 0.5  # slower than this it is simpler to stop

@@ -3,6 +3,7 @@
 from math import isfinite, nan
 from typing import Protocol
 
+from autopilot.lists import ListKind
 from autopilot.navigator.breadcrumbs import Breadcrumbs
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.destination import Destinations
@@ -23,7 +24,8 @@ from autopilot.navigator.smart_return import SmartReturn
 from autopilot.navigator.takeoff import Takeoff
 from autopilot.navigator.termination import Termination
 from autopilot.ports import TERRAIN_VALID
-from autopilot.vehicle import ACCEPTED, ListKind, Mode, OffboardSetpoint, Reply, Severity, Verdict
+from autopilot.requests import OffboardSetpoint
+from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
 _SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
 

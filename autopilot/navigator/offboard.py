@@ -5,7 +5,7 @@ from math import nan
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.ground import Ask, vertical_ask
 from autopilot.ports import SETPOINT_TRAJECTORY
-from autopilot.vehicle import OffboardSetpoint
+from autopilot.requests import OffboardSetpoint
 
 STREAM_PERIOD_US = 500_000  # setpoints must come faster than 2 Hz before the mode may be entered (PX4)
 

@@ -11,8 +11,9 @@ from autopilot.navigator.circle import Circle, speed_limit
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.manual import speed_down_of, yaw_rate_of
 from autopilot.navigator.setpoint import Vector
+from autopilot.requests import OrbitRequest
 from autopilot.sticks import StickInput, curved, without_centre
-from autopilot.vehicle import ACCEPTED, OrbitRequest, OrbitStatus, Reply, Verdict
+from autopilot.vehicle import ACCEPTED, OrbitStatus, Reply, Verdict
 from common.geodesy import GeoPoint
 
 _RADIUS_MIN_M, _RADIUS_MAX_M = 1.0, 1000.0

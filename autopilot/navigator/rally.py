@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from math import isfinite
 
+from autopilot.lists import ItemRefusal, MissionItem
 from autopilot.navigator.fence_items import place_refusal
 from autopilot.navigator.items import Result
-from autopilot.vehicle import ItemRefusal, MissionItem
 
 RALLY_POINT = 5100  # MAV_CMD
 MAX_RALLY_POINTS = 100  # a choice for the pilot, not a map; guess

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_LEAN, SETPOINT_RATE, SETPOINT_TRAJECTORY
-from autopilot.vehicle import OffboardSetpoint
+from autopilot.requests import OffboardSetpoint
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w

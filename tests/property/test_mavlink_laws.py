@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as pymavlink_all
 from pymavlink.mavftp import MAVFTP
 
+from autopilot.lists import MissionItem
 from autopilot.mavlink.codec import FrameReader, decode, encode, frame_bytes, known_type, message_type
 from autopilot.mavlink.convert import degrees_e7, degrees_from_e7, quat_from_wxyz, wxyz_from_quat
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.missions import item_from_fields, scaled_position
-from autopilot.vehicle import MissionItem
 from tests.unit.autopilot.mavlink.rig import Rig
 from tests.unit.autopilot.mavlink.test_ftp import FtpClient
 

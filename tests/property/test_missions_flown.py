@@ -5,9 +5,10 @@ from math import isfinite, nan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from autopilot.lists import MissionItem
 from autopilot.navigator.item_checks import SUPPORTED_COMMANDS, refuse_items
 from autopilot.ports import SETPOINT_TRAJECTORY
-from autopilot.vehicle import MissionItem, Mode
+from autopilot.vehicle import Mode
 from tests.unit.autopilot.kinematic import Kinematic, geo
 
 FLOWN_S = 25.0

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from pyulog import ULog
 
+from autopilot.lists import ListKind, MissionItem
 from autopilot.params import parameter_table
 from autopilot.persistence import Persistence
-from autopilot.vehicle import ListKind, MissionItem
 from common.state_folder import StateFolder
 from common.ulog import UlogWriter
 from mission.log_shelf import FlightLogs

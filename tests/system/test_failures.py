@@ -9,9 +9,10 @@ from math import nan
 import numpy as np
 import pytest
 
+from autopilot.lists import MissionItem
 from autopilot.mavlink.codec import encode
 from autopilot.mavlink.links import LinkRole, memory_pair
-from autopilot.vehicle import MissionItem, Mode
+from autopilot.vehicle import Mode
 from common.geodesy import geodetic_from_ned
 from mission.client import CommandRefused
 from mission.flight import Flight, FlightConfig

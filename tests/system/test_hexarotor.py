@@ -6,7 +6,8 @@ from math import nan
 import numpy as np
 import pytest
 
-from autopilot.vehicle import MissionItem, Mode
+from autopilot.lists import MissionItem
+from autopilot.vehicle import Mode
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from sim.world.world import WorldConfig

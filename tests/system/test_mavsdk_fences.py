@@ -14,7 +14,7 @@ from mavsdk.plugins.geofence import (
 from mavsdk.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.plugins.mission_raw import MissionRaw, MissionRawError, MissionRawResult
 
-from autopilot.vehicle import ListKind
+from autopilot.lists import ListKind
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 from mission.flight import FlightConfig
 from tests.system.raw_vehicle import OPEN, RawVehicle

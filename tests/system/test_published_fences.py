@@ -8,7 +8,8 @@ import json
 import numpy as np
 import pytest
 
-from autopilot.vehicle import ListKind, Mode
+from autopilot.lists import ListKind
+from autopilot.vehicle import Mode
 from common.geodesy import geodetic_from_ned
 from mission.client import CommandRefused, MissionRefused
 from mission.flight import Flight, FlightConfig

@@ -11,7 +11,8 @@ from math import nan
 import numpy as np
 import pytest
 
-from autopilot.vehicle import LandedState, MissionItem, Mode
+from autopilot.lists import MissionItem
+from autopilot.vehicle import LandedState, Mode
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from mission.summary import segment_distance_m

@@ -8,6 +8,7 @@ from math import atan2, cos, exp, isfinite, nan, pi, sin
 
 import numpy as np
 
+from autopilot.lists import MissionItem
 from autopilot.node import FlightController, HostPorts, hover_thrust
 from autopilot.params import all_parameters
 from autopilot.ports import (
@@ -25,7 +26,8 @@ from autopilot.ports import (
     Samples,
     Setpoint,
 )
-from autopilot.vehicle import LandedState, MissionItem, Mode, OffboardSetpoint, Severity
+from autopilot.requests import OffboardSetpoint
+from autopilot.vehicle import LandedState, Mode, Severity
 from common.airframe import load_airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import FRAME_US, GRAVITY_M_S2

@@ -4,9 +4,9 @@ from math import isnan, nan
 
 import pytest
 
+from autopilot.lists import ListKind, MissionItem
 from autopilot.params import parameter_table
 from autopilot.persistence import WRITE_PERIOD_US, Persistence
-from autopilot.vehicle import ListKind, MissionItem
 from common.state_folder import StateFolder
 
 

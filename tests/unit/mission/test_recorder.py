@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from autopilot.vehicle import MissionItem
+from autopilot.lists import MissionItem
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from mission.flight_log import NAVIGATION_STATES

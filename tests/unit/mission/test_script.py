@@ -5,7 +5,8 @@ from math import hypot, nan, pi
 
 import pytest
 
-from autopilot.vehicle import ListKind, Mode
+from autopilot.lists import ListKind
+from autopilot.vehicle import Mode
 from common.geodesy import DEFAULT_HOME, GeoPoint, geodetic_from_ned
 from mission.client import CommandRefused, ScriptError, ScriptTimeout
 from mission.flight import Flight, FlightConfig

@@ -6,7 +6,8 @@ import pytest
 
 from autopilot.commander.arming import arming_reasons
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
-from autopilot.vehicle import CalibrationKind, LandedState, Mode, Severity, Verdict
+from autopilot.requests import CalibrationKind
+from autopilot.vehicle import LandedState, Mode, Severity, Verdict
 from tests.unit.autopilot.kinematic import ALL_VALID, ORIGIN, Kinematic, geo
 
 

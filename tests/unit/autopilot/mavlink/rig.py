@@ -12,7 +12,7 @@ from autopilot.commander.watch import StationLink
 from autopilot.estimator.state import EstimatorState
 from autopilot.external import ExternalPositions
 from autopilot.host import Host
-from autopilot.lists import ItemLists
+from autopilot.lists import ItemLists, ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.codec import FrameReader, Message, decode, encode, message_id
 from autopilot.mavlink.definitions import DEFINITIONS
 from autopilot.mavlink.dialects import Dialect
@@ -39,23 +39,10 @@ from autopilot.ports import (
     ExternalSample,
     Samples,
 )
+from autopilot.requests import CalibrationKind, OffboardSetpoint, OrbitRequest, TargetReport
 from autopilot.sticks import Sticks
 from autopilot.traffic import Aircraft, Traffic
-from autopilot.vehicle import (
-    ACCEPTED,
-    BatteryLevel,
-    CalibrationKind,
-    ItemRefusal,
-    ListKind,
-    MissionItem,
-    Mode,
-    OffboardSetpoint,
-    OrbitRequest,
-    OrbitStatus,
-    Reply,
-    TargetReport,
-    VehicleState,
-)
+from autopilot.vehicle import ACCEPTED, BatteryLevel, Mode, OrbitStatus, Reply, VehicleState
 from common.geodesy import GeoPoint
 from common.records import row_reader
 from sim.bodies.multirotor import BodyState

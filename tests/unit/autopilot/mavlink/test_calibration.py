@@ -2,7 +2,8 @@
 
 import pytest
 
-from autopilot.vehicle import CalibrationKind, Verdict
+from autopilot.requests import CalibrationKind
+from autopilot.vehicle import Verdict
 from tests.unit.autopilot.mavlink.rig import Rig, texts
 
 CALIBRATE, SET_OFFSETS, STORAGE = 241, 242, 245

@@ -1,6 +1,6 @@
+from autopilot.lists import ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.home_item import with_home, without_home
-from autopilot.vehicle import ItemRefusal, ListKind, MissionItem
 from tests.unit.autopilot.mavlink.rig import Rig, flying_state, texts
 
 WAYPOINT, JUMP = 16, 177

@@ -3,10 +3,11 @@ from math import isnan
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.lists import ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.mission_items import item_from_fields, scaled_position
 from autopilot.mavlink.missions import DOWNLOAD_IDLE_US, RETRIES_MAX
 from autopilot.navigator.items import MAX_ITEMS
-from autopilot.vehicle import FenceLimit, FenceState, ItemRefusal, ListKind, MissionItem, Reply, Verdict
+from autopilot.vehicle import FenceLimit, FenceState, Reply, Verdict
 from tests.unit.autopilot.mavlink.rig import FRAME_US, Client, Rig, texts
 
 MISSION, FENCE, RALLY = ListKind

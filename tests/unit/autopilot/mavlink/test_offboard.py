@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_RATE, SETPOINT_TRAJECTORY
-from autopilot.vehicle import OffboardSetpoint
+from autopilot.requests import OffboardSetpoint
 from common.geodesy import geodetic_from_ned
 from tests.unit.autopilot.mavlink.rig import HOME, Rig, texts
 

@@ -6,8 +6,9 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.host import LogFile
+from autopilot.lists import MissionItem
 from autopilot.mavlink.shell import PIECES_PER_FRAME, PROMPT
-from autopilot.vehicle import MissionItem, Reply, Verdict
+from autopilot.vehicle import Reply, Verdict
 from common.ulog import UlogWriter
 from tests.unit.autopilot.mavlink.rig import Client, Rig
 

@@ -5,9 +5,11 @@ from timeit import repeat
 
 import pytest
 
+from autopilot.lists import ListKind
 from autopilot.navigator.fence_items import FenceCommand
 from autopilot.ports import SETPOINT_TRAJECTORY
-from autopilot.vehicle import FenceLimit, ListKind, Mode, OffboardSetpoint, Severity, Verdict
+from autopilot.requests import OffboardSetpoint
+from autopilot.vehicle import FenceLimit, Mode, Severity, Verdict
 from tests.unit.autopilot.kinematic import ORIGIN, Kinematic, geo, item
 
 SQUARE = ((-50.0, -50.0), (-50.0, 50.0), (50.0, 50.0), (50.0, -50.0))

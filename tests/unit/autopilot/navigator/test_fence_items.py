@@ -4,10 +4,10 @@ from math import cos, radians, sin
 
 import pytest
 
+from autopilot.lists import ItemRefusal, MissionItem
 from autopilot.navigator.fence_items import MAX_FENCE_ITEMS, FenceCommand, GeoCircle, GeoPolygon, fence_shapes
 from autopilot.navigator.items import Result
 from autopilot.navigator.rally import MAX_RALLY_POINTS, RALLY_POINT, RallyPoints
-from autopilot.vehicle import ItemRefusal, MissionItem
 from tests.unit.autopilot.kinematic import item
 
 INCLUSION, EXCLUSION = FenceCommand.INCLUSION_VERTEX, FenceCommand.EXCLUSION_VERTEX

@@ -7,7 +7,8 @@ import pytest
 
 from autopilot.navigator.ground import Ask, standing_d, vertical_ask
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_RATE, SETPOINT_TRAJECTORY, TERRAIN_VALID
-from autopilot.vehicle import OffboardSetpoint, Verdict
+from autopilot.requests import OffboardSetpoint
+from autopilot.vehicle import Verdict
 from tests.unit.autopilot.kinematic import Kinematic
 
 HOVER = 0.43

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_LEAN, SETPOINT_TRAJECTORY
-from autopilot.vehicle import LandedState, Mode, OffboardSetpoint, Verdict
+from autopilot.requests import OffboardSetpoint
+from autopilot.vehicle import LandedState, Mode, Verdict
 from tests.unit.autopilot.kinematic import ORIGIN, Kinematic, geo, heading_error, position_setpoint
 
 

@@ -12,7 +12,8 @@ from autopilot.ports import (
     SETPOINT_TRAJECTORY,
     VELOCITY_VALID,
 )
-from autopilot.vehicle import LandedState, Mode, OffboardSetpoint, Verdict
+from autopilot.requests import OffboardSetpoint
+from autopilot.vehicle import LandedState, Mode, Verdict
 from tests.unit.autopilot.kinematic import ORIGIN, Kinematic, geo, heading_error, position_setpoint
 
 

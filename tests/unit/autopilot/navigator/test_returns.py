@@ -6,10 +6,11 @@ from math import hypot, nan
 import numpy as np
 import pytest
 
+from autopilot.lists import ListKind
 from autopilot.navigator.breadcrumbs import without_loops, without_straights
 from autopilot.navigator.fence_items import FenceCommand
 from autopilot.navigator.rally import RALLY_POINT
-from autopilot.vehicle import ListKind, Mode, Verdict
+from autopilot.vehicle import Mode, Verdict
 from tests.unit.autopilot.kinematic import Kinematic, do, geo, item, position_setpoint
 
 LAND_START, WAYPOINT, LAND, TAKEOFF = 189, 16, 21, 22
