@@ -4,15 +4,17 @@
 ability of its own.
 """
 
-from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from autopilot.camera.camera import Camera
+from autopilot.external import ExternalPositions
 from autopilot.host import Host
 from autopilot.lists import ItemLists
+from autopilot.obstacles import Obstacles
+from autopilot.payload import Payloads
 from autopilot.requests import CalibrationKind, OffboardSetpoint, OrbitRequest, TargetReport
 from autopilot.sticks import Sticks
-from autopilot.traffic import Aircraft
+from autopilot.traffic import Traffic
 from autopilot.vehicle import Mode, Reply, Severity, VehicleState
 from common.params import ParameterTable
 
@@ -103,34 +105,6 @@ class GuidedPort(Protocol):
         ...
 
 
-class PayloadPort(Protocol):
-    """What the vehicle carries (autopilot.payload)."""
-
-    def takes(self, command: int) -> bool: ...
-
-    def run(self, command: int, params: tuple[float, float, float, float], x: float, y: float, z: float) -> Reply: ...
-
-
-class ObstaclePort(Protocol):
-    """What is round the vehicle (autopilot.obstacles)."""
-
-    def reported(self, time_us: int, distances_m: Sequence[float], first_rad: float, increment_rad: float) -> None: ...
-
-
-class ExternalPort(Protocol):
-    """Positions from outside (autopilot.external)."""
-
-    def report(self, report: Any) -> str: ...
-
-
-class TrafficPort(Protocol):
-    """Other aircraft (autopilot.traffic)."""
-
-    def report(self, aircraft: Aircraft) -> None: ...
-
-    def known(self) -> Sequence[Aircraft]: ...
-
-
 class Vehicle(Protocol):
     """What may be asked of the vehicle. Altitudes are AMSL [m], angles radians, NaN means default."""
 
@@ -158,16 +132,16 @@ class Vehicle(Protocol):
     @property
     def guidance(self) -> Guidance: ...
     @property
-    def payload(self) -> PayloadPort: ...
+    def payload(self) -> Payloads: ...
 
     @property
-    def traffic(self) -> TrafficPort: ...
+    def traffic(self) -> Traffic: ...
 
     @property
-    def obstacles(self) -> ObstaclePort: ...
+    def obstacles(self) -> Obstacles: ...
 
     @property
-    def external(self) -> ExternalPort: ...
+    def external(self) -> ExternalPositions: ...
 
     @property
     def guided(self) -> GuidedPort: ...
