@@ -102,6 +102,8 @@ class ExternalService(Service):
             raise RefusedPositionError(f"frame {frame} is not supported")
         q_frame_from_frd = attitude(fields.q)
         vel: Vector = (fields.vx, fields.vy, fields.vz)
+        if not all(is_sane(value, _FAST_M_S) for value in vel):  # before a turn makes it unknown
+            raise RefusedPositionError("the velocity is not one")
         if child in (BODY_FRD, BODY_NED):
             vel = rotated(q_frame_from_frd, vel) if q_frame_from_frd else _UNKNOWN
         elif child != frame:
