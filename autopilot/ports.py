@@ -29,6 +29,7 @@ TERRAIN_VALID = wp.constant(32)
 WIND_VALID = wp.constant(64)
 DEAD_RECKONING = wp.constant(128)
 EXTERNAL_POSITION = wp.constant(256)  # a client's horizontal position is being fused
+ACCEL_DOUBTED = wp.constant(512)
 
 # ExternalSample.holds: the bits of EKF2_EV_CTRL
 EXTERNAL_HOLDS_POS = wp.constant(1)  # north and east

@@ -8,7 +8,7 @@ means:
 | off    | no more samples (GNSS also reports fix type 0)                | not used                                   |
 | stuck  | samples keep coming with new times and the last value         | not used                                   |
 | biased | the magnitude is added to each axis of the value              | in the unit of the value: see `BIAS_UNITS` |
-| noisy  | the white noise is multiplied by the magnitude                | factor                                     |
+| noisy  | the white noise is multiplied by the magnitude (GNSS: jammed) | factor                                     |
 | slow   | the period of the samples is multiplied by the magnitude      | factor, rounded down, at least 1           |
 
 A motor that fails loses a share of its command: 1 stops it, 0.4 leaves it weak (`set_motor_loss`).

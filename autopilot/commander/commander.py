@@ -235,6 +235,7 @@ class Commander:
             alt_m = alt_amsl_m if isfinite(alt_amsl_m) else (state.home or state.position).alt_m
             state.home = GeoPoint(lat_deg, lon_deg, alt_m)
             state.home_ned = ned_from_geodetic(lat_deg, lon_deg, alt_m, state.origin)
+            state.home_yaw_rad = state.yaw_rad  # of the vehicle: a place has none
             self.announcer.home_changed()
         self._is_home_given = True
         return ACCEPTED

@@ -32,6 +32,7 @@ STICKS_LOST = 1 << 16
 ESTIMATOR_FAILED = 1 << 17
 FENCE_BREACHED = 1 << 18
 TRAFFIC_NEAR = 1 << 20
+ACCEL_DOUBTED = 1 << 21
 
 TERMINATION_BREAKER = 121212  # CBRK_FLIGHTTERM: the failure detector may not stop the motors
 
@@ -162,5 +163,7 @@ RULES: tuple[Rule, ...] = (
     Rule(BATTERY_SILENT, always(Action.WARN), Severity.WARNING, "Battery sensor silent: charge is estimated"),
     Rule(FLIGHT_TIME_NEAR, always(Action.WARN), Severity.WARNING, "Flight time is nearly over"),
     Rule(WIND_STRONG, always(Action.WARN), Severity.WARNING, "Strong wind"),
+    Rule(ACCEL_DOUBTED, always(Action.WARN), Severity.CRITICAL, "Vibration compensation ON",
+         "Vibration compensation OFF"),
     Rule(DEAD_RECKONING, always(Action.WARN), Severity.WARNING, "GNSS lost: dead reckoning", "GNSS is used again"),
 )  # fmt: skip

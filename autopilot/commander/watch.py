@@ -9,6 +9,7 @@ from math import hypot, isnan
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.crash import AttitudeWatch
 from autopilot.commander.failsafe import (
+    ACCEL_DOUBTED,
     BATTERY_CRITICAL,
     BATTERY_EMERGENCY,
     BATTERY_LOW,
@@ -29,6 +30,7 @@ from autopilot.commander.failsafe import (
 )
 from autopilot.commander.flying import Flying
 from autopilot.commander.motors import MotorWatch
+from autopilot.ports import ACCEL_DOUBTED as ACCEL_DOUBTED_FLAG
 from autopilot.ports import DEAD_RECKONING as DEAD_RECKONING_FLAG
 from autopilot.ports import HEIGHT_VALID, WIND_VALID
 from autopilot.vehicle import BatteryLevel, LandedState, Mode, VehicleState
@@ -179,6 +181,8 @@ class FailureWatch:
             self._reckoning_us = state.time_us
         if state.time_us - self._reckoning_us < _FIX_STEADY_US:
             bits |= DEAD_RECKONING
+        if state.estimate.flags & ACCEL_DOUBTED_FLAG:
+            bits |= ACCEL_DOUBTED
         if not is_flying:
             return bits
         if self.airborne_us < 0:

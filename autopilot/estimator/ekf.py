@@ -30,11 +30,16 @@ from autopilot.estimator.fuse import seconds_since
 from autopilot.estimator.generated import predict_covariance
 from autopilot.estimator.health import (
     DEAD_RECKONING_AFTER_S,
+    DOUBTED_ACCEL_NSD,
+    climb_innov_lpf,
+    doubt_accel,
     flags,
+    is_doubted,
     is_healthy,
     is_sound,
     listen,
     with_deviations,
+    with_doubt,
 )
 from autopilot.estimator.params import HEIGHT_REF_GNSS, MAG_TYPE_NONE, EstimatorParams, estimator_params
 from autopilot.estimator.predict import predict_nominal, process_variance
@@ -64,6 +69,7 @@ from autopilot.estimator.state import (
     PHASE_ALIGNING,
     PHASE_RUNNING,
     RANGE_RING,
+    VEL,
     Alignment,
     Ekf,
     EstimatorState,
@@ -169,6 +175,8 @@ def take_gnss(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
         nominal, vel_aid = fuse_gnss_vel(params, cov, i, nominal, ekf.rows[i].gnss_vel, sample, may_reset)
         nominal, pos_aid = fuse_gnss_pos(params, cov, i, nominal, ekf.rows[i].gnss_pos, sample, age_s, may_reset)
         ekf.rows[i].gnss_vel = vel_aid
+        ekf.rows[i].climb_innov_lpf = climb_innov_lpf(ekf.rows[i])
+        ekf.rows[i].doubted_time_us = doubt_accel(ekf.rows[i], ekf.params[i].accel_bias_limit)
         ekf.rows[i].gnss_pos = pos_aid
     is_reference = ekf.rows[i].baro.is_active == 0 and ekf.rows[i].external_height.is_active == 0
     nominal, height_aid = fuse_gnss_height(
@@ -283,6 +291,9 @@ def predict(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample) -> None:
     step_s = ekf.rows[i].step_dt_s + imu.dt_s
     if step_s > params.predict_s - 0.5 * imu.dt_s:
         added_var = process_variance(params, ekf.covariance, i, nominal.vel_ned, step_s)
+        if is_doubted(ekf.rows[i]):
+            for axis in range(3):
+                added_var[VEL + axis] = added_var[VEL + axis] + DOUBTED_ACCEL_NSD * step_s
         rot = wp.quat_to_matrix(nominal.q_ned_from_frd)
         predict_covariance(ekf.covariance, i, rot, delta_vel_ned, step_s, added_var)
         step_s = 0.0
@@ -304,22 +315,23 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
     ekf.rows[i].horizon_time_us = now_us
     if ekf.rows[i].phase != PHASE_RUNNING:
         return
+    lenient = with_doubt(params, is_doubted(ekf.rows[i]))
     resets_before = ekf.rows[i].nominal.reset_count
-    predict(ekf, i, params, imu)
+    predict(ekf, i, lenient, imu)
     if is_waiting(ekf.rows[i].gnss_inbox):
-        take_gnss(ekf, i, params, now_us)
+        take_gnss(ekf, i, lenient, now_us)
     if is_waiting(ekf.rows[i].baro_inbox):
-        take_baro(ekf, i, params, now_us)
+        take_baro(ekf, i, lenient, now_us)
     if is_waiting(ekf.rows[i].mag_inbox):
-        take_mag(ekf, i, params, now_us, imu.gyro_frd)
+        take_mag(ekf, i, lenient, now_us, imu.gyro_frd)
     if is_waiting(ekf.rows[i].range_inbox):
-        take_range(ekf, i, params, now_us)
+        take_range(ekf, i, lenient, now_us)
     if is_waiting(ekf.rows[i].external_inbox):
-        take_external(ekf, i, params, now_us)
+        take_external(ekf, i, lenient, now_us)
     if params.drag_ctrl > 0 and drag_is_due(ekf.rows[i].drag_sum):
-        take_drag(ekf, i, params, now_us)
+        take_drag(ekf, i, lenient, now_us)
     if ekf.rows[i].stillness.is_still == 1:
-        take_rest(ekf, i, params, now_us)
+        take_rest(ekf, i, lenient, now_us)
     if ekf.rows[i].nominal.reset_count != resets_before:
         ekf.rows[i].output = jump_output(ekf.rows[i].output, ekf.rows[i].nominal)
         ekf.rows[i].estimate = with_jump(ekf.rows[i].estimate, ekf.rows[i].nominal)

@@ -2,6 +2,10 @@
 
 In: the state after a horizon step. Out: `Estimate.flags` and standard deviations, and aids switched off when their
 sensor fell silent or froze.
+
+Barometer and GNSS velocity that leave the prediction on the same side say that the accelerometer is wrong: heavy
+vibration, or a large bias. It is doubted then, for as long as that lasts (PX4's bad_acc_vertical, ArduPilot's vibration
+failsafe): velocity counts as uncertain and follows GNSS, and the bias may be as large as no healthy sensor's.
 """
 
 import warp as wp
@@ -22,6 +26,7 @@ from autopilot.estimator.state import (
     Nominal,
 )
 from autopilot.ports import (
+    ACCEL_DOUBTED,
     DEAD_RECKONING,
     EXTERNAL_POSITION,
     HEIGHT_VALID,
@@ -39,6 +44,13 @@ wp.set_module_options({"enable_backward": False})
 
 _SILENT_AFTER_S = wp.constant(1.0)  # five samples of the slowest source
 DEAD_RECKONING_AFTER_S = wp.constant(1.0)
+DOUBTED_ACCEL_NSD = wp.constant(1.0)  # [m²/s³] what 2 m/s² too much do between two fixes; guess
+_DOUBTED_BIAS_LIMIT = wp.constant(4.0)  # [m/s²] guess
+_DOUBTED_BIAS_WALK = wp.constant(0.5)  # [m/s²/√s] guess
+_DOUBT_S = wp.constant(10.0)  # after the last sign of it (PX4)
+_DOUBT_SIGMA = wp.constant(4.0)  # both sources, on the same side
+_DOUBT_CLIMB_M_S = wp.constant(0.15)  # mean innovation that says it goes on; guess, far above the receiver's noise
+_CLIMB_LPF_GAIN = wp.constant(0.05)  # per fix
 _TERRAIN_AFTER_S = wp.constant(2.0)
 _MAX_TILT_VAR = wp.constant(0.01)  # rad²: 6 deg
 _MAX_YAW_VAR = wp.constant(0.07)  # rad²: 15 deg
@@ -60,6 +72,52 @@ def listen(aid: Aid, inbox: Inbox, horizon_time_us: wp.int64) -> Aid:
 def is_healthy(aid: Aid) -> bool:
     """The source is in use and agrees with the estimate."""
     return aid.is_active == 1 and aid.test_ratio_lpf < 1.0
+
+
+@wp.func
+def is_doubted(state: EstimatorState) -> bool:
+    """The accelerometer is not believed at present."""
+    return seconds_since(state.horizon_time_us, state.doubted_time_us) < _DOUBT_S
+
+
+@wp.func
+def with_doubt(params: EstimatorParams, is_doubted: bool) -> EstimatorParams:
+    """The parameters with which an accelerometer that is doubted may have any bias."""
+    out = params
+    if is_doubted:
+        out.accel_bias_limit = wp.max(params.accel_bias_limit, _DOUBTED_BIAS_LIMIT)
+        out.accel_bias_walk = wp.max(params.accel_bias_walk, _DOUBTED_BIAS_WALK)
+    return out
+
+
+@wp.func
+def doubt_accel(state: EstimatorState, bias_limit: float) -> wp.int64:
+    """When the accelerometer was last doubted, after a GNSS velocity has been judged.
+
+    Args:
+        state: of the vehicle.
+        bias_limit: [m/s²] of a healthy accelerometer.
+    """
+    bias_frd = state.nominal.accel_bias_frd
+    bias_most = wp.max(wp.abs(bias_frd[0]), wp.max(wp.abs(bias_frd[1]), wp.abs(bias_frd[2])))
+    goes_on = wp.abs(state.climb_innov_lpf) > _DOUBT_CLIMB_M_S or bias_most > bias_limit
+    climb, height = state.gnss_vel.innov[2], state.baro.innov[0]
+    limit = _DOUBT_SIGMA * _DOUBT_SIGMA
+    is_wrong = (
+        state.baro.is_active == 1
+        and climb * height > 0.0
+        and climb * climb > limit * state.gnss_vel.innov_var[2]
+        and height * height > limit * state.baro.innov_var[0]
+    )
+    if is_wrong or (is_doubted(state) and goes_on):
+        return state.horizon_time_us
+    return state.doubted_time_us
+
+
+@wp.func
+def climb_innov_lpf(state: EstimatorState) -> float:
+    """[m/s] the low-passed vertical innovation of the GNSS velocity."""
+    return state.climb_innov_lpf + _CLIMB_LPF_GAIN * (state.gnss_vel.innov[2] - state.climb_innov_lpf)
 
 
 @wp.func
@@ -122,6 +180,8 @@ def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: 
             bits = bits | VELOCITY_VALID
         if vel_s > DEAD_RECKONING_AFTER_S:
             bits = bits | DEAD_RECKONING
+        if is_doubted(state):
+            bits = bits | ACCEL_DOUBTED
         height_s = seconds_since(now_us, state.baro.fused_time_us)
         if state.baro.is_active == 0:
             height_s = seconds_since(now_us, state.gnss_height.fused_time_us)

@@ -194,6 +194,8 @@ class EstimatorState:
     external_vel: Aid  # north, east, down [m/s]
     external_yaw: Aid  # [rad]
     external_reset_count: int  # of the last external sample used
+    doubted_time_us: wp.int64  # when the accelerometer last contradicted GNSS and barometer, 0: never
+    climb_innov_lpf: float  # [m/s] of the GNSS velocity, down
     wander_time_us: wp.int64  # to which the GNSS wander was propagated
     drag_sum: DragSum
     is_yaw_aligned: int

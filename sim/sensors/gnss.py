@@ -2,7 +2,8 @@
 
 Errors per axis: white noise plus a first-order Gauss-Markov error (ionosphere, multipath, ephemeris) in position,
 vertical 1.5 times the horizontal; white noise in velocity. Samples wait in a queue of four for their delivery, so a
-delay of several periods works too. Left out: multipath near trees and walls, satellite geometry, clock jumps.
+delay of several periods works too. Noise that a fault multiplies is that of a jammed receiver: it knows that it is
+worse, and sees fewer satellites. Left out: multipath near trees and walls, satellite geometry, clock jumps.
 """
 
 from typing import Any
@@ -29,6 +30,7 @@ CORRELATION_TIME_S = 60.0
 VERTICAL_FACTOR = 1.5  # vertical errors over horizontal ones
 VELOCITY_STD_M_S = 0.1  # each axis, white
 SATELLITES = wp.constant(14)  # guess: open sky, two constellations
+JAMMED_SATELLITES = wp.constant(5)  # as few as still give a height; guess
 # What the receiver says about itself, whatever the noise scale: a receiver does not know that it is simulated.
 REPORTED_H_STD_M = 0.95  # √(0.3² + 0.6²) √2: both axes together, as u-blox hAcc
 REPORTED_V_STD_M = 1.0  # 1.5 √(0.3² + 0.6²)
@@ -147,12 +149,13 @@ def gnss_delivered(model: GnssModel, state: GnssState, held: GnssSample, fault: 
     """The oldest waiting sample as the driver delivers it; nothing comes out of a receiver that is off."""
     sample = held
     if fault.mode != FAULT_OFF:
+        gain = noise_gain(fault)
         sample.time_us = wp.int64(state.queue_tick[state.queue_head] + 1) * wp.int64(TICK_US)
         sample.fix_type = model.fix_type
-        sample.satellites = SATELLITES
-        sample.pos_h_std = model.pos_h_std
-        sample.pos_v_std = model.pos_v_std
-        sample.vel_std = model.reported_vel_std
+        sample.satellites = wp.max(int(float(SATELLITES) / wp.sqrt(gain)), JAMMED_SATELLITES)
+        sample.pos_h_std = gain * model.pos_h_std
+        sample.pos_v_std = gain * model.pos_v_std
+        sample.vel_std = gain * model.reported_vel_std
         if fault.mode != FAULT_STUCK or held.fix_type < 3:
             pos = state.queue_pos_ned[state.queue_head]
             vel = state.queue_vel_ned[state.queue_head]

@@ -2,11 +2,15 @@
 
 import numpy as np
 
+from autopilot.mavlink.links import LinkRole, memory_pair
+from mission.client import Client
 from mission.flight import Flight, FlightConfig
 from sim.world.world import WorldConfig
 
 OPEN_GROUND = WorldConfig(trees_per_ha=0.0, hill_height_m=0.0)
 E7 = 1e7
+CMD_TAKEOFF, CMD_SET_MODE, CMD_ARM = 22, 176, 400
+GUIDED = 4  # COPTER_MODE
 
 
 class Flown:
@@ -106,3 +110,45 @@ class Sticks:
             if self.is_sending:
                 self._drone.send("MANUAL_CONTROL", target=1, buttons=0, **self.axes)
             await self._drone.sleep(0.02)
+
+
+class Station:
+    """A ground station that speaks ArduPilot's dialect with a vehicle; `run` flies a script of its own.
+
+    Args:
+        arguments: of Flown.
+    """
+
+    def __init__(self, **arguments):
+        vehicle_end, client_end = memory_pair(LinkRole.GROUND)
+        config = {"dialect": "ardupilot", **arguments.pop("config", {})}
+        self.flown = Flown(config=config, links=[vehicle_end], **arguments)
+        self.client = Client(client_end)
+
+    def run(self, script, seconds=600.0):
+        """Flies `script(client)` to its end."""
+        running = self.client.start(script(self.client))
+
+        async def wait(drone):
+            while not running.is_done:
+                self.client.frame(drone.time_us)
+                await drone.sleep(0.02)
+
+        self.flown.run(wait, seconds)
+        if running.error is not None:
+            raise running.error
+        return running.result
+
+    async def mode(self, number):
+        await self.client.command(CMD_SET_MODE, 1.0, float(number), name="mode")
+        await self.client.until(lambda: self.client.latest("HEARTBEAT").custom_mode == number, 3.0, "mode")
+
+    async def airborne(self, height_m=10.0):
+        """Takes off in Guided, as ArduPilot's users do."""
+        client, state = self.client, self.flown.state
+        await client.until(lambda: state.is_ready_to_arm, 60.0, "ready")
+        await self.mode(GUIDED)
+        await client.command(CMD_ARM, 1.0, name="arm")
+        await client.command(CMD_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m, name="takeoff")
+        await client.until(lambda: abs(self.flown.pos[2] + height_m) < 1.5, 60.0, "at the height")
+        await client.sleep(3.0)

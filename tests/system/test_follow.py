@@ -101,23 +101,27 @@ def test_follows_a_walker_at_the_angle_asked_for(angle_deg, sends_velocity):
     wanted[:, 2] = flight.controller.state.home_ned[2] - 10.0
     errors = np.abs(vehicle - wanted)
     assert np.percentile(np.hypot(errors[:, 0], errors[:, 1]), 95) < 3.0
+    assert errors[:, :2].max() < 6.0  # of an axis
     assert errors[:, 2].max() < 1.5
     distances = np.hypot(*(vehicle - target)[:, :2].T)
     assert np.abs(distances - 8.0).max() < 4.0
 
 
 def test_velocity_alone_moves_nothing():
-    """PX4: velocity only must not move the vehicle: < 4 m in 15 s."""
+    """PX4: velocity only must not move the vehicle: < 4 m in 15 s; lands within 1 m of home."""
     flight = Flight(FlightConfig(world=OPEN, seed=4))
 
     async def script(drone):
         await airborne(drone, 10.0)
         walker = Walker(drone, np.random.default_rng(1))
         await drone._set_mode(AUTO, AUTO_FOLLOW, "follow")
-        return await follow(flight, drone, walker, 15.0, has_position=False)
+        rows = await follow(flight, drone, walker, 15.0, has_position=False)
+        await drone.land()
+        return rows
 
     rows = flight.fly(script).result
     assert max(dist(row[:2], rows[0, :2]) for row in rows) < 1.0
+    assert hypot(*truth(flight)[0][:2]) < 1.0
 
 
 def test_follows_round_a_bend_and_looks_at_the_target():

@@ -17,6 +17,7 @@ from autopilot.mavlink.convert import (
 )
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.ports import (
+    ACCEL_DOUBTED,
     HEIGHT_VALID,
     POSITION_VALID,
     TERRAIN_VALID,
@@ -62,6 +63,7 @@ _ESTIMATOR_BITS = (
     (POSITION_VALID, 8 | 16 | 256 | 512),  # relative, absolute, and both predicted
     (HEIGHT_VALID, 32),  # absolute height
     (TERRAIN_VALID, 64),  # height above ground
+    (ACCEL_DOUBTED, 2048),  # accelerometer error
 )
 
 

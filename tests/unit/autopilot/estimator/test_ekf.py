@@ -8,6 +8,7 @@ import warp as wp
 
 from autopilot.estimator.state import SLOW, SLOW_COUNT, SLOW_COV
 from autopilot.ports import (
+    ACCEL_DOUBTED,
     DEAD_RECKONING,
     HEIGHT_VALID,
     POSITION_VALID,
@@ -145,6 +146,26 @@ def test_jittering_imu_intervals_change_nothing() -> None:
     found = errors(flight, run(default_ekf(), flight.samples)[0])
     assert np.abs(found.pos[AIRBORNE:]).max() < 0.1
     assert found.tilt_deg[AIRBORNE:].max() < 0.1
+
+
+def test_healthy_accelerometer_is_never_doubted(traces: Any) -> None:
+    assert not np.any(traces["estimate"]["flags"] & ACCEL_DOUBTED)
+
+
+@pytest.mark.parametrize("bias_m_s2", [2.0, -3.0])
+def test_accelerometer_that_contradicts_gnss_and_barometer_is_doubted_and_its_bias_found(bias_m_s2: float) -> None:
+    at, over = 30 * TICKS, 50 * TICKS
+
+    def shake(samples: Any) -> None:
+        samples["imu"]["accel_frd"][at:over, 2] += bias_m_s2
+
+    flight, trace = flown(shake)
+    is_doubted = (trace["estimate"]["flags"] & ACCEL_DOUBTED) != 0
+    assert not is_doubted[:at].any()
+    assert is_doubted[at + 3 * TICKS : over].all()
+    assert trace["estimate"]["reset_count"][-1] == 0
+    assert trace["estimate"]["accel_bias_frd"][over - TICKS, 2] == pytest.approx(bias_m_s2, abs=0.5)
+    assert np.abs(errors(flight, trace).pos[at:, 2]).max() < 5.0
 
 
 def test_gate_rejects_gnss_jump() -> None:
