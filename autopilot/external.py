@@ -8,7 +8,7 @@ stays the boot home.
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import cos, isfinite, isnan, nan, pi, sin
+from math import cos, isfinite, isnan, nan, sin
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from autopilot.ports import (
     EXTERNAL_HOLDS_YAW,
     YAW_ALIGNED,
 )
+from common.attitude import wrapped
 from common.params import Parameter, ParameterTable
 
 Vector = tuple[float, float, float]
@@ -208,6 +209,6 @@ def _turned(report: ExternalReport, angle_rad: float) -> ExternalReport:
     """The report in a frame turned back about down by an angle."""
     c, s = cos(angle_rad), sin(angle_rad)
     (x, y, z), (vx, vy, vz) = report.pos, report.vel
-    yaw = (report.yaw + angle_rad + pi) % (2.0 * pi) - pi
+    yaw = wrapped(report.yaw + angle_rad)
     pos, vel = (c * x - s * y, s * x + c * y, z), (c * vx - s * vy, s * vx + c * vy, vz)
     return replace(report, pos=pos, vel=vel, yaw=yaw)

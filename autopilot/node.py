@@ -6,7 +6,6 @@ Out: the setpoint row; telemetry through the attached servers. Time is the simul
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import asin, atan2
 from typing import Any, Protocol
 
 import numpy as np
@@ -38,6 +37,7 @@ from autopilot.sticks import Sticks
 from autopilot.traffic import Traffic
 from autopilot.vehicle import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from common.airframe import Airframe
+from common.attitude import roll_pitch_yaw_of
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import GRAVITY_M_S2
 from common.params import ParameterTable
@@ -219,11 +219,7 @@ class FlightController:
         if time_us >= self._next_health_us:
             self._next_health_us = time_us + _HEALTH_PERIOD_US
             state.health = self._read_health()
-        x, y, z, w = estimate.q_ned_from_frd
-        state.roll_rad = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-        sine = 2.0 * (w * y - z * x)
-        state.pitch_rad = asin(1.0 if sine > 1.0 else -1.0 if sine < -1.0 else sine)
-        state.yaw_rad = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        state.roll_rad, state.pitch_rad, state.yaw_rad = roll_pitch_yaw_of(estimate.q_ned_from_frd)
         north, east, down = estimate.pos_ned
         state.position = GeoPoint(*geodetic_from_ned(north, east, down, state.origin))
 

@@ -1,12 +1,12 @@
 """`honeyguide picture`: what a camera sees from a place in the world, without a flight."""
 
 from dataclasses import dataclass
-from math import cos, radians, sin
+from math import radians
 from pathlib import Path
 
 import common.kernels  # noqa: F401  (starts Warp without its greeting)
 from autopilot.camera.picture import jpeg_bytes
-from autopilot.gimbal.gimbal import product
+from common.attitude import product, quat_of
 from common.files import write_whole
 from sim.sensors.camera import CameraPose, Renderer
 from sim.world.world import WorldConfig, build_world
@@ -40,9 +40,8 @@ def take_picture(output: Path, world: WorldConfig, viewpoint: Viewpoint, size: s
     world_map = build_world(world)
     ground_m = float(world_map.height(viewpoint.north_m, viewpoint.east_m))
     place = (viewpoint.north_m, viewpoint.east_m, -ground_m - viewpoint.above_ground_m)
-    half_yaw, half_pitch = 0.5 * radians(viewpoint.yaw_deg), 0.5 * radians(viewpoint.pitch_deg)
-    turned = product((0.0, 0.0, sin(half_yaw), cos(half_yaw)), (0.0, sin(half_pitch), 0.0, cos(half_pitch)))
-    pose = CameraPose(place, product(turned, _RDF_IN_FRD), viewpoint.hfov_deg)
+    q_ned_from_frd = quat_of(radians(viewpoint.yaw_deg), radians(viewpoint.pitch_deg))
+    pose = CameraPose(place, product(q_ned_from_frd, _RDF_IN_FRD), viewpoint.hfov_deg)
     pictures = Renderer(world_map).pictures([pose], width, height, samples=2)
     try:
         write_whole(output, jpeg_bytes(pictures.rgb[0]))

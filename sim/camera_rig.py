@@ -9,12 +9,10 @@ from functools import cached_property
 
 from autopilot.camera import picture
 from autopilot.camera.ports import RawFrame, View
-from autopilot.gimbal.gimbal import product
+from common.attitude import product, rotated
 from sim.rig import Rig
 from sim.sensors.camera import CameraPose, Renderer
 from sim.world.world import WorldMap
-
-Quat = tuple[float, float, float, float]  # x, y, z, w
 
 MOUNT_FRD = (0.10, 0.0, 0.06)  # [m] of the lens from the centre of gravity: under the nose; guess
 
@@ -54,7 +52,7 @@ class CameraRig:
         row = self._body[self._i_vehicle]
         x, y, z, w = (float(value) for value in row["q_ned_from_frd"])
         q = (x, y, z, w)
-        north, east, down = (float(a) + b for a, b in zip(row["pos_ned"], _rotated(q, MOUNT_FRD), strict=True))
+        north, east, down = (float(a) + b for a, b in zip(row["pos_ned"], rotated(q, MOUNT_FRD), strict=True))
         q_ned_from_rdf = product(q, view.q_frd_from_rdf)
         return CameraPose((north, east, down), q_ned_from_rdf, view.hfov_deg, view.exposure, view.balance)
 
@@ -75,10 +73,3 @@ class CameraRig:
         """Ends the thread; frames that it has not begun are lost."""
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
-
-
-def _rotated(q: Quat, v: tuple[float, float, float]) -> tuple[float, float, float]:
-    """A vector turned by a unit quaternion."""
-    x, y, z, w = q
-    turned = product(product(q, (*v, 0.0)), (-x, -y, -z, w))
-    return turned[:3]

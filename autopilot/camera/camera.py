@@ -15,7 +15,7 @@ import numpy as np
 
 from autopilot.camera.lens import FOCUS_NEAR_M, Lens
 from autopilot.camera.picture import defocused, jpeg_bytes
-from autopilot.camera.ports import FrameSource, Quat, RawFrame, View
+from autopilot.camera.ports import FrameSource, RawFrame, View
 from autopilot.camera.settings import MODE, Settings
 from autopilot.camera.storage import MediaFolder
 from autopilot.camera.trigger import NEVER_US, Trigger
@@ -23,6 +23,7 @@ from autopilot.camera.video import RATE_HZ, Recording
 from autopilot.gimbal.gimbal import Gimbal
 from autopilot.payload import Params
 from autopilot.vehicle import ACCEPTED, Reply, VehicleState, Verdict
+from common.attitude import Quat
 from common.geodesy import GeoPoint
 
 CAMERA_ID = 100  # MAV_COMP_ID_CAMERA

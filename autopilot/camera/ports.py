@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Quat = tuple[float, float, float, float]  # x, y, z, w
+from common.attitude import Quat
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from math import isfinite, isnan, nan, radians
 
-from autopilot.gimbal.gimbal import Gimbal, wrapped
+from autopilot.gimbal.gimbal import Gimbal
 from autopilot.payload import Params
 from autopilot.vehicle import ACCEPTED, Reply, VehicleState, Verdict
+from common.attitude import wrapped
 from common.geodesy import ned_from_geodetic
 
 DEVICE_ID = 154  # MAV_COMP_ID_GIMBAL

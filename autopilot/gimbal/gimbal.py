@@ -6,11 +6,10 @@ then by what its motors could do since. Left out: motor dynamics, the error of i
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, hypot, isfinite, nan, pi, radians, sin
+from math import atan2, hypot, isfinite, nan, radians
 
 from autopilot.vehicle import VehicleState
-
-Quat = tuple[float, float, float, float]  # x, y, z, w
+from common.attitude import Quat, inverse, product, quat_of, wrapped
 
 # A common small mapping gimbal; guess.
 PITCH_MIN, PITCH_MAX = radians(-90.0), radians(30.0)
@@ -117,12 +116,12 @@ class Gimbal:
     def q_ned_from_frd(self) -> Quat:
         """Attitude of the camera's body (x ahead) in ned."""
         self.update()
-        return _turned(self.yaw + self._state.yaw_rad, self.pitch)
+        return quat_of(self.yaw + self._state.yaw_rad, self.pitch)
 
     def q_heading_from_frd(self) -> Quat:
         """Attitude of the camera's body in the vehicle's levelled frame."""
         self.update()
-        return _turned(self.yaw, self.pitch)
+        return quat_of(self.yaw, self.pitch)
 
     def q_ned_from_rdf(self) -> Quat:
         """Attitude of the camera by estimate."""
@@ -130,30 +129,7 @@ class Gimbal:
 
     def q_frd_from_rdf(self) -> Quat:
         """Attitude of the camera in the vehicle's body: what its joints do."""
-        x, y, z, w = self._state.estimate.q_ned_from_frd
-        return product((-x, -y, -z, w), self.q_ned_from_rdf())
-
-
-def product(a: Quat, b: Quat) -> Quat:
-    """Hamilton product: first `b`, then `a`."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
-
-
-def _turned(yaw: float, pitch: float) -> Quat:
-    """Yaw, then pitch."""
-    return product((0.0, 0.0, sin(0.5 * yaw), cos(0.5 * yaw)), (0.0, sin(0.5 * pitch), 0.0, cos(0.5 * pitch)))
-
-
-def wrapped(angle: float) -> float:
-    """The angle [rad] shifted by turns into [-pi, pi]."""
-    return (angle + pi) % (2.0 * pi) - pi
+        return product(inverse(self._state.estimate.q_ned_from_frd), self.q_ned_from_rdf())
 
 
 def _bounded(value: float, most: float) -> float:

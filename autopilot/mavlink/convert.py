@@ -7,6 +7,8 @@ saturate, and a number that is not finite becomes the given default, so that tel
 from collections.abc import Sequence
 from math import isfinite, isnan, nan, pi
 
+from common.attitude import Quat
+
 INT16_MAX = 32_767
 INT32_MAX = 2_147_483_647
 UINT16_MAX = 65_535
@@ -18,8 +20,6 @@ RELATIVE_FRAMES = frozenset({3, 6})  # altitude above home
 TERRAIN_FRAMES = frozenset({10, 11})  # altitude above ground
 LATLON_FRAMES = GLOBAL_FRAMES | RELATIVE_FRAMES | TERRAIN_FRAMES
 MISSION_FRAME = 2  # not a position
-
-Quat = tuple[float, float, float, float]
 
 
 def wxyz_from_quat(q_xyzw: Sequence[float]) -> Quat:

@@ -5,14 +5,15 @@ heading is its own. What is not finite is refused with a text, and so is a frame
 """
 
 from collections.abc import Mapping, Sequence
-from math import atan2, isinf, isnan, nan, sqrt
+from math import isinf, isnan, nan, sqrt
 from typing import Any
 
 from autopilot.external import ExternalReport, Vector
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Endpoint, Sender
-from autopilot.mavlink.convert import Quat, quat_from_wxyz
+from autopilot.mavlink.convert import quat_from_wxyz
 from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import Severity
+from common.attitude import Quat, rotated, yaw_of
 
 # MAV_FRAME
 LOCAL_NED = 1
@@ -70,7 +71,7 @@ class ExternalService(Service):
     def mocap_received(self, sender: Sender, fields: Any) -> None:
         """Takes position [m, ned from where the vehicle booted] and heading for the estimator."""
         try:
-            yaw = heading(attitude(fields.q))
+            yaw = _heading(attitude(fields.q))
         except RefusedPositionError as refusal:
             self._refuse(str(refusal))
             return
@@ -113,7 +114,7 @@ class ExternalService(Service):
             fields.time_usec,
             (fields.x, fields.y, fields.z),
             vel,
-            heading(q_frame_from_frd),
+            _heading(q_frame_from_frd),
             *pose_deviations(fields.pose_covariance),
             vel_std=deviation(fields.velocity_covariance, 0, 6, 11),
             reset_counter=fields.reset_counter,
@@ -156,20 +157,9 @@ def attitude(wxyz: Sequence[float]) -> Quat | None:
     return (x / length, y / length, z / length, w / length)
 
 
-def heading(q_frame_from_frd: Quat | None) -> float:
+def _heading(q_frame_from_frd: Quat | None) -> float:
     """[rad] NaN if the attitude is not told."""
-    if q_frame_from_frd is None:
-        return nan
-    x, y, z, w = q_frame_from_frd
-    return atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-
-
-def rotated(q_dst_from_src: Quat, v: Vector) -> Vector:
-    """The vector in the destination frame."""
-    x, y, z, w = q_dst_from_src
-    a, b, c = v
-    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    return (a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx)
+    return nan if q_frame_from_frd is None else yaw_of(q_frame_from_frd)
 
 
 def pose(kind: str, time_us: int, fields: Any, yaw: float, reset_counter: int) -> ExternalReport:

@@ -5,7 +5,7 @@ attitude. Nobody else pays for them.
 """
 
 from collections.abc import Mapping
-from math import asin, atan2, isfinite, nan
+from math import isfinite, nan
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -15,11 +15,12 @@ from autopilot.gimbal.gimbal import PITCH_MAX, PITCH_MIN, RATE_MAX, YAW_MAX, YAW
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.component import Component, Payload
-from autopilot.mavlink.convert import wxyz_from_quat
+from autopilot.mavlink.convert import quat_from_wxyz, wxyz_from_quat
 from autopilot.mavlink.service import Command, CommandHandler, Handler, Service
 from autopilot.mavlink.telemetry.gimbal import DEVICE_ABILITIES, manager_flags
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.vehicle import Reply, Severity, Verdict
+from common.attitude import roll_pitch_yaw_of
 
 STATUS_US = 200_000  # the 5 Hz of the protocol
 ATTITUDE_US = 100_000
@@ -178,11 +179,9 @@ class GimbalManager(Service):
 
     def attitude_received(self, sender: Sender, f: Any) -> None:
         """Points the gimbal by a quaternion, or turns it at rates where that is NaN; roll stays level."""
-        w, x, y, z = f.q
         pitch = yaw = nan
-        if isfinite(w) and isfinite(x) and isfinite(y) and isfinite(z):
-            pitch = asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
-            yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        if all(map(isfinite, f.q)):
+            _, pitch, yaw = roll_pitch_yaw_of(quat_from_wxyz(f.q))
         self._point(sender, f, pitch, yaw, f.angular_velocity_y, f.angular_velocity_z)
 
     def pitchyaw_received(self, sender: Sender, f: Any) -> None:

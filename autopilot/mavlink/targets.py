@@ -5,7 +5,7 @@ the clocks of senders are not known.
 """
 
 from collections.abc import Mapping, Sequence
-from math import atan2, isfinite, nan, radians, sqrt, tan
+from math import isfinite, nan, radians, sqrt, tan
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -24,6 +24,7 @@ from autopilot.mavlink.service import Command, CommandHandler, Handler, Service,
 from autopilot.ports import POSITION_VALID
 from autopilot.requests import OrbitRequest, TargetReport
 from autopilot.vehicle import Reply, Severity
+from common.attitude import rotated, yaw_of
 from common.geodesy import ned_from_geodetic
 
 HAS_POSITION, HAS_VELOCITY, HAS_ATTITUDE = 1, 2, 8  # FOLLOW_TARGET.est_capabilities
@@ -171,18 +172,6 @@ def finite_triple(values: Sequence[float]) -> tuple[float, float, float] | None:
 
 def heading_of(q_wxyz: Sequence[float]) -> float:
     """Heading [rad] of an attitude; NaN if it is none."""
-    x, y, z, w = quat_from_wxyz(q_wxyz)
     if not 0.5 < sum(element * element for element in q_wxyz) < 2.0:
         return nan
-    return atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-
-
-def rotated(q: Sequence[float], v: Sequence[float]) -> tuple[float, float, float]:
-    """A vector turned by a unit quaternion (x, y, z, w)."""
-    x, y, z, w = q
-    tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
-    return (
-        v[0] + w * tx + y * tz - z * ty,
-        v[1] + w * ty + z * tx - x * tz,
-        v[2] + w * tz + x * ty - y * tx,
-    )
+    return yaw_of(quat_from_wxyz(q_wxyz))

@@ -3,6 +3,7 @@
 from math import atan2, cos, hypot, pi, sin, sqrt
 
 from autopilot.navigator.setpoint import Vector
+from common.attitude import wrapped
 
 ACCEL_SHARE = 0.6  # of MPC_ACC_HOR that a circle may take; the rest keeps to it in wind: guess
 
@@ -46,7 +47,7 @@ class Circle:
 
     @property
     def yaw_along(self) -> float:
-        return (self.angle + self.direction * 0.5 * pi + pi) % (2.0 * pi) - pi
+        return wrapped(self.angle + self.direction * 0.5 * pi)
 
     @property
     def yaw_rate(self) -> float:
@@ -57,7 +58,7 @@ class Circle:
         """Moves the point on."""
         step = self.speed_m_s * dt_s / self.radius_m
         self.turned_rad += step
-        self.angle = (self.angle + self.direction * step + pi) % (2.0 * pi) - pi
+        self.angle = wrapped(self.angle + self.direction * step)
 
 
 def speed_limit(radius_m: float, accel_max: float) -> float:

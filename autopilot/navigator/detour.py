@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.navigator.region import FloatArray, Point, Region
+from common.attitude import wrapped
 
 _NODES_MAX = 160  # corners of a way, those nearest to the direct one first
 _STEPS_MAX = 600  # per stretch; a longer one counts as closed
@@ -171,7 +172,7 @@ def _around_polygon(vertices: Sequence[Point], distance: float, *, is_inclusion:
         before, after = vertices[i - 1], vertices[(i + 1) % len(vertices)]
         course_in = atan2(corner[1] - before[1], corner[0] - before[0])
         course_out = atan2(after[1] - corner[1], after[0] - corner[0])
-        turn = (course_out - course_in + pi) % (2.0 * pi) - pi
+        turn = wrapped(course_out - course_in)
         if turn * side > 1e-3:  # the border turns away from the allowed side
             normal = course_in - side * 0.5 * pi
             yield from _arc(corner, distance, normal, turn, max(1, ceil(abs(turn) / _TURN_PER_CORNER)))

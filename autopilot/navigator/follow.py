@@ -6,7 +6,7 @@ course counts, or the side on which the vehicle happens to be. A pilot's sticks 
 bearing (roll) and the height (throttle) until the mode is chosen anew.
 """
 
-from math import atan2, cos, hypot, isfinite, nan, pi, radians, sin
+from math import atan2, cos, hypot, isfinite, nan, radians, sin
 
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
@@ -14,6 +14,7 @@ from autopilot.navigator.target import TargetFilter
 from autopilot.requests import TargetReport
 from autopilot.sticks import StickInput
 from autopilot.vehicle import Severity
+from common.attitude import wrapped
 from common.params import Parameter
 
 LOST_US = 3_000_000  # a target not heard of for longer is waited for (ArduPilot's AP_FOLLOW_TIMEOUT_MS)
@@ -32,11 +33,6 @@ _TURN_RAD_S = 1.5
 _AHEAD_S = 0.5
 _STICK_DEAD = 0.1
 _DISTANCE_MIN_M, _DISTANCE_MAX_M, _HEIGHT_MAX_M = 1.0, 100.0, 100.0
-
-
-def _wrapped(angle: float) -> float:
-    """The angle [rad] between -pi and pi."""
-    return (angle + pi) % (2.0 * pi) - pi
 
 
 class Follow:
@@ -146,10 +142,10 @@ class Follow:
         if abs(sticks.roll) > _STICK_DEAD:
             if not isfinite(self._course):
                 self._course = self._bearing - self._angle_rad
-            ahead = _wrapped(self._course + self._angle_rad - atan2(east, north))
+            ahead = wrapped(self._course + self._angle_rad - atan2(east, north))
             if abs(ahead) < _TURN_RAD_S * _AHEAD_S:
                 rate = min(_TURN_RAD_S, self._context.number("MPC_XY_VEL_MAX") / self._distance_m)
-                self._angle_rad = _wrapped(self._angle_rad + rate * sticks.roll * dt_s)
+                self._angle_rad = wrapped(self._angle_rad + rate * sticks.roll * dt_s)
 
     def _follow_course(self, target: TargetFilter, dt_s: float) -> None:
         """Takes the direction of the target's velocity, the more slowly the less it is known."""
@@ -160,7 +156,7 @@ class Follow:
         if not isfinite(self._course):
             self._course = course
             return
-        away = _wrapped(course - self._course)
+        away = wrapped(course - self._course)
         self._course += away * min(dt_s / (_COURSE_TIME_S + _COURSE_TIME_PER_RAD_S * std), 1.0)
 
     def _turn(self, distance_m: float, dt_s: float) -> float:
@@ -168,7 +164,7 @@ class Follow:
         context = self._context
         if not isfinite(self._course):
             return 0.0
-        away = _wrapped(self._course + self._angle_rad - self._bearing)
+        away = wrapped(self._course + self._angle_rad - self._bearing)
         way_m = abs(away) * distance_m
         speed = min(context.number("FLW_TGT_MAX_VEL"), (2.0 * _TURN_ACCEL_M_S2 * way_m) ** 0.5, way_m / max(dt_s, 1e-3))
         speed = speed if away > 0.0 else -speed

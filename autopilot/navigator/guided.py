@@ -5,7 +5,7 @@ attitude and rates stop after GUID_TIMEOUT. A take-off stays in the mode.
 """
 
 from enum import Enum, auto
-from math import atan2, isfinite, nan
+from math import isfinite, nan
 
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.goto import reposition_target
@@ -16,6 +16,7 @@ from autopilot.navigator.way import Way
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_LEAN, SETPOINT_TRAJECTORY
 from autopilot.requests import OffboardSetpoint
 from autopilot.vehicle import ACCEPTED, LandedState, Reply, Severity, Verdict
+from common.attitude import yaw_of
 
 THRUST_IS_THRUST = 8  # bit of GUID_OPTIONS
 _LEAST_TAKEOFF_M = 0.5  # above the place where it stands; guess
@@ -190,7 +191,6 @@ class Guided:
         context = self._context
         if setpoint.kind != SETPOINT_ATTITUDE or int(context.number("GUID_OPTIONS")) & THRUST_IS_THRUST:
             return setpoint
-        x, y, z, w = setpoint.q_ned_from_frd
         share = 2.0 * setpoint.thrust - 1.0
         speed = context.number("MPC_Z_V_AUTO_UP" if share > 0.0 else "MPC_Z_V_AUTO_DN")
         has_yaw_rate = isfinite(setpoint.yaw_rate)
@@ -199,7 +199,7 @@ class Guided:
             SETPOINT_LEAN,
             vel_ned=(nan, nan, -share * speed),
             accel_ned=(0.0, 0.0, nan),  # over ground the trajectory goes along with the vehicle
-            yaw=nan if has_yaw_rate else atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+            yaw=nan if has_yaw_rate else yaw_of(setpoint.q_ned_from_frd),
             yaw_rate=setpoint.yaw_rate,
             q_ned_from_frd=setpoint.q_ned_from_frd,
         )

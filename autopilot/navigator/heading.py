@@ -5,12 +5,13 @@ Whatever has to do with the payload's own aim is not here.
 """
 
 from enum import IntEnum
-from math import atan2, cos, hypot, isfinite, nan, pi, radians, sin
+from math import atan2, hypot, isfinite, nan, pi, radians
 from typing import TYPE_CHECKING
 
 from autopilot.navigator.setpoint import Vector
 from autopilot.ports import SETPOINT_TRAJECTORY
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Verdict
+from common.attitude import wrapped
 from common.kernels import FRAME_US
 
 if TYPE_CHECKING:
@@ -165,8 +166,3 @@ class Heading:
         else:
             self._turned = wrapped(self._turned + (step if left > 0.0 else -step))
         return self._turned
-
-
-def wrapped(angle: float) -> float:
-    """The angle [rad] within ±pi."""
-    return atan2(sin(angle), cos(angle))

@@ -1,6 +1,6 @@
 """What the camera tells of itself: information, settings, storage, capture, stream and field of view."""
 
-from math import asin, atan, atan2, degrees, isfinite, nan, radians, tan
+from math import atan, degrees, isfinite, nan, radians, tan
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -14,6 +14,7 @@ from autopilot.mavlink.convert import INT32_MAX, degrees_e7, i32, u16, u32, wxyz
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.ports import TERRAIN_VALID
 from autopilot.vehicle import VehicleState
+from common.attitude import roll_pitch_yaw_of
 from common.clock import SIMULATED_EPOCH_US
 from common.geodesy import geodetic_from_ned
 
@@ -141,7 +142,7 @@ class CameraMessages:
 
     def feedback(self, shot: Shot) -> bytes:
         """One photo, as ArduPilot reports it."""
-        x, y, z, w = shot.q_ned_from_frd
+        _, pitch, yaw = roll_pitch_yaw_of(shot.q_ned_from_frd)
         return _feedback(
             time_usec=SIMULATED_EPOCH_US + shot.time_us,
             img_idx=shot.index + 1 & 0xFFFF,
@@ -149,8 +150,8 @@ class CameraMessages:
             lng=degrees_e7(shot.place.lon_deg),
             alt_msl=shot.place.alt_m,
             alt_rel=shot.above_home_m,
-            pitch=degrees(asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))),
-            yaw=degrees(atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))) % 360.0,
+            pitch=degrees(pitch),
+            yaw=degrees(yaw) % 360.0,
             foc_len=FOCAL_LENGTH_MM,
             flags=mavlink.CAMERA_FEEDBACK_PHOTO,
             completed_captures=shot.index + 1 & 0xFFFF,

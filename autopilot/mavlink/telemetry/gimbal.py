@@ -5,10 +5,11 @@ from math import degrees
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.gimbal.control import AUTOPILOT, DEVICE_ID, Client, Flag, GimbalControl
-from autopilot.gimbal.gimbal import PITCH_MAX, PITCH_MIN, YAW_MAX, YAW_MIN, wrapped
+from autopilot.gimbal.gimbal import PITCH_MAX, PITCH_MIN, YAW_MAX, YAW_MIN
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.vehicle import VehicleState
+from common.attitude import wrapped
 
 DEVICE_ABILITIES = (
     mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_NEUTRAL

@@ -4,7 +4,7 @@ from math import atan2, cos, inf, nan, pi, sin
 
 import pytest
 
-from autopilot.mavlink.external import rotated
+from common.attitude import rotated
 from tests.unit.autopilot.mavlink.rig import Rig, texts
 
 POS, HEIGHT, VEL, YAW = 1, 2, 4, 8
