@@ -22,6 +22,7 @@ INJECT, TERMINATE, TAKEOFF, WAYPOINT, LAND = 420, 185, 22, 16, 21
 ABOVE_HOME = 6  # MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 GYRO, MAG, BARO, GNSS, BATTERY, MOTOR, RC_SIGNAL = 0, 2, 3, 4, 100, 101, 104  # FAILURE_UNIT
 OK, OFF, STUCK, WRONG, SLOW, DELAYED, INTERMITTENT = 0, 1, 2, 4, 5, 6, 7  # FAILURE_TYPE
+HEIGHT_REFERENCES = BY_BARO, BY_GNSS = (0, 1)
 HEIGHT_M = 10.0
 GCS = 6  # MAV_TYPE
 
@@ -92,7 +93,7 @@ def hovering(unit, failure, instance=0, seconds=30.0, height_m=HEIGHT_M, **param
 
     async def script(drone, fail):
         await drone.arm()
-        await drone.takeoff(height_m)
+        await drone.takeoff(height_m, timeout_s=120.0)
         await drone.sleep(3.0)
         await fail(unit, failure, instance)
         await drone.sleep(seconds)
@@ -125,8 +126,9 @@ def in_mission(unit, failure, **params):
     return flown(script, **params)
 
 
-def test_gnss_lost_in_a_mission_leads_to_a_blind_descent():
-    outcome = in_mission(GNSS, OFF)
+@pytest.mark.parametrize("height_reference", HEIGHT_REFERENCES)
+def test_gnss_lost_in_a_mission_leads_to_a_blind_descent(height_reference):
+    outcome = in_mission(GNSS, OFF, EKF2_HGT_REF=height_reference)
     assert outcome.said("Position lost: land")
     assert not outcome.said("Position is valid again")
     assert outcome.disarmed_s < 30.0
@@ -134,10 +136,15 @@ def test_gnss_lost_in_a_mission_leads_to_a_blind_descent():
 
 
 @pytest.mark.parametrize(
-    ("unit", "failure", "limit_s"), [(MAG, OFF, 90.0), (MAG, STUCK, 120.0), (BARO, OFF, 90.0), (BARO, STUCK, 90.0)]
+    ("unit", "failure", "limit_s", "height_reference"),
+    [
+        (MAG, OFF, 90.0, BY_BARO),
+        (MAG, STUCK, 120.0, BY_BARO),
+        *((BARO, failure, 90.0, reference) for failure in (OFF, STUCK) for reference in HEIGHT_REFERENCES),
+    ],
 )
-def test_mission_finishes_without(unit, failure, limit_s):
-    outcome = in_mission(unit, failure)
+def test_mission_finishes_without(unit, failure, limit_s, height_reference):
+    outcome = in_mission(unit, failure, EKF2_HGT_REF=height_reference)
     assert outcome.flight.drone.reached[-1] == 5
     assert outcome.disarmed_s < limit_s
 
@@ -242,7 +249,8 @@ def test_quadrotor_without_a_motor_says_so_and_stops_the_others():
 
 
 def test_motor_failure_can_terminate_the_flight():
-    height_m = 50.0
+    """PX4: free fall from 100 m disarms within 2 + sqrt(2h/10) s."""
+    height_m = 100.0
     outcome = hovering(MOTOR, OFF, 1, seconds=15.0, height_m=height_m, COM_ACT_FAIL_ACT=4)
     assert outcome.said("Motor failure: flight terminated")
     assert outcome.disarmed_s < 2.0 + np.sqrt(2.0 * height_m / 10.0)

@@ -253,6 +253,26 @@ def test_vibration_failsafe(bias_m_s2):
     assert flown.home_distance_m < 2.0
 
 
+@pytest.mark.parametrize("bias_m_s2", [2.0, -2.0])
+def test_mission_is_flown_with_a_wrong_accelerometer(bias_m_s2):
+    """PX4 asks this of two IMUs: "clipped accelerometer on the primary IMU: corridor 3 m in truth"; here is one."""
+    flown = Flown()
+
+    async def script(drone):
+        await drone.wait_ready()
+        await drone.upload(items(flown, 60.0))
+        await drone.start_mission()
+        await drone.until(lambda: flown.pos[0] > 15.0, 60.0, "underway")
+        flown.flight.rig.arrays.sensors.numpy()["imu"]["accel_bias_frd"][0, 2] += bias_m_s2
+        await drone.until(lambda: 1 in drone.reached, 60.0, "the waypoint")
+        await drone.wait_disarmed(120.0)
+
+    flown.run(script)
+    assert np.abs(np.array(flown.rows)[:, 2]).max() < 2.0
+    assert flown.home_distance_m < 2.0
+    assert not flown.body["is_crashed"]
+
+
 def test_accelerometer_that_is_wrong_on_every_axis_is_flown_with():
     """The failure that clients inject as wrong: 2 m/s2 too much on each axis, which tilts the horizon by 16 deg."""
     flown = Flown(SYS_FAILURE_EN=1.0)

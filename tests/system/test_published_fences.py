@@ -99,6 +99,25 @@ def test_direct_return_passes_around_an_exclusion_polygon():
     assert not flown.state.fence.breach_count
 
 
+def test_goto_passes_around_an_exclusion_polygon():
+    """ArduPilot rover: avoidance in guided: around the fence without a breach, and home again."""
+    flown = Flown()
+
+    async def script(drone, flown):
+        await drone.wait_ready()
+        await drone.upload(polygon(BLOCK, EXCLUSION_VERTEX), FENCE_LIST)
+        await airborne(drone)
+        await drone.goto_ned(70.0, 0.0, -10.0)
+        assert np.hypot(flown.track[-1][0] - 70.0, flown.track[-1][1]) < 2.0
+        await drone.return_home()
+        await drone.wait_disarmed(180.0)
+
+    track = flown.run(script)
+    assert flown.home_error_m < 1.5  # 3 to 7 m published
+    assert least_clearance(flown, track) > 0.5
+    assert not flown.state.fence.breach_count
+
+
 @pytest.mark.parametrize(
     ("parameters", "target"),
     [

@@ -13,7 +13,8 @@ from tests.system.published import Flown, Station
 
 SETPOINT_MASK = {"velocity": 0b1101_1100_0111, "position": 0b1101_1111_1000, "velocity and yaw rate": 0b0101_1100_0111,
                  "velocity and yaw": 0b1001_1100_0111}  # fmt: skip
-CONDITION_YAW, CHANGE_MODE_TO_LAND = 115, 21
+CONDITION_YAW, LAND = 115, 21
+LOITER, RTL = 5, 6  # COPTER_MODE
 
 
 def turned_deg(angle_rad):
@@ -99,6 +100,35 @@ def test_local_position_target():
         begin_s = flown.now_s
         await client.sleep(5.0)
         assert np.hypot(*(flown.since(begin_s)[:, 1:3] - 30.0).T).max() < 1.5
+
+    station.run(script)
+
+
+def test_overridden_channels_move_the_vehicle_and_let_it_go():
+    """ArduPilot: "overrides: mode change within 10 s; override speed < 2 m/s and back"."""
+    station = Station()
+    flown = station.flown
+
+    async def override(client, seconds, pitch):
+        channels = {f"chan{i}_raw": 65535 for i in range(5, 9)}
+        for _ in range(round(seconds * 10)):
+            client.send(
+                "RC_CHANNELS_OVERRIDE", target_system=1, target_component=1, chan1_raw=1500, chan2_raw=pitch,
+                chan3_raw=1500, chan4_raw=1500, **channels,
+            )  # fmt: skip
+            await client.sleep(0.1)
+
+    async def script(client):
+        await station.airborne()
+        await override(client, 1.0, 1500)
+        begin_s = flown.now_s
+        await station.mode(LOITER)
+        assert flown.now_s - begin_s < 1.0
+        await override(client, 5.0, 1350)
+        assert 0.5 < hypot(*flown.vel[:2]) < 2.0
+        await override(client, 4.0, 1500)
+        assert hypot(*flown.vel[:2]) < 0.3
+        await client.until(lambda: client.latest("HEARTBEAT").custom_mode == RTL, 10.0, "return without overrides")
 
     station.run(script)
 
@@ -193,7 +223,7 @@ def test_guided_changes_between_its_kinds_of_target():
         assert hypot(*flown.vel[:2]) < 0.5  # an attitude is not kept without a stream
         await target(client, "velocity", 4.0, vy=-2.0)
         assert flown.vel[1] == pytest.approx(-2.0, abs=0.4)
-        await client.command(CHANGE_MODE_TO_LAND, name="land")
+        await client.command(LAND, name="land")
         await client.until(lambda: not flown.state.is_armed, 60.0, "disarmed")
 
     station.run(script)

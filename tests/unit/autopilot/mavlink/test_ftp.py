@@ -351,6 +351,16 @@ def test_parameter_file_is_what_pymavlink_reads(rig, ftp):
     assert len(with_defaults.defaults) == len(rig.vehicle.params)
 
 
+def test_parameter_file_equals_the_list_bit_by_bit(rig, ftp):
+    """PX4's own test of parameters by FTP."""
+    decoded = MAVFTP.ftp_param_decode(ftp.read("@PARAM/param.pck"))
+    layouts = {1: "<b", 2: "<h", 3: "<i", 4: "<f"}
+    in_file = {name.decode(): struct.pack(layouts[kind], value).ljust(4, b"\0") for name, value, kind in decoded.params}
+    rig.client.send("PARAM_REQUEST_LIST")
+    in_list = {each.param_id: each.param_value.to_bytes(4, "little") for each in rig.all("PARAM_VALUE", 50)}
+    assert in_file == in_list
+
+
 def test_parameter_file_without_a_folder_is_there(rig, ftp):
     rig.vehicle.host.files = None
     assert len(ftp.read("/@PARAM/param.pck")) > 1000
