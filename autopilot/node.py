@@ -356,6 +356,7 @@ class FlightController:
         if self._on_reboot is None:
             return Reply(Verdict.UNSUPPORTED, "there is nothing to restart")
         self._on_reboot()
+        self.commander.hold_reasons_back()
         return ACCEPTED
 
     def _enter_anew(self, mode: Mode) -> Reply:

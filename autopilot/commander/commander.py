@@ -323,12 +323,17 @@ class Commander:
         self._unpowered_us = state.time_us
         self.guard.release()
         self._next_check_us = 0
+        self.hold_reasons_back()
         if not MODE_RULES[state.mode].needs_sticks and state.mode is not Mode.GUIDED:  # arming again in it is usual
             self.change_mode(Mode.HOLD)
         self.announcer.heartbeat_now()
         self.announcer.statustext(Severity.INFO, text)
 
     # ---- checks and failsafes ----
+
+    def hold_reasons_back(self) -> None:
+        """No text against arming for a while: the vehicle has just been stopped or restarted."""
+        self._next_text_us = max(self._next_text_us, self.state.time_us + _FIRST_TEXT_US)
 
     def _judge_position(self) -> None:
         """Valid at once, lost after COM_POS_FS_DELAY."""

@@ -6,6 +6,7 @@ information are refused without a text: asking is how clients find out what ther
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import isfinite, isinf, isnan, nan, radians
 from typing import Any
 
@@ -24,6 +25,7 @@ from autopilot.mavlink.convert import (
     whole,
 )
 from autopilot.mavlink.dialects import UnknownModeError
+from autopilot.mavlink.home_item import in_clients_numbers
 from autopilot.mavlink.service import Command, CommandHandler, Handler, RequestHandler, Service, denied
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
@@ -195,6 +197,7 @@ class CommandService(Service):
         if command.command in _PROBES and reply.verdict != Verdict.DENIED:
             return
         name = _name(command.command)
+        reply = replace(reply, reason=in_clients_numbers(reply.reason, self._endpoint.dialect.first_seq))
         text = f"{name}: {reply.reason or reply.verdict.name.lower().replace('_', ' ')}"
         if command.command in _PROBES:
             self._endpoint.text_once(Severity.NOTICE, text)

@@ -15,7 +15,7 @@ from autopilot.lists import ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.goto import GotoService
-from autopilot.mavlink.home_item import with_home, without_home
+from autopilot.mavlink.home_item import in_clients_numbers, with_home, without_home
 from autopilot.mavlink.mission_items import infinite_element, item_from_fields, scaled_position
 from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import Severity
@@ -111,7 +111,8 @@ class MissionService(Service):
             first_seq = self._first_seq(kind)
             refusal = self._endpoint.vehicle.lists.load(kind, without_home(items) if first_seq else items)
             if refusal is not None and items:
-                refusal = replace(refusal, seq=refusal.seq + first_seq)
+                reason = in_clients_numbers(refusal.reason, first_seq)
+                refusal = replace(refusal, seq=refusal.seq + first_seq, reason=reason)
         return refusal
 
     # Upload
@@ -313,7 +314,8 @@ class MissionService(Service):
         """Makes an item the current one; the answer is MISSION_CURRENT, whether it changed or not."""
         reply = self._endpoint.vehicle.set_current_item(max(fields.seq - self._first_seq(ListKind.MISSION), 0))
         if reply.reason:
-            self._endpoint.text(Severity.WARNING, f"Mission: {reply.reason}")
+            reason = in_clients_numbers(reply.reason, self._first_seq(ListKind.MISSION))
+            self._endpoint.text(Severity.WARNING, f"Mission: {reason}")
         telemetry = self._endpoint.telemetry
         payload = telemetry.builders[_MISSION_CURRENT_ID](self._endpoint.vehicle.state)
         if payload is not None:

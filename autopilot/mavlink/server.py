@@ -26,6 +26,7 @@ from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
 from autopilot.mavlink.goto import GotoService
+from autopilot.mavlink.home_item import in_clients_numbers
 from autopilot.mavlink.identity import banner
 from autopilot.mavlink.intake import share
 from autopilot.mavlink.links import Link, LinkSource
@@ -55,6 +56,7 @@ from autopilot.vehicle import Severity
 HEARTBEAT_US = 1_000_000
 AFTER_AUTOPILOT_US = 40_000
 _HEARTBEAT = known_type("HEARTBEAT")
+_EXTENDED_SYS_STATE = known_type("EXTENDED_SYS_STATE")
 _HOME_POSITION = known_type("HOME_POSITION")
 _MISSION_CURRENT = known_type("MISSION_CURRENT")
 _MISSION_ITEM_REACHED = known_type("MISSION_ITEM_REACHED")
@@ -101,6 +103,7 @@ class MavlinkServer:
         self._router = Router(self._endpoint)
         self._turn = 0
         self._is_heartbeat_due = False
+        self._landed_state = vehicle.state.landed_state  # as told
         self._next_component_heartbeat_us = -1  # not planned yet
         self._commands = CommandService(self._endpoint)
         self._messages: dict[str, Handler] = {}
@@ -221,6 +224,8 @@ class MavlinkServer:
             run()
         if self._components and time_us >= self._next_component_heartbeat_us:
             self._send_component_heartbeats(time_us)
+        if endpoint.vehicle.state.landed_state is not self._landed_state:
+            self._tell_landed_state()
         if self._is_heartbeat_due:
             self._is_heartbeat_due = False
             self._broadcast_telemetry(_HEARTBEAT.msg_id)
@@ -309,7 +314,7 @@ class MavlinkServer:
     # Announcer
 
     def statustext(self, severity: Severity, text: str) -> None:
-        self._endpoint.text(severity, text)
+        self._endpoint.text(severity, in_clients_numbers(text, self._endpoint.dialect.first_seq))
         self._events.text_told(severity, text)
 
     def mission_item_reached(self, seq: int) -> None:
@@ -318,7 +323,9 @@ class MavlinkServer:
 
     def mission_current_changed(self, seq: int) -> None:
         endpoint = self._endpoint
-        payload = mission_progress(endpoint.vehicle.state, seq + endpoint.dialect.first_seq)
+        state = endpoint.vehicle.state
+        first_seq = endpoint.dialect.first_seq if state.mission_count else 0
+        payload = mission_progress(state, seq + first_seq)
         endpoint.broadcast(_MISSION_CURRENT, payload)
 
     def home_changed(self) -> None:
@@ -336,6 +343,12 @@ class MavlinkServer:
         self._next_component_heartbeat_us = time_us + HEARTBEAT_US
         for component in self._components:
             component.send_heartbeat()
+        self._is_heartbeat_due = True
+
+    def _tell_landed_state(self) -> None:
+        """At once, and a heartbeat with it: stations take either of them for flying or not."""
+        self._landed_state = self._endpoint.vehicle.state.landed_state
+        self._broadcast_telemetry(_EXTENDED_SYS_STATE.msg_id)
         self._is_heartbeat_due = True
 
     def heartbeat_now(self) -> None:

@@ -236,3 +236,19 @@ def test_vehicle_that_is_being_calibrated_is_not_armed():
     assert rig.recorder.has_text("[cal] calibration done: gyro")
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     assert rig.fc.calibration.start(CalibrationKind.GYRO).reason == "the vehicle is armed"
+
+
+def test_reasons_against_arming_wait_while_a_stopped_vehicle_falls_and_a_restarted_one_aligns():
+    rig = Kinematic().flying()
+    rig.run(31.0)
+    rig.fc.disarm(force=True)
+    rig.run(2.0)
+    assert not rig.recorder.has_text("PreArm")
+    rig.run(30.0)
+    rig.fc._on_reboot = lambda: None
+    rig.fc.reboot()
+    rig.flags = 0
+    rig.run(2.0)
+    assert not rig.recorder.has_text("PreArm")
+    rig.run(10.0)
+    assert rig.recorder.has_text("PreArm")

@@ -1,6 +1,7 @@
 from autopilot.lists import ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.home_item import with_home, without_home
+from autopilot.vehicle import Reply, Severity, Verdict
 from tests.unit.autopilot.mavlink.rig import Rig, flying_state, texts
 
 WAYPOINT, JUMP = 16, 177
@@ -99,3 +100,27 @@ def test_refused_item_is_named_by_the_clients_number():
     messages = rig.frame()
     assert [message.fields.type for message in messages if message.name == "MISSION_ACK"] == [3]
     assert texts(messages) == ["Mission: item 2: no such command"]
+
+
+def test_texts_number_items_as_the_client_does():
+    rig = Rig(dialect=ARDUPILOT)
+    rig.frame(2)
+    rig.vehicle.reply = Reply(Verdict.DENIED, "there is no item 9")
+    rig.client.command(224, 10.0)
+    assert texts(rig.frame()) == ["Mission: there is no item 10"]
+    rig.client.send("MISSION_SET_CURRENT", target_component=1, seq=10)
+    assert texts(rig.frame()) == ["Mission: there is no item 10"]
+    rig.server.statustext(Severity.INFO, "Mission waits after item 3")
+    rig.server.statustext(Severity.INFO, "Return to rally point 1")
+    assert texts(rig.frame()) == ["Mission waits after item 4", "Return to rally point 1"]
+    rig.vehicle.stored[ListKind.MISSION].refusal = ItemRefusal(1, 13, "jump to item 7 is not possible")
+    upload(rig, [item(0), item(1), item(2)])
+    assert texts(rig.frame()) == ["Mission: item 2: jump to item 8 is not possible"]
+
+
+def test_the_current_item_of_no_mission_is_0():
+    rig = Rig(dialect=ARDUPILOT)
+    rig.frame(2)
+    rig.update(mission_count=0, mission_current=0)
+    rig.server.mission_current_changed(0)
+    assert [each.seq for each in rig.all("MISSION_CURRENT", 60)] == [0, 0]

@@ -47,6 +47,16 @@ def test_system_status_is_in_step_with_the_landed_state():
         assert rig.all("HEARTBEAT")[-1].system_status == expected
 
 
+def test_lift_off_is_told_in_the_same_frame():
+    rig = Rig()
+    rig.update(landed_state=LandedState.ON_GROUND)
+    rig.frame(55)
+    rig.update(landed_state=LandedState.TAKEOFF)
+    messages = {message.name: message.fields for message in rig.frame()}
+    assert messages["HEARTBEAT"].system_status == mavlink.MAV_STATE_ACTIVE
+    assert messages["EXTENDED_SYS_STATE"].landed_state == LandedState.TAKEOFF
+
+
 def test_ground_station_connects_without_silence():
     """QGroundControl's sequence: each request is answered within 100 ms, ack before message."""
     rig = Rig()
