@@ -218,6 +218,8 @@ class Component:
         if now_us < self._due_us:
             return
         due_us = self.work()
+        if self._intervals:
+            self._intervals = [item for item in self._intervals if item.channel.is_open]  # clients come and go
         for item in self._intervals:
             if now_us >= item.due_us:
                 item.due_us = max(item.due_us + item.interval_us, now_us + FRAME_US)
