@@ -23,6 +23,12 @@ CHUNK_TICKS = 1000
 OUTPUT_PERIOD_US = 20_000
 SENSORS = ("gnss", "baro", "mag", "range")
 SOURCES = {"gnss_pos": 2, "gnss_vel": 3, "gnss_height": 1, "baro": 1, "mag": 3, "range": 1, "drag": 2, "rest": 3}
+UNHEARD = (
+    "external_pos",
+    "external_height",
+    "external_vel",
+    "external_yaw",
+)  # recordings hold none of it; logs name it
 
 # The defaults describe this project's simulated sensors. What differs for real ones, of which nothing is known:
 REAL_SENSORS: dict[str, float] = {
@@ -52,7 +58,7 @@ OUTPUT_DTYPE = np.dtype(
         ("estimate", row_dtype(Estimate)),
         ("horizon_time_us", "<i8"),
         ("body_field_frd", "<f4", (3,)),
-        *((name, AID_DTYPE) for name in SOURCES),
+        *((name, AID_DTYPE) for name in (*SOURCES, *UNHEARD)),
     ]
 )
 EVENT_DTYPE = np.dtype(

@@ -165,5 +165,6 @@ RULES: tuple[Rule, ...] = (
     Rule(WIND_STRONG, always(Action.WARN), Severity.WARNING, "Strong wind"),
     Rule(ACCEL_DOUBTED, always(Action.WARN), Severity.CRITICAL, "Vibration compensation ON",
          "Vibration compensation OFF"),
-    Rule(DEAD_RECKONING, always(Action.WARN), Severity.WARNING, "GNSS lost: dead reckoning", "GNSS is used again"),
+    Rule(DEAD_RECKONING, always(Action.WARN), Severity.WARNING, "No position source: dead reckoning",
+         "Position source is back"),
 )  # fmt: skip

@@ -261,12 +261,14 @@ def estimator_flags(state: VehicleState) -> int:
 
 
 def test_ratios(health: Any) -> tuple[float, float, float, float, float]:
-    """Smoothed test ratios of GNSS velocity and position, barometer, magnetometer, range; above 1 is rejected."""
+    """Smoothed test ratios of velocity, position (a client's, else GNSS), barometer, magnetometer, range finder."""
     if health is None:
         return 0.0, 0.0, 0.0, 0.0, 0.0
+    vel = health.external_vel if health.external_vel.is_active else health.gnss_vel
+    pos = health.external_pos if health.external_pos.is_active else health.gnss_pos
     return (
-        health.gnss_vel.test_ratio_lpf,
-        health.gnss_pos.test_ratio_lpf,
+        vel.test_ratio_lpf,
+        pos.test_ratio_lpf,
         health.baro.test_ratio_lpf,
         health.mag.test_ratio_lpf,
         health.range.test_ratio_lpf,

@@ -280,10 +280,10 @@ def test_dead_reckoning_is_told_and_so_is_its_end():
     rig = flying_away()
     rig.flags |= DEAD_RECKONING
     rig.run(1.0)
-    assert rig.recorder.has_text("GNSS lost: dead reckoning")
+    assert rig.recorder.has_text("No position source: dead reckoning")
     rig.flags &= ~DEAD_RECKONING
     rig.run(4.0)
-    assert rig.recorder.has_text("GNSS is used again")
+    assert rig.recorder.has_text("Position source is back")
     assert rig.state.mode is Mode.HOLD
 
 
