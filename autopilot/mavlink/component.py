@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot.mavlink.channel import Channel, Endpoint, Sender
 from autopilot.mavlink.codec import MessageType, known_type, message_type
 from autopilot.mavlink.convert import INT32_MAX, bounded_int, whole
-from autopilot.mavlink.service import Command, CommandHandler, Handler, denied
+from autopilot.mavlink.service import COMMAND_ACK, Command, CommandHandler, Handler, acknowledgement, denied
 from autopilot.vehicle import ACCEPTED, Reply, Severity, Verdict
 from common.kernels import FRAME_US
 
@@ -23,7 +23,6 @@ _PROBES = frozenset(
 )  # asked by the dozen when a ground station connects: a refusal needs no text
 
 _HEARTBEAT = known_type("HEARTBEAT")
-_COMMAND_ACK = known_type("COMMAND_ACK")
 _MESSAGE_INTERVAL = known_type("MESSAGE_INTERVAL")
 
 Payload = Callable[[], bytes | None]
@@ -96,8 +95,7 @@ class Component:
         self.endpoint.broadcast(kind, payload, self.compid)
 
     def ack(self, command: Command, verdict: Verdict) -> None:
-        payload = _COMMAND_ACK.pack(command.command, verdict, 0, 0, command.sender.sysid, command.sender.compid)
-        self.reply(command.sender, _COMMAND_ACK, payload)
+        self.reply(command.sender, COMMAND_ACK, acknowledgement(command, verdict))
 
     # Being asked
 

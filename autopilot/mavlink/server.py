@@ -23,6 +23,7 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.events import EventService
 from autopilot.mavlink.external import ExternalService
 from autopilot.mavlink.fence import FenceService
+from autopilot.mavlink.flight_commands import FlightCommands
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
 from autopilot.mavlink.goto import GotoService
@@ -33,6 +34,7 @@ from autopilot.mavlink.links import Link, LinkSource
 from autopilot.mavlink.log_streaming import LogStreamingService
 from autopilot.mavlink.log_transfer import LogTransferService
 from autopilot.mavlink.manual import ManualService
+from autopilot.mavlink.message_requests import MessageRequests
 from autopilot.mavlink.mission_commands import MissionCommands
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.modes import ModeService
@@ -106,6 +108,7 @@ class MavlinkServer:
         self._landed_state = vehicle.state.landed_state  # as told
         self._next_component_heartbeat_us = -1  # not planned yet
         self._commands = CommandService(self._endpoint)
+        self._requests = MessageRequests(self._endpoint)
         self._messages: dict[str, Handler] = {}
         self._handlers: dict[int, Handler] = {}  # the same, by id
         self._frames: list[Callable[[], None]] = []  # of the services that have something to do each frame
@@ -125,6 +128,8 @@ class MavlinkServer:
         self._events = EventService(endpoint)
         return [
             self._commands,
+            self._requests,
+            FlightCommands(endpoint),
             parameters,
             MissionCommands(endpoint),
             ModeService(endpoint),
@@ -169,7 +174,7 @@ class MavlinkServer:
     def _add(self, service: Service) -> None:
         self._add_messages(service.messages())
         self._commands.add(service.commands())
-        self._commands.add_requests(service.requests())
+        self._requests.add(service.requests())
         if type(service).frame is not Service.frame:
             self._frames.append(service.frame)
 

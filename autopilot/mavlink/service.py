@@ -5,7 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from autopilot.mavlink.channel import Sender
+from autopilot.mavlink.codec import known_type
 from autopilot.vehicle import Reply, Verdict
+
+COMMAND_ACK = known_type("COMMAND_ACK")
 
 Handler = Callable[[Sender, Any], None]
 
@@ -50,6 +53,11 @@ class Service:
 
     def frame(self) -> None:
         """Called once per frame, after the messages that have come in; not at all if it is not overridden."""
+
+
+def acknowledgement(command: Command, verdict: Verdict) -> bytes:
+    """The payload of COMMAND_ACK."""
+    return COMMAND_ACK.pack(command.command, verdict, 0, 0, command.sender.sysid, command.sender.compid)
 
 
 def denied(reason: str) -> Reply:
