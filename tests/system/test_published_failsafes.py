@@ -32,7 +32,7 @@ def items(flown, length_m):
     ]
 
 
-@pytest.mark.parametrize("timeout_s", [5.0, 10.0])
+@pytest.mark.parametrize("timeout_s", [5.0, pytest.param(10.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("action", "mode", "text"),
     [

@@ -62,6 +62,13 @@ def test_links_lead_somewhere(name):
             assert anchor in anchors(there), f"{target}#{anchor}"
 
 
+def test_tests_that_are_named_exist():
+    for name, page in PAGES.items():
+        for test, target in re.findall(r"\[(test_\w+)\]\(([^)]+\.py)\)", page.read_text(encoding="utf-8")):
+            source = (page.parent / target).read_text(encoding="utf-8")
+            assert re.search(rf"^def {test}\(", source, re.MULTILINE), f"{name}: {test}"
+
+
 def flight_arguments(line):
     """The arguments of `honeyguide fly` in a command line; None if it is another command."""
     words = shlex.split(line)
