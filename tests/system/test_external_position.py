@@ -14,6 +14,7 @@ PERIOD_S = 1.0 / 30.0
 NOISE_M = 0.01
 UNKNOWN = (nan,) * 21
 MAG_NONE = 5
+REBOOT = 246  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 OPEN = WorldConfig(trees_per_ha=0.0, hill_height_m=0.0)
 
 
@@ -194,6 +195,21 @@ def test_position_is_not_ready_while_nobody_sends():
     hall.fly(script)
     assert "GNSS" in hall.flight.controller.check_arming()[0]
     hall.flight.close()
+
+
+def test_ready_again_after_a_restart():
+    hall = Hall()
+
+    async def script(drone):
+        await drone.wait_ready()
+        await drone.command(REBOOT, 1.0, name="restart")
+        state = hall.flight.controller.state
+        await drone.until(lambda: not state.is_ready_to_arm, 5.0, "restarting")
+        await drone.until(lambda: state.is_ready_to_arm, 30.0, "ready again")
+
+    hall.fly(script)
+    hall.flight.close()
+    assert np.linalg.norm(np.array(hall.estimate.pos_ned) - hall.pos_ned) < 0.1
 
 
 def _wrapped(angle):

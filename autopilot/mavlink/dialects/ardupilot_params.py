@@ -24,6 +24,8 @@ _FENCE_ACTIONS: Mapping[int, int] = {1: 0, 0: 0, 2: 4, 3: 1, 5: 2, 6: 3}
 _BATTERY_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 2}
 # Modes of a switch: PX4's COM_FLTMODE numbers to mode numbers of a copter.
 _SWITCH_MODES: Mapping[int, int] = {8: 0, 6: 1, 1: 2, 3: 3, 7: 4, 4: 5, 5: 6, 11: 9, 2: 16, 12: 23}
+# Positions from outside: none, by MAVLink; the heading stays the compass's unless EKF2_EV_CTRL itself says otherwise.
+_VISION_TYPES: Mapping[int, int] = {0: 0, 7: 1} | dict.fromkeys(range(1, 16), 1)
 # Heading on mission legs: towards the next waypoint, along the way.
 _YAW_MODES: Mapping[int, int] = {0: 1, 3: 3}
 
@@ -63,6 +65,11 @@ ALIASES: tuple[Alias, ...] = (
     Alias("RTL_LOIT_TIME", "RTL_LAND_DELAY", INT32, MS),
     Alias("RTL_SPEED", "RTL_RETURN_SPD", INT16, CM),
     Alias("SYSID_THISMAV", "MAV_SYS_ID", INT16),
+    Alias("VISO_DELAY_MS", "EKF2_EV_DELAY", INT16),
+    Alias("VISO_POS_M_NSE", "EKF2_EVP_NOISE", REAL32),
+    Alias("VISO_TYPE", "EKF2_EV_CTRL", INT8, numbers=_VISION_TYPES),
+    Alias("VISO_VEL_M_NSE", "EKF2_EVV_NOISE", REAL32),
+    Alias("VISO_YAW_M_NSE", "EKF2_EVA_NOISE", REAL32),
     Alias("WPNAV_ACCEL", "MPC_ACC_HOR", REAL32, CM),
     Alias("WPNAV_RADIUS", "NAV_ACC_RAD", REAL32, CM),
     Alias("WPNAV_SPEED", "MPC_XY_CRUISE", REAL32, CM),

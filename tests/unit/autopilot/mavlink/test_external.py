@@ -4,6 +4,7 @@ from math import atan2, cos, inf, nan, pi, sin
 
 import pytest
 
+from autopilot.mavlink.dialects.ardupilot_params import ALIASES
 from common.attitude import rotated
 from tests.unit.autopilot.mavlink.rig import Rig, texts
 
@@ -225,6 +226,12 @@ def test_flood_of_positions_is_bounded():
         vision(r.client, x=nan if i % 2 else 1.0, z=nan if i % 3 else 1.0, yaw=nan if i % 5 else 1.0)
     r.frame(20)
     assert len(r.vehicle.external.waiting) <= 4
+
+
+def test_ardupilots_switch_asks_for_all_but_the_heading():
+    (switch,) = (alias for alias in ALIASES if alias.name == "VISO_TYPE")
+    assert (switch.ours(0), switch.ours(1)) == (0, POS | HEIGHT | VEL)
+    assert [switch.shown(used) for used in (0, 1, 7, 15)] == [0, 1, 1, 1]
 
 
 def test_rotation_is_the_active_one():
