@@ -275,7 +275,7 @@ class FlightController:
         if self.state.mode is Mode.GUIDED:
             refusal = self.navigator.takeoff_refusal(alt_amsl_m)
             return Reply(Verdict.DENIED, refusal) if refusal else self.guided.takeoff(alt_amsl_m, yaw_rad)
-        reason = self.commander.refusal(Mode.TAKEOFF)
+        reason = self.commander.request_refusal(Mode.TAKEOFF)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)
         reply = self.navigator.request_takeoff(alt_amsl_m, yaw_rad)
@@ -284,7 +284,7 @@ class FlightController:
         return self._enter_anew(Mode.TAKEOFF)
 
     def land(self, lat_deg: float, lon_deg: float, yaw_rad: float) -> Reply:
-        reason = self.commander.refusal(Mode.LAND)
+        reason = self.commander.request_refusal(Mode.LAND)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)
         reply = self.navigator.request_landing(lat_deg, lon_deg, yaw_rad)
@@ -298,6 +298,9 @@ class FlightController:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
         if not self.commander.has_position:
             return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
+        reason = self.commander.request_refusal(Mode.HOLD)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
         reply = self.navigator.reposition(lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
         if reply.verdict is not Verdict.ACCEPTED:
             return reply
@@ -326,7 +329,7 @@ class FlightController:
         state = self.state
         if not state.is_armed or state.landed_state is LandedState.ON_GROUND:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
-        reason = self.commander.refusal(Mode.ORBIT)
+        reason = self.commander.request_refusal(Mode.ORBIT)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)
         reply = self.navigator.orbit.request(request)
@@ -361,10 +364,11 @@ class FlightController:
 
     def _enter_anew(self, mode: Mode) -> Reply:
         """Enters a mode, also if it is the present one, whose target is a new one then."""
-        if self.state.mode is mode:
+        is_new = self.state.mode is not mode
+        reply = self.commander.request_mode(mode)
+        if reply.verdict is Verdict.ACCEPTED and not is_new:
             self.navigator.enter(mode)
-            return ACCEPTED
-        return self.commander.request_mode(mode)
+        return reply
 
 
 def hover_thrust(airframe: Airframe) -> float:

@@ -33,6 +33,9 @@ _LIFT_TIMEOUT_US = 10_000_000  # a take-off that has not left the ground by then
 _FRAME_LONGEST_S = 0.1  # longer gaps do not count as landed time
 _ON_ITS_SIDE_RAD = 0.25 * pi  # lean from which a vehicle on the ground has not landed but crashed, as for arming
 _FALLEN_US = 10_000_000  # after its motors stopped in the air a vehicle is down, whatever the estimate says; guess
+_HOME_FAR_M = 50_000.0  # from where the vehicle was switched on (ArduPilot)
+_HOME_HIGH_M = 10_000.0
+_OFF_GROUND_M = 0.15  # a lower hover is not told from standing; guess
 _RESET_TOLD_M = 0.5  # smaller jumps of the position are not worth a text; guess
 
 
@@ -123,6 +126,10 @@ class Commander:
             self._flying.enter(mode)
             self.announcer.heartbeat_now()
 
+    def begin_here(self) -> None:
+        """Begins the present mode anew where the vehicle is; for failsafes."""
+        self._flying.begin_here(self.state.mode)
+
     # ---- what clients ask for ----
 
     def arm(self, *, force: bool) -> Reply:
@@ -177,21 +184,21 @@ class Commander:
 
     def request_mode(self, mode: Mode) -> Reply:
         """Changes the mode for a client, or says why not."""
-        reason = self._pilot_refusal(mode) or self.refusal(mode)
+        reason = self.request_refusal(mode)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)
         self.guard.release()
         self.change_mode(mode)
         return ACCEPTED
 
-    def _pilot_refusal(self, mode: Mode) -> str:
-        """Why a client may not choose a mode that could be flown; empty if it may."""
+    def request_refusal(self, mode: Mode) -> str:
+        """Why a client may not choose a mode now; empty if it may."""
         state = self.state
         if state.mode is Mode.TERMINATION and mode is not state.mode:
             return "the flight is terminated"
         if mode is Mode.TERMINATION and state.mode is not mode:
             return "a flight is terminated by command, not by a mode"
-        return self.guard.refusal(mode) if state.is_armed else ""
+        return (self.guard.refusal(mode) if state.is_armed else "") or self.refusal(mode)
 
     def terminate(self) -> Reply:
         """Stops the motors for good, wherever the vehicle is."""
@@ -233,8 +240,10 @@ class Commander:
             if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
                 return Reply(Verdict.DENIED, "there is no such latitude and longitude")
             alt_m = alt_amsl_m if isfinite(alt_amsl_m) else (state.home or state.position).alt_m
-            state.home = GeoPoint(lat_deg, lon_deg, alt_m)
-            state.home_ned = ned_from_geodetic(lat_deg, lon_deg, alt_m, state.origin)
+            home_ned = ned_from_geodetic(lat_deg, lon_deg, alt_m, state.origin)
+            if hypot(home_ned[0], home_ned[1]) > _HOME_FAR_M or abs(alt_m - state.origin.alt_m) > _HOME_HIGH_M:
+                return Reply(Verdict.DENIED, "home would be too far away to return to")
+            state.home, state.home_ned = GeoPoint(lat_deg, lon_deg, alt_m), home_ned
             state.home_yaw_rad = state.yaw_rad  # of the vehicle: a place has none
             self.announcer.home_changed()
         self._is_home_given = True
@@ -305,9 +314,14 @@ class Commander:
         """Released from the ground, but not yet off it."""
         state = self.state
         is_put_down = MODE_RULES[state.mode].needs_sticks and self._flying.ask is Ask.DOWN
-        if self._lift_d - state.estimate.pos_ned[2] > _AIRBORNE_M or self._flying.is_landing or is_put_down:
+        risen_m = self._lift_d - state.estimate.pos_ned[2]
+        if risen_m > _AIRBORNE_M or self._flying.is_landing or is_put_down:
             self._has_flown = True
         elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
+            is_hovering = MODE_RULES[state.mode].needs_sticks or self._flying.ask is not Ask.UP
+            if is_hovering and risen_m > _OFF_GROUND_M:  # it shall not go higher
+                self._has_flown = True
+                return
             self.announcer.statustext(Severity.CRITICAL, "Takeoff failed: still on the ground")
             self._touch_down()
             self.stop_motors("Disarmed: no take-off")

@@ -13,6 +13,10 @@ class Flying(Protocol):
 
     def enter(self, mode: Mode) -> None: ...
 
+    def begin_here(self, mode: Mode) -> None:
+        """Begins a mode anew where the vehicle is, whatever clients have asked of it."""
+        ...
+
     def on_armed(self) -> None: ...
 
     def arming_reason(self) -> str:

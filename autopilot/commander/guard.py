@@ -30,6 +30,8 @@ class Authority(Protocol):
 
     def change_mode(self, mode: Mode) -> None: ...
 
+    def begin_here(self) -> None: ...
+
     def stop_motors(self, text: str) -> None: ...
 
 
@@ -92,9 +94,21 @@ class Guard:
             commander.stop_motors("Disarmed by failsafe on the ground")
             return
         state.is_failsafe = True
-        if strongest > max(self._action, MODE_STRENGTH.get(state.mode, Action.WARN)):
+        if strongest > max(self._action, self._strength()):
             self._action = strongest
-            commander.change_mode(ACTION_MODES[strongest])
+            mode = ACTION_MODES[strongest]
+            if mode is state.mode:
+                commander.begin_here()  # not where a client has sent it
+            else:
+                commander.change_mode(mode)
+
+    def _strength(self) -> Action:
+        """The action that what is being flown stands for: weaker ones, or the same, do not end it."""
+        state = self._commander.state
+        strength = MODE_STRENGTH.get(state.mode, Action.WARN)
+        if state.landed_state is LandedState.LANDING:
+            return max(strength, Action.RETURN)  # nearly down, in whatever mode: nothing calls it up again
+        return min(strength, Action.RETURN) if strength is Action.LAND else strength  # on the way to a landing place
 
     def _possible(self, action: Action) -> Action:
         """The action, or the next stronger one that can be flown now."""

@@ -103,7 +103,8 @@ class FlightCommands(Service):
         """Sets home.
 
         Params: p1 1: here; otherwise p5, p6 place and p7 altitude.
-        Refused: TEMPORARILY_REJECTED without a position; DENIED for a place that is not on earth.
+        Refused: TEMPORARILY_REJECTED without a position; DENIED for a place that is not on earth, more than 50 km from
+        where the vehicle was switched on, or more than 10 km higher or lower.
         """
         if command.p1 == 1.0:
             return self._endpoint.vehicle.set_home(nan, nan, nan)

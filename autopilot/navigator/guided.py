@@ -173,7 +173,7 @@ class Guided:
         return ACCEPTED
 
     def forget_goto(self) -> None:
-        """The mode could not be entered."""
+        """The mode could not be entered, or another was."""
         self._next = None
 
     def receive(self, setpoint: OffboardSetpoint) -> None:

@@ -207,6 +207,11 @@ class Mission:
 
     # ---- flying ----
 
+    @property
+    def is_flying(self) -> bool:
+        """Whether an item is being flown."""
+        return self._is_flying
+
     def start(self) -> None:
         """Begins, or goes on at the current item from the present place."""
         state = self._context.state

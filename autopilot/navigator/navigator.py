@@ -189,10 +189,30 @@ class Navigator:
             self.mission.leave()  # a return may end with its landing part
         if self._active is self.orbit and mode is not Mode.ORBIT:
             self.orbit.leave()
+        self._forget_requests(mode)
         self._active = self._modes[mode]
         self.context.heading.end_turn()
         if self.context.state.is_armed:
             self._active.start()
+
+    def begin_here(self, mode: Mode) -> None:
+        """Begins a mode anew, or another, without what clients have asked of it: where the vehicle is."""
+        self._forget_requests(None)
+        self.enter(mode)
+
+    def _forget_requests(self, kept: Mode | None) -> None:
+        """A place or a height that was asked of a mode does not wait for the next time it is entered."""
+        if kept is not Mode.HOLD:
+            self.context.next_hold = None
+            self.hold.via = []
+        if kept is not Mode.TAKEOFF:
+            self.takeoff.forget()
+        if kept is not Mode.LAND:
+            self.land.request(None, nan)
+        if kept is not Mode.ORBIT:
+            self.orbit.forget()
+        if kept is not Mode.GUIDED:
+            self.guided.forget_goto()
 
     def on_armed(self) -> None:
         """Starts the mode that was chosen before."""

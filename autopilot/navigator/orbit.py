@@ -64,6 +64,10 @@ class Orbit:
         self._request = request
         return ACCEPTED
 
+    def forget(self) -> None:
+        """The orbit asked for is not flown."""
+        self._request = None
+
     def start(self) -> None:
         context = self._context
         request, self._request = self._request or self._ahead(), None

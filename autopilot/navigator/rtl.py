@@ -10,7 +10,7 @@ from autopilot.navigator.fence import Fence
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.way import Way
-from autopilot.vehicle import Mode, Severity
+from autopilot.vehicle import Severity
 
 _HEIGHT_M = 0.5  # height error at which the climb ends
 
@@ -32,8 +32,8 @@ class Return:
         mission: flown from its landing part, if that is where it leads.
     """
 
-    __slots__ = ("_arrival", "_back_d", "_context", "_destination", "_destinations", "_fence", "_mission", "_phase",
-                 "_start", "_way")  # fmt: skip
+    __slots__ = ("_arrival", "_back_d", "_context", "_destination", "_destinations", "_fence", "_items", "_mission",
+                 "_phase", "_start", "_way")  # fmt: skip
 
     def __init__(self, context: NavContext, destinations: Destinations, fence: Fence, mission: Mission) -> None:
         self._context = context
@@ -43,6 +43,7 @@ class Return:
         self._way = Way(context)
         self._arrival = Arrival(context)
         self._phase = _Phase.CLIMB
+        self._items = mission.items  # when the destination was chosen
         self._destination = Destination((0.0, 0.0, 0.0), "home")
         self._start: Vector = (0.0, 0.0, 0.0)
         self._back_d = 0.0  # [m] height of the way back
@@ -58,6 +59,7 @@ class Return:
     def _head_for(self, destination: Destination) -> None:
         context = self._context
         self._destination = destination
+        self._items = self._mission.items
         if destination.name != "home":
             context.announcer.statustext(Severity.INFO, f"Return to {destination.name}")
         here = context.stop_point()
@@ -73,6 +75,9 @@ class Return:
         context = self._context
         if context.is_on_ground and self._phase is not _Phase.MISSION:
             return
+        if self._destination.landing_item is not None and self._phase is not _Phase.MISSION:
+            if self._mission.items is not self._items:
+                self._head_for(self._destinations.choose())  # the mission has been replaced
         if self._phase is _Phase.CLIMB:
             if context.state.estimate.pos_ned[2] < self._back_d + _HEIGHT_M:
                 self._cruise()
@@ -82,10 +87,17 @@ class Return:
         elif self._phase is _Phase.ARRIVED:
             self._arrival.frame()
         else:
-            self._mission.frame()
-            if context.wish is Mode.RETURN:  # its last item; it is this mode that is flown already
-                context.wish = None
-                self._head_for(self._destinations.home())
+            self._fly_mission()
+
+    def _fly_mission(self) -> None:
+        """The landing part of the mission. A part that does not end on the ground is followed by the way home."""
+        context = self._context
+        self._mission.frame()
+        if context.is_on_ground:
+            context.wants_lift = False  # whatever follows the landing is not part of the return
+        elif not self._mission.is_flying:
+            context.wish = context.next_hold = None
+            self._head_for(self._destinations.home())
 
     def _return_d(self, here: Vector) -> float:
         """Down coordinate [m] of the way back, from the heights and the cone that the parameters give."""

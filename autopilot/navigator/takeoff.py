@@ -67,13 +67,16 @@ class Takeoff:
         self._target_alt_m(is_told=True)
         return Reply(Verdict.ACCEPTED)
 
+    def forget(self) -> None:
+        """The next take-off goes to the usual height."""
+        self._alt_amsl_m = self._yaw = nan
+
     def start(self) -> None:
         context = self._context
         self._climb.start(context.down_of(self._target_alt_m(is_told=False)), self._yaw)
 
     def frame(self) -> None:
         if self._climb.frame():
-            self._alt_amsl_m = self._yaw = nan
             self._context.hold_next(self._climb.target_ned, self._climb.yaw)
 
     def _base_alt_m(self) -> float:

@@ -1,0 +1,164 @@
+"""What one mode was asked for, or had begun, does no harm when another takes over: whole sequences on flat ground."""
+
+from math import hypot, nan
+
+from autopilot.commander.failsafe import BATTERY_CRITICAL, BATTERY_EMERGENCY
+from autopilot.lists import ListKind
+from autopilot.navigator.mission import MissionState
+from autopilot.ports import POSITION_VALID, VELOCITY_VALID
+from autopilot.requests import OrbitRequest
+from autopilot.vehicle import Mode, Verdict
+from tests.unit.autopilot.kinematic import DT_S, ORIGIN, Kinematic, do, geo, item, position_setpoint
+
+WAYPOINT, LAND, TAKEOFF, LAND_START = 16, 21, 22, 189
+INCLUSION_CIRCLE = 5003
+
+
+def place(north, east, height=10.0):
+    lat, lon, _ = geo(north, east)
+    return lat, lon, ORIGIN.alt_m + height
+
+
+class TestLeftOver:
+    def test_a_landing_place_given_up_is_not_flown_to_by_the_next_landing(self):
+        rig = Kinematic().flying()
+        lat, lon, _ = place(200.0, 0.0)
+        assert rig.fc.land(lat, lon, nan).verdict is Verdict.ACCEPTED
+        rig.run(3.0)
+        rig.fc.set_mode(Mode.HOLD)
+        rig.run(5.0)
+        north = rig.pos[0]
+        rig.fc.set_mode(Mode.LAND)
+        rig.disarmed(60.0)
+        assert abs(rig.pos[0] - north) < 5.0
+
+    def test_a_goto_refused_leaves_no_place_behind(self):
+        rig = Kinematic(COM_FLT_TIME_MAX=30.0).flying()
+        rig.run_until(lambda: rig.state.mode is Mode.RETURN, 60.0)
+        assert rig.fc.reposition(*place(300.0, 0.0), nan, nan).verdict is Verdict.TEMPORARILY_REJECTED
+        assert rig.fc.navigator.context.next_hold is None
+
+    def test_an_orbit_refused_is_not_the_next_one(self):
+        rig = Kinematic(COM_FLT_TIME_MAX=30.0).flying()
+        rig.run_until(lambda: rig.state.mode is Mode.RETURN, 60.0)
+        lat, lon, _ = place(300.0, 0.0)
+        assert rig.fc.orbit(OrbitRequest(20.0, 3.0, lat_deg=lat, lon_deg=lon)).verdict is Verdict.TEMPORARILY_REJECTED
+        rig.table.set("COM_FLT_TIME_MAX", -1.0)
+        rig.run(1.0)
+        assert rig.fc.set_mode(Mode.ORBIT).verdict is Verdict.ACCEPTED
+        circle = rig.fc.navigator.orbit.circle
+        assert hypot(circle.centre_ned[0] - rig.pos[0], circle.centre_ned[1] - rig.pos[1]) < 50.0
+
+    def test_a_takeoff_height_given_up_is_not_climbed_to_by_the_next_takeoff(self):
+        rig = Kinematic().ready()
+        rig.fc.takeoff(ORIGIN.alt_m + 60.0, nan)
+        rig.fc.arm(force=False)
+        rig.run(5.0)
+        rig.fc.set_mode(Mode.LAND)
+        rig.disarmed(60.0)
+        rig.fc.set_mode(Mode.TAKEOFF)
+        rig.run(1.0)
+        assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
+        rig.run_until(lambda: rig.state.mode is Mode.HOLD, 60.0)
+        assert -rig.pos[2] < 10.0
+
+
+class TestLowHover:
+    def test_a_hover_close_above_the_ground_goes_on(self):
+        rig = Kinematic().ready()
+        rig.fc.set_offboard(position_setpoint(0.0, 0.0, -0.35))
+        assert rig.fc.set_mode(Mode.OFFBOARD).verdict is Verdict.ACCEPTED
+        assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
+        for _ in range(round(20.0 / DT_S)):
+            rig.fc.set_offboard(position_setpoint(0.0, 0.0, -0.35))
+            rig.frame()
+        assert rig.state.is_armed
+        assert -rig.pos[2] > 0.2
+
+
+class TestLandingGoesOn:
+    def descending(self):
+        rig = Kinematic(COM_LOW_BAT_ACT=3).flying(20.0)
+        rig.fc.load_mission([item(0, WAYPOINT, 30.0), item(1, LAND, 30.0, height=0.0)])
+        rig.fc.set_mode(Mode.MISSION)
+        rig.run_until(lambda: rig.fc.navigator.is_landing and -rig.pos[2] < 4.0, 120.0)
+        return rig
+
+    def test_a_critical_battery_does_not_call_a_landing_mission_back_up(self):
+        rig = self.descending()
+        rig.fc.commander.guard.act(BATTERY_CRITICAL)
+        assert rig.state.mode is Mode.MISSION
+        rig.disarmed(30.0)
+        assert abs(rig.pos[0] - 30.0) < 3.0
+
+    def test_an_emergency_ends_the_way_to_a_landing_place(self):
+        rig = Kinematic(COM_LOW_BAT_ACT=3).flying(10.0)
+        lat, lon, _ = place(2000.0, 0.0)
+        rig.fc.land(lat, lon, nan)
+        rig.run(5.0)
+        rig.fc.commander.guard.act(BATTERY_EMERGENCY)
+        rig.disarmed(60.0)
+        assert rig.pos[0] < 200.0
+
+
+class TestReturnByMission:
+    def home_by_mission(self):
+        rig = Kinematic(RTL_TYPE=1).flying(20.0)
+        items = [item(0, WAYPOINT, 60.0), do(1, LAND_START), item(2, WAYPOINT, 50.0), item(3, LAND, 40.0, height=0.0)]
+        assert rig.fc.load_mission(items) is None
+        rig.fc.set_mode(Mode.RETURN)
+        return rig
+
+    def test_a_return_whose_mission_is_taken_away_goes_home(self):
+        rig = self.home_by_mission()
+        rig.run_until(lambda: rig.state.mission_state == MissionState.ACTIVE, 200.0)
+        assert rig.state.mode is Mode.RETURN
+        assert rig.fc.load_mission([]) is None
+        rig.disarmed(200.0)
+
+    def test_a_return_to_a_mission_taken_away_on_the_way_goes_home(self):
+        rig = self.home_by_mission()
+        rig.run(2.0)
+        assert rig.fc.load_mission([]) is None
+        rig.disarmed(200.0)
+
+    def test_a_return_that_has_landed_by_the_mission_does_not_take_off_again(self):
+        rig = Kinematic(RTL_TYPE=1, COM_DISARM_LAND=5.0).flying(20.0)
+        items = [
+            do(0, LAND_START), item(1, WAYPOINT, 30.0), item(2, LAND, 30.0, height=0.0), item(3, TAKEOFF, 30.0),
+            item(4, WAYPOINT, 90.0),
+        ]  # fmt: skip
+        assert rig.fc.load_mission(items) is None
+        rig.fc.set_mode(Mode.RETURN)
+        rig.disarmed(200.0)
+        assert abs(rig.pos[0] - 30.0) < 3.0
+
+
+class TestHoldAgain:
+    def test_a_fence_that_asks_to_hold_stops_a_goto(self):
+        rig = Kinematic(GF_ACTION=2).flying(10.0)
+        rig.fc.reposition(*place(300.0, 0.0), nan, nan)
+        rig.run(5.0)
+        fence = [item(0, INCLUSION_CIRCLE, params=(60.0, 0.0, 0.0, 0.0), frame=0)]
+        assert rig.fc.lists.load(ListKind.FENCE, fence) is None
+        rig.run(60.0)
+        assert rig.pos[0] < 90.0
+
+
+class TestPrecisionLandingWithoutPosition:
+    def test_it_lands_blind(self):
+        rig = Kinematic().flying(10.0)
+        rig.fc.report_landing_target((0.0, 0.0, 0.0))
+        rig.fc.set_mode(Mode.PRECISION_LAND)
+        rig.run(0.5)
+        rig.flags &= ~(POSITION_VALID | VELOCITY_VALID)
+        rig.disarmed(90.0)
+
+
+class TestHome:
+    def test_home_is_not_set_where_no_return_could_lead(self):
+        rig = Kinematic().flying()
+        lat, lon, alt = place(60_000.0, 0.0)
+        assert rig.fc.set_home(lat, lon, alt).verdict is Verdict.DENIED
+        lat, lon, _ = place(10.0, 0.0)
+        assert rig.fc.set_home(lat, lon, ORIGIN.alt_m + 20_000.0).verdict is Verdict.DENIED
