@@ -96,7 +96,7 @@ def _answers(streamed: set[str]) -> Iterator[tuple[object, ...]]:
     for path in sorted((ROOT / "autopilot" / "mavlink").rglob("*.py")):
         text = path.read_text(encoding="utf-8")
         module = path.relative_to(ROOT / "autopilot").as_posix()
-        for name in re.findall(r'^_\w+ = known_type\("(\w+)"\)(?!\.msg_id)', text, re.MULTILINE):
+        for name in re.findall(r'^\w+ = known_type\("(\w+)"\)(?!\.msg_id)', text, re.MULTILINE):
             senders.setdefault(name, module)
         received.update(re.findall(r'message_id\("(\w+)"\)', text))
     for name in sorted(set(senders) - streamed - received):
