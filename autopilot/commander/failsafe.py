@@ -81,7 +81,9 @@ LINK_ACTIONS = {
     0: Action.WARN, 1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND, 5: Action.TERMINATE, 6: Action.DISARM,
     7: Action.SMART_RETURN,
 }  # fmt: skip
-"""NAV_DLL_ACT and NAV_RCL_ACT; PX4 has no 7."""
+"""NAV_DLL_ACT, NAV_RCL_ACT, COM_EST_FAIL_ACT and COM_FLT_TIME_ACT; PX4 has no 7."""
+POSITION_ACTIONS = {3: Action.LAND, 5: Action.TERMINATE, 6: Action.DISARM}
+"""COM_POS_LOST_ACT."""
 MOTOR_ACTIONS = {0: Action.WARN, 1: Action.HOLD, 2: Action.LAND, 3: Action.RETURN, 4: Action.TERMINATE}
 """COM_ACT_FAIL_ACT."""
 LIMIT_ACTIONS = {
@@ -124,8 +126,10 @@ def by(parameter: str, actions: dict[int, Action], otherwise: Action = Action.WA
 
 
 def _position_lost(params: ParameterTable, mode: Mode) -> Action:
-    """A pilot at the sticks may fly on without a position; what flies by itself lands."""
-    return Action.ALTITUDE if mode is Mode.POSITION and int(params["COM_POSCTL_NAVL"]) == 0 else Action.LAND
+    """A pilot at the sticks may fly on without a position; what flies by itself must come down."""
+    if mode is Mode.POSITION and int(params["COM_POSCTL_NAVL"]) == 0:
+        return Action.ALTITUDE
+    return POSITION_ACTIONS.get(int(params["COM_POS_LOST_ACT"]), Action.LAND)
 
 
 def _control_lost(params: ParameterTable, _: Mode) -> Action:
@@ -144,11 +148,12 @@ RULES: tuple[Rule, ...] = (
     Rule(MOTOR_FAILED, by("COM_ACT_FAIL_ACT", MOTOR_ACTIONS), Severity.EMERGENCY, "Motor failure"),
     Rule(POSITION_LOST, _position_lost, Severity.CRITICAL, "Position lost", "Position is valid again"),
     Rule(HEIGHT_LOST, always(Action.LAND), Severity.CRITICAL, "Height lost", "Height is valid again"),
-    Rule(ESTIMATOR_FAILED, always(Action.LAND), Severity.CRITICAL, "Estimator failure", "Estimator is steady again"),
+    Rule(ESTIMATOR_FAILED, by("COM_EST_FAIL_ACT", LINK_ACTIONS), Severity.CRITICAL, "Estimator failure",
+         "Estimator is steady again"),
     Rule(BATTERY_EMERGENCY, by("COM_LOW_BAT_ACT", EMERGENCY_BATTERY_ACTIONS), Severity.EMERGENCY,
          "Battery nearly empty"),
     Rule(BATTERY_CRITICAL, by("COM_LOW_BAT_ACT", CRITICAL_BATTERY_ACTIONS), Severity.CRITICAL, "Battery critical"),
-    Rule(FLIGHT_TIME_OVER, always(Action.RETURN), Severity.CRITICAL, "Flight time is over"),
+    Rule(FLIGHT_TIME_OVER, by("COM_FLT_TIME_ACT", LINK_ACTIONS), Severity.CRITICAL, "Flight time is over"),
     Rule(WIND_HIGH, by("COM_WIND_MAX_ACT", LIMIT_ACTIONS), Severity.CRITICAL, "Wind above its limit",
          "Wind is below its limit again"),
     Rule(FENCE_BREACHED, by("GF_ACTION", FENCE_ACTIONS), Severity.CRITICAL, "Geofence breached"),

@@ -57,7 +57,8 @@ class Guard:
 
     def refusal(self, mode: Mode) -> str:
         """Why a failure forbids a mode that a client asks for; empty if none does."""
-        if self.failures & FLIGHT_TIME_OVER and mode not in (Mode.RETURN, Mode.LAND, Mode.PRECISION_LAND):
+        is_over = self.failures & FLIGHT_TIME_OVER and self._commander.params["COM_FLT_TIME_ACT"]
+        if is_over and mode not in (Mode.RETURN, Mode.SMART_RETURN, Mode.LAND, Mode.PRECISION_LAND):
             return "the flight time is over: only Return and Land"
         return ""
 

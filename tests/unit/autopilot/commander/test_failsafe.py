@@ -276,6 +276,25 @@ def test_flight_time_is_told_and_then_ends_the_flight_at_home():
     rig.ready()  # the next flight has its own time
 
 
+@pytest.mark.parametrize(("action", "mode"), [(0, Mode.HOLD), (3, Mode.LAND), (5, Mode.TERMINATION)])
+def test_flight_time_has_an_action_of_its_own(action, mode):
+    rig = Kinematic(COM_FLT_TIME_MAX=40.0, COM_FLT_TIME_ACT=action).flying()
+    rig.run_until(lambda: rig.recorder.has_text("Flight time is over"), 60.0)
+    rig.run(0.1)
+    assert rig.state.mode is mode
+    if action == 0:
+        assert rig.fc.set_mode(Mode.RETURN).verdict is Verdict.ACCEPTED
+        assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+
+
+@pytest.mark.parametrize(("action", "mode"), [(3, Mode.LAND), (5, Mode.TERMINATION)])
+def test_lost_position_has_an_action_of_its_own(action, mode):
+    rig = flying_away(COM_POS_LOST_ACT=action)
+    rig.flags &= ~POSITION_VALID
+    rig.run(1.0)
+    assert rig.state.mode is mode
+
+
 def test_dead_reckoning_is_told_and_so_is_its_end():
     rig = flying_away()
     rig.flags |= DEAD_RECKONING
@@ -327,6 +346,16 @@ def test_estimate_that_jumps_again_and_again_is_not_believed():
         rig.run(5.0)
     assert rig.recorder.has_text("Estimator failure: land")
     assert rig.state.mode is Mode.LAND
+
+
+def test_estimator_failure_has_an_action_of_its_own():
+    rig = flying_away(COM_EST_FAIL_ACT=0)
+    rig.estimate["pos_reset_ned"] = (0.0, 10.0, 0.0)
+    for count in range(1, 4):
+        rig.estimate["reset_count"] = count
+        rig.run(5.0)
+    assert rig.recorder.has_text("Estimator failure")
+    assert rig.state.mode is Mode.HOLD
 
 
 def test_vehicle_that_holds_stays_where_it_is_when_the_estimate_jumps():
