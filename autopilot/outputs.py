@@ -11,7 +11,6 @@ from autopilot.vehicle import ACCEPTED, Reply, VehicleState, Verdict
 SET_RELAY, SET_SERVO, SET_ACTUATOR = 181, 183, 187  # MAV_CMD
 FIRST_CHANNEL, CHANNELS = 9, 8  # outputs 1 to 8 are the rotors'
 RELAYS = 6
-ACTUATORS = 6
 _PULSE_MIN_US, _PULSE_MID_US, _PULSE_MAX_US = 500, 1500, 2500
 _ACTUATOR_SWING_US = 500.0  # of the full range of an actuator, to either side
 

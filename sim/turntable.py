@@ -14,7 +14,6 @@ from common.kernels import FRAME_US
 
 TURN_RAD_S = 1.5  # as fast as hands turn a vehicle; guess
 SPIN_RAD_S = 1.2
-_ARRIVED_RAD = 0.02
 _FRAME_S = FRAME_US * 1e-6
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("common", "autopilot", "sim", "policies", "mission", "bench")
-NEEDS_VEHICLE = "<!-- vehicle -->"  # in front of an example that talks to a vehicle in another process
 
+# <!-- vehicle --> is in front of an example that talks to a vehicle in another process
 _FENCE = re.compile(r"^( *)(<!-- vehicle -->\n *)?```(\w*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 _REFERENCE = re.compile(r"^\[([^\]]+)\]: (\S+)$", re.MULTILINE)

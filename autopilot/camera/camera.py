@@ -19,7 +19,7 @@ from autopilot.camera.ports import FrameSource, RawFrame, View
 from autopilot.camera.settings import MODE, Settings
 from autopilot.camera.storage import MediaFolder
 from autopilot.camera.trigger import NEVER_US, Trigger
-from autopilot.camera.video import RATE_HZ, Recording
+from autopilot.camera.video import Recording
 from autopilot.gimbal.gimbal import Gimbal
 from autopilot.payload import Params
 from autopilot.vehicle import ACCEPTED, Reply, VehicleState, Verdict
@@ -359,10 +359,6 @@ class Camera:
     @property
     def recording_ms(self) -> int:
         return 0 if self.recording is None else (self._state.time_us - self.recording.start_us) // 1000
-
-    @property
-    def video_rate_hz(self) -> float:
-        return RATE_HZ
 
     @property
     def mode(self) -> CameraMode:

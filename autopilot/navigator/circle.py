@@ -1,4 +1,7 @@
-"""A point that runs round a circle: the moving setpoint of orbits and of loiters with turns."""
+"""A point that runs round a circle: the moving setpoint of an orbit, which a pilot may change while it is flown.
+
+The turns of a mission are a way with an end (autopilot.navigator.curve).
+"""
 
 from math import atan2, cos, hypot, pi, sin, sqrt
 

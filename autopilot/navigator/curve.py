@@ -1,4 +1,4 @@
-"""Curved ways: a spline through waypoints, a circle, and a point that moves along them as fast as the turns allow.
+"""Curved ways: splines, turns round a place, and a point that moves along them as fast as the bends allow.
 
 The vehicle is asked to be with that point, at its velocity; the point waits for a vehicle that lags behind.
 """
@@ -98,7 +98,7 @@ class Polyline:
         return max(speed, _SLOWEST_M_S)
 
 
-class Circle:
+class Turns:
     """Level turns around a centre.
 
     Args:

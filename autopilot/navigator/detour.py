@@ -5,11 +5,10 @@ distance to the border all along; that is found by steps as long as the clearanc
 so that the largest fence costs a fraction of a second, once per way.
 """
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from math import atan2, ceil, cos, hypot, inf, pi, sin
+from math import atan2, ceil, cos, inf, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,9 +184,3 @@ def _arc(centre: Point, radius: float, first: float, turn: float, count: int) ->
     for i in range(count):
         course = first + (i + 0.5) * part
         yield centre[0] + outer * cos(course), centre[1] + outer * sin(course)
-
-
-def length_of(start: Point, way: Sequence[Point]) -> float:
-    """Length [m] of a way."""
-    points = (start, *way)
-    return sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(points))

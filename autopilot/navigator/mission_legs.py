@@ -8,7 +8,7 @@ from math import cos, hypot, isfinite, nan, pi, radians, sin
 
 from autopilot.lists import MissionItem
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.curve import Circle, Polyline, Runner, bearing, between, spline
+from autopilot.navigator.curve import Polyline, Runner, Turns, bearing, between, spline
 from autopilot.navigator.items import WAYPOINTS, Command, hold_time_s, is_here, passes_through
 from autopilot.navigator.land import Landing
 from autopilot.navigator.mission_route import Route, distance_to_line
@@ -314,7 +314,7 @@ class Leg:
         if self._stage is _Stage.CURVE and self._runner is not None:
             here, _ = self._runner.curve.at(self._runner.way)
         turns = length / (2.0 * pi * abs(radius))
-        self._runner = Runner(Circle(place, bearing(place, here), radius, turns, pace), pace, speed)
+        self._runner = Runner(Turns(place, bearing(place, here), radius, turns, pace), pace, speed)
         self._stage = _Stage.CURVE
 
     def _spline(self, item: MissionItem, start: Vector, along: Vector, target: Vector, speed: float) -> None:

@@ -14,7 +14,6 @@ from tests.system.published import E7, Flown, Sticks, airborne
 AUTO, FOLLOW = 4, 8
 DO_ORBIT = 34
 BEHIND_M = 30.0
-UNKNOWN_HEADING = 65535
 
 
 class Target:

@@ -1,14 +1,14 @@
 """Ways around fences: open all along, not much longer than they must be, and found whenever there is one."""
 
 import itertools
-from math import cos, hypot, inf, pi, sin
+from math import cos, dist, hypot, inf, pi, sin
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.navigator.detour import Bounds, detour, length_of
+from autopilot.navigator.detour import Bounds, detour
 from autopilot.navigator.region import Region
 
 MARGIN = 2.0
@@ -16,6 +16,10 @@ BLOCK = ((-20.0, 40.0), (20.0, 40.0), (20.0, 60.0), (-20.0, 60.0))
 YARD = ((-100.0, -100.0), (-100.0, 200.0), (100.0, 200.0), (100.0, -100.0))
 U_SHAPE = ((-50.0, 0.0), (50.0, 0.0), (50.0, 100.0), (30.0, 100.0), (30.0, 20.0), (-30.0, 20.0), (-30.0, 100.0),
            (-50.0, 100.0))  # fmt: skip
+
+
+def length_of(start, way):
+    return sum(dist(a, b) for a, b in itertools.pairwise((start, *way)))
 
 
 def bounds(polygons=(), circles=(), reach=inf):
