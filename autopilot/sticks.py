@@ -49,6 +49,7 @@ class StickInput:
     count: int = 0  # of messages taken; grows with each
     heard_until_us: int = 0  # the sticks are lost after that; 0: never heard
     speed: float = 0.0  # [1/s] of the stick that moves fastest, low-passed
+    is_ardupilot: bool = False  # they are read as ArduPilot reads them, where the two differ
     steer_hold: bool = False  # the sticks are followed in Hold as they are in Position (ArduPilot's LOITER)
 
 
@@ -85,6 +86,7 @@ class Sticks:
         self.takes_every_source = True
         self.takes_over = False
         self.input.steer_hold = True
+        self.input.is_ardupilot = True
 
     # ---- what others ask ----
 

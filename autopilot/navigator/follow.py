@@ -3,7 +3,7 @@
 In: the target's filtered position and velocity (`target`). Out: a moving position setpoint, each frame. The bearing is
 counted from the target's course, as PX4's FLW_TGT_FA; while the target stands, and before it has moved, its last
 course counts, or the side on which the vehicle happens to be. A pilot's sticks change the distance (pitch), the
-bearing (roll) and the height (throttle) until the mode is chosen anew.
+bearing (roll) and the height (throttle) until the mode is chosen anew; not in ArduPilot, where a throttle may rest low.
 """
 
 from math import atan2, cos, hypot, isfinite, nan, radians, sin
@@ -105,7 +105,7 @@ class Follow:
         self._follow_course(target, dt_s)
         sticks = context.state.sticks
         self._speed_away = self._speed_down = 0.0
-        if now_us <= sticks.heard_until_us:
+        if now_us <= sticks.heard_until_us and not sticks.is_ardupilot:
             self._adjust(sticks, place, here, dt_s)
         distance_m = self._distance_m
         rate = self._turn(distance_m, dt_s)

@@ -1,7 +1,7 @@
 """Orbit: flies round a point until another mode is chosen, or for a number of turns.
 
-A pilot's sticks change it, as in PX4: forward flies a smaller circle, left flies faster clockwise, the throttle climbs;
-with the nose along the circle right flies a smaller one and forward flies faster.
+A pilot's sticks change it, as in PX4: forward flies a smaller circle, left flies faster clockwise (right in ArduPilot),
+the throttle climbs; with the nose along the circle right flies a smaller one and forward flies faster.
 """
 
 from enum import IntEnum
@@ -134,7 +134,7 @@ class Orbit:
         if self._yaw is OrbitYaw.ALONG:
             inwards, faster = circle.direction * right, circle.direction * forward
         else:
-            inwards, faster = forward, -right
+            inwards, faster = forward, right if sticks.is_ardupilot else -right
         away_m_s = -inwards * number("MPC_XY_CRUISE")
         radius_m = circle.radius_m + away_m_s * dt_s
         circle.radius_m = min(max(radius_m, _RADIUS_MIN_M), _RADIUS_MAX_M)

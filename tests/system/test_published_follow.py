@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
-from tests.system.published import E7, Flown, Sticks, airborne
+from tests.system.published import E7, Flown, Station, Sticks, airborne
 
 AUTO, FOLLOW = 4, 8
+ARDUPILOT_FOLLOW = 23
 DO_ORBIT = 34
 BEHIND_M = 30.0
 
@@ -154,6 +155,20 @@ def test_sticks_change_height_distance_and_angle_of_following():
     assert angles[6] - angles[5] < -1.5  # longer than half a second it waits for the vehicle
     assert distances[7] == pytest.approx(8.0, abs=1.5)
     assert angles[7] == pytest.approx(angles[4], abs=0.3)  # chosen anew: as the parameters say
+
+
+def test_throttle_that_rests_low_does_not_change_following_in_ardupilot():
+    station = Station(FLW_TGT_DST=8.0, FLW_TGT_HT=10.0)
+
+    async def script(client):
+        Sticks(client).axes["z"] = 0
+        await station.airborne()
+        client.start(Target(client, 2.0, start_ned=(10.0, 0.0, 0.0)).report("FOLLOW_TARGET", 30.0))
+        await station.mode(ARDUPILOT_FOLLOW)
+        await client.sleep(20.0)
+
+    station.run(script)
+    assert station.flown.pos[2] == pytest.approx(-10.0, abs=1.5)
 
 
 def test_sticks_change_radius_speed_and_height_of_an_orbit():
