@@ -1,18 +1,32 @@
-"""What the vehicle remembers over a restart: parameters that differ from their defaults, mission, fence, rally points.
+"""What the vehicle remembers over a restart: parameters that differ from their defaults, lists, a home it was given.
 
 Each change is noted before it is acknowledged to the client, so it survives a killed process. Whole records, which
 survive a loss of power too, are written at most once per second of simulated time, and at the end.
 """
 
 from collections.abc import Callable, Collection, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from autopilot.host import Storage
 from autopilot.lists import ItemLists, ListKind, MissionItem
+from autopilot.vehicle import Reply, Verdict
+from common.geodesy import GeoPoint
 from common.params import Parameter, ParameterError, ParameterTable
 
 PARAMETERS = "parameters"
+GIVEN_HOME = "given_home"  # by a client; where the vehicle boots is not the vehicle's affair
 WRITE_PERIOD_US = 1_000_000
+
+
+_HOME_FIELDS = ("lat_deg", "lon_deg", "alt_m")
+
+
+class HomeHolder(Protocol):
+    """Who knows home (autopilot.commander)."""
+
+    on_home_given: Callable[[GeoPoint], None]
+
+    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply: ...
 
 
 class Persistence:
@@ -30,6 +44,7 @@ class Persistence:
         self._storage = storage
         self._params = params
         self._lists: ItemLists | None = None
+        self._home: dict[str, Any] = {}
         self._unwritten: set[str] = set()
         self._write_us = 0
         self._values: dict[str, Any] = storage.read(PARAMETERS)
@@ -54,6 +69,23 @@ class Persistence:
                 self._restore_list(lists, kind, content)
         lists.on_change(self._list_changed)
 
+    def keep_home(self, commander: HomeHolder) -> None:
+        """Restores the home that a client gave; a later one is kept."""
+        stored = self._storage.read(GIVEN_HOME)
+        if stored:
+            try:
+                reply = commander.set_home(*(float(stored[name]) for name in _HOME_FIELDS))
+            except (KeyError, TypeError, ValueError):
+                self.problems.append("the stored home is no place; it is left out")
+            else:
+                if reply.verdict is not Verdict.ACCEPTED:
+                    self.problems.append(f"the stored home is left out: {reply.reason}")
+        commander.on_home_given = self._home_given
+
+    def _home_given(self, home: GeoPoint) -> None:
+        self._home = {name: getattr(home, name) for name in _HOME_FIELDS}
+        self._note(GIVEN_HOME, self._home)
+
     def _restore_list(self, lists: ItemLists, kind: ListKind, content: Mapping[str, Any]) -> None:
         try:
             items = [_item(seq, each) for seq, each in enumerate(content["items"])]
@@ -73,13 +105,18 @@ class Persistence:
     def write(self) -> None:
         """Writes what has changed."""
         for record in sorted(self._unwritten):
-            content = self._values if record == PARAMETERS else self._list_content(ListKind[record.upper()])
+            content = self._content_of(record)
             try:
                 self._storage.write(record, content)
             except OSError as error:  # a full disk is no reason to fall from the sky
                 self.on_trouble(f"{record.capitalize()} not stored: {error.strerror}")
             else:
                 self._unwritten.discard(record)
+
+    def _content_of(self, record: str) -> Mapping[str, Any]:
+        if record == PARAMETERS:
+            return self._values
+        return self._home if record == GIVEN_HOME else self._list_content(ListKind[record.upper()])
 
     def _parameter_changed(self, declaration: Parameter) -> None:
         name = declaration.name

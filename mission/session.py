@@ -109,6 +109,8 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     links = [] if speed is None else _links(options, speed)
     stream = _stream(options.stream_port)
     folder = _new_folder(options.run_folder)
+    if state is not None and options.home is not None:
+        keep_home(state, config.home)
     with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
         flight = Flight(
             config,
@@ -120,8 +122,6 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
             has_camera_thread=speed is not None,
         )
     if state is not None:
-        if options.home is not None:
-            keep_home(state, config.home)
         for problem in (*state.problems, *(flight.persistence.problems if flight.persistence else ())):
             _print_line(console, problem)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))

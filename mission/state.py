@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from autopilot.persistence import GIVEN_HOME
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.state_folder import StateFolder
 
@@ -38,3 +39,4 @@ def stored_home(state: StateFolder | None) -> GeoPoint:
 def keep_home(state: StateFolder, home: GeoPoint) -> None:
     """Remembers a home that was given."""
     state.write(HOME, {"lat_deg": home.lat_deg, "lon_deg": home.lon_deg, "alt_m": home.alt_m})
+    state.write(GIVEN_HOME, {})  # a client's home belongs to the place of before

@@ -4,6 +4,7 @@ In: the vehicle's state and what clients ask for. Out: mode, arming and landed s
 which mode to fly through `Flying`, and asks it what it alone can know.
 """
 
+from collections.abc import Callable
 from math import hypot, isfinite, pi, sqrt
 
 from autopilot.abilities import Announcer
@@ -83,6 +84,7 @@ class Commander:
         self._lift_d = 0.0
         self._has_flown = False  # since arming
         self._is_home_given = False  # by a client: arming does not move it
+        self.on_home_given: Callable[[GeoPoint], None] = lambda _: None
         self._load()
         params.on_change(self._on_parameter)
 
@@ -247,6 +249,8 @@ class Commander:
             state.home_yaw_rad = state.yaw_rad  # of the vehicle: a place has none
             self.announcer.home_changed()
         self._is_home_given = True
+        if state.home is not None:
+            self.on_home_given(state.home)
         return ACCEPTED
 
     def _set_home_here(self) -> None:

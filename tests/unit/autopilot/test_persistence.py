@@ -7,6 +7,8 @@ import pytest
 from autopilot.lists import ListKind, MissionItem
 from autopilot.params import parameter_table
 from autopilot.persistence import WRITE_PERIOD_US, Persistence
+from autopilot.vehicle import ACCEPTED, Reply, Verdict
+from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
 
 
@@ -155,3 +157,47 @@ def test_full_disk_is_said_and_does_not_stop_the_flight(state):
     state.is_full = False
     keeper.frame(WRITE_PERIOD_US)
     assert state.read("parameters") == {"MIS_TAKEOFF_ALT": 12.5}
+
+
+class Commander:
+    """Takes any home, or refuses."""
+
+    def __init__(self):
+        self.home = None
+        self.refusal = None
+        self.on_home_given = lambda _: None
+
+    def set_home(self, *home):
+        if self.refusal is None:
+            self.home = GeoPoint(*home)
+            self.on_home_given(self.home)
+        return self.refusal or ACCEPTED
+
+
+def test_home_that_a_client_gave_is_kept(tmp_path):
+    with_home = Commander()
+    first = StateFolder(tmp_path)
+    Persistence(first, parameter_table()).keep_home(with_home)
+    assert with_home.home is None
+    with_home.set_home(47.0, 8.0, 500.0)
+    first.close()  # as a killed process leaves it: noted, and never written whole
+    again = Commander()
+    second = StateFolder(tmp_path)
+    Persistence(second, parameter_table()).keep_home(again)
+    assert again.home == GeoPoint(47.0, 8.0, 500.0)
+    second.close()
+
+
+def test_home_that_does_not_fit_is_told_and_left_out(tmp_path):
+    state = StateFolder(tmp_path)
+    state.write("given_home", {"lat_deg": 47.0, "lon_deg": "east", "alt_m": 1.0})
+    persistence = Persistence(state, parameter_table())
+    persistence.keep_home(Commander())
+    assert "no place" in persistence.problems[0]
+    state.write("given_home", {"lat_deg": 47.0, "lon_deg": 8.0, "alt_m": 1.0})
+    persistence = Persistence(state, parameter_table())
+    commander = Commander()
+    commander.refusal = Reply(Verdict.DENIED, "home would be too far away")
+    persistence.keep_home(commander)
+    assert "too far" in persistence.problems[0]
+    state.close()
