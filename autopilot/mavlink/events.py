@@ -1,19 +1,29 @@
 """The events protocol: what happened, in a numbered sequence, so that a client can ask again for what it missed.
 
-In: mode and arming changes, failsafe texts. Out: EVENT as it happens, CURRENT_EVENT_SEQUENCE at 1 Hz, and answers to
-REQUEST_EVENT. Off unless MAV_EVENTS is set: stations that hear events may expect their health reports too, which this
-vehicle gives by SYS_STATUS and texts.
+In: mode and arming changes, failsafe texts, arming checks. Out: EVENT as it happens, CURRENT_EVENT_SEQUENCE at 1 Hz,
+and answers to REQUEST_EVENT. A report of the arming checks, as events between two summaries, follows within a second
+when their result has changed. Off unless MAV_EVENTS is set: stations show the texts, which come in any case, and the
+events.
 """
 
-import zlib
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from autopilot.commander.failsafe import RULES
-from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Endpoint, Sender
+from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.event_texts import (
+    ARMED,
+    ARMING_SUMMARY,
+    DISARMED,
+    FAILSAFES,
+    HEALTH_SUMMARY,
+    MODE_CHANGED,
+    Check,
+    check_of,
+    summaries,
+)
 from autopilot.mavlink.service import Handler, Service
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.vehicle import Severity
@@ -22,24 +32,14 @@ KEPT = 64  # events that can be asked for again
 PERIOD_US = 1_000_000
 SEQUENCE_RESET = 1  # CURRENT_EVENT_SEQUENCE.flags: the sequence has begun anew
 UNAVAILABLE = 0  # RESPONSE_EVENT_ERROR.reason
+PROTOCOL = 8  # level of events that are not shown, but read by the client's program
+CHECKS_MAX = 12  # per report; a vehicle is seldom wrong in more ways
 _ARGUMENTS = 40  # bytes
 _SEQUENCES = 1 << 16
 
 _EVENT = known_type("EVENT")
 _CURRENT_EVENT_SEQUENCE = known_type("CURRENT_EVENT_SEQUENCE")
 _RESPONSE_EVENT_ERROR = known_type("RESPONSE_EVENT_ERROR")
-
-
-def event_id(name: str) -> int:
-    """An event's number: the component in the upper byte, a hash of the name below, the same in every version."""
-    return AUTOPILOT_COMPONENT << 24 | zlib.crc32(name.encode("ascii")) & 0xFFFFFF
-
-
-ARMED = event_id("armed")
-DISARMED = event_id("disarmed")
-MODE_CHANGED = event_id("mode_changed")  # argument: custom_mode, 32 bits
-# Failsafe texts begin with their rule's text; the first rule that fits.
-FAILSAFES = {rule.text: event_id(rule.text.lower().replace(" ", "_")) for rule in RULES}
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +60,7 @@ class EventService(Service):
         self._is_reset = True  # not told yet
         state = endpoint.vehicle.state
         self._seen = (state.is_armed, state.mode)
+        self._reported: object = None  # what the last report was made from
 
     def messages(self) -> Mapping[str, Handler]:
         return {"REQUEST_EVENT": self.event_requested}
@@ -78,6 +79,7 @@ class EventService(Service):
             flags = SEQUENCE_RESET if self._is_reset else 0
             self._is_reset = False
             self._endpoint.broadcast(_CURRENT_EVENT_SEQUENCE, _CURRENT_EVENT_SEQUENCE.pack(self._sequence, flags))
+            self._report(is_asked=False)
 
     # What happens
 
@@ -104,13 +106,38 @@ class EventService(Service):
     def _tell(self, number: int, severity: Severity, arguments: bytes = b"") -> None:
         if not self._is_on:
             return
+        self._send(number, severity << 4 | severity, arguments)  # as it is logged, and as it is shown
+
+    def _send(self, number: int, levels: int, arguments: bytes) -> None:
         self._sequence = (self._sequence + 1) % _SEQUENCES
-        levels = severity << 4 | severity  # as it is logged, and as it is shown
         time_ms = boot_ms(self._endpoint.time_us)
         padded = tuple(arguments.ljust(_ARGUMENTS, b"\0"))
         payload = _EVENT.pack(0, 0, number, time_ms, self._sequence, levels, padded)
         self._kept.append(_Event(self._sequence, payload))
         self._endpoint.broadcast(_EVENT, payload)
+
+    # Arming checks
+
+    def report(self) -> None:
+        """Tells the result of the arming checks now, because a client has asked for them."""
+        if self._is_on:
+            self._report(is_asked=True)
+
+    def _report(self, *, is_asked: bool) -> None:
+        """A summary, each check that fails, and the components' health; what clients take for one report."""
+        vehicle = self._endpoint.vehicle
+        state = vehicle.state
+        checks: list[Check] = [] if state.is_armed else [check_of(reason) for reason in vehicle.check_arming()]
+        made_from = (state.is_armed, state.is_failsafe, checks)
+        if made_from == self._reported and not is_asked:
+            return
+        self._reported = made_from
+        may_run = not state.is_failsafe if state.is_armed else not checks
+        before, after = summaries(checks, may_arm=not checks, may_run=may_run)
+        self._send(ARMING_SUMMARY, PROTOCOL << 4 | PROTOCOL, before)
+        for check in checks[:CHECKS_MAX]:
+            self._send(check.number, Severity.ERROR << 4 | Severity.ERROR, check.arguments)
+        self._send(HEALTH_SUMMARY, PROTOCOL << 4 | PROTOCOL, after)
 
     # What clients ask for
 

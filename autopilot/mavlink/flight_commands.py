@@ -13,6 +13,7 @@ from autopilot.mavlink.altitude import command_alt_amsl_m
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.convert import is_position, whole
 from autopilot.mavlink.dialects import UnknownModeError
+from autopilot.mavlink.events import EventService
 from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
@@ -23,8 +24,9 @@ REBOOT = 1  # param1 of PREFLIGHT_REBOOT_SHUTDOWN
 class FlightCommands(Service):
     """Passes them on to the vehicle, whose reply is the answer."""
 
-    def __init__(self, endpoint: Endpoint) -> None:
+    def __init__(self, endpoint: Endpoint, events: EventService) -> None:
         self._endpoint = endpoint
+        self._events = events
 
     def messages(self) -> Mapping[str, Handler]:
         return {"SET_MODE": self.set_mode_received}
@@ -116,11 +118,12 @@ class FlightCommands(Service):
         return self._endpoint.vehicle.set_home(command.x, command.y, alt_amsl_m)
 
     def _run_prearm_checks(self, _: Command) -> Reply:
-        """Checks whether the vehicle may be armed, and names each reason against it in a text.
+        """Checks whether the vehicle may be armed, and names each reason against it in a text; as events, too.
 
         Refused: TEMPORARILY_REJECTED while armed.
         """
         vehicle = self._endpoint.vehicle
+        self._events.report()
         if vehicle.state.is_armed:
             return Reply(Verdict.TEMPORARILY_REJECTED, "the vehicle is armed")
         for reason in vehicle.check_arming():

@@ -14,6 +14,7 @@ from typing import Any
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.ftp_files import FtpError, FtpFiles, Nak, OpenFile
+from autopilot.mavlink.metadata import MetadataService
 from autopilot.mavlink.parameters import ParameterService
 from autopilot.mavlink.service import Handler, Service
 
@@ -111,9 +112,9 @@ Answer = tuple[int, int, bytes]  # session, offset, data
 class FtpService(Service):
     """Serves files to clients."""
 
-    def __init__(self, endpoint: Endpoint, parameters: ParameterService) -> None:
+    def __init__(self, endpoint: Endpoint, parameters: ParameterService, metadata: MetadataService) -> None:
         self._endpoint = endpoint
-        self._files = FtpFiles(endpoint, parameters)
+        self._files = FtpFiles(endpoint, parameters, metadata)
         self._sessions: dict[int, _Session] = {}
         self._replies: OrderedDict[Sender, _LastReply] = OrderedDict()
         self._work: dict[int, Callable[[Sender, Request], Answer]] = {

@@ -1,4 +1,4 @@
-"""What the names of MAVLink FTP stand for: files of the host's folder, or the parameter file made on demand."""
+"""What the names of MAVLink FTP stand for: files of the host's folder, or files made on demand."""
 
 import zlib
 from enum import IntEnum
@@ -6,6 +6,7 @@ from typing import Protocol
 from urllib.parse import parse_qs
 
 from autopilot.mavlink.channel import Endpoint
+from autopilot.mavlink.metadata import METADATA_FOLDER, MetadataService
 from autopilot.mavlink.param_file import UPLOAD_BYTES_MAX, ParamFileError, packed_parameters, unpacked_parameters
 from autopilot.mavlink.parameters import ParameterService
 from autopilot.vehicle import Severity
@@ -138,9 +139,10 @@ class _ParameterUpload:
 class FtpFiles:
     """Finds what a name stands for."""
 
-    def __init__(self, endpoint: Endpoint, parameters: ParameterService) -> None:
+    def __init__(self, endpoint: Endpoint, parameters: ParameterService, metadata: MetadataService) -> None:
         self._endpoint = endpoint
         self._parameters = parameters
+        self._metadata = metadata
 
     @property
     def _folder(self) -> ConfinedFolder:
@@ -154,8 +156,11 @@ class FtpFiles:
         own = _own_name(name)
         if own is None:
             return _FolderFile(self._folder, name, is_writable=False)
-        file_name, _, query = own.partition("?")
-        if file_name != PARAM_FILE:
+        own_folder, own_file = own
+        if own_folder == METADATA_FOLDER and own_file in self._metadata.files:
+            return _Snapshot(self._metadata.files[own_file])
+        file_name, _, query = own_file.partition("?")
+        if own_folder != PARAM_FOLDER or file_name != PARAM_FILE:
             raise FileNotFoundError
         return _Snapshot(self._parameter_file(query))
 
@@ -179,7 +184,7 @@ class FtpFiles:
             if is_new:
                 folder.create(name)
             return _FolderFile(folder, name, is_writable=True)
-        if own.partition("?")[0] != PARAM_FILE:
+        if own[0] != PARAM_FOLDER or own[1].partition("?")[0] != PARAM_FILE:
             raise FtpError(Nak.FILE_PROTECTED)
         return _ParameterUpload(self._endpoint, self._parameters)
 
@@ -187,10 +192,14 @@ class FtpFiles:
         """The entries of a folder as the protocol writes them, each ended by a zero byte."""
         own = _own_name(name)
         if own is not None:
-            if own:
+            own_folder, inner = own
+            if inner:
                 raise FileNotFoundError
-            size = len(self._parameter_file(""))
-            return [_entry("F", PARAM_FILE, size, 0, with_times=with_times)]
+            if own_folder == METADATA_FOLDER:
+                sizes = {file: len(content) for file, content in self._metadata.files.items()}
+            else:
+                sizes = {PARAM_FILE: len(self._parameter_file(""))}
+            return [_entry("F", file, size, 0, with_times=with_times) for file, size in sorted(sizes.items())]
         return [
             _entry("D" if entry.is_folder else "F", entry.name, entry.size, entry.time_s, with_times=with_times)
             for entry in self._folder.entries(name)
@@ -211,10 +220,10 @@ class FtpFiles:
         return checksum ^ 0xFFFFFFFF
 
 
-def _own_name(name: str) -> str | None:
-    """What follows `@PARAM/` in a name; None for a name of the folder."""
+def _own_name(name: str) -> tuple[str, str] | None:
+    """A folder of our own and what follows it in a name; None for a name of the host's folder."""
     folder, _, rest = name.lstrip("/").partition("/")
-    return rest if folder == PARAM_FOLDER else None
+    return (folder, rest) if folder in (PARAM_FOLDER, METADATA_FOLDER) else None
 
 
 def _entry(kind: str, name: str, size: int, time_s: int, *, with_times: bool) -> bytes:

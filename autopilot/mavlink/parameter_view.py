@@ -76,6 +76,16 @@ class ParameterView:
             return min(alias.numbers.values()), max(alias.numbers.values())
         return self._shown(name, declaration.minimum), self._shown(name, declaration.maximum)
 
+    def meaning(self, name: str) -> str:
+        """What it is for, in words."""
+        if name in self._constants:
+            return self._constants[name].meaning
+        return self._table.declarations[self._ours(name)].meaning
+
+    def unit(self, name: str) -> str:
+        """The unit of a name of our own; of another one none: its scale may differ."""
+        return self._table.declarations[name].unit if name in self._table else ""
+
     def set(self, name: str, asked: float) -> int | float:
         """Sets our parameter behind a name and returns the value that is now under it."""
         if name in self._constants:

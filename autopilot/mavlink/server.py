@@ -35,6 +35,7 @@ from autopilot.mavlink.log_streaming import LogStreamingService
 from autopilot.mavlink.log_transfer import LogTransferService
 from autopilot.mavlink.manual import ManualService
 from autopilot.mavlink.message_requests import MessageRequests
+from autopilot.mavlink.metadata import MetadataService
 from autopilot.mavlink.mission_commands import MissionCommands
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.modes import ModeService
@@ -125,11 +126,12 @@ class MavlinkServer:
     def _services(self) -> list[Service]:
         endpoint = self._endpoint
         parameters, goto = ParameterService(endpoint), GotoService(endpoint)
+        metadata = MetadataService(endpoint)
         self._events = EventService(endpoint)
         return [
             self._commands,
             self._requests,
-            FlightCommands(endpoint),
+            FlightCommands(endpoint, self._events),
             parameters,
             MissionCommands(endpoint),
             ModeService(endpoint),
@@ -140,7 +142,8 @@ class MavlinkServer:
             FenceService(endpoint),
             SafetyService(endpoint),
             CalibrationService(endpoint),
-            FtpService(endpoint, parameters),
+            metadata,
+            FtpService(endpoint, parameters, metadata),
             TargetService(endpoint),
             ManualService(endpoint),
             LogTransferService(endpoint),

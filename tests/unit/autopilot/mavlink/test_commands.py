@@ -211,7 +211,7 @@ def test_home_that_is_not_known_is_refused():
 @pytest.mark.parametrize(
     "probe",
     [
-        (512, 397),  # REQUEST_MESSAGE of COMPONENT_METADATA, which a ground station asks for when it connects
+        (512, 395),  # REQUEST_MESSAGE of COMPONENT_INFORMATION, which stations took before COMPONENT_METADATA
         (512, 259),
         (511, 9999, 1e6),
         (510, 9999),

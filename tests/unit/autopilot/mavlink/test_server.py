@@ -70,7 +70,10 @@ def test_ground_station_connects_without_silence():
     names = [message.name for message in rig.frame(FRAMES_IN_100_MS)]
     assert names.index("COMMAND_ACK") < names.index("AUTOPILOT_VERSION")
 
-    for msg_id in (300, 397, 395, 280, 259):  # protocol, metadata, gimbal, camera
+    rig.client.command(mavlink.MAV_CMD_REQUEST_MESSAGE, 397)
+    names = [message.name for message in rig.frame(FRAMES_IN_100_MS)]
+    assert names.index("COMMAND_ACK") < names.index("COMPONENT_METADATA")
+    for msg_id in (300, 395, 280, 259):  # protocol, older metadata, gimbal, camera
         rig.client.command(mavlink.MAV_CMD_REQUEST_MESSAGE, msg_id, 0)
         ack = rig.only("COMMAND_ACK", FRAMES_IN_100_MS)
         assert (ack.command, ack.result) == (512, mavlink.MAV_RESULT_UNSUPPORTED)
