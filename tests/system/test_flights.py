@@ -44,6 +44,7 @@ def test_estimator_is_accurate_and_knows_how_accurate(summary):
         assert 0.92 < share < 0.98, source
 
 
+@pytest.mark.slow
 def test_horizontal_error_over_twenty_flights():
     """One flight is as wrong as the receiver happened to wander; over many the deviation is what was specified."""
     errors_m = [mission_trial(FlightConfig(seed=seed, **WIND)).pos_h_rms_m for seed in range(20)]

@@ -177,6 +177,7 @@ def action_relay_on():
     return RelayCommand.ON
 
 
+@pytest.mark.slow
 def test_follow_me_and_orbit(vehicle):
     action, follow = vehicle.plugin(Action), vehicle.plugin(FollowMe)
     vehicle.airborne(action)
