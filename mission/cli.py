@@ -83,7 +83,8 @@ def fly(
     ] = None,
 ) -> None:
     """Fly: world, vehicle, flight controller and MAVLink links, in real time or faster."""
-    from mission.session import FlightOptions, UserError, fly_session
+    from mission.options import FlightOptions, UserError
+    from mission.session import fly_session
 
     try:
         exit_code = fly_session(

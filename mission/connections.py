@@ -1,0 +1,75 @@
+"""How a flight of `honeyguide fly` is reached from outside: its ports, the key of its signatures, its live picture."""
+
+from autopilot.mavlink.links import LinkError, LinkRole, LinkSource
+from autopilot.mavlink.signing import FileStore, MemoryStore, SigningConfig
+from autopilot.mavlink.tcp import TcpPort
+from autopilot.mavlink.udp import SILENCE_US, UdpPort, address_towards
+from common.clock import wall_unix_us
+from common.state_folder import StateFolder
+from mission.options import FlightOptions, UserError
+from mission.stream import StreamServer
+
+GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
+API_PORT_STEP = 14580 - 14540
+PORT_MAX = 65535
+
+
+def open_links(options: FlightOptions, speed: float) -> list[LinkSource]:
+    _check_ports(options)
+    links: list[LinkSource] = []
+    silence_us = int(SILENCE_US * max(speed, 1.0))  # clients' heartbeats follow the wall clock
+    try:
+        bind = options.bind or address_towards(options.host)
+        for role, port, step in (
+            (LinkRole.GROUND, options.gcs_port, GROUND_PORT_STEP),
+            (LinkRole.ONBOARD, options.api_port, API_PORT_STEP),
+        ):
+            links.append(UdpPort(port, role, options.host, local_port=port + step, bind=bind, silence_us=silence_us))
+        if options.tcp_port is not None:
+            links.append(TcpPort(options.tcp_port, bind=bind))
+    except LinkError as error:
+        for link in links:
+            link.close()
+        options_of = {"UDP": "--gcs-port or --api-port", "TCP": "--tcp-port"}
+        name = next((name for name in options_of if f"{name} port" in str(error) and " is in use " in str(error)), "")
+        hint = f"; another flight may be running: choose {options_of[name]}" if name else ""
+        raise UserError(f"{str(error).rstrip('.')}{hint}") from error
+    return links
+
+
+def _check_ports(options: FlightOptions) -> None:
+    """The clients' two ports and the vehicle's own two must exist and be four."""
+    gcs_port, api_port = options.gcs_port, options.api_port
+    for name, port, step in (("gcs", gcs_port, GROUND_PORT_STEP), ("api", api_port, API_PORT_STEP)):
+        if port + step > PORT_MAX:
+            raise UserError(
+                f"--{name}-port {port}: must be at most {PORT_MAX - step}: the vehicle's own is {step} above"
+            )
+    own = (gcs_port + GROUND_PORT_STEP, api_port + API_PORT_STEP)
+    if len({gcs_port, api_port, *own}) < 4:
+        raise UserError(
+            f"--gcs-port {gcs_port} and --api-port {api_port}: must differ, also from the vehicle's own ports "
+            f"{own[0]} and {own[1]}"
+        )
+
+
+def signing_config(options: FlightOptions, speed: float | None, state: StateFolder | None) -> SigningConfig | None:
+    """Signatures follow the wall clock of the other end; in lockstep there is none, and the date is simulated."""
+    if speed is None:
+        return None
+    store = MemoryStore() if state is None else FileStore(state.folder / "signing.json")
+    try:
+        store.load()
+    except ValueError as error:  # without its key the vehicle would obey anybody
+        raise UserError(f"{error}; remove it to fly without signing") from error
+    return SigningConfig(store, wall_unix_us, options.has_to_sign)
+
+
+def open_stream(port: int) -> StreamServer | None:
+    """The camera's live picture, if it is asked for."""
+    if port == 0:
+        return None
+    try:
+        return StreamServer(port)
+    except OSError as error:
+        raise UserError(f"--stream-port {port}: {error.strerror}") from error
