@@ -337,6 +337,8 @@ class FlightController:
 
     def start_mission(self, first: int, last: int = -1) -> Reply:
         mission = self.navigator.mission
+        if not mission.items:  # without one the numbers mean nothing, and mode Mission says why not
+            first = last = -1
         if first >= 0:
             reply = mission.set_current(first)
             if reply.verdict is not Verdict.ACCEPTED:

@@ -14,6 +14,7 @@ from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.convert import is_position, whole
 from autopilot.mavlink.dialects import UnknownModeError
 from autopilot.mavlink.events import EventService
+from autopilot.mavlink.identity import banner
 from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
@@ -37,10 +38,12 @@ class FlightCommands(Service):
             mavlink.MAV_CMD_NAV_TAKEOFF: self._takeoff,
             mavlink.MAV_CMD_NAV_LAND: self._land,
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,
+            mavlink.MAV_CMD_NAV_LOITER_UNLIM: self._hold,
             mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
             mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
             mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_prearm_checks,
             mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+            mavlink.MAV_CMD_DO_SEND_BANNER: self._send_banner,
         }
 
     def _arm_disarm(self, command: Command) -> Reply:
@@ -87,6 +90,13 @@ class FlightCommands(Service):
         """
         return self._endpoint.vehicle.set_mode(Mode.RETURN)
 
+    def _hold(self, _: Command) -> Reply:
+        """Holds here, in mode Hold (ArduPilot: Loiter).
+
+        Refused: TEMPORARILY_REJECTED in the air without a position.
+        """
+        return self._endpoint.vehicle.set_mode(Mode.HOLD)
+
     def _set_mode(self, command: Command) -> Reply:
         """Changes the flight mode.
 
@@ -128,6 +138,11 @@ class FlightCommands(Service):
             return Reply(Verdict.TEMPORARILY_REJECTED, "the vehicle is armed")
         for reason in vehicle.check_arming():
             self._endpoint.text(Severity.CRITICAL, f"PreArm: {reason}")
+        return ACCEPTED
+
+    def _send_banner(self, command: Command) -> Reply:
+        """Sends the text that greets a client, once more."""
+        self._endpoint.text(Severity.INFO, banner(self._endpoint.dialect), to=command.sender)
         return ACCEPTED
 
     def _reboot(self, command: Command) -> Reply:

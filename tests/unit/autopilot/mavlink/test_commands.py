@@ -324,3 +324,18 @@ def test_longest_interval_fits_the_answer():
     assert rig.ack(511, 30, 1e30).result == ACCEPTED
     rig.client.command(510, 30)
     assert rig.only("MESSAGE_INTERVAL").interval_us == INT32_MAX
+
+
+def test_loiter_as_a_command_holds():
+    rig = Rig()
+    assert rig.ack(17, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0).result == ACCEPTED  # pymavlink's set_mode_loiter
+    assert rig.vehicle.calls == [("set_mode", Mode.HOLD)]
+
+
+def test_banner_is_sent_again_to_who_asks():
+    rig = Rig()
+    rig.client.command(42428)
+    messages = rig.frame()
+    assert [m.fields.result for m in messages if m.name == "COMMAND_ACK"] == [ACCEPTED]
+    assert any("Honeyguide" in text for text in texts(messages))
+    assert not any("Honeyguide" in text for text in texts(rig.second_client.received()))
