@@ -208,3 +208,31 @@ def test_sticks_change_radius_speed_and_height_of_an_orbit():
     assert speed[4] == pytest.approx(3.0, abs=0.4)
     assert height[5] - height[4] > 3.0
     assert speed[6] < -1.0  # it turns the other way
+
+
+def test_yaw_stick_turns_an_orbit_that_leaves_the_heading_to_it():
+    """PX4's orbit with ORBIT_YAW_BEHAVIOUR 4."""
+    flown = Flown()
+    headings = []
+
+    async def script(drone):
+        await airborne(drone)
+        sticks = Sticks(drone)
+        lat, lon, _ = geodetic_from_ned(20.0, 10.0, 0.0, DEFAULT_HOME)
+        await drone.command_int(
+            DO_ORBIT, 0, (10.0, 3.0, 4.0, nan), round(lat * E7), round(lon * E7), drone.home.alt_m + 10.0, name="orbit"
+        )
+        await drone.sleep(15.0)
+        for yaw in (0, 500, -500, 0):
+            headings.append(flown.state.yaw_rad)
+            await sticks.hold(1.0, r=yaw)
+            await drone.sleep(2.0)
+        headings.append(flown.state.yaw_rad)
+        assert hypot(*(flown.pos[:2] - (20.0, 10.0))) == pytest.approx(10.0, abs=0.7)
+
+    flown.run(script)
+    still, right, left, after = np.degrees(np.diff(np.unwrap(headings)))
+    assert still == pytest.approx(0.0, abs=2.0)
+    assert right > 15.0
+    assert left == pytest.approx(-right, abs=5.0)
+    assert after == pytest.approx(0.0, abs=2.0)
