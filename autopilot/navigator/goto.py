@@ -37,6 +37,13 @@ def reposition_target(
     return target, context.heading_to(state.estimate.pos_ned, target, yaw)
 
 
+def ground_d(context: NavContext) -> float:
+    """Down coordinate [m] of the ground: below the vehicle or where it stood last, whichever is lower."""
+    stand_ned = context.state.stand_ned or context.state.home_ned
+    stood_d = stand_ned[2] + context.standing_height_m
+    return max(stood_d, context.state.estimate.terrain_d) if context.state.estimate.flags & TERRAIN_VALID else stood_d
+
+
 def _refusal(context: NavContext, target: Vector) -> Reply:
     here = context.state.estimate.pos_ned
     way_m = hypot(target[0] - here[0], target[1] - here[1])
@@ -45,12 +52,9 @@ def _refusal(context: NavContext, target: Vector) -> Reply:
         return Reply(Verdict.DENIED, f"target is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed")
     if abs(target[2]) > 10_000.0:
         return Reply(Verdict.DENIED, "altitude is out of range")
-    stand_ned = context.state.stand_ned or context.state.home_ned
-    ground_d = stand_ned[2] + context.standing_height_m
-    if context.state.estimate.flags & TERRAIN_VALID:
-        ground_d = max(ground_d, context.state.estimate.terrain_d)
-    if target[2] > ground_d + _BELOW_GROUND_M:
-        return Reply(Verdict.DENIED, f"target is {target[2] - ground_d:.0f} m below the ground")
+    lowest_d = ground_d(context)
+    if target[2] > lowest_d + _BELOW_GROUND_M:
+        return Reply(Verdict.DENIED, f"target is {target[2] - lowest_d:.0f} m below the ground")
     reason = context.place_refusal(target)
     if reason:
         return Reply(Verdict.DENIED, f"target is {reason}")

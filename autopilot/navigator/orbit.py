@@ -9,6 +9,7 @@ from math import cos, hypot, isfinite, nan, sin
 
 from autopilot.navigator.circle import Circle, speed_limit
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.goto import ground_d
 from autopilot.navigator.manual import speed_down_of, yaw_rate_of
 from autopilot.navigator.setpoint import Vector
 from autopilot.requests import OrbitRequest
@@ -17,6 +18,7 @@ from autopilot.vehicle import ACCEPTED, OrbitStatus, Reply, Verdict
 from common.geodesy import GeoPoint
 
 _RADIUS_MIN_M, _RADIUS_MAX_M = 1.0, 1000.0
+_LOWEST_M = 1.0  # height above the ground, below which nobody flies sideways; guess
 _NEAR_M = 1.0  # distance from the circle at which the orbit begins
 _DEFAULT_SPEED_M_S = 5.0  # unless the circle is too small for it; guess
 
@@ -61,6 +63,8 @@ class Orbit:
             return _denied("an orbit needs a speed")
         if request.turns_rad < 0.0:
             return _denied("the number of turns cannot be negative")
+        if isfinite(request.alt_amsl_m) and self._context.down_of(request.alt_amsl_m) > self._lowest_d():
+            return _denied(f"an orbit is flown {_LOWEST_M:g} m above the ground or higher")
         self._request = request
         return ACCEPTED
 
@@ -145,9 +149,15 @@ class Orbit:
         elif speed * circle.direction < 0.0:
             circle.speed_m_s = 0.0  # it does not fly backwards
         north, east, down = circle.centre_ned
+        lowest_d = self._lowest_d()
+        if down_m_s > 0.0 and down + down_m_s * dt_s > lowest_d:
+            down_m_s = 0.0
         circle.centre_ned = (north, east, down + down_m_s * dt_s)
         self._tell(circle)
         return away_m_s if circle.radius_m == radius_m else 0.0, down_m_s
+
+    def _lowest_d(self) -> float:
+        return ground_d(self._context) - _LOWEST_M
 
     def _tell(self, circle: Circle) -> None:
         centre = GeoPoint(*self._context.geodetic_of(circle.centre_ned))

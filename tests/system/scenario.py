@@ -36,6 +36,7 @@ UNDERGROUND_M = 0.3
 AIRBORNE_M = 1.0  # motors that stop higher than this have stopped in the air
 SPEED_MARGIN_M_S = 4.0  # wind, and the overshoot of a braking vehicle
 TILT_MAX_DEG = 70.0  # the control's limit is 45, gusts and yaw come on top
+FENCE_MARGIN_M = 4.0  # gusts, and where the estimate errs
 HOME_S = 400.0  # for the return at the end
 
 
@@ -183,6 +184,52 @@ class Scenario:
         self.ask("takeoff", self.fc.takeoff(self.alt(float(self.rng.uniform(3.0, 25.0))), nan))
         self.ask("arm", self.fc.arm(force=False))
         self.run(float(self.rng.uniform(0.5, 12.0)))
+
+    def fly_at_fence(self):
+        """Flies about inside a fence until it is breached: then it stops soon enough, whatever it was doing."""
+        self.set("GF_ACTION", float(self.rng.choice([2, 3, 5])))
+        self.begin()
+        if self.state.landed_state is LandedState.ON_GROUND:
+            return
+        radius_m = float(self.rng.uniform(25.0, 60.0))
+        fence = [MissionItem(0, 6, 5003, (radius_m, 0.0, 0.0, 0.0), *self.place(1.0), 0.0)]
+        self.fc.lists.load(ListKind.FENCE, fence)
+        self.new_fence = self.new_rally = lambda: None
+        self.parameter = self.station = lambda: None
+        region = self.fc.fence.region
+        end_us = self.flight.time_us + int(self.seconds * 1e6)
+        while self.flight.time_us < end_us and not self.state.fence.breached:
+            self.event()
+            end_event_us = self.flight.time_us + int(float(self.rng.choice([0.1, 3.0, 10.0])) * 1e6)
+            while self.flight.time_us < end_event_us and not self.state.fence.breached:
+                self.frame()
+        if not self.state.fence.breached:
+            return
+        self.note("breach")
+        speed = hypot(*(float(v) for v in self.body[0]["vel_ned"][:2]))
+        accel, jerk = float(self.fc.params["MPC_ACC_HOR"]), float(self.fc.params["MPC_JERK_MAX"])
+        allowed_m = speed * (0.5 * speed / accel + accel / jerk + 1.0) + FENCE_MARGIN_M
+        for _ in range(round(30.0 * 1e6 / FRAME_US)):
+            self.frame()
+            north, east, _ = self.pos_ned
+            if -float(region.clearance(north, east)) > allowed_m:
+                self.fail(f"{-float(region.clearance(north, east)):.1f} m beyond the fence, {allowed_m:.1f} m allowed")
+
+    def fly_out_of_charge(self):
+        """Whatever it is doing when the battery is nearly empty, soon it stands on the ground."""
+        self.set("COM_LOW_BAT_ACT", float(self.rng.choice([2, 3])))
+        self.parameter = lambda: None
+        self.begin()
+        end_us = self.flight.time_us + int(self.seconds * 1e6)
+        while self.flight.time_us < end_us:
+            self.event()
+            self.run(float(self.rng.choice([0.02, 0.1, 1.0, 3.0])))
+        self.sticks = None if self.rng.random() < 0.5 or self.sticks is None else (0.0, 0.0, 0.0, 0.0)
+        if not self.state.is_armed:
+            return
+        self.ask("battery empty", self.fc.inject_failure(BATTERY, OFF, 0))
+        seconds = 20.0 + max(self.height_m, 0.0) / 0.5
+        self.until(lambda: not self.state.is_armed, seconds, "on the ground and disarmed")
 
     def come_home(self):
         """With healthy sensors, no fence and nobody else in control it returns, lands and disarms."""

@@ -155,6 +155,23 @@ class TestPrecisionLandingWithoutPosition:
         rig.disarmed(90.0)
 
 
+class TestOrbitNearTheGround:
+    def test_an_orbit_on_or_below_the_ground_is_refused(self):
+        rig = Kinematic().flying()
+        for height in (0.5, -20.0):
+            reply = rig.fc.orbit(OrbitRequest(20.0, 3.0, alt_amsl_m=ORIGIN.alt_m + height))
+            assert reply.verdict is Verdict.DENIED
+            assert "above the ground" in reply.reason
+
+    def test_a_pilot_cannot_push_an_orbit_into_the_ground(self):
+        rig = Kinematic().flying(5.0)
+        assert rig.fc.orbit(OrbitRequest(20.0, 3.0)).verdict is Verdict.ACCEPTED
+        rig.run(20.0)
+        rig.piloted(30.0, throttle=-1.0)
+        assert rig.state.mode is Mode.ORBIT
+        assert -rig.pos[2] > 0.7
+
+
 class TestHome:
     def test_home_is_not_set_where_no_return_could_lead(self):
         rig = Kinematic().flying()
