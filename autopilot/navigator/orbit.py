@@ -186,7 +186,8 @@ class Orbit:
 
     def _centre_of(self, request: OrbitRequest, here: Vector) -> Vector:
         context = self._context
-        down = context.down_of(request.alt_amsl_m) if isfinite(request.alt_amsl_m) else here[2]
+        is_asked = isfinite(request.alt_amsl_m)
+        down = context.down_of(request.alt_amsl_m) if is_asked else min(here[2], self._lowest_d())
         if isfinite(request.lat_deg):
             north, east, _ = context.pos_ned_of(request.lat_deg, request.lon_deg, context.state.position.alt_m)
             return north, east, down

@@ -163,6 +163,14 @@ class TestOrbitNearTheGround:
             assert reply.verdict is Verdict.DENIED
             assert "above the ground" in reply.reason
 
+    def test_an_orbit_begun_close_to_the_ground_climbs_first(self):
+        rig = Kinematic().flying()
+        rig.fc.set_mode(Mode.LAND)
+        rig.run_until(lambda: -rig.pos[2] < 0.4)
+        assert rig.fc.set_mode(Mode.ORBIT).verdict is Verdict.ACCEPTED
+        rig.run(20.0)
+        assert -rig.pos[2] > 0.7
+
     def test_a_pilot_cannot_push_an_orbit_into_the_ground(self):
         rig = Kinematic().flying(5.0)
         assert rig.fc.orbit(OrbitRequest(20.0, 3.0)).verdict is Verdict.ACCEPTED
