@@ -12,7 +12,6 @@ import warp as wp
 from autopilot.estimator.align import aligned_nominal, average, is_aligned
 from autopilot.estimator.calibration import calibrated
 from autopilot.estimator.delay import (
-    MAX_AGE_S,
     bounded_sample,
     correct_output,
     due_count,
@@ -26,39 +25,41 @@ from autopilot.estimator.delay import (
     start_output,
     with_jump,
 )
-from autopilot.estimator.fuse import seconds_since
 from autopilot.estimator.generated import predict_covariance
 from autopilot.estimator.health import (
-    DEAD_RECKONING_AFTER_S,
     DOUBTED_ACCEL_NSD,
-    climb_innov_lpf,
-    doubt_accel,
     flags,
     is_doubted,
-    is_healthy,
     is_sound,
     listen,
     with_deviations,
     with_doubt,
 )
-from autopilot.estimator.params import HEIGHT_REF_GNSS, MAG_TYPE_NONE, EstimatorParams, estimator_params
+from autopilot.estimator.params import EstimatorParams, estimator_params
 from autopilot.estimator.predict import predict_nominal, process_variance
-from autopilot.estimator.sources.baro import BARO_STUCK_AFTER, BARO_STUCK_MOVED, baro_repeats, fuse_baro, start_baro
-from autopilot.estimator.sources.drag import drag_is_due, fuse_drag, is_airborne
+from autopilot.estimator.sources.baro import (
+    BARO_STUCK_AFTER,
+    BARO_STUCK_MOVED,
+    baro_repeats,
+    start_baro,
+    take_baro,
+)
+from autopilot.estimator.sources.drag import drag_is_due, take_drag
 from autopilot.estimator.sources.external import listen_external, receive_external, take_external
 from autopilot.estimator.sources.gnss import (
     GNSS_STUCK_AFTER,
     GNSS_STUCK_MOVED,
-    fuse_gnss_height,
-    fuse_gnss_pos,
-    fuse_gnss_vel,
-    gnss_is_good,
     gnss_repeats,
-    propagate_wander,
+    take_gnss,
 )
-from autopilot.estimator.sources.mag import MAG_STUCK_AFTER, MAG_STUCK_MOVED, fuse_mag, mag_repeats, start_mag
-from autopilot.estimator.sources.range import RANGE_STUCK_AFTER, RANGE_STUCK_MOVED, fuse_range, range_repeats
-from autopilot.estimator.sources.rest import fuse_rest, observe_stillness, rest_is_due
+from autopilot.estimator.sources.mag import MAG_STUCK_AFTER, MAG_STUCK_MOVED, mag_repeats, take_mag
+from autopilot.estimator.sources.range import (
+    RANGE_STUCK_AFTER,
+    RANGE_STUCK_MOVED,
+    range_repeats,
+    take_range,
+)
+from autopilot.estimator.sources.rest import observe_stillness, take_rest
 from autopilot.estimator.state import (
     BARO_RING,
     COV_ROWS,
@@ -155,127 +156,6 @@ def receive_samples(ekf: Ekf, i: int, samples: Samples) -> None:
             RANGE_STUCK_AFTER,
             RANGE_STUCK_MOVED,
         )
-
-
-@wp.func
-def take_gnss(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
-    """Fuses the oldest waiting GNSS sample if the horizon has passed it."""
-    sample = ekf.gnss_ring[i, ekf.rows[i].gnss_inbox.tail % GNSS_RING]
-    if sample.time_us > now_us:
-        return
-    ekf.rows[i].gnss_inbox.tail += 1
-    age_s = seconds_since(now_us, sample.time_us)
-    if age_s > MAX_AGE_S or not gnss_is_good(params, sample):
-        return
-    cov = ekf.covariance
-    nominal = propagate_wander(params, cov, i, ekf.rows[i].nominal, sample, ekf.rows[i].wander_time_us)
-    ekf.rows[i].wander_time_us = sample.time_us
-    may_reset = ekf.rows[i].external_pos.is_active == 0
-    if ekf.rows[i].is_yaw_aligned == 1:
-        nominal, vel_aid = fuse_gnss_vel(params, cov, i, nominal, ekf.rows[i].gnss_vel, sample, may_reset)
-        nominal, pos_aid = fuse_gnss_pos(params, cov, i, nominal, ekf.rows[i].gnss_pos, sample, age_s, may_reset)
-        ekf.rows[i].gnss_vel = vel_aid
-        ekf.rows[i].climb_innov_lpf = climb_innov_lpf(ekf.rows[i])
-        ekf.rows[i].doubted_time_us = doubt_accel(ekf.rows[i], ekf.params[i].accel_bias_limit)
-        ekf.rows[i].gnss_pos = pos_aid
-    is_reference = ekf.rows[i].baro.is_active == 0 and ekf.rows[i].external_height.is_active == 0
-    nominal, height_aid = fuse_gnss_height(
-        params, cov, i, nominal, ekf.rows[i].gnss_height, sample, age_s, is_reference
-    )
-    ekf.rows[i].gnss_height = height_aid
-    ekf.rows[i].nominal = nominal
-
-
-@wp.func
-def take_baro(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
-    """Fuses the oldest waiting pressure if the horizon has passed it, unless GNSS height is preferred and alive."""
-    sample = ekf.baro_ring[i, ekf.rows[i].baro_inbox.tail % BARO_RING]
-    if sample.time_us > now_us:
-        return
-    ekf.rows[i].baro_inbox.tail += 1
-    age_s = seconds_since(now_us, sample.time_us)
-    is_gnss_good = is_healthy(ekf.rows[i].gnss_height)
-    if params.baro_ctrl == 0 or age_s > MAX_AGE_S or (params.height_ref == HEIGHT_REF_GNSS and is_gnss_good):
-        ekf.rows[i].baro.is_active = 0
-        return
-    nominal, aid, origin_height = fuse_baro(
-        params,
-        ekf.covariance,
-        i,
-        ekf.rows[i].nominal,
-        ekf.rows[i].baro,
-        ekf.rows[i].origin_baro_height,
-        sample,
-        age_s,
-        is_gnss_good or is_healthy(ekf.rows[i].external_height),
-    )
-    ekf.rows[i].nominal = nominal
-    ekf.rows[i].baro = aid
-    ekf.rows[i].origin_baro_height = origin_height
-
-
-@wp.func
-def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_frd: wp.vec3) -> None:
-    """Fuses the oldest waiting field if the horizon has passed it; the first one ever sets heading."""
-    sample = ekf.mag_ring[i, ekf.rows[i].mag_inbox.tail % MAG_RING]
-    if sample.time_us > now_us:
-        return
-    ekf.rows[i].mag_inbox.tail += 1
-    age_s = seconds_since(now_us, sample.time_us)
-    if params.mag_type == MAG_TYPE_NONE or age_s > MAX_AGE_S:
-        return
-    if ekf.rows[i].is_yaw_aligned == 0:
-        ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, ekf.rows[i].nominal, sample.field_frd_gauss)
-        ekf.rows[i].is_yaw_aligned = 1
-    omega_frd = gyro_frd - ekf.rows[i].nominal.gyro_bias_frd
-    nominal, aid = fuse_mag(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].mag, sample, omega_frd, age_s)
-    ekf.rows[i].nominal = nominal
-    ekf.rows[i].mag = aid
-
-
-@wp.func
-def take_range(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
-    """Fuses the oldest waiting distance if the horizon has passed it."""
-    sample = ekf.range_ring[i, ekf.rows[i].range_inbox.tail % RANGE_RING]
-    if sample.time_us > now_us:
-        return
-    ekf.rows[i].range_inbox.tail += 1
-    if params.range_ctrl == 1 and seconds_since(now_us, sample.time_us) < MAX_AGE_S:
-        nominal, aid = fuse_range(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].range, sample)
-        ekf.rows[i].nominal = nominal
-        ekf.rows[i].range = aid
-
-
-@wp.func
-def take_drag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
-    """Fuses the averaged specific force in the air, and starts the next average."""
-    drag_sum = ekf.rows[i].drag_sum
-    if ekf.rows[i].stillness.is_still == 1:
-        drag_sum.ground_d = ekf.rows[i].nominal.pos_ned[2]
-    if is_airborne(drag_sum, ekf.rows[i].nominal):
-        is_starved = seconds_since(now_us, ekf.rows[i].gnss_vel.fused_time_us) > DEAD_RECKONING_AFTER_S
-        if ekf.rows[i].external_pos.is_active == 1 or ekf.rows[i].external_vel.is_active == 1:
-            is_starved = False
-        corrects_velocity = params.drag_ctrl == 2 and is_starved
-        nominal, aid = fuse_drag(
-            params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].drag, drag_sum, now_us, corrects_velocity
-        )
-        ekf.rows[i].nominal = nominal
-        ekf.rows[i].drag = aid
-    else:
-        ekf.rows[i].drag.is_active = 0
-    drag_sum.accel_frd = wp.vec3()
-    drag_sum.time_s = 0.0
-    ekf.rows[i].drag_sum = drag_sum
-
-
-@wp.func
-def take_rest(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
-    """Fuses zero velocity if the vehicle stands still."""
-    if rest_is_due(ekf.rows[i].rest, ekf.rows[i].nominal, now_us):
-        nominal, aid = fuse_rest(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].rest, now_us)
-        ekf.rows[i].nominal = nominal
-        ekf.rows[i].rest = aid
 
 
 @wp.func

@@ -7,6 +7,7 @@ the reference is moved if GNSS height agrees with the estimate, and the height i
 
 import warp as wp
 
+from autopilot.estimator.delay import MAX_AGE_S
 from autopilot.estimator.fuse import (
     fuse,
     judge,
@@ -18,8 +19,9 @@ from autopilot.estimator.fuse import (
     set_offset_by_state,
     set_state_by_offset,
 )
-from autopilot.estimator.params import EstimatorParams
-from autopilot.estimator.state import POS, SLOW_BARO, SLOW_COUNT, SLOW_COV, Aid, Nominal
+from autopilot.estimator.health import is_healthy
+from autopilot.estimator.params import HEIGHT_REF_GNSS, EstimatorParams
+from autopilot.estimator.state import BARO_RING, POS, SLOW_BARO, SLOW_COUNT, SLOW_COV, Aid, Ekf, Nominal
 from autopilot.ports import BaroSample
 from common.kernels import vec24
 
@@ -103,3 +105,31 @@ def fuse_baro(
             set_state_by_offset(cov, i, POS + 2, SLOW_BARO, var)
         aid = mark_reset(aid)
     return nominal, aid, origin_height
+
+
+@wp.func
+def take_baro(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
+    """Fuses the oldest waiting pressure if the horizon has passed it, unless GNSS height is preferred and alive."""
+    sample = ekf.baro_ring[i, ekf.rows[i].baro_inbox.tail % BARO_RING]
+    if sample.time_us > now_us:
+        return
+    ekf.rows[i].baro_inbox.tail += 1
+    age_s = seconds_since(now_us, sample.time_us)
+    is_gnss_good = is_healthy(ekf.rows[i].gnss_height)
+    if params.baro_ctrl == 0 or age_s > MAX_AGE_S or (params.height_ref == HEIGHT_REF_GNSS and is_gnss_good):
+        ekf.rows[i].baro.is_active = 0
+        return
+    nominal, aid, origin_height = fuse_baro(
+        params,
+        ekf.covariance,
+        i,
+        ekf.rows[i].nominal,
+        ekf.rows[i].baro,
+        ekf.rows[i].origin_baro_height,
+        sample,
+        age_s,
+        is_gnss_good or is_healthy(ekf.rows[i].external_height),
+    )
+    ekf.rows[i].nominal = nominal
+    ekf.rows[i].baro = aid
+    ekf.rows[i].origin_baro_height = origin_height

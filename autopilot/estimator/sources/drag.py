@@ -7,11 +7,12 @@ EKF2_DRAG_CTRL is 2 and nothing else measures velocity. Runs in the air only.
 
 import warp as wp
 
-from autopilot.estimator.fuse import fuse, fuse_part, judge, mark_fused
+from autopilot.estimator.fuse import fuse, fuse_part, judge, mark_fused, seconds_since
 from autopilot.estimator.generated import drag_products
+from autopilot.estimator.health import DEAD_RECKONING_AFTER_S
 from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.sources.mag import body_axis_ned
-from autopilot.estimator.state import WIND, Aid, DragSum, Nominal
+from autopilot.estimator.state import WIND, Aid, DragSum, Ekf, Nominal
 from common.kernels import vec24
 
 wp.set_module_options({"enable_backward": False})
@@ -97,3 +98,26 @@ def drag_square(params: EstimatorParams, axis: int) -> float:
     if ballistic > 1.0:
         square = 0.5 * _AIR_DENSITY / ballistic
     return square
+
+
+@wp.func
+def take_drag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
+    """Fuses the averaged specific force in the air, and starts the next average."""
+    drag_sum = ekf.rows[i].drag_sum
+    if ekf.rows[i].stillness.is_still == 1:
+        drag_sum.ground_d = ekf.rows[i].nominal.pos_ned[2]
+    if is_airborne(drag_sum, ekf.rows[i].nominal):
+        is_starved = seconds_since(now_us, ekf.rows[i].gnss_vel.fused_time_us) > DEAD_RECKONING_AFTER_S
+        if ekf.rows[i].external_pos.is_active == 1 or ekf.rows[i].external_vel.is_active == 1:
+            is_starved = False
+        corrects_velocity = params.drag_ctrl == 2 and is_starved
+        nominal, aid = fuse_drag(
+            params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].drag, drag_sum, now_us, corrects_velocity
+        )
+        ekf.rows[i].nominal = nominal
+        ekf.rows[i].drag = aid
+    else:
+        ekf.rows[i].drag.is_active = 0
+    drag_sum.accel_frd = wp.vec3()
+    drag_sum.time_s = 0.0
+    ekf.rows[i].drag_sum = drag_sum

@@ -11,6 +11,7 @@ While a client's position is fused it sets nothing: two frames that differ would
 
 import warp as wp
 
+from autopilot.estimator.delay import MAX_AGE_S
 from autopilot.estimator.fuse import (
     fuse,
     fuse_state,
@@ -25,8 +26,9 @@ from autopilot.estimator.fuse import (
     set_state_by_offset,
     set_variance,
 )
+from autopilot.estimator.health import climb_innov_lpf, doubt_accel
 from autopilot.estimator.params import GPS_CTRL_HEIGHT, GPS_CTRL_POS, GPS_CTRL_VEL, EstimatorParams
-from autopilot.estimator.state import ATT, BODY, POS, SLOW, SLOW_COUNT, SLOW_COV, VEL, Aid, Nominal
+from autopilot.estimator.state import ATT, BODY, GNSS_RING, POS, SLOW, SLOW_COUNT, SLOW_COV, VEL, Aid, Ekf, Nominal
 from autopilot.ports import GnssSample
 from common.kernels import vec24
 
@@ -241,3 +243,32 @@ def fuse_gnss_height(
                 set_offset_by_state(cov, i, POS + 2, 2, var)
             aid = mark_reset(aid)
     return nominal, aid
+
+
+@wp.func
+def take_gnss(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
+    """Fuses the oldest waiting GNSS sample if the horizon has passed it."""
+    sample = ekf.gnss_ring[i, ekf.rows[i].gnss_inbox.tail % GNSS_RING]
+    if sample.time_us > now_us:
+        return
+    ekf.rows[i].gnss_inbox.tail += 1
+    age_s = seconds_since(now_us, sample.time_us)
+    if age_s > MAX_AGE_S or not gnss_is_good(params, sample):
+        return
+    cov = ekf.covariance
+    nominal = propagate_wander(params, cov, i, ekf.rows[i].nominal, sample, ekf.rows[i].wander_time_us)
+    ekf.rows[i].wander_time_us = sample.time_us
+    may_reset = ekf.rows[i].external_pos.is_active == 0
+    if ekf.rows[i].is_yaw_aligned == 1:
+        nominal, vel_aid = fuse_gnss_vel(params, cov, i, nominal, ekf.rows[i].gnss_vel, sample, may_reset)
+        nominal, pos_aid = fuse_gnss_pos(params, cov, i, nominal, ekf.rows[i].gnss_pos, sample, age_s, may_reset)
+        ekf.rows[i].gnss_vel = vel_aid
+        ekf.rows[i].climb_innov_lpf = climb_innov_lpf(ekf.rows[i])
+        ekf.rows[i].doubted_time_us = doubt_accel(ekf.rows[i], ekf.params[i].accel_bias_limit)
+        ekf.rows[i].gnss_pos = pos_aid
+    is_reference = ekf.rows[i].baro.is_active == 0 and ekf.rows[i].external_height.is_active == 0
+    nominal, height_aid = fuse_gnss_height(
+        params, cov, i, nominal, ekf.rows[i].gnss_height, sample, age_s, is_reference
+    )
+    ekf.rows[i].gnss_height = height_aid
+    ekf.rows[i].nominal = nominal

@@ -7,10 +7,11 @@ were rejected for long, the field of the body is learned anew from the attitude.
 
 import warp as wp
 
+from autopilot.estimator.delay import MAX_AGE_S
 from autopilot.estimator.fuse import fuse, judge, mark_fused, mark_reset, noise_variance, seconds_since, set_variance
 from autopilot.estimator.generated import mag_products
-from autopilot.estimator.params import EstimatorParams
-from autopilot.estimator.state import ATT, BODY, EARTH, Aid, Nominal
+from autopilot.estimator.params import MAG_TYPE_NONE, EstimatorParams
+from autopilot.estimator.state import ATT, BODY, EARTH, MAG_RING, Aid, Ekf, Nominal
 from autopilot.ports import MagSample
 from common.kernels import vec24
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
@@ -117,3 +118,22 @@ def fuse_mag(
             set_variance(cov, i, BODY + axis, params.body_field_init * params.body_field_init + var)
         aid = mark_reset(aid)
     return nominal, aid
+
+
+@wp.func
+def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_frd: wp.vec3) -> None:
+    """Fuses the oldest waiting field if the horizon has passed it; the first one ever sets heading."""
+    sample = ekf.mag_ring[i, ekf.rows[i].mag_inbox.tail % MAG_RING]
+    if sample.time_us > now_us:
+        return
+    ekf.rows[i].mag_inbox.tail += 1
+    age_s = seconds_since(now_us, sample.time_us)
+    if params.mag_type == MAG_TYPE_NONE or age_s > MAX_AGE_S:
+        return
+    if ekf.rows[i].is_yaw_aligned == 0:
+        ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, ekf.rows[i].nominal, sample.field_frd_gauss)
+        ekf.rows[i].is_yaw_aligned = 1
+    omega_frd = gyro_frd - ekf.rows[i].nominal.gyro_bias_frd
+    nominal, aid = fuse_mag(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].mag, sample, omega_frd, age_s)
+    ekf.rows[i].nominal = nominal
+    ekf.rows[i].mag = aid

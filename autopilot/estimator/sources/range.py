@@ -6,10 +6,11 @@ and sets it again when several samples in a row do not fit: the edge of a crown,
 
 import warp as wp
 
+from autopilot.estimator.delay import MAX_AGE_S
 from autopilot.estimator.fuse import fuse_gain, judge, mark_fused, mark_reset, seconds_since, set_sum_variance
 from autopilot.estimator.generated import range_products
 from autopilot.estimator.params import EstimatorParams
-from autopilot.estimator.state import POS, TERRAIN, Aid, Nominal
+from autopilot.estimator.state import POS, RANGE_RING, TERRAIN, Aid, Ekf, Nominal
 from autopilot.ports import RangeSample
 from common.kernels import vec24
 
@@ -63,3 +64,16 @@ def fuse_range(
             nominal = fuse_gain(params, cov, i, nominal, ph, ph_slow, gain, innov, innov_var)
             aid = mark_fused(aid)
     return nominal, aid
+
+
+@wp.func
+def take_range(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
+    """Fuses the oldest waiting distance if the horizon has passed it."""
+    sample = ekf.range_ring[i, ekf.rows[i].range_inbox.tail % RANGE_RING]
+    if sample.time_us > now_us:
+        return
+    ekf.rows[i].range_inbox.tail += 1
+    if params.range_ctrl == 1 and seconds_since(now_us, sample.time_us) < MAX_AGE_S:
+        nominal, aid = fuse_range(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].range, sample)
+        ekf.rows[i].nominal = nominal
+        ekf.rows[i].range = aid

@@ -7,7 +7,7 @@ import warp as wp
 
 from autopilot.estimator.fuse import fuse_state, judge, mark_fused, seconds_since
 from autopilot.estimator.params import EstimatorParams
-from autopilot.estimator.state import VEL, Aid, Nominal, Stillness
+from autopilot.estimator.state import VEL, Aid, Ekf, Nominal, Stillness
 from autopilot.ports import ImuSample
 from common.kernels import GRAVITY_M_S2, vec24
 
@@ -79,3 +79,12 @@ def fuse_rest(
             nominal = fuse_state(params, cov, i, nominal, VEL + axis, -nominal.vel_ned[axis], var)
         aid = mark_fused(aid)
     return nominal, aid
+
+
+@wp.func
+def take_rest(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
+    """Fuses zero velocity if the vehicle stands still."""
+    if rest_is_due(ekf.rows[i].rest, ekf.rows[i].nominal, now_us):
+        nominal, aid = fuse_rest(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].rest, now_us)
+        ekf.rows[i].nominal = nominal
+        ekf.rows[i].rest = aid
