@@ -378,7 +378,7 @@ class Commander:
             self.change_mode(Mode.HOLD)  # the pilot has gone: whoever comes next may need none
         reasons = self.check_arming()
         state.is_ready_to_arm = not reasons
-        if reasons and state.time_us >= self._next_text_us:
+        if reasons and state.time_us >= self._next_text_us and not state.is_calibrating:
             self._next_text_us = state.time_us + _TEXT_PERIOD_US
             self.announcer.statustext(Severity.CRITICAL, f"PreArm: {reasons[0]}")
 

@@ -33,10 +33,23 @@ def _entry(view: ParameterView, name: str) -> dict[str, Any]:
     if _AT_POWER_ON in meaning:
         entry["rebootRequired"] = True
     if view.is_integer(name) and low < high:
-        values = choices(meaning, low, high)
-        if values:
+        flags, values = bits(meaning, high), choices(meaning, low, high)
+        if flags:
+            entry["bitmask"] = [{"index": index, "description": text} for index, text in flags.items()]
+        elif values:
             entry["values"] = [{"value": value, "description": text} for value, text in values.items()]
     return entry
+
+
+def bits(meaning: str, high: float) -> dict[int, str]:
+    """What the bits of a mask stand for, by their index; empty if the parameter is none or does not tell."""
+    start = meaning.find("bit 0 ")
+    if start >= 0:
+        named = choices(": " + meaning[start:].replace("bit ", ""), 0.0, high)
+        return named if max(named, default=0) < int(high).bit_length() else {}
+    masks = choices(meaning, 1.0, high)
+    is_mask = len(masks) > 2 and all(value & value - 1 == 0 for value in masks) and high == 2 * max(masks) - 1
+    return {value.bit_length() - 1: text for value, text in masks.items()} if is_mask else {}
 
 
 def choices(meaning: str, low: float, high: float) -> dict[int, str]:

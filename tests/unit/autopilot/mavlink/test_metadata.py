@@ -9,7 +9,7 @@ import pytest
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.metadata import GENERAL, METADATA_FOLDER, checksum
-from autopilot.mavlink.parameter_metadata import choices
+from autopilot.mavlink.parameter_metadata import bits, choices
 from tests.unit.autopilot.mavlink.rig import Rig
 
 ACCEPTED, ACK, NAK = 0, 128, 129
@@ -100,3 +100,17 @@ def test_files_are_listed_and_read_only():
 )
 def test_choices_are_found_in_the_meaning(meaning, bounds, expected):
     assert choices(meaning, *bounds) == expected
+
+
+@pytest.mark.parametrize(
+    ("meaning", "high", "expected"),
+    [
+        ("exceptions: bit 0 mission, bit 1 other auto modes", 3, {0: "Mission", 1: "Other auto modes"}),
+        ("exceptions: bit 0 mission, 1 hold, 2 offboard", 7, {0: "Mission", 1: "Hold", 2: "Offboard"}),
+        ("which limits: 1 ceiling, 2 radius, 4 shapes", 7, {0: "Ceiling", 1: "Radius", 2: "Shapes"}),
+        ("action: 0 warn, 1 hold, 2 return", 2, {}),
+        ("action: 1 warn, 2 return", 7, {}),
+    ],
+)
+def test_bits_are_found_in_the_meaning(meaning, high, expected):
+    assert bits(meaning, high) == expected
