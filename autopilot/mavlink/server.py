@@ -16,6 +16,7 @@ from autopilot.mavlink.camera.component import AttachedCamera, CameraComponent
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, OnFrame, Sender
 from autopilot.mavlink.codec import Frame, known_type
 from autopilot.mavlink.commands import CommandService
+from autopilot.mavlink.compass import CompassService
 from autopilot.mavlink.component import Component
 from autopilot.mavlink.devices import DeviceService
 from autopilot.mavlink.dialects import Dialect
@@ -128,6 +129,7 @@ class MavlinkServer:
         parameters, goto = ParameterService(endpoint), GotoService(endpoint)
         metadata = MetadataService(endpoint)
         self._events = EventService(endpoint)
+        self._compass = CompassService(endpoint)
         return [
             self._commands,
             self._requests,
@@ -142,6 +144,7 @@ class MavlinkServer:
             FenceService(endpoint),
             SafetyService(endpoint),
             CalibrationService(endpoint),
+            self._compass,
             metadata,
             FtpService(endpoint, parameters, metadata),
             TargetService(endpoint),
@@ -324,6 +327,7 @@ class MavlinkServer:
     def statustext(self, severity: Severity, text: str) -> None:
         self._endpoint.text(severity, in_clients_numbers(text, self._endpoint.dialect.first_seq))
         self._events.text_told(severity, text)
+        self._compass.text_told(text)
 
     def mission_item_reached(self, seq: int) -> None:
         payload = _MISSION_ITEM_REACHED.pack(seq + self._endpoint.dialect.first_seq)
