@@ -29,14 +29,7 @@ class Flown:
 
     def run(self, script, seconds=600.0):
         """Flies `script(drone)` to its end and returns what it returned."""
-        running = self.flight.drone.start(script(self.flight.drone))
-        end_us = int(seconds * 1e6)
-        self.flight.run(lambda flight: running.is_done or flight.time_us > end_us, on_frame=self._note)
-        assert running.is_done, "not finished in time"
-        if running.error is not None:
-            raise running.error
-        self.flight.close()
-        return running.result
+        return fly_to_end(self.flight, script(self.flight.drone), self._note, seconds)
 
     def _note(self, flight):
         body = self.body
@@ -78,6 +71,18 @@ class Flown:
     def said(self, part):
         """Whether a text with these words was sent."""
         return any(part in text for text in self.flight.drone.texts)
+
+
+def fly_to_end(flight, script, on_frame, seconds):
+    """Flies until a script of the flight's own client is done; returns what it returned."""
+    running = flight.drone.start(script)
+    end_us = int(seconds * 1e6)
+    flight.run(lambda flight: running.is_done or flight.time_us > end_us, on_frame=on_frame)
+    assert running.is_done, "not finished in time"
+    if running.error is not None:
+        raise running.error
+    flight.close()
+    return running.result
 
 
 async def airborne(drone, height_m=10.0):

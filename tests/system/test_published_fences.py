@@ -12,44 +12,25 @@ from autopilot.lists import ListKind
 from autopilot.vehicle import Mode
 from common.geodesy import geodetic_from_ned
 from mission.client import CommandRefused, MissionRefused
-from mission.flight import Flight, FlightConfig
+from mission.flight import FlightConfig
 from mission.plan import PlanItem, parse_plan
 from mission.plan_lists import EXCLUSION_VERTEX, FENCE_LIST, INCLUSION_VERTEX, RALLY_LIST
 from mission.script import fly_plan
-from sim.world.world import WorldConfig
+from tests.system.published import Flown, airborne
 
-OPEN_GROUND = WorldConfig(trees_per_ha=0.0, hill_height_m=0.0)
 BLOCK = ((25.0, -30.0), (25.0, 30.0), (45.0, 30.0), (45.0, -30.0))
 FIELD = ((-40.0, -60.0), (-40.0, 60.0), (100.0, 60.0), (100.0, -60.0))
 
 
-class Flown:
-    """A flight and its track in truth."""
+class Fenced(Flown):
+    """A flight whose script is given the flight too."""
 
     def __init__(self, **parameters):
-        self.flight = Flight(FlightConfig(world=OPEN_GROUND, parameters=parameters))
-        self.track = []
-
-    def frame(self, flight):
-        self.track.append(flight.rig.arrays.body.numpy()[0]["pos_ned"].astype(float))
+        super().__init__(config={"seed": 0}, **parameters)
 
     def run(self, script, seconds=600.0):
-        running = self.flight.drone.start(script(self.flight.drone, self))
-        end_us = int(seconds * 1e6)
-        self.flight.run(lambda flight: running.is_done or flight.time_us > end_us, on_frame=self.frame)
-        assert running.is_done, "not finished in time"
-        if running.error is not None:
-            raise running.error
-        self.flight.close()
-        return np.array(self.track)
-
-    @property
-    def state(self):
-        return self.flight.controller.state
-
-    @property
-    def home_error_m(self):
-        return float(np.hypot(*self.track[-1][:2]))
+        super().run(lambda drone: script(drone, self), seconds)
+        return np.array(self.rows)[:, 1:4]
 
 
 def place(north, east):
@@ -67,12 +48,6 @@ def least_clearance(flown, track):
     return float(fence.region.clearances(track[:, :2]).min())
 
 
-async def airborne(drone, height_m=10.0):
-    await drone.wait_ready()
-    await drone.arm()
-    await drone.takeoff(height_m)
-
-
 async def back_home(drone, flown, begin_s, seconds=30.0):
     """The fence has answered in time, and the vehicle comes home and lands."""
     assert flown.state.mode is Mode.RETURN
@@ -82,7 +57,7 @@ async def back_home(drone, flown, begin_s, seconds=30.0):
 
 def test_direct_return_passes_around_an_exclusion_polygon():
     """PX4, late 2026: a direct return past an exclusion zone goes around it; home within 5 m, no breach."""
-    flown = Flown(RTL_RETURN_ALT=15.0)
+    flown = Fenced(RTL_RETURN_ALT=15.0)
 
     async def script(drone, _):
         await drone.wait_ready()
@@ -94,26 +69,26 @@ def test_direct_return_passes_around_an_exclusion_polygon():
         await drone.wait_disarmed(180.0)
 
     track = flown.run(script)
-    assert flown.home_error_m < 1.5  # 5 m published
+    assert flown.home_distance_m < 1.5  # 5 m published
     assert least_clearance(flown, track) > 0.5
     assert not flown.state.fence.breach_count
 
 
 def test_goto_passes_around_an_exclusion_polygon():
     """ArduPilot rover: avoidance in guided: around the fence without a breach, and home again."""
-    flown = Flown()
+    flown = Fenced()
 
     async def script(drone, flown):
         await drone.wait_ready()
         await drone.upload(polygon(BLOCK, EXCLUSION_VERTEX), FENCE_LIST)
         await airborne(drone)
         await drone.goto_ned(70.0, 0.0, -10.0)
-        assert np.hypot(flown.track[-1][0] - 70.0, flown.track[-1][1]) < 2.0
+        assert np.hypot(flown.pos[0] - 70.0, flown.pos[1]) < 2.0
         await drone.return_home()
         await drone.wait_disarmed(180.0)
 
     track = flown.run(script)
-    assert flown.home_error_m < 1.5  # 3 to 7 m published
+    assert flown.home_distance_m < 1.5  # 3 to 7 m published
     assert least_clearance(flown, track) > 0.5
     assert not flown.state.fence.breach_count
 
@@ -128,7 +103,7 @@ def test_goto_passes_around_an_exclusion_polygon():
 )
 def test_breach_of_a_limit_returns_home(parameters, target):
     """ArduPilot copter: circle, maximum and minimum altitude: RTL within 30 s of the breach, home within 10 m."""
-    flown = Flown(GF_ACTION=3.0, RTL_RETURN_ALT=12.0, **parameters)
+    flown = Fenced(GF_ACTION=3.0, RTL_RETURN_ALT=12.0, **parameters)
 
     async def script(drone, flown):
         await airborne(drone)
@@ -144,12 +119,12 @@ def test_breach_of_a_limit_returns_home(parameters, target):
         assert any("Geofence breached" in text for text in drone.texts)
 
     flown.run(script)
-    assert flown.home_error_m < 1.5  # 10 m published
+    assert flown.home_distance_m < 1.5  # 10 m published
 
 
 def test_vehicle_outside_its_fence_is_told_before_arming():
     """ArduPilot copter: arming outside a fence is refused, with a text that says why."""
-    flown = Flown()
+    flown = Fenced()
 
     async def script(drone, _):
         await drone.wait_ready()
@@ -168,7 +143,7 @@ def test_vehicle_outside_its_fence_is_told_before_arming():
 
 def test_polygon_fence_is_uploaded_kept_and_flown_within():
     """ArduPilot rover: upload, refusal of bad lists, the fence respected by a client that goes on, home 3..7 m."""
-    flown = Flown(GF_ACTION=3.0, GF_PREDICT=1.0, RTL_RETURN_ALT=12.0)
+    flown = Fenced(GF_ACTION=3.0, GF_PREDICT=1.0, RTL_RETURN_ALT=12.0)
 
     async def script(drone, flown):
         await drone.wait_ready()
@@ -186,26 +161,26 @@ def test_polygon_fence_is_uploaded_kept_and_flown_within():
         await drone.wait_disarmed(180.0)
 
     track = flown.run(script)
-    assert flown.home_error_m < 1.5  # 3 to 7 m published
+    assert flown.home_distance_m < 1.5  # 3 to 7 m published
     assert least_clearance(flown, track) > 0.0  # predicted: stopped inside, in truth
     assert track[:, 1].max() > 35.0
 
 
 def test_smart_return_goes_back_through_the_corner():
     """ArduPilot rover: SmartRTL back through the corner (5 m) to 3..7 m of home."""
-    flown = Flown()
+    flown = Fenced()
 
     async def script(drone, flown):
         await airborne(drone)
         await drone.goto_ned(50.0, 0.0, -10.0)
         await drone.goto_ned(50.0, 40.0, -10.0)
-        flown.begin = len(flown.track)
+        flown.begin = len(flown.rows)
         assert flown.flight.controller.set_mode(Mode.SMART_RETURN).reason == ""
         await drone.wait_disarmed(180.0)
 
     track = flown.run(script)[flown.begin :]
     assert np.hypot(track[:, 0] - 50.0, track[:, 1]).min() < 2.5  # 5 m published
-    assert flown.home_error_m < 2.5  # 3 to 7 m published
+    assert flown.home_distance_m < 2.5  # 3 to 7 m published
 
 
 def test_plan_with_fence_and_rally_points_is_flown_inside_and_returns_to_the_point():
@@ -226,7 +201,7 @@ def test_plan_with_fence_and_rally_points_is_flown_inside_and_returns_to_the_poi
                      "polygons": [{"version": 1, "inclusion": True, "polygon": [list(place(*p)) for p in FIELD]}]},
         "rallyPoints": {"version": 2, "points": [[*place(40.0, -20.0), 15.0]]},
     }  # fmt: skip
-    flown = Flown()
+    flown = Fenced()
 
     async def script(drone, _):
         await fly_plan(drone, parse_plan(json.dumps(document), "fenced.plan"))
@@ -239,9 +214,9 @@ def test_plan_with_fence_and_rally_points_is_flown_inside_and_returns_to_the_poi
 
 def test_fence_is_the_same_after_a_reboot_that_keeps_its_items():
     """ArduPilot rover: a fence survives a reboot; keeping the items is the host's part."""
-    flown = Flown()
+    flown = Fenced()
     lists = flown.flight.controller.lists
     assert lists.load(ListKind.FENCE, polygon(FIELD, INCLUSION_VERTEX)) is None
-    again = Flown()
+    again = Fenced()
     assert again.flight.controller.lists.load(ListKind.FENCE, lists.items(ListKind.FENCE)) is None
     assert again.flight.controller.fence.region.polygons == flown.flight.controller.fence.region.polygons

@@ -17,6 +17,7 @@ from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from mission.summary import segment_distance_m
 from sim.world.world import WorldConfig
+from tests.system.published import fly_to_end
 
 WAYPOINT, TURNS, RETURN, LAND, TAKEOFF, SPLINE, JUMP, SPEED = 16, 18, 20, 21, 22, 82, 177, 178
 OPEN_GROUND = WorldConfig(trees_per_ha=0.0)
@@ -69,13 +70,7 @@ class Flown:
 def fly(script, seconds=600.0, wind_m_s=0.0, **parameters):
     """Runs `script(drone, flown)` to its end."""
     flown = Flown(Flight(FlightConfig(world=OPEN_GROUND, wind_m_s=wind_m_s, parameters=parameters)))
-    running = flown.flight.drone.start(script(flown.flight.drone, flown))
-    end_us = int(seconds * 1e6)
-    flown.flight.run(lambda flight: running.is_done or flight.time_us > end_us, on_frame=flown.frame)
-    assert running.is_done, "not finished in time"
-    if running.error is not None:
-        raise running.error
-    flown.flight.close()
+    fly_to_end(flown.flight, script(flown.flight.drone, flown), flown.frame, seconds)
     return flown
 
 
