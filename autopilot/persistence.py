@@ -5,11 +5,12 @@ survive a loss of power too, are written at most once per second of simulated ti
 """
 
 from collections.abc import Callable, Collection, Mapping
-from typing import Any, Protocol
+from typing import Any
 
+from autopilot.commander.home import Home
 from autopilot.host import Storage
 from autopilot.lists import ItemLists, ListKind, MissionItem
-from autopilot.vehicle import Reply, Verdict
+from autopilot.vehicle import Verdict
 from common.geodesy import GeoPoint
 from common.params import Parameter, ParameterError, ParameterTable
 
@@ -17,16 +18,7 @@ PARAMETERS = "parameters"
 GIVEN_HOME = "given_home"  # by a client; where the vehicle boots is not the vehicle's affair
 WRITE_PERIOD_US = 1_000_000
 
-
 _HOME_FIELDS = ("lat_deg", "lon_deg", "alt_m")
-
-
-class HomeHolder(Protocol):
-    """Who knows home (autopilot.commander)."""
-
-    on_home_given: Callable[[GeoPoint], None]
-
-    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply: ...
 
 
 class Persistence:
@@ -69,18 +61,18 @@ class Persistence:
                 self._restore_list(lists, kind, content)
         lists.on_change(self._list_changed)
 
-    def keep_home(self, commander: HomeHolder) -> None:
+    def keep_home(self, home: Home) -> None:
         """Restores the home that a client gave; a later one is kept."""
         stored = self._storage.read(GIVEN_HOME)
         if stored:
             try:
-                reply = commander.set_home(*(float(stored[name]) for name in _HOME_FIELDS))
+                reply = home.set(*(float(stored[name]) for name in _HOME_FIELDS), has_position=False)
             except (KeyError, TypeError, ValueError):
                 self.problems.append("the stored home is no place; it is left out")
             else:
                 if reply.verdict is not Verdict.ACCEPTED:
                     self.problems.append(f"the stored home is left out: {reply.reason}")
-        commander.on_home_given = self._home_given
+        home.on_given = self._home_given
 
     def _home_given(self, home: GeoPoint) -> None:
         self._home = {name: getattr(home, name) for name in _HOME_FIELDS}

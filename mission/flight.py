@@ -179,7 +179,7 @@ class Flight:
             self.host.logs = self._flight_logs = FlightLogs(state.folder / "logs", self.recorder, self.params)
         if self.persistence is not None:
             self.persistence.keep_lists(self.controller.lists)
-            self.persistence.keep_home(self.controller.commander)
+            self.persistence.keep_home(self.controller.commander.home)
             self.persistence.on_trouble = lambda text: self.server.statustext(Severity.WARNING, text)
 
     def frame(self) -> None:

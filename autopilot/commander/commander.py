@@ -4,8 +4,7 @@ In: the vehicle's state and what clients ask for. Out: mode, arming and landed s
 which mode to fly through `Flying`, and asks it what it alone can know.
 """
 
-from collections.abc import Callable
-from math import hypot, isfinite, pi, sqrt
+from math import hypot, pi, sqrt
 
 from autopilot.abilities import Announcer
 from autopilot.commander.arming import arming_reasons
@@ -13,6 +12,7 @@ from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.failsafe import CRASHED
 from autopilot.commander.flying import Flying
 from autopilot.commander.guard import Guard
+from autopilot.commander.home import Home
 from autopilot.commander.landing import LandingDetector
 from autopilot.commander.modes import MODE_RULES, NO_STICKS, mode_refusal
 from autopilot.commander.motors import MotorWatch
@@ -21,7 +21,6 @@ from autopilot.commander.watch import FailureWatch, StationLink
 from autopilot.navigator.ground import Ask
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID
 from autopilot.vehicle import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
-from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
 
 _POSITION_FLAGS = POSITION_VALID | VELOCITY_VALID | HEIGHT_VALID
@@ -34,8 +33,6 @@ _LIFT_TIMEOUT_US = 10_000_000  # a take-off that has not left the ground by then
 _FRAME_LONGEST_S = 0.1  # longer gaps do not count as landed time
 _ON_ITS_SIDE_RAD = 0.25 * pi  # lean from which a vehicle on the ground has not landed but crashed, as for arming
 _FALLEN_US = 10_000_000  # after its motors stopped in the air a vehicle is down, whatever the estimate says; guess
-_HOME_FAR_M = 50_000.0  # from where the vehicle was switched on (ArduPilot)
-_HOME_HIGH_M = 10_000.0
 _OFF_GROUND_M = 0.15  # a lower hover is not told from standing; guess
 _RESET_TOLD_M = 0.5  # smaller jumps of the position are not worth a text; guess
 
@@ -69,6 +66,7 @@ class Commander:
         self.has_position = False
         self.station = StationLink()
         self.guard = Guard(self)
+        self.home = Home(state, announcer)
         self._battery = battery
         self._watch = FailureWatch(state, params, battery, self.station, motors)
         self._landing = landing
@@ -83,8 +81,6 @@ class Commander:
         self._lift_since_us = 0
         self._lift_d = 0.0
         self._has_flown = False  # since arming
-        self._is_home_given = False  # by a client: arming does not move it
-        self.on_home_given: Callable[[GeoPoint], None] = lambda _: None
         self._load()
         params.on_change(self._on_parameter)
 
@@ -104,7 +100,7 @@ class Commander:
         battery.count_on(state.time_us)
         self._watch.judge_battery()
         if state.home is None and self.has_position and state.estimate.pos_h_std <= self._eph:
-            self._set_home_here()
+            self.home.set_here()
         if state.landed_state is LandedState.ON_GROUND:
             if state.is_armed:
                 self._stand()
@@ -144,8 +140,8 @@ class Commander:
                 return Reply(Verdict.TEMPORARILY_REJECTED, reasons[0])
         if self.has_position:
             state.stand_ned = state.estimate.pos_ned
-            if not self._is_home_given:
-                self._set_home_here()
+            if not self.home.is_given:
+                self.home.set_here()
         state.is_armed = True
         state.armed_since_us = self._landed_since_us = state.time_us
         state.takeoff_us = 0
@@ -231,36 +227,7 @@ class Commander:
 
     def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
         """Sets home; all NaN: here."""
-        state = self.state
-        if not (isfinite(lat_deg) and isfinite(lon_deg)):
-            if isfinite(lat_deg) or isfinite(lon_deg):
-                return Reply(Verdict.DENIED, "needs both latitude and longitude")
-            if not self.has_position:
-                return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
-            self._set_home_here()
-        else:
-            if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
-                return Reply(Verdict.DENIED, "there is no such latitude and longitude")
-            alt_m = alt_amsl_m if isfinite(alt_amsl_m) else (state.home or state.position).alt_m
-            home_ned = ned_from_geodetic(lat_deg, lon_deg, alt_m, state.origin)
-            if hypot(home_ned[0], home_ned[1]) > _HOME_FAR_M or abs(alt_m - state.origin.alt_m) > _HOME_HIGH_M:
-                return Reply(Verdict.DENIED, "home would be too far away to return to")
-            state.home, state.home_ned = GeoPoint(lat_deg, lon_deg, alt_m), home_ned
-            state.home_yaw_rad = state.yaw_rad  # of the vehicle: a place has none
-            self.announcer.home_changed()
-        self._is_home_given = True
-        if state.home is not None:
-            self.on_home_given(state.home)
-        return ACCEPTED
-
-    def _set_home_here(self) -> None:
-        state = self.state
-        state.home_ned = state.estimate.pos_ned
-        if state.landed_state is LandedState.ON_GROUND:
-            state.stand_ned = state.home_ned
-        state.home = GeoPoint(*geodetic_from_ned(*state.home_ned, state.origin))
-        state.home_yaw_rad = state.yaw_rad
-        self.announcer.home_changed()
+        return self.home.set(lat_deg, lon_deg, alt_amsl_m, has_position=self.has_position)
 
     # ---- on the ground and in the air ----
 

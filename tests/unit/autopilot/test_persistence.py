@@ -4,12 +4,16 @@ from math import isnan, nan
 
 import pytest
 
+from autopilot.commander.home import Home
 from autopilot.lists import ListKind, MissionItem
 from autopilot.params import parameter_table
 from autopilot.persistence import WRITE_PERIOD_US, Persistence
-from autopilot.vehicle import ACCEPTED, Reply, Verdict
+from autopilot.vehicle import VehicleState
 from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
+from tests.unit.autopilot.kinematic import Recorder
+
+PLACE = GeoPoint(47.0, 8.0, 488.0)
 
 
 class Lists:
@@ -159,31 +163,21 @@ def test_full_disk_is_said_and_does_not_stop_the_flight(state):
     assert state.read("parameters") == {"MIS_TAKEOFF_ALT": 12.5}
 
 
-class Commander:
-    """Takes any home, or refuses."""
-
-    def __init__(self):
-        self.home = None
-        self.refusal = None
-        self.on_home_given = lambda _: None
-
-    def set_home(self, *home):
-        if self.refusal is None:
-            self.home = GeoPoint(*home)
-            self.on_home_given(self.home)
-        return self.refusal or ACCEPTED
+def home_of(state):
+    return Home(state, Recorder())
 
 
 def test_home_that_a_client_gave_is_kept(tmp_path):
-    with_home = Commander()
+    given = VehicleState(origin=PLACE)
+    with_home = home_of(given)
     first = StateFolder(tmp_path)
     Persistence(first, parameter_table()).keep_home(with_home)
-    assert with_home.home is None
-    with_home.set_home(47.0, 8.0, 500.0)
+    assert given.home is None
+    with_home.set(47.0, 8.0, 500.0, has_position=False)
     first.close()  # as a killed process leaves it: noted, and never written whole
-    again = Commander()
+    again = VehicleState(origin=PLACE)
     second = StateFolder(tmp_path)
-    Persistence(second, parameter_table()).keep_home(again)
+    Persistence(second, parameter_table()).keep_home(home_of(again))
     assert again.home == GeoPoint(47.0, 8.0, 500.0)
     second.close()
 
@@ -192,12 +186,10 @@ def test_home_that_does_not_fit_is_told_and_left_out(tmp_path):
     state = StateFolder(tmp_path)
     state.write("given_home", {"lat_deg": 47.0, "lon_deg": "east", "alt_m": 1.0})
     persistence = Persistence(state, parameter_table())
-    persistence.keep_home(Commander())
+    persistence.keep_home(home_of(VehicleState(origin=PLACE)))
     assert "no place" in persistence.problems[0]
     state.write("given_home", {"lat_deg": 47.0, "lon_deg": 8.0, "alt_m": 1.0})
     persistence = Persistence(state, parameter_table())
-    commander = Commander()
-    commander.refusal = Reply(Verdict.DENIED, "home would be too far away")
-    persistence.keep_home(commander)
+    persistence.keep_home(home_of(VehicleState(origin=GeoPoint(0.0, 0.0, 0.0))))
     assert "too far" in persistence.problems[0]
     state.close()
