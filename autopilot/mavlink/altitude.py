@@ -1,4 +1,4 @@
-"""The altitude of a command above sea level, from the frame it comes in."""
+"""Altitudes above sea level, from the frame they come in."""
 
 from math import isnan, nan
 
@@ -10,14 +10,21 @@ from autopilot.vehicle import Reply, VehicleState, Verdict
 
 def command_alt_amsl_m(state: VehicleState, command: Command) -> tuple[float, Reply | None]:
     """The altitude in parameter 7 above sea level [m] (NaN if free), or why there is none."""
-    if command.frame in GLOBAL_FRAMES or (isnan(command.z) and command.frame in LATLON_FRAMES):
+    if isnan(command.z) and command.frame in LATLON_FRAMES:
         return command.z, None
-    if command.frame in RELATIVE_FRAMES:
+    return alt_amsl_m(state, command.frame, command.z)
+
+
+def alt_amsl_m(state: VehicleState, frame: int, alt_m: float) -> tuple[float, Reply | None]:
+    """An altitude in a MAV_FRAME above sea level [m], or why there is none."""
+    if frame in GLOBAL_FRAMES:
+        return alt_m, None
+    if frame in RELATIVE_FRAMES:
         if state.home is None:
             return nan, Reply(Verdict.TEMPORARILY_REJECTED, "an altitude above home needs a home position")
-        return state.home.alt_m + command.z, None
-    if command.frame in TERRAIN_FRAMES:
+        return state.home.alt_m + alt_m, None
+    if frame in TERRAIN_FRAMES:
         if not state.estimate.flags & TERRAIN_VALID:
             return nan, Reply(Verdict.TEMPORARILY_REJECTED, "the height above ground is not known")
-        return state.origin.alt_m - state.estimate.terrain_d + command.z, None
-    return nan, denied(f"frame {command.frame} is not supported")
+        return state.origin.alt_m - state.estimate.terrain_d + alt_m, None
+    return nan, denied(f"frame {frame} is not supported")

@@ -8,11 +8,9 @@ from collections.abc import Mapping
 from math import cos, isfinite, isinf, isnan, nan, sin
 from typing import Any
 
+from autopilot.mavlink.altitude import alt_amsl_m
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.convert import (
-    GLOBAL_FRAMES,
-    RELATIVE_FRAMES,
-    TERRAIN_FRAMES,
     degrees_from_e7,
     is_position,
     quat_from_wxyz,
@@ -23,7 +21,6 @@ from autopilot.ports import (
     SETPOINT_ATTITUDE,
     SETPOINT_RATE,
     SETPOINT_TRAJECTORY,
-    TERRAIN_VALID,
     YAW_ALIGNED,
 )
 from autopilot.requests import OffboardSetpoint
@@ -129,31 +126,17 @@ class OffboardService(Service):
         if not is_position(lat_deg, lon_deg):
             raise RefusedSetpointError("there is no such latitude and longitude")
         origin = self._endpoint.vehicle.state.origin
-        alt_amsl_m = self._alt_amsl_m(alt_m, fields.coordinate_frame)
-        north, east, down = nan, nan, origin.alt_m - alt_amsl_m
+        amsl_m, refusal = alt_amsl_m(self._endpoint.vehicle.state, fields.coordinate_frame, alt_m)
+        if refusal is not None:
+            raise RefusedSetpointError(refusal.reason)
+        north, east, down = nan, nan, origin.alt_m - amsl_m
         if not isnan(lat_deg):
-            level_m = origin.alt_m if isnan(alt_amsl_m) else alt_amsl_m
+            level_m = origin.alt_m if isnan(amsl_m) else amsl_m
             north, east, level_down = ned_from_geodetic(lat_deg, lon_deg, level_m, origin)
-            down = nan if isnan(alt_amsl_m) else level_down
+            down = nan if isnan(amsl_m) else level_down
         vel = masked((fields.vx, fields.vy, fields.vz), mask, VELOCITY_BIT)
         accel = masked((fields.afx, fields.afy, fields.afz), mask, ACCELERATION_BIT)
         return self._trajectory_setpoint(fields, (north, east, down), vel, accel)
-
-    def _alt_amsl_m(self, alt_m: float, frame: int) -> float:
-        """Altitude above sea level of an altitude in a MAV_FRAME."""
-        state = self._endpoint.vehicle.state
-        if frame in GLOBAL_FRAMES:
-            return alt_m
-        if frame in RELATIVE_FRAMES:
-            if state.home is None:
-                raise RefusedSetpointError("an altitude above home needs a home position")
-            return state.home.alt_m + alt_m
-        if frame in TERRAIN_FRAMES:
-            if not state.estimate.flags & TERRAIN_VALID:
-                raise RefusedSetpointError("the height above ground is not known")
-            terrain_d: float = state.estimate.terrain_d
-            return state.origin.alt_m - terrain_d + alt_m
-        raise RefusedSetpointError(f"frame {frame} is not supported")
 
     def _trajectory_setpoint(self, fields: Any, pos: Triple, vel: Triple, accel: Triple) -> OffboardSetpoint:
         if fields.type_mask & FORCE_BIT and any(isfinite(element) for element in accel):
