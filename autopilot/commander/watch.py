@@ -45,6 +45,11 @@ _FIX_STEADY_US = 3_000_000  # after dead reckoning, GNSS counts as used again af
 _RESETS_MAX = 3
 _RESETS_WITHIN_US = 30_000_000
 _RESET_M = 3.0  # smaller jumps do no harm
+_BATTERY_BITS = {
+    BatteryLevel.LOW: BATTERY_LOW,
+    BatteryLevel.CRITICAL: BATTERY_LOW | BATTERY_CRITICAL,
+    BatteryLevel.EMERGENCY: BATTERY_LOW | BATTERY_CRITICAL | BATTERY_EMERGENCY,
+}
 _HEIGHT_MODES = frozenset({Mode.ALTITUDE})
 # COM_DLL_EXCEPT: the bit that lets a mode go on without a ground station (PX4)
 EXCEPTION_BITS = {
@@ -80,10 +85,10 @@ class FailureWatch:
     """
 
     __slots__ = (
-        "_attitude", "_battery", "_battery_critical", "_battery_emergency", "_battery_low", "_except_bits",
-        "_is_position_lost", "_motors", "_next_slow_us", "_offboard_loss_us", "_params", "_reckoning_us", "_resets_us",
-        "_slow", "_state", "_station", "_station_loss_us", "_time_max_us", "_wind_max", "_wind_speed", "_wind_warn",
-        "airborne_us",
+        "_attitude", "_battery", "_battery_bits", "_battery_critical", "_battery_emergency", "_battery_low",
+        "_except_bits", "_is_position_lost", "_motors", "_next_slow_us", "_offboard_loss_us", "_params",
+        "_reckoning_us", "_resets_us", "_slow", "_state", "_station", "_station_loss_us", "_time_max_us",
+        "_wind_max", "_wind_speed", "_wind_warn", "airborne_us",
     )  # fmt: skip
 
     def __init__(
@@ -113,6 +118,7 @@ class FailureWatch:
         self._reckoning_us = -_FIX_STEADY_US  # when GNSS was last missed
         self._resets_us: list[int] = []  # when the estimate was last set anew
         self._is_position_lost = False
+        self._battery_bits = 0  # the worst charge since arming
         self._slow = 0  # bits of the slow checks
         self._wind_speed = 0.0
         self.airborne_us = -1  # when it left the ground; -1: it has not yet
@@ -143,11 +149,8 @@ class FailureWatch:
         if mode in _HEIGHT_MODES and not state.estimate.flags & HEIGHT_VALID:
             failures |= HEIGHT_LOST
         if state.battery_level > BatteryLevel.OK:
-            failures |= BATTERY_LOW
-            if state.battery_level > BatteryLevel.LOW:
-                failures |= BATTERY_CRITICAL
-            if state.battery_level > BatteryLevel.CRITICAL:
-                failures |= BATTERY_EMERGENCY
+            self._battery_bits |= _BATTERY_BITS[state.battery_level]
+        failures |= self._battery_bits  # in flight a charge does not come back (PX4)
         if state.time_us >= self._next_slow_us:
             self._next_slow_us = state.time_us + _SLOW_PERIOD_US
             self._slow = self._slow_failures(is_flying)

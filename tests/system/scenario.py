@@ -46,7 +46,7 @@ class Violation(AssertionError):
 
 
 class Wrecked(Exception):
-    """The pilot has flown the vehicle into the ground."""
+    """The pilot has flown the vehicle into the ground, or the wind has, without any position."""
 
 
 class Scenario:
@@ -137,7 +137,8 @@ class Scenario:
         settled = now_us - self.mode_since_us > 3_000_000
         if state.mode in BY_THRUST:
             return
-        if tilt_deg > TILT_MAX_DEG and self.mode in STEERED and self.height_m < AIRBORNE_M:
+        is_blind = self.fails and not self.fc.commander.has_position  # the wind drags it over the ground
+        if tilt_deg > TILT_MAX_DEG and (self.mode in STEERED or is_blind) and self.height_m < AIRBORNE_M:
             raise Wrecked
         if tilt_deg > TILT_MAX_DEG and settled:
             self.fail(f"leans by {tilt_deg:.0f} deg")

@@ -384,3 +384,16 @@ def test_lost_station_sends_the_vehicle_back_along_its_track_or_directly_where_n
         rig.fc.station.heard(rig.time_us)
         rig.run(10.5)
         assert rig.state.mode is mode
+
+
+def test_a_charge_estimate_that_wavers_does_not_take_control_from_the_pilot_again():
+    rig = flying_away()
+    drain_to(rig, 0.0695)
+    rig.run(0.1)
+    assert rig.state.mode is Mode.RETURN
+    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    for share in (0.0705, 0.0695, 0.0705, 0.0695):
+        drain_to(rig, share)
+        rig.run(0.1)
+    assert rig.state.mode is Mode.HOLD
+    assert sum("Battery critical" in text for _, text in rig.recorder.texts) == 1
