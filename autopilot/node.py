@@ -129,7 +129,8 @@ class FlightController:
         )
         self.payload = Payloads()
         self.camera = self._mount_camera()
-        self.payload.add(AuxOutputs(self.state))
+        self._outputs = AuxOutputs(self.state)
+        self.payload.add(self._outputs)
         self.traffic = Traffic(self.state, params)
         self.obstacles = Obstacles(params)
         self.state.obstacles = self.obstacles
@@ -204,6 +205,8 @@ class FlightController:
         self._setpoint.write()
         if self.camera is not None and time_us >= self.camera.due_us:
             self.camera.frame()
+        if time_us >= self._outputs.due_us:
+            self._outputs.frame()
         for server in self._servers:
             server.frame(time_us)
         if self.external.waiting:

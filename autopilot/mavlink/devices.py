@@ -35,6 +35,8 @@ class DeviceService(Service):
         return {
             mavlink.MAV_CMD_DO_SET_RELAY: self._relay,
             mavlink.MAV_CMD_DO_SET_SERVO: self._servo,
+            mavlink.MAV_CMD_DO_REPEAT_RELAY: self._repeat_relay,
+            mavlink.MAV_CMD_DO_REPEAT_SERVO: self._repeat_servo,
             mavlink.MAV_CMD_DO_SET_ACTUATOR: self._actuator,
             mavlink.MAV_CMD_DO_GRIPPER: self._gripper,
         }
@@ -52,6 +54,22 @@ class DeviceService(Service):
 
         Params: p1 output, 9 to 16; p2 pulse [us], 500 to 2500.
         Refused: DENIED for an output that is a rotor's or not there, and for a pulse out of range.
+        """
+        return self._run(command)
+
+    def _repeat_relay(self, command: Command) -> Reply:
+        """Switches a relay to and fro.
+
+        Params: p1 relay, from 0; p2 how often; p3 period [s].
+        Refused: DENIED for a relay there is not, and for a number or period out of range.
+        """
+        return self._run(command)
+
+    def _repeat_servo(self, command: Command) -> Reply:
+        """Moves an auxiliary output to a pulse and back to the middle, several times.
+
+        Params: p1 output, 9 to 16; p2 pulse [us], 500 to 2500; p3 how often; p4 period [s].
+        Refused: DENIED for an output that is a rotor's or not there, and for a pulse, number or period out of range.
         """
         return self._run(command)
 
