@@ -8,7 +8,7 @@ from math import isfinite, nan, radians
 from autopilot.commander.commander import Commander
 from autopilot.navigator.navigator import Navigator
 from autopilot.payload import Params, Payloads
-from autopilot.vehicle import ACCEPTED, LandedState, Mode, Reply, Severity, Verdict
+from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
 _NOT_FLYING = Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
 _AT_PLACE: Params = (3.0, 0.0, 0.0, 0.0)  # MAV_ROI_LOCATION in parameter 1, for the command's older form
@@ -44,7 +44,7 @@ class Guidance:
 
     def turn(self, angle_deg: float, rate_deg_s: float, direction: float, *, is_relative: bool) -> Reply:
         """Turns on the spot or on the way (autopilot.navigator.heading)."""
-        if not self._is_flying:
+        if not self._state.is_flying:
             return _NOT_FLYING
         return self._navigator.context.heading.turn(angle_deg, rate_deg_s, direction, is_relative=is_relative)
 
@@ -82,7 +82,7 @@ class Guidance:
         return self._fly_from(self._navigator.mission.return_path(), "no DO_RETURN_PATH_START")
 
     def _fly_from(self, seq: int | None, lacks: str) -> Reply:
-        if not self._is_flying:
+        if not self._state.is_flying:
             return _NOT_FLYING
         if seq is None:
             return Reply(Verdict.FAILED, f"the mission has {lacks}")
@@ -99,7 +99,7 @@ class Guidance:
             height_m: above home, at least MIS_TAKEOFF_ALT; NaN or 0: that.
         """
         context = self._navigator.context
-        if not self._is_flying or not context.is_landing:
+        if not self._state.is_flying or not context.is_landing:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not landing")
         reason = self._commander.refusal(Mode.HOLD)
         if reason:
@@ -111,7 +111,3 @@ class Guidance:
         context.next_hold = ((north, east, down), self._state.yaw_rad, False)
         context.announcer.statustext(Severity.WARNING, "Landing aborted: climbing")
         return self._commander.request_mode(Mode.HOLD)
-
-    @property
-    def _is_flying(self) -> bool:
-        return self._state.is_armed and self._state.landed_state is not LandedState.ON_GROUND

@@ -35,7 +35,7 @@ from autopilot.payload import Payloads
 from autopilot.requests import OffboardSetpoint, OrbitRequest, TargetReport
 from autopilot.sticks import Sticks
 from autopilot.traffic import Traffic
-from autopilot.vehicle import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
+from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, VehicleState, Verdict
 from common.airframe import Airframe
 from common.attitude import roll_pitch_yaw_of
 from common.geodesy import GeoPoint, geodetic_from_ned
@@ -297,7 +297,7 @@ class FlightController:
 
     def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
         state = self.state
-        if not state.is_armed or state.landed_state is LandedState.ON_GROUND:
+        if not state.is_flying:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
         if not self.commander.has_position:
             return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
@@ -330,7 +330,7 @@ class FlightController:
 
     def orbit(self, request: OrbitRequest) -> Reply:
         state = self.state
-        if not state.is_armed or state.landed_state is LandedState.ON_GROUND:
+        if not state.is_flying:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
         reason = self.commander.request_refusal(Mode.ORBIT)
         if reason:

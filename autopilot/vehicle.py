@@ -193,3 +193,8 @@ class VehicleState:
     gimbal: "GimbalControl | None" = None  # None: the vehicle carries none
     sticks: StickInput = field(default_factory=StickInput)
     fence: FenceState = field(default_factory=FenceState)
+
+    @property
+    def is_flying(self) -> bool:
+        """Armed, and off the ground."""
+        return self.is_armed and self.landed_state is not LandedState.ON_GROUND

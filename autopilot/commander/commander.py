@@ -354,10 +354,10 @@ class Commander:
         estimate = self.state.estimate
         self._reset_count = estimate.reset_count
         jump_m = sqrt(sum(axis * axis for axis in estimate.pos_reset_ned))
-        is_flying = self.state.is_armed and self.state.landed_state is not LandedState.ON_GROUND
-        if is_flying:
-            self._watch.note_reset(jump_m)
-        if jump_m > _RESET_TOLD_M and is_flying:
+        if not self.state.is_flying:
+            return
+        self._watch.note_reset(jump_m)
+        if jump_m > _RESET_TOLD_M:
             self.announcer.statustext(Severity.NOTICE, f"Estimator: position reset by {jump_m:.1f} m")
 
     def _watch_failures(self, dt_s: float) -> None:

@@ -121,7 +121,7 @@ class Pilot:
 
     def _may_take_over(self) -> bool:
         state = self._state
-        if not state.is_armed or state.landed_state is LandedState.ON_GROUND:
+        if not state.is_flying:
             return False
         return bool((self._override & 1 and state.mode in _AUTO) or (self._override & 2 and state.mode in _OUTSIDE))
 

@@ -79,6 +79,13 @@ class NavContext:
         """Forgets the speeds asked for by commands and mission items."""
         self.cruise_speed = self.climb_speed = self.descend_speed = nan
 
+    def use_return_speed(self) -> None:
+        """The speeds of a way home: RTL_RETURN_SPD, or the usual ones if that is not set."""
+        self.reset_speeds()
+        speed = self.number("RTL_RETURN_SPD")
+        if speed > 0.0:
+            self.cruise_speed = speed
+
     def set_speed(self, kind: int, speed_m_s: float) -> None:
         """Changes a speed (numbered as SPEED_TYPE: 2 climb, 3 descent, else horizontal); NaN: the parameter's."""
         if kind == CLIMB_SPEED:

@@ -147,7 +147,7 @@ class Guided:
         """Goes to a place; what is NaN stays as it is. The caller sees to it that the mode is or will be this one."""
         context = self._context
         state = context.state
-        if not state.is_armed or state.landed_state is LandedState.ON_GROUND:
+        if not state.is_flying:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
         if not context.has_position:
             return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")

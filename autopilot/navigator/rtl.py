@@ -50,10 +50,7 @@ class Return:
 
     def start(self) -> None:
         context = self._context
-        context.reset_speeds()
-        speed = context.number("RTL_RETURN_SPD")
-        if speed > 0.0:
-            context.cruise_speed = speed
+        context.use_return_speed()
         self._head_for(self._destinations.choose())
 
     def _head_for(self, destination: Destination) -> None:

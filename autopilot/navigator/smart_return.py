@@ -27,10 +27,7 @@ class SmartReturn:
 
     def start(self) -> None:
         context = self._context
-        context.reset_speeds()
-        speed = context.number("RTL_RETURN_SPD")
-        if speed > 0.0:
-            context.cruise_speed = speed
+        context.use_return_speed()
         here = context.stop_point()
         self._crumbs.points.append(here)
         self._crumbs.tidy()
