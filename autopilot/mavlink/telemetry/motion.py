@@ -88,11 +88,11 @@ def height_above_home(state: VehicleState) -> float:
 
 
 def vfr_hud(state: VehicleState) -> bytes:
-    """Speed over ground, heading, altitude, climb rate, throttle."""
+    """Speed through the air (0 if the wind is not known) and over ground, heading, altitude, climb rate, throttle."""
     estimate = state.estimate
     north, east, down = estimate.vel_ned
     ground_speed = hypot(north, east)
-    air_speed = nan
+    air_speed = 0.0  # as autopilots without an airspeed sensor send it: not every display can draw a NaN
     if estimate.flags & WIND_VALID:
         wind_north, wind_east, _ = estimate.wind_ned
         air_speed = hypot(north - wind_north, east - wind_east, down)

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot.mavlink.codec import message_id
 from autopilot.mavlink.links import LinkRole
 from autopilot.mavlink.streams import STREAMS
-from autopilot.ports import POSITION_VALID
+from autopilot.ports import POSITION_VALID, WIND_VALID
 from autopilot.vehicle import LandedState, Mode
 from tests.unit.autopilot.mavlink.rig import HOME, Rig
 
@@ -98,6 +98,12 @@ def test_vfr_hud():
     assert hud.airspeed == pytest.approx((2.0**2 + 6.0**2 + 0.5**2) ** 0.5)  # wind from the east and the south
     assert (hud.heading, hud.throttle) == (int(degrees(1.2)), 42)
     assert (hud.alt, hud.climb) == (518.0, 0.5)
+
+
+def test_airspeed_without_wind_is_0():
+    rig = Rig()
+    without(rig, WIND_VALID)
+    assert request(rig, "VFR_HUD").airspeed == 0.0
 
 
 def test_altitude():
