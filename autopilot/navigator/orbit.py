@@ -19,6 +19,7 @@ from common.geodesy import GeoPoint
 
 _RADIUS_MIN_M, _RADIUS_MAX_M = 1.0, 1000.0
 _LOWEST_M = 1.0  # height above the ground, below which nobody flies sideways; guess
+_CLEAR_M = 0.3  # below that height it climbs before it goes round; guess
 _NEAR_M = 1.0  # distance from the circle at which the orbit begins
 _DEFAULT_SPEED_M_S = 5.0  # unless the circle is too small for it; guess
 
@@ -110,9 +111,11 @@ class Orbit:
         if not self._is_on_circle:
             north, east, down = context.state.estimate.pos_ned
             place = circle.pos_ned
-            self._is_on_circle = hypot(north - place[0], east - place[1]) < _NEAR_M and abs(
-                down - place[2]
-            ) < context.number("NAV_MC_ALT_RAD")
+            self._is_on_circle = (
+                hypot(north - place[0], east - place[1]) < _NEAR_M
+                and abs(down - place[2]) < context.number("NAV_MC_ALT_RAD")
+                and down < self._lowest_d() + _CLEAR_M
+            )
             return
         sticks = context.state.sticks
         away_m_s, down_m_s = 0.0, 0.0

@@ -37,7 +37,7 @@ UNDERGROUND_M = 0.3
 AIRBORNE_M = 1.0  # motors that stop higher than this have stopped in the air
 SPEED_MARGIN_M_S = 4.0  # wind, and the overshoot of a braking vehicle
 TILT_MAX_DEG = 70.0  # the control's limit is 45, gusts and yaw come on top
-FENCE_MARGIN_M = 4.0  # gusts, and where the estimate errs
+FENCE_MARGIN_M = 6.0  # gusts, and where the estimate errs
 HOME_S = 400.0  # for the return at the end
 
 
@@ -206,6 +206,7 @@ class Scenario:
             while self.flight.time_us < end_event_us and not self.state.fence.breached:
                 self.frame()
         if not self.state.fence.breached:
+            self.flight.close()
             return
         self.note("breach")
         speed = hypot(*(float(v) for v in self.body[0]["vel_ned"][:2]))

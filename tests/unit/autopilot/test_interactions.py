@@ -168,8 +168,11 @@ class TestOrbitNearTheGround:
         rig.fc.set_mode(Mode.LAND)
         rig.run_until(lambda: -rig.pos[2] < 0.4)
         assert rig.fc.set_mode(Mode.ORBIT).verdict is Verdict.ACCEPTED
+        start = rig.pos[:2].copy()
+        rig.run_until(lambda: -rig.pos[2] > 0.48, 20.0)
+        assert hypot(*(rig.pos[:2] - start)) < 0.2
         rig.run(20.0)
-        assert -rig.pos[2] > 0.7
+        assert hypot(*(rig.pos[:2] - start)) > 1.0
 
     def test_a_pilot_cannot_push_an_orbit_into_the_ground(self):
         rig = Kinematic().flying(5.0)
