@@ -138,7 +138,7 @@ class Commander:
             reasons = self.check_arming()
             if reasons:
                 return Reply(Verdict.TEMPORARILY_REJECTED, reasons[0])
-        if self.has_position:
+        if self.has_position and state.landed_state is LandedState.ON_GROUND:  # not saved from a fall
             state.stand_ned = state.estimate.pos_ned
             if not self.home.is_given:
                 self.home.set_here()

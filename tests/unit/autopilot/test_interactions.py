@@ -183,6 +183,21 @@ class TestOrbitNearTheGround:
         assert -rig.pos[2] > 0.7
 
 
+class TestArmedInTheAir:
+    def test_motors_started_again_in_a_fall_leave_home_where_it_was_and_catch_the_vehicle(self):
+        rig = Kinematic().flying(40.0)
+        home, home_ned, stand_ned = rig.state.home, rig.state.home_ned, rig.state.stand_ned
+        assert rig.fc.disarm(force=True).verdict is Verdict.ACCEPTED
+        rig.run(0.5)
+        assert rig.fc.arm(force=True).verdict is Verdict.ACCEPTED
+        assert (rig.state.home, rig.state.home_ned, rig.state.stand_ned) == (home, home_ned, stand_ned)
+        rig.run(15.0)
+        assert rig.state.is_armed
+        assert -rig.pos[2] > 20.0
+        assert rig.fc.set_mode(Mode.RETURN).verdict is Verdict.ACCEPTED
+        rig.disarmed(200.0)
+
+
 class TestHome:
     def test_home_is_not_set_where_no_return_could_lead(self):
         rig = Kinematic().flying()
