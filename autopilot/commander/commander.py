@@ -176,6 +176,8 @@ class Commander:
             reasons.append("not on the ground")
         if MODE_RULES[mode].needs_sticks and not self._pilot.is_heard:
             reasons.append(NO_STICKS)
+        if int(self.params["NAV_DLL_ACT"]) and self._watch.misses_station:
+            reasons.append("ground station lost")  # the failsafe would disarm it at once (PX4)
         others = self._flying.refusal(mode), self._pilot.arming_reason(mode), self._flying.arming_reason()
         reasons += filter(None, others)
         return reasons

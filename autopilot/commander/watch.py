@@ -171,15 +171,20 @@ class FailureWatch:
                 level = BatteryLevel.EMERGENCY
         state.battery_level = level
 
+    @property
+    def misses_station(self) -> bool:
+        """Whether there was a ground station, is none now, and the mode is not excepted."""
+        state, heard_us = self._state, self._station.heard_us
+        is_lost = heard_us >= 0 and state.time_us - heard_us > self._station_loss_us
+        return is_lost and not EXCEPTION_BITS.get(state.mode, 0) & self._except_bits
+
     def _slow_failures(self, is_flying: bool) -> int:
         state = self._state
         bits = 0
         if is_flying and state.traffic_conflict_us > state.time_us and self._params["NAV_TRAFF_AVOID"]:
             bits |= TRAFFIC_NEAR
-        heard_us = self._station.heard_us
-        if heard_us >= 0 and state.time_us - heard_us > self._station_loss_us:
-            if not EXCEPTION_BITS.get(state.mode, 0) & self._except_bits:
-                bits |= STATION_LOST
+        if self.misses_station:
+            bits |= STATION_LOST
         if state.estimate.flags & DEAD_RECKONING_FLAG and (is_flying or self._slow & DEAD_RECKONING):
             self._reckoning_us = state.time_us
         if state.time_us - self._reckoning_us < _FIX_STEADY_US:

@@ -183,6 +183,19 @@ class TestOrbitNearTheGround:
         assert -rig.pos[2] > 0.7
 
 
+class TestArmingIntoAFailsafe:
+    def test_a_ground_station_that_is_lost_forbids_arming_where_its_loss_has_an_action(self):
+        rig = Kinematic(NAV_DLL_ACT=2).ready()
+        assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED  # there has never been one
+        assert rig.fc.disarm(force=False).verdict is Verdict.ACCEPTED
+        rig.fc.station.heard(rig.time_us)
+        rig.run(15.0)
+        reply = rig.fc.arm(force=False)
+        assert (reply.verdict, reply.reason) == (Verdict.TEMPORARILY_REJECTED, "ground station lost")
+        rig.fc.station.heard(rig.time_us)
+        assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
+
+
 class TestArmedInTheAir:
     def test_motors_started_again_in_a_fall_leave_home_where_it_was_and_catch_the_vehicle(self):
         rig = Kinematic().flying(40.0)
