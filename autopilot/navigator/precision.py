@@ -9,6 +9,7 @@ from enum import IntEnum
 from math import hypot, nan
 
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.goto import ground_d
 from autopilot.navigator.land import Landing
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.target import TargetFilter
@@ -17,6 +18,7 @@ from autopilot.vehicle import Severity
 FRESH_US = 1_000_000  # older sightings say nothing about now
 _ACCEL_STD_M_S2 = 0.3  # of a platform that stands or moves steadily; guess
 _SIGHT_STD_M = 0.1  # of one sighting; guess
+_LOWEST_M = 1.0  # height above the ground of the approach, at least: nobody flies sideways below that; guess
 _CENTRED_SHARE = 3.0  # times PLD_HACC_RAD: further off the descent stops until it is centred again; guess
 
 
@@ -106,7 +108,7 @@ class PrecisionLand:
     def _approach(self) -> None:
         context = self._context
         self._phase = _Phase.APPROACH
-        self._approach_d = context.stop_point()[2]
+        self._approach_d = min(context.stop_point()[2], ground_d(context) - _LOWEST_M)
         self._yaw = context.state.yaw_rad
 
     def _search(self) -> None:

@@ -145,6 +145,23 @@ class TestHoldAgain:
         assert rig.pos[0] < 90.0
 
 
+class TestPrecisionLandingFromTheGround:
+    def test_it_climbs_before_it_goes_to_a_target_beside(self):
+        rig = Kinematic().flying(10.0)
+        rig.fc.set_mode(Mode.LAND)
+        rig.run_until(lambda: -rig.pos[2] < 0.3)
+        rig.fc.report_landing_target((8.0, 0.0, 0.0))
+        assert rig.fc.set_mode(Mode.PRECISION_LAND).verdict is Verdict.ACCEPTED
+        highest = 0.0
+        for _ in range(round(60.0 / DT_S)):
+            rig.fc.report_landing_target((8.0, 0.0, 0.0))
+            rig.frame()
+            highest = max(highest, -rig.pos[2])
+        assert highest > 0.6
+        assert not rig.state.is_armed
+        assert abs(rig.pos[0] - 8.0) < 0.5
+
+
 class TestPrecisionLandingWithoutPosition:
     def test_it_lands_blind(self):
         rig = Kinematic().flying(10.0)
