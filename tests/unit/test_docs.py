@@ -127,10 +127,10 @@ def test_reference_links_are_defined_and_used():
             assert name in used, f"{page}: [{name}]"
 
 
-def test_parameter_list_is_current(monkeypatch):
+def test_generated_pages_are_current(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "docs")
-    page = runpy.run_path(str(ROOT / "docs" / "generate.py"))
-    assert page["PARAMETERS_PATH"].read_text(encoding="utf-8") == page["parameters_text"](), "python docs/generate.py"
+    for path, text in runpy.run_path(str(ROOT / "docs" / "generate.py"))["generated_pages"]().items():
+        assert path.read_text(encoding="utf-8") == text, "python docs/generate.py"
 
 
 def test_options_of_fly_are_all_described():
