@@ -205,7 +205,9 @@ class Scenario:
             end_event_us = self.flight.time_us + int(float(self.rng.choice([0.1, 3.0, 10.0])) * 1e6)
             while self.flight.time_us < end_event_us and not self.state.fence.breached:
                 self.frame()
-        if not self.state.fence.breached:
+        home_m = float(region.clearance(*self.state.home_ned[:2]))
+        if not self.state.fence.breached or home_m < 0.0:  # a return then leads out again
+            self.note(f"home {home_m:.0f} m inside the fence")
             self.flight.close()
             return
         self.note("breach")
