@@ -38,7 +38,7 @@ from autopilot.traffic import Traffic
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, VehicleState, Verdict
 from common.airframe import Airframe
 from common.attitude import roll_pitch_yaw_of
-from common.geodesy import GeoPoint, geodetic_from_ned
+from common.geodesy import GeoPoint
 from common.kernels import GRAVITY_M_S2
 from common.params import ParameterTable
 
@@ -124,9 +124,7 @@ class FlightController:
         self.params = params
         self.host = host or Host()
         self.sticks = Sticks(params)
-        self.state = VehicleState(
-            origin=origin, position=origin, sticks=self.sticks.input, rotor_count=len(airframe.rotors)
-        )
+        self.state = VehicleState(origin=origin, sticks=self.sticks.input, rotor_count=len(airframe.rotors))
         self.payload = Payloads()
         self.camera = self._mount_camera()
         self._outputs = AuxOutputs(self.state)
@@ -223,8 +221,6 @@ class FlightController:
             self._next_health_us = time_us + _HEALTH_PERIOD_US
             state.health = self._read_health()
         state.roll_rad, state.pitch_rad, state.yaw_rad = roll_pitch_yaw_of(estimate.q_ned_from_frd)
-        north, east, down = estimate.pos_ned
-        state.position = GeoPoint(*geodetic_from_ned(north, east, down, state.origin))
 
     def _follow_wish(self, mode: Mode) -> None:
         """A mode is done: goes over to the next, or lands if that cannot be flown."""

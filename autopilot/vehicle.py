@@ -11,7 +11,7 @@ from math import nan
 from typing import TYPE_CHECKING, Any
 
 from autopilot.sticks import StickInput
-from common.geodesy import GeoPoint
+from common.geodesy import GeoPoint, geodetic_from_ned
 
 if TYPE_CHECKING:  # they work on the state below
     from autopilot.gimbal.control import GimbalControl
@@ -152,7 +152,6 @@ class VehicleState:
     actuators: Any = None  # Actuators
     health: Any = None  # EstimatorState, renewed at 5 Hz
     origin: GeoPoint = field(default_factory=lambda: GeoPoint(0.0, 0.0, 0.0))  # of the ned frame
-    position: GeoPoint = field(default_factory=lambda: GeoPoint(0.0, 0.0, 0.0))  # lat_deg, lon_deg, alt_m AMSL
     roll_rad: float = 0.0
     pitch_rad: float = 0.0
     yaw_rad: float = 0.0
@@ -193,6 +192,18 @@ class VehicleState:
     gimbal: "GimbalControl | None" = None  # None: the vehicle carries none
     sticks: StickInput = field(default_factory=StickInput)
     fence: FenceState = field(default_factory=FenceState)
+    _placed: Any = None  # the estimate that `_place` belongs to
+    _place: GeoPoint | None = None
+
+    @property
+    def position(self) -> GeoPoint:
+        """Where it is: latitude, longitude, altitude above sea level; worked out when it is asked for."""
+        estimate = self.estimate
+        if self._place is None or estimate is not self._placed:
+            north, east, down = (0.0, 0.0, 0.0) if estimate is None else estimate.pos_ned
+            self._placed = estimate
+            self._place = GeoPoint(*geodetic_from_ned(north, east, down, self.origin))
+        return self._place
 
     @property
     def is_flying(self) -> bool:

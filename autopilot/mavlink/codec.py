@@ -21,6 +21,7 @@ MAGIC_V1 = 0xFE
 MAGIC_V2 = 0xFD
 SIGNED_FLAG = 0x01
 SIGNATURE_LENGTH = 13
+_SHORTEST_V2 = 12  # header and checksum
 
 _HEADER_V2 = struct.Struct(
     "<BBBBBBHB"
@@ -201,6 +202,10 @@ class FrameReader:
             data: the bytes that came in.
             is_whole: `data` is a datagram: what is unfinished at its end will never be finished.
         """
+        if not self._rest:
+            only = _only_frame(data)
+            if only is not None:
+                return [only]
         buffer = self._rest + data if self._rest else bytes(data)
         frames: list[Frame] = []
         size = len(buffer)
@@ -235,6 +240,17 @@ class FrameReader:
             at = end
         self._rest = buffer[at:]
         return frames
+
+
+def _only_frame(data: bytes) -> Frame | None:
+    """The frame that `data` is, if it is one whole unsigned MAVLink 2 frame: what nearly every piece is."""
+    if len(data) < _SHORTEST_V2 or data[0] != MAGIC_V2 or len(data) != _SHORTEST_V2 + data[1] or data[2]:
+        return None
+    msg_id = data[7] | data[8] << 8 | data[9] << 16
+    kind = message_type(msg_id) if msg_id in DEFINITIONS else None
+    if kind is None or mcrf4xx(data[1:-2] + kind.crc_extra) != data[-2] | data[-1] << 8:
+        return None
+    return Frame(kind, data[5], data[6], data[4], data[10:-2], data)
 
 
 def _frame_end(buffer: bytes, at: int, size: int) -> int:

@@ -119,7 +119,6 @@ def flying_state() -> VehicleState:
         ),
         health=record(EstimatorState, "EstimatorState", gnss_pos__test_ratio_lpf=0.1, stillness__accel_var=0.3),
         origin=HOME,
-        position=GeoPoint(47.397832, 8.545859, 518.0),
         roll_rad=0.05,
         pitch_rad=-0.02,
         yaw_rad=1.2,
