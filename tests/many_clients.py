@@ -15,6 +15,7 @@ from time import perf_counter
 
 import numpy as np
 
+from autopilot.mavlink.channel import AUTOPILOT_COMPONENT
 from autopilot.mavlink.codec import FrameReader, encode, known_type
 from tests.system.vehicle import IdleVehicle
 
@@ -106,7 +107,7 @@ class Clients:
             if frame.kind.msg_id == _ACK and self._asked_s[i] is not None:
                 noticed.latencies_s.append(now_s - self._asked_s[i])
                 self._asked_s[i] = None
-            elif frame.kind.msg_id == _HEARTBEAT:
+            elif frame.kind.msg_id == _HEARTBEAT and frame.compid == AUTOPILOT_COMPONENT:
                 if self._heartbeat_s[i] is not None:
                     noticed.heartbeat_gaps_s.append(now_s - self._heartbeat_s[i])
                 self._heartbeat_s[i] = now_s

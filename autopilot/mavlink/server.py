@@ -356,6 +356,8 @@ class MavlinkServer:
         for component in self._components:
             component.send_heartbeat()
         self._is_heartbeat_due = True
+        for channel in self._endpoint.channels:
+            channel.schedule.postpone(_HEARTBEAT.msg_id, time_us + HEARTBEAT_US)
 
     def _tell_landed_state(self) -> None:
         """At once, and a heartbeat with it: stations take either of them for flying or not."""

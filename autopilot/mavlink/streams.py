@@ -191,6 +191,12 @@ class StreamSchedule:
             for name in names:
                 self._change(known_type(name).msg_id, _interval_us(rate_hz))
 
+    def postpone(self, msg_id: int, due_us: int) -> None:
+        """Sends a streamed message next at a time, because it has just been sent otherwise."""
+        if self._is_planned:
+            self._queue = [(due_us if each == msg_id else when_us, each) for when_us, each in self._queue]
+            heapify(self._queue)
+
     def _change(self, msg_id: int, interval_us: int) -> None:
         """The other streams keep their times: clients repeat their requests often."""
         if interval_us == self.interval_us[msg_id]:
