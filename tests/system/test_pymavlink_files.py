@@ -1,50 +1,28 @@
 """pymavlink's own file transfer client, which MAVProxy's is made from, over UDP."""
 
-import threading
-from time import sleep
+import subprocess
+import sys
 
 import pytest
 from pymavlink import mavutil
 from pymavlink.mavftp import MAVFTP
 
-from autopilot.mavlink.links import UdpLink
-from autopilot.mavlink.server import MavlinkServer
-from common.folder import ConfinedFolder
-from tests.system.vehicle import free_ports
-from tests.unit.autopilot.mavlink.rig import RecordingVehicle
+from autopilot.params import parameter_table
+from tests.system.vehicle import ROOT, free_ports
 
-FRAME_US = 20_000
-FRAME_WALL_S = 0.004
 CONTENT = bytes(i * 7 % 251 for i in range(60_001))
 
 
 @pytest.fixture
-def vehicle(tmp_path):
-    vehicle = RecordingVehicle()
-    vehicle.host.files = ConfinedFolder(tmp_path / "files")
-    return vehicle
-
-
-@pytest.fixture
-def ftp(vehicle):
+def ftp(tmp_path):
     port, _ = free_ports()
     master = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}", source_system=255, dialect="ardupilotmega")
-    server = MavlinkServer(vehicle, [UdpLink(port)])
-    is_over = threading.Event()
-
-    def serve():
-        while not is_over.is_set():
-            vehicle.state.time_us += FRAME_US
-            server.frame(vehicle.state.time_us)
-            sleep(FRAME_WALL_S)
-
-    thread = threading.Thread(target=serve)
-    thread.start()
-    assert master.wait_heartbeat(timeout=20.0) is not None
+    command = [sys.executable, "-m", "tests.system.file_server", str(port), str(tmp_path / "files")]
+    server = subprocess.Popen(command, cwd=ROOT)
+    assert master.wait_heartbeat(timeout=60.0) is not None
     yield MAVFTP(master, 1, 1)
-    is_over.set()
-    thread.join()
-    server.close()
+    server.terminate()
+    server.wait(10.0)
     master.close()
 
 
@@ -57,7 +35,7 @@ def done(ftp, result, what):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("loss_percent", [0, 2])
-def test_file_goes_up_and_comes_down(ftp, vehicle, tmp_path, loss_percent):
+def test_file_goes_up_and_comes_down(ftp, tmp_path, loss_percent):
     ftp.ftp_settings.pkt_loss_tx = ftp.ftp_settings.pkt_loss_rx = loss_percent
     (tmp_path / "up.bin").write_bytes(CONTENT)
     assert ftp.cmd_mkdir(["d"]).error_code == 0  # waits for its reply by itself
@@ -67,7 +45,7 @@ def test_file_goes_up_and_comes_down(ftp, vehicle, tmp_path, loss_percent):
     assert (tmp_path / "down.bin").read_bytes() == CONTENT
 
 
-def test_parameters_come_as_one_file(ftp, vehicle, tmp_path):
+def test_parameters_come_as_one_file(ftp, tmp_path):
     done(ftp, ftp.cmd_get(["@PARAM/param.pck", str(tmp_path / "param.pck")]), "OpenFileRO")
     decoded = MAVFTP.ftp_param_decode((tmp_path / "param.pck").read_bytes())
-    assert [name.decode() for name, _, _ in decoded.params] == vehicle.params.names
+    assert [name.decode() for name, _, _ in decoded.params] == parameter_table().names
