@@ -21,7 +21,7 @@ SAMPLES = Samples.numpy_dtype()
 
 @dataclass
 class SensorNoise:
-    """One standard deviation each; the defaults are those of the issue's default sensors."""
+    """One standard deviation each; the defaults are those of the default sensors."""
 
     gyro: float = 0.005  # [rad/s] per sample
     accel: float = 0.2  # [m/s²] per sample
