@@ -55,17 +55,32 @@ class Throttle:
         return self._voltage_share
 
 
-class Stabilized:
-    """Modes Stabilized and Manual: roll, pitch and yaw rate by sticks, the throttle stick is the thrust."""
+class StickMode:
+    """A mode that follows the sticks of this frame and remembers nothing between frames."""
 
-    __slots__ = ("_context", "_throttle")
+    __slots__ = ("_context",)
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
-        self._throttle = Throttle(context)
 
     def start(self) -> None:
-        """Nothing is remembered between frames."""
+        """Has nothing to begin."""
+
+
+class ThrustMode(StickMode):
+    """A stick mode whose throttle stick is the thrust."""
+
+    __slots__ = ("_throttle",)
+
+    def __init__(self, context: NavContext) -> None:
+        super().__init__(context)
+        self._throttle = Throttle(context)
+
+
+class Stabilized(ThrustMode):
+    """Modes Stabilized and Manual: roll, pitch and yaw rate by sticks, the throttle stick is the thrust."""
+
+    __slots__ = ()
 
     def frame(self) -> None:
         context = self._context
@@ -76,17 +91,10 @@ class Stabilized:
             context.setpoint.tilt(lean_of(context), yaw_rate_of(context), thrust)
 
 
-class Acro:
+class Acro(ThrustMode):
     """Mode Acro: body rates by sticks, the throttle stick is the thrust."""
 
-    __slots__ = ("_context", "_throttle")
-
-    def __init__(self, context: NavContext) -> None:
-        self._context = context
-        self._throttle = Throttle(context)
-
-    def start(self) -> None:
-        """Nothing is remembered between frames."""
+    __slots__ = ()
 
     def frame(self) -> None:
         context = self._context
@@ -107,16 +115,10 @@ class Acro:
         context.setpoint.turn(omega_frd, thrust)
 
 
-class Altitude:
+class Altitude(StickMode):
     """Mode Altitude: roll, pitch and yaw rate by sticks, the throttle stick is the climb rate. Needs no position."""
 
-    __slots__ = ("_context",)
-
-    def __init__(self, context: NavContext) -> None:
-        self._context = context
-
-    def start(self) -> None:
-        """Nothing is remembered between frames."""
+    __slots__ = ()
 
     def frame(self) -> None:
         context = self._context
@@ -126,16 +128,10 @@ class Altitude:
             context.setpoint.lean(lean_of(context), speed_down_of(context), yaw_rate_of(context))
 
 
-class Position:
+class Position(StickMode):
     """Mode Position: velocity by sticks, forward being where the nose points; sticks in the middle hold the place."""
 
-    __slots__ = ("_context",)
-
-    def __init__(self, context: NavContext) -> None:
-        self._context = context
-
-    def start(self) -> None:
-        """Nothing is remembered between frames."""
+    __slots__ = ()
 
     def frame(self) -> None:
         context = self._context
@@ -149,16 +145,10 @@ class Position:
         context.setpoint.move((north, east, speed_down_of(context)), yaw_rate_of(context))
 
 
-class Brake:
+class Brake(StickMode):
     """Mode Brake: stops as fast as the limits allow, whatever the sticks say, and holds there."""
 
-    __slots__ = ("_context",)
-
-    def __init__(self, context: NavContext) -> None:
-        self._context = context
-
-    def start(self) -> None:
-        """Nothing is remembered between frames."""
+    __slots__ = ()
 
     def frame(self) -> None:
         if not self._context.is_on_ground:
