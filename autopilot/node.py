@@ -4,7 +4,7 @@ In: estimate, samples, actuators and estimator health, read from the kernel rows
 Out: the setpoint row; telemetry through the attached servers. Time is the simulated time it is given.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -24,7 +24,7 @@ from autopilot.gimbal.gimbal import Gimbal
 from autopilot.guidance import Guidance
 from autopilot.host import Host
 from autopilot.injection import Failure, FailureInjector, Unit, failure_request, injection_refusal
-from autopilot.lists import ItemLists, ItemRefusal, ListKind, MissionItem
+from autopilot.lists import ItemLists, ListKind
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.navigator import Navigator
@@ -350,9 +350,6 @@ class FlightController:
 
     def set_current_item(self, seq: int, *, is_reset: bool = False) -> Reply:
         return self.navigator.mission.set_current(seq, is_reset=is_reset)
-
-    def load_mission(self, items: Sequence[MissionItem]) -> ItemRefusal | None:
-        return self.lists.load(ListKind.MISSION, items)
 
     def reboot(self) -> Reply:
         if self.state.is_armed:

@@ -5,7 +5,7 @@ from math import isfinite, nan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.lists import MissionItem
+from autopilot.lists import ListKind, MissionItem
 from autopilot.navigator.item_checks import SUPPORTED_COMMANDS, refuse_items
 from autopilot.ports import SETPOINT_TRAJECTORY
 from autopilot.vehicle import Mode
@@ -43,7 +43,7 @@ def missions(draw):
 @given(missions(), st.integers(0, 8), st.booleans())
 def test_every_mission_that_is_taken_is_flown(mission, restart_at, is_paused):
     rig = Kinematic().flying()
-    assert rig.fc.load_mission(mission) is None
+    assert rig.fc.lists.load(ListKind.MISSION, mission) is None
     rig.fc.set_mode(Mode.MISSION)
     for frame in range(round(FLOWN_S / 0.02)):
         rig.frame()

@@ -339,7 +339,7 @@ class Scenario:
                 177: (float(rng.integers(0, max(seq, 1))), 2.0, 0.0, 0.0),
             }.get(command, (0.0, 0.0, 0.0, nan))  # fmt: skip
             items.append(MissionItem(seq, 6, command, params, *self.place(), float(rng.uniform(3.0, 25.0))))
-        refusal = self.fc.load_mission(items)
+        refusal = self.fc.lists.load(ListKind.MISSION, items)
         commands = [item.command for item in items]
         self.note(f"mission {commands}: {'taken' if refusal is None else refusal.reason}")
         if refusal is not None and not refusal.reason:

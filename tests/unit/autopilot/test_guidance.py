@@ -4,6 +4,7 @@ from math import atan2, degrees, nan
 
 import pytest
 
+from autopilot.lists import ListKind
 from autopilot.vehicle import Mode, Reply, Verdict
 from tests.unit.autopilot.kinematic import Kinematic, do, geo, heading_error, item, position_setpoint
 
@@ -85,7 +86,7 @@ def test_pause_without_anything_to_pause_is_refused():
 def test_mission_goes_on_at_its_nearest_landing_sequence():
     rig = Kinematic().flying()
     assert rig.fc.guidance.fly_landing_sequence().verdict is Verdict.FAILED
-    rig.fc.load_mission(
+    rig.fc.lists.load(ListKind.MISSION,
         [
             item(0, WAYPOINT, 300.0), item(1, LAND_START, 200.0), item(2, WAYPOINT, 200.0), item(3, LAND, 220.0),
             do(4, LAND_START), item(5, WAYPOINT, 30.0, 20.0), item(6, LAND, 40.0, 20.0, 0.0),
@@ -101,7 +102,7 @@ def test_return_path_is_joined_at_its_nearest_leg():
     rig = Kinematic().flying()
     mission = [item(0, WAYPOINT, 0.0, 100.0), do(1, RETURN_PATH)]
     mission += [item(2, WAYPOINT, -20.0, 90.0), item(3, WAYPOINT, -10.0, -60.0), item(4, LAND, 0.0, -80.0, 0.0)]
-    rig.fc.load_mission(mission)
+    rig.fc.lists.load(ListKind.MISSION, mission)
     assert rig.fc.guidance.fly_return_path().verdict is Verdict.ACCEPTED
     rig.disarmed()
     assert rig.recorder.reached == [3, 4]
@@ -121,7 +122,7 @@ def test_landing_can_be_aborted(height_m, reached_m):
 
 def test_mission_ends_after_the_last_item_asked_for():
     rig = Kinematic().flying()
-    rig.fc.load_mission([item(i, WAYPOINT, 10.0 * (i + 1)) for i in range(4)])
+    rig.fc.lists.load(ListKind.MISSION, [item(i, WAYPOINT, 10.0 * (i + 1)) for i in range(4)])
     assert rig.fc.start_mission(1, 2).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
     assert rig.recorder.reached == [1, 2]

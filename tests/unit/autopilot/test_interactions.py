@@ -79,7 +79,7 @@ class TestLowHover:
 class TestLandingGoesOn:
     def descending(self):
         rig = Kinematic(COM_LOW_BAT_ACT=3).flying(20.0)
-        rig.fc.load_mission([item(0, WAYPOINT, 30.0), item(1, LAND, 30.0, height=0.0)])
+        rig.fc.lists.load(ListKind.MISSION, [item(0, WAYPOINT, 30.0), item(1, LAND, 30.0, height=0.0)])
         rig.fc.set_mode(Mode.MISSION)
         rig.run_until(lambda: rig.fc.navigator.is_landing and -rig.pos[2] < 4.0, 120.0)
         return rig
@@ -105,7 +105,7 @@ class TestReturnByMission:
     def home_by_mission(self):
         rig = Kinematic(RTL_TYPE=1).flying(20.0)
         items = [item(0, WAYPOINT, 60.0), do(1, LAND_START), item(2, WAYPOINT, 50.0), item(3, LAND, 40.0, height=0.0)]
-        assert rig.fc.load_mission(items) is None
+        assert rig.fc.lists.load(ListKind.MISSION, items) is None
         rig.fc.set_mode(Mode.RETURN)
         return rig
 
@@ -113,13 +113,13 @@ class TestReturnByMission:
         rig = self.home_by_mission()
         rig.run_until(lambda: rig.state.mission_state == MissionState.ACTIVE, 200.0)
         assert rig.state.mode is Mode.RETURN
-        assert rig.fc.load_mission([]) is None
+        assert rig.fc.lists.load(ListKind.MISSION, []) is None
         rig.disarmed(200.0)
 
     def test_a_return_to_a_mission_taken_away_on_the_way_goes_home(self):
         rig = self.home_by_mission()
         rig.run(2.0)
-        assert rig.fc.load_mission([]) is None
+        assert rig.fc.lists.load(ListKind.MISSION, []) is None
         rig.disarmed(200.0)
 
     def test_a_return_that_has_landed_by_the_mission_does_not_take_off_again(self):
@@ -128,7 +128,7 @@ class TestReturnByMission:
             do(0, LAND_START), item(1, WAYPOINT, 30.0), item(2, LAND, 30.0, height=0.0), item(3, TAKEOFF, 30.0),
             item(4, WAYPOINT, 90.0),
         ]  # fmt: skip
-        assert rig.fc.load_mission(items) is None
+        assert rig.fc.lists.load(ListKind.MISSION, items) is None
         rig.fc.set_mode(Mode.RETURN)
         rig.disarmed(200.0)
         assert abs(rig.pos[0] - 30.0) < 3.0

@@ -2,6 +2,7 @@
 
 import pytest
 
+from autopilot.lists import ListKind
 from autopilot.navigator.mission import MissionState
 from autopilot.ports import DEAD_RECKONING, POSITION_VALID, WIND_VALID
 from autopilot.vehicle import BatteryLevel, LandedState, Mode, Severity, Verdict
@@ -111,7 +112,7 @@ def test_silent_battery_sensor_is_told_once_and_its_charge_still_falls():
 
 def test_mission_that_a_failsafe_ended_is_not_complete():
     rig = Kinematic().flying()
-    rig.fc.load_mission([item(0, 16, 50.0), item(1, 21, 50.0)])
+    rig.fc.lists.load(ListKind.MISSION, [item(0, 16, 50.0), item(1, 21, 50.0)])
     rig.fc.start_mission(0)
     rig.run(2.0)
     drain_to(rig, 0.04)
@@ -203,7 +204,7 @@ def test_pilot_may_take_over_while_the_ground_station_is_still_lost():
 def test_excepted_modes_go_on_without_a_ground_station(mode, bits):
     rig = with_station(2, COM_DLL_EXCEPT=bits)
     if mode is Mode.MISSION:
-        rig.fc.load_mission([item(0, 16, 200.0)])
+        rig.fc.lists.load(ListKind.MISSION, [item(0, 16, 200.0)])
         rig.fc.start_mission(0)
     rig.run(STATION_LOSS_S + 2.0)
     assert rig.state.mode is mode

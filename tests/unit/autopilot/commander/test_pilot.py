@@ -2,6 +2,7 @@
 
 import pytest
 
+from autopilot.lists import ListKind
 from autopilot.ports import POSITION_VALID, VELOCITY_VALID
 from autopilot.vehicle import LandedState, Mode, Verdict
 from tests.unit.autopilot.kinematic import ORIGIN, Kinematic, item, position_setpoint
@@ -15,7 +16,7 @@ def in_mode(mode, **params):
     """In the air with a pilot, in a mode."""
     rig = Kinematic(**params)
     if mode is Mode.MISSION:
-        rig.fc.load_mission([item(i, WAYPOINT, 500.0 * (i + 1), 0.0, 20.0) for i in range(2)])
+        rig.fc.lists.load(ListKind.MISSION, [item(i, WAYPOINT, 500.0 * (i + 1), 0.0, 20.0) for i in range(2)])
     rig.flying(20.0)
     rig.piloted(0.2)
     if mode is Mode.OFFBOARD:

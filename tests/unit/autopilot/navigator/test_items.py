@@ -5,6 +5,7 @@ from math import inf, nan
 
 import pytest
 
+from autopilot.lists import ListKind
 from autopilot.navigator import item_checks
 from autopilot.navigator.item_checks import SUPPORTED_COMMANDS
 from autopilot.navigator.items import MAX_ITEMS
@@ -105,7 +106,7 @@ def test_takeoff_and_landing_may_name_no_place():
 
 def test_refused_mission_leaves_the_old_one():
     rig = Kinematic().ready()
-    assert rig.fc.load_mission([GOOD]) is None
-    assert rig.fc.load_mission([item(0, 16), item(1, 211)]).seq == 1
+    assert rig.fc.lists.load(ListKind.MISSION, [GOOD]) is None
+    assert rig.fc.lists.load(ListKind.MISSION, [item(0, 16), item(1, 211)]).seq == 1
     assert list(rig.fc.navigator.mission.items) == [GOOD]
     assert rig.state.mission_count == 1

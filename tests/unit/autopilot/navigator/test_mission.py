@@ -5,6 +5,7 @@ from math import nan, radians
 import numpy as np
 import pytest
 
+from autopilot.lists import ListKind
 from autopilot.navigator.mission import MissionState
 from autopilot.vehicle import LandedState, Mode, Verdict
 from tests.unit.autopilot.kinematic import Kinematic, do, geo, heading_error, item
@@ -24,7 +25,7 @@ WAYPOINT, LOITER, LOITER_TIME, RETURN, LAND, TAKEOFF, DELAY, JUMP, SPEED, HOME =
 
 
 def started(rig, *items):
-    assert rig.fc.load_mission(items) is None
+    assert rig.fc.lists.load(ListKind.MISSION, items) is None
     assert rig.fc.set_mode(Mode.MISSION).verdict is Verdict.ACCEPTED
     if not rig.state.is_armed:
         assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
@@ -233,7 +234,7 @@ def test_pause_without_a_mission_is_refused():
 
 def test_mission_starts_at_the_item_asked_for_and_a_complete_one_starts_again():
     rig = Kinematic().flying()
-    rig.fc.load_mission([item(0, WAYPOINT, 20.0), item(1, WAYPOINT, 0.0, 20.0)])
+    rig.fc.lists.load(ListKind.MISSION, [item(0, WAYPOINT, 20.0), item(1, WAYPOINT, 0.0, 20.0)])
     assert rig.fc.start_mission(1).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
     assert rig.recorder.reached == [1]
@@ -255,11 +256,11 @@ def test_current_item_can_be_changed_in_flight():
 def test_a_new_mission_in_flight_replaces_the_one_being_flown():
     rig = started(Kinematic().flying(), item(0, WAYPOINT, 100.0))
     rig.run(2.0)
-    assert rig.fc.load_mission([item(0, WAYPOINT, 0.0, 50.0), item(1, LOITER, 0.0, 60.0)]) is None
+    assert rig.fc.lists.load(ListKind.MISSION, [item(0, WAYPOINT, 0.0, 50.0), item(1, LOITER, 0.0, 60.0)]) is None
     rig.run(1.0)
     assert rig.state.mode is Mode.MISSION
     assert rig.sp("pos_ned")[1] == pytest.approx(50.0, abs=0.1)
-    assert rig.fc.load_mission([]) is None
+    assert rig.fc.lists.load(ListKind.MISSION, []) is None
     rig.run(0.1)
     assert rig.state.mode is Mode.HOLD
     assert rig.state.mission_state == MissionState.NO_MISSION
@@ -269,7 +270,7 @@ def test_mission_without_items_or_too_far_away_is_refused():
     rig = Kinematic().flying()
     reply = rig.fc.set_mode(Mode.MISSION)
     assert (reply.verdict, reply.reason) == (Verdict.TEMPORARILY_REJECTED, "no mission is loaded")
-    rig.fc.load_mission([item(0, WAYPOINT, 20_000.0)])
+    rig.fc.lists.load(ListKind.MISSION, [item(0, WAYPOINT, 20_000.0)])
     assert "km away" in rig.fc.set_mode(Mode.MISSION).reason
 
 
@@ -315,5 +316,5 @@ def test_mission_that_ends_with_a_return_is_announced_as_complete():
 )
 def test_item_far_below_home_is_taken_with_a_warning(height, command, is_told):
     rig = Kinematic().ready()
-    assert rig.fc.load_mission([item(0, TAKEOFF), item(1, command, 30.0, 0.0, height)]) is None
+    assert rig.fc.lists.load(ListKind.MISSION, [item(0, TAKEOFF), item(1, command, 30.0, 0.0, height)]) is None
     assert rig.recorder.has_text("Mission: item 1 is 20 m below home") == is_told

@@ -5,6 +5,7 @@ from math import atan2, hypot, nan, pi, radians
 import numpy as np
 import pytest
 
+from autopilot.lists import ListKind
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Verdict
 from tests.unit.autopilot.kinematic import Kinematic, do, heading_error, item
 
@@ -31,7 +32,7 @@ class Camera:
 
 
 def started(rig, *items):
-    assert rig.fc.load_mission(items) is None
+    assert rig.fc.lists.load(ListKind.MISSION, items) is None
     assert rig.fc.set_mode(Mode.MISSION).verdict is Verdict.ACCEPTED
     if not rig.state.is_armed:
         assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
@@ -219,10 +220,10 @@ def test_payload_gets_the_altitude_above_sea_level_and_a_refusal_does_not_stop_t
 def test_items_for_the_payload_are_refused_unless_something_takes_them():
     rig = Kinematic().ready()
     mission = [item(0, WAYPOINT, 10.0), do(1, CAMERA)]
-    refusal = rig.fc.load_mission(mission)
+    refusal = rig.fc.lists.load(ListKind.MISSION, mission)
     assert (refusal.seq, refusal.result, refusal.reason) == (1, 3, "no payload takes command 203")
     Camera(rig)
-    assert rig.fc.load_mission(mission) is None
+    assert rig.fc.lists.load(ListKind.MISSION, mission) is None
 
 
 def test_waypoint_missed_by_a_change_of_home_is_turned_back_to():
@@ -253,7 +254,7 @@ def test_same_current_item_in_a_new_mission_is_flown_on():
     rig = started(Kinematic().flying(), item(0, WAYPOINT, 20.0), item(1, WAYPOINT, 80.0), item(2, WAYPOINT, 80.0, 30.0))
     rig.run_until(lambda: rig.state.mission_current == 1 and rig.pos[0] > 40.0)
     new = [item(0, WAYPOINT, 20.0), item(1, WAYPOINT, 80.0), item(2, WAYPOINT, 120.0, 0.0), item(3, LOITER, 150.0)]
-    assert rig.fc.load_mission(new) is None
+    assert rig.fc.lists.load(ListKind.MISSION, new) is None
     rig.run(1.0)
     assert rig.state.mission_current == 1
     assert rig.vel[0] == pytest.approx(5.0, abs=0.2)
@@ -287,7 +288,7 @@ def started_again(rig):
 def test_mission_needs_the_ends_that_the_parameter_asks_for(asked, has_takeoff, has_landing, lacks):
     rig = Kinematic(MIS_TKO_LAND_REQ=asked).ready()
     places = [TAKEOFF] * has_takeoff + [WAYPOINT] + [LAND] * has_landing
-    assert rig.fc.load_mission([item(seq, command, 10.0) for seq, command in enumerate(places)]) is None
+    assert rig.fc.lists.load(ListKind.MISSION, [item(seq, command, 10.0) for seq, command in enumerate(places)]) is None
     reply = rig.fc.set_mode(Mode.MISSION)
     assert (reply.verdict is Verdict.ACCEPTED) == (lacks is None)
     assert (lacks or "") in reply.reason

@@ -89,7 +89,7 @@ def test_return_with_a_mission_landing_flies_it():
     rig = at(60.0, 0.0, RTL_TYPE=1)
     mission = [item(0, WAYPOINT, 200.0), do(1, LAND_START), item(2, WAYPOINT, 50.0, 40.0, 12.0),
                item(3, WAYPOINT, 20.0, 40.0, 8.0), item(4, LAND, 20.0, 30.0, 0.0)]  # fmt: skip
-    assert rig.fc.load_mission(mission) is None
+    assert rig.fc.lists.load(ListKind.MISSION, mission) is None
     track = returned(rig)
     assert rig.pos[:2] == pytest.approx((20.0, 30.0), abs=0.5)
     assert nearest_m(track, 50.0, 40.0) < 2.1
@@ -101,7 +101,7 @@ def test_return_along_the_mission_goes_back_over_its_places():
     rig = Kinematic(RTL_TYPE=2).ready()
     places = ((0.0, 30.0), (40.0, 30.0), (40.0, 80.0))
     items = [item(0, TAKEOFF), *(item(i + 1, WAYPOINT, *place) for i, place in enumerate(places))]
-    assert rig.fc.load_mission(items) is None
+    assert rig.fc.lists.load(ListKind.MISSION, items) is None
     assert rig.fc.start_mission(0).verdict is Verdict.ACCEPTED
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: rig.pos[1] > 60.0)
