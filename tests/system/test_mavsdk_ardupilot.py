@@ -1,7 +1,6 @@
 """MAVSDK 4.1 with a vehicle in ArduPilot's dialect, in this process: what works with ArduPilot works with it."""
 
 from math import nan
-from time import monotonic, sleep
 
 import pytest
 from mavsdk.plugins.action import Action
@@ -13,44 +12,17 @@ from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
 
 from autopilot.vehicle import Mode
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
-from mission.flight import Flight, FlightConfig
+from mission.flight import FlightConfig
 from sim.world.world import WorldConfig
 from tests.system.raw_mavsdk import RawMavsdk
+from tests.system.raw_vehicle import QuickFlight
 
-FRAMES = 4  # at once: 40 times real time
-PATIENCE_S = 30.0  # wall clock
-
-
-class Session:
-    """A flight with MAVSDK as its client."""
-
-    def make_turn(self, link):
-        self.flight = Flight(FlightConfig(dialect="ardupilot", world=WorldConfig(trees_per_ha=0.0)), links=[link])
-        self.flight.run(lambda flight: flight.controller.state.is_ready_to_arm and flight.time_us >= 3_000_000)
-
-        def turn():
-            for _ in range(FRAMES):
-                self.flight.frame()
-
-        return turn
-
-    @property
-    def state(self):
-        return self.flight.controller.state
-
-    def place(self):
-        return self.state.estimate.pos_ned
-
-    def until(self, condition, what):
-        deadline_s = monotonic() + PATIENCE_S
-        while not condition():
-            assert monotonic() < deadline_s, f"{what}; at {self.place()} in {self.state.mode}"
-            sleep(0.01)
+CONFIG = FlightConfig(dialect="ardupilot", world=WorldConfig(trees_per_ha=0.0))
 
 
 @pytest.fixture
 def session():
-    session = Session()
+    session = QuickFlight(CONFIG)
     with RawMavsdk(session.make_turn) as mavsdk:
         session.system = mavsdk.system
         yield session

@@ -2,7 +2,6 @@
 
 import json
 from math import degrees, nan
-from time import monotonic, sleep
 
 import pytest
 from mavsdk.plugins.action import Action
@@ -12,46 +11,18 @@ from mavsdk.plugins.mission_raw import MissionRaw, MissionRawError, MissionRawRe
 
 from autopilot.vehicle import Mode
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
-from mission.flight import Flight, FlightConfig
+from mission.flight import FlightConfig
 from sim.world.world import WorldConfig
 from tests.system.raw_mavsdk import RawMavsdk
+from tests.system.raw_vehicle import QuickFlight
 
-FRAMES = 4  # at once: 40 times real time
-PATIENCE_S = 30.0  # wall clock
 Camera, Vehicle = MissionItem.CameraAction, MissionItem.VehicleAction
-
-
-class Session:
-    """A flight with MAVSDK as its client."""
-
-    def __init__(self, folder):
-        self.flight = None
-        self._folder = folder  # where the camera stores its photos
-
-    def make_turn(self, link):
-        self.flight = Flight(FlightConfig(world=WorldConfig(trees_per_ha=0.0)), links=[link], folder=self._folder)
-        self.flight.run(lambda flight: flight.controller.state.is_ready_to_arm and flight.time_us >= 3_000_000)
-
-        def turn():
-            for _ in range(FRAMES):
-                self.flight.frame()
-
-        return turn
-
-    @property
-    def state(self):
-        return self.flight.controller.state
-
-    def until(self, condition, what):
-        deadline_s = monotonic() + PATIENCE_S
-        while not condition():
-            assert monotonic() < deadline_s, what
-            sleep(0.01)
+CONFIG = FlightConfig(world=WorldConfig(trees_per_ha=0.0))
 
 
 @pytest.fixture
 def session(tmp_path):
-    session = Session(tmp_path)
+    session = QuickFlight(CONFIG, folder=tmp_path)
     with RawMavsdk(session.make_turn) as mavsdk:
         session.system = mavsdk.system
         yield session

@@ -4,90 +4,15 @@ Each test quotes what is published. Sensors are noisy; the air is still, as in P
 the published tests judge them: by the vehicle's own telemetry, unless truth is named.
 """
 
-from dataclasses import dataclass, field
 from itertools import pairwise
 from math import nan
 
 import numpy as np
 import pytest
 
-from autopilot.lists import MissionItem
 from autopilot.vehicle import LandedState, Mode
-from common.geodesy import geodetic_from_ned
-from mission.flight import Flight, FlightConfig
 from mission.summary import segment_distance_m
-from sim.world.world import WorldConfig
-from tests.system.published import fly_to_end
-
-WAYPOINT, TURNS, RETURN, LAND, TAKEOFF, SPLINE, JUMP, SPEED = 16, 18, 20, 21, 22, 82, 177, 178
-OPEN_GROUND = WorldConfig(trees_per_ha=0.0)
-GROUND_SPEED = 1.0
-
-
-@dataclass
-class Flown:
-    """A flight, and what each frame of it showed."""
-
-    flight: Flight
-    rows: list = field(default_factory=list)
-
-    def frame(self, flight):
-        state = flight.controller.state
-        estimate = state.estimate
-        self.rows.append(
-            (state.time_us * 1e-6, *estimate.pos_ned, *estimate.vel_ned, state.mission_current, state.mode)
-        )
-
-    def since(self, time_s, until_s=1e9):
-        table = np.array(self.rows)
-        return table[(table[:, 0] > time_s) & (table[:, 0] <= until_s)]
-
-    def speed(self, time_s, until_s=1e9):
-        rows = self.since(time_s, until_s)
-        return np.hypot(rows[:, 4], rows[:, 5])
-
-    @property
-    def now_s(self):
-        return self.flight.time_us * 1e-6
-
-    @property
-    def mode(self):
-        return self.flight.controller.state.mode
-
-    @property
-    def pos(self):
-        return np.array(self.flight.controller.state.estimate.pos_ned)
-
-    @property
-    def vel(self):
-        return np.array(self.flight.controller.state.estimate.vel_ned)
-
-    def home_error(self):
-        home = self.flight.controller.state.home_ned
-        return float(np.hypot(self.pos[0] - home[0], self.pos[1] - home[1]))
-
-
-def fly(script, seconds=600.0, wind_m_s=0.0, **parameters):
-    """Runs `script(drone, flown)` to its end."""
-    flown = Flown(Flight(FlightConfig(world=OPEN_GROUND, wind_m_s=wind_m_s, parameters=parameters)))
-    fly_to_end(flown.flight, script(flown.flight.drone, flown), flown.frame, seconds)
-    return flown
-
-
-def item(flown, seq, command, north=nan, east=nan, height=10.0, params=(0.0, 0.0, 0.0, nan)):
-    lat, lon = nan, nan
-    if north == north:
-        lat, lon, _ = geodetic_from_ned(north, east, 0.0, flown.flight.config.home)
-    return MissionItem(seq, 6, command, tuple(map(float, params)), lat, lon, height)
-
-
-def do(seq, command, *params):
-    return MissionItem(seq, 2, command, (*map(float, params), 0.0, 0.0, 0.0, 0.0)[:4], 0.0, 0.0, 0.0)
-
-
-def speed_item(seq, speed_m_s):
-    return do(seq, SPEED, GROUND_SPEED, speed_m_s, -1.0)
-
+from tests.system.flown_missions import JUMP, RETURN, TAKEOFF, WAYPOINT, do, fly, item, speed_item
 
 SQUARE = [(20.0, 0.0), (20.0, 20.0), (0.0, 20.0), (0.0, 0.0)]
 
@@ -386,53 +311,6 @@ def test_mission_is_paused_and_gone_on_with_on_its_path():
         assert np.abs(flown.since(begin_s)[:, 2]).max() < 0.5
 
     fly(script)
-
-
-@pytest.mark.parametrize("wind_m_s", [0.0, 6.0])
-def test_spline_goes_smoothly_through_its_waypoints(wind_m_s):
-    """Not published with a tolerance; PX4 keeps missions in a corridor of 5 m, ArduPilot arrives within 2 m."""
-    corners = [(20.0, 0.0), (50.0, 20.0), (50.0, 60.0), (10.0, 60.0), (-20.0, 30.0)]
-
-    async def script(drone, flown):
-        await drone.wait_ready()
-        items = [item(flown, 0, TAKEOFF), item(flown, 1, WAYPOINT, *corners[0])]
-        items += [item(flown, 2 + k, SPLINE, *corner, 10.0 + 2.0 * (k % 2)) for k, corner in enumerate(corners[1:])]
-        await drone.upload(items)
-        await drone.start_mission()
-        await drone.until(lambda: 1 in drone.reached, 60.0, "first waypoint")
-        begin_s = flown.now_s
-        await drone.until(lambda: 4 in drone.reached, 120.0, "last but one")
-        rows = flown.since(begin_s)
-        for k, corner in enumerate(corners[1:4]):
-            assert np.linalg.norm(rows[:, 1:4] - (*corner, -10.0 - 2.0 * (k % 2)), axis=1).min() < 0.7
-        assert flown.speed(begin_s + 2.0).min() > 3.0  # no stop, no corner
-        assert flown.speed(begin_s).max() < 5.7
-        await drone.wait_mission_finished(5, 60.0)
-
-    fly(script, wind_m_s=wind_m_s)
-
-
-@pytest.mark.parametrize("wind_m_s", [0.0, 6.0])
-def test_turns_keep_their_radius(wind_m_s):
-    """Not published with a tolerance; a circle of 15 m at the speed that its bend allows."""
-
-    async def script(drone, flown):
-        await drone.wait_ready()
-        turns = item(flown, 1, TURNS, 30.0, 0.0, params=(2.0, 0.0, -15.0, nan))
-        await drone.upload([item(flown, 0, TAKEOFF), turns, item(flown, 2, LAND, 30.0, 0.0, 0.0)])
-        await drone.start_mission()
-        await drone.until(lambda: flown.pos[0] > 10.0, 60.0, "near the circle")
-        await drone.sleep(8.0)
-        begin_s = flown.now_s
-        await drone.sleep(25.0)
-        rows = flown.since(begin_s)
-        away = np.hypot(rows[:, 1] - 30.0, rows[:, 2])
-        assert np.abs(away - 15.0).max() < 0.6
-        angle = np.unwrap(np.arctan2(rows[:, 2], rows[:, 1] - 30.0))
-        assert angle[-1] < angle[0] - 6.0  # counter-clockwise
-        await drone.wait_disarmed(200.0)
-
-    fly(script, wind_m_s=wind_m_s)
 
 
 def test_velocity_setpoints_are_paused_and_gone_on_with():
