@@ -74,7 +74,7 @@ format: $(STAMP) ## Format the code and mend what lint can mend
 	$(BIN)/ruff format .
 
 lock: $(STAMP) ## Pin the installed versions in constraints.txt
-	@{ sed '/^[^#]/,$$d' constraints.txt; $(BIN)/python -m pip freeze --exclude-editable; } > constraints.txt.part
+	@{ sed '/^[^#]/,$$d' constraints.txt; $(BIN)/python -m pip freeze --exclude-editable | sed "s/+cpu$$//"; } > constraints.txt.part
 	@mv constraints.txt.part constraints.txt
 	@touch $(STAMP)
 

@@ -2,8 +2,11 @@
 
 import gymnasium
 
+from policies.tasks.gym import register
+
 gymnasium.register(
     id="honeyguide/Hover-v0",
     entry_point="policies.tasks.hover:HoverEnv",
     vector_entry_point="policies.tasks.hover:HoverVectorEnv",
 )
+register()

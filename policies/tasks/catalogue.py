@@ -1,0 +1,57 @@
+"""The tasks by name: what `honeyguide train NAME` and `gymnasium.make("honeyguide/NAME-v0")` build."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+
+from policies.tasks.roller_ball import RollerBall
+from policies.tasks.task import Task, TaskSettings
+
+
+class UnknownTask(ValueError):
+    """No task of that name, or a setting it has not; the message is one sentence for the user."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A task as users ask for it."""
+
+    settings: type[TaskSettings]
+    build: Callable[[Any, int, str], Task]
+
+
+CATALOGUE: dict[str, Entry] = {
+    "RollerBall": Entry(TaskSettings, RollerBall),
+}
+
+
+def task_settings(name: str, values: Mapping[str, Any]) -> TaskSettings:
+    """The checked settings of a task, from text or plain values.
+
+    Raises:
+        UnknownTask: no such task, no such setting, or a value it cannot have.
+    """
+    try:
+        return _entry(name).settings(**values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise UnknownTask(f"{name}: {key}: {first['msg']}") from None
+
+
+def build_task(name: str, env_count: int, settings: TaskSettings | None = None, device: str = "cpu") -> Task:
+    """Environments of a task, not yet reset.
+
+    Raises:
+        UnknownTask: no such task.
+    """
+    entry = _entry(name)
+    return entry.build(settings or entry.settings(), env_count, device)
+
+
+def _entry(name: str) -> Entry:
+    if name not in CATALOGUE:
+        raise UnknownTask(f"{name}: no such task; there are {', '.join(CATALOGUE)}")
+    return CATALOGUE[name]

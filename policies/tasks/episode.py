@@ -1,0 +1,110 @@
+"""What every task's kernel shares: the border to the learner, and the book-keeping of steps and episodes.
+
+A task's step kernel, one thread per environment, reads its action from the border, moves the world, and then:
+
+    at = open_frame(border, i)                       # older frames shift; the newest is written from column `at`
+    ... border.observations[i, at + k] = ...
+    if close_step(border, i, reward, outcome):       # the episode ended: what it saw last is kept, a new one begins
+        begin_episode(border, i)                     # draws the numbers of the new episode
+        ... place the vehicle, write the first frame
+
+so that one launch is one decision of all environments, resets included (Gymnasium's same-step auto-reset).
+"""
+
+from enum import IntEnum
+
+import warp as wp
+
+from policies.tasks.numbers import draw_numbers
+
+wp.set_module_options({"enable_backward": False})
+
+
+class Outcome(IntEnum):
+    """How an episode ended."""
+
+    RUNNING = 0
+    SUCCESS = 1
+    TIMEOUT = 2  # the only one that is a truncation
+    HIT_WALL = 3
+    HIT_OBSTACLE = 4
+    FELL = 5
+    HIT_OTHER = 6  # rolled over, struck an edge
+
+
+RUNNING = wp.constant(int(Outcome.RUNNING))
+SUCCESS = wp.constant(int(Outcome.SUCCESS))
+TIMEOUT = wp.constant(int(Outcome.TIMEOUT))
+HIT_WALL = wp.constant(int(Outcome.HIT_WALL))
+HIT_OBSTACLE = wp.constant(int(Outcome.HIT_OBSTACLE))
+FELL = wp.constant(int(Outcome.FELL))
+HIT_OTHER = wp.constant(int(Outcome.HIT_OTHER))
+
+OUTCOME_COUNT = len(Outcome)
+SCORE_COLUMNS = OUTCOME_COUNT + 2  # episodes by outcome, then the sums of their returns and of their lengths
+_RETURN_SCORE = wp.constant(OUTCOME_COUNT)
+_LENGTH_SCORE = wp.constant(OUTCOME_COUNT + 1)
+
+
+@wp.struct
+class Border:
+    """What learner and task exchange; one row per environment."""
+
+    continuous: wp.array2d(dtype=float)  # in: [-1, 1], (envs, continuous actions)
+    branches: wp.array2d(dtype=int)  # in: the choice of each branch, (envs, branches)
+    observations: wp.array2d(dtype=float)  # out: what the next decision sees, (envs, frames x elements)
+    final_observations: wp.array2d(dtype=float)  # out: what the last ended episode saw last
+    rewards: wp.array(dtype=float)  # out: since the last decision
+    outcomes: wp.array(dtype=int)  # out: of this step's end, or RUNNING
+    is_terminated: wp.array(dtype=wp.bool)  # out: ended by what happened
+    is_truncated: wp.array(dtype=wp.bool)  # out: ended by its step limit
+    steps: wp.array(dtype=int)  # decisions of the running episode
+    returns: wp.array(dtype=float)  # sum of its rewards
+    episodes: wp.array(dtype=int)  # episodes begun; keys the draws
+    scores: wp.array2d(dtype=float)  # of ended episodes since they were last taken, (envs, SCORE_COLUMNS)
+    seed: wp.array(dtype=int)  # (1,)
+    samplers: wp.array2d(dtype=float)  # what numbers are drawn from
+    numbers: wp.array2d(dtype=float)  # of the running episode, (envs, numbers)
+    frame_size: int
+
+
+@wp.func
+def open_frame(border: Border, i: int) -> int:
+    """Shifts the stacked frames by one and returns the column where the newest begins."""
+    size = border.frame_size
+    older = border.observations.shape[1] - size
+    for k in range(older):
+        border.observations[i, k] = border.observations[i, k + size]
+    return older
+
+
+@wp.func
+def close_step(border: Border, i: int, reward: float, outcome: int) -> bool:
+    """Books one decision; true if the episode ended with it. Its last observation must have been written before."""
+    border.rewards[i] = reward
+    border.outcomes[i] = outcome
+    border.returns[i] += reward
+    border.steps[i] += 1
+    is_over = outcome != RUNNING
+    border.is_truncated[i] = outcome == TIMEOUT
+    border.is_terminated[i] = is_over and outcome != TIMEOUT
+    if is_over:
+        for k in range(border.observations.shape[1]):
+            border.final_observations[i, k] = border.observations[i, k]
+        border.scores[i, outcome] += 1.0
+        border.scores[i, _RETURN_SCORE] += border.returns[i]
+        border.scores[i, _LENGTH_SCORE] += float(border.steps[i])
+    return is_over
+
+
+@wp.func
+def begin_episode(border: Border, i: int) -> int:
+    """Clears the row for a new episode, draws its numbers and returns its index, which keys its draws."""
+    episode = border.episodes[i]
+    border.episodes[i] = episode + 1
+    border.steps[i] = 0
+    border.returns[i] = 0.0
+    for k in range(border.observations.shape[1]):
+        border.observations[i, k] = 0.0
+    draw_numbers(border.samplers, border.numbers, border.seed[0], i, episode)
+    return episode

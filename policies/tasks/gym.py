@@ -1,0 +1,154 @@
+"""Tasks as Gymnasium environments: one (`TaskEnv`) or a batch (`TaskVectorEnv`), the same kernels.
+
+    env = gymnasium.make("policies:honeyguide/RollerBall-v0", preset="as-coded", render_mode="rgb_array")
+    envs = gymnasium.make_vec("policies:honeyguide/RollerBall-v0", num_envs=1024)
+
+Keyword arguments are the task's settings. `info["outcome"]` names how an episode ended. Arrays that are returned are
+copies; whoever wants none takes a `Task` and its border.
+"""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from policies.tasks.catalogue import CATALOGUE, build_task, task_settings
+from policies.tasks.episode import Outcome
+from policies.tasks.layout import Layout
+from policies.tasks.task import Task
+
+Array = NDArray[Any]
+
+
+class TaskEnv(gymnasium.Env[Array, Any]):
+    """One environment of a task."""
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012  (as Gymnasium declares it)
+
+    def __init__(self, task: str, render_mode: str | None = None, **settings: Any) -> None:
+        self.task = build_task(task, 1, task_settings(task, settings))
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.task.decision_s))}
+        self.observation_space = observation_space(self.task.layout)
+        self.action_space = action_space(self.task.layout)
+        self._views = _Views(self.task)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Starts an episode; `options` are not used."""
+        super().reset(seed=seed, options=options)
+        if seed is not None or not self._views.is_begun:
+            self._views.reset(int(self.np_random.integers(2**31)))
+        else:
+            self.task.begin(np.ones(1, dtype=np.bool_))
+        return self._views.observations[0].copy(), {}
+
+    def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """One decision. The task begins the next episode by itself; `reset` begins another."""
+        views = self._views
+        views.act(np.asarray(action)[None])
+        is_over = bool(views.is_terminated[0] or views.is_truncated[0])
+        observation = (views.final_observations if is_over else views.observations)[0].copy()
+        info = {"outcome": Outcome(int(views.outcomes[0])).name.lower()} if is_over else {}
+        return observation, float(views.rewards[0]), bool(views.is_terminated[0]), bool(views.is_truncated[0]), info
+
+    def render(self) -> Any:
+        """What is seen from above, RGB."""
+        return self.task.picture(0) if self.render_mode == "rgb_array" else None
+
+
+class TaskVectorEnv(VectorEnv[Array, Array, Array]):
+    """Many environments in one launch. An episode that ends is followed by the next in the same step."""
+
+    metadata: dict[str, Any] = {  # noqa: RUF012  (as Gymnasium declares it)
+        "render_modes": ["rgb_array"],
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(self, task: str, num_envs: int = 1, render_mode: str | None = None, **settings: Any) -> None:
+        self.task = build_task(task, num_envs, task_settings(task, settings))
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.single_observation_space = observation_space(self.task.layout)
+        self.single_action_space = action_space(self.task.layout)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._views = _Views(self.task)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Starts an episode of every environment; `options` are not used."""
+        super().reset(seed=seed, options=options)
+        self._views.reset(int(self.np_random.integers(2**31)))
+        return self._views.observations.copy(), {}
+
+    def step(self, actions: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
+        """One decision each; `final_obs` of the info holds what the ended episodes saw last."""
+        views = self._views
+        views.act(actions)
+        is_over = views.is_terminated | views.is_truncated
+        info: dict[str, Any] = {}
+        if is_over.any():
+            info = {"final_obs": views.final_observations.copy(), "_final_obs": is_over}
+            info |= {"outcome": views.outcomes.copy(), "_outcome": is_over}
+        rewards = views.rewards.astype(np.float64)
+        return views.observations.copy(), rewards, views.is_terminated.copy(), views.is_truncated.copy(), info
+
+    def render(self) -> Any:
+        """A tuple of pictures, RGB."""
+        return tuple(self.task.picture(i) for i in range(self.num_envs)) if self.render_mode == "rgb_array" else None
+
+
+class _Views:
+    """A task's border as NumPy arrays: live on the CPU."""
+
+    def __init__(self, task: Task) -> None:
+        border = task.border
+        self._task = task
+        self.is_begun = False
+        self.continuous: Array = border.continuous.numpy()
+        self.branches: Array = border.branches.numpy()
+        self.observations: Array = border.observations.numpy()
+        self.final_observations: Array = border.final_observations.numpy()
+        self.rewards: Array = border.rewards.numpy()
+        self.outcomes: Array = border.outcomes.numpy()
+        self.is_terminated: Array = border.is_terminated.numpy()
+        self.is_truncated: Array = border.is_truncated.numpy()
+
+    def reset(self, seed: int) -> None:
+        self.is_begun = True
+        self._task.reset(seed)
+
+    def act(self, actions: Array) -> None:
+        """Writes the actions, one row per environment, and steps."""
+        if self._task.layout.branches:
+            self.branches[:] = actions.reshape(self.branches.shape)
+        else:
+            self.continuous[:] = np.clip(actions, -1.0, 1.0)
+        self._task.step()
+
+
+def observation_space(layout: Layout) -> Any:
+    """Of one environment."""
+    return Box(-np.inf, np.inf, shape=(layout.observation_size,), dtype=np.float32)
+
+
+def action_space(layout: Layout) -> Any:
+    """Of one environment: a box, or the discrete branches."""
+    if not layout.branches:
+        return Box(-1.0, 1.0, shape=(len(layout.continuous),), dtype=np.float32)
+    sizes = layout.branch_sizes
+    return Discrete(sizes[0]) if len(sizes) == 1 else MultiDiscrete(np.array(sizes))
+
+
+def register() -> None:
+    """Registers every task of the catalogue as `honeyguide/NAME-v0`."""
+    for name in CATALOGUE:
+        gymnasium.register(
+            id=f"honeyguide/{name}-v0",
+            entry_point="policies.tasks.gym:TaskEnv",
+            vector_entry_point="policies.tasks.gym:TaskVectorEnv",
+            kwargs={"task": name},
+        )

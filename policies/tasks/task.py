@@ -1,0 +1,159 @@
+"""A batch of environments of one task: its arrays, and the two recorded launches that begin and step them.
+
+A task is a subclass that declares a layout and numbers, makes its own arrays with `_zeros`, and names two kernels:
+
+    begin(border, is_chosen, state…)   starts an episode in the chosen rows
+    step(border, state…)               one decision of every row; rows whose episode ends begin the next
+
+The learner sees arrays only: actions in; observations, rewards and ends out. Nothing here knows torch or Gymnasium.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Border, Outcome
+from policies.tasks.layout import Layout
+from policies.tasks.numbers import Number, NumberTable, Sampler
+
+
+class TaskSettings(BaseModel):
+    """What a user may choose of any task; each task adds its own."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    preset: str = "as-coded"
+    """`as-documented` (the text), `as-coded` (the published code) or `improved` (ours)."""
+    split: str = "train"
+    """`train` or `test`: which of the two disjoint sets of places goals are drawn from."""
+    stack: int = Field(default=0, ge=0, le=50)
+    """Observations in a stack; 0: as the preset has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """What the episodes that ended since the last look came to."""
+
+    outcomes: tuple[int, ...]  # episodes by Outcome
+    return_sum: float
+    length_sum: float  # [decisions]
+
+    @property
+    def episode_count(self) -> int:
+        return sum(self.outcomes)
+
+    def count(self, outcome: Outcome) -> int:
+        return self.outcomes[outcome]
+
+    def __add__(self, other: "Scores") -> "Scores":
+        return Scores(
+            tuple(a + b for a, b in zip(self.outcomes, other.outcomes, strict=True)),
+            self.return_sum + other.return_sum,
+            self.length_sum + other.length_sum,
+        )
+
+
+class Task:
+    """Environments of one task, side by side. The arrays are made once and live as long as the task."""
+
+    numbers: ClassVar[tuple[Number, ...]]
+    """The declared numbers, one per field of the task's struct."""
+    decision_s: float
+    """Simulated time between two decisions [s]."""
+
+    def __init__(
+        self, layout: Layout, env_count: int, *, number_defaults: Mapping[str, float | Sampler], device: str = "cpu"
+    ) -> None:
+        self.layout = layout
+        self.env_count = env_count
+        self.device = device
+        self._arrays: dict[str, Any] = {}
+        self.number_table = NumberTable(self.numbers, device)
+        self.number_table.update(number_defaults)
+        size = layout.observation_size
+        border = Border()
+        border.continuous = self._zeros("continuous", (env_count, len(layout.continuous)), float)
+        border.branches = self._zeros("branches", (env_count, len(layout.branches)), int)
+        border.observations = self._zeros("observations", (env_count, size), float)
+        border.final_observations = self._zeros("final_observations", (env_count, size), float)
+        border.rewards = self._zeros("rewards", env_count, float)
+        border.outcomes = self._zeros("outcomes", env_count, int)
+        border.is_terminated = self._zeros("is_terminated", env_count, wp.bool)
+        border.is_truncated = self._zeros("is_truncated", env_count, wp.bool)
+        border.steps = self._zeros("steps", env_count, int)
+        border.returns = self._zeros("returns", env_count, float)
+        border.episodes = self._zeros("episodes", env_count, int)
+        border.scores = self._zeros("scores", (env_count, SCORE_COLUMNS), float)
+        border.seed = self._zeros("seed", 1, int)
+        border.numbers = self._zeros("numbers", (env_count, len(self.number_table.names)), float)
+        border.samplers = self.number_table.array
+        border.frame_size = layout.frame_size
+        self.border = border
+        self._is_chosen = wp.zeros(env_count, dtype=wp.bool, device=device)
+        self._begin: Any = None
+        self._step: Any = None
+
+    def _zeros(self, name: str, shape: Any, dtype: Any) -> Any:
+        """An array of the task's state: saved and restored by name."""
+        array = wp.zeros(shape, dtype=dtype, device=self.device)
+        self._arrays[name] = array
+        return array
+
+    def _record(self, begin: Any, step: Any, state: list[Any]) -> None:
+        """Records the task's two launches; to be called once, at the end of the subclass's `__init__`."""
+        chosen = [self.border, self._is_chosen, *state]
+        self._begin = wp.launch(begin, self.env_count, chosen, device=self.device, record_cmd=True)
+        self._step = wp.launch(step, self.env_count, [self.border, *state], device=self.device, record_cmd=True)
+
+    def reset(self, seed: int) -> None:
+        """Starts all environments anew. The same seed gives the same episodes, whatever ran before."""
+        self.border.seed.fill_(seed % 2**31)
+        for name in ("episodes", "scores", "rewards", "outcomes", "is_terminated", "is_truncated"):
+            self._arrays[name].zero_()
+        self.begin(np.ones(self.env_count, dtype=np.bool_))
+
+    def begin(self, is_chosen: NDArray[np.bool_]) -> None:
+        """Starts an episode in the chosen rows, shape (envs,); the others are not touched."""
+        self._is_chosen.assign(is_chosen)
+        self._begin.launch()
+
+    def step(self) -> None:
+        """One decision of all environments, with the actions that lie in the border."""
+        self._step.launch()
+
+    def set_numbers(self, values: Mapping[str, float | Sampler]) -> None:
+        """Sets or randomises numbers from the next episodes on (domain randomisation, curricula).
+
+        Raises:
+            NumberError: no such number, or a value out of its bounds.
+        """
+        self.number_table.update(values)
+
+    def take_scores(self) -> Scores:
+        """The sums over the episodes that ended since the last call."""
+        sums = self.border.scores.numpy().sum(axis=0, dtype=np.float64)
+        self.border.scores.zero_()
+        outcomes = tuple(int(count) for count in sums[:OUTCOME_COUNT])
+        return Scores(outcomes, float(sums[OUTCOME_COUNT]), float(sums[OUTCOME_COUNT + 1]))
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """A copy of everything that changes: restoring it continues bit for bit."""
+        state = {name: array.numpy().copy() for name, array in self._arrays.items()}
+        state["samplers"] = self.number_table.rows.copy()
+        return state
+
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Restores what `state` returned, of a task with the same settings and size."""
+        for name, array in self._arrays.items():
+            array.assign(state[name])
+        self.number_table.rows[:] = state["samplers"]
+        self.number_table.array.assign(self.number_table.rows)
+
+    def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
+        """One environment seen from above, RGB, shape (height, width, 3)."""
+        raise NotImplementedError
