@@ -63,7 +63,7 @@ def test_beginning_one_row_touches_only_that_row():
 
 def test_stacked_frames_hold_the_last_observations_oldest_first_after_zeros():
     task = build_task(NAME, 1, task_settings(NAME, {"stack": 3}))
-    task.reset(0)
+    task.reset(1)
     task.border.continuous.numpy()[:] = 0.5
     frames = [task.border.observations.numpy()[0, -8:].copy()]
     assert not task.border.observations.numpy()[0, :16].any()
@@ -112,7 +112,7 @@ def test_a_layout_survives_its_record_and_refuses_another():
     assert Layout.from_record(layout.record()) == layout
     other = build_task(NAME, 1, task_settings(NAME, {"stack": 2})).layout
     with pytest.raises(
-        LayoutError, match="ball.pt: made for another task or preset: stacked frames is 2 there and 1 here"
+        LayoutError, match=r"ball\.pt: made for another task or preset: stacked frames is 2 there and 1 here"
     ):
         layout.require(other, "ball.pt")
 
