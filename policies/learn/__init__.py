@@ -1,0 +1,1 @@
+"""Training of policies: the only folder that knows torch."""

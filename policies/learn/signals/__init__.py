@@ -1,0 +1,1 @@
+"""Where the reward comes from: the task, demonstrations, novelty."""
