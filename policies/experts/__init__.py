@@ -1,0 +1,1 @@
+"""Those who know how: scripted experts, keyboard driving and recorded demonstrations."""
