@@ -1,0 +1,1 @@
+"""Training configuration: ML-Agents' YAML, its defaults and its flags, and the keys of our own."""

@@ -1,0 +1,204 @@
+"""One behaviour: what is trained, by which algorithm, with which numbers. Names and defaults are ML-Agents'."""
+
+from collections.abc import Mapping
+from typing import Any, Literal, Self
+
+from pydantic import ValidationInfo, field_validator, model_validator
+
+from policies.learn.config.block import (
+    Block,
+    Count,
+    CountOrNone,
+    NotNegative,
+    NotNegativeWhole,
+    Positive,
+    PositiveOrNone,
+    Schedule,
+    Share,
+    ShareOrNone,
+    own_key,
+)
+from policies.learn.config.network import NetworkSettings
+from policies.learn.config.signals import ExtrinsicSettings, RewardSignals
+
+
+class HyperparametersBase(Block):
+    """What both algorithms have."""
+
+    batch_size: Count = 1024
+    """Steps per gradient step."""
+    buffer_size: Count = 10240
+    """PPO: steps collected before each update. SAC: steps the replay buffer holds."""
+    learning_rate: Positive = 3e-4
+    """Of Adam, at the start."""
+    learning_rate_schedule: Schedule = "constant"
+    """`linear`: falls to 0 at max_steps."""
+    max_grad_norm: PositiveOrNone = own_key(None)
+    """Gradients are scaled down to this norm; none: not at all."""
+
+    @model_validator(mode="after")
+    def _batch_fits(self) -> Self:
+        if self.batch_size > self.buffer_size:
+            sizes = f"batch_size {self.batch_size} is larger than buffer_size {self.buffer_size}"
+            raise ValueError(f"{sizes}: no batch would ever be full")
+        return self
+
+
+class PpoHyperparameters(HyperparametersBase):
+    """`hyperparameters` of `trainer_type: ppo`."""
+
+    learning_rate_schedule: Schedule = "linear"
+    """`linear`: falls to 0 at max_steps."""
+    beta: NotNegative = 5e-3
+    """Weight of the entropy."""
+    beta_schedule: Schedule = "linear"
+    """`linear`: falls to 1e-5; the default is the learning rate's schedule."""
+    epsilon: Positive = 0.2
+    """How far the ratio of new to old probability may move before it is clipped."""
+    epsilon_schedule: Schedule = "linear"
+    """`linear`: falls to 0.1; the default is the learning rate's schedule."""
+    lambd: Share = 0.95
+    """λ of the generalised advantage estimate."""
+    num_epoch: Count = 3
+    """Passes over the buffer per update."""
+    shared_critic: bool = False
+    """Whether actor and critic share one body."""
+    target_kl: PositiveOrNone = own_key(None)
+    """An update ends early when the policy has moved this far (mean KL); none: never."""
+    normalize_returns: bool = own_key(False)
+    """Whether critics learn returns divided by their running deviation."""
+    joint_ratio: bool = own_key(False)
+    """Whether the ratio is of the whole action, not of each branch and dimension by itself."""
+    normalize_advantages: Literal["buffer", "minibatch", "none"] = own_key("buffer")
+    """Over what advantages are brought to mean 0 and deviation 1."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _schedules_follow(cls, raw: Any) -> Any:
+        if isinstance(raw, Mapping) and "learning_rate_schedule" in raw:
+            schedule = raw["learning_rate_schedule"]
+            return {"beta_schedule": schedule, "epsilon_schedule": schedule, **raw}
+        return raw
+
+
+class SacHyperparameters(HyperparametersBase):
+    """`hyperparameters` of `trainer_type: sac`."""
+
+    batch_size: Count = 128
+    """Steps per gradient step."""
+    buffer_size: Count = 50000
+    """Steps the replay buffer holds."""
+    buffer_init_steps: NotNegativeWhole = 0
+    """Steps of random actions before the first update."""
+    init_entcoef: Positive = 1.0
+    """Entropy temperature at the start."""
+    tau: Share = 0.005
+    """How far the target network follows at each update."""
+    steps_per_update: Positive = 1.0
+    """Steps of experience per update."""
+    reward_signal_steps_per_update: Positive = 1.0
+    """Steps per update of the reward signals; the default is steps_per_update."""
+    save_replay_buffer: bool = False
+    """Whether the replay buffer is saved with the checkpoints."""
+    hindsight: NotNegativeWhole = own_key(0)
+    """Copies of each step in which a goal reached later in the episode stands for the goal (HER, `future`)."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _signals_follow(cls, raw: Any) -> Any:
+        if isinstance(raw, Mapping) and "steps_per_update" in raw:
+            return {"reward_signal_steps_per_update": raw["steps_per_update"], **raw}
+        return raw
+
+
+Hyperparameters = PpoHyperparameters | SacHyperparameters
+HYPERPARAMETERS: Mapping[str, type[PpoHyperparameters] | type[SacHyperparameters]] = {
+    "ppo": PpoHyperparameters,
+    "sac": SacHyperparameters,
+}
+
+
+class BehavioralCloning(Block):
+    """Cloning of demonstrations beside the updates."""
+
+    demo_path: str
+    """Demonstrations: a file or a folder."""
+    steps: NotNegativeWhole = 0
+    """Steps over which its learning rate falls to 0; 0: it stays."""
+    strength: NotNegative = 1.0
+    """Its learning rate is the policy's times this."""
+    samples_per_update: NotNegativeWhole = 0
+    """Demonstrated steps per update at most; 0: all."""
+    num_epoch: CountOrNone = None
+    """Passes per update; none: the policy's."""
+    batch_size: CountOrNone = None
+    """Steps per gradient step; none: the policy's."""
+
+
+class Behavior(Block):
+    """One entry of `behaviors`."""
+
+    trainer_type: Literal["ppo", "sac"] = "ppo"
+    """The algorithm."""
+    hyperparameters: Hyperparameters = PpoHyperparameters()
+    """Numbers of the algorithm."""
+    network_settings: NetworkSettings = NetworkSettings()
+    """Networks of the policy and its critic."""
+    reward_signals: RewardSignals = RewardSignals(extrinsic=ExtrinsicSettings())
+    """What is rewarded; the default is the task's reward alone."""
+    behavioral_cloning: BehavioralCloning | None = None
+    """Cloning of demonstrations; none: off."""
+    self_play: None = None
+    """Refused: each environment has one agent."""
+    max_steps: Count = 500_000
+    """Training ends after this many decisions of all environments together."""
+    time_horizon: Count = 64
+    """Decisions after which a trajectory is cut and its rest estimated."""
+    summary_freq: Count = 50_000
+    """Steps between summaries."""
+    keep_checkpoints: Count = 5
+    """How many of the newest checkpoints stay."""
+    checkpoint_interval: Count = 500_000
+    """Steps between checkpoints."""
+    even_checkpoints: bool = False
+    """Whether keep_checkpoints are spread evenly over max_steps, in place of checkpoint_interval."""
+    threaded: bool = False
+    """Accepted; collecting and learning take turns here."""
+    init_path: str | None = None
+    """A checkpoint that the networks start from."""
+    success_target: ShareOrNone = own_key(None)
+    """Training ends when this share of episodes succeeds; none: at max_steps only."""
+
+    @field_validator("self_play", mode="before")
+    @classmethod
+    def _no_opponents(cls, raw: Any) -> None:
+        if raw is not None:
+            raise ValueError("self-play is not supported: each environment has one agent")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _trainer_has_numbers(cls, raw: Any) -> Any:
+        return {"hyperparameters": {}, **raw} if isinstance(raw, Mapping) else raw
+
+    @field_validator("hyperparameters", mode="before")
+    @classmethod
+    def _of_the_trainer(cls, raw: Any, info: ValidationInfo) -> Any:
+        kind = HYPERPARAMETERS.get(info.data.get("trainer_type", ""))
+        if kind is None:  # an unknown trainer is refused under its own key
+            return PpoHyperparameters()
+        if isinstance(raw, HyperparametersBase) and not isinstance(raw, kind):
+            raise ValueError(f"are those of another trainer than {info.data['trainer_type']}")
+        return kind.model_validate(raw)
+
+    @model_validator(mode="after")
+    def _sequences_fit(self) -> Self:
+        memory = self.network_settings.memory
+        batch = self.hyperparameters.batch_size
+        if memory and memory.sequence_length > batch:
+            raise ValueError(f"memory: sequence_length {memory.sequence_length} is larger than batch_size {batch}")
+        return self
+
+    @property
+    def checkpoint_steps(self) -> int:
+        """Steps between checkpoints."""
+        return max(1, self.max_steps // self.keep_checkpoints) if self.even_checkpoints else self.checkpoint_interval

@@ -1,0 +1,60 @@
+"""What every block of the configuration shares: frozen, no unknown keys, numbers as people type them.
+
+YAML 1.1 reads `1e-5` (no dot) as text and `2e6` as text or float: both are taken as the numbers they are meant to be.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+Schedule = Literal["linear", "constant"]
+
+
+class Block(BaseModel):
+    """One mapping of the file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False)
+
+
+def own_key(default: Any, **limits: Any) -> Any:
+    """A key that ML-Agents does not have; its default keeps ML-Agents' behaviour."""
+    return Field(default=default, json_schema_extra={"is_own": True}, **limits)
+
+
+def is_own_key(block: type[BaseModel], key: str) -> bool:
+    """Whether the key is ours."""
+    extra = block.model_fields[key].json_schema_extra
+    return isinstance(extra, dict) and "is_own" in extra
+
+
+def _number(raw: Any) -> Any:
+    if isinstance(raw, bool):
+        raise ValueError("must be a number")
+    return raw
+
+
+def _whole(raw: Any) -> Any:
+    number = _number(raw)
+    try:
+        value = float(number)
+    except (TypeError, ValueError):
+        raise ValueError("must be a whole number") from None
+    if not value.is_integer():
+        raise ValueError("must be a whole number")
+    return int(number) if isinstance(number, int) else int(value)
+
+
+def _none(raw: Any) -> Any:
+    return None if isinstance(raw, str) and raw.lower() == "none" else raw
+
+
+Whole = Annotated[int, BeforeValidator(_whole)]
+Count = Annotated[int, BeforeValidator(_whole), Field(ge=1)]
+NotNegativeWhole = Annotated[int, BeforeValidator(_whole), Field(ge=0)]
+Real = Annotated[float, BeforeValidator(_number)]
+Positive = Annotated[float, BeforeValidator(_number), Field(gt=0.0)]
+NotNegative = Annotated[float, BeforeValidator(_number), Field(ge=0.0)]
+Share = Annotated[float, BeforeValidator(_number), Field(ge=0.0, le=1.0)]
+PositiveOrNone = Annotated[Positive | None, BeforeValidator(_none)]
+ShareOrNone = Annotated[Share | None, BeforeValidator(_none)]
+CountOrNone = Annotated[Count | None, BeforeValidator(_none)]

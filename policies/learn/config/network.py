@@ -1,0 +1,44 @@
+"""Networks: `network_settings` of a behaviour and of each reward signal."""
+
+from typing import Literal
+
+from pydantic import field_validator
+
+from policies.learn.config.block import Block, Count, NotNegativeWhole
+
+Encoder = Literal["simple", "nature_cnn", "resnet", "match3", "fully_connected"]
+
+
+class Memory(Block):
+    """A recurrent policy: one LSTM layer behind the body."""
+
+    sequence_length: Count = 64
+    """Decisions per sequence that gradients flow through; at most the batch size."""
+    memory_size: Count = 128
+    """Floats of state: half of them hidden, half of them cell."""
+
+    @field_validator("memory_size")
+    @classmethod
+    def _halves(cls, size: int) -> int:
+        if size % 2:
+            raise ValueError("must be even: half of it is the hidden state, half the cell")
+        return size
+
+
+class NetworkSettings(Block):
+    """Body of the actor, of the critic, or of a reward signal's network."""
+
+    hidden_units: Count = 128
+    """Width of each dense layer."""
+    num_layers: NotNegativeWhole = 2
+    """Dense layers."""
+    normalize: bool = False
+    """Whether vector observations are normalised by their running mean and variance."""
+    vis_encode_type: Encoder = "simple"
+    """Encoder of images."""
+    goal_conditioning_type: Literal["hyper", "none"] = "hyper"
+    """Whether goal elements of the observation drive a hyper-network; no effect where the task declares no goal."""
+    deterministic: bool = False
+    """Whether actions are the most probable ones instead of draws."""
+    memory: Memory | None = None
+    """LSTM; none: feed-forward."""
