@@ -1,0 +1,114 @@
+"""What an expert did, read from Minari datasets, as one flat batch of transitions for GAIL and behavioural cloning.
+
+A path is ML-Agents' `demo_path`: a dataset's folder, a file in it, a folder of several datasets, or the id of a
+dataset under Minari's root on this machine. Nothing is downloaded. A dataset says in its metadata which layout it was
+recorded with; another task or preset is refused.
+"""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from policies.experts.demonstration_file import LAYOUT_KEY
+from policies.learn.signals.signal import Transitions
+from policies.tasks.layout import Layout
+
+_METADATA_FILE = "metadata.json"
+
+
+class DemonstrationError(ValueError):
+    """Demonstrations that cannot be read; the message is one sentence for the user."""
+
+
+def load_demonstrations(demo_path: str, layout: Layout) -> Transitions:
+    """All transitions of all episodes at a path, in the order they were recorded.
+
+    Args:
+        demo_path: a dataset's folder, a file in it, a folder of datasets, or the id of a local dataset.
+        layout: of the policy that is to learn from them.
+
+    Returns:
+        Transitions, (decisions,), at least one.
+
+    Raises:
+        DemonstrationError: nothing there, no episode in it, or not readable.
+        LayoutError: recorded with another task or preset.
+    """
+    datasets = [_read_dataset(folder, layout) for folder in _data_folders(demo_path)]
+    episodes = [episode for dataset in datasets for episode in dataset]
+    if not episodes:
+        raise DemonstrationError(f"{demo_path}: has no episodes")
+    columns = [np.concatenate(column) for column in zip(*episodes, strict=True)]
+    return Transitions(*(torch.from_numpy(column) for column in columns))
+
+
+def _data_folders(demo_path: str) -> list[Path]:
+    """The folders with a metadata.json that a path means."""
+    path = Path(demo_path)
+    if path.is_file():
+        path = path.parent
+    elif not path.exists():
+        root = Path(os.environ.get("MINARI_DATASETS_PATH") or Path.home() / ".minari" / "datasets")
+        path = root / demo_path
+        if not path.is_dir():
+            raise DemonstrationError(f"{demo_path}: no such file or folder, and no dataset of this name in {root}")
+    folders = sorted(file.parent for file in path.rglob(_METADATA_FILE) if file.parent.suffix != ".part")
+    if not folders:
+        raise DemonstrationError(f"{demo_path}: no Minari dataset there ({_METADATA_FILE} is missing)")
+    return folders
+
+
+_Episode = tuple[NDArray[Any], ...]
+
+
+def _read_dataset(folder: Path, layout: Layout) -> list[_Episode]:
+    """The episodes of one dataset as columns in the order of `Transitions`."""
+    from minari.dataset.minari_storage import MinariStorage  # noqa: PLC0415  (only who has demonstrations pays for it)
+
+    try:
+        record = MinariStorage.read_raw_metadata(folder).get(LAYOUT_KEY)
+        storage = MinariStorage.read(folder)
+        count = int(storage.total_episodes)
+        episodes = list(storage.get_episodes(range(count))) if count else []  # an empty dataset has an empty file
+        recorded = Layout.from_record(json.loads(record)) if record else None
+    except (OSError, KeyError, ValueError, TypeError, AssertionError) as error:
+        raise DemonstrationError(f"{folder}: not a readable Minari dataset: {_first_line(error)}") from error
+    if recorded is None:
+        raise DemonstrationError(f"{folder}: was not recorded by honeyguide (no {LAYOUT_KEY} in {_METADATA_FILE})")
+    layout.require(recorded, str(folder))
+    return [_columns(episode, layout, f"{folder}: episode {k}") for k, episode in enumerate(episodes)]
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error) or type(error).__name__).splitlines()[0]
+
+
+def _columns(episode: dict[str, Any], layout: Layout, place: str) -> _Episode:
+    observations = np.asarray(episode["observations"], np.float32)
+    actions = np.asarray(episode["actions"])
+    rewards = np.asarray(episode["rewards"], np.float32)
+    count = len(rewards)
+    is_ended = np.asarray(episode["terminations"], np.bool_) | np.asarray(episode["truncations"], np.bool_)
+    if observations.shape != (count + 1, layout.observation_size):
+        raise DemonstrationError(
+            f"{place}: {count} rewards need observations of shape {(count + 1, layout.observation_size)}, "
+            f"not {observations.shape}"
+        )
+    width = len(layout.branches) or len(layout.continuous)
+    if actions.size != count * width:
+        raise DemonstrationError(f"{place}: {count} rewards need {count * width} actions, not {actions.size}")
+    actions = actions.reshape(count, width)
+    if not (np.isfinite(observations).all() and np.isfinite(actions).all() and np.isfinite(rewards).all()):
+        raise DemonstrationError(f"{place}: holds a value that is not finite")
+    if layout.branches:
+        continuous, branches = np.zeros((count, 0), np.float32), actions.astype(np.int64)
+        if (branches < 0).any() or (branches >= np.array(layout.branch_sizes)).any():
+            raise DemonstrationError(f"{place}: holds a choice that no branch has")
+    else:
+        continuous, branches = actions.astype(np.float32).clip(-1.0, 1.0), np.zeros((count, 0), np.int64)
+    return observations[:-1], observations[1:], continuous, branches, rewards, is_ended
