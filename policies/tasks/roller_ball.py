@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from common.rng import draw_key
 from policies.tasks.drawing import GOAL, VEHICLE, Canvas
 from policies.tasks.episode import FELL, RUNNING, SUCCESS, TIMEOUT, Border, begin_episode, close_step, open_frame
+from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Element, Layout
 from policies.tasks.numbers import Number, typed_rows
 from policies.tasks.task import Task, TaskSettings
@@ -135,6 +136,7 @@ class RollerBall(Task):
 
     numbers: ClassVar = NUMBERS
     decision_s = _STEPS * _STEP_S
+    goal = PlaceGoal(goal=(0, 1, 2), achieved=(3, 4, 5), radius="reach_m", reward=1.0)
 
     def __init__(self, settings: TaskSettings, env_count: int, device: str = "cpu") -> None:
         axes = ("x", "y", "z")

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Border, Outcome
+from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Layout
 from policies.tasks.numbers import Number, NumberTable, Sampler
 
@@ -65,6 +66,8 @@ class Task:
     """The declared numbers, one per field of the task's struct."""
     decision_s: float
     """Simulated time between two decisions [s]."""
+    goal: PlaceGoal | None = None
+    """How observations tell of the goal, for hindsight replay; none: they tell too little."""
 
     def __init__(
         self, layout: Layout, env_count: int, *, number_defaults: Mapping[str, float | Sampler], device: str = "cpu"
