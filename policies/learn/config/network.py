@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import field_validator
 
-from policies.learn.config.block import Block, Count, NotNegativeWhole
+from policies.learn.config.block import Block, Count, NotNegativeWhole, own_key
 
 Encoder = Literal["simple", "nature_cnn", "resnet", "match3", "fully_connected"]
 
@@ -37,7 +37,9 @@ class NetworkSettings(Block):
     vis_encode_type: Encoder = "simple"
     """Encoder of images."""
     goal_conditioning_type: Literal["hyper", "none"] = "hyper"
-    """Whether goal elements of the observation drive a hyper-network; no effect where the task declares no goal."""
+    """Whether goal elements of the observation drive a hyper-network; no effect without a goal signal."""
+    goal_signal: bool = own_key(False)
+    """Whether the task's goal elements are a goal signal, which ML-Agents declares at the sensor."""
     deterministic: bool = False
     """Whether actions are the most probable ones instead of draws."""
     memory: Memory | None = None

@@ -1,0 +1,42 @@
+"""What the training loop asks of an algorithm: PPO and SAC are learners.
+
+One iteration collects some decisions of all environments and updates the networks. Everything a learner needs to go on
+bit for bit is in its state, its task's included.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from policies.learn.policy import Policy
+from policies.tasks.task import Scores
+
+
+@dataclass(frozen=True, slots=True)
+class Iteration:
+    """What one iteration did."""
+
+    steps: int  # decisions collected, over all environments
+    scores: Scores  # of the episodes that ended meanwhile
+    statistics: Mapping[str, float]  # TensorBoard tag to value, ML-Agents' names: "Losses/Policy Loss"
+
+
+class Learner(Protocol):
+    """An algorithm on a task."""
+
+    steps: int
+    """Decisions collected so far, over all environments."""
+    policy: Policy
+    """What acts; its parameters are those being trained."""
+
+    def iterate(self) -> Iteration:
+        """Collects and learns once."""
+        ...
+
+    def state(self) -> dict[str, Any]:
+        """Networks, optimisers, generators and the task's arrays: tensors, arrays and plain values only."""
+        ...
+
+    def load_state(self, state: Mapping[str, Any]) -> None:
+        """Goes on from what `state` returned."""
+        ...

@@ -1,0 +1,118 @@
+"""Bodies of actors and critics, and the critic: vectors in, features and values out; ML-Agents' shapes.
+
+A body normalises (if asked to), passes dense layers with swish, and an LSTM if it has memory. Observations are
+(..., observation) without memory and (steps, sequences, observation) with it.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import torch
+import torch.nn.functional as F  # noqa: N812  (the name of the field)
+from torch import Tensor, nn
+
+from policies.learn.config.network import NetworkSettings
+from policies.learn.dense import dense, value_heads
+from policies.learn.hyper import HyperDense
+from policies.learn.memory import Recurrence
+from policies.learn.normalizer import Normalizer
+from policies.tasks.layout import Layout
+
+
+class Body(nn.Module):
+    """What turns observations into features."""
+
+    def __init__(
+        self, inputs: int, settings: NetworkSettings, generator: torch.Generator, goal_indices: Sequence[int] = ()
+    ) -> None:
+        """A body with weights drawn from `generator`.
+
+        Args:
+            inputs: floats of an observation.
+            settings: its shape.
+            generator: on the CPU.
+            goal_indices: elements that make the last layer's weights; none: a plain layer.
+        """
+        super().__init__()
+        width = settings.hidden_units
+        self.normalizer = Normalizer(inputs) if settings.normalize else None
+        self.goal_indices = list(goal_indices)
+        count = max(settings.num_layers, 1) - bool(self.goal_indices)
+        sizes = [inputs, *[width] * count]
+        self.layers = nn.ModuleList(dense(a, b, generator) for a, b in pairwise(sizes))
+        self.hyper = HyperDense(sizes[-1], width, len(self.goal_indices), generator) if self.goal_indices else None
+        memory = settings.memory
+        self.recurrence = Recurrence(width, memory.memory_size, generator) if memory else None
+        self.memory_size = memory.memory_size if memory else 0
+        self.size = self.recurrence.size if self.recurrence else width
+
+    def normalize(self, observations: Tensor) -> None:
+        """Takes observations into account, shape (..., observation), if this body normalises."""
+        if self.normalizer is not None:
+            self.normalizer.update(observations)
+
+    def encode(self, observations: Tensor) -> Tensor:
+        """Features before the memory, shape (..., hidden units)."""
+        features = observations if self.normalizer is None else self.normalizer(observations)
+        goals = features[..., self.goal_indices] if self.hyper is not None else None
+        for layer in self.layers:
+            features = F.silu(layer(features))
+        return features if self.hyper is None else F.silu(self.hyper(features, goals))
+
+    def step(self, observations: Tensor, memory: Tensor) -> tuple[Tensor, Tensor]:
+        """Features (rows, size) and the memory after them (rows, memory); no columns without memory."""
+        features = self.encode(observations)
+        return (features, memory) if self.recurrence is None else self.recurrence.step(features, memory)
+
+    def forward(self, observations: Tensor, memory: Tensor | None = None, is_start: Tensor | None = None) -> Tensor:
+        """Features, shape (..., size); `memory` and `is_start` as `Recurrence.forward` has them."""
+        features = self.encode(observations)
+        if self.recurrence is None or memory is None or is_start is None:
+            return features
+        outputs: Tensor = self.recurrence(features, memory, is_start)
+        return outputs
+
+
+def policy_body(layout: Layout, settings: NetworkSettings, generator: torch.Generator) -> Body:
+    """The body of an actor or a critic for a layout.
+
+    Its goal drives a hyper-network only where the settings call it a goal signal: most tasks mark goal elements, for
+    hindsight, while ML-Agents' environments seldom declare a goal sensor, so that its default `hyper` does nothing.
+    """
+    is_hyper = settings.goal_signal and settings.goal_conditioning_type == "hyper"
+    return Body(layout.observation_size, settings, generator, layout.goal_indices if is_hyper else ())
+
+
+class Critic(nn.Module):
+    """Estimates the return of each reward signal."""
+
+    def __init__(self, body: Body, signal_count: int, generator: torch.Generator, *, normalizes: bool = False) -> None:
+        """A critic on a body of its own, or on the actor's.
+
+        Args:
+            body: what makes its features.
+            signal_count: reward signals, one head each.
+            generator: draws the heads' weights.
+            normalizes: whether the heads learn returns brought to mean 0 and deviation 1.
+        """
+        super().__init__()
+        self.body = body
+        self.heads = value_heads(body.size, signal_count, generator)
+        self.normalizer = Normalizer(signal_count) if normalizes else None
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """Estimated returns in the rewards' unit, shape (..., signals); without memory."""
+        return self._in_rewards(self.body(observations))
+
+    def step(self, observations: Tensor, memory: Tensor) -> tuple[Tensor, Tensor]:
+        """Estimated returns (rows, signals), and the memory after them."""
+        features, memory = self.body.step(observations, memory)
+        return self._in_rewards(features), memory
+
+    def own_unit(self, returns: Tensor) -> Tensor:
+        """Returns as the heads are to give them."""
+        return returns if self.normalizer is None else self.normalizer.unbounded(returns)
+
+    def _in_rewards(self, features: Tensor) -> Tensor:
+        outputs: Tensor = self.heads(features)
+        return outputs if self.normalizer is None else self.normalizer.inverse(outputs)

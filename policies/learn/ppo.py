@@ -1,0 +1,315 @@
+"""PPO (Schulman et al. 2017, arXiv 1707.06347) in ML-Agents' form, on many environments at once.
+
+One iteration: T decisions of N environments are collected, the critic estimates their returns by reward signal,
+advantages are averaged over the signals, and actor and critic take some epochs of minibatches. Options of ours that
+ML-Agents does not have are off by default (`policies/learn/config/behavior.py` says which they are).
+"""
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor, nn
+
+from policies.learn import losses
+from policies.learn.config.behavior import Behavior, PpoHyperparameters
+from policies.learn.gae import advantages, cut_at_horizon
+from policies.learn.learner import Iteration
+from policies.learn.networks import Body, Critic, policy_body
+from policies.learn.policy import Policy
+from policies.learn.rollout import Batch, Rollout
+from policies.learn.schedule import BETA_FLOOR, EPSILON_FLOOR, RATE_FLOOR, scheduled
+from policies.learn.signals.extrinsic import ExtrinsicSignal
+from policies.learn.signals.signal import RewardSignal, Transitions
+from policies.learn.tensors import TaskTensors
+from policies.tasks.task import Task
+
+_ROWS = 8192  # observations the critic values at once: what they pass through stays in the processor's cache
+
+
+class Cloning(Protocol):
+    """Behavioural cloning that runs beside the updates."""
+
+    def update(self) -> dict[str, float]:
+        """Trains the policy on demonstrations after an update; TensorBoard tags to values."""
+        ...
+
+    def state(self) -> dict[str, Any]: ...
+
+    def load_state(self, state: Mapping[str, Any]) -> None: ...
+
+
+class Ppo:
+    """A learner: see `policies/learn/learner.py`."""
+
+    def __init__(
+        self,
+        task: Task,
+        policy: Policy,
+        behavior: Behavior,
+        signals: Sequence[RewardSignal],
+        *,
+        seed: int,
+        cloning: Cloning | None = None,
+    ) -> None:
+        """Resets the task and makes the critic.
+
+        Args:
+            task: its environments all belong to the learner.
+            policy: for the task's layout; trained in place.
+            behavior: with PPO's hyperparameters.
+            signals: what is rewarded; their order is that of the value heads.
+            seed: of the task's episodes, the critic's weights, the draws of actions and of minibatches.
+            cloning: of demonstrations, on the same policy; none: off.
+        """
+        if not isinstance(behavior.hyperparameters, PpoHyperparameters):
+            raise TypeError("hyperparameters are not PPO's")
+        self.steps = 0
+        self.hyperparameters = behavior.hyperparameters
+        self.behavior = behavior
+        self.signals = list(signals)
+        self.cloning = cloning
+        self.task = TaskTensors(task)
+        device = self.task.device
+        self.policy = policy.to(device)
+        self.critic = self._critic(torch.Generator().manual_seed(seed)).to(device)
+        parameters = dict.fromkeys([*self.policy.parameters(), *self.critic.parameters()])  # a shared body once
+        self._parameters: list[nn.Parameter] = list(parameters)
+        self.optimizer = torch.optim.Adam(self._parameters, lr=self.hyperparameters.learning_rate, fused=True)
+        self._generator = torch.Generator(device).manual_seed(seed)
+        self._rollout = self._store(task)
+        self._memory = policy.start_memory(task.env_count)
+        self._critic_memory = policy.start_memory(task.env_count)
+        self._gammas = torch.tensor([signal.gamma for signal in self.signals], device=device)
+        self._is_episodic = torch.tensor([signal.is_episodic for signal in self.signals], device=device)
+        self._running_sums = torch.zeros(task.env_count, len(self.signals), device=device)
+        task.reset(seed)
+
+    def iterate(self) -> Iteration:
+        """Collects, estimates and learns once."""
+        rollout = self._rollout
+        self._collect(rollout)
+        self.steps += rollout.rewards.numel()
+        has_learned_signals = any(not isinstance(signal, ExtrinsicSignal) for signal in self.signals)
+        transitions = rollout.transitions() if has_learned_signals else None
+        rewards = self._rewards(rollout, transitions)
+        statistics = self._estimate(rollout, rewards) | self._improve(rollout, transitions)
+        if self.cloning is not None:
+            statistics |= self.cloning.update()
+        return Iteration(rollout.rewards.numel(), self.task.task.take_scores(), statistics)
+
+    @torch.inference_mode()
+    def _collect(self, rollout: Rollout) -> None:
+        """T decisions of all environments."""
+        rollout.observations[0] = self.task.observations
+        for t in range(len(rollout.rewards)):
+            if t % rollout.sequence_length == 0:
+                rollout.memories[t // rollout.sequence_length] = self._memory
+            features, memory = self.policy.body.step(rollout.observations[t], self._memory)
+            distribution = self.policy.heads(features)
+            actions = distribution.draw(self._generator)
+            self.task.step(self.policy.bounded(actions), actions.branches)
+            rollout.record(t, actions, distribution.log_probs(actions), self.task)
+            self._memory = _forgotten(memory, self.task)
+        self.policy.body.normalize(rollout.observations[:-1])
+        if not self.hyperparameters.shared_critic:
+            self.critic.body.normalize(rollout.observations[:-1])
+
+    def _rewards(self, rollout: Rollout, transitions: Transitions | None) -> Tensor:
+        """Of every signal times its strength, shape (T, N, signals)."""
+        streams = [rollout.rewards if transitions is None else signal.rewards(transitions) for signal in self.signals]
+        return torch.stack([s.strength * stream for s, stream in zip(self.signals, streams, strict=True)], dim=-1)
+
+    @torch.inference_mode()
+    def _estimate(self, rollout: Rollout, rewards: Tensor) -> dict[str, float]:
+        """Values, advantages and returns of the whole rollout."""
+        values, next_values = self._recurrent_values(rollout) if self.policy.memory_size else self._values(rollout)
+        is_over = rollout.is_over
+        is_final = rollout.is_terminated[..., None] & self._is_episodic
+        is_cut = cut_at_horizon(is_over, self.behavior.time_horizon)
+        streams = advantages(rewards, values, next_values, is_final, is_cut, self._gammas, self.hyperparameters.lambd)
+        returns = streams + values
+        if self.critic.normalizer is not None:
+            self.critic.normalizer.update(returns)
+        rollout.values.copy_(self.critic.own_unit(values))
+        rollout.returns.copy_(self.critic.own_unit(returns))
+        combined = streams.mean(-1)
+        over_buffer = self.hyperparameters.normalize_advantages == "buffer"
+        rollout.advantages.copy_(losses.standardized(combined) if over_buffer else combined)
+        return self._signal_statistics(rewards, values, is_over)
+
+    def _values(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
+        """Of what each decision saw, and of what came of it, shape (T, N, signals) each."""
+        parts = torch.split(rollout.observations.flatten(0, 1), _ROWS)
+        values = torch.cat([self.critic(part) for part in parts]).view(*rollout.observations.shape[:2], -1)
+        next_values = values[1:].clone()
+        is_over = rollout.is_over
+        next_values[is_over] = self.critic(rollout.final_observations[is_over])
+        return values[:-1], next_values
+
+    def _recurrent_values(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
+        """As `_values`, with the critic's memory going along, forgetting where episodes end."""
+        values, next_values = [], []
+        for t, is_over in enumerate(rollout.is_over):
+            if t % rollout.sequence_length == 0:
+                rollout.critic_memories[t // rollout.sequence_length] = self._critic_memory
+            value, memory = self.critic.step(rollout.observations[t], self._critic_memory)
+            next_seen = torch.where(is_over[:, None], rollout.final_observations[t], rollout.observations[t + 1])
+            values.append(value)
+            next_values.append(self.critic.step(next_seen, memory)[0])
+            self._critic_memory = memory.masked_fill(is_over[:, None], 0.0)
+        return torch.stack(values), torch.stack(next_values)
+
+    def _improve(self, rollout: Rollout, transitions: Transitions | None) -> dict[str, float]:
+        """Epochs of minibatches on actor and critic, and on the signals that learn."""
+        numbers = self.hyperparameters
+        done = self.steps / self.behavior.max_steps
+        rate = scheduled(numbers.learning_rate, RATE_FLOOR, numbers.learning_rate_schedule, done)
+        beta = scheduled(numbers.beta, BETA_FLOOR, numbers.beta_schedule, done)
+        epsilon = scheduled(numbers.epsilon, EPSILON_FLOOR, numbers.epsilon_schedule, done)
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate
+        sums = torch.zeros(3, device=self.task.device)
+        of_signals: dict[str, float] = {}
+        update_count = 0
+        for _epoch in range(numbers.num_epoch):
+            moved = []
+            for batch in rollout.minibatches(numbers.batch_size, self._generator):
+                parts, divergence = self._learn(batch, epsilon, beta)
+                sums += parts
+                moved.append(divergence)
+                update_count += 1
+                if transitions is not None:
+                    of_signals |= self._teach_signals(transitions, batch)
+            if numbers.target_kl is not None and torch.stack(moved).mean() > numbers.target_kl:
+                break
+        policy_loss, value_loss, entropy = (sums / update_count).tolist()
+        return of_signals | {
+            "Losses/Policy Loss": abs(policy_loss),
+            "Losses/Value Loss": value_loss,
+            "Policy/Entropy": entropy,
+            "Policy/Learning Rate": rate,
+            "Policy/Epsilon": epsilon,
+            "Policy/Beta": beta,
+        }
+
+    def _learn(self, batch: Batch, epsilon: float, beta: float) -> tuple[Tensor, Tensor]:
+        """One gradient step; policy loss, value loss and entropy, shape (3,), and how far the policy had moved."""
+        features = self._features(self.policy.body, batch)
+        distribution = self.policy.heads(features)
+        if not self.hyperparameters.shared_critic:
+            features = self._features(self.critic.body, batch)
+        log_probs, old_log_probs = distribution.log_probs(batch.actions), batch.log_probs
+        if self.hyperparameters.joint_ratio:
+            log_probs, old_log_probs = log_probs.sum(-1, keepdim=True), old_log_probs.sum(-1, keepdim=True)
+        weights = batch.advantages
+        if self.hyperparameters.normalize_advantages == "minibatch":
+            weights = losses.standardized(weights)
+        policy_loss = losses.policy_loss(log_probs, old_log_probs, weights, epsilon)
+        value_loss = losses.value_loss(self.critic.heads(features), batch.values, batch.returns, epsilon)
+        entropy = distribution.entropy().mean()
+        loss = policy_loss + 0.5 * value_loss - beta * entropy
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        if self.hyperparameters.max_grad_norm is not None:
+            nn.utils.clip_grad_norm_(self._parameters, self.hyperparameters.max_grad_norm)
+        self.optimizer.step()
+        with torch.no_grad():
+            return torch.stack((policy_loss, value_loss, entropy)), losses.divergence(log_probs, old_log_probs)
+
+    def _features(self, body: Body, batch: Batch) -> Tensor:
+        """Of a minibatch, flat, shape (B, features)."""
+        sequences = batch.sequences
+        if sequences is None:
+            features: Tensor = body(batch.observations)
+            return features
+        memory = sequences.memory if body is self.policy.body else sequences.critic_memory
+        observations = batch.observations.view(*sequences.is_start.shape, -1)
+        outputs: Tensor = body(observations, memory, sequences.is_start)
+        return outputs.flatten(0, 1)
+
+    def _teach_signals(self, transitions: Transitions, batch: Batch) -> dict[str, float]:
+        """One update of every signal that learns, on the decisions of a minibatch."""
+        envs = transitions.rewards.shape[1]
+        chosen = transitions[batch.rows // envs, batch.rows % envs]
+        statistics: dict[str, float] = {}
+        for signal in self.signals:
+            statistics |= signal.update(chosen)
+        return statistics
+
+    def _signal_statistics(self, rewards: Tensor, values: Tensor, is_over: Tensor) -> dict[str, float]:
+        """Mean value estimates; mean sums of rewards of the episodes that ended, if any did."""
+        statistics = {
+            f"Policy/{signal.name.capitalize()} Value Estimate": value
+            for signal, value in zip(self.signals, values.mean((0, 1)).tolist(), strict=True)
+        }
+        sums = rewards.cumsum(0) + self._running_sums
+        steps = torch.arange(1, len(is_over) + 1, device=is_over.device)
+        last = (steps[:, None] * is_over).amax(0)  # decisions until the last end of each environment; 0: none ended
+        until = sums.gather(0, (last - 1).clamp(min=0)[None, :, None].expand(1, -1, sums.shape[-1]))[0]
+        until = until * (last > 0)[:, None]
+        self._running_sums = sums[-1] - until
+        count = int(is_over.sum())
+        if count:
+            for signal, total in zip(self.signals, until.sum(0).tolist(), strict=True):
+                statistics[f"Policy/{signal.name.capitalize()} Reward"] = total / count
+        return statistics
+
+    def _critic(self, generator: torch.Generator) -> Critic:
+        """A body of its own unless it is shared."""
+        policy, numbers = self.policy, self.hyperparameters
+        body = policy.body if numbers.shared_critic else policy_body(policy.layout, policy.settings, generator)
+        return Critic(body, len(self.signals), generator, normalizes=numbers.normalize_returns)
+
+    def _store(self, task: Task) -> Rollout:
+        """Room for buffer_size decisions, in whole rounds of all environments and in whole sequences."""
+        steps = math.ceil(self.hyperparameters.buffer_size / task.env_count)
+        memory = self.policy.settings.memory
+        length = min(memory.sequence_length, steps) if memory else 1
+        steps = math.ceil(steps / length) * length
+        sizes = (self.policy.memory_size, length)
+        return Rollout(task.layout, (steps, task.env_count), len(self.signals), sizes, self.task.device)
+
+    def state(self) -> dict[str, Any]:
+        """A copy of all that going on takes."""
+        return copy.deepcopy(
+            {
+                "steps": self.steps,
+                "policy": self.policy.state_dict(),
+                "critic": self.critic.state_dict(),
+                "optimizer": self.optimizer.state_dict(),
+                "generator": self._generator.get_state(),
+                "memory": self._memory.clone(),
+                "critic_memory": self._critic_memory.clone(),
+                "running_sums": self._running_sums.clone(),
+                "signals": [signal.state() for signal in self.signals],
+                "cloning": self.cloning.state() if self.cloning is not None else {},
+                "task": self.task.task.state(),
+            }
+        )
+
+    def load_state(self, state: Mapping[str, Any]) -> None:
+        """Goes on bit for bit from a state of the same settings."""
+        state = copy.deepcopy(dict(state))
+        self.steps = state["steps"]
+        self.policy.load_state_dict(state["policy"])
+        self.critic.load_state_dict(state["critic"])
+        self.optimizer.load_state_dict(state["optimizer"])
+        self._generator.set_state(state["generator"].cpu())
+        self._memory = state["memory"]
+        self._critic_memory = state["critic_memory"]
+        self._running_sums = state["running_sums"]
+        for signal, its_state in zip(self.signals, state["signals"], strict=True):
+            signal.load_state(its_state)
+        if self.cloning is not None:
+            self.cloning.load_state(state["cloning"])
+        self.task.task.load_state(state["task"])
+
+
+def _forgotten(memory: Tensor, task: TaskTensors) -> Tensor:
+    """Memory after a decision: nothing where the episode ended with it."""
+    if not memory.shape[1]:
+        return memory
+    return memory.masked_fill((task.is_terminated | task.is_truncated)[:, None], 0.0)
