@@ -1,16 +1,18 @@
-"""The command line: `honeyguide fly`, `honeyguide estimate` and `honeyguide picture`.
+"""The command line: `honeyguide fly`, `estimate` and `picture`; those of learning tasks come from task_commands.py.
 
 A wrong argument, file or port gives one sentence on standard error and exit code 2; a mission that failed gives 1.
 """
 
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 from rich.console import Console
 
 from autopilot.mavlink.links import GROUND_STATION_PORT, OFFBOARD_PORT
 from common.geodesy import DEFAULT_HOME
+from mission import task_commands
+from mission.refusal import refuse
 
 app = typer.Typer(
     add_completion=False,
@@ -20,7 +22,6 @@ app = typer.Typer(
     help="Fly a simulated drone and its flight controller over MAVLink.",
 )
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
-_ERRORS = Console(stderr=True, soft_wrap=True, highlight=False)
 
 
 def main() -> None:
@@ -98,7 +99,7 @@ def fly(
             )
         )  # fmt: skip
     except UserError as error:
-        _fail(str(error))
+        refuse(str(error))
     raise typer.Exit(exit_code)
 
 
@@ -113,7 +114,7 @@ def estimate(
     try:
         estimate_log(log, output, Console())
     except EstimateError as error:
-        _fail(str(error))
+        refuse(str(error))
 
 
 @app.command()
@@ -138,9 +139,8 @@ def picture(
     try:
         take_picture(output, world, Viewpoint(north, east, up, yaw, pitch, fov), size)
     except PictureError as error:
-        _fail(str(error))
+        refuse(str(error))
 
 
-def _fail(sentence: str) -> NoReturn:
-    _ERRORS.print(f"honeyguide: {sentence}", markup=False)
-    raise typer.Exit(2)
+for _command in (task_commands.demonstrate, task_commands.play, task_commands.drive):
+    app.command()(_command)

@@ -48,7 +48,10 @@ def check_is_free(folder: Path) -> None:
 
     Raises:
         DemonstrationFileError: something is there already, or its parent is missing.
+        ModuleNotFoundError: Minari is not installed.
     """
+    import minari  # noqa: F401, PLC0415  (extra `learn`)
+
     if folder.exists():
         raise DemonstrationFileError(f"{folder}: there is something of that name already")
     if not folder.parent.is_dir():
@@ -62,7 +65,7 @@ def write_demonstrations(folder: Path, origin: Origin, episodes: Sequence[Episod
         DemonstrationFileError: something is there already, or it cannot be written.
     """
     check_is_free(folder)
-    part = part_path(folder)
+    part = part_path(folder).absolute()  # Minari joins a relative path to itself
     try:
         shutil.rmtree(part, ignore_errors=True)
         _write(part, origin, episodes)

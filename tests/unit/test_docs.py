@@ -1,5 +1,6 @@
 """The documentation tells the truth: folder maps, links, commands, examples and the parameter list."""
 
+import inspect
 import re
 import runpy
 import shlex
@@ -19,6 +20,11 @@ NOT_RUN_HERE = {
     'make tune ARGS="--airframe sim/bodies/airframes/f450.toml"': "tests/unit/autopilot/test_tuning.py",
     ".venv/bin/python -m autopilot.estimator.derive": "tests/unit/autopilot/estimator/test_derive.py",
 }
+
+RUN_BY_OTHERS = (
+    f"{HONEYGUIDE} picture ",  # tests/unit/mission/test_picture.py
+    *(f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")),  # tests/unit/mission/test_task_commands.py
+)
 
 
 def modules():
@@ -81,7 +87,7 @@ def flight_arguments(line):
 
 @pytest.mark.parametrize(("page", "line"), commands())
 def test_command_works(page, line, tmp_path, monkeypatch):
-    if line in NOT_RUN_HERE or line.startswith(f"{HONEYGUIDE} picture "):  # tests/unit/mission/test_picture.py
+    if line in NOT_RUN_HERE or line.startswith(RUN_BY_OTHERS):
         return
     arguments = flight_arguments(line)
     assert arguments is not None, f"{page}: nobody runs this: {line}"
@@ -133,8 +139,29 @@ def test_generated_pages_are_current(monkeypatch):
         assert path.read_text(encoding="utf-8") == text, "python docs/generate.py"
 
 
-def test_options_of_fly_are_all_described():
-    described = set(re.findall(r"^\| `(--[\w-]+)", PAGES["docs/flying.md"].read_text(encoding="utf-8"), re.MULTILINE))
-    fly = next(command for command in app.registered_commands if command.callback.__name__ == "fly")
-    names = {f"--{name.replace('_', '-')}" for name in fly.callback.__annotations__ if name != "return"}
-    assert described == names
+SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options are described, if there are several
+    "fly": ("docs/flying.md", ""),
+    "play": ("docs/demonstrations.md", "Watch"),
+    "drive": ("docs/demonstrations.md", "Drive"),
+    "demonstrate": ("docs/demonstrations.md", "Record"),
+}
+
+
+@pytest.mark.parametrize("name", SECTIONS_OF_COMMANDS)
+def test_options_are_all_described(name):
+    page, heading = SECTIONS_OF_COMMANDS[name]
+    text = PAGES[page].read_text(encoding="utf-8")
+    if heading:
+        text = text.partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
+    described = set(re.findall(r"^\| `(--[\w-]+)", text, re.MULTILINE))
+    command = next(command for command in app.registered_commands if command.callback.__name__ == name)
+    options = {
+        parameter.name.replace("_", "-")
+        for parameter in inspect.signature(command.callback).parameters.values()
+        if not is_argument(parameter)
+    }
+    assert described == {f"--{option}" for option in options}
+
+
+def is_argument(parameter):
+    return any(type(mark).__name__ == "ArgumentInfo" for mark in parameter.annotation.__metadata__)

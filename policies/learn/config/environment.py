@@ -109,21 +109,21 @@ class CompletionCriteria(Block):
 
     behavior: str
     """The behaviour that is measured."""
-    measure: Literal["reward", "progress"] = "reward"
-    """Mean episode reward, or steps / max_steps."""
+    measure: Literal["reward", "progress", "success"] = "reward"
+    """Mean episode reward, steps / max_steps, or (ours) the share of episodes that succeeded."""
     threshold: Real = 0.0
     """The lesson is over when the measure is above this."""
     min_lesson_length: NotNegativeWhole = 0
     """Episodes that must have ended first."""
     signal_smoothing: bool = True
-    """Whether the reward is 0.75 of the new mean and 0.25 of the one before."""
+    """Whether the reward (or success) is 0.75 of the new mean and 0.25 of the one before."""
     require_reset: bool = False
     """Whether the environments start anew with the next lesson."""
 
     @model_validator(mode="after")
-    def _progress_is_a_share(self) -> Self:
-        if self.measure == "progress" and not 0.0 <= self.threshold <= 1.0:
-            raise ValueError(f"threshold {self.threshold:g} of progress is not between 0 and 1")
+    def _shares_lie_between_0_and_1(self) -> Self:
+        if self.measure != "reward" and not 0.0 <= self.threshold <= 1.0:
+            raise ValueError(f"threshold {self.threshold:g} of {self.measure} is not between 0 and 1")
         return self
 
 
