@@ -13,7 +13,13 @@ Schedule = Literal["linear", "constant"]
 class Block(BaseModel):
     """One mapping of the file."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        use_attribute_docstrings=True,
+        allow_inf_nan=False,
+        coerce_numbers_to_str=True,  # a run may be called 7
+    )
 
 
 def own_key(default: Any, **limits: Any) -> Any:

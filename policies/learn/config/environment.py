@@ -1,8 +1,9 @@
 """The environment: `environment_parameters` (numbers, samplers, curricula), `env_settings`, `engine_settings`."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from policies.learn.config.block import Block, Count, NotNegative, NotNegativeWhole, Positive, Real, Whole
 from policies.tasks.numbers import Sampler
@@ -99,9 +100,38 @@ class ConstantSampler(Block):
         return Sampler.constant(self.sampler_parameters.value)
 
 
-SamplerSettings = Annotated[
-    UniformSampler | GaussianSampler | MultiRangeUniformSampler | ConstantSampler, Field(discriminator="sampler_type")
-]
+_Samplers = UniformSampler | GaussianSampler | MultiRangeUniformSampler | ConstantSampler
+_SAMPLERS: Mapping[str, type[_Samplers]] = {
+    "uniform": UniformSampler,
+    "gaussian": GaussianSampler,
+    "multirangeuniform": MultiRangeUniformSampler,
+    "constant": ConstantSampler,
+}
+
+
+def _sampler(raw: Any) -> Any:
+    """The sampler of a mapping, chosen here so that errors name the key and not every kind it might have been."""
+    if not isinstance(raw, Mapping):
+        return raw
+    if "sampler_type" not in raw:
+        raise ValueError("has no sampler_type")
+    kind = _SAMPLERS.get(str(raw["sampler_type"]))
+    if kind is None:
+        raise ValueError(f"sampler_type {raw['sampler_type']!r} is not one of {', '.join(_SAMPLERS)}")
+    return kind.model_validate(raw)
+
+
+def _value(raw: Any) -> Any:
+    made = _sampler(raw)
+    if isinstance(made, _Samplers):
+        return made
+    try:
+        return float("bool" if isinstance(raw, bool) else raw)
+    except (TypeError, ValueError):
+        raise ValueError("must be a number or a sampler") from None
+
+
+Value = Annotated[Real | _Samplers, BeforeValidator(_value)]
 
 
 class CompletionCriteria(Block):
@@ -132,7 +162,7 @@ class Lesson(Block):
 
     name: str
     """Shown in summaries."""
-    value: Real | SamplerSettings
+    value: Value
     """The number, or what it is drawn from, in this lesson."""
     completion_criteria: CompletionCriteria | None = None
     """When the next lesson begins; the last lesson has none."""
@@ -156,7 +186,15 @@ class Curriculum(Block):
         return self
 
 
-EnvironmentParameter = Real | SamplerSettings | Curriculum
+def _parameter(raw: Any) -> Any:
+    if isinstance(raw, Curriculum):
+        return raw
+    if isinstance(raw, Mapping) and "curriculum" in raw:
+        return Curriculum.model_validate(raw)
+    return _value(raw)
+
+
+EnvironmentParameter = Annotated[Real | _Samplers | Curriculum, BeforeValidator(_parameter)]
 
 
 def lessons_of(name: str, parameter: EnvironmentParameter) -> tuple[Lesson, ...]:

@@ -1,0 +1,91 @@
+"""What pydantic found wrong with a configuration, as one sentence for the user."""
+
+import difflib
+from collections.abc import Iterable
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails
+
+_BOUNDS = {
+    "greater_than": ("gt", "above"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "below"),
+    "less_than_equal": ("le", "at most"),
+}
+_KINDS = {
+    "float": "a number",
+    "finite": "a finite number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "string": "text",
+    "model": "a mapping of keys to values",
+    "dict": "a mapping of keys to values",
+    "tuple": "a list",
+    "list": "a list",
+    "none": "left out",
+}
+
+
+def sentence(error: ErrorDetails, model: type[BaseModel]) -> str:
+    """What is wrong, without the place.
+
+    Args:
+        error: as pydantic reports it.
+        model: the model that was validated.
+    """
+    kind, context = error["type"], error.get("ctx", {})
+    if kind == "extra_forbidden":
+        return unknown_key(str(error["loc"][-1]), _keys_beside(model, error["loc"]))
+    if kind == "missing":
+        return "is required"
+    if kind == "literal_error":
+        return f"must be {context['expected'].replace(chr(39), '')}, not {shown(error['input'])}"
+    if kind in _BOUNDS:
+        name, word = _BOUNDS[kind]
+        return f"must be {word} {context[name]:g}, not {shown(error['input'])}"
+    if kind in {"value_error", "assertion_error"}:
+        return str(context.get("error", error["msg"]))
+    if kind in {"too_short", "string_too_short"}:
+        return "must not be empty"
+    wanted = _KINDS.get(kind.split("_", maxsplit=1)[0])
+    return f"must be {wanted}, not {shown(error['input'])}" if wanted else error["msg"][0].lower() + error["msg"][1:]
+
+
+def unknown_key(key: str, known_keys: Iterable[str]) -> str:
+    """The sentence about a key that does not exist."""
+    near = difflib.get_close_matches(key, [known for known in known_keys if known != key], n=1)
+    return f"unknown key; did you mean {near[0]}?" if near else "unknown key"
+
+
+def _keys_beside(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
+    """The keys that the block with the last key of a path may have."""
+    models = [model]
+    for step in loc[:-1]:
+        below = [
+            m for at in models if step in at.model_fields for m in _models_in(at.model_fields[str(step)].annotation)
+        ]
+        models = below or models  # a list's index, or the name of a parameter: no field
+    return [key for at in models for key in at.model_fields]
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]
+
+
+def shown(value: Any) -> str:
+    """A value as people wrote it, short."""
+    if value is None:
+        return "empty"
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, list | tuple):
+        return "a list"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, BaseModel):
+        return type(value).__name__
+    text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
