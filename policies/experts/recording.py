@@ -31,14 +31,11 @@ class Episode:
     branches: NDArray[np.int64]  # (steps, branches)
     rewards: NDArray[np.float64]  # (steps,)
     outcome: Outcome
+    is_truncated: bool  # cut by its step limit; a task may call that a success
 
     @property
     def is_success(self) -> bool:
         return self.outcome is Outcome.SUCCESS
-
-    @property
-    def is_truncated(self) -> bool:
-        return self.outcome is Outcome.TIMEOUT
 
 
 @dataclass(slots=True)
@@ -73,23 +70,23 @@ class Recorder:
         rewards, outcomes = border.rewards.numpy().copy(), border.outcomes.numpy()
         for i, row in enumerate(self._rows):
             row.rewards.append(rewards[i])
-        final = border.final_observations.numpy()
-        rows = [int(i) for i in np.flatnonzero(outcomes)]
-        return [(i, self._taken(i, final[i], Outcome(int(outcomes[i])))) for i in rows]
+        return [(int(i), self._taken(int(i), Outcome(int(outcomes[i])))) for i in np.flatnonzero(outcomes)]
 
     def drop(self, i_row: int) -> None:
         """Forgets what the row has done since its last end."""
         self._rows[i_row] = _Row()
 
-    def _taken(self, i: int, final: NDArray[np.float32], outcome: Outcome) -> Episode:
+    def _taken(self, i: int, outcome: Outcome) -> Episode:
         row = self._rows[i]
         self.drop(i)
+        final = self._task.border.final_observations.numpy()[i]
         return Episode(
             observations=np.stack([*row.observations, final]).astype(np.float32),
             continuous=np.stack(row.continuous).astype(np.float32),
             branches=np.stack(row.branches).astype(np.int64),
             rewards=np.array(row.rewards, dtype=np.float64),
             outcome=outcome,
+            is_truncated=bool(self._task.border.is_truncated.numpy()[i]),
         )
 
 
