@@ -21,9 +21,10 @@ import gymnasium
 from common.files import part_path
 from policies.experts.recording import Episode
 from policies.tasks.gym import action_space, observation_space
-from policies.tasks.layout import LAYOUT_KEY, Layout
+from policies.tasks.layout import Layout
 from policies.tasks.task import TaskSettings
 
+LAYOUT_KEY = "honeyguide_layout"
 TASK_KEY = "honeyguide_task"
 SETTINGS_KEY = "honeyguide_settings"
 

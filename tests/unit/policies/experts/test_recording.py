@@ -8,6 +8,7 @@ from minari import MinariDataset
 
 from policies.experts.catalogue import NoExpert, build_expert
 from policies.experts.demonstration_file import (
+    LAYOUT_KEY,
     SETTINGS_KEY,
     DemonstrationFileError,
     Origin,
@@ -17,7 +18,7 @@ from policies.experts.expert import RandomDriver
 from policies.experts.recording import RecordingError, record_episodes
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
-from policies.tasks.layout import LAYOUT_KEY, Layout
+from policies.tasks.layout import Layout
 
 
 def recorded(count=7, rows=3, seed=5, **options):
