@@ -6,6 +6,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from policies.tasks.reach_target.reach_target import ReachTarget
+from policies.tasks.reach_target.settings import ReachSettings
 from policies.tasks.roller_ball import RollerBall
 from policies.tasks.task import Task, TaskSettings
 
@@ -24,6 +26,7 @@ class Entry:
 
 CATALOGUE: dict[str, Entry] = {
     "RollerBall": Entry(TaskSettings, RollerBall),
+    "ReachTarget": Entry(ReachSettings, ReachTarget),
 }
 
 
