@@ -17,7 +17,7 @@ CLIP = 3.0  # ML-Agents' PPO clips draws to ±3 and divides them by 3
 _MASKED = -1e8  # ML-Agents' logit of a choice that does not exist
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _ENTROPY_OF_1 = 0.5 * math.log(2.0 * math.pi * math.e)
-_LOG_SIGMA_LIMITS = (-20.0, 2.0)  # ML-Agents' SAC
+LOG_SIGMA_LIMITS = (-20.0, 2.0)  # ML-Agents' SAC
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class ActionHeads(nn.Module):
         empty = features[..., :0]
         mean = self.mean(features) if self.mean is not None else empty
         if isinstance(self.log_sigma, nn.Linear):
-            log_sigma = self.log_sigma(features).clamp(*_LOG_SIGMA_LIMITS)
+            log_sigma = self.log_sigma(features).clamp(*LOG_SIGMA_LIMITS)
         else:
             log_sigma = empty if self.log_sigma is None else self.log_sigma
         return ActionDistribution(mean, log_sigma, self._choice_logs(features))

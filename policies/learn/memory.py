@@ -15,7 +15,7 @@ class Recurrence(nn.Module):
     def __init__(self, inputs: int, memory_size: int, generator: torch.Generator) -> None:
         super().__init__()
         self.size = memory_size // 2
-        self.lstm: nn.LSTM = nn.utils.skip_init(nn.LSTM, inputs, self.size)  # type: ignore[no-untyped-call]
+        self.lstm = nn.LSTM(inputs, self.size, device="meta").to_empty(device="cpu")  # no draw from a global generator
         with torch.no_grad():
             for name, parameter in self.lstm.named_parameters():
                 for i_gate, gate in enumerate(parameter.chunk(4)):

@@ -1,0 +1,156 @@
+"""A policy judged: it plays a fixed number of episodes in every environment, and these are counted.
+
+In: a policy and a task. Out: how the episodes ended, with a confidence interval. Short episodes are not favoured: how
+many episodes each environment plays is decided before the first one begins.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from policies.learn.policy import Policy
+from policies.learn.tensors import TaskTensors
+from policies.tasks.catalogue import build_task
+from policies.tasks.episode import Outcome
+from policies.tasks.numbers import Sampler
+from policies.tasks.task import Task, TaskSettings
+
+ENVIRONMENTS = 500  # at most, side by side
+LONGEST = 10_000  # decisions after which an episode counts as a timeout: some tasks have no limit of their own (guess)
+_Z95 = 1.959964  # two-sided 95 % of a normal distribution
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """What the episodes came to."""
+
+    outcomes: dict[str, int]  # episodes by name of the outcome, in lower case
+    mean_return: float
+    mean_length: float  # [decisions]
+
+    @property
+    def episodes(self) -> int:
+        return sum(self.outcomes.values())
+
+    @property
+    def success_rate(self) -> float:
+        return self.outcomes["success"] / self.episodes
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Of the success rate, 95 %."""
+        return wilson_interval(self.outcomes["success"], self.episodes)
+
+
+def wilson_interval(successes: int, count: int) -> tuple[float, float]:
+    """The 95 % confidence interval of a rate (Wilson 1927, eq. 1: it holds near 0 and 1 too)."""
+    if count == 0:
+        return 0.0, 1.0
+    rate = successes / count
+    shrink = 1.0 + _Z95**2 / count
+    middle = (rate + _Z95**2 / (2.0 * count)) / shrink
+    half = _Z95 / shrink * math.sqrt(rate * (1.0 - rate) / count + _Z95**2 / (4.0 * count**2))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def evaluate(
+    policy: Policy,
+    name: str,
+    settings: TaskSettings,
+    *,
+    episodes: int,
+    seed: int,
+    numbers: Mapping[str, Sampler] | None = None,
+    is_greedy: bool = True,
+    longest: int = LONGEST,
+) -> Evaluation:
+    """Plays exactly so many episodes.
+
+    Args:
+        policy: what acts; it is not changed.
+        name: the task.
+        settings: of the task; its `split` says on which places.
+        episodes: how many count.
+        seed: of the episodes, and of the actions if they are drawn.
+        numbers: of the task, if they are not the settings' own.
+        is_greedy: takes the most probable action; else it is drawn.
+        longest: decisions after which an episode is cut and counts as a timeout.
+
+    Raises:
+        LayoutError: the policy was made for another task, or for other settings of it.
+        NumberError: a number that the task has not.
+    """
+    device = next(policy.parameters()).device
+    task = build_task(name, min(episodes, ENVIRONMENTS), settings, str(device))
+    task.layout.require(policy.layout, "policy")
+    task.set_numbers(numbers or {})
+    task.reset(seed)
+    generator = None if is_greedy else torch.Generator(device).manual_seed(seed)
+    return _play(policy, task, _quota(episodes, task.env_count), generator, longest)
+
+
+def _quota(episodes: int, env_count: int) -> NDArray[np.int64]:
+    """How many episodes of each environment count, shape (envs,)."""
+    return np.array([episodes // env_count + (i < episodes % env_count) for i in range(env_count)], dtype=np.int64)
+
+
+def _play(
+    policy: Policy, task: Task, quota: NDArray[np.int64], generator: torch.Generator | None, longest: int
+) -> Evaluation:
+    tensors = TaskTensors(task)
+    memory = policy.start_memory(task.env_count)
+    tally = _Tally(quota, longest)
+    with torch.inference_mode():
+        while not tally.is_complete:
+            actions, memory = policy.act(tensors.observations, memory, generator)
+            tensors.step(policy.bounded(actions), actions.branches)
+            is_over, is_cut = tally.count(tensors.rewards.cpu().numpy(), tensors.outcomes.cpu().numpy())
+            memory = memory.masked_fill(torch.from_numpy(is_over).to(memory.device)[:, None], 0.0)
+            if is_cut.any():
+                task.begin(is_cut)
+    return tally.evaluation()
+
+
+class _Tally:
+    """Counts episodes, as many of each environment as were asked for; shapes (envs,)."""
+
+    def __init__(self, quota: NDArray[np.int64], longest: int) -> None:
+        self._left = quota.copy()
+        self._longest = longest
+        self._returns = np.zeros(len(quota))
+        self._steps = np.zeros(len(quota), dtype=np.int64)
+        self._outcomes = np.zeros(len(Outcome), dtype=np.int64)
+        self._return_sum = 0.0
+        self._length_sum = 0
+
+    @property
+    def is_complete(self) -> bool:
+        return not self._left.any()
+
+    def count(
+        self, rewards: NDArray[np.float32], outcomes: NDArray[np.int32]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Books one decision; says where an episode is over, and where because it took too long."""
+        self._returns += rewards
+        self._steps += 1
+        is_ended = outcomes != Outcome.RUNNING
+        is_cut = ~is_ended & (self._steps >= self._longest)
+        is_over = is_ended | is_cut
+        is_counted = is_over & (self._left > 0)
+        ends = np.where(is_cut, Outcome.TIMEOUT, outcomes)[is_counted]
+        self._outcomes += np.bincount(ends, minlength=len(Outcome))
+        self._return_sum += float(self._returns[is_counted].sum())
+        self._length_sum += int(self._steps[is_counted].sum())
+        self._left -= is_counted
+        self._returns[is_over] = 0.0
+        self._steps[is_over] = 0
+        return is_over, is_cut
+
+    def evaluation(self) -> Evaluation:
+        count = int(self._outcomes.sum())
+        outcomes = {outcome.name.lower(): int(self._outcomes[outcome]) for outcome in Outcome if outcome}
+        return Evaluation(outcomes, self._return_sum / count, self._length_sum / count)

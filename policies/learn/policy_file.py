@@ -1,0 +1,77 @@
+"""Policy files: weights, the layout they were made for, the network's settings, and a card saying where they come from.
+
+In: a trained policy. Out: one small file that `honeyguide eval`, `export` and `play` take, and that is refused for any
+other task.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from pydantic import ValidationError
+
+from policies.learn.checkpoint import CheckpointError, load, save
+from policies.learn.config.network import NetworkSettings
+from policies.learn.policy import Policy
+from policies.tasks.layout import Layout
+
+KIND = "policy"
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyCard:
+    """Where a policy comes from, and how good it was found to be."""
+
+    task: str
+    settings: dict[str, Any]  # of the task, all of them
+    seed: int
+    steps: int
+    figures: dict[str, float] = field(default_factory=dict)  # "success_rate", "episodes", …
+
+
+def save_policy(path: Path, policy: Policy, card: PolicyCard) -> None:
+    """Writes a policy file.
+
+    Raises:
+        CheckpointError: it cannot be written.
+    """
+    save(path, {"policy": policy_record(policy), "card": asdict(card)}, KIND)
+
+
+def load_policy(path: Path) -> tuple[Policy, PolicyCard]:
+    """Reads a policy file.
+
+    Raises:
+        CheckpointError: no such file, damaged, or not a policy.
+    """
+    content = load(path, KIND)
+    return policy_of(content["policy"], str(path)), PolicyCard(**content["card"])
+
+
+def policy_record(policy: Policy) -> dict[str, Any]:
+    """A policy as plain values and tensors."""
+    return {
+        "layout": policy.layout.record(),
+        "network": policy.settings.model_dump(),
+        "is_squashed": policy.is_squashed,
+        "weights": policy.state_dict(),
+    }
+
+
+def policy_of(record: Mapping[str, Any], place: str) -> Policy:
+    """What `policy_record` returned; `place` is named if it does not fit together.
+
+    Raises:
+        CheckpointError: written by another version of this program.
+    """
+    try:
+        settings = NetworkSettings.model_validate(record["network"])
+        layout = Layout.from_record(record["layout"])
+        policy = Policy(layout, settings, torch.Generator().manual_seed(0), is_squashed=record["is_squashed"])
+        policy.load_state_dict(record["weights"])
+    except (ValidationError, KeyError, TypeError, RuntimeError) as error:
+        reason = str(error).strip().splitlines()[-1].strip()
+        raise CheckpointError(f"{place}: written by another version of honeyguide: {reason}") from error
+    return policy.eval()

@@ -1,0 +1,48 @@
+"""Policy files: what was saved acts the same, and is refused where it does not fit."""
+
+import pytest
+import torch
+
+from policies.learn.checkpoint import CheckpointError, load, save
+from policies.learn.config.network import Memory, NetworkSettings
+from policies.learn.policy import Policy
+from policies.learn.policy_file import PolicyCard, load_policy, save_policy
+from policies.tasks.catalogue import build_task
+
+CARD = PolicyCard("RollerBall", {"preset": "as-coded"}, 7, 1000, {"success_rate": 0.99})
+
+
+def make_policy(**network):
+    policy = Policy(
+        build_task("RollerBall", 1).layout, NetworkSettings(normalize=True, **network), torch.Generator().manual_seed(0)
+    )
+    policy.body.normalize(torch.randn(50, 8, generator=torch.Generator().manual_seed(1)))
+    return policy
+
+
+@pytest.mark.parametrize("network", [{}, {"memory": Memory(memory_size=16)}])
+def test_policy_that_was_saved_acts_the_same(tmp_path, network):
+    policy = make_policy(**network)
+    save_policy(tmp_path / "a.pt", policy, CARD)
+    again, card = load_policy(tmp_path / "a.pt")
+    assert card == CARD
+    observations = torch.randn(20, 8, generator=torch.Generator().manual_seed(2))
+    acted = [each.act(observations, each.start_memory(20)) for each in (policy, again)]
+    assert torch.equal(acted[0][0].continuous, acted[1][0].continuous)
+    assert torch.equal(acted[0][1], acted[1][1])
+    assert again.layout == policy.layout
+
+
+def test_policy_file_of_two_layers_of_128_is_small(tmp_path):
+    save_policy(tmp_path / "a.pt", make_policy(), CARD)
+    assert (tmp_path / "a.pt").stat().st_size < 200_000
+
+
+def test_policy_of_another_version_is_refused(tmp_path):
+    path = tmp_path / "a.pt"
+    save_policy(path, make_policy(), CARD)
+    content = load(path, "policy")
+    del content["policy"]["weights"]["body.layers.0.weight"]
+    save(path, content, "policy")
+    with pytest.raises(CheckpointError, match=r"a\.pt: written by another version of honeyguide: .*body\.layers\.0"):
+        load_policy(path)
