@@ -6,6 +6,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from policies.tasks.parking.level1 import Parking1
+from policies.tasks.parking.settings import ParkingSettings
 from policies.tasks.reach_target.reach_target import ReachTarget
 from policies.tasks.reach_target.settings import ReachSettings
 from policies.tasks.roller_ball import RollerBall
@@ -27,6 +29,7 @@ class Entry:
 CATALOGUE: dict[str, Entry] = {
     "RollerBall": Entry(TaskSettings, RollerBall),
     "ReachTarget": Entry(ReachSettings, ReachTarget),
+    "Parking1": Entry(ParkingSettings, Parking1),
 }
 
 

@@ -1,0 +1,265 @@
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import policies  # noqa: F401  (registers the tasks)
+from policies.tasks.catalogue import UnknownTask, build_task, task_settings
+from policies.tasks.episode import Outcome
+from policies.tasks.numbers import Sampler
+from policies.tasks.parking.arena import BLOCK_PLACES, LEVEL1_MARKER, LEVEL1_SPOTS, LEVEL1_START, pose
+
+PRESETS = ("as-documented", "as-coded", "improved")
+PUSH, RIGHT, LEFT = 0, 1, 2
+
+
+def built(env_count=1, seed=0, numbers=None, **settings):
+    task = build_task("Parking1", env_count, task_settings("Parking1", settings))
+    task.set_numbers(numbers or {})
+    task.reset(seed)
+    return task
+
+
+def act(task, *actions):
+    """Steps with one action, or one per row; returns rewards."""
+    task.border.branches.numpy()[:] = np.array(actions).reshape(-1, task.border.branches.shape[1])
+    task.step()
+    return task.border.rewards.numpy().copy()
+
+
+def put(task, row, *, pos=None, yaw_deg=None, vel=None, goal=None):
+    """Moves car or goal of one row."""
+    world = task.world
+    if pos is not None:
+        world.pos.numpy()[row] = pos
+    if yaw_deg is not None:
+        world.yaw.numpy()[row] = np.radians(yaw_deg)
+    if vel is not None:
+        world.vel.numpy()[row] = vel
+    if goal is not None:
+        world.goal.numpy()[row] = pose(goal)
+
+
+def drive_until_over(task, action, limit=2000):
+    for _ in range(limit):
+        act(task, action)
+        if task.border.outcomes.numpy()[0]:
+            return Outcome(int(task.border.outcomes.numpy()[0]))
+    return Outcome.RUNNING
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.filterwarnings("ignore:.*A Box observation space m.*infinity.*:UserWarning")
+def test_it_is_a_valid_gymnasium_environment(preset):
+    check_env(gymnasium.make("honeyguide/Parking1-v0", preset=preset, render_mode="rgb_array").unwrapped)
+
+
+def test_presets_have_the_documented_sizes_of_observation_and_action():
+    assert [built(preset=preset).layout.observation_size for preset in PRESETS] == [27, 27, 22]
+    assert [built(preset=preset).layout.branch_sizes for preset in PRESETS] == [(3,), (3,), (3, 3)]
+    assert [built(preset=preset).decision_s for preset in PRESETS] == [0.06, 0.06, 0.06]
+
+
+def test_a_push_as_coded_adds_two_metres_per_second_and_is_damped_in_three_ticks():
+    task = built()
+    speed = 0.0
+    for _ in range(5):
+        act(task, PUSH)
+        speed = (speed + 800.0 / 8.0 * 0.02) * 0.84**3
+    assert task.world.vel.numpy()[0] == pytest.approx([0.0, speed], rel=1e-5)
+
+
+def test_as_documented_the_car_is_pushed_in_every_tick_and_reaches_its_terminal_speed():
+    task = built(preset="as-documented")
+    put(task, 0, goal=(8.0, 12.0, 0.0))
+    for _ in range(20):
+        act(task, 0)
+    assert task.world.vel.numpy()[0][1] == pytest.approx(1.0 * 0.84 / 0.16, rel=1e-4)  # v = (v + 400/8 x 0.02) x 0.84
+
+
+def test_a_turn_as_coded_is_three_degrees_and_leaves_the_push_out():
+    task = built()
+    act(task, RIGHT)
+    assert np.degrees(task.world.yaw.numpy()[0]) == pytest.approx(3.0, abs=1e-4)
+    act(task, LEFT)
+    act(task, LEFT)
+    assert np.degrees(task.world.yaw.numpy()[0]) == pytest.approx(-3.0, abs=1e-4)
+    assert not task.world.vel.numpy().any()
+
+
+def test_the_first_goal_as_coded_is_the_marker_of_the_scene_and_a_crash_keeps_it_and_the_velocity():
+    task = built()
+    assert task.world.goal.numpy()[0, :2] == pytest.approx(LEVEL1_MARKER)
+    put(task, 0, pos=(-13.0, 13.8), vel=(0.0, 5.0))
+    act(task, PUSH)
+    assert task.border.outcomes.numpy()[0] == Outcome.HIT_WALL
+    assert task.world.goal.numpy()[0, :2] == pytest.approx(LEVEL1_MARKER)
+    assert task.world.pos.numpy()[0] == pytest.approx(LEVEL1_START[:2])
+    assert task.world.vel.numpy()[0, 1] > 3.0
+
+
+def test_a_park_as_coded_draws_one_of_the_three_spots_and_stops_the_car():
+    task = built(64)
+    for row in range(64):
+        put(task, row, pos=LEVEL1_MARKER, vel=(0.0, 1.0))
+    act(task, *[PUSH] * 64)
+    assert (task.border.outcomes.numpy() == Outcome.SUCCESS).all()
+    assert not task.world.vel.numpy().any()
+    goals = {tuple(np.round(goal, 3)) for goal in task.world.goal.numpy()[:, :2].tolist()}
+    assert goals == set(LEVEL1_SPOTS)
+
+
+def test_as_documented_every_episode_draws_a_spot_and_starts_at_rest():
+    task = built(64, preset="as-documented")
+    for row in range(64):
+        put(task, row, pos=(0.0, 14.0), vel=(0.0, 5.0))
+    act(task, *[0] * 64)
+    assert (task.border.outcomes.numpy() == Outcome.HIT_WALL).all()
+    assert not task.world.vel.numpy().any()
+    assert len({tuple(goal) for goal in task.world.goal.numpy()[:, :2].tolist()}) == len(LEVEL1_SPOTS)
+
+
+@pytest.mark.parametrize(("x", "z", "yaw_deg"), BLOCK_PLACES)
+def test_driving_into_a_block_ends_as_a_hit_of_an_obstacle(x, z, yaw_deg):
+    task = built(goals="anywhere")
+    put(task, 0, pos=(x, z - 4.0), yaw_deg=0.0, goal=(14.0, 14.0, 0.0))
+    assert drive_until_over(task, PUSH) == Outcome.HIT_OBSTACLE
+    assert task.border.rewards.numpy()[0] == pytest.approx(-0.5, abs=0.02)
+
+
+def test_an_episode_without_limit_goes_on_and_one_with_a_limit_is_truncated():
+    task = built(2)
+    for _ in range(300):
+        act(task, RIGHT, RIGHT)
+    assert task.border.steps.numpy().tolist() == [300, 300]
+    task = built(2, numbers={"step_limit": 20.0})
+    for _ in range(20):
+        act(task, RIGHT, RIGHT)
+    assert (task.border.outcomes.numpy() == Outcome.TIMEOUT).all()
+    assert task.border.is_truncated.numpy().all()
+    assert not task.border.is_terminated.numpy().any()
+
+
+def test_success_in_pose_needs_place_heading_and_slowness():
+    task = built(5, preset="improved")
+    numbers_ahead = 0.29
+    for row, (offset, turn_deg, speed) in enumerate(
+        [(0.0, 0.0, 0.0), (0.4, 0.0, 0.0), (0.0, 14.0, 0.0), (0.0, 0.0, 1.0), (0.2, -8.0, 0.1)]
+    ):
+        goal = (0.0, 0.0, 30.0)
+        task.world.blocks.numpy()[row] = [pose((12.0, z, 0.0)) for z in (-9.0, 0.0, 9.0)]
+        yaw = np.radians(goal[2] + turn_deg)
+        nose = np.array([np.sin(yaw), np.cos(yaw)])
+        put(
+            task, row, pos=(offset, 0.0) - numbers_ahead * nose, yaw_deg=goal[2] + turn_deg, vel=speed * nose, goal=goal
+        )
+    act(task, *[(0, 0)] * 5)
+    assert task.border.outcomes.numpy().tolist() == [Outcome.SUCCESS, 0, 0, 0, Outcome.SUCCESS]
+
+
+def test_improved_episodes_differ_and_begin_clear_of_everything():
+    task = built(2048, preset="improved")
+    assert not task.border.outcomes.numpy().any()
+    act(task, *[(0, 0)] * 2048)
+    assert not task.border.outcomes.numpy().any()
+    blocks = task.world.blocks.numpy()[..., :2]
+    gaps = np.linalg.norm(blocks[:, [0, 0, 1]] - blocks[:, [1, 2, 2]], axis=-1)
+    assert gaps.min() >= 6.0
+    goals = task.world.goal.numpy()[:, :2]
+    assert np.linalg.norm(blocks - goals[:, None], axis=-1).min() > 1.6
+    assert np.linalg.norm(task.world.pos.numpy() - goals, axis=-1).min() >= 3.1
+    for values in (goals[:, 0], task.world.yaw.numpy(), blocks[:, 0, 0]):
+        assert len(np.unique(values)) > 1900
+
+
+def test_goals_of_train_and_test_lie_in_different_cells():
+    def goal_cells(split):
+        task = built(4096, goals="anywhere", split=split, resets="clean")
+        return {tuple(cell) for cell in np.floor(task.world.goal.numpy()[:, :2]).astype(int).tolist()}
+
+    train, test = goal_cells("train"), goal_cells("test")
+    assert not train & test
+    assert 0.15 < len(test) / (len(train) + len(test)) < 0.25
+    assert len(train) > 300
+
+
+def test_starts_may_be_kept_near_the_goal():
+    task = built(512, starts="anywhere", goals="anywhere", resets="clean", numbers={"start_range_m": 5.0})
+    gaps = np.abs(task.world.pos.numpy() - task.world.goal.numpy()[:, :2])
+    assert gaps.max() <= 5.0
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_rows_do_not_depend_on_who_else_is_in_the_batch_and_seeds_repeat(preset):
+    def episode(env_count, seed):
+        task = built(env_count, seed, preset=preset, rays=3)
+        seen = []
+        for k in range(150):
+            choices = [[(k * 7 + row) // 5 % size for size in task.layout.branch_sizes] for row in range(env_count)]
+            act(task, *choices)
+            seen.append(np.concatenate([task.border.observations.numpy()[0], task.border.rewards.numpy()[:1]]))
+        return np.array(seen).tobytes()
+
+    assert episode(1, 3) == episode(40, 3)
+    assert episode(1, 3) == episode(1, 3)
+    assert preset != "improved" or episode(1, 3) != episode(1, 4)
+
+
+def test_a_restored_task_continues_bit_for_bit():
+    task = built(16, preset="improved")
+    act(task, *[(1, 1)] * 16)
+    state = task.state()
+    ends = []
+    for _ in range(2):
+        task.load_state(state)
+        for k in range(60):
+            act(task, *[(k % 3, 1)] * 16)
+        ends.append(task.state())
+    assert all(ends[0][name].tobytes() == ends[1][name].tobytes() for name in ends[0])
+
+
+def test_a_mirrored_world_gives_mirrored_ranges():
+    task = built(2, observation="ranged", rays=4)
+    for row, side in enumerate((1.0, -1.0)):
+        put(task, row, pos=(side * 3.0, -11.0), yaw_deg=side * 20.0, goal=(side * 8.0, 9.0, side * 40.0))
+        task.world.blocks.numpy()[row] = [
+            pose((side * x, z, side * yaw)) for x, z, yaw in ((4.0, 2.0, 25.0), (-6.0, 3.0, -50.0), (9.0, -9.0, 10.0))
+        ]
+    act(task, PUSH, PUSH)
+    names = [element.name for element in task.layout.frame]
+    seen = {name: task.border.observations.numpy()[:, k] for k, name in enumerate(names)}
+    for name in names:
+        if name.endswith("_right") and "wall" not in name:
+            assert seen[name][0] == pytest.approx(-seen[name][1], abs=1e-5), name
+        elif name.endswith("_forward") and "wall_x" not in name:
+            assert seen[name][0] == pytest.approx(seen[name][1], abs=1e-5), name
+    assert seen["ray_right_1_fraction"][0] == pytest.approx(seen["ray_left_1_fraction"][1], abs=2e-3)
+
+
+def test_numbers_may_be_randomised():
+    task = built(256, numbers={"drag_per_s": Sampler(intervals=((4.0, 12.0),))})
+    act(task, *[PUSH] * 256)
+    drag = task.border.numbers.numpy()[:, task.number_table.names.index("drag_per_s")]
+    assert drag.std() > 1.0
+    assert task.world.vel.numpy()[:, 1] == pytest.approx(2.0 * (1.0 - drag * 0.02) ** 3, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"preset": "hard"}, "Parking1: preset: .*as-documented, as-coded or improved"),
+        ({"split": "all"}, "Parking1: split: .*train or test"),
+        ({"ray_tags": "wall+tree"}, "Parking1: ray_tags: .*at most once"),
+        ({"observation": "pixels"}, "Parking1: observation"),
+    ],
+)
+def test_settings_that_do_not_exist_are_refused_in_one_sentence(settings, message):
+    with pytest.raises(UnknownTask, match=message):
+        task_settings("Parking1", settings)
+
+
+def test_pictures_show_every_preset():
+    for preset in PRESETS:
+        picture = built(preset=preset, rays=4).picture(0, 240)
+        assert picture.shape[0] == 240
+        assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 5
