@@ -8,12 +8,13 @@ ML-Agents does not have are off by default (`policies/learn/config/behavior.py` 
 import copy
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from policies.learn import losses
+from policies.learn.bc import Cloning
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
 from policies.learn.gae import advantages, cut_at_horizon
 from policies.learn.learner import Iteration
@@ -27,18 +28,6 @@ from policies.learn.tensors import TaskTensors
 from policies.tasks.task import Task
 
 _ROWS = 8192  # observations the critic values at once: what they pass through stays in the processor's cache
-
-
-class Cloning(Protocol):
-    """Behavioural cloning that runs beside the updates."""
-
-    def update(self) -> dict[str, float]:
-        """Trains the policy on demonstrations after an update; TensorBoard tags to values."""
-        ...
-
-    def state(self) -> dict[str, Any]: ...
-
-    def load_state(self, state: Mapping[str, Any]) -> None: ...
 
 
 class Ppo:
@@ -97,7 +86,7 @@ class Ppo:
         rewards = self._rewards(rollout, transitions)
         statistics = self._estimate(rollout, rewards) | self._improve(rollout, transitions)
         if self.cloning is not None:
-            statistics |= self.cloning.update()
+            statistics |= self.cloning.update(self.steps)
         return Iteration(rollout.rewards.numel(), self.task.task.take_scores(), statistics)
 
     @torch.inference_mode()

@@ -57,8 +57,8 @@ class RndSettings(SignalSettings):
 
     learning_rate: Positive = 1e-4
     """Of the predictor."""
-    normalize_reward: bool = own_key(False)
-    """Whether rewards are divided by the running deviation of their returns, as in the RND paper."""
+    normalize_reward: bool = own_key(True)
+    """Whether observations and rewards are normalised, as in the RND paper; false: neither, as in ML-Agents."""
 
 
 class RewardSignals(Block):
