@@ -39,7 +39,8 @@ def demonstrate(
 
 
 def play(
-    task: Annotated[str, _TASK],
+    task_or_policy: Annotated[str, typer.Argument(help="A task's name, or a policy's file.")],
+    policy: Annotated[Path | None, typer.Option(help="A policy's file, to play it in the named task.")] = None,
     random: Annotated[bool, typer.Option("--random", help="Actions by chance instead of the expert's.")] = False,
     mp4: Annotated[Path | None, typer.Option(help="Write a film instead of opening a window.")] = None,
     episodes: Annotated[int, typer.Option(min=1, max=100_000, help="End after this many.")] = 5,
@@ -47,18 +48,19 @@ def play(
     env_args: _EnvArgs = None,
     seed: _Seed = 0,
 ) -> None:
-    """Watch a task's expert, or chance, in a window or as a film."""
+    """Watch a trained policy, a task's expert, or chance, in a window or as a film."""
     with learn_extra():
-        from mission.play import PlayOptions, play_task
+        from mission.play import PlayError, PlayOptions, play_task
         from mission.video import VideoError
         from mission.window import WindowError
         from policies.experts.catalogue import NoExpert
         from policies.tasks.catalogue import UnknownTask
+        from policies.tasks.layout import LayoutError
 
-        options = PlayOptions(task, episodes, envs, seed, tuple(env_args or ()), random, mp4)
+        options = PlayOptions(task_or_policy, episodes, envs, seed, tuple(env_args or ()), policy, random, mp4)
         try:
             typer.echo(play_task(options))
-        except (UnknownTask, NoExpert, WindowError, VideoError) as error:
+        except (UnknownTask, NoExpert, PlayError, LayoutError, WindowError, VideoError) as error:
             refuse(str(error))
 
 

@@ -1,18 +1,19 @@
 """A task as a command is given it: a name of the catalogue, and KEY=VALUE pairs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.task import Task, TaskSettings
 
 
-def settings_of(task: str, pairs: Sequence[str]) -> TaskSettings:
-    """The settings of a task from the pairs of `--env-args`.
+def settings_of(task: str, pairs: Sequence[str], others: Mapping[str, Any] | None = None) -> TaskSettings:
+    """The settings of a task from the pairs of `--env-args`, and from `others` where they say nothing.
 
     Raises:
         UnknownTask: no such task or setting, a value it cannot have, or no pair.
     """
-    values: dict[str, str] = {}
+    values = dict(others or {})
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not equals or not key:

@@ -108,6 +108,41 @@ def test_environments_are_tiled(run, tmp_path):
     assert pictures[0][480:, 480:].max() < 30  # no fourth environment
 
 
+def policy_file(folder):
+    import torch
+
+    from policies.learn.config.network import NetworkSettings
+    from policies.learn.policy import Policy
+    from policies.learn.policy_file import PolicyCard, save_policy
+    from policies.tasks.catalogue import build_task
+
+    layout = build_task("RollerBall", 1).layout
+    policy = Policy(layout, NetworkSettings(hidden_units=8), torch.Generator().manual_seed(0))
+    save_policy(folder / "ball.pt", policy, PolicyCard("RollerBall", {"preset": "as-coded"}, 0, 0))
+
+
+def test_policy_is_played_by_its_file_alone(run, tmp_path):
+    policy_file(tmp_path)
+    for words in (["ball.pt"], ["RollerBall", "--policy", "ball.pt"]):
+        result = run("play", *words, "--mp4", "a.mp4", "--episodes", 1)
+        assert "1 episodes: " in result.output
+    assert len(pictures_of(tmp_path / "a.mp4")[1]) > 1
+
+
+def test_policy_of_another_layout_is_refused(run, tmp_path):
+    policy_file(tmp_path)
+    result = run("play", "ball.pt", "--env-args", "stack=2", "--mp4", "a.mp4")
+    assert result.exit_code == 2
+    assert "ball.pt: made for another task or preset: stacked frames is 1 there and 2 here" in result.stderr
+
+
+def test_file_that_is_no_policy_is_refused(run, tmp_path):
+    (tmp_path / "ball.pt").write_bytes(b"no policy")
+    result = run("play", "ball.pt", "--mp4", "a.mp4")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("honeyguide: ball.pt: ")
+
+
 def test_window_shows_until_it_is_closed(run, pygame):
     pygame.event.post(pygame.event.Event(pygame.QUIT))
     assert "no episode ended" in run("play", "RollerBall").output
