@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from policies.experts.expert import Expert
+from policies.experts.pursuit import PursuitExpert
 from policies.experts.roller_ball import RollerBallExpert
 
 
@@ -12,6 +13,7 @@ class NoExpert(ValueError):
 
 EXPERTS: dict[str, Callable[[], Expert]] = {
     "RollerBall": RollerBallExpert,
+    "ReachTarget": PursuitExpert,
 }
 
 

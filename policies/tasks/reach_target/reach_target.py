@@ -80,17 +80,16 @@ class ReachTarget(Task):
         self._record(begin, step, [state, _rules(settings)])
 
     def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
-        """Platform, car and target from above, z upwards; at the bottom right what is around the car."""
+        """Platform, car and target from above, z upwards; beside it what is close to the car."""
         half = 1.1 * float(self._row(i_env)["half_platform_m"])
-        canvas = Canvas((-half, half), (-half, half), height_px)
+        canvas = Canvas((-half, 1.6 * half), (-half, half), height_px)
         self._draw(canvas, i_env)
         world: Any = self.world
         x, _, z = (float(value) for value in world.pos.numpy()[i_env])
         near = Canvas((x - _INSET_M, x + _INSET_M), (z - _INSET_M, z + _INSET_M), height_px // 4)
         self._draw(near, i_env)
         height, width = near.pixels.shape[:2]
-        canvas.pixels[-height - 2 :, -width - 2 :] = INK
-        canvas.pixels[-height:, -width:] = near.pixels
+        canvas.pixels[:height, -width:] = near.pixels
         speed = float(np.linalg.norm(world.vel.numpy()[i_env]))
         canvas.text(f"{float(self.border.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {speed:4.1f} m/s")
         return canvas.pixels
