@@ -1,4 +1,4 @@
-"""ReachTarget's expert: pure pursuit of the target, slow enough for the bend and for the edge, in reverse to turn round.
+"""ReachTarget's expert: pure pursuit of the target, slow enough for bends and edges, in reverse to turn round.
 
 It steers on the arc that leads through the target (Coulter 1992, CMU-RI-TR-92-01). A target inside the turning circle,
 or an edge close ahead, puts it into reverse until the nose has come round. It reads the task's world and numbers.
