@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Literal, Self
 
-from pydantic import ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from policies.learn.config.block import (
     Block,
@@ -20,6 +20,11 @@ from policies.learn.config.block import (
 )
 from policies.learn.config.network import NetworkSettings
 from policies.learn.config.signals import ExtrinsicSettings, RewardSignals
+
+
+def _as(key: str, otherwise: Any) -> Any:
+    """The default of a key that is as another one, declared above it."""
+    return Field(default_factory=lambda data: data.get(key, otherwise), json_schema_extra={"as": key})
 
 
 class HyperparametersBase(Block):
@@ -51,12 +56,12 @@ class PpoHyperparameters(HyperparametersBase):
     """`linear`: falls to 0 at max_steps."""
     beta: NotNegative = 5e-3
     """Weight of the entropy."""
-    beta_schedule: Schedule = "linear"
-    """`linear`: falls to 1e-5; the default is the learning rate's schedule."""
+    beta_schedule: Schedule = _as("learning_rate_schedule", "linear")
+    """`linear`: falls to 1e-5."""
     epsilon: Positive = 0.2
     """How far the ratio of new to old probability may move before it is clipped."""
-    epsilon_schedule: Schedule = "linear"
-    """`linear`: falls to 0.1; the default is the learning rate's schedule."""
+    epsilon_schedule: Schedule = _as("learning_rate_schedule", "linear")
+    """`linear`: falls to 0.1."""
     lambd: Share = 0.95
     """λ of the generalised advantage estimate."""
     num_epoch: Count = 3
@@ -71,14 +76,6 @@ class PpoHyperparameters(HyperparametersBase):
     """Whether the ratio is of the whole action, not of each branch and dimension by itself."""
     normalize_advantages: Literal["buffer", "minibatch", "none"] = own_key("buffer")
     """Over what advantages are brought to mean 0 and deviation 1."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _schedules_follow(cls, raw: Any) -> Any:
-        if isinstance(raw, Mapping) and "learning_rate_schedule" in raw:
-            schedule = raw["learning_rate_schedule"]
-            return {"beta_schedule": schedule, "epsilon_schedule": schedule, **raw}
-        return raw
 
 
 class SacHyperparameters(HyperparametersBase):
@@ -96,19 +93,12 @@ class SacHyperparameters(HyperparametersBase):
     """How far the target network follows at each update."""
     steps_per_update: Positive = 1.0
     """Steps of experience per update."""
-    reward_signal_steps_per_update: Positive = 1.0
-    """Steps per update of the reward signals; the default is steps_per_update."""
+    reward_signal_steps_per_update: Positive = _as("steps_per_update", 1.0)
+    """Steps of experience per update of the reward signals."""
     save_replay_buffer: bool = False
     """Whether the replay buffer is saved with the checkpoints."""
     hindsight: NotNegativeWhole = own_key(0)
     """Copies of each step in which a goal reached later in the episode stands for the goal (HER, `future`)."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _signals_follow(cls, raw: Any) -> Any:
-        if isinstance(raw, Mapping) and "steps_per_update" in raw:
-            return {"reward_signal_steps_per_update": raw["steps_per_update"], **raw}
-        return raw
 
 
 Hyperparameters = PpoHyperparameters | SacHyperparameters
@@ -116,6 +106,10 @@ HYPERPARAMETERS: Mapping[str, type[PpoHyperparameters] | type[SacHyperparameters
     "ppo": PpoHyperparameters,
     "sac": SacHyperparameters,
 }
+
+
+def _default_hyperparameters(data: dict[str, Any]) -> Hyperparameters:
+    return HYPERPARAMETERS[data.get("trainer_type", "ppo")]()
 
 
 class BehavioralCloning(Block):
@@ -140,7 +134,7 @@ class Behavior(Block):
 
     trainer_type: Literal["ppo", "sac"] = "ppo"
     """The algorithm."""
-    hyperparameters: Hyperparameters = PpoHyperparameters()
+    hyperparameters: Hyperparameters = Field(default_factory=_default_hyperparameters)
     """Numbers of the algorithm."""
     network_settings: NetworkSettings = NetworkSettings()
     """Networks of the policy and its critic."""
@@ -174,11 +168,6 @@ class Behavior(Block):
     def _no_opponents(cls, raw: Any) -> None:
         if raw is not None:
             raise ValueError("self-play is not supported: each environment has one agent")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _trainer_has_numbers(cls, raw: Any) -> Any:
-        return {"hyperparameters": {}, **raw} if isinstance(raw, Mapping) else raw
 
     @field_validator("hyperparameters", mode="before")
     @classmethod

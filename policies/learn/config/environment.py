@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, model_validator
 
 from policies.learn.config.block import Block, Count, NotNegative, NotNegativeWhole, Positive, Real, Whole
 from policies.tasks.numbers import Sampler
@@ -30,13 +30,15 @@ class GaussianParameters(Block):
 
 
 class MultiRangeUniformParameters(Block):
-    intervals: Annotated[tuple[tuple[Real, Real], ...], Field(min_length=1)] = ((0.0, 1.0),)
+    intervals: tuple[tuple[Real, Real], ...] = ((0.0, 1.0),)
     """Pairs of minimum and maximum."""
     seed: Whole = -1
     """-1: as the run."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
+        if not self.intervals:
+            raise ValueError("has no intervals")
         for low, high in self.intervals:
             if low > high:
                 raise ValueError(f"interval [{low:g}, {high:g}] ends before it begins")
@@ -176,10 +178,13 @@ class Lesson(Block):
 class Curriculum(Block):
     """Lessons of one parameter, in order."""
 
-    curriculum: Annotated[tuple[Lesson, ...], Field(min_length=1)]
+    curriculum: tuple[Lesson, ...]
+    """The lessons."""
 
     @model_validator(mode="after")
     def _lessons_lead_on(self) -> Self:
+        if not self.curriculum:
+            raise ValueError("has no lessons")
         for lesson in self.curriculum[:-1]:
             if lesson.completion_criteria is None:
                 raise ValueError(f"lesson {lesson.name} has no completion_criteria and is not the last")

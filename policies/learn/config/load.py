@@ -135,6 +135,8 @@ def _first_refusal(error: ValidationError, root: Placed, name: str) -> ConfigErr
     """The error that stands first in the file."""
     found: list[tuple[int, ConfigError]] = []
     for detail in error.errors():
+        if detail["type"] == "default_factory_not_called":  # a default that is as another key, which is wrong itself
+            continue
         loc = detail["loc"]
         place, path = place_at(root, ("behaviors", name, *loc[1:]) if loc[:1] == ("behavior",) else loc)
         found.append((place.line, error_at(place, path, sentence(detail, RunConfig))))

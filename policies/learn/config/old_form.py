@@ -142,7 +142,7 @@ def parameters_from_old(samplers: Placed, curricula: Placed, notes: list[str]) -
         if name != "resampling-interval":  # every episode draws anew
             parameters.put(name, _sampler_from_old(mapping_at(samplers, name)), samplers.places[name])
     for behavior in curricula:
-        _add_curricula(parameters, behavior, mapping_at(curricula, behavior), notes)
+        _add_curricula(parameters, behavior, curricula, notes)
     return parameters
 
 
@@ -161,11 +161,12 @@ def _sampler_from_old(old: Placed) -> Placed:
     return sampler
 
 
-def _add_curricula(parameters: Placed, behavior: str, old: Placed, notes: list[str]) -> None:
+def _add_curricula(parameters: Placed, behavior: str, curricula: Placed, notes: list[str]) -> None:
     """One old curriculum sets several parameters by one row of thresholds: each becomes a curriculum of its own."""
+    old = mapping_at(curricula, behavior)
     for key in ("measure", "thresholds", "parameters"):
         if key not in old:
-            raise error_at(old.place, f"curriculum.{behavior}.{key}", "is required")
+            raise error_at(curricula.places[behavior], f"curriculum.{behavior}.{key}", "is required")
     unknown = [key for key in old if key not in {*_CURRICULUM_KEYS, "thresholds", "parameters"}]
     dropped = "unknown key (dropped, as ML-Agents does)"
     notes.extend(note_at(old.places[key], f"curriculum.{behavior}.{key}", dropped) for key in unknown)
@@ -198,5 +199,5 @@ def _lesson(behavior: str, old: Placed, thresholds: list[Any], k: int, value: An
         for key in _CURRICULUM_KEYS:
             if key in old:
                 criteria.take(key, old)
-        lesson.put("completion_criteria", criteria)
+        lesson.put("completion_criteria", criteria, old.places["thresholds"])
     return lesson

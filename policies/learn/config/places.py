@@ -218,6 +218,6 @@ def place_at(root: Placed, loc: tuple[int | str, ...]) -> tuple[Place, str]:
             place = value.place if isinstance(value, Placed) else place
         else:
             text = f"{text}.{step}" if text else step
-            place = value.place_of(step) if isinstance(value, Placed) else place
+            place = value.places.get(step, place) if isinstance(value, Placed) else place
             value = value.get(step) if isinstance(value, Placed) else None
     return place, text
