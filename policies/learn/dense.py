@@ -17,7 +17,7 @@ def dense(inputs: int, outputs: int, generator: torch.Generator, gain: float = 1
 def value_heads(inputs: int, outputs: int, generator: torch.Generator) -> nn.Linear:
     """A linear layer: Xavier uniform, one head at a time; bias 0."""
     layer: nn.Linear = nn.utils.skip_init(nn.Linear, inputs, outputs)  # type: ignore[no-untyped-call]
-    for row in layer.weight:
-        nn.init.xavier_uniform_(row[None], generator=generator)
+    for k in range(outputs):
+        nn.init.xavier_uniform_(layer.weight.data[k : k + 1], generator=generator)
     nn.init.zeros_(layer.bias)
     return layer
