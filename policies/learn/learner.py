@@ -40,3 +40,15 @@ class Learner(Protocol):
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Goes on from what `state` returned."""
         ...
+
+
+class Companion(Protocol):
+    """What trains the policy beside an algorithm: behavioural cloning."""
+
+    def update(self, steps: int) -> dict[str, float]:
+        """Learns after the algorithm has; `steps` as `Learner.steps`. TensorBoard tag to value."""
+        ...
+
+    def state(self) -> dict[str, Any]: ...
+
+    def load_state(self, state: Mapping[str, Any]) -> None: ...

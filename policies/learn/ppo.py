@@ -14,10 +14,9 @@ import torch
 from torch import Tensor, nn
 
 from policies.learn import losses
-from policies.learn.bc import Cloning
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
 from policies.learn.gae import advantages, cut_at_horizon
-from policies.learn.learner import Iteration
+from policies.learn.learner import Companion, Iteration
 from policies.learn.networks import Body, Critic, policy_body
 from policies.learn.policy import Policy
 from policies.learn.rollout import Batch, Rollout
@@ -41,7 +40,7 @@ class Ppo:
         signals: Sequence[RewardSignal],
         *,
         seed: int,
-        cloning: Cloning | None = None,
+        cloning: Companion | None = None,
     ) -> None:
         """Resets the task and makes the critic.
 
