@@ -1,9 +1,10 @@
-"""Writes docs/parameters.md and docs/mavlink.md from the code: `python docs/generate.py`. A test keeps them current."""
+"""Writes the pages of docs that come from the code: `python docs/generate.py`. A test keeps them current."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
 from mavlink_page import mavlink_text
+from training_page import training_text
 
 from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
@@ -21,6 +22,7 @@ from mission.flight import Flight, FlightConfig
 
 PARAMETERS_PATH = Path(__file__).with_name("parameters.md")
 MAVLINK_PATH = Path(__file__).with_name("mavlink.md")
+TRAINING_PATH = Path(__file__).with_name("training-config.md")
 SECTIONS = {
     "Estimator": ESTIMATOR_PARAMETERS,
     "Control": CONTROL_PARAMETERS,
@@ -67,7 +69,11 @@ def _table(declarations: Iterable[Parameter]) -> str:
 
 def generated_pages() -> dict[Path, str]:
     """The text of every generated page, by its path."""
-    return {PARAMETERS_PATH: parameters_text(), MAVLINK_PATH: mavlink_text(Flight(FlightConfig()).server)}
+    return {
+        PARAMETERS_PATH: parameters_text(),
+        MAVLINK_PATH: mavlink_text(Flight(FlightConfig()).server),
+        TRAINING_PATH: training_text(),
+    }
 
 
 def _alias_table() -> str:

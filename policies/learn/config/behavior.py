@@ -33,7 +33,7 @@ class HyperparametersBase(Block):
     batch_size: Count = 1024
     """Steps per gradient step."""
     buffer_size: Count = 10240
-    """PPO: steps collected before each update. SAC: steps the replay buffer holds."""
+    """Steps collected before each update."""
     learning_rate: Positive = 3e-4
     """Of Adam, at the start."""
     learning_rate_schedule: Schedule = "constant"

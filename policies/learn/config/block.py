@@ -23,14 +23,8 @@ class Block(BaseModel):
 
 
 def own_key(default: Any, **limits: Any) -> Any:
-    """A key that ML-Agents does not have; its default keeps ML-Agents' behaviour."""
+    """A key that ML-Agents does not have."""
     return Field(default=default, json_schema_extra={"is_own": True}, **limits)
-
-
-def is_own_key(block: type[BaseModel], key: str) -> bool:
-    """Whether the key is ours."""
-    extra = block.model_fields[key].json_schema_extra
-    return isinstance(extra, dict) and "is_own" in extra
 
 
 def _number(raw: Any) -> Any:
@@ -55,12 +49,12 @@ def _none(raw: Any) -> Any:
 
 
 Whole = Annotated[int, BeforeValidator(_whole)]
-Count = Annotated[int, BeforeValidator(_whole), Field(ge=1)]
-NotNegativeWhole = Annotated[int, BeforeValidator(_whole), Field(ge=0)]
+Count = Annotated[int, Field(ge=1), BeforeValidator(_whole)]
+NotNegativeWhole = Annotated[int, Field(ge=0), BeforeValidator(_whole)]
 Real = Annotated[float, BeforeValidator(_number)]
-Positive = Annotated[float, BeforeValidator(_number), Field(gt=0.0)]
-NotNegative = Annotated[float, BeforeValidator(_number), Field(ge=0.0)]
-Share = Annotated[float, BeforeValidator(_number), Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0), BeforeValidator(_number)]
+NotNegative = Annotated[float, Field(ge=0.0), BeforeValidator(_number)]
+Share = Annotated[float, Field(ge=0.0, le=1.0), BeforeValidator(_number)]
 PositiveOrNone = Annotated[Positive | None, BeforeValidator(_none)]
 ShareOrNone = Annotated[Share | None, BeforeValidator(_none)]
 CountOrNone = Annotated[Count | None, BeforeValidator(_none)]
