@@ -7,7 +7,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from policies.tasks.parking.level1 import Parking1
-from policies.tasks.parking.settings import ParkingSettings
+from policies.tasks.parking.level2 import Parking2
+from policies.tasks.parking.settings import Parking2Settings, ParkingSettings
 from policies.tasks.reach_target.reach_target import ReachTarget
 from policies.tasks.reach_target.settings import ReachSettings
 from policies.tasks.roller_ball import RollerBall
@@ -30,6 +31,7 @@ CATALOGUE: dict[str, Entry] = {
     "RollerBall": Entry(TaskSettings, RollerBall),
     "ReachTarget": Entry(ReachSettings, ReachTarget),
     "Parking1": Entry(ParkingSettings, Parking1),
+    "Parking2": Entry(Parking2Settings, Parking2),
 }
 
 

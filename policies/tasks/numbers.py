@@ -143,9 +143,21 @@ def draw_numbers(
         numbers[i_env, k] = draw_number(samplers, k, seed, i_env, episode)
 
 
-def typed_rows(numbers: Any, struct: Any) -> Any:
-    """The rows of a float array, shape (environments, numbers), seen as a task's struct of floats: the same memory."""
+def typed_rows(numbers: Any, struct: Any, first: int = 0) -> Any:
+    """The rows of a float array, shape (environments, numbers), seen as a task's struct of floats: the same memory.
+
+    Args:
+        numbers: a task's `border.numbers`.
+        struct: its fields are the columns from `first` on, in order.
+        first: where a task has several structs, the column of this one's first field.
+    """
     names = list(struct.vars)
-    if len(names) != numbers.shape[1]:
-        raise ValueError(f"{struct.key}: {len(names)} fields for {numbers.shape[1]} numbers")
-    return wp.array(ptr=numbers.ptr, dtype=struct, shape=(numbers.shape[0],), device=numbers.device)
+    if first + len(names) > numbers.shape[1]:
+        raise ValueError(f"{struct.key}: {len(names)} fields for {numbers.shape[1] - first} numbers")
+    return wp.array(
+        ptr=numbers.ptr + first * numbers.strides[1],
+        dtype=struct,
+        shape=(numbers.shape[0],),
+        strides=(numbers.strides[0],),
+        device=numbers.device,
+    )

@@ -86,27 +86,27 @@ def picture_of(task: Any, i_env: int, height_px: int) -> NDArray[np.uint8]:
     """One environment of either level."""
     world = task.world
     numbers = numbers_of(task, i_env)
-    is_level_2 = hasattr(world, "movers")
+    is_level_2 = hasattr(task, "movers")
     picture = ParkingPicture(2 if is_level_2 else 1, height_px)
     pos, yaw_rad = world.pos.numpy()[i_env], float(world.yaw.numpy()[i_env])
     picture.box(world.goal.numpy()[i_env], PAD_SIZE, GOAL)
     picture.rays(pos, yaw_rad, ray_fractions(task, i_env), numbers)
     if is_level_2:
-        _draw_level_2(picture, world, i_env, numbers)
+        _draw_level_2(picture, task, i_env, numbers)
     else:
-        for block in world.blocks.numpy()[i_env]:
+        for block in task.blocks.numpy()[i_env]:
             picture.box(block, BLOCK_SIZE, OBSTACLE)
     picture.car(pos, yaw_rad, numbers)
     return picture.canvas.pixels
 
 
-def _draw_level_2(picture: ParkingPicture, world: Any, i_env: int, numbers: dict[str, float]) -> None:
+def _draw_level_2(picture: ParkingPicture, task: Any, i_env: int, numbers: dict[str, float]) -> None:
     for x, z, yaw_deg in PORTAL_PLACES:
         yaw_rad = np.radians(yaw_deg)
         picture.box((x, z, np.sin(yaw_rad), np.cos(yaw_rad)), (PORTAL_SIZE[0], 0.4), _PORTAL)
     radius = numbers["mover_radius_m"]
     reach = max(0.0, numbers["mover_length_m"] / 2 - radius)
-    for mover in world.movers.numpy()[i_env]:
+    for mover in task.movers.numpy()[i_env]:
         picture.box(mover, (2 * radius, 2 * reach), OBSTACLE)
         for side in (-1.0, 1.0):
             end = picture.place(float(mover[0] + side * reach * mover[2]), float(mover[1] + side * reach * mover[3]))

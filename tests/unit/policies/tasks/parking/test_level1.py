@@ -147,7 +147,7 @@ def test_success_in_pose_needs_place_heading_and_slowness():
         [(0.0, 0.0, 0.0), (0.4, 0.0, 0.0), (0.0, 14.0, 0.0), (0.0, 0.0, 1.0), (0.2, -8.0, 0.1)]
     ):
         goal = (0.0, 0.0, 30.0)
-        task.world.blocks.numpy()[row] = [pose((12.0, z, 0.0)) for z in (-9.0, 0.0, 9.0)]
+        task.blocks.numpy()[row] = [pose((12.0, z, 0.0)) for z in (-9.0, 0.0, 9.0)]
         yaw = np.radians(goal[2] + turn_deg)
         nose = np.array([np.sin(yaw), np.cos(yaw)])
         put(
@@ -162,7 +162,7 @@ def test_improved_episodes_differ_and_begin_clear_of_everything():
     assert not task.border.outcomes.numpy().any()
     act(task, *[(0, 0)] * 2048)
     assert not task.border.outcomes.numpy().any()
-    blocks = task.world.blocks.numpy()[..., :2]
+    blocks = task.blocks.numpy()[..., :2]
     gaps = np.linalg.norm(blocks[:, [0, 0, 1]] - blocks[:, [1, 2, 2]], axis=-1)
     assert gaps.min() >= 6.0
     goals = task.world.goal.numpy()[:, :2]
@@ -222,7 +222,7 @@ def test_a_mirrored_world_gives_mirrored_ranges():
     task = built(2, observation="ranged", rays=4)
     for row, side in enumerate((1.0, -1.0)):
         put(task, row, pos=(side * 3.0, -11.0), yaw_deg=side * 20.0, goal=(side * 8.0, 9.0, side * 40.0))
-        task.world.blocks.numpy()[row] = [
+        task.blocks.numpy()[row] = [
             pose((side * x, z, side * yaw)) for x, z, yaw in ((4.0, 2.0, 25.0), (-6.0, 3.0, -50.0), (9.0, -9.0, 10.0))
         ]
     act(task, PUSH, PUSH)
