@@ -29,7 +29,7 @@ class Hindsight:
         """
         shape = (replay.slots, replay.env_count)
         device = replay.rows.device
-        self._goal = goal
+        self.goal = goal
         self._replay = replay
         self._share = goals_per_transition / (goals_per_transition + 1)
         self._episode = torch.zeros(replay.env_count, dtype=torch.int64, device=device)  # running, modulo slots
@@ -65,10 +65,10 @@ class Hindsight:
         goals = torch.where(
             (chance[0] < self._share)[:, None],
             self._achieved_later(places, chance[1]),
-            transitions.observations[:, self._goal.goal],
+            transitions.observations[:, self.goal.goal],
         )
         radii, is_success = self._radii.flatten()[places], self._is_success.flatten()[places]
-        return with_goals(transitions, goals, self._goal, radii, is_success)
+        return with_goals(transitions, goals, self.goal, radii, is_success)
 
     def _achieved_later(self, places: Tensor, chance: Tensor) -> Tensor:
         """What was achieved by these or later transitions of their episodes, shape (B, elements of a goal)."""
@@ -78,7 +78,7 @@ class Hindsight:
         rounds = newest - (newest - slots) % replay.slots  # the round that lies in the slot
         last = self._last_rounds[self._episodes[slots, envs], envs]
         later = rounds + (chance * (last - rounds + 1)).long()
-        return replay.take(later % replay.slots * replay.env_count + envs).next_observations[:, self._goal.achieved]
+        return replay.take(later % replay.slots * replay.env_count + envs).next_observations[:, self.goal.achieved]
 
     def state(self) -> dict[str, Any]:
         """What is known."""

@@ -1,10 +1,11 @@
 """What soft actor-critic makes small, as functions of tensors (Haarnoja et al. 2018, arXiv 1812.05905).
 
-An action has a continuous part, branches, or both. The critics give one value per choice of each branch, and what an
-action is worth is the sum over its branches; an action without branches counts as one branch of a single choice. So
-the expectation over choices is taken exactly, and only the continuous part is sampled.
+An action has a continuous part, branches, or both. A critic gives a base value of observation and continuous part, and
+a value for each choice of each branch; an action is worth the base and the values of its choices. So what is expected
+over choices is exact, and only the continuous part is sampled. All values have a column per reward signal.
 """
 
+import math
 from collections.abc import Sequence
 
 import torch
@@ -16,57 +17,79 @@ DISCRETE_ENTROPY = 0.2  # of the greatest entropy of a branch, as ML-Agents aims
 def target_entropies(continuous_size: int, branch_sizes: Sequence[int]) -> list[float]:
     """The entropy each temperature aims at [nat]: of the continuous part if there is one, then of each branch."""
     continuous = [-float(continuous_size)] if continuous_size else []
-    return continuous + [DISCRETE_ENTROPY * float(torch.tensor(float(size)).log()) for size in branch_sizes]
+    return continuous + [DISCRETE_ENTROPY * math.log(size) for size in branch_sizes]
 
 
-def values_of(values: Tensor, branches: Tensor, sizes: Sequence[int]) -> Tensor:
-    """What each critic thinks of the actions taken, shape (critics, B).
-
-    Args:
-        values: of all choices, branch by branch, shape (critics, B, sum of sizes).
-        branches: the choices taken, shape (B, branches).
-        sizes: choices of each branch; empty: `values` has one column.
-    """
-    if not sizes:
-        return values[..., 0]
-    starts = torch.tensor([sum(sizes[:k]) for k in range(len(sizes))], device=branches.device)
-    columns = (branches + starts).expand(len(values), -1, -1)
-    return values.gather(2, columns).sum(dim=2)
-
-
-def entropies(log_prob: Tensor | None, log_probs: Sequence[Tensor]) -> Tensor:
+def entropies(log_probs: Tensor, choice_logs: Tensor) -> Tensor:
     """The entropy of each part of the action [nat], shape (B, parts); of the continuous part one sample of it.
 
     Args:
-        log_prob: of the sampled continuous part, shape (B,); None: there is none.
-        log_probs: of all choices of each branch, (B, choices) each.
+        log_probs: of the continuous dimensions as drawn, shape (B, dimensions).
+        choice_logs: log-probabilities of all choices, shape (B, branches, choices).
     """
-    continuous = [-log_prob] if log_prob is not None else []
-    return torch.stack(continuous + [-(branch.exp() * branch).sum(dim=1) for branch in log_probs], dim=1)
+    branches = -(choice_logs.exp() * choice_logs).sum(dim=2)
+    return torch.cat((-log_probs.sum(dim=1, keepdim=True), branches), dim=1) if log_probs.shape[1] else branches
 
 
-def soft_values(values: Tensor, log_probs: Sequence[Tensor], entropy: Tensor, temperatures: Tensor) -> Tensor:
-    """What a state is worth to the policy: the lesser critic's value plus entropy by temperature, shape (B,).
+def action_values(values: Tensor, branches: Tensor) -> Tensor:
+    """What each critic thinks of actions taken, shape (critics, B, signals).
 
     Args:
-        values: of all choices, with the sampled continuous part, shape (critics, B, sum of choices or 1).
-        log_probs: of all choices of each branch, (B, choices) each; none: `values` has one column.
-        entropy: of each part, shape (B, parts).
-        temperatures: of each part, shape (parts,).
+        values: base, then choices branch by branch, shape (critics, B, signals, 1 + branches x choices).
+        branches: the choices taken, shape (B, branches).
     """
-    least = values.amin(dim=0)
-    probabilities = torch.cat(list(log_probs), dim=1).exp() if log_probs else torch.ones_like(least)
-    return (probabilities * least).sum(dim=1) + (entropy * temperatures).sum(dim=1)
+    base: Tensor = values[..., 0]
+    if not branches.shape[1]:
+        return base
+    choices = values[..., 1:]
+    choices = choices.reshape(*choices.shape[:3], branches.shape[1], -1)
+    index = branches[None, :, None, :, None].expand(*choices.shape[:4], 1)
+    taken: Tensor = choices.gather(4, index)[..., 0]
+    return base + taken.sum(dim=3)
 
 
-def critic_targets(rewards: Tensor, is_terminated: Tensor, next_values: Tensor, gamma: float) -> Tensor:
-    """What the critics are to say, shape (B,): a timeout is no end, the value after it counts."""
-    return rewards + gamma * (1.0 - is_terminated) * next_values
+def expected_values(values: Tensor, choice_logs: Tensor) -> Tensor:
+    """What the policy expects, by the lesser critic of each signal, shape (B, signals).
+
+    Args:
+        values: as in `action_values`, with the continuous part that the policy drew.
+        choice_logs: log-probabilities of all choices, shape (B, branches, choices).
+    """
+    choices = (values[..., 1:] * choice_logs.exp().flatten(1)[:, None]).sum(dim=3)
+    return (values[..., 0] + choices).amin(dim=0)
+
+
+def critic_targets(rewards: Tensor, goes_on: Tensor, next_values: Tensor, gammas: Tensor) -> Tensor:
+    """What the critics are to say, shape (B, signals).
+
+    Args:
+        rewards: of each signal, shape (B, signals).
+        goes_on: 0.0 after a true end, 1.0 otherwise: what follows a timeout counts; shape (B, signals).
+        next_values: of the observations after the decisions, entropy included, shape (B, signals).
+        gammas: shape (signals,).
+    """
+    return rewards + gammas * goes_on * next_values
 
 
 def critic_losses(values: Tensor, targets: Tensor) -> Tensor:
-    """Half the mean squared error of each critic, shape (critics,)."""
-    return 0.5 * (values - targets).square().mean(dim=1)
+    """Half the mean squared error of each critic, shape (critics,).
+
+    Args:
+        values: shape (critics, B, signals).
+        targets: shape (B, signals).
+    """
+    return 0.5 * (values - targets).square().mean(dim=(1, 2))
+
+
+def policy_loss(expected: Tensor, entropy: Tensor, temperatures: Tensor) -> Tensor:
+    """Falls as the policy expects more, over all signals, and as its entropy by temperature rises.
+
+    Args:
+        expected: shape (B, signals).
+        entropy: shape (B, parts).
+        temperatures: shape (parts,).
+    """
+    return -(expected.sum(dim=1) + entropy @ temperatures).mean()
 
 
 def temperature_loss(log_temperatures: Tensor, entropy: Tensor, targets: Tensor) -> Tensor:

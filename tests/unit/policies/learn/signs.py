@@ -1,0 +1,75 @@
+"""A task whose best policy is known: a sign says which choice of each branch pays, and where to point."""
+
+import warp as wp
+
+from common.rng import draw_key
+from policies.tasks.episode import SUCCESS, Border, begin_episode, close_step, open_frame
+from policies.tasks.layout import Branch, Element, Layout
+from policies.tasks.numbers import Number, typed_rows
+from policies.tasks.task import Task
+
+SIZES = (3, 2)
+
+
+@wp.struct
+class SignsNumbers:
+    pay: float
+
+
+@wp.struct
+class SignsState:
+    sign: wp.array(dtype=wp.vec3)
+    numbers: wp.array(dtype=SignsNumbers)
+
+
+@wp.func
+def show(border: Border, state: SignsState, i: int):
+    """A new episode of one decision, and its sign."""
+    episode = begin_episode(border, i)
+    rng = draw_key(border.seed[0], i, episode, 1)
+    state.sign[i] = wp.vec3(float(wp.randi(rng, 0, 3)), float(wp.randi(rng, 0, 2)), wp.randf(rng, -0.8, 0.8))
+    at = open_frame(border, i)
+    for k in range(3):
+        border.observations[i, at + k] = state.sign[i][k]
+
+
+@wp.kernel(enable_backward=False)
+def begin(border: Border, is_chosen: wp.array(dtype=wp.bool), state: SignsState):
+    i = wp.tid()
+    if is_chosen[i]:
+        show(border, state, i)
+
+
+@wp.kernel(enable_backward=False)
+def step(border: Border, state: SignsState):
+    i = wp.tid()
+    sign = state.sign[i]
+    reward = float(0.0)
+    for k in range(border.branches.shape[1]):
+        if border.branches[i, k] == int(sign[k]):
+            reward += 0.5
+    if border.continuous.shape[1] > 0:
+        reward -= wp.abs(border.continuous[i, 0] - sign[2])
+    if close_step(border, i, reward * state.numbers[i].pay, SUCCESS):
+        show(border, state, i)
+
+
+class Signs(Task):
+    """One decision per episode; right choices of both branches pay 1, pointing wrong costs its distance."""
+
+    numbers = (Number("pay", 1.0, 0.0, 10.0, "1", "factor of all rewards", "guess"),)
+    decision_s = 1.0
+
+    def __init__(self, env_count, branches=SIZES, is_pointing=False):
+        layout = Layout(
+            "Signs",
+            1,
+            tuple(Element(f"sign_{k}", "1") for k in range(3)),
+            continuous=(Element("point", "1"),) if is_pointing else (),
+            branches=tuple(Branch(f"branch_{size}", tuple("abc"[:size])) for size in branches),
+        )
+        super().__init__(layout, env_count, number_defaults={})
+        state = SignsState()
+        state.sign = self._zeros("sign", env_count, wp.vec3)
+        state.numbers = typed_rows(self.border.numbers, SignsNumbers)
+        self._record(begin, step, [state])
