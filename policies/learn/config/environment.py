@@ -212,7 +212,7 @@ class EnvSettings(Block):
 
     env_path: str | None = None
     """The task by name."""
-    env_args: tuple[str, ...] = ()
+    env_args: Annotated[tuple[str, ...], BeforeValidator(lambda raw: () if raw is None else raw)] = ()
     """Settings of the task, each `name=value`."""
     base_port: Whole = 5005
     """Accepted; the task runs in this process."""

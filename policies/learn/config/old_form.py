@@ -10,29 +10,18 @@ from policies.learn.config.behavior import HYPERPARAMETERS
 from policies.learn.config.places import Place, Placed, error_at, mapping_at, merged, note_at
 from policies.learn.config.refusal import shown, unknown_key
 
-_NETWORK_KEYS = ("num_layers", "hidden_units", "normalize", "vis_encode_type")
 MEMORY_KEYS = ("use_recurrent", "sequence_length", "memory_size")
-_SAC_INTERVALS = ("num_update", "train_interval")
+_NETWORK_KEYS = "num_layers hidden_units normalize vis_encode_type".split()
+_SAC_INTERVALS = "num_update train_interval".split()
 _BLOCK_KEYS = (
-    *("max_steps", "time_horizon", "summary_freq", "keep_checkpoints", "init_path", "threaded"),
-    *("reward_signals", "behavioral_cloning", "self_play"),
-)
+    "max_steps time_horizon summary_freq keep_checkpoints init_path threaded "
+    "reward_signals behavioral_cloning self_play"
+).split()
 _REQUIRED_OF_PPO = (
-    *(
-        "batch_size",
-        "beta",
-        "buffer_size",
-        "epsilon",
-        "hidden_units",
-        "lambd",
-        "learning_rate",
-        "max_steps",
-        "memory_size",
-    ),
-    *("normalize", "num_epoch", "num_layers", "reward_signals", "sequence_length", "summary_freq", "time_horizon"),
-    "use_recurrent",
-)
-_CURRICULUM_KEYS = ("measure", "min_lesson_length", "signal_smoothing")
+    "batch_size beta buffer_size epsilon hidden_units lambd learning_rate max_steps memory_size normalize num_epoch "
+    "num_layers reward_signals sequence_length summary_freq time_horizon use_recurrent"
+).split()
+_CURRICULUM_KEYS = "measure min_lesson_length signal_smoothing".split()
 _KNOWN = {
     *_NETWORK_KEYS,
     *MEMORY_KEYS,
@@ -107,7 +96,7 @@ def _in_new_form(name: str, flat: Placed, notes: list[str]) -> Placed:
         elif key not in _KNOWN:
             sentence = f"{unknown_key(key, _KNOWN)} (dropped, as ML-Agents does in silence)"
             notes.append(note_at(flat.places[key], f"{name}.{key}", sentence))
-    if flat.get("use_recurrent") is True:
+    if wants_memory(flat, name):
         memory = Placed(flat.place)
         for key in ("sequence_length", "memory_size"):
             if key in flat:
@@ -116,6 +105,19 @@ def _in_new_form(name: str, flat: Placed, notes: list[str]) -> Placed:
     if trainer == "sac" and "steps_per_update" not in numbers and set(_SAC_INTERVALS) & set(flat):
         numbers.put("steps_per_update", _steps_per_update(name, flat), _interval_place(flat))
     return behavior
+
+
+def wants_memory(block: Placed, path: str) -> bool:
+    """Whether `use_recurrent` is there, and true.
+
+    Raises:
+        ConfigError: it is neither true nor false.
+    """
+    value = block.get("use_recurrent", False)
+    if not isinstance(value, bool):
+        place = block.places["use_recurrent"]
+        raise error_at(place, f"{path}.use_recurrent", f"must be true or false, not {shown(value)}")
+    return value
 
 
 def _interval_place(flat: Placed) -> Place:

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from policies.learn.config.behavior import BehavioralCloning
 from policies.learn.config.environment import CompletionCriteria
 from policies.learn.config.network import Memory, NetworkSettings
-from policies.learn.config.old_form import MEMORY_KEYS
+from policies.learn.config.old_form import MEMORY_KEYS, wants_memory
 from policies.learn.config.places import Placed, note_at
 from policies.learn.config.refusal import unknown_key
 from policies.learn.config.run import TorchSettings
@@ -69,7 +69,7 @@ def _put_memory_right(network: Placed, path: str, notes: list[str], *, is_strict
     if not flat:
         return
     place = min((network.places[key] for key in flat), key=lambda place: place.line)
-    is_wanted = flat.get("use_recurrent") is True and network.get("memory") is None
+    is_wanted = wants_memory(network, path) and network.get("memory") is None
     if is_wanted and not is_strict:
         memory = Placed(place)
         for key in flat:
@@ -87,15 +87,8 @@ def _put_memory_right(network: Placed, path: str, notes: list[str], *, is_strict
 
 def _put_signal_right(signal: Placed, path: str, kind: str, notes: list[str]) -> None:
     if kind in _ENCODED and "encoding_size" in signal:
-        place = signal.places["encoding_size"]
-        if "network_settings" in signal:
-            effect = "deprecated, has no effect beside network_settings"
-        else:
-            effect = "deprecated, taken as network_settings: {hidden_units}"
-            network = Placed(place)
-            network.take("hidden_units", signal, "encoding_size")
-            signal.put("network_settings", network, place)
-        notes.append(note_at(place, f"{path}.encoding_size", effect))
+        if signal["encoding_size"] is not None:  # empty in the files that ML-Agents itself writes
+            _put_encoding_size_right(signal, path, notes)
         signal.drop("encoding_size")
     for network, where in _below(signal, path, "network_settings"):
         _put_memory_right(network, where, notes, is_strict=True)
@@ -103,6 +96,18 @@ def _put_signal_right(signal: Placed, path: str, kind: str, notes: list[str]) ->
             notes.append(note_at(network.places["memory"], f"{where}.memory", "reward signals have no memory: dropped"))
             network.drop("memory")
         _drop_unknown(network, where, NetworkSettings, notes)
+
+
+def _put_encoding_size_right(signal: Placed, path: str, notes: list[str]) -> None:
+    place = signal.places["encoding_size"]
+    if "network_settings" in signal:
+        effect = "deprecated, has no effect beside network_settings"
+    else:
+        effect = "deprecated, taken as network_settings: {hidden_units}"
+        network = Placed(place)
+        network.take("hidden_units", signal, "encoding_size")
+        signal.put("network_settings", network, place)
+    notes.append(note_at(place, f"{path}.encoding_size", effect))
 
 
 def _put_curricula_right(root: Placed, notes: list[str]) -> None:

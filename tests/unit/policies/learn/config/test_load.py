@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -215,6 +217,65 @@ def test_a_key_that_stands_twice_is_warned_about_and_the_last_one_counts(tmp_pat
     assert loaded.warnings == (
         f"{tmp_path}/config.yaml:6: behaviors.Car.hyperparameters.batch_size: stands here twice; the last one counts",
     )
+
+
+def test_what_ml_agents_writes_of_its_own_runs_is_read_without_a_warning(tmp_path):
+    network = "{normalize: false, hidden_units: 64, num_layers: 2, vis_encode_type: simple, memory: null, "
+    network += "goal_conditioning_type: hyper, deterministic: false}"
+    signal = f"gamma: 0.9, strength: 1.0, network_settings: {network}"
+    text = (
+        "default_settings: null\nbehaviors:\n  Car:\n    trainer_type: ppo\n"
+        "    hyperparameters: {batch_size: 64, beta_schedule: linear, epsilon_schedule: linear, shared_critic: false}\n"
+        f"    checkpoint_interval: 500\n    network_settings: {network}\n"
+        f"    reward_signals:\n      extrinsic: {{{signal}}}\n"
+        f"      gail: {{{signal}, learning_rate: 0.0003, encoding_size: null, use_actions: false, demo_path: a}}\n"
+        "    init_path: null\n    self_play: null\n    behavioral_cloning: null\n    even_checkpoints: false\n"
+        "env_settings: {env_path: null, env_args: null, seed: -1}\nenvironment_parameters: null\n"
+        "checkpoint_settings: {run_id: a, initialize_from: null, load_model: false, results_dir: results}\n"
+        "torch_settings: {device: null}\ndebug: false\n"
+    )
+    loaded = load(tmp_path, text)
+    assert loaded.warnings == ()
+    assert loaded.config.behavior.reward_signals.gail.network_settings.hidden_units == 64
+    assert loaded.config.env_settings.env_args == ()
+
+
+VALID = (Path(__file__).parent / "data" / "parking_gail.yaml").read_text().splitlines()
+JUNK = [
+    "",
+    "~",
+    "[]",
+    "{}",
+    "[1]",
+    "{a: 1}",
+    "-1",
+    "0",
+    "true",
+    "1e400",
+    ".nan",
+    "'x'",
+    "!t x",
+    "*a",
+    "&a b",
+    "- 1",
+    "<<",
+]
+
+
+@given(k=st.integers(1, len(VALID) - 1), junk=st.sampled_from(JUNK))
+def test_a_junk_value_is_refused_with_file_and_line_or_taken_whole(k, junk, tmp_path_factory):
+    path = tmp_path_factory.getbasetemp() / "junk.yaml"
+    line = VALID[k].split(":")[0] + ": " + junk
+    path.write_text("\n".join([*VALID[:k], line, *VALID[k + 1 :]]) + "\n", encoding="utf-8")
+    try:
+        config = load_config(path).config
+    except ConfigError as error:
+        place, _, sentence = str(error).removeprefix(f"{path}:").partition(": ")
+        assert place.isdigit()
+        assert sentence
+        assert "\n" not in sentence
+    else:
+        assert type(config).model_validate(dict(config)) == config
 
 
 @given(text=st.text(alphabet="abehviors:{}[]&*!-#|>'\"\n\t 01,.<", max_size=80))

@@ -104,3 +104,10 @@ def test_encoding_size_counts_only_without_network_settings(tmp_path):
     assert warnings == [
         "3: behaviors.Car.reward_signals.curiosity.encoding_size: deprecated, has no effect beside network_settings"
     ]
+
+
+def test_use_recurrent_is_true_or_false(tmp_path):
+    with pytest.raises(
+        ValueError, match=r"3: behaviors\.Car\.network_settings\.use_recurrent: must be true or false, not 1"
+    ):
+        load(tmp_path, CAR + "    network_settings: {use_recurrent: 1}\n")
