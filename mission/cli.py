@@ -1,4 +1,4 @@
-"""The command line: `honeyguide fly`, `estimate` and `picture`; those of learning tasks come from task_commands.py.
+"""The command line: `honeyguide fly`, `estimate` and `picture`; the others come from *_commands.py.
 
 A wrong argument, file or port gives one sentence on standard error and exit code 2; a mission that failed gives 1.
 """
@@ -11,7 +11,7 @@ from rich.console import Console
 
 from autopilot.mavlink.links import GROUND_STATION_PORT, OFFBOARD_PORT
 from common.geodesy import DEFAULT_HOME
-from mission import task_commands
+from mission import task_commands, training_commands
 from mission.refusal import refuse
 
 app = typer.Typer(
@@ -144,3 +144,6 @@ def picture(
 
 for _command in (task_commands.demonstrate, task_commands.play, task_commands.drive):
     app.command()(_command)
+app.command(context_settings={"allow_extra_args": True})(training_commands.train)
+app.command(name="eval")(training_commands.evaluate)
+app.command()(training_commands.export)

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.clock import Pacer
-from mission.task_settings import settings_of, task_of
+from mission.task_settings import task_of
 from mission.video import Mp4
 from mission.window import Request, Window
 from policies.experts.catalogue import build_expert
 from policies.experts.expert import Expert, RandomDriver
-from policies.tasks.catalogue import CATALOGUE, build_task
+from policies.tasks.catalogue import CATALOGUE, build_task, settings_of
 from policies.tasks.episode import Outcome
 from policies.tasks.task import Scores, Task
 

@@ -40,12 +40,13 @@ def save(path: Path, content: Mapping[str, Any], kind: str) -> None:
         raise CheckpointError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def load(path: Path, kind: str) -> dict[str, Any]:
+def load(path: Path, *kinds: str) -> dict[str, Any]:
     """What `save` wrote.
 
     Raises:
-        CheckpointError: no such file, damaged, or not of that kind.
+        CheckpointError: no such file, damaged, or of none of these kinds.
     """
+    kind = " or ".join(kinds)
     try:
         with zipfile.ZipFile(path) as archive:
             damaged = archive.testzip()
@@ -56,7 +57,7 @@ def load(path: Path, kind: str) -> dict[str, Any]:
         raise CheckpointError(f"{path}: not a {kind} of honeyguide, or damaged") from error
     if damaged is not None or not isinstance(whole, dict) or "honeyguide" not in whole:
         raise CheckpointError(f"{path}: not a {kind} of honeyguide, or damaged")
-    if whole["honeyguide"] != kind:
+    if whole["honeyguide"] not in kinds:
         raise CheckpointError(f"{path}: a {whole['honeyguide']} of honeyguide, not a {kind}")
     content: dict[str, Any] = _restored(whole["content"])
     return content

@@ -19,32 +19,38 @@ class RecentEpisodes:
     """The scores of the last so many episodes, and of those that ended in the same iteration as the oldest of them."""
 
     def __init__(self, least: int) -> None:
-        self._least = least
-        self._parts: deque[Scores] = deque()
+        self.least = least
+        """Episodes that are kept at least."""
         self.scores = NO_SCORES
+        self._parts: deque[Scores] = deque()
 
     def add(self, scores: Scores) -> None:
         """Counts the episodes of one iteration."""
-        if scores.episode_count:
-            self._parts.append(scores)
-        self.scores = sum(self._parts, NO_SCORES)
-        while self._parts and self.scores.episode_count - self._parts[0].episode_count >= self._least:
-            self._parts.popleft()
-            self.scores = sum(self._parts, NO_SCORES)  # summed anew: no rounding is carried along
+        if not scores.episode_count:
+            return
+        self._parts.append(scores)
+        self.scores = self.scores + scores
+        while self.scores.episode_count - self._parts[0].episode_count >= self.least:
+            self.scores = _without(self.scores, self._parts.popleft())
 
     def clear(self) -> None:
         """Forgets them."""
         self._parts.clear()
         self.scores = NO_SCORES
 
-    def state(self) -> list[list[float]]:
+    def state(self) -> dict[str, Any]:
         """Everything, as plain values."""
-        return [score_record(part) for part in self._parts]
+        return {"sums": score_record(self.scores), "parts": [score_record(part) for part in self._parts]}
 
-    def load_state(self, state: list[list[float]]) -> None:
+    def load_state(self, state: Mapping[str, Any]) -> None:
         """Restores what `state` returned."""
-        self._parts = deque(scores_of(record) for record in state)
-        self.scores = sum(self._parts, NO_SCORES)
+        self._parts = deque(scores_of(record) for record in state["parts"])
+        self.scores = scores_of(state["sums"])
+
+
+def _without(all_scores: Scores, part: Scores) -> Scores:
+    outcomes = tuple(a - b for a, b in zip(all_scores.outcomes, part.outcomes, strict=True))
+    return Scores(outcomes, all_scores.return_sum - part.return_sum, all_scores.length_sum - part.length_sum)
 
 
 class Curriculum:

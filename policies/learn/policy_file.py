@@ -17,7 +17,8 @@ from policies.learn.config.network import NetworkSettings
 from policies.learn.policy import Policy
 from policies.tasks.layout import Layout
 
-KIND = "policy"
+POLICY = "policy"  # kinds of files
+CHECKPOINT = "checkpoint"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +38,16 @@ def save_policy(path: Path, policy: Policy, card: PolicyCard) -> None:
     Raises:
         CheckpointError: it cannot be written.
     """
-    save(path, {"policy": policy_record(policy), "card": asdict(card)}, KIND)
+    save(path, {"policy": policy_record(policy), "card": asdict(card)}, POLICY)
 
 
 def load_policy(path: Path) -> tuple[Policy, PolicyCard]:
-    """Reads a policy file.
+    """Reads a policy file, or the policy of a checkpoint.
 
     Raises:
-        CheckpointError: no such file, damaged, or not a policy.
+        CheckpointError: no such file, damaged, or neither of them.
     """
-    content = load(path, KIND)
+    content = load(path, POLICY, CHECKPOINT)
     return policy_of(content["policy"], str(path)), PolicyCard(**content["card"])
 
 
@@ -75,3 +76,25 @@ def policy_of(record: Mapping[str, Any], place: str) -> Policy:
         reason = str(error).strip().splitlines()[-1].strip()
         raise CheckpointError(f"{place}: written by another version of honeyguide: {reason}") from error
     return policy.eval()
+
+
+def find_policy(name: str) -> Path:
+    """The policy that a user means: a file, a run's folder, or the name of a run in `results/`.
+
+    Raises:
+        CheckpointError: there is none.
+    """
+    if Path(name).is_file():
+        return Path(name)
+    for folder in (Path(name), Path("results") / name):
+        if folder.is_dir():
+            found = sorted(folder.glob("*.pt")) or sorted(folder.glob("*/*.pt"), key=_steps)[-1:]
+            if len(found) == 1:
+                return found[0]
+            raise CheckpointError(f"{folder}: {'several policies' if found else 'no policy'} in it; name a .pt file")
+    raise CheckpointError(f"{name}: no such policy file, and no such run in results/")
+
+
+def _steps(checkpoint: Path) -> int:
+    steps = checkpoint.stem.rpartition("-")[2]
+    return int(steps) if steps.isdigit() else -1

@@ -1,6 +1,6 @@
 """The tasks by name: what `honeyguide train NAME` and `gymnasium.make("honeyguide/NAME-v0")` build."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +47,21 @@ def task_settings(name: str, values: Mapping[str, Any]) -> TaskSettings:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         raise UnknownTask(f"{name}: {key}: {first['msg']}") from None
+
+
+def settings_of(name: str, pairs: Sequence[str], others: Mapping[str, Any] | None = None) -> TaskSettings:
+    """The checked settings of a task from the pairs of `env_args`, and from `others` where they say nothing.
+
+    Raises:
+        UnknownTask: as `task_settings`, or no pair.
+    """
+    values = dict(others or {})
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key:
+            raise UnknownTask(f"--env-args {pair}: must be KEY=VALUE")
+        values[key] = value
+    return task_settings(name, values)
 
 
 def build_task(name: str, env_count: int, settings: TaskSettings | None = None, device: str = "cpu") -> Task:

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mission.cli import app
+from policies.learn.config.command_line import flags
 from tests.documents import PACKAGES, ROOT, anchors, blocks, commands, links, pages, references
 
 PAGES = {page.relative_to(ROOT).as_posix(): page for page in pages()}
@@ -24,6 +25,7 @@ NOT_RUN_HERE = {
 RUN_BY_OTHERS = (
     f"{HONEYGUIDE} picture ",  # tests/unit/mission/test_picture.py
     *(f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")),  # tests/unit/mission/test_task_commands.py
+    *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/test_training_commands.py
 )
 
 
@@ -165,3 +167,13 @@ def test_options_are_all_described(name):
 
 def is_argument(parameter):
     return any(type(mark).__name__ == "ArgumentInfo" for mark in parameter.annotation.__metadata__)
+
+
+def test_options_of_train_are_all_described():
+    page = PAGES["docs/training.md"].read_text(encoding="utf-8").partition("## Options of train")[2]
+    described = set(re.findall(r"^\| `(--[\w-]+)", page, re.MULTILINE))
+    train = next(command for command in app.registered_commands if command.callback.__name__ == "train")
+    arguments = {"return", "context", "task_or_config"}
+    names = {f"--{name.replace('_', '-')}" for name in train.callback.__annotations__ if name not in arguments}
+    assert described == names
+    assert {flag.option for flag in flags()} <= names

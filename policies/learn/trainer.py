@@ -1,0 +1,323 @@
+"""The training loop: iterations, lessons, curves, checkpoints, and when to stop.
+
+In: a configuration and somebody who watches. Out: a run folder with the trained policy. A run that was killed goes on
+from its newest checkpoint bit for bit: all that an iteration depends on is in the checkpoint.
+"""
+
+import secrets
+from collections import deque
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from common.clock import wall_time_s
+from policies.learn import checkpoint
+from policies.learn.build import build_learner
+from policies.learn.config.run import RunConfig
+from policies.learn.curriculum import Curriculum, RecentEpisodes
+from policies.learn.evaluate import Evaluation, evaluate
+from policies.learn.export import export_policy
+from policies.learn.fit import flat, require_fit, settings_that_must_fit
+from policies.learn.policy_file import CHECKPOINT, POLICY, PolicyCard, policy_record, save_policy
+from policies.learn.run_folder import RunError, RunFolder, starting_point
+from policies.learn.tensorboard import EventFile, Period
+from policies.tasks.catalogue import build_task, settings_of
+from policies.tasks.episode import Outcome
+from policies.tasks.layout import Layout
+from policies.tasks.numbers import NumberError
+from policies.tasks.task import Scores
+
+RECENT_EPISODES = 1000  # over which success rate and mean reward are shown
+HELD_OUT_EPISODES = 2000  # by which `success_target` is judged
+_RATE_ITERATIONS = 20  # over which steps per second are shown
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a training has come."""
+
+    steps: int
+    max_steps: int
+    steps_per_s: float
+    elapsed_s: float  # of training, also before it was resumed
+    scores: Scores  # of the last episodes
+
+    @property
+    def left_s(self) -> float:
+        """Until max_steps, at this pace."""
+        return max(0, self.max_steps - self.steps) / self.steps_per_s if self.steps_per_s else 0.0
+
+    @property
+    def success_rate(self) -> float | None:
+        count = self.scores.episode_count
+        return self.scores.count(Outcome.SUCCESS) / count if count else None
+
+    @property
+    def mean_reward(self) -> float | None:
+        count = self.scores.episode_count
+        return self.scores.return_sum / count if count else None
+
+
+class Watcher(Protocol):
+    """Who watches a training."""
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the training is to end after this iteration."""
+        ...
+
+    def show(self, progress: Progress) -> None:
+        """Is called after each iteration."""
+        ...
+
+    def note(self, line: str) -> None:
+        """Is called when something is worth a line."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What a training came to."""
+
+    end: str  # "max_steps", "success_target" or "stopped"
+    progress: Progress
+    held_out: Evaluation | None  # the last one on held-out episodes, if there was one
+    policy: Path
+    network: Path
+
+
+def train(config: RunConfig, watcher: Watcher) -> Result:
+    """Trains until max_steps, success_target, or until the watcher stops it.
+
+    Raises:
+        RunError: the run exists already, or does not exist, or its files cannot be written.
+        CheckpointError: a checkpoint cannot be written or read, or is of a run with other settings.
+        LayoutError: a checkpoint of another task.
+        NumberError: an environment parameter that the task has not.
+        UnknownTask: no such task, or a setting that it has not.
+    """
+    training = Training(config, watcher)
+    try:
+        return training.run()
+    except OSError as error:
+        raise RunError(f"{error.filename or training.folder.path}: cannot be written: {error.strerror}") from error
+
+
+class Training:
+    """One run."""
+
+    def __init__(self, config: RunConfig, watcher: Watcher) -> None:
+        """Prepares everything and writes nothing."""
+        self.folder = RunFolder.of(config)
+        self.behavior = config.behavior
+        self.watcher = watcher
+        settings = config.checkpoint_settings
+        self._is_resumed = settings.resume
+        self.folder.check(is_resumed=settings.resume, is_forced=settings.force)
+        self.task_name = config.env_settings.env_path or ""
+        self.task_settings = settings_of(self.task_name, config.env_settings.env_args)
+        newest = self.folder.newest_checkpoint() if settings.resume else None
+        content = checkpoint.load(newest, CHECKPOINT) if newest else None
+        self.seed = _seed(config, content)
+        self.config = config.model_copy(
+            update={"env_settings": config.env_settings.model_copy(update={"seed": self.seed})}
+        )
+        device = config.torch_settings.device or "cpu"
+        self.task = build_task(self.task_name, config.env_settings.env_count, self.task_settings, device)
+        self.curriculum = Curriculum(config.environment_parameters)
+        self._set_numbers()
+        self.learner = build_learner(self.config, self.task, self.seed)
+        self.period = Period()
+        self.recent = RecentEpisodes(max(RECENT_EPISODES, 2 * self.task.env_count))  # slow episodes count too
+        self._elapsed_before_s = 0.0
+        self._events_position: dict[str, Any] | None = None
+        self._saved: list[dict[str, Any]] = []
+        self._held_out: Evaluation | None = None
+        self._moments: deque[tuple[float, int]] = deque(maxlen=_RATE_ITERATIONS + 1)
+        if newest is not None and content is not None:
+            self._restore(newest, content)
+        elif start := starting_point(config):
+            self._initialize(start)
+
+    def run(self) -> Result:
+        """Iterates until the end."""
+        self.folder.begin(self.config, is_resumed=self._is_resumed)
+        self.watcher.note(f"training {self.folder.behavior} on {self.task_name}, seed {self.seed}: {self.folder.path}")
+        self._begin_s = wall_time_s()
+        self._moments.append((self._begin_s, self.learner.steps))
+        self._events = EventFile(self.folder.training, self._events_position)
+        try:
+            end = self._iterate()
+            if not self._saved or self._saved[-1]["steps"] != self.learner.steps:
+                self._save()
+            return self._finish(end)
+        finally:
+            self._events.close()
+
+    def _iterate(self) -> str:
+        while self.learner.steps < self.behavior.max_steps:
+            before = self.learner.steps
+            iteration = self.learner.iterate()
+            steps = self.learner.steps
+            self.period.add(iteration.scores, iteration.statistics)
+            self.recent.add(iteration.scores)
+            self._moments.append((wall_time_s(), steps))
+            self.watcher.show(self._progress())
+            self._advance(iteration.scores)
+            is_reached = _has_passed(before, steps, self.behavior.summary_freq) and self._summarize()
+            if is_reached:
+                return "success_target"
+            if self.watcher.is_stopped:
+                return "stopped"
+            if _has_passed(before, steps, self.behavior.checkpoint_steps):
+                self._save()
+        return "max_steps"
+
+    def _advance(self, scores: Scores) -> None:
+        """Moves the curriculum on."""
+        lines, is_reset = self.curriculum.advance(scores, self.learner.steps / self.behavior.max_steps)
+        if not lines:
+            return
+        self._set_numbers()
+        self.recent.clear()
+        for line in lines:
+            self.watcher.note(line)
+        if is_reset:
+            self.task.begin(np.ones(self.task.env_count, dtype=np.bool_))
+
+    def _summarize(self) -> bool:
+        """Writes one point of each curve; true if the success target is reached."""
+        values = self.period.values() | self.curriculum.tags() | {"Is Training": 1.0}
+        self.period = Period()
+        target = self.behavior.success_target
+        is_reached = False
+        if target is not None and self.curriculum.is_last and self._is_promising(target):
+            self._held_out = self._judge()
+            values["Environment/Held-out Success Rate"] = self._held_out.success_rate
+            is_reached = self._held_out.interval[0] >= target
+        self._events.write(self.learner.steps, values)
+        return is_reached
+
+    def _is_promising(self, target: float) -> bool:
+        """Whether enough training episodes succeed, drawn actions and all, to make an evaluation worth its time."""
+        scores = self.recent.scores
+        rate = scores.count(Outcome.SUCCESS) / max(scores.episode_count, 1)
+        return scores.episode_count >= self.recent.least and rate >= 1.0 - 5.0 * (1.0 - target)
+
+    def _judge(self) -> Evaluation:
+        """The most probable actions on held-out episodes: others at each evaluation."""
+        return evaluate(
+            self.learner.policy,
+            self.task_name,
+            self.task_settings.model_copy(update={"split": "test"}),
+            episodes=HELD_OUT_EPISODES,
+            seed=(self.seed + self.learner.steps) % 2**31,
+            numbers=self.curriculum.final_numbers(),
+        )
+
+    def _save(self) -> None:
+        """Writes a checkpoint and what belongs to it, then removes the oldest."""
+        steps = self.learner.steps
+        path = checkpoint.checkpoint_path(self.folder.training, self.folder.behavior, steps)
+        progress = self._progress()
+        entry = {
+            "steps": steps,
+            "file_path": str(path),
+            "reward": progress.mean_reward,
+            "success_rate": progress.success_rate,
+            "elapsed_s": round(progress.elapsed_s, 3),
+        }
+        self._saved.append(entry)
+        content = {
+            "policy": policy_record(self.learner.policy),
+            "card": asdict(self._card()),
+            "must_fit": settings_that_must_fit(self.config, self.task_settings),
+            "seed": self.seed,
+            "learner": self.learner.state(),
+            "curriculum": self.curriculum.state(),
+            "period": self.period.state(),
+            "recent": self.recent.state(),
+            "events": self._events.position(),
+            "elapsed_s": progress.elapsed_s,
+            "saved": self._saved,
+        }
+        checkpoint.save(path, content, CHECKPOINT)
+        export_policy(self.learner.policy, path.with_suffix(".onnx"))
+        self.folder.write_status(self._status())
+        checkpoint.prune(self.folder.training, self.folder.behavior, self.behavior.keep_checkpoints)
+
+    def _finish(self, end: str) -> Result:
+        """Writes the trained policy."""
+        save_policy(self.folder.policy, self.learner.policy, self._card())
+        export_policy(self.learner.policy, self.folder.network)
+        self.folder.write_status(self._status() | {"end": end})
+        return Result(end, self._progress(), self._held_out, self.folder.policy, self.folder.network)
+
+    def _status(self) -> dict[str, Any]:
+        progress = self._progress()
+        return {
+            self.folder.behavior: {"checkpoints": self._saved, "final_checkpoint": self._saved[-1]},
+            "lessons": self.curriculum.lesson,
+            "seed": self.seed,
+            "elapsed_s": round(progress.elapsed_s, 3),
+            "steps_per_s": round(progress.steps_per_s, 1),
+        }
+
+    def _card(self) -> PolicyCard:
+        progress = self._progress()
+        figures: dict[str, float] = {}
+        if progress.success_rate is not None and progress.mean_reward is not None:
+            figures = {"training_success_rate": progress.success_rate, "training_reward": progress.mean_reward}
+        if self._held_out is not None:
+            low, high = self._held_out.interval
+            figures |= {"success_rate": self._held_out.success_rate, "success_low": low, "success_high": high}
+        settings = self.task_settings.model_dump()
+        return PolicyCard(self.task_name, settings, self.seed, self.learner.steps, figures)
+
+    def _progress(self) -> Progress:
+        now_s = wall_time_s()
+        (then_s, then_steps), steps = self._moments[0], self.learner.steps
+        rate = (steps - then_steps) / max(self._moments[-1][0] - then_s, 1e-9)
+        elapsed_s = self._elapsed_before_s + now_s - self._begin_s
+        return Progress(steps, self.behavior.max_steps, rate, elapsed_s, self.recent.scores)
+
+    def _set_numbers(self) -> None:
+        try:
+            self.task.set_numbers(self.curriculum.numbers())
+        except NumberError as error:
+            raise NumberError(f"environment_parameters: {error}") from None
+
+    def _restore(self, path: Path, content: dict[str, Any]) -> None:
+        """Goes on where the checkpoint was taken."""
+        self.task.layout.require(Layout.from_record(content["policy"]["layout"]), str(path))
+        require_fit(settings_that_must_fit(self.config, self.task_settings), content["must_fit"], str(path))
+        self.learner.load_state(content["learner"])
+        self.curriculum.load_state(content["curriculum"])
+        self._set_numbers()  # the configuration may have other ones than those the task was saved with
+        self.period.load_state(content["period"])
+        self.recent.load_state(content["recent"])
+        self._events_position = content["events"]
+        self._elapsed_before_s = content["elapsed_s"]
+        self._saved = content["saved"]
+
+    def _initialize(self, path: Path) -> None:
+        """Starts from the networks of another run."""
+        content = checkpoint.load(path, CHECKPOINT, POLICY)
+        self.task.layout.require(Layout.from_record(content["policy"]["layout"]), str(path))
+        mine = {"network_settings": self.learner.policy.settings.model_dump()}
+        require_fit(flat(mine), flat({"network_settings": content["policy"]["network"]}), str(path))
+        self.learner.policy.load_state_dict(content["policy"]["weights"])
+
+
+def _has_passed(before: int, steps: int, period: int) -> bool:
+    """Whether a multiple of the period lies in (before, steps]."""
+    return steps // period > before // period
+
+
+def _seed(config: RunConfig, content: dict[str, Any] | None) -> int:
+    """The configured one; else that of the run that is resumed; else a new one."""
+    if config.env_settings.seed >= 0:
+        return config.env_settings.seed
+    return int(content["seed"]) if content is not None else secrets.randbelow(2**31)
