@@ -27,7 +27,7 @@ class Cloning:
         settings: BehavioralCloning,
         demonstrations: Transitions,
         algorithm: tuple[float, int, int],
-        generator: torch.Generator,
+        seed: int,
     ) -> None:
         """Cloning that has not begun.
 
@@ -36,12 +36,12 @@ class Cloning:
             settings: the behaviour's `behavioral_cloning`.
             demonstrations: (decisions,), on the policy's device.
             algorithm: learning rate, batch size and epochs of the algorithm beside it; defaults of the settings.
-            generator: draws the order; it becomes the cloning's own.
+            seed: of the order.
         """
         learning_rate, batch_size, epoch_count = algorithm
         self._policy = policy
         self._demonstrations = demonstrations
-        self._generator = generator
+        self._generator = torch.Generator(demonstrations.rewards.device).manual_seed(seed)
         self._anneal_steps = settings.steps
         self._learning_rate = learning_rate * settings.strength
         self._batch_size = settings.batch_size or batch_size

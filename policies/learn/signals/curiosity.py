@@ -62,12 +62,13 @@ class CuriositySignal:
     name = "curiosity"
     is_episodic = False
 
-    def __init__(self, layout: Layout, settings: CuriositySettings, generator: torch.Generator) -> None:
-        """Models that know nothing yet; `generator` draws their weights and becomes the signal's own."""
+    def __init__(
+        self, layout: Layout, settings: CuriositySettings, seed: int, device: torch.device | str = "cpu"
+    ) -> None:
+        """Networks that know nothing yet, on a device; `seed` draws their weights."""
         self.gamma = settings.gamma
         self.strength = settings.strength
-        self.generator = generator
-        self.network = _Models(layout, settings, generator)
+        self.network = _Models(layout, settings, torch.Generator().manual_seed(seed)).to(device)
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=settings.learning_rate)
         self._has_updated = False
 
@@ -98,8 +99,8 @@ class CuriositySignal:
         }
 
     def state(self) -> dict[str, Any]:
-        return snapshot(self.network, self.optimizer, self.generator) | {"has_updated": self._has_updated}
+        return snapshot(self.network, self.optimizer) | {"has_updated": self._has_updated}
 
     def load_state(self, state: Mapping[str, Any]) -> None:
-        restore(state, self.network, self.optimizer, self.generator)
+        restore(state, self.network, self.optimizer)
         self._has_updated = state["has_updated"]

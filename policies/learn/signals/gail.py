@@ -60,29 +60,28 @@ class GailSignal:
     name = "gail"
     is_episodic = True
 
-    def __init__(
-        self, layout: Layout, settings: GailSettings, demonstrations: Transitions, generator: torch.Generator
-    ) -> None:
+    def __init__(self, layout: Layout, settings: GailSettings, demonstrations: Transitions, seed: int) -> None:
         """A discriminator that knows nothing yet.
 
         Args:
             layout: of the policy and of the demonstrations.
             settings: the signal's block.
             demonstrations: (decisions,), on the device to learn on.
-            generator: draws weights, rows, mixtures and noise; it becomes the signal's own.
+            seed: of weights, drawn rows, mixtures and noise.
         """
+        device = demonstrations.observations.device
         self.gamma = settings.gamma
         self.strength = settings.strength
         self.settings = settings
         self.demonstrations = demonstrations
-        self.generator = generator
+        self.generator = torch.Generator(device).manual_seed(seed)
         self._branch_sizes = layout.branch_sizes
         self._normalizer = Normalizer(layout.observation_size) if settings.network_settings.normalize else None
         if self._normalizer is not None:  # by the expert's statistics, as in ML-Agents, but all of them at once
-            self._normalizer.to(demonstrations.observations.device).update(demonstrations.observations)
+            self._normalizer.to(device).update(demonstrations.observations)
         self._expert_inputs = self._inputs(demonstrations)
-        self.network = _Discriminator(self._expert_inputs.shape[-1], settings, generator)
-        self.network.to(demonstrations.observations.device)
+        weights = torch.Generator().manual_seed(seed)
+        self.network = _Discriminator(self._expert_inputs.shape[-1], settings, weights).to(device)
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=settings.learning_rate)
 
     def _inputs(self, transitions: Transitions) -> Tensor:
@@ -134,7 +133,8 @@ class GailSignal:
         return statistics
 
     def state(self) -> dict[str, Any]:
-        return snapshot(self.network, self.optimizer, self.generator)
+        return snapshot(self.network, self.optimizer) | {"generator": self.generator.get_state()}
 
     def load_state(self, state: Mapping[str, Any]) -> None:
-        restore(state, self.network, self.optimizer, self.generator)
+        restore(state, self.network, self.optimizer)
+        self.generator.set_state(state["generator"])

@@ -27,16 +27,12 @@ def flat_actions(transitions: Transitions, branch_sizes: Sequence[int]) -> Tenso
     return torch.cat([transitions.continuous, *(part.to(transitions.continuous.dtype) for part in parts)], dim=-1)
 
 
-def snapshot(network: nn.Module, optimizer: torch.optim.Optimizer, generator: torch.Generator) -> dict[str, Any]:
-    """A copy of all three."""
-    parts = {"network": network.state_dict(), "optimizer": optimizer.state_dict(), "generator": generator.get_state()}
-    return copy.deepcopy(parts)
+def snapshot(network: nn.Module, optimizer: torch.optim.Optimizer) -> dict[str, Any]:
+    """A copy of both."""
+    return copy.deepcopy({"network": network.state_dict(), "optimizer": optimizer.state_dict()})
 
 
-def restore(
-    state: Mapping[str, Any], network: nn.Module, optimizer: torch.optim.Optimizer, generator: torch.Generator
-) -> None:
+def restore(state: Mapping[str, Any], network: nn.Module, optimizer: torch.optim.Optimizer) -> None:
     """Puts back what `snapshot` copied."""
     network.load_state_dict(state["network"])
     optimizer.load_state_dict(copy.deepcopy(state["optimizer"]))
-    generator.set_state(state["generator"])

@@ -44,15 +44,16 @@ class RndSignal:
     name = "rnd"
     is_episodic = False
 
-    def __init__(self, layout: Layout, settings: RndSettings, generator: torch.Generator) -> None:
-        """Two networks drawn by `generator`, which becomes the signal's own."""
+    def __init__(self, layout: Layout, settings: RndSettings, seed: int, device: torch.device | str = "cpu") -> None:
+        """Networks that know nothing yet, on a device; `seed` draws their weights."""
         self.gamma = settings.gamma
         self.strength = settings.strength
         self.settings = settings
-        self.generator = generator
-        self.network = _Pair(layout, settings, generator)
+        self.network = _Pair(layout, settings, torch.Generator().manual_seed(seed)).to(device)
         self.optimizer = torch.optim.Adam(self.network.predictor.parameters(), lr=settings.learning_rate)
-        self._running = torch.zeros(0)  # discounted sum of each environment's rewards up to the last rollout
+        self._running = torch.zeros(
+            0, device=device
+        )  # discounted sum of each environment's rewards up to the last rollout
 
     def _seen(self, transitions: Transitions) -> Tensor:
         return transitions.next_observations if self.settings.normalize_reward else transitions.observations
@@ -89,8 +90,8 @@ class RndSignal:
         return {"Losses/RND Loss": loss.item()}
 
     def state(self) -> dict[str, Any]:
-        return snapshot(self.network, self.optimizer, self.generator) | {"running": self._running.clone()}
+        return snapshot(self.network, self.optimizer) | {"running": self._running.clone()}
 
     def load_state(self, state: Mapping[str, Any]) -> None:
-        restore(state, self.network, self.optimizer, self.generator)
+        restore(state, self.network, self.optimizer)
         self._running = state["running"].clone()

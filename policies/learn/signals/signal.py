@@ -5,9 +5,10 @@ memory. Each has its own discount and its own value head; the learner multiplies
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Protocol, runtime_checkable
 
+import torch
 from torch import Tensor
 
 
@@ -32,6 +33,10 @@ class Transitions:
             self.rewards[rows],
             self.is_ended[rows],
         )
+
+    def to(self, device: torch.device | str) -> "Transitions":
+        """The same on a device."""
+        return Transitions(*(getattr(self, column.name).to(device) for column in fields(self)))
 
 
 @runtime_checkable

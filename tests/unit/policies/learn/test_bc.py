@@ -20,8 +20,7 @@ def policy(layout, seed=0, **settings):
 
 
 def cloning(learner, demonstrations, rates=(1e-3, 64, 3), seed=0, **settings):
-    generator = torch.Generator().manual_seed(seed)
-    return Cloning(learner, BehavioralCloning(demo_path="unused", **settings), demonstrations, rates, generator)
+    return Cloning(learner, BehavioralCloning(demo_path="unused", **settings), demonstrations, rates, seed)
 
 
 def linear_expert(seed=0, count=4096):

@@ -9,7 +9,7 @@ from tests.unit.policies.learn.signals.transitions import PUSHED, STEERED, drawn
 
 def signal(layout=PUSHED, seed=0, **settings):
     settings = CuriositySettings(learning_rate=1e-3, network_settings={"hidden_units": 32}, **settings)
-    return CuriositySignal(layout, settings, torch.Generator().manual_seed(seed))
+    return CuriositySignal(layout, settings, seed)
 
 
 def test_it_pays_nothing_before_its_first_update():

@@ -11,7 +11,7 @@ SMALL = {"hidden_units": 32, "num_layers": 1}
 
 def signal(layout=PUSHED, seed=0, network=SMALL, **settings):
     settings = GailSettings(demo_path="unused", network_settings=network, learning_rate=3e-3, **settings)
-    return GailSignal(layout, settings, drawn(layout, (512,), 1, centre=1.0), torch.Generator().manual_seed(seed))
+    return GailSignal(layout, settings, drawn(layout, (512,), 1, centre=1.0), seed)
 
 
 def train(gail, layout, count, first=0):
@@ -42,7 +42,7 @@ def test_with_actions_it_tells_apart_who_sees_the_same_but_acts_otherwise():
     expert = gail.demonstrations
     for column, choice in ((0, 2), (1, 0)):
         expert.branches[:, column] = choice
-    gail = GailSignal(STEERED, gail.settings, expert, torch.Generator().manual_seed(0))
+    gail = GailSignal(STEERED, gail.settings, expert, 0)
     other = drawn(STEERED, (512,), 1, centre=1.0)
     other.branches[:, 0] = 0
     for _ in range(100):
@@ -82,7 +82,7 @@ def test_normalisation_makes_the_unit_of_observations_irrelevant():
         demonstrations = drawn(PUSHED, (512,), 1, centre=1.0)
         demonstrations.observations.mul_(scale)
         settings = GailSettings(demo_path="unused", network_settings={"normalize": True})
-        gail = GailSignal(PUSHED, settings, demonstrations, torch.Generator().manual_seed(0))
+        gail = GailSignal(PUSHED, settings, demonstrations, 0)
         rows = drawn(PUSHED, (50,), 2)
         rows.observations.mul_(scale)
         rewards.append(gail.rewards(rows))

@@ -12,7 +12,7 @@ def signal(*, normalize_reward=True, seed=0, gamma=0.9):
     settings = RndSettings(
         learning_rate=1e-3, gamma=gamma, network_settings={"hidden_units": 32}, normalize_reward=normalize_reward
     )
-    return RndSignal(PUSHED, settings, torch.Generator().manual_seed(seed))
+    return RndSignal(PUSHED, settings, seed)
 
 
 def test_rewards_are_normalised_unless_ml_agents_form_is_asked_for():

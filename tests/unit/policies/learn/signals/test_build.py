@@ -1,0 +1,84 @@
+import pytest
+import torch
+
+from policies.experts.catalogue import build_expert
+from policies.experts.demonstration_file import Origin, write_demonstrations
+from policies.experts.recording import record_episodes
+from policies.learn.bc import Cloning
+from policies.learn.config.behavior import Behavior, BehavioralCloning, PpoHyperparameters
+from policies.learn.config.network import NetworkSettings
+from policies.learn.config.signals import RewardSignals
+from policies.learn.demonstrations import DemonstrationError, load_demonstrations
+from policies.learn.policy import Policy
+from policies.learn.ppo import Ppo
+from policies.learn.signals.build import build_signals
+from policies.tasks.catalogue import build_task, task_settings
+
+ALL = {
+    "extrinsic": {"gamma": 0.99},
+    "gail": {"gamma": 0.9, "strength": 0.1, "use_actions": True},
+    "curiosity": {"gamma": 0.95, "strength": 0.02},
+    "rnd": {"gamma": 0.8, "strength": 0.01},
+}
+
+
+@pytest.fixture(scope="module")
+def demonstrations(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("roller_ball") / "expert"
+    task = build_task("RollerBall", 64)
+    episodes = record_episodes(task, build_expert("RollerBall"), 64, seed=1)
+    write_demonstrations(folder, Origin(task.layout, task_settings("RollerBall", {}), "scripted", 1), episodes)
+    return str(folder)
+
+
+def learner(demo_path, blocks, seed=1, env_count=16, *, has_cloning=False, **numbers):
+    gail = {"gail": blocks["gail"] | {"demo_path": demo_path}} if "gail" in blocks else {}
+    behavior = Behavior(
+        hyperparameters=PpoHyperparameters(**{"batch_size": 64, "buffer_size": 256} | numbers),
+        network_settings=NetworkSettings(hidden_units=64, normalize=True),
+        reward_signals=RewardSignals.model_validate(blocks | gail),
+    )
+    task = build_task("RollerBall", env_count)
+    policy = Policy(task.layout, behavior.network_settings, torch.Generator().manual_seed(seed))
+    cloning = None
+    if has_cloning:
+        settings = BehavioralCloning(demo_path=demo_path, steps=10_000, samples_per_update=128)
+        cloning = Cloning(policy, settings, load_demonstrations(demo_path, task.layout), (1e-3, 64, 1), seed)
+    signals = build_signals(behavior.reward_signals, task.layout, seed)
+    return Ppo(task, policy, behavior, signals, seed=seed, cloning=cloning)
+
+
+def test_all_signals_teach_one_policy_each_with_its_discount(demonstrations):
+    ppo = learner(demonstrations, ALL, has_cloning=True)
+    assert [(signal.name, signal.gamma) for signal in ppo.signals] == [
+        ("extrinsic", 0.99),
+        ("gail", 0.9),
+        ("curiosity", 0.95),
+        ("rnd", 0.8),
+    ]
+    ppo.iterate()
+    statistics = ppo.iterate().statistics
+    for tag in (
+        "Policy/Extrinsic Value Estimate",
+        "Policy/Gail Value Estimate",
+        "Policy/GAIL Policy Estimate",
+        "Losses/GAIL Loss",
+        "Losses/Curiosity Forward Loss",
+        "Losses/RND Loss",
+        "Losses/Pretraining Loss",
+    ):
+        assert tag in statistics
+
+
+def test_a_restored_learner_with_all_signals_continues_bit_for_bit(demonstrations):
+    first = learner(demonstrations, ALL, has_cloning=True)
+    first.iterate()
+    second = learner(demonstrations, ALL, seed=2, has_cloning=True)
+    second.load_state(first.state())
+    for _ in range(2):
+        assert first.iterate().statistics == second.iterate().statistics
+
+
+def test_gail_without_demonstrations_is_refused(tmp_path):
+    with pytest.raises(DemonstrationError, match="nothing: no such file"):
+        learner(str(tmp_path / "nothing"), ALL)
