@@ -23,6 +23,7 @@ from policies.learn.evaluate import Evaluation, evaluate
 from policies.learn.export import ExportError, export_policy
 from policies.learn.policy_file import find_policy, load_policy
 from policies.learn.run_folder import RunError, RunFolder
+from policies.learn.sac import SacError
 from policies.learn.trainer import Progress as TrainingProgress
 from policies.learn.trainer import Result, train
 from policies.tasks.catalogue import CATALOGUE, UnknownTask, settings_of
@@ -30,7 +31,8 @@ from policies.tasks.layout import LayoutError
 from policies.tasks.numbers import NumberError
 
 USER_ERRORS = (
-    CheckpointError, ConfigError, DemonstrationError, ExportError, LayoutError, NumberError, RunError, UnknownTask,
+    CheckpointError, ConfigError, DemonstrationError, ExportError, LayoutError, NumberError, RunError, SacError,
+    UnknownTask,
 )  # fmt: skip
 LINE_PERIOD_S = 10.0  # between lines where there is no terminal
 INFERENCE_EPISODES = 1000
