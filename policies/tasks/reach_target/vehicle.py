@@ -46,6 +46,7 @@ class Car:
     inertia: wp.vec3  # [kg m²] about the car's axes
     inv_inertia: wp.vec3
     hub: wp.vec3  # [m] where a front right wheel is fixed, car frame
+    span_m: float  # within which of the centre all wheels touch the ground
     radius_m: float
     length_m: float  # of a fully extended suspension and the wheel below it
     travel_m: float
@@ -119,6 +120,7 @@ def car_of(n: ReachNumbers) -> Car:
     car.inertia = n.mass_kg * wp.vec3(squares[1] + squares[2], squares[0] + squares[2], squares[0] + squares[1])
     car.inv_inertia = wp.vec3(1.0 / car.inertia[0], 1.0 / car.inertia[1], 1.0 / car.inertia[2])
     car.hub = wp.vec3(0.5 * n.track_m, n.axle_height_m, 0.5 * n.wheelbase_m)
+    car.span_m = wp.length(car.hub) + n.wheel_radius_m + n.suspension_travel_m
     car.radius_m = n.wheel_radius_m
     car.travel_m = n.suspension_travel_m
     car.length_m = n.wheel_radius_m + n.suspension_travel_m
@@ -179,8 +181,9 @@ def spun(car: Car, spin: float, motor_nm: float, brake_nm: float, grip: float, r
     The tyre pulls with `road` + grip x radius x spin; brakes are friction: they stop the wheel and never turn it.
     """
     inertia = car.wheel_inertia + _SUBSTEP_S * (car.wheel_damping + grip * car.radius_m * car.radius_m)
-    free = (car.wheel_inertia * spin + _SUBSTEP_S * (motor_nm - car.radius_m * road)) / inertia
-    brake = _SUBSTEP_S * brake_nm / inertia
+    per_inertia = 1.0 / inertia
+    free = (car.wheel_inertia * spin + _SUBSTEP_S * (motor_nm - car.radius_m * road)) * per_inertia
+    brake = _SUBSTEP_S * brake_nm * per_inertia
     return wp.sign(free) * wp.max(wp.abs(free) - brake, 0.0)
 
 
@@ -228,20 +231,20 @@ def wheel_pull(
 def in_ground_plane(direction: wp.vec3, up_car: wp.vec3) -> wp.vec3:
     """The part of a direction that lies in the ground plane, as a unit vector."""
     flat = direction - wp.dot(direction, up_car) * up_car
-    return flat / wp.max(wp.length(flat), _TINY)
+    return flat * (1.0 / wp.max(wp.length(flat), _TINY))
 
 
 @wp.func
-def drop_to_ground(car: Car, pos: wp.vec3, turn: wp.mat33, hub: wp.vec3) -> float:
+def drop_to_ground(car: Car, pos: wp.vec3, turn: wp.mat33, up_car: wp.vec3, hub: wp.vec3) -> float:
     """From a hub down the suspension to the platform [m]; out of every wheel's reach where there is none."""
-    place = pos + turn @ hub
-    drop = 2.0 * car.length_m
-    if turn[1, 1] > _UPRIGHT:
-        below = place[1] / turn[1, 1]
-        x = place[0] - below * turn[0, 1]
-        z = place[2] - below * turn[2, 1]
-        if below > 0.0 and wp.max(wp.abs(x), wp.abs(z)) <= car.half_platform_m:
-            drop = below
+    out_of_reach = 2.0 * car.length_m
+    if up_car[1] < _UPRIGHT:
+        return out_of_reach
+    drop = (pos[1] + wp.dot(up_car, hub)) / up_car[1]
+    if wp.max(wp.abs(pos[0]), wp.abs(pos[2])) > car.half_platform_m - car.span_m:
+        place = pos + turn @ (hub - wp.vec3(0.0, drop, 0.0))
+        if drop < 0.0 or wp.max(wp.abs(place[0]), wp.abs(place[2])) > car.half_platform_m:
+            return out_of_reach
     return drop
 
 
@@ -294,7 +297,7 @@ def driven(car: Car, controls: Controls, motion: Motion) -> Motion:
         wheel.heading = ahead
         if k < 2:
             wheel.heading = steered
-        wheel.drop_m = drop_to_ground(car, motion.pos, turn, wheel.hub)
+        wheel.drop_m = drop_to_ground(car, motion.pos, turn, up_car, wheel.hub)
         wheel.spin = spin[k]
         pull = wheel_pull(car, controls, wheel, up_car, vel_car, motion.omega_car)
         force += pull.force_car
