@@ -13,6 +13,7 @@ from policies.learn.policy import Policy
 from policies.learn.ppo import Ppo
 from policies.learn.signals.build import build_signals
 from policies.tasks.catalogue import build_task, task_settings
+from policies.tasks.episode import Outcome
 
 ALL = {
     "extrinsic": {"gamma": 0.99},
@@ -82,3 +83,22 @@ def test_a_restored_learner_with_all_signals_continues_bit_for_bit(demonstration
 def test_gail_without_demonstrations_is_refused(tmp_path):
     with pytest.raises(DemonstrationError, match="nothing: no such file"):
         learner(str(tmp_path / "nothing"), ALL)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "blocks",
+    [
+        {"gail": {"strength": 1.0, "use_actions": True}},
+        {"extrinsic": {"gamma": 0.99}, "gail": {"gamma": 0.95, "strength": 0.1, "use_actions": True}},
+    ],
+)
+def test_imitation_alone_and_beside_the_tasks_reward_reaches_the_cubes(demonstrations, blocks):
+    """At 490,000 steps 98.8 and 99.9 % succeeded (measured with one seed); chance reaches a fifth."""
+    network = {"hidden_units": 64, "normalize": True}
+    gail = blocks["gail"] | {"learning_rate": 1e-3, "reward_form": "logit", "network_settings": network}
+    numbers = {"batch_size": 2048, "buffer_size": 8192, "learning_rate": 1e-3, "beta": 1e-3}
+    ppo = learner(demonstrations, blocks | {"gail": gail}, env_count=256, **numbers)
+    while ppo.steps < 600_000:
+        scores = ppo.iterate().scores
+    assert scores.count(Outcome.SUCCESS) > 0.95 * scores.episode_count > 100
