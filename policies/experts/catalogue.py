@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from policies.experts.expert import Expert
+from policies.experts.parking import Parking1Expert, Parking2Expert
 from policies.experts.pursuit import PursuitExpert
 from policies.experts.roller_ball import RollerBallExpert
 
@@ -12,6 +13,8 @@ class NoExpert(ValueError):
 
 
 EXPERTS: dict[str, Callable[[], Expert]] = {
+    "Parking1": Parking1Expert,
+    "Parking2": Parking2Expert,
     "RollerBall": RollerBallExpert,
     "ReachTarget": PursuitExpert,
 }
