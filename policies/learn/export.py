@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 from torch import Tensor, nn
 
-from common.files import write_whole
+from common.files import part_path, write_whole
 from policies.learn.actions import CLIP, LOG_SIGMA_LIMITS
 from policies.learn.hyper import HyperDense
 from policies.learn.networks import Body
@@ -32,7 +32,7 @@ _MASKED = 1e8
 
 
 class ExportError(ValueError):
-    """The exported network does not do what the policy does; the message is one sentence."""
+    """An exported network that does not do what the policy does, or cannot be written; the message is one sentence."""
 
 
 def export_policy(policy: Policy, path: Path) -> float:
@@ -42,14 +42,17 @@ def export_policy(policy: Policy, path: Path) -> float:
         The largest difference found between the two.
 
     Raises:
-        ExportError: they differ by more than 1e-5.
-        OSError: the file cannot be written.
+        ExportError: they differ by more than 1e-5, or the file cannot be written.
     """
     content = onnx_bytes(policy)
     difference = largest_difference(policy, content)
     if difference > TOLERANCE:
         raise ExportError(f"{path}: the exported network differs from the policy by {difference:.1e}")
-    write_whole(path, content)
+    try:
+        write_whole(path, content)
+    except OSError as error:
+        part_path(path).unlink(missing_ok=True)
+        raise ExportError(f"{path}: cannot be written: {error.strerror}") from error
     return difference
 
 

@@ -4,6 +4,7 @@ In: a configuration and somebody who watches. Out: a run folder with the trained
 from its newest checkpoint bit for bit: all that an iteration depends on is in the checkpoint.
 """
 
+import os
 import secrets
 from collections import deque
 from dataclasses import asdict, dataclass
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+import torch
 
 from common.clock import wall_time_s
 from policies.learn import checkpoint
@@ -98,11 +100,16 @@ def train(config: RunConfig, watcher: Watcher) -> Result:
         NumberError: an environment parameter that the task has not.
         UnknownTask: no such task, or a setting that it has not.
     """
-    training = Training(config, watcher)
+    threads_before = torch.get_num_threads()
+    torch.set_num_threads(max(1, min((os.cpu_count() or 1) // 2, 4)))  # ML-Agents' rule; the same sums each time
     try:
+        training = Training(config, watcher)
         return training.run()
     except OSError as error:
-        raise RunError(f"{error.filename or training.folder.path}: cannot be written: {error.strerror}") from error
+        folder = RunFolder.of(config).path
+        raise RunError(f"{error.filename or folder}: cannot be read or written: {error.strerror}") from error
+    finally:
+        torch.set_num_threads(threads_before)
 
 
 class Training:
@@ -124,7 +131,7 @@ class Training:
         self.config = config.model_copy(
             update={"env_settings": config.env_settings.model_copy(update={"seed": self.seed})}
         )
-        device = config.torch_settings.device or "cpu"
+        device = _device(config.torch_settings.device or "cpu")
         self.task = build_task(self.task_name, config.env_settings.env_count, self.task_settings, device)
         self.curriculum = Curriculum(config.environment_parameters)
         self._set_numbers()
@@ -314,6 +321,18 @@ class Training:
 def _has_passed(before: int, steps: int, period: int) -> bool:
     """Whether a multiple of the period lies in (before, steps]."""
     return steps // period > before // period
+
+
+def _device(name: str) -> str:
+    """Where networks and environments are, by its full name.
+
+    Raises:
+        RunError: there is no such device.
+    """
+    try:
+        return str(torch.zeros(1, device=name).device)
+    except (RuntimeError, AssertionError):
+        raise RunError(f"torch_settings.device {name}: torch finds no such device here") from None
 
 
 def _seed(config: RunConfig, content: dict[str, Any] | None) -> int:
