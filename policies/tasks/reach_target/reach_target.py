@@ -13,6 +13,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from policies.tasks.drawing import GOAL, GOOD, INK, OBSTACLE, VEHICLE, Canvas
+from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Element, Layout
 from policies.tasks.numbers import typed_rows
 from policies.tasks.reach_target.kernel import (
@@ -65,6 +66,8 @@ class ReachTarget(Task):
         layout = Layout("ReachTarget", 1, _frame(settings), continuous=_ACTIONS, stack=settings.stack or 1)
         super().__init__(layout, env_count, number_defaults={}, device=device)
         self.settings = settings
+        if (settings.observation, settings.reward, settings.success) == ("world", "sparse", "reach"):
+            self.goal = PlaceGoal(goal=(0, 1, 2), achieved=(3, 4, 5), radius="reach_m", reward=1.0)
         state = ReachState()
         state.pos = self._zeros("pos", env_count, wp.vec3)
         state.q = self._zeros("q", env_count, wp.quat)

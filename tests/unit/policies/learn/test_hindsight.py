@@ -1,8 +1,11 @@
+import numpy as np
 import pytest
 import torch
 
 from policies.learn.hindsight import Hindsight, with_goals
 from policies.learn.replay import Replay, ReplayBatch
+from policies.tasks.catalogue import build_task, task_settings
+from policies.tasks.episode import Outcome
 from policies.tasks.goals import PlaceGoal
 
 GOAL = PlaceGoal(goal=(0,), achieved=(1,), radius="reach_m", reward=1.0)
@@ -96,3 +99,35 @@ def test_restored_hindsight_goes_on_alike():
     one, two = relabelled(replay, hindsight), relabelled(twin_replay, twin)
     assert torch.equal(one.observations, two.observations)
     assert torch.equal(one.rewards, two.rewards)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "radius_m"), [("RollerBall", {}, 2.0), ("ReachTarget", {"variant": 0}, 20.0)], ids=str
+)
+def test_a_tasks_own_successes_are_those_its_place_goal_tells(name, settings, radius_m):
+    task = build_task(name, 256, task_settings(name, settings))
+    task.set_numbers({"reach_m": radius_m})
+    task.reset(3)
+    actions = np.random.default_rng(3)
+    goal = task.goal
+    counts = 0
+    for _ in range(60):
+        task.border.continuous.numpy()[:] = actions.uniform(-1.0, 1.0, task.border.continuous.shape)
+        task.step()
+        outcomes = task.border.outcomes.numpy()
+        is_over = outcomes != Outcome.RUNNING
+        seen = np.where(is_over[:, None], task.border.final_observations.numpy(), task.border.observations.numpy())
+        distance = np.linalg.norm(seen[:, goal.goal] - seen[:, goal.achieved], axis=1)
+        is_success = outcomes == Outcome.SUCCESS
+        clear = np.abs(distance - radius_m) > 1e-4
+        assert np.array_equal(distance[clear] < radius_m, is_success[clear])
+        assert (task.border.rewards.numpy()[is_success] == goal.reward).all()
+        assert not task.border.rewards.numpy()[~is_success].any()
+        counts += is_success.sum()
+    assert counts > 50
+
+
+def test_only_tasks_whose_observations_hold_goal_and_place_have_a_place_goal():
+    assert build_task("ReachTarget", 1, task_settings("ReachTarget", {"variant": 0})).goal is not None
+    for variant in (1, 2, 3, 4):
+        assert build_task("ReachTarget", 1, task_settings("ReachTarget", {"variant": variant})).goal is None
