@@ -101,9 +101,7 @@ class Ppo:
             self.task.step(self.policy.bounded(actions), actions.branches)
             rollout.record(t, actions, distribution.log_probs(actions), self.task)
             self._memory = _forgotten(memory, self.task)
-        self.policy.body.normalize(rollout.observations[:-1])
-        if not self.hyperparameters.shared_critic:
-            self.critic.body.normalize(rollout.observations[:-1])
+        self.policy.body.normalize(rollout.observations[:-1])  # the critic's too
 
     def _rewards(self, rollout: Rollout, transitions: Transitions | None) -> Tensor:
         """Of every signal times its strength, shape (T, N, signals)."""
@@ -246,9 +244,10 @@ class Ppo:
         return statistics
 
     def _critic(self, generator: torch.Generator) -> Critic:
-        """A body of its own unless it is shared."""
+        """With a body of its own unless it is shared; both see the same, so that one normaliser serves them."""
         policy, numbers = self.policy, self.hyperparameters
         body = policy.body if numbers.shared_critic else policy_body(policy.layout, policy.settings, generator)
+        body.normalizer = policy.body.normalizer
         return Critic(body, len(self.signals), generator, normalizes=numbers.normalize_returns)
 
     def _store(self, task: Task) -> Rollout:

@@ -183,18 +183,67 @@ def test_scores_are_those_of_the_episodes_that_ended():
     assert iteration.statistics["Policy/Extrinsic Reward"] == pytest.approx(iteration.scores.return_sum / count)
 
 
-def test_it_learns_to_push_the_ball_to_the_cube():
+def success_rate(ppo, decision_count=100):
+    """Of the most probable actions, on episodes that were not trained on."""
+    task = ppo.task.task
+    task.reset(999)
+    task.take_scores()
+    memory = ppo.policy.start_memory(task.env_count)
+    with torch.inference_mode():
+        for _ in range(decision_count):
+            actions, memory = ppo.policy.act(ppo.task.observations, memory)
+            ppo.task.step(ppo.policy.bounded(actions), actions.branches)
+    scores = task.take_scores()
+    return scores.count(Outcome.SUCCESS) / scores.episode_count
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_it_learns_to_push_the_ball_to_the_cube(seed):
     ppo = learner(
-        env_count=256,
-        buffer_size=256 * 32,
+        seed=seed,
+        signals=[ExtrinsicSignal(gamma=0.995)],
+        env_count=512,
+        buffer_size=512 * 16,
         batch_size=2048,
         learning_rate=3e-3,
         learning_rate_schedule="constant",
+        beta=0.0,
+        num_epoch=2,
         width=64,
     )
-    rates = []
-    for _ in range(40):
-        scores = ppo.iterate().scores
-        rates.append(scores.count(Outcome.SUCCESS) / scores.episode_count)
-    assert rates[0] < 0.5
-    assert min(rates[-5:]) > 0.85
+    while ppo.steps < 400_000:
+        ppo.iterate()
+    assert success_rate(ppo) > 0.98
+
+
+@pytest.mark.parametrize("memory", [None, Memory(sequence_length=8, memory_size=8)], ids=["feed-forward", "recurrent"])
+def test_a_timeout_bootstraps_and_a_true_end_does_not(memory):
+    ppo = learner(memory=memory, signals=[Constant(0.0, gamma=0.5), Constant(0.0, gamma=0.5, is_episodic=False)])
+    rollout = ppo._rollout
+    ppo._collect(rollout)
+    rollout.is_truncated.zero_()
+    rollout.is_terminated.zero_()
+    rollout.is_truncated[-1, 0] = True
+    rollout.is_terminated[-1, 1] = True
+    rollout.final_observations.fill_(2.0)
+    with torch.no_grad():
+        ppo.critic.heads.weight.zero_()
+        ppo.critic.heads.bias.copy_(torch.tensor([10.0, 20.0]))  # whatever is seen
+    ppo._estimate(rollout, torch.zeros(*rollout.rewards.shape, 2))
+    last = rollout.returns[-1]
+    assert last[0].tolist() == [5.0, 10.0]
+    assert last[1].tolist() == [0.0, 10.0]
+    assert last[2].tolist() == [5.0, 10.0]
+
+
+def test_a_timeout_is_valued_by_what_its_episode_saw_last():
+    ppo = learner(is_normalized=False)
+    rollout = ppo._rollout
+    ppo._collect(rollout)
+    rollout.is_truncated[5, 0] = True
+    rollout.final_observations[5, 0] = 3.0
+    with torch.no_grad():
+        _, next_values = ppo._values(rollout)
+        assert torch.allclose(next_values[5, 0], ppo.critic(torch.full((8,), 3.0)))
+        is_going_on = ~rollout.is_over[7]
+        assert torch.allclose(next_values[7][is_going_on], ppo.critic(rollout.observations[8][is_going_on]), atol=1e-6)
