@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import field_validator
 
-from policies.learn.config.block import Block, NotNegative, Positive, Share, own_key
+from policies.learn.config.block import Block, CountOrNone, NotNegative, Positive, Share, own_key
 from policies.learn.config.network import NetworkSettings
 
 
@@ -34,6 +34,8 @@ class GailSettings(SignalSettings):
     """Whether the discriminator sees actions too, not only observations."""
     use_vail: bool = False
     """Whether the discriminator has a variational bottleneck."""
+    batch_size: CountOrNone = own_key(None)
+    """Steps per update of the discriminator, drawn from the policy's minibatch; none: all of it."""
     reward_form: Literal["ml-agents", "logit", "log"] = own_key("ml-agents")
     """From the discriminator's D: `ml-agents` -log(1 - D), never negative; `logit` log D - log(1 - D); `log` log D."""
 

@@ -99,10 +99,9 @@ class GailSignal:
 
     def update(self, batch: Transitions) -> dict[str, float]:
         network, generator = self.network, self.generator
-        policy = self._inputs(batch)
+        policy = self._inputs(self._drawn(batch))
         count = len(policy)
-        rows = torch.randint(len(self._expert_inputs), (count,), generator=generator, device=policy.device)
-        expert = self._expert_inputs[rows]
+        expert = self._expert_inputs[self._drawn_rows(len(self._expert_inputs), count)]
         shares = torch.rand(policy.shape, generator=generator, device=policy.device)
 
         means = network.code_means(torch.cat([expert, policy]))
@@ -131,6 +130,14 @@ class GailSignal:
         if network.sigma is not None:
             network.beta = beta
         return statistics
+
+    def _drawn(self, batch: Transitions) -> Transitions:
+        """As many of a minibatch's rows as an update takes."""
+        count, size = len(batch.rewards), self.settings.batch_size
+        return batch if size is None or size >= count else batch[self._drawn_rows(count, size)]
+
+    def _drawn_rows(self, total: int, count: int) -> Tensor:
+        return torch.randint(total, (count,), generator=self.generator, device=self.generator.device)
 
     def state(self) -> dict[str, Any]:
         return snapshot(self.network, self.optimizer) | {"generator": self.generator.get_state()}

@@ -60,6 +60,13 @@ def test_without_actions_it_cannot_see_them():
     assert torch.equal(gail.rewards(rows), gail.rewards(rows_with_other_actions))
 
 
+def test_it_learns_from_some_rows_of_a_minibatch_as_well():
+    gail = signal(batch_size=16)
+    statistics = [gail.update(drawn(PUSHED, (256,), k, centre=-1.0)) for k in range(200)][-1]
+    assert statistics["Policy/GAIL Expert Estimate"] > 0.7
+    assert statistics["Policy/GAIL Policy Estimate"] < 0.3
+
+
 def test_a_rollout_is_rewarded_row_by_row_as_a_batch_is():
     gail = signal()
     rollout = drawn(PUSHED, (7, 3))
