@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from torch import Tensor, nn
+
 from policies.learn.policy import Policy
 from policies.tasks.task import Scores
 
@@ -40,6 +42,17 @@ class Learner(Protocol):
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Goes on from what `state` returned."""
         ...
+
+    def take_critics(self, state: Mapping[str, Any]) -> None:
+        """Starts from the critics in another run's state, where they fit: same algorithm, same networks."""
+        ...
+
+
+def load_if_fitting(module: nn.Module, weights: Mapping[str, Tensor]) -> None:
+    """Loads weights of the same names and shapes; others are left alone."""
+    shapes = {name: tensor.shape for name, tensor in weights.items()}
+    if shapes == {name: tensor.shape for name, tensor in module.state_dict().items()}:
+        module.load_state_dict(weights)
 
 
 class Companion(Protocol):

@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from policies.learn import losses
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
 from policies.learn.gae import advantages, cut_at_horizon
-from policies.learn.learner import Companion, Iteration
+from policies.learn.learner import Companion, Iteration, load_if_fitting
 from policies.learn.networks import Body, Critic, policy_body
 from policies.learn.policy import Policy
 from policies.learn.rollout import Batch, Rollout
@@ -276,6 +276,10 @@ class Ppo:
                 "task": self.task.task.state(),
             }
         )
+
+    def take_critics(self, state: Mapping[str, Any]) -> None:
+        """Starts from another run's critic if it fits."""
+        load_if_fitting(self.critic, state.get("critic", {}))
 
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Goes on bit for bit from a state of the same settings."""

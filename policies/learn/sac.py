@@ -27,7 +27,7 @@ from torch import Tensor
 
 from policies.learn.config.behavior import Behavior, SacHyperparameters
 from policies.learn.hindsight import Hindsight
-from policies.learn.learner import Companion, Iteration
+from policies.learn.learner import Companion, Iteration, load_if_fitting
 from policies.learn.policy import Policy
 from policies.learn.replay import Replay, ReplayBatch
 from policies.learn.sac_update import SoftActorCritic
@@ -207,6 +207,12 @@ class Sac:
             state["replay"] = self.replay.state()
             state["hindsight"] = self._hindsight.state() if self._hindsight is not None else {}
         return state
+
+    def take_critics(self, state: Mapping[str, Any]) -> None:
+        """Starts from another run's critics and targets if they fit."""
+        networks = state.get("networks", {})
+        load_if_fitting(self.networks.critics, networks.get("critics", {}))
+        load_if_fitting(self.networks.targets, networks.get("targets", {}))
 
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Goes on from a state of the same settings: bit for bit if the buffer is in it."""

@@ -7,6 +7,7 @@ from its newest checkpoint bit for bit: all that an iteration depends on is in t
 import os
 import secrets
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -312,10 +313,17 @@ class Training:
     def _initialize(self, path: Path) -> None:
         """Starts from the networks of another run."""
         content = checkpoint.load(path, CHECKPOINT, POLICY)
-        self.task.layout.require(Layout.from_record(content["policy"]["layout"]), str(path))
-        mine = {"network_settings": self.learner.policy.settings.model_dump()}
-        require_fit(flat(mine), flat({"network_settings": content["policy"]["network"]}), str(path))
-        self.learner.policy.load_state_dict(content["policy"]["weights"])
+        there = content["policy"]
+        self.task.layout.require(Layout.from_record(there["layout"]), str(path))
+        require_fit(_network(policy_record(self.learner.policy)), _network(there), str(path))
+        self.learner.policy.load_state_dict(there["weights"])
+        self.learner.take_critics(content.get("learner", {}))
+
+
+def _network(policy: Mapping[str, Any]) -> dict[str, Any]:
+    """What must be the same for the weights of one policy to fit into another."""
+    settings = {key: value for key, value in policy["network"].items() if key != "deterministic"}
+    return {"trainer_type": "sac" if policy["is_squashed"] else "ppo", **flat(settings, "network_settings.")}
 
 
 def _has_passed(before: int, steps: int, period: int) -> bool:

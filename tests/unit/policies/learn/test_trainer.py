@@ -1,0 +1,149 @@
+"""The training loop goes on bit for bit, whatever learns; networks of other runs are a place to start from."""
+
+import pytest
+import torch
+
+from policies.learn.checkpoint import CheckpointError, checkpoints, load
+from policies.learn.config.run import RunConfig
+from policies.learn.policy_file import load_policy
+from policies.learn.trainer import Training, train
+
+PPO = {"hyperparameters": {"batch_size": 256, "buffer_size": 1024}}
+NETWORK = {"hidden_units": 16, "num_layers": 1, "normalize": True}
+RECURRENT = {**NETWORK, "memory": {"memory_size": 8, "sequence_length": 8}}
+SAC = {"batch_size": 64, "buffer_size": 4000, "buffer_init_steps": 500, "steps_per_update": 50}
+KINDS = {
+    "ppo": {**PPO, "network_settings": NETWORK},
+    "ppo with memory": {**PPO, "network_settings": RECURRENT},
+    "ppo with curiosity and rnd": {
+        **PPO,
+        "network_settings": NETWORK,
+        "reward_signals": {"extrinsic": {}, "curiosity": {"strength": 0.1}, "rnd": {"normalize_reward": True}},
+    },
+    "sac": {
+        "trainer_type": "sac",
+        "hyperparameters": {**SAC, "save_replay_buffer": True},
+        "network_settings": NETWORK,
+    },
+    "sac with hindsight": {
+        "trainer_type": "sac",
+        "hyperparameters": {**SAC, "save_replay_buffer": True, "hindsight": 2},
+        "network_settings": NETWORK,
+    },
+}
+
+
+class StopAfter:
+    """Watches, and stops after so many iterations."""
+
+    def __init__(self, iterations=None):
+        self.iterations = iterations
+        self.shown = []
+        self.notes = []
+
+    @property
+    def is_stopped(self):
+        return len(self.shown) == self.iterations
+
+    def show(self, progress):
+        self.shown.append(progress)
+
+    def note(self, line):
+        self.notes.append(line)
+
+
+def config(folder, kind="ppo", **settings):
+    return RunConfig.model_validate(
+        {
+            "behavior_name": "B",
+            "behavior": {"max_steps": 4_000, "summary_freq": 1_500, "checkpoint_interval": 10**9, **KINDS[kind]},
+            "env_settings": {"env_path": "RollerBall", "num_areas": 64, "seed": 5},
+            "environment_parameters": {"force_n": {"sampler_type": "uniform", "sampler_parameters": UNIFORM}},
+            "checkpoint_settings": {"results_dir": str(folder), "run_id": "run", **settings},
+        }
+    )
+
+
+UNIFORM = {"min_value": 8.0, "max_value": 12.0}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_stopped_and_resumed_training_ends_with_the_same_bytes(tmp_path, kind):
+    whole = train(config(tmp_path / "whole", kind), StopAfter())
+    for iterations in (1, 1):
+        is_first = not (tmp_path / "parts").exists()
+        train(config(tmp_path / "parts", kind, resume=not is_first), StopAfter(iterations))
+    parts = train(config(tmp_path / "parts", kind, resume=True), StopAfter())
+    assert whole.end == parts.end == "max_steps"
+    assert whole.policy.read_bytes() == parts.policy.read_bytes()
+    ends = [checkpoints(tmp_path / name / "run" / "B", "B")[-1] for name in ("whole", "parts")]
+    learners = [load(end, "checkpoint")["learner"] for end in ends]
+    torch.testing.assert_close(*(_tensors(learner) for learner in learners), rtol=0.0, atol=0.0, equal_nan=True)
+
+
+def _tensors(state):
+    """Nested plain values with arrays as tensors of their bytes."""
+    if isinstance(state, dict):
+        return {key: _tensors(value) for key, value in state.items()}
+    if isinstance(state, list | tuple):
+        return [_tensors(value) for value in state]
+    if hasattr(state, "tobytes"):
+        return torch.frombuffer(bytearray(state.tobytes()) or bytearray(1), dtype=torch.uint8)
+    if isinstance(state, bool | int | float):
+        return torch.tensor(state, dtype=torch.float64)
+    return state if isinstance(state, torch.Tensor) else torch.zeros(0)
+
+
+def test_preparing_a_training_writes_nothing(tmp_path):
+    Training(config(tmp_path), StopAfter())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_progress_counts_steps_and_episodes(tmp_path):
+    watcher = StopAfter()
+    train(config(tmp_path), watcher)
+    assert [progress.steps for progress in watcher.shown] == [1024, 2048, 3072, 4096]
+    assert watcher.shown[-1].scores.episode_count > 0
+    assert watcher.shown[-1].left_s == 0.0
+    assert watcher.shown[0].left_s > 0.0
+    assert "RollerBall" in watcher.notes[0]
+
+
+def test_seed_is_chosen_and_kept_where_none_is_given(tmp_path):
+    given = config(tmp_path)
+    given = given.model_copy(update={"env_settings": given.env_settings.model_copy(update={"seed": -1})})
+    first = Training(given, StopAfter())
+    assert first.seed != Training(given, StopAfter()).seed
+    first.watcher = StopAfter(1)
+    first.run()
+    resume = given.checkpoint_settings.model_copy(update={"resume": True})
+    again = Training(given.model_copy(update={"checkpoint_settings": resume}), StopAfter())
+    assert again.seed == first.seed == load_policy(first.folder.policy)[1].seed
+
+
+@pytest.mark.parametrize("kind", ["ppo", "sac"])
+def test_networks_of_another_run_are_where_a_new_one_starts(tmp_path, kind):
+    train(config(tmp_path, kind), StopAfter(2))
+    start = Training(config(tmp_path, kind, initialize_from="run", run_id="next"), StopAfter()).learner.state()
+    there = load(checkpoints(tmp_path / "run" / "B", "B")[-1], "checkpoint")["learner"]
+    if kind == "sac":
+        start, there = start | start["networks"], there | there["networks"]
+    for name in ("policy", "critic") if kind == "ppo" else ("policy", "critics", "targets"):
+        torch.testing.assert_close(_tensors(start[name]), _tensors(there[name]), rtol=0.0, atol=0.0)
+    assert start["steps"] == 0
+
+
+def test_networks_that_do_not_fit_are_refused_with_the_first_difference(tmp_path):
+    train(config(tmp_path), StopAfter(1))
+    with pytest.raises(CheckpointError, match=r"network_settings\.memory"):
+        Training(config(tmp_path, "ppo with memory", initialize_from="run", run_id="next"), StopAfter())
+    with pytest.raises(CheckpointError, match="trainer_type is ppo there and sac here"):
+        Training(config(tmp_path, "sac", initialize_from="run", run_id="next"), StopAfter())
+
+
+def test_policy_starts_alone_where_the_critic_has_other_signals(tmp_path):
+    train(config(tmp_path), StopAfter(1))
+    kind = "ppo with curiosity and rnd"
+    learner = Training(config(tmp_path, kind, initialize_from="run", run_id="next"), StopAfter()).learner
+    there = load_policy(tmp_path / "run" / "B.pt")[0]
+    torch.testing.assert_close(learner.policy.state_dict(), there.state_dict(), rtol=0.0, atol=0.0)
