@@ -4,6 +4,7 @@ import torch
 from policies.learn.config.behavior import Behavior
 from policies.learn.policy import Policy
 from policies.learn.sac import Sac, SacError
+from policies.learn.signals.build import build_signals
 from policies.learn.signals.extrinsic import ExtrinsicSignal
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
@@ -43,11 +44,11 @@ def flat(value):
 
 def mean_reward(task, policy, rounds=20):
     """Of the most probable actions."""
-    sac_free = policy.start_memory(task.env_count)
+    no_memory = policy.start_memory(task.env_count)
     task.take_scores()
     for _ in range(rounds):
         with torch.no_grad():
-            actions, _ = policy.act(torch.from_numpy(task.border.observations.numpy().copy()), sac_free)
+            actions, _ = policy.act(torch.from_numpy(task.border.observations.numpy().copy()), no_memory)
         if actions.continuous.shape[1]:
             task.border.continuous.numpy()[:] = policy.bounded(actions).numpy()
         if actions.branches.shape[1]:
@@ -150,6 +151,24 @@ def test_temperatures_and_losses_have_ml_agents_tags():
         "Policy/Continuous Entropy Coeff",
         "Policy/Discrete Entropy Coeff",
     }
+
+
+def test_novelty_is_a_stream_of_its_own_and_learns_as_often_as_its_key_says():
+    task = Signs(50, (3, 2), is_pointing=True)
+    behavior = Behavior.model_validate(
+        {
+            "trainer_type": "sac",
+            "hyperparameters": {**FAST, "reward_signal_steps_per_update": 100},
+            "network_settings": {"hidden_units": 16},
+            "reward_signals": {"extrinsic": {}, "rnd": {"gamma": 0.9}, "curiosity": {"strength": 0.01}},
+        }
+    )
+    policy = Policy(task.layout, behavior.network_settings, torch.Generator().manual_seed(1), is_squashed=True)
+    sac = Sac(task, policy, behavior, build_signals(behavior.reward_signals, task.layout, 1, "cpu"), seed=1)
+    statistics = sac.iterate().statistics
+    assert {"Policy/Extrinsic Value", "Policy/Rnd Value", "Policy/Curiosity Value"} <= set(statistics)
+    assert "Losses/RND Loss" in statistics
+    assert sac.state()["update_counts"] == [1000 // 8, 1000 // 100]
 
 
 def test_what_it_does_not_do_is_refused_in_one_sentence():
