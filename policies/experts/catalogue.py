@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from policies.experts.expert import Expert
 from policies.experts.parking import Parking1Expert, Parking2Expert
-from policies.experts.pursuit import PursuitExpert
+from policies.experts.reach_target import ReachTargetExpert
 from policies.experts.roller_ball import RollerBallExpert
 
 
@@ -16,7 +16,7 @@ EXPERTS: dict[str, Callable[[], Expert]] = {
     "Parking1": Parking1Expert,
     "Parking2": Parking2Expert,
     "RollerBall": RollerBallExpert,
-    "ReachTarget": PursuitExpert,
+    "ReachTarget": ReachTargetExpert,
 }
 
 

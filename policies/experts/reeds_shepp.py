@@ -7,7 +7,7 @@ are solved below; time reversed and the plane mirrored, they give the others.
 Frames are Unity's: x right, z forward, yaw clockwise from +z. A right turn raises the yaw, a left turn lowers it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,39 +34,46 @@ class ReedsSheppPath:
 
     def poses(self, start: Array, spacing_m: float) -> tuple[Array, NDArray[np.int64]]:
         """Poses along the path from `start` (x, z, yaw), (n, 3), and the way each is driven: 1 ahead, -1 back."""
-        poses, directions = [np.asarray(start, dtype=np.float64)], [1]
+        poses = [np.asarray(start, dtype=np.float64)[None]]
+        directions = [np.ones(1, dtype=np.int64)]
         for turn, length in zip(self.turns, self.lengths_m, strict=True):
             count = max(1, int(np.ceil(abs(length) / spacing_m)))
-            begin = poses[-1]
-            poses += [moved(begin, int(turn), length * k / count, self.radius_m) for k in range(1, count + 1)]
-            directions += [1 if length >= 0.0 else -1] * count
-        directions[0] = directions[min(1, len(directions) - 1)]
-        return np.array(poses), np.array(directions)
+            poses.append(moved(poses[-1][-1], int(turn), length * np.arange(1, count + 1) / count, self.radius_m))
+            directions.append(np.full(count, 1 if length >= 0.0 else -1))
+        directions[0] = directions[min(1, len(directions) - 1)][:1]
+        return np.concatenate(poses), np.concatenate(directions)
 
 
-def moved(pose: Array, turn: int, length_m: float, radius_m: float) -> Array:
-    """The pose (x, z, yaw) after one piece."""
+def moved(pose: Array, turn: int, length_m: "float | Array", radius_m: float) -> Array:
+    """The pose (x, z, yaw) after a piece of each length, shape (..., 3)."""
     x, z, yaw = (float(value) for value in pose)
+    lengths = np.asarray(length_m, dtype=np.float64)
     if turn == STRAIGHT:
-        return np.array([x + length_m * np.sin(yaw), z + length_m * np.cos(yaw), yaw])
-    after = yaw + turn * length_m / radius_m
-    x += turn * radius_m * (np.cos(yaw) - np.cos(after))  # round a centre at its right or its left
-    z += turn * radius_m * (np.sin(after) - np.sin(yaw))
-    return np.array([x, z, after])
+        return np.stack([x + lengths * np.sin(yaw), z + lengths * np.cos(yaw), np.full_like(lengths, yaw)], axis=-1)
+    after = yaw + turn * lengths / radius_m
+    x_after = x + turn * radius_m * (np.cos(yaw) - np.cos(after))  # round a centre at its right or its left
+    z_after = z + turn * radius_m * (np.sin(after) - np.sin(yaw))
+    return np.stack([x_after, z_after, after], axis=-1)
+
+
+def paths_by_length(start: Array, goal: Array, radius_m: float) -> Iterator[ReedsSheppPath]:
+    """The paths from one pose (x, z, yaw) to another, one per word that leads there, the shortest first."""
+    words, totals = _words(*_local(np.asarray(start, float), np.asarray(goal, float), radius_m))
+    for k in np.argsort(totals):
+        if np.isfinite(totals[k]):
+            is_driven = np.abs(words[k]) > 1e-9
+            yield ReedsSheppPath(np.array(_TURNS[k])[is_driven], words[k][is_driven] * radius_m, radius_m)
 
 
 def shortest_path(start: Array, goal: Array, radius_m: float) -> ReedsSheppPath:
     """The shortest path from one pose (x, z, yaw) to another."""
-    pieces, k_word = _shortest(*_local(np.asarray(start, float), np.asarray(goal, float), radius_m))
-    turns = np.array(_TURNS[int(k_word)])
-    is_driven = np.abs(pieces) > 1e-9
-    return ReedsSheppPath(turns[is_driven], pieces[is_driven] * radius_m, radius_m)
+    return next(paths_by_length(start, goal, radius_m))
 
 
 def shortest_lengths(starts: Array, goals: Array, radius_m: float) -> Array:
     """Lengths [m] of the shortest paths between poses, shapes (..., 3)."""
-    pieces, _ = _shortest(*_local(np.asarray(starts, float), np.asarray(goals, float), radius_m))
-    return np.asarray(np.abs(pieces).sum(axis=0) * radius_m)
+    _, totals = _words(*_local(np.asarray(starts, float), np.asarray(goals, float), radius_m))
+    return np.asarray(totals.min(axis=0) * radius_m)
 
 
 def _local(start: Array, goal: Array, radius_m: float) -> tuple[Array, Array, Array]:
@@ -78,8 +85,8 @@ def _local(start: Array, goal: Array, radius_m: float) -> tuple[Array, Array, Ar
     return ahead, left, start[..., 2] - goal[..., 2]
 
 
-def _shortest(x: Array, y: Array, phi: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Lengths of the pieces of the shortest word, shape (5, ...), and its index."""
+def _words(x: Array, y: Array, phi: Array) -> tuple[Array, Array]:
+    """Lengths of the pieces of every word, shape (words, 5, ...), and their sums; infinite: it does not lead there."""
     words = np.zeros((4 * len(_FORMULAS), _PIECES, *np.shape(x)))
     flips = ((1, 1), (-1, 1), (1, -1), (-1, -1))  # of time (x, phi and the lengths) and of the plane (y, phi)
     with np.errstate(invalid="ignore"):  # where a word does not exist its lengths are NaN
@@ -88,8 +95,7 @@ def _shortest(x: Array, y: Array, phi: Array) -> tuple[Array, NDArray[np.intp]]:
                 for j, piece in enumerate(formula(time * x, plane * y, time * plane * phi)):
                     words[i_flip * len(_FORMULAS) + k, j] = time * np.asarray(piece)
     totals = np.abs(words).sum(axis=1)
-    best = np.argmin(np.where(np.isnan(totals), np.inf, totals), axis=0)
-    return np.take_along_axis(words, best[None, None], axis=0)[0], best
+    return words, np.where(np.isnan(totals), np.inf, totals)
 
 
 # The words. Each takes the goal (x, y, phi) and gives the signed lengths of its pieces in radii; the first turn is to
@@ -210,6 +216,6 @@ _FORMULAS: tuple[tuple[str, Callable[[Array, Array, Array], tuple[Array, ...]]],
     ("LRSLR", _lrslr),
 )
 _SIDE = {"L": LEFT, "S": STRAIGHT, "R": RIGHT}
-_TURNS = [  # of every word, in the order of `_shortest`: mirroring the plane swaps left and right
+_TURNS = [  # of every word, in the order of `_words`: mirroring the plane swaps left and right
     [plane * _SIDE[letter] for letter in name.ljust(_PIECES, "S")] for plane in (1, 1, -1, -1) for name, _ in _FORMULAS
 ]

@@ -2,6 +2,7 @@
 
 import json
 
+import gymnasium
 import numpy as np
 import pytest
 from minari import MinariDataset
@@ -99,6 +100,28 @@ def test_minari_reads_what_was_written(tmp_path):
     assert json.loads(metadata[SETTINGS_KEY]) == settings.model_dump()
     assert all(row["success"] for row in dataset.storage.get_episode_metadata(range(7)))
     assert dataset.recover_environment().unwrapped.task.layout == task.layout
+
+
+def test_demonstrations_are_read_as_they_were_written(tmp_path):
+    from policies.learn.demonstrations import load_demonstrations
+
+    task = build_task("Parking2", 2, task_settings("Parking2", {}))
+    episodes = record_episodes(task, build_expert("Parking2"), 2, seed=0)
+    write_demonstrations(tmp_path / "demo", Origin(task.layout, task_settings("Parking2", {}), "scripted", 0), episodes)
+    read = load_demonstrations(str(tmp_path / "demo"), task.layout)
+    written = np.concatenate([episode.branches for episode in episodes])
+    np.testing.assert_array_equal(read.branches.numpy(), written)
+    np.testing.assert_array_equal(read.observations.numpy()[0], episodes[0].observations[0])
+
+
+def test_gymnasium_collects_the_pictures_of_an_episode():
+    env = gymnasium.wrappers.RenderCollection(gymnasium.make("honeyguide/Parking1-v0", render_mode="rgb_array"))
+    env.reset(seed=1)
+    for _ in range(3):
+        env.step(env.action_space.sample())
+    pictures = env.render()
+    assert len(pictures) == 4
+    assert all(picture.shape == pictures[0].shape and picture.dtype == np.uint8 for picture in pictures)
 
 
 def test_existing_folder_is_left_alone(tmp_path):
