@@ -108,10 +108,12 @@ def evaluate_policy(
     path = find_policy(name)
     policy, card = load_policy(path)
     task_name = task or card.task
-    own = card.settings if task_name == card.task else {}
+    own, numbers = (card.settings, card.samplers()) if task_name == card.task else ({}, {})
     settings = settings_of(task_name, pairs, {**own, "split": "test"})
     episodes, seed = episodes_and_seed
-    evaluation = evaluate(policy, task_name, settings, episodes=episodes, seed=seed, is_greedy=not is_drawn)
+    evaluation = evaluate(
+        policy, task_name, settings, episodes=episodes, seed=seed, numbers=numbers, is_greedy=not is_drawn
+    )
     shown = ", ".join(f"{key}={value}" for key, value in settings.model_dump().items())
     _print(console, f"{path} on {task_name} ({shown}), seed {seed}")
     console.print(_evaluation_table(evaluation))
@@ -134,7 +136,7 @@ def _play(config: RunConfig, console: Console) -> None:
     """The policy of a run, playing."""
     folder = RunFolder.of(config)
     folder.check(is_resumed=True, is_forced=False)
-    policy, _ = load_policy(folder.newest_checkpoint())
+    policy, card = load_policy(folder.newest_checkpoint())
     name = config.env_settings.env_path or ""
     evaluation = evaluate(
         policy,
@@ -142,6 +144,7 @@ def _play(config: RunConfig, console: Console) -> None:
         settings_of(name, config.env_settings.env_args),
         episodes=INFERENCE_EPISODES,
         seed=max(config.env_settings.seed, 0),
+        numbers=card.samplers(),
         is_greedy=config.behavior.network_settings.deterministic,
     )
     console.print(_evaluation_table(evaluation))
@@ -156,7 +159,8 @@ class _Watcher:
         self._line_s = wall_time_s()
         self._bar: Progress | None = None
         if console.is_terminal:
-            columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.description}"))
+            steps = TextColumn("{task.completed:,.0f} steps,")
+            columns = (BarColumn(bar_width=15), TaskProgressColumn(), steps, TextColumn("{task.description}"))
             self._bar = Progress(*columns, console=console, transient=True)
             self._task = self._bar.add_task("starting", total=max_steps)
             self._bar.start()

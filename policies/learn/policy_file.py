@@ -16,6 +16,7 @@ from policies.learn.checkpoint import CheckpointError, load, save
 from policies.learn.config.network import NetworkSettings
 from policies.learn.policy import Policy
 from policies.tasks.layout import Layout
+from policies.tasks.numbers import Sampler
 
 POLICY = "policy"  # kinds of files
 CHECKPOINT = "checkpoint"
@@ -29,7 +30,12 @@ class PolicyCard:
     settings: dict[str, Any]  # of the task, all of them
     seed: int
     steps: int
-    figures: dict[str, float] = field(default_factory=dict)  # "success_rate", "episodes", …
+    figures: dict[str, float] = field(default_factory=dict)  # "success_rate", "training_reward", …
+    numbers: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the task, in the last lesson
+
+    def samplers(self) -> dict[str, Sampler]:
+        """What the task's numbers are drawn from, where they are not the settings' own."""
+        return {name: Sampler(**record) for name, record in self.numbers.items()}
 
 
 def save_policy(path: Path, policy: Policy, card: PolicyCard) -> None:

@@ -282,7 +282,8 @@ class Training:
             low, high = self._held_out.interval
             figures |= {"success_rate": self._held_out.success_rate, "success_low": low, "success_high": high}
         settings = self.task_settings.model_dump()
-        return PolicyCard(self.task_name, settings, self.seed, self.learner.steps, figures)
+        numbers = {name: asdict(sampler) for name, sampler in self.curriculum.final_numbers().items()}
+        return PolicyCard(self.task_name, settings, self.seed, self.learner.steps, figures, numbers)
 
     def _progress(self) -> Progress:
         now_s = wall_time_s()

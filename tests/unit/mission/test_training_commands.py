@@ -401,6 +401,15 @@ def test_policy_is_judged_on_held_out_places(finished):
     assert "split=train" in result.output
 
 
+def test_policy_is_judged_with_the_numbers_it_was_trained_with():
+    for name, step_limit in (("short", 1.0), ("long", 50.0)):
+        write_config(max_steps=1, parameters={"step_limit": step_limit, "reach_m": 0.1})
+        assert honeyguide("train", "config.yaml", "--run-id", name).exit_code == 0
+    short, long = (honeyguide("eval", name, "--episodes", "20").output for name in ("short", "long"))
+    assert "1.0 decisions" in short
+    assert "1.0 decisions" not in long
+
+
 def test_policy_is_refused_for_another_task(finished):
     result = honeyguide("eval", finished, "--task", "ReachTarget")
     assert result.exit_code == 2
