@@ -109,7 +109,9 @@ def braking() -> Check:
     start = float(task.world.pos.numpy()[0, 2])  # type: ignore[attr-defined]
     distance = float(drive(task, (0.0, 0.0, 1.0), 4.0)[-1, 2]) - start
     best = 10.0**2 / (2.0 * _accel(4.0 * NUMBER["brake_torque_nm"]))
-    return Check("braking distance from 10 m/s", distance, "m", best, "the brakes' torque, if no wheel locked")
+    return Check(
+        "braking distance from 10 m/s", distance, "m", best, "the brakes' torque, if the rear wheels did not lift"
+    )
 
 
 def braking_gently() -> Check:
@@ -135,9 +137,12 @@ def turn_radius() -> Check:
     radius = float(np.sqrt(centre[2] + centre[0] ** 2 + centre[1] ** 2))
     rear = float(np.sqrt(radius**2 - (NUMBER["wheelbase_m"] / 2.0) ** 2))
     kinematic = NUMBER["wheelbase_m"] / np.tan(np.radians(NUMBER["steer_max_deg"]))
-    speed = float(np.linalg.norm(path[-1, 3:]))
     return Check(
-        "turn radius of the rear axle, slow", rear, "m", float(kinematic), f"wheelbase over tan 25 deg; {speed:.1f} m/s"
+        "turn radius of the rear axle, slow",
+        rear,
+        "m",
+        float(kinematic),
+        "wheelbase over tan 25 deg; the front wheels stay parallel",
     )
 
 
@@ -154,20 +159,6 @@ def cornering() -> Check:
     return Check("greatest side acceleration", best, "m/s²", limit, "peak of the side curve times gravity")
 
 
-def fall() -> Check:
-    """Creeping over the edge: how far past it the centre is when the episode ends."""
-    task = car(half_platform_m=50.0)
-    task.world.pos.assign(np.array([[0.0, 0.859, 45.0]], np.float32))  # type: ignore[attr-defined]
-    set_rolling(task, 10.0)
-    far = 0.0
-    for _ in range(40):
-        row = drive(task, (0.0, 0.0, 0.0), DECISION_S)[-1]
-        if task.border.outcomes.numpy()[0]:
-            break
-        far = float(row[2]) - 50.0
-    return Check("centre past the edge when last seen, at 10 m/s", far, "m", None, "then it strikes the edge or falls")
-
-
 CHECKS = (
     rest_height,
     gentle_acceleration,
@@ -178,7 +169,6 @@ CHECKS = (
     braking_gently,
     turn_radius,
     cornering,
-    fall,
 )
 
 
