@@ -44,7 +44,7 @@ from policies.tasks.parking.observe_ranged import (
     write_walls,
 )
 from policies.tasks.parking.rays import ray_elements, write_rays
-from policies.tasks.parking.scene import Scene, portal_half
+from policies.tasks.parking.scene import Scene, pad_half, portal_half
 from policies.tasks.parking.settings import AS_DOCUMENTED, RANGED, Choices, Rules
 
 wp.set_module_options({"enable_backward": False})
@@ -69,7 +69,7 @@ def frame_of(choices: Choices, rules: Rules, tags: tuple[str, ...]) -> tuple[Ele
     if choices.observation == "ranged":
         pair = ("mover_z", "mover_x")
         return (
-            *goal_elements(choices.success == "pose"),
+            *goal_elements(),
             Element("is_goal_here", "1", is_goal=True),
             *velocity_elements("vel_car"),
             *surface_elements(*pair, *walls, "portal"),
@@ -128,16 +128,16 @@ def observe_ranged(
     at: int,
     motion: Motion,
     scene: Scene,
-    rules: Rules,
     numbers: CarNumbers,
     more: Level2Numbers,
 ) -> int:
     """What lies ahead on the route, and what is about; returns the next column."""
     box = box_of_car(motion.pose, numbers.box_ahead_m)
-    ahead = scene.goal
-    if not scene.has_goal:  # the way leads through the portal; the heading stays the goal's
-        ahead = wp.vec4(scene.portal[0], scene.portal[1], scene.goal[2], scene.goal[3])
-    next_at = write_goal(border, i, at, box, ahead, rules)
+    next_at = int(0)
+    if scene.has_goal:
+        next_at = write_goal(border, i, at, box, scene.goal, pad_half())
+    else:  # the way leads through the portal
+        next_at = write_goal(border, i, at, box, scene.portal, portal_half())
     border.observations[i, next_at] = wp.where(scene.has_goal, 1.0, 0.0)
     next_at = write_velocity(border, i, next_at + 1, box, motion.vel)
     next_at = write_obstacles(border, i, next_at, box, scene)
@@ -163,7 +163,7 @@ def observe(
     """The newest frame."""
     at = open_frame(border, i)
     if rules.observation == _RANGED:
-        at = observe_ranged(border, i, at, motion, scene, rules, numbers, more)
+        at = observe_ranged(border, i, at, motion, scene, numbers, more)
     elif rules.observation == _AS_DOCUMENTED:
         at = write_target(border, i, at, motion.pose, scene.goal[0], GOAL_HEIGHT, scene.goal[1])
     else:

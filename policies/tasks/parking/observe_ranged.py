@@ -1,7 +1,7 @@
 """What our car sees: what is where in the frame of its box, with ranges; nothing a real vehicle could not know.
 
 A surface is two floats: the direction to its nearest point times 1 / (1 + distance / 1 m), so that what is near is
-large and what is far fades. The goal is a direction, a distance and a nearness; its heading is given where it counts.
+large and what is far fades. The goal is a direction, a distance and a nearness, its heading, and its nearest edge.
 """
 
 import warp as wp
@@ -22,7 +22,6 @@ from policies.tasks.parking.arena import (
 )
 from policies.tasks.parking.car import nearest_in_box
 from policies.tasks.parking.scene import MAX_OBSTACLES, Scene
-from policies.tasks.parking.settings import Rules
 
 wp.set_module_options({"enable_backward": False})
 
@@ -32,15 +31,17 @@ _PER_RANGE = wp.constant(1.0 / RANGE_SCALE_M)
 _PER_SPEED = wp.constant(1.0 / SPEED_SCALE_M_S)
 
 
-def goal_elements(needs_pose: bool) -> tuple[Element, ...]:
-    """Four, and two of its heading."""
-    heading = (Element("goal_heading_car_sin", "1", is_goal=True), Element("goal_heading_car_cos", "1", is_goal=True))
+def goal_elements() -> tuple[Element, ...]:
+    """Eight: where its centre is, how it is turned, and where its nearest edge is."""
     return (
         Element("goal_direction_right", "1", is_goal=True),
         Element("goal_direction_forward", "1", is_goal=True),
         Element("goal_distance", "m", RANGE_SCALE_M, is_goal=True),
         Element("goal_nearness", "1", is_goal=True),
-        *(heading if needs_pose else ()),
+        Element("goal_heading_right", "1", is_goal=True),
+        Element("goal_heading_forward", "1", is_goal=True),
+        Element("goal_edge_right", "1", is_goal=True),
+        Element("goal_edge_forward", "1", is_goal=True),
     )
 
 
@@ -70,19 +71,6 @@ def faded(gap: wp.vec2, radius: float) -> wp.vec2:
 
 
 @wp.func
-def write_goal(border: Border, i: int, at: int, box: wp.vec4, goal: wp.vec4, rules: Rules) -> int:
-    """The goal elements; returns the next column."""
-    gap = into_frame(box, place_of(goal))
-    distance = wp.length(gap)
-    next_at = write_pair(border, i, at, gap / wp.max(distance, 1.0e-6))
-    next_at = write_pair(border, i, next_at, wp.vec2(distance * _PER_RANGE, 1.0 / (1.0 + distance)))
-    if rules.needs_pose:
-        nose = forward_of(goal)
-        next_at = write_pair(border, i, next_at, wp.vec2(wp.dot(nose, right_of(box)), wp.dot(nose, forward_of(box))))
-    return next_at
-
-
-@wp.func
 def write_velocity(border: Border, i: int, at: int, box: wp.vec4, vel: wp.vec2) -> int:
     """A velocity in the car's frame; returns the next column."""
     seen = wp.vec2(wp.dot(vel, right_of(box)), wp.dot(vel, forward_of(box)))
@@ -97,6 +85,18 @@ def write_box(border: Border, i: int, at: int, box: wp.vec4, other: wp.vec4, hal
     world = gap[0] * right_of(other) + gap[1] * forward_of(other)
     seen = wp.vec2(wp.dot(world, right_of(box)), wp.dot(world, forward_of(box)))
     return write_pair(border, i, at, faded(seen, radius))
+
+
+@wp.func
+def write_goal(border: Border, i: int, at: int, box: wp.vec4, goal: wp.vec4, half: wp.vec2) -> int:
+    """The goal elements of what is to be driven to, with its half sizes; returns the next column."""
+    gap = into_frame(box, place_of(goal))
+    distance = wp.length(gap)
+    nose = forward_of(goal)
+    next_at = write_pair(border, i, at, gap / wp.max(distance, 1.0e-6))
+    next_at = write_pair(border, i, next_at, wp.vec2(distance * _PER_RANGE, 1.0 / (1.0 + distance)))
+    next_at = write_pair(border, i, next_at, wp.vec2(wp.dot(nose, right_of(box)), wp.dot(nose, forward_of(box))))
+    return write_box(border, i, next_at, box, goal, half, 0.0)
 
 
 @wp.func

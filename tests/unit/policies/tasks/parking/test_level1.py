@@ -55,7 +55,7 @@ def test_it_is_a_valid_gymnasium_environment(preset):
 
 
 def test_presets_have_the_documented_sizes_of_observation_and_action():
-    assert [built(preset=preset).layout.observation_size for preset in PRESETS] == [27, 27, 22]
+    assert [built(preset=preset).layout.observation_size for preset in PRESETS] == [27, 27, 24]
     assert [built(preset=preset).layout.branch_sizes for preset in PRESETS] == [(3,), (3,), (3, 3)]
     assert [built(preset=preset).decision_s for preset in PRESETS] == [0.06, 0.06, 0.06]
 

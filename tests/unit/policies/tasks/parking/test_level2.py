@@ -55,7 +55,7 @@ def test_it_is_a_valid_gymnasium_environment(preset):
 
 def test_presets_have_the_documented_sizes_of_observation_and_action():
     layouts = [built(preset=preset).layout for preset in PRESETS]
-    assert [layout.observation_size for layout in layouts] == [6 + 29 * 3, 57 * 3, 27]
+    assert [layout.observation_size for layout in layouts] == [6 + 29 * 3, 57 * 3, 29]
     assert [layout.branch_sizes for layout in layouts] == [(3, 2), (3, 2), (3, 3)]
 
 
