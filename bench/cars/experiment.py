@@ -1,0 +1,31 @@
+"""The experiments of the reproduction: what is trained, how often, on what it is judged, and what was reported."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """Held-out episodes of one kind."""
+
+    label: str
+    settings: dict[str, Any] = field(default_factory=dict)  # of the task, over those of the recipe
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """One row of the results."""
+
+    name: str
+    title: str
+    recipe: str
+    seeds: int = 5
+    settings: dict[str, Any] = field(default_factory=dict)  # of the task, over those of the recipe
+    judged: tuple[Judged, ...] = (Judged("held out"),)
+    document: str = "not reported"
+    target: float | None = None  # success at least
+    limit_s: float | None = None  # wall clock at most
+    threads: int = 1
+
+
+NEW_SPOTS = Judged("new spots", {"split": "test"})

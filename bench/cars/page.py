@@ -1,0 +1,105 @@
+"""Writes docs/results/cars.md and its pictures from the results of the runs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.cars import curves
+from bench.cars.experiment import Experiment
+from bench.cars.experiments import SECTIONS, Section
+from bench.cars.result import Result
+from bench.cars.statistics import over_seeds, wilson
+from common.files import write_whole
+
+DOCS = Path(__file__).parent.parent.parent / "docs" / "results"
+INTRODUCTION = """# The two car documents, trained anew
+
+What 'Learning to Drive with Unity ML-Agents' and 'Park It Right!' report, and what the same tasks come to here. Everything
+on this page is made by one command, from nothing, which takes hours on two cores and goes on where it was when stopped:
+
+```sh
+make reproduce-cars
+```
+
+Each run is one process on one core (its number of threads is in the table) with one run on the other core beside it. Wall
+clock is that of training, from the first decision to the last update; compiling the kernels for the first time, some
+20 s once per machine, is not in it. Success is that of the greedy policy on held-out episodes: new places, new draws,
+{episodes} per run. "95 %" is the interval of the mean over training seeds (Student); for one seed it is Wilson's over its
+episodes. "Worst" is the worst seed. Measured on {machine}.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Results by experiment, one per seed."""
+
+    results: Mapping[str, Sequence[Result]]
+
+    def of(self, experiment: Experiment) -> Sequence[Result]:
+        return self.results.get(experiment.name, ())
+
+
+def write_page(results: Mapping[str, Sequence[Result]]) -> Path:
+    """Writes the page and its pictures; experiments without results are named as such."""
+    table = Table(results)
+    every = [result for runs in results.values() for result in runs]
+    machines = ", ".join(sorted({result.machine for result in every})) or "no machine yet"
+    counts = sorted({evaluated.episodes for result in every for evaluated in result.evaluations})
+    episodes = " or ".join(f"{count:,}" for count in counts) or "0"
+    parts = [INTRODUCTION.format(episodes=episodes, machine=machines)]
+    parts += [_section(section, table) for section in SECTIONS]
+    path = DOCS / "cars.md"
+    DOCS.mkdir(parents=True, exist_ok=True)
+    write_whole(path, "\n".join(parts).encode())
+    return path
+
+
+def _section(section: Section, table: Table) -> str:
+    lines = [f"## {section.title}\n", section.words, ""]
+    lines += [
+        "| run | judged on | document | at least | success | 95 % | worst | seeds | steps | wall clock | steps/s |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for experiment in section.experiments:
+        lines += _rows(experiment, table.of(experiment))
+    for picture in section.pictures:
+        runs = {label: table.results.get(name, ()) for label, name in picture.runs.items()}
+        if any(runs.values()):
+            curves.draw(
+                DOCS / "images" / f"{picture.name}.png",
+                picture.title,
+                runs,
+                value=picture.value,
+                over=picture.over,
+            )
+            lines += ["", f"![{picture.title}](images/{picture.name}.png)"]
+    return "\n".join(lines) + "\n"
+
+
+def _rows(experiment: Experiment, runs: Sequence[Result]) -> list[str]:
+    target = "" if experiment.target is None else f"{100 * experiment.target:g} %"
+    if experiment.limit_s is not None:
+        target += f", {_duration(experiment.limit_s)}"
+    if not runs:
+        return [f"| {experiment.title} | | {experiment.document} | {target} | not run | | | | | | |"]
+    steps = over_seeds([result.steps for result in runs]).value
+    wall = [result.train_s for result in runs]
+    longest = "" if len(wall) == 1 else f" (longest {_duration(max(wall))})"
+    rate = over_seeds([result.steps_per_s for result in runs]).value
+    lines = []
+    for k, judged in enumerate(experiment.judged):
+        evaluated = [result.evaluations[k] for result in runs]
+        shares = [item.successes / item.episodes for item in evaluated]
+        interval = over_seeds(shares) if len(runs) > 1 else wilson(evaluated[0].successes, evaluated[0].episodes)
+        first = k == 0
+        lines.append(
+            f"| {experiment.title if first else ''} | {judged.label} | {experiment.document if first else ''} "
+            f"| {target if first else ''} | {100 * interval.value:.2f} % "
+            f"| {100 * max(0.0, interval.low):.2f} to {100 * min(1.0, interval.high):.2f} % | {100 * min(shares):.2f} % "
+            f"| {len(runs)} | {steps / 1e6:.2f} M | {_duration(sum(wall) / len(wall))}{longest} | {rate:,.0f} |"
+        )
+    return lines
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.1f} min"
