@@ -37,9 +37,9 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc]  # its package has no types
         return observations, rewards.astype(np.float32), is_over, infos
 
     def close(self) -> None:
-        pass
+        """There is nothing to close."""
 
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:  # noqa: ARG002  (as its parent declares it)
         return [getattr(self, attr_name, None)] * self.num_envs
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
@@ -48,5 +48,5 @@ class BatchVecEnv(VecEnv):  # type: ignore[misc]  # its package has no types
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         raise NotImplementedError
 
-    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:  # noqa: ARG002
         return [False] * self.num_envs

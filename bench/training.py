@@ -39,7 +39,14 @@ def measure() -> list[Row]:
         Row(f"{name}: our settings, ours over Stable-Baselines3", ours / peer, "x", "higher", 3.0, COMMAND),
         Row(f"{name}: document's settings", faithful, "steps/s", "higher", None, COMMAND),
         Row(f"{name}: document's settings, Stable-Baselines3", faithful_peer, "steps/s", "higher", None, COMMAND),
-        Row(f"{name}: document's settings, ours over Stable-Baselines3", faithful / faithful_peer, "x", "higher", 3.0, COMMAND),
+        Row(
+            f"{name}: document's settings, ours over Stable-Baselines3",
+            faithful / faithful_peer,
+            "x",
+            "higher",
+            3.0,
+            COMMAND,
+        ),
     ]
 
 
@@ -78,7 +85,9 @@ def _peer_rate(envs: int, rollout: int, epochs: int, batch: int, iterations: int
 
     networks = {"net_arch": [64, 64], "activation_fn": torch.nn.SiLU}
     batched = BatchVecEnv(TASK, envs, **SETTINGS)
-    model = PPO("MlpPolicy", batched, n_steps=rollout, batch_size=batch, n_epochs=epochs, policy_kwargs=networks, seed=0)
+    model = PPO(
+        "MlpPolicy", batched, n_steps=rollout, batch_size=batch, n_epochs=epochs, policy_kwargs=networks, seed=0
+    )
     model.learn(envs * rollout)  # warm
     start = time.perf_counter()
     model.learn(envs * rollout * iterations, reset_num_timesteps=True)

@@ -92,20 +92,26 @@ def _run(todo: list[tuple[Experiment, int]], jobs: int) -> list[str]:
 
 def _start(experiment: Experiment, seed: int, core: int) -> tuple[str, subprocess.Popen[bytes]]:
     name = f"{experiment.name}-{seed}"
-    command = [sys.executable, "-m", "bench.cars.run", experiment.name, str(seed), str(RESULTS / f"{name}.json")]
+    command = [
+        "taskset",
+        "-c",
+        str(core),
+        sys.executable,
+        "-m",
+        "bench.cars.run",
+        experiment.name,
+        str(seed),
+        str(RESULTS / f"{name}.json"),
+    ]
     environment = {**os.environ, "OMP_NUM_THREADS": str(experiment.threads)}
     with (RESULTS / f"{name}.log").open("wb") as log:
-        process = subprocess.Popen(
-            command, stdout=log, stderr=subprocess.STDOUT, env=environment, preexec_fn=lambda: _bind(core)
-        )
+        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=environment)
     return name, process
 
 
-def _bind(core: int) -> None:
-    os.sched_setaffinity(0, {core})
-
-
-def _first_ended(running: dict[int, tuple[str, "subprocess.Popen[bytes]"]]) -> tuple[str, "subprocess.Popen[bytes]", int]:
+def _first_ended(
+    running: dict[int, tuple[str, "subprocess.Popen[bytes]"]],
+) -> tuple[str, "subprocess.Popen[bytes]", int]:
     by_pid = {process.pid: (name, process, core) for core, (name, process) in running.items()}
     pid, status = os.waitpid(-1, 0)
     name, process, core = by_pid[pid]

@@ -14,18 +14,18 @@ from common.files import write_whole
 DOCS = Path(__file__).parent.parent.parent / "docs" / "results"
 INTRODUCTION = """# The two car documents, trained anew
 
-What 'Learning to Drive with Unity ML-Agents' and 'Park It Right!' report, and what the same tasks come to here. Everything
-on this page is made by one command, from nothing, which takes hours on two cores and goes on where it was when stopped:
+What 'Learning to Drive with Unity ML-Agents' and 'Park It Right!' report, and what the same tasks come to here. All of
+this page is made by one command, from nothing, which takes hours on two cores and goes on where it was when stopped:
 
 ```sh
 make reproduce-cars
 ```
 
-Each run is one process on one core (its number of threads is in the table) with one run on the other core beside it. Wall
-clock is that of training, from the first decision to the last update; compiling the kernels for the first time, some
-20 s once per machine, is not in it. Success is that of the greedy policy on held-out episodes: new places, new draws,
-{episodes} per run. "95 %" is the interval of the mean over training seeds (Student); for one seed it is Wilson's over its
-episodes. "Worst" is the worst seed. Measured on {machine}.
+Each run is one process on one core, with another run on the other core beside it. Wall clock is that of training, from
+the first decision to the last update; compiling the kernels, once per machine, is not in it. Success is that of the
+greedy policy on held-out episodes: new places, new draws, {episodes} per run. "95 %" is the interval of the mean over
+training seeds (Student's t); for one seed it is Wilson's over its episodes. "Worst" is the worst seed. Measured on
+{machine}.
 """
 
 
