@@ -95,7 +95,8 @@ def _rows(experiment: Experiment, runs: Sequence[Result]) -> list[str]:
         lines.append(
             f"| {experiment.title if first else ''} | {judged.label} | {experiment.document if first else ''} "
             f"| {target if first else ''} | {100 * interval.value:.2f} % "
-            f"| {100 * max(0.0, interval.low):.2f} to {100 * min(1.0, interval.high):.2f} % | {100 * min(shares):.2f} % "
+            f"| {100 * max(0.0, interval.low):.2f} to {100 * min(1.0, interval.high):.2f} % "
+            f"| {100 * min(shares):.2f} % "
             f"| {len(runs)} | {steps / 1e6:.2f} M | {_duration(sum(wall) / len(wall))}{longest} | {rate:,.0f} |"
         )
     return lines

@@ -1,7 +1,7 @@
 """`python -m bench.cars.run NAME SEED FILE`: one training run of one experiment, judged and written as JSON.
 
-The recipe is what `honeyguide train` would run; the experiment may change settings of its task. The kernels are compiled
-by a run of no length first, so that the clock measures training.
+The recipe is what `honeyguide train` would run; the experiment may change settings of its task. The kernels are
+compiled first, so that the clock measures training.
 """
 
 import sys
