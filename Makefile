@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly test test-all test-mavproxy test-mavsdk3 fuzz check tune bench format lock clean
+.PHONY: help setup fly train-demo reproduce-cars test test-all test-mavproxy test-mavsdk3 fuzz check tune bench format lock clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -24,6 +24,14 @@ $(STAMP): pyproject.toml constraints.txt
 
 fly: $(STAMP) ## Fly the default mission; flags: make fly ARGS="--once --speed max --wind 5"
 	@$(BIN)/honeyguide fly $(ARGS)
+
+train-demo: $(STAMP) ## Train Parking1 from nothing while you watch, then look at what it learnt; flags: ARGS="--seed 7"
+	@$(BIN)/honeyguide train Parking1 --run-id train-demo --force $(ARGS)
+	@$(BIN)/honeyguide eval results/train-demo/Parking1.pt --env-args split=test
+	@$(BIN)/honeyguide play results/train-demo/Parking1.pt --env-args split=test --envs 4 --episodes 3 --mp4 results/train-demo/Parking1.mp4
+
+reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch (hours); flags: ARGS="parking1 --seeds 2"
+	@$(BIN)/python -m bench.cars $(ARGS)
 
 # loadfile keeps a test file's kernels in one process, so that each is compiled once.
 test: $(STAMP) ## Run the tests that take seconds; flags: make test ARGS="-k plan"

@@ -17,7 +17,19 @@ from rich.table import Table
 from bench.row import Row, WrongResult, machine
 from common.files import write_whole
 
-SCRIPTS = ("flights", "flight", "python_share", "batch", "threads", "scaling", "hover", "sac", "startup")
+SCRIPTS = (
+    "flights",
+    "flight",
+    "python_share",
+    "batch",
+    "threads",
+    "scaling",
+    "hover",
+    "environments",
+    "training",
+    "sac",
+    "startup",
+)
 RESULTS = Path(__file__).parent / "results.json"
 
 
