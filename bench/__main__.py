@@ -27,19 +27,7 @@ SCRIPTS = (
     "hover",
     "environments",
     "training",
-SCRIPTS = (
-    "flights",
-    "flight",
-    "python_share",
-    "batch",
-    "threads",
-    "scaling",
-    "hover",
-    "environments",
-    "training",
     "sac",
-    "startup",
-)
     "startup",
 )
 RESULTS = Path(__file__).parent / "results.json"
