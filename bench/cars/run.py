@@ -10,7 +10,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import torch
-from policies.learn.trainer import Progress, train
 
 from bench.cars.experiment import Experiment
 from bench.cars.experiments import EXPERIMENTS
@@ -22,6 +21,7 @@ from policies.learn.config.run import RunConfig
 from policies.learn.curriculum import Curriculum
 from policies.learn.evaluate import evaluate
 from policies.learn.policy_file import load_policy
+from policies.learn.trainer import Progress, train
 from policies.tasks.catalogue import build_task, settings_of
 from policies.tasks.episode import Outcome
 
