@@ -19,8 +19,8 @@ def test_a_recipe_is_found_by_its_task_and_by_its_own_name():
     assert recipe("RollerBall") == recipe("roller-ball")
 
 
-def test_roller_ball_has_the_numbers_of_the_tutorial():
-    behavior = load_config(recipe("RollerBall")).config.behavior
+def test_the_tutorial_has_its_numbers():
+    behavior = load_config(recipe("roller-ball-tutorial")).config.behavior
     numbers = behavior.hyperparameters
     assert (numbers.batch_size, numbers.buffer_size, numbers.learning_rate) == (10, 100, 3e-4)
     assert (numbers.beta, numbers.lambd, numbers.num_epoch) == (5e-4, 0.99, 3)
