@@ -32,7 +32,7 @@ def reference_wheel(squeeze, rise, along, across, spin, motor, brake):
     radius, inertia = N["wheel_radius_m"], 0.5 * N["wheel_mass_kg"] * N["wheel_radius_m"] ** 2
     load = N["spring_n_m"] * squeeze - N["damper_ns_m"] * rise
     load += N["bump_stop_n_m"] * max(squeeze - N["suspension_travel_m"], 0.0)
-    load = max(load, 0.0)
+    load = min(max(load, 0.0), N["mass_kg"] * N["gravity_m_s2"])
     slow = N["slip_speed_m_s"]
     slide = radius * spin - along
     slip = abs(slide) / max(abs(along), abs(radius * spin), slow)

@@ -189,10 +189,14 @@ def spun(car: Car, spin: float, motor_nm: float, brake_nm: float, grip: float, r
 
 @wp.func
 def suspension_load(car: Car, squeeze_m: float, rise_m_s: float) -> float:
-    """Force of the ground on a wheel along the ground's normal [N]; never a pull."""
+    """Force of the ground on a wheel along the ground's normal [N]; never a pull.
+
+    Never more than the car's weight either, four times a wheel's share: a wheel that comes back over an edge lies deep
+    in the platform, and all its spring says would throw the car away.
+    """
     load = car.spring_n_m * squeeze_m - car.damper_ns_m * rise_m_s
     load += car.bump_stop_n_m * wp.max(squeeze_m - car.travel_m, 0.0)
-    return wp.max(load, 0.0)
+    return wp.clamp(load, 0.0, car.weight_n)
 
 
 @wp.func
@@ -264,7 +268,7 @@ def scraped(car: Car, motion: Motion, turn: wp.mat33, vel_car: wp.vec3) -> wp.sp
         if place[1] < 0.0 and wp.max(wp.abs(place[0]), wp.abs(place[2])) <= car.half_platform_m:
             vel = vel_car + wp.cross(motion.omega_car, corner)
             rise = wp.dot(vel, up_car)
-            load = wp.max(-car.contact_n_m * place[1] - car.contact_ns_m * rise, 0.0)
+            load = wp.clamp(-car.contact_n_m * place[1] - car.contact_ns_m * rise, 0.0, car.weight_n)
             slide = vel - rise * up_car
             pull = load * (up_car - car.contact_friction * slide / wp.max(wp.length(slide), car.slip_speed_m_s))
             force += pull

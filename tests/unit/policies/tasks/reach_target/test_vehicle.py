@@ -16,6 +16,8 @@ from bench.vehicle import (
 )
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.numbers import Sampler
+from policies.tasks.reach_target.numbers import ReachNumbers
+from policies.tasks.reach_target.vehicle import car_of, suspension_load
 
 
 def heading(q):
@@ -151,3 +153,14 @@ def test_wild_driving_with_wild_numbers_stays_finite(seed):
         task.step()
     assert np.isfinite(task.border.observations.numpy()).all()
     assert np.linalg.norm(task.world.vel.numpy(), axis=1).max() < 100.0
+
+
+def test_the_platform_never_pushes_a_wheel_harder_than_the_car_weighs():
+    numbers = ReachNumbers()
+    for name, value in NUMBER.items():
+        setattr(numbers, name, value)
+    vehicle = car_of(numbers)
+    weight = NUMBER["mass_kg"] * NUMBER["gravity_m_s2"]
+    assert suspension_load(vehicle, 0.05, 0.0) == pytest.approx(0.05 * NUMBER["spring_n_m"])
+    assert suspension_load(vehicle, 0.6, -5.0) == pytest.approx(weight)  # a wheel that came back over an edge
+    assert suspension_load(vehicle, 0.05, 5.0) == 0.0
