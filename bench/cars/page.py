@@ -24,7 +24,8 @@ make reproduce-cars
 Each run is one process on one core, with another run on the other core beside it. Wall clock is that of training, from
 the first decision to the last update; compiling the kernels, once per machine, is not in it. Success is that of the
 greedy policy on held-out episodes: new places, new draws, {episodes} per run. "95 %" is the interval of the mean over
-training seeds (Student's t); for one seed it is Wilson's over its episodes. "Worst" is the worst seed. Measured on
+training seeds (Student's t); for one seed it is Wilson's over its episodes. "Worst" is the worst seed; "drawn" is the mean over seeds if actions are drawn, as ML-Agents' runtime does unless
+told otherwise. Measured on
 {machine}.
 """
 
@@ -57,8 +58,8 @@ def write_page(results: Mapping[str, Sequence[Result]]) -> Path:
 def _section(section: Section, table: Table) -> str:
     lines = [f"## {section.title}\n", section.words, ""]
     lines += [
-        "| run | judged on | document | at least | success | 95 % | worst | seeds | steps | wall clock | steps/s |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+        "| run | judged on | document | at least | success | 95 % | worst | drawn | seeds | steps | wall clock | steps/s |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for experiment in section.experiments:
         lines += _rows(experiment, table.of(experiment))
@@ -81,7 +82,7 @@ def _rows(experiment: Experiment, runs: Sequence[Result]) -> list[str]:
     if experiment.limit_s is not None:
         target += f", {_duration(experiment.limit_s)}"
     if not runs:
-        return [f"| {experiment.title} | | {experiment.document} | {target} | not run | | | | | | |"]
+        return [f"| {experiment.title} | | {experiment.document} | {target} | not run | | | | | | | |"]
     steps = over_seeds([result.steps for result in runs]).value
     wall = [result.train_s for result in runs]
     longest = "" if len(wall) == 1 else f" (longest {_duration(max(wall))})"
@@ -90,13 +91,14 @@ def _rows(experiment: Experiment, runs: Sequence[Result]) -> list[str]:
     for k, judged in enumerate(experiment.judged):
         evaluated = [result.evaluations[k] for result in runs]
         shares = [item.successes / item.episodes for item in evaluated]
+        drawn = [item.drawn_successes / item.episodes for item in evaluated]
         interval = over_seeds(shares) if len(runs) > 1 else wilson(evaluated[0].successes, evaluated[0].episodes)
         first = k == 0
         lines.append(
             f"| {experiment.title if first else ''} | {judged.label} | {experiment.document if first else ''} "
             f"| {target if first else ''} | {100 * interval.value:.2f} % "
             f"| {100 * max(0.0, interval.low):.2f} to {100 * min(1.0, interval.high):.2f} % "
-            f"| {100 * min(shares):.2f} % "
+            f"| {100 * min(shares):.2f} % | {100 * over_seeds(drawn).value:.2f} % "
             f"| {len(runs)} | {steps / 1e6:.2f} M | {_duration(sum(wall) / len(wall))}{longest} | {rate:,.0f} |"
         )
     return lines

@@ -20,11 +20,12 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Evaluated:
-    """A greedy policy on held-out episodes."""
+    """A policy on held-out episodes, taking its most probable actions."""
 
     label: str
     successes: int
     episodes: int
+    drawn_successes: int  # of as many episodes with actions drawn, as ML-Agents' runtime draws them by default
     mean_return: float
     outcomes: dict[str, int]
 

@@ -28,6 +28,7 @@ from policies.tasks.episode import Outcome
 EPISODES = 1000
 HELD_OUT_SEED = 1_000_003  # no training run is given it
 CURVE_POINTS = 300
+_SUCCESS = Outcome.SUCCESS.name.lower()
 
 
 class Curve:
@@ -92,10 +93,21 @@ def run(experiment: Experiment, seed: int, kept: Path | None) -> Result:
     evaluations = []
     for judged in experiment.judged:
         settings = settings_of(task, with_settings(config.env_settings.env_args, judged.settings))
-        judgement = evaluate(policy, task, settings, episodes=EPISODES, seed=HELD_OUT_SEED, numbers=numbers)
-        successes = judgement.outcomes[Outcome.SUCCESS.name.lower()]
+        greedy, drawn = (
+            evaluate(
+                policy, task, settings, episodes=EPISODES, seed=HELD_OUT_SEED, numbers=numbers, is_greedy=is_greedy
+            )
+            for is_greedy in (True, False)
+        )
         evaluations.append(
-            Evaluated(judged.label, successes, judgement.episodes, judgement.mean_return, judgement.outcomes)
+            Evaluated(
+                judged.label,
+                greedy.outcomes[_SUCCESS],
+                greedy.episodes,
+                drawn.outcomes[_SUCCESS],
+                greedy.mean_return,
+                greedy.outcomes,
+            )
         )
     progress = result.progress
     return Result(
@@ -120,7 +132,7 @@ def main(name: str, seed: str, path: str) -> None:
     result = run(EXPERIMENTS[name], int(seed), Path(path).with_suffix(".pt"))
     write(Path(path), result)
     for evaluated in result.evaluations:
-        print(f"{evaluated.label}: {evaluated.successes} of {evaluated.episodes}  {evaluated.outcomes}")
+        print(f"{evaluated.label}: {evaluated.successes} (drawn: {evaluated.drawn_successes}) of {evaluated.episodes}")
     print(f"{result.steps:,} steps, {result.train_s:.0f} s, {result.steps_per_s:,.0f} steps/s")
 
 
