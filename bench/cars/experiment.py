@@ -21,6 +21,9 @@ class Experiment:
     recipe: str
     seeds: int = 5
     settings: dict[str, Any] = field(default_factory=dict)  # of the task, over those of the recipe
+    changes: dict[str, Any] = field(
+        default_factory=dict
+    )  # of the recipe: a dotted key of the run's configuration to its value
     judged: tuple[Judged, ...] = (Judged("held out"),)
     document: str = "not reported"
     target: float | None = None  # success at least

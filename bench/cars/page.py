@@ -12,6 +12,10 @@ from bench.cars.statistics import over_seeds, wilson
 from common.files import write_whole
 
 DOCS = Path(__file__).parent.parent.parent / "docs" / "results"
+_COLUMNS = (
+    *("run", "judged on", "document", "at least", "success", "95 %", "worst", "drawn"),
+    *("seeds", "steps", "wall clock", "steps/s"),
+)
 INTRODUCTION = """# The two car documents, trained anew
 
 What 'Learning to Drive with Unity ML-Agents' and 'Park It Right!' report, and what the same tasks come to here. All of
@@ -21,12 +25,12 @@ this page is made by one command, from nothing, which takes hours on two cores a
 make reproduce-cars
 ```
 
-Each run is one process on one core, with another run on the other core beside it. Wall clock is that of training, from
-the first decision to the last update; compiling the kernels, once per machine, is not in it. Success is that of the
-greedy policy on held-out episodes: new places, new draws, {episodes} per run. "95 %" is the interval of the mean over
-training seeds (Student's t); for one seed it is Wilson's over its episodes. "Worst" is the worst seed; "drawn" is the mean over seeds if actions are drawn, as ML-Agents' runtime does unless
-told otherwise. Measured on
-{machine}.
+Each run is one process on one core, with another run on the other core beside it. Wall clock is that of training,
+from the first decision to the last update; compiling the kernels, once per machine, is not in it. Success is that
+of the most probable actions on held-out episodes: new places, new draws, {episodes} per run. "95 %" is the interval
+of the mean over training seeds (Student's t); for one seed it is Wilson's over its episodes. "Worst" is the worst
+seed. "Drawn" is the mean over seeds if actions are drawn, as ML-Agents' runtime does unless told otherwise.
+Measured on {machine}.
 """
 
 
@@ -58,8 +62,8 @@ def write_page(results: Mapping[str, Sequence[Result]]) -> Path:
 def _section(section: Section, table: Table) -> str:
     lines = [f"## {section.title}\n", section.words, ""]
     lines += [
-        "| run | judged on | document | at least | success | 95 % | worst | drawn | seeds | steps | wall clock | steps/s |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|",
+        f"| {' | '.join(_COLUMNS)} |",
+        f"|{'---|' * len(_COLUMNS)}",
     ]
     for experiment in section.experiments:
         lines += _rows(experiment, table.of(experiment))

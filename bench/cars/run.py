@@ -57,11 +57,23 @@ class Curve:
 
 def configured(experiment: Experiment, seed: int, folder: str) -> RunConfig:
     """The recipe with the experiment's settings, as a run of its own."""
-    config = load_config(recipe(experiment.recipe)).config
+    config = changed(load_config(recipe(experiment.recipe)).config, experiment.changes)
     arguments = with_settings(config.env_settings.env_args, experiment.settings)
     environment = config.env_settings.model_copy(update={"env_args": arguments, "seed": seed})
     checkpoint = config.checkpoint_settings.model_copy(update={"run_id": experiment.name, "results_dir": folder})
     return config.model_copy(update={"env_settings": environment, "checkpoint_settings": checkpoint})
+
+
+def changed(config: RunConfig, changes: dict[str, Any]) -> RunConfig:
+    """The configuration with values put in place of others; a key is a path with dots, None takes a block away."""
+    plain = config.model_dump(exclude_unset=True)
+    for path, value in changes.items():
+        *parents, key = path.split(".")
+        block = plain
+        for parent in parents:
+            block = block.setdefault(parent, {})
+        block[key] = value
+    return RunConfig.model_validate(plain)
 
 
 def with_settings(arguments: tuple[str, ...], settings: dict[str, Any]) -> tuple[str, ...]:
