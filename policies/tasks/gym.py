@@ -36,21 +36,23 @@ class TaskEnv(gymnasium.Env[Array, Any]):
         self.observation_space = observation_space(self.task.layout)
         self.action_space = action_space(self.task.layout)
         self._views = _Views(self.task)
+        self._is_next_begun = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Starts an episode; `options` are not used."""
+        """Starts an episode, after an end the one that the task has begun by itself; `options` are not used."""
         super().reset(seed=seed, options=options)
         if seed is not None or not self._views.is_begun:
             self._views.reset(int(self.np_random.integers(2**31)))
-        else:
+        elif not self._is_next_begun:  # to begin it again would lose what a task carries over from the last episode
             self.task.begin(np.ones(1, dtype=np.bool_))
+        self._is_next_begun = False
         return self._views.observations[0].copy(), {}
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """One decision. The task begins the next episode by itself; `reset` begins another."""
+        """One decision. What ends an episode begins the next; `reset` shows it."""
         views = self._views
         views.act(np.asarray(action)[None])
-        is_over = bool(views.is_terminated[0] or views.is_truncated[0])
+        is_over = self._is_next_begun = bool(views.is_terminated[0] or views.is_truncated[0])
         observation = (views.final_observations if is_over else views.observations)[0].copy()
         info = {"outcome": Outcome(int(views.outcomes[0])).name.lower()} if is_over else {}
         return observation, float(views.rewards[0]), bool(views.is_terminated[0]), bool(views.is_truncated[0]), info

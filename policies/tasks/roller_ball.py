@@ -2,7 +2,8 @@
 
 Frames are Unity's: x right, z forward, y up, left-handed; the floor is 10 x 10 m with its centre at the origin. One
 decision is ten physics steps of 20 ms with the force held. The ball rolls without slip: seven fifths of its mass are
-to be accelerated (solid sphere), and what it turns against is the floor's friction, never the air.
+to be accelerated (solid sphere), and what it turns against is the floor's friction, never the air. Whether it is there
+is looked at once per decision; the tutorial looks at every physics step.
 """
 
 from typing import Any, ClassVar

@@ -10,7 +10,7 @@ The learner sees arrays only: actions in; observations, rewards and ends out. No
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import warp as wp
@@ -22,15 +22,18 @@ from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Layout
 from policies.tasks.numbers import Number, NumberTable, Sampler
 
+Preset = Literal["as-documented", "as-coded", "improved"]
+Split = Literal["train", "test"]
+
 
 class TaskSettings(BaseModel):
     """What a user may choose of any task; each task adds its own."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    preset: str = "as-coded"
+    preset: Preset = "as-coded"
     """`as-documented` (the text), `as-coded` (the published code) or `improved` (ours)."""
-    split: str = "train"
+    split: Split = "train"
     """`train` or `test`: which of the two disjoint sets of places goals are drawn from."""
     stack: int = Field(default=0, ge=0, le=50)
     """Observations in a stack; 0: as the preset has it."""

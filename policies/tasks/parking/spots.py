@@ -1,8 +1,10 @@
 """Where a goal or a start may be: cells of 1 m, split once and for all into train and test, and draws inside them.
 
-Whether a cell belongs to the test set is decided by a fixed seed alone, so the sets are the same in every run: 20 % of
-the free cells are never a goal in training. A place is drawn in a cell of the set and rejected as long as obstacles are
-in the way; with the sizes of these arenas 64 draws fail with a chance below 1e-9.
+Whether a cell belongs to the test set is decided by a fixed seed alone, so the sets are the same in every run, on a
+storey of both levels: 20 % of the free cells never hold the centre of a goal in training. Disjoint are the centres, not
+the pads: a pad reaches into the cells around its own, and the nearest training goal may be a step across an edge away.
+A place is drawn in a cell of the set and rejected as long as obstacles are in the way; with the sizes of these arenas
+64 draws fail with a chance below 1e-9.
 """
 
 import numpy as np
@@ -27,7 +29,7 @@ from policies.tasks.parking.arena import (
     storey_centre,
 )
 from policies.tasks.parking.car import box_distance
-from policies.tasks.parking.scene import MAX_OBSTACLES, Scene
+from policies.tasks.parking.scene import MAX_OBSTACLES, Scene, portal_half
 
 wp.set_module_options({"enable_backward": False})
 
@@ -120,7 +122,7 @@ def draw_start(scene: Scene, storey: int, range_m: float, seed: int, i_env: int,
             is_free = clearance(scene, start) > _START_CLEARANCE
             if scene.has_goal and wp.length(start - goal) < _START_GOAL:
                 is_free = False
-            if scene.has_portal and box_distance(scene.portal, wp.vec2(3.0, 0.1), start) < _PORTAL_CLEARANCE:
+            if scene.has_portal and box_distance(scene.portal, portal_half(), start) < _PORTAL_CLEARANCE:
                 is_free = False
             if is_free:
                 is_found = 1

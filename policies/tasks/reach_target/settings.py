@@ -6,7 +6,6 @@ from pydantic import Field
 
 from policies.tasks.task import TaskSettings
 
-Preset = Literal["as-documented", "as-coded", "improved"]
 Observation = Literal["world", "world-heading", "car", "ego"]
 Reward = Literal["sparse", "shaped", "shaped-each-step", "potential"]
 Success = Literal["reach", "reach-goes-on", "pose"]
@@ -21,8 +20,6 @@ _IS_SHAPED = (False, True, True, True, False)
 class ReachSettings(TaskSettings):
     """What a user may choose of ReachTarget. `auto` is what the preset has."""
 
-    preset: Preset = "as-coded"
-    """`as-documented` (the article), `as-coded` (the published code) or `improved` (ours)."""
     variant: int = Field(default=4, ge=0, le=4)
     """Which of the article's five agents; `improved` has one agent only and ignores it."""
     observation: Observation | Literal["auto"] = "auto"
@@ -36,7 +33,8 @@ class ReachSettings(TaskSettings):
     start: Start | Literal["auto"] = "auto"
     """`centre`, and after a success where the car is; or `anywhere`."""
     goals: Goals | Literal["auto"] = "auto"
-    """`everywhere`, or `split`: training and test targets lie in disjoint squares of the platform."""
+    """`everywhere`, whatever the split: held-out episodes are new draws; or `split`: training and test targets lie in
+    disjoint squares of the platform."""
     heights: Heights = "local"
     """`stacked`: world heights as the published scene shows them to A0-A2, 20 m lower for each of 16 platforms."""
 

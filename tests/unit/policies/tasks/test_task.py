@@ -126,3 +126,26 @@ def test_the_batch_gives_the_last_observation_of_an_episode_that_ended_and_begin
             break
     i = int(np.flatnonzero(info["_final_obs"])[0])
     assert not np.array_equal(info["final_obs"][i], observations[i])
+
+
+def test_a_single_environment_carries_over_what_the_task_does():
+    env = gymnasium.make("honeyguide/RollerBall-v0").unwrapped
+    observation, _ = env.reset(seed=3)
+    is_over = False
+    while not is_over:
+        ball, cube = observation[[3, 5]], observation[[0, 2]]
+        action = np.clip(0.5 * (cube - ball) - 0.5 * observation[6:8], -1.0, 1.0)
+        observation, _, is_over, _, info = env.step(action)
+    assert info["outcome"] == "success"
+    next_observation, _ = env.reset()
+    assert next_observation[3:].tolist() == observation[3:].tolist()  # the ball rolls on
+    assert next_observation[:3].tolist() != observation[:3].tolist()
+    assert env.reset()[0][[3, 5]].tolist() == [0.0, 0.0]  # given up: placed anew
+
+
+@pytest.mark.parametrize("name", ["RollerBall", "ReachTarget", "Parking1", "Parking2"])
+def test_presets_and_splits_that_do_not_exist_are_refused(name):
+    with pytest.raises(UnknownTask, match=r"split: .*'train' or 'test'"):
+        task_settings(name, {"split": "all"})
+    with pytest.raises(UnknownTask, match=r"preset: .*'as-coded' or 'improved'"):
+        task_settings(name, {"preset": "as-dreamt"})

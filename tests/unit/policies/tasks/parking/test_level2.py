@@ -210,34 +210,6 @@ def test_the_velocity_a_tracking_sensor_would_give_is_that_of_the_movers():
     assert (first_right, first_forward) == pytest.approx((-2.0 * np.sin(yaw), 2.0 * np.cos(yaw)), rel=1e-4)
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-def test_rows_do_not_depend_on_who_else_is_in_the_batch_and_seeds_repeat(preset):
-    def episode(env_count, seed):
-        task = built(env_count, seed, preset=preset)
-        seen = []
-        for k in range(200):
-            choices = [[(k * 7 + row) // 5 % size for size in task.layout.branch_sizes] for row in range(env_count)]
-            act(task, *choices)
-            seen.append(np.concatenate([task.border.observations.numpy()[0], task.border.rewards.numpy()[:1]]))
-        return np.array(seen).tobytes()
-
-    assert episode(1, 3) == episode(20, 3)
-    assert episode(1, 3) == episode(1, 3)
-
-
-def test_a_restored_task_continues_bit_for_bit():
-    task = built(16, preset="improved")
-    act(task, *[(1, 1)] * 16)
-    state = task.state()
-    ends = []
-    for _ in range(2):
-        task.load_state(state)
-        for k in range(60):
-            act(task, *[(k % 3, 1)] * 16)
-        ends.append(task.state())
-    assert all(ends[0][name].tobytes() == ends[1][name].tobytes() for name in ends[0])
-
-
 def test_the_picture_shows_both_storeys():
     picture = built(preset="as-documented").picture(0, 240)
     assert picture.shape[1] > 1.8 * picture.shape[0]

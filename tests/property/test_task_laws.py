@@ -1,0 +1,179 @@
+"""Laws of every learning task: what no preset, seed or order of its rows may break."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from policies.tasks.catalogue import CATALOGUE, build_task, task_settings
+from policies.tasks.numbers import Sampler
+from policies.tasks.parking.level1 import Parking1
+from policies.tasks.parking.level2 import Parking2
+from policies.tasks.parking.numbers import CarNumbers, Level2Numbers
+from policies.tasks.reach_target.numbers import ReachNumbers
+from policies.tasks.reach_target.reach_target import ReachTarget
+from policies.tasks.roller_ball import RollerBall, RollerBallNumbers
+
+FEW = settings(max_examples=5, deadline=None)  # the first example compiles a kernel
+PRESETS = ("as-documented", "as-coded", "improved")
+TASKS = [
+    ("RollerBall", "as-coded"),
+    *((name, preset) for name in CATALOGUE if name != "RollerBall" for preset in PRESETS),
+]
+every_task = pytest.mark.parametrize(("name", "preset"), TASKS)
+seeds = st.integers(0, 2**31 - 1)
+STRUCTS = {
+    RollerBall: (RollerBallNumbers,),
+    ReachTarget: (ReachNumbers,),
+    Parking1: (CarNumbers,),
+    Parking2: (CarNumbers, Level2Numbers),
+}
+
+
+def built(name, preset, env_count, seed=0, **more):
+    task = build_task(name, env_count, task_settings(name, {"preset": preset, **more}))
+    task.reset(seed)
+    return task
+
+
+def act(task, rng, rows=None):
+    """One step; the actions of `rows` (all rows) are drawn for the largest batch, so that a row's are its own."""
+    rows = np.arange(task.env_count) if rows is None else rows
+    layout = task.layout
+    pushed = rng.uniform(-1.0, 1.0, (64, len(layout.continuous)))
+    chosen = rng.integers(np.array(layout.branch_sizes, dtype=int), size=(64, len(layout.branches)))
+    task.border.continuous.assign(pushed[rows].astype(np.float32))
+    task.border.branches.assign(chosen[rows].astype(np.int32))
+    task.step()
+
+
+def driven(name, preset, env_count, seed, step_count=40):
+    """What the rows saw and were paid, (steps, rows, elements + 1)."""
+    task = built(name, preset, env_count, seed)
+    rng = np.random.default_rng(seed)
+    seen = []
+    for _ in range(step_count):
+        act(task, rng)
+        seen.append(np.column_stack([task.border.observations.numpy(), task.border.rewards.numpy()]))
+    return np.array(seen)
+
+
+@every_task
+@given(seed=seeds)
+@FEW
+def test_the_same_seed_gives_the_same_bytes_and_a_row_is_its_own(name, preset, seed):
+    many = driven(name, preset, 24, seed)
+    assert many.tobytes() == driven(name, preset, 24, seed).tobytes()
+    assert many[:, :1].tobytes() == driven(name, preset, 1, seed).tobytes()
+    assert preset != "improved" or not np.array_equal(many[0], driven(name, preset, 24, seed + 1, 1)[0])
+
+
+@every_task
+def test_permuted_rows_do_permuted_things(name, preset):
+    task, other = built(name, preset, 24), built(name, preset, 24)
+    order = np.random.default_rng(1).permutation(24)
+    state = task.state()
+    other.load_state({key: rows[order] if len(rows) == 24 else rows for key, rows in state.items()})
+    rng, other_rng = np.random.default_rng(2), np.random.default_rng(2)
+    for _ in range(15):
+        act(task, rng)
+        act(other, other_rng, order)
+    is_same_episode = task.border.episodes.numpy() == state["episodes"]  # what is drawn afterwards is keyed by the row
+    assert is_same_episode.any()
+    for array in ("observations", "returns", "steps"):
+        there, here = getattr(task.border, array).numpy()[order], getattr(other.border, array).numpy()
+        assert np.array_equal(there[is_same_episode[order]], here[is_same_episode[order]]), array
+
+
+@every_task
+def test_a_restored_task_continues_bit_for_bit_and_what_ran_before_a_reset_does_not_matter(name, preset):
+    task = built(name, preset, 8, 3)
+    fresh = task.state()
+    act(task, np.random.default_rng(0))
+    state = task.state()
+    ends = []
+    for _ in range(2):
+        task.load_state(state)
+        rng = np.random.default_rng(1)
+        for _ in range(40):
+            act(task, rng)
+        ends.append(task.state())
+    assert all(ends[0][key].tobytes() == ends[1][key].tobytes() for key in ends[0])
+    task.reset(3)
+    again = task.state()
+    of_the_past = {"continuous", "branches", "final_observations"}
+    assert [key for key in fresh if key not in of_the_past and fresh[key].tobytes() != again[key].tobytes()] == []
+
+
+@every_task
+def test_beginning_one_row_touches_only_that_row(name, preset):
+    task = built(name, preset, 4)
+    before = task.state()
+    task.begin(np.array([False, True, False, False]))
+    after = task.state()
+    assert after["episodes"].tolist() == [1, 2, 1, 1]
+    others = [0, 2, 3]
+    for key, rows in before.items():
+        assert len(rows) != 4 or np.array_equal(rows[others], after[key][others]), key
+
+
+@pytest.mark.parametrize("task", STRUCTS, ids=lambda task: task.__name__)
+def test_numbers_are_declared_in_the_order_of_their_structs_and_start_within_their_bounds(task):
+    names = [name for struct in STRUCTS[task] for name in struct.vars]
+    assert [number.name for number in task.numbers] == names
+    for number in task.numbers:
+        assert number.minimum <= number.default <= number.maximum
+        assert number.meaning
+        assert number.source
+
+
+def around(number, value):
+    """Even within half of the value to both sides, as far as the bounds allow."""
+    low, high = value - 0.5 * abs(value), value + 0.5 * abs(value)
+    return Sampler(intervals=((max(number.minimum, low), min(number.maximum, high)),))
+
+
+def anywhere(number, _value):
+    return Sampler(intervals=((number.minimum, number.maximum),))
+
+
+@every_task
+@pytest.mark.parametrize("spread", [around, anywhere])
+def test_every_number_may_be_randomised_at_once_and_nothing_becomes_infinite(name, preset, spread):
+    task = built(name, preset, 64)
+    declared = task.number_table.declarations
+    values = dict(zip(declared, task.border.numbers.numpy()[0].tolist(), strict=True))
+    task.set_numbers({key: spread(declared[key], values[key]) for key in declared if key != "step_limit"})
+    task.reset(0)
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        act(task, rng)
+        for array in (task.border.observations, task.border.final_observations, task.border.rewards):
+            assert np.isfinite(array.numpy()).all()
+
+
+@given(x=st.floats(-40.0, 40.0), z=st.floats(-40.0, 40.0), yaw=st.floats(-3.0, 3.0), seed=seeds)
+@FEW
+def test_a_mirrored_reach_target_is_seen_and_paid_mirrored(x, z, yaw, seed):
+    task = built("ReachTarget", "improved", 2)
+    rng = np.random.default_rng(seed)
+    goal_x, goal_z, goal_yaw = rng.uniform([-40.0, -40.0, -3.0], [40.0, 40.0, 3.0])
+    for row, side in enumerate((1.0, -1.0)):
+        task.world.pos.numpy()[row] = (side * x, 0.86, z)
+        task.world.q.numpy()[row] = (0.0, np.sin(side * yaw / 2), 0.0, np.cos(yaw / 2))
+        task.world.target.numpy()[row] = (side * goal_x, 0.5, goal_z)
+        task.world.target_yaw.numpy()[row] = side * goal_yaw
+    names = [element.name for element in task.layout.frame]
+    flipped = ("goal_bearing_sin", "vel_car_x", "yaw_rate", "goal_heading_sin", "steering")
+    partners = {"edge_right": "edge_left", "edge_left": "edge_right"}
+    columns = [names.index(partners.get(name, name)) for name in names]
+    signs = np.array([-1.0 if name in flipped else 1.0 for name in names])
+    for _ in range(10):
+        steer, throttle, brake = rng.uniform(-1.0, 1.0, 3)
+        task.border.continuous.numpy()[:] = [(steer, throttle, brake), (-steer, throttle, brake)]
+        task.step()
+        if task.border.outcomes.numpy().any():
+            return
+        one, other = task.border.observations.numpy()
+        assert other == pytest.approx(signs * one[columns], abs=2e-3)
+        assert task.border.rewards.numpy()[0] == pytest.approx(task.border.rewards.numpy()[1], abs=1e-3)
