@@ -56,9 +56,9 @@ def train_run(request: TrainingRequest, console: Console) -> None:
         One of USER_ERRORS.
     """
     loaded = chosen_config(request)
-    for warning in (*loaded.warnings, *_without_effect(request.given)):
-        _print(console, warning)
     config = loaded.config
+    for warning in (*loaded.warnings, *_without_effect(request.given, config)):
+        _print(console, warning)
     if config.checkpoint_settings.inference:
         _play(config, console)
         return
@@ -210,8 +210,8 @@ def _summary(result: Result) -> str:
     lines = [f"{_ENDS[result.end]}: {progress.steps:,} steps in {timedelta(seconds=round(progress.elapsed_s))}"]
     if progress.success_rate is not None:
         lines.append(f"training: success {100.0 * progress.success_rate:.1f} %, reward {progress.mean_reward:.3f}")
-    if result.held_out is not None:
-        lines.append(f"held-out: success {_rate(result.held_out)} of {result.held_out.episodes} episodes")
+    if result.judged is not None:
+        lines.append(f"judged: success {_rate(result.judged)} of {result.judged.episodes} episodes it did not train on")
     return "\n".join([*lines, f"policy: {result.policy}, {result.network}"])
 
 
@@ -231,14 +231,14 @@ def _evaluation_table(evaluation: Evaluation) -> Table:
     return table
 
 
-def _without_effect(given: CommandLine) -> list[str]:
-    """A line for each flag that was given in vain."""
+def _without_effect(given: CommandLine, config: RunConfig) -> list[str]:
+    """A line for each flag, or key, that was given in vain."""
     silent = {"--train"}
     accepted = {flag.option for flag in flags() if flag.key and flag.meaning.startswith("Accepted")} | {"--debug"}
     said = {f"--{entry.name.replace('_', '-')}" for entry in fields(given) if getattr(given, entry.name)}
     lines = [f"{option}: accepted, has no effect here" for option in sorted(said & accepted - silent)]
-    if given.deterministic and not given.inference:
-        lines.append("--deterministic: has an effect with --inference only; training draws its actions")
+    if config.behavior.network_settings.deterministic and not config.checkpoint_settings.inference:
+        lines.append("deterministic: has an effect with --inference only; training draws its actions")
     return lines
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from policies.learn.policy import Policy
 from policies.learn.tensors import TaskTensors
+from policies.learn.threads import few_threads
 from policies.tasks.catalogue import build_task
 from policies.tasks.episode import Outcome
 from policies.tasks.numbers import Sampler
@@ -90,7 +91,8 @@ def evaluate(
     task.set_numbers(numbers or {})
     task.reset(seed)
     generator = None if is_greedy else torch.Generator(device).manual_seed(seed)
-    return _play(policy, task, _quota(episodes, task.env_count), generator, longest)
+    with few_threads():
+        return _play(policy, task, _quota(episodes, task.env_count), generator, longest)
 
 
 def _quota(episodes: int, env_count: int) -> NDArray[np.int64]:

@@ -5,6 +5,7 @@ been compared with the policy on random observations; the layout is in its metad
 because torch's tracing exporter is deprecated and fixes the batch size of memories, and the other needs onnxscript.
 """
 
+import copy
 import json
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ def export_policy(policy: Policy, path: Path) -> float:
     Raises:
         ExportError: they differ by more than 1e-5, or the file cannot be written.
     """
+    policy = copy.deepcopy(policy).cpu()  # where the graph is compared with it; a training's own may be on a GPU
     content = onnx_bytes(policy)
     difference = largest_difference(policy, content)
     if difference > TOLERANCE:

@@ -53,6 +53,11 @@ class Hindsight:
         self._is_success[slot] = is_success
         self._episode.add_(is_over).remainder_(self._replay.slots)  # each has a slot of its own: still distinct
 
+    def cut(self) -> None:
+        """Takes what comes next for other episodes than those that are running."""
+        newest = (self._replay.rounds - 1) % self._replay.slots
+        self._episode.add_(self._episodes[newest] == self._episode).remainder_(self._replay.slots)
+
     def relabel(self, transitions: ReplayBatch, places: Tensor, generator: torch.Generator) -> ReplayBatch:
         """Drawn transitions, k of k + 1 with another goal.
 

@@ -35,6 +35,10 @@ class Learner(Protocol):
         """Collects and learns once."""
         ...
 
+    def restart(self) -> None:
+        """Begins an episode in every environment, whatever was going on there."""
+        ...
+
     def state(self) -> dict[str, Any]:
         """Networks, optimisers, generators and the task's arrays: tensors, arrays and plain values only."""
         ...

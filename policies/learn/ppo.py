@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -21,6 +22,7 @@ from policies.learn.networks import Body, Critic, policy_body
 from policies.learn.policy import Policy
 from policies.learn.rollout import Batch, Rollout
 from policies.learn.schedule import BETA_FLOOR, EPSILON_FLOOR, RATE_FLOOR, scheduled
+from policies.learn.signals.episode_rewards import EpisodeRewards
 from policies.learn.signals.extrinsic import ExtrinsicSignal
 from policies.learn.signals.signal import RewardSignal, Transitions
 from policies.learn.tensors import TaskTensors
@@ -72,7 +74,7 @@ class Ppo:
         self._critic_memory = policy.start_memory(task.env_count)
         self._gammas = torch.tensor([signal.gamma for signal in self.signals], device=device)
         self._is_episodic = torch.tensor([signal.is_episodic for signal in self.signals], device=device)
-        self._running_sums = torch.zeros(task.env_count, len(self.signals), device=device)
+        self._episode_rewards = EpisodeRewards([signal.name for signal in self.signals], task.env_count, device)
         task.reset(seed)
 
     def iterate(self) -> Iteration:
@@ -87,6 +89,13 @@ class Ppo:
         if self.cloning is not None:
             statistics |= self.cloning.update(self.steps)
         return Iteration(rollout.rewards.numel(), self.task.task.take_scores(), statistics)
+
+    def restart(self) -> None:
+        """Begins an episode in every environment; what was remembered of the running ones is forgotten."""
+        self.task.task.begin(np.ones(len(self._memory), dtype=np.bool_))
+        self._memory = torch.zeros_like(self._memory)
+        self._critic_memory = torch.zeros_like(self._critic_memory)
+        self._episode_rewards.clear()
 
     @torch.inference_mode()
     def _collect(self, rollout: Rollout) -> None:
@@ -124,7 +133,11 @@ class Ppo:
         combined = streams.mean(-1)
         over_buffer = self.hyperparameters.normalize_advantages == "buffer"
         rollout.advantages.copy_(losses.standardized(combined) if over_buffer else combined)
-        return self._signal_statistics(rewards, values, is_over)
+        estimates = {
+            f"Policy/{signal.name.capitalize()} Value Estimate": value
+            for signal, value in zip(self.signals, values.mean((0, 1)).tolist(), strict=True)
+        }
+        return estimates | self._episode_rewards.add(rewards, is_over)
 
     def _values(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
         """Of what each decision saw, and of what came of it, shape (T, N, signals) each."""
@@ -225,24 +238,6 @@ class Ppo:
             statistics |= signal.update(chosen)
         return statistics
 
-    def _signal_statistics(self, rewards: Tensor, values: Tensor, is_over: Tensor) -> dict[str, float]:
-        """Mean value estimates; mean sums of rewards of the episodes that ended, if any did."""
-        statistics = {
-            f"Policy/{signal.name.capitalize()} Value Estimate": value
-            for signal, value in zip(self.signals, values.mean((0, 1)).tolist(), strict=True)
-        }
-        sums = rewards.cumsum(0) + self._running_sums
-        steps = torch.arange(1, len(is_over) + 1, device=is_over.device)
-        last = (steps[:, None] * is_over).amax(0)  # decisions until the last end of each environment; 0: none ended
-        until = sums.gather(0, (last - 1).clamp(min=0)[None, :, None].expand(1, -1, sums.shape[-1]))[0]
-        until = until * (last > 0)[:, None]
-        self._running_sums = sums[-1] - until
-        count = int(is_over.sum())
-        if count:
-            for signal, total in zip(self.signals, until.sum(0).tolist(), strict=True):
-                statistics[f"Policy/{signal.name.capitalize()} Reward"] = total / count
-        return statistics
-
     def _critic(self, generator: torch.Generator) -> Critic:
         """With a body of its own unless it is shared; both see the same, so that one normaliser serves them."""
         policy, numbers = self.policy, self.hyperparameters
@@ -270,7 +265,7 @@ class Ppo:
                 "generator": self._generator.get_state(),
                 "memory": self._memory.clone(),
                 "critic_memory": self._critic_memory.clone(),
-                "running_sums": self._running_sums.clone(),
+                "running_sums": self._episode_rewards.sums.clone(),
                 "signals": [signal.state() for signal in self.signals],
                 "cloning": self.cloning.state() if self.cloning is not None else {},
                 "task": self.task.task.state(),
@@ -289,9 +284,9 @@ class Ppo:
         self.critic.load_state_dict(state["critic"])
         self.optimizer.load_state_dict(state["optimizer"])
         self._generator.set_state(state["generator"].cpu())
-        self._memory = state["memory"]
-        self._critic_memory = state["critic_memory"]
-        self._running_sums = state["running_sums"]
+        self._memory = state["memory"].to(self.task.device)
+        self._critic_memory = state["critic_memory"].to(self.task.device)
+        self._episode_rewards.load(state["running_sums"])
         for signal, its_state in zip(self.signals, state["signals"], strict=True):
             signal.load_state(its_state)
         if self.cloning is not None:

@@ -21,6 +21,7 @@ import copy
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import torch
 import warp as wp
 from torch import Tensor
@@ -32,8 +33,9 @@ from policies.learn.policy import Policy
 from policies.learn.replay import Replay, ReplayBatch
 from policies.learn.sac_update import SoftActorCritic
 from policies.learn.schedule import RATE_FLOOR, scheduled
+from policies.learn.signals.episode_rewards import EpisodeRewards
 from policies.learn.signals.extrinsic import ExtrinsicSignal
-from policies.learn.signals.signal import RewardSignal
+from policies.learn.signals.signal import RewardSignal, Transitions
 from policies.learn.tensors import TaskTensors
 from policies.tasks.episode import Outcome
 from policies.tasks.task import Task
@@ -95,6 +97,7 @@ class Sac:
         self._signal_update_count = 0
         self._is_episodic = torch.tensor([signal.is_episodic for signal in signals], device=device)
         self._strengths = torch.tensor([signal.strength for signal in signals], device=device)
+        self._episode_rewards = EpisodeRewards([signal.name for signal in self.signals], task.env_count, device)
         self._no_memory = policy.start_memory(task.env_count)
         task.reset(seed)
 
@@ -102,20 +105,30 @@ class Sac:
         """Rounds of one decision of all environments, each with the updates that are then due."""
         numbers = self.hyperparameters
         statistics: list[dict[str, float]] = []
+        collected: list[tuple[Tensor, Tensor]] = []
         rounds = -(-_ITERATION_STEPS // self.replay.env_count)
         for _round in range(rounds):
-            self._collect()
+            collected.append(self._collect())
             self.networks.set_learning_rate(self._learning_rate())
             due = self._due(numbers.steps_per_update, self._update_count)
             statistics.extend(self._update() for _ in range(due))
             due = self._due(numbers.reward_signal_steps_per_update, self._signal_update_count)
             statistics.extend(self._update_signals() for _ in range(due))
+        rewards, is_ended = (torch.stack(column) for column in zip(*collected, strict=True))
         now = self.networks.temperatures() | {"Policy/Learning Rate": self._learning_rate()}
+        now |= self._episode_rewards.add(rewards, is_ended)
         return Iteration(rounds * self.replay.env_count, self.task.task.take_scores(), _means(statistics) | now)
 
+    def restart(self) -> None:
+        """Begins an episode in every environment; hindsight takes it for another than the running one."""
+        self.task.task.begin(np.ones(self.replay.env_count, dtype=np.bool_))
+        self._episode_rewards.clear()
+        if self._hindsight is not None:
+            self._hindsight.cut()
+
     @torch.no_grad()
-    def _collect(self) -> None:
-        """One decision of all environments, into the buffer."""
+    def _collect(self) -> tuple[Tensor, Tensor]:
+        """One decision of all environments, into the buffer; what the signals paid (envs, signals), and which ended."""
         task = self.task
         observations = task.observations.clone()
         continuous, branches = self._decide(observations)
@@ -124,19 +137,23 @@ class Sac:
         is_ended = task.is_terminated | task.is_truncated
         if self._hindsight is not None and radii is not None:
             self._hindsight.add(radii, is_ended, task.outcomes == int(Outcome.SUCCESS))
-        self.replay.add(
-            ReplayBatch(
-                observations=observations,
-                next_observations=torch.where(is_ended[:, None], task.final_observations, task.observations),
-                continuous=continuous,
-                branches=branches,
-                rewards=task.rewards,
-                is_terminated=task.is_terminated,
-                is_ended=is_ended,
-            )
+        made = ReplayBatch(
+            observations=observations,
+            next_observations=torch.where(is_ended[:, None], task.final_observations, task.observations),
+            continuous=continuous,
+            branches=branches,
+            rewards=task.rewards,
+            is_terminated=task.is_terminated,
+            is_ended=is_ended,
         )
+        self.replay.add(made)
         self.policy.body.normalize(observations)
         self.steps += self.replay.env_count
+        return self._rewards(made.transitions()), is_ended
+
+    def _rewards(self, transitions: Transitions) -> Tensor:
+        """Of every signal times its strength, shape (B, signals)."""
+        return torch.stack([signal.rewards(transitions) for signal in self.signals], dim=1) * self._strengths
 
     def _decide(self, observations: Tensor) -> tuple[Tensor, Tensor]:
         """The policy's draws; before the first updates any action is as likely as any other."""
@@ -169,10 +186,8 @@ class Sac:
     def _update(self) -> dict[str, float]:
         """Networks, and the clone if there is one."""
         batch = self._drawn()
-        transitions = batch.transitions()
-        rewards = torch.stack([signal.rewards(transitions) for signal in self.signals], dim=1) * self._strengths
         goes_on = 1.0 - batch.is_terminated[:, None] * self._is_episodic
-        statistics = self.networks.update(batch, rewards, goes_on, self._generator)
+        statistics = self.networks.update(batch, self._rewards(batch.transitions()), goes_on, self._generator)
         self._update_count += 1
         return statistics if self.cloning is None else statistics | self.cloning.update(self.steps)
 
@@ -199,6 +214,7 @@ class Sac:
             "update_counts": [self._update_count, self._signal_update_count],
             "networks": copy.deepcopy(self.networks.state()),
             "generator": self._generator.get_state(),
+            "running_sums": self._episode_rewards.sums.clone(),
             "signals": copy.deepcopy([signal.state() for signal in self.signals]),
             "cloning": copy.deepcopy(self.cloning.state()) if self.cloning is not None else {},
             "task": self.task.task.state(),
@@ -220,6 +236,7 @@ class Sac:
         self._update_count, self._signal_update_count = state["update_counts"]
         self.networks.load_state(copy.deepcopy(state["networks"]))
         self._generator.set_state(state["generator"].cpu())
+        self._episode_rewards.load(state["running_sums"])
         for signal, its_state in zip(self.signals, copy.deepcopy(state["signals"]), strict=True):
             signal.load_state(its_state)
         if self.cloning is not None:

@@ -4,7 +4,6 @@ In: a configuration and somebody who watches. Out: a run folder with the trained
 from its newest checkpoint bit for bit: all that an iteration depends on is in the checkpoint.
 """
 
-import os
 import secrets
 from collections import deque
 from collections.abc import Mapping
@@ -12,7 +11,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
 import torch
 
 from common.clock import wall_time_s
@@ -20,12 +18,14 @@ from policies.learn import checkpoint
 from policies.learn.build import build_learner
 from policies.learn.config.run import RunConfig
 from policies.learn.curriculum import Curriculum, RecentEpisodes
-from policies.learn.evaluate import Evaluation, evaluate
+from policies.learn.evaluate import Evaluation
 from policies.learn.export import export_policy
 from policies.learn.fit import flat, require_fit, settings_that_must_fit
 from policies.learn.policy_file import CHECKPOINT, POLICY, PolicyCard, policy_record, save_policy
 from policies.learn.run_folder import RunError, RunFolder, starting_point
+from policies.learn.success_target import SuccessTarget
 from policies.learn.tensorboard import EventFile, Period
+from policies.learn.threads import few_threads
 from policies.tasks.catalogue import build_task, settings_of
 from policies.tasks.episode import Outcome
 from policies.tasks.layout import Layout
@@ -33,7 +33,6 @@ from policies.tasks.numbers import NumberError
 from policies.tasks.task import Scores
 
 RECENT_EPISODES = 1000  # over which success rate and mean reward are shown
-HELD_OUT_EPISODES = 2000  # by which `success_target` is judged
 _RATE_ITERATIONS = 20  # over which steps per second are shown
 
 
@@ -86,7 +85,7 @@ class Result:
 
     end: str  # "max_steps", "success_target" or "stopped"
     progress: Progress
-    held_out: Evaluation | None  # the last one on held-out episodes, if there was one
+    judged: Evaluation | None  # of the trained policy, if it was held against the success target
     policy: Path
     network: Path
 
@@ -101,16 +100,12 @@ def train(config: RunConfig, watcher: Watcher) -> Result:
         NumberError: an environment parameter that the task has not.
         UnknownTask: no such task, or a setting that it has not.
     """
-    threads_before = torch.get_num_threads()
-    torch.set_num_threads(max(1, min((os.cpu_count() or 1) // 2, 4)))  # ML-Agents' rule; the same sums each time
     try:
-        training = Training(config, watcher)
-        return training.run()
+        with few_threads():
+            return Training(config, watcher).run()
     except OSError as error:
         folder = RunFolder.of(config).path
         raise RunError(f"{error.filename or folder}: cannot be read or written: {error.strerror}") from error
-    finally:
-        torch.set_num_threads(threads_before)
 
 
 class Training:
@@ -142,7 +137,9 @@ class Training:
         self._elapsed_before_s = 0.0
         self._events_position: dict[str, Any] | None = None
         self._saved: list[dict[str, Any]] = []
-        self._held_out: Evaluation | None = None
+        share = self.behavior.success_target
+        self._target = SuccessTarget(share, self.task_name, self.task_settings) if share is not None else None
+        self._judged: Evaluation | None = None
         self._moments: deque[tuple[float, int]] = deque(maxlen=_RATE_ITERATIONS + 1)
         if newest is not None and content is not None:
             self._restore(newest, content)
@@ -167,6 +164,7 @@ class Training:
     def _iterate(self) -> str:
         while self.learner.steps < self.behavior.max_steps:
             before = self.learner.steps
+            self._judged = None  # that was another policy
             iteration = self.learner.iterate()
             steps = self.learner.steps
             self.period.add(iteration.scores, iteration.statistics)
@@ -193,37 +191,21 @@ class Training:
         for line in lines:
             self.watcher.note(line)
         if is_reset:
-            self.task.begin(np.ones(self.task.env_count, dtype=np.bool_))
+            self.learner.restart()
 
     def _summarize(self) -> bool:
         """Writes one point of each curve; true if the success target is reached."""
         values = self.period.values() | self.curriculum.tags() | {"Is Training": 1.0}
         self.period = Period()
-        target = self.behavior.success_target
         is_reached = False
-        if target is not None and self.curriculum.is_last and self._is_promising(target):
-            self._held_out = self._judge()
-            values["Environment/Held-out Success Rate"] = self._held_out.success_rate
-            is_reached = self._held_out.interval[0] >= target
+        if self._target is not None:
+            episodes_seed = (self.seed + self.learner.steps) % 2**31  # another at each summary, and never training's
+            self._judged = self._target.judge(self.learner.policy, self.recent, self.curriculum, episodes_seed)
+            if self._judged is not None:
+                values["Environment/Judged Success Rate"] = self._judged.success_rate
+                is_reached = self._target.is_reached(self._judged)
         self._events.write(self.learner.steps, values)
         return is_reached
-
-    def _is_promising(self, target: float) -> bool:
-        """Whether enough training episodes succeed, drawn actions and all, to make an evaluation worth its time."""
-        scores = self.recent.scores
-        rate = scores.count(Outcome.SUCCESS) / max(scores.episode_count, 1)
-        return scores.episode_count >= self.recent.least and rate >= 1.0 - 5.0 * (1.0 - target)
-
-    def _judge(self) -> Evaluation:
-        """The most probable actions on held-out episodes: others at each evaluation."""
-        return evaluate(
-            self.learner.policy,
-            self.task_name,
-            self.task_settings.model_copy(update={"split": "test"}),
-            episodes=HELD_OUT_EPISODES,
-            seed=(self.seed + self.learner.steps) % 2**31,
-            numbers=self.curriculum.final_numbers(),
-        )
 
     def _save(self) -> None:
         """Writes a checkpoint and what belongs to it, then removes the oldest."""
@@ -261,7 +243,7 @@ class Training:
         save_policy(self.folder.policy, self.learner.policy, self._card())
         export_policy(self.learner.policy, self.folder.network)
         self.folder.write_status(self._status() | {"end": end})
-        return Result(end, self._progress(), self._held_out, self.folder.policy, self.folder.network)
+        return Result(end, self._progress(), self._judged, self.folder.policy, self.folder.network)
 
     def _status(self) -> dict[str, Any]:
         progress = self._progress()
@@ -278,9 +260,9 @@ class Training:
         figures: dict[str, float] = {}
         if progress.success_rate is not None and progress.mean_reward is not None:
             figures = {"training_success_rate": progress.success_rate, "training_reward": progress.mean_reward}
-        if self._held_out is not None:
-            low, high = self._held_out.interval
-            figures |= {"success_rate": self._held_out.success_rate, "success_low": low, "success_high": high}
+        if self._judged is not None:
+            low, high = self._judged.interval
+            figures |= {"success_rate": self._judged.success_rate, "success_low": low, "success_high": high}
         settings = self.task_settings.model_dump()
         numbers = {name: asdict(sampler) for name, sampler in self.curriculum.final_numbers().items()}
         return PolicyCard(self.task_name, settings, self.seed, self.learner.steps, figures, numbers)

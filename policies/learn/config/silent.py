@@ -39,6 +39,7 @@ def put_right(root: Placed, name: str, notes: list[str], *, is_strict: bool) -> 
         _drop_unknown(network, where, NetworkSettings, notes)
         for memory, memory_path in _below(network, where, "memory"):
             _drop_unknown(memory, memory_path, Memory, notes)
+    _note_encoder(behavior, path, notes)
     for cloning, where in _below(behavior, path, "behavioral_cloning"):
         _drop_unknown(cloning, where, BehavioralCloning, notes)
     for signals, where in _below(behavior, path, "reward_signals"):
@@ -85,17 +86,38 @@ def _put_memory_right(network: Placed, path: str, notes: list[str], *, is_strict
         network.drop(key)
 
 
+def _note_encoder(behavior: Placed, path: str, notes: list[str]) -> None:
+    """Says once that nothing is there to encode, where an encoder of images is chosen that is not the default."""
+    networks = list(_below(behavior, path, "network_settings"))
+    for signals, signals_path in _below(behavior, path, "reward_signals"):
+        for kind in signals:
+            for signal, where in _below(signals, signals_path, kind):
+                networks += _below(signal, where, "network_settings")
+    for network, where in networks:
+        if network.get("vis_encode_type", "simple") != "simple":
+            sentence = "has no effect: no task shows its policy images yet"
+            notes.append(note_at(network.places["vis_encode_type"], f"{where}.vis_encode_type", sentence))
+            return
+
+
 def _put_signal_right(signal: Placed, path: str, kind: str, notes: list[str]) -> None:
     if kind in _ENCODED and "encoding_size" in signal:
         if signal["encoding_size"] is not None:  # empty in the files that ML-Agents itself writes
             _put_encoding_size_right(signal, path, notes)
         signal.drop("encoding_size")
     for network, where in _below(signal, path, "network_settings"):
-        _put_memory_right(network, where, notes, is_strict=True)
-        if network.get("memory") is not None:
-            notes.append(note_at(network.places["memory"], f"{where}.memory", "reward signals have no memory: dropped"))
-            network.drop("memory")
+        _drop_memory(network, where, notes)
         _drop_unknown(network, where, NetworkSettings, notes)
+
+
+def _drop_memory(network: Placed, path: str, notes: list[str]) -> None:
+    keys = [key for key in (*MEMORY_KEYS, "memory") if network.get(key) is not None]
+    if not keys:
+        return
+    place = min((network.places[key] for key in keys), key=lambda place: place.line)
+    notes.append(note_at(place, f"{path}.{', '.join(keys)}", "reward signals have no memory: dropped"))
+    for key in keys:
+        network.drop(key)
 
 
 def _put_encoding_size_right(signal: Placed, path: str, notes: list[str]) -> None:

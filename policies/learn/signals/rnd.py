@@ -51,9 +51,7 @@ class RndSignal:
         self.settings = settings
         self.network = _Pair(layout, settings, torch.Generator().manual_seed(seed)).to(device)
         self.optimizer = torch.optim.Adam(self.network.predictor.parameters(), lr=settings.learning_rate)
-        self._running = torch.zeros(
-            0, device=device
-        )  # discounted sum of each environment's rewards up to the last rollout
+        self._running = torch.zeros(0, device=device)  # discounted sum of each environment's rewards so far
 
     def _seen(self, transitions: Transitions) -> Tensor:
         return transitions.next_observations if self.settings.normalize_reward else transitions.observations
@@ -94,4 +92,4 @@ class RndSignal:
 
     def load_state(self, state: Mapping[str, Any]) -> None:
         restore(state, self.network, self.optimizer)
-        self._running = state["running"].clone()
+        self._running = state["running"].clone().to(self._running.device)

@@ -315,7 +315,7 @@ def test_new_run_starts_from_the_policy_of_another(finished):
     assert "--initialize-from: results/none: there is no such run" in result.stderr
 
 
-def test_training_stops_when_held_out_episodes_succeed():
+def test_training_stops_when_episodes_it_did_not_train_on_succeed():
     write_config(max_steps=300_000, success_target=0.1, checkpoint_interval=500_000)
     result = train()
     assert "success target reached" in result.output

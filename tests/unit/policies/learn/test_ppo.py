@@ -122,6 +122,16 @@ def test_the_actor_remembers_until_its_episode_ends():
         assert rollout.memories[k][~is_fresh].abs().amin() > 0.0
 
 
+def test_a_restart_begins_all_episodes_anew_without_memory_of_the_old_ones():
+    ppo = learner(memory=Memory(sequence_length=8, memory_size=8))
+    ppo.iterate()
+    running = [ppo._memory, ppo._critic_memory, ppo.task.task.border.steps.numpy()]
+    assert all(values.any() for values in running)
+    ppo.restart()
+    fresh = [ppo._memory, ppo._critic_memory, ppo.task.task.border.steps.numpy(), ppo.state()["running_sums"]]
+    assert not any(values.any() for values in fresh)
+
+
 @pytest.mark.parametrize("memory", [None, Memory(sequence_length=8, memory_size=8)], ids=["feed-forward", "recurrent"])
 def test_before_learning_the_ratio_of_new_to_old_probability_is_one(memory):
     ppo = learner(memory=memory, is_normalized=False)

@@ -1,11 +1,13 @@
 import pytest
 import torch
 
+from policies.learn.bc import Cloning
 from policies.learn.config.behavior import Behavior
 from policies.learn.policy import Policy
 from policies.learn.sac import Sac, SacError
 from policies.learn.signals.build import build_signals
 from policies.learn.signals.extrinsic import ExtrinsicSignal
+from policies.learn.signals.signal import Transitions
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
 from tests.unit.policies.learn.signs import Signs
@@ -138,6 +140,64 @@ def test_a_timeout_is_kept_as_no_end_and_with_what_the_episode_saw_last():
     assert torch.equal(batch.next_observations[is_cut, :3], batch.observations[is_cut, :3])  # of the same goal
 
 
+def test_rewards_are_those_of_the_episodes_that_ended():
+    iteration = small().iterate()
+    mean = iteration.scores.return_sum / iteration.scores.episode_count
+    assert iteration.statistics["Policy/Extrinsic Reward"] == pytest.approx(mean)
+
+
+def test_a_restart_begins_all_episodes_anew_and_parts_them_from_the_old_ones_in_hindsight():
+    sac = small(hindsight=4)
+    sac.iterate()
+    task, hindsight = sac.task.task, sac._hindsight
+    assert task.border.steps.numpy().any()
+    running = hindsight._episode.clone()
+    sac.restart()
+    assert not task.border.steps.numpy().any()
+    assert (hindsight._episode != running).any()
+    sac._collect()
+    before, after = hindsight._episodes[sac.replay.rounds - 2], hindsight._episodes[sac.replay.rounds - 1]
+    assert (before != after).all()
+
+
+def test_a_clone_of_demonstrations_acts_as_they_did_and_goes_on_bit_for_bit():
+    def cloned(seed):
+        task = Signs(50, (3, 2), is_pointing=True)
+        behavior = Behavior.model_validate(
+            {
+                "trainer_type": "sac",
+                "hyperparameters": {**FAST, "init_entcoef": 0.02, "learning_rate": 3e-3},
+                "network_settings": {"hidden_units": 64, "normalize": True},
+                "behavioral_cloning": {"demo_path": "unused", "samples_per_update": 256},
+            }
+        )
+        policy = Policy(task.layout, behavior.network_settings, torch.Generator().manual_seed(seed), is_squashed=True)
+        settings = behavior.behavioral_cloning
+        cloning = Cloning(policy, settings, shown(task.layout), (3e-3, 256, 1), seed)
+        silent = ExtrinsicSignal(0.0, strength=0.0)  # what is learnt comes from the demonstrations alone
+        return Sac(task, policy, behavior, [silent], seed=seed, cloning=cloning)
+
+    one, two = cloned(1), cloned(2)
+    for _ in range(2):
+        statistics = one.iterate().statistics
+    assert statistics["Losses/Pretraining Loss"] > 0.0
+    assert mean_reward(one.task.task, one.policy) > 0.9
+    state = one.state()
+    two.load_state(state)
+    assert flat(two.state()["cloning"]) == flat(state["cloning"])
+    two.replay.load_state(one.replay.state())
+    assert one.iterate().statistics == two.iterate().statistics
+
+
+def shown(layout):
+    """What whoever reads the signs does."""
+    task = Signs(2000, layout.branch_sizes, is_pointing=True)
+    task.reset(77)
+    signs = torch.from_numpy(task.border.observations.numpy().copy())
+    ends = torch.ones(2000, dtype=torch.bool)
+    return Transitions(signs, signs, signs[:, 2:], signs[:, :2].long(), torch.ones(2000), ends)
+
+
 def test_temperatures_and_losses_have_ml_agents_tags():
     sac = learner(Signs(50, (3, 2), is_pointing=True))
     sac.iterate()
@@ -146,6 +206,7 @@ def test_temperatures_and_losses_have_ml_agents_tags():
         "Losses/Policy Loss",
         "Losses/Q1 Loss",
         "Losses/Q2 Loss",
+        "Policy/Extrinsic Reward",
         "Policy/Extrinsic Value",
         "Policy/Learning Rate",
         "Policy/Continuous Entropy Coeff",
@@ -166,7 +227,8 @@ def test_novelty_is_a_stream_of_its_own_and_learns_as_often_as_its_key_says():
     policy = Policy(task.layout, behavior.network_settings, torch.Generator().manual_seed(1), is_squashed=True)
     sac = Sac(task, policy, behavior, build_signals(behavior.reward_signals, task.layout, 1, "cpu"), seed=1)
     statistics = sac.iterate().statistics
-    assert {"Policy/Extrinsic Value", "Policy/Rnd Value", "Policy/Curiosity Value"} <= set(statistics)
+    assert {f"Policy/{name} Value" for name in ("Extrinsic", "Rnd", "Curiosity")} <= set(statistics)
+    assert {f"Policy/{name} Reward" for name in ("Extrinsic", "Rnd", "Curiosity")} <= set(statistics)
     assert "Losses/RND Loss" in statistics
     assert sac.state()["update_counts"] == [1000 // 8, 1000 // 100]
 

@@ -1,0 +1,52 @@
+"""When a training may stop early: the policy is judged on episodes of its own that it never trained on.
+
+In: the policy, and the training's last episodes. Out: an evaluation, when one is worth its time. It is played on the
+run's own split of the places: to choose the policy by its success on test places would be to train on them.
+"""
+
+from dataclasses import dataclass
+
+from policies.learn.curriculum import Curriculum, RecentEpisodes
+from policies.learn.evaluate import Evaluation, evaluate
+from policies.learn.policy import Policy
+from policies.tasks.episode import Outcome
+from policies.tasks.task import TaskSettings
+
+
+@dataclass(frozen=True, slots=True)
+class SuccessTarget:
+    """The share of episodes that is to succeed, and on what."""
+
+    share: float
+    task_name: str
+    settings: TaskSettings
+    episode_count: int = 2000
+    """Of one judgement."""
+
+    def judge(
+        self, policy: Policy, recent: RecentEpisodes, curriculum: Curriculum, episodes_seed: int
+    ) -> Evaluation | None:
+        """The most probable actions in the last lesson; none before that, and while training fails too often.
+
+        Args:
+            policy: what is judged.
+            recent: the training's last episodes.
+            curriculum: the lessons.
+            episodes_seed: of the episodes; another one at each judgement.
+        """
+        if not (curriculum.is_last and self._is_promising(recent)):
+            return None
+        numbers = curriculum.final_numbers()
+        return evaluate(
+            policy, self.task_name, self.settings, episodes=self.episode_count, seed=episodes_seed, numbers=numbers
+        )
+
+    def is_reached(self, evaluation: Evaluation) -> bool:
+        """Whether the success rate is above the target with 97.5 % confidence."""
+        return evaluation.interval[0] >= self.share
+
+    def _is_promising(self, recent: RecentEpisodes) -> bool:
+        """Whether enough training episodes succeed, drawn actions and all, to make an evaluation worth its time."""
+        scores = recent.scores
+        rate = scores.count(Outcome.SUCCESS) / max(scores.episode_count, 1)
+        return scores.episode_count >= recent.least and rate >= 1.0 - 5.0 * (1.0 - self.share)
