@@ -15,8 +15,8 @@ from policies.experts.parking_planner import Memory, Situation, next_command, wr
 from policies.tasks.numbers import typed_rows
 from policies.tasks.parking import level1, level2
 from policies.tasks.parking.arena import PORTAL_PLACES, STOREY_2_FROM_X, forward_of, place_of, pose, storey_of
-from policies.tasks.parking.numbers import CAR_NUMBERS, CarNumbers, Level2Numbers
-from policies.tasks.parking.scene import Scene, pad_half, portal_half
+from policies.tasks.parking.numbers import CAR_NUMBERS, CarNumbers, Level1Numbers, Level2Numbers
+from policies.tasks.parking.scene import Scene, portal_half
 from policies.tasks.parking.settings import Rules
 from policies.tasks.parking.world import CarState, motion_of
 from policies.tasks.task import Task
@@ -41,7 +41,7 @@ def parking_target(scene: Scene, rules: Rules, numbers: CarNumbers) -> Target:
     """The pad, to be touched; or the place of the car's origin from which it turns into the pose on the spot."""
     target = Target()
     target.pose = scene.goal
-    target.half = pad_half()
+    target.half = scene.goal_half
     if rules.needs_pose:
         place = place_of(scene.goal) - forward_of(scene.goal) * numbers.box_ahead_m
         target.pose = wp.vec4(place[0], place[1], scene.goal[2], scene.goal[3])
@@ -58,9 +58,7 @@ def forget(memories: wp.array(dtype=Memory), i: int) -> None:
 
 
 @wp.kernel(enable_backward=False)
-def fill_level1(
-    rows: wp.array(dtype=int), cars: CarState, blocks: wp.array2d(dtype=wp.vec4), rules: Rules, fields: Fields
-) -> None:
+def fill_level1(rows: wp.array(dtype=int), cars: CarState, blocks: level1.Blocks, rules: Rules, fields: Fields) -> None:
     """The fields of the rows that have begun another episode."""
     i = rows[wp.tid()]
     scene = level1.scene_of(cars, blocks, i)
@@ -70,7 +68,7 @@ def fill_level1(
 
 @wp.kernel(enable_backward=False)
 def act_level1(
-    branches: wp.array2d(dtype=int), cars: CarState, blocks: wp.array2d(dtype=wp.vec4), rules: Rules, fields: Fields
+    branches: wp.array2d(dtype=int), cars: CarState, blocks: level1.Blocks, rules: Rules, fields: Fields
 ) -> None:
     """The next action of every row."""
     i = wp.tid()
@@ -161,7 +159,7 @@ class Parking1Expert:
         if not isinstance(task, level1.Parking1):
             raise TypeError(f"{task.layout.task} is not Parking1")
         self._fields = self._fields or _fields(task)
-        inputs = [task.world, task.blocks, task.rules, self._fields]
+        inputs = [task.world, _blocks(task), task.rules, self._fields]
         _launch(task, fill_level1, act_level1, self._new_episodes.rows(task), inputs)
 
 
@@ -186,6 +184,13 @@ class Parking2Expert:
             rows = np.union1d(rows, np.flatnonzero(storeys != self._storeys))
         self._storeys = storeys
         _launch(task, fill_level2, act_level2, rows, self._inputs)
+
+
+def _blocks(task: level1.Parking1) -> Any:
+    blocks = level1.Blocks()
+    blocks.poses = task.blocks
+    blocks.numbers = typed_rows(task.border.numbers, Level1Numbers, first=len(CAR_NUMBERS))
+    return blocks
 
 
 def _movers_and_places(task: level2.Parking2) -> tuple[Any, Any]:

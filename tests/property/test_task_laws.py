@@ -9,7 +9,7 @@ from policies.tasks.catalogue import CATALOGUE, build_task, task_settings
 from policies.tasks.numbers import Sampler
 from policies.tasks.parking.level1 import Parking1
 from policies.tasks.parking.level2 import Parking2
-from policies.tasks.parking.numbers import CarNumbers, Level2Numbers
+from policies.tasks.parking.numbers import CarNumbers, Level1Numbers, Level2Numbers
 from policies.tasks.reach_target.numbers import ReachNumbers
 from policies.tasks.reach_target.reach_target import ReachTarget
 from policies.tasks.roller_ball import RollerBall, RollerBallNumbers
@@ -25,7 +25,7 @@ seeds = st.integers(0, 2**31 - 1)
 STRUCTS = {
     RollerBall: (RollerBallNumbers,),
     ReachTarget: (ReachNumbers,),
-    Parking1: (CarNumbers,),
+    Parking1: (CarNumbers, Level1Numbers),
     Parking2: (CarNumbers, Level2Numbers),
 }
 

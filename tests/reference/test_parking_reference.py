@@ -6,9 +6,7 @@ import warp as wp
 
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.parking.arena import (
-    BLOCK_SIZE,
     INNER_FACES,
-    PAD_SIZE,
     PORTAL_PLACES,
     PORTAL_SIZE,
     STOREY_X,
@@ -129,11 +127,11 @@ def scene_gaps(task, row, radius):
         portal = tuple(size / 2 for size in PORTAL_SIZE)
         surfaces.append(("portal", rounded(pose(PORTAL_PLACES[storey]), portal, radius)))
     else:
-        block = tuple(size / 2 for size in BLOCK_SIZE)
+        block = tuple(size / 2 for size in (3.467, 1.0))
         surfaces += [("obstacle", rounded(box, block, radius)) for box in task.blocks.numpy()[row]]
     goal = task.world.goal.numpy()[row]
     if int(goal[0] > 34.0) == storey:
-        surfaces.append(("goal", rounded(goal, tuple(size / 2 for size in PAD_SIZE), radius)))
+        surfaces.append(("goal", rounded(goal, tuple(size / 2 for size in (2.5, 1.0)), radius)))
     return surfaces
 
 

@@ -26,7 +26,6 @@ INNER_FACES = (  # [m] from a storey's centre; the gaps at the corners are narro
     WALL_CENTRES[3] - WALL_THICKNESS / 2,
 )
 
-BLOCK_SIZE = (3.467, 1.0)  # [m] along its own x and z
 BLOCK_PLACES = ((-3.28, 1.83, -32.3), (-1.99, -5.70, 31.5), (7.19, -1.03, 31.5))  # x, z [m], yaw [deg]
 
 PORTAL_SIZE = (6.0, 0.2)  # [m] a plate 6 x 3 tilted by 75 deg; taken as upright, thickness a guess
@@ -46,7 +45,6 @@ LEVEL1_MARKER = (-3.79, 12.20)  # of the scene: the goal before the first park (
 LEVEL2_START = (-12.70, -10.02, 56.3)
 LEVEL2_SPOT = (78.42, 12.24)
 LEVEL2_SPOTS_BELOW = ((-3.2, 12.0), (8.0, 12.0))  # of storey 1, in the code but commented out
-PAD_SIZE = (2.5, 1.0)  # [m] along its own x and z
 
 CAR_HEIGHT = 0.5  # [m] of the car's origin
 SPOT_HEIGHT, BLOCK_HEIGHT, WALL_HEIGHT, MOVER_HEIGHT = 0.3, 0.46, 0.0, 0.0  # [m] of their centres
@@ -56,8 +54,6 @@ STOREY_X_2 = wp.constant(STOREY_X[1])
 STOREY_Z_2 = wp.constant(STOREY_Z[1])
 WALL_X_LOW, WALL_X_HIGH, WALL_Z_LOW, WALL_Z_HIGH = (wp.constant(face) for face in INNER_FACES)
 WALL_CENTRE_X_LOW, WALL_CENTRE_X_HIGH, WALL_CENTRE_Z_LOW, WALL_CENTRE_Z_HIGH = (wp.constant(c) for c in WALL_CENTRES)
-BLOCK_HALF_X, BLOCK_HALF_Z = wp.constant(BLOCK_SIZE[0] / 2), wp.constant(BLOCK_SIZE[1] / 2)
-PAD_HALF_X, PAD_HALF_Z = wp.constant(PAD_SIZE[0] / 2), wp.constant(PAD_SIZE[1] / 2)
 PORTAL_HALF_X, PORTAL_HALF_Z = wp.constant(PORTAL_SIZE[0] / 2), wp.constant(PORTAL_SIZE[1] / 2)
 
 

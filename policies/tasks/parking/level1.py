@@ -12,10 +12,8 @@ import warp as wp
 from common.rng import draw_key
 from policies.tasks.episode import RUNNING, SUCCESS, Border, begin_episode, close_step
 from policies.tasks.layout import Layout
-from policies.tasks.numbers import Sampler
+from policies.tasks.numbers import Sampler, typed_rows
 from policies.tasks.parking.arena import (
-    BLOCK_HALF_X,
-    BLOCK_HALF_Z,
     BLOCK_HEIGHT,
     BLOCK_PLACES,
     LEVEL1_MARKER,
@@ -28,11 +26,11 @@ from policies.tasks.parking.arena import (
 )
 from policies.tasks.parking.car import TICK_S, box_of_car
 from policies.tasks.parking.drive import BRANCHES, Motion, command_of, moved
-from policies.tasks.parking.numbers import CAR_NUMBERS, CarNumbers, reward_defaults
+from policies.tasks.parking.numbers import CAR_NUMBERS, LEVEL1_NUMBERS, CarNumbers, Level1Numbers, reward_defaults
 from policies.tasks.parking.observe_documents import gap_to
 from policies.tasks.parking.observe_level1 import BLOCK_COUNT, frame_of, observe
 from policies.tasks.parking.parked import capped, end_reward, outcome_of, progress_reward, way_of
-from policies.tasks.parking.scene import Scene, contact_of
+from policies.tasks.parking.scene import Scene, contact_of, half_of_pad
 from policies.tasks.parking.settings import AS_DOCUMENTED, PROGRESS, Choices, ParkingSettings, Rules, chosen, rules_of
 from policies.tasks.parking.spots import cells, draw_block, draw_goal, draw_start
 from policies.tasks.parking.table import table_reward
@@ -94,6 +92,14 @@ _PRESET_NUMBERS: dict[str, dict[str, float | Sampler]] = {
 
 
 @wp.struct
+class Blocks:
+    """The blocks; one row per environment."""
+
+    poses: wp.array2d(dtype=wp.vec4)
+    numbers: wp.array(dtype=Level1Numbers)
+
+
+@wp.struct
 class Level1Places:
     """What is the same for all environments."""
 
@@ -106,14 +112,16 @@ class Level1Places:
 
 
 @wp.func
-def scene_of(cars: CarState, blocks: wp.array2d(dtype=wp.vec4), i: int) -> Scene:
+def scene_of(cars: CarState, blocks: Blocks, i: int) -> Scene:
     """The arena."""
+    numbers = blocks.numbers[i]
     scene = Scene()
     for k in range(BLOCK_COUNT):
-        scene.obstacles[k] = blocks[i, k]
+        scene.obstacles[k] = blocks.poses[i, k]
     scene.obstacle_count = BLOCK_COUNT
-    scene.obstacle_half = wp.vec2(BLOCK_HALF_X, BLOCK_HALF_Z)
+    scene.obstacle_half = wp.vec2(0.5 * numbers.block_width_m, 0.5 * numbers.block_length_m)
     scene.goal = cars.goal[i]
+    scene.goal_half = half_of_pad(cars.numbers[i])
     scene.has_goal = True
     return scene
 
@@ -130,7 +138,7 @@ def place_blocks(
     border: Border,
     rules: Rules,
     places: Level1Places,
-    blocks: wp.array2d(dtype=wp.vec4),
+    blocks: Blocks,
     i: int,
     episode: int,
 ) -> None:
@@ -141,10 +149,10 @@ def place_blocks(
             others.obstacle_count = k
             others.obstacles[k] = draw_block(others, border.seed[0], i, episode, _BLOCK_STREAM + k)
         for k in range(BLOCK_COUNT):
-            blocks[i, k] = others.obstacles[k]
+            blocks.poses[i, k] = others.obstacles[k]
     else:
         for k in range(BLOCK_COUNT):
-            blocks[i, k] = places.blocks[k]
+            blocks.poses[i, k] = places.blocks[k]
 
 
 @wp.func
@@ -153,7 +161,7 @@ def place_goal(
     rules: Rules,
     places: Level1Places,
     cars: CarState,
-    blocks: wp.array2d(dtype=wp.vec4),
+    blocks: Blocks,
     i: int,
     episode: int,
 ) -> None:
@@ -176,7 +184,7 @@ def place_car(
     rules: Rules,
     places: Level1Places,
     cars: CarState,
-    blocks: wp.array2d(dtype=wp.vec4),
+    blocks: Blocks,
     i: int,
     episode: int,
 ) -> None:
@@ -197,7 +205,7 @@ def begin_row(
     rules: Rules,
     places: Level1Places,
     cars: CarState,
-    blocks: wp.array2d(dtype=wp.vec4),
+    blocks: Blocks,
     i: int,
     outcome: int,
 ) -> None:
@@ -227,7 +235,7 @@ def begin(
     rules: Rules,
     places: Level1Places,
     cars: CarState,
-    blocks: wp.array2d(dtype=wp.vec4),
+    blocks: Blocks,
 ) -> None:
     """Starts an episode in the chosen rows."""
     i = wp.tid()
@@ -236,7 +244,7 @@ def begin(
 
 
 @wp.kernel(enable_backward=False)
-def step(border: Border, rules: Rules, places: Level1Places, cars: CarState, blocks: wp.array2d(dtype=wp.vec4)) -> None:
+def step(border: Border, rules: Rules, places: Level1Places, cars: CarState, blocks: Blocks) -> None:
     """One decision of every row."""
     i = wp.tid()
     numbers = cars.numbers[i]
@@ -267,7 +275,7 @@ def step(border: Border, rules: Rules, places: Level1Places, cars: CarState, blo
 class Parking1(ParkingTask):
     """The task. Layout version 1."""
 
-    numbers: ClassVar = CAR_NUMBERS
+    numbers: ClassVar = (*CAR_NUMBERS, *LEVEL1_NUMBERS)
 
     def __init__(self, settings: ParkingSettings, env_count: int, device: str = "cpu") -> None:
         choices = chosen(settings, PRESETS[settings.preset])
@@ -282,7 +290,10 @@ class Parking1(ParkingTask):
         self.rules = rules
         self.world = self._car_state()
         self.blocks = self._zeros("blocks", (env_count, len(BLOCK_PLACES)), wp.vec4)
-        self._record(begin, step, [rules, self._places(settings.split), self.world, self.blocks])
+        blocks = Blocks()
+        blocks.poses = self.blocks
+        blocks.numbers = typed_rows(self.border.numbers, Level1Numbers, first=len(CAR_NUMBERS))
+        self._record(begin, step, [rules, self._places(settings.split), self.world, blocks])
 
     def _places(self, split: str) -> Any:
         places = Level1Places()

@@ -34,7 +34,7 @@ from policies.tasks.parking.numbers import CAR_NUMBERS, LEVEL2_NUMBERS, CarNumbe
 from policies.tasks.parking.observe_documents import gap_to
 from policies.tasks.parking.observe_level2 import GOAL_HEIGHT, STACKS, frame_of, observe
 from policies.tasks.parking.parked import capped, end_reward, outcome_of, progress_reward, way_of
-from policies.tasks.parking.scene import PORTAL, Scene, contact_of
+from policies.tasks.parking.scene import PORTAL, Scene, contact_of, half_of_pad
 from policies.tasks.parking.settings import AS_DOCUMENTED, PROGRESS, Choices, Parking2Settings, Rules, chosen, rules_of
 from policies.tasks.parking.spots import cells, draw_goal, draw_start
 from policies.tasks.parking.table import table_reward
@@ -132,6 +132,7 @@ def scene_of(cars: CarState, movers: Movers, places: Level2Places, i: int, store
     scene.obstacle_half = wp.vec2(0.0, half_line(numbers))
     scene.obstacle_radius = numbers.mover_radius_m
     scene.goal = cars.goal[i]
+    scene.goal_half = half_of_pad(cars.numbers[i])
     scene.has_goal = storey_of(scene.goal[0]) == storey
     scene.portal = places.portals[storey]
     scene.has_portal = True

@@ -1,7 +1,7 @@
 """The numbers of the parking tasks: motion, sizes, tests, rewards, sensors. Any can be set or randomised by name.
 
-`CAR_NUMBERS` belong to both levels, `LEVEL2_NUMBERS` to the second alone. Rewards have one set of names; which of them
-count, and their defaults, follow from the chosen reward.
+`CAR_NUMBERS` belong to both levels, `LEVEL1_NUMBERS` and `LEVEL2_NUMBERS` to one alone. Rewards have one set of names;
+which of them count, and their defaults, follow from the chosen reward.
 """
 
 import warp as wp
@@ -54,6 +54,8 @@ class CarNumbers:
     ray_degrees: float
     ray_length_m: float
     ray_radius_m: float
+    pad_width_m: float
+    pad_length_m: float
 
 
 CAR_NUMBERS = (
@@ -92,6 +94,22 @@ CAR_NUMBERS = (
     Number("ray_degrees", 120.0, 0.0, 180.0, "deg", "angle of the outermost rays, to each side of forward", "document"),
     Number("ray_length_m", 1000.0, 1.0, 1000.0, "m", "reach of the rays", "document: example"),
     Number("ray_radius_m", 0.5, 0.0, 10.0, "m", "radius of the sphere that is cast", "ML-Agents default"),
+    Number("pad_width_m", 2.5, 0.2, 3.0, "m", "of the spot, along its own x", _PREFAB),
+    Number("pad_length_m", 1.0, 0.2, 2.0, "m", "of the spot, along its own z", _PREFAB),
+)
+
+
+@wp.struct
+class Level1Numbers:
+    """One row per environment; declared in `LEVEL1_NUMBERS`."""
+
+    block_width_m: float
+    block_length_m: float
+
+
+LEVEL1_NUMBERS = (
+    Number("block_width_m", 3.467, 0.2, 5.0, "m", "of the blocks, along their own x", "code: scene"),
+    Number("block_length_m", 1.0, 0.2, 2.5, "m", "of the blocks, along their own z", "code: scene"),
 )
 
 

@@ -28,7 +28,7 @@ from policies.tasks.parking.observe_ranged import (
     write_walls,
 )
 from policies.tasks.parking.rays import ray_elements, write_rays
-from policies.tasks.parking.scene import Scene, pad_half
+from policies.tasks.parking.scene import Scene
 from policies.tasks.parking.settings import AS_DOCUMENTED, RANGED, Choices, Rules
 
 wp.set_module_options({"enable_backward": False})
@@ -82,7 +82,7 @@ def observe(border: Border, i: int, motion: Motion, scene: Scene, rules: Rules, 
     at = open_frame(border, i)
     if rules.observation == _RANGED:
         box = box_of_car(motion.pose, numbers.box_ahead_m)
-        at = write_goal(border, i, at, box, scene.goal, pad_half())
+        at = write_goal(border, i, at, box, scene.goal, scene.goal_half)
         at = write_velocity(border, i, at, box, motion.vel)
         at = write_obstacles(border, i, at, box, scene)
         at = write_walls(border, i, at, box)

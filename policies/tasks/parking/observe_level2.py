@@ -44,7 +44,7 @@ from policies.tasks.parking.observe_ranged import (
     write_walls,
 )
 from policies.tasks.parking.rays import ray_elements, write_rays
-from policies.tasks.parking.scene import Scene, pad_half, portal_half
+from policies.tasks.parking.scene import Scene, portal_half
 from policies.tasks.parking.settings import AS_DOCUMENTED, RANGED, Choices, Rules
 
 wp.set_module_options({"enable_backward": False})
@@ -135,7 +135,7 @@ def observe_ranged(
     box = box_of_car(motion.pose, numbers.box_ahead_m)
     next_at = int(0)
     if scene.has_goal:
-        next_at = write_goal(border, i, at, box, scene.goal, pad_half())
+        next_at = write_goal(border, i, at, box, scene.goal, scene.goal_half)
     else:  # the way leads through the portal
         next_at = write_goal(border, i, at, box, scene.portal, portal_half())
     border.observations[i, next_at] = wp.where(scene.has_goal, 1.0, 0.0)

@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from policies.tasks.drawing import GOAL, INK, OBSTACLE, VEHICLE, Canvas, Rgb
 from policies.tasks.parking.arena import (
-    BLOCK_SIZE,
     INNER_FACES,
-    PAD_SIZE,
     PORTAL_PLACES,
     PORTAL_SIZE,
     STOREY_X,
@@ -89,13 +87,13 @@ def picture_of(task: Any, i_env: int, height_px: int) -> NDArray[np.uint8]:
     is_level_2 = hasattr(task, "movers")
     picture = ParkingPicture(2 if is_level_2 else 1, height_px)
     pos, yaw_rad = world.pos.numpy()[i_env], float(world.yaw.numpy()[i_env])
-    picture.box(world.goal.numpy()[i_env], PAD_SIZE, GOAL)
+    picture.box(world.goal.numpy()[i_env], (numbers["pad_width_m"], numbers["pad_length_m"]), GOAL)
     picture.rays(pos, yaw_rad, ray_fractions(task, i_env), numbers)
     if is_level_2:
         _draw_level_2(picture, task, i_env, numbers)
     else:
         for block in task.blocks.numpy()[i_env]:
-            picture.box(block, BLOCK_SIZE, OBSTACLE)
+            picture.box(block, (numbers["block_width_m"], numbers["block_length_m"]), OBSTACLE)
     picture.car(pos, yaw_rad, numbers)
     return picture.canvas.pixels
 

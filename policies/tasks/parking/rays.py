@@ -21,7 +21,7 @@ from policies.tasks.parking.arena import (
     storey_of,
 )
 from policies.tasks.parking.numbers import CarNumbers
-from policies.tasks.parking.scene import MAX_OBSTACLES, Scene, pad_half, portal_half
+from policies.tasks.parking.scene import MAX_OBSTACLES, Scene, portal_half
 from policies.tasks.parking.settings import Rules
 
 wp.set_module_options({"enable_backward": False})
@@ -131,7 +131,7 @@ def cast_ray(start: wp.vec2, ray: wp.vec2, scene: Scene, rules: Rules, radius: f
                 cast.distance_m = far
                 cast.tag = rules.obstacle_tag
     if scene.has_goal:
-        far = ray_to_box(start, ray, scene.goal, pad_half(), radius)
+        far = ray_to_box(start, ray, scene.goal, scene.goal_half, radius)
         if far < cast.distance_m:
             cast.distance_m = far
             cast.tag = rules.goal_tag

@@ -5,7 +5,7 @@ Obstacles are rounded boxes: blocks have no rounding, moving capsules no width b
 
 import warp as wp
 
-from policies.tasks.parking.arena import PAD_HALF_X, PAD_HALF_Z, PORTAL_HALF_X, PORTAL_HALF_Z, forward_of
+from policies.tasks.parking.arena import PORTAL_HALF_X, PORTAL_HALF_Z, forward_of
 from policies.tasks.parking.car import box_meets_capsule, box_of_car, boxes_overlap, is_at_wall
 from policies.tasks.parking.numbers import CarNumbers
 
@@ -28,6 +28,7 @@ class Scene:
     obstacle_half: wp.vec2  # [m]
     obstacle_radius: float  # [m]
     goal: wp.vec4  # the pad
+    goal_half: wp.vec2  # [m]
     has_goal: wp.bool
     portal: wp.vec4
     has_portal: wp.bool
@@ -40,9 +41,9 @@ def half_of_car(numbers: CarNumbers) -> wp.vec2:
 
 
 @wp.func
-def pad_half() -> wp.vec2:
+def half_of_pad(numbers: CarNumbers) -> wp.vec2:
     """Half sizes of the pad [m]."""
-    return wp.vec2(PAD_HALF_X, PAD_HALF_Z)
+    return wp.vec2(0.5 * numbers.pad_width_m, 0.5 * numbers.pad_length_m)
 
 
 @wp.func
@@ -73,6 +74,6 @@ def contact_of(car: wp.vec4, scene: Scene, numbers: CarNumbers) -> int:
             return OBSTACLE
     if scene.has_portal and boxes_overlap(box, half, scene.portal, portal_half()):
         return PORTAL
-    if scene.has_goal and boxes_overlap(box, half, scene.goal, pad_half()):
+    if scene.has_goal and boxes_overlap(box, half, scene.goal, scene.goal_half):
         return PAD
     return CLEAR

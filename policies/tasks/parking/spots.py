@@ -16,7 +16,6 @@ from policies.tasks.parking.arena import (
     INNER_FACES,
     LEVEL1_START,
     LEVEL2_START,
-    PAD_SIZE,
     PORTAL_EXITS,
     PORTAL_PLACES,
     STOREY_X,
@@ -35,12 +34,12 @@ wp.set_module_options({"enable_backward": False})
 
 SPLIT_SEED = 527  # of the train and test sets; never to be changed
 TEST_SHARE = 0.2
-PAD_REACH = float(np.hypot(*PAD_SIZE) / 2)  # [m] 1.35, from the pad's centre to its corners
-_WALL_MARGIN = PAD_REACH + 0.15  # [m] from a goal's centre to a wall
+_PAD_REACH = float(np.hypot(2.5, 1.0) / 2)  # [m] 1.35, from the published pad's centre to its corners
+_WALL_MARGIN = _PAD_REACH + 0.15  # [m] from a goal's centre to a wall
 _START_MARGIN = 3.5  # [m] from a goal to the published start
 _PORTAL_MARGIN = 3.5  # [m] from a goal to the middle of a portal or to where it leads
 
-_GOAL_CLEARANCE = wp.constant(PAD_REACH + 0.3)  # [m] from a goal's centre to an obstacle's surface
+_GOAL_CLEARANCE = wp.constant(_PAD_REACH + 0.3)  # [m] from a goal's centre to an obstacle's surface
 _START_CLEARANCE = wp.constant(1.8)  # [m] the same of a start: the car's box reaches 1.3 from its origin
 _START_GOAL = wp.constant(3.2)  # [m] from a start to the goal
 _PORTAL_CLEARANCE = wp.constant(2.0)  # [m] from a start to a portal's plate

@@ -196,6 +196,24 @@ def test_published_spots_are_for_training_and_lie_in_training_cells(preset):
     assert len(np.unique(places(split="test", goals="published"), axis=0)) <= 3
 
 
+@pytest.mark.parametrize(
+    ("place", "number", "sizes_m", "outcome"),
+    [
+        ((8.0, 9.0, 0.0), "pad_width_m", (2.5, 3.0), Outcome.SUCCESS),
+        (BLOCK_PLACES[0], "block_width_m", (3.467, 5.0), Outcome.HIT_OBSTACLE),
+    ],
+)
+def test_pads_and_blocks_are_as_wide_as_their_numbers_say(place, number, sizes_m, outcome):
+    yaw_rad = np.radians(place[2])
+    between = (sum(sizes_m) / 2 + 1.1317) / 2  # where a car beside it touches the wide one only
+    pos = np.array(place[:2]) + between * np.array([np.cos(yaw_rad), -np.sin(yaw_rad)])
+    for size_m, expected in zip(sizes_m, (Outcome.RUNNING, outcome), strict=True):
+        task = built(numbers={number: size_m})
+        put(task, 0, pos=pos, yaw_deg=place[2], goal=(8.0, 9.0, 0.0))
+        act(task, RIGHT)
+        assert task.border.outcomes.numpy()[0] == expected
+
+
 def test_starts_may_be_kept_near_the_goal():
     task = built(512, starts="anywhere", goals="anywhere", resets="clean", numbers={"start_range_m": 5.0})
     gaps = np.abs(task.world.pos.numpy() - task.world.goal.numpy()[:, :2])
