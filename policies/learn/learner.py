@@ -4,7 +4,7 @@ One iteration collects some decisions of all environments and updates the networ
 bit for bit is in its state, its task's included.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -50,6 +50,15 @@ class Learner(Protocol):
     def take_critics(self, state: Mapping[str, Any]) -> None:
         """Starts from the critics in another run's state, where they fit: same algorithm, same networks."""
         ...
+
+
+def means(statistics: Iterable[Mapping[str, float]]) -> dict[str, float]:
+    """Of each tag over the updates that have it."""
+    columns: dict[str, list[float]] = {}
+    for row in statistics:
+        for tag, value in row.items():
+            columns.setdefault(tag, []).append(value)
+    return {tag: sum(values) / len(values) for tag, values in columns.items()}
 
 
 def load_if_fitting(module: nn.Module, weights: Mapping[str, Tensor]) -> None:

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from policies.learn import losses
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
 from policies.learn.gae import advantages, cut_at_horizon
-from policies.learn.learner import Companion, Iteration, load_if_fitting
+from policies.learn.learner import Companion, Iteration, load_if_fitting, means
 from policies.learn.networks import Body, Critic, policy_body
 from policies.learn.policy import Policy
 from policies.learn.rollout import Batch, Rollout
@@ -171,7 +171,7 @@ class Ppo:
         for group in self.optimizer.param_groups:
             group["lr"] = rate
         sums = torch.zeros(3, device=self.task.device)
-        of_signals: dict[str, float] = {}
+        of_signals: list[dict[str, float]] = []
         update_count = 0
         for _epoch in range(numbers.num_epoch):
             moved = []
@@ -181,12 +181,12 @@ class Ppo:
                 moved.append(divergence)
                 update_count += 1
                 if transitions is not None:
-                    of_signals |= self._teach_signals(transitions, batch)
+                    of_signals.append(self._teach_signals(transitions, batch))
             if numbers.target_kl is not None and torch.stack(moved).mean() > numbers.target_kl:
                 break
         policy_loss, value_loss, entropy = (sums / update_count).tolist()
-        return of_signals | {
-            "Losses/Policy Loss": abs(policy_loss),
+        return means(of_signals) | {
+            "Losses/Policy Loss": policy_loss,
             "Losses/Value Loss": value_loss,
             "Policy/Entropy": entropy,
             "Policy/Learning Rate": rate,
@@ -195,7 +195,7 @@ class Ppo:
         }
 
     def _learn(self, batch: Batch, epsilon: float, beta: float) -> tuple[Tensor, Tensor]:
-        """One gradient step; policy loss, value loss and entropy, shape (3,), and how far the policy had moved."""
+        """One gradient step; size of policy loss, value loss, entropy, shape (3,), and how far the policy had moved."""
         features = self._features(self.policy.body, batch)
         distribution = self.policy.heads(features)
         if not self.hyperparameters.shared_critic:
@@ -216,7 +216,7 @@ class Ppo:
             nn.utils.clip_grad_norm_(self._parameters, self.hyperparameters.max_grad_norm)
         self.optimizer.step()
         with torch.no_grad():
-            return torch.stack((policy_loss, value_loss, entropy)), losses.divergence(log_probs, old_log_probs)
+            return torch.stack((policy_loss.abs(), value_loss, entropy)), losses.divergence(log_probs, old_log_probs)
 
     def _features(self, body: Body, batch: Batch) -> Tensor:
         """Of a minibatch, flat, shape (B, features)."""

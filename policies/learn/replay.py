@@ -59,6 +59,11 @@ class Replay:
         self._widths = [observation_size, observation_size, *action_sizes, 1, 1, 1]
         self.rows = torch.zeros(self.slots, env_count, sum(self._widths), device=device)
 
+    @property
+    def capacity(self) -> int:
+        """Transitions that the ring holds when it is full."""
+        return self.slots * self.env_count
+
     def __len__(self) -> int:
         """Transitions that lie in the ring."""
         return min(self.rounds, self.slots) * self.env_count

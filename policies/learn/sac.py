@@ -28,7 +28,7 @@ from torch import Tensor
 
 from policies.learn.config.behavior import Behavior, SacHyperparameters
 from policies.learn.hindsight import Hindsight
-from policies.learn.learner import Companion, Iteration, load_if_fitting
+from policies.learn.learner import Companion, Iteration, load_if_fitting, means
 from policies.learn.policy import Policy
 from policies.learn.replay import Replay, ReplayBatch
 from policies.learn.sac_update import SoftActorCritic
@@ -71,7 +71,8 @@ class Sac:
             cloning: of demonstrations, on the same policy; none: off.
 
         Raises:
-            SacError: a policy with memory, or hindsight where the observation tells too little of the goal.
+            SacError: a policy with memory, a buffer that never holds a batch, or hindsight where the observation tells
+                too little of the goal.
         """
         if not isinstance(behavior.hyperparameters, SacHyperparameters) or not policy.is_squashed:
             raise TypeError("hyperparameters or policy are not SAC's")
@@ -91,6 +92,11 @@ class Sac:
         layout = task.layout
         sizes = len(layout.continuous), len(layout.branches)
         self.replay = Replay(self.hyperparameters.buffer_size, task.env_count, layout.observation_size, sizes, device)
+        if self.replay.capacity < self.hyperparameters.batch_size:
+            raise SacError(
+                f"hyperparameters: buffer_size: {self.hyperparameters.buffer_size} holds {self.replay.capacity} steps "
+                f"in whole rounds of {task.env_count} environments: never a batch of {self.hyperparameters.batch_size}"
+            )
         self._hindsight = _hindsight(task, self.replay, self.hyperparameters.hindsight)
         self._radii = _numbers(task, self._hindsight.goal.radius) if self._hindsight is not None else None
         self._update_count = 0
@@ -117,7 +123,7 @@ class Sac:
         rewards, is_ended = (torch.stack(column) for column in zip(*collected, strict=True))
         now = self.networks.temperatures() | {"Policy/Learning Rate": self._learning_rate()}
         now |= self._episode_rewards.add(rewards, is_ended)
-        return Iteration(rounds * self.replay.env_count, self.task.task.take_scores(), _means(statistics) | now)
+        return Iteration(rounds * self.replay.env_count, self.task.task.take_scores(), means(statistics) | now)
 
     def restart(self) -> None:
         """Begins an episode in every environment; hindsight takes it for another than the running one."""
@@ -263,12 +269,3 @@ def _numbers(task: Task, name: str) -> Tensor:
     """A number of all running episodes, shape (envs,): live."""
     numbers: Tensor = wp.to_torch(task.border.numbers)
     return numbers[:, task.number_table.names.index(name)]
-
-
-def _means(statistics: list[dict[str, float]]) -> dict[str, float]:
-    """Of each tag over those that have it."""
-    columns: dict[str, list[float]] = {}
-    for row in statistics:
-        for tag, value in row.items():
-            columns.setdefault(tag, []).append(value)
-    return {tag: sum(values) / len(values) for tag, values in columns.items()}

@@ -324,6 +324,11 @@ def test_training_stops_when_episodes_it_did_not_train_on_succeed():
     assert card.steps < 300_000
 
 
+def test_training_says_that_it_draws_its_actions_whatever_the_configuration_asks_for():
+    write_config(max_steps=1, network_settings={"hidden_units": 16, "deterministic": True})
+    assert "deterministic: has an effect with --inference only" in train().output
+
+
 def test_lessons_advance_and_are_shown():
     criteria = {"behavior": "Ball", "measure": "progress", "threshold": 0.5, "require_reset": True}
     lessons = [{"name": "easy", "value": 3.0, "completion_criteria": criteria}, {"name": "hard", "value": 1.0}]

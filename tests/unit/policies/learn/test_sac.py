@@ -236,6 +236,8 @@ def test_novelty_is_a_stream_of_its_own_and_learns_as_often_as_its_key_says():
 def test_what_it_does_not_do_is_refused_in_one_sentence():
     with pytest.raises(SacError, match="memory: is not supported with trainer_type sac"):
         learner(build_task("RollerBall", 1), network={"memory": {"memory_size": 16, "sequence_length": 8}})
+    with pytest.raises(SacError, match="buffer_size: 300 holds 200 steps in whole rounds of 200 environments: never a"):
+        learner(Signs(200), buffer_size=300, batch_size=256)
     with pytest.raises(SacError, match="hindsight: is not possible with Signs as it is set"):
         learner(Signs(1), hindsight=4)
     with pytest.raises(SacError, match="hindsight: is not possible with RollerBall as it is set"):
