@@ -33,7 +33,11 @@ _MASKED = 1e8
 
 
 class ExportError(ValueError):
-    """An exported network that does not do what the policy does, or cannot be written; the message is one sentence."""
+    """An exported network that cannot be written; the message is one sentence for the user."""
+
+
+class ParityError(ExportError):
+    """An exported network that does not do what the policy does."""
 
 
 def export_policy(policy: Policy, path: Path) -> float:
@@ -43,13 +47,14 @@ def export_policy(policy: Policy, path: Path) -> float:
         The largest difference found between the two.
 
     Raises:
-        ExportError: they differ by more than 1e-5, or the file cannot be written.
+        ParityError: they differ by more than 1e-5.
+        ExportError: the file cannot be written.
     """
     policy = copy.deepcopy(policy).cpu()  # where the graph is compared with it; a training's own may be on a GPU
     content = onnx_bytes(policy)
     difference = largest_difference(policy, content)
     if difference > TOLERANCE:
-        raise ExportError(f"{path}: the exported network differs from the policy by {difference:.1e}")
+        raise ParityError(f"{path}: the exported network differs from the policy by {difference:.1e}")
     try:
         write_whole(path, content)
     except OSError as error:

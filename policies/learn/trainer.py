@@ -19,7 +19,7 @@ from policies.learn.build import build_learner
 from policies.learn.config.run import RunConfig
 from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation
-from policies.learn.export import export_policy
+from policies.learn.export import ParityError, export_policy
 from policies.learn.fit import flat, require_fit, settings_that_must_fit
 from policies.learn.policy_file import CHECKPOINT, POLICY, PolicyCard, policy_record, save_policy
 from policies.learn.run_folder import RunError, RunFolder, starting_point
@@ -96,6 +96,7 @@ def train(config: RunConfig, watcher: Watcher) -> Result:
     Raises:
         RunError: the run exists already, or does not exist, or its files cannot be written.
         CheckpointError: a checkpoint cannot be written or read, or is of a run with other settings.
+        ExportError: a network cannot be written.
         LayoutError: a checkpoint of another task.
         NumberError: an environment parameter that the task has not.
         UnknownTask: no such task, or a setting that it has not.
@@ -219,7 +220,7 @@ class Training:
             "success_rate": progress.success_rate,
             "elapsed_s": round(progress.elapsed_s, 3),
         }
-        self._saved.append(entry)
+        self._saved = [*self._saved, entry][-self.behavior.keep_checkpoints :]
         content = {
             "policy": policy_record(self.learner.policy),
             "card": asdict(self._card()),
@@ -234,16 +235,23 @@ class Training:
             "saved": self._saved,
         }
         checkpoint.save(path, content, CHECKPOINT)
-        export_policy(self.learner.policy, path.with_suffix(".onnx"))
+        self._export(path.with_suffix(".onnx"))
         self.folder.write_status(self._status())
         checkpoint.prune(self.folder.training, self.folder.behavior, self.behavior.keep_checkpoints)
 
     def _finish(self, end: str) -> Result:
         """Writes the trained policy."""
         save_policy(self.folder.policy, self.learner.policy, self._card())
-        export_policy(self.learner.policy, self.folder.network)
+        self._export(self.folder.network)
         self.folder.write_status(self._status() | {"end": end})
         return Result(end, self._progress(), self._judged, self.folder.policy, self.folder.network)
+
+    def _export(self, path: Path) -> None:
+        """The policy as an ONNX network. Hours of training are not given up where rounding drives the two apart."""
+        try:
+            export_policy(self.learner.policy, path)
+        except ParityError as error:
+            self.watcher.note(f"{error}; it was not written")
 
     def _status(self) -> dict[str, Any]:
         progress = self._progress()

@@ -1,5 +1,7 @@
 """The training loop goes on bit for bit, whatever learns; networks of other runs are a place to start from."""
 
+import json
+
 import pytest
 import torch
 
@@ -53,10 +55,16 @@ class StopAfter:
 
 
 def config(folder, kind="ppo", **settings):
+    """A run of a kind, or of a behaviour's own block."""
     return RunConfig.model_validate(
         {
             "behavior_name": "B",
-            "behavior": {"max_steps": 4_000, "summary_freq": 1_500, "checkpoint_interval": 10**9, **KINDS[kind]},
+            "behavior": {
+                "max_steps": 4_000,
+                "summary_freq": 1_500,
+                "checkpoint_interval": 10**9,
+                **(kind if isinstance(kind, dict) else KINDS[kind]),
+            },
             "env_settings": {"env_path": "RollerBall", "num_areas": 64, "seed": 5},
             "environment_parameters": {"force_n": {"sampler_type": "uniform", "sampler_parameters": UNIFORM}},
             "checkpoint_settings": {"results_dir": str(folder), "run_id": "run", **settings},
@@ -64,16 +72,37 @@ def config(folder, kind="ppo", **settings):
     )
 
 
+def imitating(kind, demonstrations):
+    """The same, with GAIL (its code noisy) and cloning."""
+    gail = {
+        "demo_path": demonstrations,
+        "use_vail": True,
+        "use_actions": True,
+        "network_settings": {"hidden_units": 16},
+    }
+    cloning = {"demo_path": demonstrations, "samples_per_update": 256, "steps": 4_000}
+    return {**KINDS[kind], "reward_signals": {"extrinsic": {}, "gail": gail}, "behavioral_cloning": cloning}
+
+
 UNIFORM = {"min_value": 8.0, "max_value": 12.0}
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_stopped_and_resumed_training_ends_with_the_same_bytes(tmp_path, kind):
-    whole = train(config(tmp_path / "whole", kind), StopAfter())
+    goes_on_bit_for_bit(tmp_path, KINDS[kind])
+
+
+@pytest.mark.parametrize("kind", ["ppo", "ppo with memory", "sac"])
+def test_so_does_one_that_imitates(tmp_path, kind, demonstrations):
+    goes_on_bit_for_bit(tmp_path, imitating(kind, demonstrations))
+
+
+def goes_on_bit_for_bit(tmp_path, behavior):
+    whole = train(config(tmp_path / "whole", behavior), StopAfter())
     for iterations in (1, 1):
         is_first = not (tmp_path / "parts").exists()
-        train(config(tmp_path / "parts", kind, resume=not is_first), StopAfter(iterations))
-    parts = train(config(tmp_path / "parts", kind, resume=True), StopAfter())
+        train(config(tmp_path / "parts", behavior, resume=not is_first), StopAfter(iterations))
+    parts = train(config(tmp_path / "parts", behavior, resume=True), StopAfter())
     assert whole.end == parts.end == "max_steps"
     assert whole.policy.read_bytes() == parts.policy.read_bytes()
     ends = [checkpoints(tmp_path / name / "run" / "B", "B")[-1] for name in ("whole", "parts")]
@@ -107,6 +136,30 @@ def test_progress_counts_steps_and_episodes(tmp_path):
     assert watcher.shown[-1].left_s == 0.0
     assert watcher.shown[0].left_s > 0.0
     assert "RollerBall" in watcher.notes[0]
+
+
+def test_status_lists_the_checkpoints_that_are_there(tmp_path):
+    given = config(tmp_path, {**KINDS["ppo"], "checkpoint_interval": 1_000, "keep_checkpoints": 2})
+    train(given, StopAfter())
+    status = json.loads((tmp_path / "run" / "run_logs" / "training_status.json").read_text())
+    listed = [entry["file_path"] for entry in status["B"]["checkpoints"]]
+    assert listed == [str(path) for path in checkpoints(tmp_path / "run" / "B", "B")]
+    assert len(listed) == 2
+
+
+def test_a_lesson_that_asks_for_it_begins_with_new_episodes_and_no_memory(tmp_path):
+    criteria = {"behavior": "B", "measure": "progress", "threshold": 0.2, "require_reset": True}
+    lessons = [{"name": "a", "value": 1.0, "completion_criteria": criteria}, {"name": "b", "value": 2.0}]
+    given = config(tmp_path, "ppo with memory")
+    given = RunConfig.model_validate(
+        given.model_dump() | {"environment_parameters": {"reach_m": {"curriculum": lessons}}}
+    )
+    training = Training(given, StopAfter(1))
+    training.run()
+    state = training.learner.state()
+    assert not state["task"]["steps"].any()
+    assert not state["memory"].any()
+    assert not state["critic_memory"].any()
 
 
 def test_seed_is_chosen_and_kept_where_none_is_given(tmp_path):

@@ -1,9 +1,6 @@
 import pytest
 import torch
 
-from policies.experts.catalogue import build_expert
-from policies.experts.demonstration_file import Origin, write_demonstrations
-from policies.experts.recording import record_episodes
 from policies.learn.bc import Cloning
 from policies.learn.config.behavior import Behavior, BehavioralCloning, PpoHyperparameters
 from policies.learn.config.network import NetworkSettings
@@ -12,7 +9,7 @@ from policies.learn.demonstrations import DemonstrationError, load_demonstration
 from policies.learn.policy import Policy
 from policies.learn.ppo import Ppo
 from policies.learn.signals.build import build_signals
-from policies.tasks.catalogue import build_task, task_settings
+from policies.tasks.catalogue import build_task
 from policies.tasks.episode import Outcome
 
 ALL = {
@@ -21,15 +18,6 @@ ALL = {
     "curiosity": {"gamma": 0.95, "strength": 0.02},
     "rnd": {"gamma": 0.8, "strength": 0.01},
 }
-
-
-@pytest.fixture(scope="module")
-def demonstrations(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("roller_ball") / "expert"
-    task = build_task("RollerBall", 64)
-    episodes = record_episodes(task, build_expert("RollerBall"), 64, seed=1)
-    write_demonstrations(folder, Origin(task.layout, task_settings("RollerBall", {}), "scripted", 1), episodes)
-    return str(folder)
 
 
 def learner(demo_path, blocks, seed=1, env_count=16, *, has_cloning=False, **numbers):
