@@ -1,6 +1,7 @@
 """`honeyguide play`: a task seen while something drives it, in a window at its real pace or as an mp4.
 
-What drives is a trained policy, the task's scripted expert, or chance.
+What drives is a trained policy, the task's scripted expert, or chance. A task's bare name takes the policy that ships
+for it, and its expert where there is none or where settings were asked for that the policy was not made for.
 """
 
 from collections.abc import Callable
@@ -15,11 +16,13 @@ from numpy.typing import NDArray
 from common.clock import Pacer
 from mission.task_settings import task_of
 from mission.video import Mp4
-from mission.window import Request, Window
+from mission.window import Request, Window, WindowError
 from policies.experts.catalogue import build_expert
 from policies.experts.expert import Expert, RandomDriver
+from policies.pretrained.shelf import pretrained
 from policies.tasks.catalogue import CATALOGUE, build_task, settings_of
 from policies.tasks.episode import Outcome
+from policies.tasks.layout import LayoutError
 from policies.tasks.task import Scores, Task
 
 
@@ -31,13 +34,14 @@ class PlayError(ValueError):
 class PlayOptions:
     """What the command is given."""
 
-    what: str  # a task's name, or a policy's file
+    what: str  # a task's name, or a policy: a file, a run's folder, or the name of a run
     episodes: int
     envs: int
     seed: int
     env_args: tuple[str, ...] = ()
-    policy: Path | None = None
+    policy: str | None = None
     is_random: bool = False
+    is_expert: bool = False
     mp4: Path | None = None
 
 
@@ -45,43 +49,62 @@ def play_task(options: PlayOptions) -> str:
     """Shows episodes until enough have ended, and says how they did.
 
     Raises:
-        UnknownTask: no such task, file or setting.
+        UnknownTask: no such setting.
         NoExpert: no scripted expert for the task.
-        PlayError: the file is not a policy's.
+        PlayError: no such task or policy, or a file that is none.
         LayoutError: the policy was made for another task or preset.
         WindowError: no display.
         VideoError: the film cannot be written.
     """
-    task, driver = _cast(options)
+    task, driver, who = _cast(options)
     with ExitStack() as stack:
         if options.mp4 is not None:
             film = stack.enter_context(Mp4(options.mp4, task.decision_s))
-            return in_words(_shown(task, driver, options, _filming(film)))
-        window = stack.enter_context(Window(task.layout.task))
-        return in_words(_shown(task, driver, options, _showing(window, task.decision_s)))
+            return f"{who}: {in_words(_shown(task, driver, options, _filming(film)))}"
+        try:
+            window = stack.enter_context(Window(task.layout.task))
+        except WindowError as error:
+            raise WindowError(f"{error}; --mp4 FILE writes a film") from None
+        return f"{who}: {in_words(_shown(task, driver, options, _showing(window, task.decision_s)))}"
 
 
-def _cast(options: PlayOptions) -> tuple[Task, Expert]:
-    """The task and whoever drives it."""
+def _cast(options: PlayOptions) -> tuple[Task, Expert, str]:
+    """The task, whoever drives it, and what they are called."""
     is_task = options.what in CATALOGUE
-    policy_file = options.policy if is_task else Path(options.what)
-    if policy_file is None or (not is_task and not policy_file.exists()):
-        task, _ = task_of(options.what, options.env_args, options.envs)
-        return task, RandomDriver(options.seed) if options.is_random else build_expert(options.what)
+    if is_task and options.is_random:
+        return task_of(options.what, options.env_args, options.envs)[0], RandomDriver(options.seed), "chance"
+    if not is_task or options.policy is not None:
+        return _with_policy(options, options.policy or options.what)
+    has_preset = any(pair.startswith("preset=") for pair in options.env_args)  # it makes another task of it
+    shipped = None if options.is_expert or has_preset else pretrained(options.what)
+    if shipped is not None:
+        try:
+            return _with_policy(options, str(shipped))
+        except LayoutError:
+            pass  # other settings were asked for than the policy was made for: the expert knows them all
+    return task_of(options.what, options.env_args, options.envs)[0], build_expert(options.what), "expert"
+
+
+def _with_policy(options: PlayOptions, name: str) -> tuple[Task, Expert, str]:
+    """A trained policy, in its own task and settings where no others are asked for."""
     from policies.learn.checkpoint import CheckpointError
     from policies.learn.policy_driver import PolicyDriver
-    from policies.learn.policy_file import load_policy
+    from policies.learn.policy_file import find_policy, load_policy
 
+    is_task = options.what in CATALOGUE
     try:
-        policy, card = load_policy(policy_file)
+        path = find_policy(name)
+        policy, card = load_policy(path)
     except CheckpointError as error:
-        raise PlayError(str(error)) from None
-    name = options.what if is_task else card.task
-    task = build_task(
-        name, options.envs, settings_of(name, options.env_args, card.settings if name == card.task else {})
-    )
-    task.layout.require(policy.layout, str(policy_file))
-    return task, PolicyDriver(policy)
+        raise PlayError(str(error) if is_task else f"{error}; the tasks are {', '.join(CATALOGUE)}") from None
+    task_name = options.what if is_task else card.task
+    is_own = task_name == card.task
+    settings = settings_of(task_name, options.env_args, card.settings if is_own else {})
+    task = build_task(task_name, options.envs, settings)
+    task.layout.require(policy.layout, str(path))
+    if is_own:
+        task.set_numbers(card.samplers())
+    return task, PolicyDriver(policy), str(path)
 
 
 def _shown(task: Task, driver: Expert, options: PlayOptions, show: Callable[[NDArray[np.uint8]], bool]) -> Scores:

@@ -39,9 +39,10 @@ def demonstrate(
 
 
 def play(
-    task_or_policy: Annotated[str, typer.Argument(help="A task's name, or a policy's file.")],
-    policy: Annotated[Path | None, typer.Option(help="A policy's file, to play it in the named task.")] = None,
-    random: Annotated[bool, typer.Option("--random", help="Actions by chance instead of the expert's.")] = False,
+    task_or_policy: Annotated[str, typer.Argument(help="A task, or a policy: a file, a run's folder, or its name.")],
+    policy: Annotated[str | None, typer.Option(help="A policy, to play it in the named task.")] = None,
+    expert: Annotated[bool, typer.Option("--expert", help="The scripted expert, even if a policy ships.")] = False,
+    random: Annotated[bool, typer.Option("--random", help="Actions by chance.")] = False,
     mp4: Annotated[Path | None, typer.Option(help="Write a film instead of opening a window.")] = None,
     episodes: Annotated[int, typer.Option(min=1, max=100_000, help="End after this many.")] = 5,
     envs: Annotated[int, typer.Option(min=1, max=64, help="Environments side by side.")] = 1,
@@ -57,7 +58,7 @@ def play(
         from policies.tasks.catalogue import UnknownTask
         from policies.tasks.layout import LayoutError
 
-        options = PlayOptions(task_or_policy, episodes, envs, seed, tuple(env_args or ()), policy, random, mp4)
+        options = PlayOptions(task_or_policy, episodes, envs, seed, tuple(env_args or ()), policy, random, expert, mp4)
         try:
             typer.echo(play_task(options))
         except (UnknownTask, NoExpert, PlayError, LayoutError, WindowError, VideoError) as error:

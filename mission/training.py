@@ -24,6 +24,7 @@ from policies.learn.export import ExportError, export_policy
 from policies.learn.policy_file import find_policy, load_policy
 from policies.learn.run_folder import RunError, RunFolder
 from policies.learn.sac import SacError
+from policies.learn.task_check import check_against_task
 from policies.learn.trainer import Progress as TrainingProgress
 from policies.learn.trainer import Result, train
 from policies.tasks.catalogue import CATALOGUE, UnknownTask, settings_of
@@ -59,6 +60,7 @@ def train_run(request: TrainingRequest, console: Console) -> None:
     config = loaded.config
     for warning in (*loaded.warnings, *_without_effect(request.given, config)):
         _print(console, warning)
+    check_against_task(loaded)
     if config.checkpoint_settings.inference:
         _play(config, console)
         return
@@ -112,7 +114,14 @@ def evaluate_policy(
     settings = settings_of(task_name, pairs, {**own, "split": "test"})
     episodes, seed = episodes_and_seed
     evaluation = evaluate(
-        policy, task_name, settings, episodes=episodes, seed=seed, numbers=numbers, is_greedy=not is_drawn
+        policy,
+        task_name,
+        settings,
+        episodes=episodes,
+        seed=seed,
+        numbers=numbers,
+        is_greedy=not is_drawn,
+        place=str(path),
     )
     shown = ", ".join(f"{key}={value}" for key, value in settings.model_dump().items())
     _print(console, f"{path} on {task_name} ({shown}), seed {seed}")

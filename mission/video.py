@@ -1,5 +1,6 @@
 """Films: RGB pictures as an mp4 (H.264, yuv420p, what browsers play); PyAV is imported when one is begun."""
 
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -75,8 +76,15 @@ class Mp4:
             self._container.mux(self._stream.encode())
             self._container.close()
         except OSError as error:
+            self._remove()
             raise VideoError(f"{self._target}: cannot be written: {error.strerror}") from error
         part_path(self._target).replace(self._target)
+
+    def _remove(self) -> None:
+        """Leaves nothing of a film that did not become complete."""
+        with suppress(OSError):  # the disk is still full
+            self._container.close()
+        part_path(self._target).unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         return self
@@ -87,5 +95,4 @@ class Mp4:
         if kind is None:
             self.close()
         elif self._container is not None:
-            self._container.close()
-            part_path(self._target).unlink(missing_ok=True)
+            self._remove()

@@ -41,12 +41,12 @@ class Window:
         try:
             pygame.display.init()
         except pygame.error as error:
-            raise WindowError(f"there is no display to open a window on ({error}); --mp4 FILE writes a film") from None
+            raise WindowError(f"there is no display to open a window on ({error})") from None
         # SDL falls back to pictures that nobody sees, unless it was asked for them.
         driver = pygame.display.get_driver()
         if driver == "offscreen" and os.environ.get("SDL_VIDEODRIVER") != driver:
             pygame.display.quit()
-            raise WindowError("there is no display to open a window on; --mp4 FILE writes a film")
+            raise WindowError("there is no display to open a window on")
         self._controls = {
             key: control
             for control, keys in {

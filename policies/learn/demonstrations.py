@@ -47,6 +47,17 @@ def load_demonstrations(demo_path: str, layout: Layout) -> Transitions:
     return Transitions(*(torch.from_numpy(column) for column in columns))
 
 
+def check_demonstrations(demo_path: str, layout: Layout) -> None:
+    """Makes sure that there are demonstrations at a path, of this task and preset; episodes are not read.
+
+    Raises:
+        DemonstrationError: nothing there, or not readable.
+        LayoutError: recorded with another task or preset.
+    """
+    for folder in _data_folders(demo_path):
+        layout.require(_recorded_layout(folder), str(folder))
+
+
 def _data_folders(demo_path: str) -> list[Path]:
     """The folders with a metadata.json that a path means."""
     path = Path(demo_path)
@@ -66,21 +77,31 @@ def _data_folders(demo_path: str) -> list[Path]:
 _Episode = tuple[NDArray[Any], ...]
 
 
+def _recorded_layout(folder: Path) -> Layout:
+    """The layout that a dataset was recorded with."""
+    try:
+        record = json.loads((folder / _METADATA_FILE).read_text(encoding="utf-8")).get(LAYOUT_KEY)
+        recorded = Layout.from_record(json.loads(record)) if record else None
+    except (OSError, AttributeError, KeyError, ValueError, TypeError) as error:
+        raise DemonstrationError(
+            f"{folder}: not a readable Minari dataset: {_METADATA_FILE}: {_first_line(error)}"
+        ) from error
+    if recorded is None:
+        raise DemonstrationError(f"{folder}: was not recorded by honeyguide (no {LAYOUT_KEY} in {_METADATA_FILE})")
+    return recorded
+
+
 def _read_dataset(folder: Path, layout: Layout) -> list[_Episode]:
     """The episodes of one dataset as columns in the order of `Transitions`."""
     from minari.dataset.minari_storage import MinariStorage  # noqa: PLC0415  (only who has demonstrations pays for it)
 
+    layout.require(_recorded_layout(folder), str(folder))
     try:
-        record = MinariStorage.read_raw_metadata(folder).get(LAYOUT_KEY)
         storage = MinariStorage.read(folder)
         count = int(storage.total_episodes)
         episodes = list(storage.get_episodes(range(count))) if count else []  # an empty dataset has an empty file
-        recorded = Layout.from_record(json.loads(record)) if record else None
     except (OSError, KeyError, ValueError, TypeError, AssertionError) as error:
         raise DemonstrationError(f"{folder}: not a readable Minari dataset: {_first_line(error)}") from error
-    if recorded is None:
-        raise DemonstrationError(f"{folder}: was not recorded by honeyguide (no {LAYOUT_KEY} in {_METADATA_FILE})")
-    layout.require(recorded, str(folder))
     return [_columns(episode, layout, f"{folder}: episode {k}") for k, episode in enumerate(episodes)]
 
 

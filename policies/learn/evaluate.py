@@ -68,6 +68,7 @@ def evaluate(
     numbers: Mapping[str, Sampler] | None = None,
     is_greedy: bool = True,
     longest: int = LONGEST,
+    place: str = "policy",
 ) -> Evaluation:
     """Plays exactly so many episodes.
 
@@ -80,6 +81,7 @@ def evaluate(
         numbers: of the task, if they are not the settings' own.
         is_greedy: takes the most probable action; else it is drawn.
         longest: decisions after which an episode is cut and counts as a timeout.
+        place: what messages call the policy.
 
     Raises:
         LayoutError: the policy was made for another task, or for other settings of it.
@@ -87,7 +89,7 @@ def evaluate(
     """
     device = next(policy.parameters()).device
     task = build_task(name, min(episodes, ENVIRONMENTS), settings, str(device))
-    task.layout.require(policy.layout, "policy")
+    task.layout.require(policy.layout, place)
     task.set_numbers(numbers or {})
     task.reset(seed)
     generator = None if is_greedy else torch.Generator(device).manual_seed(seed)

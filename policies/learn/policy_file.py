@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from policies.learn.checkpoint import CheckpointError, load, save
 from policies.learn.config.network import NetworkSettings
 from policies.learn.policy import Policy
+from policies.pretrained.shelf import pretrained
 from policies.tasks.layout import Layout
 from policies.tasks.numbers import Sampler
 
@@ -85,7 +86,7 @@ def policy_of(record: Mapping[str, Any], place: str) -> Policy:
 
 
 def find_policy(name: str) -> Path:
-    """The policy that a user means: a file, a run's folder, or the name of a run in `results/`.
+    """The policy that a user means: a file, a run's folder, the name of a run in `results/`, or a task that ships one.
 
     Raises:
         CheckpointError: there is none.
@@ -98,6 +99,9 @@ def find_policy(name: str) -> Path:
             if len(found) == 1:
                 return found[0]
             raise CheckpointError(f"{folder}: {'several policies' if found else 'no policy'} in it; name a .pt file")
+    shipped = pretrained(name)
+    if shipped is not None:
+        return shipped
     raise CheckpointError(f"{name}: no such policy file, and no such run in results/")
 
 

@@ -76,7 +76,7 @@ class RunFolder:
         if not is_resumed:
             for file in self._files():
                 file.unlink(missing_ok=True)
-        write_whole(self.configuration, dump(config).encode())
+        write_whole(self.configuration, dump(_to_train_again(config)).encode())
 
     def write_status(self, status: dict[str, Any]) -> None:
         """Writes checkpoints, times and figures for people and scripts.
@@ -90,6 +90,12 @@ class RunFolder:
         yield from (self.policy, self.network, self.status)
         for pattern in (f"{self.behavior}-*.pt", f"{self.behavior}-*.onnx", "*.part", "events.out.tfevents.*"):
             yield from self.training.glob(pattern)
+
+
+def _to_train_again(config: RunConfig) -> RunConfig:
+    """Without what was said of this once only: who trains from the file anew neither resumes nor overwrites."""
+    once = dict.fromkeys(("resume", "load_model", "force"), False)
+    return config.model_copy(update={"checkpoint_settings": config.checkpoint_settings.model_copy(update=once)})
 
 
 def starting_point(config: RunConfig) -> Path | None:

@@ -1,10 +1,12 @@
 """The tasks by name: what `honeyguide train NAME` and `gymnasium.make("honeyguide/NAME-v0")` build."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from policies.tasks.parking.level1 import Parking1
 from policies.tasks.parking.level2 import Parking2
@@ -41,12 +43,24 @@ def task_settings(name: str, values: Mapping[str, Any]) -> TaskSettings:
     Raises:
         UnknownTask: no such task, no such setting, or a value it cannot have.
     """
+    kind = _entry(name).settings
     try:
-        return _entry(name).settings(**values)
+        return kind(**values)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise UnknownTask(f"{name}: {key}: {first['msg']}") from None
+        raise UnknownTask(f"{name}: {key}: {_sentence(first, kind)}") from None
+
+
+def _sentence(error: ErrorDetails, kind: type[TaskSettings]) -> str:
+    """What is wrong with one setting; an empty text, which stands for the preset's choice, is not offered."""
+    context = error.get("ctx", {})
+    if error["type"] == "extra_forbidden":
+        return f"no such setting; there are {', '.join(kind.model_fields)}"
+    if error["type"] == "literal_error":
+        expected = context["expected"].removeprefix("'', ").removeprefix("'' or ").replace("'", "")
+        return f"must be {expected}, not {error['input']}"
+    return str(context.get("error", error["msg"][0].lower() + error["msg"][1:]))
 
 
 def settings_of(name: str, pairs: Sequence[str], others: Mapping[str, Any] | None = None) -> TaskSettings:
@@ -72,6 +86,11 @@ def build_task(name: str, env_count: int, settings: TaskSettings | None = None, 
     """
     entry = _entry(name)
     return entry.build(settings or entry.settings(), env_count, device)
+
+
+def file_stem(name: str) -> str:
+    """What files about a task are called: `ReachTarget` is `reach-target`."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
 
 
 def _entry(name: str) -> Entry:

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -97,10 +97,11 @@ def with_command_line(loaded: Loaded, given: CommandLine) -> Loaded:
     Raises:
         ConfigError: a flag's value that its key cannot have.
     """
-    config, warnings = loaded.config, list(loaded.warnings)
+    config, warnings, options = loaded.config, list(loaded.warnings), dict(loaded.options)
     for entry in fields(given):
         value = getattr(given, entry.name)
         if value is not None and value is not False and entry.metadata["key"]:
+            options[entry.metadata["key"]] = _option(entry.name)
             config = _with(config, entry.metadata["key"], value, _option(entry.name))
     if given.cpu and given.torch_device is None:
         config = _with(config, "torch_settings.device", "cpu", "--cpu")
@@ -114,7 +115,7 @@ def with_command_line(loaded: Loaded, given: CommandLine) -> Loaded:
     if config.checkpoint_settings.resume and checkpoints.initialize_from is not None:
         warnings.append(f"--initialize-from: {checkpoints.initialize_from} is left alone, because the run is resumed")
         config = _with(config, "checkpoint_settings.initialize_from", None, "--initialize-from")
-    return Loaded(config, tuple(warnings))
+    return replace(loaded, config=config, warnings=tuple(warnings), options=options)
 
 
 def _with(config: RunConfig, path: str, value: Any, option: str) -> RunConfig:

@@ -4,7 +4,8 @@ In: a YAML file, the name of one of its behaviours, and the curriculum and sampl
 Out: the configuration, and one sentence for each thing in the file that is not what it seems to be.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,18 @@ class Loaded:
 
     config: RunConfig
     warnings: tuple[str, ...] = ()
+    root: Placed = field(default_factory=lambda: Placed(Place("")))
+    """The file in its new form: where its keys stand."""
+    options: Mapping[str, str] = field(default_factory=dict)
+    """Keys that a flag has set, and the flag."""
+
+    def error(self, loc: tuple[int | str, ...], sentence: str) -> ConfigError:
+        """What is wrong with the value of a key, with the flag, or the file and the line, that it comes from."""
+        option = self.options.get(".".join(map(str, loc)))
+        if option is not None:
+            return ConfigError(f"{option}: {sentence}")
+        place, path = place_at(self.root, loc)
+        return error_at(place, path, sentence)
 
 
 def load_config(
@@ -58,7 +71,7 @@ def load_config(
     _move_old_parameters(root, notes)
     name = next(iter(root["behaviors"]))
     put_right(root, name, notes, is_strict=is_strict)
-    return Loaded(_validated(root, name), tuple(notes))
+    return Loaded(_validated(root, name), tuple(notes), root)
 
 
 def _in_new_form(file: Placed, wanted: str | None, notes: list[str]) -> Placed:

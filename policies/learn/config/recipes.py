@@ -1,10 +1,10 @@
 """The recipes that ship with the project, by the name of their task or of their file."""
 
-import re
 from importlib.resources import files
 from pathlib import Path
 
 from policies.learn.config.places import ConfigError
+from policies.tasks.catalogue import file_stem
 
 
 def recipe_names() -> list[str]:
@@ -21,7 +21,7 @@ def recipe(name: str) -> Path:
     Raises:
         ConfigError: no such recipe.
     """
-    stem = name if name in recipe_names() else re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
+    stem = name if name in recipe_names() else file_stem(name)
     if stem not in recipe_names():
         raise ConfigError(f"{name}: there is no recipe of this name; there are {', '.join(recipe_names())}")
     return _folder() / f"{stem}.yaml"

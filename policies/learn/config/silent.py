@@ -19,6 +19,7 @@ from policies.learn.config.refusal import unknown_key
 from policies.learn.config.run import TorchSettings
 
 _ENCODED = ("gail", "curiosity", "rnd")
+_HOW_TO_ASK = ": a memory is asked for by memory: {sequence_length, memory_size}"
 
 
 def put_right(root: Placed, name: str, notes: list[str], *, is_strict: bool) -> None:
@@ -28,14 +29,15 @@ def put_right(root: Placed, name: str, notes: list[str], *, is_strict: bool) -> 
         root: a configuration in the new form whose `behaviors` has the one of that name.
         name: the behaviour.
         notes: warnings are appended.
-        is_strict: whether flat memory keys are dropped, as ML-Agents does; else they make the LSTM they ask for.
+        is_strict: whether flat memory keys are dropped, as ML-Agents does; else they make the LSTM they ask for. SAC
+            has none here, so that it drops them always.
     """
     behavior, path = root["behaviors"][name], f"behaviors.{name}"
     if "framework" in behavior:
         notes.append(note_at(behavior.places["framework"], f"{path}.framework", "deprecated, has no effect"))
         behavior.drop("framework")
     for network, where in _below(behavior, path, "network_settings"):
-        _put_memory_right(network, where, notes, is_strict=is_strict)
+        _put_memory_right(network, where, notes, is_strict=is_strict or behavior.get("trainer_type") == "sac")
         _drop_unknown(network, where, NetworkSettings, notes)
         for memory, memory_path in _below(network, where, "memory"):
             _drop_unknown(memory, memory_path, Memory, notes)
@@ -80,7 +82,7 @@ def _put_memory_right(network: Placed, path: str, notes: list[str], *, is_strict
         effect = "ML-Agents drops these keys in silence and builds no memory; here they make the LSTM that they ask for"
     else:
         effect = "dropped, as ML-Agents does in silence"
-        effect += ": a memory is asked for by memory: {sequence_length, memory_size}" if is_wanted else ""
+        effect += _HOW_TO_ASK if is_wanted and is_strict else ""
     notes.append(note_at(place, f"{path}.{', '.join(flat)}", effect))
     for key in flat:
         network.drop(key)

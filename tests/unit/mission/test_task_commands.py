@@ -1,7 +1,12 @@
 """`honeyguide demonstrate`, `play` and `drive`: what they leave behind, and what they refuse."""
 
+import os
 import re
 import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -83,6 +88,36 @@ def test_existing_dataset_is_left_alone(run, tmp_path):
     assert (tmp_path / "demo" / "main_data.hdf5").read_bytes() == before
 
 
+def in_process(*words):
+    """The command in a process of its own, whose files may have 2 kB."""
+    program = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048))\n"
+    program += "from mission.cli import main; main()"
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
+    line = [sys.executable, "-c", program, *words]
+    return subprocess.run(line, env=environment, text=True, capture_output=True, check=False)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("demonstrate", "RollerBall", "--episodes", "20", "--out", "new"),
+        ("play", "RollerBall", "--expert", "--mp4", "new"),
+    ],
+)
+def test_full_disk_leaves_nothing_half_written(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = in_process(*words)
+    assert result.returncode == 2, result.stderr
+    assert result.stderr == "honeyguide: new: cannot be written: File too large\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_drive_without_a_display_says_so(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "x11")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    assert_refused(run("drive", "RollerBall"), "no display to open a window on(?!.*mp4)", tmp_path)
+
+
 def test_play_without_a_display_points_to_the_film(run, tmp_path, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
@@ -123,9 +158,11 @@ def policy_file(folder):
 
 def test_policy_is_played_by_its_file_alone(run, tmp_path):
     policy_file(tmp_path)
-    for words in (["ball.pt"], ["RollerBall", "--policy", "ball.pt"]):
+    (tmp_path / "results" / "mine").mkdir(parents=True)
+    shutil.copy(tmp_path / "ball.pt", tmp_path / "results" / "mine")
+    for words in (["ball.pt"], ["RollerBall", "--policy", "ball.pt"], ["mine"]):
         result = run("play", *words, "--mp4", "a.mp4", "--episodes", 1)
-        assert "1 episodes: " in result.output
+        assert "ball.pt: 1 episodes: " in result.output
     assert len(pictures_of(tmp_path / "a.mp4")[1]) > 1
 
 

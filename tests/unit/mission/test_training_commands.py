@@ -3,7 +3,9 @@
 import json
 import os
 import random
+import re
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -343,8 +345,52 @@ def test_unknown_number_is_refused():
     write_config(parameters={"reech_m": 2.0})
     result = train()
     assert result.exit_code == 2
-    assert "environment_parameters: reech_m: this task has no such number" in result.stderr
+    assert "environment_parameters.reech_m: this task has no such number" in result.stderr
     assert not RUN.exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words", "sentence"),
+    [
+        ({"env": "Roller"}, (), r"config\.yaml:\d+: env_settings\.env_path: Roller: no such task; there are "),
+        ({}, ("--env", "Roller"), r"--env: Roller: no such task"),
+        ({}, ("--env-args", "colour=red"), r"--env-args: RollerBall: colour: no such setting; there are preset, split"),
+        ({}, ("--env-args", "preset=best"), r"preset: must be as-documented, as-coded or improved, not best"),
+        (
+            {"parameters": {"reach_m": {"curriculum": [
+                {"name": "near", "value": 3, "completion_criteria": {"behavior": "Ball", "threshold": 0.5}},
+                {"name": "far", "value": 1e-3},
+            ]}}},
+            (),
+            r"config\.yaml:\d+: environment_parameters\.reach_m\.curriculum\[1\]\.value: 0\.001 is not between",
+        ),
+        (
+            {"reward_signals": {"gail": {"demo_path": "demo"}}},
+            (),
+            r"config\.yaml:\d+: behaviors\.Ball\.reward_signals\.gail\.demo_path: demo: no such file",
+        ),
+        (
+            {"behavioral_cloning": {"demo_path": "demo"}},
+            (),
+            r"config\.yaml:\d+: behaviors\.Ball\.behavioral_cloning\.demo_path: demo: no such file",
+        ),
+    ],
+)  # fmt: skip
+def test_what_the_task_has_not_is_refused_with_its_place(change, words, sentence):
+    write_config(**change)
+    result = train(*words)
+    assert result.exit_code == 2
+    (line,) = result.stderr.strip().splitlines()
+    assert re.search(sentence, line), line
+    assert not RUN.exists()
+
+
+def test_overwriting_and_resuming_are_not_kept_in_the_configuration(finished):
+    shutil.copytree(finished, RUN)
+    write_config()
+    for flag in ("--resume", "--force"):
+        assert train(flag).exit_code == 0
+        assert honeyguide("train", RUN / "configuration.yaml").exit_code == 2  # there is a run of this name
 
 
 def test_configuration_without_a_task_asks_for_one():

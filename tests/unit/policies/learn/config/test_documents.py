@@ -150,7 +150,7 @@ def test_parking_sac():
     assert load_config(DATA / "parking_sac.yaml").config.behavior == Behavior(
         trainer_type="sac",
         hyperparameters=numbers,
-        network_settings=with_memory(PARKING_NETWORK),
+        network_settings=PARKING_NETWORK,  # as it was in ML-Agents: our SAC has no memory either
         reward_signals=RewardSignals(extrinsic=EXTRINSIC),
         max_steps=5_000_000,
         **PARKING,

@@ -1,0 +1,63 @@
+"""What only the task can say of a configuration: whether it has these settings and numbers, and can learn in this way.
+
+In: a configuration, and where its keys stand. Out: nothing, or one sentence with file, line and key, before a run
+begins; every lesson is looked at, so that none is refused hours later.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from policies.learn.config.environment import Curriculum, lessons_of
+from policies.learn.config.load import Loaded
+from policies.learn.config.signals import GailSettings
+from policies.learn.demonstrations import DemonstrationError, check_demonstrations
+from policies.tasks.catalogue import UnknownTask, build_task, settings_of, task_settings
+from policies.tasks.layout import LayoutError
+from policies.tasks.numbers import NumberError
+from policies.tasks.task import Task
+
+
+def check_against_task(loaded: Loaded) -> None:
+    """Refuses what the task that is named has not.
+
+    Raises:
+        ConfigError: `FILE:LINE: key: …`, or the flag.
+    """
+    name = loaded.config.env_settings.env_path or ""
+    with _refused_at(loaded, "env_settings", "env_path"):
+        task_settings(name, {})
+    with _refused_at(loaded, "env_settings", "env_args"):
+        task = build_task(name, 1, settings_of(name, loaded.config.env_settings.env_args))
+    _check_numbers(loaded, task)
+    _check_demonstrations(loaded, task)
+
+
+def _check_numbers(loaded: Loaded, task: Task) -> None:
+    for name, parameter in loaded.config.environment_parameters.items():
+        for k, lesson in enumerate(lessons_of(name, parameter)):
+            below = ("curriculum", k, "value") if isinstance(parameter, Curriculum) else ()
+            with _refused_at(loaded, "environment_parameters", name, *below):
+                task.set_numbers({name: lesson.sampler})
+
+
+def _check_demonstrations(loaded: Loaded, task: Task) -> None:
+    behavior = loaded.config.behavior
+    paths: dict[tuple[str, ...], str] = {
+        ("reward_signals", name): signal.demo_path
+        for name, signal in behavior.reward_signals.in_use.items()
+        if isinstance(signal, GailSettings)
+    }
+    if behavior.behavioral_cloning is not None:
+        paths["behavioral_cloning",] = behavior.behavioral_cloning.demo_path
+    for block, path in paths.items():
+        with _refused_at(loaded, "behaviors", loaded.config.behavior_name, *block, "demo_path"):
+            check_demonstrations(path, task.layout)
+
+
+@contextmanager
+def _refused_at(loaded: Loaded, *loc: int | str) -> Iterator[None]:
+    """What the task refuses, with the place of the key that asks for it."""
+    try:
+        yield
+    except (UnknownTask, NumberError, DemonstrationError, LayoutError) as error:
+        raise loaded.error(loc, str(error).removeprefix(f"{loc[1]}: ")) from None

@@ -1,0 +1,12 @@
+"""The trained policies that ship with the project, by the name of their task: files of this folder."""
+
+from importlib.resources import files
+from pathlib import Path
+
+from policies.tasks.catalogue import file_stem
+
+
+def pretrained(name: str) -> Path | None:
+    """The policy of a task (`ReachTarget`) or of that name (`reach-target`); None if none ships."""
+    path = Path(str(files("policies.pretrained"))) / f"{file_stem(name)}.pt"
+    return path if path.is_file() else None
