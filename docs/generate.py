@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mavlink_page import mavlink_text
+from tasks_page import tasks_text
 from training_page import training_text
 
 from autopilot.commander.params import COMMANDER_PARAMETERS
@@ -22,6 +23,7 @@ from mission.flight import Flight, FlightConfig
 
 PARAMETERS_PATH = Path(__file__).with_name("parameters.md")
 MAVLINK_PATH = Path(__file__).with_name("mavlink.md")
+TASKS_PATH = Path(__file__).with_name("tasks.md")
 TRAINING_PATH = Path(__file__).with_name("training-config.md")
 SECTIONS = {
     "Estimator": ESTIMATOR_PARAMETERS,
@@ -73,6 +75,7 @@ def generated_pages() -> dict[Path, str]:
         PARAMETERS_PATH: parameters_text(),
         MAVLINK_PATH: mavlink_text(Flight(FlightConfig()).server),
         TRAINING_PATH: training_text(),
+        TASKS_PATH: tasks_text(),
     }
 
 

@@ -29,7 +29,7 @@ Split = Literal["train", "test"]
 class TaskSettings(BaseModel):
     """What a user may choose of any task; each task adds its own."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
     preset: Preset = "as-coded"
     """`as-documented` (the text), `as-coded` (the published code) or `improved` (ours)."""

@@ -51,10 +51,12 @@ class ParkingSettings(TaskSettings):
     reward: RewardKind = ""
     """The documents' table (PPO column, PPO+GAIL column, or as the code applies it), or `progress`: ours."""
     starts: Places = ""
+    """The `published` pose, or `anywhere` free, with any yaw."""
     goals: Places = ""
     """`published` places, or `anywhere` free in the cells of the chosen split. Published places are training spots:
     where nothing is chosen here, `split=test` draws from the test cells."""
     obstacles: Places = ""
+    """Blocks and moving obstacles at their `published` places, or `anywhere`, others in each episode."""
     success: Success = ""
     """`touch`: any overlap with the pad; `pose`: at its centre, aligned with it, and slow."""
     actions: Actions = ""
