@@ -17,9 +17,9 @@ HEADER = """\
 
 Written by `docs/generate.py` from the code: do not edit.
 
-What each task shows, takes and can be set to, as a reference. Gymnasium knows them as `policies:honeyguide/NAME-v0`, with
-the settings as keyword arguments; `honeyguide` takes settings as `--env-args KEY=VALUE`, and training configurations set
-or randomise the numbers by name under `environment_parameters`.
+What each task shows, takes and can be set to, as a reference. Gymnasium knows them as `policies:honeyguide/NAME-v0`,
+with the settings as keyword arguments; `honeyguide` takes settings as `--env-args KEY=VALUE`, and training
+configurations set or randomise the numbers by name under `environment_parameters`.
 
 | task | what is to be done |
 |---|---|
@@ -27,11 +27,12 @@ or randomise the numbers by name under `environment_parameters`.
 | [ReachTarget](#reachtarget) | drive a car with four driven wheels to a target: [reach-target.md](reach-target.md) |
 | [Parking1](#parking1) | park a car between three blocks: [parking.md](parking.md) |
 | [Parking2](#parking2) | park a car on one of two storeys, past moving obstacles: [parking.md](parking.md) |
-| Hover | hold a drone at a point by body rates and thrust, on its estimate; in Gymnasium only (`policies/tasks/hover.py`) |
+| Hover | hold a drone at a point by body rates and thrust, on its estimate; in Gymnasium only |
 
 The linked pages say what the presets are made of, how rewards are paid, and which spots are held out for tests. Every
-reward is among the numbers. In the tables of observations `#` stands for a number, an element times its scale is the quantity
-in its unit, and elements of the goal are what hyper-networks and hindsight replay use. Coordinates are Unity's: x right, y up, z forward, yaw clockwise from +z seen from above.
+reward is among the numbers. In the tables of observations `#` stands for a number, an element times its scale is the
+quantity in its unit, and elements of the goal are what hyper-networks and hindsight replay use. Coordinates are
+Unity's: x right, y up, z forward, yaw clockwise from +z seen from above.
 
 | outcome | an episode that |
 |---|---|
