@@ -3,6 +3,9 @@
 In: a configuration and the task's environments. Out: a learner whose every random draw comes from the seed.
 """
 
+import math
+from collections.abc import Iterator
+
 import torch
 
 from policies.learn.bc import Cloning
@@ -38,6 +41,17 @@ def build_learner(config: RunConfig, task: Task, seed: int) -> Learner:
     cloning = _cloning(behavior, policy, seed, task.device)
     algorithm = Sac if is_sac else Ppo
     return algorithm(task, policy, behavior, signals, seed=seed, cloning=cloning)
+
+
+def remarks(behavior: Behavior, env_count: int) -> Iterator[str]:
+    """What the configuration does not say outright of so many environments, one line for the user each."""
+    memory, numbers = behavior.network_settings.memory, behavior.hyperparameters
+    steps = math.ceil(numbers.buffer_size / env_count)
+    if behavior.trainer_type == "ppo" and memory is not None and steps < memory.sequence_length:
+        yield (
+            f"network_settings.memory.sequence_length {memory.sequence_length}: is {steps} here, as buffer_size "
+            f"{numbers.buffer_size} is {steps} decisions of each of {env_count} environments"
+        )
 
 
 def _cloning(behavior: Behavior, policy: Policy, seed: int, device: str) -> Cloning | None:

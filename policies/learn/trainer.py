@@ -15,7 +15,7 @@ import torch
 
 from common.clock import wall_time_s
 from policies.learn import checkpoint
-from policies.learn.build import build_learner
+from policies.learn.build import build_learner, remarks
 from policies.learn.config.run import RunConfig
 from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation
@@ -151,6 +151,8 @@ class Training:
         """Iterates until the end."""
         self.folder.begin(self.config, is_resumed=self._is_resumed)
         self.watcher.note(f"training {self.folder.behavior} on {self.task_name}, seed {self.seed}: {self.folder.path}")
+        for line in remarks(self.behavior, self.task.env_count):
+            self.watcher.note(line)
         self._begin_s = wall_time_s()
         self._moments.append((self._begin_s, self.learner.steps))
         self._events = EventFile(self.folder.training, self._events_position)

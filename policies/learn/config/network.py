@@ -35,12 +35,12 @@ class NetworkSettings(Block):
     normalize: bool = False
     """Whether vector observations are normalised by their running mean and variance."""
     vis_encode_type: Encoder = "simple"
-    """Encoder of images."""
+    """Encoder of images; no effect yet: no task shows its policy any."""
     goal_conditioning_type: Literal["hyper", "none"] = "hyper"
     """Whether goal elements of the observation drive a hyper-network; no effect without a goal signal."""
     goal_signal: bool = own_key(False)
     """Whether the task's goal elements are a goal signal, which ML-Agents declares at the sensor."""
     deterministic: bool = False
-    """Whether actions are the most probable ones instead of draws."""
+    """Whether `--inference` takes the most probable actions instead of drawing them; training draws."""
     memory: Memory | None = None
     """LSTM; none: feed-forward."""

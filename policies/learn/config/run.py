@@ -32,7 +32,7 @@ class TorchSettings(Block):
     """Where networks are computed."""
 
     device: str | None = None
-    """`cpu`, `cuda`, `cuda:0`; none: as the trainer chooses."""
+    """`cpu`, `cuda`, `cuda:0`; none: `cpu`."""
 
 
 class RunConfig(Block):

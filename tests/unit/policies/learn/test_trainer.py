@@ -162,6 +162,13 @@ def test_a_lesson_that_asks_for_it_begins_with_new_episodes_and_no_memory(tmp_pa
     assert not state["critic_memory"].any()
 
 
+def test_sequences_that_the_buffer_is_too_short_for_are_told_of(tmp_path):
+    given = config(tmp_path, {**KINDS["ppo"], "network_settings": {"hidden_units": 16, "memory": {"memory_size": 8}}})
+    watcher = StopAfter(1)
+    train(given, watcher)
+    assert watcher.notes[1].startswith("network_settings.memory.sequence_length 64: is 16 here, as buffer_size 1024 is")
+
+
 def test_seed_is_chosen_and_kept_where_none_is_given(tmp_path):
     given = config(tmp_path)
     given = given.model_copy(update={"env_settings": given.env_settings.model_copy(update={"seed": -1})})
