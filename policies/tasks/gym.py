@@ -110,6 +110,7 @@ class _Views:
         border = task.border
         self._task = task
         self.is_begun = False
+        self._sizes = np.array(task.layout.branch_sizes)
         self.continuous: Array = border.continuous.numpy()
         self.branches: Array = border.branches.numpy()
         self.observations: Array = border.observations.numpy()
@@ -124,10 +125,19 @@ class _Views:
         self._task.reset(seed)
 
     def act(self, actions: Array) -> None:
-        """Writes the actions, one row per environment, and steps."""
+        """Writes the actions, one row per environment, and steps.
+
+        Raises:
+            ValueError: a choice that a branch has not, or a number that is none: the kernels trust what they are given.
+        """
         if self._task.layout.branches:
-            self.branches[:] = actions.reshape(self.branches.shape)
+            choices = np.asarray(actions).reshape(self.branches.shape)
+            if ((choices < 0) | (choices >= self._sizes)).any():
+                raise ValueError(f"action: choices must be at least 0 and below {self._sizes.tolist()}")
+            self.branches[:] = choices
         else:
+            if not np.isfinite(actions).all():
+                raise ValueError("action: must be finite")
             self.continuous[:] = np.clip(actions, -1.0, 1.0)
         self._task.step()
 

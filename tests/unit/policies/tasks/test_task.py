@@ -143,6 +143,18 @@ def test_a_single_environment_carries_over_what_the_task_does():
     assert env.reset()[0][[3, 5]].tolist() == [0.0, 0.0]  # given up: placed anew
 
 
+@pytest.mark.parametrize(
+    ("name", "action"),
+    [("Parking1", 3), ("Parking1", -1), ("Parking2", [0, 2]), ("RollerBall", [np.nan, 0.0])],
+)
+def test_actions_outside_their_space_are_refused(name, action):
+    env = gymnasium.make(f"policies:honeyguide/{name}-v0").unwrapped
+    observation, _ = env.reset(seed=1)
+    with pytest.raises(ValueError, match=r"^action: "):
+        env.step(action)
+    assert env.task.border.observations.numpy()[0].tolist() == observation.tolist()  # nothing has moved
+
+
 @pytest.mark.parametrize("name", ["RollerBall", "ReachTarget", "Parking1", "Parking2"])
 def test_presets_and_splits_that_do_not_exist_are_refused(name):
     with pytest.raises(UnknownTask, match="split: must be train or test"):
