@@ -21,9 +21,7 @@ class Experiment:
     recipe: str
     seeds: int = 5
     settings: dict[str, Any] = field(default_factory=dict)  # of the task, over those of the recipe
-    changes: dict[str, Any] = field(
-        default_factory=dict
-    )  # of the recipe: a dotted key of the run's configuration to its value
+    changes: dict[str, Any] = field(default_factory=dict)  # of the recipe: path with dots to value
     judged: tuple[Judged, ...] = (Judged("held out"),)
     document: str = "not reported"
     target: float | None = None  # success at least

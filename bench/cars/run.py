@@ -10,11 +10,13 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import torch
+from rich.console import Console
 
 from bench.cars.experiment import Experiment
 from bench.cars.experiments import EXPERIMENTS
 from bench.cars.result import Evaluated, Point, Result, write
 from bench.row import machine
+from mission.demonstrate import DemonstrateOptions, demonstrate_task
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
 from policies.learn.config.run import RunConfig
@@ -28,6 +30,7 @@ from policies.tasks.episode import Outcome
 EPISODES = 1000
 HELD_OUT_SEED = 1_000_003  # no training run is given it
 CURVE_POINTS = 300
+DEMONSTRATIONS = 400  # episodes
 _SUCCESS = Outcome.SUCCESS.name.lower()
 
 
@@ -95,6 +98,8 @@ def run(experiment: Experiment, seed: int, kept: Path | None) -> Result:
         config = configured(experiment, seed, folder)
         task = config.env_settings.env_path or ""
         _compile(task, config)
+        if config.behavior.reward_signals.gail is not None:
+            config = changed(config, {"behavior.reward_signals.gail.demo_path": str(_demonstrated(config, folder))})
         curve = Curve(config.behavior.max_steps)
         result = train(config, curve)
         policy, _ = load_policy(result.policy)
@@ -133,6 +138,17 @@ def run(experiment: Experiment, seed: int, kept: Path | None) -> Result:
         curve.points,
         evaluations,
     )
+
+
+def _demonstrated(config: RunConfig, folder: str) -> Path:
+    """Demonstrations of the task's expert on its training spots, not on the clock."""
+    path = Path(folder) / "demonstrations"
+    environment = config.env_settings
+    options = DemonstrateOptions(
+        environment.env_path or "", path, DEMONSTRATIONS, environment.seed, env_args=environment.env_args
+    )
+    demonstrate_task(options, Console())
+    return path
 
 
 def _compile(task: str, config: RunConfig) -> None:
