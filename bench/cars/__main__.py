@@ -16,11 +16,13 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bench.cars.experiment import Experiment
-from bench.cars.experiments import EXPERIMENTS
+from bench.cars.experiments import EXPERIMENTS, SECTIONS
 from bench.cars.page import write_page
 from bench.cars.result import Result, read
+from common.files import write_whole
 
 RESULTS = Path("results/cars")
+PRETRAINED = Path(__file__).parents[2] / "policies" / "pretrained"
 console = Console(highlight=False)
 
 
@@ -39,6 +41,7 @@ def main(
     failed = [] if page else _run([*_todo(chosen, seeds, again=again)], jobs)
     path = write_page(results())
     console.print(f"wrote {path}")
+    _publish()
     for name in failed:
         console.print(f"[red]failed[/red] {name}: see {RESULTS / name}.log")
     raise typer.Exit(1 if failed else 0)
@@ -51,6 +54,14 @@ def results() -> dict[str, list[Result]]:
         runs = [read(path) for path in RESULTS.glob(f"{experiment.name}-*.json") if _is_of(path, experiment.name)]
         found[experiment.name] = sorted(runs, key=lambda result: result.seed)
     return found
+
+
+def _publish() -> None:
+    """Puts the first seed's policies of the headline into policies/pretrained/."""
+    for experiment in SECTIONS[0].experiments:
+        trained = RESULTS / f"{experiment.name}-1.pt"
+        if trained.exists():
+            write_whole(PRETRAINED / f"{experiment.name}.pt", trained.read_bytes())
 
 
 def _is_of(path: Path, name: str) -> bool:
