@@ -28,6 +28,7 @@ from policies.learn.signals.signal import RewardSignal, Transitions
 from policies.learn.tensors import TaskTensors
 from policies.tasks.task import Task
 
+_CRITIC_SEED = 1_000_003  # apart from the policy's: their bodies are to begin with other weights
 _ROWS = 8192  # observations the critic values at once: what they pass through stays in the processor's cache
 
 
@@ -64,7 +65,7 @@ class Ppo:
         self.task = TaskTensors(task)
         device = self.task.device
         self.policy = policy.to(device)
-        self.critic = self._critic(torch.Generator().manual_seed(seed)).to(device)
+        self.critic = self._critic(torch.Generator().manual_seed(seed + _CRITIC_SEED)).to(device)
         parameters = dict.fromkeys([*self.policy.parameters(), *self.critic.parameters()])  # a shared body once
         self._parameters: list[nn.Parameter] = list(parameters)
         self.optimizer = torch.optim.Adam(self._parameters, lr=self.hyperparameters.learning_rate, fused=True)
