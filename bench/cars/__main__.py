@@ -1,7 +1,8 @@
 """`python -m bench.cars [NAME…]`: trains every row of docs/results/cars.md from scratch and writes the page.
 
-Runs that are done (results/cars/NAME-SEED.json) are kept; `--again` trains them anew, `--page` only writes the page.
-Two runs go side by side, each on a core of its own.
+Runs that are done (results/cars/NAME-SEED.json) are kept; `--again` trains them anew, `--page` only writes the page,
+`--shipped` takes the runs that the shipped page was made of (docs/results/cars.jsonl) as done. Two runs go side by
+side, each on a core of its own.
 """
 
 import os
@@ -17,11 +18,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from bench.cars.experiment import Experiment
 from bench.cars.experiments import EXPERIMENTS, SECTIONS
-from bench.cars.page import write_page
-from bench.cars.result import Result, read
+from bench.cars.page import DOCS, write_page
+from bench.cars.result import Result, read, read_all, write, write_all
 from common.files import write_whole
 
 RESULTS = Path("results/cars")
+RUNS = DOCS / "cars.jsonl"
 PRETRAINED = Path(__file__).parents[2] / "policies" / "pretrained"
 console = Console(highlight=False)
 
@@ -32,14 +34,22 @@ def main(
     jobs: Annotated[int, typer.Option(min=1, help="Runs side by side, one core each.")] = 2,
     again: Annotated[bool, typer.Option("--again", help="Train anew what is there.")] = False,
     page: Annotated[bool, typer.Option("--page", help="Train nothing, only write the page.")] = False,
+    shipped: Annotated[bool, typer.Option("--shipped", help="Take the shipped page's runs as done.")] = False,
 ) -> None:
     unknown = [name for name in names or () if name not in EXPERIMENTS]
     if unknown:
         console.print(f"cars: no experiment {unknown[0]}; there are {', '.join(EXPERIMENTS)}", markup=False)
         raise typer.Exit(2)
+    if shipped:
+        for result in read_all(RUNS):
+            path = RESULTS / f"{result.experiment}-{result.seed}.json"
+            if not path.exists():
+                write(path, result)
     chosen = [EXPERIMENTS[name] for name in names or EXPERIMENTS]
     failed = [] if page else _run([*_todo(chosen, seeds, again=again)], jobs)
-    path = write_page(results())
+    there = results()
+    path = write_page(there)
+    write_all(RUNS, [result for runs in there.values() for result in runs])
     console.print(f"wrote {path}")
     _publish()
     for name in failed:

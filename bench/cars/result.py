@@ -1,11 +1,14 @@
 """What one training run came to; kept as JSON, so that a stopped reproduction goes on where it was."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bench.cars.statistics import Interval, wilson
 from common.files import write_whole
+
+POINTS_KEPT = 80  # of a curve, beside the page
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +64,27 @@ def write(path: Path, result: Result) -> None:
 
 def read(path: Path) -> Result:
     """Reads what `write` wrote."""
-    raw = json.loads(path.read_text(encoding="utf-8"))
+    return _parsed(path.read_text(encoding="utf-8"))
+
+
+def write_all(path: Path, results: Iterable[Result]) -> None:
+    """Writes results as lines of one file, curves thinned: what a page was made of."""
+    lines = []
+    for result in results:
+        raw = asdict(result)
+        spacing = max(1, len(raw["curve"]) // POINTS_KEPT)
+        raw["curve"] = [{k: round(v, 4) for k, v in point.items()} for point in raw["curve"][::spacing]]
+        lines.append(json.dumps(raw, separators=(",", ":")) + "\n")
+    write_whole(path, "".join(lines).encode())
+
+
+def read_all(path: Path) -> list[Result]:
+    """Reads what `write_all` wrote."""
+    return [_parsed(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def _parsed(text: str) -> Result:
+    raw = json.loads(text)
     raw["curve"] = [Point(**point) for point in raw["curve"]]
     raw["evaluations"] = [Evaluated(**evaluated) for evaluated in raw["evaluations"]]
     return Result(**raw)
