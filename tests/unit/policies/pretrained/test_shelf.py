@@ -18,7 +18,8 @@ def test_shipped_policies_are_small_and_fit_their_task():
         build_task(card.task, 1, task_settings(card.task, card.settings)).layout.require(policy.layout, str(path))
 
 
-def test_policy_is_found_by_its_task_and_by_its_own_name():
+def test_policy_is_found_by_its_task_and_by_its_own_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # where no run of one's own has the name
     for path in SHIPPED:
         assert pretrained(path.stem) == find_policy(path.stem) == path
     for name in CATALOGUE:
