@@ -9,6 +9,7 @@
 `minari.MinariDataset(DIR)` reads it. Minari itself is imported when it is needed (extra `learn`).
 """
 
+import copy
 import json
 import os
 import shutil
@@ -104,7 +105,7 @@ def _write(folder: Path, origin: Origin, episodes: Sequence[Episode]) -> None:
 
     layout = origin.layout
     settings = origin.settings.model_dump(mode="json")
-    spec = gymnasium.spec(f"honeyguide/{layout.task}-v0")
+    spec = copy.deepcopy(gymnasium.spec(f"honeyguide/{layout.task}-v0"))  # the registry's own must stay as it is
     spec.kwargs = {**spec.kwargs, **settings}
     storage = MinariStorage.new(folder, observation_space(layout), action_space(layout), spec)
     storage.update_episodes(

@@ -18,6 +18,7 @@ HONEYGUIDE = ".venv/bin/honeyguide"
 NOT_RUN_HERE = {
     "make fly": "the commands with ARGS run it",
     "make test": "this is it",
+    "make reproduce-cars": "hours of training; docs/results/cars.md is what it writes",
     "make train-demo": "minutes of training; tests/unit/mission/test_training_commands.py runs its commands",
     'make tune ARGS="--airframe sim/bodies/airframes/f450.toml"': "tests/unit/autopilot/test_tuning.py",
     ".venv/bin/python -m autopilot.estimator.derive": "tests/unit/autopilot/estimator/test_derive.py",

@@ -102,6 +102,14 @@ def test_minari_reads_what_was_written(tmp_path):
     assert dataset.recover_environment().unwrapped.task.layout == task.layout
 
 
+def test_recording_changes_nothing_of_what_gymnasium_has_registered(tmp_path):
+    task, episodes = recorded()
+    write_demonstrations(
+        tmp_path / "demo", Origin(task.layout, task_settings("RollerBall", {}), "scripted", 5), episodes
+    )
+    assert gymnasium.spec("honeyguide/RollerBall-v0").kwargs == {"task": "RollerBall"}
+
+
 def test_demonstrations_are_read_as_they_were_written(tmp_path):
     from policies.learn.demonstrations import load_demonstrations
 
