@@ -8,8 +8,9 @@ from bench.cars import curves
 from bench.cars.experiment import Experiment
 from bench.cars.experiments import SECTIONS, Section
 from bench.cars.result import Result
-from bench.cars.statistics import over_seeds, wilson
+from bench.cars.statistics import over_seeds
 from common.files import write_whole
+from policies.learn.evaluate import wilson_interval
 
 DOCS = Path(__file__).parent.parent.parent / "docs" / "results"
 _COLUMNS = (
@@ -96,12 +97,15 @@ def _rows(experiment: Experiment, runs: Sequence[Result]) -> list[str]:
         evaluated = [result.evaluations[k] for result in runs]
         shares = [item.successes / item.episodes for item in evaluated]
         drawn = [item.drawn_successes / item.episodes for item in evaluated]
-        interval = over_seeds(shares) if len(runs) > 1 else wilson(evaluated[0].successes, evaluated[0].episodes)
+        interval = over_seeds(shares)
+        low, high = interval.low, interval.high
+        if len(runs) == 1:
+            low, high = wilson_interval(evaluated[0].successes, evaluated[0].episodes)
         first = k == 0
         lines.append(
             f"| {experiment.title if first else ''} | {judged.label} | {experiment.document if first else ''} "
             f"| {target if first else ''} | {100 * interval.value:.2f} % "
-            f"| {100 * max(0.0, interval.low):.2f} to {100 * min(1.0, interval.high):.2f} % "
+            f"| {100 * max(0.0, low):.2f} to {100 * min(1.0, high):.2f} % "
             f"| {100 * min(shares):.2f} % | {100 * over_seeds(drawn).value:.2f} % "
             f"| {len(runs)} | {steps / 1e6:.2f} M | {_duration(sum(wall) / len(wall))}{longest} | {rate:,.0f} |"
         )

@@ -5,7 +5,6 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from bench.cars.statistics import Interval, wilson
 from common.files import write_whole
 
 POINTS_KEPT = 80  # of a curve, beside the page
@@ -31,10 +30,6 @@ class Evaluated:
     drawn_successes: int  # of as many episodes with actions drawn, as ML-Agents' runtime draws them by default
     mean_return: float
     outcomes: dict[str, int]
-
-    @property
-    def success(self) -> Interval:
-        return wilson(self.successes, self.episodes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Intervals for success rates, of one run and over seeds."""
+"""Intervals of means over training seeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,6 @@ from math import sqrt
 
 import numpy as np
 
-Z_95 = 1.959964
 # Student's t, two-sided 95 %, by degrees of freedom (any statistics table).
 T_95 = {1: 12.706, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447, 7: 2.365, 8: 2.306, 9: 2.262}
 
@@ -18,17 +17,6 @@ class Interval:
     value: float
     low: float
     high: float
-
-
-def wilson(successes: int, trials: int) -> Interval:
-    """The share of successes with Wilson's score interval (Wilson 1927, eq. 13)."""
-    if trials == 0:
-        return Interval(0.0, 0.0, 1.0)
-    share = successes / trials
-    z2 = Z_95**2 / trials
-    middle = (share + z2 / 2) / (1 + z2)
-    half = Z_95 * sqrt(share * (1 - share) / trials + z2 / (4 * trials)) / (1 + z2)
-    return Interval(share, max(0.0, middle - half), min(1.0, middle + half))
 
 
 def over_seeds(values: Sequence[float]) -> Interval:
