@@ -19,7 +19,7 @@ NOT_RUN_HERE = {
     "make fly": "the commands with ARGS run it",
     "make test": "this is it",
     "make reproduce-cars": "hours of training; docs/results/cars.md is what it writes",
-    "make train-demo": "minutes of training; tests/unit/mission/test_training_commands.py runs its commands",
+    "make train-demo": "minutes of training; tests/unit/mission/training runs its commands",
     'make tune ARGS="--airframe sim/bodies/airframes/f450.toml"': "tests/unit/autopilot/test_tuning.py",
     ".venv/bin/python -m autopilot.estimator.derive": "tests/unit/autopilot/estimator/test_derive.py",
 }
@@ -27,7 +27,7 @@ NOT_RUN_HERE = {
 RUN_BY_OTHERS = (
     f"{HONEYGUIDE} picture ",  # tests/unit/mission/test_picture.py
     *(f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")),  # tests/unit/mission/test_task_commands.py
-    *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/test_training_commands.py
+    *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/training
 )
 
 

@@ -1,81 +1,22 @@
-"""`honeyguide train`, `eval` and `export`: runs that end, go on and are refused as the documentation says."""
+"""`honeyguide train`: runs that end, are killed, go on and are left alone as the documentation says."""
 
 import json
 import os
 import random
-import re
 import resource
-import shutil
 import signal
 import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
 
 import pytest
 import torch
-import yaml
-from typer.testing import CliRunner
 
-from mission.cli import app
 from policies.learn.checkpoint import checkpoints, load
 from policies.learn.config.load import load_config
 from policies.learn.policy_file import load_policy
-from policies.tasks.catalogue import build_task
-
-PROGRAM = [sys.executable, "-c", "from mission.cli import main; main()"]
-RUN = Path("results/run")
-
-
-def write_config(path="config.yaml", *, env="RollerBall", parameters=None, **behavior):
-    """A run of five iterations of 2,048 steps, with a checkpoint after each."""
-    block = {
-        "trainer_type": "ppo",
-        "hyperparameters": {"batch_size": 256, "buffer_size": 2048, "learning_rate": 1e-3},
-        "network_settings": {"hidden_units": 16, "num_layers": 1, "normalize": True},
-        "max_steps": 10_000,
-        "summary_freq": 2_000,
-        "checkpoint_interval": 2_000,
-        **behavior,
-    }
-    settings = {"num_areas": 128, "seed": 3} | ({"env_path": env} if env else {})
-    whole = {"behaviors": {"Ball": block}, "env_settings": settings, "environment_parameters": parameters or {}}
-    Path(path).write_text(yaml.safe_dump(whole), encoding="utf-8")
-
-
-def honeyguide(*words):
-    return CliRunner().invoke(app, [*map(str, words)])
-
-
-def train(*words):
-    return honeyguide("train", "config.yaml", "--run-id", "run", *words)
-
-
-def in_process(*words, **options):
-    """The command as a process of its own: it can be killed, and has its own limits."""
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
-    return subprocess.Popen([*PROGRAM, *words], env=environment, text=True, stderr=subprocess.PIPE, **options)
-
-
-@pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    """The folder of a run that was never interrupted."""
-    folder = tmp_path_factory.mktemp("finished")
-    before = Path.cwd()
-    os.chdir(folder)
-    try:
-        write_config()
-        result = train()
-        assert result.exit_code == 0, result.output
-    finally:
-        os.chdir(before)
-    return folder / RUN
+from tests.unit.mission.training.training_run import RUN, honeyguide, in_process, train, write_config
 
 
 def without_times(checkpoint):
@@ -339,149 +280,3 @@ def test_lessons_advance_and_are_shown():
     assert result.exit_code == 0, result.output
     assert "reach_m: lesson hard begins" in result.output
     assert [lesson for _, lesson in curve(RUN, "Environment/Lesson Number/reach_m")] == [0, 0, 1, 1, 1]
-
-
-def test_unknown_number_is_refused():
-    write_config(parameters={"reech_m": 2.0})
-    result = train()
-    assert result.exit_code == 2
-    assert "environment_parameters.reech_m: this task has no such number" in result.stderr
-    assert not RUN.exists()
-
-
-@pytest.mark.parametrize(
-    ("change", "words", "sentence"),
-    [
-        ({"env": "Roller"}, (), r"config\.yaml:\d+: env_settings\.env_path: Roller: no such task; there are "),
-        ({}, ("--env", "Roller"), r"--env: Roller: no such task"),
-        ({}, ("--env-args", "colour=red"), r"--env-args: RollerBall: colour: no such setting; there are preset, split"),
-        ({}, ("--env-args", "preset=best"), r"preset: must be as-documented, as-coded or improved, not best"),
-        (
-            {"parameters": {"reach_m": {"curriculum": [
-                {"name": "near", "value": 3, "completion_criteria": {"behavior": "Ball", "threshold": 0.5}},
-                {"name": "far", "value": 1e-3},
-            ]}}},
-            (),
-            r"config\.yaml:\d+: environment_parameters\.reach_m\.curriculum\[1\]\.value: 0\.001 is not between",
-        ),
-        (
-            {"reward_signals": {"gail": {"demo_path": "demo"}}},
-            (),
-            r"config\.yaml:\d+: behaviors\.Ball\.reward_signals\.gail\.demo_path: demo: no such file",
-        ),
-        (
-            {"behavioral_cloning": {"demo_path": "demo"}},
-            (),
-            r"config\.yaml:\d+: behaviors\.Ball\.behavioral_cloning\.demo_path: demo: no such file",
-        ),
-    ],
-)  # fmt: skip
-def test_what_the_task_has_not_is_refused_with_its_place(change, words, sentence):
-    write_config(**change)
-    result = train(*words)
-    assert result.exit_code == 2
-    (line,) = result.stderr.strip().splitlines()
-    assert re.search(sentence, line), line
-    assert not RUN.exists()
-
-
-def test_overwriting_and_resuming_are_not_kept_in_the_configuration(finished):
-    shutil.copytree(finished, RUN)
-    write_config()
-    for flag in ("--resume", "--force"):
-        assert train(flag).exit_code == 0
-        assert honeyguide("train", RUN / "configuration.yaml").exit_code == 2  # there is a run of this name
-
-
-def test_configuration_without_a_task_asks_for_one():
-    write_config(env=None, max_steps=2_000)
-    result = train()
-    assert result.exit_code == 2
-    assert "config.yaml: names no task in env_settings.env_path: give --env, one of RollerBall" in result.stderr
-    assert train("--env", "RollerBall").exit_code == 0
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (("train", "Nothing"), "Nothing: there is no recipe of this name"),
-        (("train", "none.yaml"), "none.yaml"),
-        (("train", "config.yaml", "--env", "Nothing"), "Nothing: no such task"),
-        (("train", "config.yaml", "--env-args", "preset"), "--env-args preset: must be KEY=VALUE"),
-        (("train", "config.yaml", "--env-args", "speed=3"), "RollerBall: speed"),
-        (("train", "config.yaml", "surplus"), "surplus: not expected"),
-        (("train", "config.yaml", "--num-areas", "0"), "--num-areas"),
-        (("train", "config.yaml", "--torch-device", "warp"), "torch_settings.device warp: torch finds no such device"),
-        (("train", "config.yaml", "--torch-device", "cuda:7"), "torch_settings.device cuda:7: torch finds no such"),
-        (("eval", "nothing"), "nothing: no such policy file, and no such run in results/"),
-        (("eval", "config.yaml"), "config.yaml: not a policy or checkpoint of honeyguide, or damaged"),
-        (("export", "nothing"), "nothing: no such policy file"),
-    ],
-)
-def test_wrong_words_get_one_sentence(words, sentence):
-    write_config()
-    result = honeyguide(*words)
-    assert result.exit_code == 2
-    assert sentence in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
-    assert not Path("results").exists()
-
-
-def test_flags_of_ml_agents_are_accepted_and_say_so():
-    write_config(max_steps=1)
-    result = train("--train", "--width", "84", "--base-port", "5005", "--no-graphics", "--time-scale", "20")
-    assert result.exit_code == 0
-    for option in ("--width", "--base-port", "--no-graphics", "--time-scale"):
-        assert f"{option}: accepted, has no effect here" in result.output
-    assert "--train" not in result.output
-
-
-def test_all_settings_after_env_args_belong_to_it():
-    write_config(max_steps=1)
-    assert train("--env-args", "preset=as-coded", "stack=2").exit_code == 0
-    assert load_policy(RUN / "Ball.pt")[1].settings["stack"] == 2
-
-
-def test_policy_is_judged_on_held_out_places(finished):
-    result = honeyguide("eval", finished, "--episodes", "50", "--seed", "4")
-    assert result.exit_code == 0, result.output
-    assert "split=test" in result.output
-    assert "seed 4" in result.output
-    assert "success rate" in result.output
-    result = honeyguide("eval", finished / "Ball/Ball-2048.pt", "--episodes", "10", "--env-args", "split=train")
-    assert "split=train" in result.output
-
-
-def test_policy_is_judged_with_the_numbers_it_was_trained_with():
-    for name, step_limit in (("short", 1.0), ("long", 50.0)):
-        write_config(max_steps=1, parameters={"step_limit": step_limit, "reach_m": 0.1})
-        assert honeyguide("train", "config.yaml", "--run-id", name).exit_code == 0
-    short, long = (honeyguide("eval", name, "--episodes", "20").output for name in ("short", "long"))
-    assert "1.0 decisions" in short
-    assert "1.0 decisions" not in long
-
-
-def test_policy_is_refused_for_another_task(finished):
-    result = honeyguide("eval", finished, "--task", "ReachTarget")
-    assert result.exit_code == 2
-    assert "made for another task or preset" in result.stderr
-
-
-def test_inference_plays_the_run(finished):
-    result = honeyguide(
-        *("train", finished / "configuration.yaml", "--run-id", "run", "--results-dir", finished.parent),
-        *("--inference", "--deterministic"),
-    )
-    assert result.exit_code == 0, result.output
-    assert "mean reward" in result.output
-
-
-def test_exported_network_is_written_where_asked(finished):
-    result = honeyguide("export", finished, "a.onnx")
-    assert result.exit_code == 0, result.output
-    assert Path("a.onnx").read_bytes() == (finished / "Ball.onnx").read_bytes()
-    assert honeyguide("export", finished, "no/folder/a.onnx").exit_code == 2
-
-
-def test_layout_of_the_policy_is_that_of_the_task(finished):
-    assert load_policy(finished / "Ball.pt")[0].layout == build_task("RollerBall", 1).layout
