@@ -1,0 +1,1 @@
+"""What tasks flown by the flight controller share."""

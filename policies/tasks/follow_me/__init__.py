@@ -1,0 +1,1 @@
+"""The drone that follows its owner."""
