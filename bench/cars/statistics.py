@@ -1,22 +1,14 @@
 """Intervals of means over training seeds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
 
+from policies.tasks.intervals import Interval
+
 # Student's t, two-sided 95 %, by degrees of freedom (any statistics table).
 T_95 = {1: 12.706, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447, 7: 2.365, 8: 2.306, 9: 2.262}
-
-
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """A figure and the bounds of its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
 
 
 def over_seeds(values: Sequence[float]) -> Interval:

@@ -4,7 +4,6 @@ In: a policy and a task. Out: how the episodes ended, with a confidence interval
 many episodes each environment plays is decided before the first one begins.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,12 +16,12 @@ from policies.learn.tensors import TaskTensors
 from policies.learn.threads import few_threads
 from policies.tasks.catalogue import build_task
 from policies.tasks.episode import Outcome
+from policies.tasks.intervals import wilson_interval
 from policies.tasks.numbers import Sampler
 from policies.tasks.task import Task, TaskSettings
 
 ENVIRONMENTS = 500  # at most, side by side
 LONGEST = 10_000  # decisions after which an episode counts as a timeout: some tasks have no limit of their own (guess)
-_Z95 = 1.959964  # two-sided 95 % of a normal distribution
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +44,6 @@ class Evaluation:
     def interval(self) -> tuple[float, float]:
         """Of the success rate, 95 %."""
         return wilson_interval(self.outcomes["success"], self.episodes)
-
-
-def wilson_interval(successes: int, count: int) -> tuple[float, float]:
-    """The 95 % confidence interval of a rate (Wilson 1927, eq. 1: it holds near 0 and 1 too)."""
-    if count == 0:
-        return 0.0, 1.0
-    rate = successes / count
-    shrink = 1.0 + _Z95**2 / count
-    middle = (rate + _Z95**2 / (2.0 * count)) / shrink
-    half = _Z95 / shrink * math.sqrt(rate * (1.0 - rate) / count + _Z95**2 / (4.0 * count**2))
-    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def evaluate(

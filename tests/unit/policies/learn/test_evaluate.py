@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 import torch
-from scipy.stats import binomtest
 
 from policies.learn.config.network import Memory, NetworkSettings
-from policies.learn.evaluate import _quota, _Tally, evaluate, wilson_interval
+from policies.learn.evaluate import _quota, _Tally, evaluate
 from policies.learn.policy import Policy
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
@@ -20,16 +19,6 @@ def make_policy(layout=None, **network):
     layout = layout or build_task("RollerBall", 1).layout
     settings = NetworkSettings(hidden_units=16, num_layers=1, **network)
     return Policy(layout, settings, torch.Generator().manual_seed(0))
-
-
-@pytest.mark.parametrize(("successes", "count"), [(0, 10), (10, 10), (997, 1000), (1, 3)])
-def test_interval_is_wilsons(successes, count):
-    expected = binomtest(successes, count).proportion_ci(method="wilson")
-    assert wilson_interval(successes, count) == pytest.approx((expected.low, expected.high), abs=1e-6)
-
-
-def test_interval_of_nothing_is_everything():
-    assert wilson_interval(0, 0) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("episodes", [1, 7, 500, 1003])
