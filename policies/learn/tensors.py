@@ -18,6 +18,10 @@ class TaskTensors:
         self.device = torch.device(task.device)
         self.observations: Tensor = wp.to_torch(border.observations)  # (envs, observation)
         self.final_observations: Tensor = wp.to_torch(border.final_observations)
+        self.images = _tensor(border.images)  # (envs, height, width, channels) uint8
+        self.final_images = _tensor(border.final_images)
+        self.privileged = _tensor(border.privileged)  # (envs, privileged elements)
+        self.final_privileged = _tensor(border.final_privileged)
         self.rewards: Tensor = wp.to_torch(border.rewards)  # (envs,)
         self.outcomes: Tensor = wp.to_torch(border.outcomes)
         self.is_terminated: Tensor = wp.to_torch(border.is_terminated)
@@ -41,6 +45,12 @@ class TaskTensors:
                 self.task.step()
         else:
             self.task.step()
+
+
+def _tensor(array: Any) -> Tensor:
+    """A view of an array, which may be one of no elements."""
+    tensor: Tensor = wp.to_torch(array) if array.size else torch.from_numpy(array.numpy()).to(str(array.device))
+    return tensor
 
 
 def _actions(array: Any) -> Tensor | None:

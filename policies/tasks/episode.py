@@ -8,7 +8,9 @@ A task's step kernel, one thread per environment, reads its action from the bord
         begin_episode(border, i)                     # draws the numbers of the new episode
         ... place the vehicle, write the first frame
 
-so that one launch is one decision of all environments, resets included (Gymnasium's same-step auto-reset).
+so that one launch is one decision of all environments, resets included (Gymnasium's same-step auto-reset). A task that
+shows images has launches of its own: it moves and draws what came of it, judges (`close_step`), calls
+`Task.keep_last_images`, begins the episodes that follow, and draws those.
 """
 
 from enum import IntEnum
@@ -54,6 +56,10 @@ class Border:
     branches: wp.array2d(dtype=int)  # in: the choice of each branch, (envs, branches)
     observations: wp.array2d(dtype=float)  # out: what the next decision sees, (envs, frames x elements)
     final_observations: wp.array2d(dtype=float)  # out: what the last ended episode saw last
+    images: wp.array4d(dtype=wp.uint8)  # out: the image of the next decision, (envs, height, width, channels)
+    final_images: wp.array4d(dtype=wp.uint8)  # out: what the last ended episode saw last
+    privileged: wp.array2d(dtype=float)  # out: for critics only, (envs, elements)
+    final_privileged: wp.array2d(dtype=float)  # out: of the last ended episode's end
     rewards: wp.array(dtype=float)  # out: since the last decision
     outcomes: wp.array(dtype=int)  # out: of this step's end, or RUNNING
     is_terminated: wp.array(dtype=wp.bool)  # out: ended by what happened
@@ -80,7 +86,7 @@ def open_frame(border: Border, i: int) -> int:
 
 @wp.func
 def close_step(border: Border, i: int, reward: float, outcome: int) -> bool:
-    """Books one decision; true if the episode ended with it. Its last observation must have been written before."""
+    """Books one decision; true if the episode ended with it. What it saw last must have been written before."""
     border.rewards[i] = reward
     border.outcomes[i] = outcome
     border.returns[i] += reward
@@ -91,6 +97,8 @@ def close_step(border: Border, i: int, reward: float, outcome: int) -> bool:
     if is_over:
         for k in range(border.observations.shape[1]):
             border.final_observations[i, k] = border.observations[i, k]
+        for k in range(border.privileged.shape[1]):
+            border.final_privileged[i, k] = border.privileged[i, k]
         border.scores[i, outcome] += 1.0
         border.scores[i, _RETURN_SCORE] += border.returns[i]
         border.scores[i, _LENGTH_SCORE] += float(border.steps[i])
@@ -108,3 +116,13 @@ def begin_episode(border: Border, i: int) -> int:
         border.observations[i, k] = 0.0
     draw_numbers(border.samplers, border.numbers, border.seed[0], i, episode)
     return episode
+
+
+@wp.kernel(enable_backward=False)
+def keep_last_image_rows(border: Border) -> None:
+    """Copies one row of pixels of each image whose episode ended with this decision; one thread each."""
+    i, y = wp.tid()
+    if border.outcomes[i] != RUNNING:
+        for x in range(border.images.shape[2]):
+            for c in range(border.images.shape[3]):
+                border.final_images[i, y, x, c] = border.images[i, y, x, c]

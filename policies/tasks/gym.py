@@ -3,15 +3,16 @@
     env = gymnasium.make("policies:honeyguide/RollerBall-v0", preset="as-coded", render_mode="rgb_array")
     envs = gymnasium.make_vec("policies:honeyguide/RollerBall-v0", num_envs=1024)
 
-Keyword arguments are the task's settings. `info["outcome"]` names how an episode ended. Arrays that are returned are
-copies; whoever wants none takes a `Task` and its border.
+Keyword arguments are the task's settings. Of a task that shows images an observation is a dict of `image` and `vector`.
+`info["outcome"]` names how an episode ended. Arrays that are returned are copies; whoever wants none takes a `Task` and
+its border.
 """
 
 from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from gymnasium.spaces import Box, Dict, Discrete, MultiDiscrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -22,9 +23,10 @@ from policies.tasks.layout import Layout
 from policies.tasks.task import Task
 
 Array = NDArray[Any]
+Observation = Array | dict[str, Array]
 
 
-class TaskEnv(gymnasium.Env[Array, Any]):
+class TaskEnv(gymnasium.Env[Observation, Any]):
     """One environment of a task."""
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012  (as Gymnasium declares it)
@@ -38,7 +40,9 @@ class TaskEnv(gymnasium.Env[Array, Any]):
         self._views = _Views(self.task)
         self._is_next_begun = False
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
         """Starts an episode, after an end the one that the task has begun by itself; `options` are not used."""
         super().reset(seed=seed, options=options)
         if seed is not None or not self._views.is_begun:
@@ -46,23 +50,28 @@ class TaskEnv(gymnasium.Env[Array, Any]):
         elif not self._is_next_begun:  # to begin it again would lose what a task carries over from the last episode
             self.task.begin(np.ones(1, dtype=np.bool_))
         self._is_next_begun = False
-        return self._views.observations[0].copy(), {}
+        return self._views.seen(0), {}
 
-    def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One decision. What ends an episode begins the next; `reset` shows it."""
         views = self._views
         views.act(np.asarray(action)[None])
         is_over = self._is_next_begun = bool(views.is_terminated[0] or views.is_truncated[0])
-        observation = (views.final_observations if is_over else views.observations)[0].copy()
         info = {"outcome": Outcome(int(views.outcomes[0])).name.lower()} if is_over else {}
-        return observation, float(views.rewards[0]), bool(views.is_terminated[0]), bool(views.is_truncated[0]), info
+        return (
+            views.seen(0, is_final=is_over),
+            float(views.rewards[0]),
+            bool(views.is_terminated[0]),
+            bool(views.is_truncated[0]),
+            info,
+        )
 
     def render(self) -> Any:
         """What is seen from above, RGB."""
         return self.task.picture(0) if self.render_mode == "rgb_array" else None
 
 
-class TaskVectorEnv(VectorEnv[Array, Array, Array]):
+class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
     """Many environments in one launch. An episode that ends is followed by the next in the same step."""
 
     metadata: dict[str, Any] = {  # noqa: RUF012  (as Gymnasium declares it)
@@ -80,23 +89,25 @@ class TaskVectorEnv(VectorEnv[Array, Array, Array]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._views = _Views(self.task)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
         """Starts an episode of every environment; `options` are not used."""
         super().reset(seed=seed, options=options)
         self._views.reset(int(self.np_random.integers(2**31)))
-        return self._views.observations.copy(), {}
+        return self._views.seen(), {}
 
-    def step(self, actions: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
+    def step(self, actions: Array) -> tuple[Observation, Array, Array, Array, dict[str, Any]]:
         """One decision each; `final_obs` of the info holds what the ended episodes saw last."""
         views = self._views
         views.act(actions)
         is_over = views.is_terminated | views.is_truncated
         info: dict[str, Any] = {}
         if is_over.any():
-            info = {"final_obs": views.final_observations.copy(), "_final_obs": is_over}
+            info = {"final_obs": views.seen(is_final=True), "_final_obs": is_over}
             info |= {"outcome": views.outcomes.copy(), "_outcome": is_over}
         rewards = views.rewards.astype(np.float64)
-        return views.observations.copy(), rewards, views.is_terminated.copy(), views.is_truncated.copy(), info
+        return views.seen(), rewards, views.is_terminated.copy(), views.is_truncated.copy(), info
 
     def render(self) -> Any:
         """A tuple of pictures, RGB."""
@@ -115,6 +126,8 @@ class _Views:
         self.branches: Array = border.branches.numpy()
         self.observations: Array = border.observations.numpy()
         self.final_observations: Array = border.final_observations.numpy()
+        self.images: Array = border.images.numpy()
+        self.final_images: Array = border.final_images.numpy()
         self.rewards: Array = border.rewards.numpy()
         self.outcomes: Array = border.outcomes.numpy()
         self.is_terminated: Array = border.is_terminated.numpy()
@@ -123,6 +136,13 @@ class _Views:
     def reset(self, seed: int) -> None:
         self.is_begun = True
         self._task.reset(seed)
+
+    def seen(self, rows: Any = slice(None), *, is_final: bool = False) -> Observation:
+        """A copy of the observations of rows, or of what their last ended episodes saw last."""
+        vector = (self.final_observations if is_final else self.observations)[rows].copy()
+        if self._task.layout.image is None:
+            return vector
+        return {"image": (self.final_images if is_final else self.images)[rows].copy(), "vector": vector}
 
     def act(self, actions: Array) -> None:
         """Writes the actions, one row per environment, and steps.
@@ -144,7 +164,10 @@ class _Views:
 
 def observation_space(layout: Layout) -> Any:
     """Of one environment."""
-    return Box(-np.inf, np.inf, shape=(layout.observation_size,), dtype=np.float32)
+    vector = Box(-np.inf, np.inf, shape=(layout.observation_size,), dtype=np.float32)
+    if layout.image is None:
+        return vector
+    return Dict({"image": Box(0, 255, shape=layout.image.shape, dtype=np.uint8), "vector": vector})
 
 
 def action_space(layout: Layout) -> Any:

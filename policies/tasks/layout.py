@@ -30,6 +30,20 @@ class Branch:
 
 
 @dataclass(frozen=True, slots=True)
+class ImageElement:
+    """The image of an observation, bytes of 0 to 255, beside its floats; it is never stacked."""
+
+    height: int
+    width: int
+    channels: tuple[str, ...]  # "red", "green", "blue", "nearness"
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Height, width, channels."""
+        return self.height, self.width, len(self.channels)
+
+
+@dataclass(frozen=True, slots=True)
 class Layout:
     """Observation and action of a task in one preset. A change of meaning raises `version`."""
 
@@ -39,6 +53,8 @@ class Layout:
     continuous: tuple[Element, ...] = ()
     branches: tuple[Branch, ...] = ()
     stack: int = 1  # the last frames, oldest first, zeros before an episode's start
+    image: ImageElement | None = None  # the newest one
+    privileged: tuple[Element, ...] = ()  # what critics may see in training, and no policy
 
     @property
     def frame_size(self) -> int:
@@ -47,6 +63,11 @@ class Layout:
     @property
     def observation_size(self) -> int:
         return len(self.frame) * self.stack
+
+    @property
+    def image_shape(self) -> tuple[int, int, int]:
+        """Height, width, channels; zeros without an image."""
+        return self.image.shape if self.image is not None else (0, 0, 0)
 
     @property
     def branch_sizes(self) -> tuple[int, ...]:
@@ -72,10 +93,12 @@ class Layout:
             continuous=tuple(Element(**element) for element in record["continuous"]),
             branches=tuple(Branch(branch["name"], tuple(branch["choices"])) for branch in record["branches"]),
             stack=record["stack"],
+            image=_image(record.get("image")),  # of older files: none
+            privileged=tuple(Element(**element) for element in record.get("privileged", ())),
         )
 
     def require(self, other: "Layout", place: str) -> None:
-        """Refuses what was made for another layout.
+        """Refuses what was made for another layout; what only critics see may differ.
 
         Args:
             other: the layout that came with the policy, checkpoint or recording.
@@ -87,6 +110,10 @@ class Layout:
         difference = _first_difference(self, other)
         if difference:
             raise LayoutError(f"{place}: made for another task or preset: {difference}")
+
+
+def _image(record: dict[str, Any] | None) -> ImageElement | None:
+    return ImageElement(record["height"], record["width"], tuple(record["channels"])) if record else None
 
 
 @dataclass(slots=True)
@@ -111,7 +138,12 @@ def _first_difference(here: Layout, there: Layout) -> str:
             for k, (a, b) in enumerate(zip(here.frame, there.frame, strict=False))
         ),
         *(_Pair(f"scale of {a.name}", a.scale, b.scale) for a, b in zip(here.frame, there.frame, strict=False)),
+        _Pair("image", _words(here.image), _words(there.image)),
         _Pair("continuous actions", [a.name for a in here.continuous], [a.name for a in there.continuous]),
         _Pair("discrete actions", [a.choices for a in here.branches], [a.choices for a in there.branches]),
     ]
     return next((f"{pair.what} is {pair.there} there and {pair.here} here" for pair in pairs if pair.differs), "")
+
+
+def _words(image: ImageElement | None) -> str:
+    return f"{image.height} x {image.width} of {', '.join(image.channels)}" if image is not None else "none"

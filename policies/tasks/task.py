@@ -17,7 +17,7 @@ import warp as wp
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Border, Outcome
+from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Border, Outcome, keep_last_image_rows
 from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Layout
 from policies.tasks.numbers import Number, NumberTable, Sampler
@@ -87,6 +87,10 @@ class Task:
         border.branches = self._zeros("branches", (env_count, len(layout.branches)), int)
         border.observations = self._zeros("observations", (env_count, size), float)
         border.final_observations = self._zeros("final_observations", (env_count, size), float)
+        border.images = self._zeros("images", (env_count, *layout.image_shape), wp.uint8)
+        border.final_images = self._zeros("final_images", (env_count, *layout.image_shape), wp.uint8)
+        border.privileged = self._zeros("privileged", (env_count, len(layout.privileged)), float)
+        border.final_privileged = self._zeros("final_privileged", (env_count, len(layout.privileged)), float)
         border.rewards = self._zeros("rewards", env_count, float)
         border.outcomes = self._zeros("outcomes", env_count, int)
         border.is_terminated = self._zeros("is_terminated", env_count, wp.bool)
@@ -132,6 +136,11 @@ class Task:
         """One decision of all environments, with the actions that lie in the border."""
         self._step.launch()
 
+    def keep_last_images(self) -> None:
+        """Keeps the images of the episodes that just ended; to be called before those of the next ones are drawn."""
+        image_rows = (self.env_count, self.layout.image_shape[0])
+        wp.launch(keep_last_image_rows, image_rows, [self.border], device=self.device)
+
     def set_numbers(self, values: Mapping[str, float | Sampler]) -> None:
         """Sets or randomises numbers from the next episodes on (domain randomisation, curricula).
 
@@ -149,14 +158,15 @@ class Task:
 
     def state(self) -> dict[str, NDArray[Any]]:
         """A copy of everything that changes: restoring it continues bit for bit."""
-        state = {name: array.numpy().copy() for name, array in self._arrays.items()}
+        state = {name: array.numpy().copy() for name, array in self._arrays.items() if array.size}
         state["samplers"] = self.number_table.rows.copy()
         return state
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Restores what `state` returned, of a task with the same settings and size."""
         for name, array in self._arrays.items():
-            array.assign(state[name])
+            if array.size:
+                array.assign(state[name])
         self.number_table.rows[:] = state["samplers"]
         self.number_table.array.assign(self.number_table.rows)
 
