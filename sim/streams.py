@@ -1,6 +1,7 @@
 """Names of the random streams of the simulator: one number per use, never one for two uses.
 
-A stream is the last counter of a draw (see `common/rng.py`). 1 to 9 belong to the wind, 10 to 49 to the sensors.
+A stream is the last counter of a draw (see `common/rng.py`). 1 to 9 belong to the wind, 10 to 49 to the sensors,
+50 to 59 to the owner and their phone.
 """
 
 import warp as wp
@@ -32,3 +33,12 @@ RANGE_WHITE = wp.constant(42)
 
 BATTERY_VOLTAGE = wp.constant(45)
 BATTERY_CURRENT = wp.constant(46)
+
+OWNER_BODY = wp.constant(50)
+OWNER_PLAN = wp.constant(51)
+
+PHONE_POSITION = wp.constant(55)
+PHONE_VELOCITY = wp.constant(56)
+PHONE_CORRELATED = wp.constant(57)
+PHONE_CORRELATED_START = wp.constant(58)
+PHONE_DROPOUT = wp.constant(59)
