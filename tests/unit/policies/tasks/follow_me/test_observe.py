@@ -9,15 +9,13 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.attitude import rotated
+from policies.tasks.flight.own import Command, OwnState, command_rows
 from policies.tasks.follow_me.observe import (
     DOCUMENT,
     EGO,
     EGO_BLIND,
-    Command,
     OwnerReport,
-    OwnState,
     camera_mount,
-    command_rows,
     observe_rows,
     pack_images,
     vector_elements,

@@ -1,0 +1,63 @@
+"""The hovers that episodes start from: flown once per process, from power-on, by the flight controller itself.
+
+Every estimator has converged then and every integrator has settled. A row that starts an episode takes one of them
+over, and flies on in a world, with a wind and with noise of its own.
+"""
+
+from functools import cache
+
+import numpy as np
+
+from autopilot.navigator.setpoint import SetpointPort
+from autopilot.params import parameter_table
+from common.airframe import load_airframe
+from common.geodesy import DEFAULT_HOME
+from sim.rig import Rig
+from sim.sensors.sensors import sensor_model
+from sim.wind import wind_model
+from sim.world.world import WorldConfig, WorldMap, build_world
+
+AIRFRAME = "x500"
+HOVER_COUNT = 64
+HOVER_HEIGHT_M = 2.0
+_SPREAD_M = 0.5  # of the places they hover at, per axis
+_ALIGN_TICKS = 2000  # 8 s: power-on until the estimator is aligned and has used GNSS
+_CLIMB_TICKS = 2000  # 8 s: up, and settled
+
+
+def build_rig(world: WorldMap, count: int, *, has_estimator: bool, threads: int, device: str) -> Rig:
+    """Vehicles with the default flight controller, powered on at home."""
+    rig = Rig(
+        load_airframe(AIRFRAME),
+        world,
+        sensor_model(home=DEFAULT_HOME),
+        wind_model(0.0),
+        home=DEFAULT_HOME,
+        vehicle_count=count,
+        has_estimator=has_estimator,
+        threads=threads,
+        device=device,
+    )
+    rig.load_parameters(parameter_table())
+    return rig
+
+
+@cache
+def hover_bank(has_estimator: bool, device: str) -> Rig:
+    """Vehicles that hover about `HOVER_HEIGHT_M` above home, each with a heading of its own."""
+    plain = WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0)
+    rig = build_rig(build_world(plain, device), HOVER_COUNT, has_estimator=has_estimator, threads=1, device=device)
+    rig.advance(_ALIGN_TICKS)
+    rng = np.random.default_rng(0)
+    setpoints = rig.arrays.autopilot.setpoint
+    rows = setpoints.numpy()
+    for i in range(HOVER_COUNT):
+        north, east, down = np.array([0.0, 0.0, -HOVER_HEIGHT_M]) + rng.uniform(-_SPREAD_M, _SPREAD_M, 3)
+        port = SetpointPort(rows[i : i + 1])
+        port.set_flags(is_armed=True, is_landed=False)
+        port.fly_to((north, east, down), rng.uniform(-np.pi, np.pi))
+        port.write()
+    if setpoints.device.is_cuda:
+        setpoints.assign(rows)
+    rig.advance(_CLIMB_TICKS)
+    return rig

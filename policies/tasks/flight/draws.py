@@ -1,0 +1,36 @@
+"""Draws at an episode's start that are not numbers: keyed by seed, environment and episode, like those.
+
+Training and test episodes draw their seeds of worlds, paths and noise from two disjoint sets: even and odd numbers.
+"""
+
+import warp as wp
+
+from common.rng import draw_key
+
+wp.set_module_options({"enable_backward": False})
+
+WORLD_STREAM = wp.constant(1)
+NOISE_STREAM = wp.constant(2)
+HOVER_STREAM = wp.constant(3)
+WIND_STREAM = wp.constant(4)
+PATH_STREAM = wp.constant(5)
+_SEED_BITS = wp.constant(wp.uint32(0x3FFFFFFF))
+
+
+@wp.func
+def draw_seed(seed: int, i_env: int, episode: int, stream: int, is_test: int) -> int:
+    """A seed below 2**31: even in training, odd in tests."""
+    return 2 * int(draw_key(seed, i_env, episode, stream) & _SEED_BITS) + is_test
+
+
+@wp.func
+def draw_index(seed: int, i_env: int, episode: int, stream: int, count: int) -> int:
+    """One of 0 to count - 1."""
+    share = wp.randf(draw_key(seed, i_env, episode, stream))
+    return wp.min(int(share * float(count)), count - 1)
+
+
+@wp.func
+def draw_angle(seed: int, i_env: int, episode: int, stream: int) -> float:
+    """An angle in [-pi, pi) [rad]."""
+    return 2.0 * wp.pi * (wp.randf(draw_key(seed, i_env, episode, stream)) - 0.5)
