@@ -1,8 +1,8 @@
 """A flown policy's own part: the vehicle as its flight controller estimates it, and what an action asks for.
 
-In: the estimate, in training from the simulated estimator, in flight from MAVLink telemetry. Out: the first twelve floats
-of an ego-centric observation, and the velocity and yaw rate an action in [-1, 1] asks for. Knows nothing of the simulator:
-a companion computer launches the same functions.
+In: the estimate, in training from the simulated estimator, in flight from MAVLink telemetry. Out: the first twelve
+floats of an ego-centric observation, and the velocity and yaw rate an action in [-1, 1] asks for. Knows nothing of the
+simulator: a companion computer launches the same functions.
 """
 
 import warp as wp

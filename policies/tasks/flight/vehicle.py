@@ -1,4 +1,4 @@
-"""What flown tasks do with a vehicle's row: vary it at an episode's start, command it, read its estimate, judge a touch.
+"""What flown tasks do with a vehicle's row: vary it at an episode's start, command it, read it, judge a touch.
 
 Kernel functions over the arrays of a rig; truth and estimate are told apart by name.
 """

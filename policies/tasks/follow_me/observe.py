@@ -21,6 +21,7 @@ from policies.tasks.flight.own import (
     OwnState,
     level_from_ned,
     write3,
+    write_own,
 )
 from policies.tasks.layout import Branch, Element
 
