@@ -1,0 +1,1 @@
+"""Flights that follow somebody: the owner and their phone, the onboard camera, the companion computer."""

@@ -1,0 +1,119 @@
+"""`honeyguide companion`: a policy as a process of its own, between the vehicle's MAVLink port and its camera.
+
+In: addresses and a policy. Out: setpoints, and a line of figures. The wall clock is the companion's own; the vehicle's
+clock comes with its telemetry.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+
+from autopilot.mavlink.links import LinkError, LinkRole, UdpLink
+from common.clock import Pacer, wall_time_s
+from policies.companion.camera import CameraUrlError, ImageSource, StreamCamera
+from policies.companion.companion import Companion
+from policies.companion.pilot import PilotError, load_pilot
+
+POLL_US = 2_000
+PROGRESS_US = 500_000
+
+
+class CompanionError(ValueError):
+    """Something the user gave is wrong; the message is one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompanionOptions:
+    """The options of `honeyguide companion`, as given."""
+
+    policy: str
+    link: str
+    camera: str
+    is_told: bool
+    seconds: float | None
+
+
+def run_companion(options: CompanionOptions, console: Console) -> str:
+    """Runs until it is stopped; returns what it did, in one sentence.
+
+    Raises:
+        CompanionError: the policy, or an address, cannot be used; nothing has been sent.
+    """
+    try:
+        pilot = load_pilot(options.policy)
+        camera: ImageSource = StreamCamera(options.camera)
+        link = open_link(options.link)
+    except (PilotError, CameraUrlError, LinkError) as error:
+        raise CompanionError(str(error)) from error
+    companion = Companion(link, camera, pilot, is_told=options.is_told, wall_s=wall_time_s)
+    try:
+        _loop(companion, options.seconds, console)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        companion.close()
+    return f"{companion.decision_count} decisions; {latency_text(companion)}"
+
+
+def open_link(url: str) -> UdpLink:
+    """A MAVLink link from its address: `udpout://HOST:PORT`, where the vehicle listens.
+
+    Raises:
+        LinkError: it is no such address, or the host is unknown.
+    """
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError:
+        parts, port = urlsplit(""), None
+    if parts.scheme != "udpout" or not parts.hostname or not port or parts.path not in ("", "/"):
+        raise LinkError(f"{url}: must be udpout://HOST:PORT")
+    return UdpLink(port, LinkRole.ONBOARD, parts.hostname)
+
+
+def _loop(companion: Companion, seconds: float | None, console: Console) -> None:
+    pacer = Pacer(1.0)
+    start_s, shown_us = wall_time_s(), 0
+    polled_us = 0
+    show = _shower(console)
+    with Live(console=console, transient=True, auto_refresh=False) as live:
+        while seconds is None or wall_time_s() - start_s < seconds:
+            time_us = int((wall_time_s() - start_s) * 1e6)
+            before = companion.phase
+            companion.frame(time_us)
+            if companion.phase is not before:
+                why = f": {companion.trouble}" if companion.trouble else ""
+                show(f"{time_us * 1e-6:7.1f} s  {companion.phase.value}{why}")
+            if console.is_terminal and time_us - shown_us >= PROGRESS_US:
+                shown_us = time_us
+                live.update(progress_line(companion, time_us), refresh=True)
+            polled_us = max(polled_us + POLL_US, time_us)
+            pacer.wait_until(polled_us)
+
+
+def _shower(console: Console) -> Callable[[str], None]:
+    def show(text: str) -> None:
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    return show
+
+
+def progress_line(companion: Companion, time_us: int) -> str:
+    """State, how far the owner is, how old the picture is, and how long a decision takes."""
+    state = companion.phase.value + (f" ({companion.trouble})" if companion.trouble else "")
+    return (
+        f"{state} | owner {companion.owner_distance_m():.1f} m | "
+        f"picture {companion.picture_age_s(time_us) * 1e3:.0f} ms | {latency_text(companion)}"
+    )
+
+
+def latency_text(companion: Companion) -> str:
+    """Median and 99th percentile of the time from a picture to its setpoint."""
+    if not companion.latencies_s:
+        return "no decision timed"
+    median, late = np.percentile(np.array(companion.latencies_s) * 1e3, (50, 99))
+    return f"picture to setpoint {median:.1f} ms, 99 % within {late:.1f} ms"

@@ -1,0 +1,137 @@
+"""Where the companion's pictures come from: a stream over TCP, or the memory of the same process.
+
+In: a TCP stream of pictures (common/image_stream.py), or frames handed over in lockstep. Out: the newest picture, each
+only once. The stream is read without waiting; a camera that is not there, or goes away, is looked for again and again.
+"""
+
+import errno
+import socket
+from contextlib import suppress
+from typing import Protocol
+from urllib.parse import urlsplit
+
+from common.image_stream import ImageFrame, ImageReader, ImageStreamError
+
+CAMERA_PORT = 14_600  # guess: a free port near the vehicle's others
+RETRY_US = 500_000
+_CHUNK = 1 << 18  # [byte] of one read: sixteen pictures of 64 x 64 x 4
+_UNDER_WAY = {0, errno.EAGAIN, errno.EALREADY, errno.EINPROGRESS, errno.EISCONN, errno.ENOTCONN}
+
+
+class CameraUrlError(ValueError):
+    """An address of a camera that cannot be used; the text is one sentence."""
+
+
+class ImageSource(Protocol):
+    """Pictures of the onboard camera."""
+
+    def take(self, time_us: int) -> ImageFrame | None:
+        """The newest picture since the last call, None if there is none.
+
+        Args:
+            time_us: the companion's own clock.
+        """
+        ...
+
+    def close(self) -> None: ...
+
+
+class MemoryCamera:
+    """Pictures of a camera in this process."""
+
+    def __init__(self) -> None:
+        self._newest: ImageFrame | None = None
+
+    def publish(self, frame: ImageFrame) -> None:
+        """Called by the camera."""
+        self._newest = frame
+
+    def take(self, time_us: int) -> ImageFrame | None:  # noqa: ARG002  (the stream's needs it)
+        newest, self._newest = self._newest, None
+        return newest
+
+    def close(self) -> None:
+        """Has nothing to give back."""
+
+
+class StreamCamera:
+    """Pictures that come over TCP.
+
+    Args:
+        url: `tcp://HOST:PORT`.
+
+    Raises:
+        CameraUrlError: it is no such address.
+    """
+
+    def __init__(self, url: str) -> None:
+        self._address = _address(url)
+        self._socket: socket.socket | None = None
+        self._reader = ImageReader()
+        self._retry_us = 0
+        self.trouble = ""  # why there are no pictures, as far as is known
+
+    def take(self, time_us: int) -> ImageFrame | None:
+        if self._socket is None:
+            if time_us < self._retry_us:
+                return None
+            self._retry_us = time_us + RETRY_US
+            self._connect()
+        newest: ImageFrame | None = None
+        while self._socket is not None and (data := self._read()):
+            try:
+                frames = self._reader.feed(data)
+            except ImageStreamError as error:
+                self._give_up(str(error))
+                break
+            newest = frames[-1] if frames else newest
+        return newest
+
+    def _connect(self) -> None:
+        self._reader = ImageReader()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._socket.setblocking(False)
+        try:
+            code = self._socket.connect_ex(self._address)
+        except OSError as error:  # an unknown host
+            self._give_up(error.strerror or str(error))
+            return
+        if code not in _UNDER_WAY:
+            self._give_up("nobody there")
+
+    def _read(self) -> bytes:
+        """What has come in; nothing if no more is there yet, or the camera has gone."""
+        if self._socket is None:
+            return b""
+        try:
+            data = self._socket.recv(_CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            if error.errno not in _UNDER_WAY:
+                self._give_up("nobody there")
+            return b""
+        if not data:
+            self._give_up("the camera has ended the stream")
+        return data
+
+    def _give_up(self, trouble: str) -> None:
+        self.trouble = trouble
+        self.close()
+        self._socket = None
+
+    def close(self) -> None:
+        if self._socket is not None:
+            with suppress(OSError):
+                self._socket.close()
+
+
+def _address(url: str) -> tuple[str, int]:
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError:
+        parts, port = urlsplit(""), None
+    if parts.scheme != "tcp" or not parts.hostname or port is None or parts.path not in ("", "/"):
+        raise CameraUrlError(f"{url}: must be tcp://HOST:PORT")
+    return parts.hostname, port

@@ -1,0 +1,181 @@
+"""The companion computer: telemetry and pictures in, Offboard setpoints out. Start here.
+
+In: bytes of a MAVLink link and pictures of the onboard camera, taken in at every step. Out: a decision of the policy
+for each new picture (10 Hz), sent at once and repeated at 20 Hz; a change of mode when the state machine asks for one;
+texts for the pilot. `frame(time_us)` is the whole loop: a process calls it on the wall clock, a lockstep flight on
+simulated time, and then the same flight gives the same bytes.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.vehicle import Mode
+from common.attitude import Vector
+from common.image_stream import ImageFrame
+from policies.companion.camera import ImageSource
+from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
+from policies.companion.observation import Observer
+from policies.companion.vehicle_link import ByteLink, VehicleLink
+
+SETPOINT_US = 50_000
+DECISION_US = 100_000
+DECISION_EARLY_US = 10_000  # a picture may come this much earlier than the decision period asks
+IMAGE_OLD_US = 500_000  # guess: five pictures missed, 3 m at full speed
+TELEMETRY_OLD_US = 500_000
+HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
+OWNER_LOST_US = 5_000_000
+LATENCIES_KEPT = 600  # a minute of decisions
+
+Floats = NDArray[np.float32]
+STILL: tuple[Vector, float] = ((0.0, 0.0, 0.0), 0.0)
+
+
+class Pilot(Protocol):
+    """Whoever flies: a trained policy, or a script that sees the same."""
+
+    kind: int  # of its vector: EGO or EGO_BLIND
+    image_shape: tuple[int, int, int]  # (height, width, channels) of the picture it needs
+
+    def reset(self) -> None:
+        """Forgets what came before."""
+        ...
+
+    def act(self, vector: Floats, image: NDArray[np.uint8] | None) -> Floats:
+        """The action for an observation: four numbers in [-1, 1]."""
+        ...
+
+
+class Companion:
+    """One vehicle's companion.
+
+    Args:
+        link: bytes to and from the vehicle.
+        camera: the onboard camera.
+        pilot: who flies.
+        is_told: engage as soon as everything is there; otherwise the pilot chooses Offboard.
+        wall_s: a clock in seconds that the latency is measured with; none: it is not measured.
+    """
+
+    def __init__(
+        self,
+        link: ByteLink,
+        camera: ImageSource,
+        pilot: Pilot,
+        *,
+        is_told: bool = False,
+        wall_s: Callable[[], float] | None = None,
+    ) -> None:
+        self.vehicle = VehicleLink(link)
+        self.engagement = Engagement(is_told=is_told)
+        self.latencies_s: deque[float] = deque(maxlen=LATENCIES_KEPT)  # picture in to setpoint out
+        self.decision_count = 0
+        self.trouble = ""  # why it does not fly
+        self._camera = camera
+        self._pilot = pilot
+        self._observer = Observer(pilot.kind)
+        self._wall_s = wall_s
+        self._picture: ImageFrame | None = None  # the newest
+        self._picture_us = -1  # when it came in, on our clock; -1: never
+        self._decided_us = 0  # when the picture that was decided on was taken, on the vehicle's clock
+        self._action: Floats = np.zeros(4, dtype=np.float32)
+        self._setpoint = STILL
+        self._setpoint_due_us = 0
+        self._sending = Sending.NOTHING
+
+    def frame(self, time_us: int) -> None:
+        """One step of the loop.
+
+        Args:
+            time_us: the companion's own clock; never goes back.
+        """
+        self.vehicle.receive(time_us)
+        self.vehicle.keep_alive(time_us)
+        picture = self._camera.take(time_us)
+        begun_s = self._wall_s() if self._wall_s is not None and picture is not None else None
+        if picture is not None:
+            self._picture, self._picture_us = picture, time_us
+        self.trouble = self._trouble(time_us)
+        orders = self.engagement.step(self._situation(time_us))
+        if orders.text:
+            self.vehicle.say(orders.text)
+        if orders.wish is not Wish.NONE:
+            self.vehicle.ask_for(orders.wish)
+        has_decided = self._choose(orders.sending, picture, time_us)
+        if orders.sending is not Sending.NOTHING and (has_decided or time_us >= self._setpoint_due_us):
+            self._setpoint_due_us = time_us + SETPOINT_US
+            self.vehicle.send_setpoint(*self._setpoint)
+        if has_decided and begun_s is not None and self._wall_s is not None:
+            self.latencies_s.append(self._wall_s() - begun_s)
+
+    def picture_age_s(self, time_us: int) -> float:
+        """Since the newest picture came in; infinite without one."""
+        return (time_us - self._picture_us) * 1e-6 if self._picture_us >= 0 else float("inf")
+
+    def owner_distance_m(self) -> float:
+        """From the vehicle to where the owner was last reported; NaN if either is unknown."""
+        a, b = self.vehicle.own.pos_ned, self.vehicle.owner.pos_ned
+        return float(np.linalg.norm(np.subtract(a, b)))
+
+    def close(self) -> None:
+        """Stops sending; the vehicle notices."""
+        self._camera.close()
+        self.vehicle.close()
+
+    def _choose(self, sending: Sending, picture: ImageFrame | None, time_us: int) -> bool:
+        """Renews the setpoint; whether by a new decision of the pilot."""
+        if sending is not Sending.POLICY:
+            self._setpoint, self._sending = STILL, sending
+            return False
+        if self._sending is not Sending.POLICY:  # an episode begins, as in training: no memory, no last action
+            self._sending = sending
+            self._pilot.reset()
+            self._action[:] = 0.0
+            self._decided_us = -DECISION_US
+        if picture is None or picture.time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
+            return False
+        self._decided_us = picture.time_us
+        self._decide(picture, time_us)
+        return True
+
+    def _decide(self, picture: ImageFrame, time_us: int) -> None:
+        own = self.vehicle.own
+        vector = self._observer.vector(own, self.vehicle.owner, self._action, time_us)
+        self._action = self._pilot.act(vector, picture.pixels)
+        self._setpoint = self._observer.setpoint(self._action, own)
+        self.decision_count += 1
+
+    def _situation(self, time_us: int) -> Situation:
+        own = self.vehicle.own
+        return Situation(
+            time_us=time_us,
+            is_offboard=own.mode in (Mode.OFFBOARD, Mode.GUIDED),
+            is_airborne=own.is_armed and not own.is_on_ground,
+            mode_name=own.mode_name,
+            trouble=self.trouble,
+            is_refused=self.vehicle.take_refusal(),
+        )
+
+    def _trouble(self, time_us: int) -> str:
+        """Why the policy cannot fly now; "" if it can."""
+        own, owner = self.vehicle.own, self.vehicle.owner
+        if time_us - own.heartbeat_us > HEARTBEAT_OLD_US:
+            return "no heartbeat of the vehicle"
+        if time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
+            return "no attitude or position from the vehicle"
+        if self._picture is None or time_us - self._picture_us > IMAGE_OLD_US:
+            return "no pictures"
+        if own.boot_us - self._picture.time_us > IMAGE_OLD_US:
+            return "pictures come too late"
+        if self._picture.pixels.shape != self._pilot.image_shape:
+            return "pictures of another size"
+        if time_us - owner.arrived_us > OWNER_LOST_US:
+            return "owner lost"
+        return ""
+
+    @property
+    def phase(self) -> Phase:
+        return self.engagement.phase

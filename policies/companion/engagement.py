@@ -1,0 +1,159 @@
+"""Who flies: the companion's state machine, from waiting for data to handing control back.
+
+In: the situation, at every step of the companion's loop. Out: which setpoints to send, which mode to ask for, what to
+tell the pilot. It knows no sockets, no messages and no clock but the one in the situation. The pilot comes first: the
+companion never takes back what has been taken from it, and flies again only when it is told again.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+ASK_AGAIN_US = 500_000  # a mode that has not come is asked for again
+ENGAGE_PATIENCE_US = 3_000_000  # after which a change to Offboard that has not come has failed
+HAND_BACK_PATIENCE_US = 3_000_000  # after which the vehicle is left to its own loss-of-offboard failsafe
+SILENCE_US = 2_000_000  # after control has gone, before setpoints that ask for nothing are offered again
+
+
+class Phase(Enum):
+    """What the companion is doing."""
+
+    WAITING = "waiting"  # something is missing; sends nothing
+    READY = "ready"  # offers setpoints that stay where they are, so that the pilot may choose Offboard
+    ENGAGING = "engaging"  # was told to engage, and asks for Offboard
+    FLYING = "flying"  # the policy's setpoints are flown
+    HANDING_BACK = "handing back"  # stays where it is, and asks for Hold
+    RELEASED = "released"  # control has gone to somebody else; sends nothing
+
+
+class Sending(Enum):
+    """Which setpoints go out."""
+
+    NOTHING = 0
+    STAY = 1  # no velocity, no turning
+    POLICY = 2
+
+
+class Wish(Enum):
+    """The mode to ask the vehicle for."""
+
+    NONE = 0
+    OFFBOARD = 1
+    HOLD = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the state machine looks at."""
+
+    time_us: int  # on the companion's own clock
+    is_offboard: bool  # the vehicle's mode, as last heard
+    is_airborne: bool  # armed, and not on the ground
+    mode_name: str = ""  # for the pilot to read
+    trouble: str = ""  # why the policy cannot fly now; "" if it can
+    is_refused: bool = False  # the vehicle has refused Offboard since the last step
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """What follows from it."""
+
+    sending: Sending = Sending.NOTHING
+    wish: Wish = Wish.NONE
+    text: str = ""  # to tell the pilot
+
+
+class Engagement:
+    """The state machine.
+
+    Args:
+        is_told: to engage as soon as everything is there; once.
+    """
+
+    def __init__(self, *, is_told: bool = False) -> None:
+        self.phase = Phase.WAITING
+        self._is_told = is_told
+        self._since_us = 0  # when this phase began
+        self._asked_us = 0  # when a mode was last asked for
+        self._was_offboard = True  # until seen otherwise: a vehicle found in Offboard is flown by somebody else
+
+    def engage(self) -> None:
+        """Tells the companion to take control as soon as everything is there."""
+        self._is_told = True
+
+    def step(self, now: Situation) -> Orders:
+        """Takes the next step; at most one change of phase."""
+        is_chosen = now.is_offboard and not self._was_offboard  # the pilot has just switched to Offboard
+        self._was_offboard = now.is_offboard
+        match self.phase:
+            case Phase.WAITING:
+                return self._waiting(now)
+            case Phase.READY:
+                return self._ready(now, is_chosen)
+            case Phase.ENGAGING:
+                return self._engaging(now)
+            case Phase.FLYING:
+                return self._flying(now)
+            case Phase.HANDING_BACK:
+                return self._handing_back(now)
+            case Phase.RELEASED:
+                return self._released(now)
+
+    def _waiting(self, now: Situation) -> Orders:
+        if not now.trouble:
+            return self._go(Phase.READY, now, Sending.STAY, text="Companion: ready to follow")
+        return Orders()
+
+    def _ready(self, now: Situation, is_chosen: bool) -> Orders:
+        if now.trouble:
+            return self._go(Phase.WAITING, now, text=f"Companion: not ready: {now.trouble}")
+        if is_chosen and now.is_airborne:
+            return self._go(Phase.FLYING, now, Sending.POLICY, text="Companion: following")
+        if self._is_told and now.is_airborne and not now.is_offboard:
+            self._is_told = False
+            return self._ask(Phase.ENGAGING, now, Wish.OFFBOARD)
+        return Orders(Sending.STAY)
+
+    def _engaging(self, now: Situation) -> Orders:
+        if now.trouble:
+            return self._go(Phase.WAITING, now, text=f"Companion: not engaged: {now.trouble}")
+        if now.is_offboard:
+            return self._go(Phase.FLYING, now, Sending.POLICY, text="Companion: following")
+        if now.is_refused or now.time_us - self._since_us > ENGAGE_PATIENCE_US:
+            return self._go(Phase.READY, now, Sending.STAY, text="Companion: not engaged: Offboard was refused")
+        if now.time_us - self._asked_us >= ASK_AGAIN_US:
+            self._asked_us = now.time_us
+            return Orders(Sending.STAY, Wish.OFFBOARD)
+        return Orders(Sending.STAY)
+
+    def _flying(self, now: Situation) -> Orders:
+        if not now.is_offboard:
+            text = f"Companion: stopped: mode {now.mode_name}"
+            return self._go(Phase.RELEASED, now, text=text)
+        if not now.is_airborne:
+            return self._go(Phase.RELEASED, now, text="Companion: stopped: not in the air")
+        if now.trouble:
+            return self._ask(Phase.HANDING_BACK, now, Wish.HOLD, f"Companion: hold: {now.trouble}")
+        return Orders(Sending.POLICY)
+
+    def _handing_back(self, now: Situation) -> Orders:
+        if not now.is_offboard:
+            return self._go(Phase.RELEASED, now)
+        if now.time_us - self._since_us > HAND_BACK_PATIENCE_US:
+            return self._go(Phase.RELEASED, now, text="Companion: stopped: Hold was not taken")
+        if now.time_us - self._asked_us >= ASK_AGAIN_US:
+            self._asked_us = now.time_us
+            return Orders(Sending.STAY, Wish.HOLD)
+        return Orders(Sending.STAY)
+
+    def _released(self, now: Situation) -> Orders:
+        if now.time_us - self._since_us >= SILENCE_US:
+            return self._go(Phase.WAITING, now)
+        return Orders()
+
+    def _go(self, phase: Phase, now: Situation, sending: Sending = Sending.NOTHING, text: str = "") -> Orders:
+        self.phase, self._since_us = phase, now.time_us
+        return Orders(sending, text=text)
+
+    def _ask(self, phase: Phase, now: Situation, wish: Wish, text: str = "") -> Orders:
+        self.phase, self._since_us, self._asked_us = phase, now.time_us, now.time_us
+        return Orders(Sending.STAY, wish, text)

@@ -1,0 +1,86 @@
+"""Who flies a companion: a policy file, checked against the task it was made for, or the scripted follower.
+
+In: what a user names. Out: a `Pilot`; what cannot fly is refused with one sentence before anything is sent.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from policies.companion.companion import Pilot
+from policies.experts.follower import ScriptedFollower
+from policies.learn.checkpoint import CheckpointError
+from policies.learn.policy import Policy
+from policies.learn.policy_file import find_policy, load_policy
+from policies.tasks.flight.own import ACTIONS
+from policies.tasks.follow_me.observe import EGO, EGO_BLIND, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
+from policies.tasks.layout import ImageElement, Layout, LayoutError
+
+SCRIPTED = "scripted"
+TASK = "FollowMe"
+LAYOUT_VERSION = 1
+
+Floats = NDArray[np.float32]
+
+
+class PilotError(ValueError):
+    """A policy that cannot fly; the text is one sentence for the user."""
+
+
+class LearnedPilot:
+    """A trained policy: its most probable action, its memory kept from picture to picture.
+
+    Args:
+        policy: made for FollowMe in a preset whose actions are setpoints.
+        place: where it came from, for the message.
+
+    Raises:
+        PilotError: it was made for something else.
+    """
+
+    image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
+
+    def __init__(self, policy: Policy, place: str) -> None:
+        layout = policy.layout
+        is_blind = len(layout.frame) == len(vector_elements(int(EGO_BLIND)))
+        self.kind = int(EGO_BLIND) if is_blind else int(EGO)
+        image = ImageElement(IMAGE_SIZE, IMAGE_SIZE, IMAGE_CHANNELS)
+        here = Layout(TASK, LAYOUT_VERSION, vector_elements(self.kind), ACTIONS, image=image)
+        try:
+            here.require(layout, place)
+        except LayoutError as error:
+            raise PilotError(str(error)) from error
+        self._policy = policy
+        self._memory = policy.start_memory(1)
+        torch.set_num_threads(1)  # one small picture: more threads only wait for each other
+        self.act(np.zeros(layout.observation_size, np.float32), np.zeros(self.image_shape, np.uint8))  # warms up
+        self.reset()
+
+    def reset(self) -> None:
+        self._memory = self._policy.start_memory(1)
+
+    def act(self, vector: Floats, image: NDArray[np.uint8] | None) -> Floats:  # noqa: ARG002
+        with torch.inference_mode():
+            actions, self._memory = self._policy.act(torch.from_numpy(vector)[None], self._memory, None)
+            bounded: Floats = self._policy.bounded(actions)[0].numpy()
+        return bounded
+
+
+def load_pilot(name: str) -> Pilot:
+    """The pilot that a user means: `scripted`, or a policy as `honeyguide play` takes it.
+
+    Raises:
+        PilotError: no such policy, damaged, or made for another task, preset or layout.
+    """
+    if name == SCRIPTED:
+        return ScriptedFollower()
+    try:
+        path: Path = find_policy(name)
+        policy, card = load_policy(path)
+    except CheckpointError as error:
+        raise PilotError(str(error)) from error
+    if card.task != TASK:
+        raise PilotError(f"{path}: made for {card.task}; a companion flies policies of {TASK}")
+    return LearnedPilot(policy, str(path))

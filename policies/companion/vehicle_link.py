@@ -1,0 +1,245 @@
+"""The companion's MAVLink link: what the vehicle and the owner's phone tell, and what the companion says to them.
+
+In: bytes of a link. Out: the newest telemetry with the time of its arrival; heartbeats, requests for telemetry rates,
+setpoints, mode changes and texts. The companion is a component of the vehicle's own system, as onboard computers are.
+Any autopilot with PX4's or ArduPilot's modes will do.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Any, Protocol
+
+from autopilot.mavlink.codec import Frame, FrameReader, encode, message_id
+from autopilot.mavlink.convert import degrees_from_e7, quat_from_wxyz
+from autopilot.mavlink.dialects import Dialect, UnknownModeError
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.vehicle import LandedState, Mode, Severity
+from common.attitude import Quat, Vector
+from common.geodesy import GeoPoint, ned_from_geodetic
+from policies.companion.engagement import Wish
+
+COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+AUTOPILOT_COMPONENT = 1
+HEARTBEAT_US = 1_000_000
+REQUEST_US = 5_000_000  # rates are asked for again: the vehicle may have restarted
+TEXT_LENGTH = 50  # characters of one STATUSTEXT
+NEVER_US = -(1 << 62)
+
+# What is asked for, and how often [Hz]. The autopilot's own default rates on a ground station's link are lower.
+RATES_HZ = {
+    "ATTITUDE_QUATERNION": 50.0,
+    "LOCAL_POSITION_NED": 50.0,
+    "DISTANCE_SENSOR": 20.0,
+    "EXTENDED_SYS_STATE": 5.0,
+    "GPS_GLOBAL_ORIGIN": 1.0,
+}
+_COMMAND_SET_MODE, _COMMAND_SET_INTERVAL = 176, 511
+_CUSTOM_MODE = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+_ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
+_LOCAL_NED = 1
+_VELOCITY_AND_YAW_RATE = 0b0101_1100_0111  # type_mask: position, acceleration and yaw are free
+_HAS_POSITION, _HAS_VELOCITY = 1, 2  # FOLLOW_TARGET.est_capabilities
+_LOOKS_DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
+_IDS = {
+    name: message_id(name)
+    for name in (*RATES_HZ, "HEARTBEAT", "FOLLOW_TARGET", "COMMAND_ACK")
+}  # fmt: skip
+_NAMES = {msg_id: name for name, msg_id in _IDS.items()}
+_DIALECTS: dict[int, Dialect] = {int(PX4.autopilot): PX4, int(ARDUPILOT.autopilot): ARDUPILOT}
+
+
+class ByteLink(Protocol):
+    """A byte pipe to the vehicle (autopilot.mavlink.links has some)."""
+
+    def send(self, data: bytes) -> None: ...
+
+    def receive(self) -> Sequence[bytes]: ...
+
+    def close(self) -> None: ...
+
+
+@dataclass(slots=True)
+class Own:
+    """The vehicle as it estimates itself. Times of arrival are on the companion's clock."""
+
+    q_ned_from_frd: Quat = (0.0, 0.0, 0.0, 1.0)
+    omega_frd: Vector = (0.0, 0.0, 0.0)  # [rad/s]
+    attitude_us: int = NEVER_US
+    boot_us: int = NEVER_US  # the vehicle's clock at its newest attitude
+    pos_ned: Vector = (nan, nan, nan)  # [m]
+    vel_ned: Vector = (nan, nan, nan)  # [m/s]
+    position_us: int = NEVER_US
+    range_m: float = nan  # along the body's down axis; NaN: no return
+    range_us: int = NEVER_US
+    heartbeat_us: int = NEVER_US
+    is_armed: bool = False
+    is_on_ground: bool = True
+    mode: Mode | None = None
+    mode_name: str = "unknown"
+    origin: GeoPoint | None = None  # of the local frame
+
+
+@dataclass(slots=True)
+class Owner:
+    """The owner as the phone reports: where it was when the report arrived."""
+
+    pos_ned: Vector = (nan, nan, nan)  # [m] in the vehicle's local frame
+    vel_ned: Vector = (0.0, 0.0, 0.0)  # [m/s]
+    std_m: float = nan  # of a horizontal axis, as the phone says; NaN: it does not
+    arrived_us: int = NEVER_US
+    count: int = 0  # reports so far
+
+
+class VehicleLink:
+    """The companion's end of a link.
+
+    Args:
+        link: bytes to and from the vehicle.
+        system_id: of the vehicle.
+    """
+
+    def __init__(self, link: ByteLink, *, system_id: int = 1) -> None:
+        self.own = Own()
+        self.owner = Owner()
+        self.system_id = system_id
+        self._link = link
+        self._reader = FrameReader()
+        self._dialect: Dialect = PX4
+        self._seq = 0
+        self._text_id = 0
+        self._is_refused = False
+        self._heartbeat_us = NEVER_US
+        self._request_us = NEVER_US
+
+    def receive(self, time_us: int) -> None:
+        """Takes in what has arrived."""
+        for data in self._link.receive():
+            for frame in self._reader.feed(data):
+                name = _NAMES.get(frame.kind.msg_id)
+                if name is not None:
+                    self._take(name, frame, time_us)
+
+    def keep_alive(self, time_us: int) -> None:
+        """Sends the heartbeat, and asks for telemetry, when they are due."""
+        if time_us - self._heartbeat_us >= HEARTBEAT_US:
+            self._heartbeat_us = time_us
+            self._send("HEARTBEAT", type=18, autopilot=8, system_status=4, mavlink_version=3)
+        if self.own.heartbeat_us != NEVER_US and time_us - self._request_us >= REQUEST_US:
+            self._request_us = time_us
+            for name, rate_hz in RATES_HZ.items():
+                self._command(_COMMAND_SET_INTERVAL, float(message_id(name)), 1.0e6 / rate_hz)
+
+    def take_refusal(self) -> bool:
+        """Whether the vehicle has refused a change of mode since the last call."""
+        is_refused, self._is_refused = self._is_refused, False
+        return is_refused
+
+    def send_setpoint(self, vel_ned: Vector, yaw_rate: float) -> None:
+        """A velocity [m/s] and a yaw rate [rad/s], flown in Offboard."""
+        north, east, down = vel_ned
+        self._send(
+            "SET_POSITION_TARGET_LOCAL_NED",
+            time_boot_ms=max(self.own.boot_us, 0) // 1000 & 0xFFFFFFFF,
+            target_system=self.system_id,
+            target_component=AUTOPILOT_COMPONENT,
+            coordinate_frame=_LOCAL_NED,
+            type_mask=_VELOCITY_AND_YAW_RATE,
+            vx=north,
+            vy=east,
+            vz=down,
+            yaw_rate=yaw_rate,
+        )
+
+    def ask_for(self, wish: Wish) -> None:
+        """Asks the vehicle for a mode."""
+        is_px4 = self._dialect is PX4
+        mode = Mode.HOLD if wish is Wish.HOLD else Mode.OFFBOARD if is_px4 else Mode.GUIDED
+        number = self._dialect.custom_mode(mode)
+        if is_px4:
+            self._command(_COMMAND_SET_MODE, _CUSTOM_MODE, number >> 16 & 0xFF, number >> 24 & 0xFF)
+        else:
+            self._command(_COMMAND_SET_MODE, _CUSTOM_MODE, number)
+
+    def say(self, text: str, severity: Severity = Severity.NOTICE) -> None:
+        """A text for the pilot's ground station."""
+        pieces = [text[start : start + TEXT_LENGTH] for start in range(0, len(text), TEXT_LENGTH)]
+        text_id = 0
+        if len(pieces) > 1:
+            self._text_id = text_id = self._text_id % 0xFFFF + 1
+        for i, piece in enumerate(pieces):
+            self._send("STATUSTEXT", severity=int(severity), text=piece, id=text_id, chunk_seq=i)
+
+    def close(self) -> None:
+        self._link.close()
+
+    def _send(self, name: str, **fields: Any) -> None:
+        self._seq = self._seq + 1 & 0xFF
+        self._link.send(encode(name, self.system_id, COMPONENT, self._seq, **fields))
+
+    def _command(self, command: int, *params: float) -> None:
+        fields = {f"param{k + 1}": float(value) for k, value in enumerate(params)}
+        target = {"target_system": self.system_id, "target_component": AUTOPILOT_COMPONENT}
+        self._send("COMMAND_LONG", command=command, **target, **fields)
+
+    def _take(self, name: str, frame: Frame, time_us: int) -> None:
+        if name == "FOLLOW_TARGET":
+            self._owner_reported(frame.kind.unpack(frame.payload), time_us)
+        elif frame.sysid == self.system_id and frame.compid == AUTOPILOT_COMPONENT:
+            self._vehicle_told(name, frame.kind.unpack(frame.payload), time_us)
+
+    def _vehicle_told(self, name: str, fields: Any, time_us: int) -> None:
+        own = self.own
+        if name == "ATTITUDE_QUATERNION":
+            own.q_ned_from_frd = quat_from_wxyz((fields.q1, fields.q2, fields.q3, fields.q4))
+            own.omega_frd = (fields.rollspeed, fields.pitchspeed, fields.yawspeed)
+            own.boot_us, own.attitude_us = fields.time_boot_ms * 1000, time_us
+        elif name == "LOCAL_POSITION_NED":
+            own.pos_ned = (fields.x, fields.y, fields.z)
+            own.vel_ned = (fields.vx, fields.vy, fields.vz)
+            own.position_us = time_us
+        elif name == "DISTANCE_SENSOR":
+            self._distance_told(fields, time_us)
+        elif name == "HEARTBEAT":
+            self._heartbeat_told(fields, time_us)
+        elif name == "EXTENDED_SYS_STATE":
+            own.is_on_ground = fields.landed_state == LandedState.ON_GROUND
+        elif name == "GPS_GLOBAL_ORIGIN":
+            own.origin = GeoPoint(
+                degrees_from_e7(fields.latitude), degrees_from_e7(fields.longitude), fields.altitude * 1.0e-3
+            )
+        elif fields.command == _COMMAND_SET_MODE and fields.target_component in (0, COMPONENT):  # COMMAND_ACK
+            self._is_refused |= fields.result != 0
+
+    def _distance_told(self, fields: Any, time_us: int) -> None:
+        if fields.orientation != _LOOKS_DOWN:
+            return
+        is_inside = fields.min_distance <= fields.current_distance <= fields.max_distance
+        self.own.range_m = fields.current_distance * 0.01 if is_inside else nan
+        self.own.range_us = time_us
+
+    def _heartbeat_told(self, fields: Any, time_us: int) -> None:
+        own = self.own
+        self._dialect = _DIALECTS.get(fields.autopilot, PX4)
+        own.heartbeat_us = time_us
+        own.is_armed = bool(fields.base_mode & _ARMED)
+        try:
+            own.mode = self._dialect.mode_from_custom(fields.custom_mode)
+            own.mode_name = own.mode.name.replace("_", " ").capitalize()
+        except UnknownModeError:
+            own.mode, own.mode_name = None, f"{fields.custom_mode:#x}"
+
+    def _owner_reported(self, fields: Any, time_us: int) -> None:
+        origin = self.own.origin
+        if origin is None or not fields.est_capabilities & _HAS_POSITION:
+            return
+        pos_ned = ned_from_geodetic(degrees_from_e7(fields.lat), degrees_from_e7(fields.lon), fields.alt, origin)
+        if not all(isfinite(element) for element in pos_ned):
+            return
+        owner = self.owner
+        north, east, down = fields.vel if fields.est_capabilities & _HAS_VELOCITY else (0.0, 0.0, 0.0)
+        owner.pos_ned, owner.vel_ned = pos_ned, (north, east, down)
+        owner.std_m = fields.position_cov[0] ** 0.5 if fields.position_cov[0] > 0.0 else nan
+        owner.arrived_us = time_us
+        owner.count += 1
