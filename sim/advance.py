@@ -34,9 +34,10 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class RigArrays:
-    """The vehicles, their surroundings and their flight controllers; arrays have one row per vehicle."""
+    """The vehicles, their surroundings and their flight controllers; arrays but `worlds` have one row per vehicle."""
 
-    world: World
+    worlds: wp.array(dtype=World)
+    i_world: wp.array(dtype=int)  # the world that each vehicle is in
     tick: wp.array(dtype=int)  # ticks since power-on
     seed: wp.array(dtype=int)
     model: wp.array(dtype=MultirotorModel)
@@ -90,7 +91,7 @@ def boot(rig: RigArrays, chosen: wp.array(dtype=int)) -> None:
     if chosen[i] == 0:
         return
     model = rig.model[i]
-    down = -ground_height(rig.world, 0.0, 0.0) - model.contact.leg_frd[2]
+    down = -ground_height(rig.worlds[rig.i_world[i]], 0.0, 0.0) - model.contact.leg_frd[2]
     rig.body[i] = body_at_rest(model, wp.vec3(0.0, 0.0, down), 0.0)
     rig.wind[i] = WindState()
     power_on(rig, i)
@@ -108,6 +109,7 @@ def make_advance(has_estimator: bool) -> Any:
     @wp.kernel(enable_backward=False, module="unique")
     def advance(rig: RigArrays, first_vehicle: int, tick_count: int) -> None:
         i = first_vehicle + wp.tid()
+        world = rig.worlds[rig.i_world[i]]
         seed = rig.seed[i]
         tick = rig.tick[i]
         model = rig.model[i]
@@ -121,12 +123,12 @@ def make_advance(has_estimator: bool) -> Any:
         control = rig.autopilot.control[i]
         motor_loss = rig.faults[i].motor_loss
         for _ in range(tick_count):
-            height = -body.pos_ned[2] - ground_height(rig.world, body.pos_ned[0], body.pos_ned[1])
+            height = -body.pos_ned[2] - ground_height(world, body.pos_ned[0], body.pos_ned[1])
             wind = wind_step(wind_model, wind, body.vel_ned, height, seed, i, tick, TICK_S)
             command = weakened(control.actuators.command, motor_loss)
-            body = body_tick(model, body, command, wind.wind_ned, rig.world)
+            body = body_tick(model, body, command, wind.wind_ned, world)
             if wp.static(has_estimator):
-                sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, rig.world, seed, i, tick)
+                sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, world, seed, i, tick)
                 estimator_step(rig.autopilot.ekf, i, sensors.samples)
                 estimate = rig.autopilot.ekf.rows[i].estimate
             else:

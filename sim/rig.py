@@ -28,7 +28,8 @@ from sim.bodies.multirotor import BodyState, MultirotorModel, multirotor_model
 from sim.faults import Faults
 from sim.sensors.sensors import SensorModel, SensorState
 from sim.wind import WindModel, WindState
-from sim.world.world import WorldMap
+from sim.world.batch import WorldBatch
+from sim.world.world import World, WorldMap
 
 Rows = np.ndarray[Any, Any]
 Snapshot = list[Rows]
@@ -36,11 +37,11 @@ Snapshot = list[Rows]
 
 
 class Rig:
-    """Vehicles of one airframe in one world.
+    """Vehicles of one airframe, all in one world or each in its own.
 
     Args:
         airframe: the vehicle.
-        world: the ground they fly over; its origin is the home they boot at.
+        world: the ground they fly over, its origin the home they boot at; of a batch, vehicle i is in world i.
         sensor_model: noise and delays of the sensors.
         wind_model: the air.
         home: where the vehicles boot; the origin of ned.
@@ -54,7 +55,7 @@ class Rig:
     def __init__(
         self,
         airframe: Airframe,
-        world: WorldMap,
+        world: WorldMap | WorldBatch,
         sensor_model: SensorModel,
         wind_model: WindModel,
         *,
@@ -68,7 +69,8 @@ class Rig:
         self.vehicle_count = vehicle_count
         self.device = device
         self.arrays = RigArrays()
-        self.arrays.world = world.kernel
+        self._world = world  # holds the arrays that the kernels' structs point into
+        self.arrays.worlds, self.arrays.i_world = self._worlds(world)
         self.arrays.tick = wp.zeros(vehicle_count, dtype=int, device=device)
         self.arrays.seed = wp.full(vehicle_count, seed, dtype=int, device=device)
         model = multirotor_model(airframe, home.alt_m)
@@ -128,7 +130,7 @@ class Rig:
     @cached_property
     def _row_views(self) -> list[tuple[Any, Rows]]:
         """Each array that has a row per vehicle, and its view: making the views of large structs takes milliseconds."""
-        return [(array, array.numpy()) for array in _row_arrays(self.arrays)]
+        return [(array, array.numpy()) for array in row_arrays(self.arrays)]
 
     def reboot(self, i_vehicle: int = 0) -> None:
         """Powers the sensors and the flight controller of one vehicle off and on, wherever it is."""
@@ -163,6 +165,15 @@ class Rig:
     def _rows(self, struct_type: Any, value: Any) -> Any:
         return wp.array([value] * self.vehicle_count, dtype=struct_type, device=self.device)
 
+    def _worlds(self, world: WorldMap | WorldBatch) -> tuple[Any, Any]:
+        """The worlds, and which of them each vehicle is in."""
+        if isinstance(world, WorldMap):
+            kernels = wp.array([world.kernel], dtype=World, device=self.device)
+            return kernels, wp.zeros(self.vehicle_count, dtype=int, device=self.device)
+        if world.count != self.vehicle_count:
+            raise ValueError(f"{self.vehicle_count} vehicles need as many worlds, not {world.count}")
+        return world.kernels, wp.array(np.arange(world.count), dtype=int, device=self.device)
+
     def _autopilot(self, airframe: Airframe) -> Autopilot:
         autopilot = Autopilot()
         autopilot.ekf = make_ekf(self.vehicle_count, self.device)
@@ -173,15 +184,20 @@ class Rig:
         return autopilot
 
 
-def _row_arrays(arrays: Any) -> list[Any]:
-    """Every array of a struct and of the structs in it that has a row per vehicle, in the order of declaration."""
+def row_arrays(arrays: Any) -> list[Any]:
+    """Every array that holds the state of vehicles, of a struct and of those in it, in the order of declaration.
+
+    The worlds are left out, and which a vehicle is in: a vehicle restored from elsewhere stays in its own.
+    """
     found = []
     for name in arrays.cls.__annotations__:
         member = getattr(arrays, name)
+        if name in ("worlds", "i_world"):
+            continue
         if isinstance(member, wp.array):
             found.append(member)
-        elif name != "world":  # the same for all
-            found.extend(_row_arrays(member))
+        else:
+            found.extend(row_arrays(member))
     return found
 
 

@@ -1,7 +1,7 @@
 """Names of the random streams of the simulator: one number per use, never one for two uses.
 
 A stream is the last counter of a draw (see `common/rng.py`). 1 to 9 belong to the wind, 10 to 49 to the sensors,
-50 to 59 to the owner and their phone.
+50 to 59 to the owner and their phone, 90 to 99 to the growing of worlds.
 """
 
 import warp as wp
@@ -42,3 +42,7 @@ PHONE_VELOCITY = wp.constant(56)
 PHONE_CORRELATED = wp.constant(57)
 PHONE_CORRELATED_START = wp.constant(58)
 PHONE_DROPOUT = wp.constant(59)
+
+HILLS = wp.constant(90)
+TREE_PLACES = wp.constant(91)
+TREE_SIZES = wp.constant(92)

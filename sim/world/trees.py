@@ -27,7 +27,7 @@ CROWN_BASE_SHARE = 0.35
 CROWN_RADIUS_SHARE = (0.16, 0.26)
 ROOT_M = 1.0  # trunks go this far into the ground, so that none floats on a slope
 
-_NO_OBSTACLE_M = -1.0e6  # height of the highest tree when there is none
+NO_OBSTACLE_M = -1.0e6  # height of the highest tree when there is none
 _UPRIGHT = wp.constant(1.0e-12)  # squared horizontal direction below which a ray cannot cross the side of a trunk
 _FAR = wp.constant(1.0e30)
 
@@ -52,7 +52,8 @@ class Forest:
     Bucket k lists the trees bucket_trees[bucket_start[k] : bucket_start[k + 1]].
     """
 
-    trees: wp.array[Tree]
+    trees: wp.array[Tree]  # the first tree_count; there may be room for more
+    tree_count: int
     bucket_start: wp.array[wp.int32]  # (buckets² + 1,), rows to the north
     bucket_trees: wp.array[wp.int32]  # indices into trees
     buckets: int  # per side
@@ -307,13 +308,14 @@ class ForestMap:
     @property
     def top_m(self) -> float:
         """Height of the highest crown above the home plane [m]; far below ground without trees."""
-        return float((self.trees["crown_high"] + self.trees["crown_radius"]).max(initial=_NO_OBSTACLE_M))
+        return float((self.trees["crown_high"] + self.trees["crown_radius"]).max(initial=NO_OBSTACLE_M))
 
     def kernel(self, device: str) -> Forest:
         """The trees as kernels read them."""
         buckets, start, indices = fill_buckets(self.trees, self.size_m)
         forest = Forest()
         forest.trees = wp.array(self.trees, dtype=Tree, device=device)
+        forest.tree_count = len(self.trees)
         forest.bucket_start = wp.array(start, dtype=wp.int32, device=device)
         forest.bucket_trees = wp.array(indices, dtype=wp.int32, device=device)
         forest.buckets = buckets

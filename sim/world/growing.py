@@ -1,0 +1,405 @@
+"""Kernels that grow worlds: the hills, trees and buckets of the chosen worlds of a batch, from a seed each.
+
+In: `Growing`, the numbers and the scratch of a batch. Out: the `World` rows. Launched in the order of this file, each
+for all chosen worlds; a thread takes one row of a terrain, one cell of a planting grid, or a whole world. The hills
+are those of `terrain.make_heights`, in float32; the trees stand on Poisson-disc points planted as in `poisson.py`.
+"""
+
+import warp as wp
+
+from sim.streams import HILLS, TREE_PLACES, TREE_SIZES
+from sim.world.terrain import LACUNARITY, PERSISTENCE, Terrain, terrain_height
+from sim.world.trees import (
+    CONTACT_MARGIN_M,
+    CROWN_BASE_SHARE,
+    CROWN_RADIUS_SHARE,
+    EDGE_M,
+    NO_OBSTACLE_M,
+    ROOT_M,
+    TRUNK_RADIUS_SHARE,
+    Forest,
+    Tree,
+)
+from sim.world.world import World
+
+wp.set_module_options({"enable_backward": False})
+
+ROUNDS = 3  # times each empty cell is visited
+DARTS = wp.constant(4)  # thrown at it in each visit
+PHASES = 9  # cells three apart cannot disturb each other (Wei 2008)
+COVERAGE = wp.constant(0.655)  # points per spacing² reached with these darts; measured
+
+_LACUNARITY = wp.constant(LACUNARITY)
+_PERSISTENCE = wp.constant(PERSISTENCE)
+_CROWN_RADIUS_LEAST = wp.constant(CROWN_RADIUS_SHARE[0])
+_CROWN_RADIUS_MOST = wp.constant(CROWN_RADIUS_SHARE[1])
+_CROWN_BASE = wp.constant(CROWN_BASE_SHARE)
+_TRUNK_RADIUS = wp.constant(TRUNK_RADIUS_SHARE)
+_ROOT_M = wp.constant(ROOT_M)
+_EDGE_M = wp.constant(EDGE_M)
+_MARGIN_M = wp.constant(CONTACT_MARGIN_M)
+_NO_OBSTACLE = wp.constant(NO_OBSTACLE_M)
+_EMPTY = wp.constant(1.0e9)  # coordinate of the point of an empty cell [m]
+_SQRT_HALF = wp.constant(0.7071067811865476)
+_SQUARE_M_PER_HA = wp.constant(1.0e4)
+_LEAST_WAVELENGTH_M = wp.constant(1.0)  # below it lattice numbers lose digits
+_LEAST_BLEND_M = wp.constant(1.0e-3)
+
+
+@wp.struct
+class WorldNumbers:
+    """What one world of a batch is grown from; the fields are those of `WorldConfig`."""
+
+    hill_height_m: float
+    hill_wavelength_m: float
+    clearing_radius_m: float
+    clearing_blend_m: float
+    trees_per_ha: float
+    tree_height_min_m: float
+    tree_height_max_m: float
+    has_walls: int
+    wall_height_m: float
+
+
+@wp.struct
+class Growing:
+    """A batch of worlds and what is needed to grow them; arrays have one row per world."""
+
+    worlds: wp.array[World]
+    numbers: wp.array[WorldNumbers]
+    seeds: wp.array[wp.int32]
+    chosen: wp.array[wp.int32]  # indices of the worlds to grow, the first `chosen_count`
+    chosen_count: wp.array[wp.int32]  # (1,)
+    middle: wp.array[wp.float32]  # noise at home
+    highest: wp.array[wp.float32]  # largest rise or fall of the noise from there
+    ground_max_m: wp.array[wp.float32]
+    edge_max_m: wp.array[wp.float32]  # highest ground along the edges of the map
+    points: wp.array2d[wp.vec2]  # (worlds, most_cells²) [m] from the planting square's corner; all empty between calls
+    most_cells: int  # per side of a planting grid
+    octaves: int
+    trees_per_ha_max: float
+    tree_height_limit_m: float
+
+
+@wp.struct
+class Grid:
+    """The planting grid of one world: cells that hold one point at most."""
+
+    side_m: float
+    spacing_m: float
+    cell_m: float
+    cells: int  # per side
+
+
+@wp.struct
+class BucketSpan:
+    """The rows and columns of buckets that list a tree, ends included."""
+
+    row_low: int
+    row_high: int
+    column_low: int
+    column_high: int
+
+
+@wp.kernel(enable_backward=False)
+def choose(growing: Growing, is_chosen: wp.array[wp.bool], seeds: wp.array[wp.int32]) -> None:
+    """Lists the chosen worlds, in any order, and takes their seeds."""
+    i_world = wp.tid()
+    if not is_chosen[i_world]:
+        return
+    growing.chosen[wp.atomic_add(growing.chosen_count, 0, 1)] = i_world
+    growing.seeds[i_world] = seeds[i_world]
+    growing.highest[i_world] = 0.0
+    growing.ground_max_m[i_world] = -1.0e9
+    growing.edge_max_m[i_world] = -1.0e9
+
+
+@wp.func
+def lattice_gradient(row_key: wp.uint32, j: int) -> wp.vec2:
+    """Unit gradient at column `j` of the lattice row that the key names."""
+    state = wp.rand_init(int(row_key), j)
+    x = 2.0 * wp.randf(state) - 1.0
+    y = 2.0 * wp.randf(state) - 1.0
+    return wp.vec2(x, y) / wp.sqrt(x * x + y * y + 1.0e-12)
+
+
+@wp.func
+def smooth(x: float) -> float:
+    """`terrain.smootherstep`."""
+    return x * x * x * (x * (x * 6.0 - 15.0) + 10.0)
+
+
+@wp.func
+def add_octave(
+    heights: wp.array2d[wp.float32], key: wp.uint32, row: int, lattice_per_cell: float, amplitude: float
+) -> None:
+    """Adds one layer of gradient noise (Perlin 2002) to a row of the terrain's grid, from west to east."""
+    north = float(row) * lattice_per_cell
+    i = int(north)
+    u = north - float(i)
+    fade_u = smooth(u)
+    south_key = wp.rand_init(int(key), i)
+    north_key = wp.rand_init(int(key), i + 1)
+    south_west = wp.vec2(0.0, 0.0)
+    north_west = wp.vec2(0.0, 0.0)
+    south_east = wp.vec2(0.0, 0.0)
+    north_east = wp.vec2(0.0, 0.0)
+    at = int(-2)
+    for column in range(heights.shape[1]):
+        east = float(column) * lattice_per_cell
+        j = int(east)
+        if j != at:
+            if j == at + 1:
+                south_west = south_east
+                north_west = north_east
+            else:
+                south_west = lattice_gradient(south_key, j)
+                north_west = lattice_gradient(north_key, j)
+            south_east = lattice_gradient(south_key, j + 1)
+            north_east = lattice_gradient(north_key, j + 1)
+            at = j
+        v = east - float(j)
+        fade_v = smooth(v)
+        south = wp.lerp(south_west[0] * u + south_west[1] * v, south_east[0] * u + south_east[1] * (v - 1.0), fade_v)
+        beyond = wp.lerp(
+            north_west[0] * (u - 1.0) + north_west[1] * v,
+            north_east[0] * (u - 1.0) + north_east[1] * (v - 1.0),
+            fade_v,
+        )
+        heights[row, column] = heights[row, column] + amplitude * wp.lerp(south, beyond, fade_u)
+
+
+@wp.kernel(enable_backward=False)
+def raise_noise(growing: Growing, groups: int) -> None:
+    """Fractal noise in place of the heights: LACUNARITY and PERSISTENCE from each octave to the next."""
+    group, row = wp.tid()
+    for slot in range(group, growing.chosen_count[0], groups):
+        i_world = growing.chosen[slot]
+        terrain = growing.worlds[i_world].terrain
+        for column in range(terrain.cells + 1):
+            terrain.heights[row, column] = 0.0
+        wavelength_m = wp.max(growing.numbers[i_world].hill_wavelength_m, _LEAST_WAVELENGTH_M)
+        lattice_per_cell = 1.0 / (wavelength_m * terrain.cells_per_m)
+        amplitude = float(1.0)
+        hills_key = wp.rand_init(growing.seeds[i_world], HILLS)
+        for octave in range(growing.octaves):
+            add_octave(terrain.heights, wp.rand_init(int(hills_key), octave), row, lattice_per_cell, amplitude)
+            lattice_per_cell *= _LACUNARITY
+            amplitude *= _PERSISTENCE
+
+
+@wp.kernel(enable_backward=False)
+def find_highest(growing: Growing, groups: int) -> None:
+    """The noise at home, and its largest rise or fall from there."""
+    group, row = wp.tid()
+    for slot in range(group, growing.chosen_count[0], groups):
+        i_world = growing.chosen[slot]
+        terrain = growing.worlds[i_world].terrain
+        middle = terrain.heights[terrain.cells // 2, terrain.cells // 2]
+        if row == 0:
+            growing.middle[i_world] = middle
+        highest = float(0.0)
+        for column in range(terrain.cells + 1):
+            highest = wp.max(highest, wp.abs(terrain.heights[row, column] - middle))
+        wp.atomic_max(growing.highest, i_world, highest)
+
+
+@wp.kernel(enable_backward=False)
+def shape_hills(growing: Growing, groups: int) -> None:
+    """Heights from the noise: within the bound of the hills, level in the clearing, and how high they reach."""
+    group, row = wp.tid()
+    for slot in range(group, growing.chosen_count[0], groups):
+        i_world = growing.chosen[slot]
+        terrain = growing.worlds[i_world].terrain
+        numbers = growing.numbers[i_world]
+        scale = float(0.0)
+        if growing.highest[i_world] > 0.0:
+            scale = numbers.hill_height_m / growing.highest[i_world]
+        cell_m = 1.0 / terrain.cells_per_m
+        # triangles that reach into the clearing have corners up to a cell's diagonal outside of it
+        level_radius_m = numbers.clearing_radius_m + 1.5 * cell_m
+        north = float(row) * cell_m - terrain.half_size_m
+        row_max = float(-1.0e9)
+        edge_max = float(-1.0e9)
+        for column in range(terrain.cells + 1):
+            east = float(column) * cell_m - terrain.half_size_m
+            beyond_m = wp.sqrt(north * north + east * east) - level_radius_m
+            share = smooth(wp.clamp(beyond_m / wp.max(numbers.clearing_blend_m, _LEAST_BLEND_M), 0.0, 1.0))
+            hill = (terrain.heights[row, column] - growing.middle[i_world]) * scale
+            # the product may exceed the bound by a rounding
+            height = wp.clamp(hill, -numbers.hill_height_m, numbers.hill_height_m) * share + 0.0
+            terrain.heights[row, column] = height
+            row_max = wp.max(row_max, height)
+            if row == 0 or row == terrain.cells or column == 0 or column == terrain.cells:
+                edge_max = wp.max(edge_max, height)
+        wp.atomic_max(growing.ground_max_m, i_world, row_max)
+        wp.atomic_max(growing.edge_max_m, i_world, edge_max)
+
+
+@wp.func
+def tree_height_max_m(growing: Growing, numbers: WorldNumbers) -> float:
+    """Height of the highest trees of a world [m], within the limit that its buckets are made for."""
+    return wp.min(numbers.tree_height_max_m, growing.tree_height_limit_m)
+
+
+@wp.func
+def planting_grid(growing: Growing, i_world: int) -> Grid:
+    """The planting grid of a world; no cells when it has no trees."""
+    grid = Grid()
+    density = wp.min(growing.numbers[i_world].trees_per_ha, growing.trees_per_ha_max)
+    grid.side_m = 2.0 * (growing.worlds[i_world].terrain.half_size_m - _EDGE_M)
+    if density > 0.0 and grid.side_m > 0.0:
+        grid.spacing_m = wp.sqrt(COVERAGE * _SQUARE_M_PER_HA / density)
+        grid.cell_m = grid.spacing_m * _SQRT_HALF
+        # the upper rows of a grid too large, by rounding, for the store go without
+        grid.cells = wp.min(int(wp.ceil(grid.side_m / grid.cell_m)), growing.most_cells)
+    return grid
+
+
+@wp.func
+def is_free(points: wp.array2d[wp.vec2], i_world: int, grid: Grid, row: int, column: int, dart: wp.vec2) -> bool:
+    """Whether no point of the neighbouring cells is nearer to the dart than the spacing."""
+    for i in range(wp.max(row - 2, 0), wp.min(row + 3, grid.cells)):
+        for j in range(wp.max(column - 2, 0), wp.min(column + 3, grid.cells)):
+            off = points[i_world, i * grid.cells + j] - dart
+            if wp.dot(off, off) < grid.spacing_m * grid.spacing_m:
+                return False
+    return True
+
+
+@wp.kernel(enable_backward=False)
+def plant(growing: Growing, groups: int, visit: int) -> None:
+    """One visit to a ninth of the cells of each planting grid: darts until one lands free, DARTS at most."""
+    group, place_row, place_column = wp.tid()
+    for slot in range(group, growing.chosen_count[0], groups):
+        i_world = growing.chosen[slot]
+        grid = planting_grid(growing, i_world)
+        key = wp.rand_init(growing.seeds[i_world], TREE_PLACES)
+        # each world and round begins at another ninth
+        phase = (visit + int(wp.rand_init(int(key), visit // PHASES) % wp.uint32(PHASES))) % PHASES
+        row = 3 * place_row + phase // 3
+        column = 3 * place_column + phase % 3
+        cell = row * grid.cells + column
+        if row < grid.cells and column < grid.cells and growing.points[i_world, cell][0] == _EMPTY:
+            numbers = growing.numbers[i_world]
+            keep_out_m = numbers.clearing_radius_m + _CROWN_RADIUS_MOST * tree_height_max_m(growing, numbers)
+            middle = wp.vec2(0.5 * grid.side_m, 0.5 * grid.side_m)
+            state = wp.rand_init(int(wp.rand_init(int(key), ROUNDS + visit // PHASES)), cell)
+            has_landed = bool(False)
+            for _ in range(DARTS):
+                north = (float(row) + wp.randf(state)) * grid.cell_m
+                east = (float(column) + wp.randf(state)) * grid.cell_m
+                dart = wp.vec2(north, east)
+                if not has_landed and wp.max(north, east) < grid.side_m and wp.length(dart - middle) > keep_out_m:
+                    if is_free(growing.points, i_world, grid, row, column, dart):
+                        growing.points[i_world, cell] = dart
+                        has_landed = True
+
+
+@wp.func
+def grown_tree(terrain: Terrain, numbers: WorldNumbers, height_max_m: float, place: wp.vec2, key: wp.uint32) -> Tree:
+    """The tree at a place [m], with the proportions of `trees.make_trees`."""
+    state = key
+    height_min_m = wp.min(numbers.tree_height_min_m, height_max_m)
+    height = height_min_m + (height_max_m - height_min_m) * wp.randf(state)
+    crown_share = _CROWN_RADIUS_LEAST + (_CROWN_RADIUS_MOST - _CROWN_RADIUS_LEAST) * wp.randf(state)
+    ground = terrain_height(terrain, place[0], place[1])
+    tree = Tree()
+    tree.north = place[0]
+    tree.east = place[1]
+    tree.root_height = ground - _ROOT_M
+    tree.trunk_radius = _TRUNK_RADIUS * height
+    tree.crown_radius = height * crown_share
+    tree.crown_low = ground + _CROWN_BASE * height + tree.crown_radius
+    tree.crown_high = ground + height - tree.crown_radius
+    return tree
+
+
+@wp.func
+def bucket_of(forest: Forest, coordinate_m: float) -> int:
+    """Row or column of the bucket at a coordinate, that of the nearest edge beyond the map."""
+    return wp.clamp(int((coordinate_m + forest.half_size_m) * forest.buckets_per_m), 0, forest.buckets - 1)
+
+
+@wp.func
+def bucket_span(forest: Forest, tree: Tree) -> BucketSpan:
+    """The buckets that list a tree: those it reaches within CONTACT_MARGIN_M of."""
+    reach = tree.crown_radius + _MARGIN_M
+    span = BucketSpan()
+    span.row_low = bucket_of(forest, tree.north - reach)
+    span.row_high = bucket_of(forest, tree.north + reach)
+    span.column_low = bucket_of(forest, tree.east - reach)
+    span.column_high = bucket_of(forest, tree.east + reach)
+    return span
+
+
+@wp.func
+def collect_trees(growing: Growing, i_world: int, forest: Forest) -> Forest:
+    """Trees on the planted points, and how many each bucket lists, in the element after its start.
+
+    Empties the planting grid for the next time. A tree for which the store has no room is left out.
+    """
+    grid = planting_grid(growing, i_world)
+    terrain = growing.worlds[i_world].terrain
+    numbers = growing.numbers[i_world]
+    height_max_m = tree_height_max_m(growing, numbers)
+    sizes_key = wp.rand_init(growing.seeds[i_world], TREE_SIZES)
+    for bucket in range(forest.bucket_start.shape[0]):
+        forest.bucket_start[bucket] = 0
+    tree_count = int(0)
+    entries = int(0)
+    top_m = float(_NO_OBSTACLE)
+    corner = wp.vec2(0.5 * grid.side_m, 0.5 * grid.side_m)
+    for cell in range(grid.cells * grid.cells):
+        point = growing.points[i_world, cell]
+        if point[0] != _EMPTY:
+            growing.points[i_world, cell] = wp.vec2(_EMPTY, _EMPTY)
+            tree = grown_tree(terrain, numbers, height_max_m, point - corner, wp.rand_init(int(sizes_key), cell))
+            span = bucket_span(forest, tree)
+            wanted = (span.row_high - span.row_low + 1) * (span.column_high - span.column_low + 1)
+            if tree_count < forest.trees.shape[0] and entries + wanted <= forest.bucket_trees.shape[0]:
+                forest.trees[tree_count] = tree
+                tree_count += 1
+                entries += wanted
+                top_m = wp.max(top_m, tree.crown_high + tree.crown_radius)
+                for row in range(span.row_low, span.row_high + 1):
+                    for column in range(span.column_low, span.column_high + 1):
+                        following = row * forest.buckets + column + 1
+                        forest.bucket_start[following] = forest.bucket_start[following] + 1
+    forest.tree_count = tree_count
+    forest.top_m = top_m
+    return forest
+
+
+@wp.func
+def list_trees(forest: Forest) -> None:
+    """Fills the buckets' lists, each in ascending order, from how many they hold."""
+    bucket_count = forest.buckets * forest.buckets
+    for bucket in range(bucket_count):
+        forest.bucket_start[bucket + 1] = forest.bucket_start[bucket + 1] + forest.bucket_start[bucket]
+    # the starts run ahead to the ends while the lists are filled
+    for i_tree in range(forest.tree_count):
+        span = bucket_span(forest, forest.trees[i_tree])
+        for row in range(span.row_low, span.row_high + 1):
+            for column in range(span.column_low, span.column_high + 1):
+                bucket = row * forest.buckets + column
+                forest.bucket_trees[forest.bucket_start[bucket]] = i_tree
+                forest.bucket_start[bucket] = forest.bucket_start[bucket] + 1
+    for k in range(bucket_count):
+        forest.bucket_start[bucket_count - k] = forest.bucket_start[bucket_count - k - 1]
+    forest.bucket_start[0] = 0
+
+
+@wp.kernel(enable_backward=False)
+def settle(growing: Growing, groups: int) -> None:
+    """Makes the trees and their buckets of the planted points, and completes the `World` rows."""
+    group = wp.tid()
+    for slot in range(group, growing.chosen_count[0], groups):
+        i_world = growing.chosen[slot]
+        world = growing.worlds[i_world]
+        world.forest = collect_trees(growing, i_world, world.forest)
+        list_trees(world.forest)
+        world.terrain.ground_max_m = growing.ground_max_m[i_world]
+        world.walls.is_built = growing.numbers[i_world].has_walls
+        world.walls.top_m = growing.edge_max_m[i_world] + growing.numbers[i_world].wall_height_m
+        growing.worlds[i_world] = world
