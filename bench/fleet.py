@@ -4,12 +4,14 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import parameter_table
 from bench.row import require
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
+from sim.restore import RowRestore
 from sim.rig import Rig, Snapshot
 from sim.sensors.sensors import sensor_model
 from sim.wind import wind_model
@@ -25,7 +27,8 @@ def hovering(vehicle_count: int, *, has_estimator: bool = True, threads: int = 1
     """X500s 10 m over home in 5 m/s of turbulent wind with gusts, default noise, the default world below."""
     rig = _rig(vehicle_count, has_estimator, threads)
     rows = np.arange(vehicle_count)
-    rig.restore(_hovers(has_estimator), rows, rows % _SEED_COUNT, rows + 1)
+    sources, seeds = (wp.array(values, dtype=int) for values in (rows % _SEED_COUNT, rows + 1))
+    RowRestore(rig, _hovers(has_estimator), sources, wp.full(vehicle_count, True, dtype=wp.bool), seeds).launch()
     rig.advance(250)
     check(rig, has_estimator=has_estimator)
     return rig
@@ -76,7 +79,7 @@ def _rig(vehicle_count: int, has_estimator: bool, threads: int) -> Rig:
 
 
 @cache
-def _hovers(has_estimator: bool) -> Snapshot:
+def _hovers(has_estimator: bool) -> Rig:
     rig = _rig(_SEED_COUNT, has_estimator, 1)
     rig.advance(_ALIGN_TICKS)
     rows = rig.arrays.autopilot.setpoint.numpy()
@@ -86,4 +89,4 @@ def _hovers(has_estimator: bool) -> Snapshot:
         port.fly_to((0.0, 0.0, -HEIGHT_M), 0.0)
         port.write()
     rig.advance(_CLIMB_TICKS)
-    return rig.snapshot()
+    return rig

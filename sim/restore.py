@@ -79,11 +79,6 @@ class RowRestore:
             command.launch()
 
 
-def restore_rows(rig: Rig, bank: Rig, sources: Any, is_chosen: Any, seeds: Any) -> None:
-    """Restores chosen vehicles once; see `RowRestore`, which is quicker when it is done again and again."""
-    RowRestore(rig, bank, sources, is_chosen, seeds).launch()
-
-
 def _words(array: Any) -> Any:
     """An array with a row per vehicle as words, the same memory."""
     row_bytes = array.strides[0]

@@ -5,7 +5,7 @@ as rows of the other arrays. One call of `advance` is one launch per thread, for
 """
 
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -111,26 +111,13 @@ class Rig:
         wp.launch(boot, dim=self.vehicle_count, inputs=[self.arrays, marks], device=self.device)
 
     def snapshot(self) -> Snapshot:
-        """A copy of all rows, to be restored in this rig or in another with the same world."""
-        return [array.numpy().copy() for array, _ in self._row_views]
+        """A copy of all rows, to be restored in this rig or in another of as many vehicles."""
+        return [array.numpy().copy() for array in row_arrays(self.arrays)]
 
-    def restore(self, snapshot: Snapshot, rows: Rows, sources: Rows, seeds: Rows) -> None:
-        """Puts vehicles where the snapshot found others (or themselves), to fly on with noise of their own.
-
-        Args:
-            snapshot: of this rig or of another.
-            rows: indices of the vehicles, shape (n,).
-            sources: the rows of the snapshot they take, shape (n,).
-            seeds: of their noise from now on, shape (n,).
-        """
-        for (array, view), copies in zip(self._row_views, snapshot, strict=True):
-            _put(array, view, rows, copies[sources])
-        _put(self.arrays.seed, self.arrays.seed.numpy(), rows, seeds)
-
-    @cached_property
-    def _row_views(self) -> list[tuple[Any, Rows]]:
-        """Each array that has a row per vehicle, and its view: making the views of large structs takes milliseconds."""
-        return [(array, array.numpy()) for array in row_arrays(self.arrays)]
+    def restore(self, snapshot: Snapshot) -> None:
+        """Puts every vehicle where the snapshot found it; of some vehicles, `sim.restore.RowRestore` does it."""
+        for array, rows in zip(row_arrays(self.arrays), snapshot, strict=True):
+            array.assign(rows)
 
     def reboot(self, i_vehicle: int = 0) -> None:
         """Powers the sensors and the flight controller of one vehicle off and on, wherever it is."""
@@ -199,15 +186,6 @@ def row_arrays(arrays: Any) -> list[Any]:
         else:
             found.extend(row_arrays(member))
     return found
-
-
-def _put(array: Any, view: Rows, rows: Rows, values: Rows) -> None:
-    """Writes chosen rows of a Warp array, of which `view` is the live view (on a GPU: any array of its type)."""
-    if array.device.is_cuda:
-        view[...] = array.numpy()
-    view[rows] = values
-    if array.device.is_cuda:
-        array.assign(view)
 
 
 @cache

@@ -24,7 +24,8 @@ from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
 from common.kernels import FRAME_TICKS, TICK_S
 from sim.advance import RigArrays
-from sim.rig import Rig, Snapshot
+from sim.restore import RowRestore
+from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
 from sim.wind import wind_model
 from sim.world.world import build_world
@@ -114,11 +115,18 @@ class HoverBatch:
         self._act = _recorded(act, vehicle_count, [actions, arrays.autopilot.setpoint])
         self._observe = _recorded(observe, vehicle_count, [arrays, actions, observations])
         self._judge = _recorded(judge, vehicle_count, [arrays, rewards, is_lost])
+        sources, seeds = wp.zeros(vehicle_count, dtype=int), wp.zeros(vehicle_count, dtype=int)
+        is_chosen = wp.zeros(vehicle_count, dtype=wp.bool)
+        self._sources, self._seeds, self._is_chosen = sources.numpy(), seeds.numpy(), is_chosen.numpy()
+        self._restore = RowRestore(self.rig, _bank(), sources, is_chosen, seeds)
 
     def reset(self, rows: NDArray[np.int64], rng: np.random.Generator) -> None:
         """Starts episodes: chosen vehicles, shape (n,), from hovers drawn at random."""
         draws = rng.integers([START_COUNT, 2**31], size=(rows.size, 2))  # by row: a batch's first is a single vehicle's
-        self.rig.restore(_starts(), rows, draws[:, 0], draws[:, 1])
+        self._sources[rows], self._seeds[rows] = draws[:, 0], draws[:, 1]
+        self._is_chosen[:] = False
+        self._is_chosen[rows] = True
+        self._restore.launch()
         self.actions[rows] = 0.0
         self.step_counts[rows] = 0
         self._observe.launch()
@@ -221,7 +229,7 @@ def _recorded(kernel: Any, vehicle_count: int, inputs: list[Any]) -> Any:
 
 
 @cache
-def _starts() -> Snapshot:
+def _bank() -> Rig:
     """Vehicles that hover near the point, flown there from power-on by the flight controller itself."""
     rig = _rig(START_COUNT, 0)
     rig.advance(_ALIGN_TICKS)
@@ -234,4 +242,4 @@ def _starts() -> Snapshot:
         port.fly_to((north, east, down), rng.uniform(-np.pi, np.pi))
         port.write()
     rig.advance(_CLIMB_TICKS)
-    return rig.snapshot()
+    return rig

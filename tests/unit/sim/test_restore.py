@@ -5,7 +5,7 @@ import warp as wp
 from autopilot.params import parameter_table
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
-from sim.restore import RowRestore, restore_rows
+from sim.restore import RowRestore
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
 from sim.wind import wind_model
@@ -15,13 +15,12 @@ from tests.unit.sim.test_rig import climb, make_rig, of_rows, same_bits
 
 
 def put(rig, bank, rows, sources, seeds):
-    """Restores rows of the rig from rows of the bank, by the kernels."""
-    count = rig.vehicle_count
-    values = np.zeros((3, count), dtype=np.int32)
-    values[0, rows] = 1
-    values[1, rows], values[2, rows] = sources, seeds
-    arrays = (wp.array(values[1], dtype=int), wp.array(values[0].astype(bool), dtype=wp.bool))
-    restore_rows(rig, bank, *arrays, wp.array(values[2], dtype=int))
+    """Restores rows of the rig from rows of the bank."""
+    values = np.zeros((2, rig.vehicle_count), dtype=np.int32)
+    values[:, rows] = sources, seeds
+    is_chosen = np.isin(np.arange(rig.vehicle_count), rows)
+    arrays = [wp.array(values[0], dtype=int), wp.array(is_chosen, dtype=wp.bool), wp.array(values[1], dtype=int)]
+    RowRestore(rig, bank, *arrays).launch()
 
 
 @pytest.fixture(scope="module")
@@ -32,21 +31,39 @@ def bank():
     return rig
 
 
-def test_it_does_what_the_restore_on_the_host_does_and_touches_no_other_row(bank):
-    by_kernel, by_host = make_rig(4), make_rig(4)
-    for rig in (by_kernel, by_host):
-        rig.advance(500)
-    rows, sources, seeds = np.array([0, 3]), np.array([2, 1]), np.array([77, 78])
-    before = by_kernel.snapshot()
-    put(by_kernel, bank, rows, sources, seeds)
-    by_host.restore(bank.snapshot(), rows, sources, seeds)
-    after = by_kernel.snapshot()
-    assert same_bits(after, by_host.snapshot())
+def test_restored_vehicles_take_every_row_and_a_seed_of_their_own_and_no_other_vehicle_is_touched(bank):
+    rig = make_rig(4)
+    rig.advance(500)
+    before, given = rig.snapshot(), bank.snapshot()
+    put(rig, bank, np.array([0, 3]), np.array([2, 1]), np.array([77, 78]))
+    after = rig.snapshot()
     assert same_bits(of_rows(after, [1, 2]), of_rows(before, [1, 2]))
-    assert not same_bits(of_rows(after, [0]), of_rows(before, [0]))
-    for rig in (by_kernel, by_host):
-        rig.advance(100)
-    assert same_bits(by_kernel.snapshot(), by_host.snapshot())
+    is_seed = [rows.tolist() == [77, 0, 0, 78] for rows in after]
+    assert is_seed.count(True) == 1
+    kept = [k for k, is_changed in enumerate(is_seed) if not is_changed]
+    assert len(kept) > 15  # the estimator's covariance and waiting samples are among them
+    assert same_bits([after[k][[0, 3]] for k in kept], [given[k][[2, 1]] for k in kept])
+
+
+def test_a_restored_vehicle_flies_the_same_flight_again():
+    rig, keeper = make_rig(2), make_rig(2)
+    rig.advance(2000)
+    climb(rig, 3.0)
+    put(keeper, rig, np.arange(2), np.arange(2), np.zeros(2))
+    rig.advance(250)
+    first = rig.snapshot()
+    put(rig, keeper, np.arange(2), np.arange(2), np.zeros(2))
+    rig.advance(250)
+    assert same_bits(first, rig.snapshot())
+
+
+def test_a_restored_vehicle_flies_on_with_the_noise_of_its_new_seed(bank):
+    rig = make_rig(2)
+    put(rig, bank, np.arange(2), np.zeros(2, dtype=int), np.array([0, 77]))
+    gyro = rig.arrays.sensors.numpy()["samples"]["imu"]["gyro_frd"]
+    assert np.array_equal(gyro[0], gyro[1])
+    rig.advance(1)
+    assert not np.array_equal(gyro[0], gyro[1])
 
 
 def test_a_recorded_restore_reads_its_arrays_anew(bank):
