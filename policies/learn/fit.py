@@ -11,7 +11,7 @@ from policies.learn.checkpoint import CheckpointError
 from policies.learn.config.run import RunConfig
 from policies.tasks.task import TaskSettings
 
-_OF_PPO = ("shared_critic", "normalize_returns")
+_OF_PPO = ("shared_critic", "privileged_critic", "normalize_returns")
 _OF_SAC = ("buffer_size", "hindsight", "save_replay_buffer")
 _OF_SIGNALS = ("network_settings", "use_actions", "use_vail", "normalize_reward")
 

@@ -6,6 +6,7 @@ from torch import Tensor, nn
 from policies.learn.actions import ActionDistribution, ActionHeads, Actions, bounded
 from policies.learn.config.network import NetworkSettings
 from policies.learn.networks import policy_body
+from policies.learn.seen import Seen
 from policies.tasks.layout import Layout
 
 
@@ -47,19 +48,19 @@ class Policy(nn.Module):
         return torch.zeros(row_count, self.memory_size, device=next(self.parameters()).device)
 
     def forward(
-        self, observations: Tensor, memory: Tensor | None = None, is_start: Tensor | None = None
+        self, observations: Tensor | Seen, memory: Tensor | None = None, is_start: Tensor | None = None
     ) -> ActionDistribution:
         """Of (..., observation), or with memory of (steps, sequences, observation): see `Recurrence.forward`."""
         distribution: ActionDistribution = self.heads(self.body(observations, memory, is_start))
         return distribution
 
     def act(
-        self, observations: Tensor, memory: Tensor, generator: torch.Generator | None = None
+        self, observations: Tensor | Seen, memory: Tensor, generator: torch.Generator | None = None
     ) -> tuple[Actions, Tensor]:
         """One decision per row.
 
         Args:
-            observations: shape (rows, observation).
+            observations: shape (rows, observation); with its image if the layout has one.
             memory: from `start_memory` or from the last decision, shape (rows, memory).
             generator: draws the actions; none: the most probable ones.
 

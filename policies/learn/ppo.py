@@ -18,10 +18,11 @@ from policies.learn import losses
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
 from policies.learn.gae import advantages, cut_at_horizon
 from policies.learn.learner import Companion, Iteration, load_if_fitting, means
-from policies.learn.networks import Body, Critic, policy_body
+from policies.learn.networks import Body, Critic, policy_body, privileged_body
 from policies.learn.policy import Policy
 from policies.learn.rollout import Batch, Rollout
 from policies.learn.schedule import BETA_FLOOR, EPSILON_FLOOR, RATE_FLOOR, scheduled
+from policies.learn.seen import Seen
 from policies.learn.signals.episode_rewards import EpisodeRewards
 from policies.learn.signals.extrinsic import ExtrinsicSignal
 from policies.learn.signals.signal import RewardSignal, Transitions
@@ -30,6 +31,7 @@ from policies.tasks.task import Task
 
 _CRITIC_SEED = 1_000_003  # apart from the policy's: their bodies are to begin with other weights
 _ROWS = 8192  # observations the critic values at once: what they pass through stays in the processor's cache
+_IMAGES = 256  # the same of images
 
 
 class Ppo:
@@ -101,17 +103,19 @@ class Ppo:
     @torch.inference_mode()
     def _collect(self, rollout: Rollout) -> None:
         """T decisions of all environments."""
-        rollout.observations[0] = self.task.observations
+        rollout.begin(self.task)
         for t in range(len(rollout.rewards)):
             if t % rollout.sequence_length == 0:
                 rollout.memories[t // rollout.sequence_length] = self._memory
-            features, memory = self.policy.body.step(rollout.observations[t], self._memory)
+            features, memory = self.policy.body.step(rollout.seen[t], self._memory)
             distribution = self.policy.heads(features)
             actions = distribution.draw(self._generator)
             self.task.step(self.policy.bounded(actions), actions.branches)
             rollout.record(t, actions, distribution.log_probs(actions), self.task)
             self._memory = _forgotten(memory, self.task)
-        self.policy.body.normalize(rollout.observations[:-1])  # the critic's too
+        self.policy.body.normalize(rollout.seen[:-1])  # the critic's too, unless it sees something else
+        if self.critic.body.is_privileged:
+            self.critic.body.normalize(rollout.seen[:-1])
 
     def _rewards(self, rollout: Rollout, transitions: Transitions | None) -> Tensor:
         """Of every signal times its strength, shape (T, N, signals)."""
@@ -142,12 +146,17 @@ class Ppo:
 
     def _values(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
         """Of what each decision saw, and of what came of it, shape (T, N, signals) each."""
-        parts = torch.split(rollout.observations.flatten(0, 1), _ROWS)
-        values = torch.cat([self.critic(part) for part in parts]).view(*rollout.observations.shape[:2], -1)
+        seen = rollout.seen.mapped(lambda part: part.flatten(0, 1))
+        values = self._valued(seen).view(*rollout.observations.shape[:2], -1)
         next_values = values[1:].clone()
-        is_over = rollout.is_over
-        next_values[is_over] = self.critic(rollout.final_observations[is_over])
+        next_values[rollout.is_over] = self._valued(rollout.last_seen())
         return values[:-1], next_values
+
+    def _valued(self, seen: Seen) -> Tensor:
+        """What the critic says of rows, shape (rows, signals)."""
+        size = _ROWS if self.critic.body.encoder is None else _IMAGES
+        count = len(seen.vector)
+        return torch.cat([self.critic(seen[first : first + size]) for first in range(0, max(count, 1), size)])
 
     def _recurrent_values(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
         """As `_values`, with the critic's memory going along, forgetting where episodes end."""
@@ -155,10 +164,9 @@ class Ppo:
         for t, is_over in enumerate(rollout.is_over):
             if t % rollout.sequence_length == 0:
                 rollout.critic_memories[t // rollout.sequence_length] = self._critic_memory
-            value, memory = self.critic.step(rollout.observations[t], self._critic_memory)
-            next_seen = torch.where(is_over[:, None], rollout.final_observations[t], rollout.observations[t + 1])
+            value, memory = self.critic.step(rollout.seen[t], self._critic_memory)
             values.append(value)
-            next_values.append(self.critic.step(next_seen, memory)[0])
+            next_values.append(self.critic.step(rollout.next_seen(t), memory)[0])
             self._critic_memory = memory.masked_fill(is_over[:, None], 0.0)
         return torch.stack(values), torch.stack(next_values)
 
@@ -223,11 +231,11 @@ class Ppo:
         """Of a minibatch, flat, shape (B, features)."""
         sequences = batch.sequences
         if sequences is None:
-            features: Tensor = body(batch.observations)
+            features: Tensor = body(batch.seen)
             return features
         memory = sequences.memory if body is self.policy.body else sequences.critic_memory
-        observations = batch.observations.view(*sequences.is_start.shape, -1)
-        outputs: Tensor = body(observations, memory, sequences.is_start)
+        seen = batch.seen.mapped(lambda part: part.view(*sequences.is_start.shape, *part.shape[1:]))
+        outputs: Tensor = body(seen, memory, sequences.is_start)
         return outputs.flatten(0, 1)
 
     def _teach_signals(self, transitions: Transitions, batch: Batch) -> dict[str, float]:
@@ -240,10 +248,13 @@ class Ppo:
         return statistics
 
     def _critic(self, generator: torch.Generator) -> Critic:
-        """With a body of its own unless it is shared; both see the same, so that one normaliser serves them."""
+        """With a body of its own unless it is shared; one normaliser serves both where they see the same."""
         policy, numbers = self.policy, self.hyperparameters
-        body = policy.body if numbers.shared_critic else policy_body(policy.layout, policy.settings, generator)
-        body.normalizer = policy.body.normalizer
+        if numbers.privileged_critic:
+            body = privileged_body(policy.layout, policy.settings, generator)
+        else:
+            body = policy.body if numbers.shared_critic else policy_body(policy.layout, policy.settings, generator)
+            body.normalizer = policy.body.normalizer
         return Critic(body, len(self.signals), generator, normalizes=numbers.normalize_returns)
 
     def _store(self, task: Task) -> Rollout:

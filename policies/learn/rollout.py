@@ -11,9 +11,10 @@ import torch
 from torch import Tensor
 
 from policies.learn.actions import Actions, bounded
+from policies.learn.seen import Seen
 from policies.learn.signals.signal import Transitions
 from policies.learn.tensors import TaskTensors
-from policies.tasks.layout import Layout
+from policies.tasks.layout import ImageElement, Layout
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,13 +22,18 @@ class Batch:
     """Rows of a rollout, B of them; of recurrent policies, sequences after one another step by step."""
 
     rows: Tensor  # (B,), indices into the flat rollout
-    observations: Tensor  # (B, observation)
+    seen: Seen  # (B, ...)
     actions: Actions  # (B, ...)
     log_probs: Tensor  # (B, heads)
     values: Tensor  # (B, signals)
     advantages: Tensor  # (B,)
     returns: Tensor  # (B, signals)
     sequences: "Sequences | None"
+
+    @property
+    def observations(self) -> Tensor:
+        """The floats, shape (B, observation)."""
+        return self.seen.vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +66,18 @@ class Rollout:
         def zeros(*sizes: int, dtype: torch.dtype = torch.float32) -> Tensor:
             return torch.zeros(sizes, dtype=dtype, device=device)
 
-        self.observations = zeros(steps + 1, envs, layout.observation_size)
-        self.final_observations = zeros(steps, envs, layout.observation_size)  # of value where an episode ended
+        def seen(count: int, *, image: ImageElement | None) -> Seen:
+            return Seen(
+                zeros(count, envs, layout.observation_size),
+                zeros(count, envs, *image.shape, dtype=torch.uint8) if image is not None else None,
+                zeros(count, envs, len(layout.privileged)) if layout.privileged else None,
+            )
+
+        self.seen = seen(steps + 1, image=layout.image)
+        self.final_seen = seen(steps, image=None)  # of value where an episode ended
+        self.final_images: list[Tensor] = []  # by decision, of the episodes that ended with it: ends are few
+        self.observations = self.seen.vector
+        self.final_observations = self.final_seen.vector
         self.actions = Actions(
             zeros(steps, envs, len(layout.continuous)), zeros(steps, envs, len(layout.branches), dtype=torch.int64)
         )
@@ -91,16 +107,41 @@ class Rollout:
         """What came of each decision; where the episode ended, what it saw last. Shape (T, N, observation)."""
         return torch.where(self.is_over[..., None], self.final_observations, self.observations[1:])
 
+    def begin(self, task: TaskTensors) -> None:
+        """Notes what the first decision sees."""
+        self.seen.write(0, task.seen)
+        self.final_images.clear()
+
     def record(self, t: int, actions: Actions, log_probs: Tensor, task: TaskTensors) -> None:
-        """Notes the decision `t` and what came of it; `observations[t]` lies here already."""
+        """Notes the decision `t` and what came of it; what it saw lies here already."""
         self.actions.continuous[t] = actions.continuous
         self.actions.branches[t] = actions.branches
         self.log_probs[t] = log_probs
         self.rewards[t] = task.rewards
         self.is_terminated[t] = task.is_terminated
         self.is_truncated[t] = task.is_truncated
-        self.final_observations[t] = task.final_observations
-        self.observations[t + 1] = task.observations
+        self.final_seen.write(t, task.final_seen)
+        self.seen.write(t + 1, task.seen)
+        if task.final_seen.image is not None:
+            self.final_images.append(task.final_seen.image[task.is_terminated | task.is_truncated])
+
+    def next_seen(self, t: int) -> Seen:
+        """What came of the decisions `t`; where the episode ended, what it saw last. Shape (N, ...)."""
+        is_over = self.is_over[t]
+        following, last = self.seen[t + 1], self.final_seen[t]
+        vector, image, privileged = following.vector, following.image, following.privileged
+        if image is not None:
+            image = image.clone()
+            image[is_over] = self.final_images[t]
+        if privileged is not None and last.privileged is not None:
+            privileged = torch.where(is_over[:, None], last.privileged, privileged)
+        return Seen(torch.where(is_over[:, None], last.vector, vector), image, privileged)
+
+    def last_seen(self) -> Seen:
+        """What the episodes that ended saw last, a row each, in the order of `is_over`."""
+        last = self.final_seen[self.is_over]
+        image = torch.cat(self.final_images) if self.seen.image is not None else None
+        return Seen(last.vector, image, last.privileged)
 
     def transitions(self) -> Transitions:
         """As reward signals see it, (T, N)."""
@@ -148,7 +189,7 @@ class Rollout:
 
         return Batch(
             rows,
-            pick(self.observations[:-1]),
+            self.seen[:-1].mapped(pick),
             Actions(pick(self.actions.continuous), pick(self.actions.branches)),
             pick(self.log_probs),
             pick(self.values),

@@ -6,6 +6,7 @@ import torch
 import warp as wp
 from torch import Tensor
 
+from policies.learn.seen import Seen
 from policies.tasks.task import Task
 
 
@@ -22,6 +23,11 @@ class TaskTensors:
         self.final_images = _tensor(border.final_images)
         self.privileged = _tensor(border.privileged)  # (envs, privileged elements)
         self.final_privileged = _tensor(border.final_privileged)
+        layout = task.layout
+        image, final_image = (self.images, self.final_images) if layout.image is not None else (None, None)
+        privileged, final_privileged = (self.privileged, self.final_privileged) if layout.privileged else (None, None)
+        self.seen = Seen(self.observations, image, privileged)
+        self.final_seen = Seen(self.final_observations, final_image, final_privileged)
         self.rewards: Tensor = wp.to_torch(border.rewards)  # (envs,)
         self.outcomes: Tensor = wp.to_torch(border.outcomes)
         self.is_terminated: Tensor = wp.to_torch(border.is_terminated)

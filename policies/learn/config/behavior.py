@@ -68,6 +68,8 @@ class PpoHyperparameters(HyperparametersBase):
     """Passes over the buffer per update."""
     shared_critic: bool = False
     """Whether actor and critic share one body."""
+    privileged_critic: bool = own_key(False)
+    """Whether the critic sees the task's privileged elements in place of its image; the policy never does."""
     target_kl: PositiveOrNone = own_key(None)
     """An update ends early when the policy has moved this far (mean KL); none: never."""
     normalize_returns: bool = own_key(False)
@@ -76,6 +78,12 @@ class PpoHyperparameters(HyperparametersBase):
     """Whether the ratio is of the whole action, not of each branch and dimension by itself."""
     normalize_advantages: Literal["buffer", "minibatch", "none"] = own_key("buffer")
     """Over what advantages are brought to mean 0 and deviation 1."""
+
+    @model_validator(mode="after")
+    def _one_body_sees_one_thing(self) -> Self:
+        if self.privileged_critic and self.shared_critic:
+            raise ValueError("privileged_critic: cannot be with shared_critic: a shared body sees what the policy sees")
+        return self
 
 
 class SacHyperparameters(HyperparametersBase):

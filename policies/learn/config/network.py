@@ -6,7 +6,7 @@ from pydantic import field_validator
 
 from policies.learn.config.block import Block, Count, NotNegativeWhole, own_key
 
-Encoder = Literal["simple", "nature_cnn", "resnet", "match3", "fully_connected"]
+Encoder = Literal["simple", "nature_cnn", "resnet", "match3", "fully_connected", "compact"]
 
 
 class Memory(Block):
@@ -35,7 +35,7 @@ class NetworkSettings(Block):
     normalize: bool = False
     """Whether vector observations are normalised by their running mean and variance."""
     vis_encode_type: Encoder = "simple"
-    """Encoder of images; no effect yet: no task shows its policy any."""
+    """Encoder of images, if the task shows any; `compact` is our own: half the work of `simple`."""
     goal_conditioning_type: Literal["hyper", "none"] = "hyper"
     """Whether goal elements of the observation drive a hyper-network; no effect without a goal signal."""
     goal_signal: bool = own_key(False)

@@ -11,8 +11,8 @@ from policies.tasks.layout import Element, ImageElement, Layout
 from policies.tasks.numbers import Number, typed_rows
 from policies.tasks.task import Task
 
-SIDE = 24  # [px]
-HALF = wp.constant(3)  # [px] half a side of the square
+SIDE = 32  # [px]
+HALF = wp.constant(4)  # [px] half a side of the square
 
 
 @wp.struct

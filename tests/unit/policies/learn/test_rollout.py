@@ -5,7 +5,8 @@ import torch
 
 from policies.learn.actions import Actions
 from policies.learn.rollout import Rollout
-from policies.tasks.layout import Branch, Element, Layout
+from policies.learn.seen import Seen
+from policies.tasks.layout import Branch, Element, ImageElement, Layout
 
 STEPS, ENVS, LENGTH = 12, 5, 4
 LAYOUT = Layout(
@@ -14,6 +15,8 @@ LAYOUT = Layout(
     frame=(Element("trace", "1"), Element("twice", "1")),
     continuous=(Element("push", "1"),),
     branches=(Branch("gear", ("a", "b")),),
+    image=ImageElement(2, 3, ("decision", "environment", "is_last")),
+    privileged=(Element("minus_trace", "1"),),
 )
 ENDS = [(3, 0), (0, 1), (11, 2), (5, 3), (6, 3)]  # (decision, environment)
 
@@ -31,15 +34,18 @@ class TracedTask:
         self.is_terminated = torch.tensor(here) & ~self.is_truncated
         self.decision += 1
         self.rewards = self.traces + self.decision
-        self.final_observations = self.seen(0.5)
+        self.final_seen = self.traced(0.5)
 
-    def seen(self, more=0.0):
+    def traced(self, more=0.0):
+        """Floats of 1000 x environment + decision; images of decision, environment, and whether it was the last."""
         trace = self.traces + self.decision + more
-        return torch.stack((trace, 2.0 * trace), -1)
+        image = torch.tensor([[self.decision, env, 1 if more else 0] for env in range(ENVS)], dtype=torch.uint8)
+        image = image[:, None, None].expand(-1, 2, 3, -1)
+        return Seen(torch.stack((trace, 2.0 * trace), -1), image, -trace[:, None])
 
     @property
-    def observations(self):
-        return self.seen()
+    def seen(self):
+        return self.traced()
 
 
 @pytest.fixture(params=[0, 6], ids=["feed-forward", "recurrent"])
@@ -47,7 +53,7 @@ def rollout(request):
     memory = (request.param, LENGTH if request.param else 1)
     made = Rollout(LAYOUT, (STEPS, ENVS), 1, memory, torch.device("cpu"))
     task = TracedTask()
-    made.observations[0] = task.observations
+    made.begin(task)
     for t in range(STEPS):
         trace = made.observations[t, :, :1]
         if t % made.sequence_length == 0:
@@ -79,6 +85,24 @@ def test_next_observations_are_what_ended_episodes_saw_last(rollout):
     assert torch.equal(rollout.next_observations()[..., 0], expected)
 
 
+def test_images_and_privileged_elements_are_those_of_the_floats(rollout):
+    image = rollout.seen.image.long()
+    assert torch.equal(1000 * image[:, :, 1, 2, 1] + image[:, :, 0, 0, 0], rollout.observations[..., 0].long())
+    assert not image[..., 2].any()
+    assert torch.equal(rollout.seen.privileged[..., 0], -rollout.observations[..., 0])
+    for t in range(STEPS):
+        following = rollout.next_seen(t)
+        assert torch.equal(following.vector, rollout.next_observations()[t])
+        assert torch.equal(following.privileged[:, 0], -following.vector[:, 0])
+        assert following.image[:, 0, 0, 1].tolist() == list(range(ENVS))
+        assert following.image[:, 1, 1, 0].tolist() == [t + 1] * ENVS
+        assert torch.equal(following.image[:, 0, 0, 2].bool(), rollout.is_over[t])
+    last = rollout.last_seen()
+    assert last.image[:, 0, 0, :2].tolist() == [[decision + 1, env] for decision, env in sorted(ENDS)]
+    assert torch.equal(last.vector[:, 0], -last.privileged[:, 0])
+    assert (last.vector[:, 0] % 1 == 0.5).all()
+
+
 def test_transitions_carry_the_actions_the_task_took(rollout):
     transitions = rollout.transitions()
     assert torch.equal(transitions.continuous[..., 0], traces().clamp(max=3.0) / 3.0)
@@ -91,6 +115,9 @@ def test_a_minibatch_keeps_what_belongs_together(rollout):
         trace = batch.observations[:, 0]
         assert torch.equal(traces().flatten()[batch.rows], trace)
         assert torch.equal(batch.observations[:, 1], 2.0 * trace)
+        assert torch.equal(batch.seen.privileged[:, 0], -trace)
+        assert torch.equal(batch.seen.image[:, 1, 1, 0], (trace % 1000).byte())
+        assert torch.equal(batch.seen.image[:, 0, 2, 1], (trace // 1000).byte())
         assert torch.equal(batch.actions.continuous[:, 0], trace)
         assert torch.equal(batch.actions.branches[:, 0], trace.long() % 2)
         assert torch.equal(batch.log_probs, -trace[:, None].expand(-1, 2))

@@ -33,7 +33,7 @@ def test_another_image_is_refused_and_other_privileged_elements_are_not():
     frame = (Element("side", "1", is_goal=True),)
     image = ImageElement(SIDE, SIDE, ("red", "green", "blue"))
     smaller = Layout("Squares", 1, frame, LAYOUT.continuous, image=ImageElement(SIDE, 12, ("red",)))
-    with pytest.raises(LayoutError, match="image is 24 x 12 of red there and 24 x 24 of red, green, blue here"):
+    with pytest.raises(LayoutError, match="image is 32 x 12 of red there and 32 x 32 of red, green, blue here"):
         LAYOUT.require(smaller, "policy")
     with pytest.raises(LayoutError, match="image is none there"):
         LAYOUT.require(Layout("Squares", 1, frame, LAYOUT.continuous), "policy")
