@@ -1,0 +1,232 @@
+import numpy as np
+import pytest
+
+from common.attitude import product, quat_of
+from policies.tracker import OwnerTracker, PhoneReport, Sighting, TrackerSettings, sighting_axes_ned
+from sim.owner import Owner
+from sim.world.people import RUN_SPEED_M_S, person_model
+from sim.world.world import WorldConfig, build_world
+
+OWNERS = 20
+DECISION_US = 100_000
+SECONDS = 30.0
+S = TrackerSettings()
+OWN_STD_M, OWN_TIME_S = 0.6, 60.0  # the vehicle's own place
+Q_RDF_LEVEL = (0.5, 0.5, 0.5, 0.5)  # forward camera: right is east, down is down, forward is north
+
+
+class Walks:
+    """Owners that walk, what a camera that follows them sees, and what their phones say."""
+
+    def __init__(self, speed_max_m_s, owners=OWNERS, seed=11):
+        world = build_world(
+            WorldConfig(seed=3, size_m=256.0, hill_height_m=8.0, hill_wavelength_m=120.0, trees_per_ha=100.0)
+        )
+        owner = Owner(world, np.zeros((owners, 3)), seed, model=person_model(speed_max_m_s))
+        self.owners = owners
+        self.steps = int(SECONDS * 1e6 / DECISION_US)
+        shape = (self.steps, owners, 3)
+        self.pos, self.vel = np.empty(shape), np.empty(shape)
+        self.reports = [[None] * owners for _ in range(self.steps)]
+        self.rng = np.random.default_rng(seed)
+        own = OWN_STD_M * self.rng.standard_normal((owners, 3))
+        own_rate = np.zeros((owners, 3))
+        for k in range(self.steps):
+            for part in range(5):
+                owner.step_to(25 * k + 5 * part)
+                for i, fix in enumerate(owner.phones.numpy()["fix"]):
+                    if fix["is_new"]:
+                        self.reports[k][i] = PhoneReport(
+                            int(fix["time_us"]), fix["pos_ned"].copy(), fix["vel_ned"].copy()
+                        )
+            # the vehicle's own error drifts smoothly: its filter has no jumps
+            own_rate += -0.1 * own_rate + 0.01 * np.sqrt(0.2) * self.rng.standard_normal((owners, 3))
+            own = own * np.exp(-0.1 / OWN_TIME_S) + 0.1 * own_rate
+            rows = owner.people.numpy()
+            self.pos[k] = rows["pos_ned"] - [0.0, 0.0, 1.0] + own  # the chest in the vehicle's frame
+            self.vel[k] = rows["vel_ned"] + own_rate
+        yaw = self.rng.uniform(-np.pi, np.pi, owners)
+        self.offset = np.stack([-2.0 * np.cos(yaw), -2.0 * np.sin(yaw), np.full(owners, -0.7)], axis=-1)
+        self.yaw = yaw
+
+    def camera(self, k, i):
+        """Where the camera is: about 2 m behind the owner."""
+        return self.pos[k, i] + self.offset[i] + 0.3 * np.sin(0.1 * k + np.arange(3))
+
+    def sighting(self, k, i, has_range=True):
+        """The owner as the camera of vehicle i sees them at decision k, with noise."""
+        camera = self.camera(k, i)
+        way = self.pos[k, i] - camera
+        distance = float(np.linalg.norm(way))
+        cos, sin = np.cos(self.yaw[i]), np.sin(self.yaw[i])
+        forward, right, down = cos * way[0] + sin * way[1], cos * way[1] - sin * way[0], way[2]
+        noise = self.rng.standard_normal(3)
+        return Sighting(
+            float(np.arctan2(right, forward)) + S.direction_std_rad * noise[0],
+            float(np.arctan2(-down, np.hypot(forward, right))) + S.direction_std_rad * noise[1],
+            distance + (S.range_std_m + S.range_std_share * distance) * noise[2] if has_range else None,
+            camera,
+            product(quat_of(self.yaw[i], 0.0), Q_RDF_LEVEL),
+        )
+
+
+def track(walks, i, is_seen, is_heard, has_range=True):
+    """Tracks at all decisions of one owner; `is_seen(k)` and `is_heard(k)` say what there is."""
+    tracker = OwnerTracker()
+    tracks = []
+    for k in range(walks.steps):
+        time_us = k * DECISION_US
+        report = walks.reports[k][i]
+        if report is not None and is_heard(k):
+            tracker.hear(time_us, report)
+        if is_seen(k):
+            tracker.see(time_us, walks.sighting(k, i, has_range))
+        tracks.append(tracker.at(time_us))
+    return tracks
+
+
+def errors(walks, i, tracks):
+    return np.array([t.pos_ned for t in tracks]) - walks.pos[:, i], np.array([t.vel_ned for t in tracks]) - walks.vel[
+        :, i
+    ]
+
+
+def normalised(error, cov):
+    return np.einsum("ki,ki->k", error, np.linalg.solve(cov, error[..., None])[..., 0])
+
+
+@pytest.fixture(scope="module")
+def walks():
+    return Walks(RUN_SPEED_M_S)
+
+
+def always(_k):
+    return True
+
+
+def never(_k):
+    return False
+
+
+def not_the_last_3_s_of_10(k):
+    return k % 100 < 70
+
+
+@pytest.fixture(scope="module")
+def tracked(walks):
+    return [track(walks, i, always, always) for i in range(OWNERS)]
+
+
+def test_error_is_as_large_as_the_covariance_says(walks, tracked):
+    both = [errors(walks, i, tracked[i]) for i in range(OWNERS)]
+    pos = np.array([normalised(both[i][0], np.array([t.pos_cov for t in tracked[i]])) for i in range(OWNERS)])
+    vel = np.array([normalised(both[i][1], np.array([t.vel_cov for t in tracked[i]])) for i in range(OWNERS)])
+    for nees in (pos, vel):
+        mean = nees[:, 10:].mean(axis=0)
+        # chi-square of three degrees of freedom, mean of the owners: 99.9 % below
+        limit = 3.0 + 3.1 * np.sqrt(6.0 / OWNERS)
+        assert (mean < limit).mean() > 0.97  # people start and stop more suddenly than a normal distribution has it
+        assert 1.0 < mean.mean() < 4.0
+
+
+def test_owner_in_the_picture_is_placed_within_centimetres(walks, tracked):
+    off = [np.linalg.norm(errors(walks, i, tracked[i])[0], axis=1)[10:] for i in range(OWNERS)]
+    assert np.sqrt(np.mean(np.square(off))) < 0.25
+
+
+def end_of_gap(walks, is_seen, is_heard, owners=10):
+    off = [np.linalg.norm(errors(walks, i, track(walks, i, is_seen, is_heard))[0], axis=1) for i in range(owners)]
+    return np.array(off)[:, 99::100]
+
+
+def test_phone_carries_the_track_while_the_owner_is_hidden_for_3_s(walks):
+    off = end_of_gap(walks, not_the_last_3_s_of_10, always)
+    assert np.median(off) < 1.0  # the phone alone is 2 m off on average, and taught by the camera less
+
+
+def test_camera_carries_the_track_while_the_phone_is_silent_for_3_s(walks):
+    assert end_of_gap(walks, always, not_the_last_3_s_of_10).max() < 1.0
+
+
+def test_covariance_grows_and_ages_count_while_both_are_missing_for_3_s(walks):
+    tracks = track(walks, 0, not_the_last_3_s_of_10, not_the_last_3_s_of_10)
+    before, after = tracks[69], tracks[99]
+    assert np.trace(after.pos_cov) > 10.0 * np.trace(before.pos_cov)
+    assert after.seen_age_s == pytest.approx(3.0)
+    assert after.heard_age_s > 3.0
+
+
+def test_owner_without_phone_is_tracked_by_direction_alone(walks):
+    tracker = OwnerTracker()
+    for k in range(100):
+        tracker.see(k * DECISION_US, walks.sighting(k, 0, has_range=False))
+        ray = sighting_axes_ned(walks.sighting(k, 0))[0]
+    towards = tracker.at(99 * DECISION_US).pos_ned - walks.camera(99, 0)
+    assert np.linalg.norm(np.cross(ray, towards)) < 0.3 * np.linalg.norm(towards)
+
+
+def still_owner(tracker, decisions, start=0, pos=(5.0, 1.0, -1.0)):
+    for k in range(start, start + decisions):
+        tracker.hear(k * 100_000, PhoneReport(k * 100_000 - 300_000, pos, (0.0, 0.0, 0.0)))
+        tracker.see(k * 100_000, Sighting(0.0, 0.0, 5.0, (pos[0] - 5.0, pos[1], pos[2]), Q_RDF_LEVEL))
+
+
+def test_wild_sighting_and_wild_report_are_rejected():
+    tracker = OwnerTracker()
+    still_owner(tracker, 40)
+    before = tracker.at(4_000_000)
+    assert not tracker.see(4_000_000, Sighting(0.6, 0.0, 5.0, (0.0, 1.0, -1.0), Q_RDF_LEVEL))
+    assert not tracker.see(4_000_000, Sighting(0.0, 0.0, 9.0, (0.0, 1.0, -1.0), Q_RDF_LEVEL))
+    assert not tracker.hear(4_000_000, PhoneReport(3_700_000, (25.0, 1.0, -1.0), (0.0, 0.0, 0.0)))
+    after = tracker.at(4_000_000)
+    assert after.pos_ned.tobytes() == before.pos_ned.tobytes()
+
+
+def test_sightings_that_insist_are_believed():
+    tracker = OwnerTracker()
+    still_owner(tracker, 40)
+    for k in range(40, 60):
+        tracker.see(k * 100_000, Sighting(0.0, 0.0, 5.0, (0.0, 6.0, -1.0), Q_RDF_LEVEL))
+    np.testing.assert_allclose(tracker.at(6_000_000).pos_ned, [5.0, 6.0, -1.0], atol=0.3)
+
+
+def test_late_reports_of_a_moving_owner_do_not_lag():
+    tracker = OwnerTracker()
+    for k in range(40):
+        valid_s = 0.5 * k
+        tracker.hear(
+            int(1e6 * (valid_s + 0.3)), PhoneReport(int(1e6 * valid_s), (3.0 * valid_s, 0.0, 0.0), (3.0, 0.0, 0.0))
+        )
+    at = tracker.at(20_000_000)
+    np.testing.assert_allclose(at.pos_ned, [60.0, 0.0, 0.0], atol=0.3)
+    np.testing.assert_allclose(at.vel_ned, [3.0, 0.0, 0.0], atol=0.1)
+
+
+def test_camera_teaches_the_error_of_the_phone():
+    tracker = OwnerTracker()
+    for k in range(60):
+        tracker.hear(k * 100_000, PhoneReport(k * 100_000, (7.0, 3.0, -2.0), (0.0, 0.0, 0.0)))
+        tracker.see(k * 100_000, Sighting(0.0, 0.0, 5.0, (0.0, 1.0, -1.0), Q_RDF_LEVEL))
+    for k in range(60, 90):  # hidden, and off to the north
+        tracker.hear(k * 100_000, PhoneReport(k * 100_000, (7.0 + 0.1 * (k - 60), 3.0, -2.0), (1.0, 0.0, 0.0)))
+    np.testing.assert_allclose(tracker.at(8_900_000).pos_ned, [7.9, 1.0, -1.0], atol=0.3)
+
+
+def test_same_inputs_give_the_same_track_however_often_it_is_asked(walks):
+    asked, unasked = OwnerTracker(), OwnerTracker()
+    for k in range(50):
+        sighting = walks.sighting(k, 0)
+        asked.see(k * DECISION_US, sighting)
+        unasked.see(k * DECISION_US, sighting)
+        for part in range(3):
+            asked.at(k * DECISION_US + 30_000 * part)
+    first, second = asked.at(5_000_000), unasked.at(5_000_000)
+    assert first.pos_ned.tobytes() == second.pos_ned.tobytes()
+    assert first.pos_cov.tobytes() == second.pos_cov.tobytes()
+
+
+def test_nothing_is_known_before_the_first_measurement():
+    tracker = OwnerTracker()
+    assert not tracker.at(1_000_000).is_known
+    still_owner(tracker, 1, start=10)
+    assert tracker.at(1_000_000).is_known
