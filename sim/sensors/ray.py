@@ -19,6 +19,7 @@ GROUND = wp.constant(1)
 TRUNK = wp.constant(2)
 CROWN = wp.constant(3)
 WALL = wp.constant(4)
+PERSON = wp.constant(5)  # drawn by the fast camera only
 
 RAY_MAX_M = wp.constant(4000.0)  # beyond it fog hides everything
 _NEVER = wp.constant(1.0e30)

@@ -1,0 +1,189 @@
+"""The ground round a camera as columns of distances, and where a pixel's ray meets it.
+
+A column looks along one level direction: at each of its distances it holds the steepest slope under which any ground
+up to there is seen. A ray meets the ground between the two distances whose slopes enclose its own; a few Newton steps
+on the world's exact surface give the place. Where a neighbouring ridge misleads a ray, it walks on along the distances.
+"""
+
+import warp as wp
+
+from sim.sensors.quick.flags import FAST
+from sim.sensors.quick.ground import Ground, surface
+from sim.sensors.quick.solids import NEVER
+from sim.sensors.quick.view import View, face_length, level_direction, pseudo_angle
+
+wp.set_module_options(FAST)
+
+_NEWTON_STEPS = wp.constant(4)
+_WALK_BACK = wp.constant(2)  # samples that a misled ray goes back
+_SECANT_STEPS = wp.constant(8)
+_STEEP = wp.constant(1.5)  # rays this much steeper than the first sample's need no column
+
+
+@wp.struct
+class Columns:
+    """The columns of all cameras."""
+
+    slopes: wp.array[float]  # running maxima, (cameras, room, samples)
+    distances: wp.array[float]  # [m], (cameras, samples)
+    room: int
+    samples: int
+
+
+@wp.struct
+class Found:
+    """Where a ray meets the ground."""
+
+    t: float  # NEVER if it does not
+    k: int  # sample at its end of the search: the next pixel's is near
+
+
+@wp.struct
+class LevelRay:
+    """A ray over the map: changes per unit of t."""
+
+    u: float  # [cells] to the north
+    v: float  # [cells] to the east
+    climb: float  # [m]
+    ahead: float  # [m] along the heading
+    right: float
+
+
+@wp.func
+def level_ray(view: View, cells_per_m: float, ray_ned: wp.vec3) -> LevelRay:
+    """A ray as it goes over the map."""
+    level = LevelRay()
+    level.u = ray_ned[0] * cells_per_m
+    level.v = ray_ned[1] * cells_per_m
+    level.climb = -ray_ned[2]
+    level.ahead = ray_ned[0] * view.heading[0] + ray_ned[1] * view.heading[1]
+    level.right = ray_ned[1] * view.heading[0] - ray_ned[0] * view.heading[1]
+    return level
+
+
+@wp.kernel
+def lay_columns(ground: Ground, views: wp.array[View], is_chosen: wp.array[wp.bool], columns: Columns) -> None:
+    i_camera, i_column = wp.tid()
+    if not is_chosen[i_camera]:
+        return
+    view = views[i_camera]
+    if i_column >= view.columns:
+        return
+    direction = level_direction(view.angle_low + float(i_column) / view.columns_per_angle)
+    per_m = ground.cells_per_m
+    u_rate = per_m * (direction[0] * view.heading[0] - direction[1] * view.heading[1])
+    v_rate = per_m * (direction[0] * view.heading[1] + direction[1] * view.heading[0])
+    u = (view.pos_ned[0] + ground.half_size_m) * per_m
+    v = (view.pos_ned[1] + ground.half_size_m) * per_m
+    first = (i_camera * columns.room + i_column) * columns.samples
+    first_distance = i_camera * columns.samples
+    steepest = float(-NEVER)
+    for k in range(columns.samples):
+        distance = columns.distances[first_distance + k]
+        height = surface(ground, view.cell_base, u + distance * u_rate, v + distance * v_rate)[0]
+        steepest = wp.max(steepest, (height + view.pos_ned[2]) / distance)
+        columns.slopes[first + k] = steepest
+
+
+@wp.func
+def ground_depth(
+    ground: Ground, columns: Columns, view: View, i_camera: int, ray: LevelRay, k_start: int, t_max: float
+) -> Found:
+    """Where a ray meets the ground before `t_max`; NEVER if it does not, or surely only behind it."""
+    found = Found()
+    found.k = k_start
+    found.t = NEVER
+    major = face_length(ray.ahead, ray.right)
+    low = float(0.0)
+    high = float(t_max)
+    t = view.above_ground / wp.max(-ray.climb, 1.0e-6)
+    if ray.climb * view.first_m > -_STEEP * view.above_ground * major:
+        inverse = 1.0 / major
+        slope = ray.climb * inverse
+        place = (pseudo_angle(ray.ahead, ray.right) - view.angle_low) * view.columns_per_angle
+        left = wp.clamp(int(place), 0, view.columns - 2)
+        share = place - float(left)
+        first = (i_camera * columns.room + left) * columns.samples
+        last = columns.samples - 1
+        skyline_left = columns.slopes[first + last]
+        skyline_right = columns.slopes[first + columns.samples + last]
+        if slope > skyline_left + share * (skyline_right - skyline_left):
+            return found
+        if (share > 0.5 and slope <= skyline_right) or slope > skyline_left:
+            first = first + columns.samples
+        k = wp.min(k_start, last)
+        while k < last and columns.slopes[first + k] < slope:
+            k = k + 1
+        while k > 0 and columns.slopes[first + k - 1] >= slope:
+            k = k - 1
+        found.k = k
+        first_distance = i_camera * columns.samples
+        far = columns.distances[first_distance + k]
+        high = wp.min(high, far * inverse)
+        if k > 0:
+            near = columns.distances[first_distance + k - 1]
+            low = near * inverse
+            if low >= t_max:
+                return found
+            # between two samples level ground has a slope that is linear in one over the distance
+            slope_near = columns.slopes[first + k - 1]
+            part = (slope - slope_near) / wp.max(columns.slopes[first + k] - slope_near, 1.0e-6)
+            t = near * far * inverse / wp.max(far + part * (near - far), 1.0e-6)
+        t = wp.clamp(t, low, high)
+    u = (view.pos_ned[0] + ground.half_size_m) * ground.cells_per_m
+    v = (view.pos_ned[1] + ground.half_size_m) * ground.cells_per_m
+    for _ in range(_NEWTON_STEPS):
+        here = surface(ground, view.cell_base, u + t * ray.u, v + t * ray.v)
+        gap = ray.climb * t - view.pos_ned[2] - here[0]
+        rate = wp.min(ray.climb - here[1] * ray.u - here[2] * ray.v, -1.0e-4)
+        step = -gap / rate
+        t_next = wp.clamp(t + step, low, high)
+        if wp.abs(step) < 0.005 + 0.0005 * t:
+            found.t = t_next
+            return found
+        t = t_next
+    return walk(ground, columns, view, i_camera, ray, found.k, t_max)
+
+
+@wp.func
+def walk(
+    ground: Ground, columns: Columns, view: View, i_camera: int, ray: LevelRay, k_start: int, t_max: float
+) -> Found:
+    """Where a ray meets the ground: from sample to sample until it is under it, then by regula falsi."""
+    found = Found()
+    found.k = k_start
+    found.t = NEVER
+    u = (view.pos_ned[0] + ground.half_size_m) * ground.cells_per_m
+    v = (view.pos_ned[1] + ground.half_size_m) * ground.cells_per_m
+    inverse = 1.0 / face_length(ray.ahead, ray.right)
+    first = i_camera * columns.samples
+    low = float(0.0)
+    gap_low = view.above_ground
+    k = wp.max(k_start - _WALK_BACK, 0)
+    if k > 0:
+        low = columns.distances[first + k - 1] * inverse
+        gap_low = (
+            ray.climb * low - view.pos_ned[2] - surface(ground, view.cell_base, u + low * ray.u, v + low * ray.v)[0]
+        )
+    while k < columns.samples and low < t_max:
+        high = columns.distances[first + k] * inverse
+        gap = (
+            ray.climb * high - view.pos_ned[2] - surface(ground, view.cell_base, u + high * ray.u, v + high * ray.v)[0]
+        )
+        if gap <= 0.0:
+            gap_high = float(gap)
+            for _ in range(_SECANT_STEPS):
+                t = low + (high - low) * wp.clamp(gap_low / wp.max(gap_low - gap_high, 1.0e-6), 0.02, 0.98)
+                gap = ray.climb * t - view.pos_ned[2] - surface(ground, view.cell_base, u + t * ray.u, v + t * ray.v)[0]
+                if gap > 0.0:
+                    low = t
+                    gap_low = gap
+                else:
+                    high = t
+                    gap_high = gap
+            found.t = low + (high - low) * wp.clamp(gap_low / wp.max(gap_low - gap_high, 1.0e-6), 0.0, 1.0)
+            return found
+        low = high
+        gap_low = gap
+        k = k + 1
+    return found

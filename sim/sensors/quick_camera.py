@@ -1,0 +1,163 @@
+"""The fast camera: colours, depth and classes of many small pictures, thousands a second on one core, or on a GPU.
+
+In: lenses, which kernels write, one per camera; the worlds; the person each camera looks for. Out: 8-bit sRGB, depth
+along the optical axis and classes, in arrays that stay where they are. For training and onboard cameras at 10 Hz; the
+exact and slower renderer is `sim.sensors.camera`. Camera frame rdf.
+"""
+
+from math import ceil, pi, radians, tan
+from typing import Any, Protocol
+
+import numpy as np
+import warp as wp
+
+from sim.sensors.camera import Lens
+from sim.sensors.quick.colours import make_paints
+from sim.sensors.quick.columns import Columns, lay_columns
+from sim.sensors.quick.ground import make_ground, pack
+from sim.sensors.quick.prepare import prepare_views
+from sim.sensors.quick.rows import Outputs, draw_rows
+from sim.sensors.quick.solids import Sights, Solid
+from sim.sensors.quick.view import View
+from sim.world.trees import BUCKET_M
+from sim.world.world import World, WorldConfig, WorldMap
+
+RANGE_M = 80.0
+SAMPLES = 48  # distances per column at the default range
+_LIMBS = 24  # solids of a person
+_CROWDED = 2.0  # trees stand closer in places than on average
+
+
+class Worlds(Protocol):
+    """Many worlds of one configuration, as `sim.world.batch.WorldBatch`."""
+
+    @property
+    def config(self) -> WorldConfig:
+        """Of all of them."""
+
+    @property
+    def kernels(self) -> Any:
+        """Array of `World`, shape (worlds,)."""
+
+
+class QuickCamera:
+    """So many cameras in one world or in many.
+
+    Args:
+        worlds: what is seen, its arrays on `device`.
+        count: number of cameras.
+        width: of each picture [pixels].
+        height: of each picture [pixels].
+        hfov_deg: horizontal field of view the lenses begin with.
+        people: array of `Person`, shape (count,): row i is seen by camera i alone, stature 0 is nobody; None for none.
+        i_world: the world of each camera; None: the only one, or camera i looks at world i.
+        range_m: fog hides what is farther; farther ground and trees are not drawn.
+        device: a Warp device.
+
+    Attributes:
+        lenses: array of `sim.sensors.camera.Lens`, shape (count,), for kernels to write.
+        rgb: uint8, (count, height, width, 3).
+        depth_m: float32, (count, height, width), along the optical axis; `sim.sensors.camera.SKY_DEPTH_M` for the sky.
+        kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON of `sim.sensors.ray`. From inside a
+            tree or person all pixels are that, at depth 0.
+        i_world: array of int, shape (count,).
+    """
+
+    def __init__(
+        self,
+        worlds: Worlds | WorldMap,
+        count: int,
+        *,
+        width: int = 64,
+        height: int = 64,
+        hfov_deg: float = 90.0,
+        people: Any = None,
+        i_world: Any = None,
+        range_m: float = RANGE_M,
+        device: str = "cpu",
+    ) -> None:
+        config = worlds.config
+        if isinstance(worlds, WorldMap):
+            self._worlds = wp.array([worlds.kernel], dtype=World, device=device)
+        else:
+            self._worlds = worlds.kernels
+        world_count = len(self._worlds)
+        if i_world is None:
+            if world_count not in (1, count):
+                raise ValueError(f"{count} cameras and {world_count} worlds: say which camera looks at which world")
+            i_world = np.arange(count) % world_count
+        self.i_world = wp.array(i_world, dtype=wp.int32, device=device)
+        self.lenses = wp.array(_first_lens(hfov_deg, count), dtype=Lens, device=device)
+        self.rgb = wp.zeros((count, height, width, 3), dtype=wp.uint8, device=device)
+        self.depth_m = wp.zeros((count, height, width), dtype=wp.float32, device=device)
+        self.kind = wp.zeros((count, height, width), dtype=wp.uint8, device=device)
+        self._buckets = max(1, ceil(config.size_m / BUCKET_M))
+        self._ground = make_ground(config, world_count, device)
+        self._everyone = wp.full(count, value=True, dtype=wp.bool, device=device)
+        outputs = Outputs()
+        outputs.rgb, outputs.depth_m, outputs.kind = self.rgb.flatten(), self.depth_m.flatten(), self.kind.flatten()
+        outputs.front = wp.zeros(count * height * width, dtype=wp.int32, device=device)
+        outputs.width, outputs.height = width, height
+        views = wp.zeros(count, dtype=View, device=device)
+        columns = _columns(count, width, range_m, device)
+        sights = _sights(count, _solids_room(config, range_m), device)
+        size, paints = wp.vec2i(width, height), make_paints(device)
+        ground, chosen = self._ground, self._everyone
+        seen = [self._worlds, self.i_world, self.lenses, people, chosen, ground, range_m, size, views, columns, sights]
+        drawn = [ground, paints, views, chosen, columns, sights, range_m, outputs]
+        self._prepare = wp.launch(prepare_views, dim=count, inputs=seen, device=device, record_cmd=True)
+        lay, columns_dim = [ground, views, chosen, columns], (count, columns.room)
+        self._lay = wp.launch(lay_columns, dim=columns_dim, inputs=lay, device=device, record_cmd=True)
+        self._draw = wp.launch(draw_rows, dim=(count, height), inputs=drawn, device=device, record_cmd=True)
+        self._device = device
+        self.refresh()
+
+    def refresh(self, is_chosen: Any = None) -> None:
+        """Packs worlds that are new: array of bool, shape (worlds,); None for all."""
+        if is_chosen is None:
+            is_chosen = wp.full(len(self._worlds), value=True, dtype=wp.bool, device=self._device)
+        pack(self._ground, self._worlds, self._buckets, is_chosen)
+
+    def render(self, is_chosen: Any = None) -> None:
+        """Takes the pictures of the chosen cameras: array of bool, shape (count,); None for all."""
+        chosen = self._everyone if is_chosen is None else is_chosen
+        self._prepare.set_param_at_index(4, chosen)
+        self._lay.set_param_at_index(2, chosen)
+        self._draw.set_param_at_index(3, chosen)
+        self._prepare.launch()
+        self._lay.launch()
+        self._draw.launch()
+
+
+def _first_lens(hfov_deg: float, count: int) -> Any:
+    """Rows of `Lens` at the origin that look north."""
+    kernel_type: Any = Lens
+    rows = np.zeros(count, kernel_type.numpy_dtype())
+    rows["q_ned_from_rdf"] = (0.5, 0.5, 0.5, 0.5)
+    rows["half_width"] = tan(0.5 * radians(hfov_deg))
+    rows["exposure"] = 1.0
+    rows["balance"] = 1.0
+    return rows
+
+
+def _columns(count: int, width: int, range_m: float, device: str) -> Any:
+    columns = Columns()
+    columns.room = max(16, 2 * width)
+    columns.samples = round(SAMPLES * max(1.0, (range_m / RANGE_M) ** 0.4))
+    columns.slopes = wp.zeros(count * columns.room * columns.samples, dtype=wp.float32, device=device)
+    columns.distances = wp.zeros(count * columns.samples, dtype=wp.float32, device=device)
+    return columns
+
+
+def _sights(count: int, room: int, device: str) -> Any:
+    sights = Sights()
+    sights.room = room
+    sights.solids = wp.zeros(count * room, dtype=Solid, device=device)
+    sights.boxes = wp.zeros(count * room, dtype=wp.vec4i, device=device)
+    return sights
+
+
+def _solids_room(config: WorldConfig, range_m: float) -> int:
+    """How many solids a camera can list: two per tree in a third of the circle of its range, and a person."""
+    area_ha = min(pi * range_m**2 / 3.0, config.size_m**2) * 1.0e-4
+    return _LIMBS + 32 + ceil(2.0 * _CROWDED * config.trees_per_ha * area_ha)
