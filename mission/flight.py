@@ -7,7 +7,7 @@ the scripting client, then the recorder. With the memory link alone it is a pure
 from collections.abc import Callable, Sequence
 from math import isnan, nan
 from pathlib import Path
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Literal, Protocol, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -23,7 +23,7 @@ from autopilot.mavlink.signing import SigningConfig
 from autopilot.node import FlightController, HostPorts
 from autopilot.params import parameter_table
 from autopilot.persistence import Persistence
-from autopilot.vehicle import Severity
+from autopilot.vehicle import Mode, Severity
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer
 from common.folder import ConfinedFolder
@@ -34,6 +34,7 @@ from common.records import row_reader
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
 from mission.client import Running
+from mission.follow.owner import FollowedOwner, OwnerConfig
 from mission.injection import RigInjector
 from mission.log_shelf import FlightLogs, RunLog
 from mission.recorder import History, Recorder
@@ -47,7 +48,11 @@ from sim.sensors.ring import RingSensor
 from sim.sensors.sensors import sensor_model
 from sim.turntable import Turntable
 from sim.wind import wind_model
+from sim.world.batch import grown_world
 from sim.world.world import WorldConfig, WorldMap, build_world
+
+if TYPE_CHECKING:
+    from mission.follow.onboard import OnboardCamera
 
 TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
 DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (PX4, ARDUPILOT)}
@@ -80,7 +85,15 @@ class FlightConfig(BaseModel):
     parameters: dict[str, float] = {}
     """Values of the flight controller's parameters that differ from their defaults, by name."""
     world: WorldConfig = WorldConfig()
-    """The ground."""
+    """The ground; with an owner: grown as in training, from its seed."""
+    owner: OwnerConfig | None = None
+    """Who walks through the world with a phone, to be followed; the vehicle then carries a camera for its companion."""
+
+
+class Computer(Protocol):
+    """A companion computer on board, in lockstep with the flight."""
+
+    def frame(self, time_us: int) -> None: ...
 
 
 class Flight:
@@ -109,7 +122,7 @@ class Flight:
     ) -> None:
         self.config = config
         self.airframe: Airframe = load_airframe(config.airframe)
-        self.world: WorldMap = build_world(config.world)
+        self.world: WorldMap = flight_world(config)
         self.rig = Rig(
             self.airframe,
             self.world,
@@ -147,6 +160,11 @@ class Flight:
         self._surroundings = Surroundings(
             self.controller, self.rig, config.traffic_count, ring, config.home, config.seed
         )
+        self.owner: FollowedOwner | None = None
+        self.onboard: OnboardCamera | None = None
+        if config.owner is not None:
+            links = [*links, *self._carry_camera(config.owner)]
+        self.computers: list[Computer] = []
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
         on_frame = None if self._tlog is None else self._tlog.frame
@@ -182,14 +200,28 @@ class Flight:
             self.persistence.keep_home(self.controller.commander.home)
             self.persistence.on_trouble = lambda text: self.server.statustext(Severity.WARNING, text)
 
+    def _carry_camera(self, config: OwnerConfig) -> Sequence[Link]:
+        """Brings the owner and the onboard camera in; the phone's link."""
+        from mission.follow.onboard import OnboardCamera  # what a policy sees is defined beside the policies
+
+        self.owner = FollowedOwner(config, self.world, self.config.seed, self.config.home)
+        self.onboard = OnboardCamera(self.rig, self.world)
+        return [self.owner.vehicle_end]
+
     def frame(self) -> None:
         """Advances by 20 ms."""
         self._injector.frame(self.time_us)
         self.rig.advance(FRAME_TICKS)
         self.time_us += FRAME_US
         self._surroundings.frame(self.time_us)
+        if self.owner is not None:
+            self.owner.frame(self.time_us, is_followed=self.controller.state.mode is Mode.OFFBOARD)
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
+        if self.onboard is not None:
+            self.onboard.frame(self.time_us)
+        for computer in self.computers:
+            computer.frame(self.time_us)
         if self.stream is not None:
             self.stream.frame()
         if self._flight_logs is not None:
@@ -246,6 +278,13 @@ class Flight:
         if self._tlog is not None:
             self._tlog.close()
         return self.recorder.close()
+
+
+def flight_world(config: FlightConfig) -> WorldMap:
+    """The ground of a flight."""
+    if config.owner is not None:
+        return grown_world(config.world, config.world.seed)
+    return build_world(config.world)
 
 
 def host_files(folder: Path | None, state: StateFolder | None) -> ConfinedFolder | None:

@@ -93,6 +93,10 @@ class Owner:
         """The time of `people`, since the start."""
         return self._tick * TICK_US
 
+    def change_model(self, model: Any) -> None:
+        """They move by another model from the next plan on: a person who waited sets off."""
+        self._given[1] = model
+
     def step_to(self, tick: int) -> bool:
         """Moves on to the last multiple of PERSON_TICKS at or before a tick; true if a phone reported on the way."""
         has_report = False

@@ -73,6 +73,7 @@ class Companion:
         self.engagement = Engagement(is_told=is_told)
         self.latencies_s: deque[float] = deque(maxlen=LATENCIES_KEPT)  # picture in to setpoint out
         self.decision_count = 0
+        self.seen: Floats = np.zeros(0, dtype=np.float32)  # the vector that was decided on last
         self.trouble = ""  # why it does not fly
         self._camera = camera
         self._pilot = pilot
@@ -144,6 +145,7 @@ class Companion:
     def _decide(self, picture: ImageFrame, time_us: int) -> None:
         own = self.vehicle.own
         vector = self._observer.vector(own, self.vehicle.owner, self._action, time_us)
+        self.seen = vector.copy()
         self._action = self._pilot.act(vector, picture.pixels)
         self._setpoint = self._observer.setpoint(self._action, own)
         self.decision_count += 1
@@ -154,6 +156,7 @@ class Companion:
             time_us=time_us,
             is_offboard=own.mode in (Mode.OFFBOARD, Mode.GUIDED),
             is_airborne=own.is_armed and not own.is_on_ground,
+            is_holding=own.mode is Mode.HOLD,
             mode_name=own.mode_name,
             trouble=self.trouble,
             is_refused=self.vehicle.take_refusal(),

@@ -48,6 +48,7 @@ class Situation:
     time_us: int  # on the companion's own clock
     is_offboard: bool  # the vehicle's mode, as last heard
     is_airborne: bool  # armed, and not on the ground
+    is_holding: bool  # in mode Hold: waiting for whatever comes next
     mode_name: str = ""  # for the pilot to read
     trouble: str = ""  # why the policy cannot fly now; "" if it can
     is_refused: bool = False  # the vehicle has refused Offboard since the last step
@@ -66,7 +67,7 @@ class Engagement:
     """The state machine.
 
     Args:
-        is_told: to engage as soon as everything is there; once.
+        is_told: to engage as soon as everything is there and the vehicle holds in the air; once.
     """
 
     def __init__(self, *, is_told: bool = False) -> None:
@@ -108,7 +109,7 @@ class Engagement:
             return self._go(Phase.WAITING, now, text=f"Companion: not ready: {now.trouble}")
         if is_chosen and now.is_airborne:
             return self._go(Phase.FLYING, now, Sending.POLICY, text="Companion: following")
-        if self._is_told and now.is_airborne and not now.is_offboard:
+        if self._is_told and now.is_airborne and now.is_holding:  # never out of a takeoff, a landing or a return
             self._is_told = False
             return self._ask(Phase.ENGAGING, now, Wish.OFFBOARD)
         return Orders(Sending.STAY)

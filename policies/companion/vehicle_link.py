@@ -27,11 +27,11 @@ REQUEST_US = 5_000_000  # rates are asked for again: the vehicle may have restar
 TEXT_LENGTH = 50  # characters of one STATUSTEXT
 NEVER_US = -(1 << 62)
 
-# What is asked for, and how often [Hz]. The autopilot's own default rates on a ground station's link are lower.
+# What is asked for, and how often [Hz]: in training nothing that is seen is older than a frame of 20 ms
 RATES_HZ = {
     "ATTITUDE_QUATERNION": 50.0,
     "LOCAL_POSITION_NED": 50.0,
-    "DISTANCE_SENSOR": 20.0,
+    "DISTANCE_SENSOR": 50.0,
     "EXTENDED_SYS_STATE": 5.0,
     "GPS_GLOBAL_ORIGIN": 1.0,
 }
@@ -75,7 +75,7 @@ class Own:
     range_us: int = NEVER_US
     heartbeat_us: int = NEVER_US
     is_armed: bool = False
-    is_on_ground: bool = True
+    is_on_ground: bool = True  # or just taking off, or landing
     mode: Mode | None = None
     mode_name: str = "unknown"
     origin: GeoPoint | None = None  # of the local frame
@@ -204,7 +204,7 @@ class VehicleLink:
         elif name == "HEARTBEAT":
             self._heartbeat_told(fields, time_us)
         elif name == "EXTENDED_SYS_STATE":
-            own.is_on_ground = fields.landed_state == LandedState.ON_GROUND
+            own.is_on_ground = fields.landed_state != LandedState.IN_AIR
         elif name == "GPS_GLOBAL_ORIGIN":
             own.origin = GeoPoint(
                 degrees_from_e7(fields.latitude), degrees_from_e7(fields.longitude), fields.altitude * 1.0e-3

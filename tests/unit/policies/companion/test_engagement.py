@@ -24,9 +24,9 @@ class Bench:
         self.machine = Engagement(is_told=is_told)
         self.time_us = 0
 
-    def step(self, *, trouble="", offboard=False, airborne=True, refused=False, after_us=STEP_US):
+    def step(self, *, trouble="", offboard=False, airborne=True, holding=True, refused=False, after_us=STEP_US):
         self.time_us += after_us
-        situation = Situation(self.time_us, offboard, airborne, "Position", trouble, refused)
+        situation = Situation(self.time_us, offboard, airborne, holding, "Position", trouble, refused)
         return self.machine.step(situation)
 
     @property
@@ -98,6 +98,7 @@ def test_offboard_chosen_before_everything_was_there_does_not_engage_later():
 def test_told_to_engage_it_asks_for_offboard_once_airborne_and_again_until_it_comes():
     bench = Bench(is_told=True).ready()
     assert bench.step(airborne=False).wish is Wish.NONE
+    assert bench.step(holding=False).wish is Wish.NONE
     orders = bench.step()
     assert (bench.phase, orders.wish, orders.sending) == (Phase.ENGAGING, Wish.OFFBOARD, Sending.STAY)
     assert bench.step().wish is Wish.NONE

@@ -1,0 +1,51 @@
+"""A flight with its companion on board, in one process and simulated time: the same flight byte for byte each time.
+
+In: what the flight is made from, and who flies. Out: the flight, ready to be advanced; its companion speaks MAVLink
+over a link in memory and gets the camera's pictures from memory, and is otherwise the one that flies as a process.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from autopilot.mavlink.links import Link, LinkRole, LinkSource, memory_pair
+from mission.flight import Flight, FlightConfig
+from mission.script import Drone
+from policies.companion.camera import MemoryCamera
+from policies.companion.companion import Companion, Pilot
+
+TAKEOFF_M = 2.5  # the vehicle's least; the policy goes on from there
+
+
+def flight_with_companion(
+    config: FlightConfig,
+    pilot: Pilot,
+    *,
+    is_told: bool = True,
+    links: Sequence[Link | LinkSource] = (),
+    folder: Path | None = None,
+) -> tuple[Flight, Companion]:
+    """A flight, and the companion on board, which engages as soon as the vehicle hovers.
+
+    Args:
+        config: with an owner.
+        pilot: who flies.
+        is_told: False: it waits for the pilot to choose Offboard.
+        links: of ground stations.
+        folder: of the logs.
+    """
+    vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
+    flight = Flight(config, links=[vehicle_end, *links], folder=folder)
+    if flight.onboard is None:
+        raise ValueError("a companion needs a flight with an owner")
+    camera = MemoryCamera()
+    flight.onboard.add_sink(camera.publish)
+    companion = Companion(companion_end, camera, pilot, is_told=is_told)
+    flight.computers.append(companion)
+    return flight, companion
+
+
+async def take_off(drone: Drone) -> None:
+    """Up to where a companion takes over."""
+    await drone.wait_ready()
+    await drone.arm()
+    await drone.takeoff(TAKEOFF_M)

@@ -1,0 +1,153 @@
+"""A companion on board a flight in lockstep: it follows, sees what training sees, and gives control back."""
+
+from math import dist
+
+import numpy as np
+import pytest
+import warp as wp
+
+from autopilot.mavlink.codec import FrameReader, decode
+from autopilot.mavlink.links import LinkRole, memory_pair
+from autopilot.vehicle import Mode
+from common.geodesy import ned_from_geodetic
+from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.owner import PHONE_SYSTEM
+from policies.companion.companion import IMAGE_OLD_US, OWNER_LOST_US, TELEMETRY_OLD_US
+from policies.companion.engagement import Phase
+from policies.companion.observation import REPORT_LAG_S
+from policies.experts.follower import ScriptedFollower
+from policies.tasks.flight.own import OwnState
+from policies.tasks.flight.vehicle import own_state
+from policies.tasks.follow_me.observe import EGO, OwnerReport, observe_rows, vector_elements
+from sim.advance import RigArrays
+from tests.unit.mission.follow_flight import advance, config, following, lose
+
+
+@wp.kernel
+def read_own(rig: RigArrays, own: wp.array(dtype=OwnState)):
+    own[0] = own_state(rig, 0, 1)
+
+
+def distance_m(flight):
+    pos = flight.rig.arrays.body.numpy()[0]["pos_ned"]
+    return dist(tuple(map(float, pos)), flight.owner.chest_ned)
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """A companion that has followed for 12 s."""
+    flight, companion = following()
+    advance(flight, 12.0)
+    return flight, companion
+
+
+def test_the_owner_waits_until_the_vehicle_follows():
+    flight, companion = flight_with_companion(config(), ScriptedFollower(), is_told=False)
+    flight.fly(take_off, seconds=40.0)
+    advance(flight, 5.0)
+    assert companion.phase is Phase.READY
+    assert not flight.owner.is_walking
+    assert flight.owner.vel_ned == (0.0, 0.0, 0.0)
+
+
+def test_a_scripted_follower_with_a_good_phone_stays_in_the_band():
+    flight, _ = following(phone_error=0.0)
+    distances = []
+    flight.run(lambda f: distances.append(distance_m(f)) or len(distances) >= 1000)
+    inside = np.mean((np.array(distances) >= 1.0) & (np.array(distances) <= 3.2))
+    assert flight.owner.is_walking
+    assert inside > 0.95
+
+
+def test_the_companion_sees_what_training_sees(flown):
+    flight, companion = flown
+    while True:  # up to a frame with a decision
+        count, action = companion.decision_count, companion._action.copy()
+        flight.frame()
+        if companion.decision_count > count:
+            break
+    own, report = wp.zeros(1, dtype=OwnState), wp.zeros(1, dtype=OwnerReport)
+    wp.launch(read_own, 1, [flight.rig.arrays, own])
+    fix = flight.owner._phone[0]["fix"]
+    row = report.numpy()[0]
+    row["pos_ned"], row["vel_ned"] = fix["pos_ned"], fix["vel_ned"]
+    row["age_s"], row["is_known"] = (flight.time_us - int(fix["time_us"])) * 1e-6, 1
+    out = wp.zeros((1, len(vector_elements(int(EGO)))), dtype=float)
+    actions = wp.array([action], dtype=wp.vec4)
+    wp.launch(observe_rows, 1, [int(EGO), own, report, actions, out])
+    # a frame of 20 ms of the report's way, centimetres of the range finder and of latitudes
+    assert companion.seen == pytest.approx(out.numpy()[0], abs=0.025)
+    exact = [k for k, element in enumerate(vector_elements(int(EGO))) if "owner" not in element.name]
+    assert companion.seen[exact] == pytest.approx(out.numpy()[0][exact], abs=2e-3)
+
+
+def test_the_phone_is_heard_through_the_vehicle_with_its_lag(flown):
+    flight, companion = flown
+    fix = flight.owner._phone[0]["fix"]
+    assert companion.vehicle.owner.pos_ned == pytest.approx([float(x) for x in fix["pos_ned"]], abs=0.05)
+    lag_s = (companion.vehicle.owner.arrived_us - int(fix["time_us"])) * 1e-6
+    assert lag_s == pytest.approx(REPORT_LAG_S, abs=0.05)
+
+
+def test_a_ground_station_hears_the_phone_too():
+    vehicle_end, station_end = memory_pair(LinkRole.GROUND)
+    flight, _ = flight_with_companion(config(phone_error=0.0), ScriptedFollower(), links=[vehicle_end])
+    advance(flight, 6.0)
+    reader = FrameReader()
+    messages = [decode(frame) for data in station_end.receive() for frame in reader.feed(data)]
+    reports = [message for message in messages if message.name == "FOLLOW_TARGET" and message.sysid == PHONE_SYSTEM]
+    assert 8 <= len(reports) <= 12
+    fields = reports[-1].fields
+    pos = ned_from_geodetic(fields.lat * 1e-7, fields.lon * 1e-7, fields.alt, flight.config.home)
+    assert pos == pytest.approx(flight.owner.chest_ned, abs=0.05)
+
+
+def test_pictures_that_stop_end_in_hold_within_the_stated_time():
+    flight, companion = following()
+    flight.onboard._sinks.clear()
+    stopped_us = flight.time_us
+    advance(flight, 3.0, lambda: flight.controller.state.mode is Mode.HOLD)
+    assert flight.controller.state.mode is Mode.HOLD
+    assert flight.time_us - stopped_us <= IMAGE_OLD_US + 200_000
+    advance(flight, 0.2)
+    assert any("hold: no pictures" in text for text in flight.drone.texts)
+    assert companion.phase is Phase.RELEASED
+
+
+def test_telemetry_that_stops_ends_in_hold_within_the_stated_time():
+    flight, companion = following()
+    lose(companion, "LOCAL_POSITION_NED")
+    stopped_us = flight.time_us
+    advance(flight, 3.0, lambda: flight.controller.state.mode is Mode.HOLD)
+    assert flight.controller.state.mode is Mode.HOLD
+    assert flight.time_us - stopped_us <= TELEMETRY_OLD_US + 200_000
+
+
+def test_an_owner_lost_for_five_seconds_ends_in_hold():
+    flight, companion = following()
+    lose(companion, "FOLLOW_TARGET")
+    stopped_us = companion.vehicle.owner.arrived_us
+    advance(flight, 8.0, lambda: flight.controller.state.mode is Mode.HOLD)
+    assert flight.controller.state.mode is Mode.HOLD
+    assert flight.time_us - stopped_us == pytest.approx(OWNER_LOST_US, abs=200_000)
+    assert companion.trouble == "owner lost"
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.POSITION])
+def test_the_pilots_mode_stops_every_setpoint(mode):
+    flight, companion = following()
+    if mode is Mode.POSITION:
+        flight.drone.send("MANUAL_CONTROL", target=1, x=0, y=0, z=500, r=0, buttons=0)
+        flight.frame()
+    sub = 3 if mode is Mode.HOLD else 0
+    main = 4 if mode is Mode.HOLD else 3
+    flight.drone.send(
+        "COMMAND_LONG", target_system=1, target_component=1, command=176, param1=1, param2=main, param3=sub
+    )
+    advance(flight, 0.1)
+    assert flight.controller.state.mode is mode
+    assert companion.phase is Phase.RELEASED
+    decisions = companion.decision_count
+    advance(flight, 10.0)
+    assert flight.controller.state.mode is not Mode.OFFBOARD
+    assert companion.decision_count == decisions
