@@ -24,6 +24,7 @@ SCRIPTS = (
     "batch",
     "threads",
     "scaling",
+    "worlds",
     "hover",
     "environments",
     "training",

@@ -15,6 +15,7 @@ from sim.world.growing import (
     COVERAGE,
     PHASES,
     ROUNDS,
+    Grid,
     Growing,
     WorldNumbers,
     choose,
@@ -173,14 +174,16 @@ class WorldBatch:
         growing.seeds = self._zeros(count, wp.int32)
         growing.chosen = self._zeros(count, wp.int32)
         growing.chosen_count = self._zeros(1, wp.int32)
+        growing.grids = self._zeros(count, Grid)
         growing.middle = self._zeros(count, wp.float32)
         growing.highest = self._zeros(count, wp.float32)
         growing.ground_max_m = self._zeros(count, wp.float32)
         growing.edge_max_m = self._zeros(count, wp.float32)
         side_m = max(0.0, config.size_m - 2.0 * EDGE_M)
-        growing.most_cells = ceil(side_m * sqrt(2.0) / _spacing_m(growing.trees_per_ha_max))
+        # one more: in float32 the quotient may round up
+        growing.most_cells = ceil(side_m * sqrt(2.0) / _spacing_m(growing.trees_per_ha_max)) + 1
         empty = wp.vec2(1.0e9, 1.0e9)
-        growing.points = wp.full((count, max(1, growing.most_cells**2)), empty, dtype=wp.vec2, device=self.device)
+        growing.points = wp.full((count, growing.most_cells**2), empty, dtype=wp.vec2, device=self.device)
 
     def _record(self) -> list[Any]:
         """The launches that grow the chosen worlds, in order."""
@@ -191,8 +194,7 @@ class WorldBatch:
         launches: list[tuple[Any, tuple[int, ...], list[Any]]] = [
             (kernel, (groups, rows), []) for kernel in (raise_noise, find_highest, shape_hills)
         ]
-        if places > 0:
-            launches += [(plant, (groups, places, places), [visit]) for visit in range(ROUNDS * PHASES)]
+        launches += [(plant, (groups, places, places), [visit]) for visit in range(ROUNDS * PHASES)]
         launches.append((settle, (groups,), []))
         return [
             wp.launch(kernel, dim, inputs=[growing, groups, *more], device=self.device, record_cmd=True)

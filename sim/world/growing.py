@@ -7,6 +7,7 @@ are those of `terrain.make_heights`, in float32; the trees stand on Poisson-disc
 
 import warp as wp
 
+import common.kernels  # noqa: F401  (starts Warp quietly)
 from sim.streams import HILLS, TREE_PLACES, TREE_SIZES
 from sim.world.terrain import LACUNARITY, PERSISTENCE, Terrain, terrain_height
 from sim.world.trees import (
@@ -62,6 +63,18 @@ class WorldNumbers:
 
 
 @wp.struct
+class Grid:
+    """The planting grid of one world: cells that hold one point at most."""
+
+    side_m: float
+    spacing_m: float
+    cell_m: float
+    cells: int  # per side
+    keep_out_m: float  # radius round home without trees
+    tree_height_max_m: float
+
+
+@wp.struct
 class Growing:
     """A batch of worlds and what is needed to grow them; arrays have one row per world."""
 
@@ -70,6 +83,7 @@ class Growing:
     seeds: wp.array[wp.int32]
     chosen: wp.array[wp.int32]  # indices of the worlds to grow, the first `chosen_count`
     chosen_count: wp.array[wp.int32]  # (1,)
+    grids: wp.array[Grid]
     middle: wp.array[wp.float32]  # noise at home
     highest: wp.array[wp.float32]  # largest rise or fall of the noise from there
     ground_max_m: wp.array[wp.float32]
@@ -82,16 +96,6 @@ class Growing:
 
 
 @wp.struct
-class Grid:
-    """The planting grid of one world: cells that hold one point at most."""
-
-    side_m: float
-    spacing_m: float
-    cell_m: float
-    cells: int  # per side
-
-
-@wp.struct
 class BucketSpan:
     """The rows and columns of buckets that list a tree, ends included."""
 
@@ -101,14 +105,31 @@ class BucketSpan:
     column_high: int
 
 
+@wp.func
+def planting_grid(growing: Growing, i_world: int) -> Grid:
+    """The planting grid of a world, within the limits of the batch; no cells when it has no trees."""
+    numbers = growing.numbers[i_world]
+    grid = Grid()
+    grid.tree_height_max_m = wp.min(numbers.tree_height_max_m, growing.tree_height_limit_m)
+    grid.keep_out_m = numbers.clearing_radius_m + _CROWN_RADIUS_MOST * grid.tree_height_max_m
+    grid.side_m = 2.0 * (growing.worlds[i_world].terrain.half_size_m - _EDGE_M)
+    density = wp.min(numbers.trees_per_ha, growing.trees_per_ha_max)
+    if density > 0.0 and grid.side_m > 0.0:
+        grid.spacing_m = wp.sqrt(COVERAGE * _SQUARE_M_PER_HA / density)
+        grid.cell_m = grid.spacing_m * _SQRT_HALF
+        grid.cells = wp.min(int(wp.ceil(grid.side_m / grid.cell_m)), growing.most_cells)
+    return grid
+
+
 @wp.kernel(enable_backward=False)
 def choose(growing: Growing, is_chosen: wp.array[wp.bool], seeds: wp.array[wp.int32]) -> None:
-    """Lists the chosen worlds, in any order, and takes their seeds."""
+    """Lists the chosen worlds, in any order, takes their seeds and lays out their planting grids."""
     i_world = wp.tid()
     if not is_chosen[i_world]:
         return
     growing.chosen[wp.atomic_add(growing.chosen_count, 0, 1)] = i_world
     growing.seeds[i_world] = seeds[i_world]
+    growing.grids[i_world] = planting_grid(growing, i_world)
     growing.highest[i_world] = 0.0
     growing.ground_max_m[i_world] = -1.0e9
     growing.edge_max_m[i_world] = -1.0e9
@@ -237,26 +258,6 @@ def shape_hills(growing: Growing, groups: int) -> None:
 
 
 @wp.func
-def tree_height_max_m(growing: Growing, numbers: WorldNumbers) -> float:
-    """Height of the highest trees of a world [m], within the limit that its buckets are made for."""
-    return wp.min(numbers.tree_height_max_m, growing.tree_height_limit_m)
-
-
-@wp.func
-def planting_grid(growing: Growing, i_world: int) -> Grid:
-    """The planting grid of a world; no cells when it has no trees."""
-    grid = Grid()
-    density = wp.min(growing.numbers[i_world].trees_per_ha, growing.trees_per_ha_max)
-    grid.side_m = 2.0 * (growing.worlds[i_world].terrain.half_size_m - _EDGE_M)
-    if density > 0.0 and grid.side_m > 0.0:
-        grid.spacing_m = wp.sqrt(COVERAGE * _SQUARE_M_PER_HA / density)
-        grid.cell_m = grid.spacing_m * _SQRT_HALF
-        # the upper rows of a grid too large, by rounding, for the store go without
-        grid.cells = wp.min(int(wp.ceil(grid.side_m / grid.cell_m)), growing.most_cells)
-    return grid
-
-
-@wp.func
 def is_free(points: wp.array2d[wp.vec2], i_world: int, grid: Grid, row: int, column: int, dart: wp.vec2) -> bool:
     """Whether no point of the neighbouring cells is nearer to the dart than the spacing."""
     for i in range(wp.max(row - 2, 0), wp.min(row + 3, grid.cells)):
@@ -273,7 +274,7 @@ def plant(growing: Growing, groups: int, visit: int) -> None:
     group, place_row, place_column = wp.tid()
     for slot in range(group, growing.chosen_count[0], groups):
         i_world = growing.chosen[slot]
-        grid = planting_grid(growing, i_world)
+        grid = growing.grids[i_world]
         key = wp.rand_init(growing.seeds[i_world], TREE_PLACES)
         # each world and round begins at another ninth
         phase = (visit + int(wp.rand_init(int(key), visit // PHASES) % wp.uint32(PHASES))) % PHASES
@@ -281,8 +282,6 @@ def plant(growing: Growing, groups: int, visit: int) -> None:
         column = 3 * place_column + phase % 3
         cell = row * grid.cells + column
         if row < grid.cells and column < grid.cells and growing.points[i_world, cell][0] == _EMPTY:
-            numbers = growing.numbers[i_world]
-            keep_out_m = numbers.clearing_radius_m + _CROWN_RADIUS_MOST * tree_height_max_m(growing, numbers)
             middle = wp.vec2(0.5 * grid.side_m, 0.5 * grid.side_m)
             state = wp.rand_init(int(wp.rand_init(int(key), ROUNDS + visit // PHASES)), cell)
             has_landed = bool(False)
@@ -290,7 +289,7 @@ def plant(growing: Growing, groups: int, visit: int) -> None:
                 north = (float(row) + wp.randf(state)) * grid.cell_m
                 east = (float(column) + wp.randf(state)) * grid.cell_m
                 dart = wp.vec2(north, east)
-                if not has_landed and wp.max(north, east) < grid.side_m and wp.length(dart - middle) > keep_out_m:
+                if not has_landed and wp.max(north, east) < grid.side_m and wp.length(dart - middle) > grid.keep_out_m:
                     if is_free(growing.points, i_world, grid, row, column, dart):
                         growing.points[i_world, cell] = dart
                         has_landed = True
@@ -339,10 +338,9 @@ def collect_trees(growing: Growing, i_world: int, forest: Forest) -> Forest:
 
     Empties the planting grid for the next time. A tree for which the store has no room is left out.
     """
-    grid = planting_grid(growing, i_world)
+    grid = growing.grids[i_world]
     terrain = growing.worlds[i_world].terrain
     numbers = growing.numbers[i_world]
-    height_max_m = tree_height_max_m(growing, numbers)
     sizes_key = wp.rand_init(growing.seeds[i_world], TREE_SIZES)
     for bucket in range(forest.bucket_start.shape[0]):
         forest.bucket_start[bucket] = 0
@@ -354,7 +352,9 @@ def collect_trees(growing: Growing, i_world: int, forest: Forest) -> Forest:
         point = growing.points[i_world, cell]
         if point[0] != _EMPTY:
             growing.points[i_world, cell] = wp.vec2(_EMPTY, _EMPTY)
-            tree = grown_tree(terrain, numbers, height_max_m, point - corner, wp.rand_init(int(sizes_key), cell))
+            tree = grown_tree(
+                terrain, numbers, grid.tree_height_max_m, point - corner, wp.rand_init(int(sizes_key), cell)
+            )
             span = bucket_span(forest, tree)
             wanted = (span.row_high - span.row_low + 1) * (span.column_high - span.column_low + 1)
             if tree_count < forest.trees.shape[0] and entries + wanted <= forest.bucket_trees.shape[0]:

@@ -74,6 +74,11 @@ def test_a_world_of_many_equals_the_one_of_a_batch_of_one():
     assert grown_world(CONFIG, 9).config == CONFIG.model_copy(update={"seed": 9})
 
 
+def test_the_room_of_a_batch_changes_no_world_that_fits():
+    roomy = grown(1, trees_per_ha_max=600.0, tree_height_limit_m=30.0)
+    assert bytes_of(roomy, 0) == bytes_of(grown(1), 0)
+
+
 def test_growing_some_worlds_leaves_every_byte_of_the_others():
     batch = grown(4)
     before = [bytes_of(batch, i) for i in range(4)]
