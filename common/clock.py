@@ -18,6 +18,11 @@ def wall_time_s() -> float:
     return time.perf_counter()
 
 
+def wall_sleep_s(seconds: float) -> None:
+    """Lets the wall clock run on, while simulated time stands still."""
+    time.sleep(seconds)
+
+
 def wall_unix_us() -> int:
     """Unix time in microseconds; it steps when the machine's clock is set."""
     return time.time_ns() // 1000

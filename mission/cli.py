@@ -73,6 +73,8 @@ def fly(
     stream_port: Annotated[
         int, typer.Option(min=0, max=65535, help="HTTP port of the camera's live picture; 0: none.")
     ] = 0,
+    view: Annotated[bool, typer.Option("--view", help="Show the flight on a live page in the browser.")] = False,
+    view_port: Annotated[int, typer.Option(min=1, max=65535, help="HTTP port of the live page.")] = 8080,
     traffic: Annotated[int, typer.Option(min=0, max=50, help="Other aircraft that are heard by ADS-B.")] = 0,
     lidar: Annotated[bool, typer.Option("--lidar", help="Carry a ring of range finders that looks round.")] = False,
     param: Annotated[
@@ -95,7 +97,7 @@ def fly(
                 trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, bind=bind,
                 tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
                 run_folder=run_folder, stream_port=stream_port, parameters=tuple(param or ()), state=state,
-                traffic_count=traffic, has_lidar=lidar,
+                traffic_count=traffic, has_lidar=lidar, has_view=view, view_port=view_port,
             )
         )  # fmt: skip
     except UserError as error:

@@ -1,4 +1,7 @@
-"""How a flight of `honeyguide fly` is reached from outside: its ports, the key of its signatures, its live picture."""
+"""How a flight is reached from outside: its ports, the key of its signatures, its live picture, its live page."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from autopilot.mavlink.links import LinkError, LinkRole, LinkSource
 from autopilot.mavlink.signing import FileStore, MemoryStore, SigningConfig
@@ -6,8 +9,14 @@ from autopilot.mavlink.tcp import TcpPort
 from autopilot.mavlink.udp import SILENCE_US, UdpPort, address_towards
 from common.clock import wall_unix_us
 from common.state_folder import StateFolder
+from mission.flight import Flight
 from mission.options import FlightOptions, UserError
 from mission.stream import StreamServer
+
+if TYPE_CHECKING:
+    import viser
+
+    from mission.view.live import LiveView
 
 GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
 API_PORT_STEP = 14580 - 14540
@@ -73,3 +82,24 @@ def open_stream(port: int) -> StreamServer | None:
         return StreamServer(port)
     except OSError as error:
         raise UserError(f"--stream-port {port}: {error.strerror}") from error
+
+
+def open_page(port: int) -> "viser.ViserServer":
+    """The server of the live page; it opens its port before the flight begins."""
+    try:
+        from mission.view.live import open_page as open_server
+
+        return open_server(port, "Honeyguide")
+    except ImportError as error:
+        raise UserError(f"--view: {error.name} is missing: pip install 'honeyguide[viewer]'") from error
+    except OSError as error:
+        raise UserError(f"--view-port {port}: {error.strerror}") from error
+
+
+def live_view(
+    flight: Flight, page: "viser.ViserServer", speed: float | None, path_ned: Sequence[Sequence[float]]
+) -> "LiveView":
+    """The live page of a flight."""
+    from mission.view.live import LiveView
+
+    return LiveView(flight, page, speed=speed, path_ned=path_ned)

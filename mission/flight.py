@@ -47,7 +47,7 @@ from sim.sensors.esc import esc_reader
 from sim.sensors.ring import RingSensor
 from sim.sensors.sensors import sensor_model
 from sim.turntable import Turntable
-from sim.wind import wind_model
+from sim.wind import WindModel, wind_model
 from sim.world.batch import grown_world
 from sim.world.world import WorldConfig, WorldMap, build_world
 
@@ -127,18 +127,19 @@ class Flight:
             self.airframe,
             self.world,
             sensor_model(noise_scale=config.noise, home=config.home),
-            wind_model(config.wind_m_s, config.wind_from_deg, TURBULENCE, GUST_SHARE * config.wind_m_s),
+            flight_wind(config.wind_m_s, config.wind_from_deg),
             home=config.home,
             seed=config.seed,
         )
         self.rig.prepare(FRAME_TICKS)
         self.time_us = 0
+        self._pacer = Pacer(None)
         self.ready_s = nan  # power-on to ready to arm
         self.params = flight_parameters(config, self.airframe)
         self.persistence = None if state is None else Persistence(state, self.params, config.parameters)
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
-        self._injector = RigInjector(self.rig, self.airframe, config.noise)
+        self.injector = RigInjector(self.rig, self.airframe, config.noise)
         self._camera_rig = CameraRig(self.rig, self.world, has_thread=has_camera_thread)
         self._camera_rig.prepare()
         media = None if folder is None else MediaFolder(folder / "media")
@@ -151,7 +152,7 @@ class Flight:
             self.airframe,
             config.home,
             on_reboot=self.rig.reboot,
-            injector=self._injector,
+            injector=self.injector,
             host=self.host,
             turntable=Turntable(self.rig.arrays.body.numpy()),
             on_corrections=lambda _: self._surroundings.receiver.correct(self.time_us),
@@ -210,7 +211,7 @@ class Flight:
 
     def frame(self) -> None:
         """Advances by 20 ms."""
-        self._injector.frame(self.time_us)
+        self.injector.frame(self.time_us)
         self.rig.advance(FRAME_TICKS)
         self.time_us += FRAME_US
         self._surroundings.frame(self.time_us)
@@ -245,12 +246,20 @@ class Flight:
             speed: simulated seconds per second; None runs as fast as possible.
             on_frame: called after each frame, for progress displays.
         """
-        pacer = Pacer(speed)
+        self._pacer = Pacer(speed)
         while not is_over(self):
-            pacer.wait_until(self.time_us)
+            self._pacer.wait_until(self.time_us)
             self.frame()
             if on_frame is not None:
                 on_frame(self)
+
+    def change_speed(self, speed: float | None) -> None:
+        """Simulated seconds per second from the next frame on, while it runs; None: as fast as possible."""
+        self._pacer = Pacer(speed)
+
+    def set_wind(self, speed_m_s: float, from_deg: float) -> None:
+        """From the next frame on the mean blows so, with turbulence and gusts to match."""
+        self.rig.arrays.wind_model.fill_(flight_wind(speed_m_s, from_deg))
 
     def fly(self, script: Script, *, seconds: float = 3600.0) -> Running:
         """Runs a script to its end in lockstep, for at most `seconds` of simulated time."""
@@ -285,6 +294,11 @@ def flight_world(config: FlightConfig) -> WorldMap:
     if config.owner is not None:
         return grown_world(config.world, config.world.seed)
     return build_world(config.world)
+
+
+def flight_wind(speed_m_s: float, from_deg: float) -> WindModel:
+    """The air of a flight: the mean, and the turbulence and gusts that go with it."""
+    return wind_model(speed_m_s, from_deg, TURBULENCE, GUST_SHARE * speed_m_s)
 
 
 def host_files(folder: Path | None, state: StateFolder | None) -> ConfinedFolder | None:

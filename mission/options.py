@@ -46,6 +46,8 @@ class FlightOptions:
     run_folder: Path | None
     dialect: str = "px4"
     stream_port: int = 0
+    has_view: bool = False
+    view_port: int = 8080
     parameters: tuple[str, ...] = ()  # NAME=VALUE
     state: Path | None = None
     traffic_count: int = 0

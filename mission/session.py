@@ -2,7 +2,7 @@
 
 import json
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
@@ -18,7 +18,7 @@ from common.geodesy import GeoPoint
 from common.params import ParameterError
 from common.state_folder import StateFolder
 from mission.client import Running
-from mission.connections import open_links, open_stream, signing_config
+from mission.connections import live_view, open_links, open_page, open_stream, signing_config
 from mission.flight import Flight, flight_parameters
 from mission.options import FlightOptions, UserError, check_end, flight_config, speed_of
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
@@ -61,6 +61,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     signing = signing_config(options, speed, state)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
+    page = open_page(options.view_port) if options.has_view else None
     folder = _new_folder(options.run_folder)
     if state is not None and options.home is not None:
         keep_home(state, config.home)
@@ -77,9 +78,13 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     if state is not None:
         for problem in (*state.problems, *(flight.persistence.problems if flight.persistence else ())):
             _print_line(console, problem)
+    path_ned = [] if plan is None else planned_path(plan, config.home)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
-    _run(flight, running, options, speed, folder, console)
-    return _finish(flight, running, plan, folder, console)
+    view = None if page is None else live_view(flight, page, speed, [point for _, point in path_ned])
+    _run(flight, running, options, speed, folder, console, [] if view is None else [view.frame])
+    if view is not None:
+        view.close()
+    return _finish(flight, running, plan, path_ned, folder, console)
 
 
 def _plan(path: Path | None, home: GeoPoint) -> Plan:
@@ -115,7 +120,13 @@ def _candidates(stem: Path) -> Any:
 
 
 def _run(
-    flight: Flight, running: Running | None, options: FlightOptions, speed: float | None, folder: Path, console: Console
+    flight: Flight,
+    running: Running | None,
+    options: FlightOptions,
+    speed: float | None,
+    folder: Path,
+    console: Console,
+    watchers: Sequence[Callable[[], None]],
 ) -> None:
     """Advances the flight until it is over or the user stops it."""
     end_us = int(options.seconds * 1e6) if options.seconds is not None else None
@@ -133,6 +144,8 @@ def _run(
             with Live(console=console, transient=True, auto_refresh=False) as live:
 
                 def on_frame(_: Flight) -> None:
+                    for watch in watchers:
+                        watch()
                     if progress.is_due():
                         live.update(progress.table(), refresh=True)
 
@@ -163,6 +176,8 @@ def _print_start(options: FlightOptions, speed: float | None, folder: Path, cons
     _print_line(console, f"flying: {where}; logs in {folder}")
     if options.stream_port:
         _print_line(console, f"the camera's picture: http://{LOOPBACK}:{options.stream_port}/")
+    if options.has_view:
+        _print_line(console, f"live page: http://{LOOPBACK}:{options.view_port}/")
     if options.wind_m_s > WIND_EXPECTED_M_S:
         _print_line(console, f"wind of {options.wind_m_s:g} m/s is more than an x500 can be relied on to fly")
 
@@ -172,13 +187,19 @@ def _print_line(console: Console, text: str) -> None:
     console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
-def _finish(flight: Flight, running: Running | None, plan: Plan | None, folder: Path, console: Console) -> int:
+def _finish(
+    flight: Flight,
+    running: Running | None,
+    plan: Plan | None,
+    path_ned: list[tuple[int, Any]],
+    folder: Path,
+    console: Console,
+) -> int:
     """Writes the run folder and prints the summary; returns the exit code."""
     history = flight.close()
     if len(history.time_us) == 0:
         console.print("the flight ended before its first frame")
         return 0 if running is None else 1
-    path_ned = [] if plan is None else planned_path(plan, flight.config.home)
     summary = summarise(flight, history, running, path_ned, curved_items(plan) if plan else frozenset())
     write_whole(folder / "summary.json", (json.dumps(summary.as_json(), indent=2) + "\n").encode())
     title = f"{flight.airframe.name}, wind {flight.config.wind_m_s:g} m/s, seed {flight.config.seed}: {summary.result}"

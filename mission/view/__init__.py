@@ -1,0 +1,1 @@
+"""What people see of a flight: the live page, replays, films."""

@@ -1,0 +1,172 @@
+"""What people can do on the live page: send the vehicle somewhere, change wind and pace, break a motor.
+
+In: clicks, on viser's threads. Out: tasks for the flight's thread. Vehicle commands go through the flight's scripting
+client over MAVLink, as any ground station's would; wind and motors are the simulator's own.
+"""
+
+from collections.abc import Callable, Coroutine
+from math import hypot, isnan
+from typing import Any
+
+import viser
+
+from autopilot.injection import Failure, Unit
+from mission.client import Running
+from mission.flight import Flight
+from mission.script import Drone, ScriptError
+
+CLIMB_M = 5.0  # above the ground, when a click finds the vehicle standing
+FAR_M = 2000.0  # of a click's ray
+LEAST_HEIGHT_M = 2.0
+SPEEDS = {"1/4 x": 0.25, "1/2 x": 0.5, "1 x": 1.0, "2 x": 2.0, "5 x": 5.0, "max": None}
+
+
+class Controls:
+    """Buttons and sliders of one flight.
+
+    Args:
+        flight: what they act on.
+        server: of the page.
+        do: hands a task to the flight's thread.
+        speed: at which the flight begins.
+    """
+
+    def __init__(
+        self,
+        flight: Flight,
+        server: viser.ViserServer,
+        do: Callable[[Callable[[], None]], None],
+        speed: float | None,
+    ) -> None:
+        self._flight, self._do = flight, do
+        self._running: Running | None = None
+        self.is_paused = False
+        self.follows = True
+        self.lines: tuple[str, ...] = ("click on the ground to fly there",)
+        self._add_commands(server.gui)
+        self._add_pace(server.gui, speed)
+        self._add_trouble(server.gui)
+        server.scene.on_click()(self._clicked)
+
+    def _add_pace(self, gui: viser.GuiApi, begin: float | None) -> None:
+        with gui.add_folder("Time and view"):
+            pause = gui.add_checkbox("Pause", initial_value=False)
+            names = {value: name for name, value in SPEEDS.items()}
+            speed = gui.add_dropdown("Pace", tuple(SPEEDS), initial_value=names.get(begin, "1 x"))
+            follow = gui.add_checkbox("Camera follows", initial_value=True)
+
+        @pause.on_update
+        def _(_: Any) -> None:
+            self.is_paused = pause.value
+
+        @speed.on_update
+        def _(_: Any) -> None:
+            chosen = SPEEDS[speed.value]
+            self._do(lambda: self._flight.change_speed(chosen))
+
+        @follow.on_update
+        def _(_: Any) -> None:
+            self.follows = follow.value
+
+    def _add_commands(self, gui: viser.GuiApi) -> None:
+        with gui.add_folder("Vehicle"):
+            self._height = gui.add_slider(
+                "Height of gotos", min=LEAST_HEIGHT_M, max=60.0, step=0.5, initial_value=CLIMB_M
+            )
+            for name, script in (("Take off", self._take_off), ("Hold", _hold), ("Return", _return), ("Land", _land)):
+                self._add_command(gui, name, script)
+
+    def _add_command(self, gui: viser.GuiApi, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
+        button = gui.add_button(name)
+
+        @button.on_click
+        def _(_: Any) -> None:
+            self._do(lambda: self._start(name, script))
+
+    def _add_trouble(self, gui: viser.GuiApi) -> None:
+        config = self._flight.config
+        with gui.add_folder("Trouble"):
+            wind = gui.add_slider("Wind [m/s]", min=0.0, max=20.0, step=0.5, initial_value=config.wind_m_s)
+            wind_from = gui.add_slider("from [deg]", min=0.0, max=360.0, step=5.0, initial_value=config.wind_from_deg)
+            numbers = tuple(str(i + 1) for i in range(len(self._flight.airframe.rotors)))
+            motor = gui.add_dropdown("Motor", numbers)
+            kill = gui.add_button("Kill the motor", color="red")
+            repair = gui.add_button("Repair all motors")
+
+        def blow(_: Any) -> None:
+            speed_m_s, from_deg = float(wind.value), float(wind_from.value)  # browsers send whole numbers as int
+            self._do(lambda: self._flight.set_wind(speed_m_s, from_deg))
+
+        wind.on_update(blow)
+        wind_from.on_update(blow)
+
+        @kill.on_click
+        def _(_: Any) -> None:
+            number = int(motor.value)
+            self._do(lambda: self._break(number, Failure.OFF, f"motor {number} is off"))
+
+        @repair.on_click
+        def _(_: Any) -> None:
+            self._do(lambda: self._break(0, Failure.OK, "all motors run"))
+
+    # On the flight's thread
+
+    def _break(self, motor: int, failure: Failure, text: str) -> None:
+        self._flight.injector.inject(Unit.MOTOR, failure, motor)
+        self._say(text)
+
+    def _start(self, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
+        """Runs a script; the one that a click has started before is given up."""
+        if self._running is not None:
+            self._running.cancel()
+        self._running = self._flight.drone.start(self._told(name, script))
+
+    async def _told(self, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
+        self._say(f"{name} …")
+        try:
+            await script(self._flight.drone)
+        except ScriptError as error:
+            self._say(f"{name}: {error}")
+        else:
+            self._say(f"{name}: done")
+
+    def _say(self, text: str) -> None:
+        self.lines = (text,)
+
+    async def _take_off(self, drone: Drone) -> None:
+        await drone.wait_ready()
+        await drone.arm()
+        await drone.takeoff(self._height.value)
+
+    async def _fly_to(self, drone: Drone, north_m: float, east_m: float, up_m: float) -> None:
+        if not drone.is_armed or drone.is_landed:
+            await self._take_off(drone)
+        await drone.goto_ned(north_m, east_m, -up_m - self._height.value)
+
+    def _clicked(self, event: viser.SceneClickEvent) -> None:
+        """On a thread of viser's."""
+        world = self._flight.world
+        distance_m = world.ray_hit(event.ray_origin, event.ray_direction, FAR_M)
+        if isnan(distance_m) or distance_m >= FAR_M:
+            return
+        north, east = (
+            float(start + distance_m * along)
+            for start, along in zip(event.ray_origin[:2], event.ray_direction[:2], strict=True)
+        )
+        if max(abs(north), abs(east)) > 0.5 * world.config.size_m:
+            return
+        up = float(world.height(north, east))
+        name = f"go to {north:.0f} m north, {east:.0f} m east ({hypot(north, east):.0f} m from home)"
+        self._do(lambda: self._start(name, lambda drone: self._fly_to(drone, north, east, up)))
+
+
+async def _hold(drone: Drone) -> None:
+    await drone.hold()
+
+
+async def _return(drone: Drone) -> None:
+    await drone.return_home()
+
+
+async def _land(drone: Drone) -> None:
+    await drone.land()

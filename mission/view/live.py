@@ -1,0 +1,164 @@
+"""The live page of a flight: `honeyguide fly --view`.
+
+In: a running flight, frame by frame, and what people click. Out: the page at http://127.0.0.1:PORT. The flight's
+thread reads a moment and hands it over, 15 times a second while a browser is open; sending happens on viser's threads.
+Clicks wait in a queue for the flight's next frame: the vehicle is commanded by the flight's own MAVLink client.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from queue import Empty, SimpleQueue
+from socket import socket
+
+import numpy as np
+import rich
+import viser
+from numpy.typing import NDArray
+
+from autopilot.camera.ports import RawFrame
+from common.clock import wall_sleep_s, wall_time_s
+from mission.flight import Flight
+from mission.stream import LOOPBACK
+from mission.view.controls import Controls
+from mission.view.moment import Moment, moment_of
+from mission.view.panel import PLOT_PERIOD_S, Panel
+from mission.view.scene import Mount, Scene, chase_of, wxyz_of
+from sim.camera_rig import MOUNT_FRD, CameraRig
+
+UPDATE_S = 1.0 / 15.0
+STATUS_S = 0.25
+PLOTS_S = 0.5
+PICTURE_S = 0.2
+PAUSE_S = 0.05  # how often a paused flight looks whether it may go on
+PICTURE_SIZE = (320, 180)
+HFOV_DEG = 80.0
+RDF_IN_FRD = (0.5, 0.5, 0.5, 0.5)  # a camera that looks ahead
+
+
+class LiveView:
+    """The page of one flight.
+
+    Args:
+        flight: what is shown.
+        server: of the page.
+        speed: simulated seconds per second at which it begins; None: as fast as possible.
+        path_ned: [m] (n, 3) way that it is to fly; empty without a plan.
+        score: lines of text about how well it goes.
+    """
+
+    def __init__(
+        self,
+        flight: Flight,
+        server: viser.ViserServer,
+        *,
+        speed: float | None = None,
+        path_ned: Sequence[Sequence[float]] = (),
+        score: Callable[[], tuple[str, ...]] = tuple,
+    ) -> None:
+        self._flight, self._server, self._score = flight, server, score
+        self._todo: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._camera = flight.controller.camera
+        mount = None if self._camera is None else Mount(MOUNT_FRD, RDF_IN_FRD, HFOV_DEG, *PICTURE_SIZE)
+        self._camera_rig = CameraRig(flight.rig, flight.world, has_thread=True)
+        self._pending: Future[RawFrame] | None = None
+        self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned)
+        moment = moment_of(flight)
+        self._panel = Panel(server, has_owner=not np.isnan(moment.owner_ned[0]))
+        self._controls = Controls(flight, server, self._todo.put, speed)
+        self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
+        self._next_point_s = 0.0
+        self._followed_ned: NDArray[np.float32] | None = None
+        server.on_client_connect(lambda client: self._todo.put(lambda: self._place_camera(client)))
+
+    def frame(self) -> None:
+        """Does what is due; the flight calls it after each of its frames, and waits here while it is paused."""
+        self._do_what_was_clicked()
+        while self._controls.is_paused:
+            wall_sleep_s(PAUSE_S)
+            self._do_what_was_clicked()
+        if self._flight.time_us * 1e-6 >= self._next_point_s:
+            self._next_point_s = self._flight.time_us * 1e-6 + PLOT_PERIOD_S
+            self._panel.note(moment_of(self._flight))
+        if self._is_due("update", UPDATE_S) and self._server.get_clients():
+            self._update()
+
+    def close(self) -> None:
+        """Ends the page."""
+        self._camera_rig.close()
+        self._server.stop()
+
+    def _do_what_was_clicked(self) -> None:
+        while True:
+            try:
+                task = self._todo.get_nowait()
+            except Empty:
+                return
+            task()
+
+    def _is_due(self, what: str, period_s: float) -> bool:
+        now_s = wall_time_s()
+        is_due = now_s >= self._next_s[what]
+        if is_due:
+            self._next_s[what] = now_s + period_s
+        return is_due
+
+    def _update(self) -> None:
+        moment = moment_of(self._flight)
+        self._scene.show(moment)
+        self._move_cameras(moment)
+        if self._is_due("status", STATUS_S):
+            self._panel.show_status(moment, (*self._score(), *self._controls.lines))
+        if self._is_due("plots", PLOTS_S):
+            self._panel.draw_plots()
+        if self._camera is not None and self._is_due("picture", PICTURE_S):
+            self._take_picture()
+
+    def _take_picture(self) -> None:
+        if self._camera is None or (self._pending is not None and not self._pending.done()):
+            return
+        view = self._camera.view(PICTURE_SIZE, is_smooth=False)
+        if self._scene.frustum is not None:
+            self._scene.frustum.wxyz = wxyz_of(view.q_frd_from_rdf)
+        self._pending = self._camera_rig.capture(view)
+        self._pending.add_done_callback(self._show_picture)
+
+    def _show_picture(self, future: "Future[RawFrame]") -> None:
+        """On the camera's thread."""
+        if not future.cancelled() and future.exception() is None:
+            rgb = future.result().rgb
+            self._panel.show_picture(rgb)
+            if self._scene.frustum is not None:
+                self._scene.frustum.image = rgb
+
+    def _place_camera(self, client: viser.ClientHandle) -> None:
+        eye_ned, target_ned = chase_of(moment_of(self._flight))
+        client.camera.up_direction = (0.0, 0.0, -1.0)
+        client.camera.position = eye_ned
+        client.camera.look_at = target_ned
+
+    def _move_cameras(self, moment: Moment) -> None:
+        """Carries each viewer along with the vehicle, wherever they have turned to."""
+        if not self._controls.follows:
+            self._followed_ned = None
+            return
+        if self._followed_ned is not None:
+            moved = moment.pos_ned - self._followed_ned
+            if float(np.linalg.norm(moved)) < 0.01:
+                return
+            for client in self._server.get_clients().values():
+                client.camera.position = client.camera.position + moved
+        self._followed_ned = moment.pos_ned
+
+
+def open_page(port: int, title: str) -> viser.ViserServer:
+    """A page at the loopback address; port 0 takes a free one.
+
+    Raises:
+        OSError: the port is in use.
+    """
+    with socket() as probe:  # viser would take the next port in silence
+        probe.bind((LOOPBACK, port))
+    rich.get_console().quiet = True  # viser prints through it that it starts and stops
+    server = viser.ViserServer(host=LOOPBACK, port=port, label=title, verbose=False)
+    server.gui.configure_theme(show_share_button=False, show_logo=False)
+    return server

@@ -1,0 +1,115 @@
+"""The column left of the scene: status, onboard picture and plots.
+
+In: moments. Out: viser's GUI elements, each renewed at its own slow rate: text at 4 Hz, plots at 2 Hz.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from math import isnan
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from viser import uplot
+
+from mission.view.moment import ACTIONS, Moment
+
+PLOT_PERIOD_S = 0.5  # simulated time between two points that are plotted
+PLOT_POINTS = 600
+_COLOURS = ("#2868dc", "#e87820", "#3aa655", "#8a4fbf")
+_ACTION_NAMES = ("ahead", "right", "down", "yaw rate")
+
+Read = Callable[[Moment], tuple[float, ...]]
+PLOTS: dict[str, tuple[tuple[str, ...], Read]] = {
+    "distance to owner [m]": (("distance",), lambda moment: (moment.distance_m,)),
+    "height above ground [m]": (("height",), lambda moment: (moment.height_m,)),
+    "speed [m/s]": (("speed",), lambda moment: (moment.speed_m_s,)),
+    "battery [%]": (("battery",), lambda moment: (100.0 * moment.battery,)),
+    "policy's action": (_ACTION_NAMES, lambda moment: tuple(float(value) for value in moment.action)),
+}
+"""What is plotted over time: title, names of the lines, values."""
+
+
+class Panel:
+    """Status, picture and plots of one flight.
+
+    Args:
+        server: of the page.
+        has_owner: whether somebody is followed; without, there is no distance and no action to plot.
+    """
+
+    def __init__(self, server: viser.ViserServer, *, has_owner: bool) -> None:
+        self._gui = server.gui
+        self._picture: viser.GuiImageHandle | None = None
+        panel = self._gui.add_panel()
+        with panel.add_tab("Flight"):
+            self._status = self._gui.add_markdown("waiting for the flight")
+            self._picture_folder = self._gui.add_folder("Onboard camera", visible=False)
+            self._plots = [
+                Plot(self._gui, title, names, read)
+                for title, (names, read) in PLOTS.items()
+                if has_owner or not (title.startswith("distance") or len(names) == ACTIONS)
+            ]
+        panel.dock_left()
+        self._gui.main_panel.dock_right()
+
+    def show_status(self, moment: Moment, lines: tuple[str, ...]) -> None:
+        """Renews the text."""
+        armed = "armed" if moment.is_armed else "disarmed"
+        rows = [
+            f"**{moment.mode_name}**, {armed}, {moment.time_s:.1f} s",
+            f"height {moment.height_m:.1f} m, speed {moment.speed_m_s:.1f} m/s, battery {100.0 * moment.battery:.0f} %",
+        ]
+        if not isnan(moment.distance_m):
+            rows.append(f"distance to owner {moment.distance_m:.1f} m")
+        self._status.content = "  \n".join((*rows, *lines))
+
+    def show_picture(self, rgb: NDArray[np.uint8]) -> None:
+        """Renews the onboard picture; any thread may do so."""
+        if self._picture is None:
+            with self._picture_folder:
+                self._picture = self._gui.add_image(rgb, format="jpeg", jpeg_quality=80)
+            self._picture_folder.visible = True
+        else:
+            self._picture.image = rgb
+
+    def note(self, moment: Moment) -> None:
+        """Adds a point to each plot."""
+        for plot in self._plots:
+            plot.note(moment)
+
+    def draw_plots(self) -> None:
+        """Sends the plots."""
+        for plot in self._plots:
+            plot.draw()
+
+
+class Plot:
+    """One chart over time."""
+
+    def __init__(self, gui: viser.GuiApi, title: str, names: tuple[str, ...], read: Read) -> None:
+        self._read = read
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=PLOT_POINTS)
+        series = [
+            uplot.Series(label="s"),
+            *(
+                uplot.Series(label=name, stroke=colour, width=1.5)
+                for name, colour in zip(names, _COLOURS, strict=False)
+            ),
+        ]
+        empty = tuple(np.zeros(1) for _ in series)
+        self._handle = gui.add_uplot(
+            empty,
+            tuple(series),
+            title=title,
+            scales={"x": uplot.Scale(time=False)},
+            legend=uplot.Legend(show=len(names) > 1),
+            height=130,
+        )
+
+    def note(self, moment: Moment) -> None:
+        self._rows.append((moment.time_s, *self._read(moment)))
+
+    def draw(self) -> None:
+        if self._rows:
+            self._handle.data = tuple(np.array(column) for column in zip(*self._rows, strict=True))

@@ -1,0 +1,194 @@
+"""The 3-D scene in the browser: world, vehicle, owner and trails, in ned.
+
+In: a world once, then moments. Out: nodes of viser's scene; only what moves is sent again. What stands still costs
+nothing after a browser has loaded it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan, isnan, radians, tan
+
+import numpy as np
+import trimesh
+import viser
+from numpy.typing import NDArray
+
+from common.airframe import Airframe
+from common.attitude import quat_of, yaw_of
+from mission.view import shapes
+from mission.view.moment import Moment
+from sim.world.world import WorldMap
+
+VEHICLE_RGB, OWNER_RGB, GOAL_RGB, PLAN_RGB = (40, 110, 220), (232, 120, 32), (220, 40, 90), (250, 250, 250)
+STATURE_M = 1.75
+ARRIVED_M = 1.0  # a goal nearer than this is not shown: it would hide the vehicle
+TRAIL_POINTS = 600
+TRAIL_PERIOD_S = 0.25
+BLADE_TURNS_PER_S = 2.7  # shown; at their true speed blades would stand still or seem to turn backwards
+SKY_RGB = (190, 212, 232)
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """How a camera is carried, for its frustum."""
+
+    pos_frd: tuple[float, float, float]
+    q_frd_from_rdf: tuple[float, float, float, float]
+    hfov_deg: float
+    width: int  # [pixels]
+    height: int
+
+
+class Scene:
+    """One flight's scene.
+
+    Args:
+        server: of the page.
+        world: what stands still.
+        airframe: of the vehicle.
+        mount: of its camera; None: it has none.
+        path_ned: [m] (n, 3) way that it is to fly; empty without a plan.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        world: WorldMap,
+        airframe: Airframe,
+        *,
+        mount: Mount | None = None,
+        path_ned: Sequence[Sequence[float]] = (),
+    ) -> None:
+        self._api = server.scene
+        self._api.set_up_direction("-z")
+        self._api.configure_default_lights(cast_shadow=False)  # shadows would cost a weak machine half its frames
+        self._api.configure_fog(0.4 * world.config.size_m, 1.4 * world.config.size_m, color=SKY_RGB)
+        self._api.set_background_image(np.full((2, 2, 3), SKY_RGB, np.uint8))
+        self._add_world(world)
+        self._vehicle = self._api.add_frame("/vehicle", axes_length=0.4, axes_radius=0.008)
+        self._add_mesh("/vehicle/frame", shapes.quadrotor(airframe))
+        blade = shapes.rotor(airframe)
+        self._rotors = [
+            self._api.add_mesh_simple(
+                f"/vehicle/rotor{i}", blade.vertices, blade.faces, color=shapes.BLADE, position=hub - (0, 0, 0.03)
+            )
+            for i, hub in enumerate(shapes.hubs_frd(airframe))
+        ]
+        self._spins = [rotor.spin for rotor in airframe.rotors]
+        self._owner = self._api.add_frame("/owner", show_axes=False, visible=False)
+        self._add_mesh("/owner/body", shapes.person(STATURE_M))
+        self._goal = self._api.add_icosphere("/goal", radius=0.35, color=GOAL_RGB, opacity=0.7, visible=False)
+        self.frustum = None if mount is None else self._frustum(mount)
+        self._trails = {
+            "vehicle": Trail(self._api, "/trails/vehicle", VEHICLE_RGB),
+            "owner": Trail(self._api, "/trails/owner", OWNER_RGB),
+        }
+        if len(path_ned) > 1:
+            self._api.add_line_segments("/plan", _segments(np.array(path_ned, np.float32)), PLAN_RGB, thickness=0.08)
+
+    def _add_mesh(self, name: str, mesh: shapes.Mesh) -> None:
+        linear = (255.0 * (mesh.colours / 255.0) ** 2.2).astype(np.uint8)  # glTF's vertex colours are linear light
+        self._api.add_mesh_trimesh(
+            name, trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=linear, process=False)
+        )
+
+    def _add_world(self, world: WorldMap) -> None:
+        self._add_mesh("/world/ground", shapes.ground(world))
+        ring = shapes.walls(world)
+        if ring is not None:
+            self._add_mesh("/world/walls", ring)
+        forest = shapes.trees(world)
+        count = len(forest.trunk_ned)
+        if count == 0:
+            return
+        upright = np.tile((1.0, 0.0, 0.0, 0.0), (count, 1))
+        for name, mesh, where, size, colours in (
+            ("trunks", shapes.trunk(), forest.trunk_ned, forest.trunk_size, shapes.BARK),
+            ("crowns", shapes.ball(), forest.crown_ned, forest.crown_size, forest.crown_colours),
+        ):
+            self._api.add_batched_meshes_simple(
+                f"/world/{name}",
+                mesh.vertices,
+                mesh.faces,
+                upright,
+                where,
+                batched_scales=size,
+                batched_colors=colours,
+                lod="off",
+                cast_shadow=False,
+            )
+
+    def _frustum(self, mount: Mount) -> viser.CameraFrustumHandle:
+        aspect = mount.width / mount.height
+        return self._api.add_camera_frustum(
+            "/vehicle/camera",
+            2.0 * atan(tan(0.5 * radians(mount.hfov_deg)) / aspect),
+            aspect,
+            scale=0.15,
+            thickness=0.006,
+            position=mount.pos_frd,
+            wxyz=wxyz_of(mount.q_frd_from_rdf),
+        )
+
+    def show(self, moment: Moment) -> None:
+        """Moves what moves."""
+        self._vehicle.position = moment.pos_ned
+        self._vehicle.wxyz = wxyz_of(moment.q_ned_from_frd)
+        for handle, spin, speed in zip(self._rotors, self._spins, moment.rotor_speed[: len(self._rotors)], strict=True):
+            if speed > 1.0:
+                handle.wxyz = wxyz_of(quat_of(2.0 * np.pi * BLADE_TURNS_PER_S * spin * moment.time_s, 0.0))
+        has_owner = not isnan(moment.owner_ned[0])
+        if has_owner:
+            self._owner.position = moment.owner_ned
+            self._owner.wxyz = wxyz_of(quat_of(moment.owner_heading_rad, 0.0))
+            self._trails["owner"].extend(moment.time_s, moment.owner_ned - (0.0, 0.0, 0.05))
+        self._owner.visible = has_owner
+        has_goal = bool(np.linalg.norm(moment.goal_ned - moment.pos_ned) > ARRIVED_M)  # False for NaN
+        if has_goal:
+            self._goal.position = moment.goal_ned
+        self._goal.visible = has_goal
+        self._trails["vehicle"].extend(moment.time_s, moment.pos_ned)
+
+    def show_trails(self, vehicle_ned: NDArray[np.float32], owner_ned: NDArray[np.float32]) -> None:
+        """Whole trails at once, for a replay that jumps."""
+        self._trails["vehicle"].draw(vehicle_ned)
+        self._trails["owner"].draw(owner_ned - np.array((0.0, 0.0, 0.05), np.float32))
+
+
+class Trail:
+    """Where something has been, as a line that forgets its beginning."""
+
+    def __init__(self, api: viser.SceneApi, name: str, rgb: tuple[int, int, int]) -> None:
+        self._api, self._name, self._rgb = api, name, rgb
+        self._points: list[NDArray[np.float32]] = []
+        self._next_s = 0.0
+
+    def extend(self, time_s: float, point_ned: NDArray[np.float32]) -> None:
+        """Appends a place when it is time for one."""
+        if time_s < self._next_s:
+            return
+        self._next_s = time_s + TRAIL_PERIOD_S
+        self._points = [*self._points[-TRAIL_POINTS:], np.asarray(point_ned, np.float32)]
+        self.draw(np.array(self._points))
+
+    def draw(self, points_ned: NDArray[np.float32]) -> None:
+        """Draws the line through these places; a single one draws none."""
+        if len(points_ned) > 1 and not np.isnan(points_ned).any():
+            self._api.add_line_segments(self._name, _segments(points_ned), self._rgb, thickness=0.05)
+
+
+def _segments(points: NDArray[np.floating]) -> NDArray[np.float32]:
+    return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+
+
+def wxyz_of(q_xyzw: NDArray[np.float32] | tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    """Warp's order as viser's."""
+    x, y, z, w = (float(value) for value in q_xyzw)
+    return w, x, y, z
+
+
+def chase_of(moment: Moment) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """A place behind and above the vehicle, and where to look from there [m], ned."""
+    yaw = yaw_of([float(value) for value in moment.q_ned_from_frd])
+    ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0], np.float32)
+    return moment.pos_ned - 5.0 * ahead - np.array([0.0, 0.0, 2.2], np.float32), moment.pos_ned + 2.0 * ahead

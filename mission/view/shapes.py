@@ -1,0 +1,225 @@
+"""The world's things as triangles, for the page in the browser and for the HTML file.
+
+In: a `WorldMap`, an airframe. Out: vertices in ned [m] (or in the body's frd), faces that run counter-clockwise seen
+from outside, and colours with the light already in them where nobody lights them later. Made once per flight.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.airframe import Airframe
+from sim.world.walls import WALL_THICKNESS_M
+from sim.world.world import WorldMap
+
+Floats = NDArray[np.float32]
+SUN_NED = np.array([-0.60, 0.51, -0.62], np.float32)  # where the light comes from: as in the cameras' pictures, nearly
+GRASS, MEADOW, EARTH = (np.array(rgb, np.float32) for rgb in ((92, 122, 58), (140, 150, 82), (150, 130, 96)))  # sRGB
+SIDES = 7  # of a trunk: few triangles, and round enough
+
+BARK = (104, 82, 62)
+LEAVES = ((58, 98, 44), (94, 132, 62))  # darkest and lightest
+CONCRETE = (168, 164, 158)
+JACKET, TROUSERS, SKIN = (232, 120, 32), (52, 58, 74), (222, 184, 152)
+FRAME, BLADE = (48, 52, 60), (30, 32, 36)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mesh:
+    """Triangles."""
+
+    vertices: Floats  # (n, 3)
+    faces: NDArray[np.uint32]  # (m, 3)
+    colours: NDArray[np.uint8]  # (n, 3)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Trees:
+    """Trunks are `trunk()` and crowns `ball()`, each scaled and moved."""
+
+    trunk_ned: Floats  # (trees, 3) middle of each
+    trunk_size: Floats  # (trees, 3)
+    crown_ned: Floats
+    crown_size: Floats
+    crown_colours: NDArray[np.uint8]  # (trees, 3)
+
+
+def ground(world: WorldMap, cells_most: int = 256) -> Mesh:
+    """The terrain, hill-shaded; its grid is thinned so that a side has at most `cells_most` cells."""
+    half_m = 0.5 * world.config.size_m
+    count = min(world.heights.shape[0], cells_most + 1)
+    side = np.linspace(-half_m, half_m, count)
+    north, east = np.meshgrid(side, side, indexing="ij")
+    vertices = np.stack([north, east, -world.height(north, east)], axis=-1).reshape(-1, 3).astype(np.float32)
+    normal_ned = world.normal_ned(north, east).reshape(-1, 3)
+    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).reshape(-1)
+    faces = np.concatenate(
+        [
+            np.stack([corner, corner + count + 1, corner + count], axis=1),
+            np.stack([corner, corner + 1, corner + count + 1], axis=1),
+        ]
+    )
+    patches = 0.5 + 0.5 * np.sin(0.11 * north + np.sin(0.07 * east)) * np.sin(0.13 * east + np.sin(0.05 * north))
+    steep = np.clip((1.0 + normal_ned[:, 2:]) * 8.0, 0.0, 1.0)
+    colour = GRASS + patches.reshape(-1, 1) * (MEADOW - GRASS)
+    colour = colour + steep * (EARTH - colour)
+    sun = SUN_NED / np.linalg.norm(SUN_NED)
+    light = 0.45 + 0.85 * np.clip(normal_ned @ sun, 0.0, 1.0)
+    return Mesh(vertices, faces.astype(np.uint32), np.clip(colour * light[:, None], 0, 255).astype(np.uint8))
+
+
+def trees(world: WorldMap) -> Trees:
+    """Every tree; a crown is drawn as the ellipsoid round its capsule's axis."""
+    rows = world.trees
+    crown_half_m = 0.5 * (rows["crown_high"] - rows["crown_low"]) + rows["crown_radius"]
+    trunk_half_m = 0.5 * (rows["crown_low"] - rows["root_height"])
+    radius, thick = rows["crown_radius"], rows["trunk_radius"]
+    shade = (np.abs(np.sin(12.9898 * rows["north"] + 78.233 * rows["east"])) % 1.0)[:, None]
+    dark, light = (np.array(rgb, np.float32) for rgb in LEAVES)
+    return Trees(
+        np.stack([rows["north"], rows["east"], -0.5 * (rows["crown_low"] + rows["root_height"])], axis=1),
+        np.stack([thick, thick, trunk_half_m], axis=1),
+        np.stack([rows["north"], rows["east"], -0.5 * (rows["crown_low"] + rows["crown_high"])], axis=1),
+        np.stack([radius, radius, crown_half_m], axis=1),
+        (dark + shade * (light - dark)).astype(np.uint8),
+    )
+
+
+def walls(world: WorldMap) -> Mesh | None:
+    """The ring of walls round the map, if there is one."""
+    if not world.config.has_walls:
+        return None
+    half_m = 0.5 * world.config.size_m
+    low_m, top_m = float(world.heights.min()) - 1.0, world.walls.top_m
+    middle, length = half_m + 0.5 * WALL_THICKNESS_M, 2.0 * (half_m + WALL_THICKNESS_M)
+    up = (-0.5 * (low_m + top_m), top_m - low_m)
+    boxes = [
+        box(centre, size, CONCRETE)
+        for sign in (1.0, -1.0)
+        for centre, size in (
+            ((sign * middle, 0.0, up[0]), (WALL_THICKNESS_M, length, up[1])),
+            ((0.0, sign * middle, up[0]), (length, WALL_THICKNESS_M, up[1])),
+        )
+    ]
+    return joined(boxes)
+
+
+def quadrotor(airframe: Airframe) -> Mesh:
+    """The vehicle without its rotors, in frd: a hull, a nose that shows the heading, an arm and a motor for each."""
+    hubs = hubs_frd(airframe)
+    span_m = float(np.abs(hubs[:, :2]).max())
+    parts = [
+        box((0.0, 0.0, 0.0), (1.1 * span_m, 0.6 * span_m, 0.35 * span_m), FRAME),
+        box((0.55 * span_m, 0.0, 0.0), (0.2 * span_m, 0.35 * span_m, 0.25 * span_m), JACKET),
+    ]
+    for hub in hubs:
+        parts.append(beam((0.0, 0.0, 0.0), hub, 0.06 * span_m, FRAME))
+        parts.append(box(hub, (0.15 * span_m, 0.15 * span_m, 0.2 * span_m), FRAME))
+    return joined(parts)
+
+
+def rotor(airframe: Airframe) -> Mesh:
+    """Two blades across the hub, along x, in frd."""
+    radius_m = rotor_radius_m(airframe)
+    return box((0.0, 0.0, 0.0), (2.0 * radius_m, 0.12 * radius_m, 0.02 * radius_m), BLADE)
+
+
+def hubs_frd(airframe: Airframe) -> Floats:
+    """Places of the rotors [m], (rotors, 3)."""
+    return np.array([(rotor.x_m, rotor.y_m, rotor.z_m) for rotor in airframe.rotors], np.float32)
+
+
+def rotor_radius_m(airframe: Airframe) -> float:
+    """As large as neighbours leave room for; the flight model knows thrust, not size."""
+    hubs = hubs_frd(airframe)
+    gaps = np.linalg.norm(hubs[:, None] - hubs[None, :], axis=2)
+    return 0.45 * float(gaps[gaps > 0.0].min())
+
+
+def person(stature_m: float) -> Mesh:
+    """A standing person, in hfrd round the feet: legs, body with arms, head."""
+    h = stature_m
+    parts = [box((0.0, side * 0.055 * h, -0.24 * h), (0.09 * h, 0.085 * h, 0.48 * h), TROUSERS) for side in (-1.0, 1.0)]
+    parts += [box((0.0, side * 0.145 * h, -0.62 * h), (0.07 * h, 0.06 * h, 0.36 * h), JACKET) for side in (-1.0, 1.0)]
+    parts.append(box((0.0, 0.0, -0.65 * h), (0.13 * h, 0.22 * h, 0.36 * h), JACKET))
+    head = ball()
+    radius = np.array([0.075, 0.07, 0.09], np.float32) * h
+    parts.append(painted(head.vertices * radius + np.array([0.0, 0.0, -0.92 * h], np.float32), head.faces, SKIN))
+    return joined(parts)
+
+
+def box(
+    centre: tuple[float, float, float] | Floats, size: tuple[float, float, float], rgb: tuple[int, int, int]
+) -> Mesh:
+    """A box along the axes; no two sides share a vertex, so that its edges stay sharp."""
+    vertices: list[NDArray[np.float64]] = []
+    faces: list[int] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            outward = np.zeros(3)
+            outward[axis] = sign
+            right, up = np.roll(np.abs(outward), 1), np.roll(np.abs(outward), 2)
+            first = len(vertices)
+            vertices += [outward - right - up, outward + right - up, outward + right + up, outward - right + up]
+            order = (0, 1, 2, 0, 2, 3) if sign > 0.0 else (0, 2, 1, 0, 3, 2)
+            faces += [first + k for k in order]
+    corners = np.array(centre) + 0.5 * np.array(vertices) * np.array(size)
+    return painted(corners.astype(np.float32), np.array(faces, np.uint32).reshape(-1, 3), rgb)
+
+
+def beam(start: tuple[float, float, float], end: Floats, width_m: float, rgb: tuple[int, int, int]) -> Mesh:
+    """A box from one place to another."""
+    along = np.asarray(end, np.float32) - np.array(start, np.float32)
+    length = float(np.linalg.norm(along))
+    x = along / length
+    y = np.cross((0.0, 0.0, 1.0), x)
+    y /= np.linalg.norm(y)
+    level = box((0.5 * length, 0.0, 0.0), (length, width_m, width_m), rgb)
+    turned = level.vertices @ np.stack([x, y, np.cross(x, y)]).astype(np.float32)
+    return Mesh(turned + np.array(start, np.float32), level.faces, level.colours)
+
+
+def trunk() -> Mesh:
+    """The side of a cylinder of radius 1 from z = -1 to 1."""
+    angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    vertices = np.concatenate([np.column_stack([ring, np.full(SIDES, z)]) for z in (-1.0, 1.0)])
+    here, there = np.arange(SIDES), (np.arange(SIDES) + 1) % SIDES
+    faces = np.concatenate(
+        [np.stack([here, there, there + SIDES], axis=1), np.stack([here, there + SIDES, here + SIDES], axis=1)]
+    )
+    return painted(vertices.astype(np.float32), faces.astype(np.uint32), BARK)
+
+
+def ball() -> Mesh:
+    """An octahedron whose faces have been divided once and pushed out to radius 1: 32 triangles."""
+    corners = [np.array(c, float) for c in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1))]
+    coarse = [(x, y, z) for x in (0, 3) for y in (1, 4) for z in (2, 5)]
+    vertices: list[NDArray[np.float64]] = []
+    faces: list[tuple[int, int, int]] = []
+    for x, y, z in coarse:
+        a, b, c = (corners[i] for i in (x, y, z))
+        if np.dot(np.cross(b - a, c - a), a + b + c) < 0.0:
+            b, c = c, b
+        middles = [m / np.linalg.norm(m) for m in (a + b, b + c, c + a)]
+        first = len(vertices)
+        vertices += [a, b, c, *middles]
+        faces += [(first + i, first + j, first + k) for i, j, k in ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))]
+    unique, index = np.unique(np.round(np.array(vertices), 6), axis=0, return_inverse=True)
+    return painted(unique.astype(np.float32), index.reshape(-1)[np.array(faces)].astype(np.uint32), LEAVES[0])
+
+
+def painted(vertices: Floats, faces: NDArray[np.uint32], rgb: tuple[int, int, int]) -> Mesh:
+    """In one colour."""
+    return Mesh(vertices, faces, np.broadcast_to(np.array(rgb, np.uint8), (len(vertices), 3)).copy())
+
+
+def joined(parts: list[Mesh]) -> Mesh:
+    """Several meshes as one."""
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]]).astype(np.uint32)
+    return Mesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
+        np.concatenate([part.colours for part in parts]),
+    )

@@ -1,0 +1,101 @@
+"""The live page in a headless Chromium: it loads, shows the scene, and its clicks reach vehicle and simulator."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from mission.flight import Flight, FlightConfig
+from mission.view.live import LiveView, open_page
+from sim.world.world import WorldConfig
+from tests.browser import CHROMIUM, Browser
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: apt install chromium")
+WORLD = WorldConfig(size_m=64.0, trees_per_ha=60.0, clearing_radius_m=5.0)  # little to draw: Chromium has no GPU here
+
+
+class Shown:
+    """A flight in real time on a thread of its own, its page, and a browser that looks at it."""
+
+    def __init__(self, tmp_path):
+        self.flight = Flight(FlightConfig(world=WORLD))
+        self.server = open_page(0, "Honeyguide")
+        self.view = LiveView(self.flight, self.server, speed=3.0)
+        self._is_over = False
+        self._thread = threading.Thread(target=self._fly)
+        self._thread.start()
+        self.browser = Browser(tmp_path, 1000, 500)
+        self.browser.open(f"http://127.0.0.1:{self.server.get_port()}/")
+
+    def _fly(self):
+        self.flight.run(lambda _: self._is_over, speed=3.0, on_frame=lambda _: self.view.frame())
+
+    def wait(self, condition, timeout_s=60.0):
+        end_s = time.monotonic() + timeout_s
+        while not condition():
+            assert time.monotonic() < end_s, "not in time"
+            time.sleep(0.2)
+
+    def close(self):
+        self._is_over = True
+        self._thread.join()
+        self.browser.close()
+        self.view.close()
+        self.flight.close()
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    page = Shown(tmp_path_factory.mktemp("profile"))
+    yield page
+    page.close()
+
+
+def text(shown):
+    return shown.browser.evaluate("document.body.innerText")
+
+
+def test_the_page_shows_a_scene_and_plots_that_go_on(shown):
+    shown.browser.wait("document.body?.innerText.includes('disarmed')")
+    shown.wait(lambda: len(np.unique(scene_pixels(shown).reshape(-1, 3), axis=0)) > 200)
+    assert shown.browser.evaluate("document.querySelectorAll('canvas').length") >= 4  # the scene and three plots
+    plots = "[...document.querySelectorAll('.u-wrap canvas')].map(c => c.toDataURL()).join()"
+    before = shown.browser.wait(plots)
+    shown.wait(lambda: shown.browser.evaluate(plots) != before)
+    assert shown.browser.errors == []
+
+
+def test_the_page_asks_the_network_for_nothing(shown):
+    hosts = {url.split("/")[2] for url in shown.browser.requests if url.startswith(("http", "ws"))}
+    assert hosts == {f"127.0.0.1:{shown.server.get_port()}"}
+
+
+def test_a_button_and_a_click_on_the_ground_fly_the_vehicle(shown):
+    shown.wait(lambda: shown.flight.controller.state.is_ready_to_arm)
+    shown.browser.click_button("Take off")
+    shown.wait(lambda: shown.flight.controller.state.is_flying and height(shown) > 4.0)
+    start_ned = position(shown)
+    shown.browser.click(400, 420)
+    shown.wait(lambda: np.linalg.norm((position(shown) - start_ned)[:2]) > 1.0)
+    shown.browser.wait("document.body?.innerText.includes('go to')")
+    assert "m from home" in text(shown)
+
+
+def test_a_dead_motor_brings_the_vehicle_down(shown):
+    shown.wait(lambda: shown.flight.controller.state.is_flying)
+    shown.browser.click_button("Kill the motor")
+    shown.browser.wait("document.body?.innerText.includes('motor 1 is off')")
+    shown.wait(lambda: height(shown) < 0.5)
+
+
+def scene_pixels(shown):
+    return shown.browser.picture()[200:, 320:660]
+
+
+def position(shown):
+    return shown.flight.rig.arrays.body.numpy()[0]["pos_ned"].copy()
+
+
+def height(shown):
+    return float(shown.flight.rig.arrays.body.numpy()[0]["height_agl_m"])
