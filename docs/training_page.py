@@ -58,6 +58,8 @@ BLOCKS: Mapping[str, type[BaseModel]] = {
     "behaviors: NAME": behavior.Behavior,
     "hyperparameters of ppo": behavior.PpoHyperparameters,
     "hyperparameters of sac": behavior.SacHyperparameters,
+    "hyperparameters of dagger": behavior.DaggerHyperparameters,
+    "hyperparameters of dagger: augmentation": behavior.Augmentation,
     "network_settings": network.NetworkSettings,
     "network_settings: memory": network.Memory,
     "reward_signals: extrinsic": signals.ExtrinsicSettings,

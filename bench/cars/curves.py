@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Protocol
 
 import matplotlib as mpl
 
@@ -10,14 +11,21 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from bench.cars.result import Result
+from bench.cars.result import Point
 
 COLOURS = ("#26659f", "#c43d34", "#3a8c52", "#b8860b", "#7b4fa3", "#5c5a55")
 _GRID = 200  # points each curve is drawn at
 
 
+class Trained(Protocol):
+    """A run with a curve."""
+
+    @property
+    def curve(self) -> Sequence[Point]: ...
+
+
 def draw(
-    path: Path, title: str, runs: Mapping[str, Sequence[Result]], *, value: str, over: str, log_x: bool = False
+    path: Path, title: str, runs: Mapping[str, Sequence[Trained]], *, value: str, over: str, log_x: bool = False
 ) -> None:
     """Writes one figure: per label the mean over seeds, and every seed faintly behind it.
 
@@ -58,7 +66,7 @@ def draw(
     plt.close(figure)
 
 
-def _sampled(result: Result, value: str, over: str) -> tuple[np.ndarray, np.ndarray]:
+def _sampled(result: Trained, value: str, over: str) -> tuple[np.ndarray, np.ndarray]:
     points = result.curve
     x = np.array([getattr(point, over) for point in points], dtype=float)
     y = np.array([getattr(point, value) for point in points], dtype=float)

@@ -9,14 +9,16 @@ from collections.abc import Iterator
 import torch
 
 from policies.learn.bc import Cloning
-from policies.learn.config.behavior import Behavior
+from policies.learn.config.behavior import Behavior, DaggerHyperparameters
 from policies.learn.config.run import RunConfig
+from policies.learn.dagger import Dagger
 from policies.learn.demonstrations import load_demonstrations
 from policies.learn.learner import Learner
 from policies.learn.policy import Policy
 from policies.learn.ppo import Ppo
 from policies.learn.sac import Sac
 from policies.learn.signals.build import build_signals
+from policies.learn.teacher import load_teacher
 from policies.tasks.task import Task
 
 
@@ -29,14 +31,18 @@ def build_learner(config: RunConfig, task: Task, seed: int) -> Learner:
         seed: of every random draw.
 
     Raises:
+        CheckpointError: a teacher that cannot be read.
         DemonstrationError: demonstrations that cannot be read.
-        LayoutError: demonstrations of another task.
+        LayoutError: demonstrations, or a teacher, of another task.
         SacError: what soft actor-critic does not do.
     """
     behavior = config.behavior
     is_sac = behavior.trainer_type == "sac"
     generator = torch.Generator().manual_seed(seed)
     policy = Policy(task.layout, behavior.network_settings, generator, is_squashed=is_sac).to(task.device)
+    if isinstance(behavior.hyperparameters, DaggerHyperparameters):
+        teacher = load_teacher(behavior.hyperparameters.teacher, task.layout, task.device)
+        return Dagger(task, policy, behavior, teacher, seed=seed)
     signals = build_signals(behavior.reward_signals, task.layout, seed, task.device)
     cloning = _cloning(behavior, policy, seed, task.device)
     algorithm = Sac if is_sac else Ppo

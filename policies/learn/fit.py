@@ -13,13 +13,15 @@ from policies.tasks.task import TaskSettings
 
 _OF_PPO = ("shared_critic", "privileged_critic", "normalize_returns")
 _OF_SAC = ("buffer_size", "hindsight", "save_replay_buffer")
+_OF_DAGGER = ("buffer_size", "save_replay_buffer")
+_OF_TRAINERS = {"ppo": _OF_PPO, "sac": _OF_SAC, "dagger": _OF_DAGGER}
 _OF_SIGNALS = ("network_settings", "use_actions", "use_vail", "normalize_reward")
 
 
 def settings_that_must_fit(config: RunConfig, settings: TaskSettings) -> dict[str, Any]:
     """Of a run: key to plain value."""
     behavior = config.behavior
-    names = _OF_SAC if behavior.trainer_type == "sac" else _OF_PPO
+    names = _OF_TRAINERS[behavior.trainer_type]
     hyperparameters = behavior.hyperparameters.model_dump()
     signals = {name: signal.model_dump() for name, signal in behavior.reward_signals.in_use.items()}
     return flat(

@@ -6,6 +6,7 @@ from torch import Tensor, nn
 from policies.learn.actions import ActionDistribution, ActionHeads, Actions, bounded
 from policies.learn.config.network import NetworkSettings
 from policies.learn.networks import policy_body
+from policies.learn.perception import Beliefs, Perception
 from policies.learn.seen import Seen
 from policies.tasks.layout import Layout
 
@@ -36,6 +37,9 @@ class Policy(nn.Module):
             layout.branch_sizes,
             generator,
             is_sigma_learned_by_state=is_squashed,
+        )
+        self.perception = (
+            Perception(self.body.size, layout, settings.perceives, generator) if settings.perceives else None
         )
 
     @property
@@ -72,6 +76,12 @@ class Policy(nn.Module):
         if generator is None:
             return distribution.mode(), memory
         return distribution.draw(generator), memory
+
+    def act_and_believe(self, observations: Tensor | Seen, memory: Tensor) -> tuple[Actions, Tensor, Beliefs | None]:
+        """One decision per row as `act` takes it without a generator, and what is believed; none without beliefs."""
+        features, memory = self.body.step(observations, memory)
+        beliefs: Beliefs | None = self.perception(features) if self.perception is not None else None
+        return self.heads(features).mode(), memory, beliefs
 
     def bounded(self, actions: Actions) -> Tensor:
         """The continuous actions as the task takes them, [-1, 1], shape (rows, continuous)."""

@@ -7,10 +7,14 @@ begins; every lesson is looked at, so that none is refused hours later.
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from policies.learn.checkpoint import CheckpointError
+from policies.learn.config.behavior import DaggerHyperparameters
 from policies.learn.config.environment import Curriculum, lessons_of
 from policies.learn.config.load import Loaded
 from policies.learn.config.signals import GailSettings
 from policies.learn.demonstrations import DemonstrationError, check_demonstrations
+from policies.learn.perception import require_privileged
+from policies.learn.teacher import load_teacher
 from policies.tasks.catalogue import UnknownTask, build_task, settings_of, task_settings
 from policies.tasks.layout import LayoutError
 from policies.tasks.numbers import NumberError
@@ -30,6 +34,7 @@ def check_against_task(loaded: Loaded) -> None:
         task = build_task(name, 1, settings_of(name, loaded.config.env_settings.env_args))
     _check_numbers(loaded, task)
     _check_demonstrations(loaded, task)
+    _check_teacher(loaded, task)
 
 
 def _check_numbers(loaded: Loaded, task: Task) -> None:
@@ -54,10 +59,20 @@ def _check_demonstrations(loaded: Loaded, task: Task) -> None:
             check_demonstrations(path, task.layout)
 
 
+def _check_teacher(loaded: Loaded, task: Task) -> None:
+    behavior = loaded.config.behavior
+    place = ("behaviors", loaded.config.behavior_name)
+    with _refused_at(loaded, *place, "network_settings", "perceives"):
+        require_privileged(task.layout, behavior.network_settings.perceives)
+    if isinstance(behavior.hyperparameters, DaggerHyperparameters):
+        with _refused_at(loaded, *place, "hyperparameters", "teacher"):
+            load_teacher(behavior.hyperparameters.teacher, task.layout)
+
+
 @contextmanager
 def _refused_at(loaded: Loaded, *loc: int | str) -> Iterator[None]:
     """What the task refuses, with the place of the key that asks for it."""
     try:
         yield
-    except (UnknownTask, NumberError, DemonstrationError, LayoutError) as error:
+    except (UnknownTask, NumberError, DemonstrationError, LayoutError, CheckpointError) as error:
         raise loaded.error(loc, str(error).removeprefix(f"{loc[1]}: ")) from None

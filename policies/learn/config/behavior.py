@@ -109,10 +109,41 @@ class SacHyperparameters(HyperparametersBase):
     """Copies of each step in which a goal reached later in the episode stands for the goal (HER, `future`)."""
 
 
-Hyperparameters = PpoHyperparameters | SacHyperparameters
-HYPERPARAMETERS: Mapping[str, type[PpoHyperparameters] | type[SacHyperparameters]] = {
+class Augmentation(Block):
+    """How images are changed at random while a student learns from them; nothing by default."""
+
+    shift_px: NotNegativeWhole = own_key(0)
+    """Images are moved by up to this many pixels; what lies ahead moves with them, so keep it small."""
+    exposure: NotNegative = own_key(0.0)
+    """Colours are brightened or darkened by up to this many stops."""
+    noise: NotNegative = own_key(0.0)
+    """Deviation of noise added to colours, of 255."""
+
+
+class DaggerHyperparameters(HyperparametersBase):
+    """`hyperparameters` of `trainer_type: dagger`: a student learns what a teacher does in the states it gets into."""
+
+    teacher: str = own_key(...)
+    """The teacher: a policy file, a run, or a task that ships a policy; it sees the task's privileged elements."""
+    steps_per_round: Count = own_key(8192)
+    """Steps collected before each update."""
+    num_epoch: Count = own_key(4)
+    """How often each step is learnt from, in the mean, if the buffer holds them all."""
+    mixing: Share = own_key(0.5)
+    """In round i the teacher drives this to the power of i of the environments: all in the first round."""
+    perception_strength: NotNegative = own_key(0.1)
+    """Weight of the beliefs that `network_settings` names, next to that of the actions."""
+    augmentation: Augmentation = own_key(Augmentation())
+    """How images are changed at random."""
+    save_replay_buffer: bool = own_key(False)
+    """Whether the buffer is saved with the checkpoints; without it a resumed run begins to fill it anew."""
+
+
+Hyperparameters = PpoHyperparameters | SacHyperparameters | DaggerHyperparameters
+HYPERPARAMETERS: Mapping[str, type[Hyperparameters]] = {
     "ppo": PpoHyperparameters,
     "sac": SacHyperparameters,
+    "dagger": DaggerHyperparameters,
 }
 
 
@@ -140,8 +171,8 @@ class BehavioralCloning(Block):
 class Behavior(Block):
     """One entry of `behaviors`."""
 
-    trainer_type: Literal["ppo", "sac"] = "ppo"
-    """The algorithm."""
+    trainer_type: Literal["ppo", "sac", "dagger"] = "ppo"
+    """The algorithm; `dagger`, a student beside a teacher, is ours."""
     hyperparameters: Hyperparameters = Field(default_factory=_default_hyperparameters)
     """Numbers of the algorithm."""
     network_settings: NetworkSettings = NetworkSettings()

@@ -44,3 +44,5 @@ class NetworkSettings(Block):
     """Whether `--inference` takes the most probable actions instead of drawing them; training draws."""
     memory: Memory | None = None
     """LSTM; none: feed-forward."""
+    perceives: tuple[str, ...] = own_key(())
+    """Privileged elements of the task that the policy also says its belief of; learnt beside a teacher."""

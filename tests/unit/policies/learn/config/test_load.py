@@ -57,6 +57,11 @@ def refused(folder, text, *args, **kwargs):
             CAR + "      buffer_size: 31\n",
             "4: @.hyper: batch_size 32 is larger than buffer_size 31: no batch would ever be full",
         ),
+        (
+            CAR.replace("ppo", "dagger") + "      teacher: t.pt\n      mixing: 2\n",
+            "7: @.hyper.mixing: must be at most 1, not 2",
+        ),
+        (CAR.replace("ppo", "dagger"), "4: @.hyper.teacher: is required"),
         (CAR + "    max_step: 10\n", "6: @.max_step: unknown key; did you mean max_steps?"),
         (
             CAR + "    self_play: {window: 10}\n",
@@ -108,7 +113,7 @@ def refused(folder, text, *args, **kwargs):
             MASS + "    curriculum:\n    - name: a\n      valu: 1\n",
             "9: environment_parameters.mass.curriculum[0].value: is required",
         ),
-        ("behaviors:\n  Car:\n    trainer_type: poca\n", "3: @.trainer_type: must be ppo or sac, not 'poca'"),
+        ("behaviors:\n  Car:\n    trainer_type: poca\n", "3: @.trainer_type: must be ppo, sac or dagger, not 'poca'"),
         ("behaviors:\n  Car:\n    hyperparameters: {}\n", "3: @.trainer_type: is required"),
         ("behaviors: {}\n", "1: behaviors: there is no behaviour to train"),
         ("behaviors: 7\n", "1: behaviors: must be a mapping of keys to values, not 7"),

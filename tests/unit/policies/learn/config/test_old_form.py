@@ -117,7 +117,10 @@ def test_an_unknown_flat_key_is_warned_about(tmp_path):
     [
         (FLAT.replace("  lambd: 0.95\n", ""), "20: Car.lambd: is required in this old form of the file"),
         (FLAT.replace("trainer: ppo", "summary: 1"), "21: Car.trainer: is required"),
-        (FLAT.replace("trainer: ppo", "trainer: offline_bc"), "2: @trainer_type: must be ppo or sac, not 'offline_bc'"),
+        (
+            FLAT.replace("trainer: ppo", "trainer: offline_bc"),
+            "2: @trainer_type: must be ppo, sac or dagger, not 'offline_bc'",
+        ),
         (FLAT.replace("beta: 5.0e-3", "beta: -1"), "4: @hyperparameters.beta: must be at least 0, not -1"),
         (FLAT.replace("num_layers: 2", "num_layers: two"), "14: @network_settings.num_layers: must be a whole number"),
         (FLAT + "Truck: Cart\n", "23: Truck: refers to 'Cart', which is no block of its own"),
