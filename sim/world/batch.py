@@ -13,18 +13,17 @@ import warp as wp
 
 from sim.world.growing import (
     COVERAGE,
+    EMPTY_M,
     PHASES,
     ROUNDS,
     Grid,
     Growing,
     WorldNumbers,
     choose,
-    find_highest,
     plant,
-    raise_noise,
     settle,
-    shape_hills,
 )
+from sim.world.hills import find_highest, raise_noise, shape_hills
 from sim.world.terrain import Terrain, TerrainMap
 from sim.world.trees import (
     BUCKET_M,
@@ -182,7 +181,7 @@ class WorldBatch:
         side_m = max(0.0, config.size_m - 2.0 * EDGE_M)
         # one more: in float32 the quotient may round up
         growing.most_cells = ceil(side_m * sqrt(2.0) / _spacing_m(growing.trees_per_ha_max)) + 1
-        empty = wp.vec2(1.0e9, 1.0e9)
+        empty = wp.vec2(EMPTY_M, EMPTY_M)
         growing.points = wp.full((count, growing.most_cells**2), empty, dtype=wp.vec2, device=self.device)
 
     def _record(self) -> list[Any]:

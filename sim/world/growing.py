@@ -1,15 +1,15 @@
-"""Kernels that grow worlds: the hills, trees and buckets of the chosen worlds of a batch, from a seed each.
+"""Kernels that grow worlds: how the chosen worlds of a batch are prepared, planted and completed, from a seed each.
 
-In: `Growing`, the numbers and the scratch of a batch. Out: the `World` rows. Launched in the order of this file, each
-for all chosen worlds; a thread takes one row of a terrain, one cell of a planting grid, or a whole world. The hills
-are those of `terrain.make_heights`, in float32; the trees stand on Poisson-disc points planted as in `poisson.py`.
+In: `Growing`, the numbers and the scratch of a batch. Out: the `World` rows. `choose` comes first, then the hills
+(`hills.py`), then `plant` again and again, and `settle`, each for all chosen worlds; a thread takes one cell of a
+planting grid or a whole world. The trees stand on Poisson-disc points, planted as in `poisson.py`.
 """
 
 import warp as wp
 
 import common.kernels  # noqa: F401  (starts Warp quietly)
-from sim.streams import HILLS, TREE_PLACES, TREE_SIZES
-from sim.world.terrain import LACUNARITY, PERSISTENCE, Terrain, terrain_height
+from sim.streams import TREE_PLACES, TREE_SIZES
+from sim.world.terrain import Terrain, terrain_height
 from sim.world.trees import (
     CONTACT_MARGIN_M,
     CROWN_BASE_SHARE,
@@ -29,9 +29,8 @@ ROUNDS = 3  # times each empty cell is visited
 DARTS = wp.constant(4)  # thrown at it in each visit
 PHASES = 9  # cells three apart cannot disturb each other (Wei 2008)
 COVERAGE = wp.constant(0.655)  # points per spacing² reached with these darts; measured
+EMPTY_M = wp.constant(1.0e9)  # coordinate of the point of an empty cell [m]
 
-_LACUNARITY = wp.constant(LACUNARITY)
-_PERSISTENCE = wp.constant(PERSISTENCE)
 _CROWN_RADIUS_LEAST = wp.constant(CROWN_RADIUS_SHARE[0])
 _CROWN_RADIUS_MOST = wp.constant(CROWN_RADIUS_SHARE[1])
 _CROWN_BASE = wp.constant(CROWN_BASE_SHARE)
@@ -40,11 +39,8 @@ _ROOT_M = wp.constant(ROOT_M)
 _EDGE_M = wp.constant(EDGE_M)
 _MARGIN_M = wp.constant(CONTACT_MARGIN_M)
 _NO_OBSTACLE = wp.constant(NO_OBSTACLE_M)
-_EMPTY = wp.constant(1.0e9)  # coordinate of the point of an empty cell [m]
 _SQRT_HALF = wp.constant(0.7071067811865476)
 _SQUARE_M_PER_HA = wp.constant(1.0e4)
-_LEAST_WAVELENGTH_M = wp.constant(1.0)  # below it lattice numbers lose digits
-_LEAST_BLEND_M = wp.constant(1.0e-3)
 
 
 @wp.struct
@@ -136,128 +132,6 @@ def choose(growing: Growing, is_chosen: wp.array[wp.bool], seeds: wp.array[wp.in
 
 
 @wp.func
-def lattice_gradient(row_key: wp.uint32, j: int) -> wp.vec2:
-    """Unit gradient at column `j` of the lattice row that the key names."""
-    state = wp.rand_init(int(row_key), j)
-    x = 2.0 * wp.randf(state) - 1.0
-    y = 2.0 * wp.randf(state) - 1.0
-    return wp.vec2(x, y) / wp.sqrt(x * x + y * y + 1.0e-12)
-
-
-@wp.func
-def smooth(x: float) -> float:
-    """`terrain.smootherstep`."""
-    return x * x * x * (x * (x * 6.0 - 15.0) + 10.0)
-
-
-@wp.func
-def add_octave(
-    heights: wp.array2d[wp.float32], key: wp.uint32, row: int, lattice_per_cell: float, amplitude: float
-) -> None:
-    """Adds one layer of gradient noise (Perlin 2002) to a row of the terrain's grid, from west to east."""
-    north = float(row) * lattice_per_cell
-    i = int(north)
-    u = north - float(i)
-    fade_u = smooth(u)
-    south_key = wp.rand_init(int(key), i)
-    north_key = wp.rand_init(int(key), i + 1)
-    south_west = wp.vec2(0.0, 0.0)
-    north_west = wp.vec2(0.0, 0.0)
-    south_east = wp.vec2(0.0, 0.0)
-    north_east = wp.vec2(0.0, 0.0)
-    at = int(-2)
-    for column in range(heights.shape[1]):
-        east = float(column) * lattice_per_cell
-        j = int(east)
-        if j != at:
-            if j == at + 1:
-                south_west = south_east
-                north_west = north_east
-            else:
-                south_west = lattice_gradient(south_key, j)
-                north_west = lattice_gradient(north_key, j)
-            south_east = lattice_gradient(south_key, j + 1)
-            north_east = lattice_gradient(north_key, j + 1)
-            at = j
-        v = east - float(j)
-        fade_v = smooth(v)
-        south = wp.lerp(south_west[0] * u + south_west[1] * v, south_east[0] * u + south_east[1] * (v - 1.0), fade_v)
-        beyond = wp.lerp(
-            north_west[0] * (u - 1.0) + north_west[1] * v,
-            north_east[0] * (u - 1.0) + north_east[1] * (v - 1.0),
-            fade_v,
-        )
-        heights[row, column] = heights[row, column] + amplitude * wp.lerp(south, beyond, fade_u)
-
-
-@wp.kernel(enable_backward=False)
-def raise_noise(growing: Growing, groups: int) -> None:
-    """Fractal noise in place of the heights: LACUNARITY and PERSISTENCE from each octave to the next."""
-    group, row = wp.tid()
-    for slot in range(group, growing.chosen_count[0], groups):
-        i_world = growing.chosen[slot]
-        terrain = growing.worlds[i_world].terrain
-        for column in range(terrain.cells + 1):
-            terrain.heights[row, column] = 0.0
-        wavelength_m = wp.max(growing.numbers[i_world].hill_wavelength_m, _LEAST_WAVELENGTH_M)
-        lattice_per_cell = 1.0 / (wavelength_m * terrain.cells_per_m)
-        amplitude = float(1.0)
-        hills_key = wp.rand_init(growing.seeds[i_world], HILLS)
-        for octave in range(growing.octaves):
-            add_octave(terrain.heights, wp.rand_init(int(hills_key), octave), row, lattice_per_cell, amplitude)
-            lattice_per_cell *= _LACUNARITY
-            amplitude *= _PERSISTENCE
-
-
-@wp.kernel(enable_backward=False)
-def find_highest(growing: Growing, groups: int) -> None:
-    """The noise at home, and its largest rise or fall from there."""
-    group, row = wp.tid()
-    for slot in range(group, growing.chosen_count[0], groups):
-        i_world = growing.chosen[slot]
-        terrain = growing.worlds[i_world].terrain
-        middle = terrain.heights[terrain.cells // 2, terrain.cells // 2]
-        if row == 0:
-            growing.middle[i_world] = middle
-        highest = float(0.0)
-        for column in range(terrain.cells + 1):
-            highest = wp.max(highest, wp.abs(terrain.heights[row, column] - middle))
-        wp.atomic_max(growing.highest, i_world, highest)
-
-
-@wp.kernel(enable_backward=False)
-def shape_hills(growing: Growing, groups: int) -> None:
-    """Heights from the noise: within the bound of the hills, level in the clearing, and how high they reach."""
-    group, row = wp.tid()
-    for slot in range(group, growing.chosen_count[0], groups):
-        i_world = growing.chosen[slot]
-        terrain = growing.worlds[i_world].terrain
-        numbers = growing.numbers[i_world]
-        scale = float(0.0)
-        if growing.highest[i_world] > 0.0:
-            scale = numbers.hill_height_m / growing.highest[i_world]
-        cell_m = 1.0 / terrain.cells_per_m
-        # triangles that reach into the clearing have corners up to a cell's diagonal outside of it
-        level_radius_m = numbers.clearing_radius_m + 1.5 * cell_m
-        north = float(row) * cell_m - terrain.half_size_m
-        row_max = float(-1.0e9)
-        edge_max = float(-1.0e9)
-        for column in range(terrain.cells + 1):
-            east = float(column) * cell_m - terrain.half_size_m
-            beyond_m = wp.sqrt(north * north + east * east) - level_radius_m
-            share = smooth(wp.clamp(beyond_m / wp.max(numbers.clearing_blend_m, _LEAST_BLEND_M), 0.0, 1.0))
-            hill = (terrain.heights[row, column] - growing.middle[i_world]) * scale
-            # the product may exceed the bound by a rounding
-            height = wp.clamp(hill, -numbers.hill_height_m, numbers.hill_height_m) * share + 0.0
-            terrain.heights[row, column] = height
-            row_max = wp.max(row_max, height)
-            if row == 0 or row == terrain.cells or column == 0 or column == terrain.cells:
-                edge_max = wp.max(edge_max, height)
-        wp.atomic_max(growing.ground_max_m, i_world, row_max)
-        wp.atomic_max(growing.edge_max_m, i_world, edge_max)
-
-
-@wp.func
 def is_free(points: wp.array2d[wp.vec2], i_world: int, grid: Grid, row: int, column: int, dart: wp.vec2) -> bool:
     """Whether no point of the neighbouring cells is nearer to the dart than the spacing."""
     for i in range(wp.max(row - 2, 0), wp.min(row + 3, grid.cells)):
@@ -281,7 +155,7 @@ def plant(growing: Growing, groups: int, visit: int) -> None:
         row = 3 * place_row + phase // 3
         column = 3 * place_column + phase % 3
         cell = row * grid.cells + column
-        if row < grid.cells and column < grid.cells and growing.points[i_world, cell][0] == _EMPTY:
+        if row < grid.cells and column < grid.cells and growing.points[i_world, cell][0] == EMPTY_M:
             middle = wp.vec2(0.5 * grid.side_m, 0.5 * grid.side_m)
             state = wp.rand_init(int(wp.rand_init(int(key), ROUNDS + visit // PHASES)), cell)
             has_landed = bool(False)
@@ -350,8 +224,8 @@ def collect_trees(growing: Growing, i_world: int, forest: Forest) -> Forest:
     corner = wp.vec2(0.5 * grid.side_m, 0.5 * grid.side_m)
     for cell in range(grid.cells * grid.cells):
         point = growing.points[i_world, cell]
-        if point[0] != _EMPTY:
-            growing.points[i_world, cell] = wp.vec2(_EMPTY, _EMPTY)
+        if point[0] != EMPTY_M:
+            growing.points[i_world, cell] = wp.vec2(EMPTY_M, EMPTY_M)
             tree = grown_tree(
                 terrain, numbers, grid.tree_height_max_m, point - corner, wp.rand_init(int(sizes_key), cell)
             )
