@@ -14,6 +14,7 @@ from policies.experts.follower import ScriptedFollower
 from policies.learn.checkpoint import CheckpointError
 from policies.learn.policy import Policy
 from policies.learn.policy_file import find_policy, load_policy
+from policies.learn.seen import Seen
 from policies.tasks.flight.own import ACTIONS
 from policies.tasks.follow_me.observe import EGO, EGO_BLIND, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
 from policies.tasks.layout import ImageElement, Layout, LayoutError
@@ -61,9 +62,11 @@ class LearnedPilot:
     def reset(self) -> None:
         self._memory = self._policy.start_memory(1)
 
-    def act(self, vector: Floats, image: NDArray[np.uint8] | None) -> Floats:  # noqa: ARG002
+    def act(self, vector: Floats, image: NDArray[np.uint8] | None) -> Floats:
+        picture = torch.from_numpy(image)[None] if image is not None else None
         with torch.inference_mode():
-            actions, self._memory = self._policy.act(torch.from_numpy(vector)[None], self._memory, None)
+            seen = Seen(torch.from_numpy(vector)[None], picture)
+            actions, self._memory = self._policy.act(seen, self._memory, None)
             bounded: Floats = self._policy.bounded(actions)[0].numpy()
         return bounded
 

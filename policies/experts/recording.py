@@ -112,8 +112,10 @@ def record_episodes(
         progress: told how many there are, after every step.
 
     Raises:
-        RecordingError: hardly any episode succeeds.
+        RecordingError: hardly any episode succeeds, or the task shows images.
     """
+    if task.layout.image is not None:
+        raise RecordingError(f"{task.layout.task}: shows images as it is set, and demonstrations hold none")
     shares = np.full(task.env_count, count // task.env_count)
     shares[: count % task.env_count] += 1
     kept: list[list[Episode]] = [[] for _ in range(task.env_count)]

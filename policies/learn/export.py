@@ -3,6 +3,8 @@
 In: a policy. Out: a graph written layer by layer (opset 9, ML-Agents' own; any batch size, also with memory), which has
 been compared with the policy on random observations; the layout is in its metadata. The graph is written by hand
 because torch's tracing exporter is deprecated and fixes the batch size of memories, and the other needs onnxscript.
+
+Inputs are obs_0, the floats; or obs_0, the image (batch, channels, height, width) from 0 to 1, and obs_1, the floats.
 """
 
 import copy
@@ -24,11 +26,15 @@ from policies.learn.hyper import HyperDense
 from policies.learn.networks import Body
 from policies.learn.normalizer import LIMIT
 from policies.learn.policy import Policy
+from policies.learn.seen import Seen
+from policies.learn.vision import Residual
+from policies.tasks.layout import Layout
 
 OPSET = 9
 IR_VERSION = 4  # the one that came with opset 9
 API_VERSION = 3.0  # ML-Agents' number of this set of names
 TOLERANCE = 1e-5
+IMAGE_TOLERANCE = 1e-4  # encoders sum thousands of terms, and in another order
 _MASKED = 1e8
 
 
@@ -47,13 +53,13 @@ def export_policy(policy: Policy, path: Path) -> float:
         The largest difference found between the two.
 
     Raises:
-        ParityError: they differ by more than 1e-5.
+        ParityError: they differ by more than 1e-5; with images, 1e-4.
         ExportError: the file cannot be written.
     """
     policy = copy.deepcopy(policy).cpu()  # where the graph is compared with it; a training's own may be on a GPU
     content = onnx_bytes(policy)
     difference = largest_difference(policy, content)
-    if difference > TOLERANCE:
+    if difference > (TOLERANCE if policy.layout.image is None else IMAGE_TOLERANCE):
         raise ParityError(f"{path}: the exported network differs from the policy by {difference:.1e}")
     try:
         write_whole(path, content)
@@ -67,7 +73,7 @@ def onnx_bytes(policy: Policy) -> bytes:
     """The policy as an ONNX model."""
     graph = _Graph()
     layout = policy.layout
-    features = _body(graph, policy.body, layout.observation_size)
+    features = _body(graph, policy.body, layout)
     graph.constant_output("version_number", [API_VERSION])
     graph.constant_output("memory_size", [float(policy.memory_size)])
     if layout.continuous:
@@ -81,13 +87,21 @@ def onnx_bytes(policy: Policy) -> bytes:
     return content
 
 
-def _body(graph: "_Graph", body: Body, size: int) -> str:
-    features = graph.input("obs_0", ["batch", size])
+def _body(graph: "_Graph", body: Body, layout: Layout) -> str:
+    encoded = ""
+    if body.encoder is not None:
+        height, width, channels = layout.image_shape
+        encoded = _encoder(
+            graph, body.encoder.layers, graph.input(_names(layout)[0], ["batch", channels, height, width])
+        )
+    features = graph.input(_names(layout)[-1], ["batch", layout.observation_size])
     if body.normalizer is not None:
         centred = graph.node("Sub", features, graph.weight(body.normalizer.mean.float()))
         scaled = graph.node("Div", centred, graph.weight(body.normalizer.deviation))
         features = graph.node("Clip", scaled, min=-LIMIT, max=LIMIT)
     goals = graph.node("Gather", features, graph.integers(body.goal_indices), axis=1) if body.goal_indices else ""
+    if encoded:
+        features = graph.node("Concat", encoded, features, axis=1)
     for layer in body.layers:
         features = graph.swish(graph.dense(features, layer))
     if body.hyper is not None:
@@ -95,6 +109,37 @@ def _body(graph: "_Graph", body: Body, size: int) -> str:
     if body.recurrence is not None:
         features = _lstm(graph, body.recurrence.lstm, features, body.memory_size)
     return features
+
+
+def _names(layout: Layout) -> tuple[str, ...]:
+    """Of the inputs: the image's, if there is one, and the floats'."""
+    return ("obs_0",) if layout.image is None else ("obs_0", "obs_1")
+
+
+def _encoder(graph: "_Graph", layers: nn.Sequential, images: str) -> str:
+    """Layer by layer; raises TypeError for one that encoders do not have."""
+    for layer in layers:
+        match layer:
+            case nn.Conv2d():
+                images = graph.convolution(images, layer)
+            case nn.LeakyReLU():
+                images = graph.node("LeakyRelu", images, alpha=layer.negative_slope)
+            case nn.ReLU():
+                images = graph.node("Relu", images)
+            case nn.SiLU():
+                images = graph.swish(images)
+            case nn.MaxPool2d():
+                sizes = {"kernel_shape": [layer.kernel_size] * 2, "strides": [layer.stride] * 2}
+                images = graph.node("MaxPool", images, **sizes)
+            case Residual():
+                images = graph.node("Add", images, _encoder(graph, layer.layers, images))
+            case nn.Flatten():
+                images = graph.node("Flatten", images, axis=1)
+            case nn.Linear():
+                images = graph.dense(images, layer)
+            case _:
+                raise TypeError(f"no such layer in a graph: {layer}")
+    return images
 
 
 def _hyper(graph: "_Graph", hyper: HyperDense, features: str, goals: str) -> str:
@@ -189,6 +234,12 @@ class _Graph:
         assert isinstance(layer, nn.Linear)  # noqa: S101  (for the type checker)
         return self.node("Gemm", inputs, self.weight(layer.weight), self.weight(layer.bias), transB=1)
 
+    def convolution(self, images: str, layer: nn.Conv2d) -> str:
+        """A convolution of (batch, channels, height, width)."""
+        sizes = {"kernel_shape": layer.kernel_size, "strides": layer.stride, "pads": [*layer.padding] * 2}
+        assert layer.bias is not None  # noqa: S101  (for the type checker)
+        return self.node("Conv", images, self.weight(layer.weight), self.weight(layer.bias), **sizes)
+
     def swish(self, inputs: str) -> str:
         return self.node("Mul", inputs, self.node("Sigmoid", inputs))
 
@@ -240,15 +291,21 @@ def largest_difference(policy: Policy, content: bytes, row_count: int = 64, deci
         observations = torch.randn(row_count, policy.layout.observation_size, generator=generator)
         if policy.body.normalizer is not None:  # as wide as those that the policy has seen
             observations = policy.body.normalizer.inverse(observations)
+        seen, images = Seen(observations), observations[:, :0]
+        if policy.layout.image is not None:
+            bytes_ = torch.randint(0, 256, (row_count, *policy.layout.image_shape), generator=generator)
+            seen = Seen(observations, bytes_.to(torch.uint8))
+            images = bytes_.permute(0, 3, 1, 2) / 255.0
         given = {
-            "obs_0": observations.numpy(),
+            _names(policy.layout)[0]: images.numpy(),
+            _names(policy.layout)[-1]: observations.numpy(),
             "action_masks": np.ones((row_count, sum(policy.layout.branch_sizes)), dtype=np.float32),
             "recurrent_in": graph_memory,
         }
         values = session.run(None, {name: value for name, value in given.items() if name in names})
         results = dict(zip([node.name for node in session.get_outputs()], values, strict=True))
         with torch.inference_mode():
-            features, memory = policy.body.step(observations, memory)
+            features, memory = policy.body.step(seen, memory)
             distribution = policy.heads(features)
             actions = distribution.mode()
         if policy.layout.continuous:

@@ -39,13 +39,25 @@ class PolicyCard:
         return {name: Sampler(**record) for name, record in self.numbers.items()}
 
 
-def save_policy(path: Path, policy: Policy, card: PolicyCard) -> None:
+def save_policy(path: Path, policy: Policy, card: PolicyCard, *, is_half: bool = False) -> None:
     """Writes a policy file.
+
+    Args:
+        path: of the file.
+        policy: to be saved.
+        card: where it comes from.
+        is_half: whether weights are rounded to 16 bits: half the size, for policies that see images and ship.
 
     Raises:
         CheckpointError: it cannot be written.
     """
-    save(path, {"policy": policy_record(policy), "card": asdict(card)}, POLICY)
+    record = policy_record(policy)
+    if is_half:
+        record["weights"] = {
+            name: tensor.half() if tensor.dtype is torch.float32 else tensor  # a normaliser's sums stay whole
+            for name, tensor in record["weights"].items()
+        }
+    save(path, {"policy": record, "card": asdict(card)}, POLICY)
 
 
 def load_policy(path: Path) -> tuple[Policy, PolicyCard]:

@@ -8,15 +8,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from policies.learn.checkpoint import CheckpointError
-from policies.learn.config.behavior import DaggerHyperparameters
+from policies.learn.config.behavior import Behavior, DaggerHyperparameters, PpoHyperparameters
 from policies.learn.config.environment import Curriculum, lessons_of
 from policies.learn.config.load import Loaded
 from policies.learn.config.signals import GailSettings
 from policies.learn.demonstrations import DemonstrationError, check_demonstrations
 from policies.learn.perception import require_privileged
 from policies.learn.teacher import load_teacher
+from policies.learn.vision import LEAST_SIDES
 from policies.tasks.catalogue import UnknownTask, build_task, settings_of, task_settings
-from policies.tasks.layout import LayoutError
+from policies.tasks.layout import Layout, LayoutError
 from policies.tasks.numbers import NumberError
 from policies.tasks.task import Task
 
@@ -32,9 +33,33 @@ def check_against_task(loaded: Loaded) -> None:
         task_settings(name, {})
     with _refused_at(loaded, "env_settings", "env_args"):
         task = build_task(name, 1, settings_of(name, loaded.config.env_settings.env_args))
+    for loc, sentence in _unseen(loaded.config.behavior, task.layout):
+        raise loaded.error(("behaviors", loaded.config.behavior_name, *loc), sentence)
     _check_numbers(loaded, task)
     _check_demonstrations(loaded, task)
     _check_teacher(loaded, task)
+
+
+def _unseen(behavior: Behavior, layout: Layout) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What the networks would have to see and cannot: keys below the behaviour, and what is wrong with each."""
+    numbers, kind = behavior.hyperparameters, behavior.network_settings.vis_encode_type
+    if isinstance(numbers, PpoHyperparameters) and numbers.privileged_critic and not layout.privileged:
+        yield ("hyperparameters", "privileged_critic"), f"{layout.task} as it is set has no privileged elements"
+    if layout.image is None:
+        return
+    height, width, _ = layout.image.shape
+    least = LEAST_SIDES[kind]
+    if min(height, width) < least:
+        sentence = f"{kind} needs images of {least} x {least} at least; those of {layout.task} are {height} x {width}"
+        yield ("network_settings", "vis_encode_type"), sentence
+    blind = f"sees no images, and {layout.task} as it is set shows one"
+    if behavior.trainer_type == "sac":
+        yield ("trainer_type",), f"sac {blind}"
+    for name in behavior.reward_signals.in_use:
+        if name != "extrinsic":
+            yield ("reward_signals", name), blind
+    if behavior.behavioral_cloning is not None:
+        yield ("behavioral_cloning",), blind
 
 
 def _check_numbers(loaded: Loaded, task: Task) -> None:

@@ -41,7 +41,6 @@ def put_right(root: Placed, name: str, notes: list[str], *, is_strict: bool) -> 
         _drop_unknown(network, where, NetworkSettings, notes)
         for memory, memory_path in _below(network, where, "memory"):
             _drop_unknown(memory, memory_path, Memory, notes)
-    _note_encoder(behavior, path, notes)
     for cloning, where in _below(behavior, path, "behavioral_cloning"):
         _drop_unknown(cloning, where, BehavioralCloning, notes)
     for signals, where in _below(behavior, path, "reward_signals"):
@@ -86,20 +85,6 @@ def _put_memory_right(network: Placed, path: str, notes: list[str], *, is_strict
     notes.append(note_at(place, f"{path}.{', '.join(flat)}", effect))
     for key in flat:
         network.drop(key)
-
-
-def _note_encoder(behavior: Placed, path: str, notes: list[str]) -> None:
-    """Says once that nothing is there to encode, where an encoder of images is chosen that is not the default."""
-    networks = list(_below(behavior, path, "network_settings"))
-    for signals, signals_path in _below(behavior, path, "reward_signals"):
-        for kind in signals:
-            for signal, where in _below(signals, signals_path, kind):
-                networks += _below(signal, where, "network_settings")
-    for network, where in networks:
-        if network.get("vis_encode_type", "simple") != "simple":
-            sentence = "has no effect: no task shows its policy images yet"
-            notes.append(note_at(network.places["vis_encode_type"], f"{where}.vis_encode_type", sentence))
-            return
 
 
 def _put_signal_right(signal: Placed, path: str, kind: str, notes: list[str]) -> None:

@@ -1,6 +1,7 @@
 """Exported networks do what the policy does, under ML-Agents' names, for any number of rows."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import onnx
@@ -9,9 +10,10 @@ import pytest
 import torch
 
 from policies.learn.config.network import Memory, NetworkSettings
-from policies.learn.export import TOLERANCE, ExportError, export_policy, largest_difference, onnx_bytes
+from policies.learn.export import IMAGE_TOLERANCE, TOLERANCE, ExportError, export_policy, largest_difference, onnx_bytes
 from policies.learn.policy import Policy
-from policies.tasks.layout import Branch, Element, Layout
+from policies.learn.vision import LEAST_SIDES
+from policies.tasks.layout import Branch, Element, ImageElement, Layout
 
 FRAME = (Element("goal_x", "m", is_goal=True), *(Element(f"e{k}", "1") for k in range(4)))
 CONTINUOUS = (Element("steer", "1"), Element("throttle", "1"))
@@ -30,10 +32,11 @@ NETWORKS = {
 }
 
 
-def make_policy(kind, network):
+def make_policy(kind, network, image=None, **more):
     layout, options = KINDS[kind]
+    layout = replace(layout, image=image)
     generator = torch.Generator().manual_seed(1)
-    settings = NetworkSettings(hidden_units=16, num_layers=2, **NETWORKS[network])
+    settings = NetworkSettings(hidden_units=16, num_layers=2, **NETWORKS[network], **more)
     policy = Policy(layout, settings, generator, **options)
     policy.body.normalize(3.0 + 2.0 * torch.randn(100, layout.observation_size, generator=generator))
     with torch.no_grad():
@@ -51,6 +54,20 @@ def session(policy):
 def test_exported_network_does_what_the_policy_does(kind, network):
     policy = make_policy(kind, network)
     assert largest_difference(policy, onnx_bytes(policy)) <= TOLERANCE
+
+
+IMAGE = ImageElement(40, 36, ("red", "green", "blue", "nearness"))  # of different sides: none is taken for another
+
+
+@pytest.mark.parametrize("encoder", LEAST_SIDES)
+@pytest.mark.parametrize("network", ["normalised", "recurrent", "hyper"])
+def test_exported_network_sees_images_as_the_policy_does(encoder, network):
+    policy = make_policy("hybrid", network, vis_encode_type=encoder, image=IMAGE)
+    content = onnx_bytes(policy)
+    assert largest_difference(policy, content) <= IMAGE_TOLERANCE
+    inputs = {node.name: node.shape for node in onnxruntime.InferenceSession(content).get_inputs()}
+    assert inputs["obs_0"] == ["batch", 4, 40, 36]
+    assert inputs["obs_1"] == ["batch", 10]
 
 
 def test_names_and_shapes_are_those_of_ml_agents():

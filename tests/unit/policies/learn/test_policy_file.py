@@ -7,7 +7,9 @@ from policies.learn.checkpoint import CheckpointError, load, save
 from policies.learn.config.network import Memory, NetworkSettings
 from policies.learn.policy import Policy
 from policies.learn.policy_file import PolicyCard, load_policy, save_policy
+from policies.learn.seen import Seen
 from policies.tasks.catalogue import build_task
+from policies.tasks.layout import Element, ImageElement, Layout
 
 CARD = PolicyCard("RollerBall", {"preset": "as-coded"}, 7, 1000, {"success_rate": 0.99})
 
@@ -46,3 +48,20 @@ def test_policy_of_another_version_is_refused(tmp_path):
     save(path, content, "policy")
     with pytest.raises(CheckpointError, match=r"a\.pt: written by another version of honeyguide: .*body\.layers\.0"):
         load_policy(path)
+
+
+def test_a_policy_of_the_follow_me_documents_size_is_below_a_megabyte_in_half_precision(tmp_path):
+    frame = tuple(Element(f"e{k}", "1") for k in range(7))
+    layout = Layout("T", 1, frame, (Element("push", "1"),), image=ImageElement(64, 64, ("red", "green", "blue")))
+    settings = NetworkSettings(hidden_units=256, num_layers=1, vis_encode_type="simple")
+    policy = Policy(layout, settings, torch.Generator().manual_seed(0))
+    save_policy(tmp_path / "a.pt", policy, CARD, is_half=True)
+    assert (tmp_path / "a.pt").stat().st_size < 1_000_000
+    again, _ = load_policy(tmp_path / "a.pt")
+    assert again.layout == layout
+    generator = torch.Generator().manual_seed(2)
+    image = torch.randint(0, 256, (20, 64, 64, 3), dtype=torch.uint8, generator=generator)
+    seen = Seen(torch.randn(20, 7, generator=generator), image)
+    means = [each(seen).mean for each in (policy, again)]
+    assert torch.allclose(means[0], means[1], atol=2e-3)
+    assert not torch.equal(means[0], means[1])

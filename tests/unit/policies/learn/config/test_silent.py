@@ -44,11 +44,6 @@ def load(folder, text, **kwargs):
             "3: behaviors.Car.reward_signals.rnd.network_settings.use_recurrent, memory_size: "
             "reward signals have no memory: dropped",
         ),
-        (
-            "    network_settings: {vis_encode_type: resnet}\n"
-            "    reward_signals: {rnd: {network_settings: {vis_encode_type: nature_cnn}}}\n",
-            "3: behaviors.Car.network_settings.vis_encode_type: has no effect: no task shows its policy images yet",
-        ),
         ("    framework: tensorflow\n", "3: behaviors.Car.framework: deprecated, has no effect"),
         ("torch_settings: {dev: cpu}\n", f"3: torch_settings.dev: unknown key; did you mean device? {DROPPED}"),
         (
