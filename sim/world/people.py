@@ -13,8 +13,7 @@ from common.kernels import TICK_S
 from common.rng import draw_key
 from common.rotation import wrap_pi
 from sim.streams import OWNER_BODY, OWNER_PLAN
-from sim.world.terrain import grid_coordinate, outer_cell
-from sim.world.trees import Forest
+from sim.world.footways import BODY_CLEARANCE_M, around_nearest, clear_of_trunks, free_way_m, towards_tree
 from sim.world.world import World, ground_height, ray_hit
 
 wp.set_module_options({"enable_backward": False})
@@ -25,20 +24,20 @@ WALK_SPEED_M_S = 2.0  # people walk below and run above it; Baker et al. 2025 (a
 RUN_SPEED_M_S = 5.0  # 18 km/h: a brisk run
 
 CHEST_M = wp.constant(1.0)  # above the feet: what a follower keeps its distance to, and where the phone is carried
-BODY_CLEARANCE_M = wp.constant(0.3)  # from the axis of a body to the bark: half a shoulder's width and a little
 _EDGE_M = wp.constant(8.0)  # turns back this far from the edge of the map; guess
 _TURN = wp.constant(6.283185307179586)
 _PI = wp.constant(3.141592653589793)
-_NONE_M = wp.constant(1.0e9)
 _AHEAD_S = wp.constant(1.6)  # how far ahead people look for trees, in time and at least; guess
 _AHEAD_MIN_M = wp.constant(2.5)
 _AHEAD_MAX_M = wp.constant(7.0)
 _FACE_GAIN = wp.constant(2.5)  # [1/s] from a course error to a turn rate; guess
 _TURN_TIME_S = wp.constant(0.25)  # of a turn rate towards what is wanted; guess
+_CREEP_M_S = wp.constant(0.3)  # past a trunk that is touched; guess
+_CHORD_S = wp.constant(0.25)  # half of the time in which a person who walks into a trunk can stop; guess
+_BRAKE_TIME_S = wp.constant(0.2)  # how fast people stop before what they would run into; guess
+_BRAKE_M_S2 = wp.constant(5.0)  # guess
 _SLOPE_STEP_M = wp.constant(0.5)  # about one step: a person feels the slope over it
-_WALK_RATIO_M_S = wp.constant(
-    0.39
-)  # step length over steps per second; Sekiya and Nagasaki 1998: 0.0065 m per step/min
+_WALK_RATIO_M_S = wp.constant(0.39)  # step length over steps per second; Sekiya and Nagasaki 1998: 0.0065 m/(steps/min)
 _RUN_STEPS = wp.vec2(2.3, 0.12)  # steps per second at rest and per m/s: 2.5 at 2 m/s, 2.9 at 5 m/s; guess
 
 
@@ -88,7 +87,7 @@ def person_model(speed_max_m_s: float = WALK_SPEED_M_S) -> Any:
     model = PersonModel()
     model.speed_min = 0.4  # guess: strolling
     model.speed_max = speed_max_m_s
-    model.stop_share = 0.15  # guess, as are the next seven
+    model.stop_share = 0.2  # guess, as are the next seven
     model.stop_min_s, model.stop_max_s = 1.0, 4.0
     model.plan_min_s, model.plan_max_s = 2.0, 7.0
     model.course_std_rad = 0.9
@@ -179,9 +178,15 @@ def person_step(w: World, model: PersonModel, person: Person, seed: int, i: int,
         out.turn_rate + (rate_sp - out.turn_rate) * dt_s / (_TURN_TIME_S + dt_s), -rate_max, rate_max
     )
     out.heading_rad = wrap_pi(out.heading_rad + out.turn_rate * dt_s)
-    # speed: slower for a sharp turn and on a slope
+    # speed: slower for a sharp turn, on a slope, and straight before a trunk
     speed_sp = out.speed_sp * slope_share(w, out) * wp.max(0.25, 1.0 - wp.abs(error) / (0.5 * _PI))
     accel = wp.clamp((speed_sp - out.speed) / model.speed_time_s, -model.accel_max, model.accel_max)
+    # along the chord of a bend
+    chord_rad = out.heading_rad + _CHORD_S * out.turn_rate
+    free_m = free_way_m(w.forest, wp.vec2(out.pos_ned[0], out.pos_ned[1]), chord_rad, ahead_m(out))
+    speed_limit = _CREEP_M_S + wp.sqrt(model.accel_max * free_m)
+    if speed_limit < out.speed:
+        accel = wp.max((speed_limit - out.speed) / _BRAKE_TIME_S, -_BRAKE_M_S2)
     out.speed = wp.max(out.speed + accel * dt_s, 0.0)
     return stepped(w, out, dt_s)
 
@@ -196,6 +201,8 @@ def stepped(w: World, person: Person, dt_s: float) -> Person:
     place = clear_of_trunks(w.forest, within_map(w, north, east))
     out.pos_ned = wp.vec3(place[0], place[1], -ground_height(w, place[0], place[1]))
     out.vel_ned = (out.pos_ned - start) / dt_s
+    # a trunk that was touched takes the speed towards it
+    out.speed = wp.min(person.speed, wp.length(wp.vec2(out.vel_ned[0], out.vel_ned[1])))
     # hysteresis: nobody changes gait at every breath
     if person.speed > 1.1 * WALK_SPEED_M_S:
         out.is_running = 1
@@ -230,7 +237,8 @@ def planned(w: World, model: PersonModel, person: Person, seed: int, i: int, tic
             out.bend_rad_s = model.bend_std_rad_s * wp.randn(state)
             out.clearance_m = model.clearance_min_m + (model.clearance_max_m - model.clearance_min_m) * wp.randf(state)
             if wp.randf(state) < model.graze_share:
-                out.course_rad = towards_tree(w.forest, out)
+                place = wp.vec2(person.pos_ned[0], person.pos_ned[1])
+                out.course_rad = towards_tree(w.forest, place, out.course_rad, out.clearance_m)
                 out.bend_rad_s = 0.0
     out.course_rad = inward_course(w, out)
     return out
@@ -275,85 +283,10 @@ def slope_share(w: World, person: Person) -> float:
 
 
 @wp.func
-def bucket_at(forest: Forest, north: float, east: float) -> int:
-    """The bucket that lists every tree near a place [m], -1 beyond the map."""
-    row = outer_cell(grid_coordinate(north, forest.half_size_m, forest.buckets_per_m), forest.buckets)
-    column = outer_cell(grid_coordinate(east, forest.half_size_m, forest.buckets_per_m), forest.buckets)
-    if row < 0 or column < 0 or row >= forest.buckets or column >= forest.buckets:
-        return -1
-    return row * forest.buckets + column
-
-
-@wp.func
-def clear_of_trunks(forest: Forest, place: wp.vec2) -> wp.vec2:
-    """A place [m] moved straight out of the trunk it is nearest to, if that is nearer than BODY_CLEARANCE_M."""
-    out = place
-    bucket = bucket_at(forest, place[0], place[1])
-    if bucket < 0:
-        return out
-    for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
-        tree = forest.trees[forest.bucket_trees[k]]
-        off = out - wp.vec2(tree.north, tree.east)
-        distance = wp.length(off)
-        keep = tree.trunk_radius + BODY_CLEARANCE_M
-        if distance < keep:
-            outward = wp.vec2(1.0, 0.0)
-            if distance > 1.0e-6:
-                outward = off / distance
-            out = wp.vec2(tree.north, tree.east) + keep * outward
-    return out
-
-
-@wp.func
 def free_course(w: World, person: Person) -> float:
     """The course [rad], turned to the nearer tangent of a tree that is in the way; and once more for the next tree."""
-    once = around_nearest(w.forest, person, person.course_rad)
+    place = wp.vec2(person.pos_ned[0], person.pos_ned[1])
+    once = around_nearest(w.forest, place, person.course_rad, ahead_m(person), person.clearance_m)
     if once == person.course_rad:
         return once
-    return around_nearest(w.forest, person, once)
-
-
-@wp.func
-def around_nearest(forest: Forest, person: Person, course_rad: float) -> float:
-    """A course [rad] past the first tree within sight that a course would bring too close."""
-    along = wp.vec2(wp.cos(course_rad), wp.sin(course_rad))
-    place = wp.vec2(person.pos_ned[0], person.pos_ned[1])
-    look = ahead_m(person)
-    nearest = _NONE_M
-    out = course_rad
-    for i_point in range(3):  # buckets list trees 2 m and more beyond their borders: no gap between these points
-        point = place + (0.5 * float(i_point) * look) * along
-        bucket = bucket_at(forest, point[0], point[1])
-        if bucket >= 0:
-            for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
-                tree = forest.trees[forest.bucket_trees[k]]
-                off = wp.vec2(tree.north, tree.east) - place
-                forward = wp.dot(off, along)
-                keep = tree.trunk_radius + BODY_CLEARANCE_M + person.clearance_m
-                side = along[0] * off[1] - along[1] * off[0]
-                if forward > 0.0 and forward < look and wp.abs(side) < keep and forward < nearest:
-                    nearest = forward
-                    distance = wp.max(wp.length(off), 1.0e-3)
-                    # the tangent; nearer than `keep` it leads straight across
-                    aside = wp.asin(wp.min(keep / distance, 1.0))
-                    out = wrap_pi(wp.atan2(off[1], off[0]) - wp.where(side >= 0.0, aside, -aside))
-    return out
-
-
-@wp.func
-def towards_tree(forest: Forest, person: Person) -> float:
-    """The course [rad] that just passes the first tree listed around a place ahead; unchanged if there is none."""
-    along = wp.vec2(wp.cos(person.course_rad), wp.sin(person.course_rad))
-    place = wp.vec2(person.pos_ned[0], person.pos_ned[1])
-    point = place + 8.0 * along
-    bucket = bucket_at(forest, point[0], point[1])
-    out = person.course_rad
-    if bucket >= 0:
-        for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
-            tree = forest.trees[forest.bucket_trees[k]]
-            off = wp.vec2(tree.north, tree.east) - place
-            distance = wp.length(off)
-            keep = tree.trunk_radius + BODY_CLEARANCE_M + person.clearance_m
-            if out == person.course_rad and wp.dot(off, along) > 2.0 and distance > keep:
-                out = wp.atan2(off[1], off[0]) + wp.asin(keep / distance)
-    return wrap_pi(out)
+    return around_nearest(w.forest, place, once, ahead_m(person), person.clearance_m)

@@ -1,9 +1,12 @@
 import numpy as np
 import pytest
+import warp as wp
 
 from sim.owner import Owner
-from sim.world.people import PERSON_DT_S, RUN_SPEED_M_S, WALK_SPEED_M_S, person_model
-from sim.world.world import WorldConfig, build_world
+from sim.world.people import PERSON_DT_S, RUN_SPEED_M_S, WALK_SPEED_M_S, Person, is_in_sight, person_model
+from sim.world.world import World, WorldConfig, build_world
+
+wp.set_module_options({"enable_backward": False})
 
 PEOPLE = 48
 STEPS = 3000  # a minute
@@ -84,3 +87,58 @@ def test_the_same_seed_gives_the_same_walk_and_each_row_its_own(forest):
 def test_velocity_is_the_change_of_the_place(running):
     pos, vel = running["pos_ned"].astype(np.float64), running["vel_ned"]
     np.testing.assert_allclose(np.diff(pos, axis=0), PERSON_DT_S * vel[1:], atol=1e-4)
+
+
+def test_accelerations_are_those_of_legs(running):
+    change = (running["vel_ned"][10:, :, :2] - running["vel_ned"][:-10, :, :2]) / (10 * PERSON_DT_S)
+    size = np.linalg.norm(change, axis=-1)
+    assert (size < 5.0).mean() > 0.999  # the rest: a trunk is touched
+    assert size.max() < 15.0
+
+
+def test_people_slow_down_on_slopes(forest, running):
+    moving = running["speed_sp"] > 0.5
+    north, east, heading = running["pos_ned"][..., 0], running["pos_ned"][..., 1], running["heading_rad"]
+    rise = forest.height(north + np.cos(heading), east + np.sin(heading)) - forest.height(north, east)
+    share = running["speed"] / np.maximum(running["speed_sp"], 0.5)
+    assert share[moving & (np.abs(rise) > 0.3)].mean() < 0.7 * share[moving & (np.abs(rise) < 0.05)].mean()
+
+
+def test_steps_follow_the_speed(running):
+    turns = np.diff(np.unwrap(running["gait_phase"], axis=0), axis=0) / (
+        2.0 * np.pi * PERSON_DT_S
+    )  # strides per second
+    standing = running["speed"][1:] < 1e-3
+    fast = running["speed"][1:] > 3.0
+    assert np.abs(turns[standing]).max(initial=0.0) < 0.1
+    assert 1.2 < turns[fast].mean() < 1.6
+    assert (running["is_running"][1:][fast] == 1).all()
+
+
+@wp.kernel
+def sight(world: World, eyes: wp.array[wp.vec3], people: wp.array[Person], is_seen: wp.array[wp.int32]):
+    i = wp.tid()
+    if is_in_sight(world, eyes[i], people[i]):
+        is_seen[i] = 1
+
+
+def test_a_trunk_hides_a_person_who_stands_behind_it(forest):
+    trees = forest.trees
+    tree = trees[np.argmin(np.hypot(trees["north"] - 20.0, trees["east"]))]
+    people = np.zeros(3, dtype=wp.zeros(1, dtype=Person).numpy().dtype)
+    # behind the trunk, beside it, and behind a hill of the ground
+    off_m = tree["trunk_radius"] + 0.35
+    for row, (north, east) in enumerate([(off_m, 0.0), (0.0, 1.5), (off_m, 0.0)]):
+        place = np.array([tree["north"] + north, tree["east"] + east])
+        people[row]["pos_ned"] = [*place, -forest.height(*place)]
+        people[row]["stature_m"] = 1.75
+    eyes = people["pos_ned"] - [2.0 * off_m, 0.0, 1.2]
+    eyes[2] = people["pos_ned"][2] + [0.0, 0.0, 0.5]  # from under ground
+    is_seen = wp.zeros(3, dtype=wp.int32)
+    wp.launch(
+        sight,
+        dim=3,
+        inputs=[forest.kernel, wp.array(eyes, dtype=wp.vec3), wp.array(people, dtype=Person)],
+        outputs=[is_seen],
+    )
+    assert is_seen.numpy().tolist() == [0, 1, 0]
