@@ -8,6 +8,8 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from policies.tasks.follow_me.follow_me import FollowMe
+from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.parking.level1 import Parking1
 from policies.tasks.parking.level2 import Parking2
 from policies.tasks.parking.settings import Parking2Settings, ParkingSettings
@@ -34,6 +36,7 @@ CATALOGUE: dict[str, Entry] = {
     "ReachTarget": Entry(ReachSettings, ReachTarget),
     "Parking1": Entry(ParkingSettings, Parking1),
     "Parking2": Entry(Parking2Settings, Parking2),
+    "FollowMe": Entry(FollowSettings, FollowMe),
 }
 
 

@@ -27,11 +27,12 @@ class Outcome(IntEnum):
 
     RUNNING = 0
     SUCCESS = 1
-    TIMEOUT = 2  # the only one that is a truncation
+    TIMEOUT = 2  # a truncation
     HIT_WALL = 3
     HIT_OBSTACLE = 4
     FELL = 5
-    HIT_OTHER = 6  # rolled over, struck an edge
+    HIT_OTHER = 6  # rolled over, struck an edge, came too near a person
+    LOST = 7  # what was to be followed
 
 
 RUNNING = wp.constant(int(Outcome.RUNNING))
@@ -41,6 +42,7 @@ HIT_WALL = wp.constant(int(Outcome.HIT_WALL))
 HIT_OBSTACLE = wp.constant(int(Outcome.HIT_OBSTACLE))
 FELL = wp.constant(int(Outcome.FELL))
 HIT_OTHER = wp.constant(int(Outcome.HIT_OTHER))
+LOST = wp.constant(int(Outcome.LOST))
 
 OUTCOME_COUNT = len(Outcome)
 SCORE_COLUMNS = OUTCOME_COUNT + 2  # episodes by outcome, then the sums of their returns and of their lengths
@@ -102,6 +104,16 @@ def close_step(border: Border, i: int, reward: float, outcome: int) -> bool:
         border.scores[i, outcome] += 1.0
         border.scores[i, _RETURN_SCORE] += border.returns[i]
         border.scores[i, _LENGTH_SCORE] += float(border.steps[i])
+    return is_over
+
+
+@wp.func
+def close_step_in_time(border: Border, i: int, reward: float, outcome: int) -> bool:
+    """As `close_step`, of a task whose success is to last until time is up: that end is a truncation as well."""
+    is_over = close_step(border, i, reward, outcome)
+    if outcome == SUCCESS:
+        border.is_truncated[i] = True
+        border.is_terminated[i] = False
     return is_over
 
 

@@ -15,6 +15,7 @@ from common.geodesy import DEFAULT_HOME
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
 from sim.wind import wind_model
+from sim.world.batch import WorldBatch
 from sim.world.world import WorldConfig, WorldMap, build_world
 
 AIRFRAME = "x500"
@@ -25,7 +26,7 @@ _ALIGN_TICKS = 2000  # 8 s: power-on until the estimator is aligned and has used
 _CLIMB_TICKS = 2000  # 8 s: up, and settled
 
 
-def build_rig(world: WorldMap, count: int, *, has_estimator: bool, threads: int, device: str) -> Rig:
+def build_rig(world: WorldMap | WorldBatch, count: int, *, has_estimator: bool, threads: int, device: str) -> Rig:
     """Vehicles with the default flight controller, powered on at home."""
     rig = Rig(
         load_airframe(AIRFRAME),

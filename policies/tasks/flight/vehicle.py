@@ -6,7 +6,7 @@ Kernel functions over the arrays of a rig; truth and estimate are told apart by 
 import warp as wp
 
 from autopilot.ports import SETPOINT_TRAJECTORY, Estimate, Setpoint
-from policies.tasks.flight.draws import NOISE_STREAM, WIND_STREAM, draw_angle, draw_seed
+from policies.tasks.flight.draws import WIND_STREAM, draw_angle
 from policies.tasks.flight.numbers import FlightNumbers
 from policies.tasks.flight.own import Command, OwnState
 from sim.advance import RigArrays, true_estimate
@@ -18,7 +18,6 @@ wp.set_module_options({"enable_backward": False})
 
 NOISE_LEVELS_PER_UNIT = 4  # the sensors' noise scale is rounded to a quarter
 _LEVELS = wp.constant(float(NOISE_LEVELS_PER_UNIT))
-_NAN = wp.constant(wp.vec3(wp.nan, wp.nan, wp.nan))
 
 
 @wp.struct
@@ -30,10 +29,8 @@ class Makes:
 
 
 @wp.func
-def vary_vehicle(
-    rig: RigArrays, makes: Makes, numbers: FlightNumbers, seed: int, i: int, episode: int, is_test: int
-) -> None:
-    """Gives row i the air, the sensors, the mass and the motors of its episode, and noise of its own from now on."""
+def vary_vehicle(rig: RigArrays, makes: Makes, numbers: FlightNumbers, seed: int, i: int, episode: int) -> None:
+    """Gives row i the air, the sensors, the mass and the motors of its episode."""
     model = makes.body[0]
     model.mass_kg = model.mass_kg * numbers.mass_scale
     model.mass_inv = model.mass_inv / numbers.mass_scale
@@ -51,7 +48,6 @@ def vary_vehicle(
     wind.turbulence_w_std = 0.1 * numbers.wind_m_s * numbers.wind_turbulence  # MIL-F-8785C: a tenth of W20
     rig.wind_model[i] = wind
     rig.wind[i] = WindState()
-    rig.seed[i] = draw_seed(seed, i, episode, NOISE_STREAM, is_test)
     body = rig.body[i]
     body.impact_speed = 0.0  # that of standing on the ground before the hover
     rig.body[i] = body
@@ -60,19 +56,20 @@ def vary_vehicle(
 @wp.func
 def velocity_setpoint(command: Command) -> Setpoint:
     """As an offboard client's SET_POSITION_TARGET_LOCAL_NED with velocity and yaw rate."""
+    free = wp.vec3(wp.nan, wp.nan, wp.nan)
     setpoint = Setpoint()
     setpoint.kind = SETPOINT_TRAJECTORY
     setpoint.is_armed = 1
-    setpoint.pos_ned = _NAN
+    setpoint.pos_ned = free
     setpoint.vel_ned = command.vel_ned
-    setpoint.accel_ned = _NAN
+    setpoint.accel_ned = free
     setpoint.yaw = wp.nan
     setpoint.yaw_rate = command.yaw_rate
-    setpoint.path_start_ned = _NAN
+    setpoint.path_start_ned = free
     setpoint.cruise_speed = wp.nan
     setpoint.climb_speed = wp.nan
     setpoint.descend_speed = wp.nan
-    setpoint.omega_frd = _NAN
+    setpoint.omega_frd = free
     return setpoint
 
 

@@ -1,0 +1,234 @@
+"""FollowMe: a drone keeps 1 to 3 m from its owner's chest, who walks and runs through hills and trees.
+
+In: an action, 10 Hz: velocity and yaw rate for the flight controller, or the document's three choices. Out: what the
+vehicle knows of itself and of the owner, and its camera's picture; of teachers, the truth. The simulator and the flight
+controller are those of every flight.
+"""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from policies.tasks.flight.bank import HOVER_COUNT
+from policies.tasks.flight.numbers import FLIGHT_NUMBERS, FlightNumbers
+from policies.tasks.flight.own import ACTIONS
+from policies.tasks.flight.ranges import RAYS, measure_ranges
+from policies.tasks.flight.task import DECISION_TICKS, FlightTask
+from policies.tasks.follow_me.images import Eyes
+from policies.tasks.follow_me.kernels import (
+    MEASURES,
+    FollowState,
+    Rules,
+    Start,
+    act,
+    judge,
+    look,
+    place,
+    prepare,
+    recorded,
+    show,
+    walk,
+)
+from policies.tasks.follow_me.numbers import DOCUMENTED, IMPROVED, NUMBERS, TREES_PER_HA_MAX, FollowNumbers
+from policies.tasks.follow_me.observe import BRANCHES, DOCUMENT, EGO, EGO_BLIND, IMAGE_CHANNELS, vector_elements
+from policies.tasks.follow_me.picture import draw
+from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
+from policies.tasks.follow_me.settings import FollowSettings
+from policies.tasks.follow_me.sight import Sight
+from policies.tasks.layout import ImageElement, Layout
+from policies.tasks.numbers import Sampler, typed_rows
+from sim.sensors.camera import Lens
+from sim.sensors.phone import PhoneModel, PhoneState, phone_model
+from sim.world.people import RUN_SPEED_M_S, WALK_SPEED_M_S, Person, PersonModel, person_model
+from sim.world.world import WorldConfig
+
+WORLD = WorldConfig(
+    size_m=256.0,
+    cell_m=4.0,
+    hill_height_m=8.0,
+    hill_wavelength_m=120.0,
+    clearing_radius_m=5.0,
+    clearing_blend_m=60.0,
+    trees_per_ha=100.0,
+    tree_height_min_m=8.0,
+    tree_height_max_m=15.0,
+    has_walls=True,
+)
+_OWNERS: dict[str, float | Sampler] = {
+    "walks": WALK_SPEED_M_S,
+    "runs": RUN_SPEED_M_S,
+    "any": Sampler(intervals=((1.0, RUN_SPEED_M_S),)),
+}
+_VECTORS = {"as-documented": int(DOCUMENT), "improved": int(EGO), "vision-only": int(EGO_BLIND)}
+
+
+class FollowMe(FlightTask):
+    """The task. Layout version 1."""
+
+    numbers: ClassVar = NUMBERS
+
+    def __init__(self, settings: FollowSettings, env_count: int, device: str = "cpu") -> None:
+        is_documented = settings.preset == "as-documented"
+        super().__init__(
+            _layout(settings),
+            env_count,
+            WORLD,
+            trees_per_ha_max=TREES_PER_HA_MAX,
+            has_estimator=settings.has_estimator,
+            number_defaults=(DOCUMENTED if is_documented else IMPROVED) | {"owner_speed_max": _OWNERS[settings.owner]},
+            device=device,
+        )
+        self.settings = settings
+        self.follow = self._state()
+        self.measures = self.follow.measures
+        self._eyes: Eyes | None = None
+        if self.layout.image is not None:
+            self._eyes = Eyes(self.border, self.rig.arrays, self.follow.numbers, self.worlds, self.follow.people)
+            self.follow.lenses = self._eyes.lenses
+        self._record_all(_rules(settings, self.layout), self._start())
+
+    def begin(self, is_chosen: NDArray[np.bool_]) -> None:
+        """Starts an episode in the chosen rows, shape (envs,); the others are not touched."""
+        self.is_starting.assign(is_chosen)
+        self._begin_rows()
+
+    def step(self) -> None:
+        """One decision of all environments, with the actions that lie in the border."""
+        self._act.launch()
+        self.rig.advance(DECISION_TICKS)
+        self._walk.launch()
+        self._look_all.launch()
+        if self._sees_truth:
+            self._measure_all.launch()
+        if self._eyes is not None:
+            self._eyes.take()
+        self._judge.launch()
+        self.keep_last_images()
+        self._begin_rows()
+
+    def _begin_rows(self) -> None:
+        """Starts the episodes of the rows that are starting."""
+        self._prepare.launch()
+        self.take_off()
+        self._place.launch()
+        self._look_starting.launch()
+        if self._sees_truth:
+            self._measure_starting.launch()
+        if self._eyes is not None:
+            self._eyes.refresh(self.is_growing)
+            self._eyes.take(self.is_starting)
+        self._show.launch()
+
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Restores what `state` returned."""
+        super().load_state(state)
+        if self._eyes is not None:
+            self._eyes.refresh()
+
+    @property
+    def _sees_truth(self) -> bool:
+        return self.settings.observation == "state" or bool(self.layout.privileged)
+
+    def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
+        """Drone and owner from above, and what the camera sees."""
+        body = self.rig.arrays.body.numpy()[i_env]
+        owner = self.follow.people.numpy()[i_env]
+        x, y, z, w = (float(value) for value in body["q_ned_from_frd"])
+        yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        distance, seen = self.measures.numpy()[i_env, [0, 2]]
+        words = f"{float(self.border.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {distance:4.1f} m"
+        return draw(
+            self.worlds.map(i_env),
+            body["pos_ned"].astype(np.float64),
+            yaw,
+            owner["pos_ned"].astype(np.float64),
+            float(owner["heading_rad"]),
+            self.border.images.numpy()[i_env] if self._eyes is not None else None,
+            words + ("" if seen else "  not in view"),
+            height_px,
+        )
+
+    def _state(self) -> Any:
+        n = self.env_count
+        state = FollowState()
+        state.flight = typed_rows(self.border.numbers, FlightNumbers)
+        state.numbers = typed_rows(self.border.numbers, FollowNumbers, first=len(FLIGHT_NUMBERS))
+        state.actions = self._zeros("last_actions", n, wp.vec4)
+        state.people = self._zeros("people", n, Person)
+        state.person_models = self._zeros("person_models", n, PersonModel)
+        state.phones = self._zeros("phones", n, PhoneState)
+        state.phone_models = self._zeros("phone_models", n, PhoneModel)
+        state.path_seeds = self._zeros("path_seeds", n, int)
+        state.sights = self._zeros("sights", n, Sight)
+        state.unseen_s = self._zeros("unseen_s", n, float)
+        state.nearness = self._zeros("nearness", (n, RAYS), float)
+        state.lenses = self._zeros("lenses", n, Lens)
+        state.measures = self._zeros("measures", (n, len(MEASURES)), float)
+        state.is_all = wp.full(n, value=True, dtype=wp.bool, device=self.device)
+        return state
+
+    def _start(self) -> Any:
+        start = Start()
+        start.is_starting = self.is_starting
+        start.is_growing = self.is_growing
+        start.world_seeds = self.world_seeds
+        start.noise_seeds = self.noise_seeds
+        start.hovers = self.hovers
+        start.hover_count = HOVER_COUNT
+        start.world_numbers = self.worlds.numbers
+        start.makes = self.makes
+        start.person = wp.array([person_model()], dtype=PersonModel, device=self.device)
+        start.phone = wp.array([phone_model()], dtype=PhoneModel, device=self.device)
+        return start
+
+    def _record_all(self, rules: Any, start: Any) -> None:
+        border, rig, state = self.border, self.rig.arrays, self.follow
+
+        def record(kernel: Any, *inputs: Any) -> Any:
+            return recorded(kernel, self.env_count, list(inputs), self.device)
+
+        def measure(rows: Any) -> Any:
+            inputs = [rig, rows, state.nearness]
+            return wp.launch(measure_ranges, (self.env_count, RAYS), inputs, device=self.device, record_cmd=True)
+
+        self._act = record(act, border, rules, rig)
+        self._walk = record(walk, rules, rig, state)
+        self._look_all = record(look, rig, state, state.is_all)
+        self._measure_all = measure(state.is_all)
+        self._judge = record(judge, border, rules, rig, state, start)
+        self._prepare = record(prepare, border, rules, state, start)
+        self._place = record(place, border, rig, state, start)
+        self._look_starting = record(look, rig, state, self.is_starting)
+        self._measure_starting = measure(self.is_starting)
+        self._show = record(show, border, rules, rig, state, start)
+
+
+def _layout(settings: FollowSettings) -> Layout:
+    is_camera = settings.observation == "camera"
+    is_documented = settings.preset == "as-documented"
+    channels = IMAGE_CHANNELS[:3] if is_documented else IMAGE_CHANNELS
+    return Layout(
+        "FollowMe",
+        1,
+        vector_elements(_VECTORS[settings.preset]) if is_camera else PRIVILEGED_ELEMENTS,
+        continuous=() if is_documented else ACTIONS,
+        branches=BRANCHES if is_documented else (),
+        stack=settings.stack or 1,
+        image=ImageElement(settings.image_size, settings.image_size, channels) if is_camera else None,
+        privileged=PRIVILEGED_ELEMENTS if is_camera and not is_documented else (),
+    )
+
+
+def _rules(settings: FollowSettings, layout: Layout) -> Any:
+    rules = Rules()
+    rules.vector = _VECTORS[settings.preset] if settings.observation == "camera" else -1
+    rules.is_documented = int(settings.preset == "as-documented")
+    rules.has_estimator = int(settings.has_estimator)
+    rules.has_privileged = int(bool(layout.privileged))
+    rules.is_test = int(settings.split == "test")
+    rules.is_kept = int(settings.terrain == "kept")
+    rules.decision_ticks = DECISION_TICKS
+    return rules
