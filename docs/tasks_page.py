@@ -11,7 +11,6 @@ from policies.tasks.episode import Outcome
 from policies.tasks.layout import Branch, Element, Layout
 from policies.tasks.task import Task
 
-PRESETS = ("as-documented", "as-coded", "improved")
 HEADER = """\
 # Tasks
 
@@ -27,23 +26,26 @@ configurations set or randomise the numbers by name under `environment_parameter
 | [ReachTarget](#reachtarget) | drive a car with four driven wheels to a target: [reach-target.md](reach-target.md) |
 | [Parking1](#parking1) | park a car between three blocks: [parking.md](parking.md) |
 | [Parking2](#parking2) | park a car on one of two storeys, past moving obstacles: [parking.md](parking.md) |
+| [FollowMe](#followme) | follow a person who walks and runs through hills and trees, with a camera drone |
 | Hover | hold a drone at a point by body rates and thrust, on its estimate; in Gymnasium only |
 
 The linked pages say what the presets are made of, how rewards are paid, and which spots are held out for tests. Every
 reward is among the numbers. In the tables of observations `#` stands for a number, an element times its scale is the
-quantity in its unit, and elements of the goal are what hyper-networks and hindsight replay use. Coordinates are
-Unity's: x right, y up, z forward, yaw clockwise from +z seen from above.
+quantity in its unit, and elements of the goal are what hyper-networks and hindsight replay use. Coordinates on the
+ground are Unity's: x right, y up, z forward, yaw clockwise from +z seen from above; tasks that are flown say `hfrd`
+(level along the heading: ahead, right, down) and `frd` (the body's axes).
 
 | outcome | an episode that |
 |---|---|
 """
 OUTCOMES = {
     Outcome.SUCCESS: "reached what was to be reached",
-    Outcome.TIMEOUT: "was cut at `step_limit`: the only one that is a truncation",
+    Outcome.TIMEOUT: "was cut at its limit of decisions: a truncation",
     Outcome.HIT_WALL: "ended at a wall",
-    Outcome.HIT_OBSTACLE: "ended at a block or a moving obstacle",
+    Outcome.HIT_OBSTACLE: "ended at a block, a moving obstacle, a tree or, in flight, a wall or the ground",
     Outcome.FELL: "ended under the floor",
-    Outcome.HIT_OTHER: "rolled over, or struck an edge",
+    Outcome.HIT_OTHER: "rolled over, struck an edge, or came too near a person",
+    Outcome.LOST: "lost whom it followed",
 }
 
 
@@ -54,7 +56,7 @@ def tasks_text() -> str:
 
 
 def _section(name: str) -> str:
-    presets = {preset: build_task(name, 1, task_settings(name, {"preset": preset})) for preset in PRESETS}
+    presets = {preset: build_task(name, 1, task_settings(name, {"preset": preset})) for preset in _presets(name)}
     parts = [f"## {name}\n", _preset_table(presets), "Settings:\n", _settings_table(name)]
     shown: dict[tuple[Element, ...], str] = {}
     for preset, task in presets.items():
@@ -64,12 +66,20 @@ def _section(name: str) -> str:
     return "\n".join([*parts, "Numbers:\n", _number_table(presets)])
 
 
+def _presets(name: str) -> list[str]:
+    """The presets that a task has."""
+    return list(CATALOGUE[name].settings.model_json_schema()["properties"]["preset"]["enum"])
+
+
 def _preset_table(presets: dict[str, Task]) -> str:
     rows = ["| preset | observation | actions | a decision is |", "|---|---|---|---|"]
     for preset, task in presets.items():
         layout = task.layout
         floats = f"{layout.observation_size} floats"
         floats += f" ({layout.stack} frames of {layout.frame_size})" if layout.stack > 1 else ""
+        if layout.image is not None:
+            height, width, _ = layout.image_shape
+            floats += f", an image of {height} x {width} ({', '.join(layout.image.channels)})"
         rows.append(f"| `{preset}` | {floats} | {_actions(layout)} | {task.decision_s:g} s |")
     return "\n".join(rows) + "\n"
 
@@ -87,7 +97,7 @@ def _choices(branch: Branch) -> str:
 def _settings_table(name: str) -> str:
     rows = ["| setting | default | values | meaning |", "|---|---|---|---|"]
     for key, schema in CATALOGUE[name].settings.model_json_schema()["properties"].items():
-        default = schema["default"] if schema["default"] not in {"", "auto"} else "as the preset"
+        default = str(schema["default"]).lower() if schema["default"] not in {"", "auto"} else "as the preset"
         rows.append(f"| `{key}` | {default} | {_values(schema)} | {_one_line(schema.get('description', ''))} |")
     return "\n".join(rows) + "\n"
 
@@ -98,6 +108,8 @@ def _values(schema: dict[str, Any]) -> str:
     choices = [choice for kind in kinds for choice in kind.get("enum", []) if choice]
     if choices:
         return ", ".join(choices)
+    if schema.get("type") == "boolean":
+        return "true, false"
     return f"{schema['minimum']} … {schema['maximum']}" if "minimum" in schema else "text"
 
 

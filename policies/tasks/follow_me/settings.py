@@ -15,7 +15,7 @@ Terrain = Literal["fresh", "kept"]
 class FollowSettings(TaskSettings):
     """What a user may choose of FollowMe."""
 
-    preset: FollowPreset = "improved"  # type: ignore[assignment]
+    preset: FollowPreset = "improved"  # type: ignore[assignment]  # tasks have presets of their own
     """`as-documented` (the text), `improved` (ours) or `vision-only` (ours, without any word of where the owner is)."""
     observation: Observation = "camera"
     """`camera`: what a policy can know in flight; `state`: the truth, for teachers."""
