@@ -206,7 +206,7 @@ class Flight:
         from mission.follow.onboard import OnboardCamera  # what a policy sees is defined beside the policies
 
         self.owner = FollowedOwner(config, self.world, self.config.seed, self.config.home)
-        self.onboard = OnboardCamera(self.rig, self.world)
+        self.onboard = OnboardCamera(self.rig, self.world, self.owner.people)
         return [self.owner.vehicle_end]
 
     def frame(self) -> None:

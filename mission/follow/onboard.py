@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from autopilot.camera.ports import View
 from common.image_stream import ImageFrame
 from policies.tasks.follow_me.observe import (
+    DEPTH_HALF_M,
     HFOV_DEG,
     IMAGE_CHANNELS,
     IMAGE_SIZE,
@@ -22,21 +24,34 @@ from policies.tasks.follow_me.observe import (
 )
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
+from sim.sensors.quick_camera import QuickCamera
+from sim.sensors.ray import PERSON
 from sim.world.world import WorldMap
 
 PERIOD_US = 100_000
-DEPTH_HALF_M = 4.0  # as policies/tasks/follow_me/observe.py encodes it
 
 Sink = Callable[[ImageFrame], None]
 
 
 class OnboardCamera:
-    """The forward camera of vehicle 0 of a rig."""
+    """The forward camera of vehicle 0 of a rig.
 
-    def __init__(self, rig: Rig, world: WorldMap) -> None:
+    Args:
+        rig: where the truth is.
+        world: what is seen.
+        people: who is seen: an array of one `Person`.
+    """
+
+    def __init__(self, rig: Rig, world: WorldMap, people: Any) -> None:
         self._eye = CameraRig(rig, world)
         self._view = View(IMAGE_SIZE, IMAGE_SIZE, HFOV_DEG, camera_mount())
-        self._images = wp.zeros((1, IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), dtype=wp.uint8)
+        self._camera = QuickCamera(world, 1, width=IMAGE_SIZE, height=IMAGE_SIZE, hfov_deg=HFOV_DEG, people=people)
+        self._lens: NDArray[Any] = self._camera.lenses.numpy()  # live, as the next
+        self._kind: NDArray[np.uint8] = self._camera.kind.numpy()
+        images: Any = wp.zeros((1, IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), dtype=wp.uint8)
+        inputs = [self._camera.rgb, self._camera.depth_m, images]
+        self._pack = wp.launch(pack_images, (1, IMAGE_SIZE, IMAGE_SIZE), inputs, record_cmd=True)
+        self._images: NDArray[np.uint8] = images.numpy()
         self._sinks: list[Sink] = []
         self._sequence = 0
         self._due_us = 0
@@ -45,23 +60,26 @@ class OnboardCamera:
         """Somebody who gets every picture from now on."""
         self._sinks.append(sink)
 
+    @property
+    def is_owner_in_view(self) -> bool:
+        """Whether the last picture shows any of the owner."""
+        return bool((self._kind == int(PERSON)).any())
+
     def frame(self, time_us: int) -> None:
-        """Takes a picture if one is due and somebody wants it."""
+        """Takes a picture if one is due."""
         if time_us < self._due_us:
             return
         self._due_us = max(self._due_us + PERIOD_US, time_us)
-        if not self._sinks:
-            return
         taken = self.take(time_us)
         for sink in self._sinks:
             sink(taken)
 
     def take(self, time_us: int) -> ImageFrame:
         """A picture of this moment."""
-        raw = self._eye.capture(self._view).result()
-        rgb: Any = wp.array(raw.rgb[None], dtype=wp.uint8)
-        depth_m: Any = wp.array(raw.depth_m[None], dtype=float)
-        wp.launch(pack_images, (1, IMAGE_SIZE, IMAGE_SIZE), [rgb, depth_m, self._images])
-        pixels = np.array(self._images.numpy()[0])
+        pose = self._eye.pose(self._view)
+        self._lens["pos_ned"] = pose.pos_ned
+        self._lens["q_ned_from_rdf"] = pose.q_ned_from_rdf
+        self._camera.render()
+        self._pack.launch()
         self._sequence += 1
-        return ImageFrame(time_us, self._sequence, pixels, HFOV_DEG, TILT_DEG, DEPTH_HALF_M)
+        return ImageFrame(time_us, self._sequence, self._images[0].copy(), HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))

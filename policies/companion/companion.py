@@ -19,6 +19,7 @@ from common.image_stream import ImageFrame
 from policies.companion.camera import ImageSource
 from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
 from policies.companion.observation import Observer
+from policies.companion.owner_watch import OwnerWatch
 from policies.companion.vehicle_link import ByteLink, VehicleLink
 
 SETPOINT_US = 50_000
@@ -27,7 +28,7 @@ DECISION_EARLY_US = 10_000  # a picture may come this much earlier than the deci
 IMAGE_OLD_US = 500_000  # guess: five pictures missed, 3 m at full speed
 TELEMETRY_OLD_US = 500_000
 HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
-OWNER_LOST_US = 5_000_000
+OWNER_LOST_S = 5.0  # neither seen nor heard of
 LATENCIES_KEPT = 600  # a minute of decisions
 
 Floats = NDArray[np.float32]
@@ -44,7 +45,7 @@ class Pilot(Protocol):
         """Forgets what came before."""
         ...
 
-    def act(self, vector: Floats, image: NDArray[np.uint8] | None) -> Floats:
+    def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:
         """The action for an observation: four numbers in [-1, 1]."""
         ...
 
@@ -78,6 +79,7 @@ class Companion:
         self._camera = camera
         self._pilot = pilot
         self._observer = Observer(pilot.kind)
+        self._watch = OwnerWatch()
         self._wall_s = wall_s
         self._picture: ImageFrame | None = None  # the newest
         self._picture_us = -1  # when it came in, on our clock; -1: never
@@ -111,15 +113,16 @@ class Companion:
             self.vehicle.send_setpoint(*self._setpoint)
         if has_decided and begun_s is not None and self._wall_s is not None:
             self.latencies_s.append(self._wall_s() - begun_s)
+        if picture is not None:  # only now: the setpoint does not wait for it
+            self._watch.update(picture, self.vehicle.own, self.vehicle.owner)
 
     def picture_age_s(self, time_us: int) -> float:
         """Since the newest picture came in; infinite without one."""
         return (time_us - self._picture_us) * 1e-6 if self._picture_us >= 0 else float("inf")
 
     def owner_distance_m(self) -> float:
-        """From the vehicle to where the owner was last reported; NaN if either is unknown."""
-        a, b = self.vehicle.own.pos_ned, self.vehicle.owner.pos_ned
-        return float(np.linalg.norm(np.subtract(a, b)))
+        """From the vehicle to the owner as tracked; NaN while nothing is known."""
+        return self._watch.distance_m(self.vehicle.own)
 
     def close(self) -> None:
         """Stops sending; the vehicle notices."""
@@ -164,7 +167,7 @@ class Companion:
 
     def _trouble(self, time_us: int) -> str:
         """Why the policy cannot fly now; "" if it can."""
-        own, owner = self.vehicle.own, self.vehicle.owner
+        own = self.vehicle.own
         if time_us - own.heartbeat_us > HEARTBEAT_OLD_US:
             return "no heartbeat of the vehicle"
         if time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
@@ -175,7 +178,7 @@ class Companion:
             return "pictures come too late"
         if self._picture.pixels.shape != self._pilot.image_shape:
             return "pictures of another size"
-        if time_us - owner.arrived_us > OWNER_LOST_US:
+        if self._watch.silence_s(own.boot_us) > OWNER_LOST_S:
             return "owner lost"
         return ""
 

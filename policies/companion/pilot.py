@@ -62,10 +62,9 @@ class LearnedPilot:
     def reset(self) -> None:
         self._memory = self._policy.start_memory(1)
 
-    def act(self, vector: Floats, image: NDArray[np.uint8] | None) -> Floats:
-        picture = torch.from_numpy(image)[None] if image is not None else None
+    def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:
         with torch.inference_mode():
-            seen = Seen(torch.from_numpy(vector)[None], picture)
+            seen = Seen(torch.from_numpy(vector)[None], torch.from_numpy(image)[None])
             actions, self._memory = self._policy.act(seen, self._memory, None)
             bounded: Floats = self._policy.bounded(actions)[0].numpy()
         return bounded

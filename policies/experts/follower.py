@@ -1,17 +1,26 @@
 """A scripted follower: keeps two metres behind its owner from the same observation as a policy, without obstacles.
 
-In: the observation's vector, with the phone's report in it. Out: velocity and yaw rate as an action. It is what a
-trained policy is compared with, and what flies a companion that has been given none.
+In: the observation's vector, with the phone's report in it, and its image. Out: velocity and yaw rate as an action. It
+is what a trained policy is compared with, and what flies a companion that has been given none.
 """
 
-from math import atan2, hypot
-from typing import Any
+from math import atan2, hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from common.attitude import rotated
+from policies.sight import Sight, find_owner
 from policies.tasks.flight.own import ACTIONS
-from policies.tasks.follow_me.observe import EGO, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
+from policies.tasks.follow_me.observe import (
+    DEPTH_HALF_M,
+    EGO,
+    HFOV_DEG,
+    IMAGE_CHANNELS,
+    IMAGE_SIZE,
+    camera_mount,
+    vector_elements,
+)
 
 DISTANCE_M = 2.0  # to the owner's chest, level: the middle of the band
 HEIGHT_M = 1.6  # above the ground: over the chest, so that the owner is in the middle of a picture tilted down
@@ -24,7 +33,7 @@ Floats = NDArray[np.float32]
 
 
 class ScriptedFollower:
-    """Flies on the phone's report and the range finder alone."""
+    """Flies on the picture where the owner is in it, on the phone's report where not, and on the range finder."""
 
     kind = int(EGO)
     image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
@@ -34,27 +43,40 @@ class ScriptedFollower:
         self._index = {element.name: k for k, element in enumerate(elements)}
         self._scales = np.array([element.scale for element in elements], dtype=np.float32)
         self._limits = np.array([element.scale for element in ACTIONS], dtype=np.float32)
+        self._values = np.zeros(len(elements), dtype=np.float32)
 
     def reset(self) -> None:
         """Remembers nothing."""
 
-    def act(self, vector: Floats, image: NDArray[np.uint8] | None) -> Floats:  # noqa: ARG002  (a pilot's signature)
+    def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:
         """Along the line of sight to the right distance, as fast as the owner; faces them; keeps its height."""
-        values = vector * self._scales
-
-        def read(*names: str) -> Any:
-            return tuple(float(values[self._index[name]]) for name in names)
-
+        self._values = vector * self._scales
         wanted = np.zeros(4, dtype=np.float32)
-        height_m, is_height_valid, is_known = read("height", "is_height_valid", "is_owner_known")
-        if is_height_valid:
-            wanted[2] = HEIGHT_GAIN * (height_m - HEIGHT_M)
-        if is_known:
-            ahead_m, right_m = read("owner_pos_hfrd_x", "owner_pos_hfrd_y")
-            vel_ahead, vel_right = read("owner_vel_hfrd_x", "owner_vel_hfrd_y")
-            distance_m = max(hypot(ahead_m, right_m), _NEAR_M)
-            closing = DISTANCE_GAIN * (distance_m - DISTANCE_M) / distance_m
-            wanted[0] = vel_ahead + closing * ahead_m
-            wanted[1] = vel_right + closing * right_m
-            wanted[3] = YAW_GAIN * atan2(right_m, ahead_m)
+        if self._read("is_height_valid"):
+            wanted[2] = HEIGHT_GAIN * (self._read("height") - HEIGHT_M)
+        sight = find_owner(image, HFOV_DEG, float(DEPTH_HALF_M))
+        if sight is not None:
+            ahead_m, right_m = self._level(sight)
+        elif self._read("is_owner_known"):
+            ahead_m, right_m = self._read("owner_pos_hfrd_x"), self._read("owner_pos_hfrd_y")
+        else:
+            return np.clip(wanted / self._limits, -1.0, 1.0)
+        distance_m = max(hypot(ahead_m, right_m), _NEAR_M)
+        closing = DISTANCE_GAIN * (distance_m - DISTANCE_M) / distance_m
+        wanted[0] = self._read("owner_vel_hfrd_x") + closing * ahead_m
+        wanted[1] = self._read("owner_vel_hfrd_y") + closing * right_m
+        wanted[3] = YAW_GAIN * atan2(right_m, ahead_m)
         return np.clip(wanted / self._limits, -1.0, 1.0)
+
+    def _read(self, name: str) -> float:
+        return float(self._values[self._index[name]])
+
+    def _level(self, sight: Sight) -> tuple[float, float]:
+        """Ahead and right of the vehicle [m], level, of what the tilted camera of a tilted vehicle sees."""
+        x, y, z = rotated(camera_mount(), sight.place_rdf)
+        down_x, down_y = self._read("down_frd_x"), self._read("down_frd_y")
+        down = np.array([down_x, down_y, sqrt(max(1.0 - down_x**2 - down_y**2, 0.0))])
+        ahead = np.array([1.0, 0.0, 0.0]) - down_x * down
+        ahead /= np.linalg.norm(ahead)
+        place = np.array([x, y, z])
+        return float(place @ ahead), float(place @ np.cross(down, ahead))

@@ -41,7 +41,7 @@ DOCUMENT_YAW_RATE_RAD_S = wp.constant(1.0)  # unpublished; guess
 _PLACE_SCALE = wp.constant(5.0)  # [m]
 _PLACE_MAX = wp.constant(4.0)  # an owner reported farther than this many scales away is shown at that distance
 _AGE_MAX_S = wp.constant(5.0)  # a report is not carried on for longer
-_DEPTH_HALF_M = wp.constant(4.0)  # this far away the depth channel is at half of its range
+DEPTH_HALF_M = wp.constant(4.0)  # this far away the depth channel is at half of its range
 _SKY_M = wp.constant(1000.0)  # depths from here on are the sky's
 
 IMAGE_SIZE = 64  # [pixels]
@@ -141,7 +141,7 @@ def depth_byte(depth_m: float) -> wp.uint8:
     """The depth channel: 0 at the lens, 127 at 4 m, 255 in the sky."""
     if depth_m >= _SKY_M:
         return wp.uint8(255)
-    return wp.uint8(wp.floor(255.0 * depth_m / (depth_m + _DEPTH_HALF_M)))
+    return wp.uint8(wp.floor(255.0 * depth_m / (depth_m + DEPTH_HALF_M)))
 
 
 @wp.kernel(enable_backward=False)

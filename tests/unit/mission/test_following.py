@@ -12,7 +12,7 @@ from autopilot.vehicle import Mode
 from common.geodesy import ned_from_geodetic
 from mission.follow.lockstep import flight_with_companion, take_off
 from mission.follow.owner import PHONE_SYSTEM
-from policies.companion.companion import IMAGE_OLD_US, OWNER_LOST_US, TELEMETRY_OLD_US
+from policies.companion.companion import IMAGE_OLD_US, OWNER_LOST_S, TELEMETRY_OLD_US
 from policies.companion.engagement import Phase
 from policies.companion.observation import REPORT_LAG_S
 from policies.experts.follower import ScriptedFollower
@@ -126,11 +126,19 @@ def test_telemetry_that_stops_ends_in_hold_within_the_stated_time():
 def test_an_owner_lost_for_five_seconds_ends_in_hold():
     flight, companion = following()
     lose(companion, "FOLLOW_TARGET")
-    stopped_us = companion.vehicle.owner.arrived_us
+    flight.owner._person["stature_m"] = 0.0  # nobody to be seen
+    lost_us = flight.time_us
     advance(flight, 8.0, lambda: flight.controller.state.mode is Mode.HOLD)
     assert flight.controller.state.mode is Mode.HOLD
-    assert flight.time_us - stopped_us == pytest.approx(OWNER_LOST_US, abs=200_000)
+    assert flight.time_us - lost_us == pytest.approx(OWNER_LOST_S * 1e6, abs=300_000)
     assert companion.trouble == "owner lost"
+
+
+def test_an_owner_who_is_only_seen_is_not_lost():
+    flight, companion = following()
+    lose(companion, "FOLLOW_TARGET")
+    advance(flight, 8.0)
+    assert companion.phase is Phase.FLYING
 
 
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.POSITION])

@@ -1,0 +1,73 @@
+"""Which policies may fly."""
+
+import numpy as np
+import pytest
+import torch
+
+from policies.companion.pilot import LAYOUT_VERSION, TASK, PilotError, load_pilot
+from policies.experts.follower import ScriptedFollower
+from policies.learn.config.network import NetworkSettings
+from policies.learn.policy import Policy
+from policies.learn.policy_file import PolicyCard, save_policy
+from policies.tasks.flight.own import ACTIONS
+from policies.tasks.follow_me.observe import EGO, EGO_BLIND, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
+from policies.tasks.layout import ImageElement, Layout
+
+IMAGE = ImageElement(IMAGE_SIZE, IMAGE_SIZE, IMAGE_CHANNELS)
+
+
+def policy_file(folder, *, task=TASK, version=LAYOUT_VERSION, kind=EGO, actions=ACTIONS, image=IMAGE):
+    layout = Layout(task, version, vector_elements(int(kind)), actions, image=image)
+    settings = NetworkSettings.model_validate(
+        {"hidden_units": 16, "num_layers": 1, "memory": {"memory_size": 16, "sequence_length": 8}}
+    )
+    path = folder / "policy.pt"
+    save_policy(path, Policy(layout, settings, torch.Generator().manual_seed(1)), PolicyCard(task, {}, 0, 0))
+    return path
+
+
+@pytest.mark.parametrize("kind", [EGO, EGO_BLIND])
+def test_a_policy_of_the_task_flies_and_remembers(tmp_path, kind):
+    pilot = load_pilot(str(policy_file(tmp_path, kind=kind)))
+    assert pilot.kind == int(kind)
+    vector = np.full(len(vector_elements(int(kind))), 0.1, np.float32)
+    image = np.full(pilot.image_shape, 100, np.uint8)
+    first = pilot.act(vector, image)
+    second = pilot.act(vector, image)
+    pilot.reset()
+    assert first.shape == (4,)
+    assert not np.array_equal(first, second)
+    assert np.array_equal(first, pilot.act(vector, image))
+
+
+def test_scripted_needs_no_file():
+    assert isinstance(load_pilot("scripted"), ScriptedFollower)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"task": "Parking1"}, "made for Parking1"),
+        ({"version": LAYOUT_VERSION + 1}, "layout version"),
+        ({"actions": ACTIONS[:3]}, "continuous actions"),
+        ({"image": None}, "image"),
+    ],
+)
+def test_other_policies_are_refused_in_one_sentence(tmp_path, changes, sentence):
+    path = policy_file(tmp_path, **changes)
+    with pytest.raises(PilotError, match=sentence) as refusal:
+        load_pilot(str(path))
+    assert str(path) in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_file_that_is_not_there_is_refused():
+    with pytest.raises(PilotError, match="no such policy file"):
+        load_pilot("nowhere.pt")
+
+
+def test_a_file_that_is_no_policy_is_refused(tmp_path):
+    path = tmp_path / "policy.pt"
+    path.write_bytes(b"nothing of the kind")
+    with pytest.raises(PilotError, match="damaged"):
+        load_pilot(str(path))
