@@ -9,7 +9,8 @@ which sightings teach and which then serves while the owner is hidden.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, exp, inf, isfinite, sin, sqrt
+from math import cos, exp, inf, isfinite, pi, sin, sqrt
+from sys import float_info
 
 import numpy as np
 from filterpy.kalman import IMMEstimator, KalmanFilter
@@ -99,6 +100,16 @@ class OwnerTrack:
     def is_known(self) -> bool:
         """Whether anything has ever been seen or heard."""
         return isfinite(self.seen_age_s) or isfinite(self.heard_age_s)
+
+
+class _Filter(KalmanFilter):  # type: ignore[misc]  # filterpy has no types
+    """filterpy's filter of one model; its own likelihood asks scipy and takes most of a step's time."""
+
+    @property
+    def likelihood(self) -> float:
+        """Density of the last innovation, never zero."""
+        exponent = -0.5 * float(self.y @ self.SI @ self.y)
+        return max(exp(exponent) / sqrt((2.0 * pi) ** len(self.y) * float(np.linalg.det(self.S))), float_info.min)
 
 
 class _Models(IMMEstimator):  # type: ignore[misc]  # filterpy has no types
@@ -307,7 +318,7 @@ def _models(s: TrackerSettings) -> _Models:
     bias_keep = exp(-_STEP_S / s.report_bias_time_s)
     filters = []
     for motion in _motions(s):
-        model = KalmanFilter(dim_x=_STATES, dim_z=3)
+        model = _Filter(dim_x=_STATES, dim_z=3)
         model.x = np.zeros(_STATES)
         model.P = np.zeros((_STATES, _STATES))
         model.P[_POS, _POS] = _UNKNOWN_M**2 * np.eye(3)
