@@ -273,7 +273,7 @@ class _Source:
     refused: int = 0  # in a row
 
     def age_s(self, time_us: int) -> float:
-        return inf if self.last_us is None else (time_us - self.last_us) * 1e-6
+        return inf if self.last_us is None else (time_us - self.last_us) / 1e6
 
 
 @dataclass(frozen=True, slots=True)
