@@ -28,6 +28,7 @@ _UNKNOWN_M = 1000.0  # standard deviation of a place, or of a range, of which no
 _NEAR_M, _FAR_M = 0.5, 10.0  # a direction without range is taken as of an owner at least and at most this far away
 _GATE = 16.27  # chi-square of three degrees of freedom, exceeded by one good measurement in a thousand
 _MANOEUVRING = 1  # index of the model; 0: steady
+_FORGET_US = 60_000_000  # after so long without a call nothing is left to carry on
 _ASTRAY_M = 5.0  # what is added to the uncertainty of a place that turned out wrong; guess
 
 
@@ -80,7 +81,7 @@ class PhoneReport:
 
     time_us: int  # of validity
     pos_ned: Sequence[float]  # [m]
-    vel_ned: Sequence[float]  # [m/s]
+    vel_ned: Sequence[float] | None  # [m/s]; None if the phone does not say
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +149,7 @@ class OwnerTracker:
         self._phone = _Source()
 
     def see(self, time_us: int, sighting: Sighting) -> bool:
-        """Fuses a sighting; false if it was rejected.
+        """Fuses a sighting; false if it was rejected: not plausible, or not a number.
 
         Args:
             time_us: when the picture was taken.
@@ -163,6 +164,8 @@ class OwnerTracker:
         H[:, _POS] = axes_ned
         H[:, _VEL] = -self._lag_s(time_us) * axes_ned
         z = axes_ned @ camera_pos_ned + np.array([range_m, 0.0, 0.0])
+        if not np.isfinite(z).all():
+            return False
         R = np.diag(std_m**2) + axes_ned @ self._lag_cov(time_us) @ axes_ned.T
         if not self._admits(self._camera, not is_behind and self._is_plausible(z, H, R), _POS):
             return False
@@ -171,7 +174,7 @@ class OwnerTracker:
         return True
 
     def hear(self, time_us: int, report: PhoneReport) -> bool:
-        """Fuses a report; false if it was rejected.
+        """Fuses a report; false if it was rejected: not plausible, or not a number.
 
         Args:
             time_us: when it came.
@@ -185,16 +188,19 @@ class OwnerTracker:
         H[:, _VEL] = -lag_s * np.eye(3)
         R = _level_diagonal(s.report_std_m) ** 2 + self._lag_cov(report.time_us)
         z = np.asarray(report.pos_ned, np.float64)
+        if not np.isfinite(z).all():
+            return False
         if not self._admits(self._phone, self._is_plausible(z, H, R), _BIAS):
             return False
         self._models.fuse(z, H, R)
-        H = np.zeros((3, _STATES))
-        H[:, _VEL] = np.eye(3)
-        R = s.report_vel_std**2 * np.eye(3) + abs(lag_s) * np.diag(self._mean_nsd2())
-        vel = np.asarray(report.vel_ned, np.float64)
-        if self._is_plausible(vel, H, R):
-            self._models.fuse(vel, H, R)
         self._phone.last_us = report.time_us
+        if report.vel_ned is not None:
+            H = np.zeros((3, _STATES))
+            H[:, _VEL] = np.eye(3)
+            R = s.report_vel_std**2 * np.eye(3) + abs(lag_s) * np.diag(self._mean_nsd2())
+            vel = np.asarray(report.vel_ned, np.float64)
+            if self._is_plausible(vel, H, R):
+                self._models.fuse(vel, H, R)
         return True
 
     def at(self, time_us: int) -> OwnerTrack:
@@ -218,6 +224,9 @@ class OwnerTracker:
     def _advance(self, time_us: int) -> None:
         """Steps the filter to the last whole step at or before a time: when it is asked does not change its state."""
         if self._time_us is None:
+            self._time_us = time_us
+        if time_us - self._time_us > _FORGET_US:
+            self._models = _models(self._settings)
             self._time_us = time_us
         while self._time_us + STEP_US <= time_us:
             self._models.step()
@@ -249,7 +258,7 @@ class OwnerTracker:
         return float(axes_ned[0] @ way) if is_placed else _NEAR_M, np.array([_UNKNOWN_M, across, across])
 
     def _is_plausible(self, z: Array, H: Array, R: Array) -> bool:
-        """Whether the innovation is within the gate."""
+        """Whether the innovation is within the gate; not a number never is."""
         innov = z - H @ self._models.x
         innov_var = H @ self._models.P @ H.T + R
         return float(innov @ np.linalg.solve(innov_var, innov)) < _GATE

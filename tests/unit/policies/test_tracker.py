@@ -230,3 +230,29 @@ def test_nothing_is_known_before_the_first_measurement():
     assert not tracker.at(1_000_000).is_known
     still_owner(tracker, 1, start=10)
     assert tracker.at(1_000_000).is_known
+
+
+def test_what_is_not_a_number_is_never_believed():
+    tracker = OwnerTracker()
+    still_owner(tracker, 20)
+    for k in range(20, 40):
+        assert not tracker.see(k * 100_000, Sighting(np.nan, 0.0, 5.0, (0.0, 1.0, -1.0), Q_RDF_LEVEL))
+        assert not tracker.hear(k * 100_000, PhoneReport(k * 100_000, (np.nan, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    assert np.isfinite(tracker.at(4_000_000).pos_ned).all()
+
+
+def test_reports_without_velocity_tell_it_by_their_places():
+    tracker = OwnerTracker()
+    for k in range(30):
+        tracker.hear(k * 500_000, PhoneReport(k * 500_000, (0.75 * k, 0.0, 0.0), None))
+    np.testing.assert_allclose(tracker.at(14_500_000).vel_ned, [1.5, 0.0, 0.0], atol=0.2)
+
+
+def test_a_minute_without_a_call_leaves_nothing_but_the_ages():
+    tracker = OwnerTracker()
+    still_owner(tracker, 20)
+    track = tracker.at(100_000_000)
+    assert np.trace(track.pos_cov) > 1e6
+    assert track.seen_age_s == pytest.approx(98.1)
+    still_owner(tracker, 10, start=1001)
+    np.testing.assert_allclose(tracker.at(101_000_000).pos_ned, [5.0, 1.0, -1.0], atol=0.2)
