@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly train-demo reproduce-cars test test-all test-mavproxy test-mavsdk3 fuzz check tune bench format lock clean
+.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-mavproxy test-mavsdk3 fuzz check tune bench format lock clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -22,7 +22,10 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	@touch $@
 
-fly: $(STAMP) ## Fly the default mission; flags: make fly ARGS="--once --speed max --wind 5"
+fly: $(STAMP) ## Let the drone follow somebody through hills and trees; flags: make fly ARGS="--owner run --view"
+	@$(BIN)/honeyguide follow $(ARGS)
+
+mission: $(STAMP) ## Fly the default mission; flags: make mission ARGS="--once --speed max --wind 5"
 	@$(BIN)/honeyguide fly $(ARGS)
 
 train-demo: $(STAMP) ## Train Parking1 from nothing while you watch, then look at what it learnt; flags: ARGS="--seed 7"

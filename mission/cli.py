@@ -144,8 +144,10 @@ def picture(
         refuse(str(error))
 
 
-for _command in (task_commands.demonstrate, task_commands.play, task_commands.drive, follow_commands.companion):
+for _command in (task_commands.demonstrate, task_commands.play, task_commands.drive):
     app.command()(_command)
+app.command()(follow_commands.follow)
+app.command()(follow_commands.companion)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
 app.command()(training_commands.export)

@@ -1,6 +1,5 @@
 """How a flight is reached from outside: its ports, the key of its signatures, its live picture, its live page."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from autopilot.mavlink.links import LinkError, LinkRole, LinkSource
@@ -9,15 +8,11 @@ from autopilot.mavlink.tcp import TcpPort
 from autopilot.mavlink.udp import SILENCE_US, UdpPort, address_towards
 from common.clock import wall_unix_us
 from common.state_folder import StateFolder
-from mission.flight import Flight
 from mission.options import FlightOptions, UserError
 from mission.stream import StreamServer
 
 if TYPE_CHECKING:
     import viser
-
-    from mission.view.live import LiveView
-
 GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
 API_PORT_STEP = 14580 - 14540
 PORT_MAX = 65535
@@ -94,12 +89,3 @@ def open_page(port: int) -> "viser.ViserServer":
         raise UserError(f"--view: {error.name} is missing: pip install 'honeyguide[viewer]'") from error
     except OSError as error:
         raise UserError(f"--view-port {port}: {error.strerror}") from error
-
-
-def live_view(
-    flight: Flight, page: "viser.ViserServer", speed: float | None, path_ned: Sequence[Sequence[float]]
-) -> "LiveView":
-    """The live page of a flight."""
-    from mission.view.live import LiveView
-
-    return LiveView(flight, page, speed=speed, path_ned=path_ned)

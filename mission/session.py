@@ -18,7 +18,7 @@ from common.geodesy import GeoPoint
 from common.params import ParameterError
 from common.state_folder import StateFolder
 from mission.client import Running
-from mission.connections import live_view, open_links, open_page, open_stream, signing_config
+from mission.connections import open_links, open_page, open_stream, signing_config
 from mission.flight import Flight, flight_parameters
 from mission.options import FlightOptions, UserError, check_end, flight_config, speed_of
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
@@ -28,6 +28,7 @@ from mission.script import fly_plan
 from mission.state import StateError, keep_home, open_state
 from mission.stream import LOOPBACK
 from mission.summary import Summary, curved_items, planned_path, summarise
+from mission.view.recording import Recorder
 
 WIND_EXPECTED_M_S = 13.0  # measured: an x500 finishes the default mission for 12 of 12 seeds; at 14 m/s for 10
 
@@ -62,7 +63,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
     page = open_page(options.view_port) if options.has_view else None
-    folder = _new_folder(options.run_folder)
+    folder = new_folder(options.run_folder)
     if state is not None and options.home is not None:
         keep_home(state, config.home)
     with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
@@ -77,13 +78,22 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
         )
     if state is not None:
         for problem in (*state.problems, *(flight.persistence.problems if flight.persistence else ())):
-            _print_line(console, problem)
+            print_line(console, problem)
     path_ned = [] if plan is None else planned_path(plan, config.home)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
-    view = None if page is None else live_view(flight, page, speed, [point for _, point in path_ned])
-    _run(flight, running, options, speed, folder, console, [] if view is None else [view.frame])
-    if view is not None:
+    way_ned = [point for _, point in path_ned]
+    recorder = Recorder(flight, way_ned)
+    watchers = [recorder.frame]
+    if page is not None:
+        from mission.view.live import LiveView
+
+        view = LiveView(flight, page, speed=speed, path_ned=way_ned)
+        watchers.append(view.frame)
+    _print_start(options, speed, folder, console)
+    advance(flight, _end(options, speed, running), speed, watchers, Progress(flight, running), console)
+    if page is not None:
         view.close()
+    recorder.recording().save(folder)
     return _finish(flight, running, plan, path_ned, folder, console)
 
 
@@ -95,7 +105,7 @@ def _plan(path: Path | None, home: GeoPoint) -> Plan:
         raise UserError(str(error)) from error
 
 
-def _new_folder(folder: Path | None) -> Path:
+def new_folder(folder: Path | None) -> Path:
     """Makes the run folder; one that already holds a flight is left alone."""
     if folder is None:
         stem = Path("runs") / wall_date_text()
@@ -119,16 +129,8 @@ def _candidates(stem: Path) -> Any:
         number += 1
 
 
-def _run(
-    flight: Flight,
-    running: Running | None,
-    options: FlightOptions,
-    speed: float | None,
-    folder: Path,
-    console: Console,
-    watchers: Sequence[Callable[[], None]],
-) -> None:
-    """Advances the flight until it is over or the user stops it."""
+def _end(options: FlightOptions, speed: float | None, running: Running | None) -> Callable[[Flight], bool]:
+    """What is asked after each frame: whether the flight is over."""
     end_us = int(options.seconds * 1e6) if options.seconds is not None else None
     ends_with_script = options.once or (speed is None and end_us is None)
 
@@ -137,19 +139,37 @@ def _run(
             return True
         return ends_with_script and (running is None or running.is_done)
 
-    progress = Progress(flight, running)
+    return is_over
+
+
+def advance(
+    flight: Flight,
+    is_over: Callable[[Flight], bool],
+    speed: float | None,
+    watchers: Sequence[Callable[[], None]],
+    progress: Progress,
+    console: Console,
+) -> None:
+    """Advances the flight until it is over or the user stops it, and shows a line of figures.
+
+    Args:
+        flight: what flies.
+        is_over: asked after each frame.
+        speed: simulated seconds per second; None: as fast as possible.
+        watchers: called after each frame.
+        progress: the line.
+        console: where it is shown.
+    """
     try:
-        with _sigterm_interrupts():
-            _print_start(options, speed, folder, console)
-            with Live(console=console, transient=True, auto_refresh=False) as live:
+        with _sigterm_interrupts(), Live(console=console, transient=True, auto_refresh=False) as live:
 
-                def on_frame(_: Flight) -> None:
-                    for watch in watchers:
-                        watch()
-                    if progress.is_due():
-                        live.update(progress.table(), refresh=True)
+            def on_frame(_: Flight) -> None:
+                for watch in watchers:
+                    watch()
+                if progress.is_due():
+                    live.update(progress.table(), refresh=True)
 
-                flight.run(is_over, speed=speed, on_frame=on_frame)
+            flight.run(is_over, speed=speed, on_frame=on_frame)
     except KeyboardInterrupt:
         console.print("stopped by the user")
 
@@ -173,16 +193,16 @@ def _print_start(options: FlightOptions, speed: float | None, folder: Path, cons
     if options.tcp_port is not None:
         ports += f", TCP {options.tcp_port}"
     where = "lockstep, without network links" if speed is None else ports
-    _print_line(console, f"flying: {where}; logs in {folder}")
+    print_line(console, f"flying: {where}; logs in {folder}")
     if options.stream_port:
-        _print_line(console, f"the camera's picture: http://{LOOPBACK}:{options.stream_port}/")
+        print_line(console, f"the camera's picture: http://{LOOPBACK}:{options.stream_port}/")
     if options.has_view:
-        _print_line(console, f"live page: http://{LOOPBACK}:{options.view_port}/")
+        print_line(console, f"live page: http://{LOOPBACK}:{options.view_port}/")
     if options.wind_m_s > WIND_EXPECTED_M_S:
-        _print_line(console, f"wind of {options.wind_m_s:g} m/s is more than an x500 can be relied on to fly")
+        print_line(console, f"wind of {options.wind_m_s:g} m/s is more than an x500 can be relied on to fly")
 
 
-def _print_line(console: Console, text: str) -> None:
+def print_line(console: Console, text: str) -> None:
     """One line however narrow the console is, at once also into a pipe: rich flushes."""
     console.print(text, markup=False, highlight=False, soft_wrap=True)
 
@@ -207,8 +227,8 @@ def _finish(
     if summary.armed_s > 0.0:
         console.print(_summary_table(summary))
     else:
-        _print_line(console, f"result: {summary.result}\nsimulated: {summary.simulated_s:.1f} s, never armed")
-    _print_line(console, f"logs, summary and picture: {folder}")
+        print_line(console, f"result: {summary.result}\nsimulated: {summary.simulated_s:.1f} s, never armed")
+    print_line(console, f"logs, summary and picture: {folder}")
     return 0 if summary.is_success or running is None else 1
 
 

@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 
 from autopilot.camera.ports import RawFrame
 from common.clock import wall_sleep_s, wall_time_s
+from common.image_stream import ImageFrame
 from mission.flight import Flight
 from mission.stream import LOOPBACK
 from mission.view.controls import Controls
-from mission.view.moment import Moment, moment_of
+from mission.view.moment import Moment, Row, moment_of
 from mission.view.panel import PLOT_PERIOD_S, Panel
 from mission.view.scene import Mount, Scene, chase_of, wxyz_of
+from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount
 from sim.camera_rig import MOUNT_FRD, CameraRig
 
 UPDATE_S = 1.0 / 15.0
@@ -31,7 +33,8 @@ PLOTS_S = 0.5
 PICTURE_S = 0.2
 PAUSE_S = 0.05  # how often a paused flight looks whether it may go on
 PICTURE_SIZE = (320, 180)
-HFOV_DEG = 80.0
+PHOTO_HFOV_DEG = 80.0
+ENLARGED = 4  # a policy's picture is small
 RDF_IN_FRD = (0.5, 0.5, 0.5, 0.5)  # a camera that looks ahead
 
 
@@ -43,6 +46,7 @@ class LiveView:
         server: of the page.
         speed: simulated seconds per second at which it begins; None: as fast as possible.
         path_ned: [m] (n, 3) way that it is to fly; empty without a plan.
+        action: what a policy on board chose last.
         score: lines of text about how well it goes.
     """
 
@@ -53,17 +57,22 @@ class LiveView:
         *,
         speed: float | None = None,
         path_ned: Sequence[Sequence[float]] = (),
+        action: Callable[[], Row | None] = lambda: None,
         score: Callable[[], tuple[str, ...]] = tuple,
     ) -> None:
-        self._flight, self._server, self._score = flight, server, score
+        self._flight, self._server, self._action, self._score = flight, server, action, score
         self._todo: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._camera = flight.controller.camera
-        mount = None if self._camera is None else Mount(MOUNT_FRD, RDF_IN_FRD, HFOV_DEG, *PICTURE_SIZE)
+        self._pixels: NDArray[np.uint8] | None = None  # newest picture of the camera that a policy sees through
+        mount = None if self._camera is None else Mount(MOUNT_FRD, RDF_IN_FRD, PHOTO_HFOV_DEG, *PICTURE_SIZE)
+        if flight.onboard is not None:
+            flight.onboard.add_sink(self._seen)
+            mount = Mount(MOUNT_FRD, camera_mount(), HFOV_DEG, 1, 1)
         self._camera_rig = CameraRig(flight.rig, flight.world, has_thread=True)
         self._pending: Future[RawFrame] | None = None
         self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned)
-        moment = moment_of(flight)
-        self._panel = Panel(server, has_owner=not np.isnan(moment.owner_ned[0]))
+        moment = self._moment()
+        self._panel = Panel(server, has_owner=moment.has_owner)
         self._controls = Controls(flight, server, self._todo.put, speed)
         self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
         self._next_point_s = 0.0
@@ -78,9 +87,12 @@ class LiveView:
             self._do_what_was_clicked()
         if self._flight.time_us * 1e-6 >= self._next_point_s:
             self._next_point_s = self._flight.time_us * 1e-6 + PLOT_PERIOD_S
-            self._panel.note(moment_of(self._flight))
+            self._panel.note(self._moment())
         if self._is_due("update", UPDATE_S) and self._server.get_clients():
             self._update()
+
+    def _moment(self) -> Moment:
+        return moment_of(self._flight, self._action())
 
     def close(self) -> None:
         """Ends the page."""
@@ -103,35 +115,44 @@ class LiveView:
         return is_due
 
     def _update(self) -> None:
-        moment = moment_of(self._flight)
+        moment = self._moment()
         self._scene.show(moment)
         self._move_cameras(moment)
         if self._is_due("status", STATUS_S):
             self._panel.show_status(moment, (*self._score(), *self._controls.lines))
         if self._is_due("plots", PLOTS_S):
             self._panel.draw_plots()
-        if self._camera is not None and self._is_due("picture", PICTURE_S):
-            self._take_picture()
+        if self._is_due("picture", PICTURE_S):
+            self._renew_picture()
 
-    def _take_picture(self) -> None:
+    def _seen(self, frame: ImageFrame) -> None:
+        self._pixels = frame.pixels[..., :3]
+
+    def _renew_picture(self) -> None:
+        if self._pixels is not None:
+            self._show_picture(self._pixels.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1))
+        if self._flight.onboard is not None:
+            return
         if self._camera is None or (self._pending is not None and not self._pending.done()):
             return
         view = self._camera.view(PICTURE_SIZE, is_smooth=False)
         if self._scene.frustum is not None:
             self._scene.frustum.wxyz = wxyz_of(view.q_frd_from_rdf)
         self._pending = self._camera_rig.capture(view)
-        self._pending.add_done_callback(self._show_picture)
+        self._pending.add_done_callback(self._show_taken)
 
-    def _show_picture(self, future: "Future[RawFrame]") -> None:
+    def _show_taken(self, future: "Future[RawFrame]") -> None:
         """On the camera's thread."""
         if not future.cancelled() and future.exception() is None:
-            rgb = future.result().rgb
-            self._panel.show_picture(rgb)
-            if self._scene.frustum is not None:
-                self._scene.frustum.image = rgb
+            self._show_picture(future.result().rgb)
+
+    def _show_picture(self, rgb: NDArray[np.uint8]) -> None:
+        self._panel.show_picture(rgb)
+        if self._scene.frustum is not None:
+            self._scene.frustum.image = rgb
 
     def _place_camera(self, client: viser.ClientHandle) -> None:
-        eye_ned, target_ned = chase_of(moment_of(self._flight))
+        eye_ned, target_ned = chase_of(self._moment())
         client.camera.up_direction = (0.0, 0.0, -1.0)
         client.camera.position = eye_ned
         client.camera.look_at = target_ned

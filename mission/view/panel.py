@@ -5,7 +5,6 @@ In: moments. Out: viser's GUI elements, each renewed at its own slow rate: text 
 
 from collections import deque
 from collections.abc import Callable
-from math import isnan
 
 import numpy as np
 import viser
@@ -22,10 +21,10 @@ _ACTION_NAMES = ("ahead", "right", "down", "yaw rate")
 Read = Callable[[Moment], tuple[float, ...]]
 PLOTS: dict[str, tuple[tuple[str, ...], Read]] = {
     "distance to owner [m]": (("distance",), lambda moment: (moment.distance_m,)),
-    "height above ground [m]": (("height",), lambda moment: (moment.height_m,)),
+    "height above ground [m]": (("height",), lambda moment: (float(moment.row["height_m"]),)),
     "speed [m/s]": (("speed",), lambda moment: (moment.speed_m_s,)),
-    "battery [%]": (("battery",), lambda moment: (100.0 * moment.battery,)),
-    "policy's action": (_ACTION_NAMES, lambda moment: tuple(float(value) for value in moment.action)),
+    "battery [%]": (("battery",), lambda moment: (100.0 * float(moment.row["battery"]),)),
+    "policy's action": (_ACTION_NAMES, lambda moment: tuple(float(value) for value in moment.row["action"])),
 }
 """What is plotted over time: title, names of the lines, values."""
 
@@ -55,12 +54,13 @@ class Panel:
 
     def show_status(self, moment: Moment, lines: tuple[str, ...]) -> None:
         """Renews the text."""
-        armed = "armed" if moment.is_armed else "disarmed"
+        armed = "armed" if moment.row["is_armed"] else "disarmed"
         rows = [
             f"**{moment.mode_name}**, {armed}, {moment.time_s:.1f} s",
-            f"height {moment.height_m:.1f} m, speed {moment.speed_m_s:.1f} m/s, battery {100.0 * moment.battery:.0f} %",
+            f"height {moment.row['height_m']:.1f} m, speed {moment.speed_m_s:.1f} m/s, "
+            f"battery {100.0 * moment.row['battery']:.0f} %",
         ]
-        if not isnan(moment.distance_m):
+        if moment.has_owner:
             rows.append(f"distance to owner {moment.distance_m:.1f} m")
         self._status.content = "  \n".join((*rows, *lines))
 

@@ -6,7 +6,7 @@ nothing after a browser has loaded it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan, isnan, radians, tan
+from math import atan, radians, tan
 
 import numpy as np
 import trimesh
@@ -134,15 +134,15 @@ class Scene:
         """Moves what moves."""
         self._vehicle.position = moment.pos_ned
         self._vehicle.wxyz = wxyz_of(moment.q_ned_from_frd)
-        for handle, spin, speed in zip(self._rotors, self._spins, moment.rotor_speed[: len(self._rotors)], strict=True):
+        speeds = moment.row["rotor_speed"][: len(self._rotors)]
+        for handle, spin, speed in zip(self._rotors, self._spins, speeds, strict=True):
             if speed > 1.0:
                 handle.wxyz = wxyz_of(quat_of(2.0 * np.pi * BLADE_TURNS_PER_S * spin * moment.time_s, 0.0))
-        has_owner = not isnan(moment.owner_ned[0])
-        if has_owner:
+        if moment.has_owner:
             self._owner.position = moment.owner_ned
-            self._owner.wxyz = wxyz_of(quat_of(moment.owner_heading_rad, 0.0))
+            self._owner.wxyz = wxyz_of(quat_of(float(moment.row["owner"]["heading_rad"]), 0.0))
             self._trails["owner"].extend(moment.time_s, moment.owner_ned - (0.0, 0.0, 0.05))
-        self._owner.visible = has_owner
+        self._owner.visible = moment.has_owner
         has_goal = bool(np.linalg.norm(moment.goal_ned - moment.pos_ned) > ARRIVED_M)  # False for NaN
         if has_goal:
             self._goal.position = moment.goal_ned
@@ -181,14 +181,14 @@ def _segments(points: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
 
 
-def wxyz_of(q_xyzw: NDArray[np.float32] | tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+def wxyz_of(q_xyzw: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     """Warp's order as viser's."""
-    x, y, z, w = (float(value) for value in q_xyzw)
+    x, y, z, w = q_xyzw
     return w, x, y, z
 
 
 def chase_of(moment: Moment) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """A place behind and above the vehicle, and where to look from there [m], ned."""
-    yaw = yaw_of([float(value) for value in moment.q_ned_from_frd])
+    yaw = yaw_of(moment.q_ned_from_frd)
     ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0], np.float32)
     return moment.pos_ned - 5.0 * ahead - np.array([0.0, 0.0, 2.2], np.float32), moment.pos_ned + 2.0 * ahead

@@ -21,7 +21,7 @@ SIDES = 7  # of a trunk: few triangles, and round enough
 BARK = (104, 82, 62)
 LEAVES = ((58, 98, 44), (94, 132, 62))  # darkest and lightest
 CONCRETE = (168, 164, 158)
-JACKET, TROUSERS, SKIN = (232, 120, 32), (52, 58, 74), (222, 184, 152)
+JACKET, TROUSERS, SKIN = (24, 74, 196), (52, 58, 74), (222, 184, 152)
 FRAME, BLADE = (48, 52, 60), (30, 32, 36)
 
 

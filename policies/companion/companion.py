@@ -124,6 +124,11 @@ class Companion:
         """From the vehicle to the owner as tracked; NaN while nothing is known."""
         return self._watch.distance_m(self.vehicle.own)
 
+    @property
+    def action(self) -> Floats:
+        """What the pilot chose last, shape (4,); zeros before it flies."""
+        return self._action.copy()
+
     def close(self) -> None:
         """Stops sending; the vehicle notices."""
         self._camera.close()

@@ -17,6 +17,7 @@ HONEYGUIDE = ".venv/bin/honeyguide"
 # Run by continuous integration, by other tests, or too long for a test: what they are is checked, not run.
 NOT_RUN_HERE = {
     "make fly": "the commands with ARGS run it",
+    "make mission": "the commands with ARGS run it",
     "make test": "this is it",
     "make reproduce-cars": "hours of training; docs/results/cars.md is what it writes",
     "make train-demo": "minutes of training; tests/unit/mission/training runs its commands",
@@ -79,12 +80,12 @@ def test_tests_that_are_named_exist():
             assert re.search(rf"^def {test}\(", source, re.MULTILINE), f"{name}: {test}"
 
 
-def flight_arguments(line):
-    """The arguments of `honeyguide fly` in a command line; None if it is another command."""
+def flight_arguments(line, target, command):
+    """The arguments of a command of `honeyguide` in a command line; None if it is another command."""
     words = shlex.split(line)
-    if words[:2] == ["make", "fly"] and len(words) == 3 and words[2].startswith("ARGS="):
+    if words[:2] == ["make", target] and len(words) == 3 and words[2].startswith("ARGS="):
         return shlex.split(words[2].removeprefix("ARGS="))
-    if words[:2] == [HONEYGUIDE, "fly"]:
+    if words[:2] == [HONEYGUIDE, command]:
         return words[2:]
     return None
 
@@ -93,7 +94,14 @@ def flight_arguments(line):
 def test_command_works(page, line, tmp_path, monkeypatch):
     if line in NOT_RUN_HERE or line.startswith(RUN_BY_OTHERS):
         return
-    arguments = flight_arguments(line)
+    follow_arguments = flight_arguments(line, "fly", "follow")
+    if follow_arguments is not None:
+        shortened = ["--speed", "max", "--seconds", "2", "--no-mp4", "--run-folder", str(tmp_path / "flight")]
+        result = CliRunner().invoke(app, ["follow", *follow_arguments, *shortened])
+        assert result.exit_code in {0, 1}, result.output  # 1: the script follows by the phone alone, and may fail
+        assert (tmp_path / "flight" / "summary.json").exists()
+        return
+    arguments = flight_arguments(line, "mission", "fly")
     assert arguments is not None, f"{page}: nobody runs this: {line}"
     monkeypatch.chdir(ROOT)
     is_whole = {"--once", "max"} <= set(arguments)
@@ -145,6 +153,7 @@ def test_generated_pages_are_current(monkeypatch):
 
 SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options are described, if there are several
     "fly": ("docs/flying.md", ""),
+    "follow": ("docs/follow.md", "Options of follow"),
     "play": ("docs/demonstrations.md", "Watch"),
     "drive": ("docs/demonstrations.md", "Drive"),
     "demonstrate": ("docs/demonstrations.md", "Record"),

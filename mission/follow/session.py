@@ -1,0 +1,184 @@
+"""`honeyguide follow`: an owner walks, the drone follows by a policy; live progress, scorecard, run folder, film.
+
+The vehicle takes off, its companion on board engages, and after the time asked for it lands. The companion speaks
+MAVLink over a link in memory, so that everything but ground stations and the live page is the same each time.
+"""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from autopilot.mavlink.links import LinkError
+from autopilot.vehicle import Mode
+from common.airframe import AirframeError, load_airframe
+from common.files import write_whole
+from common.params import ParameterError
+from mission.connections import open_links, open_page
+from mission.flight import FlightConfig, flight_parameters
+from mission.follow.judge import track_of
+from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.owner import FOLLOW_WORLD, OwnerConfig, Pace
+from mission.options import FlightOptions, UserError, flight_config, speed_of
+from mission.progress import Progress
+from mission.script import Drone
+from mission.session import advance, new_folder, print_line
+from mission.stream import LOOPBACK
+from mission.video import Mp4, VideoError
+from mission.view.chase import PICTURE_S, film
+from mission.view.moment import distances_m
+from mission.view.recording import Recorder, Recording
+from policies.companion.companion import Companion, Pilot
+from policies.companion.engagement import Phase
+from policies.companion.pilot import SCRIPTED, TASK, PilotError, load_pilot
+from policies.pretrained.shelf import pretrained
+from policies.tasks.follow_me.scorecard import Scorecard, lines, scorecard
+from policies.tasks.follow_me.track import Ranges
+from sim.world.world import WorldMap
+
+ENGAGE_S = 20.0  # after the take-off, until it follows
+FILM = "flight.mp4"
+
+
+@dataclass(frozen=True, slots=True)
+class FollowOptions:
+    """The options of `honeyguide follow`, as given."""
+
+    flight: FlightOptions
+    pace: Pace
+    policy: str | None  # None: the shipped one, or else the script
+    seconds: float
+    has_film: bool
+
+
+def follow_session(options: FollowOptions) -> int:
+    """Flies as asked and returns the exit code: 0 if it followed all the time and landed.
+
+    Raises:
+        UserError: an option, file, port or folder is wrong; nothing has been written.
+    """
+    console = Console()
+    speed = speed_of(options.flight.speed)
+    config = follow_config(options)
+    pilot, name = chosen_pilot(options.policy)
+    try:
+        flight_parameters(config, load_airframe(config.airframe))
+        links = [] if speed is None else open_links(options.flight, speed)
+    except (AirframeError, ParameterError, LinkError) as error:
+        raise UserError(str(error)) from error
+    page = open_page(options.flight.view_port) if options.flight.has_view else None
+    folder = new_folder(options.flight.run_folder)
+    with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
+        flight, companion = flight_with_companion(config, pilot, links=links, folder=folder)
+    recorder = Recorder(flight, action=lambda: companion.action)
+    watchers: list[Callable[[], None]] = [recorder.frame]
+    if page is not None:
+        from mission.view.live import LiveView
+
+        view = LiveView(
+            flight, page, speed=speed, action=lambda: companion.action, score=lambda: score_lines(recorder, companion)
+        )
+        watchers.append(view.frame)
+    running = flight.drone.start(follow(flight.drone, companion, options.seconds))
+    where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.flight.gcs_port}"
+    print_line(console, f"{name} follows an owner who {options.pace}s; {where}; logs in {folder}")
+    if options.flight.has_view:
+        print_line(console, f"live page: http://{LOOPBACK}:{options.flight.view_port}/")
+    advance(flight, lambda _: running.is_done, speed, watchers, Progress(flight, running), console)
+    if page is not None:
+        view.close()
+    running.cancel()
+    flight.close()
+    if running.error is not None:
+        print_line(console, f"result: {running.error}")
+    return finish(recorder.recording(), flight.world, options, folder, console, is_landed=running.error is None)
+
+
+def follow_config(options: FollowOptions) -> FlightConfig:
+    """The flight that the options describe: the world of training, with their seed and trees."""
+    config = flight_config(options.flight, None)
+    world = FOLLOW_WORLD.model_copy(
+        update={"seed": options.flight.world_seed, "trees_per_ha": options.flight.trees_per_ha}
+    )
+    return config.model_copy(update={"world": world, "owner": OwnerConfig(pace=options.pace)})
+
+
+def chosen_pilot(policy: str | None) -> tuple[Pilot, str]:
+    """Who flies, and how it is called."""
+    name = policy or (TASK if pretrained(TASK) is not None else SCRIPTED)
+    try:
+        return load_pilot(name), "a script" if name == SCRIPTED else f"the policy {name}"
+    except PilotError as error:
+        raise UserError(str(error)) from error
+
+
+async def follow(drone: Drone, companion: Companion, seconds: float) -> None:
+    """Takes off, lets the companion follow for so long, and lands."""
+    await take_off(drone)
+    await drone.until(lambda: companion.phase is Phase.FLYING, ENGAGE_S, "the companion's taking over")
+    await drone.sleep(seconds)
+    await drone.land()
+
+
+def score_lines(recorder: Recorder, companion: Companion) -> tuple[str, ...]:
+    """How it goes so far, for the live page."""
+    state = f"companion: {companion.phase.value}" + (f" ({companion.trouble})" if companion.trouble else "")
+    rows = recorder.recording().rows
+    rows = rows[rows["mode"] == Mode.OFFBOARD]
+    if len(rows) == 0:
+        return (state,)
+    distance, ranges = distances_m(rows), Ranges()
+    is_near = (distance >= ranges.near_m) & (distance <= ranges.far_m)
+    band = f"{ranges.near_m:g} to {ranges.far_m:g} m"
+    return (state, f"within {band}: {100.0 * is_near.mean():.0f} %, median {float(np.median(distance)):.1f} m")
+
+
+def finish(
+    recording: Recording, world: WorldMap, options: FollowOptions, folder: Path, console: Console, *, is_landed: bool
+) -> int:
+    """Writes recording, scorecard and film, and shows the scorecard; returns the exit code."""
+    recording.save(folder)
+    with console.status("looking at the flight again"):
+        track = track_of(recording, world, options.seconds)
+    is_good = False
+    if track is not None:
+        card = scorecard([track])
+        is_good = is_landed and track.is_whole and card.collision.value == 0.0
+        write_whole(folder / "summary.json", (json.dumps(summary_of(card), indent=2) + "\n").encode())
+        console.print(_table(card))
+    if options.has_film:
+        write_film(recording, world, folder / FILM, console)
+    print_line(console, f"logs, scorecard and film: {folder}")
+    return 0 if is_good else 1
+
+
+def summary_of(card: Scorecard) -> dict[str, float | int]:
+    """What `summary.json` holds: the scorecard's figures."""
+    names = [name for name in Scorecard.__dataclass_fields__ if name not in ("episodes", "minutes")]
+    return {name: getattr(card, name).value for name in names} | {"minutes": card.minutes}
+
+
+def write_film(recording: Recording, world: WorldMap, target: Path, console: Console) -> None:
+    """Chase view and onboard view as an mp4.
+
+    Raises:
+        UserError: it cannot be written.
+    """
+    try:
+        with Mp4(target, PICTURE_S) as mp4, console.status("") as status:
+            for i, picture in enumerate(film(recording, world)):
+                mp4.show(picture)
+                status.update(f"filming: {i * PICTURE_S:.0f} s")
+    except VideoError as error:
+        raise UserError(str(error)) from error
+
+
+def _table(card: Scorecard) -> Table:
+    table = Table("figure", "value", title="scorecard", title_justify="left")
+    for row in lines(card):
+        table.add_row(*row)
+    return table

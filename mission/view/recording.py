@@ -1,0 +1,106 @@
+"""What a run keeps for those who look at it later: a moment of each frame, and what the flight was made from.
+
+In: a running flight. Out: `replay.npz` in the run folder, small enough to keep: 0.4 MB a minute. Replays, films,
+HTML files and the scorecard are made from it alone.
+"""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.files import write_whole
+from mission.flight import Flight, FlightConfig
+from mission.view.moment import MOMENT, Moment, Row, moment_of
+
+FILE = "replay.npz"
+_FIRST_ROWS = 1024
+
+
+class RecordingError(ValueError):
+    """A folder without a run that can be shown; the message is one sentence."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Recording:
+    """One flight, as it is shown."""
+
+    config: FlightConfig
+    rows: NDArray[Any]  # of MOMENT, (moments,)
+    path_ned: NDArray[np.float32]  # [m] (n, 3) of its plan; empty without one
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def moment(self, index: int) -> Moment:
+        return Moment(self.rows[index])
+
+    @property
+    def has_owner(self) -> bool:
+        return self.config.owner is not None
+
+    def every(self, frames: int) -> "Recording":
+        """The same with fewer moments."""
+        return Recording(self.config, self.rows[::frames], self.path_ned)
+
+    def save(self, folder: Path) -> None:
+        """Writes it into the folder of its run."""
+        stream = BytesIO()
+        config = np.array(self.config.model_dump_json())
+        np.savez_compressed(stream, rows=self.rows, path_ned=self.path_ned, config=config)
+        write_whole(folder / FILE, stream.getvalue())
+
+
+def load_recording(folder: Path) -> Recording:
+    """The recording of a run.
+
+    Raises:
+        RecordingError: there is none, or it cannot be read.
+    """
+    path = folder / FILE
+    try:
+        with np.load(BytesIO(path.read_bytes())) as data:
+            rows, path_ned, text = data["rows"], data["path_ned"], str(data["config"])
+        config = FlightConfig.model_validate(json.loads(text))
+    except FileNotFoundError:
+        raise RecordingError(f"{folder}: holds no run that can be shown: {FILE} is missing") from None
+    except (OSError, EOFError, KeyError, ValueError, BadZipFile) as error:
+        raise RecordingError(f"{path}: cannot be read: {str(error).partition(chr(10))[0]}") from error
+    if len(rows) == 0 or rows.dtype != MOMENT:
+        raise RecordingError(f"{path}: was written by another version, or holds nothing")
+    return Recording(config, rows, path_ned)
+
+
+class Recorder:
+    """Keeps what is shown of a flight.
+
+    Args:
+        flight: what is recorded.
+        path_ned: [m] (n, 3) of its plan.
+        action: what a policy on board chose last.
+    """
+
+    def __init__(
+        self, flight: Flight, path_ned: Sequence[Any] = (), action: Callable[[], Row | None] = lambda: None
+    ) -> None:
+        self._flight, self._action = flight, action
+        self._path_ned = np.array(path_ned, np.float32).reshape(-1, 3)
+        self._rows = np.zeros(_FIRST_ROWS, MOMENT)
+        self._count = 0
+
+    def frame(self) -> None:
+        """Notes the frame that is ending."""
+        if self._count == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
+        self._rows[self._count] = moment_of(self._flight, self._action()).row
+        self._count += 1
+
+    def recording(self) -> Recording:
+        """Everything so far."""
+        return Recording(self._flight.config, self._rows[: self._count].copy(), self._path_ned)
