@@ -1,40 +1,112 @@
-"""How far it is from a vehicle to what is solid, all round: truth for teachers and critics.
+"""How near everything solid is to a vehicle, all round: truth for teachers and critics.
 
-24 level directions from the true heading clockwise, then up and down. Rays end at `RANGE_M`: what lies beyond it, a
-decision of a tenth of a second need not know.
+24 level sectors of 15 degrees from the true heading clockwise, each with the nearest thing in it: rays would pass thin
+trunks by. Then up and down, and where the nearest tree is. What lies beyond `RANGE_M` is not told.
 """
+
+import math
 
 import warp as wp
 
-from common.rotation import yaw_from_quat
+from common.rotation import wrap_pi, yaw_from_quat
 from policies.tasks.layout import Element
 from sim.advance import RigArrays
-from sim.world.world import ray_hit
+from sim.world.terrain import grid_coordinate, outer_cell, terrain_ray_hit
+from sim.world.trees import Tree
+from sim.world.walls import walls_ray_hit
+from sim.world.world import World, ray_hit
 
 wp.set_module_options({"enable_backward": False})
 
-LEVEL_RAYS = 24
-RAYS = LEVEL_RAYS + 2
-RANGE_M = wp.constant(8.0)
-_LEVEL_RAYS = wp.constant(LEVEL_RAYS)
+SECTORS = 24
+RANGES = SECTORS + 4
+RANGE_M = wp.constant(8.0)  # no more than a bucket of the forest, so that its neighbours hold every tree within
+_SECTORS = wp.constant(SECTORS)
+_SECTOR_RAD = wp.constant(2.0 * math.pi / SECTORS)
+_HULL_M = wp.constant(0.35)  # a crown that begins this much higher or lower counts: half a vehicle's height and more
 
-RANGE_ELEMENTS = tuple(
-    Element(f"nearness_{name}", "1") for name in (*(f"{15 * k}_deg" for k in range(LEVEL_RAYS)), "up", "down")
+RANGE_ELEMENTS = (
+    *(Element(f"nearness_{15 * k}_deg", "1") for k in range(SECTORS)),
+    Element("nearness_up", "1"),
+    Element("nearness_down", "1"),
+    Element("nearest_tree_ahead", "1"),  # unit vector to the tree times its nearness
+    Element("nearest_tree_right", "1"),
 )
 
 
+@wp.func
+def nearness(distance_m: float) -> float:
+    """1 for touching, 0 at `RANGE_M` and beyond."""
+    return wp.clamp(1.0 - distance_m / RANGE_M, 0.0, 1.0)
+
+
+@wp.func
+def width_at(tree: Tree, height: float) -> float:
+    """Radius of a tree at a height [m]: of its crown or of its trunk, 0 above it."""
+    radius = float(0.0)
+    if height < tree.crown_low:
+        radius = tree.trunk_radius
+    nearest = wp.clamp(wp.clamp(height, tree.crown_low, tree.crown_high), height - _HULL_M, height + _HULL_M)
+    off = nearest - wp.clamp(nearest, tree.crown_low, tree.crown_high)
+    spare = tree.crown_radius * tree.crown_radius - off * off
+    if spare > 0.0:
+        radius = wp.max(radius, wp.sqrt(spare))
+    return radius
+
+
+@wp.func
+def add_tree(tree: Tree, pos_ned: wp.vec3, yaw: float, out: wp.array2d(dtype=float), i: int) -> None:
+    """Marks the sectors that a tree fills."""
+    north = tree.north - pos_ned[0]
+    east = tree.east - pos_ned[1]
+    distance = wp.sqrt(north * north + east * east)
+    radius = width_at(tree, -pos_ned[2])
+    near = nearness(wp.max(distance - radius, 0.0))
+    if radius <= 0.0 or near <= 0.0:
+        return
+    bearing = wrap_pi(wp.atan2(east, north) - yaw)
+    half = wp.asin(wp.min(radius / wp.max(distance, 1.0e-3), 1.0))
+    first = int(wp.round((bearing - half) / _SECTOR_RAD))
+    last = int(wp.round((bearing + half) / _SECTOR_RAD))
+    for k in range(first, last + 1):
+        sector = (k + _SECTORS) % _SECTORS
+        out[i, sector] = wp.max(out[i, sector], near)
+    ahead = out[i, _SECTORS + 2]
+    right = out[i, _SECTORS + 3]
+    if near * near > ahead * ahead + right * right:
+        out[i, _SECTORS + 2] = near * wp.cos(bearing)
+        out[i, _SECTORS + 3] = near * wp.sin(bearing)
+
+
+@wp.func
+def add_trees(w: World, pos_ned: wp.vec3, yaw: float, out: wp.array2d(dtype=float), i: int) -> None:
+    """Marks the sectors that the trees around fill."""
+    forest = w.forest
+    row = outer_cell(grid_coordinate(pos_ned[0], forest.half_size_m, forest.buckets_per_m), forest.buckets)
+    column = outer_cell(grid_coordinate(pos_ned[1], forest.half_size_m, forest.buckets_per_m), forest.buckets)
+    for r in range(wp.max(row - 1, 0), wp.min(row + 2, forest.buckets)):
+        for c in range(wp.max(column - 1, 0), wp.min(column + 2, forest.buckets)):
+            bucket = r * forest.buckets + c
+            for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
+                add_tree(forest.trees[forest.bucket_trees[k]], pos_ned, yaw, out, i)
+
+
 @wp.kernel(enable_backward=False)
-def measure_ranges(rig: RigArrays, rows: wp.array(dtype=wp.bool), nearness: wp.array2d(dtype=float)) -> None:
-    """1 for touching, 0 for nothing within `RANGE_M`; shape (vehicles, RAYS), of the chosen rows."""
-    i, k = wp.tid()
+def measure_ranges(rig: RigArrays, rows: wp.array(dtype=wp.bool), out: wp.array2d(dtype=float)) -> None:
+    """The elements of `RANGE_ELEMENTS`, shape (vehicles, RANGES), of the chosen rows."""
+    i = wp.tid()
     if not rows[i]:
         return
     body = rig.body[i]
-    bearing = yaw_from_quat(body.q_ned_from_frd) + float(k) * 2.0 * wp.pi / float(_LEVEL_RAYS)
-    dir_ned = wp.vec3(wp.cos(bearing), wp.sin(bearing), 0.0)
-    if k == _LEVEL_RAYS:
-        dir_ned = wp.vec3(0.0, 0.0, -1.0)
-    if k == _LEVEL_RAYS + 1:
-        dir_ned = wp.vec3(0.0, 0.0, 1.0)
-    world = rig.worlds[rig.i_world[i]]
-    nearness[i, k] = 1.0 - ray_hit(world, body.pos_ned, dir_ned, RANGE_M) / RANGE_M
+    w = rig.worlds[rig.i_world[i]]
+    yaw = yaw_from_quat(body.q_ned_from_frd)
+    for k in range(_SECTORS):
+        bearing = yaw + float(k) * _SECTOR_RAD
+        dir_ned = wp.vec3(wp.cos(bearing), wp.sin(bearing), 0.0)
+        ground = terrain_ray_hit(w.terrain, body.pos_ned, dir_ned, RANGE_M)
+        out[i, k] = nearness(walls_ray_hit(w.walls, body.pos_ned, dir_ned, ground))
+    out[i, _SECTORS] = nearness(ray_hit(w, body.pos_ned, wp.vec3(0.0, 0.0, -1.0), RANGE_M))
+    out[i, _SECTORS + 1] = nearness(ray_hit(w, body.pos_ned, wp.vec3(0.0, 0.0, 1.0), RANGE_M))
+    out[i, _SECTORS + 2] = 0.0
+    out[i, _SECTORS + 3] = 0.0
+    add_trees(w, body.pos_ned, yaw, out, i)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from policies.tasks.flight.bank import HOVER_COUNT
 from policies.tasks.flight.numbers import FLIGHT_NUMBERS, FlightNumbers
 from policies.tasks.flight.own import ACTIONS
-from policies.tasks.flight.ranges import RAYS, measure_ranges
+from policies.tasks.flight.ranges import RANGES, measure_ranges
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
 from policies.tasks.follow_me.images import Eyes
 from policies.tasks.follow_me.kernels import (
@@ -164,7 +164,7 @@ class FollowMe(FlightTask):
         state.path_seeds = self._zeros("path_seeds", n, int)
         state.sights = self._zeros("sights", n, Sight)
         state.unseen_s = self._zeros("unseen_s", n, float)
-        state.nearness = self._zeros("nearness", (n, RAYS), float)
+        state.nearness = self._zeros("nearness", (n, RANGES), float)
         state.lenses = self._zeros("lenses", n, Lens)
         state.measures = self._zeros("measures", (n, len(MEASURES)), float)
         state.is_all = wp.full(n, value=True, dtype=wp.bool, device=self.device)
@@ -190,19 +190,15 @@ class FollowMe(FlightTask):
         def record(kernel: Any, *inputs: Any) -> Any:
             return recorded(kernel, self.env_count, list(inputs), self.device)
 
-        def measure(rows: Any) -> Any:
-            inputs = [rig, rows, state.nearness]
-            return wp.launch(measure_ranges, (self.env_count, RAYS), inputs, device=self.device, record_cmd=True)
-
         self._act = record(act, border, rules, rig)
         self._walk = record(walk, rules, rig, state)
         self._look_all = record(look, rig, state, state.is_all)
-        self._measure_all = measure(state.is_all)
+        self._measure_all = record(measure_ranges, rig, state.is_all, state.nearness)
         self._judge = record(judge, border, rules, rig, state, start)
         self._prepare = record(prepare, border, rules, state, start)
         self._place = record(place, border, rig, state, start)
         self._look_starting = record(look, rig, state, self.is_starting)
-        self._measure_starting = measure(self.is_starting)
+        self._measure_starting = record(measure_ranges, rig, self.is_starting, state.nearness)
         self._show = record(show, border, rules, rig, state, start)
 
 

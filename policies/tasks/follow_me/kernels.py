@@ -92,7 +92,7 @@ class FollowState:
     path_seeds: wp.array(dtype=int)
     sights: wp.array(dtype=Sight)
     unseen_s: wp.array(dtype=float)
-    nearness: wp.array2d(dtype=float)  # (envs, RAYS)
+    nearness: wp.array2d(dtype=float)  # (envs, RANGES)
     lenses: wp.array(dtype=Lens)
     measures: wp.array2d(dtype=float)  # (envs, MEASURES)
     is_all: wp.array(dtype=wp.bool)  # every row

@@ -7,7 +7,7 @@ near everything solid is, all round.
 import warp as wp
 
 from policies.tasks.flight.own import OWN_ELEMENTS, OWN_SIZE, SPEED_SCALE, OwnState, write3, write_own
-from policies.tasks.flight.ranges import RANGE_ELEMENTS, RAYS
+from policies.tasks.flight.ranges import RANGE_ELEMENTS, RANGES
 from policies.tasks.follow_me.sight import ROOM_MAX_M, Sight
 from policies.tasks.layout import Element
 from sim.bodies.multirotor import BodyState
@@ -18,7 +18,7 @@ _PLACE_SCALE = wp.constant(5.0)  # [m]
 _PLACE_MAX = wp.constant(4.0)  # in scales
 _DISTANCE_SCALE = wp.constant(3.0)  # [m]
 _UNSEEN_SCALE = wp.constant(5.0)  # [s]
-_RAYS = wp.constant(RAYS)
+_RANGES = wp.constant(RANGES)
 
 PRIVILEGED_ELEMENTS = (
     *(Element(f"true_{e.name}", e.unit, e.scale) for e in OWN_ELEMENTS),
@@ -75,5 +75,5 @@ def write_privileged(
     out[i, at + 10] = float(sight.is_free)
     out[i, at + 11] = wp.min(unseen_s / _UNSEEN_SCALE, 2.0)
     out[i, at + 12] = sight.room_m / ROOM_MAX_M
-    for k in range(_RAYS):
+    for k in range(_RANGES):
         out[i, at + 13 + k] = nearness[i, k]
