@@ -11,7 +11,7 @@ from rich.console import Console
 
 from autopilot.mavlink.links import GROUND_STATION_PORT, OFFBOARD_PORT
 from common.geodesy import DEFAULT_HOME
-from mission import follow_commands, task_commands, training_commands
+from mission import follow_commands, task_commands, training_commands, view_commands
 from mission.refusal import refuse
 
 app = typer.Typer(
@@ -148,6 +148,7 @@ for _command in (task_commands.demonstrate, task_commands.play, task_commands.dr
     app.command()(_command)
 app.command()(follow_commands.follow)
 app.command()(follow_commands.companion)
+app.command()(view_commands.replay)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
 app.command()(training_commands.export)

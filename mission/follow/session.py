@@ -28,8 +28,7 @@ from mission.progress import Progress
 from mission.script import Drone
 from mission.session import advance, new_folder, print_line
 from mission.stream import LOOPBACK
-from mission.video import Mp4, VideoError
-from mission.view.chase import PICTURE_S, film
+from mission.view.film import write_film
 from mission.view.moment import distances_m
 from mission.view.recording import Recorder, Recording
 from policies.companion.companion import Companion, Pilot
@@ -160,21 +159,6 @@ def summary_of(card: Scorecard) -> dict[str, float | int]:
     """What `summary.json` holds: the scorecard's figures."""
     names = [name for name in Scorecard.__dataclass_fields__ if name not in ("episodes", "minutes")]
     return {name: getattr(card, name).value for name in names} | {"minutes": card.minutes}
-
-
-def write_film(recording: Recording, world: WorldMap, target: Path, console: Console) -> None:
-    """Chase view and onboard view as an mp4.
-
-    Raises:
-        UserError: it cannot be written.
-    """
-    try:
-        with Mp4(target, PICTURE_S) as mp4, console.status("") as status:
-            for i, picture in enumerate(film(recording, world)):
-                mp4.show(picture)
-                status.update(f"filming: {i * PICTURE_S:.0f} s")
-    except VideoError as error:
-        raise UserError(str(error)) from error
 
 
 def _table(card: Scorecard) -> Table:

@@ -117,6 +117,7 @@ class LiveView:
     def _update(self) -> None:
         moment = self._moment()
         self._scene.show(moment)
+        self._scene.extend_trails(moment)
         self._move_cameras(moment)
         if self._is_due("status", STATUS_S):
             self._panel.show_status(moment, (*self._score(), *self._controls.lines))

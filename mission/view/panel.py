@@ -5,6 +5,7 @@ In: moments. Out: viser's GUI elements, each renewed at its own slow rate: text 
 
 from collections import deque
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import viser
@@ -16,7 +17,7 @@ from mission.view.moment import ACTIONS, Moment
 PLOT_PERIOD_S = 0.5  # simulated time between two points that are plotted
 PLOT_POINTS = 600
 _COLOURS = ("#2868dc", "#e87820", "#3aa655", "#8a4fbf")
-_ACTION_NAMES = ("ahead", "right", "down", "yaw rate")
+ACTION_NAMES = ("ahead", "right", "down", "yaw rate")
 
 Read = Callable[[Moment], tuple[float, ...]]
 PLOTS: dict[str, tuple[tuple[str, ...], Read]] = {
@@ -24,7 +25,7 @@ PLOTS: dict[str, tuple[tuple[str, ...], Read]] = {
     "height above ground [m]": (("height",), lambda moment: (float(moment.row["height_m"]),)),
     "speed [m/s]": (("speed",), lambda moment: (moment.speed_m_s,)),
     "battery [%]": (("battery",), lambda moment: (100.0 * float(moment.row["battery"]),)),
-    "policy's action": (_ACTION_NAMES, lambda moment: tuple(float(value) for value in moment.row["action"])),
+    "policy's action": (ACTION_NAMES, lambda moment: tuple(float(value) for value in moment.row["action"])),
 }
 """What is plotted over time: title, names of the lines, values."""
 
@@ -77,6 +78,10 @@ class Panel:
         """Adds a point to each plot."""
         for plot in self._plots:
             plot.note(moment)
+
+    def note_row(self, row: Any) -> None:
+        """Adds a point to each plot, from a row of a recording."""
+        self.note(Moment(row))
 
     def draw_plots(self) -> None:
         """Sends the plots."""

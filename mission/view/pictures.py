@@ -30,6 +30,7 @@ class Eye:
     """
 
     def __init__(self, world: WorldMap, width: int, height: int, hfov_deg: float, *, range_m: float = RANGE_M) -> None:
+        self._world = world  # kernels see its arrays by their addresses: they must not go before the camera
         people = wp.zeros(1, dtype=Person)
         self.camera = QuickCamera(
             world, 1, width=width, height=height, hfov_deg=hfov_deg, people=people, range_m=range_m

@@ -7,6 +7,7 @@ nothing after a browser has loaded it.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan, radians, tan
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -141,18 +142,23 @@ class Scene:
         if moment.has_owner:
             self._owner.position = moment.owner_ned
             self._owner.wxyz = wxyz_of(quat_of(float(moment.row["owner"]["heading_rad"]), 0.0))
-            self._trails["owner"].extend(moment.time_s, moment.owner_ned - (0.0, 0.0, 0.05))
         self._owner.visible = moment.has_owner
         has_goal = bool(np.linalg.norm(moment.goal_ned - moment.pos_ned) > ARRIVED_M)  # False for NaN
         if has_goal:
             self._goal.position = moment.goal_ned
         self._goal.visible = has_goal
-        self._trails["vehicle"].extend(moment.time_s, moment.pos_ned)
 
-    def show_trails(self, vehicle_ned: NDArray[np.float32], owner_ned: NDArray[np.float32]) -> None:
-        """Whole trails at once, for a replay that jumps."""
-        self._trails["vehicle"].draw(vehicle_ned)
-        self._trails["owner"].draw(owner_ned - np.array((0.0, 0.0, 0.05), np.float32))
+    def extend_trails(self, moment: Moment) -> None:
+        """Appends where everybody is."""
+        self._trails["vehicle"].extend(moment.time_s, moment.pos_ned)
+        if moment.has_owner:
+            self._trails["owner"].extend(moment.time_s, moment.owner_ned)
+
+    def draw_trails(self, rows: NDArray[Any]) -> None:
+        """Draws them anew from rows of a recording that may have jumped."""
+        self._trails["vehicle"].draw(rows["pos_ned"])
+        if len(rows) and Moment(rows[0]).has_owner:
+            self._trails["owner"].draw(rows["owner"]["pos_ned"])
 
 
 class Trail:

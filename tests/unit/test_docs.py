@@ -28,6 +28,7 @@ NOT_RUN_HERE = {
 RUN_BY_OTHERS = (
     f"{HONEYGUIDE} picture ",  # tests/unit/mission/test_picture.py
     *(f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")),  # tests/unit/mission/test_task_commands.py
+    f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
     *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/training
 )
 
@@ -152,8 +153,9 @@ def test_generated_pages_are_current(monkeypatch):
 
 
 SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options are described, if there are several
-    "fly": ("docs/flying.md", ""),
+    "fly": ("docs/flying.md", "Options"),
     "follow": ("docs/follow.md", "Options of follow"),
+    "replay": ("docs/flying.md", "Looking at a run again"),
     "play": ("docs/demonstrations.md", "Watch"),
     "drive": ("docs/demonstrations.md", "Drive"),
     "demonstrate": ("docs/demonstrations.md", "Record"),

@@ -1,0 +1,139 @@
+"""A recorded flight as one HTML file that needs nothing else: no network, no server, no library.
+
+In: a recording and its world. Out: the page `replay.html` of this folder with the data inside: scene, paths, plots and
+the onboard pictures, one sheet of small JPEGs. A minute's flight makes about half a megabyte.
+"""
+
+import json
+from base64 import b64encode
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.vehicle import Mode
+from common.airframe import load_airframe
+from common.files import write_whole
+from mission.angles import yaw_rad
+from mission.view import shapes
+from mission.view.moment import distances_m
+from mission.view.panel import ACTION_NAMES
+from mission.view.pictures import onboard_eye
+from mission.view.recording import Recording
+from sim.world.world import WorldMap
+
+STRIDE = 5  # frames of the flight per moment of the page: 10 a second
+TILES_MOST = 600  # onboard pictures
+TILES_PER_S = 5
+TILE_COLUMNS = 20
+CELLS_MOST = 128
+JPEG_QUALITY = 80
+STATURE_M = 1.75
+Json = dict[str, Any]
+
+
+def write_html(recording: Recording, world: WorldMap, target: Path, title: str) -> None:
+    """Writes the file.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    page = files("mission.view").joinpath("replay.html").read_text(encoding="utf-8")
+    data = json.dumps(page_data(recording.every(STRIDE), world, title)).replace("</", "<\\/")
+    write_whole(target, page.replace("/*DATA*/", data).encode())
+
+
+def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
+    """Everything the page shows; the border to its JavaScript, hence a dict."""
+    airframe = load_airframe(recording.config.airframe)
+    rows = recording.rows
+    return {
+        "title": title,
+        "modes": {int(mode): mode.name.replace("_", " ").title() for mode in Mode},
+        "size_m": world.config.size_m,
+        "sun_ned": shapes.SUN_NED.tolist(),
+        "heading_rad": float(yaw_rad(rows["q_ned_from_frd"][:1].astype(float))[0]),
+        "has_owner": recording.has_owner,
+        "ground": _mesh(shapes.ground(world, CELLS_MOST)),
+        "walls": None if (walls := shapes.walls(world)) is None else _mesh(walls),
+        **_trees(world),
+        "vehicle": _mesh(shapes.quadrotor(airframe)),
+        "blade": _mesh(shapes.rotor(airframe)),
+        "person": _mesh(shapes.person(STATURE_M)),
+        "hubs": _array(shapes.hubs_frd(airframe)),
+        "spins": [rotor.spin for rotor in airframe.rotors],
+        "path_ned": _array(recording.path_ned) if len(recording.path_ned) > 1 else None,
+        "track": _track(rows),
+        "plots": _plots(recording),
+        "onboard": _onboard(recording, world),
+    }
+
+
+def _array(values: NDArray[Any]) -> Json:
+    """Numbers for JavaScript's typed arrays, little-endian."""
+    kind = {"f": "f4", "u": "u4", "i": "u4"}[values.dtype.kind] if values.dtype.itemsize > 1 else "u1"
+    return {"type": kind, "data": b64encode(values.astype(f"<{kind}").tobytes()).decode()}
+
+
+def _mesh(mesh: shapes.Mesh) -> Json:
+    return {name: _array(getattr(mesh, name)) for name in ("vertices", "faces", "colours")}
+
+
+def _trees(world: WorldMap) -> Json:
+    forest = shapes.trees(world)
+    if len(forest.trunk_ned) == 0:
+        return {"trunks": None}
+    bark = np.broadcast_to(np.array(shapes.BARK, np.uint8), forest.crown_colours.shape)
+    return {
+        "trunk": _mesh(shapes.trunk()),
+        "ball": _mesh(shapes.ball()),
+        "trunks": {"place": _array(forest.trunk_ned), "size": _array(forest.trunk_size), "tint": _array(bark)},
+        "crowns": {
+            "place": _array(forest.crown_ned),
+            "size": _array(forest.crown_size),
+            "tint": _array(forest.crown_colours),
+        },
+    }
+
+
+def _track(rows: NDArray[Any]) -> Json:
+    names = ("time_s", "pos_ned", "q_ned_from_frd", "rotor_speed", "mode", "is_armed")
+    return {name: _array(rows[name]) for name in names} | {
+        "owner_ned": _array(rows["owner"]["pos_ned"]),
+        "owner_heading_rad": _array(rows["owner"]["heading_rad"]),
+    }
+
+
+def _plots(recording: Recording) -> list[Json]:
+    rows = recording.rows
+    plots: list[tuple[str, tuple[str, ...], list[NDArray[Any]]]] = [
+        ("height above ground [m]", ("height",), [rows["height_m"]]),
+        ("speed [m/s]", ("speed",), [np.linalg.norm(rows["vel_ned"], axis=1)]),
+        ("battery [%]", ("battery",), [100.0 * rows["battery"]]),
+    ]
+    if recording.has_owner:
+        plots.insert(0, ("distance to owner [m]", ("distance",), [distances_m(rows)]))
+        plots.append(("action", ACTION_NAMES, list(rows["action"].T)))
+    return [
+        {"title": title, "names": names, "columns": [_array(column) for column in columns]}
+        for title, names, columns in plots
+    ]
+
+
+def _onboard(recording: Recording, world: WorldMap) -> Json:
+    """The onboard camera's pictures side by side, row by row."""
+    stride = max(10 // TILES_PER_S, -(-len(recording) // TILES_MOST))
+    eye = onboard_eye(world)
+    side = len(eye.rgb)
+    rows = recording.rows[::stride]
+    sheet = np.zeros((-(-len(rows) // TILE_COLUMNS) * side, TILE_COLUMNS * side, 3), np.uint8)
+    for i, row in enumerate(rows):
+        eye.look_from(row)
+        top, left = i // TILE_COLUMNS * side, i % TILE_COLUMNS * side
+        sheet[top : top + side, left : left + side] = eye.rgb
+    _, jpeg = cv2.imencode(".jpg", sheet[..., ::-1], (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
+    text = b64encode(jpeg.tobytes()).decode()
+    return {"sheet": text, "side": side, "columns": TILE_COLUMNS, "count": len(rows), "stride": stride}
