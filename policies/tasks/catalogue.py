@@ -10,6 +10,8 @@ from pydantic_core import ErrorDetails
 
 from policies.tasks.follow_me.follow_me import FollowMe
 from policies.tasks.follow_me.settings import FollowSettings
+from policies.tasks.navigate.navigate import Navigate
+from policies.tasks.navigate.settings import NavigateSettings
 from policies.tasks.parking.level1 import Parking1
 from policies.tasks.parking.level2 import Parking2
 from policies.tasks.parking.settings import Parking2Settings, ParkingSettings
@@ -37,6 +39,7 @@ CATALOGUE: dict[str, Entry] = {
     "Parking1": Entry(ParkingSettings, Parking1),
     "Parking2": Entry(Parking2Settings, Parking2),
     "FollowMe": Entry(FollowSettings, FollowMe),
+    "Navigate": Entry(NavigateSettings, Navigate),
 }
 
 

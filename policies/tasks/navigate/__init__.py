@@ -1,0 +1,1 @@
+"""Navigate: a drone reaches a goal through forest at speed."""

@@ -1,0 +1,168 @@
+"""Navigate: a drone reaches a goal 60 to 85 m away through forest, below its crowns and at speed.
+
+In: an action, 10 Hz: velocity and yaw rate for the flight controller. Out: what the vehicle knows of itself, where the
+goal is by its estimate, and what its rangefinder or its depth camera sees. The simulator and the flight controller are
+those of every flight.
+"""
+
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from policies.tasks.flight.bank import HOVER_COUNT
+from policies.tasks.flight.numbers import FLIGHT_NUMBERS, FlightNumbers
+from policies.tasks.flight.own import ACTIONS, OWN_ELEMENTS
+from policies.tasks.flight.task import DECISION_TICKS, FlightTask
+from policies.tasks.layout import ImageElement, Layout
+from policies.tasks.navigate.images import DEPTH_CHANNELS, DepthEyes
+from policies.tasks.navigate.kernels import MEASURES, NavigateState, Rules, Start, act, judge, place, prepare, show
+from policies.tasks.navigate.numbers import IMPROVED, NUMBERS, TREES_PER_HA_MAX, NavigateNumbers
+from policies.tasks.navigate.observe import GOAL_ELEMENTS
+from policies.tasks.navigate.picture import draw
+from policies.tasks.navigate.scan import RANGE_ELEMENTS, RANGES, scan
+from policies.tasks.navigate.settings import NavigateSettings
+from policies.tasks.numbers import typed_rows
+from sim.world.world import WorldConfig
+
+WORLD = WorldConfig(
+    size_m=192.0,
+    cell_m=4.0,
+    hill_height_m=4.0,
+    hill_wavelength_m=120.0,
+    clearing_radius_m=5.0,
+    clearing_blend_m=60.0,
+    trees_per_ha=TREES_PER_HA_MAX,
+    tree_height_min_m=10.0,
+    tree_height_max_m=14.0,
+)
+
+
+class Navigate(FlightTask):
+    """The task. Layout version 1."""
+
+    numbers: ClassVar = NUMBERS
+
+    def __init__(self, settings: NavigateSettings, env_count: int, device: str = "cpu") -> None:
+        super().__init__(
+            _layout(settings),
+            env_count,
+            WORLD,
+            trees_per_ha_max=TREES_PER_HA_MAX,
+            has_estimator=settings.has_estimator,
+            number_defaults=IMPROVED,
+            device=device,
+        )
+        self.settings = settings
+        self.navigation = self._state()
+        self.measures = self.navigation.measures
+        self._eyes: DepthEyes | None = None
+        if self.layout.image is not None:
+            self._eyes = DepthEyes(self.border, self.rig.arrays, self.navigation.numbers, self.worlds)
+        self._record_all()
+
+    def begin(self, is_chosen: NDArray[np.bool_]) -> None:
+        """Starts an episode in the chosen rows, shape (envs,); the others are not touched."""
+        self.is_starting.assign(is_chosen)
+        self._begin_rows()
+
+    def step(self) -> None:
+        """One decision of all environments, with the actions that lie in the border."""
+        self._act.launch()
+        self.rig.advance(DECISION_TICKS)
+        self._see(self.navigation.is_all)
+        self._judge.launch()
+        self.keep_last_images()
+        self._begin_rows()
+
+    def _begin_rows(self) -> None:
+        """Starts the episodes of the rows that are starting."""
+        self._prepare.launch()
+        self.take_off()
+        self._place.launch()
+        if self._eyes is not None:
+            self._eyes.refresh(self.is_growing)
+        self._see(self.is_starting)
+        self._show.launch()
+
+    def _see(self, rows: Any) -> None:
+        """What the chosen rows see of the forest."""
+        if self._eyes is not None:
+            self._eyes.take(rows)
+        else:
+            self._scan.set_param_at_index(2, rows)
+            self._scan.launch()
+
+    def load_state(self, state: Any) -> None:
+        """Restores what `state` returned."""
+        super().load_state(state)
+        if self._eyes is not None:
+            self._eyes.refresh()
+
+    def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
+        """Drone, trees, goal and ranges from above."""
+        body = self.rig.arrays.body.numpy()[i_env]
+        x, y, z, w = (float(value) for value in body["q_ned_from_frd"])
+        yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        goal_ned = self.navigation.goals_ned.numpy()[i_env].astype(np.float64)
+        pos_ned = body["pos_ned"].astype(np.float64)
+        away_m, speed = np.linalg.norm(goal_ned - pos_ned), np.linalg.norm(body["vel_ned"])
+        words = f"{float(self.border.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {away_m:4.1f} m  {speed:3.1f} m/s"
+        ranges_m = self.navigation.ranges_m.numpy()[i_env]
+        return draw(self.worlds.map(i_env), pos_ned, yaw, goal_ned, ranges_m, words, height_px)
+
+    def _state(self) -> Any:
+        n = self.env_count
+        state = NavigateState()
+        state.flight = typed_rows(self.border.numbers, FlightNumbers)
+        state.numbers = typed_rows(self.border.numbers, NavigateNumbers, first=len(FLIGHT_NUMBERS))
+        state.actions = self._zeros("last_actions", n, wp.vec4)
+        state.goals_ned = self._zeros("goals_ned", n, wp.vec3)
+        state.pos_ned = self._zeros("last_pos_ned", n, wp.vec3)
+        state.path_m = self._zeros("path_m", n, float)
+        state.start_distance_m = self._zeros("start_distance_m", n, float)
+        state.ranges_m = self._zeros("ranges_m", (n, RANGES), float)
+        state.measures = self._zeros("measures", (n, len(MEASURES)), float)
+        state.is_all = wp.full(n, value=True, dtype=wp.bool, device=self.device)
+        return state
+
+    def _record_all(self) -> None:
+        border, rig, state = self.border, self.rig.arrays, self.navigation
+        rules = Rules()
+        rules.has_rays = int(self.settings.observation == "rays")
+        rules.has_estimator = int(self.settings.has_estimator)
+        rules.is_test = int(self.settings.split == "test")
+        rules.decision_s = self.decision_s
+        start = Start()
+        start.is_starting = self.is_starting
+        start.is_growing = self.is_growing
+        start.world_seeds = self.world_seeds
+        start.noise_seeds = self.noise_seeds
+        start.hovers = self.hovers
+        start.hover_count = HOVER_COUNT
+        start.world_numbers = self.worlds.numbers
+        start.makes = self.makes
+
+        def record(kernel: Any, *inputs: Any) -> Any:
+            return wp.launch(kernel, self.env_count, list(inputs), device=self.device, record_cmd=True)
+
+        self._act = record(act, border, rules, rig)
+        self._scan = record(scan, rig, state.numbers, state.is_all, state.ranges_m)
+        self._judge = record(judge, border, rules, rig, state, start)
+        self._prepare = record(prepare, border, rules, state, start)
+        self._place = record(place, border, rig, state, start)
+        self._show = record(show, border, rules, rig, state, start)
+
+
+def _layout(settings: NavigateSettings) -> Layout:
+    has_rays = settings.observation == "rays"
+    size = settings.image_size
+    return Layout(
+        "Navigate",
+        1,
+        (*OWN_ELEMENTS, *GOAL_ELEMENTS, *(RANGE_ELEMENTS if has_rays else ())),
+        continuous=ACTIONS,
+        stack=settings.stack or (2 if has_rays else 1),
+        image=None if has_rays else ImageElement(size, size, DEPTH_CHANNELS),
+    )

@@ -1,0 +1,23 @@
+"""Navigate's settings: what the policy sees the forest with, and what a quick training may leave out."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from policies.tasks.task import TaskSettings
+
+NavigatePreset = Literal["improved"]
+Observation = Literal["rays", "depth"]
+
+
+class NavigateSettings(TaskSettings):
+    """What a user may choose of Navigate."""
+
+    preset: NavigatePreset = "improved"  # type: ignore[assignment]
+    """`improved`: ours, the only one; no document describes this task."""
+    observation: Observation = "rays"
+    """`rays`: what is nearest in each direction, as a scanning rangefinder tells; `depth`: a depth camera's image."""
+    has_estimator: bool = True
+    """Whether the flight controller flies on its estimate; if not, on the truth: quicker, in training only."""
+    image_size: int = Field(default=64, ge=8, le=256)
+    """Width and height of the depth image [pixels]."""
