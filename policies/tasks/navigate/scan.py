@@ -54,9 +54,7 @@ def slice_radius(tree: Tree, height: float) -> float:
 
 
 @wp.func
-def add_tree(
-    tree: Tree, pos_ned: wp.vec3, heading: float, ranges_m: wp.array2d(dtype=float), i: int
-) -> None:
+def add_tree(tree: Tree, pos_ned: wp.vec3, heading: float, ranges_m: wp.array2d(dtype=float), i: int) -> None:
     """Shortens the ranges of the sectors that a tree reaches into: exactly, the nearest of all returns in each."""
     north = tree.north - pos_ned[0]
     east = tree.east - pos_ned[1]
@@ -85,9 +83,7 @@ def add_tree(
 
 
 @wp.func
-def add_forest(
-    forest: Forest, pos_ned: wp.vec3, heading: float, ranges_m: wp.array2d(dtype=float), i: int
-) -> None:
+def add_forest(forest: Forest, pos_ned: wp.vec3, heading: float, ranges_m: wp.array2d(dtype=float), i: int) -> None:
     """All trees that can be in range, each once: where its bucket is that of its axis."""
     reach = RANGE_M + 4.0  # crowns reach towards us
     row_low = bucket_of(forest, pos_ned[0] - reach)
