@@ -27,6 +27,7 @@ configurations set or randomise the numbers by name under `environment_parameter
 | [Parking1](#parking1) | park a car between three blocks: [parking.md](parking.md) |
 | [Parking2](#parking2) | park a car on one of two storeys, past moving obstacles: [parking.md](parking.md) |
 | [FollowMe](#followme) | follow a person who walks and runs through hills and trees, with a camera drone |
+| [Navigate](#navigate) | fly a drone through forest to a goal, at speed: [navigate.md](navigate.md) |
 | Hover | hold a drone at a point by body rates and thrust, on its estimate; in Gymnasium only |
 
 The linked pages say what the presets are made of, how rewards are paid, and which spots are held out for tests. Every
@@ -45,7 +46,7 @@ OUTCOMES = {
     Outcome.HIT_OBSTACLE: "ended at a block, a moving obstacle, a tree or, in flight, a wall or the ground",
     Outcome.FELL: "ended under the floor",
     Outcome.HIT_OTHER: "rolled over, struck an edge, or came too near a person",
-    Outcome.LOST: "lost whom it followed",
+    Outcome.LOST: "lost whom it followed, or left the forest upwards",
 }
 
 
@@ -68,7 +69,7 @@ def _section(name: str) -> str:
 
 def _presets(name: str) -> list[str]:
     """The presets that a task has."""
-    return list(CATALOGUE[name].settings.model_json_schema()["properties"]["preset"]["enum"])
+    return _choices_of(CATALOGUE[name].settings.model_json_schema()["properties"]["preset"])
 
 
 def _preset_table(presets: dict[str, Task]) -> str:
@@ -105,12 +106,17 @@ def _settings_table(name: str) -> str:
 def _values(schema: dict[str, Any]) -> str:
     """What a setting may have; an empty text and `auto` stand for the preset's choice."""
     kinds = schema.get("anyOf", [schema])
-    choices = [choice for kind in kinds for choice in kind.get("enum", []) if choice]
+    choices = [choice for kind in kinds for choice in _choices_of(kind) if choice not in {"", "auto"}]
     if choices:
         return ", ".join(choices)
     if schema.get("type") == "boolean":
         return "true, false"
     return f"{schema['minimum']} … {schema['maximum']}" if "minimum" in schema else "text"
+
+
+def _choices_of(schema: dict[str, Any]) -> list[Any]:
+    """What a literal may be; JSON Schema calls a single choice otherwise."""
+    return [schema["const"]] if "const" in schema else list(schema.get("enum", []))
 
 
 def _one_line(text: str) -> str:
