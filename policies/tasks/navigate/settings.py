@@ -13,7 +13,7 @@ Observation = Literal["rays", "depth"]
 class NavigateSettings(TaskSettings):
     """What a user may choose of Navigate."""
 
-    preset: NavigatePreset = "improved"  # type: ignore[assignment]
+    preset: NavigatePreset = "improved"
     """`improved`: ours, the only one; no document describes this task."""
     observation: Observation = "rays"
     """`rays`: what is nearest in each direction, as a scanning rangefinder tells; `depth`: a depth camera's image."""
