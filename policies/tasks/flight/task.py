@@ -47,7 +47,7 @@ class FlightTask(Task):
         super().__init__(layout, env_count, number_defaults=number_defaults, device=device)
         self.worlds = WorldBatch(world, env_count, device, trees_per_ha_max=trees_per_ha_max)
         self.rig: Rig = build_rig(
-            self.worlds, env_count, has_estimator=has_estimator, threads=worker_count(), device=device
+            self.worlds, env_count, has_estimator=has_estimator, threads=worker_count(device), device=device
         )
         self.world_seeds = self._zeros("world_seeds", env_count, int)
         self.noise_seeds = self._zeros("noise_seeds", env_count, int)
@@ -79,9 +79,9 @@ class FlightTask(Task):
         self.worlds.grow(everyone, self.world_seeds)
 
 
-def worker_count() -> int:
-    """One thread per core that this process may use; results do not depend on it."""
-    return len(os.sched_getaffinity(0))
+def worker_count(device: str) -> int:
+    """One thread per core that this process may use, of a GPU one; results do not depend on it."""
+    return len(os.sched_getaffinity(0)) if device == "cpu" else 1
 
 
 def _makes(rig: Rig) -> Makes:
