@@ -26,7 +26,7 @@ configurations set or randomise the numbers by name under `environment_parameter
 | [ReachTarget](#reachtarget) | drive a car with four driven wheels to a target: [reach-target.md](reach-target.md) |
 | [Parking1](#parking1) | park a car between three blocks: [parking.md](parking.md) |
 | [Parking2](#parking2) | park a car on one of two storeys, past moving obstacles: [parking.md](parking.md) |
-| [FollowMe](#followme) | follow a person who walks and runs through hills and trees, with a camera drone |
+| [FollowMe](#followme) | a drone follows a person through hills and trees: [follow-me.md](follow-me.md) |
 | [Navigate](#navigate) | fly a drone through forest to a goal, at speed: [navigate.md](navigate.md) |
 | Hover | hold a drone at a point by body rates and thrust, on its estimate; in Gymnasium only |
 
