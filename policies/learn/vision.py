@@ -57,7 +57,9 @@ class ImageEncoder(nn.Module):
 
     def forward(self, images: Tensor) -> Tensor:
         """Of bytes (..., height, width, channels), shape (..., features)."""
-        rows = images.flatten(0, -4).permute(0, 3, 1, 2) * (1.0 / 255.0)
+        rows = (
+            images.flatten(0, -4).permute(0, 3, 1, 2).float().mul_(1.0 / 255.0)
+        )  # one product takes three times as long
         features: Tensor = self.layers(rows)
         return features.view(*images.shape[:-3], -1)
 
