@@ -29,6 +29,7 @@ SCRIPTS = (
     "environments",
     "training",
     "sac",
+    "companion",
     "startup",
 )
 RESULTS = Path(__file__).parent / "results.json"

@@ -76,6 +76,12 @@ def fly(
     view: Annotated[bool, typer.Option("--view", help="Show the flight on a live page in the browser.")] = False,
     view_port: Annotated[int, typer.Option(min=1, max=65535, help="HTTP port of the live page.")] = 8080,
     traffic: Annotated[int, typer.Option(min=0, max=50, help="Other aircraft that are heard by ADS-B.")] = 0,
+    owner: Annotated[
+        str | None, typer.Option(help="Somebody with a phone walks through the world: walk or run; see companion.")
+    ] = None,
+    image_port: Annotated[
+        int, typer.Option(min=1, max=65535, help="TCP port of the pictures for a companion, with an owner.")
+    ] = 14600,
     lidar: Annotated[bool, typer.Option("--lidar", help="Carry a ring of range finders that looks round.")] = False,
     param: Annotated[
         list[str] | None, typer.Option(help="Sets a parameter of the flight controller: NAME=VALUE. Repeatable.")
@@ -98,6 +104,7 @@ def fly(
                 tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
                 run_folder=run_folder, stream_port=stream_port, parameters=tuple(param or ()), state=state,
                 traffic_count=traffic, has_lidar=lidar, has_view=view, view_port=view_port,
+                owner=owner, image_port=image_port,
             )
         )  # fmt: skip
     except UserError as error:

@@ -8,6 +8,7 @@ from autopilot.mavlink.tcp import TcpPort
 from autopilot.mavlink.udp import SILENCE_US, UdpPort, address_towards
 from common.clock import wall_unix_us
 from common.state_folder import StateFolder
+from mission.follow.image_server import ImageServer
 from mission.options import FlightOptions, UserError
 from mission.stream import StreamServer
 
@@ -77,6 +78,16 @@ def open_stream(port: int) -> StreamServer | None:
         return StreamServer(port)
     except OSError as error:
         raise UserError(f"--stream-port {port}: {error.strerror}") from error
+
+
+def open_images(options: FlightOptions) -> ImageServer | None:
+    """The onboard camera's pictures for a companion computer, if somebody is to be followed."""
+    if options.owner is None:
+        return None
+    try:
+        return ImageServer(options.image_port)
+    except LinkError as error:
+        raise UserError(f"--image-port {options.image_port}: {error}") from error
 
 
 def open_page(port: int) -> "viser.ViserServer":

@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast, get_args
 
 from pydantic import ValidationError
 
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.state_folder import StateFolder
 from mission.flight import FlightConfig
+from mission.follow.owner import FOLLOW_WORLD, OwnerConfig, Pace
 from mission.state import stored_home
 from sim.world.world import WorldConfig
 
@@ -52,6 +54,8 @@ class FlightOptions:
     state: Path | None = None
     traffic_count: int = 0
     has_lidar: bool = False
+    owner: str | None = None  # walk or run
+    image_port: int = 14600
 
 
 def speed_of(text: str) -> float | None:
@@ -73,6 +77,8 @@ def check_end(options: FlightOptions, speed: float | None) -> None:
         raise UserError("--plan and --idle: choose one, to fly a plan or to wait for a ground station")
     if options.is_idle and options.once:
         raise UserError("--idle and --once: without a plan there is no mission to end with; use --seconds to end")
+    if options.owner not in (None, *get_args(Pace)):
+        raise UserError(f"--owner {options.owner}: must be walk or run")
     if options.is_idle and speed is None and options.seconds is None:
         raise UserError("--idle --speed max: nobody can connect, so give --seconds to say when it ends")
 
@@ -92,16 +98,20 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
             traffic_count=options.traffic_count,
             has_lidar=options.has_lidar,
             parameters=dict(_parameter(text) for text in options.parameters),
-            world=WorldConfig(
-                seed=options.world_seed,
-                trees_per_ha=options.trees_per_ha,
-                hill_height_m=options.hill_height_m,
-                has_walls=options.has_walls,
-            ),
+            owner=None if options.owner is None else OwnerConfig(pace=cast(Pace, options.owner)),
+            world=_world(options),
         )
     except ValidationError as error:
         first = error.errors()[0]
         raise UserError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def _world(options: FlightOptions) -> WorldConfig:
+    """With an owner the world of training: its hills can be walked."""
+    given: dict[str, Any] = {"seed": options.world_seed, "trees_per_ha": options.trees_per_ha}
+    if options.owner is not None:
+        return FOLLOW_WORLD.model_copy(update=given)
+    return WorldConfig(**given, hill_height_m=options.hill_height_m, has_walls=options.has_walls)
 
 
 def _parameter(text: str) -> tuple[str, float]:

@@ -18,7 +18,7 @@ from common.geodesy import GeoPoint
 from common.params import ParameterError
 from common.state_folder import StateFolder
 from mission.client import Running
-from mission.connections import open_links, open_page, open_stream, signing_config
+from mission.connections import open_images, open_links, open_page, open_stream, signing_config
 from mission.flight import Flight, flight_parameters
 from mission.options import FlightOptions, UserError, check_end, flight_config, speed_of
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
@@ -62,6 +62,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     signing = signing_config(options, speed, state)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
+    images = open_images(options)
     page = open_page(options.view_port) if options.has_view else None
     folder = new_folder(options.run_folder)
     if state is not None and options.home is not None:
@@ -76,6 +77,9 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
             stream=stream,
             has_camera_thread=speed is not None,
         )
+    if images is not None and flight.onboard is not None:
+        flight.onboard.add_sink(images.publish)
+        flight.computers.append(images)
     if state is not None:
         for problem in (*state.problems, *(flight.persistence.problems if flight.persistence else ())):
             print_line(console, problem)
@@ -93,6 +97,8 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     advance(flight, _end(options, speed, running), speed, watchers, Progress(flight, running), console)
     if page is not None:
         view.close()
+    if images is not None:
+        images.close()
     recorder.recording().save(folder)
     return _finish(flight, running, plan, path_ned, folder, console)
 
@@ -194,6 +200,8 @@ def _print_start(options: FlightOptions, speed: float | None, folder: Path, cons
         ports += f", TCP {options.tcp_port}"
     where = "lockstep, without network links" if speed is None else ports
     print_line(console, f"flying: {where}; logs in {folder}")
+    if options.owner is not None:
+        print_line(console, f"pictures for a companion: tcp://{LOOPBACK}:{options.image_port}")
     if options.stream_port:
         print_line(console, f"the camera's picture: http://{LOOPBACK}:{options.stream_port}/")
     if options.has_view:

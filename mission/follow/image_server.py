@@ -31,7 +31,7 @@ class ImageServer:
         self.url = f"tcp://{host}:{self.port}"
         self._clients: dict[socket.socket, bytes] = {}  # and what is left of the last picture
 
-    def poll(self) -> None:
+    def frame(self, time_us: int) -> None:  # noqa: ARG002  (whatever is on board is given the time)
         """Lets clients in and goes on with what they have not taken yet."""
         with suppress(BlockingIOError):
             while True:

@@ -4,7 +4,7 @@ In: what the flight is made from, and who flies. Out: the flight, ready to be ad
 over a link in memory and gets the camera's pictures from memory, and is otherwise the one that flies as a process.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from autopilot.mavlink.links import Link, LinkRole, LinkSource, memory_pair
@@ -23,6 +23,7 @@ def flight_with_companion(
     is_told: bool = True,
     links: Sequence[Link | LinkSource] = (),
     folder: Path | None = None,
+    wall_s: Callable[[], float] | None = None,
 ) -> tuple[Flight, Companion]:
     """A flight, and the companion on board, which engages as soon as the vehicle hovers.
 
@@ -32,6 +33,7 @@ def flight_with_companion(
         is_told: False: it waits for the pilot to choose Offboard.
         links: of ground stations.
         folder: of the logs.
+        wall_s: a clock that the companion's latency is measured with.
     """
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
     flight = Flight(config, links=[vehicle_end, *links], folder=folder)
@@ -39,7 +41,7 @@ def flight_with_companion(
         raise ValueError("a companion needs a flight with an owner")
     camera = MemoryCamera()
     flight.onboard.add_sink(camera.publish)
-    companion = Companion(companion_end, camera, pilot, is_told=is_told)
+    companion = Companion(companion_end, camera, pilot, is_told=is_told, wall_s=wall_s)
     flight.computers.append(companion)
     return flight, companion
 

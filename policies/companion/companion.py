@@ -177,11 +177,10 @@ class Companion:
             return "no heartbeat of the vehicle"
         if time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
             return "no attitude or position from the vehicle"
-        if self._picture is None or time_us - self._picture_us > IMAGE_OLD_US:
-            return "no pictures"
-        if own.boot_us - self._picture.time_us > IMAGE_OLD_US:
-            return "pictures come too late"
-        if self._picture.pixels.shape != self._pilot.image_shape:
+        picture = self._picture
+        if picture is None or max(time_us - self._picture_us, own.boot_us - picture.time_us) > IMAGE_OLD_US:
+            return "no new pictures"  # none came in, or what came in was old
+        if picture.pixels.shape != self._pilot.image_shape:
             return "pictures of another size"
         if self._watch.silence_s(own.boot_us) > OWNER_LOST_S:
             return "owner lost"

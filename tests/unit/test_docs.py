@@ -29,6 +29,7 @@ RUN_BY_OTHERS = (
     f"{HONEYGUIDE} picture ",  # tests/unit/mission/test_picture.py
     *(f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")),  # tests/unit/mission/test_task_commands.py
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
+    f"{HONEYGUIDE} companion ",  # tests/system/test_companion.py
     *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/training
 )
 
@@ -156,6 +157,7 @@ SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options ar
     "fly": ("docs/flying.md", "Options"),
     "follow": ("docs/follow.md", "Options of follow"),
     "replay": ("docs/flying.md", "Looking at a run again"),
+    "companion": ("docs/companion.md", "The companion computer"),
     "play": ("docs/demonstrations.md", "Watch"),
     "drive": ("docs/demonstrations.md", "Drive"),
     "demonstrate": ("docs/demonstrations.md", "Record"),
@@ -167,7 +169,7 @@ def test_options_are_all_described(name):
     page, heading = SECTIONS_OF_COMMANDS[name]
     text = PAGES[page].read_text(encoding="utf-8")
     if heading:
-        text = text.partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
+        text = text.partition(f"# {heading}\n")[2].partition("\n## ")[0]
     described = set(re.findall(r"^\| `(--[\w-]+)", text, re.MULTILINE))
     command = next(command for command in app.registered_commands if command.callback.__name__ == name)
     options = {

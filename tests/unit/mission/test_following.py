@@ -110,7 +110,7 @@ def test_pictures_that_stop_end_in_hold_within_the_stated_time():
     assert flight.controller.state.mode is Mode.HOLD
     assert flight.time_us - stopped_us <= IMAGE_OLD_US + 200_000
     advance(flight, 0.2)
-    assert any("hold: no pictures" in text for text in flight.drone.texts)
+    assert any("hold: no new pictures" in text for text in flight.drone.texts)
     assert companion.phase is Phase.RELEASED
 
 

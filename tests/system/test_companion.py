@@ -1,0 +1,157 @@
+"""A companion as a process of its own: MAVLink over UDP, pictures over TCP, real time."""
+
+import subprocess
+import time
+from math import atan2, dist, hypot
+
+import numpy as np
+import pytest
+
+from autopilot.mavlink.links import LinkRole
+from autopilot.mavlink.udp import UdpPort
+from autopilot.vehicle import Mode
+from common.attitude import wrapped, yaw_of
+from mission.flight import Flight
+from mission.follow.image_server import ImageServer
+from mission.follow.lockstep import take_off
+from policies.tasks.follow_me.scorecard import scorecard
+from policies.tasks.follow_me.track import Track
+from tests.system.vehicle import HONEYGUIDE, ROOT, free_ports
+from tests.unit.mission.follow_flight import config
+
+SECONDS = 60.0
+SAMPLE_FRAMES = 5
+STARTED_S = 60.0  # wall clock: torch has to be imported
+NOBODY_PORT = 9  # discard: the vehicle's first client is not there
+
+
+class Scene:
+    """A flight in this process, in real time, and a companion in another."""
+
+    def __init__(self, folder, seed=3, pace="walk"):
+        port = free_ports()[1]
+        self.images = ImageServer(0)
+        self.flight = Flight(
+            config(pace, seed), links=[UdpPort(NOBODY_PORT, LinkRole.ONBOARD, local_port=port)], folder=folder
+        )
+        self.flight.onboard.add_sink(self.images.publish)
+        self.flight.computers.append(self.images)
+        self._output = (folder / "companion.txt").open("w+")
+        command = [HONEYGUIDE, "companion", "--policy", "scripted", "--engage"]
+        command += ["--link", f"udpout://127.0.0.1:{port}", "--camera", self.images.url]
+        self.companion = subprocess.Popen(command, stdout=self._output, stderr=subprocess.STDOUT, cwd=ROOT)
+
+    @property
+    def mode(self):
+        return self.flight.controller.state.mode
+
+    def wait_for(self, is_enough, seconds):
+        """Flies on in real time until it is enough."""
+        end_us = self.flight.time_us + round(seconds * 1e6)
+        self.flight.run(lambda f: is_enough() or f.time_us >= end_us, speed=1.0)
+        assert is_enough(), (self.mode, self.flight.drone.texts, self.said())
+
+    def engaged(self):
+        """Up, and followed by the companion."""
+        drone = self.flight.drone
+        self.wait_for(lambda: any("ready to follow" in text for text in drone.texts), STARTED_S)
+        running = drone.start(take_off(drone))
+        self.wait_for(lambda: running.is_done and self.mode is Mode.OFFBOARD, 40.0)
+        return self
+
+    def said(self):
+        self._output.seek(0)
+        return self._output.read()
+
+    def close(self):
+        if self.companion.poll() is None:
+            self.companion.terminate()
+        self.companion.wait(20.0)
+        self.images.close()
+        self.flight.close()
+        self._output.close()
+
+
+@pytest.fixture
+def scene(tmp_path):
+    scene = Scene(tmp_path)
+    yield scene
+    scene.close()
+
+
+def sample(flight):
+    """Distance, bearing, in view, collided: the truth of this moment."""
+    body, chest = flight.rig.arrays.body.numpy()[0], flight.owner.chest_ned
+    pos = tuple(map(float, body["pos_ned"]))
+    bearing = atan2(chest[1] - pos[1], chest[0] - pos[0]) - yaw_of(body["q_ned_from_frd"].astype(float))
+    has_touched = bool(body["is_on_ground"]) or bool(body["is_crashed"])
+    return dist(pos, chest), wrapped(bearing), flight.onboard.is_owner_in_view, has_touched
+
+
+def flown_track(scene, seconds):
+    rows = []
+    start_us = scene.flight.time_us
+
+    def is_over(flight):
+        if flight.time_us > start_us and (flight.time_us - start_us) % (SAMPLE_FRAMES * 20_000) == 0:
+            rows.append(sample(flight))
+        return scene.mode is not Mode.OFFBOARD or flight.time_us >= start_us + seconds * 1e6
+
+    scene.flight.run(is_over, speed=1.0)
+    distance, bearing, in_view, collided = (np.array(column) for column in zip(*rows, strict=True))
+    times = 0.1 * np.arange(1, len(rows) + 1)
+    return Track(times, distance, bearing, in_view.astype(bool), collided.astype(bool), seconds)
+
+
+@pytest.mark.slow
+def test_a_minute_of_following_over_udp_meets_the_scorecard(scene):
+    scene.engaged()
+    card = scorecard([flown_track(scene, SECONDS)])
+    assert card.minutes == pytest.approx(SECONDS / 60.0, abs=0.02), (scene.flight.drone.texts, scene.said())
+    assert card.in_band.value > 0.9
+    assert card.tracking.value > 0.9
+    assert card.in_view.value > 0.9
+    assert card.collision.value == 0.0
+
+
+def test_a_companion_that_dies_leaves_the_vehicle_in_hold(scene):
+    scene.engaged()
+    scene.companion.kill()
+    scene.wait_for(lambda: scene.mode is Mode.HOLD, 5.0)
+    speed_m_s = hypot(*map(float, scene.flight.rig.arrays.body.numpy()[0]["vel_ned"]))
+    assert speed_m_s < 5.0
+
+
+def test_pictures_that_end_hand_control_back(scene):
+    scene.engaged()
+    scene.images.close()
+    ended_us = scene.flight.time_us
+    scene.flight.onboard._sinks.clear()
+    scene.flight.computers.clear()
+    scene.wait_for(lambda: scene.mode is Mode.HOLD, 5.0)
+    assert scene.flight.time_us - ended_us < 1_500_000
+    scene.wait_for(lambda: any("hold: no new pictures" in text for text in scene.flight.drone.texts), 1.0)
+
+
+def test_the_command_line_serves_an_owner_and_a_companion_follows(tmp_path):
+    gcs_port, api_port = free_ports()
+    image_port = gcs_port + 2
+    fly = [HONEYGUIDE, "fly", "--idle", "--owner", "walk", "--gcs-port", gcs_port, "--api-port", api_port]
+    fly += ["--image-port", image_port, "--run-folder", tmp_path / "run"]
+    follow = [HONEYGUIDE, "companion", "--policy", "scripted", "--link", f"udpout://127.0.0.1:{api_port + 40}"]
+    follow += ["--camera", f"tcp://127.0.0.1:{image_port}"]
+    with (tmp_path / "fly.txt").open("w") as fly_out, (tmp_path / "companion.txt").open("w") as out:
+        vehicle = subprocess.Popen([str(word) for word in fly], stdout=fly_out, stderr=subprocess.STDOUT, cwd=ROOT)
+        companion = subprocess.Popen([str(word) for word in follow], stdout=out, stderr=subprocess.STDOUT, cwd=ROOT)
+        deadline = time.monotonic() + 2.0 * STARTED_S
+        try:
+            while "ready" not in (tmp_path / "companion.txt").read_text() and time.monotonic() < deadline:
+                time.sleep(0.2)
+        finally:
+            companion.terminate()
+            vehicle.terminate()
+            companion.wait(20.0)
+            vehicle.wait(30.0)
+    said = (tmp_path / "companion.txt").read_text()
+    assert "ready" in said, (said, (tmp_path / "fly.txt").read_text())
+    assert f"tcp://127.0.0.1:{image_port}" in (tmp_path / "fly.txt").read_text()
