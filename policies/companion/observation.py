@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from common.attitude import Vector, rotated
 from policies.companion.vehicle_link import Own, Owner
 from policies.tasks.flight.own import Command, OwnState, command_rows
-from policies.tasks.follow_me.observe import OwnerReport, observe_rows, vector_elements
+from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, observe_rows, vector_elements
 
 HEIGHT_OLD_US = 500_000  # a range measured longer ago tells nothing of the ground below
 REPORT_LAG_S = 0.3  # of a phone's position when it arrives; guess: phones do not say, their clock is not ours
-REPORT_OLD_S = 5.0  # an older report tells nothing
 
 Floats = NDArray[np.float32]
 

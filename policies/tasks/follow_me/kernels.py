@@ -35,7 +35,7 @@ from policies.tasks.flight.vehicle import (
     velocity_setpoint,
 )
 from policies.tasks.follow_me.numbers import FollowNumbers
-from policies.tasks.follow_me.observe import OwnerReport, document_action, write_vector
+from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, document_action, write_vector
 from policies.tasks.follow_me.privileged import write_privileged
 from policies.tasks.follow_me.reward import document_reward, follow_outcome, follow_reward, is_in_band
 from policies.tasks.follow_me.sight import Sight, lens_of, see
@@ -50,7 +50,6 @@ wp.set_module_options({"enable_backward": False})
 _STEP_S = wp.constant(PERSON_DT_S)
 _STEP_TICKS = wp.constant(PERSON_TICKS)
 _TICKS_PER_S = wp.constant(1.0 / TICK_S)
-_REPORT_OLD_S = wp.constant(5.0)  # an older report tells nothing
 _PRIVILEGED = wp.constant(-1)
 _DISTANCE_STREAM = wp.constant(6)
 _BEARING_STREAM = wp.constant(7)
@@ -164,7 +163,7 @@ def owner_report(phone: PhoneState, tick: int) -> OwnerReport:
     """What the phone's newest report tells at a tick."""
     report = OwnerReport()
     age_s = float(wp.int64(tick) * wp.int64(TICK_US) - phone.fix.time_us) * 1.0e-6
-    if phone.fix.is_known == 1 and age_s < _REPORT_OLD_S:
+    if phone.fix.is_known == 1 and age_s < REPORT_OLD_S:
         report.pos_ned = phone.fix.pos_ned
         report.vel_ned = phone.fix.vel_ned
         report.age_s = age_s

@@ -40,7 +40,7 @@ DOCUMENT_YAW_RATE_RAD_S = wp.constant(1.0)  # unpublished; guess
 
 _PLACE_SCALE = wp.constant(5.0)  # [m]
 _PLACE_MAX = wp.constant(4.0)  # an owner reported farther than this many scales away is shown at that distance
-_AGE_MAX_S = wp.constant(5.0)  # a report is not carried on for longer
+REPORT_OLD_S = wp.constant(5.0)  # a report older than this tells nothing; guess
 DEPTH_HALF_M = wp.constant(4.0)  # this far away the depth channel is at half of its range
 _SKY_M = wp.constant(1000.0)  # depths from here on are the sky's
 
@@ -93,7 +93,7 @@ def _write_owner(own: OwnState, report: OwnerReport, out: wp.array2d(dtype=float
         out[i, at + k] = 0.0
     if report.is_known == 1:
         yaw = yaw_from_quat(own.q_ned_from_frd)
-        age_s = wp.clamp(report.age_s, 0.0, _AGE_MAX_S)
+        age_s = wp.clamp(report.age_s, 0.0, REPORT_OLD_S)
         place = level_from_ned(report.pos_ned + age_s * report.vel_ned - own.pos_ned, yaw) / _PLACE_SCALE
         far = wp.length(place)
         if far > _PLACE_MAX:
