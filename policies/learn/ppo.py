@@ -207,6 +207,7 @@ class Ppo:
         """One gradient step; size of policy loss, value loss, entropy, shape (3,), and how far the policy had moved."""
         features = self._features(self.policy.body, batch)
         distribution = self.policy.heads(features)
+        believed = self._beliefs_loss(features, batch)
         if not self.hyperparameters.shared_critic:
             features = self._features(self.critic.body, batch)
         log_probs, old_log_probs = distribution.log_probs(batch.actions), batch.log_probs
@@ -218,7 +219,7 @@ class Ppo:
         policy_loss = losses.policy_loss(log_probs, old_log_probs, weights, epsilon)
         value_loss = losses.value_loss(self.critic.heads(features), batch.values, batch.returns, epsilon)
         entropy = distribution.entropy().mean()
-        loss = policy_loss + 0.5 * value_loss - beta * entropy
+        loss = policy_loss + 0.5 * value_loss - beta * entropy + self.hyperparameters.perception_strength * believed
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         if self.hyperparameters.max_grad_norm is not None:
@@ -226,6 +227,11 @@ class Ppo:
         self.optimizer.step()
         with torch.no_grad():
             return torch.stack((policy_loss.abs(), value_loss, entropy)), losses.divergence(log_probs, old_log_probs)
+
+    def _beliefs_loss(self, features: Tensor, batch: Batch) -> Tensor | float:
+        """Of a policy that says what it believes: else its beliefs would go astray as its features change."""
+        perception, privileged = self.policy.perception, batch.seen.privileged
+        return perception.loss(features, privileged) if perception is not None and privileged is not None else 0.0
 
     def _features(self, body: Body, batch: Batch) -> Tensor:
         """Of a minibatch, flat, shape (B, features)."""

@@ -70,6 +70,8 @@ class PpoHyperparameters(HyperparametersBase):
     """Whether actor and critic share one body."""
     privileged_critic: bool = own_key(False)
     """Whether the critic sees the task's privileged elements in place of its image; the policy never does."""
+    perception_strength: NotNegative = own_key(0.1)
+    """Weight of the beliefs that `network_settings` names, if it names any."""
     target_kl: PositiveOrNone = own_key(None)
     """An update ends early when the policy has moved this far (mean KL); none: never."""
     normalize_returns: bool = own_key(False)

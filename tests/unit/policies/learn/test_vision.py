@@ -169,6 +169,17 @@ def test_a_timeout_is_valued_by_the_image_its_episode_saw_last():
             assert torch.equal(rollout.next_seen(t).image[:, 0, 0, 2] == 4, rollout.is_over[t])
 
 
+@pytest.mark.parametrize("memory", [None, MEMORY], ids=["feed-forward", "recurrent"])
+def test_ppo_goes_on_teaching_what_a_policy_believes(memory):
+    network = {"perceives": ("place",), "memory": memory}
+    ppo, still = (learner(network=network, perception_strength=strength) for strength in (0.1, 0.0))
+    before = ppo.policy.perception.layer.weight.detach().clone()
+    ppo.iterate()
+    still.iterate()
+    assert not torch.equal(ppo.policy.perception.layer.weight, before)
+    assert torch.equal(still.policy.perception.layer.weight, before)
+
+
 def distance(ppo):
     """Mean cost of the most probable action, on squares that were not trained on."""
     task = ppo.task
