@@ -105,24 +105,46 @@ def is_in_solid(solid: Solid) -> bool:
 
 @wp.func
 def ball_span(across: float, depth: float, radius: float) -> wp.vec2:
-    """First and last x (or y) of a ball in the picture, as x = across / depth; everything if it reaches the lens."""
-    spare = depth * depth - radius * radius
-    if depth <= radius or spare < 1.0e-4:
-        return wp.vec2(-NEVER, NEVER)
-    half = radius * wp.sqrt(wp.max(across * across + spare, 0.0))
-    return wp.vec2((across * depth - half) / spare, (across * depth + half) / spare)
+    """First and last x (or y) of a ball in the picture, as x = across / depth; first after last if it is behind."""
+    if depth < -0.99 * radius:  # an end that was moved: the capsule goes on to the side from here
+        return wp.vec2(wp.where(across < radius, -NEVER, NEVER), wp.where(across > -radius, NEVER, -NEVER))
+    tangent_squared = across * across + depth * depth - radius * radius
+    if tangent_squared <= 1.0e-6:
+        return wp.vec2(-NEVER, NEVER)  # the lens is in it, seen along the other axis
+    tangent = wp.sqrt(tangent_squared)
+    # the two tangents from the lens; one that points backwards leaves that side open, or all of it unseen
+    low = across * tangent - depth * radius
+    low_depth = depth * tangent + across * radius
+    high = across * tangent + depth * radius
+    high_depth = depth * tangent - across * radius
+    first = wp.where(low < 0.0, -NEVER, NEVER)
+    last = wp.where(high > 0.0, NEVER, -NEVER)
+    if low_depth > 1.0e-6:
+        first = low / low_depth
+    if high_depth > 1.0e-6:
+        last = high / high_depth
+    return wp.vec2(first, last)
+
+
+@wp.func
+def in_front(point: wp.vec3, other: wp.vec3, radius: float) -> wp.vec3:
+    """An end of an axis, moved along it to where the capsule comes into the half space in front of the lens."""
+    if point[2] >= -radius or other[2] <= -radius:
+        return point
+    return point + ((-radius - point[2]) / (other[2] - point[2])) * (other - point)
 
 
 @wp.func
 def solid_box(solid: Solid, per_pixel: float, width: int, height: int) -> wp.vec4i:
     """First and last column and row that the capsule can cover; last before first if none."""
-    tip = solid.foot + solid.length * solid.axis
-    nothing = wp.vec4i(0, -1, 0, -1)
-    if wp.max(solid.foot[2], tip[2]) + solid.radius <= 0.0:
-        return nothing
-    x_foot = ball_span(solid.foot[0], solid.foot[2], solid.radius)
+    end = solid.foot + solid.length * solid.axis
+    if wp.max(solid.foot[2], end[2]) + solid.radius <= 0.0:
+        return wp.vec4i(0, -1, 0, -1)
+    foot = in_front(solid.foot, end, solid.radius)
+    tip = in_front(end, solid.foot, solid.radius)
+    x_foot = ball_span(foot[0], foot[2], solid.radius)
     x_tip = ball_span(tip[0], tip[2], solid.radius)
-    y_foot = ball_span(solid.foot[1], solid.foot[2], solid.radius)
+    y_foot = ball_span(foot[1], foot[2], solid.radius)
     y_tip = ball_span(tip[1], tip[2], solid.radius)
     x0 = first_pixel(wp.min(x_foot[0], x_tip[0]), per_pixel, width)
     x1 = first_pixel(wp.max(x_foot[1], x_tip[1]), per_pixel, width) - 1
