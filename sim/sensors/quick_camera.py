@@ -19,7 +19,7 @@ from sim.sensors.quick.prepare import prepare_views
 from sim.sensors.quick.rows import Outputs, draw_rows
 from sim.sensors.quick.solids import Sights, Solid
 from sim.sensors.quick.view import View
-from sim.world.trees import BUCKET_M
+from sim.world.trees import BUCKET_M, CROWN_RADIUS_SHARE
 from sim.world.world import World, WorldConfig, WorldMap
 
 RANGE_M = 80.0
@@ -100,7 +100,7 @@ class QuickCamera:
         outputs.width, outputs.height = width, height
         views = wp.zeros(count, dtype=View, device=device)
         columns = _columns(count, width, range_m, device)
-        sights = _sights(count, _solids_room(config, range_m), device)
+        sights = _sights(count, config, range_m, device)
         size, paints = wp.vec2i(width, height), make_paints(device)
         ground, chosen = self._ground, self._everyone
         seen = [self._worlds, self.i_world, self.lenses, people, chosen, ground, range_m, size, views, columns, sights]
@@ -149,9 +149,10 @@ def _columns(count: int, width: int, range_m: float, device: str) -> Any:
     return columns
 
 
-def _sights(count: int, room: int, device: str) -> Any:
+def _sights(count: int, config: WorldConfig, range_m: float, device: str) -> Any:
     sights = Sights()
-    sights.room = room
+    room = sights.room = _solids_room(config, range_m)
+    sights.crown_max_m = CROWN_RADIUS_SHARE[1] * config.tree_height_max_m
     sights.solids = wp.zeros(count * room, dtype=Solid, device=device)
     sights.boxes = wp.zeros(count * room, dtype=wp.vec4i, device=device)
     return sights

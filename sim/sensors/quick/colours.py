@@ -20,6 +20,7 @@ _SIDE = wp.constant(SIDE)
 _MASK = wp.constant(SIDE - 1)
 _PATCHES_PER_M = wp.constant(2.0)
 _DETAIL_PER_M = wp.constant(16.0)
+_BLEND_M = wp.constant(0.08)  # pixels finer than a texel
 _TONES = 256
 _LAST_CODE = wp.constant(4095)
 _CLOUD = wp.constant(wp.vec3(0.93, 0.94, 0.96))
@@ -55,6 +56,13 @@ def blended(table: wp.array[wp.uint8], x: float, y: float) -> float:
 
 
 @wp.func
+def nearest(table: wp.array[wp.uint8], x: float, y: float) -> float:
+    """A repeating table at its nearest texel, -1..1."""
+    texel = (int(wp.floor(x)) & _MASK) * _SIDE + (int(wp.floor(y)) & _MASK)
+    return float(table[texel]) * (1.0 / 128.0) - 1.0
+
+
+@wp.func
 def ground_colour(paints: Paints, north: float, east: float, sun: float, footprint_m: float) -> wp.vec3:
     """Light sent back by the ground.
 
@@ -66,7 +74,11 @@ def ground_colour(paints: Paints, north: float, east: float, sun: float, footpri
         footprint_m: width of a pixel there: detail finer than it is faded out.
     """
     fade = wp.clamp(1.2 - 2.0 * footprint_m, 0.12, 1.0)
-    detail = fade * blended(paints.detail, north * _DETAIL_PER_M, east * _DETAIL_PER_M)
+    detail = float(0.0)
+    if footprint_m < _BLEND_M:
+        detail = fade * blended(paints.detail, north * _DETAIL_PER_M, east * _DETAIL_PER_M)
+    else:
+        detail = fade * nearest(paints.detail, north * _DETAIL_PER_M, east * _DETAIL_PER_M)
     x = int(wp.floor(north * _PATCHES_PER_M + 0.9 * detail)) & _MASK
     y = int(wp.floor(east * _PATCHES_PER_M - 0.9 * detail)) & _MASK
     tone = int(float(paints.patches[x * _SIDE + y]) + 34.0 * detail)

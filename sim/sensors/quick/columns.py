@@ -15,6 +15,8 @@ from sim.sensors.quick.view import View, face_length, level_direction, pseudo_an
 wp.set_module_options(FAST)
 
 _NEWTON_STEPS = wp.constant(4)
+_STEP_M = wp.constant(0.02)  # the last step: exact on one triangle, and off by a share of itself where it leaves it
+_STEP_SHARE = wp.constant(0.004)
 _WALK_BACK = wp.constant(2)  # samples that a misled ray goes back
 _SECANT_STEPS = wp.constant(8)
 _STEEP = wp.constant(1.5)  # rays this much steeper than the first sample's need no column
@@ -36,6 +38,7 @@ class Found:
 
     t: float  # NEVER if it does not
     k: int  # sample at its end of the search: the next pixel's is near
+    height: float  # [m] of the ground met last: the next pixel's is like it
 
 
 @wp.struct
@@ -87,20 +90,21 @@ def lay_columns(ground: Ground, views: wp.array[View], is_chosen: wp.array[wp.bo
 
 @wp.func
 def ground_depth(
-    ground: Ground, columns: Columns, view: View, i_camera: int, ray: LevelRay, k_start: int, t_max: float
+    ground: Ground, columns: Columns, view: View, i_camera: int, ray: LevelRay, before: Found, t_max: float
 ) -> Found:
     """Where a ray meets the ground before `t_max`; NEVER if it does not, or surely only behind it."""
     found = Found()
-    found.k = k_start
+    found.k = before.k
+    found.height = before.height
     found.t = NEVER
     major = face_length(ray.ahead, ray.right)
     low = float(0.0)
     high = float(t_max)
-    t = view.above_ground / wp.max(-ray.climb, 1.0e-6)
+    t = wp.max(-view.pos_ned[2] - before.height, 0.0) / wp.max(-ray.climb, 1.0e-6)
     if ray.climb * view.first_m > -_STEEP * view.above_ground * major:
         inverse = 1.0 / major
         slope = ray.climb * inverse
-        place = (pseudo_angle(ray.ahead, ray.right) - view.angle_low) * view.columns_per_angle
+        place = (pseudo_angle(ray.ahead, ray.right, inverse) - view.angle_low) * view.columns_per_angle
         left = wp.clamp(int(place), 0, view.columns - 2)
         share = place - float(left)
         first = (i_camera * columns.room + left) * columns.samples
@@ -111,7 +115,7 @@ def ground_depth(
             return found
         if (share > 0.5 and slope <= skyline_right) or slope > skyline_left:
             first = first + columns.samples
-        k = wp.min(k_start, last)
+        k = wp.min(before.k, last)
         while k < last and columns.slopes[first + k] < slope:
             k = k + 1
         while k > 0 and columns.slopes[first + k - 1] >= slope:
@@ -129,7 +133,7 @@ def ground_depth(
             slope_near = columns.slopes[first + k - 1]
             part = (slope - slope_near) / wp.max(columns.slopes[first + k] - slope_near, 1.0e-6)
             t = near * far * inverse / wp.max(far + part * (near - far), 1.0e-6)
-        t = wp.clamp(t, low, high)
+    t = wp.clamp(t, low, high)
     u = (view.pos_ned[0] + ground.half_size_m) * ground.cells_per_m
     v = (view.pos_ned[1] + ground.half_size_m) * ground.cells_per_m
     for _ in range(_NEWTON_STEPS):
@@ -138,20 +142,22 @@ def ground_depth(
         rate = wp.min(ray.climb - here[1] * ray.u - here[2] * ray.v, -1.0e-4)
         step = -gap / rate
         t_next = wp.clamp(t + step, low, high)
-        if wp.abs(step) < 0.005 + 0.0005 * t:
+        if wp.abs(step) < _STEP_M + _STEP_SHARE * t:
             found.t = t_next
+            found.height = ray.climb * t_next - view.pos_ned[2]
             return found
         t = t_next
-    return walk(ground, columns, view, i_camera, ray, found.k, t_max)
+    return walk(ground, columns, view, i_camera, ray, found, t_max)
 
 
 @wp.func
 def walk(
-    ground: Ground, columns: Columns, view: View, i_camera: int, ray: LevelRay, k_start: int, t_max: float
+    ground: Ground, columns: Columns, view: View, i_camera: int, ray: LevelRay, before: Found, t_max: float
 ) -> Found:
     """Where a ray meets the ground: from sample to sample until it is under it, then by regula falsi."""
     found = Found()
-    found.k = k_start
+    found.k = before.k
+    found.height = before.height
     found.t = NEVER
     u = (view.pos_ned[0] + ground.half_size_m) * ground.cells_per_m
     v = (view.pos_ned[1] + ground.half_size_m) * ground.cells_per_m
@@ -159,7 +165,7 @@ def walk(
     first = i_camera * columns.samples
     low = float(0.0)
     gap_low = view.above_ground
-    k = wp.max(k_start - _WALK_BACK, 0)
+    k = wp.max(before.k - _WALK_BACK, 0)
     if k > 0:
         low = columns.distances[first + k - 1] * inverse
         gap_low = (

@@ -17,6 +17,7 @@ from sim.world.world import World, WorldConfig
 wp.set_module_options({"enable_backward": False})
 
 TEXEL_M = 1.0  # of the light's raster: shadows of crowns need no finer one
+_BLEND_M = wp.constant(0.5)
 _SHADOW_MAX_M = wp.constant(60.0)  # longest way of the sun's light from a crown to the ground
 
 
@@ -58,15 +59,20 @@ def surface(ground: Ground, base: int, u_map: float, v_map: float) -> wp.vec3:
 
 
 @wp.func
-def sunlight(ground: Ground, base: int, x: float, y: float) -> float:
-    """Cosine of the sun on the ground, 0 in a shadow, blended between four texels.
+def sunlight(ground: Ground, base: int, x: float, y: float, footprint_m: float) -> float:
+    """Cosine of the sun on the ground, 0 in a shadow; blended between four texels where a pixel is finer than they.
 
     Args:
         ground: all worlds.
         base: index of the world's first texel.
         x: place in texels from the south edge.
         y: in texels from the west edge.
+        footprint_m: width of a pixel there.
     """
+    if footprint_m > _BLEND_M:
+        last = ground.texels - 1
+        texel = wp.clamp(int(x), 0, last) * ground.texels + wp.clamp(int(y), 0, last)
+        return float(ground.light[base + texel]) * (1.0 / 255.0)
     edge = float(ground.texels) - 1.001
     u = wp.clamp(x - 0.5, 0.0, edge)
     v = wp.clamp(y - 0.5, 0.0, edge)

@@ -10,7 +10,7 @@ from sim.sensors.quick.columns import Columns
 from sim.sensors.quick.figure import list_person
 from sim.sensors.quick.ground import Ground, surface
 from sim.sensors.quick.solids import NEVER, Sights, list_forest
-from sim.sensors.quick.view import View, pseudo_angle
+from sim.sensors.quick.view import View, face_length, level_direction, pseudo_angle
 from sim.sensors.ray import SKY
 from sim.sensors.shading import SUN_NED
 from sim.world.people import Person
@@ -50,6 +50,12 @@ def with_axes(view: View, lens: Lens, width: int) -> View:
 
 
 @wp.func
+def level_ned(view: View, ahead: float, right: float) -> wp.vec2:
+    """North and east of a level direction that is counted from the heading."""
+    return wp.vec2(ahead * view.heading[0] - right * view.heading[1], ahead * view.heading[1] + right * view.heading[0])
+
+
+@wp.func
 def with_columns(view: View, width: int, height: int, room: int) -> View:
     """The camera with the range of level directions in its picture: all of them if straight up or down is in it."""
     half_x = 0.5 * float(width) * view.per_pixel
@@ -62,7 +68,7 @@ def with_columns(view: View, width: int, height: int, room: int) -> View:
         ray = view.ahead + x * view.right + y * view.down
         ahead = ray[0] * view.heading[0] + ray[1] * view.heading[1]
         right = ray[1] * view.heading[0] - ray[0] * view.heading[1]
-        angle = pseudo_angle(ahead, right)
+        angle = pseudo_angle(ahead, right, 1.0 / face_length(ahead, right))
         low = wp.min(low, angle)
         high = wp.max(high, angle)
     depth = wp.max(wp.abs(view.up_rdf[2]), 1.0e-6)  # where straight up or down is in the picture
@@ -70,6 +76,11 @@ def with_columns(view: View, width: int, height: int, room: int) -> View:
     if is_upright or high - low > 4.0:
         low = -4.0
         high = 4.0
+    else:
+        left_way = level_direction(low)
+        right_way = level_direction(high)
+        view.left_edge = wp.normalize(level_ned(view, -left_way[1], left_way[0]))
+        view.right_edge = wp.normalize(level_ned(view, right_way[1], -right_way[0]))
     view.angle_low = low
     view.columns = wp.clamp(int((high - low) / (2.0 * view.per_pixel)) + 2, 8, room)
     view.columns_per_angle = float(view.columns - 1) / wp.max(high - low, 1.0e-3)

@@ -119,7 +119,7 @@ def land_colour(paints: Paints, ground: Ground, view: View, north: float, east: 
     """Light sent back by the ground, with the pad at home."""
     per_m = ground.texels_per_m
     half = ground.half_size_m
-    sun = sunlight(ground, view.texel_base, (north + half) * per_m, (east + half) * per_m)
+    sun = sunlight(ground, view.texel_base, (north + half) * per_m, (east + half) * per_m, footprint_m)
     if north * north + east * east < 2.56:
         albedo = _PAD
         if landing_pad(north, east) > 0.5:
@@ -149,6 +149,7 @@ def draw_rows(
     middle = view.ahead + y * view.down
     per_range = 1.0 / (range_m * range_m)
     found = Found()
+    found.height = -view.pos_ned[2] - view.above_ground
     for column in range(outputs.width):
         x = (float(column) + 0.5 - 0.5 * float(outputs.width)) * view.per_pixel
         ray = middle + x * view.right
@@ -163,7 +164,7 @@ def draw_rows(
             if t_wall < t:
                 t = t_wall
                 kind = WALL
-        found = ground_depth(ground, columns, view, i_camera, level_ray(view, ground.cells_per_m, ray), found.k, t)
+        found = ground_depth(ground, columns, view, i_camera, level_ray(view, ground.cells_per_m, ray), found, t)
         if found.t < t:
             t = found.t
             kind = GROUND

@@ -40,6 +40,7 @@ class Sights:
     solids: wp.array[Solid]
     boxes: wp.array[wp.vec4i]  # first and last column and row in the picture
     room: int
+    crown_max_m: float  # no crown has a larger radius
 
 
 @wp.func
@@ -214,6 +215,12 @@ def list_bucket(
     """The camera with the trees of one bucket on its list, those that stand in it."""
     if row < 0 or column < 0 or row >= forest.buckets or column >= forest.buckets:
         return view
+    middle = wp.vec2(float(row) + 0.5, float(column) + 0.5) / forest.buckets_per_m
+    half = wp.vec2(forest.half_size_m, forest.half_size_m)
+    off_middle = middle - half - wp.vec2(view.pos_ned[0], view.pos_ned[1])
+    spare = 0.71 / forest.buckets_per_m + sights.crown_max_m
+    if wp.dot(view.left_edge, off_middle) < -spare or wp.dot(view.right_edge, off_middle) < -spare:
+        return view
     bucket = row * forest.buckets + column
     for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
         i_tree = forest.bucket_trees[k]
@@ -222,11 +229,12 @@ def list_bucket(
         own_column = int((tree.east + forest.half_size_m) * forest.buckets_per_m)
         off_north = tree.north - view.pos_ned[0]
         off_east = tree.east - view.pos_ned[1]
-        ahead = off_north * view.heading[0] + off_east * view.heading[1]
+        off = wp.vec2(off_north, off_east)
         reach = range_m + tree.crown_radius
-        is_near = off_north * off_north + off_east * off_east < reach * reach
-        is_ahead = ahead > -tree.crown_radius or wp.abs(view.ahead[2]) > 0.5
-        if own_row == row and own_column == column and is_near and is_ahead:
+        is_near = wp.dot(off, off) < reach * reach
+        is_left = wp.dot(view.right_edge, off) > -tree.crown_radius
+        is_right = wp.dot(view.left_edge, off) > -tree.crown_radius
+        if own_row == row and own_column == column and is_near and is_left and is_right:
             view = list_tree(sights, i_camera, view, tree, i_tree, size[0], size[1])
     return view
 

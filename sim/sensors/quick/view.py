@@ -29,6 +29,8 @@ class View:
     gain: wp.vec3  # on red, green and blue light
     above_ground: float  # [m], at least a few centimetres
     angle_low: float  # pseudo-angle of the first column
+    left_edge: wp.vec2  # level normals of the picture's outermost directions, pointing inwards; 0 for all round
+    right_edge: wp.vec2
     columns: int
     columns_per_angle: float
     first_m: float  # distance of a column's first sample
@@ -47,13 +49,21 @@ def face_length(a: float, b: float) -> float:
 
 
 @wp.func
-def pseudo_angle(a: float, b: float) -> float:
-    """-4..4 of a level direction: 0 ahead, 2 to the right, -2 to the left."""
-    if wp.abs(b) <= a:
-        return b / wp.max(a, _TINY)
-    if wp.abs(b) >= wp.abs(a):
-        return wp.where(b > 0.0, 2.0, -2.0) - a / b
-    return wp.where(b > 0.0, 4.0, -4.0) + b / a
+def pseudo_angle(a: float, b: float, inverse: float) -> float:
+    """-4..4 of a level direction: 0 ahead, 2 to the right, -2 to the left.
+
+    Args:
+        a: ahead.
+        b: to the right.
+        inverse: one over their `face_length`.
+    """
+    side = wp.where(b < 0.0, -1.0, 1.0)
+    angle = side * 2.0 - side * a * inverse
+    if wp.abs(b) <= wp.abs(a):
+        angle = b * inverse
+        if a < 0.0:
+            angle = side * 4.0 - b * inverse
+    return angle
 
 
 @wp.func

@@ -6,8 +6,9 @@ import warp as wp
 
 from sim.sensors.camera import Lens, pixel_ray
 from sim.sensors.quick_camera import RANGE_M, QuickCamera
-from sim.sensors.ray import CROWN, RAY_MAX_M, SKY, TRUNK, first_hit, is_trunk
+from sim.sensors.ray import CROWN, PERSON, RAY_MAX_M, SKY, TRUNK, first_hit, is_trunk
 from sim.sensors.skyline import Skyline, make_skyline
+from sim.world.people import Person
 from sim.world.world import World, WorldConfig, build_world
 
 FOLLOW_WORLD = WorldConfig(
@@ -77,3 +78,44 @@ def test_classes_and_depth_are_those_of_the_exact_ray_cast(config):
     assert (camera.kind.numpy() != kind).mean() < 0.003
     is_near = (kind != SKY) & (camera.kind.numpy() != SKY)
     assert np.percentile(np.abs(camera.depth_m.numpy() - depth_m)[is_near], 99) < 0.06
+
+
+def test_a_picture_is_the_same_alone_and_among_others():
+    rng = np.random.default_rng(9)
+    world = build_world(FOLLOW_WORLD)
+    many, alone = QuickCamera(world, 5), QuickCamera(world, 1)
+    pointed(many, random_places(world, 5, rng), rng)
+    many.render()
+    alone.lenses.numpy()[:] = many.lenses.numpy()[3]
+    alone.render()
+    assert (alone.rgb.numpy()[0] == many.rgb.numpy()[3]).all()
+    assert (alone.depth_m.numpy()[0] == many.depth_m.numpy()[3]).all()
+
+
+def test_from_inside_a_crown_all_is_crown_at_no_distance():
+    world = build_world(FOLLOW_WORLD)
+    tree = world.trees[0]
+    camera = QuickCamera(world, 1)
+    camera.lenses.numpy()["pos_ned"] = (tree["north"], tree["east"], -tree["crown_high"])
+    camera.render()
+    assert (camera.kind.numpy() == CROWN).all()
+    assert (camera.depth_m.numpy() == 0.0).all()
+
+
+def test_person_stands_in_the_picture_with_a_blue_shirt():
+    world = build_world(FOLLOW_WORLD)
+    people = wp.zeros(1, dtype=Person)
+    ground = float(world.height(3.0, 0.0))
+    people.numpy()["pos_ned"] = (3.0, 0.0, -ground)
+    people.numpy()["stature_m"] = 1.75
+    camera = QuickCamera(world, 1, people=people)
+    camera.lenses.numpy()["pos_ned"] = (0.0, 0.0, -ground - 1.2)
+    camera.render()
+    is_person = camera.kind.numpy()[0] == PERSON
+    rows, columns = np.nonzero(is_person)
+    assert rows.max() - rows.min() == pytest.approx(1.75 / 3.0 * 32.0, abs=2.5)
+    assert abs(columns.mean() - 31.5) < 1.0
+    chest = camera.rgb.numpy()[0, 32, 31].astype(int)
+    assert chest[2] > chest[0] + 40
+    assert chest[2] > chest[1] + 40
+    assert camera.depth_m.numpy()[0, 32, 31] == pytest.approx(2.87, abs=0.08)
