@@ -30,6 +30,7 @@ SCRIPTS = (
     "training",
     "sac",
     "companion",
+    "camera",
     "startup",
 )
 RESULTS = Path(__file__).parent / "results.json"
