@@ -1,4 +1,4 @@
-"""How many pictures a second does the fast camera take on one core, of any poses and of the worst, and beside Bullet?"""
+"""How many pictures a second does the fast camera take on one core, of any poses, of the worst, and beside Bullet?"""
 
 import time
 
@@ -75,7 +75,7 @@ def _bullet_rate() -> float:
     try:
         heights = np.random.default_rng(1).uniform(0.0, 0.5, 65 * 65)
         shape = pybullet.createCollisionShape(
-            pybullet.GEOM_HEIGHTFIELD, [4.0, 4.0, 1.0], heightfieldData=heights, numHeightfieldRows=65,
+            pybullet.GEOM_HEIGHTFIELD, meshScale=[4.0, 4.0, 1.0], heightfieldData=heights, numHeightfieldRows=65,
             numHeightfieldColumns=65, physicsClientId=client,
         )  # fmt: skip
         pybullet.createMultiBody(0, shape, physicsClientId=client)
