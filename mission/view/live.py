@@ -76,7 +76,6 @@ class LiveView:
         self._controls = Controls(flight, server, self._todo.put, speed)
         self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
         self._next_point_s = 0.0
-        self._followed_ned: NDArray[np.float32] | None = None
         server.on_client_connect(lambda client: self._todo.put(lambda: self._place_camera(client)))
 
     def frame(self) -> None:
@@ -159,17 +158,18 @@ class LiveView:
         client.camera.look_at = target_ned
 
     def _move_cameras(self, moment: Moment) -> None:
-        """Carries each viewer along with the vehicle, wherever they have turned to."""
+        """Keeps the vehicle in the middle of each viewer's picture, seen from where they have turned to.
+
+        Place and target of a viewer come in one message of their browser: however late it is, their difference holds.
+        """
         if not self._controls.follows:
-            self._followed_ned = None
             return
-        if self._followed_ned is not None:
-            moved = moment.pos_ned - self._followed_ned
-            if float(np.linalg.norm(moved)) < 0.01:
-                return
-            for client in self._server.get_clients().values():
-                client.camera.position = client.camera.position + moved
-        self._followed_ned = moment.pos_ned
+        for client in self._server.get_clients().values():
+            camera = client.camera
+            offset = np.asarray(camera.position) - np.asarray(camera.look_at)
+            with client.atomic():
+                camera.position = moment.pos_ned + offset
+                camera.look_at = moment.pos_ned
 
 
 def open_page(port: int, title: str) -> viser.ViserServer:

@@ -21,7 +21,7 @@ def run(*arguments):
 def test_it_follows_lands_and_writes_scorecard_and_recording(tmp_path):
     folder = tmp_path / "run"
     result = run("--policy", "scripted", "--speed", "max", "--seconds", "2", "--no-mp4", "--run-folder", str(folder))
-    assert result.exit_code in {0, 1}, result.output  # the script follows by the phone alone
+    assert result.exit_code in {0, 1}, result.output  # a script may fail to follow
     assert "scorecard" in result.output
     assert "in_band" in json.loads((folder / "summary.json").read_text())
     recording = load_recording(folder)

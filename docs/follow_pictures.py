@@ -1,0 +1,61 @@
+"""The pictures of docs/follow.md and the README: the live page in Chromium, and three moments of the film.
+
+python docs/follow_pictures.py, from the project's folder; needs Chromium. Writes docs/images/live.jpg and follow.jpg.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+IMAGES = Path(__file__).parent / "images"
+sys.path.insert(0, str(IMAGES.parents[1]))
+
+from mission.flight import FlightConfig  # noqa: E402
+from mission.follow.lockstep import flight_with_companion, take_off  # noqa: E402
+from mission.follow.owner import FOLLOW_WORLD, OwnerConfig  # noqa: E402
+from mission.follow.session import chosen_pilot, score_lines  # noqa: E402
+from mission.view.chase import PICTURE_S, film  # noqa: E402
+from mission.view.live import LiveView, open_page  # noqa: E402
+from mission.view.recording import Recorder  # noqa: E402
+from tests.browser import Browser  # noqa: E402
+
+SEED = 5
+FOLLOWED_S = 25.0
+MOMENTS_S = (17.0, 25.0, 33.0)  # of the film
+QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 88)
+
+
+def main() -> None:
+    pilot, _ = chosen_pilot(None)
+    flight, companion = flight_with_companion(FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(), seed=SEED), pilot)
+    recorder = Recorder(flight, action=lambda: companion.action)
+    page = open_page(0, "Honeyguide")
+    view = LiveView(
+        flight, page, speed=None, action=lambda: companion.action, score=lambda: score_lines(recorder, companion)
+    )
+    watched = [recorder.frame, view.frame]
+    flight.drone.start(take_off(flight.drone))
+    with tempfile.TemporaryDirectory() as profile:
+        browser = Browser(Path(profile), 1280, 800)
+        browser.open(f"http://127.0.0.1:{page.get_port()}/")
+        browser.wait("document.body?.innerText.includes('Hold')")
+        end_us = flight.time_us + int((FOLLOWED_S + 12.0) * 1e6)
+        flight.run(lambda f: f.time_us >= end_us, speed=2.0, on_frame=lambda _: [watch() for watch in watched])
+        browser.evaluate("document.querySelector('.mantine-Notification-closeButton')?.click()")
+        shown_us = flight.time_us + 3_000_000
+        flight.run(lambda f: f.time_us >= shown_us, speed=1.0, on_frame=lambda _: [watch() for watch in watched])
+        picture = browser.picture()
+        browser.close()
+    view.close()
+    flight.close()
+    cv2.imwrite(str(IMAGES / "live.jpg"), picture[..., ::-1], QUALITY)
+    chosen = {round(moment_s / PICTURE_S) for moment_s in MOMENTS_S}
+    shots = [shot for i, shot in enumerate(film(recorder.recording(), flight.world)) if i in chosen]
+    cv2.imwrite(str(IMAGES / "follow.jpg"), np.hstack(shots)[..., ::-1], QUALITY)
+
+
+if __name__ == "__main__":
+    main()
