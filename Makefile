@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-mavproxy test-mavsdk3 fuzz check tune bench format lock clean
+.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-mavproxy test-mavsdk3 fuzz check tune bench format lock clean reproduce-follow
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -35,6 +35,9 @@ train-demo: $(STAMP) ## Train Parking1 from nothing while you watch, then look a
 
 reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch (hours); flags: ARGS="parking1 --seeds 2"
 	@$(BIN)/python -m bench.cars $(ARGS)
+
+reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
+	@$(BIN)/python -m bench.follow $(ARGS)
 
 # loadfile keeps a test file's kernels in one process, so that each is compiled once.
 test: $(STAMP) ## Run the tests that take seconds; flags: make test ARGS="-k plan"

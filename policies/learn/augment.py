@@ -23,14 +23,18 @@ def augmented(images: Tensor, settings: Augmentation, generator: torch.Generator
         images = _shifted(images, settings.shift_px, generator)
     if not (settings.exposure or settings.noise):
         return images
-    colours = images[..., :3].float()
-    if settings.exposure:
-        stops = torch.rand(images.shape[1], generator=generator, device=images.device) * 2.0 - 1.0
-        colours *= torch.exp2(settings.exposure * stops)[:, None, None, None]
-    if settings.noise:
-        colours += settings.noise * torch.randn(colours.shape, generator=generator, device=images.device)
-    colours = colours.round_().clamp_(0.0, 255.0).to(torch.uint8)
-    return torch.cat((colours, images[..., 3:]), dim=-1)
+    is_colour = torch.arange(images.shape[-1], device=images.device) < 3
+    stops = settings.exposure * (torch.rand(images.shape[1], generator=generator, device=images.device) * 2.0 - 1.0)
+    pixels = images.shape[2] * images.shape[3]
+    gains = torch.where(is_colour, torch.exp2(stops)[:, None], 1.0).repeat(1, pixels)
+    deviations = (settings.noise * is_colour).repeat(pixels)
+    changed = torch.empty_like(images)
+    for before, after in zip(images.flatten(2), changed.flatten(2), strict=True):  # step by step: caches are small
+        floats = before * gains
+        if settings.noise:
+            floats.addcmul_(torch.randn(floats.shape, generator=generator, device=images.device), deviations)
+        after.copy_(floats.add_(0.5).clamp_(0.0, 255.0))
+    return changed
 
 
 def _shifted(images: Tensor, most: int, generator: torch.Generator) -> Tensor:

@@ -1,0 +1,1 @@
+"""Reproduction of docs/results/follow.md."""

@@ -1,0 +1,86 @@
+"""`python -m bench.follow.flights STAGE SEED FOLDER`: flies a stage's policy over MAVLink, and adds what came of it.
+
+One vehicle at a time, in lockstep: the whole flight controller, a companion computer with the policy, the owner's
+phone, wind and sensor noise. A flight that ends early, because the companion gave control back or the vehicle crashed,
+is not followed for the rest of its minute.
+"""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from bench.follow.judge import scorecards
+from bench.follow.result import read, write
+from bench.follow.run import policy_path, result_path
+from bench.follow.stages import CELLS, Cell
+from mission.flight import FlightConfig
+from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.owner import FOLLOW_WORLD, OwnerConfig
+from mission.follow.watch import FollowWatch
+from policies.companion.companion import Pilot
+from policies.companion.engagement import Phase
+from policies.companion.pilot import load_pilot
+from policies.tasks.follow_me.track import Track
+
+FLIGHTS = 10  # of each cell
+SECONDS = 60.0
+FIRST_SEED = 1_000_003  # no training is given it, and no tuning
+_TAKEOFF_S = 40.0
+_ENGAGE_S = 5.0
+_WINDS_M_S = (0.0, 1.5, 3.0, 4.5, 6.0)  # the range of training, by seed
+
+
+class NotEngaged(RuntimeError):
+    """A companion did not take over: there is nothing to judge."""
+
+
+def fly(pilot: Pilot, cell: Cell, seed: int, seconds: float = SECONDS) -> Track:
+    """One flight.
+
+    Args:
+        pilot: who flies.
+        cell: how many trees, and how fast an owner.
+        seed: of the world, the owner, the phone, wind and noise.
+        seconds: how long it is to follow.
+
+    Raises:
+        NotEngaged: it never began to follow.
+    """
+    pilot.reset()
+    world = FOLLOW_WORLD.model_copy(update={"trees_per_ha": cell.trees_per_ha, "seed": seed})
+    owner = OwnerConfig(pace="walk" if cell.owner_speed_max < 3.0 else "run")
+    config = FlightConfig(owner=owner, world=world, seed=seed, wind_m_s=_WINDS_M_S[seed % len(_WINDS_M_S)])
+    flight, companion = flight_with_companion(config, pilot)
+    try:
+        flight.fly(take_off, seconds=_TAKEOFF_S)
+        end_us = flight.time_us + round(_ENGAGE_S * 1e6)
+        flight.run(lambda _: companion.phase is Phase.FLYING or flight.time_us >= end_us)
+        if companion.phase is not Phase.FLYING:
+            raise NotEngaged(f"seed {seed}: {companion.phase.value}: {companion.trouble}")
+        watch = FollowWatch(flight, seconds)
+
+        def is_over(_: object) -> bool:
+            watch.frame()
+            return watch.is_complete or watch.has_collided or companion.phase is not Phase.FLYING
+
+        flight.run(is_over)
+    finally:
+        flight.close()
+    return watch.track(cell.trees_per_ha, cell.owner_speed_max)
+
+
+def main(name: str, seed: str, folder: str) -> None:
+    where = Path(folder)
+    pilot = load_pilot(str(policy_path(where, name, int(seed))))
+    tracks: dict[Cell, list[Track]] = {}
+    for cell in CELLS:
+        tracks[cell] = [fly(pilot, cell, FIRST_SEED + k) for k in range(FLIGHTS)]
+        print(f"{cell}: flown", flush=True)
+    path = result_path(where, name, int(seed))
+    result = read(path)
+    judged = [item for item in result.judged if not item.is_flown]
+    write(path, replace(result, judged=[*judged, *scorecards(tracks, is_flown=True)]))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,64 @@
+"""A policy judged in batch: held-out worlds of each tree density, owners of each class of speed.
+
+In: a policy and settings of FollowMe. Out: a scorecard of each cell, and of each speed over all densities.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from bench.follow.result import Judged
+from bench.follow.stages import CELLS, OWNER_SPEEDS, Cell
+from policies.learn.policy import Policy
+from policies.learn.tensors import TaskTensors
+from policies.tasks.follow_me.follow_me import FollowMe
+from policies.tasks.follow_me.recording import Recording
+from policies.tasks.follow_me.scorecard import scorecard
+from policies.tasks.follow_me.settings import FollowSettings
+from policies.tasks.follow_me.track import Track
+
+EPISODES = 64  # of each cell
+HELD_OUT_SEED = 1_000_003  # no training run is given it
+
+
+def judge_in_batch(policy: Policy, settings: FollowSettings, cells: Sequence[Cell] = CELLS) -> list[Judged]:
+    """Scorecards on the test split, the estimator in the loop."""
+    held_out = settings.model_copy(update={"split": "test", "has_estimator": True, "terrain": "fresh"})
+    task = FollowMe(held_out, EPISODES)
+    flown = {cell: _fly(policy, task, cell) for cell in cells}
+    return scorecards({cell: tracks for cell, (tracks, _) in flown.items()}, {c: r for c, (_, r) in flown.items()})
+
+
+def scorecards(
+    tracks: dict[Cell, list[Track]], returns: dict[Cell, float] | None = None, *, is_flown: bool = False
+) -> list[Judged]:
+    """Of each cell, and of each speed over all densities."""
+    judged = [
+        Judged(is_flown, cell.trees_per_ha, cell.owner_speed_max, (returns or {}).get(cell), scorecard(flown))
+        for cell, flown in tracks.items()
+    ]
+    for speed in OWNER_SPEEDS:
+        pooled = [track for cell, flown in tracks.items() if cell.owner_speed_max == speed for track in flown]
+        if pooled:
+            judged.append(Judged(is_flown, None, speed, None, scorecard(pooled)))
+    return judged
+
+
+def _fly(policy: Policy, task: FollowMe, cell: Cell) -> tuple[list[Track], float]:
+    """The first episode of every environment, by the most probable actions; their tracks and mean reward."""
+    task.set_numbers({"trees_per_ha": cell.trees_per_ha, "owner_speed_max": cell.owner_speed_max})
+    task.reset(HELD_OUT_SEED)
+    tensors, recording = TaskTensors(task), Recording(task)
+    memory = policy.start_memory(task.env_count)
+    with torch.inference_mode():
+        while not recording.is_complete:
+            actions, memory = policy.act(tensors.seen, memory)
+            tensors.step(policy.bounded(actions), actions.branches)
+            recording.record()
+            is_over = tensors.is_terminated | tensors.is_truncated
+            memory = memory.masked_fill(is_over[:, None], 0.0) if memory.shape[1] else memory
+    trees, speed = cell.trees_per_ha, cell.owner_speed_max
+    tracks = [replace(track, trees_per_ha=trees, owner_speed_max=speed) for track in recording.tracks()]
+    return tracks, float(np.mean(recording.returns))

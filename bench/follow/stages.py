@@ -1,0 +1,91 @@
+"""The stages of the reproduction: what is trained after what, on what it is judged, and what was reported."""
+
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any
+
+TREES_PER_HA = (50.0, 100.0, 200.0)
+OWNER_SPEEDS = (2.0, 5.0)  # [m/s] the fastest walk, and the fastest run
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """Held-out worlds of one tree density, with owners of one class of speed."""
+
+    trees_per_ha: float
+    owner_speed_max: float  # [m/s]
+
+
+CELLS = tuple(Cell(trees, speed) for speed, trees in product(OWNER_SPEEDS, TREES_PER_HA))
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One training, and how what comes of it is judged."""
+
+    name: str
+    title: str
+    recipe: str
+    teacher: str | None = None  # stage whose policy teaches
+    start: str | None = None  # stage whose networks this one starts from
+    changes: dict[str, Any] = field(default_factory=dict)  # of the recipe: path with dots to value
+    judged: dict[str, Any] = field(default_factory=dict)  # settings of the task to judge in, over the recipe's
+    flies: bool = False  # also judged in flights over MAVLink
+    document: str = "not reported"
+    limit_s: float | None = None  # wall clock at most, with all stages before it
+    figure: str = "in_band"  # of the scorecard, that the targets are of
+    targets: tuple[float | None, float | None] = (None, None)  # at OWNER_SPEEDS, at least
+
+    @property
+    def before(self) -> tuple[str, ...]:
+        """Stages that must be done first."""
+        return tuple(name for name in (self.teacher, self.start) if name is not None)
+
+
+STAGES: dict[str, Stage] = {
+    stage.name: stage
+    for stage in (
+        Stage("teacher", "Teacher: sees the truth, PPO", "follow-me-teacher"),
+        Stage(
+            "student",
+            "Improved: camera and phone, DAgger",
+            "follow-me",
+            teacher="teacher",
+            flies=True,
+            document="reward 20 to 30, not ready for use, 36.4 h",
+            limit_s=1800.0,
+            targets=(0.98, 0.85),
+        ),
+        Stage(
+            "vision-only",
+            "Vision only: no word of the owner, DAgger",
+            "follow-me-vision",
+            teacher="teacher",
+            flies=True,
+            document="best published drone tracking success: about 72 % (GC-VAT)",
+            figure="success",
+            targets=(0.85, None),
+        ),
+        Stage(
+            "document",
+            "As documented: pixels and seven numbers, plain PPO",
+            "follow-me-document",
+            document="reward 20 to 30, 10 M steps, 36.4 h",
+            limit_s=7200.0,
+        ),
+    )
+}
+
+
+def in_order(names: list[str]) -> list[Stage]:
+    """The stages of these names and those they need, each after what it needs."""
+    found: dict[str, Stage] = {}
+
+    def add(name: str) -> None:
+        for before in STAGES[name].before:
+            add(before)
+        found.setdefault(name, STAGES[name])
+
+    for name in names:
+        add(name)
+    return list(found.values())

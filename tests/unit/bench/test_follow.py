@@ -1,0 +1,73 @@
+"""The reproduction of following: order of stages, results kept whole, and a page that says what they say."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bench.cars.result import Point
+from bench.follow.page import duration, write_page
+from bench.follow.result import Judged, Result, read, read_all, write, write_all
+from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, in_order
+from policies.learn.config.recipes import recipe
+from policies.tasks.follow_me.scorecard import scorecard
+from policies.tasks.follow_me.track import Track
+
+
+def track(distance, count=600):
+    column = np.full(count, distance)
+    seen = np.ones(count, dtype=np.bool_)
+    return Track(np.arange(1, count + 1) * 0.1, column, np.zeros(count), seen, ~seen, 60.0)
+
+
+def result(stage="student", *, is_flown=False):
+    near, far = scorecard([track(2.0), track(2.2)]), scorecard([track(2.0), track(3.5)])
+    judged = [Judged(False, cell.trees_per_ha, cell.owner_speed_max, 12.5, far) for cell in CELLS]
+    judged += [Judged(False, None, speed, None, far) for speed in OWNER_SPEEDS]
+    if is_flown:
+        judged += [Judged(True, trees, 2.0, None, near) for trees in (None, 100.0)]
+    curve = [Point(1000 * k, 2.0 * k, 0.1 * k, float(k)) for k in range(8)]
+    return Result(stage, 1, 600_000, 900.0, "a machine", 400_000, curve, judged)
+
+
+def test_every_stage_has_a_recipe_and_comes_after_what_it_needs():
+    order = in_order(list(STAGES))
+    for k, stage in enumerate(order):
+        assert recipe(stage.recipe).is_file()
+        assert {*stage.before} <= {earlier.name for earlier in order[:k]}
+
+
+def test_a_stage_brings_those_it_needs():
+    assert [stage.name for stage in in_order(["vision-only"])] == ["teacher", "vision-only"]
+
+
+def test_results_are_read_as_they_were_written(tmp_path):
+    path = tmp_path / "student-1.json"
+    write(path, result(is_flown=True))
+    again = read(path)
+    before, after = (which.cards(is_flown=True)[None, 2.0].card for which in (result(is_flown=True), again))
+    assert after.success.low == pytest.approx(before.success.low)
+    assert after.distance_rmse_m.value == pytest.approx(before.distance_rmse_m.value)
+    assert math.isnan(after.loss_s.value)
+    assert "NaN" not in path.read_text(encoding="utf-8")
+    write_all(tmp_path / "all.jsonl", [again, result("teacher")])
+    assert [kept.stage for kept in read_all(tmp_path / "all.jsonl")] == ["student", "teacher"]
+
+
+def test_page_tells_what_was_measured_and_what_was_not(tmp_path):
+    text = write_page({"student": [result(is_flown=True)]}, tmp_path).read_text(encoding="utf-8")
+    assert STAGES["document"].title + " | " + STAGES["document"].document + " | not run" in text
+    assert "| batch | 2 m/s | 98 % in band | 50.0 % (" in text
+    assert "| flown | 2 m/s | 98 % in band | 100.0 % (100.0 to 100.0) |" in text
+    assert "| Improved: camera and phone, DAgger | 0.60 M | 15.0 min |" in text
+    assert {path.name for path in (tmp_path / "images").iterdir()} == {"follow-reward.png", "follow-student.png"}
+    assert all(path.stat().st_size < 300_000 for path in (tmp_path / "images").iterdir())
+
+
+def test_page_without_any_result_is_still_a_page(tmp_path):
+    assert "none yet" in write_page({}, tmp_path).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(90.0, "90 s"), (900.0, "15.0 min"), (7200.0, "2.0 h")])
+def test_durations_are_as_people_say_them(seconds, text):
+    assert duration(seconds) == text
