@@ -75,7 +75,7 @@ class FlightConfig(BaseModel):
     wind_from_deg: float = Field(default=270.0, ge=0.0, le=360.0)
     """Where the wind comes from, clockwise from north."""
     noise: float = Field(default=1.0, ge=0.0, le=10.0)
-    """Scales every sensor's noise; 0 makes them perfect."""
+    """Scales every sensor's noise, and that of the onboard camera; 0 makes them perfect."""
     dialect: Literal["px4", "ardupilot"] = "px4"
     """Which autopilot's numbers ground stations get. The flight's own script always gets PX4's."""
     traffic_count: int = Field(default=0, ge=0, le=50)
@@ -206,7 +206,7 @@ class Flight:
         from mission.follow.onboard import OnboardCamera  # what a policy sees is defined beside the policies
 
         self.owner = FollowedOwner(config, self.world, self.config.seed, self.config.home)
-        self.onboard = OnboardCamera(self.rig, self.world, self.owner.people)
+        self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)
         return [self.owner.vehicle_end]
 
     def frame(self) -> None:

@@ -1,7 +1,7 @@
 """The onboard camera of a follow-me flight: what the policy sees, ten times a second, with the time it was taken.
 
-In: the true pose of the vehicle, and the owner. Out: pictures of 64 x 64 pixels, colour and depth packed as in
-training, to whoever asked for them: a companion in the same process, or a server of streams.
+In: the true pose of the vehicle, and the owner. Out: pictures of 64 x 64 pixels, colour and depth with noise and
+packed as in training, to whoever asked for them: a companion in the same process, or a server of streams.
 """
 
 from collections.abc import Callable
@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from autopilot.camera.ports import View
 from common.image_stream import ImageFrame
+from policies.tasks.episode import Border
+from policies.tasks.follow_me.images import take_images
+from policies.tasks.follow_me.numbers import FollowNumbers
 from policies.tasks.follow_me.observe import (
     DEPTH_HALF_M,
     HFOV_DEG,
@@ -20,7 +23,6 @@ from policies.tasks.follow_me.observe import (
     IMAGE_SIZE,
     TILT_DEG,
     camera_mount,
-    pack_images,
 )
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
@@ -40,17 +42,23 @@ class OnboardCamera:
         rig: where the truth is.
         world: what is seen.
         people: who is seen: an array of one `Person`.
+        noise: of the pictures; 1 is training's.
     """
 
-    def __init__(self, rig: Rig, world: WorldMap, people: Any) -> None:
+    def __init__(self, rig: Rig, world: WorldMap, people: Any, noise: float = 1.0) -> None:
         self._eye = CameraRig(rig, world)
         self._view = View(IMAGE_SIZE, IMAGE_SIZE, HFOV_DEG, camera_mount())
         self._camera = QuickCamera(world, 1, width=IMAGE_SIZE, height=IMAGE_SIZE, hfov_deg=HFOV_DEG, people=people)
         self._lens: NDArray[Any] = self._camera.lenses.numpy()  # live, as the next
         self._kind: NDArray[np.uint8] = self._camera.kind.numpy()
         images: Any = wp.zeros((1, IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), dtype=wp.uint8)
-        inputs = [self._camera.rgb, self._camera.depth_m, images]
-        self._pack = wp.launch(pack_images, (1, IMAGE_SIZE, IMAGE_SIZE), inputs, record_cmd=True)
+        border: Any = Border()
+        border.images = images
+        numbers: Any = wp.zeros(1, dtype=FollowNumbers)
+        numbers.numpy()["camera_noise"] = noise
+        everyone: Any = wp.full(1, value=True, dtype=wp.bool)
+        inputs = [border, rig.arrays, numbers, self._camera.rgb, self._camera.depth_m, everyone]
+        self._pack = wp.launch(take_images, (1, IMAGE_SIZE), inputs, record_cmd=True)
         self._images: NDArray[np.uint8] = images.numpy()
         self._sinks: list[Sink] = []
         self._sequence = 0

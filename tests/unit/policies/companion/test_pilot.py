@@ -10,14 +10,16 @@ from policies.learn.config.network import NetworkSettings
 from policies.learn.policy import Policy
 from policies.learn.policy_file import PolicyCard, save_policy
 from policies.tasks.flight.own import ACTIONS
+from policies.tasks.follow_me.follow_me import _layout
 from policies.tasks.follow_me.observe import EGO, EGO_BLIND, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
+from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.layout import ImageElement, Layout
 
 IMAGE = ImageElement(IMAGE_SIZE, IMAGE_SIZE, IMAGE_CHANNELS)
 
 
-def policy_file(folder, *, task=TASK, version=LAYOUT_VERSION, kind=EGO, actions=ACTIONS, image=IMAGE):
-    layout = Layout(task, version, vector_elements(int(kind)), actions, image=image)
+def policy_file(folder, *, task=TASK, version=LAYOUT_VERSION, kind=EGO, actions=ACTIONS, image=IMAGE, layout=None):
+    layout = layout or Layout(task, version, vector_elements(int(kind)), actions, image=image)
     settings = NetworkSettings.model_validate(
         {"hidden_units": 16, "num_layers": 1, "memory": {"memory_size": 16, "sequence_length": 8}}
     )
@@ -38,6 +40,17 @@ def test_a_policy_of_the_task_flies_and_remembers(tmp_path, kind):
     assert first.shape == (4,)
     assert not np.array_equal(first, second)
     assert np.array_equal(first, pilot.act(vector, image))
+
+
+@pytest.mark.parametrize("preset", ["improved", "vision-only"])
+def test_what_the_task_shows_is_what_the_pilot_takes(tmp_path, preset):
+    assert load_pilot(str(policy_file(tmp_path, layout=_layout(FollowSettings(preset=preset)))))
+
+
+@pytest.mark.parametrize("settings", [{"preset": "as-documented"}, {"observation": "state"}])
+def test_what_a_companion_cannot_know_or_say_is_refused(tmp_path, settings):
+    with pytest.raises(PilotError, match="made for another task or preset"):
+        load_pilot(str(policy_file(tmp_path, layout=_layout(FollowSettings(**settings)))))
 
 
 def test_scripted_needs_no_file():
