@@ -4,6 +4,7 @@ import inspect
 import re
 import runpy
 import shlex
+import socket
 
 import pytest
 from typer.testing import CliRunner
@@ -93,6 +94,12 @@ def flight_arguments(line, target, command):
     return None
 
 
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
 @pytest.mark.parametrize(("page", "line"), commands())
 def test_command_works(page, line, tmp_path, monkeypatch):
     if line in NOT_RUN_HERE or line.startswith(RUN_BY_OTHERS):
@@ -109,6 +116,8 @@ def test_command_works(page, line, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     is_whole = {"--once", "max"} <= set(arguments)
     shortened = [] if is_whole else ["--speed", "max", "--seconds", "5"]  # the last one of an option counts
+    if "--view" in arguments:
+        shortened += ["--view-port", str(free_port())]
     result = CliRunner().invoke(app, ["fly", *arguments, *shortened, "--run-folder", str(tmp_path / "flight")])
     is_idle = "--idle" in arguments
     assert result.exit_code == (0 if is_whole or is_idle else 1), result.output  # 1: shortened before its end
