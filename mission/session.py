@@ -62,7 +62,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     signing = signing_config(options, speed, state)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
-    images = open_images(options)
+    images = None if speed is None else open_images(options)
     page = open_page(options.view_port) if options.has_view else None
     folder = new_folder(options.run_folder)
     if state is not None and options.home is not None:
@@ -200,7 +200,7 @@ def _print_start(options: FlightOptions, speed: float | None, folder: Path, cons
         ports += f", TCP {options.tcp_port}"
     where = "lockstep, without network links" if speed is None else ports
     print_line(console, f"flying: {where}; logs in {folder}")
-    if options.owner is not None:
+    if options.owner is not None and speed is not None:
         print_line(console, f"pictures for a companion: tcp://{LOOPBACK}:{options.image_port}")
     if options.stream_port:
         print_line(console, f"the camera's picture: http://{LOOPBACK}:{options.stream_port}/")
