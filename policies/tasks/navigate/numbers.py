@@ -30,6 +30,7 @@ class NavigateNumbers:
     speed_m_s: float
     progress_reward: float
     goal_reward: float
+    time_cost: float
     collision_cost: float
     ceiling_cost: float
     clearance_m: float
@@ -53,15 +54,16 @@ NAVIGATE_NUMBERS = (
     Number("slowest_m_s", 3.0, 0.5, 20.0, "m/s", "time is up for who is slower, in a straight line", "guess"),
     Number("ceiling_m", 4.0, 2.0, 100.0, "m", "higher above the ground counts as over the forest", "guess"),
     Number("range_noise", 1.0, 0.0, 4.0, "1", "factor on the errors of ranges and depths", "guess"),
-    Number("speed_m_s", 5.5, 0.5, 7.0, "m/s", "faster progress is not paid more; the mean is to be 5", _WANTED),
+    Number("speed_m_s", 6.0, 0.5, 7.0, "m/s", "faster progress is not paid more; the mean is to be 5", _WANTED),
     Number("progress_reward", 0.2, 0.0, 10.0, "1", "per metre towards the goal", "tuned"),
     Number("goal_reward", 5.0, 0.0, 1000.0, "1", "of arriving, which ends the episode", "tuned"),
-    Number("collision_cost", 5.0, 0.0, 1000.0, "1", "of touching anything, which ends the episode", "tuned"),
-    Number("ceiling_cost", 5.0, 0.0, 1000.0, "1", "of leaving the forest upwards, which ends the episode", "tuned"),
+    Number("time_cost", 0.05, 0.0, 10.0, "1", "per decision: careful is not to be slow", "tuned"),
+    Number("collision_cost", 8.0, 0.0, 1000.0, "1", "of touching anything, which ends the episode", "tuned"),
+    Number("ceiling_cost", 8.0, 0.0, 1000.0, "1", "of leaving the forest upwards, which ends the episode", "tuned"),
     Number("clearance_m", 1.2, 0.0, 2.0, "m", "room to obstacles below which there is a cost", "tuned"),
     Number("clearance_cost", 0.1, 0.0, 10.0, "1", "per decision for no room at all, growing as the square", "tuned"),
     Number("height_cost", 0.01, 0.0, 10.0, "1", "per decision and squared metre off the goal's height", "tuned"),
-    Number("heading_cost", 0.005, 0.0, 10.0, "1", "per decision of flying backwards; half of it sideways", "tuned"),
+    Number("heading_cost", 0.03, 0.0, 10.0, "1", "per decision of flying backwards; half of it sideways", "tuned"),
     Number("jerk_cost", 0.005, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),
     Number("turn_cost", 0.001, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
 )

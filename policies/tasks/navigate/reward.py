@@ -45,7 +45,7 @@ def navigate_reward(
     last_action: wp.vec4,
 ) -> float:
     """Of one decision that led `progress_m` nearer to the goal and left `room_m` to the nearest obstacle."""
-    reward = n.progress_reward * wp.min(progress_m, n.speed_m_s * step_s)
+    reward = n.progress_reward * wp.min(progress_m, n.speed_m_s * step_s) - n.time_cost
     tight = wp.max(1.0 - room_m / wp.max(n.clearance_m, 1.0e-3), 0.0)
     reward -= n.clearance_cost * tight * tight
     high = body.height_agl_m - n.goal_height_m

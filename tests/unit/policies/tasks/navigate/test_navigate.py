@@ -145,7 +145,7 @@ def test_goal_is_told_by_estimate_in_the_heading_frame() -> None:
 
 
 def test_progress_is_paid_up_to_the_wanted_speed_only() -> None:
-    costs = ("clearance_cost", "height_cost", "heading_cost", "jerk_cost", "turn_cost")
+    costs = ("time_cost", "clearance_cost", "height_cost", "heading_cost", "jerk_cost", "turn_cost")
     free = dict.fromkeys(costs, 0.0) | {"trees_per_ha": 0.0, "wind_m_s": 0.0, "speed_m_s": 2.0}
     task = _task(1, numbers=free | {"progress_reward": 0.1}, **QUICK)
     frame = task.border.observations.numpy()[0, task.layout.frame_size :]
