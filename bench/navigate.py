@@ -43,7 +43,8 @@ Actions are the most probable ones. Made by `python -m bench.navigate`; the task
 [navigate.md](../navigate.md).
 
 Rates have Wilson's 95 % interval, speeds the bootstrap's over episodes. Mean speed is the length of the way flown over
-its time, standing start included, of the flights that arrived; "straight" is the distance to the goal over that time.
+its time, standing start included, of the flights that arrived; "straight" is how much nearer the goal came over that
+time.
 
 | trees/ha | success | mean speed | straight | collisions | over the forest | out of time |
 |---|---|---|---|---|---|---|
@@ -73,10 +74,13 @@ class Flights:
     def share(self, outcome: Outcome) -> Interval:
         return rate(self.outcomes == outcome)
 
-    def speed(self, way: str) -> Interval:
-        """Mean over the flights that arrived of a measure over the time [m/s]."""
+    def speed(self, is_straight: bool) -> Interval:
+        """Mean over the flights that arrived of the way flown, or made towards the goal, over the time [m/s]."""
         arrived = self.measures[self.outcomes == Outcome.SUCCESS]
-        speeds = arrived[:, MEASURES.index(way)] / arrived[:, MEASURES.index("time_s")]
+        made_m = arrived[:, MEASURES.index("path_m")]
+        if is_straight:
+            made_m = arrived[:, MEASURES.index("start_distance_m")] - arrived[:, MEASURES.index("distance_m")]
+        speeds = made_m / arrived[:, MEASURES.index("time_s")]
         return bootstrap(len(speeds), lambda rows: float(speeds[rows].mean()) if len(rows) else float("nan"))
 
 
@@ -122,18 +126,18 @@ def row(trees_per_ha: float, flights: Flights) -> str:
         share = flights.share(outcome)
         return f"{100 * share.value:.1f} % ({100 * share.low:.1f} to {100 * share.high:.1f})"
 
-    def speed(way: str) -> str:
-        mean = flights.speed(way)
+    def speed(is_straight: bool) -> str:
+        mean = flights.speed(is_straight)
         return f"{mean.value:.2f} m/s ({mean.low:.2f} to {mean.high:.2f})"
 
-    cells = [f"{trees_per_ha:.0f}", percent(Outcome.SUCCESS), speed("path_m"), speed("start_distance_m")]
+    cells = [f"{trees_per_ha:.0f}", percent(Outcome.SUCCESS), speed(is_straight=False), speed(is_straight=True)]
     cells += [percent(outcome) for outcome in (Outcome.HIT_OBSTACLE, Outcome.LOST, Outcome.TIMEOUT)]
     return "| " + " | ".join(cells) + " |"
 
 
 def picture(settings: dict[str, str], flights: Flights, trees_per_ha: float) -> NDArray[np.uint8]:
     """The first flights from above, three in a row, each with its goal straight up."""
-    task = build(settings, trees_per_ha, EPISODES)  # the same forests again
+    task = build(settings, trees_per_ha, PICTURES)  # the same forests: draws do not depend on the batch
     tiles = []
     for i, path in enumerate(flights.paths):
         goal = flights.goals_ned[i, :2].astype(np.float64)
