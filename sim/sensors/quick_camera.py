@@ -14,12 +14,13 @@ import warp as wp
 from sim.sensors.camera import Lens
 from sim.sensors.quick.colours import make_paints
 from sim.sensors.quick.columns import Columns, lay_columns
-from sim.sensors.quick.ground import make_ground, pack
+from sim.sensors.quick.ground import make_ground, pack_cells
+from sim.sensors.quick.light import STRIPS, light_corners, light_strips
 from sim.sensors.quick.prepare import prepare_views
 from sim.sensors.quick.rows import Outputs, draw_rows
 from sim.sensors.quick.solids import Sights, Solid
 from sim.sensors.quick.view import View
-from sim.world.trees import BUCKET_M, CROWN_RADIUS_SHARE
+from sim.world.trees import CROWN_RADIUS_SHARE
 from sim.world.world import World, WorldConfig, WorldMap
 
 RANGE_M = 80.0
@@ -77,6 +78,7 @@ class QuickCamera:
         device: str = "cpu",
     ) -> None:
         config = worlds.config
+        self._seen = worlds  # kernels' structs do not keep their arrays alive
         if isinstance(worlds, WorldMap):
             self._worlds = wp.array([worlds.kernel], dtype=World, device=device)
         else:
@@ -91,8 +93,7 @@ class QuickCamera:
         self.rgb = wp.zeros((count, height, width, 3), dtype=wp.uint8, device=device)
         self.depth_m = wp.zeros((count, height, width), dtype=wp.float32, device=device)
         self.kind = wp.zeros((count, height, width), dtype=wp.uint8, device=device)
-        self._buckets = max(1, ceil(config.size_m / BUCKET_M))
-        self._ground = make_ground(config, world_count, device)
+        self._ground = ground = make_ground(config, world_count, device)
         self._everyone = wp.full(count, value=True, dtype=wp.bool, device=device)
         outputs = Outputs()
         outputs.rgb, outputs.depth_m, outputs.kind = self.rgb.flatten(), self.depth_m.flatten(), self.kind.flatten()
@@ -102,21 +103,29 @@ class QuickCamera:
         columns = _columns(count, width, range_m, device)
         sights = _sights(count, config, range_m, device)
         size, paints = wp.vec2i(width, height), make_paints(device)
-        ground, chosen = self._ground, self._everyone
+        chosen = self._everyone
         seen = [self._worlds, self.i_world, self.lenses, people, chosen, ground, range_m, size, views, columns, sights]
         drawn = [ground, paints, views, chosen, columns, sights, range_m, outputs]
         self._prepare = wp.launch(prepare_views, dim=count, inputs=seen, device=device, record_cmd=True)
         lay, columns_dim = [ground, views, chosen, columns], (count, columns.room)
         self._lay = wp.launch(lay_columns, dim=columns_dim, inputs=lay, device=device, record_cmd=True)
         self._draw = wp.launch(draw_rows, dim=(count, height), inputs=drawn, device=device, record_cmd=True)
-        self._device = device
+        every_world = wp.full(world_count, value=True, dtype=wp.bool, device=device)
+        self._every_world = every_world
+        fresh = [self._worlds, every_world, ground]
+        self._pack = [
+            wp.launch(pack_cells, dim=(world_count, ground.side), inputs=fresh, device=device, record_cmd=True),
+            wp.launch(light_corners, dim=(world_count, ground.side + 1), inputs=fresh, device=device, record_cmd=True),
+            wp.launch(light_strips, dim=(world_count, STRIPS), inputs=[*fresh, STRIPS], device=device, record_cmd=True),
+        ]
         self.refresh()
 
     def refresh(self, is_chosen: Any = None) -> None:
         """Packs worlds that are new: array of bool, shape (worlds,); None for all."""
-        if is_chosen is None:
-            is_chosen = wp.full(len(self._worlds), value=True, dtype=wp.bool, device=self._device)
-        pack(self._ground, self._worlds, self._buckets, is_chosen)
+        chosen = self._every_world if is_chosen is None else is_chosen
+        for command in self._pack:
+            command.set_param_at_index(1, chosen)
+            command.launch()
 
     def render(self, is_chosen: Any = None) -> None:
         """Takes the pictures of the chosen cameras: array of bool, shape (count,); None for all."""

@@ -14,9 +14,9 @@ from sim.world.world import World
 
 wp.set_module_options({"enable_backward": False})
 
-_SUN_AZIMUTH, _SUN_ELEVATION = radians(140.0), radians(38.0)
+SUN_AZIMUTH, SUN_ELEVATION = radians(140.0), radians(38.0)
 SUN_NED = wp.constant(
-    wp.vec3(cos(_SUN_ELEVATION) * cos(_SUN_AZIMUTH), cos(_SUN_ELEVATION) * sin(_SUN_AZIMUTH), -sin(_SUN_ELEVATION))
+    wp.vec3(cos(SUN_ELEVATION) * cos(SUN_AZIMUTH), cos(SUN_ELEVATION) * sin(SUN_AZIMUTH), -sin(SUN_ELEVATION))
 )
 SUN_LIGHT = wp.constant(wp.vec3(1.45, 1.32, 1.08))
 SKY_LIGHT = wp.constant(wp.vec3(0.26, 0.33, 0.44))

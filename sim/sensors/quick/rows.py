@@ -8,7 +8,8 @@ import warp as wp
 from sim.sensors.quick.colours import Paints, blended, code, ground_colour, sky_light
 from sim.sensors.quick.columns import Columns, Found, ground_depth, level_ray
 from sim.sensors.quick.flags import FAST
-from sim.sensors.quick.ground import Ground, sunlight
+from sim.sensors.quick.ground import Ground
+from sim.sensors.quick.light import sunlight
 from sim.sensors.quick.solids import NEVER, Sights, Solid, solid_depth
 from sim.sensors.quick.view import View
 from sim.sensors.ray import CROWN, GROUND, RAY_MAX_M, SKY, WALL
