@@ -21,6 +21,7 @@ from policies.companion.engagement import Engagement, Phase, Sending, Situation,
 from policies.companion.observation import Observer
 from policies.companion.owner_watch import OwnerWatch
 from policies.companion.vehicle_link import ByteLink, VehicleLink
+from policies.tasks.follow_me.observe import EGO_BLIND
 
 SETPOINT_US = 50_000
 DECISION_US = 100_000
@@ -28,7 +29,7 @@ DECISION_EARLY_US = 10_000  # a picture may come this much earlier than the deci
 IMAGE_OLD_US = 500_000  # guess: five pictures missed, 3 m at full speed
 TELEMETRY_OLD_US = 500_000
 HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
-OWNER_LOST_S = 5.0  # neither seen nor heard of
+OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
 LATENCIES_KEPT = 600  # a minute of decisions
 
 Floats = NDArray[np.float32]
@@ -79,7 +80,7 @@ class Companion:
         self._camera = camera
         self._pilot = pilot
         self._observer = Observer(pilot.kind)
-        self._watch = OwnerWatch()
+        self._watch = OwnerWatch(hears=pilot.kind != EGO_BLIND)
         self._wall_s = wall_s
         self._picture: ImageFrame | None = None  # the newest
         self._picture_us = -1  # when it came in, on our clock; -1: never

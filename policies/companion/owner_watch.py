@@ -16,10 +16,15 @@ from policies.tracker import OwnerTrack, OwnerTracker, PhoneReport, Sighting
 
 
 class OwnerWatch:
-    """The tracker, fed with what a companion gets."""
+    """The tracker, fed with what a companion gets.
 
-    def __init__(self) -> None:
+    Args:
+        hears: whether the phone's reports count; who flies by sight alone has lost an owner who is out of sight.
+    """
+
+    def __init__(self, *, hears: bool = True) -> None:
         self._tracker = OwnerTracker()
+        self._hears = hears
         self._track: OwnerTrack | None = None
         self._reports = 0  # fed so far
 
@@ -34,7 +39,7 @@ class OwnerWatch:
         if not isfinite(own.pos_ned[0]):  # directions from nowhere
             return
         now_us = picture.time_us
-        if owner.count != self._reports:
+        if self._hears and owner.count != self._reports:
             self._reports = owner.count
             valid_us = now_us - round(REPORT_LAG_S * 1e6)
             self._tracker.hear(now_us, PhoneReport(valid_us, owner.pos_ned, owner.vel_ned))
