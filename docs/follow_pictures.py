@@ -1,4 +1,4 @@
-"""The pictures of docs/follow.md and the README: the live page in Chromium, and three moments of the film.
+"""The pictures of docs/follow-me.md and the README: the live page in Chromium, and three moments of the film.
 
 python docs/follow_pictures.py, from the project's folder; needs Chromium. Writes docs/images/live.jpg and follow.jpg.
 """

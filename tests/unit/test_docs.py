@@ -165,7 +165,7 @@ def test_generated_pages_are_current(monkeypatch):
 
 SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options are described, if there are several
     "fly": ("docs/flying.md", "Options"),
-    "follow": ("docs/follow.md", "Options of follow"),
+    "follow": ("docs/follow-me.md", "Options of follow"),
     "replay": ("docs/flying.md", "Looking at a run again"),
     "companion": ("docs/companion.md", "The companion computer"),
     "play": ("docs/demonstrations.md", "Watch"),
