@@ -12,9 +12,9 @@ from mission.refusal import learn_extra, refuse
 
 def companion(
     policy: Annotated[str, typer.Option(help="A policy of FollowMe: a file or a run's folder; or 'scripted'.")],
-    link: Annotated[str, typer.Option(help="Where the vehicle listens: udpout://HOST:PORT.")] = (
-        "udpout://127.0.0.1:14580"
-    ),
+    link: Annotated[
+        str, typer.Option(help="The vehicle: udpout://HOST:PORT, udpin://ADDRESS:PORT, tcp://HOST:PORT.")
+    ] = ("udpout://127.0.0.1:14580"),
     camera: Annotated[str, typer.Option(help="Where the pictures come from: tcp://HOST:PORT.")] = (
         "tcp://127.0.0.1:14600"
     ),

@@ -20,7 +20,7 @@ _FAULTS = select.POLLERR | select.POLLHUP | select.POLLNVAL
 
 
 class TcpPeer:
-    """The link to one client."""
+    """The link to whoever is at the other end of a stream: one client, or of a client the port."""
 
     keeps_datagrams = False
     is_internal = False
@@ -38,6 +38,10 @@ class TcpPeer:
 
     def fileno(self) -> int:
         return self._socket.fileno()
+
+    def connect(self, address: tuple[str, int]) -> None:
+        """Begins to connect; what is sent meanwhile waits. A failure shows when it is read."""
+        self._socket.connect_ex(address)
 
     def receive(self) -> Sequence[bytes]:
         if not self.is_ready:

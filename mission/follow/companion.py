@@ -6,13 +6,13 @@ clock comes with its telemetry.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from urllib.parse import urlsplit
 
 import numpy as np
 from rich.console import Console
 from rich.live import Live
 
-from autopilot.mavlink.links import LinkError, LinkRole, UdpLink
+from autopilot.mavlink.client_links import open_client_link
+from autopilot.mavlink.links import LinkError
 from common.clock import Pacer, wall_time_s
 from policies.companion.camera import CameraUrlError, ImageSource, StreamCamera
 from policies.companion.companion import Companion
@@ -46,7 +46,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     try:
         pilot = load_pilot(options.policy)
         camera: ImageSource = StreamCamera(options.camera)
-        link = open_link(options.link)
+        link = open_client_link(options.link)
     except (PilotError, CameraUrlError, LinkError) as error:
         raise CompanionError(str(error)) from error
     companion = Companion(link, camera, pilot, is_told=options.is_told, wall_s=wall_time_s)
@@ -57,22 +57,6 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     finally:
         companion.close()
     return f"{companion.decision_count} decisions; {latency_text(companion)}"
-
-
-def open_link(url: str) -> UdpLink:
-    """A MAVLink link from its address: `udpout://HOST:PORT`, where the vehicle listens.
-
-    Raises:
-        LinkError: it is no such address, or the host is unknown.
-    """
-    try:
-        parts = urlsplit(url)
-        port = parts.port
-    except ValueError:
-        parts, port = urlsplit(""), None
-    if parts.scheme != "udpout" or not parts.hostname or not port or parts.path not in ("", "/"):
-        raise LinkError(f"{url}: must be udpout://HOST:PORT")
-    return UdpLink(port, LinkRole.ONBOARD, parts.hostname)
 
 
 def _loop(companion: Companion, seconds: float | None, console: Console) -> None:

@@ -1,0 +1,85 @@
+"""A client's links, by their addresses: both directions, and an end that comes late or goes away."""
+
+import time
+
+import pytest
+
+from autopilot.mavlink.client_links import open_client_link
+from autopilot.mavlink.links import LinkError, LinkRole
+from autopilot.mavlink.tcp import TcpPort
+from autopilot.mavlink.udp import UdpPort
+from tests.system.vehicle import free_ports
+
+FRAME = bytes.fromhex("fd09000000ffbe000000000000000608c0040392fe")  # a heartbeat: the vehicle's ports look for one
+
+
+@pytest.fixture
+def opened():
+    """Opens what is asked for, and closes it at the end."""
+    ends = []
+
+    def take(end):
+        ends.append(end)
+        return end
+
+    yield take
+    for end in ends:
+        end.close()
+
+
+def until(found, seconds=5.0):
+    end_s = time.monotonic() + seconds
+    while not (result := found()):
+        assert time.monotonic() < end_s, "not in time"
+        time.sleep(0.005)
+    return result
+
+
+def heard(port):
+    """What has come to one of the vehicle's ports, and the link that it came by."""
+    port.poll(0)
+    return next(((link, data) for link in port.links if (data := list(link.receive()))), None)
+
+
+def test_udpin_hears_who_sends_to_it_and_answers_them(opened):
+    api_port, own_port = free_ports()
+    link = opened(open_client_link(f"udpin://127.0.0.1:{api_port}"))
+    link.send(b"nobody has been heard yet")
+    vehicle = opened(UdpPort(api_port, LinkRole.ONBOARD, local_port=own_port))
+    vehicle.links[0].send(b"telemetry")
+    assert until(lambda: list(link.receive())) == [b"telemetry"]
+    link.send(FRAME)
+    assert until(lambda: heard(vehicle))[1] == [FRAME]
+
+
+def test_udpout_speaks_first(opened):
+    api_port, own_port = free_ports()
+    vehicle = opened(UdpPort(api_port, LinkRole.ONBOARD, local_port=own_port))
+    link = opened(open_client_link(f"udpout://127.0.0.1:{own_port}"))
+    link.send(FRAME)
+    until(lambda: heard(vehicle))[0].send(b"answer")
+    assert until(lambda: list(link.receive())) == [b"answer"]
+
+
+def test_tcp_connects_when_the_other_end_has_come_and_again_when_it_is_back(opened):
+    port = free_ports()[0]
+    link = opened(open_client_link(f"tcp://127.0.0.1:{port}"))
+
+    def tell(vehicle):
+        link.send(FRAME)
+        link.receive()
+        return heard(vehicle)
+
+    link.send(FRAME)
+    link.receive()  # nobody there yet
+    for _ in range(2):
+        vehicle = TcpPort(port)
+        until(lambda vehicle=vehicle: tell(vehicle))[0].send(b"answer")
+        assert until(lambda: list(link.receive())) == [b"answer"]
+        vehicle.close()
+
+
+@pytest.mark.parametrize("scheme", ["udpout", "udpin", "tcp"])
+def test_an_unknown_host_is_one_sentence(scheme):
+    with pytest.raises(LinkError, match="the host nobody"):
+        open_client_link(f"{scheme}://nobody.invalid:14540")
