@@ -15,7 +15,7 @@ from sim.sensors.camera import Lens
 from sim.sensors.quick.colours import make_paints
 from sim.sensors.quick.columns import Columns, lay_columns
 from sim.sensors.quick.ground import make_ground, pack_cells
-from sim.sensors.quick.light import STRIPS, light_corners, light_strips
+from sim.sensors.quick.light import STRIPS, light_corners, light_strips, pack_light
 from sim.sensors.quick.prepare import prepare_views
 from sim.sensors.quick.rows import Outputs, draw_rows
 from sim.sensors.quick.solids import Sights, Solid
@@ -24,7 +24,7 @@ from sim.world.trees import CROWN_RADIUS_SHARE
 from sim.world.world import World, WorldConfig, WorldMap
 
 RANGE_M = 80.0
-SAMPLES = 48  # distances per column at the default range
+SAMPLES = 40  # distances per column at the default range
 _LIMBS = 24  # solids of a person
 _CROWDED = 2.0  # trees stand closer in places than on average
 
@@ -117,6 +117,13 @@ class QuickCamera:
             wp.launch(pack_cells, dim=(world_count, ground.side), inputs=fresh, device=device, record_cmd=True),
             wp.launch(light_corners, dim=(world_count, ground.side + 1), inputs=fresh, device=device, record_cmd=True),
             wp.launch(light_strips, dim=(world_count, STRIPS), inputs=[*fresh, STRIPS], device=device, record_cmd=True),
+            wp.launch(
+                pack_light,
+                dim=(world_count, ground.texels),
+                inputs=[ground, every_world],
+                device=device,
+                record_cmd=True,
+            ),
         ]
         self.refresh()
 

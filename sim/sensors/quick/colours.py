@@ -22,7 +22,11 @@ _PATCHES_PER_M = wp.constant(2.0)
 _DETAIL_PER_M = wp.constant(16.0)
 _BLEND_M = wp.constant(0.08)  # pixels finer than a texel
 _TONES = 256
-_LAST_CODE = wp.constant(4095)
+_LAST_CODE = wp.constant(2047)
+_DARKEST = wp.constant(2.0**-12)
+_BRIGHTEST = wp.constant(15.99)
+_DARKEST_BITS = wp.constant((127 - 12) << 23)
+_DROPPED_BITS = wp.constant(16)  # of a float's, so that 128 codes are in each doubling of the light
 _CLOUD = wp.constant(wp.vec3(0.93, 0.94, 0.96))
 
 
@@ -34,7 +38,7 @@ class Paints:
     patches: wp.array[wp.uint8]  # which tone, half a metre a texel, (256 * 256,)
     detail: wp.array[wp.uint8]  # 128 is the mean, (256 * 256,)
     clouds: wp.array[wp.uint8]
-    codes: wp.array[wp.uint8]  # sRGB of light / (1 + light), (4096,)
+    codes: wp.array[wp.uint8]  # sRGB of light from 2^-12 to 16 in steps of its floats' bits, (2048,)
 
 
 @wp.func
@@ -109,9 +113,9 @@ def sky_light(paints: Paints, north: float, east: float, climb: float, length: f
 
 @wp.func
 def code(paints: Paints, light: float) -> wp.uint8:
-    """8-bit sRGB of linear light, its highlights rolled off."""
-    bright = wp.max(light, 0.0)
-    return paints.codes[wp.min(int(bright / (1.0 + bright) * 4096.0), _LAST_CODE)]
+    """8-bit sRGB of linear light, its highlights rolled off: by its exponent and the first bits of its mantissa."""
+    bits = wp.cast(wp.clamp(light, _DARKEST, _BRIGHTEST), wp.int32)
+    return paints.codes[((bits - _DARKEST_BITS) >> _DROPPED_BITS) & _LAST_CODE]
 
 
 def _smooth_noise(rng: np.random.Generator, steepness: float, longest: float) -> NDArray[np.float64]:
@@ -140,8 +144,8 @@ def make_paints(device: str) -> Any:
     stops = [0.0, 0.45, 0.80, 1.0]
     colours = np.array([[0.060, 0.118, 0.024], [0.092, 0.150, 0.034], [0.160, 0.185, 0.058], [0.170, 0.140, 0.075]])
     tones = np.stack([np.interp(place, stops, colours[:, i]) for i in range(3)], axis=-1)
-    light = np.minimum((np.arange(4096) + 0.5) / 4096.0, 0.9998)
-    light = light / (1.0 - light)
+    steps = np.arange(2048)
+    light = 2.0 ** (steps // 128 - 12) * (1.0 + (steps % 128 + 0.5) / 128.0)
     rolled = light * (1.0 + 0.12 * light) / (1.0 + light)
     paints = Paints()
     paints.tones = wp.array(tones, dtype=wp.vec3, device=device)

@@ -1,25 +1,25 @@
 """The ground round a camera as columns of distances, and where a pixel's ray meets it.
 
 A column looks along one level direction: at each of its distances it holds the steepest slope under which any ground
-up to there is seen. A ray meets the ground between the two distances whose slopes enclose its own; a few Newton steps
-on the world's exact surface give the place. Where a neighbouring ridge misleads a ray, it walks on along the distances.
+up to there is seen. A ray meets the ground between the two distances whose slopes enclose its own, on a triangle whose
+plane it meets within the triangle: first that of the pixel before, then as Newton's method leads from one to the next.
+A ray steeper than all ground needs no column. One that a neighbouring ridge misleads walks on along the distances.
 """
 
 import warp as wp
 
 from sim.sensors.quick.flags import FAST
-from sim.sensors.quick.ground import Ground, surface
+from sim.sensors.quick.ground import Ground, Plane, plane_at, surface, triangle_at
 from sim.sensors.quick.solids import NEVER
 from sim.sensors.quick.view import View, face_length, level_direction, pseudo_angle
 
 wp.set_module_options(FAST)
 
-_NEWTON_STEPS = wp.constant(4)
+_PLANES = wp.constant(4)  # triangles tried in turn, as Newton's method goes from one to the next
 _STEP_M = wp.constant(0.02)  # the last step: exact on one triangle, and off by a share of itself where it leaves it
 _STEP_SHARE = wp.constant(0.004)
 _WALK_BACK = wp.constant(2)  # samples that a misled ray goes back
 _SECANT_STEPS = wp.constant(8)
-_STEEP = wp.constant(1.5)  # rays this much steeper than the first sample's need no column
 
 
 @wp.struct
@@ -38,7 +38,7 @@ class Found:
 
     t: float  # NEVER if it does not
     k: int  # sample at its end of the search: the next pixel's is near
-    height: float  # [m] of the ground met last: the next pixel's is like it
+    plane: Plane  # met last: the next pixel's is often the same
 
 
 @wp.struct
@@ -76,14 +76,12 @@ def lay_columns(ground: Ground, views: wp.array[View], is_chosen: wp.array[wp.bo
     per_m = ground.cells_per_m
     u_rate = per_m * (direction[0] * view.heading[0] - direction[1] * view.heading[1])
     v_rate = per_m * (direction[0] * view.heading[1] + direction[1] * view.heading[0])
-    u = (view.pos_ned[0] + ground.half_size_m) * per_m
-    v = (view.pos_ned[1] + ground.half_size_m) * per_m
     first = (i_camera * columns.room + i_column) * columns.samples
     first_distance = i_camera * columns.samples
     steepest = float(-NEVER)
     for k in range(columns.samples):
         distance = columns.distances[first_distance + k]
-        height = surface(ground, view.cell_base, u + distance * u_rate, v + distance * v_rate)[0]
+        height = surface(ground, view.cell_base, view.eye[0] + distance * u_rate, view.eye[1] + distance * v_rate)[0]
         steepest = wp.max(steepest, (height + view.pos_ned[2]) / distance)
         columns.slopes[first + k] = steepest
 
@@ -93,15 +91,18 @@ def ground_depth(
     ground: Ground, columns: Columns, view: View, i_camera: int, ray: LevelRay, before: Found, t_max: float
 ) -> Found:
     """Where a ray meets the ground before `t_max`; NEVER if it does not, or surely only behind it."""
-    found = Found()
-    found.k = before.k
-    found.height = before.height
+    found = before
     found.t = NEVER
-    major = face_length(ray.ahead, ray.right)
     low = float(0.0)
-    high = float(t_max)
-    t = wp.max(-view.pos_ned[2] - before.height, 0.0) / wp.max(-ray.climb, 1.0e-6)
-    if ray.climb * view.first_m > -_STEEP * view.above_ground * major:
+    high = float(NEVER)
+    t = plane_depth(before.plane, ray)  # as if the ground went on as it was in the pixel before
+    is_steep = ray.climb * ray.climb > view.steep_squared * (ray.ahead * ray.ahead + ray.right * ray.right)
+    if is_steep or view.columns == 0:
+        if ray.climb > 0.0:
+            return found
+        t = wp.max(t, 0.0)
+    else:
+        major = face_length(ray.ahead, ray.right)
         inverse = 1.0 / major
         slope = ray.climb * inverse
         place = (pseudo_angle(ray.ahead, ray.right, inverse) - view.angle_low) * view.columns_per_angle
@@ -115,39 +116,63 @@ def ground_depth(
             return found
         if (share > 0.5 and slope <= skyline_right) or slope > skyline_left:
             first = first + columns.samples
-        k = wp.min(before.k, last)
-        while k < last and columns.slopes[first + k] < slope:
-            k = k + 1
-        while k > 0 and columns.slopes[first + k - 1] >= slope:
-            k = k - 1
+        k = first_at(columns, first, slope, before.k)
         found.k = k
         first_distance = i_camera * columns.samples
         far = columns.distances[first_distance + k]
-        high = wp.min(high, far * inverse)
+        high = wp.min(t_max, far * inverse)
+        near = float(0.0)
         if k > 0:
             near = columns.distances[first_distance + k - 1]
             low = near * inverse
             if low >= t_max:
                 return found
-            # between two samples level ground has a slope that is linear in one over the distance
-            slope_near = columns.slopes[first + k - 1]
-            part = (slope - slope_near) / wp.max(columns.slopes[first + k] - slope_near, 1.0e-6)
-            t = near * far * inverse / wp.max(far + part * (near - far), 1.0e-6)
-    t = wp.clamp(t, low, high)
-    u = (view.pos_ned[0] + ground.half_size_m) * ground.cells_per_m
-    v = (view.pos_ned[1] + ground.half_size_m) * ground.cells_per_m
-    for _ in range(_NEWTON_STEPS):
-        here = surface(ground, view.cell_base, u + t * ray.u, v + t * ray.v)
-        gap = ray.climb * t - view.pos_ned[2] - here[0]
-        rate = wp.min(ray.climb - here[1] * ray.u - here[2] * ray.v, -1.0e-4)
-        step = -gap / rate
-        t_next = wp.clamp(t + step, low, high)
-        if wp.abs(step) < _STEP_M + _STEP_SHARE * t:
-            found.t = t_next
-            found.height = ray.climb * t_next - view.pos_ned[2]
+        if t < low or t > high:
+            t = high
+            if k > 0:
+                chord = chord_distance(near, far, columns.slopes[first + k - 1], columns.slopes[first + k], slope)
+                t = wp.clamp(chord * inverse, low, high)
+            found.plane.i = -1
+    for _ in range(_PLANES):
+        u = view.eye[0] + t * ray.u
+        v = view.eye[1] + t * ray.v
+        if triangle_at(ground, view.cell_base, u, v) == found.plane.i:
+            found.t = t
             return found
-        t = t_next
+        found.plane = plane_at(ground, view.cell_base, u, v, view.eye)
+        t_next = plane_depth(found.plane, ray)
+        if wp.abs(t_next - t) < _STEP_M + _STEP_SHARE * t:
+            found.t = t_next
+            return found
+        t = wp.clamp(t_next, low, high)
+        if t != t_next:
+            found.plane.i = -1
     return walk(ground, columns, view, i_camera, ray, found, t_max)
+
+
+@wp.func
+def first_at(columns: Columns, first: int, slope: float, start: int) -> int:
+    """The first sample of a column whose slope reaches one that the last reaches; the search starts anywhere."""
+    last = columns.samples - 1
+    k = wp.min(start, last)
+    while k < last and columns.slopes[first + k] < slope:
+        k = k + 1
+    while k > 0 and columns.slopes[first + k - 1] >= slope:
+        k = k - 1
+    return k
+
+
+@wp.func
+def chord_distance(near: float, far: float, slope_near: float, slope_far: float, slope: float) -> float:
+    """Where a slope is met between two samples of an even hillside: it is linear in one over the distance."""
+    part = (slope - slope_near) / wp.max(slope_far - slope_near, 1.0e-6)
+    return near * far / wp.max(far + part * (near - far), 1.0e-6)
+
+
+@wp.func
+def plane_depth(plane: Plane, ray: LevelRay) -> float:
+    """Parameter of a ray at a plane of the ground."""
+    return plane.below / wp.max(plane.rise_north * ray.u + plane.rise_east * ray.v - ray.climb, 1.0e-4)
 
 
 @wp.func
@@ -157,10 +182,10 @@ def walk(
     """Where a ray meets the ground: from sample to sample until it is under it, then by regula falsi."""
     found = Found()
     found.k = before.k
-    found.height = before.height
+    found.plane = before.plane
     found.t = NEVER
-    u = (view.pos_ned[0] + ground.half_size_m) * ground.cells_per_m
-    v = (view.pos_ned[1] + ground.half_size_m) * ground.cells_per_m
+    u = view.eye[0]
+    v = view.eye[1]
     inverse = 1.0 / face_length(ray.ahead, ray.right)
     first = i_camera * columns.samples
     low = float(0.0)

@@ -53,7 +53,7 @@ def sunlight(ground: Ground, base: int, x: float, y: float, footprint_m: float) 
     if footprint_m > _BLEND_M:
         last = ground.texels - 1
         texel = wp.clamp(int(x), 0, last) * ground.texels + wp.clamp(int(y), 0, last)
-        return float(ground.light[base + texel]) * (1.0 / 255.0)
+        return float(int(ground.light_four[base + texel]) & 255) * (1.0 / 255.0)
     edge = float(ground.texels) - 1.001
     u = wp.clamp(x - 0.5, 0.0, edge)
     v = wp.clamp(y - 0.5, 0.0, edge)
@@ -61,10 +61,11 @@ def sunlight(ground: Ground, base: int, x: float, y: float, footprint_m: float) 
     j = int(v)
     u = u - float(i)
     v = v - float(j)
-    k = base + i * ground.texels + j
-    south = float(ground.light[k]) + v * (float(ground.light[k + 1]) - float(ground.light[k]))
-    k = k + ground.texels
-    north = float(ground.light[k]) + v * (float(ground.light[k + 1]) - float(ground.light[k]))
+    four = int(ground.light_four[base + i * ground.texels + j])
+    here = float(four & 255)
+    north = float((four >> 16) & 255)
+    south = here + v * (float((four >> 8) & 255) - here)
+    north = north + v * (float((four >> 24) & 255) - north)
     return (south + u * (north - south)) * (1.0 / 255.0)
 
 
@@ -201,3 +202,23 @@ def light_strips(worlds: wp.array[World], is_chosen: wp.array[wp.bool], ground: 
         reach = far_m * ground.texels_per_m
         if north + reach > float(first) and north - reach < float(end):
             darken(ground, i_world * ground.texels * ground.texels, crown_shadow(w.terrain, tree), first, end)
+
+
+@wp.kernel
+def pack_light(ground: Ground, is_chosen: wp.array[wp.bool]) -> None:
+    i_world, i = wp.tid()
+    if not is_chosen[i_world]:
+        return
+    last = ground.texels - 1
+    start = i_world * ground.texels * ground.texels
+    south = start + i * ground.texels
+    north = start + wp.min(i + 1, last) * ground.texels
+    here = wp.uint32(ground.light[south])
+    north_here = wp.uint32(ground.light[north])
+    for j in range(ground.texels):
+        east = wp.uint32(ground.light[south + wp.min(j + 1, last)])
+        north_east = wp.uint32(ground.light[north + wp.min(j + 1, last)])
+        low = here | (east << wp.uint32(8))
+        ground.light_four[south + j] = low | (north_here << wp.uint32(16)) | (north_east << wp.uint32(24))
+        here = east
+        north_here = north_east

@@ -19,7 +19,8 @@ from sim.world.world import World
 wp.set_module_options({"enable_backward": False})
 
 _FAR_M = wp.constant(1.0e5)  # no camera is so far out; not true of NaN either
-_FIRST_SHARE = wp.constant(0.35)  # a column begins this share of the height above ground away
+_MARGIN = wp.constant(1.02)  # on the steepest slope
+_GENTLE = wp.constant(0.01)  # level ground counts as this steep, squared
 _FIRST_MIN_M = wp.constant(0.25)
 
 
@@ -62,6 +63,8 @@ def with_columns(view: View, width: int, height: int, room: int) -> View:
     half_y = 0.5 * float(height) * view.per_pixel
     low = float(NEVER)
     high = float(-NEVER)
+    falling = int(0)
+    climbing = int(0)
     for i in range(4):
         x = wp.where(i % 2 == 0, -half_x, half_x)
         y = wp.where(i < 2, -half_y, half_y)
@@ -71,6 +74,9 @@ def with_columns(view: View, width: int, height: int, room: int) -> View:
         angle = pseudo_angle(ahead, right, 1.0 / face_length(ahead, right))
         low = wp.min(low, angle)
         high = wp.max(high, angle)
+        if ray[2] * ray[2] > view.steep_squared * (ahead * ahead + right * right):
+            falling = falling + wp.where(ray[2] > 0.0, 1, 0)
+            climbing = climbing + wp.where(ray[2] < 0.0, 1, 0)
     depth = wp.max(wp.abs(view.up_rdf[2]), 1.0e-6)  # where straight up or down is in the picture
     is_upright = wp.abs(view.up_rdf[0]) <= half_x * depth and wp.abs(view.up_rdf[1]) <= half_y * depth
     if is_upright or high - low > 4.0:
@@ -84,7 +90,18 @@ def with_columns(view: View, width: int, height: int, room: int) -> View:
     view.angle_low = low
     view.columns = wp.clamp(int((high - low) / (2.0 * view.per_pixel)) + 2, 8, room)
     view.columns_per_angle = float(view.columns - 1) / wp.max(high - low, 1.0e-3)
+    if falling == 4 or climbing == 4:  # so are all rays between
+        view.columns = 0
     return view
+
+
+@wp.func
+def steepest(ground: Ground, world: int) -> float:
+    """Square of a slope that no ground of a world has."""
+    squared = float(_GENTLE)
+    for i in range(ground.side):
+        squared = wp.max(squared, _MARGIN * ground.steepness[world * ground.side + i])
+    return squared
 
 
 @wp.kernel
@@ -112,8 +129,12 @@ def prepare_views(
     view.inside = SKY
     u = (view.pos_ned[0] + ground.half_size_m) * ground.cells_per_m
     v = (view.pos_ned[1] + ground.half_size_m) * ground.cells_per_m
+    view.eye = wp.vec3(u, v, -view.pos_ned[2])
     view.above_ground = wp.max(-view.pos_ned[2] - surface(ground, view.cell_base, u, v)[0], 0.02)
-    view.first_m = wp.clamp(_FIRST_SHARE * view.above_ground, _FIRST_MIN_M, 0.25 * range_m)
+    view.steep_squared = steepest(ground, world)
+    # no ray that needs a column meets the ground nearer, even where both slopes are the steepest
+    near = 0.5 * view.above_ground / wp.sqrt(view.steep_squared)
+    view.first_m = wp.clamp(near, _FIRST_MIN_M, 0.25 * range_m)
     growth = wp.pow(range_m / view.first_m, 1.0 / float(columns.samples - 1))
     distance = view.first_m
     for k in range(columns.samples):

@@ -8,7 +8,7 @@ import warp as wp
 from sim.sensors.quick.colours import Paints, blended, code, ground_colour, sky_light
 from sim.sensors.quick.columns import Columns, Found, ground_depth, level_ray
 from sim.sensors.quick.flags import FAST
-from sim.sensors.quick.ground import Ground
+from sim.sensors.quick.ground import Ground, plane_at
 from sim.sensors.quick.light import sunlight
 from sim.sensors.quick.solids import NEVER, Sights, Solid, solid_depth
 from sim.sensors.quick.view import View
@@ -150,7 +150,7 @@ def draw_rows(
     middle = view.ahead + y * view.down
     per_range = 1.0 / (range_m * range_m)
     found = Found()
-    found.height = -view.pos_ned[2] - view.above_ground
+    found.plane = plane_at(ground, view.cell_base, view.eye[0], view.eye[1], view.eye)
     for column in range(outputs.width):
         x = (float(column) + 0.5 - 0.5 * float(outputs.width)) * view.per_pixel
         ray = middle + x * view.right

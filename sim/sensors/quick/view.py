@@ -28,10 +28,12 @@ class View:
     per_pixel: float  # of x and y
     gain: wp.vec3  # on red, green and blue light
     above_ground: float  # [m], at least a few centimetres
+    eye: wp.vec3  # cells from the south edge and from the west edge, metres above home
+    steep_squared: float  # no ground in this world is steeper [m²/m²]
     angle_low: float  # pseudo-angle of the first column
     left_edge: wp.vec2  # level normals of the picture's outermost directions, pointing inwards; 0 for all round
     right_edge: wp.vec2
-    columns: int
+    columns: int  # 0: no ray of the picture needs one
     columns_per_angle: float
     first_m: float  # distance of a column's first sample
     solids: int  # listed for this camera
