@@ -36,7 +36,7 @@ class Ranges:
 class Track:
     """One episode or flight. Arrays have one entry per sample, at even times."""
 
-    time_s: NDArray[np.float64]  # since the episode's start, rising
+    time_s: NDArray[np.float64]  # since the episode's start: the first sample one interval after it
     distance_m: NDArray[np.float64]  # vehicle to the owner's chest
     bearing_rad: NDArray[np.float64]  # of the owner from the vehicle's true heading, in [-pi, pi]
     is_in_view: NDArray[np.bool_]  # some of the owner is in the camera's picture, not hidden
@@ -49,17 +49,17 @@ class Track:
         lengths = {len(column) for column in (self.distance_m, self.bearing_rad, self.is_in_view, self.is_collided)}
         if not len(self.time_s) or lengths != {len(self.time_s)}:
             raise ValueError("a track's arrays must have one entry per sample, and at least one")
+        if self.time_s[0] <= 0.0:
+            raise ValueError("a track's first sample is one interval after its start")
 
     @property
     def interval_s(self) -> float:
         """Between two samples."""
-        return float(self.time_s[-1] - self.time_s[0]) / max(len(self.time_s) - 1, 1)
+        return float(self.time_s[-1]) / len(self.time_s)
 
     @property
     def planned_count(self) -> int:
         """Samples of an episode that nothing ended early; at least those there are."""
-        if len(self.time_s) < 2:
-            return 1
         return max(len(self.time_s), round(self.planned_s / self.interval_s))
 
     @property

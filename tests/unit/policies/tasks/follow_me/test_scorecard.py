@@ -55,6 +55,12 @@ def test_time_after_a_collision_counts_as_not_followed():
     assert (card.success.value, card.collision.value) == (0.0, 1.0)
 
 
+def test_an_episode_of_one_decision_was_not_followed_for_the_rest():
+    card = scorecard([track(count=1)])
+    assert card.success.value == 0.0
+    assert card.in_band.value == pytest.approx(1.0 / COUNT)
+
+
 def test_nearer_than_half_a_metre_is_a_collision():
     distance = np.full(COUNT, 2.0)
     distance[300] = 0.45
@@ -139,4 +145,9 @@ def test_no_episode_is_refused():
 
 def test_arrays_of_different_length_are_refused():
     with pytest.raises(ValueError, match="one entry per sample"):
-        Track(np.zeros(2), np.zeros(3), np.zeros(2), np.zeros(2, bool), np.zeros(2, bool), 60.0)
+        Track(np.ones(2), np.zeros(3), np.zeros(2), np.zeros(2, bool), np.zeros(2, bool), 60.0)
+
+
+def test_a_sample_at_the_very_start_is_refused():
+    with pytest.raises(ValueError, match="first sample"):
+        Track(np.arange(2.0), np.zeros(2), np.zeros(2), np.zeros(2, bool), np.zeros(2, bool), 60.0)
