@@ -57,16 +57,15 @@ def fly(pilot: Pilot, cell: Cell, seed: int, seconds: float = SECONDS) -> Track:
         flight.run(lambda _: companion.phase is Phase.FLYING or flight.time_us >= end_us)
         if companion.phase is not Phase.FLYING:
             raise NotEngaged(f"seed {seed}: {companion.phase.value}: {companion.trouble}")
-        watch = FollowWatch(flight, seconds)
-
-        def is_over(_: object) -> bool:
-            watch.frame()
-            return watch.is_complete or watch.has_collided or companion.phase is not Phase.FLYING
-
-        flight.run(is_over)
+        watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, seconds)
+        watch.frame()  # it follows from now on
+        flight.run(lambda _: watch.is_over, on_frame=lambda _: watch.frame())
     finally:
         flight.close()
-    return watch.track(cell.trees_per_ha, cell.owner_speed_max)
+    track = watch.track()
+    if track is None:
+        raise NotEngaged(f"seed {seed}: it followed for no time")
+    return replace(track, trees_per_ha=cell.trees_per_ha, owner_speed_max=cell.owner_speed_max)
 
 
 def main(name: str, seed: str, folder: str) -> None:

@@ -14,30 +14,27 @@ from rich.console import Console
 from rich.table import Table
 
 from autopilot.mavlink.links import LinkError
-from autopilot.vehicle import Mode
 from common.airframe import AirframeError, load_airframe
 from common.files import write_whole
 from common.params import ParameterError
 from mission.connections import open_links, open_page
 from mission.flight import FlightConfig, flight_parameters
-from mission.follow.judge import track_of
 from mission.follow.lockstep import flight_with_companion, take_off
 from mission.follow.owner import FOLLOW_WORLD, OwnerConfig, Pace
+from mission.follow.watch import FollowWatch
 from mission.options import FlightOptions, UserError, flight_config, speed_of
 from mission.progress import Progress
 from mission.script import Drone
 from mission.session import advance, new_folder, print_line
 from mission.stream import LOOPBACK
 from mission.view.film import write_film
-from mission.view.moment import distances_m
-from mission.view.recording import Recorder, Recording
+from mission.view.recording import Recorder
 from policies.companion.companion import Companion, Pilot
 from policies.companion.engagement import Phase
 from policies.companion.pilot import SCRIPTED, TASK, PilotError, load_pilot
 from policies.pretrained.shelf import pretrained
 from policies.tasks.follow_me.scorecard import Scorecard, lines, scorecard
-from policies.tasks.follow_me.track import Ranges
-from sim.world.world import WorldMap
+from policies.tasks.follow_me.track import Ranges, Track
 
 ENGAGE_S = 20.0  # after the take-off, until it follows
 FILM = "flight.mp4"
@@ -74,12 +71,13 @@ def follow_session(options: FollowOptions) -> int:
     with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
         flight, companion = flight_with_companion(config, pilot, links=links, folder=folder)
     recorder = Recorder(flight, action=lambda: companion.action)
-    watchers: list[Callable[[], None]] = [recorder.frame]
+    watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, options.seconds)
+    watchers: list[Callable[[], None]] = [recorder.frame, watch.frame]
     if page is not None:
         from mission.view.live import LiveView
 
         view = LiveView(
-            flight, page, speed=speed, action=lambda: companion.action, score=lambda: score_lines(recorder, companion)
+            flight, page, speed=speed, action=lambda: companion.action, score=lambda: score_lines(watch, companion)
         )
         watchers.append(view.frame)
     running = flight.drone.start(follow(flight.drone, companion, options.seconds))
@@ -92,9 +90,12 @@ def follow_session(options: FollowOptions) -> int:
         view.close()
     running.cancel()
     flight.close()
+    recorder.recording().save(folder)
     if running.error is not None:
         print_line(console, f"result: {running.error}")
-    return finish(recorder.recording(), flight.world, options, folder, console, is_landed=running.error is None)
+    if options.has_film:
+        write_film(recorder.recording(), flight.world, folder / FILM, console)
+    return finish(watch.track(), folder, console, is_landed=running.error is None)
 
 
 def follow_config(options: FollowOptions) -> FlightConfig:
@@ -123,34 +124,26 @@ async def follow(drone: Drone, companion: Companion, seconds: float) -> None:
     await drone.land()
 
 
-def score_lines(recorder: Recorder, companion: Companion) -> tuple[str, ...]:
+def score_lines(watch: FollowWatch, companion: Companion) -> tuple[str, ...]:
     """How it goes so far, for the live page."""
     state = f"companion: {companion.phase.value}" + (f" ({companion.trouble})" if companion.trouble else "")
-    rows = recorder.recording().rows
-    rows = rows[rows["mode"] == Mode.OFFBOARD]
-    if len(rows) == 0:
+    track, ranges = watch.track(), Ranges()
+    if track is None:
         return (state,)
-    distance, ranges = distances_m(rows), Ranges()
+    distance = track.distance_m
     is_near = (distance >= ranges.near_m) & (distance <= ranges.far_m)
     band = f"{ranges.near_m:g} to {ranges.far_m:g} m"
     return (state, f"within {band}: {100.0 * is_near.mean():.0f} %, median {float(np.median(distance)):.1f} m")
 
 
-def finish(
-    recording: Recording, world: WorldMap, options: FollowOptions, folder: Path, console: Console, *, is_landed: bool
-) -> int:
-    """Writes recording, scorecard and film, and shows the scorecard; returns the exit code."""
-    recording.save(folder)
-    with console.status("looking at the flight again"):
-        track = track_of(recording, world, options.seconds)
+def finish(track: Track | None, folder: Path, console: Console, *, is_landed: bool) -> int:
+    """Writes and shows the scorecard of what was followed, if anything was; returns the exit code."""
     is_good = False
     if track is not None:
         card = scorecard([track])
         is_good = is_landed and track.is_whole and card.collision.value == 0.0
         write_whole(folder / "summary.json", (json.dumps(summary_of(card), indent=2) + "\n").encode())
         console.print(_table(card))
-    if options.has_film:
-        write_film(recording, world, folder / FILM, console)
     print_line(console, f"logs, scorecard and film: {folder}")
     return 0 if is_good else 1
 

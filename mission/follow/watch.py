@@ -1,73 +1,76 @@
-"""How well a flight follows: the truth of its owner and its obstacles, ten times a second, for a scorecard.
+"""How well a flight follows: the truth of its owner and its obstacles, for a scorecard.
 
-In: a flight with an owner, frame by frame. Out: a `Track`. It looks at the truth: nothing of it goes back.
+In: a flight with an owner, frame by frame, and whether somebody follows. Out: a `Track` from then on, a sample for each
+decision; it ends with the planned time, with a collision, or when nobody follows any more. Nothing of the truth goes
+back to who flies.
 """
 
-from dataclasses import replace
-from math import nan
+from collections.abc import Callable
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from mission.flight import Flight
-from policies.tasks.follow_me.measuring import COLUMNS, measure_rows
+from policies.tasks.follow_me.measuring import COLUMNS, forget_impacts, measure_rows
 from policies.tasks.follow_me.observe import DECISION_S
-from policies.tasks.follow_me.track import Track
+from policies.tasks.follow_me.track import Ranges, Track
 
 _SAMPLE_US = round(DECISION_S * 1e6)
 
 
 class FollowWatch:
-    """Watches vehicle 0 of a flight from now on: call `frame` after each of the flight's.
+    """Watches vehicle 0 of a flight: call `frame` after each of the flight's.
 
     Args:
         flight: with an owner.
+        is_following: whether somebody makes the vehicle follow now.
         planned_s: how long it is to follow.
-        touch_m: nearer to any part of the owner is a collision.
 
     Raises:
         ValueError: the flight has no owner.
     """
 
-    def __init__(self, flight: Flight, planned_s: float, touch_m: float = 0.5) -> None:
+    def __init__(self, flight: Flight, is_following: Callable[[], bool], planned_s: float) -> None:
         if flight.owner is None:
             raise ValueError("there is nobody to follow in this flight")
         self._flight = flight
+        self._is_following = is_following
         self._planned_s = planned_s
         self._out = wp.zeros((1, len(COLUMNS)), dtype=float)
-        impact_before = float(flight.rig.arrays.body.numpy()["impact_speed"][0])  # of standing on the ground
-        self._inputs = [flight.rig.arrays, flight.owner.people, touch_m, impact_before, self._out]
+        self._row: NDArray[np.float32] = self._out.numpy()[0]  # live
+        self._inputs = [flight.rig.arrays, flight.owner.people, Ranges().collision_m, self._out]
         self._rows: list[NDArray[np.float32]] = []
-        self._start_us = flight.time_us
-        self._due_us = self._start_us + _SAMPLE_US
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether it has followed for as long as planned."""
-        return self._flight.time_us >= self._start_us + round(self._planned_s * 1e6)
+        self._start_us = -1  # of the flight, when it began to follow; -1: not yet
+        self.is_over = False
 
     @property
     def sample_count(self) -> int:
         """Samples taken so far."""
         return len(self._rows)
 
-    @property
-    def has_collided(self) -> bool:
-        """Whether it has touched anything since it is watched."""
-        return any(row[3] > 0.5 for row in self._rows[-1:])
-
     def frame(self) -> None:
-        """Takes a sample if one is due."""
-        if self._flight.time_us < self._due_us:
+        """Looks for collisions, and takes a sample if one is due or the following is over."""
+        if self.is_over:
             return
-        self._due_us += _SAMPLE_US
+        if self._start_us < 0:
+            if self._is_following():
+                self._start_us = self._flight.time_us
+                wp.launch(forget_impacts, 1, [self._flight.rig.arrays])
+            return
         wp.launch(measure_rows, 1, self._inputs)
-        self._rows.append(self._out.numpy()[0].copy())
+        passed_us = self._flight.time_us - self._start_us
+        has_collided = self._row[COLUMNS.index("is_collided")] > 0.5
+        is_left = not self._is_following()
+        self.is_over = has_collided or is_left or passed_us >= round(self._planned_s * 1e6)
+        is_due = passed_us >= (len(self._rows) + 1) * _SAMPLE_US
+        if is_due or has_collided or (is_left and not self._rows):
+            self._rows.append(self._row.copy())
 
-    def track(self, trees_per_ha: float = nan, owner_speed_max: float = nan) -> Track:
-        """What was seen so far; at least one frame must have been."""
+    def track(self) -> Track | None:
+        """What was seen so far; none before the first sample."""
+        if not self._rows:
+            return None
         distance, bearing, is_in_view, is_collided = np.array(self._rows, dtype=np.float64).T
         time_s = DECISION_S * np.arange(1, len(self._rows) + 1, dtype=np.float64)
-        track = Track(time_s, distance, bearing, is_in_view > 0.5, is_collided > 0.5, self._planned_s)
-        return replace(track, trees_per_ha=trees_per_ha, owner_speed_max=owner_speed_max)
+        return Track(time_s, distance, bearing, is_in_view > 0.5, is_collided > 0.5, self._planned_s)
