@@ -47,6 +47,7 @@ class _Watched:
     def __init__(self, script: Pilot, learned: Pilot) -> None:
         self.kind, self.image_shape = learned.kind, learned.image_shape
         self._script, self._learned = script, learned
+        self.owner_hfrd = script.owner_hfrd
         self.is_finite = True
 
     def reset(self) -> None:
@@ -55,7 +56,9 @@ class _Watched:
     def act(self, vector: np.ndarray, image: np.ndarray) -> np.ndarray:
         action = self._learned.act(vector, image)
         self.is_finite &= bool(np.isfinite(action).all())
-        return self._script.act(vector, image)
+        chosen = self._script.act(vector, image)
+        self.owner_hfrd = self._script.owner_hfrd
+        return chosen
 
 
 def _latency_ms(pilot: _Watched) -> tuple[float, float]:

@@ -1,16 +1,17 @@
 """The owner in a picture, by the blue of their shirt: where, and how far away by the depth beside the colour.
 
-In: one picture of the onboard camera, 10 Hz. Out: direction and range, for the tracker and for scripted followers.
-Trained policies look for themselves. What is blue and has a depth is taken for the shirt: skies have none.
+In: one picture of the onboard camera, 10 Hz. Out: direction and range, or the place of the chest, for a scripted
+follower and policies that say nothing of the owner. What is blue and has a depth is taken for the shirt.
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, hypot, radians, sin, tan
+from math import atan2, cos, hypot, radians, sin, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common.attitude import Vector
+from common.attitude import Vector, rotated
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, camera_mount
 
 BLUE_OVER_RED, BLUE_OVER_GREEN = 1.6, 1.3  # ratios of sRGB values; measured on the shirt, near and far, sun and shade
 PIXELS_MIN = 3  # fewer are chance
@@ -60,3 +61,21 @@ def find_owner(pixels: NDArray[np.uint8], hfov_deg: float, depth_half_m: float) 
     along_m = depth_half_m * byte / (255.0 - byte)
     level = hypot(1.0, right)
     return Sight(atan2(right, 1.0), atan2(-down, level), along_m * hypot(level, down) + _HALF_BODY_M, count)
+
+
+def chest_hfrd(pixels: NDArray[np.uint8], down_frd: tuple[float, float]) -> Vector | None:
+    """The owner's chest from the vehicle: ahead, right and down [m], level; None if they are not to be seen.
+
+    Args:
+        pixels: of the policy's camera, shape (height, width, 4).
+        down_frd: the first two elements of the unit vector down in the body frame: how the vehicle leans.
+    """
+    sight = find_owner(pixels, HFOV_DEG, float(DEPTH_HALF_M))
+    if sight is None:
+        return None
+    place = np.array(rotated(camera_mount(), sight.place_rdf))  # from the lens, a decimetre from the vehicle's middle
+    down_x, down_y = down_frd
+    down = np.array([down_x, down_y, sqrt(max(1.0 - down_x**2 - down_y**2, 0.0))])
+    ahead = np.array([1.0, 0.0, 0.0]) - down_x * down
+    ahead /= np.linalg.norm(ahead)
+    return float(place @ ahead), float(place @ np.cross(down, ahead)), float(place @ down) + SHIRT_OVER_CHEST_M

@@ -8,6 +8,7 @@ simulated time, and then the same flight gives the same bytes.
 
 from collections import deque
 from collections.abc import Callable
+from math import isclose, isfinite
 from typing import Protocol
 
 import numpy as np
@@ -21,7 +22,7 @@ from policies.companion.engagement import Engagement, Phase, Sending, Situation,
 from policies.companion.observation import Observer
 from policies.companion.owner_watch import OwnerWatch
 from policies.companion.vehicle_link import ByteLink, VehicleLink
-from policies.tasks.follow_me.observe import EGO_BLIND
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG
 
 SETPOINT_US = 50_000
 DECISION_US = 100_000
@@ -31,6 +32,8 @@ TELEMETRY_OLD_US = 500_000
 HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
 LATENCIES_KEPT = 600  # a minute of decisions
+LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the pictures that policies are trained on
+LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
 
 Floats = NDArray[np.float32]
 STILL: tuple[Vector, float] = ((0.0, 0.0, 0.0), 0.0)
@@ -41,6 +44,7 @@ class Pilot(Protocol):
 
     kind: int  # of its vector: EGO or EGO_BLIND
     image_shape: tuple[int, int, int]  # (height, width, channels) of the picture it needs
+    owner_hfrd: Vector | None  # [m] where the last picture showed the owner's chest, from the vehicle; None: nowhere
 
     def reset(self) -> None:
         """Forgets what came before."""
@@ -102,20 +106,24 @@ class Companion:
         begun_s = self._wall_s() if self._wall_s is not None and picture is not None else None
         if picture is not None:
             self._picture, self._picture_us = picture, time_us
-        self.trouble = self._trouble(time_us)
+        blindness = self._blindness(time_us)
+        self.trouble = blindness or self._loss()
         orders = self.engagement.step(self._situation(time_us))
         if orders.text:
             self.vehicle.say(orders.text)
         if orders.wish is not Wish.NONE:
             self.vehicle.ask_for(orders.wish)
-        has_decided = self._choose(orders.sending, picture, time_us)
+        self._switch(orders.sending)
+        has_looked = picture is not None and not blindness and self._look(picture, time_us)
+        has_decided = has_looked and orders.sending is Sending.POLICY
         if orders.sending is not Sending.NOTHING and (has_decided or time_us >= self._setpoint_due_us):
             self._setpoint_due_us = time_us + SETPOINT_US
             self.vehicle.send_setpoint(*self._setpoint)
         if has_decided and begun_s is not None and self._wall_s is not None:
             self.latencies_s.append(self._wall_s() - begun_s)
         if picture is not None:  # only now: the setpoint does not wait for it
-            self._watch.update(picture, self.vehicle.own, self.vehicle.owner)
+            seen_hfrd = self._pilot.owner_hfrd if has_looked else None
+            self._watch.update(picture.time_us, self.vehicle.own, self.vehicle.owner, seen_hfrd)
 
     def picture_age_s(self, time_us: int) -> float:
         """Since the newest picture came in; infinite without one."""
@@ -127,7 +135,7 @@ class Companion:
 
     @property
     def action(self) -> Floats:
-        """What the pilot chose last, shape (4,); zeros before it flies."""
+        """What the pilot chose last, shape (4,); zeros while it does not fly."""
         return self._action.copy()
 
     def close(self) -> None:
@@ -135,29 +143,33 @@ class Companion:
         self._camera.close()
         self.vehicle.close()
 
-    def _choose(self, sending: Sending, picture: ImageFrame | None, time_us: int) -> bool:
-        """Renews the setpoint; whether by a new decision of the pilot."""
-        if sending is not Sending.POLICY:
-            self._setpoint, self._sending = STILL, sending
-            return False
-        if self._sending is not Sending.POLICY:  # an episode begins, as in training: no memory, no last action
-            self._sending = sending
-            self._pilot.reset()
-            self._action[:] = 0.0
+    def _switch(self, sending: Sending) -> None:
+        """Takes over, or lets go."""
+        if sending is Sending.POLICY and self._sending is not Sending.POLICY:
+            self._pilot.reset()  # an episode begins, as in training: no memory, no last action
             self._decided_us = -DECISION_US
-        if picture is None or picture.time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
-            return False
-        self._decided_us = picture.time_us
-        self._decide(picture, time_us)
-        return True
+        self._sending = sending
+        if sending is not Sending.POLICY:
+            self._setpoint = STILL
+            self._action[:] = 0.0
 
-    def _decide(self, picture: ImageFrame, time_us: int) -> None:
+    def _look(self, picture: ImageFrame, time_us: int) -> bool:
+        """Lets the pilot see a picture, if one is due, and decide if it flies; whether it was due.
+
+        Who does not fly looks too: the owner must have been seen before anybody flies by sight.
+        """
+        if 0 <= picture.time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
+            return False  # a clock that has gone back is that of a vehicle that has restarted
+        self._decided_us = picture.time_us
         own = self.vehicle.own
         vector = self._observer.vector(own, self.vehicle.owner, self._action, time_us)
         self.seen = vector.copy()
-        self._action = self._pilot.act(vector, picture.pixels)
-        self._setpoint = self._observer.setpoint(self._action, own)
-        self.decision_count += 1
+        action = self._pilot.act(vector, picture.pixels)
+        if self._sending is Sending.POLICY:
+            self._action = action
+            self._setpoint = self._observer.setpoint(action, own)
+            self.decision_count += 1
+        return True
 
     def _situation(self, time_us: int) -> Situation:
         own = self.vehicle.own
@@ -171,21 +183,27 @@ class Companion:
             is_refused=self.vehicle.take_refusal(),
         )
 
-    def _trouble(self, time_us: int) -> str:
-        """Why the policy cannot fly now; "" if it can."""
+    def _blindness(self, time_us: int) -> str:
+        """Why there is nothing to decide on; "" if there is."""
         own = self.vehicle.own
         if time_us - own.heartbeat_us > HEARTBEAT_OLD_US:
             return "no heartbeat of the vehicle"
-        if time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
+        is_placed = isfinite(own.pos_ned[0])
+        if not is_placed or time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
             return "no attitude or position from the vehicle"
         picture = self._picture
         if picture is None or max(time_us - self._picture_us, own.boot_us - picture.time_us) > IMAGE_OLD_US:
             return "no new pictures"  # none came in, or what came in was old
         if picture.pixels.shape != self._pilot.image_shape:
             return "pictures of another size"
-        if self._watch.silence_s(own.boot_us) > OWNER_LOST_S:
-            return "owner lost"
+        lens = (picture.hfov_deg, picture.pitch_deg, picture.depth_half_m)
+        if not all(isclose(here, there, rel_tol=LENS_TOLERANCE) for here, there in zip(lens, LENS, strict=True)):
+            return "pictures of another lens"
         return ""
+
+    def _loss(self) -> str:
+        """Whether the owner is lost."""
+        return "owner lost" if self._watch.silence_s(self.vehicle.own.boot_us) > OWNER_LOST_S else ""
 
     @property
     def phase(self) -> Phase:

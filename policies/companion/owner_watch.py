@@ -1,18 +1,18 @@
-"""Where the owner is, and for how long they have been lost: sightings in the pictures and the phone's reports, tracked.
+"""Where the owner is, and for how long they have been lost: what the pilot sees and the phone reports, tracked.
 
-In: pictures, telemetry and reports as they come in. Out: the track, and the age of the last word of the owner. Only
-whether the companion may fly, and what its line of figures shows, depends on it: policies see pictures and reports.
+In: where the pilot saw the owner, telemetry and reports as they come in. Out: the track, and the age of the last word
+of the owner. Only whether the companion may fly, and what its line of figures shows, depends on it: policies see
+pictures and reports.
 """
 
 from math import asin, atan2, inf, isfinite, sqrt
 
-from common.attitude import inverse, product, rotated
-from common.image_stream import ImageFrame
+from common.attitude import Vector, product, quat_of, yaw_of
 from policies.companion.observation import REPORT_LAG_S
 from policies.companion.vehicle_link import Own, Owner
-from policies.sight import SHIRT_OVER_CHEST_M, find_owner
-from policies.tasks.follow_me.observe import camera_mount
 from policies.tracker import OwnerTrack, OwnerTracker, PhoneReport, Sighting
+
+_AHEAD = (0.5, 0.5, 0.5, 0.5)  # q_frd_from_rdf of an eye that looks ahead
 
 
 class OwnerWatch:
@@ -28,24 +28,25 @@ class OwnerWatch:
         self._track: OwnerTrack | None = None
         self._reports = 0  # fed so far
 
-    def update(self, picture: ImageFrame, own: Own, owner: Owner) -> None:
-        """Takes in a new picture, and the report that came since the last one.
+    def update(self, now_us: int, own: Own, owner: Owner, seen_hfrd: Vector | None) -> None:
+        """Takes in what a new picture showed, and the report that came since the last one.
 
         Args:
-            picture: of this moment.
+            now_us: when the picture was taken, on the vehicle's clock.
             own: the vehicle's newest telemetry.
             owner: the phone's newest report.
+            seen_hfrd: [m] where it showed the owner's chest, from the vehicle; None: nowhere.
         """
         if not isfinite(own.pos_ned[0]):  # directions from nowhere
             return
-        now_us = picture.time_us
+        if self._track is not None and now_us < self._track.time_us:  # the vehicle has restarted: another frame, too
+            self._tracker = OwnerTracker()
         if self._hears and owner.count != self._reports:
             self._reports = owner.count
             valid_us = now_us - round(REPORT_LAG_S * 1e6)
             self._tracker.hear(now_us, PhoneReport(valid_us, owner.pos_ned, owner.vel_ned))
-        sighting = sighting_of(picture, own)
-        if sighting is not None:
-            self._tracker.see(now_us, sighting)
+        if seen_hfrd is not None:
+            self._tracker.see(now_us, sighting_of(seen_hfrd, own))
         self._track = self._tracker.at(now_us)
 
     def silence_s(self, vehicle_us: int) -> float:
@@ -66,15 +67,10 @@ class OwnerWatch:
         return sqrt(sum((a - b) ** 2 for a, b in zip(self._track.pos_ned, own.pos_ned, strict=True)))
 
 
-def sighting_of(picture: ImageFrame, own: Own) -> Sighting | None:
-    """The owner in a picture, as the tracker takes it; None if they are not to be seen."""
-    sight = find_owner(picture.pixels, picture.hfov_deg, picture.depth_half_m)
-    if sight is None:
-        return None
-    q_ned_from_rdf = product(own.q_ned_from_frd, camera_mount())
-    north, east, below = rotated(q_ned_from_rdf, sight.place_rdf)
-    right, down, ahead = rotated(inverse(q_ned_from_rdf), (north, east, below + SHIRT_OVER_CHEST_M))
-    range_m = sqrt(right**2 + down**2 + ahead**2)
+def sighting_of(seen_hfrd: Vector, own: Own) -> Sighting:
+    """A place ahead, right and down of the vehicle [m] as the tracker takes it: seen by a level eye in its middle."""
+    ahead, right, down = seen_hfrd
+    range_m = sqrt(ahead**2 + right**2 + down**2)
     elevation_rad = asin(-down / max(range_m, 1.0e-6))
-    pos_ned = own.pos_ned  # of the lens, a decimetre away
-    return Sighting(atan2(right, ahead), elevation_rad, range_m, pos_ned, q_ned_from_rdf)
+    q_ned_from_rdf = product(quat_of(yaw_of(own.q_ned_from_frd), 0.0), _AHEAD)
+    return Sighting(atan2(right, ahead), elevation_rad, range_m, own.pos_ned, q_ned_from_rdf)

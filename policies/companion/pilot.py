@@ -9,12 +9,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from common.attitude import Vector
+from policies.companion.belief import owner_belief
 from policies.companion.companion import Pilot
 from policies.experts.follower import ScriptedFollower
 from policies.learn.checkpoint import CheckpointError
 from policies.learn.policy import Policy
 from policies.learn.policy_file import find_policy, load_policy
 from policies.learn.seen import Seen
+from policies.sight import chest_hfrd
 from policies.tasks.flight.own import ACTIONS
 from policies.tasks.follow_me.observe import EGO, EGO_BLIND, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
 from policies.tasks.layout import ImageElement, Layout, LayoutError
@@ -32,6 +35,8 @@ class PilotError(ValueError):
 
 class LearnedPilot:
     """A trained policy: its most probable action, its memory kept from picture to picture.
+
+    Where the owner is seen is what it believes, or if it has no such beliefs where their shirt is in the picture.
 
     Args:
         policy: made for FollowMe in a preset whose actions are setpoints.
@@ -55,18 +60,27 @@ class LearnedPilot:
             raise PilotError(str(error)) from error
         self._policy = policy
         self._memory = policy.start_memory(1)
+        self._belief = owner_belief(policy)
+        self._down = [k for k, element in enumerate(layout.frame) if element.name in ("down_frd_x", "down_frd_y")]
+        self.owner_hfrd: Vector | None = None
         torch.set_num_threads(1)  # one small picture: more threads only wait for each other
         self.act(np.zeros(layout.observation_size, np.float32), np.zeros(self.image_shape, np.uint8))  # warms up
         self.reset()
 
     def reset(self) -> None:
         self._memory = self._policy.start_memory(1)
+        self.owner_hfrd = None
 
     def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:
         with torch.inference_mode():
             seen = Seen(torch.from_numpy(vector)[None], torch.from_numpy(image)[None])
-            actions, self._memory = self._policy.act(seen, self._memory, None)
+            actions, self._memory, beliefs = self._policy.act_and_believe(seen, self._memory)
             bounded: Floats = self._policy.bounded(actions)[0].numpy()
+        if self._belief is not None and beliefs is not None:
+            self.owner_hfrd = self._belief.place(beliefs)
+        else:
+            down_x, down_y = (float(vector[k]) for k in self._down)
+            self.owner_hfrd = chest_hfrd(image, (down_x, down_y))
         return bounded
 
 

@@ -4,21 +4,18 @@ In: the observation's vector, with the phone's report in it, and its image. Out:
 is what a trained policy is compared with, and what flies a companion that has been given none.
 """
 
-from math import atan2, hypot, sqrt
+from math import atan2, hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common.attitude import rotated
-from policies.sight import Sight, find_owner
+from common.attitude import Vector
+from policies.sight import chest_hfrd
 from policies.tasks.flight.own import ACTIONS
 from policies.tasks.follow_me.observe import (
-    DEPTH_HALF_M,
     EGO,
-    HFOV_DEG,
     IMAGE_CHANNELS,
     IMAGE_SIZE,
-    camera_mount,
     vector_elements,
 )
 
@@ -39,6 +36,7 @@ class ScriptedFollower:
     image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
 
     def __init__(self) -> None:
+        self.owner_hfrd: Vector | None = None  # as a companion's `Pilot`
         elements = vector_elements(self.kind)
         self._index = {element.name: k for k, element in enumerate(elements)}
         self._scales = np.array([element.scale for element in elements], dtype=np.float32)
@@ -46,7 +44,8 @@ class ScriptedFollower:
         self._values = np.zeros(len(elements), dtype=np.float32)
 
     def reset(self) -> None:
-        """Remembers nothing."""
+        """Has nothing to forget but where the owner was seen."""
+        self.owner_hfrd = None
 
     def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:
         """Along the line of sight to the right distance, as fast as the owner; faces them; keeps its height."""
@@ -54,9 +53,9 @@ class ScriptedFollower:
         wanted = np.zeros(4, dtype=np.float32)
         if self._read("is_height_valid"):
             wanted[2] = HEIGHT_GAIN * (self._read("height") - HEIGHT_M)
-        sight = find_owner(image, HFOV_DEG, float(DEPTH_HALF_M))
-        if sight is not None:
-            ahead_m, right_m = self._level(sight)
+        self.owner_hfrd = chest_hfrd(image, (self._read("down_frd_x"), self._read("down_frd_y")))
+        if self.owner_hfrd is not None:
+            ahead_m, right_m, _ = self.owner_hfrd
         elif self._read("is_owner_known"):
             ahead_m, right_m = self._read("owner_pos_hfrd_x"), self._read("owner_pos_hfrd_y")
         else:
@@ -70,13 +69,3 @@ class ScriptedFollower:
 
     def _read(self, name: str) -> float:
         return float(self._values[self._index[name]])
-
-    def _level(self, sight: Sight) -> tuple[float, float]:
-        """Ahead and right of the vehicle [m], level, of what the tilted camera of a tilted vehicle sees."""
-        x, y, z = rotated(camera_mount(), sight.place_rdf)
-        down_x, down_y = self._read("down_frd_x"), self._read("down_frd_y")
-        down = np.array([down_x, down_y, sqrt(max(1.0 - down_x**2 - down_y**2, 0.0))])
-        ahead = np.array([1.0, 0.0, 0.0]) - down_x * down
-        ahead /= np.linalg.norm(ahead)
-        place = np.array([x, y, z])
-        return float(place @ ahead), float(place @ np.cross(down, ahead))

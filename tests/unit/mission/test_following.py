@@ -1,5 +1,6 @@
 """A companion on board a flight in lockstep: it follows, sees what training sees, and gives control back."""
 
+from dataclasses import replace
 from math import dist
 
 import numpy as np
@@ -21,6 +22,7 @@ from policies.tasks.flight.vehicle import own_state
 from policies.tasks.follow_me.observe import EGO, OwnerReport, observe_rows, vector_elements
 from sim.advance import RigArrays
 from tests.unit.mission.follow_flight import advance, config, following, lose
+from tests.unit.policies.companion.test_pilot import believer
 
 
 @wp.kernel
@@ -139,6 +141,27 @@ def test_an_owner_who_is_only_seen_is_not_lost():
     lose(companion, "FOLLOW_TARGET")
     advance(flight, 8.0)
     assert companion.phase is Phase.FLYING
+
+
+@pytest.mark.parametrize(("in_view", "phase"), [(5.0, Phase.READY), (-5.0, Phase.WAITING)])
+def test_who_flies_by_sight_alone_is_ready_when_it_believes_to_see_the_owner(tmp_path, in_view, phase):
+    pilot = believer(tmp_path, "vision-only", in_view=in_view)
+    flight, companion = flight_with_companion(config(), pilot, is_told=False)
+    advance(flight, 4.0)
+    assert companion.phase is phase
+    assert companion.decision_count == 0
+    assert not companion.action.any()
+    if phase is Phase.READY:
+        assert companion.owner_distance_m() == pytest.approx(3.5, abs=0.1)  # as believed
+
+
+def test_pictures_of_another_lens_end_in_hold():
+    flight, companion = following()
+    flight.onboard._sinks.clear()
+    flight.onboard.add_sink(lambda frame: companion._camera.publish(replace(frame, hfov_deg=60.0)))
+    advance(flight, 1.0, lambda: flight.controller.state.mode is Mode.HOLD)
+    assert flight.controller.state.mode is Mode.HOLD
+    assert companion.trouble == "pictures of another lens"
 
 
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.POSITION])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from policies.companion.belief import IN_VIEW, PLACE
 from policies.companion.pilot import LAYOUT_VERSION, TASK, PilotError, load_pilot
 from policies.experts.follower import ScriptedFollower
 from policies.learn.config.network import NetworkSettings
@@ -20,12 +21,63 @@ IMAGE = ImageElement(IMAGE_SIZE, IMAGE_SIZE, IMAGE_CHANNELS)
 
 def policy_file(folder, *, task=TASK, version=LAYOUT_VERSION, kind=EGO, actions=ACTIONS, image=IMAGE, layout=None):
     layout = layout or Layout(task, version, vector_elements(int(kind)), actions, image=image)
+    return saved(folder, policy(layout), task)
+
+
+def policy(layout, perceives=()):
     settings = NetworkSettings.model_validate(
-        {"hidden_units": 16, "num_layers": 1, "memory": {"memory_size": 16, "sequence_length": 8}}
+        {
+            "hidden_units": 16,
+            "num_layers": 1,
+            "memory": {"memory_size": 16, "sequence_length": 8},
+            "perceives": [*perceives],
+        }
     )
+    return Policy(layout, settings, torch.Generator().manual_seed(1))
+
+
+def saved(folder, made, task=TASK):
     path = folder / "policy.pt"
-    save_policy(path, Policy(layout, settings, torch.Generator().manual_seed(1)), PolicyCard(task, {}, 0, 0))
+    save_policy(path, made, PolicyCard(task, {}, 0, 0))
     return path
+
+
+def believer(folder, preset="improved", place=(3.0, -1.0, 1.5), in_view=5.0):
+    """A pilot that always believes the same: the owner at a place [m], in view with these log odds."""
+    layout = _layout(FollowSettings(preset=preset))
+    made = policy(layout, (IN_VIEW, *PLACE))
+    scales = [next(e.scale for e in layout.privileged if e.name == name) for name in PLACE]
+    with torch.no_grad():
+        made.perception.layer.weight.zero_()
+        made.perception.layer.bias[:4] = torch.tensor([in_view, *np.divide(place, scales)])
+    return load_pilot(str(saved(folder, made)))
+
+
+def shown(pilot, image=100):
+    pilot.act(np.zeros(len(vector_elements(pilot.kind)), np.float32), np.full(pilot.image_shape, image, np.uint8))
+    return pilot.owner_hfrd
+
+
+def test_the_owner_is_where_the_policy_believes_them_to_be(tmp_path):
+    pilot = believer(tmp_path)
+    assert pilot.owner_hfrd is None
+    assert shown(pilot) == pytest.approx((3.0, -1.0, 1.5))
+    pilot.reset()
+    assert pilot.owner_hfrd is None
+
+
+def test_an_owner_believed_out_of_sight_is_nowhere(tmp_path):
+    assert shown(believer(tmp_path, in_view=-0.1)) is None
+
+
+def test_a_policy_without_beliefs_goes_by_the_shirt(tmp_path):
+    pilot = load_pilot(str(policy_file(tmp_path)))
+    assert shown(pilot) is None
+    image = np.full(pilot.image_shape, 100, np.uint8)
+    image[28:36, 28:36] = (20, 40, 120, 85)  # in the middle of a camera that looks 10 degrees down; 85: 2 m away
+    pilot.act(np.zeros(len(vector_elements(pilot.kind)), np.float32), image)
+    ahead, right, down = pilot.owner_hfrd
+    assert (ahead, right, down) == pytest.approx((2.1, 0.0, 0.55), abs=0.06)
 
 
 @pytest.mark.parametrize("kind", [EGO, EGO_BLIND])
