@@ -10,7 +10,7 @@ from bench.row import Row, require
 from common.clock import wall_time_s
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_companion, take_off
-from mission.follow.owner import FOLLOW_WORLD, OwnerConfig
+from mission.follow.owner import OwnerConfig
 from policies.companion.companion import Pilot
 from policies.companion.engagement import Phase
 from policies.companion.pilot import LAYOUT_VERSION, SCRIPTED, TASK, load_pilot
@@ -20,6 +20,7 @@ from policies.learn.policy_file import PolicyCard, save_policy
 from policies.pretrained.shelf import pretrained
 from policies.tasks.flight.own import ACTIONS
 from policies.tasks.follow_me.observe import EGO, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
+from policies.tasks.follow_me.world import FOLLOW_WORLD
 from policies.tasks.layout import ImageElement, Layout
 
 COMMAND = "python -m bench companion"

@@ -15,11 +15,14 @@ sys.path.insert(0, str(IMAGES.parents[1]))
 
 from mission.flight import FlightConfig  # noqa: E402
 from mission.follow.lockstep import flight_with_companion, take_off  # noqa: E402
-from mission.follow.owner import FOLLOW_WORLD, OwnerConfig  # noqa: E402
+from mission.follow.owner import OwnerConfig  # noqa: E402
 from mission.follow.session import chosen_pilot, score_lines  # noqa: E402
+from mission.follow.watch import FollowWatch  # noqa: E402
 from mission.view.chase import PICTURE_S, film  # noqa: E402
 from mission.view.live import LiveView, open_page  # noqa: E402
 from mission.view.recording import Recorder  # noqa: E402
+from policies.companion.engagement import Phase  # noqa: E402
+from policies.tasks.follow_me.world import FOLLOW_WORLD  # noqa: E402
 from tests.browser import Browser  # noqa: E402
 
 SEED = 5
@@ -32,11 +35,12 @@ def main() -> None:
     pilot, _ = chosen_pilot(None)
     flight, companion = flight_with_companion(FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(), seed=SEED), pilot)
     recorder = Recorder(flight, action=lambda: companion.action)
+    watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, FOLLOWED_S)
     page = open_page(0, "Honeyguide")
     view = LiveView(
-        flight, page, speed=None, action=lambda: companion.action, score=lambda: score_lines(recorder, companion)
+        flight, page, speed=None, action=lambda: companion.action, score=lambda: score_lines(watch, companion)
     )
-    watched = [recorder.frame, view.frame]
+    watched = [recorder.frame, watch.frame, view.frame]
     flight.drone.start(take_off(flight.drone))
     with tempfile.TemporaryDirectory() as profile:
         browser = Browser(Path(profile), 1280, 800)

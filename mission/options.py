@@ -9,8 +9,9 @@ from pydantic import ValidationError
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.state_folder import StateFolder
 from mission.flight import FlightConfig
-from mission.follow.owner import FOLLOW_WORLD, OwnerConfig, Pace
+from mission.follow.owner import OwnerConfig, Pace
 from mission.state import stored_home
+from policies.tasks.follow_me.world import FOLLOW_WORLD
 from sim.world.world import WorldConfig
 
 HOME_MOST = (89.0, 180.0, 6000.0)  # latitude and longitude [deg], altitude [m]: highest airfields

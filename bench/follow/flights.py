@@ -15,12 +15,13 @@ from bench.follow.run import policy_path, result_path
 from bench.follow.stages import CELLS, Cell
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_companion, take_off
-from mission.follow.owner import FOLLOW_WORLD, OwnerConfig
+from mission.follow.owner import OwnerConfig
 from mission.follow.watch import FollowWatch
 from policies.companion.companion import Pilot
 from policies.companion.engagement import Phase
 from policies.companion.pilot import load_pilot
 from policies.tasks.follow_me.track import Track
+from policies.tasks.follow_me.world import FOLLOW_WORLD
 
 FLIGHTS = 10  # of each cell
 SECONDS = 60.0

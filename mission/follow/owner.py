@@ -16,28 +16,17 @@ from autopilot.mavlink.links import LinkRole, memory_pair
 from common.attitude import Vector
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import TICK_US
+from policies.tasks.follow_me.world import STOP_SHARE
 from sim.owner import Owner
 from sim.sensors.phone import CORRELATED_STD_M, POSITION_STD_M, VERTICAL_FACTOR, phone_model
 from sim.world.people import CHEST_M, RUN_SPEED_M_S, WALK_SPEED_M_S, person_model
-from sim.world.world import WorldConfig, WorldMap
+from sim.world.world import WorldMap
 
 Pace = Literal["walk", "run"]
 SPEEDS_M_S: dict[Pace, float] = {"walk": WALK_SPEED_M_S, "run": RUN_SPEED_M_S}
-# Hills and trees a person can walk in, as in training
-FOLLOW_WORLD = WorldConfig(
-    size_m=256.0,
-    cell_m=4.0,
-    hill_height_m=8.0,
-    hill_wavelength_m=120.0,
-    clearing_radius_m=5.0,
-    clearing_blend_m=60.0,
-    trees_per_ha=100.0,
-    tree_height_min_m=8.0,
-    tree_height_max_m=15.0,
-    has_walls=True,
-)
 PHONE_SYSTEM, PHONE_COMPONENT = 254, 190  # guess: a station's numbers, not those of other clients
 HEARTBEAT_US = 1_000_000
+_SETS_OFF_S = (0.5, 2.0)  # that late at most, as at the start of an episode of training
 _HAS_POSITION_AND_VELOCITY = 3  # FOLLOW_TARGET.est_capabilities
 _NOT_GIVEN = (0.0, 0.0, 0.0)
 
@@ -68,8 +57,10 @@ class FollowedOwner:
     def __init__(self, config: OwnerConfig, world: WorldMap, seed: int, home: GeoPoint) -> None:
         still = person_model(0.0)
         still.speed_min = 0.0
+        still.plan_min_s, still.plan_max_s = _SETS_OFF_S  # who then follows need not wait for a long plan to end
         self._home = home
         self._walking: Any = person_model(SPEEDS_M_S[config.pace])
+        self._walking.stop_share = STOP_SHARE
         towards_home_rad = np.pi
         self._owner = Owner(
             world,

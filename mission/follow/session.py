@@ -20,7 +20,7 @@ from common.params import ParameterError
 from mission.connections import open_links, open_page
 from mission.flight import FlightConfig, flight_parameters
 from mission.follow.lockstep import flight_with_companion, take_off
-from mission.follow.owner import FOLLOW_WORLD, OwnerConfig, Pace
+from mission.follow.owner import OwnerConfig, Pace
 from mission.follow.watch import FollowWatch
 from mission.options import FlightOptions, UserError, flight_config, speed_of
 from mission.progress import Progress
@@ -35,6 +35,7 @@ from policies.companion.pilot import SCRIPTED, TASK, PilotError, load_pilot
 from policies.pretrained.shelf import pretrained
 from policies.tasks.follow_me.scorecard import Scorecard, lines, scorecard
 from policies.tasks.follow_me.track import Ranges, Track
+from policies.tasks.follow_me.world import FOLLOW_WORLD
 
 ENGAGE_S = 20.0  # after the take-off, until it follows
 FILM = "flight.mp4"

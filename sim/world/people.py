@@ -108,13 +108,6 @@ def chest_ned(person: Person) -> wp.vec3:
 
 
 @wp.func
-def is_in_sight(w: World, eye_ned: wp.vec3, person: Person) -> bool:
-    """Whether a straight line from an eye to the person's chest or head meets no ground, trunk, crown or wall."""
-    head_ned = person.pos_ned - wp.vec3(0.0, 0.0, 0.93 * person.stature_m)
-    return is_line_free(w, eye_ned, chest_ned(person)) or is_line_free(w, eye_ned, head_ned)
-
-
-@wp.func
 def is_line_free(w: World, from_ned: wp.vec3, to_ned: wp.vec3) -> bool:
     """Whether nothing solid is on the line between two points [m]."""
     way = to_ned - from_ned

@@ -38,25 +38,13 @@ from policies.tasks.follow_me.picture import draw
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.follow_me.sight import Sight
+from policies.tasks.follow_me.world import FOLLOW_WORLD
 from policies.tasks.layout import ImageElement, Layout
 from policies.tasks.numbers import Sampler, typed_rows
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_model
 from sim.world.people import RUN_SPEED_M_S, WALK_SPEED_M_S, Person, PersonModel, person_model
-from sim.world.world import WorldConfig
 
-WORLD = WorldConfig(
-    size_m=256.0,
-    cell_m=4.0,
-    hill_height_m=8.0,
-    hill_wavelength_m=120.0,
-    clearing_radius_m=5.0,
-    clearing_blend_m=60.0,
-    trees_per_ha=100.0,
-    tree_height_min_m=8.0,
-    tree_height_max_m=15.0,
-    has_walls=True,
-)
 _OWNERS: dict[str, float | Sampler] = {
     "walks": WALK_SPEED_M_S,
     "runs": RUN_SPEED_M_S,
@@ -75,7 +63,7 @@ class FollowMe(FlightTask):
         super().__init__(
             _layout(settings),
             env_count,
-            WORLD,
+            FOLLOW_WORLD,
             trees_per_ha_max=TREES_PER_HA_MAX,
             has_estimator=settings.has_estimator,
             number_defaults=(DOCUMENTED if is_documented else IMPROVED) | {"owner_speed_max": _OWNERS[settings.owner]},

@@ -6,6 +6,7 @@ The seven numbers of the air and the vehicle come first (`FLIGHT_NUMBERS`); all 
 import warp as wp
 
 from policies.tasks.flight.numbers import FLIGHT_NUMBERS
+from policies.tasks.follow_me.world import STOP_SHARE
 from policies.tasks.numbers import Number, Sampler
 
 WORLD_FIELDS = ("hill_height_m", "trees_per_ha")
@@ -62,7 +63,7 @@ FOLLOW_NUMBERS = (
     Number("hill_height_m", 8.0, 0.0, 30.0, "m", "bound of the hills above and valleys below the start", "guess"),
     Number("trees_per_ha", 100.0, 0.0, TREES_PER_HA_MAX, "1/ha", "trees per hectare", "guess: open woodland"),
     Number("owner_speed_max", 2.0, 0.4, 6.0, "m/s", "the owner's fastest walk or run", "2: walks, 5: runs"),
-    Number("owner_stop_share", 0.15, 0.0, 1.0, "1", "share of the owner's plans that are a stop", "guess"),
+    Number("owner_stop_share", STOP_SHARE, 0.0, 1.0, "1", "share of the owner's plans that are a stop", "guess"),
     Number(
         "owner_graze_share", 0.3, 0.0, 1.0, "1", "share of the owner's plans that lead closely past a tree", "guess"
     ),

@@ -5,7 +5,7 @@ page and as lines for a terminal. An episode that ended early is not followed fo
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,23 +122,6 @@ def _median_of(tracks: Sequence[Track]) -> Callable[[NDArray[np.int64]], float]:
 
 def _ratio(part: float, whole: float) -> float:
     return float(part / whole) if whole else math.nan
-
-
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Episodes of one tree density and one class of owner speed."""
-
-    trees_per_ha: float
-    owner_speed_max: float
-    card: Scorecard
-
-
-def by_density_and_speed(tracks: Iterable[Track], ranges: Ranges | None = None) -> list[Group]:
-    """A scorecard for each pair of density and speed, slow owners in few trees first."""
-    cells: dict[tuple[float, float], list[Track]] = {}
-    for track in tracks:
-        cells.setdefault((track.owner_speed_max, track.trees_per_ha), []).append(track)
-    return [Group(trees, speed, scorecard(cells[speed, trees], ranges)) for speed, trees in sorted(cells)]
 
 
 NAMES: dict[str, tuple[str, str]] = {

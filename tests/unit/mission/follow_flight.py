@@ -3,9 +3,10 @@
 from autopilot.mavlink.codec import FrameReader
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_companion, take_off
-from mission.follow.owner import FOLLOW_WORLD, OwnerConfig
+from mission.follow.owner import OwnerConfig
 from policies.companion.engagement import Phase
 from policies.experts.follower import ScriptedFollower
+from policies.tasks.follow_me.world import FOLLOW_WORLD
 
 
 def config(pace="walk", seed=3, **owner):

@@ -3,7 +3,7 @@ import pytest
 import warp as wp
 
 from sim.owner import Owner
-from sim.world.people import PERSON_DT_S, RUN_SPEED_M_S, WALK_SPEED_M_S, Person, is_in_sight, person_model
+from sim.world.people import PERSON_DT_S, RUN_SPEED_M_S, WALK_SPEED_M_S, Person, chest_ned, is_line_free, person_model
 from sim.world.world import World, WorldConfig, build_world
 
 wp.set_module_options({"enable_backward": False})
@@ -118,7 +118,7 @@ def test_steps_follow_the_speed(running):
 @wp.kernel
 def sight(world: World, eyes: wp.array[wp.vec3], people: wp.array[Person], is_seen: wp.array[wp.int32]):
     i = wp.tid()
-    if is_in_sight(world, eyes[i], people[i]):
+    if is_line_free(world, eyes[i], chest_ned(people[i])):
         is_seen[i] = 1
 
 

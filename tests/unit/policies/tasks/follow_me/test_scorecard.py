@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from policies.tasks.follow_me.scorecard import by_density_and_speed, lines, scorecard
+from policies.tasks.follow_me.scorecard import lines, scorecard
 from policies.tasks.follow_me.track import Ranges, Track, losses
 
 COUNT = 600  # decisions of 0.1 s
@@ -122,13 +122,6 @@ def test_intervals_hold_the_figure_and_shrink_with_episodes():
 def test_order_of_episodes_does_not_matter():
     tracks = [track(d) for d in (1.2, 2.0, 3.5)]
     assert scorecard(tracks).in_band.value == scorecard(tracks[::-1]).in_band.value
-
-
-def test_groups_are_by_density_and_speed():
-    tracks = [track(speed=5.0, trees=200.0), track(speed=2.0, trees=200.0), track(speed=2.0, trees=100.0), track()]
-    groups = by_density_and_speed(tracks)
-    found = [(group.owner_speed_max, group.trees_per_ha, group.card.episodes) for group in groups]
-    assert found == [(2.0, 100.0, 2), (2.0, 200.0, 1), (5.0, 200.0, 1)]
 
 
 def test_lines_of_one_flight_have_no_intervals():
