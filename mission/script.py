@@ -16,7 +16,7 @@ from math import dist, isnan, nan
 from typing import Any
 
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
-from mission.client import Client, ScriptError, ScriptTimeout
+from mission.client import Client, CommandRefused, ScriptError, ScriptTimeout
 from mission.plan import Plan
 from mission.plan_lists import FENCE_LIST, RALLY_LIST, fence_items, rally_items
 
@@ -246,6 +246,21 @@ class Drone(Client):
             raise ScriptError("start_offboard: set an offboard setpoint first")
         await self.sleep(0.5)  # PX4 wants a stream before the switch
         await self._set_mode(MAIN_OFFBOARD, 0, "offboard")
+
+    async def let_companion_fly(self, timeout_s: float = 5.0) -> None:
+        """Switches to OFFBOARD for the setpoints of a companion computer on board.
+
+        Args:
+            timeout_s: how long to ask: a companion that has just been stopped is silent for a while.
+        """
+        end_us = self.time_us + int(timeout_s * 1e6)
+        while True:
+            try:
+                return await self._set_mode(MAIN_OFFBOARD, 0, "offboard")
+            except CommandRefused:
+                if self.time_us >= end_us:
+                    raise
+            await self.sleep(0.5)
 
     async def stop_offboard(self) -> None:
         """Holds here and stops streaming."""

@@ -13,6 +13,7 @@ import viser
 from autopilot.injection import Failure, Unit
 from mission.client import Running
 from mission.flight import Flight
+from mission.follow.lockstep import take_off
 from mission.script import Drone, ScriptError
 
 CLIMB_M = 5.0  # above the ground, when a click finds the vehicle standing
@@ -75,6 +76,8 @@ class Controls:
             )
             for name, script in (("Take off", self._take_off), ("Hold", _hold), ("Return", _return), ("Land", _land)):
                 self._add_command(gui, name, script)
+            if self._flight.owner is not None:
+                self._add_command(gui, "Follow", _follow)
 
     def _add_command(self, gui: viser.GuiApi, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
         button = gui.add_button(name)
@@ -162,6 +165,13 @@ class Controls:
 
 async def _hold(drone: Drone) -> None:
     await drone.hold()
+
+
+async def _follow(drone: Drone) -> None:
+    """Lets the companion on board fly, after the pilot has taken over, or from the ground."""
+    if not drone.is_armed or drone.is_landed:
+        await take_off(drone)
+    await drone.let_companion_fly()
 
 
 async def _return(drone: Drone) -> None:

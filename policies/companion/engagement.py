@@ -18,7 +18,9 @@ class Phase(Enum):
     """What the companion is doing."""
 
     WAITING = "waiting"  # something is missing; sends nothing
-    READY = "ready"  # offers setpoints that stay where they are, so that the pilot may choose Offboard
+    READY = (
+        "ready"  # offers setpoints that stay where they are, so that the pilot may choose Offboard; sends none in it
+    )
     ENGAGING = "engaging"  # was told to engage, and asks for Offboard
     FLYING = "flying"  # the policy's setpoints are flown
     HANDING_BACK = "handing back"  # stays where it is, and asks for Hold
@@ -87,7 +89,7 @@ class Engagement:
         self._was_offboard = now.is_offboard
         match self.phase:
             case Phase.WAITING:
-                return self._waiting(now)
+                return self._waiting(now, is_chosen)
             case Phase.READY:
                 return self._ready(now, is_chosen)
             case Phase.ENGAGING:
@@ -97,28 +99,30 @@ class Engagement:
             case Phase.HANDING_BACK:
                 return self._handing_back(now)
             case Phase.RELEASED:
-                return self._released(now)
+                return self._released(now, is_chosen)
 
-    def _waiting(self, now: Situation) -> Orders:
-        if not now.trouble:
-            return self._go(Phase.READY, now, Sending.STAY, text="Companion: ready to follow")
-        return Orders()
+    def _waiting(self, now: Situation, is_chosen: bool) -> Orders:
+        if now.trouble:
+            return Orders()
+        if is_chosen and now.is_airborne:
+            return self._follow(now)
+        return self._go(Phase.READY, now, _offered(now), text="Companion: ready to follow")
 
     def _ready(self, now: Situation, is_chosen: bool) -> Orders:
         if now.trouble:
             return self._go(Phase.WAITING, now, text=f"Companion: not ready: {now.trouble}")
         if is_chosen and now.is_airborne:
-            return self._go(Phase.FLYING, now, Sending.POLICY, text="Companion: following")
+            return self._follow(now)
         if self._is_told and now.is_airborne and now.is_holding:  # never out of a takeoff, a landing or a return
             self._is_told = False
             return self._ask(Phase.ENGAGING, now, Wish.OFFBOARD)
-        return Orders(Sending.STAY)
+        return Orders(_offered(now))
 
     def _engaging(self, now: Situation) -> Orders:
         if now.trouble:
             return self._go(Phase.WAITING, now, text=f"Companion: not engaged: {now.trouble}")
         if now.is_offboard:
-            return self._go(Phase.FLYING, now, Sending.POLICY, text="Companion: following")
+            return self._follow(now)
         if now.is_refused or now.time_us - self._since_us > ENGAGE_PATIENCE_US:
             return self._go(Phase.READY, now, Sending.STAY, text="Companion: not engaged: Offboard was refused")
         if now.time_us - self._asked_us >= ASK_AGAIN_US:
@@ -146,10 +150,15 @@ class Engagement:
             return Orders(Sending.STAY, Wish.HOLD)
         return Orders(Sending.STAY)
 
-    def _released(self, now: Situation) -> Orders:
+    def _released(self, now: Situation, is_chosen: bool) -> Orders:
+        if is_chosen and now.is_airborne and not now.trouble:  # the last setpoints were recent enough to be flown on
+            return self._follow(now)
         if now.time_us - self._since_us >= SILENCE_US:
             return self._go(Phase.WAITING, now)
         return Orders()
+
+    def _follow(self, now: Situation) -> Orders:
+        return self._go(Phase.FLYING, now, Sending.POLICY, text="Companion: following")
 
     def _go(self, phase: Phase, now: Situation, sending: Sending = Sending.NOTHING, text: str = "") -> Orders:
         self.phase, self._since_us = phase, now.time_us
@@ -158,3 +167,8 @@ class Engagement:
     def _ask(self, phase: Phase, now: Situation, wish: Wish, text: str = "") -> Orders:
         self.phase, self._since_us, self._asked_us = phase, now.time_us, now.time_us
         return Orders(Sending.STAY, wish, text)
+
+
+def _offered(now: Situation) -> Sending:
+    """What is sent in readiness: nothing to a vehicle in Offboard, which somebody else flies, or nobody."""
+    return Sending.NOTHING if now.is_offboard else Sending.STAY

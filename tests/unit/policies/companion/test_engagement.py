@@ -82,8 +82,9 @@ def test_a_vehicle_found_in_offboard_is_left_to_whoever_flies_it():
     bench = Bench()
     for _ in range(5):
         orders = bench.step(offboard=True)
+        assert orders.sending is Sending.NOTHING
     assert bench.phase is Phase.READY
-    assert orders.sending is Sending.STAY
+    assert bench.step(offboard=False).sending is Sending.STAY
 
 
 def test_offboard_chosen_before_everything_was_there_does_not_engage_later():
@@ -173,6 +174,20 @@ def test_released_it_is_silent_and_flies_again_only_when_offboard_is_chosen_anew
     assert bench.step(offboard=True).sending is Sending.POLICY
 
 
+@pytest.mark.parametrize("after_us", [STEP_US, SILENCE_US, SILENCE_US + STEP_US])
+def test_offboard_chosen_again_soon_is_flown_at_once(after_us):
+    bench = Bench().released()
+    bench.step(after_us=after_us)
+    assert bench.step(offboard=True).sending is Sending.POLICY
+
+
+def test_offboard_chosen_again_without_pictures_is_not_flown():
+    bench = Bench().released()
+    bench.step(offboard=True, trouble="no pictures")
+    for _ in range(500):
+        assert bench.step(offboard=True).sending is Sending.NOTHING
+
+
 def test_told_once_it_does_not_engage_again_after_the_pilot_took_over():
     bench = Bench(is_told=True).ready()
     bench.step()
@@ -187,4 +202,4 @@ def test_offboard_left_on_after_a_failed_hand_back_does_not_engage():
     bench = Bench().handing_back()
     bench.step(offboard=True, trouble="x", after_us=HAND_BACK_PATIENCE_US + 1)
     for _ in range(500):
-        assert bench.step(offboard=True).sending is not Sending.POLICY
+        assert bench.step(offboard=True).sending is Sending.NOTHING  # the vehicle's own failsafe is to notice
