@@ -31,6 +31,8 @@ MAG_SOFT_IRON_CROSS = wp.constant(39)
 
 RANGE_WHITE = wp.constant(42)
 
+CAMERA = wp.constant(43)
+
 BATTERY_VOLTAGE = wp.constant(45)
 BATTERY_CURRENT = wp.constant(46)
 

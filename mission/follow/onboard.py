@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from autopilot.camera.ports import View
 from common.image_stream import ImageFrame
 from policies.tasks.episode import Border
-from policies.tasks.follow_me.images import take_images
+from policies.tasks.follow_me.images import pack_images, set_optics
 from policies.tasks.follow_me.numbers import FollowNumbers
 from policies.tasks.follow_me.observe import (
     DEPTH_HALF_M,
@@ -48,7 +48,9 @@ class OnboardCamera:
     def __init__(self, rig: Rig, world: WorldMap, people: Any, noise: float = 1.0) -> None:
         self._eye = CameraRig(rig, world)
         self._view = View(IMAGE_SIZE, IMAGE_SIZE, HFOV_DEG, camera_mount())
-        self._camera = QuickCamera(world, 1, width=IMAGE_SIZE, height=IMAGE_SIZE, hfov_deg=HFOV_DEG, people=people)
+        self._camera = QuickCamera(
+            world, 1, width=IMAGE_SIZE, height=IMAGE_SIZE, hfov_deg=HFOV_DEG, people=people, has_optics=True
+        )
         self._lens: NDArray[Any] = self._camera.lenses.numpy()  # live, as the next
         self._kind: NDArray[np.uint8] = self._camera.kind.numpy()
         images: Any = wp.zeros((1, IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), dtype=wp.uint8)
@@ -57,8 +59,10 @@ class OnboardCamera:
         numbers: Any = wp.zeros(1, dtype=FollowNumbers)
         numbers.numpy()["camera_noise"] = noise
         everyone: Any = wp.full(1, value=True, dtype=wp.bool)
-        inputs = [border, rig.arrays, numbers, self._camera.rgb, self._camera.depth_m, everyone]
-        self._pack = wp.launch(take_images, (1, IMAGE_SIZE), inputs, record_cmd=True)
+        optics = [rig.arrays, numbers, everyone, self._camera.optics]
+        self._set_optics = wp.launch(set_optics, 1, optics, record_cmd=True)
+        inputs = [border, self._camera.rgb, self._camera.depth_m, everyone]
+        self._pack = wp.launch(pack_images, (1, IMAGE_SIZE), inputs, record_cmd=True)
         self._images: NDArray[np.uint8] = images.numpy()
         self._sinks: list[Sink] = []
         self._sequence = 0
@@ -87,6 +91,7 @@ class OnboardCamera:
         pose = self._eye.pose(self._view)
         self._lens["pos_ned"] = pose.pos_ned
         self._lens["q_ned_from_rdf"] = pose.q_ned_from_rdf
+        self._set_optics.launch()
         self._camera.render()
         self._pack.launch()
         self._sequence += 1

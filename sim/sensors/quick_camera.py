@@ -16,6 +16,7 @@ from sim.sensors.quick.colours import make_paints
 from sim.sensors.quick.columns import Columns, lay_columns
 from sim.sensors.quick.ground import make_ground, pack_cells
 from sim.sensors.quick.light import STRIPS, light_corners, light_strips, pack_light
+from sim.sensors.quick.optics import Optics, expose
 from sim.sensors.quick.prepare import prepare_views
 from sim.sensors.quick.rows import Outputs, draw_rows
 from sim.sensors.quick.solids import Sights, Solid
@@ -53,10 +54,12 @@ class QuickCamera:
         people: array of `Person`, shape (count,): row i is seen by camera i alone, stature 0 is nobody; None for none.
         i_world: the world of each camera; None: the only one, or camera i looks at world i.
         range_m: fog hides what is farther; farther ground and trees are not drawn.
+        has_optics: whether `optics` spoil the pictures; they are perfect otherwise.
         device: a Warp device.
 
     Attributes:
         lenses: array of `sim.sensors.camera.Lens`, shape (count,), for kernels to write.
+        optics: array of `sim.sensors.quick.optics.Optics`, likewise; shape (0,) without optics.
         rgb: uint8, (count, height, width, 3).
         depth_m: float32, (count, height, width), along the optical axis; `sim.sensors.camera.SKY_DEPTH_M` for the sky.
         kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON of `sim.sensors.ray`. From inside a
@@ -75,6 +78,7 @@ class QuickCamera:
         people: Any = None,
         i_world: Any = None,
         range_m: float = RANGE_M,
+        has_optics: bool = False,
         device: str = "cpu",
     ) -> None:
         config = worlds.config
@@ -95,8 +99,10 @@ class QuickCamera:
         self.kind = wp.zeros((count, height, width), dtype=wp.uint8, device=device)
         self._ground = ground = make_ground(config, world_count, device)
         self._everyone = wp.full(count, value=True, dtype=wp.bool, device=device)
+        self.optics = wp.zeros(count if has_optics else 0, dtype=Optics, device=device)
+        perfect = (wp.zeros_like(self.rgb), wp.zeros_like(self.depth_m)) if has_optics else (self.rgb, self.depth_m)
         outputs = Outputs()
-        outputs.rgb, outputs.depth_m, outputs.kind = self.rgb.flatten(), self.depth_m.flatten(), self.kind.flatten()
+        outputs.rgb, outputs.depth_m, outputs.kind = perfect[0].flatten(), perfect[1].flatten(), self.kind.flatten()
         outputs.front = wp.zeros(count * height * width, dtype=wp.int32, device=device)
         outputs.width, outputs.height = width, height
         views = wp.zeros(count, dtype=View, device=device)
@@ -110,6 +116,11 @@ class QuickCamera:
         lay, columns_dim = [ground, views, chosen, columns], (count, columns.room)
         self._lay = wp.launch(lay_columns, dim=columns_dim, inputs=lay, device=device, record_cmd=True)
         self._draw = wp.launch(draw_rows, dim=(count, height), inputs=drawn, device=device, record_cmd=True)
+        self._expose: Any = None
+        if has_optics:
+            pictures = [array.flatten() for array in (*perfect, self.rgb, self.depth_m)]
+            shown = [self.lenses, chosen, self.optics, size, *pictures]
+            self._expose = wp.launch(expose, dim=(count, height), inputs=shown, device=device, record_cmd=True)
         every_world = wp.full(world_count, value=True, dtype=wp.bool, device=device)
         self._every_world = every_world
         fresh = [self._worlds, every_world, ground]
@@ -143,6 +154,9 @@ class QuickCamera:
         self._prepare.launch()
         self._lay.launch()
         self._draw.launch()
+        if self._expose is not None:
+            self._expose.set_param_at_index(1, chosen)
+            self._expose.launch()
 
 
 def _first_lens(hfov_deg: float, count: int) -> Any:
