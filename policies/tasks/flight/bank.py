@@ -28,8 +28,9 @@ _CLIMB_TICKS = 2000  # 8 s: up, and settled
 
 def build_rig(world: WorldMap | WorldBatch, count: int, *, has_estimator: bool, threads: int, device: str) -> Rig:
     """Vehicles with the default flight controller, powered on at home."""
+    airframe = load_airframe(AIRFRAME)
     rig = Rig(
-        load_airframe(AIRFRAME),
+        airframe,
         world,
         sensor_model(home=DEFAULT_HOME),
         wind_model(0.0),
@@ -39,7 +40,7 @@ def build_rig(world: WorldMap | WorldBatch, count: int, *, has_estimator: bool, 
         threads=threads,
         device=device,
     )
-    rig.load_parameters(parameter_table())
+    rig.load_parameters(parameter_table(airframe))
     return rig
 
 

@@ -17,6 +17,7 @@ from policies.companion.companion import IMAGE_OLD_US, OWNER_LOST_S, TELEMETRY_O
 from policies.companion.engagement import Phase
 from policies.companion.observation import REPORT_LAG_S
 from policies.experts.follower import ScriptedFollower
+from policies.tasks.flight.bank import hover_bank
 from policies.tasks.flight.own import OwnState
 from policies.tasks.flight.vehicle import own_state
 from policies.tasks.follow_me.observe import EGO, OwnerReport, observe_rows, vector_elements
@@ -81,6 +82,14 @@ def test_the_companion_sees_what_training_sees(flown):
     assert companion.seen == pytest.approx(out.numpy()[0], abs=0.025)
     exact = [k for k, element in enumerate(vector_elements(int(EGO))) if "owner" not in element.name]
     assert companion.seen[exact] == pytest.approx(out.numpy()[0][exact], abs=2e-3)
+
+
+def test_training_flies_with_the_parameters_of_flights(flown):
+    there, here = hover_bank(has_estimator=True, device="cpu").arrays.autopilot, flown[0].rig.arrays.autopilot
+    for trained, flying in ((there.ekf.params, here.ekf.params), (there.control_params, here.control_params)):
+        names = trained.numpy().dtype.names
+        differ = [name for name in names if not np.array_equal(trained.numpy()[name][0], flying.numpy()[name][0])]
+        assert differ == []
 
 
 def test_the_phone_is_heard_through_the_vehicle_with_its_lag(flown):
