@@ -1,5 +1,7 @@
 """The line of figures that is shown while flying."""
 
+from math import dist
+
 import numpy as np
 from rich.table import Table
 
@@ -9,10 +11,8 @@ from mission.client import Running
 from mission.flight import Flight
 
 PROGRESS_PERIOD_S = 0.2
-PROGRESS_HEADINGS = (
-    *("time\ns", "mode\n", "armed\n", "item\n", "north\nm", "east\nm"),
-    *("height\nm", "speed\nm/s", "battery\n%", "pace\nx"),
-)
+HEADINGS_BEFORE = ("time\ns", "mode\n", "armed\n")
+HEADINGS_AFTER = ("north\nm", "east\nm", "height\nm", "speed\nm/s", "battery\n%", "pace\nx")
 
 
 class Progress:
@@ -37,14 +37,13 @@ class Progress:
         north, east, down = state.estimate.pos_ned
         velocity = state.estimate.vel_ned
         table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
-        for heading in PROGRESS_HEADINGS:
+        for heading in (*HEADINGS_BEFORE, "item\n" if self._flight.owner is None else "owner\nm", *HEADINGS_AFTER):
             table.add_column(heading, justify="right", no_wrap=True)
-        count = state.mission_count
         table.add_row(
             f"{self._flight.time_us * 1e-6:.1f}",
             Mode(state.mode).name,
             "yes" if state.is_armed else "no",
-            f"{min(state.mission_current + 1, count)} of {count}" if count else "none",
+            self._aim(),
             f"{north:.1f}",
             f"{east:.1f}",
             f"{-down:.1f}",
@@ -53,3 +52,11 @@ class Progress:
             f"{rate:.1f}",
         )
         return table
+
+    def _aim(self) -> str:
+        """The mission's item, or how far away the owner is who is followed."""
+        state, owner = self._flight.controller.state, self._flight.owner
+        if owner is not None:
+            return f"{dist(state.estimate.pos_ned, owner.chest_ned):.1f}"
+        count = state.mission_count
+        return f"{min(state.mission_current + 1, count)} of {count}" if count else "none"

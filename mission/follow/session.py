@@ -7,6 +7,7 @@ MAVLink over a link in memory, so that everything but ground stations and the li
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +16,12 @@ from rich.table import Table
 
 from autopilot.mavlink.links import LinkError
 from common.airframe import AirframeError, load_airframe
+from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
 from mission.connections import open_links, open_page
 from mission.flight import FlightConfig, flight_parameters
+from mission.follow.companion import latency_text
 from mission.follow.lockstep import flight_with_companion, take_off
 from mission.follow.owner import OwnerConfig, Pace
 from mission.follow.watch import FollowWatch
@@ -70,7 +73,7 @@ def follow_session(options: FollowOptions) -> int:
     page = open_page(options.flight.view_port) if options.flight.has_view else None
     folder = new_folder(options.flight.run_folder)
     with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
-        flight, companion = flight_with_companion(config, pilot, links=links, folder=folder)
+        flight, companion = flight_with_companion(config, pilot, links=links, folder=folder, wall_s=wall_time_s)
     recorder = Recorder(flight, action=lambda: companion.action)
     watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, options.seconds)
     watchers: list[Callable[[], None]] = [recorder.frame, watch.frame]
@@ -94,9 +97,12 @@ def follow_session(options: FollowOptions) -> int:
     recorder.recording().save(folder)
     if running.error is not None:
         print_line(console, f"result: {running.error}")
+    exit_code = finish(watch.track(), folder, console, is_landed=running.error is None)
+    print_line(console, latency_text(companion))
     if options.has_film:
         write_film(recorder.recording(), flight.world, folder / FILM, console)
-    return finish(watch.track(), folder, console, is_landed=running.error is None)
+    print_line(console, f"{'logs, scorecard and film' if options.has_film else 'logs and scorecard'}: {folder}")
+    return exit_code
 
 
 def follow_config(options: FollowOptions) -> FlightConfig:
@@ -145,14 +151,16 @@ def finish(track: Track | None, folder: Path, console: Console, *, is_landed: bo
         is_good = is_landed and track.is_whole and card.collision.value == 0.0
         write_whole(folder / "summary.json", (json.dumps(summary_of(card), indent=2) + "\n").encode())
         console.print(_table(card))
-    print_line(console, f"logs, scorecard and film: {folder}")
+    else:
+        print_line(console, "the owner was not followed: there is no scorecard")
     return 0 if is_good else 1
 
 
-def summary_of(card: Scorecard) -> dict[str, float | int]:
-    """What `summary.json` holds: the scorecard's figures."""
+def summary_of(card: Scorecard) -> dict[str, float | None]:
+    """What `summary.json` holds: the scorecard's figures; null for what the flight had none of."""
     names = [name for name in Scorecard.__dataclass_fields__ if name not in ("episodes", "minutes")]
-    return {name: getattr(card, name).value for name in names} | {"minutes": card.minutes}
+    figures = {name: getattr(card, name).value for name in names}
+    return {name: value if isfinite(value) else None for name, value in figures.items()} | {"minutes": card.minutes}
 
 
 def _table(card: Scorecard) -> Table:

@@ -70,8 +70,10 @@ def load_recording(folder: Path) -> Recording:
         config = FlightConfig.model_validate(json.loads(text))
     except FileNotFoundError:
         raise RecordingError(f"{folder}: holds no run that can be shown: {FILE} is missing") from None
-    except (OSError, EOFError, KeyError, ValueError, BadZipFile) as error:
-        raise RecordingError(f"{path}: cannot be read: {str(error).partition(chr(10))[0]}") from error
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (EOFError, KeyError, ValueError, BadZipFile) as error:
+        raise RecordingError(f"{path}: cannot be read: damaged, or no recording") from error
     if len(rows) == 0 or rows.dtype != MOMENT:
         raise RecordingError(f"{path}: was written by another version, or holds nothing")
     return Recording(config, rows, path_ned)

@@ -12,8 +12,10 @@ from typer.testing import CliRunner
 from autopilot.vehicle import Mode
 from common.airframe import AIRFRAME_FOLDER
 from mission.cli import app
+from mission.flight import Flight
 from mission.plan import DEFAULT_PLAN
 from mission.progress import Progress
+from tests.unit.mission.follow_flight import config
 
 
 @pytest.fixture
@@ -132,7 +134,7 @@ def test_progress_fits_80_columns(count, item):
         mission_count=count,
         battery_remaining=1.0,
     )
-    flight = SimpleNamespace(time_us=3_600_000_000, controller=SimpleNamespace(state=state))
+    flight = SimpleNamespace(time_us=3_600_000_000, controller=SimpleNamespace(state=state), owner=None)
     console = Console(width=80, file=StringIO())
     progress = Progress(flight, None)
     progress.table()
@@ -142,6 +144,18 @@ def test_progress_fits_80_columns(count, item):
     assert "…" not in text
     for part in ("3600.0", widest_mode.name, item, "-1234.5", "1234.5", "17.0", "100", "m/s"):
         assert part in text
+
+
+def test_progress_of_a_flight_with_an_owner_shows_how_far_away_they_are():
+    flight = Flight(config())
+    flight.frame()
+    console = Console(width=80, file=StringIO())
+    console.print(Progress(flight, None).table())
+    headings, units, figures = (line.split() for line in console.file.getvalue().splitlines())
+    assert headings[3] == "owner"
+    assert units[1] == "m"
+    assert float(figures[3]) == pytest.approx(3.0, abs=1.0)  # a chest, 3 m away
+    flight.close()
 
 
 def test_option_out_of_range_is_refused(fly, tmp_path):

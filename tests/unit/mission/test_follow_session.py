@@ -23,7 +23,10 @@ def test_it_follows_lands_and_writes_scorecard_and_recording(tmp_path):
     result = run("--policy", "scripted", "--speed", "max", "--seconds", "2", "--no-mp4", "--run-folder", str(folder))
     assert result.exit_code in {0, 1}, result.output  # a script may fail to follow
     assert "scorecard" in result.output
-    assert "in_band" in json.loads((folder / "summary.json").read_text())
+    summary = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)  # no NaN: strict readers
+    assert summary["in_band"] is not None
+    assert "picture to setpoint" in result.output
+    assert "logs and scorecard: " in result.output
     recording = load_recording(folder)
     assert recording.has_owner
     assert recording.rows["height_m"].max() > 2.0
