@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot.camera.ports import View
 from common.image_stream import ImageFrame
-from policies.tasks.episode import Border
-from policies.tasks.follow_me.images import pack_images, set_optics
+from policies.tasks.follow_me.images import set_optics
 from policies.tasks.follow_me.numbers import FollowNumbers
 from policies.tasks.follow_me.observe import (
     DEPTH_HALF_M,
@@ -23,11 +22,11 @@ from policies.tasks.follow_me.observe import (
     IMAGE_SIZE,
     TILT_DEG,
     camera_mount,
+    pack_images,
 )
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.quick_camera import QuickCamera
-from sim.sensors.ray import PERSON
 from sim.world.world import WorldMap
 
 PERIOD_US = 100_000
@@ -51,17 +50,14 @@ class OnboardCamera:
         self._camera = QuickCamera(
             world, 1, width=IMAGE_SIZE, height=IMAGE_SIZE, hfov_deg=HFOV_DEG, people=people, has_optics=True
         )
-        self._lens: NDArray[Any] = self._camera.lenses.numpy()  # live, as the next
-        self._kind: NDArray[np.uint8] = self._camera.kind.numpy()
+        self._lens: NDArray[Any] = self._camera.lenses.numpy()  # live
         images: Any = wp.zeros((1, IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), dtype=wp.uint8)
-        border: Any = Border()
-        border.images = images
         numbers: Any = wp.zeros(1, dtype=FollowNumbers)
         numbers.numpy()["camera_noise"] = noise
         everyone: Any = wp.full(1, value=True, dtype=wp.bool)
         optics = [rig.arrays, numbers, everyone, self._camera.optics]
         self._set_optics = wp.launch(set_optics, 1, optics, record_cmd=True)
-        inputs = [border, self._camera.rgb, self._camera.depth_m, everyone]
+        inputs = [self._camera.rgb, self._camera.depth_m, everyone, images]
         self._pack = wp.launch(pack_images, (1, IMAGE_SIZE), inputs, record_cmd=True)
         self._images: NDArray[np.uint8] = images.numpy()
         self._sinks: list[Sink] = []
@@ -71,11 +67,6 @@ class OnboardCamera:
     def add_sink(self, sink: Sink) -> None:
         """Somebody who gets every picture from now on."""
         self._sinks.append(sink)
-
-    @property
-    def is_owner_in_view(self) -> bool:
-        """Whether the last picture shows any of the owner."""
-        return bool((self._kind == int(PERSON)).any())
 
     def frame(self, time_us: int) -> None:
         """Takes a picture if one is due."""

@@ -8,9 +8,8 @@ from typing import Any
 
 import warp as wp
 
-from policies.tasks.episode import Border
 from policies.tasks.follow_me.numbers import FollowNumbers
-from policies.tasks.follow_me.observe import HFOV_DEG, depth_byte
+from policies.tasks.follow_me.observe import HFOV_DEG, pack_images
 from sim.advance import RigArrays
 from sim.sensors.quick.optics import Optics, sensor_noise
 from sim.sensors.quick_camera import QuickCamera
@@ -30,21 +29,6 @@ def set_optics(
     i = wp.tid()
     if rows[i]:
         optics[i] = sensor_noise(optics[i], numbers[i].camera_noise, rig.seed[i], rig.tick[i])
-
-
-@wp.kernel(enable_backward=False)
-def pack_images(
-    border: Border, rgb: wp.array4d(dtype=wp.uint8), depth_m: wp.array3d(dtype=float), rows: wp.array(dtype=wp.bool)
-) -> None:
-    """The images of the chosen rows; one thread per row of pixels."""
-    i, y = wp.tid()
-    if not rows[i]:
-        return
-    for x in range(rgb.shape[2]):
-        for c in range(3):
-            border.images[i, y, x, c] = rgb[i, y, x, c]
-        if border.images.shape[3] == 4:
-            border.images[i, y, x, 3] = depth_byte(depth_m[i, y, x])
 
 
 class Eyes:
@@ -76,7 +60,7 @@ class Eyes:
         self._everyone = everyone
         set_inputs = [rig, numbers, everyone, camera.optics]
         self._set_optics = wp.launch(set_optics, count, set_inputs, device=device, record_cmd=True)
-        inputs = [border, camera.rgb, camera.depth_m, everyone]
+        inputs = [camera.rgb, camera.depth_m, everyone, border.images]
         self._pack = wp.launch(pack_images, (count, height), inputs, device=device, record_cmd=True)
 
     @property
@@ -90,7 +74,7 @@ class Eyes:
         self._set_optics.set_param_at_index(2, chosen)
         self._set_optics.launch()
         self._camera.render(chosen)
-        self._pack.set_param_at_index(3, chosen)
+        self._pack.set_param_at_index(2, chosen)
         self._pack.launch()
 
     def refresh(self, worlds: Any = None) -> None:

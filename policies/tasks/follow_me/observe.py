@@ -146,14 +146,23 @@ def depth_byte(depth_m: float) -> wp.uint8:
 
 @wp.kernel(enable_backward=False)
 def pack_images(
-    rgb: wp.array4d(dtype=wp.uint8), depth_m: wp.array3d(dtype=float), images: wp.array4d(dtype=wp.uint8)
+    rgb: wp.array4d(dtype=wp.uint8),
+    depth_m: wp.array3d(dtype=float),
+    rows: wp.array(dtype=wp.bool),
+    images: wp.array4d(dtype=wp.uint8),
 ) -> None:
-    """Red, green, blue (and depth, where the image has a fourth channel), shape (rows, height, width, channels)."""
-    i, row, column = wp.tid()
-    for k in range(3):
-        images[i, row, column, k] = rgb[i, row, column, k]
-    if images.shape[3] == 4:
-        images[i, row, column, 3] = depth_byte(depth_m[i, row, column])
+    """Red, green, blue (and depth, where the image has a fourth channel) of the chosen rows, as they are observed.
+
+    Shapes (rows, height, width, channels), of depth without the last. One thread per row of pixels.
+    """
+    i, y = wp.tid()
+    if not rows[i]:
+        return
+    for x in range(rgb.shape[2]):
+        for c in range(3):
+            images[i, y, x, c] = rgb[i, y, x, c]
+        if images.shape[3] == 4:
+            images[i, y, x, 3] = depth_byte(depth_m[i, y, x])
 
 
 def camera_mount() -> tuple[float, float, float, float]:

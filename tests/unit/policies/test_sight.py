@@ -18,6 +18,13 @@ DISTANCES_M = (1.0, 2.0, 3.0, 4.0, 5.0)  # beyond 6 m a shirt is two pixels
 SIDES_M = (-0.3, 0.0, 0.4)
 
 
+def packed(camera):
+    images = wp.zeros((*camera.rgb.shape[:3], 4), dtype=wp.uint8)
+    everyone = wp.full(len(images), value=True, dtype=wp.bool)
+    wp.launch(pack_images, images.shape[:2], [camera.rgb, camera.depth_m, everyone, images])
+    return images.numpy()
+
+
 @pytest.fixture(scope="module")
 def views():
     """Owners at several places before a camera 1.6 m above the ground: the pictures, and where the shirts are."""
@@ -31,10 +38,9 @@ def views():
     lenses["pos_ned"], lenses["q_ned_from_rdf"] = eye, q_ned_from_rdf
     camera.lenses.assign(lenses)
     camera.render()
-    images = wp.zeros((*camera.rgb.shape[:3], 4), dtype=wp.uint8)
-    wp.launch(pack_images, images.shape[:3], [camera.rgb, camera.depth_m, images])
+    images = packed(camera)
     shirts = owner.people.numpy()["pos_ned"] - np.array([0.0, 0.0, float(CHEST_M) + SHIRT_OVER_CHEST_M])
-    return images.numpy(), shirts, eye, q_ned_from_rdf
+    return images, shirts, eye, q_ned_from_rdf
 
 
 def test_direction_and_range_are_those_of_the_shirt(views):
@@ -60,6 +66,5 @@ def test_a_world_without_people_shows_nobody():
         lenses["q_ned_from_rdf"][i] = product(quat_of(i * np.pi / 18.0, -0.2 + 0.02 * i), camera_mount())
     camera.lenses.assign(lenses)
     camera.render()
-    images = wp.zeros((*camera.rgb.shape[:3], 4), dtype=wp.uint8)
-    wp.launch(pack_images, images.shape[:3], [camera.rgb, camera.depth_m, images])
-    assert [find_owner(image, HFOV_DEG, float(DEPTH_HALF_M)) for image in images.numpy()] == [None] * 36
+    images = packed(camera)
+    assert [find_owner(image, HFOV_DEG, float(DEPTH_HALF_M)) for image in images] == [None] * 36

@@ -101,7 +101,7 @@ def test_depth_channel_grows_with_depth_up_to_the_sky() -> None:
     depth_m = wp.array([[[0.0, 4.0, 12.0, 4000.0]]], dtype=float)
     rgb = wp.array(np.arange(12, dtype=np.uint8).reshape(1, 1, 4, 3), dtype=wp.uint8)
     images = wp.zeros((1, 1, 4, 4), dtype=wp.uint8)
-    wp.launch(pack_images, dim=(1, 1, 4), inputs=[rgb, depth_m], outputs=[images])
+    wp.launch(pack_images, dim=(1, 1), inputs=[rgb, depth_m, wp.array([True], dtype=wp.bool), images])
     packed: NDArray[np.uint8] = images.numpy()
     assert packed[0, 0, :, 3].tolist() == [0, 127, 191, 255]
     assert packed[0, 0, :, :3].tolist() == rgb.numpy()[0, 0].tolist()
