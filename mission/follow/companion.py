@@ -14,8 +14,8 @@ from rich.live import Live
 from autopilot.mavlink.client_links import open_client_link
 from autopilot.mavlink.links import LinkError
 from common.clock import Pacer, wall_time_s
-from policies.companion.camera import CameraUrlError, ImageSource, StreamCamera
-from policies.companion.companion import Companion
+from policies.companion.camera import CameraUrlError, StreamCamera
+from policies.companion.companion import NO_PICTURES, Companion
 from policies.companion.pilot import PilotError, load_pilot
 
 POLL_US = 2_000
@@ -45,13 +45,14 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     """
     try:
         pilot = load_pilot(options.policy)
-        camera: ImageSource = StreamCamera(options.camera)
+        camera = StreamCamera(options.camera)
         link = open_client_link(options.link)
     except (PilotError, CameraUrlError, LinkError) as error:
         raise CompanionError(str(error)) from error
     companion = Companion(link, camera, pilot, is_told=options.is_told, wall_s=wall_time_s)
+    _shower(console)(f"{options.policy} flies; vehicle: {options.link}, pictures: {options.camera}; Ctrl-C ends it")
     try:
-        _loop(companion, options.seconds, console)
+        _loop(companion, camera, options.seconds, console)
     except KeyboardInterrupt:
         pass
     finally:
@@ -59,7 +60,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     return f"{companion.decision_count} decisions; {latency_text(companion)}"
 
 
-def _loop(companion: Companion, seconds: float | None, console: Console) -> None:
+def _loop(companion: Companion, camera: StreamCamera, seconds: float | None, console: Console) -> None:
     pacer = Pacer(1.0)
     start_s, shown_us = wall_time_s(), 0
     polled_us = 0
@@ -70,11 +71,11 @@ def _loop(companion: Companion, seconds: float | None, console: Console) -> None
             before = companion.phase
             companion.frame(time_us)
             if companion.phase is not before:
-                why = f": {companion.trouble}" if companion.trouble else ""
+                why = f": {trouble_text(companion, camera)}" if companion.trouble else ""
                 show(f"{time_us * 1e-6:7.1f} s  {companion.phase.value}{why}")
             if console.is_terminal and time_us - shown_us >= PROGRESS_US:
                 shown_us = time_us
-                live.update(progress_line(companion, time_us), refresh=True)
+                live.update(progress_line(companion, camera, time_us), refresh=True)
             polled_us = max(polled_us + POLL_US, time_us)
             pacer.wait_until(polled_us)
 
@@ -86,9 +87,15 @@ def _shower(console: Console) -> Callable[[str], None]:
     return show
 
 
-def progress_line(companion: Companion, time_us: int) -> str:
+def trouble_text(companion: Companion, camera: StreamCamera) -> str:
+    """Why the companion does not fly, with what is wrong with the camera if it is that."""
+    is_dark = companion.trouble == NO_PICTURES and camera.trouble
+    return f"{companion.trouble}: {camera.trouble}" if is_dark else companion.trouble
+
+
+def progress_line(companion: Companion, camera: StreamCamera, time_us: int) -> str:
     """State, how far the owner is, how old the picture is, and how long a decision takes."""
-    state = companion.phase.value + (f" ({companion.trouble})" if companion.trouble else "")
+    state = companion.phase.value + (f" ({trouble_text(companion, camera)})" if companion.trouble else "")
     return (
         f"{state} | owner {companion.owner_distance_m():.1f} m | "
         f"picture {companion.picture_age_s(time_us) * 1e3:.0f} ms | {latency_text(companion)}"

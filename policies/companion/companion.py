@@ -31,6 +31,7 @@ IMAGE_OLD_US = 500_000  # guess: five pictures missed, 3 m at full speed
 TELEMETRY_OLD_US = 500_000
 HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
+NO_PICTURES = "no new pictures"
 LATENCIES_KEPT = 600  # a minute of decisions
 LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the pictures that policies are trained on
 LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
@@ -193,7 +194,7 @@ class Companion:
             return "no attitude or position from the vehicle"
         picture = self._picture
         if picture is None or max(time_us - self._picture_us, own.boot_us - picture.time_us) > IMAGE_OLD_US:
-            return "no new pictures"  # none came in, or what came in was old
+            return NO_PICTURES  # none came in, or what came in was old
         if picture.pixels.shape != self._pilot.image_shape:
             return "pictures of another size"
         lens = (picture.hfov_deg, picture.pitch_deg, picture.depth_half_m)

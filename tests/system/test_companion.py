@@ -13,10 +13,13 @@ from mission.flight import Flight
 from mission.follow.image_server import ImageServer
 from mission.follow.lockstep import take_off
 from mission.follow.watch import FollowWatch
+from policies.companion.pilot import SCRIPTED, TASK
+from policies.pretrained.shelf import pretrained
 from policies.tasks.follow_me.scorecard import scorecard
 from tests.system.vehicle import HONEYGUIDE, ROOT, free_ports
 from tests.unit.mission.follow_flight import config
 
+POLICY = TASK if pretrained(TASK) is not None else SCRIPTED  # what `make fly` flies
 SECONDS = 60.0
 SEED = 2  # the script knows no trees; its way leads past them by 1.2 m and more
 STARTED_S = 60.0  # wall clock: torch has to be imported
@@ -35,7 +38,7 @@ class Scene:
         self.flight.onboard.add_sink(self.images.publish)
         self.flight.computers.append(self.images)
         self._output = (folder / "companion.txt").open("w+")
-        command = [HONEYGUIDE, "companion", "--policy", "scripted", "--engage"]
+        command = [HONEYGUIDE, "companion", "--policy", POLICY, "--engage"]
         command += ["--link", f"udpout://127.0.0.1:{port}", "--camera", self.images.url]
         self.companion = subprocess.Popen(command, stdout=self._output, stderr=subprocess.STDOUT, cwd=ROOT)
 

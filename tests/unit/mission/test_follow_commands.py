@@ -5,7 +5,14 @@ import socket
 import pytest
 from typer.testing import CliRunner
 
+from autopilot.mavlink.codec import encode
+from autopilot.mavlink.links import LinkRole, memory_pair
 from mission.cli import app
+from mission.follow.companion import trouble_text
+from policies.companion.camera import StreamCamera
+from policies.companion.companion import Companion
+from policies.companion.pilot import load_pilot
+from tests.system.vehicle import free_ports
 from tests.unit.policies.companion.test_pilot import policy_file
 
 
@@ -44,3 +51,24 @@ def test_a_port_that_is_taken():
 
 def test_a_camera_of_another_kind():
     assert "must be tcp://HOST:PORT" in refused("--policy", "scripted", "--camera", "http://127.0.0.1:1")
+
+
+def test_it_says_who_flies_and_where_and_what_is_missing():
+    result = CliRunner().invoke(app, ["companion", "--policy", "scripted", "--seconds", "0.2"])
+    assert result.exit_code == 0
+    first, last = result.stdout.strip().splitlines()
+    assert "vehicle: udpout://127.0.0.1:14580, pictures: tcp://127.0.0.1:14600" in first
+    assert "no decision timed" in last
+
+
+def test_a_camera_that_is_not_there_is_named():
+    camera = StreamCamera(f"tcp://127.0.0.1:{free_ports()[0]}")
+    own_end, vehicle_end = memory_pair(LinkRole.ONBOARD)
+    companion = Companion(own_end, camera, load_pilot("scripted"))
+    vehicle_end.send(encode("HEARTBEAT", 1, 1, 0, type=2, autopilot=12, system_status=4, mavlink_version=3))
+    vehicle_end.send(encode("ATTITUDE_QUATERNION", 1, 1, 1, time_boot_ms=1, q1=1.0))
+    vehicle_end.send(encode("LOCAL_POSITION_NED", 1, 1, 2, time_boot_ms=1))
+    for time_us in range(0, 100_000, 20_000):
+        companion.frame(time_us)
+    assert trouble_text(companion, camera) == "no new pictures: nobody there"
+    companion.close()
