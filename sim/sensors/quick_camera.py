@@ -121,13 +121,14 @@ class QuickCamera:
             pictures = [array.flatten() for array in (*perfect, self.rgb, self.depth_m)]
             shown = [self.lenses, chosen, self.optics, size, *pictures]
             self._expose = wp.launch(expose, dim=(count, height), inputs=shown, device=device, record_cmd=True)
+        strips = 1 if self.rgb.device.is_cpu else STRIPS  # each thread goes through all trees
         every_world = wp.full(world_count, value=True, dtype=wp.bool, device=device)
         self._every_world = every_world
         fresh = [self._worlds, every_world, ground]
         self._pack = [
             wp.launch(pack_cells, dim=(world_count, ground.side), inputs=fresh, device=device, record_cmd=True),
             wp.launch(light_corners, dim=(world_count, ground.side + 1), inputs=fresh, device=device, record_cmd=True),
-            wp.launch(light_strips, dim=(world_count, STRIPS), inputs=[*fresh, STRIPS], device=device, record_cmd=True),
+            wp.launch(light_strips, dim=(world_count, strips), inputs=[*fresh, strips], device=device, record_cmd=True),
             wp.launch(
                 pack_light,
                 dim=(world_count, ground.texels),

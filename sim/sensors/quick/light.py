@@ -16,7 +16,7 @@ from sim.world.world import World
 
 wp.set_module_options({"enable_backward": False})
 
-STRIPS = 16  # threads per world
+STRIPS = 16  # threads per world on a GPU
 _BLEND_M = wp.constant(0.5)
 _AWAY_NORTH = wp.constant(-cos(SUN_AZIMUTH))  # level direction in which shadows fall
 _AWAY_EAST = wp.constant(-sin(SUN_AZIMUTH))

@@ -26,11 +26,11 @@ _FIRST_MIN_M = wp.constant(0.25)
 
 @wp.func
 def with_axes(view: View, lens: Lens, width: int) -> View:
-    """The camera with its pose, axes and optics; at the origin if its pose is not a number."""
+    """The camera with its pose, axes and optics; far up in the sky if its pose is not a number."""
     q = wp.normalize(lens.q_ned_from_rdf)
     pos_ned = lens.pos_ned
-    size = wp.abs(pos_ned[0]) + wp.abs(pos_ned[1]) + wp.abs(pos_ned[2]) + wp.abs(q[0]) + wp.abs(q[1]) + wp.abs(q[2])
-    if not size < _FAR_M:
+    is_turned = wp.dot(lens.q_ned_from_rdf, lens.q_ned_from_rdf) > 0.0
+    if not (wp.abs(pos_ned[0]) + wp.abs(pos_ned[1]) + wp.abs(pos_ned[2]) < _FAR_M and is_turned):
         q = wp.quat(0.5, 0.5, 0.5, 0.5)
         pos_ned = wp.vec3(0.0, 0.0, -_FAR_M)
     view.pos_ned = pos_ned

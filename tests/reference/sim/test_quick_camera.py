@@ -67,12 +67,16 @@ def pointed(camera, places, rng):
     lenses["q_ned_from_rdf"] = q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
-@pytest.mark.parametrize("config", [FOLLOW_WORLD, STEEP_WORLD], ids=["follow", "steep"])
-def test_classes_and_depth_are_those_of_the_exact_ray_cast(config):
+@pytest.mark.parametrize(
+    ("config", "low_m", "high_m"),
+    [(FOLLOW_WORLD, 0.3, 10.0), (FOLLOW_WORLD, 10.0, 40.0), (STEEP_WORLD, 0.3, 10.0)],
+    ids=["follow", "high", "steep"],
+)
+def test_classes_and_depth_are_those_of_the_exact_ray_cast(config, low_m, high_m):
     rng = np.random.default_rng(8)
     world = build_world(config)
     camera = QuickCamera(world, 60)
-    pointed(camera, random_places(world, 60, rng), rng)
+    pointed(camera, random_places(world, 60, rng, low_m, high_m), rng)
     camera.render()
     depth_m, kind = exact(world, camera)
     assert (camera.kind.numpy() != kind).mean() < 0.003

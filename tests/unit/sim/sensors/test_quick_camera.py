@@ -3,6 +3,7 @@ import pytest
 import warp as wp
 
 from sim.sensors.quick_camera import QuickCamera
+from sim.sensors.ray import SKY
 from sim.world.batch import WorldBatch
 from sim.world.world import WorldConfig
 
@@ -93,6 +94,16 @@ def test_only_chosen_pictures_are_taken():
     assert not same(after, before, 1, 1)
     camera.render()
     assert same(pictures(camera), after, 1, 1)
+
+
+def test_a_pose_that_is_not_a_number_shows_the_sky():
+    camera = QuickCamera(grown(1), 2)
+    look_around(camera)
+    lenses = camera.lenses.numpy()
+    lenses["pos_ned"][0, 1] = np.nan
+    lenses["q_ned_from_rdf"][1, 2] = np.nan
+    camera.render()
+    assert (camera.kind.numpy() == SKY).all()
 
 
 def test_cameras_and_worlds_that_do_not_match_are_refused():
