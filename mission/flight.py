@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from mission.follow.onboard import OnboardCamera
 
 TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
+OUTSIDE_MODES = (Mode.OFFBOARD, Mode.GUIDED)  # in which a companion may fly, PX4's and ArduPilot's
 DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (PX4, ARDUPILOT)}
 GUST_SHARE = 0.3  # guess: a gust adds up to this share of the mean wind
 
@@ -216,7 +217,7 @@ class Flight:
         self.time_us += FRAME_US
         self._surroundings.frame(self.time_us)
         if self.owner is not None:
-            self.owner.frame(self.time_us, is_followed=self.controller.state.mode is Mode.OFFBOARD)
+            self.owner.frame(self.time_us, is_followed=self.controller.state.mode in OUTSIDE_MODES)
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
         if self.onboard is not None:

@@ -164,6 +164,18 @@ def test_who_flies_by_sight_alone_is_ready_when_it_believes_to_see_the_owner(tmp
         assert companion.owner_distance_m() == pytest.approx(3.5, abs=0.1)  # as believed
 
 
+def test_in_the_ardupilot_dialect_it_flies_in_guided_and_hands_back_by_loiter():
+    ardupilot = config().model_copy(update={"dialect": "ardupilot"})
+    flight, companion = flight_with_companion(ardupilot, ScriptedFollower())
+    flight.fly(take_off, seconds=40.0)
+    advance(flight, 5.0)
+    assert (companion.phase, flight.controller.state.mode) == (Phase.FLYING, Mode.GUIDED)
+    assert flight.owner.is_walking
+    flight.onboard._sinks.clear()
+    advance(flight, 1.0)
+    assert (companion.phase, flight.controller.state.mode) == (Phase.RELEASED, Mode.HOLD)
+
+
 def test_pictures_of_another_lens_end_in_hold():
     flight, companion = following()
     flight.onboard._sinks.clear()
