@@ -49,14 +49,18 @@ class FollowWatch:
         """Samples taken so far."""
         return len(self._rows)
 
+    def begin(self) -> None:
+        """It is to follow from now on, whether it does or not; otherwise that begins by itself."""
+        self._start_us = self._flight.time_us
+        wp.launch(forget_impacts, 1, [self._flight.rig.arrays])
+
     def frame(self) -> None:
         """Looks for collisions, and takes a sample if one is due or the following is over."""
         if self.is_over:
             return
         if self._start_us < 0:
             if self._is_following():
-                self._start_us = self._flight.time_us
-                wp.launch(forget_impacts, 1, [self._flight.rig.arrays])
+                self.begin()
             return
         wp.launch(measure_rows, 1, self._inputs)
         passed_us = self._flight.time_us - self._start_us

@@ -1,6 +1,6 @@
 """FollowMe's numbers: the world, the owner, their phone, distances, and what the reward weighs, with their sources.
 
-The seven numbers of the air and the vehicle come first (`FLIGHT_NUMBERS`); all can be set or randomised by name.
+The numbers of the air and the vehicle come first (`FLIGHT_NUMBERS`); all can be set or randomised by name.
 """
 
 import warp as wp
