@@ -16,12 +16,13 @@ from mission.follow.watch import FollowWatch
 from policies.companion.pilot import SCRIPTED, TASK
 from policies.pretrained.shelf import pretrained
 from policies.tasks.follow_me.scorecard import scorecard
+from policies.tasks.follow_me.world import FOLLOW_WORLD
 from tests.system.vehicle import HONEYGUIDE, ROOT, free_ports
 from tests.unit.mission.follow_flight import config
 
 POLICY = TASK if pretrained(TASK) is not None else SCRIPTED  # what `make fly` flies
 SECONDS = 60.0
-SEED = 2  # the script knows no trees; its way leads past them by 1.2 m and more
+OPEN = FOLLOW_WORLD.model_copy(update={"trees_per_ha": 0.0})  # the script that flies knows no trees
 STARTED_S = 60.0  # wall clock: torch has to be imported
 NOBODY_PORT = 9  # discard: the vehicle's first client is not there
 
@@ -29,11 +30,13 @@ NOBODY_PORT = 9  # discard: the vehicle's first client is not there
 class Scene:
     """A flight in this process, in real time, and a companion in another."""
 
-    def __init__(self, folder, seed=SEED, pace="walk"):
+    def __init__(self, folder, seed=3, pace="walk"):
         port = free_ports()[1]
         self.images = ImageServer(0)
         self.flight = Flight(
-            config(pace, seed), links=[UdpPort(NOBODY_PORT, LinkRole.ONBOARD, local_port=port)], folder=folder
+            config(pace, seed).model_copy(update={"world": OPEN}),
+            links=[UdpPort(NOBODY_PORT, LinkRole.ONBOARD, local_port=port)],
+            folder=folder,
         )
         self.flight.onboard.add_sink(self.images.publish)
         self.flight.computers.append(self.images)
