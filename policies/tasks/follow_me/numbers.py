@@ -50,6 +50,7 @@ class FollowNumbers:
     height_cost: float
     jerk_cost: float
     turn_cost: float
+    blind_cost: float
     clearance_m: float
     clearance_cost: float
     collision_cost: float
@@ -95,8 +96,17 @@ FOLLOW_NUMBERS = (
     Number("height_cost", 0.02, 0.0, 10.0, "1", "per decision and metre off the best height, at most 3", "tuned"),
     Number("jerk_cost", 0.01, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),
     Number("turn_cost", 0.002, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
-    Number("clearance_m", 1.2, 0.0, 2.0, "m", "room to obstacles below which there is a cost", "tuned"),
-    Number("clearance_cost", 0.1, 0.0, 10.0, "1", "per decision for no room at all, growing as the square", "tuned"),
+    Number(
+        "blind_cost",
+        0.015,
+        0.0,
+        10.0,
+        "1",
+        "per decision and (m/s)² asked for to where the camera does not look",
+        "tuned",
+    ),
+    Number("clearance_m", 1.5, 0.0, 2.0, "m", "room to obstacles below which there is a cost", "tuned"),
+    Number("clearance_cost", 0.2, 0.0, 10.0, "1", "per decision for no room at all, growing as the square", "tuned"),
     Number("collision_cost", 8.0, 0.0, 1000.0, "1", "of a collision, which ends the episode", "tuned"),
     Number("lost_cost", 3.0, 0.0, 1000.0, "1", "of losing the owner, which ends the episode", "tuned"),
     Number("document_within", 0.1, -10.0, 10.0, "1", "document: per payment within `far_m` of the person", _DOCUMENT),

@@ -1,8 +1,9 @@
 """What a decision pays, and how an episode ends.
 
 Ours: near the best distance, the owner ahead and in sight, level with them; no jerks, no turning for nothing, room to
-obstacles; dear collisions and losses, which end the episode. The document's: per payment more within 3 m than
-otherwise, and a fine for a collision. Time is up at the limit: a success if the owner is followed then.
+obstacles, no haste where the camera does not look; dear collisions and losses, which end the episode. The document's:
+per payment more within 3 m than otherwise, and a fine for a collision. Time is up at the limit: a success if the owner
+is followed then.
 """
 
 import math
@@ -10,6 +11,7 @@ import math
 import warp as wp
 
 from policies.tasks.episode import HIT_OBSTACLE, HIT_OTHER, LOST, RUNNING, SUCCESS, TIMEOUT
+from policies.tasks.flight.own import SPEED_MAX_M_S
 from policies.tasks.follow_me.numbers import FollowNumbers
 from policies.tasks.follow_me.sight import Sight
 
@@ -51,6 +53,14 @@ def follow_outcome(n: FollowNumbers, sight: Sight, has_touched: bool, unseen_s: 
 
 
 @wp.func
+def blind_speed(action: wp.vec4) -> float:
+    """How fast an action asks to fly to where the camera, which sees 45 degrees to either side, does not look [m/s]."""
+    aside = wp.max(wp.abs(action[1]) - wp.max(action[0], 0.0), 0.0)
+    back = wp.max(-action[0], 0.0)
+    return SPEED_MAX_M_S * wp.sqrt(aside * aside + back * back)
+
+
+@wp.func
 def follow_reward(n: FollowNumbers, sight: Sight, outcome: int, action: wp.vec4, last_action: wp.vec4) -> float:
     """Ours, of one decision."""
     distance = sight.distance_m
@@ -64,6 +74,8 @@ def follow_reward(n: FollowNumbers, sight: Sight, outcome: int, action: wp.vec4,
     change = action - last_action
     reward -= n.jerk_cost * wp.dot(change, change)
     reward -= n.turn_cost * action[3] * action[3]
+    blind = blind_speed(action)
+    reward -= n.blind_cost * blind * blind
     tight = wp.max(1.0 - sight.room_m / wp.max(n.clearance_m, 1.0e-3), 0.0)
     reward -= n.clearance_cost * tight * tight
     if outcome == HIT_OBSTACLE or outcome == HIT_OTHER:  # noqa: SIM109  (kernels know no tuples)
