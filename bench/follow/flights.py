@@ -23,7 +23,7 @@ from policies.companion.pilot import load_pilot
 from policies.tasks.follow_me.track import Track
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
-FLIGHTS = 10  # of each cell
+FLIGHTS = 20  # of each cell
 SECONDS = 60.0
 FIRST_SEED = 1_000_003  # no training is given it, and no tuning
 _TAKEOFF_S = 40.0
