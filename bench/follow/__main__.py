@@ -20,11 +20,13 @@ from rich.console import Console
 from bench.cars.page import DOCS
 from bench.follow.page import write_page
 from bench.follow.result import Result, read, read_all, write, write_all
-from bench.follow.run import result_path
+from bench.follow.run import policy_path, result_path
 from bench.follow.stages import STAGES, Stage, in_order
+from common.files import write_whole
 
 RESULTS = Path("results/follow")
 RUNS = DOCS / "follow.jsonl"
+PRETRAINED = Path(__file__).parents[2] / "policies" / "pretrained"
 console = Console(highlight=False)
 
 
@@ -77,6 +79,7 @@ def main(
     path = write_page(there)
     write_all(RUNS, [result for runs in there.values() for result in runs])
     console.print(f"wrote {path}")
+    _publish()
     for name in failed:
         console.print(f"[red]failed[/red] {name}: see {RESULTS / name}.log")
     raise typer.Exit(1 if failed else 0)
@@ -89,6 +92,14 @@ def results() -> dict[str, list[Result]]:
         paths = [path for path in RESULTS.glob(f"{name}-*.json") if path.stem.rsplit("-", 1)[0] == name]
         found[name] = sorted((read(path) for path in paths), key=lambda result: result.seed)
     return found
+
+
+def _publish() -> None:
+    """Puts the first seed's policies into policies/pretrained/, under the names of their recipes."""
+    for stage in STAGES.values():
+        trained = policy_path(RESULTS, stage.name, 1)
+        if stage.ships and trained.exists():
+            write_whole(PRETRAINED / f"{stage.recipe}.pt", trained.read_bytes())
 
 
 def _jobs(names: Sequence[str], seeds: int) -> list[Job]:

@@ -17,7 +17,7 @@ from bench.row import machine
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
 from policies.learn.config.run import RunConfig
-from policies.learn.policy_file import load_policy
+from policies.learn.policy_file import load_policy, save_policy
 from policies.learn.run_folder import RunError, RunFolder
 from policies.learn.trainer import train
 from policies.tasks.catalogue import build_task, settings_of
@@ -66,8 +66,8 @@ def run(stage: Stage, seed: int, folder: Path) -> Result:
     curve = Curve(config.behavior.max_steps)
     result = train(config, curve)
     kept = policy_path(folder, stage.name, seed)
-    kept.write_bytes(result.policy.read_bytes())
-    policy, _ = load_policy(kept)
+    save_policy(kept, *load_policy(result.policy), is_half=True)
+    policy, _ = load_policy(kept)  # judged and flown as it ships
     return Result(
         stage.name,
         seed,

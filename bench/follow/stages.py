@@ -31,6 +31,7 @@ class Stage:
     changes: dict[str, Any] = field(default_factory=dict)  # of the recipe: path with dots to value
     judged: dict[str, Any] = field(default_factory=dict)  # settings of the task to judge in, over the recipe's
     flies: bool = False  # also judged in flights over MAVLink
+    ships: bool = True  # the first seed's policy goes to policies/pretrained/
     document: str = "not reported"
     limit_s: float | None = None  # wall clock at most, with all stages before it
     figure: str = "in_band"  # of the scorecard, that the targets are of
@@ -72,6 +73,7 @@ STAGES: dict[str, Stage] = {
             "follow-me-document",
             document="reward 20 to 30, 10 M steps, 36.4 h",
             limit_s=7200.0,
+            ships=False,
         ),
     )
 }
