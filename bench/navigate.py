@@ -50,7 +50,7 @@ time.
 |---|---|---|---|---|---|---|
 {rows}
 
-![Flights from above](images/navigate.png)
+![Flights from above](images/navigate.jpg)
 
 Flights through 600 trees/ha: blue arrived, red ended at a tree; trunks, crowns, and goals with their radius in red.
 
@@ -168,7 +168,7 @@ def main(arguments: list[str]) -> int:
         print(lines[-1], flush=True)
     image = picture(settings, flights, DENSITIES[-1])
     (DOCS / "images").mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(DOCS / "images" / "navigate.png"), image[..., ::-1])
+    cv2.imwrite(str(DOCS / "images" / "navigate.jpg"), image[..., ::-1], (cv2.IMWRITE_JPEG_QUALITY, 82))
     page = PAGE.format(episodes=EPISODES, rows="\n".join(lines), machine=machine())
     write_whole(DOCS / "navigate.md", page.encode())
     return 0
