@@ -26,7 +26,7 @@ class Control(StrEnum):
 class _Axis:
     """What a continuous action is pulled up and down by, and where it lies when no key is held."""
 
-    up: Control
+    up: Control | None
     down: Control | None
     idle: float = 0.0
 
@@ -37,10 +37,14 @@ _AXES = {
     "brake": _Axis(Control.BRAKE, None),
     "force_x": _Axis(Control.RIGHT, Control.LEFT),
     "force_z": _Axis(Control.FORWARD, Control.BACK),
+    "forward_sp": _Axis(Control.FORWARD, Control.BACK),
+    "right_sp": _Axis(None, None),
+    "down_sp": _Axis(None, Control.BRAKE),  # a drone climbs while the key is held that a car brakes with
+    "yaw_rate_sp": _Axis(Control.RIGHT, Control.LEFT),
 }
 # In this order: whoever steers and pushes steers, where an action can do one of them only.
 _CHOICES = {
-    Control.BRAKE: {"brake"},
+    Control.BRAKE: {"brake", "up"},
     Control.LEFT: {"left"},
     Control.RIGHT: {"right"},
     Control.FORWARD: {"forward", "push", "accelerate", "drive"},

@@ -1,5 +1,7 @@
 """Laws of every learning task: what no preset, seed or order of its rows may break."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,12 +17,15 @@ from policies.tasks.reach_target.reach_target import ReachTarget
 from policies.tasks.roller_ball import RollerBall, RollerBallNumbers
 
 FEW = settings(max_examples=5, deadline=None)  # the first example compiles a kernel
-PRESETS = ("as-documented", "as-coded", "improved")
 TASKS = [
-    ("RollerBall", "as-coded"),
-    *((name, preset) for name in CATALOGUE if name != "RollerBall" for preset in PRESETS),
+    (name, preset)
+    for name, entry in CATALOGUE.items()
+    for preset in (
+        ("as-coded",) if name == "RollerBall" else get_args(entry.settings.model_fields["preset"].annotation)
+    )
 ]
 every_task = pytest.mark.parametrize(("name", "preset"), TASKS)
+FLOWN = {"FollowMe", "Navigate"}  # the noise of a rig's sensors is keyed by the row
 seeds = st.integers(0, 2**31 - 1)
 STRUCTS = {
     RollerBall: (RollerBallNumbers,),
@@ -47,6 +52,13 @@ def act(task, rng, rows=None):
     task.step()
 
 
+def is_same(one, other):
+    """Whether two arrays of numbers or structs hold the same values; NaN is one, and padding is none."""
+    if one.dtype.names:
+        return all(is_same(one[field], other[field]) for field in one.dtype.names)
+    return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+
+
 def driven(name, preset, env_count, seed, step_count=40):
     """What the rows saw and were paid, (steps, rows, elements + 1)."""
     task = built(name, preset, env_count, seed)
@@ -68,7 +80,7 @@ def test_the_same_seed_gives_the_same_bytes_and_a_row_is_its_own(name, preset, s
     assert preset != "improved" or not np.array_equal(many[0], driven(name, preset, 24, seed + 1, 1)[0])
 
 
-@every_task
+@pytest.mark.parametrize(("name", "preset"), [(name, preset) for name, preset in TASKS if name not in FLOWN])
 def test_permuted_rows_do_permuted_things(name, preset):
     task, other = built(name, preset, 24), built(name, preset, 24)
     order = np.random.default_rng(1).permutation(24)
@@ -98,11 +110,11 @@ def test_a_restored_task_continues_bit_for_bit_and_what_ran_before_a_reset_does_
         for _ in range(40):
             act(task, rng)
         ends.append(task.state())
-    assert all(ends[0][key].tobytes() == ends[1][key].tobytes() for key in ends[0])
+    assert [key for key in ends[0] if not is_same(ends[0][key], ends[1][key])] == []
     task.reset(3)
     again = task.state()
-    of_the_past = {"continuous", "branches", "final_observations"}
-    assert [key for key in fresh if key not in of_the_past and fresh[key].tobytes() != again[key].tobytes()] == []
+    of_the_past = {"continuous", "branches", "final_observations", "measures"}
+    assert [key for key in fresh if key not in of_the_past and not is_same(fresh[key], again[key])] == []
 
 
 @every_task
@@ -113,8 +125,8 @@ def test_beginning_one_row_touches_only_that_row(name, preset):
     after = task.state()
     assert after["episodes"].tolist() == [1, 2, 1, 1]
     others = [0, 2, 3]
-    for key, rows in before.items():
-        assert len(rows) != 4 or np.array_equal(rows[others], after[key][others]), key
+    for key in before.keys() - {"is_starting", "is_growing"}:  # which rows begin
+        assert len(before[key]) != 4 or is_same(before[key][others], after[key][others]), key
 
 
 @pytest.mark.parametrize("task", STRUCTS, ids=lambda task: task.__name__)

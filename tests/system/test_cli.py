@@ -75,7 +75,13 @@ def test_flown_mission_gives_0_and_a_whole_run_folder(fly, tmp_path):
     assert result.stderr == ""
     assert "mission completed" in result.stdout
     folder = tmp_path / "flight"
-    assert sorted(path.name for path in folder.iterdir()) == ["flight.png", "flight.tlog", "flight.ulg", "summary.json"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "flight.png",
+        "flight.tlog",
+        "flight.ulg",
+        "replay.npz",
+        "summary.json",
+    ]
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["is_success"] is True
     assert summary["cross_track_p95_m"] < 1.5
@@ -151,7 +157,13 @@ def test_sigterm_ends_a_flight_like_an_interrupt(tmp_path):
     assert process.returncode == 0, errors
     assert "stopped by the user" in output
     assert errors == ""
-    assert sorted(path.name for path in folder.iterdir()) == ["flight.png", "flight.tlog", "flight.ulg", "summary.json"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "flight.png",
+        "flight.tlog",
+        "flight.ulg",
+        "replay.npz",
+        "summary.json",
+    ]
     ULog(str(folder / "flight.ulg"))
 
 

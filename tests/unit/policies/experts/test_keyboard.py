@@ -1,5 +1,7 @@
 """The keyboard: every action of every task has its keys."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
@@ -8,8 +10,10 @@ from policies.tasks.catalogue import CATALOGUE, build_task
 from policies.tasks.layout import Branch, Element, Layout
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
-@pytest.mark.parametrize("preset", ["as-documented", "as-coded", "improved"])
+@pytest.mark.parametrize(
+    ("name", "preset"),
+    [(n, p) for n, entry in CATALOGUE.items() for p in get_args(entry.settings.model_fields["preset"].annotation)],
+)
 def test_every_task_can_be_driven(name, preset):
     entry = CATALOGUE[name]
     task = build_task(name, 2, entry.settings(preset=preset))
