@@ -10,34 +10,24 @@ import numpy as np
 import warp as wp
 
 from bench.row import Row, best_of, require
+from policies.tasks.follow_me.world import FOLLOW_WORLD
 from sim.world.batch import WorldBatch
 from sim.world.world import WorldConfig
 
 WORLDS = 64
 TIMES = 5
 COMMAND = "python -m bench worlds"
-CONFIG = WorldConfig(
-    size_m=256.0,
-    hill_height_m=8.0,
-    hill_wavelength_m=120.0,
-    clearing_radius_m=5.0,
-    clearing_blend_m=60.0,
-    trees_per_ha=100.0,
-    tree_height_min_m=8.0,
-    tree_height_max_m=15.0,
-    has_walls=True,
-)
 
 
 def measure() -> list[Row]:
     name = "fresh world of 256 m"
-    dense = CONFIG.model_copy(update={"trees_per_ha": 600.0})
-    fine = CONFIG.model_copy(update={"cell_m": 2.0})
+    dense = FOLLOW_WORLD.model_copy(update={"trees_per_ha": 600.0})
+    fine = FOLLOW_WORLD.model_copy(update={"cell_m": 2.0})
     return [
-        Row(f"{name}, 100 trees/ha, 65 x 65 heights", _one_ms(CONFIG), "ms", "lower", 2.0, COMMAND),
+        Row(f"{name}, 100 trees/ha, 65 x 65 heights", _one_ms(FOLLOW_WORLD), "ms", "lower", 2.0, COMMAND),
         Row(f"{name}, 600 trees/ha, 65 x 65 heights", _one_ms(dense), "ms", "lower", None, COMMAND),
         Row(f"{name}, 100 trees/ha, 129 x 129 heights", _one_ms(fine), "ms", "lower", None, COMMAND),
-        Row(f"{name}, {WORLDS} at once: each", _each_ms(CONFIG), "ms", "lower", 2.0, COMMAND),
+        Row(f"{name}, {WORLDS} at once: each", _each_ms(FOLLOW_WORLD), "ms", "lower", 2.0, COMMAND),
     ]
 
 

@@ -11,10 +11,11 @@ from matplotlib.collections import EllipseCollection, LineCollection
 
 from common.attitude import product, quat_of
 from common.kernels import TICK_US
+from policies.tasks.follow_me.world import FOLLOW_WORLD
 from policies.tracker import OwnerTracker, PhoneReport, Sighting, TrackerSettings
 from sim.owner import Owner
 from sim.world.people import CHEST_M, RUN_SPEED_M_S, person_model
-from sim.world.world import WorldConfig, WorldMap, build_world
+from sim.world.world import WorldMap, build_world
 
 PICTURE = Path(__file__).with_name("images") / "owner.png"
 SECONDS, SEED = 180, 8
@@ -92,20 +93,7 @@ def draw(world: WorldMap, rows: dict[str, np.ndarray]) -> None:
 
 def main() -> None:
     """Walks, tracks and draws."""
-    world = build_world(
-        WorldConfig(
-            seed=5,
-            size_m=256.0,
-            hill_height_m=8.0,
-            hill_wavelength_m=120.0,
-            clearing_radius_m=5.0,
-            clearing_blend_m=60.0,
-            trees_per_ha=100.0,
-            tree_height_min_m=8.0,
-            tree_height_max_m=15.0,
-            has_walls=True,
-        )
-    )
+    world = build_world(FOLLOW_WORLD.model_copy(update={"seed": 5}))
     draw(world, follow(world))
 
 

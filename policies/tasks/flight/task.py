@@ -8,6 +8,7 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
@@ -57,6 +58,15 @@ class FlightTask(Task):
         bank = hover_bank(has_estimator, device)
         self._restore = RowRestore(self.rig, bank, self.hovers, self.is_starting, self.noise_seeds)
         self.makes = _makes(self.rig)
+
+    def begin(self, is_chosen: NDArray[np.bool_]) -> None:
+        """Starts an episode in the chosen rows, shape (envs,); the others are not touched."""
+        self.is_starting.assign(is_chosen)
+        self._begin_rows()
+
+    def _begin_rows(self) -> None:
+        """Starts the episodes of the rows that are starting."""
+        raise NotImplementedError
 
     def take_off(self) -> None:
         """Grows the worlds that are to grow, and puts the vehicles of the rows that start into their hovers there."""

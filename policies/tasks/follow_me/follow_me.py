@@ -78,11 +78,6 @@ class FollowMe(FlightTask):
             self.follow.lenses = self._eyes.lenses
         self._record_all(_rules(settings, self.layout), self._start())
 
-    def begin(self, is_chosen: NDArray[np.bool_]) -> None:
-        """Starts an episode in the chosen rows, shape (envs,); the others are not touched."""
-        self.is_starting.assign(is_chosen)
-        self._begin_rows()
-
     def step(self) -> None:
         """One decision of all environments, with the actions that lie in the border."""
         self._act.launch()

@@ -62,11 +62,6 @@ class Navigate(FlightTask):
             self._eyes = DepthEyes(self.border, self.rig.arrays, self.navigation.numbers, self.worlds)
         self._record_all()
 
-    def begin(self, is_chosen: NDArray[np.bool_]) -> None:
-        """Starts an episode in the chosen rows, shape (envs,); the others are not touched."""
-        self.is_starting.assign(is_chosen)
-        self._begin_rows()
-
     def step(self) -> None:
         """One decision of all environments, with the actions that lie in the border."""
         self._act.launch()
