@@ -4,9 +4,7 @@ In: setpoints, written into the rows of `arrays.autopilot.setpoint`. Out: the tr
 as rows of the other arrays. One call of `advance` is one launch per thread, for one vehicle or thousands.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,6 +26,7 @@ from sim.bodies.multirotor import BodyState, MultirotorModel, multirotor_model
 from sim.faults import Faults
 from sim.sensors.sensors import SensorModel, SensorState
 from sim.wind import WindModel, WindState
+from sim.workers import Workers
 from sim.world.batch import WorldBatch
 from sim.world.world import World, WorldMap
 
@@ -85,17 +84,13 @@ class Rig:
         self._home = home
         self._commands: dict[int, list[Any]] = {}
         self._kernel = _advance_kernel(has_estimator)
-        self._chunks = _chunks(vehicle_count, threads)
+        self._workers = Workers(vehicle_count, threads)
         self.boot()
-        self._pool = ThreadPoolExecutor(len(self._chunks)) if len(self._chunks) > 1 else None
 
     def advance(self, tick_count: int) -> None:
         """Advances every vehicle by `tick_count` ticks of 4 ms."""
         commands = self.prepare(tick_count)
-        if self._pool is None:
-            commands[0].launch()
-        else:
-            list(self._pool.map(_launch, commands))
+        self._workers.run(lambda k: commands[k].launch())
 
     def prepare(self, tick_count: int) -> list[Any]:
         """Compiles or loads the kernel for `advance(tick_count)`, so that the first advance takes no longer."""
@@ -146,7 +141,7 @@ class Rig:
                 device=self.device,
                 record_cmd=True,
             )
-            for first, count in self._chunks
+            for first, count in self._workers.chunks
         ]
 
     def _rows(self, struct_type: Any, value: Any) -> Any:
@@ -191,13 +186,3 @@ def row_arrays(arrays: Any) -> list[Any]:
 @cache
 def _advance_kernel(has_estimator: bool) -> Any:
     return make_advance(has_estimator)
-
-
-def _launch(command: Any) -> None:
-    command.launch()
-
-
-def _chunks(vehicle_count: int, threads: int) -> list[tuple[int, int]]:
-    """Splits the vehicles into (first, count) parts of nearly equal size."""
-    bounds = [vehicle_count * k // threads for k in range(threads + 1)]
-    return [(low, high - low) for low, high in pairwise(bounds) if high > low]

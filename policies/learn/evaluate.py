@@ -81,7 +81,7 @@ def evaluate(
     task.set_numbers(numbers or {})
     task.reset(seed)
     generator = None if is_greedy else torch.Generator(device).manual_seed(seed)
-    with few_threads():
+    with few_threads(has_images=task.layout.image is not None):
         return _play(policy, task, _quota(episodes, task.env_count), generator, longest)
 
 

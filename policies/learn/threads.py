@@ -1,4 +1,4 @@
-"""How many threads torch computes with while training and judging: ML-Agents' rule, the same sums each time."""
+"""How many threads torch computes with while training and judging; the same sums each time on the same cores."""
 
 import os
 from collections.abc import Iterator
@@ -8,10 +8,14 @@ import torch
 
 
 @contextmanager
-def few_threads() -> Iterator[None]:
-    """Half the cores, at most 4: more only get in each other's way in small networks."""
+def few_threads(*, has_images: bool = False) -> Iterator[None]:
+    """Half the cores that this process may use, at most 4, ML-Agents' rule; all of them for networks of images.
+
+    More only get in each other's way in small networks; convolutions share their work well.
+    """
+    cores = len(os.sched_getaffinity(0))
     before = torch.get_num_threads()
-    torch.set_num_threads(max(1, min((os.cpu_count() or 1) // 2, 4)))
+    torch.set_num_threads(max(1, min(cores if has_images else cores // 2, 4)))
     try:
         yield
     finally:

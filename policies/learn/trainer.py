@@ -102,8 +102,9 @@ def train(config: RunConfig, watcher: Watcher) -> Result:
         UnknownTask: no such task, or a setting that it has not.
     """
     try:
-        with few_threads():
-            return Training(config, watcher).run()
+        training = Training(config, watcher)
+        with few_threads(has_images=training.task.layout.image is not None):
+            return training.run()
     except OSError as error:
         folder = RunFolder.of(config).path
         raise RunError(f"{error.filename or folder}: cannot be read or written: {error.strerror}") from error

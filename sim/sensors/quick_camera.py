@@ -21,6 +21,7 @@ from sim.sensors.quick.prepare import prepare_views
 from sim.sensors.quick.rows import Outputs, draw_rows
 from sim.sensors.quick.solids import Sights, Solid
 from sim.sensors.quick.view import View
+from sim.workers import Workers
 from sim.world.trees import CROWN_RADIUS_SHARE
 from sim.world.world import World, WorldConfig, WorldMap
 
@@ -28,6 +29,9 @@ RANGE_M = 80.0
 SAMPLES = 40  # distances per column at the default range
 _LIMBS = 24  # solids of a person
 _CROWDED = 2.0  # trees stand closer in places than on average
+
+
+_Pass = tuple[Any, tuple[int, ...], list[Any]]  # kernel, threads per camera, and its inputs but the first camera
 
 
 class Worlds(Protocol):
@@ -55,6 +59,7 @@ class QuickCamera:
         i_world: the world of each camera; None: the only one, or camera i looks at world i.
         range_m: fog hides what is farther; farther ground and trees are not drawn.
         has_optics: whether `optics` spoil the pictures; they are perfect otherwise.
+        threads: the cameras are split into as many launches; the pictures do not depend on it.
         device: a Warp device.
 
     Attributes:
@@ -79,6 +84,7 @@ class QuickCamera:
         i_world: Any = None,
         range_m: float = RANGE_M,
         has_optics: bool = False,
+        threads: int = 1,
         device: str = "cpu",
     ) -> None:
         config = worlds.config
@@ -112,15 +118,19 @@ class QuickCamera:
         chosen = self._everyone
         seen = [self._worlds, self.i_world, self.lenses, people, chosen, ground, range_m, size, views, columns, sights]
         drawn = [ground, paints, views, chosen, columns, sights, range_m, outputs]
-        self._prepare = wp.launch(prepare_views, dim=count, inputs=seen, device=device, record_cmd=True)
-        lay, columns_dim = [ground, views, chosen, columns], (count, columns.room)
-        self._lay = wp.launch(lay_columns, dim=columns_dim, inputs=lay, device=device, record_cmd=True)
-        self._draw = wp.launch(draw_rows, dim=(count, height), inputs=drawn, device=device, record_cmd=True)
-        self._expose: Any = None
+        pictures = [array.flatten() for array in (*perfect, self.rgb, self.depth_m)]
+        passes: list[_Pass] = [
+            (prepare_views, (), seen),
+            (lay_columns, (columns.room,), [ground, views, chosen, columns]),
+            (draw_rows, (height,), drawn),
+        ]
         if has_optics:
-            pictures = [array.flatten() for array in (*perfect, self.rgb, self.depth_m)]
-            shown = [self.lenses, chosen, self.optics, size, *pictures]
-            self._expose = wp.launch(expose, dim=(count, height), inputs=shown, device=device, record_cmd=True)
+            passes.append((expose, (height,), [self.lenses, chosen, self.optics, size, *pictures]))
+        self._workers = Workers(count, threads)
+        self._commands = [
+            [_recorded(a_pass, chosen, first, rows, device) for a_pass in passes]
+            for first, rows in self._workers.chunks
+        ]
         strips = 1 if self.rgb.device.is_cpu else STRIPS  # each thread goes through all trees
         every_world = wp.full(world_count, value=True, dtype=wp.bool, device=device)
         self._every_world = every_world
@@ -149,15 +159,20 @@ class QuickCamera:
     def render(self, is_chosen: Any = None) -> None:
         """Takes the pictures of the chosen cameras: array of bool, shape (count,); None for all."""
         chosen = self._everyone if is_chosen is None else is_chosen
-        self._prepare.set_param_at_index(4, chosen)
-        self._lay.set_param_at_index(2, chosen)
-        self._draw.set_param_at_index(3, chosen)
-        self._prepare.launch()
-        self._lay.launch()
-        self._draw.launch()
-        if self._expose is not None:
-            self._expose.set_param_at_index(1, chosen)
-            self._expose.launch()
+
+        def render_chunk(k: int) -> None:
+            for command, i_chosen in self._commands[k]:
+                command.set_param_at_index(i_chosen, chosen)
+                command.launch()
+
+        self._workers.run(render_chunk)
+
+
+def _recorded(a_pass: _Pass, chosen: Any, first: int, count: int, device: str) -> tuple[Any, int]:
+    """A launch for some cameras, and the index of its parameter that says which of them are chosen."""
+    kernel, dim, inputs = a_pass
+    i_chosen = 1 + next(k for k, value in enumerate(inputs) if value is chosen)
+    return wp.launch(kernel, (count, *dim), [first, *inputs], device=device, record_cmd=True), i_chosen
 
 
 def _first_lens(hfov_deg: float, count: int) -> Any:

@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from policies.tasks.flight.task import worker_count
 from policies.tasks.follow_me.numbers import FollowNumbers
 from policies.tasks.follow_me.observe import HFOV_DEG, pack_images
 from sim.advance import RigArrays
@@ -53,6 +54,7 @@ class Eyes:
             hfov_deg=HFOV_DEG,
             people=people,
             has_optics=True,
+            threads=worker_count(str(device)),
             device=device,
         )
         camera = self._camera

@@ -9,6 +9,7 @@ from typing import Any
 import warp as wp
 
 from policies.tasks.episode import Border
+from policies.tasks.flight.task import worker_count
 from policies.tasks.follow_me.observe import HFOV_DEG, depth_byte
 from policies.tasks.follow_me.sight import lens_of
 from policies.tasks.navigate.numbers import NavigateNumbers
@@ -62,7 +63,14 @@ class DepthEyes:
         count, height, width, _ = border.images.shape
         device = worlds.device
         self._camera = camera = QuickCamera(
-            worlds, count, width=width, height=height, hfov_deg=HFOV_DEG, has_optics=True, device=device
+            worlds,
+            count,
+            width=width,
+            height=height,
+            hfov_deg=HFOV_DEG,
+            has_optics=True,
+            threads=worker_count(str(device)),
+            device=device,
         )
         rows = wp.full(count, value=True, dtype=wp.bool, device=device)
         aimed = [rig, numbers, rows, camera.lenses, camera.optics]

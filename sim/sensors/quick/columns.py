@@ -65,8 +65,11 @@ def level_ray(view: View, cells_per_m: float, ray_ned: wp.vec3) -> LevelRay:
 
 
 @wp.kernel
-def lay_columns(ground: Ground, views: wp.array[View], is_chosen: wp.array[wp.bool], columns: Columns) -> None:
-    i_camera, i_column = wp.tid()
+def lay_columns(
+    first: int, ground: Ground, views: wp.array[View], is_chosen: wp.array[wp.bool], columns: Columns
+) -> None:
+    i_chunk, i_column = wp.tid()
+    i_camera = first + i_chunk
     if not is_chosen[i_camera]:
         return
     view = views[i_camera]
@@ -76,14 +79,14 @@ def lay_columns(ground: Ground, views: wp.array[View], is_chosen: wp.array[wp.bo
     per_m = ground.cells_per_m
     u_rate = per_m * (direction[0] * view.heading[0] - direction[1] * view.heading[1])
     v_rate = per_m * (direction[0] * view.heading[1] + direction[1] * view.heading[0])
-    first = (i_camera * columns.room + i_column) * columns.samples
+    first_slope = (i_camera * columns.room + i_column) * columns.samples
     first_distance = i_camera * columns.samples
     steepest = float(-NEVER)
     for k in range(columns.samples):
         distance = columns.distances[first_distance + k]
         height = surface(ground, view.cell_base, view.eye[0] + distance * u_rate, view.eye[1] + distance * v_rate)[0]
         steepest = wp.max(steepest, (height + view.pos_ned[2]) / distance)
-        columns.slopes[first + k] = steepest
+        columns.slopes[first_slope + k] = steepest
 
 
 @wp.func

@@ -49,6 +49,12 @@ def sensor_noise(optics: Optics, scale: float, seed: int, tick: int) -> Optics:
 
 
 @wp.func
+def is_perfect(optics: Optics) -> bool:
+    """Whether the camera neither errs nor smears."""
+    return optics.read_std + optics.shot_std + optics.depth_std_share + optics.shutter_s == 0.0
+
+
+@wp.func
 def even(bits: wp.uint32, byte: int) -> float:
     """A draw of unit variance from one byte: uniform, which a network cannot tell from normal."""
     level = float(int(bits >> wp.uint32(8 * byte)) & 255)
@@ -102,6 +108,7 @@ def smeared(rgb: wp.array[wp.uint8], first: int, size: wp.vec2i, row: int, colum
 
 @wp.kernel
 def expose(
+    first: int,
     lenses: wp.array[Lens],
     is_chosen: wp.array[wp.bool],
     all_optics: wp.array[Optics],
@@ -111,23 +118,30 @@ def expose(
     rgb: wp.array[wp.uint8],
     depth_m: wp.array[float],
 ) -> None:
-    i_camera, row = wp.tid()
+    i_chunk, row = wp.tid()
+    i_camera = first + i_chunk
     if not is_chosen[i_camera]:
         return
     optics = all_optics[i_camera]
     state = draw_key(optics.seed, row, optics.tick, CAMERA)
     per_pixel = 2.0 * lenses[i_camera].half_width / float(size[0])
     y = (float(row) + 0.5 - 0.5 * float(size[1])) * per_pixel
-    first = i_camera * size[0] * size[1]
+    first_pixel = i_camera * size[0] * size[1]
+    if is_perfect(optics):
+        for k in range(first_pixel + row * size[0], first_pixel + (row + 1) * size[0]):
+            for c in range(3):
+                rgb[3 * k + c] = perfect_rgb[3 * k + c]
+            depth_m[k] = perfect_depth_m[k]
+        return
     for column in range(size[0]):
-        k = first + row * size[0] + column
+        k = first_pixel + row * size[0] + column
         depth = perfect_depth_m[k]
         levels = levels_of(perfect_rgb, 3 * k)
         if optics.shutter_s > 0.0:
             x = (float(column) + 0.5 - 0.5 * float(size[0])) * per_pixel
             way = smear(optics, x, y, depth, per_pixel)
             if wp.dot(way, way) > _STILL_SQUARED:
-                levels = smeared(perfect_rgb, first, size, row, column, way)
+                levels = smeared(perfect_rgb, first_pixel, size, row, column, way)
         bits = wp.randu(state)
         read = optics.read_std * optics.read_std
         shot = optics.shot_std * optics.shot_std * (1.0 / 255.0)

@@ -96,6 +96,18 @@ def test_only_chosen_pictures_are_taken():
     assert same(pictures(camera), after, 1, 1)
 
 
+def test_pictures_do_not_depend_on_the_number_of_threads():
+    batch = grown(3)
+    alone, shared = (QuickCamera(batch, 3, has_optics=True, threads=threads) for threads in (1, 2))
+    for camera in (alone, shared):
+        look_around(camera)
+        rows = camera.optics.numpy()
+        rows["read_std"], rows["seed"] = 3.0, range(3)
+        camera.render(flags(True, False, True))
+    assert all((a == b).all() for a, b in zip(pictures(alone), pictures(shared), strict=True))
+    assert alone.rgb.numpy()[2].any()
+
+
 def test_a_pose_that_is_not_a_number_shows_the_sky():
     camera = QuickCamera(grown(1), 2)
     look_around(camera)
