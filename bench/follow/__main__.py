@@ -2,7 +2,8 @@
 
 Stages that are done (results/follow/STAGE-SEED.json) are kept and stopped ones go on; `--again` trains them anew,
 `--page` only writes the page, `--shipped` takes what the shipped page was made of (docs/results/follow.jsonl) as done.
-Two processes go side by side, each on a core of its own; a stage waits for those it needs.
+Two processes go side by side, each on a core of its own; a stage waits for those it needs, and one that takes several
+cores for all others to end.
 """
 
 import os
@@ -27,6 +28,11 @@ from common.files import write_whole
 RESULTS = Path("results/follow")
 RUNS = DOCS / "follow.jsonl"
 PRETRAINED = Path(__file__).parents[2] / "policies" / "pretrained"
+QUICKER = {  # memory of images is kept, not given back after each use; threads that wait do not take a core
+    "MALLOC_MMAP_THRESHOLD_": str(2**30),
+    "MALLOC_TRIM_THRESHOLD_": str(2**32),
+    "OMP_WAIT_POLICY": "passive",
+}
 console = Console(highlight=False)
 
 
@@ -41,6 +47,11 @@ class Job:
     @property
     def name(self) -> str:
         return f"{self.stage.name}-{self.seed}{'-flown' if self.is_flight else ''}"
+
+    @property
+    def takes_all(self) -> bool:
+        """Whether it is alone on the machine."""
+        return self.stage.cores > 1 and not self.is_flight
 
     @property
     def is_done(self) -> bool:
@@ -129,10 +140,12 @@ def _run(waiting: list[Job], count: int) -> list[str]:
     failed: list[str] = []
     while waiting or running:
         for core in cores:
-            job = next((job for job in waiting if job.is_ready), None)
-            if job is not None and core not in running:
+            if core in running or any(job.takes_all for job, _ in running.values()):
+                continue
+            job = next((job for job in waiting if job.is_ready and not (job.takes_all and running)), None)
+            if job is not None:
                 waiting.remove(job)
-                running[core] = job, _start(job, core)
+                running[core] = job, _start(job, cores if job.takes_all else [core])
                 console.print(f"{job.name}: begun")
         if not running:
             return failed + [job.name for job in waiting]
@@ -144,11 +157,11 @@ def _run(waiting: list[Job], count: int) -> list[str]:
     return failed
 
 
-def _start(job: Job, core: int) -> subprocess.Popen[bytes]:
+def _start(job: Job, cores: Sequence[int]) -> subprocess.Popen[bytes]:
     module = "bench.follow.flights" if job.is_flight else "bench.follow.run"
     words = [job.stage.name, str(job.seed), str(RESULTS)]
-    command = ["taskset", "-c", str(core), sys.executable, "-m", module, *words]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    command = ["taskset", "-c", ",".join(map(str, cores)), sys.executable, "-m", module, *words]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", **QUICKER}
     with (RESULTS / f"{job.name}.log").open("ab") as log:
         return subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=environment)
 

@@ -8,7 +8,7 @@ from bench.cars import curves
 from bench.cars.page import DOCS
 from bench.follow import pictures
 from bench.follow.result import Judged, Result
-from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, Stage
+from bench.follow.stages import CELLS, OWNER_SPEEDS, STAGES, Stage, in_order
 from common.files import write_whole
 from policies.tasks.follow_me.scorecard import NAMES, written
 from policies.tasks.follow_me.track import Ranges
@@ -26,7 +26,7 @@ make reproduce-follow
 
 A teacher that sees the truth is trained by PPO; students that see what flies (a 64 x 64 picture with depth, the flight
 controller's estimate and, but for vision-only, the phone's reports) learn from it by DAgger. Each stage is one process
-on one core, with another beside it. Wall clock is that of training; compiling the kernels, once per machine, is not in
+on as many cores as the table says. Wall clock is that of training; compiling the kernels, once per machine, is not in
 it. Judged are most probable actions in held-out worlds: fresh hills, trees, owners, wind and noise, {episodes}.
 "Flown" are flights over MAVLink in lockstep: the whole autopilot, a companion computer, one vehicle at a time.
 Intervals are 95 % over episodes: Wilson's for rates, the bootstrap's for the rest. Measured on {machine}.
@@ -109,7 +109,17 @@ def _summary_rows(stage: Stage, result: Result) -> list[str]:
 
 
 def _training(results: Results, docs: Path) -> str:
-    columns = ("policy", "decisions", "wall clock", "with what came before", "at most", "decisions/s", "seeds", "file")
+    columns = (
+        "policy",
+        "decisions",
+        "cores",
+        "wall clock",
+        "with what came before",
+        "at most",
+        "decisions/s",
+        "seeds",
+        "file",
+    )
     lines = ["## What training takes", "", f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
     for stage in STAGES.values():
         runs = results.get(stage.name, ())
@@ -117,11 +127,12 @@ def _training(results: Results, docs: Path) -> str:
             continue
         first = runs[0]
         seconds = sum(run.train_s for run in runs) / len(runs)
-        whole = seconds + sum(results[name][0].train_s for name in stage.before if results.get(name))
+        before = [earlier.name for earlier in in_order([stage.name]) if earlier is not stage]
+        whole = seconds + sum(results[name][0].train_s for name in before if results.get(name))
         limit = "" if stage.limit_s is None else duration(stage.limit_s)
         lines.append(
-            f"| {stage.title} | {first.steps / 1e6:.2f} M | {duration(seconds)} | {duration(whole)} | {limit} "
-            f"| {first.steps_per_s:,.0f} | {len(runs)} | {first.policy_bytes / 1024:,.0f} kB |"
+            f"| {stage.title} | {first.steps / 1e6:.2f} M | {stage.cores} | {duration(seconds)} | {duration(whole)} "
+            f"| {limit} | {first.steps_per_s:,.0f} | {len(runs)} | {first.policy_bytes / 1024:,.0f} kB |"
         )
     drawn = {stage.title: results.get(stage.name, ()) for stage in STAGES.values()}
     if any(run.curve for runs in drawn.values() for run in runs):

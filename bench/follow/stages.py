@@ -30,6 +30,7 @@ class Stage:
     start: str | None = None  # stage whose networks this one starts from
     changes: dict[str, Any] = field(default_factory=dict)  # of the recipe: path with dots to value
     judged: dict[str, Any] = field(default_factory=dict)  # settings of the task to judge in, over the recipe's
+    cores: int = 1  # that its training is given
     flies: bool = False  # also judged in flights over MAVLink
     ships: bool = True  # the first seed's policy goes to policies/pretrained/
     document: str = "not reported"
@@ -58,6 +59,13 @@ STAGES: dict[str, Stage] = {
             targets=(0.98, 0.85),
         ),
         Stage(
+            "tuned",
+            "Tuned: the improved student goes on by PPO, its critic sees the truth",
+            "follow-me-tuned",
+            start="student",
+            ships=False,
+        ),
+        Stage(
             "vision-only",
             "Vision only: no word of the owner, DAgger",
             "follow-me-vision",
@@ -73,6 +81,7 @@ STAGES: dict[str, Stage] = {
             "follow-me-document",
             document="reward 20 to 30, 10 M steps, 36.4 h",
             limit_s=7200.0,
+            cores=2,
             ships=False,
         ),
     )

@@ -219,7 +219,9 @@ class Ppo:
         policy_loss = losses.policy_loss(log_probs, old_log_probs, weights, epsilon)
         value_loss = losses.value_loss(self.critic.heads(features), batch.values, batch.returns, epsilon)
         entropy = distribution.entropy().mean()
-        loss = policy_loss + 0.5 * value_loss - beta * entropy + self.hyperparameters.perception_strength * believed
+        loss = 0.5 * value_loss
+        if self.steps > self.hyperparameters.critic_warm_up:
+            loss = loss + policy_loss - beta * entropy + self.hyperparameters.perception_strength * believed
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         if self.hyperparameters.max_grad_norm is not None:

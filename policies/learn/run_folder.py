@@ -16,6 +16,7 @@ from common.files import write_whole
 from policies.learn.checkpoint import checkpoints
 from policies.learn.config.dump import dump
 from policies.learn.config.run import RunConfig
+from policies.learn.policy_file import find_policy
 
 
 class RunError(ValueError):
@@ -102,11 +103,12 @@ def starting_point(config: RunConfig) -> Path | None:
     """The checkpoint or policy whose networks a run starts from, by `init_path` or by `initialize_from`.
 
     Raises:
+        CheckpointError: there is no such policy.
         RunError: there is no such run, or nothing in it.
     """
     settings = config.checkpoint_settings
     if config.behavior.init_path:
-        return Path(config.behavior.init_path)
+        return find_policy(config.behavior.init_path)
     if not settings.initialize_from:
         return None
     folder = RunFolder(Path(settings.results_dir) / settings.initialize_from, config.behavior_name)

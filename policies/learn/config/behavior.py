@@ -70,6 +70,8 @@ class PpoHyperparameters(HyperparametersBase):
     """Whether actor and critic share one body."""
     privileged_critic: bool = own_key(False)
     """Whether the critic sees the task's privileged elements in place of its image; the policy never does."""
+    critic_warm_up: NotNegativeWhole = own_key(0)
+    """Decisions at the start in which the critic learns alone, so that it does not lead a trained policy astray."""
     perception_strength: NotNegative = own_key(0.1)
     """Weight of the beliefs that `network_settings` names, if it names any."""
     target_kl: PositiveOrNone = own_key(None)
@@ -85,6 +87,8 @@ class PpoHyperparameters(HyperparametersBase):
     def _one_body_sees_one_thing(self) -> Self:
         if self.privileged_critic and self.shared_critic:
             raise ValueError("privileged_critic: cannot be with shared_critic: a shared body sees what the policy sees")
+        if self.critic_warm_up and self.shared_critic:
+            raise ValueError("critic_warm_up: cannot be with shared_critic: a shared body learns with the critic")
         return self
 
 

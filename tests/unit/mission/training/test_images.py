@@ -113,6 +113,13 @@ def test_a_privileged_critic_is_not_shared():
     assert "privileged_critic: cannot be with shared_critic" in result.stderr
 
 
+def test_a_shared_critic_does_not_warm_up_alone():
+    configured(hyperparameters={"critic_warm_up": 1024, "shared_critic": True})
+    result = train()
+    assert result.exit_code == 2
+    assert "critic_warm_up: cannot be with shared_critic" in result.stderr
+
+
 def test_demonstrations_of_images_are_refused():
     with pytest.raises(RecordingError, match="Squares: shows images as it is set, and demonstrations hold none"):
         record_episodes(Squares(2), RandomDriver(0), 2, seed=0)

@@ -180,6 +180,16 @@ def test_ppo_goes_on_teaching_what_a_policy_believes(memory):
     assert torch.equal(still.policy.perception.layer.weight, before)
 
 
+def test_a_critic_that_warms_up_leaves_the_policy_as_it_was():
+    ppo = learner(privileged_critic=True, buffer_size=128, critic_warm_up=128)
+    policy, critic = ([weight.detach().clone() for weight in part.parameters()] for part in (ppo.policy, ppo.critic))
+    ppo.iterate()
+    assert all(torch.equal(a, b) for a, b in zip(policy, ppo.policy.parameters(), strict=True))
+    assert not any(torch.equal(a, b) for a, b in zip(critic, ppo.critic.parameters(), strict=True))
+    ppo.iterate()
+    assert not all(torch.equal(a, b) for a, b in zip(policy, ppo.policy.parameters(), strict=True))
+
+
 def distance(ppo):
     """Mean cost of the most probable action, on squares that were not trained on."""
     task = ppo.task
