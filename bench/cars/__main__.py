@@ -5,21 +5,17 @@ Runs that are done (results/cars/NAME-SEED.json) are kept; `--again` trains them
 side, each on a core of its own.
 """
 
-import os
-import subprocess
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bench.cars.experiment import Experiment
 from bench.cars.experiments import EXPERIMENTS, SECTIONS
 from bench.cars.page import DOCS, write_page
 from bench.cars.result import Result, read, read_all, write, write_all
+from bench.side_by_side import Job, run_side_by_side
 from common.files import write_whole
 
 RESULTS = Path("results/cars")
@@ -46,7 +42,8 @@ def main(
             if not path.exists():
                 write(path, result)
     chosen = [EXPERIMENTS[name] for name in names or EXPERIMENTS]
-    failed = [] if page else _run([*_todo(chosen, seeds, again=again)], jobs)
+    todo = [] if page else _jobs(chosen, seeds, again=again)
+    failed = run_side_by_side(todo, RESULTS, jobs, console)
     there = results()
     path = write_page(there)
     write_all(RUNS, [result for runs in there.values() for result in runs])
@@ -78,66 +75,16 @@ def _is_of(path: Path, name: str) -> bool:
     return path.stem.rsplit("-", 1)[0] == name
 
 
-def _todo(chosen: list[Experiment], seeds: int | None, *, again: bool) -> Iterator[tuple[Experiment, int]]:
+def _jobs(chosen: list[Experiment], seeds: int | None, *, again: bool) -> list[Job]:
     """Longest first within a seed would finish sooner; in order, a stopped reproduction has whole rows."""
+    jobs: list[Job] = []
     for experiment in chosen:
         for seed in range(1, (seeds or experiment.seeds) + 1):
-            if again or not (RESULTS / f"{experiment.name}-{seed}.json").exists():
-                yield experiment, seed
-
-
-def _run(todo: list[tuple[Experiment, int]], jobs: int) -> list[str]:
-    """Runs them, each in a process bound to a core; returns the names of those that failed."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    cores = sorted(os.sched_getaffinity(0))[:jobs]
-    running: dict[int, tuple[str, subprocess.Popen[bytes]]] = {}
-    failed: list[str] = []
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as progress:
-        bar = progress.add_task("runs", total=len(todo))
-        waiting = iter(todo)
-        pending = next(waiting, None)
-        while pending or running:
-            for core in cores:
-                if pending and core not in running:
-                    running[core] = _start(*pending, core)
-                    progress.update(bar, description=", ".join(name for name, _ in running.values()))
-                    pending = next(waiting, None)
-            name, process, core = _first_ended(running)
-            del running[core]
-            if process.returncode != 0:
-                failed.append(name)
-            progress.advance(bar)
-    return failed
-
-
-def _start(experiment: Experiment, seed: int, core: int) -> tuple[str, subprocess.Popen[bytes]]:
-    name = f"{experiment.name}-{seed}"
-    command = [
-        "taskset",
-        "-c",
-        str(core),
-        sys.executable,
-        "-m",
-        "bench.cars.run",
-        experiment.name,
-        str(seed),
-        str(RESULTS / f"{name}.json"),
-    ]
-    environment = {**os.environ, "OMP_NUM_THREADS": str(experiment.threads)}
-    with (RESULTS / f"{name}.log").open("wb") as log:
-        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=environment)
-    return name, process
-
-
-def _first_ended(
-    running: dict[int, tuple[str, "subprocess.Popen[bytes]"]],
-) -> tuple[str, "subprocess.Popen[bytes]", int]:
-    by_pid = {process.pid: (name, process, core) for core, (name, process) in running.items()}
-    pid, status = os.waitpid(-1, 0)
-    name, process, core = by_pid[pid]
-    process.returncode = os.waitstatus_to_exitcode(status)
-    return name, process, core
+            path = RESULTS / f"{experiment.name}-{seed}.json"
+            if again or not path.exists():
+                words = ("bench.cars.run", experiment.name, str(seed), str(path))
+                jobs.append(Job(path.stem, words, threads=experiment.threads))
+    return jobs
 
 
 if __name__ == "__main__":

@@ -6,12 +6,9 @@ Two processes go side by side, each on a core of its own; a stage waits for thos
 cores for all others to end.
 """
 
-import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -22,46 +19,14 @@ from bench.cars.page import DOCS
 from bench.follow.page import write_page
 from bench.follow.result import Result, read, read_all, write, write_all
 from bench.follow.run import policy_path, result_path
-from bench.follow.stages import STAGES, Stage, in_order
+from bench.follow.stages import STAGES, in_order
+from bench.side_by_side import Job, run_side_by_side
 from common.files import write_whole
 
 RESULTS = Path("results/follow")
 RUNS = DOCS / "follow.jsonl"
 PRETRAINED = Path(__file__).parents[2] / "policies" / "pretrained"
-QUICKER = {  # memory of images is kept, not given back after each use; threads that wait do not take a core
-    "MALLOC_MMAP_THRESHOLD_": str(2**30),
-    "MALLOC_TRIM_THRESHOLD_": str(2**32),
-    "OMP_WAIT_POLICY": "passive",
-}
 console = Console(highlight=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """One process: a stage's training and judgement, or its flights."""
-
-    stage: Stage
-    seed: int
-    is_flight: bool
-
-    @property
-    def name(self) -> str:
-        return f"{self.stage.name}-{self.seed}{'-flown' if self.is_flight else ''}"
-
-    @property
-    def takes_all(self) -> bool:
-        """Whether it is alone on the machine."""
-        return self.stage.cores > 1 and not self.is_flight
-
-    @property
-    def is_done(self) -> bool:
-        path = result_path(RESULTS, self.stage.name, self.seed)
-        return path.exists() and (not self.is_flight or bool(read(path).cards(is_flown=True)))
-
-    @property
-    def is_ready(self) -> bool:
-        before = (self.stage.name,) if self.is_flight else self.stage.before
-        return all(result_path(RESULTS, name, self.seed).exists() for name in before)
 
 
 def main(
@@ -85,7 +50,7 @@ def main(
     if not page:
         if again:
             _forget(names or list(STAGES), seeds)
-        failed = _run(_jobs(names or list(STAGES), seeds), jobs)
+        failed = run_side_by_side(_jobs(names or list(STAGES), seeds), RESULTS, jobs, console)
     there = results()
     path = write_page(there)
     write_all(RUNS, [result for runs in there.values() for result in runs])
@@ -115,14 +80,22 @@ def _publish() -> None:
 
 def _jobs(names: Sequence[str], seeds: int) -> list[Job]:
     """What is left to do, in order."""
-    whole = [
-        Job(stage, seed, is_flight)
-        for seed in range(1, seeds + 1)
-        for stage in in_order(list(names))
-        for is_flight in (False, True)
-        if stage.flies or not is_flight
-    ]
-    return [job for job in whole if not job.is_done]
+    jobs: list[Job] = []
+    for seed in range(1, seeds + 1):
+        for stage in in_order(list(names)):
+            path = result_path(RESULTS, stage.name, seed)
+            words = (stage.name, str(seed), str(RESULTS))
+            name = f"{stage.name}-{seed}"
+            if not path.exists():
+                there = partial(_are_done, stage.before, seed)
+                jobs.append(Job(name, ("bench.follow.run", *words), takes_all=stage.cores > 1, is_ready=there))
+            if stage.flies and not (path.exists() and read(path).cards(is_flown=True)):
+                jobs.append(Job(f"{name}-flown", ("bench.follow.flights", *words), is_ready=path.exists))
+    return jobs
+
+
+def _are_done(names: Sequence[str], seed: int) -> bool:
+    return all(result_path(RESULTS, name, seed).exists() for name in names)
 
 
 def _forget(names: Sequence[str], seeds: int) -> None:
@@ -130,48 +103,6 @@ def _forget(names: Sequence[str], seeds: int) -> None:
         for seed in range(1, seeds + 1):
             result_path(RESULTS, name, seed).unlink(missing_ok=True)
             shutil.rmtree(RESULTS / "runs" / f"{name}-{seed}", ignore_errors=True)
-
-
-def _run(waiting: list[Job], count: int) -> list[str]:
-    """Runs them, each in a process bound to a core; the names of those that failed or wait for such."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    cores = sorted(os.sched_getaffinity(0))[:count]
-    running: dict[int, tuple[Job, subprocess.Popen[bytes]]] = {}
-    failed: list[str] = []
-    while waiting or running:
-        for core in cores:
-            if core in running or any(job.takes_all for job, _ in running.values()):
-                continue
-            job = next((job for job in waiting if job.is_ready and not (job.takes_all and running)), None)
-            if job is not None:
-                waiting.remove(job)
-                running[core] = job, _start(job, cores if job.takes_all else [core])
-                console.print(f"{job.name}: begun")
-        if not running:
-            return failed + [job.name for job in waiting]
-        core = _first_ended(running)
-        job, process = running.pop(core)
-        console.print(f"{job.name}: {'done' if process.returncode == 0 else 'failed'}")
-        if process.returncode != 0:
-            failed.append(job.name)
-    return failed
-
-
-def _start(job: Job, cores: Sequence[int]) -> subprocess.Popen[bytes]:
-    module = "bench.follow.flights" if job.is_flight else "bench.follow.run"
-    words = [job.stage.name, str(job.seed), str(RESULTS)]
-    command = ["taskset", "-c", ",".join(map(str, cores)), sys.executable, "-m", module, *words]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", **QUICKER}
-    with (RESULTS / f"{job.name}.log").open("ab") as log:
-        return subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=environment)
-
-
-def _first_ended(running: dict[int, tuple[Job, "subprocess.Popen[bytes]"]]) -> int:
-    """The core whose process ended."""
-    cores = {process.pid: core for core, (_, process) in running.items()}
-    pid, status = os.waitpid(-1, 0)
-    running[cores[pid]][1].returncode = os.waitstatus_to_exitcode(status)
-    return cores[pid]
 
 
 if __name__ == "__main__":

@@ -59,7 +59,7 @@ def test_page_tells_what_was_measured_and_what_was_not(tmp_path):
     assert STAGES["document"].title + " | " + STAGES["document"].document + " | not run" in text
     assert "| batch | 2 m/s | 98 % in band | 50.0 % (" in text
     assert "| flown | 2 m/s | 98 % in band | 100.0 % (100.0 to 100.0) |" in text
-    assert "| Improved: camera and phone, DAgger | 0.60 M | 15.0 min |" in text
+    assert "| Improved: camera and phone, DAgger | 0.60 M | 1 | 15.0 min |" in text
     assert {path.name for path in (tmp_path / "images").iterdir()} == {"follow-reward.png", "follow-student.png"}
     assert all(path.stat().st_size < 300_000 for path in (tmp_path / "images").iterdir())
 
