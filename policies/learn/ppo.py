@@ -223,7 +223,7 @@ class Ppo:
         if self.steps > self.hyperparameters.critic_warm_up:
             loss = loss + policy_loss - beta * entropy + self.hyperparameters.perception_strength * believed
         self.optimizer.zero_grad(set_to_none=True)
-        loss.backward()
+        loss.backward()  # type: ignore[no-untyped-call]
         if self.hyperparameters.max_grad_norm is not None:
             nn.utils.clip_grad_norm_(self._parameters, self.hyperparameters.max_grad_norm)
         self.optimizer.step()
