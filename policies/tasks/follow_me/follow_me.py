@@ -146,6 +146,7 @@ class FollowMe(FlightTask):
         state.phone_models = self._zeros("phone_models", n, PhoneModel)
         state.path_seeds = self._zeros("path_seeds", n, int)
         state.sights = self._zeros("sights", n, Sight)
+        state.reaches_m = wp.zeros(n, dtype=float, device=self.device)  # of one step only
         state.unseen_s = self._zeros("unseen_s", n, float)
         state.nearness = self._zeros("nearness", (n, RANGES), float)
         state.lenses = self._zeros("lenses", n, Lens)

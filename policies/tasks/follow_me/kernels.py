@@ -38,7 +38,7 @@ from policies.tasks.follow_me.numbers import FollowNumbers
 from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, document_action, write_vector
 from policies.tasks.follow_me.privileged import write_privileged
 from policies.tasks.follow_me.reward import document_reward, follow_outcome, follow_reward, is_in_band
-from policies.tasks.follow_me.sight import Sight, lens_of, see
+from policies.tasks.follow_me.sight import Sight, lens_of, reach_from, see
 from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_start, phone_step
@@ -90,6 +90,7 @@ class FollowState:
     phone_models: wp.array(dtype=PhoneModel)
     path_seeds: wp.array(dtype=int)
     sights: wp.array(dtype=Sight)
+    reaches_m: wp.array(dtype=float)  # least distance to the owner's body during the decision
     unseen_s: wp.array(dtype=float)
     nearness: wp.array2d(dtype=float)  # (envs, RANGES)
     lenses: wp.array(dtype=Lens)
@@ -141,10 +142,15 @@ def walk(rules: Rules, rig: RigArrays, state: FollowState) -> None:
     person = state.people[i]
     phone = state.phones[i]
     seed = state.path_seeds[i]
+    body = rig.body[i]
+    reach_m = float(wp.inf)
     end = rig.tick[i]
     for tick in range(end - rules.decision_ticks, end, _STEP_TICKS):
         person = person_step(world, model, person, seed, i, tick, _STEP_S)
         phone = phone_step(phone_model, phone, person, seed, i, tick + _STEP_TICKS)
+        since_s = float(end - tick - _STEP_TICKS) / _TICKS_PER_S
+        reach_m = wp.min(reach_m, reach_from(body.pos_ned - since_s * body.vel_ned, person))
+    state.reaches_m[i] = reach_m
     state.people[i] = person
     state.phones[i] = phone
 
@@ -213,6 +219,7 @@ def judge(border: Border, rules: Rules, rig: RigArrays, state: FollowState, star
         sight.is_in_view == 1, 0.0, state.unseen_s[i] + float(rules.decision_ticks) / _TICKS_PER_S
     )
     touched = has_touched(rig.body[i])
+    sight.reach_m = wp.min(sight.reach_m, state.reaches_m[i])
     outcome = follow_outcome(numbers, sight, touched, state.unseen_s[i], border.steps[i] + 1)
     reward = float(0.0)
     if rules.is_documented == 1:

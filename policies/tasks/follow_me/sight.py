@@ -68,6 +68,14 @@ def room_around(w: World, body: BodyState) -> float:
 
 
 @wp.func
+def reach_from(pos_ned: wp.vec3, person: Person) -> float:
+    """Distance of a place from the nearest part of a person's body, a line from soles to crown [m]."""
+    nearest = person.pos_ned
+    nearest[2] = wp.clamp(pos_ned[2], person.pos_ned[2] - person.stature_m, person.pos_ned[2])
+    return wp.length(pos_ned - nearest)
+
+
+@wp.func
 def see(w: World, body: BodyState, person: Person) -> Sight:
     """How a vehicle and its owner stand to each other."""
     sight = Sight()
@@ -79,11 +87,7 @@ def see(w: World, body: BodyState, person: Person) -> Sight:
     sight.vel_hfrd = level_from_ned(person.vel_ned, yaw)
     sight.distance_m = wp.length(sight.place_hfrd)
     sight.bearing_rad = wp.atan2(sight.place_hfrd[1], sight.place_hfrd[0])
-    nearest = body.pos_ned
-    nearest[0] = person.pos_ned[0]
-    nearest[1] = person.pos_ned[1]
-    nearest[2] = wp.clamp(body.pos_ned[2], person.pos_ned[2] - person.stature_m, person.pos_ned[2])
-    sight.reach_m = wp.length(body.pos_ned - nearest)
+    sight.reach_m = reach_from(body.pos_ned, person)
     sight.room_m = room_around(w, body)
     lens = lens_of(body, 1.0)
     is_chest_free = is_line_free(w, lens.pos_ned, chest)

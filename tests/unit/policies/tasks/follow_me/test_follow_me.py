@@ -137,6 +137,22 @@ def test_vector_is_what_a_companion_makes_of_estimate_and_report() -> None:
     np.testing.assert_allclose(task.border.observations.numpy()[0], out.numpy()[0], rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.parametrize(("aside_m", "outcome"), [(0.0, Outcome.HIT_OTHER), (0.3, Outcome.RUNNING)])
+def test_an_owner_who_runs_past_between_two_decisions_has_been_hit(aside_m: float, outcome: Outcome) -> None:
+    task = _task(1, numbers={"touch_m": 0.2, "trees_per_ha": 0.0, "owner_speed_max": 6.0}, **STATE)
+    people = task.follow.people.numpy()
+    drone_ned = task.rig.arrays.body.numpy()[0]["pos_ned"]
+    people["pos_ned"][0, :2] = drone_ned[0] + aside_m, drone_ned[1] - 0.3  # 0.6 m to the east in 0.1 s
+    people["course_rad"] = people["heading_rad"] = 0.5 * math.pi
+    people["speed"] = people["speed_sp"] = 6.0
+    people["turn_rate"] = people["bend_rad_s"] = 0.0
+    people["plan_left_s"] = 10.0
+    people["stature_m"] = 4.0  # as high as the drone flies
+    task.follow.people.assign(people)
+    task.step()
+    assert Outcome(int(task.border.outcomes.numpy()[0])) is outcome
+
+
 def _documented(numbers: dict[str, float]) -> tuple[float, Outcome]:
     task = _task(1, numbers=numbers, preset="as-documented", observation="state", has_estimator="false")
     task.step()
