@@ -30,6 +30,7 @@ SCRIPTS = (
     "training",
     "sac",
     "companion",
+    "tracker",
     "camera",
     "startup",
 )

@@ -1,115 +1,17 @@
 import numpy as np
 import pytest
 
-from common.attitude import product, quat_of
-from policies.tracker import OwnerTracker, PhoneReport, Sighting, TrackerSettings, sighting_axes_ned
-from sim.owner import Owner
-from sim.world.people import RUN_SPEED_M_S, person_model
-from sim.world.world import WorldConfig, build_world
+from bench.tracker import DECISION_US, Walks, always, errors, normalised, not_the_last_3_s_of_10, track
+from policies.tracker import OwnerTracker, PhoneReport, Sighting, sighting_axes_ned
+from sim.world.people import RUN_SPEED_M_S
 
 OWNERS = 20
-DECISION_US = 100_000
-SECONDS = 30.0
-S = TrackerSettings()
-OWN_STD_M, OWN_TIME_S = 0.6, 60.0  # the vehicle's own place
 Q_RDF_LEVEL = (0.5, 0.5, 0.5, 0.5)  # forward camera: right is east, down is down, forward is north
-
-
-class Walks:
-    """Owners that walk, what a camera that follows them sees, and what their phones say."""
-
-    def __init__(self, speed_max_m_s, owners=OWNERS, seed=11):
-        world = build_world(
-            WorldConfig(seed=3, size_m=256.0, hill_height_m=8.0, hill_wavelength_m=120.0, trees_per_ha=100.0)
-        )
-        owner = Owner(world, np.zeros((owners, 3)), seed, model=person_model(speed_max_m_s))
-        self.owners = owners
-        self.steps = int(SECONDS * 1e6 / DECISION_US)
-        shape = (self.steps, owners, 3)
-        self.pos, self.vel = np.empty(shape), np.empty(shape)
-        self.reports = [[None] * owners for _ in range(self.steps)]
-        self.rng = np.random.default_rng(seed)
-        own = OWN_STD_M * self.rng.standard_normal((owners, 3))
-        own_rate = np.zeros((owners, 3))
-        for k in range(self.steps):
-            for part in range(5):
-                owner.step_to(25 * k + 5 * part)
-                for i, fix in enumerate(owner.phones.numpy()["fix"]):
-                    if fix["is_new"]:
-                        self.reports[k][i] = PhoneReport(
-                            int(fix["time_us"]), fix["pos_ned"].copy(), fix["vel_ned"].copy()
-                        )
-            # the vehicle's own error drifts smoothly: its filter has no jumps
-            own_rate += -0.1 * own_rate + 0.01 * np.sqrt(0.2) * self.rng.standard_normal((owners, 3))
-            own = own * np.exp(-0.1 / OWN_TIME_S) + 0.1 * own_rate
-            rows = owner.people.numpy()
-            self.pos[k] = rows["pos_ned"] - [0.0, 0.0, 1.0] + own  # the chest in the vehicle's frame
-            self.vel[k] = rows["vel_ned"] + own_rate
-        yaw = self.rng.uniform(-np.pi, np.pi, owners)
-        self.offset = np.stack([-2.0 * np.cos(yaw), -2.0 * np.sin(yaw), np.full(owners, -0.7)], axis=-1)
-        self.yaw = yaw
-
-    def camera(self, k, i):
-        """Where the camera is: about 2 m behind the owner."""
-        return self.pos[k, i] + self.offset[i] + 0.3 * np.sin(0.1 * k + np.arange(3))
-
-    def sighting(self, k, i, has_range=True):
-        """The owner as the camera of vehicle i sees them at decision k, with noise."""
-        camera = self.camera(k, i)
-        way = self.pos[k, i] - camera
-        distance = float(np.linalg.norm(way))
-        cos, sin = np.cos(self.yaw[i]), np.sin(self.yaw[i])
-        forward, right, down = cos * way[0] + sin * way[1], cos * way[1] - sin * way[0], way[2]
-        noise = self.rng.standard_normal(3)
-        return Sighting(
-            float(np.arctan2(right, forward)) + S.direction_std_rad * noise[0],
-            float(np.arctan2(-down, np.hypot(forward, right))) + S.direction_std_rad * noise[1],
-            distance + (S.range_std_m + S.range_std_share * distance) * noise[2] if has_range else None,
-            camera,
-            product(quat_of(self.yaw[i], 0.0), Q_RDF_LEVEL),
-        )
-
-
-def track(walks, i, is_seen, is_heard, has_range=True):
-    """Tracks at all decisions of one owner; `is_seen(k)` and `is_heard(k)` say what there is."""
-    tracker = OwnerTracker()
-    tracks = []
-    for k in range(walks.steps):
-        time_us = k * DECISION_US
-        report = walks.reports[k][i]
-        if report is not None and is_heard(k):
-            tracker.hear(time_us, report)
-        if is_seen(k):
-            tracker.see(time_us, walks.sighting(k, i, has_range))
-        tracks.append(tracker.at(time_us))
-    return tracks
-
-
-def errors(walks, i, tracks):
-    return np.array([t.pos_ned for t in tracks]) - walks.pos[:, i], np.array([t.vel_ned for t in tracks]) - walks.vel[
-        :, i
-    ]
-
-
-def normalised(error, cov):
-    return np.einsum("ki,ki->k", error, np.linalg.solve(cov, error[..., None])[..., 0])
 
 
 @pytest.fixture(scope="module")
 def walks():
-    return Walks(RUN_SPEED_M_S)
-
-
-def always(_k):
-    return True
-
-
-def never(_k):
-    return False
-
-
-def not_the_last_3_s_of_10(k):
-    return k % 100 < 70
+    return Walks(RUN_SPEED_M_S, OWNERS)
 
 
 @pytest.fixture(scope="module")
