@@ -13,7 +13,10 @@ from mission.refusal import learn_extra, refuse
 def companion(
     policy: Annotated[str, typer.Option(help="A policy of FollowMe: a file or a run's folder; or 'scripted'.")],
     link: Annotated[
-        str, typer.Option(help="The vehicle: udpout://HOST:PORT, udpin://ADDRESS:PORT, tcp://HOST:PORT.")
+        str,
+        typer.Option(
+            help="The vehicle: udpout://HOST:PORT, udpin://ADDRESS:PORT, tcp://HOST:PORT, serial://PATH:BAUD."
+        ),
     ] = ("udpout://127.0.0.1:14580"),
     camera: Annotated[str, typer.Option(help="Where the pictures come from: tcp://HOST:PORT.")] = (
         "tcp://127.0.0.1:14600"

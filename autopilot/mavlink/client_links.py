@@ -1,9 +1,11 @@
 """A client's end of a link, opened from its address as MAVSDK writes them.
 
 In: `udpout://HOST:PORT`, where the other end listens; `udpin://ADDRESS:PORT`, where it sends to; `tcp://HOST:PORT`,
-where it accepts connections. Out: a link. None of them waits: an end that is not there yet is spoken to when it is.
+where it accepts connections; `serial:///dev/NAME:BAUD`, a cable to it. Out: a link. None of them waits: an end that is
+not there yet is spoken to when it is.
 """
 
+import re
 import socket
 from collections.abc import Sequence
 from contextlib import suppress
@@ -20,9 +22,12 @@ from autopilot.mavlink.links import (
     bound_socket,
     is_loopback,
 )
+from autopilot.mavlink.serial_port import SerialLink
 from autopilot.mavlink.tcp import TcpPeer
 
-KINDS = "udpout://HOST:PORT, udpin://ADDRESS:PORT or tcp://HOST:PORT"
+KINDS = "udpout://HOST:PORT, udpin://ADDRESS:PORT, tcp://HOST:PORT or serial:///dev/NAME:BAUD"
+
+_SERIAL = re.compile(r"serial://(?P<path>/[^:]+):(?P<baud>[1-9]\d{0,7})")
 
 
 def open_client_link(url: str, role: LinkRole = LinkRole.ONBOARD) -> Link:
@@ -33,8 +38,10 @@ def open_client_link(url: str, role: LinkRole = LinkRole.ONBOARD) -> Link:
         role: who is there.
 
     Raises:
-        LinkError: it is no such address, the host is unknown, or the port is in use.
+        LinkError: it is no such address, the host is unknown, or the port is in use or not there.
     """
+    if found := _SERIAL.fullmatch(url):
+        return SerialLink(found["path"], int(found["baud"]), role)
     try:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port

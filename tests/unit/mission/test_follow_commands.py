@@ -34,12 +34,17 @@ def test_a_policy_of_another_layout(tmp_path):
 
 @pytest.mark.parametrize(
     "link",
-    ["", "127.0.0.1:14580", "serial:///dev/ttyS0:57600", "udpout://127.0.0.1", "tcp://127.0.0.1:x", "udpout://:1"],
+    ["", "127.0.0.1:14580", "serial:///dev/ttyS0", "udpout://127.0.0.1", "tcp://127.0.0.1:x", "udpout://:1"],
 )
 def test_an_address_of_another_kind(link):
-    assert "must be udpout://HOST:PORT, udpin://ADDRESS:PORT or tcp://HOST:PORT" in refused(
+    assert "must be udpout://HOST:PORT, udpin://ADDRESS:PORT, tcp://HOST:PORT or serial:///dev/NAME:BAUD" in refused(
         "--policy", "scripted", "--link", link
     )
+
+
+def test_a_serial_port_that_is_not_there():
+    sentence = "/dev/nobody cannot be opened at 57600 baud: No such file or directory."
+    assert sentence in refused("--policy", "scripted", "--link", "serial:///dev/nobody:57600")
 
 
 def test_a_port_that_is_taken():

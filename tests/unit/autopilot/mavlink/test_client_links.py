@@ -1,6 +1,8 @@
 """A client's links, by their addresses: both directions, and an end that comes late or goes away."""
 
+import os
 import time
+import tty
 
 import pytest
 
@@ -77,6 +79,49 @@ def test_tcp_connects_when_the_other_end_has_come_and_again_when_it_is_back(open
         until(lambda vehicle=vehicle: tell(vehicle))[0].send(b"answer")
         assert until(lambda: list(link.receive())) == [b"answer"]
         vehicle.close()
+
+
+@pytest.fixture
+def plugged(tmp_path):
+    """Plugs a cable into `/…/ttyACM0`: the vehicle's end; the other is pulled out when the function is called again."""
+    port, ends = tmp_path / "ttyACM0", []
+
+    def plug():
+        unplug()
+        ends[:] = os.openpty()
+        tty.setraw(ends[0])
+        port.symlink_to(os.ttyname(ends[1]))
+        return port, ends[0]
+
+    def unplug():
+        port.unlink(missing_ok=True)
+        while ends:
+            os.close(ends.pop())
+
+    yield plug
+    unplug()
+
+
+def test_serial_speaks_over_a_cable_both_ways_and_again_when_it_is_back(opened, plugged):
+    port, vehicle = plugged()
+    link = opened(open_client_link(f"serial://{port}:57600"))
+    link.send(b"request")
+    assert os.read(vehicle, 100) == b"request"
+    os.write(vehicle, FRAME)
+    assert until(lambda: list(link.receive())) == [FRAME]
+    _, vehicle = plugged()
+    assert list(link.receive()) == []  # that cable was pulled out
+    link.send(b"request")
+    assert os.read(vehicle, 100) == b"request"
+
+
+def test_a_serial_port_that_another_program_has_is_one_sentence(opened):
+    vehicle, cable = os.openpty()
+    opened(open_client_link(f"serial://{os.ttyname(cable)}:57600"))
+    with pytest.raises(LinkError, match="cannot be opened at 57600 baud"):
+        open_client_link(f"serial://{os.ttyname(cable)}:57600")
+    os.close(cable)
+    os.close(vehicle)
 
 
 @pytest.mark.parametrize("scheme", ["udpout", "udpin", "tcp"])
