@@ -1,6 +1,6 @@
 """Runs processes side by side, each bound to cores of its own, until all have ended; each writes a log.
 
-In: jobs, in the order in which they are to begin. Out: the names of those that failed, or wait for such.
+In: jobs, of which the first that may begin does. Out: the names of those that failed, or wait for such.
 """
 
 import os
@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import wait
 from pathlib import Path
 
 from rich.console import Console
@@ -83,8 +84,10 @@ def _start(job: Job, folder: Path, cores: Sequence[int]) -> "subprocess.Popen[by
 
 
 def _first_ended(running: dict[int, tuple[Job, "subprocess.Popen[bytes]"]]) -> int:
-    """The key of the process that ended first."""
-    keys = {process.pid: key for key, (_, process) in running.items()}
-    pid, status = os.waitpid(-1, 0)
-    running[keys[pid]][1].returncode = os.waitstatus_to_exitcode(status)
-    return keys[pid]
+    """The key of a process that has ended."""
+    watched = {os.pidfd_open(process.pid): key for key, (_, process) in running.items()}
+    key = watched[wait(watched)[0]]  # type: ignore[index]  # descriptors come back as they are given
+    for descriptor in watched:
+        os.close(descriptor)
+    running[key][1].wait()
+    return key

@@ -22,7 +22,7 @@ _OWNERS, _SECONDS = 20, 30.0
 _FIRST = 10  # decisions until the track stands
 _GAP_END = slice(99, None, 100)  # last decisions of the gaps below
 _OWN_STD_M, _OWN_TIME_S = 0.6, 60.0  # of the vehicle's own place
-_Q_RDF_LEVEL = (0.5, 0.5, 0.5, 0.5)
+_Q_FRD_FROM_RDF = (0.5, 0.5, 0.5, 0.5)
 _S = TrackerSettings()
 _When = Callable[[int], bool]
 
@@ -39,10 +39,9 @@ def measure() -> list[Row]:
         ):
             off, nees = _errors(walks, is_seen, is_heard, when)
             require(np.isfinite(off), "the track is not a number")
-            rows.append(Row(f"track of an owner {word}, {what}", off, "m", "lower", None, COMMAND))
-            rows.append(
-                Row("the same, normalised squared error (3: as large as told)", nees, "", "lower", None, COMMAND)
-            )
+            name = f"track of an owner {word}, {what}"
+            rows.append(Row(name, off, "m", "lower", None, COMMAND))
+            rows.append(Row(f"{name}: normalised squared error (3: as told)", nees, "", "lower", None, COMMAND))
     return rows
 
 
@@ -57,10 +56,10 @@ class Walks:
         self.owners = owners
         self.steps = int(_SECONDS * 1e6 / DECISION_US)
         shape = (self.steps, owners, 3)
-        self.pos, self.vel = np.empty(shape), np.empty(shape)
+        self.pos_ned, self.vel_ned = np.empty(shape), np.empty(shape)
         self.reports: list[list[PhoneReport | None]] = [[None] * owners for _ in range(self.steps)]
-        self.rng = np.random.default_rng(seed)
-        own = _OWN_STD_M * self.rng.standard_normal((owners, 3))
+        self.rng = rng = np.random.default_rng(seed)
+        own = _OWN_STD_M * rng.standard_normal((owners, 3))
         own_rate = np.zeros((owners, 3))
         for k in range(self.steps):
             for part in range(5):
@@ -71,25 +70,25 @@ class Walks:
                             int(fix["time_us"]), fix["pos_ned"].copy(), fix["vel_ned"].copy()
                         )
             # the vehicle's own error drifts smoothly: its filter has no jumps
-            own_rate += -0.1 * own_rate + 0.01 * np.sqrt(0.2) * self.rng.standard_normal((owners, 3))
+            own_rate += -0.1 * own_rate + 0.01 * np.sqrt(0.2) * rng.standard_normal((owners, 3))
             own = own * np.exp(-0.1 / _OWN_TIME_S) + 0.1 * own_rate
             rows = owner.people.numpy()
-            self.pos[k] = rows["pos_ned"] - [0.0, 0.0, float(CHEST_M)] + own  # the chest in the vehicle's frame
-            self.vel[k] = rows["vel_ned"] + own_rate
-        yaw = self.rng.uniform(-np.pi, np.pi, owners)
-        self.offset = np.stack([-2.0 * np.cos(yaw), -2.0 * np.sin(yaw), np.full(owners, -0.7)], axis=-1)
-        self.yaw = yaw
+            self.pos_ned[k] = rows["pos_ned"] - [0.0, 0.0, float(CHEST_M)] + own  # the chest in the vehicle's frame
+            self.vel_ned[k] = rows["vel_ned"] + own_rate
+        yaw = rng.uniform(-np.pi, np.pi, owners)
+        self.offset_ned = np.stack([-2.0 * np.cos(yaw), -2.0 * np.sin(yaw), np.full(owners, -0.7)], axis=-1)
+        self.yaw_rad = yaw
 
     def camera(self, k: int, i: int) -> NDArray[np.float64]:
         """Where the camera is: about 2 m behind the owner."""
-        return self.pos[k, i] + self.offset[i] + 0.3 * np.sin(0.1 * k + np.arange(3))
+        return self.pos_ned[k, i] + self.offset_ned[i] + 0.3 * np.sin(0.1 * k + np.arange(3))
 
     def sighting(self, k: int, i: int, *, has_range: bool = True) -> Sighting:
         """The owner as the camera of vehicle i sees them at decision k, with noise."""
         camera = self.camera(k, i)
-        way = self.pos[k, i] - camera
+        way = self.pos_ned[k, i] - camera
         distance = float(np.linalg.norm(way))
-        cos, sin = np.cos(self.yaw[i]), np.sin(self.yaw[i])
+        cos, sin = np.cos(self.yaw_rad[i]), np.sin(self.yaw_rad[i])
         forward, right, down = cos * way[0] + sin * way[1], cos * way[1] - sin * way[0], way[2]
         noise = self.rng.standard_normal(3)
         return Sighting(
@@ -97,7 +96,7 @@ class Walks:
             float(np.arctan2(-down, np.hypot(forward, right))) + _S.direction_std_rad * noise[1],
             distance + (_S.range_std_m + _S.range_std_share * distance) * noise[2] if has_range else None,
             camera,
-            product(quat_of(self.yaw[i], 0.0), _Q_RDF_LEVEL),
+            product(quat_of(self.yaw_rad[i], 0.0), _Q_FRD_FROM_RDF),
         )
 
 
@@ -119,7 +118,7 @@ def track(walks: Walks, i: int, is_seen: _When, is_heard: _When) -> list[OwnerTr
 def errors(walks: Walks, i: int, tracks: list[OwnerTrack]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Of place and velocity, shape (decisions, 3) each."""
     pos, vel = np.array([t.pos_ned for t in tracks]), np.array([t.vel_ned for t in tracks])
-    return pos - walks.pos[:, i], vel - walks.vel[:, i]
+    return pos - walks.pos_ned[:, i], vel - walks.vel_ned[:, i]
 
 
 def normalised(error: NDArray[np.float64], cov: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -32,8 +32,8 @@ console = Console(highlight=False)
 def main(
     names: Annotated[list[str] | None, typer.Argument(help="Stages, with those they need; default: all.")] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Seeds of each.")] = 1,
-    jobs: Annotated[int, typer.Option(min=1, help="Processes side by side, one core each.")] = 2,
-    again: Annotated[bool, typer.Option("--again", help="Train the named stages anew.")] = False,
+    jobs: Annotated[int, typer.Option(min=1, help="Cores: each process has one, or all.")] = 2,
+    again: Annotated[bool, typer.Option("--again", help="Train the named stages and those after them anew.")] = False,
     page: Annotated[bool, typer.Option("--page", help="Train nothing, only write the page.")] = False,
     shipped: Annotated[bool, typer.Option("--shipped", help="Take the shipped page's results as done.")] = False,
 ) -> None:
@@ -46,6 +46,7 @@ def main(
             path = result_path(RESULTS, result.stage, result.seed)
             if not path.exists():
                 write(path, result)
+                _fetch(result)
     failed: list[str] = []
     if not page:
         if again:
@@ -70,6 +71,13 @@ def results() -> dict[str, list[Result]]:
     return found
 
 
+def _fetch(result: Result) -> None:
+    """Puts the policy that ships where the stages after it look for it."""
+    shipped = PRETRAINED / f"{STAGES[result.stage].recipe}.pt"
+    if result.seed == 1 and shipped.exists():
+        write_whole(policy_path(RESULTS, result.stage, 1), shipped.read_bytes())
+
+
 def _publish() -> None:
     """Puts the first seed's policies into policies/pretrained/, under the names of their recipes."""
     for stage in STAGES.values():
@@ -88,18 +96,21 @@ def _jobs(names: Sequence[str], seeds: int) -> list[Job]:
             name = f"{stage.name}-{seed}"
             if not path.exists():
                 there = partial(_are_done, stage.before, seed)
-                jobs.append(Job(name, ("bench.follow.run", *words), takes_all=stage.cores > 1, is_ready=there))
+                jobs.append(Job(name, ("bench.follow.run", *words), takes_all=stage.takes_all, is_ready=there))
             if stage.flies and not (path.exists() and read(path).cards(is_flown=True)):
                 jobs.append(Job(f"{name}-flown", ("bench.follow.flights", *words), is_ready=path.exists))
     return jobs
 
 
 def _are_done(names: Sequence[str], seed: int) -> bool:
-    return all(result_path(RESULTS, name, seed).exists() for name in names)
+    return all(path(RESULTS, name, seed).exists() for name in names for path in (result_path, policy_path))
 
 
 def _forget(names: Sequence[str], seeds: int) -> None:
-    for name in names:
+    """Takes away what came of stages, and of those that come after them."""
+    for name in STAGES:
+        if not {stage.name for stage in in_order([name])} & {*names}:
+            continue
         for seed in range(1, seeds + 1):
             result_path(RESULTS, name, seed).unlink(missing_ok=True)
             shutil.rmtree(RESULTS / "runs" / f"{name}-{seed}", ignore_errors=True)

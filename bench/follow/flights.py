@@ -7,7 +7,6 @@ is not followed for the rest of its minute.
 
 import sys
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 
 from bench.follow.judge import scorecards
@@ -66,7 +65,8 @@ def main(name: str, seed: str, folder: str) -> None:
     where = Path(folder)
     pilot = load_pilot(str(policy_path(where, name, int(seed))))
     tracks: dict[Cell, list[Track]] = {}
-    for first, cell in zip(count(FIRST_SEED, FLIGHTS), CELLS, strict=False):  # no two flights with one seed
+    for i, cell in enumerate(CELLS):
+        first = FIRST_SEED + i * FLIGHTS  # no two flights with one seed
         tracks[cell] = [fly(pilot, cell, first + k) for k in range(FLIGHTS)]
         print(f"{cell}: flown", flush=True)
     path = result_path(where, name, int(seed))

@@ -25,8 +25,10 @@ make reproduce-follow
 ```
 
 A teacher that sees the truth is trained by PPO; students that see what flies (a 64 x 64 picture with depth, the flight
-controller's estimate and, but for vision-only, the phone's reports) learn from it by DAgger. Each stage is one process
-on as many cores as the table says. Wall clock is that of training; compiling the kernels, once per machine, is not in
+controller's estimate and, but for vision-only, the phone's reports) learn from it by DAgger; PPO may go on with what
+they have learned, its critic alone seeing the truth. Each stage is one process on as many cores as the table says, at
+times with another beside it; glibc keeps their memory and OpenMP's threads wait passively (`bench/side_by_side.py`).
+Wall clock is that of training; compiling the kernels, once per machine, is not in
 it. Judged are most probable actions in held-out worlds: fresh hills, trees, owners, wind and noise, {episodes}.
 "Flown" are flights over MAVLink in lockstep: the whole autopilot, a companion computer, one vehicle at a time.
 Intervals are 95 % over episodes: Wilson's for rates, the bootstrap's for the rest. Measured on {machine}.
@@ -131,7 +133,7 @@ def _training(results: Results, docs: Path) -> str:
         whole = seconds + sum(results[name][0].train_s for name in before if results.get(name))
         limit = "" if stage.limit_s is None else duration(stage.limit_s)
         lines.append(
-            f"| {stage.title} | {first.steps / 1e6:.2f} M | {stage.cores} | {duration(seconds)} | {duration(whole)} "
+            f"| {stage.title} | {first.steps / 1e6:.2f} M | {first.cores} | {duration(seconds)} | {duration(whole)} "
             f"| {limit} | {first.steps_per_s:,.0f} | {len(runs)} | {first.policy_bytes / 1024:,.0f} kB |"
         )
     drawn = {stage.title: results.get(stage.name, ()) for stage in STAGES.values()}

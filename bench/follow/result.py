@@ -32,6 +32,7 @@ class Result:
     seed: int
     steps: int
     train_s: float  # wall clock of training, kernels compiled before
+    cores: int  # that it was trained on
     machine: str
     policy_bytes: int
     curve: list[Point]

@@ -3,6 +3,7 @@
 A training that was stopped goes on from its newest checkpoint; a stage that was trained but not judged is judged.
 """
 
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,7 @@ def run(stage: Stage, seed: int, folder: Path) -> Result:
         seed,
         result.progress.steps,
         result.progress.elapsed_s,
+        len(os.sched_getaffinity(0)),
         machine(),
         kept.stat().st_size,
         curve.points,

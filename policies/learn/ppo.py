@@ -60,6 +60,7 @@ class Ppo:
         if not isinstance(behavior.hyperparameters, PpoHyperparameters):
             raise TypeError("hyperparameters are not PPO's")
         self.steps = 0
+        self._is_warming_up = False
         self.hyperparameters = behavior.hyperparameters
         self.behavior = behavior
         self.signals = list(signals)
@@ -83,13 +84,14 @@ class Ppo:
     def iterate(self) -> Iteration:
         """Collects, estimates and learns once."""
         rollout = self._rollout
+        self._is_warming_up = self.steps < self.hyperparameters.critic_warm_up
         self._collect(rollout)
         self.steps += rollout.rewards.numel()
         has_learned_signals = any(not isinstance(signal, ExtrinsicSignal) for signal in self.signals)
         transitions = rollout.transitions() if has_learned_signals else None
         rewards = self._rewards(rollout, transitions)
         statistics = self._estimate(rollout, rewards) | self._improve(rollout, transitions)
-        if self.cloning is not None:
+        if self.cloning is not None and not self._is_warming_up:
             statistics |= self.cloning.update(self.steps)
         return Iteration(rollout.rewards.numel(), self.task.task.take_scores(), statistics)
 
@@ -113,7 +115,8 @@ class Ppo:
             self.task.step(self.policy.bounded(actions), actions.branches)
             rollout.record(t, actions, distribution.log_probs(actions), self.task)
             self._memory = _forgotten(memory, self.task)
-        self.policy.body.normalize(rollout.seen[:-1])  # the critic's too, unless it sees something else
+        if not self._is_warming_up:
+            self.policy.body.normalize(rollout.seen[:-1])  # the critic's too, unless it sees something else
         if self.critic.body.is_privileged:
             self.critic.body.normalize(rollout.seen[:-1])
 
@@ -217,10 +220,11 @@ class Ppo:
         if self.hyperparameters.normalize_advantages == "minibatch":
             weights = losses.standardized(weights)
         policy_loss = losses.policy_loss(log_probs, old_log_probs, weights, epsilon)
-        value_loss = losses.value_loss(self.critic.heads(features), batch.values, batch.returns, epsilon)
+        reach = math.inf if self._is_warming_up else epsilon  # a new critic has far to go
+        value_loss = losses.value_loss(self.critic.heads(features), batch.values, batch.returns, reach)
         entropy = distribution.entropy().mean()
         loss = 0.5 * value_loss
-        if self.steps > self.hyperparameters.critic_warm_up:
+        if not self._is_warming_up:
             loss = loss + policy_loss - beta * entropy + self.hyperparameters.perception_strength * believed
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]

@@ -9,7 +9,7 @@ import torch
 
 @contextmanager
 def few_threads(*, has_images: bool = False) -> Iterator[None]:
-    """Half the cores that this process may use, at most 4, ML-Agents' rule; all of them for networks of images.
+    """Half the cores that this process may use, ML-Agents' rule, or all for networks of images; at most 4 either way.
 
     More only get in each other's way in small networks; convolutions share their work well.
     """

@@ -71,7 +71,8 @@ class PpoHyperparameters(HyperparametersBase):
     privileged_critic: bool = own_key(False)
     """Whether the critic sees the task's privileged elements in place of its image; the policy never does."""
     critic_warm_up: NotNegativeWhole = own_key(0)
-    """Decisions at the start in which the critic learns alone, so that it does not lead a trained policy astray."""
+    """Decisions at the start in which the critic learns alone, so that it does not lead a trained policy astray; its
+    values are not clipped then."""
     perception_strength: NotNegative = own_key(0.1)
     """Weight of the beliefs that `network_settings` names, if it names any."""
     target_kl: PositiveOrNone = own_key(None)
@@ -204,7 +205,7 @@ class Behavior(Block):
     threaded: bool = False
     """Accepted; collecting and learning take turns here."""
     init_path: str | None = None
-    """A checkpoint that the networks start from."""
+    """Whose networks this one starts from: a policy file or checkpoint, a run, or the name of one that ships."""
     success_target: ShareOrNone = own_key(None)
     """Training ends when this share of episodes succeeds; none: at max_steps only."""
 

@@ -48,7 +48,7 @@ from sim.world.people import RUN_SPEED_M_S, WALK_SPEED_M_S, Person, PersonModel,
 _OWNERS: dict[str, float | Sampler] = {
     "walks": WALK_SPEED_M_S,
     "runs": RUN_SPEED_M_S,
-    "any": Sampler(intervals=((1.0, RUN_SPEED_M_S),)),
+    "any": Sampler(intervals=((1.0, RUN_SPEED_M_S), (4.0, 6.0), (4.0, 6.0))),  # the fastest are the hardest to follow
 }
 _VECTORS = {"as-documented": int(DOCUMENT), "improved": int(EGO), "vision-only": int(EGO_BLIND)}
 

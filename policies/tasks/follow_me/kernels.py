@@ -219,7 +219,7 @@ def judge(border: Border, rules: Rules, rig: RigArrays, state: FollowState, star
         sight.is_in_view == 1, 0.0, state.unseen_s[i] + float(rules.decision_ticks) / _TICKS_PER_S
     )
     touched = has_touched(rig.body[i])
-    sight.reach_m = wp.min(sight.reach_m, state.reaches_m[i])
+    sight.reach_m = state.reaches_m[i]
     outcome = follow_outcome(numbers, sight, touched, state.unseen_s[i], border.steps[i] + 1)
     reward = float(0.0)
     if rules.is_documented == 1:

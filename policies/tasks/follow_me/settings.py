@@ -20,7 +20,8 @@ class FollowSettings(TaskSettings):
     observation: Observation = "camera"
     """`camera`: what a policy can know in flight; `state`: the truth, for teachers."""
     owner: OwnerClass = "walks"
-    """The owner's fastest: `walks` up to 2 m/s, `runs` up to 5 m/s, or `any` between 1 and 5 m/s, drawn per episode."""
+    """The owner's fastest: `walks` up to 2 m/s, `runs` up to 5 m/s, or `any` between 1 and 6 m/s, drawn per episode,
+    five in eight above 4 m/s."""
     has_estimator: bool = True
     """Whether the flight controller flies on its estimate; if not, on the truth: quicker, in training only."""
     terrain: Terrain = "fresh"

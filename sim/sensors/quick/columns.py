@@ -66,10 +66,10 @@ def level_ray(view: View, cells_per_m: float, ray_ned: wp.vec3) -> LevelRay:
 
 @wp.kernel
 def lay_columns(
-    first: int, ground: Ground, views: wp.array[View], is_chosen: wp.array[wp.bool], columns: Columns
+    first_camera: int, ground: Ground, views: wp.array[View], is_chosen: wp.array[wp.bool], columns: Columns
 ) -> None:
-    i_chunk, i_column = wp.tid()
-    i_camera = first + i_chunk
+    i_row, i_column = wp.tid()
+    i_camera = first_camera + i_row
     if not is_chosen[i_camera]:
         return
     view = views[i_camera]

@@ -108,7 +108,7 @@ def smeared(rgb: wp.array[wp.uint8], first: int, size: wp.vec2i, row: int, colum
 
 @wp.kernel
 def expose(
-    first: int,
+    first_camera: int,
     lenses: wp.array[Lens],
     is_chosen: wp.array[wp.bool],
     all_optics: wp.array[Optics],
@@ -118,8 +118,8 @@ def expose(
     rgb: wp.array[wp.uint8],
     depth_m: wp.array[float],
 ) -> None:
-    i_chunk, row = wp.tid()
-    i_camera = first + i_chunk
+    i_row, row = wp.tid()
+    i_camera = first_camera + i_row
     if not is_chosen[i_camera]:
         return
     optics = all_optics[i_camera]

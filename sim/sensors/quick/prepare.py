@@ -106,7 +106,7 @@ def steepest(ground: Ground, world: int) -> float:
 
 @wp.kernel
 def prepare_views(
-    first: int,
+    first_camera: int,
     worlds: wp.array[World],
     i_world: wp.array[int],
     lenses: wp.array[Lens],
@@ -119,7 +119,7 @@ def prepare_views(
     columns: Columns,
     sights: Sights,
 ) -> None:
-    i_camera = first + wp.tid()
+    i_camera = first_camera + wp.tid()
     if not is_chosen[i_camera]:
         return
     world = i_world[i_camera]

@@ -131,7 +131,7 @@ def land_colour(paints: Paints, ground: Ground, view: View, north: float, east: 
 
 @wp.kernel
 def draw_rows(
-    first: int,
+    first_camera: int,
     ground: Ground,
     paints: Paints,
     views: wp.array[View],
@@ -141,8 +141,8 @@ def draw_rows(
     range_m: float,
     outputs: Outputs,
 ) -> None:
-    i_chunk, row = wp.tid()
-    i_camera = first + i_chunk
+    i_row, row = wp.tid()
+    i_camera = first_camera + i_row
     if not is_chosen[i_camera]:
         return
     view = views[i_camera]

@@ -27,7 +27,7 @@ def result(stage="student", *, is_flown=False):
     if is_flown:
         judged += [Judged(True, trees, 2.0, None, near) for trees in (None, 100.0)]
     curve = [Point(1000 * k, 2.0 * k, 0.1 * k, float(k)) for k in range(8)]
-    return Result(stage, 1, 600_000, 900.0, "a machine", 400_000, curve, judged)
+    return Result(stage, 1, 600_000, 900.0, 1, "a machine", 400_000, curve, judged)
 
 
 def test_every_stage_has_a_recipe_and_comes_after_what_it_needs():

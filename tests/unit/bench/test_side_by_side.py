@@ -5,13 +5,25 @@ from rich.console import Console
 
 from bench.side_by_side import Job, run_side_by_side
 
+NOTE = """
+import sys, time, pathlib
+name, *waits_for = sys.argv[1:]
+lines = pathlib.Path("lines")
+def tell(word):
+    with lines.open("a") as file:
+        file.write(word + " " + name + "\\n")
+tell("begin")
+while any("end " + other not in lines.read_text() for other in waits_for):
+    time.sleep(0.01)
+tell("end")
+"""
+
 
 @pytest.fixture
 def modules(tmp_path, monkeypatch):
-    """Modules for `python -m`: `note NAME` adds a line at its begin and its end, `fail` fails."""
+    """Modules for `python -m`: `note NAME OTHER…` tells of its begin, waits for others, tells its end; `fail` fails."""
     (tmp_path / "lines").touch()
-    lines = "import sys\nfor word in ('begin', 'end'):\n    open('lines', 'a').write(f'{word} {sys.argv[1]}\\n')\n"
-    (tmp_path / "note.py").write_text(lines)
+    (tmp_path / "note.py").write_text(NOTE)
     (tmp_path / "fail.py").write_text("raise SystemExit('no')\n")
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -23,15 +35,15 @@ def run(folder, *jobs):
 
 def test_a_job_begins_when_what_it_needs_is_there(modules):
     later = Job("b", ("note", "b"), is_ready=lambda: "end a" in (modules / "lines").read_text())
-    assert run(modules, Job("a", ("note", "a")), later) == []
+    assert run(modules, later, Job("a", ("note", "a"))) == []
     assert (modules / "lines").read_text().split("\n")[:-1] == ["begin a", "end a", "begin b", "end b"]
 
 
-def test_a_job_that_takes_all_is_alone(modules):
-    jobs = [Job(name, ("note", name), takes_all=name == "c") for name in "abcd"]
+def test_a_job_that_takes_all_waits_for_the_others_and_has_none_beside_it(modules):
+    jobs = [Job("a", ("note", "a", "d")), Job("c", ("note", "c"), takes_all=True), Job("d", ("note", "d"))]
     assert run(modules, *jobs) == []
     lines = (modules / "lines").read_text().split("\n")
-    assert lines.index("end c") == lines.index("begin c") + 1
+    assert lines[-3:-1] == ["begin c", "end c"]
 
 
 def test_jobs_that_fail_and_those_that_wait_for_them_are_named(modules):
