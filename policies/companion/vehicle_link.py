@@ -110,6 +110,7 @@ class VehicleLink:
         self._seq = 0
         self._text_id = 0
         self._is_refused = False
+        self._asked_for: Mode | None = None
         self._heartbeat_us = NEVER_US
         self._request_us = NEVER_US
 
@@ -156,6 +157,7 @@ class VehicleLink:
         """Asks the vehicle for a mode."""
         is_px4 = self._dialect is PX4
         mode = Mode.HOLD if wish is Wish.HOLD else Mode.OFFBOARD if is_px4 else Mode.GUIDED
+        self._asked_for = mode
         number = self._dialect.custom_mode(mode)
         if is_px4:
             self._command(_COMMAND_SET_MODE, _CUSTOM_MODE, number >> 16 & 0xFF, number >> 24 & 0xFF)
@@ -211,6 +213,8 @@ class VehicleLink:
             )
         elif fields.command == _COMMAND_SET_MODE and fields.target_component in (0, COMPONENT):  # COMMAND_ACK
             self._is_refused |= fields.result != 0
+            if fields.result == 0 and self._asked_for is not None:  # known now: its next heartbeat may be a second away
+                self._enter(self._asked_for)
 
     def _distance_told(self, fields: Any, time_us: int) -> None:
         if fields.orientation != _LOOKS_DOWN:
@@ -225,10 +229,12 @@ class VehicleLink:
         own.heartbeat_us = time_us
         own.is_armed = bool(fields.base_mode & _ARMED)
         try:
-            own.mode = self._dialect.mode_from_custom(fields.custom_mode)
-            own.mode_name = own.mode.name.replace("_", " ").capitalize()
+            self._enter(self._dialect.mode_from_custom(fields.custom_mode))
         except UnknownModeError:
             own.mode, own.mode_name = None, f"{fields.custom_mode:#x}"
+
+    def _enter(self, mode: Mode) -> None:
+        self.own.mode, self.own.mode_name = mode, mode.name.replace("_", " ").capitalize()
 
     def _owner_reported(self, fields: Any, time_us: int) -> None:
         origin = self.own.origin

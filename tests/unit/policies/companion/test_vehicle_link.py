@@ -1,0 +1,54 @@
+"""What a companion believes of its vehicle's mode, by heartbeats and by answers to its own requests."""
+
+import pytest
+
+from autopilot.mavlink.codec import encode
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.links import memory_pair
+from autopilot.vehicle import Mode
+from policies.companion.engagement import Wish
+from policies.companion.vehicle_link import COMPONENT, VehicleLink
+
+
+@pytest.fixture
+def vehicle():
+    """Its end of the link, with the companion's."""
+    end, companion_end = memory_pair()
+    link = VehicleLink(companion_end)
+    tell(end, link, "HEARTBEAT", autopilot=int(PX4.autopilot), custom_mode=PX4.custom_mode(Mode.HOLD), base_mode=128)
+    return end, link
+
+
+def tell(end, link, name, **fields):
+    end.send(encode(name, 1, 1, 0, **fields))
+    link.receive(0)
+
+
+def answer(end, link, result, target_component=COMPONENT):
+    tell(end, link, "COMMAND_ACK", command=176, result=result, target_component=target_component)
+
+
+def test_a_mode_that_was_asked_for_is_known_with_the_answer(vehicle):
+    end, link = vehicle
+    link.ask_for(Wish.OFFBOARD)
+    assert link.own.mode is Mode.HOLD
+    answer(end, link, 0)
+    assert link.own.mode is Mode.OFFBOARD
+    assert not link.take_refusal()
+    tell(end, link, "HEARTBEAT", autopilot=int(PX4.autopilot), custom_mode=PX4.custom_mode(Mode.LAND))
+    assert link.own.mode is Mode.LAND
+
+
+def test_a_refusal_changes_no_mode(vehicle):
+    end, link = vehicle
+    link.ask_for(Wish.OFFBOARD)
+    answer(end, link, 2)
+    assert link.own.mode is Mode.HOLD
+    assert link.take_refusal()
+
+
+def test_answers_to_others_say_nothing(vehicle):
+    end, link = vehicle
+    link.ask_for(Wish.OFFBOARD)
+    answer(end, link, 0, target_component=190)
+    assert link.own.mode is Mode.HOLD
