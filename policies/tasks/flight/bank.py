@@ -20,8 +20,8 @@ from sim.world.world import WorldConfig, WorldMap, build_world
 
 AIRFRAME = "x500"
 HOVER_COUNT = 64
-HOVER_HEIGHT_M = 2.0
-_SPREAD_M = 0.5  # of the places they hover at, per axis
+LOW_M = (1.5, 2.5)  # heights of hovers
+_SPREAD_M = 0.5  # of the places they hover at, to the north and to the east
 _ALIGN_TICKS = 2000  # 8 s: power-on until the estimator is aligned and has used GNSS
 _CLIMB_TICKS = 2000  # 8 s: up, and settled
 
@@ -45,16 +45,18 @@ def build_rig(world: WorldMap | WorldBatch, count: int, *, has_estimator: bool, 
 
 
 @cache
-def hover_bank(has_estimator: bool, device: str) -> Rig:
-    """Vehicles that hover about `HOVER_HEIGHT_M` above home, each with a heading of its own."""
+def hover_bank(has_estimator: bool, device: str, heights_m: tuple[float, float] = LOW_M) -> Rig:
+    """Vehicles that hover above home, between two heights, each with a heading of its own."""
     plain = WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0)
     rig = build_rig(build_world(plain, device), HOVER_COUNT, has_estimator=has_estimator, threads=1, device=device)
     rig.advance(_ALIGN_TICKS)
     rng = np.random.default_rng(0)
     setpoints = rig.arrays.autopilot.setpoint
     rows = setpoints.numpy()
+    low, high = heights_m
+    middle, spread = np.array([0.0, 0.0, -0.5 * (low + high)]), np.array([_SPREAD_M, _SPREAD_M, 0.5 * (high - low)])
     for i in range(HOVER_COUNT):
-        north, east, down = np.array([0.0, 0.0, -HOVER_HEIGHT_M]) + rng.uniform(-_SPREAD_M, _SPREAD_M, 3)
+        north, east, down = middle + rng.uniform(-spread, spread)
         port = SetpointPort(rows[i : i + 1])
         port.set_flags(is_armed=True, is_landed=False)
         port.fly_to((north, east, down), rng.uniform(-np.pi, np.pi))

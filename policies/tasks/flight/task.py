@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from common.geodesy import DEFAULT_HOME
 from common.kernels import TICK_S
-from policies.tasks.flight.bank import build_rig, hover_bank
+from policies.tasks.flight.bank import LOW_M, build_rig, hover_bank
 from policies.tasks.flight.vehicle import NOISE_LEVELS_PER_UNIT, Makes
 from policies.tasks.layout import Layout
 from policies.tasks.numbers import Sampler
@@ -44,6 +44,7 @@ class FlightTask(Task):
         has_estimator: bool,
         number_defaults: Mapping[str, float | Sampler],
         device: str,
+        hover_heights_m: tuple[float, float] = LOW_M,
     ) -> None:
         super().__init__(layout, env_count, number_defaults=number_defaults, device=device)
         self.worlds = WorldBatch(world, env_count, device, trees_per_ha_max=trees_per_ha_max)
@@ -55,7 +56,7 @@ class FlightTask(Task):
         self.hovers = self._zeros("hovers", env_count, int)  # of the bank, that the episode started from
         self.is_starting = self._zeros("is_starting", env_count, wp.bool)
         self.is_growing = self._zeros("is_growing", env_count, wp.bool)
-        bank = hover_bank(has_estimator, device)
+        bank = hover_bank(has_estimator, device, hover_heights_m)
         self._restore = RowRestore(self.rig, bank, self.hovers, self.is_starting, self.noise_seeds)
         self.makes = _makes(self.rig)
 

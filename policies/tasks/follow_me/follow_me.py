@@ -12,7 +12,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from policies.tasks.flight.bank import HOVER_COUNT
+from policies.tasks.flight.bank import HOVER_COUNT, LOW_M
 from policies.tasks.flight.numbers import FLIGHT_NUMBERS, FlightNumbers
 from policies.tasks.flight.own import ACTIONS
 from policies.tasks.flight.ranges import RANGES, measure_ranges
@@ -50,6 +50,7 @@ _OWNERS: dict[str, float | Sampler] = {
     "runs": RUN_SPEED_M_S,
     "any": Sampler(intervals=((1.0, RUN_SPEED_M_S), (4.0, 6.0), (4.0, 6.0))),  # the fastest are the hardest to follow
 }
+_TAKEOVER_M = (1.5, 3.5)  # heights at which a companion may take over
 _VECTORS = {"as-documented": int(DOCUMENT), "improved": int(EGO), "vision-only": int(EGO_BLIND)}
 
 
@@ -68,6 +69,7 @@ class FollowMe(FlightTask):
             has_estimator=settings.has_estimator,
             number_defaults=(DOCUMENTED if is_documented else IMPROVED) | {"owner_speed_max": _OWNERS[settings.owner]},
             device=device,
+            hover_heights_m=LOW_M if is_documented else _TAKEOVER_M,
         )
         self.settings = settings
         self.follow = self._state()

@@ -277,6 +277,16 @@ def phone_of(model: PhoneModel, n: FollowNumbers) -> PhoneModel:
     return model
 
 
+@wp.func
+def phone_that_has_reported(model: PhoneModel, person: Person, seed: int, i: int, tick: int) -> PhoneState:
+    """The phone of an owner who has been standing there for some time."""
+    since = tick - 2 * model.period_ticks - model.lag_ticks
+    phone = phone_start(model, seed, i, since)
+    for then in range(since, tick, _STEP_TICKS):
+        phone = phone_step(model, phone, person, seed, i, then)
+    return phone_step(model, phone, person, seed, i, tick)
+
+
 @wp.kernel(enable_backward=False)
 def place(border: Border, rig: RigArrays, state: FollowState, start: Start) -> None:
     i = wp.tid()
@@ -304,7 +314,7 @@ def place(border: Border, rig: RigArrays, state: FollowState, start: Start) -> N
     person = person_start(world, state.person_models[i], north, east, heading, path_seed, i, tick)
     phone_model = state.phone_models[i]
     state.people[i] = person
-    state.phones[i] = phone_step(phone_model, phone_start(phone_model, path_seed, i, tick), person, path_seed, i, tick)
+    state.phones[i] = phone_that_has_reported(phone_model, person, path_seed, i, tick)
 
 
 @wp.kernel(enable_backward=False)
