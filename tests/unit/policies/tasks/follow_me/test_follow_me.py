@@ -137,6 +137,22 @@ def test_vector_is_what_a_companion_makes_of_estimate_and_report() -> None:
     np.testing.assert_allclose(task.border.observations.numpy()[0], out.numpy()[0], rtol=1e-5, atol=1e-6)
 
 
+def test_episodes_start_as_takeovers_do() -> None:
+    task = _task(64, **STATE)
+    fixes, tick = task.follow.phones.numpy()["fix"].copy(), task.rig.arrays.tick.numpy().copy()
+    people_ned = task.follow.people.numpy()["pos_ned"].copy()
+    is_known = fixes["is_known"] == 1
+    assert is_known.mean() > 0.9  # others are silent just then
+    ages_s = tick * 0.004 - fixes["time_us"] * 1e-6
+    assert ages_s[is_known].min() >= 0.3  # the phone's lag
+    off_m = np.linalg.norm((fixes["pos_ned"] - people_ned)[is_known, :2], axis=1)
+    assert 0.5 < off_m.mean() < 4.0
+    task.step()
+    heights_m = task.rig.arrays.body.numpy()["height_agl_m"]
+    assert heights_m.min() < 2.0
+    assert heights_m.max() > 3.0  # a vehicle's least takeoff is 2.5 m
+
+
 @pytest.mark.parametrize(("aside_m", "outcome"), [(0.0, Outcome.HIT_OTHER), (0.3, Outcome.RUNNING)])
 def test_an_owner_who_runs_past_between_two_decisions_has_been_hit(aside_m: float, outcome: Outcome) -> None:
     task = _task(1, numbers={"touch_m": 0.2, "trees_per_ha": 0.0, "owner_speed_max": 6.0}, **STATE)
