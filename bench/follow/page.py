@@ -14,6 +14,7 @@ from policies.tasks.follow_me.scorecard import NAMES, written
 from policies.tasks.follow_me.track import Ranges
 from policies.tasks.intervals import Interval
 
+REWARDS = {"ours": "follow-reward", "the document's": "follow-document-reward"}  # what is drawn, and where
 Results = Mapping[str, Sequence[Result]]
 INTRODUCTION = """# Following an owner, trained anew
 
@@ -136,11 +137,13 @@ def _training(results: Results, docs: Path) -> str:
             f"| {stage.title} | {first.steps / 1e6:.2f} M | {first.cores} | {duration(seconds)} | {duration(whole)} "
             f"| {limit} | {first.steps_per_s:,.0f} | {len(runs)} | {first.policy_bytes / 1024:,.0f} kB |"
         )
-    drawn = {stage.title: results.get(stage.name, ()) for stage in STAGES.values()}
-    if any(run.curve for runs in drawn.values() for run in runs):
-        title = "Mean episode reward while training; a teacher drives students' first rounds"
-        curves.draw(docs / "images" / "follow-reward.png", title, drawn, value="reward", over="wall_s")
-        lines += ["", f"![{title}](images/follow-reward.png)"]
+    for reward, name in REWARDS.items():
+        drawn = {stage.title: results.get(stage.name, ()) for stage in STAGES.values() if stage.reward == reward}
+        if any(run.curve for runs in drawn.values() for run in runs):
+            title = f"Mean episode reward while training, {reward}"
+            curves.draw(docs / "images" / f"{name}.png", title, drawn, value="reward", over="wall_s")
+            lines += ["", f"![{title}](images/{name}.png)"]
+    lines += ["", "A teacher drives students' first rounds."]
     return "\n".join(lines) + "\n"
 
 

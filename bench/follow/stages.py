@@ -30,6 +30,7 @@ class Stage:
     start: str | None = None  # stage whose networks this one starts from
     changes: dict[str, Any] = field(default_factory=dict)  # of the recipe: path with dots to value
     judged: dict[str, Any] = field(default_factory=dict)  # settings of the task to judge in, over the recipe's
+    reward: str = "ours"  # or the document's: they cannot be compared
     takes_all: bool = False  # its training is given all cores
     flies: bool = False  # also judged in flights over MAVLink
     ships: bool = True  # the first seed's policy goes to policies/pretrained/
@@ -81,6 +82,7 @@ STAGES: dict[str, Stage] = {
             "follow-me-document",
             document="reward 20 to 30, 10 M steps, 36.4 h",
             limit_s=7200.0,
+            reward="the document's",
             takes_all=True,
             ships=False,
         ),
