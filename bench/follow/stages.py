@@ -64,6 +64,7 @@ STAGES: dict[str, Stage] = {
             "Tuned: the improved student goes on by PPO, its critic sees the truth",
             "follow-me-tuned",
             start="student",
+            flies=True,
             ships=False,
         ),
         Stage(
