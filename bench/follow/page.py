@@ -29,8 +29,8 @@ A teacher that sees the truth is trained by PPO; students that see what flies (a
 controller's estimate and, but for vision-only, the phone's reports) learn from it by DAgger; PPO may go on with what
 they have learned, its critic alone seeing the truth. Each stage is one process on as many cores as the table says, at
 times with another beside it; glibc keeps their memory and OpenMP's threads wait passively (`bench/side_by_side.py`).
-Wall clock is that of training; compiling the kernels, once per machine, is not in
-it. Judged are most probable actions in held-out worlds: fresh hills, trees, owners, wind and noise, {episodes}.
+Wall clock is that of training; compiling the kernels, once per machine, is not in it. Judged are most probable actions
+in held-out worlds: fresh hills, trees, owners, wind and noise, {episodes}.
 "Flown" are flights over MAVLink in lockstep: the whole autopilot, a companion computer, one vehicle at a time.
 Intervals are 95 % over episodes: Wilson's for rates, the bootstrap's for the rest. Measured on {machine}.
 
