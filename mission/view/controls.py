@@ -20,6 +20,7 @@ CLIMB_M = 5.0  # above the ground, when a click finds the vehicle standing
 FAR_M = 2000.0  # of a click's ray
 LEAST_HEIGHT_M = 2.0
 SPEEDS = {"1/4 x": 0.25, "1/2 x": 0.5, "1 x": 1.0, "2 x": 2.0, "5 x": 5.0, "max": None}
+_LINES = 3  # what happened last: one thing soon follows another
 
 
 class Controls:
@@ -134,7 +135,7 @@ class Controls:
             self._say(f"{name}: done")
 
     def _say(self, text: str) -> None:
-        self.lines = (text,)
+        self.lines = (*self.lines, text)[-_LINES:]
 
     async def _take_off(self, drone: Drone) -> None:
         await drone.wait_ready()
