@@ -110,7 +110,7 @@ class VehicleLink:
         self._seq = 0
         self._text_id = 0
         self._is_refused = False
-        self._asked_for: Mode | None = None
+        self._asked_for: Mode | None = None  # and not answered yet
         self._heartbeat_us = NEVER_US
         self._request_us = NEVER_US
 
@@ -213,8 +213,10 @@ class VehicleLink:
             )
         elif fields.command == _COMMAND_SET_MODE and fields.target_component in (0, COMPONENT):  # COMMAND_ACK
             self._is_refused |= fields.result != 0
-            if fields.result == 0 and self._asked_for is not None:  # known now: its next heartbeat may be a second away
-                self._enter(self._asked_for)
+            if fields.target_component == COMPONENT:  # one to everybody may answer a ground station
+                if fields.result == 0 and self._asked_for is not None:
+                    self._enter(self._asked_for)  # known now: its next heartbeat may be a second away
+                self._asked_for = None
 
     def _distance_told(self, fields: Any, time_us: int) -> None:
         if fields.orientation != _LOOKS_DOWN:

@@ -26,6 +26,9 @@ def assert_refused(result, pattern):
     assert lines[0].startswith("honeyguide: ")
 
 
+RUN_FILES = ["flight.png", "flight.tlog", "flight.ulg", "replay.npz", "summary.json"]  # of a whole flight
+
+
 @pytest.fixture
 def fly(tmp_path):
     """Runs a lockstep flight into a folder of the test."""
@@ -75,13 +78,7 @@ def test_flown_mission_gives_0_and_a_whole_run_folder(fly, tmp_path):
     assert result.stderr == ""
     assert "mission completed" in result.stdout
     folder = tmp_path / "flight"
-    assert sorted(path.name for path in folder.iterdir()) == [
-        "flight.png",
-        "flight.tlog",
-        "flight.ulg",
-        "replay.npz",
-        "summary.json",
-    ]
+    assert sorted(path.name for path in folder.iterdir()) == RUN_FILES
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["is_success"] is True
     assert summary["cross_track_p95_m"] < 1.5
@@ -157,13 +154,7 @@ def test_sigterm_ends_a_flight_like_an_interrupt(tmp_path):
     assert process.returncode == 0, errors
     assert "stopped by the user" in output
     assert errors == ""
-    assert sorted(path.name for path in folder.iterdir()) == [
-        "flight.png",
-        "flight.tlog",
-        "flight.ulg",
-        "replay.npz",
-        "summary.json",
-    ]
+    assert sorted(path.name for path in folder.iterdir()) == RUN_FILES
     ULog(str(folder / "flight.ulg"))
 
 

@@ -54,7 +54,7 @@ class Eyes:
             hfov_deg=HFOV_DEG,
             people=people,
             has_optics=True,
-            threads=worker_count(str(device)),
+            threads=worker_count(device),
             device=device,
         )
         camera = self._camera

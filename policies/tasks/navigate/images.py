@@ -69,7 +69,7 @@ class DepthEyes:
             height=height,
             hfov_deg=HFOV_DEG,
             has_optics=True,
-            threads=worker_count(str(device)),
+            threads=worker_count(device),
             device=device,
         )
         rows = wp.full(count, value=True, dtype=wp.bool, device=device)

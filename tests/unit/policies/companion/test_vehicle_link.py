@@ -52,3 +52,19 @@ def test_answers_to_others_say_nothing(vehicle):
     link.ask_for(Wish.OFFBOARD)
     answer(end, link, 0, target_component=190)
     assert link.own.mode is Mode.HOLD
+
+
+def test_an_old_request_is_not_answered_twice(vehicle):
+    end, link = vehicle
+    link.ask_for(Wish.OFFBOARD)
+    answer(end, link, 0)
+    tell(end, link, "HEARTBEAT", autopilot=int(PX4.autopilot), custom_mode=PX4.custom_mode(Mode.HOLD))
+    answer(end, link, 0)
+    assert link.own.mode is Mode.HOLD
+
+
+def test_an_answer_to_everybody_says_nothing_of_the_mode(vehicle):
+    end, link = vehicle
+    link.ask_for(Wish.OFFBOARD)
+    answer(end, link, 0, target_component=0)
+    assert link.own.mode is Mode.HOLD
