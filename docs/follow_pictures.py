@@ -14,8 +14,8 @@ IMAGES = Path(__file__).parent / "images"
 sys.path.insert(0, str(IMAGES.parents[1]))
 
 from mission.flight import FlightConfig  # noqa: E402
+from mission.flight_config import OwnerConfig  # noqa: E402
 from mission.follow.lockstep import flight_with_companion, take_off  # noqa: E402
-from mission.follow.owner import OwnerConfig  # noqa: E402
 from mission.follow.session import chosen_pilot, score_lines  # noqa: E402
 from mission.follow.watch import FollowWatch  # noqa: E402
 from mission.view.chase import PICTURE_S, film  # noqa: E402

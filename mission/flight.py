@@ -7,9 +7,7 @@ the scripting client, then the recorder. With the memory link alone it is a pure
 from collections.abc import Callable, Sequence
 from math import isnan, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol, Self
-
-from pydantic import BaseModel, ConfigDict, Field
+from typing import TYPE_CHECKING, Protocol, Self
 
 from autopilot.camera.storage import MediaFolder
 from autopilot.control.airframe import rotors_leaver
@@ -21,20 +19,17 @@ from autopilot.mavlink.links import Link, LinkRole, LinkSource, memory_pair
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.signing import SigningConfig
 from autopilot.node import FlightController, HostPorts
-from autopilot.params import parameter_table
 from autopilot.persistence import Persistence
 from autopilot.vehicle import Mode, Severity
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer
 from common.folder import ConfinedFolder
-from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.kernels import FRAME_TICKS, FRAME_US
-from common.params import ParameterTable
 from common.records import row_reader
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
 from mission.client import Running
-from mission.follow.owner import FollowedOwner, OwnerConfig
+from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
 from mission.injection import RigInjector
 from mission.log_shelf import FlightLogs, RunLog
 from mission.recorder import History, Recorder
@@ -49,46 +44,18 @@ from sim.sensors.sensors import sensor_model
 from sim.turntable import Turntable
 from sim.wind import WindModel, wind_model
 from sim.world.batch import grown_world
-from sim.world.world import WorldConfig, WorldMap, build_world
+from sim.world.world import WorldMap, build_world
 
 if TYPE_CHECKING:
     from mission.follow.onboard import OnboardCamera
+    from mission.follow.owner import FollowedOwner
+
+__all__ = ["Flight", "FlightConfig", "flight_parameters"]
 
 TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
 OUTSIDE_MODES = (Mode.OFFBOARD, Mode.GUIDED)  # in which a companion may fly, PX4's and ArduPilot's
 DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (PX4, ARDUPILOT)}
 GUST_SHARE = 0.3  # guess: a gust adds up to this share of the mean wind
-
-
-class FlightConfig(BaseModel):
-    """What a flight is made from."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    airframe: str = "x500"
-    """Name of an airframe, or path of an airframe file."""
-    home: GeoPoint = DEFAULT_HOME
-    """Where the vehicle boots."""
-    seed: int = Field(default=0, ge=0, le=2**31 - 1)
-    """Seeds sensor noise and turbulence."""
-    wind_m_s: float = Field(default=0.0, ge=0.0, le=20.0)
-    """Mean wind speed; above 0 it is turbulent and has gusts. More would blow a parked vehicle over."""
-    wind_from_deg: float = Field(default=270.0, ge=0.0, le=360.0)
-    """Where the wind comes from, clockwise from north."""
-    noise: float = Field(default=1.0, ge=0.0, le=10.0)
-    """Scales every sensor's noise, and that of the onboard camera; 0 makes them perfect."""
-    dialect: Literal["px4", "ardupilot"] = "px4"
-    """Which autopilot's numbers ground stations get. The flight's own script always gets PX4's."""
-    traffic_count: int = Field(default=0, ge=0, le=50)
-    """Other aircraft that an ADS-B receiver on board hears."""
-    has_lidar: bool = False
-    """A ring of range finders that looks round the vehicle."""
-    parameters: dict[str, float] = {}
-    """Values of the flight controller's parameters that differ from their defaults, by name."""
-    world: WorldConfig = WorldConfig()
-    """The ground; with an owner: grown as in training, from its seed."""
-    owner: OwnerConfig | None = None
-    """Who walks through the world with a phone, to be followed; the vehicle then carries a camera for its companion."""
 
 
 class Computer(Protocol):
@@ -205,6 +172,7 @@ class Flight:
     def _carry_camera(self, config: OwnerConfig) -> Sequence[Link]:
         """Brings the owner and the onboard camera in; the phone's link."""
         from mission.follow.onboard import OnboardCamera  # what a policy sees is defined beside the policies
+        from mission.follow.owner import FollowedOwner
 
         self.owner = FollowedOwner(config, self.world, self.config.seed, self.config.home)
         self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)
@@ -306,18 +274,6 @@ def host_files(folder: Path | None, state: StateFolder | None) -> ConfinedFolder
     """Where files of clients go: with the state, or else with the run."""
     root = folder if state is None else state.folder
     return None if root is None else ConfinedFolder(root / "files")
-
-
-def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTable:
-    """The flight controller's parameters: the defaults of the airframe, and what the configuration says.
-
-    Raises:
-        ParameterError: an unknown name, or a value out of bounds.
-    """
-    table = parameter_table(airframe)
-    for name, value in config.parameters.items():
-        table.set_exactly(name, value)
-    return table
 
 
 def host_ports(rig: Rig, airframe: Airframe, i_vehicle: int = 0) -> HostPorts:

@@ -8,10 +8,8 @@ from pydantic import ValidationError
 
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.state_folder import StateFolder
-from mission.flight import FlightConfig
-from mission.follow.owner import OwnerConfig, Pace
+from mission.flight_config import FlightConfig, OwnerConfig, Pace
 from mission.state import stored_home
-from policies.tasks.follow_me.world import FOLLOW_WORLD
 from sim.world.world import WorldConfig
 
 HOME_MOST = (89.0, 180.0, 6000.0)  # latitude and longitude [deg], altitude [m]: highest airfields
@@ -111,6 +109,8 @@ def _world(options: FlightOptions) -> WorldConfig:
     """With an owner the world of training: its hills can be walked."""
     given: dict[str, Any] = {"seed": options.world_seed, "trees_per_ha": options.trees_per_ha}
     if options.owner is not None:
+        from policies.tasks.follow_me.world import FOLLOW_WORLD
+
         return FOLLOW_WORLD.model_copy(update=given)
     return WorldConfig(**given, hill_height_m=options.hill_height_m, has_walls=options.has_walls)
 

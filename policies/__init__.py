@@ -2,11 +2,17 @@
 
 import gymnasium
 
-from policies.tasks.gym import register
+from policies.tasks.catalogue import CATALOGUE
 
 gymnasium.register(
     id="honeyguide/Hover-v0",
     entry_point="policies.tasks.hover:HoverEnv",
     vector_entry_point="policies.tasks.hover:HoverVectorEnv",
 )
-register()
+for _name in CATALOGUE:
+    gymnasium.register(
+        id=f"honeyguide/{_name}-v0",
+        entry_point="policies.tasks.gym:TaskEnv",
+        vector_entry_point="policies.tasks.gym:TaskVectorEnv",
+        kwargs={"task": _name},
+    )

@@ -4,11 +4,10 @@ In: the time, and whether the vehicle follows yet. Out: `people`, which cameras 
 with a phone's lag and error. Nobody walks off before the drone is there: until it follows, the owner stands.
 """
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
 
 from autopilot.mavlink.codec import encode
 from autopilot.mavlink.convert import degrees_e7
@@ -16,32 +15,19 @@ from autopilot.mavlink.links import LinkRole, memory_pair
 from common.attitude import Vector
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import TICK_US
+from mission.flight_config import OwnerConfig, Pace
 from policies.tasks.follow_me.world import STOP_SHARE
 from sim.owner import Owner
 from sim.sensors.phone import CORRELATED_STD_M, POSITION_STD_M, VERTICAL_FACTOR, phone_model
 from sim.world.people import CHEST_M, RUN_SPEED_M_S, WALK_SPEED_M_S, person_model
 from sim.world.world import WorldMap
 
-Pace = Literal["walk", "run"]
 SPEEDS_M_S: dict[Pace, float] = {"walk": WALK_SPEED_M_S, "run": RUN_SPEED_M_S}
 PHONE_SYSTEM, PHONE_COMPONENT = 254, 190  # guess: a station's numbers, not those of other clients
 HEARTBEAT_US = 1_000_000
 _SETS_OFF_S = (0.5, 2.0)  # that late at most, as at the start of an episode of training
 _HAS_POSITION_AND_VELOCITY = 3  # FOLLOW_TARGET.est_capabilities
 _NOT_GIVEN = (0.0, 0.0, 0.0)
-
-
-class OwnerConfig(BaseModel):
-    """Who is followed."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    pace: Pace = "walk"
-    """`walk`: up to 2 m/s; `run`: up to 5 m/s."""
-    start_m: float = Field(default=3.0, ge=1.0, le=50.0)
-    """How far north of home they wait."""
-    phone_error: float = Field(default=1.0, ge=0.0, le=10.0)
-    """Scales the errors of the phone's position."""
 
 
 class FollowedOwner:

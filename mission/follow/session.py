@@ -21,9 +21,9 @@ from common.files import write_whole
 from common.params import ParameterError
 from mission.connections import open_links, open_page
 from mission.flight import FlightConfig, flight_parameters
+from mission.flight_config import OwnerConfig, Pace
 from mission.follow.companion import latency_text
 from mission.follow.lockstep import flight_with_companion, take_off
-from mission.follow.owner import OwnerConfig, Pace
 from mission.follow.watch import FollowWatch
 from mission.options import FlightOptions, UserError, flight_config, speed_of
 from mission.progress import Progress

@@ -1,24 +1,19 @@
-"""The tasks by name: what `honeyguide train NAME` and `gymnasium.make("honeyguide/NAME-v0")` build."""
+"""The tasks by name: what `honeyguide train NAME` and `gymnasium.make("honeyguide/NAME-v0")` build.
+
+Light to import: a task's kernels are imported when it is asked for.
+"""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, cast
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from policies.tasks.follow_me.follow_me import FollowMe
-from policies.tasks.follow_me.settings import FollowSettings
-from policies.tasks.navigate.navigate import Navigate
-from policies.tasks.navigate.settings import NavigateSettings
-from policies.tasks.parking.level1 import Parking1
-from policies.tasks.parking.level2 import Parking2
-from policies.tasks.parking.settings import Parking2Settings, ParkingSettings
-from policies.tasks.reach_target.reach_target import ReachTarget
-from policies.tasks.reach_target.settings import ReachSettings
-from policies.tasks.roller_ball import RollerBall
-from policies.tasks.task import Task, TaskSettings
+if TYPE_CHECKING:
+    from policies.tasks.task import Task, TaskSettings
 
 
 class UnknownTask(ValueError):
@@ -27,23 +22,31 @@ class UnknownTask(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A task as users ask for it."""
+    """A task as users ask for it: where its settings and its class are defined."""
 
-    settings: type[TaskSettings]
-    build: Callable[[Any, int, str], Task]
+    settings_at: str
+    task_at: str
+
+    @property
+    def settings(self) -> "type[TaskSettings]":
+        return cast("type[TaskSettings]", resolve_name(f"policies.tasks.{self.settings_at}"))
+
+    @property
+    def build(self) -> "Callable[[Any, int, str], Task]":
+        return cast("Callable[[Any, int, str], Task]", resolve_name(f"policies.tasks.{self.task_at}"))
 
 
 CATALOGUE: dict[str, Entry] = {
-    "RollerBall": Entry(TaskSettings, RollerBall),
-    "ReachTarget": Entry(ReachSettings, ReachTarget),
-    "Parking1": Entry(ParkingSettings, Parking1),
-    "Parking2": Entry(Parking2Settings, Parking2),
-    "FollowMe": Entry(FollowSettings, FollowMe),
-    "Navigate": Entry(NavigateSettings, Navigate),
+    "RollerBall": Entry("task:TaskSettings", "roller_ball:RollerBall"),
+    "ReachTarget": Entry("reach_target.settings:ReachSettings", "reach_target.reach_target:ReachTarget"),
+    "Parking1": Entry("parking.settings:ParkingSettings", "parking.level1:Parking1"),
+    "Parking2": Entry("parking.settings:Parking2Settings", "parking.level2:Parking2"),
+    "FollowMe": Entry("follow_me.settings:FollowSettings", "follow_me.follow_me:FollowMe"),
+    "Navigate": Entry("navigate.settings:NavigateSettings", "navigate.navigate:Navigate"),
 }
 
 
-def task_settings(name: str, values: Mapping[str, Any]) -> TaskSettings:
+def task_settings(name: str, values: Mapping[str, Any]) -> "TaskSettings":
     """The checked settings of a task, from text or plain values.
 
     Raises:
@@ -58,7 +61,7 @@ def task_settings(name: str, values: Mapping[str, Any]) -> TaskSettings:
         raise UnknownTask(f"{name}: {key}: {_sentence(first, kind)}") from None
 
 
-def _sentence(error: ErrorDetails, kind: type[TaskSettings]) -> str:
+def _sentence(error: ErrorDetails, kind: "type[TaskSettings]") -> str:
     """What is wrong with one setting; an empty text, which stands for the preset's choice, is not offered."""
     context = error.get("ctx", {})
     if error["type"] == "extra_forbidden":
@@ -69,7 +72,7 @@ def _sentence(error: ErrorDetails, kind: type[TaskSettings]) -> str:
     return str(context.get("error", error["msg"][0].lower() + error["msg"][1:]))
 
 
-def settings_of(name: str, pairs: Sequence[str], others: Mapping[str, Any] | None = None) -> TaskSettings:
+def settings_of(name: str, pairs: Sequence[str], others: Mapping[str, Any] | None = None) -> "TaskSettings":
     """The checked settings of a task from the pairs of `env_args`, and from `others` where they say nothing.
 
     Raises:
@@ -84,7 +87,7 @@ def settings_of(name: str, pairs: Sequence[str], others: Mapping[str, Any] | Non
     return task_settings(name, values)
 
 
-def build_task(name: str, env_count: int, settings: TaskSettings | None = None, device: str = "cpu") -> Task:
+def build_task(name: str, env_count: int, settings: "TaskSettings | None" = None, device: str = "cpu") -> "Task":
     """Environments of a task, not yet reset.
 
     Raises:

@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from policies.tasks.catalogue import CATALOGUE, build_task, task_settings
+from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
 from policies.tasks.layout import Layout
 from policies.tasks.task import Task
@@ -176,14 +176,3 @@ def action_space(layout: Layout) -> Any:
         return Box(-1.0, 1.0, shape=(len(layout.continuous),), dtype=np.float32)
     sizes = layout.branch_sizes
     return Discrete(sizes[0]) if len(sizes) == 1 else MultiDiscrete(np.array(sizes))
-
-
-def register() -> None:
-    """Registers every task of the catalogue as `honeyguide/NAME-v0`."""
-    for name in CATALOGUE:
-        gymnasium.register(
-            id=f"honeyguide/{name}-v0",
-            entry_point="policies.tasks.gym:TaskEnv",
-            vector_entry_point="policies.tasks.gym:TaskVectorEnv",
-            kwargs={"task": name},
-        )

@@ -2,8 +2,8 @@
 
 from autopilot.mavlink.codec import FrameReader
 from mission.flight import FlightConfig
+from mission.flight_config import OwnerConfig
 from mission.follow.lockstep import flight_with_companion, take_off
-from mission.follow.owner import OwnerConfig
 from policies.companion.engagement import Phase
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.follow_me.world import FOLLOW_WORLD

@@ -5,7 +5,8 @@ import pytest
 
 from common.geodesy import DEFAULT_HOME
 from common.kernels import FRAME_US
-from mission.follow.owner import FollowedOwner, OwnerConfig
+from mission.flight_config import OwnerConfig
+from mission.follow.owner import FollowedOwner
 from policies.tasks.follow_me.numbers import NUMBERS
 from sim.world.world import WorldConfig, build_world
 

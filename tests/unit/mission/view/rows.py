@@ -4,7 +4,7 @@ import numpy as np
 
 from autopilot.vehicle import Mode
 from mission.flight import FlightConfig
-from mission.follow.owner import OwnerConfig
+from mission.flight_config import OwnerConfig
 from mission.view.moment import MOMENT
 from mission.view.recording import Recording
 from sim.world.world import WorldConfig

@@ -1,0 +1,72 @@
+"""What a flight is made from, as values that can be checked before anything of it is built.
+
+Light to import: a wrong option is told before kernels, servers or pictures are loaded.
+"""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from autopilot.params import parameter_table
+from common.airframe import Airframe
+from common.geodesy import DEFAULT_HOME, GeoPoint
+from common.params import ParameterTable
+from sim.world.world import WorldConfig
+
+Pace = Literal["walk", "run"]
+
+
+class OwnerConfig(BaseModel):
+    """Who is followed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    pace: Pace = "walk"
+    """`walk`: up to 2 m/s; `run`: up to 5 m/s."""
+    start_m: float = Field(default=3.0, ge=1.0, le=50.0)
+    """How far north of home they wait."""
+    phone_error: float = Field(default=1.0, ge=0.0, le=10.0)
+    """Scales the errors of the phone's position."""
+
+
+class FlightConfig(BaseModel):
+    """What a flight is made from."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    airframe: str = "x500"
+    """Name of an airframe, or path of an airframe file."""
+    home: GeoPoint = DEFAULT_HOME
+    """Where the vehicle boots."""
+    seed: int = Field(default=0, ge=0, le=2**31 - 1)
+    """Seeds sensor noise and turbulence."""
+    wind_m_s: float = Field(default=0.0, ge=0.0, le=20.0)
+    """Mean wind speed; above 0 it is turbulent and has gusts. More would blow a parked vehicle over."""
+    wind_from_deg: float = Field(default=270.0, ge=0.0, le=360.0)
+    """Where the wind comes from, clockwise from north."""
+    noise: float = Field(default=1.0, ge=0.0, le=10.0)
+    """Scales every sensor's noise, and that of the onboard camera; 0 makes them perfect."""
+    dialect: Literal["px4", "ardupilot"] = "px4"
+    """Which autopilot's numbers ground stations get. The flight's own script always gets PX4's."""
+    traffic_count: int = Field(default=0, ge=0, le=50)
+    """Other aircraft that an ADS-B receiver on board hears."""
+    has_lidar: bool = False
+    """A ring of range finders that looks round the vehicle."""
+    parameters: dict[str, float] = {}
+    """Values of the flight controller's parameters that differ from their defaults, by name."""
+    world: WorldConfig = WorldConfig()
+    """The ground; with an owner: grown as in training, from its seed."""
+    owner: OwnerConfig | None = None
+    """Who walks through the world with a phone, to be followed; the vehicle then carries a camera for its companion."""
+
+
+def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTable:
+    """The flight controller's parameters: the defaults of the airframe, and what the configuration says.
+
+    Raises:
+        ParameterError: an unknown name, or a value out of bounds.
+    """
+    table = parameter_table(airframe)
+    for name, value in config.parameters.items():
+        table.set_exactly(name, value)
+    return table
