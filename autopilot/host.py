@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from autopilot.camera.ports import FrameSource, VideoStream
 from autopilot.camera.storage import MediaFolder
+from common.clock import SIMULATED_EPOCH_US
 from common.folder import ConfinedFolder
 
 LogListener = Callable[[bytes], None]
@@ -88,3 +89,5 @@ class Host:
     frames: FrameSource | None = None  # None: the vehicle carries no camera
     media: MediaFolder | None = None  # None: there is no card in the camera
     stream: VideoStream | None = None
+    read_truth: Callable[[], Any] | None = None  # a simulator's body state: for telemetry, never for the controller
+    boot_unix_us: int = SIMULATED_EPOCH_US  # the date of power-on

@@ -127,6 +127,7 @@ class FlightController:
         self.state = VehicleState(origin=origin, sticks=self.sticks.input, rotor_count=len(airframe.rotors))
         self.payload = Payloads()
         self.camera = self._mount_camera()
+        self.state.read_rotor_speeds = ports.read_rotor_speeds
         self._outputs = AuxOutputs(self.state)
         self.payload.add(self._outputs)
         self.traffic = Traffic(self.state, params)

@@ -4,7 +4,7 @@
 answer to whatever is asked of the vehicle; the ground station is shown the reason of a refusal.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from math import nan
@@ -184,7 +184,7 @@ class VehicleState:
     aux_pulses_us: tuple[int, ...] = (0,) * 8  # of the outputs 9 to 16, 0: never set
     traffic_conflict_us: int = 0  # until then an aircraft counts as near
     nearest_aircraft: "Aircraft | None" = None
-    read_truth: Callable[[], Any] | None = None  # the simulator's body state, for telemetry alone
+    read_rotor_speeds: Callable[[], Sequence[float]] | None = None  # [rad/s] as the ESCs report them
     read_winch: Callable[[], WinchStatus] | None = None  # asked when it is sent
     obstacles: "Obstacles | None" = None
     relays: int = 0  # a bit for each that is on

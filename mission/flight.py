@@ -22,7 +22,7 @@ from autopilot.node import FlightController, HostPorts
 from autopilot.persistence import Persistence
 from autopilot.vehicle import Mode, Severity
 from common.airframe import Airframe, load_airframe
-from common.clock import Pacer
+from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder
 from common.kernels import FRAME_TICKS, FRAME_US
 from common.records import row_reader
@@ -112,7 +112,12 @@ class Flight:
         self._camera_rig.prepare()
         media = None if folder is None else MediaFolder(folder / "media")
         self.host = Host(
-            files=host_files(folder, state), storage=state, frames=self._camera_rig, media=media, stream=stream
+            files=host_files(folder, state),
+            storage=state,
+            frames=self._camera_rig,
+            media=media,
+            stream=stream,
+            boot_unix_us=config.boot_unix_us,
         )
         self.controller = FlightController(
             host_ports(self.rig, self.airframe),
@@ -216,6 +221,8 @@ class Flight:
             on_frame: called after each frame, for progress displays.
         """
         self._pacer = Pacer(speed)
+        if speed is not None and self.time_us == 0:
+            self.host.boot_unix_us = wall_unix_us()
         while not is_over(self):
             self._pacer.wait_until(self.time_us)
             self.frame()

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from autopilot.params import parameter_table
 from common.airframe import Airframe
+from common.clock import SIMULATED_EPOCH_US
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.params import ParameterTable
 from sim.world.world import WorldConfig
@@ -56,6 +57,8 @@ class FlightConfig(BaseModel):
     """Values of the flight controller's parameters that differ from their defaults, by name."""
     world: WorldConfig = WorldConfig()
     """The ground; with an owner: grown as in training, from its seed."""
+    boot_unix_us: int = Field(default=SIMULATED_EPOCH_US, ge=0)
+    """The date of power-on, as Unix time, in lockstep; a flight that is paced by the wall clock takes the wall's."""
     owner: OwnerConfig | None = None
     """Who walks through the world with a phone, to be followed; the vehicle then carries a camera for its companion."""
 

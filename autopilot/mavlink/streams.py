@@ -5,14 +5,16 @@ In: the vehicle's state, at each frame. Out: frames on one link. Requests change
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from heapq import heapify, heapreplace
 
+from autopilot.host import Host
 from autopilot.mavlink.aircraft import adsb_vehicle
 from autopilot.mavlink.codec import MessageType, known_type
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.identity import autopilot_version
 from autopilot.mavlink.links import LinkRole
-from autopilot.mavlink.telemetry import ardupilot, gimbal, guidance, motion, radio, sensors, status
+from autopilot.mavlink.telemetry import ardupilot, board, gimbal, guidance, motion, radio, sensors, status, truth
 from autopilot.vehicle import VehicleState
 from common.kernels import FRAME_US
 
@@ -36,7 +38,6 @@ class Stream:
 
 STREAMS: tuple[Stream, ...] = (
     Stream("SYS_STATUS", status.sys_status, 2, 2),
-    Stream("SYSTEM_TIME", status.system_time, 1, 1),
     Stream("BATTERY_STATUS", status.battery_status, 1, 1),
     Stream("HOME_POSITION", status.home_position, 0.5, 0.5),
     Stream("GPS_GLOBAL_ORIGIN", status.gps_global_origin, 0.2, 0.2),
@@ -58,8 +59,8 @@ STREAMS: tuple[Stream, ...] = (
     Stream("GPS_RAW_INT", sensors.gps_raw_int, 5, 5),
     Stream("HIGHRES_IMU", sensors.highres_imu, 0, 10),
     Stream("SCALED_IMU", sensors.scaled_imu, 0, 0),
-    Stream("RAW_IMU", sensors.raw_imu, 0, 0),
-    Stream("HIL_STATE_QUATERNION", sensors.hil_state_quaternion, 0, 0),
+    Stream("RAW_IMU", sensors.raw_imu, 0, 0, 2),
+    Stream("SCALED_IMU2", sensors.scaled_imu2, 0, 0, 2),
     Stream("OBSTACLE_DISTANCE", sensors.obstacle_distance, 5, 5),
     Stream("ADSB_VEHICLE", adsb_vehicle, 0, 0),
     Stream("SCALED_PRESSURE", sensors.scaled_pressure, 1, 1),
@@ -77,7 +78,27 @@ STREAMS: tuple[Stream, ...] = (
     Stream("EKF_STATUS_REPORT", ardupilot.ekf_status_report, 0, 0, 1),
     Stream("WIND", ardupilot.wind, 0, 0, 1),
     Stream("RANGEFINDER", ardupilot.rangefinder, 0, 0, 2),
+    Stream("TERRAIN_REPORT", ardupilot.terrain_report, 0, 0, 1),
+    Stream("AHRS", ardupilot.ahrs, 0, 0, 1),
+    Stream("AHRS2", ardupilot.ahrs2, 0, 0, 2),
+    Stream("POWER_STATUS", board.power_status, 0, 0, 1),
+    Stream("MEMINFO", board.meminfo, 0, 0, 1),
+    Stream("HWSTATUS", board.hwstatus, 0, 0, 1),
+    Stream("MCU_STATUS", board.mcu_status, 0, 0, 1),
+    Stream("ESC_TELEMETRY_1_TO_4", board.esc_telemetry_1_to_4, 0, 0, 1),
+    Stream("ESC_TELEMETRY_5_TO_8", board.esc_telemetry_5_to_8, 0, 0, 1),
 )
+
+
+def host_streams(host: Host) -> tuple[Stream, ...]:
+    """What the machine around the flight controller knows: the date, and the simulator's truth."""
+    return (
+        Stream("SYSTEM_TIME", partial(status.system_time, host), 1, 1),
+        Stream("HIL_STATE_QUATERNION", partial(truth.hil_state_quaternion, host), 0, 0),
+        Stream("SIMSTATE", partial(truth.simstate, host), 0, 0, 1),
+        Stream("SIM_STATE", partial(truth.sim_state, host), 0, 0),
+    )
+
 
 # REQUEST_DATA_STREAM: old requests name a group of messages (MAV_DATA_STREAM).
 GROUPS: dict[int, tuple[str, ...]] = {
@@ -100,13 +121,20 @@ GROUPS: dict[int, tuple[str, ...]] = {
         *("EKF_STATUS_REPORT", "WIND", "RANGEFINDER", "SYSTEM_TIME"),
     ),  # EXTRA3
 }
+# What ArduPilot sends besides in these groups, and of the first group instead: it has no other messages of the IMU.
+ARDUPILOT_GROUPS: dict[int, tuple[str, ...]] = GROUPS | {
+    1: ("RAW_IMU", "SCALED_IMU2", "SCALED_PRESSURE"),
+    2: (*GROUPS[2], "POWER_STATUS", "MCU_STATUS", "MEMINFO"),
+    10: (*GROUPS[10], "SIMSTATE", "AHRS2"),
+    12: (*GROUPS[12], "AHRS", "HWSTATUS", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4", "ESC_TELEMETRY_5_TO_8"),
+}
 GROUP_ALL = 0
 
 
 class Telemetry:
     """Every message the vehicle can be asked for, by id."""
 
-    def __init__(self, dialect: Dialect, sysid: int, *, has_gimbal: bool = False) -> None:
+    def __init__(self, dialect: Dialect, sysid: int, host: Host, *, has_gimbal: bool = False) -> None:
         def heartbeat(state: VehicleState) -> bytes:
             """Mode, armed or not, state; also at once when one of them changes."""
             return status.heartbeat(state, dialect)
@@ -125,6 +153,7 @@ class Telemetry:
             return status.current_mode(state, dialect)
 
         is_ardupilot = dialect.name == "ardupilot"
+        self.groups = ARDUPILOT_GROUPS if is_ardupilot else GROUPS
 
         def manager_status(state: VehicleState) -> bytes | None:
             """Who has control of the gimbal; at 5 Hz on links that have asked for its information."""
@@ -133,6 +162,7 @@ class Telemetry:
         streams: tuple[Stream, ...] = (
             Stream("HEARTBEAT", heartbeat, 1, 1),
             *STREAMS,
+            *host_streams(host),
             Stream("AUTOPILOT_VERSION", version, 0, 0),
             Stream("CURRENT_MODE", current_mode, 0.5, 0.5),
         )
@@ -186,7 +216,8 @@ class StreamSchedule:
 
     def set_group(self, group: int, rate_hz: float) -> None:
         """Sets the rate of every message of a MAV_DATA_STREAM group; 0 stops them."""
-        groups = GROUPS if group == GROUP_ALL else {group: GROUPS.get(group, ())}
+        all_groups = self._telemetry.groups
+        groups = all_groups if group == GROUP_ALL else {group: all_groups.get(group, ())}
         for names in groups.values():
             for name in names:
                 self._change(known_type(name).msg_id, _interval_us(rate_hz))

@@ -60,7 +60,7 @@ class CameraComponent(Component):
     def __init__(self, endpoint: Endpoint, camera: Camera, stream: VideoStream | None) -> None:
         self._camera = camera
         self._stream = stream
-        self._messages = CameraMessages(camera, endpoint.vehicle.state, stream)
+        self._messages = CameraMessages(camera, endpoint.vehicle.state, endpoint.vehicle.host, stream)
         self._settings = SettingsService(camera.settings, self.reply)
         self._single: dict[tuple[int, int], tuple[float, int]] = {}  # number and time of a client's last single photo
         super().__init__(endpoint, CAMERA_ID, mavlink.MAV_TYPE_CAMERA, "Camera")

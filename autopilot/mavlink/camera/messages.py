@@ -8,6 +8,7 @@ from autopilot.camera.camera import Camera, Shot
 from autopilot.camera.lens import FOCAL_LENGTH_MM, SENSOR_HEIGHT_MM, SENSOR_WIDTH_MM
 from autopilot.camera.ports import VideoStream
 from autopilot.camera.settings import PHOTO_SIZES
+from autopilot.host import Host
 from autopilot.mavlink.camera.definition import MODEL, VENDOR, VERSION
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.convert import INT32_MAX, degrees_e7, i32, u16, u32, wxyz_from_quat
@@ -15,7 +16,6 @@ from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.ports import TERRAIN_VALID
 from autopilot.vehicle import VehicleState
 from common.attitude import roll_pitch_yaw_of
-from common.clock import SIMULATED_EPOCH_US
 from common.geodesy import geodetic_from_ned
 
 GIMBAL_DEVICE = 154  # MAV_COMP_ID_GIMBAL
@@ -56,9 +56,10 @@ class CameraMessages:
         stream: its live picture, None if there is none.
     """
 
-    def __init__(self, camera: Camera, state: VehicleState, stream: VideoStream | None) -> None:
+    def __init__(self, camera: Camera, state: VehicleState, host: Host, stream: VideoStream | None) -> None:
         self._camera = camera
         self._state = state
+        self._host = host
         self._stream = stream
 
     def information(self) -> bytes:
@@ -128,7 +129,7 @@ class CameraMessages:
         url = shot.name if self._stream is None else self._stream.media_uri(shot.name)
         return _image_captured(
             time_boot_ms=boot_ms(shot.time_us),
-            time_utc=SIMULATED_EPOCH_US + shot.time_us,
+            time_utc=self._host.boot_unix_us + shot.time_us,
             camera_id=0,
             lat=degrees_e7(shot.place.lat_deg),
             lon=degrees_e7(shot.place.lon_deg),
@@ -144,7 +145,7 @@ class CameraMessages:
         """One photo, as ArduPilot reports it."""
         _, pitch, yaw = roll_pitch_yaw_of(shot.q_ned_from_frd)
         return _feedback(
-            time_usec=SIMULATED_EPOCH_US + shot.time_us,
+            time_usec=self._host.boot_unix_us + shot.time_us,
             img_idx=shot.index + 1 & 0xFFFF,
             lat=degrees_e7(shot.place.lat_deg),
             lng=degrees_e7(shot.place.lon_deg),

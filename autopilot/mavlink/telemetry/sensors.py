@@ -13,7 +13,6 @@ from autopilot.mavlink.convert import (
     i32,
     u16,
     u32,
-    wxyz_from_quat,
 )
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.ports import (
@@ -31,13 +30,13 @@ from common.kernels import GRAVITY_M_S2
 _gps_raw_int = known_type("GPS_RAW_INT").pack
 _highres_imu = known_type("HIGHRES_IMU").pack
 _scaled_imu = known_type("SCALED_IMU").pack
+_scaled_imu2 = known_type("SCALED_IMU2").pack
 _scaled_pressure = known_type("SCALED_PRESSURE").pack
 _distance_sensor = known_type("DISTANCE_SENSOR").pack
 _servo_output_raw = known_type("SERVO_OUTPUT_RAW").pack
 _actuator_output_status = known_type("ACTUATOR_OUTPUT_STATUS").pack
 _obstacle_distance = known_type("OBSTACLE_DISTANCE").pack
 _raw_imu = known_type("RAW_IMU").pack
-_hil_state_quaternion = known_type("HIL_STATE_QUATERNION").pack
 _vibration = known_type("VIBRATION").pack
 _estimator_status = known_type("ESTIMATOR_STATUS").pack
 
@@ -124,13 +123,22 @@ def highres_imu(state: VehicleState) -> bytes:
 
 def scaled_imu(state: VehicleState) -> bytes:
     """Gyroscope, accelerometer and magnetometer in milli-units."""
-    samples = state.samples
+    return _scaled_imu(boot_ms(state.time_us), *_milli_units(state))
+
+
+def scaled_imu2(state: VehicleState) -> bytes:
+    """The same once more, where clients look for a second IMU: there is one only."""
+    return _scaled_imu2(boot_ms(state.time_us), *_milli_units(state))
+
+
+def _milli_units(state: VehicleState) -> tuple[int, ...]:
+    """Specific force [mg], body rates [mrad/s], magnetic field [mgauss]."""
+    imu, mag = state.samples.imu, state.samples.mag
     milli_g = 1000.0 / GRAVITY_M_S2
-    return _scaled_imu(
-        boot_ms(state.time_us),
-        *(i16(value * milli_g) for value in samples.imu.accel_frd),
-        *(i16(value * 1000.0) for value in samples.imu.gyro_frd),
-        *(i16(value * 1000.0) for value in samples.mag.field_frd_gauss),
+    return (
+        *(i16(value * milli_g) for value in imu.accel_frd),
+        *(i16(value * 1000.0) for value in imu.gyro_frd),
+        *(i16(value * 1000.0) for value in mag.field_frd_gauss),
     )
 
 
@@ -155,34 +163,7 @@ def obstacle_distance(state: VehicleState) -> bytes | None:
 
 def raw_imu(state: VehicleState) -> bytes:
     """The IMU in the units of SCALED_IMU: its driver delivers no raw counts."""
-    imu, mag = state.samples.imu, state.samples.mag
-    return _raw_imu(
-        imu.time_us,
-        *(i16(axis * 1000.0 / GRAVITY_M_S2) for axis in imu.accel_frd),
-        *(i16(axis * 1000.0) for axis in imu.gyro_frd),
-        *(i16(axis * 1000.0) for axis in mag.field_frd_gauss),
-    )
-
-
-def hil_state_quaternion(state: VehicleState) -> bytes | None:
-    """The simulator's truth, for comparison; the flight controller does not know it."""
-    if state.read_truth is None:
-        return None
-    truth = state.read_truth()
-    north, east, down = truth.pos_ned
-    lat_deg, lon_deg, alt_m = geodetic_from_ned(north, east, down, state.origin)
-    return _hil_state_quaternion(
-        state.time_us,
-        wxyz_from_quat(truth.q_ned_from_frd),
-        *truth.omega_frd,
-        degrees_e7(lat_deg),
-        degrees_e7(lon_deg),
-        i32(alt_m * 1000.0),
-        *(i16(axis * 100.0) for axis in truth.vel_ned),
-        0,
-        0,
-        *(i16(axis * 1000.0 / GRAVITY_M_S2) for axis in truth.accel_frd),
-    )
+    return _raw_imu(state.samples.imu.time_us, *_milli_units(state))
 
 
 def scaled_pressure(state: VehicleState) -> bytes | None:

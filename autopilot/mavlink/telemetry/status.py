@@ -5,6 +5,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.host import Host
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.convert import INT16_MAX, UINT16_MAX, bounded_int, degrees_e7, i16, i32, u16
 from autopilot.mavlink.dialects import Dialect
@@ -235,9 +236,9 @@ def fence_status(state: VehicleState) -> bytes:
     )
 
 
-def system_time(state: VehicleState) -> bytes:
-    """The date is unknown (0): simulated time counts from power-on."""
-    return _system_time(0, boot_ms(state.time_us))
+def system_time(host: Host, state: VehicleState) -> bytes:
+    """Unix time, which goes on from the date of power-on with simulated time."""
+    return _system_time(host.boot_unix_us + state.time_us, boot_ms(state.time_us))
 
 
 def current_mode(state: VehicleState, dialect: Dialect) -> bytes:

@@ -226,7 +226,7 @@ class RecordingVehicle:
         self.params = parameter_table()
         self.station = StationLink()
         self.calibration = RecordedCalibration(self)
-        self.host = Host()
+        self.host = Host(read_truth=record_of_body)
         self.camera: Camera | None = None
         self.sticks = Sticks(self.params)
         self.state.sticks = self.sticks.input
@@ -257,7 +257,7 @@ class RecordingVehicle:
         )
         self.obstacles.sensed(self.state.time_us, [5.0] * 71 + [float("inf")], 0.0)
         self.state.obstacles = self.obstacles
-        self.state.read_truth = record_of_body
+        self.state.read_rotor_speeds = lambda: [500.0, 510.0, 520.0, 530.0, 0.0, 0.0, 0.0, 0.0]
         self.state.nearest_aircraft = Aircraft(1, "HB-ABC", 47.0, 8.0, 900.0, 1.0, 60.0, 0.0)
 
     @property
