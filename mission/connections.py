@@ -13,7 +13,7 @@ from mission.options import FlightOptions, UserError
 from mission.stream import StreamServer
 
 if TYPE_CHECKING:
-    import viser
+    from mission.view.page import PageServer
 GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
 API_PORT_STEP = 14580 - 14540
 PORT_MAX = 65535
@@ -90,12 +90,12 @@ def open_images(options: FlightOptions) -> ImageServer | None:
         raise UserError(f"--image-port {options.image_port}: {error}") from error
 
 
-def open_page(port: int) -> "viser.ViserServer":
+def open_page(port: int) -> "PageServer":
     """The server of the live page; it opens its port before the flight begins."""
     try:
-        from mission.view.live import open_page as open_server
+        from mission.view.page import PageServer
 
-        return open_server(port, "Honeyguide")
+        return PageServer(port, "Honeyguide")
     except ImportError as error:
         raise UserError(f"--view: {error.name} is missing: pip install 'honeyguide[viewer]'") from error
     except OSError as error:

@@ -20,13 +20,13 @@ from common.state_folder import StateFolder
 from mission.client import Running
 from mission.connections import open_images, open_links, open_page, open_stream, signing_config
 from mission.flight import Flight, flight_parameters
+from mission.net_guard import LOOPBACK
 from mission.options import FlightOptions, UserError, check_end, flight_config, speed_of
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
 from mission.plots import plot_flight
 from mission.progress import Progress
 from mission.script import fly_plan
 from mission.state import StateError, keep_home, open_state
-from mission.stream import LOOPBACK
 from mission.summary import Summary, curved_items, planned_path, summarise
 from mission.view.recording import Recorder
 
@@ -94,6 +94,8 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
         view = LiveView(flight, page, speed=speed, path_ned=way_ned)
         watchers.append(view.frame)
     _print_start(options, speed, folder, console)
+    if page is not None:
+        print_line(console, f"live page: {page.url}")
     advance(flight, _end(options, speed, running), speed, watchers, Progress(flight, running), console)
     if page is not None:
         view.close()
@@ -204,8 +206,6 @@ def _print_start(options: FlightOptions, speed: float | None, folder: Path, cons
         print_line(console, f"pictures for a companion: tcp://{LOOPBACK}:{options.image_port}")
     if options.stream_port:
         print_line(console, f"the camera's picture: http://{LOOPBACK}:{options.stream_port}/")
-    if options.has_view:
-        print_line(console, f"live page: http://{LOOPBACK}:{options.view_port}/")
     if options.wind_m_s > WIND_EXPECTED_M_S:
         print_line(console, f"wind of {options.wind_m_s:g} m/s is more than an x500 can be relied on to fly")
 

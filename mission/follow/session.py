@@ -29,7 +29,6 @@ from mission.options import FlightOptions, UserError, flight_config, speed_of
 from mission.progress import Progress
 from mission.script import Drone
 from mission.session import advance, new_folder, print_line
-from mission.stream import LOOPBACK
 from mission.view.film import write_film
 from mission.view.recording import Recorder
 from policies.companion.companion import Companion, Pilot
@@ -87,8 +86,8 @@ def follow_session(options: FollowOptions) -> int:
     running = flight.drone.start(follow(flight.drone, companion, options.seconds))
     where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.flight.gcs_port}"
     print_line(console, f"{name} follows an owner who {options.pace}s; {where}; logs in {folder}")
-    if options.flight.has_view:
-        print_line(console, f"live page: http://{LOOPBACK}:{options.flight.view_port}/")
+    if page is not None:
+        print_line(console, f"live page: {page.url}")
     advance(flight, lambda _: running.is_done, speed, watchers, Progress(flight, running), console)
     if page is not None:
         view.close()

@@ -15,10 +15,13 @@ from mission.client import Running
 from mission.flight import Flight
 from mission.follow.lockstep import take_off
 from mission.script import Drone, ScriptError
+from mission.view.inputs import within
 
 CLIMB_M = 5.0  # above the ground, when a click finds the vehicle standing
 FAR_M = 2000.0  # of a click's ray
 LEAST_HEIGHT_M = 2.0
+HEIGHT_MAX_M = 60.0
+WIND_MAX_M_S = 20.0
 SPEEDS = {"1/4 x": 0.25, "1/2 x": 0.5, "1 x": 1.0, "2 x": 2.0, "5 x": 5.0, "max": None}
 _LINES = 3  # what happened last: one thing soon follows another
 
@@ -59,12 +62,13 @@ class Controls:
 
         @pause.on_update
         def _(_: Any) -> None:
-            self.is_paused = pause.value
+            self.is_paused = bool(pause.value)
 
         @speed.on_update
         def _(_: Any) -> None:
-            chosen = SPEEDS[speed.value]
-            self._do(lambda: self._flight.change_speed(chosen))
+            if speed.value in SPEEDS:
+                chosen = SPEEDS[speed.value]
+                self._do(lambda: self._flight.change_speed(chosen))
 
         @follow.on_update
         def _(_: Any) -> None:
@@ -73,7 +77,7 @@ class Controls:
     def _add_commands(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("Vehicle"):
             self._height = gui.add_slider(
-                "Height of gotos", min=LEAST_HEIGHT_M, max=60.0, step=0.5, initial_value=CLIMB_M
+                "Height of gotos", min=LEAST_HEIGHT_M, max=HEIGHT_MAX_M, step=0.5, initial_value=CLIMB_M
             )
             for name, script in (("Take off", self._take_off), ("Hold", _hold), ("Return", _return), ("Land", _land)):
                 self._add_command(gui, name, script)
@@ -90,7 +94,7 @@ class Controls:
     def _add_trouble(self, gui: viser.GuiApi) -> None:
         config = self._flight.config
         with gui.add_folder("Trouble"):
-            wind = gui.add_slider("Wind [m/s]", min=0.0, max=20.0, step=0.5, initial_value=config.wind_m_s)
+            wind = gui.add_slider("Wind [m/s]", min=0.0, max=WIND_MAX_M_S, step=0.5, initial_value=config.wind_m_s)
             wind_from = gui.add_slider("from [deg]", min=0.0, max=360.0, step=5.0, initial_value=config.wind_from_deg)
             numbers = tuple(str(i + 1) for i in range(len(self._flight.airframe.rotors)))
             motor = gui.add_dropdown("Motor", numbers)
@@ -98,7 +102,7 @@ class Controls:
             repair = gui.add_button("Repair all motors")
 
         def blow(_: Any) -> None:
-            speed_m_s, from_deg = float(wind.value), float(wind_from.value)  # browsers send whole numbers as int
+            speed_m_s, from_deg = within(wind.value, 0.0, WIND_MAX_M_S), within(wind_from.value, 0.0, 360.0)
             self._do(lambda: self._flight.set_wind(speed_m_s, from_deg))
 
         wind.on_update(blow)
@@ -106,8 +110,9 @@ class Controls:
 
         @kill.on_click
         def _(_: Any) -> None:
-            number = int(motor.value)
-            self._do(lambda: self._break(number, Failure.OFF, f"motor {number} is off"))
+            if motor.value in numbers:
+                number = int(motor.value)
+                self._do(lambda: self._break(number, Failure.OFF, f"motor {number} is off"))
 
         @repair.on_click
         def _(_: Any) -> None:
@@ -137,15 +142,19 @@ class Controls:
     def _say(self, text: str) -> None:
         self.lines = (*self.lines, text)[-_LINES:]
 
+    @property
+    def _height_m(self) -> float:
+        return within(self._height.value, LEAST_HEIGHT_M, HEIGHT_MAX_M)
+
     async def _take_off(self, drone: Drone) -> None:
         await drone.wait_ready()
         await drone.arm()
-        await drone.takeoff(self._height.value)
+        await drone.takeoff(self._height_m)
 
     async def _fly_to(self, drone: Drone, north_m: float, east_m: float, up_m: float) -> None:
         if not drone.is_armed or drone.is_landed:
             await self._take_off(drone)
-        await drone.goto_ned(north_m, east_m, -up_m - self._height.value)
+        await drone.goto_ned(north_m, east_m, -up_m - self._height_m)
 
     def _clicked(self, event: viser.SceneClickEvent) -> None:
         """On a thread of viser's."""

@@ -1,17 +1,16 @@
 """The live page of a flight: `honeyguide fly --view`.
 
-In: a running flight, frame by frame, and what people click. Out: the page at http://127.0.0.1:PORT. The flight's
+In: a running flight, frame by frame, and what people click. Out: the page, at the address of its server. The flight's
 thread reads a moment and hands it over, 15 times a second while a browser is open; sending happens on viser's threads.
 Clicks wait in a queue for the flight's next frame: the vehicle is commanded by the flight's own MAVLink client.
 """
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from queue import Empty, SimpleQueue
-from socket import socket
+from contextlib import suppress
+from queue import Empty, Full, Queue
 
 import numpy as np
-import rich
 import viser
 from numpy.typing import NDArray
 
@@ -19,7 +18,6 @@ from autopilot.camera.ports import RawFrame
 from common.clock import wall_sleep_s, wall_time_s
 from common.image_stream import ImageFrame
 from mission.flight import Flight
-from mission.stream import LOOPBACK
 from mission.view.controls import Controls
 from mission.view.moment import Moment, Row, moment_of
 from mission.view.panel import PLOT_PERIOD_S, Panel
@@ -32,6 +30,8 @@ STATUS_S = 0.25
 PLOTS_S = 0.5
 PICTURE_S = 0.2
 PAUSE_S = 0.05  # how often a paused flight looks whether it may go on
+TASKS_MAX = 64  # clicks that wait; what is beyond is not done
+TASKS_PER_FRAME_MAX = 4
 PICTURE_SIZE = (320, 180)
 PHOTO_HFOV_DEG = 80.0
 ENLARGED = 4  # a policy's picture is small
@@ -61,7 +61,7 @@ class LiveView:
         score: Callable[[], tuple[str, ...]] = tuple,
     ) -> None:
         self._flight, self._server, self._action, self._score = flight, server, action, score
-        self._todo: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._todo: Queue[Callable[[], None]] = Queue(TASKS_MAX)
         self._camera = flight.controller.camera
         self._pixels: NDArray[np.uint8] | None = None  # newest picture of the camera that a policy sees through
         mount = None if self._camera is None else Mount(MOUNT_FRD, RDF_IN_FRD, PHOTO_HFOV_DEG, *PICTURE_SIZE)
@@ -73,10 +73,10 @@ class LiveView:
         self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned)
         moment = self._moment()
         self._panel = Panel(server, has_owner=moment.has_owner)
-        self._controls = Controls(flight, server, self._todo.put, speed)
+        self._controls = Controls(flight, server, self._add_task, speed)
         self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
         self._next_point_s = 0.0
-        server.on_client_connect(lambda client: self._todo.put(lambda: self._place_camera(client)))
+        server.on_client_connect(lambda client: self._add_task(lambda: self._place_camera(client)))
 
     def frame(self) -> None:
         """Does what is due; the flight calls it after each of its frames, and waits here while it is paused."""
@@ -98,8 +98,12 @@ class LiveView:
         self._camera_rig.close()
         self._server.stop()
 
+    def _add_task(self, task: Callable[[], None]) -> None:
+        with suppress(Full):
+            self._todo.put_nowait(task)
+
     def _do_what_was_clicked(self) -> None:
-        while True:
+        for _ in range(TASKS_PER_FRAME_MAX):
             try:
                 task = self._todo.get_nowait()
             except Empty:
@@ -170,17 +174,3 @@ class LiveView:
             with client.atomic():
                 camera.position = moment.pos_ned + offset
                 camera.look_at = moment.pos_ned
-
-
-def open_page(port: int, title: str) -> viser.ViserServer:
-    """A page at the loopback address; port 0 takes a free one.
-
-    Raises:
-        OSError: the port is in use.
-    """
-    with socket() as probe:  # viser would take the next port in silence
-        probe.bind((LOOPBACK, port))
-    rich.get_console().quiet = True  # viser prints through it that it starts and stops
-    server = viser.ViserServer(host=LOOPBACK, port=port, label=title, verbose=False)
-    server.gui.configure_theme(show_share_button=False, show_logo=False)
-    return server

@@ -16,7 +16,6 @@ from common.clock import wall_sleep_s, wall_time_s
 from common.kernels import FRAME_US
 from mission.flight import flight_world
 from mission.options import UserError
-from mission.stream import LOOPBACK
 from mission.view.film import write_film
 from mission.view.html import write_html
 from mission.view.panel import PLOT_PERIOD_S, Panel
@@ -66,7 +65,7 @@ def replay(options: ReplayOptions, console: Console) -> None:
         from mission.connections import open_page
 
         page = open_page(options.view_port)
-        console.print(f"replay: http://{LOOPBACK}:{options.view_port}/ (Ctrl-C ends it)", highlight=False)
+        console.print(f"replay: {page.url} (Ctrl-C ends it)", highlight=False, soft_wrap=True)
         view = ReplayView(recording, world, page)
         try:
             while True:
@@ -115,7 +114,8 @@ class ReplayView:
         now_s = wall_time_s()
         passed_s, self._wall_s = now_s - self._wall_s, now_s
         if self._play.value and self._server.get_clients():
-            self._time.value = min(self._time.value + passed_s * PACES[self._pace.value], float(self._times[-1]))
+            pace = PACES.get(self._pace.value, 1.0)
+            self._time.value = min(self._time.value + passed_s * pace, float(self._times[-1]))
         index = min(int(np.searchsorted(self._times, self._time.value)), len(self._times) - 1)
         self._count += 1
         if self._count % SLOW_UPDATES == 0:

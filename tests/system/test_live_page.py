@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from mission.flight import Flight, FlightConfig
-from mission.view.live import LiveView, open_page
+from mission.view.live import LiveView
+from mission.view.page import PageServer
 from sim.world.world import WorldConfig
 from tests.browser import CHROMIUM, Browser
 
@@ -20,13 +21,13 @@ class Shown:
 
     def __init__(self, tmp_path):
         self.flight = Flight(FlightConfig(world=WORLD))
-        self.server = open_page(0, "Honeyguide")
+        self.server = PageServer(0, "Honeyguide")
         self.view = LiveView(self.flight, self.server, speed=3.0)
         self._is_over = False
         self._thread = threading.Thread(target=self._fly)
         self._thread.start()
         self.browser = Browser(tmp_path, 1000, 500)
-        self.browser.open(f"http://127.0.0.1:{self.server.get_port()}/")
+        self.browser.open(self.server.url)
 
     def _fly(self):
         self.flight.run(lambda _: self._is_over, speed=3.0, on_frame=lambda _: self.view.frame())

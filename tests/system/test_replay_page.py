@@ -7,7 +7,7 @@ import pytest
 
 from mission.flight import flight_world
 from mission.view.html import write_html
-from mission.view.live import open_page
+from mission.view.page import PageServer
 from mission.view.replay import ReplayView
 from tests.browser import CHROMIUM, Browser
 from tests.unit.mission.view.rows import CONFIG, hovering
@@ -46,9 +46,9 @@ def test_the_html_file_shows_the_flight_and_its_slider_moves_it(browser, tmp_pat
 
 
 def test_the_replay_page_plays(browser):
-    server = open_page(0, "Honeyguide")
+    server = PageServer(0, "Honeyguide")
     view = ReplayView(recording(), flight_world(CONFIG), server)
-    browser.open(f"http://127.0.0.1:{server.get_port()}/")
+    browser.open(server.url)
     end_s = time.monotonic() + 60.0
     shown = "document.body?.innerText.match(/Offboard, disarmed, (1[1-9]\\.\\d) s/)"
     while not browser.evaluate(f"!!{shown}"):

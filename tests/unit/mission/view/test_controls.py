@@ -3,7 +3,8 @@
 import pytest
 
 from mission.flight import Flight, FlightConfig
-from mission.view.live import LiveView, open_page
+from mission.view.live import LiveView
+from mission.view.page import PageServer
 from policies.companion.engagement import Phase
 from sim.world.world import WorldConfig
 from tests.unit.mission.follow_flight import advance, following
@@ -19,7 +20,7 @@ def buttons(server):
 
 @pytest.fixture
 def page():
-    server = open_page(0, "Honeyguide")
+    server = PageServer(0, "Honeyguide")
     yield server
     server.stop()
 
