@@ -6,6 +6,7 @@ In: requests of MAVLink commands. Out: the navigator's heading, the mission's cu
 from math import isfinite, nan, radians
 
 from autopilot.commander.commander import Commander
+from autopilot.navigator.goto import target_refusal
 from autopilot.navigator.navigator import Navigator
 from autopilot.payload import Params, Payloads
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
@@ -107,7 +108,10 @@ class Guidance:
         least_m = context.number("MIS_TAKEOFF_ALT")
         climb_m = max(height_m, least_m) if isfinite(height_m) else least_m
         north, east, down = context.stop_point()
-        down = min(down, self._state.home_ned[2] - climb_m)
-        context.next_hold = ((north, east, down), self._state.yaw_rad, False)
+        place = (north, east, min(down, self._state.home_ned[2] - climb_m))
+        refusal = target_refusal(context, place)
+        if refusal is not ACCEPTED:
+            return refusal
+        context.next_hold = (place, self._state.yaw_rad, False)
         context.announcer.statustext(Severity.WARNING, "Landing aborted: climbing")
         return self._commander.request_mode(Mode.HOLD)

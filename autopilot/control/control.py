@@ -29,6 +29,7 @@ from autopilot.ports import (
 )
 from common.kernels import FRAME_TICKS, GRAVITY_M_S2, TICK_S, vec8
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
+from common.vectors import clamp3
 
 wp.set_module_options({"enable_backward": False})
 
@@ -127,16 +128,17 @@ def aim_of_thrust(thrust_ned: wp.vec3, trajectory: TrajectoryState) -> Aim:
 
 
 @wp.func
-def aim_of_attitude(yaw: float, sp: Setpoint) -> Aim:
+def aim_of_attitude(params: ControlParams, yaw: float, sp: Setpoint) -> Aim:
     """The attitude of the setpoint; with a finite yaw rate its heading is `yaw` [rad] carried on at that rate."""
     aim = Aim()
     aim.q_ned_from_frd = wp.normalize(sp.q_ned_from_frd)
     aim.yaw = yaw_from_quat(aim.q_ned_from_frd)
     if wp.isfinite(sp.yaw_rate):
         lean = quat_from_yaw(-aim.yaw) * aim.q_ned_from_frd
-        aim.yaw = wrap_pi(yaw + sp.yaw_rate * _TICK_S)
+        rate = wp.clamp(sp.yaw_rate, -params.rate_max_yaw, params.rate_max_yaw)
+        aim.yaw = wrap_pi(yaw + rate * _TICK_S)
         aim.q_ned_from_frd = quat_from_yaw(aim.yaw) * lean
-        aim.omega_ned = wp.vec3(0.0, 0.0, sp.yaw_rate)
+        aim.omega_ned = wp.vec3(0.0, 0.0, rate)
     return aim
 
 
@@ -242,7 +244,7 @@ def inner_loops(
 ) -> ControlState:
     """The state with attitude and rate loop, allocation and motor commands of this tick."""
     now = state
-    omega_sp_frd = sp.omega_frd
+    omega_sp_frd = clamp3(sp.omega_frd, wp.vec3(params.rate_max_roll, params.rate_max_pitch, params.rate_max_yaw))
     if sp.kind != SETPOINT_RATE:
         omega_sp_frd = rate_setpoint(params, est.q_ned_from_frd, now.aim.q_ned_from_frd, now.aim.omega_ned)
     if sp.is_landed == 0:
@@ -298,7 +300,7 @@ def control_tick(
             now.aim.q_ned_from_frd = turned(now.aim.q_ned_from_frd, now.aim.omega_ned, _TICK_S)
         collective_n = upright_collective(airframe, now.velocity.thrust_sp_ned, est)
     elif sp.kind == SETPOINT_ATTITUDE:
-        now.aim = aim_of_attitude(now.aim.yaw, sp)
+        now.aim = aim_of_attitude(params, now.aim.yaw, sp)
     else:
         now.aim.q_ned_from_frd = est.q_ned_from_frd
     collective_n = wp.min(collective_n, now.ramp * thrust_max_n)

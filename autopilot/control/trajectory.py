@@ -323,7 +323,7 @@ def braking_speed(distance: float, decel: float, gain: float) -> float:
 def yaw_step(params: ControlParams, state: TrajectoryState, sp: Setpoint, dt_s: float) -> TrajectoryState:
     """The yaw setpoint turned towards its goal the short way, within rate and acceleration; or at a rate alone."""
     turned = state
-    feed = finite_or(sp.yaw_rate, 0.0)
+    feed = wp.clamp(finite_or(sp.yaw_rate, 0.0), -params.rate_max_yaw, params.rate_max_yaw)
     rate_max = wp.max(params.yaw_rate_auto, wp.abs(feed))
     accel = params.yaw_accel_auto
     rate = feed

@@ -7,7 +7,6 @@ information are refused without a text: asking is how clients find out what ther
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import isinf
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -20,7 +19,15 @@ from autopilot.mavlink.convert import (
     whole,
 )
 from autopilot.mavlink.home_item import in_clients_numbers
-from autopilot.mavlink.service import COMMAND_ACK, Command, CommandHandler, Handler, Service, acknowledgement, denied
+from autopilot.mavlink.service import (
+    COMMAND_ACK,
+    Command,
+    CommandHandler,
+    Handler,
+    Service,
+    acknowledgement,
+    out_of_range,
+)
 from autopilot.vehicle import Reply, Severity, Verdict
 
 _SHORT_NAMES = {
@@ -128,10 +135,7 @@ class CommandService(Service):
             if command.command not in _PROBES:
                 self._endpoint.text_once(Severity.NOTICE, f"{_name(command.command)} is not supported")
             return
-        if any(isinf(p) for p in (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)):
-            reply: Reply | None = denied("a parameter is infinite")
-        else:
-            reply = handler(command)
+        reply = out_of_range(command) or handler(command)
         if reply is None:
             return
         self._ack(command, reply.verdict)

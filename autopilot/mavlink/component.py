@@ -6,14 +6,22 @@ and the messages clients have asked to be sent at intervals. It works when somet
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import isfinite, isinf
+from math import isfinite
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.channel import Channel, Endpoint, Sender
 from autopilot.mavlink.codec import MessageType, known_type, message_type
 from autopilot.mavlink.convert import INT32_MAX, bounded_int, whole
-from autopilot.mavlink.service import COMMAND_ACK, Command, CommandHandler, Handler, acknowledgement, denied
+from autopilot.mavlink.service import (
+    COMMAND_ACK,
+    Command,
+    CommandHandler,
+    Handler,
+    acknowledgement,
+    denied,
+    out_of_range,
+)
 from autopilot.vehicle import ACCEPTED, Reply, Severity, Verdict
 from common.kernels import FRAME_US
 
@@ -112,10 +120,8 @@ class Component:
         reply: Reply | None
         if handler is None:
             reply = Reply(Verdict.UNSUPPORTED, f"command {command.command} is not supported")
-        elif any(isinf(p) for p in (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)):
-            reply = denied("a parameter is infinite")
         else:
-            reply = handler(command)
+            reply = out_of_range(command) or handler(command)
         if reply is not None:
             self.ack(command, reply.verdict)
             is_refusal = reply.verdict not in (Verdict.ACCEPTED, Verdict.IN_PROGRESS)

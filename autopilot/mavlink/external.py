@@ -5,10 +5,11 @@ heading is its own. What is not finite is refused with a text, and so is a frame
 """
 
 from collections.abc import Mapping, Sequence
-from math import isinf, isnan, nan, sqrt
+from math import inf, isnan, nan, sqrt
 from typing import Any
 
 from autopilot.external import ExternalReport, Vector
+from autopilot.mavlink.bounds import ANGLE_MAX_RAD, POSITION_MAX_M, SPEED_MAX_M_S, is_within
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Endpoint, Sender
 from autopilot.mavlink.convert import quat_from_wxyz
 from autopilot.mavlink.service import Handler, Service
@@ -24,8 +25,6 @@ LOCAL_FRD = 20
 NORTH_FRAMES = frozenset({LOCAL_NED, 14})
 FREE_FRAMES = frozenset({LOCAL_FRD, 16, 18})
 QUALITY_FAILED = -1
-_FAR_M = 1.0e5
-_FAST_M_S = 1.0e3
 _UNKNOWN: Vector = (nan, nan, nan)
 
 
@@ -103,7 +102,7 @@ class ExternalService(Service):
             raise RefusedPositionError(f"frame {frame} is not supported")
         q_frame_from_frd = attitude(fields.q)
         vel: Vector = (fields.vx, fields.vy, fields.vz)
-        if not all(is_sane(value, _FAST_M_S) for value in vel):  # before a turn makes it unknown
+        if not is_within(SPEED_MAX_M_S, *vel):  # before a turn makes it unknown
             raise RefusedPositionError("the velocity is not one")
         if child in (BODY_FRD, BODY_NED):
             vel = rotated(q_frame_from_frd, vel) if q_frame_from_frd else _UNKNOWN
@@ -124,22 +123,17 @@ class ExternalService(Service):
     def _take(self, sender: Sender, report: ExternalReport) -> None:
         if sender.compid == AUTOPILOT_COMPONENT and sender.sysid != self._endpoint.sysid:
             return  # another vehicle telling where it is itself
-        if not all(is_sane(value, _FAR_M) for value in report.pos):
+        if not is_within(POSITION_MAX_M, *report.pos):
             self._refuse("the position is not one")
-        elif not all(is_sane(value, _FAST_M_S) for value in report.vel):
+        elif not is_within(SPEED_MAX_M_S, *report.vel):
             self._refuse("the velocity is not one")
-        elif isinf(report.yaw):
+        elif not is_within(ANGLE_MAX_RAD, report.yaw):
             self._refuse("the heading is not one")
         elif reason := self._endpoint.vehicle.external.report(report):
             self._refuse(reason)
 
     def _refuse(self, reason: str) -> None:
         self._endpoint.text_once(Severity.WARNING, f"External position: {reason}")
-
-
-def is_sane(value: float, limit: float) -> bool:
-    """Unknown (NaN), or of a size that there is."""
-    return isnan(value) or -limit < value < limit
 
 
 def attitude(wxyz: Sequence[float]) -> Quat | None:
@@ -187,4 +181,5 @@ def deviation(covariance: Sequence[float], *diagonal: int) -> float:
     variances = [covariance[i] for i in diagonal]
     if isnan(covariance[0]) or any(isnan(variance) or variance < 0.0 for variance in variances):
         return nan
-    return sqrt(max(variances))
+    largest = max(variances)
+    return sqrt(largest) if largest <= POSITION_MAX_M**2 else inf

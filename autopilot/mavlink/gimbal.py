@@ -12,11 +12,12 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.gimbal.control import DEVICE_ID, Flag, GimbalControl
 from autopilot.gimbal.gimbal import PITCH_MAX, PITCH_MIN, RATE_MAX, YAW_MAX, YAW_MIN
+from autopilot.mavlink.bounds import ANGLE_MAX_RAD, RATE_MAX_RAD_S, is_within
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.component import Component, Payload
 from autopilot.mavlink.convert import quat_from_wxyz, wxyz_from_quat
-from autopilot.mavlink.service import Command, CommandHandler, Handler, Service
+from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
 from autopilot.mavlink.telemetry.gimbal import DEVICE_ABILITIES, manager_flags
 from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.vehicle import Reply, Severity, Verdict
@@ -173,7 +174,10 @@ class GimbalManager(Service):
         if f.gimbal_device_id not in (0, 1, DEVICE_ID):
             return
         client = (sender.sysid, sender.compid)
-        reply = self._control.point(client, f.flags, pitch, yaw, pitch_rate, yaw_rate)
+        if is_within(ANGLE_MAX_RAD, pitch, yaw) and is_within(RATE_MAX_RAD_S, pitch_rate, yaw_rate):
+            reply = self._control.point(client, f.flags, pitch, yaw, pitch_rate, yaw_rate)
+        else:
+            reply = denied("an angle or a rate is out of range")
         if reply.verdict is not Verdict.ACCEPTED:
             self._endpoint.text_once(Severity.NOTICE, f"Gimbal: {reply.reason}")
 

@@ -5,12 +5,13 @@ and known in its dialect only.
 """
 
 from collections.abc import Mapping
-from math import isinf, nan
+from math import nan
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.altitude import command_alt_amsl_m
+from autopilot.mavlink.bounds import PARAMETER_MAX, is_within
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.convert import is_position, whole
 from autopilot.mavlink.mission_items import item_from_fields
@@ -75,7 +76,7 @@ class GotoService(Service):
             reply = Reply(Verdict.TEMPORARILY_REJECTED, "needs mode Guided")
         elif item.command != mavlink.MAV_CMD_NAV_WAYPOINT:
             reply = Reply(Verdict.UNSUPPORTED, "only a waypoint can be a guided item")
-        elif any(isinf(element) for element in (item.x, item.y, item.z)) or not is_position(item.x, item.y):
+        elif not is_within(PARAMETER_MAX, item.x, item.y, item.z) or not is_position(item.x, item.y):
             reply = denied("there is no such place")
         elif reply is None and fields.current == GUIDED_ALTITUDE:
             reply = self._go(nan, nan, alt_amsl_m, nan, nan)

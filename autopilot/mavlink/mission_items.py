@@ -1,24 +1,25 @@
 """Mission items as messages carry them, and as the vehicle keeps them."""
 
 from collections.abc import Sequence
-from math import isinf, nan
+from math import nan
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.lists import ItemRefusal, MissionItem
+from autopilot.mavlink.bounds import PARAMETER_MAX, first_outside
 from autopilot.mavlink.convert import INT32_MAX, LATLON_FRAMES, MISSION_FRAME, bounded_int
 
 LOCAL_SCALE = 1.0e4  # local positions travel as 0.1 mm
 
 
-def infinite_element(items: Sequence[MissionItem]) -> ItemRefusal | None:
-    """The first item with an infinite number, which means nothing in any command."""
+def element_out_of_range(items: Sequence[MissionItem]) -> ItemRefusal | None:
+    """The first item with a number that no command can mean."""
     for item in items:
-        for i, value in enumerate((*item.params, item.x, item.y, item.z)):
-            if isinf(value):
-                result = mavlink.MAV_MISSION_INVALID_PARAM1 + i
-                return ItemRefusal(item.seq, result, f"parameter {i + 1} is infinite")
+        i = first_outside(PARAMETER_MAX, (*item.params, item.x, item.y, item.z))
+        if i is not None:
+            result = mavlink.MAV_MISSION_INVALID_PARAM1 + i
+            return ItemRefusal(item.seq, result, f"parameter {i + 1} is out of range")
     return None
 
 

@@ -16,7 +16,7 @@ from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.goto import GotoService
 from autopilot.mavlink.home_item import in_clients_numbers, with_home, without_home
-from autopilot.mavlink.mission_items import infinite_element, item_from_fields, scaled_position
+from autopilot.mavlink.mission_items import element_out_of_range, item_from_fields, scaled_position
 from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import Severity
 
@@ -106,7 +106,7 @@ class MissionService(Service):
 
     def _store(self, kind: ListKind, items: Sequence[MissionItem]) -> ItemRefusal | None:
         """Checks and stores a list that a client has sent; a refusal has the client's numbers."""
-        refusal = infinite_element(items)
+        refusal = element_out_of_range(items)
         if refusal is None:
             first_seq = self._first_seq(kind)
             refusal = self._endpoint.vehicle.lists.load(kind, without_home(items) if first_seq else items)

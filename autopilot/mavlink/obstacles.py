@@ -1,9 +1,10 @@
 """OBSTACLE_DISTANCE: what the ring sensor on board measures, told; what a client measures, taken in."""
 
 from collections.abc import Mapping
-from math import inf, isfinite, nan, radians
+from math import inf, isnan, nan, radians
 from typing import Any
 
+from autopilot.mavlink.bounds import ANGLE_MAX_RAD, is_known
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.convert import UINT16_MAX
 from autopilot.mavlink.service import Handler, Service
@@ -34,8 +35,11 @@ class ObstacleService(Service):
         elif fields.frame not in _NORTH_FRAMES:
             self._endpoint.text_once(Severity.WARNING, f"Obstacles: frame {fields.frame} is not supported")
             return
-        increment_deg = fields.increment_f if fields.increment_f and isfinite(fields.increment_f) else fields.increment
-        if not isfinite(first_rad) or not increment_deg:
+        increment_deg = fields.increment if isnan(fields.increment_f) else fields.increment_f or fields.increment
+        if not is_known(ANGLE_MAX_RAD, first_rad, radians(increment_deg)):
+            self._endpoint.text_once(Severity.WARNING, "Obstacles: the bearing is out of range")
+            return
+        if not increment_deg:
             return
         distances_m = [_metres(value, fields.max_distance) for value in fields.distances]
         vehicle.obstacles.reported(self._endpoint.time_us, distances_m, first_rad, radians(increment_deg))

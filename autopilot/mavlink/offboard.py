@@ -5,10 +5,18 @@ that is NaN counts as ignored. What cannot be flown is refused with a text, at m
 """
 
 from collections.abc import Mapping
-from math import cos, isfinite, isinf, isnan, nan, sin
+from math import cos, isfinite, isnan, nan, sin
 from typing import Any
 
 from autopilot.mavlink.altitude import alt_amsl_m
+from autopilot.mavlink.bounds import (
+    ACCEL_MAX_M_S2,
+    ANGLE_MAX_RAD,
+    POSITION_MAX_M,
+    RATE_MAX_RAD_S,
+    SPEED_MAX_M_S,
+    is_within,
+)
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.convert import (
     degrees_from_e7,
@@ -143,8 +151,11 @@ class OffboardService(Service):
             raise RefusedSetpointError("forces are not supported")
         yaw = nan if fields.type_mask & YAW_BIT else fields.yaw
         yaw_rate = nan if fields.type_mask & YAW_RATE_BIT else fields.yaw_rate
-        if any(isinf(element) for element in (*pos, *vel, *accel, yaw, yaw_rate)):
-            raise RefusedSetpointError("an element is infinite")
+        require_within("position", POSITION_MAX_M, *pos)
+        require_within("velocity", SPEED_MAX_M_S, *vel)
+        require_within("acceleration", ACCEL_MAX_M_S2, *accel)
+        require_within("heading", ANGLE_MAX_RAD, yaw)
+        require_within("yaw rate", RATE_MAX_RAD_S, yaw_rate)
         if not any(isfinite(element) for element in (*pos, *vel, *accel)):
             raise RefusedSetpointError("position, velocity and acceleration are all ignored")
         return OffboardSetpoint(
@@ -156,6 +167,16 @@ class OffboardService(Service):
             yaw=yaw,
             yaw_rate=yaw_rate,
         )
+
+
+def require_within(what: str, limit: float, *values: float) -> None:
+    """Lets free elements and sizes that there are pass.
+
+    Raises:
+        RefusedSetpointError: a value is infinite or larger than any vehicle can mean.
+    """
+    if not is_within(limit, *values):
+        raise RefusedSetpointError(f"the {what} is out of range")
 
 
 def masked(triple: Triple, mask: int, first_bit: int) -> Triple:
@@ -199,8 +220,7 @@ def attitude_setpoint(fields: Any, time_us: int) -> OffboardSetpoint:
     thrust = min(max(fields.thrust, 0.0), 1.0)
     given = (fields.body_roll_rate, fields.body_pitch_rate, fields.body_yaw_rate)
     rates = [nan if mask & bit else rate for rate, bit in zip(given, BODY_RATE_BITS, strict=True)]
-    if any(isinf(rate) for rate in rates):
-        raise RefusedSetpointError("an element is infinite")
+    require_within("body rate", RATE_MAX_RAD_S, *rates)
     if mask & ATTITUDE_BIT:
         if any(isnan(rate) for rate in rates):
             raise RefusedSetpointError("without an attitude all three body rates are needed")

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from autopilot.mavlink.bounds import PARAMETER_MAX, first_outside
 from autopilot.mavlink.channel import Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.vehicle import Reply, Verdict
@@ -62,3 +63,10 @@ def acknowledgement(command: Command, verdict: Verdict) -> bytes:
 
 def denied(reason: str) -> Reply:
     return Reply(Verdict.DENIED, reason)
+
+
+def out_of_range(command: Command) -> Reply | None:
+    """The refusal of a command with a parameter that no command can mean."""
+    params = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
+    i = first_outside(PARAMETER_MAX, params)
+    return None if i is None else denied(f"parameter {i + 1} is out of range")

@@ -5,12 +5,13 @@ the clocks of senders are not known.
 """
 
 from collections.abc import Mapping, Sequence
-from math import isfinite, nan, radians, sqrt, tan
+from math import isfinite, isnan, nan, radians, sqrt, tan
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.altitude import command_alt_amsl_m
+from autopilot.mavlink.bounds import POSITION_MAX_M, SPEED_MAX_M_S, is_known
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.convert import (
     INT32_MAX,
@@ -64,8 +65,13 @@ class TargetService(Service):
         pos_ned = self._pos_ned(fields.lat, fields.lon, fields.alt)
         if pos_ned is None:
             return
-        stds = [sqrt(var) for var in fields.position_cov[:2] if isfinite(var) and var > 0.0]
-        vel_ned = finite_triple(fields.vel) if fields.est_capabilities & HAS_VELOCITY else None
+        vel_ned = None
+        if fields.est_capabilities & HAS_VELOCITY and not any(map(isnan, fields.vel)):
+            vel_ned = known_triple(SPEED_MAX_M_S, fields.vel)
+            if vel_ned is None:
+                self._endpoint.text_once(Severity.WARNING, "Follow: the target's velocity is out of range")
+                return
+        stds = [sqrt(var) for var in fields.position_cov[:2] if 0.0 < var <= POSITION_MAX_M]
         course_rad = heading_of(fields.attitude_q) if fields.est_capabilities & HAS_ATTITUDE else nan
         pos_std = max([*stds, _POS_STD_MIN_M]) if stds else _POS_STD_M
         self._endpoint.vehicle.report_target(TargetReport(pos_ned, vel_ned, pos_std, _VEL_STD_M_S, course_rad))
@@ -106,21 +112,23 @@ class TargetService(Service):
         if not state.estimate.flags & POSITION_VALID:
             return
         if fields.position_valid:
-            pos = finite_triple((fields.x, fields.y, fields.z))
+            pos = known_triple(POSITION_MAX_M, (fields.x, fields.y, fields.z))
             if pos is None:
-                return
-            if fields.frame == _LOCAL_NED:
+                self._refuse_landing_target("the position is out of range")
+            elif fields.frame == _LOCAL_NED:
                 self._endpoint.vehicle.report_landing_target(pos)
             elif fields.frame in _BODY_FRAMES:
                 self._report_offset(pos)
             else:
-                text = f"Landing target: frame {fields.frame} is not supported"
-                self._endpoint.text_once(Severity.WARNING, text)
+                self._refuse_landing_target(f"frame {fields.frame} is not supported")
             return
         if not (abs(fields.angle_x) < _WIDEST_RAD and abs(fields.angle_y) < _WIDEST_RAD):  # also for NaN
             return
         # the camera looks down with its upper edge ahead: the image's x is right, its y is back
         ray = (-tan(fields.angle_y), tan(fields.angle_x), 1.0)
+        if fields.distance > POSITION_MAX_M:
+            self._refuse_landing_target("the distance is out of range")
+            return
         if fields.distance > 0.0:
             scale = fields.distance / sqrt(sum(element * element for element in ray))
             self._report_offset((ray[0] * scale, ray[1] * scale, ray[2] * scale))
@@ -132,6 +140,9 @@ class TargetService(Service):
             north, east, down = state.estimate.pos_ned
             pos = (north + turned[0] * scale, east + turned[1] * scale, down + height_m)
             self._endpoint.vehicle.report_landing_target(pos)
+
+    def _refuse_landing_target(self, reason: str) -> None:
+        self._endpoint.text_once(Severity.WARNING, f"Landing target: {reason}")
 
     def _report_offset(self, offset_frd: tuple[float, float, float]) -> None:
         estimate = self._endpoint.vehicle.state.estimate
@@ -164,10 +175,10 @@ class TargetService(Service):
         return self._endpoint.vehicle.orbit(request)
 
 
-def finite_triple(values: Sequence[float]) -> tuple[float, float, float] | None:
-    """The three numbers, None if one is not finite."""
+def known_triple(limit: float, values: Sequence[float]) -> tuple[float, float, float] | None:
+    """The three numbers, None if one is not set or out of range."""
     x, y, z = values
-    return (x, y, z) if isfinite(x) and isfinite(y) and isfinite(z) else None
+    return (x, y, z) if is_known(limit, x, y, z) else None
 
 
 def heading_of(q_wxyz: Sequence[float]) -> float:

@@ -31,7 +31,7 @@ def reposition_target(
         target = (base[0], base[1], context.down_of(alt_amsl_m))
     else:
         target = base
-    refusal = _refusal(context, target)
+    refusal = target_refusal(context, target)
     if refusal is not ACCEPTED:
         return refusal
     return target, context.heading_to(state.estimate.pos_ned, target, yaw)
@@ -44,7 +44,8 @@ def ground_d(context: NavContext) -> float:
     return max(stood_d, context.state.estimate.terrain_d) if context.state.estimate.flags & TERRAIN_VALID else stood_d
 
 
-def _refusal(context: NavContext, target: Vector) -> Reply:
+def target_refusal(context: NavContext, target: Vector) -> Reply:
+    """Why the vehicle may not be sent to a place [m]; ACCEPTED if it may."""
     here = context.state.estimate.pos_ned
     way_m = hypot(target[0] - here[0], target[1] - here[1])
     longest_m = context.number("MIS_DIST_1WP")

@@ -17,6 +17,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
 FREE: Vector = (nan, nan, nan)
 _NOT_HOLDING_M_S = 0.01
+_LARGEST = 1.0e9  # its square is within single precision
 _LEVEL_NORTH = (0.0, 0.0, 0.0, 1.0)
 _LAYOUT = "<3i26f"  # kind, is_armed, is_landed, then every float in the order of autopilot.ports.Setpoint
 _FIELDS = (
@@ -266,11 +267,18 @@ class SetpointPort:
             pos_ned = (pos_ned[0], pos_ned[1], nan)
             vel_ned = (vel_ned[0], vel_ned[1], self._press_speed)
             path_start_ned = FREE
-        self._pack_into(
-            self._buffer, 0, kind, self.is_armed, self.is_landed, *pos_ned, *vel_ned, *self.accel_ned, self.yaw,
+        flags = (kind, self.is_armed, self.is_landed)
+        values = (
+            *pos_ned, *vel_ned, *self.accel_ned, self.yaw,
             yaw_rate, *path_start_ned, self.cruise_speed, self.climb_speed, self.descend_speed, self.exit_speed,
             *q_ned_from_frd, *self.omega_frd, thrust,
         )  # fmt: skip
+        try:
+            self._pack_into(self._buffer, 0, *flags, *values)
+        except (
+            OverflowError
+        ):  # beyond single precision; who asks has failed to bound it, and is flown as far as it goes
+            self._pack_into(self._buffer, 0, *flags, *(min(max(value, -_LARGEST), _LARGEST) for value in values))
 
     def _free_all(self) -> None:
         self._is_changed = True

@@ -5,7 +5,7 @@ Kalman filter (Bar-Shalom, Li and Kirubarajan 2001, section 6.3.2: discrete whit
 have the same noise and share one covariance.
 """
 
-from math import hypot
+from math import hypot, isfinite
 
 from autopilot.navigator.setpoint import Vector
 
@@ -86,7 +86,7 @@ class TargetFilter:
     def report(
         self, time_us: int, pos_ned: Vector, vel_ned: Vector | None, pos_std: float, vel_std: float = 0.3
     ) -> None:
-        """Takes a report.
+        """Takes a report; one that is not finite, or of a speed that nobody has, says nothing.
 
         Args:
             time_us: when it came.
@@ -95,6 +95,10 @@ class TargetFilter:
             pos_std: [m] per axis.
             vel_std: [m/s] per axis.
         """
+        if not all(map(isfinite, (*pos_ned, *(vel_ned or ()), pos_std, vel_std))):
+            return
+        if vel_ned is not None and hypot(vel_ned[0], vel_ned[1]) > _SPEED_MAX_M_S:
+            return
         if self.time_us is None or self._is_elsewhere(time_us, pos_ned, pos_std):
             self._level, self._vertical = AxisFilter(pos_std**2), AxisFilter(pos_std**2)
             self.pos_ned, self.vel_ned = pos_ned, vel_ned or (0.0, 0.0, 0.0)
@@ -108,7 +112,7 @@ class TargetFilter:
         self._correct_position(pos_ned, pos_std)
         if vel_ned is not None:
             self._correct_velocity(vel_ned, vel_std)
-        if self.speed_xy > _SPEED_MAX_M_S:
+        if not all(map(isfinite, self.pos_ned)) or not self.speed_xy <= _SPEED_MAX_M_S:
             self.forget()
 
     def _is_elsewhere(self, time_us: int, pos_ned: Vector, pos_std: float) -> bool:

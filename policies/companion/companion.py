@@ -32,6 +32,7 @@ TELEMETRY_OLD_US = 500_000
 HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
 NO_PICTURES = "no new pictures"
+NO_DECISION = "the policy does not decide"
 LATENCIES_KEPT = 600  # a minute of decisions
 LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the pictures that policies are trained on
 LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
@@ -92,6 +93,7 @@ class Companion:
         self._decided_us = 0  # when the picture that was decided on was taken, on the vehicle's clock
         self._action: Floats = np.zeros(4, dtype=np.float32)
         self._setpoint = STILL
+        self._is_undecided = False  # the pilot's last action was no number
         self._setpoint_due_us = 0
         self._sending = Sending.NOTHING
 
@@ -108,7 +110,7 @@ class Companion:
         if picture is not None:
             self._picture, self._picture_us = picture, time_us
         blindness = self._blindness(time_us)
-        self.trouble = blindness or self._loss()
+        self.trouble = blindness or self._loss() or (NO_DECISION if self._is_undecided else "")
         orders = self.engagement.step(self._situation(time_us))
         if orders.text:
             self.vehicle.say(orders.text)
@@ -166,6 +168,11 @@ class Companion:
         vector = self._observer.vector(own, self.vehicle.owner, self._action, time_us)
         self.seen = vector.copy()
         action = self._pilot.act(vector, picture.pixels)
+        self._is_undecided = not np.isfinite(action).all()
+        if self._is_undecided:
+            self._pilot.reset()  # what it remembers is no number either
+            self._setpoint = STILL
+            return False
         if self._sending is Sending.POLICY:
             self._action = action
             self._setpoint = self._observer.setpoint(action, own)

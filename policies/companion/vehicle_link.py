@@ -7,9 +7,10 @@ Any autopilot with PX4's or ArduPilot's modes will do.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import isnan, nan
 from typing import Any, Protocol
 
+from autopilot.mavlink.bounds import POSITION_MAX_M, RATE_MAX_RAD_S, SPEED_MAX_M_S, is_known
 from autopilot.mavlink.codec import Frame, FrameReader, encode, message_id
 from autopilot.mavlink.convert import degrees_from_e7, quat_from_wxyz
 from autopilot.mavlink.dialects import Dialect, UnknownModeError
@@ -194,13 +195,11 @@ class VehicleLink:
     def _vehicle_told(self, name: str, fields: Any, time_us: int) -> None:
         own = self.own
         if name == "ATTITUDE_QUATERNION":
-            own.q_ned_from_frd = quat_from_wxyz((fields.q1, fields.q2, fields.q3, fields.q4))
-            own.omega_frd = (fields.rollspeed, fields.pitchspeed, fields.yawspeed)
-            own.boot_us, own.attitude_us = fields.time_boot_ms * 1000, time_us
+            self._attitude_told(fields, time_us)
         elif name == "LOCAL_POSITION_NED":
-            own.pos_ned = (fields.x, fields.y, fields.z)
-            own.vel_ned = (fields.vx, fields.vy, fields.vz)
-            own.position_us = time_us
+            pos_ned, vel_ned = (fields.x, fields.y, fields.z), (fields.vx, fields.vy, fields.vz)
+            if is_known(POSITION_MAX_M, *pos_ned) and is_known(SPEED_MAX_M_S, *vel_ned):
+                own.pos_ned, own.vel_ned, own.position_us = pos_ned, vel_ned, time_us
         elif name == "DISTANCE_SENSOR":
             self._distance_told(fields, time_us)
         elif name == "HEARTBEAT":
@@ -217,6 +216,14 @@ class VehicleLink:
                 if fields.result == 0 and self._asked_for is not None:
                     self._enter(self._asked_for)  # known now: its next heartbeat may be a second away
                 self._asked_for = None
+
+    def _attitude_told(self, fields: Any, time_us: int) -> None:
+        wxyz = (fields.q1, fields.q2, fields.q3, fields.q4)
+        omega_frd = (fields.rollspeed, fields.pitchspeed, fields.yawspeed)
+        if is_known(1.1, *wxyz) and is_known(RATE_MAX_RAD_S, *omega_frd):  # of unit length, but for rounding
+            own = self.own
+            own.q_ned_from_frd, own.omega_frd = quat_from_wxyz(wxyz), omega_frd
+            own.boot_us, own.attitude_us = fields.time_boot_ms * 1000, time_us
 
     def _distance_told(self, fields: Any, time_us: int) -> None:
         if fields.orientation != _LOOKS_DOWN:
@@ -243,11 +250,12 @@ class VehicleLink:
         if origin is None or not fields.est_capabilities & _HAS_POSITION:
             return
         pos_ned = ned_from_geodetic(degrees_from_e7(fields.lat), degrees_from_e7(fields.lon), fields.alt, origin)
-        if not all(isfinite(element) for element in pos_ned):
+        has_velocity = fields.est_capabilities & _HAS_VELOCITY and not any(map(isnan, fields.vel))
+        north, east, down = fields.vel if has_velocity else (0.0, 0.0, 0.0)
+        if not is_known(POSITION_MAX_M, *pos_ned) or not is_known(SPEED_MAX_M_S, north, east, down):
             return
-        owner = self.owner
-        north, east, down = fields.vel if fields.est_capabilities & _HAS_VELOCITY else (0.0, 0.0, 0.0)
+        owner, var = self.owner, fields.position_cov[0]
         owner.pos_ned, owner.vel_ned = pos_ned, (north, east, down)
-        owner.std_m = fields.position_cov[0] ** 0.5 if fields.position_cov[0] > 0.0 else nan
+        owner.std_m = var**0.5 if 0.0 < var <= POSITION_MAX_M else nan
         owner.arrived_us = time_us
         owner.count += 1

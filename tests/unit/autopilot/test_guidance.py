@@ -120,6 +120,27 @@ def test_landing_can_be_aborted(height_m, reached_m):
     assert -rig.pos[2] == pytest.approx(reached_m, abs=0.1)
 
 
+@pytest.mark.parametrize("height_m", [10_100.0, 1e6])
+def test_landing_is_not_aborted_into_the_stratosphere(height_m):
+    rig = landing()
+    reply = rig.fc.guidance.abort_landing(height_m)
+    assert (reply.verdict, reply.reason) == (Verdict.DENIED, "altitude is out of range")
+    rig.disarmed()
+
+
+def test_landing_is_not_aborted_through_the_ceiling():
+    rig = landing(GF_ACTION=1, GF_MAX_VER_DIST=20.0)
+    assert "fence" in rig.fc.guidance.abort_landing(30.0).reason
+    assert rig.fc.guidance.abort_landing(15.0).verdict is Verdict.ACCEPTED
+
+
+def landing(**params):
+    rig = Kinematic(**params).flying()
+    rig.fc.set_mode(Mode.LAND)
+    rig.run_until(lambda: rig.pos[2] > -1.5)
+    return rig
+
+
 def test_mission_ends_after_the_last_item_asked_for():
     rig = Kinematic().flying()
     rig.fc.lists.load(ListKind.MISSION, [item(i, WAYPOINT, 10.0 * (i + 1)) for i in range(4)])

@@ -73,6 +73,15 @@ def test_acceleration_alone_is_followed_within_its_limit() -> None:
     np.testing.assert_allclose(accel[-1], np.array([1.0, -30.0, 0.0]) * 4.0 / np.hypot(1.0, 30.0), atol=1e-5)
 
 
+@pytest.mark.parametrize("rate", [10.0, 1000.0, -3.0e38])
+def test_yaw_turns_no_faster_than_the_vehicle(rate: float) -> None:
+    generator = Generator()
+    generator.ask(vel_ned=(0.0, 0.0, 0.0), yaw_rate=rate)
+    turned = generator.run(2.0)["yaw_rate"][0]
+    assert np.abs(turned).max() == pytest.approx(np.radians(200.0), rel=1e-3)  # MC_YAWRATE_MAX
+    assert np.sign(turned[-1]) == np.sign(rate)
+
+
 def test_nothing_finite_holds_the_place() -> None:
     generator = Generator()
     generator.ask()

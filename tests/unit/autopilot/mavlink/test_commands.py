@@ -308,7 +308,7 @@ def test_repeated_interval_requests_starve_no_stream():
     assert count == pytest.approx(10, abs=1)  # 0.5 Hz for 20 s
 
 
-@pytest.mark.parametrize("params", [(9999, 1e6), (253, 1e6), (nan, 1e6), (1e30, 0)])
+@pytest.mark.parametrize("params", [(9999, 1e6), (253, 1e6), (nan, 1e6), (1e9, 0)])
 def test_interval_of_a_message_we_do_not_send_is_unsupported(params):
     assert Rig().ack(511, *params).result == UNSUPPORTED
 
@@ -321,7 +321,7 @@ def test_heartbeat_cannot_be_stopped():
 
 def test_longest_interval_fits_the_answer():
     rig = Rig()
-    assert rig.ack(511, 30, 1e30).result == ACCEPTED
+    assert rig.ack(511, 30, 1e10).result == ACCEPTED
     rig.client.command(510, 30)
     assert rig.only("MESSAGE_INTERVAL").interval_us == INT32_MAX
 

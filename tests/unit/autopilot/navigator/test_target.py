@@ -55,6 +55,27 @@ def test_a_jump_is_another_place_and_not_noise():
     assert target.vel_ned == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("speed", [61.0, 3.4e38, float("inf"), float("nan")])
+def test_no_report_of_a_speed_that_nobody_has_is_believed_not_even_the_first(speed):
+    target = TargetFilter(0.3)
+    target.report(S, (1.0, 2.0, -3.0), (speed, 0.0, 0.0), 0.5)
+    assert target.time_us is None
+    target.report(2 * S, (1.0, 2.0, -3.0), (1.0, 0.0, 0.0), 0.5)
+    target.report(3 * S, (2.0, 2.0, -3.0), (0.0, -speed, 0.0), 0.5)
+    assert target.at(4 * S) == pytest.approx((3.0, 2.0, -3.0))
+
+
+@pytest.mark.parametrize("place", [float("nan"), float("inf"), 3.4e38])
+def test_a_place_that_is_none_does_not_stay(place):
+    target = TargetFilter(0.3)
+    for i in range(5):
+        target.report(i * S, (0.0, place, 0.0), None, 0.5)
+        target.report(i * S, (0.0, 0.0, place), None, 0.5)
+    for i in range(5, 40):
+        target.report(i * S, (10.0, 20.0, -3.0), None, 0.5)
+    assert target.pos_ned == pytest.approx((10.0, 20.0, -3.0), abs=0.01)
+
+
 @pytest.mark.parametrize("radius", [10.0, -25.0])
 def test_point_runs_round_at_its_speed(radius):
     circle = Circle((5.0, 6.0, -7.0), radius, 3.0, (105.0, 6.0, 0.0))

@@ -1,5 +1,7 @@
 """What a companion believes of its vehicle's mode, by heartbeats and by answers to its own requests."""
 
+from math import inf, nan
+
 import pytest
 
 from autopilot.mavlink.codec import encode
@@ -68,3 +70,41 @@ def test_an_answer_to_everybody_says_nothing_of_the_mode(vehicle):
     link.ask_for(Wish.OFFBOARD)
     answer(end, link, 0, target_component=0)
     assert link.own.mode is Mode.HOLD
+
+
+PLACE = {"lat": 473977420, "lon": 85455940, "alt": 488.0, "est_capabilities": 3}
+
+
+@pytest.fixture
+def followed(vehicle):
+    end, link = vehicle
+    tell(end, link, "GPS_GLOBAL_ORIGIN", latitude=473977420, longitude=85455940, altitude=488_000)
+    return end, link
+
+
+@pytest.mark.parametrize("speed", [inf, -inf, 3.4e38, 1e30])
+def test_owner_of_a_speed_that_nobody_has_is_not_believed(followed, speed):
+    end, link = followed
+    tell(end, link, "FOLLOW_TARGET", **PLACE, vel=(0.0, speed, 0.0))
+    assert link.owner.count == 0
+
+
+def test_owner_without_a_velocity_is_still_a_place(followed):
+    end, link = followed
+    tell(end, link, "FOLLOW_TARGET", **PLACE, vel=(nan, 1.0, 0.0), position_cov=(3.4e38, 0.0, 0.0))
+    assert link.owner.count == 1
+    assert link.owner.vel_ned == (0.0, 0.0, 0.0)
+    assert link.owner.std_m != link.owner.std_m
+
+
+@pytest.mark.parametrize("value", [nan, inf, 3.4e38])
+def test_telemetry_that_is_no_number_changes_nothing(vehicle, value):
+    end, link = vehicle
+    tell(end, link, "ATTITUDE_QUATERNION", q1=1.0, yawspeed=0.5)
+    tell(end, link, "LOCAL_POSITION_NED", x=1.0, vx=2.0)
+    told = (link.own.pos_ned, link.own.vel_ned, link.own.q_ned_from_frd, link.own.omega_frd)
+    tell(end, link, "ATTITUDE_QUATERNION", q1=value)
+    tell(end, link, "ATTITUDE_QUATERNION", q1=1.0, rollspeed=value)
+    tell(end, link, "LOCAL_POSITION_NED", x=value)
+    tell(end, link, "LOCAL_POSITION_NED", vz=value)
+    assert told == (link.own.pos_ned, link.own.vel_ned, link.own.q_ned_from_frd, link.own.omega_frd)

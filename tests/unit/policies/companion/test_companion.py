@@ -1,0 +1,93 @@
+"""The companion's loop in memory: a vehicle that flies in Offboard, pictures, and a pilot that stops deciding."""
+
+import numpy as np
+
+from autopilot.mavlink.codec import FrameReader, decode, encode
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.links import LinkRole, memory_pair
+from autopilot.vehicle import Mode
+from common.image_stream import ImageFrame
+from policies.companion.companion import LENS, NO_DECISION, Companion
+from policies.companion.engagement import Phase
+from policies.experts.follower import ScriptedFollower
+
+FRAME_US = 20_000
+
+
+class Pictures:
+    """A camera that takes one at 10 Hz."""
+
+    def __init__(self, shape):
+        self._pixels = np.zeros(shape, np.uint8)
+
+    def take(self, time_us):
+        return ImageFrame(time_us, 0, self._pixels, *LENS) if time_us % 100_000 == 0 else None
+
+    def close(self):
+        pass
+
+
+class Doubting(ScriptedFollower):
+    """Sees the owner 3 m ahead; decides on nothing while `is_lost`."""
+
+    is_lost = False
+    resets = 0
+
+    def reset(self):
+        super().reset()
+        self.resets += 1
+
+    def act(self, vector, image):
+        self.owner_hfrd = (3.0, 0.0, 0.5)
+        return np.full(4, np.nan if self.is_lost else 0.5, np.float32)
+
+
+class Air:
+    """What the vehicle tells, and what it is told."""
+
+    def __init__(self):
+        companion_end, self.end = memory_pair(LinkRole.ONBOARD)
+        self.pilot = Doubting()
+        self.companion = Companion(companion_end, Pictures(self.pilot.image_shape), self.pilot)
+        self.mode = Mode.HOLD
+        self.time_us = 0
+        self._reader = FrameReader()
+
+    def run(self, seconds):
+        """The messages the companion sends meanwhile."""
+        told = []
+        for _ in range(round(seconds * 1e6) // FRAME_US):
+            self.time_us += FRAME_US
+            mode = PX4.custom_mode(self.mode)
+            self._tell("HEARTBEAT", autopilot=12, base_mode=128, custom_mode=mode, system_status=4)
+            self._tell("EXTENDED_SYS_STATE", landed_state=2)
+            self._tell("ATTITUDE_QUATERNION", time_boot_ms=self.time_us // 1000, q1=1.0)
+            self._tell("LOCAL_POSITION_NED", x=1.0, z=-5.0)
+            self.companion.frame(self.time_us)
+            told += [decode(frame) for data in self.end.receive() for frame in self._reader.feed(data)]
+        return told
+
+    def _tell(self, name, **fields):
+        self.end.send(encode(name, 1, 1, 0, **fields))
+
+
+def test_a_policy_that_does_not_decide_hands_back_and_sends_no_number_that_is_none():
+    air = Air()
+    air.run(1.0)
+    air.mode = Mode.OFFBOARD
+    air.run(1.0)
+    assert air.companion.phase is Phase.FLYING
+    air.pilot.is_lost, air.pilot.resets = True, 0
+    told = air.run(0.5)
+    assert air.companion.trouble == NO_DECISION
+    assert air.companion.phase is Phase.HANDING_BACK
+    assert air.pilot.resets > 0
+    sent = [m.fields for m in told if m.name == "SET_POSITION_TARGET_LOCAL_NED"]
+    assert sent
+    assert np.isfinite([(f.vx, f.vy, f.vz, f.yaw_rate) for f in sent]).all()
+    assert (sent[-1].vx, sent[-1].vy, sent[-1].vz, sent[-1].yaw_rate) == (0.0, 0.0, 0.0, 0.0)
+    assert np.isfinite(air.companion.action).all()
+    air.pilot.is_lost = False
+    air.mode = Mode.HOLD
+    air.run(3.0)
+    assert air.companion.phase is Phase.READY
