@@ -37,7 +37,7 @@ class Doubting(ScriptedFollower):
         super().reset()
         self.resets += 1
 
-    def act(self, vector, image):
+    def act(self, *_):
         self.owner_hfrd = (3.0, 0.0, 0.5)
         return np.full(4, np.nan if self.is_lost else 0.5, np.float32)
 
