@@ -32,6 +32,7 @@ SCRIPTS = (
     "companion",
     "tracker",
     "camera",
+    "film",
     "startup",
 )
 RESULTS = Path(__file__).parent / "results.json"

@@ -18,7 +18,8 @@ from mission.flight_config import OwnerConfig  # noqa: E402
 from mission.follow.lockstep import flight_with_companion, take_off  # noqa: E402
 from mission.follow.session import chosen_pilot, score_lines  # noqa: E402
 from mission.follow.watch import FollowWatch  # noqa: E402
-from mission.view.chase import PICTURE_S, film  # noqa: E402
+from mission.view.chase import PICTURE_S  # noqa: E402
+from mission.view.film_pictures import film  # noqa: E402
 from mission.view.live import LiveView, open_page  # noqa: E402
 from mission.view.recording import Recorder  # noqa: E402
 from policies.companion.engagement import Phase  # noqa: E402
@@ -28,6 +29,7 @@ from tests.browser import Browser  # noqa: E402
 SEED = 5
 FOLLOWED_S = 25.0
 MOMENTS_S = (17.0, 25.0, 33.0)  # of the film
+SHOT_SIZE = (640, 360)
 QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 88)
 
 
@@ -58,7 +60,8 @@ def main() -> None:
     cv2.imwrite(str(IMAGES / "live.jpg"), picture[..., ::-1], QUALITY)
     chosen = {round(moment_s / PICTURE_S) for moment_s in MOMENTS_S}
     shots = [shot for i, shot in enumerate(film(recorder.recording(), flight.world)) if i in chosen]
-    cv2.imwrite(str(IMAGES / "follow.jpg"), np.hstack(shots)[..., ::-1], QUALITY)
+    small = [cv2.resize(shot, SHOT_SIZE, interpolation=cv2.INTER_AREA) for shot in shots]
+    cv2.imwrite(str(IMAGES / "follow.jpg"), np.hstack(small)[..., ::-1], QUALITY)
 
 
 if __name__ == "__main__":

@@ -1,29 +1,62 @@
 """The chase camera's film as a file.
 
-In: a recording and its world. Out: an mp4, which takes its name when it is complete.
+In: a recording and its world. Out: an mp4, which takes its name when it is complete, and how far it is meanwhile: a bar
+in a terminal, a line every few seconds elsewhere.
 """
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from common.clock import wall_time_s
 from mission.options import UserError
 from mission.video import Mp4, VideoError
-from mission.view.chase import PICTURE_S, film
+from mission.view.chase import PICTURE_S, STRIDE
+from mission.view.film_pictures import film
 from mission.view.recording import Recording
 from sim.world.world import WorldMap
 
+LINE_S = 5.0  # wall clock, between two lines
+
 
 def write_film(recording: Recording, world: WorldMap, target: Path, console: Console) -> None:
-    """Chase view and onboard view as an mp4.
+    """Chase view and onboard view as an mp4; says where it lies.
 
     Raises:
         UserError: it cannot be written.
     """
+    count = len(recording.rows[::STRIDE])
     try:
-        with Mp4(target, PICTURE_S) as mp4, console.status("") as status:
+        with Mp4(target, PICTURE_S) as mp4, told(console, count) as tell:
             for i, picture in enumerate(film(recording, world)):
                 mp4.show(picture)
-                status.update(f"filming: {i * PICTURE_S:.0f} s")
+                tell(i + 1)
     except VideoError as error:
         raise UserError(str(error)) from error
+    console.print(f"film of {count * PICTURE_S:.0f} s: {target}", markup=False, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def told(console: Console, count: int) -> Iterator[Callable[[int], None]]:
+    """Inside, whoever gives the number of pictures done has it shown, with the time passed and left."""
+    if console.is_terminal:
+        columns = (TextColumn("film"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=console, transient=True) as progress:
+            task = progress.add_task("film", total=count)
+            yield lambda done: progress.update(task, completed=done)
+        return
+    start_s = shown_s = wall_time_s()
+
+    def tell(done: int) -> None:
+        nonlocal shown_s
+        now_s = wall_time_s()
+        if now_s - shown_s >= LINE_S:
+            shown_s = now_s
+            left_s = (now_s - start_s) * (count - done) / done
+            text = f"film: picture {done} of {count}, {now_s - start_s:.0f} s, {left_s:.0f} s left"
+            console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    yield tell

@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 
 from mission.cli import app
 from mission.flight import flight_world
-from mission.view.chase import HEIGHT, WIDTH
 from mission.view.film import write_film
+from mission.view.film_pictures import HEIGHT, WIDTH
 from mission.view.recording import load_recording
 from tests.unit.mission.view.rows import CONFIG, hovering
 
