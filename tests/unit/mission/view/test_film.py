@@ -74,7 +74,7 @@ def test_what_is_told_has_a_total_and_names_the_file_also_without_a_terminal(wor
     target = tmp_path / "with a name that is long enough to be wrapped at eighty columns of a terminal.mp4"
     write_film(hovering(0.4), world, target, Console(file=out, width=80))
     lines = out.getvalue().splitlines()
-    assert lines[0].startswith("film: picture 1 of 10, 0 s, ")
+    assert lines[0].startswith("film: picture 1 of 10, ")
     assert lines[-1] == f"film of 0 s: {target}"
     with av.open(str(target)) as written:
         assert sum(1 for _ in written.decode(video=0)) == 10
