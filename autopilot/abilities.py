@@ -4,6 +4,7 @@
 ability of its own.
 """
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from autopilot.camera.camera import Camera
@@ -52,6 +53,17 @@ class Calibration(Protocol):
 
     def set_offsets(self, sensor: str, offsets: tuple[float, float, float]) -> None:
         """Writes the offsets of a sensor: GYRO, ACC or MAG."""
+        ...
+
+
+class MotorTests(Protocol):
+    """Rotors that are turned on the ground (autopilot.motor_test)."""
+
+    rotor_count: int
+    clockwise: Sequence[int]  # rotors from 0, from the nose on
+
+    def spin(self, rotors: Sequence[int], command: float, seconds: float, *, pause_s: float = 0.0) -> Reply:
+        """Turns rotors one after the other, each so long."""
         ...
 
 
@@ -125,6 +137,9 @@ class Vehicle(Protocol):
     def calibration(self) -> Calibration: ...
 
     sticks: Sticks
+
+    @property
+    def motor_test(self) -> MotorTests: ...
 
     @property
     def fence(self) -> FenceSwitch: ...

@@ -25,6 +25,7 @@ from autopilot.guidance import Guidance
 from autopilot.host import Host
 from autopilot.injection import Failure, FailureInjector, Unit, failure_request, injection_refusal
 from autopilot.lists import ItemLists, ListKind
+from autopilot.motor_test import MotorTest
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission import Mission
 from autopilot.navigator.navigator import Navigator
@@ -170,6 +171,7 @@ class FlightController:
         self.commander.connect(self.navigator)
         self.guidance = Guidance(self.commander, self.navigator, self.payload)
         self.station = self.commander.station
+        self.motor_test = MotorTest(self.state, self._setpoint, self._relay, airframe)
         self.calibration = Calibrator(self.state, params, self._relay, turntable)
         self._setpoint.write()
 
@@ -198,6 +200,8 @@ class FlightController:
         self.commander.frame(dt_s)
         if self.state.is_calibrating:
             self.calibration.frame()
+        if self.motor_test.is_running:
+            self.motor_test.frame()
         wish = self.navigator.frame()
         if wish is not None:
             self._follow_wish(wish)

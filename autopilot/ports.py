@@ -139,6 +139,7 @@ class Setpoint:
     q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE; SETPOINT_LEAN: its heading is not used
     omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE
     thrust: float  # [0..1] collective, share of the maximum thrust
+    motor_test: vec8  # [0..1] commands of the rotors while the vehicle is disarmed, not otherwise
 
 
 @wp.struct

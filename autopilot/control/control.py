@@ -87,13 +87,14 @@ def rotor_thrust(airframe: ControlAirframe, share: float, voltage_share: float) 
 
 
 @wp.func
-def rest(voltage_share: float, airframe: ControlAirframe, est: Estimate, is_armed: int) -> ControlState:
-    """The state with the rotors stopped, or idling when armed; everything else remembered is forgotten."""
+def rest(voltage_share: float, airframe: ControlAirframe, est: Estimate, sp: Setpoint) -> ControlState:
+    """The state with the rotors stopped or tested, or idling when armed; everything else remembered is forgotten."""
     still = ControlState()
     still.voltage_share = voltage_share
     still.trajectory = trajectory_at_estimate(est, 0)
     still.was_landed = 1
-    if is_armed == 1:
+    still.actuators.command = sp.motor_test
+    if sp.is_armed == 1:
         command = vec8()
         for i in range(airframe.rotor_count):
             command[i] = airframe.idle_command
@@ -278,7 +279,7 @@ def control_tick(
     is_direct = sp.kind == SETPOINT_ATTITUDE or sp.kind == SETPOINT_RATE
     is_idle = sp.is_armed == 0 or sp.kind == SETPOINT_IDLE
     if is_idle or (sp.is_landed == 1 and (not is_direct or sp.thrust <= 0.0)):
-        return rest(voltage_share, airframe, est, sp.is_armed)
+        return rest(voltage_share, airframe, est, sp)
 
     rotor_max_n = rotor_thrust(airframe, 1.0, voltage_share)
     thrust_max_n = float(airframe.rotor_count) * rotor_max_n

@@ -40,6 +40,7 @@ from autopilot.mavlink.metadata import MetadataService
 from autopilot.mavlink.mission_commands import MissionCommands
 from autopilot.mavlink.missions import MissionService
 from autopilot.mavlink.modes import ModeService
+from autopilot.mavlink.motor_tests import MotorTestService
 from autopilot.mavlink.obstacles import ObstacleService
 from autopilot.mavlink.offboard import OffboardService
 from autopilot.mavlink.origin import OriginService
@@ -143,6 +144,7 @@ class MavlinkServer:
             OffboardService(endpoint),
             FenceService(endpoint),
             SafetyService(endpoint),
+            MotorTestService(endpoint),
             CalibrationService(endpoint),
             self._compass,
             metadata,

@@ -12,6 +12,7 @@ import numpy as np
 
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_LEAN, SETPOINT_RATE, SETPOINT_TRAJECTORY
 from autopilot.requests import OffboardSetpoint
+from common.kernels import MAX_ROTORS
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
@@ -19,10 +20,10 @@ FREE: Vector = (nan, nan, nan)
 _NOT_HOLDING_M_S = 0.01
 _LARGEST = 1.0e9  # its square is within single precision
 _LEVEL_NORTH = (0.0, 0.0, 0.0, 1.0)
-_LAYOUT = "<3i26f"  # kind, is_armed, is_landed, then every float in the order of autopilot.ports.Setpoint
+_LAYOUT = f"<3i{26 + MAX_ROTORS}f"  # kind, is_armed, is_landed, then the floats of autopilot.ports.Setpoint
 _FIELDS = (
     "kind", "is_armed", "is_landed", "pos_ned", "vel_ned", "accel_ned", "yaw", "yaw_rate", "path_start_ned",
-    "cruise_speed", "climb_speed", "descend_speed", "exit_speed", "q_ned_from_frd", "omega_frd", "thrust",
+    "cruise_speed", "climb_speed", "descend_speed", "exit_speed", "q_ned_from_frd", "omega_frd", "thrust", "motor_test",
 )  # fmt: skip
 
 
@@ -34,7 +35,7 @@ class SetpointPort:
     """
 
     __slots__ = (
-        "_buffer", "_is_changed", "_pack_into", "_press_speed", "_settling", "accel_ned", "climb_speed",
+        "_buffer", "_is_changed", "_motor_test", "_pack_into", "_press_speed", "_settling", "accel_ned", "climb_speed",
         "cruise_speed", "descend_speed", "exit_speed", "is_armed", "is_landed", "kind", "omega_frd", "path_start_ned",
         "pos_ned", "q_ned_from_frd", "thrust", "vel_ned", "yaw", "yaw_rate",
     )  # fmt: skip
@@ -46,6 +47,7 @@ class SetpointPort:
         self._buffer: Any = row.view(np.uint8).reshape(-1)
         self._pack_into = layout.pack_into
         self._is_changed = True
+        self._motor_test: tuple[float, ...] = (0.0,) * MAX_ROTORS
         self.is_armed = False
         self.is_landed = True
         self._settling: tuple[float, float] | None = None  # thrust [0..1] and heading [rad]
@@ -242,6 +244,12 @@ class SetpointPort:
             self._press_speed = speed_down
             self._is_changed = True
 
+    def test_motors(self, commands: tuple[float, ...]) -> None:
+        """From now on, while disarmed: the commands [0..1] of the rotors."""
+        if commands != self._motor_test:
+            self._motor_test = commands
+            self._is_changed = True
+
     def set_yaw(self, yaw: float) -> None:
         """Changes the heading [rad] of the setpoint being flown."""
         self.yaw = yaw
@@ -271,7 +279,7 @@ class SetpointPort:
         values = (
             *pos_ned, *vel_ned, *self.accel_ned, self.yaw,
             yaw_rate, *path_start_ned, self.cruise_speed, self.climb_speed, self.descend_speed, self.exit_speed,
-            *q_ned_from_frd, *self.omega_frd, thrust,
+            *q_ned_from_frd, *self.omega_frd, thrust, *self._motor_test,
         )  # fmt: skip
         try:
             self._pack_into(self._buffer, 0, *flags, *values)

@@ -197,6 +197,19 @@ class RecordingGuided:
         self._record("guided.forget_goto")
 
 
+class RecordedMotorTest:
+    """The motor test of a recording vehicle with four rotors, numbered as those of an X are."""
+
+    rotor_count = 4
+    clockwise = (0, 3, 1, 2)
+
+    def __init__(self, record: Callable[..., Reply]) -> None:
+        self._record = record
+
+    def spin(self, rotors: Sequence[int], command: float, seconds: float, *, pause_s: float = 0.0) -> Reply:
+        return self._record("spin", list(rotors), command, seconds, pause_s)
+
+
 class RecordedCalibration:
     """The calibration of a recording vehicle."""
 
@@ -244,6 +257,7 @@ class RecordingVehicle:
         self.guided = RecordingGuided(self._record)
         self.missing_modes: set[Mode] = set()
         self.guidance = RecordingGuidance(self._record)
+        self.motor_test = RecordedMotorTest(self._record)
         self.payload = Payloads()
         self.payload.add(AuxOutputs(self.state))
         self.traffic = Traffic(self.state, self.params)
