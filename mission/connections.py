@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from autopilot.mavlink.links import LinkError, LinkRole, LinkSource
+from autopilot.mavlink.links import GIVE_WAY_US, LinkError, LinkRole, LinkSource
 from autopilot.mavlink.signing import FileStore, MemoryStore, SigningConfig
 from autopilot.mavlink.tcp import TcpPort
 from autopilot.mavlink.udp import SILENCE_US, UdpPort, address_towards
@@ -22,16 +22,22 @@ PORT_MAX = 65535
 def open_links(options: FlightOptions, speed: float) -> list[LinkSource]:
     _check_ports(options)
     links: list[LinkSource] = []
-    silence_us = int(SILENCE_US * max(speed, 1.0))  # clients' heartbeats follow the wall clock
+    pace = max(speed, 1.0)  # clients' heartbeats follow the wall clock
+    silence_us, give_way_us = int(SILENCE_US * pace), int(GIVE_WAY_US * pace)
     try:
         bind = options.bind or address_towards(options.host)
         for role, port, step in (
             (LinkRole.GROUND, options.gcs_port, GROUND_PORT_STEP),
             (LinkRole.ONBOARD, options.api_port, API_PORT_STEP),
         ):
-            links.append(UdpPort(port, role, options.host, local_port=port + step, bind=bind, silence_us=silence_us))
+            links.append(
+                UdpPort(
+                    port, role, options.host,
+                    local_port=port + step, bind=bind, silence_us=silence_us, give_way_us=give_way_us,
+                )
+            )  # fmt: skip
         if options.tcp_port is not None:
-            links.append(TcpPort(options.tcp_port, bind=bind))
+            links.append(TcpPort(options.tcp_port, bind=bind, give_way_us=give_way_us))
     except LinkError as error:
         for link in links:
             link.close()

@@ -21,6 +21,7 @@ MAGIC_V1 = 0xFE
 MAGIC_V2 = 0xFD
 SIGNED_FLAG = 0x01
 SIGNATURE_LENGTH = 13
+FRAME_MAX = 280  # [byte]
 _SHORTEST_V2 = 12  # header and checksum
 
 _HEADER_V2 = struct.Struct(
@@ -96,15 +97,15 @@ def message_id(name: str) -> int:
     return _IDS_BY_NAME[name]
 
 
-@cache
 def message_type(key: int | str) -> MessageType | None:
     """The layout of a message by id or name, None if it is unknown."""
     msg_id = _IDS_BY_NAME.get(key) if isinstance(key, str) else key
-    definition = None if msg_id is None else DEFINITIONS.get(msg_id)
-    if definition is None:
-        return None
-    if isinstance(key, str):
-        return message_type(definition.id)
+    return _layout(msg_id) if msg_id is not None and msg_id in DEFINITIONS else None
+
+
+@cache  # of the messages there are: clients send numbers of any
+def _layout(msg_id: int) -> MessageType:
+    definition = DEFINITIONS[msg_id]
     packer, unpacker, size = _compile(definition)
     system_at, component_at = _target_positions(definition)
     crc_extra = bytes([definition.crc_extra])
@@ -242,12 +243,21 @@ class FrameReader:
         return frames
 
 
+def begins_with_frame(data: bytes) -> bool:
+    """Whether a message that we know stands at the beginning, with a right checksum: what only MAVLink clients send."""
+    head = data[:FRAME_MAX]
+    if head[:1] not in (bytes([MAGIC_V1]), bytes([MAGIC_V2])):
+        return False
+    end = _frame_end(head, 0, len(head))
+    return end <= len(head) and _checked_frame(head, 0, end) is not None
+
+
 def _only_frame(data: bytes) -> Frame | None:
     """The frame that `data` is, if it is one whole unsigned MAVLink 2 frame: what nearly every piece is."""
     if len(data) < _SHORTEST_V2 or data[0] != MAGIC_V2 or len(data) != _SHORTEST_V2 + data[1] or data[2]:
         return None
     msg_id = data[7] | data[8] << 8 | data[9] << 16
-    kind = message_type(msg_id) if msg_id in DEFINITIONS else None
+    kind = message_type(msg_id)
     if kind is None or mcrf4xx(data[1:-2] + kind.crc_extra) != data[-2] | data[-1] << 8:
         return None
     return Frame(kind, data[5], data[6], data[4], data[10:-2], data)
@@ -268,7 +278,7 @@ def _checked_frame(buffer: bytes, at: int, end: int) -> Frame | None:
     start, seq, sysid, compid, msg_id = _header(buffer, at)
     if start == at + 10 and buffer[at + 2] & ~SIGNED_FLAG:  # flags we do not know change how it is to be read
         return None
-    kind = message_type(msg_id) if msg_id in DEFINITIONS else None
+    kind = message_type(msg_id)
     if kind is None:
         return None
     stop = start + buffer[at + 1]

@@ -20,6 +20,7 @@ PORT_MAX = 65_535
 DATAGRAM_MAX = 65_535  # [byte]
 DATAGRAMS_PER_POLL_MAX = 1_000  # a flood must not stop the client
 MEMORY_CHUNKS_MAX = 100_000  # a reader that never reads must not fill the memory
+GIVE_WAY_US = 5_000_000  # guess: some heartbeats missed
 
 
 class LinkError(Exception):

@@ -11,9 +11,10 @@ from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 
-from autopilot.mavlink.codec import MAGIC_V1, MAGIC_V2
+from autopilot.mavlink.codec import begins_with_frame
 from autopilot.mavlink.links import (
     DATAGRAM_MAX,
+    GIVE_WAY_US,
     LOOPBACK,
     Link,
     LinkError,
@@ -23,7 +24,7 @@ from autopilot.mavlink.links import (
     is_loopback,
 )
 
-PEERS_MAX = 32  # per port; the one heard longest ago gives way
+PEERS_MAX = 32  # per port; one that has been silent gives way, and while none has, a newcomer gets no link
 DATAGRAMS_PER_READ_MAX = (
     64  # of one client in one frame; the rest waits in its socket, and what finds that full is lost
 )
@@ -90,7 +91,7 @@ class UdpPeer:
 
 
 class UdpPort:
-    """Speaks to one address from the start, and to everyone who sends it MAVLink.
+    """Speaks to one address from the start, and to everyone who sends it a MAVLink message with a right checksum.
 
     Args:
         remote_port: where the first client listens.
@@ -100,6 +101,7 @@ class UdpPort:
         bind: the address the port is open at; "": loopback, or the address that leads to `host` if that is another
             machine.
         silence_us: a client that has been silent for so long is forgotten; the first one never is.
+        give_way_us: of too many clients one that has been silent for so long gives way to a newcomer.
 
     Raises:
         LinkError: an address is unknown, or the local port is taken.
@@ -114,9 +116,10 @@ class UdpPort:
         local_port: int = 0,
         bind: str = "",
         silence_us: int = SILENCE_US,
+        give_way_us: int = GIVE_WAY_US,
     ) -> None:
         self._role = role
-        self._silence_us = silence_us
+        self._silence_us, self._give_way_us = silence_us, give_way_us
         self._remote = (address_of(host), remote_port)
         self._socket = bound_socket(socket.SOCK_DGRAM, address_of(bind or address_towards(host)), local_port)
         # Only now: until here another vehicle on the same port would have been refused.
@@ -162,10 +165,10 @@ class UdpPort:
             self.take(data, address)
 
     def take(self, data: bytes, address: Address) -> None:
-        """A datagram from an address that may not have a link yet; one that is no MAVLink makes none."""
+        """A datagram from an address that may not have a link yet; rubbish makes none, and is answered by nothing."""
         peer = self._peers.get(address)
         if peer is None:
-            if data[:1] not in (bytes([MAGIC_V1]), bytes([MAGIC_V2])):
+            if not begins_with_frame(data) or not self._has_room():
                 return
             try:
                 peer = self._add(address)
@@ -175,14 +178,21 @@ class UdpPort:
         peer.is_ready = True
         peer.heard_us = self._time_us
 
+    def _has_room(self) -> bool:
+        """Whether there may be one more client; makes room for it if somebody has been silent."""
+        if len(self._peers) < PEERS_MAX:
+            return True
+        oldest = min((peer for peer in self._peers.values() if peer.address != self._remote), key=lambda p: p.heard_us)
+        if self._time_us - oldest.heard_us < self._give_way_us:
+            return False
+        self._drop(oldest)
+        return True
+
     def _add(self, address: Address) -> UdpPeer:
         peer = UdpPeer(self, self._own, address, self._role, self._time_us)
         self._peers[address] = peer
         self._by_fileno[peer.fileno()] = peer
         self._poller.register(peer, select.POLLIN)
-        if len(self._peers) > PEERS_MAX:
-            others = [other for other in self._peers.values() if other is not peer and other.address != self._remote]
-            self._drop(min(others, key=lambda other: other.heard_us))
         self.links = tuple(self._peers.values())
         return peer
 

@@ -6,9 +6,10 @@ from contextlib import ExitStack
 import pytest
 
 from autopilot.mavlink.codec import FrameReader, decode, encode
-from autopilot.mavlink.links import LinkError, LinkRole, UdpLink
+from autopilot.mavlink.links import GIVE_WAY_US, LinkError, LinkRole, UdpLink
 from autopilot.mavlink.server import MavlinkServer
-from autopilot.mavlink.tcp import UNSENT_MAX, TcpPort
+from autopilot.mavlink.tcp import PEERS_MAX as TCP_PEERS_MAX
+from autopilot.mavlink.tcp import PROOF_MAX, UNSENT_MAX, TcpPort
 from autopilot.mavlink.udp import PEERS_MAX, UdpPort
 from tests.unit.autopilot.mavlink.rig import FRAME_US, RecordingVehicle
 
@@ -75,11 +76,35 @@ def test_everyone_who_speaks_has_a_link_of_their_own(listener, port):
         assert received(port) == [[], [b"again"]]
 
 
-def test_what_is_no_mavlink_makes_no_link(listener, port):
+@pytest.mark.parametrize(
+    "rubbish", [b"GET / HTTP/1.1", b"", b"\xfd", b"\xfe", HELLO[:-1], HELLO[:-1] + b"x", b"x" + HELLO, bytes(5000)]
+)
+def test_what_is_no_right_frame_makes_no_link_and_is_sent_nothing(listener, port, rubbish):
+    server = MavlinkServer(RecordingVehicle(), [port])
     with udp_socket() as other:
-        speak(other, port, b"GET / HTTP/1.1")
-        received(port)
+        speak(other, port, rubbish)
+        for i in range(100):
+            server.frame(5_000_000 + i * FRAME_US)
         assert len(port.links) == 1
+        other.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            other.recv(100)
+
+
+def test_newcomers_do_not_evict_a_client_with_heartbeats(listener, port):
+    with ExitStack() as stack:
+        pilot = stack.enter_context(udp_socket())
+        for second in range(20):
+            speak(pilot, port)
+            for data in (b"\xfd", HELLO):
+                for _ in range(PEERS_MAX + 8):
+                    with udp_socket() as newcomer:
+                        speak(newcomer, port, data)
+            received(port, second * 1_000_000)
+        assert len(port.links) == PEERS_MAX
+        for link in port.links:
+            link.send(b"still")
+        assert pilot.recv(100) == b"still"
 
 
 def test_client_silent_for_long_is_forgotten_and_the_first_stays(listener, port):
@@ -104,7 +129,7 @@ def test_clients_are_bounded_and_the_one_heard_longest_ago_gives_way(listener, p
         others = [stack.enter_context(udp_socket()) for _ in range(PEERS_MAX + 4)]
         for i, other in enumerate(others):
             speak(other, port)
-            received(port, i)
+            received(port, i * 1_000_000)
         assert len(port.links) == PEERS_MAX
         for link in port.links:
             link.send(b"last")
@@ -174,8 +199,10 @@ def test_tcp_client_comes_speaks_and_goes():
     with socket.create_connection((LOOPBACK, port.local_port), 5.0) as client:
         port.poll(0)
         (link,) = port.links
-        client.sendall(b"ab")
-        assert received(port) == [[b"ab"]]
+        client.sendall(HELLO[:9])
+        assert received(port) == [[]]
+        client.sendall(HELLO[9:] + b"ab")
+        assert received(port) == [[HELLO + b"ab"]]
         link.send(b"cd")
         assert client.recv(100) == b"cd"
     received(port)
@@ -189,6 +216,8 @@ def test_tcp_client_that_does_not_read_costs_a_bounded_queue_and_then_whole_fram
     port = TcpPort(0)
     with socket.create_connection((LOOPBACK, port.local_port), 5.0) as client:
         port.poll(0)
+        client.sendall(HELLO)
+        received(port)
         (link,) = port.links
         for i in range(200_000):
             link.send(encode("ATTITUDE", 1, 1, i & 0xFF, i, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6))
@@ -205,6 +234,99 @@ def test_tcp_client_that_does_not_read_costs_a_bounded_queue_and_then_whole_fram
         assert len(times) > 1_000
         assert times == list(range(len(times)))
         assert reader.bad_byte_count == 0
+    port.close()
+
+
+def over_tcp(port, client, frames=100):
+    """What a client hears of a vehicle behind the port."""
+    server, reader, messages = MavlinkServer(RecordingVehicle(), [port]), FrameReader(), []
+    for i in range(frames):
+        server.frame(5_000_000 + i * FRAME_US)
+    client.settimeout(0.1)
+    try:
+        while data := client.recv(1 << 16):
+            messages += [decode(frame) for frame in reader.feed(data)]
+    except (TimeoutError, ConnectionError):
+        return server, messages
+    return server, messages
+
+
+ARM = encode("COMMAND_LONG", 255, 190, 0, target_system=1, target_component=1, command=400, param1=1.0, param2=21196.0)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        b"POST / HTTP/1.1\r\nOrigin: https://evil.example\r\nContent-Length: 50\r\n\r\n", b"GET / HTTP/1.1\r\n\r\n",
+        b"\x16\x03\x01", b"x", b"\xfd" + bytes(PROOF_MAX),
+    ],
+)  # fmt: skip
+def test_tcp_client_that_does_not_begin_with_mavlink_is_closed_and_not_obeyed(head):
+    port = TcpPort(0)
+    with socket.create_connection((LOOPBACK, port.local_port), 5.0) as client:
+        client.sendall(head + ARM)
+        server, messages = over_tcp(port, client)
+        assert {message.name for message in messages} <= {"HEARTBEAT"}
+        assert list(port.links) == []
+        server.close()
+
+
+def test_tcp_client_that_says_nothing_hears_heartbeats_and_after_its_first_frame_everything():
+    port = TcpPort(0)
+    with socket.create_connection((LOOPBACK, port.local_port), 5.0) as client:
+        server, messages = over_tcp(port, client)
+        assert {message.name for message in messages} == {"HEARTBEAT"}
+        client.sendall(ARM)
+        for i in range(100, 200):
+            server.frame(5_000_000 + i * FRAME_US)
+        reader, names = FrameReader(), set()
+        with pytest.raises(TimeoutError):
+            while True:
+                names |= {decode(frame).name for frame in reader.feed(client.recv(1 << 16))}
+        assert {"HEARTBEAT", "ATTITUDE", "COMMAND_ACK"} <= names
+        server.close()
+
+
+def test_a_thousand_idle_tcp_connections_do_not_evict_a_client_that_speaks():
+    port = TcpPort(0)
+    with ExitStack() as stack, socket.create_connection((LOOPBACK, port.local_port), 5.0) as pilot:
+        pilot.sendall(HELLO)
+        received(port)
+        (link,) = port.links
+        for i in range(1_000):
+            idle = stack.enter_context(socket.socket())
+            idle.setblocking(False)
+            idle.connect_ex((LOOPBACK, port.local_port))
+            if i % 3 == 0:
+                received(port, i * FRAME_US)
+            if i % 50 == 0:
+                pilot.sendall(HELLO)
+        assert link in port.links
+        assert len(port.links) <= TCP_PEERS_MAX
+    port.close()
+
+
+def test_a_tcp_newcomer_gets_the_place_of_one_that_has_said_nothing_else_of_one_long_silent():
+    port = TcpPort(0)
+    with ExitStack() as stack:
+
+        def come(data, time_us):
+            client = stack.enter_context(socket.create_connection((LOOPBACK, port.local_port), 5.0))
+            client.sendall(data)
+            received(port, time_us)
+            received(port, time_us)
+            return client
+
+        come(b"\xfd", 0)
+        for _ in range(TCP_PEERS_MAX - 1):
+            come(HELLO, 1)
+        come(HELLO, 2)  # instead of the first
+        assert all(link.is_heard for link in port.links)
+        before = set(port.links)
+        come(HELLO, 3)
+        assert set(port.links) == before
+        come(HELLO, 2 + GIVE_WAY_US)
+        assert len(set(port.links) - before) == 1
     port.close()
 
 

@@ -7,12 +7,13 @@ import tty
 import pytest
 
 from autopilot.mavlink.client_links import open_client_link
+from autopilot.mavlink.codec import encode
 from autopilot.mavlink.links import LinkError, LinkRole
 from autopilot.mavlink.tcp import TcpPort
 from autopilot.mavlink.udp import UdpPort
 from tests.system.vehicle import free_ports
 
-FRAME = bytes.fromhex("fd09000000ffbe000000000000000608c0040392fe")  # a heartbeat: the vehicle's ports look for one
+FRAME = encode("HEARTBEAT", 255, 190, 0, type=6, autopilot=8)  # the vehicle's ports look for a right one
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@ import struct
 import pytest
 from pymavlink.dialects.v20 import all as pymavlink_all
 
-from autopilot.mavlink.codec import FrameReader, decode, encode, known_type, message_type
+from autopilot.mavlink.codec import FrameReader, _layout, begins_with_frame, decode, encode, known_type, message_type
 from autopilot.mavlink.definitions import DEFINITIONS
 
 HEARTBEAT_FIELDS = {"type": 2, "autopilot": 12, "base_mode": 157, "custom_mode": 0x03040000, "system_status": 4}
@@ -122,3 +122,21 @@ def test_reader_keeps_at_most_one_frame():
     for _ in range(1000):
         reader.feed(b"\xfd\xff" * 100)
     assert len(reader._rest) <= 280
+
+
+def test_numbers_that_clients_send_fill_no_cache():
+    before = _layout.cache_info().currsize
+    for msg_id in range(1 << 24, (1 << 24) + 1_000):
+        assert message_type(msg_id) is None
+        assert message_type(-msg_id) is None
+    assert _layout.cache_info().currsize == before
+
+
+def test_a_right_frame_is_seen_at_the_beginning_only():
+    hello = encode("HEARTBEAT", 3, 1, 9, **HEARTBEAT_FIELDS)
+    assert begins_with_frame(hello)
+    assert begins_with_frame(hello + b"rubbish" * 100)
+    for i in range(len(hello)):
+        assert not begins_with_frame(hello[:i])
+        assert not begins_with_frame(hello[:i] + bytes([hello[i] ^ 1]) + hello[i + 1 :])
+    assert not begins_with_frame(b"x" + hello)
