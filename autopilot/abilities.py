@@ -161,6 +161,10 @@ class Vehicle(Protocol):
     @property
     def guided(self) -> GuidedPort: ...
 
+    def follow_ardupilot(self) -> None:
+        """From now on pilots and modes are treated as ArduPilot treats them."""
+        ...
+
     def has_mode(self, mode: Mode) -> bool:
         """Whether there is such a mode at all."""
         ...

@@ -187,6 +187,11 @@ class FlightController:
         self.payload.add(camera)
         return camera
 
+    def follow_ardupilot(self) -> None:
+        """From now on pilots and modes are treated as ArduPilot treats them."""
+        self.sticks.follow_ardupilot()
+        self.commander.follow_ardupilot()
+
     def attach(self, server: Server) -> None:
         """Adds a MAVLink server: it hears of events, and its frame is run at the end of each frame."""
         self._relay.targets.append(server)
@@ -196,6 +201,7 @@ class FlightController:
         """Runs one frame of the Python part at `time_us`: reads, decides, writes the setpoint, serves links."""
         dt_s = (time_us - self.state.time_us) * 1e-6
         self._read(time_us)
+        self.sticks.frame(time_us)
         self.fence.frame()
         self.commander.frame(dt_s)
         if self.state.is_calibrating:

@@ -50,6 +50,7 @@ class CalibrationKind(Enum):
 
     GYRO = "gyro"
     MAG = "mag"
+    BARO = "baro"
     ACCEL = "accel"
     ACCEL_SIMPLE = "accel simple"  # the vehicle stays level
     LEVEL = "level"

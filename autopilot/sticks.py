@@ -3,6 +3,9 @@
 In: joystick positions (MANUAL_CONTROL) and overridden radio channels (RC_CHANNELS_OVERRIDE) as clients send them. Out:
 one `StickInput`, which the stick modes fly and telemetry shows. Nothing is computed until a message comes: whether the
 sticks are heard is one comparison with the time of this frame.
+
+With `has_radio` a simulated radio lies beside the vehicle, as in ArduPilot's SITL: sticks in the middle, throttle down.
+It has what no client overrides, and everything again once the overrides are released or time out.
 """
 
 from collections.abc import Sequence
@@ -15,6 +18,8 @@ CHANNELS = 18  # of RC_CHANNELS
 CALIBRATED = 8  # channels with parameters of their own
 UNUSED = 0xFFFF  # in RC_CHANNELS: no such channel
 _RELEASED = 0  # no value: nobody overrides the channel
+_RADIO_US = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800) + (0,) * 10  # what nobody touches (ArduPilot's SITL)
+_RADIO_MIDDLE_US, _RADIO_LOW_US = 1500, 1000
 _PULSES_US = (800, 2200)  # a pulse outside is none
 _MOVED_S = 0.1  # low-pass of a stick's speed (PX4: MovingDiff)
 
@@ -51,6 +56,11 @@ class StickInput:
     speed: float = 0.0  # [1/s] of the stick that moves fastest, low-passed
     is_ardupilot: bool = False  # they are read as ArduPilot reads them, where the two differ
     steer_hold: bool = False  # the sticks are followed in Hold as they are in Position (ArduPilot's LOITER)
+    is_untouched: bool = False  # a radio is heard, and nobody is at its sticks
+
+    def has_pilot(self, now_us: int) -> bool:
+        """Whether somebody steers: a mode that flies by itself does so beside a radio that nobody touches."""
+        return now_us <= self.heard_until_us and not self.is_untouched
 
 
 class Sticks:
@@ -61,9 +71,9 @@ class Sticks:
     """
 
     __slots__ = (
-        "_calibration", "_first", "_heard_us", "_in_mode", "_joystick_us", "_map", "_override_us", "_params", "_sender",
-        "_speeds", "input", "is_cut", "is_forward_low", "takes_every_source",
-        "takes_over",
+        "_calibration", "_first", "_heard_us", "_in_mode", "_loss_us", "_map", "_override_us", "_overrides",
+        "_params", "_radio", "_sender", "_speeds", "has_radio", "input", "is_cut", "is_forward_low",
+        "takes_every_source", "takes_over",
     )  # fmt: skip
 
     def __init__(self, params: ParameterTable) -> None:
@@ -72,6 +82,8 @@ class Sticks:
         self.is_forward_low = False  # a pitch stick pushed forward is a short pulse (ArduPilot), not a long one (PX4)
         self.takes_every_source = False  # whatever COM_RC_IN_MODE says: ArduPilot has no such setting
         self.takes_over = True  # moving them may leave auto modes, as COM_RC_OVERRIDE says; not in ArduPilot
+        self.has_radio = False  # a simulated one, whose sticks nobody touches
+        self._overrides = [_RELEASED] * CHANNELS  # [us] by the sender in control
         self._params = params
         self._sender: tuple[Source, int, int] | None = None  # in control: kind, system and component id
         self._first: Source | None = None  # kind that came first since power-on
@@ -87,6 +99,36 @@ class Sticks:
         self.takes_over = False
         self.input.steer_hold = True
         self.input.is_ardupilot = True
+        self.has_radio = True
+        self._hand_back()
+
+    def frame(self, now_us: int) -> None:
+        """The simulated radio's part, where there is one: it is heard unless cut, and takes over from lost senders."""
+        if not self.has_radio or self.is_cut:
+            return
+        if self._sender is not None and now_us > self.input.heard_until_us:
+            self._hand_back()
+        if self._sender is None:
+            self.input.heard_until_us = now_us + self._loss_us
+
+    def _hand_back(self) -> None:
+        """Gives the sticks to the simulated radio."""
+        now = self.input
+        self._sender = None
+        self._overrides = [_RELEASED] * CHANNELS
+        now.buttons = 0
+        now.speed = 0.0
+        now.count += 1
+        now.is_untouched = True
+        self._read_channels()
+
+    def _read_channels(self) -> None:
+        """Every channel as overridden, or else the radio's; and the sticks that they mean."""
+        now = self.input
+        radio = self._radio if self.has_radio else (_RELEASED,) * CHANNELS
+        now.channels[:] = [pulse or radio_us for pulse, radio_us in zip(self._overrides, radio, strict=True)]
+        now.roll, pitch, now.yaw, now.throttle = (self._deflection(stick) for stick in self._map)
+        now.pitch = -pitch if self.is_forward_low else pitch
 
     # ---- what others ask ----
 
@@ -120,10 +162,13 @@ class Sticks:
             axes: roll, pitch, yaw, throttle, each -1..1; None leaves one as it is.
             buttons: bits.
         """
-        refusal = self._take_control(Source.JOYSTICK, sender, now_us, self._joystick_us)
+        # ArduPilot takes a joystick for overridden channels: it may be silent for as long
+        silence_us = self._override_us if self.has_radio else self._loss_us
+        refusal = self._take_control(Source.JOYSTICK, sender, now_us, silence_us)
         if refusal is not None:
             return refusal
         now = self.input
+        now.is_untouched = False
         old = (now.roll, now.pitch, now.yaw, now.throttle)
         roll, pitch, yaw, throttle = (was if axis is None else axis for was, axis in zip(old, axes, strict=True))
         now.buttons = buttons
@@ -131,7 +176,8 @@ class Sticks:
         for stick, value in zip(self._map, (roll, pitch, yaw, throttle), strict=True):
             if stick:
                 is_turned = stick == self._map[1] and self.is_forward_low
-                now.channels[stick - 1] = self._pulse_us(stick, -value if is_turned else value)
+                self._overrides[stick - 1] = self._pulse_us(stick, -value if is_turned else value)
+                now.channels[stick - 1] = self._overrides[stick - 1]
         return ""
 
     def channels_overridden(self, sender: tuple[int, int], now_us: int, pulses_us: Sequence[int | None]) -> str:
@@ -147,18 +193,25 @@ class Sticks:
         refusal = self._take_control(Source.RADIO, sender, now_us, self._override_us)
         if refusal is not None:
             return refusal
-        channels = now.channels
+        overrides = self._overrides
         for i, pulse_us in enumerate(pulses_us[:CHANNELS]):
             if pulse_us is not None:
-                channels[i] = pulse_us if _PULSES_US[0] <= pulse_us <= _PULSES_US[1] else _RELEASED
-        if not any(stick and channels[stick - 1] for stick in self._map):  # switches at most: nobody flies, or no more
+                overrides[i] = pulse_us if _PULSES_US[0] <= pulse_us <= _PULSES_US[1] else _RELEASED
+        if self.has_radio and not any(overrides):
+            self._hand_back()
+            return ""
+        old = (now.roll, now.pitch, now.yaw, now.throttle)
+        self._read_channels()
+        now.is_untouched = not any(stick and overrides[stick - 1] for stick in self._map)  # switches at most
+        if now.is_untouched and not self.has_radio:  # nobody flies, or no more
             now.heard_until_us = min(was_heard_us, now_us - 1)
             now.speed = 0.0
             now.count += 1
             return ""
         now.buttons = 0
-        roll, pitch, yaw, throttle = (self._deflection(stick) for stick in self._map)
-        self._move(now_us, roll, -pitch if self.is_forward_low else pitch, yaw, throttle)
+        new = (now.roll, now.pitch, now.yaw, now.throttle)
+        now.roll, now.pitch, now.yaw, now.throttle = old
+        self._move(now_us, *new)
         return ""
 
     def _take_control(self, source: Source, sender: tuple[int, int], now_us: int, silence_us: int) -> str | None:
@@ -173,12 +226,11 @@ class Sticks:
             return f"COM_RC_IN_MODE {int(mode)} does not take a {source.name.lower()}"
         who = (source, *sender)
         if who != self._sender:
-            if self.is_heard(now_us):
+            if self.is_heard(now_us) and self._sender is not None:
                 return ""
             self._sender = who
-            now = self.input
-            now.roll = now.pitch = now.yaw = now.throttle = 0.0
-            now.channels[:] = [_RELEASED] * CHANNELS
+            self._overrides = [_RELEASED] * CHANNELS
+            self._read_channels()
         if self._first is None:
             self._first = source
         if not self.is_heard(now_us):
@@ -238,10 +290,14 @@ class Sticks:
     def _load(self) -> None:
         params = self._params
         self._in_mode = InMode(int(params["COM_RC_IN_MODE"]))
-        self._joystick_us = round(float(params["COM_RC_LOSS_T"]) * 1e6)
+        self._loss_us = round(float(params["COM_RC_LOSS_T"]) * 1e6)
         self._override_us = round(float(params["RC_OVERRIDE_TIME"]) * 1e6)
         names = ("RC_MAP_ROLL", "RC_MAP_PITCH", "RC_MAP_YAW", "RC_MAP_THROTTLE")
         self._map = tuple(int(params[name]) for name in names)
+        self._radio = list(_RADIO_US)
+        for stick, pulse_us in zip(self._map, (_RADIO_MIDDLE_US,) * 3 + (_RADIO_LOW_US,), strict=True):
+            if stick:
+                self._radio[stick - 1] = pulse_us
         self._calibration = [
             tuple(float(params[f"RC{i}_{name}"]) for name in ("MIN", "TRIM", "MAX", "REV", "DZ"))
             for i in range(1, CALIBRATED + 1)

@@ -58,6 +58,10 @@ def fly(
     hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m].")] = 12.0,
     walls: Annotated[bool, typer.Option("--walls", help="Walls along the edges of the map.")] = False,
     dialect: Annotated[str, typer.Option(help="What ground stations take it for: px4 or ardupilot.")] = "px4",
+    announce_components: Annotated[
+        bool,
+        typer.Option("--announce-components", help="ArduPilot's dialect: heartbeats of camera, gimbal and winch, too."),
+    ] = False,
     host: Annotated[str, typer.Option(help="Address ground stations are sent to.")] = "127.0.0.1",
     bind: Annotated[str, typer.Option(help="Address the vehicle's ports are open at. Default: loopback.")] = "",
     tcp_port: Annotated[
@@ -104,7 +108,7 @@ def fly(
                 tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
                 run_folder=run_folder, stream_port=stream_port, parameters=tuple(param or ()), state=state,
                 traffic_count=traffic, has_lidar=lidar, has_view=view, view_port=view_port,
-                owner=owner, image_port=image_port,
+                owner=owner, image_port=image_port, announces_components=announce_components,
             )
         )  # fmt: skip
     except UserError as error:

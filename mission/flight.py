@@ -147,7 +147,14 @@ class Flight:
             self.server = MavlinkServer(self.controller, [vehicle_end, *links], on_frame=on_frame, signing=signing)
             self._servers = [self.server]
         else:  # the script is not asked to know two languages: it has a server of its own
-            self.server = MavlinkServer(self.controller, links, dialect, on_frame, signing)
+            self.server = MavlinkServer(
+                self.controller,
+                links,
+                dialect,
+                on_frame,
+                signing,
+                announces_components=config.announces_components,
+            )
             self._servers = [self.server, MavlinkServer(self.controller, [vehicle_end])]
         self.drone = Drone(client_end)
         log = None if folder is None else folder / "flight.ulg"

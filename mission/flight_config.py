@@ -49,6 +49,8 @@ class FlightConfig(BaseModel):
     """Scales every sensor's noise, and that of the onboard camera; 0 makes them perfect."""
     dialect: Literal["px4", "ardupilot"] = "px4"
     """Which autopilot's numbers ground stations get. The flight's own script always gets PX4's."""
+    announces_components: bool = False
+    """Camera, gimbal and winch send heartbeats of their own in ArduPilot's dialect, too; in PX4's they always do."""
     traffic_count: int = Field(default=0, ge=0, le=50)
     """Other aircraft that an ADS-B receiver on board hears."""
     has_lidar: bool = False

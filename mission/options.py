@@ -46,6 +46,7 @@ class FlightOptions:
     api_port: int
     run_folder: Path | None
     dialect: str = "px4"
+    announces_components: bool = False
     stream_port: int = 0
     has_view: bool = False
     view_port: int = 8080
@@ -94,6 +95,7 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
             wind_from_deg=options.wind_from_deg,
             noise=options.noise,
             dialect=options.dialect,
+            announces_components=options.announces_components,
             traffic_count=options.traffic_count,
             has_lidar=options.has_lidar,
             parameters=dict(_parameter(text) for text in options.parameters),

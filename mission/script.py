@@ -36,6 +36,7 @@ MAIN_OFFBOARD = 6
 AUTO_LOITER = 3
 AUTO_MISSION = 4
 AUTO_RTL = 5
+AUTO_LAND = 6
 
 FRAME_GLOBAL = 0
 FRAME_LOCAL_NED = 1
@@ -120,6 +121,8 @@ class Drone(Client):
         await self.until(lambda: self.is_ready, timeout_s, "ready to arm")
 
     async def arm(self, *, force: bool = False) -> None:
+        if not self.is_armed and self.px4_mode in ((MAIN_AUTO, AUTO_RTL), (MAIN_AUTO, AUTO_LAND)):
+            await self.hold()  # a vehicle that follows ArduPilot stays in them, and is not armed there
         await self.command(CMD_ARM_DISARM, 1.0, FORCE_MAGIC if force else 0.0, name="arm")
         await self.until(lambda: self.is_armed, 2.0, "armed")
 

@@ -93,6 +93,7 @@ class Calibrator:
             CalibrationKind.ACCEL: self._accel,
             CalibrationKind.ACCEL_SIMPLE: self._accel_simple,
             CalibrationKind.LEVEL: self._level,
+            CalibrationKind.BARO: self._baro,
         }
         self._flow = self._whole(kind.value.split()[0], flows[kind]())
         self._state.is_calibrating = True
@@ -143,6 +144,10 @@ class Calibrator:
         if self._table is not None:
             self._table.release()
         self._tell(f"calibration {how}")
+
+    def _baro(self) -> Flow:
+        """The estimator levels the barometer on the ground by itself: nothing is left to find."""
+        yield
 
     def _gyro(self) -> Flow:
         gyro = yield from self._averaged(lambda: self._state.samples.imu.gyro_frd, (0, 100))

@@ -14,7 +14,7 @@ from autopilot.commander.flying import Flying
 from autopilot.commander.guard import Guard
 from autopilot.commander.home import Home
 from autopilot.commander.landing import LandingDetector
-from autopilot.commander.modes import MODE_RULES, NO_STICKS, mode_refusal
+from autopilot.commander.modes import MODE_RULES, NO_STICKS, PASSING_MODES, mode_refusal
 from autopilot.commander.motors import MotorWatch
 from autopilot.commander.pilot import Pilot
 from autopilot.commander.watch import FailureWatch, StationLink
@@ -81,12 +81,17 @@ class Commander:
         self._lift_since_us = 0
         self._lift_d = 0.0
         self._has_flown = False  # since arming
+        self._is_ardupilot = False
         self._load()
         params.on_change(self._on_parameter)
 
     def connect(self, flying: Flying) -> None:
         """Names the navigator; once, before the first frame."""
         self._flying = flying
+
+    def follow_ardupilot(self) -> None:
+        """Modes by ArduPilot's rules: any may be chosen on the ground, some are not armable, landing changes none."""
+        self._is_ardupilot = True
 
     # ---- each frame ----
 
@@ -167,11 +172,18 @@ class Commander:
 
     def check_arming(self) -> list[str]:
         """Reasons why the vehicle may not be armed now; empty when ready."""
+        reasons = self._arming_reasons()
+        if not MODE_RULES[self.state.mode].may_arm:
+            reasons.append(
+                "Mode not armable" if self._is_ardupilot else f"mode {self.state.mode.name} does not allow arming"
+            )
+        return reasons
+
+    def _arming_reasons(self) -> list[str]:
+        """Those besides the mode."""
         state = self.state
         mode = state.mode
         reasons = arming_reasons(state, self.params, needs_position=self._needs_position(mode))
-        if not MODE_RULES[mode].may_arm:
-            reasons.append(f"mode {mode.name} does not allow arming")
         if state.landed_state is not LandedState.ON_GROUND:
             reasons.append("not on the ground")
         if MODE_RULES[mode].needs_sticks and not self._pilot.is_heard:
@@ -218,11 +230,12 @@ class Commander:
         state = self.state
         if mode is state.mode:
             return ""
+        is_free = self._is_ardupilot and not state.is_armed  # any mode: arming asks for what it needs
         return mode_refusal(
             mode,
-            has_position=self.has_position,
-            has_home=state.home is not None,
-            is_on_ground=state.landed_state is LandedState.ON_GROUND,
+            has_position=self.has_position or is_free,
+            has_home=state.home is not None or is_free,
+            is_on_ground=state.landed_state is LandedState.ON_GROUND and not self._is_ardupilot,
             needs_position=self._needs_position(mode),
             has_sticks=self._pilot.is_heard,
         ) or self._flying.refusal(mode)
@@ -311,7 +324,8 @@ class Commander:
         self.guard.release()
         self._next_check_us = 0
         self.hold_reasons_back()
-        if not MODE_RULES[state.mode].needs_sticks and state.mode is not Mode.GUIDED:  # arming again in it is usual
+        stays = MODE_RULES[state.mode].needs_sticks or state.mode is Mode.GUIDED  # arming again in it is usual
+        if not stays and not (self._is_ardupilot and state.mode not in PASSING_MODES):
             self.change_mode(Mode.HOLD)
         self.announcer.heartbeat_now()
         self.announcer.statustext(Severity.INFO, text)
@@ -343,9 +357,9 @@ class Commander:
 
     def _check_before_arming(self) -> None:
         state = self.state
-        if MODE_RULES[state.mode].needs_sticks and not self._pilot.is_heard:
+        if MODE_RULES[state.mode].needs_sticks and not self._pilot.is_heard and not self._is_ardupilot:
             self.change_mode(Mode.HOLD)  # the pilot has gone: whoever comes next may need none
-        reasons = self.check_arming()
+        reasons = self._arming_reasons() if self._is_ardupilot else self.check_arming()
         state.is_ready_to_arm = not reasons
         if reasons and state.time_us >= self._next_text_us and not state.is_calibrating:
             self._next_text_us = state.time_us + _TEXT_PERIOD_US

@@ -41,6 +41,10 @@ MODE_RULES: dict[Mode, ModeRule] = {
 }
 
 
+# Modes of which nothing is left once it is disarmed: it goes over to Hold. By ArduPilot's rules it stays in any other.
+PASSING_MODES = frozenset({Mode.TAKEOFF, Mode.OFFBOARD, Mode.TERMINATION})
+
+
 def mode_refusal(
     mode: Mode, *, has_position: bool, has_home: bool, is_on_ground: bool, needs_position: bool, has_sticks: bool
 ) -> str:

@@ -34,10 +34,11 @@ class CalibrationService(Service):
     def _calibrate(self, command: Command) -> Reply:
         """Starts a calibration, or cancels the running one; what follows is told in texts "[cal] ...".
 
-        Params: p1 = 1 gyroscope; p2 = 1 magnetometer; p5 = 1 accelerometer on six sides, 2 level horizon, 4
+        Params: p1 = 1 gyroscope; p2 = 1 magnetometer; p3 = 1 barometer, which the estimator levels by itself: nothing
+        is left to do; p5 = 1 accelerometer on six sides, 2 level horizon, 4
         accelerometer where it stands; all 0: cancel.
-        Refused: TEMPORARILY_REJECTED: armed, or another calibration is running; UNSUPPORTED: barometer, radio, airspeed
-        and motors need none here.
+        Refused: TEMPORARILY_REJECTED: armed, or another calibration is running; UNSUPPORTED: radio, airspeed and motors
+        need none here.
         """
         calibration = self._endpoint.vehicle.calibration
         wanted = [whole(value, 0) for value in (command.p1, command.p2, command.p3, command.p4, command.x, command.y)]
@@ -48,12 +49,14 @@ class CalibrationService(Service):
             return calibration.start(CalibrationKind.GYRO)
         if wanted[1] == 1:
             return calibration.start(CalibrationKind.MAG)
+        if wanted[2] == 1:
+            return calibration.start(CalibrationKind.BARO)
         kind = _ACCEL_KINDS.get(wanted[4])
         if kind is not None:
             return calibration.start(kind)
-        if wanted[2]:
-            return Reply(Verdict.UNSUPPORTED, "the estimator levels the barometer by itself")
-        return Reply(Verdict.UNSUPPORTED, "gyroscope, magnetometer, accelerometer and level can be calibrated")
+        return Reply(
+            Verdict.UNSUPPORTED, "gyroscope, magnetometer, barometer, accelerometer and level can be calibrated"
+        )
 
     def _set_offsets(self, command: Command) -> Reply:
         """Sets a sensor's offsets, as CAL_* parameters.

@@ -24,11 +24,15 @@ def with_home(items: Sequence[MissionItem], state: VehicleState) -> list[Mission
     """Our mission as clients see it: home before the first item, every number one higher; an empty one stays empty."""
     if not items:
         return []
+    return [home_item(state), *(_moved(item, 1) for item in items)]
+
+
+def home_item(state: VehicleState) -> MissionItem:
+    """Home as item 0; the place of power-on while there is no home."""
     home = state.home or state.origin
-    first = MissionItem(
+    return MissionItem(
         0, mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_CMD_NAV_WAYPOINT, (0.0,) * 4, home.lat_deg, home.lon_deg, home.alt_m
     )
-    return [first, *(_moved(item, 1) for item in items)]
 
 
 def without_home(items: Sequence[MissionItem]) -> list[MissionItem]:

@@ -7,8 +7,6 @@ answered with a text, at most every 10 s.
 from collections.abc import Mapping
 from typing import Any
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.service import Handler, Service
 from autopilot.sticks import CHANNELS
@@ -28,8 +26,6 @@ class ManualService(Service):
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
         self._sticks = endpoint.vehicle.sticks
-        if endpoint.dialect.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA:
-            self._sticks.follow_ardupilot()
 
     def messages(self) -> Mapping[str, Handler]:
         return {

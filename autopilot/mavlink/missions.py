@@ -15,7 +15,7 @@ from autopilot.lists import ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.goto import GotoService
-from autopilot.mavlink.home_item import in_clients_numbers, with_home, without_home
+from autopilot.mavlink.home_item import home_item, in_clients_numbers, with_home, without_home
 from autopilot.mavlink.mission_items import element_out_of_range, item_from_fields, scaled_position
 from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import Severity
@@ -32,7 +32,6 @@ _MISSION_COUNT = known_type("MISSION_COUNT")
 _MISSION_CURRENT_ID = known_type("MISSION_CURRENT").msg_id
 _MISSION_ITEM = known_type("MISSION_ITEM")
 _MISSION_ITEM_INT = known_type("MISSION_ITEM_INT")
-_MISSION_REQUEST_INT = known_type("MISSION_REQUEST_INT")
 
 _KINDS = frozenset(ListKind)
 _NAMES = {ListKind.MISSION: "Mission", ListKind.FENCE: "Fence", ListKind.RALLY: "Rally points"}
@@ -77,6 +76,7 @@ class MissionService(Service):
         self._uploads: dict[ListKind, Upload] = {}
         self._finished: dict[ListKind, Finished] = {}
         self._downloads: dict[tuple[Sender, ListKind], Download] = {}
+        self._item_request = known_type(endpoint.dialect.item_request)
 
     def messages(self) -> Mapping[str, Handler]:
         return {
@@ -185,8 +185,8 @@ class MissionService(Service):
 
     def _request_next(self, upload: Upload) -> None:
         sender = upload.sender
-        payload = _MISSION_REQUEST_INT.pack(sender.sysid, sender.compid, upload.next_seq, upload.kind)
-        self._endpoint.reply(sender, _MISSION_REQUEST_INT, payload)
+        payload = self._item_request.pack(sender.sysid, sender.compid, upload.next_seq, upload.kind)
+        self._endpoint.reply(sender, self._item_request, payload)
         upload.retry_at_us = self._endpoint.time_us + RETRY_US
 
     def frame(self) -> None:
@@ -257,6 +257,8 @@ class MissionService(Service):
             download.until_us = now_us + DOWNLOAD_IDLE_US
         if fields.seq < len(items):
             return kind, items[fields.seq]
+        if fields.seq == 0 and self._first_seq(kind):  # of an empty mission, too: how clients ask for home
+            return kind, home_item(self._endpoint.vehicle.state)
         self._refuse(sender, mavlink.MAV_MISSION_INVALID_SEQUENCE, f"there is no item {fields.seq}", kind)
         return kind, None
 

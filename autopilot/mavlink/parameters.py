@@ -31,7 +31,8 @@ class ParameterService(Service):
         self._endpoint = endpoint
         self._view = endpoint.parameters
         self._next_index: dict[Channel, int] = {}  # lists under way
-        self._setting = ""  # the answer tells of this change
+        self._setting = ""  # the answer tells of this change,
+        self._also_changed: list[str] = []  # and these are told after it
         self._view.on_change(self._changed)
 
     def messages(self) -> Mapping[str, Handler]:
@@ -72,7 +73,7 @@ class ParameterService(Service):
             self._endpoint.reply(sender, _PARAM_VALUE, self._value(name, self._view.indices[name]))
 
     def set_requested(self, sender: Sender, fields: Any) -> None:
-        """Sets a parameter to the nearest value it can have, and sends to everybody what it is now."""
+        """Sets a parameter to the nearest value it can have; tells everybody what it is now, under this name first."""
         name = fields.param_id
         if name == HASH_NAME:  # the client has these values already: the list may stop
             self._next_index.pop(sender.channel, None)
@@ -95,6 +96,9 @@ class ParameterService(Service):
                 bounds = f"{low:g} to {high:g}"
                 self._endpoint.text(Severity.NOTICE, f"Parameter {name}: {asked:g} asked, {stored:g} set ({bounds})")
         self._endpoint.broadcast(_PARAM_VALUE, self._value(name, view.indices[name]))
+        also_changed, self._also_changed = self._also_changed, []
+        for other in also_changed:
+            self._changed(other)
 
     def entries(self) -> list[ParamEntry]:
         """The list as numbers: what the values of PARAM_VALUE say."""
@@ -113,8 +117,10 @@ class ParameterService(Service):
             self._endpoint.text(Severity.WARNING, f"Parameter file: {unknown} names are not known")
 
     def _changed(self, name: str) -> None:
-        """Tells every client of a change that none of them asked for."""
-        if name != self._setting:
+        """Tells every client of a change that none of them asked for, but of what one did ask for first."""
+        if self._setting and name != self._setting:
+            self._also_changed.append(name)
+        elif name != self._setting:
             self._endpoint.broadcast(_PARAM_VALUE, self._value(name, NOT_IN_LIST))
 
     def _value(self, name: str, index: int) -> bytes:

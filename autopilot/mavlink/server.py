@@ -92,6 +92,8 @@ class MavlinkServer:
         dialect: Dialect = PX4,
         on_frame: OnFrame | None = None,
         signing: SigningConfig | None = None,
+        *,
+        announces_components: bool = False,
     ) -> None:
         """Connects the services.
 
@@ -102,8 +104,11 @@ class MavlinkServer:
             on_frame: gets the time and the bytes of each frame received, and of each frame sent on the first link
                 or in answer to somebody.
             signing: where the key is kept, and whether unsigned frames are refused; None: in memory, and they are not.
+            announces_components: camera, gimbal and winch send heartbeats in a dialect, too, in which they do not.
         """
         sysid = int(vehicle.params[SYSID_PARAMETER])
+        if dialect.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA:
+            vehicle.follow_ardupilot()
         self._endpoint = Endpoint(vehicle, links, dialect, sysid, on_frame, signing)
         self._router = Router(self._endpoint)
         self._turn = 0
@@ -119,6 +124,9 @@ class MavlinkServer:
         for service in self._services():
             self._add(service)
         self._components = self._make_components()
+        self._has_component_heartbeats = bool(self._components) and (
+            dialect.announces_components or announces_components
+        )
         endpoint = self._endpoint
         for component in self._components:
             endpoint.compids.add(component.compid)
@@ -235,7 +243,7 @@ class MavlinkServer:
             self._serve(busy)
         for run in self._frames:
             run()
-        if self._components and time_us >= self._next_component_heartbeat_us:
+        if self._has_component_heartbeats and time_us >= self._next_component_heartbeat_us:
             self._send_component_heartbeats(time_us)
         if endpoint.vehicle.state.landed_state is not self._landed_state:
             self._tell_landed_state()
@@ -346,15 +354,16 @@ class MavlinkServer:
         self._broadcast_telemetry(_HOME_POSITION.msg_id)
 
     def _send_component_heartbeats(self, time_us: int) -> None:
-        """Once a second, and the vehicle's right behind them.
+        """Once a second, between two of the vehicle's.
 
-        Some clients (MAVSDK's FollowMe) read the flight mode from whichever heartbeat of the system came last; others
-        take the first one they ever hear for the vehicle's.
+        Some clients (pymavlink's wait_heartbeat) take the first heartbeat they ever hear for the vehicle's; others
+        (MAVSDK's FollowMe) read the flight mode from whichever of the system came last.
         """
         if self._next_component_heartbeat_us < 0:
             self._next_component_heartbeat_us = time_us + AFTER_AUTOPILOT_US
             return
         self._next_component_heartbeat_us = time_us + HEARTBEAT_US
+        self._broadcast_telemetry(_HEARTBEAT.msg_id)
         for component in self._components:
             component.send_heartbeat()
         self._is_heartbeat_due = True

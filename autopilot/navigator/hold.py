@@ -9,7 +9,7 @@ from autopilot.navigator.way import Way
 class Hold:
     """Mode Hold: the place is where the mode before ended, where a client sent the vehicle, or where it can stop.
 
-    Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as they are heard.
+    Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as he steers.
     """
 
     __slots__ = ("_context", "_is_flown", "_is_goto", "_is_steered", "_reset_count", "_steered", "_way",
@@ -64,9 +64,9 @@ class Hold:
             context.fly_to(self.target_ned, self.yaw, context.state.estimate.pos_ned if self._is_goto else None)
 
     def _follow_sticks(self) -> bool:
-        """Flies as the sticks say and returns whether they are heard; once they are lost, it stops."""
+        """Flies as the sticks say and returns whether somebody steers; once nobody does, it stops."""
         state = self._context.state
-        if state.time_us <= state.sticks.heard_until_us:
+        if state.sticks.has_pilot(state.time_us):
             self._is_steered = True
             self._steered.frame()
         elif self._is_steered:

@@ -119,7 +119,7 @@ class Orbit:
             return
         sticks = context.state.sticks
         away_m_s, down_m_s = 0.0, 0.0
-        if now_us <= sticks.heard_until_us:
+        if sticks.has_pilot(now_us):
             away_m_s, down_m_s = self._adjust(circle, sticks, dt_s)
         circle.advance(dt_s)
         if 0.0 < self._turns_rad <= circle.turned_rad:
@@ -168,8 +168,8 @@ class Orbit:
 
     def _yaw_rate(self, circle: Circle) -> float:
         if self._yaw is OrbitYaw.BY_STICKS:
-            is_heard = self._context.state.time_us <= self._context.state.sticks.heard_until_us
-            return yaw_rate_of(self._context) if is_heard else 0.0
+            state = self._context.state
+            return yaw_rate_of(self._context) if state.sticks.has_pilot(state.time_us) else 0.0
         return circle.yaw_rate if self._yaw in (OrbitYaw.TO_CENTRE, OrbitYaw.ALONG) else nan
 
     def _heading(self, circle: Circle) -> float:

@@ -383,7 +383,8 @@ class Radio:
 
 
 def test_overridden_channels_fly_ardupilots_modes_and_lost_ones_bring_it_home():
-    """Alt Hold to take off, Loiter for a 50 m dash and 10 s within 5 m, Brake with the stick held, then radio loss."""
+    """Alt Hold to take off, Loiter for a 50 m dash and 10 s within 5 m, Brake with the stick held; the sticks released,
+    then the radio lost."""
     alt_hold, loiter, rtl, brake = 2, 5, 6, 17
     seen = {}
 
@@ -411,11 +412,13 @@ def test_overridden_channels_fly_ardupilots_modes_and_lost_ones_bring_it_home():
         seen["slow"] = speed(flight)
         await radio.mode(loiter)
         await radio.override(1.0)
-        radio.pulses = {}
-        await client.sleep(2.5)
+        radio.pulses = dict.fromkeys(range(1, 9), 0)  # released: the simulated radio has them again
+        await client.sleep(5.0)
         seen["held"] = radio.mode_number
-        await client.sleep(1.5)
+        flight.controller.sticks.is_cut = True
+        await client.sleep(1.0)
         seen["lost"] = radio.mode_number
+        flight.controller.sticks.is_cut = False
         await radio.override(2.0)
         seen["back"] = radio.mode_number
         await client.until(lambda: not flight.controller.state.is_armed, 180.0, "disarmed")

@@ -67,6 +67,8 @@ class Dialect(Protocol):
     modes: Sequence[ModeRow]  # that a client may ask for
     goto_mode: Mode  # in which a place is held to which a client sends the vehicle
     first_seq: int  # of a mission in the lists that clients see; 1 where item 0 is home
+    item_request: str  # the message by which it asks for the items of a list that is uploaded
+    announces_components: bool  # camera, gimbal and winch send heartbeats of their own
     long_frames: Mapping[int, int]  # MAV_FRAME of the altitude in a COMMAND_LONG, by MAV_CMD; otherwise 0 (AMSL)
     aliases: Sequence[Alias]
     constants: Sequence[Constant]

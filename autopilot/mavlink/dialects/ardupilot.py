@@ -67,6 +67,8 @@ class ArduPilotDialect:
     modes: Sequence[ModeRow] = MODES
     goto_mode = Mode.GUIDED
     first_seq = 1
+    item_request = "MISSION_REQUEST"  # clients made for ArduPilot may know no other
+    announces_components = False  # a camera and a mount are parts of component 1
     long_frames: Mapping[int, int] = {
         mavlink.MAV_CMD_NAV_TAKEOFF: _RELATIVE,
         mavlink.MAV_CMD_DO_SET_ROI: _RELATIVE,

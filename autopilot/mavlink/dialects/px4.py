@@ -66,6 +66,8 @@ class Px4Dialect:
     modes: Sequence[ModeRow] = MODES
     goto_mode = Mode.HOLD
     first_seq = 0
+    item_request = "MISSION_REQUEST_INT"
+    announces_components = True
     long_frames: Mapping[int, int] = {}
     aliases: Sequence[Alias] = ()
     constants: Sequence[Constant] = ()

@@ -15,7 +15,7 @@ RSSI_UNKNOWN, RSSI_FULL, RSSI_NONE = 255, 100, 0  # ground stations show it as p
 
 
 def rc_channels(state: VehicleState) -> bytes:
-    """No channels until sticks are heard for the first time."""
+    """No channels until sticks are heard; in ArduPilot's dialect a simulated radio is, from the start."""
     channels = state.sticks.channels
     count = max((i + 1 for i, pulse_us in enumerate(channels) if pulse_us), default=0)
     return _rc_channels(boot_ms(state.time_us), count, *(pulse_us or UNUSED for pulse_us in channels), _rssi(state))

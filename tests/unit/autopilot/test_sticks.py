@@ -166,6 +166,78 @@ def test_sticks_lost_before_can_be_forgotten_until_they_come_back():
     assert sticks.is_lost(START_US + 4_000_000)
 
 
+RADIO = [1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800]  # ArduPilot's SITL
+
+
+def with_radio(**params):
+    sticks = sticks_with(**params)
+    sticks.follow_ardupilot()
+    sticks.frame(START_US)
+    return sticks
+
+
+def test_a_simulated_radio_is_heard_with_sticks_in_the_middle_and_throttle_down():
+    sticks = with_radio()
+    now = sticks.input
+    assert sticks.is_heard(START_US)
+    assert (now.roll, now.pitch, now.yaw, now.throttle) == (0.0, 0.0, 0.0, -1.0)
+    assert now.channels[:8] == RADIO
+    assert not now.has_pilot(START_US)
+    assert not sticks_with().is_heard(START_US)  # in PX4's dialect there is none
+
+
+@pytest.mark.parametrize("release", ["by the client", "by time", "joystick silent"])
+def test_sticks_go_back_to_the_simulated_radio(release):
+    sticks = with_radio()
+    now_us = START_US
+    if release == "joystick silent":
+        joystick(sticks, roll=0.5, throttle=0.2)
+    else:
+        override(sticks, 1700, 1500, 1600, 1500, 1500, 2000)
+    assert sticks.input.roll > 0.3
+    assert sticks.input.has_pilot(now_us)
+    if release == "by the client":
+        override(sticks, 0, 0, 0, 0, 0, 0)
+    else:
+        now_us += 3_000_001
+    sticks.frame(now_us)
+    now = sticks.input
+    assert now.channels[:8] == RADIO
+    assert (now.roll, now.throttle) == (0.0, -1.0)
+    assert sticks.is_heard(now_us)
+    assert not sticks.is_lost(now_us)
+    assert not now.has_pilot(now_us)
+
+
+def test_channels_that_nobody_overrides_are_the_radios():
+    sticks = with_radio()
+    override(sticks, 0, 0, 1600)
+    assert sticks.input.channels[:4] == [1500, 1500, 1600, 1500]
+    assert sticks.input.has_pilot(START_US)
+    override(sticks, LEAVE, LEAVE, 0, LEAVE, 1100)  # a switch is none
+    assert sticks.input.channels[:5] == [1500, 1500, 1000, 1500, 1100]
+    assert sticks.is_heard(START_US)
+    assert not sticks.input.has_pilot(START_US)
+
+
+def test_a_radio_that_is_cut_is_lost_and_comes_back():
+    sticks = with_radio(COM_RC_LOSS_T=0.5)
+    sticks.is_cut = True
+    sticks.frame(START_US + 500_001)
+    assert sticks.is_lost(START_US + 500_001)
+    sticks.is_cut = False
+    sticks.frame(START_US + 600_000)
+    assert sticks.is_heard(START_US + 600_000)
+
+
+def test_a_radio_cut_under_a_pilot_ends_his_sticks():
+    sticks = with_radio()
+    override(sticks, 1500, 1500, 1500, 1500)
+    sticks.is_cut = True
+    sticks.frame(START_US + 3_000_001)
+    assert sticks.is_lost(START_US + 3_000_001)
+
+
 def test_speed_is_that_of_the_fastest_stick_and_fades():
     sticks = sticks_with()
     joystick(sticks)

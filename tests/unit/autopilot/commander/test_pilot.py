@@ -179,7 +179,7 @@ def test_the_gesture_arms_only_in_a_mode_flown_by_sticks():
 
 def test_the_gesture_arms_in_hold_where_the_sticks_steer_it():
     rig = Kinematic().ready()
-    rig.fc.sticks.follow_ardupilot()
+    rig.fc.follow_ardupilot()
     rig.piloted(1.5, throttle=-1.0, yaw=1.0)
     assert rig.state.is_armed
 

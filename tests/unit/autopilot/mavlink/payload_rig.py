@@ -77,8 +77,8 @@ class PayloadVehicle(RecordingVehicle):
 class PayloadRig(Rig):
     """Server and client; the camera's frame runs before the server's, as in the controller."""
 
-    def __init__(self, folder=None, stream=None, dialect=PX4):
-        super().__init__(dialect=dialect, vehicle=PayloadVehicle(folder, stream))
+    def __init__(self, folder=None, stream=None, dialect=PX4, **options):
+        super().__init__(dialect=dialect, vehicle=PayloadVehicle(folder, stream), **options)
         self.vehicle.camera.settings.set("CAM_SMOOTH", 0)
 
     def frame(self, count=1):

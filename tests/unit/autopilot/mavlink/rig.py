@@ -291,6 +291,9 @@ class RecordingVehicle:
         self.calls.append(call)
         return self.reply
 
+    def follow_ardupilot(self) -> None:
+        self.sticks.follow_ardupilot()
+
     def has_mode(self, mode: Mode) -> bool:
         return mode not in self.missing_modes
 
@@ -383,6 +386,7 @@ class Rig:
         role: LinkRole = LinkRole.GROUND,
         dialect: Dialect = PX4,
         vehicle: RecordingVehicle | None = None,
+        **options: bool,
     ) -> None:
         self.vehicle = vehicle or RecordingVehicle()
         vehicle_end, client_end = memory_pair(role)
@@ -395,6 +399,7 @@ class Rig:
             [vehicle_end, second_vehicle_end],
             dialect,
             on_frame=lambda time_us, data: self.log.append((time_us, data)),
+            **options,
         )
         self.time_us = 5_000_000
 

@@ -17,6 +17,7 @@ CALIBRATE, SET_OFFSETS, STORAGE = 241, 242, 245
         ((0.0, 0.0, 0.0, 0.0, 1.0), ("calibrate", CalibrationKind.ACCEL)),
         ((0.0, 0.0, 0.0, 0.0, 2.0), ("calibrate", CalibrationKind.LEVEL)),
         ((0.0, 0.0, 0.0, 0.0, 4.0), ("calibrate", CalibrationKind.ACCEL_SIMPLE)),
+        ((0.0, 0.0, 1.0), ("calibrate", CalibrationKind.BARO)),
         ((0.0,) * 7, ("cancel_calibration",)),
     ],
 )
@@ -26,7 +27,7 @@ def test_calibration_is_asked_of_the_vehicle(params, call):
     assert rig.vehicle.calls == [call]
 
 
-@pytest.mark.parametrize("params", [(0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (3.0,)])
+@pytest.mark.parametrize("params", [(0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (3.0,)])
 def test_other_calibrations_are_refused_with_a_reason(params):
     rig = Rig()
     rig.client.command(CALIBRATE, *params)

@@ -45,12 +45,27 @@ def test_each_component_has_a_heartbeat_of_its_own_once_a_second(rig):
     beats = [(m.compid, m.fields.type, m.fields.autopilot) for m in rig.frame(100) if m.name == "HEARTBEAT"]
     assert beats.count((CAMERA, mavlink.MAV_TYPE_CAMERA, mavlink.MAV_AUTOPILOT_INVALID)) == 2
     assert beats.count((GIMBAL, mavlink.MAV_TYPE_GIMBAL, mavlink.MAV_AUTOPILOT_INVALID)) == 2
-    assert len(beats) == 7  # the autopilot's: the first of all, then one behind those of the components
+    assert len(beats) == 9  # the autopilot's: the first of all, then one before and one behind the components'
 
 
 def test_whoever_begins_to_listen_hears_the_autopilot_first(rig):
     beats = [m.compid for m in rig.frame(500) if m.name == "HEARTBEAT"]
-    assert beats == [1, *[GIMBAL, CAMERA, 1] * 10]
+    assert beats == [1, *[1, GIMBAL, CAMERA, 1] * 10]
+
+
+def test_whoever_begins_to_listen_between_two_frames_hears_the_autopilot_first(rig):
+    """pymavlink's wait_heartbeat takes the first heartbeat for the vehicle's."""
+    for _ in range(200):
+        beats = [m.compid for m in rig.frame() if m.name == "HEARTBEAT"]
+        assert not beats or beats[0] == 1
+
+
+@pytest.mark.parametrize(("announces", "compids"), [(False, {1}), (True, {1, CAMERA, GIMBAL})])
+def test_components_have_no_heartbeat_in_ardupilots_dialect_unless_asked_for(tmp_path, announces, compids):
+    rig = PayloadRig(tmp_path / "media", dialect=ARDUPILOT, announces_components=announces)
+    assert {m.compid for m in rig.frame(100) if m.name == "HEARTBEAT"} == compids
+    rig.to(CAMERA, REQUEST, INFORMATION)
+    assert from_camera(rig.frame(), "CAMERA_INFORMATION")
 
 
 def test_the_autopilot_has_the_last_word_in_every_frame_with_heartbeats(rig):

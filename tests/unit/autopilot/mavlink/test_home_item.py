@@ -1,5 +1,8 @@
+import pytest
+
 from autopilot.lists import ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.home_item import with_home, without_home
 from autopilot.vehicle import Reply, Severity, Verdict
 from tests.unit.autopilot.mavlink.rig import Rig, flying_state, texts
@@ -11,27 +14,28 @@ def item(seq: int, command: int = WAYPOINT, p1: float = 0.0) -> MissionItem:
     return MissionItem(seq, 3, command, (p1, 0.0, 0.0, 0.0), 47.4, 8.5, 20.0)
 
 
-def upload(rig: Rig, items: list[MissionItem]):
+def upload(rig: Rig, items: list[MissionItem], **options):
     """Uploads as a client does; returns the acknowledgement."""
-    (ack,) = [message.fields for message in answers(rig, items) if message.name == "MISSION_ACK"]
+    (ack,) = [message.fields for message in answers(rig, items, **options) if message.name == "MISSION_ACK"]
     return ack
 
 
-def answers(rig: Rig, items: list[MissionItem]):
-    """Uploads as a client does; returns the messages that answer the last item."""
-    rig.client.send("MISSION_COUNT", count=len(items))
+def answers(rig: Rig, items: list[MissionItem], kind: ListKind = ListKind.MISSION, *, in_integers: bool = True):
+    """Uploads as a client does that knows MISSION_REQUEST alone; returns the messages that answer the last item."""
+    rig.client.send("MISSION_COUNT", count=len(items), mission_type=kind)
     for sent in items:
-        request = rig.only("MISSION_REQUEST_INT")
-        assert request.seq == sent.seq
+        request = rig.only("MISSION_REQUEST")
+        assert (request.seq, request.mission_type) == (sent.seq, kind)
         rig.client.send(
-            "MISSION_ITEM_INT",
+            "MISSION_ITEM_INT" if in_integers else "MISSION_ITEM",
             seq=sent.seq,
             frame=sent.frame,
             command=sent.command,
             param1=sent.params[0],
-            x=int(sent.x * 1e7),
-            y=int(sent.y * 1e7),
+            x=int(sent.x * 1e7) if in_integers else sent.x,
+            y=int(sent.y * 1e7) if in_integers else sent.y,
             z=sent.z,
+            mission_type=kind,
         )
     return rig.frame()
 
@@ -56,6 +60,37 @@ def test_upload_leaves_home_out():
     stored = rig.vehicle.lists.items(ListKind.MISSION)
     assert [each.seq for each in stored] == [0, 1]
     assert stored[1].params[0] == 0.0
+
+
+@pytest.mark.parametrize("in_integers", [False, True])
+@pytest.mark.parametrize("kind", ListKind)
+def test_every_list_is_asked_for_by_the_message_that_ardupilots_clients_know(kind, in_integers):
+    rig = Rig(dialect=ARDUPILOT)
+    assert upload(rig, [item(0), item(1), item(2)], kind=kind, in_integers=in_integers).type == 0
+    stored = rig.vehicle.lists.items(kind)
+    assert len(stored) == (2 if kind is ListKind.MISSION else 3)
+    assert stored[0].x == pytest.approx(47.4, abs=1e-5)
+
+
+@pytest.mark.parametrize("kind", ListKind)
+def test_px4s_clients_are_asked_in_integers(kind):
+    rig = Rig(dialect=PX4)
+    rig.client.send("MISSION_COUNT", count=1, mission_type=kind)
+    assert rig.only("MISSION_REQUEST_INT").mission_type == kind
+
+
+def test_home_is_served_although_the_mission_is_empty():
+    rig = Rig(dialect=ARDUPILOT)
+    rig.client.send("MISSION_REQUEST_LIST")
+    assert rig.only("MISSION_COUNT").count == 0
+    rig.client.send("MISSION_REQUEST", seq=0)
+    home = rig.only("MISSION_ITEM")
+    assert (home.seq, home.frame, home.command, home.z) == (0, 0, WAYPOINT, 488.0)
+    assert home.x == pytest.approx(47.397742, abs=1e-5)
+    rig.client.send("MISSION_REQUEST", seq=1)
+    assert rig.only("MISSION_ACK").type == 13  # MAV_MISSION_INVALID_SEQUENCE
+    rig.client.send("MISSION_REQUEST_INT", seq=0, mission_type=1)
+    assert rig.only("MISSION_ACK").type == 13
 
 
 def test_upload_of_home_alone_clears():

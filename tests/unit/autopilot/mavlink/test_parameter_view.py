@@ -140,6 +140,16 @@ def test_list_and_set_go_through_the_aliases():
     assert rig.vehicle.params["RTL_RETURN_ALT"] == 20.0
 
 
+@pytest.mark.parametrize(("name", "value"), [("RTL_ALT", 2000.0), ("RTL_RETURN_ALT", 20.0)])
+def test_set_is_answered_first_under_the_name_that_was_set(name, value):
+    """Scripts set a parameter and print the next PARAM_VALUE."""
+    rig = Rig(dialect=ARDUPILOT)
+    rig.client.send("PARAM_SET", param_id=name, param_value=bits(value), param_type=9)
+    told = [(answer.param_id, answer.param_value) for answer in rig.all("PARAM_VALUE")]
+    assert told[0] == (name, bits(value))
+    assert sorted(each for each, _ in told) == ["RTL_ALT", "RTL_RETURN_ALT"]
+
+
 def test_value_out_of_range_is_told_in_the_clients_unit():
     rig = Rig(dialect=ARDUPILOT)
     rig.client.send("PARAM_SET", param_id="WPNAV_SPEED", param_value=bits(9000.0), param_type=9)

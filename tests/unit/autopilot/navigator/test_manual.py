@@ -211,7 +211,7 @@ def test_brake_ignores_the_sticks():
 
 def test_hold_is_steered_by_sticks_in_ardupilot_and_stops_without_them():
     rig = Kinematic(NAV_RCL_ACT=0)
-    rig.fc.sticks.follow_ardupilot()
+    rig.fc.follow_ardupilot()
     rig.flying(20.0)
     rig.run(2.0)
     rig.piloted(3.0, pitch=1.0)
@@ -226,7 +226,7 @@ def test_hold_is_steered_by_sticks_in_ardupilot_and_stops_without_them():
 
 def test_hold_takes_off_and_lands_by_throttle_in_ardupilot():
     rig = Kinematic().ready()
-    rig.fc.sticks.follow_ardupilot()
+    rig.fc.follow_ardupilot()
     rig.piloted(0.2, throttle=1.0)
     assert rig.fc.arm(force=False).reason == "throttle above the middle"
     rig.piloted(0.2, throttle=-1.0)
