@@ -30,6 +30,8 @@ WIND_VALID = wp.constant(64)
 DEAD_RECKONING = wp.constant(128)
 EXTERNAL_POSITION = wp.constant(256)  # a client's horizontal position is being fused
 ACCEL_DOUBTED = wp.constant(512)
+MAG_DISTURBED = wp.constant(1024)  # the field is not that of the place
+MAG_FAULTY = wp.constant(2048)  # heading was reset against the magnetometer, which does not agree yet
 
 # ExternalSample.holds: the bits of EKF2_EV_CTRL
 EXTERNAL_HOLDS_POS = wp.constant(1)  # north and east

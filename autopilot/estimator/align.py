@@ -10,7 +10,7 @@ import warp as wp
 from autopilot.estimator.fuse import set_slow_variance, set_sum_variance, set_variance
 from autopilot.estimator.params import MAG_TYPE_NONE, EstimatorParams
 from autopilot.estimator.sources.baro import baro_height
-from autopilot.estimator.sources.mag import start_mag
+from autopilot.estimator.sources.mag import is_disturbed, start_mag
 from autopilot.estimator.state import (
     ACCEL_BIAS,
     ATT,
@@ -125,5 +125,7 @@ def aligned_nominal(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: in
         nominal.gyro_bias_frd = align.gyro_frd / align.time_s
     start_covariance(params, cov, i, align)
     if align.mag_count >= _MAG_SAMPLES and params.mag_type != MAG_TYPE_NONE:
-        nominal = start_mag(params, cov, i, nominal, align.mag_frd / float(align.mag_count))
+        field_frd = align.mag_frd / float(align.mag_count)
+        if not is_disturbed(params, nominal.q_ned_from_frd, field_frd):
+            nominal = start_mag(params, cov, i, nominal, field_frd)
     return nominal

@@ -30,6 +30,8 @@ def calibrated(params: EstimatorParams, samples: Samples) -> Samples:
     gyro = samples.imu.gyro_frd - wp.vec3(params.gyro_offset_x, params.gyro_offset_y, params.gyro_offset_z)
     accel = samples.imu.accel_frd - wp.vec3(params.accel_offset_x, params.accel_offset_y, params.accel_offset_z)
     field = samples.mag.field_frd_gauss - wp.vec3(params.mag_offset_x, params.mag_offset_y, params.mag_offset_z)
+    if params.mag_yaw != 0.0:
+        field = wp.quat_rotate(wp.quat_from_axis_angle(wp.vec3(0.0, 0.0, 1.0), params.mag_yaw), field)
     if params.board_roll != 0.0 or params.board_pitch != 0.0 or params.board_yaw != 0.0:
         turn = board_attitude(params)
         gyro = wp.quat_rotate(turn, gyro)

@@ -52,6 +52,7 @@ from autopilot.estimator.sources.gnss import (
     gnss_repeats,
     take_gnss,
 )
+from autopilot.estimator.sources.heading import take_heading
 from autopilot.estimator.sources.mag import MAG_STUCK_AFTER, MAG_STUCK_MOVED, mag_repeats, take_mag
 from autopilot.estimator.sources.range import (
     RANGE_STUCK_AFTER,
@@ -75,7 +76,9 @@ from autopilot.estimator.state import (
     Ekf,
     EstimatorState,
     OutputSample,
+    YawEstimator,
 )
+from autopilot.estimator.yaw_estimator import start_tilt, sum_imu
 from autopilot.ports import (
     BaroSample,
     ExternalSample,
@@ -198,7 +201,9 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
     lenient = with_doubt(params, is_doubted(ekf.rows[i]))
     resets_before = ekf.rows[i].nominal.reset_count
     predict(ekf, i, lenient, imu)
+    ekf.yaw[i] = sum_imu(ekf.yaw[i], imu)
     if is_waiting(ekf.rows[i].gnss_inbox):
+        take_heading(ekf, i, lenient, now_us)
         take_gnss(ekf, i, lenient, now_us)
     if is_waiting(ekf.rows[i].baro_inbox):
         take_baro(ekf, i, lenient, now_us)
@@ -212,6 +217,8 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
         take_drag(ekf, i, lenient, now_us)
     if ekf.rows[i].stillness.is_still == 1:
         take_rest(ekf, i, lenient, now_us)
+    else:
+        ekf.yaw[i].has_moved = 1
     if ekf.rows[i].nominal.reset_count != resets_before:
         ekf.rows[i].output = jump_output(ekf.rows[i].output, ekf.rows[i].nominal)
         ekf.rows[i].estimate = with_jump(ekf.rows[i].estimate, ekf.rows[i].nominal)
@@ -261,6 +268,7 @@ def align(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample, samples: Sa
         ekf.rows[i].baro.is_active = 1
         ekf.rows[i].baro.judged_time_us = imu.time_us
     ekf.rows[i].nominal = nominal
+    ekf.yaw[i] = start_tilt(YawEstimator(), nominal.q_ned_from_frd, nominal.gyro_bias_frd)
     output = start_output(nominal)
     ekf.rows[i].output = output
     for k in range(IMU_RING):
@@ -323,6 +331,7 @@ def at_boot(ekf: Ekf, i: int) -> EstimatorState:
 def estimator_reset(ekf: Ekf, i: int) -> None:
     """Powers the estimator of vehicle i on anew."""
     ekf.rows[i] = at_boot(ekf, i)
+    ekf.yaw[i] = YawEstimator()
     ekf.external[i] = ExternalSample()
 
 
@@ -342,6 +351,7 @@ def make_ekf(vehicle_count: int, device: str = "cpu", params: Any = None) -> Ekf
     row = params if params is not None else estimator_params()
     ekf = Ekf()
     ekf.rows = wp.zeros(vehicle_count, dtype=EstimatorState, device=device)
+    ekf.yaw = wp.zeros(vehicle_count, dtype=YawEstimator, device=device)
     ekf.params = wp.array([row] * vehicle_count, dtype=EstimatorParams, device=device)
     ekf.covariance = wp.zeros((vehicle_count, COV_ROWS), dtype=vec24, device=device)
     ekf.imu_ring = wp.zeros((vehicle_count, IMU_RING), dtype=ImuSample, device=device)

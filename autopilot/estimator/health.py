@@ -30,6 +30,8 @@ from autopilot.ports import (
     DEAD_RECKONING,
     EXTERNAL_POSITION,
     HEIGHT_VALID,
+    MAG_DISTURBED,
+    MAG_FAULTY,
     POSITION_VALID,
     TERRAIN_VALID,
     TILT_ALIGNED,
@@ -182,6 +184,10 @@ def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: 
             bits = bits | DEAD_RECKONING
         if is_doubted(state):
             bits = bits | ACCEL_DOUBTED
+        if state.is_mag_disturbed == 1:
+            bits = bits | MAG_DISTURBED
+        if state.is_mag_faulty == 1:
+            bits = bits | MAG_FAULTY
         height_s = seconds_since(now_us, state.baro.fused_time_us)
         if state.baro.is_active == 0:
             height_s = seconds_since(now_us, state.gnss_height.fused_time_us)

@@ -19,6 +19,10 @@ GPS_CTRL_VEL = wp.constant(4)
 
 MAG_TYPE_NONE = wp.constant(5)
 
+# EKF2_MAG_CHECK
+MAG_CHECK_STRENGTH = wp.constant(1)
+MAG_CHECK_INCLINATION = wp.constant(2)
+
 HEIGHT_REF_GNSS = wp.constant(1)
 
 
@@ -34,6 +38,7 @@ class EstimatorParams:
     mag_offset_x: float
     mag_offset_y: float
     mag_offset_z: float
+    mag_yaw: float
     board_roll: float
     board_pitch: float
     board_yaw: float
@@ -74,6 +79,9 @@ class EstimatorParams:
     earth_field_walk: float
     body_field_walk: float
     body_field_init: float
+    mag_check: int
+    mag_check_strength: float
+    mag_check_inclination: float
     rest_height: float
     boot_std: float
     range_ctrl: int
@@ -112,6 +120,7 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
     *(_offset("GYRO", axis, 0.5, "rad/s", "gyro") for axis in "XYZ"),
     *(_offset("ACC", axis, 5.0, "m/s^2", "accel") for axis in "XYZ"),
     *(_offset("MAG", axis, 2.0, "gauss", "mag") for axis in "XYZ"),
+    Parameter("CAL_MAG0_YAW", 0.0, -180.0, 180.0, "deg", "yaw of the compass in the vehicle", _CALIBRATED, "mag_yaw"),
     Parameter(
         "SENS_BOARD_X_OFF", 0.0, -45.0, 45.0, "deg", "roll of the board in the vehicle", _CALIBRATED, "board_roll"
     ),
@@ -261,6 +270,29 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
     ),
     Parameter(
         "EKF2_MAG_B_INIT", 5.0e-3, 0.0, 0.3, "gauss", "body field left after calibration", "guess", "body_field_init"
+    ),
+    Parameter(
+        "EKF2_MAG_CHECK",
+        3,
+        0,
+        3,
+        "",
+        "a field that is not that of the place is not used, by: 1 strength, 2 inclination",
+        "PX4's numbers; its default is 1",
+        "mag_check",
+    ),
+    Parameter(
+        "EKF2_MAG_CHK_STR", 0.2, 0.0, 1.0, "gauss", "largest error of the field's strength", _PX4, "mag_check_strength"
+    ),
+    Parameter(
+        "EKF2_MAG_CHK_INC",
+        20.0,
+        0.0,
+        90.0,
+        "deg",
+        "largest error of the field's inclination",
+        _PX4,
+        "mag_check_inclination",
     ),
     Parameter(
         "EKF2_MIN_RNG", 0.2, 0.0, 2.0, "m", "height above ground at boot", "airframe: landing gear", "rest_height"

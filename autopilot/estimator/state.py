@@ -14,7 +14,7 @@ import warp as wp
 
 from autopilot.estimator.params import EstimatorParams
 from autopilot.ports import BaroSample, Estimate, ExternalSample, GnssSample, ImuSample, MagSample, RangeSample
-from common.kernels import vec24
+from common.kernels import vec5, vec24
 
 wp.set_module_options({"enable_backward": False})
 
@@ -162,6 +162,37 @@ class DragSum:
 
 
 @wp.struct
+class YawEstimator:
+    """Tilt without heading, and five filters that know no heading at first; see `yaw_estimator.py`."""
+
+    q_level_from_frd: wp.quat  # to a level frame that stands still and whose heading is unknown
+    gyro_bias_frd: wp.vec3  # [rad/s]
+    accel_lpf_frd: wp.vec3  # [m/s²]
+    delta_angle_frd: wp.vec3  # [rad] summed since the tilt was renewed
+    delta_vel_frd: wp.vec3  # [m/s]
+    step_s: float  # over which they were summed
+    delta_vel_level: wp.vec3  # [m/s] summed since the last fix
+    since_fix_s: float
+    is_running: int  # the five filters have started
+    yaw: vec5  # [rad] heading of the level frame's x axis
+    vel_north: vec5  # [m/s]
+    vel_east: vec5  # [m/s]
+    p_nn: vec5  # covariance of velocity north, east and heading
+    p_ne: vec5
+    p_ny: vec5
+    p_ee: vec5
+    p_ey: vec5
+    p_yy: vec5
+    weight: vec5  # probabilities
+    innov_north: vec5  # [m/s]
+    innov_east: vec5  # [m/s]
+    yaw_level: float  # [rad] weighted heading of the level frame's x axis
+    yaw_var: float  # [rad²]
+    has_moved: int  # the vehicle was not at rest all the time since it was aligned
+    disagree_s: float  # for how long the main filter's heading has differed by more than both can explain
+
+
+@wp.struct
 class EstimatorState:
     """The estimator of one vehicle, without its covariance and rings."""
 
@@ -199,6 +230,9 @@ class EstimatorState:
     wander_time_us: wp.int64  # to which the GNSS wander was propagated
     drag_sum: DragSum
     is_yaw_aligned: int
+    is_mag_disturbed: int  # the field is not that of the place
+    is_mag_faulty: int  # heading was reset against the magnetometer; it is not used until it agrees again
+    mag_agree_s: float  # for how long a faulty magnetometer has agreed
     origin_baro_height: float  # [m] standard-atmosphere height of the ned origin
     fault_count: int  # times the covariance lost its shape and was started anew
     estimate: Estimate
@@ -209,6 +243,7 @@ class Ekf:
     """Everything the estimator keeps, one row per vehicle."""
 
     rows: wp.array(dtype=EstimatorState)
+    yaw: wp.array(dtype=YawEstimator)
     params: wp.array(dtype=EstimatorParams)
     covariance: wp.array2d(dtype=vec24)  # row r of vehicle i is covariance[i, r], COV_ROWS of them
     imu_ring: wp.array2d(dtype=ImuSample)

@@ -1,8 +1,12 @@
 """Magnetometer: three body axes, observing heading, the earth field and the field of the body (hard iron).
 
-Starts with heading from the levelled field and the declination of the world model. Stops when its values freeze or it
-falls silent; the gyro then carries heading, which GNSS velocity holds while the vehicle accelerates. When its samples
-were rejected for long, the field of the body is learned anew from the attitude.
+Starts with heading from the levelled field and the declination of the world model. Stops when its values freeze, it
+falls silent, or its field is not that of the place; the gyro then carries heading, which GNSS velocity holds while the
+vehicle accelerates. When its samples were rejected for long, the field of the body is learned anew from the attitude.
+
+A vehicle that has not moved since it was aligned knows its heading from the magnetometer alone: there heading is set
+again, instead of learning a field of the body that no calibration leaves. A magnetometer against which heading was
+reset (`heading.py`) is used again once it has agreed for a while.
 """
 
 import warp as wp
@@ -10,8 +14,8 @@ import warp as wp
 from autopilot.estimator.delay import MAX_AGE_S
 from autopilot.estimator.fuse import fuse, judge, mark_fused, mark_reset, noise_variance, seconds_since, set_variance
 from autopilot.estimator.generated import mag_products
-from autopilot.estimator.params import MAG_TYPE_NONE, EstimatorParams
-from autopilot.estimator.state import ATT, BODY, EARTH, MAG_RING, Aid, Ekf, Nominal
+from autopilot.estimator.params import MAG_CHECK_INCLINATION, MAG_CHECK_STRENGTH, MAG_TYPE_NONE, EstimatorParams
+from autopilot.estimator.state import ATT, BODY, EARTH, MAG_RING, Aid, Ekf, EstimatorState, Nominal
 from autopilot.ports import MagSample
 from common.kernels import vec24
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
@@ -24,6 +28,9 @@ _RESET_AFTER_S = wp.constant(5.0)
 # World Magnetic Model 2025, error model of its technical report: 131 to 145 nT per component at one deviation
 _WORLD_MODEL_STD_GAUSS = wp.constant(1.4e-3)
 _UNKNOWN_FIELD_STD_GAUSS = wp.constant(0.1)
+_AGREE_RAD = wp.constant(0.175)  # [rad] 10 deg
+_AGREE_S = wp.constant(10.0)  # guess
+_BODY_SIGMAS = wp.constant(4.0)  # of what a calibration leaves
 _HEADING_INIT_STD = wp.constant(0.5)  # [rad] before the first fusion, which knows how wrong the field can be
 
 
@@ -31,6 +38,23 @@ _HEADING_INIT_STD = wp.constant(0.5)  # [rad] before the first fusion, which kno
 def has_field_model(params: EstimatorParams) -> bool:
     """The host knows the earth field at the origin."""
     return wp.length_sq(params.earth_field_ned_gauss) > 1.0e-4
+
+
+@wp.func
+def is_disturbed(params: EstimatorParams, q_ned_from_frd: wp.quat, field_frd: wp.vec3) -> bool:
+    """The field differs from that of the place by more than EKF2_MAG_CHK_STR or EKF2_MAG_CHK_INC."""
+    earth_ned = params.earth_field_ned_gauss
+    strength = wp.length(field_frd)
+    is_wrong = bool(False)
+    if has_field_model(params):
+        if (params.mag_check & MAG_CHECK_STRENGTH) != 0:
+            is_wrong = wp.abs(strength - wp.length(earth_ned)) > params.mag_check_strength
+        if (params.mag_check & MAG_CHECK_INCLINATION) != 0:
+            down = wp.quat_rotate(q_ned_from_frd, field_frd)[2] / wp.max(strength, 1.0e-6)
+            inclination = wp.asin(wp.clamp(down, -1.0, 1.0))
+            at_place = wp.asin(wp.clamp(earth_ned[2] / wp.length(earth_ned), -1.0, 1.0))
+            is_wrong = is_wrong or wp.abs(inclination - at_place) > params.mag_check_inclination
+    return is_wrong
 
 
 @wp.func
@@ -54,13 +78,21 @@ def start_mag(
     nominal.yaw_jump = nominal.yaw_jump + wrap_pi(yaw - yaw_before)
     nominal.reset_count += 1
     nominal.q_ned_from_frd = wp.normalize(quat_from_yaw(wrap_pi(yaw - yaw_before)) * nominal.q_ned_from_frd)
+    set_variance(cov, i, ATT + 2, _HEADING_INIT_STD * _HEADING_INIT_STD)
+    return start_field(params, cov, i, nominal, field_frd)
+
+
+@wp.func
+def start_field(
+    params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, nominal: Nominal, field_frd: wp.vec3
+) -> Nominal:
+    """The nominal state with the field states of a calibrated magnetometer at a known attitude."""
     earth_std = _WORLD_MODEL_STD_GAUSS
     nominal.earth_field_ned = params.earth_field_ned_gauss
     if not has_field_model(params):
         earth_std = _UNKNOWN_FIELD_STD_GAUSS
         nominal.earth_field_ned = wp.quat_rotate(nominal.q_ned_from_frd, field_frd)
     nominal.body_field_frd = wp.vec3(0.0, 0.0, 0.0)
-    set_variance(cov, i, ATT + 2, _HEADING_INIT_STD * _HEADING_INIT_STD)
     for axis in range(3):
         set_variance(cov, i, EARTH + axis, earth_std * earth_std)
         set_variance(cov, i, BODY + axis, params.body_field_init * params.body_field_init)
@@ -121,6 +153,27 @@ def fuse_mag(
 
 
 @wp.func
+def heading_is_stale(params: EstimatorParams, state: EstimatorState, time_us: wp.int64) -> bool:
+    """The magnetometer contradicts the heading that it set itself: for long, or by a field that no calibration leaves."""
+    body_ned = wp.quat_rotate(state.nominal.q_ned_from_frd, state.nominal.body_field_frd)
+    limit = _BODY_SIGMAS * params.body_field_init
+    return (
+        body_ned[0] * body_ned[0] + body_ned[1] * body_ned[1] > limit * limit
+        or seconds_since(time_us, state.mag.fused_time_us) > _RESET_AFTER_S
+    )
+
+
+@wp.func
+def agree_s(params: EstimatorParams, state: EstimatorState, field_frd: wp.vec3, step_s: float) -> float:
+    """[s] for how long the heading of a faulty magnetometer has been that of the vehicle."""
+    q_ned_from_frd = state.nominal.q_ned_from_frd
+    apart = wrap_pi(mag_heading(params, q_ned_from_frd, field_frd) - yaw_from_quat(q_ned_from_frd))
+    if wp.abs(apart) > _AGREE_RAD:
+        return 0.0
+    return state.mag_agree_s + wp.min(step_s, 1.0)
+
+
+@wp.func
 def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_frd: wp.vec3) -> None:
     """Fuses the oldest waiting field if the horizon has passed it; the first one ever sets heading."""
     sample = ekf.mag_ring[i, ekf.rows[i].mag_inbox.tail % MAG_RING]
@@ -130,9 +183,29 @@ def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_f
     age_s = seconds_since(now_us, sample.time_us)
     if params.mag_type == MAG_TYPE_NONE or age_s > MAX_AGE_S:
         return
-    if ekf.rows[i].is_yaw_aligned == 0:
-        ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, ekf.rows[i].nominal, sample.field_frd_gauss)
+    nominal = ekf.rows[i].nominal
+    ekf.rows[i].is_mag_disturbed = 0
+    if is_disturbed(params, nominal.q_ned_from_frd, sample.field_frd_gauss):
+        ekf.rows[i].is_mag_disturbed = 1
+        ekf.rows[i].mag_agree_s = 0.0
+        return
+    aid = ekf.rows[i].mag
+    if ekf.rows[i].is_mag_faulty == 1:
+        step_s = seconds_since(sample.time_us, aid.judged_time_us)
+        aid.judged_time_us = sample.time_us
+        aid.is_active = 0
+        ekf.rows[i].mag = aid
+        ekf.rows[i].mag_agree_s = agree_s(params, ekf.rows[i], sample.field_frd_gauss, step_s)
+        if ekf.rows[i].mag_agree_s < _AGREE_S:
+            return
+        ekf.rows[i].is_mag_faulty = 0
+        ekf.rows[i].mag_agree_s = 0.0
+        ekf.rows[i].nominal = start_field(params, ekf.covariance, i, nominal, sample.field_frd_gauss)
+    elif ekf.rows[i].is_yaw_aligned == 0:
+        ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, nominal, sample.field_frd_gauss)
         ekf.rows[i].is_yaw_aligned = 1
+    elif aid.fuse_count > 0 and ekf.yaw[i].has_moved == 0 and heading_is_stale(params, ekf.rows[i], sample.time_us):
+        ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, nominal, sample.field_frd_gauss)
     omega_frd = gyro_frd - ekf.rows[i].nominal.gyro_bias_frd
     nominal, aid = fuse_mag(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].mag, sample, omega_frd, age_s)
     ekf.rows[i].nominal = nominal
