@@ -167,12 +167,12 @@ class YawEstimator:
 
     q_level_from_frd: wp.quat  # to a level frame that stands still and whose heading is unknown
     gyro_bias_frd: wp.vec3  # [rad/s]
-    accel_lpf_frd: wp.vec3  # [m/s²]
-    delta_angle_frd: wp.vec3  # [rad] summed since the tilt was renewed
+    delta_angle_frd: wp.vec3  # [rad] summed since the attitude was renewed
     delta_vel_frd: wp.vec3  # [m/s]
     step_s: float  # over which they were summed
     delta_vel_level: wp.vec3  # [m/s] summed since the last fix
     since_fix_s: float
+    fix_vel_ned: wp.vec3  # [m/s] of the last fix
     is_running: int  # the five filters have started
     yaw: vec5  # [rad] heading of the level frame's x axis
     vel_north: vec5  # [m/s]
@@ -232,6 +232,7 @@ class EstimatorState:
     is_yaw_aligned: int
     is_mag_disturbed: int  # the field is not that of the place
     is_mag_faulty: int  # heading was reset against the magnetometer; it is not used until it agrees again
+    mag_stale_s: float  # for how long it has contradicted the heading that it alone had set
     mag_agree_s: float  # for how long a faulty magnetometer has agreed
     origin_baro_height: float  # [m] standard-atmosphere height of the ned origin
     fault_count: int  # times the covariance lost its shape and was started anew

@@ -14,24 +14,29 @@ import warp as wp
 from autopilot.estimator.state import YawEstimator
 from autopilot.ports import ImuSample
 from common.kernels import GRAVITY_M_S2, YAW_MODELS
-from common.rotation import quat_from_rotvec, wrap_pi, yaw_from_quat
+from common.rotation import quat_from_rotvec, quat_from_yaw, wrap_pi, yaw_from_quat
+from common.vectors import clamp3
 
 wp.set_module_options({"enable_backward": False})
 
 # Riseborough's figures, his noises of one 10 ms sample as densities
 _TILT_GAIN = wp.constant(0.2)  # [rad/s] of the complementary filter
-_ACCEL_LPF_GAIN = wp.constant(10.0)  # of the low-pass on the accelerometer, times _TILT_GAIN [1/s]
 _BIAS_GAIN = wp.constant(0.04)  # [1/s] of the gyro bias, per tilt correction
 _BIAS_LIMIT = wp.constant(0.05)  # [rad/s]
-_BIAS_MAX_RATE = wp.constant(0.175)  # [rad/s] a vehicle that turns faster says nothing about the bias
-_TRUST_LOSS = wp.constant(2.0)  # the accelerometer shows no tilt from half a g of motion on
+_TRUST_LOSS = wp.constant(2.0)  # the accelerometer shows no tilt from half a g of unknown motion on
 _YAW_NSD = wp.constant(1.0e-4)  # [rad²/s]
 _VEL_NSD = wp.constant(0.04)  # [m²/s³]
 _MAX_RATIO = wp.constant(25.0)  # squared innovation ratio beyond which an innovation is shortened
 _MIN_WEIGHT = wp.constant(1.0e-5)  # a heading once ruled out can come back
-_STEP_S = wp.constant(0.0199)  # the tilt is renewed at 50 Hz
+_STEP_S = wp.constant(0.0199)  # attitude is renewed at 50 Hz
 _MAX_FIX_GAP_S = wp.constant(1.0)  # after a longer silence the filters start anew
 _CONVERGED_VAR = wp.constant(0.0685)  # [rad²] (15 deg)²
+
+
+@wp.func
+def has_yaw(est: YawEstimator) -> bool:
+    """The vehicle has moved enough for its heading to be known to 15 deg."""
+    return est.is_running == 1 and est.yaw_var < _CONVERGED_VAR
 
 
 @wp.func
@@ -39,42 +44,23 @@ def start_tilt(est: YawEstimator, q_ned_from_frd: wp.quat, gyro_bias_frd: wp.vec
     """The estimator at rest: tilt and bias as the main filter has them, heading unknown."""
     est.q_level_from_frd = q_ned_from_frd
     est.gyro_bias_frd = gyro_bias_frd
-    est.accel_lpf_frd = wp.quat_rotate_inv(q_ned_from_frd, wp.vec3(0.0, 0.0, -GRAVITY_M_S2))
     est.delta_angle_frd = wp.vec3()
     est.delta_vel_frd = wp.vec3()
     est.step_s = 0.0
+    est.delta_vel_level = wp.vec3()
+    est.since_fix_s = 0.0
     est.is_running = 0
     return est
 
 
 @wp.func
-def accel_trust(accel_lpf_frd: wp.vec3) -> float:
-    """How much [0..1] the accelerometer shows of the tilt: all of it where it measures one g."""
-    excess_g = wp.abs(wp.length(accel_lpf_frd) / GRAVITY_M_S2 - 1.0)
-    trust = 1.0 - wp.min(_TRUST_LOSS * excess_g, 1.0)
-    return trust * trust
-
-
-@wp.func
-def advance_tilt(est: YawEstimator) -> YawEstimator:
-    """The tilt after the IMU samples summed since the last call, and the velocity gained in the level frame."""
-    dt_s = est.step_s
-    if dt_s <= 0.0:
-        return est
-    lpf_gain = wp.min(_ACCEL_LPF_GAIN * _TILT_GAIN * dt_s, 1.0)
-    est.accel_lpf_frd = est.accel_lpf_frd + lpf_gain * (est.delta_vel_frd / dt_s - est.accel_lpf_frd)
-    down_frd = wp.quat_rotate_inv(est.q_level_from_frd, wp.vec3(0.0, 0.0, 1.0))
-    seen_down_frd = -wp.normalize(est.accel_lpf_frd)
-    correction = wp.cross(seen_down_frd, down_frd) * (_TILT_GAIN * accel_trust(est.accel_lpf_frd))
-    turn_frd = est.delta_angle_frd - est.gyro_bias_frd * dt_s
-    if wp.length(turn_frd) < _BIAS_MAX_RATE * dt_s:
-        bias = est.gyro_bias_frd - correction * (_BIAS_GAIN * dt_s)
-        for axis in range(3):
-            est.gyro_bias_frd[axis] = wp.clamp(bias[axis], -_BIAS_LIMIT, _BIAS_LIMIT)
+def turn_step(est: YawEstimator) -> YawEstimator:
+    """Attitude after the IMU samples summed since the last call, and the velocity gained in the level frame."""
+    turn_frd = est.delta_angle_frd - est.gyro_bias_frd * est.step_s
     middle_vel_frd = est.delta_vel_frd + 0.5 * wp.cross(turn_frd, est.delta_vel_frd)
     est.delta_vel_level = est.delta_vel_level + wp.quat_rotate(est.q_level_from_frd, middle_vel_frd)
-    est.q_level_from_frd = wp.normalize(est.q_level_from_frd * quat_from_rotvec(turn_frd + correction * dt_s))
-    est.since_fix_s = est.since_fix_s + dt_s
+    est.q_level_from_frd = wp.normalize(est.q_level_from_frd * quat_from_rotvec(turn_frd))
+    est.since_fix_s = est.since_fix_s + est.step_s
     est.delta_angle_frd = wp.vec3()
     est.delta_vel_frd = wp.vec3()
     est.step_s = 0.0
@@ -88,7 +74,33 @@ def sum_imu(est: YawEstimator, imu: ImuSample) -> YawEstimator:
     est.delta_vel_frd = est.delta_vel_frd + imu.accel_frd * imu.dt_s
     est.step_s = est.step_s + imu.dt_s
     if est.step_s > _STEP_S:
-        est = advance_tilt(est)
+        est = turn_step(est)
+    return est
+
+
+@wp.func
+def correct_tilt(est: YawEstimator, gained_ned: wp.vec3) -> YawEstimator:
+    """Tilt and gyro bias moved towards what the accelerometer shows, less the acceleration that GNSS measured.
+
+    Riseborough takes the specific force for gravity's, unless it is far from one g: in a long turn tilt is then wrong
+    by several degrees, and heading with it. Once heading is known GNSS tells gravity and acceleration apart; before,
+    it tells how little the accelerometer is worth.
+    """
+    dt_s = est.since_fix_s
+    accel_ned = gained_ned / dt_s
+    accel_level = wp.vec3(0.0, 0.0, accel_ned[2])
+    unexplained = wp.sqrt(accel_ned[0] * accel_ned[0] + accel_ned[1] * accel_ned[1])
+    if has_yaw(est):
+        accel_level = wp.quat_rotate_inv(quat_from_yaw(est.yaw_level), accel_ned)
+        unexplained = 0.0
+    gravity_level = accel_level - est.delta_vel_level / dt_s
+    excess = wp.max(wp.abs(wp.length(gravity_level) - GRAVITY_M_S2), unexplained)
+    trust = 1.0 - wp.min(_TRUST_LOSS * excess / GRAVITY_M_S2, 1.0)
+    axis_level = wp.cross(wp.normalize(gravity_level), wp.vec3(0.0, 0.0, 1.0))
+    correction = axis_level * (trust * trust * wp.min(_TILT_GAIN * dt_s, 1.0))
+    bias_frd = est.gyro_bias_frd - wp.quat_rotate_inv(est.q_level_from_frd, correction) * _BIAS_GAIN
+    est.gyro_bias_frd = clamp3(bias_frd, wp.vec3(_BIAS_LIMIT))
+    est.q_level_from_frd = wp.normalize(quat_from_rotvec(correction) * est.q_level_from_frd)
     return est
 
 
@@ -206,15 +218,18 @@ def combine_models(est: YawEstimator) -> YawEstimator:
 @wp.func
 def take_velocity(est: YawEstimator, vel_ned: wp.vec3, vel_std: float) -> YawEstimator:
     """The estimator after a GNSS velocity, to whose time the IMU samples have been summed."""
-    est = advance_tilt(est)
+    est = turn_step(est)
     obs_var = vel_std * vel_std
-    if est.is_running == 0 or est.since_fix_s > _MAX_FIX_GAP_S:
+    if est.is_running == 0 or est.since_fix_s > _MAX_FIX_GAP_S or est.since_fix_s <= 0.0:
         est = start_models(est, vel_ned[0], vel_ned[1], obs_var)
+        est = combine_models(est)
     else:
         for k in range(YAW_MODELS):
             est = predict_model(est, k)
             est = fuse_model(est, k, vel_ned[0], vel_ned[1], obs_var)
-    est = combine_models(est)
+        est = combine_models(est)
+        est = correct_tilt(est, vel_ned - est.fix_vel_ned)
+    est.fix_vel_ned = vel_ned
     est.delta_vel_level = wp.vec3()
     est.since_fix_s = 0.0
     return est
@@ -224,9 +239,3 @@ def take_velocity(est: YawEstimator, vel_ned: wp.vec3, vel_std: float) -> YawEst
 def estimated_yaw(est: YawEstimator) -> float:
     """[rad] heading of the vehicle by the yaw estimator."""
     return wrap_pi(est.yaw_level + yaw_from_quat(est.q_level_from_frd))
-
-
-@wp.func
-def has_yaw(est: YawEstimator) -> bool:
-    """The vehicle has moved enough for its heading to be known to 15 deg."""
-    return est.is_running == 1 and est.yaw_var < _CONVERGED_VAR

@@ -74,7 +74,7 @@ def judge_heading(ekf: Ekf, i: int, sample: GnssSample, step_s: float) -> bool:
 
 @wp.func
 def take_heading(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
-    """Gives the oldest waiting fix to the yaw estimator if the horizon has passed it, and sets heading where it must."""
+    """The oldest waiting fix, once the horizon has passed it, moves the yaw estimator, which may set heading."""
     sample = ekf.gnss_ring[i, ekf.rows[i].gnss_inbox.tail % GNSS_RING]
     is_late = seconds_since(now_us, sample.time_us) > MAX_AGE_S
     if sample.time_us > now_us or is_late or not gnss_is_good(params, sample):

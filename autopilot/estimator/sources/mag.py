@@ -15,7 +15,7 @@ from autopilot.estimator.delay import MAX_AGE_S
 from autopilot.estimator.fuse import fuse, judge, mark_fused, mark_reset, noise_variance, seconds_since, set_variance
 from autopilot.estimator.generated import mag_products
 from autopilot.estimator.params import MAG_CHECK_INCLINATION, MAG_CHECK_STRENGTH, MAG_TYPE_NONE, EstimatorParams
-from autopilot.estimator.state import ATT, BODY, EARTH, MAG_RING, Aid, Ekf, EstimatorState, Nominal
+from autopilot.estimator.state import ATT, BODY, EARTH, MAG_RING, Aid, Ekf, Nominal
 from autopilot.ports import MagSample
 from common.kernels import vec24
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
@@ -30,7 +30,8 @@ _WORLD_MODEL_STD_GAUSS = wp.constant(1.4e-3)
 _UNKNOWN_FIELD_STD_GAUSS = wp.constant(0.1)
 _AGREE_RAD = wp.constant(0.175)  # [rad] 10 deg
 _AGREE_S = wp.constant(10.0)  # guess
-_BODY_SIGMAS = wp.constant(4.0)  # of what a calibration leaves
+_STALE_RAD = wp.constant(0.07)  # [rad] 4 deg
+_STALE_S = wp.constant(1.0)  # guess
 _HEADING_INIT_STD = wp.constant(0.5)  # [rad] before the first fusion, which knows how wrong the field can be
 
 
@@ -153,24 +154,15 @@ def fuse_mag(
 
 
 @wp.func
-def heading_is_stale(params: EstimatorParams, state: EstimatorState, time_us: wp.int64) -> bool:
-    """The magnetometer contradicts the heading that it set itself: for long, or by a field that no calibration leaves."""
-    body_ned = wp.quat_rotate(state.nominal.q_ned_from_frd, state.nominal.body_field_frd)
-    limit = _BODY_SIGMAS * params.body_field_init
-    return (
-        body_ned[0] * body_ned[0] + body_ned[1] * body_ned[1] > limit * limit
-        or seconds_since(time_us, state.mag.fused_time_us) > _RESET_AFTER_S
-    )
+def heading_apart(params: EstimatorParams, q_ned_from_frd: wp.quat, field_frd: wp.vec3) -> float:
+    """[rad] between the heading that a field implies and that of an attitude."""
+    return wp.abs(wrap_pi(mag_heading(params, q_ned_from_frd, field_frd) - yaw_from_quat(q_ned_from_frd)))
 
 
 @wp.func
-def agree_s(params: EstimatorParams, state: EstimatorState, field_frd: wp.vec3, step_s: float) -> float:
-    """[s] for how long the heading of a faulty magnetometer has been that of the vehicle."""
-    q_ned_from_frd = state.nominal.q_ned_from_frd
-    apart = wrap_pi(mag_heading(params, q_ned_from_frd, field_frd) - yaw_from_quat(q_ned_from_frd))
-    if wp.abs(apart) > _AGREE_RAD:
-        return 0.0
-    return state.mag_agree_s + wp.min(step_s, 1.0)
+def knows_heading_by_mag_alone(ekf: Ekf, i: int) -> bool:
+    """The vehicle stands as it was aligned: no motion has shown its heading, and nothing from outside."""
+    return ekf.yaw[i].has_moved == 0 and ekf.rows[i].external_yaw.is_active == 0
 
 
 @wp.func
@@ -190,12 +182,16 @@ def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_f
         ekf.rows[i].mag_agree_s = 0.0
         return
     aid = ekf.rows[i].mag
+    step_s = wp.min(seconds_since(sample.time_us, aid.judged_time_us), 1.0)
+    apart = heading_apart(params, nominal.q_ned_from_frd, sample.field_frd_gauss)
     if ekf.rows[i].is_mag_faulty == 1:
-        step_s = seconds_since(sample.time_us, aid.judged_time_us)
         aid.judged_time_us = sample.time_us
         aid.is_active = 0
         ekf.rows[i].mag = aid
-        ekf.rows[i].mag_agree_s = agree_s(params, ekf.rows[i], sample.field_frd_gauss, step_s)
+        if apart > _AGREE_RAD:
+            ekf.rows[i].mag_agree_s = 0.0
+        else:
+            ekf.rows[i].mag_agree_s += step_s
         if ekf.rows[i].mag_agree_s < _AGREE_S:
             return
         ekf.rows[i].is_mag_faulty = 0
@@ -204,8 +200,13 @@ def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_f
     elif ekf.rows[i].is_yaw_aligned == 0:
         ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, nominal, sample.field_frd_gauss)
         ekf.rows[i].is_yaw_aligned = 1
-    elif aid.fuse_count > 0 and ekf.yaw[i].has_moved == 0 and heading_is_stale(params, ekf.rows[i], sample.time_us):
-        ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, nominal, sample.field_frd_gauss)
+    elif apart < _STALE_RAD or not knows_heading_by_mag_alone(ekf, i):
+        ekf.rows[i].mag_stale_s = 0.0
+    else:
+        ekf.rows[i].mag_stale_s += step_s
+        if ekf.rows[i].mag_stale_s > _STALE_S:
+            ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, nominal, sample.field_frd_gauss)
+            ekf.rows[i].mag_stale_s = 0.0
     omega_frd = gyro_frd - ekf.rows[i].nominal.gyro_bias_frd
     nominal, aid = fuse_mag(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].mag, sample, omega_frd, age_s)
     ekf.rows[i].nominal = nominal
