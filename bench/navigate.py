@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from bench.row import machine
 from common.files import write_whole
 from policies.learn.policy import Policy
-from policies.learn.policy_file import find_policy, load_policy
+from policies.learn.policy_file import load_policy
+from policies.learn.policy_path import find_policy
 from policies.learn.tensors import TaskTensors
 from policies.learn.threads import few_threads
 from policies.tasks.catalogue import build_task, task_settings

@@ -36,6 +36,7 @@ from mission.recorder import History, Recorder
 from mission.script import Drone, Script
 from mission.stream import StreamServer
 from mission.surroundings import Surroundings
+from mission.texts import Texts
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.esc import esc_reader
@@ -119,11 +120,13 @@ class Flight:
             stream=stream,
             boot_unix_us=config.boot_unix_us,
         )
+        self.texts = Texts(lambda: self.time_us)
         self.controller = FlightController(
             host_ports(self.rig, self.airframe),
             self.params,
             self.airframe,
             config.home,
+            self.texts,
             on_reboot=self.rig.reboot,
             injector=self.injector,
             host=self.host,

@@ -7,7 +7,9 @@ import typer
 from rich.console import Console
 
 from autopilot.mavlink.links import GROUND_STATION_PORT, OFFBOARD_PORT
+from mission.checks import check_policy
 from mission.refusal import learn_extra, refuse
+from mission.terminal import busy
 
 
 def companion(
@@ -28,7 +30,10 @@ def companion(
 ) -> None:
     """Fly a policy as a companion computer does: over MAVLink and the camera's stream, in its own process."""
     with learn_extra():
-        from mission.follow.companion import CompanionError, CompanionOptions, run_companion
+        if policy != "scripted":
+            check_policy(policy)
+        with busy(Console(), "loading the program"):
+            from mission.follow.companion import CompanionError, CompanionOptions, run_companion
 
         try:
             typer.echo(run_companion(CompanionOptions(policy, link, camera, engage, seconds), Console()))
@@ -60,7 +65,7 @@ def follow(
 ) -> None:
     """Let the drone follow somebody who walks through hills and trees."""
     with learn_extra():
-        from mission.follow.session import FollowOptions, follow_session
+        from mission.follow.options import FollowOptions, check_follow_options
         from mission.options import FlightOptions, UserError
 
         if owner not in ("walk", "run"):
@@ -72,8 +77,12 @@ def follow(
             has_to_sign=False, gcs_port=gcs_port, api_port=api_port, run_folder=run_folder, has_view=view,
             view_port=view_port,
         )  # fmt: skip
+        options = FollowOptions(flight, "run" if owner == "run" else "walk", policy, seconds, mp4)
         try:
-            code = follow_session(FollowOptions(flight, "run" if owner == "run" else "walk", policy, seconds, mp4))
+            check_follow_options(options)
+            with busy(Console(), "loading the program"):
+                from mission.follow.session import follow_session
+            code = follow_session(options)
         except UserError as error:
             refuse(str(error))
     raise typer.Exit(code)

@@ -12,13 +12,16 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.console import Console
 
 from common.clock import Pacer
 from mission.task_settings import task_of
+from mission.terminal import Say, busy
 from mission.video import Mp4
 from mission.window import Request, Window, WindowError
 from policies.experts.catalogue import build_expert
 from policies.experts.expert import Expert, RandomDriver
+from policies.learn.policy_path import CheckpointError, find_policy
 from policies.pretrained.shelf import pretrained
 from policies.tasks.catalogue import CATALOGUE, build_task, settings_of
 from policies.tasks.episode import Outcome
@@ -45,8 +48,8 @@ class PlayOptions:
     mp4: Path | None = None
 
 
-def play_task(options: PlayOptions) -> str:
-    """Shows episodes until enough have ended, and says how they did.
+def play_task(options: PlayOptions, console: Console) -> str:
+    """Shows episodes until enough have ended, and says how they did and where the film lies.
 
     Raises:
         UnknownTask: no such setting.
@@ -59,8 +62,10 @@ def play_task(options: PlayOptions) -> str:
     task, driver, who = _cast(options)
     with ExitStack() as stack:
         if options.mp4 is not None:
+            say = stack.enter_context(busy(console, f"filming {options.episodes} episodes of {task.layout.task}"))
             film = stack.enter_context(Mp4(options.mp4, task.decision_s))
-            return f"{who}: {in_words(_shown(task, driver, options, _filming(film)))}"
+            scores = _shown(task, driver, options, _filming(film, task.decision_s, say))
+            return f"{who}: {in_words(scores)}\nfilm: {options.mp4}"
         try:
             window = stack.enter_context(Window(task.layout.task))
         except WindowError as error:
@@ -87,9 +92,8 @@ def _cast(options: PlayOptions) -> tuple[Task, Expert, str]:
 
 def _with_policy(options: PlayOptions, name: str) -> tuple[Task, Expert, str]:
     """A trained policy, in its own task and settings where no others are asked for."""
-    from policies.learn.checkpoint import CheckpointError
     from policies.learn.policy_driver import PolicyDriver
-    from policies.learn.policy_file import find_policy, load_policy
+    from policies.learn.policy_file import load_policy
 
     is_task = options.what in CATALOGUE
     try:
@@ -118,9 +122,14 @@ def _shown(task: Task, driver: Expert, options: PlayOptions, show: Callable[[NDA
     return scores
 
 
-def _filming(film: Mp4) -> Callable[[NDArray[np.uint8]], bool]:
+def _filming(film: Mp4, picture_s: float, say: Say) -> Callable[[NDArray[np.uint8]], bool]:
+    count = 0
+
     def show(picture: NDArray[np.uint8]) -> bool:
+        nonlocal count
         film.show(picture)
+        count += 1
+        say(f"filming: picture {count}, {count * picture_s:.1f} s of film")
         return True
 
     return show

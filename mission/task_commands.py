@@ -6,9 +6,11 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from mission.checks import check_task, check_task_or_policy
 from mission.refusal import learn_extra, refuse
+from mission.terminal import busy
 
-_TASK = typer.Argument(help="A task's name: RollerBall, ReachTarget, Parking1, Parking2.")
+_TASK = typer.Argument(help="A task's name: RollerBall, ReachTarget, Parking1, Parking2, FollowMe, Navigate.")
 _EnvArgs = Annotated[
     list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as preset=improved. Repeatable.")
 ]
@@ -25,6 +27,7 @@ def demonstrate(
 ) -> None:
     """Record demonstrations of a task's scripted expert."""
     with learn_extra():
+        check_task(task)
         from mission.demonstrate import DemonstrateOptions, demonstrate_task
         from policies.experts.catalogue import NoExpert
         from policies.experts.demonstration_file import DemonstrationFileError
@@ -51,16 +54,18 @@ def play(
 ) -> None:
     """Watch a trained policy, a task's expert, or chance, in a window or as a film."""
     with learn_extra():
-        from mission.play import PlayError, PlayOptions, play_task
-        from mission.video import VideoError
-        from mission.window import WindowError
-        from policies.experts.catalogue import NoExpert
-        from policies.tasks.catalogue import UnknownTask
-        from policies.tasks.layout import LayoutError
+        check_task_or_policy(task_or_policy)
+        with busy(Console(), "loading the program"):
+            from mission.play import PlayError, PlayOptions, play_task
+            from mission.video import VideoError
+            from mission.window import WindowError
+            from policies.experts.catalogue import NoExpert
+            from policies.tasks.catalogue import UnknownTask
+            from policies.tasks.layout import LayoutError
 
         options = PlayOptions(task_or_policy, episodes, envs, seed, tuple(env_args or ()), policy, random, expert, mp4)
         try:
-            typer.echo(play_task(options))
+            typer.echo(play_task(options, Console()))
         except (UnknownTask, NoExpert, PlayError, LayoutError, WindowError, VideoError) as error:
             refuse(str(error))
 
@@ -76,6 +81,7 @@ def drive(
 ) -> None:
     """Drive a task yourself: arrow keys or WASD, space brakes, R restarts, Esc ends."""
     with learn_extra():
+        check_task(task)
         from mission.drive import DriveOptions, drive_task
         from mission.window import WindowError
         from policies.experts.demonstration_file import DemonstrationFileError

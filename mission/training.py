@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 
 from common.clock import wall_time_s
-from policies.learn.checkpoint import CheckpointError
+from mission.terminal import LINE_PERIOD_S, busy, print_line
 from policies.learn.config.command_line import CommandLine, flags, with_command_line
 from policies.learn.config.load import Loaded, load_config
 from policies.learn.config.places import ConfigError
@@ -21,7 +21,8 @@ from policies.learn.config.run import RunConfig
 from policies.learn.demonstrations import DemonstrationError
 from policies.learn.evaluate import Evaluation, evaluate
 from policies.learn.export import ExportError, export_policy
-from policies.learn.policy_file import find_policy, load_policy
+from policies.learn.policy_file import load_policy
+from policies.learn.policy_path import CheckpointError, find_policy
 from policies.learn.run_folder import RunError, RunFolder
 from policies.learn.sac import SacError
 from policies.learn.task_check import check_against_task
@@ -35,7 +36,6 @@ USER_ERRORS = (
     CheckpointError, ConfigError, DemonstrationError, ExportError, LayoutError, NumberError, RunError, SacError,
     UnknownTask,
 )  # fmt: skip
-LINE_PERIOD_S = 10.0  # between lines where there is no terminal
 INFERENCE_EPISODES = 1000
 _ENDS = {"max_steps": "all steps done", "success_target": "success target reached", "stopped": "stopped by the user"}
 
@@ -59,14 +59,14 @@ def train_run(request: TrainingRequest, console: Console) -> None:
     loaded = chosen_config(request)
     config = loaded.config
     for warning in (*loaded.warnings, *_without_effect(request.given, config)):
-        _print(console, warning)
+        print_line(console, warning)
     check_against_task(loaded)
     if config.checkpoint_settings.inference:
         _play(config, console)
         return
     with _watched(console, config.behavior.max_steps) as watcher:
         result = train(config, watcher)
-    _print(console, _summary(result))
+    print_line(console, _summary(result))
 
 
 def chosen_config(request: TrainingRequest) -> Loaded:
@@ -113,18 +113,20 @@ def evaluate_policy(
     own, numbers = (card.settings, card.samplers()) if task_name == card.task else ({}, {})
     settings = settings_of(task_name, pairs, {**own, "split": "test"})
     episodes, seed = episodes_and_seed
-    evaluation = evaluate(
-        policy,
-        task_name,
-        settings,
-        episodes=episodes,
-        seed=seed,
-        numbers=numbers,
-        is_greedy=not is_drawn,
-        place=str(path),
-    )
-    shown = ", ".join(f"{key}={value}" for key, value in settings.model_dump().items())
-    _print(console, f"{path} on {task_name} ({shown}), seed {seed}")
+    with busy(console, f"playing {episodes} episodes of {task_name}") as say:
+        evaluation = evaluate(
+            policy,
+            task_name,
+            settings,
+            episodes=episodes,
+            seed=seed,
+            numbers=numbers,
+            is_greedy=not is_drawn,
+            place=str(path),
+            progress=lambda ended: say(f"episode {ended} of {episodes} of {task_name}"),
+        )
+    shown = ", ".join(f"{key}={value}" for key, value in settings.model_dump().items() if value not in ("", None, ()))
+    print_line(console, f"{path} on {task_name} ({shown}), seed {seed}")
     console.print(_evaluation_table(evaluation))
 
 
@@ -138,7 +140,7 @@ def export_network(name: str, output: Path | None, console: Console) -> None:
     target = output or path.with_suffix(".onnx")
     policy, _ = load_policy(path)
     difference = export_policy(policy, target)
-    _print(console, f"{target}: does what {path} does, to within {difference:.1e}")
+    print_line(console, f"{target}: does what {path} does, to within {difference:.1e}")
 
 
 def _play(config: RunConfig, console: Console) -> None:
@@ -147,15 +149,17 @@ def _play(config: RunConfig, console: Console) -> None:
     folder.check(is_resumed=True, is_forced=False)
     policy, card = load_policy(folder.newest_checkpoint())
     name = config.env_settings.env_path or ""
-    evaluation = evaluate(
-        policy,
-        name,
-        settings_of(name, config.env_settings.env_args),
-        episodes=INFERENCE_EPISODES,
-        seed=max(config.env_settings.seed, 0),
-        numbers=card.samplers(),
-        is_greedy=config.behavior.network_settings.deterministic,
-    )
+    with busy(console, f"playing {INFERENCE_EPISODES} episodes of {name}") as say:
+        evaluation = evaluate(
+            policy,
+            name,
+            settings_of(name, config.env_settings.env_args),
+            episodes=INFERENCE_EPISODES,
+            seed=max(config.env_settings.seed, 0),
+            numbers=card.samplers(),
+            is_greedy=config.behavior.network_settings.deterministic,
+            progress=lambda ended: say(f"episode {ended} of {INFERENCE_EPISODES} of {name}"),
+        )
     console.print(_evaluation_table(evaluation))
 
 
@@ -179,16 +183,16 @@ class _Watcher:
             self._bar.update(self._task, completed=progress.steps, description=_figures(progress))
         elif wall_time_s() - self._line_s >= LINE_PERIOD_S:
             self._line_s = wall_time_s()
-            _print(self._console, f"{progress.steps:,} of {progress.max_steps:,} steps, {_figures(progress)}")
+            print_line(self._console, f"{progress.steps:,} of {progress.max_steps:,} steps, {_figures(progress)}")
 
     def note(self, line: str) -> None:
-        _print(self._console, line)
+        print_line(self._console, line)
 
     def stop(self, *_: object) -> None:
         if self.is_stopped:
             raise KeyboardInterrupt  # asked twice
         self.is_stopped = True
-        _print(self._console, "stopping after this iteration; once more to stop at once")
+        print_line(self._console, "stopping after this iteration; once more to stop at once")
 
     def close(self) -> None:
         if self._bar is not None:
@@ -249,8 +253,3 @@ def _without_effect(given: CommandLine, config: RunConfig) -> list[str]:
     if config.behavior.network_settings.deterministic and not config.checkpoint_settings.inference:
         lines.append("deterministic: has an effect with --inference only; training draws its actions")
     return lines
-
-
-def _print(console: Console, text: str) -> None:
-    """Lines however narrow the console is, at once also into a pipe."""
-    console.print(text, markup=False, highlight=False, soft_wrap=True)

@@ -9,7 +9,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from mission.checks import check_policy, check_recipe
 from mission.refusal import learn_extra, refuse
+from mission.terminal import busy
 
 _EnvArgs = Annotated[
     list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as preset=improved. Repeatable.")
@@ -68,8 +70,10 @@ def train(
 ) -> None:
     """Train a policy on a task, by one of our recipes or by an ML-Agents configuration."""
     with learn_extra():
-        from mission.training import USER_ERRORS, TrainingRequest, train_run
-        from policies.learn.config.command_line import CommandLine
+        check_recipe(task_or_config)
+        with busy(Console(), "loading the program"):
+            from mission.training import USER_ERRORS, TrainingRequest, train_run
+            from policies.learn.config.command_line import CommandLine
 
         if context.args and env_args is None:
             refuse(f"{context.args[0]}: not expected; settings of the task go after --env-args")
@@ -101,7 +105,9 @@ def evaluate(
 ) -> None:
     """Play a policy on episodes it was not trained on, and count how they end."""
     with learn_extra():
-        from mission.training import USER_ERRORS, evaluate_policy
+        check_policy(policy)
+        with busy(Console(), "loading the program"):
+            from mission.training import USER_ERRORS, evaluate_policy
 
         try:
             evaluate_policy(policy, task, tuple(env_args or ()), (episodes, seed), Console(), is_drawn=drawn)
@@ -115,7 +121,9 @@ def export(
 ) -> None:
     """Write a policy as an ONNX network with ML-Agents' names."""
     with learn_extra():
-        from mission.training import USER_ERRORS, export_network
+        check_policy(policy)
+        with busy(Console(), "loading the program"):
+            from mission.training import USER_ERRORS, export_network
 
         try:
             export_network(policy, output, Console())

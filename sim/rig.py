@@ -83,7 +83,7 @@ class Rig:
         self.arrays.autopilot = self._autopilot(airframe)
         self._home = home
         self._commands: dict[int, list[Any]] = {}
-        self._kernel = _advance_kernel(has_estimator)
+        self._kernel = advance_kernel(has_estimator=has_estimator)
         self._workers = Workers(vehicle_count, threads)
         self.boot()
 
@@ -184,5 +184,6 @@ def row_arrays(arrays: Any) -> list[Any]:
 
 
 @cache
-def _advance_kernel(has_estimator: bool) -> Any:
+def advance_kernel(*, has_estimator: bool) -> Any:
+    """The kernel of the whole loop, the same object for every rig."""
     return make_advance(has_estimator)

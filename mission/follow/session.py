@@ -6,7 +6,6 @@ MAVLink over a link in memory, so that everything but ground stations and the li
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
@@ -20,38 +19,30 @@ from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
 from mission.connections import open_links, open_page
-from mission.flight import FlightConfig, flight_parameters
-from mission.flight_config import OwnerConfig, Pace
+from mission.flight import flight_parameters
+from mission.flying import advance
 from mission.follow.companion import latency_text
 from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.options import FollowOptions, follow_config
 from mission.follow.watch import FollowWatch
-from mission.options import FlightOptions, UserError, flight_config, speed_of
+from mission.loading import load_kernels
+from mission.options import UserError, speed_of
 from mission.progress import Progress
 from mission.script import Drone
-from mission.session import advance, new_folder, print_line
+from mission.session import new_folder
+from mission.terminal import busy, print_line
 from mission.view.film import write_film
 from mission.view.recording import Recorder
 from policies.companion.companion import Companion, Pilot
 from policies.companion.engagement import Phase
-from policies.companion.pilot import SCRIPTED, TASK, PilotError, load_pilot
+from policies.companion.names import SCRIPTED, TASK
+from policies.companion.pilot import PilotError, load_pilot
 from policies.pretrained.shelf import pretrained
 from policies.tasks.follow_me.scorecard import Scorecard, lines, scorecard
 from policies.tasks.follow_me.track import Ranges, Track
-from policies.tasks.follow_me.world import FOLLOW_WORLD
 
 ENGAGE_S = 20.0  # after the take-off, until it follows
 FILM = "flight.mp4"
-
-
-@dataclass(frozen=True, slots=True)
-class FollowOptions:
-    """The options of `honeyguide follow`, as given."""
-
-    flight: FlightOptions
-    pace: Pace
-    policy: str | None  # None: the shipped one, or else the script
-    seconds: float
-    has_film: bool
 
 
 def follow_session(options: FollowOptions) -> int:
@@ -71,7 +62,9 @@ def follow_session(options: FollowOptions) -> int:
         raise UserError(str(error)) from error
     page = open_page(options.flight.view_port) if options.flight.has_view else None
     folder = new_folder(options.flight.run_folder)
-    with console.status("building the world and loading the kernels (the first time they are compiled: 20 s)"):
+    with busy(console, "loading kernels") as say:
+        load_kernels(say, has_camera=page is not None, has_owner=True)
+        say("building the world")
         flight, companion = flight_with_companion(config, pilot, links=links, folder=folder, wall_s=wall_time_s)
     recorder = Recorder(flight, action=lambda: companion.action)
     watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, options.seconds)
@@ -85,7 +78,8 @@ def follow_session(options: FollowOptions) -> int:
         watchers.append(view.frame)
     running = flight.drone.start(follow(flight.drone, companion, options.seconds))
     where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.flight.gcs_port}"
-    print_line(console, f"{name} follows an owner who {options.pace}s; {where}; logs in {folder}")
+    print_line(console, f"{name} follows an owner who {options.pace}s; {where}")
+    print_line(console, f"logs: {folder}")
     if page is not None:
         print_line(console, f"live page: {page.url}")
     advance(flight, lambda _: running.is_done, speed, watchers, Progress(flight, running), console)
@@ -102,15 +96,6 @@ def follow_session(options: FollowOptions) -> int:
         write_film(recorder.recording(), flight.world, folder / FILM, console)
     print_line(console, f"{'logs, scorecard and film' if options.has_film else 'logs and scorecard'}: {folder}")
     return exit_code
-
-
-def follow_config(options: FollowOptions) -> FlightConfig:
-    """The flight that the options describe: the world of training, with their seed and trees."""
-    config = flight_config(options.flight, None)
-    world = FOLLOW_WORLD.model_copy(
-        update={"seed": options.flight.world_seed, "trees_per_ha": options.flight.trees_per_ha}
-    )
-    return config.model_copy(update={"world": world, "owner": OwnerConfig(pace=options.pace)})
 
 
 def chosen_pilot(policy: str | None) -> tuple[Pilot, str]:

@@ -17,12 +17,9 @@ import torch
 from numpy.typing import NDArray
 
 from common.files import part_path, write_durably
+from policies.learn.policy_path import CheckpointError
 
 _ARRAY = "npy"  # an array is stored as {"npy": its bytes in NumPy's format}: any element type, no pickled code
-
-
-class CheckpointError(ValueError):
-    """A checkpoint or policy file that cannot be read or written; the message is one sentence for the user."""
 
 
 def save(path: Path, content: Mapping[str, Any], kind: str) -> None:

@@ -4,7 +4,7 @@ In: a policy and a task. Out: how the episodes ended, with a confidence interval
 many episodes each environment plays is decided before the first one begins.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +57,7 @@ def evaluate(
     is_greedy: bool = True,
     longest: int = LONGEST,
     place: str = "policy",
+    progress: Callable[[int], None] | None = None,
 ) -> Evaluation:
     """Plays exactly so many episodes.
 
@@ -70,6 +71,7 @@ def evaluate(
         is_greedy: takes the most probable action; else it is drawn.
         longest: decisions after which an episode is cut and counts as a timeout.
         place: what messages call the policy.
+        progress: is told now and then how many have ended.
 
     Raises:
         LayoutError: the policy was made for another task, or for other settings of it.
@@ -82,7 +84,8 @@ def evaluate(
     task.reset(seed)
     generator = None if is_greedy else torch.Generator(device).manual_seed(seed)
     with few_threads(has_images=task.layout.image is not None):
-        return _play(policy, task, _quota(episodes, task.env_count), generator, longest)
+        tally = _Tally(_quota(episodes, task.env_count), longest)
+        return _play(policy, task, tally, generator, progress)
 
 
 def _quota(episodes: int, env_count: int) -> NDArray[np.int64]:
@@ -91,11 +94,14 @@ def _quota(episodes: int, env_count: int) -> NDArray[np.int64]:
 
 
 def _play(
-    policy: Policy, task: Task, quota: NDArray[np.int64], generator: torch.Generator | None, longest: int
+    policy: Policy,
+    task: Task,
+    tally: "_Tally",
+    generator: torch.Generator | None,
+    progress: Callable[[int], None] | None,
 ) -> Evaluation:
     tensors = TaskTensors(task)
     memory = policy.start_memory(task.env_count)
-    tally = _Tally(quota, longest)
     with torch.inference_mode():
         while not tally.is_complete:
             actions, memory = policy.act(tensors.seen, memory, generator)
@@ -104,6 +110,8 @@ def _play(
             memory = memory.masked_fill(torch.from_numpy(is_over).to(memory.device)[:, None], 0.0)
             if is_cut.any():
                 task.begin(is_cut)
+            if progress is not None and is_over.any():
+                progress(tally.ended)
     return tally.evaluation()
 
 
@@ -122,6 +130,11 @@ class _Tally:
     @property
     def is_complete(self) -> bool:
         return not self._left.any()
+
+    @property
+    def ended(self) -> int:
+        """How many episodes have been counted."""
+        return int(self._outcomes.sum())
 
     def count(
         self, rewards: NDArray[np.float32], outcomes: NDArray[np.int32]

@@ -7,8 +7,8 @@ In: configurations. Out: one sentence with the first difference, before anything
 from collections.abc import Mapping
 from typing import Any
 
-from policies.learn.checkpoint import CheckpointError
 from policies.learn.config.run import RunConfig
+from policies.learn.policy_path import CheckpointError
 from policies.tasks.task import TaskSettings
 
 _OF_PPO = ("shared_critic", "privileged_critic", "normalize_returns")

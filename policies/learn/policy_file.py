@@ -12,10 +12,10 @@ from typing import Any
 import torch
 from pydantic import ValidationError
 
-from policies.learn.checkpoint import CheckpointError, load, save
+from policies.learn.checkpoint import load, save
 from policies.learn.config.network import NetworkSettings
 from policies.learn.policy import Policy
-from policies.pretrained.shelf import pretrained
+from policies.learn.policy_path import CheckpointError
 from policies.tasks.layout import Layout
 from policies.tasks.numbers import Sampler
 
@@ -95,28 +95,3 @@ def policy_of(record: Mapping[str, Any], place: str) -> Policy:
         reason = str(error).strip().splitlines()[-1].strip()
         raise CheckpointError(f"{place}: written by another version of honeyguide: {reason}") from error
     return policy.eval()
-
-
-def find_policy(name: str) -> Path:
-    """The policy that a user means: a file, a run's folder, the name of a run in `results/`, or a task that ships one.
-
-    Raises:
-        CheckpointError: there is none.
-    """
-    if Path(name).is_file():
-        return Path(name)
-    for folder in (Path(name), Path("results") / name):
-        if folder.is_dir():
-            found = sorted(folder.glob("*.pt")) or sorted(folder.glob("*/*.pt"), key=_steps)[-1:]
-            if len(found) == 1:
-                return found[0]
-            raise CheckpointError(f"{folder}: {'several policies' if found else 'no policy'} in it; name a .pt file")
-    shipped = pretrained(name)
-    if shipped is not None:
-        return shipped
-    raise CheckpointError(f"{name}: no such policy file, and no such run in results/")
-
-
-def _steps(checkpoint: Path) -> int:
-    steps = checkpoint.stem.rpartition("-")[2]
-    return int(steps) if steps.isdigit() else -1

@@ -16,7 +16,7 @@ from common.files import write_whole
 from policies.learn.checkpoint import checkpoints
 from policies.learn.config.dump import dump
 from policies.learn.config.run import RunConfig
-from policies.learn.policy_file import find_policy
+from policies.learn.policy_path import find_policy
 
 
 class RunError(ValueError):

@@ -7,13 +7,13 @@ begins; every lesson is looked at, so that none is refused hours later.
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from policies.learn.checkpoint import CheckpointError
 from policies.learn.config.behavior import Behavior, DaggerHyperparameters, PpoHyperparameters
 from policies.learn.config.environment import Curriculum, lessons_of
 from policies.learn.config.load import Loaded
 from policies.learn.config.signals import GailSettings
 from policies.learn.demonstrations import DemonstrationError, check_demonstrations
 from policies.learn.perception import require_privileged
+from policies.learn.policy_path import CheckpointError
 from policies.learn.teacher import load_teacher
 from policies.learn.vision import LEAST_SIDES
 from policies.tasks.catalogue import UnknownTask, build_task, settings_of, task_settings

@@ -10,7 +10,8 @@ from torch import Tensor
 
 from policies.learn.actions import Actions
 from policies.learn.policy import Policy
-from policies.learn.policy_file import find_policy, load_policy
+from policies.learn.policy_file import load_policy
+from policies.learn.policy_path import find_policy
 from policies.tasks.layout import Element, Layout, LayoutError
 
 

@@ -22,18 +22,22 @@ class UnknownTask(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A task as users ask for it: where its settings and its class are defined."""
+    """A task as users ask for it: its settings and what builds it, or where these are defined in this folder."""
 
-    settings_at: str
-    task_at: str
+    settings_at: "str | type[TaskSettings]"
+    task_at: "str | Callable[[Any, int, str], Task]"
 
     @property
     def settings(self) -> "type[TaskSettings]":
-        return cast("type[TaskSettings]", resolve_name(f"policies.tasks.{self.settings_at}"))
+        return cast("type[TaskSettings]", _found(self.settings_at))
 
     @property
     def build(self) -> "Callable[[Any, int, str], Task]":
-        return cast("Callable[[Any, int, str], Task]", resolve_name(f"policies.tasks.{self.task_at}"))
+        return cast("Callable[[Any, int, str], Task]", _found(self.task_at))
+
+
+def _found(place: object) -> object:
+    return resolve_name(f"policies.tasks.{place}") if isinstance(place, str) else place
 
 
 CATALOGUE: dict[str, Entry] = {
@@ -102,7 +106,16 @@ def file_stem(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
 
 
-def _entry(name: str) -> Entry:
+def check_name(name: str) -> None:
+    """Refuses a name that no task has.
+
+    Raises:
+        UnknownTask: no such task.
+    """
     if name not in CATALOGUE:
         raise UnknownTask(f"{name}: no such task; there are {', '.join(CATALOGUE)}")
+
+
+def _entry(name: str) -> Entry:
+    check_name(name)
     return CATALOGUE[name]

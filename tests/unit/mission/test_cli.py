@@ -151,10 +151,10 @@ def test_progress_of_a_flight_with_an_owner_shows_how_far_away_they_are():
     flight.frame()
     console = Console(width=80, file=StringIO())
     console.print(Progress(flight, None).table())
-    headings, units, figures = (line.split() for line in console.file.getvalue().splitlines())
-    assert headings[3] == "owner"
-    assert units[1] == "m"
-    assert float(figures[3]) == pytest.approx(3.0, abs=1.0)  # a chest, 3 m away
+    headings, units, figures = console.file.getvalue().splitlines()
+    assert headings.split()[3:5] == ["to", "owner"]
+    assert units.split()[1] == "m"
+    assert float(figures.split()[3]) == pytest.approx(3.0, abs=1.0)  # a chest, 3 m away
     flight.close()
 
 

@@ -61,7 +61,8 @@ def test_a_camera_of_another_kind():
 def test_it_says_who_flies_and_where_and_what_is_missing():
     result = CliRunner().invoke(app, ["companion", "--policy", "scripted", "--seconds", "0.2"])
     assert result.exit_code == 0
-    first, last = result.stdout.strip().splitlines()
+    loading, first, last = result.stdout.strip().splitlines()
+    assert loading == "loading the program ..."
     assert "vehicle: udpout://127.0.0.1:14580, pictures: tcp://127.0.0.1:14600" in first
     assert "no decision timed" in last
 

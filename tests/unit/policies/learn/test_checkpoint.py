@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from policies.learn.checkpoint import CheckpointError, checkpoint_path, checkpoints, load, prune, save
+from policies.learn.checkpoint import checkpoint_path, checkpoints, load, prune, save
+from policies.learn.policy_path import CheckpointError
 
 CONTENT = {
     "steps": 7,

@@ -3,10 +3,11 @@
 import pytest
 import torch
 
-from policies.learn.checkpoint import CheckpointError, load, save
+from policies.learn.checkpoint import load, save
 from policies.learn.config.network import Memory, NetworkSettings
 from policies.learn.policy import Policy
 from policies.learn.policy_file import PolicyCard, load_policy, save_policy
+from policies.learn.policy_path import CheckpointError
 from policies.learn.seen import Seen
 from policies.tasks.catalogue import build_task
 from policies.tasks.layout import Element, ImageElement, Layout

@@ -3,7 +3,8 @@
 from importlib.resources import files
 from pathlib import Path
 
-from policies.learn.policy_file import find_policy, load_policy
+from policies.learn.policy_file import load_policy
+from policies.learn.policy_path import find_policy
 from policies.pretrained.shelf import pretrained
 from policies.tasks.catalogue import CATALOGUE, build_task, file_stem, task_settings
 

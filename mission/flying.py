@@ -1,0 +1,167 @@
+"""A flight of `honeyguide fly`, from its first frame to its run folder: progress, texts, summary, logs, picture."""
+
+import json
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from common.files import write_whole
+from mission.client import Running
+from mission.flight import Flight
+from mission.options import FlightOptions
+from mission.plan import Plan
+from mission.plots import plot_flight
+from mission.progress import TABLE_PERIOD_S, Progress
+from mission.script import fly_plan
+from mission.summary import Summary, curved_items, planned_path, summarise
+from mission.terminal import LINE_PERIOD_S, print_line
+from mission.view.recording import Recorder
+
+if TYPE_CHECKING:
+    from mission.view.page import PageServer
+
+
+def fly_to_the_end(
+    flight: Flight,
+    plan: Plan | None,
+    options: FlightOptions,
+    speed: float | None,
+    page: "PageServer | None",
+    folder: Path,
+    console: Console,
+) -> int:
+    """Flies the plan, or waits for ground stations; writes the run folder and returns the exit code."""
+    path_ned = [] if plan is None else planned_path(plan, flight.config.home)
+    running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
+    way_ned = [point for _, point in path_ned]
+    recorder = Recorder(flight, way_ned)
+    watchers = [recorder.frame]
+    if page is not None:
+        from mission.view.live import LiveView
+
+        view = LiveView(flight, page, speed=speed, path_ned=way_ned)
+        watchers.append(view.frame)
+    advance(flight, _end(options, speed, running), speed, watchers, Progress(flight, running), console)
+    if page is not None:
+        view.close()
+    recorder.recording().save(folder)
+    return _finish(flight, running, plan, path_ned, folder, console)
+
+
+def _end(options: FlightOptions, speed: float | None, running: Running | None) -> Callable[[Flight], bool]:
+    """What is asked after each frame: whether the flight is over."""
+    end_us = int(options.seconds * 1e6) if options.seconds is not None else None
+    ends_with_script = options.once or (speed is None and end_us is None)
+
+    def is_over(flight: Flight) -> bool:
+        if end_us is not None and flight.time_us >= end_us:
+            return True
+        return ends_with_script and (running is None or running.is_done)
+
+    return is_over
+
+
+def advance(
+    flight: Flight,
+    is_over: Callable[[Flight], bool],
+    speed: float | None,
+    watchers: Sequence[Callable[[], None]],
+    progress: Progress,
+    console: Console,
+) -> None:
+    """Advances the flight until it is over or the user stops it, and shows a line of figures.
+
+    Args:
+        flight: what flies.
+        is_over: asked after each frame.
+        speed: simulated seconds per second; None: as fast as possible.
+        watchers: called after each frame.
+        progress: the line.
+        console: where it is shown.
+    """
+    try:
+        with _sigterm_interrupts(), Live(console=console, transient=True, auto_refresh=False) as live:
+            told = 0
+
+            def on_frame(_: Flight) -> None:
+                nonlocal told
+                for watch in watchers:
+                    watch()
+                for text in flight.texts.since(told):
+                    print_line(console, str(text))
+                told = flight.texts.count
+                if console.is_terminal and progress.is_due(TABLE_PERIOD_S):
+                    live.update(progress.table(), refresh=True)
+                elif not console.is_terminal and progress.is_due(LINE_PERIOD_S):
+                    print_line(console, progress.line())
+
+            flight.run(is_over, speed=speed, on_frame=on_frame)
+    except KeyboardInterrupt:
+        console.print("stopped by the user")
+
+
+@contextmanager
+def _sigterm_interrupts() -> Iterator[None]:
+    """Inside, SIGTERM is what Ctrl-C is."""
+
+    def interrupt(*_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _finish(
+    flight: Flight,
+    running: Running | None,
+    plan: Plan | None,
+    path_ned: list[tuple[int, Any]],
+    folder: Path,
+    console: Console,
+) -> int:
+    """Writes the run folder and prints the summary; returns the exit code."""
+    history = flight.close()
+    if len(history.time_us) == 0:
+        console.print("the flight ended before its first frame")
+        return 0 if running is None else 1
+    summary = summarise(flight, history, running, path_ned, curved_items(plan) if plan else frozenset())
+    write_whole(folder / "summary.json", (json.dumps(summary.as_json(), indent=2) + "\n").encode())
+    title = f"{flight.airframe.name}, wind {flight.config.wind_m_s:g} m/s, seed {flight.config.seed}: {summary.result}"
+    plot_flight(history, flight.world, path_ned, title, folder / "flight.png")
+    if summary.armed_s > 0.0:
+        console.print(_summary_table(summary))
+    else:
+        print_line(console, f"result: {summary.result}\nsimulated: {summary.simulated_s:.1f} s, never armed")
+    print_line(console, f"logs, summary and picture: {folder}")
+    return 0 if summary.is_success or running is None else 1
+
+
+def _summary_table(summary: Summary) -> Table:
+    table = Table("figure", "value", title="flight", title_justify="left")
+    rows = [
+        ("result", summary.result),
+        ("simulated / armed", f"{summary.simulated_s:.1f} s / {summary.armed_s:.1f} s"),
+        ("power-on to ready", f"{summary.ready_s:.1f} s"),
+        ("cross-track, 95 %", f"{summary.cross_track_p95_m:.2f} m"),
+        (
+            "landing error, true / by estimate",
+            f"{summary.landing_error_true_m:.2f} / {summary.landing_error_est_m:.2f} m",
+        ),
+        ("estimator error RMS, horizontal axis / vertical", f"{summary.pos_h_rms_m:.2f} / {summary.pos_v_rms_m:.2f} m"),
+        ("velocity RMS, worst axis", f"{summary.vel_rms_m_s:.3f} m/s"),
+        ("tilt / yaw RMS", f"{summary.tilt_rms_deg:.2f} / {summary.yaw_rms_deg:.2f} deg"),
+        ("least clearance", f"{summary.clearance_min_m:.1f} m"),
+        ("battery left", f"{100.0 * summary.battery_remaining:.0f} %"),
+    ]
+    for row in rows:
+        table.add_row(*row)
+    return table

@@ -1,0 +1,62 @@
+"""What a command shows on the terminal: whole lines, and what it is busy with while nothing else can be seen."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from common.clock import wall_time_s
+
+LINE_PERIOD_S = 5.0  # between lines where there is no terminal
+Say = Callable[[str], None]
+
+
+def print_line(console: Console, text: str) -> None:
+    """One line however narrow the console is, at once also into a pipe: rich flushes."""
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def busy(console: Console, text: str) -> Iterator[Say]:
+    """Shows what is under way, and for how long, until the block ends; what it yields changes the text.
+
+    On a terminal it is one line that is renewed and goes away. Elsewhere it is a line at once, and one every
+    `LINE_PERIOD_S` seconds.
+    """
+    if console.is_terminal:
+        columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+        with Progress(*columns, console=console, transient=True) as progress:
+            task = progress.add_task(text, total=None)
+            yield lambda new: progress.update(task, description=new)
+        return
+    print_line(console, f"{text} ...")
+    lines = _Lines(console, text)
+    try:
+        yield lines.say
+    finally:
+        lines.end()
+
+
+class _Lines:
+    """Prints what is under way every few seconds, from a thread of its own."""
+
+    def __init__(self, console: Console, text: str) -> None:
+        self._console = console
+        self._text = text
+        self._start_s = wall_time_s()
+        self._is_over = Event()
+        self._thread = Thread(target=self._print, daemon=True)
+        self._thread.start()
+
+    def say(self, text: str) -> None:
+        self._text = text
+
+    def end(self) -> None:
+        self._is_over.set()
+        self._thread.join()
+
+    def _print(self) -> None:
+        while not self._is_over.wait(LINE_PERIOD_S):
+            print_line(self._console, f"{self._text}: {wall_time_s() - self._start_s:.0f} s so far")

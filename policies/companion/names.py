@@ -1,0 +1,4 @@
+"""What a companion's pilots are called."""
+
+SCRIPTED = "scripted"
+TASK = "FollowMe"
