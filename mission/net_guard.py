@@ -6,6 +6,7 @@ browsers say which page asks, and pages cannot change it. A token in the address
 """
 
 import secrets
+import sys
 from collections.abc import Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socket import SHUT_RDWR, socket
@@ -60,7 +61,7 @@ class BoundedHttpServer(ThreadingHTTPServer):
     """
 
     daemon_threads = True
-    request_queue_size = CONNECTIONS_MAX
+    request_queue_size = 128
 
     def __init__(self, address: tuple[str, int], handler: type["GuardedHandler"]) -> None:
         self._lock = Lock()
@@ -97,7 +98,9 @@ class BoundedHttpServer(ThreadingHTTPServer):
         super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Clients that reset, fall silent or stop reading are nobody's business."""
+        """Clients that reset, fall silent or stop reading are nobody's business; a fault of ours is told."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class GuardedHandler(BaseHTTPRequestHandler):

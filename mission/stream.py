@@ -5,13 +5,12 @@ In: the camera's view, at each frame of the flight. Out: http://127.0.0.1:PORT/ 
 rendered only while somebody watches, on a thread of its own, paced by the wall clock.
 """
 
+import shutil
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Condition, Thread
-from typing import Any
 
 from autopilot.camera.camera import Camera
 from autopilot.camera.picture import jpeg_bytes
@@ -19,8 +18,8 @@ from autopilot.camera.ports import FrameSource, RawFrame
 from autopilot.camera.storage import MediaFolder
 from autopilot.mavlink.camera.definition import FILE_NAME, definition_xml
 from common.clock import wall_time_s
+from mission.net_guard import LOOPBACK, BoundedHttpServer, GuardedHandler
 
-LOOPBACK = "127.0.0.1"
 RATE_HZ = 10.0
 QUALITY = 80
 WATCHERS_MAX = 8
@@ -56,8 +55,7 @@ class StreamServer:
         self._watchers = 0
         self._is_closed = False
         self._news = Condition()
-        self._http = ThreadingHTTPServer((host, port), _handler(self))
-        self._http.daemon_threads = True
+        self._http = BoundedHttpServer((host, port), _handler(self))
         self._address = f"http://{host}:{self._http.server_address[1]}"
         self.uri = f"{self._address}/stream.mjpg"
         self.definition_uri = f"{self._address}/{FILE_NAME}"
@@ -151,14 +149,11 @@ class StreamServer:
         return self._serial
 
 
-def _handler(stream: StreamServer) -> type[BaseHTTPRequestHandler]:
+def _handler(stream: StreamServer) -> type[GuardedHandler]:
     """The request handler of one server."""
 
-    class Handler(BaseHTTPRequestHandler):
-        def log_message(self, *_: Any) -> None:
-            """Requests are nobody's business."""
-
-        def do_GET(self) -> None:
+    class Handler(GuardedHandler):
+        def answer(self) -> None:
             path = self.path.partition("?")[0]
             if path == "/":
                 self._answer("text/html; charset=utf-8", _PAGE)
@@ -178,12 +173,15 @@ def _handler(stream: StreamServer) -> type[BaseHTTPRequestHandler]:
                 self.send_error(HTTPStatus.NOT_FOUND)
 
         def _answer(self, kind: str, content: bytes) -> None:
+            self._answer_head(kind, len(content))
+            self.wfile.write(content)
+
+        def _answer_head(self, kind: str, size: int) -> None:
             self.send_response(HTTPStatus.OK)
             self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(content)))
+            self.send_header("Content-Length", str(size))
             self.send_header("Cache-Control", "no-store")
             self.end_headers()
-            self.wfile.write(content)
 
         def _still(self) -> None:
             picture = stream.next_picture(stream.serial)
@@ -198,18 +196,15 @@ def _handler(stream: StreamServer) -> type[BaseHTTPRequestHandler]:
             self.send_header("Cache-Control", "no-store")
             self.end_headers()
             serial = stream.serial
-            try:
-                while True:
-                    picture = stream.next_picture(serial)
-                    if picture is None:
-                        if stream.is_paused:
-                            continue
-                        return
-                    serial, jpeg = picture
-                    head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
-                    self.wfile.write(head.encode() + jpeg + b"\r\n")
-            except (BrokenPipeError, ConnectionResetError):
-                return  # the browser has gone
+            while True:  # until the browser goes, or takes nothing for too long
+                picture = stream.next_picture(serial)
+                if picture is None:
+                    if stream.is_paused:
+                        continue
+                    return
+                serial, jpeg = picture
+                head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
+                self.wfile.write(head.encode() + jpeg + b"\r\n")
 
         def _media(self, name: str) -> None:
             """A stored file, by a name that the camera itself would list."""
@@ -217,6 +212,9 @@ def _handler(stream: StreamServer) -> type[BaseHTTPRequestHandler]:
             if path is None:
                 self.send_error(HTTPStatus.NOT_FOUND)
             else:
-                self._answer("image/jpeg" if path.suffix == ".jpg" else "video/mp4", path.read_bytes())
+                with path.open("rb") as file:
+                    kind = "image/jpeg" if path.suffix == ".jpg" else "video/mp4"
+                    self._answer_head(kind, path.stat().st_size)
+                    shutil.copyfileobj(file, self.wfile)
 
     return Handler

@@ -15,6 +15,7 @@ from common.image_stream import ImageFrame, ImageReader, ImageStreamError
 CAMERA_PORT = 14_600  # guess: a free port near the vehicle's others
 RETRY_US = 500_000
 _CHUNK = 1 << 18  # [byte] of one read: sixteen pictures of 64 x 64 x 4
+READS_MAX = 4  # of one step: a camera that floods must not hold up the pilot
 _UNDER_WAY = {0, errno.EAGAIN, errno.EALREADY, errno.EINPROGRESS, errno.EISCONN, errno.ENOTCONN}
 
 
@@ -78,7 +79,10 @@ class StreamCamera:
             self._retry_us = time_us + RETRY_US
             self._connect()
         newest: ImageFrame | None = None
-        while self._socket is not None and (data := self._read()):
+        for _ in range(READS_MAX):
+            data = self._read()
+            if not data:
+                break
             try:
                 frames = self._reader.feed(data)
             except ImageStreamError as error:
