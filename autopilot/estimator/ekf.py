@@ -92,7 +92,7 @@ from common.kernels import GRAVITY_M_S2, vec24
 
 wp.set_module_options({"enable_backward": False})
 
-SOUNDNESS_SAMPLES = wp.constant(256)  # the covariance is looked over once a second
+SOUNDNESS_SAMPLES = wp.constant(256)  # the covariance is looked over once a second; at once if the state is no number
 WATCH_SAMPLES = wp.constant(4)  # flags and deviations are renewed at 62 Hz
 
 
@@ -239,7 +239,8 @@ def watch(ekf: Ekf, i: int, params: EstimatorParams) -> None:
     ekf.rows[i].range = listen(ekf.rows[i].range, ekf.rows[i].range_inbox, now_us)
     if ekf.rows[i].external_inbox.head > 0:
         listen_external(ekf, i, now_us)
-    if ekf.rows[i].imu_tail % SOUNDNESS_SAMPLES == 0:
+    is_lost = not (wp.isfinite(ekf.rows[i].nominal.pos_ned) and wp.isfinite(ekf.rows[i].nominal.vel_ned))
+    if is_lost or ekf.rows[i].imu_tail % SOUNDNESS_SAMPLES == 0:
         if not is_sound(ekf.covariance, i, ekf.rows[i].nominal):
             ekf.rows[i].fault_count += 1
             ekf.rows[i].phase = PHASE_ALIGNING

@@ -5,7 +5,7 @@ heading is its own. What is not finite is refused with a text, and so is a frame
 """
 
 from collections.abc import Mapping, Sequence
-from math import inf, isnan, nan, sqrt
+from math import inf, isnan, nan, pi, sqrt
 from typing import Any
 
 from autopilot.external import ExternalReport, Vector
@@ -25,6 +25,7 @@ LOCAL_FRD = 20
 NORTH_FRAMES = frozenset({LOCAL_NED, 14})
 FREE_FRAMES = frozenset({LOCAL_FRD, 16, 18})
 QUALITY_FAILED = -1
+_POS_STD_MAX_M, _VEL_STD_MAX_M_S, _YAW_STD_MAX_RAD = 1.0e3, 1.0e2, pi  # wider says nothing
 _UNKNOWN: Vector = (nan, nan, nan)
 
 
@@ -62,7 +63,7 @@ class ExternalService(Service):
             "VISION_SPEED_ESTIMATE",
             fields.usec,
             vel=(fields.x, fields.y, fields.z),
-            vel_std=deviation(fields.covariance, 0, 4, 8),
+            vel_std=deviation(_VEL_STD_MAX_M_S, fields.covariance, 0, 4, 8),
             reset_counter=fields.reset_counter,
         )
         self._take(sender, report)
@@ -115,7 +116,7 @@ class ExternalService(Service):
             vel,
             _heading(q_frame_from_frd),
             *pose_deviations(fields.pose_covariance),
-            vel_std=deviation(fields.velocity_covariance, 0, 6, 11),
+            vel_std=deviation(_VEL_STD_MAX_M_S, fields.velocity_covariance, 0, 6, 11),
             reset_counter=fields.reset_counter,
             is_north_known=frame in NORTH_FRAMES,
         )
@@ -173,13 +174,17 @@ def pose(kind: str, time_us: int, fields: Any, yaw: float, reset_counter: int) -
 
 def pose_deviations(covariance: Sequence[float]) -> tuple[float, float, float]:
     """Horizontal, vertical, heading, from the upper triangle of a 6 x 6 matrix of x, y, z, roll, pitch, yaw."""
-    return deviation(covariance, 0, 6), deviation(covariance, 11), deviation(covariance, 20)
+    level_std = deviation(_POS_STD_MAX_M, covariance, 0, 6)
+    return level_std, deviation(_POS_STD_MAX_M, covariance, 11), deviation(_YAW_STD_MAX_RAD, covariance, 20)
 
 
-def deviation(covariance: Sequence[float], *diagonal: int) -> float:
-    """The largest of some standard deviations; NaN if they are not known (the first element says so for all)."""
+def deviation(limit: float, covariance: Sequence[float], *diagonal: int) -> float:
+    """The largest of some standard deviations; NaN if they are not known (the first element says so for all).
+
+    Infinite beyond the limit: so wide a guess says nothing, and its variance would drown what single precision knows.
+    """
     variances = [covariance[i] for i in diagonal]
     if isnan(covariance[0]) or any(isnan(variance) or variance < 0.0 for variance in variances):
         return nan
     largest = max(variances)
-    return sqrt(largest) if largest <= POSITION_MAX_M**2 else inf
+    return sqrt(largest) if largest <= limit * limit else inf

@@ -87,7 +87,7 @@ def _blend(context: NavContext, height: float, slow: float, fast: float) -> floa
     low = context.number("MPC_LAND_ALT2")
     if height >= high:
         return max(slow, fast)
-    if height <= low or fast <= slow:
+    if not height > low or fast <= slow:  # also where the height is not a number
         return slow
     return round((slow + (fast - slow) * (height - low) / (high - low)) * 20.0) / 20.0
 

@@ -317,6 +317,17 @@ def test_covariance_stays_symmetric_and_positive_for_ten_minutes() -> None:
     assert ekf.rows.numpy()["fault_count"][0] == 0
 
 
+def test_a_state_that_is_no_number_is_forgotten_at_once() -> None:
+    flight = make_flight(seed=5, duration_s=20.0)
+    ekf = default_ekf()
+    run(ekf, flight.samples[: 15 * TICKS], keep_trace=False)
+    ekf.rows.numpy()["nominal"]["pos_ned"][0] = np.nan
+    trace = run(ekf, flight.samples[15 * TICKS :])[0]
+    lost = ~np.isfinite(trace["estimate"]["pos_ned"]).all(axis=1)
+    assert lost.sum() < 0.05 * TICKS
+    assert trace["fault_count"][-1] == 1
+
+
 def test_one_vehicle_equals_its_row_among_sixteen() -> None:
     flights = [make_flight(seed=seed, duration_s=12.0) for seed in range(16)]
     many, one = default_ekf(16), default_ekf(1)
