@@ -46,7 +46,7 @@ test: $(STAMP) ## Run the tests that take seconds; flags: make test ARGS="-k pla
 test-all: $(STAMP) ## Run every test, the slow ones too
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile tests $(ARGS)
 
-fuzz: $(STAMP) ## Send a hovering vehicle 1,000,000 broken frames and 100,000 valid messages; flags: ARGS="--seed 7"
+fuzz: $(STAMP) ## Send a vehicle 2,000,000 broken and extreme frames, in every mode of both dialects; flags: ARGS="--seed 7"
 	@$(BIN)/python -m tests.fuzz $(ARGS)
 
 MAVPROXY := .venv-mavproxy

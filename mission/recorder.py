@@ -222,7 +222,9 @@ class Recorder:
             self._judged_us[name] = int(judged_us[-1])
             innov = health[name]["innov"][is_new, :components]
             innov_var = health[name]["innov_var"][is_new, :components]
-            is_inside = np.abs(innov) <= BAND_SIGMA * np.sqrt(innov_var)
+            is_inside = np.abs(innov) <= BAND_SIGMA * np.sqrt(
+                np.maximum(innov_var, 0.0)
+            )  # a broken filter's may be negative
             self._in_band[name][0] += int(np.count_nonzero(is_inside & (innov_var > 0.0)))
             self._in_band[name][1] += int(np.count_nonzero(innov_var > 0.0))
 

@@ -2,7 +2,9 @@
 
 import pytest
 
+from autopilot.vehicle import Mode
 from tests.fuzz.hover import Hover
+from tests.fuzz.modes import FRAME_MAX_S, ModeFlight
 
 WORST_FRAME_S = 1.0  # of processor time; 40 ms as a rule, but the machine does other things
 
@@ -14,3 +16,14 @@ def test_traffic_neither_stops_nor_moves_a_hovering_vehicle(kind, count, per_fra
     assert hover.work_off() < 1_000
     assert hover.worst_frame_s < WORST_FRAME_S
     hover.flight.close()
+
+
+@pytest.mark.parametrize("dialect", ["px4", "ardupilot"])
+def test_extreme_numbers_end_no_flight_in_any_mode(dialect):
+    flight = ModeFlight(3, dialect)
+    for mode in Mode:
+        flight.send(mode, 480)
+    flight.close()
+    assert flight.worst_frame_s < FRAME_MAX_S
+    assert sum(flight.frames_in.values()) > 0.5 * sum(flight.frames.values())
+    assert min(flight.frames_in.values()) > 0, flight.frames_in
