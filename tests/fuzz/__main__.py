@@ -70,13 +70,14 @@ def fly_every_mode(progress: Progress, total: int, seed: int) -> None:
                 flight.send(mode, MODE_CHUNK)
                 progress.advance(task, MODE_CHUNK)
         flight.close()
+        frames, frames_in = sum(flight.frames.values()), sum(flight.frames_in.values())
         shares = {mode: flight.frames_in[mode] / flight.frames[mode] for mode in Mode}
         rarest = min(shares, key=lambda mode: shares[mode])
         progress.console.print(
-            f"extreme, {dialect}: {flight.sent} sent in {len(shares)} modes, {sum(flight.frames.values())} frames, "
-            f"{flight.flights} flights; {100.0 * sum(flight.frames_in.values()) / sum(flight.frames.values()):.0f} % in "
-            f"the mode meant, least in {rarest.name} ({100.0 * shares[rarest]:.0f} %); worst frame "
-            f"{1e3 * flight.worst_frame_s:.1f} ms (bound {1e3 * FRAME_MAX_S:.0f} ms)"
+            f"extreme, {dialect}: {flight.sent} sent in {len(shares)} modes, {frames} frames, {flight.flights} flights; "
+            f"{100.0 * frames_in / frames:.0f} % in the mode meant, least in {rarest.name} "
+            f"({100.0 * shares[rarest]:.0f} %); worst frame {1e3 * flight.worst_frame_s:.1f} ms "
+            f"(bound {1e3 * FRAME_MAX_S:.0f} ms)"
         )
         if flight.worst_frame_s > FRAME_MAX_S:
             sys.exit(f"a frame took {1e3 * flight.worst_frame_s:.1f} ms")
