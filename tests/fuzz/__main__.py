@@ -74,7 +74,7 @@ def fly_every_mode(progress: Progress, total: int, seed: int) -> None:
         shares = {mode: flight.frames_in[mode] / flight.frames[mode] for mode in Mode}
         rarest = min(shares, key=lambda mode: shares[mode])
         progress.console.print(
-            f"extreme, {dialect}: {flight.sent} sent in {len(shares)} modes, {frames} frames, {flight.flights} flights; "
+            f"extreme, {dialect}: {flight.sent} in {len(shares)} modes, {frames} frames, {flight.flights} flights, "
             f"{100.0 * frames_in / frames:.0f} % in the mode meant, least in {rarest.name} "
             f"({100.0 * shares[rarest]:.0f} %); worst frame {1e3 * flight.worst_frame_s:.1f} ms "
             f"(bound {1e3 * FRAME_MAX_S:.0f} ms)"
