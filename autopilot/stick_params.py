@@ -39,6 +39,8 @@ STICK_PARAMETERS: list[Parameter] = [
     Parameter("NAV_RCL_ACT", 2, 0, 7, "",
               "lost sticks: 0 nothing (if flown by them: return), 1 hold, 2 return, 3 land, 5 and 6 stop the motors, "
               "7 smart return", f"{_PX4}; it has no 7"),
+    Parameter("COM_FAIL_ACT_T", 5.0, 0.0, 25.0, "s",
+              "lost sticks: time in Hold before they lead to a return or a landing, 0: at once", _PX4),
     Parameter("COM_RCL_EXCEPT", 0, 0, 7, "",
               "where lost sticks change nothing: bit 0 mission, bit 1 other auto modes, bit 2 offboard", _PX4),
     Parameter("MAN_ARM_GESTURE", 1, 0, 1, "",

@@ -1,7 +1,8 @@
 """The guard: acts on new failures, by the rules of `failsafe`, and tells the pilot; once per frame while armed.
 
 In: the bits that `watch` sees. Out: mode changes, texts, disarming, through the commander. A stronger action replaces a
-weaker one, never the other way round; a pilot who chooses a mode takes over, and only a new failure acts again.
+weaker one, never the other way round; a pilot who chooses a mode takes over, and only a new failure acts again. When
+the sticks are lost it first holds for COM_FAIL_ACT_T, in which the pilot may come back or choose a mode (PX4).
 """
 
 from typing import Protocol
@@ -13,10 +14,13 @@ from autopilot.commander.failsafe import (
     MODE_STRENGTH,
     OUTCOMES,
     RULES,
+    STICKS_LOST,
     Action,
 )
 from autopilot.vehicle import LandedState, Mode, Severity, VehicleState
 from common.params import ParameterTable
+
+_DELAYED = frozenset({Action.RETURN, Action.SMART_RETURN, Action.LAND})  # by COM_FAIL_ACT_T
 
 
 class Authority(Protocol):
@@ -38,11 +42,13 @@ class Authority(Protocol):
 class Guard:
     """What has failed on one vehicle, and what is being done about it."""
 
-    __slots__ = ("_action", "_commander", "failures")
+    __slots__ = ("_action", "_commander", "_due_us", "_waiting", "failures")
 
     def __init__(self, commander: Authority) -> None:
         self._commander = commander
         self._action = Action.WARN  # of the failsafe in progress
+        self._waiting = Action.WARN  # what lost sticks lead to once their time is over
+        self._due_us = 0
         self.failures = 0  # bits as of the last frame
 
     def reset(self) -> None:
@@ -53,7 +59,7 @@ class Guard:
     def release(self) -> None:
         """A pilot has taken over, or the flight is over."""
         self._commander.state.is_failsafe = False
-        self._action = Action.WARN
+        self._action = self._waiting = Action.WARN
 
     def refusal(self, mode: Mode) -> str:
         """Why a failure forbids a mode that a client asks for; empty if none does."""
@@ -64,6 +70,8 @@ class Guard:
 
     def see(self, failures: int) -> None:
         """Takes what is wrong in this frame."""
+        if self._waiting is not Action.WARN and self._commander.state.time_us >= self._due_us:
+            self._stop_waiting(is_lost=bool(failures & STICKS_LOST))
         if failures == self.failures:
             return
         new, over = failures & ~self.failures, self.failures & ~failures
@@ -78,14 +86,39 @@ class Guard:
     def act(self, new: int) -> None:
         """Takes the strongest action of the failures that are new; announces each of them."""
         commander = self._commander
-        state = commander.state
         strongest = Action.WARN
         for rule in RULES:
             if not rule.failure & new:
                 continue
-            action = self._possible(rule.action(commander.params, state.mode))
+            action = rule.action(commander.params, commander.state.mode)
+            if rule.failure is STICKS_LOST:
+                action = self._first(action)
+            action = self._possible(action)
             strongest = max(strongest, action)
             commander.announcer.statustext(rule.severity, rule.text + OUTCOMES.get(action, ""))
+        self._take(strongest)
+
+    def _first(self, action: Action) -> Action:
+        """What is done at once when the sticks are lost: the action, or Hold until COM_FAIL_ACT_T is over."""
+        commander = self._commander
+        state = commander.state
+        delay_s = 0.0 if state.sticks.is_ardupilot else float(commander.params["COM_FAIL_ACT_T"])
+        if delay_s <= 0.0 or action not in _DELAYED or not int(commander.params["NAV_RCL_ACT"]):
+            return action
+        self._waiting, self._due_us = action, state.time_us + round(delay_s * 1e6)
+        return Action.WARN if state.landed_state is LandedState.ON_GROUND else Action.HOLD
+
+    def _stop_waiting(self, *, is_lost: bool) -> None:
+        """The sticks have been given their time: acts if they are still lost."""
+        action, self._waiting = self._possible(self._waiting), Action.WARN
+        if is_lost:
+            self._commander.announcer.statustext(Severity.CRITICAL, "Sticks lost" + OUTCOMES[action])
+            self._take(action)
+
+    def _take(self, strongest: Action) -> None:
+        """Changes the mode or stops the motors, unless something stronger is under way."""
+        commander = self._commander
+        state = commander.state
         if strongest is Action.WARN:
             return
         if strongest is Action.DISARM:

@@ -54,8 +54,8 @@ class Pilot:
     """
 
     __slots__ = (
-        "_arm_hold_us", "_corner", "_corner_since_us", "_count", "_exceptions", "_has_gesture", "_is_done",
-        "_override", "_params", "_speed_max", "_state", "_sticks", "_switch_channel", "_switch_position",
+        "_arm_hold_us", "_corner", "_corner_since_us", "_count", "_count_armed", "_exceptions", "_has_gesture",
+        "_is_done", "_is_missed", "_override", "_params", "_speed_max", "_state", "_sticks", "_switch_channel", "_switch_position",
     )  # fmt: skip
 
     def __init__(self, state: VehicleState, params: ParameterTable, sticks: Sticks) -> None:
@@ -63,6 +63,8 @@ class Pilot:
         self._params = params
         self._sticks = sticks
         self._count = 0  # of messages read
+        self._count_armed = 0  # of messages heard before arming
+        self._is_missed = False  # the loss of the sticks has been reported
         self._corner = 0  # the yaw stick with the throttle down: 1 right, -1 left
         self._is_done = False  # it has been acted on
         self._corner_since_us = 0
@@ -75,8 +77,10 @@ class Pilot:
         return self._sticks.is_heard(self._state.time_us)
 
     def on_armed(self) -> None:
-        """Sticks that are not there at arming are not missed until they come back (PX4)."""
+        """Sticks are missed only once they are heard while armed, or in a mode that is flown by them."""
         self._sticks.forget(self._state.time_us)
+        self._count_armed = self._state.sticks.count
+        self._is_missed = False
 
     def arming_reason(self, mode: Mode) -> str:
         """Why the sticks forbid arming in a mode; empty if they do not."""
@@ -92,11 +96,15 @@ class Pilot:
         return MODE_RULES[mode].needs_sticks or (mode is Mode.HOLD and self._state.sticks.steer_hold)
 
     def failures(self) -> int:
-        """STICKS_LOST, unless the present mode is excepted; otherwise 0."""
+        """STICKS_LOST, unless the mode in which they were lost is excepted; otherwise 0."""
         state = self._state
-        if not 0 < state.sticks.heard_until_us < state.time_us:
-            return 0
-        return 0 if EXCEPTION_BITS.get(state.mode, 0) & self._exceptions else STICKS_LOST
+        sticks = state.sticks
+        if not 0 < sticks.heard_until_us < state.time_us:
+            self._is_missed = False
+        elif not self._is_missed:
+            is_expected = sticks.count != self._count_armed or MODE_RULES[state.mode].needs_sticks
+            self._is_missed = is_expected and not EXCEPTION_BITS.get(state.mode, 0) & self._exceptions
+        return STICKS_LOST if self._is_missed else 0
 
     def frame(self, commander: Authority) -> None:
         """Does what the last message asks for, once."""

@@ -15,6 +15,7 @@ from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Endpoint, Sender
 from autopilot.mavlink.component import Component
 from autopilot.mavlink.convert import (
     LATLON_FRAMES,
+    RELATIVE_FRAMES,
     degrees_from_e7,
     whole,
 )
@@ -110,7 +111,9 @@ class CommandService(Service):
         is_global = f.frame in LATLON_FRAMES
         x = degrees_from_e7(f.x) if is_global else float(f.x)
         y = degrees_from_e7(f.y) if is_global else float(f.y)
-        command = Command(f.command, f.frame, f.param1, f.param2, f.param3, f.param4, x, y, f.z, sender)
+        is_amsl = f.command in self._endpoint.dialect.amsl_commands and f.frame in RELATIVE_FRAMES
+        frame = mavlink.MAV_FRAME_GLOBAL if is_amsl else f.frame
+        command = Command(f.command, frame, f.param1, f.param2, f.param3, f.param4, x, y, f.z, sender)
         self._dispatch(command, f.target_component)
 
     def _dispatch(self, command: Command, target: int) -> None:

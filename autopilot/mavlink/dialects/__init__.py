@@ -70,6 +70,7 @@ class Dialect(Protocol):
     item_request: str  # the message by which it asks for the items of a list that is uploaded
     announces_components: bool  # camera, gimbal and winch send heartbeats of their own
     long_frames: Mapping[int, int]  # MAV_FRAME of the altitude in a COMMAND_LONG, by MAV_CMD; otherwise 0 (AMSL)
+    amsl_commands: frozenset[int]  # MAV_CMDs whose altitude is above sea level even in a frame relative to home
     aliases: Sequence[Alias]
     constants: Sequence[Constant]
 

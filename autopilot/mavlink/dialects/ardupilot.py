@@ -74,6 +74,7 @@ class ArduPilotDialect:
         mavlink.MAV_CMD_DO_SET_ROI: _RELATIVE,
         mavlink.MAV_CMD_DO_SET_ROI_LOCATION: _RELATIVE,
     }
+    amsl_commands: frozenset[int] = frozenset({mavlink.MAV_CMD_DO_ORBIT})  # a command of PX4's: see there
     aliases: Sequence[Alias] = ALIASES
     constants: Sequence[Constant] = CONSTANTS
 

@@ -69,6 +69,10 @@ class Px4Dialect:
     item_request = "MISSION_REQUEST_INT"
     announces_components = True
     long_frames: Mapping[int, int] = {}
+    # PX4 never looks at the frame of these, and MAVSDK sends altitudes above sea level in a relative one.
+    amsl_commands: frozenset[int] = frozenset(
+        {mavlink.MAV_CMD_DO_ORBIT, mavlink.MAV_CMD_DO_SET_HOME, mavlink.MAV_CMD_DO_SET_ROI_LOCATION}
+    )
     aliases: Sequence[Alias] = ()
     constants: Sequence[Constant] = ()
 

@@ -1,5 +1,7 @@
 """Taking over, lost sticks, arming by sticks and the mode switch, over the kinematic stand-in."""
 
+from math import nan
+
 import pytest
 
 from autopilot.lists import ListKind
@@ -28,7 +30,8 @@ def in_mode(mode, **params):
     return rig
 
 
-def lose(rig, seconds=1.0):
+def lose(rig, seconds=6.0):
+    """Without sticks, until COM_FAIL_ACT_T is over."""
     for _ in range(round(seconds / 0.02)):
         if rig.state.mode is Mode.OFFBOARD:
             rig.fc.set_offboard(position_setpoint(0.0, 0.0, -20.0))
@@ -43,6 +46,38 @@ def test_lost_sticks_do_what_the_parameter_says(mode, action, expected):
     assert rig.state.mode is expected
     assert rig.recorder.has_text("Sticks lost")
     assert rig.state.is_failsafe
+
+
+def test_lost_sticks_are_waited_for_in_hold_before_they_lead_home():
+    rig = in_mode(Mode.POSITION)
+    lose(rig, 5.3)  # 0.5 s until they are lost, and 5 s
+    assert rig.state.mode is Mode.HOLD
+    assert rig.recorder.has_text("Sticks lost: hold")
+    lose(rig, 0.4)
+    assert rig.state.mode is Mode.RETURN
+    assert rig.recorder.has_text("Sticks lost: return")
+
+
+def test_the_wait_for_sticks_is_a_parameter():
+    rig = in_mode(Mode.POSITION, COM_FAIL_ACT_T=0.0)
+    lose(rig, 0.7)
+    assert rig.state.mode is Mode.RETURN
+
+
+def test_sticks_that_come_back_in_time_are_no_failsafe():
+    rig = in_mode(Mode.POSITION)
+    lose(rig, 3.0)
+    rig.piloted(6.0)
+    assert rig.state.mode is Mode.HOLD
+    assert not rig.recorder.has_text("Sticks lost: return")
+
+
+def test_a_mode_chosen_while_the_sticks_are_waited_for_is_flown():
+    rig = in_mode(Mode.POSITION)
+    lose(rig, 3.0)
+    assert rig.fc.set_mode(Mode.LAND).verdict is Verdict.ACCEPTED
+    lose(rig, 6.0)
+    assert rig.state.mode is Mode.LAND
 
 
 @pytest.mark.parametrize("mode", STICK_MODES)
@@ -96,7 +131,7 @@ def test_sticks_that_come_back_do_not_change_the_mode_back():
 def test_a_failure_of_the_radio_is_a_loss():
     rig = in_mode(Mode.POSITION)
     rig.fc.sticks.is_cut = True
-    rig.piloted(1.0)
+    rig.piloted(6.0)
     assert rig.state.mode is Mode.RETURN
 
 
@@ -114,6 +149,34 @@ def test_sticks_that_were_lost_before_arming_are_not_missed():
     rig.flying()
     rig.run(5.0)
     assert rig.state.mode is Mode.HOLD
+
+
+def test_one_stick_message_before_arming_makes_sticks_not_compulsory():
+    rig = Kinematic().ready()
+    rig.pilot()
+    assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
+    rig.frame()
+    assert rig.fc.takeoff(ORIGIN.alt_m + 5.0, nan).verdict is Verdict.ACCEPTED
+    rig.run(8.0)
+    assert rig.state.landed_state is LandedState.IN_AIR
+    assert not rig.recorder.has_text("Sticks lost")
+    rig.pilot()
+    rig.frame()
+    assert rig.fc.set_mode(Mode.POSITION).verdict is Verdict.ACCEPTED
+    lose(rig)
+    assert rig.state.mode is Mode.RETURN  # now they are missed
+
+
+def test_a_vehicle_armed_in_a_mode_flown_by_sticks_misses_them_at_once():
+    rig = Kinematic().ready()
+    rig.pilot(throttle=-1.0)
+    rig.fc.set_mode(Mode.POSITION)
+    assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
+    rig.run(1.0)
+    assert rig.recorder.has_text("Sticks lost")
+    assert rig.state.is_armed
+    rig.run(5.0)
+    assert not rig.state.is_armed
 
 
 @pytest.mark.parametrize("mode", AUTO_MODES)

@@ -3,6 +3,7 @@ from math import isnan, nan, radians
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.vehicle import Mode, Reply, Verdict
 from tests.unit.autopilot.mavlink.rig import HOME, Rig, texts
 
@@ -71,6 +72,25 @@ def test_takeoff_above_home_by_command_int():
     rig = Rig()
     assert send_int(rig, 22, 3, param4=90.0, z=10.0) == ACCEPTED
     assert rig.vehicle.calls == [("takeoff", HOME.alt_m + 10.0, pytest.approx(radians(90.0)))]
+
+
+@pytest.mark.parametrize("frame", [0, 3, 5, 6])
+def test_orbit_home_and_region_of_interest_are_above_sea_level_in_any_frame_of_px4(frame):
+    rig = Rig()
+    place = {"x": round(HOME.lat_deg * 1e7), "y": round(HOME.lon_deg * 1e7), "z": 500.0}
+    for command in (34, 179, 195):
+        assert send_int(rig, command, frame, **place) == ACCEPTED
+    orbit, home, look_at = rig.vehicle.calls
+    assert (orbit[1].alt_amsl_m, home[3], look_at[4]) == (500.0, 500.0, 500.0)
+
+
+def test_an_orbit_is_above_sea_level_and_home_and_roi_in_their_frame_in_ardupilot():
+    rig = Rig(dialect=ARDUPILOT)
+    place = {"x": round(HOME.lat_deg * 1e7), "y": round(HOME.lon_deg * 1e7), "z": 500.0}
+    for command in (34, 179, 195):
+        assert send_int(rig, command, 3, **place) == ACCEPTED
+    orbit, home, look_at = rig.vehicle.calls
+    assert (orbit[1].alt_amsl_m, home[3], look_at[4]) == (500.0, HOME.alt_m + 500.0, HOME.alt_m + 500.0)
 
 
 def test_altitude_above_ground_counts_from_the_terrain():
