@@ -277,9 +277,10 @@ class FlightController:
         return self.commander.check_arming()
 
     def set_mode(self, mode: Mode) -> Reply:
-        if mode is Mode.HOLD and self.state.mode is mode and self.navigator.hold.is_underway:
-            return self._enter_anew(mode)  # hold here, not at the place it was sent to
-        return self.commander.request_mode(mode)
+        reply = self.commander.request_mode(mode)
+        if mode is Mode.HOLD and reply.verdict is Verdict.ACCEPTED and self.navigator.is_going:
+            self.navigator.stay()  # here, not at the place it was sent to
+        return reply
 
     def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
         if self.state.mode is Mode.GUIDED:
@@ -303,8 +304,7 @@ class FlightController:
         return self._enter_anew(Mode.LAND)
 
     def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
-        state = self.state
-        if not state.is_flying:
+        if not self._may_go:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
         if not self.commander.has_position:
             return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
@@ -336,8 +336,7 @@ class FlightController:
             self._on_corrections(rtcm)
 
     def orbit(self, request: OrbitRequest) -> Reply:
-        state = self.state
-        if not state.is_flying:
+        if not self._may_go:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
         reason = self.commander.request_refusal(Mode.ORBIT)
         if reason:
@@ -370,6 +369,11 @@ class FlightController:
         self._on_reboot()
         self.commander.hold_reasons_back()
         return ACCEPTED
+
+    @property
+    def _may_go(self) -> bool:
+        """Whether the vehicle can be sent somewhere: it is in the air, or about to be."""
+        return self.state.is_flying or self.navigator.is_taking_off
 
     def _enter_anew(self, mode: Mode) -> Reply:
         """Enters a mode, also if it is the present one, whose target is a new one then."""

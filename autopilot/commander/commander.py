@@ -231,11 +231,13 @@ class Commander:
         if mode is state.mode:
             return ""
         is_free = self._is_ardupilot and not state.is_armed  # any mode: arming asks for what it needs
+        is_lifting = self._flying.is_taking_off and MODE_RULES[mode].on_takeoff
+        is_lenient = self._is_ardupilot or is_lifting
         return mode_refusal(
             mode,
             has_position=self.has_position or is_free,
             has_home=state.home is not None or is_free,
-            is_on_ground=state.landed_state is LandedState.ON_GROUND and not self._is_ardupilot,
+            is_on_ground=state.landed_state is LandedState.ON_GROUND and not is_lenient,
             needs_position=self._needs_position(mode),
             has_sticks=self._pilot.is_heard,
         ) or self._flying.refusal(mode)

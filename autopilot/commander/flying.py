@@ -27,6 +27,9 @@ class Flying(Protocol):
     def wants_lift(self) -> bool: ...
 
     @property
+    def is_taking_off(self) -> bool: ...
+
+    @property
     def is_landing(self) -> bool: ...
 
     @property

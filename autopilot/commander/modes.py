@@ -14,6 +14,7 @@ class ModeRule:
     may_arm: bool  # the vehicle may be armed in it
     on_ground: bool  # may be chosen while standing on the ground
     needs_sticks: bool = False  # flown by a pilot
+    on_takeoff: bool = False  # may be chosen on the ground once a take-off has begun, which is finished first
 
 
 NO_STICKS = "needs a pilot's sticks"
@@ -30,8 +31,8 @@ MODE_RULES: dict[Mode, ModeRule] = {
     Mode.ALTITUDE: ModeRule(needs_position=False, needs_home=False, may_arm=True, on_ground=True, needs_sticks=True),
     Mode.POSITION: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True, needs_sticks=True),
     Mode.PRECISION_LAND: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
-    Mode.FOLLOW: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
-    Mode.ORBIT: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
+    Mode.FOLLOW: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False, on_takeoff=True),
+    Mode.ORBIT: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False, on_takeoff=True),
     Mode.BRAKE: ModeRule(needs_position=True, needs_home=False, may_arm=False, on_ground=False),
     Mode.SMART_RETURN: ModeRule(needs_position=True, needs_home=True, may_arm=False, on_ground=False),
     Mode.GUIDED: ModeRule(needs_position=True, needs_home=False, may_arm=True, on_ground=True),

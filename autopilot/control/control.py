@@ -208,6 +208,12 @@ def started(
 
 
 @wp.func
+def is_light(airframe: ControlAirframe, ramp: float, thrust_max_n: float) -> bool:
+    """Whether the thrust allowed so far at take-off could carry the vehicle: until then the ground holds it."""
+    return ramp * thrust_max_n >= airframe.mass_kg * _GRAVITY
+
+
+@wp.func
 def outer_loops(
     params: ControlParams,
     airframe: ControlAirframe,
@@ -218,7 +224,7 @@ def outer_loops(
 ) -> ControlState:
     """The state with trajectory, position and velocity loop advanced by a 50 Hz frame."""
     now = state
-    if now.ramp * thrust_max_n < airframe.mass_kg * _GRAVITY:  # not yet light: the trajectory does not run ahead
+    if not is_light(airframe, now.ramp, thrust_max_n):  # the trajectory does not run ahead
         now.trajectory = trajectory_at_estimate(est, 0)
     now.trajectory = trajectory_step(params, now.trajectory, est, sp, _FRAME_S)
     vel_sp_ned = velocity_setpoint(params, now.trajectory, est)
@@ -248,7 +254,7 @@ def inner_loops(
     omega_sp_frd = clamp3(sp.omega_frd, wp.vec3(params.rate_max_roll, params.rate_max_pitch, params.rate_max_yaw))
     if sp.kind != SETPOINT_RATE:
         omega_sp_frd = rate_setpoint(params, est.q_ned_from_frd, now.aim.q_ned_from_frd, now.aim.omega_ned)
-    if sp.is_landed == 0:
+    if sp.is_landed == 0 and is_light(airframe, now.ramp, float(airframe.rotor_count) * rotor_max_n):
         now.rate = rate_step(params, now.rate, omega_sp_frd, now.actuators.torque_unallocated_frd, _TICK_S)
     torque_frd = rate_torque(params, now.rate, omega_sp_frd, airframe.inertia_kg_m2)
     rotor_min_n = rotor_thrust(airframe, airframe.idle_speed_share, now.voltage_share)

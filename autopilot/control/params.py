@@ -38,6 +38,7 @@ class ControlParams:
     jerk_direct: float
     lag_max_m: float
     tilt_max: float  # [rad]
+    tilt_max_ramp: float  # [rad] while the thrust of a take-off grows
     thrust_min: float  # share of the maximum
     thrust_max: float
     takeoff_ramp_s: float
@@ -100,6 +101,9 @@ CONTROL_PARAMETERS: list[Parameter] = [
     Parameter("MPC_JERK_MAX", 20.0, 0.5, 500.0, "m/s^3", "jerk to positions and velocities", "guess", "jerk_direct"),
     Parameter("MPC_XY_ERR_MAX", 2.0, 0.1, 10.0, "m", "lag behind the trajectory at which it waits", _PX4, "lag_max_m"),
     Parameter("MPC_TILTMAX_AIR", 45.0, 20.0, 70.0, "deg", "tilt limit", _PX4, "tilt_max"),
+    Parameter(
+        "MPC_TILTMAX_LND", 12.0, 5.0, 70.0, "deg", "tilt limit while a take-off's thrust grows", _PX4, "tilt_max_ramp"
+    ),
     Parameter("MPC_THR_MIN", 0.08, 0.0, 0.3, "norm", "least collective thrust in flight", "guess", "thrust_min"),
     Parameter("MPC_THR_MAX", 1.0, 0.5, 1.0, "norm", "greatest collective thrust", _PX4, "thrust_max"),
     Parameter("MPC_TKO_RAMP_T", 0.6, 0.0, 5.0, "s", "from idle to full thrust at take-off", "guess", "takeoff_ramp_s"),

@@ -110,7 +110,10 @@ def velocity_step(
     most = params.thrust_max * thrust_max_n / airframe.mass_kg
     least = params.thrust_min * thrust_max_n / airframe.mass_kg
     after = state
-    after.thrust_sp_ned = limit_thrust(wanted, wp.tan(params.tilt_max), least, most)
+    lean_max = params.tilt_max
+    if is_ramping:
+        lean_max = params.tilt_max_ramp
+    after.thrust_sp_ned = limit_thrust(wanted, wp.tan(lean_max), least, most)
     short = wanted - after.thrust_sp_ned
     if not is_ramping:
         for k in range(3):

@@ -11,7 +11,7 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.goto import reposition_target
 from autopilot.navigator.ground import Ask, vertical_ask
 from autopilot.navigator.setpoint import Vector
-from autopilot.navigator.takeoff import Climb
+from autopilot.navigator.takeoff import Climb, is_high
 from autopilot.navigator.way import Way
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_LEAN, SETPOINT_TRAJECTORY
 from autopilot.requests import OffboardSetpoint
@@ -48,7 +48,7 @@ class Guided:
         self._is_flown = False  # what is asked for is in the setpoint
         self._is_told = False  # that it stands on the ground
         self._way = Way(context)  # around what the fence excludes
-        self._next: tuple[Vector, float] | None = None  # a place asked for before the mode was entered
+        self._next: tuple[Vector, float] | None = None  # a place asked for before the mode was entered, or on take-off
         self._setpoint: OffboardSetpoint | None = None
         self._received_us = 0
 
@@ -73,9 +73,8 @@ class Guided:
     def frame(self) -> None:
         context = self._context
         if self._task is _Task.CLIMB:
-            if self._climb.frame():
-                self._go(self._climb.target_ned, self._climb.yaw, is_line=False)
-                self._is_flown = True
+            if self._climb.frame() or (self._next is not None and is_high(context)):
+                self._climbed()
         elif context.is_on_ground:
             self._stand()
         elif self._task is _Task.SETPOINT:
@@ -85,6 +84,15 @@ class Guided:
         elif not self._is_flown:
             self._is_flown = True
             context.fly_to(self._place, self._yaw, context.state.estimate.pos_ned if self._is_line else None)
+
+    def _climbed(self) -> None:
+        """A take-off is over: stays there, or goes where a client has sent it meanwhile."""
+        if self._next is None:
+            self._go(self._climb.target_ned, self._climb.yaw, is_line=False)
+            self._is_flown = True
+        else:
+            place, self._next = self._next, None
+            self._go(*place, is_line=True)
 
     def _go(self, place: Vector, yaw: float, *, is_line: bool) -> None:
         self._task = _Task.PLACE
@@ -139,6 +147,7 @@ class Guided:
         elif not _LEAST_TAKEOFF_M <= height_m <= _HIGHEST_M:
             return Reply(Verdict.DENIED, f"{height_m:.1f} m above the ground is out of range")
         self._task = _Task.CLIMB
+        self._next = None
         context.heading.end_turn()
         self._climb.start(context.down_of(alt_amsl_m), yaw)
         return ACCEPTED
@@ -147,7 +156,7 @@ class Guided:
         """Goes to a place; what is NaN stays as it is. The caller sees to it that the mode is or will be this one."""
         context = self._context
         state = context.state
-        if not state.is_flying:
+        if not state.is_flying and not self._is_climbing:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
         if not context.has_position:
             return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
@@ -165,12 +174,17 @@ class Guided:
         return self._take(target)
 
     def _take(self, target: tuple[Vector, float]) -> Reply:
-        if self._is_active:
+        if self._is_active and (is_high(self._context) or not self._is_climbing):
             self._context.heading.end_turn()
             self._go(*target, is_line=True)
         else:
             self._next = target
         return ACCEPTED
+
+    @property
+    def _is_climbing(self) -> bool:
+        """Whether a take-off has been asked for and is not over."""
+        return self._is_active and self._task is _Task.CLIMB and self._context.state.is_armed
 
     def forget_goto(self) -> None:
         """The mode could not be entered, or another was."""
@@ -185,6 +199,7 @@ class Guided:
         if self._task is not _Task.CLIMB or not self._context.is_on_ground:
             self._task = _Task.SETPOINT
             self._is_flown = False
+            self._next = None
 
     def _as_flown(self, setpoint: OffboardSetpoint) -> OffboardSetpoint:
         """An attitude's thrust is a climb rate, 0.5 for none, unless GUID_OPTIONS says that it is a thrust."""

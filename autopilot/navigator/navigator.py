@@ -21,7 +21,7 @@ from autopilot.navigator.orbit import Orbit
 from autopilot.navigator.rally import RallyPoints
 from autopilot.navigator.rtl import Return
 from autopilot.navigator.smart_return import SmartReturn
-from autopilot.navigator.takeoff import Takeoff
+from autopilot.navigator.takeoff import Climb, Takeoff, is_high
 from autopilot.navigator.termination import Termination
 from autopilot.ports import TERRAIN_VALID
 from autopilot.requests import OffboardSetpoint
@@ -52,6 +52,7 @@ class Navigator:
 
     __slots__ = (
         "_active",
+        "_climb",
         "_mission_checked",
         "_mission_problem",
         "_modes",
@@ -110,6 +111,7 @@ class Navigator:
             Mode.BRAKE: Brake(context),
         }
         self._active: FlightMode = self._modes[Mode.HOLD]
+        self._climb: Climb | None = None  # of a take-off, which is finished before the active mode goes elsewhere
         self.ask = Ask.STAY  # of the setpoint flown
         self._mission_checked: object = None
         self._mission_problem = ""
@@ -164,6 +166,16 @@ class Navigator:
         return self.context.wants_lift
 
     @property
+    def is_taking_off(self) -> bool:
+        """Whether a take-off has been asked for and is not over, on the ground or above it."""
+        return self.context.state.is_armed and (self._active is self.takeoff or self._climb is not None)
+
+    @property
+    def is_going(self) -> bool:
+        """Whether the vehicle is sent to a place and still on its way there, in mode Hold."""
+        return self._climb is not None or self.hold.is_underway
+
+    @property
     def is_landing(self) -> bool:
         """Whether the mode is on its last descent."""
         return self.context.is_landing
@@ -190,10 +202,24 @@ class Navigator:
         if self._active is self.orbit and mode is not Mode.ORBIT:
             self.orbit.leave()
         self._forget_requests(mode)
+        is_low = self.is_taking_off and not is_high(self.context)
         self._active = self._modes[mode]
         self.context.heading.end_turn()
-        if self.context.state.is_armed:
+        self._climb = self.takeoff.climb if is_low and self._goes_away(mode) else None
+        if self.context.state.is_armed and self._climb is None:
             self._active.start()
+
+    def _goes_away(self, mode: Mode) -> bool:
+        """Whether a mode just asked for leads elsewhere at once; a mission takes off by itself."""
+        context = self.context
+        if mode is Mode.HOLD:
+            return context.next_hold is not None and context.next_hold[2]
+        return mode in (Mode.ORBIT, Mode.FOLLOW) or (mode is Mode.MISSION and not context.is_on_ground)
+
+    def stay(self) -> None:
+        """Holds where it is: what it was sent to is given up."""
+        self.context.next_hold = None
+        self.enter(Mode.HOLD)
 
     def begin_here(self, mode: Mode) -> None:
         """Begins a mode anew, or another, without what clients have asked of it: where the vehicle is."""
@@ -220,6 +246,7 @@ class Navigator:
         self.context.next_hold = None
         self.crumbs.clear()
         self.context.heading.reset()
+        self._climb = None
         self._active.start()
 
     def frame(self) -> Mode | None:
@@ -232,7 +259,8 @@ class Navigator:
         wish: Mode | None = None
         if state.is_armed:
             self.crumbs.frame()
-            self._active.frame()
+            if self._climb is None or self._has_climbed(self._climb):
+                self._active.frame()
             if context.heading.is_active or context.yaw_mode:
                 context.heading.frame()
             wish = context.wish
@@ -247,6 +275,14 @@ class Navigator:
         may_turn = state.is_armed and state.mode is not Mode.TERMINATION
         setpoint.set_flags(is_armed=may_turn, is_landed=context.is_on_ground)
         return wish
+
+    def _has_climbed(self, climb: Climb) -> bool:
+        """Goes on with the take-off; once that is high enough, the mode asked for meanwhile begins."""
+        if not climb.frame() and not is_high(self.context):
+            return False
+        self._climb = None
+        self._active.start()
+        return True
 
     def _respect_ground(self) -> None:
         """Lets the vehicle settle where it touches the ground, and go down gently to a place on the ground.
@@ -282,7 +318,8 @@ class Navigator:
         if not (isfinite(lat_deg) or isfinite(lon_deg) or isfinite(alt_amsl_m) or isfinite(yaw)):
             context.next_hold = (context.stop_point(), context.state.yaw_rad, False)
         else:
-            base = self.hold.target_ned if context.state.mode is Mode.HOLD else context.stop_point()
+            is_holding = context.state.mode is Mode.HOLD and self._climb is None
+            base = self.hold.target_ned if is_holding else context.stop_point()
             target = reposition_target(context, base, lat_deg, lon_deg, alt_amsl_m, yaw)
             if isinstance(target, Reply):
                 return target

@@ -8,6 +8,7 @@ from autopilot.vehicle import Reply, Severity, Verdict
 
 REACHED_M = 0.3  # height error at which a climb ends; half of what PX4's tests allow
 _SETTLED_M_S = 0.5
+_SAFE_M = 5.0  # height over where it stood from which a vehicle may lean as it likes; guess
 
 
 class Climb:
@@ -47,14 +48,20 @@ class Climb:
         return is_near and abs(estimate.vel_ned[2]) < _SETTLED_M_S
 
 
+def is_high(context: NavContext) -> bool:
+    """Whether a vehicle that takes off is high enough to go elsewhere; below that it would skid over the ground."""
+    stand_ned = context.state.stand_ned or context.state.home_ned
+    return stand_ned[2] - context.state.estimate.pos_ned[2] >= _SAFE_M
+
+
 class Takeoff:
     """Mode Takeoff: climbs, then holds."""
 
-    __slots__ = ("_alt_amsl_m", "_climb", "_context", "_yaw")
+    __slots__ = ("_alt_amsl_m", "_context", "_yaw", "climb")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
-        self._climb = Climb(context)
+        self.climb = Climb(context)  # goes on if a client sends the vehicle elsewhere while it is low
         self._alt_amsl_m = nan
         self._yaw = nan
 
@@ -73,11 +80,11 @@ class Takeoff:
 
     def start(self) -> None:
         context = self._context
-        self._climb.start(context.down_of(self._target_alt_m(is_told=False)), self._yaw)
+        self.climb.start(context.down_of(self._target_alt_m(is_told=False)), self._yaw)
 
     def frame(self) -> None:
-        if self._climb.frame():
-            self._context.hold_next(self._climb.target_ned, self._climb.yaw)
+        if self.climb.frame():
+            self._context.hold_next(self.climb.target_ned, self.climb.yaw)
 
     def _base_alt_m(self) -> float:
         state = self._context.state

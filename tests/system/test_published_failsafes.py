@@ -126,7 +126,7 @@ def test_throttle_failsafe(action, mode):
         await drone.command(176, 1.0, 3.0, name="position mode")
         await drone.sleep(1.0)
         sticks.is_sending = False
-        await drone.until(lambda: flown.state.mode is mode, 2.0, "failsafe")
+        await drone.until(lambda: flown.state.mode is mode, 8.0, "failsafe")  # PX4 holds for 5 s first
         if mode is not Mode.HOLD:
             await drone.wait_disarmed(120.0)
 

@@ -292,7 +292,7 @@ def test_a_vehicle_whose_pilot_falls_silent_comes_home(mode):
         await airborne(pilot, mode, 20.0)
         await pilot.hold(1.5, x=FORWARD // 3)
         pilot.is_sending = False
-        await pilot.drone.until(lambda: pilot.drone.px4_mode == (MAIN_AUTO, RTL), 2.0, "return")
+        await pilot.drone.until(lambda: pilot.drone.px4_mode == (MAIN_AUTO, RTL), 8.0, "return")
         pilot.is_sending = True
         pilot.move()
         await pilot.drone.sleep(3.0)
@@ -308,7 +308,7 @@ def test_a_failure_of_the_radio_can_be_injected_and_repaired():
     async def script(pilot):
         await airborne(pilot, Mode.POSITION, 20.0)
         await pilot.drone.command(CMD_INJECT_FAILURE, RC_SIGNAL, OFF, name="fail")
-        await pilot.drone.until(lambda: pilot.drone.px4_mode == (MAIN_AUTO, RTL), 2.0, "return")
+        await pilot.drone.until(lambda: pilot.drone.px4_mode == (MAIN_AUTO, RTL), 8.0, "return")
         await pilot.drone.command(CMD_INJECT_FAILURE, RC_SIGNAL, REPAIRED, name="repair")
         await pilot.drone.sleep(0.5)
         await pilot.mode(Mode.POSITION)
