@@ -145,10 +145,11 @@ def picture(
     hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m].")] = 12.0,
 ) -> None:
     """Take a picture of the world from a place in it."""
+    from mission.flight_config import TREELESS_M
     from mission.picture import PictureError, Viewpoint, take_picture
     from sim.world.world import WorldConfig
 
-    world = WorldConfig(seed=world_seed, trees_per_ha=trees, hill_height_m=hills)
+    world = WorldConfig(seed=world_seed, trees_per_ha=trees, hill_height_m=hills, treeless_radius_m=TREELESS_M)
     try:
         take_picture(output, world, Viewpoint(north, east, up, yaw, pitch, fov), size)
     except PictureError as error:

@@ -15,6 +15,7 @@ from common.params import ParameterTable
 from sim.world.world import WorldConfig
 
 Pace = Literal["walk", "run"]
+TREELESS_M = 80.0  # round home, of the command line's worlds: clients' examples fly to 60 m from it, lower than trees
 
 
 class OwnerConfig(BaseModel):

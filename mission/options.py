@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.state_folder import StateFolder
-from mission.flight_config import FlightConfig, OwnerConfig, Pace
+from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, Pace
 from mission.state import stored_home
 from sim.world.world import WorldConfig
 
@@ -108,13 +108,15 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
 
 
 def _world(options: FlightOptions) -> WorldConfig:
-    """With an owner the world of training: its hills can be walked."""
+    """With an owner the world of training: its hills can be walked; otherwise no trees near home."""
     given: dict[str, Any] = {"seed": options.world_seed, "trees_per_ha": options.trees_per_ha}
     if options.owner is not None:
         from policies.tasks.follow_me.world import FOLLOW_WORLD
 
         return FOLLOW_WORLD.model_copy(update=given)
-    return WorldConfig(**given, hill_height_m=options.hill_height_m, has_walls=options.has_walls)
+    return WorldConfig(
+        **given, hill_height_m=options.hill_height_m, has_walls=options.has_walls, treeless_radius_m=TREELESS_M
+    )
 
 
 def _parameter(text: str) -> tuple[str, float]:

@@ -55,7 +55,8 @@ class Pilot:
 
     __slots__ = (
         "_arm_hold_us", "_corner", "_corner_since_us", "_count", "_count_armed", "_exceptions", "_has_gesture",
-        "_is_done", "_is_missed", "_override", "_params", "_speed_max", "_state", "_sticks", "_switch_channel", "_switch_position",
+        "_is_done", "_is_missed", "_override", "_params", "_speed_max", "_state", "_sticks", "_switch_channel",
+        "_switch_position",
     )  # fmt: skip
 
     def __init__(self, state: VehicleState, params: ParameterTable, sticks: Sticks) -> None:

@@ -108,6 +108,9 @@ class WorldConfig(BaseModel):
     """Width of the ring round the clearing in which the hills grow to full height [m]."""
     trees_per_ha: float = Field(default=60.0, ge=0.0, le=1_000.0)
     """Trees per hectare outside the clearing; 0 plants none."""
+    treeless_radius_m: float = Field(default=0.0, ge=0.0, le=1_000.0)
+    """Radius round home that is free of trees, if it is more than the clearing's, hills or not [m]; not in worlds grown
+    in batches."""
     tree_height_min_m: float = Field(default=5.0, ge=1.0, le=60.0)
     """Height of the lowest trees [m]."""
     tree_height_max_m: float = Field(default=10.0, ge=1.0, le=60.0)
@@ -209,7 +212,7 @@ def build_world(config: WorldConfig | None = None, device: str = "cpu") -> World
         config.trees_per_ha,
         config.tree_height_min_m,
         config.tree_height_max_m,
-        config.clearing_radius_m,
+        max(config.clearing_radius_m, config.treeless_radius_m),
     )
     forest = ForestMap(trees, config.size_m)
     edges = np.concatenate([heights[0], heights[-1], heights[:, 0], heights[:, -1]])
