@@ -103,7 +103,8 @@ class Pilot:
         if not 0 < sticks.heard_until_us < state.time_us:
             self._is_missed = False
         elif not self._is_missed:
-            is_expected = sticks.count != self._count_armed or MODE_RULES[state.mode].needs_sticks
+            is_heard_armed = sticks.count != self._count_armed or sticks.is_ardupilot  # its radio is always there
+            is_expected = is_heard_armed or MODE_RULES[state.mode].needs_sticks
             self._is_missed = is_expected and not EXCEPTION_BITS.get(state.mode, 0) & self._exceptions
         return STICKS_LOST if self._is_missed else 0
 
