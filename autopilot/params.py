@@ -4,6 +4,7 @@ Ground stations that speak PX4 ask for certain names when they connect and open 
 Those without a meaning here are constants (minimum = maximum): they can be read, and setting them changes nothing.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import sqrt
 
@@ -108,7 +109,8 @@ def _of_airframe(item: Parameter, value: int | float) -> Parameter:
     return replace(item, default=item.clamped(value), source="airframe file")
 
 
-def parameter_table(airframe: Airframe | None = None) -> ParameterTable:
-    """A vehicle's table, at the defaults of its airframe."""
+def parameter_table(airframe: Airframe | None = None, more: Sequence[Parameter] = ()) -> ParameterTable:
+    """A vehicle's table, at the defaults of its airframe; `more` are those that only its dialect has."""
     own = {} if airframe is None else airframe_defaults(airframe)
-    return ParameterTable(_of_airframe(item, own[item.name]) if item.name in own else item for item in all_parameters())
+    declared = (*all_parameters(), *more)
+    return ParameterTable(_of_airframe(item, own[item.name]) if item.name in own else item for item in declared)

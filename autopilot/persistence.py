@@ -28,13 +28,21 @@ class Persistence:
         storage: where they are.
         params: gets the stored values now; later changes are kept.
         chosen: parameters that this run was given: what is stored of them stays stored, and is not used.
+        passing: parameters that are this run's alone: they are not kept.
     """
 
-    def __init__(self, storage: Storage, params: ParameterTable, chosen: Collection[str] = ()) -> None:
+    def __init__(
+        self,
+        storage: Storage,
+        params: ParameterTable,
+        chosen: Collection[str] = (),
+        passing: Collection[str] = (),
+    ) -> None:
         self.problems: list[str] = []  # one sentence for each record of which something could not be used
         self.on_trouble: Callable[[str], None] = self.problems.append  # hears when something cannot be stored
         self._storage = storage
         self._params = params
+        self._passing = passing
         self._lists: ItemLists | None = None
         self._home: dict[str, Any] = {}
         self._unwritten: set[str] = set()
@@ -112,6 +120,8 @@ class Persistence:
 
     def _parameter_changed(self, declaration: Parameter) -> None:
         name = declaration.name
+        if name in self._passing:
+            return
         value = self._params[name]
         if value == declaration.default:
             self._values.pop(name, None)

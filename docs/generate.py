@@ -7,6 +7,7 @@ from mavlink_page import mavlink_text
 from tasks_page import tasks_text
 from training_page import training_text
 
+from autopilot.ardupilot_params import ARDUPILOT_PARAMETERS
 from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
@@ -20,6 +21,7 @@ from common.airframe import load_airframe
 from common.files import write_whole
 from common.params import Parameter
 from mission.flight import Flight, FlightConfig
+from mission.simulator_params import simulator_parameters
 
 PARAMETERS_PATH = Path(__file__).with_name("parameters.md")
 MAVLINK_PATH = Path(__file__).with_name("mavlink.md")
@@ -45,6 +47,19 @@ airframe brings its own. They are read and set over MAVLink (PARAM_*), by a grou
 the gains were designed.
 """
 
+ARDUPILOT_HEADER = """## In the ArduPilot dialect alone
+
+PX4 has nothing like them: a vehicle has them with [`--dialect ardupilot`](flying.md#dialects).
+
+"""
+
+SIMULATOR_HEADER = """## The simulator, in the ArduPilot dialect
+
+They change the flight's air, sensors, motors, battery and pace while it is flown, as those of ArduPilot's SITL do, and
+are not kept for the next flight. The flight controller does not read them.
+
+"""
+
 ALIAS_HEADER = """## Names in the ArduPilot dialect
 
 With [`--dialect ardupilot`](flying.md#dialects) the vehicle has these names too. Those that stand for nothing can
@@ -57,7 +72,9 @@ def parameters_text() -> str:
     """The whole page."""
     x500 = parameter_table(load_airframe("x500")).declarations
     sections = [f"## {title}\n\n{_table(x500[item.name] for item in declared)}" for title, declared in SECTIONS.items()]
-    return "\n".join([HEADER, *sections, ALIAS_HEADER + _alias_table()])
+    simulator = simulator_parameters(FlightConfig(), load_airframe("x500"))
+    ardupilot = [ARDUPILOT_HEADER + _table(ARDUPILOT_PARAMETERS), SIMULATOR_HEADER + _table(simulator)]
+    return "\n".join([HEADER, *sections, *ardupilot, ALIAS_HEADER + _alias_table()])
 
 
 def _table(declarations: Iterable[Parameter]) -> str:

@@ -34,6 +34,8 @@ from mission.injection import RigInjector
 from mission.log_shelf import FlightLogs, RunLog
 from mission.recorder import History, Recorder
 from mission.script import Drone, Script
+from mission.simulator_params import PREFIX as SIMULATOR_PREFIX
+from mission.simulator_params import TURBULENCE_SHARE, SimulatorParameters
 from mission.stream import StreamServer
 from mission.surroundings import Surroundings
 from mission.texts import Texts
@@ -105,7 +107,8 @@ class Flight:
         self._pacer = Pacer(None)
         self.ready_s = nan  # power-on to ready to arm
         self.params = flight_parameters(config, self.airframe)
-        self.persistence = None if state is None else Persistence(state, self.params, config.parameters)
+        passing = {name for name in self.params if name.startswith(SIMULATOR_PREFIX)}
+        self.persistence = None if state is None else Persistence(state, self.params, config.parameters, passing)
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
         self.injector = RigInjector(self.rig, self.airframe, config.noise)
@@ -169,6 +172,7 @@ class Flight:
         self._stream_rig = None if stream is None else CameraRig(self.rig, self.world, has_thread=True)
         if stream is not None and self._stream_rig is not None and self.controller.camera is not None:
             stream.start(self.controller.camera, self._stream_rig)
+        self.simulator_params = SimulatorParameters(self)
         self._flight_logs: FlightLogs | None = None
         self._connect_host(log, state)
 
@@ -230,7 +234,7 @@ class Flight:
             speed: simulated seconds per second; None runs as fast as possible.
             on_frame: called after each frame, for progress displays.
         """
-        self._pacer = Pacer(speed)
+        self.change_speed(speed)
         if speed is not None and self.time_us == 0:
             self.host.boot_unix_us = wall_unix_us()
         while not is_over(self):
@@ -242,10 +246,21 @@ class Flight:
     def change_speed(self, speed: float | None) -> None:
         """Simulated seconds per second from the next frame on, while it runs; None: as fast as possible."""
         self._pacer = Pacer(speed)
+        self.simulator_params.tell(SIM_SPEEDUP=speed or 0.0)
 
     def set_wind(self, speed_m_s: float, from_deg: float) -> None:
         """From the next frame on the mean blows so, with turbulence and gusts to match."""
-        self.rig.arrays.wind_model.fill_(flight_wind(speed_m_s, from_deg))
+        self.set_air(speed_m_s, from_deg, TURBULENCE_SHARE * speed_m_s)
+        self.simulator_params.tell(
+            SIM_WIND_SPD=speed_m_s, SIM_WIND_DIR=from_deg, SIM_WIND_TURB=TURBULENCE_SHARE * speed_m_s
+        )
+
+    def set_air(self, speed_m_s: float, from_deg: float, turbulence_m_s: float) -> None:
+        """From the next frame on the mean blows so; the vertical wind deviates so much, and gusts go with it."""
+        air = flight_wind(speed_m_s, from_deg)
+        air.turbulence_w_std = turbulence_m_s
+        air.gust_m_s = GUST_SHARE / TURBULENCE_SHARE * turbulence_m_s
+        self.rig.arrays.wind_model.fill_(air)
 
     def fly(self, script: Script, *, seconds: float = 3600.0) -> Running:
         """Runs a script to its end in lockstep, for at most `seconds` of simulated time."""

@@ -7,11 +7,13 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from autopilot.ardupilot_params import ARDUPILOT_PARAMETERS
 from autopilot.params import parameter_table
 from common.airframe import Airframe
 from common.clock import SIMULATED_EPOCH_US
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.params import ParameterTable
+from mission.simulator_params import simulator_parameters
 from sim.world.world import WorldConfig
 
 Pace = Literal["walk", "run"]
@@ -72,7 +74,8 @@ def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTabl
     Raises:
         ParameterError: an unknown name, or a value out of bounds.
     """
-    table = parameter_table(airframe)
+    own = [*ARDUPILOT_PARAMETERS, *simulator_parameters(config, airframe)] if config.dialect == "ardupilot" else []
+    table = parameter_table(airframe, own)
     for name, value in config.parameters.items():
         table.set_exactly(name, value)
     return table

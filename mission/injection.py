@@ -17,6 +17,7 @@ from typing import Any
 from autopilot.injection import Failure, Unit
 from autopilot.vehicle import ACCEPTED, Reply, Verdict
 from common.airframe import Airframe
+from sim.battery import battery_model, charge_at
 from sim.faults import set_fault, set_motor_loss
 from sim.rig import Rig
 
@@ -59,6 +60,7 @@ class RigInjector:
     def __init__(self, rig: Rig, airframe: Airframe, noise: float, i_vehicle: int = 0) -> None:
         self._faults = rig.arrays.faults.numpy()[i_vehicle]
         self._body = rig.arrays.body.numpy()[i_vehicle : i_vehicle + 1]
+        self._battery = battery_model(airframe)
         self._capacity_c = 3.6 * airframe.battery.capacity_mah
         self._rotor_count = len(airframe.rotors)
         self._has_noise = noise > 0.0
@@ -121,6 +123,15 @@ class RigInjector:
             set_fault(self._faults, sensor, *changes[failure])
         self._note(unit, 0, failure)
         return ACCEPTED
+
+    def weaken(self, rotor: int, share: float) -> None:
+        """Gives a motor, from 0, a share of its command only."""
+        set_motor_loss(self._faults, rotor, 1.0 - share)
+        self._note(Unit.MOTOR, rotor, Failure.OK)
+
+    def charge_to(self, rest_v: float) -> None:
+        """Gives the battery the charge at which it rests at a voltage."""
+        self._body["battery_charge_c"][0] = charge_at(self._battery, rest_v)
 
     def _note(self, unit: Unit, rotor: int, failure: Failure) -> None:
         if failure is Failure.INTERMITTENT:

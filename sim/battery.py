@@ -64,3 +64,18 @@ def battery_model(airframe: Airframe) -> BatteryModel:
     model.motor_efficiency = data.motor_efficiency
     model.avionics_w = data.avionics_w
     return model
+
+
+_HALVINGS = 40
+
+
+def charge_at(model: BatteryModel, rest_v: float) -> float:
+    """The charge [C] at which the pack rests at a voltage [V]; the curve rises, so halving the interval finds it."""
+    empty_c, full_c = 0.0, float(model.capacity_c)
+    for _ in range(_HALVINGS):
+        middle_c = 0.5 * (empty_c + full_c)
+        if float(open_circuit_voltage(model, middle_c)) < rest_v:
+            empty_c = middle_c
+        else:
+            full_c = middle_c
+    return 0.5 * (empty_c + full_c)

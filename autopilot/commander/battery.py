@@ -6,7 +6,9 @@ current is counted on. Left out: temperature and ageing.
 
 from math import exp, nan
 
+from autopilot.vehicle import BatteryLevel
 from common.airframe import Battery
+from common.params import ParameterTable
 
 _CORRECTION_TIME_S = 120.0  # the count follows the voltage this slowly; guess, longer than any load transient
 _CURVE_POINTS = 201
@@ -107,3 +109,31 @@ def _rest_voltage_share(charge: float) -> float:
         return -1.031 * exp(-35.0 * s) + 3.685 + 0.2156 * s - 0.1178 * s * s + 0.3201 * s**3
 
     return (cell_v(charge) - cell_v(0.0)) / (cell_v(1.0) - cell_v(0.0))
+
+
+class VoltageLimits:
+    """Voltages below which the battery counts as low or critical, whatever its charge (ArduPilot's BATT_*_VOLT).
+
+    Args:
+        params: BATT_LOW_VOLT, BATT_CRT_VOLT, BATT_LOW_TIMER; where they are missing nothing is limited.
+    """
+
+    __slots__ = ("_has_limits", "_params", "_since_us")
+
+    def __init__(self, params: ParameterTable) -> None:
+        self._params = params
+        self._has_limits = "BATT_LOW_VOLT" in params
+        self._since_us: dict[BatteryLevel, int] = {}  # since when the voltage has been below
+
+    def level(self, now_us: int, voltage_v: float) -> BatteryLevel:
+        """LOW or CRITICAL after the voltage has been too low for long enough; UNDEFINED otherwise."""
+        level = BatteryLevel.UNDEFINED
+        if not self._has_limits or voltage_v <= 0.0:
+            return level
+        patience_us = float(self._params["BATT_LOW_TIMER"]) * 1e6
+        for limited, name in ((BatteryLevel.LOW, "BATT_LOW_VOLT"), (BatteryLevel.CRITICAL, "BATT_CRT_VOLT")):
+            if voltage_v >= float(self._params[name]):
+                self._since_us.pop(limited, None)
+            elif now_us - self._since_us.setdefault(limited, now_us) >= patience_us:
+                level = limited
+        return level

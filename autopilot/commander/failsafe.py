@@ -98,6 +98,10 @@ OFFBOARD_ACTIONS = {
 """COM_OBL_RC_ACT."""
 TRAFFIC_ACTIONS = {2: Action.RETURN, 3: Action.LAND, 4: Action.HOLD}
 """NAV_TRAFF_AVOID; with 0 nobody looks."""
+LOW_BATTERY_ACTIONS = {
+    1: Action.LAND, 2: Action.RETURN, 3: Action.SMART_RETURN, 4: Action.SMART_RETURN, 5: Action.TERMINATE,
+}  # fmt: skip
+"""BATT_FS_LOW_ACT, in ArduPilot's dialect."""
 CRITICAL_BATTERY_ACTIONS = {2: Action.LAND, 3: Action.RETURN}
 EMERGENCY_BATTERY_ACTIONS = {2: Action.LAND, 3: Action.LAND}
 
@@ -123,6 +127,12 @@ def always(action: Action) -> ActionChoice:
 def by(parameter: str, actions: dict[int, Action], otherwise: Action = Action.WARN) -> ActionChoice:
     """The action that a parameter chooses."""
     return lambda params, _mode: actions.get(int(params[parameter]), otherwise)
+
+
+def _battery_low(params: ParameterTable, _: Mode) -> Action:
+    """A warning, unless ArduPilot's parameter says otherwise."""
+    name = "BATT_FS_LOW_ACT"
+    return LOW_BATTERY_ACTIONS.get(int(params[name]), Action.WARN) if name in params else Action.WARN
 
 
 def _position_lost(params: ParameterTable, mode: Mode) -> Action:
@@ -164,7 +174,7 @@ RULES: tuple[Rule, ...] = (
     Rule(STICKS_LOST, _sticks_lost, Severity.CRITICAL, "Sticks lost", "Sticks are back"),
     Rule(OFFBOARD_LOST, by("COM_OBL_RC_ACT", OFFBOARD_ACTIONS, Action.HOLD), Severity.CRITICAL,
          "Offboard setpoints lost"),
-    Rule(BATTERY_LOW, always(Action.WARN), Severity.WARNING, "Battery low"),
+    Rule(BATTERY_LOW, _battery_low, Severity.WARNING, "Battery low"),
     Rule(BATTERY_SILENT, always(Action.WARN), Severity.WARNING, "Battery sensor silent: charge is estimated"),
     Rule(FLIGHT_TIME_NEAR, always(Action.WARN), Severity.WARNING, "Flight time is nearly over"),
     Rule(WIND_STRONG, always(Action.WARN), Severity.WARNING, "Strong wind"),

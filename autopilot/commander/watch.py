@@ -6,7 +6,7 @@ guard's. Slow things (wind, time, the ground station) are looked at five times a
 
 from math import hypot, isnan
 
-from autopilot.commander.battery import BatteryEstimator
+from autopilot.commander.battery import BatteryEstimator, VoltageLimits
 from autopilot.commander.crash import AttitudeWatch
 from autopilot.commander.failsafe import (
     ACCEL_DOUBTED,
@@ -78,7 +78,7 @@ class FailureWatch:
 
     Args:
         state: the vehicle as of this frame.
-        params: COM_*, BAT_*, FD_*.
+        params: COM_*, BAT_*, BATT_*, FD_*.
         battery: the charge estimator.
         station: when a ground station was heard.
         motors: the motor watch.
@@ -87,7 +87,7 @@ class FailureWatch:
     __slots__ = (
         "_attitude", "_battery", "_battery_bits", "_battery_critical", "_battery_emergency", "_battery_low",
         "_except_bits", "_is_position_lost", "_motors", "_next_slow_us", "_offboard_loss_us", "_params",
-        "_reckoning_us", "_resets_us", "_slow", "_state", "_station", "_station_loss_us", "_time_max_us",
+        "_reckoning_us", "_resets_us", "_slow", "_state", "_station", "_station_loss_us", "_time_max_us", "_voltage",
         "_wind_max", "_wind_speed", "_wind_warn", "airborne_us",
     )  # fmt: skip
 
@@ -105,6 +105,7 @@ class FailureWatch:
         self._station = station
         self._motors = motors
         self._attitude = AttitudeWatch(params)
+        self._voltage = VoltageLimits(params)
         self._wind_speed = 0.0  # [m/s] low-passed
         self.reset()
         self._load()
@@ -169,7 +170,7 @@ class FailureWatch:
                 level = BatteryLevel.CRITICAL
             if remaining < self._battery_emergency:
                 level = BatteryLevel.EMERGENCY
-        state.battery_level = level
+        state.battery_level = max(level, self._voltage.level(state.time_us, float(state.samples.battery.voltage_v)))
 
     @property
     def misses_station(self) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.abilities import Vehicle
+from autopilot.mavlink.aux_functions import AuxFunctions
 from autopilot.mavlink.calibration import CalibrationService
 from autopilot.mavlink.camera.component import AttachedCamera, CameraComponent
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, OnFrame, Sender
@@ -51,6 +52,7 @@ from autopilot.mavlink.service import CommandHandler, Handler, Service
 from autopilot.mavlink.shell import ShellService
 from autopilot.mavlink.signing import Judgement, SigningConfig
 from autopilot.mavlink.signing_setup import SigningService
+from autopilot.mavlink.stream_rates import StreamRateService
 from autopilot.mavlink.streams import Stream
 from autopilot.mavlink.targets import TargetService
 from autopilot.mavlink.telemetry.status import mission_progress
@@ -153,6 +155,8 @@ class MavlinkServer:
             FenceService(endpoint),
             SafetyService(endpoint),
             MotorTestService(endpoint),
+            AuxFunctions(endpoint),
+            StreamRateService(endpoint),
             CalibrationService(endpoint),
             self._compass,
             metadata,

@@ -178,6 +178,7 @@ class Telemetry:
         self.types: dict[int, MessageType] = {}
         self.builders: dict[int, Builder] = {}
         self.default_interval_us: dict[LinkRole, dict[int, int]] = {role: {} for role in LinkRole}
+        self._own_interval_us: dict[LinkRole, dict[int, int]] = {}  # unless parameters say otherwise
         for stream in self.streams:
             kind = known_type(stream.name)
             self.types[kind.msg_id] = kind
@@ -185,6 +186,18 @@ class Telemetry:
             own_hz = stream.ardupilot_hz if is_ardupilot else 0.0
             self.default_interval_us[LinkRole.GROUND][kind.msg_id] = _interval_us(max(stream.ground_hz, own_hz))
             self.default_interval_us[LinkRole.ONBOARD][kind.msg_id] = _interval_us(max(stream.onboard_hz, own_hz))
+        self._own_interval_us = {role: dict(intervals) for role, intervals in self.default_interval_us.items()}
+
+    def group_ids(self, group: int) -> list[int]:
+        """The messages of a MAV_DATA_STREAM group; GROUP_ALL: those of every group."""
+        names = self.groups.values() if group == GROUP_ALL else (self.groups.get(group, ()),)
+        return [known_type(name).msg_id for of_group in names for name in of_group]
+
+    def set_group_default(self, group: int, rate_hz: float) -> None:
+        """Links that come from now on get a group at this rate; negative: each message at its own."""
+        for role, intervals in self.default_interval_us.items():
+            for msg_id in self.group_ids(group):
+                intervals[msg_id] = self._own_interval_us[role][msg_id] if rate_hz < 0.0 else _interval_us(rate_hz)
 
 
 def _interval_us(rate_hz: float) -> int:
@@ -197,6 +210,7 @@ class StreamSchedule:
 
     def __init__(self, telemetry: Telemetry, role: LinkRole) -> None:
         self._telemetry = telemetry
+        self._role = role
         self._defaults = dict(telemetry.default_interval_us[role])
         self.interval_us = dict(self._defaults)  # by message id; 0: not sent
         self._queue: list[tuple[int, int]] = []  # (due time, message id), a heap
@@ -216,11 +230,15 @@ class StreamSchedule:
 
     def set_group(self, group: int, rate_hz: float) -> None:
         """Sets the rate of every message of a MAV_DATA_STREAM group; 0 stops them."""
-        all_groups = self._telemetry.groups
-        groups = all_groups if group == GROUP_ALL else {group: all_groups.get(group, ())}
-        for names in groups.values():
-            for name in names:
-                self._change(known_type(name).msg_id, _interval_us(rate_hz))
+        for msg_id in self._telemetry.group_ids(group):
+            self._change(msg_id, _interval_us(rate_hz))
+
+    def reset_group(self, group: int) -> None:
+        """Sends every message of a group as a link that comes now would get it."""
+        defaults = self._telemetry.default_interval_us[self._role]
+        for msg_id in self._telemetry.group_ids(group):
+            self._defaults[msg_id] = defaults[msg_id]
+            self._change(msg_id, defaults[msg_id])
 
     def postpone(self, msg_id: int, due_us: int) -> None:
         """Sends a streamed message next at a time, because it has just been sent otherwise."""

@@ -9,6 +9,7 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.parameter_view import ParameterView
 from autopilot.params import parameter_table
 from common.airframe import load_airframe
+from mission.flight_config import FlightConfig, flight_parameters
 from tests.unit.autopilot.mavlink.rig import Rig, texts
 
 AXES = "XYZ"
@@ -66,7 +67,8 @@ def test_names_are_dense_and_short_and_values_fit_their_types(dialect):
 
 
 def test_every_alias_stands_for_a_parameter_and_has_no_other_meaning():
-    table = parameter_table()
+    airframe = load_airframe("x500")
+    table = flight_parameters(FlightConfig(dialect="ardupilot"), airframe)
     assert [alias.name for alias in ALIASES if alias.of not in table or alias.name in table] == []
     names = [alias.name for alias in ALIASES] + [constant.name for constant in CONSTANTS]
     assert len(set(names)) == len(names)
