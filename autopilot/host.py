@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from autopilot.camera.ports import FrameSource, VideoStream
+from autopilot.camera.ports import FrameSource, PictureServer, VideoStream
 from autopilot.camera.storage import MediaFolder
 from common.clock import SIMULATED_EPOCH_US
 from common.folder import ConfinedFolder
@@ -88,6 +88,12 @@ class Host:
     storage: Storage | None = None
     frames: FrameSource | None = None  # None: the vehicle carries no camera
     media: MediaFolder | None = None  # None: there is no card in the camera
-    stream: VideoStream | None = None
+    stream: PictureServer | None = None  # the camera's picture and its files over HTTP
+    video: VideoStream | None = None  # for ground stations
     read_truth: Callable[[], Any] | None = None  # a simulator's body state: for telemetry, never for the controller
     boot_unix_us: int = SIMULATED_EPOCH_US  # the date of power-on
+
+    @property
+    def live_stream(self) -> VideoStream | None:
+        """What stations are told of, and may start and stop."""
+        return self.video or self.stream

@@ -3,7 +3,6 @@
 A wrong argument, file or port gives one sentence on standard error and exit code 2; a mission that failed gives 1.
 """
 
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +15,7 @@ from mission import follow_commands, task_commands, training_commands, view_comm
 from mission.refusal import refuse
 
 app = typer.Typer(
+    add_completion=False,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -29,18 +29,8 @@ def main() -> None:
     app()
 
 
-def _print_version(is_asked: bool) -> None:
-    if is_asked:
-        typer.echo(f"honeyguide {version('honeyguide')}")
-        raise typer.Exit
-
-
 @app.callback()
-def _root(
-    _: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
-    ] = False,
-) -> None:
+def _root() -> None:
     """Fly a simulated drone and its flight controller over MAVLink."""
 
 
@@ -87,6 +77,15 @@ def fly(
     stream_port: Annotated[
         int, typer.Option(min=0, max=65535, help="HTTP port of the camera's live picture; 0: none.")
     ] = 0,
+    video_port: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=65534,
+            help="UDP port of --host that the camera's video is sent to (H.264, RTP); 0: none.",
+            show_default="5600, when a client starts the video",
+        ),
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Show the flight on a live page in the browser.")] = False,
     view_port: Annotated[int, typer.Option(min=1, max=65535, help="HTTP port of the live page.")] = 8080,
     traffic: Annotated[int, typer.Option(min=0, max=50, help="Other aircraft that are heard by ADS-B.")] = 0,
@@ -116,9 +115,10 @@ def fly(
                 wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
                 trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, bind=bind,
                 tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
-                run_folder=run_folder, stream_port=stream_port, parameters=tuple(param or ()), state=state,
-                traffic_count=traffic, has_lidar=lidar, has_view=view, view_port=view_port,
-                owner=owner, image_port=image_port, announces_components=announce_components,
+                run_folder=run_folder, stream_port=stream_port, video_port=video_port,
+                parameters=tuple(param or ()), state=state, traffic_count=traffic, has_lidar=lidar,
+                has_view=view, view_port=view_port, owner=owner, image_port=image_port,
+                announces_components=announce_components,
             )
         )  # fmt: skip
     except UserError as error:

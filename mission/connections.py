@@ -10,6 +10,7 @@ from common.clock import wall_unix_us
 from common.state_folder import StateFolder
 from mission.follow.image_server import ImageServer
 from mission.options import FlightOptions, UserError
+from mission.rtp import PORT, RtpVideo, VideoError
 from mission.stream import StreamServer
 
 if TYPE_CHECKING:
@@ -86,6 +87,24 @@ def open_stream(port: int) -> StreamServer | None:
         raise UserError(f"--stream-port {port}: {error.strerror}") from error
 
 
+def open_video(port: int | None, host: str, *, may_wait: bool) -> RtpVideo | None:
+    """The camera's video for ground stations.
+
+    Args:
+        port: where it is sent from the start; None: to the usual one, once a client starts it; 0: nowhere.
+        host: the address it is sent to.
+        may_wait: whether it may wait for a client.
+    """
+    if port == 0 or (port is None and not may_wait):
+        return None
+    try:
+        return RtpVideo(host, port or PORT, is_running=port is not None)
+    except VideoError as error:
+        if port is None:
+            return None
+        raise UserError(f"--video-port {port}: {error}") from error
+
+
 def open_images(options: FlightOptions) -> ImageServer | None:
     """The onboard camera's pictures for a companion computer, if somebody is to be followed."""
     if options.owner is None:
@@ -103,8 +122,6 @@ def open_page(port: int) -> "PageServer":
 
         return PageServer(port, "Honeyguide")
     except ImportError as error:
-        raise UserError(
-            f"--view: {error.name} is missing; it comes with the extra 'viewer' (docs/flying.md, Installing)"
-        ) from error
+        raise UserError(f"--view: {error.name} is missing: pip install 'honeyguide[viewer]'") from error
     except OSError as error:
         raise UserError(f"--view-port {port}: {error.strerror}") from error

@@ -33,6 +33,7 @@ from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
 from mission.injection import RigInjector
 from mission.log_shelf import FlightLogs, RunLog
 from mission.recorder import History, Recorder
+from mission.rtp import RtpVideo
 from mission.script import Drone, Script
 from mission.simulator_params import PREFIX as SIMULATOR_PREFIX
 from mission.simulator_params import TURBULENCE_SHARE, SimulatorParameters
@@ -45,6 +46,7 @@ from sim.sensors.esc import esc_reader
 from sim.sensors.ring import RingSensor
 from sim.sensors.sensors import sensor_model
 from sim.turntable import Turntable
+from sim.video_rig import VideoRig
 from sim.wind import WindModel, wind_model
 from sim.world.batch import grown_world
 from sim.world.world import WorldMap, build_world
@@ -76,6 +78,7 @@ class Flight:
         signing: where the key of MAVLink's signatures is kept, and whether they are required.
         folder: where `flight.ulg` and `flight.tlog` are written; None writes nothing.
         stream: serves the camera's live picture.
+        video: sends it to ground stations.
         has_camera_thread: photos are rendered while the flight goes on, which is then no longer the same each time.
         state: what outlives the flight; None: it begins with defaults and nothing is kept.
     """
@@ -89,6 +92,7 @@ class Flight:
         state: StateFolder | None = None,
         signing: SigningConfig | None = None,
         stream: StreamServer | None = None,
+        video: RtpVideo | None = None,
         has_camera_thread: bool = False,
     ) -> None:
         self.config = config
@@ -121,6 +125,7 @@ class Flight:
             frames=self._camera_rig,
             media=media,
             stream=stream,
+            video=video,
             boot_unix_us=config.boot_unix_us,
         )
         self.texts = Texts(lambda: self.time_us)
@@ -173,6 +178,12 @@ class Flight:
         if stream is not None and self._stream_rig is not None and self.controller.camera is not None:
             stream.start(self.controller.camera, self._stream_rig)
         self.simulator_params = SimulatorParameters(self)
+        self.video = video
+        self._video_rig: VideoRig | None = None
+        if video is not None and self.controller.camera is not None:
+            self._video_rig = VideoRig(self.rig, self.world, None if self.owner is None else self.owner.people)
+            video.start(self.controller.camera, self._video_rig)
+            video.on_trouble = lambda text: self.server.statustext(Severity.WARNING, text)
         self._flight_logs: FlightLogs | None = None
         self._connect_host(log, state)
 
@@ -213,6 +224,8 @@ class Flight:
             computer.frame(self.time_us)
         if self.stream is not None:
             self.stream.frame()
+        if self.video is not None:
+            self.video.frame()
         if self._flight_logs is not None:
             self._flight_logs.frame(is_armed=self.controller.state.is_armed)
         if self.persistence is not None:
@@ -272,11 +285,12 @@ class Flight:
 
     def close(self) -> History:
         """Completes the logs, closes the links and returns the history; a state folder stays the caller's to close."""
-        if self.stream is not None:
-            self.stream.close()
+        for output in (self.stream, self.video):
+            if output is not None:
+                output.close()
         if self.controller.camera is not None:
             self.controller.camera.close()
-        for rig in (self._camera_rig, self._stream_rig):
+        for rig in (self._camera_rig, self._stream_rig, self._video_rig):
             if rig is not None:
                 rig.close()
         if self.persistence is not None:

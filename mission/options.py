@@ -48,6 +48,7 @@ class FlightOptions:
     dialect: str = "px4"
     announces_components: bool = False
     stream_port: int = 0
+    video_port: int | None = None  # None: the default one, when a client starts the stream; 0: no video
     has_view: bool = False
     view_port: int = 8080
     parameters: tuple[str, ...] = ()  # NAME=VALUE

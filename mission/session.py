@@ -15,14 +15,16 @@ from common.files import write_whole
 from common.geodesy import GeoPoint
 from common.params import ParameterError
 from common.state_folder import StateFolder
-from mission.connections import open_images, open_links, open_page, open_stream, signing_config
+from mission.connections import open_images, open_links, open_page, open_stream, open_video, signing_config
 from mission.flight_config import flight_parameters
 from mission.net_guard import LOOPBACK
 from mission.options import FlightOptions, UserError, check_end, flight_config, speed_of
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
+from mission.rtp import session_description
 from mission.state import StateError, keep_home, open_state
 from mission.terminal import busy, print_line
 
+VIDEO = "video.sdp"
 WIND_EXPECTED_M_S = 13.0  # measured: an x500 finishes the default mission for 12 of 12 seeds; at 14 m/s for 10
 
 
@@ -55,6 +57,8 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     signing = signing_config(options, speed, state)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
+    is_reached = speed is not None and not options.stream_port  # stations are told of one stream
+    video = open_video(options.video_port, options.host, may_wait=is_reached)
     images = None if speed is None else open_images(options)
     page = open_page(options.view_port) if options.has_view else None
     folder = new_folder(options.run_folder)
@@ -79,6 +83,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
             signing=signing,
             state=state,
             stream=stream,
+            video=video,
             has_camera_thread=speed is not None,
         )
     if images is not None and flight.onboard is not None:
@@ -140,5 +145,8 @@ def _print_start(options: FlightOptions, speed: float | None, folder: Path, cons
         print_line(console, f"pictures for a companion: tcp://{LOOPBACK}:{options.image_port}")
     if options.stream_port:
         print_line(console, f"the camera's picture: http://{LOOPBACK}:{options.stream_port}/")
+    if options.video_port:
+        write_whole(folder / VIDEO, session_description(options.host, options.video_port).encode())
+        print_line(console, f"video: UDP {options.video_port} (H.264 in RTP); players open {folder / VIDEO}")
     if options.wind_m_s > WIND_EXPECTED_M_S:
         print_line(console, f"wind of {options.wind_m_s:g} m/s is more than an x500 can be relied on to fly")

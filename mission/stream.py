@@ -44,7 +44,7 @@ class StreamServer:
 
     def __init__(self, port: int, host: str = LOOPBACK) -> None:
         self.width, self.height = 320, 180
-        self.rate_hz = RATE_HZ
+        self.rate_hz, self.bitrate, self.is_rtp = RATE_HZ, 0, False
         self.is_running = True
         self._camera: Camera | None = None
         self._source: FrameSource | None = None

@@ -21,7 +21,6 @@ from autopilot.ports import (
     BatterySample,
     Estimate,
     Setpoint,
-    contact,
 )
 from common.kernels import GRAVITY_M_S2, TICK_S, TICK_US
 from sim.bodies.multirotor import BodyState, MultirotorModel, body_at_rest, body_tick
@@ -130,7 +129,7 @@ def make_advance(has_estimator: bool) -> Any:
             body = body_tick(model, body, command, wind.wind_ned, world)
             if wp.static(has_estimator):
                 sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, world, seed, i, tick)
-                estimator_step(rig.autopilot.ekf, i, sensors.samples, contact(setpoint))
+                estimator_step(rig.autopilot.ekf, i, sensors.samples)
                 estimate = rig.autopilot.ekf.rows[i].estimate
             else:
                 sensors.samples.battery = true_battery(body, tick)

@@ -45,12 +45,19 @@ class FrameSource(Protocol):
 class VideoStream(Protocol):
     """A live picture that clients may watch."""
 
-    uri: str
-    definition_uri: str  # where the camera's definition file is; empty for nowhere
+    uri: str  # its address; of RTP: the UDP port that a station listens on
+    is_rtp: bool  # H.264 in RTP packets over UDP; otherwise pictures over HTTP
     width: int
     height: int
     rate_hz: float
+    bitrate: int  # [bit/s] at most; 0: unknown
     is_running: bool  # may be set: STOP_STREAMING pauses it
+
+
+class PictureServer(VideoStream, Protocol):
+    """One that serves files as well."""
+
+    definition_uri: str  # where the camera's definition file is; empty for nowhere
 
     def media_uri(self, name: str) -> str:
         """Where a stored file can be fetched."""

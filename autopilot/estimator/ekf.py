@@ -282,15 +282,8 @@ def align(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample, samples: Sa
 
 
 @wp.func
-def estimator_step(ekf: Ekf, i: int, samples: Samples, contact: int) -> None:
-    """One tick of vehicle i, on its row in place: nothing happens without a new IMU sample.
-
-    Args:
-        ekf: of all vehicles.
-        i: the vehicle.
-        samples: the newest of each sensor.
-        contact: CONTACT_*: what the commander says.
-    """
+def estimator_step(ekf: Ekf, i: int, samples: Samples) -> None:
+    """One tick of vehicle i, on its row in place: nothing happens without a new IMU sample."""
     if samples.imu.time_us == ekf.rows[i].time_us:
         return
     params = ekf.params[i]
@@ -301,8 +294,7 @@ def estimator_step(ekf: Ekf, i: int, samples: Samples, contact: int) -> None:
     ekf.rows[i].imu_head += 1
     ekf.rows[i].imu_tail = wp.max(ekf.rows[i].imu_tail, ekf.rows[i].imu_head - IMU_RING)
     ekf.rows[i].time_us = imu.time_us
-    clean.imu = imu
-    observe_stillness(ekf, i, params, clean, contact)
+    ekf.rows[i].stillness = observe_stillness(ekf.rows[i].stillness, imu)
     receive_samples(ekf, i, clean)
     if ekf.external[i].time_us != ekf.rows[i].external_inbox.arrived_time_us:
         receive_external(ekf, i)

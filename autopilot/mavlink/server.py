@@ -183,7 +183,7 @@ class MavlinkServer:
             components.append(device)
             self._add(GimbalManager(endpoint, vehicle.state.gimbal, device))
         if vehicle.camera is not None:
-            camera = CameraComponent(endpoint, vehicle.camera, vehicle.host.stream)
+            camera = CameraComponent(endpoint, vehicle.camera)
             components.append(camera)
             self._add(AttachedCamera(camera))
             self._commands.delegated.update(AttachedCamera(camera).commands())

@@ -13,13 +13,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from common.clock import wall_time_s
 from mission.options import UserError
+from mission.terminal import LINE_PERIOD_S, print_line
 from mission.video import Mp4, VideoError
 from mission.view.chase import PICTURE_S, STRIDE
 from mission.view.film_pictures import film
 from mission.view.recording import Recording
 from sim.world.world import WorldMap
-
-LINE_S = 5.0  # wall clock, between two lines
 
 
 def write_film(recording: Recording, world: WorldMap, target: Path, console: Console) -> None:
@@ -36,7 +35,7 @@ def write_film(recording: Recording, world: WorldMap, target: Path, console: Con
                 tell(i + 1)
     except VideoError as error:
         raise UserError(str(error)) from error
-    console.print(f"film of {count * PICTURE_S:.0f} s: {target}", markup=False, highlight=False, soft_wrap=True)
+    print_line(console, f"film of {count * PICTURE_S:.0f} s: {target}")
 
 
 @contextmanager
@@ -53,10 +52,9 @@ def told(console: Console, count: int) -> Iterator[Callable[[int], None]]:
     def tell(done: int) -> None:
         nonlocal shown_s
         now_s = wall_time_s()
-        if now_s - shown_s >= LINE_S:
+        if now_s - shown_s >= LINE_PERIOD_S:
             shown_s = now_s
             left_s = (now_s - start_s) * (count - done) / done
-            text = f"film: picture {done} of {count}, {now_s - start_s:.0f} s, {left_s:.0f} s left"
-            console.print(text, markup=False, highlight=False, soft_wrap=True)
+            print_line(console, f"film: picture {done} of {count}, {now_s - start_s:.0f} s, {left_s:.0f} s left")
 
     yield tell

@@ -8,6 +8,7 @@ from mavsdk import ComponentType, Configuration, ConnectionResult, Mavsdk
 from mavsdk.plugins.camera import Camera, CameraError, CameraResult, Mode, Option, PhotosRange, Setting
 from mavsdk.plugins.gimbal import ControlMode, Gimbal, GimbalError, GimbalMode, SendMode
 
+from tests.system.receiver import Receiver
 from tests.system.test_mavsdk import START_UP_S
 from tests.system.vehicle import IdleVehicle, is_free
 
@@ -105,6 +106,31 @@ def test_camera_plugin_takes_photos_and_video_and_changes_settings(vehicle, syst
     camera.reset_settings(CAMERA)
     camera.format_storage(CAMERA, 1)
     assert stored(vehicle, ".jpg") == []
+
+
+@pytest.mark.slow
+def test_camera_plugin_starts_and_stops_the_video_that_a_station_watches(tmp_path):
+    port = next(port for port in range(15_600, 15_998, 2) if is_free(port) and is_free(port + 1))
+    with IdleVehicle(tmp_path, "--trees", 20, "--video-port", port) as vehicle, Receiver(tmp_path, port) as receiver:
+        mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+        assert mavsdk.add_any_connection(f"udpin://127.0.0.1:{vehicle.api_port}") == ConnectionResult.SUCCESS
+        camera = Camera(mavsdk.first_autopilot(START_UP_S))
+        until(lambda: camera.camera_list().cameras, "found")
+        until(lambda: camera.get_video_stream_info(CAMERA).settings.uri, "told of the video")
+        settings = camera.get_video_stream_info(CAMERA).settings
+        assert settings.uri == str(port)
+        assert (settings.horizontal_resolution_pix, settings.vertical_resolution_pix) == (640, 360)
+        until(lambda: receiver.count > 2, "watched")
+        assert receiver.size == (640, 360)
+        camera.stop_video_streaming(CAMERA, 1)
+        time.sleep(1.0)
+        count = receiver.count
+        time.sleep(1.0)
+        assert receiver.count == count
+        camera.start_video_streaming(CAMERA, 1)
+        until(lambda: receiver.count > count + 2, "watched again")
+        mavsdk.destroy()
+        assert (vehicle.folder / "video.sdp").read_text().startswith("v=0")
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.camera.camera import CAMERA_ID, Camera, Shot
 from autopilot.camera.camera import Command as CameraCommand
-from autopilot.camera.ports import VideoStream
 from autopilot.mavlink.camera.messages import STREAM_ID, CameraMessages
 from autopilot.mavlink.camera.settings import SettingsService
 from autopilot.mavlink.channel import Endpoint
@@ -23,6 +22,7 @@ _CAMERA_SETTINGS = known_type("CAMERA_SETTINGS")
 _CAMERA_TRIGGER = known_type("CAMERA_TRIGGER")
 _CAMERA_IMAGE_CAPTURED = known_type("CAMERA_IMAGE_CAPTURED")
 _CAMERA_FEEDBACK = known_type("CAMERA_FEEDBACK")
+_STREAM_STATUS = known_type("VIDEO_STREAM_STATUS")
 _IMAGE_CAPTURED_ID = _CAMERA_IMAGE_CAPTURED.msg_id
 # Requests older than REQUEST_MESSAGE, and what they ask for.
 _OLD_REQUESTS = {
@@ -54,13 +54,12 @@ class CameraComponent(Component):
     Args:
         endpoint: the vehicle's links.
         camera: the camera.
-        stream: its live picture, None if there is none.
     """
 
-    def __init__(self, endpoint: Endpoint, camera: Camera, stream: VideoStream | None) -> None:
+    def __init__(self, endpoint: Endpoint, camera: Camera) -> None:
         self._camera = camera
-        self._stream = stream
-        self._messages = CameraMessages(camera, endpoint.vehicle.state, endpoint.vehicle.host, stream)
+        self._stream = endpoint.vehicle.host.live_stream
+        self._messages = CameraMessages(camera, endpoint.vehicle.state, endpoint.vehicle.host)
         self._settings = SettingsService(camera.settings, self.reply)
         self._single: dict[tuple[int, int], tuple[float, int]] = {}  # number and time of a client's last single photo
         super().__init__(endpoint, CAMERA_ID, mavlink.MAV_TYPE_CAMERA, "Camera")
@@ -81,12 +80,12 @@ class CameraComponent(Component):
         }
 
     def _stream_payloads(self) -> Mapping[str, Payload]:
-        if self._stream is None:
+        stream, messages = self._stream, self._messages
+        if stream is None:
             return {}
-        messages = self._messages
         return {
-            "VIDEO_STREAM_INFORMATION": messages.stream_information,
-            "VIDEO_STREAM_STATUS": messages.stream_status,
+            "VIDEO_STREAM_INFORMATION": partial(messages.stream_information, stream),
+            "VIDEO_STREAM_STATUS": partial(messages.stream_status, stream),
         }
 
     def default_interval_us(self, msg_id: int) -> int:
@@ -106,8 +105,8 @@ class CameraComponent(Component):
             mavlink.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: self._old_image_request,
             mavlink.MAV_CMD_RESET_CAMERA_SETTINGS: self._reset,
             mavlink.MAV_CMD_STORAGE_FORMAT: self._format,
-            mavlink.MAV_CMD_VIDEO_START_STREAMING: partial(self._stream_switched, True),
-            mavlink.MAV_CMD_VIDEO_STOP_STREAMING: partial(self._stream_switched, False),
+            mavlink.MAV_CMD_VIDEO_START_STREAMING: self._start_stream,
+            mavlink.MAV_CMD_VIDEO_STOP_STREAMING: self._stop_stream,
         }
 
     # Pictures
@@ -249,18 +248,32 @@ class CameraComponent(Component):
             return denied("parameter 2 must be 1 to format the storage")
         return self._camera.format_storage()
 
-    def _stream_switched(self, is_on: bool, command: Command) -> Reply:
-        """Starts or pauses the live picture.
+    def _start_stream(self, command: Command) -> Reply | None:
+        """Starts the live video, or goes on with it.
 
         Params: p1 stream (0 or 1).
         Refused: UNSUPPORTED: the vehicle was started without a stream; DENIED: no such stream.
         """
+        return self._switch_stream(command, is_on=True)
+
+    def _stop_stream(self, command: Command) -> Reply | None:
+        """Pauses the live video.
+
+        Params: p1 stream (0 or 1).
+        Refused: UNSUPPORTED: the vehicle was started without a stream; DENIED: no such stream.
+        """
+        return self._switch_stream(command, is_on=False)
+
+    def _switch_stream(self, command: Command, *, is_on: bool) -> Reply | None:
+        """Switches it, and tells everyone."""
         if self._stream is None:
-            return Reply(Verdict.UNSUPPORTED, "there is no live picture; --stream-port gives one")
+            return Reply(Verdict.UNSUPPORTED, "there is no live video; --video-port gives one")
         if command.p1 == command.p1 and command.p1 not in (0.0, float(STREAM_ID)):
             return denied(f"there is no stream {command.p1:g}")
         self._stream.is_running = is_on
-        return ACCEPTED
+        self.ack(command, Verdict.ACCEPTED)
+        self.broadcast(_STREAM_STATUS, self._messages.stream_status(self._stream))
+        return None
 
 
 class AttachedCamera(Service):

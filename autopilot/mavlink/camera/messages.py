@@ -53,18 +53,17 @@ class CameraMessages:
     Args:
         camera: the camera.
         state: the vehicle that carries it.
-        stream: its live picture, None if there is none.
+        host: where its picture and its files are.
     """
 
-    def __init__(self, camera: Camera, state: VehicleState, host: Host, stream: VideoStream | None) -> None:
+    def __init__(self, camera: Camera, state: VehicleState, host: Host) -> None:
         self._camera = camera
         self._state = state
         self._host = host
-        self._stream = stream
 
     def information(self) -> bytes:
         """Maker, optics, abilities, and where the definition file is."""
-        stream = self._stream
+        server = self._host.stream
         width, height = PHOTO_SIZES[-1]
         return _information(
             time_boot_ms=boot_ms(self._state.time_us),
@@ -76,9 +75,9 @@ class CameraMessages:
             sensor_size_v=SENSOR_HEIGHT_MM,
             resolution_h=width,
             resolution_v=height,
-            flags=_CAPABILITIES | (mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if stream else 0),
-            cam_definition_version=VERSION if stream and stream.definition_uri else 0,
-            cam_definition_uri=stream.definition_uri if stream else "",
+            flags=_CAPABILITIES | (mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if self._host.live_stream else 0),
+            cam_definition_version=VERSION if server and server.definition_uri else 0,
+            cam_definition_uri=server.definition_uri if server else "",
             gimbal_device_id=GIMBAL_DEVICE,
         )
 
@@ -126,7 +125,7 @@ class CameraMessages:
 
     def image_captured(self, shot: Shot) -> bytes:
         """One photo."""
-        url = shot.name if self._stream is None else self._stream.media_uri(shot.name)
+        url = shot.name if self._host.stream is None else self._host.stream.media_uri(shot.name)
         return _image_captured(
             time_boot_ms=boot_ms(shot.time_us),
             time_utc=self._host.boot_unix_us + shot.time_us,
@@ -158,38 +157,34 @@ class CameraMessages:
             completed_captures=shot.index + 1 & 0xFFFF,
         )
 
-    def stream_information(self) -> bytes | None:
-        """The live picture and where it is; none without one."""
-        stream = self._stream
-        if stream is None:
-            return None
+    def stream_information(self, stream: VideoStream) -> bytes:
+        """The live picture and where it is."""
         return _stream_information(
             stream_id=STREAM_ID,
             count=1,
-            type=mavlink.VIDEO_STREAM_TYPE_RTSP,  # the enumeration has no name for HTTP; the address says what it is
+            # The enumeration has no name for HTTP; the address says what it is.
+            type=mavlink.VIDEO_STREAM_TYPE_RTPUDP if stream.is_rtp else mavlink.VIDEO_STREAM_TYPE_RTSP,
             flags=self._stream_flags(stream),
             framerate=stream.rate_hz,
             resolution_h=stream.width,
             resolution_v=stream.height,
-            bitrate=0,
+            bitrate=stream.bitrate,
             rotation=0,
             hfov=u16(self._camera.lens.hfov_deg),
             name="Camera",
             uri=stream.uri,
+            encoding=mavlink.VIDEO_STREAM_ENCODING_H264 if stream.is_rtp else mavlink.VIDEO_STREAM_ENCODING_UNKNOWN,
         )
 
-    def stream_status(self) -> bytes | None:
-        """Whether the live picture runs; none without one."""
-        stream = self._stream
-        if stream is None:
-            return None
+    def stream_status(self, stream: VideoStream) -> bytes:
+        """Whether the live picture runs."""
         return _stream_status(
             stream_id=STREAM_ID,
             flags=self._stream_flags(stream),
             framerate=stream.rate_hz,
             resolution_h=stream.width,
             resolution_v=stream.height,
-            bitrate=0,
+            bitrate=stream.bitrate,
             rotation=0,
             hfov=u16(self._camera.lens.hfov_deg),
         )

@@ -54,6 +54,8 @@ class Stream:
     width: int = 320
     height: int = 180
     rate_hz: float = 10.0
+    bitrate: int = 0
+    is_rtp: bool = False
     is_running: bool = True
 
     def media_uri(self, name):
@@ -63,7 +65,7 @@ class Stream:
 class PayloadVehicle(RecordingVehicle):
     """With camera and gimbal."""
 
-    def __init__(self, folder, stream):
+    def __init__(self, folder, stream, video=None):
         super().__init__()
         self.state = flying_state()
         self.light = Light()
@@ -71,14 +73,14 @@ class PayloadVehicle(RecordingVehicle):
         gimbal = Gimbal(self.state)
         self.state.gimbal = GimbalControl(gimbal, self.state)
         self.camera = Camera(self.state, gimbal, self.light, media)
-        self.host = Host(frames=self.light, media=media, stream=stream)
+        self.host = Host(frames=self.light, media=media, stream=stream, video=video)
 
 
 class PayloadRig(Rig):
     """Server and client; the camera's frame runs before the server's, as in the controller."""
 
-    def __init__(self, folder=None, stream=None, dialect=PX4, **options):
-        super().__init__(dialect=dialect, vehicle=PayloadVehicle(folder, stream), **options)
+    def __init__(self, folder=None, stream=None, dialect=PX4, video=None, **options):
+        super().__init__(dialect=dialect, vehicle=PayloadVehicle(folder, stream, video), **options)
         self.vehicle.camera.settings.set("CAM_SMOOTH", 0)
 
     def frame(self, count=1):

@@ -320,6 +320,43 @@ def test_stream_is_paused_and_resumed(rig):
     assert rig.acks(CAMERA, start, 2) == [(CAMERA, DENIED)]
 
 
+def test_a_ground_station_is_told_which_port_the_video_comes_to():
+    video = Stream(uri="5600", is_rtp=True, width=640, height=360, rate_hz=15.0, bitrate=2_000_000)
+    rig = PayloadRig(stream=Stream(), video=video)
+    (information,) = from_camera(requested(rig, REQUEST, 269, 1), "VIDEO_STREAM_INFORMATION")
+    assert (information.type, information.encoding) == (
+        mavlink.VIDEO_STREAM_TYPE_RTPUDP,
+        mavlink.VIDEO_STREAM_ENCODING_H264,
+    )
+    assert (information.uri, information.resolution_h, information.resolution_v) == ("5600", 640, 360)
+    assert (information.stream_id, information.count, information.bitrate) == (1, 1, 2_000_000)
+    (camera,) = from_camera(requested(rig, REQUEST, 259), "CAMERA_INFORMATION")
+    assert camera.flags & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+    assert camera.cam_definition_uri == Stream.definition_uri  # files are served over HTTP as before
+
+
+def test_everyone_is_told_when_the_video_starts_and_stops(rig):
+    for command, flags in (
+        (mavlink.MAV_CMD_VIDEO_STOP_STREAMING, 0),
+        (mavlink.MAV_CMD_VIDEO_START_STREAMING, mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING),
+    ):
+        rig.to(CAMERA, command, 1)
+        (status,) = from_camera(rig.frame(), "VIDEO_STREAM_STATUS")
+        assert status.flags == flags
+        (told,) = [m for m in rig.second_client.received() if m.name == "VIDEO_STREAM_STATUS"]
+        assert told.fields.flags == flags
+
+
+def test_without_video_its_start_is_refused_with_the_option_that_gives_it():
+    rig = PayloadRig()
+    rig.to(CAMERA, mavlink.MAV_CMD_VIDEO_START_STREAMING, 1)
+    messages = rig.frame()
+    assert [m.fields.result for m in messages if m.name == "COMMAND_ACK"] == [UNSUPPORTED]
+    assert any("--video-port" in m.fields.text for m in messages if m.name == "STATUSTEXT")
+    (camera,) = from_camera(requested(rig, REQUEST, 259), "CAMERA_INFORMATION")
+    assert not camera.flags & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+
+
 def test_messages_come_at_an_interval_to_who_asked(rig):
     assert rig.acks(CAMERA, 511, STATUS, 200_000) == [(CAMERA, ACCEPTED)]
     assert len(from_camera(rig.frame(50), "CAMERA_CAPTURE_STATUS")) == 5

@@ -69,7 +69,7 @@ def test_the_clock_does_not_show_sixty_seconds():
 
 
 def test_what_is_told_has_a_total_and_names_the_file_also_without_a_terminal(world, tmp_path, monkeypatch):
-    monkeypatch.setattr(film_file, "LINE_S", 0.0)
+    monkeypatch.setattr(film_file, "LINE_PERIOD_S", 0.0)
     out = io.StringIO()
     target = tmp_path / "with a name that is long enough to be wrapped at eighty columns of a terminal.mp4"
     write_film(hovering(0.4), world, target, Console(file=out, width=80))
