@@ -52,13 +52,15 @@ def _track(axes: Axes, history: History, world: WorldMap, path_ned: Sequence[tup
     trees = world.trees
     near = (np.abs(trees["north"]) < reach) & (np.abs(trees["east"]) < reach)
     axes.scatter(trees["east"][near], trees["north"][near], s=6, c="#2b8a3e", alpha=0.5, label="trees")
+    axes.plot(east, north, color=TRUE_COLOUR, lw=3.0, alpha=0.6, label="true")
+    axes.plot(history.pos_ned_est[:, 1], history.pos_ned_est[:, 0], color=ESTIMATE_COLOUR, lw=1, label="estimate")
     if len(path_ned) > 1:
         points = np.array([point for _, point in path_ned])
-        axes.plot(points[:, 1], points[:, 0], "--", color=PLAN_COLOUR, lw=1, label="plan")
-    axes.plot(history.pos_ned_est[:, 1], history.pos_ned_est[:, 0], color=ESTIMATE_COLOUR, lw=1, label="estimate")
-    axes.plot(east, north, color=TRUE_COLOUR, lw=1.5, label="true")
+        axes.plot(points[:, 1], points[:, 0], "--", color=PLAN_COLOUR, lw=1.2, marker=".", label="plan")
+        for seq, point in path_ned[1:]:  # the first is where it takes off
+            axes.annotate(str(seq + 1), (point[1], point[0]), xytext=(4, 4), textcoords="offset points", fontsize=8)
     axes.set(xlabel="east [m]", ylabel="north [m]", aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
-    axes.legend(loc="upper right", fontsize=8)
+    _legend_above(axes)
 
 
 def _profile(axes: Axes, history: History, world: WorldMap) -> None:
@@ -68,7 +70,7 @@ def _profile(axes: Axes, history: History, world: WorldMap) -> None:
     ground = world.height(history.pos_ned_true[:, 0].astype(float), history.pos_ned_true[:, 1].astype(float))
     axes.fill_between(time_s, ground, min(0.0, float(ground.min())) - 1.0, color="#2b8a3e", alpha=0.4, label="ground")
     axes.set(xlabel="time [s]", ylabel="height above home [m]")
-    axes.legend(loc="upper right", fontsize=8)
+    _legend_above(axes)
 
 
 def _errors(
@@ -78,7 +80,12 @@ def _errors(
         axes.plot(time_s, column, lw=0.9, label=name)
     axes.axhline(0.0, color="black", lw=0.5)
     axes.set_ylabel(label)
-    axes.legend(loc="upper right", fontsize=8, ncols=3)
+    _legend_above(axes)
+
+
+def _legend_above(axes: Axes) -> None:
+    """Beside the curves, not over them."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, fontsize=8, ncols=4, frameon=False)
 
 
 def _euler_error_deg(history: History) -> Rows:
