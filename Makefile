@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-mavproxy test-mavsdk3 fuzz check tune bench format lock clean reproduce-follow
+.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-mavproxy test-mavsdk3 test-dronekit fuzz check tune bench format lock clean reproduce-follow
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -69,6 +69,16 @@ $(MAVSDK3)/.installed: tests/mavsdk3/requirements.txt
 
 test-mavsdk3: $(STAMP) $(MAVSDK3)/.installed ## Fly with MAVSDK 3, in an environment of its own (.venv-mavsdk3)
 	$(MAVSDK3)/bin/python -m pytest -q -p no:cacheprovider -W ignore::DeprecationWarning tests/mavsdk3 $(ARGS)
+
+DRONEKIT := .venv-dronekit
+
+$(DRONEKIT)/.installed: tests/dronekit/requirements.txt
+	@test -x $(DRONEKIT)/bin/python || "$(PYTHON)" -m venv $(DRONEKIT)
+	$(DRONEKIT)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/dronekit/requirements.txt
+	@touch $@
+
+test-dronekit: $(STAMP) $(DRONEKIT)/.installed ## Fly with dronekit, in an environment of its own (.venv-dronekit)
+	$(DRONEKIT)/bin/python -m pytest -q -p no:cacheprovider -W ignore::DeprecationWarning tests/dronekit $(ARGS)
 
 check: $(STAMP) ## Check format, lint, types and layers, as CI does before the tests
 	$(BIN)/ruff format --check .

@@ -15,7 +15,7 @@ from autopilot.mavlink.convert import is_position, whole
 from autopilot.mavlink.dialects import UnknownModeError
 from autopilot.mavlink.events import EventService
 from autopilot.mavlink.identity import banner
-from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
+from autopilot.mavlink.service import COMMAND_ACK, Command, CommandHandler, Handler, Service, denied
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
 FORCE = 21196  # param2 of COMPONENT_ARM_DISARM
@@ -155,13 +155,20 @@ class FlightCommands(Service):
             return Reply(Verdict.UNSUPPORTED, "only a reboot of the autopilot is supported")
         return self._endpoint.vehicle.reboot()
 
-    def set_mode_received(self, _: Sender, fields: Any) -> None:
-        """Changes the flight mode; there is no acknowledgement, the heartbeat is the answer."""
+    def set_mode_received(self, sender: Sender, fields: Any) -> None:
+        """Changes the flight mode; the heartbeat is the answer, in ArduPilot's dialect after COMMAND_ACK number 11."""
         try:
             mode = self._endpoint.dialect.mode_from_custom(fields.custom_mode)
         except UnknownModeError as unknown:
             self._endpoint.text_once(Severity.WARNING, f"Mode: {unknown}")
+            self._acknowledge_set_mode(sender, Verdict.DENIED)
             return
         reply = self._endpoint.vehicle.set_mode(mode)
         if reply.verdict != Verdict.ACCEPTED:
             self._endpoint.text(Severity.WARNING, f"Mode: {reply.reason}")
+        self._acknowledge_set_mode(sender, reply.verdict)
+
+    def _acknowledge_set_mode(self, sender: Sender, verdict: Verdict) -> None:
+        if self._endpoint.dialect.acknowledges_set_mode:
+            payload = COMMAND_ACK.pack(mavlink.MAVLINK_MSG_ID_SET_MODE, verdict, 0, 0, sender.sysid, sender.compid)
+            self._endpoint.reply(sender, COMMAND_ACK, payload)

@@ -17,6 +17,7 @@ from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import Severity
 
 VALUES_PER_FRAME = 20  # 1000 values/s per channel; guess at what a client's receive buffer takes
+QUIET_US = 500_000  # between two requests of a script that waits for each answer; guess
 NOT_IN_LIST = 65_535  # index of a value nobody asked for
 HASH_NAME = "_HASH_CHECK"
 
@@ -31,8 +32,9 @@ class ParameterService(Service):
         self._endpoint = endpoint
         self._view = endpoint.parameters
         self._next_index: dict[Channel, int] = {}  # lists under way
-        self._setting = ""  # the answer tells of this change,
-        self._also_changed: list[str] = []  # and these are told after it
+        self._setting = ""  # the answer tells of this change
+        self._also_changed: dict[str, None] = {}  # the other names of what clients have set, told later,
+        self._quiet_until_us = 0  # once they have asked for nothing for a while
         self._view.on_change(self._changed)
 
     def messages(self) -> Mapping[str, Handler]:
@@ -47,7 +49,14 @@ class ParameterService(Service):
         self._next_index[sender.channel] = 0
 
     def frame(self) -> None:
-        """Sends the next values of the lists under way."""
+        """Sends the next values of the lists under way, and other names of what was set.
+
+        Scripts take the next PARAM_VALUE for the answer to what they ask: nothing else comes between.
+        """
+        if self._also_changed and self._endpoint.time_us >= self._quiet_until_us:
+            also_changed, self._also_changed = self._also_changed, {}
+            for name in also_changed:
+                self._changed(name)
         for channel, first in list(self._next_index.items()):
             last = min(first + VALUES_PER_FRAME, len(self._view))
             for i in range(first, last):
@@ -59,6 +68,7 @@ class ParameterService(Service):
 
     def read_requested(self, sender: Sender, fields: Any) -> None:
         """Sends one parameter, by name or by index; PARAM_ERROR if there is none."""
+        self._quiet_until_us = self._endpoint.time_us + QUIET_US
         name = fields.param_id
         if fields.param_index >= 0:
             if fields.param_index >= len(self._view):
@@ -74,6 +84,7 @@ class ParameterService(Service):
 
     def set_requested(self, sender: Sender, fields: Any) -> None:
         """Sets a parameter to the nearest value it can have; tells everybody what it is now, under this name first."""
+        self._quiet_until_us = self._endpoint.time_us + QUIET_US
         name = fields.param_id
         if name == HASH_NAME:  # the client has these values already: the list may stop
             self._next_index.pop(sender.channel, None)
@@ -96,9 +107,6 @@ class ParameterService(Service):
                 bounds = f"{low:g} to {high:g}"
                 self._endpoint.text(Severity.NOTICE, f"Parameter {name}: {asked:g} asked, {stored:g} set ({bounds})")
         self._endpoint.broadcast(_PARAM_VALUE, self._value(name, view.indices[name]))
-        also_changed, self._also_changed = self._also_changed, []
-        for other in also_changed:
-            self._changed(other)
 
     def entries(self) -> list[ParamEntry]:
         """The list as numbers: what the values of PARAM_VALUE say."""
@@ -117,10 +125,11 @@ class ParameterService(Service):
             self._endpoint.text(Severity.WARNING, f"Parameter file: {unknown} names are not known")
 
     def _changed(self, name: str) -> None:
-        """Tells every client of a change that none of them asked for, but of what one did ask for first."""
-        if self._setting and name != self._setting:
-            self._also_changed.append(name)
-        elif name != self._setting:
+        """Tells every client of a change that none of them asked for."""
+        if self._setting:
+            if name != self._setting:
+                self._also_changed[name] = None
+        else:
             self._endpoint.broadcast(_PARAM_VALUE, self._value(name, NOT_IN_LIST))
 
     def _value(self, name: str, index: int) -> bytes:

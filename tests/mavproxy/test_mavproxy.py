@@ -44,7 +44,7 @@ def test_connects_and_has_every_parameter_by_file_within_5_s(console):
 def test_parameter_is_set_and_shown(console):
     console.do("param set RTL_ALT 2500", "LOITER> ")
     console.do("param show RTL_ALT", r"RTL_ALT +2500")
-    console.do("param show RTL_RETURN_ALT", r"RTL_RETURN_ALT +25\.0")
+    console.do("param fetch RTL_RETURN_ALT", r"RTL_RETURN_ALT *= *25\.0")
 
 
 @pytest.mark.parametrize(

@@ -38,12 +38,6 @@ class Script:
         prearm = mavlink.MAV_SYS_STATUS_PREARM_CHECK
         self.wait("SYS_STATUS", lambda message: message.onboard_control_sensors_health & prearm)
 
-    def set_mode(self, name, just_before=lambda: None):
-        """By name; pymavlink chooses how by the latest heartbeat, a camera's or gimbal's among them."""
-        self.wait("HEARTBEAT", lambda message: message.get_srcComponent() == 1)
-        just_before()
-        self.link.set_mode(name)
-
     def wait_mode(self, name):
         self.wait("HEARTBEAT", lambda message: message.get_srcComponent() == 1 and self.link.flightmode == name)
 
@@ -82,7 +76,7 @@ def test_tutorial_for_ardupilot(tmp_path, monkeypatch):
         link = script.link
         script.wait_ready()
         assert link.mode_mapping()["GUIDED"] == 4
-        script.set_mode("GUIDED")
+        link.set_mode("GUIDED")
         script.wait_mode("GUIDED")
         link.arducopter_arm()
         link.motors_armed_wait()
@@ -112,7 +106,7 @@ def test_tutorial_for_ardupilot(tmp_path, monkeypatch):
             1, 1, 0, 3, mavlink.MAV_CMD_NAV_WAYPOINT, 2, 0, 0, 0, 0, 0, home.latitude * 1e-7, home.longitude * 1e-7, 6.0
         )
         script.wait_place(0.0, 0.0, 1.5)
-        script.set_mode("RTL")
+        link.set_mode("RTL")
         script.wait_mode("RTL")
         script.wait_disarmed()
 
@@ -129,7 +123,7 @@ def test_tutorial_for_px4(tmp_path, monkeypatch):
         while wall_time_s() < end_s:
             script.local_target(POSITION_ONLY, 8.0, 0.0, -6.0)
             script.wait("ATTITUDE", lambda _: True)
-        script.set_mode("OFFBOARD", lambda: script.local_target(POSITION_ONLY, 8.0, 0.0, -6.0))
+        link.set_mode("OFFBOARD")
         end_s = wall_time_s() + PATIENCE_S
         while True:
             script.local_target(POSITION_ONLY, 8.0, 0.0, -6.0)
@@ -138,7 +132,7 @@ def test_tutorial_for_px4(tmp_path, monkeypatch):
                 break
             assert wall_time_s() < end_s
         assert link.flightmode == "OFFBOARD"
-        script.set_mode("LOITER")
+        link.set_mode("LOITER")
         script.wait_mode("LOITER")
         link.set_mode_rtl()
         script.wait_mode("RTL")

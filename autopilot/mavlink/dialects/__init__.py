@@ -68,6 +68,7 @@ class Dialect(Protocol):
     goto_mode: Mode  # in which a place is held to which a client sends the vehicle
     first_seq: int  # of a mission in the lists that clients see; 1 where item 0 is home
     item_request: str  # the message by which it asks for the items of a list that is uploaded
+    acknowledges_set_mode: bool  # the old message SET_MODE is answered by COMMAND_ACK with the message's own number
     announces_components: bool  # camera, gimbal and winch send heartbeats of their own
     long_frames: Mapping[int, int]  # MAV_FRAME of the altitude in a COMMAND_LONG, by MAV_CMD; otherwise 0 (AMSL)
     amsl_commands: frozenset[int]  # MAV_CMDs whose altitude is above sea level even in a frame relative to home

@@ -68,6 +68,7 @@ class ArduPilotDialect:
     goto_mode = Mode.GUIDED
     first_seq = 1
     item_request = "MISSION_REQUEST"  # clients made for ArduPilot may know no other
+    acknowledges_set_mode = True
     announces_components = False  # a camera and a mount are parts of component 1
     long_frames: Mapping[int, int] = {
         mavlink.MAV_CMD_NAV_TAKEOFF: _RELATIVE,

@@ -67,6 +67,7 @@ class Px4Dialect:
     goto_mode = Mode.HOLD
     first_seq = 0
     item_request = "MISSION_REQUEST_INT"
+    acknowledges_set_mode = False
     announces_components = True
     long_frames: Mapping[int, int] = {}
     # PX4 never looks at the frame of these, and MAVSDK sends altitudes above sea level in a relative one.

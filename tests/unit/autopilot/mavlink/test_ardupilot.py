@@ -105,3 +105,11 @@ def test_takeoff_altitude_is_above_home():
     call = rig.vehicle.calls[0]
     assert call[0] == "takeoff"
     assert call[1] == rig.vehicle.state.home.alt_m + 10.0
+
+
+@pytest.mark.parametrize(("number", "result"), [(5, 0), (99, 2)])
+def test_the_old_set_mode_is_acknowledged_by_its_number(number, result):
+    rig = Rig(dialect=ARDUPILOT)
+    rig.client.send("SET_MODE", base_mode=1, custom_mode=number)
+    ack = rig.only("COMMAND_ACK")
+    assert (ack.command, ack.result) == (11, result)

@@ -134,7 +134,7 @@ def test_list_and_set_go_through_the_aliases():
     assert {"RTL_ALT", "RTL_RETURN_ALT", "FRAME_CLASS"} <= set(names)
     assert [value.param_index for value in values] == list(range(values[0].param_count))
     rig.client.send("PARAM_SET", param_id="RTL_ALT", param_value=bits(2000.0), param_type=mavlink.MAV_PARAM_TYPE_REAL32)
-    answers = {value.param_id: value for value in rig.all("PARAM_VALUE")}
+    answers = {value.param_id: value for value in rig.all("PARAM_VALUE", 30)}
     assert answers["RTL_ALT"].param_value == bits(2000.0)
     assert answers["RTL_ALT"].param_index == names.index("RTL_ALT")
     assert answers["RTL_RETURN_ALT"].param_value == bits(20.0)
@@ -147,9 +147,11 @@ def test_set_is_answered_first_under_the_name_that_was_set(name, value):
     """Scripts set a parameter and print the next PARAM_VALUE."""
     rig = Rig(dialect=ARDUPILOT)
     rig.client.send("PARAM_SET", param_id=name, param_value=bits(value), param_type=9)
-    told = [(answer.param_id, answer.param_value) for answer in rig.all("PARAM_VALUE")]
-    assert told[0] == (name, bits(value))
-    assert sorted(each for each, _ in told) == ["RTL_ALT", "RTL_RETURN_ALT"]
+    answer = rig.only("PARAM_VALUE", 20)
+    assert (answer.param_id, answer.param_value) == (name, bits(value))
+    rig.client.send("PARAM_REQUEST_READ", param_id="WPNAV_SPEED", param_index=-1)
+    assert rig.only("PARAM_VALUE", 20).param_id == "WPNAV_SPEED"
+    assert {rig.only("PARAM_VALUE", 20).param_id, name} == {"RTL_ALT", "RTL_RETURN_ALT"}
 
 
 def test_value_out_of_range_is_told_in_the_clients_unit():
