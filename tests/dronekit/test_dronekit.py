@@ -156,14 +156,19 @@ def test_mode_is_chosen_on_the_ground(vehicle, name):
 
 
 def test_channels_are_overridden_and_go_back_to_the_radio(vehicle):
-    until(lambda: vehicle.channels["3"] == 1000)
+    heard = []
+
+    @vehicle.on_message("RC_CHANNELS")
+    def listener(_, __, message):
+        heard[:] = [message.chan1_raw, message.chan2_raw, message.chan3_raw]
+
+    until(lambda: heard == [1500, 1500, 1000])
     vehicle.channels.overrides = {"1": 1010, "2": 1020}
-    until(lambda: (vehicle.channels["1"], vehicle.channels["2"]) == (1010, 1020))
+    until(lambda: heard == [1010, 1020, 1000])
     del vehicle.channels.overrides["1"]
-    until(lambda: (vehicle.channels["1"], vehicle.channels["2"]) == (1500, 1020))
+    until(lambda: heard == [1500, 1020, 1000])
     vehicle.channels.overrides = {}
-    until(lambda: (vehicle.channels["1"], vehicle.channels["2"]) == (1500, 1500))
-    assert len(vehicle.channels.overrides) == 0
+    until(lambda: heard == [1500, 1500, 1000])
 
 
 def test_calibrations_are_accepted(vehicle):
