@@ -367,6 +367,7 @@ class FlightController:
         if self._on_reboot is None:
             return Reply(Verdict.UNSUPPORTED, "there is nothing to restart")
         self._on_reboot()
+        self.state.boot_us = self.state.time_us
         self.commander.hold_reasons_back()
         return ACCEPTED
 

@@ -147,6 +147,7 @@ class VehicleState:
     """
 
     time_us: int = 0
+    boot_us: int = 0  # when the flight controller was last restarted; clients' clocks begin there
     estimate: Any = None  # Estimate
     samples: Any = None  # Samples
     actuators: Any = None  # Actuators

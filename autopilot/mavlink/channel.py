@@ -6,10 +6,13 @@ all of them.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from autopilot.abilities import Vehicle
-from autopilot.mavlink.codec import SIGNED_FLAG, MessageType, frame_bytes, known_type
+from autopilot.mavlink.boot_clock import BootClock
+from autopilot.mavlink.codec import SIGNED_FLAG, Frame, MessageType, frame_bytes, known_type
 from autopilot.mavlink.dialects import Dialect
+from autopilot.mavlink.frame_log import FrameLog, OnFrame
 from autopilot.mavlink.intake import Intake
 from autopilot.mavlink.links import FixedLinks, Link, LinkSource
 from autopilot.mavlink.parameter_view import ParameterView
@@ -26,8 +29,6 @@ TEXT_PERIOD_US = 200_000  # texts to all that one client may cause in the long r
 TEXT_BURST_US = 4_000_000  # and ahead of that; what is beyond goes to that client alone
 HEARD_MAX = 64  # systems and components per channel
 CLIENTS_MAX = 32  # greeted per channel
-
-OnFrame = Callable[[int, bytes], None]
 
 _STATUSTEXT = known_type("STATUSTEXT")
 
@@ -61,7 +62,7 @@ class Channel:
     def __init__(self, link: Link, number: int, sysid: int, schedule: StreamSchedule) -> None:
         self.link = link
         self.signer: Signer | None = None  # while there is a key
-        self._link_id = number & 0xFF
+        self.number = number
         self.schedule = schedule
         self.intake = Intake(link)
         self.heard = Heard()
@@ -73,8 +74,8 @@ class Channel:
         self._seq = 0
         self._component_seqs: dict[int, int] = {}  # clients count losses per component
 
-    def send(self, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> bytes:
-        """Sends one message and returns its frame."""
+    def send(self, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
+        """Sends one message."""
         if compid == AUTOPILOT_COMPONENT:
             seq = self._seq
             self._seq = seq + 1 & 0xFF
@@ -85,10 +86,9 @@ class Channel:
             frame = frame_bytes(kind, payload, seq, self._sysid, compid)
         else:
             frame = frame_bytes(kind, payload, seq, self._sysid, compid, SIGNED_FLAG)
-            frame += self.signer.signature(frame, self._link_id)
+            frame += self.signer.signature(frame, self.number & 0xFF)
         if not self.is_mute:
             self.link.send(frame)
-        return frame
 
     def pass_on(self, frame: bytes) -> None:
         """Sends a frame of somebody else's, as it is."""
@@ -121,6 +121,8 @@ class Endpoint:
         self.dialect = dialect
         self.sysid = sysid
         self.time_us = 0
+        self.clock = BootClock()
+        self._log = None if on_frame is None else FrameLog(on_frame, sysid)
         self.on_request: dict[int, Callable[[Sender], None]] = {}  # by message: who hears that it was asked for
         self.compids = {AUTOPILOT_COMPONENT}  # the vehicle's components behind these links
         self.parameters = ParameterView(vehicle.params, dialect)
@@ -134,7 +136,6 @@ class Endpoint:
         self.channels: list[Channel] = []
         self._links: list[Sequence[Link]] = []  # of each source, as it was when the channels were made
         self._renew_channels()
-        self._on_frame = on_frame
         self._text_id = 0
         self._texts_until_us: dict[str, int] = {}
 
@@ -173,35 +174,40 @@ class Endpoint:
 
     def reply(self, sender: Sender, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
         """Sends a message on the channel of `sender`."""
-        frame = sender.channel.send(kind, payload, compid)
+        payload = self._on_clients_clock(kind, payload)
+        sender.channel.send(kind, payload, compid)
         self.sent_count += 1
-        if self._on_frame is not None:
-            self._on_frame(self.time_us, frame)
+        if self._log is not None:
+            self._log.sent(self.time_us, kind, payload, compid)
 
     def broadcast(self, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
         """Sends a message on every channel; the frame log gets it once."""
+        payload = self._on_clients_clock(kind, payload)
         self.sent_count += len(self.channels)
-        for i, channel in enumerate(self.channels):
-            frame = channel.send(kind, payload, compid)
-            if i == 0 and self._on_frame is not None:
-                self._on_frame(self.time_us, frame)
+        for channel in self.channels:
+            channel.send(kind, payload, compid)
+        if self._log is not None and self.channels:
+            self._log.sent(self.time_us, kind, payload, compid)
 
-    def received(self, frame: bytes) -> None:
+    def received(self, channel: Channel, frame: Frame) -> None:
         """Shows a received frame to the frame log."""
-        if self._on_frame is not None:
-            self._on_frame(self.time_us, frame)
+        if self._log is not None:
+            self._log.received(self.time_us, frame, channel.number)
+
+    def _on_clients_clock(self, kind: MessageType, payload: bytes) -> bytes:
+        return self.clock.shown(kind, payload, self.time_us) if self.clock.boot_us else payload
 
     def send_streams(self) -> None:
         """Sends the telemetry that is due; the frame log gets the first channel's."""
         state = self.vehicle.state
         for i, channel in enumerate(self.channels):
-            send = channel.send if i or self._on_frame is None else self._send_logged
-            channel.schedule.send_due(self.time_us, state, send)
+            channel.schedule.send_due(self.time_us, state, partial(self._stream, channel, None if i else self._log))
 
-    def _send_logged(self, kind: MessageType, payload: bytes) -> None:
-        frame = self.channels[0].send(kind, payload)
-        if self._on_frame is not None:
-            self._on_frame(self.time_us, frame)
+    def _stream(self, channel: Channel, log: FrameLog | None, kind: MessageType, payload: bytes) -> None:
+        payload = self._on_clients_clock(kind, payload)
+        channel.send(kind, payload)
+        if log is not None:
+            log.sent(self.time_us, kind, payload, AUTOPILOT_COMPONENT)
 
     def is_for_us(self, target_system: int, target_component: int) -> bool:
         """Whether a message is addressed to one of our components; 0 addresses all."""

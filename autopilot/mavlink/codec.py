@@ -349,6 +349,16 @@ def _wire_codes(definition: Any) -> dict[str, str]:
     return named
 
 
+def field_positions(name: str) -> dict[str, tuple[int, str]]:
+    """Where each field of a message is in its payload, and its `struct` code."""
+    positions: dict[str, tuple[int, str]] = {}
+    at = 0
+    for field, code in _wire_codes(DEFINITIONS[_IDS_BY_NAME[name]]).items():
+        positions[field] = (at, code)
+        at += struct.calcsize("<" + code)
+    return positions
+
+
 def _target_positions(definition: Any) -> tuple[int, int]:
     """Where target_system and target_component are in the payload; -1: the message has no such field."""
     positions = {"target_system": -1, "target_component": -1}

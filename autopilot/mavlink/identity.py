@@ -55,7 +55,7 @@ def autopilot_version(dialect: Dialect, sysid: int) -> bytes:
         capabilities=CAPABILITIES | dialect.capabilities,
         flight_sw_version=dialect.flight_sw_version,
         middleware_sw_version=dialect.flight_sw_version,
-        flight_custom_version=tuple(dialect.custom_version(f"HG-{project_version()}")),
+        flight_custom_version=tuple(dialect.custom_version(PROJECT, project_version())),
         uid=int.from_bytes(uid2[-8:], "big"),
         uid2=tuple(uid2.ljust(18, b"\0")),
     )

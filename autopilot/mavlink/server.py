@@ -14,7 +14,7 @@ from autopilot.abilities import Vehicle
 from autopilot.mavlink.aux_functions import AuxFunctions
 from autopilot.mavlink.calibration import CalibrationService
 from autopilot.mavlink.camera.component import AttachedCamera, CameraComponent
-from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, OnFrame, Sender
+from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, Sender
 from autopilot.mavlink.codec import Frame, known_type
 from autopilot.mavlink.commands import CommandService
 from autopilot.mavlink.compass import CompassService
@@ -26,6 +26,7 @@ from autopilot.mavlink.events import EventService
 from autopilot.mavlink.external import ExternalService
 from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.flight_commands import FlightCommands
+from autopilot.mavlink.frame_log import OnFrame
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
 from autopilot.mavlink.goto import GotoService
@@ -104,7 +105,7 @@ class MavlinkServer:
             links: where clients are, and where they come and go.
             dialect: which autopilot's numbers to use.
             on_frame: gets the time and the bytes of each frame received, and of each frame sent on the first link
-                or in answer to somebody.
+                or in answer to somebody, counted as one stream.
             signing: where the key is kept, and whether unsigned frames are refused; None: in memory, and they are not.
             announces_components: camera, gimbal and winch send heartbeats in a dialect, too, in which they do not.
         """
@@ -241,6 +242,7 @@ class MavlinkServer:
         """
         endpoint = self._endpoint
         endpoint.time_us = time_us
+        endpoint.clock.boot_us = endpoint.vehicle.state.boot_us
         endpoint.poll()
         busy = [channel for channel in endpoint.channels if channel.intake.fill()]
         if busy:
@@ -274,7 +276,7 @@ class MavlinkServer:
         """Passes a frame on to whom else it concerns; hands it to its service, or to the component it is for."""
         endpoint = self._endpoint
         if frame.kind.msg_id != _SETUP_SIGNING_ID:  # its key belongs into no log
-            endpoint.received(frame.raw)
+            endpoint.received(channel, frame)
         if endpoint.signer.is_watching and not self._is_let_in(channel, frame):
             return
         if frame.sysid == endpoint.sysid and frame.compid in endpoint.compids:
@@ -327,9 +329,10 @@ class MavlinkServer:
             self._endpoint.reply(sender, _PING, payload)
 
     def _timesync_received(self, sender: Sender, fields: Any) -> None:
-        """Answers a request with simulated time; tc1 other than 0 is itself an answer."""
+        """Answers a request with the time since boot; tc1 other than 0 is itself an answer."""
         if fields.tc1 == 0:
-            self._endpoint.reply(sender, _TIMESYNC, _TIMESYNC.pack(max(self._endpoint.time_us, 1) * 1000, fields.ts1))
+            time_us = self._endpoint.clock.shown_us(self._endpoint.time_us)
+            self._endpoint.reply(sender, _TIMESYNC, _TIMESYNC.pack(max(time_us, 1) * 1000, fields.ts1))
 
     def _data_stream_requested(self, sender: Sender, fields: Any) -> None:
         """Sets the rate of a group of messages on this link (the old way)."""

@@ -71,6 +71,7 @@ class Dialect(Protocol):
     acknowledges_set_mode: bool  # the old message SET_MODE is answered by COMMAND_ACK with the message's own number
     announces_components: bool  # camera, gimbal and winch send heartbeats of their own
     long_frames: Mapping[int, int]  # MAV_FRAME of the altitude in a COMMAND_LONG, by MAV_CMD; otherwise 0 (AMSL)
+    is_active_armed: bool  # the heartbeat's state is active once armed, on the ground too
     amsl_commands: frozenset[int]  # MAV_CMDs whose altitude is above sea level even in a frame relative to home
     aliases: Sequence[Alias]
     constants: Sequence[Constant]
@@ -95,8 +96,8 @@ class Dialect(Protocol):
         """
         ...
 
-    def custom_version(self, text: str) -> bytes:
-        """The 8 bytes of AUTOPILOT_VERSION.flight_custom_version for 8 characters."""
+    def custom_version(self, project: str, version: str) -> bytes:
+        """The 8 bytes of AUTOPILOT_VERSION.flight_custom_version."""
         ...
 
     def parameter_type(self, declaration: Parameter) -> int:

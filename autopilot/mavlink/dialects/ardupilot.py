@@ -70,6 +70,7 @@ class ArduPilotDialect:
     item_request = "MISSION_REQUEST"  # clients made for ArduPilot may know no other
     acknowledges_set_mode = True
     announces_components = False  # a camera and a mount are parts of component 1
+    is_active_armed = False
     long_frames: Mapping[int, int] = {
         mavlink.MAV_CMD_NAV_TAKEOFF: _RELATIVE,
         mavlink.MAV_CMD_DO_SET_ROI: _RELATIVE,
@@ -93,8 +94,9 @@ class ArduPilotDialect:
     def mode_from_command(self, main_mode: int, _sub_mode: int) -> Mode:
         return self.mode_from_custom(main_mode)
 
-    def custom_version(self, text: str) -> bytes:
-        return text.encode("ascii")[:8].ljust(8, b"\0")
+    def custom_version(self, _project: str, version: str) -> bytes:
+        """Text, as ArduPilot."""
+        return f"HG-{version}".encode("ascii")[:8].ljust(8, b"\0")
 
     def parameter_type(self, declaration: Parameter) -> int:
         return int(mavlink.MAV_PARAM_TYPE_INT32 if declaration.is_integer else mavlink.MAV_PARAM_TYPE_REAL32)

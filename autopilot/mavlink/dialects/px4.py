@@ -1,7 +1,9 @@
 """PX4's numbers: modes as main and sub mode, integer parameters as bit patterns."""
 
+import re
 import struct
 from collections.abc import Mapping, Sequence
+from hashlib import sha1
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -69,6 +71,7 @@ class Px4Dialect:
     item_request = "MISSION_REQUEST_INT"
     acknowledges_set_mode = False
     announces_components = True
+    is_active_armed = True
     long_frames: Mapping[int, int] = {}
     # PX4 never looks at the frame of these, and MAVSDK sends altitudes above sea level in a relative one.
     amsl_commands: frozenset[int] = frozenset(
@@ -90,9 +93,13 @@ class Px4Dialect:
             raise UnknownModeError(f"there is no mode {main_mode}/{sub_mode}")
         return mode
 
-    def custom_version(self, text: str) -> bytes:
-        """PX4 sends the bytes of its git hash in reverse order, and clients turn them round."""
-        return text.encode("ascii")[:8].ljust(8, b"\0")[::-1]
+    def custom_version(self, project: str, version: str) -> bytes:
+        """As PX4: five bytes of a hash, then the vendor's version as three bytes; clients read it from the end.
+
+        PX4's hash names its source; ours, which may be no checkout, names project and version.
+        """
+        numbers = bytes(min(int(part), 255) for part in (re.findall(r"\d+", version) + ["0"] * 3)[:3])
+        return (sha1(f"{project} {version}".encode(), usedforsecurity=False).digest()[:5] + numbers)[::-1]
 
     def parameter_type(self, declaration: Parameter) -> int:
         return int(mavlink.MAV_PARAM_TYPE_INT32 if declaration.is_integer else mavlink.MAV_PARAM_TYPE_REAL32)

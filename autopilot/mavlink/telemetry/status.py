@@ -88,14 +88,15 @@ def heartbeat(state: VehicleState, dialect: Dialect) -> bytes:
         dialect.autopilot,
         base_mode | _ARMED if state.is_armed else base_mode,
         dialect.custom_mode(state.mode),
-        system_status(state),
+        system_status(state, dialect),
         MAVLINK_VERSION,
     )
 
 
-def system_status(state: VehicleState) -> int:
-    """MAV_STATE: standby on the ground, active or critical in the air."""
-    if state.landed_state in (LandedState.ON_GROUND, LandedState.UNDEFINED):
+def system_status(state: VehicleState, dialect: Dialect) -> int:
+    """MAV_STATE: standby, active or critical once armed (PX4) or off the ground (ArduPilot)."""
+    is_standing = state.landed_state in (LandedState.ON_GROUND, LandedState.UNDEFINED)
+    if is_standing and not (state.is_armed and dialect.is_active_armed):
         return int(mavlink.MAV_STATE_STANDBY)
     if state.mode is Mode.TERMINATION:
         return int(mavlink.MAV_STATE_FLIGHT_TERMINATION)

@@ -57,7 +57,7 @@ def test_unknown_mode_is_refused_by_its_name():
 
 
 def test_custom_version_is_plain_text():
-    assert ARDUPILOT.custom_version("HG-0.1.0") == b"HG-0.1.0"
+    assert ARDUPILOT.custom_version("Honeyguide", "0.1.0") == b"HG-0.1.0"
 
 
 def test_heartbeat_is_a_copter_of_ardupilot():

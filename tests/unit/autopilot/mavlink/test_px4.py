@@ -60,7 +60,10 @@ def test_wrong_parameter_type_is_noticed():
     assert PX4.parameter_value(INT32, 0x3F800000, REAL32) is None
 
 
-def test_custom_version_is_reversed_and_8_bytes():
-    assert PX4.custom_version("HG-0.1.0") == b"0.1.0-GH"
-    assert len(PX4.custom_version("HG-0.10.11")) == 8
-    assert PX4.custom_version("A") == bytes(7) + b"A"
+def test_custom_version_is_the_vendors_version_and_a_hash_read_from_the_end():
+    version = PX4.custom_version("Honeyguide", "1.2.3")
+    assert tuple(version[:3]) == (3, 2, 1)
+    assert len(version) == 8
+    assert version[3:] != PX4.custom_version("Honeyguide", "1.2.4")[3:]
+    assert tuple(PX4.custom_version("Honeyguide", "0.10.999.dev1")[:3]) == (255, 10, 0)
+    assert tuple(PX4.custom_version("Honeyguide", "7")[:3]) == (0, 0, 7)

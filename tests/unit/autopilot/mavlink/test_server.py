@@ -1,6 +1,10 @@
+import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.codec import FrameReader, encode
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.identity import project_version
 from autopilot.mavlink.links import LinkRole, memory_pair
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.vehicle import LandedState, Mode, Severity
@@ -37,7 +41,6 @@ def test_heartbeat_follows_a_change_in_the_same_frame():
 def test_system_status_is_in_step_with_the_landed_state():
     rig = Rig()
     for landed_state, is_failsafe, expected in (
-        (LandedState.ON_GROUND, False, mavlink.MAV_STATE_STANDBY),
         (LandedState.IN_AIR, False, mavlink.MAV_STATE_ACTIVE),
         (LandedState.LANDING, False, mavlink.MAV_STATE_ACTIVE),
         (LandedState.IN_AIR, True, mavlink.MAV_STATE_CRITICAL),
@@ -45,6 +48,39 @@ def test_system_status_is_in_step_with_the_landed_state():
         rig.update(landed_state=landed_state, is_failsafe=is_failsafe)
         rig.server.heartbeat_now()
         assert rig.all("HEARTBEAT")[-1].system_status == expected
+
+
+@pytest.mark.parametrize(
+    ("dialect", "is_armed", "expected"),
+    [
+        (PX4, True, mavlink.MAV_STATE_ACTIVE),
+        (PX4, False, mavlink.MAV_STATE_STANDBY),
+        (ARDUPILOT, True, mavlink.MAV_STATE_STANDBY),  # there active means flying, for ground stations
+        (ARDUPILOT, False, mavlink.MAV_STATE_STANDBY),
+    ],
+)
+def test_a_vehicle_on_the_ground_is_active_once_armed_in_px4(dialect, is_armed, expected):
+    rig = Rig(dialect=dialect)
+    rig.update(landed_state=LandedState.ON_GROUND, is_armed=is_armed)
+    rig.server.heartbeat_now()
+    assert rig.all("HEARTBEAT")[-1].system_status == expected
+
+
+def test_clocks_that_clients_see_begin_again_with_a_restart():
+    rig = Rig()
+    rig.frame(100)
+    rig.update(boot_us=rig.time_us)
+    messages = {message.name: message.fields for message in rig.frame(300)}
+    rig.client.send("TIMESYNC", tc1=0, ts1=7)
+    rig.client.send("PING", time_usec=5_000_123, seq=1)
+    messages |= {message.name: message.fields for message in rig.frame()}
+    assert 5_000 < messages["ATTITUDE"].time_boot_ms < 6_100
+    assert 5_000 < messages["SYSTEM_TIME"].time_boot_ms < 6_100
+    assert messages["SYSTEM_TIME"].time_unix_usec > 1_700_000_000_000_000  # the date stays
+    assert 3_000_000 < messages["ESTIMATOR_STATUS"].time_usec < 6_100_000
+    assert messages["GPS_RAW_INT"].time_usec == 0  # a fix from before
+    assert 5_000_000_000 < messages["TIMESYNC"].tc1 < 6_100_000_000
+    assert (messages["TIMESYNC"].ts1, messages["PING"].time_usec) == (7, 5_000_123)  # the client's own
 
 
 def test_lift_off_is_told_in_the_same_frame():
@@ -93,7 +129,8 @@ def test_autopilot_version_says_who_we_are():
     rig.client.command(mavlink.MAV_CMD_REQUEST_MESSAGE, 148)
     version = rig.only("AUTOPILOT_VERSION")
     assert version.flight_sw_version >> 16 > 0x0104  # QGroundControl calls PX4 before 1.4.1 too old
-    assert bytes(version.flight_custom_version)[::-1].startswith(b"HG-")
+    ours = tuple(int(part) for part in project_version().split(".")[:3])
+    assert tuple(version.flight_custom_version[2::-1]) == ours  # where MAVSDK reads the vendor's version
     for bit in (
         mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2,
         mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT,
