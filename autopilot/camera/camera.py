@@ -99,6 +99,7 @@ class Camera:
         self._busy_until_us = 0
         self._pending: deque[tuple[Shot, View, Future[RawFrame]]] = deque()
         self._listeners: list[ListensToShots] = []
+        self._full_listeners: list[Callable[[], None]] = []
         self._handlers: dict[int, Callable[[Params, float], Reply]] = {
             Command.DIGICAM_CONTROL: self._digicam,
             Command.TRIGGER_DISTANCE: self._trigger_distance,
@@ -116,6 +117,10 @@ class Camera:
     def on_shot(self, listener: ListensToShots) -> None:
         """`listener` hears of each photo when it is stored."""
         self._listeners.append(listener)
+
+    def on_full(self, listener: Callable[[], None]) -> None:
+        """`listener` hears when a recording was stopped because the storage is full."""
+        self._full_listeners.append(listener)
 
     # autopilot.payload.Payload
 
@@ -152,6 +157,10 @@ class Camera:
                 if recording.wants_frame:
                     recording.expect(self._source.capture(self.view(recording.size, is_smooth=False)))
                 recording.advance()
+            if not recording.has_room:
+                self.stop_video()
+                for tell in self._full_listeners:
+                    tell()
         self._plan()
 
     def _plan(self) -> None:
@@ -351,10 +360,10 @@ class Camera:
         """Completes the recording, if there is one: the command may be a repeat."""
         if self.recording is None:
             return ACCEPTED
-        self.recording.close()
+        is_stored = self.recording.close()
         self.recording = None
         self._plan()
-        return ACCEPTED
+        return ACCEPTED if is_stored else Reply(Verdict.FAILED, "the video cannot be stored")
 
     @property
     def recording_ms(self) -> int:

@@ -14,10 +14,11 @@ from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.component import Component, Payload
 from autopilot.mavlink.convert import whole
 from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
-from autopilot.vehicle import ACCEPTED, Reply, Verdict
+from autopilot.vehicle import ACCEPTED, Reply, Severity, Verdict
 
 REPEAT_US = 3_000_000  # a single photo of the same number from the same client is a repeat that long; guess
-_CAPTURE_STATUS_ID = known_type("CAMERA_CAPTURE_STATUS").msg_id
+_CAPTURE_STATUS = known_type("CAMERA_CAPTURE_STATUS")
+_CAPTURE_STATUS_ID = _CAPTURE_STATUS.msg_id
 _CAMERA_SETTINGS = known_type("CAMERA_SETTINGS")
 _CAMERA_TRIGGER = known_type("CAMERA_TRIGGER")
 _CAMERA_IMAGE_CAPTURED = known_type("CAMERA_IMAGE_CAPTURED")
@@ -64,6 +65,7 @@ class CameraComponent(Component):
         self._single: dict[tuple[int, int], tuple[float, int]] = {}  # number and time of a client's last single photo
         super().__init__(endpoint, CAMERA_ID, mavlink.MAV_TYPE_CAMERA, "Camera")
         camera.on_shot(self._shot_taken)
+        camera.on_full(self._video_stopped)
 
     def messages(self) -> Mapping[str, Handler]:
         return self._settings.messages()
@@ -185,6 +187,10 @@ class CameraComponent(Component):
         self.endpoint.broadcast(_CAMERA_TRIGGER, _CAMERA_TRIGGER.pack(shot.time_us, shot.index))
         if self.endpoint.dialect.name == "ardupilot":  # what its clients draw photos from
             self.endpoint.broadcast(_CAMERA_FEEDBACK, self._messages.feedback(shot))
+
+    def _video_stopped(self) -> None:
+        self.endpoint.text(Severity.WARNING, "Camera: video stopped: the storage is full")
+        self.broadcast(_CAPTURE_STATUS, self._messages.capture_status())
 
     # Information
 

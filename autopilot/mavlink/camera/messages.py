@@ -98,7 +98,7 @@ class CameraMessages:
             storage_count=1,
             status=mavlink.STORAGE_STATUS_READY,
             total_capacity=media.capacity_bytes / _MIB,
-            used_capacity=media.used_bytes / _MIB,
+            used_capacity=(media.used_bytes + media.growing_bytes) / _MIB,
             available_capacity=media.free_bytes / _MIB,
             read_speed=_SPEED_MIB_S,
             write_speed=_SPEED_MIB_S,

@@ -24,11 +24,14 @@ class Light:
     views: list[View] = field(default_factory=list)
     waiting: list[Future] = field(default_factory=list)
     is_slow: bool = False
+    has_noise: bool = False
 
     def capture(self, view: View):
         self.views.append(view)
         rgb = np.full((view.height, view.width, 3), 128, np.uint8)
         rgb[:, ::8] = 0
+        if self.has_noise:
+            rgb = np.random.default_rng(len(self.views)).integers(0, 256, rgb.shape, np.uint8)
         depth = np.full((view.height, view.width), 100.0, np.float32)
         frame: Future[RawFrame] = Future()
         if self.is_slow:

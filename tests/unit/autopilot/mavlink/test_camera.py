@@ -1,5 +1,6 @@
 """The camera component over MAVLink: information, photos, series, video, settings, and who answers what."""
 
+import shutil
 import struct
 from itertools import pairwise
 from math import degrees
@@ -262,6 +263,48 @@ def test_full_card_takes_no_more(rig):
     rig.vehicle.camera.media.used_bytes = rig.vehicle.camera.media.capacity_bytes
     assert rig.acks(CAMERA, START, 0, 0, 1, 1) == [(CAMERA, FAILED)]
     assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, FAILED)]
+
+
+def test_a_recording_stops_when_the_card_is_full_and_says_so(rig, tmp_path):
+    media = rig.vehicle.camera.media
+    media.capacity_bytes = 3 << 20
+    rig.vehicle.light.has_noise = True  # nothing that could be compressed
+    rig.vehicle.camera.settings.set("CAM_VIDRES", 1)
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, ACCEPTED)]
+    messages = rig.frame(50)
+    (growing,) = from_camera(requested(rig, REQUEST, STORAGE), "STORAGE_INFORMATION")
+    assert 0.1 < growing.used_capacity < 3.0
+    while rig.vehicle.camera.recording is not None:
+        assert rig.time_us < 60_000_000, "it goes on and on"
+        messages = rig.frame()
+    assert texts(messages) == ["Camera: video stopped: the storage is full"]
+    (status,) = from_camera(messages, "CAMERA_CAPTURE_STATUS")  # to everyone, though nobody asked for it
+    assert status.video_status == 0
+    assert status.available_capacity < 0.5
+    assert any(m.name == "CAMERA_CAPTURE_STATUS" for m in rig.second_client.received())
+    video = tmp_path / "media" / "VID_00001.mp4"
+    assert 2 << 20 < video.stat().st_size <= media.capacity_bytes
+    assert cv2.VideoCapture(str(video)).read()[0]  # it is complete
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, FAILED)]
+
+
+def test_a_recording_stops_before_the_hosts_disk_is_full(rig, monkeypatch):
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, ACCEPTED)]
+    rig.frame(20)
+    usage = shutil.disk_usage("/")
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=100_000))
+    messages = rig.frame(60)
+    assert "Camera: video stopped: the storage is full" in texts(messages)
+    assert rig.vehicle.camera.recording is None
+    assert rig.acks(CAMERA, START, 0, 0, 1, 1) == [(CAMERA, FAILED)]
+
+
+def test_a_video_whose_folder_has_gone_ends_no_flight(rig, tmp_path):
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, ACCEPTED)]
+    rig.frame(20)
+    shutil.rmtree(tmp_path / "media")
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == [(CAMERA, FAILED)]
+    assert rig.vehicle.camera.recording is None
 
 
 def test_formatting_removes_the_pictures_when_it_is_confirmed(rig, tmp_path):
