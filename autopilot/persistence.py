@@ -56,7 +56,7 @@ class Persistence:
     def _restore(self, name: str) -> bool:
         try:
             self._params.set_exactly(name, self._values[name])
-        except (ParameterError, TypeError):
+        except (ParameterError, TypeError, OverflowError):
             return False
         return True
 
@@ -75,7 +75,7 @@ class Persistence:
         if stored:
             try:
                 reply = home.set(*(float(stored[name]) for name in _HOME_FIELDS), has_position=False)
-            except (KeyError, TypeError, ValueError):
+            except (KeyError, TypeError, ValueError, OverflowError):
                 self.problems.append("the stored home is no place; it is left out")
             else:
                 if reply.verdict is not Verdict.ACCEPTED:
@@ -89,7 +89,7 @@ class Persistence:
     def _restore_list(self, lists: ItemLists, kind: ListKind, content: Mapping[str, Any]) -> None:
         try:
             items = [_item(seq, each) for seq, each in enumerate(content["items"])]
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, OverflowError):
             self.problems.append(f"the stored {_record(kind)} is not a list of items; it is left out")
             return
         refusal = lists.load(kind, items)

@@ -154,6 +154,8 @@ def load_airframe(name_or_path: str) -> Airframe:
         return Airframe.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise AirframeError(f"{path}: not TOML: {error}") from error
+    except RecursionError as error:
+        raise AirframeError(f"{path}: not an airframe: nested too deeply") from error
     except OSError as error:
         raise AirframeError(f"{path}: {error.strerror}") from error
     except ValidationError as error:

@@ -68,14 +68,20 @@ def write_whole(target: Path | str, content: bytes) -> None:
         file.write(content)
 
 
-def write_durably(target: Path, content: bytes) -> None:
+def write_durably(target: Path, content: bytes, mode: int = 0o666) -> None:
     """Writes the file in one go, and returns when it would survive a loss of power.
+
+    Args:
+        target: the file.
+        content: all of it.
+        mode: who may read it, from the first byte on; the umask takes from it.
 
     Raises:
         OSError: the folder is missing or may not be written; an existing file is as it was.
     """
     part = part_path(target)
-    with part.open("wb") as file:
+    part.unlink(missing_ok=True)  # what a killed process left may be open to others
+    with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
@@ -85,3 +91,11 @@ def write_durably(target: Path, content: bytes) -> None:
         os.fsync(folder)
     finally:
         os.close(folder)
+
+
+def write_to_nowhere() -> None:
+    """From now on what is written to standard output and standard error is lost, and fails no more."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for descriptor in (1, 2):
+        os.dup2(nowhere, descriptor)
+    os.close(nowhere)

@@ -72,7 +72,7 @@ class StateFolder:
             return dict(whole["content"])
         except FileNotFoundError:
             return {}
-        except (ValueError, TypeError, KeyError):
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
             self._put_aside(path, "the defaults are used")
             return {}
 
@@ -84,9 +84,12 @@ class StateFolder:
             checksum, _, text = line.partition(b" ")
             if checksum != _checksum(text):
                 return changes, True
-            number, change = json.loads(text)
-            if number == generation:
-                changes.append(change)
+            try:
+                number, change = json.loads(text)
+                if number == generation:
+                    changes.append(dict(change))
+            except (ValueError, TypeError, RecursionError):
+                return changes, True
         return changes, False
 
     def note(self, record: str, changes: Mapping[str, Any]) -> None:

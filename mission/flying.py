@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from common.files import write_whole
+from common.files import write_to_nowhere, write_whole
 from mission.client import Running
 from mission.flight import Flight
 from mission.options import FlightOptions
@@ -86,7 +86,7 @@ def advance(
         console: where it is shown.
     """
     try:
-        with _sigterm_interrupts(), Live(console=console, transient=True, auto_refresh=False) as live:
+        with _signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
             told = 0
 
             def on_frame(_: Flight) -> None:
@@ -107,17 +107,25 @@ def advance(
 
 
 @contextmanager
-def _sigterm_interrupts() -> Iterator[None]:
-    """Inside, SIGTERM is what Ctrl-C is."""
+def _signals_interrupt() -> Iterator[None]:
+    """Inside, SIGTERM is what Ctrl-C is, and so is SIGHUP: a terminal that was closed takes no more lines."""
 
     def interrupt(*_: object) -> NoReturn:
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
+    def hang_up(*_: object) -> NoReturn:
+        write_to_nowhere()
+        raise KeyboardInterrupt
+
+    before = {
+        number: signal.signal(number, handler)
+        for number, handler in ((signal.SIGTERM, interrupt), (signal.SIGHUP, hang_up))
+    }
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _finish(

@@ -7,6 +7,7 @@ from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.state_folder import StateFolder
 
 HOME = "home"  # the record
+ALT_MAX_M = 10_000.0
 
 
 class StateError(ValueError):
@@ -31,9 +32,11 @@ def stored_home(state: StateFolder | None) -> GeoPoint:
     """Where the vehicle boots if nothing else is said: the home given last, or the default."""
     stored = {} if state is None else state.read(HOME)
     try:
-        return GeoPoint(float(stored["lat_deg"]), float(stored["lon_deg"]), float(stored["alt_m"]))
-    except (KeyError, TypeError, ValueError):
+        home = GeoPoint(float(stored["lat_deg"]), float(stored["lon_deg"]), float(stored["alt_m"]))
+    except (KeyError, TypeError, ValueError, OverflowError):
         return DEFAULT_HOME
+    is_on_earth = abs(home.lat_deg) <= 90.0 and abs(home.lon_deg) <= 180.0 and abs(home.alt_m) <= ALT_MAX_M
+    return home if is_on_earth else DEFAULT_HOME
 
 
 def keep_home(state: StateFolder, home: GeoPoint) -> None:

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 
 from common.clock import wall_time_s
+from common.files import write_to_nowhere
 from mission.terminal import LINE_PERIOD_S, busy, print_line
 from policies.learn.config.command_line import CommandLine, flags, with_command_line
 from policies.learn.config.load import Loaded, load_config
@@ -188,7 +189,9 @@ class _Watcher:
     def note(self, line: str) -> None:
         print_line(self._console, line)
 
-    def stop(self, *_: object) -> None:
+    def stop(self, number: int, _: object) -> None:
+        if number == signal.SIGHUP:
+            write_to_nowhere()
         if self.is_stopped:
             raise KeyboardInterrupt  # asked twice
         self.is_stopped = True
@@ -202,7 +205,7 @@ class _Watcher:
 @contextmanager
 def _watched(console: Console, max_steps: int) -> Iterator[_Watcher]:
     watcher = _Watcher(console, max_steps)
-    before = {number: signal.signal(number, watcher.stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, watcher.stop) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
         yield watcher
     finally:

@@ -37,6 +37,8 @@ _BIT_PATTERN_FIELDS = {("PARAM_VALUE", "param_value"), ("PARAM_SET", "param_valu
 # Declared as text, but it holds the bytes of a number.
 _BYTES_FIELDS = {(name, "param_value") for name in ("PARAM_EXT_VALUE", "PARAM_EXT_SET", "PARAM_EXT_ACK")}
 
+_PRINTABLE = dict.fromkeys([*range(32), 127], "?")
+
 _IDS_BY_NAME: dict[str, int] = {item.msgname: item.id for item in DEFINITIONS.values()}
 
 
@@ -377,4 +379,6 @@ def _chars(value: bytes | str) -> bytes:
 
 
 def _text(value: bytes) -> str:
-    return value.partition(b"\0")[0].decode("ascii", "replace")
+    """What a peer wrote, without control characters: it may come to stand in texts, and those on terminals."""
+    text = value.partition(b"\0")[0].decode("ascii", "replace")
+    return text if text.isprintable() else text.translate(_PRINTABLE)

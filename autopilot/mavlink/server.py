@@ -306,7 +306,7 @@ class MavlinkServer:
     def close(self) -> None:
         """Closes the links."""
         if self._endpoint.signer.has_key:
-            self._endpoint.signer.save()
+            self._endpoint.signer.save(is_last=True)
         for source in self._endpoint.sources:
             source.close()
 

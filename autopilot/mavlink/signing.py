@@ -10,12 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 from hashlib import sha256
+from hmac import compare_digest
 from pathlib import Path
 from typing import Protocol
 
 from autopilot.mavlink.codec import SIGNATURE_LENGTH, Frame, known_type
 from autopilot.mavlink.links import Link
-from common.files import part_path, write_whole
+from common.files import write_durably
 
 KEY_LENGTH = 32
 EPOCH_UNIX_US = 1_420_070_400_000_000  # 2015-01-01 00:00 UTC
@@ -34,7 +35,8 @@ class SigningState:
     """What outlives a flight; an empty key: signing is off."""
 
     key: bytes = b""
-    timestamp: int = 0  # [10 us] since 2015
+    timestamp: int = 0  # [10 us] since 2015: nothing was sent or believed after it, or in the minute after it
+    is_complete: bool = False  # it is the last one: nothing came after it at all
 
 
 class SigningStore(Protocol):
@@ -74,17 +76,17 @@ class FileStore:
             return SigningState()
         try:
             content = json.loads(self._path.read_text(encoding="utf-8"))
-            state = SigningState(bytes.fromhex(content["key"]), int(content["timestamp"]))
-        except (ValueError, KeyError, TypeError) as error:
+            is_complete = content.get("is_complete") is True
+            state = SigningState(bytes.fromhex(content["key"]), int(content["timestamp"]), is_complete)
+        except (AttributeError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"{self._path}: is no signing key") from error
         if len(state.key) not in (0, KEY_LENGTH) or not 0 <= state.timestamp <= TIMESTAMP_MAX:
             raise ValueError(f"{self._path}: is no signing key")
         return state
 
     def save(self, state: SigningState) -> None:
-        content = json.dumps({"key": state.key.hex(), "timestamp": state.timestamp})
-        part_path(self._path).touch(mode=0o600)  # before there is anything in it
-        write_whole(self._path, content.encode())
+        content = {"key": state.key.hex(), "timestamp": state.timestamp, "is_complete": state.is_complete}
+        write_durably(self._path, json.dumps(content).encode(), mode=0o600)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +113,10 @@ class Signer:
         self._config = config
         state = config.store.load()
         self._key = state.key
-        # saved once a minute: what was sent after the last time must not be sent again
-        self._timestamp = state.timestamp + MINUTE_TICKS if state.key else 0
+        # Saved once a minute: what was sent after the last time must not be sent again, and what was heard until then
+        # must not be believed again. Stations follow our clock, so they are ahead of it as soon as they hear us.
+        margin = 0 if state.is_complete else MINUTE_TICKS
+        self._timestamp = self._heard_before = state.timestamp + margin if state.key else 0
         self._save_at = self._timestamp
         self._streams: dict[tuple[int, int, int], int] = {}
 
@@ -127,22 +131,26 @@ class Signer:
 
     def set_up(self, key: bytes, timestamp: int) -> None:
         """Takes a new key; one of zeros turns signing off."""
+        if key != self._key:
+            self._streams.clear()
         self._key = b"" if not any(key) else key
         if timestamp <= TIMESTAMP_SANE_MAX:
             self._timestamp = max(self._timestamp, timestamp)
-        self._streams.clear()
         self.save()
 
-    def save(self) -> None:
-        """Stores key and time."""
-        self._config.store.save(SigningState(self._key, self._timestamp))
+    def save(self, *, is_last: bool = False) -> None:
+        """Stores key and time; `is_last`: nothing is sent or believed after it."""
+        self._config.store.save(SigningState(self._key, self._timestamp, is_last))
         self._save_at = self._timestamp + MINUTE_TICKS
+
+    def _save_if_due(self) -> None:
+        if self._timestamp >= self._save_at:
+            self.save()
 
     def signature(self, frame: bytes, link_id: int) -> bytes:
         """What goes behind a frame that announces a signature."""
         self._timestamp = min(max(self._now(), self._timestamp + 1), TIMESTAMP_MAX)
-        if self._timestamp >= self._save_at:
-            self.save()
+        self._save_if_due()
         tail = bytes([link_id]) + self._timestamp.to_bytes(6, "little")
         return tail + sha256(self._key + frame + tail).digest()[:6]
 
@@ -161,18 +169,20 @@ class Signer:
         """Whether the signature is right and newer than all before; then the clock follows it."""
         raw = frame.raw
         tail = raw[-SIGNATURE_LENGTH:-6]
-        if sha256(self._key + raw[:-6]).digest()[:6] != raw[-6:]:
+        if not compare_digest(sha256(self._key + raw[:-6]).digest()[:6], raw[-6:]):
             return False
         stream = (frame.sysid, frame.compid, tail[0])
         timestamp = int.from_bytes(tail[1:], "little")
         last = self._streams.get(stream)
         if last is None:
-            if timestamp + MINUTE_TICKS < max(self._timestamp, self._now()) or len(self._streams) >= STREAMS_MAX:
+            is_old = timestamp + MINUTE_TICKS < max(self._timestamp, self._now()) or timestamp <= self._heard_before
+            if is_old or len(self._streams) >= STREAMS_MAX:
                 return False
         elif timestamp <= last:
             return False
         self._streams[stream] = timestamp
         self._timestamp = max(self._timestamp, timestamp)
+        self._save_if_due()
         return True
 
     def _now(self) -> int:

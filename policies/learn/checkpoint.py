@@ -56,7 +56,12 @@ def load(path: Path, *kinds: str) -> dict[str, Any]:
         raise CheckpointError(f"{path}: not a {kind} of honeyguide, or damaged")
     if whole["honeyguide"] not in kinds:
         raise CheckpointError(f"{path}: a {whole['honeyguide']} of honeyguide, not a {kind}")
-    content: dict[str, Any] = _restored(whole["content"])
+    try:
+        content = _restored(whole["content"])
+    except (AttributeError, EOFError, KeyError, RecursionError, TypeError, ValueError) as error:
+        raise CheckpointError(f"{path}: not a {kind} of honeyguide, or damaged") from error
+    if not isinstance(content, dict):
+        raise CheckpointError(f"{path}: not a {kind} of honeyguide, or damaged")
     return content
 
 

@@ -67,7 +67,11 @@ def load_policy(path: Path) -> tuple[Policy, PolicyCard]:
         CheckpointError: no such file, damaged, or neither of them.
     """
     content = load(path, POLICY, CHECKPOINT)
-    return policy_of(content["policy"], str(path)), PolicyCard(**content["card"])
+    try:
+        record, card = content["policy"], PolicyCard(**content["card"])
+    except (KeyError, TypeError) as error:
+        raise CheckpointError(f"{path}: written by another version of honeyguide: {error}") from error
+    return policy_of(record, str(path)), card
 
 
 def policy_record(policy: Policy) -> dict[str, Any]:
@@ -91,7 +95,7 @@ def policy_of(record: Mapping[str, Any], place: str) -> Policy:
         layout = Layout.from_record(record["layout"])
         policy = Policy(layout, settings, torch.Generator().manual_seed(0), is_squashed=record["is_squashed"])
         policy.load_state_dict(record["weights"])
-    except (ValidationError, KeyError, TypeError, RuntimeError) as error:
+    except (ValidationError, AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].strip()
         raise CheckpointError(f"{place}: written by another version of honeyguide: {reason}") from error
     return policy.eval()

@@ -163,6 +163,25 @@ def test_sigterm_ends_a_flight_like_an_interrupt(tmp_path):
     ULog(str(folder / "flight.ulg"))
 
 
+def test_a_terminal_that_is_closed_ends_a_flight_like_an_interrupt(tmp_path):
+    gcs_port, api_port = free_ports()
+    folder = tmp_path / "flight"
+    words = ["fly", "--idle", "--gcs-port", gcs_port, "--api-port", api_port, "--run-folder", folder]
+    process = subprocess.Popen(
+        [HONEYGUIDE, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert any(line.startswith("logs: ") for line in iter(process.stdout.readline, ""))
+    time.sleep(0.5)
+    process.send_signal(signal.SIGHUP)
+    process.stdout.close()  # what is printed from now on would fail
+    with process.stderr:
+        errors = process.stderr.read()
+    assert process.wait(timeout=60.0) == 0, errors
+    assert errors == ""
+    assert sorted(path.name for path in folder.iterdir()) == RUN_FILES
+    ULog(str(folder / "flight.ulg"))
+
+
 def test_interrupt_while_starting_is_no_traceback(tmp_path):
     ports = [str(port) for port in free_ports()]
     process = subprocess.Popen(

@@ -162,11 +162,13 @@ class _Walk:
         self._file = file
         self._notes = notes
         self._nodes_left = MAX_NODES
+        self._merged_sizes: dict[int, int] = {}
 
     def mapping(self, node: yaml.MappingNode, path: str, above: tuple[int, ...]) -> Placed:
         """One mapping; `above` are the nodes it lies in."""
         self._enter(node, path, above)
         self._note_duplicates(node, path)
+        self._charge(node, path, self._merged_size(node, ()) - len(node.value))
         self._loader.flatten_mapping(node)  # the merge key <<
         result = Placed(self._place(node))
         for key_node, value_node in node.value:
@@ -191,9 +193,28 @@ class _Walk:
     def _enter(self, node: yaml.Node, path: str, above: tuple[int, ...]) -> None:
         if id(node) in above:
             raise error_at(self._place(node), path, "contains itself")
-        self._nodes_left -= len(node.value)
+        self._charge(node, path, len(node.value))
+
+    def _charge(self, node: yaml.Node, path: str, count: int) -> None:
+        self._nodes_left -= count
         if self._nodes_left < 0:
             raise error_at(self._place(node), path, f"more than {MAX_NODES} values, aliases written out")
+
+    def _merged_size(self, node: yaml.Node, above: tuple[int, ...]) -> int:
+        """How many keys a mapping has once its merge keys are written out, counted without writing them."""
+        if not isinstance(node, yaml.MappingNode):
+            return 0
+        if id(node) in above:
+            raise error_at(self._place(node), "", "contains itself")
+        if id(node) not in self._merged_sizes:
+            size = 0
+            for key_node, value_node in node.value:
+                is_merge = key_node.tag == "tag:yaml.org,2002:merge"
+                many = isinstance(value_node, yaml.SequenceNode)
+                merged = (value_node.value if many else [value_node]) if is_merge else []
+                size += sum(self._merged_size(each, (*above, id(node))) for each in merged) if is_merge else 1
+            self._merged_sizes[id(node)] = size
+        return self._merged_sizes[id(node)]
 
     def _note_duplicates(self, node: yaml.MappingNode, path: str) -> None:
         seen: set[str] = set()

@@ -134,15 +134,29 @@ def test_chosen_parameter_is_neither_read_nor_stored(state):
 
 
 def test_stored_values_that_do_not_fit_are_named_and_left_alone(state):
-    state.write("parameters", {"NO_SUCH": 1.0, "MAV_SYS_ID": 100_000, "MIS_TAKEOFF_ALT": "high"})
+    state.write(
+        "parameters", {"NO_SUCH": 1.0, "MAV_SYS_ID": 100_000, "MIS_TAKEOFF_ALT": "high", "NAV_RCL_ACT": 10**400}
+    )
     params, _, keeper = restarted(state)
     assert params["MAV_SYS_ID"] == 1
     (problem,) = keeper.problems
-    assert problem.endswith("NO_SUCH, MAV_SYS_ID, MIS_TAKEOFF_ALT")
-    assert len(state.read("parameters")) == 3
+    assert problem.endswith("NO_SUCH, MAV_SYS_ID, MIS_TAKEOFF_ALT, NAV_RCL_ACT")
+    assert len(state.read("parameters")) == 4
 
 
-@pytest.mark.parametrize("content", [{"items": 3}, {"items": [{}]}, {"other": []}])
+NUMBERS = {"command": 16, "frame": 3, "params": [0, 0, 0, 0], "position": [47.0, 8.0, 10.0], "autocontinue": True}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"items": 3},
+        {"items": [{}]},
+        {"other": []},
+        {"items": [NUMBERS | {"frame": float("inf")}]},
+        {"items": [NUMBERS | {"position": [47.0, 8.0, 10**400]}]},
+    ],
+)
 def test_stored_list_that_is_none_is_left_out_with_a_sentence(state, content):
     state.write("mission", content)
     _, lists, keeper = restarted(state)
@@ -185,6 +199,10 @@ def test_home_that_a_client_gave_is_kept(tmp_path):
 def test_home_that_does_not_fit_is_told_and_left_out(tmp_path):
     state = StateFolder(tmp_path)
     state.write("given_home", {"lat_deg": 47.0, "lon_deg": "east", "alt_m": 1.0})
+    persistence = Persistence(state, parameter_table())
+    persistence.keep_home(home_of(VehicleState(origin=PLACE)))
+    assert "no place" in persistence.problems[0]
+    state.write("given_home", {"lat_deg": 10**400, "lon_deg": 8.0, "alt_m": 1.0})
     persistence = Persistence(state, parameter_table())
     persistence.keep_home(home_of(VehicleState(origin=PLACE)))
     assert "no place" in persistence.problems[0]

@@ -74,6 +74,14 @@ def test_what_is_no_text_is_refused(tmp_path):
         load_airframe(str(path))
 
 
+def test_what_is_nested_without_end_is_refused_in_one_sentence(tmp_path):
+    path = tmp_path / "deep.toml"
+    path.write_text("a = " + "[" * 100_000)
+    with pytest.raises(AirframeError, match=r"deep\.toml: not ") as refused:
+        load_airframe(str(path))
+    assert "\n" not in str(refused.value)
+
+
 @pytest.mark.parametrize("name", ["zeppelin", "", "none.toml", "/dev/null/x.toml"])
 def test_unknown_airframe_is_refused_with_the_known_ones(name):
     with pytest.raises(AirframeError, match=r"unknown airframe '.*'; known: f450, f550, x500"):

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from zlib import crc32
 
 import pytest
 
@@ -71,8 +72,13 @@ def test_change_that_a_kill_cut_off_has_not_happened(folder, lost):
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"{", b"[]", b'{"version": 2}', b"\xff\xfe", b'{"version": 1, "record": "b"}']
-)
+    "content",
+    [
+        b"", b"{", b"[]", b'{"version": 2}', b"\xff\xfe", b'{"version": 1, "record": "b"}', b"[" * 100_000,
+        b'{"version": 1, "record": "parameters", "generation": Infinity, "content": {}}',
+        b'{"version": 1, "record": "parameters", "generation": 1, "content": 3}',
+    ],
+)  # fmt: skip
 def test_damaged_record_is_put_aside_with_a_sentence(folder, content):
     state = StateFolder(folder)
     state.write("parameters", {"A": 1})
@@ -102,6 +108,16 @@ def test_damaged_journal_is_used_up_to_the_damage_and_put_aside(folder):
     assert (folder / "parameters.journal.bad-1").read_bytes() == bytes(journal)
     state.note("parameters", {"P9": 9})
     assert reopened(state).read("parameters") == {"P0": 0, "P9": 9}
+
+
+@pytest.mark.parametrize("line", [b"3", b"{}", b"[1]", b"[1, 3]", b"[1, 2, 3]", b"[" * 100_000])
+def test_line_of_a_journal_that_is_no_change_is_damage(folder, line):
+    state = StateFolder(folder)
+    state.write("parameters", {"A": 1})
+    (folder / "parameters.journal").write_bytes(f"{crc32(line):08x} ".encode() + line + b"\n")
+    state = reopened(state)
+    assert state.read("parameters") == {"A": 1}
+    assert "its changes up to there are used" in state.problems[0]
 
 
 def test_long_journal_is_folded_into_the_record(folder):

@@ -2,11 +2,12 @@
 
 import json
 from contextlib import closing
+from math import inf, nan
 
 import pytest
 from typer.testing import CliRunner
 
-from common.geodesy import GeoPoint
+from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.state_folder import StateFolder
 from mission.cli import app
 from mission.state import stored_home
@@ -50,6 +51,23 @@ def test_damaged_file_is_one_sentence_and_put_aside(fly, tmp_path):
     assert result.exit_code == 0, result.output
     (line,) = [line for line in result.output.splitlines() if "parameters.json" in line]
     assert line.endswith("cannot be read; the defaults are used, and it is kept as parameters.json.bad-1")
+
+
+@pytest.mark.parametrize(
+    "home",
+    [
+        {"lat_deg": nan, "lon_deg": 8.0, "alt_m": 0.0},
+        {"lat_deg": 91.0, "lon_deg": 8.0, "alt_m": 0.0},
+        {"lat_deg": 47.0, "lon_deg": 1e9, "alt_m": 0.0},
+        {"lat_deg": 47.0, "lon_deg": 8.0, "alt_m": inf},
+        {"lat_deg": 10**400, "lon_deg": 8.0, "alt_m": 0.0},
+        {"lat_deg": [], "lon_deg": 8.0, "alt_m": 0.0},
+    ],
+)
+def test_home_that_is_no_place_on_earth_is_the_default(tmp_path, home):
+    with closing(StateFolder(tmp_path)) as folder:
+        folder.write("home", home)
+        assert stored_home(folder) == DEFAULT_HOME
 
 
 def test_folder_in_use_is_refused(fly, tmp_path):

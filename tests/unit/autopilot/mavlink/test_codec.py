@@ -140,3 +140,10 @@ def test_a_right_frame_is_seen_at_the_beginning_only():
         assert not begins_with_frame(hello[:i])
         assert not begins_with_frame(hello[:i] + bytes([hello[i] ^ 1]) + hello[i + 1 :])
     assert not begins_with_frame(b"x" + hello)
+
+
+def test_text_of_a_peer_holds_no_control_characters():
+    raw = b"\x1b[2Ja\rb\nc\x07\x7f"
+    frame = encode("PARAM_SET", 255, 190, 0, param_id=raw)
+    (decoded,) = FrameReader().feed(frame)
+    assert decode(decoded).fields.param_id == "?[2Ja?b?c??"

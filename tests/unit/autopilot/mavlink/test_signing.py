@@ -1,5 +1,7 @@
 """Signatures as pymavlink makes and checks them, and the rules about replays, keys and unsigned frames."""
 
+import os
+
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -9,6 +11,7 @@ from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.signing import (
     EPOCH_UNIX_US,
     MINUTE_TICKS,
+    STREAMS_MAX,
     FileStore,
     MemoryStore,
     SigningConfig,
@@ -244,7 +247,105 @@ def test_key_file_is_private_whole_and_checked(tmp_path):
     store.save(SigningState(KEY, 77))
     assert FileStore(path).load() == SigningState(KEY, 77)
     assert path.stat().st_mode & 0o077 == 0
-    for rubbish in ("", "{}", '{"key": "00", "timestamp": 1}', '{"key": "", "timestamp": -1}', "[1]"):
+    left = tmp_path / "signing.json.part"
+    left.touch(mode=0o644)  # by a killed process
+    left.chmod(0o644)
+    store.save(SigningState(KEY, 78))
+    assert path.stat().st_mode & 0o077 == 0
+    good = f'"key": "{KEY.hex()}"'
+    for rubbish in (
+        "", "{}", '{"key": "00", "timestamp": 1}', '{"key": "", "timestamp": -1}', "[1]", "3", "[" * 100_000,
+        f"{{{good}, \"timestamp\": 1e400}}", f"{{{good}, \"timestamp\": NaN}}", f"{{{good}, \"timestamp\": {10**400}}}",
+    ):  # fmt: skip
         path.write_text(rubbish)
         with pytest.raises(ValueError, match="is no signing key"):
             store.load()
+
+
+def signed_command(station):
+    return bytes(station.mav.command_long_encode(1, 1, 400, 0, 1.0, 0, 0, 0, 0, 0, 0).pack(station.mav))
+
+
+@pytest.mark.parametrize("i_byte", range(1, 7))
+def test_every_byte_of_a_signature_counts(i_byte):
+    station = Station(key=KEY)
+    station.sign()
+    frame = bytearray(signed_command(station))
+    frame[-i_byte] ^= 0x01
+    station.write(frame)
+    station.frame()
+    assert station.vehicle.calls == []
+
+
+def test_streams_are_remembered_up_to_a_number_and_no_more_are_let_in():
+    station = Station(key=KEY)
+    station.sign()
+    taken = 0
+    for i in range(STREAMS_MAX + 10):
+        station.mav.srcSystem, station.mav.srcComponent = 100 + i // 200, 1 + i % 200
+        taken += station.arms()
+    assert taken == STREAMS_MAX
+    station.mav.srcSystem, station.mav.srcComponent = 100, 1
+    assert station.arms()  # one of them still is
+
+
+def timestamps(station, frames=100):
+    """Of what the vehicle signs."""
+    found = []
+    for _ in range(frames):
+        station.time_us += FRAME_US
+        station.server.frame(station.time_us)
+        raw = [frame.raw for data in station.end.receive() for frame in FrameReader().feed(data)]
+        found += [int.from_bytes(each[-12:-6], "little") for each in raw]
+    return found
+
+
+@pytest.mark.parametrize("is_killed", [True, False])
+def test_no_time_is_signed_twice_over_a_restart_even_if_the_clock_stands(is_killed):
+    station = Station(key=KEY)
+    sent = timestamps(station)
+    if not is_killed:
+        station.server.close()
+    after = Station(store=station.store)
+    assert min(timestamps(after)) > max(sent)
+
+
+@pytest.mark.parametrize("is_killed", [True, False])
+def test_no_frame_is_believed_again_after_a_restart(is_killed):
+    station = Station(key=KEY)
+    station.frame()
+    station.sign(timestamp=NOW + 5 * MINUTE_TICKS // 6)  # later than what has been stored so far
+    frames = [signed_command(station) for _ in range(3)]
+    for frame in frames:
+        station.write(frame)
+        station.frame()
+    assert len(station.vehicle.calls) == 3
+    if not is_killed:
+        station.server.close()
+    after = Station(store=station.store)
+    for frame in frames:
+        after.write(frame)
+        after.frame()
+    assert after.vehicle.calls == []
+    after.sign(timestamp=max(timestamps(after, 5)))  # a station follows the clock that it hears
+    assert after.arms()
+
+
+def test_no_frame_is_believed_again_after_the_same_key_is_set_again():
+    station = Station(key=KEY)
+    station.sign()
+    frame = signed_command(station)
+    station.write(frame)
+    station.frame()
+    station.set_up(KEY)
+    station.write(frame)
+    station.frame()
+    assert len(station.vehicle.calls) == 1
+
+
+def test_key_is_on_the_disk_when_it_is_stored(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append(os.fstat(descriptor).st_ino))
+    path = tmp_path / "signing.json"
+    FileStore(path).save(SigningState(KEY, 77))
+    assert synced == [path.stat().st_ino, tmp_path.stat().st_ino]

@@ -1,13 +1,14 @@
 """The companion's loop in memory: a vehicle that flies in Offboard, pictures, and a pilot that stops deciding."""
 
 import numpy as np
+import pytest
 
 from autopilot.mavlink.codec import FrameReader, decode, encode
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.links import LinkRole, memory_pair
 from autopilot.vehicle import Mode
 from common.image_stream import ImageFrame
-from policies.companion.companion import LENS, NO_DECISION, Companion
+from policies.companion.companion import IMAGE_OLD_US, LENS, NO_DECISION, NO_PICTURES, Companion
 from policies.companion.engagement import Phase
 from policies.experts.follower import ScriptedFollower
 
@@ -20,8 +21,10 @@ class Pictures:
     def __init__(self, shape):
         self._pixels = np.zeros(shape, np.uint8)
 
+    age_us = 0  # of each picture when it comes in
+
     def take(self, time_us):
-        return ImageFrame(time_us, 0, self._pixels, *LENS) if time_us % 100_000 == 0 else None
+        return ImageFrame(time_us - self.age_us, 0, self._pixels, *LENS) if time_us % 100_000 == 0 else None
 
     def close(self):
         pass
@@ -48,7 +51,8 @@ class Air:
     def __init__(self):
         companion_end, self.end = memory_pair(LinkRole.ONBOARD)
         self.pilot = Doubting()
-        self.companion = Companion(companion_end, Pictures(self.pilot.image_shape), self.pilot)
+        self.pictures = Pictures(self.pilot.image_shape)
+        self.companion = Companion(companion_end, self.pictures, self.pilot)
         self.mode = Mode.HOLD
         self.time_us = 0
         self._reader = FrameReader()
@@ -91,3 +95,19 @@ def test_a_policy_that_does_not_decide_hands_back_and_sends_no_number_that_is_no
     air.mode = Mode.HOLD
     air.run(3.0)
     assert air.companion.phase is Phase.READY
+
+
+@pytest.mark.parametrize(
+    ("age_us", "is_taken"), [(IMAGE_OLD_US - 100_000, True), (600_000, False), (50_000_000, False)]
+)
+def test_pictures_taken_long_ago_are_none_even_if_they_come_in_now(age_us, is_taken):
+    air = Air()
+    air.time_us = 60_000_000
+    air.run(1.0)
+    air.mode = Mode.OFFBOARD
+    air.run(1.0)
+    assert air.companion.phase is Phase.FLYING
+    air.pictures.age_us = age_us
+    air.run(1.0)
+    assert (air.companion.trouble != NO_PICTURES) is is_taken
+    assert (air.companion.phase is Phase.FLYING) is is_taken

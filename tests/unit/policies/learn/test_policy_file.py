@@ -66,3 +66,28 @@ def test_a_policy_of_the_follow_me_documents_size_is_below_a_megabyte_in_half_pr
     means = [each(seen).mean for each in (policy, again)]
     assert torch.allclose(means[0], means[1], atol=2e-3)
     assert not torch.equal(means[0], means[1])
+
+
+CONTENTS = {
+    "a list": [1, 2],
+    "a number": 3,
+    "nothing": {},
+    "an array that is none": {"npy": [1.0]},
+    "an array of objects": {"npy": torch.frombuffer(bytearray(b"\x93NUMPY\x01\x00"), dtype=torch.uint8)},
+    "another card": {"policy": {}, "card": {"speed": 3}},
+    "a card that is none": {"policy": {}, "card": [1]},
+    "a policy that is none": {"policy": [1], "card": {"task": "T", "settings": {}, "seed": 0, "steps": 0}},
+    "a layout that is none": {
+        "policy": {"network": {}, "layout": [3], "is_squashed": False, "weights": 7},
+        "card": {"task": "T", "settings": {}, "seed": 0, "steps": 0},
+    },
+}
+
+
+@pytest.mark.parametrize("name", CONTENTS)
+def test_any_other_content_is_refused_in_one_sentence(tmp_path, name):
+    path = tmp_path / "odd.pt"
+    torch.save({"honeyguide": "policy", "content": CONTENTS[name]}, path)
+    with pytest.raises(CheckpointError, match=r"odd\.pt: ") as refused:
+        load_policy(path)
+    assert "\n" not in str(refused.value)

@@ -1,4 +1,5 @@
 from pathlib import Path
+from time import process_time
 
 import pytest
 from hypothesis import given
@@ -6,7 +7,7 @@ from hypothesis import strategies as st
 
 from policies.learn.config.behavior import Behavior
 from policies.learn.config.load import load_config
-from policies.learn.config.places import ConfigError
+from policies.learn.config.places import ConfigError, parse_yaml
 from policies.learn.config.signals import CuriositySettings, ExtrinsicSettings
 
 CAR = """\
@@ -147,6 +148,22 @@ def test_what_is_no_configuration_is_refused(tmp_path, text, sentence):
 def test_aliases_that_multiply_are_refused(tmp_path):
     bomb = "a0: &a0 [1, 1]\n" + "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 9))
     assert "more than 100000 values" in refused(tmp_path, bomb)
+
+
+def test_merges_that_multiply_are_refused_before_they_are_written_out(tmp_path):
+    lines = ["a0: &a0 {k: 1}"]
+    lines += [f"a{i}: &a{i}\n  <<: [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 30)]
+    for text in ("\n".join(lines), "behaviors:\n  <<: *z\n" + "\n".join(lines).replace("a29: &a29", "z: &z")):
+        before_s = process_time()
+        assert "values, aliases written out" in refused(tmp_path, text) or "alias" in refused(tmp_path, text)
+        assert process_time() - before_s < 2.0
+
+
+def test_a_merge_is_still_a_merge(tmp_path):
+    text = "base: &base {batch_size: 64, buffer_size: 640}\nbehaviors:\n  Car:\n    hyperparameters:\n"
+    text += "      <<: [*base, {batch_size: 1}]\n      buffer_size: 1280\n"
+    placed = parse_yaml(text, "config.yaml", [])
+    assert placed["behaviors"]["Car"]["hyperparameters"] == {"batch_size": 64, "buffer_size": 1280}
 
 
 def test_a_missing_file_and_a_folder_are_refused_in_one_sentence(tmp_path):
