@@ -24,6 +24,11 @@ class MissionItem:
     autocontinue: bool = True
 
 
+def item_name(seq: int) -> str:
+    """How texts call an item: people count from 1, whatever the dialect's numbers begin with."""
+    return f"item {seq + 1}"
+
+
 @dataclass(frozen=True, slots=True)
 class ItemRefusal:
     """Why a mission was not taken: the item and the MAV_MISSION_RESULT to answer with."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from autopilot.commander.home import Home
 from autopilot.host import Storage
-from autopilot.lists import ItemLists, ListKind, MissionItem
+from autopilot.lists import ItemLists, ListKind, MissionItem, item_name
 from autopilot.vehicle import Verdict
 from common.geodesy import GeoPoint
 from common.params import Parameter, ParameterError, ParameterTable
@@ -94,7 +94,7 @@ class Persistence:
             return
         refusal = lists.load(kind, items)
         if refusal is not None:
-            self.problems.append(f"the stored {_record(kind)} is left out: item {refusal.seq}: {refusal.reason}")
+            self.problems.append(f"the stored {_record(kind)} is left out: {item_name(refusal.seq)}: {refusal.reason}")
 
     def frame(self, time_us: int) -> None:
         """Writes what has changed, if it is time."""

@@ -335,7 +335,7 @@ async def fly_plan(drone: Drone, plan: Plan) -> None:
         await drone.until(lambda: last.seq in drone.reached or not drone.is_armed, 3600.0, "mission finished")
     if last.seq not in drone.reached and not drone.is_mission_complete:
         current = drone.latest("MISSION_CURRENT")
-        where = "" if current is None else f" at item {current.seq}"
+        where = "" if current is None else f" at item {current.seq + 1}"
         raise ScriptError(f"the flight ended before the mission did{where} ({'; '.join(drone.texts[first_text:])})")
 
 

@@ -6,7 +6,6 @@ information are refused without a text: asking is how clients find out what ther
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -19,7 +18,6 @@ from autopilot.mavlink.convert import (
     degrees_from_e7,
     whole,
 )
-from autopilot.mavlink.home_item import in_clients_numbers
 from autopilot.mavlink.service import (
     COMMAND_ACK,
     Command,
@@ -153,7 +151,6 @@ class CommandService(Service):
         if command.command in _PROBES and reply.verdict != Verdict.DENIED:
             return
         name = _name(command.command)
-        reply = replace(reply, reason=in_clients_numbers(reply.reason, self._endpoint.dialect.first_seq))
         text = f"{name}: {reply.reason or reply.verdict.name.lower().replace('_', ' ')}"
         if command.command in _PROBES:
             self._endpoint.text_once(Severity.NOTICE, text)

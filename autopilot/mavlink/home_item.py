@@ -1,6 +1,5 @@
 """Missions whose item 0 is home, as ArduPilot's clients number them, from and to ours, which begin with a real item."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,14 +9,6 @@ from autopilot.lists import MissionItem
 from autopilot.vehicle import VehicleState
 
 _JUMP = mavlink.MAV_CMD_DO_JUMP
-_ITEM = re.compile(r"\b([Ii]tem) (\d+)")
-
-
-def in_clients_numbers(text: str, first_seq: int) -> str:
-    """A text of the vehicle with its mission items numbered as clients see them, our first as `first_seq`."""
-    if not first_seq:
-        return text
-    return _ITEM.sub(lambda found: f"{found[1]} {int(found[2]) + first_seq}", text)
 
 
 def with_home(items: Sequence[MissionItem], state: VehicleState) -> list[MissionItem]:

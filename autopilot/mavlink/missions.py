@@ -11,11 +11,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.lists import ItemRefusal, ListKind, MissionItem
+from autopilot.lists import ItemRefusal, ListKind, MissionItem, item_name
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.goto import GotoService
-from autopilot.mavlink.home_item import home_item, in_clients_numbers, with_home, without_home
+from autopilot.mavlink.home_item import home_item, with_home, without_home
 from autopilot.mavlink.mission_items import element_out_of_range, item_from_fields, scaled_position
 from autopilot.mavlink.service import Handler, Service
 from autopilot.vehicle import Severity
@@ -99,6 +99,11 @@ class MissionService(Service):
         """Number of our first item in the list that clients see: 1 where item 0 is home."""
         return self._endpoint.dialect.first_seq if kind is ListKind.MISSION else 0
 
+    def _name(self, kind: ListKind, seq: int) -> str:
+        """How texts call the item of a number in the list that clients see."""
+        first_seq = self._first_seq(kind)
+        return "home" if seq < first_seq else item_name(seq - first_seq)
+
     def _served(self, kind: ListKind) -> Sequence[MissionItem]:
         vehicle = self._endpoint.vehicle
         items = vehicle.lists.items(kind)
@@ -111,8 +116,7 @@ class MissionService(Service):
             first_seq = self._first_seq(kind)
             refusal = self._endpoint.vehicle.lists.load(kind, without_home(items) if first_seq else items)
             if refusal is not None and items:
-                reason = in_clients_numbers(refusal.reason, first_seq)
-                refusal = replace(refusal, seq=refusal.seq + first_seq, reason=reason)
+                refusal = replace(refusal, seq=refusal.seq + first_seq)
         return refusal
 
     # Upload
@@ -162,7 +166,7 @@ class MissionService(Service):
             self._late_item(sender, kind, fields.seq)
         elif fields.seq > upload.next_seq:
             del self._uploads[kind]
-            reason = f"item {fields.seq} came instead of {upload.next_seq}"
+            reason = f"{self._name(kind, fields.seq)} came instead of {self._name(kind, upload.next_seq)}"
             self._refuse(sender, mavlink.MAV_MISSION_INVALID_SEQUENCE, reason, kind)
         elif fields.seq == upload.next_seq:
             upload.items[fields.seq : fields.seq + 1] = [item_from_fields(fields)]
@@ -180,7 +184,7 @@ class MissionService(Service):
         if finished is not None and (finished.sender, finished.last_seq) == (sender, seq):
             self._ack(sender, finished.result, kind)
         else:
-            reason = f"item {seq} came without an upload"
+            reason = f"{self._name(kind, seq)} came without an upload"
             self._refuse(sender, mavlink.MAV_MISSION_INVALID_SEQUENCE, reason, kind)
 
     def _request_next(self, upload: Upload) -> None:
@@ -200,7 +204,7 @@ class MissionService(Service):
                 self._request_next(upload)
             else:
                 del self._uploads[upload.kind]
-                reason = f"upload given up, item {upload.next_seq} did not come"
+                reason = f"upload given up, {self._name(upload.kind, upload.next_seq)} did not come"
                 self._refuse(upload.sender, mavlink.MAV_MISSION_OPERATION_CANCELLED, reason, upload.kind)
 
     def _load(self, sender: Sender, kind: ListKind, items: Sequence[MissionItem]) -> int:
@@ -209,7 +213,7 @@ class MissionService(Service):
         if refusal is None:
             self._ack(sender, ACCEPTED, kind)
             return int(ACCEPTED)
-        self._refuse(sender, refusal.result, f"item {refusal.seq}: {refusal.reason}", kind)
+        self._refuse(sender, refusal.result, f"{self._name(kind, refusal.seq)}: {refusal.reason}", kind)
         return refusal.result
 
     # Download
@@ -259,7 +263,7 @@ class MissionService(Service):
             return kind, items[fields.seq]
         if fields.seq == 0 and self._first_seq(kind):  # of an empty mission, too: how clients ask for home
             return kind, home_item(self._endpoint.vehicle.state)
-        self._refuse(sender, mavlink.MAV_MISSION_INVALID_SEQUENCE, f"there is no item {fields.seq}", kind)
+        self._refuse(sender, mavlink.MAV_MISSION_INVALID_SEQUENCE, f"there is no {self._name(kind, fields.seq)}", kind)
         return kind, None
 
     def _reply_item(self, sender: Sender, message: Any, kind: ListKind, item: MissionItem, x: float, y: float) -> None:
@@ -316,8 +320,7 @@ class MissionService(Service):
         """Makes an item the current one; the answer is MISSION_CURRENT, whether it changed or not."""
         reply = self._endpoint.vehicle.set_current_item(max(fields.seq - self._first_seq(ListKind.MISSION), 0))
         if reply.reason:
-            reason = in_clients_numbers(reply.reason, self._first_seq(ListKind.MISSION))
-            self._endpoint.text(Severity.WARNING, f"Mission: {reason}")
+            self._endpoint.text(Severity.WARNING, f"Mission: {reply.reason}")
         telemetry = self._endpoint.telemetry
         payload = telemetry.builders[_MISSION_CURRENT_ID](self._endpoint.vehicle.state)
         if payload is not None:

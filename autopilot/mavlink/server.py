@@ -30,7 +30,6 @@ from autopilot.mavlink.frame_log import OnFrame
 from autopilot.mavlink.ftp import FtpService
 from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
 from autopilot.mavlink.goto import GotoService
-from autopilot.mavlink.home_item import in_clients_numbers
 from autopilot.mavlink.identity import banner
 from autopilot.mavlink.intake import share
 from autopilot.mavlink.links import Link, LinkSource
@@ -342,7 +341,7 @@ class MavlinkServer:
     # Announcer
 
     def statustext(self, severity: Severity, text: str) -> None:
-        self._endpoint.text(severity, in_clients_numbers(text, self._endpoint.dialect.first_seq))
+        self._endpoint.text(severity, text)
         self._events.text_told(severity, text)
         self._compass.text_told(text)
 

@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from math import degrees, isfinite, nan
 from typing import Any
 
-from autopilot.lists import ListKind
+from autopilot.lists import ListKind, item_name
 from autopilot.mavlink.channel import Endpoint
 from autopilot.mavlink.identity import PROJECT, project_version
 from autopilot.vehicle import LandedState, Mode, Reply, Verdict
@@ -201,7 +201,7 @@ class ShellCommands:
             return self._usage("mission")
         state = self._vehicle.state
         items = self._vehicle.lists.items(ListKind.MISSION)
-        where = f", item {state.mission_current} is next" if items else ""
+        where = f", {item_name(state.mission_current)} is next" if items else ""
         return (f"mission    {len(items)} items{where}",)
 
     def _versions(self, arguments: Sequence[str]) -> Lines:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from math import isfinite
 
-from autopilot.lists import ItemRefusal, MissionItem
+from autopilot.lists import ItemRefusal, MissionItem, item_name
 from autopilot.navigator.items import (
     ABSOLUTE_FRAMES,
     MAX_ITEMS,
@@ -53,7 +53,7 @@ def warning_of(items: Sequence[MissionItem]) -> str:
     for item in items:
         has_height = item.command in PLACED or item.command == Command.TAKEOFF
         if has_height and item.frame in RELATIVE_FRAMES and item.z < -_DEEP_M:
-            return f"item {item.seq} is {-item.z:.0f} m below home"
+            return f"{item_name(item.seq)} is {-item.z:.0f} m below home"
     return ""
 
 
@@ -214,8 +214,12 @@ def _check_gate(item: MissionItem, items: Sequence[MissionItem]) -> _Problem | N
 def _check_jump(item: MissionItem, items: Sequence[MissionItem]) -> _Problem | None:
     target = item.params[0]
     if not (target == target and target == int(target) and 0 <= target < len(items)) or int(target) == item.seq:
-        return Result.PARAM1, f"jump to item {target} is not possible"
+        return Result.PARAM1, f"jump to {_target_name(target)} is not possible"
     return _repeats_problem(item) or _loop_problem(item, int(target), items)
+
+
+def _target_name(target: float) -> str:
+    return item_name(int(target)) if isfinite(target) and target == int(target) else f"item {target:g}"
 
 
 def _check_jump_to_tag(item: MissionItem, items: Sequence[MissionItem]) -> _Problem | None:
@@ -248,7 +252,7 @@ def _repeats_problem(item: MissionItem) -> _Problem | None:
 
 def _loop_problem(item: MissionItem, target: int, items: Sequence[MissionItem]) -> _Problem | None:
     if target < item.seq and not any(other.command in NAV_COMMANDS for other in items[target : item.seq]):
-        return Result.PARAM1, f"jump to item {target} repeats no item that takes time"
+        return Result.PARAM1, f"jump to {item_name(target)} repeats no item that takes time"
     return None
 
 

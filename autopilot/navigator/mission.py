@@ -9,7 +9,7 @@ from enum import IntEnum
 from math import hypot
 
 from autopilot.abilities import FenceSwitch
-from autopilot.lists import ItemRefusal, MissionItem
+from autopilot.lists import ItemRefusal, MissionItem, item_name
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.item_checks import refuse_items, warning_of
 from autopilot.navigator.items import MAX_ITEMS, NAV_COMMANDS, PLACED, PLACED_OR_HERE, Command, is_here, is_same
@@ -120,7 +120,7 @@ class Mission:
             is_reset: every jump counts from the beginning again, and a complete mission may be flown again.
         """
         if not 0 <= seq < len(self.items):
-            return Reply(Verdict.DENIED, f"there is no item {seq}")
+            return Reply(Verdict.DENIED, f"there is no {item_name(seq)}")
         state = self._context.state
         if seq == 0 or is_reset:
             self._route.restart()
@@ -137,7 +137,7 @@ class Mission:
     def end_after(self, last: int) -> Reply:
         """The mission ends after an item, until it is restarted."""
         if not self._index <= last < len(self.items):
-            return Reply(Verdict.DENIED, f"the mission cannot end at item {last}")
+            return Reply(Verdict.DENIED, f"the mission cannot end at {item_name(last)}")
         self._route.end = last + 1
         return ACCEPTED
 
@@ -260,7 +260,7 @@ class Mission:
             if following >= self._route.end:
                 self._announce_current(index)
             index = following
-        context.announcer.statustext(Severity.ERROR, f"Mission item {self._index} jumps in a circle")
+        context.announcer.statustext(Severity.ERROR, f"Mission {item_name(self._index)} jumps in a circle")
         context.state.mission_state = MissionState.PAUSED  # not complete: not every item was done
         self._hold()
 
@@ -284,7 +284,7 @@ class Mission:
             return
         self._index = index + 1
         self._announce_current(self._index)
-        context.announcer.statustext(Severity.INFO, f"Mission waits after item {index}")
+        context.announcer.statustext(Severity.INFO, f"Mission waits after {item_name(index)}")
         self._hold()
 
     def _complete(self) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from math import isfinite, nan, radians
 
 from autopilot.abilities import FenceSwitch
-from autopilot.lists import MissionItem
+from autopilot.lists import MissionItem, item_name
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.items import CONDITIONS, RELATIVE_FRAMES, ROI_AS_ASKED, Command, is_here
 from autopilot.navigator.mission_legs import Leg
@@ -72,7 +72,7 @@ class Actions:
             condition = self._delayed[0].seq
             count = len(self._delayed) - 1
             if count:
-                text = f"Mission item {condition} did not come true: {count} more left out"
+                text = f"Mission {item_name(condition)} did not come true: {count} more left out"
                 self._context.announcer.statustext(Severity.NOTICE, text)
             self._delayed.clear()
 
@@ -161,7 +161,7 @@ class Actions:
     def _tell(self, item: MissionItem, reply: Reply) -> None:
         """Says why an item could not be carried out."""
         if reply.verdict not in (Verdict.ACCEPTED, Verdict.IN_PROGRESS):
-            text = f"Mission item {item.seq}: {reply.reason or reply.verdict.name.lower()}"
+            text = f"Mission {item_name(item.seq)}: {reply.reason or reply.verdict.name.lower()}"
             self._context.announcer.statustext(Severity.WARNING, text)
 
     def _alt_amsl_m(self, item: MissionItem) -> float:

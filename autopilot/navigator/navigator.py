@@ -3,7 +3,7 @@
 from math import isfinite, nan
 from typing import Protocol
 
-from autopilot.lists import ListKind
+from autopilot.lists import ListKind, item_name
 from autopilot.navigator.breadcrumbs import Breadcrumbs
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.destination import Destinations
@@ -146,7 +146,7 @@ class Navigator:
             for seq, place in mission.places():
                 reason = fence.refusal(place)
                 if reason:
-                    self._mission_problem = f"item {seq} is {reason}"
+                    self._mission_problem = f"{item_name(seq)} is {reason}"
                     break
         return self._mission_problem
 

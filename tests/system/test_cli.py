@@ -102,7 +102,7 @@ def test_mission_that_the_vehicle_refuses_gives_1(fly, tmp_path):
     assert "Traceback" not in result.stderr
     summary = json.loads((tmp_path / "flight" / "summary.json").read_text())
     assert not summary["is_success"]
-    assert "item 1" in summary["result"]
+    assert "item 2" in summary["result"]
     ULog(str(tmp_path / "flight" / "flight.ulg"))  # is whole
 
 

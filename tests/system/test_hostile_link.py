@@ -182,7 +182,7 @@ def test_wrong_mission_item_is_refused_and_the_old_mission_stays(holding, item, 
     running = holding.flight.fly(script, seconds=5.0)
     assert isinstance(running.error, MissionRefused), running.error
     assert running.error.result == result
-    assert "item 1" in str(running.error)
+    assert "item 2" in str(running.error)
     kept = holding.flight.fly(lambda drone: drone.download(), seconds=5.0).result
     assert len(kept) == 1
     assert holding.run(0.5) < HOLD_M

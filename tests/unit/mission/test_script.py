@@ -204,7 +204,7 @@ def test_plan_whose_flight_ends_elsewhere_has_failed(flight):
         return flying.error
 
     error = result_of(flight, script)
-    assert str(error).startswith("the flight ended before the mission did at item 1 (")
+    assert str(error).startswith("the flight ended before the mission did at item 2 (")
     assert "Position lost" in str(error)
 
 

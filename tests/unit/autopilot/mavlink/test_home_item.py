@@ -4,7 +4,6 @@ from autopilot.lists import ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.home_item import with_home, without_home
-from autopilot.vehicle import Reply, Severity, Verdict
 from tests.unit.autopilot.mavlink.rig import Rig, flying_state, texts
 
 WAYPOINT, JUMP = 16, 177
@@ -143,19 +142,18 @@ def test_refused_item_is_named_by_the_clients_number():
     assert texts(messages) == ["Mission: item 2: no such command"]
 
 
-def test_texts_number_items_as_the_client_does():
-    rig = Rig(dialect=ARDUPILOT)
-    rig.frame(2)
-    rig.vehicle.reply = Reply(Verdict.DENIED, "there is no item 9")
-    rig.client.command(224, 10.0)
+@pytest.mark.parametrize("dialect", [PX4, ARDUPILOT], ids=lambda dialect: dialect.name)
+def test_texts_count_items_from_1_in_both_dialects(dialect):
+    rig = Rig(dialect=dialect)
+    rig.vehicle.stored[ListKind.MISSION].refusal = ItemRefusal(1, 13, "jump to item 8 is not possible")
+    count = 2 + dialect.first_seq  # home is not counted
+    rig.client.send("MISSION_COUNT", count=count)
+    for seq in range(count):
+        rig.frame()
+        rig.client.send("MISSION_ITEM_INT", seq=seq, frame=3, command=WAYPOINT)
+    assert texts(rig.frame()) == ["Mission: item 2: jump to item 8 is not possible"]
+    rig.client.send("MISSION_REQUEST_INT", seq=9 + dialect.first_seq)
     assert texts(rig.frame()) == ["Mission: there is no item 10"]
-    rig.client.send("MISSION_SET_CURRENT", target_component=1, seq=10)
-    assert texts(rig.frame()) == ["Mission: there is no item 10"]
-    rig.server.statustext(Severity.INFO, "Mission waits after item 3")
-    rig.server.statustext(Severity.INFO, "Return to rally point 1")
-    assert texts(rig.frame()) == ["Mission waits after item 4", "Return to rally point 1"]
-    rig.vehicle.stored[ListKind.MISSION].refusal = ItemRefusal(1, 13, "jump to item 7 is not possible")
-    assert texts(answers(rig, [item(0), item(1), item(2)])) == ["Mission: item 2: jump to item 8 is not possible"]
 
 
 def test_the_current_item_of_no_mission_is_0():

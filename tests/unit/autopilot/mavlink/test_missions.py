@@ -77,7 +77,7 @@ def test_refused_item_leaves_the_old_plan_and_is_named():
     send_item(rig.client, PLAN[0])
     messages = rig.frame()
     assert [m.fields.type for m in messages if m.name == "MISSION_ACK"] == [mavlink.MAV_MISSION_UNSUPPORTED]
-    assert texts(messages) == ["Mission: item 1: command 93 is not supported"]
+    assert texts(messages) == ["Mission: item 2: command 93 is not supported"]
     assert rig.vehicle.stored[MISSION].items == OLD_PLAN
 
 
@@ -255,7 +255,7 @@ def test_refusal_of_a_fence_names_the_fence():
     send_item(rig.client, PLAN[0], mission_type=FENCE)
     messages = rig.frame()
     assert [m.fields[2:] for m in messages if m.name == "MISSION_ACK"] == [(mavlink.MAV_MISSION_INVALID, FENCE)]
-    assert texts(messages) == ["Fence: item 0: the polygon crosses itself"]
+    assert texts(messages) == ["Fence: item 1: the polygon crosses itself"]
 
 
 def test_listeners_hear_of_a_new_list_and_not_of_a_refused_one():

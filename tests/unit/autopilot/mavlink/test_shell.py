@@ -194,7 +194,7 @@ def test_status_tells_mode_place_and_battery(shell):
 
 def test_mission_status_counts_items(rig, shell):
     rig.vehicle.lists.load(0, [MissionItem(0, 0, 16, (0.0,) * 4, 47.0, 8.0, 500.0)] * 2)
-    assert shell.run("mission status") == ["mission    2 items, item 1 is next"]
+    assert shell.run("mission status") == ["mission    2 items, item 2 is next"]
 
 
 def test_listener_prints_the_last_row(rig, shell):

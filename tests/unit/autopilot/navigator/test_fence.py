@@ -133,10 +133,10 @@ def test_take_off_above_the_ceiling_is_refused():
 def test_mission_with_an_item_outside_is_not_started():
     rig = fenced(Kinematic().flying(), polygon(SQUARE))
     assert rig.fc.lists.load(ListKind.MISSION, [item(0, 16, 20.0), item(1, 16, 60.0), item(2, 20, frame=2)]) is None
-    assert rig.recorder.has_text("Mission: item 1 is outside fence: shapes")
+    assert rig.recorder.has_text("Mission: item 2 is outside fence: shapes")
     reply = rig.fc.set_mode(Mode.MISSION)
     assert reply.verdict is Verdict.TEMPORARILY_REJECTED
-    assert reply.reason == "item 1 is outside fence: shapes"
+    assert reply.reason == "item 2 is outside fence: shapes"
     fenced(rig, polygon([(1.5 * north, east) for north, east in SQUARE]))
     assert rig.fc.set_mode(Mode.MISSION).verdict is Verdict.ACCEPTED
 

@@ -250,7 +250,7 @@ def test_current_item_can_be_changed_in_flight():
     rig.frame()
     assert rig.sp("pos_ned")[1] == pytest.approx(100.0, abs=0.1)
     reply = rig.fc.set_current_item(7)
-    assert (reply.verdict, reply.reason) == (Verdict.DENIED, "there is no item 7")
+    assert (reply.verdict, reply.reason) == (Verdict.DENIED, "there is no item 8")
 
 
 def test_a_new_mission_in_flight_replaces_the_one_being_flown():
@@ -317,4 +317,4 @@ def test_mission_that_ends_with_a_return_is_announced_as_complete():
 def test_item_far_below_home_is_taken_with_a_warning(height, command, is_told):
     rig = Kinematic().ready()
     assert rig.fc.lists.load(ListKind.MISSION, [item(0, TAKEOFF), item(1, command, 30.0, 0.0, height)]) is None
-    assert rig.recorder.has_text("Mission: item 1 is 20 m below home") == is_told
+    assert rig.recorder.has_text("Mission: item 2 is 20 m below home") == is_told

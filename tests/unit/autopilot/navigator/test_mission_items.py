@@ -154,7 +154,7 @@ def test_what_is_still_delayed_when_the_item_is_done_is_left_out():
     finished(started(rig, item(0, WAYPOINT, 10.0), do(1, AFTER, 60.0), do(2, CAMERA), item(3, WAYPOINT, 30.0)))
     assert camera.shots == []
     assert rig.recorder.reached == [0, 3]
-    assert rig.recorder.has_text("Mission item 1 did not come true: 1 more left out")
+    assert rig.recorder.has_text("Mission item 2 did not come true: 1 more left out")
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_payload_gets_the_altitude_above_sea_level_and_a_refusal_does_not_stop_t
     camera = Camera(rig, (ROI_AT,), Reply(Verdict.FAILED, "the gimbal is stuck"))
     finished(started(rig, item(0, WAYPOINT, 10.0), item(1, ROI_AT, 50.0, 50.0, 3.0), item(2, WAYPOINT, 20.0)))
     assert camera.shots[0][7] == pytest.approx(rig.state.home.alt_m + 3.0)
-    assert rig.recorder.has_text("Mission item 1: the gimbal is stuck")
+    assert rig.recorder.has_text("Mission item 2: the gimbal is stuck")
 
 
 def test_items_for_the_payload_are_refused_unless_something_takes_them():
