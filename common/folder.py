@@ -6,6 +6,7 @@ nor a symbolic link leads outside. What is stored is bounded in bytes and in num
 
 import errno
 import os
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +32,7 @@ class ConfinedFolder:
         self.quota_bytes = quota_bytes
         self._used_bytes = 0
         self._entries = 0
+        self.looked_at = 0  # entries, since it was made: what the work of a request is counted by
         self._measure()
 
     def path(self, name: str) -> Path:
@@ -40,11 +42,20 @@ class ConfinedFolder:
             PermissionError: outside the folder.
         """
         parts = [part for part in name.split("/") if part not in ("", ".")]
-        path = self.root.joinpath(*parts)
-        # the last part too: opening it would follow a link
-        if ".." in parts or "\0" in name or not path.resolve().is_relative_to(self.root):
+        if ".." in parts or "\0" in name:
             raise PermissionError(errno.EACCES, "outside the folder", name)
+        path = self.root
+        for part in parts:  # the last one too: opening it would follow a link
+            path /= part
+            if path.is_symlink() and not self._is_inside(path):
+                raise PermissionError(errno.EACCES, "outside the folder", name)
         return path
+
+    def _is_inside(self, path: Path) -> bool:
+        try:
+            return path.resolve().is_relative_to(self.root)
+        except RuntimeError:  # a link to itself
+            return False
 
     def entries(self, name: str) -> list[FolderEntry]:
         """What a folder holds, in the order of the names; without what leads outside."""
@@ -52,19 +63,28 @@ class ConfinedFolder:
         folder = self.path(name)
         if folder == self.root and not folder.exists():
             return found
-        for path in sorted(folder.iterdir()):
-            if path.resolve().is_relative_to(self.root):
-                stat = path.stat()
-                is_folder = path.is_dir()
-                found.append(FolderEntry(path.name, is_folder, 0 if is_folder else stat.st_size, int(stat.st_mtime)))
-        return found
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                self.looked_at += 1
+                if entry.is_symlink() and not self._is_inside(Path(entry.path)):
+                    continue
+                try:
+                    status = entry.stat()
+                except OSError:  # a link to nothing, or it has just gone
+                    continue
+                is_folder = stat.S_ISDIR(status.st_mode)
+                size = 0 if is_folder else status.st_size
+                found.append(FolderEntry(entry.name, is_folder, size, int(status.st_mtime)))
+        return sorted(found, key=lambda entry: entry.name)
 
     def size(self, name: str) -> int:
         """Bytes of a file that can be read."""
-        path = self.path(name)
-        if path.is_dir():
+        status = self.path(name).stat()
+        if stat.S_ISDIR(status.st_mode):
             raise IsADirectoryError(errno.EISDIR, "a folder", name)
-        return path.stat().st_size
+        if not stat.S_ISREG(status.st_mode):  # a pipe would wait for its other end
+            raise PermissionError(errno.EACCES, "not a file", name)
+        return status.st_size
 
     def read(self, name: str, offset: int, count: int) -> bytes:
         """Bytes of a file from `offset` on; fewer at its end."""
@@ -75,11 +95,12 @@ class ConfinedFolder:
     def create(self, name: str) -> None:
         """Makes a file, or empties it."""
         path = self._changeable(name)
-        self._measure()
-        if not path.exists():
+        size = self.size(name) if path.exists() else None
+        if size is None:
             self._require_entry()
         path.open("wb").close()
-        self._measure()
+        self._entries += size is None
+        self._used_bytes -= size or 0
 
     def write(self, name: str, offset: int, data: bytes) -> None:
         """Writes into a file that exists.
@@ -105,23 +126,31 @@ class ConfinedFolder:
             OSError: EINVAL, it is shorter.
         """
         path = self._changeable(name)
-        if length > path.stat().st_size:
+        size = path.stat().st_size
+        if length > size:
             raise OSError(errno.EINVAL, "the file is shorter", name)
         with path.open("r+b") as file:
             file.truncate(length)
+        self._used_bytes -= size - length
 
     def remove(self, name: str) -> None:
         """Removes a file."""
-        self._changeable(name).unlink()
+        path = self._changeable(name)
+        size = path.lstat().st_size
+        path.unlink()
+        self._entries -= 1
+        self._used_bytes -= size
 
     def make_folder(self, name: str) -> None:
-        self._measure()
+        path = self._changeable(name)
         self._require_entry()
-        self._changeable(name).mkdir()
+        path.mkdir()
+        self._entries += 1
 
     def remove_folder(self, name: str) -> None:
         """Removes an empty folder."""
         self._changeable(name).rmdir()
+        self._entries -= 1
 
     def rename(self, name: str, new_name: str) -> None:
         """Gives a file or a folder another name or place; what stands there already is not replaced."""
@@ -139,7 +168,9 @@ class ConfinedFolder:
 
     def _require_entry(self) -> None:
         if self._entries >= ENTRIES_MAX:
-            raise OSError(errno.ENOSPC, "too many files")
+            self._measure()  # others may have removed some
+            if self._entries >= ENTRIES_MAX:
+                raise OSError(errno.ENOSPC, "too many files")
         self.root.mkdir(parents=True, exist_ok=True)
 
     def _measure(self) -> None:
@@ -147,5 +178,6 @@ class ConfinedFolder:
         self._used_bytes = self._entries = 0
         for folder, folder_names, file_names in os.walk(self.root):
             self._entries += len(folder_names) + len(file_names)
+            self.looked_at += 1 + len(folder_names) + len(file_names)
             for file_name in file_names:
                 self._used_bytes += os.lstat(os.path.join(folder, file_name)).st_size  # noqa: PTH118  walk gives text

@@ -1,19 +1,22 @@
 """MAVLink FTP: files of the host's folder, and the parameter file, for any number of clients.
 
-In: FILE_TRANSFER_PROTOCOL requests. Out: one reply each; a burst is sent some packets per frame. A request that comes
-again, because its reply was lost, gets the same reply and is not carried out again.
+In: FILE_TRANSFER_PROTOCOL requests. Out: one reply each; a burst is sent some packets per frame, and what is beyond a
+frame's work waits for the next one. A request that comes again, because its reply was lost, gets the same reply and is
+not carried out again.
 """
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import islice
 from struct import Struct
 from typing import Any
 
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.ftp_files import FtpError, FtpFiles, Nak, OpenFile
+from autopilot.mavlink.ftp_work import REQUEST_WORK, Budget, Checksums, Listings
 from autopilot.mavlink.metadata import MetadataService
 from autopilot.mavlink.parameters import ParameterService
 from autopilot.mavlink.service import Handler, Service
@@ -28,6 +31,7 @@ BURST_PACKETS = 150  # PX4 ends a burst after about 35 KB, and the client asks f
 BURST_PACKETS_PER_FRAME = 24  # of all bursts together: 287 KB/s
 
 _HEADER = Struct("<HBBBBBxI")  # seq, session, opcode, size, request opcode, burst complete, padding, offset
+_OPCODE_AT = 3
 _PAYLOAD_BYTES = _HEADER.size + DATA_BYTES
 _FTP = known_type("FILE_TRANSFER_PROTOCOL")
 
@@ -117,6 +121,7 @@ class FtpService(Service):
         self._files = FtpFiles(endpoint, parameters, metadata)
         self._sessions: dict[int, _Session] = {}
         self._replies: OrderedDict[Sender, _LastReply] = OrderedDict()
+        self._budget, self._checksums, self._listings = Budget(), Checksums(), Listings()
         self._work: dict[int, Callable[[Sender, Request], Answer]] = {
             Opcode.NONE: lambda _, request: (request.session, 0, _EMPTY),
             Opcode.TERMINATE_SESSION: self._terminate,
@@ -133,7 +138,6 @@ class FtpService(Service):
             Opcode.REMOVE_DIRECTORY: self._change,
             Opcode.TRUNCATE_FILE: self._change,
             Opcode.RENAME: self._change,
-            Opcode.CALC_FILE_CRC32: self._checksum,
         }
 
     def messages(self) -> Mapping[str, Handler]:
@@ -142,14 +146,20 @@ class FtpService(Service):
     def requested(self, sender: Sender, fields: Any) -> None:
         """One step of a file transfer: list, open, read, write, remove, rename, checksum."""
         raw = bytes(fields.payload)
-        seq, session, opcode, size, _, _, offset = _HEADER.unpack_from(raw)
-        if opcode >= Opcode.ACK:  # a reply
+        if raw[_OPCODE_AT] >= Opcode.ACK:  # a reply
             return
         last = self._replies.get(sender)
-        now_us = self._endpoint.time_us
-        if last is not None and last.request == raw and now_us - last.time_us < REPLY_KEPT_US:
+        if last is not None and last.request == raw and self._endpoint.time_us - last.time_us < REPLY_KEPT_US:
             self._send(sender, last.payload)
-            return
+        elif not self._checksums.has(sender, raw):
+            if self._budget.is_left and not self._budget.waiting:
+                self._carry_out(sender, raw)
+            else:
+                self._budget.wait(sender, raw)
+
+    def _carry_out(self, sender: Sender, raw: bytes) -> None:
+        seq, session, opcode, size, _, _, offset = _HEADER.unpack_from(raw)
+        before = self._files.work
         request = Request(seq, session, opcode, size, offset, raw[_HEADER.size : _HEADER.size + size])
         try:
             if size > DATA_BYTES:
@@ -158,17 +168,30 @@ class FtpService(Service):
                 self._begin_burst(sender, request)
                 self._replies.pop(sender, None)  # asked for again, it is sent again
                 return
+            if opcode == Opcode.CALC_FILE_CRC32:
+                self._begin_checksum(sender, request, raw)
+                return
             work = self._work.get(opcode)
             if work is None:
                 raise FtpError(Nak.UNKNOWN_COMMAND)
             payload = _ack(request, *work(sender, request))
         except (FtpError, OSError) as error:
             payload = _nak(seq, session, opcode, error)
-        self._remember(sender, _LastReply(raw, payload, now_us))
+        finally:
+            self._budget.charge(REQUEST_WORK + self._files.work - before)
+        self._answer(sender, raw, payload)
+
+    def _answer(self, sender: Sender, raw: bytes, payload: bytes) -> None:
+        self._remember(sender, _LastReply(raw, payload, self._endpoint.time_us))
         self._send(sender, payload)
 
     def frame(self) -> None:
-        """Sends the next packets of the bursts and closes sessions that nobody uses."""
+        """Goes on with what waits, sends the next packets of the bursts and closes sessions that nobody uses."""
+        budget = self._budget
+        while budget.waiting and budget.is_left:
+            self._carry_out(*budget.waiting.popleft())
+        self._checksums.go_on(budget)
+        budget.renew()
         if not self._sessions:
             return
         now_us = self._endpoint.time_us
@@ -261,10 +284,14 @@ class FtpService(Service):
 
     # Names
 
-    def _list(self, _: Sender, request: Request) -> Answer:
-        listing = self._files.listing(request.name, with_times=request.opcode == Opcode.LIST_DIRECTORY_WITH_TIME)
+    def _list(self, sender: Sender, request: Request) -> Answer:
+        now_us, opcode = self._endpoint.time_us, request.opcode
+        listing = self._listings.get(sender, opcode, request.data, now_us) if request.offset else None
+        if listing is None:
+            listing = self._files.listing(request.name, with_times=opcode == Opcode.LIST_DIRECTORY_WITH_TIME)
+            self._listings.keep(sender, opcode, request.data, now_us, listing)
         data = b""
-        for entry in listing[request.offset :]:
+        for entry in islice(listing, request.offset, None):
             if len(data) + len(entry) > DATA_BYTES:
                 break
             data += entry
@@ -289,8 +316,14 @@ class FtpService(Service):
                 files.rename(*request.names)
         return request.session, 0, _EMPTY
 
-    def _checksum(self, _: Sender, request: Request) -> Answer:
-        return request.session, 0, self._files.checksum(request.name).to_bytes(4, "little")
+    def _begin_checksum(self, sender: Sender, request: Request, raw: bytes) -> None:
+        def done(checksum: int) -> None:
+            self._answer(sender, raw, _ack(request, request.session, 0, checksum.to_bytes(4, "little")))
+
+        def failed(error: FtpError | OSError) -> None:
+            self._answer(sender, raw, _nak(request.seq, request.session, request.opcode, error))
+
+        self._checksums.begin(sender, raw, self._files.open(request.name), done, failed)
 
     # Replies
 

@@ -1,6 +1,5 @@
 """What the names of MAVLink FTP stand for: files of the host's folder, or files made on demand."""
 
-import zlib
 from enum import IntEnum
 from typing import Protocol
 from urllib.parse import parse_qs
@@ -14,7 +13,8 @@ from common.folder import ConfinedFolder
 
 PARAM_FOLDER = "@PARAM"
 PARAM_FILE = "param.pck"
-_READ_BYTES = 1 << 16
+_ENTRY_WORK = 4  # [us] of a file that is looked at
+_PARAMETER_WORK = 10  # [us] of one in the parameter file
 
 
 class Nak(IntEnum):
@@ -143,6 +143,13 @@ class FtpFiles:
         self._endpoint = endpoint
         self._parameters = parameters
         self._metadata = metadata
+        self._made_work = 0
+
+    @property
+    def work(self) -> int:
+        """What requests have cost so far, about [us]."""
+        folder = self._endpoint.vehicle.host.files
+        return self._made_work + (0 if folder is None else _ENTRY_WORK * folder.looked_at)
 
     @property
     def _folder(self) -> ConfinedFolder:
@@ -171,6 +178,7 @@ class FtpFiles:
         except ValueError as error:
             raise FtpError(Nak.FAIL) from error
         entries = self._parameters.entries()
+        self._made_work += _PARAMETER_WORK * len(entries)
         chosen = entries[max(start, 0) :]
         if count > 0:
             chosen = chosen[:count]
@@ -210,14 +218,6 @@ class FtpFiles:
         if any(_own_name(name) is not None for name in names) or self._endpoint.vehicle.host.files is None:
             raise FtpError(Nak.FILE_PROTECTED)
         return self._folder
-
-    def checksum(self, name: str) -> int:
-        """CRC32 without the inversions at both ends, as PX4 and MAVSDK compute it."""
-        file, checksum, offset = self.open(name), 0xFFFFFFFF, 0
-        while data := file.read(offset, _READ_BYTES):
-            checksum = zlib.crc32(data, checksum)
-            offset += len(data)
-        return checksum ^ 0xFFFFFFFF
 
 
 def _own_name(name: str) -> tuple[str, str] | None:
