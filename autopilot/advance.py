@@ -34,5 +34,5 @@ def estimate_samples(
     """Runs the estimator alone over recorded samples, one column per tick, and keeps its state after each tick."""
     i = wp.tid()
     for tick in range(tick_count):
-        estimator_step(ekf, i, samples[i, tick])
+        estimator_step(ekf, i, samples[i, tick], False)
         states[i, tick] = ekf.rows[i]

@@ -117,6 +117,7 @@ def make_advance(has_estimator: bool) -> Any:
         params = rig.autopilot.control_params[i]
         airframe = rig.autopilot.airframe[i]
         setpoint = rig.autopilot.setpoint[i]
+        is_in_air = setpoint.is_armed == 1 and setpoint.is_landed == 0
         body = rig.body[i]
         wind = rig.wind[i]
         sensors = rig.sensors[i]
@@ -129,7 +130,7 @@ def make_advance(has_estimator: bool) -> Any:
             body = body_tick(model, body, command, wind.wind_ned, world)
             if wp.static(has_estimator):
                 sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, world, seed, i, tick)
-                estimator_step(rig.autopilot.ekf, i, sensors.samples)
+                estimator_step(rig.autopilot.ekf, i, sensors.samples, is_in_air)
                 estimate = rig.autopilot.ekf.rows[i].estimate
             else:
                 sensors.samples.battery = true_battery(body, tick)

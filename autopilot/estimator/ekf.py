@@ -282,8 +282,15 @@ def align(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample, samples: Sa
 
 
 @wp.func
-def estimator_step(ekf: Ekf, i: int, samples: Samples) -> None:
-    """One tick of vehicle i, on its row in place: nothing happens without a new IMU sample."""
+def estimator_step(ekf: Ekf, i: int, samples: Samples, is_in_air: bool) -> None:
+    """One tick of vehicle i, on its row in place: nothing happens without a new IMU sample.
+
+    Args:
+        ekf: of all vehicles.
+        i: the vehicle.
+        samples: the newest of each sensor.
+        is_in_air: the commander says so; False where nobody knows, as in a replay.
+    """
     if samples.imu.time_us == ekf.rows[i].time_us:
         return
     params = ekf.params[i]
@@ -294,7 +301,8 @@ def estimator_step(ekf: Ekf, i: int, samples: Samples) -> None:
     ekf.rows[i].imu_head += 1
     ekf.rows[i].imu_tail = wp.max(ekf.rows[i].imu_tail, ekf.rows[i].imu_head - IMU_RING)
     ekf.rows[i].time_us = imu.time_us
-    ekf.rows[i].stillness = observe_stillness(ekf.rows[i].stillness, imu)
+    clean.imu = imu
+    observe_stillness(ekf, i, params, clean, is_in_air)
     receive_samples(ekf, i, clean)
     if ekf.external[i].time_us != ekf.rows[i].external_inbox.arrived_time_us:
         receive_external(ekf, i)

@@ -117,14 +117,21 @@ class Alignment:
 
 @wp.struct
 class Stillness:
-    """Is the vehicle at rest, by the look of its IMU alone?"""
+    """Is the vehicle at rest?"""
 
     gyro_mean_frd: wp.vec3  # [rad/s]
     accel_mean_frd: wp.vec3  # [m/s²]
     gyro_var: float  # [(rad/s)²] about the mean, the three axes together
     accel_var: float  # [(m/s²)²]
-    still_s: float  # for how long
-    is_still: int
+    still_s: float  # for how long the IMU has shown no vibration and no turn
+    accel_recent_ned: wp.vec3  # [m/s²] mean of seconds
+    accel_before_ned: wp.vec3  # [m/s²] slower mean of that one: a velocity gained shows as their difference
+    gnss_vel_ned: wp.vec3  # [m/s] low-passed
+    baro_height: float  # [m] tracked
+    baro_climb: float  # [m/s]
+    calm_s: float  # for how long nothing has spoken of motion
+    has_moved: int  # since power-on
+    is_still: int  # at rest: velocity is zero
 
 
 @wp.struct

@@ -1,34 +1,56 @@
-"""Rest: while the IMU shows a vehicle that stands still, its velocity is zero.
+"""Rest: while nothing speaks of motion, velocity is zero.
 
-Holds tilt and biases together from alignment until GNSS takes over, and again after landing. Stops with motion.
+Holds tilt and biases together from alignment until GNSS takes over, and again after landing.
+
+A smooth drive, climb or hover looks to an IMU like rest: only the change from one to the other shows. So rest ends with
+any sign of motion: vibration, a turn, velocity gained by the accelerometer, GNSS velocity, barometer climb, the
+estimate itself; and never is while the commander says that the vehicle is in the air. It comes back when all of them,
+filtered, have been quiet for seconds. GNSS alone would not do: a threshold above its noise lets a slow climb pass.
 """
 
 import warp as wp
 
 from autopilot.estimator.fuse import fuse_state, judge, mark_fused, seconds_since
 from autopilot.estimator.params import EstimatorParams
-from autopilot.estimator.state import VEL, Aid, Ekf, Nominal, Stillness
-from autopilot.ports import ImuSample
+from autopilot.estimator.sources.baro import baro_height
+from autopilot.estimator.state import PHASE_RUNNING, VEL, Aid, Ekf, Nominal, Stillness
+from autopilot.ports import BaroSample, GnssSample, ImuSample, Samples
 from common.kernels import GRAVITY_M_S2, vec24
 
 wp.set_module_options({"enable_backward": False})
 
 _STD = wp.constant(0.1)  # [m/s]
+# What is fused 25 times a second has an error that does not change: a creep below the limits that follow. So velocity
+# is never taken for better known than that.
+_CREEP_STD = wp.constant(0.05)  # [m/s]
+_STIRRED_STD = wp.constant(0.1)  # [m/s] what velocity may have become when a sign of motion is seen
 _GATE_SIGMA = wp.constant(5.0)
 _PERIOD_S = wp.constant(0.0399)
-_MAX_SPEED = wp.constant(0.5)  # [m/s] faster by its own estimate: a smooth cruise, not rest
 _AVERAGE_S = wp.constant(0.1)  # time constant of the running means
-_STILL_AFTER_S = wp.constant(0.4)
 # guess: between a BMI088 at rest (gyro 0.005 rad/s, accelerometer 0.05 m/s², three axes) and a hovering airframe
 _MAX_GYRO_VAR = wp.constant(4.0e-4)  # [(rad/s)²]
 _MAX_ACCEL_VAR = wp.constant(0.02)  # [(m/s²)²]
 _MAX_RATE = wp.constant(0.05)  # [rad/s] bias included
 _MAX_GRAVITY_ERROR = wp.constant(0.5)  # [m/s²]
 
+# Signs of motion. Each limit is above four deviations of its filtered noise, with the default sensors.
+_RECENT_S = wp.constant(2.0)  # within which velocity is gained
+_BEFORE_S = wp.constant(10.0)
+_MAX_GAIN = wp.constant(0.06)  # [m/s] gained by the accelerometer; noise of the default IMU at rest: 0.01
+_GNSS_S = wp.constant(2.0)  # time constant
+_GNSS_STEP_S = wp.constant(0.2)  # a fix after a longer gap counts no more
+_MAX_GNSS_SPEED = wp.constant(0.15)  # [m/s] noise 0.02 per axis
+_BARO_S = wp.constant(2.0)  # time constant
+_BARO_GAP_S = wp.constant(1.0)
+_MAX_CLIMB = wp.constant(0.1)  # [m/s] noise 0.01
+_MAX_SPEED = wp.constant(0.2)  # [m/s] by the estimate
+_STILL_AFTER_S = wp.constant(0.4)  # from power-on
+_STILL_AGAIN_AFTER_S = wp.constant(3.0)  # the filters have forgotten most of a motion
+
 
 @wp.func
-def observe_stillness(still: Stillness, imu: ImuSample) -> Stillness:
-    """Running means and variances of the IMU, and what they say."""
+def observe_imu(still: Stillness, imu: ImuSample) -> Stillness:
+    """Running means and variances of the IMU, and for how long they have been those of rest or of a smooth motion."""
     if wp.length_sq(still.accel_mean_frd) == 0.0:
         still.gyro_mean_frd = imu.gyro_frd
         still.accel_mean_frd = imu.accel_frd
@@ -49,19 +71,112 @@ def observe_stillness(still: Stillness, imu: ImuSample) -> Stillness:
         still.still_s = still.still_s + imu.dt_s
     else:
         still.still_s = 0.0
+    return still
+
+
+@wp.func
+def observe_accel(still: Stillness, accel_ned: wp.vec3, dt_s: float) -> Stillness:
+    """Means of the acceleration since the IMU is quiet. Of ned, for a multirotor that drives leans and feels nothing.
+
+    They wait for the estimator to settle.
+    """
+    if still.still_s > _RECENT_S:
+        recent_change = accel_ned - still.accel_recent_ned
+        still.accel_recent_ned = still.accel_recent_ned + recent_change * wp.min(dt_s / _RECENT_S, 1.0)
+        before_change = still.accel_recent_ned - still.accel_before_ned
+        still.accel_before_ned = still.accel_before_ned + before_change * wp.min(dt_s / _BEFORE_S, 1.0)
+    else:
+        still.accel_recent_ned = wp.vec3()
+        still.accel_before_ned = wp.vec3()
+    return still
+
+
+@wp.func
+def observe_gnss(params: EstimatorParams, still: Stillness, sample: GnssSample, step_s: float) -> Stillness:
+    """The low-passed velocity after a fix, if the receiver knows it."""
+    if sample.fix_type >= params.gnss_min_fix and sample.vel_std <= params.gnss_max_vel_std:
+        gain = wp.clamp(step_s, 0.0, _GNSS_STEP_S) / _GNSS_S
+        still.gnss_vel_ned = still.gnss_vel_ned + gain * (sample.vel_ned - still.gnss_vel_ned)
+    return still
+
+
+@wp.func
+def observe_baro(still: Stillness, sample: BaroSample, step_s: float) -> Stillness:
+    """Height and climb after a pressure: a critically damped tracker."""
+    height = baro_height(sample.pressure_pa)
+    if step_s > _BARO_GAP_S or step_s < 0.0:
+        still.baro_height = height
+        still.baro_climb = 0.0
+    else:
+        share = step_s / _BARO_S
+        error = height - still.baro_height - still.baro_climb * step_s
+        still.baro_height = still.baro_height + still.baro_climb * step_s + 2.0 * share * error
+        still.baro_climb = still.baro_climb + share / _BARO_S * error
+    return still
+
+
+@wp.func
+def shows_motion(still: Stillness, vel_ned: wp.vec3) -> bool:
+    """Something other than vibration says that the vehicle moves.
+
+    Args:
+        still: after the newest samples.
+        vel_ned: [m/s] by the estimate.
+    """
+    gained = (still.accel_recent_ned - still.accel_before_ned) * _RECENT_S
+    return (
+        wp.length_sq(gained) > _MAX_GAIN * _MAX_GAIN
+        or wp.length_sq(still.gnss_vel_ned) > _MAX_GNSS_SPEED * _MAX_GNSS_SPEED
+        or wp.abs(still.baro_climb) > _MAX_CLIMB
+        or wp.length_sq(vel_ned) > _MAX_SPEED * _MAX_SPEED
+    )
+
+
+@wp.func
+def conclude(still: Stillness, vel_ned: wp.vec3, is_in_air: bool, dt_s: float) -> Stillness:
+    """Whether the vehicle is at rest."""
+    if is_in_air or shows_motion(still, vel_ned):
+        still.has_moved = 1
+        still.calm_s = 0.0
+    elif still.still_s == 0.0:
+        still.calm_s = 0.0
+    else:
+        still.calm_s = still.calm_s + dt_s
+    needed_s = _STILL_AFTER_S
+    if still.has_moved == 1:
+        needed_s = _STILL_AGAIN_AFTER_S
     still.is_still = 0
-    if still.still_s > _STILL_AFTER_S:
+    if still.calm_s > needed_s:
         still.is_still = 1
     return still
 
 
 @wp.func
-def rest_is_due(aid: Aid, nominal: Nominal, time_us: wp.int64) -> bool:
-    """The estimate does not speak against rest, and the last zero-velocity update is a while ago."""
-    return (
-        wp.length_sq(nominal.vel_ned) < _MAX_SPEED * _MAX_SPEED
-        and seconds_since(time_us, aid.judged_time_us) > _PERIOD_S
-    )
+def stir(cov: wp.array2d(dtype=vec24), i: int) -> None:
+    """Velocity is less certain: a vehicle taken to be at rest was not."""
+    for axis in range(3):
+        row = cov[i, VEL + axis]
+        row[VEL + axis] = row[VEL + axis] + _STIRRED_STD * _STIRRED_STD
+        cov[i, VEL + axis] = row
+
+
+@wp.func
+def observe_stillness(ekf: Ekf, i: int, params: EstimatorParams, samples: Samples, is_in_air: bool) -> None:
+    """Takes what is new in the samples, before the inboxes have seen them."""
+    still = observe_imu(ekf.rows[i].stillness, samples.imu)
+    if ekf.rows[i].phase == PHASE_RUNNING:
+        still = observe_accel(still, ekf.rows[i].estimate.accel_ned, samples.imu.dt_s)
+    if samples.gnss.time_us != ekf.rows[i].gnss_inbox.arrived_time_us:
+        step_s = seconds_since(samples.gnss.time_us, ekf.rows[i].gnss_inbox.arrived_time_us)
+        still = observe_gnss(params, still, samples.gnss, step_s)
+    if samples.baro.time_us != ekf.rows[i].baro_inbox.arrived_time_us:
+        step_s = seconds_since(samples.baro.time_us, ekf.rows[i].baro_inbox.arrived_time_us)
+        still = observe_baro(still, samples.baro, step_s)
+    was_still = still.is_still
+    still = conclude(still, ekf.rows[i].nominal.vel_ned, is_in_air, samples.imu.dt_s)
+    if was_still == 1 and still.calm_s == 0.0:
+        stir(ekf.covariance, i)
+    ekf.rows[i].stillness = still
 
 
 @wp.func
@@ -76,15 +191,16 @@ def fuse_rest(
     aid.is_active = 1
     if aid.test_ratio <= 1.0:
         for axis in range(3):
-            nominal = fuse_state(params, cov, i, nominal, VEL + axis, -nominal.vel_ned[axis], var)
+            if cov[i, VEL + axis][VEL + axis] > _CREEP_STD * _CREEP_STD:
+                nominal = fuse_state(params, cov, i, nominal, VEL + axis, -nominal.vel_ned[axis], var)
         aid = mark_fused(aid)
     return nominal, aid
 
 
 @wp.func
 def take_rest(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
-    """Fuses zero velocity if the vehicle stands still."""
-    if rest_is_due(ekf.rows[i].rest, ekf.rows[i].nominal, now_us):
+    """Fuses zero velocity, 25 times a second."""
+    if seconds_since(now_us, ekf.rows[i].rest.judged_time_us) > _PERIOD_S:
         nominal, aid = fuse_rest(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].rest, now_us)
         ekf.rows[i].nominal = nominal
         ekf.rows[i].rest = aid

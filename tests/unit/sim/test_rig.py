@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import parameter_table
@@ -10,11 +11,11 @@ from sim.wind import wind_model
 from sim.world.world import build_world
 
 
-def make_rig(vehicle_count, *, is_noisy=True, **options):
+def make_rig(vehicle_count, *, is_noisy=True, noise_scale=1.0, **options):
     rig = Rig(
         load_airframe("x500"),
         build_world(),
-        sensor_model(noise_scale=1.0 if is_noisy else 0.0, home=DEFAULT_HOME),
+        sensor_model(noise_scale=noise_scale if is_noisy else 0.0, home=DEFAULT_HOME),
         wind_model(4.0, 270.0, 1.0, 1.0) if is_noisy else wind_model(0.0),
         home=DEFAULT_HOME,
         vehicle_count=vehicle_count,
@@ -158,3 +159,27 @@ def test_reboot_restarts_the_controller_and_leaves_the_body_where_it_is():
 
 def fresh_body(snapshot):
     return next(rows for rows in snapshot if rows.dtype.names and "rotor_speed" in rows.dtype.names)
+
+
+@pytest.mark.parametrize("noise_scale", [0.0, 0.2])
+def test_slow_climb_with_quiet_sensors_is_not_taken_for_rest(noise_scale):
+    rig = make_rig(4, noise_scale=noise_scale)  # in a wind of 4 m/s
+    rig.advance(2000)
+    climb(rig, 15.0)
+    rows = rig.arrays.autopilot.setpoint.numpy()
+    for i in range(4):
+        port = SetpointPort(rows[i : i + 1])
+        port.set_flags(is_armed=True, is_landed=False)
+        port.move((0.0, 0.0, -0.3), 0.0)
+        port.write()
+    before, height_before = height_errors(rig), -rig.arrays.body.numpy()["pos_ned"][:, 2]
+    rig.advance(20 * 250)
+    assert np.all(-rig.arrays.body.numpy()["pos_ned"][:, 2] - height_before > 5.0)
+    assert np.abs(height_errors(rig) - before).max() < 0.3
+    assert not rig.arrays.autopilot.ekf.rows.numpy()["stillness"]["is_still"].any()
+
+
+def height_errors(rig):
+    """[m] estimated minus true."""
+    estimate = rig.arrays.autopilot.ekf.rows.numpy()["estimate"]
+    return rig.arrays.body.numpy()["pos_ned"][:, 2] - estimate["pos_ned"][:, 2]

@@ -4,6 +4,7 @@ A vehicle rests, climbs, and flies a figure of eight while it turns. Attitude fo
 multirotor's thrust axis) and heading; IMU samples are exact differences of the motion over each interval, plus noise.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from autopilot.ports import Samples
 
 Array = NDArray[np.float64]
+Path = Callable[[Array], tuple[Array, Array]]
 
 GRAVITY = np.array([0.0, 0.0, 9.80665])
 FIELD_NED_GAUSS = (0.212, 0.011, 0.430)  # Zurich, rounded
@@ -134,6 +136,8 @@ def make_flight(
     noise: SensorNoise | None = None,
     jitter: float = 0.0,
     gnss_delay_s: float = 0.12,
+    path: Path | None = None,
+    leans: bool = True,
 ) -> Flight:
     """A flight and its samples.
 
@@ -148,6 +152,8 @@ def make_flight(
         noise: of the sensors.
         jitter: share by which IMU intervals vary about 4 ms.
         gnss_delay_s: from validity to delivery.
+        path: position and heading at given times, in the place of the figure of eight.
+        leans: a multirotor leans into its acceleration, a ground vehicle stays level.
     """
     noise = noise or SensorNoise()
     rng = np.random.default_rng(seed)
@@ -155,13 +161,14 @@ def make_flight(
     dt_us = np.round(4000.0 * (1.0 + jitter * rng.uniform(-1.0, 1.0, count))).astype(np.int64)
     time_us = np.cumsum(dt_us)
     edges = np.concatenate([[0.0], time_us * 1e-6])
-    pos, yaw = figure_of_eight(edges, rest_s, size_m, rate, yaw_rate, yaw0)
+    path = path or (lambda times_s: figure_of_eight(times_s, rest_s, size_m, rate, yaw_rate, yaw0))
+    pos, yaw = path(edges)
     h = 1e-3
-    before, _ = figure_of_eight(edges - h, rest_s, size_m, rate, yaw_rate, yaw0)
-    after, _ = figure_of_eight(edges + h, rest_s, size_m, rate, yaw_rate, yaw0)
+    before, _ = path(edges - h)
+    after, _ = path(edges + h)
     vel = (after - before) / (2.0 * h)
     accel = (after - 2.0 * pos + before) / h**2
-    q = attitude(accel - GRAVITY, yaw)
+    q = attitude(accel - GRAVITY if leans else np.broadcast_to(-GRAVITY, accel.shape), yaw)
     dt = dt_us * 1e-6
     turn = rotvec_from_quat(quat_multiply(quat_conjugate(q[:-1]), q[1:]))
     middle = quat_multiply(q[:-1], np.concatenate([0.25 * turn * 2.0 / 2.0, np.ones((count, 1))], -1))

@@ -33,7 +33,7 @@ def run_samples(
     for k in range(samples.shape[1]):
         if k < external.shape[1]:
             ekf.external[i] = external[i, k]
-        estimator_step(ekf, i, samples[i, k])
+        estimator_step(ekf, i, samples[i, k], False)
         if k < trace.shape[1]:
             trace[i, k] = ekf.rows[i]
 
