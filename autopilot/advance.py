@@ -11,7 +11,7 @@ from autopilot.control.control import ControlState
 from autopilot.control.params import ControlParams
 from autopilot.estimator.ekf import estimator_step
 from autopilot.estimator.state import Ekf, EstimatorState
-from autopilot.ports import Samples, Setpoint
+from autopilot.ports import CONTACT_UNKNOWN, Samples, Setpoint
 
 wp.set_module_options({"enable_backward": False})
 
@@ -34,5 +34,5 @@ def estimate_samples(
     """Runs the estimator alone over recorded samples, one column per tick, and keeps its state after each tick."""
     i = wp.tid()
     for tick in range(tick_count):
-        estimator_step(ekf, i, samples[i, tick], False)
+        estimator_step(ekf, i, samples[i, tick], CONTACT_UNKNOWN)
         states[i, tick] = ekf.rows[i]

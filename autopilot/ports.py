@@ -19,6 +19,11 @@ SETPOINT_ATTITUDE = wp.constant(2)  # attitude (yaw by rate where yaw_rate is fi
 SETPOINT_RATE = wp.constant(3)  # body rates and collective thrust
 SETPOINT_LEAN = wp.constant(4)  # roll and pitch as an attitude; yaw rate, height or climb rate by the trajectory
 
+# What the commander says of the vehicle
+CONTACT_UNKNOWN = wp.constant(0)  # nobody says, as in a replay
+CONTACT_GROUND = wp.constant(1)
+CONTACT_NONE = wp.constant(2)  # in the air, or driving
+
 # Estimate.flags
 TILT_ALIGNED = wp.constant(1)
 YAW_ALIGNED = wp.constant(2)
@@ -142,6 +147,16 @@ class Setpoint:
     omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE
     thrust: float  # [0..1] collective, share of the maximum thrust
     motor_test: vec8  # [0..1] commands of the rotors while the vehicle is disarmed, not otherwise
+
+
+@wp.func
+def contact(setpoint: Setpoint) -> int:
+    """CONTACT_* by a setpoint; a vehicle that was disarmed in the air may be anywhere."""
+    if setpoint.is_landed == 1:
+        return CONTACT_GROUND
+    if setpoint.is_armed == 1:
+        return CONTACT_NONE
+    return CONTACT_UNKNOWN
 
 
 @wp.struct

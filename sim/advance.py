@@ -21,6 +21,7 @@ from autopilot.ports import (
     BatterySample,
     Estimate,
     Setpoint,
+    contact,
 )
 from common.kernels import GRAVITY_M_S2, TICK_S, TICK_US
 from sim.bodies.multirotor import BodyState, MultirotorModel, body_at_rest, body_tick
@@ -117,7 +118,6 @@ def make_advance(has_estimator: bool) -> Any:
         params = rig.autopilot.control_params[i]
         airframe = rig.autopilot.airframe[i]
         setpoint = rig.autopilot.setpoint[i]
-        is_in_air = setpoint.is_armed == 1 and setpoint.is_landed == 0
         body = rig.body[i]
         wind = rig.wind[i]
         sensors = rig.sensors[i]
@@ -130,7 +130,7 @@ def make_advance(has_estimator: bool) -> Any:
             body = body_tick(model, body, command, wind.wind_ned, world)
             if wp.static(has_estimator):
                 sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, world, seed, i, tick)
-                estimator_step(rig.autopilot.ekf, i, sensors.samples, is_in_air)
+                estimator_step(rig.autopilot.ekf, i, sensors.samples, contact(setpoint))
                 estimate = rig.autopilot.ekf.rows[i].estimate
             else:
                 sensors.samples.battery = true_battery(body, tick)

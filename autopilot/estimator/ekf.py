@@ -282,14 +282,14 @@ def align(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample, samples: Sa
 
 
 @wp.func
-def estimator_step(ekf: Ekf, i: int, samples: Samples, is_in_air: bool) -> None:
+def estimator_step(ekf: Ekf, i: int, samples: Samples, contact: int) -> None:
     """One tick of vehicle i, on its row in place: nothing happens without a new IMU sample.
 
     Args:
         ekf: of all vehicles.
         i: the vehicle.
         samples: the newest of each sensor.
-        is_in_air: the commander says so; False where nobody knows, as in a replay.
+        contact: CONTACT_*: what the commander says.
     """
     if samples.imu.time_us == ekf.rows[i].time_us:
         return
@@ -302,7 +302,7 @@ def estimator_step(ekf: Ekf, i: int, samples: Samples, is_in_air: bool) -> None:
     ekf.rows[i].imu_tail = wp.max(ekf.rows[i].imu_tail, ekf.rows[i].imu_head - IMU_RING)
     ekf.rows[i].time_us = imu.time_us
     clean.imu = imu
-    observe_stillness(ekf, i, params, clean, is_in_air)
+    observe_stillness(ekf, i, params, clean, contact)
     receive_samples(ekf, i, clean)
     if ekf.external[i].time_us != ekf.rows[i].external_inbox.arrived_time_us:
         receive_external(ekf, i)

@@ -129,8 +129,9 @@ class Stillness:
     gnss_vel_ned: wp.vec3  # [m/s] low-passed
     baro_height: float  # [m] tracked
     baro_climb: float  # [m/s]
+    contact: int  # CONTACT_*: what the commander says
     calm_s: float  # for how long nothing has spoken of motion
-    has_moved: int  # since power-on
+    has_moved: int  # since power-on, or since the commander said that the vehicle has landed
     is_still: int  # at rest: velocity is zero
 
 

@@ -5,7 +5,8 @@ Holds tilt and biases together from alignment until GNSS takes over, and again a
 A smooth drive, climb or hover looks to an IMU like rest: only the change from one to the other shows. So rest ends with
 any sign of motion: vibration, a turn, velocity gained by the accelerometer, GNSS velocity, barometer climb, the
 estimate itself; and never is while the commander says that the vehicle is in the air. It comes back when all of them,
-filtered, have been quiet for seconds. GNSS alone would not do: a threshold above its noise lets a slow climb pass.
+filtered, have been quiet for seconds, or at once with a landing that the commander tells of. GNSS alone would not do: a
+threshold above its noise lets a slow climb pass.
 """
 
 import warp as wp
@@ -14,7 +15,7 @@ from autopilot.estimator.fuse import fuse_state, judge, mark_fused, seconds_sinc
 from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.sources.baro import baro_height
 from autopilot.estimator.state import PHASE_RUNNING, VEL, Aid, Ekf, Nominal, Stillness
-from autopilot.ports import BaroSample, GnssSample, ImuSample, Samples
+from autopilot.ports import CONTACT_GROUND, CONTACT_NONE, BaroSample, GnssSample, ImuSample, Samples
 from common.kernels import GRAVITY_M_S2, vec24
 
 wp.set_module_options({"enable_backward": False})
@@ -23,6 +24,7 @@ _STD = wp.constant(0.1)  # [m/s]
 # What is fused 25 times a second has an error that does not change: a creep below the limits that follow. So velocity
 # is never taken for better known than that.
 _CREEP_STD = wp.constant(0.05)  # [m/s]
+_LANDED_CREEP_STD = wp.constant(0.02)  # [m/s] where the commander says that it stands
 _STIRRED_STD = wp.constant(0.1)  # [m/s] what velocity may have become when a sign of motion is seen
 _GATE_SIGMA = wp.constant(5.0)
 _PERIOD_S = wp.constant(0.0399)
@@ -133,9 +135,14 @@ def shows_motion(still: Stillness, vel_ned: wp.vec3) -> bool:
 
 
 @wp.func
-def conclude(still: Stillness, vel_ned: wp.vec3, is_in_air: bool, dt_s: float) -> Stillness:
+def conclude(still: Stillness, vel_ned: wp.vec3, contact: int, dt_s: float) -> Stillness:
     """Whether the vehicle is at rest."""
-    if is_in_air or shows_motion(still, vel_ned):
+    if contact == CONTACT_GROUND and still.contact != CONTACT_GROUND:
+        still.has_moved = 0
+        still.gnss_vel_ned = wp.vec3()
+        still.baro_climb = 0.0
+    still.contact = contact
+    if contact == CONTACT_NONE or shows_motion(still, vel_ned):
         still.has_moved = 1
         still.calm_s = 0.0
     elif still.still_s == 0.0:
@@ -161,7 +168,7 @@ def stir(cov: wp.array2d(dtype=vec24), i: int) -> None:
 
 
 @wp.func
-def observe_stillness(ekf: Ekf, i: int, params: EstimatorParams, samples: Samples, is_in_air: bool) -> None:
+def observe_stillness(ekf: Ekf, i: int, params: EstimatorParams, samples: Samples, contact: int) -> None:
     """Takes what is new in the samples, before the inboxes have seen them."""
     still = observe_imu(ekf.rows[i].stillness, samples.imu)
     if ekf.rows[i].phase == PHASE_RUNNING:
@@ -173,7 +180,7 @@ def observe_stillness(ekf: Ekf, i: int, params: EstimatorParams, samples: Sample
         step_s = seconds_since(samples.baro.time_us, ekf.rows[i].baro_inbox.arrived_time_us)
         still = observe_baro(still, samples.baro, step_s)
     was_still = still.is_still
-    still = conclude(still, ekf.rows[i].nominal.vel_ned, is_in_air, samples.imu.dt_s)
+    still = conclude(still, ekf.rows[i].nominal.vel_ned, contact, samples.imu.dt_s)
     if was_still == 1 and still.calm_s == 0.0:
         stir(ekf.covariance, i)
     ekf.rows[i].stillness = still
@@ -181,9 +188,15 @@ def observe_stillness(ekf: Ekf, i: int, params: EstimatorParams, samples: Sample
 
 @wp.func
 def fuse_rest(
-    params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, nominal: Nominal, aid: Aid, time_us: wp.int64
+    params: EstimatorParams,
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    nominal: Nominal,
+    aid: Aid,
+    time_us: wp.int64,
+    creep_std: float,
 ) -> tuple[Nominal, Aid]:
-    """Zero velocity in three axes."""
+    """Zero velocity in three axes, which stays uncertain by a creep."""
     var = _STD * _STD
     innov = -nominal.vel_ned
     innov_var = wp.vec3(cov[i, VEL][VEL] + var, cov[i, VEL + 1][VEL + 1] + var, cov[i, VEL + 2][VEL + 2] + var)
@@ -191,7 +204,7 @@ def fuse_rest(
     aid.is_active = 1
     if aid.test_ratio <= 1.0:
         for axis in range(3):
-            if cov[i, VEL + axis][VEL + axis] > _CREEP_STD * _CREEP_STD:
+            if cov[i, VEL + axis][VEL + axis] > creep_std * creep_std:
                 nominal = fuse_state(params, cov, i, nominal, VEL + axis, -nominal.vel_ned[axis], var)
         aid = mark_fused(aid)
     return nominal, aid
@@ -201,6 +214,9 @@ def fuse_rest(
 def take_rest(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
     """Fuses zero velocity, 25 times a second."""
     if seconds_since(now_us, ekf.rows[i].rest.judged_time_us) > _PERIOD_S:
-        nominal, aid = fuse_rest(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].rest, now_us)
+        creep_std = _CREEP_STD
+        if ekf.rows[i].stillness.contact == CONTACT_GROUND:
+            creep_std = _LANDED_CREEP_STD
+        nominal, aid = fuse_rest(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].rest, now_us, creep_std)
         ekf.rows[i].nominal = nominal
         ekf.rows[i].rest = aid

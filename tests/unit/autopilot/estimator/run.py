@@ -9,7 +9,7 @@ import warp as wp
 from autopilot.estimator.ekf import Ekf, estimator_reset, estimator_step, make_ekf
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS, estimator_params
 from autopilot.estimator.state import EstimatorState
-from autopilot.ports import ExternalSample, Samples
+from autopilot.ports import CONTACT_UNKNOWN, ExternalSample, Samples
 from common.params import ParameterTable
 from tests.unit.autopilot.estimator.flights import (
     FIELD_NED_GAUSS,
@@ -33,7 +33,7 @@ def run_samples(
     for k in range(samples.shape[1]):
         if k < external.shape[1]:
             ekf.external[i] = external[i, k]
-        estimator_step(ekf, i, samples[i, k], False)
+        estimator_step(ekf, i, samples[i, k], CONTACT_UNKNOWN)
         if k < trace.shape[1]:
             trace[i, k] = ekf.rows[i]
 

@@ -10,6 +10,7 @@ import warp as wp
 
 from autopilot.estimator.sources.rest import conclude
 from autopilot.estimator.state import Stillness
+from autopilot.ports import CONTACT_GROUND, CONTACT_NONE, CONTACT_UNKNOWN
 from tests.unit.autopilot.estimator.flights import (
     Array,
     Flight,
@@ -131,10 +132,23 @@ def test_drive_without_gnss_is_not_taken_for_rest() -> None:
     assert not trace["stillness"]["is_still"][int((DEPARTURE_S + 2.0) * TICKS) :].any()
 
 
+def concluded(still: Stillness, contact: int, seconds: float) -> Stillness:
+    for _ in range(int(seconds * TICKS)):
+        still = conclude(still, wp.vec3(), contact, 0.004)
+    return still
+
+
 def test_vehicle_in_the_air_by_its_commander_is_never_at_rest() -> None:
     still = Stillness()
     still.still_s = 60.0
-    for is_in_air, expected in ((False, 1), (True, 0)):
-        for _ in range(2 * TICKS):
-            still = conclude(still, wp.vec3(), is_in_air, 0.004)
-        assert still.is_still == expected
+    assert concluded(still, CONTACT_UNKNOWN, 5.0).is_still == 1
+    assert concluded(still, CONTACT_NONE, 5.0).is_still == 0
+
+
+def test_landed_vehicle_is_at_rest_at_once_by_its_commander_and_later_by_itself() -> None:
+    still = Stillness()
+    still.still_s = 60.0
+    flown = concluded(still, CONTACT_NONE, 5.0)
+    assert concluded(flown, CONTACT_UNKNOWN, 2.0).is_still == 0
+    assert concluded(flown, CONTACT_UNKNOWN, 5.0).is_still == 1
+    assert concluded(flown, CONTACT_GROUND, 1.0).is_still == 1
