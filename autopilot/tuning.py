@@ -268,7 +268,10 @@ def main(
     rows = all_margins(frame)
     console.print(_margin_table(frame, rows))
     console.print(_gain_table(frame, design(frame)))
-    console.print(f"Required: {PHASE_REQUIRED_DEG:.0f} deg and {GAIN_REQUIRED_DB:.0f} dB.")
+    console.print(
+        f"Enough is a gain margin of {GAIN_REQUIRED_DB:.0f} dB and a phase margin of {PHASE_REQUIRED_DEG:.0f} deg; "
+        "nothing is required of the disk margins."
+    )
     if not all(row.is_sufficient for row in rows):
         raise typer.Exit(1)
 

@@ -3,6 +3,7 @@
 A wrong argument, file or port gives one sentence on standard error and exit code 2; a mission that failed gives 1.
 """
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +16,6 @@ from mission import follow_commands, task_commands, training_commands, view_comm
 from mission.refusal import refuse
 
 app = typer.Typer(
-    add_completion=False,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -29,8 +29,18 @@ def main() -> None:
     app()
 
 
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
+        typer.echo(f"honeyguide {version('honeyguide')}")
+        raise typer.Exit
+
+
 @app.callback()
-def _root() -> None:
+def _root(
+    _: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
     """Fly a simulated drone and its flight controller over MAVLink."""
 
 

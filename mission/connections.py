@@ -122,6 +122,8 @@ def open_page(port: int) -> "PageServer":
 
         return PageServer(port, "Honeyguide")
     except ImportError as error:
-        raise UserError(f"--view: {error.name} is missing: pip install 'honeyguide[viewer]'") from error
+        raise UserError(
+            f"--view: {error.name} is missing; it comes with the extra 'viewer' (docs/flying.md, Installing)"
+        ) from error
     except OSError as error:
         raise UserError(f"--view-port {port}: {error.strerror}") from error

@@ -55,6 +55,12 @@ def follow(
     noise: Annotated[float, typer.Option(min=0.0, max=10.0, help="Scale of all sensor noise.")] = 1.0,
     world_seed: Annotated[int, typer.Option(min=0, help="Seed of hills and trees.")] = 1,
     trees: Annotated[float, typer.Option(min=0.0, max=1000.0, help="Trees per hectare.")] = 100.0,
+    hills: Annotated[float, typer.Option(min=0.0, max=300.0, help="Height of the hills [m]; trained on 8.")] = 8.0,
+    airframe: Annotated[str, typer.Option(help="Airframe name or TOML file; the policy was trained on x500.")] = "x500",
+    dialect: Annotated[str, typer.Option(help="What ground stations take it for: px4 or ardupilot.")] = "px4",
+    param: Annotated[
+        list[str] | None, typer.Option(help="Sets a parameter of the flight controller: NAME=VALUE. Repeatable.")
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Show the flight on a live page in the browser.")] = False,
     view_port: Annotated[int, typer.Option(min=1, max=65535, help="HTTP port of the live page.")] = 8080,
     mp4: Annotated[bool, typer.Option("--mp4/--no-mp4", help="Film it afterwards: chase and onboard view.")] = True,
@@ -72,10 +78,10 @@ def follow(
             refuse(f"--owner {owner}: must be walk or run")
         flight = FlightOptions(
             plan=None, is_idle=True, once=False, speed=speed, seconds=None, seed=seed, wind_m_s=wind,
-            wind_from_deg=wind_from, noise=noise, airframe="x500", home=None, world_seed=world_seed,
-            trees_per_ha=trees, hill_height_m=0.0, has_walls=True, host=host, bind="", tcp_port=None,
+            wind_from_deg=wind_from, noise=noise, airframe=airframe, home=None, world_seed=world_seed,
+            trees_per_ha=trees, hill_height_m=hills, has_walls=True, host=host, bind="", tcp_port=None,
             has_to_sign=False, gcs_port=gcs_port, api_port=api_port, run_folder=run_folder, has_view=view,
-            view_port=view_port,
+            view_port=view_port, dialect=dialect, parameters=tuple(param or ()),
         )  # fmt: skip
         options = FollowOptions(flight, "run" if owner == "run" else "walk", policy, seconds, mp4)
         try:

@@ -31,6 +31,8 @@ class Window:
         Raises:
             WindowError: no display.
         """
+        if not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")):
+            raise WindowError("there is no display to open a window on")  # SDL would print a line of its own first
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         import pygame
 

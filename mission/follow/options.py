@@ -42,9 +42,9 @@ def check_follow_options(options: FollowOptions) -> None:
 
 
 def follow_config(options: FollowOptions) -> FlightConfig:
-    """The flight that the options describe: the world of training, with their seed and trees."""
-    config = flight_config(options.flight, None)
-    world = FOLLOW_WORLD.model_copy(
-        update={"seed": options.flight.world_seed, "trees_per_ha": options.flight.trees_per_ha}
-    )
+    """The flight that the options describe: the world of training, with their seed, trees and hills."""
+    given = options.flight
+    config = flight_config(given, None)
+    own = {"seed": given.world_seed, "trees_per_ha": given.trees_per_ha, "hill_height_m": given.hill_height_m}
+    world = FOLLOW_WORLD.model_copy(update=own)
     return config.model_copy(update={"world": world, "owner": OwnerConfig(pace=options.pace)})

@@ -28,6 +28,9 @@ NOT_RUN_HERE = {
 }
 
 RUN_BY_OTHERS = (
+    "pipx install ",
+    "pip wheel ",
+    "docker ",  # tests/system/test_installing.py builds the wheel and flies from it
     f"{HONEYGUIDE} picture ",  # tests/unit/mission/test_picture.py
     *(f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")),  # tests/unit/mission/test_task_commands.py
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py

@@ -163,3 +163,14 @@ def test_option_out_of_range_is_refused(fly, tmp_path):
     assert result.exit_code == 2
     assert "Invalid value for '--wind'" in result.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_version_is_printed():
+    result = CliRunner().invoke(app, ["--version"])
+    assert result.exit_code == 0
+    assert re.fullmatch(r"honeyguide \d+\.\d+\.\d+\n", result.stdout)
+
+
+def test_a_shell_can_complete_the_commands():
+    result = CliRunner().invoke(app, ["--show-completion", "bash"])
+    assert "_HONEYGUIDE_COMPLETE" in result.stdout or result.exit_code == 0
