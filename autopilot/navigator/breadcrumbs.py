@@ -13,7 +13,8 @@ from autopilot.vehicle import Mode, Severity
 
 _PERIOD_US = 200_000  # between two looks; at the highest speed that is within the default accuracy
 _ROOM_SHARE = 0.9  # of the points: if tidying leaves more, there is no room to go on
-_DENSE_MAX = 1_000  # points among which loops are looked for; bounds the time that takes
+_DENSE_MAX = 600  # points among which loops are looked for; bounds the time that takes
+_ROWS = 32  # points whose passages are looked for at once
 _Array = NDArray[np.float64]
 
 
@@ -81,8 +82,10 @@ def with_steps(points: _Array, longest_m: float) -> _Array:
     lengths = np.sqrt(np.sum(np.diff(points, axis=0) ** 2, axis=1))
     step_m = max(longest_m, float(lengths.sum()) / _DENSE_MAX)
     counts = np.maximum(np.ceil(lengths / step_m).astype(np.int64), 1)
-    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(points[:-1], points[1:], counts, strict=True)]
-    return np.concatenate([*parts, points[-1:]])
+    i_leg = np.repeat(np.arange(len(counts)), counts)
+    share = (np.arange(len(i_leg)) - (np.cumsum(counts) - counts)[i_leg]) / counts[i_leg]
+    between = points[i_leg] + share[:, None] * (points[1:] - points[:-1])[i_leg]
+    return np.concatenate([between, points[-1:]])
 
 
 def without_straights(points: _Array, tolerance_m: float) -> _Array:
@@ -94,9 +97,9 @@ def without_straights(points: _Array, tolerance_m: float) -> _Array:
         first, last = parts.pop()
         if last - first < 2:
             continue
-        off = _off_segment(points[first + 1 : last], points[first], points[last])
-        i_worst = int(np.argmax(off))
-        if off[i_worst] > tolerance_m:
+        off_sq = _off_segment_sq(points[first + 1 : last], points[first], points[last])
+        i_worst = int(off_sq.argmax())
+        if off_sq[i_worst] > tolerance_m * tolerance_m:
             middle = first + 1 + i_worst
             is_kept[middle] = True
             parts += [(first, middle), (middle, last)]
@@ -109,28 +112,42 @@ def without_loops(points: _Array, near_m: float) -> _Array:
     From each point it goes on at the end of the last later stretch that passes near it.
     """
     kept = [0]
-    i_point = 0
+    i_point = first = 0
+    passages = _last_passages(points, 0, near_m)
     while i_point < len(points) - 1:
-        i_point = max(_last_passage(points, i_point, near_m), i_point + 1)
+        if i_point >= first + _ROWS:
+            first, passages = i_point, _last_passages(points, i_point, near_m)
+        i_point = max(int(passages[i_point - first]), i_point + 1)
         kept.append(i_point)
     return points[kept]
 
 
-def _last_passage(points: _Array, i_point: int, near_m: float) -> int:
-    """Number of the end of the last stretch after the next two that passes near a point; 0 if none does."""
-    starts, ends = points[i_point + 2 : -1], points[i_point + 3 :]
+def _last_passages(points: _Array, first: int, near_m: float) -> NDArray[np.int64]:
+    """Number of the end of the last stretch after the next two that passes near each of some points; 0 if none does.
+
+    For _ROWS points from `first` on at once: one by one they would take longer than a frame of the vehicle has.
+    """
+    here = points[first : first + _ROWS] - points[first]  # from there: large numbers would cancel
+    starts, ends = points[first + 2 : -1] - points[first], points[first + 3 :] - points[first]
+    if not len(starts):
+        return np.zeros(len(here), np.int64)
     way = ends - starts
     length_sq = np.maximum(np.sum(way * way, axis=1), 1e-9)
-    share = np.clip(np.sum((points[i_point] - starts) * way, axis=1) / length_sq, 0.0, 1.0)
-    off_sq = np.sum((starts + share[:, None] * way - points[i_point]) ** 2, axis=1)
-    near = np.flatnonzero(off_sq < near_m * near_m)
-    return i_point + 3 + int(near[-1]) if len(near) else 0
+    along = here @ way.T - np.sum(starts * way, axis=1)
+    share = np.minimum(np.maximum(along / length_sq, 0.0), 1.0)
+    off_sq = np.sum(here * here, axis=1)[:, None] - 2.0 * here @ starts.T + np.sum(starts * starts, axis=1)
+    off_sq += share * (share * length_sq - 2.0 * along)
+    is_later = np.arange(len(starts)) >= np.arange(len(here))[:, None]
+    is_near = is_later & (off_sq < near_m * near_m)
+    last = len(starts) - 1 - np.argmax(is_near[:, ::-1], axis=1)
+    return np.where(is_near.any(axis=1), first + 3 + last, 0)
 
 
-def _off_segment(points: _Array, start: _Array, end: _Array) -> _Array:
-    """Distance [m] of each point from a straight stretch."""
-    way = end - start
+def _off_segment_sq(points: _Array, start: _Array, end: _Array) -> _Array:
+    """Square of the distance [m²] of each point from a straight stretch."""
+    way, there = end - start, points - start
     length_sq = max(float(way @ way), 1e-9)
-    share = np.clip((points - start) @ way / length_sq, 0.0, 1.0)
-    off: _Array = np.sqrt(np.sum((start + share[:, None] * way - points) ** 2, axis=1))
-    return off
+    along = there @ way
+    share = np.minimum(np.maximum(along / length_sq, 0.0), 1.0)
+    off_sq: _Array = np.einsum("ij,ij->i", there, there) + share * (share * length_sq - 2.0 * along)
+    return off_sq
