@@ -16,7 +16,7 @@ import pexpect
 from common.clock import wall_time_s
 
 ROOT = Path(__file__).parents[2]
-MODULES = "log,wp,rally,fence,param,arm,mode,cmdlong,misc,signing,ftp,output,link"
+MODULES = "log,wp,rally,fence,param,arm,mode,rc,cmdlong,misc,signing,ftp,output,link"
 SPEED = 4.0  # times real time; MAVProxy's timers run on the wall clock
 STOP_TIMEOUT_S = 30.0
 START_TIMEOUT_S = 120.0  # with a cold cache the kernels are compiled first
@@ -77,7 +77,7 @@ class Console:
             timeout=30,
             cwd=str(folder),
         )
-        self.child.logfile_read = (folder / "mavproxy.txt").open("w")
+        self.child.logfile_read = (folder / "mavproxy.txt").open("w", buffering=1)
 
     def _wait_for_vehicle(self, output):
         """MAVProxy asks too early, and for system 0, if the vehicle comes up after it."""
@@ -103,6 +103,10 @@ class Console:
             raise
         finally:
             self._output.close()
+
+    def heard(self):
+        """All that MAVProxy has printed so far."""
+        return (self.folder / "mavproxy.txt").read_text()
 
     def expect(self, pattern, timeout_s=30.0):
         """Waits for a text; returns what matched."""
