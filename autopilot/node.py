@@ -5,6 +5,7 @@ Out: the setpoint row; telemetry through the attached servers. Time is the simul
 """
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -220,17 +221,26 @@ class FlightController:
             server.frame(time_us)
         if self.external.waiting:
             self.external.write()
+        self.state.ticks.clear()
+
+    def note_tick(self, time_us: int) -> None:
+        """Keeps what the kernels have made of a tick between two frames, to be told in the next."""
+        tick = copy(self.state)
+        self._read_motion(tick, time_us)
+        self.state.ticks.append(tick)
 
     def _read(self, time_us: int) -> None:
         """Renews the vehicle state from the kernel rows."""
-        state = self.state
+        self._read_motion(self.state, time_us)
+        if time_us >= self._next_health_us:
+            self._next_health_us = time_us + _HEALTH_PERIOD_US
+            self.state.health = self._read_health()
+
+    def _read_motion(self, state: VehicleState, time_us: int) -> None:
         state.time_us = time_us
         estimate = state.estimate = self._read_estimate()
         state.samples = self._read_samples()
         state.actuators = self._read_actuators()
-        if time_us >= self._next_health_us:
-            self._next_health_us = time_us + _HEALTH_PERIOD_US
-            state.health = self._read_health()
         state.roll_rad, state.pitch_rad, state.yaw_rad = roll_pitch_yaw_of(estimate.q_ned_from_frd)
 
     def _follow_wish(self, mode: Mode) -> None:

@@ -193,6 +193,9 @@ class VehicleState:
     gimbal: "GimbalControl | None" = None  # None: the vehicle carries none
     sticks: StickInput = field(default_factory=StickInput)
     fence: FenceState = field(default_factory=FenceState)
+    ticks: "list[VehicleState]" = field(
+        default_factory=list
+    )  # the moments since the last frame, while somebody listens
     _placed: Any = None  # the estimate that `_place` belongs to
     _place: GeoPoint | None = None
 

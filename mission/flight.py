@@ -24,7 +24,7 @@ from autopilot.vehicle import Mode, Severity
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder
-from common.kernels import FRAME_TICKS, FRAME_US
+from common.kernels import FRAME_TICKS, FRAME_US, TICK_US
 from common.records import row_reader
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
@@ -211,7 +211,10 @@ class Flight:
     def frame(self) -> None:
         """Advances by 20 ms."""
         self.injector.frame(self.time_us)
-        self.rig.advance(FRAME_TICKS)
+        if any(server.needs_ticks for server in self._servers):
+            self._advance_by_ticks()
+        else:
+            self.rig.advance(FRAME_TICKS)
         self.time_us += FRAME_US
         self._surroundings.frame(self.time_us)
         if self.owner is not None:
@@ -232,6 +235,13 @@ class Flight:
             self.persistence.frame(self.time_us)
         if isnan(self.ready_s) and self.controller.state.is_ready_to_arm:
             self.ready_s = self.time_us * 1e-6
+
+    def _advance_by_ticks(self) -> None:
+        """The same frame in single ticks, each of which is shown to the flight controller's servers."""
+        for tick in range(1, FRAME_TICKS):
+            self.rig.advance(1)
+            self.controller.note_tick(self.time_us + tick * TICK_US)
+        self.rig.advance(1)
 
     def run(
         self,

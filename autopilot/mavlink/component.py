@@ -166,7 +166,7 @@ class Component:
         """Sends a message of this component at an interval to the channel that asks.
 
         Params: p1 message id; p2 interval [us], 0 default, -1 never.
-        Refused: UNSUPPORTED: the component has no such message; DENIED: the interval is not a number.
+        Refused: UNSUPPORTED: the component has no such message; DENIED: the interval is not a number or below 20 ms.
         """
         msg_id = whole(command.p1, -1)
         if msg_id not in self._payloads:
@@ -174,6 +174,8 @@ class Component:
         if not isfinite(command.p2):
             return denied("the interval is not a number")
         interval_us = bounded_int(command.p2, -1, INT32_MAX)
+        if 0 < interval_us < FRAME_US:
+            return denied("at most 50 Hz")
         self.set_interval(command.sender.channel, msg_id, interval_us or self.default_interval_us(msg_id))
         return ACCEPTED
 

@@ -63,8 +63,9 @@ class MessageRequests(Service):
     def _set_message_interval(self, command: Command) -> Reply:
         """Sets how often a message is sent on this link.
 
-        Params: p1 message id; p2 interval [us], at least 20 ms; 0: the default, -1: never.
-        Refused: UNSUPPORTED for a message that is not sent; DENIED for the heartbeat.
+        Params: p1 message id; p2 interval [us], 0: the default, -1: never. At least 20 ms; 4 ms for attitude, position,
+        IMU and motors.
+        Refused: UNSUPPORTED for a message that is not sent; DENIED for the heartbeat, and for a shorter interval.
         """
         msg_id = whole(command.p1, -1)
         if msg_id not in self._endpoint.telemetry.builders:
@@ -74,7 +75,11 @@ class MessageRequests(Service):
         if msg_id == _HEARTBEAT_ID and command.p2 != 0.0:
             return denied("the heartbeat is fixed")
         interval_us = bounded_int(command.p2, -1, INT32_MAX)
-        command.sender.channel.schedule.set_interval(msg_id, interval_us)
+        schedule = command.sender.channel.schedule
+        refusal = schedule.refusal(msg_id, interval_us)
+        if refusal:
+            return denied(refusal)
+        schedule.set_interval(msg_id, interval_us)
         return ACCEPTED
 
     def _get_message_interval(self, command: Command) -> Reply | None:

@@ -233,6 +233,11 @@ class MavlinkServer:
             "REQUEST_DATA_STREAM": self._data_stream_requested,
         }
 
+    @property
+    def needs_ticks(self) -> bool:
+        """Whether a client gets messages more often than once per frame."""
+        return any(channel.schedule.needs_ticks for channel in self._endpoint.channels)
+
     def frame(self, time_us: int) -> None:
         """Receives, answers, and sends what is due.
 

@@ -16,13 +16,20 @@ from autopilot.mavlink.identity import autopilot_version
 from autopilot.mavlink.links import LinkRole
 from autopilot.mavlink.telemetry import ardupilot, board, gimbal, guidance, motion, radio, sensors, status, truth
 from autopilot.vehicle import VehicleState
-from common.kernels import FRAME_US
+from common.kernels import FRAME_US, TICK_US
 
 Builder = Callable[[VehicleState], bytes | None]
 Send = Callable[[MessageType, bytes], object]
 
 SPREAD = 8  # streams start at different eighths of their interval, so that no frame has to send them all
 NEVER_US = 1 << 62
+# What the kernels renew at each tick: these may be sent so often, everything else once per frame.
+_RENEWED_EACH_TICK = frozenset(
+    {
+        *("ATTITUDE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "ODOMETRY", "HIGHRES_IMU"),
+        *("SCALED_IMU", "SCALED_IMU2", "RAW_IMU", "ATTITUDE_TARGET", "ACTUATOR_OUTPUT_STATUS"),
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +200,10 @@ class Telemetry:
         names = self.groups.values() if group == GROUP_ALL else (self.groups.get(group, ()),)
         return [known_type(name).msg_id for of_group in names for name in of_group]
 
+    def least_interval_us(self, msg_id: int) -> int:
+        """How often a message can be sent."""
+        return TICK_US if self.types[msg_id].name in _RENEWED_EACH_TICK else FRAME_US
+
     def set_group_default(self, group: int, rate_hz: float) -> None:
         """Links that come from now on get a group at this rate; negative: each message at its own."""
         for role, intervals in self.default_interval_us.items():
@@ -215,13 +226,25 @@ class StreamSchedule:
         self.interval_us = dict(self._defaults)  # by message id; 0: not sent
         self._queue: list[tuple[int, int]] = []  # (due time, message id), a heap
         self._is_planned = False
+        self._needs_ticks = False
+
+    @property
+    def needs_ticks(self) -> bool:
+        """Whether a message is sent more often than once per frame."""
+        return self._needs_ticks
+
+    def refusal(self, msg_id: int, interval_us: int) -> str:
+        """Why a message cannot be sent at an interval; empty if it can."""
+        least_us = self._telemetry.least_interval_us(msg_id)
+        return f"at most {1_000_000 // least_us} Hz" if 0 < interval_us < least_us else ""
 
     def set_interval(self, msg_id: int, interval_us: int) -> None:
-        """Sends a message every `interval_us`, but at most once per frame; 0: default interval; negative: never."""
+        """Sends a message every `interval_us`, at most as often as it can be; 0: default interval; negative: never."""
         if interval_us == 0:
             self._change(msg_id, self._defaults[msg_id])
         else:
-            self._change(msg_id, max(interval_us, FRAME_US) if interval_us > 0 else 0)
+            least_us = self._telemetry.least_interval_us(msg_id)
+            self._change(msg_id, max(interval_us, least_us) if interval_us > 0 else 0)
 
     def set_default(self, msg_id: int, interval_us: int) -> None:
         """Makes an interval the default on this link, and sends the message so."""
@@ -251,6 +274,7 @@ class StreamSchedule:
         if interval_us == self.interval_us[msg_id]:
             return
         self.interval_us[msg_id] = interval_us
+        self._needs_ticks = any(0 < each < FRAME_US for each in self.interval_us.values())
         if self._is_planned:
             self._queue = [entry for entry in self._queue if entry[1] != msg_id]
             if interval_us:
@@ -268,7 +292,13 @@ class StreamSchedule:
         self._is_planned = True
 
     def send_due(self, now_us: int, state: VehicleState, send: Send) -> None:
-        """Sends what is due now."""
+        """Sends what is due now; where messages come more often than frames, first what was due since the last one."""
+        if self._needs_ticks:
+            for moment in state.ticks:
+                self._send_due(moment.time_us, moment, send)
+        self._send_due(now_us, state, send)
+
+    def _send_due(self, now_us: int, state: VehicleState, send: Send) -> None:
         if not self._is_planned:
             self._plan(now_us)
         queue = self._queue
