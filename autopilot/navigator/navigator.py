@@ -27,6 +27,8 @@ from autopilot.ports import TERRAIN_VALID
 from autopilot.requests import OffboardSetpoint
 from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
+_GOING = frozenset({Mode.TAKEOFF, Mode.HOLD, Mode.ORBIT, Mode.FOLLOW, Mode.MISSION})  # in which a take-off is finished
+_WAITS_US = 2_000_000  # a take-off that is interrupted on the ground, for a place to go to; guess
 _SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
 
 
@@ -53,9 +55,11 @@ class Navigator:
     __slots__ = (
         "_active",
         "_climb",
+        "_is_rising",
         "_mission_checked",
         "_mission_problem",
         "_modes",
+        "_takeoff_us",
         "ask",
         "context",
         "crumbs",
@@ -112,6 +116,8 @@ class Navigator:
         }
         self._active: FlightMode = self._modes[Mode.HOLD]
         self._climb: Climb | None = None  # of a take-off, which is finished before the active mode goes elsewhere
+        self._is_rising = False  # a take-off has begun, and the vehicle has not been high since
+        self._takeoff_us = 0  # when mode Takeoff was last flown
         self.ask = Ask.STAY  # of the setpoint flown
         self._mission_checked: object = None
         self._mission_problem = ""
@@ -168,7 +174,7 @@ class Navigator:
     @property
     def is_taking_off(self) -> bool:
         """Whether a take-off has been asked for and is not over, on the ground or above it."""
-        return self.context.state.is_armed and (self._active is self.takeoff or self._climb is not None)
+        return self.context.state.is_armed and (self._active is self.takeoff or self._is_rising)
 
     @property
     def is_going(self) -> bool:
@@ -203,11 +209,16 @@ class Navigator:
             self.orbit.leave()
         self._forget_requests(mode)
         is_low = self.is_taking_off and not is_high(self.context)
+        self._is_rising = is_low and mode in _GOING
+        was_climbing = self._active is self.takeoff or self._climb is not None
         self._active = self._modes[mode]
         self.context.heading.end_turn()
         self._climb = self.takeoff.climb if is_low and self._goes_away(mode) else None
-        if self.context.state.is_armed and self._climb is None:
-            self._active.start()
+        if self._climb is None:
+            if self.context.state.is_armed:
+                self._active.start()
+        elif not was_climbing:
+            self._climb.resume()
 
     def _goes_away(self, mode: Mode) -> bool:
         """Whether a mode just asked for leads elsewhere at once; a mission takes off by itself."""
@@ -247,6 +258,7 @@ class Navigator:
         self.crumbs.clear()
         self.context.heading.reset()
         self._climb = None
+        self._is_rising = False
         self._active.start()
 
     def frame(self) -> Mode | None:
@@ -259,6 +271,7 @@ class Navigator:
         wish: Mode | None = None
         if state.is_armed:
             self.crumbs.frame()
+            self._watch_takeoff()
             if self._climb is None or self._has_climbed(self._climb):
                 self._active.frame()
             if context.heading.is_active or context.yaw_mode:
@@ -276,11 +289,21 @@ class Navigator:
         setpoint.set_flags(is_armed=may_turn, is_landed=context.is_on_ground)
         return wish
 
+    def _watch_takeoff(self) -> None:
+        """A client may choose Hold before it says where to go (MAVSDK): on the ground the take-off waits a little."""
+        context = self.context
+        if self._active is self.takeoff:
+            self._is_rising, self._takeoff_us = True, context.state.time_us
+        elif self._is_rising and self._climb is None:
+            is_given_up = context.is_on_ground and context.state.time_us - self._takeoff_us > _WAITS_US
+            self._is_rising = not (is_given_up or is_high(context))
+
     def _has_climbed(self, climb: Climb) -> bool:
         """Goes on with the take-off; once that is high enough, the mode asked for meanwhile begins."""
         if not climb.frame() and not is_high(self.context):
             return False
         self._climb = None
+        self._is_rising = False
         self._active.start()
         return True
 

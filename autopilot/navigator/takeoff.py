@@ -30,6 +30,11 @@ class Climb:
         self._yaw = yaw
         self._is_climbing = False
 
+    def resume(self) -> None:
+        """Goes on with the climb after another mode has flown."""
+        if self._is_climbing:
+            self._fly()
+
     def frame(self) -> bool:
         """Climbs; true once the height is reached. A vehicle above it stays where it is."""
         context = self._context
@@ -41,11 +46,15 @@ class Climb:
             north, east, down = context.stop_point()
             self.target_ned = (north, east, min(self._target_d, down))
             self.yaw = self._yaw if isfinite(self._yaw) else context.state.yaw_rad
-            context.setpoint.fly_to(self.target_ned, self.yaw, climb_speed=context.number("MPC_TKO_SPEED"))
+            self._fly()
             return False
         estimate = context.state.estimate
         is_near: bool = abs(estimate.pos_ned[2] - self.target_ned[2]) < REACHED_M
         return is_near and abs(estimate.vel_ned[2]) < _SETTLED_M_S
+
+    def _fly(self) -> None:
+        context = self._context
+        context.setpoint.fly_to(self.target_ned, self.yaw, climb_speed=context.number("MPC_TKO_SPEED"))
 
 
 def is_high(context: NavContext) -> bool:

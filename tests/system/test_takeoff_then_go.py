@@ -75,6 +75,27 @@ def test_a_goto_on_take_off_is_taken_and_flown_once_the_vehicle_is_high(pause_s)
     assert vehicle.moved_m < 0.5
 
 
+@pytest.mark.parametrize("pause_s", [0.5, 0.96, 1.02, 1.5])
+def test_a_hold_before_the_goto_as_mavsdk_sends_it_changes_nothing(pause_s):
+    vehicle = TakingOff()
+    vehicle.rest(pause_s)
+    assert vehicle.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    vehicle.rest(0.1)
+    assert vehicle.fc.reposition(*vehicle.target(), nan, nan).verdict is Verdict.ACCEPTED
+    vehicle.run(lambda: hypot(*(vehicle.pos - (NORTH_M, 0.0, -HEIGHT_M))) < 1.5, 60.0)
+    assert vehicle.lean_deg < LEAN_MAX_DEG + 4.0  # it stops for a moment in between
+    assert vehicle.moved_m < 0.5
+
+
+def test_a_take_off_given_up_on_the_ground_is_not_flown_by_a_later_goto():
+    vehicle = TakingOff()
+    vehicle.rest(0.5)
+    assert vehicle.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    vehicle.rest(4.0)
+    reply = vehicle.fc.reposition(*vehicle.target(), nan, nan)
+    assert (reply.verdict, reply.reason) == (Verdict.TEMPORARILY_REJECTED, "not in the air")
+
+
 def test_a_guided_goto_on_take_off_does_too():
     vehicle = TakingOff(Mode.GUIDED, height_m=10.0)
     vehicle.rest(0.5)
