@@ -7,15 +7,14 @@ nor a symbolic link leads outside. What is stored is bounded in bytes and in num
 import errno
 import os
 import stat
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 QUOTA_BYTES = 64 << 20
 ENTRIES_MAX = 2000  # files and folders in all
 
 
-@dataclass(frozen=True, slots=True)
-class FolderEntry:
+class FolderEntry(NamedTuple):
     """A file or a folder."""
 
     name: str
@@ -57,25 +56,22 @@ class ConfinedFolder:
         except RuntimeError:  # a link to itself
             return False
 
-    def entries(self, name: str) -> list[FolderEntry]:
-        """What a folder holds, in the order of the names; without what leads outside."""
-        found: list[FolderEntry] = []
+    def names(self, name: str) -> list[str]:
+        """What a folder holds, sorted; without links that lead outside. Looks at no file, which is what takes time."""
         folder = self.path(name)
         if folder == self.root and not folder.exists():
-            return found
+            return []
         with os.scandir(folder) as entries:
-            for entry in entries:
-                self.looked_at += 1
-                if entry.is_symlink() and not self._is_inside(Path(entry.path)):
-                    continue
-                try:
-                    status = entry.stat()
-                except OSError:  # a link to nothing, or it has just gone
-                    continue
-                is_folder = stat.S_ISDIR(status.st_mode)
-                size = 0 if is_folder else status.st_size
-                found.append(FolderEntry(entry.name, is_folder, size, int(status.st_mtime)))
-        return sorted(found, key=lambda entry: entry.name)
+            found = [e.name for e in entries if not e.is_symlink() or self._is_inside(Path(e.path))]
+        self.looked_at += len(found) // 10
+        return sorted(found)
+
+    def entry(self, folder: str, name: str) -> FolderEntry:
+        """One of the names that a folder holds."""
+        self.looked_at += 1
+        status = self.path(f"{folder}/{name}").stat()
+        is_folder = stat.S_ISDIR(status.st_mode)
+        return FolderEntry(name, is_folder, 0 if is_folder else status.st_size, int(status.st_mtime))
 
     def size(self, name: str) -> int:
         """Bytes of a file that can be read."""

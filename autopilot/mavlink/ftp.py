@@ -9,7 +9,6 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import islice
 from struct import Struct
 from typing import Any
 
@@ -291,7 +290,8 @@ class FtpService(Service):
             listing = self._files.listing(request.name, with_times=opcode == Opcode.LIST_DIRECTORY_WITH_TIME)
             self._listings.keep(sender, opcode, request.data, now_us, listing)
         data = b""
-        for entry in islice(listing, request.offset, None):
+        for i in range(request.offset, len(listing)):
+            entry = listing[i]
             if len(data) + len(entry) > DATA_BYTES:
                 break
             data += entry

@@ -1,7 +1,8 @@
 """What the names of MAVLink FTP stand for: files of the host's folder, or files made on demand."""
 
+from collections.abc import Sequence
 from enum import IntEnum
-from typing import Protocol
+from typing import Any, Protocol
 from urllib.parse import parse_qs
 
 from autopilot.mavlink.channel import Endpoint
@@ -13,6 +14,7 @@ from common.folder import ConfinedFolder
 
 PARAM_FOLDER = "@PARAM"
 PARAM_FILE = "param.pck"
+SKIPPED = b"S\0"  # an entry of a listing that is none
 _ENTRY_WORK = 4  # [us] of a file that is looked at
 _PARAMETER_WORK = 10  # [us] of one in the parameter file
 
@@ -136,6 +138,25 @@ class _ParameterUpload:
         """A file that is not complete sets nothing."""
 
 
+class _Listing(Sequence[bytes]):
+    """The entries of a folder of the host's; a file is looked at when its entry is sent."""
+
+    def __init__(self, folder: ConfinedFolder, name: str, *, with_times: bool) -> None:
+        self._folder, self._name, self._with_times = folder, name, with_times
+        self._names = folder.names(name)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __getitem__(self, i: Any) -> Any:
+        try:
+            entry = self._folder.entry(self._name, self._names[i])
+        except OSError:  # it has gone, or is a link to nothing
+            return SKIPPED
+        kind = "D" if entry.is_folder else "F"
+        return _entry(kind, entry.name, entry.size, entry.time_s, with_times=self._with_times)
+
+
 class FtpFiles:
     """Finds what a name stands for."""
 
@@ -196,7 +217,7 @@ class FtpFiles:
             raise FtpError(Nak.FILE_PROTECTED)
         return _ParameterUpload(self._endpoint, self._parameters)
 
-    def listing(self, name: str, *, with_times: bool) -> list[bytes]:
+    def listing(self, name: str, *, with_times: bool) -> Sequence[bytes]:
         """The entries of a folder as the protocol writes them, each ended by a zero byte."""
         own = _own_name(name)
         if own is not None:
@@ -208,10 +229,7 @@ class FtpFiles:
             else:
                 sizes = {PARAM_FILE: len(self._parameter_file(""))}
             return [_entry("F", file, size, 0, with_times=with_times) for file, size in sorted(sizes.items())]
-        return [
-            _entry("D" if entry.is_folder else "F", entry.name, entry.size, entry.time_s, with_times=with_times)
-            for entry in self._folder.entries(name)
-        ]
+        return _Listing(self._folder, name, with_times=with_times)
 
     def changeable(self, *names: str) -> ConfinedFolder:
         """The folder in which files of these names may be changed."""
@@ -232,4 +250,4 @@ def _entry(kind: str, name: str, size: int, time_s: int, *, with_times: bool) ->
     else:
         text = f"F{name}\t{size}" if kind == "F" else f"D{name}"
     encoded = text.encode("utf-8", "replace") + b"\0"
-    return encoded if len(encoded) <= 239 else b"S\0"  # skip: it does not fit into a reply
+    return encoded if len(encoded) <= 239 else SKIPPED  # it does not fit into a reply

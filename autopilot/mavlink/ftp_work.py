@@ -5,7 +5,7 @@ The costs are counted, not measured, so that a flight in lockstep is the same ea
 
 import zlib
 from collections import OrderedDict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from autopilot.mavlink.channel import Channel, Sender
@@ -99,7 +99,7 @@ class Checksums:
 
 @dataclass(slots=True)
 class _Listing:
-    entries: list[bytes]
+    entries: Sequence[bytes]
     used_us: int
 
 
@@ -109,14 +109,14 @@ class Listings:
     def __init__(self) -> None:
         self._kept: OrderedDict[tuple[Channel, int, bytes], _Listing] = OrderedDict()
 
-    def get(self, sender: Sender, opcode: int, name: bytes, now_us: int) -> list[bytes] | None:
+    def get(self, sender: Sender, opcode: int, name: bytes, now_us: int) -> Sequence[bytes] | None:
         listing = self._kept.get((sender.channel, opcode, name))
         if listing is None or now_us - listing.used_us > LISTING_KEPT_US:
             return None
         listing.used_us = now_us
         return listing.entries
 
-    def keep(self, sender: Sender, opcode: int, name: bytes, now_us: int, entries: list[bytes]) -> None:
+    def keep(self, sender: Sender, opcode: int, name: bytes, now_us: int, entries: Sequence[bytes]) -> None:
         self._kept.pop((sender.channel, opcode, name), None)
         self._kept[sender.channel, opcode, name] = _Listing(entries, now_us)
         if len(self._kept) > LISTINGS_KEPT_MAX:

@@ -57,7 +57,10 @@ class SerialLink:
             if self._port is None:
                 self._port = self._opened()
             self._unsent += data
-            self._unsent = self._unsent[self._port.write(self._unsent) or 0 :]
+            # not pyserial's write, which tries for ever while the other end does not read
+            self._unsent = self._unsent[os.write(self._port.fileno(), self._unsent) :]
+        except BlockingIOError:
+            pass
         except OSError:
             self.close()
         if len(self._unsent) > _UNSENT_MAX:

@@ -129,3 +129,14 @@ def test_a_serial_port_that_another_program_has_is_one_sentence(opened):
 def test_an_unknown_host_is_one_sentence(scheme):
     with pytest.raises(LinkError, match="the host nobody"):
         open_client_link(f"{scheme}://nobody.invalid:14540")
+
+
+def test_serial_goes_on_while_the_other_end_does_not_read(opened, plugged):
+    port, vehicle = plugged()
+    link = opened(open_client_link(f"serial://{port}:57600"))
+    for _ in range(2_000):  # far more than the cable takes
+        link.send(FRAME)
+        assert list(link.receive()) == []
+    while len(os.read(vehicle, 1 << 16)) > 1_000:
+        pass
+    link.send(FRAME)
