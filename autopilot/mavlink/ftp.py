@@ -14,7 +14,7 @@ from typing import Any
 
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.codec import known_type
-from autopilot.mavlink.ftp_files import FtpError, FtpFiles, Nak, OpenFile
+from autopilot.mavlink.ftp_files import FtpError, FtpFiles, Nak, OpenFile, VirtualFolder
 from autopilot.mavlink.ftp_work import REQUEST_WORK, Budget, Checksums, Listings
 from autopilot.mavlink.metadata import MetadataService
 from autopilot.mavlink.parameters import ParameterService
@@ -115,9 +115,15 @@ Answer = tuple[int, int, bytes]  # session, offset, data
 class FtpService(Service):
     """Serves files to clients."""
 
-    def __init__(self, endpoint: Endpoint, parameters: ParameterService, metadata: MetadataService) -> None:
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        parameters: ParameterService,
+        metadata: MetadataService,
+        folders: Mapping[str, VirtualFolder],
+    ) -> None:
         self._endpoint = endpoint
-        self._files = FtpFiles(endpoint, parameters, metadata)
+        self._files = FtpFiles(endpoint, parameters, metadata, folders)
         self._sessions: dict[int, _Session] = {}
         self._replies: OrderedDict[Sender, _LastReply] = OrderedDict()
         self._budget, self._checksums, self._listings = Budget(), Checksums(), Listings()

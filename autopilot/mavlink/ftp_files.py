@@ -1,6 +1,7 @@
 """What the names of MAVLink FTP stand for: files of the host's folder, or files made on demand."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Protocol
 from urllib.parse import parse_qs
@@ -16,6 +17,7 @@ PARAM_FOLDER = "@PARAM"
 PARAM_FILE = "param.pck"
 SKIPPED = b"S\0"  # an entry of a listing that is none
 _ENTRY_WORK = 4  # [us] of a file that is looked at
+_BYTES_PER_WORK = 4  # of a file made on demand
 _PARAMETER_WORK = 10  # [us] of one in the parameter file
 
 
@@ -62,6 +64,25 @@ class OpenFile(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class VirtualEntry:
+    """A file of a folder that is on no disk."""
+
+    name: str
+    size: int
+    time_s: int = 0  # Unix time
+
+
+class VirtualFolder(Protocol):
+    """A folder whose files are made on demand."""
+
+    def entries(self) -> Sequence[VirtualEntry]: ...
+
+    def open(self, name: str) -> OpenFile: ...
+
+    def open_to_write(self, name: str, /) -> OpenFile: ...
+
+
 class _FolderFile:
     """A file of the folder; it is open only while it is read or written, so nothing is left when clients vanish."""
 
@@ -85,8 +106,8 @@ class _FolderFile:
     abandon = close
 
 
-class _Snapshot:
-    """The parameter file as it was when it was opened."""
+class Snapshot:
+    """A file made on demand, as it was when it was opened."""
 
     def __init__(self, content: bytes) -> None:
         self.size = len(content)
@@ -139,18 +160,21 @@ class _ParameterUpload:
 
 
 class _Listing(Sequence[bytes]):
-    """The entries of a folder of the host's; a file is looked at when its entry is sent."""
+    """The entries of a folder of the host's behind those of others; a file is looked at when its entry is sent."""
 
-    def __init__(self, folder: ConfinedFolder, name: str, *, with_times: bool) -> None:
+    def __init__(self, first: Sequence[bytes], folder: ConfinedFolder, name: str, *, with_times: bool) -> None:
         self._folder, self._name, self._with_times = folder, name, with_times
+        self._first = first
         self._names = folder.names(name)
 
     def __len__(self) -> int:
-        return len(self._names)
+        return len(self._first) + len(self._names)
 
     def __getitem__(self, i: Any) -> Any:
+        if i < len(self._first):
+            return self._first[i]
         try:
-            entry = self._folder.entry(self._name, self._names[i])
+            entry = self._folder.entry(self._name, self._names[i - len(self._first)])
         except OSError:  # it has gone, or is a link to nothing
             return SKIPPED
         kind = "D" if entry.is_folder else "F"
@@ -160,10 +184,17 @@ class _Listing(Sequence[bytes]):
 class FtpFiles:
     """Finds what a name stands for."""
 
-    def __init__(self, endpoint: Endpoint, parameters: ParameterService, metadata: MetadataService) -> None:
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        parameters: ParameterService,
+        metadata: MetadataService,
+        folders: Mapping[str, VirtualFolder],
+    ) -> None:
         self._endpoint = endpoint
         self._parameters = parameters
         self._metadata = metadata
+        self._virtual = folders  # by their paths
         self._made_work = 0
 
     @property
@@ -181,16 +212,21 @@ class FtpFiles:
 
     def open(self, name: str) -> OpenFile:
         """Opens a file for reading."""
+        folder, inner = self._virtual_name(name)
+        if folder is not None:
+            file = folder.open(inner)
+            self._made_work += file.size // _BYTES_PER_WORK if isinstance(file, Snapshot) else 0
+            return file
         own = _own_name(name)
         if own is None:
             return _FolderFile(self._folder, name, is_writable=False)
         own_folder, own_file = own
         if own_folder == METADATA_FOLDER and own_file in self._metadata.files:
-            return _Snapshot(self._metadata.files[own_file])
+            return Snapshot(self._metadata.files[own_file])
         file_name, _, query = own_file.partition("?")
         if own_folder != PARAM_FOLDER or file_name != PARAM_FILE:
             raise FileNotFoundError
-        return _Snapshot(self._parameter_file(query))
+        return Snapshot(self._parameter_file(query))
 
     def _parameter_file(self, query: str) -> bytes:
         options = {key: values[-1] for key, values in parse_qs(query).items()}
@@ -207,6 +243,9 @@ class FtpFiles:
 
     def open_to_write(self, name: str, *, is_new: bool) -> OpenFile:
         """Opens a file for writing; a new one is empty, another keeps its content."""
+        virtual, inner = self._virtual_name(name)
+        if virtual is not None:
+            return virtual.open_to_write(inner)
         own = _own_name(name)
         if own is None:
             folder = self.changeable(name)
@@ -219,6 +258,15 @@ class FtpFiles:
 
     def listing(self, name: str, *, with_times: bool) -> Sequence[bytes]:
         """The entries of a folder as the protocol writes them, each ended by a zero byte."""
+        virtual, inner = self._virtual_name(name)
+        if virtual is not None:
+            if inner:
+                raise FileNotFoundError
+            entries = virtual.entries()
+            self._made_work += _ENTRY_WORK * len(entries)
+            return [_entry("F", each.name, each.size, each.time_s, with_times=with_times) for each in entries]
+        if own_folders := self._virtual_children(name):
+            return [_entry("D", folder, 0, 0, with_times=with_times) for folder in own_folders]
         own = _own_name(name)
         if own is not None:
             own_folder, inner = own
@@ -229,13 +277,35 @@ class FtpFiles:
             else:
                 sizes = {PARAM_FILE: len(self._parameter_file(""))}
             return [_entry("F", file, size, 0, with_times=with_times) for file, size in sorted(sizes.items())]
-        return _Listing(self._folder, name, with_times=with_times)
+        root = self._virtual_root() if not name.strip("/") else []
+        first = [_entry("D", folder, 0, 0, with_times=with_times) for folder in root]
+        return _Listing(first, self._folder, name, with_times=with_times)
 
     def changeable(self, *names: str) -> ConfinedFolder:
         """The folder in which files of these names may be changed."""
-        if any(_own_name(name) is not None for name in names) or self._endpoint.vehicle.host.files is None:
+        is_own = any(_own_name(name) is not None or self._is_virtual(name) for name in names)
+        if is_own or self._endpoint.vehicle.host.files is None:
             raise FtpError(Nak.FILE_PROTECTED)
         return self._folder
+
+    def _virtual_name(self, name: str) -> tuple[VirtualFolder | None, str]:
+        """The virtual folder that a name is in, and what follows it."""
+        path = name.strip("/")
+        for own, folder in self._virtual.items():
+            if path == own or path.startswith(f"{own}/"):
+                return folder, path[len(own) + 1 :]
+        return None, ""
+
+    def _virtual_children(self, name: str) -> list[str]:
+        """Virtual folders in a folder that is on no disk itself (APM)."""
+        path = name.strip("/")
+        return [own[len(path) + 1 :] for own in self._virtual if path and own.startswith(f"{path}/")]
+
+    def _virtual_root(self) -> list[str]:
+        return sorted({own.partition("/")[0] for own in self._virtual} | {PARAM_FOLDER}) if self._virtual else []
+
+    def _is_virtual(self, name: str) -> bool:
+        return name.strip("/").partition("/")[0] in self._virtual_root()
 
 
 def _own_name(name: str) -> tuple[str, str] | None:

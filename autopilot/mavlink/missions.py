@@ -104,7 +104,8 @@ class MissionService(Service):
         first_seq = self._first_seq(kind)
         return "home" if seq < first_seq else item_name(seq - first_seq)
 
-    def _served(self, kind: ListKind) -> Sequence[MissionItem]:
+    def served(self, kind: ListKind) -> Sequence[MissionItem]:
+        """The list as clients see it."""
         vehicle = self._endpoint.vehicle
         items = vehicle.lists.items(kind)
         return with_home(items, vehicle.state) if self._first_seq(kind) else items
@@ -118,6 +119,26 @@ class MissionService(Service):
             if refusal is not None and items:
                 refusal = replace(refusal, seq=refusal.seq + first_seq)
         return refusal
+
+    # As files
+
+    def served_count(self, kind: ListKind) -> int:
+        """How many items clients see."""
+        count = len(self._endpoint.vehicle.lists.items(kind))
+        return count + self._first_seq(kind) if count else 0
+
+    def current_seq(self, kind: ListKind) -> int:
+        """Number of the item that is flown, as clients see it; -1 in other lists than the mission."""
+        if kind is not ListKind.MISSION:
+            return -1
+        return self._endpoint.vehicle.state.mission_current + self._first_seq(kind)
+
+    def take_file(self, kind: ListKind, items: Sequence[MissionItem]) -> str:
+        """Replaces a list by that of a file; returns why it was not taken, empty if it was."""
+        if kind in self._uploads:
+            return "another client is uploading"
+        refusal = self._store(kind, items)
+        return "" if refusal is None else f"{self._name(kind, refusal.seq)}: {refusal.reason}"
 
     # Upload
 
@@ -140,7 +161,7 @@ class MissionService(Service):
         kind = self._kind(sender, fields)
         if kind is None or self._is_busy(sender, kind):
             return
-        items = list(self._served(kind))
+        items = list(self.served(kind))
         first, last = fields.start_index, fields.end_index
         if 0 <= first <= last < len(items):
             self._begin(Upload(sender, kind, items, first, last + 1))
@@ -223,7 +244,7 @@ class MissionService(Service):
         kind = self._kind(sender, fields)
         if kind is None:
             return
-        items = self._served(kind)
+        items = self.served(kind)
         downloads = self._downloads
         downloads.pop((sender, kind), None)
         while len(downloads) >= DOWNLOADS_MAX:
@@ -255,7 +276,7 @@ class MissionService(Service):
             del self._downloads[sender, kind]
             download = None
         if download is None:
-            items = self._served(kind)
+            items = self.served(kind)
         else:
             items = download.items
             download.until_us = now_us + DOWNLOAD_IDLE_US

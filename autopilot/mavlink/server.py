@@ -28,6 +28,7 @@ from autopilot.mavlink.fence import FenceService
 from autopilot.mavlink.flight_commands import FlightCommands
 from autopilot.mavlink.frame_log import OnFrame
 from autopilot.mavlink.ftp import FtpService
+from autopilot.mavlink.ftp_virtual import virtual_folders
 from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
 from autopilot.mavlink.goto import GotoService
 from autopilot.mavlink.identity import banner
@@ -138,7 +139,7 @@ class MavlinkServer:
     def _services(self) -> list[Service]:
         endpoint = self._endpoint
         parameters, goto = ParameterService(endpoint), GotoService(endpoint)
-        metadata = MetadataService(endpoint)
+        metadata, missions = MetadataService(endpoint), MissionService(endpoint, goto)
         self._events = EventService(endpoint)
         self._compass = CompassService(endpoint)
         return [
@@ -150,7 +151,7 @@ class MavlinkServer:
             ModeService(endpoint),
             self._events,
             goto,
-            MissionService(endpoint, goto),
+            missions,
             OffboardService(endpoint),
             FenceService(endpoint),
             SafetyService(endpoint),
@@ -160,7 +161,7 @@ class MavlinkServer:
             CalibrationService(endpoint),
             self._compass,
             metadata,
-            FtpService(endpoint, parameters, metadata),
+            FtpService(endpoint, parameters, metadata, virtual_folders(endpoint, missions)),
             TargetService(endpoint),
             ManualService(endpoint),
             LogTransferService(endpoint),

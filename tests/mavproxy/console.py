@@ -117,3 +117,13 @@ class Console:
         """Types a command and waits for a text."""
         self.child.sendline(line)
         return self.expect(pattern, timeout_s)
+
+    def shows(self, line, pattern, timeout_s=30.0):
+        """Types a command again and again until it shows a text: MAVProxy sets parameters beside its console."""
+        end_s = wall_time_s() + timeout_s
+        while True:
+            try:
+                return self.do(line, pattern, 2.0)
+            except pexpect.TIMEOUT:
+                if wall_time_s() > end_s:
+                    raise

@@ -1,9 +1,11 @@
 """MAVProxy 1.8.75 with a vehicle in ArduPilot's dialect: `make test-mavproxy`. The tests follow one another."""
 
+from datetime import UTC, datetime
+
 import pytest
 
 from common.clock import wall_time_s
-from tests.mavproxy.console import Console
+from tests.mavproxy.console import SPEED, Console
 
 PLAN = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t47.397742\t8.545594\t488\t1
@@ -60,6 +62,42 @@ def test_list_is_loaded_and_listed(console, module, file, kind, listed):
     console.do(f"{module} load {file}", f"Got MISSION_ACK: TYPE_{kind}: ACCEPTED")
     console.do(f"{module} list", listed)
     console.expect("Saved")
+
+
+def test_lists_go_up_and_come_down_as_files(console):
+    console.do("wp clear", "wp> |LOITER> |ACCEPTED")
+    console.do("wp ftpload plan.txt", "Sent waypoint of length 5")
+    console.do("wp ftp", r"22 3 47\.397742\d* 8\.545594\d* 10\.0")
+    console.expect("Saved")
+    console.do("rally ftp", r"5100 3 47\.3975")
+    console.expect("Saved")
+
+
+def test_folders_of_ardupilot_are_there(console):
+    console.do("ftp list @SYS", r"threads\.txt")
+    console.do("ftp list /APM/LOGS", r"flight\.ulg")
+    console.do("ftp list @MISSION", r"mission\.dat")
+
+
+def test_vehicle_tells_the_date(console):
+    year = datetime.now(UTC).year
+    console.do("time", rf"{year} \(.*{year}\)", 10.0)
+
+
+def test_simulator_is_told_of_wind_and_pace(console):
+    console.do("param set SIM_WIND_SPD 3", "LOITER> ")
+    console.shows("param show SIM_WIND_SPD", r"SIM_WIND_SPD +3\.0")
+    console.do("param set SIM_WIND_SPD 0", "LOITER> ")
+    console.shows("param show SIM_SPEEDUP", rf"SIM_SPEEDUP +{SPEED}")
+
+
+def test_motor_turns_and_a_switch_changes_the_mode(console):
+    console.do("long DO_MOTOR_TEST 1 0 10 1 1", "DO_MOTOR_TEST: ACCEPTED")
+    console.expect("Motor test: finished")
+    console.do("long DO_AUX_FUNCTION 55 2", "DO_AUX_FUNCTION: ACCEPTED")
+    console.expect("Mode GUIDED")
+    console.do("long DO_AUX_FUNCTION 55 0", "DO_AUX_FUNCTION: ACCEPTED")
+    console.expect("Mode LOITER")
 
 
 def test_modes_are_changed_by_name(console):

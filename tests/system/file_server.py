@@ -1,4 +1,6 @@
-"""A MAVLink server with files and no flight, in a process of its own: `python -m tests.system.file_server PORT FOLDER`.
+"""A MAVLink server with files and no flight, in a process of its own.
+
+`python -m tests.system.file_server PORT FOLDER [DIALECT]`
 
 pymavlink waits for its replies in a loop that never sleeps; in one process it would leave a server little time.
 """
@@ -10,16 +12,17 @@ from time import sleep
 from autopilot.mavlink.links import UdpLink
 from autopilot.mavlink.server import MavlinkServer
 from common.folder import ConfinedFolder
+from mission.flight import DIALECTS
 from tests.unit.autopilot.mavlink.rig import RecordingVehicle
 
 FRAME_US = 20_000
 FRAME_WALL_S = 0.004
 
 
-def main(port, folder):
+def main(port, folder, dialect="px4"):
     vehicle = RecordingVehicle()
     vehicle.host.files = ConfinedFolder(Path(folder))
-    server = MavlinkServer(vehicle, [UdpLink(int(port))])
+    server = MavlinkServer(vehicle, [UdpLink(int(port))], DIALECTS[dialect])
     while True:
         vehicle.state.time_us += FRAME_US
         server.frame(vehicle.state.time_us)

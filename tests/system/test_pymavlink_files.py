@@ -1,5 +1,6 @@
 """pymavlink's own file transfer client, which MAVProxy's is made from, over UDP."""
 
+import struct
 import subprocess
 import sys
 
@@ -14,10 +15,15 @@ CONTENT = bytes(i * 7 % 251 for i in range(60_001))
 
 
 @pytest.fixture
-def ftp(tmp_path):
+def dialect():
+    return "px4"
+
+
+@pytest.fixture
+def ftp(tmp_path, dialect):
     port, _ = free_ports()
     master = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}", source_system=255, dialect="ardupilotmega")
-    command = [sys.executable, "-m", "tests.system.file_server", str(port), str(tmp_path / "files")]
+    command = [sys.executable, "-m", "tests.system.file_server", str(port), str(tmp_path / "files"), dialect]
     server = subprocess.Popen(command, cwd=ROOT)
     assert master.wait_heartbeat(timeout=60.0) is not None
     yield MAVFTP(master, 1, 1)
@@ -49,3 +55,18 @@ def test_parameters_come_as_one_file(ftp, tmp_path):
     done(ftp, ftp.cmd_get(["@PARAM/param.pck", str(tmp_path / "param.pck")]), "OpenFileRO")
     decoded = MAVFTP.ftp_param_decode((tmp_path / "param.pck").read_bytes())
     assert [name.decode() for name, _, _ in decoded.params] == parameter_table().names
+
+
+@pytest.mark.parametrize("dialect", ["ardupilot"])
+def test_mission_goes_up_and_comes_down_as_ardupilots_file(ftp, tmp_path):
+    message = mavutil.mavlink.MAVLink_mission_item_int_message
+    data = struct.pack("<5H", 0x763D, 0, 0, 0, 3)
+    for seq, command in enumerate((16, 22, 16)):
+        item = message(1, 1, seq, 3, command, 0, 1, 0, 0, 0, 0, 473_977_420, 85_455_940, 10.0, 0)
+        data += message.unpacker.pack(*(getattr(item, name) for name in message.ordered_fieldnames))
+    (tmp_path / "up.dat").write_bytes(data)
+    done(ftp, ftp.cmd_put([str(tmp_path / "up.dat"), "@MISSION/mission.dat"]), "CreateFile")
+    done(ftp, ftp.cmd_get(["@MISSION/mission.dat", str(tmp_path / "down.dat")]), "OpenFileRO")
+    back = (tmp_path / "down.dat").read_bytes()
+    assert len(back) == len(data)
+    assert back[10 + 38 :][:28] == data[10 + 38 :][:28]  # parameters and place of the take-off; item 0 is home
