@@ -32,7 +32,7 @@ Rules that hold for everything below:
 
 - A command is acknowledged once, to who sent it, at once; while it takes time the acknowledgement says IN_PROGRESS and
   a final one follows. A command that is not in the table is answered UNSUPPORTED. A STATUSTEXT explains each refusal.
-- In a command NaN means "default" and 0 is a value. An infinite parameter is refused.
+- In a command NaN means "default" and 0 is a value. An infinite parameter is refused, and so is one beyond 1e10.
 - Positions are latitude and longitude in degrees; COMMAND_INT carries them exactly, COMMAND_LONG to about a metre.
 - Every message with a rate can be asked for at another one (SET_MESSAGE_INTERVAL, for one link only) or once
   (REQUEST_MESSAGE).
