@@ -20,7 +20,8 @@ from mission.follow.session import chosen_pilot, score_lines  # noqa: E402
 from mission.follow.watch import FollowWatch  # noqa: E402
 from mission.view.chase import PICTURE_S  # noqa: E402
 from mission.view.film_pictures import film  # noqa: E402
-from mission.view.live import LiveView, open_page  # noqa: E402
+from mission.view.live import LiveView  # noqa: E402
+from mission.view.page import PageServer  # noqa: E402
 from mission.view.recording import Recorder  # noqa: E402
 from policies.companion.engagement import Phase  # noqa: E402
 from policies.tasks.follow_me.world import FOLLOW_WORLD  # noqa: E402
@@ -38,7 +39,7 @@ def main() -> None:
     flight, companion = flight_with_companion(FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(), seed=SEED), pilot)
     recorder = Recorder(flight, action=lambda: companion.action)
     watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, FOLLOWED_S)
-    page = open_page(0, "Honeyguide")
+    page = PageServer(0, "Honeyguide")
     view = LiveView(
         flight, page, speed=None, action=lambda: companion.action, score=lambda: score_lines(watch, companion)
     )
@@ -46,7 +47,7 @@ def main() -> None:
     flight.drone.start(take_off(flight.drone))
     with tempfile.TemporaryDirectory() as profile:
         browser = Browser(Path(profile), 1280, 800)
-        browser.open(f"http://127.0.0.1:{page.get_port()}/")
+        browser.open(page.url)
         browser.wait("document.body?.innerText.includes('Hold')")
         end_us = flight.time_us + int((FOLLOWED_S + 12.0) * 1e6)
         flight.run(lambda f: f.time_us >= end_us, speed=2.0, on_frame=lambda _: [watch() for watch in watched])

@@ -179,11 +179,7 @@ class Flight:
             stream.start(self.controller.camera, self._stream_rig)
         self.simulator_params = SimulatorParameters(self)
         self.video = video
-        self._video_rig: VideoRig | None = None
-        if video is not None and self.controller.camera is not None:
-            self._video_rig = VideoRig(self.rig, self.world, None if self.owner is None else self.owner.people)
-            video.start(self.controller.camera, self._video_rig)
-            video.on_trouble = lambda text: self.server.statustext(Severity.WARNING, text)
+        self._video_rig = None if video is None else self._start_video(video)
         self._flight_logs: FlightLogs | None = None
         self._connect_host(log, state)
 
@@ -207,6 +203,14 @@ class Flight:
         self.owner = FollowedOwner(config, self.world, self.config.seed, self.config.home)
         self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)
         return [self.owner.vehicle_end]
+
+    def _start_video(self, video: RtpVideo) -> VideoRig:
+        """Gives the video something to show; what renders it."""
+        rig = VideoRig(self.rig, self.world, None if self.owner is None else self.owner.people)
+        if self.controller.camera is not None:
+            video.start(self.controller.camera, rig)
+        video.on_trouble = lambda text: self.server.statustext(Severity.WARNING, text)
+        return rig
 
     def frame(self) -> None:
         """Advances by 20 ms."""

@@ -40,8 +40,9 @@ class VideoRig:
     def _render(self, pose: CameraPose, view: View) -> RawFrame:
         camera = self._camera
         if camera is None:
-            size = {"width": view.width, "height": view.height}
-            camera = self._camera = QuickCamera(self._world, 1, **size, people=self._people, range_m=RANGE_M)
+            camera = self._camera = QuickCamera(
+                self._world, 1, width=view.width, height=view.height, people=self._people, range_m=RANGE_M
+            )
         lens: Any = camera.lenses.numpy()[0]
         lens["pos_ned"], lens["q_ned_from_rdf"] = pose.pos_ned, pose.q_ned_from_rdf
         lens["half_width"] = tan(0.5 * radians(pose.hfov_deg))
