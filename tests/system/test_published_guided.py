@@ -128,7 +128,12 @@ def test_overridden_channels_move_the_vehicle_and_let_it_go():
         assert 0.5 < hypot(*flown.vel[:2]) < 2.0
         await override(client, 4.0, 1500)
         assert hypot(*flown.vel[:2]) < 0.3
-        await client.until(lambda: client.latest("HEARTBEAT").custom_mode == RTL, 10.0, "return without overrides")
+        down = flown.pos[2]
+        await client.sleep(8.0)  # without overrides the simulated radio has the sticks again, and Loiter holds
+        assert client.latest("HEARTBEAT").custom_mode == LOITER
+        assert flown.pos[2] == pytest.approx(down, abs=0.5)
+        flown.flight.controller.sticks.is_cut = True
+        await client.until(lambda: client.latest("HEARTBEAT").custom_mode == RTL, 2.0, "return without a radio")
 
     station.run(script)
 

@@ -13,9 +13,12 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot.camera.settings import SETTINGS
 from autopilot.mavlink.camera.definition import definition_xml
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.links import LinkRole, memory_pair
+from autopilot.mavlink.server import MavlinkServer
 from autopilot.vehicle import Verdict
-from tests.unit.autopilot.mavlink.payload_rig import CAMERA, GIMBAL, PayloadRig, Stream
-from tests.unit.autopilot.mavlink.rig import texts
+from tests.unit.autopilot.mavlink.payload_rig import CAMERA, GIMBAL, PayloadRig, PayloadVehicle, Stream
+from tests.unit.autopilot.mavlink.rig import Client, texts
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = (
     Verdict.ACCEPTED,
@@ -59,6 +62,38 @@ def test_whoever_begins_to_listen_between_two_frames_hears_the_autopilot_first(r
     for _ in range(200):
         beats = [m.compid for m in rig.frame() if m.name == "HEARTBEAT"]
         assert not beats or beats[0] == 1
+
+
+class Door:
+    """A link source through which clients come, one per frame."""
+
+    def __init__(self):
+        self.links = []
+        self.clients = []
+
+    def poll(self, _):
+        vehicle_end, client_end = memory_pair(LinkRole.GROUND)
+        self.links = [*self.links, vehicle_end]
+        self.clients.append(Client(client_end))
+
+    def close(self):
+        pass
+
+
+@pytest.mark.parametrize("dialect", [PX4, ARDUPILOT])
+def test_on_every_new_link_the_autopilot_speaks_first(dialect):
+    """Whenever in the second of its heartbeats a client comes."""
+    door, vehicle = Door(), PayloadVehicle(None, Stream())
+    server = MavlinkServer(vehicle, [door], dialect, announces_components=True)
+    first = {}
+    for time_us in range(5_000_000, 7_000_000, 20_000):
+        vehicle.state.time_us = time_us
+        server.frame(time_us)
+        for i, client in enumerate(door.clients):
+            for message in client.received():
+                if message.name == "HEARTBEAT":
+                    first.setdefault(i, message.compid)
+    assert first == dict.fromkeys(range(100), 1)
 
 
 @pytest.mark.parametrize(("announces", "compids"), [(False, {1}), (True, {1, CAMERA, GIMBAL})])
