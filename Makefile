@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-mavproxy test-mavsdk3 test-dronekit fuzz mutants check tune bench format lock clean reproduce-follow
+.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-hostile test-mavproxy test-mavsdk3 test-dronekit fuzz mutants check tune bench format lock clean reproduce-follow
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -52,6 +52,10 @@ fuzz: $(STAMP) ## Send a vehicle 2,000,000 broken and extreme frames, in every m
 mutants: $(STAMP) ## Break safety-critical files in small ways and see whether their tests notice; flags: ARGS="--each 20"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[mutants]"
 	@$(BIN)/python -m tests.mutants $(ARGS)
+
+HOSTILE := test_page_guard test_hostile_connections test_hostile_services test_udp_link
+test-hostile: $(STAMP) ## Foreign websites, crowds, the silent and the slow at every port, a hostile client per service
+	@$(BIN)/python -m pytest -q $(HOSTILE:%=tests/system/%.py) $(ARGS)
 
 MAVPROXY := .venv-mavproxy
 
