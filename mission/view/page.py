@@ -86,7 +86,7 @@ def _guarded(token: str) -> Iterator[list[None]]:
                 live.discard(self)
                 super().connection_lost(exc)
 
-            async def recv(self, decode: bool | None = None) -> bytes | str:
+            async def recv(self, decode: bool | None = None) -> Any:
                 while not is_sound(message := await super().recv(decode)):
                     pass
                 return message
@@ -99,7 +99,7 @@ def _guarded(token: str) -> Iterator[list[None]]:
     try:
         yield opened
     finally:
-        websocket_server.serve = plain
+        websocket_server.serve = plain  # type: ignore[misc]
 
 
 def guard(token: str, answer: Answer) -> Answer:
