@@ -43,7 +43,8 @@ def simstate(host: Host, state: VehicleState) -> bytes | None:
     if host.read_truth is None:
         return None
     truth = host.read_truth()
-    lat_deg, lon_deg, _ = geodetic_from_ned(*truth.pos_ned, state.origin)
+    north, east, down = truth.pos_ned
+    lat_deg, lon_deg, _ = geodetic_from_ned(north, east, down, state.origin)
     return _simstate(
         *roll_pitch_yaw_of(truth.q_ned_from_frd),
         *truth.accel_frd,
@@ -58,7 +59,8 @@ def sim_state(host: Host, state: VehicleState) -> bytes | None:
     if host.read_truth is None:
         return None
     truth = host.read_truth()
-    lat_deg, lon_deg, alt_amsl_m = geodetic_from_ned(*truth.pos_ned, state.origin)
+    north, east, down = truth.pos_ned
+    lat_deg, lon_deg, alt_amsl_m = geodetic_from_ned(north, east, down, state.origin)
     return _sim_state(
         *wxyz_from_quat(truth.q_ned_from_frd),
         *roll_pitch_yaw_of(truth.q_ned_from_frd),
