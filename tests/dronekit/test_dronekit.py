@@ -172,12 +172,14 @@ def test_channels_are_overridden_and_go_back_to_the_radio(vehicle):
 
 
 def test_calibrations_are_accepted(vehicle):
-    for start in (vehicle.send_calibrate_gyro, vehicle.send_calibrate_barometer):
-        accepted = []
-        vehicle.add_message_listener("COMMAND_ACK", lambda _, __, ack, accepted=accepted: accepted.append(ack.result))
+    results, texts = [], []
+    vehicle.add_message_listener("COMMAND_ACK", lambda _, __, ack: results.append(ack.result))
+    vehicle.add_message_listener("STATUSTEXT", lambda _, __, message: texts.append(message.text))
+    for name, start in (("gyro", vehicle.send_calibrate_gyro), ("baro", vehicle.send_calibrate_barometer)):
+        results.clear()
         start()
-        until(lambda accepted=accepted: 0 in accepted)
-        until(lambda: vehicle.is_armable)
+        until(lambda: 0 in results)
+        until(lambda name=name: f"[cal] calibration done: {name}" in texts)
 
 
 def test_messages_are_listened_to_and_made(vehicle):
