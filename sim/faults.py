@@ -10,6 +10,7 @@ means:
 | biased | the magnitude is added to each axis of the value              | in the unit of the value: see `BIAS_UNITS` |
 | noisy  | the white noise is multiplied by the magnitude (GNSS: jammed) | factor                                     |
 | slow   | the period of the samples is multiplied by the magnitude      | factor, rounded down, at least 1           |
+| turned | the magnetometer is mounted turned about the vehicle's down   | deg                                        |
 
 A motor that fails loses a share of its command: 1 stops it, 0.4 leaves it weak (`set_motor_loss`).
 
@@ -31,8 +32,9 @@ FAULT_STUCK = wp.constant(2)
 FAULT_BIASED = wp.constant(3)
 FAULT_NOISY = wp.constant(4)
 FAULT_SLOW = wp.constant(5)
+FAULT_TURNED = wp.constant(6)
 
-FAULT_MODES: dict[str, int] = {"none": 0, "off": 1, "stuck": 2, "biased": 3, "noisy": 4, "slow": 5}
+FAULT_MODES: dict[str, int] = {"none": 0, "off": 1, "stuck": 2, "biased": 3, "noisy": 4, "slow": 5, "turned": 6}
 
 BIAS_UNITS: dict[str, str] = {
     "gyro": "rad/s",
@@ -99,6 +101,15 @@ def noise_gain(fault: SensorFault) -> float:
 
 
 @wp.func
+def fault_turn(fault: SensorFault) -> wp.quat:
+    """The turn from the vehicle's axes to those of a sensor that is mounted wrongly."""
+    angle = float(0.0)
+    if fault.mode == FAULT_TURNED:
+        angle = wp.radians(fault.magnitude)
+    return wp.quat_from_axis_angle(wp.vec3(0.0, 0.0, 1.0), angle)
+
+
+@wp.func
 def fault_bias(fault: SensorFault) -> float:
     """What is added to each axis of the value, in its unit."""
     if fault.mode == FAULT_BIASED:
@@ -131,6 +142,8 @@ def set_fault(row: Any, sensor: str, mode: str, magnitude: float = 0.0) -> None:
         raise ValueError(f"unknown fault mode '{mode}'; known: {', '.join(FAULT_MODES)}")
     if not np.isfinite(magnitude):
         raise ValueError(f"fault {sensor} {mode}: magnitude must be finite, not {magnitude}")
+    if mode == "turned" and sensor != "mag":
+        raise ValueError(f"fault {sensor} {mode}: only the magnetometer can be turned")
     if mode in {"noisy", "slow"} and magnitude < 1.0:
         raise ValueError(f"fault {sensor} {mode}: magnitude is a factor of at least 1, not {magnitude}")
     if isinstance(row, np.void | np.ndarray):

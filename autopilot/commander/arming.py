@@ -6,13 +6,25 @@ In: the vehicle's state. Out: reasons, most important first; empty means ready. 
 from collections.abc import Callable
 from math import hypot, radians
 
-from autopilot.ports import EXTERNAL_POSITION, HEIGHT_VALID, POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
+from autopilot.estimator.params import MAG_TYPE_NONE
+from autopilot.ports import (
+    EXTERNAL_POSITION,
+    HEIGHT_VALID,
+    MAG_DISTURBED,
+    MAG_FAULTY,
+    POSITION_VALID,
+    TILT_ALIGNED,
+    VELOCITY_VALID,
+    YAW_ALIGNED,
+)
 from autopilot.vehicle import VehicleState
 from common.params import ParameterTable
 
 _STALE_US = 1_000_000  # a sensor that has been silent for longer is off
 _GNSS_STALE_US = 2_000_000
 _STILL_RAD_S = 0.2  # faster than hands, wind or noise turn a vehicle that stands; guess
+_REFUSE, WARN_ONLY = 1, 2  # COM_ARM_MAG_STR
+MAGNETIC_INTERFERENCE = "strong magnetic interference"
 _UPRIGHT_RAD = radians(45.0)  # PX4 and ArduPilot refuse a steeper stand
 
 
@@ -45,15 +57,30 @@ def _barometer(state: VehicleState, _: ParameterTable) -> str:
     return "barometer: no data" if _is_stale(state, state.samples.baro.time_us, _STALE_US) else ""
 
 
-def _magnetometer(state: VehicleState, _: ParameterTable) -> str:
-    return "magnetometer: no data" if _is_stale(state, state.samples.mag.time_us, _STALE_US) else ""
+def _magnetometer(state: VehicleState, params: ParameterTable) -> str:
+    if not _has_compass(params):
+        return ""
+    if _is_stale(state, state.samples.mag.time_us, _STALE_US):
+        return "magnetometer: no data"
+    flags = state.estimate.flags
+    if flags & MAG_FAULTY:
+        return "compass contradicts the heading of the last flight: calibrate it"
+    is_checked = int(params["COM_ARM_MAG_STR"]) == _REFUSE or not flags & YAW_ALIGNED
+    return MAGNETIC_INTERFERENCE if flags & MAG_DISTURBED and is_checked else ""
 
 
 def _alignment(state: VehicleState, _: ParameterTable) -> str:
-    flags = state.estimate.flags
-    if not flags & TILT_ALIGNED:
-        return "estimator: attitude not aligned"
-    return "" if flags & YAW_ALIGNED else "estimator: heading not aligned"
+    return "" if state.estimate.flags & TILT_ALIGNED else "estimator: attitude not aligned"
+
+
+def _heading(state: VehicleState, params: ParameterTable) -> str:
+    """Without a compass the heading is found in flight."""
+    is_known = state.estimate.flags & YAW_ALIGNED
+    return "estimator: heading not aligned" if _has_compass(params) and not is_known else ""
+
+
+def _has_compass(params: ParameterTable) -> bool:
+    return int(params["EKF2_MAG_TYPE"]) != MAG_TYPE_NONE
 
 
 def _height(state: VehicleState, _: ParameterTable) -> str:
@@ -100,6 +127,8 @@ def _gnss(state: VehicleState, params: ParameterTable) -> str:
 
 def _position(state: VehicleState, params: ParameterTable) -> str:
     estimate = state.estimate
+    if not estimate.flags & YAW_ALIGNED:
+        return "estimator: heading not aligned: take off in a mode that needs no position"
     if not estimate.flags & POSITION_VALID:
         return "estimator: no valid position"
     if not estimate.flags & VELOCITY_VALID:
@@ -119,6 +148,6 @@ def _is_stale(state: VehicleState, sample_us: int, limit_us: int) -> bool:
 
 _Check = Callable[[VehicleState, ParameterTable], str]
 _ALWAYS: tuple[_Check, ...] = (
-    _calibration, _imu, _barometer, _magnetometer, _alignment, _height, _upright, _still, _biases, _battery,
+    _calibration, _imu, _barometer, _magnetometer, _alignment, _heading, _height, _upright, _still, _biases, _battery,
 )  # fmt: skip
 _POSITION: tuple[_Check, ...] = (_gnss, _position)

@@ -4,10 +4,10 @@ In: the vehicle's state and what clients ask for. Out: mode, arming and landed s
 which mode to fly through `Flying`, and asks it what it alone can know.
 """
 
-from math import hypot, pi, sqrt
+from math import degrees, hypot, nan, pi, radians, sqrt
 
 from autopilot.abilities import Announcer
-from autopilot.commander.arming import arming_reasons
+from autopilot.commander.arming import MAGNETIC_INTERFERENCE, WARN_ONLY, arming_reasons
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.failsafe import CRASHED
 from autopilot.commander.flying import Flying
@@ -19,7 +19,7 @@ from autopilot.commander.motors import MotorWatch
 from autopilot.commander.pilot import Pilot
 from autopilot.commander.watch import FailureWatch, StationLink
 from autopilot.navigator.ground import Ask
-from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID
+from autopilot.ports import HEIGHT_VALID, MAG_DISTURBED, POSITION_VALID, VELOCITY_VALID
 from autopilot.vehicle import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from common.params import Parameter, ParameterTable
 
@@ -34,6 +34,7 @@ _FRAME_LONGEST_S = 0.1  # longer gaps do not count as landed time
 _ON_ITS_SIDE_RAD = 0.25 * pi  # lean from which a vehicle on the ground has not landed but crashed, as for arming
 _FALLEN_US = 10_000_000  # after its motors stopped in the air a vehicle is down, whatever the estimate says; guess
 _OFF_GROUND_M = 0.15  # a lower hover is not told from standing; guess
+_RESET_TOLD_RAD = radians(5.0)  # guess
 _RESET_TOLD_M = 0.5  # smaller jumps of the position are not worth a text; guess
 
 
@@ -105,7 +106,7 @@ class Commander:
         battery.count_on(state.time_us)
         self._watch.judge_battery()
         if state.home is None and self.has_position and state.estimate.pos_h_std <= self._eph:
-            self.home.set_here()
+            self.home.set_here(self._lift_d if state.is_flying else nan)  # without a compass it is known in flight only
         if state.landed_state is LandedState.ON_GROUND:
             if state.is_armed:
                 self._stand()
@@ -159,6 +160,8 @@ class Commander:
         self._flying.on_armed()
         self.announcer.heartbeat_now()
         self.announcer.statustext(Severity.INFO, "Armed")
+        if state.estimate.flags & MAG_DISTURBED and int(self.params["COM_ARM_MAG_STR"]) == WARN_ONLY:
+            self.announcer.statustext(Severity.WARNING, MAGNETIC_INTERFERENCE.capitalize())
         return ACCEPTED
 
     def disarm(self, *, force: bool) -> Reply:
@@ -377,6 +380,9 @@ class Commander:
         self._watch.note_reset(jump_m)
         if jump_m > _RESET_TOLD_M:
             self.announcer.statustext(Severity.NOTICE, f"Estimator: position reset by {jump_m:.1f} m")
+        if abs(estimate.yaw_reset) > _RESET_TOLD_RAD:
+            text = f"Estimator: heading reset by {degrees(estimate.yaw_reset):.0f} deg"
+            self.announcer.statustext(Severity.NOTICE, text)
 
     def _watch_failures(self, dt_s: float) -> None:
         if self.state.mode is Mode.TERMINATION:

@@ -33,6 +33,7 @@ ESTIMATOR_FAILED = 1 << 17
 FENCE_BREACHED = 1 << 18
 TRAFFIC_NEAR = 1 << 20
 ACCEL_DOUBTED = 1 << 21
+COMPASS_FAULTY = 1 << 22
 
 TERMINATION_BREAKER = 121212  # CBRK_FLIGHTTERM: the failure detector may not stop the motors
 
@@ -180,6 +181,8 @@ RULES: tuple[Rule, ...] = (
     Rule(WIND_STRONG, always(Action.WARN), Severity.WARNING, "Strong wind"),
     Rule(ACCEL_DOUBTED, always(Action.WARN), Severity.CRITICAL, "Vibration compensation ON",
          "Vibration compensation OFF"),
+    Rule(COMPASS_FAULTY, always(Action.WARN), Severity.CRITICAL, "Emergency yaw reset: compass not used",
+         "Compass is used again"),
     Rule(DEAD_RECKONING, always(Action.WARN), Severity.WARNING, "No position source: dead reckoning",
          "Position source is back"),
 )  # fmt: skip

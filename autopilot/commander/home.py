@@ -1,7 +1,7 @@
 """Home: where the vehicle returns to. It is where it was armed, unless a client names a place."""
 
 from collections.abc import Callable
-from math import hypot, isfinite
+from math import hypot, isfinite, nan
 
 from autopilot.abilities import Announcer
 from autopilot.vehicle import ACCEPTED, LandedState, Reply, VehicleState, Verdict
@@ -51,10 +51,11 @@ class Home:
             self.on_given(state.home)
         return ACCEPTED
 
-    def set_here(self) -> None:
-        """The vehicle's own place."""
+    def set_here(self, down: float = nan) -> None:
+        """The vehicle's own place; in the air `down` [m] is the height of the ground that it left, if that is known."""
         state = self._state
-        state.home_ned = state.estimate.pos_ned
+        north, east, own_down = state.estimate.pos_ned
+        state.home_ned = (north, east, down if isfinite(down) else own_down)
         if state.landed_state is LandedState.ON_GROUND:
             state.stand_ned = state.home_ned
         state.home = GeoPoint(*geodetic_from_ned(*state.home_ned, state.origin))

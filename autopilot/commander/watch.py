@@ -14,6 +14,7 @@ from autopilot.commander.failsafe import (
     BATTERY_EMERGENCY,
     BATTERY_LOW,
     BATTERY_SILENT,
+    COMPASS_FAULTY,
     DEAD_RECKONING,
     ESTIMATOR_FAILED,
     FENCE_BREACHED,
@@ -32,7 +33,7 @@ from autopilot.commander.flying import Flying
 from autopilot.commander.motors import MotorWatch
 from autopilot.ports import ACCEL_DOUBTED as ACCEL_DOUBTED_FLAG
 from autopilot.ports import DEAD_RECKONING as DEAD_RECKONING_FLAG
-from autopilot.ports import HEIGHT_VALID, WIND_VALID
+from autopilot.ports import HEIGHT_VALID, MAG_FAULTY, WIND_VALID
 from autopilot.vehicle import BatteryLevel, LandedState, Mode, VehicleState
 from common.params import Parameter, ParameterTable
 
@@ -192,6 +193,8 @@ class FailureWatch:
             bits |= DEAD_RECKONING
         if state.estimate.flags & ACCEL_DOUBTED_FLAG:
             bits |= ACCEL_DOUBTED
+        if state.estimate.flags & MAG_FAULTY:
+            bits |= COMPASS_FAULTY
         if not is_flying:
             return bits
         if self.airborne_us < 0:

@@ -10,7 +10,15 @@ from autopilot.mavlink.codec import known_type
 from autopilot.mavlink.convert import INT16_MAX, UINT16_MAX, bounded_int, degrees_e7, i16, i32, u16
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.telemetry.motion import boot_ms
-from autopilot.ports import EXTERNAL_POSITION, POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
+from autopilot.ports import (
+    EXTERNAL_POSITION,
+    MAG_DISTURBED,
+    MAG_FAULTY,
+    POSITION_VALID,
+    TILT_ALIGNED,
+    VELOCITY_VALID,
+    YAW_ALIGNED,
+)
 from autopilot.vehicle import FenceLimit, LandedState, Mode, VehicleState
 
 _heartbeat = known_type("HEARTBEAT").pack
@@ -127,7 +135,8 @@ def healthy_sensors(state: VehicleState) -> int:
     bits = 0
     if now_us - samples.imu.time_us < FRESH_IMU_US:
         bits |= _GYRO_ACCEL
-    if _works(samples.mag, health and health.mag_inbox, now_us):
+    is_mag_wrong = flags & (MAG_DISTURBED | MAG_FAULTY)
+    if not is_mag_wrong and _works(samples.mag, health and health.mag_inbox, now_us):
         bits |= _MAG
     if _works(samples.baro, health and health.baro_inbox, now_us):
         bits |= _BARO

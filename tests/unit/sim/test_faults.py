@@ -68,6 +68,14 @@ def test_biased_adds_the_magnitude_and_nothing_else(sensor):
     assert difference == pytest.approx(np.full_like(difference, 0.25), abs=0.01)  # float32 pressure
 
 
+def test_turned_magnetometer_reads_the_field_of_a_vehicle_that_heads_elsewhere():
+    healthy, _ = warm(noise_scale=0.0)
+    turned, _ = warm(noise_scale=0.0)
+    turned.fault("mag", "turned", 90.0)
+    x, y, z = healthy.run(50)["mag"][0, -1]["field_frd_gauss"]
+    assert turned.run(50)["mag"][0, -1]["field_frd_gauss"] == pytest.approx([-y, x, z], abs=1e-6)
+
+
 @sensors
 def test_noisy_multiplies_the_white_noise(sensor):
     port, field, period = VALUES[sensor]
@@ -136,6 +144,7 @@ def test_a_struct_instance_can_be_set_too():
         ("gnss", "noisy", 0.5, "at least 1"),
         ("baro", "slow", 0.0, "at least 1"),
         ("mag", "biased", float("nan"), "finite"),
+        ("gyro", "turned", 90.0, "only the magnetometer"),
     ],
 )
 def test_set_fault_names_what_is_wrong(sensor, mode, magnitude, said):

@@ -5,7 +5,15 @@ from math import nan
 import pytest
 
 from autopilot.commander.arming import arming_reasons
-from autopilot.ports import HEIGHT_VALID, POSITION_VALID, TILT_ALIGNED, VELOCITY_VALID, YAW_ALIGNED
+from autopilot.ports import (
+    HEIGHT_VALID,
+    MAG_DISTURBED,
+    MAG_FAULTY,
+    POSITION_VALID,
+    TILT_ALIGNED,
+    VELOCITY_VALID,
+    YAW_ALIGNED,
+)
 from autopilot.requests import CalibrationKind
 from autopilot.vehicle import LandedState, Mode, Severity, Verdict
 from tests.unit.autopilot.kinematic import ALL_VALID, ORIGIN, Kinematic, geo
@@ -14,6 +22,13 @@ from tests.unit.autopilot.kinematic import ALL_VALID, ORIGIN, Kinematic, geo
 def estimate_flag(bit):
     def fail(rig):
         rig.flags = ALL_VALID & ~bit
+
+    return fail
+
+
+def raise_flag(bit):
+    def fail(rig):
+        rig.flags = ALL_VALID | bit
 
     return fail
 
@@ -73,6 +88,7 @@ def low_battery(rig):
         (stop_sensor("imu"), "IMU: no data"),
         (stop_sensor("baro"), "barometer: no data"),
         (stop_sensor("mag"), "magnetometer: no data"),
+        (raise_flag(MAG_FAULTY), "compass contradicts"),
         (stop_sensor("gnss"), "GNSS: no data"),
         (stop_sensor("battery"), "battery: no data"),
         (set_gnss("fix_type", 1), "no 3-D fix"),
@@ -108,6 +124,32 @@ def test_failing_checks_are_told_every_30_s():
     texts = [text for severity, text in rig.recorder.texts if severity is Severity.CRITICAL]
     assert len(texts) == 3
     assert texts[0].startswith("PreArm: ")
+
+
+@pytest.mark.parametrize(("check", "may_arm", "is_told"), [(0, True, False), (1, False, False), (2, True, True)])
+def test_disturbed_compass_is_told_or_refused_by_com_arm_mag_str(check, may_arm, is_told):
+    rig = Kinematic(COM_ARM_MAG_STR=check)
+    rig.flags = ALL_VALID | MAG_DISTURBED
+    rig.run(4.0)
+    assert (rig.fc.arm(force=False).verdict is Verdict.ACCEPTED) is may_arm
+    assert rig.recorder.has_text("Strong magnetic interference") is is_told
+
+
+def test_heading_that_waits_for_a_disturbed_compass_names_the_reason():
+    rig = Kinematic(COM_ARM_MAG_STR=0)
+    rig.flags = (ALL_VALID & ~YAW_ALIGNED) | MAG_DISTURBED
+    rig.run(4.0)
+    assert rig.fc.check_arming()[0] == "strong magnetic interference"
+
+
+def test_vehicle_without_compass_is_armed_in_modes_that_need_no_position():
+    rig = Kinematic(EKF2_MAG_TYPE=5)
+    rig.flags = TILT_ALIGNED | HEIGHT_VALID
+    stop_sensor("mag")(rig)
+    rig.run(4.0)
+    needing, other = (arming_reasons(rig.state, rig.table, needs_position=needs) for needs in (True, False))
+    assert not other
+    assert "heading not aligned" in needing[0]
 
 
 def test_forced_arming_skips_the_checks():
