@@ -122,6 +122,7 @@ def _ulog(log: SensorLog, replay: Replay, summary: EstimateSummary) -> bytes:
         samples_before=output[:0],
         actuators=output[:0],
         health=output,
+        yaw=output[:0],
         body=output[:0],
         vehicle=output[:0],
         origin=log.origin or GeoPoint(nan, nan, nan),

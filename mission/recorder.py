@@ -85,6 +85,7 @@ class Recorder:
         self._sensors = _RawRow(rig.arrays.sensors.numpy())
         self._control = _RawRow(autopilot.control.numpy())
         self._estimator = _RawRow(autopilot.ekf.rows.numpy())
+        self._yaw = _RawRow(autopilot.ekf.yaw.numpy())
         self._imu_ring = _RawRow(autopilot.ekf.imu_ring.numpy())
         imu_model = rig.arrays.sensor_model.numpy()["imu"][0]
         self._imu_limits = (float(imu_model["gyro_limit"]), float(imu_model["accel_limit"]))
@@ -124,7 +125,7 @@ class Recorder:
                 state.battery_used_mah,
             )
         )
-        for rows in (self._body, self._sensors, self._control, self._estimator, self._imu_ring):
+        for rows in (self._body, self._sensors, self._control, self._estimator, self._yaw, self._imu_ring):
             rows.copy()
         if len(self._time_us) >= FLUSH_FRAMES:
             self.flush()
@@ -162,6 +163,7 @@ class Recorder:
             samples_before=self._samples_before,
             actuators=self._control.take()["actuators"],
             health=estimator,
+            yaw=self._yaw.take(),
             body=self._body.take(),
             vehicle=status,
             origin=self._controller.state.origin,

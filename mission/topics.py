@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from autopilot.estimator.yaw_estimator import CONVERGED_VAR
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, TERRAIN_VALID, VELOCITY_VALID
 from common.geodesy import GeoPoint, geodetic_from_ned
+from common.kernels import YAW_MODELS
 from mission.angles import wxyz, yaw_rad
 from sim.sensors.range import MAX_DISTANCE_M, MIN_DISTANCE_M
 
@@ -36,6 +38,7 @@ class Batch:
     samples_before: Rows  # Samples of the frame before the first, one row
     actuators: Rows  # Actuators
     health: Rows  # EstimatorState
+    yaw: Rows  # YawEstimator
     body: Rows  # BodyState, the truth
     vehicle: Rows  # STATUS_DTYPE of mission.flight_log
     origin: GeoPoint
@@ -289,6 +292,29 @@ def _biases(batch: Batch) -> Columns:
     }
 
 
+def _yaw_estimator(batch: Batch) -> Columns:
+    times = batch.yaw["fix_time_us"]
+    is_new = np.diff(times, prepend=-1) != 0  # one row per fix, and one at the start of the batch
+    rows = batch.yaw[is_new]
+    heading = yaw_rad(rows["q_level_from_frd"])
+    return {
+        "timestamp": batch.time_us[is_new],
+        "timestamp_sample": rows["fix_time_us"],
+        "yaw_composite": _wrapped(rows["yaw_level"] + heading),
+        "yaw_variance": rows["yaw_var"],
+        "yaw_composite_valid": (rows["is_running"] != 0) & (rows["yaw_var"] < CONVERGED_VAR),
+        "yaw": _wrapped(rows["yaw"] + heading[:, None]),
+        "innov_vn": rows["innov_north"],
+        "innov_ve": rows["innov_east"],
+        "weight": rows["weight"],
+    }
+
+
+def _wrapped(angles: Rows) -> Rows:
+    wrapped: Rows = np.arctan2(np.sin(angles), np.cos(angles))
+    return wrapped
+
+
 INNOVATION_FIELDS = {
     "timestamp_sample": "uint64_t",
     "gps_hvel": "float[2]",
@@ -396,6 +422,16 @@ TOPICS = [
     ),
     Topic("estimator_innovations", INNOVATION_FIELDS, _innovations),
     Topic("estimator_innovation_variances", INNOVATION_FIELDS, _innovation_variances),
+    Topic(
+        "yaw_estimator_status",
+        {
+            **_SAMPLED,
+            **dict.fromkeys("yaw_composite yaw_variance".split(), "float"),
+            "yaw_composite_valid": "bool",
+            **dict.fromkeys("yaw innov_vn innov_ve weight".split(), f"float[{YAW_MODELS}]"),
+        },
+        _yaw_estimator,
+    ),
     Topic("wind", {**_SAMPLED, "windspeed_north": "float", "windspeed_east": "float"}, _wind),
     Topic(
         "estimator_sensor_bias",

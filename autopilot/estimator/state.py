@@ -180,8 +180,10 @@ class YawEstimator:
     step_s: float  # over which they were summed
     delta_vel_level: wp.vec3  # [m/s] summed since the last fix
     since_fix_s: float
-    fix_vel_ned: wp.vec3  # [m/s] of the last fix
+    fix_time_us: wp.int64  # of the last fix
+    fix_vel_ned: wp.vec3  # [m/s] its velocity
     is_running: int  # the five filters have started
+    running_s: float  # since the vehicle was last at rest
     yaw: vec5  # [rad] heading of the level frame's x axis
     vel_north: vec5  # [m/s]
     vel_east: vec5  # [m/s]
@@ -194,9 +196,12 @@ class YawEstimator:
     weight: vec5  # probabilities
     innov_north: vec5  # [m/s]
     innov_east: vec5  # [m/s]
+    ratio: vec5  # squared innovations over their variances: 2 expected
+    ratio_lpf: float  # of the weighted sum, halved: 1 expected
     yaw_level: float  # [rad] weighted heading of the level frame's x axis
     yaw_var: float  # [rad²]
     has_moved: int  # the vehicle was not at rest all the time since it was aligned
+    main_ratio_lpf: float  # of the main filter's at the same fixes
     disagree_s: float  # for how long the main filter's heading has differed by more than both can explain
 
 

@@ -30,13 +30,14 @@ _MAX_RATIO = wp.constant(25.0)  # squared innovation ratio beyond which an innov
 _MIN_WEIGHT = wp.constant(1.0e-5)  # a heading once ruled out can come back
 _STEP_S = wp.constant(0.0199)  # attitude is renewed at 50 Hz
 _MAX_FIX_GAP_S = wp.constant(1.0)  # after a longer silence the filters start anew
-_CONVERGED_VAR = wp.constant(0.0685)  # [rad²] (15 deg)²
+RATIO_S = wp.constant(2.0)  # over which the squared innovation ratio is averaged
+CONVERGED_VAR = wp.constant(0.0685)  # [rad²] (15 deg)²
 
 
 @wp.func
 def has_yaw(est: YawEstimator) -> bool:
     """The vehicle has moved enough for its heading to be known to 15 deg."""
-    return est.is_running == 1 and est.yaw_var < _CONVERGED_VAR
+    return est.is_running == 1 and est.yaw_var < CONVERGED_VAR
 
 
 @wp.func
@@ -50,6 +51,7 @@ def start_tilt(est: YawEstimator, q_ned_from_frd: wp.quat, gyro_bias_frd: wp.vec
     est.delta_vel_level = wp.vec3()
     est.since_fix_s = 0.0
     est.is_running = 0
+    est.running_s = 0.0
     return est
 
 
@@ -121,7 +123,10 @@ def start_models(est: YawEstimator, vel_north: float, vel_east: float, vel_var: 
         est.weight[k] = 1.0 / float(YAW_MODELS)
         est.innov_north[k] = 0.0
         est.innov_east[k] = 0.0
+        est.ratio[k] = 2.0
     est.is_running = 1
+    est.ratio_lpf = 1.0
+    est.main_ratio_lpf = 1.0
     return est
 
 
@@ -156,14 +161,15 @@ def fuse_model(est: YawEstimator, k: int, vel_north: float, vel_east: float, obs
     det = wp.max(s_nn * s_ee - s_ne * s_ne, 1.0e-9)
     north = vel_north - est.vel_north[k]
     east = vel_east - est.vel_east[k]
+    est.innov_north[k] = north
+    est.innov_east[k] = east
     ratio = (north * north * s_ee - 2.0 * north * east * s_ne + east * east * s_nn) / det
+    est.ratio[k] = ratio
     if ratio > _MAX_RATIO:
         shortened = wp.sqrt(_MAX_RATIO / ratio)
         north = north * shortened
         east = east * shortened
         ratio = _MAX_RATIO
-    est.innov_north[k] = north
-    est.innov_east[k] = east
     est.weight[k] = est.weight[k] * wp.exp(-0.5 * ratio) / wp.sqrt(det)
     # K = P H' S^-1, row by row
     k_nn = (est.p_nn[k] * s_ee - est.p_ne[k] * s_ne) / det
@@ -207,16 +213,19 @@ def combine_models(est: YawEstimator) -> YawEstimator:
         east += est.weight[k] * wp.sin(est.yaw[k])
     mean = wp.atan2(east, north)
     variance = float(0.0)
+    ratio = float(0.0)
     for k in range(YAW_MODELS):
         apart = wrap_pi(est.yaw[k] - mean)
         variance += est.weight[k] * (est.p_yy[k] + apart * apart)
+        ratio += est.weight[k] * est.ratio[k]
     est.yaw_level = mean
     est.yaw_var = variance
+    est.ratio_lpf = est.ratio_lpf + wp.min(est.since_fix_s / RATIO_S, 1.0) * (0.5 * ratio - est.ratio_lpf)
     return est
 
 
 @wp.func
-def take_velocity(est: YawEstimator, vel_ned: wp.vec3, vel_std: float) -> YawEstimator:
+def take_velocity(est: YawEstimator, time_us: wp.int64, vel_ned: wp.vec3, vel_std: float) -> YawEstimator:
     """The estimator after a GNSS velocity, to whose time the IMU samples have been summed."""
     est = turn_step(est)
     obs_var = vel_std * vel_std
@@ -229,6 +238,8 @@ def take_velocity(est: YawEstimator, vel_ned: wp.vec3, vel_std: float) -> YawEst
             est = fuse_model(est, k, vel_ned[0], vel_ned[1], obs_var)
         est = combine_models(est)
         est = correct_tilt(est, vel_ned - est.fix_vel_ned)
+    est.running_s = est.running_s + est.since_fix_s
+    est.fix_time_us = time_us
     est.fix_vel_ned = vel_ned
     est.delta_vel_level = wp.vec3()
     est.since_fix_s = 0.0

@@ -13,7 +13,7 @@ from autopilot.estimator.health import is_doubted
 from autopilot.estimator.params import GPS_CTRL_VEL, EstimatorParams
 from autopilot.estimator.sources.gnss import gnss_is_good, gnss_pos_std, gnss_vel_std, set_gnss_axis
 from autopilot.estimator.state import ACCEL_BIAS, ATT, GNSS_RING, GYRO_BIAS, VEL, Ekf
-from autopilot.estimator.yaw_estimator import estimated_yaw, has_yaw, start_tilt, take_velocity
+from autopilot.estimator.yaw_estimator import RATIO_S, estimated_yaw, has_yaw, start_tilt, take_velocity
 from autopilot.ports import GnssSample
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
 
@@ -21,6 +21,8 @@ wp.set_module_options({"enable_backward": False})
 
 _LEAST_ERROR = wp.constant(0.2618)  # [rad] 15 deg
 _SIGMAS = wp.constant(4.0)
+_WORSE = wp.constant(3.0)  # ratios of the two are alike, within 2.2, where heading is right, and 5 where it is wrong
+_SETTLED_S = wp.constant(10.0)  # guess
 _DISAGREE_S = wp.constant(1.0)
 _STARVED_ERROR = wp.constant(0.436)  # [rad] 25 deg, while GNSS velocity is rejected (PX4)
 _STARVED_S = wp.constant(1.0)  # (PX4)
@@ -55,20 +57,41 @@ def set_heading(ekf: Ekf, i: int, params: EstimatorParams, sample: GnssSample) -
     ekf.rows[i].nominal = nominal
     ekf.rows[i].is_yaw_aligned = 1
     ekf.yaw[i].disagree_s = 0.0
+    ekf.yaw[i].main_ratio_lpf = 1.0
 
 
 @wp.func
-def judge_heading(ekf: Ekf, i: int, sample: GnssSample, step_s: float) -> bool:
-    """Heading is wrong beyond doubt: for a while, or while GNSS velocity does not fit either."""
-    turn = wrap_pi(estimated_yaw(ekf.yaw[i]) - yaw_from_quat(ekf.rows[i].nominal.q_ned_from_frd))
+def main_ratio(ekf: Ekf, i: int, sample: GnssSample, vel_std: float) -> float:
+    """Squared horizontal innovations of the main filter over their variances, halved: 1 expected."""
+    innov_ned = sample.vel_ned - ekf.rows[i].nominal.vel_ned
+    ratio = float(0.0)
+    for axis in range(2):
+        innov_var = ekf.covariance[i, VEL + axis][VEL + axis] + vel_std * vel_std
+        ratio += innov_ned[axis] * innov_ned[axis] / innov_var
+    return 0.5 * ratio
+
+
+@wp.func
+def is_settled(ekf: Ekf, i: int) -> bool:
+    """The yaw estimator knows a heading, by a tilt that was taken at rest or has had time to come right."""
+    return has_yaw(ekf.yaw[i]) and (ekf.rows[i].alignment.is_moving == 0 or ekf.yaw[i].running_s > _SETTLED_S)
+
+
+@wp.func
+def heading_is_wrong(ekf: Ekf, i: int, sample: GnssSample, step_s: float) -> bool:
+    """Heading is wrong beyond doubt, for a while or while GNSS velocity is rejected.
+
+    Beyond doubt: it differs by more than both can explain, and the yaw estimator explains GNSS velocity better by far.
+    """
+    turn = wp.abs(wrap_pi(estimated_yaw(ekf.yaw[i]) - yaw_from_quat(ekf.rows[i].nominal.q_ned_from_frd)))
     sigma = wp.sqrt(ekf.yaw[i].yaw_var + ekf.covariance[i, ATT + 2][ATT + 2])
-    is_wrong = wp.abs(turn) > wp.max(_LEAST_ERROR, _SIGMAS * sigma)
-    if is_wrong and not is_doubted(ekf.rows[i]):
+    is_worse = ekf.yaw[i].main_ratio_lpf > _WORSE * ekf.yaw[i].ratio_lpf
+    if is_worse and turn > wp.max(_LEAST_ERROR, _SIGMAS * sigma) and not is_doubted(ekf.rows[i]):
         ekf.yaw[i].disagree_s += step_s
     else:
         ekf.yaw[i].disagree_s = 0.0
     starved_s = seconds_since(sample.time_us, ekf.rows[i].gnss_vel.fused_time_us)
-    is_starved = wp.abs(turn) > _STARVED_ERROR and starved_s > _STARVED_S
+    is_starved = is_worse and turn > _STARVED_ERROR and starved_s > _STARVED_S
     return ekf.yaw[i].disagree_s > _DISAGREE_S or is_starved
 
 
@@ -86,12 +109,15 @@ def take_heading(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) ->
         ekf.yaw[i] = start_tilt(ekf.yaw[i], nominal.q_ned_from_frd, nominal.gyro_bias_frd)
         return
     step_s = ekf.yaw[i].since_fix_s
-    ekf.yaw[i] = take_velocity(ekf.yaw[i], sample.vel_ned, gnss_vel_std(params, sample))
-    if not has_yaw(ekf.yaw[i]) or ekf.rows[i].external_yaw.is_active == 1:
+    vel_std = gnss_vel_std(params, sample)
+    gain = wp.min(step_s / RATIO_S, 1.0)
+    ekf.yaw[i].main_ratio_lpf += gain * (main_ratio(ekf, i, sample, vel_std) - ekf.yaw[i].main_ratio_lpf)
+    ekf.yaw[i] = take_velocity(ekf.yaw[i], sample.time_us, sample.vel_ned, vel_std)
+    if not is_settled(ekf, i) or ekf.rows[i].external_yaw.is_active == 1:
         return
     if ekf.rows[i].is_yaw_aligned == 0:
         set_heading(ekf, i, params, sample)
-    elif judge_heading(ekf, i, sample, step_s):
+    elif heading_is_wrong(ekf, i, sample, step_s):
         if ekf.rows[i].mag.is_active == 1:
             ekf.rows[i].is_mag_faulty = 1
         set_heading(ekf, i, params, sample)

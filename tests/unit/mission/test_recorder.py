@@ -93,6 +93,16 @@ def test_truth_and_estimate_are_the_rows(flown):
     assert estimate["xy_valid"][0] == 0  # at power-on
 
 
+def test_yaw_estimator_is_logged_and_finds_the_heading(flown):
+    logged = flown.topics["yaw_estimator_status"]
+    assert sum(logged[f"weight[{k}]"][-1] for k in range(5)) == pytest.approx(1.0, abs=1e-4)
+    assert not logged["yaw_composite_valid"][0]
+    assert logged["yaw_composite_valid"][-1]
+    heading = flown.topics["vehicle_local_position_groundtruth"]["heading"][-1]
+    error = (logged["yaw_composite"][-1] - heading + np.pi) % (2.0 * np.pi) - np.pi
+    assert abs(error) < 4.0 * np.sqrt(logged["yaw_variance"][-1])
+
+
 def test_quaternions_are_logged_with_the_scalar_first(flown):
     attitude = flown.topics["vehicle_attitude_groundtruth"]
     x, y, z, w = flown.body["q_ned_from_frd"].tolist()
