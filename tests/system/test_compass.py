@@ -81,7 +81,7 @@ def test_mission_with_a_turned_compass_is_flown_and_lands_at_home(angle_deg, win
     moving_us = history.time_us[np.argmax(speed > 2.0)]
     late = history.time_us > moving_us + FOUND_US
     assert yaw_error_deg(history)[late].max() < 5.0
-    assert off_plan_m(history.pos_ned_true).max() < 3.0
+    assert off_plan_m(history.pos_ned_true).max() < 6.0
     assert np.hypot(*history.pos_ned_true[-1, :2]) < 2.0
 
 
