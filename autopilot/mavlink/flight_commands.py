@@ -114,7 +114,7 @@ class FlightCommands(Service):
     def _set_home(self, command: Command) -> Reply:
         """Sets home.
 
-        Params: p1 1: here; otherwise p5, p6 place and p7 altitude.
+        Params: p1 1: here; otherwise p5, p6 place and p7 altitude; above sea level in any frame in PX4's dialect.
         Refused: TEMPORARILY_REJECTED without a position; DENIED for a place that is not on earth, more than 50 km from
         where the vehicle was switched on, or more than 10 km higher or lower.
         """

@@ -150,7 +150,7 @@ class MissionCommands(Service):
     def _roi_location(self, command: Command) -> Reply:
         """Points the vehicle, and a gimbal, at a place from now on, in every mode that flies itself.
 
-        Params: p5, p6 place; p7 altitude, NaN: that of home.
+        Params: p5, p6 place; p7 altitude, above sea level in any frame in PX4's dialect; NaN: that of home.
         Refused: DENIED for a place that is not on earth.
         """
         if isnan(command.z):

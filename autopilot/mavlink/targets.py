@@ -158,7 +158,7 @@ class TargetService(Service):
         Params: p1 radius [m], positive is clockwise, NaN: MC_ORBIT_RAD; p2 speed [m/s], negative turns the other way,
         NaN: 5 or what the circle allows; p3 heading: 0 to the centre, 1 as it was, 2 free, 3 along the circle, 4 by the
         yaw stick, 5 as before; p4 turns [rad], 0 or NaN: for ever; p5, p6 centre, NaN: here, or the present centre; p7
-        altitude, NaN: as it is.
+        altitude above sea level, in frames relative to home too (PX4), NaN: as it is.
         Refused: TEMPORARILY_REJECTED on the ground or without a position; DENIED for a radius or speed that cannot be
         flown, and for a heading that is none of these.
         """

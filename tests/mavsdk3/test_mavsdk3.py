@@ -8,11 +8,13 @@ import os
 import signal
 import socket
 import subprocess
+from itertools import pairwise
 from math import cos, hypot, radians
 from pathlib import Path
 
 import pytest
 from mavsdk import System
+from mavsdk.action import OrbitYawBehavior
 from mavsdk.mission import MissionItem, MissionPlan
 from mavsdk.offboard import OffboardError, PositionNedYaw, VelocityNedYaw
 from mavsdk.telemetry import FlightMode, LandedState
@@ -120,8 +122,43 @@ async def fly(port):
     await first(telemetry.armed(), lambda armed: not armed, 180.0)
     here = await first(telemetry.position_velocity_ned())
     assert hypot(here.position.north_m, here.position.east_m) < 3.0
+    await circle(drone, home)
+
+
+async def circle(drone, home):
+    """As the example do_orbit: 10 m above where it stands, told above sea level. Then the rate of highres_imu."""
+    telemetry = drone.telemetry
+    height_m = (await first(telemetry.position())).absolute_altitude_m + 10.0
+    await drone.action.set_takeoff_altitude(2.5)
+    await drone.action.arm()
+    await drone.action.takeoff()
+    await first(telemetry.landed_state(), lambda state: state == LandedState.IN_AIR)
+    place = (home.latitude_deg + 30.0 / METRES_PER_DEG, home.longitude_deg)
+    await drone.action.do_orbit(10.0, 2.0, OrbitYawBehavior.HOLD_FRONT_TO_CIRCLE_CENTER, *place, height_m)
+    heights_m, times_us = [], []
+
+    async def watch(stream, take):
+        async for value in stream:
+            take(value)
+
+    await telemetry.set_rate_imu(200.0)
+    watchers = [
+        asyncio.create_task(
+            watch(telemetry.position(), lambda position: heights_m.append(position.relative_altitude_m))
+        ),
+        asyncio.create_task(watch(telemetry.imu(), lambda imu: times_us.append(imu.timestamp_us))),
+    ]
+    await asyncio.sleep(45.0 / SPEED)
+    for watcher in watchers:
+        watcher.cancel()
+    assert max(heights_m) < 13.0
+    assert heights_m[-1] == pytest.approx(10.0, abs=2.0)
+    told_us = sorted(after - before for before, after in pairwise(times_us))
+    assert told_us[len(told_us) // 2] <= 8_000  # 200 Hz out of ticks of 4 ms
+    await drone.action.return_to_launch()
+    await first(telemetry.armed(), lambda armed: not armed, 180.0)
 
 
 def test_a_tutorial_flight(port):
-    """Parameters, arming, take-off, goto, offboard, a mission with return, landing."""
+    """Parameters, arming, take-off, goto, offboard, a mission with return, landing; an orbit."""
     asyncio.run(asyncio.wait_for(fly(port), 300.0))

@@ -5,13 +5,14 @@ import re
 import signal
 import socket
 import subprocess
+import sys
 import time
 
 import pytest
 from pyulog import ULog
 
 from mission.plan import DEFAULT_PLAN
-from tests.system.vehicle import HONEYGUIDE, IdleVehicle, free_ports, honeyguide
+from tests.system.vehicle import HONEYGUIDE, ROOT, IdleVehicle, free_ports, honeyguide
 
 LOCKSTEP = ("--once", "--speed", "max")
 
@@ -61,6 +62,26 @@ def test_port_in_use_is_refused(tmp_path):
         )
     assert_refused(result, rf"UDP port {api_port + 40} is in use .*: choose --gcs-port or --api-port$")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_second_vehicle_on_the_same_ports_is_told_before_anything_is_loaded():
+    gcs_port, api_port = free_ports()
+    words = ["fly", "--idle", "--gcs-port", str(gcs_port), "--api-port", str(api_port)]
+    code = f"""
+import sys
+from mission.cli import app
+try:
+    app({words})
+except SystemExit as end:
+    print(end.code, *sys.modules)
+"""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", gcs_port + 4020))
+        result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    exit_code, *modules = result.stdout.split()
+    assert exit_code == "2"
+    assert "another flight may be running" in result.stderr
+    assert not {"mission.flight", "sim.rig", "autopilot.node", "matplotlib", "cv2", "viser", "torch"} & set(modules)
 
 
 def test_folder_with_a_flight_is_left_alone(fly, tmp_path):
