@@ -65,7 +65,7 @@ def test_attributes_are_filled(vehicle):
     assert vehicle.system_status.state in ("STANDBY", "ACTIVE")
     assert vehicle.battery.voltage > 10.0
     assert vehicle.version.autopilot_type == 3
-    assert vehicle.version.release_type() is not None
+    until(lambda: vehicle.version.release_type() is not None)  # asked for after the first heartbeats
     assert vehicle.capabilities.param_float
     assert vehicle.capabilities.set_attitude_target
     assert vehicle.capabilities.command_int
