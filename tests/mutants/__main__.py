@@ -23,7 +23,7 @@ from cosmic_ray.work_item import TestOutcome
 MAVLINK, NAVIGATOR, COMMANDER = (f"tests/unit/autopilot/{name}" for name in ("mavlink", "navigator", "commander"))
 TARGETS = {
     "autopilot/mavlink/signing.py": [f"{MAVLINK}/test_signing.py"],
-    "autopilot/mavlink/bounds.py": [f"{MAVLINK}/test_bounds.py", f"{MAVLINK}/test_offboard.py"],
+    "autopilot/mavlink/bounds.py": [f"{MAVLINK}/test_bounds.py"],
     "autopilot/mavlink/intake.py": [f"{MAVLINK}/test_intake.py"],
     "autopilot/navigator/target.py": [f"{NAVIGATOR}/test_target.py"],
     "autopilot/navigator/fence.py": [f"{NAVIGATOR}/test_fence.py"],

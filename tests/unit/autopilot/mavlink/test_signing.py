@@ -118,13 +118,15 @@ def test_key_is_not_taken_from_another_machine_and_not_logged():
     assert not any(KEY in data for data in station.log)
 
 
-def test_key_with_an_absurd_time_works_all_the_same():
+@pytest.mark.parametrize("time", [(1 << 64) - 1, (1 << 48) - 1, 1 << 47])
+def test_key_with_an_absurd_time_works_all_the_same(time):
     station = Station()
-    station.mav.setup_signing_send(1, 1, list(KEY), (1 << 64) - 1)
+    station.mav.setup_signing_send(1, 1, list(KEY), time)
     station.frame()
     station.sign()
     assert all(message.get_signed() for message in station.frame())
     assert station.arms()
+    assert max(timestamps(station)) < NOW + MINUTE_TICKS  # its clock has not gone to where it would stand still
 
 
 def test_wrong_key_is_refused():
@@ -247,6 +249,9 @@ def test_key_file_is_private_whole_and_checked(tmp_path):
     store.save(SigningState(KEY, 77))
     assert FileStore(path).load() == SigningState(KEY, 77)
     assert path.stat().st_mode & 0o077 == 0
+    for time in (0, (1 << 48) - 1):  # the first and the last that a signature can carry
+        store.save(SigningState(KEY, time))
+        assert store.load().timestamp == time
     left = tmp_path / "signing.json.part"
     left.touch(mode=0o644)  # by a killed process
     left.chmod(0o644)
@@ -255,7 +260,7 @@ def test_key_file_is_private_whole_and_checked(tmp_path):
     good = f'"key": "{KEY.hex()}"'
     for rubbish in (
         "", "{}", '{"key": "00", "timestamp": 1}', '{"key": "", "timestamp": -1}', "[1]", "3", "[" * 100_000,
-        f"{{{good}, \"timestamp\": 1e400}}", f"{{{good}, \"timestamp\": NaN}}", f"{{{good}, \"timestamp\": {10**400}}}",
+        f"{{{good}, \"timestamp\": {1 << 48}}}", f"{{{good}, \"timestamp\": 1e400}}", f"{{{good}, \"timestamp\": NaN}}", f"{{{good}, \"timestamp\": {10**400}}}",
     ):  # fmt: skip
         path.write_text(rubbish)
         with pytest.raises(ValueError, match="is no signing key"):
