@@ -260,7 +260,8 @@ def test_key_file_is_private_whole_and_checked(tmp_path):
     good = f'"key": "{KEY.hex()}"'
     for rubbish in (
         "", "{}", '{"key": "00", "timestamp": 1}', '{"key": "", "timestamp": -1}', "[1]", "3", "[" * 100_000,
-        f"{{{good}, \"timestamp\": {1 << 48}}}", f"{{{good}, \"timestamp\": 1e400}}", f"{{{good}, \"timestamp\": NaN}}", f"{{{good}, \"timestamp\": {10**400}}}",
+        f"{{{good}, \"timestamp\": {1 << 48}}}", f"{{{good}, \"timestamp\": 1e400}}",
+        f"{{{good}, \"timestamp\": NaN}}", f"{{{good}, \"timestamp\": {10**400}}}",
     ):  # fmt: skip
         path.write_text(rubbish)
         with pytest.raises(ValueError, match="is no signing key"):
