@@ -53,6 +53,7 @@ from autopilot.estimator.sources.gnss import (
     take_gnss,
 )
 from autopilot.estimator.sources.heading import take_heading
+from autopilot.estimator.sources.heights import compare_heights
 from autopilot.estimator.sources.mag import MAG_STUCK_AFTER, MAG_STUCK_MOVED, mag_repeats, take_mag
 from autopilot.estimator.sources.range import (
     RANGE_STUCK_AFTER,
@@ -93,6 +94,7 @@ from common.kernels import GRAVITY_M_S2, vec24
 wp.set_module_options({"enable_backward": False})
 
 SOUNDNESS_SAMPLES = wp.constant(256)  # the covariance is looked over once a second; at once if the state is no number
+COMPARE_SAMPLES = wp.constant(64)  # heights are compared four times a second
 WATCH_SAMPLES = wp.constant(4)  # flags and deviations are renewed at 62 Hz
 
 
@@ -207,6 +209,8 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
         take_gnss(ekf, i, lenient, now_us)
     if is_waiting(ekf.rows[i].baro_inbox):
         take_baro(ekf, i, lenient, now_us)
+    if ekf.rows[i].imu_tail % COMPARE_SAMPLES == 0:
+        compare_heights(ekf, i, lenient)
     if is_waiting(ekf.rows[i].mag_inbox):
         take_mag(ekf, i, lenient, now_us, imu.gyro_frd)
     if is_waiting(ekf.rows[i].range_inbox):

@@ -247,6 +247,7 @@ class EstimatorState:
     is_mag_faulty: int  # heading was reset against the magnetometer; it is not used until it agrees again
     mag_stale_s: float  # for how long it has contradicted the heading that it alone had set
     mag_agree_s: float  # for how long a faulty magnetometer has agreed
+    baro_drift_var: float  # [m²] how far the barometer may have drifted since its reference height was taken
     origin_baro_height: float  # [m] standard-atmosphere height of the ned origin
     fault_count: int  # times the covariance lost its shape and was started anew
     estimate: Estimate

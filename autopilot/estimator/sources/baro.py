@@ -119,6 +119,7 @@ def take_baro(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
     if params.baro_ctrl == 0 or age_s > MAX_AGE_S or (params.height_ref == HEIGHT_REF_GNSS and is_gnss_good):
         ekf.rows[i].baro.is_active = 0
         return
+    before = ekf.rows[i].baro
     nominal, aid, origin_height = fuse_baro(
         params,
         ekf.covariance,
@@ -130,6 +131,10 @@ def take_baro(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
         age_s,
         is_gnss_good or is_healthy(ekf.rows[i].external_height),
     )
+    if before.is_active == 0 or nominal.slow[SLOW_BARO] == 0.0:
+        ekf.rows[i].baro_drift_var = 0.0
+    step_s = wp.min(seconds_since(sample.time_us, before.judged_time_us), _MAX_STEP_S)
+    ekf.rows[i].baro_drift_var += params.baro_walk * params.baro_walk * step_s
     ekf.rows[i].nominal = nominal
     ekf.rows[i].baro = aid
     ekf.rows[i].origin_baro_height = origin_height
