@@ -18,6 +18,7 @@ from autopilot.vehicle import Severity
 from common.airframe import Airframe
 from common.params import Parameter
 from mission.flight_log import STATUS_DTYPE, FlightLog
+from mission.kept_frames import FrameChoice, KeptRows
 from mission.topics import Batch
 from sim.rig import Rig
 
@@ -29,9 +30,26 @@ NO_MISSION, NOT_STARTED = 1, 2  # MISSION_STATE
 Rows = npt.NDArray[Any]
 
 
+HISTORY = np.dtype(
+    [
+        ("time_us", "u8"),
+        ("pos_ned_true", "f4", 3),
+        ("vel_ned_true", "f4", 3),
+        ("q_true", "f4", 4),
+        ("pos_ned_est", "f4", 3),
+        ("vel_ned_est", "f4", 3),
+        ("q_est", "f4", 4),
+        ("is_armed", "?"),
+        ("mode", "i4"),
+        ("mission_seq", "i4"),
+        ("battery_remaining", "f8"),
+    ]
+)
+
+
 @dataclass(slots=True)
 class History:
-    """What the summary needs of each frame; arrays of shape (frames,) or (frames, 3 or 4)."""
+    """What the summary needs of each frame kept; arrays of shape (frames,) or (frames, 3 or 4)."""
 
     time_us: Rows
     pos_ned_true: Rows
@@ -92,7 +110,9 @@ class Recorder:
         self._samples_before = np.zeros(1, dtype=rig.arrays.sensors.numpy()["samples"].dtype)
         self._judged_us = dict.fromkeys(AIDS, 0)
         self._in_band = {name: [0, 0] for name in AIDS}
-        self._history: list[History] = []
+        self._choice = FrameChoice()
+        self._is_kept: list[bool] = []
+        self._history = KeptRows(HISTORY)
         self._path = path
         self._airframe = airframe
         self._log: FlightLog | None = None if path is None else self._new_log()
@@ -108,6 +128,7 @@ class Recorder:
         if state.mission_state in (NO_MISSION, NOT_STARTED):
             self._mission_reached = -1
         self._time_us.append(time_us)
+        self._is_kept.append(self._choice.keeps(time_us, is_armed=state.is_armed))
         self._status.append(
             (
                 state.mode,
@@ -168,11 +189,13 @@ class Recorder:
             vehicle=status,
             origin=self._controller.state.origin,
         )
+        is_kept = np.array(self._is_kept)
         self._time_us.clear()
+        self._is_kept.clear()
         self._status.clear()
         self._samples_before = samples[-1:].copy()
         self._count_innovations(estimator, status["is_armed"])
-        self._history.append(_history(batch))
+        self._history.add(_history(batch), is_kept)
         imu = self._imu_ring.take()
         if self._log is not None:
             self._log.write(batch, imu)
@@ -235,24 +258,23 @@ class Recorder:
         self.flush()
         if self._log is not None:
             self._log.close()
-        names = History.__dataclass_fields__
-        if not self._history:
-            return History(*(np.empty(0) for _ in names))
-        return History(*(np.concatenate([getattr(part, name) for part in self._history]) for name in names))
+        rows = self._history.all()
+        return History(*(rows[name] for name in HISTORY.names or ()))
 
 
-def _history(batch: Batch) -> History:
+def _history(batch: Batch) -> Rows:
+    """The frames as rows of HISTORY."""
     estimate, body, status = batch.estimate, batch.body, batch.vehicle
-    return History(
-        time_us=batch.time_us,
-        pos_ned_true=body["pos_ned"],
-        vel_ned_true=body["vel_ned"],
-        q_true=body["q_ned_from_frd"],
-        pos_ned_est=estimate["pos_ned"],
-        vel_ned_est=estimate["vel_ned"],
-        q_est=estimate["q_ned_from_frd"],
-        is_armed=status["is_armed"],
-        mode=status["mode"].astype(int),
-        mission_seq=status["mission_current"].astype(int),
-        battery_remaining=status["battery_remaining"],
-    )
+    rows = np.empty(len(batch.time_us), HISTORY)
+    rows["time_us"] = batch.time_us
+    rows["pos_ned_true"] = body["pos_ned"]
+    rows["vel_ned_true"] = body["vel_ned"]
+    rows["q_true"] = body["q_ned_from_frd"]
+    rows["pos_ned_est"] = estimate["pos_ned"]
+    rows["vel_ned_est"] = estimate["vel_ned"]
+    rows["q_est"] = estimate["q_ned_from_frd"]
+    rows["is_armed"] = status["is_armed"]
+    rows["mode"] = status["mode"]
+    rows["mission_seq"] = status["mission_current"]
+    rows["battery_remaining"] = status["battery_remaining"]
+    return rows

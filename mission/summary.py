@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from autopilot.vehicle import Mode
 from common.geodesy import GeoPoint, ned_from_geodetic
+from common.kernels import FRAME_US
 from mission.plan import Plan
 from mission.recorder import History
 from sim.world.world import WorldMap
@@ -212,7 +213,7 @@ def summarise(
         result=result,
         is_success=is_success,
         simulated_s=float(history.time_us[-1] * 1e-6),
-        armed_s=float(armed.mean() * history.time_us[-1] * 1e-6),
+        armed_s=float(np.count_nonzero(armed) * FRAME_US * 1e-6),  # none of them is left out of a history
         ready_s=flight.ready_s,
         cross_track_p95_m=float(np.nanpercentile(cross, 95.0)) if np.isfinite(cross).any() else np.nan,
         landing_error_true_m=float(np.hypot(*(end_true - target)[:2])),

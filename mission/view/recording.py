@@ -1,5 +1,7 @@
 """What a run keeps for those who look at it later: a moment of each frame, and what the flight was made from.
 
+Of a vehicle disarmed for long it is a moment each second (`mission.kept_frames`).
+
 In: a running flight. Out: `replay.npz` in the run folder, small enough to keep: 0.4 MB a minute. Replays, films,
 HTML files and the scorecard are made from it alone.
 """
@@ -17,10 +19,11 @@ from numpy.typing import NDArray
 
 from common.files import write_whole
 from mission.flight import Flight, FlightConfig
+from mission.kept_frames import FrameChoice, KeptRows
 from mission.view.moment import MOMENT, Moment, Row, moment_of
 
 FILE = "replay.npz"
-_FIRST_ROWS = 1024
+_KEPT, _LEFT_OUT = np.ones(1, bool), np.zeros(1, bool)
 
 
 class RecordingError(ValueError):
@@ -93,16 +96,15 @@ class Recorder:
     ) -> None:
         self._flight, self._action = flight, action
         self._path_ned = np.array(path_ned, np.float32).reshape(-1, 3)
-        self._rows = np.zeros(_FIRST_ROWS, MOMENT)
-        self._count = 0
+        self._choice = FrameChoice()
+        self._rows = KeptRows(MOMENT)
 
     def frame(self) -> None:
         """Notes the frame that is ending."""
-        if self._count == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
-        self._rows[self._count] = moment_of(self._flight, self._action()).row
-        self._count += 1
+        is_kept = self._choice.keeps(self._flight.time_us, is_armed=self._flight.controller.state.is_armed)
+        row = moment_of(self._flight, self._action()).row
+        self._rows.add(row.reshape(1), _KEPT if is_kept else _LEFT_OUT)
 
     def recording(self) -> Recording:
         """Everything so far."""
-        return Recording(self._flight.config, self._rows[: self._count].copy(), self._path_ned)
+        return Recording(self._flight.config, self._rows.all(), self._path_ned)
