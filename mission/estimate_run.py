@@ -44,6 +44,7 @@ REAL_SENSORS: dict[str, float] = {
     "EKF2_REQ_SACC": 2.0,
     "EKF2_BARO_NOISE": 1.0,  # guess: propeller wash; PX4 has 3.5
     "EKF2_BARO_WALK": 0.1,  # guess
+    "EKF2_MAG_CHECK": 0,  # of old simulators' logs the field is not Earth's, and sound all the same
     "EKF2_MAG_NOISE": 0.05,  # PX4 default
     "EKF2_MAG_B_INIT": 0.03,  # guess: what a field calibration leaves
     "EKF2_MIN_RNG": 0.0,  # the origin is where the receiver stands

@@ -80,7 +80,7 @@ def _heading(state: VehicleState, params: ParameterTable) -> str:
 
 
 def _has_compass(params: ParameterTable) -> bool:
-    return int(params["EKF2_MAG_TYPE"]) != MAG_TYPE_NONE
+    return bool(int(params["EKF2_MAG_TYPE"]) != MAG_TYPE_NONE)
 
 
 def _height(state: VehicleState, _: ParameterTable) -> str:
