@@ -22,7 +22,8 @@ wp.set_module_options({"enable_backward": False})
 _LEAST_ERROR = wp.constant(0.2618)  # [rad] 15 deg
 _SIGMAS = wp.constant(4.0)
 _WORSE = wp.constant(3.0)  # ratios of the two are alike, within 2.2, where heading is right, and 5 where it is wrong
-_SETTLED_S = wp.constant(10.0)  # guess
+_MAX_RATIO = wp.constant(3.0)  # 1 expected; an accelerometer that is wrong by 2 m/s² leads to 5 and more
+_SETTLED_S = wp.constant(10.0)  # guess: for a tilt taken in motion
 _DISAGREE_S = wp.constant(1.0)
 _STARVED_ERROR = wp.constant(0.436)  # [rad] 25 deg, while GNSS velocity is rejected (PX4)
 _STARVED_S = wp.constant(1.0)  # (PX4)
@@ -73,8 +74,9 @@ def main_ratio(ekf: Ekf, i: int, sample: GnssSample, vel_std: float) -> float:
 
 @wp.func
 def is_settled(ekf: Ekf, i: int) -> bool:
-    """The yaw estimator knows a heading, by a tilt that was taken at rest or has had time to come right."""
-    return has_yaw(ekf.yaw[i]) and (ekf.rows[i].alignment.is_moving == 0 or ekf.yaw[i].running_s > _SETTLED_S)
+    """The yaw estimator knows a heading that explains GNSS velocity, by a tilt that has had time to come right."""
+    has_tilt = ekf.rows[i].alignment.is_moving == 0 or ekf.yaw[i].running_s > _SETTLED_S
+    return has_yaw(ekf.yaw[i]) and has_tilt and ekf.yaw[i].ratio_lpf < _MAX_RATIO
 
 
 @wp.func
