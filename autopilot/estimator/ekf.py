@@ -221,7 +221,7 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
         take_drag(ekf, i, lenient, now_us)
     if ekf.rows[i].stillness.is_still == 1:
         take_rest(ekf, i, lenient, now_us)
-    else:
+    if ekf.rows[i].stillness.still_s == 0.0:
         ekf.yaw[i].has_moved = 1
     if ekf.rows[i].nominal.reset_count != resets_before:
         ekf.rows[i].output = jump_output(ekf.rows[i].output, ekf.rows[i].nominal)

@@ -200,7 +200,7 @@ class YawEstimator:
     ratio_lpf: float  # of the weighted sum, halved: 1 expected
     yaw_level: float  # [rad] weighted heading of the level frame's x axis
     yaw_var: float  # [rad²]
-    has_moved: int  # the vehicle was not at rest all the time since it was aligned
+    has_moved: int  # the IMU has shown vibration or a turn since the vehicle was aligned
     main_ratio_lpf: float  # of the main filter's at the same fixes
     disagree_s: float  # for how long the main filter's heading has differed by more than both can explain
 
