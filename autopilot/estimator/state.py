@@ -124,8 +124,8 @@ class Stillness:
     gyro_var: float  # [(rad/s)²] about the mean, the three axes together
     accel_var: float  # [(m/s²)²]
     still_s: float  # for how long the IMU has shown no vibration and no turn
-    accel_recent_ned: wp.vec3  # [m/s²] mean of seconds
-    accel_before_ned: wp.vec3  # [m/s²] slower mean of that one: a velocity gained shows as their difference
+    accel_recent: wp.vec3  # [m/s²] specific force in the gyro's frame, mean of seconds
+    accel_before: wp.vec3  # [m/s²] slower mean of that one: a velocity gained shows as their difference
     gnss_vel_ned: wp.vec3  # [m/s] low-passed
     baro_height: float  # [m] tracked
     baro_climb: float  # [m/s]

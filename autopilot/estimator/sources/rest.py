@@ -3,9 +3,9 @@
 Holds tilt and biases together from alignment until GNSS takes over, and again after landing.
 
 A smooth drive, climb or hover looks to an IMU like rest: only the change from one to the other shows. So rest ends with
-any sign of motion: vibration, a turn, velocity gained by the accelerometer, GNSS velocity, barometer climb, the
-estimate itself; and never is while the commander says that the vehicle is in the air. It comes back when all of them,
-filtered, have been quiet for seconds, or at once with a landing that the commander tells of. GNSS alone would not do: a
+any sign of motion: vibration, a turn, velocity gained by the accelerometer, GNSS velocity, barometer climb; and never
+is while the commander says that the vehicle is in the air. It comes back when all of them, filtered, and the estimate
+have been quiet for seconds, or at once with a landing that the commander tells of. GNSS alone would not do: a
 threshold above its noise lets a slow climb pass.
 """
 
@@ -45,7 +45,7 @@ _MAX_GNSS_SPEED = wp.constant(0.15)  # [m/s] noise 0.02 per axis
 _BARO_S = wp.constant(2.0)  # time constant
 _BARO_GAP_S = wp.constant(1.0)
 _MAX_CLIMB = wp.constant(0.1)  # [m/s] noise 0.01
-_MAX_SPEED = wp.constant(0.2)  # [m/s] by the estimate
+_MAX_SPEED = wp.constant(0.2)  # [m/s] by the estimate, to be found at rest again
 _STILL_AFTER_S = wp.constant(0.4)  # from power-on
 _STILL_AGAIN_AFTER_S = wp.constant(3.0)  # the filters have forgotten most of a motion
 
@@ -77,19 +77,21 @@ def observe_imu(still: Stillness, imu: ImuSample) -> Stillness:
 
 
 @wp.func
-def observe_accel(still: Stillness, accel_ned: wp.vec3, dt_s: float) -> Stillness:
-    """Means of the acceleration since the IMU is quiet. Of ned, for a multirotor that drives leans and feels nothing.
+def observe_accel(still: Stillness, q_raw: wp.quat, imu: ImuSample) -> Stillness:
+    """Means of the specific force since the IMU is quiet, in a frame that only the gyro carries.
 
-    They wait for the estimator to settle.
+    A multirotor that drives leans, and feels nothing in its own frame; and what other sensors make of attitude, such as
+    a magnetometer on steel, is no motion. The means wait for the estimator to settle.
     """
+    force = wp.quat_rotate(q_raw, imu.accel_frd)
     if still.still_s > _RECENT_S:
-        recent_change = accel_ned - still.accel_recent_ned
-        still.accel_recent_ned = still.accel_recent_ned + recent_change * wp.min(dt_s / _RECENT_S, 1.0)
-        before_change = still.accel_recent_ned - still.accel_before_ned
-        still.accel_before_ned = still.accel_before_ned + before_change * wp.min(dt_s / _BEFORE_S, 1.0)
+        recent_change = force - still.accel_recent
+        still.accel_recent = still.accel_recent + recent_change * wp.min(imu.dt_s / _RECENT_S, 1.0)
+        before_change = still.accel_recent - still.accel_before
+        still.accel_before = still.accel_before + before_change * wp.min(imu.dt_s / _BEFORE_S, 1.0)
     else:
-        still.accel_recent_ned = wp.vec3()
-        still.accel_before_ned = wp.vec3()
+        still.accel_recent = wp.quat_rotate(q_raw, still.accel_mean_frd)
+        still.accel_before = still.accel_recent
     return still
 
 
@@ -121,16 +123,18 @@ def observe_baro(still: Stillness, sample: BaroSample, step_s: float) -> Stillne
 def shows_motion(still: Stillness, vel_ned: wp.vec3) -> bool:
     """Something other than vibration says that the vehicle moves.
 
+    The estimate speaks only against rest that has ended: upset by another sensor, it is rest that mends it.
+
     Args:
         still: after the newest samples.
         vel_ned: [m/s] by the estimate.
     """
-    gained = (still.accel_recent_ned - still.accel_before_ned) * _RECENT_S
+    gained = (still.accel_recent - still.accel_before) * _RECENT_S
     return (
         wp.length_sq(gained) > _MAX_GAIN * _MAX_GAIN
         or wp.length_sq(still.gnss_vel_ned) > _MAX_GNSS_SPEED * _MAX_GNSS_SPEED
         or wp.abs(still.baro_climb) > _MAX_CLIMB
-        or wp.length_sq(vel_ned) > _MAX_SPEED * _MAX_SPEED
+        or (still.has_moved == 1 and still.is_still == 0 and wp.length_sq(vel_ned) > _MAX_SPEED * _MAX_SPEED)
     )
 
 
@@ -172,7 +176,7 @@ def observe_stillness(ekf: Ekf, i: int, params: EstimatorParams, samples: Sample
     """Takes what is new in the samples, before the inboxes have seen them."""
     still = observe_imu(ekf.rows[i].stillness, samples.imu)
     if ekf.rows[i].phase == PHASE_RUNNING:
-        still = observe_accel(still, ekf.rows[i].estimate.accel_ned, samples.imu.dt_s)
+        still = observe_accel(still, ekf.rows[i].output.q_raw, samples.imu)
     if samples.gnss.time_us != ekf.rows[i].gnss_inbox.arrived_time_us:
         step_s = seconds_since(samples.gnss.time_us, ekf.rows[i].gnss_inbox.arrived_time_us)
         still = observe_gnss(params, still, samples.gnss, step_s)
