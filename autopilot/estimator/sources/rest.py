@@ -84,7 +84,7 @@ def observe_accel(still: Stillness, q_raw: wp.quat, imu: ImuSample) -> Stillness
     a magnetometer on steel, is no motion. The means wait for the estimator to settle.
     """
     force = wp.quat_rotate(q_raw, imu.accel_frd)
-    if still.still_s > _RECENT_S:
+    if still.still_s > _RECENT_S and wp.length_sq(still.accel_recent) > 0.0:
         recent_change = force - still.accel_recent
         still.accel_recent = still.accel_recent + recent_change * wp.min(imu.dt_s / _RECENT_S, 1.0)
         before_change = still.accel_recent - still.accel_before
@@ -177,6 +177,8 @@ def observe_stillness(ekf: Ekf, i: int, params: EstimatorParams, samples: Sample
     still = observe_imu(ekf.rows[i].stillness, samples.imu)
     if ekf.rows[i].phase == PHASE_RUNNING:
         still = observe_accel(still, ekf.rows[i].output.q_raw, samples.imu)
+    else:
+        still.accel_recent = wp.vec3()  # the frame begins with alignment
     if samples.gnss.time_us != ekf.rows[i].gnss_inbox.arrived_time_us:
         step_s = seconds_since(samples.gnss.time_us, ekf.rows[i].gnss_inbox.arrived_time_us)
         still = observe_gnss(params, still, samples.gnss, step_s)
