@@ -203,7 +203,7 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
     lenient = with_doubt(params, is_doubted(ekf.rows[i]))
     resets_before = ekf.rows[i].nominal.reset_count
     predict(ekf, i, lenient, imu)
-    ekf.yaw[i] = sum_imu(ekf.yaw[i], imu)
+    sum_imu(ekf, i, imu)
     if is_waiting(ekf.rows[i].gnss_inbox):
         take_heading(ekf, i, lenient, now_us)
         take_gnss(ekf, i, lenient, now_us)

@@ -11,7 +11,7 @@ between two fixes is a sum in that frame, so they are predicted once per fix.
 
 import warp as wp
 
-from autopilot.estimator.state import YawEstimator
+from autopilot.estimator.state import Ekf, YawEstimator
 from autopilot.ports import ImuSample
 from common.kernels import GRAVITY_M_S2, YAW_MODELS
 from common.rotation import quat_from_rotvec, quat_from_yaw, wrap_pi, yaw_from_quat
@@ -70,14 +70,13 @@ def turn_step(est: YawEstimator) -> YawEstimator:
 
 
 @wp.func
-def sum_imu(est: YawEstimator, imu: ImuSample) -> YawEstimator:
-    """The estimator one IMU sample later."""
-    est.delta_angle_frd = est.delta_angle_frd + imu.gyro_frd * imu.dt_s
-    est.delta_vel_frd = est.delta_vel_frd + imu.accel_frd * imu.dt_s
-    est.step_s = est.step_s + imu.dt_s
-    if est.step_s > _STEP_S:
-        est = turn_step(est)
-    return est
+def sum_imu(ekf: Ekf, i: int, imu: ImuSample) -> None:
+    """Takes an IMU sample; in place, since the whole estimator is moved at 50 Hz only."""
+    ekf.yaw[i].delta_angle_frd += imu.gyro_frd * imu.dt_s
+    ekf.yaw[i].delta_vel_frd += imu.accel_frd * imu.dt_s
+    ekf.yaw[i].step_s += imu.dt_s
+    if ekf.yaw[i].step_s > _STEP_S:
+        ekf.yaw[i] = turn_step(ekf.yaw[i])
 
 
 @wp.func
