@@ -4,6 +4,7 @@ A target is either the old file or the new one, never half of it; what a killed 
 """
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self
@@ -23,10 +24,14 @@ class PartFile:
         self._target: Path | None = None
         if isinstance(target, str | Path):
             self._target = Path(target)
-            self.stream: BinaryIO = part_path(self._target).open("wb", buffering=BUFFER_BYTES)
+            self.stream = self._opened(self._target)
         else:
             self.stream = target
-        self.write = self.stream.write
+        self.write: Callable[[bytes], int] = self.stream.write
+
+    @staticmethod
+    def _opened(target: Path) -> BinaryIO:
+        return part_path(target).open("wb", buffering=BUFFER_BYTES)
 
     def close(self) -> None:
         """Completes the file; a stream given by the caller stays open. A second call does nothing."""

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from common.files import PartFile
+from common.log_file import LogFile
 
 MAGIC = b"ULog\x01\x12\x35\x01"  # and the version, 1
 SYNC_MAGIC = bytes((0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12))
@@ -95,7 +95,7 @@ class UlogTopic:
         self._writer.append(record)
 
 
-class UlogWriter(PartFile):
+class UlogWriter(LogFile):
     """Writes one log; `close` gives it its name, an interrupted one stays readable under NAME.part."""
 
     def __init__(
@@ -105,6 +105,7 @@ class UlogWriter(PartFile):
         info: Mapping[str, InfoValue],
         parameters: Mapping[str, int | float],
         parameter_defaults: Mapping[str, int | float] | None = None,
+        on_trouble: Callable[[str], None] | None = None,
     ) -> None:
         """Opens the log.
 
@@ -114,11 +115,12 @@ class UlogWriter(PartFile):
             info: PX4's keys such as sys_name, ver_hw, ver_sw; a list of texts becomes a multi information message.
             parameters: values in use at the start.
             parameter_defaults: default values; those that differ from the value in use are noted in the log.
+            on_trouble: as of a `LogFile`.
 
         Raises:
             OSError: the folder is missing or may not be written.
         """
-        super().__init__(target)
+        super().__init__(target, on_trouble)
         self._start_us = start_us
         self._info = [record for key, value in info.items() for record in _info_records(key, value)]
         self._parameters = dict(parameters)
@@ -164,6 +166,14 @@ class UlogWriter(PartFile):
         self._bytes_since_sync += len(records)
         if self._bytes_since_sync >= SYNC_EVERY_BYTES:
             self.write(_record("S", SYNC_MAGIC))
+            self._bytes_since_sync = 0
+
+    def go_on(self, start_us: int) -> None:
+        """Begins a new part if this one is full; what follows is not before `start_us`."""
+        if self.is_full:
+            self.next_part()
+            self._start_us = start_us
+            self._has_data = False
             self._bytes_since_sync = 0
 
     def close(self) -> None:

@@ -20,7 +20,7 @@ from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.signing import SigningConfig
 from autopilot.node import FlightController, HostPorts
 from autopilot.persistence import Persistence
-from autopilot.vehicle import Mode, Severity
+from autopilot.vehicle import Mode
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder
@@ -40,6 +40,7 @@ from mission.simulator_params import TURBULENCE_SHARE, SimulatorParameters
 from mission.stream import StreamServer
 from mission.surroundings import Surroundings
 from mission.texts import Texts
+from mission.troubles import Troubles
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.esc import esc_reader
@@ -115,6 +116,7 @@ class Flight:
         self.persistence = None if state is None else Persistence(state, self.params, config.parameters, passing)
         self.rig.load_parameters(self.params)
         self.params.on_change(lambda _: self.rig.load_parameters(self.params))
+        self.troubles = Troubles(lambda: self.time_us)
         self.injector = RigInjector(self.rig, self.airframe, config.noise)
         self._camera_rig = CameraRig(self.rig, self.world, has_thread=has_camera_thread)
         self._camera_rig.prepare()
@@ -151,7 +153,7 @@ class Flight:
             links = [*links, *self._carry_camera(config.owner)]
         self.computers: list[Computer] = []
         vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
-        self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog")
+        self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog", self.troubles.note)
         on_frame = None if self._tlog is None else self._tlog.frame
         dialect = DIALECTS[config.dialect]
         if dialect is PX4:
@@ -169,8 +171,9 @@ class Flight:
             self._servers = [self.server, MavlinkServer(self.controller, [vehicle_end])]
         self.drone = Drone(client_end)
         log = None if folder is None else folder / "flight.ulg"
-        self.recorder = Recorder(log, self.rig, self.controller, self.airframe)
+        self.recorder = Recorder(log, self.rig, self.controller, self.airframe, self.troubles.note)
         for server in self._servers:
+            server.signer.on_trouble = self.troubles.note
             self.controller.attach(server)
         self.controller.attach(self.recorder)
         self.stream = stream
@@ -187,13 +190,14 @@ class Flight:
         """Gives the flight controller the logs, and what it remembers of earlier flights."""
         self.host.log_stream = self.recorder
         if log is not None:
-            self.host.logs = RunLog(log, self.recorder)
+            self.host.logs = RunLog(self.recorder)
         if state is not None:
-            self.host.logs = self._flight_logs = FlightLogs(state.folder / "logs", self.recorder, self.params)
+            logs = FlightLogs(state.folder / "logs", self.recorder, self.params, self.troubles.note)
+            self.host.logs = self._flight_logs = logs
         if self.persistence is not None:
             self.persistence.keep_lists(self.controller.lists)
             self.persistence.keep_home(self.controller.commander.home)
-            self.persistence.on_trouble = lambda text: self.server.statustext(Severity.WARNING, text)
+            self.persistence.on_trouble = self.troubles.note
 
     def _carry_camera(self, config: OwnerConfig) -> Sequence[Link]:
         """Brings the owner and the onboard camera in; the phone's link."""
@@ -209,7 +213,7 @@ class Flight:
         rig = VideoRig(self.rig, self.world, None if self.owner is None else self.owner.people)
         if self.controller.camera is not None:
             video.start(self.controller.camera, rig)
-        video.on_trouble = lambda text: self.server.statustext(Severity.WARNING, text)
+        video.on_trouble = self.troubles.note
         return rig
 
     def frame(self) -> None:
@@ -237,6 +241,7 @@ class Flight:
             self._flight_logs.frame(is_armed=self.controller.state.is_armed)
         if self.persistence is not None:
             self.persistence.frame(self.time_us)
+        self.troubles.tell(self.controller.commander.announcer)
         if isnan(self.ready_s) and self.controller.state.is_ready_to_arm:
             self.ready_s = self.time_us * 1e-6
 

@@ -83,15 +83,24 @@ class FlightLog:
         airframe: for the log's header.
         params: for the log's header.
         imu_limits: largest gyro [rad/s] and accelerometer [m/s^2] reading.
+        samples_before: Samples before the first frame, one row.
+        on_trouble: is told when the file cannot be written, which then ends.
     """
 
     def __init__(
-        self, path: Path | None, airframe: Airframe, params: ParameterTable, imu_limits: tuple[float, float]
+        self,
+        path: Path | None,
+        airframe: Airframe,
+        params: ParameterTable,
+        imu_limits: tuple[float, float],
+        samples_before: Rows,
+        on_trouble: Callable[[str], None],
     ) -> None:
         target = path if path is not None else cast("BinaryIO", _Nowhere())
-        self._log = _open_log(target, params, airframe)
+        self._log = _open_log(target, params, airframe, on_trouble)
         self._imu_limits = imu_limits
         self._imu_time_us = 0
+        self._samples_before = samples_before
         self._status_before = np.zeros(1, STATUS_DTYPE)
         self._topics: list[tuple[UlogTopic, Callable[[Batch], Any]]] = [
             (self._log.add_topic(topic.name, topic.fields), topic.columns) for topic in TOPICS
@@ -132,23 +141,41 @@ class FlightLog:
 
     def flush(self) -> None:
         """Hands what has been written to the file system; not once the log is complete."""
-        if not self._log.stream.closed:
-            self._log.stream.flush()
+        self._log.flush()
+
+    def parts(self) -> Sequence[Path]:
+        """The files of the log; the last one is under way."""
+        return self._log.parts()
 
     def close(self) -> None:
         """Completes the log."""
         self._log.close()
 
-    def write(self, batch: Batch, imu_rings: Rows) -> None:
-        """Logs a batch of frames, and the IMU samples that came in them."""
-        for topic, columns in self._topics:
-            topic.write(columns(batch))
+    def write(self, batch: Batch, imu_rings: Rows, is_kept: Rows) -> None:
+        """Logs a batch of frames, and the IMU samples that came in them.
+
+        Args:
+            batch: the frames.
+            imu_rings: the newest IMU samples at each of them.
+            is_kept: the frames to be logged if nobody listens; of the others the vehicle's state is.
+        """
+        self._log.go_on(int(batch.time_us[0]))
+        is_whole = bool(is_kept.all() or self._log.listeners)
+        kept = batch.only(slice(None) if is_whole else is_kept, self._samples_before)
+        if len(kept.time_us):
+            self._samples_before = kept.samples[-1:].copy()
+            for topic, columns in self._topics:
+                topic.write(columns(kept))
+        if is_whole:
+            self._write_imu(imu_rings)
+        self._write_status(batch)
+
+    def _write_imu(self, imu_rings: Rows) -> None:
         times, first = np.unique(imu_rings["time_us"], return_index=True)
         imu = imu_rings[first[times > self._imu_time_us]]
         if len(imu):
             self._imu_time_us = int(imu["time_us"][-1])
             self._imu_topic.write(_imu_columns(imu, *self._imu_limits))
-        self._write_status(batch)
 
     def _write_status(self, batch: Batch) -> None:
         """Vehicle state, landing and mission progress: when one of them changed, and twice a second."""
@@ -234,11 +261,14 @@ def _clipped_axes(samples: Rows, limit: float) -> Rows:
     return bits
 
 
-def _open_log(target: Path | BinaryIO, table: ParameterTable, airframe: Airframe) -> UlogWriter:
+def _open_log(
+    target: Path | BinaryIO, table: ParameterTable, airframe: Airframe, on_trouble: Callable[[str], None]
+) -> UlogWriter:
     return UlogWriter(
         target,
         0,
         {"sys_name": "Honeyguide", "ver_hw": "SIMULATED", "ver_sw": project_version(), "airframe": airframe.name},
         {name: table[name] for name in table},
         {name: table.declarations[name].default for name in table},
+        on_trouble,
     )

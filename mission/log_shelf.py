@@ -5,12 +5,13 @@ grows under it: killed at any moment, what is there can be read.
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
 from autopilot.host import LogFile
 from common.files import part_path
+from common.log_file import PART_BYTES_MAX
 from common.params import ParameterTable
 from mission.recorder import Recorder
 
@@ -20,26 +21,28 @@ OFF, ARMED_ONLY, FROM_BOOT_TO_DISARM, FROM_BOOT = -1, 0, 1, 2  # its values
 
 
 class RunLog:
-    """The log of this run alone, while it grows."""
+    """The log of this run alone, while it grows, in all its parts."""
 
-    def __init__(self, path: Path, recorder: Recorder) -> None:
-        self._path = path
+    def __init__(self, recorder: Recorder) -> None:
         self._recorder = recorder
 
     def logs(self) -> Sequence[LogFile]:
         self._recorder.flush_file()
-        stat = self._file().stat()
-        return [LogFile(self._path.name, stat.st_size, int(stat.st_mtime))]
+        stats = [(path.name, _file(path).stat()) for path in self._recorder.log_parts() if _file(path).exists()]
+        return [LogFile(name, stat.st_size, int(stat.st_mtime)) for name, stat in stats]
 
     def read(self, name: str, offset: int, count: int) -> bytes:
-        return _read(self._file(), offset, count) if name == self._path.name else b""
+        paths = [path for path in self._recorder.log_parts() if path.name == name]
+        return _read(_file(paths[0]), offset, count) if paths else b""
 
     def erase(self) -> int:
         return 0
 
-    def _file(self) -> Path:
-        part = part_path(self._path)
-        return part if part.exists() else self._path
+
+def _file(path: Path) -> Path:
+    """The log, or what there is of it."""
+    part = part_path(path)
+    return part if part.exists() else path
 
 
 class FlightLogs:
@@ -49,16 +52,22 @@ class FlightLogs:
         folder: made if it is missing; what an earlier run had begun and not got as far as its data is removed.
         recorder: where the data comes from.
         params: has SDLOG_MODE.
+        on_trouble: is told when a log cannot be written, which then ends; the next one is tried again.
     """
 
-    def __init__(self, folder: Path, recorder: Recorder, params: ParameterTable) -> None:
+    def __init__(
+        self, folder: Path, recorder: Recorder, params: ParameterTable, on_trouble: Callable[[str], None]
+    ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for leftover in folder.glob("*.part"):
             leftover.unlink()
         self._folder = folder
         self._recorder = recorder
         self._params = params
+        self._on_trouble = on_trouble
         self._file: BinaryIO | None = None
+        self._size = 0
+        self._has_failed = False
         self._name = ""
         self._was_armed = False
         if params[MODE_PARAMETER] >= FROM_BOOT_TO_DISARM:
@@ -66,6 +75,11 @@ class FlightLogs:
 
     def frame(self, *, is_armed: bool) -> None:
         """Begins and ends logs; at the end of each frame."""
+        if self._has_failed:
+            self.end()
+        elif self._size >= PART_BYTES_MAX:
+            self.end()
+            self._begin()
         if is_armed != self._was_armed:
             self._was_armed = is_armed
             mode = self._params[MODE_PARAMETER]
@@ -78,8 +92,13 @@ class FlightLogs:
         """Completes the log under way."""
         if self._file is not None:
             self._recorder.stop_listening(self._write)
-            self._file.close()
-            self._file = None
+            try:
+                self._file.close()
+            except OSError as error:
+                self._fail(error)
+            if self._has_failed:
+                part_path(self._folder / self._name).unlink(missing_ok=True)  # not got as far as its data
+        self._file, self._size, self._has_failed = None, 0, False
 
     def _begin(self) -> None:
         names = self._names()
@@ -88,15 +107,27 @@ class FlightLogs:
         self._name = f"log_{_number(names[-1]) + 1 if names else 1:05}.ulg"
         path = self._folder / self._name
         part = part_path(path)
-        header = self._recorder.listen(self._write)
-        self._file = part.open("wb")
-        self._file.write(header)
-        self._file.flush()
-        part.replace(path)
+        try:
+            self._file = part.open("wb")
+            self._write(self._recorder.listen(self._write))
+            self._file.flush()
+            part.replace(path)
+        except OSError as error:
+            self._fail(error)
 
     def _write(self, records: bytes) -> None:
-        if self._file is not None:
-            self._file.write(records)
+        if self._file is None or self._has_failed:
+            return
+        try:
+            self._size += self._file.write(records)
+        except OSError as error:
+            self._fail(error)
+
+    def _fail(self, error: OSError) -> None:
+        """The log ends with this frame: whoever writes to it is in the middle of that."""
+        if not self._has_failed:
+            self._on_trouble(f"{self._name} ended: {error.strerror}")
+        self._has_failed = True
 
     def _names(self) -> list[str]:
         return sorted(path.name for path in self._folder.glob("log_*.ulg") if _number(path.name))
@@ -106,7 +137,10 @@ class FlightLogs:
     def logs(self) -> Sequence[LogFile]:
         if self._file is not None:
             self._recorder.flush()
-            self._file.flush()
+            try:
+                self._file.flush()
+            except OSError as error:
+                self._fail(error)
         stats = [(name, os.stat(self._folder / name)) for name in self._names()]  # noqa: PTH116  one call per log
         return [LogFile(name, stat.st_size, int(stat.st_mtime)) for name, stat in stats]
 

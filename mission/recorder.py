@@ -4,7 +4,7 @@ In: the live kernel rows, copied raw once per frame. Out: columns, written once 
 costs a flight faster than real time almost nothing.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -91,9 +91,17 @@ class Recorder:
         rig: the simulation.
         controller: the flight controller of vehicle 0.
         airframe: for the log's header.
+        on_trouble: is told when the log cannot be written, which then ends.
     """
 
-    def __init__(self, path: Path | None, rig: Rig, controller: FlightController, airframe: Airframe) -> None:
+    def __init__(
+        self,
+        path: Path | None,
+        rig: Rig,
+        controller: FlightController,
+        airframe: Airframe,
+        on_trouble: Callable[[str], None],
+    ) -> None:
         autopilot = rig.arrays.autopilot
         self._controller = controller
         self._time_us: list[int] = []
@@ -115,12 +123,14 @@ class Recorder:
         self._history = KeptRows(HISTORY)
         self._path = path
         self._airframe = airframe
+        self._on_trouble = on_trouble
         self._log: FlightLog | None = None if path is None else self._new_log()
         self._changed: dict[str, int | float] = {}  # parameters, since the last flush
         controller.params.on_change(self._parameter_changed)
 
     def _new_log(self) -> FlightLog:
-        return FlightLog(self._path, self._airframe, self._controller.params, self._imu_limits)
+        params, before = self._controller.params, self._samples_before
+        return FlightLog(self._path, self._airframe, params, self._imu_limits, before, self._on_trouble)
 
     def frame(self, time_us: int) -> None:
         """Notes the frame that is ending."""
@@ -198,7 +208,7 @@ class Recorder:
         self._history.add(_history(batch), is_kept)
         imu = self._imu_ring.take()
         if self._log is not None:
-            self._log.write(batch, imu)
+            self._log.write(batch, imu, is_kept)
             for name, value in self._changed.items():
                 self._log.parameter(name, value)
         self._changed.clear()
@@ -235,6 +245,10 @@ class Recorder:
         self.flush()
         if self._log is not None:
             self._log.flush()
+
+    def log_parts(self) -> Sequence[Path]:
+        """The files of the log, the last one under the name that it has or will have."""
+        return self._stream().parts()
 
     def innovations_in_band(self) -> dict[str, float]:
         """Share of normalised innovations within their 95 % band while armed, per source; NaN where none came."""

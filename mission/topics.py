@@ -6,7 +6,7 @@ hold one value here are left out.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
 
@@ -42,6 +42,11 @@ class Batch:
     body: Rows  # BodyState, the truth
     vehicle: Rows  # STATUS_DTYPE of mission.flight_log
     origin: GeoPoint
+
+    def only(self, frames: Rows, samples_before: Rows) -> "Batch":
+        """Some of the frames; `samples_before` as of the frame before the first of them."""
+        names = ("time_us", "estimate", "samples", "actuators", "health", "yaw", "body", "vehicle")
+        return replace(self, samples_before=samples_before, **{name: getattr(self, name)[frames] for name in names})
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,7 +51,7 @@ from autopilot.mavlink.routing import Router
 from autopilot.mavlink.safety import SafetyService
 from autopilot.mavlink.service import CommandHandler, Handler, Service
 from autopilot.mavlink.shell import ShellService
-from autopilot.mavlink.signing import Judgement, SigningConfig
+from autopilot.mavlink.signing import Judgement, Signer, SigningConfig
 from autopilot.mavlink.signing_setup import SigningService
 from autopilot.mavlink.stream_rates import StreamRateService
 from autopilot.mavlink.streams import Stream
@@ -345,6 +345,11 @@ class MavlinkServer:
         sender.channel.schedule.set_group(fields.req_stream_id, rate_hz)
 
     # Announcer
+
+    @property
+    def signer(self) -> Signer:
+        """Signs what is sent, and judges what comes in."""
+        return self._endpoint.signer
 
     def statustext(self, severity: Severity, text: str) -> None:
         self._endpoint.text(severity, text)

@@ -22,6 +22,7 @@ KEY_LENGTH = 32
 EPOCH_UNIX_US = 1_420_070_400_000_000  # 2015-01-01 00:00 UTC
 TICK_US = 10
 MINUTE_TICKS = 6_000_000
+RETRY_TICKS = MINUTE_TICKS // 6  # after which a state that could not be stored is tried again
 STREAMS_MAX = 256  # (sysid, compid, link id) remembered against replays; no more are let in
 TIMESTAMP_MAX = (1 << 48) - 1
 TIMESTAMP_SANE_MAX = TIMESTAMP_MAX // 2  # the year 2059: a clock that starts later soon has nowhere to go
@@ -111,6 +112,7 @@ class Signer:
 
     def __init__(self, config: SigningConfig) -> None:
         self._config = config
+        self.on_trouble: Callable[[str], None] = lambda _: None  # hears when key or time cannot be stored
         state = config.store.load()
         self._key = state.key
         # Saved once a minute: what was sent after the last time must not be sent again, and what was heard until then
@@ -140,8 +142,12 @@ class Signer:
 
     def save(self, *, is_last: bool = False) -> None:
         """Stores key and time; `is_last`: nothing is sent or believed after it."""
-        self._config.store.save(SigningState(self._key, self._timestamp, is_last))
-        self._save_at = self._timestamp + MINUTE_TICKS
+        try:
+            self._config.store.save(SigningState(self._key, self._timestamp, is_last))
+            self._save_at = self._timestamp + MINUTE_TICKS
+        except OSError as error:  # a full disk is no reason to fall from the sky
+            self._save_at = self._timestamp + RETRY_TICKS
+            self.on_trouble(f"Signing key and time not stored: {error.strerror}")
 
     def _save_if_due(self) -> None:
         if self._timestamp >= self._save_at:

@@ -60,7 +60,7 @@ def write_until_killed(folder, done, kind):
     """Never returns; `done` gets a byte after each step."""
     params, lists, keeper, _state = start(folder)
     stream = Stream()
-    logs = FlightLogs(folder / "logs", stream, params)
+    logs = FlightLogs(folder / "logs", stream, params, print)
     step = 0
     os.write(done, b"R")
     while True:

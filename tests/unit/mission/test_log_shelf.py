@@ -32,7 +32,7 @@ class Stream:
 def shelf(folder, mode, stream=None):
     params = parameter_table()
     params.set("SDLOG_MODE", mode)
-    return FlightLogs(folder, stream or Stream(), params)
+    return FlightLogs(folder, stream or Stream(), params, print)
 
 
 def names(logs):
