@@ -18,9 +18,11 @@ from mission.options import FlightOptions
 from mission.plan import Plan
 from mission.plots import plot_flight
 from mission.progress import TABLE_PERIOD_S, Progress
+from mission.run_folder import OwnFiles
 from mission.script import fly_plan
 from mission.summary import Summary, curved_items, planned_path, summarise
 from mission.terminal import LINE_PERIOD_S, print_line
+from mission.view.recording import FILE as RECORDING
 from mission.view.recording import Recorder
 
 if TYPE_CHECKING:
@@ -50,8 +52,10 @@ def fly_to_the_end(
     advance(flight, _end(options, speed, running), speed, watchers, Progress(flight, running), console)
     if page is not None:
         view.close()
-    recorder.recording().save(folder)
-    return _finish(flight, running, plan, path_ned, folder, console)
+    files = OwnFiles(folder, console)
+    with files.writing(RECORDING):
+        recorder.recording().save(folder)
+    return _finish(flight, running, plan, path_ned, folder, files, console)
 
 
 def _end(options: FlightOptions, speed: float | None, running: Running | None) -> Callable[[Flight], bool]:
@@ -134,23 +138,28 @@ def _finish(
     plan: Plan | None,
     path_ned: list[tuple[int, Any]],
     folder: Path,
+    files: OwnFiles,
     console: Console,
 ) -> int:
     """Writes the run folder and prints the summary; returns the exit code."""
     history = flight.close()
+    for trouble in flight.troubles.take():
+        print_line(console, trouble)
     if len(history.time_us) == 0:
         console.print("the flight ended before its first frame")
         return 0 if running is None else 1
     summary = summarise(flight, history, running, path_ned, curved_items(plan) if plan else frozenset())
-    write_whole(folder / "summary.json", (json.dumps(summary.as_json(), indent=2) + "\n").encode())
+    with files.writing("summary.json") as path:
+        write_whole(path, (json.dumps(summary.as_json(), indent=2) + "\n").encode())
     title = f"{flight.airframe.name}, wind {flight.config.wind_m_s:g} m/s, seed {flight.config.seed}: {summary.result}"
-    plot_flight(history, flight.world, path_ned, title, folder / "flight.png")
+    with files.writing("flight.png") as path:
+        plot_flight(history, flight.world, path_ned, title, path)
     if summary.armed_s > 0.0:
         console.print(_summary_table(summary))
     else:
         print_line(console, f"result: {summary.result}\nsimulated: {summary.simulated_s:.1f} s, never armed")
-    print_line(console, f"logs, summary and picture: {folder}")
-    return 0 if summary.is_success or running is None else 1
+    print_line(console, f"{'what could be written' if files.missing else 'logs, summary and picture'}: {folder}")
+    return 0 if (summary.is_success or running is None) and not files.missing else 1
 
 
 def _summary_table(summary: Summary) -> Table:

@@ -3,14 +3,12 @@
 Light to import: what is wrong is told, and a port that is taken, before anything heavy is loaded.
 """
 
-from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 from rich.console import Console
 
 from common.airframe import AirframeError, load_airframe
-from common.clock import wall_date_text
 from common.files import write_whole
 from common.geodesy import GeoPoint
 from common.params import ParameterError
@@ -21,6 +19,7 @@ from mission.net_guard import LOOPBACK
 from mission.options import FlightOptions, UserError, check_end, flight_config, speed_of
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
 from mission.rtp import session_description
+from mission.run_folder import OwnFiles, run_folder
 from mission.state import StateError, keep_home, open_state
 from mission.terminal import busy, print_line
 
@@ -36,17 +35,18 @@ def fly_session(options: FlightOptions) -> int:
     """
     speed = speed_of(options.speed)
     check_end(options, speed)
-    if options.state is None:
-        return _fly(options, speed, None)
-    try:
-        state = open_state(options.state)
-    except StateError as error:
-        raise UserError(str(error)) from error
-    with closing(state):
-        return _fly(options, speed, state)
+    with ExitStack() as held:
+        if options.state is None:
+            return _fly(options, speed, None, held)
+        try:
+            state = held.enter_context(closing(open_state(options.state)))
+        except StateError as error:
+            raise UserError(str(error)) from error
+        return _fly(options, speed, state, held)
 
 
-def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None) -> int:
+def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None, held: ExitStack) -> int:
+    """The flight, with what must be held until its end."""
     console = Console()
     config = flight_config(options, state)
     plan = None if options.is_idle else _plan(options.plan, config.home)
@@ -61,7 +61,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None)
     video = open_video(options.video_port, options.host, may_wait=is_reached)
     images = None if speed is None else open_images(options)
     page = open_page(options.view_port) if options.has_view else None
-    folder = new_folder(options.run_folder)
+    folder = held.enter_context(run_folder(options.run_folder))
     if state is not None and options.home is not None:
         keep_home(state, config.home)
     with busy(console, "loading the program") as say:
@@ -110,30 +110,6 @@ def _plan(path: Path | None, home: GeoPoint) -> Plan:
         raise UserError(str(error)) from error
 
 
-def new_folder(folder: Path | None) -> Path:
-    """Makes the run folder; one that already holds a flight is left alone."""
-    if folder is None:
-        stem = Path("runs") / wall_date_text()
-        folder = next(path for path in _candidates(stem) if not path.exists())
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any((folder / name).exists() for name in ("flight.ulg", "flight.tlog", "summary.json")):
-            raise UserError(f"{folder}: already holds a flight; name another --run-folder")
-        write_whole(folder / "flight.tlog", b"")
-        (folder / "flight.tlog").unlink()
-    except OSError as error:
-        raise UserError(f"{folder}: cannot write there: {error.strerror}") from error
-    return folder
-
-
-def _candidates(stem: Path) -> Iterator[Path]:
-    yield stem
-    number = 2
-    while True:
-        yield stem.with_name(f"{stem.name}-{number}")
-        number += 1
-
-
 def _print_start(options: FlightOptions, speed: float | None, folder: Path, console: Console) -> None:
     ports = f"UDP {options.gcs_port} (ground stations), {options.api_port} (offboard API)"
     if options.tcp_port is not None:
@@ -146,7 +122,8 @@ def _print_start(options: FlightOptions, speed: float | None, folder: Path, cons
     if options.stream_port:
         print_line(console, f"the camera's picture: http://{LOOPBACK}:{options.stream_port}/")
     if options.video_port:
-        write_whole(folder / VIDEO, session_description(options.host, options.video_port).encode())
+        with OwnFiles(folder, console).writing(VIDEO) as path:
+            write_whole(path, session_description(options.host, options.video_port).encode())
         print_line(console, f"video: UDP {options.video_port} (H.264 in RTP); players open {folder / VIDEO}")
     if options.wind_m_s > WIND_EXPECTED_M_S:
         print_line(console, f"wind of {options.wind_m_s:g} m/s is more than an x500 can be relied on to fly")

@@ -6,8 +6,8 @@ MAVLink over a link in memory, so that everything but ground stations and the li
 
 import json
 from collections.abc import Callable
+from contextlib import ExitStack
 from math import isfinite
-from pathlib import Path
 
 import numpy as np
 from rich.console import Console
@@ -28,10 +28,11 @@ from mission.follow.watch import FollowWatch
 from mission.loading import load_kernels
 from mission.options import UserError, speed_of
 from mission.progress import Progress
+from mission.run_folder import OwnFiles, run_folder
 from mission.script import Drone
-from mission.session import new_folder
 from mission.terminal import busy, print_line
 from mission.view.film import write_film
+from mission.view.recording import FILE as RECORDING
 from mission.view.recording import Recorder
 from policies.companion.companion import Companion, Pilot
 from policies.companion.engagement import Phase
@@ -51,6 +52,12 @@ def follow_session(options: FollowOptions) -> int:
     Raises:
         UserError: an option, file, port or folder is wrong; nothing has been written.
     """
+    with ExitStack() as held:
+        return _follow(options, held)
+
+
+def _follow(options: FollowOptions, held: ExitStack) -> int:
+    """The flight, with what must be held until its end."""
     console = Console()
     speed = speed_of(options.flight.speed)
     config = follow_config(options)
@@ -61,7 +68,7 @@ def follow_session(options: FollowOptions) -> int:
     except (AirframeError, ParameterError, LinkError) as error:
         raise UserError(str(error)) from error
     page = open_page(options.flight.view_port) if options.flight.has_view else None
-    folder = new_folder(options.flight.run_folder)
+    folder = held.enter_context(run_folder(options.flight.run_folder))
     with busy(console, "loading kernels") as say:
         load_kernels(say, has_camera=page is not None, has_owner=True)
         say("building the world")
@@ -87,10 +94,14 @@ def follow_session(options: FollowOptions) -> int:
         view.close()
     running.cancel()
     flight.close()
-    recorder.recording().save(folder)
+    for trouble in flight.troubles.take():
+        print_line(console, trouble)
+    files = OwnFiles(folder, console)
+    with files.writing(RECORDING):
+        recorder.recording().save(folder)
     if running.error is not None:
         print_line(console, f"result: {running.error}")
-    exit_code = finish(watch.track(), folder, console, is_landed=running.error is None)
+    exit_code = finish(watch.track(), files, console, is_landed=running.error is None)
     print_line(console, latency_text(companion))
     if options.has_film:
         write_film(recorder.recording(), flight.world, folder / FILM, console)
@@ -127,17 +138,18 @@ def score_lines(watch: FollowWatch, companion: Companion) -> tuple[str, ...]:
     return (state, f"within {band}: {100.0 * is_near.mean():.0f} %, median {float(np.median(distance)):.1f} m")
 
 
-def finish(track: Track | None, folder: Path, console: Console, *, is_landed: bool) -> int:
+def finish(track: Track | None, files: OwnFiles, console: Console, *, is_landed: bool) -> int:
     """Writes and shows the scorecard of what was followed, if anything was; returns the exit code."""
     is_good = False
     if track is not None:
         card = scorecard([track])
         is_good = is_landed and track.is_whole and card.collision.value == 0.0
-        write_whole(folder / "summary.json", (json.dumps(summary_of(card), indent=2) + "\n").encode())
+        with files.writing("summary.json") as path:
+            write_whole(path, (json.dumps(summary_of(card), indent=2) + "\n").encode())
         console.print(_table(card))
     else:
         print_line(console, "the owner was not followed: there is no scorecard")
-    return 0 if is_good else 1
+    return 0 if is_good and not files.missing else 1
 
 
 def summary_of(card: Scorecard) -> dict[str, float | None]:

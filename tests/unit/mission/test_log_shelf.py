@@ -125,3 +125,42 @@ def test_parameter_change_is_in_the_log(tmp_path):
     flight.close()
     ulog = ULog(str(tmp_path / "flight.ulg"))
     assert [(name, value) for _, name, value in ulog.changed_parameters] == [("MIS_TAKEOFF_ALT", 7.5)]
+
+
+def test_log_from_boot_goes_on_in_the_next_one_when_it_is_large(tmp_path, monkeypatch):
+    monkeypatch.setattr("mission.log_shelf.PART_BYTES_MAX", 1000)
+    stream = Stream()
+    logs = shelf(tmp_path, 2, stream)
+    for _ in range(3):
+        for listener in list(stream.listeners):
+            listener(bytes(994))
+        logs.frame(is_armed=False)
+    assert names(logs) == [f"log_{k:05}.ulg" for k in range(1, 5)]
+    assert len(stream.listeners) == 1
+    logs.end()
+
+
+def test_log_that_cannot_be_written_ends_and_the_next_one_is_tried(tmp_path, monkeypatch):
+    told, stream, params = [], Stream(), parameter_table()
+    logs = FlightLogs(tmp_path, stream, params, told.append)
+    logs.frame(is_armed=True)
+    logs._file.close()
+    monkeypatch.setattr(logs, "_file", FullFile())
+    for _ in range(3):
+        stream.listeners[0](b"row")
+    logs.frame(is_armed=True)
+    assert (told, stream.listeners) == (["log_00001.ulg ended: No space left on device"], [])
+    for is_armed in (True, False, True):
+        logs.frame(is_armed=is_armed)
+    assert names(logs) == ["log_00001.ulg", "log_00002.ulg"]
+    assert len(told) == 1
+    logs.end()
+
+
+class FullFile:
+    """A file on a full disk."""
+
+    def write(self, _):
+        raise OSError(28, "No space left on device")
+
+    flush = close = lambda self: self.write(b"")

@@ -12,6 +12,7 @@ from mission.flight import Flight, FlightConfig
 from mission.flight_log import NAVIGATION_STATES
 from mission.topics import TOPICS, wxyz
 from sim.faults import set_fault
+from sim.world.world import WorldConfig
 
 SECONDS = 14.0
 FRAMES = round(SECONDS * 50)
@@ -221,3 +222,44 @@ def test_a_flight_without_a_folder_writes_nothing_and_still_has_a_history(tmp_pa
 def test_a_flight_of_no_frames_has_an_empty_history_and_a_whole_log(tmp_path):
     assert len(Flight(FlightConfig(), folder=tmp_path).close().time_us) == 0
     assert ULog(str(tmp_path / "flight.ulg")).data_list == []
+
+
+def test_log_of_an_idle_vehicle_thins_out_until_somebody_listens(tmp_path):
+    flight = Flight(FlightConfig(world=WorldConfig(size_m=64.0, trees_per_ha=0.0)), folder=tmp_path)
+
+    def until_s(seconds):
+        flight.run(lambda f: f.time_us >= seconds * 1_000_000)
+
+    until_s(130.0)
+    records = []
+    listener = records.append
+    flight.recorder.listen(listener)
+    until_s(132.0)
+    flight.recorder.stop_listening(listener)
+    until_s(140.0)
+    flight.close()
+    topics = {data.name: data.data["timestamp"] * 1e-6 for data in ULog(str(tmp_path / "flight.ulg")).data_list}
+    assert records
+    for name, rate_hz in {"vehicle_attitude": 50, "sensor_combined": 250}.items():
+        assert np.count_nonzero(topics[name] <= 120.0) == pytest.approx(120 * rate_hz, abs=5)
+        assert np.count_nonzero((topics[name] > 130.02) & (topics[name] <= 131.98)) == pytest.approx(
+            1.96 * rate_hz, abs=5
+        )
+    assert topics["vehicle_attitude"][-8:].tolist() == list(range(133, 141))
+    assert topics["sensor_combined"][-1] < 132.1
+    assert np.count_nonzero(topics["vehicle_gps_position"] > 132.1) == 8  # the newest of each second
+    assert np.diff(topics["vehicle_status"]).max() <= 0.5 + 1e-9
+
+
+def test_log_of_a_long_flight_goes_on_in_parts_that_clients_can_download(tmp_path, monkeypatch):
+    monkeypatch.setattr("common.log_file.PART_BYTES_MAX", 400_000)
+    flight = Flight(FlightConfig(world=WorldConfig(size_m=64.0, trees_per_ha=0.0)), folder=tmp_path)
+    flight.fly(lambda drone: drone.sleep(15.0))
+    shelf = flight.host.logs
+    listed = {log.name: log.size for log in shelf.logs()}
+    assert list(listed) == ["flight.ulg", "flight-2.ulg", "flight-3.ulg"]
+    for name, size in listed.items():
+        (tmp_path / f"copy-{name}").write_bytes(shelf.read(name, 0, size))
+    times = [ULog(str(tmp_path / f"copy-{name}")).get_dataset("vehicle_attitude").data["timestamp"] for name in listed]
+    np.testing.assert_array_equal(np.concatenate(times), np.arange(1, len(np.concatenate(times)) + 1) * 20_000)
+    flight.close()
