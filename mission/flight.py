@@ -25,6 +25,7 @@ from common.airframe import Airframe, load_airframe
 from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder
 from common.kernels import FRAME_TICKS, FRAME_US, TICK_US
+from common.params import Parameter
 from common.records import row_reader
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
@@ -114,8 +115,9 @@ class Flight:
         self.params = flight_parameters(config, self.airframe)
         passing = {name for name in self.params if name.startswith(SIMULATOR_PREFIX)}
         self.persistence = None if state is None else Persistence(state, self.params, config.parameters, passing)
-        self.rig.load_parameters(self.params)
-        self.params.on_change(lambda _: self.rig.load_parameters(self.params))
+        self._has_new_parameters = True
+        self._load_parameters()
+        self.params.on_change(self._parameter_changed)
         self.troubles = Troubles(lambda: self.time_us)
         self.injector = RigInjector(self.rig, self.airframe, config.noise)
         self._camera_rig = CameraRig(self.rig, self.world, has_thread=has_camera_thread)
@@ -137,7 +139,7 @@ class Flight:
             self.airframe,
             config.home,
             self.texts,
-            on_reboot=self.rig.reboot,
+            on_reboot=self._reboot,
             injector=self.injector,
             host=self.host,
             turntable=Turntable(self.rig.arrays.body.numpy()),
@@ -169,6 +171,7 @@ class Flight:
                 announces_components=config.announces_components,
             )
             self._servers = [self.server, MavlinkServer(self.controller, [vehicle_end])]
+        self.server.prepare()
         self.drone = Drone(client_end)
         log = None if folder is None else folder / "flight.ulg"
         self.recorder = Recorder(log, self.rig, self.controller, self.airframe, self.troubles.note)
@@ -216,8 +219,22 @@ class Flight:
         video.on_trouble = self.troubles.note
         return rig
 
+    def _parameter_changed(self, _: Parameter) -> None:
+        self._has_new_parameters = True
+
+    def _load_parameters(self) -> None:
+        """Gives the kernels what has changed: once per frame, however many parameters clients set in it."""
+        if self._has_new_parameters:
+            self._has_new_parameters = False
+            self.rig.load_parameters(self.params)
+
+    def _reboot(self) -> None:
+        self._load_parameters()
+        self.rig.reboot()
+
     def frame(self) -> None:
         """Advances by 20 ms."""
+        self._load_parameters()
         self.injector.frame(self.time_us)
         if any(server.needs_ticks for server in self._servers):
             self._advance_by_ticks()

@@ -81,7 +81,7 @@ class Rig:
         self.arrays.sensors = self._rows(SensorState, SensorState())
         self.arrays.faults = self._rows(Faults, Faults())
         self.arrays.autopilot = self._autopilot(airframe)
-        self._home = home
+        self._field_ned_gauss = field_ned_gauss(home.lat_deg, home.lon_deg, home.alt_m)
         self._commands: dict[int, list[Any]] = {}
         self._kernel = advance_kernel(has_estimator=has_estimator)
         self._workers = Workers(vehicle_count, threads)
@@ -120,8 +120,7 @@ class Rig:
 
     def load_parameters(self, table: ParameterTable) -> None:
         """Gives every flight controller the values of a parameter table, and the magnetic field of the place."""
-        field = field_ned_gauss(self._home.lat_deg, self._home.lon_deg, self._home.alt_m)
-        estimator = estimator_fields(table) | {"earth_field_ned_gauss": field}
+        estimator = estimator_fields(table) | {"earth_field_ned_gauss": self._field_ned_gauss}
         self._write_rows(self.arrays.autopilot.ekf.params, estimator)
         self._write_rows(self.arrays.autopilot.control_params, table.fields(CONTROL_PARAMETERS))
 

@@ -157,7 +157,7 @@ class FtpService(Service):
         if last is not None and last.request == raw and self._endpoint.time_us - last.time_us < REPLY_KEPT_US:
             self._send(sender, last.payload)
         elif not self._checksums.has(sender, raw):
-            if self._budget.is_left and not self._budget.waiting:
+            if self._budget.is_left and not self._budget.has_waiting:
                 self._carry_out(sender, raw)
             else:
                 self._budget.wait(sender, raw)
@@ -193,8 +193,8 @@ class FtpService(Service):
     def frame(self) -> None:
         """Goes on with what waits, sends the next packets of the bursts and closes sessions that nobody uses."""
         budget = self._budget
-        while budget.waiting and budget.is_left:
-            self._carry_out(*budget.waiting.popleft())
+        while budget.has_waiting and budget.is_left:
+            self._carry_out(*budget.take())
         self._checksums.go_on(budget)
         budget.renew()
         if not self._sessions:

@@ -4,7 +4,7 @@ The costs are counted, not measured, so that a flight in lockstep is the same ea
 """
 
 import zlib
-from collections import OrderedDict, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -30,7 +30,12 @@ class Budget:
 
     def __init__(self) -> None:
         self._left = WORK_PER_FRAME
-        self.waiting: deque[tuple[Sender, bytes]] = deque()
+        self._waiting: deque[tuple[Sender, bytes]] = deque()
+        self._own: Counter[Channel] = Counter()  # of those that wait
+
+    @property
+    def has_waiting(self) -> bool:
+        return bool(self._waiting)
 
     @property
     def is_left(self) -> bool:
@@ -45,9 +50,19 @@ class Budget:
 
     def wait(self, sender: Sender, raw: bytes) -> None:
         """Keeps a request for later, if there is room and it is not there already."""
-        own = sum(other.channel is sender.channel for other, _ in self.waiting)
-        if len(self.waiting) < QUEUE_MAX and own < QUEUE_MAX_PER_CHANNEL and (sender, raw) not in self.waiting:
-            self.waiting.append((sender, raw))
+        if len(self._waiting) >= QUEUE_MAX or self._own[sender.channel] >= QUEUE_MAX_PER_CHANNEL:
+            return
+        if (sender, raw) not in self._waiting:
+            self._waiting.append((sender, raw))
+            self._own[sender.channel] += 1
+
+    def take(self) -> tuple[Sender, bytes]:
+        """The request that has waited longest."""
+        sender, raw = self._waiting.popleft()
+        self._own[sender.channel] -= 1
+        if not self._own[sender.channel]:
+            del self._own[sender.channel]
+        return sender, raw
 
 
 @dataclass(slots=True)

@@ -1,7 +1,7 @@
 """Component metadata: what events and parameters mean, in files that clients fetch by MAVLink FTP.
 
-In: requests for COMPONENT_METADATA. Out: where the general file is; it names the others. They are made when first asked
-for, and never change while the vehicle runs.
+In: requests for COMPONENT_METADATA. Out: where the general file is; it names the others. They are made
+once, and never change while the vehicle runs.
 """
 
 import json
@@ -49,6 +49,10 @@ class MetadataService(Service):
         """Where the general file is, and its checksum."""
         time_ms = boot_ms(self._endpoint.time_us)
         return [_COMPONENT_METADATA.pack(time_ms, checksum(self.files[GENERAL]), _uri(GENERAL))]
+
+    def prepare(self) -> None:
+        """Makes the files: packing them takes a frame."""
+        _ = self.files
 
     @cached_property
     def files(self) -> dict[str, bytes]:

@@ -139,7 +139,7 @@ class MavlinkServer:
     def _services(self) -> list[Service]:
         endpoint = self._endpoint
         parameters, goto = ParameterService(endpoint), GotoService(endpoint)
-        metadata, missions = MetadataService(endpoint), MissionService(endpoint, goto)
+        self._metadata, missions = MetadataService(endpoint), MissionService(endpoint, goto)
         self._events = EventService(endpoint)
         self._compass = CompassService(endpoint)
         return [
@@ -160,8 +160,8 @@ class MavlinkServer:
             StreamRateService(endpoint),
             CalibrationService(endpoint),
             self._compass,
-            metadata,
-            FtpService(endpoint, parameters, metadata, virtual_folders(endpoint, missions)),
+            self._metadata,
+            FtpService(endpoint, parameters, self._metadata, virtual_folders(endpoint, missions)),
             TargetService(endpoint),
             ManualService(endpoint),
             LogTransferService(endpoint),
@@ -238,6 +238,10 @@ class MavlinkServer:
     def needs_ticks(self) -> bool:
         """Whether a client gets messages more often than once per frame."""
         return any(channel.schedule.needs_ticks for channel in self._endpoint.channels)
+
+    def prepare(self) -> None:
+        """Makes what takes longer than a frame may, before somebody asks for it in flight."""
+        self._metadata.prepare()
 
     def frame(self, time_us: int) -> None:
         """Receives, answers, and sends what is due.
