@@ -60,7 +60,8 @@ class Climb:
 def is_high(context: NavContext) -> bool:
     """Whether a vehicle that takes off is high enough to go elsewhere; below that it would skid over the ground."""
     stand_ned = context.state.stand_ned or context.state.home_ned
-    return stand_ned[2] - context.state.estimate.pos_ned[2] >= _SAFE_M
+    height_m: float = stand_ned[2] - context.state.estimate.pos_ned[2]
+    return height_m >= _SAFE_M
 
 
 class Takeoff:
