@@ -1,7 +1,8 @@
 """Motor tests: rotors turned one by one on the ground, to see which is which and which way it turns.
 
 In: requests of clients. Out: motor commands in the setpoint row, which the control part passes on while the vehicle is
-disarmed and never otherwise. A spin ends by itself after its time, and all end when the vehicle is armed.
+disarmed and never otherwise. A spin ends by itself after its time, and all end when the vehicle is armed, or when a
+client disarms it, terminates it or restarts it.
 """
 
 from collections.abc import Sequence
@@ -90,13 +91,14 @@ class MotorTest:
 
     def stop(self) -> None:
         """Ends every spin."""
-        self._spins = []
-        self._write()
+        if self._spins:
+            self._announcer.statustext(Severity.WARNING, "Motor test: ended")
+            self._spins = []
+            self._write()
 
     def frame(self) -> None:
         """Begins and ends what is due; called while something turns."""
         if self.refusal() is not None:
-            self._announcer.statustext(Severity.WARNING, "Motor test: ended")
             self.stop()
             return
         now_us = self._state.time_us

@@ -258,10 +258,13 @@ class FlightController:
         return self.commander.arm(force=force)
 
     def disarm(self, *, force: bool) -> Reply:
+        self.motor_test.stop()
         return self.commander.disarm(force=force)
 
     def terminate(self) -> Reply:
-        return self.commander.terminate()
+        is_testing = self.motor_test.is_running and not self.state.is_armed
+        self.motor_test.stop()
+        return ACCEPTED if is_testing else self.commander.terminate()
 
     def inject_failure(self, unit: int, failure: int, instance: int) -> Reply:
         request = failure_request(unit, failure)
@@ -376,6 +379,7 @@ class FlightController:
             return Reply(Verdict.TEMPORARILY_REJECTED, "armed")
         if self._on_reboot is None:
             return Reply(Verdict.UNSUPPORTED, "there is nothing to restart")
+        self.motor_test.stop()
         self._on_reboot()
         self.state.boot_us = self.state.time_us
         self.commander.hold_reasons_back()

@@ -25,7 +25,7 @@ class SafetyService(Service):
         }
 
     def _terminate(self, command: Command) -> Reply:
-        """Stops the motors in the air, for good; the vehicle is disarmed once it lies on the ground.
+        """Stops the motors in the air, for good; the vehicle is disarmed once it lies on the ground. Ends motor tests.
 
         Params: p1 above 0.5 terminates (1 as in PX4).
         Refused: DENIED: p1 up to 0.5 or NaN, a termination cannot be taken back; TEMPORARILY_REJECTED: not armed.

@@ -50,6 +50,26 @@ def test_arming_ends_the_test(rig):
     assert commands(rig) == [0.0] * 8
 
 
+@pytest.mark.parametrize("stop", [lambda fc: fc.disarm(force=False), lambda fc: fc.terminate()])
+def test_who_disarms_or_terminates_stops_motors_that_are_tested(rig, stop):
+    rig.fc.motor_test.spin([0, 1], 0.2, 100.0)
+    rig.run(0.1)
+    assert stop(rig.fc).verdict is Verdict.ACCEPTED
+    rig.run(0.02)
+    assert commands(rig) == [0.0] * 8
+    rig.run(150.0)
+    assert commands(rig) == [0.0] * 8
+    assert rig.recorder.has_text("Motor test: ended")
+
+
+def test_a_termination_right_after_arming_is_one_though_a_motor_was_being_tested(rig):
+    rig.fc.motor_test.spin([0], 0.2, 100.0)
+    rig.run(0.1)
+    assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
+    assert rig.fc.terminate().verdict is Verdict.ACCEPTED
+    assert not rig.fc.state.is_armed
+
+
 def test_an_armed_vehicle_tests_no_motor(rig):
     rig.fc.arm(force=False)
     rig.run(0.1)
