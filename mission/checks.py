@@ -1,8 +1,24 @@
-"""Names of tasks, recipes and policies that a command is given, refused before torch or a task's kernels are loaded."""
+"""What a command is given by name (files, runs, tasks, recipes, policies), refused before anything heavy is loaded."""
 
 from pathlib import Path
 
 from mission.refusal import refuse
+
+REPLAY_FILE = "replay.npz"  # in a run folder, what is shown of it afterwards
+
+
+def check_file(path: Path) -> None:
+    """Refuses a file that cannot be opened."""
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        refuse(f"{path}: {error.strerror}")
+
+
+def check_run(folder: Path) -> None:
+    """Refuses a folder that holds no run to be shown."""
+    if not (folder / REPLAY_FILE).exists():
+        refuse(f"{folder}: holds no run that can be shown: {REPLAY_FILE} is missing")
 
 
 def check_task(name: str) -> None:

@@ -13,7 +13,9 @@ from rich.console import Console
 from autopilot.mavlink.links import GROUND_STATION_PORT, OFFBOARD_PORT
 from common.geodesy import DEFAULT_HOME
 from mission import follow_commands, task_commands, training_commands, view_commands
+from mission.checks import check_file
 from mission.refusal import refuse
+from mission.terminal import busy
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -142,7 +144,9 @@ def estimate(
     output: Annotated[Path | None, typer.Option(help="Folder for the results. Default: beside the log.")] = None,
 ) -> None:
     """Run the estimator alone over the sensors recorded in a log."""
-    from mission.estimate import EstimateError, estimate_log
+    check_file(log)
+    with busy(Console(), "loading the program"):
+        from mission.estimate import EstimateError, estimate_log
 
     try:
         estimate_log(log, output, Console())

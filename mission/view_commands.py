@@ -6,7 +6,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from mission.checks import check_run
 from mission.refusal import learn_extra, refuse
+from mission.terminal import busy
 
 
 def replay(
@@ -16,10 +18,12 @@ def replay(
     view_port: Annotated[int, typer.Option(min=1, max=65535, help="HTTP port of the page.")] = 8080,
 ) -> None:
     """Show a finished flight in the browser, or write it as an HTML file or a film."""
+    check_run(run)
     with learn_extra():
-        from mission.options import UserError
-        from mission.view.replay import ReplayOptions
-        from mission.view.replay import replay as show
+        with busy(Console(), "loading the program"):
+            from mission.options import UserError
+            from mission.view.replay import ReplayOptions
+            from mission.view.replay import replay as show
 
         try:
             show(ReplayOptions(run, html, mp4, view_port), Console())

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.files import write_whole
+from mission.checks import REPLAY_FILE as FILE
 from mission.flight import Flight, FlightConfig
 from mission.kept_frames import FrameChoice, KeptRows
 from mission.view.moment import MOMENT, Moment, Row, moment_of
 
-FILE = "replay.npz"
 _KEPT, _LEFT_OUT = np.ones(1, bool), np.zeros(1, bool)
 
 
