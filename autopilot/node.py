@@ -382,7 +382,7 @@ class FlightController:
         self.motor_test.stop()
         self._on_reboot()
         self.state.boot_us = self.state.time_us
-        self.commander.hold_reasons_back()
+        self.commander.restart()
         return ACCEPTED
 
     @property

@@ -16,14 +16,12 @@ sys.path.insert(0, str(IMAGES.parents[1]))
 from mission.flight import FlightConfig  # noqa: E402
 from mission.flight_config import OwnerConfig  # noqa: E402
 from mission.follow.lockstep import flight_with_companion, take_off  # noqa: E402
-from mission.follow.session import chosen_pilot, score_lines  # noqa: E402
-from mission.follow.watch import FollowWatch  # noqa: E402
+from mission.follow.session import chosen_pilot, score_lines, watch_of  # noqa: E402
 from mission.view.chase import PICTURE_S  # noqa: E402
 from mission.view.film_pictures import film  # noqa: E402
 from mission.view.live import LiveView  # noqa: E402
 from mission.view.page import PageServer  # noqa: E402
 from mission.view.recording import Recorder  # noqa: E402
-from policies.companion.engagement import Phase  # noqa: E402
 from policies.tasks.follow_me.world import FOLLOW_WORLD  # noqa: E402
 from tests.browser import Browser  # noqa: E402
 
@@ -38,7 +36,7 @@ def main() -> None:
     pilot, _ = chosen_pilot(None)
     flight, companion = flight_with_companion(FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(), seed=SEED), pilot)
     recorder = Recorder(flight, action=lambda: companion.action)
-    watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, FOLLOWED_S)
+    watch = watch_of(flight, companion, FOLLOWED_S)
     page = PageServer(0, "Honeyguide")
     view = LiveView(
         flight, page, speed=None, action=lambda: companion.action, score=lambda: score_lines(watch, companion)

@@ -112,6 +112,7 @@ class Flight:
         self.time_us = 0
         self._pacer = Pacer(None)
         self.ready_s = nan  # power-on to ready to arm
+        self.is_restarted = False
         self.params = flight_parameters(config, self.airframe)
         passing = {name for name in self.params if name.startswith(SIMULATOR_PREFIX)}
         self.persistence = None if state is None else Persistence(state, self.params, config.parameters, passing)
@@ -310,6 +311,23 @@ class Flight:
         air.turbulence_w_std = turbulence_m_s
         air.gust_m_s = GUST_SHARE / TURBULENCE_SHARE * turbulence_m_s
         self.rig.arrays.wind_model.fill_(air)
+
+    @property
+    def is_crashed(self) -> bool:
+        """The truth: it struck something too fast, or a turning rotor struck the ground."""
+        return bool(self.rig.arrays.body.numpy()["is_crashed"][0])
+
+    def restart(self) -> None:
+        """Puts the vehicle back on its pad, whole and with a full battery, and restarts its flight controller.
+
+        Time, logs, world, parameters and mission go on.
+        """
+        self.controller.commander.disarm(force=True)
+        self.injector.repair()
+        self.rig.boot()
+        self.controller.reboot()
+        self.is_restarted = True
+        self.texts.statustext(Severity.NOTICE, "Simulator: the vehicle is back on its pad, restarted")
 
     def fly(self, script: Script, *, seconds: float = 3600.0) -> Running:
         """Runs a script to its end in lockstep, for at most `seconds` of simulated time."""

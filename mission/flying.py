@@ -51,11 +51,14 @@ def fly_to_the_end(
         watchers.append(view.frame)
     advance(flight, _end(options, speed, running), speed, watchers, Progress(flight, running), console)
     if page is not None:
-        view.close()
+        view.end(f"flight ended: logs in {folder}")
     files = OwnFiles(folder, console)
     with files.writing(RECORDING):
         recorder.recording().save(folder)
-    return _finish(flight, running, plan, path_ned, folder, files, console)
+    exit_code = _finish(flight, running, plan, path_ned, folder, files, console)
+    if page is not None:
+        view.close()
+    return exit_code
 
 
 def _end(options: FlightOptions, speed: float | None, running: Running | None) -> Callable[[Flight], bool]:

@@ -65,6 +65,7 @@ class RigInjector:
         self._rotor_count = len(airframe.rotors)
         self._has_noise = noise > 0.0
         self._taken_c = 0.0  # charge that an injected failure has taken from the battery
+        self.failures: set[tuple[Unit, int]] = set()  # parts that fail now, as somebody asked for
         self._intermittent: dict[tuple[Unit, int], bool] = {}  # part: whether it is off now
         self._toggled_us = 0
 
@@ -127,13 +128,22 @@ class RigInjector:
     def weaken(self, rotor: int, share: float) -> None:
         """Gives a motor, from 0, a share of its command only."""
         set_motor_loss(self._faults, rotor, 1.0 - share)
-        self._note(Unit.MOTOR, rotor, Failure.OK)
+        self._note(Unit.MOTOR, rotor, Failure.OK if share == 1.0 else Failure.SLOW)
+
+    def repair(self) -> None:
+        """Ends every failure that was asked for."""
+        for unit, rotor in sorted(self.failures):
+            self.inject(unit, Failure.OK, rotor + 1 if unit is Unit.MOTOR else 0)
 
     def charge_to(self, rest_v: float) -> None:
         """Gives the battery the charge at which it rests at a voltage."""
         self._body["battery_charge_c"][0] = charge_at(self._battery, rest_v)
 
     def _note(self, unit: Unit, rotor: int, failure: Failure) -> None:
+        if failure is Failure.OK:
+            self.failures.discard((unit, rotor))
+        else:
+            self.failures.add((unit, rotor))
         if failure is Failure.INTERMITTENT:
             self._intermittent[unit, rotor] = True
         else:

@@ -230,7 +230,7 @@ def summarise(
 
 
 def _result(flight: Any, running: Any) -> tuple[str, bool]:
-    if bool(flight.rig.arrays.body.numpy()["is_crashed"][0]):
+    if flight.is_crashed:
         return "crashed", False
     if running is None:
         return "no mission", True

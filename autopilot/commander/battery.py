@@ -34,6 +34,10 @@ class BatteryEstimator:
         span_v = battery.cells * (battery.full_cell_v - battery.empty_cell_v)
         shares = [i / (_CURVE_POINTS - 1) for i in range(_CURVE_POINTS)]
         self._curve_v = [empty_v + span_v * _rest_voltage_share(share) for share in shares]
+        self.restart()
+
+    def restart(self) -> None:
+        """As at power-on: the next sample's voltage says what is left."""
         self._sample_us = 0  # of the last sample
         self._changed_us = 0  # when it last differed from the one before
         self._plausible_us = 0  # when voltage and count last agreed

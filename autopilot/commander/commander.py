@@ -337,6 +337,11 @@ class Commander:
 
     # ---- checks and failsafes ----
 
+    def restart(self) -> None:
+        """The flight controller has been restarted: what is left of the battery is judged anew."""
+        self._battery.restart()
+        self.hold_reasons_back()
+
     def hold_reasons_back(self) -> None:
         """No text against arming for a while: the vehicle has just been stopped or restarted."""
         self._next_text_us = max(self._next_text_us, self.state.time_us + _FIRST_TEXT_US)

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from math import isfinite
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -19,12 +18,12 @@ from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
 from mission.connections import open_links, open_page
-from mission.flight import flight_parameters
+from mission.flight import Flight, flight_parameters
 from mission.flying import advance
 from mission.follow.companion import latency_text
 from mission.follow.lockstep import flight_with_companion, take_off
 from mission.follow.options import FollowOptions, follow_config
-from mission.follow.watch import FollowWatch
+from mission.follow.watch import FollowWatch, taken_over
 from mission.loading import load_kernels
 from mission.options import UserError, speed_of
 from mission.progress import Progress
@@ -39,15 +38,15 @@ from policies.companion.engagement import Phase
 from policies.companion.names import SCRIPTED, TASK
 from policies.companion.pilot import PilotError, load_pilot
 from policies.pretrained.shelf import pretrained
-from policies.tasks.follow_me.scorecard import Scorecard, lines, scorecard
-from policies.tasks.follow_me.track import Ranges, Track
+from policies.tasks.follow_me.scorecard import Scorecard, lines, named_lines, scorecard
 
 ENGAGE_S = 20.0  # after the take-off, until it follows
 FILM = "flight.mp4"
+SHOWN = ("in_band", "in_view", "distance_median_m", "collision")  # figures of the scorecard on the live page
 
 
 def follow_session(options: FollowOptions) -> int:
-    """Flies as asked and returns the exit code: 0 if it followed all the time and landed.
+    """Flies as asked and returns the exit code: 1 only if what the policy flew was not followed to its end and landed.
 
     Raises:
         UserError: an option, file, port or folder is wrong; nothing has been written.
@@ -74,7 +73,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         say("building the world")
         flight, companion = flight_with_companion(config, pilot, links=links, folder=folder, wall_s=wall_time_s)
     recorder = Recorder(flight, action=lambda: companion.action)
-    watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, options.seconds)
+    watch = watch_of(flight, companion, options.seconds)
     watchers: list[Callable[[], None]] = [recorder.frame, watch.frame]
     if page is not None:
         from mission.view.live import LiveView
@@ -91,7 +90,8 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         print_line(console, f"live page: {page.url}")
     advance(flight, lambda _: running.is_done, speed, watchers, Progress(flight, running), console)
     if page is not None:
-        view.close()
+        view.end(f"flight ended: logs in {folder}")
+    is_stopped = not running.is_done
     running.cancel()
     flight.close()
     for trouble in flight.troubles.take():
@@ -101,11 +101,16 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         recorder.recording().save(folder)
     if running.error is not None:
         print_line(console, f"result: {running.error}")
-    exit_code = finish(watch.track(), files, console, is_landed=running.error is None)
+    is_down = running.error is None and not flight.is_crashed
+    exit_code = finish(watch, files, console, is_down=is_down, is_stopped=is_stopped)
+    if flight.is_crashed:
+        print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
     print_line(console, latency_text(companion))
     if options.has_film:
         write_film(recorder.recording(), flight.world, folder / FILM, console)
     print_line(console, f"{'logs, scorecard and film' if options.has_film else 'logs and scorecard'}: {folder}")
+    if page is not None:
+        view.close()
     return exit_code
 
 
@@ -118,37 +123,59 @@ def chosen_pilot(policy: str | None) -> tuple[Pilot, str]:
         raise UserError(str(error)) from error
 
 
+def watch_of(flight: Flight, companion: Companion, seconds: float) -> FollowWatch:
+    """What judges a flight by what its companion flies of it."""
+    return FollowWatch(
+        flight,
+        lambda: companion.phase is Phase.FLYING,
+        seconds,
+        lambda has_begun: taken_over(flight, companion.phase, has_begun=has_begun),
+    )
+
+
 async def follow(drone: Drone, companion: Companion, seconds: float) -> None:
-    """Takes off, lets the companion follow for so long, and lands."""
+    """Takes off, lets the companion follow for so long, and lands, unless it is down by then."""
     await take_off(drone)
     await drone.until(lambda: companion.phase is Phase.FLYING, ENGAGE_S, "the companion's taking over")
     await drone.sleep(seconds)
-    await drone.land()
+    if drone.is_armed:
+        await drone.land()
 
 
 def score_lines(watch: FollowWatch, companion: Companion) -> tuple[str, ...]:
-    """How it goes so far, for the live page."""
+    """How it goes so far, for the live page: figures of the scorecard under its names."""
     state = f"companion: {companion.phase.value}" + (f" ({companion.trouble})" if companion.trouble else "")
-    track, ranges = watch.track(), Ranges()
+    track = watch.so_far()
     if track is None:
         return (state,)
-    distance = track.distance_m
-    is_near = (distance >= ranges.near_m) & (distance <= ranges.far_m)
-    band = f"{ranges.near_m:g} to {ranges.far_m:g} m"
-    return (state, f"within {band}: {100.0 * is_near.mean():.0f} %, median {float(np.median(distance)):.1f} m")
+    card = scorecard([track])
+    figures = ", ".join(f"{label} {text}" for name, label, text in named_lines(card) if name in SHOWN)
+    return (state, f"{watch.judged_s:.0f} s flown by the policy: {figures}")
 
 
-def finish(track: Track | None, files: OwnFiles, console: Console, *, is_landed: bool) -> int:
-    """Writes and shows the scorecard of what was followed, if anything was; returns the exit code."""
-    is_good = False
-    if track is not None:
-        card = scorecard([track])
-        is_good = is_landed and track.is_whole and card.collision.value == 0.0
-        with files.writing("summary.json") as path:
-            write_whole(path, (json.dumps(summary_of(card), indent=2) + "\n").encode())
-        console.print(_table(card))
-    else:
+def finish(watch: FollowWatch, files: OwnFiles, console: Console, *, is_down: bool, is_stopped: bool) -> int:
+    """Writes and shows the scorecard of what the policy flew, if anything was; returns the exit code.
+
+    Args:
+        watch: which judged it.
+        files: of the run.
+        console: where it is shown.
+        is_down: it landed in the end, in one piece.
+        is_stopped: the user stopped the program; what was planned beyond does not count.
+    """
+    track = watch.so_far() if is_stopped else watch.track()
+    if watch.takeovers:
+        why = ", ".join(watch.takeovers)
+        print_line(console, f"judged: the {watch.judged_s:.1f} s that the policy flew; for {watch.paused_s:.1f} s {why}")
+    is_excused = bool(watch.takeovers) or is_stopped
+    if track is None:
         print_line(console, "the owner was not followed: there is no scorecard")
+        return 0 if is_excused and not files.missing else 1
+    card = scorecard([track])
+    with files.writing("summary.json") as path:
+        write_whole(path, (json.dumps(summary_of(card), indent=2) + "\n").encode())
+    console.print(_table(card))
+    is_good = track.is_whole and card.collision.value == 0.0 and (is_down or is_excused)
     return 0 if is_good and not files.missing else 1
 
 

@@ -23,6 +23,7 @@ LEAST_HEIGHT_M = 2.0
 HEIGHT_MAX_M = 60.0
 WIND_MAX_M_S = 20.0
 SPEEDS = {"1/4 x": 0.25, "1/2 x": 0.5, "1 x": 1.0, "2 x": 2.0, "5 x": 5.0, "max": None}
+SETTLES_S = 30.0  # after power-on a vehicle that is not ready may be so without being helped
 _LINES = 3  # what happened last: one thing soon follows another
 
 
@@ -34,6 +35,7 @@ class Controls:
         server: of the page.
         do: hands a task to the flight's thread.
         speed: at which the flight begins.
+        has_plan: the vehicle has a mission, or is about to get one.
     """
 
     def __init__(
@@ -42,13 +44,16 @@ class Controls:
         server: viser.ViserServer,
         do: Callable[[Callable[[], None]], None],
         speed: float | None,
+        *,
+        has_plan: bool = False,
     ) -> None:
         self._flight, self._do = flight, do
+        self._buttons: list[viser.GuiButtonHandle] = []
         self._running: Running | None = None
         self.is_paused = False
         self.follows = True
         self.lines: tuple[str, ...] = ("click on the ground to fly there",)
-        self._add_commands(server.gui)
+        self._add_commands(server.gui, has_plan=has_plan)
         self._add_pace(server.gui, speed)
         self._add_trouble(server.gui)
         server.scene.on_click()(self._clicked)
@@ -74,22 +79,31 @@ class Controls:
         def _(_: Any) -> None:
             self.follows = follow.value
 
-    def _add_commands(self, gui: viser.GuiApi) -> None:
+    def disable(self) -> None:
+        """Nothing can be clicked any more."""
+        for button in self._buttons:
+            button.disabled = True
+
+    def _add_commands(self, gui: viser.GuiApi, *, has_plan: bool) -> None:
         with gui.add_folder("Vehicle"):
             self._height = gui.add_slider(
                 "Height of gotos", min=LEAST_HEIGHT_M, max=HEIGHT_MAX_M, step=0.5, initial_value=CLIMB_M
             )
             for name, script in (("Take off", self._take_off), ("Hold", _hold), ("Return", _return), ("Land", _land)):
                 self._add_command(gui, name, script)
+            if has_plan:
+                self._add_command(gui, "Fly the mission", self._fly_mission)
             if self._flight.owner is not None:
-                self._add_command(gui, "Follow", _follow)
+                self._add_command(gui, "Follow", self._follow)
+            self._add_button(gui, "Restart", self._restart)
 
     def _add_command(self, gui: viser.GuiApi, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
-        button = gui.add_button(name)
+        self._add_button(gui, name, lambda: self._start(name, script))
 
-        @button.on_click
-        def _(_: Any) -> None:
-            self._do(lambda: self._start(name, script))
+    def _add_button(self, gui: viser.GuiApi, name: str, task: Callable[[], None]) -> None:
+        button = gui.add_button(name)
+        button.on_click(lambda _: self._do(task))
+        self._buttons.append(button)
 
     def _add_trouble(self, gui: viser.GuiApi) -> None:
         config = self._flight.config
@@ -100,6 +114,7 @@ class Controls:
             motor = gui.add_dropdown("Motor", numbers)
             kill = gui.add_button("Kill the motor", color="red")
             repair = gui.add_button("Repair all motors")
+            self._buttons += [kill, repair]
 
         def blow(_: Any) -> None:
             speed_m_s, from_deg = within(wind.value, 0.0, WIND_MAX_M_S), within(wind_from.value, 0.0, 360.0)
@@ -146,10 +161,40 @@ class Controls:
     def _height_m(self) -> float:
         return within(self._height.value, LEAST_HEIGHT_M, HEIGHT_MAX_M)
 
+    def _restart(self) -> None:
+        if self._running is not None:
+            self._running.cancel()
+        self._flight.restart()
+        self._say("Restart: back on the pad")
+
+    async def _get_ready(self, drone: Drone) -> None:
+        """Says at once why the vehicle cannot be armed; waits only while that may end by itself."""
+        state, commander = self._flight.controller.state, self._flight.controller.commander
+        reasons = commander.check_arming()
+        if not reasons or drone.is_armed:
+            return
+        why = f"cannot be armed: {', '.join(reasons)}"
+        if self._flight.is_crashed or state.time_us - state.boot_us > SETTLES_S * 1e6:
+            raise ScriptError(why)
+        self._say(f"waits: {why}")
+        await drone.wait_ready(SETTLES_S)
+
     async def _take_off(self, drone: Drone) -> None:
-        await drone.wait_ready()
-        await drone.arm()
+        await self._get_ready(drone)
+        if not drone.is_armed:
+            await drone.arm()
         await drone.takeoff(self._height_m)
+
+    async def _fly_mission(self, drone: Drone) -> None:
+        await self._get_ready(drone)
+        await drone.start_mission()
+
+    async def _follow(self, drone: Drone) -> None:
+        """Lets the companion on board fly, after the pilot has taken over, or from the ground."""
+        if not drone.is_armed or drone.is_landed:
+            await self._get_ready(drone)
+            await take_off(drone)
+        await drone.let_companion_fly()
 
     async def _fly_to(self, drone: Drone, north_m: float, east_m: float, up_m: float) -> None:
         if not drone.is_armed or drone.is_landed:
@@ -175,13 +220,6 @@ class Controls:
 
 async def _hold(drone: Drone) -> None:
     await drone.hold()
-
-
-async def _follow(drone: Drone) -> None:
-    """Lets the companion on board fly, after the pilot has taken over, or from the ground."""
-    if not drone.is_armed or drone.is_landed:
-        await take_off(drone)
-    await drone.let_companion_fly()
 
 
 async def _return(drone: Drone) -> None:

@@ -73,9 +73,10 @@ class LiveView:
         self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned)
         moment = self._moment()
         self._panel = Panel(server, has_owner=moment.has_owner)
-        self._controls = Controls(flight, server, self._add_task, speed)
+        self._controls = Controls(flight, server, self._add_task, speed, has_plan=len(path_ned) > 0)
         self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
         self._next_point_s = 0.0
+        self._text_count = 0  # of those that are shown
         server.on_client_connect(lambda client: self._add_task(lambda: self._place_camera(client)))
 
     def frame(self) -> None:
@@ -92,6 +93,15 @@ class LiveView:
 
     def _moment(self) -> Moment:
         return moment_of(self._flight, self._action())
+
+    def end(self, text: str) -> None:
+        """The flight is over: the page shows its last moment and this text, and clicks do nothing any more."""
+        self._controls.disable()
+        moment = self._moment()
+        self._scene.show(moment)
+        self._show_texts(moment, text)
+        self._panel.draw_plots()
+        self._server.flush()
 
     def close(self) -> None:
         """Ends the page."""
@@ -123,11 +133,18 @@ class LiveView:
         self._scene.extend_trails(moment)
         self._move_cameras(moment)
         if self._is_due("status", STATUS_S):
-            self._panel.show_status(moment, (*self._score(), *self._controls.lines))
+            self._show_texts(moment)
         if self._is_due("plots", PLOTS_S):
             self._panel.draw_plots()
         if self._is_due("picture", PICTURE_S):
             self._renew_picture()
+
+    def _show_texts(self, moment: Moment, *more: str) -> None:
+        crash = ("the vehicle has crashed: Restart puts it back on its pad",) if self._flight.is_crashed else ()
+        self._panel.show_status(moment, (*more, *crash, *self._score(), *self._controls.lines))
+        if self._flight.texts.count > self._text_count:
+            self._text_count = self._flight.texts.count
+            self._panel.show_texts(self._flight.texts.since(0))
 
     def _seen(self, frame: ImageFrame) -> None:
         self._pixels = frame.pixels[..., :3]

@@ -3,8 +3,9 @@
 In: moments. Out: viser's GUI elements, each renewed at its own slow rate: text at 4 Hz, plots at 2 Hz.
 """
 
+import re
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,14 @@ import viser
 from numpy.typing import NDArray
 from viser import uplot
 
+from autopilot.vehicle import Severity
+from mission.texts import Text
 from mission.view.moment import ACTIONS, Moment
 
 PLOT_PERIOD_S = 0.5  # simulated time between two points that are plotted
 PLOT_POINTS = 600
 _COLOURS = ("#2868dc", "#e87820", "#3aa655", "#8a4fbf")
+TEXTS_SHOWN = 8
 ACTION_NAMES = ("ahead", "right", "down", "yaw rate")
 
 Read = Callable[[Moment], tuple[float, ...]]
@@ -44,6 +48,9 @@ class Panel:
         panel = self._gui.add_panel()
         with panel.add_tab("Flight"):
             self._status = self._gui.add_markdown("waiting for the flight")
+            self._texts_folder = self._gui.add_folder("What the vehicle says", visible=False)
+            with self._texts_folder:
+                self._texts = self._gui.add_markdown("")
             self._picture_folder = self._gui.add_folder("Onboard camera", visible=False)
             self._plots = [
                 Plot(self._gui, title, names, read)
@@ -63,7 +70,12 @@ class Panel:
         ]
         if moment.has_owner:
             rows.append(f"distance to owner {moment.distance_m:.1f} m")
-        self._status.content = "  \n".join((*rows, *lines))
+        self._status.content = "  \n".join((*rows, *map(plain, lines)))
+
+    def show_texts(self, texts: Sequence[Text]) -> None:
+        """Renews what the vehicle has said: the newest first, what is urgent in bold."""
+        self._texts_folder.visible = True
+        self._texts.content = "  \n".join(_text_line(text) for text in reversed(texts[-TEXTS_SHOWN:]))
 
     def show_picture(self, rgb: NDArray[np.uint8]) -> None:
         """Renews the onboard picture; any thread may do so."""
@@ -89,6 +101,16 @@ class Panel:
             plot.draw()
 
 
+def _text_line(text: Text) -> str:
+    shown = plain(str(text).strip())
+    return f"**{shown}**" if text.severity <= Severity.ERROR else shown
+
+
+def plain(text: str) -> str:
+    """Text as Markdown that shows it letter by letter: clients choose it, and viser would run scripts in it."""
+    return re.sub(r"([!-/:-@\[-`{-~])", r"\\\1", " ".join(text.split()))
+
+
 class Plot:
     """One chart over time."""
 
@@ -108,8 +130,9 @@ class Plot:
             tuple(series),
             title=title,
             scales={"x": uplot.Scale(time=False)},
+            axes=(uplot.Axis(label="s", labelSize=14, labelFont="11px sans-serif", size=28), uplot.Axis(size=44)),
             legend=uplot.Legend(show=len(names) > 1),
-            height=130,
+            height=150,
         )
 
     def note(self, moment: Moment) -> None:

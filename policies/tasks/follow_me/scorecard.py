@@ -152,11 +152,16 @@ def written(figure: Interval, unit: str) -> str:
 
 
 def lines(card: Scorecard) -> list[tuple[str, str]]:
-    """Name and text of each figure, in order; of a single flight without intervals, which one flight cannot have."""
+    """Label and text of each figure, in order."""
+    return [(label, text) for _, label, text in named_lines(card)]
+
+
+def named_lines(card: Scorecard) -> list[tuple[str, str, str]]:
+    """Name, label and text of each figure; of a single flight without intervals, which one flight cannot have."""
     shown = []
     for name, (label, unit) in NAMES.items():
         figure = getattr(card, name)
         if card.episodes == 1:
             figure = Interval(figure.value, math.nan, math.nan)
-        shown.append((label, written(figure, unit)))
+        shown.append((name, label, written(figure, unit)))
     return shown
