@@ -112,7 +112,7 @@ class Flight:
         self.time_us = 0
         self._pacer = Pacer(None)
         self.ready_s = nan  # power-on to ready to arm
-        self.is_restarted = False
+        self.restart_count = 0
         self.params = flight_parameters(config, self.airframe)
         passing = {name for name in self.params if name.startswith(SIMULATOR_PREFIX)}
         self.persistence = None if state is None else Persistence(state, self.params, config.parameters, passing)
@@ -326,7 +326,7 @@ class Flight:
         self.injector.repair()
         self.rig.boot()
         self.controller.reboot()
-        self.is_restarted = True
+        self.restart_count += 1
         self.texts.statustext(Severity.NOTICE, "Simulator: the vehicle is back on its pad, restarted")
 
     def fly(self, script: Script, *, seconds: float = 3600.0) -> Running:

@@ -5,7 +5,9 @@ Only what the tests of the live page need; the machine must have Chromium (Debia
 
 import base64
 import json
+import os
 import shutil
+import signal
 import subprocess
 import time
 from pathlib import Path
@@ -22,6 +24,8 @@ FLAGS = (
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--remote-debugging-port=0"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions"),
 )
+# A test that is killed leaves no browser behind.
+DIES_WITH_US = ("setpriv", "--pdeathsig", "KILL") if shutil.which("setpriv") else ()
 
 
 class Browser:
@@ -29,16 +33,26 @@ class Browser:
 
     def __init__(self, profile: Path, width: int = 1280, height: int = 720, flags: tuple[str, ...] = ()) -> None:
         self._process = subprocess.Popen(
-            [CHROMIUM, *FLAGS, *flags, f"--user-data-dir={profile}", f"--window-size={width},{height}", "about:blank"],
+            [
+                *(*DIES_WITH_US, CHROMIUM, *FLAGS, *flags),
+                *(f"--user-data-dir={profile}", f"--window-size={width},{height}", "about:blank"),
+            ],
             stderr=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             text=True,
+            start_new_session=True,
         )
-        address = self._address(profile)
         self._number = 0
         self.errors: list[str] = []
         self.requests: list[str] = []
-        self._socket = connect(address, max_size=None)
+        try:
+            self._open(profile, width, height)
+        except BaseException:
+            self._kill()
+            raise
+
+    def _open(self, profile: Path, width: int, height: int) -> None:
+        self._socket = connect(self._address(profile), max_size=None, ping_interval=None)
         (target,) = (t for t in self._send("Target.getTargets")["targetInfos"] if t["type"] == "page")
         attached = self._send("Target.attachToTarget", targetId=target["targetId"], flatten=True)
         self._session = attached["sessionId"]
@@ -116,7 +130,13 @@ class Browser:
         return cv2.cvtColor(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
 
     def close(self) -> None:
-        self._socket.close()
-        self._process.terminate()
+        try:
+            self._socket.close()
+        finally:
+            self._kill()
+
+    def _kill(self) -> None:
+        """Ends it with all its helpers, however it is."""
+        os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait(10.0)
         self._process.stderr.close()

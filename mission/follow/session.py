@@ -166,7 +166,9 @@ def finish(watch: FollowWatch, files: OwnFiles, console: Console, *, is_down: bo
     track = watch.so_far() if is_stopped else watch.track()
     if watch.takeovers:
         why = ", ".join(watch.takeovers)
-        print_line(console, f"judged: the {watch.judged_s:.1f} s that the policy flew; for {watch.paused_s:.1f} s {why}")
+        print_line(
+            console, f"judged: the {watch.judged_s:.1f} s that the policy flew; for {watch.paused_s:.1f} s {why}"
+        )
     is_excused = bool(watch.takeovers) or is_stopped
     if track is None:
         print_line(console, "the owner was not followed: there is no scorecard")

@@ -38,7 +38,7 @@ def taken_over(flight: Flight, phase: Phase, *, has_begun: bool) -> str:
     """
     if flight.injector.failures:
         return "a failure was injected"
-    if flight.is_restarted and phase is not Phase.FLYING:
+    if flight.restart_count and phase is not Phase.FLYING:
         return "the vehicle was restarted"
     state = flight.controller.state
     is_own = state.mode in OUTSIDE_MODES or phase is Phase.HANDING_BACK or (state.mode in _BEFORE and not has_begun)

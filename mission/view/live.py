@@ -77,6 +77,7 @@ class LiveView:
         self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
         self._next_point_s = 0.0
         self._text_count = 0  # of those that are shown
+        self._restart_count = 0
         server.on_client_connect(lambda client: self._add_task(lambda: self._place_camera(client)))
 
     def frame(self) -> None:
@@ -129,8 +130,11 @@ class LiveView:
 
     def _update(self) -> None:
         moment = self._moment()
-        self._scene.show(moment)
+        if self._flight.restart_count != self._restart_count:
+            self._restart_count = self._flight.restart_count
+            self._scene.forget_trails()
         self._scene.extend_trails(moment)
+        self._scene.show(moment)
         self._move_cameras(moment)
         if self._is_due("status", STATUS_S):
             self._show_texts(moment)

@@ -5,6 +5,7 @@ a guard first: its path must begin with this start's token, and its Host and Ori
 """
 
 import http
+import json
 import logging
 import secrets
 from collections.abc import Callable, Iterator
@@ -16,6 +17,7 @@ from typing import Any
 import rich
 import viser
 import websockets.asyncio.server as websocket_server
+from viser._messages import RunJavascriptMessage
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
@@ -24,6 +26,27 @@ from mission.view.inputs import is_sound
 
 MESSAGE_MAX = 1 << 20  # [byte] of one message of a browser; a click has some 200
 OPENING_S = 5.0  # wall clock, from a connection to its complete request
+
+# viser calls its page by its own name, and covers the scene on a phone with its controls. They get the lower part of
+# it, status and picture first.
+_PHONE_STYLE = """
+@media (max-width: 36em) {
+  #root { height: 56% !important; }
+  #root div[style*="max-height: 60%"] { max-height: 44% !important; width: 100% !important; }
+  #root div[style*="max-height: 60%"] div[style*="width: 20em"] { width: 100vw !important; }
+  #root div:has(> div > .mantine-Tabs-root):not([aria-hidden="true"]) {
+    display: flex !important; flex-direction: column;
+  }
+  #root div:has(> .mantine-Tabs-root) { order: -1; }
+}
+"""
+_DRESS = """
+document.title = TITLE;
+if (!document.getElementById("honeyguide-style")) {
+  const style = document.createElement("style");
+  style.id = "honeyguide-style"; style.textContent = STYLE; document.head.append(style);
+}
+"""
 
 _LOGGER = logging.getLogger("honeyguide.page")  # of handshakes: how strangers fail is nobody's business
 _LOGGER.disabled = True
@@ -53,6 +76,8 @@ class PageServer(viser.ViserServer):
             self.stop()
             raise RuntimeError("viser did not open its port as expected: the page would be open to any website")
         self.gui.configure_theme(show_share_button=False, show_logo=False)
+        script = _DRESS.replace("TITLE", json.dumps(title)).replace("STYLE", json.dumps(_PHONE_STYLE))
+        self.gui._websock_interface.queue_message(RunJavascriptMessage(source=script))
 
     @property
     def url(self) -> str:

@@ -58,6 +58,7 @@ class Panel:
                 if has_owner or not (title.startswith("distance") or len(names) == ACTIONS)
             ]
         panel.dock_left()
+        panel.expand()  # on a phone it would be closed
         self._gui.main_panel.dock_right()
 
     def show_status(self, moment: Moment, lines: tuple[str, ...]) -> None:

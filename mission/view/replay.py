@@ -121,15 +121,20 @@ class ReplayView:
         if self._count % SLOW_UPDATES == 0:
             self._show_slow(index)
         if index != self._shown:
+            if abs(index - self._shown) > 2 * TRAIL_FRAMES:
+                self._draw_trails(index)
             self._shown = index
             self._scene.show(self._recording.moment(index))
 
     def _show_slow(self, index: int) -> None:
         moment = self._recording.moment(index)
         self._panel.show_status(moment, (title_of(self._recording),))
-        self._scene.draw_trails(self._recording.rows[: index + 1 : TRAIL_FRAMES])
+        self._draw_trails(index)
         self._eye.look_from(self._recording.rows[index])
         self._panel.show_picture(self._eye.rgb.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1))
+
+    def _draw_trails(self, index: int) -> None:
+        self._scene.draw_trails(self._recording.rows[: index + 1 : TRAIL_FRAMES])
 
     def _place_camera(self, client: viser.ClientHandle) -> None:
         eye_ned, target_ned = chase_of(self._recording.moment(max(self._shown, 0)))

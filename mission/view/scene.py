@@ -4,7 +4,7 @@ In: a world once, then moments. Out: nodes of viser's scene; only what moves is 
 nothing after a browser has loaded it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import atan, radians, tan
 from typing import Any
@@ -23,6 +23,8 @@ from sim.world.world import WorldMap
 VEHICLE_RGB, OWNER_RGB, GOAL_RGB, PLAN_RGB = (40, 110, 220), (232, 120, 32), (220, 40, 90), (250, 250, 250)
 STATURE_M = 1.75
 ARRIVED_M = 1.0  # a goal nearer than this is not shown: it would hide the vehicle
+PLAN_M, TRAIL_M = 0.25, 0.05  # how thick they are: a plan is seen on both sides of the trail that covers it
+TRAIL_LIFT_M = 0.1  # of what walks on the ground, which would hide its trail
 TRAIL_POINTS = 600
 TRAIL_PERIOD_S = 0.25
 BLADE_TURNS_PER_S = 2.7  # shown; at their true speed blades would stand still or seem to turn backwards
@@ -85,7 +87,8 @@ class Scene:
             "owner": Trail(self._api, "/trails/owner", OWNER_RGB),
         }
         if len(path_ned) > 1:
-            self._api.add_line_segments("/plan", _segments(np.array(path_ned, np.float32)), PLAN_RGB, thickness=0.08)
+            plan = np.array(path_ned, np.float32)
+            self._api.add_line_segments("/plan", _segments(plan), PLAN_RGB, thickness=PLAN_M)
 
     def _add_mesh(self, name: str, mesh: shapes.Mesh) -> None:
         linear = (255.0 * (mesh.colours / 255.0) ** 2.2).astype(np.uint8)  # glTF's vertex colours are linear light
@@ -142,6 +145,8 @@ class Scene:
         if moment.has_owner:
             self._owner.position = moment.owner_ned
             self._owner.wxyz = wxyz_of(quat_of(float(moment.row["owner"]["heading_rad"]), 0.0))
+            self._trails["owner"].lead_to(_lifted(moment.owner_ned))
+        self._trails["vehicle"].lead_to(moment.pos_ned)
         self._owner.visible = moment.has_owner
         has_goal = bool(np.linalg.norm(moment.goal_ned - moment.pos_ned) > ARRIVED_M)  # False for NaN
         if has_goal:
@@ -149,16 +154,21 @@ class Scene:
         self._goal.visible = has_goal
 
     def extend_trails(self, moment: Moment) -> None:
-        """Appends where everybody is."""
+        """Appends where everybody is; `show` leads on from there."""
         self._trails["vehicle"].extend(moment.time_s, moment.pos_ned)
         if moment.has_owner:
-            self._trails["owner"].extend(moment.time_s, moment.owner_ned)
+            self._trails["owner"].extend(moment.time_s, _lifted(moment.owner_ned))
+
+    def forget_trails(self) -> None:
+        """Somebody has been put elsewhere."""
+        for trail in self._trails.values():
+            trail.forget()
 
     def draw_trails(self, rows: NDArray[Any]) -> None:
         """Draws them anew from rows of a recording that may have jumped."""
         self._trails["vehicle"].draw(rows["pos_ned"])
         if len(rows) and Moment(rows[0]).has_owner:
-            self._trails["owner"].draw(rows["owner"]["pos_ned"])
+            self._trails["owner"].draw(_lifted(rows["owner"]["pos_ned"]))
 
 
 class Trail:
@@ -167,20 +177,41 @@ class Trail:
     def __init__(self, api: viser.SceneApi, name: str, rgb: tuple[int, int, int]) -> None:
         self._api, self._name, self._rgb = api, name, rgb
         self._points: list[NDArray[np.float32]] = []
+        self._lines: dict[str, Any] = {}
         self._next_s = 0.0
 
     def extend(self, time_s: float, point_ned: NDArray[np.float32]) -> None:
         """Appends a place when it is time for one."""
-        if time_s < self._next_s:
-            return
-        self._next_s = time_s + TRAIL_PERIOD_S
-        self._points = [*self._points[-TRAIL_POINTS:], np.asarray(point_ned, np.float32)]
-        self.draw(np.array(self._points))
+        if time_s >= self._next_s:
+            self._next_s = time_s + TRAIL_PERIOD_S
+            self.draw([*self._points[-TRAIL_POINTS:], point_ned])
 
-    def draw(self, points_ned: NDArray[np.float32]) -> None:
+    def draw(self, points_ned: Iterable[NDArray[np.float32]]) -> None:
         """Draws the line through these places; a single one draws none."""
-        if len(points_ned) > 1 and not np.isnan(points_ned).any():
-            self._api.add_line_segments(self._name, _segments(points_ned), self._rgb, thickness=0.05)
+        self._points = [np.array(point, np.float32) for point in points_ned]
+        if len(self._points) > 1:
+            self._draw_line(self._name, np.array(self._points))
+
+    def lead_to(self, point_ned: NDArray[np.float32]) -> None:
+        """From its newest place to where something is now: a trail does not lag."""
+        if self._points:
+            self._draw_line(f"{self._name}/head", np.array([self._points[-1], point_ned], np.float32))
+
+    def forget(self) -> None:
+        """Begins anew from the next place on."""
+        self._points = []
+
+    def _draw_line(self, name: str, points_ned: NDArray[np.float32]) -> None:
+        if np.isnan(points_ned).any():
+            return
+        if name in self._lines:
+            self._lines[name].points = _segments(points_ned)
+        else:
+            self._lines[name] = self._api.add_line_segments(name, _segments(points_ned), self._rgb, thickness=TRAIL_M)
+
+
+def _lifted(points_ned: NDArray[np.float32]) -> NDArray[np.float32]:
+    return points_ned - np.array([0.0, 0.0, TRAIL_LIFT_M], np.float32)
 
 
 def _segments(points: NDArray[np.floating]) -> NDArray[np.float32]:

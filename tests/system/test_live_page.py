@@ -1,49 +1,12 @@
 """The live page in a headless Chromium: it loads, shows the scene, and its clicks reach vehicle and simulator."""
 
-import threading
-import time
-
 import numpy as np
 import pytest
 
-from mission.flight import Flight, FlightConfig
-from mission.view.live import LiveView
-from mission.view.page import PageServer
-from sim.world.world import WorldConfig
-from tests.browser import CHROMIUM, Browser
+from tests.browser import CHROMIUM
+from tests.system.shown_flight import Shown
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: apt install chromium")
-WORLD = WorldConfig(size_m=64.0, trees_per_ha=60.0, clearing_radius_m=5.0)  # little to draw: Chromium has no GPU here
-
-
-class Shown:
-    """A flight in real time on a thread of its own, its page, and a browser that looks at it."""
-
-    def __init__(self, tmp_path):
-        self.flight = Flight(FlightConfig(world=WORLD))
-        self.server = PageServer(0, "Honeyguide")
-        self.view = LiveView(self.flight, self.server, speed=3.0)
-        self._is_over = False
-        self._thread = threading.Thread(target=self._fly)
-        self._thread.start()
-        self.browser = Browser(tmp_path, 1000, 500)
-        self.browser.open(self.server.url)
-
-    def _fly(self):
-        self.flight.run(lambda _: self._is_over, speed=3.0, on_frame=lambda _: self.view.frame())
-
-    def wait(self, condition, timeout_s=60.0):
-        end_s = time.monotonic() + timeout_s
-        while not condition():
-            assert time.monotonic() < end_s, "not in time"
-            time.sleep(0.2)
-
-    def close(self):
-        self._is_over = True
-        self._thread.join()
-        self.browser.close()
-        self.view.close()
-        self.flight.close()
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +22,7 @@ def text(shown):
 
 def test_the_page_shows_a_scene_and_plots_that_go_on(shown):
     shown.browser.wait("document.body?.innerText.includes('disarmed')")
+    assert shown.browser.evaluate("document.title") == "Honeyguide"
     shown.wait(lambda: len(np.unique(scene_pixels(shown).reshape(-1, 3), axis=0)) > 200)
     assert shown.browser.evaluate("document.querySelectorAll('canvas').length") >= 4  # the scene and three plots
     plots = "[...document.querySelectorAll('.u-wrap canvas')].map(c => c.toDataURL()).join()"

@@ -1,4 +1,4 @@
-"""Who is judged: a scorecard is of what the policy flew, also when a person takes over, breaks or restarts the vehicle."""
+"""Who is judged: a scorecard is of what the policy flew, whoever takes over, breaks or restarts the vehicle."""
 
 import pytest
 from rich.console import Console

@@ -2,7 +2,10 @@
 
 import pytest
 
+from autopilot.vehicle import Mode
 from mission.flight import Flight, FlightConfig
+from mission.plan import DEFAULT_PLAN, moved_plan, read_plan
+from mission.script import fly_plan
 from mission.view.live import LiveView
 from mission.view.page import PageServer
 from policies.companion.engagement import Phase
@@ -59,4 +62,59 @@ def test_without_an_owner_there_is_nobody_to_follow(page):
     flight = Flight(FlightConfig(world=PLAIN))
     LiveView(flight, page)
     assert "Follow" not in buttons(page)
+    flight.close()
+
+
+def said_after(flight, view, seconds, is_enough=lambda: False):
+    end_us = flight.time_us + round(seconds * 1e6)
+    flight.run(lambda _: is_enough() or flight.time_us >= end_us, on_frame=lambda _: view.frame())
+    return "; ".join(view._controls.lines)
+
+
+def test_take_off_at_power_on_says_what_it_waits_for_and_then_takes_off(page):
+    flight = Flight(FlightConfig(world=PLAIN))
+    view = LiveView(flight, page)
+    buttons(page)["Take off"]()
+    assert "Take off …; waits: cannot be armed: " in said_after(flight, view, 0.1)
+    said_after(flight, view, 30.0, lambda: flight.controller.state.is_flying)
+    assert flight.controller.state.is_flying
+    flight.close()
+
+
+def test_take_off_after_a_crash_says_at_once_why_not_and_restart_helps(page):
+    flight = Flight(FlightConfig(world=PLAIN))
+    view = LiveView(flight, page)
+    buttons(page)["Take off"]()
+    said_after(flight, view, 40.0, lambda: flight.drone.pos_ned[2] < -4.0)
+    buttons(page)["Kill the motor"]()
+    said_after(flight, view, 10.0, lambda: flight.is_crashed and not flight.controller.state.is_armed)
+    assert flight.is_crashed
+    buttons(page)["Take off"]()
+    assert "Take off: cannot be armed: " in said_after(flight, view, 0.1)
+    buttons(page)["Restart"]()
+    buttons(page)["Take off"]()
+    said_after(flight, view, 40.0, lambda: flight.drone.pos_ned[2] < -4.0)
+    assert flight.controller.state.is_flying
+    assert not flight.is_crashed
+    said = [str(text) for text in flight.texts.since(0)]
+    assert any("back on its pad" in text for text in said)
+    flight.close()
+
+
+def test_a_restart_in_flight_puts_it_on_its_pad_with_a_full_battery_and_its_mission_flies_again(page):
+    flight = Flight(FlightConfig(world=PLAIN))
+    view = LiveView(flight, page, path_ned=[(0.0, 0.0, -5.0), (5.0, 0.0, -5.0)])
+    plan = read_plan(DEFAULT_PLAN)
+    running = flight.drone.start(fly_plan(flight.drone, moved_plan(plan, flight.config.home)))
+    said_after(flight, view, 40.0, lambda: flight.controller.state.is_flying and flight.drone.pos_ned[2] < -3.0)
+    buttons(page)["Restart"]()
+    said_after(flight, view, 3.0)
+    assert running.is_done
+    assert not flight.controller.state.is_armed
+    body = flight.rig.arrays.body.numpy()[0]
+    assert float(abs(body["pos_ned"][:2]).max()) < 0.1
+    assert flight.controller.state.battery_remaining > 0.99
+    buttons(page)["Fly the mission"]()
+    said_after(flight, view, 60.0, lambda: flight.drone.pos_ned[2] < -4.0)
+    assert flight.controller.state.mode is Mode.MISSION
     flight.close()

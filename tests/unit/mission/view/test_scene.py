@@ -1,0 +1,40 @@
+"""What the page's scene is given: a trail that ends where its vehicle is, and a plan that a trail does not hide."""
+
+import numpy as np
+import pytest
+
+from common.airframe import load_airframe
+from mission.flight import flight_world
+from mission.view.page import PageServer
+from mission.view.scene import PLAN_M, TRAIL_M, Scene
+from tests.unit.mission.view.rows import CONFIG, hovering
+
+
+@pytest.fixture
+def server():
+    server = PageServer(0, "Honeyguide")
+    yield server
+    server.stop()
+
+
+def nodes(server):
+    return server.scene._handle_from_node_name
+
+
+def test_a_trail_ends_where_its_vehicle_is_also_between_its_points(server):
+    scene = Scene(server, flight_world(CONFIG), load_airframe("x500"))
+    recording = hovering(1.0)
+    recording.rows["pos_ned"][:, 0] = np.linspace(0.0, 5.0, len(recording))
+    for index in (0, 15, 20, 24):
+        moment = recording.moment(index)
+        scene.extend_trails(moment)
+        scene.show(moment)
+        assert nodes(server)["/trails/vehicle/head"].points[-1, -1] == pytest.approx(moment.pos_ned)
+    assert nodes(server)["/trails/vehicle"].points[-1, -1] == pytest.approx(
+        nodes(server)["/trails/vehicle/head"].points[0, 0]
+    )
+
+
+def test_a_plan_is_wider_than_the_track_that_covers_it(server):
+    Scene(server, flight_world(CONFIG), load_airframe("x500"), path_ned=[(0.0, 0.0, -5.0), (5.0, 0.0, -5.0)])
+    assert nodes(server)["/plan"].thickness == PLAN_M > 2.0 * TRAIL_M
