@@ -20,7 +20,7 @@ from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.signing import SigningConfig
 from autopilot.node import FlightController, HostPorts
 from autopilot.persistence import Persistence
-from autopilot.vehicle import Mode
+from autopilot.vehicle import Mode, Severity
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder
