@@ -74,8 +74,8 @@ class Channel:
         self._seq = 0
         self._component_seqs: dict[int, int] = {}  # clients count losses per component
 
-    def send(self, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
-        """Sends one message."""
+    def send(self, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> bytes:
+        """Sends one message; returns its frame."""
         if compid == AUTOPILOT_COMPONENT:
             seq = self._seq
             self._seq = seq + 1 & 0xFF
@@ -89,6 +89,7 @@ class Channel:
             frame += self.signer.signature(frame, self.number & 0xFF)
         if not self.is_mute:
             self.link.send(frame)
+        return frame
 
     def pass_on(self, frame: bytes) -> None:
         """Sends a frame of somebody else's, as it is."""
@@ -175,19 +176,18 @@ class Endpoint:
     def reply(self, sender: Sender, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
         """Sends a message on the channel of `sender`."""
         payload = self._on_clients_clock(kind, payload)
-        sender.channel.send(kind, payload, compid)
+        frame = sender.channel.send(kind, payload, compid)
         self.sent_count += 1
         if self._log is not None:
-            self._log.sent(self.time_us, kind, payload, compid)
+            self._log.sent(self.time_us, kind, payload, compid, frame)
 
     def broadcast(self, kind: MessageType, payload: bytes, compid: int = AUTOPILOT_COMPONENT) -> None:
         """Sends a message on every channel; the frame log gets it once."""
         payload = self._on_clients_clock(kind, payload)
         self.sent_count += len(self.channels)
-        for channel in self.channels:
-            channel.send(kind, payload, compid)
-        if self._log is not None and self.channels:
-            self._log.sent(self.time_us, kind, payload, compid)
+        frames = [channel.send(kind, payload, compid) for channel in self.channels]
+        if self._log is not None and frames:
+            self._log.sent(self.time_us, kind, payload, compid, frames[0])
 
     def received(self, channel: Channel, frame: Frame) -> None:
         """Shows a received frame to the frame log."""
@@ -205,9 +205,9 @@ class Endpoint:
 
     def _stream(self, channel: Channel, log: FrameLog | None, kind: MessageType, payload: bytes) -> None:
         payload = self._on_clients_clock(kind, payload)
-        channel.send(kind, payload)
+        frame = channel.send(kind, payload)
         if log is not None:
-            log.sent(self.time_us, kind, payload, AUTOPILOT_COMPONENT)
+            log.sent(self.time_us, kind, payload, AUTOPILOT_COMPONENT, frame)
 
     def is_for_us(self, target_system: int, target_component: int) -> bool:
         """Whether a message is addressed to one of our components; 0 addresses all."""

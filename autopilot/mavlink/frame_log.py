@@ -6,12 +6,12 @@ Here each sender's frames are numbered anew where they are not in step, and what
 
 from collections.abc import Callable
 
-from autopilot.mavlink.codec import Frame, MessageType, frame_bytes
+from autopilot.mavlink.codec import SIGNED_FLAG, Frame, MessageType, frame_bytes
 
 OnFrame = Callable[[int, bytes], None]
 
 _SENDERS_MAX = 256  # on all channels; of too many, all are forgotten
-_FIRST_V2 = 0xFD
+_FLAGS_AT, _SEQ_AT = 2, 4  # in a MAVLink 2 frame
 
 
 class FrameLog:
@@ -30,10 +30,12 @@ class FrameLog:
         self._seqs: dict[tuple[int, int], int] = {}  # the newest in the log, by system and component
         self._heard: dict[tuple[int, int, int], int] = {}  # the newest on a channel, by its number and the sender
 
-    def sent(self, time_us: int, kind: MessageType, payload: bytes, compid: int) -> None:
-        """Logs a message of the vehicle's, unsigned."""
+    def sent(self, time_us: int, kind: MessageType, payload: bytes, compid: int, frame: bytes) -> None:
+        """Logs a message of the vehicle's, unsigned: `frame` as it was sent, if its number is in step."""
         seq = self._next((self._sysid, compid), 1)
-        self._on_frame(time_us, frame_bytes(kind, payload, seq, self._sysid, compid))
+        if frame[_SEQ_AT] != seq or frame[_FLAGS_AT] & SIGNED_FLAG:
+            frame = frame_bytes(kind, payload, seq, self._sysid, compid)
+        self._on_frame(time_us, frame)
 
     def received(self, time_us: int, frame: Frame, channel: int) -> None:
         """Logs a frame that came in on a channel: as it is, if its number is in step."""

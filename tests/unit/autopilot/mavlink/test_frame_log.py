@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from autopilot.mavlink.codec import FrameReader, decode, encode, known_type
+from autopilot.mavlink.codec import SIGNED_FLAG, FrameReader, decode, encode, frame_bytes, known_type
 from autopilot.mavlink.frame_log import FrameLog
 
 HEARTBEAT = known_type("HEARTBEAT")
@@ -19,6 +19,11 @@ class Log:
         (frame,) = FrameReader().feed(encode(name, sysid, compid, seq, time_usec=seq + 1000))
         self.log.received(0, frame, channel)
 
+    def say(self, seq, compid=1, flags=0):
+        frame = frame_bytes(HEARTBEAT, bytes(9), seq, 1, compid, flags)
+        self.log.sent(0, HEARTBEAT, bytes(9), compid, frame)
+        return frame
+
     def frames(self):
         return FrameReader().feed(b"".join(self.data))
 
@@ -30,10 +35,23 @@ class Log:
 
 def test_what_the_vehicle_says_on_many_channels_is_counted_once():
     log = Log()
-    for _ in range(300):
-        log.log.sent(0, HEARTBEAT, bytes(9), 1)
-        log.log.sent(0, HEARTBEAT, bytes(9), 154)
+    for k in range(300):
+        log.say(k & 0xFF, compid=1)
+        log.say((k + 40) & 0xFF, compid=154)
     assert [frame.seq for frame in log.frames() if frame.compid == 154] == [k & 0xFF for k in range(300)]
+
+
+def test_what_the_vehicle_says_is_not_made_into_a_frame_twice():
+    log = Log()
+    said = [log.say(k & 0xFF) for k in range(300)]
+    assert all(logged is frame for logged, frame in zip(log.data, said, strict=True))
+
+
+def test_a_signed_frame_of_the_vehicle_is_logged_unsigned():
+    log = Log()
+    log.say(0, flags=SIGNED_FLAG)
+    (frame,) = log.frames()
+    assert (frame.seq, frame.is_signed) == (0, False)
 
 
 def test_one_client_on_two_channels_loses_nothing():
