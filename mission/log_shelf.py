@@ -69,6 +69,7 @@ class FlightLogs:
         self._size = 0
         self._has_failed = False
         self._name = ""
+        self._ended: Sequence[LogFile] | None = None  # the others; None: to be looked for. Clients ask often
         self._was_armed = False
         if params[MODE_PARAMETER] >= FROM_BOOT_TO_DISARM:
             self._begin()
@@ -98,10 +99,11 @@ class FlightLogs:
                 self._fail(error)
             if self._has_failed:
                 part_path(self._folder / self._name).unlink(missing_ok=True)  # not got as far as its data
-        self._file, self._size, self._has_failed = None, 0, False
+        self._file, self._size, self._has_failed, self._ended = None, 0, False, None
 
     def _begin(self) -> None:
         names = self._names()
+        self._ended = None
         for name in names[: max(len(names) + 1 - LOGS_KEPT_MAX, 0)]:
             (self._folder / name).unlink(missing_ok=True)
         self._name = f"log_{_number(names[-1]) + 1 if names else 1:05}.ulg"
@@ -141,8 +143,18 @@ class FlightLogs:
                 self._file.flush()
             except OSError as error:
                 self._fail(error)
-        stats = [(name, os.stat(self._folder / name)) for name in self._names()]  # noqa: PTH116  one call per log
-        return [LogFile(name, stat.st_size, int(stat.st_mtime)) for name, stat in stats]
+        if self._ended is None:
+            others = [name for name in self._names() if self._file is None or name != self._name]
+            self._ended = [log for name in others if (log := self._log(name)) is not None]
+        growing = None if self._file is None else self._log(self._name)
+        return self._ended if growing is None else [*self._ended, growing]
+
+    def _log(self, name: str) -> LogFile | None:
+        try:
+            stat = os.stat(self._folder / name)  # noqa: PTH116  one call per log
+        except FileNotFoundError:
+            return None
+        return LogFile(name, stat.st_size, int(stat.st_mtime))
 
     def read(self, name: str, offset: int, count: int) -> bytes:
         return _read(self._folder / name, offset, count)
@@ -151,6 +163,7 @@ class FlightLogs:
         erased = [name for name in self._names() if self._file is None or name != self._name]
         for name in erased:
             (self._folder / name).unlink(missing_ok=True)
+        self._ended = None
         return len(erased)
 
 
