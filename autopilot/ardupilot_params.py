@@ -22,7 +22,8 @@ ARDUPILOT_PARAMETERS: list[Parameter] = [
               "voltage below which the battery is low, whatever its charge, 0: none", "ArduPilot has 10.5"),
     Parameter("BATT_CRT_VOLT", 0.0, 0.0, 100.0, "V",
               "voltage below which the battery is critical, whatever its charge, 0: none", _ARDUPILOT),
-    Parameter("BATT_LOW_TIMER", 10.0, 0.0, 120.0, "s", "for how long the voltage must be that low", _ARDUPILOT),
+    Parameter("BATT_LOW_TIMER", 10.0, 0.0, 120.0, "s", "for how long the voltage must be that low, 0: no limit",
+              _ARDUPILOT),
     Parameter("BATT_FS_LOW_ACT", 0, 0, 5, "",
               "low battery: 0 warn, 1 land, 2 return, 3 and 4 smart return, 5 terminate", _ARDUPILOT),
     *(

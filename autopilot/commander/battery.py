@@ -135,6 +135,8 @@ class VoltageLimits:
         if not self._has_limits or voltage_v <= 0.0:
             return level
         patience_us = float(self._params["BATT_LOW_TIMER"]) * 1e6
+        if patience_us <= 0.0:
+            return level
         for limited, name in ((BatteryLevel.LOW, "BATT_LOW_VOLT"), (BatteryLevel.CRITICAL, "BATT_CRT_VOLT")):
             if voltage_v >= float(self._params[name]):
                 self._since_us.pop(limited, None)

@@ -1,8 +1,11 @@
-"""The charge estimator: starts from the voltage, counts the current, is corrected by the voltage."""
+"""The charge estimator: starts from the voltage, counts the current, is corrected by the voltage. Limits of voltage."""
 
 import pytest
 
-from autopilot.commander.battery import BatteryEstimator
+from autopilot.ardupilot_params import ARDUPILOT_PARAMETERS
+from autopilot.commander.battery import BatteryEstimator, VoltageLimits
+from autopilot.params import parameter_table
+from autopilot.vehicle import BatteryLevel
 from common.airframe import load_airframe
 
 BATTERY = load_airframe("x500").battery
@@ -82,3 +85,49 @@ def test_short_dip_of_the_voltage_is_not_believed():
         is_dip = 20 <= i < 60
         battery.update(1_000_000 + i * 100_000, 12.5 + 0.001 * (i % 2) if is_dip else full_v, 0.0)
     assert battery.remaining > 0.95
+
+
+def limits(**values):
+    params = parameter_table(None, ARDUPILOT_PARAMETERS)
+    for name, value in {"BATT_LOW_VOLT": 14.0, "BATT_CRT_VOLT": 13.0, "BATT_LOW_TIMER": 2.0, **values}.items():
+        params.set_exactly(name, value)
+    return VoltageLimits(params)
+
+
+@pytest.mark.parametrize(
+    ("voltage_v", "level"),
+    [(14.0, BatteryLevel.UNDEFINED), (13.9, BatteryLevel.LOW), (12.9, BatteryLevel.CRITICAL)],
+)
+def test_voltage_counts_once_it_has_been_low_for_the_time(voltage_v, level):
+    watched = limits()
+    assert watched.level(0, voltage_v) is BatteryLevel.UNDEFINED
+    assert watched.level(1_990_000, voltage_v) is BatteryLevel.UNDEFINED
+    assert watched.level(2_000_000, voltage_v) is level
+
+
+def test_voltage_that_recovers_begins_its_time_anew():
+    watched = limits()
+    watched.level(0, 13.5)
+    watched.level(1_000_000, 15.0)
+    assert watched.level(2_500_000, 13.5) is BatteryLevel.UNDEFINED
+    assert watched.level(4_500_000, 13.5) is BatteryLevel.LOW
+
+
+@pytest.mark.parametrize(
+    ("name", "level"),
+    [
+        ("BATT_LOW_VOLT", BatteryLevel.CRITICAL),
+        ("BATT_CRT_VOLT", BatteryLevel.LOW),
+        ("BATT_LOW_TIMER", BatteryLevel.UNDEFINED),
+    ],
+)
+def test_zero_takes_a_voltage_limit_away(name, level):
+    watched = limits(**{name: 0.0})
+    watched.level(0, 12.0)
+    assert watched.level(60_000_000, 12.0) is level
+
+
+def test_a_battery_without_a_voltage_has_no_level():
+    watched = limits()
+    watched.level(0, 0.0)
+    assert watched.level(60_000_000, 0.0) is BatteryLevel.UNDEFINED
