@@ -17,6 +17,7 @@ from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 
 HOUR_S = 3600.0
 AIRFRAME = Path(__file__).parents[1] / "sim/bodies/airframes/x500.toml"
+CAPACITY = r"(?m)^(capacity_mah\s*=\s*\{\s*value\s*=\s*)([\d.]+)"
 CORNERS_NED = ((15.0, 0.0, -8.0), (15.0, 15.0, -10.0), (0.0, 15.0, -8.0), (0.0, 0.0, -12.0))
 TAKEOFF, WAYPOINT, JUMP, RELATIVE, FOREVER = 22, 16, 177, 3, -1
 MEMORY_MAX_MB = 1000.0
@@ -26,7 +27,7 @@ def main() -> int:
     with TemporaryDirectory() as folder:
         lap, airframe = Path(folder) / "lap.waypoints", Path(folder) / "large.toml"
         lap.write_text(_lap())
-        airframe.write_text(sub(r"(?m)^(capacity_mah\s*=\s*\{\s*value\s*=\s*)([\d.]+)", r"\g<1>\g<2>e2", AIRFRAME.read_text()))
+        airframe.write_text(sub(CAPACITY, r"\g<1>\g<2>e2", AIRFRAME.read_text()))
         flights = {
             "idle": (24.0, ["--idle"]),
             "flying": (4.0, ["--plan", str(lap), "--airframe", str(airframe), "--wind", "3"]),

@@ -30,6 +30,12 @@ FRAME_US = TICK_US * FRAME_TICKS
 GRAVITY_M_S2 = 9.80665  # standard gravity, CGPM 1901
 
 
+@wp.func
+def tick_end_us(tick: wp.int64) -> wp.int64:
+    """When the tick of an index, counted from power-on, ends [us]; 32 bits would be over after 99 days."""
+    return (tick + wp.int64(1)) * wp.int64(TICK_US)
+
+
 def _start_warp() -> None:
     """Initialises Warp without its greeting, and without its native warning that there is no CUDA driver."""
     wp.config.log_level = wp.LOG_WARNING

@@ -12,6 +12,12 @@ _TURN = wp.constant(6.283185307179586)
 
 
 @wp.func
+def draw_tick(tick: wp.int64) -> int:
+    """A tick as draws and schedules count it: the same number for 99 days, then from 0 again. No time is made of it."""
+    return int(tick & wp.int64(0x7FFFFFFF))
+
+
+@wp.func
 def draw_key(seed: int, i_vehicle: int, tick: int, stream: int) -> wp.uint32:
     """Generator state of the draw named by its four counters."""
     state = wp.rand_init(seed, i_vehicle)

@@ -23,7 +23,8 @@ from autopilot.ports import (
     Setpoint,
     contact,
 )
-from common.kernels import GRAVITY_M_S2, TICK_S, TICK_US
+from common.kernels import GRAVITY_M_S2, TICK_S, tick_end_us
+from common.rng import draw_tick
 from sim.bodies.multirotor import BodyState, MultirotorModel, body_at_rest, body_tick
 from sim.faults import Faults, weakened
 from sim.sensors.sensors import SensorModel, SensorState, sense
@@ -39,7 +40,7 @@ class RigArrays:
 
     worlds: wp.array(dtype=World)
     i_world: wp.array(dtype=int)  # the world that each vehicle is in
-    tick: wp.array(dtype=int)  # ticks since power-on
+    tick: wp.array(dtype=wp.int64)  # ticks since power-on
     seed: wp.array(dtype=int)
     model: wp.array(dtype=MultirotorModel)
     body: wp.array(dtype=BodyState)
@@ -52,10 +53,10 @@ class RigArrays:
 
 
 @wp.func
-def true_estimate(body: BodyState, tick: int) -> Estimate:
+def true_estimate(body: BodyState, tick: wp.int64) -> Estimate:
     """The true state in the place of an estimate."""
     estimate = Estimate()
-    estimate.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    estimate.time_us = tick_end_us(tick)
     estimate.flags = TILT_ALIGNED | YAW_ALIGNED | VELOCITY_VALID | POSITION_VALID | HEIGHT_VALID
     estimate.q_ned_from_frd = body.q_ned_from_frd
     estimate.omega_frd = body.omega_frd
@@ -67,10 +68,10 @@ def true_estimate(body: BodyState, tick: int) -> Estimate:
 
 
 @wp.func
-def true_battery(body: BodyState, tick: int) -> BatterySample:
+def true_battery(body: BodyState, tick: wp.int64) -> BatterySample:
     """The true battery in the place of a sample."""
     battery = BatterySample()
-    battery.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    battery.time_us = tick_end_us(tick)
     battery.voltage_v = body.battery_voltage_v
     battery.current_a = body.battery_current_a
     return battery
@@ -124,8 +125,9 @@ def make_advance(has_estimator: bool) -> Any:
         control = rig.autopilot.control[i]
         motor_loss = rig.faults[i].motor_loss
         for _ in range(tick_count):
+            count = draw_tick(tick)
             height = -body.pos_ned[2] - ground_height(world, body.pos_ned[0], body.pos_ned[1])
-            wind = wind_step(wind_model, wind, body.vel_ned, height, seed, i, tick, TICK_S)
+            wind = wind_step(wind_model, wind, body.vel_ned, height, seed, i, count, TICK_S)
             command = weakened(control.actuators.command, motor_loss)
             body = body_tick(model, body, command, wind.wind_ned, world)
             if wp.static(has_estimator):
@@ -135,8 +137,10 @@ def make_advance(has_estimator: bool) -> Any:
             else:
                 sensors.samples.battery = true_battery(body, tick)
                 estimate = true_estimate(body, tick)
-            control = control_tick(params, airframe, control, estimate, setpoint, sensors.samples.battery, tick)
-            tick += 1
+            control = control_tick(
+                params, airframe, control, estimate, setpoint, sensors.samples.battery, draw_tick(tick)
+            )
+            tick += wp.int64(1)
         rig.tick[i] = tick
         rig.body[i] = body
         rig.wind[i] = wind

@@ -89,7 +89,7 @@ def is_due(period_ticks: int, tick: int) -> bool:
     """True at the ticks whose end is a multiple of the period; never for period 0."""
     if period_ticks <= 0:
         return False
-    return (tick + 1) % period_ticks == 0
+    return tick % period_ticks == period_ticks - 1
 
 
 @wp.func

@@ -70,7 +70,7 @@ class Rig:
         self.arrays = RigArrays()
         self._world = world  # holds the arrays that the kernels' structs point into
         self.arrays.worlds, self.arrays.i_world = self._worlds(world)
-        self.arrays.tick = wp.zeros(vehicle_count, dtype=int, device=device)
+        self.arrays.tick = wp.zeros(vehicle_count, dtype=wp.int64, device=device)
         self.arrays.seed = wp.full(vehicle_count, seed, dtype=int, device=device)
         model = multirotor_model(airframe, home.alt_m)
         self.arrays.model = self._rows(MultirotorModel, model)

@@ -11,8 +11,8 @@ from typing import Any
 import warp as wp
 
 from autopilot.ports import BaroSample
-from common.kernels import TICK_S, TICK_US
-from common.rng import normal
+from common.kernels import TICK_S, tick_end_us
+from common.rng import draw_tick, normal
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
 from sim.streams import BARO_DRIFT, BARO_DRIFT_START, BARO_OFFSET, BARO_WHITE
 
@@ -98,13 +98,13 @@ def baro_sample(
     fault: SensorFault,
     seed: int,
     i: int,
-    tick: int,
+    tick: wp.int64,
 ) -> BaroSample:
     """What the driver reads at `alt_amsl_m` [m]."""
     sample = held
-    sample.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    sample.time_us = tick_end_us(tick)
     if fault.mode != FAULT_STUCK or held.time_us == wp.int64(0):
-        noise = noise_gain(fault) * model.white_std * normal(seed, i, tick, BARO_WHITE)
+        noise = noise_gain(fault) * model.white_std * normal(seed, i, draw_tick(tick), BARO_WHITE)
         sample.pressure_pa = isa_pressure_pa(alt_amsl_m) + state.offset_pa + state.drift_pa + noise + fault_bias(fault)
         sample.temperature_c = isa_temperature_k(alt_amsl_m) - _KELVIN
     return sample

@@ -11,8 +11,8 @@ from typing import Any
 import warp as wp
 
 from autopilot.ports import GnssSample
-from common.kernels import TICK_S, TICK_US
-from common.rng import normal3
+from common.kernels import TICK_S, tick_end_us
+from common.rng import draw_tick, normal3
 from sim.faults import FAULT_OFF, FAULT_STUCK, SensorFault, fault_bias3, is_due, noise_gain, sampling_period
 from sim.streams import GNSS_CORRELATED, GNSS_CORRELATED_START, GNSS_POSITION, GNSS_VELOCITY
 
@@ -37,6 +37,9 @@ REPORTED_V_STD_M = 1.0  # 1.5 √(0.3² + 0.6²)
 REPORTED_VEL_STD_M_S = 0.17  # 0.1 √3: all axes together, as u-blox sAcc
 
 
+ticks4 = wp.types.vector(length=4, dtype=wp.int64)
+
+
 @wp.struct
 class GnssModel:
     period_ticks: int
@@ -54,12 +57,12 @@ class GnssModel:
 
 @wp.struct
 class GnssState:
-    boot_tick: int
+    boot_tick: wp.int64
     correlated_ned: wp.vec3  # [m] Gauss-Markov position error
-    last_tick: int  # of the last sample taken
+    last_tick: wp.int64  # of the last sample taken
     queue_head: int  # slot of the oldest waiting sample
     queue_count: int
-    queue_tick: wp.vec4i  # tick at whose end the sample was taken
+    queue_tick: ticks4  # tick at whose end the sample was taken
     queue_pos_ned: wp.mat44  # [m] a row per sample: north, east, down, nothing
     queue_vel_ned: wp.mat44  # [m/s]
 
@@ -82,21 +85,21 @@ def gnss_model(noise_scale: float = 1.0) -> Any:
 
 
 @wp.func
-def gnss_boot(model: GnssModel, seed: int, i: int, tick: int) -> GnssState:
+def gnss_boot(model: GnssModel, seed: int, i: int, tick: wp.int64) -> GnssState:
     """The state at power-on: the correlated error has its stationary distribution."""
     state = GnssState()
     state.boot_tick = tick
     state.last_tick = tick
-    state.correlated_ned = wp.cw_mul(model.correlated_std_ned, normal3(seed, i, tick, GNSS_CORRELATED_START))
+    state.correlated_ned = wp.cw_mul(model.correlated_std_ned, normal3(seed, i, draw_tick(tick), GNSS_CORRELATED_START))
     return state
 
 
 @wp.func
-def gnss_is_taken(period_ticks: int, first_tick: int, fault: SensorFault, tick: int) -> bool:
+def gnss_is_taken(period_ticks: int, first_tick: wp.int64, fault: SensorFault, tick: wp.int64) -> bool:
     """True at the ticks at whose end the receiver takes a sample: none before its first fix at `first_tick`."""
     if tick < first_tick:
         return False
-    return is_due(sampling_period(period_ticks, fault), tick)
+    return is_due(sampling_period(period_ticks, fault), draw_tick(tick))
 
 
 @wp.func
@@ -108,20 +111,20 @@ def gnss_take(
     fault: SensorFault,
     seed: int,
     i: int,
-    tick: int,
+    tick: wp.int64,
 ) -> GnssState:
     """Puts a sample of the true position and velocity, with errors, into the queue; drops it if the queue is full."""
     out = state
     keep = wp.exp(-float(tick - state.last_tick) / model.correlation_ticks)
     kick = wp.sqrt(1.0 - keep * keep)
     out.correlated_ned = keep * state.correlated_ned + kick * wp.cw_mul(
-        model.correlated_std_ned, normal3(seed, i, tick, GNSS_CORRELATED)
+        model.correlated_std_ned, normal3(seed, i, draw_tick(tick), GNSS_CORRELATED)
     )
     out.last_tick = tick
     if state.queue_count < QUEUE_LENGTH:
         gain = noise_gain(fault)
-        pos_noise = gain * wp.cw_mul(model.pos_std_ned, normal3(seed, i, tick, GNSS_POSITION))
-        vel_noise = gain * model.vel_std * normal3(seed, i, tick, GNSS_VELOCITY)
+        pos_noise = gain * wp.cw_mul(model.pos_std_ned, normal3(seed, i, draw_tick(tick), GNSS_POSITION))
+        vel_noise = gain * model.vel_std * normal3(seed, i, draw_tick(tick), GNSS_VELOCITY)
         slot = (state.queue_head + state.queue_count) % QUEUE_LENGTH
         ticks = state.queue_tick
         positions = state.queue_pos_ned
@@ -139,9 +142,9 @@ def gnss_take(
 
 
 @wp.func
-def gnss_is_delivered(delay_ticks: int, queue_count: int, oldest_tick: int, tick: int) -> bool:
+def gnss_is_delivered(delay_ticks: int, queue_count: int, oldest_tick: wp.int64, tick: wp.int64) -> bool:
     """True at the tick at whose end the oldest waiting sample reaches the flight controller."""
-    return queue_count > 0 and tick - oldest_tick >= delay_ticks
+    return queue_count > 0 and tick - oldest_tick >= wp.int64(delay_ticks)
 
 
 @wp.func
@@ -150,7 +153,7 @@ def gnss_delivered(model: GnssModel, state: GnssState, held: GnssSample, fault: 
     sample = held
     if fault.mode != FAULT_OFF:
         gain = noise_gain(fault)
-        sample.time_us = wp.int64(state.queue_tick[state.queue_head] + 1) * wp.int64(TICK_US)
+        sample.time_us = tick_end_us(state.queue_tick[state.queue_head])
         sample.fix_type = model.fix_type
         sample.satellites = wp.max(int(float(SATELLITES) / wp.sqrt(gain)), JAMMED_SATELLITES)
         sample.pos_h_std = gain * model.pos_h_std

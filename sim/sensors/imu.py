@@ -15,8 +15,8 @@ from typing import Any
 import warp as wp
 
 from autopilot.ports import ImuSample
-from common.kernels import GRAVITY_M_S2, MAX_ROTORS, TICK_S, TICK_US, vec8
-from common.rng import normal3, normal6
+from common.kernels import GRAVITY_M_S2, MAX_ROTORS, TICK_S, tick_end_us, vec8
+from common.rng import draw_tick, normal3, normal6
 from common.vectors import clamp3
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias3, noise_gain
 from sim.streams import (
@@ -179,7 +179,7 @@ def imu_sample(
     accel_fault: SensorFault,
     seed: int,
     i: int,
-    tick: int,
+    tick: wp.int64,
 ) -> ImuSample:
     """What the driver reads at the end of the tick.
 
@@ -195,7 +195,7 @@ def imu_sample(
         i: vehicle.
         tick: index.
     """
-    gyro_noise, accel_noise = normal6(seed, i, tick, IMU_WHITE)
+    gyro_noise, accel_noise = normal6(seed, i, draw_tick(tick), IMU_WHITE)
     gyro_shake = model.gyro_broadband * state.speed_squared
     accel_shake = model.accel_broadband * state.speed_squared
     gyro_std = noise_gain(gyro_fault) * wp.sqrt(model.gyro_std * model.gyro_std + gyro_shake * gyro_shake)
@@ -207,7 +207,7 @@ def imu_sample(
     gyro = gyro_frd + state.gyro_bias_frd + state.gyro_drift_frd + gyro_std * gyro_noise + model.gyro_tone * tone
     accel = accel_frd + state.accel_bias_frd + state.accel_drift_frd + accel_std * accel_noise + model.accel_tone * tone
     sample = ImuSample()
-    sample.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    sample.time_us = tick_end_us(tick)
     sample.dt_s = state.dt_s
     sample.gyro_frd = clamp3(gyro + fault_bias3(gyro_fault), wp.vec3(model.gyro_limit))
     sample.accel_frd = clamp3(accel + fault_bias3(accel_fault), wp.vec3(model.accel_limit))

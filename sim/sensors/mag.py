@@ -11,8 +11,8 @@ import numpy as np
 import warp as wp
 
 from autopilot.ports import MagSample
-from common.kernels import TICK_US
-from common.rng import normal3
+from common.kernels import tick_end_us
+from common.rng import draw_tick, normal3
 from sim.faults import FAULT_STUCK, FAULT_TURNED, SensorFault, fault_bias3, fault_turn, noise_gain
 from sim.streams import MAG_HARD_IRON, MAG_SOFT_IRON_CROSS, MAG_SOFT_IRON_DIAGONAL, MAG_WHITE
 
@@ -76,15 +76,15 @@ def mag_sample(
     fault: SensorFault,
     seed: int,
     i: int,
-    tick: int,
+    tick: wp.int64,
 ) -> MagSample:
     """What the driver reads: soft iron times the field in frd, plus hard iron and noise."""
     sample = held
-    sample.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    sample.time_us = tick_end_us(tick)
     if fault.mode != FAULT_STUCK or held.time_us == wp.int64(0):
         field_frd = wp.quat_rotate_inv(q_ned_from_frd, model.field_ned_gauss)
         if fault.mode == FAULT_TURNED:
             field_frd = wp.quat_rotate(fault_turn(fault), field_frd)
-        noise = noise_gain(fault) * model.white_std * normal3(seed, i, tick, MAG_WHITE)
+        noise = noise_gain(fault) * model.white_std * normal3(seed, i, draw_tick(tick), MAG_WHITE)
         sample.field_frd_gauss = state.soft_iron * field_frd + state.hard_iron_frd + noise + fault_bias3(fault)
     return sample

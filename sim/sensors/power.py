@@ -8,8 +8,8 @@ from typing import Any
 import warp as wp
 
 from autopilot.ports import BatterySample
-from common.kernels import TICK_US
-from common.rng import normal
+from common.kernels import tick_end_us
+from common.rng import draw_tick, normal
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
 from sim.streams import BATTERY_CURRENT, BATTERY_VOLTAGE
 
@@ -45,14 +45,14 @@ def battery_sample(
     fault: SensorFault,
     seed: int,
     i: int,
-    tick: int,
+    tick: wp.int64,
 ) -> BatterySample:
     """What the driver reads; a bias fault acts on the voltage."""
     sample = held
-    sample.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    sample.time_us = tick_end_us(tick)
     if fault.mode != FAULT_STUCK or held.time_us == wp.int64(0):
         gain = noise_gain(fault)
-        voltage_noise = gain * model.voltage_std * normal(seed, i, tick, BATTERY_VOLTAGE)
+        voltage_noise = gain * model.voltage_std * normal(seed, i, draw_tick(tick), BATTERY_VOLTAGE)
         sample.voltage_v = voltage_v + voltage_noise + fault_bias(fault)
-        sample.current_a = current_a + gain * model.current_std * normal(seed, i, tick, BATTERY_CURRENT)
+        sample.current_a = current_a + gain * model.current_std * normal(seed, i, draw_tick(tick), BATTERY_CURRENT)
     return sample

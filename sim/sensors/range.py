@@ -9,8 +9,8 @@ from typing import Any
 import warp as wp
 
 from autopilot.ports import RangeSample
-from common.kernels import TICK_US
-from common.rng import normal
+from common.kernels import tick_end_us
+from common.rng import draw_tick, normal
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
 from sim.streams import RANGE_WHITE
 
@@ -51,17 +51,17 @@ def range_sample(
     fault: SensorFault,
     seed: int,
     i: int,
-    tick: int,
+    tick: wp.int64,
 ) -> RangeSample:
     """What the driver reads when the ray along body down meets something after `distance_m` [m].
 
     Out of range it reports the nearer limit and `is_valid` 0.
     """
     sample = held
-    sample.time_us = wp.int64(tick + 1) * wp.int64(TICK_US)
+    sample.time_us = tick_end_us(tick)
     if fault.mode != FAULT_STUCK or held.time_us == wp.int64(0):
         std = noise_gain(fault) * wp.max(model.near_std, model.far_std_share * distance_m)
-        distance = distance_m + std * normal(seed, i, tick, RANGE_WHITE) + fault_bias(fault)
+        distance = distance_m + std * normal(seed, i, draw_tick(tick), RANGE_WHITE) + fault_bias(fault)
         sample.is_valid = 0
         if distance >= model.min_distance and distance_m < model.max_distance:
             sample.is_valid = 1

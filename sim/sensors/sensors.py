@@ -12,6 +12,7 @@ from autopilot.ports import Samples
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.kernels import TICK_S
+from common.rng import draw_tick
 from sim.bodies.multirotor import BodyState
 from sim.faults import FAULT_OFF, Faults, SensorFault, is_due, sampling_period
 from sim.sensors.baro import BaroModel, BaroState, baro_boot, baro_drift, baro_model, baro_sample
@@ -96,14 +97,14 @@ def sensor_model(noise_scale: float = 1.0, home: GeoPoint = DEFAULT_HOME) -> Any
 
 
 @wp.func
-def sensors_boot(model: SensorModel, seed: int, i: int, tick: int) -> SensorState:
+def sensors_boot(model: SensorModel, seed: int, i: int, tick: wp.int64) -> SensorState:
     """The state at power-on, drawn for this vehicle and this power-on."""
     state = SensorState()
     state.is_booted = 1
-    state.imu = imu_boot(model.imu, seed, i, tick)
+    state.imu = imu_boot(model.imu, seed, i, draw_tick(tick))
     state.gnss = gnss_boot(model.gnss, seed, i, tick)
-    state.baro = baro_boot(model.baro, seed, i, tick)
-    state.mag = mag_boot(model.mag, seed, i, tick)
+    state.baro = baro_boot(model.baro, seed, i, draw_tick(tick))
+    state.mag = mag_boot(model.mag, seed, i, draw_tick(tick))
     state.samples.gnss.fix_type = 1
     return state
 
@@ -127,7 +128,7 @@ def sense(
     world: World,
     seed: int,
     i: int,
-    tick: int,
+    tick: wp.int64,
 ) -> SensorState:
     """The sensors after a tick; `samples` holds what the drivers have delivered by its end.
 
@@ -142,13 +143,14 @@ def sense(
         tick: index of the tick.
     """
     out = state
+    count = draw_tick(tick)
     if state.is_booted == 0:
         out = sensors_boot(model, seed, i, tick)
 
-    if is_due(DRIFT_PERIOD_TICKS, tick):
-        out.imu = imu_drift(model.imu, out.imu, seed, i, tick)
+    if is_due(DRIFT_PERIOD_TICKS, count):
+        out.imu = imu_drift(model.imu, out.imu, seed, i, count)
     period = imu_period(faults.gyro, faults.accel)
-    if is_due(period, tick):
+    if is_due(period, count):
         out.imu = imu_vibration(out.imu, body.rotor_speed, float(period) * TICK_S)
         out.samples.imu = imu_sample(
             model.imu,
@@ -163,7 +165,8 @@ def sense(
             tick,
         )
 
-    if gnss_is_taken(model.gnss.period_ticks, model.gnss.first_fix_ticks + out.gnss.boot_tick, faults.gnss, tick):
+    first_fix = out.gnss.boot_tick + wp.int64(model.gnss.first_fix_ticks)
+    if gnss_is_taken(model.gnss.period_ticks, first_fix, faults.gnss, tick):
         out.gnss = gnss_take(model.gnss, out.gnss, body.pos_ned, body.vel_ned, faults.gnss, seed, i, tick)
     if gnss_is_delivered(model.gnss.delay_ticks, out.gnss.queue_count, out.gnss.queue_tick[out.gnss.queue_head], tick):
         out.samples.gnss = gnss_delivered(model.gnss, out.gnss, out.samples.gnss, faults.gnss)
@@ -171,23 +174,23 @@ def sense(
     if faults.gnss.mode == FAULT_OFF:
         out.samples.gnss = gnss_lost(out.samples.gnss)
 
-    if is_due(model.baro.period_ticks, tick):
-        out.baro = baro_drift(model.baro, out.baro, seed, i, tick)
-    if is_due(sampling_period(model.baro.period_ticks, faults.baro), tick):
+    if is_due(model.baro.period_ticks, count):
+        out.baro = baro_drift(model.baro, out.baro, seed, i, count)
+    if is_due(sampling_period(model.baro.period_ticks, faults.baro), count):
         alt_amsl_m = model.home_alt_amsl_m - body.pos_ned[2]
         out.samples.baro = baro_sample(model.baro, out.baro, out.samples.baro, alt_amsl_m, faults.baro, seed, i, tick)
 
-    if is_due(sampling_period(model.mag.period_ticks, faults.mag), tick):
+    if is_due(sampling_period(model.mag.period_ticks, faults.mag), count):
         out.samples.mag = mag_sample(
             model.mag, out.mag, out.samples.mag, body.q_ned_from_frd, faults.mag, seed, i, tick
         )
 
-    if is_due(sampling_period(model.range.period_ticks, faults.range), tick):
+    if is_due(sampling_period(model.range.period_ticks, faults.range), count):
         down_ned = wp.quat_rotate(body.q_ned_from_frd, wp.vec3(0.0, 0.0, 1.0))
         distance_m = ray_hit(world, body.pos_ned, down_ned, model.range.max_distance)
         out.samples.range = range_sample(model.range, out.samples.range, distance_m, faults.range, seed, i, tick)
 
-    if is_due(sampling_period(model.battery.period_ticks, faults.battery), tick):
+    if is_due(sampling_period(model.battery.period_ticks, faults.battery), count):
         out.samples.battery = battery_sample(
             model.battery,
             out.samples.battery,

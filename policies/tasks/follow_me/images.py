@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from common.rng import draw_tick
 from policies.tasks.flight.task import worker_count
 from policies.tasks.follow_me.numbers import FollowNumbers
 from policies.tasks.follow_me.observe import HFOV_DEG, pack_images
@@ -29,7 +30,7 @@ def set_optics(
     """Gives the cameras of the chosen rows the noise of their episodes."""
     i = wp.tid()
     if rows[i]:
-        optics[i] = sensor_noise(optics[i], numbers[i].camera_noise, rig.seed[i], rig.tick[i])
+        optics[i] = sensor_noise(optics[i], numbers[i].camera_noise, rig.seed[i], draw_tick(rig.tick[i]))
 
 
 class Eyes:

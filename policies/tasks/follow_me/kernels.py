@@ -14,6 +14,7 @@ from typing import Any
 import warp as wp
 
 from common.kernels import TICK_S, TICK_US
+from common.rng import draw_tick
 from policies.tasks.episode import Border, begin_episode, close_step_in_time, open_frame
 from policies.tasks.flight.draws import (
     HOVER_STREAM,
@@ -144,7 +145,7 @@ def walk(rules: Rules, rig: RigArrays, state: FollowState) -> None:
     seed = state.path_seeds[i]
     body = rig.body[i]
     reach_m = float(wp.inf)
-    end = rig.tick[i]
+    end = draw_tick(rig.tick[i])
     for tick in range(end - rules.decision_ticks, end, _STEP_TICKS):
         person = person_step(world, model, person, seed, i, tick, _STEP_S)
         phone = phone_step(phone_model, phone, person, seed, i, tick + _STEP_TICKS)
@@ -187,7 +188,7 @@ def write_frame(border: Border, rules: Rules, rig: RigArrays, state: FollowState
         write_privileged(body, state.sights[i], state.unseen_s[i], action, state.nearness, border.observations, i, at)
     else:
         own = own_state(rig, i, rules.has_estimator)
-        report = owner_report(state.phones[i], rig.tick[i])
+        report = owner_report(state.phones[i], draw_tick(rig.tick[i]))
         write_vector(rules.vector, own, report, action, border.observations, i, at)
     if rules.has_privileged == 1:
         write_privileged(body, state.sights[i], state.unseen_s[i], action, state.nearness, border.privileged, i, 0)
@@ -309,7 +310,7 @@ def place(border: Border, rig: RigArrays, state: FollowState, start: Start) -> N
     east = body.pos_ned[1] + distance * wp.sin(bearing)
     heading = draw_angle(seed, i, episode, _HEADING_STREAM)
     path_seed = state.path_seeds[i]
-    tick = rig.tick[i]
+    tick = draw_tick(rig.tick[i])
     world = rig.worlds[rig.i_world[i]]
     person = person_start(world, state.person_models[i], north, east, heading, path_seed, i, tick)
     phone_model = state.phone_models[i]

@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from common.rng import draw_tick
 from policies.tasks.episode import Border
 from policies.tasks.flight.task import worker_count
 from policies.tasks.follow_me.observe import HFOV_DEG, depth_byte
@@ -36,7 +37,7 @@ def aim(
     i = wp.tid()
     if rows[i]:
         lenses[i] = lens_of(rig.body[i], 1.0)
-        optics[i] = sensor_noise(optics[i], numbers[i].range_noise, rig.seed[i], rig.tick[i])
+        optics[i] = sensor_noise(optics[i], numbers[i].range_noise, rig.seed[i], draw_tick(rig.tick[i]))
 
 
 @wp.kernel(enable_backward=False)

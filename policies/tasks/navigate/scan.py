@@ -10,7 +10,7 @@ import math
 
 import warp as wp
 
-from common.rng import draw_key
+from common.rng import draw_key, draw_tick
 from common.rotation import yaw_from_quat
 from policies.tasks.layout import Element
 from policies.tasks.navigate.numbers import NavigateNumbers
@@ -121,7 +121,7 @@ def scan(
         dir_ned = wp.vec3(wp.cos(up) * wp.cos(heading), wp.cos(up) * wp.sin(heading), -wp.sin(up))
         ranges_m[i, k] = ray_hit(world, body.pos_ned, dir_ned, RANGE_M)
     noise = numbers[i].range_noise
-    state = draw_key(rig.seed[i], 0, rig.tick[i], _STREAM)
+    state = draw_key(rig.seed[i], 0, draw_tick(rig.tick[i]), _STREAM)
     for k in range(_RANGES):
         error = _UNIFORM_HALF * (2.0 * wp.randf(state) - 1.0)
         if ranges_m[i, k] < RANGE_M:

@@ -26,17 +26,17 @@ def _record(
     bodies: wp.array(dtype=BodyState),
     world: World,
     seed: int,
-    first_tick: int,
+    first_tick: wp.int64,
     stride: int,
     out: wp.array2d(dtype=Samples),
 ):
     i = wp.tid()
     state = states[i]
-    tick = int(first_tick)
+    tick = wp.int64(first_tick)
     for k in range(out.shape[1]):
         for _ in range(stride):
             state = sense(models[i], state, faults[i], bodies[i], world, seed, i, tick)
-            tick += 1
+            tick += wp.int64(1)
         out[i, k] = state.samples
     states[i] = state
 
