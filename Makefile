@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-hostile test-mavproxy test-mavsdk3 test-dronekit fuzz mutants check tune bench format lock clean reproduce-follow
+.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-hostile test-mavproxy test-mavsdk3 test-dronekit fuzz mutants check tune bench soak format lock clean reproduce-follow
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -100,6 +100,9 @@ tune: $(STAMP) ## Print the designed gains with their gain, phase and disk margi
 bench: $(STAMP) ## Measure speed and write bench/results.json
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[bench]"
 	@$(BIN)/python -m bench $(ARGS)
+
+soak: $(STAMP) ## Idle for a simulated day and fly for four hours: memory and logs
+	@$(BIN)/python -m bench.soak $(ARGS)
 
 format: $(STAMP) ## Format the code and mend what lint can mend
 	$(BIN)/ruff check --fix .

@@ -158,7 +158,7 @@ class Client:
             self.send("HEARTBEAT", type=18, autopilot=8, base_mode=0, custom_mode=0, system_status=4, mavlink_version=3)
         if self._offboard is not None and time_us >= self._next_offboard_us:
             self._next_offboard_us = time_us + OFFBOARD_PERIOD_US
-            self._transport.send(self._offboard(time_us // 1000))
+            self._transport.send(self._offboard(time_us // 1000 & 0xFFFFFFFF))
         for running in self._scripts:
             running.step()
         self._scripts = [running for running in self._scripts if not running.is_done]

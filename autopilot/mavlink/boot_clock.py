@@ -28,9 +28,11 @@ class BootClock:
     def shown(self, kind: MessageType, payload: bytes, now_us: int) -> bytes:
         """A payload with its times since boot; dates, and times that are not known, stay."""
         for at, size, unit_us in _time_fields(kind.name):
-            value = int.from_bytes(payload[at : at + size], "little")
-            if 0 < value * unit_us <= now_us:
-                since = self.shown_us(value * unit_us) // unit_us
+            value_us = int.from_bytes(payload[at : at + size], "little") * unit_us
+            if 0 < value_us <= now_us:
+                span_us = unit_us << 8 * size  # a field of 32 bits begins again after it
+                value_us += (now_us - value_us) // span_us * span_us
+                since = self.shown_us(value_us) % span_us // unit_us
                 payload = payload[:at] + since.to_bytes(size, "little") + payload[at + size :]
         return payload
 

@@ -109,6 +109,7 @@ class Companion:
         begun_s = self._wall_s() if self._wall_s is not None and picture is not None else None
         if picture is not None:
             self._picture, self._picture_us = picture, time_us
+            self.vehicle.clock.pictured(picture.time_us)
         blindness = self._blindness(time_us)
         self.trouble = blindness or self._loss() or (NO_DECISION if self._is_undecided else "")
         orders = self.engagement.step(self._situation(time_us))

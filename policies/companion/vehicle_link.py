@@ -20,6 +20,7 @@ from autopilot.vehicle import LandedState, Mode, Severity
 from common.attitude import Quat, Vector
 from common.geodesy import GeoPoint, ned_from_geodetic
 from policies.companion.engagement import Wish
+from policies.companion.vehicle_clock import VehicleClock
 
 COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 AUTOPILOT_COMPONENT = 1
@@ -103,6 +104,7 @@ class VehicleLink:
 
     def __init__(self, link: ByteLink, *, system_id: int = 1) -> None:
         self.own = Own()
+        self.clock = VehicleClock()
         self.owner = Owner()
         self.system_id = system_id
         self._link = link
@@ -223,7 +225,7 @@ class VehicleLink:
         if is_known(1.1, *wxyz) and is_known(RATE_MAX_RAD_S, *omega_frd):  # of unit length, but for rounding
             own = self.own
             own.q_ned_from_frd, own.omega_frd = quat_from_wxyz(wxyz), omega_frd
-            own.boot_us, own.attitude_us = fields.time_boot_ms * 1000, time_us
+            own.boot_us, own.attitude_us = self.clock.time_us(fields.time_boot_ms), time_us
 
     def _distance_told(self, fields: Any, time_us: int) -> None:
         if fields.orientation != _LOOKS_DOWN:
