@@ -114,5 +114,5 @@ lock: $(STAMP) ## Pin the installed versions in constraints.txt
 	@touch $(STAMP)
 
 clean: ## Remove the virtual environment, caches and build leftovers
-	rm -rf $(VENV) $(MAVPROXY) $(MAVSDK3) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(MAVPROXY) $(MAVSDK3) $(DRONEKIT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find $(PACKAGES) tests bench -name __pycache__ -type d -prune -exec rm -rf {} +

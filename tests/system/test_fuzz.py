@@ -6,7 +6,7 @@ from autopilot.vehicle import Mode
 from tests.fuzz.hover import Hover
 from tests.fuzz.modes import FRAME_MAX_S, ModeFlight
 
-WORST_FRAME_S = 1.0  # of processor time; 40 ms as a rule, but the machine does other things
+WORST_FRAME_S = 1.0  # of processor time of all threads; 6 ms as a rule, but the machine does other things
 
 
 @pytest.mark.parametrize(("kind", "count", "per_frame"), [("broken", 20_000, 32), ("valid", 6_000, 3)])
