@@ -43,7 +43,7 @@ class Batch:
     vehicle: Rows  # STATUS_DTYPE of mission.flight_log
     origin: GeoPoint
 
-    def only(self, frames: Rows, samples_before: Rows) -> "Batch":
+    def only(self, frames: Rows | slice, samples_before: Rows) -> "Batch":
         """Some of the frames; `samples_before` as of the frame before the first of them."""
         names = ("time_us", "estimate", "samples", "actuators", "health", "yaw", "body", "vehicle")
         return replace(self, samples_before=samples_before, **{name: getattr(self, name)[frames] for name in names})

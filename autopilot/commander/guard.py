@@ -91,7 +91,7 @@ class Guard:
             if not rule.failure & new:
                 continue
             action = rule.action(commander.params, commander.state.mode)
-            if rule.failure is STICKS_LOST:
+            if rule.failure == STICKS_LOST:
                 action = self._first(action)
             action = self._possible(action)
             strongest = max(strongest, action)
