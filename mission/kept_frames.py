@@ -55,4 +55,6 @@ class KeptRows:
     def all(self) -> Rows:
         """One table; its last row is the last that was added."""
         *full, last = self._chunks or [self._newest[:0]]
-        return np.concatenate([*full, last[: len(last) - self._free], self._newest])
+        table = np.concatenate([*full, last[: len(last) - self._free], self._newest])
+        self._chunks, self._free = [table[: len(table) - len(self._newest)]], 0  # not held twice
+        return table

@@ -20,12 +20,15 @@ Rows = npt.NDArray[Any]
 TRUE_COLOUR = "#0b7285"
 ESTIMATE_COLOUR = "#e8590c"
 PLAN_COLOUR = "#495057"
+DRAWN_MAX = 60_000  # frames, 20 minutes: more are no more to see, and take memory
 
 
 def plot_flight(
     history: History, world: WorldMap, path_ned: Sequence[tuple[int, Rows]], title: str, target: Path
 ) -> None:
-    """Writes the picture of a flight as PNG."""
+    """Writes the picture of a flight as PNG; of a long one every few frames are drawn."""
+    every = -(-len(history.time_us) // DRAWN_MAX)
+    history = History(*(getattr(history, name)[::every] for name in History.__dataclass_fields__))
     figure = Figure(figsize=(12, 8), layout="constrained")
     figure.suptitle(title)
     grid = figure.add_gridspec(3, 2, width_ratios=(1.15, 1.0))

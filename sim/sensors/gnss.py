@@ -37,9 +37,6 @@ REPORTED_V_STD_M = 1.0  # 1.5 √(0.3² + 0.6²)
 REPORTED_VEL_STD_M_S = 0.17  # 0.1 √3: all axes together, as u-blox sAcc
 
 
-ticks4 = wp.types.vector(length=4, dtype=wp.int64)
-
-
 @wp.struct
 class GnssModel:
     period_ticks: int
@@ -62,7 +59,7 @@ class GnssState:
     last_tick: wp.int64  # of the last sample taken
     queue_head: int  # slot of the oldest waiting sample
     queue_count: int
-    queue_tick: ticks4  # tick at whose end the sample was taken
+    queue_tick: wp.vec4l  # tick at whose end the sample was taken
     queue_pos_ned: wp.mat44  # [m] a row per sample: north, east, down, nothing
     queue_vel_ned: wp.mat44  # [m/s]
 
