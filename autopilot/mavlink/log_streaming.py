@@ -144,6 +144,7 @@ class LogStreamingService(Service):
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
         self._streams: dict[Sender, _Stream] = {}
+        self._beginning: dict[Sender, _Stream] = {}  # of which the definitions are not made yet
 
     def messages(self) -> Mapping[str, Handler]:
         return {"LOGGING_ACK": self.acknowledged}
@@ -168,8 +169,7 @@ class LogStreamingService(Service):
             return Reply(Verdict.TEMPORARILY_REJECTED, f"{CLIENTS_MAX} clients have the log already")
         sender, endpoint = command.sender, self._endpoint
         stream = _Stream(sender, lambda kind, payload: endpoint.reply(sender, kind, payload))
-        self._streams[sender] = stream
-        stream.begin(log.listen(stream.data), endpoint.time_us)
+        self._streams[sender] = self._beginning[sender] = stream
         return ACCEPTED
 
     def _stop(self, command: Command) -> Reply:
@@ -185,7 +185,8 @@ class LogStreamingService(Service):
 
     def _end(self, log: LogStream, sender: Sender) -> None:
         stream = self._streams.pop(sender, None)
-        if stream is not None:
+        is_beginning = self._beginning.pop(sender, None) is not None
+        if stream is not None and not is_beginning:
             log.stop_listening(stream.data)
 
     def acknowledged(self, sender: Sender, fields: Any) -> None:
@@ -195,10 +196,13 @@ class LogStreamingService(Service):
             stream.acknowledged(fields.sequence, self._endpoint.time_us)
 
     def frame(self) -> None:
-        """Sends the next pieces of every stream."""
+        """Sends the next pieces of every stream. One begins per frame: making the definitions takes a millisecond."""
         if not self._streams:
             return
         log = self._endpoint.vehicle.host.log_stream
+        if self._beginning and log is not None:
+            stream = self._beginning.pop(next(iter(self._beginning)))
+            stream.begin(log.listen(stream.data), self._endpoint.time_us)
         for sender, stream in list(self._streams.items()):
             if not stream.frame(self._endpoint.time_us) and log is not None:
                 self._end(log, sender)

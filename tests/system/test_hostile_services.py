@@ -184,6 +184,7 @@ ATTACKS = {
     "logs": lambda _: cycle(
         (("LOG_REQUEST_LIST", {**US, "end": 0xFFFF}), ("LOG_REQUEST_DATA", {**US, "id": 1, "count": 0xFFFFFFFF}))
     ),
+    "log streams": lambda _: commands(2510, 2511, 2510),
     "the shell": lambda _: lines(),
     "messages on request": lambda _: every_message(),
     "message intervals": lambda _: mixed(
