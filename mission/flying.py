@@ -12,6 +12,7 @@ from rich.live import Live
 from rich.table import Table
 
 from common.files import write_to_nowhere, write_whole
+from mission.checks import REPLAY_FILE
 from mission.client import Running
 from mission.flight import Flight
 from mission.options import FlightOptions
@@ -22,7 +23,6 @@ from mission.run_folder import OwnFiles
 from mission.script import fly_plan
 from mission.summary import Summary, curved_items, planned_path, summarise
 from mission.terminal import LINE_PERIOD_S, print_line
-from mission.view.recording import FILE as RECORDING
 from mission.view.recording import Recorder
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def fly_to_the_end(
     if page is not None:
         view.end(f"flight ended: logs in {folder}")
     files = OwnFiles(folder, console)
-    with files.writing(RECORDING):
+    with files.writing(REPLAY_FILE):
         recorder.recording().save(folder)
     exit_code = _finish(flight, running, plan, path_ned, folder, files, console)
     if page is not None:

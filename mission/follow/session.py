@@ -17,6 +17,7 @@ from common.airframe import AirframeError, load_airframe
 from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
+from mission.checks import REPLAY_FILE
 from mission.connections import open_links, open_page
 from mission.flight import Flight, flight_parameters
 from mission.flying import advance
@@ -31,7 +32,6 @@ from mission.run_folder import OwnFiles, run_folder
 from mission.script import Drone
 from mission.terminal import busy, print_line
 from mission.view.film import write_film
-from mission.view.recording import FILE as RECORDING
 from mission.view.recording import Recorder
 from policies.companion.companion import Companion, Pilot
 from policies.companion.engagement import Phase
@@ -97,7 +97,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     for trouble in flight.troubles.take():
         print_line(console, trouble)
     files = OwnFiles(folder, console)
-    with files.writing(RECORDING):
+    with files.writing(REPLAY_FILE):
         recorder.recording().save(folder)
     if running.error is not None:
         print_line(console, f"result: {running.error}")
