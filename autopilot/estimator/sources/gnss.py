@@ -4,9 +4,10 @@ A position holds white noise and a wander that lasts a minute (ionosphere, ephem
 So a vehicle that boots at the origin keeps its place though the receiver says otherwise, and one that does not know its
 place never takes the mean of many fixes for better than the wander they share.
 
-Starts with the first good fix once heading is known. Stops with the fix. Sets position and velocity when the first fix
-is far off or nothing passed the gate for a while; a velocity that did not fit for so long puts heading in doubt too.
-While a client's position is fused it sets nothing: two frames that differ would set the state in turn.
+Starts with the first good fix once heading is known. Stops with the fix. A fix whose velocity is not known well enough
+gives position and height alone. Sets position and velocity when the first fix is far off or nothing passed the gate for
+a while; a velocity that did not fit for so long puts heading in doubt too. While a client's position is fused it sets
+nothing: two frames that differ would set the state in turn.
 """
 
 import warp as wp
@@ -50,14 +51,19 @@ _RESET_AFTER_S = wp.constant(5.0)  # nothing passed for so long: believe the rec
 
 @wp.func
 def gnss_is_good(params: EstimatorParams, sample: GnssSample) -> bool:
-    """The fix is good enough to be used."""
+    """The fix is good enough to be used; its velocity may not be."""
     return (
         sample.fix_type >= params.gnss_min_fix
         and sample.satellites >= params.gnss_min_satellites
         and sample.pos_h_std <= params.gnss_max_pos_h_std
         and sample.pos_v_std <= params.gnss_max_pos_v_std
-        and sample.vel_std <= params.gnss_max_vel_std
     )
+
+
+@wp.func
+def gnss_vel_is_good(params: EstimatorParams, sample: GnssSample) -> bool:
+    """The velocity of a good fix is good enough to be used, too."""
+    return sample.vel_std <= params.gnss_max_vel_std
 
 
 @wp.func
@@ -260,11 +266,12 @@ def take_gnss(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
     ekf.rows[i].wander_time_us = sample.time_us
     may_reset = ekf.rows[i].external_pos.is_active == 0
     if ekf.rows[i].is_yaw_aligned == 1:
-        nominal, vel_aid = fuse_gnss_vel(params, cov, i, nominal, ekf.rows[i].gnss_vel, sample, may_reset)
+        if gnss_vel_is_good(params, sample):
+            nominal, vel_aid = fuse_gnss_vel(params, cov, i, nominal, ekf.rows[i].gnss_vel, sample, may_reset)
+            ekf.rows[i].gnss_vel = vel_aid
+            ekf.rows[i].climb_innov_lpf = climb_innov_lpf(ekf.rows[i])
+            ekf.rows[i].doubted_time_us = doubt_accel(ekf.rows[i], ekf.params[i].accel_bias_limit)
         nominal, pos_aid = fuse_gnss_pos(params, cov, i, nominal, ekf.rows[i].gnss_pos, sample, age_s, may_reset)
-        ekf.rows[i].gnss_vel = vel_aid
-        ekf.rows[i].climb_innov_lpf = climb_innov_lpf(ekf.rows[i])
-        ekf.rows[i].doubted_time_us = doubt_accel(ekf.rows[i], ekf.params[i].accel_bias_limit)
         ekf.rows[i].gnss_pos = pos_aid
     is_reference = ekf.rows[i].baro.is_active == 0 and ekf.rows[i].external_height.is_active == 0
     nominal, height_aid = fuse_gnss_height(

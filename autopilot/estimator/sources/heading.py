@@ -11,7 +11,13 @@ from autopilot.estimator.delay import MAX_AGE_S
 from autopilot.estimator.fuse import seconds_since, set_variance
 from autopilot.estimator.health import is_doubted
 from autopilot.estimator.params import GPS_CTRL_VEL, EstimatorParams
-from autopilot.estimator.sources.gnss import gnss_is_good, gnss_pos_std, gnss_vel_std, set_gnss_axis
+from autopilot.estimator.sources.gnss import (
+    gnss_is_good,
+    gnss_pos_std,
+    gnss_vel_is_good,
+    gnss_vel_std,
+    set_gnss_axis,
+)
 from autopilot.estimator.state import ACCEL_BIAS, ATT, GNSS_RING, GYRO_BIAS, VEL, Ekf
 from autopilot.estimator.yaw_estimator import RATIO_S, estimated_yaw, has_yaw, start_tilt, take_velocity
 from autopilot.ports import GnssSample
@@ -104,7 +110,7 @@ def take_heading(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) ->
     is_late = seconds_since(now_us, sample.time_us) > MAX_AGE_S
     if sample.time_us > now_us or is_late or not gnss_is_good(params, sample):
         return
-    if (params.gnss_ctrl & GPS_CTRL_VEL) == 0:
+    if (params.gnss_ctrl & GPS_CTRL_VEL) == 0 or not gnss_vel_is_good(params, sample):
         return
     if ekf.rows[i].stillness.is_still == 1:
         nominal = ekf.rows[i].nominal

@@ -220,6 +220,21 @@ def test_position_returns_with_gnss() -> None:
     assert np.abs(errors(flight, trace).pos[back + 5 * TICKS :, :2]).max() < 3.0
 
 
+def test_a_fix_without_velocity_gives_position() -> None:
+    def without_velocity(samples: Any) -> None:
+        samples["gnss"]["vel_ned"] = 0.0
+        samples["gnss"]["vel_std"] = 1000.0
+
+    flight, trace = flown(without_velocity)
+    flags = trace["estimate"]["flags"][AIRBORNE:]
+    assert np.all(flags & (POSITION_VALID | VELOCITY_VALID) == (POSITION_VALID | VELOCITY_VALID))
+    assert trace["gnss_vel"]["judged_time_us"].max() == 0
+    found = errors(flight, trace)
+    assert np.abs(found.pos[AIRBORNE:]).max() < 3.0
+    assert np.all(rms(found.vel[AIRBORNE:]) < 0.4)
+    assert rms(found.tilt_deg[AIRBORNE:]) < 1.0
+
+
 def test_stuck_barometer_hands_height_to_gnss() -> None:
     at = 30 * TICKS
     flight, trace = flown(lambda samples: freeze(samples["baro"], at, ("pressure_pa",)))
