@@ -142,6 +142,13 @@ def fly(
 def estimate(
     log: Annotated[Path, typer.Argument(help="A PX4 ULog (.ulg), or a sensor CSV (docs/estimate.md).")],
     output: Annotated[Path | None, typer.Option(help="Folder for the results. Default: beside the log.")] = None,
+    param: Annotated[
+        list[str] | None, typer.Option(help="Sets a parameter of the estimator: NAME=VALUE. Repeatable.")
+    ] = None,
+    ignore_velocity_flag: Annotated[
+        bool,
+        typer.Option("--ignore-velocity-flag", help="Use GNSS velocities that the receiver calls invalid, too."),
+    ] = False,
 ) -> None:
     """Run the estimator alone over the sensors recorded in a log."""
     check_file(log)
@@ -149,7 +156,7 @@ def estimate(
         from mission.estimate import EstimateError, estimate_log
 
     try:
-        estimate_log(log, output, Console())
+        estimate_log(log, output, Console(), parameters=param or (), ignores_velocity_flag=ignore_velocity_flag)
     except EstimateError as error:
         refuse(str(error))
 

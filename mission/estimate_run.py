@@ -3,7 +3,7 @@
 In: a `SensorLog`. Out: the estimate at 50 Hz, and every innovation of every source.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,10 @@ CHUNK_TICKS = 1000
 OUTPUT_PERIOD_US = 20_000
 SENSORS = ("gnss", "baro", "mag", "range")
 SOURCES = {"gnss_pos": 2, "gnss_vel": 3, "gnss_height": 1, "baro": 1, "mag": 3, "range": 1, "drag": 2, "rest": 3}
+UNITS = {
+    "gnss_pos": "m", "gnss_vel": "m/s", "gnss_height": "m", "baro": "m", "mag": "gauss", "range": "m", "drag": "m/s²",
+    "rest": "m/s",
+}  # fmt: skip
 UNHEARD = (
     "external_pos",
     "external_height",
@@ -33,10 +37,13 @@ UNHEARD = (
 # The defaults describe this project's simulated sensors. What differs for real ones, of which nothing is known:
 REAL_SENSORS: dict[str, float] = {
     "EKF2_DRAG_CTRL": 0,  # the drag of the airframe is not known
-    "EKF2_GYR_NOISE": 0.015,  # PX4 default
+    # PX4's 0.015 rad/s and 0.35 m/s² at its steps of 10 ms; ours are those of 4 ms
+    "EKF2_GYR_NOISE": 0.024,
+    "EKF2_ACC_NOISE": 0.55,
     "EKF2_GYR_B_NOISE": 1.0e-4,  # PX4's 1e-3 rad/s², as a random walk at its 10 ms steps
     "EKF2_GBIAS_INIT": 0.1,  # PX4 default
-    "EKF2_ABIAS_INIT": 0.2,  # PX4 default
+    # PX4 has 0.2, which lets touchdowns and turns in the air be taken for a bias: tilt beside EKF2 is twice as far off
+    "EKF2_ABIAS_INIT": 0.05,
     "EKF2_GPS_P_NOISE": 0.5,  # PX4 default
     "EKF2_GPS_V_NOISE": 0.3,  # PX4 default
     "EKF2_REQ_EPH": 10.0,  # guess: the noise grows with the receiver's own figures, so worse fixes are of use too
@@ -46,6 +53,8 @@ REAL_SENSORS: dict[str, float] = {
     "EKF2_BARO_WALK": 0.1,  # guess
     "EKF2_MAG_CHECK": 0,  # of old simulators' logs the field is not Earth's, and sound all the same
     "EKF2_MAG_NOISE": 0.05,  # PX4 default
+    "EKF2_MAG_E_NOISE": 1.0e-4,  # PX4's 1e-3 gauss/s, as a random walk at its 10 ms steps
+    "EKF2_MAG_B_NOISE": 1.0e-5,  # PX4's 1e-4 gauss/s, likewise
     "EKF2_MAG_B_INIT": 0.03,  # guess: what a field calibration leaves
     "EKF2_MIN_RNG": 0.0,  # the origin is where the receiver stands
     "EKF2_RNG_NOISE": 0.1,  # PX4 default
@@ -81,15 +90,49 @@ class Replay:
         return estimate
 
 
-def estimator_table(recording: Recording) -> ParameterTable:
-    """The parameters for a log: its own if this project wrote it, else our defaults with the noise of real sensors."""
+def estimator_table(recording: Recording, given: Mapping[str, float]) -> ParameterTable:
+    """The parameters for a log: its own if this project wrote it, else our defaults with the noise of real sensors.
+
+    Args:
+        recording: the log.
+        given: parameters that the user sets.
+
+    Raises:
+        ParameterError: there is none of a given name, or it cannot have that value.
+    """
     table = ParameterTable(ESTIMATOR_PARAMETERS)
     for name, value in (recording.parameters if recording.is_own else REAL_SENSORS).items():
         if name in table:
             table.set(name, value)
+    for name, value in given.items():
+        table.set_exactly(name, value)
+    if "EKF2_DELAY_MAX" in given:
+        return table
     # The horizon lies behind the latest sensor's delay by one sample of a slow IMU.
     table.set("EKF2_DELAY_MAX", max(table["EKF2_DELAY_MAX"], recording.gnss_delay_s * 1e3 + 20.0))
     return table
+
+
+def accept_other_field(log: SensorLog, table: ParameterTable) -> None:
+    """Fuses the magnetometer unchecked, and notes it, where its field is nowhere in the log that of the place.
+
+    Simulators have such fields, and vehicles that were never calibrated; their logs hold no other heading.
+    """
+    if log.origin is None or not len(log.mag):
+        return
+    expected = float(np.linalg.norm(field_ned_gauss(log.origin.lat_deg, log.origin.lon_deg, log.origin.alt_m)))
+    strength = float(np.median(np.linalg.norm(log.mag["field_frd_gauss"], axis=1)))
+    if table["EKF2_MAG_CHECK"] and abs(strength - expected) > table["EKF2_MAG_CHK_STR"]:
+        table.set("EKF2_MAG_CHECK", 0)
+        log.recording.notes.append(
+            f"the magnetometer measures {strength:.2f} gauss, the place has {expected:.2f}: it is used unchecked"
+        )
+
+
+def load_kernels() -> None:
+    """Compiles what the cache lacks, so that it is not taken for the estimator's own time."""
+    wp.load_module(estimate_samples.module, device="cpu")
+    wp.load_module(reset_rows.module, device="cpu")
 
 
 def run_estimator(log: SensorLog, table: ParameterTable, progress: Callable[[int], None]) -> Replay:

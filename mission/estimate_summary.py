@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID, YAW_ALIGNED
-from common.geodesy import GeoPoint, ned_from_geodetic
-from mission.angles import euler_rad
+from common.geodesy import GeoPoint
+from mission.estimate_difference import Difference, difference
+from mission.estimate_noise import FoundNoise, in_flight, median_spread
 from mission.estimate_run import SOURCES, Replay
-from mission.sensor_log import Rows, SensorLog, Track
+from mission.sensor_log import SensorLog
 
 BAND_SIGMA = 1.959964  # 95 % of a normal distribution lie within
 
@@ -23,21 +24,10 @@ class SourceSummary:
     fused: int
     rejected: int  # by the gate
     resets: int  # times the state was set to a sample, the first included
-    in_band: float  # share of normalised innovations within 1.96 sigma, NaN where none was judged
-
-
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """RMS of our estimate minus another answer, while ours is valid; NaN where there is nothing to compare."""
-
-    pos_n_m: float
-    pos_e_m: float
-    pos_d_m: float  # a constant offset removed: height references differ
-    vel_n_m_s: float
-    vel_e_m_s: float
-    vel_d_m_s: float
-    tilt_deg: float
-    yaw_deg: float
+    noise_found: float  # standard deviation of its innovations in flight, NaN where that cannot be told
+    normalised_by_filter: float  # the same, over what the filter expects: its noise is wide, so below 1
+    normalised: float  # spread, by the median, over the noise found (own logs: what the filter expects); 1 if normal
+    in_band: float  # fraction of normalised innovations within 1.96 sigma, NaN where none was judged
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +55,17 @@ class EstimateSummary:
         return plain
 
 
-def summarise_replay(log: SensorLog, replay: Replay, parameters: dict[str, float]) -> EstimateSummary:
-    """Judges a replay that has at least one row of output."""
+def summarise_replay(
+    log: SensorLog, replay: Replay, noise: dict[str, FoundNoise], parameters: dict[str, float]
+) -> EstimateSummary:
+    """Judges a replay that has at least one row of output.
+
+    Args:
+        log: the samples.
+        replay: what the estimator answered.
+        noise: found from the log, by source; empty: innovations are judged by the filter's own.
+        parameters: with which it ran.
+    """
     estimate = replay.estimate
     last = replay.output[-1]
     flags = {"position": POSITION_VALID, "velocity": VELOCITY_VALID, "height": HEIGHT_VALID, "yaw": YAW_ALIGNED}
@@ -75,7 +74,7 @@ def summarise_replay(log: SensorLog, replay: Replay, parameters: dict[str, float
         duration_s=log.duration_s,
         samples={name: len(getattr(log, name)) for name in ("imu", "gnss", "baro", "mag", "range")},
         origin=log.origin,
-        sources={name: _source(replay.events[name], components) for name, components in SOURCES.items()},
+        sources={name: _source(replay, name, components, noise.get(name)) for name, components in SOURCES.items()},
         valid={name: float(np.mean((estimate["flags"] & flag) != 0)) for name, flag in flags.items()},
         final_gyro_bias_frd_rad_s=tuple(last["estimate"]["gyro_bias_frd"].tolist()),
         final_accel_bias_frd_m_s2=tuple(last["estimate"]["accel_bias_frd"].tolist()),
@@ -88,74 +87,23 @@ def summarise_replay(log: SensorLog, replay: Replay, parameters: dict[str, float
     )
 
 
-def _source(events: Rows, components: int) -> SourceSummary:
-    normalised = events["innov"][:, :components] / np.sqrt(events["innov_var"][:, :components])
+def _source(replay: Replay, name: str, components: int, noise: FoundNoise | None) -> SourceSummary:
+    """Counts of all samples; the innovations judged are those in flight if the noise was found there."""
+    events = replay.events[name]
     fused, resets = int(np.count_nonzero(events["is_fused"])), int(np.count_nonzero(events["is_reset"]))
+    shown = events if noise is None else in_flight(replay, name)
+    scale = 1.0 if noise is None else noise.scale
+    normalised = shown["innov"][:, :components] / np.sqrt(shown["innov_var"][:, :components]) / scale
     return SourceSummary(
         judged=len(events),
         fused=fused,
         rejected=len(events) - fused - resets,
         resets=resets,
-        in_band=float(np.mean(np.abs(normalised) <= BAND_SIGMA)) if len(events) else nan,
+        noise_found=nan if noise is None else noise.std,
+        normalised_by_filter=nan if noise is None else noise.scale,
+        normalised=median_spread(normalised) if len(shown) else nan,
+        in_band=float(np.mean(np.abs(normalised) <= BAND_SIGMA)) if len(shown) else nan,
     )
-
-
-def difference(estimate: Rows, track: Track, origin: GeoPoint | None) -> Difference:
-    """RMS of the estimate minus a track; each row of the track meets our row at or before its time.
-
-    Args:
-        estimate: Estimate rows, every 20 ms.
-        track: the other answer.
-        origin: of our ned.
-    """
-    has_pos = (estimate["flags"] & (POSITION_VALID | VELOCITY_VALID)) == (POSITION_VALID | VELOCITY_VALID)
-    ours, theirs = _matched(estimate["time_us"], has_pos, track.pos_time_us)
-    if len(ours):
-        pos_error = estimate["pos_ned"][ours].astype(float) - track_pos_ned(track, origin)[theirs]
-        pos_error[:, 2] -= pos_error[:, 2].mean()
-        if track.ref is None or origin is None:
-            pos_error -= pos_error.mean(axis=0)
-        vel_error = estimate["vel_ned"][ours].astype(float) - track.vel_ned[theirs]
-        rms = np.sqrt(np.mean(np.square(np.hstack([pos_error, vel_error])), axis=0)).tolist()
-    else:
-        rms = [nan] * 6
-    ours, theirs = _matched(estimate["time_us"], (estimate["flags"] & YAW_ALIGNED) != 0, track.q_time_us)
-    tilt, yaw = _attitude_rms(estimate["q_ned_from_frd"][ours].astype(float), track.q_ned_from_frd[theirs])
-    return Difference(rms[0], rms[1], rms[2], rms[3], rms[4], rms[5], tilt, yaw)
-
-
-def track_pos_ned(track: Track, origin: GeoPoint | None) -> Rows:
-    """Positions [m] of a track from our origin; from its own where either is not known."""
-    if track.ref is None or origin is None:
-        return track.pos_ned
-    # Tangent planes some 100 m apart are parallel to 1e-5: the shift of the origin is enough.
-    shift_ned = ned_from_geodetic(track.ref.lat_deg, track.ref.lon_deg, track.ref.alt_m, origin)
-    pos_ned: Rows = track.pos_ned + np.array(shift_ned)
-    return pos_ned
-
-
-def _matched(time_us: Rows, is_valid: Rows, other_time_us: Rows) -> tuple[Rows, Rows]:
-    """Indices of rows of ours and of theirs at most 20 ms apart, where ours is valid."""
-    latest = np.searchsorted(time_us, other_time_us, side="right") - 1
-    index = np.maximum(latest, 0)
-    is_near = (latest >= 0) & is_valid[index] & (other_time_us - time_us[index] <= 20_000)
-    return index[is_near], np.flatnonzero(is_near)
-
-
-def _attitude_rms(ours: Rows, theirs: Rows) -> tuple[float, float]:
-    """RMS tilt and heading difference [deg] of (x, y, z, w) rows."""
-    if not len(ours):
-        return nan, nan
-    sine = np.linalg.norm(np.cross(_down_frd(ours), _down_frd(theirs)), axis=1)
-    tilt = np.arcsin(np.clip(sine, 0.0, 1.0))
-    yaw = (euler_rad(ours)[:, 2] - euler_rad(theirs)[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
-    return float(np.degrees(np.sqrt(np.mean(tilt**2)))), float(np.degrees(np.sqrt(np.mean(yaw**2))))
-
-
-def _down_frd(quaternions: Rows) -> Rows:
-    """The ned down axis in the body."""
-    x, y, z, w = quaternions.T
-    return np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
 
 
 def _without_nan(value: Any) -> Any:

@@ -49,8 +49,10 @@ FIX_DTYPE = np.dtype(
 MIN_IMU_RATE_HZ = 40.0  # guess: below it a multirotor's attitude cannot be integrated
 MIN_DURATION_S = 1.0
 STANDING_SPEED_M_S = 0.5  # guess: several deviations of a receiver's velocity at rest
+UNKNOWN_STD = 1.0e3  # [m/s] accuracy of a velocity that the receiver calls invalid
 STANDING_S = 10.0  # later fixes share the slow error of the first: averaging more of them gains little
 IMU_PERIOD_S = 0.004  # the estimator's tick: faster samples are merged to about that
+MAX_UNCOVERED = 0.002  # of the time, by integration times that are taken as they are; guess
 HELD_GAP_S = 0.1  # up to here the last rate holds; the estimator integrates no longer interval
 FILLED_GAP_S = 1.0  # up to here samples are interpolated; a longer gap starts the estimator anew
 MAX_SPAN_US = 86_400_000_000  # times further than a day from the middle of a log, and
@@ -169,12 +171,19 @@ def _prepare_imu(recording: Recording) -> Rows:
 
 
 def _intervals(imu: Rows, period_s: float) -> Rows:
-    """[s] what each sample stands for: its integration time or, after lost samples, the time since the last."""
+    """[s] what each sample stands for: its integration time or, after lost samples, the time since the last.
+
+    Where integration times are unknown, or together are not the time that passed, each stands for the time since the
+    last: no rotation is lost with samples that jitter.
+    """
     since_s = np.diff(imu["time_us"], prepend=imu["time_us"][0] - round(period_s * 1e6)) * 1e-6
     dt_s = imu["dt_s"].astype(float)
-    dt_s = np.where((dt_s > 0.0) & (dt_s < HELD_GAP_S), dt_s, period_s)
-    is_held = (since_s > 1.5 * dt_s) & (since_s <= HELD_GAP_S)
-    return np.where(is_held, since_s, dt_s)
+    is_known = (dt_s > 0.0) & (dt_s < HELD_GAP_S)
+    is_near = since_s <= HELD_GAP_S
+    dt_s = np.where(is_known, dt_s, np.where(is_near, since_s, period_s))
+    dt_s = np.where((since_s > 1.5 * dt_s) & is_near, since_s, dt_s)
+    is_covered = abs(dt_s[is_near].sum() / since_s[is_near].sum() - 1.0) < MAX_UNCOVERED
+    return dt_s if is_covered else np.where(is_near, since_s, dt_s)
 
 
 def _merged(imu: Rows, group: int) -> Rows:
@@ -245,27 +254,47 @@ def _own_origin(recording: Recording) -> GeoPoint | None:
     return recording.tracks[0].ref if recording.is_own and recording.tracks else None
 
 
+# field of a fix, its name, unit, the parameter that bounds it, and +1: from below, -1: from above
+_CRITERIA = (
+    ("satellites", "satellites", "", "EKF2_REQ_NSATS", 1),
+    ("pos_h_std", "horizontal accuracy", " m", "EKF2_REQ_EPH", -1),
+    ("pos_v_std", "vertical accuracy", " m", "EKF2_REQ_EPV", -1),
+)
+
+
 def _origin(fixes: Rows, table: ParameterTable, notes: list[str]) -> GeoPoint | None:
     """The first place known: the mean of the good fixes from the first on, as long as the vehicle stands there.
 
     The estimator takes the place where it is aligned for the origin; one fix alone may lie a metre from there.
     """
     has_fix = fixes["fix_type"] >= table["EKF2_REQ_FIX"]
-    is_good = (
-        has_fix
-        & (fixes["satellites"] >= table["EKF2_REQ_NSATS"])
-        & (fixes["pos_h_std"] <= table["EKF2_REQ_EPH"])
-        & (fixes["pos_v_std"] <= table["EKF2_REQ_EPV"])
-        & (fixes["vel_std"] <= table["EKF2_REQ_SACC"])
-    )
     if not has_fix.any():
         notes.append("no GNSS fix: position and velocity are dead reckoning, magnetic declination is taken as 0")
         return None
+    is_good, refusals = has_fix.copy(), []
+    for name, what, unit, parameter, sign in _CRITERIA:
+        limit, values = table[parameter], fixes[name]
+        passes = values >= limit if sign > 0 else values <= limit
+        is_good &= passes
+        if not passes[has_fix].any():
+            best = values[has_fix].max() if sign > 0 else values[has_fix].min()
+            relation = "at most" if sign > 0 else "at least"
+            refusals.append(f"{what} {relation} {best:.3g}{unit}, {parameter} asks for {limit:g}{unit}")
     if not is_good.any():
-        notes.append("no GNSS fix is accurate enough to be used: position and velocity are dead reckoning")
+        why = "; ".join(refusals) or "none meets all criteria at once"
+        notes.append(f"no GNSS fix is accurate enough to be used ({why}): position and velocity are dead reckoning")
+    elif not (has_vel := fixes["vel_std"][is_good] <= table["EKF2_REQ_SACC"]).any():
+        if (fixes["vel_std"][is_good] >= UNKNOWN_STD).all():
+            why = "the receiver calls it invalid"
+        else:
+            why = f"EKF2_REQ_SACC asks for {table['EKF2_REQ_SACC']:g} m/s"
+        notes.append(f"no GNSS velocity is used: {why}; position and height are")
+    elif not has_vel.all():
+        notes.append(f"{np.count_nonzero(~has_vel)} GNSS fix(es) without a good velocity gave position and height only")
     chosen = fixes[is_good if is_good.any() else has_fix]
     first = GeoPoint(float(chosen["lat_deg"][0]), float(chosen["lon_deg"][0]), float(chosen["alt_m"][0]))
     is_away = np.linalg.norm(chosen["vel_ned"], axis=1) > STANDING_SPEED_M_S
+    is_away |= chosen["vel_std"] > table["EKF2_REQ_SACC"]  # who knows whether it stands
     is_away |= chosen["time_us"] - chosen["time_us"][0] > STANDING_S * 1e6
     standing = chosen[: max(1, int(np.argmax(is_away)) if is_away.any() else len(chosen))]
     north, east, down = _projected(standing, first)["pos_ned"].astype(float).mean(axis=0).tolist()

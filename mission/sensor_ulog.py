@@ -25,6 +25,7 @@ from mission.sensor_log import (
     MAG_DTYPE,
     MIN_IMU_RATE_HZ,
     RANGE_DTYPE,
+    UNKNOWN_STD,
     Recording,
     Rows,
     SensorLogError,
@@ -39,8 +40,11 @@ OWN_NAME = "Honeyguide"  # sys_name of this project's logs
 PX4_GPS_DELAY_MS = 110.0  # PX4's default of EKF2_GPS_DELAY
 MAX_DELAY_MS = 300.0  # PX4's maximum of the EKF2_*_DELAY
 RELATIVE_INVALID = 2**31 - 1  # PX4's RELATIVE_TIMESTAMP_INVALID
+MAX_STRAY_M, MAX_STRAY_M_S = 5.0, 5.0  # of a record of the log's answer from its neighbours; guess
+STRAY_ROWS = 2  # neighbours on each side: two damaged records in a row are found
+MAX_NORM_ERROR = 0.01  # of an attitude quaternion
+REF_ROWS = 5
 FACING_DOWN = 25  # distance_sensor.orientation
-UNKNOWN_STD = 1.0e3  # accuracy of a velocity the receiver calls invalid
 SEA_LEVEL_PA, HEIGHT_SCALE_M, ISA_EXPONENT = 101325.0, 44330.77, 5.2558797  # ISO 2533, as in the barometer's fusion
 
 TOPICS = (
@@ -127,8 +131,12 @@ class _Log:
 
 
 @np.errstate(invalid="ignore", over="ignore")  # numbers of a damaged log; `prepare` leaves them out
-def read_ulog(path: Path) -> Recording:
+def read_ulog(path: Path, *, ignores_velocity_flag: bool = False) -> Recording:
     """Reads the sensors of a PX4 log; one that was cut short is read as far as it goes.
+
+    Args:
+        path: of the log.
+        ignores_velocity_flag: GNSS velocities count as valid though the receiver says they are not.
 
     Raises:
         SensorLogError: it cannot be read, or has no IMU samples.
@@ -136,22 +144,23 @@ def read_ulog(path: Path) -> Recording:
     log = _Log(path)
     is_own = log.ulog.msg_info_dict.get("sys_name") == OWN_NAME
     gnss_delay_s = log.delay_s("EKF2_GPS_DELAY", 0.0 if is_own else PX4_GPS_DELAY_MS)
+    notes: list[str] = []
     recording = Recording(
         path=path,
         imu=_imu(log),
-        fixes=_fixes(log, gnss_delay_s),
+        fixes=_fixes(log, gnss_delay_s, ignores_velocity_flag),
         baro=_baro(log),
         mag=_mag(log),
         range=_range(log),
         is_own=is_own,
         parameters={name: float(value) for name, value in log.ulog.initial_parameters.items()},
         gnss_delay_s=gnss_delay_s,
-        tracks=[
-            track
-            for track in (_track(log, "log's own estimate", ""), _track(log, "truth in the log", "_groundtruth"))
-            if track is not None
-        ],
+        notes=notes,
     )
+    for name, suffix in (("log's own estimate", ""), ("truth in the log", "_groundtruth")):
+        track = _track(log, name, suffix, notes)
+        if track is not None:
+            recording.tracks.append(track)
     if log.ulog.file_corruption:
         recording.notes.append("the log is damaged: what could be read of it was used")
     if log.ulog.dropouts:
@@ -187,7 +196,7 @@ def _imu(log: _Log) -> Rows:
     )
 
 
-def _fixes(log: _Log, delay_s: float) -> Rows:
+def _fixes(log: _Log, delay_s: float, ignores_velocity_flag: bool) -> Rows:
     fields = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s", "eph", "epv", "s_variance_m_s", "fix_type", "satellites_used")
     gps = log.topic("vehicle_gps_position", *fields) or log.topic("sensor_gps", *fields)
     if gps is None or not ("latitude_deg" in gps or "lat" in gps):
@@ -200,9 +209,13 @@ def _fixes(log: _Log, delay_s: float) -> Rows:
     else:  # until 1.14: integers of 1e-7 degrees and of millimetres
         fixes["lat_deg"], fixes["lon_deg"] = gps["lat"] * 1e-7, gps["lon"] * 1e-7
         fixes["alt_m"] = gps["alt"] * 1e-3
-    fixes["vel_ned"] = gps.axes("vel_n_m_s vel_e_m_s vel_d_m_s")
+    vel_ned = gps.axes("vel_n_m_s vel_e_m_s vel_d_m_s")
+    has_vel = np.isfinite(vel_ned).all(axis=1) & np.isfinite(gps["s_variance_m_s"])
+    if not ignores_velocity_flag:
+        has_vel &= gps.get("vel_ned_valid", 1.0) != 0
+    fixes["vel_ned"] = np.where(has_vel[:, None], vel_ned, 0.0)
     fixes["pos_h_std"], fixes["pos_v_std"] = gps["eph"], gps["epv"]
-    fixes["vel_std"] = np.where(gps.get("vel_ned_valid", 1.0) != 0, gps["s_variance_m_s"], UNKNOWN_STD)
+    fixes["vel_std"] = np.where(has_vel, gps["s_variance_m_s"], UNKNOWN_STD)
     fixes["fix_type"] = gps["fix_type"]
     fixes["satellites"] = gps["satellites_used"]
     return fixes
@@ -284,7 +297,7 @@ def _range(log: _Log) -> Rows:
     return empty(RANGE_DTYPE)
 
 
-def _track(log: _Log, name: str, suffix: str) -> Track | None:
+def _track(log: _Log, name: str, suffix: str, notes: list[str]) -> Track | None:
     place = log.topic(f"vehicle_local_position{suffix}", "x", "y", "z", "vx", "vy", "vz")
     attitude = log.topic(f"vehicle_attitude{suffix}", "q[0]")
     if place is None or attitude is None:
@@ -292,14 +305,36 @@ def _track(log: _Log, name: str, suffix: str) -> Track | None:
     is_valid = np.ones(len(place["timestamp"]), dtype=bool)
     for flag in ("xy_valid", "v_xy_valid", "z_valid"):
         is_valid &= place.get(flag, 1.0) != 0
-    last = {field: float(place.get(field, np.nan)[-1]) for field in ("ref_lat", "ref_lon", "ref_alt")}
+    pos_ned = place.axes("x y z").astype(float)
+    vel_ned = place.axes("vx vy vz").astype(float)
+    q = attitude.vector("q", 4)[:, [1, 2, 3, 0]].astype(float)
+    is_unit = np.abs(np.linalg.norm(q, axis=1) - 1.0) < MAX_NORM_ERROR
+    is_whole = is_valid.copy()
+    is_whole[is_valid] = _is_smooth(pos_ned[is_valid], MAX_STRAY_M) & _is_smooth(vel_ned[is_valid], MAX_STRAY_M_S)
+    stray_count = np.count_nonzero(is_valid & ~is_whole) + np.count_nonzero(~is_unit)
+    if stray_count:
+        notes.append(f"{stray_count} damaged record(s) of the {name} were left out")
+    last = {
+        field: float(np.median(place.get(field, np.nan)[-REF_ROWS:])) for field in ("ref_lat", "ref_lon", "ref_alt")
+    }
     has_ref = all(isfinite(value) for value in last.values()) and (last["ref_lat"], last["ref_lon"]) != (0.0, 0.0)
     return Track(
         name=name,
         ref=GeoPoint(last["ref_lat"], last["ref_lon"], last["ref_alt"]) if has_ref else None,
-        pos_time_us=place.time_us()[is_valid],
-        pos_ned=place.axes("x y z").astype(float)[is_valid],
-        vel_ned=place.axes("vx vy vz").astype(float)[is_valid],
-        q_time_us=attitude.time_us(),
-        q_ned_from_frd=attitude.vector("q", 4)[:, [1, 2, 3, 0]].astype(float),
+        pos_time_us=place.time_us()[is_whole],
+        pos_ned=pos_ned[is_whole],
+        vel_ned=vel_ned[is_whole],
+        q_time_us=attitude.time_us()[is_unit],
+        q_ned_from_frd=q[is_unit],
     )
+
+
+def _is_smooth(vectors: npt.NDArray[Any], most: float) -> npt.NDArray[Any]:
+    """Whether each row is a finite number and not alone far from its neighbours: within `most` of their median."""
+    if not len(vectors):
+        return np.zeros(0, dtype=bool)
+    finite = np.where(np.isfinite(vectors), vectors, np.inf)
+    window = np.pad(finite, ((STRAY_ROWS, STRAY_ROWS), (0, 0)), mode="edge")
+    neighbours = np.stack([window[first : first + len(vectors)] for first in range(2 * STRAY_ROWS + 1)])
+    smooth: npt.NDArray[Any] = (np.abs(vectors - np.median(neighbours, axis=0)) < most).all(axis=1)
+    return smooth

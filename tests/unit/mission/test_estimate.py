@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from mission.cli import app
 from mission.estimate import EstimateError, estimate_log
+from mission.estimate_plots import _broken
 from tests.unit.mission.synthetic_log import (
     BARO_STD,
     GPS_STD,
@@ -43,10 +44,10 @@ def results(tmp_path_factory, flight):
     return folder / "results"
 
 
-def estimated(log, folder=None):
+def estimated(log, folder=None, **options):
     """Summary, CSV columns and console text of a log's estimate."""
     console = Console(file=StringIO(), width=140)
-    estimate_log(log, folder, console)
+    estimate_log(log, folder, console, **options)
     folder = folder or log.with_name(f"{log.stem}-estimate")
     assert {path.name for path in folder.iterdir()} == FILES
     summary = json.loads((folder / "summary.json").read_text())
@@ -80,7 +81,7 @@ def test_the_estimate_follows_a_recorded_flight(tmp_path, flight, form):
     if form == "csv":
         assert summary["differences"] == {}
     else:
-        answer = summary["differences"]["log's own estimate"]
+        answer = summary["differences"]["log's own estimate"]["rms"]
         assert max(answer["pos_n_m"], answer["pos_e_m"], answer["pos_d_m"]) < 0.25
         assert max(answer["vel_n_m_s"], answer["vel_e_m_s"], answer["vel_d_m_s"]) < 0.06
         assert 0.0 < answer["tilt_deg"] < 0.2
@@ -139,6 +140,124 @@ def test_the_log_of_the_estimate_has_px4s_topics_and_the_times_of_the_flight(res
     assert np.abs(topics["vehicle_local_position"]["x"] - flight.pos_ned[truth, 0]).max() < 0.4
     variances = topics["estimator_innovation_variances"]
     assert (variances["baro_vpos"][50:] > 0.0).all()
+
+
+def with_columns(tables, topic, **changes):
+    """The tables with columns of one topic replaced."""
+    fields, columns = tables[topic]
+    return tables | {topic: (fields, columns | changes)}
+
+
+def test_noise_is_found_from_the_log(tmp_path):
+    log = tmp_path / "flight.ulg"
+    write_ulog(log, px4_tables(Flight(60.0)))
+    summary, _, text = estimated(log)
+    true = {"gnss_vel": GPS_VEL_STD, "baro": BARO_STD, "mag": MAG_STD}
+    for name, std in true.items():
+        source = summary["sources"][name]
+        assert source["noise_found"] == pytest.approx(std, rel=0.25), name
+        assert source["normalised_by_filter"] < 0.6
+        assert 0.85 < source["normalised"] < 1.15
+        assert source["in_band"] == pytest.approx(0.95, abs=0.03)
+    assert summary["sources"]["gnss_pos"]["noise_found"] == pytest.approx(GPS_STD, rel=0.25)
+    assert "0.1 m/s" in text
+
+
+def test_parameters_can_be_given(tmp_path, flight):
+    log = tmp_path / "flight.ulg"
+    write_ulog(log, px4_tables(flight))
+    summary, _, _ = estimated(log, parameters=["EKF2_GPS_V_NOISE=0.4", "EKF2_MAG_TYPE=5"])
+    assert summary["parameters"]["EKF2_GPS_V_NOISE"] == pytest.approx(0.4)
+    assert summary["sources"]["mag"]["judged"] == 0
+
+
+def test_a_fix_without_velocity_gives_position_in_a_log(tmp_path, flight):
+    log = tmp_path / "flight.ulg"
+    write_ulog(log, with_columns(px4_tables(flight), "vehicle_gps_position", vel_ned_valid=False))
+    summary, columns, text = estimated(log)
+    truth = np.searchsorted(flight.time_us, columns["time_us"])
+    for name, true in zip(("north_m", "east_m", "down_m"), flight.pos_ned[truth].T, strict=True):
+        assert np.abs(columns[name] - true).max() < 1.5
+    assert summary["sources"]["gnss_pos"]["fused"] > 110
+    assert summary["sources"]["gnss_vel"]["judged"] == 0
+    assert "no GNSS velocity is used: the receiver calls it invalid" in text
+    summary, _, _ = estimated(log, tmp_path / "ignored", ignores_velocity_flag=True)
+    assert summary["sources"]["gnss_vel"]["fused"] > 110
+
+
+def test_the_note_names_the_criterion_that_no_fix_meets(tmp_path, flight):
+    log = tmp_path / "flight.ulg"
+    write_ulog(log, with_columns(px4_tables(flight), "vehicle_gps_position", eph=25.0, satellites_used=4))
+    _, _, text = estimated(log)
+    assert (
+        "no GNSS fix is accurate enough to be used (satellites at most 4, EKF2_REQ_NSATS asks for 6; "
+        "horizontal accuracy at least 25 m, EKF2_REQ_EPH asks for 10 m)"
+    ) in text
+
+
+def test_what_was_never_valid_is_said_in_words(tmp_path, flight):
+    log = tmp_path / "flight.ulg"
+    write_ulog(log, with_columns(px4_tables(flight), "vehicle_local_position", xy_valid=False))
+    summary, _, text = estimated(log)
+    assert "nan" not in text
+    assert "position and velocity not compared: the log's own estimate was never valid" in text
+    assert summary["differences"]["log's own estimate"]["rms"]["pos_n_m"] is None
+    assert summary["differences"]["log's own estimate"]["median"]["tilt_deg"] < 0.2
+
+
+def test_one_damaged_record_of_the_logs_answer_changes_nothing(tmp_path, flight, results):
+    tables = px4_tables(flight)
+    x = tables["vehicle_local_position"][1]["x"].copy()
+    x[60] = 512.0
+    log = tmp_path / "flight.ulg"
+    write_ulog(log, with_columns(tables, "vehicle_local_position", x=x))
+    summary, _, text = estimated(log)
+    whole = json.loads((results / "summary.json").read_text())
+    for figure in ("rms", "median", "largest"):
+        found, expected = (s["differences"]["log's own estimate"][figure]["pos_n_m"] for s in (summary, whole))
+        assert found == pytest.approx(expected, abs=0.01)
+    assert "1 damaged record(s) of the log's own estimate" in text
+
+
+def test_the_answer_is_compared_at_its_own_times(tmp_path):
+    flight = Flight()
+    tables = px4_tables(flight)
+    rows = flight.every(0.1) + 3  # 12 ms after a row of ours
+    rows = rows[rows < len(flight.time_us)]
+    fields, columns = tables["vehicle_local_position"]
+    moved = {"timestamp": flight.time_us[rows]}
+    moved |= dict(zip(("x", "y", "z"), flight.pos_ned[rows].T, strict=True))
+    moved |= dict(zip(("vx", "vy", "vz"), flight.vel_ned[rows].T, strict=True))
+    tables["vehicle_local_position"] = (fields, {name: moved.get(name, value) for name, value in columns.items()})
+    fields, columns = tables["vehicle_attitude"]
+    q = np.stack([np.cos(flight.yaw[rows] / 2), *np.zeros((2, len(rows))), np.sin(flight.yaw[rows] / 2)], axis=1)
+    tables["vehicle_attitude"] = (fields, {"timestamp": flight.time_us[rows], "q": q})
+    log = tmp_path / "flight.ulg"
+    write_ulog(log, tables)
+    late = estimated(log)[0]["differences"]["log's own estimate"]["median"]
+    write_ulog(log, px4_tables(flight))
+    same = estimated(log, tmp_path / "same")[0]["differences"]["log's own estimate"]["median"]
+    assert late["vel_m_s"] == pytest.approx(same["vel_m_s"], abs=0.003)
+    assert late["yaw_deg"] == pytest.approx(same["yaw_deg"], abs=0.02)
+
+
+def test_a_magnetometer_that_is_nowhere_right_is_used_unchecked_and_noted(tmp_path, flight):
+    tables = px4_tables(flight)
+    field = tables["vehicle_magnetometer"][1]["magnetometer_ga"] * 4.0
+    log = tmp_path / "flight.ulg"
+    write_ulog(log, with_columns(tables, "vehicle_magnetometer", magnetometer_ga=field))
+    summary, _, text = estimated(log)
+    assert summary["valid"]["yaw"] > 0.9
+    assert "it is used unchecked" in text
+
+
+def test_lines_end_at_gaps_and_where_yaw_turns_over():
+    times = np.array([0, 20, 40, 2000, 2020]) * 1000
+    broken_us, values = _broken(times, np.arange(5.0))
+    assert np.flatnonzero(np.isnan(values)).tolist() == [3]
+    assert broken_us[3] == 2_000_000
+    _, values = _broken(times, np.arange(5.0), np.array([1]))
+    assert np.flatnonzero(np.isnan(values)).tolist() == [1, 4]
 
 
 def test_a_rejected_fix_is_counted_and_does_not_move_the_estimate(tmp_path, flight):
@@ -226,6 +345,8 @@ def test_logs_that_cannot_be_used_are_refused_with_one_sentence(tmp_path):
     del tables["sensor_combined"]
     blind = tmp_path / "blind.ulg"
     write_ulog(blind, tables)
+    assert refused(blind, "--param", "EKF2_X=1") == refused(blind)
+    assert refused(blind, "--param", "EKF2_MAG_NOISE") == "--param EKF2_MAG_NOISE: must be NAME=VALUE, with a number"
     assert refused(blind) == (
         f"{blind}: no IMU samples: topic sensor_combined is missing, and vehicle_imu is missing or slower than 40 Hz"
     )

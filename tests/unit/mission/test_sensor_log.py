@@ -137,6 +137,18 @@ def test_samples_faster_than_the_tick_are_merged_without_losing_motion(tmp_path,
         np.testing.assert_allclose(log.imu[name], truth[: len(log.imu) * 4].reshape(-1, 4, 3).mean(axis=1), atol=1e-5)
 
 
+@pytest.mark.parametrize("has_integral_dt", [True, False])
+def test_jitter_loses_no_time(tmp_path, flight, has_integral_dt):
+    fields, columns = px4_tables(flight)["sensor_combined"]
+    rng = np.random.default_rng(3)
+    steps_us = rng.integers(2_500, 7_000, len(flight.time_us))
+    columns |= {"timestamp": START_US + np.cumsum(steps_us)}
+    # as PX4's old simulator wrote it: a part of the time that passed
+    columns |= {"gyro_integral_dt": (0.95 * steps_us).astype(int) if has_integral_dt else 0}
+    log = prepare(read_back(tmp_path, {"sensor_combined": (fields, columns)}), TABLE)
+    assert log.imu["dt_s"][1:].sum() == pytest.approx(log.duration_s, rel=1e-3)
+
+
 def test_gaps_are_held_filled_or_start_anew(tmp_path, flight):
     tables = px4_tables(flight)
     seconds = flight.time_s
