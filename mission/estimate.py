@@ -29,7 +29,6 @@ from mission.estimate_run import (
     SOURCES,
     UNITS,
     Replay,
-    accept_other_field,
     estimator_table,
     load_kernels,
     run_estimator,
@@ -130,8 +129,6 @@ def run_log(
         recording = _read(log, ignores_velocity_flag)
         table = estimator_table(recording, given)
         sensors = prepare(recording, table)
-        if not recording.is_own and "EKF2_MAG_CHECK" not in given:
-            accept_other_field(sensors, table)
     except (SensorLogError, ParameterError) as error:
         raise EstimateError(str(error)) from error
     load_kernels()

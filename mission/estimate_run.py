@@ -113,22 +113,6 @@ def estimator_table(recording: Recording, given: Mapping[str, float]) -> Paramet
     return table
 
 
-def accept_other_field(log: SensorLog, table: ParameterTable) -> None:
-    """Fuses the magnetometer unchecked, and notes it, where its field is nowhere in the log that of the place.
-
-    Simulators have such fields, and vehicles that were never calibrated; their logs hold no other heading.
-    """
-    if log.origin is None or not len(log.mag):
-        return
-    expected = float(np.linalg.norm(field_ned_gauss(log.origin.lat_deg, log.origin.lon_deg, log.origin.alt_m)))
-    strength = float(np.median(np.linalg.norm(log.mag["field_frd_gauss"], axis=1)))
-    if table["EKF2_MAG_CHECK"] and abs(strength - expected) > table["EKF2_MAG_CHK_STR"]:
-        table.set("EKF2_MAG_CHECK", 0)
-        log.recording.notes.append(
-            f"the magnetometer measures {strength:.2f} gauss, the place has {expected:.2f}: it is used unchecked"
-        )
-
-
 def load_kernels() -> None:
     """Compiles what the cache lacks, so that it is not taken for the estimator's own time."""
     wp.load_module(estimate_samples.module, device="cpu")

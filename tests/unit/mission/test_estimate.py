@@ -241,16 +241,6 @@ def test_the_answer_is_compared_at_its_own_times(tmp_path):
     assert late["yaw_deg"] == pytest.approx(same["yaw_deg"], abs=0.02)
 
 
-def test_a_magnetometer_that_is_nowhere_right_is_used_unchecked_and_noted(tmp_path, flight):
-    tables = px4_tables(flight)
-    field = tables["vehicle_magnetometer"][1]["magnetometer_ga"] * 4.0
-    log = tmp_path / "flight.ulg"
-    write_ulog(log, with_columns(tables, "vehicle_magnetometer", magnetometer_ga=field))
-    summary, _, text = estimated(log)
-    assert summary["valid"]["yaw"] > 0.9
-    assert "it is used unchecked" in text
-
-
 def test_lines_end_at_gaps_and_where_yaw_turns_over():
     times = np.array([0, 20, 40, 2000, 2020]) * 1000
     broken_us, values = _broken(times, np.arange(5.0))
