@@ -136,21 +136,23 @@ def _attitude(axes: Axes, log: SensorLog, estimate: Rows) -> None:
     """Roll, pitch and yaw; those of the log's own answer as broad pale lines below."""
     for track in log.recording.tracks[:1]:
         times, q = _sparse(track.q_time_us), _sparse(track.q_ned_from_frd)
-        _angles(axes, time_s(log, times), np.degrees(euler_rad(q)), lw=3.0, alpha=0.35)
+        _angles(axes, time_s(log, times), np.degrees(euler_rad(q)), ("", "", ""), width=3.0, alpha=0.35)
         axes.plot([], [], color="grey", lw=3.0, alpha=0.35, label=track.name)
     euler = np.degrees(euler_rad(estimate["q_ned_from_frd"]))
-    _angles(axes, time_s(log, estimate["time_us"]), euler, names=("roll", "pitch", "yaw"), lw=0.9)
+    _angles(axes, time_s(log, estimate["time_us"]), euler, ("roll", "pitch", "yaw"), width=0.9)
     axes.axhline(0.0, color="black", lw=0.5)
     axes.set_ylabel("attitude [deg]")
     _legend(axes)
 
 
-def _angles(axes: Axes, seconds: Rows, angles: Rows, names: tuple[str, ...] = ("", "", ""), **style: float) -> None:
+def _angles(
+    axes: Axes, seconds: Rows, angles: Rows, names: tuple[str, ...], *, width: float, alpha: float = 1.0
+) -> None:
     """Three angles, whose lines end at gaps and where an angle turns over at 180 deg."""
     for colour, name, column in zip(("C0", "C1", "C2"), names, angles.T, strict=True):
         turned = np.flatnonzero(np.abs(np.diff(column)) > HALF_TURN_DEG) + 1
         times, values = _broken(seconds * 1e6, column, turned)
-        axes.plot(times * 1e-6, values, color=colour, label=name, **style)
+        axes.plot(times * 1e-6, values, color=colour, label=name, lw=width, alpha=alpha)
 
 
 def _lines(axes: Axes, seconds: Rows, columns: Rows, label: str, names: tuple[str, ...] = ("x", "y", "z")) -> None:
