@@ -36,7 +36,7 @@ from autopilot.estimator.health import (
     with_doubt,
 )
 from autopilot.estimator.params import EstimatorParams, estimator_params
-from autopilot.estimator.predict import predict_nominal, process_variance
+from autopilot.estimator.predict import MANOEUVRE_ACCEL_NSD, manoeuvre_level, predict_nominal, process_variance
 from autopilot.estimator.sources.baro import (
     BARO_STUCK_AFTER,
     BARO_STUCK_MOVED,
@@ -173,18 +173,30 @@ def predict(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample) -> None:
     nominal.yaw_jump = 0.0
     gravity_ned = wp.vec3(0.0, 0.0, GRAVITY_M_S2 * imu.dt_s)
     delta_vel_ned = ekf.rows[i].step_delta_vel_ned + nominal.vel_ned - vel_before_ned - gravity_ned
+    delta_angle_frd = ekf.rows[i].step_delta_angle_frd + (imu.gyro_frd - nominal.gyro_bias_frd) * imu.dt_s
     step_s = ekf.rows[i].step_dt_s + imu.dt_s
     if step_s > params.predict_s - 0.5 * imu.dt_s:
         added_var = process_variance(params, ekf.covariance, i, nominal.vel_ned, step_s)
+        force, rate = wp.length(delta_vel_ned) / step_s, wp.length(delta_angle_frd) / step_s
+        level = manoeuvre_level(params, ekf.rows[i].manoeuvre_level, force, rate, step_s)
+        ekf.rows[i].manoeuvre_level = level
+        nominal.holds_accel_bias = 0
+        unknown_nsd = float(0.0)
         if is_doubted(ekf.rows[i]):
-            for axis in range(3):
-                added_var[VEL + axis] = added_var[VEL + axis] + DOUBTED_ACCEL_NSD * step_s
+            unknown_nsd = DOUBTED_ACCEL_NSD
+        elif level > 1.0:
+            nominal.holds_accel_bias = 1
+            unknown_nsd = MANOEUVRE_ACCEL_NSD * level * level
+        for axis in range(3):
+            added_var[VEL + axis] = added_var[VEL + axis] + unknown_nsd * step_s
         rot = wp.quat_to_matrix(nominal.q_ned_from_frd)
         predict_covariance(ekf.covariance, i, rot, delta_vel_ned, step_s, added_var)
         step_s = 0.0
         delta_vel_ned = wp.vec3()
+        delta_angle_frd = wp.vec3()
     ekf.rows[i].nominal = nominal
     ekf.rows[i].step_delta_vel_ned = delta_vel_ned
+    ekf.rows[i].step_delta_angle_frd = delta_angle_frd
     ekf.rows[i].step_dt_s = step_s
     ekf.rows[i].drag_sum.accel_frd += imu.accel_frd * imu.dt_s
     ekf.rows[i].drag_sum.time_s += imu.dt_s
@@ -265,6 +277,7 @@ def align(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample, samples: Sa
     ekf.rows[i].is_yaw_aligned = nominal.reset_count  # 1 if the magnetometer set heading
     nominal.reset_count = ekf.rows[i].nominal.reset_count
     ekf.rows[i].wander_time_us = wp.int64(0)
+    ekf.rows[i].manoeuvre_level = 0.0
     if alignment.baro_count > 0:
         count = float(alignment.baro_count)
         height_var = params.baro_noise * params.baro_noise / count

@@ -44,6 +44,15 @@ def part3(error: vec24, first: int) -> wp.vec3:
 
 
 @wp.func
+def bias_part(error: vec24) -> vec24:
+    """The elements of the accelerometer bias; zero elsewhere."""
+    out = vec24()
+    for k in range(ACCEL_BIAS, ACCEL_BIAS + 3):
+        out[k] = error[k]
+    return out
+
+
+@wp.func
 def inject(params: EstimatorParams, nominal: Nominal, error: vec24, error_slow: wp.vec4) -> Nominal:
     """The nominal state corrected by an error estimate.
 
@@ -94,7 +103,11 @@ def fuse(
     innov: float,
     innov_var: float,
 ) -> Nominal:
-    """Kalman update with one scalar: P -= w w', w = P H' / sqrt(S)."""
+    """Kalman update with one scalar: P -= w w', w = P H' / sqrt(S).
+
+    An accelerometer bias that is held is considered, not corrected (Schmidt 1966): its own block of P stays as it was,
+    the rest is that of the full update.
+    """
     inv_root = 1.0 / wp.sqrt(innov_var)
     w = ph * inv_root
     w_slow = ph_slow * inv_root
@@ -106,6 +119,11 @@ def fuse(
         for k in range(SLOW_COUNT):
             slow_row[SLOW_COUNT * j + k] = slow_row[SLOW_COUNT * j + k] - w_slow[j] * w_slow[k]
     cov[i, SLOW_COV] = slow_row
+    if nominal.holds_accel_bias == 1:
+        w_bias = bias_part(w)
+        for r in range(ACCEL_BIAS, ACCEL_BIAS + 3):
+            cov[i, r] = cov[i, r] + w[r] * w_bias
+        w = w - w_bias
     return inject(params, nominal, w * (innov * inv_root), w_slow * (innov * inv_root))
 
 
@@ -160,6 +178,8 @@ def fuse_gain(
 
     P - K H P - P H' K' + K S K' stays positive, whatever K is.
     """
+    if nominal.holds_accel_bias == 1:
+        gain = gain - bias_part(gain)
     scaled = gain * wp.sqrt(innov_var)
     for r in range(ERROR_STATES):
         cov[i, r] = cov[i, r] - (ph[r] * gain + gain[r] * ph) + scaled[r] * scaled

@@ -51,6 +51,9 @@ class EstimatorParams:
     gyro_bias_init: float
     accel_bias_init: float
     accel_bias_limit: float
+    manoeuvre_accel: float
+    manoeuvre_rate: float
+    manoeuvre_tau_s: float
     gyro_bias_limit: float
     tilt_init: float
     tau_vel_s: float
@@ -184,6 +187,29 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
         "accel_bias_init",
     ),
     Parameter("EKF2_ABL_LIM", 0.4, 0.0, 0.8, "m/s^2", "limit of the accelerometer bias", _PX4, "accel_bias_limit"),
+    Parameter(
+        "EKF2_ABL_ACCLIM",
+        25.0,
+        20.0,
+        200.0,
+        "m/s^2",
+        "specific force above which the accelerometer bias is not learned",
+        _PX4,
+        "manoeuvre_accel",
+    ),
+    Parameter(
+        "EKF2_ABL_GYRLIM",
+        3.0,
+        2.0,
+        20.0,
+        "rad/s",
+        "angular rate above which the accelerometer bias is not learned",
+        _PX4,
+        "manoeuvre_rate",
+    ),
+    Parameter(
+        "EKF2_ABL_TAU", 0.5, 0.1, 1.0, "s", "time constant with which their maxima decay", _PX4, "manoeuvre_tau_s"
+    ),
     Parameter("EKF2_GYR_B_LIM", 0.15, 0.0, 0.4, "rad/s", "limit of the gyro bias", _PX4, "gyro_bias_limit"),
     Parameter("EKF2_ANGERR_INIT", 0.1, 0.0, 0.5, "rad", "tilt error after alignment", _PX4, "tilt_init"),
     Parameter(

@@ -18,6 +18,10 @@ wp.set_module_options({"enable_backward": False})
 _MAX_WIND_VAR = wp.constant(100.0)  # (10 m/s)²
 _MAX_TERRAIN_VAR = wp.constant(1.0e4)  # (100 m)²
 
+# What an accelerometer's errors in a hard manoeuvre do to velocity: the density grows with the level's square. If
+# velocity counted as known, what is wrong of it would become a bias as soon as that is learned again.
+MANOEUVRE_ACCEL_NSD = wp.constant(0.02)  # [m²/s³] at level 1; guess: 2 m/s of a blow are gone in seconds
+
 
 @wp.func
 def delta_velocity_ned(q_ned_from_frd: wp.quat, delta_angle_frd: wp.vec3, delta_vel_frd: wp.vec3) -> wp.vec3:
@@ -36,6 +40,24 @@ def predict_nominal(nominal: Nominal, imu: ImuSample) -> Nominal:
     nominal.pos_ned = nominal.pos_ned + (vel_before_ned + nominal.vel_ned) * (0.5 * imu.dt_s)
     nominal.q_ned_from_frd = wp.normalize(nominal.q_ned_from_frd * quat_from_rotvec(delta_angle_frd))
     return nominal
+
+
+@wp.func
+def manoeuvre_level(params: EstimatorParams, before: float, force: float, rate: float, dt_s: float) -> float:
+    """The decaying maximum of specific force and angular rate, each over EKF2_ABL_ACCLIM and EKF2_ABL_GYRLIM (PX4).
+
+    Above 1 the accelerometer's clipping, its scale errors and its distance from the centre of turn would be taken for a
+    bias, which is kept long after.
+
+    Args:
+        params: of the vehicle.
+        before: the maximum so far.
+        force: [m/s²] mean over the step, so that vibration averages out.
+        rate: [rad/s] mean over the step.
+        dt_s: of the step.
+    """
+    level = wp.max(force / params.manoeuvre_accel, rate / params.manoeuvre_rate)
+    return wp.max(level, before * (1.0 - wp.min(dt_s / params.manoeuvre_tau_s, 1.0)))
 
 
 @wp.func

@@ -56,6 +56,7 @@ class Nominal:
     pos_ned: wp.vec3  # [m]
     gyro_bias_frd: wp.vec3  # [rad/s]
     accel_bias_frd: wp.vec3  # [m/s²]
+    holds_accel_bias: int  # the manoeuvre is too hard to learn it
     earth_field_ned: wp.vec3  # [gauss]
     body_field_frd: wp.vec3  # [gauss] hard iron
     wind_ned: wp.vec3  # [m/s] down component 0
@@ -217,6 +218,8 @@ class EstimatorState:
     nominal: Nominal
     step_dt_s: float  # since the last covariance prediction
     step_delta_vel_ned: wp.vec3  # [m/s] specific force integrated since then
+    step_delta_angle_frd: wp.vec3  # [rad] turned since then
+    manoeuvre_level: float  # decaying maximum of specific force and angular rate, each over its limit
     output: Output
     alignment: Alignment
     stillness: Stillness

@@ -19,7 +19,7 @@ from autopilot.estimator.fuse import (
 )
 from autopilot.estimator.generated import mag_products, predict_covariance
 from autopilot.estimator.params import EstimatorParams, estimator_params
-from autopilot.estimator.state import COV_ROWS, POS, SLOW, SLOW_BARO, SLOW_COV, Nominal
+from autopilot.estimator.state import ACCEL_BIAS, COV_ROWS, POS, SLOW, SLOW_BARO, SLOW_COV, Nominal
 from common.kernels import vec24
 
 wp.set_module_options({"enable_backward": False})
@@ -126,12 +126,15 @@ def height_row() -> np.ndarray:
     return row
 
 
-def fused(covariance: np.ndarray, first: int, count: int) -> tuple[np.ndarray, Any, np.ndarray]:
+def fused(
+    covariance: np.ndarray, first: int, count: int, holds_accel_bias: int = 0
+) -> tuple[np.ndarray, Any, np.ndarray]:
     """The covariance and nominal state after a magnetometer axis, and the observation's row."""
     axis, earth = a_rotation()[:, 1], np.array([0.2, 0.01, 0.43])
     cov = on_device(covariance)
     nominal = Nominal()
     nominal.q_ned_from_frd = wp.quat_identity()
+    nominal.holds_accel_bias = holds_accel_bias
     rows = wp.array([nominal], dtype=Nominal, device="cpu")
     params = estimator_params()
     inputs = [params, cov, wp.vec3(*axis), wp.vec3(*earth), 0.01, 0.02, first, count, rows]
@@ -168,6 +171,22 @@ def test_fusion_is_the_kalman_update() -> None:
     np.testing.assert_allclose(nominal["q_ned_from_frd"][:3], 0.5 * gain[0:3] * 0.01, atol=1e-6)
     np.testing.assert_allclose(nominal["terrain_d"], gain[23] * 0.01, atol=1e-6)
     np.testing.assert_allclose(nominal["slow"], gain[SLOW:] * 0.01, atol=1e-6)
+
+
+@pytest.mark.parametrize(("first", "count"), [(0, 0), (9, 9)])
+def test_held_bias_is_considered_and_not_corrected(first: int, count: int) -> None:
+    """Schmidt's update: its gain is zero, and the covariance is that of any gain."""
+    covariance = random_covariance()
+    found, nominal, row = fused(covariance, first, count, holds_accel_bias=1)
+    before = covariance.astype(float)
+    gain = before @ row / (row @ before @ row + 0.02)
+    if count > 0:
+        gain[:first] = gain[first + count :] = 0.0
+    gain[ACCEL_BIAS : ACCEL_BIAS + 3] = 0.0
+    np.testing.assert_allclose(found, joseph(before, gain, row, 0.02), atol=1e-6)
+    np.testing.assert_array_equal(found, found.T)
+    np.testing.assert_array_equal(nominal["accel_bias_frd"], np.zeros(3))
+    np.testing.assert_allclose(nominal["gyro_bias_frd"], gain[9:12] * 0.01, atol=1e-6)
 
 
 def test_fusion_of_a_position_with_a_slow_error_is_the_kalman_update() -> None:
