@@ -6,6 +6,7 @@ from math import nan
 import matplotlib as mpl
 import numpy as np
 
+from autopilot.ports import POSITION_VALID
 from mission.angles import euler_rad
 from mission.estimate_difference import track_pos_ned
 from mission.estimate_noise import FoundNoise
@@ -97,10 +98,14 @@ def _track(axes: Axes, log: SensorLog, estimate: Rows) -> None:
     for track in log.recording.tracks[:1]:
         _, pos_ned = _broken(_sparse(track.pos_time_us), _sparse(track_pos_ned(track, log.origin)))
         axes.plot(pos_ned[:, 1], pos_ned[:, 0], color=OTHER_COLOUR, lw=1.5, label=track.name)
-    _, pos_ned = _broken(estimate["time_us"], estimate["pos_ned"])
+    known_ned = estimate["pos_ned"].astype(float)
+    is_known = (estimate["flags"] & POSITION_VALID) != 0
+    if is_known.any():
+        known_ned[~is_known] = nan  # before the first fix it stands at the origin
+    _, pos_ned = _broken(estimate["time_us"], known_ned)
     axes.plot(pos_ned[:, 1], pos_ned[:, 0], color=ESTIMATE_COLOUR, lw=1, label="estimate")
     axes.set(xlabel="east [m]", ylabel="north [m]")
-    low, high = estimate["pos_ned"].min(axis=0), estimate["pos_ned"].max(axis=0)
+    low, high = np.nanmin(known_ned, axis=0), np.nanmax(known_ned, axis=0)
     middle, reach = 0.5 * (low + high), (0.5 + MAP_MARGIN) * max(float((high - low)[:2].max()), 1.0)
     axes.set(xlim=(middle[1] - reach, middle[1] + reach), ylim=(middle[0] - reach, middle[0] + reach))
     axes.set_aspect("equal")
