@@ -16,6 +16,7 @@ from autopilot.estimator.delay import (
     correct_output,
     due_count,
     integrate_output,
+    is_number,
     is_waiting,
     jump_output,
     output_sample,
@@ -24,6 +25,7 @@ from autopilot.estimator.delay import (
     receive,
     start_output,
     with_jump,
+    without_nan,
 )
 from autopilot.estimator.generated import predict_covariance
 from autopilot.estimator.health import (
@@ -300,7 +302,7 @@ def align(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample, samples: Sa
 
 @wp.func
 def estimator_step(ekf: Ekf, i: int, samples: Samples, contact: int) -> None:
-    """One tick of vehicle i, on its row in place: nothing happens without a new IMU sample.
+    """One tick of vehicle i, on its row in place: nothing happens without a new IMU sample that is a number.
 
     Args:
         ekf: of all vehicles.
@@ -308,10 +310,10 @@ def estimator_step(ekf: Ekf, i: int, samples: Samples, contact: int) -> None:
         samples: the newest of each sensor.
         contact: CONTACT_*: what the commander says.
     """
-    if samples.imu.time_us == ekf.rows[i].time_us:
+    if samples.imu.time_us == ekf.rows[i].time_us or not is_number(samples.imu):
         return
     params = ekf.params[i]
-    clean = calibrated(params, samples)
+    clean = without_nan(ekf, i, calibrated(params, samples))
     imu = bounded_sample(clean.imu)
     slot = ekf.rows[i].imu_head % IMU_RING
     ekf.imu_ring[i, slot] = imu

@@ -183,12 +183,11 @@ def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_f
         return
     aid = ekf.rows[i].mag
     step_s = wp.min(seconds_since(sample.time_us, aid.judged_time_us), 1.0)
-    apart = heading_apart(params, nominal.q_ned_from_frd, sample.field_frd_gauss)
     if ekf.rows[i].is_mag_faulty == 1:
         aid.judged_time_us = sample.time_us
         aid.is_active = 0
         ekf.rows[i].mag = aid
-        if apart > _AGREE_RAD:
+        if heading_apart(params, nominal.q_ned_from_frd, sample.field_frd_gauss) > _AGREE_RAD:
             ekf.rows[i].mag_agree_s = 0.0
         else:
             ekf.rows[i].mag_agree_s += step_s
@@ -200,10 +199,12 @@ def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_f
     elif ekf.rows[i].is_yaw_aligned == 0:
         ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, nominal, sample.field_frd_gauss)
         ekf.rows[i].is_yaw_aligned = 1
-    elif apart < _STALE_RAD or not knows_heading_by_mag_alone(ekf, i):
+    elif not knows_heading_by_mag_alone(ekf, i):
         ekf.rows[i].mag_stale_s = 0.0
-    else:
+    else:  # both sides of an `or` would be computed, and this one is dear
         ekf.rows[i].mag_stale_s += step_s
+        if heading_apart(params, nominal.q_ned_from_frd, sample.field_frd_gauss) < _STALE_RAD:
+            ekf.rows[i].mag_stale_s = 0.0
         if ekf.rows[i].mag_stale_s > _STALE_S:
             ekf.rows[i].nominal = start_mag(params, ekf.covariance, i, nominal, sample.field_frd_gauss)
             ekf.rows[i].mag_stale_s = 0.0

@@ -36,6 +36,7 @@ _MAX_RATE = wp.constant(0.05)  # [rad/s] bias included
 _MAX_GRAVITY_ERROR = wp.constant(0.5)  # [m/s²]
 
 # Signs of motion. Each limit is above four deviations of its filtered noise, with the default sensors.
+_ACCEL_SAMPLES = wp.constant(8)  # its means of seconds take what the running mean of 0.1 s is at 31 Hz
 _RECENT_S = wp.constant(2.0)  # within which velocity is gained
 _BEFORE_S = wp.constant(10.0)
 _MAX_GAIN = wp.constant(0.06)  # [m/s] gained by the accelerometer; noise of the default IMU at rest: 0.01
@@ -77,21 +78,26 @@ def observe_imu(still: Stillness, imu: ImuSample) -> Stillness:
 
 
 @wp.func
-def observe_accel(still: Stillness, q_raw: wp.quat, imu: ImuSample) -> Stillness:
-    """Means of the specific force since the IMU is quiet, in a frame that only the gyro carries.
+def observe_accel(still: Stillness, q_raw: wp.quat, step_s: float) -> Stillness:
+    """Slower means of the running mean of the specific force, since the IMU is quiet, in a frame of the gyro alone.
 
     A multirotor that drives leans, and feels nothing in its own frame; and what other sensors make of attitude, such as
     a magnetometer on steel, is no motion. The means wait for the estimator to settle.
+
+    Args:
+        still: after the newest IMU sample.
+        q_raw: attitude by the gyro.
+        step_s: since the last call.
     """
-    force = wp.quat_rotate(q_raw, imu.accel_frd)
+    force = wp.quat_rotate(q_raw, still.accel_mean_frd)
     if still.still_s > _RECENT_S and wp.length_sq(still.accel_recent) > 0.0:
         recent_change = force - still.accel_recent
-        still.accel_recent = still.accel_recent + recent_change * wp.min(imu.dt_s / _RECENT_S, 1.0)
+        still.accel_recent = still.accel_recent + recent_change * wp.min(step_s / _RECENT_S, 1.0)
         before_change = still.accel_recent - still.accel_before
-        still.accel_before = still.accel_before + before_change * wp.min(imu.dt_s / _BEFORE_S, 1.0)
+        still.accel_before = still.accel_before + before_change * wp.min(step_s / _BEFORE_S, 1.0)
     else:
-        still.accel_recent = wp.quat_rotate(q_raw, still.accel_mean_frd)
-        still.accel_before = still.accel_recent
+        still.accel_recent = force
+        still.accel_before = force
     return still
 
 
@@ -175,10 +181,10 @@ def stir(cov: wp.array2d(dtype=vec24), i: int) -> None:
 def observe_stillness(ekf: Ekf, i: int, params: EstimatorParams, samples: Samples, contact: int) -> None:
     """Takes what is new in the samples, before the inboxes have seen them."""
     still = observe_imu(ekf.rows[i].stillness, samples.imu)
-    if ekf.rows[i].phase == PHASE_RUNNING:
-        still = observe_accel(still, ekf.rows[i].output.q_raw, samples.imu)
-    else:
+    if ekf.rows[i].phase != PHASE_RUNNING:
         still.accel_recent = wp.vec3()  # the frame begins with alignment
+    elif ekf.rows[i].imu_head % _ACCEL_SAMPLES == 0:
+        still = observe_accel(still, ekf.rows[i].output.q_raw, float(_ACCEL_SAMPLES) * samples.imu.dt_s)
     if samples.gnss.time_us != ekf.rows[i].gnss_inbox.arrived_time_us:
         step_s = seconds_since(samples.gnss.time_us, ekf.rows[i].gnss_inbox.arrived_time_us)
         still = observe_gnss(params, still, samples.gnss, step_s)

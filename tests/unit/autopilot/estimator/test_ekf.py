@@ -17,7 +17,16 @@ from autopilot.ports import (
     YAW_ALIGNED,
 )
 from tests.unit.autopilot.estimator.flights import Flight, SensorNoise, freeze, make_flight, silence, stacked
-from tests.unit.autopilot.estimator.run import assert_same, default_ekf, errors, reset_one, rms, run, share_in_band
+from tests.unit.autopilot.estimator.run import (
+    assert_same,
+    default_ekf,
+    errors,
+    fields,
+    reset_one,
+    rms,
+    run,
+    share_in_band,
+)
 
 TICKS = 250  # per second
 ALL_VALID = TILT_ALIGNED | YAW_ALIGNED | POSITION_VALID | VELOCITY_VALID | HEIGHT_VALID
@@ -341,6 +350,33 @@ def test_a_state_that_is_no_number_is_forgotten_at_once() -> None:
     lost = ~np.isfinite(trace["estimate"]["pos_ned"]).all(axis=1)
     assert lost.sum() < 0.05 * TICKS
     assert trace["fault_count"][-1] == 1
+
+
+NUMBERS = (
+    ("imu", "gyro_frd"),
+    ("gnss", "pos_ned"),
+    ("gnss", "vel_ned"),
+    ("baro", "pressure_pa"),
+    ("mag", "field_frd_gauss"),
+    ("range", "distance_m"),
+)
+
+
+def test_a_sample_that_is_no_number_is_not_taken_for_one() -> None:
+    flight = make_flight(seed=5, duration_s=30.0)
+    spoilt = np.empty((len(NUMBERS), len(flight.samples)), flight.samples.dtype)
+    spoilt[:] = flight.samples
+    for samples, (sensor, name) in zip(spoilt, NUMBERS, strict=True):
+        time_us = samples[sensor]["time_us"]
+        first = 15 * TICKS + np.flatnonzero(np.diff(time_us[15 * TICKS :]))[0] + 1
+        samples[sensor][name][time_us == time_us[first]] = np.nan
+    ekf = default_ekf(len(spoilt))
+    trace = run(ekf, spoilt)
+    for label, states, row, yaw in zip(NUMBERS, trace, ekf.rows.numpy(), ekf.yaw.numpy(), strict=True):
+        assert row["fault_count"] == 0, label
+        assert np.abs(errors(flight, states).pos[-1]).max() < 2.0, label
+        for leaf, value in (fields(row) | fields(yaw, "yaw.")).items():
+            assert np.isfinite(value).all(), (label, leaf)
 
 
 def test_one_vehicle_equals_its_row_among_sixteen() -> None:
