@@ -60,8 +60,8 @@ class FlightConfig(BaseModel):
     """A ring of range finders that looks round the vehicle."""
     parameters: dict[str, float] = {}
     """Values of the flight controller's parameters that differ from their defaults, by name."""
-    world: WorldConfig = WorldConfig(treeless_radius_m=TREELESS_M)
-    """The ground, by default the command line's; with an owner: grown as in training, from its seed."""
+    world: WorldConfig = WorldConfig()
+    """The ground; with an owner: grown as in training, from its seed."""
     boot_unix_us: int = Field(default=SIMULATED_EPOCH_US, ge=0)
     """The date of power-on, as Unix time, in lockstep; a flight that is paced by the wall clock takes the wall's."""
     owner: OwnerConfig | None = None

@@ -9,8 +9,10 @@ from pymavlink import mavutil
 from pyulog import ULog
 
 from mission.flight import Flight, FlightConfig
+from mission.flight_config import TREELESS_M
 from mission.plan import DEFAULT_PLAN, read_plan
 from mission.script import fly_plan
+from sim.world.world import WorldConfig
 from tests.system.vehicle import HONEYGUIDE, ROOT
 
 LOGS = ("flight.ulg", "flight.tlog")
@@ -51,7 +53,8 @@ def test_two_processes_write_the_same_bytes(folders, name):
 
 
 def test_a_flight_inside_a_program_writes_the_same_bytes_as_the_command(folders, tmp_path):
-    flight = Flight(FlightConfig(seed=3, wind_m_s=5.0), folder=tmp_path)
+    world = WorldConfig(treeless_radius_m=TREELESS_M)  # the command's: no trees where clients fly first
+    flight = Flight(FlightConfig(seed=3, wind_m_s=5.0, world=world), folder=tmp_path)
     plan = read_plan(DEFAULT_PLAN)
     flight.fly(lambda drone: fly_plan(drone, plan), seconds=40.0)
     flight.close()
