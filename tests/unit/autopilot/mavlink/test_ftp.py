@@ -54,9 +54,12 @@ class FtpClient:
         self.client.send("FILE_TRANSFER_PROTOCOL", payload=tuple(raw.ljust(251, b"\0")))
 
     def ask(self, opcode, data=b"", **options):
-        """The only reply."""
+        """The only reply; what is much work may take a few frames."""
         self.send(opcode, data, **options)
-        (reply,) = self.replies()
+        replies = self.replies()
+        for _ in range(5):
+            replies = replies or self.replies()
+        (reply,) = replies
         assert reply.seq == (options.get("seq") or self.seq) + 1
         assert reply.request_opcode == opcode
         return reply
