@@ -32,8 +32,14 @@ def make_flight(**params):
 
 
 async def fail(drone, *motors, how=OFF):
-    for motor in motors:
-        await drone.command(INJECT, float(MOTOR), float(how), float(motor), name="fail")
+    """All at once: a motor that the others' failure leaves without a command is not found out."""
+    asked = [
+        drone.start(drone.command(INJECT, float(MOTOR), float(how), float(motor), name="fail")) for motor in motors
+    ]
+    await drone.until(lambda: all(each.is_done for each in asked), 5.0, "the failures")
+    for each in asked:
+        if each.error is not None:
+            raise each.error
 
 
 def run(flight, script):

@@ -53,10 +53,10 @@ def test_distances_of_a_client_count_too():
             drone.send("MANUAL_CONTROL", target=1, x=1000 if i > 10 else 0, y=0, z=500, r=0, buttons=0)
             if i == 5:
                 await drone._set_mode(POSITION_CTL, 0, "position")
-            if i % 5 == 0:  # a screen 3 m ahead that goes with the vehicle until it has moved 5 m
+            if i % 5 == 0:  # a half circle 3 m round it that goes with the vehicle until it has moved 5 m
                 gone_m = float(np.linalg.norm(pos_ned(flight)[:2] - start[:2]))
                 ahead_cm = int(max(100.0 * (7.0 - gone_m), 30.0))
-                distances = tuple(ahead_cm if k <= 4 or k >= 68 else 1201 for k in range(72))
+                distances = tuple(ahead_cm if k <= 18 or k >= 54 else 1201 for k in range(72))
                 drone.send(
                     "OBSTACLE_DISTANCE", time_usec=0, sensor_type=0, distances=distances, increment=5,
                     min_distance=20, max_distance=1200, increment_f=5.0, angle_offset=0.0, frame=12,
