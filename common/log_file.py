@@ -11,6 +11,8 @@ from typing import BinaryIO
 
 from common.files import PartFile
 
+OnTrouble = Callable[[str], None]
+
 PART_BYTES_MAX = 256 << 20  # over an hour of flight
 PARTS_KEPT_MAX = 8
 
@@ -26,7 +28,7 @@ class LogFile(PartFile):
         OSError: the folder is missing or may not be written.
     """
 
-    def __init__(self, target: Path | str | BinaryIO, on_trouble: Callable[[str], None] | None = None) -> None:
+    def __init__(self, target: Path | str | BinaryIO, on_trouble: OnTrouble | None = None) -> None:
         super().__init__(target)
         self._first = self._target
         self._on_trouble = on_trouble

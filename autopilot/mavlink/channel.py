@@ -204,7 +204,8 @@ class Endpoint:
             channel.schedule.send_due(self.time_us, state, partial(self._stream, channel, None if i else self._log))
 
     def _stream(self, channel: Channel, log: FrameLog | None, kind: MessageType, payload: bytes) -> None:
-        payload = self._on_clients_clock(kind, payload)
+        if self.clock.boot_us:
+            payload = self._on_clients_clock(kind, payload)
         frame = channel.send(kind, payload)
         if log is not None:
             log.sent(self.time_us, kind, payload, AUTOPILOT_COMPONENT, frame)

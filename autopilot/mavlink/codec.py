@@ -10,7 +10,6 @@ import struct
 from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
@@ -39,6 +38,7 @@ _BYTES_FIELDS = {(name, "param_value") for name in ("PARAM_EXT_VALUE", "PARAM_EX
 
 _PRINTABLE = dict.fromkeys([*range(32), 127], "?")
 
+_layouts: dict[int, "MessageType"] = {}  # of the messages that have been asked for
 _IDS_BY_NAME: dict[str, int] = {item.msgname: item.id for item in DEFINITIONS.values()}
 
 
@@ -102,10 +102,15 @@ def message_id(name: str) -> int:
 def message_type(key: int | str) -> MessageType | None:
     """The layout of a message by id or name, None if it is unknown."""
     msg_id = _IDS_BY_NAME.get(key) if isinstance(key, str) else key
-    return _layout(msg_id) if msg_id is not None and msg_id in DEFINITIONS else None
+    if (
+        msg_id is None or msg_id not in DEFINITIONS
+    ):  # clients send numbers of any; only layouts of messages there are, are kept
+        return None
+    if msg_id not in _layouts:
+        _layouts[msg_id] = _layout(msg_id)
+    return _layouts[msg_id]
 
 
-@cache  # of the messages there are: clients send numbers of any
 def _layout(msg_id: int) -> MessageType:
     definition = DEFINITIONS[msg_id]
     packer, unpacker, size = _compile(definition)
@@ -259,7 +264,7 @@ def _only_frame(data: bytes) -> Frame | None:
     if len(data) < _SHORTEST_V2 or data[0] != MAGIC_V2 or len(data) != _SHORTEST_V2 + data[1] or data[2]:
         return None
     msg_id = data[7] | data[8] << 8 | data[9] << 16
-    kind = message_type(msg_id)
+    kind = _layouts.get(msg_id) or message_type(msg_id)
     if kind is None or mcrf4xx(data[1:-2] + kind.crc_extra) != data[-2] | data[-1] << 8:
         return None
     return Frame(kind, data[5], data[6], data[4], data[10:-2], data)

@@ -32,7 +32,8 @@ class FrameLog:
 
     def sent(self, time_us: int, kind: MessageType, payload: bytes, compid: int, frame: bytes) -> None:
         """Logs a message of the vehicle's, unsigned: `frame` as it was sent, if its number is in step."""
-        seq = self._next((self._sysid, compid), 1)
+        sender = (self._sysid, compid)
+        seq = self._seqs[sender] = self._seqs.get(sender, -1) + 1 & 0xFF
         if frame[_SEQ_AT] != seq or frame[_FLAGS_AT] & SIGNED_FLAG:
             frame = frame_bytes(kind, payload, seq, self._sysid, compid)
         self._on_frame(time_us, frame)
