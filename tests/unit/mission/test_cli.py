@@ -171,6 +171,7 @@ def test_version_is_printed():
     assert re.fullmatch(r"honeyguide \d+\.\d+\.\d+\n", result.stdout)
 
 
-def test_a_shell_can_complete_the_commands():
-    result = CliRunner().invoke(app, ["--show-completion", "bash"])
-    assert "_HONEYGUIDE_COMPLETE" in result.stdout or result.exit_code == 0
+def test_a_shell_completes_the_commands():
+    asked = {"_HONEYGUIDE_COMPLETE": "complete_bash", "COMP_WORDS": "honeyguide fo", "COMP_CWORD": "1"}
+    result = CliRunner().invoke(app, [], env=asked, prog_name="honeyguide")
+    assert result.stdout.split() == ["follow"]
