@@ -117,22 +117,23 @@ def fly(
     ] = None,
 ) -> None:
     """Fly: world, vehicle, flight controller and MAVLink links, in real time or faster."""
-    from mission.options import FlightOptions, UserError
-    from mission.session import fly_session
+    from mission.options import FlightOptions, UserError, check_options
 
+    options = FlightOptions(
+        plan=plan, is_idle=idle, once=once, speed=speed, seconds=seconds, seed=seed, wind_m_s=wind,
+        wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
+        trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, bind=bind,
+        tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
+        run_folder=run_folder, stream_port=stream_port, video_port=video_port,
+        parameters=tuple(param or ()), state=state, traffic_count=traffic, has_lidar=lidar,
+        has_view=view, view_port=view_port, owner=owner, image_port=image_port,
+        announces_components=announce_components,
+    )  # fmt: skip
     try:
-        exit_code = fly_session(
-            FlightOptions(
-                plan=plan, is_idle=idle, once=once, speed=speed, seconds=seconds, seed=seed, wind_m_s=wind,
-                wind_from_deg=wind_from, noise=noise, airframe=airframe, home=home, world_seed=world_seed,
-                trees_per_ha=trees, hill_height_m=hills, has_walls=walls, dialect=dialect, host=host, bind=bind,
-                tcp_port=tcp_port, has_to_sign=require_signing, gcs_port=gcs_port, api_port=api_port,
-                run_folder=run_folder, stream_port=stream_port, video_port=video_port,
-                parameters=tuple(param or ()), state=state, traffic_count=traffic, has_lidar=lidar,
-                has_view=view, view_port=view_port, owner=owner, image_port=image_port,
-                announces_components=announce_components,
-            )
-        )  # fmt: skip
+        check_options(options)
+        from mission.session import fly_session
+
+        exit_code = fly_session(options)
     except UserError as error:
         refuse(str(error))
     raise typer.Exit(exit_code)

@@ -6,9 +6,12 @@ from typing import Any, cast, get_args
 
 from pydantic import ValidationError
 
+from common.airframe import AirframeError, load_airframe
 from common.geodesy import DEFAULT_HOME, GeoPoint
+from common.params import ParameterError
 from common.state_folder import StateFolder
-from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, Pace
+from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, Pace, flight_parameters
+from mission.plan import PlanError, read_plan
 from mission.state import stored_home
 from sim.world.world import WorldConfig
 
@@ -82,6 +85,22 @@ def check_end(options: FlightOptions, speed: float | None) -> None:
         raise UserError(f"--owner {options.owner}: must be walk or run")
     if options.is_idle and speed is None and options.seconds is None:
         raise UserError("--idle --speed max: nobody can connect, so give --seconds to say when it ends")
+
+
+def check_options(options: FlightOptions) -> None:
+    """Refuses what can be seen to be wrong before ports, servers or kernels are loaded.
+
+    Raises:
+        UserError: an option, the plan, the airframe or a parameter is wrong.
+    """
+    check_end(options, speed_of(options.speed))
+    try:
+        if options.plan is not None:
+            read_plan(options.plan)
+        config = flight_config(options, None)
+        flight_parameters(config, load_airframe(config.airframe))
+    except (AirframeError, ParameterError, PlanError) as error:
+        raise UserError(str(error)) from error
 
 
 def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightConfig:
