@@ -8,15 +8,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from common.airframe import AirframeError, load_airframe
 from common.files import write_whole
 from common.geodesy import GeoPoint
-from common.params import ParameterError
 from common.state_folder import StateFolder
 from mission.connections import open_images, open_links, open_page, open_stream, open_video, signing_config
-from mission.flight_config import flight_parameters
 from mission.net_guard import LOOPBACK
-from mission.options import FlightOptions, UserError, check_end, flight_config, speed_of
+from mission.options import FlightOptions, UserError, flight_config, speed_of
 from mission.plan import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
 from mission.rtp import session_description
 from mission.run_folder import OwnFiles, run_folder
@@ -28,13 +25,12 @@ WIND_EXPECTED_M_S = 13.0  # measured: an x500 finishes the default mission for 1
 
 
 def fly_session(options: FlightOptions) -> int:
-    """Flies as asked and returns the exit code.
+    """Flies what `check_options` has passed and returns the exit code.
 
     Raises:
         UserError: an option, file, port or folder is wrong; nothing has been written.
     """
     speed = speed_of(options.speed)
-    check_end(options, speed)
     with ExitStack() as held:
         if options.state is None:
             return _fly(options, speed, None, held)
@@ -50,10 +46,6 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     console = Console()
     config = flight_config(options, state)
     plan = None if options.is_idle else _plan(options.plan, config.home)
-    try:
-        flight_parameters(config, load_airframe(config.airframe))
-    except (AirframeError, ParameterError) as error:
-        raise UserError(str(error)) from error
     signing = signing_config(options, speed, state)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
