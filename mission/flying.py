@@ -1,5 +1,6 @@
 """A flight of `honeyguide fly`, from its first frame to its run folder: progress, texts, summary, logs, picture."""
 
+import gc
 import json
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -92,6 +93,7 @@ def advance(
         progress: the line.
         console: where it is shown.
     """
+    gc.freeze()  # what is loaded by now stays: to look through it for garbage takes 0.2 s, in the middle of a flight
     try:
         with _signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
             told = 0

@@ -36,8 +36,9 @@ class Troubles:
 
     def tell(self, announcer: Announcer) -> None:
         """Tells what has been noted since the last call."""
-        for text in self.take():
-            announcer.statustext(Severity.WARNING, text)
+        if self._untold:
+            for text in self.take():
+                announcer.statustext(Severity.WARNING, text)
 
     def take(self) -> list[str]:
         """What has not been told."""

@@ -128,6 +128,7 @@ class Endpoint:
         self.compids = {AUTOPILOT_COMPONENT}  # the vehicle's components behind these links
         self.parameters = ParameterView(vehicle.params, dialect)
         self.telemetry = Telemetry(dialect, sysid, vehicle.host, has_gimbal=vehicle.state.gimbal is not None)
+        self.needs_ticks = False  # a client gets messages more often than once per frame
         self.sent_count = 0  # frames sent because of somebody's message, for the sharing of work
         self.asker: Channel | None = None  # whose message is being handled
         fixed = FixedLinks([link for link in links if not isinstance(link, LinkSource)])
@@ -200,8 +201,12 @@ class Endpoint:
     def send_streams(self) -> None:
         """Sends the telemetry that is due; the frame log gets the first channel's."""
         state = self.vehicle.state
-        for i, channel in enumerate(self.channels):
-            channel.schedule.send_due(self.time_us, state, partial(self._stream, channel, None if i else self._log))
+        log, needs_ticks = self._log, False
+        for channel in self.channels:
+            channel.schedule.send_due(self.time_us, state, partial(self._stream, channel, log))
+            log = None
+            needs_ticks = needs_ticks or channel.schedule.needs_ticks
+        self.needs_ticks = needs_ticks
 
     def _stream(self, channel: Channel, log: FrameLog | None, kind: MessageType, payload: bytes) -> None:
         if self.clock.boot_us:

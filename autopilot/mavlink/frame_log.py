@@ -22,18 +22,18 @@ class FrameLog:
         sysid: the vehicle's own.
     """
 
-    __slots__ = ("_heard", "_on_frame", "_seqs", "_sysid")
+    __slots__ = ("_heard", "_on_frame", "_own", "_seqs", "_sysid")
 
     def __init__(self, on_frame: OnFrame, sysid: int) -> None:
         self._on_frame = on_frame
         self._sysid = sysid
-        self._seqs: dict[tuple[int, int], int] = {}  # the newest in the log, by system and component
+        self._own = [-1] * 256  # the vehicle's newest in the log, by component
+        self._seqs: dict[tuple[int, int], int] = {}  # the others' newest in the log, by system and component
         self._heard: dict[tuple[int, int, int], int] = {}  # the newest on a channel, by its number and the sender
 
     def sent(self, time_us: int, kind: MessageType, payload: bytes, compid: int, frame: bytes) -> None:
         """Logs a message of the vehicle's, unsigned: `frame` as it was sent, if its number is in step."""
-        sender = (self._sysid, compid)
-        seq = self._seqs[sender] = self._seqs.get(sender, -1) + 1 & 0xFF
+        seq = self._own[compid] = self._own[compid] + 1 & 0xFF
         if frame[_SEQ_AT] != seq or frame[_FLAGS_AT] & SIGNED_FLAG:
             frame = frame_bytes(kind, payload, seq, self._sysid, compid)
         self._on_frame(time_us, frame)

@@ -237,7 +237,7 @@ class MavlinkServer:
     @property
     def needs_ticks(self) -> bool:
         """Whether a client gets messages more often than once per frame."""
-        return any(channel.schedule.needs_ticks for channel in self._endpoint.channels)
+        return self._endpoint.needs_ticks
 
     def prepare(self) -> None:
         """Makes what takes longer than a frame may, before somebody asks for it in flight."""

@@ -226,12 +226,7 @@ class StreamSchedule:
         self.interval_us = dict(self._defaults)  # by message id; 0: not sent
         self._queue: list[tuple[int, int]] = []  # (due time, message id), a heap
         self._is_planned = False
-        self._needs_ticks = False
-
-    @property
-    def needs_ticks(self) -> bool:
-        """Whether a message is sent more often than once per frame."""
-        return self._needs_ticks
+        self.needs_ticks = False  # a message is sent more often than once per frame
 
     def refusal(self, msg_id: int, interval_us: int) -> str:
         """Why a message cannot be sent at an interval; empty if it can."""
@@ -274,7 +269,7 @@ class StreamSchedule:
         if interval_us == self.interval_us[msg_id]:
             return
         self.interval_us[msg_id] = interval_us
-        self._needs_ticks = any(0 < each < FRAME_US for each in self.interval_us.values())
+        self.needs_ticks = any(0 < each < FRAME_US for each in self.interval_us.values())
         if self._is_planned:
             self._queue = [entry for entry in self._queue if entry[1] != msg_id]
             if interval_us:
@@ -293,7 +288,7 @@ class StreamSchedule:
 
     def send_due(self, now_us: int, state: VehicleState, send: Send) -> None:
         """Sends what is due now; where messages come more often than frames, first what was due since the last one."""
-        if self._needs_ticks:
+        if self.needs_ticks:
             for moment in state.ticks:
                 self._send_due(moment.time_us, moment, send)
         self._send_due(now_us, state, send)

@@ -4,6 +4,7 @@ It may go anywhere, and is brought back when it has left the mode, landed or bee
 frame: nothing raises, everything it knows and asks for is finite, and no frame costs more than FRAME_MAX_S.
 """
 
+import gc
 from math import nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -77,7 +78,6 @@ class ModeFlight:
 
     def _take_off(self):
         """A new vehicle in the air, in Hold."""
-        self.flights += 1
         self._folder = TemporaryDirectory()
         self._state = StateFolder(Path(self._folder.name))
         pairs = [memory_pair(LinkRole.GROUND) for _ in range(STATIONS)]
@@ -92,6 +92,9 @@ class ModeFlight:
         rng = np.random.default_rng(self._rng.integers(1 << 62))
         asked = (server.message_handlers(), server.command_handlers(), server._endpoint.parameters.names)
         self._messages = [Messages(rng, *asked, (255 - i, 190), is_bold=True) for i in range(STATIONS)]
+        if self.flights == 0:
+            gc.freeze()  # as flights do that are shown to somebody
+        self.flights += 1
         running = flight.fly(climb, seconds=60.0)
         assert running.error is None, running.error
         self._elsewhere = STAY
