@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-hostile test-mavproxy test-mavsdk3 test-dronekit fuzz mutants check tune bench soak format lock clean reproduce-follow
+.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -45,6 +45,9 @@ test: $(STAMP) ## Run the tests that take seconds; flags: make test ARGS="-k pla
 
 test-all: $(STAMP) ## Run every test, the slow ones too
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile tests $(ARGS)
+
+golden: $(STAMP) ## Renew tests/golden/golden.json and show what has changed in the golden flights; flags: ARGS="--check"
+	@$(BIN)/python -m tests.golden $(ARGS)
 
 fuzz: $(STAMP) ## Send a vehicle 2,000,000 broken and extreme frames, in every mode of both dialects; flags: ARGS="--seed 7"
 	@$(BIN)/python -m tests.fuzz $(ARGS)
