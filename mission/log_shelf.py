@@ -98,14 +98,14 @@ class FlightLogs:
             except OSError as error:
                 self._fail(error)
             if self._has_failed:
-                part_path(self._folder / self._name).unlink(missing_ok=True)  # not got as far as its data
+                _remove(part_path(self._folder / self._name))  # not got as far as its data
         self._file, self._size, self._has_failed, self._ended = None, 0, False, None
 
     def _begin(self) -> None:
         names = self._names()
         self._ended = None
         for name in names[: max(len(names) + 1 - LOGS_KEPT_MAX, 0)]:
-            (self._folder / name).unlink(missing_ok=True)
+            _remove(self._folder / name)
         self._name = f"log_{_number(names[-1]) + 1 if names else 1:05}.ulg"
         path = self._folder / self._name
         part = part_path(path)
@@ -152,7 +152,7 @@ class FlightLogs:
     def _log(self, name: str) -> LogFile | None:
         try:
             stat = os.stat(self._folder / name)  # noqa: PTH116  one call per log
-        except FileNotFoundError:
+        except OSError:
             return None
         return LogFile(name, stat.st_size, int(stat.st_mtime))
 
@@ -160,11 +160,18 @@ class FlightLogs:
         return _read(self._folder / name, offset, count)
 
     def erase(self) -> int:
-        erased = [name for name in self._names() if self._file is None or name != self._name]
-        for name in erased:
-            (self._folder / name).unlink(missing_ok=True)
+        others = [name for name in self._names() if self._file is None or name != self._name]
         self._ended = None
-        return len(erased)
+        return sum(_remove(self._folder / name) for name in others)
+
+
+def _remove(path: Path) -> bool:
+    """Whether it is gone: a disk that has become read-only keeps what it has."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return False
+    return True
 
 
 def _number(name: str) -> int:
@@ -178,5 +185,5 @@ def _read(path: Path, offset: int, count: int) -> bytes:
         with path.open("rb") as file:
             file.seek(offset)
             return file.read(count)
-    except FileNotFoundError:
+    except OSError:
         return b""

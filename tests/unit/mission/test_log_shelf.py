@@ -1,5 +1,8 @@
 """Logs of flights: when they begin and end, what clients see of them."""
 
+import errno
+from pathlib import Path
+
 import pytest
 from pyulog import ULog
 
@@ -164,3 +167,26 @@ class FullFile:
         raise OSError(28, "No space left on device")
 
     flush = close = lambda self: self.write(b"")
+
+
+def test_a_disk_that_becomes_read_only_is_told_and_ends_no_flight(tmp_path, monkeypatch):
+    for i in range(1, LOGS_KEPT_MAX + 1):
+        (tmp_path / f"log_{i:05}.ulg").touch()
+    told = []
+    params = parameter_table()
+    params.set("SDLOG_MODE", 0)
+    stream = Stream()
+    logs = FlightLogs(tmp_path, stream, params, told.append)
+
+    def refuse(*_, **__):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    for name in ("open", "unlink", "replace"):
+        monkeypatch.setattr(Path, name, refuse)
+    for is_armed in (True, True, False):
+        logs.frame(is_armed=is_armed)
+    assert logs.erase() == 0
+    assert logs.read("log_00001.ulg", 0, 10) == b""
+    assert told == [f"log_{LOGS_KEPT_MAX + 1:05}.ulg ended: Read-only file system"]
+    assert len(logs.logs()) == LOGS_KEPT_MAX
+    assert stream.listeners == []
