@@ -125,12 +125,16 @@ def chosen_pilot(policy: str | None) -> tuple[Pilot, str]:
 
 def watch_of(flight: Flight, companion: Companion, seconds: float) -> FollowWatch:
     """What judges a flight by what its companion flies of it."""
-    return FollowWatch(
-        flight,
-        lambda: companion.phase is Phase.FLYING,
-        seconds,
-        lambda has_begun: taken_over(flight, companion.phase, has_begun=has_begun),
-    )
+    restarts_over = 0  # those after which it has followed again
+
+    def taken(has_begun: bool) -> str:
+        nonlocal restarts_over
+        if companion.phase is Phase.FLYING and flight.controller.state.is_armed:
+            restarts_over = flight.restart_count
+        is_put_back = flight.restart_count > restarts_over
+        return taken_over(flight, companion.phase, has_begun=has_begun, is_put_back=is_put_back)
+
+    return FollowWatch(flight, lambda: companion.phase is Phase.FLYING, seconds, taken)
 
 
 async def follow(drone: Drone, companion: Companion, seconds: float) -> None:

@@ -28,17 +28,18 @@ _SAMPLE_US = round(DECISION_S * 1e6)
 _BEFORE = (Mode.TAKEOFF, Mode.HOLD)  # on the way to being followed
 
 
-def taken_over(flight: Flight, phase: Phase, *, has_begun: bool) -> str:
+def taken_over(flight: Flight, phase: Phase, *, has_begun: bool, is_put_back: bool) -> str:
     """Why it is a person who has the vehicle now; "" if the policy has it, or has given it up by itself.
 
     Args:
         flight: with a companion.
         phase: of the companion.
         has_begun: it has followed before.
+        is_put_back: it was restarted, and has not followed since.
     """
     if flight.injector.failures:
         return "a failure was injected"
-    if flight.restart_count and phase is not Phase.FLYING:
+    if is_put_back:
         return "the vehicle was restarted"
     state = flight.controller.state
     is_own = state.mode in OUTSIDE_MODES or phase is Phase.HANDING_BACK or (state.mode in _BEFORE and not has_begun)

@@ -97,6 +97,20 @@ def test_a_vehicle_put_back_on_its_pad_is_whole_and_may_follow_again(tmp_path):
     assert judged.flight.controller.state.battery_remaining > 0.95
 
 
+def test_a_policy_that_gives_up_after_a_restart_has_not_followed_for_the_rest(tmp_path):
+    judged = Judged(60.0)
+    judged.flight.restart()
+    judged.fly(1.0)
+    judged.do(take_off_and_follow, 60.0)
+    judged.fly(2.0)
+    assert judged.companion.phase is Phase.FLYING
+    lose(judged.companion, "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "ODOMETRY", "ATTITUDE")
+    judged.fly(3.0)
+    assert judged.watch.takeovers == ["the vehicle was restarted"]
+    assert judged.watch.is_over
+    assert judged.exit_code(tmp_path) == 1
+
+
 async def take_off_and_follow(drone):
     await drone.wait_ready()
     await drone.arm()
