@@ -40,7 +40,7 @@ _VEL_STD = wp.constant(0.1)  # [m/s] aligned at rest
 _MOVING_VEL_STD = wp.constant(10.0)  # [m/s]
 _MOVING_POS_STD = wp.constant(1000.0)  # [m] powered on in flight, it may be anywhere; guess
 _HEIGHT_STD = wp.constant(0.1)  # [m] height counts from where it boots, wherever that is
-_WIND_STD = wp.constant(5.0)  # [m/s] guess
+WIND_STD = wp.constant(5.0)  # [m/s] guess
 _TERRAIN_STD = wp.constant(0.1)  # [m] it stands there
 
 
@@ -108,8 +108,8 @@ def start_covariance(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: i
         set_variance(cov, i, BODY + axis, params.body_field_init * params.body_field_init)
     set_variance(cov, i, ATT + 2, wp.pi * wp.pi / 3.0)  # uniform over the circle
     set_variance(cov, i, POS + 2, _HEIGHT_STD * _HEIGHT_STD)
-    set_variance(cov, i, WIND, _WIND_STD * _WIND_STD)
-    set_variance(cov, i, WIND + 1, _WIND_STD * _WIND_STD)
+    set_variance(cov, i, WIND, WIND_STD * WIND_STD)
+    set_variance(cov, i, WIND + 1, WIND_STD * WIND_STD)
     set_sum_variance(cov, i, TERRAIN, POS + 2, _TERRAIN_STD * _TERRAIN_STD)
     for j in range(SLOW_COUNT):
         set_slow_variance(cov, i, j, 0.0)  # no fix, no pressure yet

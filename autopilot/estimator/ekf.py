@@ -98,6 +98,7 @@ wp.set_module_options({"enable_backward": False})
 SOUNDNESS_SAMPLES = wp.constant(256)  # the covariance is looked over once a second; at once if the state is no number
 COMPARE_SAMPLES = wp.constant(64)  # heights are compared four times a second
 WATCH_SAMPLES = wp.constant(4)  # flags and deviations are renewed at 62 Hz
+COUNTED_SAMPLES = wp.constant(1 << 30)  # 50 days; counted anew then: a multiple of the ring and of the three above
 
 
 @wp.func
@@ -315,6 +316,9 @@ def estimator_step(ekf: Ekf, i: int, samples: Samples, contact: int) -> None:
     params = ekf.params[i]
     clean = without_nan(ekf, i, calibrated(params, samples))
     imu = bounded_sample(clean.imu)
+    if ekf.rows[i].imu_tail >= COUNTED_SAMPLES:
+        ekf.rows[i].imu_head -= COUNTED_SAMPLES
+        ekf.rows[i].imu_tail -= COUNTED_SAMPLES
     slot = ekf.rows[i].imu_head % IMU_RING
     ekf.imu_ring[i, slot] = imu
     ekf.rows[i].imu_head += 1

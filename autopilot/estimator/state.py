@@ -213,8 +213,8 @@ class EstimatorState:
     phase: int  # PHASE_*
     time_us: wp.int64  # of the newest IMU sample
     horizon_time_us: wp.int64  # of the nominal state
-    imu_head: int  # IMU samples put into the ring so far; the newest is (imu_head - 1) % IMU_RING
-    imu_tail: int  # IMU samples taken out of it so far
+    imu_head: int  # IMU samples put into the ring so far, modulo 2^30; the newest is (imu_head - 1) % IMU_RING
+    imu_tail: int  # IMU samples taken out of it so far, likewise
     nominal: Nominal
     step_dt_s: float  # since the last covariance prediction
     step_delta_vel_ned: wp.vec3  # [m/s] specific force integrated since then

@@ -2,11 +2,13 @@
 
 In: each good GNSS fix, before it is fused. Where heading is not known, it is set once the yaw estimator has converged.
 Where it is, and differs from the yaw estimator's by more than both can explain, it is set too; the magnetometer is
-faulty then and not fused until it agrees again. Velocity, position and biases were wrong with heading: they start anew.
+faulty then and not fused until it agrees again. Velocity, position, biases and wind were wrong with heading: they start
+anew.
 """
 
 import warp as wp
 
+from autopilot.estimator.align import WIND_STD
 from autopilot.estimator.delay import MAX_AGE_S
 from autopilot.estimator.fuse import seconds_since, set_variance
 from autopilot.estimator.health import is_doubted
@@ -18,7 +20,7 @@ from autopilot.estimator.sources.gnss import (
     gnss_vel_std,
     set_gnss_axis,
 )
-from autopilot.estimator.state import ACCEL_BIAS, ATT, GNSS_RING, GYRO_BIAS, VEL, Ekf
+from autopilot.estimator.state import ACCEL_BIAS, ATT, GNSS_RING, GYRO_BIAS, VEL, WIND, Ekf
 from autopilot.estimator.yaw_estimator import RATIO_S, estimated_yaw, has_yaw, start_tilt, take_velocity
 from autopilot.ports import GnssSample
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
@@ -48,6 +50,7 @@ def set_heading(ekf: Ekf, i: int, params: EstimatorParams, sample: GnssSample) -
     nominal.vel_jump_ned = nominal.vel_jump_ned + sample.vel_ned - nominal.vel_ned
     nominal.vel_ned = sample.vel_ned
     nominal.accel_bias_frd = wp.vec3()
+    nominal.wind_ned = wp.vec3()
     nominal.reset_count += 1
     vel_std = gnss_vel_std(params, sample)
     for axis in range(3):
@@ -56,6 +59,8 @@ def set_heading(ekf: Ekf, i: int, params: EstimatorParams, sample: GnssSample) -
         set_variance(cov, i, GYRO_BIAS + axis, _GYRO_BIAS_STD * _GYRO_BIAS_STD)
         set_variance(cov, i, ACCEL_BIAS + axis, params.accel_bias_init * params.accel_bias_init)
     set_variance(cov, i, ATT + 2, ekf.yaw[i].yaw_var)
+    set_variance(cov, i, WIND, WIND_STD * WIND_STD)
+    set_variance(cov, i, WIND + 1, WIND_STD * WIND_STD)
     if ekf.rows[i].external_pos.is_active == 0:
         pos_std = gnss_pos_std(params, sample)
         for axis in range(2):
