@@ -9,9 +9,14 @@ from pyulog import ULog
 from rich.console import Console
 from typer.testing import CliRunner
 
+from autopilot.ports import POSITION_VALID, VELOCITY_VALID, Estimate
 from mission.cli import app
 from mission.estimate import EstimateError, estimate_log
+from mission.estimate_difference import difference
+from mission.estimate_noise import SETTLE_US, found_noise
 from mission.estimate_plots import _broken
+from mission.estimate_run import EVENT_DTYPE, OUTPUT_DTYPE, SOURCES, Replay
+from mission.sensor_log import Track, row_dtype
 from tests.unit.mission.synthetic_log import (
     BARO_STD,
     GPS_STD,
@@ -161,6 +166,45 @@ def test_noise_is_found_from_the_log(tmp_path):
         assert source["in_band"] == pytest.approx(0.95, abs=0.03)
     assert summary["sources"]["gnss_pos"]["noise_found"] == pytest.approx(GPS_STD, rel=0.25)
     assert "0.1 m/s" in text
+
+
+@pytest.mark.parametrize("spoil", ["nothing", "settling", "resets", "rest", "outliers"])
+def test_noise_is_found_in_flight_alone(spoil):
+    rng, seconds = np.random.default_rng(1), 100.0
+    output, events = np.zeros(1, OUTPUT_DTYPE), {name: np.zeros(0, EVENT_DTYPE) for name in SOURCES}
+    baro = np.zeros(int(seconds * 10.0), EVENT_DTYPE)
+    baro["time_us"] = START_US + np.arange(1, len(baro) + 1) * 100_000
+    baro["innov"][:, 0], baro["innov_var"][:, 0] = rng.normal(0.0, 0.2, len(baro)), 0.4**2
+    output["estimate"]["time_us"] = START_US
+    some = np.zeros(len(baro), bool)
+    if spoil == "settling":
+        some = baro["time_us"] <= START_US + SETTLE_US
+    elif spoil == "resets":
+        some[::10] = baro["is_reset"][::10] = True
+    elif spoil == "rest":
+        some = (baro["time_us"] > START_US + 40_000_000) & (baro["time_us"] < START_US + 70_000_000)
+        events["rest"] = np.zeros(30 * 25, EVENT_DTYPE)
+        events["rest"]["time_us"] = START_US + 40_000_000 + np.arange(30 * 25) * 40_000
+    elif spoil == "outliers":
+        some[::100] = True
+    baro["innov"][some, 0] = 0.0 if spoil == "rest" else 5.0
+    events["baro"] = baro
+    found = found_noise(Replay(output, events, 0))
+    assert found.keys() == {"baro"}
+    assert found["baro"].std == pytest.approx(0.2, rel=0.08)
+    assert found["baro"].scale == pytest.approx(0.5, rel=0.08)
+
+
+def test_answers_are_not_compared_inside_a_gap_of_ours():
+    estimate = np.zeros(100, row_dtype(Estimate))
+    estimate["time_us"] = START_US + np.arange(100) * 20_000 + (np.arange(100) >= 50) * 900_000
+    estimate["flags"] = POSITION_VALID | VELOCITY_VALID
+    estimate["vel_ned"][50:] = 10.0  # it flew on in the gap
+    times = START_US + np.arange(290) * 10_000
+    vel_ned = np.where(times[:, None] < estimate["time_us"][50], 0.0, np.full(3, 10.0))
+    q = np.tile([0.0, 0.0, 0.0, 1.0], (len(times), 1))
+    found = difference(estimate, Track("other", None, times, np.zeros((len(times), 3)), vel_ned, times, q), None)
+    assert found.largest.vel_m_s == 0.0
 
 
 def test_parameters_can_be_given(tmp_path, flight):

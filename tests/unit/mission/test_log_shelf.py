@@ -190,3 +190,17 @@ def test_a_disk_that_becomes_read_only_is_told_and_ends_no_flight(tmp_path, monk
     assert told == [f"log_{LOGS_KEPT_MAX + 1:05}.ulg ended: Read-only file system"]
     assert len(logs.logs()) == LOGS_KEPT_MAX
     assert stream.listeners == []
+
+
+def test_a_log_begun_between_two_writes_starts_with_the_first_row_that_it_gets(tmp_path):
+    flight = Flight(FlightConfig(world=BARE))
+    flight.run(lambda flight: flight.time_us >= 1_300_000)
+    records = []
+    header = flight.recorder.listen(records.append)
+    flight.run(lambda flight: flight.time_us >= 2_500_000)
+    flight.close()
+    (tmp_path / "log.ulg").write_bytes(header + b"".join(records))
+    log = ULog(str(tmp_path / "log.ulg"))
+    times_us = log.get_dataset("vehicle_attitude").data["timestamp"]
+    assert times_us[0] < 1_300_000
+    assert log.start_timestamp == times_us[0]
