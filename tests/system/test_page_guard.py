@@ -91,6 +91,22 @@ def test_names_of_this_machine_and_other_ports_of_tunnels_are_let_in(port, path)
         assert websocket_status(port, path, protocol=PROTOCOL, Host=host, Origin=f"http://{host}") == 101, host
 
 
+@pytest.mark.parametrize(
+    ("site", "mode", "dest", "expected"),
+    [
+        ("none", "navigate", "document", 200),
+        ("same-origin", "cors", "empty", 200),
+        ("cross-site", "navigate", "document", 200),  # a link that somebody follows
+        ("cross-site", "navigate", "iframe", 403),  # framed, its buttons could be clicked unseen
+        ("cross-site", "no-cors", "script", 403),
+        ("same-site", "cors", "empty", 403),
+    ],
+)
+def test_another_website_may_link_to_the_page_and_not_embed_it(port, path, site, mode, dest, expected):
+    headers = {"Sec-Fetch-Site": site, "Sec-Fetch-Mode": mode, "Sec-Fetch-Dest": dest}
+    assert status(port, f"{path}/", **headers) == expected
+
+
 def test_connections_beyond_the_bound_are_closed_and_the_page_answers_again(page, port, path):
     idle = [create_connection(("127.0.0.1", port)) for _ in range(300)]
     assert page.get_clients() == {}

@@ -10,6 +10,7 @@ from autopilot.params import parameter_table
 from common.state_folder import StateFolder
 from mission.flight import Flight, FlightConfig
 from mission.log_shelf import LOGS_KEPT_MAX, FlightLogs
+from mission.troubles import SILENCE_US, TOLD_MAX, Troubles
 from sim.world.world import WorldConfig
 
 BARE = WorldConfig(trees_per_ha=0.0)
@@ -204,3 +205,19 @@ def test_a_log_begun_between_two_writes_starts_with_the_first_row_that_it_gets(t
     times_us = log.get_dataset("vehicle_attitude").data["timestamp"]
     assert times_us[0] < 1_300_000
     assert log.start_timestamp == times_us[0]
+
+
+def test_troubles_are_told_once_and_of_many_kinds_few_are_remembered():
+    now_us = 0
+    troubles = Troubles(lambda: now_us)
+    for _ in range(20):
+        now_us += SILENCE_US // 10
+        troubles.note("flight.ulg ended")
+    assert troubles.take() == ["flight.ulg ended"]
+    for k in range(10 * TOLD_MAX):
+        troubles.note(f"photo {k} not stored")
+    assert len(troubles.take()) == 10 * TOLD_MAX
+    assert len(troubles._noted_us) <= TOLD_MAX
+    now_us += SILENCE_US + 1
+    troubles.note(f"photo {10 * TOLD_MAX - 1} not stored")
+    assert len(troubles.take()) == 1

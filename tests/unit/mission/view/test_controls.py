@@ -118,3 +118,15 @@ def test_a_restart_in_flight_puts_it_on_its_pad_with_a_full_battery_and_its_miss
     said_after(flight, view, 60.0, lambda: flight.drone.pos_ned[2] < -4.0)
     assert flight.controller.state.mode is Mode.MISSION
     flight.close()
+
+
+def test_a_restart_ends_what_a_button_began(page):
+    flight = Flight(FlightConfig(world=PLAIN))
+    view = LiveView(flight, page)
+    buttons(page)["Take off"]()
+    assert "waits: cannot be armed" in said_after(flight, view, 0.1)
+    buttons(page)["Restart"]()
+    said_after(flight, view, 12.0)
+    assert flight.controller.state.is_ready_to_arm
+    assert not flight.controller.state.is_armed
+    flight.close()
