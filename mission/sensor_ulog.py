@@ -111,6 +111,8 @@ class _Log:
                 self.ulog = ULog(_AdvancingStream(path.read_bytes()), TOPICS)
         except _DAMAGE as error:
             raise SensorLogError(f"{path}: damaged so that no ULog reader can follow it") from error
+        values = self.ulog.initial_parameters.items()  # bytes where the type is damaged
+        self.parameters = {name: float(value) for name, value in values if isinstance(value, int | float)}
 
     def topic(self, name: str, *needed: str) -> _Columns | None:
         """The first instance of a topic, if it was logged with the needed fields."""
@@ -126,7 +128,7 @@ class _Log:
 
     def delay_s(self, name: str, default_ms: float = 0.0) -> float:
         """A delay parameter of the log."""
-        value_ms = float(self.ulog.initial_parameters.get(name, default_ms))
+        value_ms = self.parameters.get(name, default_ms)
         return (value_ms if 0.0 <= value_ms <= MAX_DELAY_MS else default_ms) * 1e-3
 
 
@@ -153,7 +155,7 @@ def read_ulog(path: Path, *, ignores_velocity_flag: bool = False) -> Recording:
         mag=_mag(log),
         range=_range(log),
         is_own=is_own,
-        parameters={name: float(value) for name, value in log.ulog.initial_parameters.items()},
+        parameters=log.parameters,
         gnss_delay_s=gnss_delay_s,
         notes=notes,
     )

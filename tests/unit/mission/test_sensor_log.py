@@ -206,6 +206,17 @@ def test_a_damaged_log_is_refused_or_read(tmp_path):
     assert outcomes == {"read", "refused"}
 
 
+def test_a_parameter_of_a_damaged_type_is_left_out(tmp_path):
+    path = tmp_path / "flight.ulg"
+    write_ulog(path, px4_tables(Flight(3.0)))
+    content = path.read_bytes()
+    for name in (b"EKF2_MAG_NOISE", b"EKF2_GPS_DELAY"):
+        path.write_bytes(content.replace(b"float " + name, b"fl\xbfat " + name, 1))
+        recording = read_ulog(path)
+        assert name.decode() not in recording.parameters
+        assert len(recording.parameters) == 1
+
+
 def test_a_csv_gives_what_the_log_gives(tmp_path, flight):
     path = tmp_path / "flight.csv"
     path.write_text("\n".join(csv_lines(flight)))
