@@ -20,6 +20,7 @@ from mission.options import FlightOptions
 from mission.plan import Plan
 from mission.plots import plot_flight
 from mission.progress import TABLE_PERIOD_S, Progress
+from mission.recorder import History
 from mission.run_folder import OwnFiles
 from mission.script import fly_plan
 from mission.summary import Summary, curved_items, planned_path, summarise
@@ -53,10 +54,11 @@ def fly_to_the_end(
     advance(flight, _end(options, speed, running), speed, watchers, Progress(flight, running), console)
     if page is not None:
         view.end(f"flight ended: logs in {folder}")
+    history = flight.close()  # before what takes long: who is to stop may be killed soon
     files = OwnFiles(folder, console)
     with files.writing(REPLAY_FILE):
         recorder.recording().save(folder)
-    exit_code = _finish(flight, running, plan, path_ned, folder, files, console)
+    exit_code = _finish(flight, history, running, plan, path_ned, folder, files, console)
     if page is not None:
         view.close()
     return exit_code
@@ -139,6 +141,7 @@ def _signals_interrupt() -> Iterator[None]:
 
 def _finish(
     flight: Flight,
+    history: History,
     running: Running | None,
     plan: Plan | None,
     path_ned: list[tuple[int, Any]],
@@ -146,8 +149,7 @@ def _finish(
     files: OwnFiles,
     console: Console,
 ) -> int:
-    """Writes the run folder and prints the summary; returns the exit code."""
-    history = flight.close()
+    """Writes the rest of the run folder and prints the summary; returns the exit code."""
     for trouble in flight.troubles.take():
         print_line(console, trouble)
     if len(history.time_us) == 0:

@@ -1,13 +1,15 @@
 """What `honeyguide fly` does round a flight."""
 
 import gc
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
 from mission.flight import Flight, FlightConfig
-from mission.flying import advance
+from mission.flying import advance, fly_to_the_end
 from mission.progress import Progress
+from mission.view.recording import Recording
 
 OBJECTS_MAX = 50_000  # a full collection of so many takes a few milliseconds; a program that is loaded has 350,000
 
@@ -24,3 +26,13 @@ def test_no_frame_waits_for_the_garbage_of_all_that_was_loaded():
     watch = [lambda: counts.append(len(gc.get_objects()))]
     advance(flight, lambda _: flight.time_us >= 200_000, None, watch, Progress(flight, None), Console(quiet=True))
     assert 0 < max(counts) < OBJECTS_MAX
+
+
+@pytest.mark.usefixtures("unfrozen")
+def test_the_logs_are_complete_before_the_recording_of_a_long_flight_is_packed(tmp_path, monkeypatch):
+    found = []
+    monkeypatch.setattr(Recording, "save", lambda _, folder: found.extend(path.name for path in folder.iterdir()))
+    options = SimpleNamespace(seconds=0.2, once=False)
+    flight = Flight(FlightConfig(), folder=tmp_path)
+    assert fly_to_the_end(flight, None, options, None, None, tmp_path, Console(quiet=True)) == 0
+    assert {"flight.ulg", "flight.tlog"} <= set(found)
