@@ -98,9 +98,9 @@ def write_durably(target: Path, content: bytes, mode: int = 0o666) -> None:
         os.close(folder)
 
 
-def write_to_nowhere() -> None:
-    """From now on what is written to standard output and standard error is lost, and fails no more."""
+def write_to_nowhere(*descriptors: int) -> None:
+    """From now on what is written there is lost, and fails no more: standard output is 1, standard error 2."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    for descriptor in (1, 2):
+    for descriptor in descriptors:
         os.dup2(nowhere, descriptor)
     os.close(nowhere)

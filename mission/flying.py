@@ -125,7 +125,7 @@ def _signals_interrupt() -> Iterator[None]:
         raise KeyboardInterrupt
 
     def hang_up(*_: object) -> NoReturn:
-        write_to_nowhere()
+        write_to_nowhere(1, 2)
         raise KeyboardInterrupt
 
     before = {

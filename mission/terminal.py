@@ -1,21 +1,31 @@
 """What a command shows on the terminal: whole lines, and what it is busy with while nothing else can be seen."""
 
+import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import Event, Thread
 
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from common.clock import wall_time_s
+from common.files import write_to_nowhere
 
 LINE_PERIOD_S = 5.0  # between lines where there is no terminal
 Say = Callable[[str], None]
 
 
 def print_line(console: Console, text: str) -> None:
-    """One line however narrow the console is, at once also into a pipe: rich flushes."""
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    """One line however narrow the console is, at once also into a pipe: rich flushes.
+
+    Where it cannot be written, as into a file on a full disk, this and what follows is lost: no flight ends by it.
+    """
+    try:
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+    except OSError as error:
+        write_to_nowhere(1)
+        with suppress(OSError):
+            print(f"honeyguide: nothing more is printed: {error.strerror}", file=sys.stderr)
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from rich.live import Live
 from autopilot.mavlink.client_links import open_client_link
 from autopilot.mavlink.links import LinkError
 from common.clock import Pacer, wall_time_s
+from mission.terminal import print_line
 from policies.companion.camera import CameraUrlError, StreamCamera
 from policies.companion.companion import NO_PICTURES, Companion
 from policies.companion.pilot import PilotError, load_pilot
@@ -84,7 +85,7 @@ def _loop(companion: Companion, camera: StreamCamera, seconds: float | None, con
 
 def _shower(console: Console) -> Callable[[str], None]:
     def show(text: str) -> None:
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        print_line(console, text)
 
     return show
 

@@ -1,6 +1,9 @@
 """What a command shows while nothing else can be seen, on a terminal and without one."""
 
+import subprocess
+import sys
 from io import StringIO
+from pathlib import Path
 from threading import Event
 
 import pytest
@@ -10,6 +13,17 @@ from autopilot.vehicle import Severity
 from mission import terminal
 from mission.terminal import busy
 from mission.texts import KEPT, Texts
+
+
+def test_lines_into_a_file_on_a_full_disk_are_lost_and_end_nothing():
+    script = (
+        "from rich.console import Console; from mission.terminal import print_line; console = Console()\n"
+        "print_line(console, 'one'); print_line(console, 'two'); console.print('three')"
+    )
+    with Path("/dev/full").open("wb") as full:
+        result = subprocess.run([sys.executable, "-c", script], stdout=full, stderr=subprocess.PIPE, check=False)
+    assert result.stderr == b"honeyguide: nothing more is printed: No space left on device\n"
+    assert result.returncode == 0
 
 
 def test_without_a_terminal_the_first_line_comes_at_once():
