@@ -106,6 +106,15 @@ def test_smooth_vehicle_is_at_rest_before_it_departs_and_not_while_it_moves(slow
         assert not is_still[int((DEPARTURE_S + 10.0) * TICKS) :].any(), label
 
 
+def test_velocity_is_uncertain_at_once_when_rest_ends(slow_motions: Any) -> None:
+    for label, _, trace in slow_motions:
+        is_still, vel_std = trace["stillness"]["is_still"], trace["estimate"]["vel_std"]
+        ends = np.flatnonzero((is_still[TICKS:-10] == 1) & (is_still[TICKS + 1 : -9] == 0)) + TICKS
+        assert len(ends), label
+        for end in ends:
+            assert vel_std[end + 1 : end + 9].max() >= 0.1 > vel_std[end], label
+
+
 def test_rest_is_found_again_after_a_smooth_drive() -> None:
     stop_s = 25.0
     path = straight((0.4, 0.0, 0.0), 2.0, stop_s)
