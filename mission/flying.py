@@ -115,6 +115,8 @@ def advance(
             flight.run(is_over, speed=speed, on_frame=on_frame)
     except KeyboardInterrupt:
         console.print("stopped by the user")
+    except SystemExit:  # rich's: who read what is printed has gone, which is as a terminal that was closed
+        write_to_nowhere(1)
 
 
 @contextmanager

@@ -1,6 +1,9 @@
 """What `honeyguide fly` does round a flight."""
 
 import gc
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -36,3 +39,16 @@ def test_the_logs_are_complete_before_the_recording_of_a_long_flight_is_packed(t
     flight = Flight(FlightConfig(), folder=tmp_path)
     assert fly_to_the_end(flight, None, options, None, None, tmp_path, Console(quiet=True)) == 0
     assert {"flight.ulg", "flight.tlog"} <= set(found)
+
+
+@pytest.mark.slow
+def test_a_reader_who_goes_ends_the_flight_with_its_logs_complete(tmp_path):
+    honeyguide = Path(sys.executable).with_name("honeyguide")
+    command = [honeyguide, "fly", "--idle", "--speed", "max", "--seconds", "100000", "--run-folder", tmp_path]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as flight:
+        while b" s  " not in flight.stdout.readline():  # until the vehicle has said something
+            pass
+        flight.stdout.close()
+        assert flight.stderr.read() == b""
+        assert flight.wait(60.0) == 0
+    assert {"flight.ulg", "flight.tlog", "summary.json"} <= {path.name for path in tmp_path.iterdir()}
