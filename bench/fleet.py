@@ -41,12 +41,12 @@ def check(rig: Rig, *, has_estimator: bool) -> None:
         WrongResult: one does not.
     """
     target = np.array([0.0, 0.0, -HEIGHT_M])
-    body = rig.arrays.body.numpy()
-    require(not body["is_crashed"].any(), "a vehicle has crashed")
-    error = np.linalg.norm(body["pos_ned"] - target, axis=1)
+    truth = rig.rows["truth"]
+    require(not truth["is_crashed"].any(), "a vehicle has crashed")
+    error = np.linalg.norm(truth["pos_ned"] - target, axis=1)
     require(error.max() < (5.0 if has_estimator else 0.5), f"a vehicle is {error.max():.2f} m from its place")
     if has_estimator:
-        estimate = rig.arrays.autopilot.ekf.rows.numpy()["estimate"]["pos_ned"]
+        estimate = rig.rows["autopilot.ekf.rows"]["estimate"]["pos_ned"]
         error = np.linalg.norm(estimate - target, axis=1)
         require(error.max() < 1.0, f"a vehicle is {error.max():.2f} m from its place by its own estimate")
 
@@ -82,7 +82,7 @@ def _rig(vehicle_count: int, has_estimator: bool, threads: int) -> Rig:
 def _hovers(has_estimator: bool) -> Rig:
     rig = _rig(_SEED_COUNT, has_estimator, 1)
     rig.advance(_ALIGN_TICKS)
-    rows = rig.arrays.autopilot.setpoint.numpy()
+    rows = rig.rows["autopilot.setpoint"]
     for i in range(_SEED_COUNT):
         port = SetpointPort(rows[i : i + 1])
         port.set_flags(is_armed=True, is_landed=False)

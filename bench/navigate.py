@@ -106,7 +106,7 @@ def fly(policy: Policy, task: Navigate) -> Flights:
     memory = policy.start_memory(count)
     with few_threads(), torch.inference_mode():
         for _ in range(LONGEST):
-            pos_ned = task.rig.arrays.body.numpy()["pos_ned"]
+            pos_ned = task.rig.truth.numpy()["pos_ned"]
             for i, path in enumerate(paths):
                 if outcomes[i] == Outcome.RUNNING:
                     path.append(pos_ned[i, :2].astype(np.float64))

@@ -143,7 +143,7 @@ class Flight:
             on_reboot=self._reboot,
             injector=self.injector,
             host=self.host,
-            turntable=Turntable(self.rig.arrays.body.numpy()),
+            turntable=Turntable(self.rig.rows["body"]),
             on_corrections=lambda _: self._surroundings.receiver.correct(self.time_us),
         )
         ring = RingSensor(self.rig, self.world, config.noise, config.seed) if config.has_lidar else None
@@ -310,12 +310,12 @@ class Flight:
         air = flight_wind(speed_m_s, from_deg)
         air.turbulence_w_std = turbulence_m_s
         air.gust_m_s = GUST_SHARE / TURBULENCE_SHARE * turbulence_m_s
-        self.rig.arrays.wind_model.fill_(air)
+        self.rig.set_air(air)
 
     @property
     def is_crashed(self) -> bool:
         """The truth: it struck something too fast, or a turning rotor struck the ground."""
-        return bool(self.rig.arrays.body.numpy()["is_crashed"][0])
+        return bool(self.rig.rows["truth"]["is_crashed"][0])
 
     def restart(self) -> None:
         """Puts the vehicle back on its pad, whole and with a full battery, and restarts its flight controller.
@@ -378,15 +378,15 @@ def host_files(folder: Path | None, state: StateFolder | None) -> ConfinedFolder
 
 def host_ports(rig: Rig, airframe: Airframe, i_vehicle: int = 0) -> HostPorts:
     """The connectors of one vehicle's flight controller, on the live rows of a rig."""
-    autopilot = rig.arrays.autopilot
-    estimator = autopilot.ekf.rows.numpy()
+    rows, chosen = rig.rows, slice(i_vehicle, i_vehicle + 1)
+    estimator = rows["autopilot.ekf.rows"]
     return HostPorts(
         read_estimate=row_reader(estimator, i_vehicle, "Estimate", "estimate"),
-        read_samples=row_reader(rig.arrays.sensors.numpy(), i_vehicle, "Samples", "samples"),
-        read_actuators=row_reader(autopilot.control.numpy(), i_vehicle, "Actuators", "actuators"),
+        read_samples=row_reader(rows["sensors"], i_vehicle, "Samples", "samples"),
+        read_actuators=row_reader(rows["autopilot.control"], i_vehicle, "Actuators", "actuators"),
         read_health=row_reader(estimator, i_vehicle, "EstimatorState"),
-        setpoint=autopilot.setpoint.numpy()[i_vehicle : i_vehicle + 1],
-        read_rotor_speeds=esc_reader(rig.arrays.body.numpy(), i_vehicle),
-        external=autopilot.ekf.external.numpy()[i_vehicle : i_vehicle + 1],
-        leave_out=rotors_leaver(autopilot.airframe.numpy()[i_vehicle : i_vehicle + 1], airframe),
+        setpoint=rows["autopilot.setpoint"][chosen],
+        read_rotor_speeds=esc_reader(rows["truth"], i_vehicle),
+        external=rows["autopilot.ekf.external"][chosen],
+        leave_out=rotors_leaver(rows["autopilot.airframe"][chosen], airframe),
     )

@@ -58,8 +58,8 @@ class RigInjector:
     """
 
     def __init__(self, rig: Rig, airframe: Airframe, noise: float, i_vehicle: int = 0) -> None:
-        self._faults = rig.arrays.faults.numpy()[i_vehicle]
-        self._body = rig.arrays.body.numpy()[i_vehicle : i_vehicle + 1]
+        self._faults = rig.rows["faults"][i_vehicle]
+        self._body = rig.rows["body"][i_vehicle : i_vehicle + 1]
         self._battery = battery_model(airframe)
         self._capacity_c = 3.6 * airframe.battery.capacity_mah
         self._rotor_count = len(airframe.rotors)

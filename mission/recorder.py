@@ -102,20 +102,20 @@ class Recorder:
         airframe: Airframe,
         on_trouble: Callable[[str], None],
     ) -> None:
-        autopilot = rig.arrays.autopilot
+        live = rig.rows
         self._controller = controller
         self._time_us: list[int] = []
         self._status: list[tuple[int | float, ...]] = []
         self._mission_reached = -1
-        self._body = _RawRow(rig.arrays.body.numpy())
-        self._sensors = _RawRow(rig.arrays.sensors.numpy())
-        self._control = _RawRow(autopilot.control.numpy())
-        self._estimator = _RawRow(autopilot.ekf.rows.numpy())
-        self._yaw = _RawRow(autopilot.ekf.yaw.numpy())
-        self._imu_ring = _RawRow(autopilot.ekf.imu_ring.numpy())
-        imu_model = rig.arrays.sensor_model.numpy()["imu"][0]
+        self._truth = _RawRow(live["truth"])
+        self._sensors = _RawRow(live["sensors"])
+        self._control = _RawRow(live["autopilot.control"])
+        self._estimator = _RawRow(live["autopilot.ekf.rows"])
+        self._yaw = _RawRow(live["autopilot.ekf.yaw"])
+        self._imu_ring = _RawRow(live["autopilot.ekf.imu_ring"])
+        imu_model = live["sensor_model"]["imu"][0]
         self._imu_limits = (float(imu_model["gyro_limit"]), float(imu_model["accel_limit"]))
-        self._samples_before = np.zeros(1, dtype=rig.arrays.sensors.numpy()["samples"].dtype)
+        self._samples_before = np.zeros(1, dtype=live["sensors"]["samples"].dtype)
         self._judged_us = dict.fromkeys(AIDS, 0)
         self._in_band = {name: [0, 0] for name in AIDS}
         self._choice = FrameChoice()
@@ -156,7 +156,7 @@ class Recorder:
                 state.battery_used_mah,
             )
         )
-        for rows in (self._body, self._sensors, self._control, self._estimator, self._yaw, self._imu_ring):
+        for rows in (self._truth, self._sensors, self._control, self._estimator, self._yaw, self._imu_ring):
             rows.copy()
         if len(self._time_us) >= FLUSH_FRAMES:
             self.flush()
@@ -195,7 +195,7 @@ class Recorder:
             actuators=self._control.take()["actuators"],
             health=estimator,
             yaw=self._yaw.take(),
-            body=self._body.take(),
+            truth=self._truth.take(),
             vehicle=status,
             origin=self._controller.state.origin,
         )
@@ -278,12 +278,12 @@ class Recorder:
 
 def _history(batch: Batch) -> Rows:
     """The frames as rows of HISTORY."""
-    estimate, body, status = batch.estimate, batch.body, batch.vehicle
+    estimate, truth, status = batch.estimate, batch.truth, batch.vehicle
     rows = np.empty(len(batch.time_us), HISTORY)
     rows["time_us"] = batch.time_us
-    rows["pos_ned_true"] = body["pos_ned"]
-    rows["vel_ned_true"] = body["vel_ned"]
-    rows["q_true"] = body["q_ned_from_frd"]
+    rows["pos_ned_true"] = truth["pos_ned"]
+    rows["vel_ned_true"] = truth["vel_ned"]
+    rows["q_true"] = truth["q_ned_from_frd"]
     rows["pos_ned_est"] = estimate["pos_ned"]
     rows["vel_ned_est"] = estimate["vel_ned"]
     rows["q_est"] = estimate["q_ned_from_frd"]

@@ -45,7 +45,7 @@ class Surroundings:
         controller.payload.add(Gripper())
         controller.payload.add(winch)
         state.read_winch = winch.status
-        controller.host.read_truth = row_reader(rig.arrays.body.numpy(), 0, "BodyState")
+        controller.host.read_truth = row_reader(rig.rows["truth"], 0, "Truth")
 
     def frame(self, time_us: int) -> None:
         """What happens by itself; before the flight controller's frame."""

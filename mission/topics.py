@@ -39,13 +39,13 @@ class Batch:
     actuators: Rows  # Actuators
     health: Rows  # EstimatorState
     yaw: Rows  # YawEstimator
-    body: Rows  # BodyState, the truth
+    truth: Rows  # Truth
     vehicle: Rows  # STATUS_DTYPE of mission.flight_log
     origin: GeoPoint
 
     def only(self, frames: Rows | slice, samples_before: Rows) -> "Batch":
         """Some of the frames; `samples_before` as of the frame before the first of them."""
-        names = ("time_us", "estimate", "samples", "actuators", "health", "yaw", "body", "vehicle")
+        names = ("time_us", "estimate", "samples", "actuators", "health", "yaw", "truth", "vehicle")
         return replace(self, samples_before=samples_before, **{name: getattr(self, name)[frames] for name in names})
 
 
@@ -82,7 +82,7 @@ def _attitude(batch: Batch) -> Columns:
 
 
 def _attitude_true(batch: Batch) -> Columns:
-    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "q": wxyz(batch.body["q_ned_from_frd"])}
+    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "q": wxyz(batch.truth["q_ned_from_frd"])}
 
 
 def _rates(batch: Batch) -> Columns:
@@ -91,7 +91,7 @@ def _rates(batch: Batch) -> Columns:
 
 
 def _rates_true(batch: Batch) -> Columns:
-    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "xyz": batch.body["omega_frd"]}
+    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "xyz": batch.truth["omega_frd"]}
 
 
 REFERENCE_FIELDS = {"ref_lat": "double", "ref_lon": "double", "ref_alt": "float"}
@@ -138,14 +138,14 @@ def _local_position(batch: Batch) -> Columns:
 
 
 def _local_position_true(batch: Batch) -> Columns:
-    body = batch.body
+    truth = batch.truth
     return {
         "timestamp": batch.time_us,
         "timestamp_sample": batch.time_us,
-        **_axes("x y z", body["pos_ned"]),
-        **_axes("vx vy vz", body["vel_ned"]),
-        "heading": yaw_rad(body["q_ned_from_frd"]),
-        "dist_bottom": body["height_agl_m"],
+        **_axes("x y z", truth["pos_ned"]),
+        **_axes("vx vy vz", truth["vel_ned"]),
+        "heading": yaw_rad(truth["q_ned_from_frd"]),
+        "dist_bottom": truth["height_agl_m"],
         **_reference(batch.origin),
     }
 

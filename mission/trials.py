@@ -145,14 +145,14 @@ def fault_trial(config: FlightConfig, sensor: str, mode: str, at_item: int = 2) 
     """The default mission with a sensor that fails when item `at_item` becomes current, until it is disarmed."""
     flight = Flight(config)
     plan = read_plan(DEFAULT_PLAN)
-    faults = flight.rig.arrays.faults.numpy()
-    body = flight.rig.arrays.body.numpy()
+    faults = flight.rig.rows["faults"]
+    truth = flight.rig.rows["truth"]
     failed_at_ned = np.zeros(3)
 
     async def script(drone: Drone) -> float:
         mission = drone.start(fly_plan(drone, plan))
         await drone.until(lambda: flight.controller.state.mission_current >= at_item, 120.0, f"item {at_item}")
-        failed_at_ned[:] = body["pos_ned"][0]
+        failed_at_ned[:] = truth["pos_ned"][0]
         set_fault(faults[0], sensor, mode)
         await drone.until(lambda: not drone.is_armed, 400.0, "the end of the flight")
         await drone.sleep(2.0)
@@ -163,7 +163,7 @@ def fault_trial(config: FlightConfig, sensor: str, mode: str, at_item: int = 2) 
     is_finished = plan.items[-1].seq in flight.drone.reached
     history = flight.close()
     upright = _cos_tilt(history.q_true)
-    is_standing = upright[-1] > UPRIGHT_COSINE and not bool(body["is_crashed"][0])
+    is_standing = upright[-1] > UPRIGHT_COSINE and not bool(truth["is_crashed"][0])
     drift = history.pos_ned_true[-1] - failed_at_ned
     return FaultFigures(
         is_disarmed_upright=running.error is None and is_standing,

@@ -12,22 +12,13 @@ import warp as wp
 from autopilot.advance import Autopilot
 from autopilot.control.control import ControlState, control_tick
 from autopilot.estimator.ekf import estimator_reset, estimator_step
-from autopilot.ports import (
-    HEIGHT_VALID,
-    POSITION_VALID,
-    TILT_ALIGNED,
-    VELOCITY_VALID,
-    YAW_ALIGNED,
-    BatterySample,
-    Estimate,
-    Setpoint,
-    contact,
-)
-from common.kernels import GRAVITY_M_S2, TICK_S, tick_end_us
+from autopilot.ports import Setpoint, contact
+from common.kernels import TICK_S
 from common.rng import draw_tick
-from sim.bodies.multirotor import BodyState, MultirotorModel, body_at_rest, body_tick
+from sim.bodies.multirotor import BodyState, MultirotorModel, body_at_rest, body_tick, truth_of
 from sim.faults import Faults, weakened
 from sim.sensors.sensors import SensorModel, SensorState, sense
+from sim.truth import Truth, true_battery, true_estimate
 from sim.wind import WindModel, WindState, wind_step
 from sim.world.world import World, ground_height
 
@@ -44,6 +35,7 @@ class RigArrays:
     seed: wp.array(dtype=int)
     model: wp.array(dtype=MultirotorModel)
     body: wp.array(dtype=BodyState)
+    truth: wp.array(dtype=Truth)
     wind_model: wp.array(dtype=WindModel)
     wind: wp.array(dtype=WindState)
     sensor_model: wp.array(dtype=SensorModel)
@@ -53,28 +45,10 @@ class RigArrays:
 
 
 @wp.func
-def true_estimate(body: BodyState, tick: wp.int64) -> Estimate:
-    """The true state in the place of an estimate."""
-    estimate = Estimate()
-    estimate.time_us = tick_end_us(tick)
-    estimate.flags = TILT_ALIGNED | YAW_ALIGNED | VELOCITY_VALID | POSITION_VALID | HEIGHT_VALID
-    estimate.q_ned_from_frd = body.q_ned_from_frd
-    estimate.omega_frd = body.omega_frd
-    estimate.accel_frd = body.accel_frd
-    estimate.vel_ned = body.vel_ned
-    estimate.pos_ned = body.pos_ned
-    estimate.accel_ned = wp.quat_rotate(body.q_ned_from_frd, body.accel_frd) + wp.vec3(0.0, 0.0, GRAVITY_M_S2)
-    return estimate
-
-
-@wp.func
-def true_battery(body: BodyState, tick: wp.int64) -> BatterySample:
-    """The true battery in the place of a sample."""
-    battery = BatterySample()
-    battery.time_us = tick_end_us(tick)
-    battery.voltage_v = body.battery_voltage_v
-    battery.current_a = body.battery_current_a
-    return battery
+def forget_impacts(rig: RigArrays, i: int) -> None:
+    """From now on only what vehicle i touches from now on counts."""
+    rig.body[i].impact_speed = 0.0
+    rig.truth[i].impact_speed = 0.0
 
 
 @wp.func
@@ -94,7 +68,9 @@ def boot(rig: RigArrays, chosen: wp.array(dtype=int)) -> None:
         return
     model = rig.model[i]
     down = -ground_height(rig.worlds[rig.i_world[i]], 0.0, 0.0) - model.contact.leg_frd[2]
-    rig.body[i] = body_at_rest(model, wp.vec3(0.0, 0.0, down), 0.0)
+    body = body_at_rest(model, wp.vec3(0.0, 0.0, down), 0.0)
+    rig.body[i] = body
+    rig.truth[i] = truth_of(body)
     rig.wind[i] = WindState()
     power_on(rig, i)
 
@@ -103,6 +79,12 @@ def boot(rig: RigArrays, chosen: wp.array(dtype=int)) -> None:
 def reboot(rig: RigArrays, i_vehicle: int) -> None:
     """Powers the sensors and the flight controller of one vehicle off and on, wherever it is."""
     power_on(rig, i_vehicle)
+
+
+@wp.kernel(enable_backward=False)
+def forget_all_impacts(rig: RigArrays) -> None:
+    """What vehicles met before, the ground they took off from above all, counts no more."""
+    forget_impacts(rig, wp.tid())
 
 
 def make_advance(has_estimator: bool) -> Any:
@@ -130,19 +112,21 @@ def make_advance(has_estimator: bool) -> Any:
             wind = wind_step(wind_model, wind, body.vel_ned, height, seed, i, count, TICK_S)
             command = weakened(control.actuators.command, motor_loss)
             body = body_tick(model, body, command, wind.wind_ned, world)
+            truth = truth_of(body)
             if wp.static(has_estimator):
-                sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], body, world, seed, i, tick)
+                sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], truth, world, seed, i, tick)
                 estimator_step(rig.autopilot.ekf, i, sensors.samples, contact(setpoint))
                 estimate = rig.autopilot.ekf.rows[i].estimate
             else:
-                sensors.samples.battery = true_battery(body, tick)
-                estimate = true_estimate(body, tick)
+                sensors.samples.battery = true_battery(truth, tick)
+                estimate = true_estimate(truth, tick)
             control = control_tick(
                 params, airframe, control, estimate, setpoint, sensors.samples.battery, draw_tick(tick)
             )
             tick += wp.int64(1)
         rig.tick[i] = tick
         rig.body[i] = body
+        rig.truth[i] = truth_of(body)
         rig.wind[i] = wind
         rig.sensors[i] = sensors
         rig.autopilot.control[i] = control

@@ -28,7 +28,7 @@ class CameraRig:
     """
 
     def __init__(self, rig: Rig, world: WorldMap, *, has_thread: bool = False, i_vehicle: int = 0) -> None:
-        self._body = rig.arrays.body.numpy()  # the live rows
+        self._truth = rig.rows["truth"]  # the live rows
         self._world = world
         self._i_vehicle = i_vehicle
         self._pool = ThreadPoolExecutor(1, "camera") if has_thread else None
@@ -49,7 +49,7 @@ class CameraRig:
 
     def pose(self, view: View) -> CameraPose:
         """Where the lens truly is now."""
-        row = self._body[self._i_vehicle]
+        row = self._truth[self._i_vehicle]
         x, y, z, w = (float(value) for value in row["q_ned_from_frd"])
         q = (x, y, z, w)
         north, east, down = (float(a) + b for a, b in zip(row["pos_ned"], rotated(q, MOUNT_FRD), strict=True))

@@ -1,7 +1,8 @@
 """The test rig: world, vehicles and their flight controllers' kernel part, advanced together.
 
-In: setpoints, written into the rows of `arrays.autopilot.setpoint`. Out: the true state, the samples and the estimates,
-as rows of the other arrays. One call of `advance` is one launch per thread, for one vehicle or thousands.
+In: setpoints. Out: the true state, the samples and the estimates. The host reads and writes them as `rows`; kernels of
+tasks take `arrays`, whose rows they read, and of which they write setpoints alone. One call of `advance` is one launch
+per thread, for one vehicle or thousands.
 """
 
 from functools import cache
@@ -21,10 +22,12 @@ from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.params import ParameterTable
-from sim.advance import RigArrays, boot, make_advance, reboot
+from sim.advance import RigArrays, boot, forget_all_impacts, make_advance, reboot
 from sim.bodies.multirotor import BodyState, MultirotorModel, multirotor_model
 from sim.faults import Faults
+from sim.rows import HostRows
 from sim.sensors.sensors import SensorModel, SensorState
+from sim.truth import Truth
 from sim.wind import WindModel, WindState
 from sim.workers import Workers
 from sim.world.batch import WorldBatch
@@ -49,6 +52,7 @@ class Rig:
         has_estimator: False gives the controller the true state (training only).
         threads: the vehicles are split into as many launches; the results do not depend on it.
         device: a Warp device.
+        has_mirrors: the host sees copies of the rows, as those of a GPU.
     """
 
     def __init__(
@@ -64,6 +68,7 @@ class Rig:
         has_estimator: bool = True,
         threads: int = 1,
         device: str = "cpu",
+        has_mirrors: bool = False,
     ) -> None:
         self.vehicle_count = vehicle_count
         self.device = device
@@ -75,6 +80,7 @@ class Rig:
         model = multirotor_model(airframe, home.alt_m)
         self.arrays.model = self._rows(MultirotorModel, model)
         self.arrays.body = self._rows(BodyState, BodyState())
+        self.arrays.truth = self._rows(Truth, Truth())
         self.arrays.wind_model = self._rows(WindModel, wind_model)
         self.arrays.wind = self._rows(WindState, WindState())
         self.arrays.sensor_model = self._rows(SensorModel, sensor_model)
@@ -82,15 +88,46 @@ class Rig:
         self.arrays.faults = self._rows(Faults, Faults())
         self.arrays.autopilot = self._autopilot(airframe)
         self._field_ned_gauss = field_ned_gauss(home.lat_deg, home.lon_deg, home.alt_m)
+        self.rows = HostRows(self.arrays, is_mirrored=has_mirrors or wp.get_device(device).is_cuda)
         self._commands: dict[int, list[Any]] = {}
         self._kernel = advance_kernel(has_estimator=has_estimator)
         self._workers = Workers(vehicle_count, threads)
         self.boot()
 
+    @property
+    def truth(self) -> Any:
+        """`Truth` of each vehicle, an array of the device, (vehicles,)."""
+        return self.arrays.truth
+
+    @property
+    def models(self) -> Any:
+        """`MultirotorModel` of each vehicle, an array of the device, (vehicles,)."""
+        return self.arrays.model
+
+    @property
+    def setpoints(self) -> Any:
+        """`Setpoint` of each vehicle, an array of the device, (vehicles,)."""
+        return self.arrays.autopilot.setpoint
+
+    def truth_row(self, i_vehicle: int = 0) -> Any:
+        """The `Truth` of one vehicle now, a structured NumPy value."""
+        return self.arrays.truth[i_vehicle : i_vehicle + 1].numpy()[0]
+
+    def set_air(self, wind_model: WindModel) -> None:
+        """From now on all vehicles fly in this air."""
+        self.arrays.wind_model.fill_(wind_model)
+
+    def forget_impacts(self) -> None:
+        """Only what the vehicles touch from now on counts."""
+        wp.launch(forget_all_impacts, dim=self.vehicle_count, inputs=[self.arrays], device=self.device)
+        self.rows.fetch()
+
     def advance(self, tick_count: int) -> None:
         """Advances every vehicle by `tick_count` ticks of 4 ms."""
+        self.rows.send()
         commands = self.prepare(tick_count)
         self._workers.run(lambda k: commands[k].launch())
+        self.rows.fetch()
 
     def prepare(self, tick_count: int) -> list[Any]:
         """Compiles or loads the kernel for `advance(tick_count)`, so that the first advance takes no longer."""
@@ -104,6 +141,7 @@ class Rig:
         mask = np.ones(self.vehicle_count, dtype=np.int32) if chosen is None else chosen.astype(np.int32)
         marks = wp.array(mask, dtype=int, device=self.device)
         wp.launch(boot, dim=self.vehicle_count, inputs=[self.arrays, marks], device=self.device)
+        self.rows.fetch()
 
     def snapshot(self) -> Snapshot:
         """A copy of all rows, to be restored in this rig or in another of as many vehicles."""
@@ -113,10 +151,12 @@ class Rig:
         """Puts every vehicle where the snapshot found it; of some vehicles, `sim.restore.RowRestore` does it."""
         for array, rows in zip(row_arrays(self.arrays), snapshot, strict=True):
             array.assign(rows)
+        self.rows.fetch()
 
     def reboot(self, i_vehicle: int = 0) -> None:
         """Powers the sensors and the flight controller of one vehicle off and on, wherever it is."""
         wp.launch(reboot, dim=1, inputs=[self.arrays, i_vehicle], device=self.device)
+        self.rows.fetch()
 
     def load_parameters(self, table: ParameterTable) -> None:
         """Gives every flight controller the values of a parameter table, and the magnetic field of the place."""

@@ -22,7 +22,7 @@ class RtkReceiver:
     """
 
     def __init__(self, rig: Rig, i_vehicle: int = 0) -> None:
-        self._row: Any = rig.arrays.sensor_model.numpy()[i_vehicle]["gnss"]
+        self._row: Any = rig.rows["sensor_model"][i_vehicle]["gnss"]
         self._plain = self._row.copy()
         self._until_us = -1  # -1: no corrections
 

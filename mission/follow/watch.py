@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from autopilot.vehicle import Mode
 from mission.flight import OUTSIDE_MODES, Flight
 from policies.companion.engagement import Phase
-from policies.tasks.follow_me.measuring import COLUMNS, forget_impacts, measure_rows
+from policies.tasks.follow_me.measuring import COLUMNS, measure_rows
 from policies.tasks.follow_me.observe import DECISION_S, HFOV_DEG, IMAGE_SIZE
 from policies.tasks.follow_me.track import Ranges, Track
 
@@ -108,7 +108,7 @@ class FollowWatch:
     def begin(self) -> None:
         """It is to follow from now on, whether it does or not; otherwise that begins by itself."""
         self._start_us = self._frame_us = self._flight.time_us
-        wp.launch(forget_impacts, 1, [self._flight.rig.arrays])
+        self._flight.rig.forget_impacts()
 
     def frame(self) -> None:
         """Looks for collisions, and takes a sample if one is due or the following is over."""
@@ -129,7 +129,7 @@ class FollowWatch:
             return
         if self._is_paused:
             self._is_paused = False
-            wp.launch(forget_impacts, 1, [self._flight.rig.arrays])
+            self._flight.rig.forget_impacts()
         self._judged_us += passed_us
         self._look(is_left=not is_following, is_time_up=is_time_up)
 

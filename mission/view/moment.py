@@ -98,13 +98,14 @@ def distances_m(rows: Any) -> Any:
 
 def moment_of(flight: Flight, action: Row | None = None) -> Moment:
     """The present instant of a flight, and what a policy on board chose last."""
-    body: Any = flight.rig.arrays.body.numpy()[0]
+    truth: Any = flight.rig.rows["truth"][0]
     state = flight.controller.state
     row = np.zeros((), MOMENT)
-    for name in ("pos_ned", "vel_ned", "q_ned_from_frd", "rotor_speed", "is_on_ground"):
-        row[name] = body[name]
+    for name in ("pos_ned", "vel_ned", "q_ned_from_frd", "is_on_ground"):
+        row[name] = truth[name]
+    row["rotor_speed"] = truth["motor_speed"]
     row["time_s"] = flight.time_us * 1e-6
-    row["height_m"] = body["height_agl_m"]
+    row["height_m"] = truth["height_agl_m"]
     row["battery"] = state.battery_remaining
     row["mode"], row["is_armed"] = state.mode, state.is_armed
     row["goal_ned"] = state.goal_ned

@@ -91,10 +91,10 @@ def observe(rig: RigArrays, actions: wp.array(dtype=wp.vec4), observations: wp.a
 def judge(rig: RigArrays, rewards: wp.array(dtype=float), is_lost: wp.array(dtype=wp.bool)) -> None:
     """How well the vehicle stays at the point, 1 at best, and whether it left the ball or touched the ground."""
     i = wp.tid()
-    body = rig.body[i]
-    distance = wp.length(body.pos_ned - HOVER_NED)
-    rewards[i] = 1.0 - distance / BALL_M - _RATE_COST * wp.length(body.omega_frd)
-    is_lost[i] = distance > BALL_M or body.is_on_ground == 1 or body.is_crashed == 1
+    truth = rig.truth[i]
+    distance = wp.length(truth.pos_ned - HOVER_NED)
+    rewards[i] = 1.0 - distance / BALL_M - _RATE_COST * wp.length(truth.omega_frd)
+    is_lost[i] = distance > BALL_M or truth.is_on_ground == 1 or truth.is_crashed == 1
 
 
 class HoverBatch:
@@ -112,7 +112,7 @@ class HoverBatch:
         self.is_lost: Flags = is_lost.numpy()
         self.step_counts = np.zeros(vehicle_count, dtype=np.int64)
         arrays = self.rig.arrays
-        self._act = _recorded(act, vehicle_count, [actions, arrays.autopilot.setpoint])
+        self._act = _recorded(act, vehicle_count, [actions, self.rig.setpoints])
         self._observe = _recorded(observe, vehicle_count, [arrays, actions, observations])
         self._judge = _recorded(judge, vehicle_count, [arrays, rewards, is_lost])
         sources, seeds = wp.zeros(vehicle_count, dtype=int), wp.zeros(vehicle_count, dtype=int)
@@ -234,7 +234,7 @@ def _bank() -> Rig:
     rig = _rig(START_COUNT, 0)
     rig.advance(_ALIGN_TICKS)
     rng = np.random.default_rng(0)
-    rows = rig.arrays.autopilot.setpoint.numpy()
+    rows = rig.rows["autopilot.setpoint"]
     for i in range(START_COUNT):
         north, east, down = np.array(HOVER_NED) + rng.uniform(-_START_SPREAD_M, _START_SPREAD_M, 3)
         port = SetpointPort(rows[i : i + 1])

@@ -23,6 +23,7 @@ from sim.contact import (
     look_around,
     obstacle_force,
 )
+from sim.truth import Truth
 from sim.world.world import World
 
 wp.set_module_options({"enable_backward": False})
@@ -68,7 +69,7 @@ class MultirotorModel:
 
 @wp.struct
 class BodyState:
-    """Truth about one vehicle."""
+    """All that a multirotor's body needs to go on; what others may read of it is its `Truth`."""
 
     pos_ned: wp.vec3  # [m]
     vel_ned: wp.vec3  # [m/s]
@@ -364,6 +365,26 @@ def body_tick(model: MultirotorModel, body: BodyState, command: vec8, wind_ned: 
     body.accel_frd = accel_sum / float(_SUBSTEP_COUNT)
     body.gyro_frd = gyro_sum / float(_SUBSTEP_COUNT)
     return drain_battery(model, body, inputs.density_ratio, TICK_S)
+
+
+@wp.func
+def truth_of(body: BodyState) -> Truth:
+    """What others may read of the body."""
+    truth = Truth()
+    truth.pos_ned = body.pos_ned
+    truth.vel_ned = body.vel_ned
+    truth.q_ned_from_frd = body.q_ned_from_frd
+    truth.omega_frd = body.omega_frd
+    truth.accel_frd = body.accel_frd
+    truth.gyro_frd = body.gyro_frd
+    truth.motor_speed = body.rotor_speed
+    truth.height_agl_m = body.height_agl_m
+    truth.battery_voltage_v = body.battery_voltage_v
+    truth.battery_current_a = body.battery_current_a
+    truth.is_on_ground = body.is_on_ground
+    truth.is_crashed = body.is_crashed
+    truth.impact_speed = body.impact_speed
+    return truth
 
 
 @wp.func

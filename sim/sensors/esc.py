@@ -17,17 +17,17 @@ POLE_PAIRS = 7  # of the usual 14-pole outrunner
 _STEP_RAD_S = 100.0 / POLE_PAIRS * 2.0 * pi / 60.0
 
 
-def esc_reader(bodies: np.ndarray[Any, Any], i_vehicle: int) -> Callable[[], list[float]]:
+def esc_reader(truths: np.ndarray[Any, Any], i_vehicle: int) -> Callable[[], list[float]]:
     """A function that returns the reported speeds [rad/s] of a vehicle's rotors.
 
     Args:
-        bodies: live structured view of the BodyState rows.
+        truths: live structured view of the Truth rows.
         i_vehicle: which row.
     """
-    fields = bodies.dtype.fields
+    fields = truths.dtype.fields
     if fields is None:
-        raise TypeError("not BodyState rows")
-    offset = i_vehicle * bodies.dtype.itemsize + fields["rotor_speed"][1]
+        raise TypeError("not Truth rows")
+    offset = i_vehicle * truths.dtype.itemsize + fields["motor_speed"][1]
     unpack = struct.Struct(f"<{MAX_ROTORS}f").unpack_from
-    buffer = bodies.view(np.uint8).data
+    buffer = truths.view(np.uint8).data
     return lambda: [round(speed / _STEP_RAD_S) * _STEP_RAD_S for speed in unpack(buffer, offset)]

@@ -39,7 +39,7 @@ class RingSensor:
 
     def __init__(self, rig: Rig, world: WorldMap, noise: float, seed: int, i_vehicle: int = 0) -> None:
         self._world = world.kernel
-        self._body: Any = rig.arrays.body.numpy()
+        self._truth: Any = rig.rows["truth"]
         self._i_vehicle = i_vehicle
         self._distance = wp.zeros(RAYS, dtype=float, device="cpu")
         self._noise_std_m = noise * NOISE_STD_M
@@ -51,7 +51,7 @@ class RingSensor:
         Args:
             yaw_rad: heading of the ring.
         """
-        pos = self._body[self._i_vehicle]["pos_ned"]
+        pos = self._truth[self._i_vehicle]["pos_ned"]
         inputs = [self._world, wp.vec3(*(float(axis) for axis in pos)), yaw_rad, MAX_M]
         wp.launch(ring_rays, dim=RAYS, inputs=inputs, outputs=[self._distance], device="cpu")
         exact = self._distance.numpy()

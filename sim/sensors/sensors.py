@@ -13,7 +13,6 @@ from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.kernels import TICK_S
 from common.rng import draw_tick
-from sim.bodies.multirotor import BodyState
 from sim.faults import FAULT_OFF, Faults, SensorFault, is_due, sampling_period
 from sim.sensors.baro import BaroModel, BaroState, baro_boot, baro_drift, baro_model, baro_sample
 from sim.sensors.gnss import (
@@ -42,6 +41,7 @@ from sim.sensors.imu import (
 from sim.sensors.mag import MagModel, MagState, mag_boot, mag_model, mag_sample
 from sim.sensors.power import BatteryMonitorModel, battery_monitor_model, battery_sample
 from sim.sensors.range import RangeModel, range_model, range_sample
+from sim.truth import Truth
 from sim.world.world import World, ray_hit
 
 wp.set_module_options({"enable_backward": False})
@@ -124,7 +124,7 @@ def sense(
     model: SensorModel,
     state: SensorState,
     faults: Faults,
-    body: BodyState,
+    truth: Truth,
     world: World,
     seed: int,
     i: int,
@@ -136,7 +136,7 @@ def sense(
         model: figures, rates and delays.
         state: after the tick before; all zero boots the sensors now.
         faults: what is broken.
-        body: true state at the end of the tick, with its means over the tick.
+        truth: true state at the end of the tick, with its means over the tick.
         world: what the range finder sees.
         seed: of the run.
         i: vehicle.
@@ -151,13 +151,13 @@ def sense(
         out.imu = imu_drift(model.imu, out.imu, seed, i, count)
     period = imu_period(faults.gyro, faults.accel)
     if is_due(period, count):
-        out.imu = imu_vibration(out.imu, body.rotor_speed, float(period) * TICK_S)
+        out.imu = imu_vibration(out.imu, truth.motor_speed, float(period) * TICK_S)
         out.samples.imu = imu_sample(
             model.imu,
             out.imu,
             out.samples.imu,
-            body.gyro_frd,
-            body.accel_frd,
+            truth.gyro_frd,
+            truth.accel_frd,
             faults.gyro,
             faults.accel,
             seed,
@@ -167,7 +167,7 @@ def sense(
 
     first_fix = out.gnss.boot_tick + wp.int64(model.gnss.first_fix_ticks)
     if gnss_is_taken(model.gnss.period_ticks, first_fix, faults.gnss, tick):
-        out.gnss = gnss_take(model.gnss, out.gnss, body.pos_ned, body.vel_ned, faults.gnss, seed, i, tick)
+        out.gnss = gnss_take(model.gnss, out.gnss, truth.pos_ned, truth.vel_ned, faults.gnss, seed, i, tick)
     if gnss_is_delivered(model.gnss.delay_ticks, out.gnss.queue_count, out.gnss.queue_tick[out.gnss.queue_head], tick):
         out.samples.gnss = gnss_delivered(model.gnss, out.gnss, out.samples.gnss, faults.gnss)
         out.gnss = gnss_drop_oldest(out.gnss)
@@ -177,25 +177,25 @@ def sense(
     if is_due(model.baro.period_ticks, count):
         out.baro = baro_drift(model.baro, out.baro, seed, i, count)
     if is_due(sampling_period(model.baro.period_ticks, faults.baro), count):
-        alt_amsl_m = model.home_alt_amsl_m - body.pos_ned[2]
+        alt_amsl_m = model.home_alt_amsl_m - truth.pos_ned[2]
         out.samples.baro = baro_sample(model.baro, out.baro, out.samples.baro, alt_amsl_m, faults.baro, seed, i, tick)
 
     if is_due(sampling_period(model.mag.period_ticks, faults.mag), count):
         out.samples.mag = mag_sample(
-            model.mag, out.mag, out.samples.mag, body.q_ned_from_frd, faults.mag, seed, i, tick
+            model.mag, out.mag, out.samples.mag, truth.q_ned_from_frd, faults.mag, seed, i, tick
         )
 
     if is_due(sampling_period(model.range.period_ticks, faults.range), count):
-        down_ned = wp.quat_rotate(body.q_ned_from_frd, wp.vec3(0.0, 0.0, 1.0))
-        distance_m = ray_hit(world, body.pos_ned, down_ned, model.range.max_distance)
+        down_ned = wp.quat_rotate(truth.q_ned_from_frd, wp.vec3(0.0, 0.0, 1.0))
+        distance_m = ray_hit(world, truth.pos_ned, down_ned, model.range.max_distance)
         out.samples.range = range_sample(model.range, out.samples.range, distance_m, faults.range, seed, i, tick)
 
     if is_due(sampling_period(model.battery.period_ticks, faults.battery), count):
         out.samples.battery = battery_sample(
             model.battery,
             out.samples.battery,
-            body.battery_voltage_v,
-            body.battery_current_a,
+            truth.battery_voltage_v,
+            truth.battery_current_a,
             faults.battery,
             seed,
             i,

@@ -65,7 +65,7 @@ class Hover:
         await drone.takeoff(HEIGHT_M)
 
     def _positions(self):
-        truth = self.flight.rig.arrays.body.numpy()[0]["pos_ned"]
+        truth = self.flight.rig.rows["truth"][0]["pos_ned"]
         return truth.copy(), np.array(self.flight.controller.state.estimate.pos_ned)
 
     def send(self, count, kind, per_frame, on_frame=None):

@@ -143,7 +143,7 @@ class ModeFlight:
         setpoint = flight.rig.arrays.autopilot.setpoint.numpy()[0]
         for name in SETPOINT_FIELDS:
             assert not np.isinf(setpoint[name]).any(), f"{name}: {setpoint[name]}"
-        body = flight.rig.arrays.body.numpy()[0]
+        body = flight.rig.rows["truth"][0]
         for name in ("pos_ned", "vel_ned", "q_ned_from_frd", "omega_frd"):
             assert np.isfinite(body[name]).all(), f"{name}: {body[name]}"
         estimate = state.estimate

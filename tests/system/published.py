@@ -37,7 +37,7 @@ class Flown:
 
     @property
     def body(self):
-        return self.flight.rig.arrays.body.numpy()[0]
+        return self.flight.rig.rows["truth"][0]
 
     @property
     def faults(self):

@@ -70,7 +70,7 @@ class Scenario:
         self.fc = self.flight.controller
         self.state = self.fc.state
         self.drone = self.flight.drone
-        self.body = self.flight.rig.arrays.body.numpy()
+        self.body = self.flight.rig.rows["truth"]
         self.seconds, self.fails = seconds, fails
         self.log = []
         self.sticks = None  # held there

@@ -101,7 +101,7 @@ def test_a_companion_that_dies_leaves_the_vehicle_in_hold(scene):
     scene.engaged()
     scene.companion.kill()
     scene.wait_for(lambda: scene.mode is Mode.HOLD, 5.0)
-    speed_m_s = hypot(*map(float, scene.flight.rig.arrays.body.numpy()[0]["vel_ned"]))
+    speed_m_s = hypot(*map(float, scene.flight.rig.rows["truth"][0]["vel_ned"]))
     assert speed_m_s < 5.0
 
 

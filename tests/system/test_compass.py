@@ -79,7 +79,7 @@ def test_mission_with_a_turned_compass_is_flown_and_lands_at_home(angle_deg, win
     assert running.error is None
     assert flight.drone.reached[-1] == 5
     assert wind_errors[0] < 2.0  # gusts are part of it
-    assert not flight.rig.arrays.body.numpy()["is_crashed"][0]
+    assert not flight.rig.rows["truth"]["is_crashed"][0]
     assert any("compass contradicts" in reason for reason in flight.controller.check_arming())
     history = flight.close()
     speed = np.hypot(*history.vel_ned_true[:, :2].T)
@@ -93,7 +93,7 @@ def test_mission_with_a_turned_compass_is_flown_and_lands_at_home(angle_deg, win
 def test_vehicle_without_compass_takes_off_by_stick_finds_its_heading_and_flies_a_mission():
     flight = new_flight(4, 3.0, EKF2_MAG_TYPE=5)
     set_fault(flight.rig.arrays.faults.numpy()[0], "mag", "off")
-    body = flight.rig.arrays.body.numpy()
+    body = flight.rig.rows["truth"]
     moving_us = []
     mission_us = []
 

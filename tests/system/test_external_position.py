@@ -27,7 +27,7 @@ class Hall:
 
     def __init__(self, **params):
         self.flight = Flight(FlightConfig(seed=3, world=OPEN, parameters={"EKF2_EV_CTRL": POS | HEIGHT, **params}))
-        self.body = self.flight.rig.arrays.body.numpy()
+        self.body = self.flight.rig.rows["truth"]
         set_fault(self.flight.rig.arrays.faults.numpy()[0], "gnss", "off")
         self.rng = np.random.default_rng(7)
         self.is_seen = True

@@ -132,7 +132,7 @@ def test_gnss_lost_in_a_mission_leads_to_a_blind_descent(height_reference):
     assert outcome.said("Position lost: land")
     assert not outcome.said("Position is valid again")
     assert outcome.disarmed_s < 30.0
-    assert not outcome.flight.rig.arrays.body.numpy()["is_crashed"][0]
+    assert not outcome.flight.rig.rows["truth"]["is_crashed"][0]
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_empty_battery_is_noticed_and_lands():
     outcome = hovering(BATTERY, OFF, seconds=60.0)
     assert outcome.said("Battery nearly empty: land")
     assert outcome.disarmed_s < 40.0
-    assert not outcome.flight.rig.arrays.body.numpy()["is_crashed"][0]
+    assert not outcome.flight.rig.rows["truth"]["is_crashed"][0]
 
 
 def test_dead_gyro_stops_the_motors():
@@ -287,7 +287,7 @@ def test_vehicle_returns_when_its_ground_station_falls_silent():
     assert running.error is None
     assert modes == [Mode.HOLD, Mode.RETURN]
     assert "Ground station lost: return" in flight.drone.texts
-    assert np.hypot(*flight.rig.arrays.body.numpy()["pos_ned"][0][:2]) < 2.0
+    assert np.hypot(*flight.rig.rows["truth"]["pos_ned"][0][:2]) < 2.0
 
 
 def test_vehicle_returns_from_wind_above_its_limit():

@@ -18,7 +18,7 @@ OPEN = WorldConfig(trees_per_ha=0.0, hill_height_m=0.0)  # targets walk past the
 
 def truth(flight):
     """[m] and [m/s] of the simulator, ned."""
-    row = flight.rig.arrays.body.numpy()[0]
+    row = flight.rig.rows["truth"][0]
     return np.array(row["pos_ned"], float), np.array(row["vel_ned"], float)
 
 
@@ -215,7 +215,7 @@ def test_orbit_that_cannot_be_flown_is_refused():
 
 def sighting(flight, target, rng, std_rad=0.01):
     """The angles under which a camera that looks down sees a place, as LANDING_TARGET carries them."""
-    row = flight.rig.arrays.body.numpy()[0]
+    row = flight.rig.rows["truth"][0]
     x, y, z, w = (float(e) for e in row["q_ned_from_frd"])
     rotation = np.array(
         [

@@ -77,7 +77,7 @@ def test_hover_with_motors_out(motors):
         await fail(drone, *motors)
         for _ in range(1000):
             await drone.sleep(0.02)
-            paths.append(flight.rig.arrays.body.numpy()["pos_ned"][0].astype(float))
+            paths.append(flight.rig.rows["truth"]["pos_ned"][0].astype(float))
         await drone.land()
 
     run(flight, script)
@@ -86,7 +86,7 @@ def test_hover_with_motors_out(motors):
     assert np.hypot(*(path[:, :2] - path[0, :2]).T).max() < 1.5
     for motor in motors:
         assert f"Motor {motor} has failed" in flight.drone.texts
-    assert not flight.rig.arrays.body.numpy()["is_crashed"][0]
+    assert not flight.rig.rows["truth"]["is_crashed"][0]
 
 
 def test_mission_with_a_motor_out():

@@ -58,7 +58,7 @@ class Holding:
 
     @property
     def body(self):
-        return self.flight.rig.arrays.body.numpy()[0]
+        return self.flight.rig.rows["truth"][0]
 
     @property
     def height_m(self):

@@ -59,8 +59,8 @@ def scene_pixels(shown):
 
 
 def position(shown):
-    return shown.flight.rig.arrays.body.numpy()[0]["pos_ned"].copy()
+    return shown.flight.rig.rows["truth"][0]["pos_ned"].copy()
 
 
 def height(shown):
-    return float(shown.flight.rig.arrays.body.numpy()[0]["height_agl_m"])
+    return float(shown.flight.rig.rows["truth"][0]["height_agl_m"])

@@ -36,7 +36,7 @@ class Cameras:
 
     def __init__(self, vehicle):
         self.mocap = vehicle.plugin(Mocap)
-        self.body = vehicle.flight.rig.arrays.body.numpy()
+        self.body = vehicle.flight.rig.rows["truth"]
         self.rng = np.random.default_rng(5)
 
     def position(self):

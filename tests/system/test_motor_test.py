@@ -31,7 +31,7 @@ class Ground:
 
     def speeds(self):
         """[rad/s] true."""
-        return np.array(self.flight.rig.arrays.body.numpy()[0]["rotor_speed"])
+        return np.array(self.flight.rig.rows["truth"][0]["rotor_speed"])
 
     def turning(self):
         return [i for i, speed in enumerate(self.speeds()) if speed > 50.0]
@@ -45,7 +45,7 @@ def ardupilot():
 
 
 def test_each_motor_turns_in_its_turn_and_the_vehicle_stays_where_it_is(ardupilot):
-    before = np.array(ardupilot.flight.rig.arrays.body.numpy()[0]["pos_ned"])
+    before = np.array(ardupilot.flight.rig.rows["truth"][0]["pos_ned"])
     turned = []
     ardupilot.command(MOTOR_TEST, 1, 0, 15, 1.0, 4)
     for _ in range(7):
@@ -55,7 +55,7 @@ def test_each_motor_turns_in_its_turn_and_the_vehicle_stays_where_it_is(ardupilo
     assert list(dict.fromkeys(tuple(motors) for motors in turned if motors)) == [(0,), (3,), (1,), (2,)]
     assert not ardupilot.turning()
     assert not ardupilot.flight.controller.state.is_armed
-    assert np.array(ardupilot.flight.rig.arrays.body.numpy()[0]["pos_ned"]) == pytest.approx(before, abs=0.01)
+    assert np.array(ardupilot.flight.rig.rows["truth"][0]["pos_ned"]) == pytest.approx(before, abs=0.01)
 
 
 def test_more_throttle_turns_it_faster(ardupilot):

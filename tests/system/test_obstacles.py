@@ -11,7 +11,7 @@ POSITION_CTL = 3
 
 
 def pos_ned(flight):
-    return np.array(flight.rig.arrays.body.numpy()[0]["pos_ned"], float)
+    return np.array(flight.rig.rows["truth"][0]["pos_ned"], float)
 
 
 @pytest.mark.parametrize("distance_m", [3.0, 6.0])

@@ -33,7 +33,7 @@ def flown(script, **config):
 
 
 def body(flight):
-    return flight.rig.arrays.body.numpy()[0]
+    return flight.rig.rows["truth"][0]
 
 
 def tilt_deg(flight):

@@ -83,7 +83,7 @@ def test_battery_failsafe():
     capacity_c = 3.6 * flown.flight.airframe.battery.capacity_mah
 
     def drain(share):
-        flown.flight.rig.arrays.body.numpy()["battery_charge_c"][0] = share * capacity_c
+        flown.flight.rig.rows["body"]["battery_charge_c"][0] = share * capacity_c
 
     async def script(drone):
         def charge_state():

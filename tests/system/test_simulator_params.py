@@ -54,7 +54,7 @@ class Hovering:
 
     @property
     def body(self):
-        return self.flight.rig.arrays.body.numpy()[0]
+        return self.flight.rig.rows["truth"][0]
 
     @property
     def state(self):
@@ -104,13 +104,13 @@ def test_gnss_goes_and_comes_back(hovering, name, off, on):
 def test_motor_loses_its_thrust_and_has_it_back(hovering):
     motor = 2  # the third: bit 4
     hovering.run(3.0)
-    before = float(hovering.body["rotor_speed"][motor])
+    before = float(hovering.body["motor_speed"][motor])
     hovering.set("SIM_ENGINE_MUL", 0.9)
     hovering.set("SIM_ENGINE_FAIL", 4)
     hovering.run(3.0)
     commands = hovering.state.actuators.command
     assert commands[motor] > 1.05 * np.mean([commands[i] for i in (0, 1, 3)])  # the controller makes up for it
-    assert float(hovering.body["rotor_speed"][motor]) == pytest.approx(before, rel=0.1)
+    assert float(hovering.body["motor_speed"][motor]) == pytest.approx(before, rel=0.1)
     hovering.set("SIM_ENGINE_FAIL", 0)
     hovering.run(3.0)
     commands = hovering.state.actuators.command

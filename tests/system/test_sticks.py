@@ -73,7 +73,7 @@ def fly(script, config=None, seconds=300.0, before=None):
 
 def body(flight):
     """The true state."""
-    return flight.rig.arrays.body.numpy()[0]
+    return flight.rig.rows["truth"][0]
 
 
 def place(flight):

@@ -24,7 +24,7 @@ class TakingOff:
         self.flight = Flight(FlightConfig(world=PLAIN))
         self.fc = self.flight.controller
         self.state = self.fc.state
-        self.body = self.flight.rig.arrays.body.numpy()
+        self.body = self.flight.rig.rows["truth"]
         self.lean_deg = self.moved_m = 0.0  # the most that was seen below LOW_M
         self.is_watched = False
         self.run(lambda: self.state.is_ready_to_arm, 30.0)

@@ -38,7 +38,7 @@ class Watched(RawVehicle):
 
     def _frame(self):
         super()._frame()
-        body = self.flight.rig.arrays.body.numpy()[0]
+        body = self.flight.rig.rows["truth"][0]
         x, y, _, _ = body["q_ned_from_frd"]
         lean_deg = degrees(np.arccos(np.clip(1.0 - 2.0 * float(x * x + y * y), -1.0, 1.0)))
         self.path.append((*body["pos_ned"].astype(float), lean_deg))
@@ -72,7 +72,7 @@ class Watched(RawVehicle):
 def vehicle():
     with Watched() as vehicle:
         yield vehicle
-        assert not vehicle.flight.rig.arrays.body.numpy()[0]["is_crashed"]
+        assert not vehicle.flight.rig.rows["truth"][0]["is_crashed"]
 
 
 @pytest.mark.slow

@@ -51,7 +51,7 @@ def hover_bank(has_estimator: bool, device: str, heights_m: tuple[float, float] 
     rig = build_rig(build_world(plain, device), HOVER_COUNT, has_estimator=has_estimator, threads=1, device=device)
     rig.advance(_ALIGN_TICKS)
     rng = np.random.default_rng(0)
-    setpoints = rig.arrays.autopilot.setpoint
+    setpoints = rig.setpoints
     rows = setpoints.numpy()
     low, high = heights_m
     middle, spread = np.array([0.0, 0.0, -0.5 * (low + high)]), np.array([_SPREAD_M, _SPREAD_M, 0.5 * (high - low)])

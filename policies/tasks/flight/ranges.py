@@ -97,16 +97,16 @@ def measure_ranges(rig: RigArrays, rows: wp.array(dtype=wp.bool), out: wp.array2
     i = wp.tid()
     if not rows[i]:
         return
-    body = rig.body[i]
+    truth = rig.truth[i]
     w = rig.worlds[rig.i_world[i]]
-    yaw = yaw_from_quat(body.q_ned_from_frd)
+    yaw = yaw_from_quat(truth.q_ned_from_frd)
     for k in range(_SECTORS):
         bearing = yaw + float(k) * _SECTOR_RAD
         dir_ned = wp.vec3(wp.cos(bearing), wp.sin(bearing), 0.0)
-        ground = terrain_ray_hit(w.terrain, body.pos_ned, dir_ned, RANGE_M)
-        out[i, k] = nearness(walls_ray_hit(w.walls, body.pos_ned, dir_ned, ground))
-    out[i, _SECTORS] = nearness(ray_hit(w, body.pos_ned, wp.vec3(0.0, 0.0, -1.0), RANGE_M))
-    out[i, _SECTORS + 1] = nearness(ray_hit(w, body.pos_ned, wp.vec3(0.0, 0.0, 1.0), RANGE_M))
+        ground = terrain_ray_hit(w.terrain, truth.pos_ned, dir_ned, RANGE_M)
+        out[i, k] = nearness(walls_ray_hit(w.walls, truth.pos_ned, dir_ned, ground))
+    out[i, _SECTORS] = nearness(ray_hit(w, truth.pos_ned, wp.vec3(0.0, 0.0, -1.0), RANGE_M))
+    out[i, _SECTORS + 1] = nearness(ray_hit(w, truth.pos_ned, wp.vec3(0.0, 0.0, 1.0), RANGE_M))
     out[i, _SECTORS + 2] = 0.0
     out[i, _SECTORS + 3] = 0.0
-    add_trees(w, body.pos_ned, yaw, out, i)
+    add_trees(w, truth.pos_ned, yaw, out, i)

@@ -97,7 +97,7 @@ def worker_count(device: str) -> int:
 
 def _makes(rig: Rig) -> Makes:
     makes = Makes()
-    makes.body = wp.clone(rig.arrays.model[:1])
+    makes.body = wp.clone(rig.models[:1])
     levels = [
         sensor_model(k / NOISE_LEVELS_PER_UNIT, DEFAULT_HOME) for k in range(_NOISE_MAX * NOISE_LEVELS_PER_UNIT + 1)
     ]

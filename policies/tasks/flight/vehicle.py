@@ -9,9 +9,10 @@ from autopilot.ports import SETPOINT_TRAJECTORY, Estimate, Setpoint
 from policies.tasks.flight.draws import WIND_STREAM, draw_angle
 from policies.tasks.flight.numbers import FlightNumbers
 from policies.tasks.flight.own import Command, OwnState
-from sim.advance import RigArrays, true_estimate
-from sim.bodies.multirotor import BodyState, MultirotorModel
+from sim.advance import RigArrays, forget_impacts
+from sim.bodies.multirotor import MultirotorModel
 from sim.sensors.sensors import SensorModel
+from sim.truth import true_estimate
 from sim.wind import WindState
 
 wp.set_module_options({"enable_backward": False})
@@ -24,7 +25,7 @@ _LEVELS = wp.constant(float(NOISE_LEVELS_PER_UNIT))
 class Makes:
     """What vehicles are made of before they are varied."""
 
-    body: wp.array(dtype=MultirotorModel)  # (1,)
+    truth: wp.array(dtype=MultirotorModel)  # (1,)
     sensors: wp.array(dtype=SensorModel)  # by noise scale: 0, 0.25, 0.5 ...
 
 
@@ -48,9 +49,7 @@ def vary_vehicle(rig: RigArrays, makes: Makes, numbers: FlightNumbers, seed: int
     wind.turbulence_w_std = 0.1 * numbers.wind_m_s * numbers.wind_turbulence  # MIL-F-8785C: a tenth of W20
     rig.wind_model[i] = wind
     rig.wind[i] = WindState()
-    body = rig.body[i]
-    body.impact_speed = 0.0  # that of standing on the ground before the hover
-    rig.body[i] = body
+    forget_impacts(rig, i)  # that of standing on the ground before the hover
 
 
 @wp.func
@@ -78,7 +77,7 @@ def vehicle_estimate(rig: RigArrays, i: int, has_estimator: int) -> Estimate:
     """What the flight controller takes for its state: its estimate, or in quick training the truth in its place."""
     if has_estimator == 1:
         return rig.autopilot.ekf.rows[i].estimate
-    return true_estimate(rig.body[i], rig.tick[i])
+    return true_estimate(rig.truth[i], rig.tick[i])
 
 
 @wp.func
@@ -95,12 +94,6 @@ def own_state(rig: RigArrays, i: int, has_estimator: int) -> OwnState:
         own.height_m = sample.distance_m * wp.quat_rotate(estimate.q_ned_from_frd, wp.vec3(0.0, 0.0, 1.0))[2]
         own.is_height_valid = sample.is_valid
     else:
-        own.height_m = rig.body[i].height_agl_m
+        own.height_m = rig.truth[i].height_agl_m
         own.is_height_valid = 1
     return own
-
-
-@wp.func
-def has_touched(body: BodyState) -> bool:
-    """Whether a vehicle has touched anything solid since its episode began."""
-    return body.impact_speed > 0.0 or body.is_on_ground == 1 or body.is_crashed == 1

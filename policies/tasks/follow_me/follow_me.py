@@ -119,15 +119,15 @@ class FollowMe(FlightTask):
 
     def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """Drone and owner from above, and what the camera sees."""
-        body = self.rig.arrays.body.numpy()[i_env]
+        truth = self.rig.truth_row(i_env)
         owner = self.follow.people.numpy()[i_env]
-        x, y, z, w = (float(value) for value in body["q_ned_from_frd"])
+        x, y, z, w = (float(value) for value in truth["q_ned_from_frd"])
         yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
         distance, seen = self.measures.numpy()[i_env, [0, 2]]
         words = f"{float(self.border.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {distance:4.1f} m"
         return draw(
             self.worlds.map(i_env),
-            body["pos_ned"].astype(np.float64),
+            truth["pos_ned"].astype(np.float64),
             yaw,
             owner["pos_ned"].astype(np.float64),
             float(owner["heading_rad"]),

@@ -29,7 +29,6 @@ from policies.tasks.flight.numbers import FlightNumbers
 from policies.tasks.flight.own import action_command
 from policies.tasks.flight.vehicle import (
     Makes,
-    has_touched,
     own_state,
     vary_vehicle,
     vehicle_estimate,
@@ -43,6 +42,7 @@ from policies.tasks.follow_me.sight import Sight, lens_of, reach_from, see
 from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_start, phone_step
+from sim.truth import has_touched
 from sim.world.growing import WorldNumbers
 from sim.world.people import PERSON_DT_S, PERSON_TICKS, Person, PersonModel, person_start, person_step
 
@@ -143,14 +143,14 @@ def walk(rules: Rules, rig: RigArrays, state: FollowState) -> None:
     person = state.people[i]
     phone = state.phones[i]
     seed = state.path_seeds[i]
-    body = rig.body[i]
+    truth = rig.truth[i]
     reach_m = float(wp.inf)
     end = draw_tick(rig.tick[i])
     for tick in range(end - rules.decision_ticks, end, _STEP_TICKS):
         person = person_step(world, model, person, seed, i, tick, _STEP_S)
         phone = phone_step(phone_model, phone, person, seed, i, tick + _STEP_TICKS)
         since_s = float(end - tick - _STEP_TICKS) / _TICKS_PER_S
-        reach_m = wp.min(reach_m, reach_from(body.pos_ned - since_s * body.vel_ned, person))
+        reach_m = wp.min(reach_m, reach_from(truth.pos_ned - since_s * truth.vel_ned, person))
     state.reaches_m[i] = reach_m
     state.people[i] = person
     state.phones[i] = phone
@@ -160,9 +160,9 @@ def walk(rules: Rules, rig: RigArrays, state: FollowState) -> None:
 def look(rig: RigArrays, state: FollowState, rows: wp.array(dtype=wp.bool)) -> None:
     i = wp.tid()
     if rows[i]:
-        body = rig.body[i]
-        state.sights[i] = see(rig.worlds[rig.i_world[i]], body, state.people[i])
-        state.lenses[i] = lens_of(body, state.numbers[i].exposure)
+        truth = rig.truth[i]
+        state.sights[i] = see(rig.worlds[rig.i_world[i]], truth, state.people[i])
+        state.lenses[i] = lens_of(truth, state.numbers[i].exposure)
 
 
 @wp.func
@@ -182,16 +182,16 @@ def owner_report(phone: PhoneState, tick: int) -> OwnerReport:
 def write_frame(border: Border, rules: Rules, rig: RigArrays, state: FollowState, i: int) -> None:
     """The newest frame of the observation, and what the critic sees."""
     at = open_frame(border, i)
-    body = rig.body[i]
+    truth = rig.truth[i]
     action = state.actions[i]
     if rules.vector == _PRIVILEGED:
-        write_privileged(body, state.sights[i], state.unseen_s[i], action, state.nearness, border.observations, i, at)
+        write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, border.observations, i, at)
     else:
         own = own_state(rig, i, rules.has_estimator)
         report = owner_report(state.phones[i], draw_tick(rig.tick[i]))
         write_vector(rules.vector, own, report, action, border.observations, i, at)
     if rules.has_privileged == 1:
-        write_privileged(body, state.sights[i], state.unseen_s[i], action, state.nearness, border.privileged, i, 0)
+        write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, border.privileged, i, 0)
 
 
 @wp.func
@@ -205,7 +205,7 @@ def write_measures(state: FollowState, rig: RigArrays, i: int, is_collided: bool
     state.measures[i, 4] = float(is_in_band(state.numbers[i], sight))
     state.measures[i, 5] = sight.room_m
     state.measures[i, 6] = wp.length(sight.vel_hfrd)
-    state.measures[i, 7] = wp.length(rig.body[i].vel_ned)
+    state.measures[i, 7] = wp.length(rig.truth[i].vel_ned)
 
 
 @wp.kernel(enable_backward=False)
@@ -219,7 +219,7 @@ def judge(border: Border, rules: Rules, rig: RigArrays, state: FollowState, star
     state.unseen_s[i] = wp.where(
         sight.is_in_view == 1, 0.0, state.unseen_s[i] + float(rules.decision_ticks) / _TICKS_PER_S
     )
-    touched = has_touched(rig.body[i])
+    touched = has_touched(rig.truth[i])
     sight.reach_m = state.reaches_m[i]
     outcome = follow_outcome(numbers, sight, touched, state.unseen_s[i], border.steps[i] + 1)
     reward = float(0.0)
@@ -300,14 +300,14 @@ def place(border: Border, rig: RigArrays, state: FollowState, start: Start) -> N
     state.person_models[i] = person_of(start.person[0], numbers)
     state.phone_models[i] = phone_of(start.phone[0], numbers)
     # ahead, some way to one side, looking anywhere
-    body = rig.body[i]
-    nose = wp.quat_rotate(body.q_ned_from_frd, wp.vec3(1.0, 0.0, 0.0))
+    truth = rig.truth[i]
+    nose = wp.quat_rotate(truth.q_ned_from_frd, wp.vec3(1.0, 0.0, 0.0))
     aside = draw_angle(seed, i, episode, _BEARING_STREAM) * numbers.start_bearing_deg / 180.0
     bearing = wp.atan2(nose[1], nose[0]) + aside
     share = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
     distance = numbers.start_distance_min_m + share * (numbers.start_distance_max_m - numbers.start_distance_min_m)
-    north = body.pos_ned[0] + distance * wp.cos(bearing)
-    east = body.pos_ned[1] + distance * wp.sin(bearing)
+    north = truth.pos_ned[0] + distance * wp.cos(bearing)
+    east = truth.pos_ned[1] + distance * wp.sin(bearing)
     heading = draw_angle(seed, i, episode, _HEADING_STREAM)
     path_seed = state.path_seeds[i]
     tick = draw_tick(rig.tick[i])

@@ -5,23 +5,14 @@ The batch task has the same in its own measures.
 
 import warp as wp
 
-from policies.tasks.flight.vehicle import has_touched
 from policies.tasks.follow_me.sight import see
 from sim.advance import RigArrays
+from sim.truth import has_touched
 from sim.world.people import Person
 
 wp.set_module_options({"enable_backward": False})
 
 COLUMNS = ("distance_m", "bearing_rad", "is_in_view", "is_collided")
-
-
-@wp.kernel(enable_backward=False)
-def forget_impacts(rig: RigArrays) -> None:
-    """What vehicles met before, the ground they took off from above all, counts no more."""
-    i = wp.tid()
-    body = rig.body[i]
-    body.impact_speed = 0.0
-    rig.body[i] = body
 
 
 @wp.kernel(enable_backward=False)
@@ -35,9 +26,9 @@ def measure_rows(rig: RigArrays, people: wp.array(dtype=Person), touch_m: float,
         out: shape (vehicles, columns).
     """
     i = wp.tid()
-    body = rig.body[i]
-    sight = see(rig.worlds[rig.i_world[i]], body, people[i])
+    truth = rig.truth[i]
+    sight = see(rig.worlds[rig.i_world[i]], truth, people[i])
     out[i, 0] = sight.distance_m
     out[i, 1] = sight.bearing_rad
     out[i, 2] = float(sight.is_in_view)
-    out[i, 3] = wp.where(has_touched(body) or sight.reach_m < touch_m, 1.0, 0.0)
+    out[i, 3] = wp.where(has_touched(truth) or sight.reach_m < touch_m, 1.0, 0.0)

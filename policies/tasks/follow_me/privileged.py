@@ -10,7 +10,7 @@ from policies.tasks.flight.own import OWN_ELEMENTS, OWN_SIZE, SPEED_SCALE, OwnSt
 from policies.tasks.flight.ranges import RANGE_ELEMENTS, RANGES
 from policies.tasks.follow_me.sight import ROOM_MAX_M, Sight
 from policies.tasks.layout import Element
-from sim.bodies.multirotor import BodyState
+from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
 
@@ -36,21 +36,21 @@ PRIVILEGED_ELEMENTS = (
 
 
 @wp.func
-def true_own(body: BodyState) -> OwnState:
+def true_own(truth: Truth) -> OwnState:
     """The vehicle as it truly is."""
     own = OwnState()
-    own.pos_ned = body.pos_ned
-    own.vel_ned = body.vel_ned
-    own.q_ned_from_frd = body.q_ned_from_frd
-    own.yaw_rate = wp.quat_rotate(body.q_ned_from_frd, body.omega_frd)[2]
-    own.height_m = body.height_agl_m
+    own.pos_ned = truth.pos_ned
+    own.vel_ned = truth.vel_ned
+    own.q_ned_from_frd = truth.q_ned_from_frd
+    own.yaw_rate = wp.quat_rotate(truth.q_ned_from_frd, truth.omega_frd)[2]
+    own.height_m = truth.height_agl_m
     own.is_height_valid = 1
     return own
 
 
 @wp.func
 def write_privileged(
-    body: BodyState,
+    truth: Truth,
     sight: Sight,
     unseen_s: float,
     last_action: wp.vec4,
@@ -60,7 +60,7 @@ def write_privileged(
     first: int,
 ) -> None:
     """The elements of `PRIVILEGED_ELEMENTS`, scaled, into row i from column `first`."""
-    write_own(true_own(body), last_action, out, i, first)
+    write_own(true_own(truth), last_action, out, i, first)
     at = first + OWN_SIZE
     place = sight.place_hfrd / _PLACE_SCALE
     far = wp.length(place)

@@ -10,9 +10,9 @@ import warp as wp
 from common.rotation import yaw_from_quat
 from policies.tasks.flight.own import level_from_ned
 from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount
-from sim.bodies.multirotor import BodyState
 from sim.camera_rig import MOUNT_FRD
 from sim.sensors.camera import Lens
+from sim.truth import Truth
 from sim.world.people import Person, chest_ned, is_line_free
 from sim.world.world import World, obstacle_contact
 
@@ -41,11 +41,11 @@ class Sight:
 
 
 @wp.func
-def lens_of(body: BodyState, exposure: float) -> Lens:
+def lens_of(truth: Truth, exposure: float) -> Lens:
     """The policy's camera on a vehicle; `exposure` is a factor on all light."""
     lens = Lens()
-    lens.pos_ned = body.pos_ned + wp.quat_rotate(body.q_ned_from_frd, LENS_FRD)
-    lens.q_ned_from_rdf = body.q_ned_from_frd * Q_FRD_FROM_RDF
+    lens.pos_ned = truth.pos_ned + wp.quat_rotate(truth.q_ned_from_frd, LENS_FRD)
+    lens.q_ned_from_rdf = truth.q_ned_from_frd * Q_FRD_FROM_RDF
     lens.half_width = HALF_WIDTH
     lens.exposure = exposure
     lens.balance = wp.vec3(1.0, 1.0, 1.0)
@@ -61,10 +61,10 @@ def is_in_frame(lens: Lens, point_ned: wp.vec3) -> bool:
 
 
 @wp.func
-def room_around(w: World, body: BodyState) -> float:
+def room_around(w: World, truth: Truth) -> float:
     """Distance from the vehicle's middle to the nearest trunk, crown, wall or ground [m], at most ROOM_MAX_M."""
-    contact = obstacle_contact(w, body.pos_ned, ROOM_MAX_M)
-    return wp.min(ROOM_MAX_M - contact[3], wp.max(body.height_agl_m, 0.0))
+    contact = obstacle_contact(w, truth.pos_ned, ROOM_MAX_M)
+    return wp.min(ROOM_MAX_M - contact[3], wp.max(truth.height_agl_m, 0.0))
 
 
 @wp.func
@@ -76,20 +76,20 @@ def reach_from(pos_ned: wp.vec3, person: Person) -> float:
 
 
 @wp.func
-def see(w: World, body: BodyState, person: Person) -> Sight:
+def see(w: World, truth: Truth, person: Person) -> Sight:
     """How a vehicle and its owner stand to each other."""
     sight = Sight()
     chest = chest_ned(person)
     head = person.pos_ned - wp.vec3(0.0, 0.0, _HEAD_SHARE * person.stature_m)
     legs = person.pos_ned - wp.vec3(0.0, 0.0, _LEG_SHARE * person.stature_m)
-    yaw = yaw_from_quat(body.q_ned_from_frd)
-    sight.place_hfrd = level_from_ned(chest - body.pos_ned, yaw)
+    yaw = yaw_from_quat(truth.q_ned_from_frd)
+    sight.place_hfrd = level_from_ned(chest - truth.pos_ned, yaw)
     sight.vel_hfrd = level_from_ned(person.vel_ned, yaw)
     sight.distance_m = wp.length(sight.place_hfrd)
     sight.bearing_rad = wp.atan2(sight.place_hfrd[1], sight.place_hfrd[0])
-    sight.reach_m = reach_from(body.pos_ned, person)
-    sight.room_m = room_around(w, body)
-    lens = lens_of(body, 1.0)
+    sight.reach_m = reach_from(truth.pos_ned, person)
+    sight.room_m = room_around(w, truth)
+    lens = lens_of(truth, 1.0)
     is_chest_free = is_line_free(w, lens.pos_ned, chest)
     is_head_free = is_chest_free or is_line_free(w, lens.pos_ned, head)
     sight.is_free = int(is_chest_free or is_head_free)

@@ -36,7 +36,7 @@ def aim(
     """Puts the cameras of the chosen rows where their vehicles carry them, with the noise of their episodes."""
     i = wp.tid()
     if rows[i]:
-        lenses[i] = lens_of(rig.body[i], 1.0)
+        lenses[i] = lens_of(rig.truth[i], 1.0)
         optics[i] = sensor_noise(optics[i], numbers[i].range_noise, rig.seed[i], draw_tick(rig.tick[i]))
 
 

@@ -15,7 +15,6 @@ from policies.tasks.flight.numbers import FlightNumbers
 from policies.tasks.flight.own import OWN_SIZE, action_command, write_own
 from policies.tasks.flight.vehicle import (
     Makes,
-    has_touched,
     own_state,
     vary_vehicle,
     vehicle_estimate,
@@ -26,7 +25,7 @@ from policies.tasks.navigate.observe import GOAL_SIZE, write_goal
 from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
 from policies.tasks.navigate.scan import write_ranges
 from sim.advance import RigArrays
-from sim.bodies.multirotor import BodyState
+from sim.truth import Truth, has_touched
 from sim.world.growing import WorldNumbers
 from sim.world.world import World, ground_height, obstacle_contact
 
@@ -98,9 +97,9 @@ def act(border: Border, rules: Rules, rig: RigArrays) -> None:
 
 
 @wp.func
-def room_beside(world: World, body: BodyState) -> float:
+def room_beside(world: World, truth: Truth) -> float:
     """Distance from the vehicle's middle to the nearest trunk or crown [m], at most 2 m."""
-    return _ROOM_MAX_M - obstacle_contact(world, body.pos_ned, _ROOM_MAX_M)[3]
+    return _ROOM_MAX_M - obstacle_contact(world, truth.pos_ned, _ROOM_MAX_M)[3]
 
 
 @wp.func
@@ -118,24 +117,24 @@ def write_frame(border: Border, rules: Rules, rig: RigArrays, state: NavigateSta
 def judge(border: Border, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     numbers = state.numbers[i]
-    body = rig.body[i]
+    truth = rig.truth[i]
     last_pos_ned = state.pos_ned[i]
     last_action = state.actions[i]
     action = chosen_action(border, i)
     state.actions[i] = action
-    state.pos_ned[i] = body.pos_ned
-    state.path_m[i] += wp.length(body.pos_ned - last_pos_ned)
+    state.pos_ned[i] = truth.pos_ned
+    state.path_m[i] += wp.length(truth.pos_ned - last_pos_ned)
     goal_ned = state.goals_ned[i]
-    distance_m = wp.length(goal_ned - body.pos_ned)
+    distance_m = wp.length(goal_ned - truth.pos_ned)
     progress_m = wp.length(goal_ned - last_pos_ned) - distance_m
     time_s = float(border.steps[i] + 1) * rules.decision_s
-    room_m = room_beside(rig.worlds[rig.i_world[i]], body)
+    room_m = room_beside(rig.worlds[rig.i_world[i]], truth)
     outcome = navigate_outcome(
-        numbers, distance_m, has_touched(body), body.height_agl_m, time_s, state.start_distance_m[i]
+        numbers, distance_m, has_touched(truth), truth.height_agl_m, time_s, state.start_distance_m[i]
     )
-    reward = navigate_reward(numbers, body, progress_m, rules.decision_s, room_m, outcome, action, last_action)
+    reward = navigate_reward(numbers, truth, progress_m, rules.decision_s, room_m, outcome, action, last_action)
     state.measures[i, 0] = distance_m
-    state.measures[i, 1] = wp.length(body.vel_ned)
+    state.measures[i, 1] = wp.length(truth.vel_ned)
     state.measures[i, 2] = room_m
     state.measures[i, 3] = state.path_m[i]
     state.measures[i, 4] = time_s
@@ -174,7 +173,7 @@ def place(border: Border, rig: RigArrays, state: NavigateState, start: Start) ->
     episode = border.episodes[i] - 1
     numbers = state.numbers[i]
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
-    pos_ned = rig.body[i].pos_ned
+    pos_ned = rig.truth[i].pos_ned
     bearing = draw_angle(seed, i, episode, _BEARING_STREAM)
     share = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
     away_m = numbers.goal_min_m + share * wp.max(numbers.goal_max_m - numbers.goal_min_m, 0.0)

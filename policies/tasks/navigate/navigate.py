@@ -97,12 +97,12 @@ class Navigate(FlightTask):
 
     def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """Drone, trees, goal and ranges from above."""
-        body = self.rig.arrays.body.numpy()[i_env]
-        x, y, z, w = (float(value) for value in body["q_ned_from_frd"])
+        truth = self.rig.truth_row(i_env)
+        x, y, z, w = (float(value) for value in truth["q_ned_from_frd"])
         yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
         goal_ned = self.navigation.goals_ned.numpy()[i_env].astype(np.float64)
-        pos_ned = body["pos_ned"].astype(np.float64)
-        away_m, speed = np.linalg.norm(goal_ned - pos_ned), np.linalg.norm(body["vel_ned"])
+        pos_ned = truth["pos_ned"].astype(np.float64)
+        away_m, speed = np.linalg.norm(goal_ned - pos_ned), np.linalg.norm(truth["vel_ned"])
         words = f"{float(self.border.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {away_m:4.1f} m  {speed:3.1f} m/s"
         ranges_m = self.navigation.ranges_m.numpy()[i_env]
         return draw(self.worlds.map(i_env), pos_ned, yaw, goal_ned, ranges_m, words, height_px)

@@ -10,7 +10,7 @@ from common.rotation import yaw_from_quat
 from policies.tasks.episode import HIT_OBSTACLE, LOST, RUNNING, SUCCESS, TIMEOUT
 from policies.tasks.flight.own import level_from_ned
 from policies.tasks.navigate.numbers import NavigateNumbers
-from sim.bodies.multirotor import BodyState
+from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
 
@@ -36,7 +36,7 @@ def navigate_outcome(
 @wp.func
 def navigate_reward(
     n: NavigateNumbers,
-    body: BodyState,
+    truth: Truth,
     progress_m: float,
     step_s: float,
     room_m: float,
@@ -48,9 +48,9 @@ def navigate_reward(
     reward = n.progress_reward * wp.min(progress_m, n.speed_m_s * step_s) - n.time_cost
     tight = wp.max(1.0 - room_m / wp.max(n.clearance_m, 1.0e-3), 0.0)
     reward -= n.clearance_cost * tight * tight
-    high = body.height_agl_m - n.goal_height_m
+    high = truth.height_agl_m - n.goal_height_m
     reward -= n.height_cost * high * high
-    vel_hfrd = level_from_ned(body.vel_ned, yaw_from_quat(body.q_ned_from_frd))
+    vel_hfrd = level_from_ned(truth.vel_ned, yaw_from_quat(truth.q_ned_from_frd))
     speed = wp.sqrt(vel_hfrd[0] * vel_hfrd[0] + vel_hfrd[1] * vel_hfrd[1])
     if speed > _MOVING_M_S:
         reward -= n.heading_cost * 0.5 * (1.0 - vel_hfrd[0] / speed)

@@ -112,14 +112,14 @@ def scan(
         return
     for k in range(_RANGES):
         ranges_m[i, k] = RANGE_M
-    body = rig.body[i]
+    truth = rig.truth[i]
     world = rig.worlds[rig.i_world[i]]
-    heading = yaw_from_quat(body.q_ned_from_frd)
-    add_forest(world.forest, body.pos_ned, heading, ranges_m, i)
+    heading = yaw_from_quat(truth.q_ned_from_frd)
+    add_forest(world.forest, truth.pos_ned, heading, ranges_m, i)
     for k in range(_SECTORS, _RANGES):
         up = _ELEVATIONS[k - _SECTORS]
         dir_ned = wp.vec3(wp.cos(up) * wp.cos(heading), wp.cos(up) * wp.sin(heading), -wp.sin(up))
-        ranges_m[i, k] = ray_hit(world, body.pos_ned, dir_ned, RANGE_M)
+        ranges_m[i, k] = ray_hit(world, truth.pos_ned, dir_ned, RANGE_M)
     noise = numbers[i].range_noise
     state = draw_key(rig.seed[i], 0, draw_tick(rig.tick[i]), _STREAM)
     for k in range(_RANGES):

@@ -68,7 +68,7 @@ def test_without_noise_the_samples_are_the_truth(seed, yaw, pos_ned):
     recorder = Recorder(noise_scale=0.0, seed=seed)
     recorder.bodies["pos_ned"][0] = pos_ned
     recorder.bodies["q_ned_from_frd"][0] = (0.0, 0.0, sin(0.5 * yaw), cos(0.5 * yaw))
-    recorder.bodies["rotor_speed"][0, :4] = 600.0
+    recorder.bodies["motor_speed"][0, :4] = 600.0
     recorder.bodies["gyro_frd"][0] = (0.1, -0.2, 0.3)
     last = recorder.run(600)[0, -1]
     assert last["imu"]["gyro_frd"].tolist() == recorder.bodies["gyro_frd"][0].tolist()

@@ -24,7 +24,7 @@ def test_the_vibration_tone_is_the_mean_of_a_turning_force_over_each_sample():
                   "accel_drift_std", "gyro_broadband", "accel_broadband"):  # fmt: skip
         imu_model[field] = 0.0
     speeds = np.float32([500.0, 620.0, 580.0, 660.0])
-    recorder.bodies["rotor_speed"][0, :4] = speeds
+    recorder.bodies["motor_speed"][0, :4] = speeds
     accel = recorder.run(200)["imu"]["accel_frd"][0].astype(np.float64) - np.float32(REST_ACCEL_FRD)
     speed = np.sum(speeds.astype(np.float64) ** 2) / np.sum(speeds)
     amplitude = float(imu_model["accel_tone"][0]) * speed**2

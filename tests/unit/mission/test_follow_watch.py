@@ -43,7 +43,7 @@ def watched():
     def is_over(_):
         watch.frame()
         if watch.sample_count > len(distances):
-            pos = flight.rig.arrays.body.numpy()[0]["pos_ned"]
+            pos = flight.rig.rows["truth"][0]["pos_ned"]
             distances.append(dist(tuple(map(float, pos)), flight.owner.chest_ned))
         return watch.is_over
 
@@ -70,7 +70,7 @@ def test_a_touch_softer_than_the_ground_at_take_off_is_a_collision():
     trees = flight.world.trees
     tree = trees[np.argmin(np.hypot(trees["north"], trees["east"]))]
     run(flight, watch, 0.5)
-    body = flight.rig.arrays.body.numpy()
+    body = flight.rig.rows["body"]
     body["pos_ned"][0] = [tree["north"] - tree["trunk_radius"] - 0.3, tree["east"], -tree["root_height"] - 2.0]
     body["vel_ned"][0] = [0.05, 0.0, 0.0]
     run(flight, watch, 0.1)
@@ -82,7 +82,7 @@ def test_a_touch_softer_than_the_ground_at_take_off_is_a_collision():
 
 def test_an_owner_brushed_between_two_samples_is_a_collision():
     flight, watch = watched_flight()
-    owner, body = flight.owner.people.numpy(), flight.rig.arrays.body.numpy()
+    owner, body = flight.owner.people.numpy(), flight.rig.rows["truth"]
     run(flight, watch, 0.54)
     place = owner["pos_ned"].copy()
     owner["pos_ned"][0] = body["pos_ned"][0] + [0.0, 0.0, 2.0]

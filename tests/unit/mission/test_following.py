@@ -32,7 +32,7 @@ def read_own(rig: RigArrays, own: wp.array(dtype=OwnState)):
 
 
 def distance_m(flight):
-    pos = flight.rig.arrays.body.numpy()[0]["pos_ned"]
+    pos = flight.rig.rows["truth"][0]["pos_ned"]
     return dist(tuple(map(float, pos)), flight.owner.chest_ned)
 
 

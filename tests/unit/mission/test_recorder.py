@@ -26,7 +26,7 @@ class Flown:
         flight = Flight(FlightConfig(seed=2, wind_m_s=3.0), folder=folder)
         flight.fly(self._climb, seconds=SECONDS)
         arrays = flight.rig.arrays
-        self.body = arrays.body.numpy()[0].copy()
+        self.body = flight.rig.truth.numpy()[0].copy()
         self.samples = arrays.sensors.numpy()["samples"][0].copy()
         self.estimate = arrays.autopilot.ekf.rows.numpy()["estimate"][0].copy()
         self.actuators = arrays.autopilot.control.numpy()["actuators"][0].copy()

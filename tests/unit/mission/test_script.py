@@ -35,7 +35,7 @@ def result_of(flight, script, seconds=300.0):
 
 
 def true_ned(flight):
-    return [float(x) for x in flight.rig.arrays.body.numpy()["pos_ned"][0]]
+    return [float(x) for x in flight.rig.rows["truth"]["pos_ned"][0]]
 
 
 def item(seq, command, north=0.0, east=0.0, height=10.0, params=(0.0, 0.0, 0.0, nan)):

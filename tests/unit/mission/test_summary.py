@@ -184,7 +184,7 @@ def test_result_is_that_of_the_script(flight):
 
 
 def test_a_crash_is_no_success_whatever_the_script_says(flight):
-    flight.rig.arrays.body.numpy()["is_crashed"][0] = 1
+    flight.rig.rows["truth"]["is_crashed"][0] = 1
     summary = summarise(flight, history_of(10), script_that(), [])
     assert (summary.result, summary.is_success) == ("crashed", False)
 

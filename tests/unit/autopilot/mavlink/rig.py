@@ -45,7 +45,7 @@ from autopilot.traffic import Aircraft, Traffic
 from autopilot.vehicle import ACCEPTED, BatteryLevel, Mode, OrbitStatus, Reply, VehicleState
 from common.geodesy import GeoPoint
 from common.records import row_reader
-from sim.bodies.multirotor import BodyState
+from sim.truth import Truth
 
 FRAME_US = 20_000
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
@@ -226,9 +226,9 @@ class RecordedCalibration:
         self._vehicle._record("set_offsets", sensor, offsets)
 
 
-def record_of_body() -> Any:
+def record_of_truth() -> Any:
     """The simulator's truth: at rest."""
-    return record(BodyState, "BodyState", q_ned_from_frd=(0.0, 0.0, 0.0, 1.0))
+    return record(Truth, "Truth", q_ned_from_frd=(0.0, 0.0, 0.0, 1.0))
 
 
 class RecordingVehicle:
@@ -239,7 +239,7 @@ class RecordingVehicle:
         self.params = parameter_table()
         self.station = StationLink()
         self.calibration = RecordedCalibration(self)
-        self.host = Host(read_truth=record_of_body)
+        self.host = Host(read_truth=record_of_truth)
         self.camera: Camera | None = None
         self.sticks = Sticks(self.params)
         self.state.sticks = self.sticks.input

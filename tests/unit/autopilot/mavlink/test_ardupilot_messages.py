@@ -10,7 +10,7 @@ from autopilot.mavlink.codec import message_id
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.ports import POSITION_VALID, TERRAIN_VALID
 from common.clock import SIMULATED_EPOCH_US
-from sim.bodies.multirotor import BodyState
+from sim.truth import Truth
 from tests.unit.autopilot.mavlink.rig import HOME, RecordingVehicle, Rig, record
 
 STREAMED = (
@@ -104,8 +104,8 @@ def test_speed_controllers_tell_revolutions_and_voltage():
 def test_truth_comes_from_the_host():
     vehicle = RecordingVehicle()
     truth = record(
-        BodyState,
-        "BodyState",
+        Truth,
+        "Truth",
         q_ned_from_frd=(0.0, 0.0, 0.6, 0.8),
         pos_ned=(100.0, 0.0, -5.0),
         vel_ned=(1.0, 2.0, 3.0),

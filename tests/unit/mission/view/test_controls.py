@@ -111,7 +111,7 @@ def test_a_restart_in_flight_puts_it_on_its_pad_with_a_full_battery_and_its_miss
     said_after(flight, view, 3.0)
     assert running.is_done
     assert not flight.controller.state.is_armed
-    body = flight.rig.arrays.body.numpy()[0]
+    body = flight.rig.rows["truth"][0]
     assert float(abs(body["pos_ned"][:2]).max()) < 0.1
     assert flight.controller.state.battery_remaining > 0.99
     buttons(page)["Fly the mission"]()

@@ -16,7 +16,7 @@ def test_every_frame_of_a_flight_is_kept():
     recorder = Recorder(flight, [(0.0, 0.0, 0.0), (5.0, 0.0, -3.0)])
     flight.run(lambda f: f.time_us >= 1_000_000, on_frame=lambda _: recorder.frame())
     recording = recorder.recording()
-    body = flight.rig.arrays.body.numpy()[0]
+    body = flight.rig.rows["truth"][0]
     assert len(recording) == 50
     assert np.diff(recording.rows["time_s"]) == pytest.approx(0.02)
     assert np.array_equal(recording.rows["pos_ned"][-1], body["pos_ned"])

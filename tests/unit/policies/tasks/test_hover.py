@@ -76,7 +76,7 @@ def test_the_policy_sees_the_estimate_and_not_the_truth():
     batch.step(np.zeros(4, np.float32))
     distance = np.linalg.norm(batch.observations[0, :3])
     estimate = batch.rig.arrays.autopilot.ekf.rows.numpy()["estimate"]["pos_ned"][0]
-    truth = batch.rig.arrays.body.numpy()["pos_ned"][0]
+    truth = batch.rig.rows["truth"]["pos_ned"][0]
     assert distance == pytest.approx(np.linalg.norm(np.array(HOVER_NED) - estimate), rel=1e-5)
     assert abs(distance - np.linalg.norm(np.array(HOVER_NED) - truth)) > 1e-3
     assert batch.rewards[0] == pytest.approx(1.0 - np.linalg.norm(np.array(HOVER_NED) - truth) / BALL_M, abs=0.1)

@@ -8,9 +8,9 @@ import warp as wp
 
 from autopilot.ports import Samples
 from common.kernels import TICK_US
-from sim.bodies.multirotor import BodyState
 from sim.faults import Faults, set_fault
 from sim.sensors.sensors import SensorModel, SensorState, sense, sensor_model
+from sim.truth import Truth
 from sim.world.world import World, WorldConfig, build_world
 
 wp.set_module_options({"enable_backward": False})
@@ -23,7 +23,7 @@ def _record(
     models: wp.array(dtype=SensorModel),
     states: wp.array(dtype=SensorState),
     faults: wp.array(dtype=Faults),
-    bodies: wp.array(dtype=BodyState),
+    bodies: wp.array(dtype=Truth),
     world: World,
     seed: int,
     first_tick: wp.int64,
@@ -53,7 +53,7 @@ class Recorder:
         self.seed = seed
         self.tick = 0
         model = model or sensor_model(noise_scale)
-        body = BodyState()
+        body = Truth()
         body.pos_ned = wp.vec3(1.0, 2.0, -10.0)
         body.vel_ned = wp.vec3(0.5, -0.25, 0.125)
         body.q_ned_from_frd = wp.quat_identity()
@@ -63,7 +63,7 @@ class Recorder:
         self._models = wp.array([model] * vehicle_count, dtype=SensorModel, device="cpu")
         self._states = wp.zeros(vehicle_count, dtype=SensorState, device="cpu")
         self._faults = wp.zeros(vehicle_count, dtype=Faults, device="cpu")
-        self._bodies = wp.array([body] * vehicle_count, dtype=BodyState, device="cpu")
+        self._bodies = wp.array([body] * vehicle_count, dtype=Truth, device="cpu")
         self.models = self._models.numpy()
         self.states = self._states.numpy()
         self.faults = self._faults.numpy()

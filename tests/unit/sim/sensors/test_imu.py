@@ -23,7 +23,7 @@ def only_vibration(recorder, speed_rad_s):
     bias_free(recorder)
     recorder.models["imu"]["gyro_std"] = 0.0
     recorder.models["imu"]["accel_std"] = 0.0
-    recorder.bodies["rotor_speed"][:, :4] = speed_rad_s
+    recorder.bodies["motor_speed"][:, :4] = speed_rad_s
     return recorder
 
 

@@ -20,7 +20,7 @@ def _measured() -> tuple[Any, Any, Any]:
     worlds.grow_all(3)
     rig = build_rig(worlds, COUNT, has_estimator=False, threads=1, device="cpu")
     rng = np.random.default_rng(0)
-    body = rig.arrays.body.numpy()
+    body = rig.rows["truth"]
     yaw = rng.uniform(-np.pi, np.pi, COUNT)
     body["q_ned_from_frd"] = np.stack([0 * yaw, 0 * yaw, np.sin(0.5 * yaw), np.cos(0.5 * yaw)], axis=1)
     for i in range(COUNT):

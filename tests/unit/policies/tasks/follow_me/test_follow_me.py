@@ -106,7 +106,7 @@ def test_observation_does_not_change_when_the_truth_does() -> None:
         return bytes(task.border.observations.numpy().tobytes())
 
     before = shown()
-    for array in (task.rig.arrays.body, task.follow.people, task.follow.sights, task.follow.nearness):
+    for array in (task.rig.truth, task.follow.people, task.follow.sights, task.follow.nearness):
         array.zero_()
     assert shown() == before
 
@@ -148,7 +148,7 @@ def test_episodes_start_as_takeovers_do() -> None:
     off_m = np.linalg.norm((fixes["pos_ned"] - people_ned)[is_known, :2], axis=1)
     assert 0.5 < off_m.mean() < 4.0
     task.step()
-    heights_m = task.rig.arrays.body.numpy()["height_agl_m"]
+    heights_m = task.rig.rows["truth"]["height_agl_m"]
     assert heights_m.min() < 2.0
     assert heights_m.max() > 3.0  # a vehicle's least takeoff is 2.5 m
 
@@ -157,7 +157,7 @@ def test_episodes_start_as_takeovers_do() -> None:
 def test_an_owner_who_runs_past_between_two_decisions_has_been_hit(aside_m: float, outcome: Outcome) -> None:
     task = _task(1, numbers={"touch_m": 0.2, "trees_per_ha": 0.0, "owner_speed_max": 6.0}, **STATE)
     people = task.follow.people.numpy()
-    drone_ned = task.rig.arrays.body.numpy()[0]["pos_ned"]
+    drone_ned = task.rig.rows["truth"][0]["pos_ned"]
     people["pos_ned"][0, :2] = drone_ned[0] + aside_m, drone_ned[1] - 0.3  # 0.6 m to the east in 0.1 s
     people["course_rad"] = people["heading_rad"] = 0.5 * math.pi
     people["speed"] = people["speed_sp"] = 6.0
@@ -224,7 +224,7 @@ def test_measures_are_the_truth_about_the_owner() -> None:
     task = _task(4, **STATE)
     _fly(task, 5)
     measures = dict(zip(MEASURES, task.measures.numpy().T, strict=True))
-    body, people = task.rig.arrays.body.numpy(), task.follow.people.numpy()
+    body, people = task.rig.rows["truth"], task.follow.people.numpy()
     chest = people["pos_ned"] - np.array([0.0, 0.0, 1.0])
     distance = np.linalg.norm(chest - body["pos_ned"], axis=1)
     np.testing.assert_allclose(measures["distance_m"], distance, rtol=1e-5)

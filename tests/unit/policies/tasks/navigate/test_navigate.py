@@ -104,14 +104,14 @@ def test_observation_does_not_change_when_the_truth_does() -> None:
 
     shown()  # fills both frames of the stack
     before = shown()
-    task.rig.arrays.body.zero_()
+    task.rig.truth.zero_()
     assert shown() == before
 
 
 def test_sectors_tell_the_nearest_that_a_fan_of_fine_rays_meets() -> None:
     task = _task(4, numbers={"range_noise": 0.0, "hill_height_m": 0.0})
     ranges_m = task.navigation.ranges_m.numpy()
-    bodies = task.rig.arrays.body.numpy()
+    bodies = task.rig.rows["truth"]
     for row, body in enumerate(bodies):
         x, y, z, w = (float(value) for value in body["q_ned_from_frd"])
         heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
@@ -134,7 +134,7 @@ def test_goal_is_told_by_estimate_in_the_heading_frame() -> None:
     names = [element.name for element in task.layout.frame]
     frame = task.border.observations.numpy()[:, task.layout.frame_size :]
     seen = {name: frame[:, k] for k, name in enumerate(names)}
-    bodies = task.rig.arrays.body.numpy()
+    bodies = task.rig.rows["truth"]
     way = task.navigation.goals_ned.numpy() - bodies["pos_ned"]
     x, y, z, w = bodies["q_ned_from_frd"].T
     heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
@@ -190,7 +190,7 @@ def test_measures_are_the_truth_about_the_way() -> None:
     task = _task(2, **QUICK)
     _fly(task, 5)
     measures = dict(zip(MEASURES, task.measures.numpy().T, strict=True))
-    pos_ned = task.rig.arrays.body.numpy()["pos_ned"]
+    pos_ned = task.rig.rows["truth"]["pos_ned"]
     goals_ned = task.navigation.goals_ned.numpy()
     np.testing.assert_allclose(measures["distance_m"], np.linalg.norm(goals_ned - pos_ned, axis=1), rtol=1e-5)
     np.testing.assert_allclose(measures["time_s"], 0.5, rtol=1e-5)
