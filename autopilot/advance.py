@@ -1,30 +1,95 @@
 """One tick of the flight controller's kernel part: samples in, motor commands out, at 250 Hz.
 
-This is the same code on every rig: inside the simulator's fused launch (sim/advance.py), or alone, on samples from a
-recorded flight or an outside simulator.
+This is the same code on every rig: fused into the simulator's launch (sim/advance.py), or alone, as a kernel on samples
+from a recorded flight, another engine or an outside simulator.
 """
+
+from functools import cache
+from typing import Any, NamedTuple
 
 import warp as wp
 
-from autopilot.control.airframe import ControlAirframe
-from autopilot.control.control import ControlState
-from autopilot.control.params import ControlParams
-from autopilot.estimator.ekf import estimator_step
+from autopilot.control.law import ControlLaw
+from autopilot.estimator.ekf import estimator_reset, estimator_step
 from autopilot.estimator.state import Ekf, EstimatorState
-from autopilot.ports import CONTACT_UNKNOWN, Samples, Setpoint
+from autopilot.ports import CONTACT_UNKNOWN, Samples, Setpoint, contact
+from common.kernels import vec8
+from common.rng import draw_tick
 
 wp.set_module_options({"enable_backward": False})
 
 
-@wp.struct
-class Autopilot:
-    """Everything the kernel part keeps; each array has one row per vehicle."""
+class AutopilotKernels(NamedTuple):
+    """The flight controller with one control law, as kernels."""
 
-    ekf: Ekf
-    control: wp.array(dtype=ControlState)
-    control_params: wp.array(dtype=ControlParams)
-    airframe: wp.array(dtype=ControlAirframe)
-    setpoint: wp.array(dtype=Setpoint)  # written by the Python part
+    Arrays: type
+    """Kernel struct of everything that it keeps: `ekf`, `control`, `control_params`, `airframe`, `setpoint`."""
+    tick: Any
+    """`@wp.func (Ekf, i, Params, Airframe, State, Setpoint, Samples, tick: int64) -> State`, to be fused."""
+    power_on: Any
+    """`@wp.func (Arrays, i)`: the state after power-on."""
+    run: Any
+    """`@wp.kernel (Arrays, samples, ticks, commands)`: one tick alone, on samples from anywhere."""
+
+
+@cache
+def autopilot_kernels(law: ControlLaw) -> AutopilotKernels:
+    """The kernels of a law, the same objects each time."""
+    params_type, airframe_type, state_type, control_tick = law.Params, law.Airframe, law.State, law.tick
+
+    @wp.struct
+    class Autopilot:
+        """Everything the kernel part keeps; each array has one row per vehicle."""
+
+        ekf: Ekf
+        control: wp.array(dtype=state_type)
+        control_params: wp.array(dtype=params_type)
+        airframe: wp.array(dtype=airframe_type)
+        setpoint: wp.array(dtype=Setpoint)  # written by the Python part
+
+    @wp.func
+    def autopilot_tick(
+        ekf: Ekf,
+        i: int,
+        params: params_type,
+        airframe: airframe_type,
+        state: state_type,
+        setpoint: Setpoint,
+        samples: Samples,
+        tick: wp.int64,
+    ) -> state_type:
+        estimator_step(ekf, i, samples, contact(setpoint))
+        estimate = ekf.rows[i].estimate
+        return control_tick(params, airframe, state, estimate, setpoint, samples.battery, draw_tick(tick))
+
+    @wp.func
+    def power_on(autopilot: Autopilot, i: int) -> None:
+        autopilot.control[i] = state_type()
+        autopilot.setpoint[i] = Setpoint()
+        estimator_reset(autopilot.ekf, i)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def run_autopilot(
+        autopilot: Autopilot,
+        samples: wp.array(dtype=Samples),
+        ticks: wp.array(dtype=wp.int64),
+        commands: wp.array(dtype=vec8),
+    ) -> None:
+        i = wp.tid()
+        control = autopilot_tick(
+            autopilot.ekf,
+            i,
+            autopilot.control_params[i],
+            autopilot.airframe[i],
+            autopilot.control[i],
+            autopilot.setpoint[i],
+            samples[i],
+            ticks[i],
+        )
+        autopilot.control[i] = control
+        commands[i] = control.actuators.command
+
+    return AutopilotKernels(Autopilot, autopilot_tick, power_on, run_autopilot)
 
 
 @wp.kernel(enable_backward=False)

@@ -83,6 +83,7 @@ class Flight:
         video: sends it to ground stations.
         has_camera_thread: photos are rendered while the flight goes on, which is then no longer the same each time.
         state: what outlives the flight; None: it begins with defaults and nothing is kept.
+        make_rig: takes the arguments of `Rig`; `sim.stepped.SteppedRig` flies with the engine and the board of others.
     """
 
     def __init__(
@@ -96,11 +97,12 @@ class Flight:
         stream: StreamServer | None = None,
         video: RtpVideo | None = None,
         has_camera_thread: bool = False,
+        make_rig: Callable[..., Rig] = Rig,
     ) -> None:
         self.config = config
         self.airframe: Airframe = load_airframe(config.airframe)
         self.world: WorldMap = flight_world(config)
-        self.rig = Rig(
+        self.rig = make_rig(
             self.airframe,
             self.world,
             sensor_model(noise_scale=config.noise, home=config.home),

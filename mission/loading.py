@@ -1,17 +1,25 @@
 """The kernels of a flight, loaded before it begins: what the cache lacks is compiled, and no flight stops for it."""
 
+from typing import Any
+
 import warp as wp
 
 from mission.terminal import Say
-from sim.rig import advance_kernel
+from sim.advance import rig_kernels
 
-_ALWAYS = ("autopilot.estimator.ekf", "sim.advance")
+_ALWAYS = ("autopilot.estimator.ekf",)
 _CAMERA = ("sim.sensors.camera",)
 _OWNER = (
     "sim.world.hills", "sim.world.growing", "sim.owner", "sim.sensors.quick.prepare", "sim.sensors.quick.columns",
     "sim.sensors.quick.rows", "sim.sensors.quick.optics", "sim.sensors.quick.ground", "sim.sensors.quick.light",
     "policies.tasks.follow_me.images", "policies.tasks.follow_me.observe", "policies.tasks.flight.own",
 )  # fmt: skip
+
+
+def flight_kernels() -> tuple[Any, ...]:
+    """Those that are in modules of their own."""
+    kernels = rig_kernels()
+    return kernels.place, kernels.power_on, kernels.forget_all_impacts, kernels.advance
 
 
 def load_kernels(say: Say, *, has_camera: bool, has_owner: bool) -> None:
@@ -23,7 +31,7 @@ def load_kernels(say: Say, *, has_camera: bool, has_owner: bool) -> None:
         has_owner: those of the owner and of the policy that follows too; their packages must have been imported.
     """
     names = (*_ALWAYS, *(_CAMERA if has_camera else ()), *(_OWNER if has_owner else ()))
-    modules = [*(wp.get_module(name) for name in names), advance_kernel(has_estimator=True).module]
+    modules = [wp.get_module(name) for name in names] + [kernel.module for kernel in flight_kernels()]
     for number, module in enumerate(modules, 1):
         say(f"loading kernels, compiled the first time: {number} of {len(modules)}")
         wp.load_module(module, device="cpu")

@@ -5,16 +5,13 @@ tasks take `arrays`, whose rows they read, and of which they write setpoints alo
 per thread, for one vehicle or thousands.
 """
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from autopilot.advance import Autopilot
-from autopilot.control.airframe import ControlAirframe, control_airframe
-from autopilot.control.control import ControlState
-from autopilot.control.params import CONTROL_PARAMETERS, ControlParams, control_params
+from autopilot.advance import autopilot_kernels
+from autopilot.control.law import MULTIROTOR_LAW, ControlLaw
 from autopilot.estimator.ekf import make_ekf
 from autopilot.estimator.params import estimator_fields
 from autopilot.ports import Setpoint
@@ -22,8 +19,8 @@ from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.params import ParameterTable
-from sim.advance import RigArrays, boot, forget_all_impacts, make_advance, reboot
-from sim.bodies.multirotor import BodyState, MultirotorModel, multirotor_model
+from sim.advance import rig_kernels
+from sim.bodies.body import MULTIROTOR_BODY, Body
 from sim.faults import Faults
 from sim.rows import HostRows
 from sim.sensors.sensors import SensorModel, SensorState
@@ -53,6 +50,8 @@ class Rig:
         threads: the vehicles are split into as many launches; the results do not depend on it.
         device: a Warp device.
         has_mirrors: the host sees copies of the rows, as those of a GPU.
+        body: what is moved.
+        law: what flies it.
     """
 
     def __init__(
@@ -69,17 +68,20 @@ class Rig:
         threads: int = 1,
         device: str = "cpu",
         has_mirrors: bool = False,
+        body: Body = MULTIROTOR_BODY,
+        law: ControlLaw = MULTIROTOR_LAW,
     ) -> None:
+        self.body, self.law = body, law
+        self._kernels = rig_kernels(body, law)
         self.vehicle_count = vehicle_count
         self.device = device
-        self.arrays = RigArrays()
+        self.arrays: Any = self._kernels.Arrays()
         self._world = world  # holds the arrays that the kernels' structs point into
         self.arrays.worlds, self.arrays.i_world = self._worlds(world)
         self.arrays.tick = wp.zeros(vehicle_count, dtype=wp.int64, device=device)
         self.arrays.seed = wp.full(vehicle_count, seed, dtype=int, device=device)
-        model = multirotor_model(airframe, home.alt_m)
-        self.arrays.model = self._rows(MultirotorModel, model)
-        self.arrays.body = self._rows(BodyState, BodyState())
+        self.arrays.model = self._rows(body.Model, body.model(airframe, home.alt_m))
+        self.arrays.body = self._rows(body.State, body.State())
         self.arrays.truth = self._rows(Truth, Truth())
         self.arrays.wind_model = self._rows(WindModel, wind_model)
         self.arrays.wind = self._rows(WindState, WindState())
@@ -90,7 +92,7 @@ class Rig:
         self._field_ned_gauss = field_ned_gauss(home.lat_deg, home.lon_deg, home.alt_m)
         self.rows = HostRows(self.arrays, is_mirrored=has_mirrors or wp.get_device(device).is_cuda)
         self._commands: dict[int, list[Any]] = {}
-        self._kernel = advance_kernel(has_estimator=has_estimator)
+        self._kernel = self._kernels.advance if has_estimator else self._kernels.advance_by_truth
         self._workers = Workers(vehicle_count, threads)
         self.boot()
 
@@ -119,7 +121,7 @@ class Rig:
 
     def forget_impacts(self) -> None:
         """Only what the vehicles touch from now on counts."""
-        wp.launch(forget_all_impacts, dim=self.vehicle_count, inputs=[self.arrays], device=self.device)
+        wp.launch(self._kernels.forget_all_impacts, dim=self.vehicle_count, inputs=[self.arrays], device=self.device)
         self.rows.fetch()
 
     def advance(self, tick_count: int) -> None:
@@ -140,8 +142,21 @@ class Rig:
         """Powers vehicles on, on the ground at home; `chosen` marks them, shape (vehicles,), None for all."""
         mask = np.ones(self.vehicle_count, dtype=np.int32) if chosen is None else chosen.astype(np.int32)
         marks = wp.array(mask, dtype=int, device=self.device)
-        wp.launch(boot, dim=self.vehicle_count, inputs=[self.arrays, marks], device=self.device)
+        self.boot_marked(marks)
         self.rows.fetch()
+
+    def boot_marked(self, marks: Any) -> None:
+        """Boots the vehicles whose mark is not 0; marks: array of int, (vehicles,)."""
+        self.place(marks)
+        self.power_on(marks)
+
+    def place(self, marks: Any) -> None:
+        """Puts marked vehicles on the ground at home, at rest and with a full battery."""
+        wp.launch(self._kernels.place, dim=self.vehicle_count, inputs=[self.arrays, marks], device=self.device)
+
+    def power_on(self, marks: Any) -> None:
+        """Powers the sensors and flight controllers of marked vehicles off and on, wherever they are."""
+        wp.launch(self._kernels.power_on, dim=self.vehicle_count, inputs=[self.arrays, marks], device=self.device)
 
     def snapshot(self) -> Snapshot:
         """A copy of all rows, to be restored in this rig or in another of as many vehicles."""
@@ -155,14 +170,16 @@ class Rig:
 
     def reboot(self, i_vehicle: int = 0) -> None:
         """Powers the sensors and the flight controller of one vehicle off and on, wherever it is."""
-        wp.launch(reboot, dim=1, inputs=[self.arrays, i_vehicle], device=self.device)
+        marks = np.zeros(self.vehicle_count, dtype=np.int32)
+        marks[i_vehicle] = 1
+        self.power_on(wp.array(marks, dtype=int, device=self.device))
         self.rows.fetch()
 
     def load_parameters(self, table: ParameterTable) -> None:
         """Gives every flight controller the values of a parameter table, and the magnetic field of the place."""
         estimator = estimator_fields(table) | {"earth_field_ned_gauss": self._field_ned_gauss}
         self._write_rows(self.arrays.autopilot.ekf.params, estimator)
-        self._write_rows(self.arrays.autopilot.control_params, table.fields(CONTROL_PARAMETERS))
+        self._write_rows(self.arrays.autopilot.control_params, table.fields(self.law.parameters))
 
     def _write_rows(self, array: Any, fields: dict[str, Any]) -> None:
         rows = array.numpy()
@@ -195,12 +212,13 @@ class Rig:
             raise ValueError(f"{self.vehicle_count} vehicles need as many worlds, not {world.count}")
         return world.kernels, wp.array(np.arange(world.count), dtype=int, device=self.device)
 
-    def _autopilot(self, airframe: Airframe) -> Autopilot:
-        autopilot = Autopilot()
+    def _autopilot(self, airframe: Airframe) -> Any:
+        law = self.law
+        autopilot: Any = autopilot_kernels(law).Arrays()
         autopilot.ekf = make_ekf(self.vehicle_count, self.device)
-        autopilot.control = self._rows(ControlState, ControlState())
-        autopilot.control_params = self._rows(ControlParams, control_params())
-        autopilot.airframe = self._rows(ControlAirframe, control_airframe(airframe))
+        autopilot.control = self._rows(law.State, law.State())
+        autopilot.control_params = self._rows(law.Params, law.default_params())
+        autopilot.airframe = self._rows(law.Airframe, law.airframe_row(airframe))
         autopilot.setpoint = self._rows(Setpoint, Setpoint())
         return autopilot
 
@@ -220,9 +238,3 @@ def row_arrays(arrays: Any) -> list[Any]:
         else:
             found.extend(row_arrays(member))
     return found
-
-
-@cache
-def advance_kernel(*, has_estimator: bool) -> Any:
-    """The kernel of the whole loop, the same object for every rig."""
-    return make_advance(has_estimator)

@@ -399,6 +399,12 @@ def body_at_rest(model: MultirotorModel, pos_ned: wp.vec3, yaw_rad: float) -> Bo
     return body
 
 
+@wp.func
+def standing_height(model: MultirotorModel) -> float:
+    """Of the centre of gravity over the ground [m] that its feet stand on."""
+    return model.contact.leg_frd[2]
+
+
 def multirotor_model(airframe: Airframe, home_alt_amsl_m: float = DEFAULT_HOME.alt_m) -> MultirotorModel:
     """Constants of an airframe whose home lies home_alt_amsl_m above sea level."""
     body, rotor = airframe.body, airframe.rotor_model

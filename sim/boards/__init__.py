@@ -1,0 +1,1 @@
+"""Boards: who flies the bodies. The own one is the flight controller of `autopilot`."""

@@ -1,0 +1,23 @@
+"""What a rig asks of whoever flies its vehicles: samples in, motor commands out."""
+
+from typing import Any, Protocol
+
+
+class Board(Protocol):
+    """Flies every vehicle of a rig; made for it."""
+
+    def boot(self, is_chosen: Any) -> None:
+        """Powers flight controllers off and on.
+
+        Args:
+            is_chosen: array of int, (vehicles,); not 0: this one.
+        """
+
+    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:
+        """Gives each flight controller what its sensors have delivered, and takes its commands, once per tick of 4 ms.
+
+        Args:
+            samples: array of `Samples`, (vehicles,).
+            truth: array of `Truth`, (vehicles,): for simulators that an outside autopilot brings along; not ours.
+            commands: array of vec8, (vehicles,), to be written: [0..1] of the motors.
+        """

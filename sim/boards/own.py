@@ -1,0 +1,28 @@
+"""The flight controller of `autopilot` as a board: the same that is fused into the fast rig's launch."""
+
+from typing import Any
+
+import warp as wp
+
+from autopilot.advance import autopilot_kernels
+from sim.rig import Rig
+
+
+class OwnBoard:
+    """See sim/boards/board.py.
+
+    Args:
+        rig: whose vehicles it flies; its setpoints and parameters are the rig's.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._kernel = autopilot_kernels(rig.law).run
+
+    def boot(self, is_chosen: Any) -> None:
+        self._rig.power_on(is_chosen)
+
+    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (it is not told the truth)
+        arrays = self._rig.arrays
+        inputs = [arrays.autopilot, samples, arrays.tick, commands]
+        wp.launch(self._kernel, dim=self._rig.vehicle_count, inputs=inputs, device=self._rig.device)

@@ -1,0 +1,36 @@
+"""A body of the native engine: what is moved, as data and functions. The multirotor's is the first."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from sim.bodies.multirotor import (
+    BodyState,
+    MultirotorModel,
+    body_at_rest,
+    body_tick,
+    multirotor_model,
+    standing_height,
+    truth_of,
+)
+
+
+class Body(NamedTuple):
+    """A class of bodies, one row of each struct per vehicle."""
+
+    Model: type
+    """Kernel struct of the constants of one airframe at one place."""
+    State: type
+    """Kernel struct of all that the body needs to go on; with `pos_ned`, `vel_ned` and `impact_speed` as in `Truth`."""
+    tick: Any
+    """`@wp.func (Model, State, command: vec8, wind_ned: vec3, World) -> State`, every 4 ms."""
+    truth: Any
+    """`@wp.func (State) -> Truth`: what others may read."""
+    at_rest: Any
+    """`@wp.func (Model, pos_ned, yaw: float) -> State`: level and still, battery full."""
+    standing_height: Any
+    """`@wp.func (Model) -> float`: of the centre of gravity over the ground [m]."""
+    model: Callable[[Any, float], Any]
+    """Makes a `Model` from the airframe file and the altitude of home [m]."""
+
+
+MULTIROTOR_BODY = Body(MultirotorModel, BodyState, body_tick, truth_of, body_at_rest, standing_height, multirotor_model)

@@ -1,0 +1,56 @@
+"""The native engine alone: the bodies that the fused rig has within its one launch."""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from common.kernels import vec8
+from sim.bodies.body import Body
+from sim.rig import Rig
+from sim.truth import Truth
+from sim.world.world import World
+
+wp.set_module_options({"enable_backward": False})
+
+
+@cache
+def _step_kernel(body: Body) -> Any:
+    model_type, state_type, body_tick, truth_of = body.Model, body.State, body.tick, body.truth
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def step(
+        models: wp.array(dtype=model_type),
+        states: wp.array(dtype=state_type),
+        worlds: wp.array(dtype=World),
+        i_world: wp.array(dtype=int),
+        commands: wp.array(dtype=vec8),
+        wind_ned: wp.array(dtype=wp.vec3),
+        truths: wp.array(dtype=Truth),
+    ) -> None:
+        i = wp.tid()
+        state = body_tick(models[i], states[i], commands[i], wind_ned[i], worlds[i_world[i]])
+        states[i] = state
+        truths[i] = truth_of(state)
+
+    return step
+
+
+class NativeEngine:
+    """See sim/engines/engine.py.
+
+    Args:
+        rig: whose bodies it moves.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._kernel = _step_kernel(rig.body)
+
+    def boot(self, is_chosen: Any) -> None:
+        self._rig.place(is_chosen)
+
+    def step(self, commands: Any, wind_ned: Any) -> None:
+        arrays = self._rig.arrays
+        rows = [arrays.model, arrays.body, arrays.worlds, arrays.i_world, commands, wind_ned, arrays.truth]
+        wp.launch(self._kernel, dim=self._rig.vehicle_count, inputs=rows, device=self._rig.device)

@@ -1,0 +1,132 @@
+"""The loop in single launches, tick by tick: any engine with any board.
+
+What sim/advance.py fuses into one launch is here four: the air and the commands as they reach the motors, the engine,
+the sensors, the board. With our own engine and board both rigs agree bit for bit; it is there for those of others.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import warp as wp
+
+from autopilot.ports import Samples
+from common.kernels import TICK_S, vec8
+from common.rng import draw_tick
+from sim.boards.board import Board
+from sim.boards.own import OwnBoard
+from sim.engines.engine import Engine
+from sim.engines.native import NativeEngine
+from sim.faults import Faults, weakened
+from sim.rig import Rig
+from sim.sensors.sensors import SensorModel, SensorState, sense
+from sim.truth import Truth
+from sim.wind import WindModel, WindState, wind_step
+from sim.world.world import World, ground_height
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel(enable_backward=False)
+def blow(
+    worlds: wp.array(dtype=World),
+    i_world: wp.array(dtype=int),
+    models: wp.array(dtype=WindModel),
+    truths: wp.array(dtype=Truth),
+    faults: wp.array(dtype=Faults),
+    board_commands: wp.array(dtype=vec8),
+    seeds: wp.array(dtype=int),
+    ticks: wp.array(dtype=wp.int64),
+    winds: wp.array(dtype=WindState),
+    wind_ned: wp.array(dtype=wp.vec3),
+    commands: wp.array(dtype=vec8),
+) -> None:
+    """The air at each vehicle, and what its motors get of the commands."""
+    i = wp.tid()
+    pos_ned = truths[i].pos_ned
+    height = -pos_ned[2] - ground_height(worlds[i_world[i]], pos_ned[0], pos_ned[1])
+    count = draw_tick(ticks[i])
+    wind = wind_step(models[i], winds[i], truths[i].vel_ned, height, seeds[i], i, count, TICK_S)
+    winds[i] = wind
+    wind_ned[i] = wind.wind_ned
+    commands[i] = weakened(board_commands[i], faults[i].motor_loss)
+
+
+@wp.kernel(enable_backward=False)
+def sense_all(
+    worlds: wp.array(dtype=World),
+    i_world: wp.array(dtype=int),
+    models: wp.array(dtype=SensorModel),
+    faults: wp.array(dtype=Faults),
+    truths: wp.array(dtype=Truth),
+    seeds: wp.array(dtype=int),
+    ticks: wp.array(dtype=wp.int64),
+    states: wp.array(dtype=SensorState),
+    samples: wp.array(dtype=Samples),
+) -> None:
+    """The sensors after a tick."""
+    i = wp.tid()
+    state = sense(models[i], states[i], faults[i], truths[i], worlds[i_world[i]], seeds[i], i, ticks[i])
+    states[i] = state
+    samples[i] = state.samples
+
+
+@wp.kernel(enable_backward=False)
+def count_on(ticks: wp.array(dtype=wp.int64)) -> None:
+    """The tick is over."""
+    i = wp.tid()
+    ticks[i] = ticks[i] + wp.int64(1)
+
+
+class SteppedRig(Rig):
+    """A rig whose bodies an engine moves and whose vehicles a board flies.
+
+    Args:
+        engine: makes the engine for this rig.
+        board: makes the board.
+        arguments: those of `Rig`; the flight controller is given samples, never the truth.
+    """
+
+    def __init__(
+        self,
+        *arguments: Any,
+        engine: Callable[[Rig], Engine] = NativeEngine,
+        board: Callable[[Rig], Board] = OwnBoard,
+        **options: Any,
+    ) -> None:
+        super().__init__(*arguments, **options)
+        count, device = self.vehicle_count, self.device
+        self._samples = wp.zeros(count, dtype=Samples, device=device)
+        self._board_commands = wp.zeros(count, dtype=vec8, device=device)
+        self._commands = wp.zeros(count, dtype=vec8, device=device)
+        self._wind_ned = wp.zeros(count, dtype=wp.vec3, device=device)
+        self._engine, self._board = engine(self), board(self)
+        self.boot()
+
+    def boot_marked(self, marks: Any) -> None:
+        if not hasattr(self, "_engine"):  # they are made for a rig that has booted
+            super().boot_marked(marks)
+            return
+        self._engine.boot(marks)
+        self.power_on(marks)
+        self._board.boot(marks)
+
+    def prepare(self, tick_count: int) -> list[Any]:  # noqa: ARG002  (any number of ticks is the same launches)
+        return []
+
+    def advance(self, tick_count: int) -> None:
+        self.rows.send()
+        for _ in range(tick_count):
+            self._tick()
+        self.rows.fetch()
+
+    def _tick(self) -> None:
+        a, air = self.arrays, [self._board_commands, self.arrays.seed, self.arrays.tick, self.arrays.wind]
+        place = [a.worlds, a.i_world]
+        self._launch(blow, [*place, a.wind_model, a.truth, a.faults, *air, self._wind_ned, self._commands])
+        self._engine.step(self._commands, self._wind_ned)
+        self._launch(sense_all, [*place, a.sensor_model, a.faults, a.truth, a.seed, a.tick, a.sensors, self._samples])
+        self._board.exchange(self._samples, a.truth, self._board_commands)
+        self._launch(count_on, [a.tick])
+
+    def _launch(self, kernel: Any, inputs: list[Any]) -> None:
+        wp.launch(kernel, dim=self.vehicle_count, inputs=inputs, device=self.device)
