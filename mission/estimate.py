@@ -204,7 +204,7 @@ def _ulog(log: SensorLog, replay: Replay, summary: EstimateSummary) -> bytes:
         actuators=output[:0],
         health=output,
         yaw=output[:0],
-        body=output[:0],
+        truth=output[:0],
         vehicle=output[:0],
         origin=log.origin or GeoPoint(nan, nan, nan),
     )

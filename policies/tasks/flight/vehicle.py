@@ -25,7 +25,7 @@ _LEVELS = wp.constant(float(NOISE_LEVELS_PER_UNIT))
 class Makes:
     """What vehicles are made of before they are varied."""
 
-    truth: wp.array(dtype=MultirotorModel)  # (1,)
+    body: wp.array(dtype=MultirotorModel)  # (1,)
     sensors: wp.array(dtype=SensorModel)  # by noise scale: 0, 0.25, 0.5 ...
 
 
