@@ -25,7 +25,7 @@ class AutopilotKernels(NamedTuple):
     Arrays: type
     """Kernel struct of everything that it keeps: `ekf`, `control`, `control_params`, `airframe`, `setpoint`."""
     tick: Any
-    """`@wp.func (Ekf, i, Params, Airframe, State, Setpoint, Samples, tick: int64) -> State`, to be fused."""
+    """`@wp.func (Arrays, i, Samples, tick: int64)`, one tick of vehicle i, on its rows in place."""
     power_on: Any
     """`@wp.func (Arrays, i)`: the state after power-on."""
     run: Any
@@ -48,19 +48,13 @@ def autopilot_kernels(law: ControlLaw) -> AutopilotKernels:
         setpoint: wp.array(dtype=Setpoint)  # written by the Python part
 
     @wp.func
-    def autopilot_tick(
-        ekf: Ekf,
-        i: int,
-        params: params_type,
-        airframe: airframe_type,
-        state: state_type,
-        setpoint: Setpoint,
-        samples: Samples,
-        tick: wp.int64,
-    ) -> state_type:
-        estimator_step(ekf, i, samples, contact(setpoint))
-        estimate = ekf.rows[i].estimate
-        return control_tick(params, airframe, state, estimate, setpoint, samples.battery, draw_tick(tick))
+    def autopilot_tick(autopilot: Autopilot, i: int, samples: Samples, tick: wp.int64) -> None:
+        setpoint = autopilot.setpoint[i]
+        estimator_step(autopilot.ekf, i, samples, contact(setpoint))
+        estimate = autopilot.ekf.rows[i].estimate
+        params, airframe, state = autopilot.control_params[i], autopilot.airframe[i], autopilot.control[i]
+        count = draw_tick(tick)
+        autopilot.control[i] = control_tick(params, airframe, state, estimate, setpoint, samples.battery, count)
 
     @wp.func
     def power_on(autopilot: Autopilot, i: int) -> None:
@@ -76,18 +70,8 @@ def autopilot_kernels(law: ControlLaw) -> AutopilotKernels:
         commands: wp.array(dtype=vec8),
     ) -> None:
         i = wp.tid()
-        control = autopilot_tick(
-            autopilot.ekf,
-            i,
-            autopilot.control_params[i],
-            autopilot.airframe[i],
-            autopilot.control[i],
-            autopilot.setpoint[i],
-            samples[i],
-            ticks[i],
-        )
-        autopilot.control[i] = control
-        commands[i] = control.actuators.command
+        autopilot_tick(autopilot, i, samples[i], ticks[i])
+        commands[i] = autopilot.control[i].actuators.command
 
     return AutopilotKernels(Autopilot, autopilot_tick, power_on, run_autopilot)
 

@@ -6,12 +6,14 @@ estimate: a shortcut for training, never used in a flight. sim/stepped.py has th
 """
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import warp as wp
 
 from autopilot.advance import autopilot_kernels
 from autopilot.control.law import MULTIROTOR_LAW, ControlLaw
+from autopilot.estimator.ekf import estimator_step
+from autopilot.ports import contact
 from common.kernels import TICK_S
 from common.rng import draw_tick
 from sim.bodies.body import MULTIROTOR_BODY, Body
@@ -112,7 +114,7 @@ def rig_kernels(body: Body = MULTIROTOR_BODY, law: ControlLaw = MULTIROTOR_LAW) 
 def advance_kernel(body: Body, law: ControlLaw, has_estimator: bool) -> Any:
     """The whole loop, with the sensors and the estimator or without."""
     arrays, body_tick, truth_of = rig_arrays(body, law), body.tick, body.truth
-    autopilot_tick, control_tick = autopilot_kernels(law).tick, law.tick
+    control_tick = law.tick
 
     @wp.kernel(enable_backward=False, module="unique")
     def advance(rig: arrays, first_vehicle: int, tick_count: int) -> None:
@@ -139,9 +141,10 @@ def advance_kernel(body: Body, law: ControlLaw, has_estimator: bool) -> Any:
             truth = truth_of(state)
             if wp.static(has_estimator):
                 sensors = sense(rig.sensor_model[i], sensors, rig.faults[i], truth, world, seed, i, tick)
-                control = autopilot_tick(
-                    rig.autopilot.ekf, i, params, airframe, control, setpoint, sensors.samples, tick
-                )
+                # As autopilot.advance's tick, whose arguments would be copied once more: a twentieth of all time
+                estimator_step(rig.autopilot.ekf, i, sensors.samples, contact(setpoint))
+                estimate = rig.autopilot.ekf.rows[i].estimate
+                control = control_tick(params, airframe, control, estimate, setpoint, sensors.samples.battery, count)
             else:
                 battery = true_battery(truth, tick)
                 sensors.samples.battery = battery
@@ -157,6 +160,6 @@ def advance_kernel(body: Body, law: ControlLaw, has_estimator: bool) -> Any:
     return advance
 
 
-RigArrays = rig_kernels().Arrays
+RigArrays: TypeAlias = Any if TYPE_CHECKING else rig_kernels().Arrays
 """Of multirotors, for the kernels of tasks: they read any row, and write `autopilot.setpoint` alone."""
 forget_impacts = rig_kernels().forget_impacts
