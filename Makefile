@@ -58,7 +58,7 @@ mutants: $(STAMP) ## Break safety-critical files in small ways and see whether t
 
 HOSTILE := test_page_guard test_hostile_connections test_hostile_services test_udp_link
 test-hostile: $(STAMP) ## Foreign websites, crowds, the silent and the slow at every port, a hostile client per service
-	@$(BIN)/python -m pytest -q $(HOSTILE:%=tests/system/%.py) $(ARGS)
+	@$(BIN)/python -m pytest -q $(HOSTILE:%=tests/system/robustness/%.py) $(ARGS)
 
 MAVPROXY := .venv-mavproxy
 

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, isfinite, pi
 
-from autopilot.abilities import Announcer
+from autopilot.interface.vehicle_interface import Announcer
+from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Reply, Severity, VehicleState, Verdict
 from autopilot.navigator.setpoint import SetpointPort
-from autopilot.vehicle import ACCEPTED, LandedState, Reply, Severity, VehicleState, Verdict
 from common.airframe import Airframe
 from common.kernels import MAX_ROTORS
 

@@ -11,11 +11,11 @@ from math import sqrt
 from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
-from autopilot.external import EXTERNAL_PARAMETERS
+from autopilot.inputs.external_position import EXTERNAL_PARAMETERS
+from autopilot.inputs.obstacles import OBSTACLE_PARAMETERS
+from autopilot.inputs.stick_params import STICK_PARAMETERS
+from autopilot.inputs.traffic import TRAFFIC_PARAMETERS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
-from autopilot.obstacles import OBSTACLE_PARAMETERS
-from autopilot.stick_params import STICK_PARAMETERS
-from autopilot.traffic import TRAFFIC_PARAMETERS
 from common.airframe import Airframe
 from common.kernels import GRAVITY_M_S2
 from common.params import Parameter, ParameterTable

@@ -8,9 +8,9 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from autopilot.commander.home import Home
-from autopilot.host import Storage
-from autopilot.lists import ItemLists, ListKind, MissionItem, item_name
-from autopilot.vehicle import Verdict
+from autopilot.interface.item_lists import ItemLists, ListKind, MissionItem, item_name
+from autopilot.interface.platform import Storage
+from autopilot.interface.vehicle_state import Verdict
 from common.geodesy import GeoPoint
 from common.params import Parameter, ParameterError, ParameterTable
 

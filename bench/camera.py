@@ -13,7 +13,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from bench.row import Row, best_of, require
-from sim.sensors.quick_camera import QuickCamera
+from sim.sensors.fast_camera.fast_camera import QuickCamera
 from sim.sensors.ray import SKY
 from sim.world.batch import WorldBatch
 from sim.world.world import WorldConfig, WorldMap, build_world

@@ -15,10 +15,10 @@ from policies.companion.companion import Pilot
 from policies.companion.engagement import Phase
 from policies.companion.pilot import LAYOUT_VERSION, SCRIPTED, TASK, load_pilot
 from policies.learn.config.network import NetworkSettings
-from policies.learn.policy import Policy
-from policies.learn.policy_file import PolicyCard, save_policy
-from policies.pretrained.shelf import pretrained
-from policies.tasks.flight.own import ACTIONS
+from policies.learn.export.policy_file import PolicyCard, save_policy
+from policies.learn.networks.policy import Policy
+from policies.pretrained.pretrained_policies import pretrained
+from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.observe import EGO, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 from policies.tasks.layout import ImageElement, Layout

@@ -17,11 +17,11 @@ from rich.table import Table
 from rich.text import Text
 
 from autopilot.ports import Estimate
-from mission.estimate import EstimateError, Estimation, run_log
-from mission.estimate_difference import Difference, difference
-from mission.estimate_noise import in_flight, median_spread
-from mission.estimate_run import SOURCES
-from mission.sensor_log import Rows, Track, row_dtype
+from mission.estimate.estimate import EstimateError, Estimation, run_log
+from mission.estimate.estimate_difference import Difference, difference
+from mission.estimate.estimate_noise import in_flight, median_spread
+from mission.estimate.estimate_run import SOURCES
+from mission.estimate.sensor_log import Rows, Track, row_dtype
 
 SETTLE_US = 10_000_000  # from the first sample on
 # EKF2 of 2026 beside that of 2023 over the same real flights: median and largest

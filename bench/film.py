@@ -14,11 +14,11 @@ from rich.console import Console
 from bench.row import Row, require
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_companion, take_off
-from mission.follow.owner import OwnerConfig
-from mission.view.chase import PICTURE_S
+from mission.follow.owner_device import OwnerConfig
+from mission.view.chase_camera import PICTURE_S
 from mission.view.film import write_film
-from mission.view.film_pictures import HEIGHT, WIDTH
-from mission.view.recording import Recorder
+from mission.view.film_images import HEIGHT, WIDTH
+from mission.view.replay_file import Recorder
 from policies.companion.pilot import SCRIPTED, load_pilot
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 

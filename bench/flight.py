@@ -10,9 +10,9 @@ from tempfile import TemporaryDirectory
 
 from bench.row import Row, require
 from mission.flight import Flight, FlightConfig
-from mission.plan import DEFAULT_PLAN, read_plan
+from mission.log.flight_summary import planned_path, summarise
+from mission.plan.plan_file import DEFAULT_PLAN, read_plan
 from mission.script import fly_plan
-from mission.summary import planned_path, summarise
 
 CONFIG = FlightConfig(wind_m_s=5.0)
 COMMAND = "python -m bench flight"

@@ -1,11 +1,11 @@
-"""How well does it fly? The standard trials (mission/trials.py), each against its target."""
+"""How well does it fly? The standard trials (mission/flight_benchmarks.py), each against its target."""
 
 import numpy as np
 
 from bench.row import Row
 from mission.flight import FlightConfig
-from mission.summary import Summary
-from mission.trials import fault_trial, hold_trial, mission_trial, square_trial, step_trial
+from mission.flight_benchmarks import fault_trial, hold_trial, mission_trial, square_trial, step_trial
+from mission.log.flight_summary import Summary
 
 COMMAND = "python -m bench flights"
 SEEDS = range(20)

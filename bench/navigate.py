@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 
 from bench.row import machine
 from common.files import write_whole
-from policies.learn.policy import Policy
-from policies.learn.policy_file import load_policy
-from policies.learn.policy_path import find_policy
-from policies.learn.tensors import TaskTensors
-from policies.learn.threads import few_threads
+from policies.learn.export.policy_file import load_policy
+from policies.learn.export.policy_path import find_policy
+from policies.learn.networks.policy import Policy
+from policies.learn.rollout.task_tensors import TaskTensors
+from policies.learn.torch_threads import few_threads
 from policies.tasks.catalogue import build_task, task_settings
-from policies.tasks.drawing import GOAL, OBSTACLE, VEHICLE, Canvas
 from policies.tasks.episode import Outcome
 from policies.tasks.intervals import Interval, bootstrap, rate
-from policies.tasks.navigate.kernels import MEASURES
 from policies.tasks.navigate.navigate import Navigate
-from policies.tasks.navigate.picture import plant
+from policies.tasks.navigate.navigate_kernels import MEASURES
+from policies.tasks.navigate.navigate_top_view import plant
+from policies.tasks.top_view import GOAL, OBSTACLE, VEHICLE, Canvas
 
 DENSITIES = (200.0, 400.0, 600.0)
 EPISODES = 500  # of each density, side by side: each environment plays one

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from bench.row import Row, best_of, require
 from mission.flight import Flight, FlightConfig
-from mission.plan import DEFAULT_PLAN, read_plan
+from mission.plan.plan_file import DEFAULT_PLAN, read_plan
 from mission.script import fly_plan
 
 CONFIG = FlightConfig(wind_m_s=5.0)

@@ -13,9 +13,9 @@ import numpy as np
 import torch
 
 from bench.row import Row, require
+from policies.learn.algorithms.sac import Sac
 from policies.learn.config.behavior import Behavior
-from policies.learn.policy import Policy
-from policies.learn.sac import Sac
+from policies.learn.networks.policy import Policy
 from policies.learn.signals.extrinsic import ExtrinsicSignal
 from policies.tasks.catalogue import build_task
 from policies.tasks.episode import Outcome

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bench.row import Row, require
 from common.attitude import product, quat_of
 from policies.tracker import OwnerTrack, OwnerTracker, PhoneReport, Sighting, TrackerSettings
-from sim.owner import Owner
+from sim.walking_owner import Owner
 from sim.world.people import CHEST_M, RUN_SPEED_M_S, WALK_SPEED_M_S, person_model
 from sim.world.world import WorldConfig, build_world
 

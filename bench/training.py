@@ -12,10 +12,10 @@ from typing import Any
 import torch
 
 from bench.row import Row, require
+from policies.learn.algorithms.learner import Learner
+from policies.learn.algorithms.ppo import Ppo
 from policies.learn.config.behavior import Behavior
-from policies.learn.learner import Learner
-from policies.learn.policy import Policy
-from policies.learn.ppo import Ppo
+from policies.learn.networks.policy import Policy
 from policies.learn.signals.extrinsic import ExtrinsicSignal
 from policies.tasks.catalogue import build_task, task_settings
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from policies.tasks.catalogue import build_task, task_settings
-from policies.tasks.reach_target.numbers import NUMBERS
+from policies.tasks.reach_target.reach_target_params import NUMBERS
 from policies.tasks.task import Task
 
 Array = np.ndarray[Any, Any]

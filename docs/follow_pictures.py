@@ -15,13 +15,13 @@ sys.path.insert(0, str(IMAGES.parents[1]))
 
 from mission.flight import FlightConfig  # noqa: E402
 from mission.flight_config import OwnerConfig  # noqa: E402
+from mission.follow.follow_session import chosen_pilot, score_lines, watch_of  # noqa: E402
 from mission.follow.lockstep import flight_with_companion, take_off  # noqa: E402
-from mission.follow.session import chosen_pilot, score_lines, watch_of  # noqa: E402
-from mission.view.chase import PICTURE_S  # noqa: E402
-from mission.view.film_pictures import film  # noqa: E402
+from mission.view.chase_camera import PICTURE_S  # noqa: E402
+from mission.view.film_images import film  # noqa: E402
 from mission.view.live import LiveView  # noqa: E402
 from mission.view.page import PageServer  # noqa: E402
-from mission.view.recording import Recorder  # noqa: E402
+from mission.view.replay_file import Recorder  # noqa: E402
 from policies.tasks.follow_me.world import FOLLOW_WORLD  # noqa: E402
 from tests.browser import Browser  # noqa: E402
 

@@ -7,21 +7,21 @@ from mavlink_page import mavlink_text
 from tasks_page import tasks_text
 from training_page import training_text
 
-from autopilot.ardupilot_params import ARDUPILOT_PARAMETERS
+from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
 from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
-from autopilot.mavlink.dialects.ardupilot_params import ALIASES, CONSTANTS
+from autopilot.inputs.obstacles import OBSTACLE_PARAMETERS
+from autopilot.inputs.stick_params import STICK_PARAMETERS
+from autopilot.inputs.traffic import TRAFFIC_PARAMETERS
+from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
-from autopilot.obstacles import OBSTACLE_PARAMETERS
 from autopilot.params import SYSTEM_PARAMETERS, parameter_table
-from autopilot.stick_params import STICK_PARAMETERS
-from autopilot.traffic import TRAFFIC_PARAMETERS
 from common.airframe import load_airframe
 from common.files import write_whole
 from common.params import Parameter
 from mission.flight import Flight, FlightConfig
-from mission.simulator_params import simulator_parameters
+from mission.simulator.simulator_params import simulator_parameters
 
 PARAMETERS_PATH = Path(__file__).with_name("parameters.md")
 MAVLINK_PATH = Path(__file__).with_name("mavlink.md")

@@ -8,15 +8,15 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as definitions
 
-from autopilot.mavlink.codec import known_type
-from autopilot.mavlink.component import Component
+from autopilot.interface.vehicle_state import Mode
+from autopilot.mavlink.components.component import Component
 from autopilot.mavlink.dialects import Alias, Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.service import CommandHandler
-from autopilot.mavlink.streams import Stream
-from autopilot.vehicle import Mode
+from autopilot.mavlink.telemetry.telemetry_rates import Stream
+from autopilot.mavlink.wire.codec import known_type
 
 ROOT = Path(__file__).parents[1]
 HEADER = """\

@@ -13,7 +13,7 @@ from common.attitude import product, quat_of
 from common.kernels import TICK_US
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 from policies.tracker import OwnerTracker, PhoneReport, Sighting, TrackerSettings
-from sim.owner import Owner
+from sim.walking_owner import Owner
 from sim.world.people import CHEST_M, RUN_SPEED_M_S, person_model
 from sim.world.world import WorldMap, build_world
 

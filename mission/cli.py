@@ -10,12 +10,14 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from autopilot.mavlink.links import GROUND_STATION_PORT, OFFBOARD_PORT
+from autopilot.mavlink.transport.links import GROUND_STATION_PORT, OFFBOARD_PORT
 from common.geodesy import DEFAULT_HOME
-from mission import follow_commands, task_commands, training_commands, view_commands
-from mission.checks import check_file
-from mission.refusal import refuse
-from mission.terminal import busy
+from mission.console.command_refusal import refuse
+from mission.console.name_checks import check_file
+from mission.console.terminal import busy
+from mission.follow import follow_commands
+from mission.train import task_commands, training_commands
+from mission.view import replay_command
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -117,7 +119,7 @@ def fly(
     ] = None,
 ) -> None:
     """Fly: world, vehicle, flight controller and MAVLink links, in real time or faster."""
-    from mission.options import FlightOptions, UserError, check_options
+    from mission.flight_options import FlightOptions, UserError, check_options
 
     options = FlightOptions(
         plan=plan, is_idle=idle, once=once, speed=speed, seconds=seconds, seed=seed, wind_m_s=wind,
@@ -131,7 +133,7 @@ def fly(
     )  # fmt: skip
     try:
         check_options(options)
-        from mission.session import fly_session
+        from mission.fly_session import fly_session
 
         exit_code = fly_session(options)
     except UserError as error:
@@ -154,7 +156,7 @@ def estimate(
     """Run the estimator alone over the sensors recorded in a log."""
     check_file(log)
     with busy(Console(), "loading the program"):
-        from mission.estimate import EstimateError, estimate_log
+        from mission.estimate.estimate import EstimateError, estimate_log
 
     try:
         estimate_log(log, output, Console(), parameters=param or (), ignores_velocity_flag=ignore_velocity_flag)
@@ -178,7 +180,7 @@ def picture(
 ) -> None:
     """Take a picture of the world from a place in it."""
     from mission.flight_config import TREELESS_M
-    from mission.picture import PictureError, Viewpoint, take_picture
+    from mission.video.image_command import PictureError, Viewpoint, take_picture
     from sim.world.world import WorldConfig
 
     world = WorldConfig(seed=world_seed, trees_per_ha=trees, hill_height_m=hills, treeless_radius_m=TREELESS_M)
@@ -192,7 +194,7 @@ for _command in (task_commands.demonstrate, task_commands.play, task_commands.dr
     app.command()(_command)
 app.command()(follow_commands.follow)
 app.command()(follow_commands.companion)
-app.command()(view_commands.replay)
+app.command()(replay_command.replay)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)
 app.command()(training_commands.export)

@@ -11,8 +11,8 @@ from math import isnan
 from types import TracebackType, coroutine
 from typing import Any, Protocol, Self
 
-from autopilot.mavlink.codec import Frame, FrameReader, Message, decode, encode, message_id
-from mission.plan import PlanItem
+from autopilot.mavlink.wire.codec import Frame, FrameReader, Message, decode, encode, message_id
+from mission.plan.plan_file import PlanItem
 
 CLIENT_SYSTEM_ID = 245
 CLIENT_COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as MAVSDK uses

@@ -2,16 +2,16 @@
 
 from typing import TYPE_CHECKING
 
-from autopilot.mavlink.links import GIVE_WAY_US, LinkError, LinkRole, LinkSource
-from autopilot.mavlink.signing import FileStore, MemoryStore, SigningConfig
-from autopilot.mavlink.tcp import TcpPort
-from autopilot.mavlink.udp import SILENCE_US, UdpPort, address_towards
+from autopilot.mavlink.transport.links import GIVE_WAY_US, LinkError, LinkRole, LinkSource
+from autopilot.mavlink.transport.tcp_port import TcpPort
+from autopilot.mavlink.transport.udp_port import SILENCE_US, UdpPort, address_towards
+from autopilot.mavlink.wire.signing import FileStore, MemoryStore, SigningConfig
 from common.clock import wall_unix_us
 from common.state_folder import StateFolder
+from mission.flight_options import FlightOptions, UserError
 from mission.follow.image_server import ImageServer
-from mission.options import FlightOptions, UserError
-from mission.rtp import PORT, RtpVideo, VideoError
-from mission.stream import StreamServer
+from mission.video.mjpeg_server import StreamServer
+from mission.video.rtp_video import PORT, RtpVideo, VideoError
 
 if TYPE_CHECKING:
     from mission.view.page import PageServer

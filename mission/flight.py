@@ -9,18 +9,18 @@ from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self
 
-from autopilot.camera.storage import MediaFolder
 from autopilot.control.airframe import rotors_leaver
-from autopilot.host import Host
+from autopilot.flight_controller import FlightController, HostPorts
+from autopilot.interface.platform import Host
+from autopilot.interface.vehicle_state import Mode, Severity
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.links import Link, LinkRole, LinkSource, memory_pair
 from autopilot.mavlink.server import MavlinkServer
-from autopilot.mavlink.signing import SigningConfig
-from autopilot.node import FlightController, HostPorts
+from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
+from autopilot.mavlink.wire.signing import SigningConfig
+from autopilot.payload.camera.storage import MediaFolder
 from autopilot.persistence import Persistence
-from autopilot.vehicle import Mode, Severity
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder
@@ -30,18 +30,18 @@ from common.records import row_reader
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
 from mission.client import Running
+from mission.console.status_texts import Texts
 from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
-from mission.injection import RigInjector
-from mission.log_shelf import FlightLogs, RunLog
-from mission.recorder import History, Recorder
-from mission.rtp import RtpVideo
+from mission.host_troubles import Troubles
+from mission.log.flight_recorder import History, Recorder
+from mission.log.stored_logs import FlightLogs, RunLog
 from mission.script import Drone, Script
-from mission.simulator_params import PREFIX as SIMULATOR_PREFIX
-from mission.simulator_params import TURBULENCE_SHARE, SimulatorParameters
-from mission.stream import StreamServer
-from mission.surroundings import Surroundings
-from mission.texts import Texts
-from mission.troubles import Troubles
+from mission.simulator.failure_injection import RigInjector
+from mission.simulator.onboard_devices import Surroundings
+from mission.simulator.simulator_params import PREFIX as SIMULATOR_PREFIX
+from mission.simulator.simulator_params import TURBULENCE_SHARE, SimulatorParameters
+from mission.video.mjpeg_server import StreamServer
+from mission.video.rtp_video import RtpVideo
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.esc import esc_reader
@@ -54,8 +54,8 @@ from sim.world.batch import grown_world
 from sim.world.world import WorldMap, build_world
 
 if TYPE_CHECKING:
-    from mission.follow.onboard import OnboardCamera
-    from mission.follow.owner import FollowedOwner
+    from mission.follow.onboard_camera import OnboardCamera
+    from mission.follow.owner_device import FollowedOwner
 
 __all__ = ["Flight", "FlightConfig", "flight_parameters"]
 
@@ -207,8 +207,8 @@ class Flight:
 
     def _carry_camera(self, config: OwnerConfig) -> Sequence[Link]:
         """Brings the owner and the onboard camera in; the phone's link."""
-        from mission.follow.onboard import OnboardCamera  # what a policy sees is defined beside the policies
-        from mission.follow.owner import FollowedOwner
+        from mission.follow.onboard_camera import OnboardCamera  # what a policy sees is defined beside the policies
+        from mission.follow.owner_device import FollowedOwner
 
         self.owner = FollowedOwner(config, self.world, self.config.seed, self.config.home)
         self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)

@@ -7,13 +7,13 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from autopilot.ardupilot_params import ARDUPILOT_PARAMETERS
+from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
 from autopilot.params import parameter_table
 from common.airframe import Airframe
 from common.clock import SIMULATED_EPOCH_US
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.params import ParameterTable
-from mission.simulator_params import simulator_parameters
+from mission.simulator.simulator_params import simulator_parameters
 from sim.world.world import WorldConfig
 
 Pace = Literal["walk", "run"]

@@ -4,7 +4,7 @@ The vehicle may fly at any multiple of real time: waits and time-outs of the scr
 The wall clock only paces the polling and notices a vehicle that has gone silent.
 """
 
-from autopilot.mavlink.links import LinkRole, UdpLink
+from autopilot.mavlink.transport.links import LinkRole, UdpLink
 from common.clock import Pacer, wall_time_s
 from mission.client import Running, ScriptError
 from mission.script import Drone, Script

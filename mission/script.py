@@ -17,8 +17,8 @@ from typing import Any
 
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from mission.client import Client, CommandRefused, ScriptError, ScriptTimeout
-from mission.plan import Plan
-from mission.plan_lists import FENCE_LIST, RALLY_LIST, fence_items, rally_items
+from mission.plan.plan_file import Plan
+from mission.plan.plan_lists import FENCE_LIST, RALLY_LIST, fence_items, rally_items
 
 FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM that skips the checks
 

@@ -1,4 +1,4 @@
-"""The light in front of a vehicle's camera: where the camera truly is, rendered (autopilot.camera.ports.FrameSource).
+"""The light in front of a vehicle's camera: where it truly is, rendered (autopilot.payload.camera.ports.FrameSource).
 
 In: views, which say where the lens points relative to the body. Out: frames of the true pose at that moment. In
 lockstep a frame is there at once; with a thread of its own the flight goes on while it is being rendered.
@@ -7,8 +7,8 @@ lockstep a frame is there at once; with a thread of its own the flight goes on w
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property
 
-from autopilot.camera import picture
-from autopilot.camera.ports import RawFrame, View
+from autopilot.payload.camera import image_file
+from autopilot.payload.camera.ports import RawFrame, View
 from common.attitude import product, rotated
 from sim.rig import Rig
 from sim.sensors.camera import CameraPose, Renderer
@@ -44,7 +44,7 @@ class CameraRig:
             self._pool.submit(self._warm_up)
 
     def _warm_up(self) -> None:
-        picture.prepare()
+        image_file.prepare()
         self.renderer.prepare()
 
     def pose(self, view: View) -> CameraPose:

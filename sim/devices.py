@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import copysign, isfinite
 
-from autopilot.payload import Params
-from autopilot.vehicle import ACCEPTED, Reply, Verdict, WinchStatus
+from autopilot.interface.vehicle_state import ACCEPTED, Reply, Verdict, WinchStatus
+from autopilot.payload.payloads import Params
 
 GRIPPER, WINCH = 211, 42600  # MAV_CMD
 _LINE_M = 30.0  # guess

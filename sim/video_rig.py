@@ -8,11 +8,11 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from math import radians, tan
 from typing import Any
 
-from autopilot.camera.ports import RawFrame, View
+from autopilot.payload.camera.ports import RawFrame, View
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.camera import CameraPose
-from sim.sensors.quick_camera import QuickCamera
+from sim.sensors.fast_camera.fast_camera import QuickCamera
 from sim.world.world import WorldMap
 
 RANGE_M = 150.0  # fog hides what is farther

@@ -16,7 +16,7 @@ from time import perf_counter
 import numpy as np
 
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT
-from autopilot.mavlink.codec import FrameReader, encode, known_type
+from autopilot.mavlink.wire.codec import FrameReader, encode, known_type
 from tests.system.vehicle import IdleVehicle
 
 CLIENTS = 20
@@ -26,7 +26,7 @@ _ACK, _HEARTBEAT = known_type("COMMAND_ACK").msg_id, known_type("HEARTBEAT").msg
 
 FLOOD = f"""
 import socket, sys, time
-from autopilot.mavlink.codec import encode
+from autopilot.mavlink.wire.codec import encode
 flood = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 flood.setblocking(False)
 ask = dict(target_system=1, target_component=1, command=512, param1=148.0)

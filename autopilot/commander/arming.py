@@ -7,6 +7,7 @@ from collections.abc import Callable
 from math import hypot, radians
 
 from autopilot.estimator.params import MAG_TYPE_NONE
+from autopilot.interface.vehicle_state import VehicleState
 from autopilot.ports import (
     EXTERNAL_POSITION,
     HEIGHT_VALID,
@@ -17,7 +18,6 @@ from autopilot.ports import (
     VELOCITY_VALID,
     YAW_ALIGNED,
 )
-from autopilot.vehicle import VehicleState
 from common.params import ParameterTable
 
 _STALE_US = 1_000_000  # a sensor that has been silent for longer is off

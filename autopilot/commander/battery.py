@@ -6,7 +6,7 @@ current is counted on. Left out: temperature and ageing.
 
 from math import exp, nan
 
-from autopilot.vehicle import BatteryLevel
+from autopilot.interface.vehicle_state import BatteryLevel
 from common.airframe import Battery
 from common.params import ParameterTable
 

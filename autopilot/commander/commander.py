@@ -6,21 +6,21 @@ which mode to fly through `Flying`, and asks it what it alone can know.
 
 from math import degrees, hypot, nan, pi, radians, sqrt
 
-from autopilot.abilities import Announcer
 from autopilot.commander.arming import MAGNETIC_INTERFERENCE, WARN_ONLY, arming_reasons
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.failsafe import CRASHED
-from autopilot.commander.flying import Flying
-from autopilot.commander.guard import Guard
+from autopilot.commander.failsafe_executor import Guard
+from autopilot.commander.failure_detector import FailureWatch, StationLink
 from autopilot.commander.home import Home
-from autopilot.commander.landing import LandingDetector
+from autopilot.commander.landing_detector import LandingDetector
 from autopilot.commander.modes import MODE_RULES, NO_STICKS, PASSING_MODES, mode_refusal
-from autopilot.commander.motors import MotorWatch
-from autopilot.commander.pilot import Pilot
-from autopilot.commander.watch import FailureWatch, StationLink
-from autopilot.navigator.ground import Ask
+from autopilot.commander.motor_failures import MotorWatch
+from autopilot.commander.navigator_interface import Flying
+from autopilot.commander.stick_commands import Pilot
+from autopilot.interface.vehicle_interface import Announcer
+from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
+from autopilot.navigator.takeoff_intent import Ask
 from autopilot.ports import HEIGHT_VALID, MAG_DISTURBED, POSITION_VALID, VELOCITY_VALID
-from autopilot.vehicle import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from common.params import Parameter, ParameterTable
 
 _POSITION_FLAGS = POSITION_VALID | VELOCITY_VALID | HEIGHT_VALID

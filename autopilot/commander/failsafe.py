@@ -1,6 +1,6 @@
 """Failsafes: which failure leads to which action, most urgent first, with what the pilot is told.
 
-A new failsafe is a bit, a row of `RULES`, and a condition in `watch.py` that sets the bit.
+A new failsafe is a bit, a row of `RULES`, and a condition in `failure_detector.py` that sets the bit.
 """
 
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from autopilot.commander.modes import MODE_RULES
-from autopilot.vehicle import Mode, Severity
+from autopilot.interface.vehicle_state import Mode, Severity
 from common.params import ParameterTable
 
 # What can be wrong at the same time, as bits.

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from math import hypot, isfinite, nan
 
-from autopilot.abilities import Announcer
-from autopilot.vehicle import ACCEPTED, LandedState, Reply, VehicleState, Verdict
+from autopilot.interface.vehicle_interface import Announcer
+from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Reply, VehicleState, Verdict
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 
 _FAR_M = 50_000.0  # from where the vehicle was switched on (ArduPilot)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from autopilot.vehicle import Mode
+from autopilot.interface.vehicle_state import Mode
 
 
 @dataclass(frozen=True, slots=True)

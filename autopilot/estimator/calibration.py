@@ -1,7 +1,7 @@
 """Calibration: what the drivers read, less the offsets measured at rest, turned into the vehicle's frame.
 
 In: raw samples. Out: samples as the estimator uses them; at the rate of the samples. Offsets and the turn of the board
-are parameters (CAL_*, SENS_BOARD_*), written by the calibrations of `commander/calibration.py` or by hand.
+are parameters (CAL_*, SENS_BOARD_*), written by the calibrations of `commander/sensor_calibration.py` or by hand.
 """
 
 import warp as wp

@@ -7,7 +7,7 @@ messages; before the first restart nothing is touched.
 from functools import cache
 from struct import calcsize
 
-from autopilot.mavlink.codec import MessageType, field_positions
+from autopilot.mavlink.wire.codec import MessageType, field_positions
 
 _FIELDS = {"time_boot_ms": 1000, "event_time_boot_ms": 1000, "time_usec": 1}  # [us] per unit
 _NOT_OURS = frozenset({"PING"})  # carries the asker's time back

@@ -8,17 +8,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from autopilot.abilities import Vehicle
+from autopilot.interface.vehicle_interface import Vehicle
+from autopilot.interface.vehicle_state import Severity
 from autopilot.mavlink.boot_clock import BootClock
-from autopilot.mavlink.codec import SIGNED_FLAG, Frame, MessageType, frame_bytes, known_type
 from autopilot.mavlink.dialects import Dialect
-from autopilot.mavlink.frame_log import FrameLog, OnFrame
-from autopilot.mavlink.intake import Intake
-from autopilot.mavlink.links import FixedLinks, Link, LinkSource
-from autopilot.mavlink.parameter_view import ParameterView
-from autopilot.mavlink.signing import MemoryStore, Signer, SigningConfig
-from autopilot.mavlink.streams import StreamSchedule, Telemetry
-from autopilot.vehicle import Severity
+from autopilot.mavlink.services.parameter_view import ParameterView
+from autopilot.mavlink.telemetry.telemetry_rates import StreamSchedule, Telemetry
+from autopilot.mavlink.transport.frame_log import FrameLog, OnFrame
+from autopilot.mavlink.transport.links import FixedLinks, Link, LinkSource
+from autopilot.mavlink.transport.receive_queue import Intake
+from autopilot.mavlink.wire.codec import SIGNED_FLAG, Frame, MessageType, frame_bytes, known_type
+from autopilot.mavlink.wire.signing import MemoryStore, Signer, SigningConfig
 from common.clock import SIMULATED_EPOCH_US
 
 AUTOPILOT_COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1

@@ -10,14 +10,9 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.vehicle_state import Reply, Severity, Verdict
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Endpoint, Sender
-from autopilot.mavlink.component import Component
-from autopilot.mavlink.convert import (
-    LATLON_FRAMES,
-    RELATIVE_FRAMES,
-    degrees_from_e7,
-    whole,
-)
+from autopilot.mavlink.components.component import Component
 from autopilot.mavlink.service import (
     COMMAND_ACK,
     Command,
@@ -27,7 +22,12 @@ from autopilot.mavlink.service import (
     acknowledgement,
     out_of_range,
 )
-from autopilot.vehicle import Reply, Severity, Verdict
+from autopilot.mavlink.wire.convert import (
+    LATLON_FRAMES,
+    RELATIVE_FRAMES,
+    degrees_from_e7,
+    whole,
+)
 
 _SHORT_NAMES = {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM: "Arm",

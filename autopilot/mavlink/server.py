@@ -10,56 +10,56 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.abilities import Vehicle
-from autopilot.mavlink.aux_functions import AuxFunctions
-from autopilot.mavlink.calibration import CalibrationService
-from autopilot.mavlink.camera.component import AttachedCamera, CameraComponent
+from autopilot.interface.vehicle_interface import Vehicle
+from autopilot.interface.vehicle_state import Severity
 from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, Sender
-from autopilot.mavlink.codec import Frame, known_type
 from autopilot.mavlink.commands import CommandService
-from autopilot.mavlink.compass import CompassService
-from autopilot.mavlink.component import Component
-from autopilot.mavlink.devices import DeviceService
+from autopilot.mavlink.components.camera.camera_component import AttachedCamera, CameraComponent
+from autopilot.mavlink.components.component import Component
+from autopilot.mavlink.components.gimbal_manager import GimbalDevice, GimbalManager
+from autopilot.mavlink.components.winch_component import WinchComponent
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.events import EventService
-from autopilot.mavlink.external import ExternalService
-from autopilot.mavlink.fence import FenceService
-from autopilot.mavlink.flight_commands import FlightCommands
-from autopilot.mavlink.frame_log import OnFrame
-from autopilot.mavlink.ftp import FtpService
-from autopilot.mavlink.ftp_virtual import virtual_folders
-from autopilot.mavlink.gimbal import GimbalDevice, GimbalManager
-from autopilot.mavlink.goto import GotoService
-from autopilot.mavlink.identity import banner
-from autopilot.mavlink.intake import share
-from autopilot.mavlink.links import Link, LinkSource
-from autopilot.mavlink.log_streaming import LogStreamingService
-from autopilot.mavlink.log_transfer import LogTransferService
-from autopilot.mavlink.manual import ManualService
-from autopilot.mavlink.message_requests import MessageRequests
-from autopilot.mavlink.metadata import MetadataService
-from autopilot.mavlink.mission_commands import MissionCommands
-from autopilot.mavlink.missions import MissionService
-from autopilot.mavlink.modes import ModeService
-from autopilot.mavlink.motor_tests import MotorTestService
-from autopilot.mavlink.obstacles import ObstacleService
-from autopilot.mavlink.offboard import OffboardService
-from autopilot.mavlink.origin import OriginService
-from autopilot.mavlink.parameters import ParameterService
-from autopilot.mavlink.routing import Router
-from autopilot.mavlink.safety import SafetyService
 from autopilot.mavlink.service import CommandHandler, Handler, Service
-from autopilot.mavlink.shell import ShellService
-from autopilot.mavlink.signing import Judgement, Signer, SigningConfig
-from autopilot.mavlink.signing_setup import SigningService
-from autopilot.mavlink.stream_rates import StreamRateService
-from autopilot.mavlink.streams import Stream
-from autopilot.mavlink.targets import TargetService
+from autopilot.mavlink.services.actions.aux_functions import AuxFunctions
+from autopilot.mavlink.services.actions.calibration_commands import CalibrationService
+from autopilot.mavlink.services.actions.compass_calibration import CompassService
+from autopilot.mavlink.services.actions.device_commands import DeviceService
+from autopilot.mavlink.services.actions.fence_switch import FenceService
+from autopilot.mavlink.services.actions.flight_commands import FlightCommands
+from autopilot.mavlink.services.actions.goto_commands import GotoService
+from autopilot.mavlink.services.actions.mission_commands import MissionCommands
+from autopilot.mavlink.services.actions.motor_test_commands import MotorTestService
+from autopilot.mavlink.services.actions.safety_commands import SafetyService
+from autopilot.mavlink.services.available_modes import ModeService
+from autopilot.mavlink.services.events import EventService
+from autopilot.mavlink.services.files.component_metadata import MetadataService
+from autopilot.mavlink.services.files.ftp import FtpService
+from autopilot.mavlink.services.files.ftp_virtual import virtual_folders
+from autopilot.mavlink.services.files.log_streaming import LogStreamingService
+from autopilot.mavlink.services.files.log_transfer import LogTransferService
+from autopilot.mavlink.services.files.shell import ShellService
+from autopilot.mavlink.services.identity import banner
+from autopilot.mavlink.services.inputs.external_position_messages import ExternalService
+from autopilot.mavlink.services.inputs.local_origin import OriginService
+from autopilot.mavlink.services.inputs.manual_control import ManualService
+from autopilot.mavlink.services.inputs.obstacle_distances import ObstacleService
+from autopilot.mavlink.services.inputs.offboard_setpoints import OffboardService
+from autopilot.mavlink.services.inputs.target_reports import TargetService
+from autopilot.mavlink.services.inputs.traffic_reports import TrafficService
+from autopilot.mavlink.services.message_requests import MessageRequests
+from autopilot.mavlink.services.mission_protocol import MissionService
+from autopilot.mavlink.services.parameter_protocol import ParameterService
+from autopilot.mavlink.services.signing_setup import SigningService
 from autopilot.mavlink.telemetry.status import mission_progress
-from autopilot.mavlink.traffic import TrafficService
-from autopilot.mavlink.winch import WinchComponent
-from autopilot.vehicle import Severity
+from autopilot.mavlink.telemetry.stream_rate_params import StreamRateService
+from autopilot.mavlink.telemetry.telemetry_rates import Stream
+from autopilot.mavlink.transport.frame_log import OnFrame
+from autopilot.mavlink.transport.links import Link, LinkSource
+from autopilot.mavlink.transport.receive_queue import share
+from autopilot.mavlink.transport.routing import Router
+from autopilot.mavlink.wire.codec import Frame, known_type
+from autopilot.mavlink.wire.signing import Judgement, Signer, SigningConfig
 
 HEARTBEAT_US = 1_000_000
 AFTER_AUTOPILOT_US = 40_000

@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from autopilot.mavlink.bounds import PARAMETER_MAX, first_outside
+from autopilot.interface.vehicle_state import Reply, Verdict
 from autopilot.mavlink.channel import Sender
-from autopilot.mavlink.codec import known_type
-from autopilot.vehicle import Reply, Verdict
+from autopilot.mavlink.wire.codec import known_type
+from autopilot.mavlink.wire.number_bounds import PARAMETER_MAX, first_outside
 
 COMMAND_ACK = known_type("COMMAND_ACK")
 

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from math import atan2, hypot, isfinite, nan, sqrt
 
-from autopilot.abilities import Announcer
+from autopilot.interface.vehicle_interface import Announcer
+from autopilot.interface.vehicle_state import LandedState, Mode, VehicleState
 from autopilot.navigator.heading import Heading
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import HEIGHT_VALID, TERRAIN_VALID
-from autopilot.vehicle import LandedState, Mode, VehicleState
 from common.geodesy import geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
 

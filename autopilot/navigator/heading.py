@@ -8,9 +8,9 @@ from enum import IntEnum
 from math import atan2, hypot, isfinite, nan, pi, radians
 from typing import TYPE_CHECKING
 
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
 from autopilot.navigator.setpoint import Vector
 from autopilot.ports import SETPOINT_TRAJECTORY
-from autopilot.vehicle import ACCEPTED, Mode, Reply, Verdict
 from common.attitude import wrapped
 from common.kernels import FRAME_US
 

@@ -3,29 +3,29 @@
 from math import isfinite, nan
 from typing import Protocol
 
-from autopilot.lists import ListKind, item_name
-from autopilot.navigator.breadcrumbs import Breadcrumbs
+from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.item_lists import ListKind, item_name
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Severity, Verdict
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.destination import Destinations
-from autopilot.navigator.fence import Fence
-from autopilot.navigator.follow import Follow
-from autopilot.navigator.goto import reposition_target
-from autopilot.navigator.ground import Ask, standing_d, vertical_ask
-from autopilot.navigator.guided import Guided
-from autopilot.navigator.hold import Hold
-from autopilot.navigator.land import Land
-from autopilot.navigator.manual import Acro, Altitude, Brake, Position, Stabilized
-from autopilot.navigator.mission import Mission
-from autopilot.navigator.offboard import STREAM_PERIOD_US, Offboard
-from autopilot.navigator.orbit import Orbit
-from autopilot.navigator.rally import RallyPoints
-from autopilot.navigator.rtl import Return
-from autopilot.navigator.smart_return import SmartReturn
-from autopilot.navigator.takeoff import Climb, Takeoff, is_high
-from autopilot.navigator.termination import Termination
+from autopilot.navigator.fence.fence import Fence
+from autopilot.navigator.fence.rally_points import RallyPoints
+from autopilot.navigator.mission.mission import Mission
+from autopilot.navigator.modes.follow import Follow
+from autopilot.navigator.modes.goto import reposition_target
+from autopilot.navigator.modes.guided import Guided
+from autopilot.navigator.modes.hold import Hold
+from autopilot.navigator.modes.land import Land
+from autopilot.navigator.modes.offboard import STREAM_PERIOD_US, Offboard
+from autopilot.navigator.modes.orbit import Orbit
+from autopilot.navigator.modes.rtl import Return
+from autopilot.navigator.modes.rtl_destination import Destinations
+from autopilot.navigator.modes.smart_return import SmartReturn
+from autopilot.navigator.modes.stick_modes import Acro, Altitude, Brake, Position, Stabilized
+from autopilot.navigator.modes.takeoff import Climb, Takeoff, is_high
+from autopilot.navigator.modes.termination import Termination
+from autopilot.navigator.paths.breadcrumbs import Breadcrumbs
+from autopilot.navigator.takeoff_intent import Ask, standing_d, vertical_ask
 from autopilot.ports import TERRAIN_VALID
-from autopilot.requests import OffboardSetpoint
-from autopilot.vehicle import ACCEPTED, Mode, Reply, Severity, Verdict
 
 _GOING = frozenset({Mode.TAKEOFF, Mode.HOLD, Mode.ORBIT, Mode.FOLLOW, Mode.MISSION})  # in which a take-off is finished
 _WAITS_US = 2_000_000  # a take-off that is interrupted on the ground, for a place to go to; guess

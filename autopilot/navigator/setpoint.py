@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from autopilot.interface.client_requests import OffboardSetpoint
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_LEAN, SETPOINT_RATE, SETPOINT_TRAJECTORY
-from autopilot.requests import OffboardSetpoint
 from common.kernels import MAX_ROTORS
 
 Vector = tuple[float, float, float]

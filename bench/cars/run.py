@@ -16,13 +16,13 @@ from bench.cars.experiment import Experiment
 from bench.cars.experiments import EXPERIMENTS
 from bench.cars.result import Evaluated, Point, Result, write
 from bench.row import machine
-from mission.demonstrate import DemonstrateOptions, demonstrate_task
+from mission.train.demonstrate import DemonstrateOptions, demonstrate_task
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
 from policies.learn.config.run import RunConfig
 from policies.learn.curriculum import Curriculum
 from policies.learn.evaluate import evaluate
-from policies.learn.policy_file import load_policy
+from policies.learn.export.policy_file import load_policy
 from policies.learn.trainer import Progress, train
 from policies.tasks.catalogue import build_task, settings_of
 from policies.tasks.episode import Outcome

@@ -15,8 +15,8 @@ from bench.follow.run import policy_path, result_path
 from bench.follow.stages import CELLS, Cell
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
+from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion, take_off
-from mission.follow.watch import FollowWatch
 from policies.companion.companion import Pilot
 from policies.companion.engagement import Phase
 from policies.companion.pilot import load_pilot

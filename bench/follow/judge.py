@@ -11,13 +11,13 @@ import torch
 
 from bench.follow.result import Judged
 from bench.follow.stages import CELLS, OWNER_SPEEDS, Cell
-from policies.learn.policy import Policy
-from policies.learn.tensors import TaskTensors
+from policies.learn.networks.policy import Policy
+from policies.learn.rollout.task_tensors import TaskTensors
 from policies.tasks.follow_me.follow_me import FollowMe
-from policies.tasks.follow_me.recording import Recording
 from policies.tasks.follow_me.scorecard import scorecard
 from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.follow_me.track import Track
+from policies.tasks.follow_me.track_recording import Recording
 
 EPISODES = 64  # of each cell
 HELD_OUT_SEED = 1_000_003  # no training run is given it

@@ -18,9 +18,9 @@ from bench.row import machine
 from policies.learn.config.load import load_config
 from policies.learn.config.recipes import recipe
 from policies.learn.config.run import RunConfig
-from policies.learn.policy_file import load_policy, save_policy
-from policies.learn.run_folder import RunError, RunFolder
+from policies.learn.export.policy_file import load_policy, save_policy
 from policies.learn.trainer import train
+from policies.learn.training_run_folder import RunError, RunFolder
 from policies.tasks.catalogue import build_task, settings_of
 from policies.tasks.follow_me.settings import FollowSettings
 

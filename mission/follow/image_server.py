@@ -9,7 +9,7 @@ import socket
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from autopilot.mavlink.links import LOOPBACK, bound_socket
+from autopilot.mavlink.transport.links import LOOPBACK, bound_socket
 from common.clock import wall_time_s
 from common.image_stream import ImageFrame, frame_bytes
 

@@ -7,11 +7,11 @@ over a link in memory and gets the camera's pictures from memory, and is otherwi
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from autopilot.mavlink.links import Link, LinkRole, LinkSource, memory_pair
+from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
 from mission.flight import Flight, FlightConfig
 from mission.script import Drone
-from policies.companion.camera import MemoryCamera
 from policies.companion.companion import Companion, Pilot
+from policies.companion.image_client import MemoryCamera
 
 TAKEOFF_M = 2.5  # the vehicle's least; the policy goes on from there
 

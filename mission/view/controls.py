@@ -10,12 +10,12 @@ from typing import Any
 
 import viser
 
-from autopilot.injection import Failure, Unit
+from autopilot.interface.failure_requests import Failure, Unit
 from mission.client import Running
 from mission.flight import Flight
 from mission.follow.lockstep import take_off
 from mission.script import Drone, ScriptError
-from mission.view.inputs import within
+from mission.view.browser_inputs import within
 
 CLIMB_M = 5.0  # above the ground, when a click finds the vehicle standing
 FAR_M = 2000.0  # of a click's ray

@@ -12,12 +12,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from common.clock import wall_time_s
-from mission.options import UserError
-from mission.terminal import LINE_PERIOD_S, print_line
-from mission.video import Mp4, VideoError
-from mission.view.chase import PICTURE_S, STRIDE
-from mission.view.film_pictures import film
-from mission.view.recording import Recording
+from mission.console.terminal import LINE_PERIOD_S, print_line
+from mission.flight_options import UserError
+from mission.video.video_file import Mp4, VideoError
+from mission.view.chase_camera import PICTURE_S, STRIDE
+from mission.view.film_images import film
+from mission.view.replay_file import Recording
 from sim.world.world import WorldMap
 
 

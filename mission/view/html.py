@@ -14,15 +14,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.vehicle import Mode
+from autopilot.interface.vehicle_state import Mode
 from common.airframe import load_airframe
 from common.files import write_whole
-from mission.angles import yaw_rad
+from mission.log.euler_angles import yaw_rad
 from mission.view import shapes
-from mission.view.moment import distances_m
+from mission.view.flight_snapshot import distances_m
 from mission.view.panel import ACTION_NAMES
-from mission.view.pictures import onboard_eye
-from mission.view.recording import Recording
+from mission.view.replay_file import Recording
+from mission.view.snapshot_images import onboard_eye
 from sim.world.world import WorldMap
 
 STRIDE = 5  # frames of the flight per moment of the page: 10 a second

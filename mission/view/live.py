@@ -14,12 +14,12 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from autopilot.camera.ports import RawFrame
+from autopilot.payload.camera.ports import RawFrame
 from common.clock import wall_sleep_s, wall_time_s
 from common.image_stream import ImageFrame
 from mission.flight import Flight
 from mission.view.controls import Controls
-from mission.view.moment import Moment, Row, moment_of
+from mission.view.flight_snapshot import Moment, Row, moment_of
 from mission.view.panel import PLOT_PERIOD_S, Panel
 from mission.view.scene import Mount, Scene, chase_of, wxyz_of
 from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount

@@ -22,7 +22,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
 from mission.net_guard import CONNECTIONS_MAX, LOOPBACK, browser_refusal, new_token
-from mission.view.inputs import is_sound
+from mission.view.browser_inputs import is_sound
 
 MESSAGE_MAX = 1 << 20  # [byte] of one message of a browser; a click has some 200
 OPENING_S = 5.0  # wall clock, from a connection to its complete request

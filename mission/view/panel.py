@@ -13,9 +13,9 @@ import viser
 from numpy.typing import NDArray
 from viser import uplot
 
-from autopilot.vehicle import Severity
-from mission.texts import Text
-from mission.view.moment import ACTIONS, Moment
+from autopilot.interface.vehicle_state import Severity
+from mission.console.status_texts import Text
+from mission.view.flight_snapshot import ACTIONS, Moment
 
 PLOT_PERIOD_S = 0.5  # simulated time between two points that are plotted
 PLOT_POINTS = 600

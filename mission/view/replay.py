@@ -15,13 +15,13 @@ from common.airframe import load_airframe
 from common.clock import wall_sleep_s, wall_time_s
 from common.kernels import FRAME_US
 from mission.flight import flight_world
-from mission.options import UserError
+from mission.flight_options import UserError
 from mission.view.film import write_film
 from mission.view.html import write_html
 from mission.view.panel import PLOT_PERIOD_S, Panel
-from mission.view.pictures import onboard_eye
-from mission.view.recording import Recording, RecordingError, load_recording
+from mission.view.replay_file import Recording, RecordingError, load_recording
 from mission.view.scene import Mount, Scene, chase_of
+from mission.view.snapshot_images import onboard_eye
 from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount
 from sim.camera_rig import MOUNT_FRD
 from sim.world.world import WorldMap

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from common.airframe import Airframe
 from common.attitude import quat_of, yaw_of
 from mission.view import shapes
-from mission.view.moment import Moment
+from mission.view.flight_snapshot import Moment
 from sim.world.world import WorldMap
 
 VEHICLE_RGB, OWNER_RGB, GOAL_RGB, PLAN_RGB = (40, 110, 220), (232, 120, 32), (220, 40, 90), (250, 250, 250)

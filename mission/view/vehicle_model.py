@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from common.airframe import Airframe
 from common.attitude import Quat
 from mission.view import shapes
-from mission.view.pictures import Eye
+from mission.view.snapshot_images import Eye
 
 NEAREST_M = 0.3  # a vehicle nearer than this is not drawn
 ROTOR_OPACITY = 0.35

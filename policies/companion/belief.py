@@ -1,12 +1,12 @@
 """Where a policy believes the owner to be: its beliefs, read as a sighting for the tracker.
 
-In: the beliefs of one decision (policies/learn/perception.py). Out: the place of the owner's chest from the vehicle in
-metres, if the policy believes to have them in the picture.
+In: the beliefs of one decision (policies/learn/networks/perception.py). Out: the place of the owner's chest from the
+vehicle in metres, if the policy believes to have them in the picture.
 """
 
 from common.attitude import Vector
-from policies.learn.perception import Beliefs, Perception
-from policies.learn.policy import Policy
+from policies.learn.networks.perception import Beliefs, Perception
+from policies.learn.networks.policy import Policy
 from policies.tasks.layout import Layout
 
 PLACE = tuple(f"true_owner_pos_hfrd_{axis}" for axis in "xyz")

@@ -14,11 +14,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.vehicle import Mode
+from autopilot.interface.vehicle_state import Mode
 from common.attitude import Vector
 from common.image_stream import ImageFrame
-from policies.companion.camera import ImageSource
 from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
+from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer
 from policies.companion.owner_watch import OwnerWatch
 from policies.companion.vehicle_link import ByteLink, VehicleLink

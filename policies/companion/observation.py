@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector, rotated
 from policies.companion.vehicle_link import Own, Owner
-from policies.tasks.flight.own import Command, OwnState, command_rows
+from policies.tasks.flight.own_state import Command, OwnState, command_rows
 from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, observe_rows, vector_elements
 
 HEIGHT_OLD_US = 500_000  # a range measured longer ago tells nothing of the ground below

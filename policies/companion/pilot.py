@@ -14,12 +14,12 @@ from policies.companion.belief import owner_belief
 from policies.companion.companion import Pilot
 from policies.companion.names import SCRIPTED, TASK
 from policies.experts.follower import ScriptedFollower
-from policies.learn.policy import Policy
-from policies.learn.policy_file import load_policy
-from policies.learn.policy_path import CheckpointError, find_policy
-from policies.learn.seen import Seen
-from policies.sight import chest_hfrd
-from policies.tasks.flight.own import ACTIONS
+from policies.learn.export.policy_file import load_policy
+from policies.learn.export.policy_path import CheckpointError, find_policy
+from policies.learn.networks.observations import Seen
+from policies.learn.networks.policy import Policy
+from policies.shirt_detector import chest_hfrd
+from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.observe import EGO, EGO_BLIND, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
 from policies.tasks.layout import ImageElement, Layout, LayoutError
 

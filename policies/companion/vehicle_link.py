@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any, Protocol
 
-from autopilot.mavlink.bounds import POSITION_MAX_M, RATE_MAX_RAD_S, SPEED_MAX_M_S, is_known
-from autopilot.mavlink.codec import Frame, FrameReader, encode, message_id
-from autopilot.mavlink.convert import degrees_from_e7, quat_from_wxyz
+from autopilot.interface.vehicle_state import LandedState, Mode, Severity
 from autopilot.mavlink.dialects import Dialect, UnknownModeError
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.vehicle import LandedState, Mode, Severity
+from autopilot.mavlink.wire.codec import Frame, FrameReader, encode, message_id
+from autopilot.mavlink.wire.convert import degrees_from_e7, quat_from_wxyz
+from autopilot.mavlink.wire.number_bounds import POSITION_MAX_M, RATE_MAX_RAD_S, SPEED_MAX_M_S, is_known
 from common.attitude import Quat, Vector
 from common.geodesy import GeoPoint, ned_from_geodetic
 from policies.companion.engagement import Wish
@@ -53,7 +53,7 @@ _DIALECTS: dict[int, Dialect] = {int(PX4.autopilot): PX4, int(ARDUPILOT.autopilo
 
 
 class ByteLink(Protocol):
-    """A byte pipe to the vehicle (autopilot.mavlink.links has some)."""
+    """A byte pipe to the vehicle (autopilot.mavlink.transport.links has some)."""
 
     def send(self, data: bytes) -> None: ...
 

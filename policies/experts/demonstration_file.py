@@ -21,7 +21,7 @@ from typing import Any
 import gymnasium
 
 from common.files import part_path
-from policies.experts.recording import Episode
+from policies.experts.episode_recording import Episode
 from policies.tasks.gym import action_space, observation_space
 from policies.tasks.layout import Layout
 from policies.tasks.task import TaskSettings

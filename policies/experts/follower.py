@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import Vector
-from policies.sight import chest_hfrd
-from policies.tasks.flight.own import ACTIONS
+from policies.shirt_detector import chest_hfrd
+from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.observe import (
     EGO,
     IMAGE_CHANNELS,

@@ -12,14 +12,14 @@ import warp as wp
 from policies.experts.expert import NewEpisodes
 from policies.experts.parking_field import NODES, Target, fill_field
 from policies.experts.parking_planner import Memory, Situation, next_command, write_command
-from policies.tasks.numbers import typed_rows
 from policies.tasks.parking import level1, level2
 from policies.tasks.parking.arena import PORTAL_PLACES, STOREY_2_FROM_X, forward_of, place_of, pose, storey_of
-from policies.tasks.parking.numbers import CAR_NUMBERS, CarNumbers, Level1Numbers, Level2Numbers
+from policies.tasks.parking.parking_params import CAR_NUMBERS, CarNumbers, Level1Numbers, Level2Numbers
 from policies.tasks.parking.scene import Scene, portal_half
 from policies.tasks.parking.settings import Rules
 from policies.tasks.parking.world import CarState, motion_of
 from policies.tasks.task import Task
+from policies.tasks.task_params import typed_rows
 
 wp.set_module_options({"enable_backward": False})
 

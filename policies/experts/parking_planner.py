@@ -14,9 +14,9 @@ from policies.experts.parking_field import Target, way_at
 from policies.tasks.parking.arena import forward_of, place_of, right_of
 from policies.tasks.parking.car import DT
 from policies.tasks.parking.drive import Command, Motion, moved, wrapped
+from policies.tasks.parking.episode_end import is_in_pose
 from policies.tasks.parking.movers import movers_touch, ran, turned_back
-from policies.tasks.parking.numbers import CarNumbers, Level2Numbers
-from policies.tasks.parking.parked import is_in_pose
+from policies.tasks.parking.parking_params import CarNumbers, Level2Numbers
 from policies.tasks.parking.scene import CLEAR, OBSTACLE, PAD, PORTAL, Scene, contact_of
 from policies.tasks.parking.settings import PUSH_OR_TURN, STEER, STEER_AND_SHIFT, Rules
 

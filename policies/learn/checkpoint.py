@@ -17,7 +17,7 @@ import torch
 from numpy.typing import NDArray
 
 from common.files import part_path, write_durably
-from policies.learn.policy_path import CheckpointError
+from policies.learn.export.policy_path import CheckpointError
 
 _ARRAY = "npy"  # an array is stored as {"npy": its bytes in NumPy's format}: any element type, no pickled code
 

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from policies.learn.config.environment import CompletionCriteria, EnvironmentParameter, lessons_of
-from policies.learn.tensorboard import NO_SCORES, score_record, scores_of
+from policies.learn.training_curves import NO_SCORES, score_record, scores_of
 from policies.tasks.episode import Outcome
-from policies.tasks.numbers import Sampler
 from policies.tasks.task import Scores
+from policies.tasks.task_params import Sampler
 
 
 class RecentEpisodes:

@@ -11,14 +11,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from policies.learn.policy import Policy
-from policies.learn.tensors import TaskTensors
-from policies.learn.threads import few_threads
+from policies.learn.networks.policy import Policy
+from policies.learn.rollout.task_tensors import TaskTensors
+from policies.learn.torch_threads import few_threads
 from policies.tasks.catalogue import build_task
 from policies.tasks.episode import Outcome
 from policies.tasks.intervals import wilson_interval
-from policies.tasks.numbers import Sampler
 from policies.tasks.task import Task, TaskSettings
+from policies.tasks.task_params import Sampler
 
 ENVIRONMENTS = 500  # at most, side by side
 LONGEST = 10_000  # decisions after which an episode counts as a timeout: some tasks have no limit of their own (guess)

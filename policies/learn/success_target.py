@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation, evaluate
-from policies.learn.policy import Policy
+from policies.learn.networks.policy import Policy
 from policies.tasks.episode import Outcome
 from policies.tasks.task import TaskSettings
 

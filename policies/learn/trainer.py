@@ -15,22 +15,22 @@ import torch
 
 from common.clock import wall_time_s
 from policies.learn import checkpoint
-from policies.learn.build import build_learner, remarks
+from policies.learn.build_learner import build_learner, remarks
+from policies.learn.checkpoint_compatibility import flat, require_fit, settings_that_must_fit
 from policies.learn.config.run import RunConfig
 from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation
-from policies.learn.export import ParityError, export_policy
-from policies.learn.fit import flat, require_fit, settings_that_must_fit
-from policies.learn.policy_file import CHECKPOINT, POLICY, PolicyCard, policy_record, save_policy
-from policies.learn.run_folder import RunError, RunFolder, starting_point
+from policies.learn.export.onnx_export import ParityError, export_policy
+from policies.learn.export.policy_file import CHECKPOINT, POLICY, PolicyCard, policy_record, save_policy
 from policies.learn.success_target import SuccessTarget
-from policies.learn.tensorboard import EventFile, Period
-from policies.learn.threads import few_threads
+from policies.learn.torch_threads import few_threads
+from policies.learn.training_curves import EventFile, Period
+from policies.learn.training_run_folder import RunError, RunFolder, starting_point
 from policies.tasks.catalogue import build_task, settings_of
 from policies.tasks.episode import Outcome
 from policies.tasks.layout import Layout
-from policies.tasks.numbers import NumberError
 from policies.tasks.task import Scores
+from policies.tasks.task_params import NumberError
 
 RECENT_EPISODES = 1000  # over which success rate and mean reward are shown
 _RATE_ITERATIONS = 20  # over which steps per second are shown

@@ -17,7 +17,7 @@ from enum import IntEnum
 
 import warp as wp
 
-from policies.tasks.numbers import draw_numbers
+from policies.tasks.task_params import draw_numbers
 
 wp.set_module_options({"enable_backward": False})
 

@@ -13,12 +13,12 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.rng import draw_key
-from policies.tasks.drawing import GOAL, VEHICLE, Canvas
 from policies.tasks.episode import FELL, RUNNING, SUCCESS, TIMEOUT, Border, begin_episode, close_step, open_frame
 from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Element, Layout
-from policies.tasks.numbers import Number, typed_rows
 from policies.tasks.task import Task, TaskSettings
+from policies.tasks.task_params import Number, typed_rows
+from policies.tasks.top_view import GOAL, VEHICLE, Canvas
 
 wp.set_module_options({"enable_backward": False})
 

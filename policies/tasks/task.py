@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Border, Outcome, keep_last_image_rows
 from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Layout
-from policies.tasks.numbers import Number, NumberTable, Sampler
+from policies.tasks.task_params import Number, NumberTable, Sampler
 
 Preset = Literal["as-documented", "as-coded", "improved"]
 Split = Literal["train", "test"]

@@ -14,7 +14,7 @@ from autopilot.ports import BaroSample
 from common.kernels import TICK_S, tick_end_us
 from common.rng import draw_tick, normal
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
-from sim.streams import BARO_DRIFT, BARO_DRIFT_START, BARO_OFFSET, BARO_WHITE
+from sim.rng_streams import BARO_DRIFT, BARO_DRIFT_START, BARO_OFFSET, BARO_WHITE
 
 wp.set_module_options({"enable_backward": False})
 

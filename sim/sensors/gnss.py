@@ -14,7 +14,7 @@ from autopilot.ports import GnssSample
 from common.kernels import TICK_S, tick_end_us
 from common.rng import draw_tick, normal3
 from sim.faults import FAULT_OFF, FAULT_STUCK, SensorFault, fault_bias3, is_due, noise_gain, sampling_period
-from sim.streams import GNSS_CORRELATED, GNSS_CORRELATED_START, GNSS_POSITION, GNSS_VELOCITY
+from sim.rng_streams import GNSS_CORRELATED, GNSS_CORRELATED_START, GNSS_POSITION, GNSS_VELOCITY
 
 wp.set_module_options({"enable_backward": False})
 

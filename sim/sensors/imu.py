@@ -19,7 +19,7 @@ from common.kernels import GRAVITY_M_S2, MAX_ROTORS, TICK_S, tick_end_us, vec8
 from common.rng import draw_tick, normal3, normal6
 from common.vectors import clamp3
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias3, noise_gain
-from sim.streams import (
+from sim.rng_streams import (
     ACCEL_DRIFT,
     ACCEL_DRIFT_START,
     ACCEL_TURN_ON,

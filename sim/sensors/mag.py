@@ -14,7 +14,7 @@ from autopilot.ports import MagSample
 from common.kernels import tick_end_us
 from common.rng import draw_tick, normal3
 from sim.faults import FAULT_STUCK, FAULT_TURNED, SensorFault, fault_bias3, fault_turn, noise_gain
-from sim.streams import MAG_HARD_IRON, MAG_SOFT_IRON_CROSS, MAG_SOFT_IRON_DIAGONAL, MAG_WHITE
+from sim.rng_streams import MAG_HARD_IRON, MAG_SOFT_IRON_CROSS, MAG_SOFT_IRON_DIAGONAL, MAG_WHITE
 
 wp.set_module_options({"enable_backward": False})
 

@@ -11,7 +11,7 @@ import warp as wp
 
 from common.kernels import TICK_S, TICK_US
 from common.rng import normal3, uniform
-from sim.streams import (
+from sim.rng_streams import (
     PHONE_CORRELATED,
     PHONE_CORRELATED_START,
     PHONE_DROPOUT,

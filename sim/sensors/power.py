@@ -11,7 +11,7 @@ from autopilot.ports import BatterySample
 from common.kernels import tick_end_us
 from common.rng import draw_tick, normal
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
-from sim.streams import BATTERY_CURRENT, BATTERY_VOLTAGE
+from sim.rng_streams import BATTERY_CURRENT, BATTERY_VOLTAGE
 
 wp.set_module_options({"enable_backward": False})
 

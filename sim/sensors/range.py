@@ -12,7 +12,7 @@ from autopilot.ports import RangeSample
 from common.kernels import tick_end_us
 from common.rng import draw_tick, normal
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
-from sim.streams import RANGE_WHITE
+from sim.rng_streams import RANGE_WHITE
 
 wp.set_module_options({"enable_backward": False})
 

@@ -6,7 +6,7 @@ order of this file; a thread takes one row of the terrain's grid.
 
 import warp as wp
 
-from sim.streams import HILLS
+from sim.rng_streams import HILLS
 from sim.world.growing import Growing
 from sim.world.terrain import LACUNARITY, PERSISTENCE
 

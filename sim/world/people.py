@@ -12,7 +12,7 @@ import warp as wp
 from common.kernels import TICK_S
 from common.rng import draw_key
 from common.rotation import wrap_pi
-from sim.streams import OWNER_BODY, OWNER_PLAN
+from sim.rng_streams import OWNER_BODY, OWNER_PLAN
 from sim.world.footways import BODY_CLEARANCE_M, around_nearest, clear_of_trunks, free_way_m, towards_tree
 from sim.world.world import World, ground_height, ray_hit
 

@@ -1,1 +1,1 @@
-"""Random traffic against a vehicle that hovers; `make fuzz` runs it at length, tests/system/test_fuzz.py briefly."""
+"""Random traffic against a vehicle that hovers; `make fuzz` runs it at length, `test_fuzz.py` briefly."""

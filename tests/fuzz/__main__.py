@@ -12,7 +12,7 @@ from time import perf_counter
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from autopilot.vehicle import Mode
+from autopilot.interface.vehicle_state import Mode
 from tests.fuzz.hover import HOLD_M, Hover
 from tests.fuzz.modes import FRAME_MAX_S, ModeFlight
 

@@ -9,8 +9,8 @@ from time import process_time
 
 import numpy as np
 
-from autopilot.mavlink.links import LinkRole, memory_pair
-from autopilot.vehicle import Mode
+from autopilot.interface.vehicle_state import Mode
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from common.state_folder import StateFolder
 from mission.flight import Flight, FlightConfig
 from tests.fuzz.messages import Messages

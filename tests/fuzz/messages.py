@@ -8,8 +8,8 @@ from math import inf, nan
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.mavlink.codec import frame_bytes, known_type, message_type
-from autopilot.mavlink.definitions import DEFINITIONS
+from autopilot.mavlink.wire.codec import frame_bytes, known_type, message_type
+from autopilot.mavlink.wire.message_definitions import DEFINITIONS
 
 ELSEWHERE = 77  # a system that is not there
 

@@ -12,11 +12,11 @@ from time import thread_time
 
 import numpy as np
 
-from autopilot.lists import ListKind, MissionItem
-from autopilot.mavlink.links import LinkRole, memory_pair
+from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.item_lists import ListKind, MissionItem
+from autopilot.interface.vehicle_state import Mode, Verdict
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.ports import SETPOINT_TRAJECTORY
-from autopilot.requests import OffboardSetpoint
-from autopilot.vehicle import Mode, Verdict
 from common.geodesy import geodetic_from_ned
 from common.state_folder import StateFolder
 from mission.flight import Flight, FlightConfig

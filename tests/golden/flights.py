@@ -4,14 +4,14 @@ from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
-from autopilot.mavlink.codec import encode
-from autopilot.mavlink.links import LinkRole, memory_pair
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from autopilot.mavlink.wire.codec import encode
 from mission.flight import Flight, FlightConfig
-from mission.plan import DEFAULT_PLAN, read_plan
+from mission.log.flight_summary import Summary, planned_path, summarise
+from mission.plan.plan_file import DEFAULT_PLAN, read_plan
 from mission.script import Drone, fly_plan
-from mission.summary import Summary, planned_path, summarise
 from sim.world.world import WorldConfig
-from tests.unit.mission.follow_flight import advance, following
+from tests.unit.mission.follow.follow_flight import advance, following
 
 PLAIN = WorldConfig(trees_per_ha=0.0)
 SET_MODE, ARM, TAKEOFF, INJECT = 176, 400, 22, 420

@@ -16,7 +16,7 @@ import numpy as np
 import warp as wp
 from pyulog import ULog
 
-from mission.summary import Summary
+from mission.log.flight_summary import Summary
 
 LOGS = ("flight.ulg", "flight.tlog")
 TOLERANCE = 0.05  # of a figure, and absolutely, on a machine that rounds otherwise

@@ -22,16 +22,19 @@ from cosmic_ray.work_item import TestOutcome
 
 MAVLINK, NAVIGATOR, COMMANDER = (f"tests/unit/autopilot/{name}" for name in ("mavlink", "navigator", "commander"))
 TARGETS = {
-    "autopilot/mavlink/signing.py": [f"{MAVLINK}/test_signing.py"],
-    "autopilot/mavlink/bounds.py": [f"{MAVLINK}/test_bounds.py"],
-    "autopilot/mavlink/intake.py": [f"{MAVLINK}/test_intake.py"],
-    "autopilot/navigator/target.py": [f"{NAVIGATOR}/test_target.py"],
-    "autopilot/navigator/fence.py": [f"{NAVIGATOR}/test_fence.py"],
-    "autopilot/navigator/region.py": [f"{NAVIGATOR}/test_region.py", f"{NAVIGATOR}/test_fence.py"],
-    "autopilot/commander/crash.py": [f"{COMMANDER}/test_crash.py"],
+    "autopilot/mavlink/wire/signing.py": [f"{MAVLINK}/wire/test_signing.py"],
+    "autopilot/mavlink/wire/number_bounds.py": [f"{MAVLINK}/wire/test_number_bounds.py"],
+    "autopilot/mavlink/transport/receive_queue.py": [f"{MAVLINK}/transport/test_receive_queue.py"],
+    "autopilot/navigator/target_filter.py": [f"{NAVIGATOR}/test_target_filter.py"],
+    "autopilot/navigator/fence/fence.py": [f"{NAVIGATOR}/fence/test_fence.py"],
+    "autopilot/navigator/fence/fence_region.py": [
+        f"{NAVIGATOR}/fence/test_fence_region.py",
+        f"{NAVIGATOR}/fence/test_fence.py",
+    ],
+    "autopilot/commander/crash_detector.py": [f"{COMMANDER}/test_crash_detector.py"],
     "autopilot/commander/battery.py": [f"{COMMANDER}/test_battery.py"],
     "autopilot/commander/arming.py": [f"{COMMANDER}/test_arming.py"],
-    "autopilot/commander/landing.py": [f"{COMMANDER}/test_landing.py"],
+    "autopilot/commander/landing_detector.py": [f"{COMMANDER}/test_landing_detector.py"],
     "common/files.py": ["tests/unit/common/test_files.py"],
 }
 TIMEOUT_S = 120.0  # of the tests of one mutant: one that hangs is noticed, too

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.lists import ListKind
-from autopilot.mavlink.codec import frame_bytes, known_type
+from autopilot.interface.item_lists import ListKind
+from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.links import memory_pair
 from autopilot.mavlink.server import MavlinkServer
+from autopilot.mavlink.transport.links import memory_pair
+from autopilot.mavlink.wire.codec import frame_bytes, known_type
 from autopilot.params import parameter_table
-from autopilot.vehicle import Mode
 from tests.unit.autopilot.kinematic import Kinematic, item, position_setpoint
 from tests.unit.autopilot.mavlink.rig import Client
 

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as pymavlink_all
 from pymavlink.mavftp import MAVFTP
 
-from autopilot.lists import MissionItem
-from autopilot.mavlink.codec import FrameReader, decode, encode, frame_bytes, known_type, message_type
-from autopilot.mavlink.convert import degrees_e7, degrees_from_e7, quat_from_wxyz, wxyz_from_quat
+from autopilot.interface.item_lists import MissionItem
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.missions import item_from_fields, scaled_position
+from autopilot.mavlink.services.mission_protocol import item_from_fields, scaled_position
+from autopilot.mavlink.wire.codec import FrameReader, decode, encode, frame_bytes, known_type, message_type
+from autopilot.mavlink.wire.convert import degrees_e7, degrees_from_e7, quat_from_wxyz, wxyz_from_quat
 from tests.unit.autopilot.mavlink.rig import Rig
-from tests.unit.autopilot.mavlink.test_ftp import FtpClient
+from tests.unit.autopilot.mavlink.services.files.test_ftp import FtpClient
 
 HEARD = (
     "HEARTBEAT", "PING", "TIMESYNC", "REQUEST_DATA_STREAM", "COMMAND_LONG", "COMMAND_INT", "SET_MODE",

@@ -5,10 +5,10 @@ from math import isfinite, nan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.lists import ListKind, MissionItem
-from autopilot.navigator.item_checks import SUPPORTED_COMMANDS, refuse_items
+from autopilot.interface.item_lists import ListKind, MissionItem
+from autopilot.interface.vehicle_state import Mode
+from autopilot.navigator.mission.item_checks import SUPPORTED_COMMANDS, refuse_items
 from autopilot.ports import SETPOINT_TRAJECTORY
-from autopilot.vehicle import Mode
 from tests.unit.autopilot.kinematic import Kinematic, geo
 
 FLOWN_S = 25.0

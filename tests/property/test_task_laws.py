@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from policies.tasks.catalogue import CATALOGUE, build_task, task_settings
-from policies.tasks.numbers import Sampler
 from policies.tasks.parking.level1 import Parking1
 from policies.tasks.parking.level2 import Parking2
-from policies.tasks.parking.numbers import CarNumbers, Level1Numbers, Level2Numbers
-from policies.tasks.reach_target.numbers import ReachNumbers
+from policies.tasks.parking.parking_params import CarNumbers, Level1Numbers, Level2Numbers
 from policies.tasks.reach_target.reach_target import ReachTarget
+from policies.tasks.reach_target.reach_target_params import ReachNumbers
 from policies.tasks.roller_ball import RollerBall, RollerBallNumbers
+from policies.tasks.task_params import Sampler
 
 FEW = settings(max_examples=5, deadline=None)  # the first example compiles a kernel
 TASKS = [

@@ -5,8 +5,8 @@ import pytest
 import warp as wp
 
 from bench.vehicle import NUMBER as N
-from policies.tasks.reach_target.numbers import ReachNumbers
-from policies.tasks.reach_target.vehicle import Car, Wheel, car_of, controls_of, wheel_pull
+from policies.tasks.reach_target.car_model import Car, Wheel, car_of, controls_of, wheel_pull
+from policies.tasks.reach_target.reach_target_params import ReachNumbers
 
 H = 0.01  # [s] sub-step
 UP = np.array([0.0, 1.0, 0.0])

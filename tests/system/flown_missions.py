@@ -5,11 +5,11 @@ from math import nan
 
 import numpy as np
 
-from autopilot.lists import MissionItem
+from autopilot.interface.item_lists import MissionItem
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from sim.world.world import WorldConfig
-from tests.system.published import fly_to_end
+from tests.system.published.published_rules import fly_to_end
 
 WAYPOINT, TURNS, RETURN, LAND, TAKEOFF, SPLINE, JUMP, SPEED = 16, 18, 20, 21, 22, 82, 177, 178
 OPEN_GROUND = WorldConfig(trees_per_ha=0.0)

@@ -5,11 +5,11 @@ The vehicle flies in a thread of its own, a few times faster than real time. Wai
 
 import time
 
-from autopilot.mavlink.codec import FrameReader, decode
-from autopilot.mavlink.links import LinkRole, memory_pair
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from autopilot.mavlink.wire.codec import FrameReader, decode
 from mission.flight import Flight, FlightConfig
 from sim.world.world import WorldConfig
-from tests.system.raw_mavsdk import RawMavsdk
+from tests.system.mavsdk.raw_mavsdk import RawMavsdk
 
 FRAME_WALL_S = 0.004  # five times real time
 OPEN = WorldConfig(trees_per_ha=0.0, hill_height_m=0.0)

@@ -8,11 +8,11 @@ from math import cos, degrees, hypot, nan, sin
 
 import numpy as np
 
-from autopilot.lists import ListKind, MissionItem
+from autopilot.interface.client_requests import OffboardSetpoint, OrbitRequest, TargetReport
+from autopilot.interface.item_lists import ListKind, MissionItem
+from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
 from autopilot.mavlink.dialects.px4 import MODE_NUMBERS, SHOWN_AS
 from autopilot.ports import SETPOINT_TRAJECTORY
-from autopilot.requests import OffboardSetpoint, OrbitRequest, TargetReport
-from autopilot.vehicle import LandedState, Mode, Verdict
 from common.geodesy import geodetic_from_ned
 from common.kernels import FRAME_US
 from mission.flight import Flight, FlightConfig

@@ -22,7 +22,7 @@ NOT_RUN_HERE = {
     "make test": "this is it",
     "make reproduce-cars": "hours of training; docs/results/cars.md is what it writes",
     "make reproduce-follow": "hours of training; docs/results/follow.md is what it writes",
-    "make train-demo": "minutes of training; tests/unit/mission/training runs its commands",
+    "make train-demo": "minutes of training; tests/unit/mission/train runs its commands",
     'make tune ARGS="--airframe sim/bodies/airframes/f450.toml"': "tests/unit/autopilot/test_tuning.py",
     ".venv/bin/python -m autopilot.estimator.derive": "tests/unit/autopilot/estimator/test_derive.py",
 }
@@ -30,12 +30,14 @@ NOT_RUN_HERE = {
 RUN_BY_OTHERS = (
     "pipx install ",
     "pip wheel ",
-    "docker ",  # tests/system/test_installing.py builds the wheel and flies from it
-    f"{HONEYGUIDE} picture ",  # tests/unit/mission/test_picture.py
-    *(f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")),  # tests/unit/mission/test_task_commands.py
+    "docker ",  # tests/system/commands/test_installing.py builds the wheel and flies from it
+    f"{HONEYGUIDE} picture ",  # tests/unit/mission/video/test_image_command.py
+    *(
+        f"{HONEYGUIDE} {name} " for name in ("demonstrate", "play", "drive")
+    ),  # tests/unit/mission/train/test_task_commands.py
     f"{HONEYGUIDE} replay ",  # tests/unit/mission/view/test_replay.py
-    f"{HONEYGUIDE} companion ",  # tests/system/test_companion.py
-    *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/training
+    f"{HONEYGUIDE} companion ",  # tests/system/companion/test_companion.py
+    *(f"{HONEYGUIDE} {name} " for name in ("train", "eval", "export")),  # tests/unit/mission/train
 )
 
 

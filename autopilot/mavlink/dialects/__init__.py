@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from autopilot.vehicle import Mode
+from autopilot.interface.vehicle_state import Mode
 from common.params import Parameter
 
 

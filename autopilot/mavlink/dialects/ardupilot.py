@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import Alias, Constant, ModeRow, UnknownModeError
-from autopilot.mavlink.dialects.ardupilot_params import ALIASES, CONSTANTS
-from autopilot.vehicle import Mode
+from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS
 from common.params import Parameter
 
 _RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT

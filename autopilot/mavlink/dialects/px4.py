@@ -7,8 +7,8 @@ from hashlib import sha1
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import Alias, Constant, ModeRow, UnknownModeError
-from autopilot.vehicle import Mode
 from common.params import Parameter
 
 MANUAL, ALTCTL, POSCTL, AUTO, ACRO, OFFBOARD, STABILIZED, TERMINATION = 1, 2, 3, 4, 5, 6, 7, 10

@@ -6,9 +6,9 @@ sends the same bytes. The speed controllers' are measured.
 
 from math import pi
 
-from autopilot.mavlink.codec import known_type
-from autopilot.mavlink.convert import UINT16_MAX, i16, u16
-from autopilot.vehicle import VehicleState
+from autopilot.interface.vehicle_state import VehicleState
+from autopilot.mavlink.wire.codec import known_type
+from autopilot.mavlink.wire.convert import UINT16_MAX, i16, u16
 from common.kernels import FRAME_US
 
 BOARD_MILLIVOLT = 5_000

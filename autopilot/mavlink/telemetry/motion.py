@@ -2,8 +2,9 @@
 
 from math import hypot, isfinite, nan
 
-from autopilot.mavlink.codec import known_type
-from autopilot.mavlink.convert import (
+from autopilot.interface.vehicle_state import VehicleState
+from autopilot.mavlink.wire.codec import known_type
+from autopilot.mavlink.wire.convert import (
     degrees_e7,
     heading_centideg,
     i16,
@@ -12,7 +13,6 @@ from autopilot.mavlink.convert import (
     wxyz_from_quat,
 )
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, TERRAIN_VALID, VELOCITY_VALID, WIND_VALID, YAW_ALIGNED
-from autopilot.vehicle import VehicleState
 from common.geodesy import geodetic_from_ned
 
 _attitude = known_type("ATTITUDE").pack

@@ -1,10 +1,10 @@
 """Telemetry of the pilot's sticks: joystick position and radio channels as the vehicle takes them."""
 
-from autopilot.mavlink.codec import known_type
-from autopilot.mavlink.convert import i16
+from autopilot.inputs.sticks import UNUSED
+from autopilot.interface.vehicle_state import VehicleState
 from autopilot.mavlink.telemetry.motion import boot_ms
-from autopilot.sticks import UNUSED
-from autopilot.vehicle import VehicleState
+from autopilot.mavlink.wire.codec import known_type
+from autopilot.mavlink.wire.convert import i16
 
 _rc_channels = known_type("RC_CHANNELS").pack
 _rc_channels_raw = known_type("RC_CHANNELS_RAW").pack

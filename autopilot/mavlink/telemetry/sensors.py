@@ -3,8 +3,10 @@
 from math import atan2, hypot, isfinite
 from typing import Any
 
-from autopilot.mavlink.codec import known_type
-from autopilot.mavlink.convert import (
+from autopilot.interface.vehicle_state import VehicleState
+from autopilot.mavlink.telemetry.motion import boot_ms
+from autopilot.mavlink.wire.codec import known_type
+from autopilot.mavlink.wire.convert import (
     UINT16_MAX,
     bounded_int,
     degrees_e7,
@@ -14,7 +16,6 @@ from autopilot.mavlink.convert import (
     u16,
     u32,
 )
-from autopilot.mavlink.telemetry.motion import boot_ms
 from autopilot.ports import (
     ACCEL_DOUBTED,
     HEIGHT_VALID,
@@ -23,7 +24,6 @@ from autopilot.ports import (
     TILT_ALIGNED,
     VELOCITY_VALID,
 )
-from autopilot.vehicle import VehicleState
 from common.geodesy import geodetic_from_ned
 from common.kernels import GRAVITY_M_S2
 

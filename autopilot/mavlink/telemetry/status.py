@@ -5,11 +5,12 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.host import Host
-from autopilot.mavlink.codec import known_type
-from autopilot.mavlink.convert import INT16_MAX, UINT16_MAX, bounded_int, degrees_e7, i16, i32, u16
+from autopilot.interface.platform import Host
+from autopilot.interface.vehicle_state import FenceLimit, LandedState, Mode, VehicleState
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.telemetry.motion import boot_ms
+from autopilot.mavlink.wire.codec import known_type
+from autopilot.mavlink.wire.convert import INT16_MAX, UINT16_MAX, bounded_int, degrees_e7, i16, i32, u16
 from autopilot.ports import (
     EXTERNAL_POSITION,
     MAG_DISTURBED,
@@ -19,7 +20,6 @@ from autopilot.ports import (
     VELOCITY_VALID,
     YAW_ALIGNED,
 )
-from autopilot.vehicle import FenceLimit, LandedState, Mode, VehicleState
 
 _heartbeat = known_type("HEARTBEAT").pack
 _sys_status = known_type("SYS_STATUS").pack

@@ -5,7 +5,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from policies.learn.config.block import (
+from policies.learn.config.config_block import (
     Block,
     Count,
     CountOrNone,

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, model_validator
 
-from policies.learn.config.block import Block, Count, NotNegative, NotNegativeWhole, Positive, Real, Whole
-from policies.tasks.numbers import Sampler
+from policies.learn.config.config_block import Block, Count, NotNegative, NotNegativeWhole, Positive, Real, Whole
+from policies.tasks.task_params import Sampler
 
 
 class UniformParameters(Block):

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import field_validator
 
-from policies.learn.config.block import Block, Count, NotNegativeWhole, own_key
+from policies.learn.config.config_block import Block, Count, NotNegativeWhole, own_key
 
 Encoder = Literal["simple", "nature_cnn", "resnet", "match3", "fully_connected", "compact"]
 

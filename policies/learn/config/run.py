@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from policies.learn.config.behavior import Behavior
-from policies.learn.config.block import Block
+from policies.learn.config.config_block import Block
 from policies.learn.config.environment import EngineSettings, EnvironmentParameter, EnvSettings
 
 

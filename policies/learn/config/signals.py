@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import field_validator
 
-from policies.learn.config.block import Block, CountOrNone, NotNegative, Positive, Share, own_key
+from policies.learn.config.config_block import Block, CountOrNone, NotNegative, Positive, Share, own_key
 from policies.learn.config.network import NetworkSettings
 
 

@@ -11,11 +11,11 @@ import torch
 from torch import Tensor, nn
 
 from policies.learn.config.signals import CuriositySettings
-from policies.learn.dense import dense
-from policies.learn.normalizer import Normalizer
-from policies.learn.signal_losses import half_squared_error, inverse_loss
-from policies.learn.signals.parts import build_body, flat_actions, restore, snapshot
+from policies.learn.networks.dense_layers import dense
+from policies.learn.networks.normalizer import Normalizer
+from policies.learn.signals.network_parts import build_body, flat_actions, restore, snapshot
 from policies.learn.signals.signal import Transitions
+from policies.learn.signals.signal_losses import half_squared_error, inverse_loss
 from policies.tasks.layout import Layout
 
 HEAD_UNITS = 256  # all numbers here are ML-Agents'

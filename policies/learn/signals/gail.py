@@ -12,11 +12,11 @@ import torch
 from torch import Tensor, nn
 
 from policies.learn.config.signals import GailSettings
-from policies.learn.dense import dense
-from policies.learn.normalizer import Normalizer
-from policies.learn.signal_losses import code_divergence, discriminator_loss, gradient_penalty, imitation_reward
-from policies.learn.signals.parts import build_body, flat_actions, restore, snapshot
+from policies.learn.networks.dense_layers import dense
+from policies.learn.networks.normalizer import Normalizer
+from policies.learn.signals.network_parts import build_body, flat_actions, restore, snapshot
 from policies.learn.signals.signal import Transitions
+from policies.learn.signals.signal_losses import code_divergence, discriminator_loss, gradient_penalty, imitation_reward
 from policies.tasks.layout import Layout
 
 GRADIENT_PENALTY_WEIGHT = 10.0  # this and the numbers of the code are ML-Agents'

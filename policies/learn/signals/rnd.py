@@ -12,10 +12,10 @@ import torch
 from torch import Tensor, nn
 
 from policies.learn.config.signals import RndSettings
-from policies.learn.normalizer import Normalizer
-from policies.learn.signal_losses import squared_error
-from policies.learn.signals.parts import build_body, restore, snapshot
+from policies.learn.networks.normalizer import Normalizer
+from policies.learn.signals.network_parts import build_body, restore, snapshot
 from policies.learn.signals.signal import Transitions
+from policies.learn.signals.signal_losses import squared_error
 from policies.tasks.layout import Layout
 
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from common.geodesy import DEFAULT_HOME
 from common.kernels import TICK_S
-from policies.tasks.flight.bank import LOW_M, build_rig, hover_bank
-from policies.tasks.flight.vehicle import NOISE_LEVELS_PER_UNIT, Makes
+from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, Makes
+from policies.tasks.flight.hover_bank import LOW_M, build_rig, hover_bank
 from policies.tasks.layout import Layout
-from policies.tasks.numbers import Sampler
 from policies.tasks.task import Task
+from policies.tasks.task_params import Sampler
 from sim.restore import RowRestore
 from sim.rig import Rig
 from sim.sensors.sensors import SensorModel, sensor_model

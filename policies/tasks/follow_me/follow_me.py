@@ -12,13 +12,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from policies.tasks.flight.bank import HOVER_COUNT, LOW_M
-from policies.tasks.flight.numbers import FLIGHT_NUMBERS, FlightNumbers
-from policies.tasks.flight.own import ACTIONS
+from policies.tasks.flight.flight_params import FLIGHT_NUMBERS, FlightNumbers
+from policies.tasks.flight.hover_bank import HOVER_COUNT, LOW_M
+from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.flight.ranges import RANGES, measure_ranges
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
-from policies.tasks.follow_me.images import Eyes
-from policies.tasks.follow_me.kernels import (
+from policies.tasks.follow_me.follow_me_kernels import (
     MEASURES,
     FollowState,
     Rules,
@@ -32,15 +31,16 @@ from policies.tasks.follow_me.kernels import (
     show,
     walk,
 )
-from policies.tasks.follow_me.numbers import DOCUMENTED, IMPROVED, NUMBERS, TREES_PER_HA_MAX, FollowNumbers
+from policies.tasks.follow_me.follow_me_params import DOCUMENTED, IMPROVED, NUMBERS, TREES_PER_HA_MAX, FollowNumbers
+from policies.tasks.follow_me.follow_me_top_view import draw
 from policies.tasks.follow_me.observe import BRANCHES, DOCUMENT, EGO, EGO_BLIND, IMAGE_CHANNELS, vector_elements
-from policies.tasks.follow_me.picture import draw
+from policies.tasks.follow_me.owner_visibility import Sight
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
-from policies.tasks.follow_me.sight import Sight
+from policies.tasks.follow_me.task_cameras import Eyes
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 from policies.tasks.layout import ImageElement, Layout
-from policies.tasks.numbers import Sampler, typed_rows
+from policies.tasks.task_params import Sampler, typed_rows
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_model
 from sim.world.people import RUN_SPEED_M_S, WALK_SPEED_M_S, Person, PersonModel, person_model

@@ -5,7 +5,7 @@ The batch task has the same in its own measures.
 
 import warp as wp
 
-from policies.tasks.follow_me.sight import see
+from policies.tasks.follow_me.owner_visibility import see
 from sim.advance import RigArrays
 from sim.truth import has_touched
 from sim.world.people import Person

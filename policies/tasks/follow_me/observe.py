@@ -11,7 +11,7 @@ import math
 import warp as wp
 
 from common.rotation import yaw_from_quat
-from policies.tasks.flight.own import (
+from policies.tasks.flight.own_state import (
     CLIMB_MAX_M_S,
     OWN_ELEMENTS,
     OWN_SIZE,

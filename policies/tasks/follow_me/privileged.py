@@ -6,9 +6,9 @@ near everything solid is, all round.
 
 import warp as wp
 
-from policies.tasks.flight.own import OWN_ELEMENTS, OWN_SIZE, SPEED_SCALE, OwnState, write3, write_own
+from policies.tasks.flight.own_state import OWN_ELEMENTS, OWN_SIZE, SPEED_SCALE, OwnState, write3, write_own
 from policies.tasks.flight.ranges import RANGE_ELEMENTS, RANGES
-from policies.tasks.follow_me.sight import ROOM_MAX_M, Sight
+from policies.tasks.follow_me.owner_visibility import ROOM_MAX_M, Sight
 from policies.tasks.layout import Element
 from sim.truth import Truth
 

@@ -11,9 +11,9 @@ import math
 import warp as wp
 
 from policies.tasks.episode import HIT_OBSTACLE, HIT_OTHER, LOST, RUNNING, SUCCESS, TIMEOUT
-from policies.tasks.flight.own import SPEED_MAX_M_S
-from policies.tasks.follow_me.numbers import FollowNumbers
-from policies.tasks.follow_me.sight import Sight
+from policies.tasks.flight.own_state import SPEED_MAX_M_S
+from policies.tasks.follow_me.follow_me_params import FollowNumbers
+from policies.tasks.follow_me.owner_visibility import Sight
 
 wp.set_module_options({"enable_backward": False})
 

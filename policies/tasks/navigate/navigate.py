@@ -11,19 +11,29 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from policies.tasks.flight.bank import HOVER_COUNT
-from policies.tasks.flight.numbers import FLIGHT_NUMBERS, FlightNumbers
-from policies.tasks.flight.own import ACTIONS, OWN_ELEMENTS
+from policies.tasks.flight.flight_params import FLIGHT_NUMBERS, FlightNumbers
+from policies.tasks.flight.hover_bank import HOVER_COUNT
+from policies.tasks.flight.own_state import ACTIONS, OWN_ELEMENTS
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
 from policies.tasks.layout import ImageElement, Layout
-from policies.tasks.navigate.images import DEPTH_CHANNELS, DepthEyes
-from policies.tasks.navigate.kernels import MEASURES, NavigateState, Rules, Start, act, judge, place, prepare, show
-from policies.tasks.navigate.numbers import IMPROVED, NUMBERS, TREES_PER_HA_MAX, NavigateNumbers
+from policies.tasks.navigate.depth_cameras import DEPTH_CHANNELS, DepthEyes
+from policies.tasks.navigate.navigate_kernels import (
+    MEASURES,
+    NavigateState,
+    Rules,
+    Start,
+    act,
+    judge,
+    place,
+    prepare,
+    show,
+)
+from policies.tasks.navigate.navigate_params import IMPROVED, NUMBERS, TREES_PER_HA_MAX, NavigateNumbers
+from policies.tasks.navigate.navigate_top_view import draw
 from policies.tasks.navigate.observe import GOAL_ELEMENTS
-from policies.tasks.navigate.picture import draw
 from policies.tasks.navigate.scan import RANGE_ELEMENTS, RANGES, scan
 from policies.tasks.navigate.settings import NavigateSettings
-from policies.tasks.numbers import typed_rows
+from policies.tasks.task_params import typed_rows
 from sim.world.world import WorldConfig
 
 WORLD = WorldConfig(

@@ -6,7 +6,7 @@ One function for training and for flight. In: the estimate, the goal. Out: five 
 import warp as wp
 
 from common.rotation import yaw_from_quat
-from policies.tasks.flight.own import OwnState, level_from_ned
+from policies.tasks.flight.own_state import OwnState, level_from_ned
 from policies.tasks.layout import Element
 
 wp.set_module_options({"enable_backward": False})

@@ -8,8 +8,8 @@ import warp as wp
 
 from common.rotation import yaw_from_quat
 from policies.tasks.episode import HIT_OBSTACLE, LOST, RUNNING, SUCCESS, TIMEOUT
-from policies.tasks.flight.own import level_from_ned
-from policies.tasks.navigate.numbers import NavigateNumbers
+from policies.tasks.flight.own_state import level_from_ned
+from policies.tasks.navigate.navigate_params import NavigateNumbers
 from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})

@@ -13,7 +13,7 @@ import warp as wp
 from common.rng import draw_key, draw_tick
 from common.rotation import yaw_from_quat
 from policies.tasks.layout import Element
-from policies.tasks.navigate.numbers import NavigateNumbers
+from policies.tasks.navigate.navigate_params import NavigateNumbers
 from sim.advance import RigArrays
 from sim.world.growing import bucket_of
 from sim.world.trees import Forest, Tree

@@ -6,7 +6,7 @@ from policies.tasks.episode import Border
 from policies.tasks.layout import Branch
 from policies.tasks.parking.arena import pose_at
 from policies.tasks.parking.car import DT, damped_push
-from policies.tasks.parking.numbers import CarNumbers
+from policies.tasks.parking.parking_params import CarNumbers
 from policies.tasks.parking.settings import PUSH_OR_TURN, STEER, STEER_AND_SHIFT, Rules
 
 wp.set_module_options({"enable_backward": False})

@@ -12,7 +12,6 @@ import warp as wp
 from common.rng import draw_key
 from policies.tasks.episode import RUNNING, SUCCESS, Border, begin_episode, close_step
 from policies.tasks.layout import Layout
-from policies.tasks.numbers import Sampler, typed_rows
 from policies.tasks.parking.arena import (
     BLOCK_HEIGHT,
     BLOCK_PLACES,
@@ -25,16 +24,23 @@ from policies.tasks.parking.arena import (
     pose_at,
 )
 from policies.tasks.parking.car import TICK_S, box_of_car
+from policies.tasks.parking.decision_rows import table_reward
 from policies.tasks.parking.drive import BRANCHES, Motion, command_of, moved
-from policies.tasks.parking.numbers import CAR_NUMBERS, LEVEL1_NUMBERS, CarNumbers, Level1Numbers, reward_defaults
+from policies.tasks.parking.episode_end import capped, end_reward, outcome_of, progress_reward, way_of
 from policies.tasks.parking.observe_documents import gap_to
 from policies.tasks.parking.observe_level1 import BLOCK_COUNT, frame_of, observe
-from policies.tasks.parking.parked import capped, end_reward, outcome_of, progress_reward, way_of
+from policies.tasks.parking.parking_params import (
+    CAR_NUMBERS,
+    LEVEL1_NUMBERS,
+    CarNumbers,
+    Level1Numbers,
+    reward_defaults,
+)
 from policies.tasks.parking.scene import Scene, contact_of, half_of_pad
 from policies.tasks.parking.settings import AS_DOCUMENTED, PROGRESS, Choices, ParkingSettings, Rules, chosen, rules_of
 from policies.tasks.parking.spots import cells, draw_block, draw_goal, draw_start
-from policies.tasks.parking.table import table_reward
 from policies.tasks.parking.world import CarState, ParkingTask, keep_motion, motion_of
+from policies.tasks.task_params import Sampler, typed_rows
 
 wp.set_module_options({"enable_backward": False})
 

@@ -17,7 +17,7 @@ from policies.tasks.parking.arena import (
     storey_centre,
 )
 from policies.tasks.parking.car import DT, nearest_on_line
-from policies.tasks.parking.numbers import Level2Numbers
+from policies.tasks.parking.parking_params import Level2Numbers
 
 wp.set_module_options({"enable_backward": False})
 

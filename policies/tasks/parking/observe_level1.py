@@ -16,7 +16,6 @@ from policies.tasks.parking.arena import (
 )
 from policies.tasks.parking.car import box_of_car
 from policies.tasks.parking.drive import Motion
-from policies.tasks.parking.numbers import CarNumbers
 from policies.tasks.parking.observe_documents import gap_to, unit_elements, unit_to, world_elements, write_vector
 from policies.tasks.parking.observe_ranged import (
     goal_elements,
@@ -27,6 +26,7 @@ from policies.tasks.parking.observe_ranged import (
     write_velocity,
     write_walls,
 )
+from policies.tasks.parking.parking_params import CarNumbers
 from policies.tasks.parking.rays import ray_elements, write_rays
 from policies.tasks.parking.scene import Scene
 from policies.tasks.parking.settings import AS_DOCUMENTED, RANGED, Choices, Rules

@@ -24,7 +24,6 @@ from policies.tasks.parking.arena import (
 from policies.tasks.parking.car import box_of_car
 from policies.tasks.parking.drive import Motion
 from policies.tasks.parking.movers import PER_STOREY
-from policies.tasks.parking.numbers import CarNumbers, Level2Numbers
 from policies.tasks.parking.observe_documents import (
     gap_to,
     seen_from,
@@ -43,6 +42,7 @@ from policies.tasks.parking.observe_ranged import (
     write_velocity,
     write_walls,
 )
+from policies.tasks.parking.parking_params import CarNumbers, Level2Numbers
 from policies.tasks.parking.rays import ray_elements, write_rays
 from policies.tasks.parking.scene import Scene, portal_half
 from policies.tasks.parking.settings import AS_DOCUMENTED, RANGED, Choices, Rules

@@ -20,7 +20,7 @@ from policies.tasks.parking.arena import (
     storey_centre,
     storey_of,
 )
-from policies.tasks.parking.numbers import CarNumbers
+from policies.tasks.parking.parking_params import CarNumbers
 from policies.tasks.parking.scene import MAX_OBSTACLES, Scene, portal_half
 from policies.tasks.parking.settings import Rules
 

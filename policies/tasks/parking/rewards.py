@@ -5,7 +5,7 @@ Rows are numbered as in the document's table 2. They are paid per applied action
 
 import warp as wp
 
-from policies.tasks.parking.numbers import CarNumbers
+from policies.tasks.parking.parking_params import CarNumbers
 
 wp.set_module_options({"enable_backward": False})
 

@@ -7,7 +7,7 @@ import warp as wp
 
 from policies.tasks.parking.arena import PORTAL_HALF_X, PORTAL_HALF_Z, forward_of
 from policies.tasks.parking.car import box_meets_capsule, box_of_car, boxes_overlap, is_at_wall
-from policies.tasks.parking.numbers import CarNumbers
+from policies.tasks.parking.parking_params import CarNumbers
 
 wp.set_module_options({"enable_backward": False})
 

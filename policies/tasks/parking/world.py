@@ -6,13 +6,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from policies.tasks.numbers import typed_rows
 from policies.tasks.parking.arena import pose_at
 from policies.tasks.parking.drive import Motion
-from policies.tasks.parking.numbers import CarNumbers
-from policies.tasks.parking.picture import picture_of
+from policies.tasks.parking.parking_params import CarNumbers
+from policies.tasks.parking.parking_top_view import picture_of
 from policies.tasks.parking.settings import Rules
 from policies.tasks.task import Task
+from policies.tasks.task_params import typed_rows
 
 wp.set_module_options({"enable_backward": False})
 

@@ -17,8 +17,7 @@ from policies.tasks.episode import (
     close_step,
     open_frame,
 )
-from policies.tasks.reach_target.numbers import ReachNumbers
-from policies.tasks.reach_target.vehicle import (
+from policies.tasks.reach_target.car_model import (
     SUBSTEPS,
     Controls,
     Motion,
@@ -27,6 +26,7 @@ from policies.tasks.reach_target.vehicle import (
     driven,
     is_chassis_hit,
 )
+from policies.tasks.reach_target.reach_target_params import ReachNumbers
 
 wp.set_module_options({"enable_backward": False})
 

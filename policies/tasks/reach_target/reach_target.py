@@ -12,10 +12,9 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from policies.tasks.drawing import GOAL, GOOD, INK, OBSTACLE, VEHICLE, Canvas
 from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Element, Layout
-from policies.tasks.numbers import typed_rows
+from policies.tasks.reach_target.car_model import STEP_S
 from policies.tasks.reach_target.kernel import (
     NEAR_M,
     OBSERVATIONS,
@@ -29,10 +28,11 @@ from policies.tasks.reach_target.kernel import (
     begin,
     step,
 )
-from policies.tasks.reach_target.numbers import NUMBERS, ReachNumbers
+from policies.tasks.reach_target.reach_target_params import NUMBERS, ReachNumbers
 from policies.tasks.reach_target.settings import ReachSettings
-from policies.tasks.reach_target.vehicle import STEP_S
 from policies.tasks.task import Task
+from policies.tasks.task_params import typed_rows
+from policies.tasks.top_view import GOAL, GOOD, INK, OBSTACLE, VEHICLE, Canvas
 
 _AXES = ("x", "y", "z")
 _EGO = (

@@ -9,7 +9,7 @@ from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
 from common.kernels import FRAME_TICKS
 from mission.flight import Flight, FlightConfig
-from mission.plan import DEFAULT_PLAN, read_plan
+from mission.plan.plan_file import DEFAULT_PLAN, read_plan
 from mission.script import fly_plan
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model

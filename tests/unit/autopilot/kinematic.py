@@ -8,8 +8,10 @@ from math import atan2, cos, exp, isfinite, nan, pi, sin
 
 import numpy as np
 
-from autopilot.lists import MissionItem
-from autopilot.node import FlightController, HostPorts, hover_thrust
+from autopilot.flight_controller import FlightController, HostPorts, hover_thrust
+from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.item_lists import MissionItem
+from autopilot.interface.vehicle_state import LandedState, Mode, Severity
 from autopilot.params import all_parameters
 from autopilot.ports import (
     HEIGHT_VALID,
@@ -26,8 +28,6 @@ from autopilot.ports import (
     Samples,
     Setpoint,
 )
-from autopilot.requests import OffboardSetpoint
-from autopilot.vehicle import LandedState, Mode, Severity
 from common.airframe import load_airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import FRAME_US, GRAVITY_M_S2

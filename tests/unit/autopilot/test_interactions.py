@@ -3,11 +3,11 @@
 from math import hypot, nan
 
 from autopilot.commander.failsafe import BATTERY_CRITICAL, BATTERY_EMERGENCY
-from autopilot.lists import ListKind
-from autopilot.navigator.mission import MissionState
+from autopilot.interface.client_requests import OrbitRequest
+from autopilot.interface.item_lists import ListKind
+from autopilot.interface.vehicle_state import Mode, Verdict
+from autopilot.navigator.mission.mission import MissionState
 from autopilot.ports import POSITION_VALID, VELOCITY_VALID
-from autopilot.requests import OrbitRequest
-from autopilot.vehicle import Mode, Verdict
 from tests.unit.autopilot.kinematic import DT_S, ORIGIN, Kinematic, do, geo, item, position_setpoint
 
 WAYPOINT, LAND, TAKEOFF, LAND_START = 16, 21, 22, 189

@@ -4,7 +4,7 @@ from math import inf, nan
 
 import pytest
 
-from autopilot.vehicle import LandedState, Verdict
+from autopilot.interface.vehicle_state import LandedState, Verdict
 from common.airframe import load_airframe
 from tests.unit.autopilot.kinematic import Kinematic
 

@@ -5,10 +5,10 @@ from math import isnan, nan
 import pytest
 
 from autopilot.commander.home import Home
-from autopilot.lists import ListKind, MissionItem
+from autopilot.interface.item_lists import ListKind, MissionItem
+from autopilot.interface.vehicle_state import VehicleState
 from autopilot.params import parameter_table
 from autopilot.persistence import WRITE_PERIOD_US, Persistence
-from autopilot.vehicle import VehicleState
 from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
 from tests.unit.autopilot.kinematic import Recorder

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench.estimate import main
-from tests.unit.mission.synthetic_log import Flight, px4_tables, write_ulog
+from tests.unit.mission.estimate.synthetic_log import Flight, px4_tables, write_ulog
 
 HEADER = "time_us,qw,qx,qy,qz,vn,ve,vd,pn,pe,pd"
 

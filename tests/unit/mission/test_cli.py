@@ -9,13 +9,13 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from autopilot.vehicle import Mode
+from autopilot.interface.vehicle_state import Mode
 from common.airframe import AIRFRAME_FOLDER
 from mission.cli import app
+from mission.console.progress_line import Progress
 from mission.flight import Flight
-from mission.plan import DEFAULT_PLAN
-from mission.progress import Progress
-from tests.unit.mission.follow_flight import config
+from mission.plan.plan_file import DEFAULT_PLAN
+from tests.unit.mission.follow.follow_flight import config
 
 
 @pytest.fixture

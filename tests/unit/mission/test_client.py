@@ -4,8 +4,8 @@ from math import nan
 
 import pytest
 
-from autopilot.mavlink.codec import FrameReader, decode, encode
-from autopilot.mavlink.links import memory_pair
+from autopilot.mavlink.transport.links import memory_pair
+from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.kernels import FRAME_US
 from mission.client import (
     Client,
@@ -18,7 +18,7 @@ from mission.client import (
     parameter_from_wire,
     parameter_to_wire,
 )
-from mission.plan import PlanItem
+from mission.plan.plan_file import PlanItem
 
 ARM = 400
 ACK_DENIED, ACK_IN_PROGRESS = 2, 5

@@ -1,7 +1,7 @@
 """A script's time over a vehicle that restarts: the vehicle's clock begins again, the script's goes on."""
 
-from autopilot.mavlink.codec import encode
-from autopilot.mavlink.links import LinkRole
+from autopilot.mavlink.transport.links import LinkRole
+from autopilot.mavlink.wire.codec import encode
 from mission.over_udp import _run
 from mission.script import Drone
 

@@ -9,7 +9,7 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from mission.options import UserError
+from mission.flight_options import UserError
 from mission.run_folder import OwnFiles, run_folder
 
 HOLDER = """

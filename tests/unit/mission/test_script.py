@@ -5,12 +5,12 @@ from math import hypot, nan, pi
 
 import pytest
 
-from autopilot.lists import ListKind
-from autopilot.vehicle import Mode
+from autopilot.interface.item_lists import ListKind
+from autopilot.interface.vehicle_state import Mode
 from common.geodesy import DEFAULT_HOME, GeoPoint, geodetic_from_ned
 from mission.client import CommandRefused, ScriptError, ScriptTimeout
 from mission.flight import Flight, FlightConfig
-from mission.plan import FenceCircle, FencePolygon, Plan, PlanItem
+from mission.plan.plan_file import FenceCircle, FencePolygon, Plan, PlanItem
 from mission.script import fly_plan
 from sim.faults import set_fault
 from sim.world.world import WorldConfig

@@ -5,10 +5,10 @@ from math import hypot, nan
 import numpy as np
 import pytest
 
-from autopilot.vehicle import Verdict
+from autopilot.interface.vehicle_state import Verdict
 from common.geodesy import DEFAULT_HOME, ned_from_geodetic
 from sim.devices import ABANDON_LINE, DELIVER, GRIPPER, LOAD_LINE, LOCK, RATE, RELATIVE, RETRACT, WINCH, Gripper, Winch
-from sim.traffic import HEARD_WITHIN_M, SimulatedTraffic
+from sim.simulated_traffic import HEARD_WITHIN_M, SimulatedTraffic
 
 
 class Clock:

@@ -2,8 +2,8 @@
 
 import pytest
 
+from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
 from autopilot.ports import POSITION_VALID, VELOCITY_VALID
-from autopilot.vehicle import LandedState, Mode, Verdict
 from tests.unit.autopilot.kinematic import Kinematic
 
 STICK_MODES = [Mode.STABILIZED, Mode.ACRO, Mode.ALTITUDE, Mode.POSITION]

@@ -5,6 +5,8 @@ from math import nan
 import pytest
 
 from autopilot.commander.arming import arming_reasons
+from autopilot.interface.client_requests import CalibrationKind
+from autopilot.interface.vehicle_state import LandedState, Mode, Severity, Verdict
 from autopilot.ports import (
     HEIGHT_VALID,
     MAG_DISTURBED,
@@ -14,8 +16,6 @@ from autopilot.ports import (
     VELOCITY_VALID,
     YAW_ALIGNED,
 )
-from autopilot.requests import CalibrationKind
-from autopilot.vehicle import LandedState, Mode, Severity, Verdict
 from tests.unit.autopilot.kinematic import ALL_VALID, ORIGIN, Kinematic, geo
 
 

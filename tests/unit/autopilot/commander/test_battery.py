@@ -2,10 +2,10 @@
 
 import pytest
 
-from autopilot.ardupilot_params import ARDUPILOT_PARAMETERS
+from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
 from autopilot.commander.battery import BatteryEstimator, VoltageLimits
+from autopilot.interface.vehicle_state import BatteryLevel
 from autopilot.params import parameter_table
-from autopilot.vehicle import BatteryLevel
 from common.airframe import load_airframe
 
 BATTERY = load_airframe("x500").battery

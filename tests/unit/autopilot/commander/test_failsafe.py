@@ -2,10 +2,10 @@
 
 import pytest
 
-from autopilot.lists import ListKind
-from autopilot.navigator.mission import MissionState
+from autopilot.interface.item_lists import ListKind
+from autopilot.interface.vehicle_state import BatteryLevel, LandedState, Mode, Severity, Verdict
+from autopilot.navigator.mission.mission import MissionState
 from autopilot.ports import DEAD_RECKONING, POSITION_VALID, WIND_VALID
-from autopilot.vehicle import BatteryLevel, LandedState, Mode, Severity, Verdict
 from tests.unit.autopilot.kinematic import Kinematic, geo, item
 
 NAN = float("nan")

@@ -7,25 +7,29 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.camera.camera import Camera
-from autopilot.commander.watch import StationLink
+from autopilot.commander.failure_detector import StationLink
 from autopilot.estimator.state import EstimatorState
-from autopilot.external import ExternalPositions
-from autopilot.host import Host
-from autopilot.lists import ItemLists, ItemRefusal, ListKind, MissionItem
-from autopilot.mavlink.codec import FrameReader, Message, decode, encode, message_id
-from autopilot.mavlink.definitions import DEFINITIONS
+from autopilot.inputs.external_position import ExternalPositions
+from autopilot.inputs.obstacles import Obstacles
+from autopilot.inputs.sticks import Sticks
+from autopilot.inputs.traffic import Aircraft, Traffic
+from autopilot.interface.client_requests import CalibrationKind, OffboardSetpoint, OrbitRequest, TargetReport
+from autopilot.interface.item_lists import ItemLists, ItemRefusal, ListKind, MissionItem
+from autopilot.interface.platform import Host
+from autopilot.interface.vehicle_state import ACCEPTED, BatteryLevel, Mode, OrbitStatus, Reply, VehicleState
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.links import Link, LinkRole, memory_pair
 from autopilot.mavlink.server import MavlinkServer
-from autopilot.navigator.fence_items import MAX_FENCE_ITEMS
-from autopilot.navigator.items import MAX_ITEMS
-from autopilot.navigator.rally import MAX_RALLY_POINTS
-from autopilot.obstacles import Obstacles
-from autopilot.outputs import AuxOutputs
+from autopilot.mavlink.transport.links import Link, LinkRole, memory_pair
+from autopilot.mavlink.wire.codec import FrameReader, Message, decode, encode, message_id
+from autopilot.mavlink.wire.message_definitions import DEFINITIONS
+from autopilot.navigator.fence.fence_items import MAX_FENCE_ITEMS
+from autopilot.navigator.fence.rally_points import MAX_RALLY_POINTS
+from autopilot.navigator.mission.item_commands import MAX_ITEMS
 from autopilot.params import parameter_table
-from autopilot.payload import Payloads
+from autopilot.payload.aux_outputs import AuxOutputs
+from autopilot.payload.camera.camera import Camera
+from autopilot.payload.payloads import Payloads
 from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
@@ -39,10 +43,6 @@ from autopilot.ports import (
     ExternalSample,
     Samples,
 )
-from autopilot.requests import CalibrationKind, OffboardSetpoint, OrbitRequest, TargetReport
-from autopilot.sticks import Sticks
-from autopilot.traffic import Aircraft, Traffic
-from autopilot.vehicle import ACCEPTED, BatteryLevel, Mode, OrbitStatus, Reply, VehicleState
 from common.geodesy import GeoPoint
 from common.records import row_reader
 from sim.truth import Truth

@@ -3,7 +3,7 @@
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.boot_clock import BootClock
-from autopilot.mavlink.codec import known_type
+from autopilot.mavlink.wire.codec import known_type
 
 DAY_US = 86_400_000_000
 BOOT_US, NOW_US = 60 * DAY_US, 60 * DAY_US + 5_000_000

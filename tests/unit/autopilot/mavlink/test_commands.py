@@ -3,8 +3,8 @@ from math import isnan, nan, radians
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.vehicle_state import Mode, Reply, Verdict
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
-from autopilot.vehicle import Mode, Reply, Verdict
 from tests.unit.autopilot.mavlink.rig import HOME, Rig, texts
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED

@@ -1,13 +1,13 @@
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.mavlink.codec import FrameReader, encode
+from autopilot.interface.vehicle_state import LandedState, Mode, Severity
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.identity import project_version
-from autopilot.mavlink.links import LinkRole, memory_pair
 from autopilot.mavlink.server import MavlinkServer
-from autopilot.vehicle import LandedState, Mode, Severity
+from autopilot.mavlink.services.identity import project_version
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from autopilot.mavlink.wire.codec import FrameReader, encode
 from tests.unit.autopilot.mavlink.rig import HOME, Client, RecordingVehicle, Rig, texts
 
 FRAMES_IN_100_MS = 5

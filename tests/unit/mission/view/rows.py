@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from autopilot.vehicle import Mode
+from autopilot.interface.vehicle_state import Mode
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
-from mission.view.moment import MOMENT
-from mission.view.recording import Recording
+from mission.view.flight_snapshot import MOMENT
+from mission.view.replay_file import Recording
 from sim.world.world import WorldConfig
 
 WORLD = WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0)

@@ -1,16 +1,16 @@
-"""The live page's buttons, clicked without a browser; tests/system/test_live_page.py clicks in one."""
+"""The live page's buttons, clicked without a browser; tests/system/page/test_live_page.py clicks in one."""
 
 import pytest
 
-from autopilot.vehicle import Mode
+from autopilot.interface.vehicle_state import Mode
 from mission.flight import Flight, FlightConfig
-from mission.plan import DEFAULT_PLAN, moved_plan, read_plan
+from mission.plan.plan_file import DEFAULT_PLAN, moved_plan, read_plan
 from mission.script import fly_plan
 from mission.view.live import LiveView
 from mission.view.page import PageServer
 from policies.companion.engagement import Phase
 from sim.world.world import WorldConfig
-from tests.unit.mission.follow_flight import advance, following
+from tests.unit.mission.follow.follow_flight import advance, following
 
 PLAIN = WorldConfig(size_m=64.0, trees_per_ha=0.0)
 

@@ -12,8 +12,8 @@ from rich.console import Console
 from mission.flight import flight_world
 from mission.view import film as film_file
 from mission.view.film import write_film
-from mission.view.film_pictures import HEIGHT, INSET, MARGIN, WIDTH, caption, film
-from mission.view.moment import Moment
+from mission.view.film_images import HEIGHT, INSET, MARGIN, WIDTH, caption, film
+from mission.view.flight_snapshot import Moment
 from tests.unit.mission.view.rows import CONFIG, hovering
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from autopilot.mavlink.codec import FrameReader, decode, encode
+from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.links import LinkRole, memory_pair
-from autopilot.vehicle import Mode
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
 from policies.companion.companion import IMAGE_OLD_US, LENS, NO_DECISION, NO_PICTURES, Companion
 from policies.companion.engagement import Phase

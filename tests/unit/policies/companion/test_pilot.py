@@ -8,9 +8,9 @@ from policies.companion.belief import IN_VIEW, PLACE
 from policies.companion.pilot import LAYOUT_VERSION, TASK, PilotError, load_pilot
 from policies.experts.follower import ScriptedFollower
 from policies.learn.config.network import NetworkSettings
-from policies.learn.policy import Policy
-from policies.learn.policy_file import PolicyCard, save_policy
-from policies.tasks.flight.own import ACTIONS
+from policies.learn.export.policy_file import PolicyCard, save_policy
+from policies.learn.networks.policy import Policy
+from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.follow_me import _layout
 from policies.tasks.follow_me.observe import EGO, EGO_BLIND, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
 from policies.tasks.follow_me.settings import FollowSettings

@@ -2,8 +2,8 @@
 
 import pytest
 
-from autopilot.mavlink.codec import encode
-from autopilot.mavlink.links import memory_pair
+from autopilot.mavlink.transport.links import memory_pair
+from autopilot.mavlink.wire.codec import encode
 from policies.companion.vehicle_clock import SPAN_MS, VehicleClock
 from policies.companion.vehicle_link import VehicleLink
 

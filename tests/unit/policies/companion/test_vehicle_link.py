@@ -4,10 +4,10 @@ from math import inf, nan
 
 import pytest
 
-from autopilot.mavlink.codec import encode
+from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.links import memory_pair
-from autopilot.vehicle import Mode
+from autopilot.mavlink.transport.links import memory_pair
+from autopilot.mavlink.wire.codec import encode
 from policies.companion.engagement import Wish
 from policies.companion.vehicle_link import COMPONENT, VehicleLink
 

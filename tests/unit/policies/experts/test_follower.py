@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from policies.experts.follower import DISTANCE_M, HEIGHT_M, ScriptedFollower
-from policies.tasks.flight.own import ACTIONS
+from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.follow_me.observe import EGO, vector_elements
 
 ELEMENTS = vector_elements(int(EGO))

@@ -3,7 +3,7 @@ import pytest
 from policies.experts.catalogue import build_expert
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
-from policies.tasks.numbers import Sampler
+from policies.tasks.task_params import Sampler
 
 
 @pytest.mark.parametrize("observation", ["world", "ego"])

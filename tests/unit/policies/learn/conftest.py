@@ -3,7 +3,7 @@ import torch
 
 from policies.experts.catalogue import build_expert
 from policies.experts.demonstration_file import Origin, write_demonstrations
-from policies.experts.recording import record_episodes
+from policies.experts.episode_recording import record_episodes
 from policies.tasks.catalogue import build_task, task_settings
 
 

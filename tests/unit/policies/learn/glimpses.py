@@ -7,13 +7,13 @@ import torch
 import warp as wp
 
 from common.rng import draw_key
-from policies.learn.actions import CLIP
 from policies.learn.config.network import NetworkSettings
-from policies.learn.policy import Policy
+from policies.learn.networks.action_distributions import CLIP
+from policies.learn.networks.policy import Policy
 from policies.tasks.episode import RUNNING, TIMEOUT, Border, begin_episode, close_step
 from policies.tasks.layout import Element, ImageElement, Layout
-from policies.tasks.numbers import Number, typed_rows
 from policies.tasks.task import Task
+from policies.tasks.task_params import Number, typed_rows
 
 SIDE = 20  # [px]
 POINT = (Element("point", "1"),)

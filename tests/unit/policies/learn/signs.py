@@ -5,8 +5,8 @@ import warp as wp
 from common.rng import draw_key
 from policies.tasks.episode import SUCCESS, Border, begin_episode, close_step, open_frame
 from policies.tasks.layout import Branch, Element, Layout
-from policies.tasks.numbers import Number, typed_rows
 from policies.tasks.task import Task
+from policies.tasks.task_params import Number, typed_rows
 
 SIZES = (3, 2)
 

@@ -8,8 +8,8 @@ import warp as wp
 from common.rng import draw_key
 from policies.tasks.episode import RUNNING, TIMEOUT, Border, begin_episode, close_step, open_frame
 from policies.tasks.layout import Element, ImageElement, Layout
-from policies.tasks.numbers import Number, typed_rows
 from policies.tasks.task import Task
+from policies.tasks.task_params import Number, typed_rows
 
 SIDE = 32  # [px]
 HALF = wp.constant(4)  # [px] half a side of the square

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from policies.learn.checkpoint import checkpoint_path, checkpoints, load, prune, save
-from policies.learn.policy_path import CheckpointError
+from policies.learn.export.policy_path import CheckpointError
 
 CONTENT = {
     "steps": 7,

@@ -5,10 +5,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from policies.learn.config.environment import EnvironmentParameter
 from policies.learn.curriculum import Curriculum, RecentEpisodes
-from policies.learn.tensorboard import NO_SCORES
+from policies.learn.training_curves import NO_SCORES
 from policies.tasks.episode import Outcome
-from policies.tasks.numbers import Sampler
 from policies.tasks.task import Scores
+from policies.tasks.task_params import Sampler
 
 
 def scores(count, mean_return, successes=0):

@@ -6,11 +6,11 @@ import torch
 
 from policies.learn.config.network import Memory, NetworkSettings
 from policies.learn.evaluate import _quota, _Tally, evaluate
-from policies.learn.policy import Policy
+from policies.learn.networks.policy import Policy
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
 from policies.tasks.layout import Element, Layout, LayoutError
-from policies.tasks.numbers import Sampler
+from policies.tasks.task_params import Sampler
 
 SETTINGS = task_settings("RollerBall", {})
 

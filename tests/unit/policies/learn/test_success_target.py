@@ -8,7 +8,7 @@ from policies.learn.config.environment import EnvironmentParameter
 from policies.learn.config.network import NetworkSettings
 from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation, evaluate
-from policies.learn.policy import Policy
+from policies.learn.networks.policy import Policy
 from policies.learn.success_target import SuccessTarget
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome

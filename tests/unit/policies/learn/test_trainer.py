@@ -7,8 +7,8 @@ import torch
 
 from policies.learn.checkpoint import checkpoints, load
 from policies.learn.config.run import RunConfig
-from policies.learn.policy_file import load_policy
-from policies.learn.policy_path import CheckpointError
+from policies.learn.export.policy_file import load_policy
+from policies.learn.export.policy_path import CheckpointError
 from policies.learn.trainer import Training, train
 
 PPO = {"hyperparameters": {"batch_size": 256, "buffer_size": 1024}}

@@ -5,7 +5,7 @@ import pytest
 import policies  # noqa: F401  (registers the tasks)
 from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.layout import Layout, LayoutError
-from policies.tasks.numbers import NumberError, Sampler
+from policies.tasks.task_params import NumberError, Sampler
 
 NAME = "RollerBall"
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from common.kernels import TICK_US
-from sim.owner import Owner
 from sim.sensors.phone import DROPOUT_MAX_S, LAG_S, PERIOD_S, phone_model
+from sim.walking_owner import Owner
 from sim.world.people import PERSON_TICKS
 from sim.world.world import WorldConfig, build_world
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from sim.owner import Owner
+from sim.walking_owner import Owner
 from sim.world.people import PERSON_DT_S, RUN_SPEED_M_S, WALK_SPEED_M_S, Person, chest_ned, is_line_free, person_model
 from sim.world.world import World, WorldConfig, build_world
 

@@ -1,14 +1,14 @@
 import pytest
 import torch
 
-from policies.learn.bc import Cloning
+from policies.learn.algorithms.behavioural_cloning import Cloning
+from policies.learn.algorithms.ppo import Ppo
 from policies.learn.config.behavior import Behavior, BehavioralCloning, PpoHyperparameters
 from policies.learn.config.network import NetworkSettings
 from policies.learn.config.signals import RewardSignals
-from policies.learn.demonstrations import DemonstrationError, load_demonstrations
-from policies.learn.policy import Policy
-from policies.learn.ppo import Ppo
-from policies.learn.signals.build import build_signals
+from policies.learn.networks.policy import Policy
+from policies.learn.rollout.demonstrations import DemonstrationError, load_demonstrations
+from policies.learn.signals.build_signals import build_signals
 from policies.tasks.catalogue import build_task
 from policies.tasks.episode import Outcome
 

@@ -2,9 +2,9 @@ import pytest
 import torch
 
 from policies.learn.config.signals import RndSettings
-from policies.learn.signal_losses import squared_error
 from policies.learn.signals.rnd import RndSignal
 from policies.learn.signals.signal import RewardSignal
+from policies.learn.signals.signal_losses import squared_error
 from tests.unit.policies.learn.signals.transitions import PUSHED, drawn
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from policies.tasks.flight.bank import build_rig
+from policies.tasks.flight.hover_bank import build_rig
 from policies.tasks.flight.ranges import RANGE_M, RANGES, SECTORS, measure_ranges
 from sim.world.batch import WorldBatch
 from sim.world.world import WorldConfig

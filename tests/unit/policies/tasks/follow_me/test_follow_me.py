@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.episode import Outcome
-from policies.tasks.flight.own import OwnState
+from policies.tasks.flight.own_state import OwnState
 from policies.tasks.follow_me.follow_me import FollowMe
-from policies.tasks.follow_me.kernels import MEASURES
+from policies.tasks.follow_me.follow_me_kernels import MEASURES
 from policies.tasks.follow_me.observe import EGO, OwnerReport, observe_rows, vector_elements
 from policies.tasks.follow_me.settings import FollowSettings
 

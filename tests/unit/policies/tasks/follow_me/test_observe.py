@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.attitude import rotated
-from policies.tasks.flight.own import Command, OwnState, command_rows
+from policies.tasks.flight.own_state import Command, OwnState, command_rows
 from policies.tasks.follow_me.observe import (
     DOCUMENT,
     EGO,

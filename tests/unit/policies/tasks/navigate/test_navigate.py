@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.episode import Outcome
-from policies.tasks.navigate.kernels import MEASURES
 from policies.tasks.navigate.navigate import Navigate
+from policies.tasks.navigate.navigate_kernels import MEASURES
 from policies.tasks.navigate.scan import BAND_M, RANGE_M, SECTORS
 
 QUICK = {"has_estimator": "false"}

@@ -6,9 +6,9 @@ from gymnasium.utils.env_checker import check_env
 import policies  # noqa: F401  (registers the tasks)
 from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.episode import Outcome
-from policies.tasks.numbers import Sampler
 from policies.tasks.parking.arena import BLOCK_PLACES, LEVEL1_MARKER, LEVEL1_SPOTS, LEVEL1_START, pose
 from policies.tasks.parking.spots import cells
+from policies.tasks.task_params import Sampler
 
 PRESETS = ("as-documented", "as-coded", "improved")
 PUSH, RIGHT, LEFT = 0, 1, 2

@@ -1,0 +1,45 @@
+"""What the commander needs of the navigator."""
+
+from typing import Protocol
+
+from autopilot.interface.vehicle_state import Mode
+from autopilot.navigator.takeoff_intent import Ask
+
+
+class Flying(Protocol):
+    """The navigator, as the commander sees it."""
+
+    def refusal(self, mode: Mode) -> str: ...
+
+    def enter(self, mode: Mode) -> None: ...
+
+    def begin_here(self, mode: Mode) -> None:
+        """Begins a mode anew where the vehicle is, whatever clients have asked of it."""
+        ...
+
+    def on_armed(self) -> None: ...
+
+    def arming_reason(self) -> str:
+        """Why the vehicle may not take off here; empty if it may."""
+        ...
+
+    @property
+    def wants_lift(self) -> bool: ...
+
+    @property
+    def is_taking_off(self) -> bool: ...
+
+    @property
+    def is_landing(self) -> bool: ...
+
+    @property
+    def ask(self) -> Ask:
+        """Vertically, what the setpoint being flown asks for."""
+        ...
+
+    @property
+    def offboard_needs_position(self) -> bool: ...
+
+    def offboard_age_us(self, time_us: int) -> int: ...
+
+    def tell_position(self, *, is_valid: bool) -> None: ...

@@ -1,0 +1,406 @@
+"""The Python part of one vehicle's flight controller: commander, navigator and MAVLink server, one `frame` at 50 Hz.
+
+In: estimate, samples, actuators and estimator health, read from the kernel rows; requests of MAVLink clients.
+Out: the setpoint row; telemetry through the attached servers. Time is the simulated time it is given.
+"""
+
+from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from autopilot.commander.battery import BatteryEstimator
+from autopilot.commander.commander import Commander
+from autopilot.commander.landing_detector import LandingDetector
+from autopilot.commander.motor_failures import LeaveOut, MotorWatch, ReadSpeeds
+from autopilot.commander.sensor_calibration import Calibrator, Turntable
+from autopilot.commander.stick_commands import Pilot
+from autopilot.inputs.external_position import ExternalPositions
+from autopilot.inputs.obstacles import Obstacles
+from autopilot.inputs.sticks import Sticks
+from autopilot.inputs.traffic import Traffic
+from autopilot.interface.client_requests import OffboardSetpoint, OrbitRequest, TargetReport
+from autopilot.interface.failure_requests import Failure, FailureInjector, Unit, failure_request, injection_refusal
+from autopilot.interface.item_lists import ItemLists, ListKind
+from autopilot.interface.platform import Host
+from autopilot.interface.vehicle_interface import Announcer
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Severity, VehicleState, Verdict
+from autopilot.motor_test import MotorTest
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.mission.mission import Mission
+from autopilot.navigator.navigator import Navigator
+from autopilot.navigator.setpoint import SetpointPort
+from autopilot.payload.aux_outputs import AuxOutputs
+from autopilot.payload.camera.camera import Camera
+from autopilot.payload.gimbal.gimbal import Gimbal
+from autopilot.payload.gimbal.gimbal_control import GimbalControl
+from autopilot.payload.payloads import Payloads
+from autopilot.roi_and_pause import Guidance
+from common.airframe import Airframe
+from common.attitude import roll_pitch_yaw_of
+from common.geodesy import GeoPoint
+from common.kernels import GRAVITY_M_S2
+from common.params import ParameterTable
+
+_HEALTH_PERIOD_US = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class HostPorts:
+    """The kernel rows of one vehicle, as common.records.row_reader reads them."""
+
+    read_estimate: Callable[[], Any]  # Estimate
+    read_samples: Callable[[], Any]  # Samples
+    read_actuators: Callable[[], Any]  # Actuators
+    read_health: Callable[[], Any]  # EstimatorState
+    setpoint: np.ndarray[Any, Any]  # live structured view, shape (1,), of the Setpoint row
+    read_rotor_speeds: ReadSpeeds | None = None  # ESC telemetry
+    leave_out: LeaveOut | None = None  # rotors that the control allocation shall not use
+    external: np.ndarray[Any, Any] | None = None  # live structured view, shape (1,), of the ExternalSample row
+
+
+class Server(Announcer, Protocol):
+    """A MAVLink server: hears of events, and has its own part of the frame."""
+
+    def frame(self, time_us: int) -> None: ...
+
+
+class _Relay:
+    """Passes events on to every attached server."""
+
+    def __init__(self) -> None:
+        self.targets: list[Announcer] = []
+
+    def statustext(self, severity: Severity, text: str) -> None:
+        for target in self.targets:
+            target.statustext(severity, text)
+
+    def mission_item_reached(self, seq: int) -> None:
+        for target in self.targets:
+            target.mission_item_reached(seq)
+
+    def mission_current_changed(self, seq: int) -> None:
+        for target in self.targets:
+            target.mission_current_changed(seq)
+
+    def home_changed(self) -> None:
+        for target in self.targets:
+            target.home_changed()
+
+    def heartbeat_now(self) -> None:
+        for target in self.targets:
+            target.heartbeat_now()
+
+
+class FlightController:
+    """One vehicle as MAVLink handlers and scripts see it (autopilot.interface.vehicle_interface.Vehicle).
+
+    Args:
+        ports: its kernel rows.
+        params: its parameters.
+        airframe: its data: battery, hover thrust.
+        origin: the geodetic origin of the ned frame.
+        announcer: hears of events besides the attached servers (a log, a test).
+        on_corrections: the GNSS receiver's input for RTCM corrections.
+        on_reboot: restarts the vehicle; None where there is nothing to restart.
+        host: files, logs and storage, as far as there are any.
+        injector: breaks parts on request; None where nothing can be broken.
+        turntable: turns the vehicle while its sensors are calibrated; None: a pilot does.
+    """
+
+    def __init__(
+        self,
+        ports: HostPorts,
+        params: ParameterTable,
+        airframe: Airframe,
+        origin: GeoPoint,
+        announcer: Announcer | None = None,
+        on_reboot: Callable[[], None] | None = None,
+        on_corrections: Callable[[bytes], None] | None = None,
+        host: Host | None = None,
+        injector: FailureInjector | None = None,
+        turntable: Turntable | None = None,
+    ) -> None:
+        self.params = params
+        self.host = host or Host()
+        self.sticks = Sticks(params)
+        self.state = VehicleState(origin=origin, sticks=self.sticks.input, rotor_count=len(airframe.rotors))
+        self.payload = Payloads()
+        self.camera = self._mount_camera()
+        self.state.read_rotor_speeds = ports.read_rotor_speeds
+        self._outputs = AuxOutputs(self.state)
+        self.payload.add(self._outputs)
+        self.traffic = Traffic(self.state, params)
+        self.obstacles = Obstacles(params)
+        self.state.obstacles = self.obstacles
+        self._read_estimate = ports.read_estimate
+        self._read_samples = ports.read_samples
+        self._read_actuators = ports.read_actuators
+        self._read_health = ports.read_health
+        self._next_health_us = 0
+        self._relay = _Relay()
+        if announcer is not None:
+            self._relay.targets.append(announcer)
+        self._servers: list[Server] = []
+        self._on_reboot = on_reboot
+        self._injector = injector
+        self._on_corrections = on_corrections
+        self._setpoint = SetpointPort(ports.setpoint)
+        state = self.state
+        self.external = ExternalPositions(
+            ports.external, params, lambda: state.time_us, lambda: (state.estimate, state.yaw_rad)
+        )
+        hover, standing_m = hover_thrust(airframe), airframe.contact.leg_z_m
+        self.commander = Commander(
+            self.state,
+            params,
+            self._relay,
+            BatteryEstimator(airframe.battery),
+            LandingDetector(params, hover, standing_m),
+            Pilot(self.state, params, self.sticks),
+            MotorWatch(self.state, params, self._relay, airframe, ports.read_rotor_speeds, ports.leave_out),
+        )
+        context = NavContext(self.state, params, self._relay, self._setpoint, hover, standing_m)
+        mission = Mission(context, self.payload, self.commander.set_home)
+        self.navigator = Navigator(context, mission)
+        self.fence, self.rally = self.navigator.fence, self.navigator.rally
+        self.lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
+        self.guided = self.navigator.guided
+        self.lists.on_change(self.navigator.warn_of_fence)
+        self.commander.connect(self.navigator)
+        self.guidance = Guidance(self.commander, self.navigator, self.payload)
+        self.station = self.commander.station
+        self.motor_test = MotorTest(self.state, self._setpoint, self._relay, airframe)
+        self.calibration = Calibrator(self.state, params, self._relay, turntable)
+        self._setpoint.write()
+
+    def _mount_camera(self) -> Camera | None:
+        """Hangs the camera on its gimbal, if the host has one."""
+        frames = self.host.frames
+        if frames is None:
+            return None
+        gimbal = Gimbal(self.state)
+        self.state.gimbal = GimbalControl(gimbal, self.state)
+        camera = Camera(self.state, gimbal, frames, self.host.media)
+        self.payload.add(self.state.gimbal)
+        self.payload.add(camera)
+        return camera
+
+    def follow_ardupilot(self) -> None:
+        """From now on pilots and modes are treated as ArduPilot treats them."""
+        self.sticks.follow_ardupilot()
+        self.commander.follow_ardupilot()
+
+    def attach(self, server: Server) -> None:
+        """Adds a MAVLink server: it hears of events, and its frame is run at the end of each frame."""
+        self._relay.targets.append(server)
+        self._servers.append(server)
+
+    def frame(self, time_us: int) -> None:
+        """Runs one frame of the Python part at `time_us`: reads, decides, writes the setpoint, serves links."""
+        dt_s = (time_us - self.state.time_us) * 1e-6
+        self._read(time_us)
+        self.sticks.frame(time_us)
+        self.fence.frame()
+        self.commander.frame(dt_s)
+        if self.state.is_calibrating:
+            self.calibration.frame()
+        if self.motor_test.is_running:
+            self.motor_test.frame()
+        wish = self.navigator.frame()
+        if wish is not None:
+            self._follow_wish(wish)
+        self._setpoint.write()
+        if self.camera is not None and time_us >= self.camera.due_us:
+            self.camera.frame()
+        if time_us >= self._outputs.due_us:
+            self._outputs.frame()
+        for server in self._servers:
+            server.frame(time_us)
+        if self.external.waiting:
+            self.external.write()
+        self.state.ticks.clear()
+
+    def note_tick(self, time_us: int) -> None:
+        """Keeps what the kernels have made of a tick between two frames, to be told in the next."""
+        tick = copy(self.state)
+        self._read_motion(tick, time_us)
+        self.state.ticks.append(tick)
+
+    def _read(self, time_us: int) -> None:
+        """Renews the vehicle state from the kernel rows."""
+        self._read_motion(self.state, time_us)
+        if time_us >= self._next_health_us:
+            self._next_health_us = time_us + _HEALTH_PERIOD_US
+            self.state.health = self._read_health()
+
+    def _read_motion(self, state: VehicleState, time_us: int) -> None:
+        state.time_us = time_us
+        estimate = state.estimate = self._read_estimate()
+        state.samples = self._read_samples()
+        state.actuators = self._read_actuators()
+        state.roll_rad, state.pitch_rad, state.yaw_rad = roll_pitch_yaw_of(estimate.q_ned_from_frd)
+
+    def _follow_wish(self, mode: Mode) -> None:
+        """A mode is done: goes over to the next, or lands if that cannot be flown."""
+        if self.commander.refusal(mode):
+            mode = Mode.LAND
+        self.commander.change_mode(mode)
+
+    # ---- autopilot.interface.vehicle_interface.Vehicle ----
+
+    def has_mode(self, mode: Mode) -> bool:
+        return self.navigator.has_mode(mode)
+
+    def arm(self, *, force: bool) -> Reply:
+        return self.commander.arm(force=force)
+
+    def disarm(self, *, force: bool) -> Reply:
+        self.motor_test.stop()
+        return self.commander.disarm(force=force)
+
+    def terminate(self) -> Reply:
+        is_testing = self.motor_test.is_running and not self.state.is_armed
+        self.motor_test.stop()
+        return ACCEPTED if is_testing else self.commander.terminate()
+
+    def inject_failure(self, unit: int, failure: int, instance: int) -> Reply:
+        request = failure_request(unit, failure)
+        if request is None:
+            return Reply(Verdict.DENIED, f"there is no failure {failure} of unit {unit}")
+        reply = injection_refusal(self.params, self.state, request[1])
+        if reply is not None:
+            return reply
+        if request[0] is Unit.RC_SIGNAL:
+            return self._cut_sticks(request[1])
+        if self._injector is None:
+            return Reply(Verdict.UNSUPPORTED, "nothing here can be made to fail")
+        return self._injector.inject(*request, instance)
+
+    def _cut_sticks(self, failure: Failure) -> Reply:
+        """Stops listening to the pilot's sticks, or listens again."""
+        if failure not in (Failure.OK, Failure.OFF):
+            return Reply(Verdict.UNSUPPORTED, f"the sticks cannot be made {failure.name.lower()}")
+        self.sticks.is_cut = failure is Failure.OFF
+        return ACCEPTED
+
+    def check_arming(self) -> list[str]:
+        return self.commander.check_arming()
+
+    def set_mode(self, mode: Mode) -> Reply:
+        reply = self.commander.request_mode(mode)
+        if mode is Mode.HOLD and reply.verdict is Verdict.ACCEPTED and self.navigator.is_going:
+            self.navigator.stay()  # here, not at the place it was sent to
+        return reply
+
+    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
+        if self.state.mode is Mode.GUIDED:
+            refusal = self.navigator.takeoff_refusal(alt_amsl_m)
+            return Reply(Verdict.DENIED, refusal) if refusal else self.guided.takeoff(alt_amsl_m, yaw_rad)
+        reason = self.commander.request_refusal(Mode.TAKEOFF)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
+        reply = self.navigator.request_takeoff(alt_amsl_m, yaw_rad)
+        if reply.verdict is not Verdict.ACCEPTED:
+            return reply
+        return self._enter_anew(Mode.TAKEOFF)
+
+    def land(self, lat_deg: float, lon_deg: float, yaw_rad: float) -> Reply:
+        reason = self.commander.request_refusal(Mode.LAND)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
+        reply = self.navigator.request_landing(lat_deg, lon_deg, yaw_rad)
+        if reply.verdict is not Verdict.ACCEPTED:
+            return reply
+        return self._enter_anew(Mode.LAND)
+
+    def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
+        if not self._may_go:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
+        if not self.commander.has_position:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
+        reason = self.commander.request_refusal(Mode.HOLD)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
+        reply = self.navigator.reposition(lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
+        if reply.verdict is not Verdict.ACCEPTED:
+            return reply
+        return self._enter_anew(Mode.HOLD)
+
+    def change_speed(self, speed_m_s: float, kind: int = 1) -> Reply:
+        return self.navigator.change_speed(speed_m_s, kind)
+
+    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
+        return self.commander.set_home(lat_deg, lon_deg, alt_amsl_m)
+
+    def set_offboard(self, setpoint: OffboardSetpoint) -> None:
+        self.navigator.set_offboard(setpoint)
+
+    def report_target(self, report: TargetReport) -> None:
+        self.navigator.follow.report(report)
+
+    def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
+        self.navigator.precision.seen(pos_ned)
+
+    def give_corrections(self, rtcm: bytes) -> None:
+        if self._on_corrections is not None:
+            self._on_corrections(rtcm)
+
+    def orbit(self, request: OrbitRequest) -> Reply:
+        if not self._may_go:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
+        reason = self.commander.request_refusal(Mode.ORBIT)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
+        reply = self.navigator.orbit.request(request)
+        return reply if reply.verdict is not Verdict.ACCEPTED else self._enter_anew(Mode.ORBIT)
+
+    def start_mission(self, first: int, last: int = -1) -> Reply:
+        mission = self.navigator.mission
+        if not mission.items:  # without one the numbers mean nothing, and mode Mission says why not
+            first = last = -1
+        if first >= 0:
+            reply = mission.set_current(first)
+            if reply.verdict is not Verdict.ACCEPTED:
+                return reply
+        if last >= 0:
+            reply = mission.end_after(last)
+            if reply.verdict is not Verdict.ACCEPTED:
+                return reply
+        return self.commander.request_mode(Mode.MISSION)
+
+    def set_current_item(self, seq: int, *, is_reset: bool = False) -> Reply:
+        return self.navigator.mission.set_current(seq, is_reset=is_reset)
+
+    def reboot(self) -> Reply:
+        if self.state.is_armed:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "armed")
+        if self._on_reboot is None:
+            return Reply(Verdict.UNSUPPORTED, "there is nothing to restart")
+        self.motor_test.stop()
+        self._on_reboot()
+        self.state.boot_us = self.state.time_us
+        self.commander.restart()
+        return ACCEPTED
+
+    @property
+    def _may_go(self) -> bool:
+        """Whether the vehicle can be sent somewhere: it is in the air, or about to be."""
+        return self.state.is_flying or self.navigator.is_taking_off
+
+    def _enter_anew(self, mode: Mode) -> Reply:
+        """Enters a mode, also if it is the present one, whose target is a new one then."""
+        is_new = self.state.mode is not mode
+        reply = self.commander.request_mode(mode)
+        if reply.verdict is Verdict.ACCEPTED and not is_new:
+            self.navigator.enter(mode)
+        return reply
+
+
+def hover_thrust(airframe: Airframe) -> float:
+    """Share [0..1] of the maximum collective thrust that carries the vehicle, at full battery and sea level."""
+    model = airframe.rotor_model
+    thrust_max_n = len(airframe.rotors) * model.thrust_n_s2 * model.max_speed_rad_s**2
+    return airframe.body.mass_kg * GRAVITY_M_S2 / thrust_max_n

@@ -1,0 +1,1 @@
+"""What comes from outside besides samples and commands: sticks, positions, obstacles, aircraft."""

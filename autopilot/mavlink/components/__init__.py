@@ -1,0 +1,1 @@
+"""Components besides the autopilot: camera, gimbal, winch."""

@@ -1,0 +1,210 @@
+"""The names under which ArduPilot's users and ground stations look for parameters.
+
+An alias is one of our parameters under ArduPilot's name, in ArduPilot's unit: setting it sets ours. A constant is there
+to be read only. Names that are ArduPilot's and ours alike (RC1_MIN) are in neither list.
+"""
+
+from collections.abc import Mapping
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot.ardupilot_only_params import STREAM_GROUPS
+from autopilot.mavlink.dialects import Alias, Constant
+
+INT8 = mavlink.MAV_PARAM_TYPE_INT8
+INT16 = mavlink.MAV_PARAM_TYPE_INT16
+INT32 = mavlink.MAV_PARAM_TYPE_INT32
+REAL32 = mavlink.MAV_PARAM_TYPE_REAL32
+CM = 100.0  # per metre
+MS = 1000.0  # per second
+
+# Failsafe actions. Ours are PX4's: 0 none, 1 hold, 2 return, 3 land; for the fence 1 warn, 2 hold, 3 return, 5 land.
+_THROTTLE_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 3, 7: 4, 1: 7}
+_STATION_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 7: 3, 3: 5, 1: 7}
+_FENCE_ACTIONS: Mapping[int, int] = {1: 0, 0: 0, 2: 4, 3: 1, 5: 2, 6: 3}
+_BATTERY_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 2}
+# Modes of a switch: PX4's COM_FLTMODE numbers to mode numbers of a copter.
+_SWITCH_MODES: Mapping[int, int] = {8: 0, 6: 1, 1: 2, 3: 3, 7: 4, 4: 5, 5: 6, 11: 9, 2: 16, 12: 23}
+# Positions from outside: none, by MAVLink; the heading stays the compass's unless EKF2_EV_CTRL itself says otherwise.
+_VISION_TYPES: Mapping[int, int] = {0: 0, 7: 1} | dict.fromkeys(range(1, 16), 1)
+# Estimator failures: nothing, land. Ours has more.
+_ESTIMATOR_ACTIONS: Mapping[int, int] = {0: 0, 3: 1}
+# Logs: while armed, or always.
+_LOG_MODES: Mapping[int, int] = {0: 0, 1: 1, 2: 1, -1: 0}
+# Functions of outputs 5 to 8: motors, where the airframe has so many.
+_SIX, _EIGHT = 6001, 8001
+# Heading on mission legs: towards the next waypoint, along the way.
+_YAW_MODES: Mapping[int, int] = {0: 1, 3: 3}
+
+# Gains from position and velocity; ArduPilot's have the same units, under its names up to 4.6 and since.
+_POSITION_GAINS: Mapping[str, str] = {
+    "POSXY_P": "XY_P", "NE_POS_P": "XY_P", "POSZ_P": "Z_P", "D_POS_P": "Z_P",
+    "VELXY_P": "XY_VEL_P_ACC", "VELXY_I": "XY_VEL_I_ACC", "VELXY_D": "XY_VEL_D_ACC",
+    "NE_VEL_P": "XY_VEL_P_ACC", "NE_VEL_I": "XY_VEL_I_ACC", "NE_VEL_D": "XY_VEL_D_ACC",
+    "VELZ_P": "Z_VEL_P_ACC", "VELZ_I": "Z_VEL_I_ACC", "VELZ_D": "Z_VEL_D_ACC",
+    "D_VEL_P": "Z_VEL_P_ACC", "D_VEL_I": "Z_VEL_I_ACC", "D_VEL_D": "Z_VEL_D_ACC",
+}  # fmt: skip
+
+ALIASES: tuple[Alias, ...] = (
+    Alias("ACRO_Y_RATE", "MC_ACRO_Y_MAX", REAL32),
+    Alias("ANGLE_MAX", "MPC_TILTMAX_AIR", INT16, 100.0),
+    Alias("ATC_RATE_P_MAX", "MC_PITCHRATE_MAX", REAL32),
+    Alias("ATC_RATE_R_MAX", "MC_ROLLRATE_MAX", REAL32),
+    Alias("ATC_RATE_Y_MAX", "MC_YAWRATE_MAX", REAL32),
+    Alias("ATC_ANG_PIT_P", "MC_PITCH_P", REAL32),
+    Alias("ATC_ANG_RLL_P", "MC_ROLL_P", REAL32),
+    Alias("ATC_ANG_YAW_P", "MC_YAW_P", REAL32),
+    Alias("ATC_SLEW_YAW", "MPC_YAWRAUTO_MAX", REAL32, 100.0),
+    Alias("BATT_CAPACITY", "BAT1_CAPACITY", INT32),
+    Alias("BATT_FS_CRT_ACT", "COM_LOW_BAT_ACT", INT8, numbers=_BATTERY_ACTIONS),
+    Alias("CIRCLE_RADIUS", "NAV_LOITER_RAD", REAL32, CM),
+    Alias("DISARM_DELAY", "COM_DISARM_LAND", INT8),
+    Alias("FENCE_ACTION", "GF_ACTION", INT8, numbers=_FENCE_ACTIONS),
+    Alias("FENCE_ALT_MAX", "GF_MAX_VER_DIST", REAL32),
+    Alias("FENCE_ALT_MIN", "GF_MIN_ALT", REAL32),
+    Alias("FENCE_ENABLE", "GF_ENABLE", INT8),
+    Alias("FENCE_MARGIN", "GF_MARGIN", REAL32),
+    Alias("FENCE_RADIUS", "GF_MAX_HOR_DIST", REAL32),
+    Alias("FENCE_TYPE", "GF_TYPES", INT8),
+    Alias("FLTMODE_CH", "RC_MAP_FLTMODE", INT8),
+    *(Alias(f"FLTMODE{i}", f"COM_FLTMODE{i}", INT8, numbers=_SWITCH_MODES) for i in range(1, 7)),
+    Alias("FRAME_CLASS", "SYS_AUTOSTART", INT8, numbers={4001: 1, 6001: 2, 8001: 3}),
+    Alias("FS_CRASH_CHECK", "CBRK_FLIGHTTERM", INT8, numbers={0: 1, 121212: 0}),
+    Alias("FS_EKF_ACTION", "COM_EST_FAIL_ACT", INT8, numbers=_ESTIMATOR_ACTIONS),
+    Alias("FS_GCS_ENABLE", "NAV_DLL_ACT", INT8, numbers=_STATION_ACTIONS),
+    Alias("FS_GCS_TIMEOUT", "COM_DL_LOSS_T", REAL32),
+    Alias("FS_THR_ENABLE", "NAV_RCL_ACT", INT8, numbers=_THROTTLE_ACTIONS),
+    Alias("LAND_SPEED", "MPC_LAND_SPEED", INT16, CM),
+    Alias("LOG_DISARMED", "SDLOG_MODE", INT8, numbers=_LOG_MODES),
+    Alias("LOIT_SPEED", "MPC_XY_VEL_MAX", REAL32, CM),
+    Alias("MOT_THST_HOVER", "MPC_THR_HOVER", REAL32),
+    Alias("PILOT_SPEED_DN", "MPC_Z_VEL_MAX_DN", INT16, CM),
+    Alias("PILOT_SPEED_UP", "MPC_Z_VEL_MAX_UP", INT16, CM),
+    Alias("PILOT_Y_RATE", "MPC_MAN_Y_MAX", REAL32),
+    Alias("PILOT_TKOFF_ALT", "MIS_TAKEOFF_ALT", REAL32, CM),
+    Alias("PSC_JERK_XY", "MPC_JERK_AUTO", REAL32),
+    *(Alias(f"PSC_{theirs}", f"MPC_{ours}", REAL32) for theirs, ours in _POSITION_GAINS.items()),
+    *(Alias(f"RC{i}_REVERSED", f"RC{i}_REV", INT8, numbers={1: 0, -1: 1}) for i in range(1, 9)),
+    *(Alias(f"RCMAP_{stick}", f"RC_MAP_{stick}", INT8) for stick in ("ROLL", "PITCH", "THROTTLE", "YAW")),
+    Alias("RC_FS_TIMEOUT", "COM_RC_LOSS_T", REAL32),
+    Alias("RTL_ALT", "RTL_RETURN_ALT", INT32, CM),
+    Alias("RTL_ALT_FINAL", "RTL_DESCEND_ALT", INT16, CM),
+    Alias("RTL_LOIT_TIME", "RTL_LAND_DELAY", INT32, MS),
+    Alias("RTL_SPEED", "RTL_RETURN_SPD", INT16, CM),
+    *(
+        Alias(f"SERVO{i}_FUNCTION", "SYS_AUTOSTART", INT16, numbers={4001: 0, _SIX: 32 + i, _EIGHT: 32 + i})
+        for i in (5, 6)
+    ),
+    *(Alias(f"SERVO{i}_FUNCTION", "SYS_AUTOSTART", INT16, numbers={4001: 0, _SIX: 0, _EIGHT: 32 + i}) for i in (7, 8)),
+    Alias("SIM_GPS_DISABLE", "SIM_GPS1_ENABLE", INT8, numbers={1: 0, 0: 1}),
+    *(Alias(name.replace("SR0", "SR1"), name, INT16) for name in STREAM_GROUPS),
+    Alias("SYSID_THISMAV", "MAV_SYS_ID", INT16),
+    Alias("VISO_DELAY_MS", "EKF2_EV_DELAY", INT16),
+    Alias("VISO_POS_M_NSE", "EKF2_EVP_NOISE", REAL32),
+    Alias("VISO_TYPE", "EKF2_EV_CTRL", INT8, numbers=_VISION_TYPES),
+    Alias("VISO_VEL_M_NSE", "EKF2_EVV_NOISE", REAL32),
+    Alias("VISO_YAW_M_NSE", "EKF2_EVA_NOISE", REAL32),
+    Alias("WPNAV_ACCEL", "MPC_ACC_HOR", REAL32, CM),
+    Alias("WPNAV_RADIUS", "NAV_ACC_RAD", REAL32, CM),
+    Alias("WPNAV_SPEED", "MPC_XY_CRUISE", REAL32, CM),
+    Alias("WPNAV_SPEED_DN", "MPC_Z_V_AUTO_DN", REAL32, CM),
+    Alias("WPNAV_SPEED_UP", "MPC_Z_V_AUTO_UP", REAL32, CM),
+    Alias("WP_YAW_BEHAVIOR", "MPC_YAW_MODE", INT8, numbers=_YAW_MODES),
+)
+
+_AXES = "XYZ"
+_RATE_LOOP = "ArduPilot's default; the rate loop's own gains are MC_RPRATE_*_ACC and MC_YAWRATE_*_ACC"
+_CURVE = "ArduPilot's default; the airframe file has the motors' curve"
+_ACCEL = "ArduPilot's default; the motors limit the angular acceleration"
+_NO_LIMIT = "not limited: the control allocation knows the voltage"
+CONSTANTS: tuple[Constant, ...] = (
+    Constant("AHRS_EKF_TYPE", 3, INT8, "the estimator, of which there is one"),
+    Constant("ARMING_CHECK", 1, INT32, "all checks; they cannot be switched off"),
+    Constant("ARMING_REQUIRE", 1, INT8, "it must be armed before the rotors turn"),
+    Constant("ATC_ACCEL_P_MAX", 110_000.0, REAL32, _ACCEL),
+    Constant("ATC_ACCEL_R_MAX", 110_000.0, REAL32, _ACCEL),
+    Constant("ATC_ACCEL_Y_MAX", 27_000.0, REAL32, _ACCEL),
+    Constant("ATC_INPUT_TC", 0.15, REAL32, "ArduPilot's default; see MPC_MAN_Y_TAU"),
+    *(
+        Constant(f"ATC_RAT_{axis}_{gain}", value, REAL32, _RATE_LOOP)
+        for axis, values in (
+            ("RLL", (0.135, 0.135, 0.0036)),
+            ("PIT", (0.135, 0.135, 0.0036)),
+            ("YAW", (0.18, 0.018, 0.0)),
+        )
+        for gain, value in zip("PID", values, strict=True)
+    ),
+    Constant("AVOID_ENABLE", 7, INT8, "fence and distances are kept to; see GF_ACTION and CP_DIST"),
+    Constant("BATT_ARM_VOLT", 0.0, REAL32, "no voltage forbids arming; see BAT_LOW_THR"),
+    Constant("BATT_CRT_MAH", 0.0, REAL32, "see BAT_CRIT_THR, a share of the capacity"),
+    Constant("BATT_LOW_MAH", 0.0, REAL32, "see BAT_LOW_THR, a share of the capacity"),
+    Constant("BATT_MONITOR", 4, INT8, "voltage and current"),
+    Constant("COMPASS_DEV_ID", 97_539, INT32, "a magnetometer"),
+    Constant("COMPASS_DEV_ID2", 0, INT32, "no second magnetometer"),
+    Constant("COMPASS_DEV_ID3", 0, INT32, "no third magnetometer"),
+    Constant("COMPASS_ENABLE", 1, INT8, "there is a magnetometer"),
+    Constant("COMPASS_USE", 1, INT8, "the magnetometer is used"),
+    Constant("COMPASS_USE2", 0, INT8, "no second magnetometer"),
+    Constant("COMPASS_USE3", 0, INT8, "no third magnetometer"),
+    *(Constant(f"COMPASS_OFS_{axis}", 1.0, REAL32, "calibrated") for axis in _AXES),
+    *(Constant(f"COMPASS_OFS2_{axis}", 0.0, REAL32, "no second magnetometer") for axis in _AXES),
+    *(Constant(f"COMPASS_OFS3_{axis}", 0.0, REAL32, "no third magnetometer") for axis in _AXES),
+    Constant("EK3_ENABLE", 1, INT8, "the estimator runs"),
+    Constant("EK3_IMU_MASK", 1, INT8, "one IMU"),
+    Constant("EK3_SRC1_POSXY", 3, INT8, "GNSS; see EKF2_GPS_CTRL and EKF2_EV_CTRL"),
+    Constant("EK3_SRC1_POSZ", 1, INT8, "barometer; see EKF2_HGT_REF"),
+    Constant("EK3_SRC1_VELXY", 3, INT8, "GNSS; see EKF2_GPS_CTRL"),
+    Constant("EK3_SRC1_VELZ", 3, INT8, "GNSS; see EKF2_GPS_CTRL"),
+    Constant("EK3_SRC1_YAW", 1, INT8, "compass; see EKF2_MAG_TYPE"),
+    Constant("FOLL_ALT_TYPE", 1, INT8, "height above home; see FLW_TGT_ALT_M"),
+    Constant("FOLL_DIST_MAX", 0.0, REAL32, "any distance"),
+    Constant("FOLL_ENABLE", 1, INT8, "mode Follow may be chosen"),
+    *(Constant(f"FOLL_OFS_{axis}", 0.0, REAL32, "see FLW_TGT_DST, _FA, _HT") for axis in _AXES),
+    Constant("FOLL_OFS_TYPE", 1, INT8, "relative to the course of the target"),
+    Constant("FOLL_POS_P", 0.1, REAL32, "see FLW_TGT_RS"),
+    Constant("FOLL_SYSID", 0, INT16, "any target"),
+    Constant("FOLL_YAW_BEHAVE", 1, INT8, "faces the target"),
+    Constant("FRAME_TYPE", 1, INT8, "as an X"),
+    Constant("FS_DR_ENABLE", 0, INT8, "dead reckoning is told; see COM_POS_LOST_ACT"),
+    Constant("FS_EKF_THRESH", 0.8, REAL32, "ArduPilot's default; the estimator fails by resets, see COM_EST_FAIL_ACT"),
+    Constant("FS_OPTIONS", 0, INT32, "no exceptions; see COM_DLL_EXCEPT and COM_RCL_EXCEPT"),
+    Constant("FS_VIBE_ENABLE", 1, INT8, "a doubted accelerometer is told, and counts for less"),
+    Constant("GPS1_TYPE", 1, INT8, "a GNSS receiver"),
+    Constant("GPS_TYPE", 1, INT8, "a GNSS receiver"),
+    *(Constant(f"INS_ACCOFFS_{axis}", 0.001, REAL32, "calibrated") for axis in _AXES),
+    *(Constant(f"INS_ACCSCAL_{axis}", 1.0, REAL32, "calibrated") for axis in _AXES),
+    Constant("LAND_SPEED_HIGH", 0, INT16, "as WPNAV_SPEED_DN"),
+    Constant("LOG_BACKEND_TYPE", 1, INT8, "files, in PX4's format"),
+    Constant("LOG_BITMASK", 180_222, INT32, "everything is logged"),
+    Constant("LOG_FILE_DSRMROT", 0, INT8, "see SDLOG_MODE"),
+    Constant("LOG_REPLAY", 1, INT8, "logs hold what `honeyguide estimate` needs"),
+    Constant("MOT_BAT_VOLT_MAX", 0.0, REAL32, _NO_LIMIT),
+    Constant("MOT_BAT_VOLT_MIN", 0.0, REAL32, _NO_LIMIT),
+    Constant("MOT_PWM_MAX", 2000, INT16, "pulse of a motor at full command"),
+    Constant("MOT_PWM_MIN", 1000, INT16, "pulse of a motor that stands"),
+    Constant("MOT_SPIN_ARM", 0.1, REAL32, _CURVE),
+    Constant("MOT_SPIN_MAX", 0.95, REAL32, _CURVE),
+    Constant("MOT_SPIN_MIN", 0.15, REAL32, _CURVE),
+    Constant("MOT_THST_EXPO", 0.65, REAL32, _CURVE),
+    Constant("MOT_HOVER_LEARN", 0, INT8, "the hover thrust is not learned"),
+    Constant("RNGFND1_TYPE", 10, INT8, "a range finder that looks down"),
+    Constant("SCHED_LOOP_RATE", 250, INT16, "rate of the control loops"),
+    Constant("SERIAL0_BAUD", 115, INT32, "links have no baud rate"),
+    Constant("SERIAL0_PROTOCOL", 2, INT8, "MAVLink 2"),
+    *(Constant(f"SERVO{i}_FUNCTION", 32 + i, INT16, f"motor {i}") for i in range(1, 5)),
+    *(Constant(f"SERVO{i}_FUNCTION", 0, INT16, "set by DO_SET_SERVO") for i in range(9, 17)),
+    *(
+        Constant(f"SERVO{i}_{name}", value, INT16, "pulse [us]; outputs are not calibrated")
+        for i in range(1, 17)
+        for name, value in (("MIN", 1000), ("MAX", 2000), ("TRIM", 1500))
+    ),
+    Constant("SIMPLE", 0, INT8, "no simple mode"),
+    *(Constant(f"SR{i}_ADSB", 1, INT16, "aircraft are told when they are heard") for i in (0, 1)),
+    *(Constant(f"SR{i}_PARAMS", 50, INT16, "20 parameters per frame") for i in (0, 1)),
+    Constant("STAT_FLTTIME", 0, INT32, "flight time is not counted from one start to the next"),
+    Constant("STAT_BOOTCNT", 1, INT16, "starts are not counted"),
+    Constant("STAT_RUNTIME", 0, INT32, "running time is not counted from one start to the next"),
+    Constant("SUPER_SIMPLE", 0, INT8, "no simple mode"),
+    Constant("TERRAIN_ENABLE", 0, INT8, "no terrain tiles: the range finder measures the ground"),
+    Constant("SYSID_MYGCS", 255, INT16, "any ground station may fly it"),
+)

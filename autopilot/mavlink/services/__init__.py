@@ -1,0 +1,1 @@
+"""The microservices of the autopilot component: protocols, commands, inputs, files."""

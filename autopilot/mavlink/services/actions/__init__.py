@@ -1,0 +1,1 @@
+"""Commands that a client gives the vehicle."""

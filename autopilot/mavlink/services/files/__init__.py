@@ -1,0 +1,1 @@
+"""File transfer, logs, component metadata, and the shell."""

@@ -1,0 +1,1 @@
+"""Setpoints, sticks and measurements that clients send."""

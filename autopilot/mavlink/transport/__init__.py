@@ -1,0 +1,1 @@
+"""Links and their frames: UDP, TCP, serial, memory, routing, queues."""

@@ -1,0 +1,1 @@
+"""The wire format: frames, fields, signatures, packed files, units."""

@@ -1,0 +1,1 @@
+"""The geofence and the rally points."""

@@ -1,0 +1,1 @@
+"""The flight modes, one file each."""

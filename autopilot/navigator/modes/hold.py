@@ -1,0 +1,85 @@
+"""Hold: stays at one place, or goes to one and stays there."""
+
+from autopilot.navigator.context import NavContext, distance
+from autopilot.navigator.modes.stick_modes import Position
+from autopilot.navigator.paths.waypoint_path import Way
+from autopilot.navigator.setpoint import Vector
+
+
+class Hold:
+    """Mode Hold: the place is where the mode before ended, where a client sent the vehicle, or where it can stop.
+
+    Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as he steers.
+    """
+
+    __slots__ = ("_context", "_is_flown", "_is_goto", "_is_steered", "_reset_count", "_steered", "_way",
+                 "target_ned", "via", "yaw")  # fmt: skip
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._is_flown = False
+        self._is_goto = False  # on a straight line to the place
+        self._steered = Position(context)
+        self._way = Way(context)
+        self.via: list[Vector] = []  # [m] points to go over on the next way to a place
+        self._is_steered = False
+        self._reset_count = 0  # of the estimate
+        self.target_ned: Vector = (0.0, 0.0, 0.0)  # [m]
+        self.yaw = 0.0  # [rad]
+
+    @property
+    def is_underway(self) -> bool:
+        """Whether the vehicle is still on its way to the place a client has sent it to."""
+        way_m = distance(self._context.state.estimate.pos_ned, self.target_ned)
+        return self._is_goto and way_m > self._context.number("NAV_ACC_RAD")
+
+    def start(self) -> None:
+        context = self._context
+        if context.next_hold is not None:
+            self.target_ned, self.yaw, self._is_goto = context.next_hold
+            context.next_hold = None
+        else:
+            self._is_goto = False
+            self.target_ned, self.yaw = context.stop_point(), context.state.yaw_rad
+        via, self.via = self.via if self._is_goto else [], []
+        self._is_flown = bool(via)
+        if via:
+            self._way.start(context.stop_point(), [*via, self.target_ned])
+        else:
+            self._way.stop()
+        self._reset_count = context.state.estimate.reset_count
+
+    def frame(self) -> None:
+        context = self._context
+        if context.state.sticks.steer_hold and self._follow_sticks():
+            return
+        if context.state.estimate.reset_count != self._reset_count:
+            self._follow_reset()
+        if self._way.left:
+            self._is_flown = not self._way.frame()
+        elif context.is_on_ground:
+            self._is_flown = False
+        elif not self._is_flown:
+            self._is_flown = True
+            context.fly_to(self.target_ned, self.yaw, context.state.estimate.pos_ned if self._is_goto else None)
+
+    def _follow_sticks(self) -> bool:
+        """Flies as the sticks say and returns whether somebody steers; once nobody does, it stops."""
+        state = self._context.state
+        if state.sticks.has_pilot(state.time_us):
+            self._is_steered = True
+            self._steered.frame()
+        elif self._is_steered:
+            self._is_steered = False
+            self.start()
+        return self._is_steered
+
+    def _follow_reset(self) -> None:
+        """The estimate has jumped: a vehicle that holds stays where it is, one that was sent still goes there."""
+        estimate = self._context.state.estimate
+        self._reset_count = estimate.reset_count
+        if not self._is_goto:
+            north, east, down = self.target_ned
+            jump = estimate.pos_reset_ned
+            self.target_ned = (north + jump[0], east + jump[1], down)
+            self._is_flown = False

@@ -1,0 +1,147 @@
+"""Landing: straight down over one place, slower near the ground; blind if the position is lost."""
+
+from math import hypot, isfinite, nan
+
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.setpoint import Vector
+from autopilot.navigator.takeoff_intent import is_near_start
+
+_BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against rotor inflow and drag; guess
+_BLIND_STEADY_S = 20.0  # after that the thrust falls further, so that a vehicle that already stands notices it; guess
+_BLIND_FALL_1_S = 0.02  # share of the hover thrust per second; guess
+_TOUCHING_US = 700_000  # longer than it takes to begin a descent; guess
+_SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, far from home; guess
+
+
+class Landing:
+    """The last descent, until the landing detector ends it."""
+
+    __slots__ = ("_blind_since_us", "_context", "_east", "_is_blind", "_moving_us", "_north", "_yaw")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._north = self._east = self._yaw = 0.0
+        self._is_blind = False
+        self._moving_us = 0  # when it last really descended
+        self._blind_since_us = 0
+
+    def start(self, north: float, east: float, yaw: float) -> None:
+        """Descends over a place [m] with a heading [rad], NaN: the present one."""
+        self._north, self._east = north, east
+        self._yaw = yaw if isfinite(yaw) else self._context.state.yaw_rad
+        self._is_blind = False
+        self._moving_us = self._context.state.time_us
+
+    def frame(self) -> None:
+        context = self._context
+        if context.is_on_ground:
+            return
+        context.is_landing = True
+        if context.has_position:
+            if self._is_blind:  # the position is back: land here
+                self._is_blind = False
+                self._north, self._east, _ = context.stop_point()
+            speed = self._pushed(self._speed())
+            context.setpoint.descend_at(self._north, self._east, speed, self._yaw, context.cruise_speed)
+            return
+        if not self._is_blind:
+            self._is_blind = True
+            self._blind_since_us = context.state.time_us
+        if context.has_height and context.state.estimate.vel_std < context.number("COM_VEL_FS_EVH"):
+            context.setpoint.descend_braking(self._pushed(self._speed()), self._yaw)
+        elif context.has_height:
+            context.setpoint.descend_level(self._pushed(self._speed()), self._yaw)
+        else:
+            context.setpoint.hang_level(context.hover_thrust * self._blind_thrust_share(), self._yaw)
+
+    def _blind_thrust_share(self) -> float:
+        """Share of the hover thrust for sinking without knowing the height."""
+        blind_s = (self._context.state.time_us - self._blind_since_us) * 1e-6
+        return max(_BLIND_THRUST_SHARE - _BLIND_FALL_1_S * max(blind_s - _BLIND_STEADY_S, 0.0), 0.0)
+
+    def _pushed(self, speed: float) -> float:
+        """The speed, or more of it once the vehicle no longer sinks: on the ground the thrust falls at once then."""
+        context = self._context
+        if context.state.estimate.vel_ned[2] > 0.5 * speed:
+            self._moving_us = context.state.time_us
+        is_touching = context.state.time_us - self._moving_us > _TOUCHING_US
+        return max(speed, context.number("MPC_Z_V_AUTO_DN")) if is_touching else speed
+
+    def _speed(self) -> float:
+        """Descent speed [m/s]: MPC_Z_V_AUTO_DN high up, MPC_LAND_SPEED low, the crawl speed just above the ground."""
+        context = self._context
+        slow = context.number("MPC_LAND_SPEED")
+        fast = context.number("MPC_Z_V_AUTO_DN")
+        height, is_measured = context.height_above_ground()
+        if not is_measured:
+            is_known_ground = is_near_start(context.state, self._north, self._east)
+            return slow if height < _SLOW_BELOW_M and not is_known_ground else _blend(context, height, slow, fast)
+        if height < context.number("MPC_LAND_ALT3"):
+            return min(slow, context.number("MPC_LAND_CRWL"))
+        return _blend(context, height, slow, fast)
+
+
+def _blend(context: NavContext, height: float, slow: float, fast: float) -> float:
+    """Speed between MPC_LAND_ALT2 (slow) and MPC_LAND_ALT1 (fast), in steps of 0.05 m/s."""
+    high = context.number("MPC_LAND_ALT1")
+    low = context.number("MPC_LAND_ALT2")
+    if height >= high:
+        return max(slow, fast)
+    if not height > low or fast <= slow:  # also where the height is not a number
+        return slow
+    return round((slow + (fast - slow) * (height - low) / (high - low)) * 20.0) / 20.0
+
+
+def slowed_near_ground(context: NavContext, fast: float) -> float:
+    """[m/s] The greatest descent speed here, as in a landing; `fast` high up, and where the ground is not known."""
+    height, is_measured = context.height_above_ground()
+    here = context.state.estimate.pos_ned
+    if not is_measured and not is_near_start(context.state, here[0], here[1]):
+        return fast
+    return _blend(context, height, min(context.number("MPC_LAND_SPEED"), fast), fast)
+
+
+class Land:
+    """Mode Land: at a given place if one was asked for, otherwise here."""
+
+    __slots__ = ("_context", "_landing", "_place", "_yaw")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._landing = Landing(context)
+        self._place: Vector | None = None  # still to be reached
+        self._yaw = nan
+
+    def request(self, place_ned: Vector | None, yaw: float) -> None:
+        """Sets place [m] and heading [rad] of the next landing; None: where the vehicle can stop."""
+        self._place = place_ned
+        self._yaw = yaw
+
+    def start(self) -> None:
+        context = self._context
+        place, yaw = self._place, self._yaw
+        if place is not None and context.has_position:
+            start = context.stop_point()
+            self._place = (place[0], place[1], start[2])
+            context.fly_to(self._place, context.heading_to(start, self._place, yaw), start)
+            return
+        self._place = None
+        self._yaw = nan
+        if context.has_position:
+            north, east, _ = context.stop_point()
+        else:
+            north, east, _ = context.state.estimate.pos_ned
+        self._landing.start(north, east, yaw)
+
+    def frame(self) -> None:
+        place = self._place
+        if place is None:
+            self._landing.frame()
+            return
+        here = self._context.state.estimate.pos_ned
+        is_there = hypot(here[0] - place[0], here[1] - place[1]) < 0.5 * self._context.number("NAV_ACC_RAD")
+        if is_there or not self._context.has_position:
+            self._place = None
+            self._landing.start(place[0], place[1], self._yaw)
+            self._yaw = nan
+            self._landing.frame()

@@ -1,0 +1,1 @@
+"""Paths that modes follow: circles, splines, straight legs, ways around the fence."""

@@ -1,0 +1,1 @@
+"""What the vehicle carries and does not fly with: camera, gimbal, outputs."""

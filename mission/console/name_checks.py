@@ -1,0 +1,65 @@
+"""What a command is given by name (files, runs, tasks, recipes, policies), refused before anything heavy is loaded."""
+
+from pathlib import Path
+
+from mission.console.command_refusal import refuse
+
+REPLAY_FILE = "replay.npz"  # in a run folder, what is shown of it afterwards
+
+
+def check_file(path: Path) -> None:
+    """Refuses a file that cannot be opened."""
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        refuse(f"{path}: {error.strerror}")
+
+
+def check_run(folder: Path) -> None:
+    """Refuses a folder that holds no run to be shown."""
+    if not (folder / REPLAY_FILE).exists():
+        refuse(f"{folder}: holds no run that can be shown: {REPLAY_FILE} is missing")
+
+
+def check_task(name: str) -> None:
+    """Refuses a task that is none."""
+    from policies.tasks.catalogue import UnknownTask, check_name
+
+    try:
+        check_name(name)
+    except UnknownTask as error:
+        refuse(str(error))
+
+
+def check_recipe(name: str) -> None:
+    """Refuses what is neither a configuration file nor a recipe."""
+    from policies.learn.config.recipes import recipe
+    from policies.learn.config.yaml_locations import ConfigError
+
+    try:
+        if not (name.endswith((".yaml", ".yml")) or Path(name).is_file()):
+            recipe(name)
+    except ConfigError as error:
+        refuse(str(error))
+
+
+def check_policy(name: str) -> None:
+    """Refuses a policy that is not there."""
+    from policies.learn.export.policy_path import CheckpointError, find_policy
+
+    try:
+        find_policy(name)
+    except CheckpointError as error:
+        refuse(str(error))
+
+
+def check_task_or_policy(name: str) -> None:
+    """Refuses what is neither."""
+    from policies.learn.export.policy_path import CheckpointError, find_policy
+    from policies.tasks.catalogue import CATALOGUE
+
+    try:
+        if name not in CATALOGUE:
+            find_policy(name)
+    except CheckpointError as error:
+        refuse(f"{error}; the tasks are {', '.join(CATALOGUE)}")

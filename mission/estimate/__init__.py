@@ -1,0 +1,1 @@
+"""The estimator over recorded sensors."""

@@ -1,0 +1,113 @@
+"""`honeyguide companion`: a policy as a process of its own, between the vehicle's MAVLink port and its camera.
+
+In: addresses and a policy. Out: setpoints, and a line of figures. The wall clock is the companion's own; the vehicle's
+clock comes with its telemetry.
+"""
+
+import gc
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+
+from autopilot.mavlink.transport.client_links import open_client_link
+from autopilot.mavlink.transport.links import LinkError
+from common.clock import Pacer, wall_time_s
+from mission.console.terminal import print_line
+from policies.companion.companion import NO_PICTURES, Companion
+from policies.companion.image_client import CameraUrlError, StreamCamera
+from policies.companion.pilot import PilotError, load_pilot
+
+POLL_US = 2_000
+PROGRESS_US = 500_000
+
+
+class CompanionError(ValueError):
+    """Something the user gave is wrong; the message is one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompanionOptions:
+    """The options of `honeyguide companion`, as given."""
+
+    policy: str
+    link: str
+    camera: str
+    is_told: bool
+    seconds: float | None
+
+
+def run_companion(options: CompanionOptions, console: Console) -> str:
+    """Runs until it is stopped; returns what it did, in one sentence.
+
+    Raises:
+        CompanionError: the policy, or an address, cannot be used; nothing has been sent.
+    """
+    try:
+        pilot = load_pilot(options.policy)
+        camera = StreamCamera(options.camera)
+        link = open_client_link(options.link)
+    except (PilotError, CameraUrlError, LinkError) as error:
+        raise CompanionError(str(error)) from error
+    companion = Companion(link, camera, pilot, is_told=options.is_told, wall_s=wall_time_s)
+    _shower(console)(f"{options.policy} flies; vehicle: {options.link}, pictures: {options.camera}; Ctrl-C ends it")
+    try:
+        _loop(companion, camera, options.seconds, console)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        companion.close()
+    return f"{companion.decision_count} decisions; {latency_text(companion)}"
+
+
+def _loop(companion: Companion, camera: StreamCamera, seconds: float | None, console: Console) -> None:
+    pacer = Pacer(1.0)
+    start_s, shown_us = wall_time_s(), 0
+    polled_us = 0
+    show = _shower(console)
+    gc.freeze()  # what is loaded by now stays: to look through it for garbage takes 0.2 s, in the middle of a flight
+    with Live(console=console, transient=True, auto_refresh=False) as live:
+        while seconds is None or wall_time_s() - start_s < seconds:
+            time_us = int((wall_time_s() - start_s) * 1e6)
+            before = companion.phase
+            companion.frame(time_us)
+            if companion.phase is not before:
+                why = f": {trouble_text(companion, camera)}" if companion.trouble else ""
+                show(f"{time_us * 1e-6:7.1f} s  {companion.phase.value}{why}")
+            if console.is_terminal and time_us - shown_us >= PROGRESS_US:
+                shown_us = time_us
+                live.update(progress_line(companion, camera, time_us), refresh=True)
+            polled_us = max(polled_us + POLL_US, time_us)
+            pacer.wait_until(polled_us)
+
+
+def _shower(console: Console) -> Callable[[str], None]:
+    def show(text: str) -> None:
+        print_line(console, text)
+
+    return show
+
+
+def trouble_text(companion: Companion, camera: StreamCamera) -> str:
+    """Why the companion does not fly, with what is wrong with the camera if it is that."""
+    is_dark = companion.trouble == NO_PICTURES and camera.trouble
+    return f"{companion.trouble}: {camera.trouble}" if is_dark else companion.trouble
+
+
+def progress_line(companion: Companion, camera: StreamCamera, time_us: int) -> str:
+    """State, how far the owner is, how old the picture is, and how long a decision takes."""
+    state = companion.phase.value + (f" ({trouble_text(companion, camera)})" if companion.trouble else "")
+    return (
+        f"{state} | owner {companion.owner_distance_m():.1f} m | "
+        f"picture {companion.picture_age_s(time_us) * 1e3:.0f} ms | {latency_text(companion)}"
+    )
+
+
+def latency_text(companion: Companion) -> str:
+    """Median and 99th percentile of the time from a picture to its setpoint."""
+    if not companion.latencies_s:
+        return "no decision timed"
+    median, late = np.percentile(np.array(companion.latencies_s) * 1e3, (50, 99))
+    return f"picture to setpoint {median:.1f} ms, 99 % within {late:.1f} ms"

@@ -1,0 +1,199 @@
+"""`honeyguide follow`: an owner walks, the drone follows by a policy; live progress, scorecard, run folder, film.
+
+The vehicle takes off, its companion on board engages, and after the time asked for it lands. The companion speaks
+MAVLink over a link in memory, so that everything but ground stations and the live page is the same each time.
+"""
+
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from math import isfinite
+
+from rich.console import Console
+from rich.table import Table
+
+from autopilot.mavlink.transport.links import LinkError
+from common.airframe import AirframeError, load_airframe
+from common.clock import wall_time_s
+from common.files import write_whole
+from common.params import ParameterError
+from mission.connections import open_links, open_page
+from mission.console.name_checks import REPLAY_FILE
+from mission.console.progress_line import Progress
+from mission.console.terminal import busy, print_line
+from mission.flight import Flight, flight_parameters
+from mission.flight_options import UserError, speed_of
+from mission.fly_loop import advance
+from mission.follow.companion_process import latency_text
+from mission.follow.follow_options import FollowOptions, follow_config
+from mission.follow.follow_scoring import FollowWatch, taken_over
+from mission.follow.lockstep import flight_with_companion, take_off
+from mission.kernel_loading import load_kernels
+from mission.run_folder import OwnFiles, run_folder
+from mission.script import Drone
+from mission.view.film import write_film
+from mission.view.replay_file import Recorder
+from policies.companion.companion import Companion, Pilot
+from policies.companion.engagement import Phase
+from policies.companion.names import SCRIPTED, TASK
+from policies.companion.pilot import PilotError, load_pilot
+from policies.pretrained.pretrained_policies import pretrained
+from policies.tasks.follow_me.scorecard import Scorecard, lines, named_lines, scorecard
+
+ENGAGE_S = 20.0  # after the take-off, until it follows
+FILM = "flight.mp4"
+SHOWN = ("in_band", "in_view", "distance_median_m", "collision")  # figures of the scorecard on the live page
+
+
+def follow_session(options: FollowOptions) -> int:
+    """Flies as asked and returns the exit code: 1 only if what the policy flew was not followed to its end and landed.
+
+    Raises:
+        UserError: an option, file, port or folder is wrong; nothing has been written.
+    """
+    with ExitStack() as held:
+        return _follow(options, held)
+
+
+def _follow(options: FollowOptions, held: ExitStack) -> int:
+    """The flight, with what must be held until its end."""
+    console = Console()
+    speed = speed_of(options.flight.speed)
+    config = follow_config(options)
+    pilot, name = chosen_pilot(options.policy)
+    try:
+        flight_parameters(config, load_airframe(config.airframe))
+        links = [] if speed is None else open_links(options.flight, speed)
+    except (AirframeError, ParameterError, LinkError) as error:
+        raise UserError(str(error)) from error
+    page = open_page(options.flight.view_port) if options.flight.has_view else None
+    folder = held.enter_context(run_folder(options.flight.run_folder))
+    with busy(console, "loading kernels") as say:
+        load_kernels(say, has_camera=page is not None, has_owner=True)
+        say("building the world")
+        flight, companion = flight_with_companion(config, pilot, links=links, folder=folder, wall_s=wall_time_s)
+    recorder = Recorder(flight, action=lambda: companion.action)
+    watch = watch_of(flight, companion, options.seconds)
+    watchers: list[Callable[[], None]] = [recorder.frame, watch.frame]
+    if page is not None:
+        from mission.view.live import LiveView
+
+        view = LiveView(
+            flight, page, speed=speed, action=lambda: companion.action, score=lambda: score_lines(watch, companion)
+        )
+        watchers.append(view.frame)
+    running = flight.drone.start(follow(flight.drone, companion, options.seconds))
+    where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.flight.gcs_port}"
+    print_line(console, f"{name} follows an owner who {options.pace}s; {where}")
+    print_line(console, f"logs: {folder}")
+    if page is not None:
+        print_line(console, f"live page: {page.url}")
+    advance(flight, lambda _: running.is_done, speed, watchers, Progress(flight, running), console)
+    if page is not None:
+        view.end(f"flight ended: logs in {folder}")
+    is_stopped = not running.is_done
+    running.cancel()
+    flight.close()
+    for trouble in flight.troubles.take():
+        print_line(console, trouble)
+    files = OwnFiles(folder, console)
+    with files.writing(REPLAY_FILE):
+        recorder.recording().save(folder)
+    if running.error is not None:
+        print_line(console, f"result: {running.error}")
+    is_down = running.error is None and not flight.is_crashed
+    exit_code = finish(watch, files, console, is_down=is_down, is_stopped=is_stopped)
+    if flight.is_crashed:
+        print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
+    print_line(console, latency_text(companion))
+    if options.has_film:
+        write_film(recorder.recording(), flight.world, folder / FILM, console)
+    print_line(console, f"{'logs, scorecard and film' if options.has_film else 'logs and scorecard'}: {folder}")
+    if page is not None:
+        view.close()
+    return exit_code
+
+
+def chosen_pilot(policy: str | None) -> tuple[Pilot, str]:
+    """Who flies, and how it is called."""
+    name = policy or (TASK if pretrained(TASK) is not None else SCRIPTED)
+    try:
+        return load_pilot(name), "a script" if name == SCRIPTED else f"the policy {name}"
+    except PilotError as error:
+        raise UserError(str(error)) from error
+
+
+def watch_of(flight: Flight, companion: Companion, seconds: float) -> FollowWatch:
+    """What judges a flight by what its companion flies of it."""
+    restarts_over = 0  # those after which it has followed again
+
+    def taken(has_begun: bool) -> str:
+        nonlocal restarts_over
+        if companion.phase is Phase.FLYING and flight.controller.state.is_armed:
+            restarts_over = flight.restart_count
+        is_put_back = flight.restart_count > restarts_over
+        return taken_over(flight, companion.phase, has_begun=has_begun, is_put_back=is_put_back)
+
+    return FollowWatch(flight, lambda: companion.phase is Phase.FLYING, seconds, taken)
+
+
+async def follow(drone: Drone, companion: Companion, seconds: float) -> None:
+    """Takes off, lets the companion follow for so long, and lands, unless it is down by then."""
+    await take_off(drone)
+    await drone.until(lambda: companion.phase is Phase.FLYING, ENGAGE_S, "the companion's taking over")
+    await drone.sleep(seconds)
+    if drone.is_armed:
+        await drone.land()
+
+
+def score_lines(watch: FollowWatch, companion: Companion) -> tuple[str, ...]:
+    """How it goes so far, for the live page: figures of the scorecard under its names."""
+    state = f"companion: {companion.phase.value}" + (f" ({companion.trouble})" if companion.trouble else "")
+    track = watch.so_far()
+    if track is None:
+        return (state,)
+    card = scorecard([track])
+    figures = ", ".join(f"{label} {text}" for name, label, text in named_lines(card) if name in SHOWN)
+    return (state, f"{watch.judged_s:.0f} s flown by the policy: {figures}")
+
+
+def finish(watch: FollowWatch, files: OwnFiles, console: Console, *, is_down: bool, is_stopped: bool) -> int:
+    """Writes and shows the scorecard of what the policy flew, if anything was; returns the exit code.
+
+    Args:
+        watch: which judged it.
+        files: of the run.
+        console: where it is shown.
+        is_down: it landed in the end, in one piece.
+        is_stopped: the user stopped the program; what was planned beyond does not count.
+    """
+    track = watch.so_far() if is_stopped else watch.track()
+    if watch.takeovers:
+        why = ", ".join(watch.takeovers)
+        print_line(
+            console, f"judged: the {watch.judged_s:.1f} s that the policy flew; for {watch.paused_s:.1f} s {why}"
+        )
+    is_excused = bool(watch.takeovers) or is_stopped
+    if track is None:
+        print_line(console, "the owner was not followed: there is no scorecard")
+        return 0 if is_excused and not files.missing else 1
+    card = scorecard([track])
+    with files.writing("summary.json") as path:
+        write_whole(path, (json.dumps(summary_of(card), indent=2) + "\n").encode())
+    console.print(_table(card))
+    is_good = track.is_whole and card.collision.value == 0.0 and (is_down or is_excused)
+    return 0 if is_good and not files.missing else 1
+
+
+def summary_of(card: Scorecard) -> dict[str, float | None]:
+    """What `summary.json` holds: the scorecard's figures; null for what the flight had none of."""
+    names = [name for name in Scorecard.__dataclass_fields__ if name not in ("episodes", "minutes")]
+    figures = {name: getattr(card, name).value for name in names}
+    return {name: value if isfinite(value) else None for name, value in figures.items()} | {"minutes": card.minutes}
+
+
+def _table(card: Scorecard) -> Table:
+    table = Table("figure", "value", title="scorecard", title_justify="left")
+    for row in lines(card):
+        table.add_row(*row)
+    return table

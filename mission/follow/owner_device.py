@@ -1,0 +1,122 @@
+"""The owner of a flight: a person who walks through its world, and their phone, a MAVLink client of its own.
+
+In: the time, and whether the vehicle follows yet. Out: `people`, which cameras draw, and FOLLOW_TARGET twice a second
+with a phone's lag and error. Nobody walks off before the drone is there: until it follows, the owner stands.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from autopilot.mavlink.wire.codec import encode
+from autopilot.mavlink.wire.convert import degrees_e7
+from common.attitude import Vector
+from common.geodesy import GeoPoint, geodetic_from_ned
+from common.kernels import TICK_US
+from mission.flight_config import OwnerConfig, Pace
+from policies.tasks.follow_me.world import STOP_SHARE
+from sim.sensors.phone import CORRELATED_STD_M, POSITION_STD_M, VERTICAL_FACTOR, phone_model
+from sim.walking_owner import Owner
+from sim.world.people import CHEST_M, RUN_SPEED_M_S, WALK_SPEED_M_S, person_model
+from sim.world.world import WorldMap
+
+SPEEDS_M_S: dict[Pace, float] = {"walk": WALK_SPEED_M_S, "run": RUN_SPEED_M_S}
+PHONE_SYSTEM, PHONE_COMPONENT = 254, 190  # guess: a station's numbers, not those of other clients
+HEARTBEAT_US = 1_000_000
+_SETS_OFF_S = (0.5, 2.0)  # that late at most, as at the start of an episode of training
+_HAS_POSITION_AND_VELOCITY = 3  # FOLLOW_TARGET.est_capabilities
+_NOT_GIVEN = (0.0, 0.0, 0.0)
+
+
+class FollowedOwner:
+    """The owner of one flight.
+
+    Args:
+        config: who.
+        world: where they walk.
+        seed: of their path and of the phone's errors.
+        home: origin of ned.
+    """
+
+    def __init__(self, config: OwnerConfig, world: WorldMap, seed: int, home: GeoPoint) -> None:
+        still = person_model(0.0)
+        still.speed_min = 0.0
+        still.plan_min_s, still.plan_max_s = _SETS_OFF_S  # who then follows need not wait for a long plan to end
+        self._home = home
+        self._walking: Any = person_model(SPEEDS_M_S[config.pace])
+        self._walking.stop_share = STOP_SHARE
+        towards_home_rad = np.pi
+        self._owner = Owner(
+            world,
+            [[config.start_m, 0.0, towards_home_rad]],
+            seed,
+            model=still,
+            phone=phone_model(config.phone_error),
+        )
+        self._person: NDArray[Any] = self._owner.people.numpy()  # live, as the next
+        self._phone: NDArray[Any] = self._owner.phones.numpy()
+        horizontal = config.phone_error**2 * (CORRELATED_STD_M**2 + POSITION_STD_M**2)
+        self._pos_var = (horizontal, horizontal, VERTICAL_FACTOR**2 * horizontal)
+        self.vehicle_end, self._link = memory_pair(LinkRole.GROUND)
+        self._seq = 0
+        self._heartbeat_us = 0
+        self.is_walking = False
+
+    @property
+    def people(self) -> Any:
+        """What cameras draw: an array of one `Person`."""
+        return self._owner.people
+
+    @property
+    def chest_ned(self) -> Vector:
+        """[m] True place of what a follower keeps its distance to."""
+        north, east, down = (float(element) for element in self._person[0]["pos_ned"])
+        return (north, east, down - float(CHEST_M))
+
+    @property
+    def vel_ned(self) -> Vector:
+        """[m/s] True velocity."""
+        north, east, down = (float(element) for element in self._person[0]["vel_ned"])
+        return (north, east, down)
+
+    def frame(self, time_us: int, *, is_followed: bool) -> None:
+        """Walks on, and sends what the phone has to say.
+
+        Args:
+            time_us: simulated time.
+            is_followed: the vehicle follows: the owner sets off.
+        """
+        if is_followed and not self.is_walking:
+            self.is_walking = True
+            self._owner.change_model(self._walking)
+        has_report = self._owner.step_to(time_us // TICK_US)
+        self._link.receive()  # a phone hears the vehicle's telemetry too; ours does not care
+        if time_us >= self._heartbeat_us:
+            self._heartbeat_us = time_us + HEARTBEAT_US
+            self._send("HEARTBEAT", type=6, autopilot=8, system_status=4, mavlink_version=3)
+        if has_report:
+            self._report()
+
+    def _report(self) -> None:
+        fix = self._phone[0]["fix"]
+        north, east, down = (float(element) for element in fix["pos_ned"])
+        lat_deg, lon_deg, alt_m = geodetic_from_ned(north, east, down, self._home)
+        self._send(
+            "FOLLOW_TARGET",
+            timestamp=int(fix["time_us"]) // 1000,
+            est_capabilities=_HAS_POSITION_AND_VELOCITY,
+            lat=degrees_e7(lat_deg),
+            lon=degrees_e7(lon_deg),
+            alt=alt_m,
+            vel=tuple(float(element) for element in fix["vel_ned"]),
+            acc=_NOT_GIVEN,
+            attitude_q=(1.0, *_NOT_GIVEN),
+            rates=_NOT_GIVEN,
+            position_cov=self._pos_var,
+        )
+
+    def _send(self, name: str, **fields: Any) -> None:
+        self._seq = self._seq + 1 & 0xFF
+        self._link.send(encode(name, PHONE_SYSTEM, PHONE_COMPONENT, self._seq, **fields))

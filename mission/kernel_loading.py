@@ -1,0 +1,46 @@
+"""The kernels of a flight, loaded before it begins: what the cache lacks is compiled, and no flight stops for it."""
+
+from typing import Any
+
+import warp as wp
+
+from mission.console.terminal import Say
+from sim.advance import rig_kernels
+
+_ALWAYS = ("autopilot.estimator.ekf",)
+_CAMERA = ("sim.sensors.camera",)
+_OWNER = (
+    "sim.world.hills",
+    "sim.world.growing",
+    "sim.walking_owner",
+    "sim.sensors.fast_camera.prepare",
+    "sim.sensors.fast_camera.columns",
+    "sim.sensors.fast_camera.rows",
+    "sim.sensors.fast_camera.optics",
+    "sim.sensors.fast_camera.ground",
+    "sim.sensors.fast_camera.light",
+    "policies.tasks.follow_me.task_cameras",
+    "policies.tasks.follow_me.observe",
+    "policies.tasks.flight.own_state",
+)
+
+
+def flight_kernels() -> tuple[Any, ...]:
+    """Those that are in modules of their own."""
+    kernels = rig_kernels()
+    return kernels.place, kernels.power_on, kernels.forget_all_impacts, kernels.advance
+
+
+def load_kernels(say: Say, *, has_camera: bool, has_owner: bool) -> None:
+    """Loads the kernels of a flight one after the other, and says which.
+
+    Args:
+        say: is told how far it is.
+        has_camera: those of the camera's pictures too, which a flight in lockstep loads when it takes the first.
+        has_owner: those of the owner and of the policy that follows too; their packages must have been imported.
+    """
+    names = (*_ALWAYS, *(_CAMERA if has_camera else ()), *(_OWNER if has_owner else ()))
+    modules = [wp.get_module(name) for name in names] + [kernel.module for kernel in flight_kernels()]
+    for number, module in enumerate(modules, 1):
+        say(f"loading kernels, compiled the first time: {number} of {len(modules)}")
+        wp.load_module(module, device="cpu")

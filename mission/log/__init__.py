@@ -1,0 +1,1 @@
+"""What is kept of a flight: recorder, flight log, summary, plots."""

@@ -1,0 +1,1 @@
+"""What the simulator adds to a flight: devices, failures, SIM_* parameters."""

@@ -1,0 +1,1 @@
+"""The commands that train, judge, show and record policies."""

@@ -1,0 +1,131 @@
+"""The commands that train and judge policies: `honeyguide train`, `eval` and `export`.
+
+`train` has every flag of ML-Agents' `mlagents-learn`; those that make no sense without Unity are accepted and say so.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from mission.console.command_refusal import learn_extra, refuse
+from mission.console.name_checks import check_policy, check_recipe
+from mission.console.terminal import busy
+
+_EnvArgs = Annotated[
+    list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as preset=improved. Repeatable.")
+]
+_NO_EFFECT = "Accepted for ML-Agents' command lines; no effect."
+_OLD = "Old name"
+_POLICY = typer.Argument(help="A policy file (.pt), a run's folder, or the name of a run in results/.")
+
+
+def train(
+    context: typer.Context,
+    task_or_config: Annotated[str, typer.Argument(help="A task or recipe by name, or an ML-Agents .yaml file.")],
+    env: Annotated[str | None, typer.Option(help="The task, if the .yaml file names none.")] = None,
+    run_id: Annotated[str | None, typer.Option(help="Name of the run. Default: the recipe's, or ppo.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run where it stopped.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a run of this name.")] = False,
+    initialize_from: Annotated[str | None, typer.Option(help="Start from the networks of this run.")] = None,
+    inference: Annotated[bool, typer.Option("--inference", help="Play the run's policy; learn nothing.")] = False,
+    deterministic: Annotated[
+        bool, typer.Option("--deterministic", help="With --inference: the most probable actions.")
+    ] = False,
+    seed: Annotated[int | None, typer.Option(help="Seed of every random draw. Default: a new one.")] = None,
+    num_envs: Annotated[int | None, typer.Option(help="Copies of the num-areas environments.")] = None,
+    num_areas: Annotated[int | None, typer.Option(help="Environments side by side.")] = None,
+    env_args: _EnvArgs = None,
+    behavior: Annotated[str | None, typer.Option(help="Which behaviour of a file that has several.")] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Drop misplaced keys as ML-Agents does: no network memory from flat keys.")
+    ] = False,
+    results_dir: Annotated[str | None, typer.Option(help="Folder of all runs. Default: results.")] = None,
+    torch_device: Annotated[str | None, typer.Option(help="Where networks are computed: cpu, cuda.")] = None,
+    keep_checkpoints: Annotated[int | None, typer.Option(help="How many of the newest checkpoints stay.")] = None,
+    save_freq: Annotated[int | None, typer.Option(help="Steps between checkpoints.")] = None,
+    curriculum: Annotated[str | None, typer.Option(help="A curriculum file of ML-Agents 0.15.")] = None,
+    sampler: Annotated[str | None, typer.Option(help="A sampler file of ML-Agents 0.15.")] = None,
+    lesson: Annotated[int | None, typer.Option(help="The lesson curricula begin with, from 0.")] = None,
+    load: Annotated[bool, typer.Option("--load", help=f"{_OLD} of --resume.")] = False,
+    cpu: Annotated[bool, typer.Option("--cpu", help=f"{_OLD} of --torch-device cpu.")] = False,
+    train: Annotated[bool, typer.Option("--train", help="Training is what happens anyway.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help=_NO_EFFECT)] = False,
+    base_port: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    timeout_wait: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    width: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    height: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    quality_level: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    time_scale: Annotated[float | None, typer.Option(help=_NO_EFFECT)] = None,
+    target_frame_rate: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    capture_frame_rate: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    no_graphics: Annotated[bool, typer.Option("--no-graphics", help=_NO_EFFECT)] = False,
+    no_graphics_monitor: Annotated[bool, typer.Option("--no-graphics-monitor", help=_NO_EFFECT)] = False,
+    max_lifetime_restarts: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    restarts_rate_limit_n: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    restarts_rate_limit_period_s: Annotated[int | None, typer.Option(help=_NO_EFFECT)] = None,
+    torch: Annotated[bool, typer.Option("--torch", help=_NO_EFFECT)] = False,
+    tensorflow: Annotated[bool, typer.Option("--tensorflow", help=_NO_EFFECT)] = False,
+) -> None:
+    """Train a policy on a task, by one of our recipes or by an ML-Agents configuration."""
+    with learn_extra():
+        check_recipe(task_or_config)
+        with busy(Console(), "loading the program"):
+            from mission.train.training import USER_ERRORS, TrainingRequest, train_run
+            from policies.learn.config.command_line import CommandLine
+
+        if context.args and env_args is None:
+            refuse(f"{context.args[0]}: not expected; settings of the task go after --env-args")
+        pairs = (*env_args, *context.args) if env_args is not None else None  # ML-Agents takes all that follow
+        given = CommandLine(
+            env=env, run_id=run_id, resume=resume, force=force, initialize_from=initialize_from, inference=inference,
+            deterministic=deterministic, seed=seed, num_envs=num_envs, num_areas=num_areas, env_args=pairs,
+            results_dir=results_dir, torch_device=torch_device, keep_checkpoints=keep_checkpoints,
+            save_freq=save_freq, curriculum=curriculum, sampler=sampler, lesson=lesson, load=load, cpu=cpu,
+            train=train, debug=debug, base_port=base_port, timeout_wait=timeout_wait, width=width, height=height,
+            quality_level=quality_level, time_scale=time_scale, target_frame_rate=target_frame_rate,
+            capture_frame_rate=capture_frame_rate, no_graphics=no_graphics, no_graphics_monitor=no_graphics_monitor,
+            max_lifetime_restarts=max_lifetime_restarts, restarts_rate_limit_n=restarts_rate_limit_n,
+            restarts_rate_limit_period_s=restarts_rate_limit_period_s, torch=torch, tensorflow=tensorflow,
+        )  # fmt: skip
+        try:
+            train_run(TrainingRequest(task_or_config, given, behavior, strict), Console())
+        except USER_ERRORS as error:
+            refuse(str(error))
+
+
+def evaluate(
+    policy: Annotated[str, _POLICY],
+    task: Annotated[str | None, typer.Option(help="Another task of the same layout. Default: the policy's.")] = None,
+    env_args: _EnvArgs = None,
+    episodes: Annotated[int, typer.Option(min=1, max=10_000_000, help="How many are played.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of the episodes.")] = 0,
+    drawn: Annotated[bool, typer.Option("--drawn", help="Draw actions instead of taking the most probable.")] = False,
+) -> None:
+    """Play a policy on episodes it was not trained on, and count how they end."""
+    with learn_extra():
+        check_policy(policy)
+        with busy(Console(), "loading the program"):
+            from mission.train.training import USER_ERRORS, evaluate_policy
+
+        try:
+            evaluate_policy(policy, task, tuple(env_args or ()), (episodes, seed), Console(), is_drawn=drawn)
+        except USER_ERRORS as error:
+            refuse(str(error))
+
+
+def export(
+    policy: Annotated[str, _POLICY],
+    output: Annotated[Path | None, typer.Argument(help="The .onnx file to write. Default: beside the policy.")] = None,
+) -> None:
+    """Write a policy as an ONNX network with ML-Agents' names."""
+    with learn_extra():
+        check_policy(policy)
+        with busy(Console(), "loading the program"):
+            from mission.train.training import USER_ERRORS, export_network
+
+        try:
+            export_network(policy, output, Console())
+        except USER_ERRORS as error:
+            refuse(str(error))

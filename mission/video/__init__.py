@@ -1,0 +1,1 @@
+"""Images of the camera for people: MJPEG, RTP, films, single images."""

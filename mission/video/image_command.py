@@ -1,0 +1,56 @@
+"""`honeyguide picture`: what a camera sees from a place in the world, without a flight."""
+
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+
+import common.kernels  # noqa: F401  (starts Warp without its greeting)
+from autopilot.payload.camera.image_file import jpeg_bytes
+from common.attitude import product, quat_of
+from common.files import write_whole
+from sim.sensors.camera import CameraPose, Renderer
+from sim.world.world import WorldConfig, build_world
+
+_RDF_IN_FRD = (0.5, 0.5, 0.5, 0.5)  # a camera that looks ahead
+
+
+class PictureError(ValueError):
+    """Something the user gave is wrong; the message is one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """Where the camera is and which way it looks."""
+
+    north_m: float
+    east_m: float
+    above_ground_m: float
+    yaw_deg: float
+    pitch_deg: float
+    hfov_deg: float
+
+
+def take_picture(output: Path, world: WorldConfig, viewpoint: Viewpoint, size: str) -> None:
+    """Writes the picture as a JPEG.
+
+    Raises:
+        PictureError: the size makes no sense, or the file cannot be written.
+    """
+    width, height = _size(size)
+    world_map = build_world(world)
+    ground_m = float(world_map.height(viewpoint.north_m, viewpoint.east_m))
+    place = (viewpoint.north_m, viewpoint.east_m, -ground_m - viewpoint.above_ground_m)
+    q_ned_from_frd = quat_of(radians(viewpoint.yaw_deg), radians(viewpoint.pitch_deg))
+    pose = CameraPose(place, product(q_ned_from_frd, _RDF_IN_FRD), viewpoint.hfov_deg)
+    pictures = Renderer(world_map).pictures([pose], width, height, samples=2)
+    try:
+        write_whole(output, jpeg_bytes(pictures.rgb[0]))
+    except OSError as error:
+        raise PictureError(f"{output}: {error.strerror}") from error
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal() and 16 <= int(width) <= 4096 and 16 <= int(height) <= 4096):
+        raise PictureError(f"--size {text}: must be WIDTHxHEIGHT, both from 16 to 4096")
+    return int(width), int(height)

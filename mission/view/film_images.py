@@ -1,0 +1,101 @@
+"""The pictures of a film: the chase camera's view, what the vehicle itself sees, and a line of figures.
+
+In: a recording and its world. Out: pictures in their order, 25 a second of flight. Each is made on one core, and as
+many at a time as there are cores: the camera's kernels and OpenCV let other threads run.
+"""
+
+import os
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from queue import SimpleQueue
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from common.airframe import load_airframe
+from mission.view.chase_camera import STRIDE, Floats, camera_path, looking
+from mission.view.flight_snapshot import Moment
+from mission.view.replay_file import Recording
+from mission.view.snapshot_images import Eye, onboard_eye
+from mission.view.vehicle_model import VehicleModel
+from sim.world.world import WorldMap
+
+WIDTH, HEIGHT, HFOV_DEG = 960, 540, 75.0
+RANGE_M = 150.0
+INSET = 192  # [pixels] side of the onboard picture
+MARGIN = 16
+STRIP, FONT_SCALE = 36, 0.7  # [pixels] height of the caption, and the size of its letters
+AHEAD = 4  # pictures that each core may be ahead of who takes them
+Picture = NDArray[np.uint8]
+
+
+def film(recording: Recording, world: WorldMap) -> Iterator[Picture]:
+    """The pictures, RGB, (HEIGHT, WIDTH, 3), one each `chase.PICTURE_S`."""
+    recording = recording.every(STRIDE)
+    places, targets = camera_path(recording, world)
+    cores = len(os.sched_getaffinity(0))
+    studios: SimpleQueue[Studio] = SimpleQueue()
+    for _ in range(cores):
+        studios.put(Studio(recording, world))
+
+    def taken(i: int) -> Picture:
+        studio = studios.get()
+        try:
+            return studio.picture(recording.rows[i], places[i], targets[i])
+        finally:
+            studios.put(studio)
+
+    with ThreadPoolExecutor(cores, "film") as pool:
+        waiting: deque[Future[Picture]] = deque()
+        try:
+            for i in range(len(recording)):
+                waiting.append(pool.submit(taken, i))
+                if len(waiting) > AHEAD * cores:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+class Studio:
+    """Makes one picture at a time."""
+
+    def __init__(self, recording: Recording, world: WorldMap) -> None:
+        self._chase = Eye(world, WIDTH, HEIGHT, HFOV_DEG, range_m=RANGE_M)
+        self._onboard = onboard_eye(world)
+        self._model = VehicleModel(load_airframe(recording.config.airframe))
+
+    def picture(self, row: Any, place: Floats, target: Floats) -> Picture:
+        """A recorded moment, seen from a place [m] towards a target."""
+        q_ned_from_rdf = looking(place, target)
+        self._chase.look(place, q_ned_from_rdf, row["owner"])
+        picture: Picture = self._chase.rgb.copy()
+        self._model.draw(picture, self._chase, row, place, q_ned_from_rdf)
+        self._onboard.look_from(row)
+        inset = cv2.resize(self._onboard.rgb, (INSET, INSET), interpolation=cv2.INTER_NEAREST)
+        picture[MARGIN : MARGIN + INSET, -MARGIN - INSET : -MARGIN] = inset
+        corner = (WIDTH - MARGIN - INSET - 1, MARGIN - 1)
+        cv2.rectangle(picture, corner, (WIDTH - MARGIN, MARGIN + INSET), (255, 255, 255), 1)
+        write_caption(picture, caption(Moment(row)))
+        return picture
+
+
+def caption(moment: Moment) -> str:
+    """Clock and mode; the distance to the owner, or speed and height where nobody is followed."""
+    minutes, tenths = divmod(int(10.0 * moment.time_s), 600)
+    if moment.has_owner:
+        figures = f"{moment.distance_m:.1f} m to the owner"
+    else:
+        figures = f"{moment.speed_m_s:.1f} m/s   {float(moment.row['height_m']):.1f} m high"
+    return f"{minutes}:{0.1 * tenths:04.1f}   {moment.mode_name}   {figures}"
+
+
+def write_caption(picture: Picture, text: str) -> None:
+    """White letters on a darkened strip along the lower edge: to be read before sky and forest."""
+    picture[-STRIP:] >>= 1
+    foot = (MARGIN, HEIGHT - STRIP // 3)
+    cv2.putText(picture, text, foot, cv2.FONT_HERSHEY_SIMPLEX, FONT_SCALE, (255, 255, 255), 1, cv2.LINE_AA)

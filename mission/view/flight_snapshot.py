@@ -1,0 +1,115 @@
+"""What is shown of a flight at one instant: a row that a recording keeps, and a `Moment` to read it.
+
+In: the live rows of the simulator and the flight controller's state. Out: moments, which the live page shows at once
+and a recording keeps for replays and films. It is the truth: for people, nothing of it goes back into a flight.
+"""
+
+from dataclasses import dataclass
+from math import nan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.interface.vehicle_state import Mode
+from mission.flight import Flight
+from sim.world.people import CHEST_M, Person
+
+Row = NDArray[np.float32]
+ROTORS = 8  # as many as a vehicle can have
+ACTIONS = 4  # what a policy chooses: velocity ahead, right and down, and yaw rate, each in [-1, 1]
+_PERSON: Any = Person
+MOMENT = np.dtype(
+    [
+        ("time_s", "f8"),
+        ("pos_ned", "f4", 3),  # [m]
+        ("vel_ned", "f4", 3),  # [m/s]
+        ("q_ned_from_frd", "f4", 4),  # x, y, z, w
+        ("rotor_speed", "f4", ROTORS),  # [rad/s]
+        ("height_m", "f4"),  # above the ground
+        ("is_on_ground", "?"),
+        ("battery", "f4"),  # [0..1] as the vehicle believes
+        ("mode", "i4"),
+        ("is_armed", "?"),
+        ("goal_ned", "f4", 3),  # [m] where the vehicle flies to; NaN: nowhere
+        ("action", "f4", ACTIONS),  # of the policy on board; NaN: none
+        ("owner", _PERSON.numpy_dtype()),  # a stature of 0: nobody
+    ]
+)
+"""One row of a recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One instant, read from a row of `MOMENT`."""
+
+    row: Any
+
+    @property
+    def time_s(self) -> float:
+        return float(self.row["time_s"])
+
+    @property
+    def pos_ned(self) -> Row:
+        """Of the vehicle [m], shape (3,)."""
+        place: Row = self.row["pos_ned"]
+        return place
+
+    @property
+    def q_ned_from_frd(self) -> tuple[float, float, float, float]:
+        x, y, z, w = (float(value) for value in self.row["q_ned_from_frd"])
+        return x, y, z, w
+
+    @property
+    def goal_ned(self) -> Row:
+        """Where it flies to [m], shape (3,); NaN: nowhere."""
+        place: Row = self.row["goal_ned"]
+        return place
+
+    @property
+    def mode_name(self) -> str:
+        return Mode(int(self.row["mode"])).name.replace("_", " ").title()
+
+    @property
+    def speed_m_s(self) -> float:
+        return float(np.linalg.norm(self.row["vel_ned"]))
+
+    @property
+    def has_owner(self) -> bool:
+        return bool(self.row["owner"]["stature_m"] > 0.0)
+
+    @property
+    def owner_ned(self) -> Row:
+        """The feet of the person it follows [m], shape (3,)."""
+        place: Row = self.row["owner"]["pos_ned"]
+        return place
+
+    @property
+    def distance_m(self) -> float:
+        """From the vehicle to its owner's chest; NaN without one."""
+        return float(distances_m(self.row)) if self.has_owner else nan
+
+
+def distances_m(rows: Any) -> Any:
+    """From the vehicle to its owner's chest [m], for one row or many."""
+    off = rows["owner"]["pos_ned"] - rows["pos_ned"] - np.array([0.0, 0.0, float(CHEST_M)], np.float32)
+    return np.linalg.norm(off, axis=-1)
+
+
+def moment_of(flight: Flight, action: Row | None = None) -> Moment:
+    """The present instant of a flight, and what a policy on board chose last."""
+    truth: Any = flight.rig.rows["truth"][0]
+    state = flight.controller.state
+    row = np.zeros((), MOMENT)
+    for name in ("pos_ned", "vel_ned", "q_ned_from_frd", "is_on_ground"):
+        row[name] = truth[name]
+    row["rotor_speed"] = truth["motor_speed"]
+    row["time_s"] = flight.time_us * 1e-6
+    row["height_m"] = truth["height_agl_m"]
+    row["battery"] = state.battery_remaining
+    row["mode"], row["is_armed"] = state.mode, state.is_armed
+    row["goal_ned"] = state.goal_ned
+    row["action"] = nan if action is None else action
+    if flight.owner is not None:
+        row["owner"] = flight.owner.people.numpy()[0]
+    return Moment(row)

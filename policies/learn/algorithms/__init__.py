@@ -1,0 +1,1 @@
+"""PPO, SAC, behavioural cloning and DAgger, with their losses."""

@@ -1,0 +1,70 @@
+"""A learner from its configuration: policy, reward signals, cloning, algorithm.
+
+In: a configuration and the task's environments. Out: a learner whose every random draw comes from the seed.
+"""
+
+import math
+from collections.abc import Iterator
+
+import torch
+
+from policies.learn.algorithms.behavioural_cloning import Cloning
+from policies.learn.algorithms.dagger import Dagger
+from policies.learn.algorithms.learner import Learner
+from policies.learn.algorithms.ppo import Ppo
+from policies.learn.algorithms.sac import Sac
+from policies.learn.algorithms.teacher import load_teacher
+from policies.learn.config.behavior import Behavior, DaggerHyperparameters
+from policies.learn.config.run import RunConfig
+from policies.learn.networks.policy import Policy
+from policies.learn.rollout.demonstrations import load_demonstrations
+from policies.learn.signals.build_signals import build_signals
+from policies.tasks.task import Task
+
+
+def build_learner(config: RunConfig, task: Task, seed: int) -> Learner:
+    """An untrained learner; the task is reset.
+
+    Args:
+        config: of the run.
+        task: its environments all belong to the learner.
+        seed: of every random draw.
+
+    Raises:
+        CheckpointError: a teacher that cannot be read.
+        DemonstrationError: demonstrations that cannot be read.
+        LayoutError: demonstrations, or a teacher, of another task.
+        SacError: what soft actor-critic does not do.
+    """
+    behavior = config.behavior
+    is_sac = behavior.trainer_type == "sac"
+    generator = torch.Generator().manual_seed(seed)
+    policy = Policy(task.layout, behavior.network_settings, generator, is_squashed=is_sac).to(task.device)
+    if isinstance(behavior.hyperparameters, DaggerHyperparameters):
+        teacher = load_teacher(behavior.hyperparameters.teacher, task.layout, task.device)
+        return Dagger(task, policy, behavior, teacher, seed=seed)
+    signals = build_signals(behavior.reward_signals, task.layout, seed, task.device)
+    cloning = _cloning(behavior, policy, seed, task.device)
+    algorithm = Sac if is_sac else Ppo
+    return algorithm(task, policy, behavior, signals, seed=seed, cloning=cloning)
+
+
+def remarks(behavior: Behavior, env_count: int) -> Iterator[str]:
+    """What the configuration does not say outright of so many environments, one line for the user each."""
+    memory, numbers = behavior.network_settings.memory, behavior.hyperparameters
+    steps = math.ceil(numbers.buffer_size / env_count)
+    if behavior.trainer_type == "ppo" and memory is not None and steps < memory.sequence_length:
+        yield (
+            f"network_settings.memory.sequence_length {memory.sequence_length}: is {steps} here, as buffer_size "
+            f"{numbers.buffer_size} is {steps} decisions of each of {env_count} environments"
+        )
+
+
+def _cloning(behavior: Behavior, policy: Policy, seed: int, device: str) -> Cloning | None:
+    settings = behavior.behavioral_cloning
+    if settings is None:
+        return None
+    numbers = behavior.hyperparameters
+    epochs = getattr(numbers, "num_epoch", 1)  # SAC has none
+    demonstrations = load_demonstrations(settings.demo_path, policy.layout).to(device)
+    return Cloning(policy, settings, demonstrations, (numbers.learning_rate, numbers.batch_size, epochs), seed)

@@ -1,0 +1,1 @@
+"""The policy and its networks: encoders, memories, action distributions."""

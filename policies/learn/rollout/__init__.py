@@ -1,0 +1,1 @@
+"""What learning reads: rollouts, replay buffers, demonstrations, tensors of a task."""

@@ -1,0 +1,330 @@
+"""FollowMe's kernels, one thread per environment, in the order of a decision.
+
+act       actions to setpoints                           (then the rig advances)
+walk      the owner and their phone, over the same time
+look      where the owner truly is from there            (then ranges and pictures are taken)
+judge     the vector, the reward, the end                (rows that end start anew:)
+prepare   numbers and seeds of the new episode           (then worlds grow and vehicles take their hovers)
+place     wind, sensors and mass, the owner, their phone (then look, ranges and pictures again)
+show      the first vector
+"""
+
+from typing import Any
+
+import warp as wp
+
+from common.kernels import TICK_S, TICK_US
+from common.rng import draw_tick
+from policies.tasks.episode import Border, begin_episode, close_step_in_time, open_frame
+from policies.tasks.flight.episode_draws import (
+    HOVER_STREAM,
+    NOISE_STREAM,
+    PATH_STREAM,
+    WORLD_STREAM,
+    draw_angle,
+    draw_index,
+    draw_seed,
+)
+from policies.tasks.flight.flight_params import FlightNumbers
+from policies.tasks.flight.flown_vehicle import (
+    Makes,
+    own_state,
+    vary_vehicle,
+    vehicle_estimate,
+    velocity_setpoint,
+)
+from policies.tasks.flight.own_state import action_command
+from policies.tasks.follow_me.follow_me_params import FollowNumbers
+from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, document_action, write_vector
+from policies.tasks.follow_me.owner_visibility import Sight, lens_of, reach_from, see
+from policies.tasks.follow_me.privileged import write_privileged
+from policies.tasks.follow_me.reward import document_reward, follow_outcome, follow_reward, is_in_band
+from sim.advance import RigArrays
+from sim.sensors.camera import Lens
+from sim.sensors.phone import PhoneModel, PhoneState, phone_start, phone_step
+from sim.truth import has_touched
+from sim.world.growing import WorldNumbers
+from sim.world.people import PERSON_DT_S, PERSON_TICKS, Person, PersonModel, person_start, person_step
+
+wp.set_module_options({"enable_backward": False})
+
+_STEP_S = wp.constant(PERSON_DT_S)
+_STEP_TICKS = wp.constant(PERSON_TICKS)
+_TICKS_PER_S = wp.constant(1.0 / TICK_S)
+_PRIVILEGED = wp.constant(-1)
+_DISTANCE_STREAM = wp.constant(6)
+_BEARING_STREAM = wp.constant(7)
+_HEADING_STREAM = wp.constant(8)
+_LAG_MAX_PERIODS = wp.constant(3)  # fewer than a phone has room for
+
+MEASURES = (
+    "distance_m", "bearing_rad", "is_in_view", "is_collided", "is_in_band", "room_m", "owner_speed_m_s", "speed_m_s",
+)  # fmt: skip
+"""Of each decision, the simulator's truth: distance to the owner's chest, its bearing from the true heading, whether
+the picture shows some of the owner, whether anything was touched or the owner came too near, whether the distance is in
+the band, room to obstacles (at most 2 m), and both speeds."""
+
+
+@wp.struct
+class Rules:
+    """What the settings choose; the same for all rows."""
+
+    vector: int  # EGO, EGO_BLIND or DOCUMENT; -1: the truth
+    is_documented: int
+    has_estimator: int
+    has_privileged: int
+    is_test: int
+    is_kept: int  # terrain
+    decision_ticks: int
+
+
+@wp.struct
+class FollowState:
+    """All that an episode has beside the rig and its world."""
+
+    flight: wp.array(dtype=FlightNumbers)
+    numbers: wp.array(dtype=FollowNumbers)
+    actions: wp.array(dtype=wp.vec4)  # the last
+    people: wp.array(dtype=Person)
+    person_models: wp.array(dtype=PersonModel)
+    phones: wp.array(dtype=PhoneState)
+    phone_models: wp.array(dtype=PhoneModel)
+    path_seeds: wp.array(dtype=int)
+    sights: wp.array(dtype=Sight)
+    reaches_m: wp.array(dtype=float)  # least distance to the owner's body during the decision
+    unseen_s: wp.array(dtype=float)
+    nearness: wp.array2d(dtype=float)  # (envs, RANGES)
+    lenses: wp.array(dtype=Lens)
+    measures: wp.array2d(dtype=float)  # (envs, MEASURES)
+    is_all: wp.array(dtype=wp.bool)  # every row
+
+
+@wp.struct
+class Start:
+    """What an episode starts with; one row per environment."""
+
+    is_starting: wp.array(dtype=wp.bool)
+    is_growing: wp.array(dtype=wp.bool)
+    world_seeds: wp.array(dtype=int)
+    noise_seeds: wp.array(dtype=int)
+    hovers: wp.array(dtype=int)
+    hover_count: int
+    world_numbers: wp.array(dtype=WorldNumbers)
+    makes: Makes
+    person: wp.array(dtype=PersonModel)  # (1,)
+    phone: wp.array(dtype=PhoneModel)  # (1,)
+
+
+@wp.func
+def chosen_action(border: Border, rules: Rules, i: int) -> wp.vec4:
+    """The action that lies in the border, in [-1, 1]."""
+    if rules.is_documented == 1:
+        return document_action(border.branches[i, 0], border.branches[i, 1], border.branches[i, 2])
+    action = wp.vec4()
+    for k in range(4):
+        action[k] = wp.clamp(border.continuous[i, k], -1.0, 1.0)
+    return action
+
+
+@wp.kernel(enable_backward=False)
+def act(border: Border, rules: Rules, rig: RigArrays) -> None:
+    i = wp.tid()
+    estimate = vehicle_estimate(rig, i, rules.has_estimator)
+    command = action_command(chosen_action(border, rules, i), estimate.q_ned_from_frd)
+    rig.autopilot.setpoint[i] = velocity_setpoint(command)
+
+
+@wp.kernel(enable_backward=False)
+def walk(rules: Rules, rig: RigArrays, state: FollowState) -> None:
+    i = wp.tid()
+    world = rig.worlds[rig.i_world[i]]
+    model = state.person_models[i]
+    phone_model = state.phone_models[i]
+    person = state.people[i]
+    phone = state.phones[i]
+    seed = state.path_seeds[i]
+    truth = rig.truth[i]
+    reach_m = float(wp.inf)
+    end = draw_tick(rig.tick[i])
+    for tick in range(end - rules.decision_ticks, end, _STEP_TICKS):
+        person = person_step(world, model, person, seed, i, tick, _STEP_S)
+        phone = phone_step(phone_model, phone, person, seed, i, tick + _STEP_TICKS)
+        since_s = float(end - tick - _STEP_TICKS) / _TICKS_PER_S
+        reach_m = wp.min(reach_m, reach_from(truth.pos_ned - since_s * truth.vel_ned, person))
+    state.reaches_m[i] = reach_m
+    state.people[i] = person
+    state.phones[i] = phone
+
+
+@wp.kernel(enable_backward=False)
+def look(rig: RigArrays, state: FollowState, rows: wp.array(dtype=wp.bool)) -> None:
+    i = wp.tid()
+    if rows[i]:
+        truth = rig.truth[i]
+        state.sights[i] = see(rig.worlds[rig.i_world[i]], truth, state.people[i])
+        state.lenses[i] = lens_of(truth, state.numbers[i].exposure)
+
+
+@wp.func
+def owner_report(phone: PhoneState, tick: int) -> OwnerReport:
+    """What the phone's newest report tells at a tick."""
+    report = OwnerReport()
+    age_s = float(wp.int64(tick) * wp.int64(TICK_US) - phone.fix.time_us) * 1.0e-6
+    if phone.fix.is_known == 1 and age_s < REPORT_OLD_S:
+        report.pos_ned = phone.fix.pos_ned
+        report.vel_ned = phone.fix.vel_ned
+        report.age_s = age_s
+        report.is_known = 1
+    return report
+
+
+@wp.func
+def write_frame(border: Border, rules: Rules, rig: RigArrays, state: FollowState, i: int) -> None:
+    """The newest frame of the observation, and what the critic sees."""
+    at = open_frame(border, i)
+    truth = rig.truth[i]
+    action = state.actions[i]
+    if rules.vector == _PRIVILEGED:
+        write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, border.observations, i, at)
+    else:
+        own = own_state(rig, i, rules.has_estimator)
+        report = owner_report(state.phones[i], draw_tick(rig.tick[i]))
+        write_vector(rules.vector, own, report, action, border.observations, i, at)
+    if rules.has_privileged == 1:
+        write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, border.privileged, i, 0)
+
+
+@wp.func
+def write_measures(state: FollowState, rig: RigArrays, i: int, is_collided: bool) -> None:
+    """The row of `MEASURES`."""
+    sight = state.sights[i]
+    state.measures[i, 0] = sight.distance_m
+    state.measures[i, 1] = sight.bearing_rad
+    state.measures[i, 2] = float(sight.is_in_view)
+    state.measures[i, 3] = float(is_collided)
+    state.measures[i, 4] = float(is_in_band(state.numbers[i], sight))
+    state.measures[i, 5] = sight.room_m
+    state.measures[i, 6] = wp.length(sight.vel_hfrd)
+    state.measures[i, 7] = wp.length(rig.truth[i].vel_ned)
+
+
+@wp.kernel(enable_backward=False)
+def judge(border: Border, rules: Rules, rig: RigArrays, state: FollowState, start: Start) -> None:
+    i = wp.tid()
+    numbers = state.numbers[i]
+    sight = state.sights[i]
+    last_action = state.actions[i]
+    action = chosen_action(border, rules, i)
+    state.actions[i] = action
+    state.unseen_s[i] = wp.where(
+        sight.is_in_view == 1, 0.0, state.unseen_s[i] + float(rules.decision_ticks) / _TICKS_PER_S
+    )
+    touched = has_touched(rig.truth[i])
+    sight.reach_m = state.reaches_m[i]
+    outcome = follow_outcome(numbers, sight, touched, state.unseen_s[i], border.steps[i] + 1)
+    reward = float(0.0)
+    if rules.is_documented == 1:
+        reward = document_reward(numbers, sight, outcome)
+    else:
+        reward = follow_reward(numbers, sight, outcome, action, last_action)
+    write_measures(state, rig, i, touched or sight.reach_m < numbers.touch_m)
+    write_frame(border, rules, rig, state, i)
+    start.is_starting[i] = close_step_in_time(border, i, reward, outcome)
+
+
+@wp.kernel(enable_backward=False)
+def prepare(border: Border, rules: Rules, state: FollowState, start: Start) -> None:
+    i = wp.tid()
+    start.is_growing[i] = False
+    if not start.is_starting[i]:
+        return
+    seed = border.seed[0]
+    episode = begin_episode(border, i)
+    numbers = state.numbers[i]
+    state.actions[i] = wp.vec4()
+    state.unseen_s[i] = 0.0
+    start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, rules.is_test)
+    start.hovers[i] = draw_index(seed, i, episode, HOVER_STREAM, start.hover_count)
+    state.path_seeds[i] = draw_seed(seed, i, episode, PATH_STREAM, rules.is_test)
+    if rules.is_kept == 0 or episode == 0:
+        start.is_growing[i] = True
+        start.world_seeds[i] = draw_seed(seed, i, episode, WORLD_STREAM, rules.is_test)
+        world = start.world_numbers[i]
+        world.hill_height_m = numbers.hill_height_m
+        world.trees_per_ha = numbers.trees_per_ha
+        start.world_numbers[i] = world
+
+
+@wp.func
+def person_of(model: PersonModel, n: FollowNumbers) -> PersonModel:
+    """The owner of an episode."""
+    model.speed_max = n.owner_speed_max
+    model.speed_min = wp.min(model.speed_min, n.owner_speed_max)
+    model.stop_share = n.owner_stop_share
+    model.graze_share = n.owner_graze_share
+    return model
+
+
+@wp.func
+def phone_of(model: PhoneModel, n: FollowNumbers) -> PhoneModel:
+    """Their phone."""
+    model.period_ticks = wp.max(int(wp.round(n.phone_period_s * _TICKS_PER_S)), 1)
+    lag_ticks = int(wp.round(n.phone_lag_s * _TICKS_PER_S))
+    model.lag_ticks = wp.min(lag_ticks, _LAG_MAX_PERIODS * model.period_ticks)
+    model.pos_std_ned = n.phone_error * model.pos_std_ned
+    model.correlated_std_ned = n.phone_error * model.correlated_std_ned
+    model.vel_std = n.phone_error * model.vel_std
+    model.dropouts_per_tick = n.phone_dropouts_per_min / (60.0 * _TICKS_PER_S)
+    return model
+
+
+@wp.func
+def phone_that_has_reported(model: PhoneModel, person: Person, seed: int, i: int, tick: int) -> PhoneState:
+    """The phone of an owner who has been standing there for some time."""
+    since = tick - 2 * model.period_ticks - model.lag_ticks
+    phone = phone_start(model, seed, i, since)
+    for then in range(since, tick, _STEP_TICKS):
+        phone = phone_step(model, phone, person, seed, i, then)
+    return phone_step(model, phone, person, seed, i, tick)
+
+
+@wp.kernel(enable_backward=False)
+def place(border: Border, rig: RigArrays, state: FollowState, start: Start) -> None:
+    i = wp.tid()
+    if not start.is_starting[i]:
+        return
+    seed = border.seed[0]
+    episode = border.episodes[i] - 1
+    numbers = state.numbers[i]
+    vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
+    state.person_models[i] = person_of(start.person[0], numbers)
+    state.phone_models[i] = phone_of(start.phone[0], numbers)
+    # ahead, some way to one side, looking anywhere
+    truth = rig.truth[i]
+    nose = wp.quat_rotate(truth.q_ned_from_frd, wp.vec3(1.0, 0.0, 0.0))
+    aside = draw_angle(seed, i, episode, _BEARING_STREAM) * numbers.start_bearing_deg / 180.0
+    bearing = wp.atan2(nose[1], nose[0]) + aside
+    share = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
+    distance = numbers.start_distance_min_m + share * (numbers.start_distance_max_m - numbers.start_distance_min_m)
+    north = truth.pos_ned[0] + distance * wp.cos(bearing)
+    east = truth.pos_ned[1] + distance * wp.sin(bearing)
+    heading = draw_angle(seed, i, episode, _HEADING_STREAM)
+    path_seed = state.path_seeds[i]
+    tick = draw_tick(rig.tick[i])
+    world = rig.worlds[rig.i_world[i]]
+    person = person_start(world, state.person_models[i], north, east, heading, path_seed, i, tick)
+    phone_model = state.phone_models[i]
+    state.people[i] = person
+    state.phones[i] = phone_that_has_reported(phone_model, person, path_seed, i, tick)
+
+
+@wp.kernel(enable_backward=False)
+def show(border: Border, rules: Rules, rig: RigArrays, state: FollowState, start: Start) -> None:
+    i = wp.tid()
+    if start.is_starting[i]:
+        write_frame(border, rules, rig, state, i)
+
+
+def recorded(kernel: Any, count: int, inputs: list[Any], device: str) -> Any:
+    """A launch of one thread per environment, recorded."""
+    return wp.launch(kernel, count, inputs, device=device, record_cmd=True)

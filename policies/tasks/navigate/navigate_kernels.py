@@ -1,0 +1,201 @@
+"""Navigate's kernels, one thread per environment, in the order of a decision.
+
+act       actions to setpoints                           (then the rig advances, ranges or depths are taken)
+judge     the vector, the reward, the end                (rows that end start anew:)
+prepare   numbers and seeds of the new episode           (then worlds grow and vehicles take their hovers)
+place     wind, sensors and mass, the goal               (then ranges or depths again)
+show      the first vector
+"""
+
+import warp as wp
+
+from policies.tasks.episode import Border, begin_episode, close_step, open_frame
+from policies.tasks.flight.episode_draws import (
+    HOVER_STREAM,
+    NOISE_STREAM,
+    WORLD_STREAM,
+    draw_angle,
+    draw_index,
+    draw_seed,
+)
+from policies.tasks.flight.flight_params import FlightNumbers
+from policies.tasks.flight.flown_vehicle import (
+    Makes,
+    own_state,
+    vary_vehicle,
+    vehicle_estimate,
+    velocity_setpoint,
+)
+from policies.tasks.flight.own_state import OWN_SIZE, action_command, write_own
+from policies.tasks.navigate.navigate_params import NavigateNumbers
+from policies.tasks.navigate.observe import GOAL_SIZE, write_goal
+from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
+from policies.tasks.navigate.scan import write_ranges
+from sim.advance import RigArrays
+from sim.truth import Truth, has_touched
+from sim.world.growing import WorldNumbers
+from sim.world.world import World, ground_height, obstacle_contact
+
+wp.set_module_options({"enable_backward": False})
+
+_ROOM_MAX_M = wp.constant(2.0)  # the largest radius that contact is asked with
+_BEARING_STREAM = wp.constant(6)
+_DISTANCE_STREAM = wp.constant(7)
+
+MEASURES = ("distance_m", "speed_m_s", "room_m", "path_m", "time_s", "start_distance_m")
+"""After each decision, the simulator's truth: distance to the goal, speed, room to trunks and crowns (at most 2 m), the
+way flown since the start of the episode, how long it took, and how far the goal was then."""
+
+
+@wp.struct
+class Rules:
+    """What the settings choose; the same for all rows."""
+
+    has_rays: int
+    has_estimator: int
+    is_test: int
+    decision_s: float
+
+
+@wp.struct
+class NavigateState:
+    """All that an episode has beside the rig and its world."""
+
+    flight: wp.array(dtype=FlightNumbers)
+    numbers: wp.array(dtype=NavigateNumbers)
+    actions: wp.array(dtype=wp.vec4)  # the last
+    goals_ned: wp.array(dtype=wp.vec3)
+    pos_ned: wp.array(dtype=wp.vec3)  # where the vehicle was at the last decision
+    path_m: wp.array(dtype=float)
+    start_distance_m: wp.array(dtype=float)
+    ranges_m: wp.array2d(dtype=float)  # (envs, RANGES)
+    measures: wp.array2d(dtype=float)  # (envs, MEASURES)
+    is_all: wp.array(dtype=wp.bool)  # every row
+
+
+@wp.struct
+class Start:
+    """What an episode starts with; one row per environment."""
+
+    is_starting: wp.array(dtype=wp.bool)
+    is_growing: wp.array(dtype=wp.bool)
+    world_seeds: wp.array(dtype=int)
+    noise_seeds: wp.array(dtype=int)
+    hovers: wp.array(dtype=int)
+    hover_count: int
+    world_numbers: wp.array(dtype=WorldNumbers)
+    makes: Makes
+
+
+@wp.func
+def chosen_action(border: Border, i: int) -> wp.vec4:
+    """The action that lies in the border, in [-1, 1]."""
+    action = wp.vec4()
+    for k in range(4):
+        action[k] = wp.clamp(border.continuous[i, k], -1.0, 1.0)
+    return action
+
+
+@wp.kernel(enable_backward=False)
+def act(border: Border, rules: Rules, rig: RigArrays) -> None:
+    i = wp.tid()
+    estimate = vehicle_estimate(rig, i, rules.has_estimator)
+    rig.autopilot.setpoint[i] = velocity_setpoint(action_command(chosen_action(border, i), estimate.q_ned_from_frd))
+
+
+@wp.func
+def room_beside(world: World, truth: Truth) -> float:
+    """Distance from the vehicle's middle to the nearest trunk or crown [m], at most 2 m."""
+    return _ROOM_MAX_M - obstacle_contact(world, truth.pos_ned, _ROOM_MAX_M)[3]
+
+
+@wp.func
+def write_frame(border: Border, rules: Rules, rig: RigArrays, state: NavigateState, i: int) -> None:
+    """The newest frame of the observation."""
+    at = open_frame(border, i)
+    own = own_state(rig, i, rules.has_estimator)
+    write_own(own, state.actions[i], border.observations, i, at)
+    write_goal(own, state.goals_ned[i], border.observations, i, at + OWN_SIZE)
+    if rules.has_rays == 1:
+        write_ranges(state.ranges_m, border.observations, i, at + OWN_SIZE + GOAL_SIZE)
+
+
+@wp.kernel(enable_backward=False)
+def judge(border: Border, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
+    i = wp.tid()
+    numbers = state.numbers[i]
+    truth = rig.truth[i]
+    last_pos_ned = state.pos_ned[i]
+    last_action = state.actions[i]
+    action = chosen_action(border, i)
+    state.actions[i] = action
+    state.pos_ned[i] = truth.pos_ned
+    state.path_m[i] += wp.length(truth.pos_ned - last_pos_ned)
+    goal_ned = state.goals_ned[i]
+    distance_m = wp.length(goal_ned - truth.pos_ned)
+    progress_m = wp.length(goal_ned - last_pos_ned) - distance_m
+    time_s = float(border.steps[i] + 1) * rules.decision_s
+    room_m = room_beside(rig.worlds[rig.i_world[i]], truth)
+    outcome = navigate_outcome(
+        numbers, distance_m, has_touched(truth), truth.height_agl_m, time_s, state.start_distance_m[i]
+    )
+    reward = navigate_reward(numbers, truth, progress_m, rules.decision_s, room_m, outcome, action, last_action)
+    state.measures[i, 0] = distance_m
+    state.measures[i, 1] = wp.length(truth.vel_ned)
+    state.measures[i, 2] = room_m
+    state.measures[i, 3] = state.path_m[i]
+    state.measures[i, 4] = time_s
+    state.measures[i, 5] = state.start_distance_m[i]
+    write_frame(border, rules, rig, state, i)
+    start.is_starting[i] = close_step(border, i, reward, outcome)
+
+
+@wp.kernel(enable_backward=False)
+def prepare(border: Border, rules: Rules, state: NavigateState, start: Start) -> None:
+    i = wp.tid()
+    start.is_growing[i] = False
+    if not start.is_starting[i]:
+        return
+    seed = border.seed[0]
+    episode = begin_episode(border, i)
+    numbers = state.numbers[i]
+    state.actions[i] = wp.vec4()
+    start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, rules.is_test)
+    start.hovers[i] = draw_index(seed, i, episode, HOVER_STREAM, start.hover_count)
+    if episode % wp.max(int(numbers.episodes_per_world), 1) == 0:
+        start.is_growing[i] = True
+        start.world_seeds[i] = draw_seed(seed, i, episode, WORLD_STREAM, rules.is_test)
+        world = start.world_numbers[i]
+        world.hill_height_m = numbers.hill_height_m
+        world.trees_per_ha = numbers.trees_per_ha
+        start.world_numbers[i] = world
+
+
+@wp.kernel(enable_backward=False)
+def place(border: Border, rig: RigArrays, state: NavigateState, start: Start) -> None:
+    i = wp.tid()
+    if not start.is_starting[i]:
+        return
+    seed = border.seed[0]
+    episode = border.episodes[i] - 1
+    numbers = state.numbers[i]
+    vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
+    pos_ned = rig.truth[i].pos_ned
+    bearing = draw_angle(seed, i, episode, _BEARING_STREAM)
+    share = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
+    away_m = numbers.goal_min_m + share * wp.max(numbers.goal_max_m - numbers.goal_min_m, 0.0)
+    north = away_m * wp.cos(bearing)
+    east = away_m * wp.sin(bearing)
+    up = ground_height(rig.worlds[rig.i_world[i]], north, east) + numbers.goal_height_m
+    goal_ned = wp.vec3(north, east, -up)
+    state.goals_ned[i] = goal_ned
+    state.pos_ned[i] = pos_ned
+    state.path_m[i] = 0.0
+    state.start_distance_m[i] = wp.length(goal_ned - pos_ned)
+
+
+@wp.kernel(enable_backward=False)
+def show(border: Border, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
+    i = wp.tid()
+    if start.is_starting[i]:
+        write_frame(border, rules, rig, state, i)

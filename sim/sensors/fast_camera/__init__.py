@@ -1,0 +1,1 @@
+"""Parts of the fast camera, `sim.sensors.fast_camera.fast_camera`."""

@@ -1,0 +1,153 @@
+"""What a camera adds to a perfect picture: noise of its sensor and its depth, and the smear of what moves meanwhile.
+
+In: perfect pictures, and per camera an `Optics` that kernels write before each. Out: the pictures as they are handed
+on. Exposure and white balance belong to the `Lens`. Draws are named by a camera's seed and tick and the pixel.
+"""
+
+import warp as wp
+
+from common.rng import draw_key
+from sim.rng_streams import CAMERA
+from sim.sensors.camera import Lens
+from sim.sensors.fast_camera.flags import FAST
+from sim.sensors.ray import RAY_MAX_M
+
+wp.set_module_options(FAST)
+
+_READ_STD = wp.constant(2.5)  # [levels] guess, a small sensor by day
+_SHOT_STD = wp.constant(4.5)  # [levels] of a white pixel; guess
+_DEPTH_STD_SHARE = wp.constant(0.02)  # Intel D435: below 2 % up to 2 m
+_UNIFORM_WIDTH = wp.constant(3.4641016)  # of a uniform draw of unit variance
+_TAPS_MAX = wp.constant(6)  # places that a smeared pixel is the mean of
+_SMEAR_MAX = wp.constant(16.0)  # [pixels]
+_STILL_SQUARED = wp.constant(0.01)  # [pixels²] a smear that nobody sees
+
+
+@wp.struct
+class Optics:
+    """One camera's imperfections; all 0: none."""
+
+    read_std: float  # [levels] noise of a black pixel
+    shot_std: float  # [levels] more noise of a white one, growing with the root of the level
+    depth_std_share: float  # error of a pixel's depth as a share of it
+    shutter_s: float  # time in which what moves is smeared; 0 smears nothing
+    vel_rdf: wp.vec3  # [m/s] of the camera, while the shutter is open
+    rate_rdf: wp.vec3  # [rad/s]
+    seed: int
+    tick: int
+
+
+@wp.func
+def sensor_noise(optics: Optics, scale: float, seed: int, tick: int) -> Optics:
+    """The camera with the noise of a small sensor by day, times a factor, as drawn for one tick."""
+    optics.read_std = scale * _READ_STD
+    optics.shot_std = scale * _SHOT_STD
+    optics.depth_std_share = scale * _DEPTH_STD_SHARE
+    optics.seed = seed
+    optics.tick = tick
+    return optics
+
+
+@wp.func
+def is_perfect(optics: Optics) -> bool:
+    """Whether the camera neither errs nor smears."""
+    return optics.read_std + optics.shot_std + optics.depth_std_share + optics.shutter_s == 0.0
+
+
+@wp.func
+def even(bits: wp.uint32, byte: int) -> float:
+    """A draw of unit variance from one byte: uniform, which a network cannot tell from normal."""
+    level = float(int(bits >> wp.uint32(8 * byte)) & 255)
+    return _UNIFORM_WIDTH * ((level + 0.5) * (1.0 / 256.0) - 0.5)
+
+
+@wp.func
+def smear(optics: Optics, x: float, y: float, depth_m: float, per_pixel: float) -> wp.vec2:
+    """Columns and rows that a point which stands still moves by while the shutter is open."""
+    place = wp.vec3(x, y, 1.0)
+    flow = -optics.vel_rdf / wp.max(depth_m, 0.05) - wp.cross(optics.rate_rdf, place)
+    way = wp.vec2(flow[0] - x * flow[2], flow[1] - y * flow[2]) * (optics.shutter_s / per_pixel)
+    length = wp.length(way)
+    if length > _SMEAR_MAX:
+        way = way * (_SMEAR_MAX / length)
+    return way
+
+
+@wp.func
+def between(rgb: wp.array[wp.uint8], first: int, size: wp.vec2i, row: float, column: float) -> wp.vec3:
+    """Levels between four pixels of the picture that begins at an index; those of its edge beyond it."""
+    v = wp.clamp(row, 0.0, float(size[1]) - 1.001)
+    u = wp.clamp(column, 0.0, float(size[0]) - 1.001)
+    i = int(v)
+    j = int(u)
+    v = v - float(i)
+    u = u - float(j)
+    upper = 3 * (first + i * size[0] + j)
+    lower = upper + 3 * size[0]
+    above = (1.0 - u) * levels_of(rgb, upper) + u * levels_of(rgb, upper + 3)
+    below = (1.0 - u) * levels_of(rgb, lower) + u * levels_of(rgb, lower + 3)
+    return (1.0 - v) * above + v * below
+
+
+@wp.func
+def levels_of(rgb: wp.array[wp.uint8], k: int) -> wp.vec3:
+    """Red, green and blue from an index on."""
+    return wp.vec3(float(rgb[k]), float(rgb[k + 1]), float(rgb[k + 2]))
+
+
+@wp.func
+def smeared(rgb: wp.array[wp.uint8], first: int, size: wp.vec2i, row: int, column: int, way: wp.vec2) -> wp.vec3:
+    """Mean level along the way of a pixel."""
+    levels = wp.vec3()
+    taps = wp.min(int(wp.length(way)) + 2, _TAPS_MAX)
+    for tap in range(taps):
+        share = (float(tap) + 0.5) / float(taps) - 0.5
+        levels = levels + between(rgb, first, size, float(row) + share * way[1], float(column) + share * way[0])
+    return levels / float(taps)
+
+
+@wp.kernel
+def expose(
+    first_camera: int,
+    lenses: wp.array[Lens],
+    is_chosen: wp.array[wp.bool],
+    all_optics: wp.array[Optics],
+    size: wp.vec2i,
+    perfect_rgb: wp.array[wp.uint8],
+    perfect_depth_m: wp.array[float],
+    rgb: wp.array[wp.uint8],
+    depth_m: wp.array[float],
+) -> None:
+    i_row, row = wp.tid()
+    i_camera = first_camera + i_row
+    if not is_chosen[i_camera]:
+        return
+    optics = all_optics[i_camera]
+    state = draw_key(optics.seed, row, optics.tick, CAMERA)
+    per_pixel = 2.0 * lenses[i_camera].half_width / float(size[0])
+    y = (float(row) + 0.5 - 0.5 * float(size[1])) * per_pixel
+    first_pixel = i_camera * size[0] * size[1]
+    if is_perfect(optics):
+        for k in range(first_pixel + row * size[0], first_pixel + (row + 1) * size[0]):
+            for c in range(3):
+                rgb[3 * k + c] = perfect_rgb[3 * k + c]
+            depth_m[k] = perfect_depth_m[k]
+        return
+    for column in range(size[0]):
+        k = first_pixel + row * size[0] + column
+        depth = perfect_depth_m[k]
+        levels = levels_of(perfect_rgb, 3 * k)
+        if optics.shutter_s > 0.0:
+            x = (float(column) + 0.5 - 0.5 * float(size[0])) * per_pixel
+            way = smear(optics, x, y, depth, per_pixel)
+            if wp.dot(way, way) > _STILL_SQUARED:
+                levels = smeared(perfect_rgb, first_pixel, size, row, column, way)
+        bits = wp.randu(state)
+        read = optics.read_std * optics.read_std
+        shot = optics.shot_std * optics.shot_std * (1.0 / 255.0)
+        for c in range(3):
+            level = levels[c] + wp.sqrt(read + shot * levels[c]) * even(bits, c)
+            rgb[3 * k + c] = wp.uint8(wp.clamp(level + 0.5, 0.0, 255.0))
+        if depth < RAY_MAX_M:
+            depth = depth * (1.0 + optics.depth_std_share * even(bits, 3))
+        depth_m[k] = depth

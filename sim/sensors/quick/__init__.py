@@ -1,1 +1,0 @@
-"""Parts of the fast camera, `sim.sensors.quick_camera`."""

@@ -1,0 +1,111 @@
+"""The MAVLink rig with a vehicle that carries a camera on a gimbal, and a light that is easy to predict."""
+
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from autopilot.interface.platform import Host
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.payload.camera.camera import Camera
+from autopilot.payload.camera.ports import RawFrame, View
+from autopilot.payload.camera.storage import MediaFolder
+from autopilot.payload.gimbal.gimbal import Gimbal
+from autopilot.payload.gimbal.gimbal_control import GimbalControl
+from tests.unit.autopilot.mavlink.rig import FRAME_US, RecordingVehicle, Rig, flying_state
+
+CAMERA, GIMBAL = 100, 154
+
+
+@dataclass
+class Light:
+    """A frame source: grey, half of it near, and delivered at once unless it is told to wait."""
+
+    views: list[View] = field(default_factory=list)
+    waiting: list[Future] = field(default_factory=list)
+    is_slow: bool = False
+    has_noise: bool = False
+
+    def capture(self, view: View):
+        self.views.append(view)
+        rgb = np.full((view.height, view.width, 3), 128, np.uint8)
+        rgb[:, ::8] = 0
+        if self.has_noise:
+            rgb = np.random.default_rng(len(self.views)).integers(0, 256, rgb.shape, np.uint8)
+        depth = np.full((view.height, view.width), 100.0, np.float32)
+        frame: Future[RawFrame] = Future()
+        if self.is_slow:
+            self.waiting.append(frame)
+        else:
+            frame.set_result(RawFrame(rgb, depth))
+        return frame
+
+    def deliver(self):
+        view = self.views[-1]
+        rgb = np.zeros((view.height, view.width, 3), np.uint8)
+        for frame in self.waiting:
+            frame.set_result(RawFrame(rgb, np.ones((view.height, view.width), np.float32)))
+        self.waiting.clear()
+
+
+@dataclass
+class Stream:
+    """A live picture that nobody serves."""
+
+    uri: str = "http://127.0.0.1:8554/stream.mjpg"
+    definition_uri: str = "http://127.0.0.1:8554/camera.xml"
+    width: int = 320
+    height: int = 180
+    rate_hz: float = 10.0
+    bitrate: int = 0
+    is_rtp: bool = False
+    is_running: bool = True
+
+    def media_uri(self, name):
+        return f"http://127.0.0.1:8554/media/{name}"
+
+
+class PayloadVehicle(RecordingVehicle):
+    """With camera and gimbal."""
+
+    def __init__(self, folder, stream, video=None):
+        super().__init__()
+        self.state = flying_state()
+        self.light = Light()
+        media = None if folder is None else MediaFolder(folder)
+        gimbal = Gimbal(self.state)
+        self.state.gimbal = GimbalControl(gimbal, self.state)
+        self.camera = Camera(self.state, gimbal, self.light, media)
+        self.host = Host(frames=self.light, media=media, stream=stream, video=video)
+
+
+class PayloadRig(Rig):
+    """Server and client; the camera's frame runs before the server's, as in the controller."""
+
+    def __init__(self, folder=None, stream=None, dialect=PX4, video=None, **options):
+        super().__init__(dialect=dialect, vehicle=PayloadVehicle(folder, stream, video), **options)
+        self.vehicle.camera.settings.set("CAM_SMOOTH", 0)
+
+    def frame(self, count=1):
+        messages = []
+        for _ in range(count):
+            self.vehicle.state.time_us = self.time_us + FRAME_US
+            if self.vehicle.camera.due_us <= self.vehicle.state.time_us:
+                self.vehicle.camera.frame()
+            messages += super().frame(1)
+        return messages
+
+    def to(self, component, command, *params):
+        """A COMMAND_LONG to a component; parameters left out are 0."""
+        values = (*params, *(0.0,) * (7 - len(params)))
+        fields = {f"param{i + 1}": value for i, value in enumerate(values)}
+        self.client.send("COMMAND_LONG", target_component=component, command=command, **fields)
+
+    def acks(self, component, command, *params):
+        """(component, result) of each acknowledgement of a command, in the next frame."""
+        self.to(component, command, *params)
+        return [
+            (message.compid, message.fields.result)
+            for message in self.frame(1)
+            if message.name == "COMMAND_ACK" and message.fields.command == command
+        ]

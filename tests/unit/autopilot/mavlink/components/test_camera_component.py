@@ -1,0 +1,531 @@
+"""The camera component over MAVLink: information, photos, series, video, settings, and who answers what."""
+
+import shutil
+import struct
+from itertools import pairwise
+from math import degrees
+from xml.etree import ElementTree as ET
+
+import cv2
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot.interface.vehicle_state import Verdict
+from autopilot.mavlink.components.camera.camera_definition import definition_xml
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.server import MavlinkServer
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from autopilot.payload.camera.camera_settings import SETTINGS
+from tests.unit.autopilot.mavlink.components.payload_rig import CAMERA, GIMBAL, PayloadRig, PayloadVehicle, Stream
+from tests.unit.autopilot.mavlink.rig import Client, texts
+
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = (
+    Verdict.ACCEPTED,
+    Verdict.TEMPORARILY_REJECTED,
+    Verdict.DENIED,
+    Verdict.UNSUPPORTED,
+    Verdict.FAILED,
+)
+REQUEST, START, STOP = 512, mavlink.MAV_CMD_IMAGE_START_CAPTURE, mavlink.MAV_CMD_IMAGE_STOP_CAPTURE
+INFORMATION, SETTINGS_ID, STORAGE, STATUS, CAPTURED = 259, 260, 261, 262, 263
+
+
+@pytest.fixture
+def rig(tmp_path):
+    return PayloadRig(tmp_path / "media", Stream())
+
+
+def from_camera(messages, name):
+    return [message.fields for message in messages if message.name == name and message.compid == CAMERA]
+
+
+def requested(rig, command, *params):
+    rig.to(CAMERA, command, *params)
+    return rig.frame()
+
+
+def test_each_component_has_a_heartbeat_of_its_own_once_a_second(rig):
+    beats = [(m.compid, m.fields.type, m.fields.autopilot) for m in rig.frame(100) if m.name == "HEARTBEAT"]
+    assert beats.count((CAMERA, mavlink.MAV_TYPE_CAMERA, mavlink.MAV_AUTOPILOT_INVALID)) == 2
+    assert beats.count((GIMBAL, mavlink.MAV_TYPE_GIMBAL, mavlink.MAV_AUTOPILOT_INVALID)) == 2
+    assert len(beats) == 9  # the autopilot's: the first of all, then one before and one behind the components'
+
+
+def test_whoever_begins_to_listen_hears_the_autopilot_first(rig):
+    beats = [m.compid for m in rig.frame(500) if m.name == "HEARTBEAT"]
+    assert beats == [1, *[1, GIMBAL, CAMERA, 1] * 10]
+
+
+def test_whoever_begins_to_listen_between_two_frames_hears_the_autopilot_first(rig):
+    """pymavlink's wait_heartbeat takes the first heartbeat for the vehicle's."""
+    for _ in range(200):
+        beats = [m.compid for m in rig.frame() if m.name == "HEARTBEAT"]
+        assert not beats or beats[0] == 1
+
+
+class Door:
+    """A link source through which clients come, one per frame."""
+
+    def __init__(self):
+        self.links = []
+        self.clients = []
+
+    def poll(self, _):
+        vehicle_end, client_end = memory_pair(LinkRole.GROUND)
+        self.links = [*self.links, vehicle_end]
+        self.clients.append(Client(client_end))
+
+    def close(self):
+        pass
+
+
+@pytest.mark.parametrize("dialect", [PX4, ARDUPILOT])
+def test_on_every_new_link_the_autopilot_speaks_first(dialect):
+    """Whenever in the second of its heartbeats a client comes."""
+    door, vehicle = Door(), PayloadVehicle(None, Stream())
+    server = MavlinkServer(vehicle, [door], dialect, announces_components=True)
+    first = {}
+    for time_us in range(5_000_000, 7_000_000, 20_000):
+        vehicle.state.time_us = time_us
+        server.frame(time_us)
+        for i, client in enumerate(door.clients):
+            for message in client.received():
+                if message.name == "HEARTBEAT":
+                    first.setdefault(i, message.compid)
+    assert first == dict.fromkeys(range(100), 1)
+
+
+@pytest.mark.parametrize(("announces", "compids"), [(False, {1}), (True, {1, CAMERA, GIMBAL})])
+def test_components_have_no_heartbeat_in_ardupilots_dialect_unless_asked_for(tmp_path, announces, compids):
+    rig = PayloadRig(tmp_path / "media", dialect=ARDUPILOT, announces_components=announces)
+    assert {m.compid for m in rig.frame(100) if m.name == "HEARTBEAT"} == compids
+    rig.to(CAMERA, REQUEST, INFORMATION)
+    assert from_camera(rig.frame(), "CAMERA_INFORMATION")
+
+
+def test_the_autopilot_has_the_last_word_in_every_frame_with_heartbeats(rig):
+    """Clients that read the mode from the latest heartbeat, whoever sent it, are right all the time."""
+    for _ in range(200):
+        beats = [m.compid for m in rig.frame() if m.name == "HEARTBEAT"]
+        assert not beats or beats[-1] == 1
+
+
+def test_sequence_numbers_count_per_component(rig):
+    seqs = {}
+    for message in rig.frame(200):
+        seqs.setdefault(message.compid, []).append(message.seq)
+    for numbers in seqs.values():
+        assert all((b - a) % 256 == 1 for a, b in pairwise(numbers))
+
+
+@pytest.mark.parametrize("target", [CAMERA, 0])
+def test_information_is_answered_by_the_camera_alone(rig, target):
+    rig.to(target, REQUEST, INFORMATION)
+    messages = rig.frame()
+    acks = [(m.compid, m.fields.result) for m in messages if m.name == "COMMAND_ACK"]
+    assert acks == [(CAMERA, ACCEPTED)]
+    (information,) = from_camera(messages, "CAMERA_INFORMATION")
+    assert bytes(information.vendor_name).rstrip(b"\0") == b"Honeyguide"
+    assert information.cam_definition_uri == Stream.definition_uri
+    assert information.gimbal_device_id == GIMBAL
+    assert information.flags & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+
+
+def test_a_command_to_all_is_acknowledged_once_and_carried_out_once(rig):
+    assert rig.acks(0, START, 0, 0, 1, 1) == [(CAMERA, ACCEPTED)]
+    assert rig.vehicle.camera.shot_count == 1
+
+
+def test_the_autopilot_passes_camera_commands_on_and_answers_for_them(rig):
+    assert rig.acks(1, START, 0, 0, 1, 1) == [(1, ACCEPTED)]
+    assert rig.vehicle.camera.shot_count == 1
+
+
+def test_what_the_camera_does_not_know_is_refused_by_it_only_if_it_is_addressed(rig):
+    arm = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+    assert rig.acks(CAMERA, arm, 1) == [(CAMERA, UNSUPPORTED)]
+    assert rig.acks(0, arm, 1) == [(1, ACCEPTED)]
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_CAMERA_TRACK_POINT, 0.5, 0.5) == [(CAMERA, UNSUPPORTED)]
+    assert rig.acks(101, REQUEST, INFORMATION) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "name"),
+    [
+        (521, (1,), "CAMERA_INFORMATION"),
+        (522, (1,), "CAMERA_SETTINGS"),
+        (525, (0, 1), "STORAGE_INFORMATION"),
+        (527, (1,), "CAMERA_CAPTURE_STATUS"),
+        (2504, (1,), "VIDEO_STREAM_INFORMATION"),
+        (2505, (1,), "VIDEO_STREAM_STATUS"),
+        (REQUEST, (271,), "CAMERA_FOV_STATUS"),
+        (REQUEST, (269, 1), "VIDEO_STREAM_INFORMATION"),
+        (REQUEST, (270, 1), "VIDEO_STREAM_STATUS"),
+    ],
+)
+def test_every_message_is_sent_on_request_new_form_and_old(rig, command, params, name):
+    assert len(from_camera(requested(rig, command, *params), name)) == 1
+
+
+def test_photo_is_a_jpeg_file_and_is_reported_with_its_place(rig, tmp_path):
+    rig.to(CAMERA, START, 0, 0, 1, 1)
+    messages = rig.frame(2)
+    (shot,) = from_camera(messages, "CAMERA_IMAGE_CAPTURED")
+    state = rig.vehicle.state
+    assert shot.capture_result == 1
+    assert shot.image_index == 0
+    assert shot.lat == round(state.position.lat_deg * 1e7)
+    assert shot.alt == round(state.position.alt_m * 1000)
+    assert shot.relative_alt == pytest.approx(30_000, abs=1)
+    assert shot.file_url.endswith("/media/IMG_00001.jpg")
+    assert cv2.imread(str(tmp_path / "media" / "IMG_00001.jpg")).shape == (360, 640, 3)
+    assert len([m for m in messages if m.name == "CAMERA_TRIGGER"]) == 1
+
+
+def test_repeated_single_photo_command_takes_one_photo(rig):
+    assert rig.acks(CAMERA, START, 0, 0, 1, 7) == [(CAMERA, ACCEPTED)]
+    assert rig.acks(CAMERA, START, 0, 0, 1, 7) == [(CAMERA, ACCEPTED)]
+    rig.frame(20)
+    assert rig.acks(CAMERA, START, 0, 0, 1, 8) == [(CAMERA, ACCEPTED)]
+    assert rig.vehicle.camera.shot_count == 2
+
+
+def test_camera_is_busy_while_it_takes_a_photo(rig):
+    rig.vehicle.light.is_slow = True
+    rig.acks(CAMERA, START, 0, 0, 1, 1)
+    (status,) = from_camera(requested(rig, REQUEST, STATUS), "CAMERA_CAPTURE_STATUS")
+    assert status.image_status == 1
+    rig.frame(20)
+    assert rig.acks(CAMERA, START, 0, 0, 1, 2) == [(CAMERA, REJECTED)]
+    rig.vehicle.light.deliver()
+    assert len(from_camera(rig.frame(2), "CAMERA_IMAGE_CAPTURED")) == 1
+    assert rig.acks(CAMERA, START, 0, 0, 1, 2) == [(CAMERA, ACCEPTED)]
+
+
+def test_series_takes_its_number_of_photos_at_its_interval(rig):
+    rig.to(CAMERA, START, 0, 0.5, 3, 0)
+    shots = from_camera(rig.frame(150), "CAMERA_IMAGE_CAPTURED")
+    assert [shot.image_index for shot in shots] == [0, 1, 2]
+    times_ms = [shot.time_boot_ms for shot in shots]
+    assert times_ms[1] - times_ms[0] == times_ms[2] - times_ms[1] == 500
+
+
+def test_endless_series_ends_when_it_is_stopped_and_refuses_another_photo(rig):
+    rig.to(CAMERA, START, 0, 1.0, 0, 0)
+    rig.frame(60)
+    (status,) = from_camera(requested(rig, REQUEST, STATUS), "CAMERA_CAPTURE_STATUS")
+    assert status.image_status & 2
+    assert status.image_interval == 1.0
+    assert rig.acks(CAMERA, START, 0, 0, 1, 1) == [(CAMERA, REJECTED)]
+    assert rig.acks(CAMERA, STOP) == [(CAMERA, ACCEPTED)]
+    count = rig.vehicle.camera.shot_count
+    rig.frame(100)
+    assert rig.vehicle.camera.shot_count == count == 2
+
+
+@pytest.mark.parametrize("params", [(0, 0.01, 0), (0, 3.4e38, 0), (0, float("nan"), 0), (0, 1.0, -1), (7, 1.0, 0)])
+def test_impossible_series_is_denied(rig, params):
+    assert rig.acks(CAMERA, START, *params) == [(CAMERA, DENIED)]
+
+
+def test_photo_report_is_sent_again_by_its_index(rig):
+    rig.to(CAMERA, START, 0, 0.5, 3, 0)
+    rig.frame(150)
+    (shot,) = from_camera(requested(rig, REQUEST, CAPTURED, 1), "CAMERA_IMAGE_CAPTURED")
+    assert shot.image_index == 1
+    (old,) = from_camera(requested(rig, 2002, 2), "CAMERA_IMAGE_CAPTURED")
+    assert old.image_index == 2
+    assert rig.acks(CAMERA, REQUEST, CAPTURED, 3) == [(CAMERA, DENIED)]
+
+
+def test_distance_trigger_takes_a_photo_each_so_many_metres(rig):
+    state = rig.vehicle.state
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 10, 0, 1) == [(CAMERA, ACCEPTED)]
+    shots = []
+    for metres in range(36):
+        state.estimate = state.estimate._replace(pos_ned=(float(metres), 0.0, -30.0))
+        shots += from_camera(rig.frame(1), "CAMERA_IMAGE_CAPTURED")
+    assert len(shots) == 4  # at 0, 10, 20 and 30 m
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0) == [(CAMERA, ACCEPTED)]
+    state.estimate = state.estimate._replace(pos_ned=(100.0, 0.0, -30.0))
+    assert from_camera(rig.frame(5), "CAMERA_IMAGE_CAPTURED") == []
+
+
+def test_interval_trigger_and_digicam_control(rig):
+    assert rig.acks(1, mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL, 500) == [(1, ACCEPTED)]
+    assert len(from_camera(rig.frame(60), "CAMERA_IMAGE_CAPTURED")) == 3
+    assert rig.acks(1, mavlink.MAV_CMD_DO_TRIGGER_CONTROL, 0) == [(1, ACCEPTED)]
+    assert from_camera(rig.frame(60), "CAMERA_IMAGE_CAPTURED") == []
+    rig.to(1, mavlink.MAV_CMD_DO_DIGICAM_CONTROL, 0, 0, 0, 0, 1)
+    assert len(from_camera(rig.frame(2), "CAMERA_IMAGE_CAPTURED")) == 1
+
+
+def test_video_has_ten_frames_a_second_of_simulated_time(rig, tmp_path):
+    start, stop = mavlink.MAV_CMD_VIDEO_START_CAPTURE, mavlink.MAV_CMD_VIDEO_STOP_CAPTURE
+    assert rig.acks(CAMERA, start, 0, 5) == [(CAMERA, ACCEPTED)]
+    assert rig.acks(CAMERA, start, 0, 0) == [(CAMERA, REJECTED)]
+    statuses = from_camera(rig.frame(100), "CAMERA_CAPTURE_STATUS")
+    assert len(statuses) == pytest.approx(10, abs=1)
+    assert statuses[-1].video_status == 1
+    assert statuses[-1].recording_time_ms > 1500
+    assert rig.acks(CAMERA, stop, 0) == [(CAMERA, ACCEPTED)]
+    assert rig.acks(CAMERA, stop, 0) == [(CAMERA, ACCEPTED)]  # a repeat
+    assert from_camera(rig.frame(50), "CAMERA_CAPTURE_STATUS") == []
+    video = cv2.VideoCapture(str(tmp_path / "media" / "VID_00001.mp4"))
+    frames = []
+    while (frame := video.read())[0]:
+        frames.append(frame[1])
+    video.release()
+    assert len(frames) == pytest.approx(21, abs=1)
+    assert frames[0].shape == (180, 320, 3)
+    assert [path.name for path in (tmp_path / "media").iterdir()] == ["VID_00001.mp4"]
+
+
+def test_without_a_card_pictures_fail_with_a_reason():
+    rig = PayloadRig(None, None)
+    rig.to(CAMERA, START, 0, 0, 1, 1)
+    messages = rig.frame()
+    assert [m.fields.result for m in messages if m.name == "COMMAND_ACK"] == [FAILED]
+    assert "Camera: no storage" in texts(messages)
+    (storage,) = from_camera(requested(rig, REQUEST, STORAGE), "STORAGE_INFORMATION")
+    assert storage.status == mavlink.STORAGE_STATUS_EMPTY
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_STREAMING, 0) == [(CAMERA, UNSUPPORTED)]
+    assert rig.acks(CAMERA, REQUEST, 269) == [(CAMERA, UNSUPPORTED)]
+
+
+def test_full_card_takes_no_more(rig):
+    rig.vehicle.camera.media.used_bytes = rig.vehicle.camera.media.capacity_bytes
+    assert rig.acks(CAMERA, START, 0, 0, 1, 1) == [(CAMERA, FAILED)]
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, FAILED)]
+
+
+def test_a_recording_stops_when_the_card_is_full_and_says_so(rig, tmp_path):
+    media = rig.vehicle.camera.media
+    media.capacity_bytes = 3 << 20
+    rig.vehicle.light.has_noise = True  # nothing that could be compressed
+    rig.vehicle.camera.settings.set("CAM_VIDRES", 1)
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, ACCEPTED)]
+    messages = rig.frame(50)
+    (growing,) = from_camera(requested(rig, REQUEST, STORAGE), "STORAGE_INFORMATION")
+    assert 0.1 < growing.used_capacity < 3.0
+    while rig.vehicle.camera.recording is not None:
+        assert rig.time_us < 60_000_000, "it goes on and on"
+        messages = rig.frame()
+    assert texts(messages) == ["Camera: video stopped: the storage is full"]
+    (status,) = from_camera(messages, "CAMERA_CAPTURE_STATUS")  # to everyone, though nobody asked for it
+    assert status.video_status == 0
+    assert status.available_capacity < 0.5
+    assert any(m.name == "CAMERA_CAPTURE_STATUS" for m in rig.second_client.received())
+    video = tmp_path / "media" / "VID_00001.mp4"
+    assert 2 << 20 < video.stat().st_size <= media.capacity_bytes
+    assert cv2.VideoCapture(str(video)).read()[0]  # it is complete
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, FAILED)]
+
+
+def test_a_recording_stops_before_the_hosts_disk_is_full(rig, monkeypatch):
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, ACCEPTED)]
+    rig.frame(20)
+    usage = shutil.disk_usage("/")
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=100_000))
+    messages = rig.frame(60)
+    assert "Camera: video stopped: the storage is full" in texts(messages)
+    assert rig.vehicle.camera.recording is None
+    assert rig.acks(CAMERA, START, 0, 0, 1, 1) == [(CAMERA, FAILED)]
+
+
+def test_a_video_whose_folder_has_gone_ends_no_flight(rig, tmp_path):
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0) == [(CAMERA, ACCEPTED)]
+    rig.frame(20)
+    shutil.rmtree(tmp_path / "media")
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == [(CAMERA, FAILED)]
+    assert rig.vehicle.camera.recording is None
+
+
+def test_formatting_removes_the_pictures_when_it_is_confirmed(rig, tmp_path):
+    rig.to(CAMERA, START, 0, 0, 1, 1)
+    rig.frame(20)
+    (tmp_path / "media" / "notes.txt").write_text("mine")
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_STORAGE_FORMAT, 1, 0) == [(CAMERA, DENIED)]
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_STORAGE_FORMAT, 1, 1) == [(CAMERA, ACCEPTED)]
+    assert [path.name for path in (tmp_path / "media").iterdir()] == ["notes.txt"]
+    (storage,) = from_camera(requested(rig, REQUEST, STORAGE), "STORAGE_INFORMATION")
+    assert storage.used_capacity == 0.0
+
+
+def test_mode_zoom_and_focus_are_told_to_everyone(rig):
+    rig.to(CAMERA, mavlink.MAV_CMD_SET_CAMERA_MODE, 0, mavlink.CAMERA_MODE_VIDEO)
+    assert from_camera(rig.frame(), "CAMERA_SETTINGS")[0].mode_id == mavlink.CAMERA_MODE_VIDEO
+    rig.to(CAMERA, mavlink.MAV_CMD_SET_CAMERA_ZOOM, mavlink.ZOOM_TYPE_RANGE, 50)
+    assert from_camera(rig.frame(), "CAMERA_SETTINGS")[0].zoomLevel == pytest.approx(50.0)
+    rig.to(CAMERA, mavlink.MAV_CMD_SET_CAMERA_FOCUS, mavlink.FOCUS_TYPE_RANGE, 20)
+    assert from_camera(rig.frame(), "CAMERA_SETTINGS")[0].focusLevel == pytest.approx(20.0)
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_SET_CAMERA_MODE, 0, 9) == [(CAMERA, DENIED)]
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_SET_CAMERA_ZOOM, 9, 1) == [(CAMERA, DENIED)]
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_RESET_CAMERA_SETTINGS, 1) == [(CAMERA, ACCEPTED)]
+    (settings,) = from_camera(requested(rig, REQUEST, SETTINGS_ID), "CAMERA_SETTINGS")
+    assert (settings.mode_id, settings.zoomLevel) == (0, 0.0)
+
+
+def test_zoom_narrows_the_view_of_the_next_photo(rig):
+    rig.acks(CAMERA, START, 0, 0, 1, 1)
+    rig.to(CAMERA, mavlink.MAV_CMD_SET_CAMERA_ZOOM, mavlink.ZOOM_TYPE_HORIZONTAL_FOV, 30)
+    rig.frame(20)
+    rig.acks(CAMERA, START, 0, 0, 1, 2)
+    wide, narrow = rig.vehicle.light.views
+    assert wide.hfov_deg == pytest.approx(80.0)
+    assert narrow.hfov_deg == pytest.approx(30.0)
+
+
+def test_near_focus_blurs_what_is_far(rig, tmp_path):
+    rig.acks(CAMERA, START, 0, 0, 1, 1)
+    rig.frame(20)
+    rig.to(CAMERA, mavlink.MAV_CMD_SET_CAMERA_FOCUS, mavlink.FOCUS_TYPE_METERS, 0.3)
+    rig.acks(CAMERA, START, 0, 0, 1, 2)
+    sharp, blurred = (cv2.imread(str(tmp_path / "media" / f"IMG_0000{i}.jpg")).astype(float) for i in (1, 2))
+    assert blurred.std() < 0.7 * sharp.std()
+
+
+def test_stream_is_paused_and_resumed(rig):
+    stop, start = mavlink.MAV_CMD_VIDEO_STOP_STREAMING, mavlink.MAV_CMD_VIDEO_START_STREAMING
+    assert rig.acks(CAMERA, stop, 1) == [(CAMERA, ACCEPTED)]
+    (status,) = from_camera(requested(rig, REQUEST, 270, 1), "VIDEO_STREAM_STATUS")
+    assert status.flags == 0
+    assert rig.acks(CAMERA, start, 1) == [(CAMERA, ACCEPTED)]
+    (information,) = from_camera(requested(rig, REQUEST, 269, 1), "VIDEO_STREAM_INFORMATION")
+    assert information.flags == mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING
+    assert information.uri == Stream.uri
+    assert rig.acks(CAMERA, start, 2) == [(CAMERA, DENIED)]
+
+
+def test_a_ground_station_is_told_which_port_the_video_comes_to():
+    video = Stream(uri="5600", is_rtp=True, width=640, height=360, rate_hz=15.0, bitrate=2_000_000)
+    rig = PayloadRig(stream=Stream(), video=video)
+    (information,) = from_camera(requested(rig, REQUEST, 269, 1), "VIDEO_STREAM_INFORMATION")
+    assert (information.type, information.encoding) == (
+        mavlink.VIDEO_STREAM_TYPE_RTPUDP,
+        mavlink.VIDEO_STREAM_ENCODING_H264,
+    )
+    assert (information.uri, information.resolution_h, information.resolution_v) == ("5600", 640, 360)
+    assert (information.stream_id, information.count, information.bitrate) == (1, 1, 2_000_000)
+    (camera,) = from_camera(requested(rig, REQUEST, 259), "CAMERA_INFORMATION")
+    assert camera.flags & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+    assert camera.cam_definition_uri == Stream.definition_uri  # files are served over HTTP as before
+
+
+def test_everyone_is_told_when_the_video_starts_and_stops(rig):
+    for command, flags in (
+        (mavlink.MAV_CMD_VIDEO_STOP_STREAMING, 0),
+        (mavlink.MAV_CMD_VIDEO_START_STREAMING, mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING),
+    ):
+        rig.to(CAMERA, command, 1)
+        (status,) = from_camera(rig.frame(), "VIDEO_STREAM_STATUS")
+        assert status.flags == flags
+        (told,) = [m for m in rig.second_client.received() if m.name == "VIDEO_STREAM_STATUS"]
+        assert told.fields.flags == flags
+
+
+def test_without_video_its_start_is_refused_with_the_option_that_gives_it():
+    rig = PayloadRig()
+    rig.to(CAMERA, mavlink.MAV_CMD_VIDEO_START_STREAMING, 1)
+    messages = rig.frame()
+    assert [m.fields.result for m in messages if m.name == "COMMAND_ACK"] == [UNSUPPORTED]
+    assert any("--video-port" in m.fields.text for m in messages if m.name == "STATUSTEXT")
+    (camera,) = from_camera(requested(rig, REQUEST, 259), "CAMERA_INFORMATION")
+    assert not camera.flags & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+
+
+def test_messages_come_at_an_interval_to_who_asked(rig):
+    assert rig.acks(CAMERA, 511, STATUS, 200_000) == [(CAMERA, ACCEPTED)]
+    assert len(from_camera(rig.frame(50), "CAMERA_CAPTURE_STATUS")) == 5
+    assert [m for m in rig.second_client.received() if m.name == "CAMERA_CAPTURE_STATUS"] == []
+    rig.acks(CAMERA, 511, STATUS, -1)
+    assert from_camera(rig.frame(50), "CAMERA_CAPTURE_STATUS") == []
+    assert rig.acks(CAMERA, 511, 30, 200_000) == [(CAMERA, UNSUPPORTED)]
+
+
+def value(layout, number):
+    return struct.pack(layout, number).ljust(128, b"\0")
+
+
+def test_settings_are_listed_read_and_set_with_an_acknowledgement(rig):
+    rig.client.send("PARAM_EXT_REQUEST_LIST", target_component=CAMERA)
+    listed = from_camera(rig.frame(), "PARAM_EXT_VALUE")
+    assert [item.param_id for item in listed] == [setting.name for setting in SETTINGS]
+    assert {item.param_count for item in listed} == {len(SETTINGS)}
+    rig.client.send(
+        "PARAM_EXT_SET", target_component=CAMERA, param_id="CAM_EV", param_value=value("<f", 1.0), param_type=9
+    )
+    (ack,) = from_camera(rig.frame(), "PARAM_EXT_ACK")
+    assert (ack.param_result, struct.unpack("<f", ack.param_value[:4])[0]) == (mavlink.PARAM_ACK_ACCEPTED, 1.0)
+    rig.client.send("PARAM_EXT_REQUEST_READ", target_component=CAMERA, param_id="CAM_EV", param_index=-1)
+    (read,) = from_camera(rig.frame(), "PARAM_EXT_VALUE")
+    assert struct.unpack("<f", read.param_value[:4])[0] == 1.0
+    rig.acks(CAMERA, START, 0, 0, 1, 1)
+    assert rig.vehicle.light.views[-1].exposure == 2.0
+
+
+def test_setting_that_does_not_exist_or_does_not_fit_is_refused(rig):
+    for name, number, kind, result in [
+        ("CAM_WBMODE", 99, 5, mavlink.PARAM_ACK_VALUE_UNSUPPORTED),
+        ("CAM_WBMODE", 1, 9, mavlink.PARAM_ACK_VALUE_UNSUPPORTED),
+        ("CAM_NONE", 1, 5, mavlink.PARAM_ACK_FAILED),
+    ]:
+        rig.client.send(
+            "PARAM_EXT_SET", target_component=CAMERA, param_id=name, param_value=value("<I", number), param_type=kind
+        )
+        (ack,) = from_camera(rig.frame(), "PARAM_EXT_ACK")
+        assert ack.param_result == result
+
+
+def test_vehicle_parameters_are_not_the_camera_s(rig):
+    rig.client.send("PARAM_REQUEST_READ", target_component=CAMERA, param_id="MAV_SYS_ID", param_index=-1)
+    assert [m for m in rig.frame() if m.name == "PARAM_VALUE"] == []
+
+
+def test_definition_file_lists_every_setting():
+    root = ET.fromstring(definition_xml())
+    names = [parameter.get("name") for parameter in root.iter("parameter")]
+    assert names == [setting.name for setting in SETTINGS]
+    assert all(parameter.find("description").text for parameter in root.iter("parameter"))
+
+
+def test_field_of_view_names_the_place_in_the_middle_of_the_picture(rig):
+    rig.vehicle.state.gimbal.gimbal.pitch = -0.7853981633974483
+    rig.vehicle.state.gimbal.gimbal.aim.pitch = -0.7853981633974483
+    (fov,) = from_camera(requested(rig, REQUEST, 271), "CAMERA_FOV_STATUS")
+    state = rig.vehicle.state
+    metres = ((fov.lat_image - fov.lat_camera) * 0.0111319) ** 2 + ((fov.lon_image - fov.lon_camera) * 0.00754) ** 2
+    height = state.estimate.terrain_d - state.estimate.pos_ned[2]
+    assert metres**0.5 == pytest.approx(height, rel=0.02)
+    assert fov.vfov == pytest.approx(50.5, abs=0.1)
+
+
+def test_slow_host_delays_a_series_and_never_stops_the_flight(rig):
+    rig.vehicle.light.is_slow = True
+    rig.to(CAMERA, START, 0, 0.5, 0, 0)
+    assert from_camera(rig.frame(500), "CAMERA_IMAGE_CAPTURED") == []
+    assert len(rig.vehicle.light.waiting) == 2
+    rig.vehicle.light.deliver()
+    shots = from_camera(rig.frame(3), "CAMERA_IMAGE_CAPTURED")
+    assert [shot.image_index for shot in shots] == [0, 1]
+
+
+def test_recording_ends_without_waiting_for_a_frame(rig, tmp_path):
+    rig.vehicle.light.is_slow = True
+    rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_START_CAPTURE, 0, 0)
+    rig.frame(10)
+    assert rig.acks(CAMERA, mavlink.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == [(CAMERA, ACCEPTED)]
+    assert rig.vehicle.camera.recording is None
+
+
+def test_ardupilot_s_clients_get_camera_feedback(tmp_path):
+    rig = PayloadRig(tmp_path / "media", dialect=ARDUPILOT)
+    rig.vehicle.state.gimbal.gimbal.point(-0.5, 0.0, is_yaw_locked=True)
+    rig.frame(100)
+    rig.to(1, START, 0, 0, 1, 1)
+    (feedback,) = [m.fields for m in rig.frame(2) if m.name == "CAMERA_FEEDBACK"]
+    assert feedback.img_idx == 1
+    assert feedback.alt_rel == pytest.approx(30.0)
+    assert feedback.pitch == pytest.approx(degrees(-0.5))
+    assert feedback.flags == mavlink.CAMERA_FEEDBACK_PHOTO

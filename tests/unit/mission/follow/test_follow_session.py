@@ -1,0 +1,60 @@
+"""`honeyguide follow`: what it writes, and what it refuses."""
+
+import json
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from mission.cli import app
+from mission.flight import flight_world
+from mission.view.film import write_film
+from mission.view.film_images import HEIGHT, WIDTH
+from mission.view.replay_file import load_recording
+from tests.unit.mission.view.rows import CONFIG, hovering
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["follow", *arguments])
+
+
+def test_it_follows_lands_and_writes_scorecard_and_recording(tmp_path):
+    folder = tmp_path / "run"
+    result = run("--speed", "max", "--seconds", "5", "--no-mp4", "--run-folder", str(folder))
+    assert result.exit_code == 0, result.output
+    assert "scorecard" in result.output
+    summary = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)  # no NaN: strict readers
+    assert summary["in_band"] is not None
+    assert "picture to setpoint" in result.output
+    assert "logs and scorecard: " in result.output
+    recording = load_recording(folder)
+    assert recording.has_owner
+    assert recording.rows["height_m"].max() > 2.0
+    assert not recording.rows["is_armed"][-1]
+    assert {"flight.ulg", "flight.tlog"} <= {path.name for path in folder.iterdir()}
+
+
+def test_a_film_shows_every_second_frame(tmp_path):
+    import av
+
+    recording = hovering(0.4)
+    write_film(recording, flight_world(CONFIG), tmp_path / "flight.mp4", Console())
+    with av.open(str(tmp_path / "flight.mp4")) as film:
+        pictures = list(film.decode(video=0))
+    assert len(pictures) == len(recording) // 2
+    assert (pictures[0].height, pictures[0].width) == (HEIGHT, WIDTH)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--owner", "swim"), "--owner swim: must be walk or run"),
+        (("--policy", "nobody"), "nobody: no such policy"),
+        (("--speed", "-1"), "--speed -1: must be a number above 0"),
+    ],
+)
+def test_wrong_arguments_are_refused_with_one_sentence(arguments, sentence, tmp_path):
+    result = run(*arguments, "--run-folder", str(tmp_path / "run"))
+    assert result.exit_code == 2
+    assert sentence in result.stderr
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,45 @@
+"""The owner of a flight is the owner of training: the same world, the same habits."""
+
+import numpy as np
+import pytest
+
+from common.geodesy import DEFAULT_HOME
+from common.kernels import FRAME_US
+from mission.flight_config import OwnerConfig
+from mission.follow.owner_device import FollowedOwner
+from policies.tasks.follow_me.follow_me_params import NUMBERS
+from sim.world.world import WorldConfig, build_world
+
+WAITED_S = 20.0
+DEFAULTS = {number.name: number.default for number in NUMBERS}
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return build_world(WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0))
+
+
+def owner_of(world, seed):
+    return FollowedOwner(OwnerConfig(), world, seed, DEFAULT_HOME)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_who_waited_sets_off_within_two_seconds_as_in_training(plain, seed):
+    owner = owner_of(plain, seed)
+    time_us = 0
+    while time_us < WAITED_S * 1e6:
+        time_us += FRAME_US
+        owner.frame(time_us, is_followed=False)
+    assert owner.vel_ned == (0.0, 0.0, 0.0)
+    followed_us = time_us
+    while np.hypot(*owner.vel_ned[:2]) < 0.05:
+        time_us += FRAME_US
+        owner.frame(time_us, is_followed=True)
+        assert time_us - followed_us < 2.3e6  # two seconds, and the first step
+
+
+def test_they_stop_and_pass_trees_as_often_as_in_training(plain):
+    model = owner_of(plain, 0)._walking
+    assert model.stop_share == pytest.approx(DEFAULTS["owner_stop_share"])
+    assert model.graze_share == pytest.approx(DEFAULTS["owner_graze_share"])
+    assert model.speed_max == pytest.approx(DEFAULTS["owner_speed_max"])

@@ -1,0 +1,54 @@
+"""What `honeyguide fly` does round a flight."""
+
+import gc
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+
+from mission.console.progress_line import Progress
+from mission.flight import Flight, FlightConfig
+from mission.fly_loop import advance, fly_to_the_end
+from mission.view.replay_file import Recording
+
+OBJECTS_MAX = 50_000  # a full collection of so many takes a few milliseconds; a program that is loaded has 350,000
+
+
+@pytest.fixture
+def unfrozen():
+    yield
+    gc.unfreeze()
+
+
+@pytest.mark.usefixtures("unfrozen")
+def test_no_frame_waits_for_the_garbage_of_all_that_was_loaded():
+    flight, counts = Flight(FlightConfig()), []
+    watch = [lambda: counts.append(len(gc.get_objects()))]
+    advance(flight, lambda _: flight.time_us >= 200_000, None, watch, Progress(flight, None), Console(quiet=True))
+    assert 0 < max(counts) < OBJECTS_MAX
+
+
+@pytest.mark.usefixtures("unfrozen")
+def test_the_logs_are_complete_before_the_recording_of_a_long_flight_is_packed(tmp_path, monkeypatch):
+    found = []
+    monkeypatch.setattr(Recording, "save", lambda _, folder: found.extend(path.name for path in folder.iterdir()))
+    options = SimpleNamespace(seconds=0.2, once=False)
+    flight = Flight(FlightConfig(), folder=tmp_path)
+    assert fly_to_the_end(flight, None, options, None, None, tmp_path, Console(quiet=True)) == 0
+    assert {"flight.ulg", "flight.tlog"} <= set(found)
+
+
+@pytest.mark.slow
+def test_a_reader_who_goes_ends_the_flight_with_its_logs_complete(tmp_path):
+    honeyguide = Path(sys.executable).with_name("honeyguide")
+    command = [honeyguide, "fly", "--idle", "--speed", "max", "--seconds", "100000", "--run-folder", tmp_path]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as flight:
+        while b" s  " not in flight.stdout.readline():  # until the vehicle has said something
+            pass
+        flight.stdout.close()
+        assert flight.stderr.read() == b""
+        assert flight.wait(60.0) == 0
+    assert {"flight.ulg", "flight.tlog", "summary.json"} <= {path.name for path in tmp_path.iterdir()}

@@ -1,0 +1,58 @@
+"""No flight stops while a kernel is compiled: all that it needs are loaded before it begins."""
+
+import subprocess
+import sys
+
+import pytest
+
+# In a process of its own: another test may have loaded the kernels before.
+FLY = """
+import sys
+from warp._src.context import Module
+
+loaded, load = [], Module.load
+def watched(self, *arguments, **options):
+    is_new = not self.execs
+    result = load(self, *arguments, **options)
+    if is_new:
+        loaded.append(self.name)
+    return result
+Module.load = watched
+
+from mission.flight import Flight, FlightConfig
+from mission.flight_config import OwnerConfig
+from mission.kernel_loading import load_kernels
+
+has_owner = sys.argv[1] == "owner"
+config = FlightConfig()
+if has_owner:
+    import mission.follow.onboard_camera, mission.follow.owner_device, mission.follow.follow_session
+    from policies.tasks.follow_me.world import FOLLOW_WORLD
+    config = FlightConfig(owner=OwnerConfig(), world=FOLLOW_WORLD)
+said = []
+load_kernels(said.append, has_camera=True, has_owner=has_owner)
+assert [text.rsplit(" ", 3)[1] for text in said] == [str(k) for k in range(1, len(said) + 1)], said
+count = len(loaded)
+if has_owner:
+    from mission.follow.lockstep import flight_with_companion
+    from policies.companion.pilot import load_pilot
+    flight, _ = flight_with_companion(config, load_pilot("FollowMe"))
+else:
+    flight = Flight(config)
+async def hop(drone):
+    await drone.wait_ready()
+    await drone.arm()
+    await drone.takeoff(2.5)
+    await drone.sleep(3.0)
+    await drone.land()
+running = flight.fly(hop)
+assert running.error is None, running.error
+assert count == len(said), (loaded, said)
+assert loaded[count:] == [], loaded[count:]
+"""
+
+
+@pytest.mark.parametrize("who", ["plan", "owner"])
+def test_no_kernel_is_loaded_once_the_flight_is_built(who):
+    result = subprocess.run([sys.executable, "-c", FLY, who], capture_output=True, text=True, timeout=300, check=False)
+    assert result.returncode == 0, result.stderr

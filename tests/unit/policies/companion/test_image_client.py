@@ -1,0 +1,62 @@
+"""Pictures in memory, as bytes, and over a stream."""
+
+import numpy as np
+import pytest
+
+from common.image_stream import ImageFrame, ImageReader, ImageStreamError, frame_bytes
+from policies.companion.image_client import CameraUrlError, MemoryCamera, StreamCamera
+
+
+def frame(sequence=7, size=(4, 6, 4)):
+    pixels = np.random.default_rng(sequence).integers(0, 256, size, dtype=np.uint8)
+    return ImageFrame(123_456_789_012, sequence, pixels, 90.0, -10.0, 4.0)
+
+
+def same(a, b):
+    fields = ("time_us", "sequence", "hfov_deg", "pitch_deg", "depth_half_m")
+    return all(getattr(a, name) == getattr(b, name) for name in fields) and np.array_equal(a.pixels, b.pixels)
+
+
+@pytest.mark.parametrize("piece", [1, 13, 47, 48, 49, 1000])
+def test_frames_come_out_as_they_went_in_however_the_stream_is_cut(piece):
+    sent = [frame(k) for k in range(3)]
+    data = b"".join(map(frame_bytes, sent))
+    reader, received = ImageReader(), []
+    for at in range(0, len(data), piece):
+        received += reader.feed(data[at : at + piece])
+    assert len(received) == 3
+    assert all(map(same, sent, received))
+
+
+def test_another_stream_is_refused():
+    with pytest.raises(ImageStreamError, match="first bytes"):
+        ImageReader().feed(b"HTTP/1.1 200 OK\r\n" + bytes(60))
+
+
+def test_another_version_is_refused():
+    data = bytearray(frame_bytes(frame()))
+    data[4] = 9
+    with pytest.raises(ImageStreamError, match="version 9"):
+        ImageReader().feed(bytes(data))
+
+
+def test_a_size_that_does_not_fit_is_refused():
+    data = bytearray(frame_bytes(frame()))
+    data[20] += 1
+    with pytest.raises(ImageStreamError, match="does not have"):
+        ImageReader().feed(bytes(data))
+
+
+def test_a_picture_in_memory_is_taken_once_and_the_newest_only():
+    camera = MemoryCamera()
+    assert camera.take(0) is None
+    camera.publish(frame(1))
+    camera.publish(frame(2))
+    assert camera.take(0).sequence == 2
+    assert camera.take(0) is None
+
+
+@pytest.mark.parametrize("url", ["", "127.0.0.1:14600", "udp://127.0.0.1:1", "tcp://host", "tcp://h:70000", "tcp://:5"])
+def test_other_addresses_are_refused(url):
+    with pytest.raises(CameraUrlError, match="must be tcp://HOST:PORT"):
+        StreamCamera(url)
