@@ -13,8 +13,6 @@ import numpy as np
 
 from autopilot.commander.battery import BatteryEstimator
 from autopilot.commander.commander import Commander
-from autopilot.commander.landing_detector import LandingDetector
-from autopilot.commander.motor_failures import LeaveOut, MotorWatch, ReadSpeeds
 from autopilot.commander.sensor_calibration import Calibrator, Turntable
 from autopilot.commander.stick_commands import Pilot
 from autopilot.inputs.external_position import ExternalPositions
@@ -38,10 +36,12 @@ from autopilot.payload.gimbal.gimbal import Gimbal
 from autopilot.payload.gimbal.gimbal_control import GimbalControl
 from autopilot.payload.payloads import Payloads
 from autopilot.roi_and_pause import Guidance
+from autopilot.vehicles.multirotor.motor_failures import LeaveOut, MotorWatch, ReadSpeeds
+from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
+from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import Airframe
 from common.attitude import roll_pitch_yaw_of
 from common.geodesy import GeoPoint
-from common.kernels import GRAVITY_M_S2
 from common.params import ParameterTable
 
 _HEALTH_PERIOD_US = 200_000
@@ -108,6 +108,7 @@ class FlightController:
         host: files, logs and storage, as far as there are any.
         injector: breaks parts on request; None where nothing can be broken.
         turntable: turns the vehicle while its sensors are calibrated; None: a pilot does.
+        vehicle: the class of vehicles that it is of.
     """
 
     def __init__(
@@ -122,11 +123,18 @@ class FlightController:
         host: Host | None = None,
         injector: FailureInjector | None = None,
         turntable: Turntable | None = None,
+        vehicle: VehicleClass = MULTIROTOR,
     ) -> None:
+        self._last_resort = vehicle.last_resort
         self.params = params
         self.host = host or Host()
         self.sticks = Sticks(params)
-        self.state = VehicleState(origin=origin, sticks=self.sticks.input, rotor_count=len(airframe.rotors))
+        self.state = VehicleState(
+            origin=origin,
+            sticks=self.sticks.input,
+            rotor_count=len(airframe.rotors),
+            mav_type=vehicle.mav_type(airframe),
+        )
         self.payload = Payloads()
         self.camera = self._mount_camera()
         self.state.read_rotor_speeds = ports.read_rotor_speeds
@@ -152,13 +160,13 @@ class FlightController:
         self.external = ExternalPositions(
             ports.external, params, lambda: state.time_us, lambda: (state.estimate, state.yaw_rad)
         )
-        hover, standing_m = hover_thrust(airframe), airframe.contact.leg_z_m
+        hover, standing_m = vehicle.hover_thrust(airframe), airframe.contact.leg_z_m
         self.commander = Commander(
             self.state,
             params,
             self._relay,
             BatteryEstimator(airframe.battery),
-            LandingDetector(params, hover, standing_m),
+            vehicle.ground_detector(params, airframe),
             Pilot(self.state, params, self.sticks),
             MotorWatch(self.state, params, self._relay, airframe, ports.read_rotor_speeds, ports.leave_out),
         )
@@ -244,9 +252,9 @@ class FlightController:
         state.roll_rad, state.pitch_rad, state.yaw_rad = roll_pitch_yaw_of(estimate.q_ned_from_frd)
 
     def _follow_wish(self, mode: Mode) -> None:
-        """A mode is done: goes over to the next, or lands if that cannot be flown."""
+        """A mode is done: goes over to the next, or to the last resort if that cannot be flown."""
         if self.commander.refusal(mode):
-            mode = Mode.LAND
+            mode = self._last_resort
         self.commander.change_mode(mode)
 
     # ---- autopilot.interface.vehicle_interface.Vehicle ----
@@ -397,10 +405,3 @@ class FlightController:
         if reply.verdict is Verdict.ACCEPTED and not is_new:
             self.navigator.enter(mode)
         return reply
-
-
-def hover_thrust(airframe: Airframe) -> float:
-    """Share [0..1] of the maximum collective thrust that carries the vehicle, at full battery and sea level."""
-    model = airframe.rotor_model
-    thrust_max_n = len(airframe.rotors) * model.thrust_n_s2 * model.max_speed_rad_s**2
-    return airframe.body.mass_kg * GRAVITY_M_S2 / thrust_max_n

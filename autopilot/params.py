@@ -6,21 +6,19 @@ Those without a meaning here are constants (minimum = maximum): they can be read
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import sqrt
 
 from autopilot.commander.params import COMMANDER_PARAMETERS
-from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.inputs.external_position import EXTERNAL_PARAMETERS
 from autopilot.inputs.obstacles import OBSTACLE_PARAMETERS
 from autopilot.inputs.stick_params import STICK_PARAMETERS
 from autopilot.inputs.traffic import TRAFFIC_PARAMETERS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
+from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
+from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import Airframe
-from common.kernels import GRAVITY_M_S2
 from common.params import Parameter, ParameterTable
 
-_AUTOSTART = {4: 4001, 6: 6001, 8: 8001}  # PX4's generic airframes by their number of rotors
 _CLIENTS = "what ground stations expect of a PX4 vehicle"
 
 
@@ -68,12 +66,12 @@ SYSTEM_PARAMETERS: list[Parameter] = [
 ]
 
 
-def all_parameters() -> list[Parameter]:
-    """Every declaration of the flight controller."""
+def all_parameters(vehicle: VehicleClass = MULTIROTOR) -> list[Parameter]:
+    """Every declaration of the flight controller of a class of vehicles."""
     return [
         *SYSTEM_PARAMETERS,
         *ESTIMATOR_PARAMETERS,
-        *CONTROL_PARAMETERS,
+        *vehicle.parameters,
         *COMMANDER_PARAMETERS,
         *NAVIGATOR_PARAMETERS,
         *STICK_PARAMETERS,
@@ -83,25 +81,6 @@ def all_parameters() -> list[Parameter]:
     ]
 
 
-def airframe_defaults(airframe: Airframe) -> dict[str, int | float]:
-    """Parameters whose default is the airframe's own: battery, landing gear, and drag for the wind estimate."""
-    body, rotor, battery = airframe.body, airframe.rotor_model, airframe.battery
-    count = len(airframe.rotors)
-    hover_speed_rad_s = sqrt(body.mass_kg * GRAVITY_M_S2 / (count * rotor.thrust_n_s2))
-    return {
-        "SYS_AUTOSTART": _AUTOSTART.get(count, 4001),
-        "BAT1_N_CELLS": battery.cells,
-        "BAT1_CAPACITY": battery.capacity_mah,
-        "BAT1_V_CHARGED": battery.full_cell_v,
-        "BAT1_V_EMPTY": battery.empty_cell_v,
-        "EKF2_MIN_RNG": airframe.contact.leg_z_m,
-        "EKF2_MCOEF": count * rotor.drag_n_s2_m * hover_speed_rad_s / body.mass_kg,
-        "MPC_THR_HOVER": body.mass_kg * GRAVITY_M_S2 / (count * rotor.thrust_n_s2 * rotor.max_speed_rad_s**2),
-        "EKF2_BCOEF_X": body.mass_kg / body.drag_area_x_m2,
-        "EKF2_BCOEF_Y": body.mass_kg / body.drag_area_y_m2,
-    }
-
-
 def _of_airframe(item: Parameter, value: int | float) -> Parameter:
     """The declaration with the airframe's default; a constant becomes another constant."""
     if item.minimum == item.maximum:
@@ -109,8 +88,10 @@ def _of_airframe(item: Parameter, value: int | float) -> Parameter:
     return replace(item, default=item.clamped(value), source="airframe file")
 
 
-def parameter_table(airframe: Airframe | None = None, more: Sequence[Parameter] = ()) -> ParameterTable:
+def parameter_table(
+    airframe: Airframe | None = None, more: Sequence[Parameter] = (), vehicle: VehicleClass = MULTIROTOR
+) -> ParameterTable:
     """A vehicle's table, at the defaults of its airframe; `more` are those that only its dialect has."""
-    own = {} if airframe is None else airframe_defaults(airframe)
-    declared = (*all_parameters(), *more)
+    own = {} if airframe is None else vehicle.defaults(airframe)
+    declared = (*all_parameters(vehicle), *more)
     return ParameterTable(_of_airframe(item, own[item.name]) if item.name in own else item for item in declared)

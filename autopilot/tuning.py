@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from autopilot.control.params import CONTROL_PARAMETERS
+from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
 from common.airframe import Airframe, AirframeError, load_airframe
 from common.kernels import FRAME_TICKS, TICK_S
 from common.params import ParameterTable

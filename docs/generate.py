@@ -9,7 +9,6 @@ from training_page import training_text
 
 from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
 from autopilot.commander.params import COMMANDER_PARAMETERS
-from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.inputs.obstacles import OBSTACLE_PARAMETERS
 from autopilot.inputs.stick_params import STICK_PARAMETERS
@@ -17,6 +16,7 @@ from autopilot.inputs.traffic import TRAFFIC_PARAMETERS
 from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.params import SYSTEM_PARAMETERS, parameter_table
+from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
 from common.airframe import load_airframe
 from common.files import write_whole
 from common.params import Parameter

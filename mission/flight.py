@@ -9,7 +9,6 @@ from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self
 
-from autopilot.control.airframe import rotors_leaver
 from autopilot.flight_controller import FlightController, HostPorts
 from autopilot.interface.platform import Host
 from autopilot.interface.vehicle_state import Mode, Severity
@@ -21,6 +20,7 @@ from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory
 from autopilot.mavlink.wire.signing import SigningConfig
 from autopilot.payload.camera.storage import MediaFolder
 from autopilot.persistence import Persistence
+from autopilot.vehicles.multirotor.control_airframe import rotors_leaver
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder

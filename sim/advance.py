@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import warp as wp
 
 from autopilot.advance import autopilot_kernels
-from autopilot.control.law import MULTIROTOR_LAW, ControlLaw
+from autopilot.control.law import ControlLaw
 from autopilot.estimator.ekf import estimator_step
 from autopilot.ports import contact
+from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
 from common.kernels import TICK_S
 from common.rng import draw_tick
 from sim.bodies.body import MULTIROTOR_BODY, Body

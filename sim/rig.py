@@ -11,10 +11,11 @@ import numpy as np
 import warp as wp
 
 from autopilot.advance import autopilot_kernels
-from autopilot.control.law import MULTIROTOR_LAW, ControlLaw
+from autopilot.control.law import ControlLaw
 from autopilot.estimator.ekf import make_ekf
 from autopilot.estimator.params import estimator_fields
 from autopilot.ports import Setpoint
+from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
 from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from common.geomagnetic import field_ned_gauss

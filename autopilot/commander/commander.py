@@ -12,15 +12,15 @@ from autopilot.commander.failsafe import CRASHED
 from autopilot.commander.failsafe_executor import Guard
 from autopilot.commander.failure_detector import FailureWatch, StationLink
 from autopilot.commander.home import Home
-from autopilot.commander.landing_detector import LandingDetector
 from autopilot.commander.modes import MODE_RULES, NO_STICKS, PASSING_MODES, mode_refusal
-from autopilot.commander.motor_failures import MotorWatch
 from autopilot.commander.navigator_interface import Flying
 from autopilot.commander.stick_commands import Pilot
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from autopilot.navigator.takeoff_intent import Ask
 from autopilot.ports import HEIGHT_VALID, MAG_DISTURBED, POSITION_VALID, VELOCITY_VALID
+from autopilot.vehicles.multirotor.motor_failures import MotorWatch
+from autopilot.vehicles.vehicle_class import GroundDetector
 from common.params import Parameter, ParameterTable
 
 _POSITION_FLAGS = POSITION_VALID | VELOCITY_VALID | HEIGHT_VALID
@@ -57,7 +57,7 @@ class Commander:
         params: ParameterTable,
         announcer: Announcer,
         battery: BatteryEstimator,
-        landing: LandingDetector,
+        landing: GroundDetector,
         pilot: Pilot,
         motors: MotorWatch,
     ) -> None:

@@ -29,12 +29,12 @@ from autopilot.commander.failsafe import (
     WIND_HIGH,
     WIND_STRONG,
 )
-from autopilot.commander.motor_failures import MotorWatch
 from autopilot.commander.navigator_interface import Flying
 from autopilot.interface.vehicle_state import BatteryLevel, LandedState, Mode, VehicleState
 from autopilot.ports import ACCEL_DOUBTED as ACCEL_DOUBTED_FLAG
 from autopilot.ports import DEAD_RECKONING as DEAD_RECKONING_FLAG
 from autopilot.ports import HEIGHT_VALID, MAG_FAULTY, WIND_VALID
+from autopilot.vehicles.multirotor.motor_failures import MotorWatch
 from common.params import Parameter, ParameterTable
 
 _SLOW_PERIOD_US = 200_000

@@ -1,4 +1,4 @@
-"""A control law: the kernel half of a vehicle class, as data and functions. The multirotor's is the first.
+"""A control law: the kernel half of a vehicle class, as data and functions.
 
 `autopilot.advance` composes a law with the estimator; whoever adds a class of vehicles writes these members.
 """
@@ -6,9 +6,6 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from autopilot.control.airframe import ControlAirframe, control_airframe
-from autopilot.control.control import ControlState, control_tick
-from autopilot.control.params import CONTROL_PARAMETERS, ControlParams, control_params
 from common.params import Parameter
 
 
@@ -29,14 +26,3 @@ class ControlLaw(NamedTuple):
     """Makes an `Airframe` from the airframe file."""
     parameters: tuple[Parameter, ...]
     """What fills `Params` from a parameter table."""
-
-
-MULTIROTOR_LAW = ControlLaw(
-    ControlParams,
-    ControlAirframe,
-    ControlState,
-    control_tick,
-    control_params,
-    control_airframe,
-    tuple(CONTROL_PARAMETERS),
-)

@@ -164,6 +164,7 @@ class VehicleState:
     )
     mode: Mode = Mode.HOLD
     rotor_count: int = 4
+    mav_type: int = 2  # MAV_TYPE; 2: quadrotor
     is_armed: bool = False
     landed_state: LandedState = LandedState.ON_GROUND
     has_ground_contact: bool = False  # stands on something, though perhaps not landed yet

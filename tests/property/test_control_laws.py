@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from autopilot.control.airframe import effectiveness
+from autopilot.vehicles.multirotor.control_airframe import effectiveness
 from common.airframe import load_airframe
-from tests.unit.autopilot.control.generator import FRAME_S, Generator
-from tests.unit.autopilot.control.mixer import mix, with_rotors
+from tests.unit.autopilot.vehicles.multirotor.generator import FRAME_S, Generator
+from tests.unit.autopilot.vehicles.multirotor.mixer import mix, with_rotors
 
 LAWS = settings(max_examples=60, deadline=None)
 X500 = load_airframe("x500")

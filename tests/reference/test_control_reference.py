@@ -7,14 +7,14 @@ import warp as wp
 from scipy.optimize import brentq, linprog
 from scipy.spatial.transform import Rotation
 
-from autopilot.control.airframe import control_airframe, effectiveness
-from autopilot.control.allocation import command_for_speed, speed_share
-from autopilot.control.attitude import attitude_error
 from autopilot.control.profile import AxisLimits, distance_via, ramp_distance, ramp_to, step_to_position
 from autopilot.tuning import Cascade, default_gains, motor_time_s
+from autopilot.vehicles.multirotor.allocation import command_for_speed, speed_share
+from autopilot.vehicles.multirotor.attitude import attitude_error
+from autopilot.vehicles.multirotor.control_airframe import control_airframe, effectiveness
 from common.airframe import load_airframe
-from tests.unit.autopilot.control.mixer import mix
-from tests.unit.autopilot.control.rig import Rig
+from tests.unit.autopilot.vehicles.multirotor.mixer import mix
+from tests.unit.autopilot.vehicles.multirotor.rig import Rig
 
 
 def limits(speed: float = 5.0, accel_up: float = 4.0, accel_down: float = 3.0, jerk: float = 20.0) -> AxisLimits:

@@ -61,7 +61,6 @@ class Dialect(Protocol):
 
     name: str
     autopilot: int  # MAV_AUTOPILOT
-    vehicle_type: int  # MAV_TYPE
     capabilities: int  # MAV_PROTOCOL_CAPABILITY bits that only this dialect sets
     flight_sw_version: int  # of the autopilot this dialect is compatible with
     modes: Sequence[ModeRow]  # that a client may ask for

@@ -59,7 +59,6 @@ class ArduPilotDialect:
 
     name = "ardupilot"
     autopilot = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
-    vehicle_type = mavlink.MAV_TYPE_QUADROTOR
     capabilities = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
     # Copter 4.7.0, a development version: newer than any release, so that no station asks for an update. It names the
     # interface we are compatible with; our own version is the custom version.

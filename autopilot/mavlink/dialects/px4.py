@@ -59,7 +59,6 @@ class Px4Dialect:
 
     name = "px4"
     autopilot = mavlink.MAV_AUTOPILOT_PX4
-    vehicle_type = mavlink.MAV_TYPE_QUADROTOR
     capabilities = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
     # PX4 1.18.0, a development version: newer than any release, so that QGroundControl neither calls it too old nor
     # asks for an update. It names the interface we are compatible with; our own version is the custom version.

@@ -50,7 +50,6 @@ _STICKS_MODE = (
     | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 )
 _STICKS_MODES = frozenset({Mode.MANUAL, Mode.STABILIZED, Mode.ACRO, Mode.ALTITUDE, Mode.POSITION})
-_TYPES = {3: mavlink.MAV_TYPE_TRICOPTER, 6: mavlink.MAV_TYPE_HEXAROTOR, 8: mavlink.MAV_TYPE_OCTOROTOR}
 _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 _GYRO_ACCEL = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
@@ -92,7 +91,7 @@ def heartbeat(state: VehicleState, dialect: Dialect) -> bytes:
     """Mode, armed or not, state."""
     base_mode = _STICKS_MODE if state.mode in _STICKS_MODES else _BASE_MODE
     return _heartbeat(
-        _TYPES.get(state.rotor_count, dialect.vehicle_type),
+        state.mav_type,
         dialect.autopilot,
         base_mode | _ARMED if state.is_armed else base_mode,
         dialect.custom_mode(state.mode),

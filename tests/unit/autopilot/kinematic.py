@@ -8,7 +8,7 @@ from math import atan2, cos, exp, isfinite, nan, pi, sin
 
 import numpy as np
 
-from autopilot.flight_controller import FlightController, HostPorts, hover_thrust
+from autopilot.flight_controller import FlightController, HostPorts
 from autopilot.interface.client_requests import OffboardSetpoint
 from autopilot.interface.item_lists import MissionItem
 from autopilot.interface.vehicle_state import LandedState, Mode, Severity
@@ -28,6 +28,7 @@ from autopilot.ports import (
     Samples,
     Setpoint,
 )
+from autopilot.vehicles.multirotor.defaults import hover_thrust
 from common.airframe import load_airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import FRAME_US, GRAVITY_M_S2

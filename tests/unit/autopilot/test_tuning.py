@@ -3,7 +3,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.tuning import (
     GAIN_DESIGN_DB,
     GAIN_REQUIRED_DB,
@@ -16,6 +15,7 @@ from autopilot.tuning import (
     greatest_gain,
     margins_of,
 )
+from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
 from common.airframe import airframe_names, load_airframe
 
 

@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from autopilot.control.airframe import control_airframe
+from autopilot.vehicles.multirotor.control_airframe import control_airframe
 from common.airframe import AIRFRAME_FOLDER, AirframeError, airframe_names, load_airframe
 from sim.bodies.multirotor import multirotor_model
 

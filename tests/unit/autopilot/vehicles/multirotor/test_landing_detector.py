@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from autopilot.commander.landing_detector import LandingDetector
 from autopilot.commander.params import COMMANDER_PARAMETERS
-from autopilot.control.params import CONTROL_PARAMETERS
 from autopilot.ports import TERRAIN_VALID, VELOCITY_VALID
+from autopilot.vehicles.multirotor.landing_detector import LandingDetector
+from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
 from common.params import ParameterTable
 
 HOVER = 0.43

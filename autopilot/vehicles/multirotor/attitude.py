@@ -6,7 +6,7 @@ control"), because tilt moves the vehicle and is fast, heading is neither.
 
 import warp as wp
 
-from autopilot.control.params import ControlParams
+from autopilot.vehicles.multirotor.params import ControlParams
 from common.vectors import clamp3
 
 wp.set_module_options({"enable_backward": False})

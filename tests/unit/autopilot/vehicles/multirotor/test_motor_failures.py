@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from autopilot.commander.motor_failures import MotorWatch
 from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.interface.vehicle_state import LandedState
+from autopilot.vehicles.multirotor.motor_failures import MotorWatch
 from common.airframe import load_airframe
 from common.params import ParameterTable
 from tests.unit.autopilot.kinematic import Recorder

@@ -2,8 +2,8 @@
 
 import warp as wp
 
-from autopilot.control.params import ControlParams
 from autopilot.control.pid import integrate_unless_short, low_pass_share
+from autopilot.vehicles.multirotor.params import ControlParams
 
 wp.set_module_options({"enable_backward": False})
 

@@ -5,7 +5,7 @@ Where a rotor would leave its range, yaw gives way first, then collective thrust
 
 import warp as wp
 
-from autopilot.control.airframe import ControlAirframe
+from autopilot.vehicles.multirotor.control_airframe import ControlAirframe
 from common.kernels import vec8
 
 wp.set_module_options({"enable_backward": False})

@@ -11,7 +11,6 @@ MPC_XY_ERR_MAX draws the trajectory along, and the way to the goal begins anew f
 
 import warp as wp
 
-from autopilot.control.params import ControlParams
 from autopilot.control.pid import clamp_horizontal, finite_or
 from autopilot.control.profile import (
     AxisLimits,
@@ -22,6 +21,7 @@ from autopilot.control.profile import (
     step_to_velocity,
 )
 from autopilot.ports import Estimate, Setpoint
+from autopilot.vehicles.multirotor.params import ControlParams
 from common.rotation import wrap_pi, yaw_from_quat
 
 wp.set_module_options({"enable_backward": False})

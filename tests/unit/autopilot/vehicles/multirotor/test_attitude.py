@@ -3,7 +3,7 @@ import pytest
 import warp as wp
 from scipy.spatial.transform import Rotation
 
-from autopilot.control.attitude import attitude_error, attitude_from_thrust, thrust_turn_rate, turned
+from autopilot.vehicles.multirotor.attitude import attitude_error, attitude_from_thrust, thrust_turn_rate, turned
 
 
 def quat(rotation: Rotation) -> wp.quat:

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from autopilot.control.airframe import effectiveness
+from autopilot.vehicles.multirotor.control_airframe import effectiveness
 from common.airframe import Airframe, load_airframe
-from tests.unit.autopilot.control.mixer import mix, with_rotors
+from tests.unit.autopilot.vehicles.multirotor.mixer import mix, with_rotors
 
 LOW, HIGH = 0.2, 8.5
 

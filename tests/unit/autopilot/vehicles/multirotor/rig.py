@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-from autopilot.control.airframe import ControlAirframe, control_airframe
-from autopilot.control.allocation import speed_share
-from autopilot.control.control import ControlState, control_tick
-from autopilot.control.params import ControlParams, control_params
 from autopilot.ports import SETPOINT_TRAJECTORY, BatterySample, Estimate, Setpoint
+from autopilot.vehicles.multirotor.allocation import speed_share
+from autopilot.vehicles.multirotor.cascade import ControlState, control_tick
+from autopilot.vehicles.multirotor.control_airframe import ControlAirframe, control_airframe
+from autopilot.vehicles.multirotor.params import ControlParams, control_params
 from common.airframe import load_airframe
 from common.kernels import GRAVITY_M_S2, TICK_S, vec8
 from common.rotation import quat_from_rotvec

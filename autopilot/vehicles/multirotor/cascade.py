@@ -2,20 +2,6 @@
 
 import warp as wp
 
-from autopilot.control.airframe import ControlAirframe
-from autopilot.control.allocation import Allocation, allocate, motor_commands
-from autopilot.control.attitude import attitude_from_thrust, rate_setpoint, thrust_turn_rate, turned
-from autopilot.control.params import ControlParams
-from autopilot.control.position import velocity_setpoint
-from autopilot.control.rate import RateState, filter_rates, rate_step, rate_torque
-from autopilot.control.trajectory import (
-    TrajectoryState,
-    flown_acceleration,
-    flown_velocity,
-    trajectory_at_estimate,
-    trajectory_step,
-)
-from autopilot.control.velocity import VelocityState, observe, velocity_step
 from autopilot.ports import (
     SETPOINT_ATTITUDE,
     SETPOINT_IDLE,
@@ -27,6 +13,20 @@ from autopilot.ports import (
     Estimate,
     Setpoint,
 )
+from autopilot.vehicles.multirotor.allocation import Allocation, allocate, motor_commands
+from autopilot.vehicles.multirotor.attitude import attitude_from_thrust, rate_setpoint, thrust_turn_rate, turned
+from autopilot.vehicles.multirotor.control_airframe import ControlAirframe
+from autopilot.vehicles.multirotor.params import ControlParams
+from autopilot.vehicles.multirotor.position import velocity_setpoint
+from autopilot.vehicles.multirotor.rate import RateState, filter_rates, rate_step, rate_torque
+from autopilot.vehicles.multirotor.trajectory import (
+    TrajectoryState,
+    flown_acceleration,
+    flown_velocity,
+    trajectory_at_estimate,
+    trajectory_step,
+)
+from autopilot.vehicles.multirotor.velocity import VelocityState, observe, velocity_step
 from common.kernels import FRAME_TICKS, GRAVITY_M_S2, TICK_S, vec8
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
 from common.vectors import clamp3

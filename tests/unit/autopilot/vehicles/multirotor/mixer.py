@@ -4,8 +4,8 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-from autopilot.control.airframe import ControlAirframe, control_airframe
-from autopilot.control.allocation import Allocation, allocate, motor_commands, speed_share
+from autopilot.vehicles.multirotor.allocation import Allocation, allocate, motor_commands, speed_share
+from autopilot.vehicles.multirotor.control_airframe import ControlAirframe, control_airframe
 from common.airframe import Airframe
 from common.kernels import vec8
 

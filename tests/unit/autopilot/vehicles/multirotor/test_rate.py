@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from autopilot.control.params import ControlParams, control_params
-from autopilot.control.rate import RateState, filter_rates, rate_step, rate_torque
+from autopilot.vehicles.multirotor.params import ControlParams, control_params
+from autopilot.vehicles.multirotor.rate import RateState, filter_rates, rate_step, rate_torque
 
 INERTIA = wp.vec3(0.01, 0.02, 0.03)
 

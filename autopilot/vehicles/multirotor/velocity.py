@@ -8,11 +8,11 @@ The integral then only meets what the accelerometer cannot see, such as a tilt e
 
 import warp as wp
 
-from autopilot.control.airframe import ControlAirframe
-from autopilot.control.params import ControlParams
 from autopilot.control.pid import clamp_horizontal, low_pass_share
-from autopilot.control.trajectory import FOLLOW_ACCEL, TrajectoryState, flown_acceleration
 from autopilot.ports import Estimate
+from autopilot.vehicles.multirotor.control_airframe import ControlAirframe
+from autopilot.vehicles.multirotor.params import ControlParams
+from autopilot.vehicles.multirotor.trajectory import FOLLOW_ACCEL, TrajectoryState, flown_acceleration
 from common.kernels import GRAVITY_M_S2
 
 wp.set_module_options({"enable_backward": False})

@@ -5,7 +5,7 @@ import pytest
 
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_LEAN, SETPOINT_RATE
 from common.kernels import GRAVITY_M_S2
-from tests.unit.autopilot.control.rig import Rig, turbulence
+from tests.unit.autopilot.vehicles.multirotor.rig import Rig, turbulence
 
 NAN = float("nan")
 NO_WIND, WIND = 0.0, 8.0

@@ -2,10 +2,10 @@
 
 import warp as wp
 
-from autopilot.control.params import ControlParams
 from autopilot.control.pid import clamp_horizontal
-from autopilot.control.trajectory import TrajectoryState, flown_velocity, follows_position, within_speeds
 from autopilot.ports import Estimate
+from autopilot.vehicles.multirotor.params import ControlParams
+from autopilot.vehicles.multirotor.trajectory import TrajectoryState, flown_velocity, follows_position, within_speeds
 
 wp.set_module_options({"enable_backward": False})
 

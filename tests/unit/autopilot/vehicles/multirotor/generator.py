@@ -4,10 +4,10 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-from autopilot.control.params import ControlParams, control_params
-from autopilot.control.position import velocity_setpoint
-from autopilot.control.trajectory import TrajectoryState, trajectory_at_estimate, trajectory_step
 from autopilot.ports import Estimate, Setpoint
+from autopilot.vehicles.multirotor.params import ControlParams, control_params
+from autopilot.vehicles.multirotor.position import velocity_setpoint
+from autopilot.vehicles.multirotor.trajectory import TrajectoryState, trajectory_at_estimate, trajectory_step
 
 wp.set_module_options({"enable_backward": False})
 

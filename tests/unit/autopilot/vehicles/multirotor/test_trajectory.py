@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tests.unit.autopilot.control.generator import FRAME_S, Generator
+from tests.unit.autopilot.vehicles.multirotor.generator import FRAME_S, Generator
 
 NAN = float("nan")
 

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from autopilot.control.params import CONTROL_PARAMETERS, ControlParams, control_params
+from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS, ControlParams, control_params
 from common.params import ParameterTable
 
 

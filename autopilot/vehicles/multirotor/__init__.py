@@ -1,0 +1,1 @@
+"""The multirotor: three to eight rotors that push along one axis."""
