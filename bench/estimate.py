@@ -1,8 +1,9 @@
 """`python -m bench.estimate FOLDER`: how far `honeyguide estimate` lies from EKF2, over a folder of recorded flights.
 
 In: each NAME.ulg of the folder and, where there is one, NAME.ekf2.csv: what PX4's EKF2 makes of the same samples
-(docs/estimate.md has its columns). Out: median and largest difference of tilt, yaw, velocity and position from 10 s on,
-and whether they are inside the band in which EKF2 agrees with its own past; the vehicle's own estimate beside both.
+(docs/how-to/estimate.md has its columns). Out: median and largest difference of tilt, yaw, velocity and position from
+10 s on, and whether they are inside the band in which EKF2 agrees with its own past; the vehicle's own estimate beside
+both.
 """
 
 import argparse

@@ -41,7 +41,7 @@ PAGE = """\
 The policy that ships (`policies/pretrained/navigate.pt`, on ranges) in held-out forests, {episodes} episodes of each
 density, goals 60 to 85 m away: estimator, sensor noise, wind up to 6 m/s with gusts, masses and motors that differ.
 Actions are the most probable ones. Made by `python -m bench.navigate`; the task is told in
-[navigate.md](../navigate.md).
+[navigate.md](../explanation/navigate.md).
 
 Rates have Wilson's 95 % interval, speeds the bootstrap's over episodes. Mean speed is the length of the way flown over
 its time, standing start included, of the flights that arrived; "straight" is how much nearer the goal came over that

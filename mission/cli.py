@@ -143,7 +143,7 @@ def fly(
 
 @app.command()
 def estimate(
-    log: Annotated[Path, typer.Argument(help="A PX4 ULog (.ulg), or a sensor CSV (docs/estimate.md).")],
+    log: Annotated[Path, typer.Argument(help="A PX4 ULog (.ulg), or a sensor CSV (docs/how-to/estimate.md).")],
     output: Annotated[Path | None, typer.Option(help="Folder for the results. Default: beside the log.")] = None,
     param: Annotated[
         list[str] | None, typer.Option(help="Sets a parameter of the estimator: NAME=VALUE. Repeatable.")

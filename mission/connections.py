@@ -123,7 +123,7 @@ def open_page(port: int) -> "PageServer":
         return PageServer(port, "Honeyguide")
     except ImportError as error:
         raise UserError(
-            f"--view: {error.name} is missing; it comes with the extra 'viewer' (docs/flying.md, Installing)"
+            f"--view: {error.name} is missing; it comes with the extra 'viewer' (docs/start/installing.md)"
         ) from error
     except OSError as error:
         raise UserError(f"--view-port {port}: {error.strerror}") from error

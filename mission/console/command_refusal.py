@@ -29,4 +29,4 @@ def learn_extra() -> Iterator[None]:
     except ModuleNotFoundError as error:
         if error.name not in _LEARN_PACKAGES:
             raise
-        refuse(f"this needs {error.name}, which comes with the extra 'learn' (docs/flying.md, Installing)")
+        refuse(f"this needs {error.name}, which comes with the extra 'learn' (docs/start/installing.md)")

@@ -1,4 +1,4 @@
-"""Sensor CSV files as recordings: one line per sample, `time_us,sensor,v0,v1,...` (docs/estimate.md)."""
+"""Sensor CSV files as recordings: one line per sample, `time_us,sensor,v0,v1,...` (docs/how-to/estimate.md)."""
 
 from math import isfinite
 from pathlib import Path

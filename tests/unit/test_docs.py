@@ -2,13 +2,13 @@
 
 import inspect
 import re
-import runpy
 import shlex
 import socket
 
 import pytest
 from typer.testing import CliRunner
 
+from docs.generate import generated_pages
 from mission.cli import app
 from policies.learn.config.command_line import flags
 from tests.documents import PACKAGES, ROOT, anchors, blocks, commands, links, pages, references
@@ -145,7 +145,7 @@ def test_examples_run(name, tmp_path, monkeypatch):
 
 
 def test_tests_that_are_named_for_clients_exist():
-    page = PAGES["docs/clients.md"]
+    page = PAGES["docs/how-to/clients.md"]
     files = {name: (page.parent / target).read_text(encoding="utf-8") for name, target in references(page).items()}
     rows = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("|")]
     named = [(test, re.findall(r"\[([\w-]+)\]", row)) for row in rows for test in re.findall(r"`(test_\w+)`", row)]
@@ -162,20 +162,19 @@ def test_reference_links_are_defined_and_used():
             assert name in used, f"{page}: [{name}]"
 
 
-def test_generated_pages_are_current(monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "docs")
-    for path, text in runpy.run_path(str(ROOT / "docs" / "generate.py"))["generated_pages"]().items():
-        assert path.read_text(encoding="utf-8") == text, "python docs/generate.py"
+def test_generated_pages_are_current():
+    for path, text in generated_pages().items():
+        assert path.read_text(encoding="utf-8") == text, "python -m docs.generate"
 
 
 SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options are described, if there are several
-    "fly": ("docs/flying.md", "Options"),
-    "follow": ("docs/follow-me.md", "Options of follow"),
-    "replay": ("docs/flying.md", "Looking at a run again"),
-    "companion": ("docs/companion.md", "The companion computer"),
-    "play": ("docs/demonstrations.md", "Watch"),
-    "drive": ("docs/demonstrations.md", "Drive"),
-    "demonstrate": ("docs/demonstrations.md", "Record"),
+    "fly": ("docs/how-to/flying.md", "Options"),
+    "follow": ("docs/how-to/follow-me.md", "Options of follow"),
+    "replay": ("docs/how-to/flying.md", "Looking at a run again"),
+    "companion": ("docs/how-to/companion.md", "The companion computer"),
+    "play": ("docs/how-to/demonstrations.md", "Watch"),
+    "drive": ("docs/how-to/demonstrations.md", "Drive"),
+    "demonstrate": ("docs/how-to/demonstrations.md", "Record"),
 }
 
 
@@ -200,7 +199,7 @@ def is_argument(parameter):
 
 
 def test_options_of_train_are_all_described():
-    page = PAGES["docs/training.md"].read_text(encoding="utf-8").partition("## Options of train")[2]
+    page = PAGES["docs/how-to/training.md"].read_text(encoding="utf-8").partition("## Options of train")[2]
     described = set(re.findall(r"^\| `(--[\w-]+)", page, re.MULTILINE))
     train = next(command for command in app.registered_commands if command.callback.__name__ == "train")
     arguments = {"return", "context", "task_or_config"}

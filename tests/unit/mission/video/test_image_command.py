@@ -11,8 +11,8 @@ from tests.unit.test_docs import ROOT
 
 
 def documented():
-    """The arguments of the command in docs/camera.md."""
-    (line,) = re.findall(r"honeyguide picture (camera\.jpg .*)", (ROOT / "docs" / "camera.md").read_text())
+    """The arguments of the command in docs/how-to/camera.md."""
+    (line,) = re.findall(r"honeyguide picture (camera\.jpg .*)", (ROOT / "docs" / "how-to" / "camera.md").read_text())
     return line.split()
 
 

@@ -1,4 +1,4 @@
-"""The text of docs/training-config.md, made from the models that read the configuration."""
+"""The text of docs/reference/training-config.md, made from the models that read the configuration."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +11,7 @@ from policies.learn.config.command_line import flags
 HEADER = """\
 # Training configuration
 
-Written by `docs/generate.py` from the code: do not edit.
+Written by `python -m docs.generate` from the code: do not edit.
 
 A run is configured by a YAML file in the form of Unity ML-Agents, whose keys and defaults are these. Keys marked with a
 star are ours, and unknown to ML-Agents; their defaults keep its behaviour, `normalize_reward` excepted.

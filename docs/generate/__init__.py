@@ -1,11 +1,7 @@
-"""Writes the pages of docs that come from the code: `python docs/generate.py`. A test keeps them current."""
+"""The pages of docs that come from the code, written by `python -m docs.generate`. A test keeps them current."""
 
 from collections.abc import Iterable
 from pathlib import Path
-
-from mavlink_page import mavlink_text
-from tasks_page import tasks_text
-from training_page import training_text
 
 from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
 from autopilot.commander.params import COMMANDER_PARAMETERS
@@ -18,15 +14,14 @@ from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.params import SYSTEM_PARAMETERS, parameter_table
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
 from common.airframe import load_airframe
-from common.files import write_whole
 from common.params import Parameter
+from docs.generate.mavlink_page import mavlink_text
+from docs.generate.tasks_page import tasks_text
+from docs.generate.training_page import training_text
 from mission.flight import Flight, FlightConfig
 from mission.simulator.simulator_params import simulator_parameters
 
-PARAMETERS_PATH = Path(__file__).with_name("parameters.md")
-MAVLINK_PATH = Path(__file__).with_name("mavlink.md")
-TASKS_PATH = Path(__file__).with_name("tasks.md")
-TRAINING_PATH = Path(__file__).with_name("training-config.md")
+REFERENCE = Path(__file__).parents[1] / "reference"
 SECTIONS = {
     "Estimator": ESTIMATOR_PARAMETERS,
     "Control": CONTROL_PARAMETERS,
@@ -39,17 +34,17 @@ SECTIONS = {
 }
 HEADER = """# Parameters
 
-Written by `docs/generate.py` from the declarations: do not edit.
+Written by `python -m docs.generate` from the declarations: do not edit.
 
 Names are PX4's where the meaning is PX4's. Defaults are those of the x500; a source `airframe file` means that another
 airframe brings its own. They are read and set over MAVLink (PARAM_*), by a ground station or by a
-[script](script.md); a value out of range is set to the nearest bound, and the vehicle says so. `make tune` shows how
-the gains were designed.
+[script](../how-to/script.md); a value out of range is set to the nearest bound, and the vehicle says so. `make tune`
+shows how the gains were designed.
 """
 
 ARDUPILOT_HEADER = """## In the ArduPilot dialect alone
 
-PX4 has nothing like them: a vehicle has them with [`--dialect ardupilot`](flying.md#dialects).
+PX4 has nothing like them: a vehicle has them with [`--dialect ardupilot`](../how-to/flying.md#dialects).
 
 """
 
@@ -62,8 +57,8 @@ are not kept for the next flight. The flight controller does not read them.
 
 ALIAS_HEADER = """## Names in the ArduPilot dialect
 
-With [`--dialect ardupilot`](flying.md#dialects) the vehicle has these names too. Those that stand for nothing can
-only be read.
+With [`--dialect ardupilot`](../how-to/flying.md#dialects) the vehicle has these names too. Those that stand for
+nothing can only be read.
 
 """
 
@@ -89,10 +84,10 @@ def _table(declarations: Iterable[Parameter]) -> str:
 def generated_pages() -> dict[Path, str]:
     """The text of every generated page, by its path."""
     return {
-        PARAMETERS_PATH: parameters_text(),
-        MAVLINK_PATH: mavlink_text(Flight(FlightConfig()).server),
-        TRAINING_PATH: training_text(),
-        TASKS_PATH: tasks_text(),
+        REFERENCE / "parameters.md": parameters_text(),
+        REFERENCE / "mavlink.md": mavlink_text(Flight(FlightConfig()).server),
+        REFERENCE / "training-config.md": training_text(),
+        REFERENCE / "tasks.md": tasks_text(),
     }
 
 
@@ -112,8 +107,3 @@ def _alias_table() -> str:
             numbers = ", ".join(f"{theirs} = {ours}" for ours, theirs in alias.numbers.items())
             lines[alias.name] = f"| {alias.name} | {alias.of} | | {numbers} |"
     return "\n".join([*rows, *(lines[name] for name in sorted(lines))]) + "\n"
-
-
-if __name__ == "__main__":
-    for path, text in generated_pages().items():
-        write_whole(path, text.encode())

@@ -1,4 +1,4 @@
-"""The text of docs/mavlink.md, made from the server's own tables and docstrings: what it says, understands, refuses."""
+"""The text of docs/reference/mavlink.md: what the vehicle says, understands and refuses, from the server's tables."""
 
 import inspect
 import re
@@ -18,15 +18,15 @@ from autopilot.mavlink.service import CommandHandler
 from autopilot.mavlink.telemetry.telemetry_rates import Stream
 from autopilot.mavlink.wire.codec import known_type
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 HEADER = """\
 # MAVLink
 
-Written by `docs/generate.py` from the code: do not edit.
+Written by `python -m docs.generate` from the code: do not edit.
 
-What the vehicle says and understands. How to connect each ground station or library is in [clients](clients.md); the
-parameters are in [parameters](parameters.md). Time is simulated time everywhere: rates, intervals and time-outs count
-the vehicle's seconds, which pass faster than yours with `--speed` above 1.
+What the vehicle says and understands. How to connect each ground station or library is in
+[clients](../how-to/clients.md); the parameters are in [parameters](parameters.md). Time is simulated time everywhere:
+rates, intervals and time-outs count the vehicle's seconds, which pass faster than yours with `--speed` above 1.
 
 Rules that hold for everything below:
 

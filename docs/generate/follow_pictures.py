@@ -1,30 +1,27 @@
-"""The pictures of docs/follow-me.md and the README: the live page in Chromium, and three moments of the film.
+"""The pictures of docs/how-to/follow-me.md and the README: the live page in Chromium, and three moments of the film.
 
-python docs/follow_pictures.py, from the project's folder; needs Chromium. Writes docs/images/live.jpg and follow.jpg.
+`python -m docs.generate.follow_pictures`; needs Chromium. Writes docs/images/live.jpg and follow.jpg.
 """
 
-import sys
 import tempfile
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-IMAGES = Path(__file__).parent / "images"
-sys.path.insert(0, str(IMAGES.parents[1]))
+from mission.flight import FlightConfig
+from mission.flight_config import OwnerConfig
+from mission.follow.follow_session import chosen_pilot, score_lines, watch_of
+from mission.follow.lockstep import flight_with_companion, take_off
+from mission.view.chase_camera import PICTURE_S
+from mission.view.film_images import film
+from mission.view.live import LiveView
+from mission.view.page import PageServer
+from mission.view.replay_file import Recorder
+from policies.tasks.follow_me.world import FOLLOW_WORLD
+from tests.browser import Browser
 
-from mission.flight import FlightConfig  # noqa: E402
-from mission.flight_config import OwnerConfig  # noqa: E402
-from mission.follow.follow_session import chosen_pilot, score_lines, watch_of  # noqa: E402
-from mission.follow.lockstep import flight_with_companion, take_off  # noqa: E402
-from mission.view.chase_camera import PICTURE_S  # noqa: E402
-from mission.view.film_images import film  # noqa: E402
-from mission.view.live import LiveView  # noqa: E402
-from mission.view.page import PageServer  # noqa: E402
-from mission.view.replay_file import Recorder  # noqa: E402
-from policies.tasks.follow_me.world import FOLLOW_WORLD  # noqa: E402
-from tests.browser import Browser  # noqa: E402
-
+IMAGES = Path(__file__).parents[1] / "images"
 SEED = 5
 FOLLOWED_S = 25.0
 MOMENTS_S = (17.0, 25.0, 33.0)  # of the film

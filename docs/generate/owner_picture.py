@@ -1,4 +1,4 @@
-"""Draws docs/images/owner.png: `python docs/owner_picture.py`. An owner among trees, their phone, and the track.
+"""Draws docs/images/owner.png, an owner among trees and their track: `python -m docs.generate.owner_picture`.
 
 Three minutes of a running owner. A camera 2 m behind sees them 15 s out of 20, with the errors the tracker expects.
 """
@@ -17,7 +17,7 @@ from sim.walking_owner import Owner
 from sim.world.people import CHEST_M, RUN_SPEED_M_S, person_model
 from sim.world.world import WorldMap, build_world
 
-PICTURE = Path(__file__).with_name("images") / "owner.png"
+PICTURE = Path(__file__).parents[1] / "images" / "owner.png"
 SECONDS, SEED = 180, 8
 DECISION_TICKS = 25
 SEEN, OF = 150, 200  # decisions

@@ -1,4 +1,4 @@
-"""The text of docs/tasks.md, made from the layouts, settings and numbers of the tasks themselves."""
+"""The text of docs/reference/tasks.md, made from the layouts, settings and numbers of the tasks themselves."""
 
 import re
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from policies.tasks.task import Task
 HEADER = """\
 # Tasks
 
-Written by `docs/generate.py` from the code: do not edit.
+Written by `python -m docs.generate` from the code: do not edit.
 
 What each task shows, takes and can be set to, as a reference. Gymnasium knows them as `policies:honeyguide/NAME-v0`,
 with the settings as keyword arguments; `honeyguide` takes settings as `--env-args KEY=VALUE`, and training
@@ -23,11 +23,11 @@ configurations set or randomise the numbers by name under `environment_parameter
 | task | what is to be done |
 |---|---|
 | [RollerBall](#rollerball) | roll a ball to a cube, by forces: ML-Agents' tutorial. +1 for the cube |
-| [ReachTarget](#reachtarget) | drive a car with four driven wheels to a target: [reach-target.md](reach-target.md) |
-| [Parking1](#parking1) | park a car between three blocks: [parking.md](parking.md) |
-| [Parking2](#parking2) | park a car on one of two storeys, past moving obstacles: [parking.md](parking.md) |
-| [FollowMe](#followme) | a drone follows a person through hills and trees: [follow-me.md](follow-me.md) |
-| [Navigate](#navigate) | fly a drone through forest to a goal, at speed: [navigate.md](navigate.md) |
+| [ReachTarget](#reachtarget) | drive a car with four driven wheels to a pose: [more](../explanation/reach-target.md) |
+| [Parking1](#parking1) | park a car between three blocks: [more](../explanation/parking.md) |
+| [Parking2](#parking2) | park a car on one of two storeys, past moving obstacles: [more](../explanation/parking.md) |
+| [FollowMe](#followme) | a drone follows a person through hills and trees: [more](../how-to/follow-me.md) |
+| [Navigate](#navigate) | fly a drone through forest to a goal, at speed: [more](../explanation/navigate.md) |
 | Hover | hold a drone at a point by body rates and thrust, on its estimate; in Gymnasium only |
 
 The linked pages say what the presets are made of, how rewards are paid, and which spots are held out for tests. Every
