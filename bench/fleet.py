@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import parameter_table
 from bench.row import require
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
+from sim.hovering import fly_to_hover
 from sim.restore import RowRestore
 from sim.rig import Rig, Snapshot
 from sim.sensors.sensors import sensor_model
@@ -19,8 +19,6 @@ from sim.world.world import build_world
 
 HEIGHT_M = 10.0
 _SEED_COUNT = 128  # vehicles flown from power-on; larger fleets are copies with noise of their own
-_ALIGN_TICKS = 2000
-_CLIMB_TICKS = 2000
 
 
 def hovering(vehicle_count: int, *, has_estimator: bool = True, threads: int = 1) -> Rig:
@@ -81,12 +79,5 @@ def _rig(vehicle_count: int, has_estimator: bool, threads: int) -> Rig:
 @cache
 def _hovers(has_estimator: bool) -> Rig:
     rig = _rig(_SEED_COUNT, has_estimator, 1)
-    rig.advance(_ALIGN_TICKS)
-    rows = rig.rows["autopilot.setpoint"]
-    for i in range(_SEED_COUNT):
-        port = SetpointPort(rows[i : i + 1])
-        port.set_flags(is_armed=True, is_landed=False)
-        port.fly_to((0.0, 0.0, -HEIGHT_M), 0.0)
-        port.write()
-    rig.advance(_CLIMB_TICKS)
+    fly_to_hover(rig, [((0.0, 0.0, -HEIGHT_M), 0.0)] * _SEED_COUNT)
     return rig

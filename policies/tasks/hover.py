@@ -17,13 +17,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import parameter_table
 from autopilot.ports import SETPOINT_RATE, Setpoint
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
 from common.kernels import FRAME_TICKS, TICK_S
 from sim.advance import RigArrays
+from sim.hovering import Hover, fly_to_hover
 from sim.restore import RowRestore
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
@@ -44,8 +44,6 @@ EPISODE_STEPS = 500  # 10 s
 STEP_S = FRAME_TICKS * TICK_S
 START_COUNT = 64  # hovers in the bank
 _START_SPREAD_M = 0.5  # of the places they hover at, per axis
-_ALIGN_TICKS = 2000  # 8 s: power-on until the estimator is aligned and has used GNSS
-_CLIMB_TICKS = 2000  # 8 s: up, and settled
 
 OBSERVATION_SIZE = 16
 """To the hover point [m] 0-2, velocity [m/s] 3-5, down 6-8, rate [rad/s] 9-11, all in frd; last action 12-15."""
@@ -232,14 +230,10 @@ def _recorded(kernel: Any, vehicle_count: int, inputs: list[Any]) -> Any:
 def _bank() -> Rig:
     """Vehicles that hover near the point, flown there from power-on by the flight controller itself."""
     rig = _rig(START_COUNT, 0)
-    rig.advance(_ALIGN_TICKS)
     rng = np.random.default_rng(0)
-    rows = rig.rows["autopilot.setpoint"]
-    for i in range(START_COUNT):
+    hovers: list[Hover] = []
+    for _ in range(START_COUNT):
         north, east, down = np.array(HOVER_NED) + rng.uniform(-_START_SPREAD_M, _START_SPREAD_M, 3)
-        port = SetpointPort(rows[i : i + 1])
-        port.set_flags(is_armed=True, is_landed=False)
-        port.fly_to((north, east, down), rng.uniform(-np.pi, np.pi))
-        port.write()
-    rig.advance(_CLIMB_TICKS)
+        hovers.append(((north, east, down), rng.uniform(-np.pi, np.pi)))
+    fly_to_hover(rig, hovers)
     return rig

@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 
-from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import parameter_table
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
+from sim.hovering import Hover, fly_to_hover
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
 from sim.wind import wind_model
@@ -22,8 +22,6 @@ AIRFRAME = "x500"
 HOVER_COUNT = 64
 LOW_M = (1.5, 2.5)  # heights of hovers
 _SPREAD_M = 0.5  # of the places they hover at, to the north and to the east
-_ALIGN_TICKS = 2000  # 8 s: power-on until the estimator is aligned and has used GNSS
-_CLIMB_TICKS = 2000  # 8 s: up, and settled
 
 
 def build_rig(world: WorldMap | WorldBatch, count: int, *, has_estimator: bool, threads: int, device: str) -> Rig:
@@ -49,19 +47,12 @@ def hover_bank(has_estimator: bool, device: str, heights_m: tuple[float, float] 
     """Vehicles that hover above home, between two heights, each with a heading of its own."""
     plain = WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0)
     rig = build_rig(build_world(plain, device), HOVER_COUNT, has_estimator=has_estimator, threads=1, device=device)
-    rig.advance(_ALIGN_TICKS)
     rng = np.random.default_rng(0)
-    setpoints = rig.setpoints
-    rows = setpoints.numpy()
     low, high = heights_m
     middle, spread = np.array([0.0, 0.0, -0.5 * (low + high)]), np.array([_SPREAD_M, _SPREAD_M, 0.5 * (high - low)])
-    for i in range(HOVER_COUNT):
+    hovers: list[Hover] = []
+    for _ in range(HOVER_COUNT):
         north, east, down = middle + rng.uniform(-spread, spread)
-        port = SetpointPort(rows[i : i + 1])
-        port.set_flags(is_armed=True, is_landed=False)
-        port.fly_to((north, east, down), rng.uniform(-np.pi, np.pi))
-        port.write()
-    if setpoints.device.is_cuda:
-        setpoints.assign(rows)
-    rig.advance(_CLIMB_TICKS)
+        hovers.append(((north, east, down), rng.uniform(-np.pi, np.pi)))
+    fly_to_hover(rig, hovers)
     return rig
