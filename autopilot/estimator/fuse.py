@@ -301,7 +301,6 @@ def noise_variance(aid: Aid, std: float) -> float:
 def mark_fused(aid: Aid) -> Aid:
     """The aid after its judged sample was fused."""
     aid.fused_time_us = aid.judged_time_us
-    aid.fuse_count += 1
     return aid
 
 

@@ -92,7 +92,6 @@ class Aid:
     fused_time_us: wp.int64  # last sample that passed its gate and was fused, 0: never
     is_active: int
     reject_count: int  # rejected samples in a row
-    fuse_count: int
     reset_count: int
     test_ratio: float  # largest innov² / (gate² innov_var) of the last sample; above 1 is rejected
     test_ratio_lpf: float

@@ -12,7 +12,6 @@ from urllib.parse import urlsplit
 
 from common.image_stream import ImageFrame, ImageReader, ImageStreamError
 
-CAMERA_PORT = 14_600  # guess: a free port near the vehicle's others
 RETRY_US = 500_000
 _CHUNK = 1 << 18  # [byte] of one read: sixteen pictures of 64 x 64 x 4
 READS_MAX = 4  # of one step: a camera that floods must not hold up the pilot

@@ -1,7 +1,7 @@
 """A multirotor's body: motors, rotors, rigid body and contact, 1,000 steps a second.
 
 In: motor commands [0..1], the wind at the vehicle, the world. Out: true position, velocity, attitude, rates, what an
-ideal IMU would measure, battery. `body_tick` is one 4 ms tick of four substeps; `body_step` one substep.
+ideal IMU would measure, battery. `body_tick` is one 4 ms tick of four substeps.
 Left out: blade flapping torque, rotor wakes on the body and on each other, vortex ring state, frame flexibility, ground
 effect on tilt.
 """
@@ -301,20 +301,6 @@ def step_inputs(
         inputs.rotor_target = rotor_targets(model, command, body.battery_voltage_v)
         inputs.lift_ratio = ground_effect(model.rotor_radius_m, inputs.around.height_agl_m + model.rotor_height_m)
     return inputs
-
-
-@wp.func
-def body_step(
-    model: MultirotorModel, body: BodyState, command: vec8, wind_ned: wp.vec3, world: World, dt: float
-) -> BodyState:
-    """One substep of dt [s] with its own look at the world; the battery is left as it is.
-
-    accel_frd and gyro_frd come out as the means over this step.
-    """
-    inputs = step_inputs(model, body, command, wind_ned, world, dt)
-    body.height_agl_m = inputs.around.height_agl_m
-    body.is_on_ground = 0
-    return _substep(model, body, inputs)
 
 
 @wp.func

@@ -9,7 +9,6 @@ from policies.tasks.flight.flight_params import FLIGHT_NUMBERS
 from policies.tasks.follow_me.world import STOP_SHARE
 from policies.tasks.task_params import Number, Sampler
 
-WORLD_FIELDS = ("hill_height_m", "trees_per_ha")
 TREES_PER_HA_MAX = 300.0
 _DOCUMENT = "Personal Navigation UAV"
 _EVT = "EVT-Bench (TrackVLA, arXiv 2505.23189), at its size"

@@ -18,7 +18,7 @@ wp.set_module_options({"enable_backward": False})
 STOREY_X = (0.0, 68.86)  # [m] centres
 STOREY_Z = (0.0, 0.03)
 WALL_CENTRES = (-15.25, 15.24, -15.26, 15.30)  # [m] from a storey's centre: x of two, z of two
-WALL_THICKNESS, WALL_LENGTH = 0.61, 29.06  # [m]
+WALL_THICKNESS = 0.61  # [m]
 INNER_FACES = (  # [m] from a storey's centre; the gaps at the corners are narrower than the car: a closed room
     WALL_CENTRES[0] + WALL_THICKNESS / 2,
     WALL_CENTRES[1] - WALL_THICKNESS / 2,

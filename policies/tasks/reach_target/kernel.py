@@ -19,7 +19,6 @@ from policies.tasks.episode import (
 )
 from policies.tasks.reach_target.car_model import (
     SUBSTEPS,
-    Controls,
     Motion,
     car_of,
     controls_of,
@@ -115,16 +114,6 @@ def keep_motion(state: ReachState, i: int, motion: Motion) -> None:
     state.vel[i] = motion.vel
     state.omega_car[i] = motion.omega_car
     state.spin[i] = motion.spin
-
-
-@wp.func
-def advanced(numbers: ReachNumbers, controls: Controls, motion: Motion, count: int) -> Motion:
-    """The car after so many physics steps, whatever happens to it: for tests and the validation table."""
-    car = car_of(numbers)
-    result = motion
-    for _ in range(count * _SUBSTEPS):
-        result = driven(car, controls, result)
-    return result
 
 
 @wp.func
