@@ -1,4 +1,4 @@
-"""`python -m bench.figures`: puts bench/results.json into the README's table of figures."""
+"""`python -m bench.figures`: puts bench/results.json into the table of docs/reference/benchmarks.md."""
 
 import json
 from pathlib import Path
@@ -7,13 +7,13 @@ from typing import Any
 from common.files import write_whole
 
 RESULTS = Path(__file__).parent / "results.json"
-README = Path(__file__).parent.parent / "README.md"
+PAGE = Path(__file__).parent.parent / "docs" / "reference" / "benchmarks.md"
 DETAILS = ("least of 20", "most of 20")  # of each source: in the table that `make bench` prints
 BEGIN, END = "<!-- figures:begin -->\n", "<!-- figures:end -->\n"
 
 
 def with_figures(text: str, rows: list[dict[str, Any]]) -> str:
-    """The README's text with the given rows between its markers."""
+    """The page's text with the given rows between its markers."""
     head, rest = text.split(BEGIN)
     tail = rest.split(END)[1]
     lines = [f"On {row}:\n\n" for row in dict.fromkeys(row["machine"] for row in rows)]
@@ -31,7 +31,7 @@ def _line(row: dict[str, Any]) -> str:
 
 def main() -> None:
     rows = json.loads(RESULTS.read_text(encoding="utf-8"))
-    write_whole(README, with_figures(README.read_text(encoding="utf-8"), rows).encode())
+    write_whole(PAGE, with_figures(PAGE.read_text(encoding="utf-8"), rows).encode())
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """The documentation tells the truth: folder maps, links, commands, examples and the parameter list."""
 
 import inspect
+import json
 import re
 import shlex
 import socket
@@ -8,6 +9,7 @@ import socket
 import pytest
 from typer.testing import CliRunner
 
+from bench.figures import RESULTS, with_figures
 from docs.generate import generated_pages
 from mission.cli import app
 from policies.learn.config.command_line import flags
@@ -87,6 +89,15 @@ def test_tests_that_are_named_exist():
         for test, target in re.findall(r"\[(test_\w+)\]\(([^)]+\.py)\)", page.read_text(encoding="utf-8")):
             source = (page.parent / target).read_text(encoding="utf-8")
             assert re.search(rf"^def {test}\(", source, re.MULTILINE), f"{name}: {test}"
+
+
+def test_readme_can_be_read_at_once():
+    assert len(PAGES["README.md"].read_text(encoding="utf-8").split()) < 900
+
+
+def test_benchmarks_are_those_that_were_measured():
+    page, rows = PAGES["docs/reference/benchmarks.md"].read_text(encoding="utf-8"), json.loads(RESULTS.read_text())
+    assert with_figures(page, rows) == page, "python -m bench.figures"
 
 
 def flight_arguments(line, target, command):
