@@ -100,6 +100,27 @@ def test_benchmarks_are_those_that_were_measured():
     assert with_figures(page, rows) == page, "python -m bench.figures"
 
 
+def test_version_is_the_same_everywhere():
+    (version,) = re.findall(
+        r'^version = "([^"]+)"$', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {version}\n" in citation
+    (date,) = re.findall(r'date-released: "(.+)"', citation)
+    assert f"## [{version}] - {date}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_files_that_recipes_name_exist():
+    """In CONTRIBUTING.md; NAME stands for a file to be added, and a bare name lies beside the path before it."""
+    text = PAGES["CONTRIBUTING.md"].read_text(encoding="utf-8")
+    for row in text.partition("## Recipes")[2].partition("## Versions")[0].splitlines():
+        folder = ROOT
+        for name in re.findall(r"`([\w./-]+\.(?:py|toml|yaml|md))`", row):
+            path = ROOT / name if "/" in name else folder / name
+            folder = path.parent
+            assert path.exists() or "NAME" in name or name == "generated.py", row
+
+
 def flight_arguments(line, target, command):
     """The arguments of a command of `honeyguide` in a command line; None if it is another command."""
     words = shlex.split(line)
