@@ -136,6 +136,7 @@ class FlightController:
             mav_type=vehicle.mav_type(airframe),
         )
         self.payload = Payloads()
+        self.gimbal: GimbalControl | None = None
         self.camera = self._mount_camera()
         self.state.read_rotor_speeds = ports.read_rotor_speeds
         self._outputs = AuxOutputs(self.state)
@@ -190,9 +191,9 @@ class FlightController:
         if frames is None:
             return None
         gimbal = Gimbal(self.state)
-        self.state.gimbal = GimbalControl(gimbal, self.state)
+        self.gimbal = GimbalControl(gimbal, self.state)
         camera = Camera(self.state, gimbal, frames, self.host.media)
-        self.payload.add(self.state.gimbal)
+        self.payload.add(self.gimbal)
         self.payload.add(camera)
         return camera
 

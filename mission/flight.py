@@ -314,6 +314,10 @@ class Flight:
         air.gust_m_s = GUST_SHARE / TURBULENCE_SHARE * turbulence_m_s
         self.rig.set_air(air)
 
+    def cut_sticks(self, *, is_cut: bool) -> None:
+        """The radio link of the sticks is lost, or is back."""
+        self.controller.sticks.is_cut = is_cut
+
     @property
     def is_crashed(self) -> bool:
         """The truth: it struck something too fast, or a turning rotor struck the ground."""

@@ -74,7 +74,10 @@ def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTabl
     Raises:
         ParameterError: an unknown name, or a value out of bounds.
     """
-    own = [*ARDUPILOT_PARAMETERS, *simulator_parameters(config, airframe)] if config.dialect == "ardupilot" else []
+    own = []
+    if config.dialect == "ardupilot":
+        simulated = simulator_parameters(airframe, config.home, config.wind_m_s, config.wind_from_deg)
+        own = [*ARDUPILOT_PARAMETERS, *simulated]
     table = parameter_table(airframe, own)
     for name, value in config.parameters.items():
         table.set_exactly(name, value)

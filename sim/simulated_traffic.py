@@ -8,7 +8,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from autopilot.inputs.traffic import Aircraft
+from autopilot.interface.aircraft import Aircraft
 from common.geodesy import GeoPoint, geodetic_from_ned
 
 HEARD_WITHIN_M = 5_000.0  # half the length of a passage

@@ -3,9 +3,9 @@
 In: reports, each with its time. Out: the list, bounded, and the conflict that the failsafe table acts on.
 """
 
-from dataclasses import dataclass
 from math import hypot, inf
 
+from autopilot.interface.aircraft import Aircraft
 from autopilot.interface.vehicle_state import VehicleState
 from common.geodesy import ned_from_geodetic
 from common.params import Parameter, ParameterTable
@@ -22,22 +22,6 @@ TRAFFIC_PARAMETERS: list[Parameter] = [
     Parameter("NAV_TRAFF_A_VER", 500.0, 0.0, 5_000.0, "m", "vertical distance of an aircraft that is near",
               "PX4 1.15 default"),
 ]  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Aircraft:
-    """One report."""
-
-    icao: int  # 24-bit address
-    callsign: str
-    lat_deg: float
-    lon_deg: float
-    alt_amsl_m: float
-    heading_rad: float
-    speed_m_s: float  # over ground
-    climb_m_s: float
-    emitter_type: int = 0  # ADSB_EMITTER_TYPE
-    squawk: int = 0
 
 
 class Traffic:

@@ -16,6 +16,7 @@ from autopilot.interface.item_lists import ItemLists
 from autopilot.interface.platform import Host
 from autopilot.interface.vehicle_state import Mode, Reply, Severity, VehicleState
 from autopilot.payload.camera.camera import Camera
+from autopilot.payload.gimbal.gimbal_control import GimbalControl
 from autopilot.payload.payloads import Payloads
 from common.params import ParameterTable
 
@@ -124,6 +125,7 @@ class Vehicle(Protocol):
     params: ParameterTable
     host: Host
     camera: Camera | None
+    gimbal: GimbalControl | None
 
     @property
     def lists(self) -> ItemLists:

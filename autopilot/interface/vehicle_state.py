@@ -8,15 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from math import nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from autopilot.inputs.obstacles import Obstacles
 from autopilot.inputs.sticks import StickInput
+from autopilot.interface.aircraft import Aircraft
 from common.geodesy import GeoPoint, geodetic_from_ned
-
-if TYPE_CHECKING:  # they work on the state below
-    from autopilot.inputs.obstacles import Obstacles
-    from autopilot.inputs.traffic import Aircraft
-    from autopilot.payload.gimbal.gimbal_control import GimbalControl
 
 
 class Mode(IntEnum):
@@ -185,13 +182,12 @@ class VehicleState:
     mission_state: int = 0  # MISSION_STATE
     aux_pulses_us: tuple[int, ...] = (0,) * 8  # of the outputs 9 to 16, 0: never set
     traffic_conflict_us: int = 0  # until then an aircraft counts as near
-    nearest_aircraft: "Aircraft | None" = None
+    nearest_aircraft: Aircraft | None = None
     read_rotor_speeds: Callable[[], Sequence[float]] | None = None  # [rad/s] as the ESCs report them
     read_winch: Callable[[], WinchStatus] | None = None  # asked when it is sent
-    obstacles: "Obstacles | None" = None
+    obstacles: Obstacles | None = None
     relays: int = 0  # a bit for each that is on
     orbit: OrbitStatus | None = None  # while one is flown
-    gimbal: "GimbalControl | None" = None  # None: the vehicle carries none
     sticks: StickInput = field(default_factory=StickInput)
     fence: FenceState = field(default_factory=FenceState)
     ticks: "list[VehicleState]" = field(

@@ -127,7 +127,7 @@ class Endpoint:
         self.on_request: dict[int, Callable[[Sender], None]] = {}  # by message: who hears that it was asked for
         self.compids = {AUTOPILOT_COMPONENT}  # the vehicle's components behind these links
         self.parameters = ParameterView(vehicle.params, dialect)
-        self.telemetry = Telemetry(dialect, sysid, vehicle.host, has_gimbal=vehicle.state.gimbal is not None)
+        self.telemetry = Telemetry(dialect, sysid, vehicle.host, gimbal=vehicle.gimbal)
         self.needs_ticks = False  # a client gets messages more often than once per frame
         self.sent_count = 0  # frames sent because of somebody's message, for the sharing of work
         self.asker: Channel | None = None  # whose message is being handled

@@ -179,10 +179,10 @@ class MavlinkServer:
         """The vehicle's components besides the autopilot, and what the autopilot itself does for them."""
         endpoint, vehicle = self._endpoint, self._endpoint.vehicle
         components: list[Component] = []
-        if vehicle.state.gimbal is not None:
-            device = GimbalDevice(endpoint, vehicle.state.gimbal)
+        if vehicle.gimbal is not None:
+            device = GimbalDevice(endpoint, vehicle.gimbal)
             components.append(device)
-            self._add(GimbalManager(endpoint, vehicle.state.gimbal, device))
+            self._add(GimbalManager(endpoint, vehicle.gimbal, device))
         if vehicle.camera is not None:
             camera = CameraComponent(endpoint, vehicle.camera)
             components.append(camera)

@@ -6,16 +6,13 @@ Whatever has to do with the payload's own aim is not here.
 
 from enum import IntEnum
 from math import atan2, hypot, isfinite, nan, pi, radians
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
-from autopilot.navigator.setpoint import Vector
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, VehicleState, Verdict
+from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import SETPOINT_TRAJECTORY
 from common.attitude import wrapped
 from common.kernels import FRAME_US
-
-if TYPE_CHECKING:
-    from autopilot.navigator.context import NavContext
 
 _FRAME_S = FRAME_US * 1e-6
 _NEAR_M = 1.0  # nearer than this a direction means nothing; guess
@@ -33,12 +30,26 @@ class YawMode(IntEnum):
     ALONG_TRAJECTORY = 3
 
 
+class FlownLeg(Protocol):
+    """What the heading depends on (autopilot.navigator.context)."""
+
+    state: VehicleState
+    setpoint: SetpointPort
+    is_landing: bool
+    leg_yaw: float  # [rad] of the mission leg being flown
+    yaw_mode: int  # MPC_YAW_MODE
+
+    def number(self, name: str) -> float:
+        """The value of a parameter in its own unit."""
+        ...
+
+
 class Heading:
     """The heading of one vehicle, beyond what the mode itself asks for."""
 
     __slots__ = ("_context", "_direction", "_offset", "_rate", "_roi", "_turn", "_turned", "is_active", "is_item_yaw")
 
-    def __init__(self, context: "NavContext") -> None:
+    def __init__(self, context: FlownLeg) -> None:
         self._context = context
         self._roi: Vector | None = None
         self._offset = 0.0  # [rad] added to the heading of the mode

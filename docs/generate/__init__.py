@@ -67,7 +67,8 @@ def parameters_text() -> str:
     """The whole page."""
     x500 = parameter_table(load_airframe("x500")).declarations
     sections = [f"## {title}\n\n{_table(x500[item.name] for item in declared)}" for title, declared in SECTIONS.items()]
-    simulator = simulator_parameters(FlightConfig(), load_airframe("x500"))
+    config = FlightConfig()
+    simulator = simulator_parameters(load_airframe(config.airframe), config.home, config.wind_m_s, config.wind_from_deg)
     ardupilot = [ARDUPILOT_HEADER + _table(ARDUPILOT_PARAMETERS), SIMULATOR_HEADER + _table(simulator)]
     return "\n".join([HEADER, *sections, *ardupilot, ALIAS_HEADER + _alias_table()])
 

@@ -5,15 +5,13 @@ They are those of one flight: none is kept for the next.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from autopilot.interface.failure_requests import Failure, Unit
+from autopilot.interface.vehicle_state import Reply
 from common.airframe import Airframe
-from common.params import Parameter
-
-if TYPE_CHECKING:
-    from mission.flight import Flight
-    from mission.flight_config import FlightConfig
+from common.geodesy import GeoPoint
+from common.params import Parameter, ParameterTable
 
 PREFIX = "SIM_"
 SPEEDUP = "SIM_SPEEDUP"
@@ -22,15 +20,15 @@ _OURS = "the flight's options"
 _ARDUPILOT = "ArduPilot default"
 
 
-def simulator_parameters(config: "FlightConfig", airframe: Airframe) -> list[Parameter]:
+def simulator_parameters(airframe: Airframe, home: GeoPoint, wind_m_s: float, wind_from_deg: float) -> list[Parameter]:
     """The declarations; the defaults are what the flight is made from."""
-    battery, home = airframe.battery, config.home
-    turbulence = TURBULENCE_SHARE * config.wind_m_s
+    battery = airframe.battery
+    turbulence = TURBULENCE_SHARE * wind_m_s
     full_v, empty_v = (battery.cells * volts for volts in (battery.full_cell_v, battery.empty_cell_v))
     return [
         Parameter(SPEEDUP, 1.0, 0.0, 1000.0, "", "simulated seconds per second, 0: as fast as possible", _OURS),
-        Parameter("SIM_WIND_SPD", config.wind_m_s, 0.0, 20.0, "m/s", "mean wind", _OURS),
-        Parameter("SIM_WIND_DIR", config.wind_from_deg, 0.0, 360.0, "deg", "where the wind comes from", _OURS),
+        Parameter("SIM_WIND_SPD", wind_m_s, 0.0, 20.0, "m/s", "mean wind", _OURS),
+        Parameter("SIM_WIND_DIR", wind_from_deg, 0.0, 360.0, "deg", "where the wind comes from", _OURS),
         Parameter("SIM_WIND_TURB", turbulence, 0.0, 5.0, "m/s",
                   "turbulence: deviation of the vertical wind; gusts are up to three times that", _OURS),
         Parameter("SIM_GPS1_ENABLE", 1, 0, 1, "", "0: the GNSS receiver falls silent", _ARDUPILOT),
@@ -53,6 +51,32 @@ def simulator_parameters(config: "FlightConfig", airframe: Airframe) -> list[Par
     ]  # fmt: skip
 
 
+class Injector(Protocol):
+    """What breaks and repairs the simulated parts (mission.simulator.failure_injection)."""
+
+    def inject(self, unit: Unit, failure: Failure, instance: int) -> Reply: ...
+
+    def weaken(self, rotor: int, share: float) -> None: ...
+
+    def charge_to(self, rest_v: float) -> None: ...
+
+
+class SimulatedFlight(Protocol):
+    """What the parameters act on (mission.flight)."""
+
+    params: ParameterTable
+    airframe: Airframe
+
+    @property
+    def injector(self) -> Injector: ...
+
+    def change_speed(self, speed: float | None) -> None: ...
+
+    def set_air(self, speed_m_s: float, from_deg: float, turbulence_m_s: float) -> None: ...
+
+    def cut_sticks(self, *, is_cut: bool) -> None: ...
+
+
 class SimulatorParameters:
     """Does what the simulator's parameters say.
 
@@ -60,7 +84,7 @@ class SimulatorParameters:
         flight: whose; its parameters are followed from now on.
     """
 
-    def __init__(self, flight: "Flight") -> None:
+    def __init__(self, flight: SimulatedFlight) -> None:
         self._flight = flight
         self._is_told = False  # by the flight itself: it has been done already
         self._actions: dict[str, Callable[[], None]] = {
@@ -119,4 +143,4 @@ class SimulatorParameters:
         self._flight.injector.charge_to(self._value("SIM_BATT_VOLTAGE"))
 
     def _cut_sticks(self) -> None:
-        self._flight.controller.sticks.is_cut = bool(self._value("SIM_RC_FAIL"))
+        self._flight.cut_sticks(is_cut=bool(self._value("SIM_RC_FAIL")))

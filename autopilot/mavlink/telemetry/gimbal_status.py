@@ -27,10 +27,8 @@ _status = known_type("GIMBAL_MANAGER_STATUS").pack
 _orientation = known_type("MOUNT_ORIENTATION").pack
 
 
-def gimbal_manager_information(state: VehicleState) -> bytes | None:
+def gimbal_manager_information(state: VehicleState) -> bytes:
     """What the gimbal can do; asking for it starts the gimbal's status and attitude on this link."""
-    if state.gimbal is None:
-        return None
     return _information(
         time_boot_ms=boot_ms(state.time_us),
         cap_flags=DEVICE_ABILITIES | mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL,
@@ -42,20 +40,15 @@ def gimbal_manager_information(state: VehicleState) -> bytes | None:
     )
 
 
-def gimbal_manager_status(state: VehicleState, sysid: int) -> bytes | None:
-    """Who has control of the gimbal, and how it holds its yaw; 5 Hz on links that have asked for its information."""
-    control = state.gimbal
-    if control is None:
-        return None
+def gimbal_manager_status(control: GimbalControl, sysid: int, state: VehicleState) -> bytes:
+    """Who has control of the gimbal; at 5 Hz on links that have asked for its information."""
     primary, secondary = (_ids(client, sysid) for client in (control.control.primary, control.control.secondary))
     return _status(boot_ms(state.time_us), manager_flags(control), DEVICE_ID, *primary, *secondary)
 
 
-def mount_orientation(state: VehicleState) -> bytes | None:
+def mount_orientation(control: GimbalControl, state: VehicleState) -> bytes:
     """Where the camera points (the old message)."""
-    if state.gimbal is None:
-        return None
-    gimbal = state.gimbal.gimbal
+    gimbal = control.gimbal
     gimbal.update()
     absolute_deg = degrees(wrapped(gimbal.yaw + state.yaw_rad))
     return _orientation(boot_ms(state.time_us), 0.0, degrees(gimbal.pitch), degrees(gimbal.yaw), absolute_deg)

@@ -26,6 +26,7 @@ from autopilot.mavlink.telemetry import (
 from autopilot.mavlink.transport.links import LinkRole
 from autopilot.mavlink.wire.adsb_messages import adsb_vehicle
 from autopilot.mavlink.wire.codec import MessageType, known_type
+from autopilot.payload.gimbal.gimbal_control import GimbalControl
 from common.kernels import FRAME_US, TICK_US
 
 Builder = Callable[[VehicleState], bytes | None]
@@ -151,7 +152,7 @@ GROUP_ALL = 0
 class Telemetry:
     """Every message the vehicle can be asked for, by id."""
 
-    def __init__(self, dialect: Dialect, sysid: int, host: Host, *, has_gimbal: bool = False) -> None:
+    def __init__(self, dialect: Dialect, sysid: int, host: Host, gimbal: GimbalControl | None = None) -> None:
         def heartbeat(state: VehicleState) -> bytes:
             """Mode, armed or not, state; also at once when one of them changes."""
             return status.heartbeat(state, dialect)
@@ -172,10 +173,6 @@ class Telemetry:
         is_ardupilot = dialect.name == "ardupilot"
         self.groups = ARDUPILOT_GROUPS if is_ardupilot else GROUPS
 
-        def manager_status(state: VehicleState) -> bytes | None:
-            """Who has control of the gimbal; at 5 Hz on links that have asked for its information."""
-            return gimbal_status.gimbal_manager_status(state, sysid)
-
         streams: tuple[Stream, ...] = (
             Stream("HEARTBEAT", heartbeat, 1, 1),
             *STREAMS,
@@ -183,11 +180,11 @@ class Telemetry:
             Stream("AUTOPILOT_VERSION", version, 0, 0),
             Stream("CURRENT_MODE", current_mode, 0.5, 0.5),
         )
-        if has_gimbal:
+        if gimbal is not None:
             streams += (
                 Stream("GIMBAL_MANAGER_INFORMATION", gimbal_status.gimbal_manager_information, 0, 0),
-                Stream("GIMBAL_MANAGER_STATUS", manager_status, 0, 0),
-                Stream("MOUNT_ORIENTATION", gimbal_status.mount_orientation, 0, 0),
+                Stream("GIMBAL_MANAGER_STATUS", partial(gimbal_status.gimbal_manager_status, gimbal, sysid), 0, 0),
+                Stream("MOUNT_ORIENTATION", partial(gimbal_status.mount_orientation, gimbal), 0, 0),
             )
         self.streams = tuple(
             replace(stream, build=mission_current) if stream.name == "MISSION_CURRENT" else stream for stream in streams

@@ -4,7 +4,7 @@ from math import degrees, pi
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.inputs.traffic import Aircraft
+from autopilot.interface.aircraft import Aircraft
 from autopilot.interface.vehicle_state import VehicleState
 from autopilot.mavlink.wire.codec import known_type
 from autopilot.mavlink.wire.convert import bounded_int, degrees_e7, i16, i32, u16

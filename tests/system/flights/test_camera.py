@@ -79,7 +79,7 @@ def test_mission_takes_photos_along_its_way(tmp_path):
             await drone.command(300)
             shots = [await inbox.next(40.0, "a photo") for _ in range(3)]
         places = [(shot.lat * 1e-7 - home.lat_deg) * 111_195.0 for shot in shots]
-        assert flight.controller.state.gimbal.gimbal.pitch == pytest.approx(radians(-90.0))
+        assert flight.controller.gimbal.gimbal.pitch == pytest.approx(radians(-90.0))
         assert np.diff(places) == pytest.approx(20.0, abs=1.0)
 
     running = flight.fly(survey)

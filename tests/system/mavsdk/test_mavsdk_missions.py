@@ -65,7 +65,7 @@ def test_mission_with_every_action_is_flown_to_its_return(session):
     session.until(lambda: not session.state.is_armed, "landed at home")
     assert {current for current, _ in reports} == {0, 1, 2, 3, 4}
     assert {total for _, total in reports} == {4}
-    assert degrees(session.state.gimbal.gimbal.aim.pitch) == pytest.approx(-30.0, abs=1.0)
+    assert degrees(session.flight.controller.gimbal.gimbal.aim.pitch) == pytest.approx(-30.0, abs=1.0)
     assert len(shots) >= 3  # two at their places, the others by distance
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.inputs.traffic import Aircraft
+from autopilot.interface.aircraft import Aircraft
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.service import Handler, Service
 from autopilot.mavlink.wire.adsb_messages import payload_of

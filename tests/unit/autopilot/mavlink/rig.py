@@ -12,7 +12,8 @@ from autopilot.estimator.state import EstimatorState
 from autopilot.inputs.external_position import ExternalPositions
 from autopilot.inputs.obstacles import Obstacles
 from autopilot.inputs.sticks import Sticks
-from autopilot.inputs.traffic import Aircraft, Traffic
+from autopilot.inputs.traffic import Traffic
+from autopilot.interface.aircraft import Aircraft
 from autopilot.interface.client_requests import CalibrationKind, OffboardSetpoint, OrbitRequest, TargetReport
 from autopilot.interface.item_lists import ItemLists, ItemRefusal, ListKind, MissionItem
 from autopilot.interface.platform import Host
@@ -29,6 +30,7 @@ from autopilot.navigator.mission.item_commands import MAX_ITEMS
 from autopilot.params import parameter_table
 from autopilot.payload.aux_outputs import AuxOutputs
 from autopilot.payload.camera.camera import Camera
+from autopilot.payload.gimbal.gimbal_control import GimbalControl
 from autopilot.payload.payloads import Payloads
 from autopilot.ports import (
     HEIGHT_VALID,
@@ -241,6 +243,7 @@ class RecordingVehicle:
         self.calibration = RecordedCalibration(self)
         self.host = Host(read_truth=record_of_truth)
         self.camera: Camera | None = None
+        self.gimbal: GimbalControl | None = None
         self.sticks = Sticks(self.params)
         self.state.sticks = self.sticks.input
         self.sticks.joystick_moved((CLIENT_SYSID, CLIENT_COMPID), 5_000_000, (0.0, 0.0, 0.0, 0.0), 0)

@@ -74,7 +74,7 @@ class PayloadVehicle(RecordingVehicle):
         self.light = Light()
         media = None if folder is None else MediaFolder(folder)
         gimbal = Gimbal(self.state)
-        self.state.gimbal = GimbalControl(gimbal, self.state)
+        self.gimbal = GimbalControl(gimbal, self.state)
         self.camera = Camera(self.state, gimbal, self.light, media)
         self.host = Host(frames=self.light, media=media, stream=stream, video=video)
 

@@ -491,8 +491,8 @@ def test_definition_file_lists_every_setting():
 
 
 def test_field_of_view_names_the_place_in_the_middle_of_the_picture(rig):
-    rig.vehicle.state.gimbal.gimbal.pitch = -0.7853981633974483
-    rig.vehicle.state.gimbal.gimbal.aim.pitch = -0.7853981633974483
+    rig.vehicle.gimbal.gimbal.pitch = -0.7853981633974483
+    rig.vehicle.gimbal.gimbal.aim.pitch = -0.7853981633974483
     (fov,) = from_camera(requested(rig, REQUEST, 271), "CAMERA_FOV_STATUS")
     state = rig.vehicle.state
     metres = ((fov.lat_image - fov.lat_camera) * 0.0111319) ** 2 + ((fov.lon_image - fov.lon_camera) * 0.00754) ** 2
@@ -521,7 +521,7 @@ def test_recording_ends_without_waiting_for_a_frame(rig, tmp_path):
 
 def test_ardupilot_s_clients_get_camera_feedback(tmp_path):
     rig = PayloadRig(tmp_path / "media", dialect=ARDUPILOT)
-    rig.vehicle.state.gimbal.gimbal.point(-0.5, 0.0, is_yaw_locked=True)
+    rig.vehicle.gimbal.gimbal.point(-0.5, 0.0, is_yaw_locked=True)
     rig.frame(100)
     rig.to(1, START, 0, 0, 1, 1)
     (feedback,) = [m.fields for m in rig.frame(2) if m.name == "CAMERA_FEEDBACK"]

@@ -36,7 +36,7 @@ def attitude(rig, frames=1):
 def angles(rig):
     """Pitch and yaw from the nose [deg] after all motion."""
     rig.frame(250)
-    gimbal = rig.vehicle.state.gimbal.gimbal
+    gimbal = rig.vehicle.gimbal.gimbal
     gimbal.update()
     return degrees(gimbal.pitch), degrees(gimbal.yaw)
 
@@ -73,7 +73,7 @@ def test_device_tells_its_information(rig):
 
 def test_angles_are_taken_at_the_motors_rate(rig):
     assert rig.ack(PITCHYAW, -45.0, 90.0, nan, nan, 0.0, 0.0, 0.0).result == ACCEPTED
-    gimbal = rig.vehicle.state.gimbal.gimbal
+    gimbal = rig.vehicle.gimbal.gimbal
     rig.frame(25)  # 0.5 s at 90 deg/s
     gimbal.update()
     assert degrees(gimbal.pitch) == pytest.approx(-45.0, abs=0.1)
@@ -166,7 +166,7 @@ def test_who_has_control_points_it_and_others_do_not(rig):
 
 def test_control_is_given_shared_and_released(rig):
     other = rig.second_client
-    control = rig.vehicle.state.gimbal
+    control = rig.vehicle.gimbal
     rig.ack(
         CONFIGURE, float(rig.client.sysid), float(rig.client.compid), float(other.sysid), float(other.compid), 0, 0, 0
     )
@@ -204,7 +204,7 @@ def test_messages_point_it_as_the_command_does(rig):
 
 
 def test_place_is_looked_at_and_left(rig):
-    state, control = rig.vehicle.state, rig.vehicle.state.gimbal
+    state, control = rig.vehicle.state, rig.vehicle.gimbal
     state.yaw_rad = 0.0
     north, east, down = state.estimate.pos_ned
     control.gimbal.look_at((north + 20.0, east + 20.0, down + 20.0))
@@ -235,7 +235,7 @@ def test_older_mount_commands_point_it(rig):
 
 def test_camera_looks_along_the_gimbal_whatever_the_vehicle_does(rig):
     """The joints undo the attitude by estimate: estimate times joints is where the gimbal points."""
-    gimbal = rig.vehicle.state.gimbal.gimbal
+    gimbal = rig.vehicle.gimbal.gimbal
     rig.ack(PITCHYAW, -30.0, 40.0, nan, nan, 0.0, 0.0, 0.0)
     rig.frame(100)
     x, y, z, w = gimbal.q_frd_from_rdf()

@@ -177,12 +177,12 @@ def test_command_out_of_range_is_denied_with_its_place(value):
 def test_gimbal_is_not_pointed_at_angles_out_of_range():
     rig = PayloadRig()
     take_control(rig)
-    aim = rig.vehicle.state.gimbal.gimbal.aim
+    aim = rig.vehicle.gimbal.gimbal.aim
     for extreme in (inf, 3.4e38, -1e30):
         rig.client.send("GIMBAL_MANAGER_SET_PITCHYAW", pitch=extreme, yaw=0.0, pitch_rate=nan, yaw_rate=nan)
         rig.client.send("GIMBAL_MANAGER_SET_PITCHYAW", pitch=nan, yaw=nan, pitch_rate=extreme, yaw_rate=nan)
         rig.frame()
-    after = rig.vehicle.state.gimbal.gimbal.aim
+    after = rig.vehicle.gimbal.gimbal.aim
     assert (after.pitch, after.yaw) == (aim.pitch, aim.yaw)
     assert not isfinite(after.pitch_rate) or abs(after.pitch_rate) <= RATE_MAX_RAD_S
 

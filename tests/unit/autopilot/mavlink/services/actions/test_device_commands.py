@@ -4,7 +4,8 @@ from math import nan
 
 import pytest
 
-from autopilot.inputs.traffic import AIRCRAFT_MAX, CONFLICT_US, FORGOTTEN_US, Aircraft
+from autopilot.inputs.traffic import AIRCRAFT_MAX, CONFLICT_US, FORGOTTEN_US
+from autopilot.interface.aircraft import Aircraft
 from autopilot.interface.vehicle_state import WinchStatus
 from autopilot.mavlink.wire.rtcm import FRAGMENT_LENGTH, RtcmAssembler, crc24q, is_rtcm
 from autopilot.mavlink.wire.tune import TuneError, tune_length_s
