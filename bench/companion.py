@@ -10,7 +10,8 @@ from bench.row import Row, require
 from common.clock import wall_time_s
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
-from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.lockstep import flight_with_companion
+from mission.script import take_off
 from policies.companion.companion import Pilot
 from policies.companion.engagement import Phase
 from policies.companion.pilot import LAYOUT_VERSION, SCRIPTED, TASK, load_pilot

@@ -13,8 +13,9 @@ from rich.console import Console
 
 from bench.row import Row, require
 from mission.flight import FlightConfig
-from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.lockstep import flight_with_companion
 from mission.follow.owner_device import OwnerConfig
+from mission.script import take_off
 from mission.view.chase_camera import PICTURE_S
 from mission.view.film import write_film
 from mission.view.film_images import HEIGHT, WIDTH

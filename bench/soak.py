@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 
 HOUR_S = 3600.0
-AIRFRAME = Path(__file__).parents[1] / "sim/bodies/airframes/x500.toml"
+AIRFRAME = Path(__file__).parents[1] / "common/airframes/x500.toml"
 CAPACITY = r"(?m)^(capacity_mah\s*=\s*\{\s*value\s*=\s*)([\d.]+)"
 CORNERS_NED = ((15.0, 0.0, -8.0), (15.0, 15.0, -10.0), (0.0, 15.0, -8.0), (0.0, 0.0, -12.0))
 TAKEOFF, WAYPOINT, JUMP, RELATIVE, FOREVER = 22, 16, 177, 3, -1

@@ -5,6 +5,7 @@ An airframe is a TOML file in which every number is `{ value = â€¦, source = "â€
 """
 
 import tomllib
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -12,7 +13,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from common.kernels import GRAVITY_M_S2
 
-AIRFRAME_FOLDER = Path(__file__).resolve().parent.parent / "sim" / "bodies" / "airframes"
+AIRFRAME_FOLDER = Path(str(files("common"))) / "airframes"
 
 
 class AirframeError(ValueError):

@@ -20,6 +20,7 @@ from mission.client import Client, CommandRefused, ScriptError, ScriptTimeout
 from mission.plan.plan_file import Plan
 from mission.plan.plan_lists import FENCE_LIST, RALLY_LIST, fence_items, rally_items
 
+TAKEOFF_M = 2.5  # the vehicle's least; a companion goes on from there
 FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM that skips the checks
 
 CMD_RETURN_TO_LAUNCH = 20
@@ -339,6 +340,13 @@ async def fly_plan(drone: Drone, plan: Plan) -> None:
         raise ScriptError(f"the flight ended before the mission did{where} ({'; '.join(drone.texts[first_text:])})")
 
 
+async def take_off(drone: Drone) -> None:
+    """Up to where a companion takes over."""
+    await drone.wait_ready()
+    await drone.arm()
+    await drone.takeoff(TAKEOFF_M)
+
+
 Script = Callable[[Drone], Coroutine[Any, Any, Any]]
 
-__all__ = ["Drone", "Script", "ScriptError", "ScriptTimeout", "fly_plan"]
+__all__ = ["Drone", "Script", "ScriptError", "ScriptTimeout", "fly_plan", "take_off"]

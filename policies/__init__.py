@@ -1,18 +1,21 @@
-"""Tasks, learning and trained policies. Importing it registers the tasks with Gymnasium."""
-
-import gymnasium
+"""Tasks, learning and trained policies. Importing it registers the tasks with Gymnasium, where that is installed."""
 
 from policies.tasks.catalogue import CATALOGUE
 
-gymnasium.register(
-    id="honeyguide/Hover-v0",
-    entry_point="policies.tasks.hover:HoverEnv",
-    vector_entry_point="policies.tasks.hover:HoverVectorEnv",
-)
-for _name in CATALOGUE:
+try:
+    import gymnasium
+except ModuleNotFoundError:  # it comes with the extra `gym`; a policy flies without it
+    pass
+else:
     gymnasium.register(
-        id=f"honeyguide/{_name}-v0",
-        entry_point="policies.tasks.gym:TaskEnv",
-        vector_entry_point="policies.tasks.gym:TaskVectorEnv",
-        kwargs={"task": _name},
+        id="honeyguide/Hover-v0",
+        entry_point="policies.tasks.hover:HoverEnv",
+        vector_entry_point="policies.tasks.hover:HoverVectorEnv",
     )
+    for _name in CATALOGUE:
+        gymnasium.register(
+            id=f"honeyguide/{_name}-v0",
+            entry_point="policies.tasks.gym:TaskEnv",
+            vector_entry_point="policies.tasks.gym:TaskVectorEnv",
+            kwargs={"task": _name},
+        )

@@ -16,7 +16,8 @@ from bench.follow.stages import CELLS, Cell
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
 from mission.follow.follow_scoring import FollowWatch
-from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.lockstep import flight_with_companion
+from mission.script import take_off
 from policies.companion.companion import Pilot
 from policies.companion.engagement import Phase
 from policies.companion.pilot import load_pilot

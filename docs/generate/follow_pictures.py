@@ -12,7 +12,8 @@ import numpy as np
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
 from mission.follow.follow_session import chosen_pilot, score_lines, watch_of
-from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.lockstep import flight_with_companion
+from mission.script import take_off
 from mission.view.chase_camera import PICTURE_S
 from mission.view.film_images import film
 from mission.view.live import LiveView

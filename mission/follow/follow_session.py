@@ -27,10 +27,10 @@ from mission.fly_loop import advance
 from mission.follow.companion_process import latency_text
 from mission.follow.follow_options import FollowOptions, follow_config
 from mission.follow.follow_scoring import FollowWatch, taken_over
-from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.lockstep import flight_with_companion
 from mission.kernel_loading import load_kernels
 from mission.run_folder import OwnFiles, run_folder
-from mission.script import Drone
+from mission.script import Drone, take_off
 from mission.view.film import write_film
 from mission.view.replay_file import Recorder
 from policies.companion.companion import Companion, Pilot

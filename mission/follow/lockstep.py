@@ -9,11 +9,8 @@ from pathlib import Path
 
 from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
 from mission.flight import Flight, FlightConfig
-from mission.script import Drone
 from policies.companion.companion import Companion, Pilot
 from policies.companion.image_client import MemoryCamera
-
-TAKEOFF_M = 2.5  # the vehicle's least; the policy goes on from there
 
 
 def flight_with_companion(
@@ -44,10 +41,3 @@ def flight_with_companion(
     companion = Companion(companion_end, camera, pilot, is_told=is_told, wall_s=wall_s)
     flight.computers.append(companion)
     return flight, companion
-
-
-async def take_off(drone: Drone) -> None:
-    """Up to where a companion takes over."""
-    await drone.wait_ready()
-    await drone.arm()
-    await drone.takeoff(TAKEOFF_M)

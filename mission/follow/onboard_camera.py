@@ -46,7 +46,7 @@ class OnboardCamera:
 
     def __init__(self, rig: Rig, world: WorldMap, people: Any, noise: float = 1.0) -> None:
         self._eye = CameraRig(rig, world)
-        self._view = View(IMAGE_SIZE, IMAGE_SIZE, HFOV_DEG, camera_mount())
+        self.view = View(IMAGE_SIZE, IMAGE_SIZE, HFOV_DEG, camera_mount())
         self._camera = QuickCamera(
             world, 1, width=IMAGE_SIZE, height=IMAGE_SIZE, hfov_deg=HFOV_DEG, people=people, has_optics=True
         )
@@ -79,7 +79,7 @@ class OnboardCamera:
 
     def take(self, time_us: int) -> ImageFrame:
         """A picture of this moment."""
-        pose = self._eye.pose(self._view)
+        pose = self._eye.pose(self.view)
         self._lens["pos_ned"] = pose.pos_ned
         self._lens["q_ned_from_rdf"] = pose.q_ned_from_rdf
         self._set_optics.launch()

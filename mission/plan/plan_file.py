@@ -8,6 +8,7 @@ own definition is kept, so that writing the plan again loses nothing. A wrong fi
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib.resources import files
 from math import isnan
 from pathlib import Path
 from typing import Any, TypeVar
@@ -38,7 +39,7 @@ D = TypeVar("D")
 
 PlanItem = MissionItem  # the record that the vehicle keeps too
 
-DEFAULT_PLAN = Path(__file__).parents[1] / "default.plan"
+DEFAULT_PLAN = Path(str(files("mission"))) / "default.plan"
 MAV_AUTOPILOT_PX4 = 12
 MAV_TYPE_QUADROTOR = 2
 RELATIVE_FRAMES = (3, 6)  # MAV_FRAME_GLOBAL_RELATIVE_ALT and its _INT

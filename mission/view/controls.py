@@ -13,8 +13,7 @@ import viser
 from autopilot.interface.failure_requests import Failure, Unit
 from mission.client import Running
 from mission.flight import Flight
-from mission.follow.lockstep import take_off
-from mission.script import Drone, ScriptError
+from mission.script import Drone, ScriptError, take_off
 from mission.view.browser_inputs import within
 
 CLIMB_M = 5.0  # above the ground, when a click finds the vehicle standing

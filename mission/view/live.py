@@ -22,7 +22,6 @@ from mission.view.controls import Controls
 from mission.view.flight_snapshot import Moment, Row, moment_of
 from mission.view.panel import PLOT_PERIOD_S, Panel
 from mission.view.scene import Mount, Scene, chase_of, wxyz_of
-from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount
 from sim.camera_rig import MOUNT_FRD, CameraRig
 
 UPDATE_S = 1.0 / 15.0
@@ -67,7 +66,7 @@ class LiveView:
         mount = None if self._camera is None else Mount(MOUNT_FRD, RDF_IN_FRD, PHOTO_HFOV_DEG, *PICTURE_SIZE)
         if flight.onboard is not None:
             flight.onboard.add_sink(self._seen)
-            mount = Mount(MOUNT_FRD, camera_mount(), HFOV_DEG, 1, 1)
+            mount = Mount(MOUNT_FRD, flight.onboard.view.q_frd_from_rdf, flight.onboard.view.hfov_deg, 1, 1)
         self._camera_rig = CameraRig(flight.rig, flight.world, has_thread=True)
         self._pending: Future[RawFrame] | None = None
         self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned)

@@ -12,7 +12,7 @@ from autopilot.mavlink.transport.udp_port import UdpPort
 from mission.flight import Flight
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.image_server import ImageServer
-from mission.follow.lockstep import take_off
+from mission.script import take_off
 from policies.companion.pilot import TASK
 from policies.tasks.follow_me.scorecard import scorecard
 from tests.system.vehicle import HONEYGUIDE, ROOT, free_ports

@@ -3,7 +3,8 @@
 from autopilot.mavlink.wire.codec import FrameReader
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
-from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.lockstep import flight_with_companion
+from mission.script import take_off
 from policies.companion.engagement import Phase
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.follow_me.world import FOLLOW_WORLD

@@ -11,8 +11,9 @@ from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode
 from common.geodesy import ned_from_geodetic
-from mission.follow.lockstep import flight_with_companion, take_off
+from mission.follow.lockstep import flight_with_companion
 from mission.follow.owner_device import PHONE_SYSTEM
+from mission.script import take_off
 from policies.companion.companion import IMAGE_OLD_US, OWNER_LOST_S, TELEMETRY_OLD_US
 from policies.companion.engagement import Phase
 from policies.companion.observation import REPORT_LAG_S
