@@ -18,8 +18,8 @@ Written by `python -m docs.generate` from the code: do not edit.
 
 What each task shows, takes and can be set to, as a reference. Gymnasium knows them as `honeyguide/NAME-v0` after
 `import policies`, and as `policies:honeyguide/NAME-v0` without it (it has no entry point for plug-ins since its
-version 1.0), with the settings as keyword arguments; `honeyguide` takes settings as `--env-args KEY=VALUE`, and training
-configurations set or randomise the numbers by name under `environment_parameters`.
+version 1.0), with the settings as keyword arguments; `honeyguide` takes settings as `--env-args KEY=VALUE`, and
+training configurations set or randomise the numbers by name under `environment_parameters`.
 
 | task | what is to be done |
 |---|---|
