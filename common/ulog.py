@@ -75,12 +75,19 @@ class UlogTopic:
         Args:
             rows: `timestamp` [us] and every field of the topic; arrays of shape (rows,) or (rows, length).
         """
-        timestamps = np.asarray(rows["timestamp"])
-        if timestamps.size:
-            records = np.zeros(timestamps.size, self._dtype)
-            records["_size"], records["_kind"], records["_topic_id"] = self._header
-            for name in self.field_names:
-                records[name] = rows[name]
+        self.append(self.records(rows))
+
+    def records(self, rows: Columns) -> npt.NDArray[Any]:
+        """Rows as they are written, for `append`."""
+        records = np.zeros(np.asarray(rows["timestamp"]).size, self._dtype)
+        records["_size"], records["_kind"], records["_topic_id"] = self._header
+        for name in self.field_names:
+            records[name] = rows[name]
+        return records
+
+    def append(self, records: npt.NDArray[Any]) -> None:
+        """Appends what `records` has made, or some of it."""
+        if len(records):
             self._last = records[-1:]
             self._writer.append(records.tobytes())
 

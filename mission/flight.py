@@ -298,6 +298,7 @@ class Flight:
     def change_speed(self, speed: float | None) -> None:
         """Simulated seconds per second from the next frame on, while it runs; None: as fast as possible."""
         self._pacer = Pacer(speed)
+        self.recorder.is_live = speed is not None
         self.simulator_params.tell(SIM_SPEEDUP=speed or 0.0)
 
     def set_wind(self, speed_m_s: float, from_deg: float) -> None:

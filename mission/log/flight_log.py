@@ -5,6 +5,8 @@ listener: log streaming, and the logs that outlive the run.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -16,7 +18,7 @@ from autopilot.mavlink.services.identity import project_version
 from common.airframe import Airframe
 from common.params import ParameterTable
 from common.ulog import UlogTopic, UlogWriter
-from mission.log.log_topics import TOPICS, Batch, Columns
+from mission.log.log_topics import TOPICS, Batch, Columns, Topic
 
 NAVIGATION_STATES = {  # vehicle_status.nav_state of PX4
     Mode.HOLD: 4,
@@ -61,6 +63,8 @@ STATUS_DTYPE = np.dtype(
 _CHANGES_SHOWN = [name for name in STATUS_DTYPE.names or () if not name.startswith("battery")]
 
 Rows = npt.NDArray[Any]
+_Table = tuple[UlogTopic, Rows, list[int]]
+"""Records of a topic, and where those of each piece begin; one more for their end."""
 
 
 class _Nowhere:
@@ -102,8 +106,8 @@ class FlightLog:
         self._imu_time_us = 0
         self._samples_before = samples_before
         self._status_before = np.zeros(1, STATUS_DTYPE)
-        self._topics: list[tuple[UlogTopic, Callable[[Batch], Any]]] = [
-            (self._log.add_topic(topic.name, topic.fields), topic.columns) for topic in TOPICS
+        self._topics: list[tuple[UlogTopic, Topic]] = [
+            (self._log.add_topic(topic.name, topic.fields), topic) for topic in TOPICS
         ]
         self._imu_topic = self._log.add_topic("sensor_combined", _IMU_FIELDS)
         self._status_topic = self._log.add_topic("vehicle_status", _STATUS_FIELDS)
@@ -127,6 +131,11 @@ class FlightLog:
 
     def stop_listening(self, listener: Callable[[bytes], None]) -> None:
         self._log.listeners.remove(listener)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody listens."""
+        return bool(self._log.listeners)
 
     def topics(self) -> Sequence[str]:
         return sorted(self._by_name)
@@ -156,28 +165,43 @@ class FlightLog:
 
         Args:
             batch: the frames.
-            imu_rings: the newest IMU samples at each of them.
+            imu_rings: the newest IMU samples at each of them, shape (frames, samples).
             is_kept: the frames to be logged if nobody listens; of the others the vehicle's state is.
         """
-        self._log.go_on(int(batch.time_us[0]))
         is_whole = bool(is_kept.all() or self._log.listeners)
+        if not is_whole and len(batch.begins) > 1:
+            for begin, end in pairwise([*batch.begins, len(batch.time_us)]):
+                piece = slice(begin, end)
+                part = replace(batch.only(piece, self._samples_before), begins=(0,))
+                self.write(part, imu_rings[piece], is_kept[piece])
+            return
         kept = batch.only(slice(None) if is_whole else is_kept, self._samples_before)
+        tables: list[_Table] = []
         if len(kept.time_us):
             self._samples_before = kept.samples[-1:].copy()
-            for topic, columns in self._topics:
-                topic.write(columns(kept))
+            tables += [self._table(topic, kept, form) for topic, form in self._topics]
         if is_whole:
-            self._write_imu(imu_rings)
-        self._write_status(batch)
+            tables.append(self._imu_table(batch, imu_rings))
+        tables += self._status_tables(batch)
+        for k, begin in enumerate(batch.begins):  # the order is that of pieces written one by one
+            self._log.go_on(int(batch.time_us[begin]))
+            for topic, records, bounds in tables:
+                topic.append(records[bounds[k] : bounds[k + 1]])
 
-    def _write_imu(self, imu_rings: Rows) -> None:
+    def _table(self, topic: UlogTopic, batch: Batch, form: Topic) -> _Table:
+        frames = None if form.frames is None else np.flatnonzero(form.frames(batch))
+        return topic, topic.records(form.columns(batch)), _bounds(batch, frames)
+
+    def _imu_table(self, batch: Batch, imu_rings: Rows) -> _Table:
         times, first = np.unique(imu_rings["time_us"], return_index=True)
-        imu = imu_rings[first[times > self._imu_time_us]]
+        first = first[times > self._imu_time_us]
+        imu = imu_rings.reshape(-1)[first]
         if len(imu):
             self._imu_time_us = int(imu["time_us"][-1])
-            self._imu_topic.write(_imu_columns(imu, *self._imu_limits))
+        records = self._imu_topic.records(_imu_columns(imu, *self._imu_limits))
+        return self._imu_topic, records, _bounds(batch, first // imu_rings.shape[1])
 
-    def _write_status(self, batch: Batch) -> None:
+    def _status_tables(self, batch: Batch) -> list[_Table]:
         """Vehicle state, landing and mission progress: when one of them changed, and twice a second."""
         status = batch.vehicle
         before = np.concatenate([self._status_before, status[:-1]])
@@ -186,12 +210,22 @@ class FlightLog:
         for name in _CHANGES_SHOWN:
             is_logged |= status[name] != before[name]
         rows, time_us = status[is_logged], batch.time_us[is_logged]
-        for topic, columns in (
-            (self._status_topic, _status_columns(rows)),
-            (self._landed_topic, _landed_columns(rows)),
-            (self._mission_topic, _mission_columns(rows)),
-        ):
-            topic.write({"timestamp": time_us, **columns})
+        bounds = _bounds(batch, np.flatnonzero(is_logged))
+        return [
+            (topic, topic.records({"timestamp": time_us, **columns}), bounds)
+            for topic, columns in (
+                (self._status_topic, _status_columns(rows)),
+                (self._landed_topic, _landed_columns(rows)),
+                (self._mission_topic, _mission_columns(rows)),
+            )
+        ]
+
+
+def _bounds(batch: Batch, frames: Rows | None) -> list[int]:
+    """Where the rows of each piece begin in a table, and its end; `frames`: which frame each row is of."""
+    begins = [*batch.begins, len(batch.time_us)]
+    bounds: list[int] = begins if frames is None else np.searchsorted(frames, begins).tolist()
+    return bounds
 
 
 _IMU_FIELDS = {

@@ -1,7 +1,8 @@
 """Records a flight: the ULog, and the history that the summary and the plots are made from.
 
-In: the live kernel rows, copied raw once per frame. Out: columns, written once per simulated second, so that logging
-costs a flight faster than real time almost nothing.
+In: the live kernel rows, copied raw once per frame. Out: columns, made for many frames at once, so that logging costs a
+flight faster than real time almost nothing. The log is in pieces of a second, written as they end in a flight that
+somebody may watch, and some at once in any other; its bytes are the same.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +23,8 @@ from mission.log.kept_frames import FrameChoice, KeptRows
 from mission.log.log_topics import Batch
 from sim.rig import Rig
 
-FLUSH_FRAMES = 50
+PIECE_FRAMES = 50
+FRAMES_MAX = 5 * PIECE_FRAMES  # written at once
 AIDS = {"gnss_pos": 2, "gnss_vel": 3, "gnss_height": 1, "baro": 1, "mag": 3, "range": 1}  # and their components
 BAND_SIGMA = 1.959964  # 95 % of a normal distribution lie within
 NO_MISSION, NOT_STARTED = 1, 2  # MISSION_STATE
@@ -65,22 +67,14 @@ class History:
 
 
 class _RawRow:
-    """Copies of the first row of a live structured view."""
+    """Copies of the first row of a live structured view, of as many frames as are written at once."""
 
     def __init__(self, rows: Rows) -> None:
-        self._dtype = rows.dtype
         first = rows[0] if rows.ndim > 1 else rows[:1]
-        self._buffer = first.view(np.uint8).reshape(-1).data
-        self._copies: list[bytes] = []
-
-    def copy(self) -> None:
-        self._copies.append(self._buffer.tobytes())
-
-    def take(self) -> Rows:
-        """The copies since the last call."""
-        rows = np.frombuffer(b"".join(self._copies), dtype=self._dtype)
-        self._copies.clear()
-        return rows
+        self.source = first.view(np.uint8).reshape(-1).data
+        self.copies = np.empty((FRAMES_MAX, *rows.shape[1:]), rows.dtype)
+        self.target = self.copies.view(np.uint8).reshape(-1).data
+        self.size = len(self.source)
 
 
 class Recorder:
@@ -113,6 +107,7 @@ class Recorder:
         self._estimator = _RawRow(live["autopilot.ekf.rows"])
         self._yaw = _RawRow(live["autopilot.ekf.yaw"])
         self._imu_ring = _RawRow(live["autopilot.ekf.imu_ring"])
+        self._raw = (self._truth, self._sensors, self._control, self._estimator, self._yaw, self._imu_ring)
         imu_model = live["sensor_model"]["imu"][0]
         self._imu_limits = (float(imu_model["gyro_limit"]), float(imu_model["accel_limit"]))
         self._samples_before = np.zeros(1, dtype=live["sensors"]["samples"].dtype)
@@ -120,6 +115,8 @@ class Recorder:
         self._in_band = {name: [0, 0] for name in AIDS}
         self._choice = FrameChoice()
         self._is_kept: list[bool] = []
+        self._begins = [0]  # the pieces, as indices of the frames noted
+        self.is_live = False  # each piece is written when it ends
         self._history = KeptRows(HISTORY)
         self._path = path
         self._airframe = airframe
@@ -156,10 +153,20 @@ class Recorder:
                 state.battery_used_mah,
             )
         )
-        for rows in (self._truth, self._sensors, self._control, self._estimator, self._yaw, self._imu_ring):
-            rows.copy()
-        if len(self._time_us) >= FLUSH_FRAMES:
+        count = len(self._time_us)
+        for rows in self._raw:
+            end = count * rows.size
+            rows.target[end - rows.size : end] = rows.source
+        if count - self._begins[-1] >= PIECE_FRAMES:
+            self._end_piece(count)
+
+    def _end_piece(self, count: int) -> None:
+        """Writes what has been noted if there is no room for more, or somebody waits for it."""
+        is_heard = self._log is not None and self._log.is_heard
+        if self.is_live or is_heard or self._changed or count == FRAMES_MAX:
             self.flush()
+        else:
+            self._begins.append(count)
 
     def statustext(self, severity: Severity, text: str) -> None:
         """Logs a text of the vehicle."""
@@ -182,36 +189,47 @@ class Recorder:
 
     def flush(self) -> None:
         """Writes what has been noted since the last flush."""
-        if not self._time_us:
+        self._write(len(self._time_us))
+
+    def _write(self, count: int) -> None:
+        """Writes the first frames noted."""
+        if not count:
             return
-        estimator = self._estimator.take()
-        samples = self._sensors.take()["samples"]
-        status = np.array(self._status, dtype=STATUS_DTYPE)
+        estimator = self._estimator.copies[:count]
+        samples = self._sensors.copies[:count]["samples"]
+        status = np.array(self._status[:count], dtype=STATUS_DTYPE)
         batch = Batch(
-            time_us=np.array(self._time_us, dtype=np.uint64),
+            time_us=np.array(self._time_us[:count], dtype=np.uint64),
             estimate=estimator["estimate"],
             samples=samples,
             samples_before=self._samples_before,
-            actuators=self._control.take()["actuators"],
+            actuators=self._control.copies[:count]["actuators"],
             health=estimator,
-            yaw=self._yaw.take(),
-            truth=self._truth.take(),
+            yaw=self._yaw.copies[:count],
+            truth=self._truth.copies[:count],
             vehicle=status,
             origin=self._controller.state.origin,
+            begins=tuple(begin for begin in self._begins if begin < count),
         )
-        is_kept = np.array(self._is_kept)
-        self._time_us.clear()
-        self._is_kept.clear()
-        self._status.clear()
+        is_kept = np.array(self._is_kept[:count])
         self._samples_before = samples[-1:].copy()
         self._count_innovations(estimator, status["is_armed"])
         self._history.add(_history(batch), is_kept)
-        imu = self._imu_ring.take()
         if self._log is not None:
-            self._log.write(batch, imu, is_kept)
+            self._log.write(batch, self._imu_ring.copies[:count], is_kept)
             for name, value in self._changed.items():
                 self._log.parameter(name, value)
         self._changed.clear()
+        self._forget(count)
+
+    def _forget(self, count: int) -> None:
+        """The first frames have been written: room for others."""
+        rest = len(self._time_us) - count
+        del self._time_us[:count], self._is_kept[:count], self._status[:count]
+        self._begins = [0]
+        if rest:
+            for rows in self._raw:
+                rows.copies[:rest] = rows.copies[count : count + rest]
 
     def _parameter_changed(self, declaration: Parameter) -> None:
         self._changed[declaration.name] = self._controller.params[declaration.name]
@@ -219,7 +237,8 @@ class Recorder:
     # ---- autopilot.interface.platform.LogStream ----
 
     def listen(self, listener: LogListener) -> bytes:
-        """What has been noted and not yet written is the listener's too: the moments before it began to listen."""
+        """What has been noted of the present piece is the listener's too: the moments before it began to listen."""
+        self._write(self._begins[-1])
         since_us = self._time_us[0] if self._time_us else self._controller.state.time_us
         return self._stream().listen(listener, since_us)
 

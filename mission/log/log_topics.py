@@ -7,6 +7,7 @@ hold one value here are left out.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from math import nan
 from typing import Any
 
@@ -42,6 +43,7 @@ class Batch:
     truth: Rows  # Truth
     vehicle: Rows  # STATUS_DTYPE of mission.log.flight_log
     origin: GeoPoint
+    begins: tuple[int, ...] = (0,)  # the log gets the frames in pieces: where each of them begins
 
     def only(self, frames: Rows | slice, samples_before: Rows) -> "Batch":
         """Some of the frames; `samples_before` as of the frame before the first of them."""
@@ -56,6 +58,7 @@ class Topic:
     name: str
     fields: dict[str, str]
     columns: Callable[[Batch], Columns]
+    frames: Callable[[Batch], Rows] | None = None  # marks those that have a row; None: all have
 
 
 def is_fresh(batch: Batch, sensor: str) -> Rows:
@@ -297,9 +300,15 @@ def _biases(batch: Batch) -> Columns:
     }
 
 
+def _has_yaw(batch: Batch) -> Rows:
+    """One row per fix, and one at the start of each piece."""
+    is_new: Rows = np.diff(batch.yaw["fix_time_us"], prepend=-1) != 0
+    is_new[list(batch.begins)] = True
+    return is_new
+
+
 def _yaw_estimator(batch: Batch) -> Columns:
-    times = batch.yaw["fix_time_us"]
-    is_new = np.diff(times, prepend=-1) != 0  # one row per fix, and one at the start of the batch
+    is_new = _has_yaw(batch)
     rows = batch.yaw[is_new]
     heading = yaw_rad(rows["q_level_from_frd"])
     return {
@@ -367,6 +376,10 @@ def _innovation_variances(batch: Batch) -> Columns:
     return _innovation_columns(batch, "innov_var")
 
 
+def _fresh_of(sensor: str) -> Callable[[Batch], Rows]:
+    return partial(is_fresh, sensor=sensor)
+
+
 _SAMPLED = {"timestamp_sample": "uint64_t"}
 
 TOPICS = [
@@ -397,9 +410,10 @@ TOPICS = [
             "vel_ned_valid": "bool",
         },
         _gps,
+        _fresh_of("gnss"),
     ),
-    Topic("sensor_baro", {**_SAMPLED, "pressure": "float", "temperature": "float"}, _baro),
-    Topic("vehicle_magnetometer", {**_SAMPLED, "magnetometer_ga": "float[3]"}, _mag),
+    Topic("sensor_baro", {**_SAMPLED, "pressure": "float", "temperature": "float"}, _baro, _fresh_of("baro")),
+    Topic("vehicle_magnetometer", {**_SAMPLED, "magnetometer_ga": "float[3]"}, _mag, _fresh_of("mag")),
     Topic(
         "distance_sensor",
         {
@@ -408,8 +422,14 @@ TOPICS = [
             **dict.fromkeys("type orientation".split(), "uint8_t"),
         },
         _range,
+        _fresh_of("range"),
     ),
-    Topic("battery_status", dict.fromkeys("voltage_v current_a discharged_mah remaining".split(), "float"), _battery),
+    Topic(
+        "battery_status",
+        dict.fromkeys("voltage_v current_a discharged_mah remaining".split(), "float"),
+        _battery,
+        _fresh_of("battery"),
+    ),
     Topic("actuator_motors", {**_SAMPLED, "control": "float[12]"}, _motors),
     Topic(
         "vehicle_attitude_setpoint",
@@ -436,6 +456,7 @@ TOPICS = [
             **dict.fromkeys("yaw innov_vn innov_ve weight".split(), f"float[{YAW_MODELS}]"),
         },
         _yaw_estimator,
+        _has_yaw,
     ),
     Topic("wind", {**_SAMPLED, "windspeed_north": "float", "windspeed_east": "float"}, _wind),
     Topic(

@@ -263,3 +263,19 @@ def test_log_of_a_long_flight_goes_on_in_parts_that_clients_can_download(tmp_pat
     times = [ULog(str(tmp_path / f"copy-{name}")).get_dataset("vehicle_attitude").data["timestamp"] for name in listed]
     np.testing.assert_array_equal(np.concatenate(times), np.arange(1, len(np.concatenate(times)) + 1) * 20_000)
     flight.close()
+
+
+def test_log_has_the_same_bytes_whether_each_second_is_written_when_it_ends_or_five_at_once(tmp_path):
+    def logged(name, is_live):
+        folder = tmp_path / name
+        folder.mkdir()
+        flight = Flight(FlightConfig(seed=2, world=WorldConfig(size_m=64.0, trees_per_ha=0.0)), folder=folder)
+        flight.recorder.is_live = is_live
+        for frame in range(1, 660):
+            flight.frame()
+            if frame in (270, 333):
+                flight.params["MPC_XY_CRUISE"] = 5.0 + frame / 1000.0
+        flight.close()
+        return (folder / "flight.ulg").read_bytes()
+
+    assert logged("live", is_live=True) == logged("fast", is_live=False)

@@ -59,9 +59,9 @@ def test_a_flight_holds_less_than_half_a_kilobyte_per_frame():
     flight, recorder = idle_flight()
     tracemalloc.start()
     try:
-        idle_until(flight, recorder, 2.0)
+        idle_until(flight, recorder, 6.0)  # the first chunk of rows is there
         before = tracemalloc.get_traced_memory()[0]
-        idle_until(flight, recorder, 10.0)
+        idle_until(flight, recorder, 14.0)
         assert (tracemalloc.get_traced_memory()[0] - before) / (8.0 * 50.0) < 500.0
     finally:
         tracemalloc.stop()
