@@ -161,7 +161,7 @@ def test_cancelled_calibration_puts_the_vehicle_down_and_keeps_the_old_offsets()
     texts = run(flight, script)
     assert texts.count("[cal] calibration cancelled") == 1
     assert offsets(flight, "ACC") == [pytest.approx(0.01), 0.0, 0.0]
-    assert not flight.rig.rows["truth"]["is_held"][0]
+    assert not flight.rig.rows["body"]["is_held"][0]
 
 
 def test_armed_vehicle_is_not_calibrated():

@@ -31,7 +31,7 @@ class Ground:
 
     def speeds(self):
         """[rad/s] true."""
-        return np.array(self.flight.rig.rows["truth"][0]["rotor_speed"])
+        return np.array(self.flight.rig.rows["truth"][0]["motor_speed"])
 
     def turning(self):
         return [i for i, speed in enumerate(self.speeds()) if speed > 50.0]

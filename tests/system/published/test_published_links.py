@@ -63,7 +63,7 @@ def test_home_yaw_without_local_position():
     """PX4: "home yaw without local position: within 20 deg"."""
     flown = Flown()
     set_fault(flown.faults, "gnss", "off")
-    q_ned_from_frd = flown.flight.rig.rows["truth"]["q_ned_from_frd"]
+    q_ned_from_frd = flown.flight.rig.rows["body"]["q_ned_from_frd"]
     q_ned_from_frd[0] = (0.0, 0.0, np.sin(0.6), np.cos(0.6))  # faces 69 deg
 
     async def script(drone):

@@ -3,6 +3,8 @@
 import pytest
 
 from autopilot.interface.vehicle_state import Mode, Reply, Verdict
+from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
+from common.airframe import load_airframe
 from tests.unit.autopilot.mavlink.rig import Rig, texts
 
 TERMINATE = 185
@@ -78,8 +80,13 @@ def test_sticks_are_cut_off_and_given_back():
     assert not rig.vehicle.sticks.is_cut
 
 
-@pytest.mark.parametrize(("rotor_count", "kind"), [(4, 2), (6, 13), (8, 14)])
-def test_heartbeat_tells_the_number_of_rotors(rotor_count, kind):
+@pytest.mark.parametrize("mav_type", [2, 10, 13])
+def test_heartbeat_tells_the_kind_of_vehicle(mav_type):
     rig = Rig()
-    rig.update(rotor_count=rotor_count)
-    assert rig.all("HEARTBEAT", 60)[0].type == kind
+    rig.update(mav_type=mav_type)
+    assert rig.all("HEARTBEAT", 60)[0].type == mav_type
+
+
+@pytest.mark.parametrize(("airframe", "mav_type"), [("x500", 2), ("f450", 2), ("f550", 13)])
+def test_a_multirotors_kind_is_the_number_of_its_rotors(airframe, mav_type):
+    assert MULTIROTOR.mav_type(load_airframe(airframe)) == mav_type
