@@ -84,6 +84,15 @@ def test_links_lead_somewhere(name):
             assert anchor in anchors(there), f"{target}#{anchor}"
 
 
+@pytest.mark.parametrize("name", PAGES)
+def test_files_that_a_page_names_by_their_path_exist(name):
+    """NAME and the like stand for a file that is to be written."""
+    named = re.findall(
+        rf"`((?:{'|'.join((*PACKAGES, 'tests', 'docs'))})/[\w/.-]+\.\w+)`", PAGES[name].read_text("utf-8")
+    )
+    assert [path for path in named if not (ROOT / path).exists() and not re.search("[A-Z]{4}", path)] == []
+
+
 def test_tests_that_are_named_exist():
     for name, page in PAGES.items():
         for test, target in re.findall(r"\[(test_\w+)\]\(([^)]+\.py)\)", page.read_text(encoding="utf-8")):
