@@ -44,7 +44,7 @@ shows how the gains were designed.
 
 ARDUPILOT_HEADER = """## In the ArduPilot dialect alone
 
-PX4 has nothing like them: a vehicle has them with [`--dialect ardupilot`](../how-to/flying.md#dialects).
+PX4 has nothing like them: a vehicle has them with [`--dialect ardupilot`](dialects.md).
 
 """
 
@@ -57,7 +57,7 @@ are not kept for the next flight. The flight controller does not read them.
 
 ALIAS_HEADER = """## Names in the ArduPilot dialect
 
-With [`--dialect ardupilot`](../how-to/flying.md#dialects) the vehicle has these names too. Those that stand for
+With [`--dialect ardupilot`](dialects.md) the vehicle has these names too. Those that stand for
 nothing can only be read.
 
 """
