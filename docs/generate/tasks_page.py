@@ -27,7 +27,7 @@ training configurations set or randomise the numbers by name under `environment_
 | [ReachTarget](#reachtarget) | drive a car with four driven wheels to a pose: [more](../explanation/reach-target.md) |
 | [Parking1](#parking1) | park a car between three blocks: [more](../explanation/parking.md) |
 | [Parking2](#parking2) | park a car on one of two storeys, past moving obstacles: [more](../explanation/parking.md) |
-| [FollowMe](#followme) | a drone follows a person through hills and trees: [more](../how-to/follow-me.md) |
+| [FollowMe](#followme) | a drone follows a person through hills and trees: [more](../explanation/following.md) |
 | [Navigate](#navigate) | fly a drone through forest to a goal, at speed: [more](../explanation/navigate.md) |
 | Hover | hold a drone at a point by body rates and thrust, on its estimate; in Gymnasium only |
 
