@@ -42,6 +42,10 @@ def _tangent_plane(origin: GeoPoint) -> tuple[float, float, float, float]:
     return sin_lat, cos_lat, axis_distance, equator_distance
 
 
+# The plane asked for last and its origin: nearly always the next one too, and found without hashing the origin.
+_newest_plane: tuple[GeoPoint, float, float, float, float] = (DEFAULT_HOME, *_tangent_plane(DEFAULT_HOME))
+
+
 def ned_from_geodetic(lat_deg: float, lon_deg: float, alt_m: float, origin: GeoPoint) -> tuple[float, float, float]:
     """North, east and down coordinates [m] of a position in the tangent plane of `origin`."""
     sin_lat_0, cos_lat_0, axis_distance_0, equator_distance_0 = _tangent_plane(origin)
@@ -64,7 +68,11 @@ def geodetic_from_ned(north: float, east: float, down: float, origin: GeoPoint) 
 
     Latitude by Bowring, "Transformation from spatial to geographical coordinates", Survey Review 23 (1976), one step.
     """
-    sin_lat_0, cos_lat_0, axis_distance_0, equator_distance_0 = _tangent_plane(origin)
+    global _newest_plane  # noqa: PLW0603
+    plane = _newest_plane
+    if plane[0] is not origin:
+        plane = _newest_plane = (origin, *_tangent_plane(origin))
+    _, sin_lat_0, cos_lat_0, axis_distance_0, equator_distance_0 = plane
     outward = axis_distance_0 - sin_lat_0 * north - cos_lat_0 * down
     equator_distance = equator_distance_0 + cos_lat_0 * north - sin_lat_0 * down
     axis_distance = hypot(outward, east)

@@ -21,7 +21,7 @@ def record_reader(dtype: np.dtype[Any], name: str) -> Callable[[Any, int], Any]:
         name: name of the record type.
     """
     leaves: list[tuple[int, int, str]] = []  # byte offset, count, code
-    scope: dict[str, Any] = {}
+    scope: dict[str, Any] = {"_new": tuple.__new__}  # a named tuple's own __new__ is one more call of Python
     expression = _record_expression(dtype, name, 0, leaves, scope)
     layout = "<"
     position = 0
@@ -69,4 +69,4 @@ def _record_expression(
         leaves.append((start + offset, count, _CODES[field_type.base.str[1:]]))
         arguments.append(f"v[{i_value}:{i_value + count}]" if field_type.shape else f"v[{i_value}]")
     scope[name] = namedtuple(name, dtype.names)  # noqa: PYI024
-    return f"{name}({', '.join(arguments)})"
+    return f"_new({name}, ({', '.join(arguments)},))"

@@ -21,10 +21,14 @@ class TlogWriter(LogFile):
     def __init__(self, target: Path | str | BinaryIO, on_trouble: OnTrouble | None = None) -> None:
         super().__init__(target, on_trouble)
         self._waiting: list[bytes] = []
+        self._time_us = -1
+        self._time = b""  # as it is written: several frames have the same
 
     def frame(self, time_us: int, frame: bytes) -> None:
         """Records one raw frame, sent or received at simulated `time_us`."""
-        self._waiting += (_TIME.pack(SIMULATED_EPOCH_US + time_us), frame)
+        if time_us != self._time_us:
+            self._time_us, self._time = time_us, _TIME.pack(SIMULATED_EPOCH_US + time_us)
+        self._waiting += (self._time, frame)
         if len(self._waiting) >= _BATCH:
             self._write_waiting()
 

@@ -239,7 +239,7 @@ class Flight:
         """Advances by 20 ms."""
         self._load_parameters()
         self.injector.frame(self.time_us)
-        if any(server.needs_ticks for server in self._servers):
+        if self._needs_ticks():
             self._advance_by_ticks()
         else:
             self.rig.advance(FRAME_TICKS)
@@ -264,6 +264,12 @@ class Flight:
         self.troubles.tell(self.controller.commander.announcer)
         if isnan(self.ready_s) and self.controller.state.is_ready_to_arm:
             self.ready_s = self.time_us * 1e-6
+
+    def _needs_ticks(self) -> bool:
+        for server in self._servers:  # noqa: SIM110  (any() would make a generator in each frame)
+            if server.needs_ticks:
+                return True
+        return False
 
     def _advance_by_ticks(self) -> None:
         """The same frame in single ticks, each of which is shown to the flight controller's servers."""

@@ -21,7 +21,7 @@ MAGIC_V2 = 0xFD
 SIGNED_FLAG = 0x01
 SIGNATURE_LENGTH = 13
 FRAME_MAX = 280  # [byte]
-_SHORTEST_V2 = 12  # header and checksum
+SHORTEST_V2 = 12  # header and checksum
 
 _HEADER_V2 = struct.Struct(
     "<BBBBBBHB"
@@ -211,7 +211,7 @@ class FrameReader:
             is_whole: `data` is a datagram: what is unfinished at its end will never be finished.
         """
         if not self._rest:
-            only = _only_frame(data)
+            only = whole_frame(data)
             if only is not None:
                 return [only]
         buffer = self._rest + data if self._rest else bytes(data)
@@ -259,9 +259,9 @@ def begins_with_frame(data: bytes) -> bool:
     return end <= len(head) and _checked_frame(head, 0, end) is not None
 
 
-def _only_frame(data: bytes) -> Frame | None:
+def whole_frame(data: bytes) -> Frame | None:
     """The frame that `data` is, if it is one whole unsigned MAVLink 2 frame: what nearly every piece is."""
-    if len(data) < _SHORTEST_V2 or data[0] != MAGIC_V2 or len(data) != _SHORTEST_V2 + data[1] or data[2]:
+    if len(data) < SHORTEST_V2 or data[0] != MAGIC_V2 or len(data) != SHORTEST_V2 + data[1] or data[2]:
         return None
     msg_id = data[7] | data[8] << 8 | data[9] << 16
     kind = _layouts.get(msg_id) or message_type(msg_id)
@@ -321,7 +321,13 @@ def _compile(definition: Any) -> tuple[Callable[..., bytes], Callable[[bytes], A
     codes = _wire_codes(definition)
     layout = struct.Struct("<" + "".join(codes.values()))
     record = namedtuple(f"{definition.msgname.lower()}_fields", definition.fieldnames)  # type: ignore[misc]  # noqa: PYI024
-    scope: dict[str, Any] = {"_pack": layout.pack, "_Record": record, "_text": _text, "_chars": _chars}
+    scope: dict[str, Any] = {
+        "_pack": layout.pack,
+        "_new": tuple.__new__,
+        "_Record": record,
+        "_text": _text,
+        "_chars": _chars,
+    }
 
     positions: dict[str, str] = {}
     values: list[str] = []
@@ -340,7 +346,7 @@ def _compile(definition: Any) -> tuple[Callable[..., bytes], Callable[[bytes], A
         i_value += count
     parameters = ", ".join(arguments[name] for name in definition.fieldnames)
     packer = eval(f"lambda {parameters}: _pack({', '.join(values)})", scope)  # noqa: S307  (text made of field names)
-    maker = eval(f"lambda v: _Record({', '.join(positions[n] for n in definition.fieldnames)})", scope)  # noqa: S307
+    maker = eval(f"lambda v: _new(_Record, ({', '.join(positions[n] for n in definition.fieldnames)},))", scope)  # noqa: S307
     size = layout.size
     unpack_from = layout.unpack_from
     return packer, lambda payload: maker(unpack_from(payload.ljust(size, b"\0"))), size

@@ -274,7 +274,7 @@ def test_log_has_the_same_bytes_whether_each_second_is_written_when_it_ends_or_f
         for frame in range(1, 660):
             flight.frame()
             if frame in (270, 333):
-                flight.params["MPC_XY_CRUISE"] = 5.0 + frame / 1000.0
+                flight.params.set("MPC_XY_CRUISE", 5.0 + frame / 1000.0)
         flight.close()
         return (folder / "flight.ulg").read_bytes()
 
