@@ -34,7 +34,9 @@ TARGETS = {
     "autopilot/commander/crash_detector.py": [f"{COMMANDER}/test_crash_detector.py"],
     "autopilot/commander/battery.py": [f"{COMMANDER}/test_battery.py"],
     "autopilot/commander/arming.py": [f"{COMMANDER}/test_arming.py"],
-    "autopilot/vehicles/multirotor/landing_detector.py": ["tests/unit/autopilot/vehicles/multirotor/test_landing_detector.py"],
+    "autopilot/vehicles/multirotor/landing_detector.py": [
+        "tests/unit/autopilot/vehicles/multirotor/test_landing_detector.py"
+    ],
     "common/files.py": ["tests/unit/common/test_files.py"],
 }
 TIMEOUT_S = 120.0  # of the tests of one mutant: one that hangs is noticed, too
