@@ -4,6 +4,7 @@ from typing import Any
 
 import warp as wp
 
+from common.warp_start import start_warp
 from mission.console.terminal import Say
 from sim.advance import rig_kernels
 
@@ -39,6 +40,7 @@ def load_kernels(say: Say, *, has_camera: bool, has_owner: bool) -> None:
         has_camera: those of the camera's pictures too, which a flight in lockstep loads when it takes the first.
         has_owner: those of the owner and of the policy that follows too; their packages must have been imported.
     """
+    start_warp()
     names = (*_ALWAYS, *(_CAMERA if has_camera else ()), *(_OWNER if has_owner else ()))
     modules = [wp.get_module(name) for name in names] + [kernel.module for kernel in flight_kernels()]
     for number, module in enumerate(modules, 1):

@@ -20,6 +20,7 @@ from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.params import ParameterTable
+from common.warp_start import start_warp
 from sim.advance import rig_kernels
 from sim.bodies.body import MULTIROTOR_BODY, Body
 from sim.faults import Faults
@@ -72,6 +73,7 @@ class Rig:
         body: Body = MULTIROTOR_BODY,
         law: ControlLaw = MULTIROTOR_LAW,
     ) -> None:
+        start_warp()
         self.body, self.law = body, law
         self._kernels = rig_kernels(body, law)
         self.vehicle_count = vehicle_count

@@ -2,6 +2,18 @@
 
 import signal
 
+import pytest
+
 # A shell that starts the tests in the background has them ignore Ctrl-C, and so would the vehicles they start and stop.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def started_warp():
+    """Tests that make arrays themselves need no greeting either; the clients' own environments have no Warp."""
+    try:
+        from common.warp_start import start_warp
+    except ModuleNotFoundError:
+        return
+    start_warp()

@@ -92,6 +92,7 @@ from autopilot.ports import (
     Samples,
 )
 from common.kernels import GRAVITY_M_S2, vec24
+from common.warp_start import start_warp
 
 wp.set_module_options({"enable_backward": False})
 
@@ -380,6 +381,7 @@ def make_ekf(vehicle_count: int, device: str = "cpu", params: Any = None) -> Ekf
         device: a Warp device.
         params: one `EstimatorParams` for all rows; None gives the defaults without a world magnetic field.
     """
+    start_warp()
     row = params if params is not None else estimator_params()
     ekf = Ekf()
     ekf.rows = wp.zeros(vehicle_count, dtype=EstimatorState, device=device)

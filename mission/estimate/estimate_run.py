@@ -17,6 +17,7 @@ from autopilot.estimator.state import PHASE_RUNNING, EstimatorState
 from autopilot.ports import Estimate, Samples
 from common.geomagnetic import field_ned_gauss
 from common.params import ParameterTable
+from common.warp_start import start_warp
 from mission.estimate.sensor_log import Recording, Rows, SensorLog, row_dtype
 
 CHUNK_TICKS = 1000
@@ -115,6 +116,7 @@ def estimator_table(recording: Recording, given: Mapping[str, float]) -> Paramet
 
 def load_kernels() -> None:
     """Compiles what the cache lacks, so that it is not taken for the estimator's own time."""
+    start_warp()
     wp.load_module(estimate_samples.module, device="cpu")
     wp.load_module(reset_rows.module, device="cpu")
 

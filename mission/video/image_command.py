@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
-import common.kernels  # noqa: F401  (starts Warp without its greeting)
 from autopilot.payload.camera.image_file import jpeg_bytes
 from common.attitude import product, quat_of
 from common.files import write_whole

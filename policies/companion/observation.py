@@ -11,6 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.attitude import Vector, rotated
+from common.warp_start import start_warp
 from policies.companion.vehicle_link import Own, Owner
 from policies.tasks.flight.own_state import Command, OwnState, command_rows
 from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, observe_rows, vector_elements
@@ -29,6 +30,7 @@ class Observer:
     """
 
     def __init__(self, kind: int) -> None:
+        start_warp()
         own, report = wp.zeros(1, dtype=OwnState), wp.zeros(1, dtype=OwnerReport)
         action, command = wp.zeros(1, dtype=wp.vec4), wp.zeros(1, dtype=Command)
         out = wp.zeros((1, len(vector_elements(kind))), dtype=float)

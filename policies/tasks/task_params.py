@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-import common.kernels  # noqa: F401  (starts Warp quietly)
 from common.rng import draw_key
+from common.warp_start import start_warp
 
 wp.set_module_options({"enable_backward": False})
 
@@ -65,6 +65,7 @@ class NumberTable:
         self.declarations = {number.name: number for number in declarations}
         self.names = list(self.declarations)
         self.rows = np.zeros((len(self.names), _COLUMNS), dtype=np.float32)
+        start_warp()
         self._device = wp.zeros(self.rows.shape, dtype=float, device=device)
         self.update({name: number.default for name, number in self.declarations.items()})
 

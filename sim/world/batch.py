@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from common.warp_start import start_warp
 from sim.world.growing import (
     COVERAGE,
     EMPTY_M,
@@ -69,6 +70,7 @@ class WorldBatch:
         trees_per_ha_max: float | None = None,
         tree_height_limit_m: float | None = None,
     ) -> None:
+        start_warp()
         self.config = config
         self.count = count
         self.device = device

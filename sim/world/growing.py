@@ -7,7 +7,6 @@ planting grid or a whole world. The trees stand on Poisson-disc points, planted 
 
 import warp as wp
 
-import common.kernels  # noqa: F401  (starts Warp quietly)
 from sim.rng_streams import TREE_PLACES, TREE_SIZES
 from sim.world.terrain import Terrain, terrain_height
 from sim.world.trees import (

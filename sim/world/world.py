@@ -13,6 +13,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from common.warp_start import start_warp
 from sim.world.terrain import (
     FloatArray,
     Terrain,
@@ -192,6 +193,7 @@ class WorldMap:
 
 def build_world(config: WorldConfig | None = None, device: str = "cpu") -> WorldMap:
     """The world of a configuration, its kernel arrays on `device`."""
+    start_warp()
     config = config or WorldConfig()
     cells = max(2, round(config.size_m / config.cell_m))
     heights = make_heights(
