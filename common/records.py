@@ -42,14 +42,55 @@ def row_reader(rows: np.ndarray[Any, Any], i_row: int, name: str, field: str = "
         name: name of the record type.
         field: reads only this nested struct of the row.
     """
-    dtype, offset = rows.dtype, i_row * rows.dtype.itemsize
-    if field:
-        if dtype.fields is None:
-            raise TypeError(f"{name} is not a structured type")
-        dtype, offset = dtype.fields[field][0], offset + dtype.fields[field][1]
+    dtype, offset = _part(rows, i_row, name, field)
     read = record_reader(dtype, name)
     buffer = rows.view(np.uint8).data
     return lambda: read(buffer, offset)
+
+
+def late_reader(rows: np.ndarray[Any, Any], i_row: int, name: str, field: str = "") -> Callable[[], Any]:
+    """As `row_reader`, where little of a row is looked at: a copy whose fields are unpacked when they are asked for."""
+    dtype, offset = _part(rows, i_row, name, field)
+    readers = {each: _field_reader(dtype, each, name) for each in dtype.names or ()}
+    buffer = rows.view(np.uint8).data[offset : offset + dtype.itemsize]
+
+    class Late:
+        _fields = dtype.names
+
+        def __init__(self) -> None:
+            self._row = bytes(buffer)
+
+        def __getattr__(self, field: str) -> Any:
+            """The first time; from then on it is an attribute."""
+            read = readers.get(field)
+            if read is None:
+                raise AttributeError(f"{name} has no {field}")
+            value = self.__dict__[field] = read(self._row)
+            return value
+
+    return Late
+
+
+def _field_reader(dtype: np.dtype[Any], field: str, name: str) -> Callable[[Any], Any]:
+    """A function that returns one field of a row's bytes."""
+    if dtype.fields is None:
+        raise TypeError(f"{name} is not a structured type")
+    field_type, offset = dtype.fields[field][:2]
+    if field_type.names is not None:
+        read = record_reader(field_type, f"{name}_{field}")
+        return lambda row: read(row, offset)
+    read_one = record_reader(np.dtype([(field, field_type)]), name)
+    return lambda row: read_one(row, offset)[0]
+
+
+def _part(rows: np.ndarray[Any, Any], i_row: int, name: str, field: str) -> tuple[np.dtype[Any], int]:
+    """The type of a row or of a field of it, and where it begins in the array [byte]."""
+    dtype, offset = rows.dtype, i_row * rows.dtype.itemsize
+    if not field:
+        return dtype, offset
+    if dtype.fields is None:
+        raise TypeError(f"{name} is not a structured type")
+    return dtype.fields[field][0], offset + dtype.fields[field][1]
 
 
 def _record_expression(

@@ -26,7 +26,7 @@ from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder
 from common.kernels import FRAME_TICKS, FRAME_US, TICK_US
 from common.params import Parameter
-from common.records import row_reader
+from common.records import late_reader, row_reader
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
 from mission.client import Running
@@ -395,9 +395,9 @@ def host_ports(rig: Rig, airframe: Airframe, i_vehicle: int = 0) -> HostPorts:
     estimator = rows["autopilot.ekf.rows"]
     return HostPorts(
         read_estimate=row_reader(estimator, i_vehicle, "Estimate", "estimate"),
-        read_samples=row_reader(rows["sensors"], i_vehicle, "Samples", "samples"),
+        read_samples=late_reader(rows["sensors"], i_vehicle, "Samples", "samples"),
         read_actuators=row_reader(rows["autopilot.control"], i_vehicle, "Actuators", "actuators"),
-        read_health=row_reader(estimator, i_vehicle, "EstimatorState"),
+        read_health=late_reader(estimator, i_vehicle, "EstimatorState"),
         setpoint=rows["autopilot.setpoint"][chosen],
         read_rotor_speeds=esc_reader(rows["truth"], i_vehicle),
         external=rows["autopilot.ekf.external"][chosen],

@@ -131,7 +131,10 @@ class Rig:
         """Advances every vehicle by `tick_count` ticks of 4 ms."""
         self.rows.send()
         commands = self.prepare(tick_count)
-        self._workers.run(lambda k: commands[k].launch())
+        if len(commands) == 1:
+            commands[0].launch()
+        else:
+            self._workers.run(lambda k: commands[k].launch())
         self.rows.fetch()
 
     def prepare(self, tick_count: int) -> list[Any]:

@@ -47,6 +47,8 @@ class HostRows:
 
     def send(self) -> None:
         """Gives the device what the host has written."""
+        if not self._mirrors:
+            return
         for name in self._mirrors.keys() & WRITTEN:
             array, mirror = self._mirrors[name]
             wp.copy(array, mirror)

@@ -6,7 +6,6 @@ all of them.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from autopilot.interface.vehicle_interface import Vehicle
 from autopilot.interface.vehicle_state import Severity
@@ -17,7 +16,7 @@ from autopilot.mavlink.telemetry.telemetry_rates import StreamSchedule, Telemetr
 from autopilot.mavlink.transport.frame_log import FrameLog, OnFrame
 from autopilot.mavlink.transport.links import FixedLinks, Link, LinkSource
 from autopilot.mavlink.transport.receive_queue import Intake
-from autopilot.mavlink.wire.codec import SIGNED_FLAG, Frame, MessageType, frame_bytes, known_type
+from autopilot.mavlink.wire.codec import SIGNED_FLAG, Frame, MessageType, Payload, frame_bytes, known_type
 from autopilot.mavlink.wire.signing import MemoryStore, Signer, SigningConfig
 from common.clock import SIMULATED_EPOCH_US
 
@@ -90,6 +89,21 @@ class Channel:
         if not self.is_mute:
             self.link.send(frame)
         return frame
+
+    def send_all(self, messages: Sequence[Payload]) -> list[bytes]:
+        """Sends messages of the autopilot's, one after the other; returns their frames."""
+        if self.signer is not None:
+            return [self.send(kind, payload) for kind, payload in messages]
+        frames, seq, sysid = [], self._seq, self._sysid
+        for kind, payload in messages:
+            frames.append(frame_bytes(kind, payload, seq, sysid, AUTOPILOT_COMPONENT))
+            seq = seq + 1 & 0xFF
+        self._seq = seq
+        if not self.is_mute:
+            send = self.link.send
+            for frame in frames:
+                send(frame)
+        return frames
 
     def pass_on(self, frame: bytes) -> None:
         """Sends a frame of somebody else's, as it is."""
@@ -203,17 +217,15 @@ class Endpoint:
         state = self.vehicle.state
         log, needs_ticks = self._log, False
         for channel in self.channels:
-            channel.schedule.send_due(self.time_us, state, partial(self._stream, channel, log))
-            log = None
+            messages = channel.schedule.due(self.time_us, state)
+            if self.clock.boot_us:
+                messages = [(kind, self._on_clients_clock(kind, payload)) for kind, payload in messages]
+            frames = channel.send_all(messages)
+            if log is not None:
+                log.sent_all(self.time_us, messages, AUTOPILOT_COMPONENT, frames)
+                log = None
             needs_ticks = needs_ticks or channel.schedule.needs_ticks
         self.needs_ticks = needs_ticks
-
-    def _stream(self, channel: Channel, log: FrameLog | None, kind: MessageType, payload: bytes) -> None:
-        if self.clock.boot_us:
-            payload = self._on_clients_clock(kind, payload)
-        frame = channel.send(kind, payload)
-        if log is not None:
-            log.sent(self.time_us, kind, payload, AUTOPILOT_COMPONENT, frame)
 
     def is_for_us(self, target_system: int, target_component: int) -> bool:
         """Whether a message is addressed to one of our components; 0 addresses all."""

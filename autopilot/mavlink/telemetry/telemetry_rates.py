@@ -25,12 +25,11 @@ from autopilot.mavlink.telemetry import (
 )
 from autopilot.mavlink.transport.links import LinkRole
 from autopilot.mavlink.wire.adsb_messages import adsb_vehicle
-from autopilot.mavlink.wire.codec import MessageType, known_type
+from autopilot.mavlink.wire.codec import MessageType, Payload, known_type
 from autopilot.payload.gimbal.gimbal_control import GimbalControl
 from common.kernels import FRAME_US, TICK_US
 
 Builder = Callable[[VehicleState], bytes | None]
-Send = Callable[[MessageType, bytes], object]
 
 SPREAD = 8  # streams start at different eighths of their interval, so that no frame has to send them all
 NEVER_US = 1 << 62
@@ -293,14 +292,16 @@ class StreamSchedule:
         heapify(self._queue)
         self._is_planned = True
 
-    def send_due(self, now_us: int, state: VehicleState, send: Send) -> None:
-        """Sends what is due now; where messages come more often than frames, first what was due since the last one."""
+    def due(self, now_us: int, state: VehicleState) -> list[Payload]:
+        """What is due now; where messages come more often than frames, first what was due since the last one."""
+        messages: list[Payload] = []
         if self.needs_ticks:
             for moment in state.ticks:
-                self._send_due(moment.time_us, moment, send)
-        self._send_due(now_us, state, send)
+                self._add_due(moment.time_us, moment, messages)
+        self._add_due(now_us, state, messages)
+        return messages
 
-    def _send_due(self, now_us: int, state: VehicleState, send: Send) -> None:
+    def _add_due(self, now_us: int, state: VehicleState, messages: list[Payload]) -> None:
         if not self._is_planned:
             self._plan(now_us)
         queue = self._queue
@@ -311,4 +312,4 @@ class StreamSchedule:
             heapreplace(queue, (next_us if next_us > now_us else now_us + interval_us[msg_id], msg_id))
             payload = builders[msg_id](state)
             if payload is not None:
-                send(types[msg_id], payload)
+                messages.append((types[msg_id], payload))

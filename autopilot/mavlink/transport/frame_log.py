@@ -4,9 +4,9 @@ Each channel counts its frames for itself, and so does each client; in one file 
 Here each sender's frames are numbered anew where they are not in step, and what was really lost stays a gap.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-from autopilot.mavlink.wire.codec import SIGNED_FLAG, Frame, MessageType, frame_bytes
+from autopilot.mavlink.wire.codec import SIGNED_FLAG, Frame, MessageType, Payload, frame_bytes
 
 OnFrame = Callable[[int, bytes], None]
 
@@ -33,10 +33,18 @@ class FrameLog:
 
     def sent(self, time_us: int, kind: MessageType, payload: bytes, compid: int, frame: bytes) -> None:
         """Logs a message of the vehicle's, unsigned: `frame` as it was sent, if its number is in step."""
-        seq = self._own[compid] = self._own[compid] + 1 & 0xFF
-        if frame[_SEQ_AT] != seq or frame[_FLAGS_AT] & SIGNED_FLAG:
-            frame = frame_bytes(kind, payload, seq, self._sysid, compid)
-        self._on_frame(time_us, frame)
+        self.sent_all(time_us, [(kind, payload)], compid, [frame])
+
+    def sent_all(self, time_us: int, messages: Sequence[Payload], compid: int, frames: Sequence[bytes]) -> None:
+        """Logs messages of one component, as `sent` does."""
+        seq, on_frame = self._own[compid], self._on_frame
+        for (kind, payload), frame in zip(messages, frames, strict=True):
+            seq = seq + 1 & 0xFF
+            if frame[_SEQ_AT] == seq and not frame[_FLAGS_AT] & SIGNED_FLAG:
+                on_frame(time_us, frame)
+            else:
+                on_frame(time_us, frame_bytes(kind, payload, seq, self._sysid, compid))
+        self._own[compid] = seq
 
     def received(self, time_us: int, frame: Frame, channel: int) -> None:
         """Logs a frame that came in on a channel: as it is, if its number is in step."""

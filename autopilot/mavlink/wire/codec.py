@@ -56,6 +56,10 @@ class MessageType:
     target_component_at: int = -1
 
 
+Payload = tuple[MessageType, bytes]
+"""A message, its fields packed."""
+
+
 class Frame(NamedTuple):
     """One frame whose checksum is right, or one of a kind we do not know, whose checksum nobody here can tell."""
 

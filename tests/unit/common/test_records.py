@@ -3,7 +3,7 @@ import pytest
 
 from autopilot.estimator.state import EstimatorState
 from autopilot.ports import Estimate, Samples
-from common.records import record_reader, row_reader
+from common.records import late_reader, record_reader, row_reader
 
 
 def rows_of(struct, count=3):
@@ -30,6 +30,7 @@ def test_record_holds_every_number_of_its_row(struct):
     rows = rows_of(struct)
     for i_row in range(len(rows)):
         assert_same(row_reader(rows, i_row, "Row")(), rows[i_row])
+        assert_same(late_reader(rows, i_row, "Row")(), rows[i_row])
 
 
 def test_reader_follows_the_live_row():
@@ -43,9 +44,20 @@ def test_reader_follows_the_live_row():
     assert before.pos_ned == (0.0, 0.0, 0.0)
 
 
+def test_fields_that_are_read_late_are_those_of_the_moment():
+    rows = rows_of(Samples)
+    expected = rows[1].copy()
+    record = late_reader(rows, 1, "Samples")()
+    rows[1] = rows[2]
+    assert_same(record, expected)
+    with pytest.raises(AttributeError, match="Samples has no wings"):
+        _ = record.wings
+
+
 def test_part_of_a_row_is_read_by_its_path():
     rows = rows_of(EstimatorState)
     assert_same(row_reader(rows, 2, "Estimate", "estimate")(), rows["estimate"][2])
+    assert_same(late_reader(rows, 2, "Estimate", "estimate")(), rows["estimate"][2])
 
 
 def test_padding_between_fields_is_skipped():
