@@ -127,6 +127,7 @@ class FlightController:
     ) -> None:
         self._last_resort = vehicle.last_resort
         self.params = params
+        self.modes = vehicle.modes
         self.host = host or Host()
         self.sticks = Sticks(params)
         self.state = VehicleState(
@@ -168,16 +169,17 @@ class FlightController:
             self._relay,
             BatteryEstimator(airframe.battery),
             vehicle.ground_detector(params, airframe),
-            Pilot(self.state, params, self.sticks),
+            Pilot(self.state, params, self.sticks, vehicle.modes),
             MotorWatch(self.state, params, self._relay, airframe, ports.read_rotor_speeds, ports.leave_out),
+            vehicle.modes,
         )
         context = NavContext(self.state, params, self._relay, self._setpoint, hover, standing_m)
         mission = Mission(context, self.payload, self.commander.set_home)
-        self.navigator = Navigator(context, mission)
+        self.navigator = Navigator(context, mission, vehicle.modes)
         self.fence, self.rally = self.navigator.fence, self.navigator.rally
         self.lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
         self.guided = self.navigator.guided
-        self.lists.on_change(self.navigator.warn_of_fence)
+        self.lists.on_change(mission.warn_of_fence)
         self.commander.connect(self.navigator)
         self.guidance = Guidance(self.commander, self.navigator, self.payload)
         self.station = self.commander.station
@@ -259,9 +261,6 @@ class FlightController:
         self.commander.change_mode(mode)
 
     # ---- autopilot.interface.vehicle_interface.Vehicle ----
-
-    def has_mode(self, mode: Mode) -> bool:
-        return self.navigator.has_mode(mode)
 
     def arm(self, *, force: bool) -> Reply:
         return self.commander.arm(force=force)
@@ -351,7 +350,7 @@ class FlightController:
         self.navigator.follow.report(report)
 
     def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
-        self.navigator.precision.seen(pos_ned)
+        self.navigator.mission.precision.seen(pos_ned)
 
     def give_corrections(self, rtcm: bytes) -> None:
         if self._on_corrections is not None:

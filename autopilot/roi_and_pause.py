@@ -14,7 +14,6 @@ from autopilot.payload.payloads import Params, Payloads
 _NOT_FLYING = Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
 _AT_PLACE: Params = (3.0, 0.0, 0.0, 0.0)  # MAV_ROI_LOCATION in parameter 1, for the command's older form
 _NOWHERE: Params = (0.0, 0.0, 0.0, 0.0)
-_PAUSABLE = (Mode.MISSION, Mode.OFFBOARD, Mode.GUIDED)
 
 
 class Guidance:
@@ -59,7 +58,7 @@ class Guidance:
     def pause(self) -> Reply:
         """Stops a mission or a client's setpoints, and holds."""
         mode = self._state.mode
-        if mode not in _PAUSABLE:
+        if mode is not Mode.MISSION and not self._commander.modes[mode].is_offboard:
             return Reply(Verdict.TEMPORARILY_REJECTED, "there is nothing to pause: no mission is being flown")
         reply = self._commander.request_mode(Mode.HOLD)
         if reply.verdict is Verdict.ACCEPTED:

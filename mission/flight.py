@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 
 from autopilot.flight_controller import FlightController, HostPorts
 from autopilot.interface.platform import Host
-from autopilot.interface.vehicle_state import Mode, Severity
+from autopilot.interface.vehicle_state import Severity
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
@@ -60,7 +60,6 @@ if TYPE_CHECKING:
 __all__ = ["Flight", "FlightConfig", "flight_parameters"]
 
 TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
-OUTSIDE_MODES = (Mode.OFFBOARD, Mode.GUIDED)  # in which a companion may fly, PX4's and ArduPilot's
 DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (PX4, ARDUPILOT)}
 GUST_SHARE = 0.3  # guess: a gust adds up to this share of the mean wind
 
@@ -246,7 +245,7 @@ class Flight:
         self.time_us += FRAME_US
         self._surroundings.frame(self.time_us)
         if self.owner is not None:
-            self.owner.frame(self.time_us, is_followed=self.controller.state.mode in OUTSIDE_MODES)
+            self.owner.frame(self.time_us, is_followed=self.is_offboard)
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
         if self.onboard is not None:
@@ -324,6 +323,11 @@ class Flight:
     def cut_sticks(self, *, is_cut: bool) -> None:
         """The radio link of the sticks is lost, or is back."""
         self.controller.sticks.is_cut = is_cut
+
+    @property
+    def is_offboard(self) -> bool:
+        """Whether a companion may fly it, in PX4's way or ArduPilot's."""
+        return self.controller.modes[self.controller.state.mode].is_offboard
 
     @property
     def is_crashed(self) -> bool:

@@ -12,9 +12,10 @@ from autopilot.commander.failsafe import CRASHED
 from autopilot.commander.failsafe_executor import Guard
 from autopilot.commander.failure_detector import FailureWatch, StationLink
 from autopilot.commander.home import Home
-from autopilot.commander.modes import MODE_RULES, NO_STICKS, PASSING_MODES, mode_refusal
+from autopilot.commander.modes import NO_STICKS, mode_refusal
 from autopilot.commander.navigator_interface import Flying
 from autopilot.commander.stick_commands import Pilot
+from autopilot.interface.mode_spec import Disarmed, ModeSpec, ModeTable
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from autopilot.navigator.takeoff_intent import Ask
@@ -49,6 +50,7 @@ class Commander:
         landing: the landing detector.
         pilot: what the pilot asks for by the sticks.
         motors: the motor watch.
+        modes: those that the vehicle has.
     """
 
     def __init__(
@@ -60,16 +62,18 @@ class Commander:
         landing: GroundDetector,
         pilot: Pilot,
         motors: MotorWatch,
+        modes: ModeTable,
     ) -> None:
         self.state = state
         self.params = params
         self.announcer = announcer
+        self.modes = modes
         self.has_position = False
         self.station = StationLink()
         self.guard = Guard(self)
         self.home = Home(state, announcer)
         self._battery = battery
-        self._watch = FailureWatch(state, params, battery, self.station, motors)
+        self._watch = FailureWatch(state, params, battery, self.station, motors, modes)
         self._landing = landing
         self._pilot = pilot
         self._flying: Flying
@@ -93,6 +97,11 @@ class Commander:
     def follow_ardupilot(self) -> None:
         """Modes by ArduPilot's rules: any may be chosen on the ground, some are not armable, landing changes none."""
         self._is_ardupilot = True
+
+    @property
+    def _spec(self) -> ModeSpec:
+        """What the table says of the present mode."""
+        return self.modes[self.state.mode]
 
     # ---- each frame ----
 
@@ -176,7 +185,7 @@ class Commander:
     def check_arming(self) -> list[str]:
         """Reasons why the vehicle may not be armed now; empty when ready."""
         reasons = self._arming_reasons()
-        if not MODE_RULES[self.state.mode].may_arm:
+        if not self._spec.may_arm:
             reasons.append(
                 "Mode not armable" if self._is_ardupilot else f"mode {self.state.mode.name} does not allow arming"
             )
@@ -189,7 +198,7 @@ class Commander:
         reasons = arming_reasons(state, self.params, needs_position=self._needs_position(mode))
         if state.landed_state is not LandedState.ON_GROUND:
             reasons.append("not on the ground")
-        if MODE_RULES[mode].needs_sticks and not self._pilot.is_heard:
+        if self._spec.needs_sticks and not self._pilot.is_heard:
             reasons.append(NO_STICKS)
         if int(self.params["NAV_DLL_ACT"]) and self._watch.misses_station:
             reasons.append("ground station lost")  # the failsafe would disarm it at once (PX4)
@@ -233,11 +242,14 @@ class Commander:
         state = self.state
         if mode is state.mode:
             return ""
+        spec = self.modes.get(mode)
+        if spec is None:
+            return f"mode {mode.name} is not supported"
         is_free = self._is_ardupilot and not state.is_armed  # any mode: arming asks for what it needs
-        is_lifting = self._flying.is_taking_off and MODE_RULES[mode].on_takeoff
+        is_lifting = self._flying.is_taking_off and spec.on_takeoff
         is_lenient = self._is_ardupilot or is_lifting
         return mode_refusal(
-            mode,
+            spec,
             has_position=self.has_position or is_free,
             has_home=state.home is not None or is_free,
             is_on_ground=state.landed_state is LandedState.ON_GROUND and not is_lenient,
@@ -267,7 +279,7 @@ class Commander:
         if state.mode is Mode.TERMINATION:
             self.stop_motors("Disarmed after termination")
             return
-        is_done = self._has_flown or not MODE_RULES[state.mode].may_arm
+        is_done = self._has_flown or not self._spec.may_arm
         limit_us = self._disarm_landed_us if is_done else self._disarm_preflight_us
         if 0 <= limit_us <= now_us - self._landed_since_us:
             self.stop_motors("Disarmed after landing" if is_done else "Disarmed: no take-off")
@@ -304,12 +316,12 @@ class Commander:
     def _lift(self) -> None:
         """Released from the ground, but not yet off it."""
         state = self.state
-        is_put_down = MODE_RULES[state.mode].needs_sticks and self._flying.ask is Ask.DOWN
+        is_put_down = self._spec.needs_sticks and self._flying.ask is Ask.DOWN
         risen_m = self._lift_d - state.estimate.pos_ned[2]
         if risen_m > _AIRBORNE_M or self._flying.is_landing or is_put_down:
             self._has_flown = True
         elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
-            is_hovering = MODE_RULES[state.mode].needs_sticks or self._flying.ask is not Ask.UP
+            is_hovering = self._spec.needs_sticks or self._flying.ask is not Ask.UP
             if is_hovering and risen_m > _OFF_GROUND_M:  # it shall not go higher
                 self._has_flown = True
                 return
@@ -329,8 +341,8 @@ class Commander:
         self.guard.release()
         self._next_check_us = 0
         self.hold_reasons_back()
-        stays = MODE_RULES[state.mode].needs_sticks or state.mode is Mode.GUIDED  # arming again in it is usual
-        if not stays and not (self._is_ardupilot and state.mode not in PASSING_MODES):
+        disarmed = self._spec.disarmed
+        if disarmed is Disarmed.HOLD or (disarmed is Disarmed.USUAL and not self._is_ardupilot):
             self.change_mode(Mode.HOLD)
         self.announcer.heartbeat_now()
         self.announcer.statustext(Severity.INFO, text)
@@ -363,11 +375,11 @@ class Commander:
     def _needs_position(self, mode: Mode) -> bool:
         if mode is Mode.OFFBOARD:
             return self._flying.offboard_needs_position
-        return MODE_RULES[mode].needs_position
+        return self.modes[mode].needs_position
 
     def _check_before_arming(self) -> None:
         state = self.state
-        if MODE_RULES[state.mode].needs_sticks and not self._pilot.is_heard and not self._is_ardupilot:
+        if self._spec.needs_sticks and not self._pilot.is_heard and not self._is_ardupilot:
             self.change_mode(Mode.HOLD)  # the pilot has gone: whoever comes next may need none
         reasons = self._arming_reasons() if self._is_ardupilot else self.check_arming()
         state.is_ready_to_arm = not reasons

@@ -5,9 +5,9 @@ A new failsafe is a bit, a row of `RULES`, and a condition in `failure_detector.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
 
-from autopilot.commander.modes import MODE_RULES
+from autopilot.interface.failsafe_action import Action
+from autopilot.interface.mode_spec import ModeSpec
 from autopilot.interface.vehicle_state import Mode, Severity
 from common.params import ParameterTable
 
@@ -38,27 +38,6 @@ COMPASS_FAULTY = 1 << 22
 TERMINATION_BREAKER = 121212  # CBRK_FLIGHTTERM: the failure detector may not stop the motors
 
 
-class Action(IntEnum):
-    """What to do, in rising order: a failsafe never replaces a stronger one."""
-
-    WARN = 0
-    ALTITUDE = 1  # the pilot flies on without a position
-    HOLD = 2
-    SMART_RETURN = 3  # back along its own track; directly where that is not known
-    RETURN = 4
-    LAND = 5  # blind if the position is lost
-    TERMINATE = 6  # motors stopped, wherever the vehicle is; disarmed once it lies on the ground
-    DISARM = 7  # at once
-
-
-ACTION_MODES = {
-    Action.ALTITUDE: Mode.ALTITUDE,
-    Action.HOLD: Mode.HOLD,
-    Action.SMART_RETURN: Mode.SMART_RETURN,
-    Action.RETURN: Mode.RETURN,
-    Action.LAND: Mode.LAND,
-    Action.TERMINATE: Mode.TERMINATION,
-}
 OUTCOMES = {
     Action.ALTITUDE: ": altitude mode",
     Action.HOLD: ": hold",
@@ -68,14 +47,6 @@ OUTCOMES = {
     Action.TERMINATE: ": flight terminated",
     Action.DISARM: ": motors stopped",
 }
-MODE_STRENGTH = {
-    Mode.RETURN: Action.RETURN,
-    Mode.SMART_RETURN: Action.RETURN,
-    Mode.LAND: Action.LAND,
-    Mode.PRECISION_LAND: Action.LAND,
-    Mode.TERMINATION: Action.TERMINATE,
-}
-"""Modes that a weaker action, or the same one, does not end."""
 
 # PX4's numbers of actions, parameter by parameter.
 LINK_ACTIONS = {
@@ -106,7 +77,7 @@ LOW_BATTERY_ACTIONS = {
 CRITICAL_BATTERY_ACTIONS = {2: Action.LAND, 3: Action.RETURN}
 EMERGENCY_BATTERY_ACTIONS = {2: Action.LAND, 3: Action.LAND}
 
-ActionChoice = Callable[[ParameterTable, Mode], Action]
+ActionChoice = Callable[[ParameterTable, ModeSpec], Action]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,35 +93,35 @@ class Rule:
 
 def always(action: Action) -> ActionChoice:
     """The same action, whatever the parameters say."""
-    return lambda _params, _mode: action
+    return lambda _params, _flown: action
 
 
 def by(parameter: str, actions: dict[int, Action], otherwise: Action = Action.WARN) -> ActionChoice:
     """The action that a parameter chooses."""
-    return lambda params, _mode: actions.get(int(params[parameter]), otherwise)
+    return lambda params, _flown: actions.get(int(params[parameter]), otherwise)
 
 
-def _battery_low(params: ParameterTable, _: Mode) -> Action:
+def _battery_low(params: ParameterTable, _: ModeSpec) -> Action:
     """A warning, unless ArduPilot's parameter says otherwise."""
     name = "BATT_FS_LOW_ACT"
     return LOW_BATTERY_ACTIONS.get(int(params[name]), Action.WARN) if name in params else Action.WARN
 
 
-def _position_lost(params: ParameterTable, mode: Mode) -> Action:
+def _position_lost(params: ParameterTable, flown: ModeSpec) -> Action:
     """A pilot at the sticks may fly on without a position; what flies by itself must come down."""
-    if mode is Mode.POSITION and int(params["COM_POSCTL_NAVL"]) == 0:
+    if flown.mode is Mode.POSITION and int(params["COM_POSCTL_NAVL"]) == 0:
         return Action.ALTITUDE
     return POSITION_ACTIONS.get(int(params["COM_POS_LOST_ACT"]), Action.LAND)
 
 
-def _control_lost(params: ParameterTable, _: Mode) -> Action:
+def _control_lost(params: ParameterTable, _: ModeSpec) -> Action:
     return Action.WARN if int(params["CBRK_FLIGHTTERM"]) == TERMINATION_BREAKER else Action.DISARM
 
 
-def _sticks_lost(params: ParameterTable, mode: Mode) -> Action:
+def _sticks_lost(params: ParameterTable, flown: ModeSpec) -> Action:
     """A mode flown by sticks cannot go on without them."""
     action = LINK_ACTIONS.get(int(params["NAV_RCL_ACT"]), Action.WARN)
-    return Action.RETURN if action is Action.WARN and MODE_RULES[mode].needs_sticks else action
+    return Action.RETURN if action is Action.WARN and flown.needs_sticks else action
 
 
 RULES: tuple[Rule, ...] = (

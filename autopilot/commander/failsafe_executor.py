@@ -8,15 +8,9 @@ again. When the sticks are lost it first holds for COM_FAIL_ACT_T, in which the 
 
 from typing import Protocol
 
-from autopilot.commander.failsafe import (
-    ACTION_MODES,
-    FLIGHT_TIME_OVER,
-    MODE_STRENGTH,
-    OUTCOMES,
-    RULES,
-    STICKS_LOST,
-    Action,
-)
+from autopilot.commander.failsafe import FLIGHT_TIME_OVER, OUTCOMES, RULES, STICKS_LOST
+from autopilot.interface.failsafe_action import Action
+from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import LandedState, Mode, Severity, VehicleState
 from common.params import ParameterTable
@@ -30,6 +24,7 @@ class Authority(Protocol):
     state: VehicleState
     params: ParameterTable
     announcer: Announcer
+    modes: ModeTable
 
     def refusal(self, mode: Mode) -> str: ...
 
@@ -43,10 +38,11 @@ class Authority(Protocol):
 class Guard:
     """What has failed on one vehicle, and what is being done about it."""
 
-    __slots__ = ("_action", "_commander", "_due_us", "_waiting", "failures")
+    __slots__ = ("_action", "_commander", "_due_us", "_modes", "_waiting", "failures")
 
     def __init__(self, commander: Authority) -> None:
         self._commander = commander
+        self._modes = {action: spec.mode for spec in commander.modes.values() for action in spec.carries_out}
         self._action = Action.WARN  # of the failsafe in progress
         self._waiting = Action.WARN  # what lost sticks lead to once their time is over
         self._due_us = 0
@@ -64,8 +60,9 @@ class Guard:
 
     def refusal(self, mode: Mode) -> str:
         """Why a failure forbids a mode that a client asks for; empty if none does."""
-        is_over = self.failures & FLIGHT_TIME_OVER and self._commander.params["COM_FLT_TIME_ACT"]
-        if is_over and mode not in (Mode.RETURN, Mode.SMART_RETURN, Mode.LAND, Mode.PRECISION_LAND):
+        commander = self._commander
+        is_over = self.failures & FLIGHT_TIME_OVER and commander.params["COM_FLT_TIME_ACT"]
+        if is_over and mode in commander.modes and commander.modes[mode].strength not in (Action.RETURN, Action.LAND):
             return "the flight time is over: only Return and Land"
         return ""
 
@@ -91,7 +88,7 @@ class Guard:
         for rule in RULES:
             if not rule.failure & new:
                 continue
-            action = rule.action(commander.params, commander.state.mode)
+            action = rule.action(commander.params, commander.modes[commander.state.mode])
             if rule.failure == STICKS_LOST:
                 action = self._first(action)
             action = self._possible(action)
@@ -131,7 +128,7 @@ class Guard:
         state.is_failsafe = True
         if strongest > max(self._action, self._strength()):
             self._action = strongest
-            mode = ACTION_MODES[strongest]
+            mode = self._modes[strongest]
             if mode is state.mode:
                 commander.begin_here()  # not where a client has sent it
             else:
@@ -140,7 +137,7 @@ class Guard:
     def _strength(self) -> Action:
         """The action that what is being flown stands for: weaker ones, or the same, do not end it."""
         state = self._commander.state
-        strength = MODE_STRENGTH.get(state.mode, Action.WARN)
+        strength = self._commander.modes[state.mode].strength
         if state.landed_state is LandedState.LANDING:
             return max(strength, Action.RETURN)  # nearly down, in whatever mode: nothing calls it up again
         return min(strength, Action.RETURN) if strength is Action.LAND else strength  # on the way to a landing place
@@ -152,7 +149,7 @@ class Guard:
                 return action
             action = Action.RETURN
         if action in (Action.ALTITUDE, Action.HOLD, Action.RETURN):
-            mode = ACTION_MODES[action]
-            if mode is not self._commander.state.mode and self._commander.refusal(mode):
+            mode = self._modes.get(action)
+            if mode is None or (mode is not self._commander.state.mode and self._commander.refusal(mode)):
                 return Action.LAND
         return action

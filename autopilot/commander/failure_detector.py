@@ -30,6 +30,7 @@ from autopilot.commander.failsafe import (
     WIND_STRONG,
 )
 from autopilot.commander.navigator_interface import Flying
+from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import BatteryLevel, LandedState, Mode, VehicleState
 from autopilot.ports import ACCEL_DOUBTED as ACCEL_DOUBTED_FLAG
 from autopilot.ports import DEAD_RECKONING as DEAD_RECKONING_FLAG
@@ -51,14 +52,6 @@ _BATTERY_BITS = {
     BatteryLevel.CRITICAL: BATTERY_LOW | BATTERY_CRITICAL,
     BatteryLevel.EMERGENCY: BATTERY_LOW | BATTERY_CRITICAL | BATTERY_EMERGENCY,
 }
-_HEIGHT_MODES = frozenset({Mode.ALTITUDE})
-# COM_DLL_EXCEPT: the bit that lets a mode go on without a ground station (PX4)
-EXCEPTION_BITS = {
-    Mode.MISSION: 1,
-    Mode.HOLD: 2, Mode.TAKEOFF: 2, Mode.RETURN: 2, Mode.LAND: 2, Mode.FOLLOW: 2, Mode.ORBIT: 2, Mode.BRAKE: 2,
-    Mode.PRECISION_LAND: 2, Mode.SMART_RETURN: 2,
-    Mode.OFFBOARD: 4, Mode.GUIDED: 4,
-}  # fmt: skip
 
 
 class StationLink:
@@ -87,7 +80,7 @@ class FailureWatch:
 
     __slots__ = (
         "_attitude", "_battery", "_battery_bits", "_battery_critical", "_battery_emergency", "_battery_low",
-        "_except_bits", "_is_position_lost", "_motors", "_next_slow_us", "_offboard_loss_us", "_params",
+        "_except_bits", "_is_position_lost", "_modes", "_motors", "_next_slow_us", "_offboard_loss_us", "_params",
         "_reckoning_us", "_resets_us", "_slow", "_state", "_station", "_station_loss_us", "_time_max_us", "_voltage",
         "_wind_max", "_wind_speed", "_wind_warn", "airborne_us",
     )  # fmt: skip
@@ -99,12 +92,14 @@ class FailureWatch:
         battery: BatteryEstimator,
         station: StationLink,
         motors: MotorWatch,
+        modes: ModeTable,
     ) -> None:
         self._state = state
         self._params = params
         self._battery = battery
         self._station = station
         self._motors = motors
+        self._modes = modes
         self._attitude = AttitudeWatch(params)
         self._voltage = VoltageLimits(params)
         self._wind_speed = 0.0  # [m/s] low-passed
@@ -148,7 +143,7 @@ class FailureWatch:
             failures |= POSITION_LOST
         if mode is Mode.OFFBOARD and flying.offboard_age_us(state.time_us) > self._offboard_loss_us:
             failures |= OFFBOARD_LOST
-        if mode in _HEIGHT_MODES and not state.estimate.flags & HEIGHT_VALID:
+        if self._modes[mode].needs_height and not state.estimate.flags & HEIGHT_VALID:
             failures |= HEIGHT_LOST
         if state.battery_level > BatteryLevel.OK:
             self._battery_bits |= _BATTERY_BITS[state.battery_level]
@@ -178,7 +173,7 @@ class FailureWatch:
         """Whether there was a ground station, is none now, and the mode is not excepted."""
         state, heard_us = self._state, self._station.heard_us
         is_lost = heard_us >= 0 and state.time_us - heard_us > self._station_loss_us
-        return is_lost and not EXCEPTION_BITS.get(state.mode, 0) & self._except_bits
+        return is_lost and not self._modes[state.mode].exception & self._except_bits
 
     def _slow_failures(self, is_flying: bool) -> int:
         state = self._state

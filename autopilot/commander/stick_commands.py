@@ -6,9 +6,8 @@ In: `state.sticks`, when a message came. Out: requests to the commander, as a cl
 from typing import Protocol
 
 from autopilot.commander.failsafe import STICKS_LOST
-from autopilot.commander.failure_detector import EXCEPTION_BITS
-from autopilot.commander.modes import MODE_RULES
 from autopilot.inputs.sticks import Sticks
+from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from common.params import Parameter, ParameterTable
@@ -18,18 +17,6 @@ _MIDDLE_THROTTLE = 0.2  # of climb rate modes, for arming (PX4)
 _CORNER = 0.9  # of the yaw stick, for the arming gesture
 _CENTRE = 0.1  # of the other two
 _SWITCH_POSITIONS = 6
-
-# Modes that moving the sticks leaves: bits of COM_RC_OVERRIDE.
-_AUTO = frozenset(
-    {Mode.HOLD, Mode.TAKEOFF, Mode.MISSION, Mode.RETURN, Mode.LAND, Mode.PRECISION_LAND, Mode.SMART_RETURN}
-)
-_OUTSIDE = frozenset({Mode.OFFBOARD, Mode.GUIDED})
-_CLIMB_RATE_MODES = frozenset({Mode.ALTITUDE, Mode.POSITION, Mode.HOLD})
-# Numbers of COM_FLTMODE1..6
-_SWITCHED = {
-    0: Mode.MANUAL, 1: Mode.ALTITUDE, 2: Mode.POSITION, 3: Mode.MISSION, 4: Mode.HOLD, 5: Mode.RETURN, 6: Mode.ACRO,
-    7: Mode.OFFBOARD, 8: Mode.STABILIZED, 10: Mode.TAKEOFF, 11: Mode.LAND, 12: Mode.FOLLOW, 13: Mode.PRECISION_LAND,
-}  # fmt: skip
 
 
 class Authority(Protocol):
@@ -51,18 +38,21 @@ class Pilot:
         state: the vehicle as of this frame.
         params: COM_RC_*, COM_RCL_EXCEPT, COM_FLTMODE*, MAN_ARM_GESTURE.
         sticks: its sticks.
+        modes: those that the vehicle has.
     """
 
     __slots__ = (
         "_arm_hold_us", "_corner", "_corner_since_us", "_count", "_count_armed", "_exceptions", "_has_gesture",
-        "_is_done", "_is_missed", "_override", "_params", "_speed_max", "_state", "_sticks", "_switch_channel",
-        "_switch_position",
+        "_is_done", "_is_missed", "_modes", "_override", "_params", "_speed_max", "_state", "_sticks",
+        "_switch_channel", "_switch_position", "_switched",
     )  # fmt: skip
 
-    def __init__(self, state: VehicleState, params: ParameterTable, sticks: Sticks) -> None:
+    def __init__(self, state: VehicleState, params: ParameterTable, sticks: Sticks, modes: ModeTable) -> None:
         self._state = state
         self._params = params
         self._sticks = sticks
+        self._modes = modes
+        self._switched = {spec.switch: spec.mode for spec in modes.values() if spec.switch is not None}
         self._count = 0  # of messages read
         self._count_armed = 0  # of messages heard before arming
         self._is_missed = False  # the loss of the sticks has been reported
@@ -88,13 +78,13 @@ class Pilot:
         if not self._is_flown(mode) or not self.is_heard:
             return ""  # without sticks the mode itself is refused, or needs none
         throttle = self._state.sticks.throttle
-        if mode in _CLIMB_RATE_MODES:
+        if self._modes[mode].is_climb_rate:
             return "throttle above the middle" if throttle > _MIDDLE_THROTTLE else ""
         return "throttle is not low" if throttle > _LOW_THROTTLE else ""
 
     def _is_flown(self, mode: Mode) -> bool:
         """Whether a mode follows the sticks."""
-        return MODE_RULES[mode].needs_sticks or (mode is Mode.HOLD and self._state.sticks.steer_hold)
+        return self._modes[mode].needs_sticks or (mode is Mode.HOLD and self._state.sticks.steer_hold)
 
     def failures(self) -> int:
         """STICKS_LOST, unless the mode in which they were lost is excepted; otherwise 0."""
@@ -104,8 +94,8 @@ class Pilot:
             self._is_missed = False
         elif not self._is_missed:
             is_heard_armed = sticks.count != self._count_armed or sticks.is_ardupilot  # its radio is always there
-            is_expected = is_heard_armed or MODE_RULES[state.mode].needs_sticks
-            self._is_missed = is_expected and not EXCEPTION_BITS.get(state.mode, 0) & self._exceptions
+            is_expected = is_heard_armed or self._modes[state.mode].needs_sticks
+            self._is_missed = is_expected and not self._modes[state.mode].exception & self._exceptions
         return STICKS_LOST if self._is_missed else 0
 
     def frame(self, commander: Authority) -> None:
@@ -131,9 +121,7 @@ class Pilot:
 
     def _may_take_over(self) -> bool:
         state = self._state
-        if not state.is_flying:
-            return False
-        return bool((self._override & 1 and state.mode in _AUTO) or (self._override & 2 and state.mode in _OUTSIDE))
+        return state.is_flying and bool(self._override & self._modes[state.mode].override)
 
     def _read_gesture(self, commander: Authority) -> None:
         """Arms and disarms by the yaw stick while the throttle is down."""
@@ -163,7 +151,7 @@ class Pilot:
         if position in (0, self._switch_position):
             return
         self._switch_position = position
-        mode = _SWITCHED.get(int(self._params[f"COM_FLTMODE{position}"]))
+        mode = self._switched.get(int(self._params[f"COM_FLTMODE{position}"]))
         if mode is not None:
             _ask(commander, "Mode switch", commander.request_mode(mode))
 

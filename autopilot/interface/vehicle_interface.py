@@ -13,6 +13,7 @@ from autopilot.inputs.sticks import Sticks
 from autopilot.inputs.traffic import Traffic
 from autopilot.interface.client_requests import CalibrationKind, OffboardSetpoint, OrbitRequest, TargetReport
 from autopilot.interface.item_lists import ItemLists
+from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.platform import Host
 from autopilot.interface.vehicle_state import Mode, Reply, Severity, VehicleState
 from autopilot.payload.camera.camera import Camera
@@ -126,6 +127,7 @@ class Vehicle(Protocol):
     host: Host
     camera: Camera | None
     gimbal: GimbalControl | None
+    modes: ModeTable
 
     @property
     def lists(self) -> ItemLists:
@@ -165,10 +167,6 @@ class Vehicle(Protocol):
 
     def follow_ardupilot(self) -> None:
         """From now on pilots and modes are treated as ArduPilot treats them."""
-        ...
-
-    def has_mode(self, mode: Mode) -> bool:
-        """Whether there is such a mode at all."""
         ...
 
     def arm(self, *, force: bool) -> Reply: ...

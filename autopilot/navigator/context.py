@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from math import atan2, hypot, isfinite, nan, sqrt
 
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import LandedState, Mode, VehicleState
 from autopilot.navigator.heading import Heading
@@ -27,9 +28,9 @@ class NavContext:
     """
 
     __slots__ = (
-        "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "find_way", "has_position",
-        "heading", "hover_thrust", "is_landing", "leg_yaw", "next_hold", "params", "place_refusal", "setpoint",
-        "standing_height_m", "state", "wants_lift", "wish", "yaw_mode",
+        "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "find_way", "flown",
+        "has_position", "heading", "hover_thrust", "is_landing", "leg_yaw", "next_hold", "params", "place_refusal",
+        "setpoint", "standing_height_m", "state", "wants_lift", "wish", "yaw_mode",
     )  # fmt: skip
 
     def __init__(
@@ -52,6 +53,7 @@ class NavContext:
         self.is_landing = False  # the mode is on its last descent
         self.place_refusal: Callable[[Vector], str] = lambda _place: ""  # why the fence lets nobody stay at a place [m]
         self.find_way: Callable[[Vector, Vector], list[Vector] | None] = lambda _start, goal: [goal]  # inside the fence
+        self.flown = FlightMode()  # the present mode
         self.wish: Mode | None = None  # the mode that shall follow this one
         self.next_hold: tuple[Vector, float, bool] | None = None  # place, heading, whether to go there in a line
         self.cruise_speed = nan  # [m/s] asked for by DO_CHANGE_SPEED; NaN: the parameter

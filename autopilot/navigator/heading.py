@@ -18,7 +18,6 @@ _FRAME_S = FRAME_US * 1e-6
 _NEAR_M = 1.0  # nearer than this a direction means nothing; guess
 _STEP_RAD = 0.005  # changes smaller than this are not worth a new setpoint
 _TURNED_RAD = radians(2.0)  # as ArduPilot judges CONDITION_YAW
-_MODES = frozenset((Mode.HOLD, Mode.MISSION, Mode.TAKEOFF, Mode.RETURN, Mode.GUIDED, Mode.SMART_RETURN))
 
 
 class YawMode(IntEnum):
@@ -133,7 +132,7 @@ class Heading:
         """Puts the heading into the setpoint that the mode has written."""
         context = self._context
         setpoint = context.setpoint
-        if setpoint.kind != SETPOINT_TRAJECTORY or context.is_landing or context.state.mode not in _MODES:
+        if setpoint.kind != SETPOINT_TRAJECTORY or context.is_landing or not context.flown.takes_heading:
             return
         yaw = self._wanted()
         if isfinite(yaw) and not abs(wrapped(yaw - setpoint.yaw)) < _STEP_RAD:

@@ -1,47 +1,33 @@
 """The navigator: one object per vehicle that turns the flight mode into setpoints, at 50 Hz."""
 
+from collections.abc import Callable
 from math import isfinite, nan
-from typing import Protocol
+from typing import TypeVar, cast
 
 from autopilot.interface.client_requests import OffboardSetpoint
-from autopilot.interface.item_lists import ListKind, item_name
-from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Severity, Verdict
+from autopilot.interface.mode_spec import FlightMode, ModeTable
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.fence.fence import Fence
 from autopilot.navigator.fence.rally_points import RallyPoints
 from autopilot.navigator.mission.mission import Mission
+from autopilot.navigator.mode_parts import ModeParts
 from autopilot.navigator.modes.follow import Follow
 from autopilot.navigator.modes.goto import reposition_target
 from autopilot.navigator.modes.guided import Guided
 from autopilot.navigator.modes.hold import Hold
 from autopilot.navigator.modes.land import Land
-from autopilot.navigator.modes.offboard import STREAM_PERIOD_US, Offboard
+from autopilot.navigator.modes.offboard import Offboard
 from autopilot.navigator.modes.orbit import Orbit
-from autopilot.navigator.modes.rtl import Return
-from autopilot.navigator.modes.rtl_destination import Destinations
-from autopilot.navigator.modes.smart_return import SmartReturn
-from autopilot.navigator.modes.stick_modes import Acro, Altitude, Brake, Position, Stabilized
 from autopilot.navigator.modes.takeoff import Climb, Takeoff, is_high
-from autopilot.navigator.modes.termination import Termination
 from autopilot.navigator.paths.breadcrumbs import Breadcrumbs
 from autopilot.navigator.takeoff_intent import Ask, standing_d, vertical_ask
 from autopilot.ports import TERRAIN_VALID
 
-_GOING = frozenset({Mode.TAKEOFF, Mode.HOLD, Mode.ORBIT, Mode.FOLLOW, Mode.MISSION})  # in which a take-off is finished
 _WAITS_US = 2_000_000  # a take-off that is interrupted on the ground, for a place to go to; guess
 _SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
 
-
-class FlightMode(Protocol):
-    """What each mode is."""
-
-    def start(self) -> None:
-        """Entered while armed, or armed in it."""
-        ...
-
-    def frame(self) -> None:
-        """Renews the setpoint; called while armed."""
-        ...
+_Mode = TypeVar("_Mode", bound=FlightMode)
 
 
 class Navigator:
@@ -50,15 +36,15 @@ class Navigator:
     Args:
         context: state, parameters, setpoint; shared by the modes.
         mission: the stored mission, which is mode Mission.
+        modes: those that the vehicle has.
     """
 
     __slots__ = (
         "_active",
         "_climb",
         "_is_rising",
-        "_mission_checked",
-        "_mission_problem",
         "_modes",
+        "_specs",
         "_takeoff_us",
         "ask",
         "context",
@@ -67,100 +53,52 @@ class Navigator:
         "follow",
         "guided",
         "hold",
-        "homing",
         "land",
         "mission",
         "offboard",
         "orbit",
-        "precision",
         "rally",
         "takeoff",
     )
 
-    def __init__(self, context: NavContext, mission: Mission) -> None:
+    def __init__(self, context: NavContext, mission: Mission, modes: ModeTable) -> None:
         self.context = context
-        self.hold = Hold(context)
-        self.takeoff = Takeoff(context)
         self.mission = mission
         self.fence = Fence(context)
         mission.connect(self.fence)
         self.rally = RallyPoints()
         self.crumbs = Breadcrumbs(context)
-        self.homing = Return(context, Destinations(context, self.rally, mission, self.fence), self.fence, mission)
-        self.land = Land(context)
-        self.offboard = Offboard(context)
-        self.follow = Follow(context)
-        self.orbit = Orbit(context)
-        self.precision = mission.precision  # landing items use it too
-        self.guided = Guided(context)
-        stabilized = Stabilized(context)
-        self._modes: dict[Mode, FlightMode] = {
-            Mode.HOLD: self.hold,
-            Mode.TAKEOFF: self.takeoff,
-            Mode.MISSION: mission,
-            Mode.RETURN: self.homing,
-            Mode.SMART_RETURN: SmartReturn(context, self.crumbs),
-            Mode.LAND: self.land,
-            Mode.OFFBOARD: self.offboard,
-            Mode.TERMINATION: Termination(context),
-            Mode.FOLLOW: self.follow,
-            Mode.ORBIT: self.orbit,
-            Mode.GUIDED: self.guided,
-            Mode.PRECISION_LAND: self.precision,
-            Mode.MANUAL: stabilized,
-            Mode.STABILIZED: stabilized,
-            Mode.ACRO: Acro(context),
-            Mode.ALTITUDE: Altitude(context),
-            Mode.POSITION: Position(context),
-            Mode.BRAKE: Brake(context),
-        }
-        self._active: FlightMode = self._modes[Mode.HOLD]
+        parts = ModeParts(context, mission, self.fence, self.rally, self.crumbs)
+        built = {build: build(parts) for build in {spec.build: None for spec in modes.values()}}
+        self._specs = modes
+        self._modes = {mode: built[spec.build] for mode, spec in modes.items()}
+        # The modes that clients ask more of than to be entered. One that the vehicle does not have is never entered.
+        self.hold = self._named(Mode.HOLD, Hold)
+        self.takeoff = self._named(Mode.TAKEOFF, Takeoff)
+        self.land = self._named(Mode.LAND, Land)
+        self.offboard = self._named(Mode.OFFBOARD, Offboard)
+        self.follow = self._named(Mode.FOLLOW, Follow)
+        self.orbit = self._named(Mode.ORBIT, Orbit)
+        self.guided = self._named(Mode.GUIDED, Guided)
+        self._active = context.flown = self._modes[context.state.mode]
         self._climb: Climb | None = None  # of a take-off, which is finished before the active mode goes elsewhere
         self._is_rising = False  # a take-off has begun, and the vehicle has not been high since
         self._takeoff_us = 0  # when mode Takeoff was last flown
         self.ask = Ask.STAY  # of the setpoint flown
-        self._mission_checked: object = None
-        self._mission_problem = ""
 
-    def has_mode(self, mode: Mode) -> bool:
-        """Whether there is such a mode at all."""
-        return mode in self._modes
+    def _named(self, mode: Mode, kind: type[_Mode]) -> _Mode:
+        """The object that flies a mode, as what it is."""
+        flown = self._modes.get(mode)
+        return flown if isinstance(flown, kind) else cast("Callable[[NavContext], _Mode]", kind)(self.context)
 
     def refusal(self, mode: Mode) -> str:
         """Why a mode cannot be flown now, as far as the navigator knows; empty if it can."""
-        if mode not in self._modes:
+        spec = self._specs.get(mode)
+        if spec is None:
             return f"mode {mode.name} is not supported"
-        if mode is Mode.MISSION:
-            return self.mission.refusal() or self._mission_outside()
-        if mode is Mode.ALTITUDE and not self.context.has_height:
+        if spec.needs_height and not self.context.has_height:
             return "no valid height"
-        if mode is Mode.SMART_RETURN:
-            return self.crumbs.refusal()
-        if mode is Mode.OFFBOARD and self.offboard.age_us(self.context.state.time_us) > STREAM_PERIOD_US:
-            return "needs setpoints faster than 2 Hz before the switch"
-        return ""
-
-    def _mission_outside(self) -> str:
-        """The first item of the mission that lies outside the fence; looked for again when either has changed."""
-        fence, mission = self.fence, self.mission
-        if not fence.is_active:
-            return ""
-        checked = (mission.items, fence.version, self.context.state.home_ned)
-        if checked != self._mission_checked:
-            self._mission_checked = checked
-            self._mission_problem = ""
-            for seq, place in mission.places():
-                reason = fence.refusal(place)
-                if reason:
-                    self._mission_problem = f"{item_name(seq)} is {reason}"
-                    break
-        return self._mission_problem
-
-    def warn_of_fence(self, _: ListKind) -> None:
-        """Says at once that a mission just loaded leaves the fence, or a fence just loaded excludes the mission."""
-        problem = self._mission_outside()
-        if problem:
-            self.context.announcer.statustext(Severity.WARNING, f"Mission: {problem}")
+        return self._modes[mode].refusal()
 
     def arming_reason(self) -> str:
         """Why the vehicle may not take off here; empty if it may."""
@@ -199,33 +137,19 @@ class Navigator:
 
     def enter(self, mode: Mode) -> None:
         """Changes to a mode: at once in flight, when armed otherwise."""
-        if self._active is self.mission and mode is not Mode.MISSION:
-            self.mission.leave()
-        if self._active is self.guided and mode is not Mode.GUIDED:
-            self.guided.leave()
-        if mode is not Mode.MISSION and self._active in (self.mission, self.homing):
-            self.mission.leave()  # a return may end with its landing part
-        if self._active is self.orbit and mode is not Mode.ORBIT:
-            self.orbit.leave()
+        self._active.leave(mode)
         self._forget_requests(mode)
         is_low = self.is_taking_off and not is_high(self.context)
-        self._is_rising = is_low and mode in _GOING
         was_climbing = self._active is self.takeoff or self._climb is not None
-        self._active = self._modes[mode]
+        self._active = self.context.flown = self._modes[mode]
+        self._is_rising = is_low and self._active.finishes_takeoff
         self.context.heading.end_turn()
-        self._climb = self.takeoff.climb if is_low and self._goes_away(mode) else None
+        self._climb = self.takeoff.climb if is_low and self._active.goes_away() else None
         if self._climb is None:
             if self.context.state.is_armed:
                 self._active.start()
         elif not was_climbing:
             self._climb.resume()
-
-    def _goes_away(self, mode: Mode) -> bool:
-        """Whether a mode just asked for leads elsewhere at once; a mission takes off by itself."""
-        context = self.context
-        if mode is Mode.HOLD:
-            return context.next_hold is not None and context.next_hold[2]
-        return mode in (Mode.ORBIT, Mode.FOLLOW) or (mode is Mode.MISSION and not context.is_on_ground)
 
     def stay(self) -> None:
         """Holds where it is: what it was sent to is given up."""
@@ -239,17 +163,9 @@ class Navigator:
 
     def _forget_requests(self, kept: Mode | None) -> None:
         """A place or a height that was asked of a mode does not wait for the next time it is entered."""
-        if kept is not Mode.HOLD:
-            self.context.next_hold = None
-            self.hold.via = []
-        if kept is not Mode.TAKEOFF:
-            self.takeoff.forget()
-        if kept is not Mode.LAND:
-            self.land.request(None, nan)
-        if kept is not Mode.ORBIT:
-            self.orbit.forget()
-        if kept is not Mode.GUIDED:
-            self.guided.forget_goto()
+        for mode, flown in self._modes.items():
+            if mode is not kept:
+                flown.forget()
 
     def on_armed(self) -> None:
         """Starts the mode that was chosen before."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from autopilot.control.law import ControlLaw
+from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import Mode
 from common.airframe import Airframe
 from common.params import Parameter, ParameterTable
@@ -52,6 +53,8 @@ class VehicleClass:
     defaults: Callable[[Airframe], Mapping[str, int | float]]
     """Parameters whose default the airframe file decides."""
     ground_detector: Callable[[ParameterTable, Airframe], GroundDetector]
+    modes: ModeTable
+    """Its flight modes."""
     last_resort: Mode
     """Where a mode leads that cannot be flown on: down for what flies, a stop for what drives."""
     hover_thrust: Callable[[Airframe], float]

@@ -9,7 +9,8 @@ from autopilot.estimator.params import ESTIMATOR_PARAMETERS
 from autopilot.inputs.obstacles import OBSTACLE_PARAMETERS
 from autopilot.inputs.stick_params import STICK_PARAMETERS
 from autopilot.inputs.traffic import TRAFFIC_PARAMETERS
-from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.ardupilot_aliases import CONSTANTS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
 from autopilot.params import SYSTEM_PARAMETERS, parameter_table
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
@@ -98,7 +99,7 @@ def _alias_table() -> str:
     for constant in CONSTANTS:
         lines[constant.name] = f"| {constant.name} | | | {constant.value:g}: {constant.meaning} |"
     known = parameter_table().declarations
-    for alias in ALIASES:
+    for alias in ARDUPILOT.aliases:
         if alias.of not in known:
             continue
         if alias.numbers is None:

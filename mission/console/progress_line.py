@@ -5,7 +5,6 @@ from math import dist
 import numpy as np
 from rich.table import Table
 
-from autopilot.interface.vehicle_state import Mode
 from common.clock import wall_time_s
 from mission.client import Running
 from mission.flight import Flight
@@ -46,7 +45,7 @@ class Progress:
         velocity = state.estimate.vel_ned
         aim = f"item {self._aim()}" if self._flight.owner is None else f"{self._aim()} m to the owner"
         return (
-            f"{self._flight.time_us * 1e-6:7.1f} s  {Mode(state.mode).name}, "
+            f"{self._flight.time_us * 1e-6:7.1f} s  {state.mode.name}, "
             f"{'armed' if state.is_armed else 'disarmed'}, {aim}, {north:.1f} m north, {east:.1f} m east, "
             f"{-down:.1f} m up, {float(np.hypot(velocity[0], velocity[1])):.1f} m/s, "
             f"battery {100.0 * state.battery_remaining:.0f} %, {rate:.1f} x"
@@ -68,7 +67,7 @@ class Progress:
             table.add_column(heading, justify="right", no_wrap=True, min_width=width)
         table.add_row(
             f"{self._flight.time_us * 1e-6:.1f}",
-            Mode(state.mode).name,
+            state.mode.name,
             "yes" if state.is_armed else "no",
             self._aim(),
             f"{north:.1f}",

@@ -14,7 +14,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from autopilot.interface.vehicle_state import Mode
-from mission.flight import OUTSIDE_MODES, Flight
+from mission.flight import Flight
 from policies.companion.engagement import Phase
 from policies.tasks.follow_me.measuring import COLUMNS, measure_rows
 from policies.tasks.follow_me.observe import DECISION_S, HFOV_DEG, IMAGE_SIZE
@@ -42,7 +42,7 @@ def taken_over(flight: Flight, phase: Phase, *, has_begun: bool, is_put_back: bo
     if is_put_back:
         return "the vehicle was restarted"
     state = flight.controller.state
-    is_own = state.mode in OUTSIDE_MODES or phase is Phase.HANDING_BACK or (state.mode in _BEFORE and not has_begun)
+    is_own = flight.is_offboard or phase is Phase.HANDING_BACK or (state.mode in _BEFORE and not has_begun)
     if is_own or state.is_failsafe or not state.is_armed:
         return ""
     return f"mode {state.mode.name.replace('_', ' ').title()} was chosen"

@@ -13,33 +13,14 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 import numpy.typing as npt
 
-from autopilot.interface.vehicle_state import LandedState, Mode, Severity
+from autopilot.interface.mode_spec import ModeTable
+from autopilot.interface.vehicle_state import LandedState, Severity
 from autopilot.mavlink.services.identity import project_version
 from common.airframe import Airframe
 from common.params import ParameterTable
 from common.ulog import UlogTopic, UlogWriter
 from mission.log.log_topics import TOPICS, Batch, Columns, Topic
 
-NAVIGATION_STATES = {  # vehicle_status.nav_state of PX4
-    Mode.HOLD: 4,
-    Mode.TAKEOFF: 17,
-    Mode.MISSION: 3,
-    Mode.RETURN: 5,
-    Mode.LAND: 18,
-    Mode.OFFBOARD: 14,
-    Mode.MANUAL: 0,
-    Mode.STABILIZED: 15,
-    Mode.ACRO: 10,
-    Mode.ALTITUDE: 1,
-    Mode.POSITION: 2,
-    Mode.PRECISION_LAND: 20,
-    Mode.FOLLOW: 19,
-    Mode.ORBIT: 21,
-    Mode.BRAKE: 4,  # PX4 has neither this nor the next two: the nearest of its own
-    Mode.SMART_RETURN: 5,
-    Mode.GUIDED: 14,
-    Mode.TERMINATION: 13,
-}
 DISARMED, ARMED = 1, 2  # vehicle_status.arming_state
 NO_MISSION, NOT_STARTED, COMPLETE = 1, 2, 5  # MISSION_STATE
 STATUS_PERIOD_US = 500_000  # state is logged when it changes, and this often
@@ -86,6 +67,7 @@ class FlightLog:
         path: of the ULog; None writes no file.
         airframe: for the log's header.
         params: for the log's header.
+        modes: of the vehicle, for what the log calls them.
         imu_limits: largest gyro [rad/s] and accelerometer [m/s^2] reading.
         samples_before: Samples before the first frame, one row.
         on_trouble: is told when the file cannot be written, which then ends.
@@ -96,6 +78,7 @@ class FlightLog:
         path: Path | None,
         airframe: Airframe,
         params: ParameterTable,
+        modes: ModeTable,
         imu_limits: tuple[float, float],
         samples_before: Rows,
         on_trouble: Callable[[str], None],
@@ -103,6 +86,9 @@ class FlightLog:
         target = path if path is not None else cast("BinaryIO", _Nowhere())
         self._log = _open_log(target, params, airframe, on_trouble)
         self._imu_limits = imu_limits
+        self._nav_states = np.zeros(1 + max(modes), int)  # by mode
+        for mode, spec in modes.items():
+            self._nav_states[mode] = spec.nav_state
         self._imu_time_us = 0
         self._samples_before = samples_before
         self._status_before = np.zeros(1, STATUS_DTYPE)
@@ -214,7 +200,7 @@ class FlightLog:
         return [
             (topic, topic.records({"timestamp": time_us, **columns}), bounds)
             for topic, columns in (
-                (self._status_topic, _status_columns(rows)),
+                (self._status_topic, _status_columns(rows, self._nav_states)),
                 (self._landed_topic, _landed_columns(rows)),
                 (self._mission_topic, _mission_columns(rows)),
             )
@@ -247,14 +233,13 @@ _MISSION_FIELDS = {
     **dict.fromkeys("seq_current seq_total".split(), "uint16_t"),
     **dict.fromkeys("valid finished".split(), "bool"),
 }
-_NAVIGATION_STATE = np.array([NAVIGATION_STATES[mode] for mode in Mode])
 
 
-def _status_columns(rows: Rows) -> Columns:
+def _status_columns(rows: Rows, nav_states: Rows) -> Columns:
     return {
         "armed_time": np.where(rows["is_armed"], rows["armed_since_us"], 0),
         "arming_state": np.where(rows["is_armed"], ARMED, DISARMED),
-        "nav_state": _NAVIGATION_STATE[rows["mode"]],
+        "nav_state": nav_states[rows["mode"]],
         "failsafe": rows["is_failsafe"],
         "pre_flight_checks_pass": rows["is_ready_to_arm"],
     }

@@ -127,7 +127,8 @@ class Recorder:
 
     def _new_log(self) -> FlightLog:
         params, before = self._controller.params, self._samples_before
-        return FlightLog(self._path, self._airframe, params, self._imu_limits, before, self._on_trouble)
+        modes = self._controller.modes
+        return FlightLog(self._path, self._airframe, params, modes, self._imu_limits, before, self._on_trouble)
 
     def frame(self, time_us: int) -> None:
         """Notes the frame that is ending."""

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.interface.vehicle_state import Mode
+from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from mission.flight import Flight
 from sim.world.people import CHEST_M, Person
 
 Row = NDArray[np.float32]
 ROTORS = 8  # as many as a vehicle can have
 ACTIONS = 4  # what a policy chooses: velocity ahead, right and down, and yaw rate, each in [-1, 1]
+MODE_TITLES = {int(mode): mode.name.replace("_", " ").title() for mode in sorted(MULTIROTOR_MODES)}
 _PERSON: Any = Person
 MOMENT = np.dtype(
     [
@@ -68,7 +69,8 @@ class Moment:
 
     @property
     def mode_name(self) -> str:
-        return Mode(int(self.row["mode"])).name.replace("_", " ").title()
+        number = int(self.row["mode"])
+        return MODE_TITLES.get(number, f"Mode {number}")
 
     @property
     def speed_m_s(self) -> float:

@@ -14,12 +14,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.interface.vehicle_state import Mode
 from common.airframe import load_airframe
 from common.files import write_whole
 from mission.log.euler_angles import yaw_rad
 from mission.view import shapes
-from mission.view.flight_snapshot import distances_m
+from mission.view.flight_snapshot import MODE_TITLES, distances_m
 from mission.view.panel import ACTION_NAMES
 from mission.view.replay_file import Recording
 from mission.view.snapshot_images import onboard_eye
@@ -52,7 +51,7 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
     rows = recording.rows
     return {
         "title": title,
-        "modes": {int(mode): mode.name.replace("_", " ").title() for mode in Mode},
+        "modes": MODE_TITLES,
         "size_m": world.config.size_m,
         "sun_ned": shapes.SUN_NED.tolist(),
         "heading_rad": float(yaw_rad(rows["q_ned_from_frd"][:1].astype(float))[0]),

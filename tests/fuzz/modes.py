@@ -150,7 +150,7 @@ class ModeFlight:
         is_lost = not np.isfinite([*estimate.pos_ned, *estimate.vel_ned, *estimate.q_ned_from_frd]).all()
         self._lost_frames = self._lost_frames + 1 if is_lost else 0
         assert self._lost_frames <= LOST_MAX, estimate
-        for target in (flight.controller.navigator.follow.target, flight.controller.navigator.precision.target):
+        for target in (flight.controller.navigator.follow.target, flight.controller.navigator.mission.precision.target):
             assert np.isfinite([*target.pos_ned, *target.vel_ned]).all(), (target.pos_ned, target.vel_ned)
 
 

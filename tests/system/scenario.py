@@ -11,7 +11,7 @@ import numpy as np
 from autopilot.interface.client_requests import OffboardSetpoint, OrbitRequest, TargetReport
 from autopilot.interface.item_lists import ListKind, MissionItem
 from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
-from autopilot.mavlink.dialects.px4 import MODE_NUMBERS, SHOWN_AS
+from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.ports import SETPOINT_TRAJECTORY
 from common.geodesy import geodetic_from_ned
 from common.kernels import FRAME_US
@@ -148,7 +148,8 @@ class Scenario:
         if settled and speed > float(self.fc.params["MPC_XY_VEL_MAX"]) + SPEED_MARGIN_M_S + self.flight.config.wind_m_s:
             self.fail(f"{speed:.1f} m/s")
         if now_us - self.mode_since_us > 1_500_000:
-            shown = MODE_NUMBERS[SHOWN_AS.get(state.mode, state.mode)]
+            custom = PX4.custom_mode(state.mode)
+            shown = (custom >> 16 & 0xFF, custom >> 24)
             if self.drone.px4_mode != shown:
                 self.fail(f"the heartbeat shows {self.drone.px4_mode} in mode {state.mode.name}")
 

@@ -1,9 +1,10 @@
 """What differs between the autopilots that ground stations know; everything else is shared."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
+from autopilot.interface.mode_spec import DialectMode, ModeSpec, ModeTable
 from autopilot.interface.vehicle_state import Mode
 from common.params import Parameter
 
@@ -21,6 +22,42 @@ class ModeRow:
     standard_mode: int = 0  # MAV_STANDARD_MODE; 0: none
     is_selectable: bool = True  # by a pilot; others are entered by a command
     is_advanced: bool = False
+
+
+class ModeNumbers:
+    """The modes of a vehicle as one dialect numbers and lists them.
+
+    Args:
+        table: the vehicle's modes.
+        entry: what a mode's row says of this dialect.
+    """
+
+    def __init__(self, table: ModeTable, entry: Callable[[ModeSpec], DialectMode | Mode]) -> None:
+        self.table = table
+        own = {mode: shown for mode, spec in table.items() if isinstance(shown := entry(spec), DialectMode)}
+        self._numbers = {mode: shown.number for mode, shown in own.items()}
+        self._modes = {number: mode for mode, number in self._numbers.items()}
+        for mode, spec in table.items():
+            nearest = entry(spec)
+            if isinstance(nearest, Mode):
+                self._numbers[mode] = own[nearest].number
+        self.rows = tuple(
+            ModeRow(mode, shown.name, table[mode].standard, shown.is_selectable, table[mode].is_advanced)
+            for mode, shown in own.items()
+        )
+
+    def number_of(self, mode: Mode) -> int:
+        """HEARTBEAT.custom_mode; of the nearest mode if the dialect does not have it."""
+        return self._numbers[mode]
+
+    def mode_of(self, number: int) -> Mode | None:
+        """The mode that a client asks for by its number."""
+        return self._modes.get(number)
+
+    @property
+    def numbers(self) -> Sequence[int]:
+        """Those that clients may ask for."""
+        return list(self._modes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +100,7 @@ class Dialect(Protocol):
     autopilot: int  # MAV_AUTOPILOT
     capabilities: int  # MAV_PROTOCOL_CAPABILITY bits that only this dialect sets
     flight_sw_version: int  # of the autopilot this dialect is compatible with
+    mode_table: ModeTable  # of the vehicle
     modes: Sequence[ModeRow]  # that a client may ask for
     goto_mode: Mode  # in which a place is held to which a client sends the vehicle
     first_seq: int  # of a mission in the lists that clients see; 1 where item 0 is home
@@ -74,6 +112,10 @@ class Dialect(Protocol):
     amsl_commands: frozenset[int]  # MAV_CMDs whose altitude is above sea level even in a frame relative to home
     aliases: Sequence[Alias]
     constants: Sequence[Constant]
+
+    def with_modes(self, table: ModeTable) -> Self:
+        """The same dialect for a vehicle with these modes."""
+        ...
 
     def custom_mode(self, mode: Mode) -> int:
         """HEARTBEAT.custom_mode of a mode."""

@@ -2,56 +2,18 @@
 
 import struct
 from collections.abc import Mapping, Sequence
+from typing import Self
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import Mode
-from autopilot.mavlink.dialects import Alias, Constant, ModeRow, UnknownModeError
-from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS
+from autopilot.mavlink.dialects import Alias, Constant, ModeNumbers, ModeRow, UnknownModeError
+from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS, switch_aliases
+from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from common.params import Parameter
 
 _RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
-
-# COPTER_MODE
-MODE_NUMBERS: dict[Mode, int] = {
-    Mode.STABILIZED: 0,
-    Mode.ACRO: 1,
-    Mode.ALTITUDE: 2,
-    Mode.MISSION: 3,
-    Mode.GUIDED: 4,
-    Mode.HOLD: 5,
-    Mode.RETURN: 6,
-    Mode.ORBIT: 7,
-    Mode.LAND: 9,
-    Mode.POSITION: 16,
-    Mode.BRAKE: 17,
-    Mode.SMART_RETURN: 21,
-    Mode.FOLLOW: 23,
-}
-# Modes of ours that ArduPilot does not have, as the nearest of its own.
-SHOWN_AS = {
-    Mode.TAKEOFF: Mode.GUIDED,
-    Mode.OFFBOARD: Mode.GUIDED,
-    Mode.MANUAL: Mode.STABILIZED,
-    Mode.PRECISION_LAND: Mode.LAND,
-    Mode.TERMINATION: Mode.LAND,
-}
-MODES = (
-    ModeRow(Mode.STABILIZED, "Stabilize", is_advanced=True),
-    ModeRow(Mode.ACRO, "Acro", is_advanced=True),
-    ModeRow(Mode.ALTITUDE, "Alt Hold", mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD),
-    ModeRow(Mode.MISSION, "Auto", mavlink.MAV_STANDARD_MODE_MISSION),
-    ModeRow(Mode.GUIDED, "Guided", is_advanced=True),
-    ModeRow(Mode.HOLD, "Loiter"),
-    ModeRow(Mode.RETURN, "RTL", mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY),
-    ModeRow(Mode.ORBIT, "Circle", mavlink.MAV_STANDARD_MODE_ORBIT),
-    ModeRow(Mode.LAND, "Land", mavlink.MAV_STANDARD_MODE_LAND),
-    ModeRow(Mode.POSITION, "PosHold", mavlink.MAV_STANDARD_MODE_POSITION_HOLD),
-    ModeRow(Mode.BRAKE, "Brake"),
-    ModeRow(Mode.SMART_RETURN, "Smart RTL"),
-    ModeRow(Mode.FOLLOW, "Follow"),
-)
-_MODES = {number: mode for mode, number in MODE_NUMBERS.items()}
 
 
 class ArduPilotDialect:
@@ -63,7 +25,6 @@ class ArduPilotDialect:
     # Copter 4.7.0, a development version: newer than any release, so that no station asks for an update. It names the
     # interface we are compatible with; our own version is the custom version.
     flight_sw_version = 4 << 24 | 7 << 16 | 0 << 8 | mavlink.FIRMWARE_VERSION_TYPE_DEV
-    modes: Sequence[ModeRow] = MODES
     goto_mode = Mode.GUIDED
     first_seq = 1
     item_request = "MISSION_REQUEST"  # clients made for ArduPilot may know no other
@@ -76,14 +37,22 @@ class ArduPilotDialect:
         mavlink.MAV_CMD_DO_SET_ROI_LOCATION: _RELATIVE,
     }
     amsl_commands: frozenset[int] = frozenset({mavlink.MAV_CMD_DO_ORBIT})  # a command of PX4's: see there
-    aliases: Sequence[Alias] = ALIASES
     constants: Sequence[Constant] = CONSTANTS
 
+    def __init__(self, modes: ModeTable) -> None:
+        self.mode_table = modes
+        self._numbers = ModeNumbers(modes, lambda spec: spec.ardupilot)
+        self.modes: Sequence[ModeRow] = sorted(self._numbers.rows, key=lambda row: self._numbers.number_of(row.mode))
+        self.aliases: Sequence[Alias] = (*ALIASES, *switch_aliases(modes))
+
+    def with_modes(self, table: ModeTable) -> Self:
+        return self if table is self.mode_table else type(self)(table)
+
     def custom_mode(self, mode: Mode) -> int:
-        return MODE_NUMBERS[SHOWN_AS.get(mode, mode)]
+        return self._numbers.number_of(mode)
 
     def mode_from_custom(self, custom_mode: int) -> Mode:
-        mode = _MODES.get(custom_mode)
+        mode = self._numbers.mode_of(custom_mode)
         if mode is None:
             entry = mavlink.enums["COPTER_MODE"].get(custom_mode)
             name = entry.name.removeprefix("COPTER_MODE_") if entry and "ENUM_END" not in entry.name else custom_mode
@@ -109,4 +78,4 @@ class ArduPilotDialect:
         return value
 
 
-ARDUPILOT = ArduPilotDialect()
+ARDUPILOT = ArduPilotDialect(MULTIROTOR_MODES)

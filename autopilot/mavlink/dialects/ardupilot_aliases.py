@@ -4,11 +4,13 @@ An alias is one of our parameters under ArduPilot's name, in ArduPilot's unit: s
 to be read only. Names that are ArduPilot's and ours alike (RC1_MIN) are in neither list.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.ardupilot_only_params import STREAM_GROUPS
+from autopilot.interface.mode_spec import DialectMode, ModeTable
+from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import Alias, Constant
 
 INT8 = mavlink.MAV_PARAM_TYPE_INT8
@@ -23,8 +25,6 @@ _THROTTLE_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 3, 7: 4, 1: 7}
 _STATION_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 7: 3, 3: 5, 1: 7}
 _FENCE_ACTIONS: Mapping[int, int] = {1: 0, 0: 0, 2: 4, 3: 1, 5: 2, 6: 3}
 _BATTERY_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 2}
-# Modes of a switch: PX4's COM_FLTMODE numbers to mode numbers of a copter.
-_SWITCH_MODES: Mapping[int, int] = {8: 0, 6: 1, 1: 2, 3: 3, 7: 4, 4: 5, 5: 6, 11: 9, 2: 16, 12: 23}
 # Positions from outside: none, by MAVLink; the heading stays the compass's unless EKF2_EV_CTRL itself says otherwise.
 _VISION_TYPES: Mapping[int, int] = {0: 0, 7: 1} | dict.fromkeys(range(1, 16), 1)
 # Estimator failures: nothing, land. Ours has more.
@@ -67,7 +67,6 @@ ALIASES: tuple[Alias, ...] = (
     Alias("FENCE_RADIUS", "GF_MAX_HOR_DIST", REAL32),
     Alias("FENCE_TYPE", "GF_TYPES", INT8),
     Alias("FLTMODE_CH", "RC_MAP_FLTMODE", INT8),
-    *(Alias(f"FLTMODE{i}", f"COM_FLTMODE{i}", INT8, numbers=_SWITCH_MODES) for i in range(1, 7)),
     Alias("FRAME_CLASS", "SYS_AUTOSTART", INT8, numbers={4001: 1, 6001: 2, 8001: 3}),
     Alias("FS_CRASH_CHECK", "CBRK_FLIGHTTERM", INT8, numbers={0: 1, 121212: 0}),
     Alias("FS_EKF_ACTION", "COM_EST_FAIL_ACT", INT8, numbers=_ESTIMATOR_ACTIONS),
@@ -111,6 +110,21 @@ ALIASES: tuple[Alias, ...] = (
     Alias("WPNAV_SPEED_UP", "MPC_Z_V_AUTO_UP", REAL32, CM),
     Alias("WP_YAW_BEHAVIOR", "MPC_YAW_MODE", INT8, numbers=_YAW_MODES),
 )
+
+
+def switch_aliases(modes: ModeTable) -> Sequence[Alias]:
+    """The modes of a switch: PX4's COM_FLTMODE numbers to ArduPilot's mode numbers."""
+    numbers = {
+        spec.switch: spec.ardupilot.number
+        for spec in modes.values()
+        if spec.switch is not None and isinstance(spec.ardupilot, DialectMode)
+    }
+    offboard, guided = modes.get(Mode.OFFBOARD), modes.get(Mode.GUIDED)
+    if offboard and offboard.switch is not None and guided and isinstance(guided.ardupilot, DialectMode):
+        numbers[offboard.switch] = guided.ardupilot.number  # no number of a switch means Guided
+    numbers = dict(sorted(numbers.items(), key=lambda item: item[1]))
+    return [Alias(f"FLTMODE{i}", f"COM_FLTMODE{i}", INT8, numbers=numbers) for i in range(1, 7)]
+
 
 _AXES = "XYZ"
 _RATE_LOOP = "ArduPilot's default; the rate loop's own gains are MC_RPRATE_*_ACC and MC_YAWRATE_*_ACC"

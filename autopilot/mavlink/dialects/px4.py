@@ -4,54 +4,15 @@ import re
 import struct
 from collections.abc import Mapping, Sequence
 from hashlib import sha1
+from typing import Self
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import Mode
-from autopilot.mavlink.dialects import Alias, Constant, ModeRow, UnknownModeError
+from autopilot.mavlink.dialects import Alias, Constant, ModeNumbers, ModeRow, UnknownModeError
+from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from common.params import Parameter
-
-MANUAL, ALTCTL, POSCTL, AUTO, ACRO, OFFBOARD, STABILIZED, TERMINATION = 1, 2, 3, 4, 5, 6, 7, 10
-
-# (main, sub) of px4_custom_mode.h
-MODE_NUMBERS: dict[Mode, tuple[int, int]] = {
-    Mode.TAKEOFF: (AUTO, 2),
-    Mode.HOLD: (AUTO, 3),
-    Mode.MISSION: (AUTO, 4),
-    Mode.RETURN: (AUTO, 5),
-    Mode.LAND: (AUTO, 6),
-    Mode.FOLLOW: (AUTO, 8),
-    Mode.PRECISION_LAND: (AUTO, 9),
-    Mode.OFFBOARD: (OFFBOARD, 0),
-    Mode.MANUAL: (MANUAL, 0),
-    Mode.STABILIZED: (STABILIZED, 0),
-    Mode.ACRO: (ACRO, 0),
-    Mode.ALTITUDE: (ALTCTL, 0),
-    Mode.POSITION: (POSCTL, 0),
-    Mode.ORBIT: (POSCTL, 1),
-    Mode.TERMINATION: (TERMINATION, 0),
-}
-# Modes of ours that PX4 does not have, as the nearest of its own.
-SHOWN_AS = {Mode.BRAKE: Mode.HOLD, Mode.SMART_RETURN: Mode.RETURN, Mode.GUIDED: Mode.OFFBOARD}
-MODES = (
-    ModeRow(Mode.POSITION, "Position", mavlink.MAV_STANDARD_MODE_POSITION_HOLD),
-    ModeRow(Mode.ALTITUDE, "Altitude", mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD),
-    ModeRow(Mode.HOLD, "Hold"),
-    ModeRow(Mode.MISSION, "Mission", mavlink.MAV_STANDARD_MODE_MISSION),
-    ModeRow(Mode.RETURN, "Return", mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY),
-    ModeRow(Mode.LAND, "Land", mavlink.MAV_STANDARD_MODE_LAND),
-    ModeRow(Mode.PRECISION_LAND, "Precision Land"),
-    ModeRow(Mode.TAKEOFF, "Takeoff", mavlink.MAV_STANDARD_MODE_TAKEOFF),
-    ModeRow(Mode.OFFBOARD, "Offboard", is_advanced=True),
-    ModeRow(Mode.FOLLOW, "Follow Me"),
-    ModeRow(Mode.ORBIT, "Orbit", mavlink.MAV_STANDARD_MODE_ORBIT, is_selectable=False),
-    ModeRow(Mode.STABILIZED, "Stabilized", is_advanced=True),
-    ModeRow(Mode.MANUAL, "Manual", is_advanced=True),
-    ModeRow(Mode.ACRO, "Acro", is_advanced=True),
-    ModeRow(Mode.TERMINATION, "Termination", is_selectable=False),
-)
-_MODES = {numbers: mode for mode, numbers in MODE_NUMBERS.items()}
-_WITHOUT_SUB_MODES = frozenset({MANUAL, ALTCTL, ACRO, OFFBOARD, STABILIZED, TERMINATION})
 
 
 class Px4Dialect:
@@ -64,7 +25,6 @@ class Px4Dialect:
     # asks for an update. It names the interface we are compatible with; our own version is the custom version.
     flight_sw_version = 1 << 24 | 18 << 16 | 0 << 8 | mavlink.FIRMWARE_VERSION_TYPE_DEV
 
-    modes: Sequence[ModeRow] = MODES
     goto_mode = Mode.HOLD
     first_seq = 0
     item_request = "MISSION_REQUEST_INT"
@@ -79,15 +39,28 @@ class Px4Dialect:
     aliases: Sequence[Alias] = ()
     constants: Sequence[Constant] = ()
 
+    def __init__(self, modes: ModeTable) -> None:
+        self.mode_table = modes
+        self._numbers = ModeNumbers(modes, lambda spec: spec.px4)
+        self.modes: Sequence[ModeRow] = self._numbers.rows
+        mains = [number >> 16 & 0xFF for number in self._numbers.numbers]
+        self._without_sub_modes = {
+            main for main in mains if mains.count(main) == 1 and self._numbers.mode_of(main << 16) is not None
+        }
+
+    def with_modes(self, table: ModeTable) -> Self:
+        return self if table is self.mode_table else type(self)(table)
+
     def custom_mode(self, mode: Mode) -> int:
-        main, sub = MODE_NUMBERS[SHOWN_AS.get(mode, mode)]
-        return main << 16 | sub << 24
+        return self._numbers.number_of(mode)
 
     def mode_from_custom(self, custom_mode: int) -> Mode:
         return self.mode_from_command(custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF)
 
     def mode_from_command(self, main_mode: int, sub_mode: int) -> Mode:
-        mode = _MODES.get((main_mode, 0 if main_mode in _WITHOUT_SUB_MODES else sub_mode))
+        sub = 0 if main_mode in self._without_sub_modes else sub_mode
+        are_bytes = 0 <= main_mode <= 0xFF and 0 <= sub <= 0xFF
+        mode = self._numbers.mode_of(main_mode << 16 | sub << 24) if are_bytes else None
         if mode is None:
             raise UnknownModeError(f"there is no mode {main_mode}/{sub_mode}")
         return mode
@@ -115,4 +88,4 @@ class Px4Dialect:
         return value
 
 
-PX4 = Px4Dialect()
+PX4 = Px4Dialect(MULTIROTOR_MODES)

@@ -31,13 +31,9 @@ class ModeService(Service):
     def requests(self) -> Mapping[str, RequestHandler]:
         return {"AVAILABLE_MODES": self._available}
 
-    @property
-    def _rows(self) -> list[ModeRow]:
-        return [row for row in self._endpoint.dialect.modes if self._endpoint.vehicle.has_mode(row.mode)]
-
     def _available(self, command: Command) -> Sequence[bytes] | Reply:
         """The modes: all of them, or the one whose number from 1 is in p2."""
-        rows = self._rows
+        rows = self._endpoint.dialect.modes
         index = whole(command.p2, _ALL)
         if index == _ALL:
             return [self._row(rows, i) for i in range(len(rows))]
@@ -60,7 +56,7 @@ class ModeService(Service):
         Refused: DENIED for a number without a mode here; TEMPORARILY_REJECTED if the mode cannot be entered now.
         """
         number = whole(command.p1, 0)
-        row = next((row for row in self._rows if row.standard_mode == number and number), None)
+        row = next((row for row in self._endpoint.dialect.modes if row.standard_mode == number and number), None)
         if row is None:
             return Reply(Verdict.DENIED, f"there is no standard mode {number}")
         return self._endpoint.vehicle.set_mode(row.mode)

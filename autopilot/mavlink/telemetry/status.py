@@ -49,7 +49,6 @@ _STICKS_MODE = (
     | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
     | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 )
-_STICKS_MODES = frozenset({Mode.MANUAL, Mode.STABILIZED, Mode.ACRO, Mode.ALTITUDE, Mode.POSITION})
 _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 _GYRO_ACCEL = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
@@ -89,7 +88,7 @@ WHOLE_PACK_ONLY = (UINT16_MAX,) * 9  # cell voltages are not measured
 
 def heartbeat(state: VehicleState, dialect: Dialect) -> bytes:
     """Mode, armed or not, state."""
-    base_mode = _STICKS_MODE if state.mode in _STICKS_MODES else _BASE_MODE
+    base_mode = _STICKS_MODE if dialect.mode_table[state.mode].needs_sticks else _BASE_MODE
     return _heartbeat(
         state.mav_type,
         dialect.autopilot,

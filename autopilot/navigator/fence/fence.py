@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from math import hypot, inf
 
 from autopilot.interface.item_lists import ItemRefusal, MissionItem
-from autopilot.interface.vehicle_state import ACCEPTED, FenceLimit, LandedState, Mode, Reply, Severity
+from autopilot.interface.vehicle_state import ACCEPTED, FenceLimit, LandedState, Reply, Severity
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.fence.fence_items import MAX_FENCE_ITEMS, FenceCommand, fence_shapes
 from autopilot.navigator.fence.fence_region import Region, region_of
@@ -23,7 +23,6 @@ _ANYWHERE = Region((), ())
 _HYSTERESIS_M = 0.5  # further inside than this a breach is over; guess
 _FIX_3D = 3
 _SOURCE_GNSS = 1  # GF_SOURCE
-_BELOW_FLOOR_MODES = frozenset((Mode.TAKEOFF, Mode.LAND, Mode.PRECISION_LAND, Mode.RETURN, Mode.SMART_RETURN))
 
 
 class Fence:
@@ -213,7 +212,7 @@ class Fence:
         if height > floor + _HYSTERESIS_M:
             self._has_risen = True
             return 0
-        if not self._has_risen or context.is_landing or state.mode in _BELOW_FLOOR_MODES:
+        if not self._has_risen or context.is_landing or context.flown.is_below_floor:
             return 0
         return _FLOOR if height < floor or had & _FLOOR else 0
 

@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 from math import hypot
 
-from autopilot.interface.item_lists import ItemRefusal, MissionItem, item_name
-from autopilot.interface.vehicle_interface import FenceSwitch
+from autopilot.interface.item_lists import ItemRefusal, ListKind, MissionItem, item_name
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Severity, Verdict
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.fence.fence import Fence
 from autopilot.navigator.mission.item_checks import refuse_items, warning_of
 from autopilot.navigator.mission.item_commands import (
     MAX_ITEMS,
@@ -44,7 +45,7 @@ class MissionState(IntEnum):
     COMPLETE = 5
 
 
-class Mission:
+class Mission(FlightMode):
     """Mode Mission and the stored mission.
 
     Args:
@@ -54,6 +55,7 @@ class Mission:
     """
 
     capacity = MAX_ITEMS
+    finishes_takeoff = takes_heading = True
 
     def __init__(
         self, context: NavContext, payload: Payloads, set_home: Callable[[float, float, float], Reply]
@@ -67,6 +69,9 @@ class Mission:
         self._index = 0
         self._is_flying = False
         self._is_chosen = False  # the current item was asked for: a restart does not go back behind it
+        self._fence: Fence
+        self._fence_checked: object = None
+        self._fence_problem = ""
         context.state.mission_state = MissionState.NO_MISSION
         context.params.on_change(self._on_parameter)
 
@@ -74,9 +79,9 @@ class Mission:
     def items(self) -> tuple[MissionItem, ...]:
         return self._route.items
 
-    def connect(self, fence: FenceSwitch) -> None:
-        """Names the fence that items switch on and off."""
-        self._actions.fence = fence
+    def connect(self, fence: Fence) -> None:
+        """Names the fence that the items keep inside, and switch on and off."""
+        self._fence = self._actions.fence = fence
 
     # ---- what clients ask for ----
 
@@ -181,7 +186,7 @@ class Mission:
         """Why the mission cannot be flown now; empty if it can."""
         if not self.items:
             return "no mission is loaded"
-        return self._lacks() or self._too_far()
+        return self._lacks() or self._too_far() or self._outside_fence()
 
     def _lacks(self) -> str:
         """What MIS_TKO_LAND_REQ asks for and the mission has not."""
@@ -204,6 +209,28 @@ class Mission:
             if way_m > longest_m:
                 return f"first waypoint is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed"
         return ""
+
+    def _outside_fence(self) -> str:
+        """The first item that lies outside the fence; looked for again when either has changed."""
+        fence = self._fence
+        if not fence.is_active:
+            return ""
+        checked = (self.items, fence.version, self._context.state.home_ned)
+        if checked != self._fence_checked:
+            self._fence_checked = checked
+            self._fence_problem = ""
+            for seq, place in self.places():
+                reason = fence.refusal(place)
+                if reason:
+                    self._fence_problem = f"{item_name(seq)} is {reason}"
+                    break
+        return self._fence_problem
+
+    def warn_of_fence(self, _: ListKind) -> None:
+        """Says at once that a mission just loaded leaves the fence, or a fence just loaded excludes the mission."""
+        problem = self._outside_fence()
+        if problem:
+            self._context.announcer.statustext(Severity.WARNING, f"Mission: {problem}")
 
     def places(self) -> Iterator[tuple[int, Vector]]:
         """Number and place [m] of every item that the vehicle flies to."""
@@ -232,8 +259,12 @@ class Mission:
         state.mission_state = MissionState.ACTIVE
         self._begin(self._index, is_joined=False)
 
-    def leave(self) -> None:
-        """Another mode took over."""
+    def goes_away(self) -> bool:
+        return not self._context.is_on_ground  # from there it takes off by itself
+
+    def leave(self, following: Mode) -> None:
+        if following is Mode.MISSION:
+            return
         if self._context.state.mission_state == MissionState.ACTIVE:
             self._context.state.mission_state = MissionState.PAUSED
         self._is_flying = False

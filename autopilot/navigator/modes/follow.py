@@ -10,6 +10,7 @@ from math import atan2, cos, hypot, isfinite, nan, radians, sin
 
 from autopilot.inputs.sticks import StickInput
 from autopilot.interface.client_requests import TargetReport
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import Severity
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
@@ -35,13 +36,15 @@ _STICK_DEAD = 0.1
 _DISTANCE_MIN_M, _DISTANCE_MAX_M, _HEIGHT_MAX_M = 1.0, 100.0, 100.0
 
 
-class Follow:
+class Follow(FlightMode):
     """Mode Follow. Without a target it holds its place and waits."""
 
     __slots__ = (
         "_angle_rad", "_bearing", "_context", "_course", "_distance_m", "_height_m", "_is_waiting", "_speed_away",
         "_speed_down", "_speed_round", "_time_us", "target",
     )  # fmt: skip
+
+    finishes_takeoff = True
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
@@ -61,6 +64,9 @@ class Follow:
         self.target.report(now_us, report.pos_ned, report.vel_ned, report.pos_std, report.vel_std)
         if isfinite(report.course_rad) and self.target.speed_xy < _COURSE_SPEED_M_S:
             self._course = report.course_rad
+
+    def goes_away(self) -> bool:
+        return True
 
     def start(self) -> None:
         self._is_waiting = False

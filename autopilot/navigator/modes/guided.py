@@ -8,7 +8,8 @@ from enum import Enum, auto
 from math import isfinite, nan
 
 from autopilot.interface.client_requests import OffboardSetpoint
-from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Reply, Severity, Verdict
+from autopilot.interface.mode_spec import FlightMode
+from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply, Severity, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.goto import reposition_target
 from autopilot.navigator.modes.takeoff import Climb, is_high
@@ -29,13 +30,15 @@ class _Task(Enum):
     SETPOINT = auto()
 
 
-class Guided:
+class Guided(FlightMode):
     """Mode Guided, and what clients ask of it."""
 
     __slots__ = (
         "_climb", "_context", "_is_active", "_is_flown", "_is_line", "_is_told", "_next",
         "_place", "_received_us", "_setpoint", "_task", "_way", "_yaw",
     )  # fmt: skip
+
+    takes_heading = True
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
@@ -66,9 +69,12 @@ class Guided:
         else:
             self._go(context.stop_point(), context.state.yaw_rad, is_line=False)
 
-    def leave(self) -> None:
-        """Another mode is entered."""
-        self._is_active = False
+    def leave(self, following: Mode) -> None:
+        if following is not Mode.GUIDED:
+            self._is_active = False
+
+    def forget(self) -> None:
+        self.forget_goto()
 
     def frame(self) -> None:
         context = self._context

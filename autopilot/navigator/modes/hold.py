@@ -1,12 +1,13 @@
 """Hold: stays at one place, or goes to one and stays there."""
 
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.navigator.context import NavContext, distance
 from autopilot.navigator.modes.stick_modes import Position
 from autopilot.navigator.paths.waypoint_path import Way
 from autopilot.navigator.setpoint import Vector
 
 
-class Hold:
+class Hold(FlightMode):
     """Mode Hold: the place is where the mode before ended, where a client sent the vehicle, or where it can stop.
 
     Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as he steers.
@@ -14,6 +15,8 @@ class Hold:
 
     __slots__ = ("_context", "_is_flown", "_is_goto", "_is_steered", "_reset_count", "_steered", "_way",
                  "target_ned", "via", "yaw")  # fmt: skip
+
+    finishes_takeoff = takes_heading = True
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
@@ -32,6 +35,14 @@ class Hold:
         """Whether the vehicle is still on its way to the place a client has sent it to."""
         way_m = distance(self._context.state.estimate.pos_ned, self.target_ned)
         return self._is_goto and way_m > self._context.number("NAV_ACC_RAD")
+
+    def goes_away(self) -> bool:
+        next_hold = self._context.next_hold
+        return next_hold is not None and next_hold[2]
+
+    def forget(self) -> None:
+        self._context.next_hold = None
+        self.via = []
 
     def start(self) -> None:
         context = self._context

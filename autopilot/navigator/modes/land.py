@@ -2,6 +2,7 @@
 
 from math import hypot, isfinite, nan
 
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff_intent import is_near_start
@@ -101,10 +102,12 @@ def slowed_near_ground(context: NavContext, fast: float) -> float:
     return _blend(context, height, min(context.number("MPC_LAND_SPEED"), fast), fast)
 
 
-class Land:
+class Land(FlightMode):
     """Mode Land: at a given place if one was asked for, otherwise here."""
 
     __slots__ = ("_context", "_landing", "_place", "_yaw")
+
+    is_below_floor = True
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
@@ -116,6 +119,9 @@ class Land:
         """Sets place [m] and heading [rad] of the next landing; None: where the vehicle can stop."""
         self._place = place_ned
         self._yaw = yaw
+
+    def forget(self) -> None:
+        self.request(None, nan)
 
     def start(self) -> None:
         context = self._context

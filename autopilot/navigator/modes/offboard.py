@@ -3,6 +3,7 @@
 from math import nan
 
 from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.takeoff_intent import Ask, vertical_ask
 from autopilot.ports import SETPOINT_TRAJECTORY
@@ -10,7 +11,7 @@ from autopilot.ports import SETPOINT_TRAJECTORY
 STREAM_PERIOD_US = 500_000  # setpoints must come faster than 2 Hz before the mode may be entered (PX4)
 
 
-class Offboard:
+class Offboard(FlightMode):
     """Mode Offboard and the latest setpoint, which comes in whatever the mode."""
 
     __slots__ = ("_context", "_flown", "_received_us", "latest")
@@ -33,6 +34,10 @@ class Offboard:
     def needs_position(self) -> bool:
         """Whether the latest setpoint can only be flown with a position estimate."""
         return self.latest is None or self.latest.kind == SETPOINT_TRAJECTORY
+
+    def refusal(self) -> str:
+        is_stream = self.age_us(self._context.state.time_us) <= STREAM_PERIOD_US
+        return "" if is_stream else "needs setpoints faster than 2 Hz before the switch"
 
     def start(self) -> None:
         self._flown = None

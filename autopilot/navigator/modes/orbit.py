@@ -9,7 +9,8 @@ from math import cos, hypot, isfinite, nan, sin
 
 from autopilot.inputs.sticks import StickInput, curved, without_centre
 from autopilot.interface.client_requests import OrbitRequest
-from autopilot.interface.vehicle_state import ACCEPTED, OrbitStatus, Reply, Verdict
+from autopilot.interface.mode_spec import FlightMode
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, OrbitStatus, Reply, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.goto import ground_d
 from autopilot.navigator.modes.stick_modes import speed_down_of, yaw_rate_of
@@ -35,10 +36,12 @@ class OrbitYaw(IntEnum):
     UNCHANGED = 5
 
 
-class Orbit:
+class Orbit(FlightMode):
     """Mode Orbit. Chosen without a request it circles a point ahead, at MC_ORBIT_RAD."""
 
     __slots__ = ("_context", "_is_on_circle", "_request", "_start_yaw", "_time_us", "_turns_rad", "_yaw", "circle")
+
+    finishes_takeoff = True
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
@@ -70,8 +73,10 @@ class Orbit:
         return ACCEPTED
 
     def forget(self) -> None:
-        """The orbit asked for is not flown."""
         self._request = None
+
+    def goes_away(self) -> bool:
+        return True
 
     def start(self) -> None:
         context = self._context
@@ -96,10 +101,10 @@ class Orbit:
         self._time_us = context.state.time_us
         context.fly_to(self.circle.pos_ned, self._heading(self.circle), context.state.estimate.pos_ned)
 
-    def leave(self) -> None:
-        """Another mode took over."""
-        self.circle = None
-        self._context.state.orbit = None
+    def leave(self, following: Mode) -> None:
+        if following is not Mode.ORBIT:
+            self.circle = None
+            self._context.state.orbit = None
 
     def frame(self) -> None:
         context, circle = self._context, self.circle

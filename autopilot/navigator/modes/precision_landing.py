@@ -8,6 +8,7 @@ PLD_SRCH_TOUT or PLD_MAX_SRCH searches ends in a normal landing.
 from enum import IntEnum
 from math import hypot, nan
 
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import Severity
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.goto import ground_d
@@ -29,10 +30,12 @@ class _Phase(IntEnum):
     LAND = 3  # the last bit, or a normal landing
 
 
-class PrecisionLand:
+class PrecisionLand(FlightMode):
     """Mode Precision land."""
 
     __slots__ = ("_approach_d", "_context", "_landing", "_phase", "_searches", "_until_us", "_yaw", "target")
+
+    is_below_floor = True
 
     def __init__(self, context: NavContext) -> None:
         self._context = context

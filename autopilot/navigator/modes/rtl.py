@@ -3,7 +3,8 @@
 from enum import IntEnum
 from math import hypot, isfinite, radians, tan
 
-from autopilot.interface.vehicle_state import Severity
+from autopilot.interface.mode_spec import FlightMode
+from autopilot.interface.vehicle_state import Mode, Severity
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.fence.fence import Fence
 from autopilot.navigator.mission.mission import Mission
@@ -22,7 +23,7 @@ class _Phase(IntEnum):
     MISSION = 3  # flown from its landing part
 
 
-class Return:
+class Return(FlightMode):
     """Mode Return. Nearer to its end than RTL_MIN_DIST it does not climb first.
 
     Args:
@@ -34,6 +35,8 @@ class Return:
 
     __slots__ = ("_arrival", "_back_d", "_context", "_destination", "_destinations", "_fence", "_items", "_mission",
                  "_phase", "_start", "_way")  # fmt: skip
+
+    is_below_floor = takes_heading = True
 
     def __init__(self, context: NavContext, destinations: Destinations, fence: Fence, mission: Mission) -> None:
         self._context = context
@@ -47,6 +50,9 @@ class Return:
         self._destination = Destination((0.0, 0.0, 0.0), "home")
         self._start: Vector = (0.0, 0.0, 0.0)
         self._back_d = 0.0  # [m] height of the way back
+
+    def leave(self, following: Mode) -> None:
+        self._mission.leave(following)  # it may end with its landing part
 
     def start(self) -> None:
         context = self._context

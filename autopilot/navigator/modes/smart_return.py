@@ -2,6 +2,7 @@
 
 from math import hypot
 
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.rtl_landing import Arrival
 from autopilot.navigator.paths.breadcrumbs import Breadcrumbs
@@ -9,13 +10,15 @@ from autopilot.navigator.paths.waypoint_path import Way
 from autopilot.navigator.setpoint import Vector
 
 
-class SmartReturn:
+class SmartReturn(FlightMode):
     """Mode Smart return.
 
     What has been flown back is forgotten, so that a pilot who takes over and flies elsewhere returns from there.
     """
 
     __slots__ = ("_arrival", "_column", "_context", "_crumbs", "_has_arrived", "_way")
+
+    is_below_floor = takes_heading = True
 
     def __init__(self, context: NavContext, crumbs: Breadcrumbs) -> None:
         self._context = context
@@ -24,6 +27,9 @@ class SmartReturn:
         self._arrival = Arrival(context)
         self._column = 0  # points of the take-off, which are not flown back
         self._has_arrived = False
+
+    def refusal(self) -> str:
+        return self._crumbs.refusal()
 
     def start(self) -> None:
         context = self._context

@@ -7,6 +7,7 @@ On the ground the throttle decides when to leave it; ground contact ends a desce
 from math import cos, hypot, radians, sin, sqrt
 
 from autopilot.inputs.sticks import curved, without_centre
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.land import slowed_near_ground
 from autopilot.navigator.setpoint import Quaternion
@@ -55,16 +56,13 @@ class Throttle:
         return self._voltage_share
 
 
-class StickMode:
+class StickMode(FlightMode):
     """A mode that follows the sticks of this frame and remembers nothing between frames."""
 
     __slots__ = ("_context",)
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
-
-    def start(self) -> None:
-        """Has nothing to begin."""
 
 
 class ThrustMode(StickMode):

@@ -2,6 +2,7 @@
 
 from math import isfinite, nan
 
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import Reply, Severity, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
@@ -64,10 +65,12 @@ def is_high(context: NavContext) -> bool:
     return height_m >= _SAFE_M
 
 
-class Takeoff:
+class Takeoff(FlightMode):
     """Mode Takeoff: climbs, then holds."""
 
     __slots__ = ("_alt_amsl_m", "_context", "_yaw", "climb")
+
+    finishes_takeoff = is_below_floor = takes_heading = True
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
@@ -85,7 +88,6 @@ class Takeoff:
         return Reply(Verdict.ACCEPTED)
 
     def forget(self) -> None:
-        """The next take-off goes to the usual height."""
         self._alt_amsl_m = self._yaw = nan
 
     def start(self) -> None:

@@ -1,9 +1,10 @@
 """Termination: the motors stand still, and nothing brings them back before the vehicle lies on the ground."""
 
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.navigator.context import NavContext
 
 
-class Termination:
+class Termination(FlightMode):
     """Mode Termination."""
 
     __slots__ = ("_context",)

@@ -4,6 +4,7 @@ from autopilot.interface.vehicle_state import Mode
 from autopilot.vehicles.multirotor.defaults import airframe_defaults, hover_thrust
 from autopilot.vehicles.multirotor.landing_detector import LandingDetector
 from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
+from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
 from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import Airframe
@@ -27,6 +28,7 @@ MULTIROTOR = VehicleClass(
     parameters=CONTROL_PARAMETERS,
     defaults=airframe_defaults,
     ground_detector=_landing_detector,
+    modes=MULTIROTOR_MODES,
     last_resort=Mode.LAND,
     hover_thrust=hover_thrust,
     mav_type=_mav_type,

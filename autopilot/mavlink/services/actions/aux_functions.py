@@ -20,21 +20,6 @@ _HIGH_US, _LOW_US = 1800, 1200
 _NAN = float("nan")
 _ALL_LIMITS = FenceLimit.CEILING | FenceLimit.RADIUS | FenceLimit.SHAPES | FenceLimit.FLOOR
 
-MODES: Mapping[int, Mode] = {
-    4: Mode.RETURN,
-    16: Mode.MISSION,
-    18: Mode.LAND,
-    33: Mode.BRAKE,
-    42: Mode.SMART_RETURN,
-    52: Mode.ACRO,
-    55: Mode.GUIDED,
-    56: Mode.HOLD,
-    57: Mode.FOLLOW,
-    68: Mode.STABILIZED,
-    69: Mode.POSITION,
-    70: Mode.ALTITUDE,
-    72: Mode.ORBIT,
-}
 RELAYS: Mapping[int, int] = {28: 0, 34: 1, 35: 2, 36: 3, 66: 4, 67: 5}
 SAVE_WAYPOINT, CAMERA_TRIGGER, FENCE, GRIPPER, MISSION_RESET, MOTOR_STOP = 7, 9, 11, 19, 24, 31
 CLEAR_MISSION, GPS_DISABLE, DISARM, ARM_DISARM, ARM_DISARM_OLD, CAMERA_VIDEO = 58, 65, 81, 153, 41, 166
@@ -54,6 +39,9 @@ class AuxFunctions(Service):
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
         self._is_ardupilot = endpoint.dialect.name == "ardupilot"
+        self._modes = {
+            spec.aux_function: spec.mode for spec in endpoint.vehicle.modes.values() if spec.aux_function is not None
+        }
         self._mode_before = Mode.HOLD
         self._seen_count = 0  # of stick messages
         self._switches: dict[int, tuple[int, Position]] = {}  # by channel: its function, and where it stands
@@ -94,8 +82,8 @@ class AuxFunctions(Service):
 
     def run(self, function: int, position: Position) -> Reply:
         """Does what a function asks for at a position of its switch."""
-        if function in MODES:
-            return self._change_mode(MODES[function], position)
+        if function in self._modes:
+            return self._change_mode(self._modes[function], position)
         if function in RELAYS:
             return self._payload(mavlink.MAV_CMD_DO_SET_RELAY, RELAYS[function], float(position is Position.HIGH))
         if function in self._functions:

@@ -13,7 +13,6 @@ from typing import Any
 
 from autopilot.interface.vehicle_state import Reply
 from autopilot.mavlink.channel import Endpoint
-from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.service import Command, RequestHandler, Service
 from autopilot.mavlink.services.event_texts import events_metadata
 from autopilot.mavlink.services.files.parameter_metadata import parameter_metadata
@@ -60,7 +59,7 @@ class MetadataService(Service):
         dialect = self._endpoint.dialect
         files = {_EVENTS: _packed(events_metadata(dialect))}
         kinds = {_EVENTS: _TYPE_EVENTS}
-        if dialect is PX4:  # stations know ArduPilot's parameters, and ArduPilot itself tells them nothing
+        if dialect.name == "px4":  # stations know ArduPilot's parameters, and ArduPilot itself tells them nothing
             files[_PARAMETERS] = _packed(parameter_metadata(self._endpoint.parameters))
             kinds[_PARAMETERS] = _TYPE_PARAMETER
         described = [

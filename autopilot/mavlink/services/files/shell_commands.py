@@ -7,26 +7,11 @@ from math import degrees, isfinite, nan
 from typing import Any
 
 from autopilot.interface.item_lists import ListKind, item_name
-from autopilot.interface.vehicle_state import LandedState, Mode, Reply, Verdict
+from autopilot.interface.vehicle_state import LandedState, Reply, Verdict
 from autopilot.mavlink.channel import Endpoint
 from autopilot.mavlink.services.identity import PROJECT, project_version
 
 Lines = Iterable[str]
-
-# PX4's names of modes, besides our own.
-MODE_NAMES: dict[str, Mode] = {
-    "manual": Mode.MANUAL,
-    "altctl": Mode.ALTITUDE,
-    "posctl": Mode.POSITION,
-    "auto:loiter": Mode.HOLD,
-    "auto:mission": Mode.MISSION,
-    "auto:rtl": Mode.RETURN,
-    "auto:takeoff": Mode.TAKEOFF,
-    "auto:land": Mode.LAND,
-    "auto:precland": Mode.PRECISION_LAND,
-    "auto:follow": Mode.FOLLOW,
-    **{mode.name.lower(): mode for mode in Mode},
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +33,10 @@ class ShellCommands:
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
         self._vehicle = endpoint.vehicle
+        specs = sorted(endpoint.vehicle.modes.values(), key=lambda spec: spec.mode)
+        theirs = sorted((spec for spec in specs if spec.shell_name), key=lambda spec: spec.nav_state)
+        self._modes = {spec.shell_name: spec.mode for spec in theirs}  # PX4's names, besides our own
+        self._modes |= {spec.mode.name.lower(): spec.mode for spec in specs}
         self._table: Mapping[str, _Entry] = {
             "help": _Entry("help", "this list", self._help),
             "status": _Entry("status", "what the vehicle is doing", self._status),
@@ -177,9 +166,9 @@ class ShellCommands:
             case ["land"]:
                 return _reply_lines(vehicle.land(nan, nan, nan))
             case ["mode", name]:
-                mode = MODE_NAMES.get(name.lower())
+                mode = self._modes.get(name.lower())
                 if mode is None:
-                    return (f"commander: {name}: no such mode; there are {' '.join(MODE_NAMES)}",)
+                    return (f"commander: {name}: no such mode; there are {' '.join(self._modes)}",)
                 return _reply_lines(vehicle.set_mode(mode))
             case ["check"]:
                 return vehicle.check_arming() or ("ready to arm",)

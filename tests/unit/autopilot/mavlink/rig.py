@@ -45,6 +45,7 @@ from autopilot.ports import (
     ExternalSample,
     Samples,
 )
+from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from common.geodesy import GeoPoint
 from common.records import row_reader
 from sim.truth import Truth
@@ -247,6 +248,7 @@ class RecordingVehicle:
         self.sticks = Sticks(self.params)
         self.state.sticks = self.sticks.input
         self.sticks.joystick_moved((CLIENT_SYSID, CLIENT_COMPID), 5_000_000, (0.0, 0.0, 0.0, 0.0), 0)
+        self.modes = MULTIROTOR_MODES
         self.reply = ACCEPTED
         self.arming_problems: list[str] = []
         self.calls: list[tuple[Any, ...]] = []
@@ -258,7 +260,6 @@ class RecordingVehicle:
         }
         self.lists = ItemLists(self.stored)
         self.guided = RecordingGuided(self._record)
-        self.missing_modes: set[Mode] = set()
         self.guidance = RecordingGuidance(self._record)
         self.motor_test = RecordedMotorTest(self._record)
         self.payload = Payloads()
@@ -296,9 +297,6 @@ class RecordingVehicle:
 
     def follow_ardupilot(self) -> None:
         self.sticks.follow_ardupilot()
-
-    def has_mode(self, mode: Mode) -> bool:
-        return mode not in self.missing_modes
 
     def arm(self, *, force: bool) -> Reply:
         return self._record("arm", force)

@@ -7,9 +7,9 @@ import pytest
 from pyulog import ULog
 
 from autopilot.interface.item_lists import MissionItem
+from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 from mission.flight import Flight, FlightConfig
-from mission.log.flight_log import NAVIGATION_STATES
 from mission.log.log_topics import TOPICS, wxyz
 from sim.faults import set_fault
 from sim.world.world import WorldConfig
@@ -131,7 +131,7 @@ def test_global_position_is_the_local_one_seen_from_home(flown):
 
 def test_status_follows_mode_and_arming(flown):
     status = flown.topics["vehicle_status"]
-    assert set(status["nav_state"]) <= set(NAVIGATION_STATES.values())
+    assert set(status["nav_state"]) <= {spec.nav_state for spec in MULTIROTOR_MODES.values()}
     assert {HOLD_NAV_STATE, TAKEOFF_NAV_STATE} <= set(status["nav_state"])
     assert (status["arming_state"][0], status["arming_state"][-1]) == (1, 2)
     assert status["pre_flight_checks_pass"][[0, -1]].tolist() == [0, 1]

@@ -5,7 +5,7 @@ from pymavlink import mavutil
 
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import UnknownModeError
-from autopilot.mavlink.dialects.ardupilot import ARDUPILOT, MODE_NUMBERS, MODES
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from tests.unit.autopilot.mavlink.rig import Rig
 
 PYMAVLINK_NAMES = {
@@ -39,14 +39,15 @@ def test_every_mode_has_the_number_pymavlink_knows(mode):
     assert mavutil.mode_mapping_acm[ARDUPILOT.custom_mode(mode)] == PYMAVLINK_NAMES[mode]
 
 
-@pytest.mark.parametrize("mode", MODE_NUMBERS)
+@pytest.mark.parametrize("mode", [row.mode for row in ARDUPILOT.modes])
 def test_mode_survives_the_round_trip(mode):
     assert ARDUPILOT.mode_from_custom(ARDUPILOT.custom_mode(mode)) is mode
     assert ARDUPILOT.mode_from_command(ARDUPILOT.custom_mode(mode), 99) is mode
 
 
 def test_every_mode_that_can_be_asked_for_is_listed():
-    assert {row.mode for row in MODES} == set(MODE_NUMBERS)
+    own = {mode for mode in Mode if ARDUPILOT.mode_from_custom(ARDUPILOT.custom_mode(mode)) is mode}
+    assert {row.mode for row in ARDUPILOT.modes} == own
 
 
 def test_unknown_mode_is_refused_by_its_name():

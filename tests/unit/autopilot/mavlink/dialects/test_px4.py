@@ -3,7 +3,7 @@ from pymavlink import mavutil
 
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import UnknownModeError
-from autopilot.mavlink.dialects.px4 import MODE_NUMBERS, PX4
+from autopilot.mavlink.dialects.px4 import PX4
 from common.params import Parameter
 
 PYMAVLINK_NAMES = {
@@ -33,7 +33,7 @@ def test_modes_are_those_pymavlink_knows(mode):
     assert mavutil.interpret_px4_mode(157, PX4.custom_mode(mode)) == PYMAVLINK_NAMES[mode]
 
 
-@pytest.mark.parametrize("mode", MODE_NUMBERS)
+@pytest.mark.parametrize("mode", [row.mode for row in PX4.modes])
 def test_mode_survives_the_round_trip(mode):
     assert PX4.mode_from_custom(PX4.custom_mode(mode)) == mode
 

@@ -1,9 +1,11 @@
 import pytest
 
+from autopilot.interface.mode_spec import mode_table
 from autopilot.interface.vehicle_state import Mode, Verdict
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
-from tests.unit.autopilot.mavlink.rig import Rig
+from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
+from tests.unit.autopilot.mavlink.rig import RecordingVehicle, Rig
 
 REQUEST, AVAILABLE, CURRENT, MONITOR = 512, 435, 436, 437
 ADVANCED, NOT_SELECTABLE = 1, 2
@@ -34,8 +36,9 @@ def test_mode_beyond_the_last_is_denied():
 
 
 def test_modes_the_vehicle_does_not_have_are_not_listed():
-    rig = Rig()
-    rig.vehicle.missing_modes = {Mode.ACRO}
+    vehicle = RecordingVehicle()
+    vehicle.modes = mode_table(*(spec for mode, spec in MULTIROTOR_MODES.items() if mode is not Mode.ACRO))
+    rig = Rig(vehicle=vehicle)
     rig.client.command(REQUEST, AVAILABLE, 0.0)
     modes = rig.all("AVAILABLE_MODES")
     assert {mode.number_modes for mode in modes} == {len(PX4.modes) - 1}

@@ -4,7 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
-from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS
+from autopilot.mavlink.dialects.ardupilot_aliases import CONSTANTS
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.services.parameter_view import ParameterView
 from autopilot.params import parameter_table
@@ -69,8 +69,8 @@ def test_names_are_dense_and_short_and_values_fit_their_types(dialect):
 def test_every_alias_stands_for_a_parameter_and_has_no_other_meaning():
     airframe = load_airframe("x500")
     table = flight_parameters(FlightConfig(dialect="ardupilot"), airframe)
-    assert [alias.name for alias in ALIASES if alias.of not in table or alias.name in table] == []
-    names = [alias.name for alias in ALIASES] + [constant.name for constant in CONSTANTS]
+    assert [alias.name for alias in ARDUPILOT.aliases if alias.of not in table or alias.name in table] == []
+    names = [alias.name for alias in ARDUPILOT.aliases] + [constant.name for constant in CONSTANTS]
     assert len(set(names)) == len(names)
     assert [constant.name for constant in CONSTANTS if constant.name in table] == []
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from autopilot.commander.modes import MODE_RULES
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from tests.unit.autopilot.mavlink.rig import Client, RecordingVehicle, Rig, texts
 
 RC_RECEIVER = 65536  # MAV_SYS_STATUS_SENSOR
@@ -110,9 +110,10 @@ def test_heartbeat_tells_modes_flown_by_sticks_from_those_that_fly_themselves(mo
     rig = Rig()
     rig.update(mode=mode)
     by_hand, by_itself = 64, 4  # MAV_MODE_FLAG: manual input, auto
+    needs_sticks = MULTIROTOR_MODES[mode].needs_sticks
     base_mode = rig.all("HEARTBEAT", 60)[-1].base_mode
-    assert bool(base_mode & by_hand) is MODE_RULES[mode].needs_sticks
-    assert bool(base_mode & by_itself) is not MODE_RULES[mode].needs_sticks
+    assert bool(base_mode & by_hand) is needs_sticks
+    assert bool(base_mode & by_itself) is not needs_sticks
 
 
 def test_status_has_a_radio_once_sticks_were_heard():
