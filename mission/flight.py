@@ -245,7 +245,8 @@ class Flight:
         self.time_us += FRAME_US
         self._surroundings.frame(self.time_us)
         if self.owner is not None:
-            self.owner.frame(self.time_us, is_followed=self.is_offboard)
+            is_followed = self.controller.modes[self.controller.state.mode].is_offboard
+            self.owner.frame(self.time_us, is_followed=is_followed)
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
         if self.onboard is not None:
@@ -323,11 +324,6 @@ class Flight:
     def cut_sticks(self, *, is_cut: bool) -> None:
         """The radio link of the sticks is lost, or is back."""
         self.controller.sticks.is_cut = is_cut
-
-    @property
-    def is_offboard(self) -> bool:
-        """Whether a companion may fly it, in PX4's way or ArduPilot's."""
-        return self.controller.modes[self.controller.state.mode].is_offboard
 
     @property
     def is_crashed(self) -> bool:

@@ -15,13 +15,12 @@ from autopilot.commander.home import Home
 from autopilot.commander.modes import NO_STICKS, mode_refusal
 from autopilot.commander.navigator_interface import Flying
 from autopilot.commander.stick_commands import Pilot
-from autopilot.interface.mode_spec import Disarmed, ModeSpec, ModeTable
+from autopilot.interface.mode_spec import Disarmed, ModeTable
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from autopilot.navigator.takeoff_intent import Ask
 from autopilot.ports import HEIGHT_VALID, MAG_DISTURBED, POSITION_VALID, VELOCITY_VALID
-from autopilot.vehicles.multirotor.motor_failures import MotorWatch
-from autopilot.vehicles.vehicle_class import GroundDetector
+from autopilot.vehicles.vehicle_class import DriveWatch, GroundDetector
 from common.params import Parameter, ParameterTable
 
 _POSITION_FLAGS = POSITION_VALID | VELOCITY_VALID | HEIGHT_VALID
@@ -61,7 +60,7 @@ class Commander:
         battery: BatteryEstimator,
         landing: GroundDetector,
         pilot: Pilot,
-        motors: MotorWatch,
+        motors: DriveWatch,
         modes: ModeTable,
     ) -> None:
         self.state = state
@@ -97,11 +96,6 @@ class Commander:
     def follow_ardupilot(self) -> None:
         """Modes by ArduPilot's rules: any may be chosen on the ground, some are not armable, landing changes none."""
         self._is_ardupilot = True
-
-    @property
-    def _spec(self) -> ModeSpec:
-        """What the table says of the present mode."""
-        return self.modes[self.state.mode]
 
     # ---- each frame ----
 
@@ -185,7 +179,7 @@ class Commander:
     def check_arming(self) -> list[str]:
         """Reasons why the vehicle may not be armed now; empty when ready."""
         reasons = self._arming_reasons()
-        if not self._spec.may_arm:
+        if not self.modes[self.state.mode].may_arm:
             reasons.append(
                 "Mode not armable" if self._is_ardupilot else f"mode {self.state.mode.name} does not allow arming"
             )
@@ -195,10 +189,10 @@ class Commander:
         """Those besides the mode."""
         state = self.state
         mode = state.mode
-        reasons = arming_reasons(state, self.params, needs_position=self._needs_position(mode))
+        reasons = arming_reasons(state, self.params, needs_position=self._flying.needs_position(mode))
         if state.landed_state is not LandedState.ON_GROUND:
             reasons.append("not on the ground")
-        if self._spec.needs_sticks and not self._pilot.is_heard:
+        if self.modes[self.state.mode].needs_sticks and not self._pilot.is_heard:
             reasons.append(NO_STICKS)
         if int(self.params["NAV_DLL_ACT"]) and self._watch.misses_station:
             reasons.append("ground station lost")  # the failsafe would disarm it at once (PX4)
@@ -253,7 +247,7 @@ class Commander:
             has_position=self.has_position or is_free,
             has_home=state.home is not None or is_free,
             is_on_ground=state.landed_state is LandedState.ON_GROUND and not is_lenient,
-            needs_position=self._needs_position(mode),
+            needs_position=self._flying.needs_position(mode),
             has_sticks=self._pilot.is_heard,
         ) or self._flying.refusal(mode)
 
@@ -279,7 +273,7 @@ class Commander:
         if state.mode is Mode.TERMINATION:
             self.stop_motors("Disarmed after termination")
             return
-        is_done = self._has_flown or not self._spec.may_arm
+        is_done = self._has_flown or not self.modes[self.state.mode].may_arm
         limit_us = self._disarm_landed_us if is_done else self._disarm_preflight_us
         if 0 <= limit_us <= now_us - self._landed_since_us:
             self.stop_motors("Disarmed after landing" if is_done else "Disarmed: no take-off")
@@ -316,12 +310,12 @@ class Commander:
     def _lift(self) -> None:
         """Released from the ground, but not yet off it."""
         state = self.state
-        is_put_down = self._spec.needs_sticks and self._flying.ask is Ask.DOWN
+        is_put_down = self.modes[self.state.mode].needs_sticks and self._flying.ask is Ask.DOWN
         risen_m = self._lift_d - state.estimate.pos_ned[2]
         if risen_m > _AIRBORNE_M or self._flying.is_landing or is_put_down:
             self._has_flown = True
         elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
-            is_hovering = self._spec.needs_sticks or self._flying.ask is not Ask.UP
+            is_hovering = self.modes[self.state.mode].needs_sticks or self._flying.ask is not Ask.UP
             if is_hovering and risen_m > _OFF_GROUND_M:  # it shall not go higher
                 self._has_flown = True
                 return
@@ -341,7 +335,7 @@ class Commander:
         self.guard.release()
         self._next_check_us = 0
         self.hold_reasons_back()
-        disarmed = self._spec.disarmed
+        disarmed = self.modes[self.state.mode].disarmed
         if disarmed is Disarmed.HOLD or (disarmed is Disarmed.USUAL and not self._is_ardupilot):
             self.change_mode(Mode.HOLD)
         self.announcer.heartbeat_now()
@@ -372,14 +366,9 @@ class Commander:
             self.has_position = False
             self._flying.tell_position(is_valid=False)
 
-    def _needs_position(self, mode: Mode) -> bool:
-        if mode is Mode.OFFBOARD:
-            return self._flying.offboard_needs_position
-        return self.modes[mode].needs_position
-
     def _check_before_arming(self) -> None:
         state = self.state
-        if self._spec.needs_sticks and not self._pilot.is_heard and not self._is_ardupilot:
+        if self.modes[self.state.mode].needs_sticks and not self._pilot.is_heard and not self._is_ardupilot:
             self.change_mode(Mode.HOLD)  # the pilot has gone: whoever comes next may need none
         reasons = self._arming_reasons() if self._is_ardupilot else self.check_arming()
         state.is_ready_to_arm = not reasons
@@ -408,7 +397,7 @@ class Commander:
             dt_s,
             self._flying,
             has_position=self.has_position,
-            needs_position=self._needs_position(self.state.mode),
+            needs_position=self._flying.needs_position(self.state.mode),
         )
         self.guard.see(failures | self._pilot.failures())
 

@@ -35,7 +35,7 @@ from autopilot.interface.vehicle_state import BatteryLevel, LandedState, Mode, V
 from autopilot.ports import ACCEL_DOUBTED as ACCEL_DOUBTED_FLAG
 from autopilot.ports import DEAD_RECKONING as DEAD_RECKONING_FLAG
 from autopilot.ports import HEIGHT_VALID, MAG_FAULTY, WIND_VALID
-from autopilot.vehicles.multirotor.motor_failures import MotorWatch
+from autopilot.vehicles.vehicle_class import DriveWatch
 from common.params import Parameter, ParameterTable
 
 _SLOW_PERIOD_US = 200_000
@@ -91,7 +91,7 @@ class FailureWatch:
         params: ParameterTable,
         battery: BatteryEstimator,
         station: StationLink,
-        motors: MotorWatch,
+        motors: DriveWatch,
         modes: ModeTable,
     ) -> None:
         self._state = state

@@ -16,7 +16,7 @@ def mode_refusal(
         has_position: horizontal position, velocity and height are valid.
         has_home: home is known.
         is_on_ground: the vehicle stands on the ground.
-        needs_position: as its row says, except in Offboard, where the setpoint decides.
+        needs_position: as its row and what it would fly now say.
         has_sticks: a pilot's sticks are heard.
     """
     if is_on_ground and not spec.on_ground:

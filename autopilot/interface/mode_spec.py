@@ -47,6 +47,10 @@ class FlightMode:
         """Why it cannot be flown now, besides what its row says; empty if it can."""
         return ""
 
+    def needs_position(self) -> bool:
+        """Whether what it would fly now needs a position, where its row says that it may."""
+        return True
+
     def goes_away(self) -> bool:
         """Whether it leads elsewhere at once."""
         return False

@@ -124,9 +124,9 @@ class Navigator:
         """Whether the mode is on its last descent."""
         return self.context.is_landing
 
-    @property
-    def offboard_needs_position(self) -> bool:
-        return self.offboard.needs_position
+    def needs_position(self, mode: Mode) -> bool:
+        """Whether a mode can only be flown with a position, as its row and what it would fly now say."""
+        return self._specs[mode].needs_position and self._modes[mode].needs_position()
 
     def offboard_age_us(self, time_us: int) -> int:
         return self.offboard.age_us(time_us)

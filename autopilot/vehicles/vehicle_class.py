@@ -41,6 +41,15 @@ class GroundDetector(Protocol):
         """
 
 
+class DriveWatch(Protocol):
+    """Says whether a motor has failed."""
+
+    def reset(self) -> None:
+        """The vehicle has just been armed."""
+
+    def has_failure(self) -> bool: ...
+
+
 @dataclass(frozen=True, slots=True)
 class VehicleClass:
     """One class of vehicles."""

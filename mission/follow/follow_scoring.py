@@ -42,7 +42,8 @@ def taken_over(flight: Flight, phase: Phase, *, has_begun: bool, is_put_back: bo
     if is_put_back:
         return "the vehicle was restarted"
     state = flight.controller.state
-    is_own = flight.is_offboard or phase is Phase.HANDING_BACK or (state.mode in _BEFORE and not has_begun)
+    is_offboard = flight.controller.modes[state.mode].is_offboard
+    is_own = is_offboard or phase is Phase.HANDING_BACK or (state.mode in _BEFORE and not has_begun)
     if is_own or state.is_failsafe or not state.is_armed:
         return ""
     return f"mode {state.mode.name.replace('_', ' ').title()} was chosen"

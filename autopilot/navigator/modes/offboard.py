@@ -30,9 +30,7 @@ class Offboard(FlightMode):
         """Time since the latest setpoint; very large without one."""
         return time_us - self._received_us if self.latest is not None else 1 << 62
 
-    @property
     def needs_position(self) -> bool:
-        """Whether the latest setpoint can only be flown with a position estimate."""
         return self.latest is None or self.latest.kind == SETPOINT_TRAJECTORY
 
     def refusal(self) -> str:

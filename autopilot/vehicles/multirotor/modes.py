@@ -185,7 +185,7 @@ MULTIROTOR_MODES = mode_table(
     ModeSpec(
         mode=Mode.OFFBOARD,
         build=of_context(Offboard),
-        needs_position=True,  # setpoints of attitude or rate need none: the commander asks the navigator
+        needs_position=True,  # though not for setpoints of attitude or rate
         may_arm=True,
         on_ground=True,
         disarmed=Disarmed.HOLD,
