@@ -8,6 +8,7 @@ from enum import IntEnum
 from math import atan2, hypot, isfinite, nan, pi, radians
 from typing import Protocol
 
+from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, VehicleState, Verdict
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import SETPOINT_TRAJECTORY
@@ -32,6 +33,7 @@ class YawMode(IntEnum):
 class FlownLeg(Protocol):
     """What the heading depends on (autopilot.navigator.context)."""
 
+    flown: FlightMode
     state: VehicleState
     setpoint: SetpointPort
     is_landing: bool
