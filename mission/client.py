@@ -4,10 +4,8 @@ In: bytes from a transport, once per frame. Out: heartbeats at 1 Hz, the offboar
 their re-sends. Coroutines wait for messages by letting frames pass; nothing sleeps and nothing reads a wall clock.
 """
 
-import struct
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator, Iterable, Sequence
-from math import isnan
 from types import TracebackType, coroutine
 from typing import Any, Protocol, Self
 
@@ -23,6 +21,7 @@ from autopilot.mavlink.wire.codec import (
     message_id,
     whole_frame,
 )
+from mission.client_fields import item_fields, parameter_from_wire, parameter_to_wire, plan_item
 from mission.plan.plan_file import PlanItem
 
 CLIENT_SYSTEM_ID = 245
@@ -33,7 +32,6 @@ HEARTBEAT_PERIOD_US = 1_000_000
 COMMAND_TIMEOUT_S = 1.5
 COMMAND_TRIES = 3
 TRANSFER_TIMEOUT_S = 1.5
-PARAMETER_IS_INTEGER = 6  # MAV_PARAM_TYPE_INT32
 
 
 class ScriptError(RuntimeError):
@@ -284,7 +282,7 @@ class Client:
                         self.reached.clear()
                     return
                 if request.seq < len(items):
-                    self.send("MISSION_ITEM_INT", **target, **_item_fields(items[request.seq]))
+                    self.send("MISSION_ITEM_INT", **target, **item_fields(items[request.seq]))
 
     async def download(self, mission_type: int = 0) -> list[PlanItem]:
         """The vehicle's mission, its fence (type 1) or its rally points (type 2)."""
@@ -297,7 +295,7 @@ class Client:
                 self.send("MISSION_REQUEST_INT", **target, seq=len(items))
                 message = await inbox.next_message(TRANSFER_TIMEOUT_S, f"mission item {len(items)}")
                 if message.name == "MISSION_ITEM_INT" and message.fields.seq == len(items):
-                    items.append(_plan_item(message.fields))
+                    items.append(plan_item(message.fields))
             self.send("MISSION_ACK", **target, type=0)
             return items
 
@@ -378,42 +376,3 @@ def _frame_of(frame: Frame | bytes) -> Frame:
 
 _HEARTBEAT_ID = message_id("HEARTBEAT")
 _NOTED = {message_id("STATUSTEXT"), message_id("MISSION_ITEM_REACHED")}
-
-
-def parameter_to_wire(value: float, param_type: int) -> int:
-    """The bit pattern of a value in PX4's encoding, where an integer's bits travel in the float field."""
-    bits = struct.pack("<i", int(value)) if param_type == PARAMETER_IS_INTEGER else struct.pack("<f", value)
-    return int.from_bytes(bits, "little")
-
-
-def parameter_from_wire(message: Any) -> float:
-    """The value in the fields of a PARAM_VALUE of PX4's encoding."""
-    bits = message.param_value.to_bytes(4, "little")
-    return float(struct.unpack("<i" if message.param_type == PARAMETER_IS_INTEGER else "<f", bits)[0])
-
-
-def _item_fields(item: PlanItem) -> dict[str, Any]:
-    fields = {f"param{k + 1}": value for k, value in enumerate(item.params)}
-    return fields | {
-        "seq": item.seq,
-        "frame": item.frame,
-        "command": item.command,
-        "current": int(item.seq == 0),
-        "autocontinue": int(item.autocontinue),
-        "x": 0 if isnan(item.x) else round(item.x * 1e7),
-        "y": 0 if isnan(item.y) else round(item.y * 1e7),
-        "z": item.z,
-    }
-
-
-def _plan_item(message: Any) -> PlanItem:
-    return PlanItem(
-        seq=message.seq,
-        frame=message.frame,
-        command=message.command,
-        params=(message.param1, message.param2, message.param3, message.param4),
-        x=message.x * 1e-7,
-        y=message.y * 1e-7,
-        z=message.z,
-        autocontinue=bool(message.autocontinue),
-    )

@@ -9,7 +9,7 @@ from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self
 
-from autopilot.flight_controller import FlightController, HostPorts
+from autopilot.flight_controller import FlightController
 from autopilot.interface.platform import Host
 from autopilot.interface.vehicle_state import Severity
 from autopilot.mavlink.dialects import Dialect
@@ -20,13 +20,11 @@ from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory
 from autopilot.mavlink.wire.signing import SigningConfig
 from autopilot.payload.camera.storage import MediaFolder
 from autopilot.persistence import Persistence
-from autopilot.vehicles.multirotor.control_airframe import rotors_leaver
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder
 from common.kernels import FRAME_TICKS, FRAME_US, TICK_US
 from common.params import Parameter
-from common.records import late_reader, row_reader
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
 from mission.client import Running
@@ -37,6 +35,7 @@ from mission.log.flight_recorder import History, Recorder
 from mission.log.stored_logs import FlightLogs, RunLog
 from mission.script import Drone, Script
 from mission.simulator.failure_injection import RigInjector
+from mission.simulator.host_ports import host_ports
 from mission.simulator.onboard_devices import Surroundings
 from mission.simulator.simulator_params import PREFIX as SIMULATOR_PREFIX
 from mission.simulator.simulator_params import TURBULENCE_SHARE, SimulatorParameters
@@ -44,7 +43,6 @@ from mission.video.mjpeg_server import StreamServer
 from mission.video.rtp_video import RtpVideo
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
-from sim.sensors.esc import esc_reader
 from sim.sensors.ring import RingSensor
 from sim.sensors.sensors import sensor_model
 from sim.turntable import Turntable
@@ -327,7 +325,7 @@ class Flight:
 
     @property
     def is_crashed(self) -> bool:
-        """The truth: it struck something too fast, or a turning rotor struck the ground."""
+        """The truth: it struck something too fast, or a turning blade struck the ground."""
         return bool(self.rig.rows["truth"]["is_crashed"][0])
 
     def restart(self) -> None:
@@ -387,19 +385,3 @@ def host_files(folder: Path | None, state: StateFolder | None) -> ConfinedFolder
     """Where files of clients go: with the state, or else with the run."""
     root = folder if state is None else state.folder
     return None if root is None else ConfinedFolder(root / "files")
-
-
-def host_ports(rig: Rig, airframe: Airframe, i_vehicle: int = 0) -> HostPorts:
-    """The connectors of one vehicle's flight controller, on the live rows of a rig."""
-    rows, chosen = rig.rows, slice(i_vehicle, i_vehicle + 1)
-    estimator = rows["autopilot.ekf.rows"]
-    return HostPorts(
-        read_estimate=row_reader(estimator, i_vehicle, "Estimate", "estimate"),
-        read_samples=late_reader(rows["sensors"], i_vehicle, "Samples", "samples"),
-        read_actuators=row_reader(rows["autopilot.control"], i_vehicle, "Actuators", "actuators"),
-        read_health=late_reader(estimator, i_vehicle, "EstimatorState"),
-        setpoint=rows["autopilot.setpoint"][chosen],
-        read_rotor_speeds=esc_reader(rows["truth"], i_vehicle),
-        external=rows["autopilot.ekf.external"][chosen],
-        leave_out=rotors_leaver(rows["autopilot.airframe"][chosen], airframe),
-    )

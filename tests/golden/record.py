@@ -16,6 +16,7 @@ import numpy as np
 import warp as wp
 from pyulog import ULog
 
+from common.warp_start import start_warp
 from mission.log.flight_summary import Summary
 
 LOGS = ("flight.ulg", "flight.tlog")
@@ -37,6 +38,7 @@ def _probe(x: wp.array(dtype=wp.float32), out: wp.array(dtype=wp.float32)) -> No
 
 def machine() -> str:
     """A name for how this machine rounds."""
+    start_warp()
     x = np.linspace(0.001, 3.0, PROBES, dtype=np.float32)
     out = wp.zeros(PROBES, dtype=wp.float32, device="cpu")
     wp.launch(_probe, dim=PROBES, inputs=[wp.array(x, device="cpu"), out], device="cpu")

@@ -10,7 +10,7 @@ from autopilot.mavlink.services.files.ftp import Opcode
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.folder import ConfinedFolder
-from mission.client import parameter_from_wire
+from mission.client_fields import parameter_from_wire
 from mission.flight import Flight, FlightConfig
 from tests.lossy import LossyLink
 

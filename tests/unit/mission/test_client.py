@@ -15,9 +15,8 @@ from mission.client import (
     ScriptError,
     ScriptTimeout,
     next_frame,
-    parameter_from_wire,
-    parameter_to_wire,
 )
+from mission.client_fields import parameter_from_wire, parameter_to_wire
 from mission.plan.plan_file import PlanItem
 
 ARM = 400
