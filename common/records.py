@@ -28,9 +28,10 @@ def record_reader(dtype: np.dtype[Any], name: str) -> Callable[[Any, int], Any]:
     for offset, count, code in leaves:
         layout += f"{offset - position}x{count}{code}"
         position = offset + struct.calcsize(f"<{count}{code}")
-    unpack = struct.Struct(layout).unpack_from
-    maker = eval(f"lambda v: {expression}", scope)  # noqa: S307  (the text is built from field names alone)
-    return lambda buffer, offset: maker(unpack(buffer, offset))
+    scope["_unpack"] = struct.Struct(layout).unpack_from
+    text = f"lambda buffer, offset: (v := _unpack(buffer, offset), {expression})[1]"  # one call for the whole row
+    read: Callable[[Any, int], Any] = eval(text, scope)  # noqa: S307  (the text is built from field names alone)
+    return read
 
 
 def row_reader(rows: np.ndarray[Any, Any], i_row: int, name: str, field: str = "") -> Callable[[], Any]:
@@ -51,36 +52,26 @@ def row_reader(rows: np.ndarray[Any, Any], i_row: int, name: str, field: str = "
 def late_reader(rows: np.ndarray[Any, Any], i_row: int, name: str, field: str = "") -> Callable[[], Any]:
     """As `row_reader`, where little of a row is looked at: a copy whose fields are unpacked when they are asked for."""
     dtype, offset = _part(rows, i_row, name, field)
-    readers = {each: _field_reader(dtype, each, name) for each in dtype.names or ()}
+    if dtype.fields is None or dtype.names is None:
+        raise TypeError(f"{name} is not a structured type")
     buffer = rows.view(np.uint8).data[offset : offset + dtype.itemsize]
 
-    class Late:
-        _fields = dtype.names
+    def copy(record: Any) -> None:
+        record.row = bytes(buffer)
 
-        def __init__(self) -> None:
-            self._row = bytes(buffer)
-
-        def __getattr__(self, field: str) -> Any:
-            """The first time; from then on it is an attribute."""
-            read = readers.get(field)
-            if read is None:
-                raise AttributeError(f"{name} has no {field}")
-            value = self.__dict__[field] = read(self._row)
-            return value
-
-    return Late
+    fields = {each: _late_field(each, *dtype.fields[each][:2], name) for each in dtype.names}
+    own = {"__slots__": ("row",), "__init__": copy, "_fields": dtype.names}
+    kind: Callable[[], Any] = type(name, (), own | fields)
+    return kind
 
 
-def _field_reader(dtype: np.dtype[Any], field: str, name: str) -> Callable[[Any], Any]:
-    """A function that returns one field of a row's bytes."""
-    if dtype.fields is None:
-        raise TypeError(f"{name} is not a structured type")
-    field_type, offset = dtype.fields[field][:2]
-    if field_type.names is not None:
-        read = record_reader(field_type, f"{name}_{field}")
-        return lambda row: read(row, offset)
-    read_one = record_reader(np.dtype([(field, field_type)]), name)
-    return lambda row: read_one(row, offset)[0]
+def _late_field(field: str, dtype: np.dtype[Any], offset: int, name: str) -> property:
+    """Unpacks one field of a record's bytes."""
+    if dtype.names is not None:
+        read = record_reader(dtype, f"{name}_{field}")
+        return property(lambda record: read(record.row, offset))
+    read_one = record_reader(np.dtype([(field, dtype)]), name)
+    return property(lambda record: read_one(record.row, offset)[0])
 
 
 def _part(rows: np.ndarray[Any, Any], i_row: int, name: str, field: str) -> tuple[np.dtype[Any], int]:

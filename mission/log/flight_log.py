@@ -179,13 +179,16 @@ class FlightLog:
         return topic, topic.records(form.columns(batch)), _bounds(batch, frames)
 
     def _imu_table(self, batch: Batch, imu_rings: Rows) -> _Table:
-        times, first = np.unique(imu_rings["time_us"], return_index=True)
-        first = first[times > self._imu_time_us]
-        imu = imu_rings.reshape(-1)[first]
+        times = imu_rings["time_us"]
+        is_new = times > self._imu_time_us
+        is_new[1:] &= times[1:] != times[:-1]  # a sample stays in its slot for many frames
+        _, first = np.unique(times[is_new], return_index=True)
+        frames = np.nonzero(is_new)[0][first]
+        imu = imu_rings[is_new][first]
         if len(imu):
             self._imu_time_us = int(imu["time_us"][-1])
         records = self._imu_topic.records(_imu_columns(imu, *self._imu_limits))
-        return self._imu_topic, records, _bounds(batch, first // imu_rings.shape[1])
+        return self._imu_topic, records, _bounds(batch, frames)
 
     def _status_tables(self, batch: Batch) -> list[_Table]:
         """Vehicle state, landing and mission progress: when one of them changed, and twice a second."""

@@ -50,7 +50,7 @@ def test_fields_that_are_read_late_are_those_of_the_moment():
     record = late_reader(rows, 1, "Samples")()
     rows[1] = rows[2]
     assert_same(record, expected)
-    with pytest.raises(AttributeError, match="Samples has no wings"):
+    with pytest.raises(AttributeError, match="has no attribute 'wings'"):
         _ = record.wings
 
 
