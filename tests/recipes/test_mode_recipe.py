@@ -43,9 +43,9 @@ class Station:
         return self.heard
 
 
-def flight_with_the_mode(monkeypatch, folder, *links, config=FLIGHT):
-    """The row stands in the table of the vehicle's class; nothing else knows of the mode."""
-    vehicle = replace(MULTIROTOR, modes=mode_table(*MULTIROTOR_MODES.values(), UP_AND_DOWN))
+def flight_with(monkeypatch, specs, folder, *links, config=FLIGHT):
+    """The vehicle's class has these rows; nothing else is told of them."""
+    vehicle = replace(MULTIROTOR, modes=mode_table(*specs))
     monkeypatch.setattr("mission.flight.FlightController", partial(FlightController, vehicle=vehicle))
     return Flight(config, links=links, folder=folder)
 
@@ -69,7 +69,7 @@ def test_a_mode_is_unknown_before_it_is_added(tmp_path):
 
 def test_a_mode_that_is_added_is_chosen_flown_shown_and_logged(monkeypatch, tmp_path):
     vehicle_end, station_end = memory_pair(LinkRole.GROUND)
-    flight = flight_with_the_mode(monkeypatch, tmp_path, vehicle_end)
+    flight = flight_with(monkeypatch, [*MULTIROTOR_MODES.values(), UP_AND_DOWN], tmp_path, vehicle_end)
     station, downs = Station(station_end), []
 
     async def script(drone):
@@ -106,10 +106,33 @@ def test_a_mode_that_is_added_is_refused_by_what_its_row_says(monkeypatch, tmp_p
         await drone.command(SET_MODE, 1.0, 4.0, 11.0)
 
     config = FLIGHT.model_copy(update={"dialect": "px4"})  # ArduPilot lets any mode be chosen on the ground
-    flight = flight_with_the_mode(monkeypatch, tmp_path, config=config)
+    flight = flight_with(monkeypatch, [*MULTIROTOR_MODES.values(), UP_AND_DOWN], tmp_path, config=config)
     running = flight.fly(script, seconds=30.0)
     flight.close()
     assert "on the ground already" in str(running.error)
+
+
+def test_a_class_of_vehicles_may_have_fewer_modes(monkeypatch, tmp_path):
+    refusals = []
+
+    async def script(drone):
+        await drone.wait_ready()
+        await drone.arm()
+        for request in (drone.takeoff(5.0), drone.command(SET_MODE, 1.0, 4.0, 5.0), drone.start_mission()):
+            with pytest.raises(CommandRefused) as refused:
+                await request
+            refusals.append(str(refused.value))
+        await drone.command(SET_MODE, 1.0, 4.0, 6.0)
+
+    specs = [MULTIROTOR_MODES[mode] for mode in (Mode.HOLD, Mode.LAND, Mode.STABILIZED, Mode.TERMINATION)]
+    flight = flight_with(monkeypatch, specs, tmp_path)
+    running = flight.fly(script, seconds=30.0)
+    flight.close()
+    assert running.error is None
+    takeoff, return_home, mission = refusals
+    assert "mode TAKEOFF is not supported" in takeoff
+    assert "there is no mode 4/5" in return_home
+    assert "mode MISSION is not supported" in mission
 
 
 @pytest.mark.parametrize(
