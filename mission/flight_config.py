@@ -3,8 +3,6 @@
 Light to import: a wrong option is told before kernels, servers or pictures are loaded.
 """
 
-from typing import Literal
-
 from pydantic import BaseModel, ConfigDict, Field
 
 from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
@@ -13,10 +11,10 @@ from common.airframe import Airframe
 from common.clock import SIMULATED_EPOCH_US
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.params import ParameterTable
+from mission.flight_settings import FlightSettings, Pace
 from mission.simulator.simulator_params import simulator_parameters
 from sim.world.world import WorldConfig
 
-Pace = Literal["walk", "run"]
 TREELESS_M = 80.0  # round home, of the command line's worlds: clients' examples fly to 60 m from it, lower than trees
 
 
@@ -33,32 +31,12 @@ class OwnerConfig(BaseModel):
     """Scales the errors of the phone's position."""
 
 
-class FlightConfig(BaseModel):
-    """What a flight is made from."""
+class FlightConfig(FlightSettings):
+    """What a flight is made from: the settings, and what several options together make."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    airframe: str = "x500"
-    """Name of an airframe, or path of an airframe file."""
     home: GeoPoint = DEFAULT_HOME
     """Where the vehicle boots."""
-    seed: int = Field(default=0, ge=0, le=2**31 - 1)
-    """Seeds sensor noise and turbulence."""
-    wind_m_s: float = Field(default=0.0, ge=0.0, le=20.0)
-    """Mean wind speed; above 0 it is turbulent and has gusts. More would blow a parked vehicle over."""
-    wind_from_deg: float = Field(default=270.0, ge=0.0, le=360.0)
-    """Where the wind comes from, clockwise from north."""
-    noise: float = Field(default=1.0, ge=0.0, le=10.0)
-    """Scales every sensor's noise, and that of the onboard camera; 0 makes them perfect."""
-    dialect: Literal["px4", "ardupilot"] = "px4"
-    """Which autopilot's numbers ground stations get. The flight's own script always gets PX4's."""
-    announces_components: bool = False
-    """Camera, gimbal and winch send heartbeats of their own in ArduPilot's dialect, too; in PX4's they always do."""
-    traffic_count: int = Field(default=0, ge=0, le=50)
-    """Other aircraft that an ADS-B receiver on board hears."""
-    has_lidar: bool = False
-    """A ring of range finders that looks round the vehicle."""
-    parameters: dict[str, float] = {}
+    parameters: dict[str, float] = Field(default_factory=dict)
     """Values of the flight controller's parameters that differ from their defaults, by name."""
     world: WorldConfig = WorldConfig()
     """The ground; with an owner: grown as in training, from its seed."""

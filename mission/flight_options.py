@@ -1,7 +1,5 @@
-"""What `honeyguide fly` is given, and the flight that this describes; what is wrong gets one sentence."""
+"""The flight that options of the command line describe; what is wrong with them gets one sentence."""
 
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, cast, get_args
 
 from pydantic import ValidationError
@@ -10,7 +8,9 @@ from common.airframe import AirframeError, load_airframe
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.params import ParameterError
 from common.state_folder import StateFolder
-from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, Pace, flight_parameters
+from mission.console.model_command import first_fault
+from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, flight_parameters
+from mission.flight_settings import FlightOptions, FlightSettings, Pace
 from mission.flight_state_folder import stored_home
 from mission.plan.plan_file import PlanError, read_plan
 from sim.world.world import WorldConfig
@@ -20,46 +20,6 @@ HOME_MOST = (89.0, 180.0, 6000.0)  # latitude and longitude [deg], altitude [m]:
 
 class UserError(ValueError):
     """Something the user gave is wrong; the message is one sentence."""
-
-
-@dataclass(frozen=True, slots=True)
-class FlightOptions:
-    """The options of `honeyguide fly`, as given."""
-
-    plan: Path | None
-    is_idle: bool
-    once: bool
-    speed: str
-    seconds: float | None
-    seed: int
-    wind_m_s: float
-    wind_from_deg: float
-    noise: float
-    airframe: str
-    home: str | None  # None: the stored one, or else the default
-    world_seed: int
-    trees_per_ha: float
-    hill_height_m: float
-    has_walls: bool
-    host: str
-    bind: str
-    tcp_port: int | None
-    has_to_sign: bool
-    gcs_port: int
-    api_port: int
-    run_folder: Path | None
-    dialect: str = "px4"
-    announces_components: bool = False
-    stream_port: int = 0
-    video_port: int | None = None  # None: the default one, when a client starts the stream; 0: no video
-    has_view: bool = False
-    view_port: int = 8080
-    parameters: tuple[str, ...] = ()  # NAME=VALUE
-    state: Path | None = None
-    traffic_count: int = 0
-    has_lidar: bool = False
-    owner: str | None = None  # walk or run
-    image_port: int = 14600
 
 
 def speed_of(text: str) -> float | None:
@@ -81,10 +41,15 @@ def check_end(options: FlightOptions, speed: float | None) -> None:
         raise UserError("--plan and --idle: choose one, to fly a plan or to wait for a ground station")
     if options.is_idle and options.once:
         raise UserError("--idle and --once: without a plan there is no mission to end with; use --seconds to end")
-    if options.owner not in (None, *get_args(Pace)):
-        raise UserError(f"--owner {options.owner}: must be walk or run")
+    check_owner(options)
     if options.is_idle and speed is None and options.seconds is None:
         raise UserError("--idle --speed max: nobody can connect, so give --seconds to say when it ends")
+
+
+def check_owner(options: FlightOptions) -> None:
+    """Refuses an owner who does not move as owners do."""
+    if options.owner not in (None, *get_args(Pace)):
+        raise UserError(f"--owner {options.owner}: must be walk or run")
 
 
 def check_options(options: FlightOptions) -> None:
@@ -108,23 +73,14 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
     home = stored_home(state) if options.home is None else _home(options.home)
     try:
         return FlightConfig(
-            airframe=options.airframe,
+            **{name: getattr(options, name) for name in FlightSettings.model_fields},
             home=home,
-            seed=options.seed,
-            wind_m_s=options.wind_m_s,
-            wind_from_deg=options.wind_from_deg,
-            noise=options.noise,
-            dialect=options.dialect,
-            announces_components=options.announces_components,
-            traffic_count=options.traffic_count,
-            has_lidar=options.has_lidar,
             parameters=dict(_parameter(text) for text in options.parameters),
             owner=None if options.owner is None else OwnerConfig(pace=cast(Pace, options.owner)),
             world=_world(options),
         )
     except ValidationError as error:
-        first = error.errors()[0]
-        raise UserError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        raise UserError(first_fault(error)) from error
 
 
 def _world(options: FlightOptions) -> WorldConfig:

@@ -18,7 +18,7 @@ from mission.console.name_checks import REPLAY_FILE
 from mission.console.progress_line import TABLE_PERIOD_S, Progress
 from mission.console.terminal import LINE_PERIOD_S, print_line
 from mission.flight import Flight
-from mission.flight_options import FlightOptions
+from mission.flight_settings import FlightOptions
 from mission.log.flight_plots import plot_flight
 from mission.log.flight_recorder import History
 from mission.log.flight_summary import Summary, curved_items, planned_path, summarise

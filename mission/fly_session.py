@@ -13,7 +13,8 @@ from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
 from mission.connections import open_images, open_links, open_page, open_stream, open_video, signing_config
 from mission.console.terminal import busy, print_line
-from mission.flight_options import FlightOptions, UserError, flight_config, speed_of
+from mission.flight_options import UserError, flight_config, speed_of
+from mission.flight_settings import FlightOptions
 from mission.flight_state_folder import StateError, keep_home, open_state
 from mission.net_guard import LOOPBACK
 from mission.plan.plan_file import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan

@@ -1,28 +1,18 @@
-"""What `honeyguide follow` is given, and the flight that this describes.
+"""The flight that the options of `honeyguide follow` describe.
 
 Light to import: what is wrong is told before the policy's packages are loaded.
 """
 
-from dataclasses import dataclass
+from typing import cast
 
 from common.airframe import AirframeError, load_airframe
 from common.params import ParameterError
-from mission.flight_config import FlightConfig, OwnerConfig, Pace, flight_parameters
-from mission.flight_options import FlightOptions, UserError, flight_config, speed_of
+from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
+from mission.flight_options import UserError, check_owner, flight_config, speed_of
+from mission.flight_settings import FollowOptions, Pace
 from policies.companion.names import SCRIPTED
 from policies.learn.export.policy_path import CheckpointError, find_policy
 from policies.tasks.follow_me.world import FOLLOW_WORLD
-
-
-@dataclass(frozen=True, slots=True)
-class FollowOptions:
-    """The options of `honeyguide follow`, as given."""
-
-    flight: FlightOptions
-    pace: Pace
-    policy: str | None  # None: the shipped one, or else the script
-    seconds: float
-    has_film: bool
 
 
 def check_follow_options(options: FollowOptions) -> None:
@@ -31,7 +21,8 @@ def check_follow_options(options: FollowOptions) -> None:
     Raises:
         UserError: an option, an airframe, a parameter or the policy's name is wrong.
     """
-    speed_of(options.flight.speed)
+    check_owner(options)
+    speed_of(options.speed)
     config = follow_config(options)
     try:
         flight_parameters(config, load_airframe(config.airframe))
@@ -43,8 +34,7 @@ def check_follow_options(options: FollowOptions) -> None:
 
 def follow_config(options: FollowOptions) -> FlightConfig:
     """The flight that the options describe: the world of training, with their seed, trees and hills."""
-    given = options.flight
-    config = flight_config(given, None)
-    own = {"seed": given.world_seed, "trees_per_ha": given.trees_per_ha, "hill_height_m": given.hill_height_m}
+    config = flight_config(options.model_copy(update={"owner": None}), None)
+    own = {"seed": options.world_seed, "trees_per_ha": options.trees_per_ha, "hill_height_m": options.hill_height_m}
     world = FOLLOW_WORLD.model_copy(update=own)
-    return config.model_copy(update={"world": world, "owner": OwnerConfig(pace=options.pace)})
+    return config.model_copy(update={"world": world, "owner": OwnerConfig(pace=cast(Pace, options.owner))})

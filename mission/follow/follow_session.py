@@ -23,9 +23,10 @@ from mission.console.progress_line import Progress
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight, flight_parameters
 from mission.flight_options import UserError, speed_of
+from mission.flight_settings import FollowOptions
 from mission.fly_loop import advance
 from mission.follow.companion_process import latency_text
-from mission.follow.follow_options import FollowOptions, follow_config
+from mission.follow.follow_options import follow_config
 from mission.follow.follow_scoring import FollowWatch, taken_over
 from mission.follow.lockstep import flight_with_companion
 from mission.kernel_loading import load_kernels
@@ -58,16 +59,16 @@ def follow_session(options: FollowOptions) -> int:
 def _follow(options: FollowOptions, held: ExitStack) -> int:
     """The flight, with what must be held until its end."""
     console = Console()
-    speed = speed_of(options.flight.speed)
+    speed = speed_of(options.speed)
     config = follow_config(options)
     pilot, name = chosen_pilot(options.policy)
     try:
         flight_parameters(config, load_airframe(config.airframe))
-        links = [] if speed is None else open_links(options.flight, speed)
+        links = [] if speed is None else open_links(options, speed)
     except (AirframeError, ParameterError, LinkError) as error:
         raise UserError(str(error)) from error
-    page = open_page(options.flight.view_port) if options.flight.has_view else None
-    folder = held.enter_context(run_folder(options.flight.run_folder))
+    page = open_page(options.view_port) if options.has_view else None
+    folder = held.enter_context(run_folder(options.run_folder))
     with busy(console, "loading kernels") as say:
         load_kernels(say, has_camera=page is not None, has_owner=True)
         say("building the world")
@@ -83,8 +84,8 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         )
         watchers.append(view.frame)
     running = flight.drone.start(follow(flight.drone, companion, options.seconds))
-    where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.flight.gcs_port}"
-    print_line(console, f"{name} follows an owner who {options.pace}s; {where}")
+    where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.gcs_port}"
+    print_line(console, f"{name} follows an owner who {options.owner}s; {where}")
     print_line(console, f"logs: {folder}")
     if page is not None:
         print_line(console, f"live page: {page.url}")

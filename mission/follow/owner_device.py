@@ -15,7 +15,8 @@ from autopilot.mavlink.wire.convert import degrees_e7
 from common.attitude import Vector
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import TICK_US
-from mission.flight_config import OwnerConfig, Pace
+from mission.flight_config import OwnerConfig
+from mission.flight_settings import Pace
 from policies.tasks.follow_me.world import STOP_SHARE
 from sim.sensors.phone import CORRELATED_STD_M, POSITION_STD_M, VERTICAL_FACTOR, phone_model
 from sim.walking_owner import Owner

@@ -37,7 +37,6 @@ LONG_FUNCTIONS = {
     "sim/sensors/fast_camera/rows.py draw_rows": 71,
     "sim/sensors/fast_camera/columns.py ground_depth": 61,
     "sim/sensors/fast_camera/fast_camera.py QuickCamera.__init__": 76,
-    "mission/cli.py fly": 90,
     "mission/flight.py Flight.__init__": 110,
     "mission/train/training_commands.py train": 72,
     "mission/video/mjpeg_server.py _handler": 69,

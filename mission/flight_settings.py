@@ -1,0 +1,102 @@
+"""The options of `honeyguide fly` and `follow`, each declared once: name, flag, help, bounds and default.
+
+The commands are made from these models (`console/model_command.py`), and `FlightConfig` has the fields of
+`FlightSettings` as its own. Light to import: the command line does so before anything else.
+"""
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from autopilot.mavlink.transport.links import GROUND_STATION_PORT, OFFBOARD_PORT
+from common.geodesy import DEFAULT_HOME
+from mission.console.model_command import option
+
+Pace = Literal["walk", "run"]
+_HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
+
+
+class FlightSettings(BaseModel):
+    """What a flight takes as it is given: options of the command line, and fields of its configuration."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    seed: int = option(0, "Seed of sensor noise and turbulence.", ge=0, le=2**31 - 1)
+    wind_m_s: float = option(0.0, "Wind speed [m/s], with turbulence and gusts.", "--wind", ge=0.0, le=20.0)
+    """The mean; more would blow a parked vehicle over."""
+    wind_from_deg: float = option(270.0, "Where the wind comes from [deg].", "--wind-from", ge=0.0, le=360.0)
+    """Clockwise from north."""
+    noise: float = option(1.0, "Scale of all sensor noise.", ge=0.0, le=10.0)
+    """Of the onboard camera's, too; 0 makes them perfect."""
+    airframe: str = option("x500", "Airframe name or TOML file.")
+    dialect: Literal["px4", "ardupilot"] = option("px4", "What ground stations take it for: px4 or ardupilot.")
+    """Which autopilot's numbers they get. The flight's own script always gets PX4's."""
+    announces_components: bool = option(
+        False, "ArduPilot's dialect: heartbeats of camera, gimbal and winch, too.", "--announce-components"
+    )
+    """In PX4's they always send them."""
+    traffic_count: int = option(0, "Other aircraft that are heard by ADS-B.", "--traffic", ge=0, le=50)
+    has_lidar: bool = option(False, "Carry a ring of range finders that looks round.", "--lidar")
+
+
+class FlightOptions(FlightSettings):
+    """The options of `honeyguide fly`, as given: the settings, what several of which make, and the session's own."""
+
+    plan: Path | None = option(None, "A QGroundControl .plan or QGC WPL 110 file. Default: a tour of the hills.")
+    is_idle: bool = option(False, "Fly no plan: wait for a ground station.", "--idle")
+    once: bool = option(False, "End with the mission; exit code 0 only if it succeeded.")
+    speed: str = option("1", "Times real time, or 'max': lockstep, without network links.")
+    seconds: float | None = option(None, "End after this much simulated time.", ge=0.1)
+    home: str | None = option(None, "Latitude,longitude[,altitude AMSL].", shown=f"{_HOME}, or as stored")
+    world_seed: int = option(1, "Seed of hills and trees.", ge=0)
+    trees_per_ha: float = option(60.0, "Trees per hectare.", "--trees", ge=0.0, le=1000.0)
+    hill_height_m: float = option(12.0, "Height of the hills [m].", "--hills", ge=0.0, le=300.0)
+    has_walls: bool = option(False, "Walls along the edges of the map.", "--walls")
+    host: str = option("127.0.0.1", "Address ground stations are sent to.")
+    bind: str = option("", "Address the vehicle's ports are open at. Default: loopback.")
+    tcp_port: int | None = option(None, "TCP port for clients that connect; ArduPilot's is 5760.", ge=1, le=65535)
+    has_to_sign: bool = option(False, "Refuse unsigned messages on this machine's links too.", "--require-signing")
+    gcs_port: int = option(GROUND_STATION_PORT, "UDP port of ground stations.", ge=1, le=65535)
+    api_port: int = option(OFFBOARD_PORT, "UDP port of the offboard API.", ge=1, le=65535)
+    stream_port: int = option(0, "HTTP port of the camera's live picture; 0: none.", ge=0, le=65535)
+    video_port: int | None = option(
+        None,
+        "UDP port of --host that the camera's video is sent to (H.264, RTP); 0: none.",
+        shown="5600, when a client starts the video",
+        ge=0,
+        le=65534,
+    )
+    has_view: bool = option(False, "Show the flight on a live page in the browser.", "--view")
+    view_port: int = option(8080, "HTTP port of the live page.", ge=1, le=65535)
+    owner: str | None = option(None, "Somebody with a phone walks through the world: walk or run; see companion.")
+    image_port: int = option(14600, "TCP port of the pictures for a companion, with an owner.", ge=1, le=65535)
+    parameters: tuple[str, ...] = option(
+        (), "Sets a parameter of the flight controller: NAME=VALUE. Repeatable.", "--param"
+    )
+    run_folder: Path | None = option(None, "Where logs go. Default: runs/DATE.")
+    state: Path | None = option(None, "Folder for what outlives the run: parameters, mission, fence, files, logs.")
+
+
+class FollowOptions(FlightOptions):
+    """The options of `honeyguide follow`, as given: those of `fly` that `FOLLOWED_WITH` names, some told otherwise."""
+
+    is_idle: bool = True
+    has_walls: bool = True
+    policy: str | None = option(
+        None, "A policy of FollowMe, or 'scripted'.", shown="the shipped one, or else 'scripted'"
+    )
+    owner: str = option("walk", "How the owner moves: walk (to 2 m/s) or run (to 5 m/s).")
+    seconds: float = option(60.0, "How long to follow; then it lands.", ge=1.0)
+    seed: int = option(0, "Seed of the owner's path, noise, turbulence.", ge=0, le=2**31 - 1)
+    trees_per_ha: float = option(100.0, "Trees per hectare.", "--trees", ge=0.0, le=1000.0)
+    hill_height_m: float = option(8.0, "Height of the hills [m]; trained on 8.", "--hills", ge=0.0, le=300.0)
+    airframe: str = option("x500", "Airframe name or TOML file; the policy was trained on x500.")
+    has_film: bool = option(True, "Film it afterwards: chase and onboard view.", "--mp4/--no-mp4")
+
+
+FOLLOWED_WITH = (
+    "policy", "owner", "seconds", "speed", "seed", "wind_m_s", "wind_from_deg", "noise", "world_seed", "trees_per_ha",
+    "hill_height_m", "airframe", "dialect", "parameters", "has_view", "view_port", "has_film", "gcs_port", "api_port",
+    "host", "run_folder",
+)  # fmt: skip
