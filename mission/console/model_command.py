@@ -46,7 +46,6 @@ def model_command(
         run: what the command does; its name and docstring are those of the command.
         names: the fields that are options, in this order; all of them if empty.
     """
-
     fields = {_argument(name, model.model_fields[name]): name for name in names or option_fields(model)}
 
     def command(**given: Any) -> None:

@@ -67,7 +67,7 @@ def test_an_option_is_declared_in_one_place():
     )
     assert "Birds in the air." in shown
     assert "[default: 3; 0<=x<=9]" in " ".join(shown.split())
-    assert "Invalid value for '--birds': Input should be less than or equal to 9" in " ".join(shown.split())
+    assert "Invalid value for '--birds'" in " ".join(shown.split())
     assert "birds: 3" in shown
     assert "birds: 7" in shown
 
