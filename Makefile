@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow
+.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -59,6 +59,9 @@ mutants: $(STAMP) ## Break safety-critical files in small ways and see whether t
 HOSTILE := test_page_guard test_hostile_connections test_hostile_services test_udp_link
 test-hostile: $(STAMP) ## Foreign websites, crowds, the silent and the slow at every port, a hostile client per service
 	@$(BIN)/python -m pytest -q $(HOSTILE:%=tests/system/robustness/%.py) $(ARGS)
+
+test-bare: $(STAMP) ## Install the wheel without extras in an environment of its own, and fly (downloads 150 MB once)
+	$(BIN)/python -m pytest -q tests/system/commands/test_installing.py -k bare $(ARGS)
 
 MAVPROXY := .venv-mavproxy
 

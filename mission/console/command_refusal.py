@@ -7,7 +7,9 @@ from typing import NoReturn
 import typer
 from rich.console import Console
 
-_LEARN_PACKAGES = {"av", "gymnasium", "h5py", "minari", "onnx", "onnxruntime", "pygame", "tensorboard", "torch", "yaml"}
+LEARN_PACKAGES = {
+    *("av", "filterpy", "gymnasium", "h5py", "minari", "onnx", "onnxruntime", "pygame", "tensorboard", "torch", "yaml"),
+}
 _ERRORS = Console(stderr=True, soft_wrap=True, highlight=False)
 
 
@@ -27,6 +29,6 @@ def learn_extra() -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        if error.name not in _LEARN_PACKAGES:
+        if error.name not in LEARN_PACKAGES:
             raise
         refuse(f"this needs {error.name}, which comes with the extra 'learn' (docs/start/installing.md)")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mission.console.command_refusal import LEARN_PACKAGES
 from tests.documents import PACKAGES as FOLDERS
 from tests.documents import ROOT
 
@@ -106,3 +107,7 @@ def test_what_is_declared_is_imported(extra):
 def test_each_package_says_that_it_is_typed(package):
     assert (ROOT / package / "py.typed").exists()
     assert "py.typed" in tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["*"]
+
+
+def test_a_missing_package_of_the_extra_learn_is_refused_in_a_sentence():
+    assert declared("learn") <= {NAMED_OTHERWISE.get(module, module) for module in LEARN_PACKAGES}

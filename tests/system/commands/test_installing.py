@@ -1,8 +1,9 @@
-"""The wheel holds all that a flight needs, and a plain install of it flies."""
+"""The wheel holds all that a flight needs, and a plain install of it flies, in a bare environment too."""
 
 import os
 import subprocess
 import sys
+import venv
 from pathlib import Path
 
 import pytest
@@ -10,14 +11,63 @@ import pytest
 ROOT = Path(__file__).parents[3]
 
 
+PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
+# Where what an extra brings is imported, when its commands are run.
+OF_EXTRAS = (
+    *("policies.", "mission.view.", "mission.train.", "mission.follow."),
+    *("autopilot.tuning", "autopilot.estimator.derive"),
+)
+IMPORT_ALL = """
+import importlib, pkgutil
+for package in ("common", "autopilot", "sim", "policies", "mission"):
+    for module in pkgutil.walk_packages(importlib.import_module(package).__path__, package + "."):
+        try:
+            importlib.import_module(module.name)
+        except ModuleNotFoundError:
+            print(module.name)
+"""
+
+
+def wheel_in(folder):
+    subprocess.run([sys.executable, *PIP, "wheel", "--no-deps", "--wheel-dir", folder, ROOT], check=True)
+    (wheel,) = folder.glob("honeyguide-*.whl")
+    return wheel
+
+
+@pytest.mark.slow
+def test_a_bare_environment_flies_and_imports_all_but_what_extras_bring(tmp_path):
+    """Downloads what a plain install needs, or takes it from pip's cache."""
+    venv.create(tmp_path / "bare", with_pip=True)
+    python = tmp_path / "bare" / "bin" / "python"
+    constraints = ["--constraint", ROOT / "constraints.txt"]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    subprocess.run([python, *PIP, "install", *constraints, wheel_in(tmp_path)], check=True, env=environment)
+
+    def run(*command):
+        return subprocess.run(
+            command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300
+        )
+
+    imports = run(python, "-c", IMPORT_ALL)
+    assert imports.returncode == 0, imports.stderr
+    assert not [module for module in imports.stdout.split() if not module.startswith(OF_EXTRAS)]
+    arguments = ("fly", "--once", "--speed", "max", "--seconds", "5", "--run-folder", "flight")
+    flight = run(python.with_name("honeyguide"), *arguments)
+    assert flight.returncode == 1, flight.stderr  # it ended before its mission
+    assert "mission not finished" in flight.stdout
+    assert (tmp_path / "flight" / "flight.ulg").stat().st_size > 100_000
+    for needs_extra in (("companion", "--policy", "scripted"), ("train", "Parking1"), ("play", "Parking1")):
+        refused = run(python.with_name("honeyguide"), *needs_extra)
+        assert refused.returncode == 2, refused.stderr
+        assert "the extra 'learn'" in refused.stderr
+
+
 @pytest.mark.slow
 def test_a_flight_from_the_wheel(tmp_path):
     """Another folder than the clone's, and nothing of the clone on the path."""
-    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
-    subprocess.run([*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", tmp_path, ROOT], check=True)
-    (wheel,) = tmp_path.glob("honeyguide-*.whl")
+    wheel = wheel_in(tmp_path)
     site = tmp_path / "site"
-    subprocess.run([*pip, "install", "--quiet", "--no-deps", "--target", site, wheel], check=True)
+    subprocess.run([sys.executable, *PIP, "install", "--no-deps", "--target", site, wheel], check=True)
     program = "import mission, sys; print(mission.__file__); from mission.cli import main; main()"
     result = subprocess.run(
         [sys.executable, "-P", "-c", program, "fly", "--once", "--speed", "max", "--run-folder", tmp_path / "flight"],
