@@ -66,19 +66,24 @@ SYSTEM_PARAMETERS: list[Parameter] = [
 ]
 
 
+def parameter_sections(vehicle: VehicleClass = MULTIROTOR) -> dict[str, Sequence[Parameter]]:
+    """Every declaration of the flight controller of a class of vehicles, by the headings of the page of parameters."""
+    return {
+        "Estimator": ESTIMATOR_PARAMETERS,
+        "Control": vehicle.parameters,
+        "Arming, landing detection, failsafes": COMMANDER_PARAMETERS,
+        "Take-off, missions, return, landing": NAVIGATOR_PARAMETERS,
+        "The pilot's sticks": STICK_PARAMETERS,
+        "Other aircraft": TRAFFIC_PARAMETERS,
+        "Obstacles": OBSTACLE_PARAMETERS,
+        "Positions from outside": EXTERNAL_PARAMETERS,
+        "System, and what ground stations ask for": SYSTEM_PARAMETERS,
+    }
+
+
 def all_parameters(vehicle: VehicleClass = MULTIROTOR) -> list[Parameter]:
     """Every declaration of the flight controller of a class of vehicles."""
-    return [
-        *SYSTEM_PARAMETERS,
-        *ESTIMATOR_PARAMETERS,
-        *vehicle.parameters,
-        *COMMANDER_PARAMETERS,
-        *NAVIGATOR_PARAMETERS,
-        *STICK_PARAMETERS,
-        *TRAFFIC_PARAMETERS,
-        *OBSTACLE_PARAMETERS,
-        *EXTERNAL_PARAMETERS,
-    ]
+    return [item for section in parameter_sections(vehicle).values() for item in section]
 
 
 def _of_airframe(item: Parameter, value: int | float) -> Parameter:

@@ -4,16 +4,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
-from autopilot.commander.params import COMMANDER_PARAMETERS
-from autopilot.estimator.params import ESTIMATOR_PARAMETERS
-from autopilot.inputs.obstacles import OBSTACLE_PARAMETERS
-from autopilot.inputs.stick_params import STICK_PARAMETERS
-from autopilot.inputs.traffic import TRAFFIC_PARAMETERS
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.ardupilot_aliases import CONSTANTS
-from autopilot.navigator.params import NAVIGATOR_PARAMETERS
-from autopilot.params import SYSTEM_PARAMETERS, parameter_table
-from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
+from autopilot.params import parameter_sections, parameter_table
 from common.airframe import load_airframe
 from common.params import Parameter
 from docs.generate.mavlink_page import mavlink_text
@@ -23,16 +16,6 @@ from mission.flight import Flight, FlightConfig
 from mission.simulator.simulator_params import simulator_parameters
 
 REFERENCE = Path(__file__).parents[1] / "reference"
-SECTIONS = {
-    "Estimator": ESTIMATOR_PARAMETERS,
-    "Control": CONTROL_PARAMETERS,
-    "Arming, landing detection, failsafes": COMMANDER_PARAMETERS,
-    "Take-off, missions, return, landing": NAVIGATOR_PARAMETERS,
-    "The pilot's sticks": STICK_PARAMETERS,
-    "Other aircraft": TRAFFIC_PARAMETERS,
-    "Obstacles": OBSTACLE_PARAMETERS,
-    "System, and what ground stations ask for": SYSTEM_PARAMETERS,
-}
 HEADER = """# Parameters
 
 Written by `python -m docs.generate` from the declarations: do not edit.
@@ -67,7 +50,10 @@ nothing can only be read.
 def parameters_text() -> str:
     """The whole page."""
     x500 = parameter_table(load_airframe("x500")).declarations
-    sections = [f"## {title}\n\n{_table(x500[item.name] for item in declared)}" for title, declared in SECTIONS.items()]
+    sections = [
+        f"## {title}\n\n{_table(x500[item.name] for item in declared)}"
+        for title, declared in parameter_sections().items()
+    ]
     config = FlightConfig()
     simulator = simulator_parameters(load_airframe(config.airframe), config.home, config.wind_m_s, config.wind_from_deg)
     ardupilot = [ARDUPILOT_HEADER + _table(ARDUPILOT_PARAMETERS), SIMULATOR_HEADER + _table(simulator)]

@@ -10,8 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from bench.figures import RESULTS, with_figures
+from common.airframe import load_airframe
 from docs.generate import generated_pages
 from mission.cli import app
+from mission.flight_config import FlightConfig, flight_parameters
 from policies.learn.config.command_line import flags
 from tests.documents import PACKAGES, ROOT, anchors, blocks, commands, links, pages, references
 
@@ -218,6 +220,15 @@ def test_reference_links_are_defined_and_used():
 def test_generated_pages_are_current():
     for path, text in generated_pages().items():
         assert path.read_text(encoding="utf-8") == text, "python -m docs.generate"
+
+
+def test_the_page_of_parameters_has_every_one_that_a_vehicle_has():
+    """As the vehicle lists them over MAVLink, in both dialects."""
+    page = PAGES["docs/reference/parameters.md"].read_text(encoding="utf-8").partition("## Names in the")[0]
+    described = set(re.findall(r"^\| (\w+) \|", page, re.MULTILINE))
+    for dialect in ("px4", "ardupilot"):
+        config = FlightConfig(dialect=dialect)
+        assert set(flight_parameters(config, load_airframe(config.airframe)).declarations) <= described
 
 
 SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options are described, if there are several
