@@ -107,7 +107,7 @@ class Commander:
         sample = state.samples.battery
         battery.update(sample.time_us, sample.voltage_v, sample.current_a)
         battery.count_on(state.time_us)
-        self._watch.judge_battery()
+        self._watch.judge_battery(sample.voltage_v)
         if state.home is None and self.has_position and state.estimate.pos_h_std <= self._eph:
             self.home.set_here(self._lift_d if state.is_flying else nan)  # without a compass it is known in flight only
         if state.landed_state is LandedState.ON_GROUND:

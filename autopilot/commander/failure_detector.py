@@ -153,7 +153,7 @@ class FailureWatch:
             self._slow = self._slow_failures(is_flying)
         return failures | self._slow
 
-    def judge_battery(self) -> None:
+    def judge_battery(self, voltage_v: float) -> None:
         """Renews the level of the charge; armed or not."""
         remaining = self._battery.remaining
         state = self._state
@@ -166,7 +166,7 @@ class FailureWatch:
                 level = BatteryLevel.CRITICAL
             if remaining < self._battery_emergency:
                 level = BatteryLevel.EMERGENCY
-        state.battery_level = max(level, self._voltage.level(state.time_us, float(state.samples.battery.voltage_v)))
+        state.battery_level = max(level, self._voltage.level(state.time_us, voltage_v))
 
     @property
     def misses_station(self) -> bool:

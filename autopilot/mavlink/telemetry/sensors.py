@@ -104,15 +104,13 @@ def gps_raw_int(state: VehicleState) -> bytes | None:
 def highres_imu(state: VehicleState) -> bytes:
     """Gyroscope, accelerometer, magnetometer and barometer as they are."""
     samples = state.samples
-    baro = samples.baro
-    updated = (
-        _ACCEL_GYRO_BITS | (_MAG_BITS if samples.mag.time_us else 0) | (_PRESSURE_BITS if samples.baro.time_us else 0)
-    )
+    imu, mag, baro = samples.imu, samples.mag, samples.baro
+    updated = _ACCEL_GYRO_BITS | (_MAG_BITS if mag.time_us else 0) | (_PRESSURE_BITS if baro.time_us else 0)
     return _highres_imu(
-        samples.imu.time_us,
-        *samples.imu.accel_frd,
-        *samples.imu.gyro_frd,
-        *samples.mag.field_frd_gauss,
+        imu.time_us,
+        *imu.accel_frd,
+        *imu.gyro_frd,
+        *mag.field_frd_gauss,
         baro.pressure_pa / 100.0,
         0.0,
         pressure_altitude_m(baro.pressure_pa),
