@@ -97,6 +97,7 @@ class Rig:
         self._commands: dict[int, list[Any]] = {}
         self._kernel = self._kernels.advance if has_estimator else self._kernels.advance_by_truth
         self._workers = Workers(vehicle_count, threads)
+        self.compose()
         self.boot()
 
     @property
@@ -150,6 +151,9 @@ class Rig:
         marks = wp.array(mask, dtype=int, device=self.device)
         self.boot_marked(marks)
         self.rows.fetch()
+
+    def compose(self) -> None:
+        """Makes what else the loop is composed of, before the first boot: nothing, where it is one launch."""
 
     def boot_marked(self, marks: Any) -> None:
         """Boots the vehicles whose mark is not 0; marks: array of int, (vehicles,)."""

@@ -77,6 +77,14 @@ def count_on(ticks: wp.array(dtype=wp.int64)) -> None:
     ticks[i] = ticks[i] + wp.int64(1)
 
 
+@wp.kernel(enable_backward=False)
+def forget_commands(is_chosen: wp.array(dtype=int), commands: wp.array(dtype=vec8)) -> None:
+    """A board that has just been powered on commands nothing."""
+    i = wp.tid()
+    if is_chosen[i] != 0:
+        commands[i] = vec8()
+
+
 class SteppedRig(Rig):
     """A rig whose bodies an engine moves and whose vehicles a board flies.
 
@@ -93,22 +101,25 @@ class SteppedRig(Rig):
         board: Callable[[Rig], Board] = OwnBoard,
         **options: Any,
     ) -> None:
+        self._make_engine, self._make_board = engine, board
         super().__init__(*arguments, **options)
+
+    def compose(self) -> None:
         count, device = self.vehicle_count, self.device
         self._samples = wp.zeros(count, dtype=Samples, device=device)
         self._board_commands = wp.zeros(count, dtype=vec8, device=device)
         self._commands = wp.zeros(count, dtype=vec8, device=device)
         self._wind_ned = wp.zeros(count, dtype=wp.vec3, device=device)
-        self._engine, self._board = engine(self), board(self)
-        self.boot()
+        self._engine, self._board = self._make_engine(self), self._make_board(self)
 
     def boot_marked(self, marks: Any) -> None:
-        if not hasattr(self, "_engine"):  # they are made for a rig that has booted
-            super().boot_marked(marks)
-            return
         self._engine.boot(marks)
         self.power_on(marks)
+
+    def power_on(self, marks: Any) -> None:
+        super().power_on(marks)
         self._board.boot(marks)
+        self._launch(forget_commands, [marks, self._board_commands])
 
     def prepare(self, tick_count: int) -> list[Any]:  # noqa: ARG002  (any number of ticks is the same launches)
         return []

@@ -20,7 +20,7 @@ class OwnBoard:
         self._kernel = autopilot_kernels(rig.law).run
 
     def boot(self, is_chosen: Any) -> None:
-        self._rig.power_on(is_chosen)
+        """Its rows are the rig's, which has powered them on."""
 
     def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (it is not told the truth)
         arrays = self._rig.arrays

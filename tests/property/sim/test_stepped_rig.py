@@ -91,6 +91,19 @@ def test_rows_of_a_device_that_the_host_cannot_see_are_the_same():
     assert same_bits([plain.rows["truth"]], [mirrored.rows["truth"]])
 
 
+def test_a_reboot_in_flight_is_the_same_on_both_rigs():
+    rigs = rig(Rig), rig(SteppedRig)
+    for each in rigs:
+        rows = each.rows["autopilot.setpoint"]
+        rows["is_armed"], rows["kind"], rows["thrust"] = 1, 3, 0.8
+        for _ in range(50):
+            each.advance(FRAME_TICKS)
+        each.reboot(1)
+        each.advance(1)
+    assert rigs[0].truth.numpy()["motor_speed"][1, 0] > 100.0  # they still turn, and nothing drives them
+    assert same_bits(*(each.snapshot() for each in rigs))
+
+
 def test_an_engine_that_holds_everything_still_lets_nothing_fly():
     """The negative control: with another engine the loop is another."""
 
