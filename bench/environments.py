@@ -45,7 +45,7 @@ def measure() -> list[Row]:
 
 def random_actions(task: Task, rng: np.random.Generator) -> tuple[Any, Any]:
     """Continuous and discrete actions for all environments."""
-    continuous = rng.uniform(-1.0, 1.0, task.border.continuous.shape).astype(np.float32)
+    continuous = rng.uniform(-1.0, 1.0, task.buffers.continuous.shape).astype(np.float32)
     sizes = task.layout.branch_sizes
     branches = rng.integers(sizes, size=(task.env_count, len(sizes))) if sizes else np.zeros((task.env_count, 0))
     return continuous, branches.astype(np.int32)
@@ -56,7 +56,7 @@ def _batch_rate(name: str, settings: Mapping[str, Any]) -> float:
     task.reset(0)
     rng = np.random.default_rng(0)
     sets = [random_actions(task, rng) for _ in range(ACTION_SETS)]
-    continuous, branches = task.border.continuous.numpy(), task.border.branches.numpy()
+    continuous, branches = task.buffers.continuous.numpy(), task.buffers.branches.numpy()
 
     def cpu_s() -> float:
         start = time.process_time()
@@ -66,7 +66,7 @@ def _batch_rate(name: str, settings: Mapping[str, Any]) -> float:
         return time.process_time() - start
 
     rate = ENVS * STEPS / best_of(5, cpu_s)
-    require(np.isfinite(task.border.observations.numpy()).all(), f"{name}: an observation is not finite")
+    require(np.isfinite(task.buffers.observations.numpy()).all(), f"{name}: an observation is not finite")
     require(task.take_scores().episode_count > 0, f"{name}: no episode ended")
     return rate
 

@@ -110,10 +110,10 @@ def fly(policy: Policy, task: Navigate) -> Flights:
             for i, path in enumerate(paths):
                 if outcomes[i] == Outcome.RUNNING:
                     path.append(pos_ned[i, :2].astype(np.float64))
-            actions, memory = policy.act(tensors.seen, memory, None)
+            actions, memory = policy.act(tensors.observation, memory, None)
             tensors.step(policy.bounded(actions), actions.branches)
-            ended = (outcomes == Outcome.RUNNING) & (task.border.outcomes.numpy() != Outcome.RUNNING)
-            outcomes[ended] = task.border.outcomes.numpy()[ended]
+            ended = (outcomes == Outcome.RUNNING) & (task.buffers.outcomes.numpy() != Outcome.RUNNING)
+            outcomes[ended] = task.buffers.outcomes.numpy()[ended]
             measures[ended] = task.measures.numpy()[ended]
             if (outcomes != Outcome.RUNNING).all():
                 break

@@ -104,8 +104,8 @@ def _theirs(reach_m: float, goals: int) -> Act:
     model.learn(STEPS)
 
     def act(observations: np.ndarray) -> np.ndarray:
-        seen = _split(observations) if goals else observations
-        return np.asarray(model.predict(seen, deterministic=True)[0])
+        observation = _split(observations) if goals else observations
+        return np.asarray(model.predict(observation, deterministic=True)[0])
 
     return act
 
@@ -116,7 +116,7 @@ def _success_rate(act: Act, reach_m: float) -> float:
     task.set_numbers({"reach_m": reach_m, "step_limit": 100.0})
     task.reset(7)
     for _ in range(400):
-        task.border.continuous.numpy()[:] = act(task.border.observations.numpy().copy())
+        task.buffers.continuous.numpy()[:] = act(task.buffers.observations.numpy().copy())
         task.step()
     scores = task.take_scores()
     return scores.count(Outcome.SUCCESS) / scores.episode_count

@@ -48,7 +48,7 @@ def drive(task: Task, action: tuple[float, float, float], seconds: float) -> Arr
     world: Any = task.world  # type: ignore[attr-defined]
     rows = []
     for _ in range(round(seconds / DECISION_S)):
-        task.border.continuous.assign(np.tile(np.array(action, np.float32), (task.env_count, 1)))
+        task.buffers.continuous.assign(np.tile(np.array(action, np.float32), (task.env_count, 1)))
         task.step()
         rows.append(np.concatenate([world.pos.numpy()[0], world.vel.numpy()[0]]))
     return np.array(rows)

@@ -129,7 +129,7 @@ SPARSE = (
 )
 
 
-def _seen(name: str, title: str, document: str, settings: dict[str, Any], changes: dict[str, Any]) -> Experiment:
+def _observation(name: str, title: str, document: str, settings: dict[str, Any], changes: dict[str, Any]) -> Experiment:
     """Parking 1 as the document's car sees it: unit vectors, no range, no speed."""
     settings = {"observation": "as-documented", **settings}
     changes = {"behavior.max_steps": 3_000_000, "behavior.success_target": None, **changes}
@@ -137,9 +137,9 @@ def _seen(name: str, title: str, document: str, settings: dict[str, Any], change
 
 
 MEMORY = (
-    _seen("parking1-seen", "document's observation, feed-forward", "13 % (PPO), 92 % (GAIL)", {}, {}),
-    _seen("parking1-seen-stack", "the same, last three stacked", "", {"stack": 3}, {}),
-    _seen(
+    _observation("parking1-seen", "document's observation, feed-forward", "13 % (PPO), 92 % (GAIL)", {}, {}),
+    _observation("parking1-seen-stack", "the same, last three stacked", "", {"stack": 3}, {}),
+    _observation(
         "parking1-seen-lstm",
         "the same, LSTM",
         "good for one spot; no LSTM was built",

@@ -54,7 +54,7 @@ def _fly(policy: Policy, task: FollowMe, cell: Cell) -> tuple[list[Track], float
     memory = policy.start_memory(task.env_count)
     with torch.inference_mode():
         while not recording.is_complete:
-            actions, memory = policy.act(tensors.seen, memory)
+            actions, memory = policy.act(tensors.observation, memory)
             tensors.step(policy.bounded(actions), actions.branches)
             recording.record()
             is_over = tensors.is_terminated | tensors.is_truncated

@@ -16,7 +16,7 @@ from policies.companion.names import SCRIPTED, TASK
 from policies.experts.follower import ScriptedFollower
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
 from policies.shirt_detector import chest_hfrd
 from policies.tasks.flight.own_state import ACTIONS
@@ -72,8 +72,8 @@ class LearnedPilot:
 
     def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:
         with torch.inference_mode():
-            seen = Seen(torch.from_numpy(vector)[None], torch.from_numpy(image)[None])
-            actions, self._memory, beliefs = self._policy.act_and_believe(seen, self._memory)
+            observation = Observation(torch.from_numpy(vector)[None], torch.from_numpy(image)[None])
+            actions, self._memory, beliefs = self._policy.act_and_believe(observation, self._memory)
             bounded: Floats = self._policy.bounded(actions)[0].numpy()
         if self._belief is not None and beliefs is not None:
             self.owner_hfrd = self._belief.place(beliefs)

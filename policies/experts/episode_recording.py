@@ -55,9 +55,9 @@ class Recorder:
 
     def note(self) -> None:
         """Takes down what is seen and what will be done; to be called between acting and stepping."""
-        border = self._task.border
+        buffers = self._task.buffers
         seen, pushed, chosen = (
-            array.numpy().copy() for array in (border.observations, border.continuous, border.branches)
+            array.numpy().copy() for array in (buffers.observations, buffers.continuous, buffers.branches)
         )
         for i, row in enumerate(self._rows):
             row.observations.append(seen[i])
@@ -66,8 +66,8 @@ class Recorder:
 
     def ended(self) -> list[tuple[int, Episode]]:
         """The rows whose episode ended with the last step, and those episodes; to be called after stepping."""
-        border = self._task.border
-        rewards, outcomes = border.rewards.numpy().copy(), border.outcomes.numpy()
+        buffers = self._task.buffers
+        rewards, outcomes = buffers.rewards.numpy().copy(), buffers.outcomes.numpy()
         for i, row in enumerate(self._rows):
             row.rewards.append(rewards[i])
         return [(int(i), self._taken(int(i), Outcome(int(outcomes[i])))) for i in np.flatnonzero(outcomes)]
@@ -79,14 +79,14 @@ class Recorder:
     def _taken(self, i: int, outcome: Outcome) -> Episode:
         row = self._rows[i]
         self.drop(i)
-        final = self._task.border.final_observations.numpy()[i]
+        final = self._task.buffers.final_observations.numpy()[i]
         return Episode(
             observations=np.stack([*row.observations, final]).astype(np.float32),
             continuous=np.stack(row.continuous).astype(np.float32),
             branches=np.stack(row.branches).astype(np.int64),
             rewards=np.array(row.rewards, dtype=np.float64),
             outcome=outcome,
-            is_truncated=bool(self._task.border.is_truncated.numpy()[i]),
+            is_truncated=bool(self._task.buffers.is_truncated.numpy()[i]),
         )
 
 

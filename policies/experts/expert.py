@@ -1,8 +1,8 @@
 """What drives a task without having learned it: a scripted expert, a person at a keyboard, or chance.
 
-An expert writes the next actions of all rows into the task's border. It is a teacher: it may look at the task's world
+An expert writes the next actions of all rows into the task's buffers. It is a teacher: it may look at the task's world
 (`task.world`, the numbers of each row), not only at what a policy observes. What it plans for an episode it keeps by
-row, and drops when `border.episodes` shows that the row has begun another.
+row, and drops when `buffers.episodes` shows that the row has begun another.
 """
 
 from typing import Any, Protocol
@@ -17,7 +17,7 @@ class Expert(Protocol):
     """Whoever chooses the actions."""
 
     def act(self, task: Task) -> None:
-        """Writes the actions of every row into `task.border.continuous` or `task.border.branches`."""
+        """Writes the actions of every row into `task.buffers.continuous` or `task.buffers.branches`."""
 
 
 class RandomDriver:
@@ -28,11 +28,11 @@ class RandomDriver:
 
     def act(self, task: Task) -> None:
         if task.layout.continuous:
-            task.border.continuous.assign(self._rng.uniform(-1.0, 1.0, task.border.continuous.shape))
+            task.buffers.continuous.assign(self._rng.uniform(-1.0, 1.0, task.buffers.continuous.shape))
         for k, size in enumerate(task.layout.branch_sizes):
-            choices = task.border.branches.numpy()
+            choices = task.buffers.branches.numpy()
             choices[:, k] = self._rng.integers(size, size=task.env_count)
-            task.border.branches.assign(choices)
+            task.buffers.branches.assign(choices)
 
 
 class NewEpisodes:
@@ -44,8 +44,8 @@ class NewEpisodes:
 
     def rows(self, task: Task) -> NDArray[np.intp]:
         """The rows that are in another episode than at the last call; at the first, all of them."""
-        episodes: NDArray[Any] = task.border.episodes.numpy()
-        seed = int(task.border.seed.numpy()[0])
+        episodes: NDArray[Any] = task.buffers.episodes.numpy()
+        seed = int(task.buffers.seed.numpy()[0])
         is_other = seed != self._seed or len(self._seen) != len(episodes)
         rows = np.arange(len(episodes)) if is_other else np.flatnonzero(episodes != self._seen)
         self._seen, self._seed = episodes.copy(), seed

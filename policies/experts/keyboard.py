@@ -73,10 +73,10 @@ class KeyboardDriver:
         """Writes the actions."""
         if self._axes:
             values = np.array([self._value(axis) for axis in self._axes], dtype=np.float32)
-            task.border.continuous.assign(np.tile(values, (task.env_count, 1)))
+            task.buffers.continuous.assign(np.tile(values, (task.env_count, 1)))
         if self._branches:
             chosen = np.array([self._chosen(choices) for choices in self._branches], dtype=np.int32)
-            task.border.branches.assign(np.tile(chosen, (task.env_count, 1)))
+            task.buffers.branches.assign(np.tile(chosen, (task.env_count, 1)))
 
     def _value(self, axis: _Axis) -> float:
         pull = float(axis.up in self.held) - float(axis.down in self.held)

@@ -189,7 +189,7 @@ class Parking2Expert:
 def _blocks(task: level1.Parking1) -> Any:
     blocks = level1.Blocks()
     blocks.poses = task.blocks
-    blocks.numbers = typed_rows(task.border.numbers, Level1Numbers, first=len(CAR_NUMBERS))
+    blocks.numbers = typed_rows(task.buffers.numbers, Level1Numbers, first=len(CAR_NUMBERS))
     return blocks
 
 
@@ -197,7 +197,7 @@ def _movers_and_places(task: level2.Parking2) -> tuple[Any, Any]:
     movers = level2.Movers()
     movers.poses = task.movers
     movers.touching = wp.zeros((task.env_count, 2), dtype=int, device=task.device)  # not looked at by `scene_of`
-    movers.numbers = typed_rows(task.border.numbers, Level2Numbers, first=len(CAR_NUMBERS))
+    movers.numbers = typed_rows(task.buffers.numbers, Level2Numbers, first=len(CAR_NUMBERS))
     places = level2.Level2Places()
     places.portals = wp.mat44(*np.vstack([*(pose(place) for place in PORTAL_PLACES), np.zeros((2, 4))]).ravel())
     return movers, places
@@ -206,4 +206,4 @@ def _movers_and_places(task: level2.Parking2) -> tuple[Any, Any]:
 def _launch(task: Task, fill: Any, act: Any, rows: Any, inputs: list[Any]) -> None:
     if len(rows):
         wp.launch(fill, len(rows), [wp.array(rows, dtype=int, device=task.device), *inputs], device=task.device)
-    wp.launch(act, task.env_count, [task.border.branches, *inputs], device=task.device)
+    wp.launch(act, task.env_count, [task.buffers.branches, *inputs], device=task.device)

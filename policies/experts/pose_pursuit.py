@@ -71,7 +71,7 @@ class PosePursuitExpert:
     def act(self, task: Task) -> None:
         """Writes the actions of every row."""
         world: Any = task.world  # type: ignore[attr-defined]
-        columns = task.border.numbers.numpy().T.astype(float)
+        columns = task.buffers.numbers.numpy().T.astype(float)
         numbers = dict(zip(task.number_table.names, columns, strict=True))
         for i in self._new.rows(task):
             self._routes.pop(int(i), None)
@@ -94,7 +94,7 @@ class PosePursuitExpert:
             )
             goal = _shifted(goals[i], -half_base)
             actions[i] = self._driven(i, car, goal, float(numbers["half_platform_m"][i]) - _MARGIN_M)
-        task.border.continuous.assign(actions)
+        task.buffers.continuous.assign(actions)
 
     def _driven(self, i: int, car: _Car, goal: Array, room_m: float) -> tuple[float, float, float]:
         """Steering, throttle and brake of a row."""

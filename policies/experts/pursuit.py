@@ -65,12 +65,12 @@ class PursuitExpert:
         is_braking = accel * view.speed < 0.0
         throttle = np.where(is_braking, 0.0, np.clip(accel / view.accel_max, -0.6, 0.6))  # more only spins the wheels
         brake = np.where(is_braking, np.clip(np.abs(accel) / view.decel_max, 0.0, 1.0), -1.0)
-        task.border.continuous.assign(np.stack([steer, throttle, brake], axis=1).astype(np.float32))
+        task.buffers.continuous.assign(np.stack([steer, throttle, brake], axis=1).astype(np.float32))
 
 
 def _view(task: Task) -> _View:
     world: Any = task.world  # type: ignore[attr-defined]
-    numbers = dict(zip(task.number_table.names, task.border.numbers.numpy().T, strict=True))
+    numbers = dict(zip(task.number_table.names, task.buffers.numbers.numpy().T, strict=True))
     x, y, z, w = world.q.numpy().T
     nose = np.stack([2.0 * (x * z + w * y), 1.0 - 2.0 * (x * x + y * y)], axis=1)  # x and z of the car's forward axis
     nose /= np.linalg.norm(nose, axis=1, keepdims=True)

@@ -17,8 +17,8 @@ class RollerBallExpert:
     def act(self, task: Task) -> None:
         world: Any = task.world  # type: ignore[attr-defined]
         names = task.number_table.names
-        numbers = task.border.numbers.numpy()
+        numbers = task.buffers.numbers.numpy()
         away = world.target.numpy() - world.pos.numpy()
         accel = (_PULL * away - _DAMPING * world.vel.numpy())[:, [0, 2]]
         unit_accel = numbers[:, names.index("force_n")] / (numbers[:, names.index("mass_kg")] * _ROLLING)
-        task.border.continuous.assign(np.clip(accel / unit_accel[:, None], -1.0, 1.0).astype(np.float32))
+        task.buffers.continuous.assign(np.clip(accel / unit_accel[:, None], -1.0, 1.0).astype(np.float32))

@@ -104,7 +104,7 @@ def _play(
     memory = policy.start_memory(task.env_count)
     with torch.inference_mode():
         while not tally.is_complete:
-            actions, memory = policy.act(tensors.seen, memory, generator)
+            actions, memory = policy.act(tensors.observation, memory, generator)
             tensors.step(policy.bounded(actions), actions.branches)
             is_over, is_cut = tally.count(tensors.rewards.cpu().numpy(), tensors.outcomes.cpu().numpy())
             memory = memory.masked_fill(torch.from_numpy(is_over).to(memory.device)[:, None], 0.0)

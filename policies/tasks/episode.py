@@ -1,11 +1,11 @@
-"""What every task's kernel shares: the border to the learner, and the book-keeping of steps and episodes.
+"""What every task's kernel shares: the buffers exchanged with the learner, and the book-keeping of steps and episodes.
 
-A task's step kernel, one thread per environment, reads its action from the border, moves the world, and then:
+A task's step kernel, one thread per environment, reads its action from the buffers, moves the world, and then:
 
-    at = open_frame(border, i)                       # older frames shift; the newest is written from column `at`
-    ... border.observations[i, at + k] = ...
-    if close_step(border, i, reward, outcome):       # the episode ended: what it saw last is kept, a new one begins
-        begin_episode(border, i)                     # draws the numbers of the new episode
+    at = open_frame(buffers, i)                       # older frames shift; the newest is written from column `at`
+    ... buffers.observations[i, at + k] = ...
+    if close_step(buffers, i, reward, outcome):       # the episode ended: what it saw last is kept, a new one begins
+        begin_episode(buffers, i)                     # draws the numbers of the new episode
         ... place the vehicle, write the first frame
 
 so that one launch is one decision of all environments, resets included (Gymnasium's same-step auto-reset). A task that
@@ -51,7 +51,7 @@ _LENGTH_SCORE = wp.constant(OUTCOME_COUNT + 1)
 
 
 @wp.struct
-class Border:
+class StepBuffers:
     """What learner and task exchange; one row per environment."""
 
     continuous: wp.array2d(dtype=float)  # in: [-1, 1], (envs, continuous actions)
@@ -77,64 +77,64 @@ class Border:
 
 
 @wp.func
-def open_frame(border: Border, i: int) -> int:
+def open_frame(buffers: StepBuffers, i: int) -> int:
     """Shifts the stacked frames by one and returns the column where the newest begins."""
-    size = border.frame_size
-    older = border.observations.shape[1] - size
+    size = buffers.frame_size
+    older = buffers.observations.shape[1] - size
     for k in range(older):
-        border.observations[i, k] = border.observations[i, k + size]
+        buffers.observations[i, k] = buffers.observations[i, k + size]
     return older
 
 
 @wp.func
-def close_step(border: Border, i: int, reward: float, outcome: int) -> bool:
+def close_step(buffers: StepBuffers, i: int, reward: float, outcome: int) -> bool:
     """Books one decision; true if the episode ended with it. What it saw last must have been written before."""
-    border.rewards[i] = reward
-    border.outcomes[i] = outcome
-    border.returns[i] += reward
-    border.steps[i] += 1
+    buffers.rewards[i] = reward
+    buffers.outcomes[i] = outcome
+    buffers.returns[i] += reward
+    buffers.steps[i] += 1
     is_over = outcome != RUNNING
-    border.is_truncated[i] = outcome == TIMEOUT
-    border.is_terminated[i] = is_over and outcome != TIMEOUT
+    buffers.is_truncated[i] = outcome == TIMEOUT
+    buffers.is_terminated[i] = is_over and outcome != TIMEOUT
     if is_over:
-        for k in range(border.observations.shape[1]):
-            border.final_observations[i, k] = border.observations[i, k]
-        for k in range(border.privileged.shape[1]):
-            border.final_privileged[i, k] = border.privileged[i, k]
-        border.scores[i, outcome] += 1.0
-        border.scores[i, _RETURN_SCORE] += border.returns[i]
-        border.scores[i, _LENGTH_SCORE] += float(border.steps[i])
+        for k in range(buffers.observations.shape[1]):
+            buffers.final_observations[i, k] = buffers.observations[i, k]
+        for k in range(buffers.privileged.shape[1]):
+            buffers.final_privileged[i, k] = buffers.privileged[i, k]
+        buffers.scores[i, outcome] += 1.0
+        buffers.scores[i, _RETURN_SCORE] += buffers.returns[i]
+        buffers.scores[i, _LENGTH_SCORE] += float(buffers.steps[i])
     return is_over
 
 
 @wp.func
-def close_step_in_time(border: Border, i: int, reward: float, outcome: int) -> bool:
+def close_step_in_time(buffers: StepBuffers, i: int, reward: float, outcome: int) -> bool:
     """As `close_step`, of a task whose success is to last until time is up: that end is a truncation as well."""
-    is_over = close_step(border, i, reward, outcome)
+    is_over = close_step(buffers, i, reward, outcome)
     if outcome == SUCCESS:
-        border.is_truncated[i] = True
-        border.is_terminated[i] = False
+        buffers.is_truncated[i] = True
+        buffers.is_terminated[i] = False
     return is_over
 
 
 @wp.func
-def begin_episode(border: Border, i: int) -> int:
+def begin_episode(buffers: StepBuffers, i: int) -> int:
     """Clears the row for a new episode, draws its numbers and returns its index, which keys its draws."""
-    episode = border.episodes[i]
-    border.episodes[i] = episode + 1
-    border.steps[i] = 0
-    border.returns[i] = 0.0
-    for k in range(border.observations.shape[1]):
-        border.observations[i, k] = 0.0
-    draw_numbers(border.samplers, border.numbers, border.seed[0], i, episode)
+    episode = buffers.episodes[i]
+    buffers.episodes[i] = episode + 1
+    buffers.steps[i] = 0
+    buffers.returns[i] = 0.0
+    for k in range(buffers.observations.shape[1]):
+        buffers.observations[i, k] = 0.0
+    draw_numbers(buffers.samplers, buffers.numbers, buffers.seed[0], i, episode)
     return episode
 
 
 @wp.kernel(enable_backward=False)
-def keep_last_image_rows(border: Border) -> None:
+def keep_last_image_rows(buffers: StepBuffers) -> None:
     """Copies one row of pixels of each image whose episode ended with this decision; one thread each."""
     i, y = wp.tid()
-    if border.outcomes[i] != RUNNING:
-        for x in range(border.images.shape[2]):
-            for c in range(border.images.shape[3]):
-                border.final_images[i, y, x, c] = border.images[i, y, x, c]
+    if buffers.outcomes[i] != RUNNING:
+        for x in range(buffers.images.shape[2]):
+            for c in range(buffers.images.shape[3]):
+                buffers.final_images[i, y, x, c] = buffers.images[i, y, x, c]

@@ -5,7 +5,7 @@
 
 Keyword arguments are the task's settings. Of a task that shows images an observation is a dict of `image` and `vector`.
 `info["outcome"]` names how an episode ended. Arrays that are returned are copies; whoever wants none takes a `Task` and
-its border.
+its buffers.
 """
 
 from typing import Any
@@ -50,7 +50,7 @@ class TaskEnv(gymnasium.Env[Observation, Any]):
         elif not self._is_next_begun:  # to begin it again would lose what a task carries over from the last episode
             self.task.begin(np.ones(1, dtype=np.bool_))
         self._is_next_begun = False
-        return self._views.seen(0), {}
+        return self._views.observation(0), {}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One decision. What ends an episode begins the next; `reset` shows it."""
@@ -59,7 +59,7 @@ class TaskEnv(gymnasium.Env[Observation, Any]):
         is_over = self._is_next_begun = bool(views.is_terminated[0] or views.is_truncated[0])
         info = {"outcome": Outcome(int(views.outcomes[0])).name.lower()} if is_over else {}
         return (
-            views.seen(0, is_final=is_over),
+            views.observation(0, is_final=is_over),
             float(views.rewards[0]),
             bool(views.is_terminated[0]),
             bool(views.is_truncated[0]),
@@ -95,7 +95,7 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
         """Starts an episode of every environment; `options` are not used."""
         super().reset(seed=seed, options=options)
         self._views.reset(int(self.np_random.integers(2**31)))
-        return self._views.seen(), {}
+        return self._views.observation(), {}
 
     def step(self, actions: Array) -> tuple[Observation, Array, Array, Array, dict[str, Any]]:
         """One decision each; `final_obs` of the info holds what the ended episodes saw last."""
@@ -104,10 +104,10 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
         is_over = views.is_terminated | views.is_truncated
         info: dict[str, Any] = {}
         if is_over.any():
-            info = {"final_obs": views.seen(is_final=True), "_final_obs": is_over}
+            info = {"final_obs": views.observation(is_final=True), "_final_obs": is_over}
             info |= {"outcome": views.outcomes.copy(), "_outcome": is_over}
         rewards = views.rewards.astype(np.float64)
-        return views.seen(), rewards, views.is_terminated.copy(), views.is_truncated.copy(), info
+        return views.observation(), rewards, views.is_terminated.copy(), views.is_truncated.copy(), info
 
     def render(self) -> Any:
         """A tuple of pictures, RGB."""
@@ -115,29 +115,29 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
 
 
 class _Views:
-    """A task's border as NumPy arrays: live on the CPU."""
+    """A task's buffers as NumPy arrays: live on the CPU."""
 
     def __init__(self, task: Task) -> None:
-        border = task.border
+        buffers = task.buffers
         self._task = task
         self.is_begun = False
         self._sizes = np.array(task.layout.branch_sizes)
-        self.continuous: Array = border.continuous.numpy()
-        self.branches: Array = border.branches.numpy()
-        self.observations: Array = border.observations.numpy()
-        self.final_observations: Array = border.final_observations.numpy()
-        self.images: Array = border.images.numpy()
-        self.final_images: Array = border.final_images.numpy()
-        self.rewards: Array = border.rewards.numpy()
-        self.outcomes: Array = border.outcomes.numpy()
-        self.is_terminated: Array = border.is_terminated.numpy()
-        self.is_truncated: Array = border.is_truncated.numpy()
+        self.continuous: Array = buffers.continuous.numpy()
+        self.branches: Array = buffers.branches.numpy()
+        self.observations: Array = buffers.observations.numpy()
+        self.final_observations: Array = buffers.final_observations.numpy()
+        self.images: Array = buffers.images.numpy()
+        self.final_images: Array = buffers.final_images.numpy()
+        self.rewards: Array = buffers.rewards.numpy()
+        self.outcomes: Array = buffers.outcomes.numpy()
+        self.is_terminated: Array = buffers.is_terminated.numpy()
+        self.is_truncated: Array = buffers.is_truncated.numpy()
 
     def reset(self, seed: int) -> None:
         self.is_begun = True
         self._task.reset(seed)
 
-    def seen(self, rows: Any = slice(None), *, is_final: bool = False) -> Observation:
+    def observation(self, rows: Any = slice(None), *, is_final: bool = False) -> Observation:
         """A copy of the observations of rows, or of what their last ended episodes saw last."""
         vector = (self.final_observations if is_final else self.observations)[rows].copy()
         if self._task.layout.image is None:

@@ -13,7 +13,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.rng import draw_key
-from policies.tasks.episode import FELL, RUNNING, SUCCESS, TIMEOUT, Border, begin_episode, close_step, open_frame
+from policies.tasks.episode import FELL, RUNNING, SUCCESS, TIMEOUT, StepBuffers, begin_episode, close_step, open_frame
 from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Element, Layout
 from policies.tasks.task import Task, TaskSettings
@@ -75,45 +75,45 @@ def rolled(pos: wp.vec3, vel: wp.vec3, force_n: wp.vec3, numbers: RollerBallNumb
 
 
 @wp.func
-def observe(border: Border, state: RollerBallState, i: int) -> None:
+def observe(buffers: StepBuffers, state: RollerBallState, i: int) -> None:
     """The eight floats of the tutorial, into the newest frame."""
-    at = open_frame(border, i)
+    at = open_frame(buffers, i)
     for k in range(3):
-        border.observations[i, at + k] = state.target[i][k]
-        border.observations[i, at + 3 + k] = state.pos[i][k]
-    border.observations[i, at + 6] = state.vel[i][0]
-    border.observations[i, at + 7] = state.vel[i][2]
+        buffers.observations[i, at + k] = state.target[i][k]
+        buffers.observations[i, at + 3 + k] = state.pos[i][k]
+    buffers.observations[i, at + 6] = state.vel[i][0]
+    buffers.observations[i, at + 7] = state.vel[i][2]
 
 
 @wp.func
-def place(border: Border, state: RollerBallState, i: int, is_ball_lost: bool) -> None:
+def place(buffers: StepBuffers, state: RollerBallState, i: int, is_ball_lost: bool) -> None:
     """Begins an episode: the cube elsewhere; the ball stays where it is unless it fell."""
-    episode = begin_episode(border, i)
+    episode = begin_episode(buffers, i)
     if is_ball_lost:
         state.pos[i] = wp.vec3(0.0, 0.5, 0.0)
         state.vel[i] = wp.vec3(0.0, 0.0, 0.0)
-    rng = draw_key(border.seed[0], i, episode, _PLACE_STREAM)
+    rng = draw_key(buffers.seed[0], i, episode, _PLACE_STREAM)
     half = state.numbers[i].half_spawn_m
     x = half * (2.0 * wp.randf(rng) - 1.0)
     z = half * (2.0 * wp.randf(rng) - 1.0)
     state.target[i] = wp.vec3(x, 0.5, z)
-    observe(border, state, i)
+    observe(buffers, state, i)
 
 
 @wp.kernel(enable_backward=False)
-def begin(border: Border, is_chosen: wp.array(dtype=wp.bool), state: RollerBallState) -> None:
+def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: RollerBallState) -> None:
     """Starts an episode in the chosen rows."""
     i = wp.tid()
     if is_chosen[i]:
-        place(border, state, i, True)
+        place(buffers, state, i, True)
 
 
 @wp.kernel(enable_backward=False)
-def step(border: Border, state: RollerBallState) -> None:
+def step(buffers: StepBuffers, state: RollerBallState) -> None:
     """One decision of every row."""
     i = wp.tid()
     numbers = state.numbers[i]
-    push = wp.vec3(wp.clamp(border.continuous[i, 0], -1.0, 1.0), 0.0, wp.clamp(border.continuous[i, 1], -1.0, 1.0))
+    push = wp.vec3(wp.clamp(buffers.continuous[i, 0], -1.0, 1.0), 0.0, wp.clamp(buffers.continuous[i, 1], -1.0, 1.0))
     pos = state.pos[i]
     vel = state.vel[i]
     for _tick in range(_STEP_COUNT):
@@ -125,11 +125,11 @@ def step(border: Border, state: RollerBallState) -> None:
         outcome = SUCCESS
     elif pos[1] < 0.0:
         outcome = FELL
-    elif float(border.steps[i] + 1) >= numbers.step_limit:
+    elif float(buffers.steps[i] + 1) >= numbers.step_limit:
         outcome = TIMEOUT
-    observe(border, state, i)
-    if close_step(border, i, wp.where(outcome == SUCCESS, 1.0, 0.0), outcome):
-        place(border, state, i, outcome == FELL)
+    observe(buffers, state, i)
+    if close_step(buffers, i, wp.where(outcome == SUCCESS, 1.0, 0.0), outcome):
+        place(buffers, state, i, outcome == FELL)
 
 
 class RollerBall(Task):
@@ -154,14 +154,14 @@ class RollerBall(Task):
         state.pos = self._zeros("pos", env_count, wp.vec3)
         state.vel = self._zeros("vel", env_count, wp.vec3)
         state.target = self._zeros("target", env_count, wp.vec3)
-        state.numbers = typed_rows(self.border.numbers, RollerBallNumbers)
+        state.numbers = typed_rows(self.buffers.numbers, RollerBallNumbers)
         self.world = state
         self._record(begin, step, [state])
 
     def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """Floor, cube and ball from above."""
         canvas = Canvas((-6.0, 6.0), (-6.0, 6.0), height_px)
-        half = float(self.border.numbers.numpy()[i_env, self.number_table.names.index("half_floor_m")])
+        half = float(self.buffers.numbers.numpy()[i_env, self.number_table.names.index("half_floor_m")])
         canvas.box((0.0, 0.0), (2.0 * half, 2.0 * half), 0.0, (255, 255, 255))
         target: Any = self.world.target.numpy()[i_env]
         ball: Any = self.world.pos.numpy()[i_env]

@@ -2,8 +2,8 @@
 
 A task is a subclass that declares a layout and numbers, makes its own arrays with `_zeros`, and names two kernels:
 
-    begin(border, is_chosen, state…)   starts an episode in the chosen rows
-    step(border, state…)               one decision of every row; rows whose episode ends begin the next
+    begin(buffers, is_chosen, state…)   starts an episode in the chosen rows
+    step(buffers, state…)               one decision of every row; rows whose episode ends begin the next
 
 The learner sees arrays only: actions in; observations, rewards and ends out. Nothing here knows torch or Gymnasium.
 """
@@ -17,7 +17,7 @@ import warp as wp
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Border, Outcome, keep_last_image_rows
+from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Outcome, StepBuffers, keep_last_image_rows
 from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Layout
 from policies.tasks.task_params import Number, NumberTable, Sampler
@@ -82,28 +82,28 @@ class Task:
         self.number_table = NumberTable(self.numbers, device)
         self.number_table.update(number_defaults)
         size = layout.observation_size
-        border = Border()
-        border.continuous = self._zeros("continuous", (env_count, len(layout.continuous)), float)
-        border.branches = self._zeros("branches", (env_count, len(layout.branches)), int)
-        border.observations = self._zeros("observations", (env_count, size), float)
-        border.final_observations = self._zeros("final_observations", (env_count, size), float)
-        border.images = self._zeros("images", (env_count, *layout.image_shape), wp.uint8)
-        border.final_images = self._zeros("final_images", (env_count, *layout.image_shape), wp.uint8)
-        border.privileged = self._zeros("privileged", (env_count, len(layout.privileged)), float)
-        border.final_privileged = self._zeros("final_privileged", (env_count, len(layout.privileged)), float)
-        border.rewards = self._zeros("rewards", env_count, float)
-        border.outcomes = self._zeros("outcomes", env_count, int)
-        border.is_terminated = self._zeros("is_terminated", env_count, wp.bool)
-        border.is_truncated = self._zeros("is_truncated", env_count, wp.bool)
-        border.steps = self._zeros("steps", env_count, int)
-        border.returns = self._zeros("returns", env_count, float)
-        border.episodes = self._zeros("episodes", env_count, int)
-        border.scores = self._zeros("scores", (env_count, SCORE_COLUMNS), float)
-        border.seed = self._zeros("seed", 1, int)
-        border.numbers = self._zeros("numbers", (env_count, len(self.number_table.names)), float)
-        border.samplers = self.number_table.array
-        border.frame_size = layout.frame_size
-        self.border = border
+        buffers = StepBuffers()
+        buffers.continuous = self._zeros("continuous", (env_count, len(layout.continuous)), float)
+        buffers.branches = self._zeros("branches", (env_count, len(layout.branches)), int)
+        buffers.observations = self._zeros("observations", (env_count, size), float)
+        buffers.final_observations = self._zeros("final_observations", (env_count, size), float)
+        buffers.images = self._zeros("images", (env_count, *layout.image_shape), wp.uint8)
+        buffers.final_images = self._zeros("final_images", (env_count, *layout.image_shape), wp.uint8)
+        buffers.privileged = self._zeros("privileged", (env_count, len(layout.privileged)), float)
+        buffers.final_privileged = self._zeros("final_privileged", (env_count, len(layout.privileged)), float)
+        buffers.rewards = self._zeros("rewards", env_count, float)
+        buffers.outcomes = self._zeros("outcomes", env_count, int)
+        buffers.is_terminated = self._zeros("is_terminated", env_count, wp.bool)
+        buffers.is_truncated = self._zeros("is_truncated", env_count, wp.bool)
+        buffers.steps = self._zeros("steps", env_count, int)
+        buffers.returns = self._zeros("returns", env_count, float)
+        buffers.episodes = self._zeros("episodes", env_count, int)
+        buffers.scores = self._zeros("scores", (env_count, SCORE_COLUMNS), float)
+        buffers.seed = self._zeros("seed", 1, int)
+        buffers.numbers = self._zeros("numbers", (env_count, len(self.number_table.names)), float)
+        buffers.samplers = self.number_table.array
+        buffers.frame_size = layout.frame_size
+        self.buffers = buffers
         self._is_chosen = wp.zeros(env_count, dtype=wp.bool, device=device)
         self._begin: Any = None
         self._step: Any = None
@@ -116,13 +116,13 @@ class Task:
 
     def _record(self, begin: Any, step: Any, state: list[Any]) -> None:
         """Records the task's two launches; to be called once, at the end of the subclass's `__init__`."""
-        chosen = [self.border, self._is_chosen, *state]
+        chosen = [self.buffers, self._is_chosen, *state]
         self._begin = wp.launch(begin, self.env_count, chosen, device=self.device, record_cmd=True)
-        self._step = wp.launch(step, self.env_count, [self.border, *state], device=self.device, record_cmd=True)
+        self._step = wp.launch(step, self.env_count, [self.buffers, *state], device=self.device, record_cmd=True)
 
     def reset(self, seed: int) -> None:
         """Starts all environments anew. The same seed gives the same episodes, whatever ran before."""
-        self.border.seed.fill_(seed % 2**31)
+        self.buffers.seed.fill_(seed % 2**31)
         for name in ("episodes", "scores", "rewards", "outcomes", "is_terminated", "is_truncated"):
             self._arrays[name].zero_()
         self.begin(np.ones(self.env_count, dtype=np.bool_))
@@ -133,13 +133,13 @@ class Task:
         self._begin.launch()
 
     def step(self) -> None:
-        """One decision of all environments, with the actions that lie in the border."""
+        """One decision of all environments, with the actions that lie in the buffers."""
         self._step.launch()
 
     def keep_last_images(self) -> None:
         """Keeps the images of the episodes that just ended; to be called before those of the next ones are drawn."""
         image_rows = (self.env_count, self.layout.image_shape[0])
-        wp.launch(keep_last_image_rows, image_rows, [self.border], device=self.device)
+        wp.launch(keep_last_image_rows, image_rows, [self.buffers], device=self.device)
 
     def set_numbers(self, values: Mapping[str, float | Sampler]) -> None:
         """Sets or randomises numbers from the next episodes on (domain randomisation, curricula).
@@ -151,8 +151,8 @@ class Task:
 
     def take_scores(self) -> Scores:
         """The sums over the episodes that ended since the last call."""
-        sums = self.border.scores.numpy().sum(axis=0, dtype=np.float64)
-        self.border.scores.zero_()
+        sums = self.buffers.scores.numpy().sum(axis=0, dtype=np.float64)
+        self.buffers.scores.zero_()
         outcomes = tuple(int(count) for count in sums[:OUTCOME_COUNT])
         return Scores(outcomes, float(sums[OUTCOME_COUNT]), float(sums[OUTCOME_COUNT + 1]))
 

@@ -148,7 +148,7 @@ def typed_rows(numbers: Any, struct: Any, first: int = 0) -> Any:
     """The rows of a float array, shape (environments, numbers), seen as a task's struct of floats: the same memory.
 
     Args:
-        numbers: a task's `border.numbers`.
+        numbers: a task's `buffers.numbers`.
         struct: its fields are the columns from `first` on, in order.
         first: where a task has several structs, the column of this one's first field.
     """

@@ -47,8 +47,8 @@ def act(task, rng, rows=None):
     layout = task.layout
     pushed = rng.uniform(-1.0, 1.0, (64, len(layout.continuous)))
     chosen = rng.integers(np.array(layout.branch_sizes, dtype=int), size=(64, len(layout.branches)))
-    task.border.continuous.assign(pushed[rows].astype(np.float32))
-    task.border.branches.assign(chosen[rows].astype(np.int32))
+    task.buffers.continuous.assign(pushed[rows].astype(np.float32))
+    task.buffers.branches.assign(chosen[rows].astype(np.int32))
     task.step()
 
 
@@ -63,11 +63,11 @@ def driven(name, preset, env_count, seed, step_count=40):
     """What the rows saw and were paid, (steps, rows, elements + 1)."""
     task = built(name, preset, env_count, seed)
     rng = np.random.default_rng(seed)
-    seen = []
+    observation = []
     for _ in range(step_count):
         act(task, rng)
-        seen.append(np.column_stack([task.border.observations.numpy(), task.border.rewards.numpy()]))
-    return np.array(seen)
+        observation.append(np.column_stack([task.buffers.observations.numpy(), task.buffers.rewards.numpy()]))
+    return np.array(observation)
 
 
 @every_task
@@ -90,10 +90,10 @@ def test_permuted_rows_do_permuted_things(name, preset):
     for _ in range(15):
         act(task, rng)
         act(other, other_rng, order)
-    is_same_episode = task.border.episodes.numpy() == state["episodes"]  # what is drawn afterwards is keyed by the row
+    is_same_episode = task.buffers.episodes.numpy() == state["episodes"]  # what is drawn afterwards is keyed by the row
     assert is_same_episode.any()
     for array in ("observations", "returns", "steps"):
-        there, here = getattr(task.border, array).numpy()[order], getattr(other.border, array).numpy()
+        there, here = getattr(task.buffers, array).numpy()[order], getattr(other.buffers, array).numpy()
         assert np.array_equal(there[is_same_episode[order]], here[is_same_episode[order]]), array
 
 
@@ -154,13 +154,13 @@ def anywhere(number, _value):
 def test_every_number_may_be_randomised_at_once_and_nothing_becomes_infinite(name, preset, spread):
     task = built(name, preset, 64)
     declared = task.number_table.declarations
-    values = dict(zip(declared, task.border.numbers.numpy()[0].tolist(), strict=True))
+    values = dict(zip(declared, task.buffers.numbers.numpy()[0].tolist(), strict=True))
     task.set_numbers({key: spread(declared[key], values[key]) for key in declared if key != "step_limit"})
     task.reset(0)
     rng = np.random.default_rng(0)
     for _ in range(200):
         act(task, rng)
-        for array in (task.border.observations, task.border.final_observations, task.border.rewards):
+        for array in (task.buffers.observations, task.buffers.final_observations, task.buffers.rewards):
             assert np.isfinite(array.numpy()).all()
 
 
@@ -182,10 +182,10 @@ def test_a_mirrored_reach_target_is_seen_and_paid_mirrored(x, z, yaw, seed):
     signs = np.array([-1.0 if name in flipped else 1.0 for name in names])
     for _ in range(10):
         steer, throttle, brake = rng.uniform(-1.0, 1.0, 3)
-        task.border.continuous.numpy()[:] = [(steer, throttle, brake), (-steer, throttle, brake)]
+        task.buffers.continuous.numpy()[:] = [(steer, throttle, brake), (-steer, throttle, brake)]
         task.step()
-        if task.border.outcomes.numpy().any():
+        if task.buffers.outcomes.numpy().any():
             return
-        one, other = task.border.observations.numpy()
+        one, other = task.buffers.observations.numpy()
         assert other == pytest.approx(signs * one[columns], abs=2e-3)
-        assert task.border.rewards.numpy()[0] == pytest.approx(task.border.rewards.numpy()[1], abs=1e-3)
+        assert task.buffers.rewards.numpy()[0] == pytest.approx(task.buffers.rewards.numpy()[1], abs=1e-3)

@@ -5,7 +5,7 @@ from typing import ClassVar
 import warp as wp
 
 from common.rng import draw_key
-from policies.tasks.episode import RUNNING, SUCCESS, TIMEOUT, Border, begin_episode, close_step, open_frame
+from policies.tasks.episode import RUNNING, SUCCESS, TIMEOUT, StepBuffers, begin_episode, close_step, open_frame
 from policies.tasks.layout import Element, Layout
 from policies.tasks.task import Task, TaskSettings
 from policies.tasks.task_params import Number, typed_rows
@@ -44,45 +44,45 @@ class SliderState:
 
 
 @wp.func
-def observe(border: Border, state: SliderState, i: int):
-    at = open_frame(border, i)
-    border.observations[i, at] = state.mark[i] - state.pos[i]
-    border.observations[i, at + 1] = state.vel[i]
+def observe(buffers: StepBuffers, state: SliderState, i: int):
+    at = open_frame(buffers, i)
+    buffers.observations[i, at] = state.mark[i] - state.pos[i]
+    buffers.observations[i, at + 1] = state.vel[i]
 
 
 @wp.func
-def place(border: Border, state: SliderState, i: int):
+def place(buffers: StepBuffers, state: SliderState, i: int):
     """Begins an episode: the cart in the middle, the mark elsewhere."""
-    episode = begin_episode(border, i)
-    rng = draw_key(border.seed[0], i, episode, _PLACE_STREAM)
+    episode = begin_episode(buffers, i)
+    rng = draw_key(buffers.seed[0], i, episode, _PLACE_STREAM)
     state.pos[i] = 0.0
     state.vel[i] = 0.0
     state.mark[i] = state.numbers[i].half_rail_m * (2.0 * wp.randf(rng) - 1.0)
-    observe(border, state, i)
+    observe(buffers, state, i)
 
 
 @wp.kernel(enable_backward=False)
-def begin(border: Border, is_chosen: wp.array(dtype=wp.bool), state: SliderState):
+def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: SliderState):
     i = wp.tid()
     if is_chosen[i]:
-        place(border, state, i)
+        place(buffers, state, i)
 
 
 @wp.kernel(enable_backward=False)
-def step(border: Border, state: SliderState):
+def step(buffers: StepBuffers, state: SliderState):
     i = wp.tid()
     numbers = state.numbers[i]
-    push = wp.clamp(border.continuous[i, 0], -1.0, 1.0)
+    push = wp.clamp(buffers.continuous[i, 0], -1.0, 1.0)
     state.vel[i] = state.vel[i] + push * numbers.accel_m_s2 * _DT
     state.pos[i] = state.pos[i] + state.vel[i] * _DT
     outcome = int(RUNNING)
     if wp.abs(state.mark[i] - state.pos[i]) < 0.1 and wp.abs(state.vel[i]) < 0.5:
         outcome = SUCCESS
-    elif float(border.steps[i] + 1) >= numbers.step_limit:
+    elif float(buffers.steps[i] + 1) >= numbers.step_limit:
         outcome = TIMEOUT
-    observe(border, state, i)
-    if close_step(border, i, wp.where(outcome == SUCCESS, 1.0, -0.01), outcome):
-        place(border, state, i)
+    observe(buffers, state, i)
+    if close_step(buffers, i, wp.where(outcome == SUCCESS, 1.0, -0.01), outcome):
+        place(buffers, state, i)
 
 
 class Slider(Task):
@@ -99,5 +99,5 @@ class Slider(Task):
         state.pos = self._zeros("pos", env_count, float)
         state.vel = self._zeros("vel", env_count, float)
         state.mark = self._zeros("mark", env_count, float)
-        state.numbers = typed_rows(self.border.numbers, SliderNumbers)
+        state.numbers = typed_rows(self.buffers.numbers, SliderNumbers)
         self._record(begin, step, [state])

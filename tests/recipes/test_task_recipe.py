@@ -29,7 +29,7 @@ def test_a_hand_made_controller_reaches_every_mark():
     task = build_task("Slider", 64)
     task.reset(1)
     for _ in range(200):
-        task.border.continuous.numpy()[:] = towards(task.border.observations.numpy())
+        task.buffers.continuous.numpy()[:] = towards(task.buffers.observations.numpy())
         task.step()
     scores = task.take_scores()
     assert scores.count(Outcome.SUCCESS) == scores.episode_count > 64

@@ -142,7 +142,7 @@ def test_rays_agree_with_sphere_tracing_in_random_scenes(name, radius):
     task = build_task(name, 24, settings)
     task.set_numbers({"ray_radius_m": radius, "ray_length_m": length, "ray_degrees": 110.0})
     task.reset(5)
-    seen = task.border.observations.numpy()[:, -(2 * rays + 1) * 6 :].reshape(24, 2 * rays + 1, 6)
+    observation = task.buffers.observations.numpy()[:, -(2 * rays + 1) * 6 :].reshape(24, 2 * rays + 1, 6)
     kinds = set()
     for row in range(24):
         start = task.world.pos.numpy()[row].astype(np.float64)
@@ -151,7 +151,7 @@ def test_rays_agree_with_sphere_tracing_in_random_scenes(name, radius):
             side = 1 if k % 2 else -1
             angle = float(task.world.yaw.numpy()[row]) + side * ((k + 1) // 2) * np.radians(110.0) / rays
             far, which = traced(start, np.array([np.sin(angle), np.cos(angle)]), [gap for _, gap in surfaces])
-            *one_hot, miss, fraction = seen[row, k]
+            *one_hot, miss, fraction = observation[row, k]
             if abs(far - length) < 0.05:
                 continue
             if far > length:

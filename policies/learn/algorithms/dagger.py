@@ -19,7 +19,7 @@ from policies.learn.algorithms.schedule import RATE_FLOOR, scheduled
 from policies.learn.algorithms.teacher import Teacher
 from policies.learn.config.behavior import Behavior, DaggerHyperparameters
 from policies.learn.networks.action_distributions import CLIP, ActionDistribution, Actions
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
 from policies.learn.rollout.image_augmentation import augmented
 from policies.learn.rollout.sequence_buffer import SequenceRing, Stretches
@@ -103,8 +103,8 @@ class Dagger:
         rewards, ends = [], []
         for t in range(ring.length):
             labels = self.teacher.actions(task.privileged)
-            ring.record(slot, t, task.seen, labels, self._is_start)
-            actions, memory = self.policy.act(task.seen, self._memory, self._generator)
+            ring.record(slot, t, task.observation, labels, self._is_start)
+            actions, memory = self.policy.act(task.observation, self._memory, self._generator)
             task.step(
                 torch.where(is_taught, labels.continuous, self.policy.bounded(actions)),
                 torch.where(is_taught, labels.branches, actions.branches),
@@ -136,9 +136,13 @@ class Dagger:
 
     def _learn(self, stretches: Stretches) -> Tensor:
         """One gradient step; losses of actions and of beliefs, shape (2,)."""
-        numbers, seen = self.hyperparameters, stretches.seen
-        image = augmented(seen.image, numbers.augmentation, self._generator) if seen.image is not None else None
-        shown = Seen(seen.vector, image)
+        numbers, observation = self.hyperparameters, stretches.observation
+        image = (
+            augmented(observation.image, numbers.augmentation, self._generator)
+            if observation.image is not None
+            else None
+        )
+        shown = Observation(observation.vector, image)
         if self.policy.memory_size:
             features = self.policy.body(shown, stretches.memory, stretches.is_start)
         else:
@@ -149,8 +153,8 @@ class Dagger:
             distribution.mean / CLIP, distribution.choice_logs, labels.continuous, labels.branches
         )
         beliefs_loss = actions_loss.new_zeros(())
-        if self.policy.perception is not None and seen.privileged is not None:
-            beliefs_loss = self.policy.perception.loss(features, seen.privileged)
+        if self.policy.perception is not None and observation.privileged is not None:
+            beliefs_loss = self.policy.perception.loss(features, observation.privileged)
         loss = actions_loss + numbers.perception_strength * beliefs_loss + _sigma_loss(distribution, labels)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]

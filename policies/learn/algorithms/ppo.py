@@ -20,7 +20,7 @@ from policies.learn.algorithms.learner import Companion, Iteration, load_if_fitt
 from policies.learn.algorithms.schedule import BETA_FLOOR, EPSILON_FLOOR, RATE_FLOOR, scheduled
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
 from policies.learn.networks.networks import Body, Critic, policy_body, privileged_body
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
 from policies.learn.rollout.rollout import Batch, Rollout
 from policies.learn.rollout.task_tensors import TaskTensors
@@ -109,16 +109,16 @@ class Ppo:
         for t in range(len(rollout.rewards)):
             if t % rollout.sequence_length == 0:
                 rollout.memories[t // rollout.sequence_length] = self._memory
-            features, memory = self.policy.body.step(rollout.seen[t], self._memory)
+            features, memory = self.policy.body.step(rollout.observation[t], self._memory)
             distribution = self.policy.heads(features)
             actions = distribution.draw(self._generator)
             self.task.step(self.policy.bounded(actions), actions.branches)
             rollout.record(t, actions, distribution.log_probs(actions), self.task)
             self._memory = _forgotten(memory, self.task)
         if not self._is_warming_up:
-            self.policy.body.normalize(rollout.seen[:-1])  # the critic's too, unless it sees something else
+            self.policy.body.normalize(rollout.observation[:-1])  # the critic's too, unless it sees something else
         if self.critic.body.is_privileged:
-            self.critic.body.normalize(rollout.seen[:-1])
+            self.critic.body.normalize(rollout.observation[:-1])
 
     def _rewards(self, rollout: Rollout, transitions: Transitions | None) -> Tensor:
         """Of every signal times its strength, shape (T, N, signals)."""
@@ -149,17 +149,17 @@ class Ppo:
 
     def _values(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
         """Of what each decision saw, and of what came of it, shape (T, N, signals) each."""
-        seen = rollout.seen.mapped(lambda part: part.flatten(0, 1))
-        values = self._valued(seen).view(*rollout.observations.shape[:2], -1)
+        observation = rollout.observation.mapped(lambda part: part.flatten(0, 1))
+        values = self._valued(observation).view(*rollout.observations.shape[:2], -1)
         next_values = values[1:].clone()
         next_values[rollout.is_over] = self._valued(rollout.last_seen())
         return values[:-1], next_values
 
-    def _valued(self, seen: Seen) -> Tensor:
+    def _valued(self, observation: Observation) -> Tensor:
         """What the critic says of rows, shape (rows, signals)."""
         size = _ROWS if self.critic.body.encoder is None else _IMAGES
-        count = len(seen.vector)
-        return torch.cat([self.critic(seen[first : first + size]) for first in range(0, max(count, 1), size)])
+        count = len(observation.vector)
+        return torch.cat([self.critic(observation[first : first + size]) for first in range(0, max(count, 1), size)])
 
     def _recurrent_values(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
         """As `_values`, with the critic's memory going along, forgetting where episodes end."""
@@ -167,9 +167,9 @@ class Ppo:
         for t, is_over in enumerate(rollout.is_over):
             if t % rollout.sequence_length == 0:
                 rollout.critic_memories[t // rollout.sequence_length] = self._critic_memory
-            value, memory = self.critic.step(rollout.seen[t], self._critic_memory)
+            value, memory = self.critic.step(rollout.observation[t], self._critic_memory)
             values.append(value)
-            next_values.append(self.critic.step(rollout.next_seen(t), memory)[0])
+            next_values.append(self.critic.step(rollout.next_observation(t), memory)[0])
             self._critic_memory = memory.masked_fill(is_over[:, None], 0.0)
         return torch.stack(values), torch.stack(next_values)
 
@@ -238,18 +238,18 @@ class Ppo:
 
     def _beliefs_loss(self, features: Tensor, batch: Batch) -> Tensor | float:
         """Of a policy that says what it believes: else its beliefs would go astray as its features change."""
-        perception, privileged = self.policy.perception, batch.seen.privileged
+        perception, privileged = self.policy.perception, batch.observation.privileged
         return perception.loss(features, privileged) if perception is not None and privileged is not None else 0.0
 
     def _features(self, body: Body, batch: Batch) -> Tensor:
         """Of a minibatch, flat, shape (B, features)."""
         sequences = batch.sequences
         if sequences is None:
-            features: Tensor = body(batch.seen)
+            features: Tensor = body(batch.observation)
             return features
         memory = sequences.memory if body is self.policy.body else sequences.critic_memory
-        seen = batch.seen.mapped(lambda part: part.view(*sequences.is_start.shape, *part.shape[1:]))
-        outputs: Tensor = body(seen, memory, sequences.is_start)
+        observation = batch.observation.mapped(lambda part: part.view(*sequences.is_start.shape, *part.shape[1:]))
+        outputs: Tensor = body(observation, memory, sequences.is_start)
         return outputs.flatten(0, 1)
 
     def _teach_signals(self, transitions: Transitions, batch: Batch) -> dict[str, float]:

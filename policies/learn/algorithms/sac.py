@@ -267,5 +267,5 @@ def _hindsight(task: Task, replay: Replay, goals_per_transition: int) -> Hindsig
 
 def _numbers(task: Task, name: str) -> Tensor:
     """A number of all running episodes, shape (envs,): live."""
-    numbers: Tensor = wp.to_torch(task.border.numbers)
+    numbers: Tensor = wp.to_torch(task.buffers.numbers)
     return numbers[:, task.number_table.names.index(name)]

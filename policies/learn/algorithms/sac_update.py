@@ -108,15 +108,15 @@ class SoftActorCritic:
         """
         temperatures = self.log_temperatures.detach().exp()
         next_values = self._next_values(batch.next_observations, temperatures, generator)
-        seen = self._seen(batch.observations)
-        values = _values(self.critics, seen, batch.continuous)
+        observation = self._observation(batch.observations)
+        values = _values(self.critics, observation, batch.continuous)
         critic = critic_losses(
             action_values(values, batch.branches), critic_targets(rewards, goes_on, next_values, self._gammas)
         )
         distribution: ActionDistribution = self.policy(batch.observations)
         drawn, entropy = _drawn(distribution, generator)
         if drawn.shape[1]:
-            values = _values(self.critics, seen, drawn)
+            values = _values(self.critics, observation, drawn)
         else:
             values = values.detach()  # of all choices: the same for any action
         policy = policy_loss(expected_values(values, distribution.choice_logs), entropy, temperatures)
@@ -130,11 +130,13 @@ class SoftActorCritic:
         """What the policy expects from here on, shape (B, signals); entropy counts as reward of the first signal."""
         distribution: ActionDistribution = self.policy(observations)
         drawn, entropy = _drawn(distribution, generator)
-        values = expected_values(_values(self.targets, self._seen(observations), drawn), distribution.choice_logs)
+        values = expected_values(
+            _values(self.targets, self._observation(observations), drawn), distribution.choice_logs
+        )
         values[:, 0] += entropy @ temperatures
         return values
 
-    def _seen(self, observations: Tensor) -> Tensor:
+    def _observation(self, observations: Tensor) -> Tensor:
         """Observations as critics see them: normalised as the policy normalises them."""
         normalizer = self.policy.body.normalizer
         return observations if normalizer is None else normalizer(observations)
@@ -189,7 +191,7 @@ def _drawn(distribution: ActionDistribution, generator: torch.Generator) -> tupl
     return actions.continuous.tanh(), entropies(log_probs, distribution.choice_logs)
 
 
-def _values(critics: nn.ModuleList, seen: Tensor, continuous: Tensor) -> Tensor:
+def _values(critics: nn.ModuleList, observation: Tensor, continuous: Tensor) -> Tensor:
     """What all critics say, shape (critics, B, signals, 1 + branches x choices)."""
-    inputs = torch.cat((seen, continuous), dim=1)
+    inputs = torch.cat((observation, continuous), dim=1)
     return torch.stack([critic(inputs) for critic in critics])

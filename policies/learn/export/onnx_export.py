@@ -25,7 +25,7 @@ from policies.learn.networks.action_distributions import CLIP, LOG_SIGMA_LIMITS
 from policies.learn.networks.hyper_network import HyperDense
 from policies.learn.networks.networks import Body
 from policies.learn.networks.normalizer import LIMIT
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
 from policies.learn.networks.vision import Residual
 from policies.tasks.layout import Layout
@@ -291,10 +291,10 @@ def largest_difference(policy: Policy, content: bytes, row_count: int = 64, deci
         observations = torch.randn(row_count, policy.layout.observation_size, generator=generator)
         if policy.body.normalizer is not None:  # as wide as those that the policy has seen
             observations = policy.body.normalizer.inverse(observations)
-        seen, images = Seen(observations), observations[:, :0]
+        observation, images = Observation(observations), observations[:, :0]
         if policy.layout.image is not None:
             bytes_ = torch.randint(0, 256, (row_count, *policy.layout.image_shape), generator=generator)
-            seen = Seen(observations, bytes_.to(torch.uint8))
+            observation = Observation(observations, bytes_.to(torch.uint8))
             images = bytes_.permute(0, 3, 1, 2) / 255.0
         given = {
             _names(policy.layout)[0]: images.numpy(),
@@ -305,7 +305,7 @@ def largest_difference(policy: Policy, content: bytes, row_count: int = 64, deci
         values = session.run(None, {name: value for name, value in given.items() if name in names})
         results = dict(zip([node.name for node in session.get_outputs()], values, strict=True))
         with torch.inference_mode():
-            features, memory = policy.body.step(seen, memory)
+            features, memory = policy.body.step(observation, memory)
             distribution = policy.heads(features)
             actions = distribution.mode()
         if policy.layout.continuous:

@@ -29,6 +29,6 @@ class PolicyDriver:
         with torch.inference_mode():
             memory = self._memory.clone()
             memory[rows] = 0.0
-            actions, self._memory = self._policy.act(TaskTensors(task).seen, memory, None)
-            task.border.continuous.assign(self._policy.bounded(actions).numpy())
-            task.border.branches.assign(actions.branches.int().numpy())
+            actions, self._memory = self._policy.act(TaskTensors(task).observation, memory, None)
+            task.buffers.continuous.assign(self._policy.bounded(actions).numpy())
+            task.buffers.branches.assign(actions.branches.int().numpy())

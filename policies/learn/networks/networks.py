@@ -17,7 +17,7 @@ from policies.learn.networks.dense_layers import dense, value_heads
 from policies.learn.networks.hyper_network import HyperDense
 from policies.learn.networks.lstm import Recurrence
 from policies.learn.networks.normalizer import Normalizer
-from policies.learn.networks.observations import Seen, as_seen
+from policies.learn.networks.observations import Observation, as_observation
 from policies.learn.networks.vision import ImageEncoder
 from policies.tasks.layout import ImageElement, Layout
 
@@ -60,32 +60,32 @@ class Body(nn.Module):
         self.memory_size = memory.memory_size if memory else 0
         self.size = self.recurrence.size if self.recurrence else width
 
-    def normalize(self, observations: Tensor | Seen) -> None:
+    def normalize(self, observations: Tensor | Observation) -> None:
         """Takes observations into account, shape (..., observation), if this body normalises."""
         if self.normalizer is not None:
-            self.normalizer.update(self._floats(as_seen(observations)))
+            self.normalizer.update(self._floats(as_observation(observations)))
 
-    def encode(self, observations: Tensor | Seen) -> Tensor:
+    def encode(self, observations: Tensor | Observation) -> Tensor:
         """Features before the memory, shape (..., hidden units)."""
-        seen = as_seen(observations)
-        floats = self._floats(seen)
+        observation = as_observation(observations)
+        floats = self._floats(observation)
         features = floats if self.normalizer is None else self.normalizer(floats)
         goals = features[..., self.goal_indices] if self.hyper is not None else None
         if self.encoder is not None:
-            if seen.image is None:
+            if observation.image is None:
                 raise ValueError("this network sees an image, and was given none")
-            features = torch.cat((self.encoder(seen.image), features), dim=-1)
+            features = torch.cat((self.encoder(observation.image), features), dim=-1)
         for layer in self.layers:
             features = F.silu(layer(features))
         return features if self.hyper is None else F.silu(self.hyper(features, goals))
 
-    def step(self, observations: Tensor | Seen, memory: Tensor) -> tuple[Tensor, Tensor]:
+    def step(self, observations: Tensor | Observation, memory: Tensor) -> tuple[Tensor, Tensor]:
         """Features (rows, size) and the memory after them (rows, memory); no columns without memory."""
         features = self.encode(observations)
         return (features, memory) if self.recurrence is None else self.recurrence.step(features, memory)
 
     def forward(
-        self, observations: Tensor | Seen, memory: Tensor | None = None, is_start: Tensor | None = None
+        self, observations: Tensor | Observation, memory: Tensor | None = None, is_start: Tensor | None = None
     ) -> Tensor:
         """Features, shape (..., size); `memory` and `is_start` as `Recurrence.forward` has them."""
         features = self.encode(observations)
@@ -94,12 +94,12 @@ class Body(nn.Module):
         outputs: Tensor = self.recurrence(features, memory, is_start)
         return outputs
 
-    def _floats(self, seen: Seen) -> Tensor:
+    def _floats(self, observation: Observation) -> Tensor:
         if not self.is_privileged:
-            return seen.vector
-        if seen.privileged is None:
+            return observation.vector
+        if observation.privileged is None:
             raise ValueError("this network sees privileged elements, and was given none")
-        return torch.cat((seen.vector, seen.privileged), dim=-1)
+        return torch.cat((observation.vector, observation.privileged), dim=-1)
 
 
 def policy_body(layout: Layout, settings: NetworkSettings, generator: torch.Generator) -> Body:
@@ -139,11 +139,11 @@ class Critic(nn.Module):
         self.heads = value_heads(body.size, signal_count, generator)
         self.normalizer = Normalizer(signal_count) if normalizes else None
 
-    def forward(self, observations: Tensor | Seen) -> Tensor:
+    def forward(self, observations: Tensor | Observation) -> Tensor:
         """Estimated returns in the rewards' unit, shape (..., signals); without memory."""
         return self._in_rewards(self.body(observations))
 
-    def step(self, observations: Tensor | Seen, memory: Tensor) -> tuple[Tensor, Tensor]:
+    def step(self, observations: Tensor | Observation, memory: Tensor) -> tuple[Tensor, Tensor]:
         """Estimated returns (rows, signals), and the memory after them."""
         features, memory = self.body.step(observations, memory)
         return self._in_rewards(features), memory

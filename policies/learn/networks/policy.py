@@ -6,7 +6,7 @@ from torch import Tensor, nn
 from policies.learn.config.network import NetworkSettings
 from policies.learn.networks.action_distributions import ActionDistribution, ActionHeads, Actions, bounded
 from policies.learn.networks.networks import policy_body
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.networks.perception import Beliefs, Perception
 from policies.tasks.layout import Layout
 
@@ -52,14 +52,14 @@ class Policy(nn.Module):
         return torch.zeros(row_count, self.memory_size, device=next(self.parameters()).device)
 
     def forward(
-        self, observations: Tensor | Seen, memory: Tensor | None = None, is_start: Tensor | None = None
+        self, observations: Tensor | Observation, memory: Tensor | None = None, is_start: Tensor | None = None
     ) -> ActionDistribution:
         """Of (..., observation), or with memory of (steps, sequences, observation): see `Recurrence.forward`."""
         distribution: ActionDistribution = self.heads(self.body(observations, memory, is_start))
         return distribution
 
     def act(
-        self, observations: Tensor | Seen, memory: Tensor, generator: torch.Generator | None = None
+        self, observations: Tensor | Observation, memory: Tensor, generator: torch.Generator | None = None
     ) -> tuple[Actions, Tensor]:
         """One decision per row.
 
@@ -77,7 +77,9 @@ class Policy(nn.Module):
             return distribution.mode(), memory
         return distribution.draw(generator), memory
 
-    def act_and_believe(self, observations: Tensor | Seen, memory: Tensor) -> tuple[Actions, Tensor, Beliefs | None]:
+    def act_and_believe(
+        self, observations: Tensor | Observation, memory: Tensor
+    ) -> tuple[Actions, Tensor, Beliefs | None]:
         """One decision per row as `act` takes it without a generator, and what is believed; none without beliefs."""
         features, memory = self.body.step(observations, memory)
         beliefs: Beliefs | None = self.perception(features) if self.perception is not None else None

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from policies.learn.networks.action_distributions import Actions, bounded
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.rollout.task_tensors import TaskTensors
 from policies.learn.signals.signal import Transitions
 from policies.tasks.layout import ImageElement, Layout
@@ -22,7 +22,7 @@ class Batch:
     """Rows of a rollout, B of them; of recurrent policies, sequences after one another step by step."""
 
     rows: Tensor  # (B,), indices into the flat rollout
-    seen: Seen  # (B, ...)
+    observation: Observation  # (B, ...)
     actions: Actions  # (B, ...)
     log_probs: Tensor  # (B, heads)
     values: Tensor  # (B, signals)
@@ -33,7 +33,7 @@ class Batch:
     @property
     def observations(self) -> Tensor:
         """The floats, shape (B, observation)."""
-        return self.seen.vector
+        return self.observation.vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +66,18 @@ class Rollout:
         def zeros(*sizes: int, dtype: torch.dtype = torch.float32) -> Tensor:
             return torch.zeros(sizes, dtype=dtype, device=device)
 
-        def seen(count: int, *, image: ImageElement | None) -> Seen:
-            return Seen(
+        def observation(count: int, *, image: ImageElement | None) -> Observation:
+            return Observation(
                 zeros(count, envs, layout.observation_size),
                 zeros(count, envs, *image.shape, dtype=torch.uint8) if image is not None else None,
                 zeros(count, envs, len(layout.privileged)) if layout.privileged else None,
             )
 
-        self.seen = seen(steps + 1, image=layout.image)
-        self.final_seen = seen(steps, image=None)  # of value where an episode ended
+        self.observation = observation(steps + 1, image=layout.image)
+        self.final_observation = observation(steps, image=None)  # of value where an episode ended
         self.final_images: list[Tensor] = []  # by decision, of the episodes that ended with it: ends are few
-        self.observations = self.seen.vector
-        self.final_observations = self.final_seen.vector
+        self.observations = self.observation.vector
+        self.final_observations = self.final_observation.vector
         self.actions = Actions(
             zeros(steps, envs, len(layout.continuous)), zeros(steps, envs, len(layout.branches), dtype=torch.int64)
         )
@@ -109,7 +109,7 @@ class Rollout:
 
     def begin(self, task: TaskTensors) -> None:
         """Notes what the first decision sees."""
-        self.seen.write(0, task.seen)
+        self.observation.write(0, task.observation)
         self.final_images.clear()
 
     def record(self, t: int, actions: Actions, log_probs: Tensor, task: TaskTensors) -> None:
@@ -120,28 +120,28 @@ class Rollout:
         self.rewards[t] = task.rewards
         self.is_terminated[t] = task.is_terminated
         self.is_truncated[t] = task.is_truncated
-        self.final_seen.write(t, task.final_seen)
-        self.seen.write(t + 1, task.seen)
-        if task.final_seen.image is not None:
-            self.final_images.append(task.final_seen.image[task.is_terminated | task.is_truncated])
+        self.final_observation.write(t, task.final_observation)
+        self.observation.write(t + 1, task.observation)
+        if task.final_observation.image is not None:
+            self.final_images.append(task.final_observation.image[task.is_terminated | task.is_truncated])
 
-    def next_seen(self, t: int) -> Seen:
+    def next_observation(self, t: int) -> Observation:
         """What came of the decisions `t`; where the episode ended, what it saw last. Shape (N, ...)."""
         is_over = self.is_over[t]
-        following, last = self.seen[t + 1], self.final_seen[t]
+        following, last = self.observation[t + 1], self.final_observation[t]
         vector, image, privileged = following.vector, following.image, following.privileged
         if image is not None:
             image = image.clone()
             image[is_over] = self.final_images[t]
         if privileged is not None and last.privileged is not None:
             privileged = torch.where(is_over[:, None], last.privileged, privileged)
-        return Seen(torch.where(is_over[:, None], last.vector, vector), image, privileged)
+        return Observation(torch.where(is_over[:, None], last.vector, vector), image, privileged)
 
-    def last_seen(self) -> Seen:
+    def last_seen(self) -> Observation:
         """What the episodes that ended saw last, a row each, in the order of `is_over`."""
-        last = self.final_seen[self.is_over]
-        image = torch.cat(self.final_images) if self.seen.image is not None else None
-        return Seen(last.vector, image, last.privileged)
+        last = self.final_observation[self.is_over]
+        image = torch.cat(self.final_images) if self.observation.image is not None else None
+        return Observation(last.vector, image, last.privileged)
 
     def transitions(self) -> Transitions:
         """As reward signals see it, (T, N)."""
@@ -189,7 +189,7 @@ class Rollout:
 
         return Batch(
             rows,
-            self.seen[:-1].mapped(pick),
+            self.observation[:-1].mapped(pick),
             Actions(pick(self.actions.continuous), pick(self.actions.branches)),
             pick(self.log_probs),
             pick(self.values),

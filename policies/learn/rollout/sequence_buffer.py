@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from policies.learn.networks.action_distributions import Actions
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.tasks.layout import Layout
 
 
@@ -20,7 +20,7 @@ from policies.tasks.layout import Layout
 class Stretches:
     """Consecutive decisions, (steps, stretches, ...)."""
 
-    seen: Seen  # with the privileged elements: the labels of perception
+    observation: Observation  # with the privileged elements: the labels of perception
     actions: Actions  # the teacher's, continuous ones in [-1, 1]
     is_start: Tensor  # (steps, stretches): an episode starts with this decision
     memory: Tensor  # (stretches, memory) of the policy before the first decision, when it was there
@@ -73,9 +73,9 @@ class SequenceRing:
         self.rounds += 1
         return slot
 
-    def record(self, slot: int, t: int, seen: Seen, actions: Actions, is_start: Tensor) -> None:
+    def record(self, slot: int, t: int, observation: Observation, actions: Actions, is_start: Tensor) -> None:
         """Writes decision `t` of a round, of all environments."""
-        parts = {"vectors": seen.vector, "images": seen.image, "privileged": seen.privileged}
+        parts = {"vectors": observation.vector, "images": observation.image, "privileged": observation.privileged}
         parts |= {"continuous": actions.continuous, "branches": actions.branches, "is_start": is_start}
         for name, part in parts.items():
             if part is not None:
@@ -94,7 +94,7 @@ class SequenceRing:
         picked = {name: part[slot, t, i_env] for name, part in self._parts.items() if name != "memories"}
         image = picked["images"] if self._has_image else None
         return Stretches(
-            Seen(picked["vectors"], image, picked["privileged"]),
+            Observation(picked["vectors"], image, picked["privileged"]),
             Actions(picked["continuous"], picked["branches"]),
             picked["is_start"],
             self._parts["memories"][slot, i_env],

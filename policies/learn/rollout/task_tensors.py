@@ -1,4 +1,4 @@
-"""A task as torch sees it: views of its border, no copies. Actions in, one launch, observations and rewards out."""
+"""A task as torch sees it: views of its buffers, no copies. Actions in, one launch, observations and rewards out."""
 
 from typing import Any
 
@@ -6,34 +6,34 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.tasks.task import Task
 
 
 class TaskTensors:
-    """The border of a task. What the task writes shows in these tensors at once."""
+    """The buffers of a task. What the task writes shows in these tensors at once."""
 
     def __init__(self, task: Task) -> None:
-        border = task.border
+        buffers = task.buffers
         self.task = task
         self.device = torch.device(task.device)
-        self.observations: Tensor = wp.to_torch(border.observations)  # (envs, observation)
-        self.final_observations: Tensor = wp.to_torch(border.final_observations)
-        self.images = _tensor(border.images)  # (envs, height, width, channels) uint8
-        self.final_images = _tensor(border.final_images)
-        self.privileged = _tensor(border.privileged)  # (envs, privileged elements)
-        self.final_privileged = _tensor(border.final_privileged)
+        self.observations: Tensor = wp.to_torch(buffers.observations)  # (envs, observation)
+        self.final_observations: Tensor = wp.to_torch(buffers.final_observations)
+        self.images = _tensor(buffers.images)  # (envs, height, width, channels) uint8
+        self.final_images = _tensor(buffers.final_images)
+        self.privileged = _tensor(buffers.privileged)  # (envs, privileged elements)
+        self.final_privileged = _tensor(buffers.final_privileged)
         layout = task.layout
         image, final_image = (self.images, self.final_images) if layout.image is not None else (None, None)
         privileged, final_privileged = (self.privileged, self.final_privileged) if layout.privileged else (None, None)
-        self.seen = Seen(self.observations, image, privileged)
-        self.final_seen = Seen(self.final_observations, final_image, final_privileged)
-        self.rewards: Tensor = wp.to_torch(border.rewards)  # (envs,)
-        self.outcomes: Tensor = wp.to_torch(border.outcomes)
-        self.is_terminated: Tensor = wp.to_torch(border.is_terminated)
-        self.is_truncated: Tensor = wp.to_torch(border.is_truncated)
-        self._continuous = _actions(border.continuous)
-        self._branches = _actions(border.branches)
+        self.observation = Observation(self.observations, image, privileged)
+        self.final_observation = Observation(self.final_observations, final_image, final_privileged)
+        self.rewards: Tensor = wp.to_torch(buffers.rewards)  # (envs,)
+        self.outcomes: Tensor = wp.to_torch(buffers.outcomes)
+        self.is_terminated: Tensor = wp.to_torch(buffers.is_terminated)
+        self.is_truncated: Tensor = wp.to_torch(buffers.is_truncated)
+        self._continuous = _actions(buffers.continuous)
+        self._branches = _actions(buffers.branches)
 
     def step(self, continuous: Tensor, branches: Tensor) -> None:
         """One decision of all environments.

@@ -85,13 +85,13 @@ class GailSignal:
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=settings.learning_rate)
 
     def _inputs(self, transitions: Transitions) -> Tensor:
-        seen = transitions.observations
+        observation = transitions.observations
         if self._normalizer is not None:
-            seen = self._normalizer(seen)
+            observation = self._normalizer(observation)
         if not self.settings.use_actions:
-            return seen
-        is_ended = transitions.is_ended[..., None].to(seen.dtype)
-        return torch.cat([seen, flat_actions(transitions, self._branch_sizes), is_ended], dim=-1)
+            return observation
+        is_ended = transitions.is_ended[..., None].to(observation.dtype)
+        return torch.cat([observation, flat_actions(transitions, self._branch_sizes), is_ended], dim=-1)
 
     @torch.no_grad()
     def rewards(self, transitions: Transitions) -> Tensor:

@@ -53,16 +53,16 @@ class RndSignal:
         self.optimizer = torch.optim.Adam(self.network.predictor.parameters(), lr=settings.learning_rate)
         self._running = torch.zeros(0, device=device)  # discounted sum of each environment's rewards so far
 
-    def _seen(self, transitions: Transitions) -> Tensor:
+    def _observation(self, transitions: Transitions) -> Tensor:
         return transitions.next_observations if self.settings.normalize_reward else transitions.observations
 
     @torch.no_grad()
     def rewards(self, transitions: Transitions) -> Tensor:
         """Rewards. What is seen here also moves the statistics that observations and rewards are normalised by."""
-        network, seen = self.network, self._seen(transitions)
+        network, observation = self.network, self._observation(transitions)
         if network.normalizer is not None:
-            network.normalizer.update(seen)
-        errors = network.errors(seen)
+            network.normalizer.update(observation)
+        errors = network.errors(observation)
         if network.sums is None:
             return errors
         # Rows drawn from a replay memory have no order to sum them in: there it is the rewards' own deviation.
@@ -81,7 +81,7 @@ class RndSignal:
         return sums
 
     def update(self, batch: Transitions) -> dict[str, float]:
-        loss = self.network.errors(self._seen(batch)).mean()
+        loss = self.network.errors(self._observation(batch)).mean()
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         self.optimizer.step()

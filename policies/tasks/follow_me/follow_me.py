@@ -76,12 +76,12 @@ class FollowMe(FlightTask):
         self.measures = self.follow.measures
         self._eyes: Eyes | None = None
         if self.layout.image is not None:
-            self._eyes = Eyes(self.border, self.rig.arrays, self.follow.numbers, self.worlds, self.follow.people)
+            self._eyes = Eyes(self.buffers, self.rig.arrays, self.follow.numbers, self.worlds, self.follow.people)
             self.follow.lenses = self._eyes.lenses
         self._record_all(_rules(settings, self.layout), self._start())
 
     def step(self) -> None:
-        """One decision of all environments, with the actions that lie in the border."""
+        """One decision of all environments, with the actions that lie in the buffers."""
         self._act.launch()
         self.rig.advance(DECISION_TICKS)
         self._walk.launch()
@@ -124,14 +124,14 @@ class FollowMe(FlightTask):
         x, y, z, w = (float(value) for value in truth["q_ned_from_frd"])
         yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
         distance, seen = self.measures.numpy()[i_env, [0, 2]]
-        words = f"{float(self.border.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {distance:4.1f} m"
+        words = f"{float(self.buffers.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {distance:4.1f} m"
         return draw(
             self.worlds.map(i_env),
             truth["pos_ned"].astype(np.float64),
             yaw,
             owner["pos_ned"].astype(np.float64),
             float(owner["heading_rad"]),
-            self.border.images.numpy()[i_env] if self._eyes is not None else None,
+            self.buffers.images.numpy()[i_env] if self._eyes is not None else None,
             words + ("" if seen else "  not in view"),
             height_px,
         )
@@ -139,8 +139,8 @@ class FollowMe(FlightTask):
     def _state(self) -> Any:
         n = self.env_count
         state = FollowState()
-        state.flight = typed_rows(self.border.numbers, FlightNumbers)
-        state.numbers = typed_rows(self.border.numbers, FollowNumbers, first=len(FLIGHT_NUMBERS))
+        state.flight = typed_rows(self.buffers.numbers, FlightNumbers)
+        state.numbers = typed_rows(self.buffers.numbers, FollowNumbers, first=len(FLIGHT_NUMBERS))
         state.actions = self._zeros("last_actions", n, wp.vec4)
         state.people = self._zeros("people", n, Person)
         state.person_models = self._zeros("person_models", n, PersonModel)
@@ -171,21 +171,21 @@ class FollowMe(FlightTask):
         return start
 
     def _record_all(self, rules: Any, start: Any) -> None:
-        border, rig, state = self.border, self.rig.arrays, self.follow
+        buffers, rig, state = self.buffers, self.rig.arrays, self.follow
 
         def record(kernel: Any, *inputs: Any) -> Any:
             return recorded(kernel, self.env_count, list(inputs), self.device)
 
-        self._act = record(act, border, rules, rig)
+        self._act = record(act, buffers, rules, rig)
         self._walk = record(walk, rules, rig, state)
         self._look_all = record(look, rig, state, state.is_all)
         self._measure_all = record(measure_ranges, rig, state.is_all, state.nearness)
-        self._judge = record(judge, border, rules, rig, state, start)
-        self._prepare = record(prepare, border, rules, state, start)
-        self._place = record(place, border, rig, state, start)
+        self._judge = record(judge, buffers, rules, rig, state, start)
+        self._prepare = record(prepare, buffers, rules, state, start)
+        self._place = record(place, buffers, rig, state, start)
         self._look_starting = record(look, rig, state, self.is_starting)
         self._measure_starting = record(measure_ranges, rig, self.is_starting, state.nearness)
-        self._show = record(show, border, rules, rig, state, start)
+        self._show = record(show, buffers, rules, rig, state, start)
 
 
 def _layout(settings: FollowSettings) -> Layout:

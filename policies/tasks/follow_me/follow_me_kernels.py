@@ -15,7 +15,7 @@ import warp as wp
 
 from common.kernels import TICK_S, TICK_US
 from common.rng import draw_tick
-from policies.tasks.episode import Border, begin_episode, close_step_in_time, open_frame
+from policies.tasks.episode import StepBuffers, begin_episode, close_step_in_time, open_frame
 from policies.tasks.flight.episode_draws import (
     HOVER_STREAM,
     NOISE_STREAM,
@@ -116,21 +116,21 @@ class Start:
 
 
 @wp.func
-def chosen_action(border: Border, rules: Rules, i: int) -> wp.vec4:
-    """The action that lies in the border, in [-1, 1]."""
+def chosen_action(buffers: StepBuffers, rules: Rules, i: int) -> wp.vec4:
+    """The action that lies in the buffers, in [-1, 1]."""
     if rules.is_documented == 1:
-        return document_action(border.branches[i, 0], border.branches[i, 1], border.branches[i, 2])
+        return document_action(buffers.branches[i, 0], buffers.branches[i, 1], buffers.branches[i, 2])
     action = wp.vec4()
     for k in range(4):
-        action[k] = wp.clamp(border.continuous[i, k], -1.0, 1.0)
+        action[k] = wp.clamp(buffers.continuous[i, k], -1.0, 1.0)
     return action
 
 
 @wp.kernel(enable_backward=False)
-def act(border: Border, rules: Rules, rig: RigArrays) -> None:
+def act(buffers: StepBuffers, rules: Rules, rig: RigArrays) -> None:
     i = wp.tid()
     estimate = vehicle_estimate(rig, i, rules.has_estimator)
-    command = action_command(chosen_action(border, rules, i), estimate.q_ned_from_frd)
+    command = action_command(chosen_action(buffers, rules, i), estimate.q_ned_from_frd)
     rig.autopilot.setpoint[i] = velocity_setpoint(command)
 
 
@@ -179,19 +179,19 @@ def owner_report(phone: PhoneState, tick: int) -> OwnerReport:
 
 
 @wp.func
-def write_frame(border: Border, rules: Rules, rig: RigArrays, state: FollowState, i: int) -> None:
+def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, i: int) -> None:
     """The newest frame of the observation, and what the critic sees."""
-    at = open_frame(border, i)
+    at = open_frame(buffers, i)
     truth = rig.truth[i]
     action = state.actions[i]
     if rules.vector == _PRIVILEGED:
-        write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, border.observations, i, at)
+        write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, buffers.observations, i, at)
     else:
         own = own_state(rig, i, rules.has_estimator)
         report = owner_report(state.phones[i], draw_tick(rig.tick[i]))
-        write_vector(rules.vector, own, report, action, border.observations, i, at)
+        write_vector(rules.vector, own, report, action, buffers.observations, i, at)
     if rules.has_privileged == 1:
-        write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, border.privileged, i, 0)
+        write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, buffers.privileged, i, 0)
 
 
 @wp.func
@@ -209,37 +209,37 @@ def write_measures(state: FollowState, rig: RigArrays, i: int, is_collided: bool
 
 
 @wp.kernel(enable_backward=False)
-def judge(border: Border, rules: Rules, rig: RigArrays, state: FollowState, start: Start) -> None:
+def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, start: Start) -> None:
     i = wp.tid()
     numbers = state.numbers[i]
     sight = state.sights[i]
     last_action = state.actions[i]
-    action = chosen_action(border, rules, i)
+    action = chosen_action(buffers, rules, i)
     state.actions[i] = action
     state.unseen_s[i] = wp.where(
         sight.is_in_view == 1, 0.0, state.unseen_s[i] + float(rules.decision_ticks) / _TICKS_PER_S
     )
     touched = has_touched(rig.truth[i])
     sight.reach_m = state.reaches_m[i]
-    outcome = follow_outcome(numbers, sight, touched, state.unseen_s[i], border.steps[i] + 1)
+    outcome = follow_outcome(numbers, sight, touched, state.unseen_s[i], buffers.steps[i] + 1)
     reward = float(0.0)
     if rules.is_documented == 1:
         reward = document_reward(numbers, sight, outcome)
     else:
         reward = follow_reward(numbers, sight, outcome, action, last_action)
     write_measures(state, rig, i, touched or sight.reach_m < numbers.touch_m)
-    write_frame(border, rules, rig, state, i)
-    start.is_starting[i] = close_step_in_time(border, i, reward, outcome)
+    write_frame(buffers, rules, rig, state, i)
+    start.is_starting[i] = close_step_in_time(buffers, i, reward, outcome)
 
 
 @wp.kernel(enable_backward=False)
-def prepare(border: Border, rules: Rules, state: FollowState, start: Start) -> None:
+def prepare(buffers: StepBuffers, rules: Rules, state: FollowState, start: Start) -> None:
     i = wp.tid()
     start.is_growing[i] = False
     if not start.is_starting[i]:
         return
-    seed = border.seed[0]
-    episode = begin_episode(border, i)
+    seed = buffers.seed[0]
+    episode = begin_episode(buffers, i)
     numbers = state.numbers[i]
     state.actions[i] = wp.vec4()
     state.unseen_s[i] = 0.0
@@ -289,12 +289,12 @@ def phone_that_has_reported(model: PhoneModel, person: Person, seed: int, i: int
 
 
 @wp.kernel(enable_backward=False)
-def place(border: Border, rig: RigArrays, state: FollowState, start: Start) -> None:
+def place(buffers: StepBuffers, rig: RigArrays, state: FollowState, start: Start) -> None:
     i = wp.tid()
     if not start.is_starting[i]:
         return
-    seed = border.seed[0]
-    episode = border.episodes[i] - 1
+    seed = buffers.seed[0]
+    episode = buffers.episodes[i] - 1
     numbers = state.numbers[i]
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
     state.person_models[i] = person_of(start.person[0], numbers)
@@ -319,10 +319,10 @@ def place(border: Border, rig: RigArrays, state: FollowState, start: Start) -> N
 
 
 @wp.kernel(enable_backward=False)
-def show(border: Border, rules: Rules, rig: RigArrays, state: FollowState, start: Start) -> None:
+def show(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, start: Start) -> None:
     i = wp.tid()
     if start.is_starting[i]:
-        write_frame(border, rules, rig, state, i)
+        write_frame(buffers, rules, rig, state, i)
 
 
 def recorded(kernel: Any, count: int, inputs: list[Any], device: str) -> Any:

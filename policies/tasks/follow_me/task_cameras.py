@@ -1,6 +1,6 @@
 """The pictures of a batch of follow-me drones: rendered with their cameras' noise, packed as the observation's image.
 
-In: the lenses that `look` has placed, the worlds, the owners. Out: `border.images`. As a policy's companion gets them,
+In: the lenses that `look` has placed, the worlds, the owners. Out: `buffers.images`. As a policy's companion gets them,
 but for their way over the network.
 """
 
@@ -37,15 +37,15 @@ class Eyes:
     """The cameras of all rows.
 
     Args:
-        border: whose images are taken.
+        buffers: whose images are taken.
         rig: the vehicles.
         numbers: of the running episodes.
         worlds: what is seen; camera i looks at world i.
         people: the owners; camera i sees person i.
     """
 
-    def __init__(self, border: Any, rig: Any, numbers: Any, worlds: WorldBatch, people: Any) -> None:
-        count, height, width, _ = border.images.shape
+    def __init__(self, buffers: Any, rig: Any, numbers: Any, worlds: WorldBatch, people: Any) -> None:
+        count, height, width, _ = buffers.images.shape
         device = worlds.device
         self._camera = QuickCamera(
             worlds,
@@ -63,7 +63,7 @@ class Eyes:
         self._everyone = everyone
         set_inputs = [rig, numbers, everyone, camera.optics]
         self._set_optics = wp.launch(set_optics, count, set_inputs, device=device, record_cmd=True)
-        inputs = [camera.rgb, camera.depth_m, everyone, border.images]
+        inputs = [camera.rgb, camera.depth_m, everyone, buffers.images]
         self._pack = wp.launch(pack_images, (count, height), inputs, device=device, record_cmd=True)
 
     @property

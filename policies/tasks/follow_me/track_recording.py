@@ -35,14 +35,14 @@ class Recording:
         """Notes the decision that was just made."""
         is_running = self._lengths == 0
         self._measures.append(self._task.measures.numpy()[:, _COLUMNS])
-        self.returns += np.where(is_running, self._task.border.rewards.numpy(), 0.0)
-        has_ended = self._task.border.outcomes.numpy() != int(RUNNING)
+        self.returns += np.where(is_running, self._task.buffers.rewards.numpy(), 0.0)
+        has_ended = self._task.buffers.outcomes.numpy() != int(RUNNING)
         self._lengths[is_running & has_ended] = len(self._measures)
 
     def tracks(self) -> list[Track]:
         """One per environment, in their order; of an episode that still runs, what there is of it."""
         names: Sequence[str] = self._task.number_table.names
-        numbers = self._task.border.numbers.numpy()
+        numbers = self._task.buffers.numbers.numpy()
         planned_s = numbers[:, names.index("decision_limit")] * self._task.decision_s
         whole = np.stack(self._measures)
         time_s = self._task.decision_s * np.arange(1, len(whole) + 1, dtype=np.float64)

@@ -1,6 +1,6 @@
 """The depth images of a batch of navigating drones: rendered, made noisy, packed as the observation's image.
 
-In: where the vehicles are, and the worlds. Out: `border.images`, one channel. The camera, its mount and the coding of
+In: where the vehicles are, and the worlds. Out: `buffers.images`, one channel. The camera, its mount and the coding of
 depth are those of FollowMe's.
 """
 
@@ -9,7 +9,7 @@ from typing import Any
 import warp as wp
 
 from common.rng import draw_tick
-from policies.tasks.episode import Border
+from policies.tasks.episode import StepBuffers
 from policies.tasks.flight.task import worker_count
 from policies.tasks.follow_me.observe import HFOV_DEG, depth_byte
 from policies.tasks.follow_me.owner_visibility import lens_of
@@ -41,27 +41,27 @@ def aim(
 
 
 @wp.kernel(enable_backward=False)
-def pack_depths(border: Border, depth_m: wp.array3d(dtype=float), rows: wp.array(dtype=wp.bool)) -> None:
+def pack_depths(buffers: StepBuffers, depth_m: wp.array3d(dtype=float), rows: wp.array(dtype=wp.bool)) -> None:
     """The images of the chosen rows; one thread per row of pixels."""
     i, y = wp.tid()
     if not rows[i]:
         return
     for x in range(depth_m.shape[2]):
-        border.images[i, y, x, 0] = depth_byte(depth_m[i, y, x])
+        buffers.images[i, y, x, 0] = depth_byte(depth_m[i, y, x])
 
 
 class DepthEyes:
     """The depth cameras of all rows.
 
     Args:
-        border: whose images are taken.
+        buffers: whose images are taken.
         rig: the vehicles.
         numbers: of the running episodes.
         worlds: what is seen; camera i looks at world i.
     """
 
-    def __init__(self, border: Any, rig: Any, numbers: Any, worlds: WorldBatch) -> None:
-        count, height, width, _ = border.images.shape
+    def __init__(self, buffers: Any, rig: Any, numbers: Any, worlds: WorldBatch) -> None:
+        count, height, width, _ = buffers.images.shape
         device = worlds.device
         self._camera = camera = QuickCamera(
             worlds,
@@ -76,7 +76,7 @@ class DepthEyes:
         rows = wp.full(count, value=True, dtype=wp.bool, device=device)
         aimed = [rig, numbers, rows, camera.lenses, camera.optics]
         self._aim = wp.launch(aim, count, aimed, device=device, record_cmd=True)
-        packed = [border, camera.depth_m, rows]
+        packed = [buffers, camera.depth_m, rows]
         self._pack = wp.launch(pack_depths, (count, height), packed, device=device, record_cmd=True)
 
     def take(self, rows: Any) -> None:

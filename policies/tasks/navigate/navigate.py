@@ -69,11 +69,11 @@ class Navigate(FlightTask):
         self.measures = self.navigation.measures
         self._eyes: DepthEyes | None = None
         if self.layout.image is not None:
-            self._eyes = DepthEyes(self.border, self.rig.arrays, self.navigation.numbers, self.worlds)
+            self._eyes = DepthEyes(self.buffers, self.rig.arrays, self.navigation.numbers, self.worlds)
         self._record_all()
 
     def step(self) -> None:
-        """One decision of all environments, with the actions that lie in the border."""
+        """One decision of all environments, with the actions that lie in the buffers."""
         self._act.launch()
         self.rig.advance(DECISION_TICKS)
         self._see(self.navigation.is_all)
@@ -113,15 +113,17 @@ class Navigate(FlightTask):
         goal_ned = self.navigation.goals_ned.numpy()[i_env].astype(np.float64)
         pos_ned = truth["pos_ned"].astype(np.float64)
         away_m, speed = np.linalg.norm(goal_ned - pos_ned), np.linalg.norm(truth["vel_ned"])
-        words = f"{float(self.border.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {away_m:4.1f} m  {speed:3.1f} m/s"
+        words = (
+            f"{float(self.buffers.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {away_m:4.1f} m  {speed:3.1f} m/s"
+        )
         ranges_m = self.navigation.ranges_m.numpy()[i_env]
         return draw(self.worlds.map(i_env), pos_ned, yaw, goal_ned, ranges_m, words, height_px)
 
     def _state(self) -> Any:
         n = self.env_count
         state = NavigateState()
-        state.flight = typed_rows(self.border.numbers, FlightNumbers)
-        state.numbers = typed_rows(self.border.numbers, NavigateNumbers, first=len(FLIGHT_NUMBERS))
+        state.flight = typed_rows(self.buffers.numbers, FlightNumbers)
+        state.numbers = typed_rows(self.buffers.numbers, NavigateNumbers, first=len(FLIGHT_NUMBERS))
         state.actions = self._zeros("last_actions", n, wp.vec4)
         state.goals_ned = self._zeros("goals_ned", n, wp.vec3)
         state.pos_ned = self._zeros("last_pos_ned", n, wp.vec3)
@@ -133,7 +135,7 @@ class Navigate(FlightTask):
         return state
 
     def _record_all(self) -> None:
-        border, rig, state = self.border, self.rig.arrays, self.navigation
+        buffers, rig, state = self.buffers, self.rig.arrays, self.navigation
         rules = Rules()
         rules.has_rays = int(self.settings.observation == "rays")
         rules.has_estimator = int(self.settings.has_estimator)
@@ -152,12 +154,12 @@ class Navigate(FlightTask):
         def record(kernel: Any, *inputs: Any) -> Any:
             return wp.launch(kernel, self.env_count, list(inputs), device=self.device, record_cmd=True)
 
-        self._act = record(act, border, rules, rig)
+        self._act = record(act, buffers, rules, rig)
         self._scan = record(scan, rig, state.numbers, state.is_all, state.ranges_m)
-        self._judge = record(judge, border, rules, rig, state, start)
-        self._prepare = record(prepare, border, rules, state, start)
-        self._place = record(place, border, rig, state, start)
-        self._show = record(show, border, rules, rig, state, start)
+        self._judge = record(judge, buffers, rules, rig, state, start)
+        self._prepare = record(prepare, buffers, rules, state, start)
+        self._place = record(place, buffers, rig, state, start)
+        self._show = record(show, buffers, rules, rig, state, start)
 
 
 def _layout(settings: NavigateSettings) -> Layout:

@@ -9,7 +9,7 @@ show      the first vector
 
 import warp as wp
 
-from policies.tasks.episode import Border, begin_episode, close_step, open_frame
+from policies.tasks.episode import StepBuffers, begin_episode, close_step, open_frame
 from policies.tasks.flight.episode_draws import (
     HOVER_STREAM,
     NOISE_STREAM,
@@ -88,19 +88,19 @@ class Start:
 
 
 @wp.func
-def chosen_action(border: Border, i: int) -> wp.vec4:
-    """The action that lies in the border, in [-1, 1]."""
+def chosen_action(buffers: StepBuffers, i: int) -> wp.vec4:
+    """The action that lies in the buffers, in [-1, 1]."""
     action = wp.vec4()
     for k in range(4):
-        action[k] = wp.clamp(border.continuous[i, k], -1.0, 1.0)
+        action[k] = wp.clamp(buffers.continuous[i, k], -1.0, 1.0)
     return action
 
 
 @wp.kernel(enable_backward=False)
-def act(border: Border, rules: Rules, rig: RigArrays) -> None:
+def act(buffers: StepBuffers, rules: Rules, rig: RigArrays) -> None:
     i = wp.tid()
     estimate = vehicle_estimate(rig, i, rules.has_estimator)
-    rig.autopilot.setpoint[i] = velocity_setpoint(action_command(chosen_action(border, i), estimate.q_ned_from_frd))
+    rig.autopilot.setpoint[i] = velocity_setpoint(action_command(chosen_action(buffers, i), estimate.q_ned_from_frd))
 
 
 @wp.func
@@ -110,31 +110,31 @@ def room_beside(world: World, truth: Truth) -> float:
 
 
 @wp.func
-def write_frame(border: Border, rules: Rules, rig: RigArrays, state: NavigateState, i: int) -> None:
+def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, i: int) -> None:
     """The newest frame of the observation."""
-    at = open_frame(border, i)
+    at = open_frame(buffers, i)
     own = own_state(rig, i, rules.has_estimator)
-    write_own(own, state.actions[i], border.observations, i, at)
-    write_goal(own, state.goals_ned[i], border.observations, i, at + OWN_SIZE)
+    write_own(own, state.actions[i], buffers.observations, i, at)
+    write_goal(own, state.goals_ned[i], buffers.observations, i, at + OWN_SIZE)
     if rules.has_rays == 1:
-        write_ranges(state.ranges_m, border.observations, i, at + OWN_SIZE + GOAL_SIZE)
+        write_ranges(state.ranges_m, buffers.observations, i, at + OWN_SIZE + GOAL_SIZE)
 
 
 @wp.kernel(enable_backward=False)
-def judge(border: Border, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
+def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     numbers = state.numbers[i]
     truth = rig.truth[i]
     last_pos_ned = state.pos_ned[i]
     last_action = state.actions[i]
-    action = chosen_action(border, i)
+    action = chosen_action(buffers, i)
     state.actions[i] = action
     state.pos_ned[i] = truth.pos_ned
     state.path_m[i] += wp.length(truth.pos_ned - last_pos_ned)
     goal_ned = state.goals_ned[i]
     distance_m = wp.length(goal_ned - truth.pos_ned)
     progress_m = wp.length(goal_ned - last_pos_ned) - distance_m
-    time_s = float(border.steps[i] + 1) * rules.decision_s
+    time_s = float(buffers.steps[i] + 1) * rules.decision_s
     room_m = room_beside(rig.worlds[rig.i_world[i]], truth)
     outcome = navigate_outcome(
         numbers, distance_m, has_touched(truth), truth.height_agl_m, time_s, state.start_distance_m[i]
@@ -146,18 +146,18 @@ def judge(border: Border, rules: Rules, rig: RigArrays, state: NavigateState, st
     state.measures[i, 3] = state.path_m[i]
     state.measures[i, 4] = time_s
     state.measures[i, 5] = state.start_distance_m[i]
-    write_frame(border, rules, rig, state, i)
-    start.is_starting[i] = close_step(border, i, reward, outcome)
+    write_frame(buffers, rules, rig, state, i)
+    start.is_starting[i] = close_step(buffers, i, reward, outcome)
 
 
 @wp.kernel(enable_backward=False)
-def prepare(border: Border, rules: Rules, state: NavigateState, start: Start) -> None:
+def prepare(buffers: StepBuffers, rules: Rules, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     start.is_growing[i] = False
     if not start.is_starting[i]:
         return
-    seed = border.seed[0]
-    episode = begin_episode(border, i)
+    seed = buffers.seed[0]
+    episode = begin_episode(buffers, i)
     numbers = state.numbers[i]
     state.actions[i] = wp.vec4()
     start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, rules.is_test)
@@ -172,12 +172,12 @@ def prepare(border: Border, rules: Rules, state: NavigateState, start: Start) ->
 
 
 @wp.kernel(enable_backward=False)
-def place(border: Border, rig: RigArrays, state: NavigateState, start: Start) -> None:
+def place(buffers: StepBuffers, rig: RigArrays, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     if not start.is_starting[i]:
         return
-    seed = border.seed[0]
-    episode = border.episodes[i] - 1
+    seed = buffers.seed[0]
+    episode = buffers.episodes[i] - 1
     numbers = state.numbers[i]
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
     pos_ned = rig.truth[i].pos_ned
@@ -195,7 +195,7 @@ def place(border: Border, rig: RigArrays, state: NavigateState, start: Start) ->
 
 
 @wp.kernel(enable_backward=False)
-def show(border: Border, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
+def show(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     if start.is_starting[i]:
-        write_frame(border, rules, rig, state, i)
+        write_frame(buffers, rules, rig, state, i)

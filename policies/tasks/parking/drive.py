@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from policies.tasks.episode import Border
+from policies.tasks.episode import StepBuffers
 from policies.tasks.layout import Branch
 from policies.tasks.parking.arena import pose_at
 from policies.tasks.parking.car import DT, damped_push
@@ -43,10 +43,10 @@ class Motion:
 
 
 @wp.func
-def command_of(border: Border, i: int, rules: Rules) -> Command:
+def command_of(buffers: StepBuffers, i: int, rules: Rules) -> Command:
     """The chosen action. A turn of `push-or-turn` leaves the push out."""
     command = Command()
-    first = border.branches[i, 0]
+    first = buffers.branches[i, 0]
     command.turn = wp.where(first == 1, 1.0, wp.where(first == 2, -1.0, 0.0))
     if rules.actions == _STEER:
         command.push = 1.0
@@ -54,7 +54,7 @@ def command_of(border: Border, i: int, rules: Rules) -> Command:
     elif rules.actions == _PUSH_OR_TURN:
         command.push = wp.where(first == 0, 1.0, 0.0)
     else:
-        second = border.branches[i, 1]
+        second = buffers.branches[i, 1]
         command.push = wp.where(second == 1, 1.0, 0.0)
         if rules.actions == _STEER_AND_SHIFT and second == 2:
             command.push = -1.0

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from common.rng import draw_key
-from policies.tasks.episode import RUNNING, SUCCESS, Border, begin_episode, close_step
+from policies.tasks.episode import RUNNING, SUCCESS, StepBuffers, begin_episode, close_step
 from policies.tasks.layout import Layout
 from policies.tasks.parking.arena import (
     BLOCK_HEIGHT,
@@ -141,7 +141,7 @@ def way_left(motion: Motion, scene: Scene, rules: Rules, numbers: CarNumbers) ->
 
 @wp.func
 def place_blocks(
-    border: Border,
+    buffers: StepBuffers,
     rules: Rules,
     places: Level1Places,
     blocks: Blocks,
@@ -153,7 +153,7 @@ def place_blocks(
         others = Scene()
         for k in range(BLOCK_COUNT):
             others.obstacle_count = k
-            others.obstacles[k] = draw_block(others, border.seed[0], i, episode, _BLOCK_STREAM + k)
+            others.obstacles[k] = draw_block(others, buffers.seed[0], i, episode, _BLOCK_STREAM + k)
         for k in range(BLOCK_COUNT):
             blocks.poses[i, k] = others.obstacles[k]
     else:
@@ -163,7 +163,7 @@ def place_blocks(
 
 @wp.func
 def place_goal(
-    border: Border,
+    buffers: StepBuffers,
     rules: Rules,
     places: Level1Places,
     cars: CarState,
@@ -175,18 +175,18 @@ def place_goal(
     scene = scene_of(cars, blocks, i)
     place = wp.vec2()
     if rules.are_goals_anywhere:
-        place = draw_goal(places.cells, scene, border.seed[0], i, episode, _GOAL_STREAM)
+        place = draw_goal(places.cells, scene, buffers.seed[0], i, episode, _GOAL_STREAM)
     elif rules.is_reset_coded and episode == 0:
         place = places.marker
     else:
-        rng = draw_key(border.seed[0], i, episode, _GOAL_STREAM)
+        rng = draw_key(buffers.seed[0], i, episode, _GOAL_STREAM)
         place = places.spots[wp.randi(rng, 0, _SPOT_COUNT)]
     cars.goal[i] = pose_at(place, wp.radians(cars.numbers[i].goal_yaw_deg))
 
 
 @wp.func
 def place_car(
-    border: Border,
+    buffers: StepBuffers,
     rules: Rules,
     places: Level1Places,
     cars: CarState,
@@ -197,8 +197,8 @@ def place_car(
     """The start pose; the velocity is not touched."""
     if rules.are_starts_anywhere:
         range_m = cars.numbers[i].start_range_m
-        cars.pos[i] = draw_start(scene_of(cars, blocks, i), 0, range_m, border.seed[0], i, episode, _START_STREAM)
-        rng = draw_key(border.seed[0], i, episode, _YAW_STREAM)
+        cars.pos[i] = draw_start(scene_of(cars, blocks, i), 0, range_m, buffers.seed[0], i, episode, _START_STREAM)
+        rng = draw_key(buffers.seed[0], i, episode, _YAW_STREAM)
         cars.yaw[i] = wp.pi * (2.0 * wp.randf(rng) - 1.0)
     else:
         cars.pos[i] = place_of(places.start)
@@ -207,7 +207,7 @@ def place_car(
 
 @wp.func
 def begin_row(
-    border: Border,
+    buffers: StepBuffers,
     rules: Rules,
     places: Level1Places,
     cars: CarState,
@@ -216,14 +216,14 @@ def begin_row(
     outcome: int,
 ) -> None:
     """Begins an episode after an outcome. As coded, only a park gives a new car and a new goal."""
-    episode = begin_episode(border, i)
+    episode = begin_episode(buffers, i)
     is_new = episode == 0 or outcome == SUCCESS or not rules.is_reset_coded
     if is_new:
-        place_blocks(border, rules, places, blocks, i, episode)
-        place_goal(border, rules, places, cars, blocks, i, episode)
+        place_blocks(buffers, rules, places, blocks, i, episode)
+        place_goal(buffers, rules, places, cars, blocks, i, episode)
         cars.vel[i] = wp.vec2(0.0, 0.0)
         cars.last_m[i] = 0.0  # a field of a new car
-    place_car(border, rules, places, cars, blocks, i, episode)
+    place_car(buffers, rules, places, cars, blocks, i, episode)
     numbers = cars.numbers[i]
     motion = motion_of(cars, i)
     scene = scene_of(cars, blocks, i)
@@ -231,12 +231,12 @@ def begin_row(
     if rules.reward == _AS_DOCUMENTED:
         cars.last_m[i] = wp.length(gap_to(motion.pose, scene.goal[0], _SPOT_HEIGHT, scene.goal[1]))
     cars.way_m[i] = way_left(motion, scene, rules, numbers)
-    observe(border, i, motion, scene, rules, numbers)
+    observe(buffers, i, motion, scene, rules, numbers)
 
 
 @wp.kernel(enable_backward=False)
 def begin(
-    border: Border,
+    buffers: StepBuffers,
     is_chosen: wp.array(dtype=wp.bool),
     rules: Rules,
     places: Level1Places,
@@ -246,17 +246,17 @@ def begin(
     """Starts an episode in the chosen rows."""
     i = wp.tid()
     if is_chosen[i]:
-        begin_row(border, rules, places, cars, blocks, i, RUNNING)
+        begin_row(buffers, rules, places, cars, blocks, i, RUNNING)
 
 
 @wp.kernel(enable_backward=False)
-def step(border: Border, rules: Rules, places: Level1Places, cars: CarState, blocks: Blocks) -> None:
+def step(buffers: StepBuffers, rules: Rules, places: Level1Places, cars: CarState, blocks: Blocks) -> None:
     """One decision of every row."""
     i = wp.tid()
     numbers = cars.numbers[i]
     scene = scene_of(cars, blocks, i)
     motion = motion_of(cars, i)
-    command = command_of(border, i, rules)
+    command = command_of(buffers, i, rules)
     outcome = int(RUNNING)
     reward = float(0.0)
     for tick in range(rules.tick_count):
@@ -266,16 +266,16 @@ def step(border: Border, rules: Rules, places: Level1Places, cars: CarState, blo
                 reward += table_reward(cars, i, motion.pose, scene, _SPOT_HEIGHT, _BLOCK_HEIGHT, rules, numbers)
             motion = moved(motion, command, is_applied, numbers)
             outcome = outcome_of(contact_of(motion.pose, scene, numbers), motion, scene.goal, rules, numbers)
-    outcome = capped(outcome, border.steps[i], numbers)
+    outcome = capped(outcome, buffers.steps[i], numbers)
     reward += end_reward(outcome, numbers)
     if rules.reward == _PROGRESS:
         way_m = way_left(motion, scene, rules, numbers)
         reward += progress_reward(cars.way_m[i], way_m, outcome, numbers)
         cars.way_m[i] = way_m
     keep_motion(cars, i, motion)
-    observe(border, i, motion, scene, rules, numbers)
-    if close_step(border, i, reward, outcome):
-        begin_row(border, rules, places, cars, blocks, i, outcome)
+    observe(buffers, i, motion, scene, rules, numbers)
+    if close_step(buffers, i, reward, outcome):
+        begin_row(buffers, rules, places, cars, blocks, i, outcome)
 
 
 class Parking1(ParkingTask):
@@ -298,7 +298,7 @@ class Parking1(ParkingTask):
         self.blocks = self._zeros("blocks", (env_count, len(BLOCK_PLACES)), wp.vec4)
         blocks = Blocks()
         blocks.poses = self.blocks
-        blocks.numbers = typed_rows(self.border.numbers, Level1Numbers, first=len(CAR_NUMBERS))
+        blocks.numbers = typed_rows(self.buffers.numbers, Level1Numbers, first=len(CAR_NUMBERS))
         self._record(begin, step, [rules, self._places(settings.split), self.world, blocks])
 
     def _places(self, split: str) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from common.rng import draw_key
-from policies.tasks.episode import RUNNING, SUCCESS, Border, begin_episode, close_step
+from policies.tasks.episode import RUNNING, SUCCESS, StepBuffers, begin_episode, close_step
 from policies.tasks.layout import Layout
 from policies.tasks.parking.arena import (
     LEVEL2_SPOT,
@@ -175,12 +175,14 @@ def portal_row(storey_before: int, goal: wp.vec4, more: Level2Numbers) -> float:
 
 
 @wp.func
-def place_movers(border: Border, rules: Rules, places: Level2Places, movers: Movers, i: int, episode: int) -> None:
+def place_movers(
+    buffers: StepBuffers, rules: Rules, places: Level2Places, movers: Movers, i: int, episode: int
+) -> None:
     """The capsules of a new world: on storey 1 the first along z, as published; anywhere, one along each axis."""
     for k in range(_MOVER_COUNT):
         mover = places.movers[k]
         if rules.are_obstacles_anywhere:
-            mover = draw_mover(k // PER_STOREY, k % 2 == 1, border.seed[0], i, episode, _MOVER_STREAM + k)
+            mover = draw_mover(k // PER_STOREY, k % 2 == 1, buffers.seed[0], i, episode, _MOVER_STREAM + k)
         movers.poses[i, k] = mover
     for storey in range(2):
         movers.touching[i, storey] = 0
@@ -188,10 +190,10 @@ def place_movers(border: Border, rules: Rules, places: Level2Places, movers: Mov
 
 @wp.func
 def place_goal(
-    border: Border, rules: Rules, places: Level2Places, cars: CarState, movers: Movers, i: int, episode: int
+    buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarState, movers: Movers, i: int, episode: int
 ) -> None:
     """A new goal, on storey 2 with its chance."""
-    seed = border.seed[0]
+    seed = buffers.seed[0]
     share = movers.numbers[i].storey_2_share
     storey = wp.where(wp.randf(draw_key(seed, i, episode, _STOREY_STREAM)) < share, 1, 0)
     place = wp.vec2()
@@ -212,11 +214,11 @@ def place_goal(
 
 @wp.func
 def place_car(
-    border: Border, rules: Rules, places: Level2Places, cars: CarState, movers: Movers, i: int, episode: int
+    buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarState, movers: Movers, i: int, episode: int
 ) -> None:
     """The start pose; the velocity is not touched."""
     if rules.are_starts_anywhere:
-        seed = border.seed[0]
+        seed = buffers.seed[0]
         storey = storey_of(cars.goal[i][0])
         if wp.randf(draw_key(seed, i, episode, _START_STOREY_STREAM)) < movers.numbers[i].start_elsewhere_share:
             storey = 1 - storey
@@ -230,17 +232,17 @@ def place_car(
 
 @wp.func
 def begin_row(
-    border: Border, rules: Rules, places: Level2Places, cars: CarState, movers: Movers, i: int, outcome: int
+    buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarState, movers: Movers, i: int, outcome: int
 ) -> None:
     """Begins an episode after an outcome. The capsules run on unless they are to be anywhere."""
-    episode = begin_episode(border, i)
+    episode = begin_episode(buffers, i)
     if episode == 0 or rules.are_obstacles_anywhere:
-        place_movers(border, rules, places, movers, i, episode)
+        place_movers(buffers, rules, places, movers, i, episode)
     if episode == 0 or outcome == SUCCESS or not rules.is_reset_coded:
-        place_goal(border, rules, places, cars, movers, i, episode)
+        place_goal(buffers, rules, places, cars, movers, i, episode)
         cars.vel[i] = wp.vec2(0.0, 0.0)
         cars.last_m[i] = 0.0  # a field of a new car
-    place_car(border, rules, places, cars, movers, i, episode)
+    place_car(buffers, rules, places, cars, movers, i, episode)
     numbers = cars.numbers[i]
     motion = motion_of(cars, i)
     scene = scene_of(cars, movers, places, i, storey_of(motion.pos[0]))
@@ -248,12 +250,12 @@ def begin_row(
     if rules.reward == _AS_DOCUMENTED:
         cars.last_m[i] = wp.length(gap_to(motion.pose, scene.goal[0], GOAL_HEIGHT, scene.goal[1]))
     cars.way_m[i] = route_left(motion, scene.goal, places, rules, numbers)
-    observe(border, i, motion, movers.poses, scene, rules, numbers, movers.numbers[i])
+    observe(buffers, i, motion, movers.poses, scene, rules, numbers, movers.numbers[i])
 
 
 @wp.kernel(enable_backward=False)
 def begin(
-    border: Border,
+    buffers: StepBuffers,
     is_chosen: wp.array(dtype=wp.bool),
     rules: Rules,
     places: Level2Places,
@@ -263,18 +265,18 @@ def begin(
     """Starts an episode in the chosen rows."""
     i = wp.tid()
     if is_chosen[i]:
-        begin_row(border, rules, places, cars, movers, i, RUNNING)
+        begin_row(buffers, rules, places, cars, movers, i, RUNNING)
 
 
 @wp.kernel(enable_backward=False)
-def step(border: Border, rules: Rules, places: Level2Places, cars: CarState, movers: Movers) -> None:
+def step(buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarState, movers: Movers) -> None:
     """One decision of every row."""
     i = wp.tid()
     numbers = cars.numbers[i]
     more = movers.numbers[i]
     goal = cars.goal[i]
     motion = motion_of(cars, i)
-    command = command_of(border, i, rules)
+    command = command_of(buffers, i, rules)
     outcome = int(RUNNING)
     reward = float(0.0)
     for tick in range(rules.tick_count):
@@ -291,7 +293,7 @@ def step(border: Border, rules: Rules, places: Level2Places, cars: CarState, mov
                 reward += portal_row(storey, goal, more)
                 motion = through_portal(motion, places)
             outcome = outcome_of(contact, motion, goal, rules, numbers)
-    outcome = capped(outcome, border.steps[i], numbers)
+    outcome = capped(outcome, buffers.steps[i], numbers)
     reward += end_reward(outcome, numbers)
     if rules.reward == _PROGRESS:
         way_m = route_left(motion, goal, places, rules, numbers)
@@ -299,9 +301,9 @@ def step(border: Border, rules: Rules, places: Level2Places, cars: CarState, mov
         cars.way_m[i] = way_m
     keep_motion(cars, i, motion)
     scene = scene_of(cars, movers, places, i, storey_of(motion.pos[0]))
-    observe(border, i, motion, movers.poses, scene, rules, numbers, more)
-    if close_step(border, i, reward, outcome):
-        begin_row(border, rules, places, cars, movers, i, outcome)
+    observe(buffers, i, motion, movers.poses, scene, rules, numbers, more)
+    if close_step(buffers, i, reward, outcome):
+        begin_row(buffers, rules, places, cars, movers, i, outcome)
 
 
 class Parking2(ParkingTask):
@@ -334,7 +336,7 @@ class Parking2(ParkingTask):
         movers = Movers()
         movers.poses = self.movers
         movers.touching = self._zeros("touching", (env_count, 2), int)
-        movers.numbers = typed_rows(self.border.numbers, Level2Numbers, first=len(CAR_NUMBERS))
+        movers.numbers = typed_rows(self.buffers.numbers, Level2Numbers, first=len(CAR_NUMBERS))
         self._record(begin, step, [rules, self._places(settings.split), self.world, movers])
 
     def _places(self, split: str) -> Any:

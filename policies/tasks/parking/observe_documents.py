@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from policies.tasks.episode import Border
+from policies.tasks.episode import StepBuffers
 from policies.tasks.layout import Element
 from policies.tasks.parking.arena import CAR_HEIGHT
 
@@ -23,11 +23,11 @@ def world_elements(name: str, unit: str = "1", is_goal: bool = False) -> tuple[E
 
 
 @wp.func
-def write_vector(border: Border, i: int, at: int, vector: wp.vec3) -> int:
+def write_vector(buffers: StepBuffers, i: int, at: int, vector: wp.vec3) -> int:
     """Writes three floats; returns the next column."""
-    border.observations[i, at] = vector[0]
-    border.observations[i, at + 1] = vector[1]
-    border.observations[i, at + 2] = vector[2]
+    buffers.observations[i, at] = vector[0]
+    buffers.observations[i, at + 1] = vector[1]
+    buffers.observations[i, at + 2] = vector[2]
     return at + 3
 
 

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from policies.tasks.episode import Border, open_frame
+from policies.tasks.episode import StepBuffers, open_frame
 from policies.tasks.layout import Element
 from policies.tasks.parking.arena import (
     BLOCK_HEIGHT,
@@ -57,36 +57,36 @@ def frame_of(choices: Choices, rules: Rules, tags: tuple[str, ...]) -> tuple[Ele
 
 
 @wp.func
-def observe_units(border: Border, i: int, at: int, car: wp.vec4, scene: Scene, is_documented: bool) -> int:
+def observe_units(buffers: StepBuffers, i: int, at: int, car: wp.vec4, scene: Scene, is_documented: bool) -> int:
     """The documents' 27 floats."""
     goal = scene.goal
     next_at = at
     if is_documented:
-        next_at = write_vector(border, i, next_at, wp.normalize(gap_to(car, goal[0], _SPOT_HEIGHT, goal[1])))
-    next_at = write_vector(border, i, next_at, unit_to(car, goal[0], _SPOT_HEIGHT, goal[1]))
+        next_at = write_vector(buffers, i, next_at, wp.normalize(gap_to(car, goal[0], _SPOT_HEIGHT, goal[1])))
+    next_at = write_vector(buffers, i, next_at, unit_to(car, goal[0], _SPOT_HEIGHT, goal[1]))
     for k in range(BLOCK_COUNT):
         block = scene.obstacles[k]
-        next_at = write_vector(border, i, next_at, unit_to(car, block[0], _BLOCK_HEIGHT, block[1]))
-    next_at = write_vector(border, i, next_at, unit_to(car, WALL_CENTRE_X_LOW, _WALL_HEIGHT, 0.0))
-    next_at = write_vector(border, i, next_at, unit_to(car, WALL_CENTRE_X_HIGH, _WALL_HEIGHT, 0.0))
-    next_at = write_vector(border, i, next_at, unit_to(car, 0.0, _WALL_HEIGHT, WALL_CENTRE_Z_LOW))
-    next_at = write_vector(border, i, next_at, unit_to(car, 0.0, _WALL_HEIGHT, WALL_CENTRE_Z_HIGH))
+        next_at = write_vector(buffers, i, next_at, unit_to(car, block[0], _BLOCK_HEIGHT, block[1]))
+    next_at = write_vector(buffers, i, next_at, unit_to(car, WALL_CENTRE_X_LOW, _WALL_HEIGHT, 0.0))
+    next_at = write_vector(buffers, i, next_at, unit_to(car, WALL_CENTRE_X_HIGH, _WALL_HEIGHT, 0.0))
+    next_at = write_vector(buffers, i, next_at, unit_to(car, 0.0, _WALL_HEIGHT, WALL_CENTRE_Z_LOW))
+    next_at = write_vector(buffers, i, next_at, unit_to(car, 0.0, _WALL_HEIGHT, WALL_CENTRE_Z_HIGH))
     if not is_documented:
-        next_at = write_vector(border, i, next_at, wp.vec3(0.0, 0.0, 0.0))  # ML-Agents pads what is too short
+        next_at = write_vector(buffers, i, next_at, wp.vec3(0.0, 0.0, 0.0))  # ML-Agents pads what is too short
     return next_at
 
 
 @wp.func
-def observe(border: Border, i: int, motion: Motion, scene: Scene, rules: Rules, numbers: CarNumbers) -> None:
+def observe(buffers: StepBuffers, i: int, motion: Motion, scene: Scene, rules: Rules, numbers: CarNumbers) -> None:
     """The newest frame."""
-    at = open_frame(border, i)
+    at = open_frame(buffers, i)
     if rules.observation == _RANGED:
         box = box_of_car(motion.pose, numbers.box_ahead_m)
-        at = write_goal(border, i, at, box, scene.goal, scene.goal_half)
-        at = write_velocity(border, i, at, box, motion.vel)
-        at = write_obstacles(border, i, at, box, scene)
-        at = write_walls(border, i, at, box)
+        at = write_goal(buffers, i, at, box, scene.goal, scene.goal_half)
+        at = write_velocity(buffers, i, at, box, motion.vel)
+        at = write_obstacles(buffers, i, at, box, scene)
+        at = write_walls(buffers, i, at, box)
     else:
-        at = observe_units(border, i, at, motion.pose, scene, rules.observation == _AS_DOCUMENTED)
+        at = observe_units(buffers, i, at, motion.pose, scene, rules.observation == _AS_DOCUMENTED)
     if rules.ray_count >= 0:
-        write_rays(border, i, at, motion.pose, scene, rules, numbers)
+        write_rays(buffers, i, at, motion.pose, scene, rules, numbers)

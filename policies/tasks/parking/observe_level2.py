@@ -8,7 +8,7 @@ velocities, as a tracking sensor would.
 
 import warp as wp
 
-from policies.tasks.episode import Border, open_frame
+from policies.tasks.episode import StepBuffers, open_frame
 from policies.tasks.layout import Element
 from policies.tasks.parking.arena import (
     MOVER_HEIGHT,
@@ -87,43 +87,43 @@ def frame_of(choices: Choices, rules: Rules, tags: tuple[str, ...]) -> tuple[Ele
 
 
 @wp.func
-def write_target(border: Border, i: int, at: int, car: wp.vec4, x: float, y: float, z: float) -> int:
+def write_target(buffers: StepBuffers, i: int, at: int, car: wp.vec4, x: float, y: float, z: float) -> int:
     """World direction and car-frame unit vector to a point; returns the next column."""
     direction = wp.normalize(gap_to(car, x, y, z))
-    next_at = write_vector(border, i, at, direction)
-    return write_vector(border, i, next_at, seen_from(car, direction))
+    next_at = write_vector(buffers, i, at, direction)
+    return write_vector(buffers, i, next_at, seen_from(car, direction))
 
 
 @wp.func
-def write_storey_walls(border: Border, i: int, at: int, car: wp.vec4, x: float, z: float) -> int:
+def write_storey_walls(buffers: StepBuffers, i: int, at: int, car: wp.vec4, x: float, z: float) -> int:
     """Unit vectors to the centres of four walls round a storey's centre; returns the next column."""
-    next_at = write_vector(border, i, at, unit_to(car, x + _WALL_LOW_X, _WALL_HEIGHT, z))
-    next_at = write_vector(border, i, next_at, unit_to(car, x + _WALL_HIGH_X, _WALL_HEIGHT, z))
-    next_at = write_vector(border, i, next_at, unit_to(car, x, _WALL_HEIGHT, z + _WALL_LOW_Z))
-    return write_vector(border, i, next_at, unit_to(car, x, _WALL_HEIGHT, z + _WALL_HIGH_Z))
+    next_at = write_vector(buffers, i, at, unit_to(car, x + _WALL_LOW_X, _WALL_HEIGHT, z))
+    next_at = write_vector(buffers, i, next_at, unit_to(car, x + _WALL_HIGH_X, _WALL_HEIGHT, z))
+    next_at = write_vector(buffers, i, next_at, unit_to(car, x, _WALL_HEIGHT, z + _WALL_LOW_Z))
+    return write_vector(buffers, i, next_at, unit_to(car, x, _WALL_HEIGHT, z + _WALL_HIGH_Z))
 
 
 @wp.func
 def observe_coded(
-    border: Border, i: int, at: int, motion: Motion, goal: wp.vec4, movers: wp.array2d(dtype=wp.vec4)
+    buffers: StepBuffers, i: int, at: int, motion: Motion, goal: wp.vec4, movers: wp.array2d(dtype=wp.vec4)
 ) -> int:
     """The 57 floats of the published code; returns the next column."""
     car = motion.pose
     next_at = at
     for k in range(2):
-        next_at = write_target(border, i, next_at, car, _PORTALS[k, 0], _PORTALS[k, 1], _PORTALS[k, 2])
-    next_at = write_target(border, i, next_at, car, goal[0], GOAL_HEIGHT, goal[1])
+        next_at = write_target(buffers, i, next_at, car, _PORTALS[k, 0], _PORTALS[k, 1], _PORTALS[k, 2])
+    next_at = write_target(buffers, i, next_at, car, goal[0], GOAL_HEIGHT, goal[1])
     for k in range(_MOVER_COUNT):
         mover = movers[i, k]
-        next_at = write_vector(border, i, next_at, unit_to(car, mover[0], _MOVER_HEIGHT, mover[1]))
-    next_at = write_storey_walls(border, i, next_at, car, 0.0, 0.0)
-    next_at = write_storey_walls(border, i, next_at, car, _STOREY_X_2, _STOREY_Z_2)
-    return write_vector(border, i, next_at, wp.vec3(motion.vel[0], 0.0, motion.vel[1]))
+        next_at = write_vector(buffers, i, next_at, unit_to(car, mover[0], _MOVER_HEIGHT, mover[1]))
+    next_at = write_storey_walls(buffers, i, next_at, car, 0.0, 0.0)
+    next_at = write_storey_walls(buffers, i, next_at, car, _STOREY_X_2, _STOREY_Z_2)
+    return write_vector(buffers, i, next_at, wp.vec3(motion.vel[0], 0.0, motion.vel[1]))
 
 
 @wp.func
 def observe_ranged(
-    border: Border,
+    buffers: StepBuffers,
     i: int,
     at: int,
     motion: Motion,
@@ -135,23 +135,23 @@ def observe_ranged(
     box = box_of_car(motion.pose, numbers.box_ahead_m)
     next_at = int(0)
     if scene.has_goal:
-        next_at = write_goal(border, i, at, box, scene.goal, scene.goal_half)
+        next_at = write_goal(buffers, i, at, box, scene.goal, scene.goal_half)
     else:  # the way leads through the portal
-        next_at = write_goal(border, i, at, box, scene.portal, portal_half())
-    border.observations[i, next_at] = wp.where(scene.has_goal, 1.0, 0.0)
-    next_at = write_velocity(border, i, next_at + 1, box, motion.vel)
-    next_at = write_obstacles(border, i, next_at, box, scene)
-    next_at = write_walls(border, i, next_at, box)
-    next_at = write_box(border, i, next_at, box, scene.portal, portal_half(), 0.0)
+        next_at = write_goal(buffers, i, at, box, scene.portal, portal_half())
+    buffers.observations[i, next_at] = wp.where(scene.has_goal, 1.0, 0.0)
+    next_at = write_velocity(buffers, i, next_at + 1, box, motion.vel)
+    next_at = write_obstacles(buffers, i, next_at, box, scene)
+    next_at = write_walls(buffers, i, next_at, box)
+    next_at = write_box(buffers, i, next_at, box, scene.portal, portal_half(), 0.0)
     for k in range(PER_STOREY):
         vel = forward_of(scene.obstacles[k]) * more.mover_speed_m_s
-        next_at = write_velocity(border, i, next_at, box, vel)
+        next_at = write_velocity(buffers, i, next_at, box, vel)
     return next_at
 
 
 @wp.func
 def observe(
-    border: Border,
+    buffers: StepBuffers,
     i: int,
     motion: Motion,
     movers: wp.array2d(dtype=wp.vec4),
@@ -161,12 +161,12 @@ def observe(
     more: Level2Numbers,
 ) -> None:
     """The newest frame."""
-    at = open_frame(border, i)
+    at = open_frame(buffers, i)
     if rules.observation == _RANGED:
-        at = observe_ranged(border, i, at, motion, scene, numbers, more)
+        at = observe_ranged(buffers, i, at, motion, scene, numbers, more)
     elif rules.observation == _AS_DOCUMENTED:
-        at = write_target(border, i, at, motion.pose, scene.goal[0], GOAL_HEIGHT, scene.goal[1])
+        at = write_target(buffers, i, at, motion.pose, scene.goal[0], GOAL_HEIGHT, scene.goal[1])
     else:
-        at = observe_coded(border, i, at, motion, scene.goal, movers)
+        at = observe_coded(buffers, i, at, motion, scene.goal, movers)
     if rules.ray_count >= 0:
-        write_rays(border, i, at, motion.pose, scene, rules, numbers)
+        write_rays(buffers, i, at, motion.pose, scene, rules, numbers)

@@ -6,7 +6,7 @@ large and what is far fades. The goal is a direction, a distance and a nearness,
 
 import warp as wp
 
-from policies.tasks.episode import Border
+from policies.tasks.episode import StepBuffers
 from policies.tasks.layout import Element
 from policies.tasks.parking.arena import (
     WALL_X_HIGH,
@@ -56,10 +56,10 @@ def surface_elements(*names: str) -> tuple[Element, ...]:
 
 
 @wp.func
-def write_pair(border: Border, i: int, at: int, pair: wp.vec2) -> int:
+def write_pair(buffers: StepBuffers, i: int, at: int, pair: wp.vec2) -> int:
     """Writes two floats; returns the next column."""
-    border.observations[i, at] = pair[0]
-    border.observations[i, at + 1] = pair[1]
+    buffers.observations[i, at] = pair[0]
+    buffers.observations[i, at + 1] = pair[1]
     return at + 2
 
 
@@ -71,51 +71,53 @@ def faded(gap: wp.vec2, radius: float) -> wp.vec2:
 
 
 @wp.func
-def write_velocity(border: Border, i: int, at: int, box: wp.vec4, vel: wp.vec2) -> int:
+def write_velocity(buffers: StepBuffers, i: int, at: int, box: wp.vec4, vel: wp.vec2) -> int:
     """A velocity in the car's frame; returns the next column."""
     seen = wp.vec2(wp.dot(vel, right_of(box)), wp.dot(vel, forward_of(box)))
-    return write_pair(border, i, at, seen * _PER_SPEED)
+    return write_pair(buffers, i, at, seen * _PER_SPEED)
 
 
 @wp.func
-def write_box(border: Border, i: int, at: int, box: wp.vec4, other: wp.vec4, half: wp.vec2, radius: float) -> int:
+def write_box(buffers: StepBuffers, i: int, at: int, box: wp.vec4, other: wp.vec4, half: wp.vec2, radius: float) -> int:
     """The nearest surface of a rounded box; returns the next column."""
     local = into_frame(other, place_of(box))
     gap = nearest_in_box(half, local) - local
     world = gap[0] * right_of(other) + gap[1] * forward_of(other)
     seen = wp.vec2(wp.dot(world, right_of(box)), wp.dot(world, forward_of(box)))
-    return write_pair(border, i, at, faded(seen, radius))
+    return write_pair(buffers, i, at, faded(seen, radius))
 
 
 @wp.func
-def write_goal(border: Border, i: int, at: int, box: wp.vec4, goal: wp.vec4, half: wp.vec2) -> int:
+def write_goal(buffers: StepBuffers, i: int, at: int, box: wp.vec4, goal: wp.vec4, half: wp.vec2) -> int:
     """The goal elements of what is to be driven to, with its half sizes; returns the next column."""
     gap = into_frame(box, place_of(goal))
     distance = wp.length(gap)
     nose = forward_of(goal)
-    next_at = write_pair(border, i, at, gap / wp.max(distance, 1.0e-6))
-    next_at = write_pair(border, i, next_at, wp.vec2(distance * _PER_RANGE, 1.0 / (1.0 + distance)))
-    next_at = write_pair(border, i, next_at, wp.vec2(wp.dot(nose, right_of(box)), wp.dot(nose, forward_of(box))))
-    return write_box(border, i, next_at, box, goal, half, 0.0)
+    next_at = write_pair(buffers, i, at, gap / wp.max(distance, 1.0e-6))
+    next_at = write_pair(buffers, i, next_at, wp.vec2(distance * _PER_RANGE, 1.0 / (1.0 + distance)))
+    next_at = write_pair(buffers, i, next_at, wp.vec2(wp.dot(nose, right_of(box)), wp.dot(nose, forward_of(box))))
+    return write_box(buffers, i, next_at, box, goal, half, 0.0)
 
 
 @wp.func
-def write_walls(border: Border, i: int, at: int, box: wp.vec4) -> int:
+def write_walls(buffers: StepBuffers, i: int, at: int, box: wp.vec4) -> int:
     """The four walls of the storey; returns the next column."""
     place = place_of(box) - storey_centre(storey_of(box[0]))
     x = wp.vec2(box[3], box[2])  # the world's axes in the car's frame
     z = wp.vec2(-box[2], box[3])
-    next_at = write_pair(border, i, at, faded((WALL_X_LOW - place[0]) * x, 0.0))
-    next_at = write_pair(border, i, next_at, faded((WALL_X_HIGH - place[0]) * x, 0.0))
-    next_at = write_pair(border, i, next_at, faded((WALL_Z_LOW - place[1]) * z, 0.0))
-    return write_pair(border, i, next_at, faded((WALL_Z_HIGH - place[1]) * z, 0.0))
+    next_at = write_pair(buffers, i, at, faded((WALL_X_LOW - place[0]) * x, 0.0))
+    next_at = write_pair(buffers, i, next_at, faded((WALL_X_HIGH - place[0]) * x, 0.0))
+    next_at = write_pair(buffers, i, next_at, faded((WALL_Z_LOW - place[1]) * z, 0.0))
+    return write_pair(buffers, i, next_at, faded((WALL_Z_HIGH - place[1]) * z, 0.0))
 
 
 @wp.func
-def write_obstacles(border: Border, i: int, at: int, box: wp.vec4, scene: Scene) -> int:
+def write_obstacles(buffers: StepBuffers, i: int, at: int, box: wp.vec4, scene: Scene) -> int:
     """The nearest surfaces of the scene's obstacles; returns the next column."""
     next_at = at
     for k in range(MAX_OBSTACLES):
         if k < scene.obstacle_count:
-            next_at = write_box(border, i, next_at, box, scene.obstacles[k], scene.obstacle_half, scene.obstacle_radius)
+            next_at = write_box(
+                buffers, i, next_at, box, scene.obstacles[k], scene.obstacle_half, scene.obstacle_radius
+            )
     return next_at

@@ -69,14 +69,14 @@ class ParkingPicture:
 
 def numbers_of(task: Any, i_env: int) -> dict[str, float]:
     """The numbers of an environment's episode by name."""
-    return dict(zip(task.number_table.names, task.border.numbers.numpy()[i_env].tolist(), strict=True))
+    return dict(zip(task.number_table.names, task.buffers.numbers.numpy()[i_env].tolist(), strict=True))
 
 
 def ray_fractions(task: Any, i_env: int) -> NDArray[np.float32]:
     """The last column of each ray in the newest frame."""
     size = task.rules.tag_count + 2
     count = 2 * task.rules.ray_count + 1
-    newest = task.border.observations.numpy()[i_env, -count * size :] if count > 0 else np.zeros(0, np.float32)
+    newest = task.buffers.observations.numpy()[i_env, -count * size :] if count > 0 else np.zeros(0, np.float32)
     return np.asarray(newest[size - 1 :: size], dtype=np.float32)
 
 

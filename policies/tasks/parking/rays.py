@@ -7,7 +7,7 @@ a capsule that is widened, and rounded, by the sphere's radius. What a sphere ov
 
 import warp as wp
 
-from policies.tasks.episode import Border
+from policies.tasks.episode import StepBuffers
 from policies.tasks.layout import Element
 from policies.tasks.parking.arena import (
     WALL_X_HIGH,
@@ -144,31 +144,33 @@ def cast_ray(start: wp.vec2, ray: wp.vec2, scene: Scene, rules: Rules, radius: f
 
 
 @wp.func
-def write_ray(border: Border, i: int, at: int, cast: Cast, length_m: float, rules: Rules) -> int:
+def write_ray(buffers: StepBuffers, i: int, at: int, cast: Cast, length_m: float, rules: Rules) -> int:
     """One ray's floats; returns the next column."""
     is_miss = cast.distance_m > length_m
     for k in range(rules.tag_count):
-        border.observations[i, at + k] = wp.where(k == cast.tag and not is_miss, 1.0, 0.0)
-    border.observations[i, at + rules.tag_count] = wp.where(is_miss, 1.0, 0.0)
-    border.observations[i, at + rules.tag_count + 1] = wp.where(is_miss, 1.0, cast.distance_m / length_m)
+        buffers.observations[i, at + k] = wp.where(k == cast.tag and not is_miss, 1.0, 0.0)
+    buffers.observations[i, at + rules.tag_count] = wp.where(is_miss, 1.0, 0.0)
+    buffers.observations[i, at + rules.tag_count + 1] = wp.where(is_miss, 1.0, cast.distance_m / length_m)
     return at + rules.tag_count + 2
 
 
 @wp.func
-def write_rays(border: Border, i: int, at: int, car: wp.vec4, scene: Scene, rules: Rules, numbers: CarNumbers) -> int:
+def write_rays(
+    buffers: StepBuffers, i: int, at: int, car: wp.vec4, scene: Scene, rules: Rules, numbers: CarNumbers
+) -> int:
     """The whole sensor, from the car's origin; returns the next column."""
     start = place_of(car)
     radius = numbers.ray_radius_m
     length_m = numbers.ray_length_m
     right = forward_of(car)
     left = right
-    next_at = write_ray(border, i, at, cast_ray(start, right, scene, rules, radius), length_m, rules)
+    next_at = write_ray(buffers, i, at, cast_ray(start, right, scene, rules, radius), length_m, rules)
     spacing_rad = wp.radians(numbers.ray_degrees) / float(wp.max(rules.ray_count, 1))
     sine = wp.sin(spacing_rad)
     cosine = wp.cos(spacing_rad)
     for _pair in range(rules.ray_count):
         right = turned(right, sine, cosine)
         left = turned(left, -sine, cosine)
-        next_at = write_ray(border, i, next_at, cast_ray(start, right, scene, rules, radius), length_m, rules)
-        next_at = write_ray(border, i, next_at, cast_ray(start, left, scene, rules, radius), length_m, rules)
+        next_at = write_ray(buffers, i, next_at, cast_ray(start, right, scene, rules, radius), length_m, rules)
+        next_at = write_ray(buffers, i, next_at, cast_ray(start, left, scene, rules, radius), length_m, rules)
     return next_at

@@ -64,7 +64,7 @@ class ParkingTask(Task):
         for name in ("yaw", "best_m", "last_m", "way_m"):
             setattr(state, name, self._zeros(name, self.env_count, float))
         state.goal = self._zeros("goal", self.env_count, wp.vec4)
-        state.numbers = typed_rows(self.border.numbers, CarNumbers)
+        state.numbers = typed_rows(self.buffers.numbers, CarNumbers)
         return state
 
     def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:

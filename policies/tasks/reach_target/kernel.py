@@ -12,7 +12,7 @@ from policies.tasks.episode import (
     RUNNING,
     SUCCESS,
     TIMEOUT,
-    Border,
+    StepBuffers,
     begin_episode,
     close_step,
     open_frame,
@@ -176,9 +176,9 @@ def is_test_square(x: float, z: float) -> bool:
 
 
 @wp.func
-def draw_target(border: Border, state: ReachState, rules: ReachRules, i: int, episode: int, count: int) -> None:
+def draw_target(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: int, episode: int, count: int) -> None:
     """Places the target of an episode, number `count`."""
-    rng = draw_key(border.seed[0], i, episode, _TARGET_STREAM + count)
+    rng = draw_key(buffers.seed[0], i, episode, _TARGET_STREAM + count)
     half = state.numbers[i].half_spawn_m
     x = wp.randf(rng, -half, half)
     z = wp.randf(rng, -half, half)
@@ -194,10 +194,10 @@ def draw_target(border: Border, state: ReachState, rules: ReachRules, i: int, ep
 
 
 @wp.func
-def place_car(border: Border, state: ReachState, rules: ReachRules, i: int, episode: int) -> None:
+def place_car(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: int, episode: int) -> None:
     """Sets the car down: in the middle as published, with a whole number of degrees, or anywhere; at rest."""
     n = state.numbers[i]
-    rng = draw_key(border.seed[0], i, episode, _YAW_STREAM)
+    rng = draw_key(buffers.seed[0], i, episode, _YAW_STREAM)
     motion = Motion()
     yaw = float(wp.randi(rng, -180, 180)) * _RAD
     x = float(0.0)
@@ -219,36 +219,36 @@ def way_to_edge(at: float, step: float, half: float) -> float:
 
 
 @wp.func
-def put3(border: Border, i: int, at: int, value: wp.vec3) -> None:
+def put3(buffers: StepBuffers, i: int, at: int, value: wp.vec3) -> None:
     """Three floats of an observation."""
     for k in range(3):
-        border.observations[i, at + k] = value[k]
+        buffers.observations[i, at + k] = value[k]
 
 
 @wp.func
-def observe_published(border: Border, state: ReachState, rules: ReachRules, i: int, at: int) -> None:
+def observe_published(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: int, at: int) -> None:
     """What the article's agents see, in their order."""
     pos = state.pos[i]
     away = state.target[i] - pos
     direction = away / wp.max(wp.length(away), _TINY)
     if rules.observation == _CAR:
-        put3(border, i, at, wp.quat_rotate_inv(state.q[i], away))
-        put3(border, i, at + 3, wp.quat_rotate_inv(state.q[i], state.vel[i]))
-        put3(border, i, at + 6, wp.quat_rotate_inv(state.q[i], direction))
+        put3(buffers, i, at, wp.quat_rotate_inv(state.q[i], away))
+        put3(buffers, i, at + 3, wp.quat_rotate_inv(state.q[i], state.vel[i]))
+        put3(buffers, i, at + 6, wp.quat_rotate_inv(state.q[i], direction))
         return
     lift = wp.vec3(0.0, 0.0, 0.0)
     if rules.is_stacked != 0:
         lift = wp.vec3(0.0, -_PLATFORM_DROP_M * float(i % _PLATFORMS), 0.0)
-    put3(border, i, at, state.target[i] + lift)
-    put3(border, i, at + 3, pos + lift)
-    put3(border, i, at + 6, state.vel[i])
+    put3(buffers, i, at, state.target[i] + lift)
+    put3(buffers, i, at + 3, pos + lift)
+    put3(buffers, i, at + 6, state.vel[i])
     if rules.observation == _WORLD_HEADING:
-        put3(border, i, at + 9, direction)
-        put3(border, i, at + 12, wp.quat_rotate(state.q[i], wp.vec3(0.0, 0.0, 1.0)))
+        put3(buffers, i, at + 9, direction)
+        put3(buffers, i, at + 12, wp.quat_rotate(state.q[i], wp.vec3(0.0, 0.0, 1.0)))
 
 
 @wp.func
-def observe_ego(border: Border, state: ReachState, i: int, at: int) -> None:
+def observe_ego(buffers: StepBuffers, state: ReachState, i: int, at: int) -> None:
     """Ours: bearing, distances, motion, the goal's heading, steering and the edges, as seen from the car."""
     pos = state.pos[i]
     yaw = yaw_of(state.q[i])
@@ -261,16 +261,16 @@ def observe_ego(border: Border, state: ReachState, i: int, at: int) -> None:
     vel_car = wp.quat_rotate_inv(state.q[i], state.vel[i])
     turn = state.target_yaw[i] - yaw
     half = state.numbers[i].half_platform_m
-    border.observations[i, at] = right / wp.max(distance, _TINY)
-    border.observations[i, at + 1] = ahead / wp.max(distance, _TINY)
-    border.observations[i, at + 2] = distance / _RANGE
-    border.observations[i, at + 3] = wp.min(distance / _NEAR, 1.0)
-    border.observations[i, at + 4] = vel_car[2] / _SPEED
-    border.observations[i, at + 5] = vel_car[0] / _SPEED
-    border.observations[i, at + 6] = state.omega_car[i][1]
-    border.observations[i, at + 7] = wp.sin(turn)
-    border.observations[i, at + 8] = wp.cos(turn)
-    border.observations[i, at + 9] = state.steer[i]
+    buffers.observations[i, at] = right / wp.max(distance, _TINY)
+    buffers.observations[i, at + 1] = ahead / wp.max(distance, _TINY)
+    buffers.observations[i, at + 2] = distance / _RANGE
+    buffers.observations[i, at + 3] = wp.min(distance / _NEAR, 1.0)
+    buffers.observations[i, at + 4] = vel_car[2] / _SPEED
+    buffers.observations[i, at + 5] = vel_car[0] / _SPEED
+    buffers.observations[i, at + 6] = state.omega_car[i][1]
+    buffers.observations[i, at + 7] = wp.sin(turn)
+    buffers.observations[i, at + 8] = wp.cos(turn)
+    buffers.observations[i, at + 9] = state.steer[i]
     for k in range(4):  # ahead, right, behind, left
         x = sin_yaw
         z = cos_yaw
@@ -281,46 +281,46 @@ def observe_ego(border: Border, state: ReachState, i: int, at: int) -> None:
             x = -x
             z = -z
         edge = wp.min(way_to_edge(pos[0], x, half), way_to_edge(pos[2], z, half))
-        border.observations[i, at + 10 + k] = wp.clamp(edge / _RANGE, -1.0, 2.0)
+        buffers.observations[i, at + 10 + k] = wp.clamp(edge / _RANGE, -1.0, 2.0)
 
 
 @wp.func
-def observe(border: Border, state: ReachState, rules: ReachRules, i: int) -> None:
+def observe(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: int) -> None:
     """Writes the newest frame."""
-    at = open_frame(border, i)
+    at = open_frame(buffers, i)
     if rules.observation <= _CAR:
-        observe_published(border, state, rules, i, at)
+        observe_published(buffers, state, rules, i, at)
     else:
-        observe_ego(border, state, i, at)
+        observe_ego(buffers, state, i, at)
 
 
 @wp.func
-def place(border: Border, state: ReachState, rules: ReachRules, i: int, is_car_kept: bool) -> None:
+def place(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: int, is_car_kept: bool) -> None:
     """Begins an episode: the target elsewhere; the car where it is after a success, otherwise at its start."""
-    episode = begin_episode(border, i)
+    episode = begin_episode(buffers, i)
     if not is_car_kept:
-        place_car(border, state, rules, i, episode)
+        place_car(buffers, state, rules, i, episode)
     state.reaches[i] = 0
-    draw_target(border, state, rules, i, episode, 0)
-    observe(border, state, rules, i)
+    draw_target(buffers, state, rules, i, episode, 0)
+    observe(buffers, state, rules, i)
 
 
 @wp.kernel(enable_backward=False)
-def begin(border: Border, is_chosen: wp.array(dtype=wp.bool), state: ReachState, rules: ReachRules) -> None:
+def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: ReachState, rules: ReachRules) -> None:
     """Starts an episode in the chosen rows."""
     i = wp.tid()
     if is_chosen[i]:
-        place(border, state, rules, i, False)
+        place(buffers, state, rules, i, False)
 
 
 @wp.kernel(enable_backward=False)
-def step(border: Border, state: ReachState, rules: ReachRules) -> None:
+def step(buffers: StepBuffers, state: ReachState, rules: ReachRules) -> None:
     """One decision of every row."""
     i = wp.tid()
     n = state.numbers[i]
     car = car_of(n)
-    steer = wp.clamp(border.continuous[i, 0], -1.0, 1.0)
-    controls = controls_of(n, steer, border.continuous[i, 1], border.continuous[i, 2])
+    steer = wp.clamp(buffers.continuous[i, 0], -1.0, 1.0)
+    controls = controls_of(n, steer, buffers.continuous[i, 1], buffers.continuous[i, 2])
     motion = motion_of(state, i)
     before = float(0.0)
     if rules.reward == _POTENTIAL:
@@ -340,7 +340,7 @@ def step(border: Border, state: ReachState, rules: ReachRules) -> None:
                 outcome = SUCCESS
                 break
             state.reaches[i] += 1
-            draw_target(border, state, rules, i, border.episodes[i] - 1, state.reaches[i])
+            draw_target(buffers, state, rules, i, buffers.episodes[i] - 1, state.reaches[i])
         if motion.pos[1] < 0.0:
             outcome = FELL
             break
@@ -351,7 +351,7 @@ def step(border: Border, state: ReachState, rules: ReachRules) -> None:
     state.steer[i] = steer
     if rules.reward == _SHAPED:
         reward += n.shaping_scale * speed_towards(motion, state.target[i])
-    is_late = outcome == RUNNING and float(border.steps[i] + 1) >= n.step_limit
+    is_late = outcome == RUNNING and float(buffers.steps[i] + 1) >= n.step_limit
     if is_late:
         outcome = wp.where(state.reaches[i] > 0, SUCCESS, TIMEOUT)
     if rules.reward == _POTENTIAL:
@@ -359,9 +359,9 @@ def step(border: Border, state: ReachState, rules: ReachRules) -> None:
         if reached == 0 and (outcome == RUNNING or is_late):
             after = potential(rules, n, motion, state.target[i], state.target_yaw[i])
         reward += n.shaping_gamma * after - before
-    observe(border, state, rules, i)
-    if close_step(border, i, reward, outcome):
+    observe(buffers, state, rules, i)
+    if close_step(buffers, i, reward, outcome):
         if is_late:  # also where SUCCESS says that the cut episode had reached a target
-            border.is_truncated[i] = True
-            border.is_terminated[i] = False
-        place(border, state, rules, i, outcome == SUCCESS and not is_late and rules.is_start_anywhere == 0)
+            buffers.is_truncated[i] = True
+            buffers.is_terminated[i] = False
+        place(buffers, state, rules, i, outcome == SUCCESS and not is_late and rules.is_start_anywhere == 0)

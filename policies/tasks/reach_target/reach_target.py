@@ -78,7 +78,7 @@ class ReachTarget(Task):
         state.target = self._zeros("target", env_count, wp.vec3)
         state.target_yaw = self._zeros("target_yaw", env_count, float)
         state.reaches = self._zeros("reaches", env_count, int)
-        state.numbers = typed_rows(self.border.numbers, ReachNumbers)
+        state.numbers = typed_rows(self.buffers.numbers, ReachNumbers)
         self.world = state
         self._record(begin, step, [state, _rules(settings)])
 
@@ -94,11 +94,11 @@ class ReachTarget(Task):
         height, width = near.pixels.shape[:2]
         canvas.pixels[:height, -width:] = near.pixels
         speed = float(np.linalg.norm(world.vel.numpy()[i_env]))
-        canvas.text(f"{float(self.border.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {speed:4.1f} m/s")
+        canvas.text(f"{float(self.buffers.steps.numpy()[i_env]) * self.decision_s:4.1f} s  {speed:4.1f} m/s")
         return canvas.pixels
 
     def _row(self, i_env: int) -> dict[str, float]:
-        return dict(zip(self.number_table.names, self.border.numbers.numpy()[i_env].tolist(), strict=True))
+        return dict(zip(self.number_table.names, self.buffers.numbers.numpy()[i_env].tolist(), strict=True))
 
     def _draw(self, canvas: Canvas, i_env: int) -> None:
         world: Any = self.world

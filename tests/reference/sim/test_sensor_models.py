@@ -41,7 +41,7 @@ def test_soft_and_hard_iron_act_as_matrix_and_offset():
     q = np.array([0.2, -0.4, 0.5, 0.7])
     q /= np.linalg.norm(q)
     recorder.bodies["q_ned_from_frd"][:] = q
-    seen = recorder.run(10)["mag"]["field_frd_gauss"][:, -1].astype(np.float64)
+    observation = recorder.run(10)["mag"]["field_frd_gauss"][:, -1].astype(np.float64)
     x, y, z, w = q
     rotation_ned_from_frd = np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -50,4 +50,4 @@ def test_soft_and_hard_iron_act_as_matrix_and_offset():
     ])  # fmt: skip
     field_frd = rotation_ned_from_frd.T @ recorder.models["mag"]["field_ned_gauss"][0].astype(np.float64)
     expected = recorder.states["mag"]["soft_iron"] @ field_frd + recorder.states["mag"]["hard_iron_frd"]
-    assert seen == pytest.approx(expected, abs=1e-6)
+    assert observation == pytest.approx(expected, abs=1e-6)

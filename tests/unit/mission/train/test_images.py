@@ -71,10 +71,10 @@ def test_a_policy_drives_by_what_it_sees():
     task.reset(0)
     driver = PolicyDriver(policy)
     driver.act(task)
-    first = task.border.continuous.numpy().copy()
-    task.border.images.zero_()
+    first = task.buffers.continuous.numpy().copy()
+    task.buffers.images.zero_()
     driver.act(task)
-    assert (first != task.border.continuous.numpy()).all()
+    assert (first != task.buffers.continuous.numpy()).all()
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ def report(count):
     return Owner(pos_ned=(10.0, 0.0, -2.0), count=count)
 
 
-def seen(watch, at_s, place=(3.0, 1.0, 1.0)):
+def observation(watch, at_s, place=(3.0, 1.0, 1.0)):
     watch.update(round(at_s * 1e6), OWN, NOBODY, place)
 
 
@@ -32,14 +32,14 @@ def test_a_sighting_is_where_the_pilot_saw_the_owner():
 def test_the_distance_is_that_of_what_was_seen():
     watch = OwnerWatch()
     for k in range(10):
-        seen(watch, 0.1 * k, (2.0, 0.0, 0.0))
+        observation(watch, 0.1 * k, (2.0, 0.0, 0.0))
     assert watch.distance_m(OWN) == pytest.approx(2.0, abs=0.1)
 
 
 def test_silence_grows_from_the_last_sight():
     watch = OwnerWatch()
     assert watch.silence_s(0) == inf
-    seen(watch, 7.0)
+    observation(watch, 7.0)
     for k in range(20):
         watch.update(7_100_000 + 100_000 * k, OWN, NOBODY, None)
     assert watch.silence_s(9_500_000) == pytest.approx(2.5)
@@ -54,8 +54,8 @@ def test_the_phone_counts_unless_the_pilot_flies_by_sight_alone():
 
 def test_a_vehicle_that_has_restarted_is_watched_anew():
     watch = OwnerWatch()
-    seen(watch, 600.0)
-    seen(watch, 3.0)
+    observation(watch, 600.0)
+    observation(watch, 3.0)
     watch.update(9_000_000, OWN, NOBODY, None)
     assert watch.silence_s(9_000_000) == pytest.approx(6.0)
     watch.update(1_000_000, OWN, NOBODY, None)

@@ -44,11 +44,11 @@ def test_recorded_actions_lead_from_observation_to_observation():
     (episode,) = episodes
     task.reset(5)
     for k, action in enumerate(episode.continuous):
-        np.testing.assert_array_equal(task.border.observations.numpy()[0], episode.observations[k])
-        task.border.continuous.assign(action[None])
+        np.testing.assert_array_equal(task.buffers.observations.numpy()[0], episode.observations[k])
+        task.buffers.continuous.assign(action[None])
         task.step()
-        assert task.border.rewards.numpy()[0] == episode.rewards[k]
-    np.testing.assert_array_equal(task.border.final_observations.numpy()[0], episode.observations[-1])
+        assert task.buffers.rewards.numpy()[0] == episode.rewards[k]
+    np.testing.assert_array_equal(task.buffers.final_observations.numpy()[0], episode.observations[-1])
     assert episode.outcome is Outcome.SUCCESS
 
 

@@ -22,7 +22,7 @@ def test_every_task_can_be_driven(name, preset):
     for control in Control:
         driver.held = {control}
         driver.act(task)
-        actions.add((*task.border.continuous.numpy()[0], *task.border.branches.numpy()[0]))
+        actions.add((*task.buffers.continuous.numpy()[0], *task.buffers.branches.numpy()[0]))
     assert len(actions) >= 3  # at least left, right and ahead differ
 
 
@@ -31,7 +31,7 @@ def test_opposite_keys_cancel():
     driver = KeyboardDriver(task.layout)
     driver.held = {Control.LEFT, Control.RIGHT, Control.FORWARD}
     driver.act(task)
-    np.testing.assert_array_equal(task.border.continuous.numpy(), [[0.0, 1.0]])
+    np.testing.assert_array_equal(task.buffers.continuous.numpy(), [[0.0, 1.0]])
 
 
 def test_steering_goes_before_pushing_where_both_are_one_action():

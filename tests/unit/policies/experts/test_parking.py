@@ -17,7 +17,7 @@ def first_outcomes(name, count, seed, longest, **settings):
     for _ in range(longest):
         expert.act(task)
         task.step()
-        firsts = np.where(firsts == Outcome.RUNNING, task.border.outcomes.numpy(), firsts)
+        firsts = np.where(firsts == Outcome.RUNNING, task.buffers.outcomes.numpy(), firsts)
         if firsts.all():
             break
     return firsts

@@ -16,7 +16,7 @@ def test_pose_is_reached_from_anywhere():
     for _ in range(180):
         expert.act(task)
         task.step()
-        firsts = np.where(firsts == Outcome.RUNNING, task.border.outcomes.numpy(), firsts)
+        firsts = np.where(firsts == Outcome.RUNNING, task.buffers.outcomes.numpy(), firsts)
     assert (firsts == Outcome.SUCCESS).all()
 
 

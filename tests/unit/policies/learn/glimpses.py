@@ -10,7 +10,7 @@ from common.rng import draw_key
 from policies.learn.config.network import NetworkSettings
 from policies.learn.networks.action_distributions import CLIP
 from policies.learn.networks.policy import Policy
-from policies.tasks.episode import RUNNING, TIMEOUT, Border, begin_episode, close_step
+from policies.tasks.episode import RUNNING, TIMEOUT, StepBuffers, begin_episode, close_step
 from policies.tasks.layout import Element, ImageElement, Layout
 from policies.tasks.task import Task
 from policies.tasks.task_params import Number, typed_rows
@@ -32,42 +32,42 @@ class GlimpsesState:
 
 
 @wp.func
-def show(border: Border, state: GlimpsesState, i: int, step: int):
+def show(buffers: StepBuffers, state: GlimpsesState, i: int, step: int):
     """The square in the first image, nothing later."""
-    border.observations[i, 0] = 1.0
-    border.privileged[i, 0] = state.place[i]
-    border.privileged[i, 1] = wp.where(step == 0, 1.0, 0.0)
-    size = border.images.shape[2]
+    buffers.observations[i, 0] = 1.0
+    buffers.privileged[i, 0] = state.place[i]
+    buffers.privileged[i, 1] = wp.where(step == 0, 1.0, 0.0)
+    size = buffers.images.shape[2]
     middle = int(0.5 * (1.0 + state.place[i]) * float(size))
-    for y in range(border.images.shape[1]):
+    for y in range(buffers.images.shape[1]):
         for x in range(size):
             is_bright = step == 0 and wp.abs(x - middle) <= 2
-            for c in range(border.images.shape[3]):
-                border.images[i, y, x, c] = wp.uint8(wp.where(is_bright, 250, 20))
+            for c in range(buffers.images.shape[3]):
+                buffers.images[i, y, x, c] = wp.uint8(wp.where(is_bright, 250, 20))
 
 
 @wp.func
-def start(border: Border, state: GlimpsesState, i: int):
-    episode = begin_episode(border, i)
-    state.place[i] = wp.randf(draw_key(border.seed[0], i, episode, 1), -0.8, 0.8)
-    show(border, state, i, 0)
+def start(buffers: StepBuffers, state: GlimpsesState, i: int):
+    episode = begin_episode(buffers, i)
+    state.place[i] = wp.randf(draw_key(buffers.seed[0], i, episode, 1), -0.8, 0.8)
+    show(buffers, state, i, 0)
 
 
 @wp.kernel(enable_backward=False)
-def begin(border: Border, is_chosen: wp.array(dtype=wp.bool), state: GlimpsesState):
+def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: GlimpsesState):
     i = wp.tid()
     if is_chosen[i]:
-        start(border, state, i)
+        start(buffers, state, i)
 
 
 @wp.kernel(enable_backward=False)
-def step(border: Border, state: GlimpsesState):
+def step(buffers: StepBuffers, state: GlimpsesState):
     i = wp.tid()
-    reward = -wp.abs(border.continuous[i, 0] - state.place[i])
-    count = border.steps[i] + 1
-    show(border, state, i, count)
-    if close_step(border, i, reward, wp.where(float(count) >= state.numbers[i].length, TIMEOUT, RUNNING)):
-        start(border, state, i)
+    reward = -wp.abs(buffers.continuous[i, 0] - state.place[i])
+    count = buffers.steps[i] + 1
+    show(buffers, state, i, count)
+    if close_step(buffers, i, reward, wp.where(float(count) >= state.numbers[i].length, TIMEOUT, RUNNING)):
+        start(buffers, state, i)
 
 
 class Glimpses(Task):
@@ -83,7 +83,7 @@ class Glimpses(Task):
         super().__init__(layout, env_count, number_defaults={})
         state = GlimpsesState()
         state.place = self._zeros("place", env_count, float)
-        state.numbers = typed_rows(self.border.numbers, GlimpsesNumbers)
+        state.numbers = typed_rows(self.buffers.numbers, GlimpsesNumbers)
         self.world = state
         self._record(begin, step, [state])
 

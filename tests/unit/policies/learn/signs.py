@@ -3,7 +3,7 @@
 import warp as wp
 
 from common.rng import draw_key
-from policies.tasks.episode import SUCCESS, Border, begin_episode, close_step, open_frame
+from policies.tasks.episode import SUCCESS, StepBuffers, begin_episode, close_step, open_frame
 from policies.tasks.layout import Branch, Element, Layout
 from policies.tasks.task import Task
 from policies.tasks.task_params import Number, typed_rows
@@ -23,35 +23,35 @@ class SignsState:
 
 
 @wp.func
-def show(border: Border, state: SignsState, i: int):
+def show(buffers: StepBuffers, state: SignsState, i: int):
     """A new episode of one decision, and its sign."""
-    episode = begin_episode(border, i)
-    rng = draw_key(border.seed[0], i, episode, 1)
+    episode = begin_episode(buffers, i)
+    rng = draw_key(buffers.seed[0], i, episode, 1)
     state.sign[i] = wp.vec3(float(wp.randi(rng, 0, 3)), float(wp.randi(rng, 0, 2)), wp.randf(rng, -0.8, 0.8))
-    at = open_frame(border, i)
+    at = open_frame(buffers, i)
     for k in range(3):
-        border.observations[i, at + k] = state.sign[i][k]
+        buffers.observations[i, at + k] = state.sign[i][k]
 
 
 @wp.kernel(enable_backward=False)
-def begin(border: Border, is_chosen: wp.array(dtype=wp.bool), state: SignsState):
+def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: SignsState):
     i = wp.tid()
     if is_chosen[i]:
-        show(border, state, i)
+        show(buffers, state, i)
 
 
 @wp.kernel(enable_backward=False)
-def step(border: Border, state: SignsState):
+def step(buffers: StepBuffers, state: SignsState):
     i = wp.tid()
     sign = state.sign[i]
     reward = float(0.0)
-    for k in range(border.branches.shape[1]):
-        if border.branches[i, k] == int(sign[k]):
+    for k in range(buffers.branches.shape[1]):
+        if buffers.branches[i, k] == int(sign[k]):
             reward += 0.5
-    if border.continuous.shape[1] > 0:
-        reward -= wp.abs(border.continuous[i, 0] - sign[2])
-    if close_step(border, i, reward * state.numbers[i].pay, SUCCESS):
-        show(border, state, i)
+    if buffers.continuous.shape[1] > 0:
+        reward -= wp.abs(buffers.continuous[i, 0] - sign[2])
+    if close_step(buffers, i, reward * state.numbers[i].pay, SUCCESS):
+        show(buffers, state, i)
 
 
 class Signs(Task):
@@ -71,5 +71,5 @@ class Signs(Task):
         super().__init__(layout, env_count, number_defaults={})
         state = SignsState()
         state.sign = self._zeros("sign", env_count, wp.vec3)
-        state.numbers = typed_rows(self.border.numbers, SignsNumbers)
+        state.numbers = typed_rows(self.buffers.numbers, SignsNumbers)
         self._record(begin, step, [state])

@@ -6,7 +6,7 @@ Red, green and blue of pixel (0, 0) are row, episode and decision, so that an im
 import warp as wp
 
 from common.rng import draw_key
-from policies.tasks.episode import RUNNING, TIMEOUT, Border, begin_episode, close_step, open_frame
+from policies.tasks.episode import RUNNING, TIMEOUT, StepBuffers, begin_episode, close_step, open_frame
 from policies.tasks.layout import Element, ImageElement, Layout
 from policies.tasks.task import Task
 from policies.tasks.task_params import Number, typed_rows
@@ -28,52 +28,52 @@ class SquaresState:
 
 
 @wp.func
-def show(border: Border, state: SquaresState, i: int):
+def show(buffers: StepBuffers, state: SquaresState, i: int):
     """Puts the square somewhere, and shows it."""
-    key = draw_key(border.seed[0], i, 100 * border.episodes[i] + border.steps[i], 1)
+    key = draw_key(buffers.seed[0], i, 100 * buffers.episodes[i] + buffers.steps[i], 1)
     state.place[i] = wp.randf(key, -0.75, 0.75)
     state.side[i] = wp.where(wp.randf(key) < 0.5, 1.0, -1.0)
-    border.observations[i, open_frame(border, i)] = state.side[i]
-    if border.privileged.shape[1] > 0:
-        border.privileged[i, 0] = state.place[i]
-    size = border.images.shape[2]
+    buffers.observations[i, open_frame(buffers, i)] = state.side[i]
+    if buffers.privileged.shape[1] > 0:
+        buffers.privileged[i, 0] = state.place[i]
+    size = buffers.images.shape[2]
     middle = int(0.5 * (1.0 + state.place[i]) * float(size))
-    for y in range(border.images.shape[1]):
+    for y in range(buffers.images.shape[1]):
         for x in range(size):
             is_inside = wp.abs(y - size // 2) <= HALF and wp.abs(x - middle) <= HALF
-            border.images[i, y, x, 0] = wp.uint8(wp.where(is_inside, 250, 20))
-            border.images[i, y, x, 1] = wp.uint8(60)
-            border.images[i, y, x, 2] = wp.uint8(wp.where(is_inside, 30, 120))
-    border.images[i, 0, 0, 0] = wp.uint8(i)
-    border.images[i, 0, 0, 1] = wp.uint8(border.episodes[i])
-    border.images[i, 0, 0, 2] = wp.uint8(border.steps[i])
+            buffers.images[i, y, x, 0] = wp.uint8(wp.where(is_inside, 250, 20))
+            buffers.images[i, y, x, 1] = wp.uint8(60)
+            buffers.images[i, y, x, 2] = wp.uint8(wp.where(is_inside, 30, 120))
+    buffers.images[i, 0, 0, 0] = wp.uint8(i)
+    buffers.images[i, 0, 0, 1] = wp.uint8(buffers.episodes[i])
+    buffers.images[i, 0, 0, 2] = wp.uint8(buffers.steps[i])
 
 
 @wp.kernel(enable_backward=False)
-def begin(border: Border, is_chosen: wp.array(dtype=wp.bool), state: SquaresState):
+def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: SquaresState):
     i = wp.tid()
     if is_chosen[i]:
-        begin_episode(border, i)
-        show(border, state, i)
+        begin_episode(buffers, i)
+        show(buffers, state, i)
 
 
 @wp.kernel(enable_backward=False)
-def step(border: Border, state: SquaresState):
+def step(buffers: StepBuffers, state: SquaresState):
     i = wp.tid()
-    reward = -wp.abs(border.continuous[i, 0] - state.place[i] * state.side[i])
-    is_over = float(border.steps[i] + 1) >= state.numbers[i].length
-    border.steps[i] += 1
-    show(border, state, i)
-    border.steps[i] -= 1
-    close_step(border, i, reward, wp.where(is_over, TIMEOUT, RUNNING))
+    reward = -wp.abs(buffers.continuous[i, 0] - state.place[i] * state.side[i])
+    is_over = float(buffers.steps[i] + 1) >= state.numbers[i].length
+    buffers.steps[i] += 1
+    show(buffers, state, i)
+    buffers.steps[i] -= 1
+    close_step(buffers, i, reward, wp.where(is_over, TIMEOUT, RUNNING))
 
 
 @wp.kernel(enable_backward=False)
-def begin_ended(border: Border, state: SquaresState):
+def begin_ended(buffers: StepBuffers, state: SquaresState):
     i = wp.tid()
-    if border.outcomes[i] != RUNNING:
-        begin_episode(border, i)
-        show(border, state, i)
+    if buffers.outcomes[i] != RUNNING:
+        begin_episode(buffers, i)
+        show(buffers, state, i)
 
 
 class Squares(Task):
@@ -95,10 +95,10 @@ class Squares(Task):
         state = SquaresState()
         state.place = self._zeros("place", env_count, float)
         state.side = self._zeros("side", env_count, float)
-        state.numbers = typed_rows(self.border.numbers, SquaresNumbers)
+        state.numbers = typed_rows(self.buffers.numbers, SquaresNumbers)
         self.world = state
         self._record(begin, step, [state])
-        self._begin_ended = wp.launch(begin_ended, env_count, [self.border, state], record_cmd=True)
+        self._begin_ended = wp.launch(begin_ended, env_count, [self.buffers, state], record_cmd=True)
 
     def step(self):
         super().step()

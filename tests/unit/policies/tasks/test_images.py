@@ -1,4 +1,4 @@
-"""Images of tasks: at the border, in layouts, and in Gymnasium. The task is `tests/unit/policies/learn/squares.py`."""
+"""Images of tasks: in the buffers, in layouts, and in Gymnasium. The task is `tests/unit/policies/learn/squares.py`."""
 
 import gymnasium
 import numpy as np
@@ -43,14 +43,14 @@ def test_another_image_is_refused_and_other_privileged_elements_are_not():
 def test_what_an_episode_saw_last_is_kept_and_the_next_is_shown():
     task = Squares(3)
     task.reset(0)
-    border = task.border
+    buffers = task.buffers
     for t in range(1, 13):
         task.step()
-        rows = border.images.numpy()[:, 0, 0].astype(int).tolist()
+        rows = buffers.images.numpy()[:, 0, 0].astype(int).tolist()
         assert rows == [[i, 1 + t // 4, t % 4] for i in range(3)]
         if t % 4 == 0:
-            assert border.final_images.numpy()[:, 0, 0].astype(int).tolist() == [[i, t // 4, 4] for i in range(3)]
-            assert (border.final_privileged.numpy() != border.privileged.numpy()).all()
+            assert buffers.final_images.numpy()[:, 0, 0].astype(int).tolist() == [[i, t // 4, 4] for i in range(3)]
+            assert (buffers.final_privileged.numpy() != buffers.privileged.numpy()).all()
 
 
 def test_images_are_part_of_the_state():
@@ -59,12 +59,12 @@ def test_images_are_part_of_the_state():
     other.reset(1)
     task.step()
     other.load_state(task.state())
-    assert np.array_equal(other.border.images.numpy(), task.border.images.numpy())
-    assert np.array_equal(other.border.final_images.numpy(), task.border.final_images.numpy())
-    other.border.continuous.assign(task.border.continuous.numpy())
+    assert np.array_equal(other.buffers.images.numpy(), task.buffers.images.numpy())
+    assert np.array_equal(other.buffers.final_images.numpy(), task.buffers.final_images.numpy())
+    other.buffers.continuous.assign(task.buffers.continuous.numpy())
     task.step()
     other.step()
-    assert np.array_equal(other.border.images.numpy(), task.border.images.numpy())
+    assert np.array_equal(other.buffers.images.numpy(), task.buffers.images.numpy())
 
 
 def test_one_environment_sees_what_the_first_of_many_sees():
@@ -74,7 +74,7 @@ def test_one_environment_sees_what_the_first_of_many_sees():
     for _ in range(6):
         alone.step()
         many.step()
-        assert np.array_equal(alone.border.images.numpy()[0], many.border.images.numpy()[0])
+        assert np.array_equal(alone.buffers.images.numpy()[0], many.buffers.images.numpy()[0])
 
 
 def test_gymnasium_gets_image_and_vector(named):

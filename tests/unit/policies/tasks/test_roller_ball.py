@@ -22,7 +22,7 @@ def test_a_hand_made_controller_reaches_every_cube():
     task = build_task("RollerBall", 256)
     task.reset(1)
     for _ in range(200):
-        task.border.continuous.numpy()[:] = towards(task.border.observations.numpy())
+        task.buffers.continuous.numpy()[:] = towards(task.buffers.observations.numpy())
         task.step()
     scores = task.take_scores()
     assert scores.count(Outcome.SUCCESS) > 1000
@@ -33,7 +33,7 @@ def test_a_hand_made_controller_reaches_every_cube():
 def test_a_constant_push_falls_off_the_floor():
     task = build_task("RollerBall", 16)
     task.reset(1)
-    task.border.continuous.numpy()[:] = 1.0
+    task.buffers.continuous.numpy()[:] = 1.0
     for _ in range(30):
         task.step()
     assert task.take_scores().count(Outcome.FELL) >= 16

@@ -16,10 +16,10 @@ def stepped(env_count, seed, count, settings=None):
     task.reset(seed)
     seen = []
     for _ in range(count):
-        observations = task.border.observations.numpy()
-        task.border.continuous.numpy()[:] = np.sin(observations[:, -2:] * 7.0 + 1.0)
+        observations = task.buffers.observations.numpy()
+        task.buffers.continuous.numpy()[:] = np.sin(observations[:, -2:] * 7.0 + 1.0)
         task.step()
-        seen.append((observations.copy(), task.border.rewards.numpy().copy(), task.border.outcomes.numpy().copy()))
+        seen.append((observations.copy(), task.buffers.rewards.numpy().copy(), task.buffers.outcomes.numpy().copy()))
     return [np.stack(parts) for parts in zip(*seen, strict=True)]
 
 
@@ -36,7 +36,7 @@ def test_a_row_does_not_depend_on_who_else_is_in_the_batch():
 def test_a_restored_task_continues_bit_for_bit():
     task = build_task(NAME, 8)
     task.reset(2)
-    task.border.continuous.numpy()[:] = 0.3
+    task.buffers.continuous.numpy()[:] = 0.3
     for _ in range(10):
         task.step()
     state = task.state()
@@ -64,13 +64,13 @@ def test_beginning_one_row_touches_only_that_row():
 def test_stacked_frames_hold_the_last_observations_oldest_first_after_zeros():
     task = build_task(NAME, 1, task_settings(NAME, {"stack": 3}))
     task.reset(1)
-    task.border.continuous.numpy()[:] = 0.5
-    frames = [task.border.observations.numpy()[0, -8:].copy()]
-    assert not task.border.observations.numpy()[0, :16].any()
+    task.buffers.continuous.numpy()[:] = 0.5
+    frames = [task.buffers.observations.numpy()[0, -8:].copy()]
+    assert not task.buffers.observations.numpy()[0, :16].any()
     for _ in range(2):
         task.step()
-        frames.append(task.border.observations.numpy()[0, -8:].copy())
-    assert np.array_equal(task.border.observations.numpy()[0], np.concatenate(frames))
+        frames.append(task.buffers.observations.numpy()[0, -8:].copy())
+    assert np.array_equal(task.buffers.observations.numpy()[0], np.concatenate(frames))
 
 
 def test_numbers_are_drawn_anew_for_each_episode_from_their_samplers():
@@ -83,13 +83,13 @@ def test_numbers_are_drawn_anew_for_each_episode_from_their_samplers():
         }
     )
     task.reset(0)
-    mass, force, *_ = task.border.numbers.numpy().T
+    mass, force, *_ = task.buffers.numbers.numpy().T
     is_low = mass <= 1.0
     assert ((mass >= 0.5) & is_low | (mass >= 2.0) & (mass <= 3.0)).all()
     assert abs(is_low.mean() - 1 / 3) < 0.03  # 4 sigma of 4,096 draws
     assert abs(force.mean() - 10.0) < 0.07
     assert abs(force.std() - 1.0) < 0.05
-    assert (task.border.numbers.numpy()[:, task.number_table.names.index("reach_m")] == 1.5).all()
+    assert (task.buffers.numbers.numpy()[:, task.number_table.names.index("reach_m")] == 1.5).all()
 
 
 def test_a_number_that_does_not_exist_or_is_out_of_bounds_is_refused_in_one_sentence():
@@ -152,7 +152,7 @@ def test_actions_outside_their_space_are_refused(name, action):
     observation, _ = env.reset(seed=1)
     with pytest.raises(ValueError, match=r"^action: "):
         env.step(action)
-    assert env.task.border.observations.numpy()[0].tolist() == observation.tolist()  # nothing has moved
+    assert env.task.buffers.observations.numpy()[0].tolist() == observation.tolist()  # nothing has moved
 
 
 @pytest.mark.parametrize("name", ["RollerBall", "ReachTarget", "Parking1", "Parking2"])

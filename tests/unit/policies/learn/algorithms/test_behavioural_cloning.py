@@ -76,8 +76,8 @@ def test_an_expert_of_roller_ball_is_cloned_to_its_success():
     task.reset(2)
     for _ in range(100):
         with torch.inference_mode():
-            actions = learner(torch.from_numpy(task.border.observations.numpy())).mode()
-        task.border.continuous.numpy()[:] = learner.bounded(actions).numpy()
+            actions = learner(torch.from_numpy(task.buffers.observations.numpy())).mode()
+        task.buffers.continuous.numpy()[:] = learner.bounded(actions).numpy()
         task.step()
     scores = task.take_scores()
     assert scores.count(Outcome.SUCCESS) > 0.95 * scores.episode_count > 60

@@ -41,7 +41,7 @@ def mean_reward(task, policy, episodes=256):
     rewards = []
     with torch.inference_mode():
         for _ in range(4 * episodes // task.env_count):
-            actions, memory = policy.act(student.task.seen, memory)
+            actions, memory = policy.act(student.task.observation, memory)
             student.task.step(policy.bounded(actions), actions.branches)
             memory = memory.masked_fill(student.task.is_truncated[:, None], 0.0)
             rewards.append(student.task.rewards.mean().item())
@@ -68,7 +68,7 @@ def test_beliefs_are_learnt_and_as_sure_as_they_are_right(trained):
     with torch.inference_mode():
         for t in range(4):
             place = task.privileged[:, 0].clone()
-            actions, memory, beliefs = policy.act_and_believe(task.seen, memory)
+            actions, memory, beliefs = policy.act_and_believe(task.observation, memory)
             assert (beliefs.means[:, 0] - place).abs().mean() < 0.15
             assert ((beliefs.means[:, 1] > 0.5) == (t == 0)).all()
             assert 0.02 < beliefs.sigmas[:, 0].mean() < 0.4

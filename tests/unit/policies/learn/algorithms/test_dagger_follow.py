@@ -14,8 +14,8 @@ from policies.tasks.catalogue import build_task, task_settings
 @pytest.mark.slow
 def test_student_of_follow_me_comes_to_do_what_its_teacher_does():
     task = build_task("FollowMe", 16, task_settings("FollowMe", {"image_size": 32}))
-    seen = build_task("FollowMe", 1, task_settings("FollowMe", {"observation": "state"})).layout
-    teacher = Policy(seen, NetworkSettings(hidden_units=16, num_layers=1), torch.Generator().manual_seed(2))
+    observation = build_task("FollowMe", 1, task_settings("FollowMe", {"observation": "state"})).layout
+    teacher = Policy(observation, NetworkSettings(hidden_units=16, num_layers=1), torch.Generator().manual_seed(2))
     network = {"hidden_units": 32, "normalize": True, "memory": {"memory_size": 32, "sequence_length": 16}}
     behavior = Behavior.model_validate(
         {

@@ -125,10 +125,10 @@ def test_the_actor_remembers_until_its_episode_ends():
 def test_a_restart_begins_all_episodes_anew_without_memory_of_the_old_ones():
     ppo = learner(memory=Memory(sequence_length=8, memory_size=8))
     ppo.iterate()
-    running = [ppo._memory, ppo._critic_memory, ppo.task.task.border.steps.numpy()]
+    running = [ppo._memory, ppo._critic_memory, ppo.task.task.buffers.steps.numpy()]
     assert all(values.any() for values in running)
     ppo.restart()
-    fresh = [ppo._memory, ppo._critic_memory, ppo.task.task.border.steps.numpy(), ppo.state()["running_sums"]]
+    fresh = [ppo._memory, ppo._critic_memory, ppo.task.task.buffers.steps.numpy(), ppo.state()["running_sums"]]
     assert not any(values.any() for values in fresh)
 
 

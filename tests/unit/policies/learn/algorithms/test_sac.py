@@ -50,11 +50,11 @@ def mean_reward(task, policy, rounds=20):
     task.take_scores()
     for _ in range(rounds):
         with torch.no_grad():
-            actions, _ = policy.act(torch.from_numpy(task.border.observations.numpy().copy()), no_memory)
+            actions, _ = policy.act(torch.from_numpy(task.buffers.observations.numpy().copy()), no_memory)
         if actions.continuous.shape[1]:
-            task.border.continuous.numpy()[:] = policy.bounded(actions).numpy()
+            task.buffers.continuous.numpy()[:] = policy.bounded(actions).numpy()
         if actions.branches.shape[1]:
-            task.border.branches.numpy()[:] = actions.branches.numpy()
+            task.buffers.branches.numpy()[:] = actions.branches.numpy()
         task.step()
     scores = task.take_scores()
     return scores.return_sum / scores.episode_count
@@ -150,10 +150,10 @@ def test_a_restart_begins_all_episodes_anew_and_parts_them_from_the_old_ones_in_
     sac = small(hindsight=4)
     sac.iterate()
     task, hindsight = sac.task.task, sac._hindsight
-    assert task.border.steps.numpy().any()
+    assert task.buffers.steps.numpy().any()
     running = hindsight._episode.clone()
     sac.restart()
-    assert not task.border.steps.numpy().any()
+    assert not task.buffers.steps.numpy().any()
     assert (hindsight._episode != running).any()
     sac._collect()
     before, after = hindsight._episodes[sac.replay.rounds - 2], hindsight._episodes[sac.replay.rounds - 1]
@@ -193,7 +193,7 @@ def shown(layout):
     """What whoever reads the signs does."""
     task = Signs(2000, layout.branch_sizes, is_pointing=True)
     task.reset(77)
-    signs = torch.from_numpy(task.border.observations.numpy().copy())
+    signs = torch.from_numpy(task.buffers.observations.numpy().copy())
     ends = torch.ones(2000, dtype=torch.bool)
     return Transitions(signs, signs, signs[:, 2:], signs[:, :2].long(), torch.ones(2000), ends)
 

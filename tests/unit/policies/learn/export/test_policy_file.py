@@ -7,7 +7,7 @@ from policies.learn.checkpoint import load, save
 from policies.learn.config.network import Memory, NetworkSettings
 from policies.learn.export.policy_file import PolicyCard, load_policy, save_policy
 from policies.learn.export.policy_path import CheckpointError
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
 from policies.tasks.catalogue import build_task
 from policies.tasks.layout import Element, ImageElement, Layout
@@ -62,8 +62,8 @@ def test_a_policy_of_the_follow_me_documents_size_is_below_a_megabyte_in_half_pr
     assert again.layout == layout
     generator = torch.Generator().manual_seed(2)
     image = torch.randint(0, 256, (20, 64, 64, 3), dtype=torch.uint8, generator=generator)
-    seen = Seen(torch.randn(20, 7, generator=generator), image)
-    means = [each(seen).mean for each in (policy, again)]
+    observation = Observation(torch.randn(20, 7, generator=generator), image)
+    means = [each(observation).mean for each in (policy, again)]
     assert torch.allclose(means[0], means[1], atol=2e-3)
     assert not torch.equal(means[0], means[1])
 

@@ -20,17 +20,17 @@ def features(rows=ROWS):
     return torch.randn(rows, 5, generator=torch.Generator().manual_seed(1))
 
 
-def parts(built, seen):
+def parts(built, observation):
     """The same distributions, of torch."""
-    gaussian = Normal(built.mean(seen), built.log_sigma.exp())
-    return gaussian, [Categorical(logits=part) for part in built.logits(seen).split(built.branch_sizes, -1)]
+    gaussian = Normal(built.mean(observation), built.log_sigma.exp())
+    return gaussian, [Categorical(logits=part) for part in built.logits(observation).split(built.branch_sizes, -1)]
 
 
 def test_log_probabilities_and_entropy_are_those_of_torch_distributions():
-    built, seen = heads(), features()
-    distribution = built(seen)
+    built, observation = heads(), features()
+    distribution = built(observation)
     actions = distribution.draw(torch.Generator().manual_seed(2))
-    gaussian, branches = parts(built, seen)
+    gaussian, branches = parts(built, observation)
     expected = [gaussian.log_prob(actions.continuous)]
     expected += [branch.log_prob(actions.branches[:, k])[:, None] for k, branch in enumerate(branches)]
     assert torch.allclose(distribution.log_probs(actions), torch.cat(expected, -1), atol=1e-5)
@@ -40,11 +40,11 @@ def test_log_probabilities_and_entropy_are_those_of_torch_distributions():
 
 def test_draws_have_the_frequencies_of_their_probabilities():
     built = heads(continuous=1)
-    seen = features(1).expand(40_000, -1)
-    actions = built(seen).draw(torch.Generator().manual_seed(3))
-    gaussian, branches = parts(built, seen[:1])
+    observation = features(1).expand(40_000, -1)
+    actions = built(observation).draw(torch.Generator().manual_seed(3))
+    gaussian, branches = parts(built, observation[:1])
     for k, branch in enumerate(branches):
-        share = torch.bincount(actions.branches[:, k], minlength=len(branch.probs[0])) / len(seen)
+        share = torch.bincount(actions.branches[:, k], minlength=len(branch.probs[0])) / len(observation)
         assert torch.allclose(share, branch.probs[0], atol=0.01)  # 4 deviations of a share of 40,000
     assert actions.continuous.mean().item() == pytest.approx(gaussian.mean.item(), abs=0.03 * gaussian.stddev.item())
     assert actions.continuous.std().item() == pytest.approx(gaussian.stddev.item(), rel=0.02)
@@ -57,18 +57,18 @@ def test_a_branch_never_draws_a_choice_it_does_not_have():
 
 
 def test_the_mode_is_the_most_probable_action():
-    built, seen = heads(), features()
-    mode = built(seen).mode()
-    gaussian, branches = parts(built, seen)
+    built, observation = heads(), features()
+    mode = built(observation).mode()
+    gaussian, branches = parts(built, observation)
     assert torch.equal(mode.continuous, gaussian.mean)
     assert torch.equal(mode.branches, torch.stack([branch.probs.argmax(-1) for branch in branches], -1))
 
 
 def test_squashed_log_probabilities_are_those_of_the_transformed_distribution():
-    built, seen = heads(2, (), is_sigma_learned_by_state=True), features()
-    distribution = built(seen)
+    built, observation = heads(2, (), is_sigma_learned_by_state=True), features()
+    distribution = built(observation)
     drawn = distribution.draw(torch.Generator().manual_seed(5))
-    base = Independent(Normal(built.mean(seen), built.log_sigma(seen).clamp(-20.0, 2.0).exp()), 1)
+    base = Independent(Normal(built.mean(observation), built.log_sigma(observation).clamp(-20.0, 2.0).exp()), 1)
     squashed = TransformedDistribution(base, [TanhTransform(cache_size=1)])
     taken = squashed.transforms[0](drawn.continuous)
     assert torch.allclose(distribution.squashed_log_probs(drawn).sum(-1), squashed.log_prob(taken), atol=1e-4)

@@ -33,20 +33,20 @@ def policy(**settings):
 
 def test_a_row_does_not_depend_on_the_others():
     acting = policy(normalize=True)
-    seen = observations(50)
-    together, _ = acting.act(seen, acting.start_memory(50))
+    observation = observations(50)
+    together, _ = acting.act(observation, acting.start_memory(50))
     for i in range(0, 50, 7):
-        alone, _ = acting.act(seen[i : i + 1], acting.start_memory(1))
+        alone, _ = acting.act(observation[i : i + 1], acting.start_memory(1))
         assert torch.allclose(alone.continuous[0], together.continuous[i], atol=1e-6)
         assert torch.equal(alone.branches[0], together.branches[i])
 
 
 def test_permuting_rows_permutes_actions():
     acting = policy(memory=Memory(sequence_length=8, memory_size=12))
-    seen, order = observations(20), torch.randperm(20, generator=generator())
+    observation, order = observations(20), torch.randperm(20, generator=generator())
     memory = torch.randn(20, 12, generator=generator(1))
-    actions, after = acting.act(seen, memory)
-    permuted, permuted_after = acting.act(seen[order], memory[order])
+    actions, after = acting.act(observation, memory)
+    permuted, permuted_after = acting.act(observation[order], memory[order])
     assert torch.allclose(actions.continuous[order], permuted.continuous, atol=1e-6)
     assert torch.allclose(after[order], permuted_after, atol=1e-6)
 

@@ -14,9 +14,9 @@ def test_statistics_are_those_of_all_that_was_seen(sizes, seed):
     normalizer = Normalizer(4)
     for batch in batches:
         normalizer.update(torch.from_numpy(batch))
-    seen = np.concatenate([np.zeros((1, 4)), *batches]).astype(np.float64)  # ML-Agents' first count: a zero
-    mean = seen.mean(0)
-    var = (((seen - mean) ** 2).sum(0) + 1.0) / len(seen)  # of variance 1
+    observation = np.concatenate([np.zeros((1, 4)), *batches]).astype(np.float64)  # ML-Agents' first count: a zero
+    mean = observation.mean(0)
+    var = (((observation - mean) ** 2).sum(0) + 1.0) / len(observation)  # of variance 1
     assert np.allclose(normalizer.mean, mean, rtol=1e-6)
     assert np.allclose(normalizer.deviation, np.sqrt(var), rtol=1e-5)
 

@@ -9,7 +9,7 @@ import torch
 from policies.learn.algorithms.ppo import Ppo
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
 from policies.learn.config.network import Memory, NetworkSettings
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
 from policies.learn.networks.vision import LEAST_SIDES, ImageEncoder
 from policies.learn.signals.extrinsic import ExtrinsicSignal
@@ -22,9 +22,9 @@ def generator(seed=0):
     return torch.Generator().manual_seed(seed)
 
 
-def seen(rows, side=32, seed=0):
+def observation(rows, side=32, seed=0):
     image = torch.randint(0, 256, (rows, side, side, 3), dtype=torch.uint8, generator=generator(seed))
-    return Seen(torch.randn(rows, 1, generator=generator(seed)), image)
+    return Observation(torch.randn(rows, 1, generator=generator(seed)), image)
 
 
 def learner(task=None, seed=1, network=None, learning_rate_schedule="constant", **numbers):
@@ -54,12 +54,12 @@ def test_encoders_flatten_64_pixels_to_their_size(kind, flat):
 @pytest.mark.parametrize("kind", LEAST_SIDES)
 def test_an_encoder_takes_its_least_image_and_no_smaller_one(kind):
     least = LEAST_SIDES[kind]
-    features = ImageEncoder(kind, (least, least, 3), 8, generator())(seen(5, least).image)
+    features = ImageEncoder(kind, (least, least, 3), 8, generator())(observation(5, least).image)
     assert features.shape == (5, 8)
     assert torch.isfinite(features).all()
     if least > 1:
         with pytest.raises(RuntimeError):
-            ImageEncoder(kind, (least - 1, least - 1, 3), 8, generator())(seen(1, least - 1).image)
+            ImageEncoder(kind, (least - 1, least - 1, 3), 8, generator())(observation(1, least - 1).image)
 
 
 def test_weights_are_drawn_from_the_generator_as_torch_and_ml_agents_draw_them():
@@ -88,7 +88,7 @@ def test_black_is_0_and_white_is_1():
 def test_a_row_acts_as_it_would_alone(memory):
     settings = NetworkSettings(hidden_units=16, vis_encode_type="simple", memory=memory)
     policy = Policy(Squares(1).layout, settings, generator())
-    many = seen(20)
+    many = observation(20)
     with torch.inference_mode():
         together, _ = policy.act(many, policy.start_memory(20))
         for i in range(20):
@@ -100,7 +100,7 @@ def test_goal_elements_drive_the_hyper_network_beside_an_image():
     settings = NetworkSettings(hidden_units=16, goal_signal=True, vis_encode_type="simple")
     policy = Policy(Squares(1).layout, settings, generator())
     assert policy.body.hyper is not None
-    one, other = seen(4), seen(4)
+    one, other = observation(4), observation(4)
     other.vector.neg_()
     assert not torch.equal(policy(one).mean, policy(other).mean)
 
@@ -152,8 +152,8 @@ def test_a_privileged_critic_sees_no_image_and_the_policy_nothing_privileged():
     assert ppo.critic.body.normalizer.mean.shape == (2,)
     ppo._collect(ppo._rollout)
     assert ppo.critic.body.normalizer.count == ppo.policy.body.normalizer.count > 1
-    one = ppo._rollout.seen[0]
-    other = Seen(one.vector, one.image, one.privileged + 1.0)
+    one = ppo._rollout.observation[0]
+    other = Observation(one.vector, one.image, one.privileged + 1.0)
     assert torch.equal(ppo.policy(one).mean, ppo.policy(other).mean)
     assert not torch.equal(ppo.critic(one), ppo.critic(other))
 
@@ -166,8 +166,8 @@ def test_a_timeout_is_valued_by_the_image_its_episode_saw_last():
         _, next_values = ppo._values(rollout)
         assert rollout.is_over.any()
         for t in range(len(next_values)):
-            assert torch.allclose(next_values[t], ppo.critic(rollout.next_seen(t)), atol=1e-5)
-            assert torch.equal(rollout.next_seen(t).image[:, 0, 0, 2] == 4, rollout.is_over[t])
+            assert torch.allclose(next_values[t], ppo.critic(rollout.next_observation(t)), atol=1e-5)
+            assert torch.equal(rollout.next_observation(t).image[:, 0, 0, 2] == 4, rollout.is_over[t])
 
 
 @pytest.mark.parametrize("memory", [None, MEMORY], ids=["feed-forward", "recurrent"])
@@ -203,7 +203,7 @@ def distance(ppo):
     memory = ppo.policy.start_memory(task.task.env_count)
     with torch.inference_mode():
         for _ in range(20):
-            actions, _ = ppo.policy.act(task.seen, memory)
+            actions, _ = ppo.policy.act(task.observation, memory)
             task.step(ppo.policy.bounded(actions), actions.branches)
             total -= task.rewards.mean().item() / 20
     return total

@@ -112,17 +112,19 @@ def test_a_tasks_own_successes_are_those_its_place_goal_tells(name, settings, ra
     goal = task.goal
     counts = 0
     for _ in range(60):
-        task.border.continuous.numpy()[:] = actions.uniform(-1.0, 1.0, task.border.continuous.shape)
+        task.buffers.continuous.numpy()[:] = actions.uniform(-1.0, 1.0, task.buffers.continuous.shape)
         task.step()
-        outcomes = task.border.outcomes.numpy()
+        outcomes = task.buffers.outcomes.numpy()
         is_over = outcomes != Outcome.RUNNING
-        seen = np.where(is_over[:, None], task.border.final_observations.numpy(), task.border.observations.numpy())
-        distance = np.linalg.norm(seen[:, goal.goal] - seen[:, goal.achieved], axis=1)
+        observation = np.where(
+            is_over[:, None], task.buffers.final_observations.numpy(), task.buffers.observations.numpy()
+        )
+        distance = np.linalg.norm(observation[:, goal.goal] - observation[:, goal.achieved], axis=1)
         is_success = outcomes == Outcome.SUCCESS
         clear = np.abs(distance - radius_m) > 1e-4
         assert np.array_equal(distance[clear] < radius_m, is_success[clear])
-        assert (task.border.rewards.numpy()[is_success] == goal.reward).all()
-        assert not task.border.rewards.numpy()[~is_success].any()
+        assert (task.buffers.rewards.numpy()[is_success] == goal.reward).all()
+        assert not task.buffers.rewards.numpy()[~is_success].any()
         counts += is_success.sum()
     assert counts > 50
 

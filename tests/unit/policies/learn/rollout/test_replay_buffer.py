@@ -39,8 +39,8 @@ def test_what_was_written_comes_back():
 def test_the_newest_transitions_stay_when_the_ring_is_full():
     replay = filled(9, 11)  # four rounds of two; one transition of the capacity is left over
     assert len(replay) == 8
-    seen = replay.take(replay.draw(1000, torch.Generator().manual_seed(1))).observations
-    assert set(seen[:, 0].tolist()) == {7.0, 8.0, 9.0, 10.0}
+    observation = replay.take(replay.draw(1000, torch.Generator().manual_seed(1))).observations
+    assert set(observation[:, 0].tolist()) == {7.0, 8.0, 9.0, 10.0}
 
 
 def test_all_transitions_are_drawn_alike():

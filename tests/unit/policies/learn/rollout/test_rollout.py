@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from policies.learn.networks.action_distributions import Actions
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.rollout.rollout import Rollout
 from policies.tasks.layout import Branch, Element, ImageElement, Layout
 
@@ -34,17 +34,17 @@ class TracedTask:
         self.is_terminated = torch.tensor(here) & ~self.is_truncated
         self.decision += 1
         self.rewards = self.traces + self.decision
-        self.final_seen = self.traced(0.5)
+        self.final_observation = self.traced(0.5)
 
     def traced(self, more=0.0):
         """Floats of 1000 x environment + decision; images of decision, environment, and whether it was the last."""
         trace = self.traces + self.decision + more
         image = torch.tensor([[self.decision, env, 1 if more else 0] for env in range(ENVS)], dtype=torch.uint8)
         image = image[:, None, None].expand(-1, 2, 3, -1)
-        return Seen(torch.stack((trace, 2.0 * trace), -1), image, -trace[:, None])
+        return Observation(torch.stack((trace, 2.0 * trace), -1), image, -trace[:, None])
 
     @property
-    def seen(self):
+    def observation(self):
         return self.traced()
 
 
@@ -86,12 +86,12 @@ def test_next_observations_are_what_ended_episodes_saw_last(rollout):
 
 
 def test_images_and_privileged_elements_are_those_of_the_floats(rollout):
-    image = rollout.seen.image.long()
+    image = rollout.observation.image.long()
     assert torch.equal(1000 * image[:, :, 1, 2, 1] + image[:, :, 0, 0, 0], rollout.observations[..., 0].long())
     assert not image[..., 2].any()
-    assert torch.equal(rollout.seen.privileged[..., 0], -rollout.observations[..., 0])
+    assert torch.equal(rollout.observation.privileged[..., 0], -rollout.observations[..., 0])
     for t in range(STEPS):
-        following = rollout.next_seen(t)
+        following = rollout.next_observation(t)
         assert torch.equal(following.vector, rollout.next_observations()[t])
         assert torch.equal(following.privileged[:, 0], -following.vector[:, 0])
         assert following.image[:, 0, 0, 1].tolist() == list(range(ENVS))
@@ -115,9 +115,9 @@ def test_a_minibatch_keeps_what_belongs_together(rollout):
         trace = batch.observations[:, 0]
         assert torch.equal(traces().flatten()[batch.rows], trace)
         assert torch.equal(batch.observations[:, 1], 2.0 * trace)
-        assert torch.equal(batch.seen.privileged[:, 0], -trace)
-        assert torch.equal(batch.seen.image[:, 1, 1, 0], (trace % 1000).byte())
-        assert torch.equal(batch.seen.image[:, 0, 2, 1], (trace // 1000).byte())
+        assert torch.equal(batch.observation.privileged[:, 0], -trace)
+        assert torch.equal(batch.observation.image[:, 1, 1, 0], (trace % 1000).byte())
+        assert torch.equal(batch.observation.image[:, 0, 2, 1], (trace // 1000).byte())
         assert torch.equal(batch.actions.continuous[:, 0], trace)
         assert torch.equal(batch.actions.branches[:, 0], trace.long() % 2)
         assert torch.equal(batch.log_probs, -trace[:, None].expand(-1, 2))

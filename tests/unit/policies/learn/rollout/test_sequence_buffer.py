@@ -3,7 +3,7 @@
 import torch
 
 from policies.learn.networks.action_distributions import Actions
-from policies.learn.networks.observations import Seen
+from policies.learn.networks.observations import Observation
 from policies.learn.rollout.sequence_buffer import SequenceRing
 from tests.unit.policies.learn.algorithms.test_sac import flat
 from tests.unit.policies.learn.glimpses import SIDE, Glimpses
@@ -23,19 +23,19 @@ def fill(store, rounds, first=0):
         for t in range(LENGTH):
             code = (100 * r + 10 * t + env)[:, None].float()
             image = (10 * t + env).to(torch.uint8)[:, None, None, None].expand(ENVS, SIDE, SIDE, 3)
-            seen = Seen(code, image, code.expand(ENVS, 2))
+            observation = Observation(code, image, code.expand(ENVS, 2))
             actions = Actions(code / 1000.0, torch.zeros(ENVS, 0, dtype=torch.int64))
-            store.record(slot, t, seen, actions, env == t)
+            store.record(slot, t, observation, actions, env == t)
 
 
 def test_stretches_are_consecutive_and_whole():
     store = ring()
     fill(store, 2)
     drawn = store.draw(40, torch.Generator().manual_seed(0))
-    codes = drawn.seen.vector[..., 0]
+    codes = drawn.observation.vector[..., 0]
     assert (codes.diff(dim=0) == 10.0).all()
-    assert torch.equal(drawn.seen.image[..., 0, 0, 0].float(), codes % 100)
-    assert torch.equal(drawn.seen.privileged[..., 1], codes)
+    assert torch.equal(drawn.observation.image[..., 0, 0, 0].float(), codes % 100)
+    assert torch.equal(drawn.observation.privileged[..., 1], codes)
     assert torch.allclose(drawn.actions.continuous[..., 0], codes / 1000.0)
     assert torch.equal(drawn.memory[:, 0], codes[0])
     env = codes[0] % 10
@@ -47,7 +47,7 @@ def test_the_oldest_round_is_written_over():
     store = ring(capacity=24)
     fill(store, 3)
     assert len(store) == 2 * ENVS
-    drawn = store.draw(60, torch.Generator().manual_seed(0)).seen.vector[0, :, 0]
+    drawn = store.draw(60, torch.Generator().manual_seed(0)).observation.vector[0, :, 0]
     assert set((drawn // 100).tolist()) == {1.0, 2.0}
 
 
@@ -57,7 +57,7 @@ def test_restored_ring_draws_the_same():
     other = ring()
     other.load_state(store.state())
     a, b = (each.draw(9, torch.Generator().manual_seed(3)) for each in (store, other))
-    assert torch.equal(a.seen.vector, b.seen.vector)
+    assert torch.equal(a.observation.vector, b.observation.vector)
     fill(store, 2, first=1)
     fill(other, 2, first=1)
     assert flat(store.state()) == flat(other.state())

@@ -18,11 +18,11 @@ STEERED = Layout(
 
 def drawn(layout, shape, seed=0, centre=0.0):
     generator = torch.Generator().manual_seed(seed)
-    seen = torch.randn(*shape, layout.observation_size, generator=generator) + centre
+    observation = torch.randn(*shape, layout.observation_size, generator=generator) + centre
     choices = [torch.randint(size, shape, generator=generator) for size in layout.branch_sizes]
     return Transitions(
-        observations=seen,
-        next_observations=seen + 0.1 * torch.randn(seen.shape, generator=generator),
+        observations=observation,
+        next_observations=observation + 0.1 * torch.randn(observation.shape, generator=generator),
         continuous=torch.rand(*shape, len(layout.continuous), generator=generator) * 2.0 - 1.0,
         branches=torch.stack(choices, -1) if choices else torch.zeros(*shape, 0, dtype=torch.int64),
         rewards=torch.rand(shape, generator=generator),

@@ -34,8 +34,8 @@ def _fly(task: FollowMe, decisions: int, seed: int = 0) -> None:
     """The same gentle actions for a row, whatever the batch."""
     actions = np.random.default_rng(seed).uniform(-0.3, 0.3, (decisions, 4)).astype(np.float32)
     for action in actions:
-        task.border.continuous.fill_(0.0)
-        task.border.continuous.assign(np.tile(action, (task.env_count, 1)))
+        task.buffers.continuous.fill_(0.0)
+        task.buffers.continuous.assign(np.tile(action, (task.env_count, 1)))
         task.step()
 
 
@@ -51,19 +51,19 @@ def test_single_environment_is_the_first_row_of_a_batch() -> None:
     _fly(one, 4)
     _fly(many, 4)
     for name in ("observations", "images", "privileged", "rewards"):
-        assert getattr(one.border, name).numpy()[0].tobytes() == getattr(many.border, name).numpy()[0].tobytes(), name
+        assert getattr(one.buffers, name).numpy()[0].tobytes() == getattr(many.buffers, name).numpy()[0].tobytes(), name
     assert one.measures.numpy()[0].tobytes() == many.measures.numpy()[0].tobytes()
 
 
 def test_same_seed_gives_the_same_bytes_and_another_seed_others() -> None:
     first, second = _task(2, **STATE), _task(2, **STATE)
     second.reset(6)
-    other = second.border.observations.numpy().copy()
+    other = second.buffers.observations.numpy().copy()
     second.reset(5)
     _fly(first, 3)
     _fly(second, 3)
-    assert first.border.observations.numpy().tobytes() == second.border.observations.numpy().tobytes()
-    assert not np.array_equal(other, first.border.observations.numpy())
+    assert first.buffers.observations.numpy().tobytes() == second.buffers.observations.numpy().tobytes()
+    assert not np.array_equal(other, first.buffers.observations.numpy())
 
 
 def test_beginning_one_row_touches_only_that_row() -> None:
@@ -103,7 +103,7 @@ def test_observation_does_not_change_when_the_truth_does() -> None:
 
     def shown() -> bytes:
         task._show.launch()  # writes the vector anew
-        return bytes(task.border.observations.numpy().tobytes())
+        return bytes(task.buffers.observations.numpy().tobytes())
 
     before = shown()
     for array in (task.rig.truth, task.follow.people, task.follow.sights, task.follow.nearness):
@@ -132,9 +132,9 @@ def test_vector_is_what_a_companion_makes_of_estimate_and_report() -> None:
     report.is_known = 1
     out = wp.zeros((1, len(vector_elements(int(EGO)))), dtype=float)
     rows: list[Any] = [wp.array([own], dtype=OwnState), wp.array([report], dtype=OwnerReport)]
-    action = wp.array(task.border.continuous.numpy(), dtype=wp.vec4)
+    action = wp.array(task.buffers.continuous.numpy(), dtype=wp.vec4)
     wp.launch(observe_rows, 1, [int(EGO), *rows, action, out])
-    np.testing.assert_allclose(task.border.observations.numpy()[0], out.numpy()[0], rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(task.buffers.observations.numpy()[0], out.numpy()[0], rtol=1e-5, atol=1e-6)
 
 
 def test_episodes_start_as_takeovers_do() -> None:
@@ -166,13 +166,13 @@ def test_an_owner_who_runs_past_between_two_decisions_has_been_hit(aside_m: floa
     people["stature_m"] = 4.0  # as high as the drone flies
     task.follow.people.assign(people)
     task.step()
-    assert Outcome(int(task.border.outcomes.numpy()[0])) is outcome
+    assert Outcome(int(task.buffers.outcomes.numpy()[0])) is outcome
 
 
 def _documented(numbers: dict[str, float]) -> tuple[float, Outcome]:
     task = _task(1, numbers=numbers, preset="as-documented", observation="state", has_estimator="false")
     task.step()
-    return float(task.border.rewards.numpy()[0]), Outcome(int(task.border.outcomes.numpy()[0]))
+    return float(task.buffers.rewards.numpy()[0]), Outcome(int(task.buffers.outcomes.numpy()[0]))
 
 
 def test_documented_rewards_are_five_payments_a_decision_and_a_fine_for_a_collision() -> None:
@@ -185,10 +185,10 @@ def test_documented_rewards_are_five_payments_a_decision_and_a_fine_for_a_collis
 
 def test_documented_choices_fly_forward_up_and_left() -> None:
     task = _task(1, preset="as-documented", observation="state", has_estimator="false")
-    task.border.branches.assign(np.array([[1, 1, 1]], dtype=np.int32))
+    task.buffers.branches.assign(np.array([[1, 1, 1]], dtype=np.int32))
     for _ in range(6):
         task.step()
-    seen = dict(zip((e.name for e in task.layout.frame), task.border.observations.numpy()[0], strict=True))
+    seen = dict(zip((e.name for e in task.layout.frame), task.buffers.observations.numpy()[0], strict=True))
     assert seen["true_vel_hfrd_x"] > 0.05
     assert seen["true_vel_hfrd_z"] < -0.01
     assert seen["true_yaw_rate"] < -0.2
@@ -201,19 +201,19 @@ def test_time_running_out_is_a_truncation_and_a_success_where_the_owner_is_follo
     start = {"start_distance_min_m": distance_m, "start_distance_max_m": distance_m, "start_bearing_deg": 0.0}
     task = _task(1, numbers={"decision_limit": 1.0, **start}, **STATE)
     task.step()
-    border = task.border
-    assert Outcome(int(border.outcomes.numpy()[0])) is outcome
-    assert (bool(border.is_truncated.numpy()[0]), bool(border.is_terminated.numpy()[0])) == (True, False)
+    buffers = task.buffers
+    assert Outcome(int(buffers.outcomes.numpy()[0])) is outcome
+    assert (bool(buffers.is_truncated.numpy()[0]), bool(buffers.is_terminated.numpy()[0])) == (True, False)
     assert task.take_scores().count(outcome) == 1
 
 
 def test_losing_the_owner_and_touching_the_ground_end_an_episode() -> None:
     task = _task(2, numbers={"wind_m_s": 0.0}, **STATE)
     ends = [set[Outcome](), set[Outcome]()]
-    task.border.continuous.assign(np.array([[0, 0, 1, 0], [-1, 0, -0.2, 0]], dtype=np.float32))
+    task.buffers.continuous.assign(np.array([[0, 0, 1, 0], [-1, 0, -0.2, 0]], dtype=np.float32))
     for _ in range(40):
         task.step()
-        for row, outcome in enumerate(task.border.outcomes.numpy()):
+        for row, outcome in enumerate(task.buffers.outcomes.numpy()):
             ends[row].add(Outcome(int(outcome)))
     assert ends[0] - {Outcome.RUNNING} == {Outcome.HIT_OBSTACLE}
     assert ends[1] - {Outcome.RUNNING} <= {Outcome.LOST, Outcome.HIT_OBSTACLE}

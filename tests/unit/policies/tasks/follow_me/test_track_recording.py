@@ -21,7 +21,7 @@ def recorded():
         recording.record()
         distances.append(task.measures.numpy()[:, 0].copy())
         if len(distances) <= 12:
-            rewards += task.border.rewards.numpy()
+            rewards += task.buffers.rewards.numpy()
     return recording, np.array(distances), rewards
 
 
@@ -45,7 +45,7 @@ def test_a_crash_ends_its_track_early_and_marks_it():
     task.reset(3)
     recording = Recording(task)
     while not recording.is_complete:
-        task.border.continuous.numpy()[:] = (0.0, 0.0, 1.0, 0.0)  # into the ground
+        task.buffers.continuous.numpy()[:] = (0.0, 0.0, 1.0, 0.0)  # into the ground
         task.step()
         recording.record()
     for track in recording.tracks():

@@ -31,7 +31,7 @@ def _fly(task: Navigate, decisions: int, seed: int = 0) -> None:
     """The same gentle actions for a row, whatever the batch."""
     actions = np.random.default_rng(seed).uniform(-0.3, 0.3, (decisions, 4)).astype(np.float32)
     for action in actions:
-        task.border.continuous.assign(np.tile(action, (task.env_count, 1)))
+        task.buffers.continuous.assign(np.tile(action, (task.env_count, 1)))
         task.step()
 
 
@@ -48,18 +48,18 @@ def test_single_environment_is_the_first_row_of_a_batch(settings: dict[str, str]
     _fly(one, 4)
     _fly(many, 4)
     for name in ("observations", "images", "rewards"):
-        assert getattr(one.border, name).numpy()[0].tobytes() == getattr(many.border, name).numpy()[0].tobytes(), name
+        assert getattr(one.buffers, name).numpy()[0].tobytes() == getattr(many.buffers, name).numpy()[0].tobytes(), name
 
 
 def test_same_seed_gives_the_same_bytes_and_another_seed_others() -> None:
     first, second = _task(2), _task(2)
     second.reset(6)
-    other = second.border.observations.numpy().copy()
+    other = second.buffers.observations.numpy().copy()
     second.reset(5)
     _fly(first, 3)
     _fly(second, 3)
-    assert first.border.observations.numpy().tobytes() == second.border.observations.numpy().tobytes()
-    assert not np.array_equal(other, first.border.observations.numpy())
+    assert first.buffers.observations.numpy().tobytes() == second.buffers.observations.numpy().tobytes()
+    assert not np.array_equal(other, first.buffers.observations.numpy())
 
 
 def test_beginning_one_row_touches_only_that_row() -> None:
@@ -88,7 +88,7 @@ def test_restored_state_continues_bit_for_bit() -> None:
     other.load_state(kept)
     _fly(other, 4, seed=1)
     restored = other.state()
-    assert task.border.episodes.numpy().min() > 1
+    assert task.buffers.episodes.numpy().min() > 1
     for name, rows in task.state().items():
         assert _bytes(rows) == _bytes(restored[name]), name
 
@@ -100,7 +100,7 @@ def test_observation_does_not_change_when_the_truth_does() -> None:
 
     def shown() -> bytes:
         task._show.launch()  # writes the vector anew
-        return bytes(task.border.observations.numpy().tobytes())
+        return bytes(task.buffers.observations.numpy().tobytes())
 
     shown()  # fills both frames of the stack
     before = shown()
@@ -132,7 +132,7 @@ def test_sectors_tell_the_nearest_that_a_fan_of_fine_rays_meets() -> None:
 def test_goal_is_told_by_estimate_in_the_heading_frame() -> None:
     task = _task(3, **QUICK)
     names = [element.name for element in task.layout.frame]
-    frame = task.border.observations.numpy()[:, task.layout.frame_size :]
+    frame = task.buffers.observations.numpy()[:, task.layout.frame_size :]
     seen = {name: frame[:, k] for k, name in enumerate(names)}
     bodies = task.rig.rows["truth"]
     way = task.navigation.goals_ned.numpy() - bodies["pos_ned"]
@@ -148,25 +148,25 @@ def test_progress_is_paid_up_to_the_wanted_speed_only() -> None:
     costs = ("time_cost", "clearance_cost", "height_cost", "heading_cost", "jerk_cost", "turn_cost")
     free = dict.fromkeys(costs, 0.0) | {"trees_per_ha": 0.0, "wind_m_s": 0.0, "speed_m_s": 2.0}
     task = _task(1, numbers=free | {"progress_reward": 0.1}, **QUICK)
-    frame = task.border.observations.numpy()[0, task.layout.frame_size :]
+    frame = task.buffers.observations.numpy()[0, task.layout.frame_size :]
     seen = dict(zip((element.name for element in task.layout.frame), frame, strict=True))
     ahead = 0.9 * np.array([seen["goal_dir_hfrd_x"], seen["goal_dir_hfrd_y"], 0.0, 0.0])
     for _ in range(25):
         before = float(task.measures.numpy()[0, 0])
-        task.border.continuous.assign(ahead[None].astype(np.float32))
+        task.buffers.continuous.assign(ahead[None].astype(np.float32))
         task.step()
         progress = before - float(task.measures.numpy()[0, 0])
     assert progress > 0.3
-    assert float(task.border.rewards.numpy()[0]) == pytest.approx(0.1 * 2.0 * 0.1, rel=1e-3)
+    assert float(task.buffers.rewards.numpy()[0]) == pytest.approx(0.1 * 2.0 * 0.1, rel=1e-3)
 
 
 def _end(numbers: dict[str, float], action: tuple[float, ...], decisions: int = 60) -> Outcome:
     task = _task(1, numbers=numbers | {"wind_m_s": 0.0, "wind_gust_m_s": 0.0}, **QUICK)
     for _ in range(decisions):
-        task.border.continuous.assign(np.array([action], dtype=np.float32))
+        task.buffers.continuous.assign(np.array([action], dtype=np.float32))
         task.step()
-        if task.border.outcomes.numpy()[0]:
-            return Outcome(int(task.border.outcomes.numpy()[0]))
+        if task.buffers.outcomes.numpy()[0]:
+            return Outcome(int(task.buffers.outcomes.numpy()[0]))
     return Outcome.RUNNING
 
 
@@ -181,8 +181,8 @@ def test_episodes_end_at_the_goal_at_a_tree_over_the_forest_and_in_time() -> Non
 def test_only_running_out_of_time_is_a_truncation() -> None:
     task = _task(1, numbers={"goal_min_m": 10.0, "goal_max_m": 10.0, "goal_radius_m": 20.0}, **QUICK)
     task.step()
-    border = task.border
-    assert (bool(border.is_truncated.numpy()[0]), bool(border.is_terminated.numpy()[0])) == (False, True)
+    buffers = task.buffers
+    assert (bool(buffers.is_truncated.numpy()[0]), bool(buffers.is_terminated.numpy()[0])) == (False, True)
     assert task.take_scores().count(Outcome.SUCCESS) == 1
 
 

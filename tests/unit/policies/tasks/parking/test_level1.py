@@ -23,9 +23,9 @@ def built(env_count=1, seed=0, numbers=None, **settings):
 
 def act(task, *actions):
     """Steps with one action, or one per row; returns rewards."""
-    task.border.branches.numpy()[:] = np.array(actions).reshape(-1, task.border.branches.shape[1])
+    task.buffers.branches.numpy()[:] = np.array(actions).reshape(-1, task.buffers.branches.shape[1])
     task.step()
-    return task.border.rewards.numpy().copy()
+    return task.buffers.rewards.numpy().copy()
 
 
 def put(task, row, *, pos=None, yaw_deg=None, vel=None, goal=None):
@@ -44,8 +44,8 @@ def put(task, row, *, pos=None, yaw_deg=None, vel=None, goal=None):
 def drive_until_over(task, action, limit=2000):
     for _ in range(limit):
         act(task, action)
-        if task.border.outcomes.numpy()[0]:
-            return Outcome(int(task.border.outcomes.numpy()[0]))
+        if task.buffers.outcomes.numpy()[0]:
+            return Outcome(int(task.buffers.outcomes.numpy()[0]))
     return Outcome.RUNNING
 
 
@@ -93,7 +93,7 @@ def test_the_first_goal_as_coded_is_the_marker_of_the_scene_and_a_crash_keeps_it
     assert task.world.goal.numpy()[0, :2] == pytest.approx(LEVEL1_MARKER)
     put(task, 0, pos=(-13.0, 13.8), vel=(0.0, 5.0))
     act(task, PUSH)
-    assert task.border.outcomes.numpy()[0] == Outcome.HIT_WALL
+    assert task.buffers.outcomes.numpy()[0] == Outcome.HIT_WALL
     assert task.world.goal.numpy()[0, :2] == pytest.approx(LEVEL1_MARKER)
     assert task.world.pos.numpy()[0] == pytest.approx(LEVEL1_START[:2])
     assert task.world.vel.numpy()[0, 1] > 3.0
@@ -104,7 +104,7 @@ def test_a_park_as_coded_draws_one_of_the_three_spots_and_stops_the_car():
     for row in range(64):
         put(task, row, pos=LEVEL1_MARKER, vel=(0.0, 1.0))
     act(task, *[PUSH] * 64)
-    assert (task.border.outcomes.numpy() == Outcome.SUCCESS).all()
+    assert (task.buffers.outcomes.numpy() == Outcome.SUCCESS).all()
     assert not task.world.vel.numpy().any()
     goals = {tuple(np.round(goal, 3)) for goal in task.world.goal.numpy()[:, :2].tolist()}
     assert goals == set(LEVEL1_SPOTS)
@@ -115,7 +115,7 @@ def test_as_documented_every_episode_draws_a_spot_and_starts_at_rest():
     for row in range(64):
         put(task, row, pos=(0.0, 14.0), vel=(0.0, 5.0))
     act(task, *[0] * 64)
-    assert (task.border.outcomes.numpy() == Outcome.HIT_WALL).all()
+    assert (task.buffers.outcomes.numpy() == Outcome.HIT_WALL).all()
     assert not task.world.vel.numpy().any()
     assert len({tuple(goal) for goal in task.world.goal.numpy()[:, :2].tolist()}) == len(LEVEL1_SPOTS)
 
@@ -125,20 +125,20 @@ def test_driving_into_a_block_ends_as_a_hit_of_an_obstacle(x, z, yaw_deg):
     task = built(goals="anywhere")
     put(task, 0, pos=(x, z - 4.0), yaw_deg=0.0, goal=(14.0, 14.0, 0.0))
     assert drive_until_over(task, PUSH) == Outcome.HIT_OBSTACLE
-    assert task.border.rewards.numpy()[0] == pytest.approx(-0.5, abs=0.02)
+    assert task.buffers.rewards.numpy()[0] == pytest.approx(-0.5, abs=0.02)
 
 
 def test_an_episode_without_limit_goes_on_and_one_with_a_limit_is_truncated():
     task = built(2)
     for _ in range(300):
         act(task, RIGHT, RIGHT)
-    assert task.border.steps.numpy().tolist() == [300, 300]
+    assert task.buffers.steps.numpy().tolist() == [300, 300]
     task = built(2, numbers={"step_limit": 20.0})
     for _ in range(20):
         act(task, RIGHT, RIGHT)
-    assert (task.border.outcomes.numpy() == Outcome.TIMEOUT).all()
-    assert task.border.is_truncated.numpy().all()
-    assert not task.border.is_terminated.numpy().any()
+    assert (task.buffers.outcomes.numpy() == Outcome.TIMEOUT).all()
+    assert task.buffers.is_truncated.numpy().all()
+    assert not task.buffers.is_terminated.numpy().any()
 
 
 def test_success_in_pose_needs_place_heading_and_slowness():
@@ -155,14 +155,14 @@ def test_success_in_pose_needs_place_heading_and_slowness():
             task, row, pos=(offset, 0.0) - numbers_ahead * nose, yaw_deg=goal[2] + turn_deg, vel=speed * nose, goal=goal
         )
     act(task, *[(0, 0)] * 5)
-    assert task.border.outcomes.numpy().tolist() == [Outcome.SUCCESS, 0, 0, 0, Outcome.SUCCESS]
+    assert task.buffers.outcomes.numpy().tolist() == [Outcome.SUCCESS, 0, 0, 0, Outcome.SUCCESS]
 
 
 def test_improved_episodes_differ_and_begin_clear_of_everything():
     task = built(2048, preset="improved")
-    assert not task.border.outcomes.numpy().any()
+    assert not task.buffers.outcomes.numpy().any()
     act(task, *[(0, 0)] * 2048)
-    assert not task.border.outcomes.numpy().any()
+    assert not task.buffers.outcomes.numpy().any()
     blocks = task.blocks.numpy()[..., :2]
     gaps = np.linalg.norm(blocks[:, [0, 0, 1]] - blocks[:, [1, 2, 2]], axis=-1)
     assert gaps.min() >= 6.0
@@ -211,7 +211,7 @@ def test_pads_and_blocks_are_as_wide_as_their_numbers_say(place, number, sizes_m
         task = built(numbers={number: size_m})
         put(task, 0, pos=pos, yaw_deg=place[2], goal=(8.0, 9.0, 0.0))
         act(task, RIGHT)
-        assert task.border.outcomes.numpy()[0] == expected
+        assert task.buffers.outcomes.numpy()[0] == expected
 
 
 def test_starts_may_be_kept_near_the_goal():
@@ -229,7 +229,7 @@ def test_a_mirrored_world_gives_mirrored_ranges():
         ]
     act(task, PUSH, PUSH)
     names = [element.name for element in task.layout.frame]
-    seen = {name: task.border.observations.numpy()[:, k] for k, name in enumerate(names)}
+    seen = {name: task.buffers.observations.numpy()[:, k] for k, name in enumerate(names)}
     for name in names:
         if name.endswith("_right") and "wall" not in name:
             assert seen[name][0] == pytest.approx(-seen[name][1], abs=1e-5), name
@@ -241,7 +241,7 @@ def test_a_mirrored_world_gives_mirrored_ranges():
 def test_numbers_may_be_randomised():
     task = built(256, numbers={"drag_per_s": Sampler(intervals=((4.0, 12.0),))})
     act(task, *[PUSH] * 256)
-    drag = task.border.numbers.numpy()[:, task.number_table.names.index("drag_per_s")]
+    drag = task.buffers.numbers.numpy()[:, task.number_table.names.index("drag_per_s")]
     assert drag.std() > 1.0
     assert task.world.vel.numpy()[:, 1] == pytest.approx(2.0 * (1.0 - drag * 0.02) ** 3, rel=1e-4)
 

@@ -29,9 +29,9 @@ def built(env_count=1, seed=0, numbers=None, **settings):
 
 def act(task, *actions):
     """Steps with one action, or one per row; returns rewards."""
-    task.border.branches.numpy()[:] = np.array(actions).reshape(-1, 2)
+    task.buffers.branches.numpy()[:] = np.array(actions).reshape(-1, 2)
     task.step()
-    return task.border.rewards.numpy().copy()
+    return task.buffers.rewards.numpy().copy()
 
 
 def put(task, row, *, pos=None, yaw_deg=None, vel=None, goal=None):
@@ -96,7 +96,7 @@ def test_who_comes_out_of_a_portal_at_rest_does_not_fall_back_into_it():
         put(task, 0, pos=(x, z), yaw_deg=yaw_deg, goal=(14.0, -14.0, 0.0))
         for _ in range(20):
             act(task, GO)
-        assert not task.border.outcomes.numpy()[0]
+        assert not task.buffers.outcomes.numpy()[0]
         assert np.linalg.norm(task.world.pos.numpy()[0] - (x, z)) > 2.0
 
 
@@ -135,9 +135,9 @@ def test_a_car_that_is_run_over_has_hit_an_obstacle():
     put(task, 0, pos=(-0.51, 9.0))
     for _ in range(200):
         act(task, STAY)
-        if task.border.outcomes.numpy()[0]:
+        if task.buffers.outcomes.numpy()[0]:
             break
-    assert task.border.outcomes.numpy()[0] == Outcome.HIT_OBSTACLE
+    assert task.buffers.outcomes.numpy()[0] == Outcome.HIT_OBSTACLE
 
 
 def test_movers_run_on_through_a_crash_as_coded():
@@ -180,7 +180,7 @@ def test_goals_anywhere_lie_clear_of_portals_and_of_the_start_in_disjoint_cells(
 def test_improved_episodes_begin_clear_of_everything():
     task = built(2048, preset="improved")
     act(task, *[STAY] * 2048)
-    assert not task.border.outcomes.numpy().any()
+    assert not task.buffers.outcomes.numpy().any()
     assert (task.movers.numpy()[:, :2, 0] < 15.0).all()
     assert (task.movers.numpy()[:, 2:, 0] > 53.0).all()
     elsewhere = (task.world.pos.numpy()[:, 0] > 34.0) != (task.world.goal.numpy()[:, 0] > 34.0)
@@ -204,7 +204,7 @@ def test_the_velocity_a_tracking_sensor_would_give_is_that_of_the_movers():
     task = built(observation="ranged", stack=1)
     names = [element.name for element in task.layout.frame]
     yaw = np.radians(56.3)
-    seen = task.border.observations.numpy()[0]
+    seen = task.buffers.observations.numpy()[0]
     first_right = seen[names.index("mover_z_vel_car_right")] * 10.0
     first_forward = seen[names.index("mover_z_vel_car_forward")] * 10.0
     assert (first_right, first_forward) == pytest.approx((-2.0 * np.sin(yaw), 2.0 * np.cos(yaw)), rel=1e-4)

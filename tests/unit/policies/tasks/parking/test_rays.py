@@ -20,7 +20,7 @@ def seen(*, pos=(0.0, 0.0), yaw_deg=0.0, blocks=(), goal=(-14.0, -14.0, 0.0), nu
     task.blocks.numpy()[0] = [pose(place) for place in (*blocks, *aside)][:3]
     task.step()  # a push of 0 N: nothing moves
     size = task.rules.tag_count + 2
-    return task.border.observations.numpy()[0, -(2 * task.rules.ray_count + 1) * size :].reshape(-1, size)
+    return task.buffers.observations.numpy()[0, -(2 * task.rules.ray_count + 1) * size :].reshape(-1, size)
 
 
 def test_the_order_is_ahead_then_right_then_left():

@@ -25,25 +25,25 @@ def rewarded(*, pos, best=30.0, last=0.0, vel=(0.0, 0.0), numbers=None, goal=GOA
     if blocks is not None:
         task.blocks.numpy()[0] = [pose(place) for place in blocks]
     task.step()
-    return float(task.border.rewards.numpy()[0]), task
+    return float(task.buffers.rewards.numpy()[0]), task
 
 
 @pytest.mark.parametrize("reward", ["as-documented", "as-coded"])
 def test_row_1_a_wall_costs_a_half_and_ends(reward):
     value, task = rewarded(pos=(5.0, 13.9), vel=(0.0, 2.0), numbers=QUIET, reward=reward)
-    assert task.border.outcomes.numpy()[0] == Outcome.HIT_WALL
+    assert task.buffers.outcomes.numpy()[0] == Outcome.HIT_WALL
     assert value == pytest.approx(-0.5, abs=2e-4)
 
 
 def test_row_2_an_obstacle_costs_a_half_and_ends():
     value, task = rewarded(pos=(-3.28, 1.0), numbers=QUIET)
-    assert task.border.outcomes.numpy()[0] == Outcome.HIT_OBSTACLE
+    assert task.buffers.outcomes.numpy()[0] == Outcome.HIT_OBSTACLE
     assert value == pytest.approx(-0.5, abs=2e-4)
 
 
 def test_row_3_a_park_pays_five_and_ends():
     value, task = rewarded(pos=(0.0, 11.0), numbers=QUIET)
-    assert task.border.outcomes.numpy()[0] == Outcome.SUCCESS
+    assert task.buffers.outcomes.numpy()[0] == Outcome.SUCCESS
     assert value == pytest.approx(5.0, abs=2e-4)
 
 
@@ -60,7 +60,7 @@ def test_row_5_the_best_distance_pays_once():
     assert value == pytest.approx(2e-5, rel=1e-3)
     assert task.world.best_m.numpy()[0] == pytest.approx(np.hypot(10.0, HEIGHT), rel=1e-5)
     task.step()
-    assert task.border.rewards.numpy()[0] == pytest.approx(-2e-5, rel=1e-3)
+    assert task.buffers.rewards.numpy()[0] == pytest.approx(-2e-5, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_row_4_as_coded_makes_a_nearer_step_within_its_radius_count_as_farther()
 
 def test_best_begins_at_30_in_each_episode_and_last_is_kept_as_coded():
     _, task = rewarded(pos=(5.0, 13.9), vel=(0.0, 2.0), best=1.0, numbers=QUIET)
-    assert task.border.outcomes.numpy()[0] == Outcome.HIT_WALL
+    assert task.buffers.outcomes.numpy()[0] == Outcome.HIT_WALL
     assert task.world.best_m.numpy()[0] == 30.0
     assert task.world.last_m.numpy()[0] == pytest.approx(np.sqrt(5.0**2 + 1.9**2 + HEIGHT**2), rel=1e-5)
 
@@ -121,7 +121,7 @@ def at_portal(**settings):
     task.reset(0)
     task.world.pos.numpy()[0], task.world.yaw.numpy()[0] = (-11.0, 11.45), np.radians(-45.0)
     task.step()
-    return float(task.border.rewards.numpy()[0])
+    return float(task.buffers.rewards.numpy()[0])
 
 
 def test_row_10_through_the_portal_towards_the_target():
@@ -149,11 +149,11 @@ def test_progress_sums_to_the_way_that_was_made_and_its_end_gives_the_potential_
     total = 0.0
     for _ in range(20):
         task.step()
-        total += float(task.border.rewards.numpy()[0])
+        total += float(task.buffers.rewards.numpy()[0])
     assert total == pytest.approx(0.1 * (way - float(task.world.way_m.numpy()[0])), abs=1e-5)
     assert total > 0.1
-    while not task.border.outcomes.numpy()[0]:
+    while not task.buffers.outcomes.numpy()[0]:
         task.step()
-        total += float(task.border.rewards.numpy()[0])
-    assert task.border.outcomes.numpy()[0] == Outcome.HIT_WALL
+        total += float(task.buffers.rewards.numpy()[0])
+    assert task.buffers.outcomes.numpy()[0] == Outcome.HIT_WALL
     assert total == pytest.approx(-1.0 + 0.1 * way, abs=1e-4)  # the potential after an end is 0

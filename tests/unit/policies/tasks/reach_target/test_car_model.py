@@ -149,9 +149,9 @@ def test_wild_driving_with_wild_numbers_stays_finite(seed):
     task.reset(seed)
     rng = np.random.default_rng(seed)
     for _ in range(150):
-        task.border.continuous.assign(rng.uniform(-1, 1, (256, 3)).astype(np.float32))
+        task.buffers.continuous.assign(rng.uniform(-1, 1, (256, 3)).astype(np.float32))
         task.step()
-    assert np.isfinite(task.border.observations.numpy()).all()
+    assert np.isfinite(task.buffers.observations.numpy()).all()
     assert np.linalg.norm(task.world.vel.numpy(), axis=1).max() < 100.0
 
 

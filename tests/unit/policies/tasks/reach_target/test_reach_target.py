@@ -29,17 +29,17 @@ def set_row(task, i=0, **values):
 
 
 def act(task, steer=0.0, throttle=0.0, brake=0.0, count=1):
-    task.border.continuous.numpy()[:] = (steer, throttle, brake)
+    task.buffers.continuous.numpy()[:] = (steer, throttle, brake)
     for _ in range(count):
         task.step()
 
 
 def reward(task):
-    return float(task.border.rewards.numpy()[0])
+    return float(task.buffers.rewards.numpy()[0])
 
 
 def outcome(task):
-    return Outcome(int(task.border.outcomes.numpy()[0]))
+    return Outcome(int(task.buffers.outcomes.numpy()[0]))
 
 
 def rolling(task, pos, vel, yaw=0.0):
@@ -68,7 +68,7 @@ def test_world_observations_are_target_car_velocity_direction_and_heading_in_tha
     world = task.world
     target, pos, vel = world.target.numpy()[0], world.pos.numpy()[0], world.vel.numpy()[0]
     direction = (target - pos) / np.linalg.norm(target - pos)
-    seen = task.border.observations.numpy()[0]
+    seen = task.buffers.observations.numpy()[0]
     assert np.allclose(seen[:12], np.concatenate([target, pos, vel, direction]), atol=1e-5)
     assert np.dot(seen[12:], vel) == pytest.approx(np.linalg.norm(vel), rel=0.1)  # it drives where it heads
 
@@ -78,7 +78,7 @@ def test_car_observations_are_the_world_ones_turned_into_the_car():
     rolling(task, (10.0, 0.859, 5.0), 4.0, np.pi / 2)  # heading along +x
     set_row(task, target=(10.0, 0.5, 25.0))  # 20 m to its left
     act(task)
-    seen = task.border.observations.numpy()[0]
+    seen = task.buffers.observations.numpy()[0]
     assert seen[:3] == pytest.approx([-20.0, 0.5 - 0.859, -0.8], abs=0.05)
     assert seen[3:6] == pytest.approx([0.0, 0.0, 4.0], abs=0.05)
     assert seen[6:9] == pytest.approx(seen[:3] / np.linalg.norm(seen[:3]), abs=1e-5)
@@ -89,7 +89,7 @@ def test_ego_observation_gives_bearing_distance_and_edges():
     rolling(task, (10.0, 0.859, 5.0), 4.0, np.pi / 2)
     set_row(task, target=(10.8, 0.5, 8.0), target_yaw=np.pi)
     act(task, 0.1)
-    seen = {element.name: value for element, value in zip(task.layout.frame, task.border.observations.numpy()[0])}  # noqa: B905
+    seen = {element.name: value for element, value in zip(task.layout.frame, task.buffers.observations.numpy()[0])}  # noqa: B905
     assert seen["goal_bearing_sin"] == pytest.approx(-1.0, abs=0.01)
     assert seen["goal_distance"] == pytest.approx(3.0 / 50.0, abs=0.001)
     assert seen["goal_distance_near"] == pytest.approx(3.0 / 5.0, abs=0.01)
@@ -105,7 +105,7 @@ def test_ego_observation_gives_bearing_distance_and_edges():
 
 def test_stacked_heights_are_those_of_the_published_scene():
     task = built(18, variant=0, heights="stacked")
-    heights = task.border.observations.numpy()[:, 4]
+    heights = task.buffers.observations.numpy()[:, 4]
     assert heights == pytest.approx([1.0 - 20.0 * (k % 16) for k in range(18)])
 
 
@@ -116,11 +116,11 @@ def test_a_reach_as_coded_pays_one_ends_the_episode_and_keeps_the_motion():
     act(task)
     assert outcome(task) == Outcome.SUCCESS
     assert reward(task) == 1.0
-    assert task.border.is_terminated.numpy()[0]
+    assert task.buffers.is_terminated.numpy()[0]
     # tested every physics step: 1.5 m less the planar radius sqrt(1 - 0.359²) = 0.933 are passed after 0.12 s
     assert task.world.pos.numpy()[0, 2] == pytest.approx(0.6, abs=0.02)
     assert task.world.vel.numpy()[0, 2] == pytest.approx(5.0, abs=0.05)
-    assert task.border.episodes.numpy()[0] == 2
+    assert task.buffers.episodes.numpy()[0] == 2
     assert np.abs(task.world.target.numpy()[0] - (0.0, 0.5, 1.5)).max() > 0.1
 
 
@@ -135,8 +135,8 @@ def test_a_reach_as_documented_pays_one_moves_the_target_and_goes_on():
     assert task.world.target.numpy()[0, 2] != 1.5
     act(task, count=2)
     assert outcome(task) == Outcome.SUCCESS  # one target in an episode that was cut
-    assert task.border.is_truncated.numpy()[0]
-    assert not task.border.is_terminated.numpy()[0]
+    assert task.buffers.is_truncated.numpy()[0]
+    assert not task.buffers.is_terminated.numpy()[0]
     assert task.world.pos.numpy()[0] == pytest.approx([0.0, 1.0, 0.0])  # back in the middle
 
 
@@ -169,10 +169,10 @@ def test_potential_shaping_of_a_whole_episode_depends_on_where_it_began_only():
 def test_standing_still_is_cut_after_two_hundred_decisions_and_starts_in_the_middle_again():
     task = built(4)
     act(task, brake=1.0, count=199)
-    assert not task.border.is_truncated.numpy().any()
+    assert not task.buffers.is_truncated.numpy().any()
     act(task, brake=1.0)
-    assert (task.border.outcomes.numpy() == Outcome.TIMEOUT).all()
-    assert task.border.is_truncated.numpy().all()
+    assert (task.buffers.outcomes.numpy() == Outcome.TIMEOUT).all()
+    assert task.buffers.is_truncated.numpy().all()
     assert task.world.pos.numpy() == pytest.approx(np.tile([0.0, 1.0, 0.0], (4, 1)))
     assert not task.world.vel.numpy().any()
 
