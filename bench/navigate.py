@@ -90,7 +90,7 @@ def build(settings: dict[str, str], trees_per_ha: float, episodes: int) -> Navig
     task = build_task("Navigate", episodes, task_settings("Navigate", settings | {"split": "test"}))
     if not isinstance(task, Navigate):
         raise TypeError(task)
-    task.set_numbers({"trees_per_ha": trees_per_ha})
+    task.set_params({"trees_per_ha": trees_per_ha})
     task.reset(SEED)
     return task
 

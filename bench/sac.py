@@ -27,7 +27,7 @@ EVALUATION_ENVS = 256
 SMALL_M = 0.5  # reach, of the hindsight comparison
 COMMAND = "python -m bench sac"
 Act = Callable[[np.ndarray], np.ndarray]
-_NUMBERS = {"batch_size": 256, "buffer_size": 100_000, "learning_rate": 1e-3, "tau": 0.02}
+_PARAMS = {"batch_size": 256, "buffer_size": 100_000, "learning_rate": 1e-3, "tau": 0.02}
 
 
 def measure() -> list[Row]:
@@ -56,12 +56,12 @@ def _timed(train: Callable[[], Act]) -> tuple[Act, float]:
 
 def _ours(reach_m: float, goals: int) -> Act:
     task = build_task("RollerBall", ENV_COUNT)
-    task.set_numbers({"reach_m": reach_m})
-    numbers = {"buffer_init_steps": 1000, "steps_per_update": 8, "init_entcoef": 0.02, "hindsight": goals}
+    task.set_params({"reach_m": reach_m})
+    params = {"buffer_init_steps": 1000, "steps_per_update": 8, "init_entcoef": 0.02, "hindsight": goals}
     behavior = Behavior.model_validate(
         {
             "trainer_type": "sac",
-            "hyperparameters": {**_NUMBERS, **numbers},
+            "hyperparameters": {**_PARAMS, **params},
             "network_settings": {"hidden_units": 64, "normalize": True},
         }
     )
@@ -98,7 +98,7 @@ def _theirs(reach_m: float, goals: int) -> Act:
         ent_coef="auto_0.02",
         policy_kwargs={"net_arch": [64, 64]},
         seed=1,
-        **_NUMBERS,
+        **_PARAMS,
         **(hindsight if goals else {}),
     )
     model.learn(STEPS)
@@ -113,7 +113,7 @@ def _theirs(reach_m: float, goals: int) -> Act:
 def _success_rate(act: Act, reach_m: float) -> float:
     """Of the episodes that end in 400 decisions of many environments."""
     task = build_task("RollerBall", EVALUATION_ENVS)
-    task.set_numbers({"reach_m": reach_m, "step_limit": 100.0})
+    task.set_params({"reach_m": reach_m, "step_limit": 100.0})
     task.reset(7)
     for _ in range(400):
         task.buffers.continuous.numpy()[:] = act(task.buffers.observations.numpy().copy())
@@ -127,7 +127,7 @@ class _PlainEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def __init__(self, reach_m: float) -> None:
         env = TaskEnv("RollerBall")
-        env.task.set_numbers({"reach_m": reach_m})
+        env.task.set_params({"reach_m": reach_m})
         super().__init__(env)
 
 

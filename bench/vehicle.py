@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from policies.tasks.catalogue import build_task, task_settings
-from policies.tasks.reach_target.reach_target_params import NUMBERS
+from policies.tasks.reach_target.reach_target_params import PARAMS
 from policies.tasks.task import Task
 
 Array = np.ndarray[Any, Any]
 
-NUMBER = {number.name: number.default for number in NUMBERS}
+NUMBER = {number.name: number.default for number in PARAMS}
 WEIGHT_N = NUMBER["mass_kg"] * NUMBER["gravity_m_s2"]
 DECISION_S = 0.2
 
@@ -35,8 +35,8 @@ class Check:
 def car(count: int = 1, half_platform_m: float = 1e6) -> Task:
     """Cars at rest, heading along +z, whose episodes neither end by time nor by a target."""
     task = build_task("ReachTarget", count, task_settings("ReachTarget", {"preset": "as-coded"}))
-    task.set_numbers({"half_platform_m": half_platform_m, "step_limit": 1e6, "half_spawn_m": 0.0})
-    task.set_numbers({"target_height_m": 10.0})  # out of the way
+    task.set_params({"half_platform_m": half_platform_m, "step_limit": 1e6, "half_spawn_m": 0.0})
+    task.set_params({"target_height_m": 10.0})  # out of the way
     task.reset(0)
     task.world.q.assign(np.tile(np.array([0.0, 0.0, 0.0, 1.0], np.float32), (count, 1)))  # type: ignore[attr-defined]
     drive(task, (0.0, 0.0, 1.0), 3.0)

@@ -106,14 +106,12 @@ def run(experiment: Experiment, seed: int, kept: Path | None) -> Result:
         size = result.policy.stat().st_size
         if kept is not None:
             kept.write_bytes(result.policy.read_bytes())
-    numbers = Curriculum(config.environment_parameters).final_numbers()
+    params = Curriculum(config.environment_parameters).final_params()
     evaluations = []
     for judged in experiment.judged:
         settings = settings_of(task, with_settings(config.env_settings.env_args, judged.settings))
         greedy, drawn = (
-            evaluate(
-                policy, task, settings, episodes=EPISODES, seed=HELD_OUT_SEED, numbers=numbers, is_greedy=is_greedy
-            )
+            evaluate(policy, task, settings, episodes=EPISODES, seed=HELD_OUT_SEED, params=params, is_greedy=is_greedy)
             for is_greedy in (True, False)
         )
         evaluations.append(

@@ -48,7 +48,7 @@ def scorecards(
 
 def _fly(policy: Policy, task: FollowMe, cell: Cell) -> tuple[list[Track], float]:
     """The first episode of every environment, by the most probable actions; their tracks and mean reward."""
-    task.set_numbers({"trees_per_ha": cell.trees_per_ha, "owner_speed_max": cell.owner_speed_max})
+    task.set_params({"trees_per_ha": cell.trees_per_ha, "owner_speed_max": cell.owner_speed_max})
     task.reset(HELD_OUT_SEED)
     tensors, recording = TaskTensors(task), Recording(task)
     memory = policy.start_memory(task.env_count)

@@ -65,7 +65,7 @@ def _section(name: str) -> str:
         frame = task.layout.frame
         shown[frame] = f"{shown[frame]}, `{preset}`" if frame in shown else f"`{preset}`"
     parts += [f"Observation {titles}:\n\n{_frame_table(frame)}" for frame, titles in shown.items()]
-    return "\n".join([*parts, "Numbers:\n", _number_table(presets)])
+    return "\n".join([*parts, "Parameters:\n", _param_table(presets)])
 
 
 def _presets(name: str) -> list[str]:
@@ -140,12 +140,12 @@ def _frame_table(frame: Iterable[Element]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _number_table(presets: dict[str, Task]) -> str:
-    rows = ["| number | default | range | unit | meaning | source |", "|---|---|---|---|---|---|"]
-    for number in next(iter(presets.values())).numbers:
-        meaning = f"{number.meaning} | {number.source}"
-        bounds = f"{number.minimum:g} … {number.maximum:g}"
-        rows.append(f"| `{number.name}` | {_defaults(number.name, presets)} | {bounds} | {number.unit} | {meaning} |")
+def _param_table(presets: dict[str, Task]) -> str:
+    rows = ["| parameter | default | range | unit | meaning | source |", "|---|---|---|---|---|---|"]
+    for param in next(iter(presets.values())).params:
+        meaning = f"{param.meaning} | {param.source}"
+        bounds = f"{param.minimum:g} … {param.maximum:g}"
+        rows.append(f"| `{param.name}` | {_defaults(param.name, presets)} | {bounds} | {param.unit} | {meaning} |")
     return "\n".join(rows) + "\n"
 
 
@@ -158,8 +158,8 @@ def _defaults(name: str, presets: dict[str, Task]) -> str:
 
 
 def _drawn_from(task: Task, name: str) -> str:
-    declared = task.number_table.declarations[name].default
-    low, high = task.number_table.rows[task.number_table.names.index(name)][4:6]
+    declared = task.param_table.declarations[name].default
+    low, high = task.param_table.rows[task.param_table.names.index(name)][4:6]
     if low != high:
         return f"drawn from {low:g} … {high:g}"
     return f"{declared if low == np.float32(declared) else low:g}"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot.payload.camera.ports import View
 from common.image_stream import ImageFrame
-from policies.tasks.follow_me.follow_me_params import FollowNumbers
+from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import (
     DEPTH_HALF_M,
     HFOV_DEG,
@@ -52,10 +52,10 @@ class OnboardCamera:
         )
         self._lens: NDArray[Any] = self._camera.lenses.numpy()  # live
         images: Any = wp.zeros((1, IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), dtype=wp.uint8)
-        numbers: Any = wp.zeros(1, dtype=FollowNumbers)
-        numbers.numpy()["camera_noise"] = noise
+        params: Any = wp.zeros(1, dtype=FollowParams)
+        params.numpy()["camera_noise"] = noise
         everyone: Any = wp.full(1, value=True, dtype=wp.bool)
-        optics = [rig.arrays, numbers, everyone, self._camera.optics]
+        optics = [rig.arrays, params, everyone, self._camera.optics]
         self._set_optics = wp.launch(set_optics, 1, optics, record_cmd=True)
         inputs = [self._camera.rgb, self._camera.depth_m, everyone, images]
         self._pack = wp.launch(pack_images, (1, IMAGE_SIZE), inputs, record_cmd=True)

@@ -107,7 +107,7 @@ def _with_policy(options: PlayOptions, name: str) -> tuple[Task, Expert, str]:
     task = build_task(task_name, options.envs, settings)
     task.layout.require(policy.layout, str(path))
     if is_own:
-        task.set_numbers(card.samplers())
+        task.set_params(card.samplers())
     return task, PolicyDriver(policy), str(path)
 
 

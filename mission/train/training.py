@@ -111,7 +111,7 @@ def evaluate_policy(
     path = find_policy(name)
     policy, card = load_policy(path)
     task_name = task or card.task
-    own, numbers = (card.settings, card.samplers()) if task_name == card.task else ({}, {})
+    own, params = (card.settings, card.samplers()) if task_name == card.task else ({}, {})
     settings = settings_of(task_name, pairs, {**own, "split": "test"})
     episodes, seed = episodes_and_seed
     with busy(console, f"playing {episodes} episodes of {task_name}") as say:
@@ -121,7 +121,7 @@ def evaluate_policy(
             settings,
             episodes=episodes,
             seed=seed,
-            numbers=numbers,
+            params=params,
             is_greedy=not is_drawn,
             place=str(path),
             progress=lambda ended: say(f"episode {ended} of {episodes} of {task_name}"),
@@ -157,7 +157,7 @@ def _play(config: RunConfig, console: Console) -> None:
             settings_of(name, config.env_settings.env_args),
             episodes=INFERENCE_EPISODES,
             seed=max(config.env_settings.seed, 0),
-            numbers=card.samplers(),
+            params=card.samplers(),
             is_greedy=config.behavior.network_settings.deterministic,
             progress=lambda ended: say(f"episode {ended} of {INFERENCE_EPISODES} of {name}"),
         )

@@ -14,7 +14,7 @@ from policies.experts.parking_field import NODES, Target, fill_field
 from policies.experts.parking_planner import Memory, Situation, next_command, write_command
 from policies.tasks.parking import level1, level2
 from policies.tasks.parking.arena import PORTAL_PLACES, STOREY_2_FROM_X, forward_of, place_of, pose, storey_of
-from policies.tasks.parking.parking_params import CAR_NUMBERS, CarNumbers, Level1Numbers, Level2Numbers
+from policies.tasks.parking.parking_params import CAR_PARAMS, CarParams, Level1Params, Level2Params
 from policies.tasks.parking.scene import Scene, portal_half
 from policies.tasks.parking.settings import Rules
 from policies.tasks.parking.world import CarState, motion_of
@@ -37,13 +37,13 @@ class Fields:
 
 
 @wp.func
-def parking_target(scene: Scene, rules: Rules, numbers: CarNumbers) -> Target:
+def parking_target(scene: Scene, rules: Rules, params: CarParams) -> Target:
     """The pad, to be touched; or the place of the car's origin from which it turns into the pose on the spot."""
     target = Target()
     target.pose = scene.goal
     target.half = scene.goal_half
     if rules.needs_pose:
-        place = place_of(scene.goal) - forward_of(scene.goal) * numbers.box_ahead_m
+        place = place_of(scene.goal) - forward_of(scene.goal) * params.box_ahead_m
         target.pose = wp.vec4(place[0], place[1], scene.goal[2], scene.goal[3])
         target.half = wp.vec2(0.0, 0.0)
     return target
@@ -63,7 +63,7 @@ def fill_level1(rows: wp.array(dtype=int), cars: CarState, blocks: level1.Blocks
     i = rows[wp.tid()]
     scene = level1.scene_of(cars, blocks, i)
     forget(fields.memories, i)
-    fill_field(fields.way, fields.cost, i, 0, scene, parking_target(scene, rules, cars.numbers[i]))
+    fill_field(fields.way, fields.cost, i, 0, scene, parking_target(scene, rules, cars.params[i]))
 
 
 @wp.kernel(enable_backward=False)
@@ -72,13 +72,13 @@ def act_level1(
 ) -> None:
     """The next action of every row."""
     i = wp.tid()
-    numbers = cars.numbers[i]
+    params = cars.params[i]
     now = Situation()
     now.scene = level1.scene_of(cars, blocks, i)
-    now.target = parking_target(now.scene, rules, numbers)
+    now.target = parking_target(now.scene, rules, params)
     now.needs_pose = rules.needs_pose
     motion = motion_of(cars, i)
-    command = next_command(fields.angles_rad, fields.way, fields.memories, i, motion, now, rules, numbers)
+    command = next_command(fields.angles_rad, fields.way, fields.memories, i, motion, now, rules, params)
     write_command(branches, i, command, rules)
 
 
@@ -89,13 +89,13 @@ def situation_of(cars: CarState, movers: level2.Movers, places: level2.Level2Pla
     now.storey = storey_of(cars.pos[i][0])
     now.scene = level2.scene_of(cars, movers, places, i, now.storey)
     now.has_movers = True
-    now.more = movers.numbers[i]
+    now.more = movers.params[i]
     now.through_portal = not now.scene.has_goal
     if now.through_portal:
         now.target.pose = now.scene.portal
         now.target.half = portal_half()
     else:
-        now.target = parking_target(now.scene, rules, cars.numbers[i])
+        now.target = parking_target(now.scene, rules, cars.params[i])
         now.needs_pose = rules.needs_pose
     return now
 
@@ -132,7 +132,7 @@ def act_level2(
     i = wp.tid()
     now = situation_of(cars, movers, places, rules, i)
     motion = motion_of(cars, i)
-    command = next_command(fields.angles_rad, fields.way, fields.memories, i, motion, now, rules, cars.numbers[i])
+    command = next_command(fields.angles_rad, fields.way, fields.memories, i, motion, now, rules, cars.params[i])
     write_command(branches, i, command, rules)
 
 
@@ -189,7 +189,7 @@ class Parking2Expert:
 def _blocks(task: level1.Parking1) -> Any:
     blocks = level1.Blocks()
     blocks.poses = task.blocks
-    blocks.numbers = typed_rows(task.buffers.numbers, Level1Numbers, first=len(CAR_NUMBERS))
+    blocks.params = typed_rows(task.buffers.params, Level1Params, first=len(CAR_PARAMS))
     return blocks
 
 
@@ -197,7 +197,7 @@ def _movers_and_places(task: level2.Parking2) -> tuple[Any, Any]:
     movers = level2.Movers()
     movers.poses = task.movers
     movers.touching = wp.zeros((task.env_count, 2), dtype=int, device=task.device)  # not looked at by `scene_of`
-    movers.numbers = typed_rows(task.buffers.numbers, Level2Numbers, first=len(CAR_NUMBERS))
+    movers.params = typed_rows(task.buffers.params, Level2Params, first=len(CAR_PARAMS))
     places = level2.Level2Places()
     places.portals = wp.mat44(*np.vstack([*(pose(place) for place in PORTAL_PLACES), np.zeros((2, 4))]).ravel())
     return movers, places

@@ -16,7 +16,7 @@ from policies.tasks.parking.car import DT
 from policies.tasks.parking.drive import Command, Motion, moved, wrapped
 from policies.tasks.parking.episode_end import is_in_pose
 from policies.tasks.parking.movers import movers_touch, ran, turned_back
-from policies.tasks.parking.parking_params import CarNumbers, Level2Numbers
+from policies.tasks.parking.parking_params import CarParams, Level2Params
 from policies.tasks.parking.scene import CLEAR, OBSTACLE, PAD, PORTAL, Scene, contact_of
 from policies.tasks.parking.settings import PUSH_OR_TURN, STEER, STEER_AND_SHIFT, Rules
 
@@ -48,7 +48,7 @@ class Situation:
 
     scene: Scene  # of the storey the car is on
     has_movers: wp.bool  # the scene's obstacles are level 2's, which move
-    more: Level2Numbers  # how they do
+    more: Level2Params  # how they do
     target: Target
     storey: int
     through_portal: wp.bool  # the target is the portal
@@ -76,17 +76,17 @@ class Memory:
 
 
 @wp.func
-def coasting(vel: wp.vec2, numbers: CarNumbers) -> wp.vec2:
+def coasting(vel: wp.vec2, params: CarParams) -> wp.vec2:
     """How far a car rolls that is not pushed any more [m]."""
-    keep = wp.max(0.0, 1.0 - numbers.drag_per_s * DT)
+    keep = wp.max(0.0, 1.0 - params.drag_per_s * DT)
     return vel * (DT * keep / wp.max(1.0 - keep, 0.01))
 
 
 @wp.func
-def cruise_m_s(rules: Rules, numbers: CarNumbers) -> float:
+def cruise_m_s(rules: Rules, params: CarParams) -> float:
     """Mean speed of a car that is pushed at every decision."""
-    keep = wp.max(0.0, 1.0 - numbers.drag_per_s * DT)
-    push = numbers.push_n / numbers.mass_kg * DT
+    keep = wp.max(0.0, 1.0 - params.drag_per_s * DT)
+    push = params.push_n / params.mass_kg * DT
     share = wp.where(rules.is_held or rules.actions == _STEER, 1.0, 1.0 / float(rules.tick_count))
     return wp.max(share * push * keep / wp.max(1.0 - keep, 0.01), 0.01)
 
@@ -144,28 +144,28 @@ def is_crash(contact: int, through_portal: bool) -> bool:
 
 
 @wp.func
-def is_arrival(contact: int, motion: Motion, now: Situation, numbers: CarNumbers) -> bool:
+def is_arrival(contact: int, motion: Motion, now: Situation, params: CarParams) -> bool:
     """Whether a contact, or a place, is what the plan is after."""
     if now.through_portal:
         return contact == PORTAL
     if now.needs_pose:
-        gap = motion.pos + coasting(motion.vel, numbers) - place_of(now.target.pose)
-        return wp.length(gap) < 0.5 * numbers.reach_m
+        gap = motion.pos + coasting(motion.vel, params) - place_of(now.target.pose)
+        return wp.length(gap) < 0.5 * params.reach_m
     return contact == PAD
 
 
 @wp.func
 def time_left(
-    way: wp.array3d(dtype=float), i: int, motion: Motion, now: Situation, rules: Rules, numbers: CarNumbers
+    way: wp.array3d(dtype=float), i: int, motion: Motion, now: Situation, rules: Rules, params: CarParams
 ) -> float:
     """From here on: the field's way, and the turn into its direction [s]."""
-    field = way_at(way, i, now.storey, motion.pos + coasting(motion.vel, numbers))
-    seconds = field[0] / cruise_m_s(rules, numbers)
+    field = way_at(way, i, now.storey, motion.pos + coasting(motion.vel, params))
+    seconds = field[0] / cruise_m_s(rules, params)
     downhill = wp.vec2(-field[1], -field[2])
     if wp.length(downhill) > 0.1:
         bearing = wp.atan2(downhill[0], downhill[1])
         turn = wp.abs(wrapped(bearing - motion.yaw))
-        turn_s = turn / wp.radians(numbers.turn_deg) * float(rules.tick_count) * DT
+        turn_s = turn / wp.radians(params.turn_deg) * float(rules.tick_count) * DT
         if rules.actions == _STEER_AND_SHIFT:
             turn_s = wp.min(turn_s, (wp.pi - turn) / wp.max(turn, 0.01) * turn_s + 1.0)
         seconds += turn_s
@@ -174,13 +174,13 @@ def time_left(
 
 @wp.func
 def rolled_out(
-    plan: Plan, way: wp.array3d(dtype=float), i: int, start: Motion, now: Situation, rules: Rules, numbers: CarNumbers
+    plan: Plan, way: wp.array3d(dtype=float), i: int, start: Motion, now: Situation, rules: Rules, params: CarParams
 ) -> float:
     """What a primitive costs [s]: its time and what is left after it; a crash costs most, a late one a little less."""
     motion = start
     scene = now.scene
     decision_s = float(rules.tick_count) * DT
-    stretch = int(wp.ceil(_STRETCH_M / (cruise_m_s(rules, numbers) * decision_s)))
+    stretch = int(wp.ceil(_STRETCH_M / (cruise_m_s(rules, params) * decision_s)))
     stop = int(wp.ceil(_STOP_S / decision_s))
     count = wp.min(plan.turn_count + stretch, _MOST_DECISIONS)
     seconds = float(0.0)
@@ -188,31 +188,31 @@ def rolled_out(
     for decision in range(count + stop):
         command = plan_command(plan, decision, rules)
         if decision == count and cost < 0.0:
-            cost = seconds + time_left(way, i, motion, now, rules, numbers)
+            cost = seconds + time_left(way, i, motion, now, rules, params)
         if decision >= count and rules.actions != _STEER:
             command.push = 0.0
             command.turn = 0.0
         for tick in range(rules.tick_count):
-            motion = moved(motion, command, rules.is_held or tick == 0, numbers)
+            motion = moved(motion, command, rules.is_held or tick == 0, params)
             seconds += DT
             scene = moved_on(scene, now)
-            contact = contact_of(motion.pose, scene, numbers)
+            contact = contact_of(motion.pose, scene, params)
             if is_crash(contact, now.through_portal):
                 return _CRASH - seconds
-            if decision < count and is_arrival(contact, motion, now, numbers):
+            if decision < count and is_arrival(contact, motion, now, params):
                 return seconds
     return cost
 
 
 @wp.func
-def one_push_m(rules: Rules, numbers: CarNumbers) -> float:
+def one_push_m(rules: Rules, params: CarParams) -> float:
     """How far a car at rest gets by the push of one decision."""
     pushes = wp.where(rules.is_held, float(rules.tick_count), 1.0)
-    return wp.length(coasting(wp.vec2(pushes * numbers.push_n / numbers.mass_kg * DT, 0.0), numbers))
+    return wp.length(coasting(wp.vec2(pushes * params.push_n / params.mass_kg * DT, 0.0), params))
 
 
 @wp.func
-def shot_command(motion: Motion, now: Situation, offset_m: float, rules: Rules, numbers: CarNumbers) -> Command:
+def shot_command(motion: Motion, now: Situation, offset_m: float, rules: Rules, params: CarParams) -> Command:
     """The analytic manoeuvre: straight to a place on the spot's axis, there into its direction, along it to the end.
 
     Args:
@@ -220,21 +220,21 @@ def shot_command(motion: Motion, now: Situation, offset_m: float, rules: Rules, 
         now: what it is in.
         offset_m: of that place ahead of the end; 0: the car turns at the end itself.
         rules: what its actions do.
-        numbers: of the car.
+        params: of the car.
     """
     command = Command()
     target = now.target.pose
-    end = place_of(target) - motion.pos - coasting(motion.vel, numbers)
+    end = place_of(target) - motion.pos - coasting(motion.vel, params)
     error = wrapped(wp.atan2(target[2], target[3]) - motion.yaw)
-    one_push = one_push_m(rules, numbers)
-    slack = wp.clamp(0.55 * one_push, 0.4 * numbers.reach_m, 0.85 * numbers.reach_m)
-    is_in_direction = wp.abs(error) <= 0.6 * wp.radians(numbers.turn_deg)
+    one_push = one_push_m(rules, params)
+    slack = wp.clamp(0.55 * one_push, 0.4 * params.reach_m, 0.85 * params.reach_m)
+    is_in_direction = wp.abs(error) <= 0.6 * wp.radians(params.turn_deg)
     along = wp.dot(end, forward_of(target))
     if wp.length(end) < slack and (is_in_direction or offset_m == 0.0):
         if not is_in_direction or rules.actions == _PUSH_OR_TURN:
             command.turn = wp.sign(error)
         return command
-    is_on_axis = offset_m != 0.0 and wp.abs(wp.dot(end, right_of(target))) < 0.5 * numbers.reach_m
+    is_on_axis = offset_m != 0.0 and wp.abs(wp.dot(end, right_of(target))) < 0.5 * params.reach_m
     if is_on_axis and is_in_direction and along * offset_m < 0.0:
         command.push = wp.sign(along)
         return command
@@ -248,26 +248,26 @@ def shot_command(motion: Motion, now: Situation, offset_m: float, rules: Rules, 
     if rules.actions == _STEER_AND_SHIFT and wp.abs(error) > 0.5 * wp.pi:
         error = wrapped(error + wp.pi)
         command.push = -1.0
-    if wp.abs(error) > wp.max(0.6 * wp.radians(numbers.turn_deg), 0.2 * numbers.reach_m / distance):
+    if wp.abs(error) > wp.max(0.6 * wp.radians(params.turn_deg), 0.2 * params.reach_m / distance):
         command.turn = wp.sign(error)
         command.push = 0.0
     return command
 
 
 @wp.func
-def is_shot_free(start: Motion, now: Situation, offset_m: float, rules: Rules, numbers: CarNumbers) -> bool:
+def is_shot_free(start: Motion, now: Situation, offset_m: float, rules: Rules, params: CarParams) -> bool:
     """Whether the manoeuvre ends in the pose without a contact."""
     motion = start
     scene = now.scene
     for _decision in range(2 * _MOST_DECISIONS):
-        command = shot_command(motion, now, offset_m, rules, numbers)
+        command = shot_command(motion, now, offset_m, rules, params)
         for tick in range(rules.tick_count):
-            motion = moved(motion, command, rules.is_held or tick == 0, numbers)
+            motion = moved(motion, command, rules.is_held or tick == 0, params)
             scene = moved_on(scene, now)
-            contact = contact_of(motion.pose, scene, numbers)
+            contact = contact_of(motion.pose, scene, params)
             if is_crash(contact, False):
                 return False
-            if contact == PAD and is_in_pose(motion, now.scene.goal, numbers):
+            if contact == PAD and is_in_pose(motion, now.scene.goal, params):
                 return True
     return False
 
@@ -288,21 +288,21 @@ def best_plan(
     motion: Motion,
     now: Situation,
     rules: Rules,
-    numbers: CarNumbers,
+    params: CarParams,
 ) -> Plan:
     """The cheapest primitive; a turn, or a way back, that was begun goes on unless another is cheaper by far."""
     best = memory.plan
     best.cost_s = 2.0 * _CRASH
     if memory.has_plan:
-        best.cost_s = rolled_out(best, way, i, motion, now, rules, numbers) - _CHANGE_COST_S
+        best.cost_s = rolled_out(best, way, i, motion, now, rules, params) - _CHANGE_COST_S
     for j in range(angles_rad.shape[0]):
         for kind in range(_KINDS):
             plan = Plan()
             plan.turn = wp.sign(angles_rad[j])
-            plan.turn_count = int(wp.round(wp.abs(angles_rad[j]) / wp.radians(numbers.turn_deg)))
+            plan.turn_count = int(wp.round(wp.abs(angles_rad[j]) / wp.radians(params.turn_deg)))
             plan.kind = kind
             if is_kind_possible(kind, plan.turn_count, rules) and (kind != WAIT or j == 0):
-                plan.cost_s = rolled_out(plan, way, i, motion, now, rules, numbers)
+                plan.cost_s = rolled_out(plan, way, i, motion, now, rules, params)
                 if kind == BACK:
                     plan.cost_s += _BACK_COST_S
                 if kind == WAIT:
@@ -313,23 +313,23 @@ def best_plan(
 
 
 @wp.func
-def is_shot_possible(k: int, motion: Motion, now: Situation, rules: Rules, numbers: CarNumbers) -> bool:
+def is_shot_possible(k: int, motion: Motion, now: Situation, rules: Rules, params: CarParams) -> bool:
     """Whether the task's actions can do the k-th manoeuvre from here, without a contact."""
     offset_m = shot_offset(k)
     if offset_m > 0.0 and rules.actions != _STEER_AND_SHIFT:
         return False
-    return is_shot_free(motion, now, offset_m, rules, numbers)
+    return is_shot_free(motion, now, offset_m, rules, params)
 
 
 @wp.func
-def chosen_shot(begun: int, motion: Motion, now: Situation, rules: Rules, numbers: CarNumbers) -> int:
+def chosen_shot(begun: int, motion: Motion, now: Situation, rules: Rules, params: CarParams) -> int:
     """The manoeuvre that was begun, as long as it is free; else the first that is; or -1."""
     if not now.needs_pose or wp.length(place_of(now.target.pose) - motion.pos) > _SHOT_M:
         return -1
-    if begun >= 0 and is_shot_possible(begun, motion, now, rules, numbers):
+    if begun >= 0 and is_shot_possible(begun, motion, now, rules, params):
         return begun
     for k in range(_SHOTS):
-        if is_shot_possible(k, motion, now, rules, numbers):
+        if is_shot_possible(k, motion, now, rules, params):
             return k
     return -1
 
@@ -343,19 +343,19 @@ def next_command(
     motion: Motion,
     now: Situation,
     rules: Rules,
-    numbers: CarNumbers,
+    params: CarParams,
 ) -> Command:
     """What to do now."""
     memory = memories[i]
-    memory.shot = chosen_shot(memory.shot, motion, now, rules, numbers)
+    memory.shot = chosen_shot(memory.shot, motion, now, rules, params)
     command = Command()
     if memory.shot >= 0:
         memory.age = 0
         memory.has_plan = False
-        command = shot_command(motion, now, shot_offset(memory.shot), rules, numbers)
+        command = shot_command(motion, now, shot_offset(memory.shot), rules, params)
     else:
         if memory.age == 0:
-            memory.plan = best_plan(memory, angles_rad, way, i, motion, now, rules, numbers)
+            memory.plan = best_plan(memory, angles_rad, way, i, motion, now, rules, params)
             memory.has_plan = memory.plan.turn_count > 1 or memory.plan.kind == BACK
         command = plan_command(memory.plan, 0, rules)
         memory.plan.turn_count = wp.max(memory.plan.turn_count - 1, 0)

@@ -71,29 +71,29 @@ class PosePursuitExpert:
     def act(self, task: Task) -> None:
         """Writes the actions of every row."""
         world: Any = task.world  # type: ignore[attr-defined]
-        columns = task.buffers.numbers.numpy().T.astype(float)
-        numbers = dict(zip(task.number_table.names, columns, strict=True))
+        columns = task.buffers.params.numpy().T.astype(float)
+        params = dict(zip(task.param_table.names, columns, strict=True))
         for i in self._new.rows(task):
             self._routes.pop(int(i), None)
         x, y, z, w = world.q.numpy().T.astype(float)
         yaws = np.arctan2(2.0 * (x * z + w * y), 1.0 - 2.0 * (x * x + y * y))
         places = world.pos.numpy()[:, [0, 2]].astype(float)
         speeds = (world.vel.numpy()[:, [0, 2]] * np.stack([np.sin(yaws), np.cos(yaws)], axis=1)).sum(axis=1)
-        mass_m = (numbers["mass_kg"] + 2.0 * numbers["wheel_mass_kg"]) * numbers["wheel_radius_m"] / 4.0
+        mass_m = (params["mass_kg"] + 2.0 * params["wheel_mass_kg"]) * params["wheel_radius_m"] / 4.0
         goals = np.column_stack([world.target.numpy()[:, [0, 2]], world.target_yaw.numpy()]).astype(float)
         actions = np.zeros((task.env_count, 3), dtype=np.float32)
         for i in range(task.env_count):
-            half_base = 0.5 * numbers["wheelbase_m"][i]
+            half_base = 0.5 * params["wheelbase_m"][i]
             car = _Car(
                 rear=_shifted(np.array([*places[i], yaws[i]]), -half_base),
                 speed=float(speeds[i]),
                 wheelbase=2.0 * half_base,
-                steer_max=float(np.radians(numbers["steer_max_deg"][i])),
-                accel_max=max(float(numbers["motor_torque_nm"][i] / mass_m[i]), 0.1),
-                decel_max=max(float(numbers["brake_torque_nm"][i] / mass_m[i]), 0.1),
+                steer_max=float(np.radians(params["steer_max_deg"][i])),
+                accel_max=max(float(params["motor_torque_nm"][i] / mass_m[i]), 0.1),
+                decel_max=max(float(params["brake_torque_nm"][i] / mass_m[i]), 0.1),
             )
             goal = _shifted(goals[i], -half_base)
-            actions[i] = self._driven(i, car, goal, float(numbers["half_platform_m"][i]) - _MARGIN_M)
+            actions[i] = self._driven(i, car, goal, float(params["half_platform_m"][i]) - _MARGIN_M)
         task.buffers.continuous.assign(actions)
 
     def _driven(self, i: int, car: _Car, goal: Array, room_m: float) -> tuple[float, float, float]:

@@ -70,7 +70,7 @@ class PursuitExpert:
 
 def _view(task: Task) -> _View:
     world: Any = task.world  # type: ignore[attr-defined]
-    numbers = dict(zip(task.number_table.names, task.buffers.numbers.numpy().T, strict=True))
+    params = dict(zip(task.param_table.names, task.buffers.params.numpy().T, strict=True))
     x, y, z, w = world.q.numpy().T
     nose = np.stack([2.0 * (x * z + w * y), 1.0 - 2.0 * (x * x + y * y)], axis=1)  # x and z of the car's forward axis
     nose /= np.linalg.norm(nose, axis=1, keepdims=True)
@@ -78,22 +78,22 @@ def _view(task: Task) -> _View:
     away = world.target.numpy()[:, [0, 2]] - pos
     ahead, right = (away * nose).sum(axis=1), away[:, 0] * nose[:, 1] - away[:, 1] * nose[:, 0]
     across = np.abs(nose[:, ::-1])
-    wheels = 0.5 * (np.abs(nose) * numbers["wheelbase_m"][:, None] + across * numbers["track_m"][:, None])
-    edge = numbers["half_platform_m"][:, None] - wheels - _MARGIN_M
-    steer_max = np.radians(numbers["steer_max_deg"])
-    mass_m = (numbers["mass_kg"] + 2.0 * numbers["wheel_mass_kg"]) * numbers["wheel_radius_m"] / 4.0
+    wheels = 0.5 * (np.abs(nose) * params["wheelbase_m"][:, None] + across * params["track_m"][:, None])
+    edge = params["half_platform_m"][:, None] - wheels - _MARGIN_M
+    steer_max = np.radians(params["steer_max_deg"])
+    mass_m = (params["mass_kg"] + 2.0 * params["wheel_mass_kg"]) * params["wheel_radius_m"] / 4.0
     return _View(
         bearing=np.arctan2(right, ahead),
         distance=np.hypot(ahead, right),
         speed=(vel * nose).sum(axis=1),
         room_ahead=_room(pos, nose, edge),
         room_behind=_room(pos, -nose, edge),
-        turn_radius=1.1 * numbers["wheelbase_m"] / np.tan(steer_max),  # wheels slip a little
-        wheelbase=numbers["wheelbase_m"],
+        turn_radius=1.1 * params["wheelbase_m"] / np.tan(steer_max),  # wheels slip a little
+        wheelbase=params["wheelbase_m"],
         steer_max=steer_max,
-        reach=numbers["reach_m"],
-        accel_max=np.maximum(numbers["motor_torque_nm"] / mass_m, 0.1),
-        decel_max=np.maximum(numbers["brake_torque_nm"] / mass_m, 0.1),
+        reach=params["reach_m"],
+        accel_max=np.maximum(params["motor_torque_nm"] / mass_m, 0.1),
+        decel_max=np.maximum(params["brake_torque_nm"] / mass_m, 0.1),
     )
 
 

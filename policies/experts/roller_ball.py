@@ -16,9 +16,9 @@ class RollerBallExpert:
 
     def act(self, task: Task) -> None:
         world: Any = task.world  # type: ignore[attr-defined]
-        names = task.number_table.names
-        numbers = task.buffers.numbers.numpy()
+        names = task.param_table.names
+        params = task.buffers.params.numpy()
         away = world.target.numpy() - world.pos.numpy()
         accel = (_PULL * away - _DAMPING * world.vel.numpy())[:, [0, 2]]
-        unit_accel = numbers[:, names.index("force_n")] / (numbers[:, names.index("mass_kg")] * _ROLLING)
+        unit_accel = params[:, names.index("force_n")] / (params[:, names.index("mass_kg")] * _ROLLING)
         task.buffers.continuous.assign(np.clip(accel / unit_accel[:, None], -1.0, 1.0).astype(np.float32))

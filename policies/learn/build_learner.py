@@ -51,12 +51,12 @@ def build_learner(config: RunConfig, task: Task, seed: int) -> Learner:
 
 def remarks(behavior: Behavior, env_count: int) -> Iterator[str]:
     """What the configuration does not say outright of so many environments, one line for the user each."""
-    memory, numbers = behavior.network_settings.memory, behavior.hyperparameters
-    steps = math.ceil(numbers.buffer_size / env_count)
+    memory, hyperparameters = behavior.network_settings.memory, behavior.hyperparameters
+    steps = math.ceil(hyperparameters.buffer_size / env_count)
     if behavior.trainer_type == "ppo" and memory is not None and steps < memory.sequence_length:
         yield (
             f"network_settings.memory.sequence_length {memory.sequence_length}: is {steps} here, as buffer_size "
-            f"{numbers.buffer_size} is {steps} decisions of each of {env_count} environments"
+            f"{hyperparameters.buffer_size} is {steps} decisions of each of {env_count} environments"
         )
 
 
@@ -64,7 +64,9 @@ def _cloning(behavior: Behavior, policy: Policy, seed: int, device: str) -> Clon
     settings = behavior.behavioral_cloning
     if settings is None:
         return None
-    numbers = behavior.hyperparameters
-    epochs = getattr(numbers, "num_epoch", 1)  # SAC has none
+    hyperparameters = behavior.hyperparameters
+    epochs = getattr(hyperparameters, "num_epoch", 1)  # SAC has none
     demonstrations = load_demonstrations(settings.demo_path, policy.layout).to(device)
-    return Cloning(policy, settings, demonstrations, (numbers.learning_rate, numbers.batch_size, epochs), seed)
+    return Cloning(
+        policy, settings, demonstrations, (hyperparameters.learning_rate, hyperparameters.batch_size, epochs), seed
+    )

@@ -1,7 +1,7 @@
 """Curricula: which lesson each environment parameter is in, and when the next begins.
 
 In: the scores of ended episodes and the share of the training that is done. Out: numbers, or what they are drawn from,
-for `Task.set_numbers`. A number or a sampler without a curriculum is a single lesson that never ends.
+for `Task.set_params`. A number or a sampler without a curriculum is a single lesson that never ends.
 """
 
 from collections import deque
@@ -64,11 +64,11 @@ class Curriculum:
         criteria = [lesson.completion_criteria for lessons in self._lessons.values() for lesson in lessons]
         self._episodes = RecentEpisodes(max([1, *(c.min_lesson_length for c in criteria if c)]))
 
-    def numbers(self) -> dict[str, Sampler]:
+    def params(self) -> dict[str, Sampler]:
         """What each parameter is drawn from now."""
         return {name: lessons[self.lesson[name]].sampler for name, lessons in self._lessons.items()}
 
-    def final_numbers(self) -> dict[str, Sampler]:
+    def final_params(self) -> dict[str, Sampler]:
         """What each parameter is drawn from in its last lesson: what a policy is judged by."""
         return {name: lessons[-1].sampler for name, lessons in self._lessons.items()}
 

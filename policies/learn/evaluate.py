@@ -53,7 +53,7 @@ def evaluate(
     *,
     episodes: int,
     seed: int,
-    numbers: Mapping[str, Sampler] | None = None,
+    params: Mapping[str, Sampler] | None = None,
     is_greedy: bool = True,
     longest: int = LONGEST,
     place: str = "policy",
@@ -67,7 +67,7 @@ def evaluate(
         settings: of the task; its `split` says on which places.
         episodes: how many count.
         seed: of the episodes, and of the actions if they are drawn.
-        numbers: of the task, if they are not the settings' own.
+        params: of the task, if they are not the settings' own.
         is_greedy: takes the most probable action; else it is drawn.
         longest: decisions after which an episode is cut and counts as a timeout.
         place: what messages call the policy.
@@ -80,7 +80,7 @@ def evaluate(
     device = next(policy.parameters()).device
     task = build_task(name, min(episodes, ENVIRONMENTS), settings, str(device))
     task.layout.require(policy.layout, place)
-    task.set_numbers(numbers or {})
+    task.set_params(params or {})
     task.reset(seed)
     generator = None if is_greedy else torch.Generator(device).manual_seed(seed)
     with few_threads(has_images=task.layout.image is not None):

@@ -36,9 +36,9 @@ class SuccessTarget:
         """
         if not (curriculum.is_last and self._is_promising(recent)):
             return None
-        numbers = curriculum.final_numbers()
+        params = curriculum.final_params()
         return evaluate(
-            policy, self.task_name, self.settings, episodes=self.episode_count, seed=episodes_seed, numbers=numbers
+            policy, self.task_name, self.settings, episodes=self.episode_count, seed=episodes_seed, params=params
         )
 
     def is_reached(self, evaluation: Evaluation) -> bool:

@@ -132,7 +132,7 @@ class Training:
         device = _device(config.torch_settings.device or "cpu")
         self.task = build_task(self.task_name, config.env_settings.env_count, self.task_settings, device)
         self.curriculum = Curriculum(config.environment_parameters)
-        self._set_numbers()
+        self._set_params()
         self.learner = build_learner(self.config, self.task, self.seed)
         self.period = Period()
         self.recent = RecentEpisodes(max(RECENT_EPISODES, 2 * self.task.env_count))  # slow episodes count too
@@ -190,7 +190,7 @@ class Training:
         lines, is_reset = self.curriculum.advance(scores, self.learner.steps / self.behavior.max_steps)
         if not lines:
             return
-        self._set_numbers()
+        self._set_params()
         self.recent.clear()
         for line in lines:
             self.watcher.note(line)
@@ -275,8 +275,8 @@ class Training:
             low, high = self._judged.interval
             figures |= {"success_rate": self._judged.success_rate, "success_low": low, "success_high": high}
         settings = self.task_settings.model_dump()
-        numbers = {name: asdict(sampler) for name, sampler in self.curriculum.final_numbers().items()}
-        return PolicyCard(self.task_name, settings, self.seed, self.learner.steps, figures, numbers)
+        params = {name: asdict(sampler) for name, sampler in self.curriculum.final_params().items()}
+        return PolicyCard(self.task_name, settings, self.seed, self.learner.steps, figures, params)
 
     def _progress(self) -> Progress:
         now_s = wall_time_s()
@@ -285,9 +285,9 @@ class Training:
         elapsed_s = self._elapsed_before_s + now_s - self._begin_s
         return Progress(steps, self.behavior.max_steps, rate, elapsed_s, self.recent.scores)
 
-    def _set_numbers(self) -> None:
+    def _set_params(self) -> None:
         try:
-            self.task.set_numbers(self.curriculum.numbers())
+            self.task.set_params(self.curriculum.params())
         except NumberError as error:
             raise NumberError(f"environment_parameters: {error}") from None
 
@@ -297,7 +297,7 @@ class Training:
         require_fit(settings_that_must_fit(self.config, self.task_settings), content["must_fit"], str(path))
         self.learner.load_state(content["learner"])
         self.curriculum.load_state(content["curriculum"])
-        self._set_numbers()  # the configuration may have other ones than those the task was saved with
+        self._set_params()  # the configuration may have other ones than those the task was saved with
         self.period.load_state(content["period"])
         self.recent.load_state(content["recent"])
         self._events_position = content["events"]

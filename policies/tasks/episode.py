@@ -17,7 +17,7 @@ from enum import IntEnum
 
 import warp as wp
 
-from policies.tasks.task_params import draw_numbers
+from policies.tasks.task_params import draw_params
 
 wp.set_module_options({"enable_backward": False})
 
@@ -72,7 +72,7 @@ class StepBuffers:
     scores: wp.array2d(dtype=float)  # of ended episodes since they were last taken, (envs, SCORE_COLUMNS)
     seed: wp.array(dtype=int)  # (1,)
     samplers: wp.array2d(dtype=float)  # what numbers are drawn from
-    numbers: wp.array2d(dtype=float)  # of the running episode, (envs, numbers)
+    params: wp.array2d(dtype=float)  # of the running episode, (envs, numbers)
     frame_size: int
 
 
@@ -126,7 +126,7 @@ def begin_episode(buffers: StepBuffers, i: int) -> int:
     buffers.returns[i] = 0.0
     for k in range(buffers.observations.shape[1]):
         buffers.observations[i, k] = 0.0
-    draw_numbers(buffers.samplers, buffers.numbers, buffers.seed[0], i, episode)
+    draw_params(buffers.samplers, buffers.params, buffers.seed[0], i, episode)
     return episode
 
 

@@ -12,5 +12,5 @@ class PlaceGoal:
 
     goal: tuple[int, ...]  # elements of the newest frame: where to go
     achieved: tuple[int, ...]  # elements of the newest frame: where one is, in the same order
-    radius: str  # the Number that holds it, in the unit of the elements
+    radius: str  # the TaskParam that holds it, in the unit of the elements
     reward: float  # paid on reaching the goal; nothing else that is paid depends on the goal

@@ -17,7 +17,7 @@ from policies.tasks.episode import FELL, RUNNING, SUCCESS, TIMEOUT, StepBuffers,
 from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Element, Layout
 from policies.tasks.task import Task, TaskSettings
-from policies.tasks.task_params import Number, typed_rows
+from policies.tasks.task_params import TaskParam, typed_rows
 from policies.tasks.top_view import GOAL, VEHICLE, Canvas
 
 wp.set_module_options({"enable_backward": False})
@@ -31,8 +31,8 @@ _SOURCE = "ML-Agents tutorial"
 
 
 @wp.struct
-class RollerBallNumbers:
-    """One row per environment; declared in `NUMBERS`."""
+class RollerBallParams:
+    """One row per environment; declared in `PARAMS`."""
 
     mass_kg: float
     force_n: float
@@ -42,13 +42,13 @@ class RollerBallNumbers:
     step_limit: float
 
 
-NUMBERS = (
-    Number("mass_kg", 1.0, 0.1, 10.0, "kg", "mass of the ball", _SOURCE),
-    Number("force_n", 10.0, 0.1, 100.0, "N", "force of an action of 1", _SOURCE),
-    Number("half_floor_m", 5.0, 1.0, 100.0, "m", "half the length of the floor's sides", _SOURCE),
-    Number("half_spawn_m", 4.0, 0.5, 100.0, "m", "how far from the middle the cube may appear, per axis", _SOURCE),
-    Number("reach_m", 1.42, 0.1, 10.0, "m", "distance of the centres at which the cube is reached", _SOURCE),
-    Number(
+PARAMS = (
+    TaskParam("mass_kg", 1.0, 0.1, 10.0, "kg", "mass of the ball", _SOURCE),
+    TaskParam("force_n", 10.0, 0.1, 100.0, "N", "force of an action of 1", _SOURCE),
+    TaskParam("half_floor_m", 5.0, 1.0, 100.0, "m", "half the length of the floor's sides", _SOURCE),
+    TaskParam("half_spawn_m", 4.0, 0.5, 100.0, "m", "how far from the middle the cube may appear, per axis", _SOURCE),
+    TaskParam("reach_m", 1.42, 0.1, 10.0, "m", "distance of the centres at which the cube is reached", _SOURCE),
+    TaskParam(
         "step_limit", 500.0, 1.0, 1e6, "1", "decisions until the episode is cut; the tutorial has no limit", "guess"
     ),
 )
@@ -61,15 +61,15 @@ class RollerBallState:
     pos: wp.array(dtype=wp.vec3)  # [m] of the ball's centre
     vel: wp.array(dtype=wp.vec3)  # [m/s]
     target: wp.array(dtype=wp.vec3)  # [m]
-    numbers: wp.array(dtype=RollerBallNumbers)
+    params: wp.array(dtype=RollerBallParams)
 
 
 @wp.func
-def rolled(pos: wp.vec3, vel: wp.vec3, force_n: wp.vec3, numbers: RollerBallNumbers) -> tuple[wp.vec3, wp.vec3]:
+def rolled(pos: wp.vec3, vel: wp.vec3, force_n: wp.vec3, params: RollerBallParams) -> tuple[wp.vec3, wp.vec3]:
     """Position and velocity one physics step later (semi-implicit Euler, as PhysX integrates)."""
-    accel = force_n * (5.0 / (7.0 * numbers.mass_kg))
-    if wp.abs(pos[0]) > numbers.half_floor_m or wp.abs(pos[2]) > numbers.half_floor_m:
-        accel = force_n / numbers.mass_kg + wp.vec3(0.0, -9.81, 0.0)  # over the edge
+    accel = force_n * (5.0 / (7.0 * params.mass_kg))
+    if wp.abs(pos[0]) > params.half_floor_m or wp.abs(pos[2]) > params.half_floor_m:
+        accel = force_n / params.mass_kg + wp.vec3(0.0, -9.81, 0.0)  # over the edge
     vel_next = vel + accel * _DT
     return pos + vel_next * _DT, vel_next
 
@@ -93,7 +93,7 @@ def place(buffers: StepBuffers, state: RollerBallState, i: int, is_ball_lost: bo
         state.pos[i] = wp.vec3(0.0, 0.5, 0.0)
         state.vel[i] = wp.vec3(0.0, 0.0, 0.0)
     rng = draw_key(buffers.seed[0], i, episode, _PLACE_STREAM)
-    half = state.numbers[i].half_spawn_m
+    half = state.params[i].half_spawn_m
     x = half * (2.0 * wp.randf(rng) - 1.0)
     z = half * (2.0 * wp.randf(rng) - 1.0)
     state.target[i] = wp.vec3(x, 0.5, z)
@@ -112,20 +112,20 @@ def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: Rolle
 def step(buffers: StepBuffers, state: RollerBallState) -> None:
     """One decision of every row."""
     i = wp.tid()
-    numbers = state.numbers[i]
+    params = state.params[i]
     push = wp.vec3(wp.clamp(buffers.continuous[i, 0], -1.0, 1.0), 0.0, wp.clamp(buffers.continuous[i, 1], -1.0, 1.0))
     pos = state.pos[i]
     vel = state.vel[i]
     for _tick in range(_STEP_COUNT):
-        pos, vel = rolled(pos, vel, push * numbers.force_n, numbers)
+        pos, vel = rolled(pos, vel, push * params.force_n, params)
     state.pos[i] = pos
     state.vel[i] = vel
     outcome = int(RUNNING)
-    if wp.length(pos - state.target[i]) < numbers.reach_m:
+    if wp.length(pos - state.target[i]) < params.reach_m:
         outcome = SUCCESS
     elif pos[1] < 0.0:
         outcome = FELL
-    elif float(buffers.steps[i] + 1) >= numbers.step_limit:
+    elif float(buffers.steps[i] + 1) >= params.step_limit:
         outcome = TIMEOUT
     observe(buffers, state, i)
     if close_step(buffers, i, wp.where(outcome == SUCCESS, 1.0, 0.0), outcome):
@@ -135,7 +135,7 @@ def step(buffers: StepBuffers, state: RollerBallState) -> None:
 class RollerBall(Task):
     """The task. Layout version 1."""
 
-    numbers: ClassVar = NUMBERS
+    params: ClassVar = PARAMS
     decision_s = _STEPS * _STEP_S
     goal = PlaceGoal(goal=(0, 1, 2), achieved=(3, 4, 5), radius="reach_m", reward=1.0)
 
@@ -154,14 +154,14 @@ class RollerBall(Task):
         state.pos = self._zeros("pos", env_count, wp.vec3)
         state.vel = self._zeros("vel", env_count, wp.vec3)
         state.target = self._zeros("target", env_count, wp.vec3)
-        state.numbers = typed_rows(self.buffers.numbers, RollerBallNumbers)
+        state.params = typed_rows(self.buffers.params, RollerBallParams)
         self.world = state
         self._record(begin, step, [state])
 
     def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """Floor, cube and ball from above."""
         canvas = Canvas((-6.0, 6.0), (-6.0, 6.0), height_px)
-        half = float(self.buffers.numbers.numpy()[i_env, self.number_table.names.index("half_floor_m")])
+        half = float(self.buffers.params.numpy()[i_env, self.param_table.names.index("half_floor_m")])
         canvas.box((0.0, 0.0), (2.0 * half, 2.0 * half), 0.0, (255, 255, 255))
         target: Any = self.world.target.numpy()[i_env]
         ball: Any = self.world.pos.numpy()[i_env]

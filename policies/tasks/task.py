@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Outcome, StepBuffers, keep_last_image_rows
 from policies.tasks.goals import PlaceGoal
 from policies.tasks.layout import Layout
-from policies.tasks.task_params import Number, NumberTable, Sampler
+from policies.tasks.task_params import Sampler, TaskParam, TaskParamTable
 
 Preset = Literal["as-documented", "as-coded", "improved"]
 Split = Literal["train", "test"]
@@ -65,7 +65,7 @@ class Scores:
 class Task:
     """Environments of one task, side by side. The arrays are made once and live as long as the task."""
 
-    numbers: ClassVar[tuple[Number, ...]]
+    params: ClassVar[tuple[TaskParam, ...]]
     """The declared numbers, one per field of the task's struct."""
     decision_s: float
     """Simulated time between two decisions [s]."""
@@ -79,8 +79,8 @@ class Task:
         self.env_count = env_count
         self.device = device
         self._arrays: dict[str, Any] = {}
-        self.number_table = NumberTable(self.numbers, device)
-        self.number_table.update(number_defaults)
+        self.param_table = TaskParamTable(self.params, device)
+        self.param_table.update(number_defaults)
         size = layout.observation_size
         buffers = StepBuffers()
         buffers.continuous = self._zeros("continuous", (env_count, len(layout.continuous)), float)
@@ -100,8 +100,8 @@ class Task:
         buffers.episodes = self._zeros("episodes", env_count, int)
         buffers.scores = self._zeros("scores", (env_count, SCORE_COLUMNS), float)
         buffers.seed = self._zeros("seed", 1, int)
-        buffers.numbers = self._zeros("numbers", (env_count, len(self.number_table.names)), float)
-        buffers.samplers = self.number_table.array
+        buffers.params = self._zeros("numbers", (env_count, len(self.param_table.names)), float)
+        buffers.samplers = self.param_table.array
         buffers.frame_size = layout.frame_size
         self.buffers = buffers
         self._is_chosen = wp.zeros(env_count, dtype=wp.bool, device=device)
@@ -141,13 +141,13 @@ class Task:
         image_rows = (self.env_count, self.layout.image_shape[0])
         wp.launch(keep_last_image_rows, image_rows, [self.buffers], device=self.device)
 
-    def set_numbers(self, values: Mapping[str, float | Sampler]) -> None:
+    def set_params(self, values: Mapping[str, float | Sampler]) -> None:
         """Sets or randomises numbers from the next episodes on (domain randomisation, curricula).
 
         Raises:
             NumberError: no such number, or a value out of its bounds.
         """
-        self.number_table.update(values)
+        self.param_table.update(values)
 
     def take_scores(self) -> Scores:
         """The sums over the episodes that ended since the last call."""
@@ -159,7 +159,7 @@ class Task:
     def state(self) -> dict[str, NDArray[Any]]:
         """A copy of everything that changes: restoring it continues bit for bit."""
         state = {name: array.numpy().copy() for name, array in self._arrays.items() if array.size}
-        state["samplers"] = self.number_table.rows.copy()
+        state["samplers"] = self.param_table.rows.copy()
         return state
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
@@ -167,8 +167,8 @@ class Task:
         for name, array in self._arrays.items():
             if array.size:
                 array.assign(state[name])
-        self.number_table.rows[:] = state["samplers"]
-        self.number_table.array.assign(self.number_table.rows)
+        self.param_table.rows[:] = state["samplers"]
+        self.param_table.array.assign(self.param_table.rows)
 
     def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """One environment seen from above, RGB, shape (height, width, 3)."""

@@ -1,7 +1,7 @@
-"""Numbers of a task: each physical or difficulty number declared once, set or randomised by name.
+"""Parameters of a task: each physical or difficulty number declared once, set or randomised by name.
 
-A task has a `wp.struct` of floats, one row per environment, and one `Number` per field. Every row is drawn anew when an
-episode starts, from the samplers below, so any number can be randomised by configuration, without a line of code.
+A task has a `wp.struct` of floats, one row per environment, and one `TaskParam` per field. Every row is drawn anew when
+an episode starts, from the samplers below, so any parameter can be randomised by configuration, without a line of code.
 Sampler kinds are ML-Agents': constant, uniform, multirangeuniform, gaussian.
 """
 
@@ -32,7 +32,7 @@ class NumberError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class TaskParam:
     """The declaration of one number; `name` is the field of the task's struct."""
 
     name: str
@@ -58,10 +58,10 @@ class Sampler:
         return Sampler(intervals=((value, value),))
 
 
-class NumberTable:
+class TaskParamTable:
     """The samplers of one task's numbers, as the kernel reads them: shape (numbers, columns)."""
 
-    def __init__(self, declarations: Iterable[Number], device: str = "cpu") -> None:
+    def __init__(self, declarations: Iterable[TaskParam], device: str = "cpu") -> None:
         self.declarations = {number.name: number for number in declarations}
         self.names = list(self.declarations)
         self.rows = np.zeros((len(self.names), _COLUMNS), dtype=np.float32)
@@ -88,7 +88,7 @@ class NumberTable:
             self._write(self.names.index(name), number, sampler)
         self._device.assign(self.rows)
 
-    def _write(self, k: int, number: Number, sampler: Sampler) -> None:
+    def _write(self, k: int, number: TaskParam, sampler: Sampler) -> None:
         ends = [end for interval in sampler.intervals for end in interval] or [sampler.mean]
         wrong = [end for end in ends if not number.minimum <= end <= number.maximum]
         if wrong:
@@ -110,8 +110,8 @@ class NumberTable:
 
 
 @wp.func
-def draw_number(samplers: wp.array2d(dtype=float), k: int, seed: int, i_env: int, episode: int) -> float:
-    """Number k of an environment's episode."""
+def draw_param(samplers: wp.array2d(dtype=float), k: int, seed: int, i_env: int, episode: int) -> float:
+    """TaskParam k of an environment's episode."""
     count = int(samplers[k, 0])
     low = samplers[k, _FIRST]
     high = samplers[k, _FIRST + 1]
@@ -136,29 +136,29 @@ def draw_number(samplers: wp.array2d(dtype=float), k: int, seed: int, i_env: int
 
 
 @wp.func
-def draw_numbers(
-    samplers: wp.array2d(dtype=float), numbers: wp.array2d(dtype=float), seed: int, i_env: int, episode: int
+def draw_params(
+    samplers: wp.array2d(dtype=float), params: wp.array2d(dtype=float), seed: int, i_env: int, episode: int
 ) -> None:
-    """All numbers of an environment's next episode, into its row of `numbers`."""
+    """All numbers of an environment's next episode, into its row of `params`."""
     for k in range(samplers.shape[0]):
-        numbers[i_env, k] = draw_number(samplers, k, seed, i_env, episode)
+        params[i_env, k] = draw_param(samplers, k, seed, i_env, episode)
 
 
-def typed_rows(numbers: Any, struct: Any, first: int = 0) -> Any:
-    """The rows of a float array, shape (environments, numbers), seen as a task's struct of floats: the same memory.
+def typed_rows(params: Any, struct: Any, first: int = 0) -> Any:
+    """The rows of a float array, shape (environments, params), seen as a task's struct of floats: the same memory.
 
     Args:
-        numbers: a task's `buffers.numbers`.
+        params: a task's `buffers.params`.
         struct: its fields are the columns from `first` on, in order.
         first: where a task has several structs, the column of this one's first field.
     """
     names = list(struct.vars)
-    if first + len(names) > numbers.shape[1]:
-        raise ValueError(f"{struct.key}: {len(names)} fields for {numbers.shape[1] - first} numbers")
+    if first + len(names) > params.shape[1]:
+        raise ValueError(f"{struct.key}: {len(names)} fields for {params.shape[1] - first} numbers")
     return wp.array(
-        ptr=numbers.ptr + first * numbers.strides[1],
+        ptr=params.ptr + first * params.strides[1],
         dtype=struct,
-        shape=(numbers.shape[0],),
-        strides=(numbers.strides[0],),
-        device=numbers.device,
+        shape=(params.shape[0],),
+        strides=(params.strides[0],),
+        device=params.device,
     )

@@ -1,6 +1,6 @@
 """Many worlds, each grown from its own seed and regrown in kernels whenever an episode wants a fresh one.
 
-In: a `WorldConfig`, and per world a seed and `WorldNumbers` that a task may rewrite before it grows a world. Out: the
+In: a `WorldConfig`, and per world a seed and `WorldParams` that a task may rewrite before it grows a world. Out: the
 `World` rows that kernels read, and a `WorldMap` of any of them for the host. The size of the map, its grid and the
 octaves are the same for all. These worlds have the character of `build_world`'s, not its bytes.
 """
@@ -19,7 +19,7 @@ from sim.world.growing import (
     ROUNDS,
     Grid,
     Growing,
-    WorldNumbers,
+    WorldParams,
     choose,
     plant,
     settle,
@@ -44,7 +44,7 @@ wp.set_module_options({"enable_backward": False})
 _PACKING = 0.75  # points per spacing² that there is room for; darts come to 0.70 at most (Wei 2008)
 _SPARE_TREES = 32  # along the edges of a small map there are more
 _GROUPS = 256  # worlds grown side by side on a GPU
-_FIELDS = tuple(WorldNumbers.cls.__annotations__)  # type: ignore[attr-defined]
+_FIELDS = tuple(WorldParams.cls.__annotations__)  # type: ignore[attr-defined]
 
 
 class WorldBatch:
@@ -89,9 +89,9 @@ class WorldBatch:
         return self._growing.worlds
 
     @property
-    def numbers(self) -> Any:
-        """What each world is grown from the next time: an array of `WorldNumbers`, shape (count,)."""
-        return self._growing.numbers
+    def params(self) -> Any:
+        """What each world is grown from the next time: an array of `WorldParams`, shape (count,)."""
+        return self._growing.params
 
     def grow(self, is_chosen: Any, seeds: Any) -> None:
         """Grows the chosen worlds anew from their numbers; the others keep every byte.
@@ -120,8 +120,8 @@ class WorldBatch:
         """A copy of one world as it is now, for the host and for flights; growing it anew leaves the copy alone."""
         growing = self._growing
         size_m = self.config.size_m
-        row = growing.numbers.numpy()[i_world]
-        numbers = {name: row[name].item() for name in _FIELDS} | {"has_walls": bool(row["has_walls"])}
+        row = growing.params.numpy()[i_world]
+        params = {name: row[name].item() for name in _FIELDS} | {"has_walls": bool(row["has_walls"])}
         seed = int(growing.seeds.numpy()[i_world]) % 2**32
         world = growing.worlds.numpy()[i_world]
         heights = self._heights[i_world].numpy().copy()
@@ -133,7 +133,7 @@ class WorldBatch:
         kernel.terrain = terrain.kernel(self.device)
         kernel.forest = forest.kernel(self.device)
         kernel.walls = walls.kernel()
-        return WorldMap(self.config.model_copy(update=numbers | {"seed": seed}), terrain, forest, walls, kernel)
+        return WorldMap(self.config.model_copy(update=params | {"seed": seed}), terrain, forest, walls, kernel)
 
     def _make_worlds(self) -> None:
         """The `World` rows, whose arrays are slices of stores for all worlds."""
@@ -168,10 +168,10 @@ class WorldBatch:
 
     def _make_scratch(self) -> None:
         config, growing, count = self.config, self._growing, self.count
-        numbers = WorldNumbers()
+        params = WorldParams()
         for name in _FIELDS:
-            setattr(numbers, name, getattr(config, name))
-        growing.numbers = wp.array([numbers] * count, dtype=WorldNumbers, device=self.device)
+            setattr(params, name, getattr(config, name))
+        growing.params = wp.array([params] * count, dtype=WorldParams, device=self.device)
         growing.seeds = self._zeros(count, wp.int32)
         growing.chosen = self._zeros(count, wp.int32)
         growing.chosen_count = self._zeros(1, wp.int32)

@@ -43,7 +43,7 @@ _SQUARE_M_PER_HA = wp.constant(1.0e4)
 
 
 @wp.struct
-class WorldNumbers:
+class WorldParams:
     """What one world of a batch is grown from; the fields are those of `WorldConfig`."""
 
     hill_height_m: float
@@ -74,7 +74,7 @@ class Growing:
     """A batch of worlds and what is needed to grow them; arrays have one row per world."""
 
     worlds: wp.array[World]
-    numbers: wp.array[WorldNumbers]
+    params: wp.array[WorldParams]
     seeds: wp.array[wp.int32]
     chosen: wp.array[wp.int32]  # indices of the worlds to grow, the first `chosen_count`
     chosen_count: wp.array[wp.int32]  # (1,)
@@ -103,12 +103,12 @@ class BucketSpan:
 @wp.func
 def planting_grid(growing: Growing, i_world: int) -> Grid:
     """The planting grid of a world, within the limits of the batch; no cells when it has no trees."""
-    numbers = growing.numbers[i_world]
+    params = growing.params[i_world]
     grid = Grid()
-    grid.tree_height_max_m = wp.min(numbers.tree_height_max_m, growing.tree_height_limit_m)
-    grid.keep_out_m = numbers.clearing_radius_m + _CROWN_RADIUS_MOST * grid.tree_height_max_m
+    grid.tree_height_max_m = wp.min(params.tree_height_max_m, growing.tree_height_limit_m)
+    grid.keep_out_m = params.clearing_radius_m + _CROWN_RADIUS_MOST * grid.tree_height_max_m
     grid.side_m = 2.0 * (growing.worlds[i_world].terrain.half_size_m - _EDGE_M)
-    density = wp.min(numbers.trees_per_ha, growing.trees_per_ha_max)
+    density = wp.min(params.trees_per_ha, growing.trees_per_ha_max)
     if density > 0.0 and grid.side_m > 0.0:
         grid.spacing_m = wp.sqrt(COVERAGE * _SQUARE_M_PER_HA / density)
         grid.cell_m = grid.spacing_m * _SQRT_HALF
@@ -169,10 +169,10 @@ def plant(growing: Growing, groups: int, visit: int) -> None:
 
 
 @wp.func
-def grown_tree(terrain: Terrain, numbers: WorldNumbers, height_max_m: float, place: wp.vec2, key: wp.uint32) -> Tree:
+def grown_tree(terrain: Terrain, params: WorldParams, height_max_m: float, place: wp.vec2, key: wp.uint32) -> Tree:
     """The tree at a place [m], with the proportions of `trees.make_trees`."""
     state = key
-    height_min_m = wp.min(numbers.tree_height_min_m, height_max_m)
+    height_min_m = wp.min(params.tree_height_min_m, height_max_m)
     height = height_min_m + (height_max_m - height_min_m) * wp.randf(state)
     crown_share = _CROWN_RADIUS_LEAST + (_CROWN_RADIUS_MOST - _CROWN_RADIUS_LEAST) * wp.randf(state)
     ground = terrain_height(terrain, place[0], place[1])
@@ -213,7 +213,7 @@ def collect_trees(growing: Growing, i_world: int, forest: Forest) -> Forest:
     """
     grid = growing.grids[i_world]
     terrain = growing.worlds[i_world].terrain
-    numbers = growing.numbers[i_world]
+    params = growing.params[i_world]
     sizes_key = wp.rand_init(growing.seeds[i_world], TREE_SIZES)
     for bucket in range(forest.bucket_start.shape[0]):
         forest.bucket_start[bucket] = 0
@@ -226,7 +226,7 @@ def collect_trees(growing: Growing, i_world: int, forest: Forest) -> Forest:
         if point[0] != EMPTY_M:
             growing.points[i_world, cell] = wp.vec2(EMPTY_M, EMPTY_M)
             tree = grown_tree(
-                terrain, numbers, grid.tree_height_max_m, point - corner, wp.rand_init(int(sizes_key), cell)
+                terrain, params, grid.tree_height_max_m, point - corner, wp.rand_init(int(sizes_key), cell)
             )
             span = bucket_span(forest, tree)
             wanted = (span.row_high - span.row_low + 1) * (span.column_high - span.column_low + 1)
@@ -273,6 +273,6 @@ def settle(growing: Growing, groups: int) -> None:
         world.forest = collect_trees(growing, i_world, world.forest)
         list_trees(world.forest)
         world.terrain.ground_max_m = growing.ground_max_m[i_world]
-        world.walls.is_built = growing.numbers[i_world].has_walls
-        world.walls.top_m = growing.edge_max_m[i_world] + growing.numbers[i_world].wall_height_m
+        world.walls.is_built = growing.params[i_world].has_walls
+        world.walls.top_m = growing.edge_max_m[i_world] + growing.params[i_world].wall_height_m
         growing.worlds[i_world] = world

@@ -82,7 +82,7 @@ def raise_noise(growing: Growing, groups: int) -> None:
         terrain = growing.worlds[i_world].terrain
         for column in range(terrain.cells + 1):
             terrain.heights[row, column] = 0.0
-        wavelength_m = wp.max(growing.numbers[i_world].hill_wavelength_m, _LEAST_WAVELENGTH_M)
+        wavelength_m = wp.max(growing.params[i_world].hill_wavelength_m, _LEAST_WAVELENGTH_M)
         lattice_per_cell = 1.0 / (wavelength_m * terrain.cells_per_m)
         amplitude = float(1.0)
         hills_key = wp.rand_init(growing.seeds[i_world], HILLS)
@@ -115,23 +115,23 @@ def shape_hills(growing: Growing, groups: int) -> None:
     for slot in range(group, growing.chosen_count[0], groups):
         i_world = growing.chosen[slot]
         terrain = growing.worlds[i_world].terrain
-        numbers = growing.numbers[i_world]
+        params = growing.params[i_world]
         scale = float(0.0)
         if growing.highest[i_world] > 0.0:
-            scale = numbers.hill_height_m / growing.highest[i_world]
+            scale = params.hill_height_m / growing.highest[i_world]
         cell_m = 1.0 / terrain.cells_per_m
         # triangles that reach into the clearing have corners up to a cell's diagonal outside of it
-        level_radius_m = numbers.clearing_radius_m + 1.5 * cell_m
+        level_radius_m = params.clearing_radius_m + 1.5 * cell_m
         north = float(row) * cell_m - terrain.half_size_m
         row_max = float(-1.0e9)
         edge_max = float(-1.0e9)
         for column in range(terrain.cells + 1):
             east = float(column) * cell_m - terrain.half_size_m
             beyond_m = wp.sqrt(north * north + east * east) - level_radius_m
-            share = smooth(wp.clamp(beyond_m / wp.max(numbers.clearing_blend_m, _LEAST_BLEND_M), 0.0, 1.0))
+            share = smooth(wp.clamp(beyond_m / wp.max(params.clearing_blend_m, _LEAST_BLEND_M), 0.0, 1.0))
             hill = (terrain.heights[row, column] - growing.middle[i_world]) * scale
             # the product may exceed the bound by a rounding
-            height = wp.clamp(hill, -numbers.hill_height_m, numbers.hill_height_m) * share + 0.0
+            height = wp.clamp(hill, -params.hill_height_m, params.hill_height_m) * share + 0.0
             terrain.heights[row, column] = height
             row_max = wp.max(row_max, height)
             if row == 0 or row == terrain.cells or column == 0 or column == terrain.cells:

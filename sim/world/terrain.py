@@ -243,7 +243,7 @@ class TerrainMap:
 
     @property
     def cells(self) -> int:
-        """Number of cells per side."""
+        """TaskParam of cells per side."""
         return self.heights.shape[0] - 1
 
     def kernel(self, device: str) -> Terrain:

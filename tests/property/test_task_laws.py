@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from policies.tasks.catalogue import CATALOGUE, build_task, task_settings
 from policies.tasks.parking.level1 import Parking1
 from policies.tasks.parking.level2 import Parking2
-from policies.tasks.parking.parking_params import CarNumbers, Level1Numbers, Level2Numbers
+from policies.tasks.parking.parking_params import CarParams, Level1Params, Level2Params
 from policies.tasks.reach_target.reach_target import ReachTarget
-from policies.tasks.reach_target.reach_target_params import ReachNumbers
-from policies.tasks.roller_ball import RollerBall, RollerBallNumbers
+from policies.tasks.reach_target.reach_target_params import ReachParams
+from policies.tasks.roller_ball import RollerBall, RollerBallParams
 from policies.tasks.task_params import Sampler
 
 FEW = settings(max_examples=5, deadline=None)  # the first example compiles a kernel
@@ -28,10 +28,10 @@ every_task = pytest.mark.parametrize(("name", "preset"), TASKS)
 FLOWN = {"FollowMe", "Navigate"}  # the noise of a rig's sensors is keyed by the row
 seeds = st.integers(0, 2**31 - 1)
 STRUCTS = {
-    RollerBall: (RollerBallNumbers,),
-    ReachTarget: (ReachNumbers,),
-    Parking1: (CarNumbers, Level1Numbers),
-    Parking2: (CarNumbers, Level2Numbers),
+    RollerBall: (RollerBallParams,),
+    ReachTarget: (ReachParams,),
+    Parking1: (CarParams, Level1Params),
+    Parking2: (CarParams, Level2Params),
 }
 
 
@@ -132,8 +132,8 @@ def test_beginning_one_row_touches_only_that_row(name, preset):
 @pytest.mark.parametrize("task", STRUCTS, ids=lambda task: task.__name__)
 def test_numbers_are_declared_in_the_order_of_their_structs_and_start_within_their_bounds(task):
     names = [name for struct in STRUCTS[task] for name in struct.vars]
-    assert [number.name for number in task.numbers] == names
-    for number in task.numbers:
+    assert [number.name for number in task.params] == names
+    for number in task.params:
         assert number.minimum <= number.default <= number.maximum
         assert number.meaning
         assert number.source
@@ -153,9 +153,9 @@ def anywhere(number, _value):
 @pytest.mark.parametrize("spread", [around, anywhere])
 def test_every_number_may_be_randomised_at_once_and_nothing_becomes_infinite(name, preset, spread):
     task = built(name, preset, 64)
-    declared = task.number_table.declarations
-    values = dict(zip(declared, task.buffers.numbers.numpy()[0].tolist(), strict=True))
-    task.set_numbers({key: spread(declared[key], values[key]) for key in declared if key != "step_limit"})
+    declared = task.param_table.declarations
+    values = dict(zip(declared, task.buffers.params.numpy()[0].tolist(), strict=True))
+    task.set_params({key: spread(declared[key], values[key]) for key in declared if key != "step_limit"})
     task.reset(0)
     rng = np.random.default_rng(0)
     for _ in range(200):

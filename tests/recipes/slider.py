@@ -8,7 +8,7 @@ from common.rng import draw_key
 from policies.tasks.episode import RUNNING, SUCCESS, TIMEOUT, StepBuffers, begin_episode, close_step, open_frame
 from policies.tasks.layout import Element, Layout
 from policies.tasks.task import Task, TaskSettings
-from policies.tasks.task_params import Number, typed_rows
+from policies.tasks.task_params import TaskParam, typed_rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -18,18 +18,18 @@ _PLACE_STREAM = wp.constant(1)
 
 
 @wp.struct
-class SliderNumbers:
-    """One row per environment; declared in `NUMBERS`."""
+class SliderParams:
+    """One row per environment; declared in `PARAMS`."""
 
     half_rail_m: float
     accel_m_s2: float
     step_limit: float
 
 
-NUMBERS = (
-    Number("half_rail_m", 2.0, 0.5, 10.0, "m", "how far from the middle marks are drawn", "guess"),
-    Number("accel_m_s2", 4.0, 0.1, 50.0, "m/s²", "acceleration of an action of 1", "guess"),
-    Number("step_limit", 100.0, 1.0, 1e6, "1", "decisions until the episode is cut", "guess"),
+PARAMS = (
+    TaskParam("half_rail_m", 2.0, 0.5, 10.0, "m", "how far from the middle marks are drawn", "guess"),
+    TaskParam("accel_m_s2", 4.0, 0.1, 50.0, "m/s²", "acceleration of an action of 1", "guess"),
+    TaskParam("step_limit", 100.0, 1.0, 1e6, "1", "decisions until the episode is cut", "guess"),
 )
 
 
@@ -40,7 +40,7 @@ class SliderState:
     pos: wp.array(dtype=float)  # [m] of the cart
     vel: wp.array(dtype=float)  # [m/s]
     mark: wp.array(dtype=float)  # [m]
-    numbers: wp.array(dtype=SliderNumbers)
+    params: wp.array(dtype=SliderParams)
 
 
 @wp.func
@@ -57,7 +57,7 @@ def place(buffers: StepBuffers, state: SliderState, i: int):
     rng = draw_key(buffers.seed[0], i, episode, _PLACE_STREAM)
     state.pos[i] = 0.0
     state.vel[i] = 0.0
-    state.mark[i] = state.numbers[i].half_rail_m * (2.0 * wp.randf(rng) - 1.0)
+    state.mark[i] = state.params[i].half_rail_m * (2.0 * wp.randf(rng) - 1.0)
     observe(buffers, state, i)
 
 
@@ -71,14 +71,14 @@ def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: Slide
 @wp.kernel(enable_backward=False)
 def step(buffers: StepBuffers, state: SliderState):
     i = wp.tid()
-    numbers = state.numbers[i]
+    params = state.params[i]
     push = wp.clamp(buffers.continuous[i, 0], -1.0, 1.0)
-    state.vel[i] = state.vel[i] + push * numbers.accel_m_s2 * _DT
+    state.vel[i] = state.vel[i] + push * params.accel_m_s2 * _DT
     state.pos[i] = state.pos[i] + state.vel[i] * _DT
     outcome = int(RUNNING)
     if wp.abs(state.mark[i] - state.pos[i]) < 0.1 and wp.abs(state.vel[i]) < 0.5:
         outcome = SUCCESS
-    elif float(buffers.steps[i] + 1) >= numbers.step_limit:
+    elif float(buffers.steps[i] + 1) >= params.step_limit:
         outcome = TIMEOUT
     observe(buffers, state, i)
     if close_step(buffers, i, wp.where(outcome == SUCCESS, 1.0, -0.01), outcome):
@@ -88,7 +88,7 @@ def step(buffers: StepBuffers, state: SliderState):
 class Slider(Task):
     """The task. Layout version 1."""
 
-    numbers: ClassVar = NUMBERS
+    params: ClassVar = PARAMS
     decision_s = DECISION_S
 
     def __init__(self, settings: TaskSettings, env_count: int, device: str = "cpu") -> None:
@@ -99,5 +99,5 @@ class Slider(Task):
         state.pos = self._zeros("pos", env_count, float)
         state.vel = self._zeros("vel", env_count, float)
         state.mark = self._zeros("mark", env_count, float)
-        state.numbers = typed_rows(self.buffers.numbers, SliderNumbers)
+        state.params = typed_rows(self.buffers.params, SliderParams)
         self._record(begin, step, [state])

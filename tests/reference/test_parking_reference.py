@@ -140,7 +140,7 @@ def test_rays_agree_with_sphere_tracing_in_random_scenes(name, radius):
     rays, length, tags = 7, 25.0, ("wall", "obstacle", "goal", "portal")
     settings = task_settings(name, {"preset": "improved", "rays": rays, "ray_tags": "+".join(tags)})
     task = build_task(name, 24, settings)
-    task.set_numbers({"ray_radius_m": radius, "ray_length_m": length, "ray_degrees": 110.0})
+    task.set_params({"ray_radius_m": radius, "ray_length_m": length, "ray_degrees": 110.0})
     task.reset(5)
     observation = task.buffers.observations.numpy()[:, -(2 * rays + 1) * 6 :].reshape(24, 2 * rays + 1, 6)
     kinds = set()

@@ -6,7 +6,7 @@ import warp as wp
 
 from bench.vehicle import NUMBER as N
 from policies.tasks.reach_target.car_model import Car, Wheel, car_of, controls_of, wheel_pull
-from policies.tasks.reach_target.reach_target_params import ReachNumbers
+from policies.tasks.reach_target.reach_target_params import ReachParams
 
 H = 0.01  # [s] sub-step
 UP = np.array([0.0, 1.0, 0.0])
@@ -69,19 +69,19 @@ def wheel_state(rng):
 
 
 @pytest.fixture(scope="module")
-def numbers():
-    numbers = ReachNumbers()
+def params():
+    params = ReachParams()
     for name, value in N.items():
-        setattr(numbers, name, value)
-    return numbers
+        setattr(params, name, value)
+    return params
 
 
-def test_one_wheel_pulls_as_the_equations_say(numbers):
-    car: Car = car_of(numbers)
+def test_one_wheel_pulls_as_the_equations_say(params):
+    car: Car = car_of(params)
     rng = np.random.default_rng(0)
     for _ in range(300):
         squeeze, rise, along, across, spin, motor, brake = wheel_state(rng)
-        controls = controls_of(numbers, 0.0, motor / 1500.0, brake / 2000.0)
+        controls = controls_of(params, 0.0, motor / 1500.0, brake / 2000.0)
         wheel = Wheel()
         wheel.hub = wp.vec3(0.0, 0.0, 0.0)
         wheel.drop_m = 0.6 - squeeze

@@ -47,17 +47,17 @@ class Dagger:
         if not isinstance(behavior.hyperparameters, DaggerHyperparameters):
             raise TypeError("hyperparameters are not DAgger's")
         self.steps = 0
-        self.hyperparameters = numbers = behavior.hyperparameters
+        self.hyperparameters = hyperparameters = behavior.hyperparameters
         self.behavior = behavior
         self.teacher = teacher
         self.task = TaskTensors(task)
         self.policy = policy.to(self.task.device)
-        self.optimizer = torch.optim.Adam(self.policy.parameters(), lr=numbers.learning_rate, fused=True)
+        self.optimizer = torch.optim.Adam(self.policy.parameters(), lr=hyperparameters.learning_rate, fused=True)
         self._generator = torch.Generator(self.task.device).manual_seed(seed)
         memory = policy.settings.memory
         self.ring = SequenceRing(
             task.layout,
-            numbers.buffer_size,
+            hyperparameters.buffer_size,
             task.env_count,
             length=memory.sequence_length if memory else 1,
             memory_size=policy.memory_size,
@@ -118,17 +118,17 @@ class Dagger:
 
     def _improve(self, count: int) -> dict[str, float]:
         """Gradient steps on stretches of all rounds, as many as `num_epoch` asks for after so many new decisions."""
-        numbers, length = self.hyperparameters, self.ring.length
+        hyperparameters, length = self.hyperparameters, self.ring.length
         rate = scheduled(
-            numbers.learning_rate,
+            hyperparameters.learning_rate,
             RATE_FLOOR,
-            numbers.learning_rate_schedule,
+            hyperparameters.learning_rate_schedule,
             self.steps / self.behavior.max_steps,
         )
         for group in self.optimizer.param_groups:
             group["lr"] = rate
-        size = max(numbers.batch_size // length, 1)
-        updates = max(round(numbers.num_epoch * count / (size * length)), 1)
+        size = max(hyperparameters.batch_size // length, 1)
+        updates = max(round(hyperparameters.num_epoch * count / (size * length)), 1)
         rows = [self._learn(self.ring.draw(size, self._generator)) for _ in range(updates)]
         names = ("Losses/Imitation Loss", "Losses/Perception Loss")
         losses = torch.stack(rows).mean(0).tolist()
@@ -136,9 +136,9 @@ class Dagger:
 
     def _learn(self, stretches: Stretches) -> Tensor:
         """One gradient step; losses of actions and of beliefs, shape (2,)."""
-        numbers, observation = self.hyperparameters, stretches.observation
+        hyperparameters, observation = self.hyperparameters, stretches.observation
         image = (
-            augmented(observation.image, numbers.augmentation, self._generator)
+            augmented(observation.image, hyperparameters.augmentation, self._generator)
             if observation.image is not None
             else None
         )
@@ -155,11 +155,11 @@ class Dagger:
         beliefs_loss = actions_loss.new_zeros(())
         if self.policy.perception is not None and observation.privileged is not None:
             beliefs_loss = self.policy.perception.loss(features, observation.privileged)
-        loss = actions_loss + numbers.perception_strength * beliefs_loss + _sigma_loss(distribution, labels)
+        loss = actions_loss + hyperparameters.perception_strength * beliefs_loss + _sigma_loss(distribution, labels)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
-        if numbers.max_grad_norm is not None:
-            nn.utils.clip_grad_norm_(self.policy.parameters(), numbers.max_grad_norm)
+        if hyperparameters.max_grad_norm is not None:
+            nn.utils.clip_grad_norm_(self.policy.parameters(), hyperparameters.max_grad_norm)
         self.optimizer.step()
         return torch.stack((actions_loss.detach(), beliefs_loss.detach()))
 

@@ -175,26 +175,26 @@ class Ppo:
 
     def _improve(self, rollout: Rollout, transitions: Transitions | None) -> dict[str, float]:
         """Epochs of minibatches on actor and critic, and on the signals that learn."""
-        numbers = self.hyperparameters
+        hyperparameters = self.hyperparameters
         done = self.steps / self.behavior.max_steps
-        rate = scheduled(numbers.learning_rate, RATE_FLOOR, numbers.learning_rate_schedule, done)
-        beta = scheduled(numbers.beta, BETA_FLOOR, numbers.beta_schedule, done)
-        epsilon = scheduled(numbers.epsilon, EPSILON_FLOOR, numbers.epsilon_schedule, done)
+        rate = scheduled(hyperparameters.learning_rate, RATE_FLOOR, hyperparameters.learning_rate_schedule, done)
+        beta = scheduled(hyperparameters.beta, BETA_FLOOR, hyperparameters.beta_schedule, done)
+        epsilon = scheduled(hyperparameters.epsilon, EPSILON_FLOOR, hyperparameters.epsilon_schedule, done)
         for group in self.optimizer.param_groups:
             group["lr"] = rate
         sums = torch.zeros(3, device=self.task.device)
         of_signals: list[dict[str, float]] = []
         update_count = 0
-        for _epoch in range(numbers.num_epoch):
+        for _epoch in range(hyperparameters.num_epoch):
             moved = []
-            for batch in rollout.minibatches(numbers.batch_size, self._generator):
+            for batch in rollout.minibatches(hyperparameters.batch_size, self._generator):
                 parts, divergence = self._learn(batch, epsilon, beta)
                 sums += parts
                 moved.append(divergence)
                 update_count += 1
                 if transitions is not None:
                     of_signals.append(self._teach_signals(transitions, batch))
-            if numbers.target_kl is not None and torch.stack(moved).mean() > numbers.target_kl:
+            if hyperparameters.target_kl is not None and torch.stack(moved).mean() > hyperparameters.target_kl:
                 break
         policy_loss, value_loss, entropy = (sums / update_count).tolist()
         return means(of_signals) | {
@@ -263,13 +263,15 @@ class Ppo:
 
     def _critic(self, generator: torch.Generator) -> Critic:
         """With a body of its own unless it is shared; one normaliser serves both where they see the same."""
-        policy, numbers = self.policy, self.hyperparameters
-        if numbers.privileged_critic:
+        policy, hyperparameters = self.policy, self.hyperparameters
+        if hyperparameters.privileged_critic:
             body = privileged_body(policy.layout, policy.settings, generator)
         else:
-            body = policy.body if numbers.shared_critic else policy_body(policy.layout, policy.settings, generator)
+            body = (
+                policy.body if hyperparameters.shared_critic else policy_body(policy.layout, policy.settings, generator)
+            )
             body.normalizer = policy.body.normalizer
-        return Critic(body, len(self.signals), generator, normalizes=numbers.normalize_returns)
+        return Critic(body, len(self.signals), generator, normalizes=hyperparameters.normalize_returns)
 
     def _store(self, task: Task) -> Rollout:
         """Room for buffer_size decisions, in whole rounds of all environments and in whole sequences."""

@@ -98,7 +98,7 @@ class Sac:
                 f"in whole rounds of {task.env_count} environments: never a batch of {self.hyperparameters.batch_size}"
             )
         self._hindsight = _hindsight(task, self.replay, self.hyperparameters.hindsight)
-        self._radii = _numbers(task, self._hindsight.goal.radius) if self._hindsight is not None else None
+        self._radii = _task_param(task, self._hindsight.goal.radius) if self._hindsight is not None else None
         self._update_count = 0
         self._signal_update_count = 0
         self._is_episodic = torch.tensor([signal.is_episodic for signal in signals], device=device)
@@ -109,16 +109,16 @@ class Sac:
 
     def iterate(self) -> Iteration:
         """Rounds of one decision of all environments, each with the updates that are then due."""
-        numbers = self.hyperparameters
+        hyperparameters = self.hyperparameters
         statistics: list[dict[str, float]] = []
         collected: list[tuple[Tensor, Tensor]] = []
         rounds = -(-_ITERATION_STEPS // self.replay.env_count)
         for _round in range(rounds):
             collected.append(self._collect())
             self.networks.set_learning_rate(self._learning_rate())
-            due = self._due(numbers.steps_per_update, self._update_count)
+            due = self._due(hyperparameters.steps_per_update, self._update_count)
             statistics.extend(self._update() for _ in range(due))
-            due = self._due(numbers.reward_signal_steps_per_update, self._signal_update_count)
+            due = self._due(hyperparameters.reward_signal_steps_per_update, self._signal_update_count)
             statistics.extend(self._update_signals() for _ in range(due))
         rewards, is_ended = (torch.stack(column) for column in zip(*collected, strict=True))
         now = self.networks.temperatures() | {"Policy/Learning Rate": self._learning_rate()}
@@ -265,7 +265,7 @@ def _hindsight(task: Task, replay: Replay, goals_per_transition: int) -> Hindsig
     return Hindsight(task.goal, replay, goals_per_transition)
 
 
-def _numbers(task: Task, name: str) -> Tensor:
-    """A number of all running episodes, shape (envs,): live."""
-    numbers: Tensor = wp.to_torch(task.buffers.numbers)
-    return numbers[:, task.number_table.names.index(name)]
+def _task_param(task: Task, name: str) -> Tensor:
+    """One parameter of all running episodes, shape (envs,): live."""
+    params: Tensor = wp.to_torch(task.buffers.params)
+    return params[:, task.param_table.names.index(name)]

@@ -122,8 +122,8 @@ class SoftActorCritic:
         policy = policy_loss(expected_values(values, distribution.choice_logs), entropy, temperatures)
         temperature = temperature_loss(self.log_temperatures, entropy, self._entropy_targets)
         self._step((critic.sum(), policy, temperature))
-        numbers = torch.cat((critic, policy.abs()[None], next_values.mean(dim=0))).tolist()
-        return dict(zip((*_LOSS_TAGS, *self._value_tags), numbers, strict=True))
+        hyperparameters = torch.cat((critic, policy.abs()[None], next_values.mean(dim=0))).tolist()
+        return dict(zip((*_LOSS_TAGS, *self._value_tags), hyperparameters, strict=True))
 
     @torch.no_grad()
     def _next_values(self, observations: Tensor, temperatures: Tensor, generator: torch.Generator) -> Tensor:

@@ -81,14 +81,14 @@ def _in_new_form(name: str, flat: Placed, notes: list[str]) -> Placed:
     for key in _REQUIRED_OF_PPO if trainer == "ppo" else ():
         if key not in flat:
             raise error_at(flat.place, f"{name}.{key}", "is required in this old form of the file")
-    behavior, network, numbers = Placed(flat.place), Placed(flat.place), Placed(flat.place)
+    behavior, network, hyperparameters = Placed(flat.place), Placed(flat.place), Placed(flat.place)
     behavior.put("trainer_type", flat["trainer"], flat.places["trainer"])
-    behavior.put("hyperparameters", numbers)
+    behavior.put("hyperparameters", hyperparameters)
     behavior.put("network_settings", network)
     own = HYPERPARAMETERS[trainer].model_fields if trainer in HYPERPARAMETERS else {}
     for key in flat:
         if key in own:
-            numbers.take(key, flat)
+            hyperparameters.take(key, flat)
         elif key in _NETWORK_KEYS:
             network.take(key, flat)
         elif key in _BLOCK_KEYS:
@@ -102,8 +102,8 @@ def _in_new_form(name: str, flat: Placed, notes: list[str]) -> Placed:
             if key in flat:
                 memory.take(key, flat)
         network.put("memory", memory, flat.places["use_recurrent"])
-    if trainer == "sac" and "steps_per_update" not in numbers and set(_SAC_INTERVALS) & set(flat):
-        numbers.put("steps_per_update", _steps_per_update(name, flat), _interval_place(flat))
+    if trainer == "sac" and "steps_per_update" not in hyperparameters and set(_SAC_INTERVALS) & set(flat):
+        hyperparameters.put("steps_per_update", _steps_per_update(name, flat), _interval_place(flat))
     return behavior
 
 

@@ -35,15 +35,15 @@ def check_against_task(loaded: Loaded) -> None:
         task = build_task(name, 1, settings_of(name, loaded.config.env_settings.env_args))
     for loc, sentence in _unseen(loaded.config.behavior, task.layout):
         raise loaded.error(("behaviors", loaded.config.behavior_name, *loc), sentence)
-    _check_numbers(loaded, task)
+    _check_params(loaded, task)
     _check_demonstrations(loaded, task)
     _check_teacher(loaded, task)
 
 
 def _unseen(behavior: Behavior, layout: Layout) -> Iterator[tuple[tuple[str, ...], str]]:
     """What the networks would have to see and cannot: keys below the behaviour, and what is wrong with each."""
-    numbers, kind = behavior.hyperparameters, behavior.network_settings.vis_encode_type
-    if isinstance(numbers, PpoHyperparameters) and numbers.privileged_critic and not layout.privileged:
+    hyperparameters, kind = behavior.hyperparameters, behavior.network_settings.vis_encode_type
+    if isinstance(hyperparameters, PpoHyperparameters) and hyperparameters.privileged_critic and not layout.privileged:
         yield ("hyperparameters", "privileged_critic"), f"{layout.task} as it is set has no privileged elements"
     if layout.image is None:
         return
@@ -62,12 +62,12 @@ def _unseen(behavior: Behavior, layout: Layout) -> Iterator[tuple[tuple[str, ...
         yield ("behavioral_cloning",), blind
 
 
-def _check_numbers(loaded: Loaded, task: Task) -> None:
+def _check_params(loaded: Loaded, task: Task) -> None:
     for name, parameter in loaded.config.environment_parameters.items():
         for k, lesson in enumerate(lessons_of(name, parameter)):
             below = ("curriculum", k, "value") if isinstance(parameter, Curriculum) else ()
             with _refused_at(loaded, "environment_parameters", name, *below):
-                task.set_numbers({name: lesson.sampler})
+                task.set_params({name: lesson.sampler})
 
 
 def _check_demonstrations(loaded: Loaded, task: Task) -> None:

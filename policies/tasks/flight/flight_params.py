@@ -1,13 +1,13 @@
-"""Numbers of every task that is flown: the air, the sensors and what the vehicle's maker did not measure exactly."""
+"""Parameters of every task that is flown: the air, the sensors and what the vehicle's maker did not measure exactly."""
 
 import warp as wp
 
-from policies.tasks.task_params import Number
+from policies.tasks.task_params import TaskParam
 
 
 @wp.struct
-class FlightNumbers:
-    """One row per environment; declared in `FLIGHT_NUMBERS`, in the same order."""
+class FlightParams:
+    """One row per environment; declared in `FLIGHT_PARAMS`, in the same order."""
 
     wind_m_s: float
     wind_turbulence: float
@@ -17,11 +17,13 @@ class FlightNumbers:
     motor_scale: float
 
 
-FLIGHT_NUMBERS = (
-    Number("wind_m_s", 0.0, 0.0, 12.0, "m/s", "mean wind at all heights, from a direction drawn per episode", "guess"),
-    Number("wind_turbulence", 1.0, 0.0, 3.0, "1", "of the mean wind; 1 is MIL-F-8785C's", "MIL-F-8785C"),
-    Number("wind_gust_m_s", 0.0, 0.0, 8.0, "m/s", "largest gust on top of the mean", "guess"),
-    Number("sensor_noise", 1.0, 0.0, 2.0, "1", "factor on every sensor's errors, rounded to a quarter", "guess"),
-    Number("mass_scale", 1.0, 0.7, 1.4, "1", "factor on mass and moments of inertia", "guess"),
-    Number("motor_scale", 1.0, 0.8, 1.2, "1", "factor on the rotors' thrust", "guess"),
+FLIGHT_PARAMS = (
+    TaskParam(
+        "wind_m_s", 0.0, 0.0, 12.0, "m/s", "mean wind at all heights, from a direction drawn per episode", "guess"
+    ),
+    TaskParam("wind_turbulence", 1.0, 0.0, 3.0, "1", "of the mean wind; 1 is MIL-F-8785C's", "MIL-F-8785C"),
+    TaskParam("wind_gust_m_s", 0.0, 0.0, 8.0, "m/s", "largest gust on top of the mean", "guess"),
+    TaskParam("sensor_noise", 1.0, 0.0, 2.0, "1", "factor on every sensor's errors, rounded to a quarter", "guess"),
+    TaskParam("mass_scale", 1.0, 0.7, 1.4, "1", "factor on mass and moments of inertia", "guess"),
+    TaskParam("motor_scale", 1.0, 0.8, 1.2, "1", "factor on the rotors' thrust", "guess"),
 )

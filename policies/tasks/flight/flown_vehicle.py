@@ -7,7 +7,7 @@ import warp as wp
 
 from autopilot.ports import SETPOINT_TRAJECTORY, Estimate, Setpoint
 from policies.tasks.flight.episode_draws import WIND_STREAM, draw_angle
-from policies.tasks.flight.flight_params import FlightNumbers
+from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.own_state import Command, OwnState
 from sim.advance import RigArrays, forget_impacts
 from sim.bodies.multirotor import MultirotorModel
@@ -30,23 +30,23 @@ class Makes:
 
 
 @wp.func
-def vary_vehicle(rig: RigArrays, makes: Makes, numbers: FlightNumbers, seed: int, i: int, episode: int) -> None:
+def vary_vehicle(rig: RigArrays, makes: Makes, params: FlightParams, seed: int, i: int, episode: int) -> None:
     """Gives row i the air, the sensors, the mass and the motors of its episode."""
     model = makes.body[0]
-    model.mass_kg = model.mass_kg * numbers.mass_scale
-    model.mass_inv = model.mass_inv / numbers.mass_scale
-    model.inertia_frd = model.inertia_frd * numbers.mass_scale
-    model.inertia_inv_frd = model.inertia_inv_frd / numbers.mass_scale
-    model.thrust_n_s2 = model.thrust_n_s2 * numbers.motor_scale
+    model.mass_kg = model.mass_kg * params.mass_scale
+    model.mass_inv = model.mass_inv / params.mass_scale
+    model.inertia_frd = model.inertia_frd * params.mass_scale
+    model.inertia_inv_frd = model.inertia_inv_frd / params.mass_scale
+    model.thrust_n_s2 = model.thrust_n_s2 * params.motor_scale
     rig.model[i] = model
-    level = int(wp.round(numbers.sensor_noise * _LEVELS))
+    level = int(wp.round(params.sensor_noise * _LEVELS))
     rig.sensor_model[i] = makes.sensors[wp.min(level, makes.sensors.shape[0] - 1)]
     towards = draw_angle(seed, i, episode, WIND_STREAM)
     wind = rig.wind_model[i]
     wind.along_ned = wp.vec3(wp.cos(towards), wp.sin(towards), 0.0)
-    wind.mean_ned = wind.along_ned * numbers.wind_m_s
-    wind.gust_m_s = numbers.wind_gust_m_s
-    wind.turbulence_w_std = 0.1 * numbers.wind_m_s * numbers.wind_turbulence  # MIL-F-8785C: a tenth of W20
+    wind.mean_ned = wind.along_ned * params.wind_m_s
+    wind.gust_m_s = params.wind_gust_m_s
+    wind.turbulence_w_std = 0.1 * params.wind_m_s * params.wind_turbulence  # MIL-F-8785C: a tenth of W20
     rig.wind_model[i] = wind
     rig.wind[i] = WindState()
     forget_impacts(rig, i)  # that of standing on the ground before the hover

@@ -78,14 +78,14 @@ class FlightTask(Task):
         """As every task's, and the rig; the worlds are grown again from their seeds and numbers."""
         state = super().state()
         state |= {f"rig{k}": rows for k, rows in enumerate(self.rig.snapshot())}
-        return state | {"world_numbers": self.worlds.numbers.numpy().copy()}
+        return state | {"world_numbers": self.worlds.params.numpy().copy()}
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Restores what `state` returned."""
         super().load_state(state)
         snapshot = [state[f"rig{k}"] for k in range(sum(name.startswith("rig") for name in state))]
         self.rig.restore(snapshot)
-        self.worlds.numbers.assign(state["world_numbers"])
+        self.worlds.params.assign(state["world_numbers"])
         everyone = wp.full(self.env_count, value=True, dtype=wp.bool, device=self.device)
         self.worlds.grow(everyone, self.world_seeds)
 

@@ -12,7 +12,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from policies.tasks.flight.flight_params import FLIGHT_NUMBERS, FlightNumbers
+from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
 from policies.tasks.flight.hover_bank import HOVER_COUNT, LOW_M
 from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.flight.ranges import RANGES, measure_ranges
@@ -31,7 +31,7 @@ from policies.tasks.follow_me.follow_me_kernels import (
     show,
     walk,
 )
-from policies.tasks.follow_me.follow_me_params import DOCUMENTED, IMPROVED, NUMBERS, TREES_PER_HA_MAX, FollowNumbers
+from policies.tasks.follow_me.follow_me_params import DOCUMENTED, IMPROVED, PARAMS, TREES_PER_HA_MAX, FollowParams
 from policies.tasks.follow_me.follow_me_top_view import draw
 from policies.tasks.follow_me.observe import BRANCHES, DOCUMENT, EGO, EGO_BLIND, IMAGE_CHANNELS, vector_elements
 from policies.tasks.follow_me.owner_visibility import Sight
@@ -57,7 +57,7 @@ _VECTORS = {"as-documented": int(DOCUMENT), "improved": int(EGO), "vision-only":
 class FollowMe(FlightTask):
     """The task. Layout version 1."""
 
-    numbers: ClassVar = NUMBERS
+    params: ClassVar = PARAMS
 
     def __init__(self, settings: FollowSettings, env_count: int, device: str = "cpu") -> None:
         is_documented = settings.preset == "as-documented"
@@ -76,7 +76,7 @@ class FollowMe(FlightTask):
         self.measures = self.follow.measures
         self._eyes: Eyes | None = None
         if self.layout.image is not None:
-            self._eyes = Eyes(self.buffers, self.rig.arrays, self.follow.numbers, self.worlds, self.follow.people)
+            self._eyes = Eyes(self.buffers, self.rig.arrays, self.follow.params, self.worlds, self.follow.people)
             self.follow.lenses = self._eyes.lenses
         self._record_all(_rules(settings, self.layout), self._start())
 
@@ -139,8 +139,8 @@ class FollowMe(FlightTask):
     def _state(self) -> Any:
         n = self.env_count
         state = FollowState()
-        state.flight = typed_rows(self.buffers.numbers, FlightNumbers)
-        state.numbers = typed_rows(self.buffers.numbers, FollowNumbers, first=len(FLIGHT_NUMBERS))
+        state.flight = typed_rows(self.buffers.params, FlightParams)
+        state.params = typed_rows(self.buffers.params, FollowParams, first=len(FLIGHT_PARAMS))
         state.actions = self._zeros("last_actions", n, wp.vec4)
         state.people = self._zeros("people", n, Person)
         state.person_models = self._zeros("person_models", n, PersonModel)
@@ -164,7 +164,7 @@ class FollowMe(FlightTask):
         start.noise_seeds = self.noise_seeds
         start.hovers = self.hovers
         start.hover_count = HOVER_COUNT
-        start.world_numbers = self.worlds.numbers
+        start.world_params = self.worlds.params
         start.makes = self.makes
         start.person = wp.array([person_model()], dtype=PersonModel, device=self.device)
         start.phone = wp.array([phone_model()], dtype=PhoneModel, device=self.device)

@@ -25,7 +25,7 @@ from policies.tasks.flight.episode_draws import (
     draw_index,
     draw_seed,
 )
-from policies.tasks.flight.flight_params import FlightNumbers
+from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.flown_vehicle import (
     Makes,
     own_state,
@@ -34,7 +34,7 @@ from policies.tasks.flight.flown_vehicle import (
     velocity_setpoint,
 )
 from policies.tasks.flight.own_state import action_command
-from policies.tasks.follow_me.follow_me_params import FollowNumbers
+from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, document_action, write_vector
 from policies.tasks.follow_me.owner_visibility import Sight, lens_of, reach_from, see
 from policies.tasks.follow_me.privileged import write_privileged
@@ -43,7 +43,7 @@ from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_start, phone_step
 from sim.truth import has_touched
-from sim.world.growing import WorldNumbers
+from sim.world.growing import WorldParams
 from sim.world.people import PERSON_DT_S, PERSON_TICKS, Person, PersonModel, person_start, person_step
 
 wp.set_module_options({"enable_backward": False})
@@ -82,8 +82,8 @@ class Rules:
 class FollowState:
     """All that an episode has beside the rig and its world."""
 
-    flight: wp.array(dtype=FlightNumbers)
-    numbers: wp.array(dtype=FollowNumbers)
+    flight: wp.array(dtype=FlightParams)
+    params: wp.array(dtype=FollowParams)
     actions: wp.array(dtype=wp.vec4)  # the last
     people: wp.array(dtype=Person)
     person_models: wp.array(dtype=PersonModel)
@@ -109,7 +109,7 @@ class Start:
     noise_seeds: wp.array(dtype=int)
     hovers: wp.array(dtype=int)
     hover_count: int
-    world_numbers: wp.array(dtype=WorldNumbers)
+    world_params: wp.array(dtype=WorldParams)
     makes: Makes
     person: wp.array(dtype=PersonModel)  # (1,)
     phone: wp.array(dtype=PhoneModel)  # (1,)
@@ -162,7 +162,7 @@ def look(rig: RigArrays, state: FollowState, rows: wp.array(dtype=wp.bool)) -> N
     if rows[i]:
         truth = rig.truth[i]
         state.sights[i] = see(rig.worlds[rig.i_world[i]], truth, state.people[i])
-        state.lenses[i] = lens_of(truth, state.numbers[i].exposure)
+        state.lenses[i] = lens_of(truth, state.params[i].exposure)
 
 
 @wp.func
@@ -202,7 +202,7 @@ def write_measures(state: FollowState, rig: RigArrays, i: int, is_collided: bool
     state.measures[i, 1] = sight.bearing_rad
     state.measures[i, 2] = float(sight.is_in_view)
     state.measures[i, 3] = float(is_collided)
-    state.measures[i, 4] = float(is_in_band(state.numbers[i], sight))
+    state.measures[i, 4] = float(is_in_band(state.params[i], sight))
     state.measures[i, 5] = sight.room_m
     state.measures[i, 6] = wp.length(sight.vel_hfrd)
     state.measures[i, 7] = wp.length(rig.truth[i].vel_ned)
@@ -211,7 +211,7 @@ def write_measures(state: FollowState, rig: RigArrays, i: int, is_collided: bool
 @wp.kernel(enable_backward=False)
 def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, start: Start) -> None:
     i = wp.tid()
-    numbers = state.numbers[i]
+    params = state.params[i]
     sight = state.sights[i]
     last_action = state.actions[i]
     action = chosen_action(buffers, rules, i)
@@ -221,13 +221,13 @@ def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState
     )
     touched = has_touched(rig.truth[i])
     sight.reach_m = state.reaches_m[i]
-    outcome = follow_outcome(numbers, sight, touched, state.unseen_s[i], buffers.steps[i] + 1)
+    outcome = follow_outcome(params, sight, touched, state.unseen_s[i], buffers.steps[i] + 1)
     reward = float(0.0)
     if rules.is_documented == 1:
-        reward = document_reward(numbers, sight, outcome)
+        reward = document_reward(params, sight, outcome)
     else:
-        reward = follow_reward(numbers, sight, outcome, action, last_action)
-    write_measures(state, rig, i, touched or sight.reach_m < numbers.touch_m)
+        reward = follow_reward(params, sight, outcome, action, last_action)
+    write_measures(state, rig, i, touched or sight.reach_m < params.touch_m)
     write_frame(buffers, rules, rig, state, i)
     start.is_starting[i] = close_step_in_time(buffers, i, reward, outcome)
 
@@ -240,7 +240,7 @@ def prepare(buffers: StepBuffers, rules: Rules, state: FollowState, start: Start
         return
     seed = buffers.seed[0]
     episode = begin_episode(buffers, i)
-    numbers = state.numbers[i]
+    params = state.params[i]
     state.actions[i] = wp.vec4()
     state.unseen_s[i] = 0.0
     start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, rules.is_test)
@@ -249,14 +249,14 @@ def prepare(buffers: StepBuffers, rules: Rules, state: FollowState, start: Start
     if rules.is_kept == 0 or episode == 0:
         start.is_growing[i] = True
         start.world_seeds[i] = draw_seed(seed, i, episode, WORLD_STREAM, rules.is_test)
-        world = start.world_numbers[i]
-        world.hill_height_m = numbers.hill_height_m
-        world.trees_per_ha = numbers.trees_per_ha
-        start.world_numbers[i] = world
+        world = start.world_params[i]
+        world.hill_height_m = params.hill_height_m
+        world.trees_per_ha = params.trees_per_ha
+        start.world_params[i] = world
 
 
 @wp.func
-def person_of(model: PersonModel, n: FollowNumbers) -> PersonModel:
+def person_of(model: PersonModel, n: FollowParams) -> PersonModel:
     """The owner of an episode."""
     model.speed_max = n.owner_speed_max
     model.speed_min = wp.min(model.speed_min, n.owner_speed_max)
@@ -266,7 +266,7 @@ def person_of(model: PersonModel, n: FollowNumbers) -> PersonModel:
 
 
 @wp.func
-def phone_of(model: PhoneModel, n: FollowNumbers) -> PhoneModel:
+def phone_of(model: PhoneModel, n: FollowParams) -> PhoneModel:
     """Their phone."""
     model.period_ticks = wp.max(int(wp.round(n.phone_period_s * _TICKS_PER_S)), 1)
     lag_ticks = int(wp.round(n.phone_lag_s * _TICKS_PER_S))
@@ -295,17 +295,17 @@ def place(buffers: StepBuffers, rig: RigArrays, state: FollowState, start: Start
         return
     seed = buffers.seed[0]
     episode = buffers.episodes[i] - 1
-    numbers = state.numbers[i]
+    params = state.params[i]
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
-    state.person_models[i] = person_of(start.person[0], numbers)
-    state.phone_models[i] = phone_of(start.phone[0], numbers)
+    state.person_models[i] = person_of(start.person[0], params)
+    state.phone_models[i] = phone_of(start.phone[0], params)
     # ahead, some way to one side, looking anywhere
     truth = rig.truth[i]
     nose = wp.quat_rotate(truth.q_ned_from_frd, wp.vec3(1.0, 0.0, 0.0))
-    aside = draw_angle(seed, i, episode, _BEARING_STREAM) * numbers.start_bearing_deg / 180.0
+    aside = draw_angle(seed, i, episode, _BEARING_STREAM) * params.start_bearing_deg / 180.0
     bearing = wp.atan2(nose[1], nose[0]) + aside
     share = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
-    distance = numbers.start_distance_min_m + share * (numbers.start_distance_max_m - numbers.start_distance_min_m)
+    distance = params.start_distance_min_m + share * (params.start_distance_max_m - params.start_distance_min_m)
     north = truth.pos_ned[0] + distance * wp.cos(bearing)
     east = truth.pos_ned[1] + distance * wp.sin(bearing)
     heading = draw_angle(seed, i, episode, _HEADING_STREAM)

@@ -1,13 +1,13 @@
 """FollowMe's numbers: the world, the owner, their phone, distances, and what the reward weighs, with their sources.
 
-The numbers of the air and the vehicle come first (`FLIGHT_NUMBERS`); all can be set or randomised by name.
+The numbers of the air and the vehicle come first (`FLIGHT_PARAMS`); all can be set or randomised by name.
 """
 
 import warp as wp
 
-from policies.tasks.flight.flight_params import FLIGHT_NUMBERS
+from policies.tasks.flight.flight_params import FLIGHT_PARAMS
 from policies.tasks.follow_me.world import STOP_SHARE
-from policies.tasks.task_params import Number, Sampler
+from policies.tasks.task_params import Sampler, TaskParam
 
 TREES_PER_HA_MAX = 300.0
 _DOCUMENT = "Personal Navigation UAV"
@@ -15,8 +15,8 @@ _EVT = "EVT-Bench (TrackVLA, arXiv 2505.23189), at its size"
 
 
 @wp.struct
-class FollowNumbers:
-    """One row per environment; declared in `FOLLOW_NUMBERS`, in the same order."""
+class FollowParams:
+    """One row per environment; declared in `FOLLOW_PARAMS`, in the same order."""
 
     hill_height_m: float
     trees_per_ha: float
@@ -59,43 +59,43 @@ class FollowNumbers:
     document_collision: float
 
 
-FOLLOW_NUMBERS = (
-    Number("hill_height_m", 8.0, 0.0, 30.0, "m", "bound of the hills above and valleys below the start", "guess"),
-    Number("trees_per_ha", 100.0, 0.0, TREES_PER_HA_MAX, "1/ha", "trees per hectare", "guess: open woodland"),
-    Number("owner_speed_max", 2.0, 0.4, 6.0, "m/s", "the owner's fastest walk or run", "2: walks, 5: runs"),
-    Number("owner_stop_share", STOP_SHARE, 0.0, 1.0, "1", "share of the owner's plans that are a stop", "guess"),
-    Number(
+FOLLOW_PARAMS = (
+    TaskParam("hill_height_m", 8.0, 0.0, 30.0, "m", "bound of the hills above and valleys below the start", "guess"),
+    TaskParam("trees_per_ha", 100.0, 0.0, TREES_PER_HA_MAX, "1/ha", "trees per hectare", "guess: open woodland"),
+    TaskParam("owner_speed_max", 2.0, 0.4, 6.0, "m/s", "the owner's fastest walk or run", "2: walks, 5: runs"),
+    TaskParam("owner_stop_share", STOP_SHARE, 0.0, 1.0, "1", "share of the owner's plans that are a stop", "guess"),
+    TaskParam(
         "owner_graze_share", 0.3, 0.0, 1.0, "1", "share of the owner's plans that lead closely past a tree", "guess"
     ),
-    Number("start_distance_min_m", 2.0, 1.0, 20.0, "m", "the owner starts at least this far away", "guess"),
-    Number("start_distance_max_m", 4.0, 1.0, 20.0, "m", "and at most this far", "guess"),
-    Number("start_bearing_deg", 30.0, 0.0, 180.0, "deg", "and at most this far to either side of the nose", "guess"),
-    Number("phone_period_s", 0.5, 0.1, 5.0, "s", "between FOLLOW_TARGET messages", "ground stations: 1 to 2 Hz"),
-    Number("phone_lag_s", 0.3, 0.0, 1.0, "s", "age of a report on its arrival", "guess"),
-    Number("phone_error", 1.0, 0.0, 4.0, "1", "factor on the phone's errors; 1: 1.5 m, drifting", "guess"),
-    Number("phone_dropouts_per_min", 1.0, 0.0, 20.0, "1/min", "how often the phone is silent for 2 to 6 s", "guess"),
-    Number("camera_noise", 1.0, 0.0, 4.0, "1", "factor on the noise of the picture", "guess"),
-    Number("exposure", 1.0, 0.25, 4.0, "1", "factor on the light of the picture", "guess"),
-    Number("decision_limit", 600.0, 1.0, 1e6, "1", "decisions of an episode; 600 are 60 s", "guess"),
-    Number("near_m", 1.0, 0.0, 20.0, "m", "to the owner's chest: nearer is too near", _EVT),
-    Number("far_m", 3.0, 0.0, 100.0, "m", "farther is not following", _EVT + " and " + _DOCUMENT),
-    Number("touch_m", 0.5, 0.0, 5.0, "m", "nearer to any part of the owner is a collision", _EVT),
-    Number("lost_m", 10.0, 1.0, 1e6, "m", "farther away the owner is lost, which ends the episode", "guess"),
-    Number("unseen_limit_s", 5.0, 0.1, 1e6, "s", "out of sight for longer the owner is lost", "the requirement"),
-    Number(
+    TaskParam("start_distance_min_m", 2.0, 1.0, 20.0, "m", "the owner starts at least this far away", "guess"),
+    TaskParam("start_distance_max_m", 4.0, 1.0, 20.0, "m", "and at most this far", "guess"),
+    TaskParam("start_bearing_deg", 30.0, 0.0, 180.0, "deg", "and at most this far to either side of the nose", "guess"),
+    TaskParam("phone_period_s", 0.5, 0.1, 5.0, "s", "between FOLLOW_TARGET messages", "ground stations: 1 to 2 Hz"),
+    TaskParam("phone_lag_s", 0.3, 0.0, 1.0, "s", "age of a report on its arrival", "guess"),
+    TaskParam("phone_error", 1.0, 0.0, 4.0, "1", "factor on the phone's errors; 1: 1.5 m, drifting", "guess"),
+    TaskParam("phone_dropouts_per_min", 1.0, 0.0, 20.0, "1/min", "how often the phone is silent for 2 to 6 s", "guess"),
+    TaskParam("camera_noise", 1.0, 0.0, 4.0, "1", "factor on the noise of the picture", "guess"),
+    TaskParam("exposure", 1.0, 0.25, 4.0, "1", "factor on the light of the picture", "guess"),
+    TaskParam("decision_limit", 600.0, 1.0, 1e6, "1", "decisions of an episode; 600 are 60 s", "guess"),
+    TaskParam("near_m", 1.0, 0.0, 20.0, "m", "to the owner's chest: nearer is too near", _EVT),
+    TaskParam("far_m", 3.0, 0.0, 100.0, "m", "farther is not following", _EVT + " and " + _DOCUMENT),
+    TaskParam("touch_m", 0.5, 0.0, 5.0, "m", "nearer to any part of the owner is a collision", _EVT),
+    TaskParam("lost_m", 10.0, 1.0, 1e6, "m", "farther away the owner is lost, which ends the episode", "guess"),
+    TaskParam("unseen_limit_s", 5.0, 0.1, 1e6, "s", "out of sight for longer the owner is lost", "the requirement"),
+    TaskParam(
         "best_distance_m", 2.0, 0.5, 20.0, "m", "distance to the owner's chest that is paid best", "middle of the band"
     ),
-    Number("best_height_m", 0.5, -1.0, 10.0, "m", "height above the owner's chest that costs nothing", "guess"),
-    Number("distance_reward", 0.06, 0.0, 10.0, "1", "per decision at the best distance", "tuned"),
-    Number("distance_width_m", 0.6, 0.05, 10.0, "m", "off the best distance by which e^-0.5 of it is left", "tuned"),
-    Number("view_reward", 0.04, 0.0, 10.0, "1", "per decision for an owner in sight, ahead", "tuned"),
-    Number("view_width_deg", 20.0, 1.0, 180.0, "deg", "off the nose by which e^-0.5 of it is left", "tuned"),
-    Number("far_cost", 0.02, 0.0, 10.0, "1", "per decision and metre beyond the band, at most 5", "tuned"),
-    Number("near_cost", 0.2, 0.0, 10.0, "1", "per decision and metre nearer than 1.3 times the near limit", "tuned"),
-    Number("height_cost", 0.02, 0.0, 10.0, "1", "per decision and metre off the best height, at most 3", "tuned"),
-    Number("jerk_cost", 0.01, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),
-    Number("turn_cost", 0.002, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
-    Number(
+    TaskParam("best_height_m", 0.5, -1.0, 10.0, "m", "height above the owner's chest that costs nothing", "guess"),
+    TaskParam("distance_reward", 0.06, 0.0, 10.0, "1", "per decision at the best distance", "tuned"),
+    TaskParam("distance_width_m", 0.6, 0.05, 10.0, "m", "off the best distance by which e^-0.5 of it is left", "tuned"),
+    TaskParam("view_reward", 0.04, 0.0, 10.0, "1", "per decision for an owner in sight, ahead", "tuned"),
+    TaskParam("view_width_deg", 20.0, 1.0, 180.0, "deg", "off the nose by which e^-0.5 of it is left", "tuned"),
+    TaskParam("far_cost", 0.02, 0.0, 10.0, "1", "per decision and metre beyond the band, at most 5", "tuned"),
+    TaskParam("near_cost", 0.2, 0.0, 10.0, "1", "per decision and metre nearer than 1.3 times the near limit", "tuned"),
+    TaskParam("height_cost", 0.02, 0.0, 10.0, "1", "per decision and metre off the best height, at most 3", "tuned"),
+    TaskParam("jerk_cost", 0.01, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),
+    TaskParam("turn_cost", 0.002, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
+    TaskParam(
         "blind_cost",
         0.015,
         0.0,
@@ -104,15 +104,17 @@ FOLLOW_NUMBERS = (
         "per decision and (m/s)² asked for to where the camera does not look",
         "tuned",
     ),
-    Number("clearance_m", 1.5, 0.0, 2.0, "m", "room to obstacles below which there is a cost", "tuned"),
-    Number("clearance_cost", 0.2, 0.0, 10.0, "1", "per decision for no room at all, growing as the square", "tuned"),
-    Number("collision_cost", 8.0, 0.0, 1000.0, "1", "of a collision, which ends the episode", "tuned"),
-    Number("lost_cost", 3.0, 0.0, 1000.0, "1", "of losing the owner, which ends the episode", "tuned"),
-    Number("document_within", 0.1, -10.0, 10.0, "1", "document: per payment within `far_m` of the person", _DOCUMENT),
-    Number("document_beyond", -0.05, -10.0, 10.0, "1", "document: per payment otherwise", _DOCUMENT),
-    Number("document_collision", -10.0, -1e3, 10.0, "1", "document: of any collision", _DOCUMENT),
+    TaskParam("clearance_m", 1.5, 0.0, 2.0, "m", "room to obstacles below which there is a cost", "tuned"),
+    TaskParam("clearance_cost", 0.2, 0.0, 10.0, "1", "per decision for no room at all, growing as the square", "tuned"),
+    TaskParam("collision_cost", 8.0, 0.0, 1000.0, "1", "of a collision, which ends the episode", "tuned"),
+    TaskParam("lost_cost", 3.0, 0.0, 1000.0, "1", "of losing the owner, which ends the episode", "tuned"),
+    TaskParam(
+        "document_within", 0.1, -10.0, 10.0, "1", "document: per payment within `far_m` of the person", _DOCUMENT
+    ),
+    TaskParam("document_beyond", -0.05, -10.0, 10.0, "1", "document: per payment otherwise", _DOCUMENT),
+    TaskParam("document_collision", -10.0, -1e3, 10.0, "1", "document: of any collision", _DOCUMENT),
 )
-NUMBERS = (*FLIGHT_NUMBERS, *FOLLOW_NUMBERS)
+PARAMS = (*FLIGHT_PARAMS, *FOLLOW_PARAMS)
 
 # Not described in the document: no wind, ideal positions of both, and nothing but a collision or the limit ends it.
 DOCUMENTED: dict[str, float | Sampler] = {

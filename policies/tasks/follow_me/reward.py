@@ -12,7 +12,7 @@ import warp as wp
 
 from policies.tasks.episode import HIT_OBSTACLE, HIT_OTHER, LOST, RUNNING, SUCCESS, TIMEOUT
 from policies.tasks.flight.own_state import SPEED_MAX_M_S
-from policies.tasks.follow_me.follow_me_params import FollowNumbers
+from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.owner_visibility import Sight
 
 wp.set_module_options({"enable_backward": False})
@@ -25,7 +25,7 @@ _NEAR_MARGIN = wp.constant(1.3)
 
 
 @wp.func
-def is_in_band(n: FollowNumbers, sight: Sight) -> bool:
+def is_in_band(n: FollowParams, sight: Sight) -> bool:
     """Whether the owner is neither too near nor too far."""
     return sight.distance_m >= n.near_m and sight.distance_m <= n.far_m
 
@@ -37,7 +37,7 @@ def bell(off: float, width: float) -> float:
 
 
 @wp.func
-def follow_outcome(n: FollowNumbers, sight: Sight, has_touched: bool, unseen_s: float, step: int) -> int:
+def follow_outcome(n: FollowParams, sight: Sight, has_touched: bool, unseen_s: float, step: int) -> int:
     """How the episode stands after decision `step`, counted from 1."""
     if has_touched:
         return HIT_OBSTACLE
@@ -61,7 +61,7 @@ def blind_speed(action: wp.vec4) -> float:
 
 
 @wp.func
-def follow_reward(n: FollowNumbers, sight: Sight, outcome: int, action: wp.vec4, last_action: wp.vec4) -> float:
+def follow_reward(n: FollowParams, sight: Sight, outcome: int, action: wp.vec4, last_action: wp.vec4) -> float:
     """Ours, of one decision."""
     distance = sight.distance_m
     reward = n.distance_reward * bell(distance - n.best_distance_m, n.distance_width_m)
@@ -86,7 +86,7 @@ def follow_reward(n: FollowNumbers, sight: Sight, outcome: int, action: wp.vec4,
 
 
 @wp.func
-def document_reward(n: FollowNumbers, sight: Sight, outcome: int) -> float:
+def document_reward(n: FollowParams, sight: Sight, outcome: int) -> float:
     """The document's, of one decision: its payments at where the decision led, and a collision's fine once."""
     if outcome == HIT_OBSTACLE or outcome == HIT_OTHER:  # noqa: SIM109  (kernels know no tuples)
         return n.document_collision

@@ -10,7 +10,7 @@ import warp as wp
 
 from common.rng import draw_tick
 from policies.tasks.flight.task import worker_count
-from policies.tasks.follow_me.follow_me_params import FollowNumbers
+from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import HFOV_DEG, pack_images
 from sim.advance import RigArrays
 from sim.sensors.fast_camera.fast_camera import QuickCamera
@@ -23,14 +23,14 @@ wp.set_module_options({"enable_backward": False})
 @wp.kernel(enable_backward=False)
 def set_optics(
     rig: RigArrays,
-    numbers: wp.array(dtype=FollowNumbers),
+    params: wp.array(dtype=FollowParams),
     rows: wp.array(dtype=wp.bool),
     optics: wp.array(dtype=Optics),
 ) -> None:
     """Gives the cameras of the chosen rows the noise of their episodes."""
     i = wp.tid()
     if rows[i]:
-        optics[i] = sensor_noise(optics[i], numbers[i].camera_noise, rig.seed[i], draw_tick(rig.tick[i]))
+        optics[i] = sensor_noise(optics[i], params[i].camera_noise, rig.seed[i], draw_tick(rig.tick[i]))
 
 
 class Eyes:
@@ -39,12 +39,12 @@ class Eyes:
     Args:
         buffers: whose images are taken.
         rig: the vehicles.
-        numbers: of the running episodes.
+        params: of the running episodes.
         worlds: what is seen; camera i looks at world i.
         people: the owners; camera i sees person i.
     """
 
-    def __init__(self, buffers: Any, rig: Any, numbers: Any, worlds: WorldBatch, people: Any) -> None:
+    def __init__(self, buffers: Any, rig: Any, params: Any, worlds: WorldBatch, people: Any) -> None:
         count, height, width, _ = buffers.images.shape
         device = worlds.device
         self._camera = QuickCamera(
@@ -61,7 +61,7 @@ class Eyes:
         camera = self._camera
         everyone = wp.full(count, value=True, dtype=wp.bool, device=device)
         self._everyone = everyone
-        set_inputs = [rig, numbers, everyone, camera.optics]
+        set_inputs = [rig, params, everyone, camera.optics]
         self._set_optics = wp.launch(set_optics, count, set_inputs, device=device, record_cmd=True)
         inputs = [camera.rgb, camera.depth_m, everyone, buffers.images]
         self._pack = wp.launch(pack_images, (count, height), inputs, device=device, record_cmd=True)

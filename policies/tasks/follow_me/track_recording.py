@@ -41,9 +41,9 @@ class Recording:
 
     def tracks(self) -> list[Track]:
         """One per environment, in their order; of an episode that still runs, what there is of it."""
-        names: Sequence[str] = self._task.number_table.names
-        numbers = self._task.buffers.numbers.numpy()
-        planned_s = numbers[:, names.index("decision_limit")] * self._task.decision_s
+        names: Sequence[str] = self._task.param_table.names
+        params = self._task.buffers.params.numpy()
+        planned_s = params[:, names.index("decision_limit")] * self._task.decision_s
         whole = np.stack(self._measures)
         time_s = self._task.decision_s * np.arange(1, len(whole) + 1, dtype=np.float64)
         tracks = []

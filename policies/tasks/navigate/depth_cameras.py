@@ -13,7 +13,7 @@ from policies.tasks.episode import StepBuffers
 from policies.tasks.flight.task import worker_count
 from policies.tasks.follow_me.observe import HFOV_DEG, depth_byte
 from policies.tasks.follow_me.owner_visibility import lens_of
-from policies.tasks.navigate.navigate_params import NavigateNumbers
+from policies.tasks.navigate.navigate_params import NavigateParams
 from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.fast_camera.fast_camera import QuickCamera
@@ -28,7 +28,7 @@ DEPTH_CHANNELS = ("nearness",)
 @wp.kernel(enable_backward=False)
 def aim(
     rig: RigArrays,
-    numbers: wp.array(dtype=NavigateNumbers),
+    params: wp.array(dtype=NavigateParams),
     rows: wp.array(dtype=wp.bool),
     lenses: wp.array(dtype=Lens),
     optics: wp.array(dtype=Optics),
@@ -37,7 +37,7 @@ def aim(
     i = wp.tid()
     if rows[i]:
         lenses[i] = lens_of(rig.truth[i], 1.0)
-        optics[i] = sensor_noise(optics[i], numbers[i].range_noise, rig.seed[i], draw_tick(rig.tick[i]))
+        optics[i] = sensor_noise(optics[i], params[i].range_noise, rig.seed[i], draw_tick(rig.tick[i]))
 
 
 @wp.kernel(enable_backward=False)
@@ -56,11 +56,11 @@ class DepthEyes:
     Args:
         buffers: whose images are taken.
         rig: the vehicles.
-        numbers: of the running episodes.
+        params: of the running episodes.
         worlds: what is seen; camera i looks at world i.
     """
 
-    def __init__(self, buffers: Any, rig: Any, numbers: Any, worlds: WorldBatch) -> None:
+    def __init__(self, buffers: Any, rig: Any, params: Any, worlds: WorldBatch) -> None:
         count, height, width, _ = buffers.images.shape
         device = worlds.device
         self._camera = camera = QuickCamera(
@@ -74,7 +74,7 @@ class DepthEyes:
             device=device,
         )
         rows = wp.full(count, value=True, dtype=wp.bool, device=device)
-        aimed = [rig, numbers, rows, camera.lenses, camera.optics]
+        aimed = [rig, params, rows, camera.lenses, camera.optics]
         self._aim = wp.launch(aim, count, aimed, device=device, record_cmd=True)
         packed = [buffers, camera.depth_m, rows]
         self._pack = wp.launch(pack_depths, (count, height), packed, device=device, record_cmd=True)

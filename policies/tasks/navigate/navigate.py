@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from policies.tasks.flight.flight_params import FLIGHT_NUMBERS, FlightNumbers
+from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
 from policies.tasks.flight.hover_bank import HOVER_COUNT
 from policies.tasks.flight.own_state import ACTIONS, OWN_ELEMENTS
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
@@ -28,7 +28,7 @@ from policies.tasks.navigate.navigate_kernels import (
     prepare,
     show,
 )
-from policies.tasks.navigate.navigate_params import IMPROVED, NUMBERS, TREES_PER_HA_MAX, NavigateNumbers
+from policies.tasks.navigate.navigate_params import IMPROVED, PARAMS, TREES_PER_HA_MAX, NavigateParams
 from policies.tasks.navigate.navigate_top_view import draw
 from policies.tasks.navigate.observe import GOAL_ELEMENTS
 from policies.tasks.navigate.scan import RANGE_ELEMENTS, RANGES, scan
@@ -52,7 +52,7 @@ WORLD = WorldConfig(
 class Navigate(FlightTask):
     """The task. Layout version 1."""
 
-    numbers: ClassVar = NUMBERS
+    params: ClassVar = PARAMS
 
     def __init__(self, settings: NavigateSettings, env_count: int, device: str = "cpu") -> None:
         super().__init__(
@@ -69,7 +69,7 @@ class Navigate(FlightTask):
         self.measures = self.navigation.measures
         self._eyes: DepthEyes | None = None
         if self.layout.image is not None:
-            self._eyes = DepthEyes(self.buffers, self.rig.arrays, self.navigation.numbers, self.worlds)
+            self._eyes = DepthEyes(self.buffers, self.rig.arrays, self.navigation.params, self.worlds)
         self._record_all()
 
     def step(self) -> None:
@@ -122,8 +122,8 @@ class Navigate(FlightTask):
     def _state(self) -> Any:
         n = self.env_count
         state = NavigateState()
-        state.flight = typed_rows(self.buffers.numbers, FlightNumbers)
-        state.numbers = typed_rows(self.buffers.numbers, NavigateNumbers, first=len(FLIGHT_NUMBERS))
+        state.flight = typed_rows(self.buffers.params, FlightParams)
+        state.params = typed_rows(self.buffers.params, NavigateParams, first=len(FLIGHT_PARAMS))
         state.actions = self._zeros("last_actions", n, wp.vec4)
         state.goals_ned = self._zeros("goals_ned", n, wp.vec3)
         state.pos_ned = self._zeros("last_pos_ned", n, wp.vec3)
@@ -148,14 +148,14 @@ class Navigate(FlightTask):
         start.noise_seeds = self.noise_seeds
         start.hovers = self.hovers
         start.hover_count = HOVER_COUNT
-        start.world_numbers = self.worlds.numbers
+        start.world_params = self.worlds.params
         start.makes = self.makes
 
         def record(kernel: Any, *inputs: Any) -> Any:
             return wp.launch(kernel, self.env_count, list(inputs), device=self.device, record_cmd=True)
 
         self._act = record(act, buffers, rules, rig)
-        self._scan = record(scan, rig, state.numbers, state.is_all, state.ranges_m)
+        self._scan = record(scan, rig, state.params, state.is_all, state.ranges_m)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, rules, state, start)
         self._place = record(place, buffers, rig, state, start)

@@ -18,7 +18,7 @@ from policies.tasks.flight.episode_draws import (
     draw_index,
     draw_seed,
 )
-from policies.tasks.flight.flight_params import FlightNumbers
+from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.flown_vehicle import (
     Makes,
     own_state,
@@ -27,13 +27,13 @@ from policies.tasks.flight.flown_vehicle import (
     velocity_setpoint,
 )
 from policies.tasks.flight.own_state import OWN_SIZE, action_command, write_own
-from policies.tasks.navigate.navigate_params import NavigateNumbers
+from policies.tasks.navigate.navigate_params import NavigateParams
 from policies.tasks.navigate.observe import GOAL_SIZE, write_goal
 from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
 from policies.tasks.navigate.scan import write_ranges
 from sim.advance import RigArrays
 from sim.truth import Truth, has_touched
-from sim.world.growing import WorldNumbers
+from sim.world.growing import WorldParams
 from sim.world.world import World, ground_height, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
@@ -61,8 +61,8 @@ class Rules:
 class NavigateState:
     """All that an episode has beside the rig and its world."""
 
-    flight: wp.array(dtype=FlightNumbers)
-    numbers: wp.array(dtype=NavigateNumbers)
+    flight: wp.array(dtype=FlightParams)
+    params: wp.array(dtype=NavigateParams)
     actions: wp.array(dtype=wp.vec4)  # the last
     goals_ned: wp.array(dtype=wp.vec3)
     pos_ned: wp.array(dtype=wp.vec3)  # where the vehicle was at the last decision
@@ -83,7 +83,7 @@ class Start:
     noise_seeds: wp.array(dtype=int)
     hovers: wp.array(dtype=int)
     hover_count: int
-    world_numbers: wp.array(dtype=WorldNumbers)
+    world_params: wp.array(dtype=WorldParams)
     makes: Makes
 
 
@@ -123,7 +123,7 @@ def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: Navig
 @wp.kernel(enable_backward=False)
 def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
     i = wp.tid()
-    numbers = state.numbers[i]
+    params = state.params[i]
     truth = rig.truth[i]
     last_pos_ned = state.pos_ned[i]
     last_action = state.actions[i]
@@ -137,9 +137,9 @@ def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateSta
     time_s = float(buffers.steps[i] + 1) * rules.decision_s
     room_m = room_beside(rig.worlds[rig.i_world[i]], truth)
     outcome = navigate_outcome(
-        numbers, distance_m, has_touched(truth), truth.height_agl_m, time_s, state.start_distance_m[i]
+        params, distance_m, has_touched(truth), truth.height_agl_m, time_s, state.start_distance_m[i]
     )
-    reward = navigate_reward(numbers, truth, progress_m, rules.decision_s, room_m, outcome, action, last_action)
+    reward = navigate_reward(params, truth, progress_m, rules.decision_s, room_m, outcome, action, last_action)
     state.measures[i, 0] = distance_m
     state.measures[i, 1] = wp.length(truth.vel_ned)
     state.measures[i, 2] = room_m
@@ -158,17 +158,17 @@ def prepare(buffers: StepBuffers, rules: Rules, state: NavigateState, start: Sta
         return
     seed = buffers.seed[0]
     episode = begin_episode(buffers, i)
-    numbers = state.numbers[i]
+    params = state.params[i]
     state.actions[i] = wp.vec4()
     start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, rules.is_test)
     start.hovers[i] = draw_index(seed, i, episode, HOVER_STREAM, start.hover_count)
-    if episode % wp.max(int(numbers.episodes_per_world), 1) == 0:
+    if episode % wp.max(int(params.episodes_per_world), 1) == 0:
         start.is_growing[i] = True
         start.world_seeds[i] = draw_seed(seed, i, episode, WORLD_STREAM, rules.is_test)
-        world = start.world_numbers[i]
-        world.hill_height_m = numbers.hill_height_m
-        world.trees_per_ha = numbers.trees_per_ha
-        start.world_numbers[i] = world
+        world = start.world_params[i]
+        world.hill_height_m = params.hill_height_m
+        world.trees_per_ha = params.trees_per_ha
+        start.world_params[i] = world
 
 
 @wp.kernel(enable_backward=False)
@@ -178,15 +178,15 @@ def place(buffers: StepBuffers, rig: RigArrays, state: NavigateState, start: Sta
         return
     seed = buffers.seed[0]
     episode = buffers.episodes[i] - 1
-    numbers = state.numbers[i]
+    params = state.params[i]
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
     pos_ned = rig.truth[i].pos_ned
     bearing = draw_angle(seed, i, episode, _BEARING_STREAM)
     share = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
-    away_m = numbers.goal_min_m + share * wp.max(numbers.goal_max_m - numbers.goal_min_m, 0.0)
+    away_m = params.goal_min_m + share * wp.max(params.goal_max_m - params.goal_min_m, 0.0)
     north = away_m * wp.cos(bearing)
     east = away_m * wp.sin(bearing)
-    up = ground_height(rig.worlds[rig.i_world[i]], north, east) + numbers.goal_height_m
+    up = ground_height(rig.worlds[rig.i_world[i]], north, east) + params.goal_height_m
     goal_ned = wp.vec3(north, east, -up)
     state.goals_ned[i] = goal_ned
     state.pos_ned[i] = pos_ned

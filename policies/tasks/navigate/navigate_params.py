@@ -1,12 +1,12 @@
 """Navigate's numbers: the forest, the way to the goal, the rangefinder, and what the reward weighs.
 
-The numbers of the air and the vehicle come first (`FLIGHT_NUMBERS`); all can be set or randomised by name.
+The numbers of the air and the vehicle come first (`FLIGHT_PARAMS`); all can be set or randomised by name.
 """
 
 import warp as wp
 
-from policies.tasks.flight.flight_params import FLIGHT_NUMBERS
-from policies.tasks.task_params import Number, Sampler
+from policies.tasks.flight.flight_params import FLIGHT_PARAMS
+from policies.tasks.task_params import Sampler, TaskParam
 
 TREES_PER_HA_MAX = 600.0
 GOAL_MAX_M = 85.0  # trees stand up to 91 m from home
@@ -14,8 +14,8 @@ _WANTED = "the requirement: 600 trees/ha at 5 m/s"
 
 
 @wp.struct
-class NavigateNumbers:
-    """One row per environment; declared in `NAVIGATE_NUMBERS`, in the same order."""
+class NavigateParams:
+    """One row per environment; declared in `NAVIGATE_PARAMS`, in the same order."""
 
     hill_height_m: float
     trees_per_ha: float
@@ -41,33 +41,33 @@ class NavigateNumbers:
     turn_cost: float
 
 
-NAVIGATE_NUMBERS = (
-    Number("hill_height_m", 4.0, 0.0, 30.0, "m", "bound of the hills above and valleys below the start", "guess"),
-    Number("trees_per_ha", 600.0, 0.0, TREES_PER_HA_MAX, "1/ha", "trees per hectare", _WANTED),
-    Number(
+NAVIGATE_PARAMS = (
+    TaskParam("hill_height_m", 4.0, 0.0, 30.0, "m", "bound of the hills above and valleys below the start", "guess"),
+    TaskParam("trees_per_ha", 600.0, 0.0, TREES_PER_HA_MAX, "1/ha", "trees per hectare", _WANTED),
+    TaskParam(
         "episodes_per_world", 1.0, 1.0, 1000.0, "1", "episodes flown in a forest, each to a goal of its own", "tuned"
     ),
-    Number("goal_min_m", 60.0, 10.0, GOAL_MAX_M, "m", "the goal is at least this far away", "guess"),
-    Number("goal_max_m", 85.0, 10.0, GOAL_MAX_M, "m", "and at most this far", "guess"),
-    Number("goal_height_m", 2.0, 1.0, 10.0, "m", "of the goal above the ground, and the height to fly at", "guess"),
-    Number("goal_radius_m", 3.0, 0.5, 20.0, "m", "nearer is arrived", "guess: twice what GNSS is off"),
-    Number("slowest_m_s", 3.0, 0.5, 20.0, "m/s", "time is up for who is slower, in a straight line", "guess"),
-    Number("ceiling_m", 4.0, 2.0, 100.0, "m", "higher above the ground counts as over the forest", "guess"),
-    Number("range_noise", 1.0, 0.0, 4.0, "1", "factor on the errors of ranges and depths", "guess"),
-    Number("speed_m_s", 6.0, 0.5, 7.0, "m/s", "faster progress is not paid more; the mean is to be 5", _WANTED),
-    Number("progress_reward", 0.2, 0.0, 10.0, "1", "per metre towards the goal", "tuned"),
-    Number("goal_reward", 5.0, 0.0, 1000.0, "1", "of arriving, which ends the episode", "tuned"),
-    Number("time_cost", 0.05, 0.0, 10.0, "1", "per decision: careful is not to be slow", "tuned"),
-    Number("collision_cost", 8.0, 0.0, 1000.0, "1", "of touching anything, which ends the episode", "tuned"),
-    Number("ceiling_cost", 8.0, 0.0, 1000.0, "1", "of leaving the forest upwards, which ends the episode", "tuned"),
-    Number("clearance_m", 1.2, 0.0, 2.0, "m", "room to obstacles below which there is a cost", "tuned"),
-    Number("clearance_cost", 0.1, 0.0, 10.0, "1", "per decision for no room at all, growing as the square", "tuned"),
-    Number("height_cost", 0.01, 0.0, 10.0, "1", "per decision and squared metre off the goal's height", "tuned"),
-    Number("heading_cost", 0.03, 0.0, 10.0, "1", "per decision of flying backwards; half of it sideways", "tuned"),
-    Number("jerk_cost", 0.005, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),
-    Number("turn_cost", 0.001, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
+    TaskParam("goal_min_m", 60.0, 10.0, GOAL_MAX_M, "m", "the goal is at least this far away", "guess"),
+    TaskParam("goal_max_m", 85.0, 10.0, GOAL_MAX_M, "m", "and at most this far", "guess"),
+    TaskParam("goal_height_m", 2.0, 1.0, 10.0, "m", "of the goal above the ground, and the height to fly at", "guess"),
+    TaskParam("goal_radius_m", 3.0, 0.5, 20.0, "m", "nearer is arrived", "guess: twice what GNSS is off"),
+    TaskParam("slowest_m_s", 3.0, 0.5, 20.0, "m/s", "time is up for who is slower, in a straight line", "guess"),
+    TaskParam("ceiling_m", 4.0, 2.0, 100.0, "m", "higher above the ground counts as over the forest", "guess"),
+    TaskParam("range_noise", 1.0, 0.0, 4.0, "1", "factor on the errors of ranges and depths", "guess"),
+    TaskParam("speed_m_s", 6.0, 0.5, 7.0, "m/s", "faster progress is not paid more; the mean is to be 5", _WANTED),
+    TaskParam("progress_reward", 0.2, 0.0, 10.0, "1", "per metre towards the goal", "tuned"),
+    TaskParam("goal_reward", 5.0, 0.0, 1000.0, "1", "of arriving, which ends the episode", "tuned"),
+    TaskParam("time_cost", 0.05, 0.0, 10.0, "1", "per decision: careful is not to be slow", "tuned"),
+    TaskParam("collision_cost", 8.0, 0.0, 1000.0, "1", "of touching anything, which ends the episode", "tuned"),
+    TaskParam("ceiling_cost", 8.0, 0.0, 1000.0, "1", "of leaving the forest upwards, which ends the episode", "tuned"),
+    TaskParam("clearance_m", 1.2, 0.0, 2.0, "m", "room to obstacles below which there is a cost", "tuned"),
+    TaskParam("clearance_cost", 0.1, 0.0, 10.0, "1", "per decision for no room at all, growing as the square", "tuned"),
+    TaskParam("height_cost", 0.01, 0.0, 10.0, "1", "per decision and squared metre off the goal's height", "tuned"),
+    TaskParam("heading_cost", 0.03, 0.0, 10.0, "1", "per decision of flying backwards; half of it sideways", "tuned"),
+    TaskParam("jerk_cost", 0.005, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),
+    TaskParam("turn_cost", 0.001, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
 )
-NUMBERS = (*FLIGHT_NUMBERS, *NAVIGATE_NUMBERS)
+PARAMS = (*FLIGHT_PARAMS, *NAVIGATE_PARAMS)
 
 # What a day outside may bring.
 IMPROVED: dict[str, float | Sampler] = {

@@ -9,7 +9,7 @@ import warp as wp
 from common.rotation import yaw_from_quat
 from policies.tasks.episode import HIT_OBSTACLE, LOST, RUNNING, SUCCESS, TIMEOUT
 from policies.tasks.flight.own_state import level_from_ned
-from policies.tasks.navigate.navigate_params import NavigateNumbers
+from policies.tasks.navigate.navigate_params import NavigateParams
 from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
@@ -19,7 +19,7 @@ _MOVING_M_S = wp.constant(1.0)  # below it there is no course to look along
 
 @wp.func
 def navigate_outcome(
-    n: NavigateNumbers, distance_m: float, has_touched: bool, height_m: float, time_s: float, start_distance_m: float
+    n: NavigateParams, distance_m: float, has_touched: bool, height_m: float, time_s: float, start_distance_m: float
 ) -> int:
     """How the episode stands, `time_s` after its start."""
     if has_touched:
@@ -35,7 +35,7 @@ def navigate_outcome(
 
 @wp.func
 def navigate_reward(
-    n: NavigateNumbers,
+    n: NavigateParams,
     truth: Truth,
     progress_m: float,
     step_s: float,

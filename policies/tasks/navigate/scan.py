@@ -13,7 +13,7 @@ import warp as wp
 from common.rng import draw_key, draw_tick
 from common.rotation import yaw_from_quat
 from policies.tasks.layout import Element
-from policies.tasks.navigate.navigate_params import NavigateNumbers
+from policies.tasks.navigate.navigate_params import NavigateParams
 from sim.advance import RigArrays
 from sim.world.growing import bucket_of
 from sim.world.trees import Forest, Tree
@@ -102,7 +102,7 @@ def add_forest(forest: Forest, pos_ned: wp.vec3, heading: float, ranges_m: wp.ar
 @wp.kernel(enable_backward=False)
 def scan(
     rig: RigArrays,
-    numbers: wp.array(dtype=NavigateNumbers),
+    params: wp.array(dtype=NavigateParams),
     rows: wp.array(dtype=wp.bool),
     ranges_m: wp.array2d(dtype=float),
 ) -> None:
@@ -120,7 +120,7 @@ def scan(
         up = _ELEVATIONS[k - _SECTORS]
         dir_ned = wp.vec3(wp.cos(up) * wp.cos(heading), wp.cos(up) * wp.sin(heading), -wp.sin(up))
         ranges_m[i, k] = ray_hit(world, truth.pos_ned, dir_ned, RANGE_M)
-    noise = numbers[i].range_noise
+    noise = params[i].range_noise
     state = draw_key(rig.seed[i], 0, draw_tick(rig.tick[i]), _STREAM)
     for k in range(_RANGES):
         error = _UNIFORM_HALF * (2.0 * wp.randf(state) - 1.0)

@@ -18,7 +18,7 @@ from policies.tasks.parking.arena import (
 )
 from policies.tasks.parking.car import box_distance
 from policies.tasks.parking.observe_documents import gap_to
-from policies.tasks.parking.parking_params import CarNumbers
+from policies.tasks.parking.parking_params import CarParams
 from policies.tasks.parking.rewards import approach_rows, near_row
 from policies.tasks.parking.scene import MAX_OBSTACLES, Scene
 from policies.tasks.parking.settings import AS_CODED, Rules
@@ -31,11 +31,11 @@ _WALL_HEIGHT = wp.constant(WALL_HEIGHT)
 
 
 @wp.func
-def wall_rows(car: wp.vec4, numbers: CarNumbers, is_coded: bool) -> float:
+def wall_rows(car: wp.vec4, params: CarParams, is_coded: bool) -> float:
     """Row 8 of the storey's four walls: to their surfaces, or as coded to their centres."""
     centre = storey_centre(storey_of(car[0]))
-    near = numbers.wall_near_m
-    pay = numbers.wall_reward
+    near = params.wall_near_m
+    pay = params.wall_reward
     x = car[0] - centre[0]
     z = car[1] - centre[1]
     if is_coded:
@@ -51,7 +51,7 @@ def wall_rows(car: wp.vec4, numbers: CarNumbers, is_coded: bool) -> float:
 
 
 @wp.func
-def obstacle_rows(car: wp.vec4, scene: Scene, height_m: float, numbers: CarNumbers, is_coded: bool) -> float:
+def obstacle_rows(car: wp.vec4, scene: Scene, height_m: float, params: CarParams, is_coded: bool) -> float:
     """Row 9 of the storey's obstacles: to their surfaces, or as coded to their centres, which lie at a height."""
     reward = float(0.0)
     for k in range(MAX_OBSTACLES):
@@ -60,7 +60,7 @@ def obstacle_rows(car: wp.vec4, scene: Scene, height_m: float, numbers: CarNumbe
             distance = box_distance(obstacle, scene.obstacle_half, place_of(car)) - scene.obstacle_radius
             if is_coded:
                 distance = wp.length(gap_to(car, obstacle[0], height_m, obstacle[1]))
-            reward += near_row(distance, numbers.obstacle_near_m, numbers.obstacle_reward)
+            reward += near_row(distance, params.obstacle_near_m, params.obstacle_reward)
     return reward
 
 
@@ -73,13 +73,13 @@ def table_reward(
     goal_height_m: float,
     obstacle_height_m: float,
     rules: Rules,
-    numbers: CarNumbers,
+    params: CarParams,
 ) -> float:
     """Rows 4 to 9. The distance to the goal is straight, also where it is on the other storey."""
     is_coded = rules.reward == _AS_CODED
     distance = wp.length(gap_to(car, scene.goal[0], goal_height_m, scene.goal[1]))
-    rows = approach_rows(distance, cars.best_m[i], cars.last_m[i], numbers, is_coded)
+    rows = approach_rows(distance, cars.best_m[i], cars.last_m[i], params, is_coded)
     cars.best_m[i] = rows.best_m
     cars.last_m[i] = rows.last_m
-    near_obstacles = obstacle_rows(car, scene, obstacle_height_m, numbers, is_coded)
-    return rows.reward + wall_rows(car, numbers, is_coded) + near_obstacles
+    near_obstacles = obstacle_rows(car, scene, obstacle_height_m, params, is_coded)
+    return rows.reward + wall_rows(car, params, is_coded) + near_obstacles

@@ -6,7 +6,7 @@ from policies.tasks.episode import StepBuffers
 from policies.tasks.layout import Branch
 from policies.tasks.parking.arena import pose_at
 from policies.tasks.parking.car import DT, damped_push
-from policies.tasks.parking.parking_params import CarNumbers
+from policies.tasks.parking.parking_params import CarParams
 from policies.tasks.parking.settings import PUSH_OR_TURN, STEER, STEER_AND_SHIFT, Rules
 
 wp.set_module_options({"enable_backward": False})
@@ -62,17 +62,17 @@ def command_of(buffers: StepBuffers, i: int, rules: Rules) -> Command:
 
 
 @wp.func
-def moved(motion: Motion, command: Command, is_applied: bool, numbers: CarNumbers) -> Motion:
+def moved(motion: Motion, command: Command, is_applied: bool, params: CarParams) -> Motion:
     """The car one tick later: turned at once, pushed along its new nose, damped, moved."""
     out = motion
     push = command.always
     if is_applied:
         push = command.push
         if command.turn != 0.0:
-            out.yaw = wrapped(motion.yaw + command.turn * wp.radians(numbers.turn_deg))
+            out.yaw = wrapped(motion.yaw + command.turn * wp.radians(params.turn_deg))
             out.pose = pose_at(motion.pos, out.yaw)
     nose = wp.vec2(out.pose[2], out.pose[3])
-    out.vel = damped_push(motion.vel, nose * (push * numbers.push_n / numbers.mass_kg), numbers.drag_per_s)
+    out.vel = damped_push(motion.vel, nose * (push * params.push_n / params.mass_kg), params.drag_per_s)
     out.pos = motion.pos + out.vel * DT
     out.pose = wp.vec4(out.pos[0], out.pos[1], out.pose[2], out.pose[3])
     return out

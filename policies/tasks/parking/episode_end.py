@@ -6,7 +6,7 @@ from policies.tasks.episode import HIT_OBSTACLE, HIT_WALL, RUNNING, SUCCESS, TIM
 from policies.tasks.parking.arena import forward_of, place_of, right_of
 from policies.tasks.parking.car import box_of_car
 from policies.tasks.parking.drive import Motion
-from policies.tasks.parking.parking_params import CarNumbers
+from policies.tasks.parking.parking_params import CarParams
 from policies.tasks.parking.rewards import shaping, way_to_go
 from policies.tasks.parking.scene import OBSTACLE, PAD, WALL
 from policies.tasks.parking.settings import Rules
@@ -22,60 +22,60 @@ def heading_error(car: wp.vec4, goal: wp.vec4) -> float:
 
 
 @wp.func
-def is_in_pose(motion: Motion, goal: wp.vec4, numbers: CarNumbers) -> bool:
+def is_in_pose(motion: Motion, goal: wp.vec4, params: CarParams) -> bool:
     """Whether the car's box is at the pad's centre, aligned and slow."""
-    gap = place_of(box_of_car(motion.pose, numbers.box_ahead_m)) - place_of(goal)
+    gap = place_of(box_of_car(motion.pose, params.box_ahead_m)) - place_of(goal)
     return (
-        wp.length(gap) < numbers.reach_m
-        and wp.length(motion.vel) < numbers.stop_m_s
-        and wp.abs(heading_error(motion.pose, goal)) < wp.radians(numbers.align_deg)
+        wp.length(gap) < params.reach_m
+        and wp.length(motion.vel) < params.stop_m_s
+        and wp.abs(heading_error(motion.pose, goal)) < wp.radians(params.align_deg)
     )
 
 
 @wp.func
-def outcome_of(contact: int, motion: Motion, goal: wp.vec4, rules: Rules, numbers: CarNumbers) -> int:
+def outcome_of(contact: int, motion: Motion, goal: wp.vec4, rules: Rules, params: CarParams) -> int:
     """How the episode ends with this contact, or RUNNING."""
     if contact == WALL:
         return HIT_WALL
     if contact == OBSTACLE:
         return HIT_OBSTACLE
-    if contact == PAD and (not rules.needs_pose or is_in_pose(motion, goal, numbers)):
+    if contact == PAD and (not rules.needs_pose or is_in_pose(motion, goal, params)):
         return SUCCESS
     return RUNNING
 
 
 @wp.func
-def end_reward(outcome: int, numbers: CarNumbers) -> float:
+def end_reward(outcome: int, params: CarParams) -> float:
     """Rows 1, 2 and 3."""
     return wp.where(
         outcome == SUCCESS,
-        numbers.park_reward,
+        params.park_reward,
         wp.where(
             outcome == HIT_WALL,
-            numbers.wall_hit_reward,
-            wp.where(outcome == HIT_OBSTACLE, numbers.obstacle_hit_reward, 0.0),
+            params.wall_hit_reward,
+            wp.where(outcome == HIT_OBSTACLE, params.obstacle_hit_reward, 0.0),
         ),
     )
 
 
 @wp.func
-def capped(outcome: int, steps: int, numbers: CarNumbers) -> int:
+def capped(outcome: int, steps: int, params: CarParams) -> int:
     """The outcome, or TIMEOUT where the step limit is reached."""
-    if outcome == RUNNING and numbers.step_limit > 0.0 and float(steps + 1) >= numbers.step_limit:
+    if outcome == RUNNING and params.step_limit > 0.0 and float(steps + 1) >= params.step_limit:
         return TIMEOUT
     return outcome
 
 
 @wp.func
-def way_of(pose: wp.vec4, goal: wp.vec4, distance_m: float, rules: Rules, numbers: CarNumbers) -> float:
+def way_of(pose: wp.vec4, goal: wp.vec4, distance_m: float, rules: Rules, params: CarParams) -> float:
     """What is left of a route of this length, turning included [m]."""
     if rules.needs_pose:
-        return way_to_go(distance_m, heading_error(pose, goal), True, numbers)
+        return way_to_go(distance_m, heading_error(pose, goal), True, params)
     return distance_m
 
 
 @wp.func
-def progress_reward(way_before_m: float, way_after_m: float, outcome: int, numbers: CarNumbers) -> float:
+def progress_reward(way_before_m: float, way_after_m: float, outcome: int, params: CarParams) -> float:
     """Shaping and the cost of time."""
     is_terminal = outcome != RUNNING and outcome != TIMEOUT
-    return shaping(way_before_m, way_after_m, is_terminal, numbers) + numbers.time_reward
+    return shaping(way_before_m, way_after_m, is_terminal, params) + params.time_reward

@@ -30,10 +30,10 @@ from policies.tasks.parking.episode_end import capped, end_reward, outcome_of, p
 from policies.tasks.parking.observe_documents import gap_to
 from policies.tasks.parking.observe_level1 import BLOCK_COUNT, frame_of, observe
 from policies.tasks.parking.parking_params import (
-    CAR_NUMBERS,
-    LEVEL1_NUMBERS,
-    CarNumbers,
-    Level1Numbers,
+    CAR_PARAMS,
+    LEVEL1_PARAMS,
+    CarParams,
+    Level1Params,
     reward_defaults,
 )
 from policies.tasks.parking.scene import Scene, contact_of, half_of_pad
@@ -90,7 +90,7 @@ PRESETS = {
         rays=-1,
     ),
 }
-_PRESET_NUMBERS: dict[str, dict[str, float | Sampler]] = {
+_PRESET_PARAMS: dict[str, dict[str, float | Sampler]] = {
     "as-documented": {"push_n": 400.0},
     "as-coded": {},
     "improved": {"goal_yaw_deg": Sampler(intervals=((-180.0, 180.0),)), "step_limit": 1000.0},
@@ -102,7 +102,7 @@ class Blocks:
     """The blocks; one row per environment."""
 
     poses: wp.array2d(dtype=wp.vec4)
-    numbers: wp.array(dtype=Level1Numbers)
+    params: wp.array(dtype=Level1Params)
 
 
 @wp.struct
@@ -120,23 +120,23 @@ class Level1Places:
 @wp.func
 def scene_of(cars: CarState, blocks: Blocks, i: int) -> Scene:
     """The arena."""
-    numbers = blocks.numbers[i]
+    params = blocks.params[i]
     scene = Scene()
     for k in range(BLOCK_COUNT):
         scene.obstacles[k] = blocks.poses[i, k]
     scene.obstacle_count = BLOCK_COUNT
-    scene.obstacle_half = wp.vec2(0.5 * numbers.block_width_m, 0.5 * numbers.block_length_m)
+    scene.obstacle_half = wp.vec2(0.5 * params.block_width_m, 0.5 * params.block_length_m)
     scene.goal = cars.goal[i]
-    scene.goal_half = half_of_pad(cars.numbers[i])
+    scene.goal_half = half_of_pad(cars.params[i])
     scene.has_goal = True
     return scene
 
 
 @wp.func
-def way_left(motion: Motion, scene: Scene, rules: Rules, numbers: CarNumbers) -> float:
+def way_left(motion: Motion, scene: Scene, rules: Rules, params: CarParams) -> float:
     """From the car's box to the pad [m]."""
-    box = box_of_car(motion.pose, numbers.box_ahead_m)
-    return way_of(box, scene.goal, wp.length(place_of(scene.goal) - place_of(box)), rules, numbers)
+    box = box_of_car(motion.pose, params.box_ahead_m)
+    return way_of(box, scene.goal, wp.length(place_of(scene.goal) - place_of(box)), rules, params)
 
 
 @wp.func
@@ -181,7 +181,7 @@ def place_goal(
     else:
         rng = draw_key(buffers.seed[0], i, episode, _GOAL_STREAM)
         place = places.spots[wp.randi(rng, 0, _SPOT_COUNT)]
-    cars.goal[i] = pose_at(place, wp.radians(cars.numbers[i].goal_yaw_deg))
+    cars.goal[i] = pose_at(place, wp.radians(cars.params[i].goal_yaw_deg))
 
 
 @wp.func
@@ -196,7 +196,7 @@ def place_car(
 ) -> None:
     """The start pose; the velocity is not touched."""
     if rules.are_starts_anywhere:
-        range_m = cars.numbers[i].start_range_m
+        range_m = cars.params[i].start_range_m
         cars.pos[i] = draw_start(scene_of(cars, blocks, i), 0, range_m, buffers.seed[0], i, episode, _START_STREAM)
         rng = draw_key(buffers.seed[0], i, episode, _YAW_STREAM)
         cars.yaw[i] = wp.pi * (2.0 * wp.randf(rng) - 1.0)
@@ -224,14 +224,14 @@ def begin_row(
         cars.vel[i] = wp.vec2(0.0, 0.0)
         cars.last_m[i] = 0.0  # a field of a new car
     place_car(buffers, rules, places, cars, blocks, i, episode)
-    numbers = cars.numbers[i]
+    params = cars.params[i]
     motion = motion_of(cars, i)
     scene = scene_of(cars, blocks, i)
-    cars.best_m[i] = numbers.best_start_m
+    cars.best_m[i] = params.best_start_m
     if rules.reward == _AS_DOCUMENTED:
         cars.last_m[i] = wp.length(gap_to(motion.pose, scene.goal[0], _SPOT_HEIGHT, scene.goal[1]))
-    cars.way_m[i] = way_left(motion, scene, rules, numbers)
-    observe(buffers, i, motion, scene, rules, numbers)
+    cars.way_m[i] = way_left(motion, scene, rules, params)
+    observe(buffers, i, motion, scene, rules, params)
 
 
 @wp.kernel(enable_backward=False)
@@ -253,7 +253,7 @@ def begin(
 def step(buffers: StepBuffers, rules: Rules, places: Level1Places, cars: CarState, blocks: Blocks) -> None:
     """One decision of every row."""
     i = wp.tid()
-    numbers = cars.numbers[i]
+    params = cars.params[i]
     scene = scene_of(cars, blocks, i)
     motion = motion_of(cars, i)
     command = command_of(buffers, i, rules)
@@ -263,17 +263,17 @@ def step(buffers: StepBuffers, rules: Rules, places: Level1Places, cars: CarStat
         if outcome == RUNNING:
             is_applied = rules.is_held or tick == 0
             if is_applied and rules.reward != _PROGRESS:
-                reward += table_reward(cars, i, motion.pose, scene, _SPOT_HEIGHT, _BLOCK_HEIGHT, rules, numbers)
-            motion = moved(motion, command, is_applied, numbers)
-            outcome = outcome_of(contact_of(motion.pose, scene, numbers), motion, scene.goal, rules, numbers)
-    outcome = capped(outcome, buffers.steps[i], numbers)
-    reward += end_reward(outcome, numbers)
+                reward += table_reward(cars, i, motion.pose, scene, _SPOT_HEIGHT, _BLOCK_HEIGHT, rules, params)
+            motion = moved(motion, command, is_applied, params)
+            outcome = outcome_of(contact_of(motion.pose, scene, params), motion, scene.goal, rules, params)
+    outcome = capped(outcome, buffers.steps[i], params)
+    reward += end_reward(outcome, params)
     if rules.reward == _PROGRESS:
-        way_m = way_left(motion, scene, rules, numbers)
-        reward += progress_reward(cars.way_m[i], way_m, outcome, numbers)
+        way_m = way_left(motion, scene, rules, params)
+        reward += progress_reward(cars.way_m[i], way_m, outcome, params)
         cars.way_m[i] = way_m
     keep_motion(cars, i, motion)
-    observe(buffers, i, motion, scene, rules, numbers)
+    observe(buffers, i, motion, scene, rules, params)
     if close_step(buffers, i, reward, outcome):
         begin_row(buffers, rules, places, cars, blocks, i, outcome)
 
@@ -281,7 +281,7 @@ def step(buffers: StepBuffers, rules: Rules, places: Level1Places, cars: CarStat
 class Parking1(ParkingTask):
     """The task. Layout version 1."""
 
-    numbers: ClassVar = (*CAR_NUMBERS, *LEVEL1_NUMBERS)
+    params: ClassVar = (*CAR_PARAMS, *LEVEL1_PARAMS)
 
     def __init__(self, settings: ParkingSettings, env_count: int, device: str = "cpu") -> None:
         choices = chosen(settings, PRESETS[settings.preset])
@@ -291,14 +291,14 @@ class Parking1(ParkingTask):
         layout = Layout(
             "Parking1", 1, frame_of(choices, rules, tags), branches=BRANCHES[choices.actions], stack=settings.stack or 1
         )
-        defaults = {**reward_defaults(choices, 1), **_PRESET_NUMBERS[settings.preset]}
+        defaults = {**reward_defaults(choices, 1), **_PRESET_PARAMS[settings.preset]}
         super().__init__(layout, env_count, number_defaults=defaults, device=device)
         self.rules = rules
         self.world = self._car_state()
         self.blocks = self._zeros("blocks", (env_count, len(BLOCK_PLACES)), wp.vec4)
         blocks = Blocks()
         blocks.poses = self.blocks
-        blocks.numbers = typed_rows(self.buffers.numbers, Level1Numbers, first=len(CAR_NUMBERS))
+        blocks.params = typed_rows(self.buffers.params, Level1Params, first=len(CAR_PARAMS))
         self._record(begin, step, [rules, self._places(settings.split), self.world, blocks])
 
     def _places(self, split: str) -> Any:

@@ -34,10 +34,10 @@ from policies.tasks.parking.movers import PER_STOREY, draw_mover, half_line, run
 from policies.tasks.parking.observe_documents import gap_to
 from policies.tasks.parking.observe_level2 import GOAL_HEIGHT, STACKS, frame_of, observe
 from policies.tasks.parking.parking_params import (
-    CAR_NUMBERS,
-    LEVEL2_NUMBERS,
-    CarNumbers,
-    Level2Numbers,
+    CAR_PARAMS,
+    LEVEL2_PARAMS,
+    CarParams,
+    Level2Params,
     reward_defaults,
 )
 from policies.tasks.parking.scene import PORTAL, Scene, contact_of, half_of_pad
@@ -95,7 +95,7 @@ PRESETS = {
         rays=-1,
     ),
 }
-_PRESET_NUMBERS: dict[str, dict[str, float | Sampler]] = {
+_PRESET_PARAMS: dict[str, dict[str, float | Sampler]] = {
     "as-documented": {"goal_yaw_deg": 6.1},
     "as-coded": {"goal_yaw_deg": 6.1, "step_limit": 50000.0},
     "improved": {"goal_yaw_deg": Sampler(intervals=((-180.0, 180.0),)), "step_limit": 2000.0},
@@ -109,7 +109,7 @@ class Movers:
 
     poses: wp.array2d(dtype=wp.vec4)  # first storey 1's, then storey 2's
     touching: wp.array2d(dtype=int)  # whether a storey's two touch
-    numbers: wp.array(dtype=Level2Numbers)
+    params: wp.array(dtype=Level2Params)
 
 
 @wp.struct
@@ -130,15 +130,15 @@ class Level2Places:
 @wp.func
 def scene_of(cars: CarState, movers: Movers, places: Level2Places, i: int, storey: int) -> Scene:
     """What is on a storey."""
-    numbers = movers.numbers[i]
+    params = movers.params[i]
     scene = Scene()
     for k in range(PER_STOREY):
         scene.obstacles[k] = movers.poses[i, PER_STOREY * storey + k]
     scene.obstacle_count = PER_STOREY
-    scene.obstacle_half = wp.vec2(0.0, half_line(numbers))
-    scene.obstacle_radius = numbers.mover_radius_m
+    scene.obstacle_half = wp.vec2(0.0, half_line(params))
+    scene.obstacle_radius = params.mover_radius_m
     scene.goal = cars.goal[i]
-    scene.goal_half = half_of_pad(cars.numbers[i])
+    scene.goal_half = half_of_pad(cars.params[i])
     scene.has_goal = storey_of(scene.goal[0]) == storey
     scene.portal = places.portals[storey]
     scene.has_portal = True
@@ -146,12 +146,12 @@ def scene_of(cars: CarState, movers: Movers, places: Level2Places, i: int, store
 
 
 @wp.func
-def route_left(motion: Motion, goal: wp.vec4, places: Level2Places, rules: Rules, numbers: CarNumbers) -> float:
+def route_left(motion: Motion, goal: wp.vec4, places: Level2Places, rules: Rules, params: CarParams) -> float:
     """From the car's box to the pad, through the portal where it is on the other storey [m]."""
-    box = box_of_car(motion.pose, numbers.box_ahead_m)
+    box = box_of_car(motion.pose, params.box_ahead_m)
     storey = storey_of(motion.pos[0])
     if storey_of(goal[0]) == storey:
-        return way_of(box, goal, wp.length(place_of(goal) - place_of(box)), rules, numbers)
+        return way_of(box, goal, wp.length(place_of(goal) - place_of(box)), rules, params)
     to_portal = wp.length(place_of(places.portals[storey]) - place_of(box))
     way_out = wp.vec2(places.exits[storey, 0], places.exits[storey, 1])
     return to_portal + wp.length(place_of(goal) - way_out)
@@ -169,7 +169,7 @@ def through_portal(motion: Motion, places: Level2Places) -> Motion:
 
 
 @wp.func
-def portal_row(storey_before: int, goal: wp.vec4, more: Level2Numbers) -> float:
+def portal_row(storey_before: int, goal: wp.vec4, more: Level2Params) -> float:
     """Rows 10 and 11."""
     return wp.where(storey_before != storey_of(goal[0]), more.portal_reward, more.wrong_portal_reward)
 
@@ -194,7 +194,7 @@ def place_goal(
 ) -> None:
     """A new goal, on storey 2 with its chance."""
     seed = buffers.seed[0]
-    share = movers.numbers[i].storey_2_share
+    share = movers.params[i].storey_2_share
     storey = wp.where(wp.randf(draw_key(seed, i, episode, _STOREY_STREAM)) < share, 1, 0)
     place = wp.vec2()
     if rules.are_goals_anywhere:
@@ -209,7 +209,7 @@ def place_goal(
             place = places.spots_2[wp.randi(rng, 0, places.spots_2.shape[0])]
         else:
             place = places.spots_1[wp.randi(rng, 0, places.spots_1.shape[0])]
-    cars.goal[i] = pose_at(place, wp.radians(cars.numbers[i].goal_yaw_deg))
+    cars.goal[i] = pose_at(place, wp.radians(cars.params[i].goal_yaw_deg))
 
 
 @wp.func
@@ -220,10 +220,10 @@ def place_car(
     if rules.are_starts_anywhere:
         seed = buffers.seed[0]
         storey = storey_of(cars.goal[i][0])
-        if wp.randf(draw_key(seed, i, episode, _START_STOREY_STREAM)) < movers.numbers[i].start_elsewhere_share:
+        if wp.randf(draw_key(seed, i, episode, _START_STOREY_STREAM)) < movers.params[i].start_elsewhere_share:
             storey = 1 - storey
         scene = scene_of(cars, movers, places, i, storey)
-        cars.pos[i] = draw_start(scene, storey, cars.numbers[i].start_range_m, seed, i, episode, _START_STREAM)
+        cars.pos[i] = draw_start(scene, storey, cars.params[i].start_range_m, seed, i, episode, _START_STREAM)
         cars.yaw[i] = wp.pi * (2.0 * wp.randf(draw_key(seed, i, episode, _YAW_STREAM)) - 1.0)
     else:
         cars.pos[i] = place_of(places.start)
@@ -243,14 +243,14 @@ def begin_row(
         cars.vel[i] = wp.vec2(0.0, 0.0)
         cars.last_m[i] = 0.0  # a field of a new car
     place_car(buffers, rules, places, cars, movers, i, episode)
-    numbers = cars.numbers[i]
+    params = cars.params[i]
     motion = motion_of(cars, i)
     scene = scene_of(cars, movers, places, i, storey_of(motion.pos[0]))
-    cars.best_m[i] = numbers.best_start_m
+    cars.best_m[i] = params.best_start_m
     if rules.reward == _AS_DOCUMENTED:
         cars.last_m[i] = wp.length(gap_to(motion.pose, scene.goal[0], GOAL_HEIGHT, scene.goal[1]))
-    cars.way_m[i] = route_left(motion, scene.goal, places, rules, numbers)
-    observe(buffers, i, motion, movers.poses, scene, rules, numbers, movers.numbers[i])
+    cars.way_m[i] = route_left(motion, scene.goal, places, rules, params)
+    observe(buffers, i, motion, movers.poses, scene, rules, params, movers.params[i])
 
 
 @wp.kernel(enable_backward=False)
@@ -272,8 +272,8 @@ def begin(
 def step(buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarState, movers: Movers) -> None:
     """One decision of every row."""
     i = wp.tid()
-    numbers = cars.numbers[i]
-    more = movers.numbers[i]
+    params = cars.params[i]
+    more = movers.params[i]
     goal = cars.goal[i]
     motion = motion_of(cars, i)
     command = command_of(buffers, i, rules)
@@ -285,23 +285,23 @@ def step(buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarStat
             storey = storey_of(motion.pos[0])
             if is_applied and rules.reward != _PROGRESS:
                 scene = scene_of(cars, movers, places, i, storey)
-                reward += table_reward(cars, i, motion.pose, scene, GOAL_HEIGHT, _MOVER_HEIGHT, rules, numbers)
+                reward += table_reward(cars, i, motion.pose, scene, GOAL_HEIGHT, _MOVER_HEIGHT, rules, params)
             run_movers(movers.poses, movers.touching, i, more)
-            motion = moved(motion, command, is_applied, numbers)
-            contact = contact_of(motion.pose, scene_of(cars, movers, places, i, storey), numbers)
+            motion = moved(motion, command, is_applied, params)
+            contact = contact_of(motion.pose, scene_of(cars, movers, places, i, storey), params)
             if contact == PORTAL:
                 reward += portal_row(storey, goal, more)
                 motion = through_portal(motion, places)
-            outcome = outcome_of(contact, motion, goal, rules, numbers)
-    outcome = capped(outcome, buffers.steps[i], numbers)
-    reward += end_reward(outcome, numbers)
+            outcome = outcome_of(contact, motion, goal, rules, params)
+    outcome = capped(outcome, buffers.steps[i], params)
+    reward += end_reward(outcome, params)
     if rules.reward == _PROGRESS:
-        way_m = route_left(motion, goal, places, rules, numbers)
-        reward += progress_reward(cars.way_m[i], way_m, outcome, numbers)
+        way_m = route_left(motion, goal, places, rules, params)
+        reward += progress_reward(cars.way_m[i], way_m, outcome, params)
         cars.way_m[i] = way_m
     keep_motion(cars, i, motion)
     scene = scene_of(cars, movers, places, i, storey_of(motion.pos[0]))
-    observe(buffers, i, motion, movers.poses, scene, rules, numbers, more)
+    observe(buffers, i, motion, movers.poses, scene, rules, params, more)
     if close_step(buffers, i, reward, outcome):
         begin_row(buffers, rules, places, cars, movers, i, outcome)
 
@@ -309,7 +309,7 @@ def step(buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarStat
 class Parking2(ParkingTask):
     """The task. Layout version 1."""
 
-    numbers: ClassVar = (*CAR_NUMBERS, *LEVEL2_NUMBERS)
+    params: ClassVar = (*CAR_PARAMS, *LEVEL2_PARAMS)
 
     def __init__(self, settings: Parking2Settings, env_count: int, device: str = "cpu") -> None:
         choices = chosen(settings, PRESETS[settings.preset])
@@ -326,7 +326,7 @@ class Parking2(ParkingTask):
         storey = settings.storey or ("2" if choices.goals == "published" else "both")
         defaults = {
             **reward_defaults(choices, 2),
-            **_PRESET_NUMBERS[settings.preset],
+            **_PRESET_PARAMS[settings.preset],
             "storey_2_share": _STOREY_2_SHARES[storey],
         }
         super().__init__(layout, env_count, number_defaults=defaults, device=device)
@@ -336,7 +336,7 @@ class Parking2(ParkingTask):
         movers = Movers()
         movers.poses = self.movers
         movers.touching = self._zeros("touching", (env_count, 2), int)
-        movers.numbers = typed_rows(self.buffers.numbers, Level2Numbers, first=len(CAR_NUMBERS))
+        movers.params = typed_rows(self.buffers.params, Level2Params, first=len(CAR_PARAMS))
         self._record(begin, step, [rules, self._places(settings.split), self.world, movers])
 
     def _places(self, split: str) -> Any:

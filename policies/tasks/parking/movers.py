@@ -17,7 +17,7 @@ from policies.tasks.parking.arena import (
     storey_centre,
 )
 from policies.tasks.parking.car import DT, nearest_on_line
-from policies.tasks.parking.parking_params import Level2Numbers
+from policies.tasks.parking.parking_params import Level2Params
 
 wp.set_module_options({"enable_backward": False})
 
@@ -26,9 +26,9 @@ _LINE_RANGE = wp.constant(9.0)  # [m] how far from the middle lines and first pl
 
 
 @wp.func
-def half_line(numbers: Level2Numbers) -> float:
+def half_line(params: Level2Params) -> float:
     """From a capsule's middle to the middle of its cap [m]."""
-    return wp.max(0.0, 0.5 * numbers.mover_length_m - numbers.mover_radius_m)
+    return wp.max(0.0, 0.5 * params.mover_length_m - params.mover_radius_m)
 
 
 @wp.func
@@ -49,17 +49,17 @@ def line_distance(a0: wp.vec2, a1: wp.vec2, b0: wp.vec2, b1: wp.vec2) -> float:
 
 
 @wp.func
-def movers_touch(a: wp.vec4, b: wp.vec4, numbers: Level2Numbers) -> bool:
+def movers_touch(a: wp.vec4, b: wp.vec4, params: Level2Params) -> bool:
     """Whether two capsules overlap."""
     gap = place_of(b) - place_of(a)
-    if wp.dot(gap, gap) > numbers.mover_length_m * numbers.mover_length_m:
+    if wp.dot(gap, gap) > params.mover_length_m * params.mover_length_m:
         return False
-    reach_a = forward_of(a) * half_line(numbers)
-    reach_b = forward_of(b) * half_line(numbers)
+    reach_a = forward_of(a) * half_line(params)
+    reach_b = forward_of(b) * half_line(params)
     at_a = place_of(a)
     at_b = place_of(b)
     distance = line_distance(at_a - reach_a, at_a + reach_a, at_b - reach_b, at_b + reach_b)
-    return distance <= 2.0 * numbers.mover_radius_m
+    return distance <= 2.0 * params.mover_radius_m
 
 
 @wp.func
@@ -69,12 +69,12 @@ def turned_back(mover: wp.vec4) -> wp.vec4:
 
 
 @wp.func
-def ran(mover: wp.vec4, storey: int, numbers: Level2Numbers) -> wp.vec4:
+def ran(mover: wp.vec4, storey: int, params: Level2Params) -> wp.vec4:
     """A mover one tick later; away from a wall that it reaches."""
-    step = forward_of(mover) * (numbers.mover_speed_m_s * DT)
+    step = forward_of(mover) * (params.mover_speed_m_s * DT)
     out = wp.vec4(mover[0] + step[0], mover[1] + step[1], mover[2], mover[3])
     local = place_of(out) - storey_centre(storey)
-    half = 0.5 * numbers.mover_length_m
+    half = 0.5 * params.mover_length_m
     is_at_high = (out[2] > 0.5 and local[0] + half >= WALL_X_HIGH) or (out[3] > 0.5 and local[1] + half >= WALL_Z_HIGH)
     is_at_low = (out[2] < -0.5 and local[0] - half <= WALL_X_LOW) or (out[3] < -0.5 and local[1] - half <= WALL_Z_LOW)
     if is_at_high or is_at_low:
@@ -84,13 +84,13 @@ def ran(mover: wp.vec4, storey: int, numbers: Level2Numbers) -> wp.vec4:
 
 @wp.func
 def run_movers(
-    movers: wp.array2d(dtype=wp.vec4), touching: wp.array2d(dtype=int), i: int, numbers: Level2Numbers
+    movers: wp.array2d(dtype=wp.vec4), touching: wp.array2d(dtype=int), i: int, params: Level2Params
 ) -> None:
     """All movers of a row, one tick."""
     for storey in range(2):
-        first = ran(movers[i, PER_STOREY * storey], storey, numbers)
-        second = ran(movers[i, PER_STOREY * storey + 1], storey, numbers)
-        is_touching = wp.where(movers_touch(first, second, numbers), 1, 0)
+        first = ran(movers[i, PER_STOREY * storey], storey, params)
+        second = ran(movers[i, PER_STOREY * storey + 1], storey, params)
+        is_touching = wp.where(movers_touch(first, second, params), 1, 0)
         if is_touching == 1 and touching[i, storey] == 0:
             first = turned_back(first)
             second = turned_back(second)

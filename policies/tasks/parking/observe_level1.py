@@ -26,7 +26,7 @@ from policies.tasks.parking.observe_ranged import (
     write_velocity,
     write_walls,
 )
-from policies.tasks.parking.parking_params import CarNumbers
+from policies.tasks.parking.parking_params import CarParams
 from policies.tasks.parking.rays import ray_elements, write_rays
 from policies.tasks.parking.scene import Scene
 from policies.tasks.parking.settings import AS_DOCUMENTED, RANGED, Choices, Rules
@@ -77,11 +77,11 @@ def observe_units(buffers: StepBuffers, i: int, at: int, car: wp.vec4, scene: Sc
 
 
 @wp.func
-def observe(buffers: StepBuffers, i: int, motion: Motion, scene: Scene, rules: Rules, numbers: CarNumbers) -> None:
+def observe(buffers: StepBuffers, i: int, motion: Motion, scene: Scene, rules: Rules, params: CarParams) -> None:
     """The newest frame."""
     at = open_frame(buffers, i)
     if rules.observation == _RANGED:
-        box = box_of_car(motion.pose, numbers.box_ahead_m)
+        box = box_of_car(motion.pose, params.box_ahead_m)
         at = write_goal(buffers, i, at, box, scene.goal, scene.goal_half)
         at = write_velocity(buffers, i, at, box, motion.vel)
         at = write_obstacles(buffers, i, at, box, scene)
@@ -89,4 +89,4 @@ def observe(buffers: StepBuffers, i: int, motion: Motion, scene: Scene, rules: R
     else:
         at = observe_units(buffers, i, at, motion.pose, scene, rules.observation == _AS_DOCUMENTED)
     if rules.ray_count >= 0:
-        write_rays(buffers, i, at, motion.pose, scene, rules, numbers)
+        write_rays(buffers, i, at, motion.pose, scene, rules, params)

@@ -42,7 +42,7 @@ from policies.tasks.parking.observe_ranged import (
     write_velocity,
     write_walls,
 )
-from policies.tasks.parking.parking_params import CarNumbers, Level2Numbers
+from policies.tasks.parking.parking_params import CarParams, Level2Params
 from policies.tasks.parking.rays import ray_elements, write_rays
 from policies.tasks.parking.scene import Scene, portal_half
 from policies.tasks.parking.settings import AS_DOCUMENTED, RANGED, Choices, Rules
@@ -128,11 +128,11 @@ def observe_ranged(
     at: int,
     motion: Motion,
     scene: Scene,
-    numbers: CarNumbers,
-    more: Level2Numbers,
+    params: CarParams,
+    more: Level2Params,
 ) -> int:
     """What lies ahead on the route, and what is about; returns the next column."""
-    box = box_of_car(motion.pose, numbers.box_ahead_m)
+    box = box_of_car(motion.pose, params.box_ahead_m)
     next_at = int(0)
     if scene.has_goal:
         next_at = write_goal(buffers, i, at, box, scene.goal, scene.goal_half)
@@ -157,16 +157,16 @@ def observe(
     movers: wp.array2d(dtype=wp.vec4),
     scene: Scene,
     rules: Rules,
-    numbers: CarNumbers,
-    more: Level2Numbers,
+    params: CarParams,
+    more: Level2Params,
 ) -> None:
     """The newest frame."""
     at = open_frame(buffers, i)
     if rules.observation == _RANGED:
-        at = observe_ranged(buffers, i, at, motion, scene, numbers, more)
+        at = observe_ranged(buffers, i, at, motion, scene, params, more)
     elif rules.observation == _AS_DOCUMENTED:
         at = write_target(buffers, i, at, motion.pose, scene.goal[0], GOAL_HEIGHT, scene.goal[1])
     else:
         at = observe_coded(buffers, i, at, motion, scene.goal, movers)
     if rules.ray_count >= 0:
-        write_rays(buffers, i, at, motion.pose, scene, rules, numbers)
+        write_rays(buffers, i, at, motion.pose, scene, rules, params)

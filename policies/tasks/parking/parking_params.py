@@ -1,13 +1,13 @@
 """The numbers of the parking tasks: motion, sizes, tests, rewards, sensors. Any can be set or randomised by name.
 
-`CAR_NUMBERS` belong to both levels, `LEVEL1_NUMBERS` and `LEVEL2_NUMBERS` to one alone. Rewards have one set of names;
+`CAR_PARAMS` belong to both levels, `LEVEL1_PARAMS` and `LEVEL2_PARAMS` to one alone. Rewards have one set of names;
 which of them count, and their defaults, follow from the chosen reward.
 """
 
 import warp as wp
 
 from policies.tasks.parking.settings import Choices
-from policies.tasks.task_params import Number, Sampler
+from policies.tasks.task_params import Sampler, TaskParam
 
 wp.set_module_options({"enable_backward": False})
 
@@ -18,8 +18,8 @@ _OURS = "guess: ours"
 
 
 @wp.struct
-class CarNumbers:
-    """One row per environment; declared in `CAR_NUMBERS`."""
+class CarParams:
+    """One row per environment; declared in `CAR_PARAMS`."""
 
     push_n: float
     turn_deg: float
@@ -58,64 +58,66 @@ class CarNumbers:
     pad_length_m: float
 
 
-CAR_NUMBERS = (
-    Number("push_n", 800.0, 0.0, 5000.0, "N", "force of one push, for one physics step", _CODE),
-    Number("turn_deg", 3.0, 0.1, 45.0, "deg", "yaw of one applied turn, at once", _CODE),
-    Number("mass_kg", 8.0, 0.5, 100.0, "kg", "mass of the car", _PREFAB),
-    Number("drag_per_s", 8.0, 0.0, 50.0, "1/s", "linear drag", _PREFAB),
-    Number("car_width_m", 1.1317, 0.2, 3.0, "m", "of the trigger box: 0.780 x scale 1.4509", _PREFAB),
-    Number("car_length_m", 1.6584, 0.2, 4.0, "m", "of the trigger box: 1.143 x scale 1.4509", _PREFAB),
-    Number("box_ahead_m", 0.29, -2.0, 2.0, "m", "from the car's origin forward to its box's centre", _PREFAB),
-    Number("goal_yaw_deg", -39.2, -180.0, 180.0, "deg", "yaw of the pad", "code: scene"),
-    Number("start_range_m", 100.0, 4.0, 100.0, "m", "how far from a goal, per axis, a car starts anywhere", _OURS),
-    Number("reach_m", 0.3, 0.05, 5.0, "m", "greatest distance of the centres that counts as parked in pose", _OURS),
-    Number("align_deg", 10.0, 1.0, 180.0, "deg", "greatest angle to the pad that counts as parked in pose", _OURS),
-    Number("stop_m_s", 0.3, 0.01, 100.0, "m/s", "speed under which a car counts as parked in pose", _OURS),
-    Number("step_limit", 0.0, 0.0, 1e6, "1", "decisions until the episode is cut; 0: no limit", _CODE),
-    Number("park_reward", 5.0, -100.0, 100.0, "1", "row 3: parked", _DOC),
-    Number("wall_hit_reward", -0.5, -100.0, 100.0, "1", "row 1: a wall was hit", _DOC),
-    Number("obstacle_hit_reward", -0.5, -100.0, 100.0, "1", "row 2: an obstacle was hit", _DOC),
-    Number("near_reward", 3e-5, -10.0, 10.0, "1", "row 4: near the goal, per applied action", _DOC),
-    Number("near_m", 2.5, 0.0, 100.0, "m", "row 4: what is near", _DOC),
-    Number("best_reward", 2e-5, -10.0, 10.0, "1", "row 5: nearer than ever in this episode", _DOC),
-    Number(
+CAR_PARAMS = (
+    TaskParam("push_n", 800.0, 0.0, 5000.0, "N", "force of one push, for one physics step", _CODE),
+    TaskParam("turn_deg", 3.0, 0.1, 45.0, "deg", "yaw of one applied turn, at once", _CODE),
+    TaskParam("mass_kg", 8.0, 0.5, 100.0, "kg", "mass of the car", _PREFAB),
+    TaskParam("drag_per_s", 8.0, 0.0, 50.0, "1/s", "linear drag", _PREFAB),
+    TaskParam("car_width_m", 1.1317, 0.2, 3.0, "m", "of the trigger box: 0.780 x scale 1.4509", _PREFAB),
+    TaskParam("car_length_m", 1.6584, 0.2, 4.0, "m", "of the trigger box: 1.143 x scale 1.4509", _PREFAB),
+    TaskParam("box_ahead_m", 0.29, -2.0, 2.0, "m", "from the car's origin forward to its box's centre", _PREFAB),
+    TaskParam("goal_yaw_deg", -39.2, -180.0, 180.0, "deg", "yaw of the pad", "code: scene"),
+    TaskParam("start_range_m", 100.0, 4.0, 100.0, "m", "how far from a goal, per axis, a car starts anywhere", _OURS),
+    TaskParam("reach_m", 0.3, 0.05, 5.0, "m", "greatest distance of the centres that counts as parked in pose", _OURS),
+    TaskParam("align_deg", 10.0, 1.0, 180.0, "deg", "greatest angle to the pad that counts as parked in pose", _OURS),
+    TaskParam("stop_m_s", 0.3, 0.01, 100.0, "m/s", "speed under which a car counts as parked in pose", _OURS),
+    TaskParam("step_limit", 0.0, 0.0, 1e6, "1", "decisions until the episode is cut; 0: no limit", _CODE),
+    TaskParam("park_reward", 5.0, -100.0, 100.0, "1", "row 3: parked", _DOC),
+    TaskParam("wall_hit_reward", -0.5, -100.0, 100.0, "1", "row 1: a wall was hit", _DOC),
+    TaskParam("obstacle_hit_reward", -0.5, -100.0, 100.0, "1", "row 2: an obstacle was hit", _DOC),
+    TaskParam("near_reward", 3e-5, -10.0, 10.0, "1", "row 4: near the goal, per applied action", _DOC),
+    TaskParam("near_m", 2.5, 0.0, 100.0, "m", "row 4: what is near", _DOC),
+    TaskParam("best_reward", 2e-5, -10.0, 10.0, "1", "row 5: nearer than ever in this episode", _DOC),
+    TaskParam(
         "best_start_m", 30.0, 0.0, 1000.0, "m", "row 5: the distance that is to be beaten first", "document and code"
     ),
-    Number("nearer_reward", 1e-5, -10.0, 10.0, "1", "row 6: nearer than last time, not best", _DOC),
-    Number("farther_reward", -2e-5, -10.0, 10.0, "1", "row 7: farther than last time", _DOC),
-    Number("wall_reward", -0.005, -10.0, 10.0, "1", "row 8: near a wall, once for each", _DOC),
-    Number("wall_near_m", 2.0, 0.0, 100.0, "m", "row 8: what is near", _DOC),
-    Number("obstacle_reward", -0.005, -10.0, 10.0, "1", "row 9: near an obstacle, once for each", _DOC),
-    Number("obstacle_near_m", 2.0, 0.0, 100.0, "m", "row 9: what is near", _DOC),
-    Number("progress_per_m", 0.05, 0.0, 10.0, "1/m", "progress: potential per metre of way to go", _OURS),
-    Number("align_m_per_rad", 1.0, 0.0, 100.0, "m/rad", "progress: way that an angle to the pad counts as", _OURS),
-    Number("discount", 0.99, 0.0, 1.0, "1", "progress: the learner's gamma", _OURS),
-    Number("time_reward", -0.002, -10.0, 10.0, "1", "progress: per decision", _OURS),
-    Number("ray_degrees", 120.0, 0.0, 180.0, "deg", "angle of the outermost rays, to each side of forward", "document"),
-    Number("ray_length_m", 1000.0, 1.0, 1000.0, "m", "reach of the rays", "document: example"),
-    Number("ray_radius_m", 0.5, 0.0, 10.0, "m", "radius of the sphere that is cast", "ML-Agents default"),
-    Number("pad_width_m", 2.5, 0.2, 3.0, "m", "of the spot, along its own x", _PREFAB),
-    Number("pad_length_m", 1.0, 0.2, 2.0, "m", "of the spot, along its own z", _PREFAB),
+    TaskParam("nearer_reward", 1e-5, -10.0, 10.0, "1", "row 6: nearer than last time, not best", _DOC),
+    TaskParam("farther_reward", -2e-5, -10.0, 10.0, "1", "row 7: farther than last time", _DOC),
+    TaskParam("wall_reward", -0.005, -10.0, 10.0, "1", "row 8: near a wall, once for each", _DOC),
+    TaskParam("wall_near_m", 2.0, 0.0, 100.0, "m", "row 8: what is near", _DOC),
+    TaskParam("obstacle_reward", -0.005, -10.0, 10.0, "1", "row 9: near an obstacle, once for each", _DOC),
+    TaskParam("obstacle_near_m", 2.0, 0.0, 100.0, "m", "row 9: what is near", _DOC),
+    TaskParam("progress_per_m", 0.05, 0.0, 10.0, "1/m", "progress: potential per metre of way to go", _OURS),
+    TaskParam("align_m_per_rad", 1.0, 0.0, 100.0, "m/rad", "progress: way that an angle to the pad counts as", _OURS),
+    TaskParam("discount", 0.99, 0.0, 1.0, "1", "progress: the learner's gamma", _OURS),
+    TaskParam("time_reward", -0.002, -10.0, 10.0, "1", "progress: per decision", _OURS),
+    TaskParam(
+        "ray_degrees", 120.0, 0.0, 180.0, "deg", "angle of the outermost rays, to each side of forward", "document"
+    ),
+    TaskParam("ray_length_m", 1000.0, 1.0, 1000.0, "m", "reach of the rays", "document: example"),
+    TaskParam("ray_radius_m", 0.5, 0.0, 10.0, "m", "radius of the sphere that is cast", "ML-Agents default"),
+    TaskParam("pad_width_m", 2.5, 0.2, 3.0, "m", "of the spot, along its own x", _PREFAB),
+    TaskParam("pad_length_m", 1.0, 0.2, 2.0, "m", "of the spot, along its own z", _PREFAB),
 )
 
 
 @wp.struct
-class Level1Numbers:
-    """One row per environment; declared in `LEVEL1_NUMBERS`."""
+class Level1Params:
+    """One row per environment; declared in `LEVEL1_PARAMS`."""
 
     block_width_m: float
     block_length_m: float
 
 
-LEVEL1_NUMBERS = (
-    Number("block_width_m", 3.467, 0.2, 5.0, "m", "of the blocks, along their own x", "code: scene"),
-    Number("block_length_m", 1.0, 0.2, 2.5, "m", "of the blocks, along their own z", "code: scene"),
+LEVEL1_PARAMS = (
+    TaskParam("block_width_m", 3.467, 0.2, 5.0, "m", "of the blocks, along their own x", "code: scene"),
+    TaskParam("block_length_m", 1.0, 0.2, 2.5, "m", "of the blocks, along their own z", "code: scene"),
 )
 
 
 @wp.struct
-class Level2Numbers:
-    """One row per environment; declared in `LEVEL2_NUMBERS`."""
+class Level2Params:
+    """One row per environment; declared in `LEVEL2_PARAMS`."""
 
     mover_speed_m_s: float
     mover_length_m: float
@@ -126,14 +128,16 @@ class Level2Numbers:
     start_elsewhere_share: float
 
 
-LEVEL2_NUMBERS = (
-    Number("mover_speed_m_s", 2.0, 0.0, 20.0, "m/s", "speed of the moving obstacles", _CODE),
-    Number("mover_length_m", 3.0, 0.2, 8.0, "m", "length of the moving obstacles, caps included", _CODE),
-    Number("mover_radius_m", 0.75, 0.05, 3.0, "m", "half their thickness", _CODE),
-    Number("portal_reward", 0.1, -10.0, 10.0, "1", "row 10: through the portal towards the target", _CODE),
-    Number("wrong_portal_reward", -0.1, -10.0, 10.0, "1", "row 11: through a portal away from it", _DOC),
-    Number("storey_2_share", 1.0, 0.0, 1.0, "1", "chance that the goal is on storey 2", _CODE),
-    Number("start_elsewhere_share", 0.5, 0.0, 1.0, "1", "chance that a car starts on the goal's other storey", _OURS),
+LEVEL2_PARAMS = (
+    TaskParam("mover_speed_m_s", 2.0, 0.0, 20.0, "m/s", "speed of the moving obstacles", _CODE),
+    TaskParam("mover_length_m", 3.0, 0.2, 8.0, "m", "length of the moving obstacles, caps included", _CODE),
+    TaskParam("mover_radius_m", 0.75, 0.05, 3.0, "m", "half their thickness", _CODE),
+    TaskParam("portal_reward", 0.1, -10.0, 10.0, "1", "row 10: through the portal towards the target", _CODE),
+    TaskParam("wrong_portal_reward", -0.1, -10.0, 10.0, "1", "row 11: through a portal away from it", _DOC),
+    TaskParam("storey_2_share", 1.0, 0.0, 1.0, "1", "chance that the goal is on storey 2", _CODE),
+    TaskParam(
+        "start_elsewhere_share", 0.5, 0.0, 1.0, "1", "chance that a car starts on the goal's other storey", _OURS
+    ),
 )
 
 _PPO_COLUMN: dict[str, float | Sampler] = {

@@ -51,25 +51,25 @@ class ParkingPicture:
         """From one point to another on the same storey."""
         self.canvas.line([self.place(float(a[0]), float(a[1])), self.place(float(b[0]), float(b[1]))], colour, width_px)
 
-    def car(self, pos: Any, yaw_rad: float, numbers: dict[str, float]) -> None:
+    def car(self, pos: Any, yaw_rad: float, params: dict[str, float]) -> None:
         """Its box, and a line over its nose."""
         nose = np.array([np.sin(yaw_rad), np.cos(yaw_rad)])
-        middle = np.asarray(pos) + nose * numbers["box_ahead_m"]
-        self.box((*middle, *nose), (numbers["car_width_m"], numbers["car_length_m"]), VEHICLE)
-        self.line(middle, middle + nose * numbers["car_length_m"] / 2, _FLOOR, 2)
+        middle = np.asarray(pos) + nose * params["box_ahead_m"]
+        self.box((*middle, *nose), (params["car_width_m"], params["car_length_m"]), VEHICLE)
+        self.line(middle, middle + nose * params["car_length_m"] / 2, _FLOOR, 2)
 
-    def rays(self, pos: Any, yaw_rad: float, casts: NDArray[np.float32], numbers: dict[str, float]) -> None:
+    def rays(self, pos: Any, yaw_rad: float, casts: NDArray[np.float32], params: dict[str, float]) -> None:
         """Each ray as far as it got, in the sensor's order; `casts` are their fractions."""
-        spacing = np.radians(numbers["ray_degrees"]) / max(1, len(casts) // 2)
+        spacing = np.radians(params["ray_degrees"]) / max(1, len(casts) // 2)
         for k, fraction in enumerate(casts):
             angle = yaw_rad + spacing * ((k + 1) // 2) * (1 if k % 2 else -1)
-            reach = min(float(fraction) * numbers["ray_length_m"], 60.0)
+            reach = min(float(fraction) * params["ray_length_m"], 60.0)
             self.line(pos, np.asarray(pos) + reach * np.array([np.sin(angle), np.cos(angle)]), _RAY)
 
 
-def numbers_of(task: Any, i_env: int) -> dict[str, float]:
+def params_of(task: Any, i_env: int) -> dict[str, float]:
     """The numbers of an environment's episode by name."""
-    return dict(zip(task.number_table.names, task.buffers.numbers.numpy()[i_env].tolist(), strict=True))
+    return dict(zip(task.param_table.names, task.buffers.params.numpy()[i_env].tolist(), strict=True))
 
 
 def ray_fractions(task: Any, i_env: int) -> NDArray[np.float32]:
@@ -83,27 +83,27 @@ def ray_fractions(task: Any, i_env: int) -> NDArray[np.float32]:
 def picture_of(task: Any, i_env: int, height_px: int) -> NDArray[np.uint8]:
     """One environment of either level."""
     world = task.world
-    numbers = numbers_of(task, i_env)
+    params = params_of(task, i_env)
     is_level_2 = hasattr(task, "movers")
     picture = ParkingPicture(2 if is_level_2 else 1, height_px)
     pos, yaw_rad = world.pos.numpy()[i_env], float(world.yaw.numpy()[i_env])
-    picture.box(world.goal.numpy()[i_env], (numbers["pad_width_m"], numbers["pad_length_m"]), GOAL)
-    picture.rays(pos, yaw_rad, ray_fractions(task, i_env), numbers)
+    picture.box(world.goal.numpy()[i_env], (params["pad_width_m"], params["pad_length_m"]), GOAL)
+    picture.rays(pos, yaw_rad, ray_fractions(task, i_env), params)
     if is_level_2:
-        _draw_level_2(picture, task, i_env, numbers)
+        _draw_level_2(picture, task, i_env, params)
     else:
         for block in task.blocks.numpy()[i_env]:
-            picture.box(block, (numbers["block_width_m"], numbers["block_length_m"]), OBSTACLE)
-    picture.car(pos, yaw_rad, numbers)
+            picture.box(block, (params["block_width_m"], params["block_length_m"]), OBSTACLE)
+    picture.car(pos, yaw_rad, params)
     return picture.canvas.pixels
 
 
-def _draw_level_2(picture: ParkingPicture, task: Any, i_env: int, numbers: dict[str, float]) -> None:
+def _draw_level_2(picture: ParkingPicture, task: Any, i_env: int, params: dict[str, float]) -> None:
     for x, z, yaw_deg in PORTAL_PLACES:
         yaw_rad = np.radians(yaw_deg)
         picture.box((x, z, np.sin(yaw_rad), np.cos(yaw_rad)), (PORTAL_SIZE[0], 0.4), _PORTAL)
-    radius = numbers["mover_radius_m"]
-    reach = max(0.0, numbers["mover_length_m"] / 2 - radius)
+    radius = params["mover_radius_m"]
+    reach = max(0.0, params["mover_length_m"] / 2 - radius)
     for mover in task.movers.numpy()[i_env]:
         picture.box(mover, (2 * radius, 2 * reach), OBSTACLE)
         for side in (-1.0, 1.0):

@@ -20,7 +20,7 @@ from policies.tasks.parking.arena import (
     storey_centre,
     storey_of,
 )
-from policies.tasks.parking.parking_params import CarNumbers
+from policies.tasks.parking.parking_params import CarParams
 from policies.tasks.parking.scene import MAX_OBSTACLES, Scene, portal_half
 from policies.tasks.parking.settings import Rules
 
@@ -156,16 +156,16 @@ def write_ray(buffers: StepBuffers, i: int, at: int, cast: Cast, length_m: float
 
 @wp.func
 def write_rays(
-    buffers: StepBuffers, i: int, at: int, car: wp.vec4, scene: Scene, rules: Rules, numbers: CarNumbers
+    buffers: StepBuffers, i: int, at: int, car: wp.vec4, scene: Scene, rules: Rules, params: CarParams
 ) -> int:
     """The whole sensor, from the car's origin; returns the next column."""
     start = place_of(car)
-    radius = numbers.ray_radius_m
-    length_m = numbers.ray_length_m
+    radius = params.ray_radius_m
+    length_m = params.ray_length_m
     right = forward_of(car)
     left = right
     next_at = write_ray(buffers, i, at, cast_ray(start, right, scene, rules, radius), length_m, rules)
-    spacing_rad = wp.radians(numbers.ray_degrees) / float(wp.max(rules.ray_count, 1))
+    spacing_rad = wp.radians(params.ray_degrees) / float(wp.max(rules.ray_count, 1))
     sine = wp.sin(spacing_rad)
     cosine = wp.cos(spacing_rad)
     for _pair in range(rules.ray_count):

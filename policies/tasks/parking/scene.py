@@ -7,7 +7,7 @@ import warp as wp
 
 from policies.tasks.parking.arena import PORTAL_HALF_X, PORTAL_HALF_Z, forward_of
 from policies.tasks.parking.car import box_meets_capsule, box_of_car, boxes_overlap, is_at_wall
-from policies.tasks.parking.parking_params import CarNumbers
+from policies.tasks.parking.parking_params import CarParams
 
 wp.set_module_options({"enable_backward": False})
 
@@ -35,15 +35,15 @@ class Scene:
 
 
 @wp.func
-def half_of_car(numbers: CarNumbers) -> wp.vec2:
+def half_of_car(params: CarParams) -> wp.vec2:
     """Half sizes of the car's box [m]."""
-    return wp.vec2(0.5 * numbers.car_width_m, 0.5 * numbers.car_length_m)
+    return wp.vec2(0.5 * params.car_width_m, 0.5 * params.car_length_m)
 
 
 @wp.func
-def half_of_pad(numbers: CarNumbers) -> wp.vec2:
+def half_of_pad(params: CarParams) -> wp.vec2:
     """Half sizes of the pad [m]."""
-    return wp.vec2(0.5 * numbers.pad_width_m, 0.5 * numbers.pad_length_m)
+    return wp.vec2(0.5 * params.pad_width_m, 0.5 * params.pad_length_m)
 
 
 @wp.func
@@ -63,10 +63,10 @@ def touches_obstacle(box: wp.vec4, half: wp.vec2, obstacle: wp.vec4, scene: Scen
 
 
 @wp.func
-def contact_of(car: wp.vec4, scene: Scene, numbers: CarNumbers) -> int:
+def contact_of(car: wp.vec4, scene: Scene, params: CarParams) -> int:
     """What the car touches: a crash comes before all else."""
-    box = box_of_car(car, numbers.box_ahead_m)
-    half = half_of_car(numbers)
+    box = box_of_car(car, params.box_ahead_m)
+    half = half_of_car(params)
     if is_at_wall(box, half):
         return WALL
     for k in range(MAX_OBSTACLES):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from policies.tasks.parking.arena import pose_at
 from policies.tasks.parking.drive import Motion
-from policies.tasks.parking.parking_params import CarNumbers
+from policies.tasks.parking.parking_params import CarParams
 from policies.tasks.parking.parking_top_view import picture_of
 from policies.tasks.parking.settings import Rules
 from policies.tasks.task import Task
@@ -28,7 +28,7 @@ class CarState:
     best_m: wp.array(dtype=float)  # shortest distance of this episode
     last_m: wp.array(dtype=float)  # distance at the last applied action
     way_m: wp.array(dtype=float)  # what was left to go at the last decision
-    numbers: wp.array(dtype=CarNumbers)
+    params: wp.array(dtype=CarParams)
 
 
 @wp.func
@@ -64,7 +64,7 @@ class ParkingTask(Task):
         for name in ("yaw", "best_m", "last_m", "way_m"):
             setattr(state, name, self._zeros(name, self.env_count, float))
         state.goal = self._zeros("goal", self.env_count, wp.vec4)
-        state.numbers = typed_rows(self.buffers.numbers, CarNumbers)
+        state.params = typed_rows(self.buffers.params, CarParams)
         return state
 
     def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:

@@ -9,7 +9,7 @@ relaxation, camber, air drag (Unity's default is none).
 
 import warp as wp
 
-from policies.tasks.reach_target.reach_target_params import ReachNumbers
+from policies.tasks.reach_target.reach_target_params import ReachParams
 
 wp.set_module_options({"enable_backward": False})
 
@@ -104,7 +104,7 @@ class WheelPull:
 
 
 @wp.func
-def car_of(n: ReachNumbers) -> Car:
+def car_of(n: ReachParams) -> Car:
     """The car that the numbers describe."""
     car = Car()
     car.forward = tyre_of(n.forward_extremum_slip, n.forward_extremum, n.forward_asymptote_slip, n.forward_asymptote)
@@ -150,7 +150,7 @@ def tyre_of(extremum_slip: float, extremum: float, asymptote_slip: float, asympt
 
 
 @wp.func
-def controls_of(n: ReachNumbers, steer: float, throttle: float, brake: float) -> Controls:
+def controls_of(n: ReachParams, steer: float, throttle: float, brake: float) -> Controls:
     """What the clipped actions do: steering in [-1, 1] (right is positive), throttle in [-1, 1], brake in [0, 1]."""
     controls = Controls()
     angle = wp.clamp(steer, -1.0, 1.0) * n.steer_max_deg * _RAD

@@ -25,7 +25,7 @@ from policies.tasks.reach_target.car_model import (
     driven,
     is_chassis_hit,
 )
-from policies.tasks.reach_target.reach_target_params import ReachNumbers
+from policies.tasks.reach_target.reach_target_params import ReachParams
 
 wp.set_module_options({"enable_backward": False})
 
@@ -91,7 +91,7 @@ class ReachState:
     target: wp.array(dtype=wp.vec3)  # [m]
     target_yaw: wp.array(dtype=float)  # [rad]
     reaches: wp.array(dtype=int)  # targets reached in the running episode
-    numbers: wp.array(dtype=ReachNumbers)
+    params: wp.array(dtype=ReachParams)
 
 
 @wp.func
@@ -143,7 +143,7 @@ def speed_towards(motion: Motion, target: wp.vec3) -> float:
 
 
 @wp.func
-def potential(rules: ReachRules, n: ReachNumbers, motion: Motion, target: wp.vec3, target_yaw: float) -> float:
+def potential(rules: ReachRules, n: ReachParams, motion: Motion, target: wp.vec3, target_yaw: float) -> float:
     """Minus the way to go over 50 m: the planar distance; for a pose, also what has to be turned close to it."""
     x = target[0] - motion.pos[0]
     z = target[2] - motion.pos[2]
@@ -155,7 +155,7 @@ def potential(rules: ReachRules, n: ReachNumbers, motion: Motion, target: wp.vec
 
 
 @wp.func
-def is_reached(rules: ReachRules, n: ReachNumbers, motion: Motion, target: wp.vec3, target_yaw: float) -> bool:
+def is_reached(rules: ReachRules, n: ReachParams, motion: Motion, target: wp.vec3, target_yaw: float) -> bool:
     """Whether the car is where it should be: centres close in 3-D; or position, heading and speed."""
     away = target - motion.pos
     if rules.success != _POSE:
@@ -179,7 +179,7 @@ def is_test_square(x: float, z: float) -> bool:
 def draw_target(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: int, episode: int, count: int) -> None:
     """Places the target of an episode, number `count`."""
     rng = draw_key(buffers.seed[0], i, episode, _TARGET_STREAM + count)
-    half = state.numbers[i].half_spawn_m
+    half = state.params[i].half_spawn_m
     x = wp.randf(rng, -half, half)
     z = wp.randf(rng, -half, half)
     yaw = wp.randf(rng, -_PI, _PI)
@@ -189,14 +189,14 @@ def draw_target(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: i
                 break
             x = wp.randf(rng, -half, half)
             z = wp.randf(rng, -half, half)
-    state.target[i] = wp.vec3(x, state.numbers[i].target_height_m, z)
+    state.target[i] = wp.vec3(x, state.params[i].target_height_m, z)
     state.target_yaw[i] = yaw
 
 
 @wp.func
 def place_car(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: int, episode: int) -> None:
     """Sets the car down: in the middle as published, with a whole number of degrees, or anywhere; at rest."""
-    n = state.numbers[i]
+    n = state.params[i]
     rng = draw_key(buffers.seed[0], i, episode, _YAW_STREAM)
     motion = Motion()
     yaw = float(wp.randi(rng, -180, 180)) * _RAD
@@ -260,7 +260,7 @@ def observe_ego(buffers: StepBuffers, state: ReachState, i: int, at: int) -> Non
     distance = wp.sqrt(right * right + ahead * ahead)
     vel_car = wp.quat_rotate_inv(state.q[i], state.vel[i])
     turn = state.target_yaw[i] - yaw
-    half = state.numbers[i].half_platform_m
+    half = state.params[i].half_platform_m
     buffers.observations[i, at] = right / wp.max(distance, _TINY)
     buffers.observations[i, at + 1] = ahead / wp.max(distance, _TINY)
     buffers.observations[i, at + 2] = distance / _RANGE
@@ -317,7 +317,7 @@ def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: Reach
 def step(buffers: StepBuffers, state: ReachState, rules: ReachRules) -> None:
     """One decision of every row."""
     i = wp.tid()
-    n = state.numbers[i]
+    n = state.params[i]
     car = car_of(n)
     steer = wp.clamp(buffers.continuous[i, 0], -1.0, 1.0)
     controls = controls_of(n, steer, buffers.continuous[i, 1], buffers.continuous[i, 2])

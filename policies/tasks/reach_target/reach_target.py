@@ -28,7 +28,7 @@ from policies.tasks.reach_target.kernel import (
     begin,
     step,
 )
-from policies.tasks.reach_target.reach_target_params import NUMBERS, ReachNumbers
+from policies.tasks.reach_target.reach_target_params import PARAMS, ReachParams
 from policies.tasks.reach_target.settings import ReachSettings
 from policies.tasks.task import Task
 from policies.tasks.task_params import typed_rows
@@ -58,7 +58,7 @@ _ACTIONS = (Element("steering", "1"), Element("throttle", "1"), Element("brake",
 class ReachTarget(Task):
     """The task. Layout version 1."""
 
-    numbers: ClassVar = NUMBERS
+    params: ClassVar = PARAMS
     decision_s = STEPS * STEP_S
 
     def __init__(self, settings: ReachSettings, env_count: int, device: str = "cpu") -> None:
@@ -78,7 +78,7 @@ class ReachTarget(Task):
         state.target = self._zeros("target", env_count, wp.vec3)
         state.target_yaw = self._zeros("target_yaw", env_count, float)
         state.reaches = self._zeros("reaches", env_count, int)
-        state.numbers = typed_rows(self.buffers.numbers, ReachNumbers)
+        state.params = typed_rows(self.buffers.params, ReachParams)
         self.world = state
         self._record(begin, step, [state, _rules(settings)])
 
@@ -98,7 +98,7 @@ class ReachTarget(Task):
         return canvas.pixels
 
     def _row(self, i_env: int) -> dict[str, float]:
-        return dict(zip(self.number_table.names, self.buffers.numbers.numpy()[i_env].tolist(), strict=True))
+        return dict(zip(self.param_table.names, self.buffers.params.numpy()[i_env].tolist(), strict=True))
 
     def _draw(self, canvas: Canvas, i_env: int) -> None:
         world: Any = self.world

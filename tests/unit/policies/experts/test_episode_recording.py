@@ -68,14 +68,14 @@ def test_same_seed_records_the_same_episodes():
 
 def test_driver_that_never_succeeds_is_given_up():
     task = build_task("RollerBall", 8)
-    task.set_numbers({"reach_m": 0.1, "half_floor_m": 1.0})
+    task.set_params({"reach_m": 0.1, "half_floor_m": 1.0})
     with pytest.raises(RecordingError, match=r"RollerBall: only 0 of \d+ episodes succeeded"):
         record_episodes(task, RandomDriver(), 8, seed=0)
 
 
 def test_failures_are_kept_on_request():
     task = build_task("RollerBall", 8)
-    task.set_numbers({"step_limit": 3.0})
+    task.set_params({"step_limit": 3.0})
     episodes = record_episodes(task, RandomDriver(), 8, seed=0, has_failures=True)
     assert {episode.outcome for episode in episodes} & {Outcome.TIMEOUT}
 

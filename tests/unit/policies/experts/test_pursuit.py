@@ -33,7 +33,7 @@ def test_pursuit_drives_on_from_target_to_target_where_reaching_ends_nothing():
 
 def test_pursuit_copes_with_other_cars():
     task = build_task("ReachTarget", 256)
-    task.set_numbers(
+    task.set_params(
         {
             "mass_kg": Sampler(intervals=((1000.0, 1600.0),)),
             "side_stiffness": Sampler(intervals=((0.8, 1.2),)),

@@ -13,7 +13,7 @@ from policies.learn.networks.policy import Policy
 from policies.tasks.episode import RUNNING, TIMEOUT, StepBuffers, begin_episode, close_step
 from policies.tasks.layout import Element, ImageElement, Layout
 from policies.tasks.task import Task
-from policies.tasks.task_params import Number, typed_rows
+from policies.tasks.task_params import TaskParam, typed_rows
 
 SIDE = 20  # [px]
 POINT = (Element("point", "1"),)
@@ -21,14 +21,14 @@ PRIVILEGED = (Element("place", "1"), Element("is_shown", "1"))
 
 
 @wp.struct
-class GlimpsesNumbers:
+class GlimpsesParams:
     length: float
 
 
 @wp.struct
 class GlimpsesState:
     place: wp.array(dtype=float)  # of the square, -1 (left edge) to 1
-    numbers: wp.array(dtype=GlimpsesNumbers)
+    params: wp.array(dtype=GlimpsesParams)
 
 
 @wp.func
@@ -66,14 +66,14 @@ def step(buffers: StepBuffers, state: GlimpsesState):
     reward = -wp.abs(buffers.continuous[i, 0] - state.place[i])
     count = buffers.steps[i] + 1
     show(buffers, state, i, count)
-    if close_step(buffers, i, reward, wp.where(float(count) >= state.numbers[i].length, TIMEOUT, RUNNING)):
+    if close_step(buffers, i, reward, wp.where(float(count) >= state.params[i].length, TIMEOUT, RUNNING)):
         start(buffers, state, i)
 
 
 class Glimpses(Task):
     """Episodes of a few decisions. Final images are not kept: nothing here looks at them."""
 
-    numbers = (Number("length", 4.0, 1.0, 100.0, "1", "decisions of an episode", "guess"),)
+    params = (TaskParam("length", 4.0, 1.0, 100.0, "1", "decisions of an episode", "guess"),)
     decision_s = 0.1
 
     def __init__(self, env_count, *, privileged=PRIVILEGED):
@@ -83,7 +83,7 @@ class Glimpses(Task):
         super().__init__(layout, env_count, number_defaults={})
         state = GlimpsesState()
         state.place = self._zeros("place", env_count, float)
-        state.numbers = typed_rows(self.buffers.numbers, GlimpsesNumbers)
+        state.params = typed_rows(self.buffers.params, GlimpsesParams)
         self.world = state
         self._record(begin, step, [state])
 

@@ -6,20 +6,20 @@ from common.rng import draw_key
 from policies.tasks.episode import SUCCESS, StepBuffers, begin_episode, close_step, open_frame
 from policies.tasks.layout import Branch, Element, Layout
 from policies.tasks.task import Task
-from policies.tasks.task_params import Number, typed_rows
+from policies.tasks.task_params import TaskParam, typed_rows
 
 SIZES = (3, 2)
 
 
 @wp.struct
-class SignsNumbers:
+class SignsParams:
     pay: float
 
 
 @wp.struct
 class SignsState:
     sign: wp.array(dtype=wp.vec3)
-    numbers: wp.array(dtype=SignsNumbers)
+    params: wp.array(dtype=SignsParams)
 
 
 @wp.func
@@ -50,14 +50,14 @@ def step(buffers: StepBuffers, state: SignsState):
             reward += 0.5
     if buffers.continuous.shape[1] > 0:
         reward -= wp.abs(buffers.continuous[i, 0] - sign[2])
-    if close_step(buffers, i, reward * state.numbers[i].pay, SUCCESS):
+    if close_step(buffers, i, reward * state.params[i].pay, SUCCESS):
         show(buffers, state, i)
 
 
 class Signs(Task):
     """One decision per episode; right choices of both branches pay 1, pointing wrong costs its distance."""
 
-    numbers = (Number("pay", 1.0, 0.0, 10.0, "1", "factor of all rewards", "guess"),)
+    params = (TaskParam("pay", 1.0, 0.0, 10.0, "1", "factor of all rewards", "guess"),)
     decision_s = 1.0
 
     def __init__(self, env_count, branches=SIZES, is_pointing=False):
@@ -71,5 +71,5 @@ class Signs(Task):
         super().__init__(layout, env_count, number_defaults={})
         state = SignsState()
         state.sign = self._zeros("sign", env_count, wp.vec3)
-        state.numbers = typed_rows(self.buffers.numbers, SignsNumbers)
+        state.params = typed_rows(self.buffers.params, SignsParams)
         self._record(begin, step, [state])

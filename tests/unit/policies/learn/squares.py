@@ -9,14 +9,14 @@ from common.rng import draw_key
 from policies.tasks.episode import RUNNING, TIMEOUT, StepBuffers, begin_episode, close_step, open_frame
 from policies.tasks.layout import Element, ImageElement, Layout
 from policies.tasks.task import Task
-from policies.tasks.task_params import Number, typed_rows
+from policies.tasks.task_params import TaskParam, typed_rows
 
 SIDE = 32  # [px]
 HALF = wp.constant(4)  # [px] half a side of the square
 
 
 @wp.struct
-class SquaresNumbers:
+class SquaresParams:
     length: float
 
 
@@ -24,7 +24,7 @@ class SquaresNumbers:
 class SquaresState:
     place: wp.array(dtype=float)  # of the square, -1 (left edge) to 1
     side: wp.array(dtype=float)  # 1: point at it, -1: away from it
-    numbers: wp.array(dtype=SquaresNumbers)
+    params: wp.array(dtype=SquaresParams)
 
 
 @wp.func
@@ -61,7 +61,7 @@ def begin(buffers: StepBuffers, is_chosen: wp.array(dtype=wp.bool), state: Squar
 def step(buffers: StepBuffers, state: SquaresState):
     i = wp.tid()
     reward = -wp.abs(buffers.continuous[i, 0] - state.place[i] * state.side[i])
-    is_over = float(buffers.steps[i] + 1) >= state.numbers[i].length
+    is_over = float(buffers.steps[i] + 1) >= state.params[i].length
     buffers.steps[i] += 1
     show(buffers, state, i)
     buffers.steps[i] -= 1
@@ -79,7 +79,7 @@ def begin_ended(buffers: StepBuffers, state: SquaresState):
 class Squares(Task):
     """Each decision costs its distance from where the square is, or from the opposite side."""
 
-    numbers = (Number("length", 4.0, 1.0, 100.0, "1", "decisions of an episode", "guess"),)
+    params = (TaskParam("length", 4.0, 1.0, 100.0, "1", "decisions of an episode", "guess"),)
     decision_s = 0.1
 
     def __init__(self, env_count, *, has_privileged=True, side=SIDE):
@@ -95,7 +95,7 @@ class Squares(Task):
         state = SquaresState()
         state.place = self._zeros("place", env_count, float)
         state.side = self._zeros("side", env_count, float)
-        state.numbers = typed_rows(self.buffers.numbers, SquaresNumbers)
+        state.params = typed_rows(self.buffers.params, SquaresParams)
         self.world = state
         self._record(begin, step, [state])
         self._begin_ended = wp.launch(begin_ended, env_count, [self.buffers, state], record_cmd=True)

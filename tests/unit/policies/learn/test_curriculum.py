@@ -35,7 +35,7 @@ def lessons(measure, threshold, **more):
 def test_numbers_and_samplers_are_single_lessons():
     gaussian = {"sampler_type": "gaussian", "sampler_parameters": {"mean": 1.0, "st_dev": 0.5}}
     curriculum = Curriculum(parameters(a=2.0, b=gaussian))
-    assert curriculum.numbers() == {"a": Sampler.constant(2.0), "b": Sampler(mean=1.0, st_dev=0.5)}
+    assert curriculum.params() == {"a": Sampler.constant(2.0), "b": Sampler(mean=1.0, st_dev=0.5)}
     assert curriculum.is_last
     assert curriculum.advance(scores(10, 1.0), 1.0) == ([], False)
 
@@ -44,7 +44,7 @@ def test_lesson_ends_when_enough_of_the_training_is_done():
     curriculum = Curriculum(parameters(a=lessons("progress", 0.5)))
     assert curriculum.advance(NO_SCORES, 0.5) == ([], False)
     assert curriculum.advance(NO_SCORES, 0.51) == (["a: lesson far begins"], False)
-    assert curriculum.numbers() == {"a": Sampler(intervals=((2.0, 3.0),))} == curriculum.final_numbers()
+    assert curriculum.params() == {"a": Sampler(intervals=((2.0, 3.0),))} == curriculum.final_params()
     assert curriculum.tags() == {"Environment/Lesson Number/a": 1.0}
 
 

@@ -62,7 +62,7 @@ def test_policy_is_not_changed():
 
 def test_endless_episodes_are_cut_and_count_as_timeouts():
     small = {"force_n": Sampler.constant(0.1)}
-    evaluation = evaluate(make_policy(), "RollerBall", SETTINGS, episodes=20, seed=1, numbers=small, longest=3)
+    evaluation = evaluate(make_policy(), "RollerBall", SETTINGS, episodes=20, seed=1, params=small, longest=3)
     assert evaluation.outcomes["timeout"] == 20 - evaluation.outcomes["success"]
     assert evaluation.mean_length <= 3.0
 

@@ -75,7 +75,7 @@ def test_stacked_frames_hold_the_last_observations_oldest_first_after_zeros():
 
 def test_numbers_are_drawn_anew_for_each_episode_from_their_samplers():
     task = build_task(NAME, 4096)
-    task.set_numbers(
+    task.set_params(
         {
             "mass_kg": Sampler(intervals=((0.5, 1.0), (2.0, 3.0))),
             "force_n": Sampler(mean=10.0, st_dev=1.0),
@@ -83,21 +83,21 @@ def test_numbers_are_drawn_anew_for_each_episode_from_their_samplers():
         }
     )
     task.reset(0)
-    mass, force, *_ = task.buffers.numbers.numpy().T
+    mass, force, *_ = task.buffers.params.numpy().T
     is_low = mass <= 1.0
     assert ((mass >= 0.5) & is_low | (mass >= 2.0) & (mass <= 3.0)).all()
     assert abs(is_low.mean() - 1 / 3) < 0.03  # 4 sigma of 4,096 draws
     assert abs(force.mean() - 10.0) < 0.07
     assert abs(force.std() - 1.0) < 0.05
-    assert (task.buffers.numbers.numpy()[:, task.number_table.names.index("reach_m")] == 1.5).all()
+    assert (task.buffers.params.numpy()[:, task.param_table.names.index("reach_m")] == 1.5).all()
 
 
 def test_a_number_that_does_not_exist_or_is_out_of_bounds_is_refused_in_one_sentence():
     task = build_task(NAME, 1)
     with pytest.raises(NumberError, match="weight: this task has no such number"):
-        task.set_numbers({"weight": 1.0})
+        task.set_params({"weight": 1.0})
     with pytest.raises(NumberError, match="mass_kg: 900 is not between"):
-        task.set_numbers({"mass_kg": Sampler(intervals=((1.0, 900.0),))})
+        task.set_params({"mass_kg": Sampler(intervals=((1.0, 900.0),))})
 
 
 def test_unknown_tasks_and_settings_are_refused_by_name():

@@ -49,8 +49,8 @@ def bytes_of(batch, i_world):
     )
 
 
-def set_numbers(batch, **values):
-    rows = batch.numbers.numpy()
+def set_params(batch, **values):
+    rows = batch.params.numpy()
     for name, value in values.items():
         rows[name] = value
 
@@ -138,9 +138,9 @@ def test_copies_of_a_world_keep_what_they_were_when_it_grows_anew():
 def test_trees_are_as_many_as_asked_and_never_closer_than_their_spacing():
     asked = np.array([30.0, 100.0, 300.0])
     batch = WorldBatch(CONFIG.model_copy(update={"size_m": 400.0}), 3, trees_per_ha_max=300.0)
-    set_numbers(batch, trees_per_ha=asked, clearing_radius_m=0.0)
+    set_params(batch, trees_per_ha=asked, clearing_radius_m=0.0)
     for seed, density in zip((1, 50), (1.0, 0.5), strict=True):
-        set_numbers(batch, trees_per_ha=density * asked)
+        set_params(batch, trees_per_ha=density * asked)
         batch.grow_all(seed)
         for i, trees_per_ha in enumerate(density * asked):
             trees = batch.map(i).trees  # on 390 m x 390 m
@@ -195,7 +195,7 @@ def test_hills_have_the_character_of_those_of_a_single_world():
 
 def test_each_world_is_grown_from_numbers_of_its_own():
     batch = WorldBatch(CONFIG, 3)
-    set_numbers(
+    set_params(
         batch, hill_height_m=[0.0, 2.0, 8.0], trees_per_ha=[0.0, 50.0, 100.0], has_walls=[0, 1, 1], wall_height_m=20.0
     )
     batch.grow_all(1)
@@ -213,7 +213,7 @@ def test_each_world_is_grown_from_numbers_of_its_own():
 
 def test_numbers_beyond_the_room_of_the_batch_get_its_limits():
     batch = WorldBatch(CONFIG, 2)
-    set_numbers(batch, trees_per_ha=1.0e6, tree_height_min_m=40.0, tree_height_max_m=60.0)
+    set_params(batch, trees_per_ha=1.0e6, tree_height_min_m=40.0, tree_height_max_m=60.0)
     batch.grow_all(1)
     world = batch.map(0)
     height = world.trees["crown_high"] + world.trees["crown_radius"] - world.trees["root_height"] - 1.0

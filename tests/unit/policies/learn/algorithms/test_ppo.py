@@ -13,10 +13,10 @@ from policies.tasks.catalogue import build_task
 from policies.tasks.episode import Outcome
 
 
-def learner(seed=1, memory=None, env_count=8, signals=None, width=16, max_steps=10**6, is_normalized=True, **numbers):
-    numbers = {"batch_size": 64, "buffer_size": 256, **numbers}
+def learner(seed=1, memory=None, env_count=8, signals=None, width=16, max_steps=10**6, is_normalized=True, **params):
+    params = {"batch_size": 64, "buffer_size": 256, **params}
     behavior = Behavior(
-        hyperparameters=PpoHyperparameters(**numbers),
+        hyperparameters=PpoHyperparameters(**params),
         network_settings=NetworkSettings(hidden_units=width, normalize=is_normalized, memory=memory),
         max_steps=max_steps,
     )

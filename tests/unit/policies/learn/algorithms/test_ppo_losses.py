@@ -54,8 +54,8 @@ def test_standardized_advantages_have_mean_0_and_deviation_1():
 def test_advantages_of_three_decisions_by_hand():
     # gamma 0.5, lambda 0.5; surprises 1 + 0.5 x 2 - 1 = 1; 0 + 0.5 x 3 - 2 = -0.5; 2 + 0.5 x 4 - 3 = 1
     # 1 at the end; -0.5 + 0.25 x 1 = -0.25; 1 + 0.25 x -0.25 = 0.9375
-    def column(*numbers):
-        return torch.tensor(numbers).view(-1, 1, 1)
+    def column(*params):
+        return torch.tensor(params).view(-1, 1, 1)
 
     nothing = torch.zeros(3, 1, 1, dtype=torch.bool)
     found = advantages(

@@ -30,7 +30,7 @@ def learner(task, *, network=(), seed=1, gamma=0.95, **hyperparameters):
 def small(**hyperparameters):
     """RollerBall with little of everything."""
     task = build_task("RollerBall", 8)
-    task.set_numbers({"step_limit": 20.0})
+    task.set_params({"step_limit": 20.0})
     sizes = {"batch_size": 32, "buffer_size": 1600, "buffer_init_steps": 400, "steps_per_update": 25}
     return learner(task, network={"hidden_units": 16}, **sizes | hyperparameters)
 
@@ -265,7 +265,7 @@ def test_hindsight_finds_cubes_that_are_seldom_met_by_chance():
     rates = []
     for hindsight in (0, 4):
         task = build_task("RollerBall", 16)
-        task.set_numbers({"reach_m": 0.5})
+        task.set_params({"reach_m": 0.5})
         rates.append(success_rate(learner(task, hindsight=hindsight), 20_000))
     assert rates[1] > 0.9
     assert rates[1] > rates[0] + 0.2

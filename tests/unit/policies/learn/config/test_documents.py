@@ -46,7 +46,7 @@ def with_memory(network: NetworkSettings) -> NetworkSettings:
 @pytest.mark.parametrize("variant", range(5))
 def test_reach_target_ppo_means_the_same_in_every_way_of_naming_a_block(variant):
     loaded = load_config(DATA / "reach_target_ppo.yaml", f"ReachTarget_{variant}")
-    numbers = PpoHyperparameters(
+    params = PpoHyperparameters(
         batch_size=2048,
         buffer_size=20480,
         beta=5e-3,
@@ -56,7 +56,7 @@ def test_reach_target_ppo_means_the_same_in_every_way_of_naming_a_block(variant)
         learning_rate_schedule="linear",
         num_epoch=3,
     )
-    assert loaded.config.behavior == Behavior(trainer_type="ppo", hyperparameters=numbers, **REACH_TARGET)
+    assert loaded.config.behavior == Behavior(trainer_type="ppo", hyperparameters=params, **REACH_TARGET)
     assert loaded.config.behavior_name == f"ReachTarget_{variant}"
     assert loaded.warnings == ()
 
@@ -80,7 +80,7 @@ def test_five_flat_behaviours_must_be_chosen_from():
 
 def test_reach_target_sac():
     loaded = load_config(DATA / "reach_target_sac.yaml")
-    numbers = SacHyperparameters(
+    params = SacHyperparameters(
         batch_size=256,
         buffer_size=500_000,
         buffer_init_steps=60_000,
@@ -91,7 +91,7 @@ def test_reach_target_sac():
         steps_per_update=1.0,
     )
     assert loaded.config == RunConfig(
-        behavior_name="ReachTarget", behavior=Behavior(trainer_type="sac", hyperparameters=numbers, **REACH_TARGET)
+        behavior_name="ReachTarget", behavior=Behavior(trainer_type="sac", hyperparameters=params, **REACH_TARGET)
     )
     assert loaded.warnings == ()
 
@@ -138,7 +138,7 @@ def test_parking_defaults():
 
 
 def test_parking_sac():
-    numbers = SacHyperparameters(
+    params = SacHyperparameters(
         batch_size=256,
         buffer_size=50_000,
         learning_rate=1e-5,
@@ -149,7 +149,7 @@ def test_parking_sac():
     )
     assert load_config(DATA / "parking_sac.yaml").config.behavior == Behavior(
         trainer_type="sac",
-        hyperparameters=numbers,
+        hyperparameters=params,
         network_settings=PARKING_NETWORK,  # as it was in ML-Agents: our SAC has no memory either
         reward_signals=RewardSignals(extrinsic=EXTRINSIC),
         max_steps=5_000_000,

@@ -86,7 +86,7 @@ behaviors = st.one_of(
         st.builds(
             Behavior,
             trainer_type=st.just(name),
-            hyperparameters=numbers,
+            hyperparameters=params,
             network_settings=networks.flatmap(
                 lambda network: maybe(memories).map(lambda memory: network.model_copy(update={"memory": memory}))
             ),
@@ -96,7 +96,7 @@ behaviors = st.one_of(
             init_path=maybe(texts),
             success_target=maybe(shares),
         )
-        for name, numbers in (("ppo", ppo), ("sac", sac))
+        for name, params in (("ppo", ppo), ("sac", sac))
     )
 )
 bounds = st.tuples(reals, reals).map(lambda pair: (min(pair), max(pair)))

@@ -221,9 +221,9 @@ def test_numbers_are_taken_as_people_type_them(tmp_path):
 
 
 def test_schedules_of_beta_and_epsilon_follow_the_learning_rates(tmp_path):
-    numbers = load(tmp_path, CAR + "      learning_rate_schedule: constant\n      beta_schedule: linear\n").config
-    assert numbers.behavior.hyperparameters.beta_schedule == "linear"
-    assert numbers.behavior.hyperparameters.epsilon_schedule == "constant"
+    params = load(tmp_path, CAR + "      learning_rate_schedule: constant\n      beta_schedule: linear\n").config
+    assert params.behavior.hyperparameters.beta_schedule == "linear"
+    assert params.behavior.hyperparameters.epsilon_schedule == "constant"
 
 
 def test_a_run_may_be_called_by_a_number_or_a_date(tmp_path):

@@ -21,9 +21,9 @@ def test_a_recipe_is_found_by_its_task_and_by_its_own_name():
 
 def test_the_tutorial_has_its_numbers():
     behavior = load_config(recipe("roller-ball-tutorial")).config.behavior
-    numbers = behavior.hyperparameters
-    assert (numbers.batch_size, numbers.buffer_size, numbers.learning_rate) == (10, 100, 3e-4)
-    assert (numbers.beta, numbers.lambd, numbers.num_epoch) == (5e-4, 0.99, 3)
+    params = behavior.hyperparameters
+    assert (params.batch_size, params.buffer_size, params.learning_rate) == (10, 100, 3e-4)
+    assert (params.beta, params.lambd, params.num_epoch) == (5e-4, 0.99, 3)
     assert (behavior.network_settings.num_layers, behavior.network_settings.hidden_units) == (2, 128)
     assert behavior.reward_signals.extrinsic.gamma == 0.99
 

@@ -27,12 +27,12 @@ def observation(rows, side=32, seed=0):
     return Observation(torch.randn(rows, 1, generator=generator(seed)), image)
 
 
-def learner(task=None, seed=1, network=None, learning_rate_schedule="constant", **numbers):
+def learner(task=None, seed=1, network=None, learning_rate_schedule="constant", **params):
     task = task or Squares(16)
-    numbers = {"batch_size": 64, "buffer_size": 128, "learning_rate_schedule": learning_rate_schedule, **numbers}
+    params = {"batch_size": 64, "buffer_size": 128, "learning_rate_schedule": learning_rate_schedule, **params}
     network = {"hidden_units": 16, "num_layers": 1, "vis_encode_type": "compact", **(network or {})}
     behavior = Behavior(
-        hyperparameters=PpoHyperparameters(**numbers), network_settings=NetworkSettings(**network), max_steps=10**6
+        hyperparameters=PpoHyperparameters(**params), network_settings=NetworkSettings(**network), max_steps=10**6
     )
     policy = Policy(task.layout, behavior.network_settings, generator(seed))
     return Ppo(task, policy, behavior, [ExtrinsicSignal(gamma=0.5)], seed=seed)

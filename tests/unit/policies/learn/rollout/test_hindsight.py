@@ -106,7 +106,7 @@ def test_restored_hindsight_goes_on_alike():
 )
 def test_a_tasks_own_successes_are_those_its_place_goal_tells(name, settings, radius_m):
     task = build_task(name, 256, task_settings(name, settings))
-    task.set_numbers({"reach_m": radius_m})
+    task.set_params({"reach_m": radius_m})
     task.reset(3)
     actions = np.random.default_rng(3)
     goal = task.goal

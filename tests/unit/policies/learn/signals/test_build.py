@@ -20,10 +20,10 @@ ALL = {
 }
 
 
-def learner(demo_path, blocks, seed=1, env_count=16, *, has_cloning=False, **numbers):
+def learner(demo_path, blocks, seed=1, env_count=16, *, has_cloning=False, **params):
     gail = {"gail": blocks["gail"] | {"demo_path": demo_path}} if "gail" in blocks else {}
     behavior = Behavior(
-        hyperparameters=PpoHyperparameters(**{"batch_size": 64, "buffer_size": 256} | numbers),
+        hyperparameters=PpoHyperparameters(**{"batch_size": 64, "buffer_size": 256} | params),
         network_settings=NetworkSettings(hidden_units=64, normalize=True),
         reward_signals=RewardSignals.model_validate(blocks | gail),
     )
@@ -85,8 +85,8 @@ def test_imitation_alone_and_beside_the_tasks_reward_reaches_the_cubes(demonstra
     """At 490,000 steps 98.8 and 99.9 % succeeded (measured with one seed); chance reaches a fifth."""
     network = {"hidden_units": 64, "normalize": True}
     gail = blocks["gail"] | {"learning_rate": 1e-3, "reward_form": "logit", "network_settings": network}
-    numbers = {"batch_size": 2048, "buffer_size": 8192, "learning_rate": 1e-3, "beta": 1e-3}
-    ppo = learner(demonstrations, blocks | {"gail": gail}, env_count=256, **numbers)
+    params = {"batch_size": 2048, "buffer_size": 8192, "learning_rate": 1e-3, "beta": 1e-3}
+    ppo = learner(demonstrations, blocks | {"gail": gail}, env_count=256, **params)
     while ppo.steps < 600_000:
         scores = ppo.iterate().scores
     assert scores.count(Outcome.SUCCESS) > 0.95 * scores.episode_count > 100

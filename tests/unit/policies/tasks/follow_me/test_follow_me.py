@@ -22,10 +22,10 @@ STATE = {"observation": "state", "has_estimator": "false"}
 SMALL = {"image_size": "8"}
 
 
-def _task(count: int, seed: int = 5, numbers: dict[str, float] | None = None, **settings: Any) -> FollowMe:
+def _task(count: int, seed: int = 5, params: dict[str, float] | None = None, **settings: Any) -> FollowMe:
     task = build_task("FollowMe", count, task_settings("FollowMe", settings))
     assert isinstance(task, FollowMe)
-    task.set_numbers(numbers or {})
+    task.set_params(params or {})
     task.reset(seed)
     return task
 
@@ -83,12 +83,12 @@ def test_beginning_one_row_touches_only_that_row() -> None:
 
 
 def test_restored_state_continues_bit_for_bit() -> None:
-    numbers = {"decision_limit": 3.0}  # so that episodes begin in between
-    task = _task(2, numbers=numbers, **SMALL)
+    params = {"decision_limit": 3.0}  # so that episodes begin in between
+    task = _task(2, params=params, **SMALL)
     _fly(task, 2)
     kept = task.state()
     _fly(task, 3, seed=1)
-    other = _task(2, seed=9, numbers=numbers, **SMALL)
+    other = _task(2, seed=9, params=params, **SMALL)
     other.load_state(kept)
     _fly(other, 3, seed=1)
     restored = other.state()
@@ -155,7 +155,7 @@ def test_episodes_start_as_takeovers_do() -> None:
 
 @pytest.mark.parametrize(("aside_m", "outcome"), [(0.0, Outcome.HIT_OTHER), (0.3, Outcome.RUNNING)])
 def test_an_owner_who_runs_past_between_two_decisions_has_been_hit(aside_m: float, outcome: Outcome) -> None:
-    task = _task(1, numbers={"touch_m": 0.2, "trees_per_ha": 0.0, "owner_speed_max": 6.0}, **STATE)
+    task = _task(1, params={"touch_m": 0.2, "trees_per_ha": 0.0, "owner_speed_max": 6.0}, **STATE)
     people = task.follow.people.numpy()
     drone_ned = task.rig.rows["truth"][0]["pos_ned"]
     people["pos_ned"][0, :2] = drone_ned[0] + aside_m, drone_ned[1] - 0.3  # 0.6 m to the east in 0.1 s
@@ -169,8 +169,8 @@ def test_an_owner_who_runs_past_between_two_decisions_has_been_hit(aside_m: floa
     assert Outcome(int(task.buffers.outcomes.numpy()[0])) is outcome
 
 
-def _documented(numbers: dict[str, float]) -> tuple[float, Outcome]:
-    task = _task(1, numbers=numbers, preset="as-documented", observation="state", has_estimator="false")
+def _documented(params: dict[str, float]) -> tuple[float, Outcome]:
+    task = _task(1, params=params, preset="as-documented", observation="state", has_estimator="false")
     task.step()
     return float(task.buffers.rewards.numpy()[0]), Outcome(int(task.buffers.outcomes.numpy()[0]))
 
@@ -199,7 +199,7 @@ def test_time_running_out_is_a_truncation_and_a_success_where_the_owner_is_follo
     distance_m: float, outcome: Outcome
 ) -> None:
     start = {"start_distance_min_m": distance_m, "start_distance_max_m": distance_m, "start_bearing_deg": 0.0}
-    task = _task(1, numbers={"decision_limit": 1.0, **start}, **STATE)
+    task = _task(1, params={"decision_limit": 1.0, **start}, **STATE)
     task.step()
     buffers = task.buffers
     assert Outcome(int(buffers.outcomes.numpy()[0])) is outcome
@@ -208,7 +208,7 @@ def test_time_running_out_is_a_truncation_and_a_success_where_the_owner_is_follo
 
 
 def test_losing_the_owner_and_touching_the_ground_end_an_episode() -> None:
-    task = _task(2, numbers={"wind_m_s": 0.0}, **STATE)
+    task = _task(2, params={"wind_m_s": 0.0}, **STATE)
     ends = [set[Outcome](), set[Outcome]()]
     task.buffers.continuous.assign(np.array([[0, 0, 1, 0], [-1, 0, -0.2, 0]], dtype=np.float32))
     for _ in range(40):

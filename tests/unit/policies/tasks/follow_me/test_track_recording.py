@@ -11,7 +11,7 @@ from policies.tasks.follow_me.track_recording import Recording
 def recorded():
     """Twelve decisions' episodes of vehicles that stay where they are."""
     task = build_task("FollowMe", 4, task_settings("FollowMe", {"observation": "state", "has_estimator": False}))
-    task.set_numbers({"decision_limit": 12.0})
+    task.set_params({"decision_limit": 12.0})
     task.reset(3)
     recording = Recording(task)
     rewards = np.zeros(4)

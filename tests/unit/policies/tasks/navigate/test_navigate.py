@@ -19,10 +19,10 @@ QUICK = {"has_estimator": "false"}
 DEPTH = {"observation": "depth", "image_size": "8"}
 
 
-def _task(count: int, seed: int = 5, numbers: dict[str, float] | None = None, **settings: Any) -> Navigate:
+def _task(count: int, seed: int = 5, params: dict[str, float] | None = None, **settings: Any) -> Navigate:
     task = build_task("Navigate", count, task_settings("Navigate", settings))
     assert isinstance(task, Navigate)
-    task.set_numbers(numbers or {})
+    task.set_params(params or {})
     task.reset(seed)
     return task
 
@@ -79,12 +79,12 @@ def test_beginning_one_row_touches_only_that_row() -> None:
 
 
 def test_restored_state_continues_bit_for_bit() -> None:
-    numbers = {"slowest_m_s": 20.0, "goal_min_m": 10.0, "goal_max_m": 10.0}  # so that episodes begin in between
-    task = _task(2, numbers=numbers)
+    params = {"slowest_m_s": 20.0, "goal_min_m": 10.0, "goal_max_m": 10.0}  # so that episodes begin in between
+    task = _task(2, params=params)
     _fly(task, 4)
     kept = task.state()
     _fly(task, 4, seed=1)
-    other = _task(2, seed=9, numbers=numbers)
+    other = _task(2, seed=9, params=params)
     other.load_state(kept)
     _fly(other, 4, seed=1)
     restored = other.state()
@@ -109,7 +109,7 @@ def test_observation_does_not_change_when_the_truth_does() -> None:
 
 
 def test_sectors_tell_the_nearest_that_a_fan_of_fine_rays_meets() -> None:
-    task = _task(4, numbers={"range_noise": 0.0, "hill_height_m": 0.0})
+    task = _task(4, params={"range_noise": 0.0, "hill_height_m": 0.0})
     ranges_m = task.navigation.ranges_m.numpy()
     bodies = task.rig.rows["truth"]
     for row, body in enumerate(bodies):
@@ -147,7 +147,7 @@ def test_goal_is_told_by_estimate_in_the_heading_frame() -> None:
 def test_progress_is_paid_up_to_the_wanted_speed_only() -> None:
     costs = ("time_cost", "clearance_cost", "height_cost", "heading_cost", "jerk_cost", "turn_cost")
     free = dict.fromkeys(costs, 0.0) | {"trees_per_ha": 0.0, "wind_m_s": 0.0, "speed_m_s": 2.0}
-    task = _task(1, numbers=free | {"progress_reward": 0.1}, **QUICK)
+    task = _task(1, params=free | {"progress_reward": 0.1}, **QUICK)
     frame = task.buffers.observations.numpy()[0, task.layout.frame_size :]
     seen = dict(zip((element.name for element in task.layout.frame), frame, strict=True))
     ahead = 0.9 * np.array([seen["goal_dir_hfrd_x"], seen["goal_dir_hfrd_y"], 0.0, 0.0])
@@ -160,8 +160,8 @@ def test_progress_is_paid_up_to_the_wanted_speed_only() -> None:
     assert float(task.buffers.rewards.numpy()[0]) == pytest.approx(0.1 * 2.0 * 0.1, rel=1e-3)
 
 
-def _end(numbers: dict[str, float], action: tuple[float, ...], decisions: int = 60) -> Outcome:
-    task = _task(1, numbers=numbers | {"wind_m_s": 0.0, "wind_gust_m_s": 0.0}, **QUICK)
+def _end(params: dict[str, float], action: tuple[float, ...], decisions: int = 60) -> Outcome:
+    task = _task(1, params=params | {"wind_m_s": 0.0, "wind_gust_m_s": 0.0}, **QUICK)
     for _ in range(decisions):
         task.buffers.continuous.assign(np.array([action], dtype=np.float32))
         task.step()
@@ -179,7 +179,7 @@ def test_episodes_end_at_the_goal_at_a_tree_over_the_forest_and_in_time() -> Non
 
 
 def test_only_running_out_of_time_is_a_truncation() -> None:
-    task = _task(1, numbers={"goal_min_m": 10.0, "goal_max_m": 10.0, "goal_radius_m": 20.0}, **QUICK)
+    task = _task(1, params={"goal_min_m": 10.0, "goal_max_m": 10.0, "goal_radius_m": 20.0}, **QUICK)
     task.step()
     buffers = task.buffers
     assert (bool(buffers.is_truncated.numpy()[0]), bool(buffers.is_terminated.numpy()[0])) == (False, True)
@@ -207,7 +207,7 @@ def test_training_and_test_episodes_draw_from_disjoint_worlds() -> None:
 
 def test_forests_last_as_many_episodes_as_asked_for_each_with_a_goal_of_its_own() -> None:
     everyone = np.ones(2, dtype=np.bool_)
-    task = _task(2, numbers={"episodes_per_world": 2.0}, **QUICK)
+    task = _task(2, params={"episodes_per_world": 2.0}, **QUICK)
     seeds, goals = [], []
     for _ in range(3):
         seeds.append(task.world_seeds.numpy().copy())

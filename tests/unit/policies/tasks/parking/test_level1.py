@@ -14,9 +14,9 @@ PRESETS = ("as-documented", "as-coded", "improved")
 PUSH, RIGHT, LEFT = 0, 1, 2
 
 
-def built(env_count=1, seed=0, numbers=None, **settings):
+def built(env_count=1, seed=0, params=None, **settings):
     task = build_task("Parking1", env_count, task_settings("Parking1", settings))
-    task.set_numbers(numbers or {})
+    task.set_params(params or {})
     task.reset(seed)
     return task
 
@@ -133,7 +133,7 @@ def test_an_episode_without_limit_goes_on_and_one_with_a_limit_is_truncated():
     for _ in range(300):
         act(task, RIGHT, RIGHT)
     assert task.buffers.steps.numpy().tolist() == [300, 300]
-    task = built(2, numbers={"step_limit": 20.0})
+    task = built(2, params={"step_limit": 20.0})
     for _ in range(20):
         act(task, RIGHT, RIGHT)
     assert (task.buffers.outcomes.numpy() == Outcome.TIMEOUT).all()
@@ -208,14 +208,14 @@ def test_pads_and_blocks_are_as_wide_as_their_numbers_say(place, number, sizes_m
     between = (sum(sizes_m) / 2 + 1.1317) / 2  # where a car beside it touches the wide one only
     pos = np.array(place[:2]) + between * np.array([np.cos(yaw_rad), -np.sin(yaw_rad)])
     for size_m, expected in zip(sizes_m, (Outcome.RUNNING, outcome), strict=True):
-        task = built(numbers={number: size_m})
+        task = built(params={number: size_m})
         put(task, 0, pos=pos, yaw_deg=place[2], goal=(8.0, 9.0, 0.0))
         act(task, RIGHT)
         assert task.buffers.outcomes.numpy()[0] == expected
 
 
 def test_starts_may_be_kept_near_the_goal():
-    task = built(512, starts="anywhere", goals="anywhere", resets="clean", numbers={"start_range_m": 5.0})
+    task = built(512, starts="anywhere", goals="anywhere", resets="clean", params={"start_range_m": 5.0})
     gaps = np.abs(task.world.pos.numpy() - task.world.goal.numpy()[:, :2])
     assert gaps.max() <= 5.0
 
@@ -239,9 +239,9 @@ def test_a_mirrored_world_gives_mirrored_ranges():
 
 
 def test_numbers_may_be_randomised():
-    task = built(256, numbers={"drag_per_s": Sampler(intervals=((4.0, 12.0),))})
+    task = built(256, params={"drag_per_s": Sampler(intervals=((4.0, 12.0),))})
     act(task, *[PUSH] * 256)
-    drag = task.buffers.numbers.numpy()[:, task.number_table.names.index("drag_per_s")]
+    drag = task.buffers.params.numpy()[:, task.param_table.names.index("drag_per_s")]
     assert drag.std() > 1.0
     assert task.world.vel.numpy()[:, 1] == pytest.approx(2.0 * (1.0 - drag * 0.02) ** 3, rel=1e-4)
 

@@ -20,9 +20,9 @@ STAY, GO = (0, 0), (0, 1)
 FAR_AWAY = (34.0, 500.0, 0.0, 1.0)  # where a mover is in nobody's way
 
 
-def built(env_count=1, seed=0, numbers=None, **settings):
+def built(env_count=1, seed=0, params=None, **settings):
     task = build_task("Parking2", env_count, task_settings("Parking2", settings))
-    task.set_numbers(numbers or {})
+    task.set_params(params or {})
     task.reset(seed)
     return task
 
@@ -188,7 +188,7 @@ def test_improved_episodes_begin_clear_of_everything():
 
 
 def test_progress_through_the_portal_is_the_length_of_the_route():
-    task = built(reward="progress", numbers={"discount": 1.0, "time_reward": 0.0, "progress_per_m": 1.0})
+    task = built(reward="progress", params={"discount": 1.0, "time_reward": 0.0, "progress_per_m": 1.0})
     world = task.world
     nose = np.array([np.sin(world.yaw.numpy()[0]), np.cos(world.yaw.numpy()[0])])
     box = world.pos.numpy()[0] + 0.29 * nose

@@ -8,10 +8,10 @@ WALL_Z_HIGH, WALL_X_HIGH, WALL_X_LOW = 14.995, 14.935, -14.945
 LENGTH = 100.0
 
 
-def seen(*, pos=(0.0, 0.0), yaw_deg=0.0, blocks=(), goal=(-14.0, -14.0, 0.0), numbers=None, **settings):
+def seen(*, pos=(0.0, 0.0), yaw_deg=0.0, blocks=(), goal=(-14.0, -14.0, 0.0), params=None, **settings):
     """The rays of one car, (rays, tags + 2), and the task."""
     task = build_task("Parking1", 1, task_settings("Parking1", {"rays": 1, **settings}))
-    task.set_numbers({"ray_degrees": 90.0, "ray_length_m": LENGTH, "turn_deg": 0.1, "push_n": 0.0, **(numbers or {})})
+    task.set_params({"ray_degrees": 90.0, "ray_length_m": LENGTH, "turn_deg": 0.1, "push_n": 0.0, **(params or {})})
     task.reset(0)
     task.world.pos.numpy()[0] = pos
     task.world.yaw.numpy()[0] = np.radians(yaw_deg)
@@ -44,12 +44,12 @@ def test_a_tagged_hit_sets_its_tag_and_an_untagged_one_none():
 
 
 def test_beyond_the_length_a_ray_misses_with_fraction_one():
-    assert seen(numbers={"ray_length_m": 10.0})[0].tolist() == [0.0, 1.0, 1.0]
+    assert seen(params={"ray_length_m": 10.0})[0].tolist() == [0.0, 1.0, 1.0]
 
 
 def test_a_sphere_meets_what_a_thin_ray_passes_and_rounds_its_corners():
     block = (0.0, 6.0, 90.0)  # half a metre wide to each side of x = 0
-    assert seen(pos=(0.6, 0.0), blocks=[block], numbers={"ray_radius_m": 0.0})[0, 0] == 0.0
+    assert seen(pos=(0.6, 0.0), blocks=[block], params={"ray_radius_m": 0.0})[0, 0] == 0.0
     hit = seen(pos=(0.8, 0.0), blocks=[block])[0]
     edge = 6.0 - 3.467 / 2
     assert hit == pytest.approx([1.0, 0.0, (edge - 0.4) / LENGTH], abs=1e-6)  # 0.3 aside of the corner: 0.4 before it
@@ -62,7 +62,7 @@ def test_pads_are_hit_as_triggers_are():
 
 
 def test_the_fan_is_spread_evenly_to_each_side():
-    rays = seen(rays=4, numbers={"ray_degrees": 80.0, "ray_radius_m": 0.0})[:, -1] * LENGTH
+    rays = seen(rays=4, params={"ray_degrees": 80.0, "ray_radius_m": 0.0})[:, -1] * LENGTH
     angles = np.radians([20.0, 40.0])
     assert rays[1] == pytest.approx(WALL_Z_HIGH / np.cos(angles[0]), rel=1e-5)
     assert rays[2] == pytest.approx(WALL_Z_HIGH / np.cos(angles[0]), rel=1e-5)

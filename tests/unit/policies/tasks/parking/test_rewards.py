@@ -13,10 +13,10 @@ GOAL = (0.0, 12.0, 0.0)
 HEIGHT = 0.2  # of the car's origin over the pad's centre
 
 
-def rewarded(*, pos, best=30.0, last=0.0, vel=(0.0, 0.0), numbers=None, goal=GOAL, blocks=None, **settings):
+def rewarded(*, pos, best=30.0, last=0.0, vel=(0.0, 0.0), params=None, goal=GOAL, blocks=None, **settings):
     """The reward of one decision from a situation, and the task after it."""
     task = build_task("Parking1", 1, task_settings("Parking1", settings))
-    task.set_numbers({**STILL, **(numbers or {})})
+    task.set_params({**STILL, **(params or {})})
     task.reset(0)
     world = task.world
     world.pos.numpy()[0], world.vel.numpy()[0] = pos, vel
@@ -30,33 +30,33 @@ def rewarded(*, pos, best=30.0, last=0.0, vel=(0.0, 0.0), numbers=None, goal=GOA
 
 @pytest.mark.parametrize("reward", ["as-documented", "as-coded"])
 def test_row_1_a_wall_costs_a_half_and_ends(reward):
-    value, task = rewarded(pos=(5.0, 13.9), vel=(0.0, 2.0), numbers=QUIET, reward=reward)
+    value, task = rewarded(pos=(5.0, 13.9), vel=(0.0, 2.0), params=QUIET, reward=reward)
     assert task.buffers.outcomes.numpy()[0] == Outcome.HIT_WALL
     assert value == pytest.approx(-0.5, abs=2e-4)
 
 
 def test_row_2_an_obstacle_costs_a_half_and_ends():
-    value, task = rewarded(pos=(-3.28, 1.0), numbers=QUIET)
+    value, task = rewarded(pos=(-3.28, 1.0), params=QUIET)
     assert task.buffers.outcomes.numpy()[0] == Outcome.HIT_OBSTACLE
     assert value == pytest.approx(-0.5, abs=2e-4)
 
 
 def test_row_3_a_park_pays_five_and_ends():
-    value, task = rewarded(pos=(0.0, 11.0), numbers=QUIET)
+    value, task = rewarded(pos=(0.0, 11.0), params=QUIET)
     assert task.buffers.outcomes.numpy()[0] == Outcome.SUCCESS
     assert value == pytest.approx(5.0, abs=2e-4)
 
 
 def test_row_4_near_the_goal_pays_beside_the_row_of_approach():
     near, far = (0.0, 12.0 - 2.45), (0.0, 12.0 - 2.55)  # a car whose box is still off the pad
-    numbers = {**QUIET, "car_length_m": 0.5, "box_ahead_m": 0.0}
-    assert rewarded(pos=near, numbers=numbers)[0] == pytest.approx(3e-5 + 2e-5, rel=1e-3)
-    assert rewarded(pos=far, numbers=numbers)[0] == pytest.approx(2e-5, rel=1e-3)
-    assert rewarded(pos=near, numbers=numbers, reward="as-documented")[0] == pytest.approx(8e-5 + 2e-5, rel=1e-3)
+    params = {**QUIET, "car_length_m": 0.5, "box_ahead_m": 0.0}
+    assert rewarded(pos=near, params=params)[0] == pytest.approx(3e-5 + 2e-5, rel=1e-3)
+    assert rewarded(pos=far, params=params)[0] == pytest.approx(2e-5, rel=1e-3)
+    assert rewarded(pos=near, params=params, reward="as-documented")[0] == pytest.approx(8e-5 + 2e-5, rel=1e-3)
 
 
 def test_row_5_the_best_distance_pays_once():
-    value, task = rewarded(pos=(0.0, 2.0), best=10.1, last=9.0, numbers=QUIET)
+    value, task = rewarded(pos=(0.0, 2.0), best=10.1, last=9.0, params=QUIET)
     assert value == pytest.approx(2e-5, rel=1e-3)
     assert task.world.best_m.numpy()[0] == pytest.approx(np.hypot(10.0, HEIGHT), rel=1e-5)
     task.step()
@@ -67,7 +67,7 @@ def test_row_5_the_best_distance_pays_once():
     ("reward", "paid"), [("as-coded", 1e-5), ("as-documented-gail", 1e-5), ("as-documented", -4e-5)]
 )
 def test_row_6_nearer_but_not_best(reward, paid):
-    value, _ = rewarded(pos=(0.0, 2.0), best=5.0, last=10.5, numbers=QUIET, reward=reward)
+    value, _ = rewarded(pos=(0.0, 2.0), best=5.0, last=10.5, params=QUIET, reward=reward)
     assert value == pytest.approx(paid, rel=1e-3)
 
 
@@ -75,26 +75,26 @@ def test_row_6_nearer_but_not_best(reward, paid):
     ("reward", "paid"), [("as-coded", -2e-5), ("as-documented-gail", -2e-5), ("as-documented", -8e-5)]
 )
 def test_row_7_farther(reward, paid):
-    value, _ = rewarded(pos=(0.0, 2.0), best=5.0, last=9.5, numbers=QUIET, reward=reward)
+    value, _ = rewarded(pos=(0.0, 2.0), best=5.0, last=9.5, params=QUIET, reward=reward)
     assert value == pytest.approx(paid, rel=1e-3)
 
 
 def test_row_4_as_coded_makes_a_nearer_step_within_its_radius_count_as_farther():
-    numbers = {**QUIET, "car_length_m": 0.5, "box_ahead_m": 0.0}
-    situation = {"pos": (0.0, 12.0 - 2.45), "best": 1.0, "last": 5.0, "numbers": numbers}
+    params = {**QUIET, "car_length_m": 0.5, "box_ahead_m": 0.0}
+    situation = {"pos": (0.0, 12.0 - 2.45), "best": 1.0, "last": 5.0, "params": params}
     assert rewarded(**situation)[0] == pytest.approx(3e-5 - 2e-5, rel=1e-3)
     assert rewarded(**situation, reward="as-documented-gail")[0] == pytest.approx(3e-5 + 1e-5, rel=1e-3)
 
 
 def test_best_begins_at_30_in_each_episode_and_last_is_kept_as_coded():
-    _, task = rewarded(pos=(5.0, 13.9), vel=(0.0, 2.0), best=1.0, numbers=QUIET)
+    _, task = rewarded(pos=(5.0, 13.9), vel=(0.0, 2.0), best=1.0, params=QUIET)
     assert task.buffers.outcomes.numpy()[0] == Outcome.HIT_WALL
     assert task.world.best_m.numpy()[0] == 30.0
     assert task.world.last_m.numpy()[0] == pytest.approx(np.sqrt(5.0**2 + 1.9**2 + HEIGHT**2), rel=1e-5)
 
 
 def test_row_8_as_coded_is_measured_to_the_centres_of_walls():
-    in_reach = {"pos": (0.0, -13.5), "last": 1e3, "best": 1.0, "numbers": {"best_start_m": 0.0}}
+    in_reach = {"pos": (0.0, -13.5), "last": 1e3, "best": 1.0, "params": {"best_start_m": 0.0}}
     assert rewarded(**in_reach)[0] == pytest.approx(-0.005 + 1e-5, rel=1e-3)
     along_the_wall = {**in_reach, "pos": (6.0, -13.5)}
     assert rewarded(**along_the_wall)[0] == pytest.approx(1e-5, rel=1e-3)
@@ -117,7 +117,7 @@ def test_row_9_costs_once_for_each_obstacle_and_not_in_the_documents_ppo_column(
 
 def at_portal(**settings):
     task = build_task("Parking2", 1, task_settings("Parking2", settings))
-    task.set_numbers({**QUIET, **STILL})
+    task.set_params({**QUIET, **STILL})
     task.reset(0)
     task.world.pos.numpy()[0], task.world.yaw.numpy()[0] = (-11.0, 11.45), np.radians(-45.0)
     task.step()
@@ -135,15 +135,15 @@ def test_row_11_through_the_portal_away_from_the_target():
 
 
 def test_rows_are_paid_for_each_applied_action():
-    once = rewarded(pos=(0.0, 2.0), best=5.0, last=9.5, numbers=QUIET)[0]
-    held = rewarded(pos=(0.0, 2.0), best=5.0, last=9.5, numbers=QUIET, repeat="held")[0]
+    once = rewarded(pos=(0.0, 2.0), best=5.0, last=9.5, params=QUIET)[0]
+    held = rewarded(pos=(0.0, 2.0), best=5.0, last=9.5, params=QUIET, repeat="held")[0]
     assert held == pytest.approx(3 * once, rel=1e-3)
 
 
 def test_progress_sums_to_the_way_that_was_made_and_its_end_gives_the_potential_back():
     free = {"discount": 1.0, "time_reward": 0.0, "progress_per_m": 0.1, "push_n": 800.0}
     task = build_task("Parking1", 1, task_settings("Parking1", {"reward": "progress"}))
-    task.set_numbers(free)
+    task.set_params(free)
     task.reset(0)
     way = float(task.world.way_m.numpy()[0])
     total = 0.0

@@ -16,7 +16,7 @@ from bench.vehicle import (
 )
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.reach_target.car_model import car_of, suspension_load
-from policies.tasks.reach_target.reach_target_params import ReachNumbers
+from policies.tasks.reach_target.reach_target_params import ReachParams
 from policies.tasks.task_params import Sampler
 
 
@@ -138,7 +138,7 @@ def test_wheels_in_the_air_spin_up_by_their_own_inertia():
 @pytest.mark.parametrize("seed", range(3))
 def test_wild_driving_with_wild_numbers_stays_finite(seed):
     task = build_task("ReachTarget", 256, task_settings("ReachTarget", {"preset": "as-documented"}))
-    task.set_numbers(
+    task.set_params(
         {
             "mass_kg": Sampler(intervals=((800.0, 2500.0),)),
             "spring_n_m": Sampler(intervals=((20000.0, 60000.0),)),
@@ -156,10 +156,10 @@ def test_wild_driving_with_wild_numbers_stays_finite(seed):
 
 
 def test_the_platform_never_pushes_a_wheel_harder_than_the_car_weighs():
-    numbers = ReachNumbers()
+    params = ReachParams()
     for name, value in NUMBER.items():
-        setattr(numbers, name, value)
-    vehicle = car_of(numbers)
+        setattr(params, name, value)
+    vehicle = car_of(params)
     weight = NUMBER["mass_kg"] * NUMBER["gravity_m_s2"]
     assert suspension_load(vehicle, 0.05, 0.0) == pytest.approx(0.05 * NUMBER["spring_n_m"])
     assert suspension_load(vehicle, 0.6, -5.0) == pytest.approx(weight)  # a wheel that came back over an edge

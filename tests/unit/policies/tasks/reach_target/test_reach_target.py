@@ -12,9 +12,9 @@ SIZES = (9, 9, 15, 9, 9)
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 
-def built(count=1, numbers=None, **settings):
+def built(count=1, params=None, **settings):
     task = build_task(NAME, count, task_settings(NAME, settings))
-    task.set_numbers(numbers or {})
+    task.set_params(params or {})
     task.reset(0)
     return task
 
@@ -125,7 +125,7 @@ def test_a_reach_as_coded_pays_one_ends_the_episode_and_keeps_the_motion():
 
 
 def test_a_reach_as_documented_pays_one_moves_the_target_and_goes_on():
-    task = built(variant=4, preset="as-documented", numbers={"step_limit": 3.0})
+    task = built(variant=4, preset="as-documented", params={"step_limit": 3.0})
     rolling(task, (0.0, 0.859, 0.0), 5.0)
     set_row(task, target=(0.0, 0.5, 1.5))
     act(task)
@@ -153,7 +153,7 @@ def test_shaping_pays_the_speed_towards_the_target_over_two_thousand(preset, tim
 
 
 def test_potential_shaping_of_a_whole_episode_depends_on_where_it_began_only():
-    task = built(observation="ego", reward="potential", numbers={"shaping_gamma": 1.0})
+    task = built(observation="ego", reward="potential", params={"shaping_gamma": 1.0})
     rolling(task, (0.0, 0.859, 0.0), 10.0)
     set_row(task, target=(0.0, 0.5, 30.0))
     total = 0.0
@@ -180,7 +180,7 @@ def test_standing_still_is_cut_after_two_hundred_decisions_and_starts_in_the_mid
 def test_driving_on_falls_off_the_edge_without_a_penalty():
     for preset in ("as-documented", "as-coded"):
         task = built(64, preset=preset)
-        task.set_numbers({"reach_m": 0.05})
+        task.set_params({"reach_m": 0.05})
         act(task, 0.0, 0.4, 0.0, 60)
         scores = task.take_scores()
         assert scores.count(Outcome.FELL) + scores.count(Outcome.HIT_OTHER) >= 64
