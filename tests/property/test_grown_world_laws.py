@@ -37,7 +37,7 @@ def batch() -> WorldBatch:
 
 
 def grow(i_world: int, seed: int, numbers: dict) -> WorldMap:
-    table = batch().numbers.numpy()
+    table = batch().params.numpy()
     for name, value in numbers.items():
         table[name][i_world] = value
     is_chosen = np.arange(COUNT) == i_world
