@@ -1,34 +1,22 @@
 """The protocol half of the scripting client: frames, commands, missions and parameters, in simulated time.
 
-In: bytes from a transport, once per frame. Out: heartbeats at 1 Hz, the offboard setpoint at 20 Hz, requests and
+In: bytes from a link, once per frame. Out: heartbeats at 1 Hz, the offboard setpoint at 20 Hz, requests and
 their re-sends. Coroutines wait for messages by letting frames pass; nothing sleeps and nothing reads a wall clock.
 """
 
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator, Iterable, Sequence
 from types import TracebackType, coroutine
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
-from autopilot.mavlink.transport.links import MemoryLink
-from autopilot.mavlink.wire.codec import (
-    MAGIC_V2,
-    SHORTEST_V2,
-    Frame,
-    FrameReader,
-    Message,
-    decode,
-    encode,
-    message_id,
-    whole_frame,
-)
+from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT, IN_PROGRESS, ByteLink, ClientEnd, frame_of
+from autopilot.mavlink.wire.codec import Frame, Message, decode, message_id
 from mission.client_fields import item_fields, parameter_from_wire, parameter_to_wire, plan_item
 from mission.plan.plan_file import PlanItem
 
 CLIENT_SYSTEM_ID = 245
 CLIENT_COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as MAVSDK uses
 OFFBOARD_PERIOD_US = 50_000
-AUTOPILOT_COMPONENT = 1
-HEARTBEAT_PERIOD_US = 1_000_000
 COMMAND_TIMEOUT_S = 1.5
 COMMAND_TRIES = 3
 TRANSFER_TIMEOUT_S = 1.5
@@ -57,16 +45,6 @@ class MissionRefused(ScriptError):
     def __init__(self, result: int, reason: str) -> None:
         super().__init__(f"mission refused (result {result}): {reason or 'no reason given'}")
         self.result = result
-
-
-class Transport(Protocol):
-    """A byte pipe to the vehicle."""
-
-    def send(self, data: bytes) -> None: ...
-
-    def receive(self) -> Sequence[bytes]:
-        """What has arrived since the last call."""
-        ...
 
 
 @coroutine
@@ -134,42 +112,35 @@ class Inbox:
 
 
 class Client:
-    """The vehicle at the other end of a transport.
+    """The vehicle at the other end of a link.
 
     Args:
-        transport: bytes to and from the vehicle.
+        link: bytes to and from the vehicle.
         system_id: of the vehicle.
     """
 
-    def __init__(self, transport: Transport, *, system_id: int = 1) -> None:
+    def __init__(self, link: ByteLink, *, system_id: int = 1) -> None:
         self.time_us = 0
-        self.system_id = system_id
         self.texts: list[str] = []
         self.reached: list[int] = []  # items of the present mission
         self._text_id = 0  # of the last text
-        self._transport = transport
-        self._reader = FrameReader()
-        self._seq = 0
+        # An onboard computer: the loss of a script is no loss of the ground station
+        self._end = ClientEnd(link, CLIENT_SYSTEM_ID, CLIENT_COMPONENT_ID, vehicle_id=system_id)
         self._latest: dict[int, Frame | bytes] = {}  # by message; bytes: a whole frame that nobody has looked at
         self._fields: dict[int, tuple[Frame | bytes, Any]] = {}  # of the frames in `_latest` that have been looked at
-        self._is_exact = isinstance(transport, MemoryLink)  # no byte is changed on the way: no checksum is needed
         self._inboxes: list[tuple[set[int], deque[Message]]] = []
         self._scripts: list[Running] = []
-        self._next_heartbeat_us = 0
         self._next_offboard_us = 0
-        self._offboard: Callable[[int], bytes] | None = None
+        self._offboard: Callable[[int], None] | None = None
 
     def frame(self, time_us: int) -> None:
         """Takes in what has arrived, sends what is due and runs the scripts to their next wait."""
         self.time_us = time_us
         self._receive()
-        if time_us >= self._next_heartbeat_us:
-            self._next_heartbeat_us = time_us + HEARTBEAT_PERIOD_US
-            # An onboard computer: the loss of a script is no loss of the ground station
-            self.send("HEARTBEAT", type=18, autopilot=8, base_mode=0, custom_mode=0, system_status=4, mavlink_version=3)
+        self._end.keep_alive(time_us)
         if self._offboard is not None and time_us >= self._next_offboard_us:
             self._next_offboard_us = time_us + OFFBOARD_PERIOD_US
-            self._transport.send(self._offboard(time_us // 1000 & 0xFFFFFFFF))
+            self._offboard(time_us // 1000 & 0xFFFFFFFF)
         for running in self._scripts:
             running.step()
         self._scripts = [running for running in self._scripts if not running.is_done]
@@ -206,17 +177,16 @@ class Client:
             return None
         known = self._fields.get(msg_id)
         if known is None or known[0] is not newest:
-            known = self._fields[msg_id] = (newest, decode(_frame_of(newest)).fields)
+            known = self._fields[msg_id] = (newest, decode(frame_of(newest)).fields)
         return known[1]
 
     def send(self, name: str, **fields: Any) -> None:
         """Sends one message."""
-        self._transport.send(self.encode(name, **fields))
+        self._end.send(name, **fields)
 
-    def encode(self, name: str, **fields: Any) -> bytes:
-        """The next frame of this client."""
-        self._seq = (self._seq + 1) & 0xFF
-        return encode(name, CLIENT_SYSTEM_ID, CLIENT_COMPONENT_ID, self._seq, **fields)
+    def ask(self, name: str, **fields: Any) -> None:
+        """Sends one message to the vehicle's autopilot."""
+        self._end.ask(name, **fields)
 
     def subscribe(self, *names: str) -> Inbox:
         """Collects messages of these kinds for the length of a `with` block."""
@@ -229,27 +199,31 @@ class Client:
             CommandRefused: any other answer.
             ScriptTimeout: no answer after three tries.
         """
-        values = (*params, *([0.0] * (7 - len(params))))
-        fields = {f"param{k + 1}": float(value) for k, value in enumerate(values)}
-        return await self._command("COMMAND_LONG", command, fields, name or f"command {command}", timeout_s)
+
+        def ask(attempt: int) -> None:
+            self._end.command(command, *params, attempt=attempt)
+
+        return await self._command(ask, command, name or f"command {command}", timeout_s)
 
     async def command_int(
         self, command: int, frame: int, params: Sequence[float], x: int, y: int, z: float, *, name: str = ""
     ) -> Any:
         """As `command`, with a position: x and y are 1e7 degrees (or 1e4 metres in local frames)."""
         fields: dict[str, Any] = {f"param{k + 1}": float(value) for k, value in enumerate(params)}
-        fields |= {"frame": frame, "current": 0, "autocontinue": 0, "x": x, "y": y, "z": z}
-        return await self._command("COMMAND_INT", command, fields, name or f"command {command}", COMMAND_TIMEOUT_S)
 
-    async def _command(self, message: str, command: int, fields: dict[str, Any], name: str, timeout_s: float) -> Any:
+        def ask(_: int) -> None:
+            self.ask("COMMAND_INT", command=command, frame=frame, x=x, y=y, z=z, **fields)
+
+        return await self._command(ask, command, name or f"command {command}", COMMAND_TIMEOUT_S)
+
+    async def _command(self, ask: Callable[[int], None], command: int, name: str, timeout_s: float) -> Any:
         first_text = len(self.texts)
         with self.subscribe("COMMAND_ACK") as inbox:
             for attempt in range(COMMAND_TRIES):
-                extra = {"confirmation": attempt} if message == "COMMAND_LONG" else {}
-                self.send(message, target_system=self.system_id, target_component=1, command=command, **fields, **extra)
+                ask(attempt)
                 try:
                     ack = await inbox.next(timeout_s, name)
-                    while ack.command != command or ack.result == 5:  # another command's, or IN_PROGRESS
+                    while not self._end.is_answer(ack, command) or ack.result == IN_PROGRESS:
                         ack = await inbox.next(timeout_s, name)
                 except ScriptTimeout:
                     continue
@@ -266,9 +240,8 @@ class Client:
             MissionRefused: the vehicle did not take it and keeps its old one.
         """
         first_text = len(self.texts)
-        target = {"target_system": self.system_id, "target_component": 1, "mission_type": mission_type}
         with self.subscribe("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK") as inbox:
-            self.send("MISSION_COUNT", **target, count=len(items))
+            self.ask("MISSION_COUNT", mission_type=mission_type, count=len(items))
             while True:
                 message = await inbox.next_message(6 * TRANSFER_TIMEOUT_S, "mission upload")
                 request = message.fields
@@ -282,31 +255,28 @@ class Client:
                         self.reached.clear()
                     return
                 if request.seq < len(items):
-                    self.send("MISSION_ITEM_INT", **target, **item_fields(items[request.seq]))
+                    self.ask("MISSION_ITEM_INT", mission_type=mission_type, **item_fields(items[request.seq]))
 
     async def download(self, mission_type: int = 0) -> list[PlanItem]:
         """The vehicle's mission, its fence (type 1) or its rally points (type 2)."""
-        target = {"target_system": self.system_id, "target_component": 1, "mission_type": mission_type}
         with self.subscribe("MISSION_COUNT", "MISSION_ITEM_INT") as inbox:
-            self.send("MISSION_REQUEST_LIST", **target)
+            self.ask("MISSION_REQUEST_LIST", mission_type=mission_type)
             count = (await inbox.next(TRANSFER_TIMEOUT_S, "mission count")).count
             items: list[PlanItem] = []
             while len(items) < count:
-                self.send("MISSION_REQUEST_INT", **target, seq=len(items))
+                self.ask("MISSION_REQUEST_INT", mission_type=mission_type, seq=len(items))
                 message = await inbox.next_message(TRANSFER_TIMEOUT_S, f"mission item {len(items)}")
                 if message.name == "MISSION_ITEM_INT" and message.fields.seq == len(items):
                     items.append(plan_item(message.fields))
-            self.send("MISSION_ACK", **target, type=0)
+            self.ask("MISSION_ACK", mission_type=mission_type, type=0)
             return items
 
     async def set_parameter(self, name: str, value: float) -> float:
         """Sets a parameter and returns the value the vehicle stored."""
         current = await self._read_parameter(name)
         with self.subscribe("PARAM_VALUE") as inbox:
-            self.send(
+            self.ask(
                 "PARAM_SET",
-                target_system=self.system_id,
-                target_component=1,
                 param_id=name,
                 param_value=parameter_to_wire(value, current.param_type),
                 param_type=current.param_type,
@@ -319,9 +289,7 @@ class Client:
 
     async def _read_parameter(self, name: str) -> Any:
         with self.subscribe("PARAM_VALUE") as inbox:
-            self.send(
-                "PARAM_REQUEST_READ", target_system=self.system_id, target_component=1, param_id=name, param_index=-1
-            )
+            self.ask("PARAM_REQUEST_READ", param_id=name, param_index=-1)
             return await self._parameter_named(inbox, name)
 
     async def _parameter_named(self, inbox: Inbox, name: str) -> Any:
@@ -331,24 +299,19 @@ class Client:
                 return message
 
     def _receive(self) -> None:
-        for data in self._transport.receive():
-            if self._is_exact and data[0] == MAGIC_V2 and len(data) == SHORTEST_V2 + data[1] and not data[2]:
-                if data[5] == self.system_id:
-                    self._take(data[7] | data[8] << 8 | data[9] << 16, data[6], data)
-                continue
-            for frame in self._reader.feed(data):
-                if frame.sysid == self.system_id:
-                    self._take(frame.kind.msg_id, frame.compid, frame)
+        for msg_id, sysid, compid, frame in self._end.arrived():
+            if sysid == self._end.vehicle_id:
+                self._take(msg_id, compid, frame)
 
     def _take(self, msg_id: int, compid: int, frame: Frame | bytes) -> None:
         if msg_id == _HEARTBEAT_ID and compid != AUTOPILOT_COMPONENT:
             return  # a camera's or gimbal's: it tells nothing of the vehicle
         self._latest[msg_id] = frame
         if msg_id in _NOTED:
-            self._note(decode(_frame_of(frame)))
+            self._note(decode(frame_of(frame)))
         for ids, queue in self._inboxes:
             if msg_id in ids:
-                queue.append(decode(_frame_of(frame)))
+                queue.append(decode(frame_of(frame)))
 
     def _note(self, message: Message) -> None:
         if message.name == "STATUSTEXT":
@@ -363,15 +326,6 @@ class Client:
         else:
             self.texts.append(fields.text)
         self._text_id = fields.id
-
-
-def _frame_of(frame: Frame | bytes) -> Frame:
-    if isinstance(frame, Frame):
-        return frame
-    whole = whole_frame(frame)
-    if whole is None:
-        raise ValueError("a frame in memory is not what was sent")
-    return whole
 
 
 _HEARTBEAT_ID = message_id("HEARTBEAT")

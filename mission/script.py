@@ -216,11 +216,9 @@ class Drone(Client):
 
     def offboard_attitude(self, wxyz: tuple[float, float, float, float], thrust: float) -> None:
         """From now on streams this attitude (w, x, y, z: body frd to ned) and collective thrust [0..1]."""
-        self._offboard = lambda time_ms: self.encode(
+        self._offboard = lambda time_ms: self.ask(
             "SET_ATTITUDE_TARGET",
             time_boot_ms=time_ms,
-            target_system=self.system_id,
-            target_component=1,
             type_mask=FREE_BODY_RATES,
             q=wxyz,
             body_roll_rate=0.0,
@@ -231,11 +229,9 @@ class Drone(Client):
 
     def offboard_rates(self, omega_frd: tuple[float, float, float], thrust: float) -> None:
         """From now on streams these body rates [rad/s] and collective thrust [0..1]."""
-        self._offboard = lambda time_ms: self.encode(
+        self._offboard = lambda time_ms: self.ask(
             "SET_ATTITUDE_TARGET",
             time_boot_ms=time_ms,
-            target_system=self.system_id,
-            target_component=1,
             type_mask=FREE_ATTITUDE,
             q=(1.0, 0.0, 0.0, 0.0),
             body_roll_rate=omega_frd[0],
@@ -281,8 +277,6 @@ class Drone(Client):
         yaw_rad: float,
     ) -> None:
         fields = {
-            "target_system": self.system_id,
-            "target_component": 1,
             "coordinate_frame": frame,
             "type_mask": mask,
             **dict(zip(("x", "y", "z"), pos, strict=True)),
@@ -290,7 +284,7 @@ class Drone(Client):
             **dict.fromkeys(("afx", "afy", "afz", "yaw_rate"), 0.0),
             "yaw": 0.0 if isnan(yaw_rad) else yaw_rad,
         }
-        self._offboard = lambda time_ms: self.encode("SET_POSITION_TARGET_LOCAL_NED", time_boot_ms=time_ms, **fields)
+        self._offboard = lambda time_ms: self.ask("SET_POSITION_TARGET_LOCAL_NED", time_boot_ms=time_ms, **fields)
 
     # -- helpers ----------------------------------------------------------------------------------------------------
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.mavlink.client_end import GROUND_STATION, ClientEnd
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
-from autopilot.mavlink.wire.codec import encode
 from autopilot.mavlink.wire.convert import degrees_e7
 from common.attitude import Vector
 from common.geodesy import GeoPoint, geodetic_from_ned
@@ -25,7 +25,6 @@ from sim.world.world import WorldMap
 
 SPEEDS_M_S: dict[Pace, float] = {"walk": WALK_SPEED_M_S, "run": RUN_SPEED_M_S}
 PHONE_SYSTEM, PHONE_COMPONENT = 254, 190  # guess: a station's numbers, not those of other clients
-HEARTBEAT_US = 1_000_000
 _SETS_OFF_S = (0.5, 2.0)  # that late at most, as at the start of an episode of training
 _HAS_POSITION_AND_VELOCITY = 3  # FOLLOW_TARGET.est_capabilities
 _NOT_GIVEN = (0.0, 0.0, 0.0)
@@ -61,8 +60,7 @@ class FollowedOwner:
         horizontal = config.phone_error**2 * (CORRELATED_STD_M**2 + POSITION_STD_M**2)
         self._pos_var = (horizontal, horizontal, VERTICAL_FACTOR**2 * horizontal)
         self.vehicle_end, self._link = memory_pair(LinkRole.GROUND)
-        self._seq = 0
-        self._heartbeat_us = 0
+        self._client = ClientEnd(self._link, PHONE_SYSTEM, PHONE_COMPONENT, mav_type=GROUND_STATION)
         self.is_walking = False
 
     @property
@@ -94,9 +92,7 @@ class FollowedOwner:
             self._owner.change_model(self._walking)
         has_report = self._owner.step_to(time_us // TICK_US)
         self._link.receive()  # a phone hears the vehicle's telemetry too; ours does not care
-        if time_us >= self._heartbeat_us:
-            self._heartbeat_us = time_us + HEARTBEAT_US
-            self._send("HEARTBEAT", type=6, autopilot=8, system_status=4, mavlink_version=3)
+        self._client.keep_alive(time_us)
         if has_report:
             self._report()
 
@@ -104,7 +100,7 @@ class FollowedOwner:
         fix = self._phone[0]["fix"]
         north, east, down = (float(element) for element in fix["pos_ned"])
         lat_deg, lon_deg, alt_m = geodetic_from_ned(north, east, down, self._home)
-        self._send(
+        self._client.send(
             "FOLLOW_TARGET",
             timestamp=int(fix["time_us"]) // 1000,
             est_capabilities=_HAS_POSITION_AND_VELOCITY,
@@ -117,7 +113,3 @@ class FollowedOwner:
             rates=_NOT_GIVEN,
             position_cov=self._pos_var,
         )
-
-    def _send(self, name: str, **fields: Any) -> None:
-        self._seq = self._seq + 1 & 0xFF
-        self._link.send(encode(name, PHONE_SYSTEM, PHONE_COMPONENT, self._seq, **fields))

@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.interface.vehicle_state import Mode
+from autopilot.mavlink.client_end import ByteLink
 from common.attitude import Vector
 from common.image_stream import ImageFrame
 from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer
 from policies.companion.owner_watch import OwnerWatch
-from policies.companion.vehicle_link import ByteLink, VehicleLink
+from policies.companion.vehicle_link import VehicleLink
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG
 
 SETPOINT_US = 50_000

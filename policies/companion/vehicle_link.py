@@ -5,16 +5,16 @@ setpoints, mode changes and texts. The companion is a component of the vehicle's
 Any autopilot with PX4's or ArduPilot's modes will do.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan, nan
-from typing import Any, Protocol
+from typing import Any
 
 from autopilot.interface.vehicle_state import LandedState, Mode, Severity
+from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT, ByteLink, ClientEnd, frame_of
 from autopilot.mavlink.dialects import Dialect, UnknownModeError
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.wire.codec import Frame, FrameReader, encode, message_id
+from autopilot.mavlink.wire.codec import decode, message_id
 from autopilot.mavlink.wire.convert import degrees_from_e7, quat_from_wxyz
 from autopilot.mavlink.wire.number_bounds import POSITION_MAX_M, RATE_MAX_RAD_S, SPEED_MAX_M_S, is_known
 from common.attitude import Quat, Vector
@@ -23,8 +23,6 @@ from policies.companion.engagement import Wish
 from policies.companion.vehicle_clock import VehicleClock
 
 COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
-AUTOPILOT_COMPONENT = 1
-HEARTBEAT_US = 1_000_000
 REQUEST_US = 5_000_000  # rates are asked for again: the vehicle may have restarted
 TEXT_LENGTH = 50  # characters of one STATUSTEXT
 NEVER_US = -(1 << 62)
@@ -50,16 +48,6 @@ _IDS = {
 }  # fmt: skip
 _NAMES = {msg_id: name for name, msg_id in _IDS.items()}
 _DIALECTS: dict[int, Dialect] = {int(PX4.autopilot): PX4, int(ARDUPILOT.autopilot): ARDUPILOT}
-
-
-class ByteLink(Protocol):
-    """A byte pipe to the vehicle (autopilot.mavlink.transport.links has some)."""
-
-    def send(self, data: bytes) -> None: ...
-
-    def receive(self) -> Sequence[bytes]: ...
-
-    def close(self) -> None: ...
 
 
 @dataclass(slots=True)
@@ -107,33 +95,29 @@ class VehicleLink:
         self.clock = VehicleClock()
         self.owner = Owner()
         self.system_id = system_id
-        self._link = link
-        self._reader = FrameReader()
+        self._client = ClientEnd(link, system_id, COMPONENT, vehicle_id=system_id)
         self._dialect: Dialect = PX4
-        self._seq = 0
         self._text_id = 0
         self._is_refused = False
         self._asked_for: Mode | None = None  # and not answered yet
-        self._heartbeat_us = NEVER_US
         self._request_us = NEVER_US
 
     def receive(self, time_us: int) -> None:
         """Takes in what has arrived."""
-        for data in self._link.receive():
-            for frame in self._reader.feed(data):
-                name = _NAMES.get(frame.kind.msg_id)
-                if name is not None:
-                    self._take(name, frame, time_us)
+        for msg_id, sysid, compid, frame in self._client.arrived():
+            name = _NAMES.get(msg_id)
+            if name == "FOLLOW_TARGET":
+                self._owner_reported(decode(frame_of(frame)).fields, time_us)
+            elif name is not None and sysid == self.system_id and compid == AUTOPILOT_COMPONENT:
+                self._vehicle_told(name, decode(frame_of(frame)).fields, time_us)
 
     def keep_alive(self, time_us: int) -> None:
         """Sends the heartbeat, and asks for telemetry, when they are due."""
-        if time_us - self._heartbeat_us >= HEARTBEAT_US:
-            self._heartbeat_us = time_us
-            self._send("HEARTBEAT", type=18, autopilot=8, system_status=4, mavlink_version=3)
+        self._client.keep_alive(time_us)
         if self.own.heartbeat_us != NEVER_US and time_us - self._request_us >= REQUEST_US:
             self._request_us = time_us
             for name, rate_hz in RATES_HZ.items():
-                self._command(_COMMAND_SET_INTERVAL, float(message_id(name)), 1.0e6 / rate_hz)
+                self._client.command(_COMMAND_SET_INTERVAL, float(message_id(name)), 1.0e6 / rate_hz)
 
     def take_refusal(self) -> bool:
         """Whether the vehicle has refused a change of mode since the last call."""
@@ -143,11 +127,9 @@ class VehicleLink:
     def send_setpoint(self, vel_ned: Vector, yaw_rate: float) -> None:
         """A velocity [m/s] and a yaw rate [rad/s], flown in Offboard."""
         north, east, down = vel_ned
-        self._send(
+        self._client.ask(
             "SET_POSITION_TARGET_LOCAL_NED",
             time_boot_ms=max(self.own.boot_us, 0) // 1000 & 0xFFFFFFFF,
-            target_system=self.system_id,
-            target_component=AUTOPILOT_COMPONENT,
             coordinate_frame=_LOCAL_NED,
             type_mask=_VELOCITY_AND_YAW_RATE,
             vx=north,
@@ -163,9 +145,9 @@ class VehicleLink:
         self._asked_for = mode
         number = self._dialect.custom_mode(mode)
         if is_px4:
-            self._command(_COMMAND_SET_MODE, _CUSTOM_MODE, number >> 16 & 0xFF, number >> 24 & 0xFF)
+            self._client.command(_COMMAND_SET_MODE, _CUSTOM_MODE, number >> 16 & 0xFF, number >> 24 & 0xFF)
         else:
-            self._command(_COMMAND_SET_MODE, _CUSTOM_MODE, number)
+            self._client.command(_COMMAND_SET_MODE, _CUSTOM_MODE, number)
 
     def say(self, text: str, severity: Severity = Severity.NOTICE) -> None:
         """A text for the pilot's ground station."""
@@ -174,25 +156,10 @@ class VehicleLink:
         if len(pieces) > 1:
             self._text_id = text_id = self._text_id % 0xFFFF + 1
         for i, piece in enumerate(pieces):
-            self._send("STATUSTEXT", severity=int(severity), text=piece, id=text_id, chunk_seq=i)
+            self._client.send("STATUSTEXT", severity=int(severity), text=piece, id=text_id, chunk_seq=i)
 
     def close(self) -> None:
-        self._link.close()
-
-    def _send(self, name: str, **fields: Any) -> None:
-        self._seq = self._seq + 1 & 0xFF
-        self._link.send(encode(name, self.system_id, COMPONENT, self._seq, **fields))
-
-    def _command(self, command: int, *params: float) -> None:
-        fields = {f"param{k + 1}": float(value) for k, value in enumerate(params)}
-        target = {"target_system": self.system_id, "target_component": AUTOPILOT_COMPONENT}
-        self._send("COMMAND_LONG", command=command, **target, **fields)
-
-    def _take(self, name: str, frame: Frame, time_us: int) -> None:
-        if name == "FOLLOW_TARGET":
-            self._owner_reported(frame.kind.unpack(frame.payload), time_us)
-        elif frame.sysid == self.system_id and frame.compid == AUTOPILOT_COMPONENT:
-            self._vehicle_told(name, frame.kind.unpack(frame.payload), time_us)
+        self._client.link.close()
 
     def _vehicle_told(self, name: str, fields: Any, time_us: int) -> None:
         own = self.own
@@ -212,7 +179,7 @@ class VehicleLink:
             own.origin = GeoPoint(
                 degrees_from_e7(fields.latitude), degrees_from_e7(fields.longitude), fields.altitude * 1.0e-3
             )
-        elif fields.command == _COMMAND_SET_MODE and fields.target_component in (0, COMPONENT):  # COMMAND_ACK
+        elif self._client.is_answer(fields, _COMMAND_SET_MODE):  # COMMAND_ACK
             self._is_refused |= fields.result != 0
             if fields.target_component == COMPONENT:  # one to everybody may answer a ground station
                 if fields.result == 0 and self._asked_for is not None:

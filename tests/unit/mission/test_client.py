@@ -218,6 +218,7 @@ def test_progress_and_other_commands_answers_are_waited_through(peer):
     def answer(message):
         if message.name == "COMMAND_LONG":
             peer.say("COMMAND_ACK", **ack(22))
+            peer.say("COMMAND_ACK", **ack(ARM, ACK_DENIED) | {"target_system": 255})  # another client's
             peer.say("COMMAND_ACK", **ack(ARM, ACK_IN_PROGRESS))
             peer.say("COMMAND_ACK", **ack(ARM))
 
