@@ -43,4 +43,5 @@ class LossyLink:
 
 def lose(companion, *names):
     """From now on messages of these kinds do not reach the companion."""
-    companion.vehicle._link = LossyLink(companion.vehicle._link, *names)
+    client = companion.vehicle._client
+    client.link = LossyLink(client.link, *names)
