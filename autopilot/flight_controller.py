@@ -19,7 +19,16 @@ from autopilot.inputs.external_position import ExternalPositions
 from autopilot.inputs.obstacles import Obstacles
 from autopilot.inputs.sticks import Sticks
 from autopilot.inputs.traffic import Traffic
-from autopilot.interface.client_requests import OffboardSetpoint, OrbitRequest, TargetReport
+from autopilot.interface.client_requests import (
+    ChangeMode,
+    ChangeSpeed,
+    ModeRequest,
+    Report,
+    Request,
+    SetCurrentItem,
+    SetHome,
+    StartMission,
+)
 from autopilot.interface.failure_requests import Failure, FailureInjector, Unit, failure_request, injection_refusal
 from autopilot.interface.item_lists import ItemLists, ListKind
 from autopilot.interface.platform import Host
@@ -178,7 +187,6 @@ class FlightController:
         self.navigator = Navigator(context, mission, vehicle.modes)
         self.fence, self.rally = self.navigator.fence, self.navigator.rally
         self.lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
-        self.guided = self.navigator.guided
         self.lists.on_change(mission.warn_of_fence)
         self.commander.connect(self.navigator)
         self.guidance = Guidance(self.commander, self.navigator, self.payload)
@@ -297,76 +305,50 @@ class FlightController:
     def check_arming(self) -> list[str]:
         return self.commander.check_arming()
 
-    def set_mode(self, mode: Mode) -> Reply:
+    def request(self, request: Request) -> Reply:
+        match request:
+            case ModeRequest():
+                return self._carry_out(request)
+            case Report():
+                return self.navigator.report(request)
+            case ChangeMode():
+                return self._change_mode(request.mode)
+            case StartMission():
+                return self._start_mission(request)
+            case SetCurrentItem():
+                return self.navigator.mission.set_current(request.seq, is_reset=request.is_reset)
+            case ChangeSpeed():
+                return self.navigator.change_speed(request.speed_m_s, request.kind)
+            case SetHome():
+                return self.commander.set_home(request.lat_deg, request.lon_deg, request.alt_amsl_m)
+
+    def _carry_out(self, request: ModeRequest) -> Reply:
+        """Judges a request, hands it to the mode that carries it out, and enters that."""
+        mode = self.navigator.mode_for(request)
+        is_flown = mode is self.state.mode
+        if request.in_air and not self.navigator.may_go(mode):
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
+        reason = self.commander.request_refusal(mode)
+        if reason:
+            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
+        reply = self.navigator.take(mode, request)
+        if reply.verdict is not Verdict.ACCEPTED:
+            return reply
+        self.commander.guard.release()  # the client takes over from a failsafe
+        self.commander.change_mode(mode)
+        if is_flown:
+            self.navigator.begin_request(mode)
+        return ACCEPTED
+
+    def _change_mode(self, mode: Mode) -> Reply:
         reply = self.commander.request_mode(mode)
-        if mode is Mode.HOLD and reply.verdict is Verdict.ACCEPTED and self.navigator.is_going:
+        if reply.verdict is Verdict.ACCEPTED and self.navigator.is_underway:
             self.navigator.stay()  # here, not at the place it was sent to
         return reply
 
-    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
-        if self.state.mode is Mode.GUIDED:
-            refusal = self.navigator.takeoff_refusal(alt_amsl_m)
-            return Reply(Verdict.DENIED, refusal) if refusal else self.guided.takeoff(alt_amsl_m, yaw_rad)
-        reason = self.commander.request_refusal(Mode.TAKEOFF)
-        if reason:
-            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
-        reply = self.navigator.request_takeoff(alt_amsl_m, yaw_rad)
-        if reply.verdict is not Verdict.ACCEPTED:
-            return reply
-        return self._enter_anew(Mode.TAKEOFF)
-
-    def land(self, lat_deg: float, lon_deg: float, yaw_rad: float) -> Reply:
-        reason = self.commander.request_refusal(Mode.LAND)
-        if reason:
-            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
-        reply = self.navigator.request_landing(lat_deg, lon_deg, yaw_rad)
-        if reply.verdict is not Verdict.ACCEPTED:
-            return reply
-        return self._enter_anew(Mode.LAND)
-
-    def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
-        if not self._may_go:
-            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
-        if not self.commander.has_position:
-            return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
-        reason = self.commander.request_refusal(Mode.HOLD)
-        if reason:
-            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
-        reply = self.navigator.reposition(lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
-        if reply.verdict is not Verdict.ACCEPTED:
-            return reply
-        return self._enter_anew(Mode.HOLD)
-
-    def change_speed(self, speed_m_s: float, kind: int = 1) -> Reply:
-        return self.navigator.change_speed(speed_m_s, kind)
-
-    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
-        return self.commander.set_home(lat_deg, lon_deg, alt_amsl_m)
-
-    def set_offboard(self, setpoint: OffboardSetpoint) -> None:
-        self.navigator.set_offboard(setpoint)
-
-    def report_target(self, report: TargetReport) -> None:
-        self.navigator.follow.report(report)
-
-    def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
-        self.navigator.mission.precision.seen(pos_ned)
-
-    def give_corrections(self, rtcm: bytes) -> None:
-        if self._on_corrections is not None:
-            self._on_corrections(rtcm)
-
-    def orbit(self, request: OrbitRequest) -> Reply:
-        if not self._may_go:
-            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
-        reason = self.commander.request_refusal(Mode.ORBIT)
-        if reason:
-            return Reply(Verdict.TEMPORARILY_REJECTED, reason)
-        reply = self.navigator.orbit.request(request)
-        return reply if reply.verdict is not Verdict.ACCEPTED else self._enter_anew(Mode.ORBIT)
-
-    def start_mission(self, first: int, last: int = -1) -> Reply:
+    def _start_mission(self, request: StartMission) -> Reply:
         mission = self.navigator.mission
+        first, last = request.first, request.last
         if not mission.items:  # without one the numbers mean nothing, and mode Mission says why not
             first = last = -1
         if first >= 0:
@@ -379,8 +361,9 @@ class FlightController:
                 return reply
         return self.commander.request_mode(Mode.MISSION)
 
-    def set_current_item(self, seq: int, *, is_reset: bool = False) -> Reply:
-        return self.navigator.mission.set_current(seq, is_reset=is_reset)
+    def give_corrections(self, rtcm: bytes) -> None:
+        if self._on_corrections is not None:
+            self._on_corrections(rtcm)
 
     def reboot(self) -> Reply:
         if self.state.is_armed:
@@ -392,16 +375,3 @@ class FlightController:
         self.state.boot_us = self.state.time_us
         self.commander.restart()
         return ACCEPTED
-
-    @property
-    def _may_go(self) -> bool:
-        """Whether the vehicle can be sent somewhere: it is in the air, or about to be."""
-        return self.state.is_flying or self.navigator.is_taking_off
-
-    def _enter_anew(self, mode: Mode) -> Reply:
-        """Enters a mode, also if it is the present one, whose target is a new one then."""
-        is_new = self.state.mode is not mode
-        reply = self.commander.request_mode(mode)
-        if reply.verdict is Verdict.ACCEPTED and not is_new:
-            self.navigator.enter(mode)
-        return reply

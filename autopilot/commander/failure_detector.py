@@ -31,7 +31,7 @@ from autopilot.commander.failsafe import (
 )
 from autopilot.commander.navigator_interface import Flying
 from autopilot.interface.mode_spec import ModeTable
-from autopilot.interface.vehicle_state import BatteryLevel, LandedState, Mode, VehicleState
+from autopilot.interface.vehicle_state import BatteryLevel, LandedState, VehicleState
 from autopilot.ports import ACCEL_DOUBTED as ACCEL_DOUBTED_FLAG
 from autopilot.ports import DEAD_RECKONING as DEAD_RECKONING_FLAG
 from autopilot.ports import HEIGHT_VALID, MAG_FAULTY, WIND_VALID
@@ -141,7 +141,7 @@ class FailureWatch:
         self._is_position_lost = not has_position and (needs_position or self._is_position_lost)
         if self._is_position_lost:
             failures |= POSITION_LOST
-        if mode is Mode.OFFBOARD and flying.offboard_age_us(state.time_us) > self._offboard_loss_us:
+        if flying.stream_age_us() > self._offboard_loss_us:
             failures |= OFFBOARD_LOST
         if self._modes[mode].needs_height and not state.estimate.flags & HEIGHT_VALID:
             failures |= HEIGHT_LOST

@@ -10,8 +10,9 @@ from enum import IntEnum
 from types import MappingProxyType
 from typing import Any
 
+from autopilot.interface.client_requests import ModeRequest, Report
 from autopilot.interface.failsafe_action import Action
-from autopilot.interface.vehicle_state import Mode
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply
 
 # COM_DLL_EXCEPT and COM_RCL_EXCEPT: the bit that lets a mode go on without a ground station, or without sticks (PX4).
 MISSION_EXCEPTED, HOLD_EXCEPTED, OFFBOARD_EXCEPTED = 1, 2, 4
@@ -30,6 +31,8 @@ class FlightMode:
     """May be flown below the fence's floor."""
     takes_heading = False
     """A region of interest and a turn that was asked for are put into its setpoint."""
+    begins_anew = True
+    """What is asked of it while it is flown ends what it has been doing."""
 
     def start(self) -> None:
         """Entered while armed, or armed in it."""
@@ -39,6 +42,23 @@ class FlightMode:
 
     def leave(self, following: Mode) -> None:
         """A mode is entered after this one, perhaps the same again."""
+
+    def take(self, _request: Any, /) -> Reply:
+        """Keeps a request that its row takes, or says why not; the vehicle enters the mode then."""
+        return ACCEPTED
+
+    def may_go(self, *, is_taking_off: bool) -> bool:
+        """Whether a vehicle that is not in the air yet may be sent somewhere by it."""
+        return is_taking_off
+
+    @property
+    def is_underway(self) -> bool:
+        """Whether the vehicle has been sent to a place, and is still on its way there."""
+        return False
+
+    def stream_age_us(self) -> int:
+        """For how long the setpoints that it lives on have been silent; 0: it lives on none."""
+        return 0
 
     def forget(self) -> None:
         """What clients have asked of it does not wait for the next time it is entered."""
@@ -122,6 +142,7 @@ class ModeSpec:
     on_ground: bool = False  # may be chosen while standing on the ground
     on_takeoff: bool = False  # may be chosen on the ground once a take-off has begun, which is finished first
     disarmed: Disarmed = Disarmed.USUAL
+    takes: tuple[type[ModeRequest] | type[Report], ...] = ()  # what clients may ask of it besides to be entered
 
     # How clients and logs know it.
     px4: DialectMode | Mode  # a mode: PX4 does not have this one, and that is the nearest of its own

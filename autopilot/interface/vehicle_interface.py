@@ -11,11 +11,11 @@ from autopilot.inputs.external_position import ExternalPositions
 from autopilot.inputs.obstacles import Obstacles
 from autopilot.inputs.sticks import Sticks
 from autopilot.inputs.traffic import Traffic
-from autopilot.interface.client_requests import CalibrationKind, OffboardSetpoint, OrbitRequest, TargetReport
+from autopilot.interface.client_requests import CalibrationKind, Request
 from autopilot.interface.item_lists import ItemLists
 from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.platform import Host
-from autopilot.interface.vehicle_state import Mode, Reply, Severity, VehicleState
+from autopilot.interface.vehicle_state import Reply, Severity, VehicleState
 from autopilot.payload.camera.camera import Camera
 from autopilot.payload.gimbal.gimbal_control import GimbalControl
 from autopilot.payload.payloads import Payloads
@@ -107,20 +107,8 @@ class Guidance(Protocol):
         ...
 
 
-class GuidedPort(Protocol):
-    """What may be asked of mode GUIDED; the caller changes to it."""
-
-    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply: ...
-
-    def goto(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply: ...
-
-    def forget_goto(self) -> None:
-        """The mode could not be entered."""
-        ...
-
-
 class Vehicle(Protocol):
-    """What may be asked of the vehicle. Altitudes are AMSL [m], angles radians, NaN means default."""
+    """What may be asked of the vehicle."""
 
     state: VehicleState
     params: ParameterTable
@@ -162,9 +150,6 @@ class Vehicle(Protocol):
     @property
     def external(self) -> ExternalPositions: ...
 
-    @property
-    def guided(self) -> GuidedPort: ...
-
     def follow_ardupilot(self) -> None:
         """From now on pilots and modes are treated as ArduPilot treats them."""
         ...
@@ -185,48 +170,12 @@ class Vehicle(Protocol):
         """Reasons why the vehicle may not be armed now; empty when ready."""
         ...
 
-    def set_mode(self, mode: Mode) -> Reply: ...
-
-    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply: ...
-
-    def land(self, lat_deg: float, lon_deg: float, yaw_rad: float) -> Reply: ...
-
-    def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
-        """Goes there and holds (mode HOLD); all NaN: hold here (pause)."""
+    def request(self, request: Request) -> Reply:
+        """Everything else that clients ask and report (autopilot.interface.client_requests)."""
         ...
-
-    def change_speed(self, speed_m_s: float, kind: int) -> Reply:
-        """A speed from now on; `kind` as SPEED_TYPE: 2 climb, 3 descent, else over ground; NaN: the default."""
-        ...
-
-    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
-        """All NaN: home is here."""
-        ...
-
-    def set_offboard(self, setpoint: OffboardSetpoint) -> None: ...
 
     def give_corrections(self, rtcm: bytes) -> None:
         """Passes corrections on to the GNSS receiver."""
-        ...
-
-    def orbit(self, request: OrbitRequest) -> Reply:
-        """Flies round a point (mode ORBIT)."""
-        ...
-
-    def report_target(self, report: TargetReport) -> None:
-        """What mode FOLLOW follows."""
-        ...
-
-    def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
-        """Where mode PRECISION_LAND lands [m]."""
-        ...
-
-    def start_mission(self, first: int, last: int) -> Reply:
-        """Mode MISSION from item `first` (-1: where it stands) to item `last` (-1: to its end)."""
-        ...
-
-    def set_current_item(self, seq: int, *, is_reset: bool = False) -> Reply:
-        """Reset: every jump counts from the beginning again."""
         ...
 
     def reboot(self) -> Reply: ...

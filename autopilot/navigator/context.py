@@ -28,7 +28,8 @@ class NavContext:
     """
 
     __slots__ = (
-        "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "find_way", "flown",
+        "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "fence_refusal", "find_way",
+        "flown",
         "has_position", "heading", "hover_thrust", "is_landing", "leg_yaw", "next_hold", "params", "place_refusal",
         "setpoint", "standing_height_m", "state", "wants_lift", "wish", "yaw_mode",
     )  # fmt: skip
@@ -52,6 +53,7 @@ class NavContext:
         self.wants_lift = False  # the mode asks to leave the ground
         self.is_landing = False  # the mode is on its last descent
         self.place_refusal: Callable[[Vector], str] = lambda _place: ""  # why the fence lets nobody stay at a place [m]
+        self.fence_refusal: Callable[[Vector], str] = lambda _place: ""  # why it lets nobody go to a place [m]
         self.find_way: Callable[[Vector, Vector], list[Vector] | None] = lambda _start, goal: [goal]  # inside the fence
         self.flown = FlightMode()  # the present mode
         self.wish: Mode | None = None  # the mode that shall follow this one

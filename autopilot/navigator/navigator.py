@@ -1,10 +1,6 @@
 """The navigator: one object per vehicle that turns the flight mode into setpoints, at 50 Hz."""
 
-from collections.abc import Callable
-from math import isfinite, nan
-from typing import TypeVar, cast
-
-from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.client_requests import ModeRequest, Report
 from autopilot.interface.mode_spec import FlightMode, ModeTable
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
 from autopilot.navigator.context import NavContext
@@ -12,13 +8,6 @@ from autopilot.navigator.fence.fence import Fence
 from autopilot.navigator.fence.rally_points import RallyPoints
 from autopilot.navigator.mission.mission import Mission
 from autopilot.navigator.mode_parts import ModeParts
-from autopilot.navigator.modes.follow import Follow
-from autopilot.navigator.modes.goto import reposition_target
-from autopilot.navigator.modes.guided import Guided
-from autopilot.navigator.modes.hold import Hold
-from autopilot.navigator.modes.land import Land
-from autopilot.navigator.modes.offboard import Offboard
-from autopilot.navigator.modes.orbit import Orbit
 from autopilot.navigator.modes.takeoff import Climb, Takeoff, is_high
 from autopilot.navigator.paths.breadcrumbs import Breadcrumbs
 from autopilot.navigator.takeoff_intent import Ask, standing_d, vertical_ask
@@ -26,8 +15,6 @@ from autopilot.ports import TERRAIN_VALID
 
 _WAITS_US = 2_000_000  # a take-off that is interrupted on the ground, for a place to go to; guess
 _SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
-
-_Mode = TypeVar("_Mode", bound=FlightMode)
 
 
 class Navigator:
@@ -43,22 +30,17 @@ class Navigator:
         "_active",
         "_climb",
         "_is_rising",
-        "_modes",
+        "_listeners",
         "_specs",
+        "_takeoff",
         "_takeoff_us",
         "ask",
         "context",
         "crumbs",
         "fence",
-        "follow",
-        "guided",
-        "hold",
-        "land",
         "mission",
-        "offboard",
-        "orbit",
+        "modes",
         "rally",
-        "takeoff",
     )
 
     def __init__(self, context: NavContext, mission: Mission, modes: ModeTable) -> None:
@@ -71,25 +53,17 @@ class Navigator:
         parts = ModeParts(context, mission, self.fence, self.rally, self.crumbs)
         built = {build: build(parts) for build in {spec.build: None for spec in modes.values()}}
         self._specs = modes
-        self._modes = {mode: built[spec.build] for mode, spec in modes.items()}
-        # The modes that clients ask more of than to be entered. One that the vehicle does not have is never entered.
-        self.hold = self._named(Mode.HOLD, Hold)
-        self.takeoff = self._named(Mode.TAKEOFF, Takeoff)
-        self.land = self._named(Mode.LAND, Land)
-        self.offboard = self._named(Mode.OFFBOARD, Offboard)
-        self.follow = self._named(Mode.FOLLOW, Follow)
-        self.orbit = self._named(Mode.ORBIT, Orbit)
-        self.guided = self._named(Mode.GUIDED, Guided)
-        self._active = context.flown = self._modes[context.state.mode]
+        self.modes = {mode: built[spec.build] for mode, spec in modes.items()}
+        self._listeners: dict[type, list[FlightMode]] = {}  # by the kind of report
+        for mode, spec in modes.items():
+            for kind in spec.takes:
+                self._listeners.setdefault(kind, []).append(self.modes[mode])
+        self._takeoff = next((flown for flown in built.values() if isinstance(flown, Takeoff)), None)
+        self._active = context.flown = self.modes[context.state.mode]
         self._climb: Climb | None = None  # of a take-off, which is finished before the active mode goes elsewhere
         self._is_rising = False  # a take-off has begun, and the vehicle has not been high since
         self._takeoff_us = 0  # when mode Takeoff was last flown
         self.ask = Ask.STAY  # of the setpoint flown
-
-    def _named(self, mode: Mode, kind: type[_Mode]) -> _Mode:
-        """The object that flies a mode, as what it is."""
-        flown = self._modes.get(mode)
-        return flown if isinstance(flown, kind) else cast("Callable[[NavContext], _Mode]", kind)(self.context)
 
     def refusal(self, mode: Mode) -> str:
         """Why a mode cannot be flown now, as far as the navigator knows; empty if it can."""
@@ -98,7 +72,7 @@ class Navigator:
             return f"mode {mode.name} is not supported"
         if spec.needs_height and not self.context.has_height:
             return "no valid height"
-        return self._modes[mode].refusal()
+        return self.modes[mode].refusal()
 
     def arming_reason(self) -> str:
         """Why the vehicle may not take off here; empty if it may."""
@@ -112,12 +86,16 @@ class Navigator:
     @property
     def is_taking_off(self) -> bool:
         """Whether a take-off has been asked for and is not over, on the ground or above it."""
-        return self.context.state.is_armed and (self._active is self.takeoff or self._is_rising)
+        return self.context.state.is_armed and (self._is_in_takeoff or self._is_rising)
 
     @property
-    def is_going(self) -> bool:
-        """Whether the vehicle is sent to a place and still on its way there, in mode Hold."""
-        return self._climb is not None or self.hold.is_underway
+    def _is_in_takeoff(self) -> bool:
+        return self._active is self._takeoff
+
+    @property
+    def is_underway(self) -> bool:
+        """Whether the present mode has been sent to a place, and the vehicle is still on its way there."""
+        return self._active.is_underway
 
     @property
     def is_landing(self) -> bool:
@@ -126,10 +104,10 @@ class Navigator:
 
     def needs_position(self, mode: Mode) -> bool:
         """Whether a mode can only be flown with a position, as its row and what it would fly now say."""
-        return self._specs[mode].needs_position and self._modes[mode].needs_position()
+        return self._specs[mode].needs_position and self.modes[mode].needs_position()
 
-    def offboard_age_us(self, time_us: int) -> int:
-        return self.offboard.age_us(time_us)
+    def stream_age_us(self) -> int:
+        return self._active.stream_age_us()
 
     def tell_position(self, *, is_valid: bool) -> None:
         """The commander's judgement of the position estimate."""
@@ -140,11 +118,11 @@ class Navigator:
         self._active.leave(mode)
         self._forget_requests(mode)
         is_low = self.is_taking_off and not is_high(self.context)
-        was_climbing = self._active is self.takeoff or self._climb is not None
-        self._active = self.context.flown = self._modes[mode]
+        was_climbing = self._is_in_takeoff or self._climb is not None
+        self._active = self.context.flown = self.modes[mode]
         self._is_rising = is_low and self._active.finishes_takeoff
         self.context.heading.end_turn()
-        self._climb = self.takeoff.climb if is_low and self._active.goes_away() else None
+        self._climb = self._takeoff.climb if self._takeoff and is_low and self._active.goes_away() else None
         if self._climb is None:
             if self.context.state.is_armed:
                 self._active.start()
@@ -152,9 +130,9 @@ class Navigator:
             self._climb.resume()
 
     def stay(self) -> None:
-        """Holds where it is: what it was sent to is given up."""
-        self.context.next_hold = None
-        self.enter(Mode.HOLD)
+        """Stays where it is in the present mode: what it was sent to is given up."""
+        self._active.forget()
+        self.enter(self.context.state.mode)
 
     def begin_here(self, mode: Mode) -> None:
         """Begins a mode anew, or another, without what clients have asked of it: where the vehicle is."""
@@ -163,7 +141,7 @@ class Navigator:
 
     def _forget_requests(self, kept: Mode | None) -> None:
         """A place or a height that was asked of a mode does not wait for the next time it is entered."""
-        for mode, flown in self._modes.items():
+        for mode, flown in self.modes.items():
             if mode is not kept:
                 flown.forget()
 
@@ -208,7 +186,7 @@ class Navigator:
     def _watch_takeoff(self) -> None:
         """A client may choose Hold before it says where to go (MAVSDK): on the ground the take-off waits a little."""
         context = self.context
-        if self._active is self.takeoff:
+        if self._is_in_takeoff:
             self._is_rising, self._takeoff_us = True, context.state.time_us
         elif self._is_rising and self._climb is None:
             is_given_up = context.is_on_ground and context.state.time_us - self._takeoff_us > _WAITS_US
@@ -246,29 +224,32 @@ class Navigator:
 
     # ---- what clients ask for ----
 
-    def set_offboard(self, setpoint: OffboardSetpoint) -> None:
-        self.offboard.receive(setpoint)
-        if self._active is self.guided:
-            self.guided.receive(setpoint)
+    def mode_for(self, request: ModeRequest) -> Mode:
+        """The mode that carries out a request: the present one, the one it names, or the first that takes it."""
+        able = [mode for mode, spec in self._specs.items() if type(request) in spec.takes]
+        if request.stays and self.context.state.mode in able:
+            return self.context.state.mode
+        return request.mode if request.mode in able or not able else able[0]
 
-    def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw: float, speed_m_s: float) -> Reply:
-        """Chooses the next place to hold; the caller changes to Hold."""
-        context = self.context
-        if not (isfinite(lat_deg) or isfinite(lon_deg) or isfinite(alt_amsl_m) or isfinite(yaw)):
-            context.next_hold = (context.stop_point(), context.state.yaw_rad, False)
-        else:
-            is_holding = context.state.mode is Mode.HOLD and self._climb is None
-            base = self.hold.target_ned if is_holding else context.stop_point()
-            target = reposition_target(context, base, lat_deg, lon_deg, alt_amsl_m, yaw)
-            if isinstance(target, Reply):
-                return target
-            points = self.fence.way(context.stop_point(), target[0])
-            if points is None:
-                return Reply(Verdict.DENIED, "there is no way to the target inside the fence")
-            self.hold.via = points[:-1]
-            context.next_hold = (*target, True)
-        if isfinite(speed_m_s) and speed_m_s > 0.0:
-            context.cruise_speed = speed_m_s
+    def may_go(self, mode: Mode) -> bool:
+        """Whether the vehicle can be sent somewhere by a mode: it is in the air, or about to be."""
+        flown = self.modes.get(mode)
+        is_taking_off = self.is_taking_off
+        return self.context.state.is_flying or (flown is not None and flown.may_go(is_taking_off=is_taking_off))
+
+    def take(self, mode: Mode, request: ModeRequest) -> Reply:
+        """Hands a request to the mode that carries it out; the caller enters that."""
+        return self.modes[mode].take(request)
+
+    def begin_request(self, mode: Mode) -> None:
+        """Begins what the present mode has just been asked for."""
+        if self.modes[mode].begins_anew:
+            self.enter(mode)
+
+    def report(self, report: Report) -> Reply:
+        """Hands what a client tells to the modes that take it, flown or not."""
+        for flown in self._listeners.get(type(report), ()):
+            flown.take(report)
         return ACCEPTED
 
     def change_speed(self, speed_m_s: float, kind: int) -> Reply:
@@ -279,31 +260,4 @@ class Navigator:
         context.set_speed(kind, speed_m_s)
         context.setpoint.set_speeds(context.cruise_speed, context.climb_speed, context.descend_speed)
         self.mission.renew_speeds()
-        return ACCEPTED
-
-    def request_takeoff(self, alt_amsl_m: float, yaw: float) -> Reply:
-        """Chooses the height of the next take-off; the caller changes to Takeoff."""
-        refusal = self.takeoff_refusal(alt_amsl_m)
-        return Reply(Verdict.DENIED, refusal) if refusal else self.takeoff.request(alt_amsl_m, yaw)
-
-    def takeoff_refusal(self, alt_amsl_m: float) -> str:
-        """Why the fence lets no take-off end at an altitude here; empty if it does."""
-        if not isfinite(alt_amsl_m):
-            return ""
-        context = self.context
-        north, east, _ = context.state.estimate.pos_ned
-        refusal = self.fence.refusal((north, east, context.down_of(alt_amsl_m)))
-        return f"takeoff would end {refusal}" if refusal else ""
-
-    def request_landing(self, lat_deg: float, lon_deg: float, yaw: float) -> Reply:
-        """Chooses where the next landing shall be; the caller changes to Land."""
-        if isfinite(lat_deg) != isfinite(lon_deg) or abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
-            return Reply(Verdict.DENIED, "there is no such latitude and longitude")
-        place = None
-        if isfinite(lat_deg) and not (lat_deg == 0.0 and lon_deg == 0.0):
-            place = self.context.pos_ned_of(lat_deg, lon_deg, self.context.state.position.alt_m)
-            refusal = self.fence.refusal(place)
-            if refusal:
-                return Reply(Verdict.DENIED, f"landing place is {refusal}")
-        self.land.request(place, yaw if isfinite(yaw) else nan)
         return ACCEPTED

@@ -12,7 +12,7 @@ from time import thread_time
 
 import numpy as np
 
-from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.client_requests import ChangeMode, OffboardSetpoint, TakeOff
 from autopilot.interface.item_lists import ListKind, MissionItem
 from autopilot.interface.vehicle_state import Mode, Verdict
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
@@ -106,9 +106,9 @@ class ModeFlight:
         if mode in STICK_MODES:
             axes = self._rng.uniform(-0.3, 0.3, 4).tolist()
             controller.sticks.joystick_moved(PILOT, state.time_us, tuple(axes), 0)
-        elif mode is Mode.OFFBOARD and controller.navigator.offboard.age_us(state.time_us) > 200_000:
+        elif mode is Mode.OFFBOARD and controller.navigator.modes[mode].stream_age_us() > 200_000:
             place = (5.0, 5.0, -HEIGHT_M)
-            controller.set_offboard(OffboardSetpoint(state.time_us, SETPOINT_TRAJECTORY, pos_ned=place))
+            controller.request(OffboardSetpoint(state.time_us, SETPOINT_TRAJECTORY, pos_ned=place))
         is_there = state.mode is mode and state.is_armed
         self._elsewhere = 0 if is_there else self._elsewhere + 1
         if self._elsewhere < STAY:
@@ -122,8 +122,8 @@ class ModeFlight:
         if mode is Mode.TERMINATION:
             controller.terminate()
         elif mode is Mode.TAKEOFF:
-            controller.takeoff(state.position.alt_m + HEIGHT_M, nan)
-        elif controller.set_mode(mode).verdict is not Verdict.ACCEPTED:
+            controller.request(TakeOff(state.position.alt_m + HEIGHT_M, nan))
+        elif controller.request(ChangeMode(mode)).verdict is not Verdict.ACCEPTED:
             self._refused += 1
             if self._refused > REFUSED_MAX:
                 self.close()
@@ -150,7 +150,8 @@ class ModeFlight:
         is_lost = not np.isfinite([*estimate.pos_ned, *estimate.vel_ned, *estimate.q_ned_from_frd]).all()
         self._lost_frames = self._lost_frames + 1 if is_lost else 0
         assert self._lost_frames <= LOST_MAX, estimate
-        for target in (flight.controller.navigator.follow.target, flight.controller.navigator.mission.precision.target):
+        modes = flight.controller.navigator.modes
+        for target in (modes[Mode.FOLLOW].target, modes[Mode.PRECISION_LAND].target):
             assert np.isfinite([*target.pos_ned, *target.vel_ned]).all(), (target.pos_ned, target.vel_ned)
 
 

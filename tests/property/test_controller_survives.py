@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from autopilot.interface.client_requests import ChangeMode, TakeOff
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
@@ -134,14 +135,14 @@ def enter(vehicle, mode):
     """Does what makes the mode possible, and asks for it; returns whether it is flown."""
     fc = vehicle.fc
     vehicle.pilot()
-    fc.set_offboard(position_setpoint(5.0, 5.0, -10.0))
+    fc.request(position_setpoint(5.0, 5.0, -10.0))
     fc.lists.load(ListKind.MISSION, [item(0, 16, 50.0), item(1, 16, 50.0, 50.0), item(2, 21, 0.0, 0.0, 0.0)])
     if mode is Mode.TAKEOFF:
-        fc.takeoff(vehicle.state.position.alt_m + 20.0, nan)
+        fc.request(TakeOff(vehicle.state.position.alt_m + 20.0, nan))
     elif mode is Mode.TERMINATION:
         fc.terminate()
     else:
-        fc.set_mode(mode)
+        fc.request(ChangeMode(mode))
     return vehicle.state.mode is mode
 
 

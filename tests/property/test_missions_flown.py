@@ -5,6 +5,7 @@ from math import isfinite, nan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from autopilot.interface.client_requests import ChangeMode, SetCurrentItem
 from autopilot.interface.item_lists import ListKind, MissionItem
 from autopilot.interface.vehicle_state import Mode
 from autopilot.navigator.mission.item_checks import SUPPORTED_COMMANDS, refuse_items
@@ -44,7 +45,7 @@ def missions(draw):
 def test_every_mission_that_is_taken_is_flown(mission, restart_at, is_paused):
     rig = Kinematic().flying()
     assert rig.fc.lists.load(ListKind.MISSION, mission) is None
-    rig.fc.set_mode(Mode.MISSION)
+    rig.fc.request(ChangeMode(Mode.MISSION))
     for frame in range(round(FLOWN_S / 0.02)):
         rig.frame()
         if frame == 300 and is_paused:
@@ -52,7 +53,7 @@ def test_every_mission_that_is_taken_is_flown(mission, restart_at, is_paused):
         if frame == 400 and is_paused:
             rig.fc.guidance.resume()
         if frame == 600:
-            rig.fc.set_current_item(restart_at)
+            rig.fc.request(SetCurrentItem(restart_at))
         if rig.sp("kind") == SETPOINT_TRAJECTORY and rig.sp("is_armed") and not rig.sp("is_landed"):
             pos, vel = rig.sp("pos_ned"), rig.sp("vel_ned")
             assert all(isfinite(p) or isfinite(v) for p, v in zip(pos, vel, strict=True)), (pos, vel)

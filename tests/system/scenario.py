@@ -8,7 +8,20 @@ from math import cos, degrees, hypot, nan, sin
 
 import numpy as np
 
-from autopilot.interface.client_requests import OffboardSetpoint, OrbitRequest, TargetReport
+from autopilot.interface.client_requests import (
+    ChangeMode,
+    ChangeSpeed,
+    GoTo,
+    LandAt,
+    LandingTargetReport,
+    OffboardSetpoint,
+    OrbitRequest,
+    SetCurrentItem,
+    SetHome,
+    StartMission,
+    TakeOff,
+    TargetReport,
+)
 from autopilot.interface.item_lists import ListKind, MissionItem
 from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
 from autopilot.mavlink.dialects.px4 import PX4
@@ -89,12 +102,12 @@ class Scenario:
         if self.has_station and now_us % 1_000_000 == 0:
             self.fc.station.heard(now_us)
         if self.stream is not None and now_us % 100_000 == 0:
-            self.fc.set_offboard(self.stream)
+            self.fc.request(self.stream)
         if self.has_target and now_us % 200_000 == 0:
             angle = now_us * 0.1e-6
             place = (20.0 * cos(angle), 20.0 * sin(angle), 0.0)
-            self.fc.report_target(TargetReport(place, (-2.0 * sin(angle), 2.0 * cos(angle), 0.0), 0.5, 0.3))
-            self.fc.report_landing_target((5.0, 5.0, 0.0))
+            self.fc.request(TargetReport(place, (-2.0 * sin(angle), 2.0 * cos(angle), 0.0), 0.5, 0.3))
+            self.fc.request(LandingTargetReport((5.0, 5.0, 0.0)))
         self.flight.frame()
         self.judge()
 
@@ -184,7 +197,7 @@ class Scenario:
     def begin(self):
         self.until(lambda: self.state.is_ready_to_arm, 60.0, "ready")
         self.has_station = bool(self.rng.random() < 0.5)
-        self.ask("takeoff", self.fc.takeoff(self.alt(float(self.rng.uniform(3.0, 25.0))), nan))
+        self.ask("takeoff", self.fc.request(TakeOff(self.alt(float(self.rng.uniform(3.0, 25.0))), nan)))
         self.ask("arm", self.fc.arm(force=False))
         self.run(float(self.rng.uniform(0.5, 12.0)))
 
@@ -248,11 +261,11 @@ class Scenario:
         self.set("RTL_LAND_DELAY", 0.0)
         self.set("RTL_TYPE", 0.0)
         self.set("NAV_DLL_ACT", 0.0)
-        self.ask("speed", self.fc.change_speed(5.0))
+        self.ask("speed", self.fc.request(ChangeSpeed(5.0)))
         if self.state.is_armed and self.state.landed_state is not LandedState.ON_GROUND:
             self.run(15.0)  # the estimator settles
             if self.state.is_armed:
-                self.ask("return", self.fc.set_mode(Mode.RETURN))
+                self.ask("return", self.fc.request(ChangeMode(Mode.RETURN)))
         self.until(lambda: not self.state.is_armed and self.height_m < AIRBORNE_M, HOME_S, "on the ground and disarmed")
 
     def ask(self, what, reply):
@@ -290,7 +303,7 @@ class Scenario:
         mode = MODES[int(self.rng.integers(len(MODES)))]
         if mode in BY_THRUST:  # hands off would let it fall; that is the pilot's affair
             mode = Mode.ALTITUDE
-        self.ask(f"mode {mode.name}", self.fc.set_mode(mode))
+        self.ask(f"mode {mode.name}", self.fc.request(ChangeMode(mode)))
 
     def command(self):
         rng, fc = self.rng, self.fc
@@ -299,22 +312,22 @@ class Scenario:
         speed = float(rng.choice([nan, 1.0, 5.0, 12.0]))
         what = int(rng.integers(13))
         if what == 0:
-            self.ask("land", fc.land(nan, nan, nan))
+            self.ask("land", fc.request(LandAt()))
         elif what == 1:
-            self.ask("land there", fc.land(lat, lon, nan))
+            self.ask("land there", fc.request(LandAt(lat, lon, nan)))
         elif what == 2:
-            self.ask("takeoff", fc.takeoff(self.alt(height_m), nan))
+            self.ask("takeoff", fc.request(TakeOff(self.alt(height_m), nan)))
         elif what in (3, 4):
-            self.ask(f"goto height {height_m}", fc.reposition(lat, lon, self.alt(height_m), nan, speed))
+            self.ask(f"goto height {height_m}", fc.request(GoTo(lat, lon, self.alt(height_m), nan, speed)))
         elif what == 5:
             request = OrbitRequest(
                 float(rng.uniform(-30, 30)), speed, int(rng.integers(6)), 0.0, lat, lon, self.alt(height_m)
             )
-            self.ask(f"orbit at height {height_m}", fc.orbit(request))
+            self.ask(f"orbit at height {height_m}", fc.request(request))
         elif what == 6:
-            self.ask("home", fc.set_home(lat, lon, self.alt(float(rng.choice([0.0, 0.0, 5.0])))))
+            self.ask("home", fc.request(SetHome(lat, lon, self.alt(float(rng.choice([0.0, 0.0, 5.0]))))))
         elif what == 7:
-            self.ask("speed", fc.change_speed(speed, int(rng.integers(4))))
+            self.ask("speed", fc.request(ChangeSpeed(speed, int(rng.integers(4)))))
         elif what == 8:
             is_high = self.height_m > 2.0
             if self.ask("disarm", fc.disarm(force=False)) and is_high:
@@ -326,7 +339,7 @@ class Scenario:
         elif what == 11:
             self.ask("turn", fc.guidance.turn(90.0, 30.0, 1.0, is_relative=False))
         else:
-            self.ask("guided goto", fc.guided.goto(lat, lon, self.alt(height_m), nan, speed))
+            self.ask("guided goto", fc.request(GoTo(lat, lon, self.alt(height_m), nan, speed, mode=Mode.GUIDED)))
 
     def new_mission(self):
         rng = self.rng
@@ -346,10 +359,10 @@ class Scenario:
         if refusal is not None and not refusal.reason:
             self.fail("mission refused without a reason")
         if rng.random() < 0.7:
-            self.ask("start mission", self.fc.start_mission(int(rng.integers(-1, 2))))
+            self.ask("start mission", self.fc.request(StartMission(int(rng.integers(-1, 2)))))
 
     def jump_in_mission(self):
-        self.ask("set current", self.fc.set_current_item(int(self.rng.integers(5))))
+        self.ask("set current", self.fc.request(SetCurrentItem(int(self.rng.integers(5)))))
 
     def new_fence(self):
         radius_m = float(self.rng.choice([0.0, 30.0, 80.0]))
@@ -388,7 +401,7 @@ class Scenario:
             still = OffboardSetpoint(0, int(SETPOINT_TRAJECTORY), pos_ned=place, vel_ned=free, yaw=0.0)
             self.stream = moving if self.rng.random() < 0.4 else still
             self.run(0.3)
-            self.ask("offboard", self.fc.set_mode(Mode.OFFBOARD))
+            self.ask("offboard", self.fc.request(ChangeMode(Mode.OFFBOARD)))
         self.note(f"stream {self.stream}")
 
     def target(self):

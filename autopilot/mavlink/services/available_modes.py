@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.client_requests import ChangeMode
 from autopilot.interface.vehicle_state import Reply, Verdict
 from autopilot.mavlink.channel import Endpoint
 from autopilot.mavlink.dialects import ModeRow
@@ -59,4 +60,4 @@ class ModeService(Service):
         row = next((row for row in self._endpoint.dialect.modes if row.standard_mode == number and number), None)
         if row is None:
             return Reply(Verdict.DENIED, f"there is no standard mode {number}")
-        return self._endpoint.vehicle.set_mode(row.mode)
+        return self._endpoint.vehicle.request(ChangeMode(row.mode))

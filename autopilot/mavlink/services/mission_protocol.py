@@ -11,6 +11,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.client_requests import SetCurrentItem
 from autopilot.interface.item_lists import ItemRefusal, ListKind, MissionItem, item_name
 from autopilot.interface.vehicle_state import Severity
 from autopilot.mavlink.channel import Endpoint, Sender
@@ -339,7 +340,8 @@ class MissionService(Service):
 
     def set_current_requested(self, sender: Sender, fields: Any) -> None:
         """Makes an item the current one; the answer is MISSION_CURRENT, whether it changed or not."""
-        reply = self._endpoint.vehicle.set_current_item(max(fields.seq - self._first_seq(ListKind.MISSION), 0))
+        seq = max(fields.seq - self._first_seq(ListKind.MISSION), 0)
+        reply = self._endpoint.vehicle.request(SetCurrentItem(seq))
         if reply.reason:
             self._endpoint.text(Severity.WARNING, f"Mission: {reply.reason}")
         telemetry = self._endpoint.telemetry

@@ -52,6 +52,7 @@ class Fence:
         self._safe_sq = -1.0  # [m²] moves shorter than this change nothing
         context.params.on_change(self._on_parameter)
         context.find_way = self.way
+        context.fence_refusal = self.refusal
         context.place_refusal = lambda place: self.refusal(place, is_to_stay=True)
         self._switch_by_parameter()
 

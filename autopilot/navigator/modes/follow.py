@@ -11,7 +11,7 @@ from math import atan2, cos, hypot, isfinite, nan, radians, sin
 from autopilot.inputs.sticks import StickInput
 from autopilot.interface.client_requests import TargetReport
 from autopilot.interface.mode_spec import FlightMode
-from autopilot.interface.vehicle_state import Severity
+from autopilot.interface.vehicle_state import ACCEPTED, Reply, Severity
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.target_filter import TargetFilter
@@ -58,12 +58,13 @@ class Follow(FlightMode):
         self._time_us = 0
         context.params.on_change(self._on_parameter)
 
-    def report(self, report: TargetReport) -> None:
+    def take(self, request: TargetReport) -> Reply:
         """The target says where it is."""
-        now_us = self._context.state.time_us
+        report, now_us = request, self._context.state.time_us
         self.target.report(now_us, report.pos_ned, report.vel_ned, report.pos_std, report.vel_std)
         if isfinite(report.course_rad) and self.target.speed_xy < _COURSE_SPEED_M_S:
             self._course = report.course_rad
+        return ACCEPTED
 
     def goes_away(self) -> bool:
         return True

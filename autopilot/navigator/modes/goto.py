@@ -2,6 +2,7 @@
 
 from math import hypot, isfinite
 
+from autopilot.interface.client_requests import GoTo
 from autopilot.interface.vehicle_state import ACCEPTED, Reply, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
@@ -10,14 +11,13 @@ from autopilot.ports import TERRAIN_VALID
 _BELOW_GROUND_M = 1.0  # below home and below the ground under the vehicle: more is a mistake, less an inaccuracy; guess
 
 
-def reposition_target(
-    context: NavContext, base: Vector, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw: float
-) -> tuple[Vector, float] | Reply:
+def reposition_target(context: NavContext, base: Vector, request: GoTo) -> tuple[Vector, float] | Reply:
     """Place and heading that are asked for, or why not.
 
     What is NaN stays as it is at `base` [m]: the place being held, or the place where the vehicle can stop.
     """
     state = context.state
+    lat_deg, lon_deg, alt_amsl_m = request.lat_deg, request.lon_deg, request.alt_amsl_m
     if isfinite(lat_deg) != isfinite(lon_deg):
         return Reply(Verdict.DENIED, "needs both latitude and longitude")
     if isfinite(lat_deg):
@@ -34,7 +34,7 @@ def reposition_target(
     refusal = target_refusal(context, target)
     if refusal is not ACCEPTED:
         return refusal
-    return target, context.heading_to(state.estimate.pos_ned, target, yaw)
+    return target, context.heading_to(state.estimate.pos_ned, target, request.yaw_rad)
 
 
 def ground_d(context: NavContext) -> float:

@@ -7,12 +7,12 @@ attitude and rates stop after GUID_TIMEOUT. A take-off stays in the mode.
 from enum import Enum, auto
 from math import isfinite, nan
 
-from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.client_requests import GoTo, OffboardSetpoint, TakeOff
 from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply, Severity, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.goto import reposition_target
-from autopilot.navigator.modes.takeoff import Climb, is_high
+from autopilot.navigator.modes.takeoff import Climb, is_high, takeoff_refusal
 from autopilot.navigator.paths.waypoint_path import Way
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff_intent import Ask, vertical_ask
@@ -39,6 +39,7 @@ class Guided(FlightMode):
     )  # fmt: skip
 
     takes_heading = True
+    begins_anew = False
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
@@ -74,7 +75,10 @@ class Guided(FlightMode):
             self._is_active = False
 
     def forget(self) -> None:
-        self.forget_goto()
+        self._next = None
+
+    def may_go(self, *, is_taking_off: bool) -> bool:  # noqa: ARG002
+        return self._is_climbing
 
     def frame(self) -> None:
         context = self._context
@@ -139,9 +143,23 @@ class Guided(FlightMode):
 
     # ---- what clients ask for ----
 
-    def takeoff(self, alt_amsl_m: float, yaw: float) -> Reply:
+    def take(self, request: GoTo | OffboardSetpoint | TakeOff) -> Reply:
+        match request:
+            case GoTo():
+                return self._go_to(request)
+            case OffboardSetpoint():
+                if self._context.flown is self:
+                    self._receive(request)
+                return ACCEPTED
+            case TakeOff():
+                return self._take_off(request.alt_amsl_m, request.yaw_rad)
+
+    def _take_off(self, alt_amsl_m: float, yaw: float) -> Reply:
         """Climbs to an altitude over the place where it stands, and stays in the mode."""
         context = self._context
+        refusal = takeoff_refusal(context, alt_amsl_m)
+        if refusal:
+            return Reply(Verdict.DENIED, refusal)
         state = context.state
         if not state.is_armed:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not armed")
@@ -158,25 +176,22 @@ class Guided(FlightMode):
         self._climb.start(context.down_of(alt_amsl_m), yaw)
         return ACCEPTED
 
-    def goto(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw: float, speed_m_s: float) -> Reply:
-        """Goes to a place; what is NaN stays as it is. The caller sees to it that the mode is or will be this one."""
+    def _go_to(self, request: GoTo) -> Reply:
+        """Goes to a place; what is NaN stays as it is."""
         context = self._context
-        state = context.state
-        if not state.is_flying and not self._is_climbing:
-            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
         if not context.has_position:
             return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
-        if not any(isfinite(element) for element in (lat_deg, lon_deg, alt_amsl_m, yaw)):  # a pause
-            return self._take((context.stop_point(), state.yaw_rad))
+        if request.is_pause:
+            return self._take((context.stop_point(), context.state.yaw_rad))
         is_held = self._is_active and self._task is _Task.PLACE
         base = self._place if is_held else context.stop_point()
-        target = reposition_target(context, base, lat_deg, lon_deg, alt_amsl_m, yaw)
+        target = reposition_target(context, base, request)
         if isinstance(target, Reply):
             return target
         if context.find_way(context.stop_point(), target[0]) is None:
             return Reply(Verdict.DENIED, "there is no way to the target inside the fence")
-        if isfinite(speed_m_s) and speed_m_s > 0.0:
-            context.cruise_speed = speed_m_s
+        if isfinite(request.speed_m_s) and request.speed_m_s > 0.0:
+            context.cruise_speed = request.speed_m_s
         return self._take(target)
 
     def _take(self, target: tuple[Vector, float]) -> Reply:
@@ -192,11 +207,7 @@ class Guided(FlightMode):
         """Whether a take-off has been asked for and is not over."""
         return self._is_active and self._task is _Task.CLIMB and self._context.state.is_armed
 
-    def forget_goto(self) -> None:
-        """The mode could not be entered, or another was."""
-        self._next = None
-
-    def receive(self, setpoint: OffboardSetpoint) -> None:
+    def _receive(self, setpoint: OffboardSetpoint) -> None:
         """An external setpoint, in the air or to leave the ground."""
         if isfinite(setpoint.yaw) or isfinite(setpoint.yaw_rate) or setpoint.kind != SETPOINT_TRAJECTORY:
             self._context.heading.end_turn()

@@ -1,7 +1,12 @@
 """Hold: stays at one place, or goes to one and stays there."""
 
+from math import isfinite
+
+from autopilot.interface.client_requests import GoTo
 from autopilot.interface.mode_spec import FlightMode
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
 from autopilot.navigator.context import NavContext, distance
+from autopilot.navigator.modes.goto import reposition_target
 from autopilot.navigator.modes.stick_modes import Position
 from autopilot.navigator.paths.waypoint_path import Way
 from autopilot.navigator.setpoint import Vector
@@ -13,26 +18,48 @@ class Hold(FlightMode):
     Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as he steers.
     """
 
-    __slots__ = ("_context", "_is_flown", "_is_goto", "_is_steered", "_reset_count", "_steered", "_way",
-                 "target_ned", "via", "yaw")  # fmt: skip
+    __slots__ = ("_context", "_is_active", "_is_flown", "_is_goto", "_is_steered", "_reset_count", "_steered", "_via",
+                 "_way", "target_ned", "yaw")  # fmt: skip
 
     finishes_takeoff = takes_heading = True
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
+        self._is_active = False  # not while a take-off is finished first
         self._is_flown = False
         self._is_goto = False  # on a straight line to the place
         self._steered = Position(context)
         self._way = Way(context)
-        self.via: list[Vector] = []  # [m] points to go over on the next way to a place
+        self._via: list[Vector] = []  # [m] points to go over on the next way to a place
         self._is_steered = False
         self._reset_count = 0  # of the estimate
         self.target_ned: Vector = (0.0, 0.0, 0.0)  # [m]
         self.yaw = 0.0  # [rad]
 
+    def take(self, request: GoTo) -> Reply:
+        """Chooses the next place to hold."""
+        context = self._context
+        if not context.has_position:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
+        if request.is_pause:
+            context.next_hold = (context.stop_point(), context.state.yaw_rad, False)
+        else:
+            target = reposition_target(context, self.target_ned if self._is_active else context.stop_point(), request)
+            if isinstance(target, Reply):
+                return target
+            points = context.find_way(context.stop_point(), target[0])
+            if points is None:
+                return Reply(Verdict.DENIED, "there is no way to the target inside the fence")
+            self._via = points[:-1]
+            context.next_hold = (*target, True)
+        if isfinite(request.speed_m_s) and request.speed_m_s > 0.0:
+            context.cruise_speed = request.speed_m_s
+        return ACCEPTED
+
     @property
     def is_underway(self) -> bool:
-        """Whether the vehicle is still on its way to the place a client has sent it to."""
+        if not self._is_active:  # a take-off is finished before it goes there
+            return self._context.state.is_armed
         way_m = distance(self._context.state.estimate.pos_ned, self.target_ned)
         return self._is_goto and way_m > self._context.number("NAV_ACC_RAD")
 
@@ -40,19 +67,23 @@ class Hold(FlightMode):
         next_hold = self._context.next_hold
         return next_hold is not None and next_hold[2]
 
+    def leave(self, following: Mode) -> None:  # noqa: ARG002
+        self._is_active = False
+
     def forget(self) -> None:
         self._context.next_hold = None
-        self.via = []
+        self._via = []
 
     def start(self) -> None:
         context = self._context
+        self._is_active = True
         if context.next_hold is not None:
             self.target_ned, self.yaw, self._is_goto = context.next_hold
             context.next_hold = None
         else:
             self._is_goto = False
             self.target_ned, self.yaw = context.stop_point(), context.state.yaw_rad
-        via, self.via = self.via if self._is_goto else [], []
+        via, self._via = self._via if self._is_goto else [], []
         self._is_flown = bool(via)
         if via:
             self._way.start(context.stop_point(), [*via, self.target_ned])

@@ -2,7 +2,9 @@
 
 from math import hypot, isfinite, nan
 
+from autopilot.interface.client_requests import LandAt
 from autopilot.interface.mode_spec import FlightMode
+from autopilot.interface.vehicle_state import ACCEPTED, Reply, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff_intent import is_near_start
@@ -115,13 +117,23 @@ class Land(FlightMode):
         self._place: Vector | None = None  # still to be reached
         self._yaw = nan
 
-    def request(self, place_ned: Vector | None, yaw: float) -> None:
-        """Sets place [m] and heading [rad] of the next landing; None: where the vehicle can stop."""
-        self._place = place_ned
-        self._yaw = yaw
+    def take(self, request: LandAt) -> Reply:
+        """Sets place and heading of the next landing; without a place it is where the vehicle can stop."""
+        lat_deg, lon_deg = request.lat_deg, request.lon_deg
+        if isfinite(lat_deg) != isfinite(lon_deg) or abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+            return Reply(Verdict.DENIED, "there is no such latitude and longitude")
+        context, place = self._context, None
+        if isfinite(lat_deg) and not (lat_deg == 0.0 and lon_deg == 0.0):
+            place = context.pos_ned_of(lat_deg, lon_deg, context.state.position.alt_m)
+            refusal = context.fence_refusal(place)
+            if refusal:
+                return Reply(Verdict.DENIED, f"landing place is {refusal}")
+        self._place = place
+        self._yaw = request.yaw_rad
+        return ACCEPTED
 
     def forget(self) -> None:
-        self.request(None, nan)
+        self._place, self._yaw = None, nan
 
     def start(self) -> None:
         context = self._context

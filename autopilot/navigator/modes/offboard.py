@@ -4,6 +4,7 @@ from math import nan
 
 from autopilot.interface.client_requests import OffboardSetpoint
 from autopilot.interface.mode_spec import FlightMode
+from autopilot.interface.vehicle_state import ACCEPTED, Reply
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.takeoff_intent import Ask, vertical_ask
 from autopilot.ports import SETPOINT_TRAJECTORY
@@ -22,19 +23,20 @@ class Offboard(FlightMode):
         self._received_us = 0
         self._flown: OffboardSetpoint | None = None
 
-    def receive(self, setpoint: OffboardSetpoint) -> None:
-        self.latest = setpoint
+    def take(self, request: OffboardSetpoint) -> Reply:
+        self.latest = request
         self._received_us = self._context.state.time_us
+        return ACCEPTED
 
-    def age_us(self, time_us: int) -> int:
+    def stream_age_us(self) -> int:
         """Time since the latest setpoint; very large without one."""
-        return time_us - self._received_us if self.latest is not None else 1 << 62
+        return self._context.state.time_us - self._received_us if self.latest is not None else 1 << 62
 
     def needs_position(self) -> bool:
         return self.latest is None or self.latest.kind == SETPOINT_TRAJECTORY
 
     def refusal(self) -> str:
-        is_stream = self.age_us(self._context.state.time_us) <= STREAM_PERIOD_US
+        is_stream = self.stream_age_us() <= STREAM_PERIOD_US
         return "" if is_stream else "needs setpoints faster than 2 Hz before the switch"
 
     def start(self) -> None:

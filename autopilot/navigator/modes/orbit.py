@@ -53,8 +53,8 @@ class Orbit(FlightMode):
         self._turns_rad = 0.0
         self._time_us = 0
 
-    def request(self, request: OrbitRequest) -> Reply:
-        """Chooses the next orbit; the caller changes to the mode."""
+    def take(self, request: OrbitRequest) -> Reply:
+        """Chooses the next orbit."""
         radius_m = self._radius_of(request)
         if not _RADIUS_MIN_M <= abs(radius_m) <= _RADIUS_MAX_M:
             return _denied(f"a radius of {abs(radius_m):.1f} m is not between {_RADIUS_MIN_M:g} and {_RADIUS_MAX_M:g}")

@@ -8,12 +8,12 @@ PLD_SRCH_TOUT or PLD_MAX_SRCH searches ends in a normal landing.
 from enum import IntEnum
 from math import hypot, nan
 
+from autopilot.interface.client_requests import LandingTargetReport
 from autopilot.interface.mode_spec import FlightMode
-from autopilot.interface.vehicle_state import Severity
+from autopilot.interface.vehicle_state import ACCEPTED, Reply, Severity
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.goto import ground_d
 from autopilot.navigator.modes.land import Landing
-from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.target_filter import TargetFilter
 
 FRESH_US = 1_000_000  # older sightings say nothing about now
@@ -47,9 +47,10 @@ class PrecisionLand(FlightMode):
         self._approach_d = 0.0  # [m]
         self._yaw = 0.0  # [rad]
 
-    def seen(self, pos_ned: Vector) -> None:
-        """The target has been seen at a place [m]."""
-        self.target.report(self._context.state.time_us, pos_ned, None, _SIGHT_STD_M)
+    def take(self, request: LandingTargetReport) -> Reply:
+        """The target has been seen."""
+        self.target.report(self._context.state.time_us, request.pos_ned, None, _SIGHT_STD_M)
+        return ACCEPTED
 
     @property
     def sees_target(self) -> bool:

@@ -2,8 +2,9 @@
 
 from math import isfinite, nan
 
+from autopilot.interface.client_requests import TakeOff
 from autopilot.interface.mode_spec import FlightMode
-from autopilot.interface.vehicle_state import Reply, Severity, Verdict
+from autopilot.interface.vehicle_state import ACCEPTED, Reply, Severity, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 
@@ -65,6 +66,15 @@ def is_high(context: NavContext) -> bool:
     return height_m >= _SAFE_M
 
 
+def takeoff_refusal(context: NavContext, alt_amsl_m: float) -> str:
+    """Why the fence lets no take-off end at an altitude here; empty if it does."""
+    if not isfinite(alt_amsl_m):
+        return ""
+    north, east, _ = context.state.estimate.pos_ned
+    refusal = context.fence_refusal((north, east, context.down_of(alt_amsl_m)))
+    return f"takeoff would end {refusal}" if refusal else ""
+
+
 class Takeoff(FlightMode):
     """Mode Takeoff: climbs, then holds."""
 
@@ -78,14 +88,17 @@ class Takeoff(FlightMode):
         self._alt_amsl_m = nan
         self._yaw = nan
 
-    def request(self, alt_amsl_m: float, yaw: float) -> Reply:
+    def take(self, request: TakeOff) -> Reply:
         """Sets the target for the next take-off; NaN: MIS_TAKEOFF_ALT above home."""
-        if alt_amsl_m > self._base_alt_m() + 10_000.0:
-            return Reply(Verdict.DENIED, f"altitude {alt_amsl_m:.0f} m is out of range")
-        self._alt_amsl_m = alt_amsl_m
-        self._yaw = yaw
+        refusal = takeoff_refusal(self._context, request.alt_amsl_m)
+        if refusal:
+            return Reply(Verdict.DENIED, refusal)
+        if request.alt_amsl_m > self._base_alt_m() + 10_000.0:
+            return Reply(Verdict.DENIED, f"altitude {request.alt_amsl_m:.0f} m is out of range")
+        self._alt_amsl_m = request.alt_amsl_m
+        self._yaw = request.yaw_rad
         self._target_alt_m(is_told=True)
-        return Reply(Verdict.ACCEPTED)
+        return ACCEPTED
 
     def forget(self) -> None:
         self._alt_amsl_m = self._yaw = nan

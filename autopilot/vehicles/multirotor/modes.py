@@ -1,5 +1,14 @@
 """The flight modes of a multirotor, one row each, in the order in which PX4's clients get them listed."""
 
+from autopilot.interface.client_requests import (
+    GoTo,
+    LandAt,
+    LandingTargetReport,
+    OffboardSetpoint,
+    OrbitRequest,
+    TakeOff,
+    TargetReport,
+)
 from autopilot.interface.failsafe_action import Action
 from autopilot.interface.mode_spec import (
     AUTO_OVERRIDE,
@@ -93,6 +102,7 @@ MULTIROTOR_MODES = mode_table(
         needs_position=True,
         may_arm=True,
         on_ground=True,
+        takes=(GoTo,),
         px4=px4_mode(Px4Main.AUTO, 3, "Hold"),
         ardupilot=DialectMode(5, "Loiter"),
         nav_state=4,
@@ -141,6 +151,7 @@ MULTIROTOR_MODES = mode_table(
     ModeSpec(
         mode=Mode.LAND,
         build=of_context(Land),
+        takes=(LandAt,),
         px4=px4_mode(Px4Main.AUTO, 6, "Land"),
         ardupilot=DialectMode(9, "Land"),
         standard=StandardMode.LAND,
@@ -157,6 +168,7 @@ MULTIROTOR_MODES = mode_table(
         mode=Mode.PRECISION_LAND,
         build=_precision_land,
         needs_position=True,
+        takes=(LandingTargetReport,),
         px4=px4_mode(Px4Main.AUTO, 9, "Precision Land"),
         ardupilot=Mode.LAND,
         nav_state=20,
@@ -173,6 +185,7 @@ MULTIROTOR_MODES = mode_table(
         may_arm=True,
         on_ground=True,
         disarmed=Disarmed.HOLD,
+        takes=(TakeOff,),
         px4=px4_mode(Px4Main.AUTO, 2, "Takeoff"),
         ardupilot=Mode.GUIDED,
         standard=StandardMode.TAKEOFF,
@@ -189,6 +202,7 @@ MULTIROTOR_MODES = mode_table(
         may_arm=True,
         on_ground=True,
         disarmed=Disarmed.HOLD,
+        takes=(OffboardSetpoint,),
         px4=px4_mode(Px4Main.OFFBOARD, 0, "Offboard"),
         ardupilot=Mode.GUIDED,
         is_advanced=True,
@@ -202,6 +216,7 @@ MULTIROTOR_MODES = mode_table(
         build=of_context(Follow),
         needs_position=True,
         on_takeoff=True,
+        takes=(TargetReport,),
         px4=px4_mode(Px4Main.AUTO, 8, "Follow Me"),
         ardupilot=DialectMode(23, "Follow"),
         nav_state=19,
@@ -215,6 +230,7 @@ MULTIROTOR_MODES = mode_table(
         build=of_context(Orbit),
         needs_position=True,
         on_takeoff=True,
+        takes=(OrbitRequest,),
         px4=px4_mode(Px4Main.POSCTL, 1, "Orbit", is_selectable=False),
         ardupilot=DialectMode(7, "Circle"),
         standard=StandardMode.ORBIT,
@@ -307,6 +323,7 @@ MULTIROTOR_MODES = mode_table(
         may_arm=True,
         on_ground=True,
         disarmed=Disarmed.SAME,
+        takes=(TakeOff, GoTo, OffboardSetpoint),
         px4=Mode.OFFBOARD,
         ardupilot=DialectMode(4, "Guided"),
         is_advanced=True,

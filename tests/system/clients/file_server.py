@@ -13,14 +13,14 @@ from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.transport.links import UdpLink
 from common.folder import ConfinedFolder
 from mission.flight import DIALECTS
-from tests.unit.autopilot.mavlink.rig import RecordingVehicle
+from tests.unit.autopilot.mavlink.rig import AskedVehicle
 
 FRAME_US = 20_000
 FRAME_WALL_S = 0.004
 
 
 def main(port, folder, dialect="px4"):
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     vehicle.host.files = ConfinedFolder(Path(folder))
     server = MavlinkServer(vehicle, [UdpLink(int(port))], DIALECTS[dialect])
     while True:

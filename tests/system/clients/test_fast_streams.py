@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.client_requests import TakeOff
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import message_id
 from mission.flight import Flight, FlightConfig
@@ -26,7 +27,7 @@ def flown(intervals_us):
         client.command(511, message_id(name), interval_us)
     flight.run(lambda flight: flight.controller.state.is_ready_to_arm)
     flight.controller.arm(force=False)
-    flight.controller.takeoff(flight.config.home.alt_m + 10.0, nan)
+    flight.controller.request(TakeOff(flight.config.home.alt_m + 10.0, nan))
     client.received()
     end_us = flight.time_us + int(SECONDS * 1e6)
     while flight.time_us < end_us:

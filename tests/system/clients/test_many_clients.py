@@ -7,7 +7,7 @@ from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from tests.many_clients import CLIENTS, measure
-from tests.unit.autopilot.mavlink.rig import FRAME_US, RecordingVehicle
+from tests.unit.autopilot.mavlink.rig import FRAME_US, AskedVehicle
 
 WORSE_MAX = 1.2
 SETPOINT_FRAMES = 2  # 25 Hz
@@ -16,7 +16,7 @@ SETPOINT_FRAMES = 2  # 25 Hz
 def lockstep(flood_per_frame, frames=500):
     """Frames to a command's acknowledgement, frames to a setpoint's arrival, and times of heartbeats [us]."""
     pairs = [memory_pair(LinkRole.GROUND) for _ in range(CLIENTS)]
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     server = MavlinkServer(vehicle, [vehicle_end for vehicle_end, _ in pairs])
     ends, readers = [client_end for _, client_end in pairs], [FrameReader() for _ in pairs]
     flooder, pilot = 7, 3

@@ -5,7 +5,7 @@ from math import cos, degrees, hypot, nan, sin
 import numpy as np
 import pytest
 
-from autopilot.interface.client_requests import OrbitRequest, TargetReport
+from autopilot.interface.client_requests import ChangeMode, GoTo, OrbitRequest, TakeOff, TargetReport
 from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
@@ -29,9 +29,9 @@ class TakingOff:
         self.is_watched = False
         self.run(lambda: self.state.is_ready_to_arm, 30.0)
         if mode is Mode.GUIDED:
-            assert self.fc.set_mode(mode).verdict is Verdict.ACCEPTED
+            assert self.fc.request(ChangeMode(mode)).verdict is Verdict.ACCEPTED
         assert self.fc.arm(force=False).verdict is Verdict.ACCEPTED
-        assert self.fc.takeoff(self.flight.config.home.alt_m + height_m, nan).verdict is Verdict.ACCEPTED
+        assert self.fc.request(TakeOff(self.flight.config.home.alt_m + height_m, nan)).verdict is Verdict.ACCEPTED
         self.start = self.pos.copy()
         self.is_watched = True
 
@@ -69,7 +69,7 @@ def test_a_goto_on_take_off_is_taken_and_flown_once_the_vehicle_is_high(pause_s)
     vehicle = TakingOff()
     vehicle.rest(pause_s)
     assert (vehicle.state.landed_state is LandedState.ON_GROUND) is (pause_s < 1.0)
-    assert vehicle.fc.reposition(*vehicle.target(), nan, nan).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(GoTo(*vehicle.target(), nan, nan)).verdict is Verdict.ACCEPTED
     vehicle.run(lambda: hypot(*(vehicle.pos - (NORTH_M, 0.0, -HEIGHT_M))) < 1.5, 60.0)
     assert vehicle.lean_deg < LEAN_MAX_DEG
     assert vehicle.moved_m < 0.5
@@ -79,9 +79,9 @@ def test_a_goto_on_take_off_is_taken_and_flown_once_the_vehicle_is_high(pause_s)
 def test_a_hold_before_the_goto_as_mavsdk_sends_it_changes_nothing(pause_s):
     vehicle = TakingOff()
     vehicle.rest(pause_s)
-    assert vehicle.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     vehicle.rest(0.1)
-    assert vehicle.fc.reposition(*vehicle.target(), nan, nan).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(GoTo(*vehicle.target(), nan, nan)).verdict is Verdict.ACCEPTED
     vehicle.run(lambda: hypot(*(vehicle.pos - (NORTH_M, 0.0, -HEIGHT_M))) < 1.5, 60.0)
     assert vehicle.lean_deg < LEAN_MAX_DEG + 4.0  # it stops for a moment in between
     assert vehicle.moved_m < 0.5
@@ -90,16 +90,16 @@ def test_a_hold_before_the_goto_as_mavsdk_sends_it_changes_nothing(pause_s):
 def test_a_take_off_given_up_on_the_ground_is_not_flown_by_a_later_goto():
     vehicle = TakingOff()
     vehicle.rest(0.5)
-    assert vehicle.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     vehicle.rest(4.0)
-    reply = vehicle.fc.reposition(*vehicle.target(), nan, nan)
+    reply = vehicle.fc.request(GoTo(*vehicle.target(), nan, nan))
     assert (reply.verdict, reply.reason) == (Verdict.TEMPORARILY_REJECTED, "not in the air")
 
 
 def test_a_guided_goto_on_take_off_does_too():
     vehicle = TakingOff(Mode.GUIDED, height_m=10.0)
     vehicle.rest(0.5)
-    assert vehicle.fc.guided.goto(*vehicle.target(), nan, nan).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(GoTo(*vehicle.target(), nan, nan, mode=Mode.GUIDED)).verdict is Verdict.ACCEPTED
     vehicle.run(lambda: hypot(*(vehicle.pos - (NORTH_M, 0.0, -HEIGHT_M))) < 1.5, 60.0)
     assert vehicle.lean_deg < LEAN_MAX_DEG
     assert vehicle.moved_m < 0.5
@@ -111,7 +111,7 @@ def test_an_orbit_on_take_off_does_too():
     latitude, longitude, _ = geodetic_from_ned(20.0, 0.0, 0.0, vehicle.flight.config.home)
     altitude = vehicle.flight.config.home.alt_m + 10.0
     request = OrbitRequest(10.0, 3.0, lat_deg=latitude, lon_deg=longitude, alt_amsl_m=altitude)
-    assert vehicle.fc.orbit(request).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(request).verdict is Verdict.ACCEPTED
     vehicle.run(lambda: abs(hypot(vehicle.pos[0] - 20.0, vehicle.pos[1]) - 10.0) < 1.0 and vehicle.pos[2] < -9.0, 40.0)
     assert vehicle.lean_deg < LEAN_MAX_DEG
     assert vehicle.moved_m < 0.5
@@ -120,11 +120,11 @@ def test_an_orbit_on_take_off_does_too():
 def test_following_on_take_off_does_too():
     vehicle = TakingOff()
     vehicle.rest(0.5)
-    assert vehicle.fc.set_mode(Mode.FOLLOW).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(ChangeMode(Mode.FOLLOW)).verdict is Verdict.ACCEPTED
     for second in range(15):
         angle = 0.1 * second
         place = (30.0 * cos(angle), 30.0 * sin(angle), 0.0)
-        vehicle.fc.report_target(TargetReport(place, (0.0, 0.0, 0.0), 0.5, 0.3))
+        vehicle.fc.request(TargetReport(place, (0.0, 0.0, 0.0), 0.5, 0.3))
         vehicle.rest(1.0)
     assert vehicle.state.mode is Mode.FOLLOW
     assert hypot(*vehicle.pos[:2]) > 5.0
@@ -135,9 +135,9 @@ def test_following_on_take_off_does_too():
 def test_holding_on_take_off_gives_up_the_goto():
     vehicle = TakingOff()
     vehicle.rest(1.2)
-    assert vehicle.fc.reposition(*vehicle.target(), nan, nan).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(GoTo(*vehicle.target(), nan, nan)).verdict is Verdict.ACCEPTED
     vehicle.rest(0.5)
-    assert vehicle.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     vehicle.rest(8.0)
     assert hypot(*vehicle.pos[:2]) < 1.0
 
@@ -145,9 +145,9 @@ def test_holding_on_take_off_gives_up_the_goto():
 def test_a_second_goto_on_take_off_replaces_the_first():
     vehicle = TakingOff()
     vehicle.rest(0.5)
-    assert vehicle.fc.reposition(*vehicle.target(), nan, nan).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(GoTo(*vehicle.target(), nan, nan)).verdict is Verdict.ACCEPTED
     vehicle.rest(0.2)
     latitude, longitude, _ = geodetic_from_ned(-15.0, 0.0, 0.0, vehicle.flight.config.home)
-    assert vehicle.fc.reposition(latitude, longitude, vehicle.target()[2], nan, nan).verdict is Verdict.ACCEPTED
+    assert vehicle.fc.request(GoTo(latitude, longitude, vehicle.target()[2], nan, nan)).verdict is Verdict.ACCEPTED
     vehicle.run(lambda: hypot(*(vehicle.pos - (-15.0, 0.0, -HEIGHT_M))) < 1.5, 60.0)
     assert vehicle.moved_m < 0.5

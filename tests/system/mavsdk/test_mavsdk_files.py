@@ -17,7 +17,7 @@ from common.state_folder import StateFolder
 from mission.flight import Flight, FlightConfig
 from sim.world.world import WorldConfig
 from tests.system.mavsdk.raw_mavsdk import Outcome, RawMavsdk, served
-from tests.unit.autopilot.mavlink.rig import RecordingVehicle
+from tests.unit.autopilot.mavlink.rig import AskedVehicle
 
 FILE, DIRECTORY = FilesystemEntry.EntryType.FILE, FilesystemEntry.EntryType.DIRECTORY
 FTP_ID = (110).to_bytes(3, "little")
@@ -26,7 +26,7 @@ LONG = bytes(i * 7 % 251 for i in range(100_001))  # three bursts and a bit
 
 @pytest.fixture
 def vehicle(tmp_path):
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     vehicle.host.files = ConfinedFolder(tmp_path / "files")
     return vehicle
 

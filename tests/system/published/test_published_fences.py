@@ -8,6 +8,7 @@ import json
 import numpy as np
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import Mode
 from common.geodesy import geodetic_from_ned
@@ -175,7 +176,7 @@ def test_smart_return_goes_back_through_the_corner():
         await drone.goto_ned(50.0, 0.0, -10.0)
         await drone.goto_ned(50.0, 40.0, -10.0)
         flown.begin = len(flown.rows)
-        assert flown.flight.controller.set_mode(Mode.SMART_RETURN).reason == ""
+        assert flown.flight.controller.request(ChangeMode(Mode.SMART_RETURN)).reason == ""
         await drone.wait_disarmed(180.0)
 
     track = flown.run(script)[flown.begin :]

@@ -8,6 +8,7 @@ from math import degrees, hypot
 import numpy as np
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from mission.client import Client, CommandRefused
@@ -243,7 +244,7 @@ def test_brake_stops_a_vehicle_whose_stick_is_held():
         pilot.move(x=FORWARD)
         await pilot.drone.sleep(6.0)
         speeds.append(speed(pilot.flight))
-        assert pilot.flight.controller.set_mode(Mode.BRAKE).verdict == 0
+        assert pilot.flight.controller.request(ChangeMode(Mode.BRAKE)).verdict == 0
         await pilot.drone.sleep(5.0)
         speeds.extend(await watched(pilot, 5.0, speed))
 

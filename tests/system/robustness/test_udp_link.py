@@ -11,7 +11,7 @@ from autopilot.mavlink.transport.tcp_port import PEERS_MAX as TCP_PEERS_MAX
 from autopilot.mavlink.transport.tcp_port import PROOF_MAX, UNSENT_MAX, TcpPort
 from autopilot.mavlink.transport.udp_port import PEERS_MAX, UdpPort
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
-from tests.unit.autopilot.mavlink.rig import FRAME_US, RecordingVehicle
+from tests.unit.autopilot.mavlink.rig import FRAME_US, AskedVehicle
 
 LOOPBACK = "127.0.0.1"
 HELLO = encode("HEARTBEAT", 255, 190, 0, type=6, autopilot=8)
@@ -80,7 +80,7 @@ def test_everyone_who_speaks_has_a_link_of_their_own(listener, port):
     "rubbish", [b"GET / HTTP/1.1", b"", b"\xfd", b"\xfe", HELLO[:-1], HELLO[:-1] + b"x", b"x" + HELLO, bytes(5000)]
 )
 def test_what_is_no_right_frame_makes_no_link_and_is_sent_nothing(listener, port, rubbish):
-    server = MavlinkServer(RecordingVehicle(), [port])
+    server = MavlinkServer(AskedVehicle(), [port])
     with udp_socket() as other:
         speak(other, port, rubbish)
         for i in range(100):
@@ -239,7 +239,7 @@ def test_tcp_client_that_does_not_read_costs_a_bounded_queue_and_then_whole_fram
 
 def over_tcp(port, client, frames=100):
     """What a client hears of a vehicle behind the port."""
-    server, reader, messages = MavlinkServer(RecordingVehicle(), [port]), FrameReader(), []
+    server, reader, messages = MavlinkServer(AskedVehicle(), [port]), FrameReader(), []
     for i in range(frames):
         server.frame(5_000_000 + i * FRAME_US)
     client.settimeout(0.1)
@@ -332,7 +332,7 @@ def test_a_tcp_newcomer_gets_the_place_of_one_that_has_said_nothing_else_of_one_
 
 def test_each_udp_client_has_its_own_intervals_sequence_and_answers(listener):
     port = UdpPort(listener.getsockname()[1], LinkRole.ONBOARD)
-    server = MavlinkServer(RecordingVehicle(), [port])
+    server = MavlinkServer(AskedVehicle(), [port])
 
     def heard(client):
         reader, messages = FrameReader(), []

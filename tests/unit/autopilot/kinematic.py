@@ -9,7 +9,7 @@ from math import atan2, cos, exp, isfinite, nan, pi, sin
 import numpy as np
 
 from autopilot.flight_controller import FlightController, HostPorts
-from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.client_requests import OffboardSetpoint, TakeOff
 from autopilot.interface.item_lists import MissionItem
 from autopilot.interface.vehicle_state import LandedState, Mode, Severity
 from autopilot.params import all_parameters
@@ -150,7 +150,7 @@ class Kinematic:
     def flying(self, height_m=10.0):
         """Takes off and holds."""
         self.ready()
-        assert self.fc.takeoff(ORIGIN.alt_m + height_m, nan).verdict == 0
+        assert self.fc.request(TakeOff(ORIGIN.alt_m + height_m, nan)).verdict == 0
         assert self.fc.arm(force=False).verdict == 0
         self.run_until(lambda: self.state.mode is Mode.HOLD)
         return self

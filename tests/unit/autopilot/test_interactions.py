@@ -3,7 +3,15 @@
 from math import hypot, nan
 
 from autopilot.commander.failsafe import BATTERY_CRITICAL, BATTERY_EMERGENCY
-from autopilot.interface.client_requests import OrbitRequest
+from autopilot.interface.client_requests import (
+    ChangeMode,
+    GoTo,
+    LandAt,
+    LandingTargetReport,
+    OrbitRequest,
+    SetHome,
+    TakeOff,
+)
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import Mode, Verdict
 from autopilot.navigator.mission.mission import MissionState
@@ -23,40 +31,40 @@ class TestLeftOver:
     def test_a_landing_place_given_up_is_not_flown_to_by_the_next_landing(self):
         rig = Kinematic().flying()
         lat, lon, _ = place(200.0, 0.0)
-        assert rig.fc.land(lat, lon, nan).verdict is Verdict.ACCEPTED
+        assert rig.fc.request(LandAt(lat, lon, nan)).verdict is Verdict.ACCEPTED
         rig.run(3.0)
-        rig.fc.set_mode(Mode.HOLD)
+        rig.fc.request(ChangeMode(Mode.HOLD))
         rig.run(5.0)
         north = rig.pos[0]
-        rig.fc.set_mode(Mode.LAND)
+        rig.fc.request(ChangeMode(Mode.LAND))
         rig.disarmed(60.0)
         assert abs(rig.pos[0] - north) < 5.0
 
     def test_a_goto_refused_leaves_no_place_behind(self):
         rig = Kinematic(COM_FLT_TIME_MAX=30.0).flying()
         rig.run_until(lambda: rig.state.mode is Mode.RETURN, 60.0)
-        assert rig.fc.reposition(*place(300.0, 0.0), nan, nan).verdict is Verdict.TEMPORARILY_REJECTED
+        assert rig.fc.request(GoTo(*place(300.0, 0.0), nan, nan)).verdict is Verdict.TEMPORARILY_REJECTED
         assert rig.fc.navigator.context.next_hold is None
 
     def test_an_orbit_refused_is_not_the_next_one(self):
         rig = Kinematic(COM_FLT_TIME_MAX=30.0).flying()
         rig.run_until(lambda: rig.state.mode is Mode.RETURN, 60.0)
         lat, lon, _ = place(300.0, 0.0)
-        assert rig.fc.orbit(OrbitRequest(20.0, 3.0, lat_deg=lat, lon_deg=lon)).verdict is Verdict.TEMPORARILY_REJECTED
+        assert rig.fc.request(OrbitRequest(20.0, 3.0, lat_deg=lat, lon_deg=lon)).verdict is Verdict.TEMPORARILY_REJECTED
         rig.table.set("COM_FLT_TIME_MAX", -1.0)
         rig.run(1.0)
-        assert rig.fc.set_mode(Mode.ORBIT).verdict is Verdict.ACCEPTED
-        circle = rig.fc.navigator.orbit.circle
+        assert rig.fc.request(ChangeMode(Mode.ORBIT)).verdict is Verdict.ACCEPTED
+        circle = rig.fc.navigator.modes[Mode.ORBIT].circle
         assert hypot(circle.centre_ned[0] - rig.pos[0], circle.centre_ned[1] - rig.pos[1]) < 50.0
 
     def test_a_takeoff_height_given_up_is_not_climbed_to_by_the_next_takeoff(self):
         rig = Kinematic().ready()
-        rig.fc.takeoff(ORIGIN.alt_m + 60.0, nan)
+        rig.fc.request(TakeOff(ORIGIN.alt_m + 60.0, nan))
         rig.fc.arm(force=False)
         rig.run(5.0)
-        rig.fc.set_mode(Mode.LAND)
+        rig.fc.request(ChangeMode(Mode.LAND))
         rig.disarmed(60.0)
-        rig.fc.set_mode(Mode.TAKEOFF)
+        rig.fc.request(ChangeMode(Mode.TAKEOFF))
         rig.run(1.0)
         assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
         rig.run_until(lambda: rig.state.mode is Mode.HOLD, 60.0)
@@ -66,11 +74,11 @@ class TestLeftOver:
 class TestLowHover:
     def test_a_hover_close_above_the_ground_goes_on(self):
         rig = Kinematic().ready()
-        rig.fc.set_offboard(position_setpoint(0.0, 0.0, -0.35))
-        assert rig.fc.set_mode(Mode.OFFBOARD).verdict is Verdict.ACCEPTED
+        rig.fc.request(position_setpoint(0.0, 0.0, -0.35))
+        assert rig.fc.request(ChangeMode(Mode.OFFBOARD)).verdict is Verdict.ACCEPTED
         assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
         for _ in range(round(20.0 / DT_S)):
-            rig.fc.set_offboard(position_setpoint(0.0, 0.0, -0.35))
+            rig.fc.request(position_setpoint(0.0, 0.0, -0.35))
             rig.frame()
         assert rig.state.is_armed
         assert -rig.pos[2] > 0.2
@@ -80,7 +88,7 @@ class TestLandingGoesOn:
     def descending(self):
         rig = Kinematic(COM_LOW_BAT_ACT=3).flying(20.0)
         rig.fc.lists.load(ListKind.MISSION, [item(0, WAYPOINT, 30.0), item(1, LAND, 30.0, height=0.0)])
-        rig.fc.set_mode(Mode.MISSION)
+        rig.fc.request(ChangeMode(Mode.MISSION))
         rig.run_until(lambda: rig.fc.navigator.is_landing and -rig.pos[2] < 4.0, 120.0)
         return rig
 
@@ -94,7 +102,7 @@ class TestLandingGoesOn:
     def test_an_emergency_ends_the_way_to_a_landing_place(self):
         rig = Kinematic(COM_LOW_BAT_ACT=3).flying(10.0)
         lat, lon, _ = place(2000.0, 0.0)
-        rig.fc.land(lat, lon, nan)
+        rig.fc.request(LandAt(lat, lon, nan))
         rig.run(5.0)
         rig.fc.commander.guard.act(BATTERY_EMERGENCY)
         rig.disarmed(60.0)
@@ -106,7 +114,7 @@ class TestReturnByMission:
         rig = Kinematic(RTL_TYPE=1).flying(20.0)
         items = [item(0, WAYPOINT, 60.0), do(1, LAND_START), item(2, WAYPOINT, 50.0), item(3, LAND, 40.0, height=0.0)]
         assert rig.fc.lists.load(ListKind.MISSION, items) is None
-        rig.fc.set_mode(Mode.RETURN)
+        rig.fc.request(ChangeMode(Mode.RETURN))
         return rig
 
     def test_a_return_whose_mission_is_taken_away_goes_home(self):
@@ -129,7 +137,7 @@ class TestReturnByMission:
             item(4, WAYPOINT, 90.0),
         ]  # fmt: skip
         assert rig.fc.lists.load(ListKind.MISSION, items) is None
-        rig.fc.set_mode(Mode.RETURN)
+        rig.fc.request(ChangeMode(Mode.RETURN))
         rig.disarmed(200.0)
         assert abs(rig.pos[0] - 30.0) < 3.0
 
@@ -137,7 +145,7 @@ class TestReturnByMission:
 class TestHoldAgain:
     def test_a_fence_that_asks_to_hold_stops_a_goto(self):
         rig = Kinematic(GF_ACTION=2).flying(10.0)
-        rig.fc.reposition(*place(300.0, 0.0), nan, nan)
+        rig.fc.request(GoTo(*place(300.0, 0.0), nan, nan))
         rig.run(5.0)
         fence = [item(0, INCLUSION_CIRCLE, params=(60.0, 0.0, 0.0, 0.0), frame=0)]
         assert rig.fc.lists.load(ListKind.FENCE, fence) is None
@@ -148,13 +156,13 @@ class TestHoldAgain:
 class TestPrecisionLandingFromTheGround:
     def test_it_climbs_before_it_goes_to_a_target_beside(self):
         rig = Kinematic().flying(10.0)
-        rig.fc.set_mode(Mode.LAND)
+        rig.fc.request(ChangeMode(Mode.LAND))
         rig.run_until(lambda: -rig.pos[2] < 0.3)
-        rig.fc.report_landing_target((8.0, 0.0, 0.0))
-        assert rig.fc.set_mode(Mode.PRECISION_LAND).verdict is Verdict.ACCEPTED
+        rig.fc.request(LandingTargetReport((8.0, 0.0, 0.0)))
+        assert rig.fc.request(ChangeMode(Mode.PRECISION_LAND)).verdict is Verdict.ACCEPTED
         highest = 0.0
         for _ in range(round(60.0 / DT_S)):
-            rig.fc.report_landing_target((8.0, 0.0, 0.0))
+            rig.fc.request(LandingTargetReport((8.0, 0.0, 0.0)))
             rig.frame()
             highest = max(highest, -rig.pos[2])
         assert highest > 0.6
@@ -165,8 +173,8 @@ class TestPrecisionLandingFromTheGround:
 class TestPrecisionLandingWithoutPosition:
     def test_it_lands_blind(self):
         rig = Kinematic().flying(10.0)
-        rig.fc.report_landing_target((0.0, 0.0, 0.0))
-        rig.fc.set_mode(Mode.PRECISION_LAND)
+        rig.fc.request(LandingTargetReport((0.0, 0.0, 0.0)))
+        rig.fc.request(ChangeMode(Mode.PRECISION_LAND))
         rig.run(0.5)
         rig.flags &= ~(POSITION_VALID | VELOCITY_VALID)
         rig.disarmed(90.0)
@@ -176,15 +184,15 @@ class TestOrbitNearTheGround:
     def test_an_orbit_on_or_below_the_ground_is_refused(self):
         rig = Kinematic().flying()
         for height in (0.5, -20.0):
-            reply = rig.fc.orbit(OrbitRequest(20.0, 3.0, alt_amsl_m=ORIGIN.alt_m + height))
+            reply = rig.fc.request(OrbitRequest(20.0, 3.0, alt_amsl_m=ORIGIN.alt_m + height))
             assert reply.verdict is Verdict.DENIED
             assert "above the ground" in reply.reason
 
     def test_an_orbit_begun_close_to_the_ground_climbs_first(self):
         rig = Kinematic().flying()
-        rig.fc.set_mode(Mode.LAND)
+        rig.fc.request(ChangeMode(Mode.LAND))
         rig.run_until(lambda: -rig.pos[2] < 0.4)
-        assert rig.fc.set_mode(Mode.ORBIT).verdict is Verdict.ACCEPTED
+        assert rig.fc.request(ChangeMode(Mode.ORBIT)).verdict is Verdict.ACCEPTED
         start = rig.pos[:2].copy()
         rig.run_until(lambda: -rig.pos[2] > 0.48, 20.0)
         assert hypot(*(rig.pos[:2] - start)) < 0.2
@@ -193,7 +201,7 @@ class TestOrbitNearTheGround:
 
     def test_a_pilot_cannot_push_an_orbit_into_the_ground(self):
         rig = Kinematic().flying(5.0)
-        assert rig.fc.orbit(OrbitRequest(20.0, 3.0)).verdict is Verdict.ACCEPTED
+        assert rig.fc.request(OrbitRequest(20.0, 3.0)).verdict is Verdict.ACCEPTED
         rig.run(20.0)
         rig.piloted(30.0, throttle=-1.0)
         assert rig.state.mode is Mode.ORBIT
@@ -224,7 +232,7 @@ class TestArmedInTheAir:
         rig.run(15.0)
         assert rig.state.is_armed
         assert -rig.pos[2] > 20.0
-        assert rig.fc.set_mode(Mode.RETURN).verdict is Verdict.ACCEPTED
+        assert rig.fc.request(ChangeMode(Mode.RETURN)).verdict is Verdict.ACCEPTED
         rig.disarmed(200.0)
 
 
@@ -232,6 +240,6 @@ class TestHome:
     def test_home_is_not_set_where_no_return_could_lead(self):
         rig = Kinematic().flying()
         lat, lon, alt = place(60_000.0, 0.0)
-        assert rig.fc.set_home(lat, lon, alt).verdict is Verdict.DENIED
+        assert rig.fc.request(SetHome(lat, lon, alt)).verdict is Verdict.DENIED
         lat, lon, _ = place(10.0, 0.0)
-        assert rig.fc.set_home(lat, lon, ORIGIN.alt_m + 20_000.0).verdict is Verdict.DENIED
+        assert rig.fc.request(SetHome(lat, lon, ORIGIN.alt_m + 20_000.0)).verdict is Verdict.DENIED

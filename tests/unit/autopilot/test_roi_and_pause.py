@@ -4,6 +4,7 @@ from math import atan2, degrees, nan
 
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode, GoTo, StartMission
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import Mode, Reply, Verdict
 from tests.unit.autopilot.kinematic import Kinematic, do, geo, heading_error, item, position_setpoint
@@ -17,11 +18,11 @@ def test_region_of_interest_is_faced_while_holding_and_after_going_elsewhere():
     assert rig.fc.guidance.look_at(195, lat, lon, nan).verdict is Verdict.ACCEPTED
     rig.run(3.0)
     assert heading_error(rig.yaw, atan2(40.0, 30.0)) < 0.02
-    rig.fc.reposition(*geo(30.0, 0.0)[:2], nan, nan, nan)
+    rig.fc.request(GoTo(*geo(30.0, 0.0)[:2], nan, nan, nan))
     rig.run(15.0)
     assert heading_error(rig.yaw, atan2(40.0, 0.0)) < 0.02
     assert rig.fc.guidance.look_ahead(197, 0.0).verdict is Verdict.ACCEPTED
-    rig.fc.reposition(*geo(0.0, 0.0)[:2], nan, nan, nan)
+    rig.fc.request(GoTo(*geo(0.0, 0.0)[:2], nan, nan, nan))
     rig.run(10.0)
     assert heading_error(rig.yaw, atan2(0.0, -1.0)) < 0.05
 
@@ -53,7 +54,7 @@ def test_turn_is_refused_on_the_ground_and_ends_with_the_next_place():
     assert rig.fc.guidance.turn(90.0, 0.0, 0.0, is_relative=False).verdict is Verdict.ACCEPTED
     rig.run(6.0)
     assert degrees(rig.yaw) == pytest.approx(90.0, abs=1.0)
-    rig.fc.reposition(*geo(-30.0, 0.0)[:2], nan, nan, nan)
+    rig.fc.request(GoTo(*geo(-30.0, 0.0)[:2], nan, nan, nan))
     rig.run(6.0)
     assert heading_error(rig.yaw, atan2(0.0, -1.0)) < 0.05
 
@@ -63,11 +64,11 @@ def test_paused_setpoints_of_a_client_are_gone_on_with():
 
     def stream(seconds):
         for _ in range(round(seconds / 0.02)):
-            rig.fc.set_offboard(position_setpoint(200.0, 0.0, -10.0))
+            rig.fc.request(position_setpoint(200.0, 0.0, -10.0))
             rig.frame()
 
     stream(0.5)
-    assert rig.fc.set_mode(Mode.OFFBOARD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.OFFBOARD)).verdict is Verdict.ACCEPTED
     stream(4.0)
     assert rig.vel[0] > 3.0
     assert rig.fc.guidance.pause().verdict is Verdict.ACCEPTED
@@ -112,7 +113,7 @@ def test_return_path_is_joined_at_its_nearest_leg():
 def test_landing_can_be_aborted(height_m, reached_m):
     rig = Kinematic().flying()
     assert rig.fc.guidance.abort_landing(height_m).verdict is Verdict.TEMPORARILY_REJECTED
-    rig.fc.set_mode(Mode.LAND)
+    rig.fc.request(ChangeMode(Mode.LAND))
     rig.run_until(lambda: rig.pos[2] > -1.5)
     assert rig.fc.guidance.abort_landing(height_m).verdict is Verdict.ACCEPTED
     rig.run(20.0)
@@ -136,7 +137,7 @@ def test_landing_is_not_aborted_through_the_ceiling():
 
 def landing(**params):
     rig = Kinematic(**params).flying()
-    rig.fc.set_mode(Mode.LAND)
+    rig.fc.request(ChangeMode(Mode.LAND))
     rig.run_until(lambda: rig.pos[2] > -1.5)
     return rig
 
@@ -144,7 +145,7 @@ def landing(**params):
 def test_mission_ends_after_the_last_item_asked_for():
     rig = Kinematic().flying()
     rig.fc.lists.load(ListKind.MISSION, [item(i, WAYPOINT, 10.0 * (i + 1)) for i in range(4)])
-    assert rig.fc.start_mission(1, 2).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(StartMission(1, 2)).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
     assert rig.recorder.reached == [1, 2]
-    assert rig.fc.start_mission(1, 7).verdict is Verdict.DENIED
+    assert rig.fc.request(StartMission(1, 7)).verdict is Verdict.DENIED

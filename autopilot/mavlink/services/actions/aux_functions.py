@@ -10,6 +10,7 @@ from enum import IntEnum
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.ardupilot_only_params import OPTION_CHANNELS
+from autopilot.interface.client_requests import ChangeMode, SetCurrentItem
 from autopilot.interface.item_lists import ListKind, MissionItem
 from autopilot.interface.vehicle_state import ACCEPTED, FenceLimit, Mode, Reply, Severity, Verdict
 from autopilot.mavlink.channel import Endpoint
@@ -50,7 +51,7 @@ class AuxFunctions(Service):
             CAMERA_TRIGGER: self._when_high(self._take_photo),
             FENCE: self._switch_fence,
             GRIPPER: self._grip,
-            MISSION_RESET: self._when_high(lambda: self._endpoint.vehicle.set_current_item(0)),
+            MISSION_RESET: self._when_high(lambda: self._endpoint.vehicle.request(SetCurrentItem(0))),
             MOTOR_STOP: self._when_high(endpoint.vehicle.terminate),
             CLEAR_MISSION: self._when_high(self._clear_mission),
             GPS_DISABLE: self._disable_gnss,
@@ -117,8 +118,8 @@ class AuxFunctions(Service):
         vehicle = self._endpoint.vehicle
         now = vehicle.state.mode
         if position is not Position.HIGH:
-            return vehicle.set_mode(self._mode_before) if now is mode else ACCEPTED
-        reply = vehicle.set_mode(mode)
+            return vehicle.request(ChangeMode(self._mode_before)) if now is mode else ACCEPTED
+        reply = vehicle.request(ChangeMode(mode))
         if reply.verdict is Verdict.ACCEPTED and now is not mode:
             self._mode_before = now
         return reply

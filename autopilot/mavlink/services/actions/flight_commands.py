@@ -9,6 +9,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.client_requests import ChangeMode, LandAt, SetHome, TakeOff
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Severity, Verdict
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.dialects import UnknownModeError
@@ -68,7 +69,7 @@ class FlightCommands(Service):
         Refused: TEMPORARILY_REJECTED without a position; DENIED for an altitude out of range.
         """
         alt_amsl_m, reply = command_alt_amsl_m(self._endpoint.vehicle.state, command)
-        return reply or self._endpoint.vehicle.takeoff(alt_amsl_m, radians(command.p4))
+        return reply or self._endpoint.vehicle.request(TakeOff(alt_amsl_m, radians(command.p4)))
 
     def _land(self, command: Command) -> Reply:
         """Lands.
@@ -81,21 +82,21 @@ class FlightCommands(Service):
             lat_deg = lon_deg = nan
         if not is_position(lat_deg, lon_deg):
             return denied("there is no such latitude and longitude")
-        return self._endpoint.vehicle.land(lat_deg, lon_deg, radians(command.p4))
+        return self._endpoint.vehicle.request(LandAt(lat_deg, lon_deg, radians(command.p4)))
 
     def _return(self, _: Command) -> Reply:
         """Returns home, or to where RTL_TYPE says, and lands.
 
         Refused: TEMPORARILY_REJECTED on the ground, without a position or without home.
         """
-        return self._endpoint.vehicle.set_mode(Mode.RETURN)
+        return self._endpoint.vehicle.request(ChangeMode(Mode.RETURN))
 
     def _hold(self, _: Command) -> Reply:
         """Holds here, in mode Hold (ArduPilot: Loiter).
 
         Refused: TEMPORARILY_REJECTED in the air without a position.
         """
-        return self._endpoint.vehicle.set_mode(Mode.HOLD)
+        return self._endpoint.vehicle.request(ChangeMode(Mode.HOLD))
 
     def _set_mode(self, command: Command) -> Reply:
         """Changes the flight mode.
@@ -109,7 +110,7 @@ class FlightCommands(Service):
             mode = self._endpoint.dialect.mode_from_command(whole(command.p2, -1), whole(command.p3, 0))
         except UnknownModeError as unknown:
             return denied(str(unknown))
-        return self._endpoint.vehicle.set_mode(mode)
+        return self._endpoint.vehicle.request(ChangeMode(mode))
 
     def _set_home(self, command: Command) -> Reply:
         """Sets home.
@@ -119,13 +120,13 @@ class FlightCommands(Service):
         where the vehicle was switched on, or more than 10 km higher or lower.
         """
         if command.p1 == 1.0:
-            return self._endpoint.vehicle.set_home(nan, nan, nan)
+            return self._endpoint.vehicle.request(SetHome())
         alt_amsl_m, reply = command_alt_amsl_m(self._endpoint.vehicle.state, command)
         if reply is not None:
             return reply
         if isnan(command.x) or isnan(alt_amsl_m) or not is_position(command.x, command.y):
             return denied("needs latitude, longitude and altitude, or parameter 1 = 1 for here")
-        return self._endpoint.vehicle.set_home(command.x, command.y, alt_amsl_m)
+        return self._endpoint.vehicle.request(SetHome(command.x, command.y, alt_amsl_m))
 
     def _run_prearm_checks(self, _: Command) -> Reply:
         """Checks whether the vehicle may be armed, and names each reason against it in a text; as events, too.
@@ -163,7 +164,7 @@ class FlightCommands(Service):
             self._endpoint.text_once(Severity.WARNING, f"Mode: {unknown}")
             self._acknowledge_set_mode(sender, Verdict.DENIED)
             return
-        reply = self._endpoint.vehicle.set_mode(mode)
+        reply = self._endpoint.vehicle.request(ChangeMode(mode))
         if reply.verdict != Verdict.ACCEPTED:
             self._endpoint.text(Severity.WARNING, f"Mode: {reply.reason}")
         self._acknowledge_set_mode(sender, reply.verdict)

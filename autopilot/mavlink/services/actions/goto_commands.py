@@ -10,6 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.client_requests import GoTo
 from autopilot.interface.vehicle_state import Mode, Reply, Severity, Verdict
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.service import Command, CommandHandler, Service, denied
@@ -49,18 +50,8 @@ class GotoService(Service):
             return denied("there is no such latitude and longitude")
         alt_amsl_m, reply = command_alt_amsl_m(state, command)
         speed_m_s = command.p1 if command.p1 > 0.0 else nan
-        return reply or self._go(command.x, command.y, alt_amsl_m, command.p4, speed_m_s)
-
-    def _go(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
-        vehicle = self._endpoint.vehicle
-        if not self._is_guided:
-            return vehicle.reposition(lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
-        reply = vehicle.guided.goto(lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
-        if reply.verdict is Verdict.ACCEPTED and vehicle.state.mode is not Mode.GUIDED:
-            reply = vehicle.set_mode(Mode.GUIDED)
-            if reply.verdict is not Verdict.ACCEPTED:
-                vehicle.guided.forget_goto()
-        return reply
+        target = GoTo(command.x, command.y, alt_amsl_m, command.p4, speed_m_s, mode=goto_mode)
+        return reply or self._endpoint.vehicle.request(target)
 
     def takes_item(self, fields: Any) -> bool:
         """Whether a MISSION_ITEM is an order of its own rather than a part of an upload."""
@@ -79,9 +70,9 @@ class GotoService(Service):
         elif not is_within(PARAMETER_MAX, item.x, item.y, item.z) or not is_position(item.x, item.y):
             reply = denied("there is no such place")
         elif reply is None and fields.current == GUIDED_ALTITUDE:
-            reply = self._go(nan, nan, alt_amsl_m, nan, nan)
+            reply = vehicle.request(GoTo(alt_amsl_m=alt_amsl_m, mode=Mode.GUIDED))
         elif reply is None:
-            reply = self._go(item.x, item.y, alt_amsl_m, nan, nan)
+            reply = vehicle.request(GoTo(item.x, item.y, alt_amsl_m, mode=Mode.GUIDED))
         if reply.verdict is not Verdict.ACCEPTED:
             self._endpoint.text_once(Severity.WARNING, f"Goto: {reply.reason}")
         return int(_RESULTS.get(reply.verdict, mavlink.MAV_MISSION_DENIED))

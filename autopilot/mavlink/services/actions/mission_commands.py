@@ -8,6 +8,7 @@ from math import isfinite, isnan, nan
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.client_requests import ChangeSpeed, SetCurrentItem, StartMission
 from autopilot.interface.vehicle_state import ACCEPTED, Reply
 from autopilot.mavlink.channel import Endpoint
 from autopilot.mavlink.service import Command, CommandHandler, Service, denied
@@ -56,10 +57,10 @@ class MissionCommands(Service):
         if command.p2 == UNCHANGED or isnan(command.p2):
             return ACCEPTED
         if command.p2 == BY_DEFAULT:
-            return self._endpoint.vehicle.change_speed(nan, kind)
+            return self._endpoint.vehicle.request(ChangeSpeed(nan, kind))
         if command.p2 < 0.0:
             return denied("a speed cannot be negative")
-        return self._endpoint.vehicle.change_speed(command.p2, kind)
+        return self._endpoint.vehicle.request(ChangeSpeed(command.p2, kind))
 
     # Mission
 
@@ -83,7 +84,8 @@ class MissionCommands(Service):
         """
         offset = self._endpoint.dialect.first_seq
         first, last = whole(command.p1, -1), whole(command.p2, -1)
-        return self._endpoint.vehicle.start_mission(first - offset, last - offset if last >= max(first, 1) else -1)
+        last = last - offset if last >= max(first, 1) else -1
+        return self._endpoint.vehicle.request(StartMission(first - offset, last))
 
     def _set_current_item(self, command: Command) -> Reply:
         """Makes a mission item the current one; in mode Mission the vehicle flies to it at once.
@@ -95,10 +97,11 @@ class MissionCommands(Service):
         vehicle = self._endpoint.vehicle
         is_reset = command.p2 == 1.0
         if seq == -1 and is_reset:
-            return vehicle.set_current_item(vehicle.state.mission_current, is_reset=True)
+            return vehicle.request(SetCurrentItem(vehicle.state.mission_current, is_reset=True))
         if seq < 0:
             return denied("parameter 1 must be an item's number")
-        return vehicle.set_current_item(max(seq - self._endpoint.dialect.first_seq, 0), is_reset=is_reset)
+        seq = max(seq - self._endpoint.dialect.first_seq, 0)
+        return vehicle.request(SetCurrentItem(seq, is_reset=is_reset))
 
     def _land_start(self, _: Command) -> Reply:
         """Goes on with the mission at its nearest DO_LAND_START.

@@ -6,6 +6,7 @@ from fnmatch import fnmatchcase
 from math import degrees, isfinite, nan
 from typing import Any
 
+from autopilot.interface.client_requests import ChangeMode, LandAt, TakeOff
 from autopilot.interface.item_lists import ListKind, item_name
 from autopilot.interface.vehicle_state import LandedState, Reply, Verdict
 from autopilot.mavlink.channel import Endpoint
@@ -164,12 +165,12 @@ class ShellCommands:
             case ["takeoff"]:
                 return self._take_off()
             case ["land"]:
-                return _reply_lines(vehicle.land(nan, nan, nan))
+                return _reply_lines(vehicle.request(LandAt()))
             case ["mode", name]:
                 mode = self._modes.get(name.lower())
                 if mode is None:
                     return (f"commander: {name}: no such mode; there are {' '.join(self._modes)}",)
-                return _reply_lines(vehicle.set_mode(mode))
+                return _reply_lines(vehicle.request(ChangeMode(mode)))
             case ["check"]:
                 return vehicle.check_arming() or ("ready to arm",)
             case ["status"]:
@@ -180,7 +181,7 @@ class ShellCommands:
     def _take_off(self) -> Lines:
         """Arms too, as PX4's command does."""
         vehicle = self._vehicle
-        reply = vehicle.takeoff(nan, nan)
+        reply = vehicle.request(TakeOff())
         if reply.verdict is Verdict.ACCEPTED and not vehicle.state.is_armed:
             reply = vehicle.arm(force=False)
         return _reply_lines(reply)

@@ -81,7 +81,7 @@ class OffboardService(Service):
         except RefusedSetpointError as refusal:
             self._endpoint.text_once(Severity.WARNING, f"Offboard: {refusal}")
             return
-        self._endpoint.vehicle.set_offboard(setpoint)
+        self._endpoint.vehicle.request(setpoint)
 
     def global_received(self, _: Sender, fields: Any) -> None:
         """Takes a setpoint in a global frame; flown in mode Offboard."""
@@ -90,7 +90,7 @@ class OffboardService(Service):
         except RefusedSetpointError as refusal:
             self._endpoint.text_once(Severity.WARNING, f"Offboard: {refusal}")
             return
-        self._endpoint.vehicle.set_offboard(setpoint)
+        self._endpoint.vehicle.request(setpoint)
 
     def attitude_received(self, _: Sender, fields: Any) -> None:
         """Takes an attitude or body rates with a thrust; flown in mode Offboard."""
@@ -99,7 +99,7 @@ class OffboardService(Service):
         except RefusedSetpointError as refusal:
             self._endpoint.text_once(Severity.WARNING, f"Offboard: {refusal}")
             return
-        self._endpoint.vehicle.set_offboard(setpoint)
+        self._endpoint.vehicle.request(setpoint)
 
     def actuators_received(self, _sender: Sender, _fields: Any) -> None:
         """Refused with a text: the motors belong to the control allocation."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.interface.client_requests import OrbitRequest, TargetReport
+from autopilot.interface.client_requests import LandingTargetReport, OrbitRequest, TargetReport
 from autopilot.interface.vehicle_state import Reply, Severity
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.service import Command, CommandHandler, Handler, Service, denied
@@ -74,7 +74,7 @@ class TargetService(Service):
         stds = [sqrt(var) for var in fields.position_cov[:2] if 0.0 < var <= POSITION_MAX_M]
         course_rad = heading_of(fields.attitude_q) if fields.est_capabilities & HAS_ATTITUDE else nan
         pos_std = max([*stds, _POS_STD_MIN_M]) if stds else _POS_STD_M
-        self._endpoint.vehicle.report_target(TargetReport(pos_ned, vel_ned, pos_std, _VEL_STD_M_S, course_rad))
+        self._endpoint.vehicle.request(TargetReport(pos_ned, vel_ned, pos_std, _VEL_STD_M_S, course_rad))
 
     def station_position_received(self, sender: Sender, fields: Any) -> None:
         """Takes the place of a ground station or of another vehicle as the target that mode Follow follows."""
@@ -85,7 +85,7 @@ class TargetService(Service):
             return
         vel_ned = (fields.vx * 0.01, fields.vy * 0.01, fields.vz * 0.01)
         course_rad = radians(fields.hdg * 0.01) if fields.hdg != UINT16_MAX else nan
-        self._endpoint.vehicle.report_target(TargetReport(pos_ned, vel_ned, _POS_STD_M, _VEL_STD_M_S, course_rad))
+        self._endpoint.vehicle.request(TargetReport(pos_ned, vel_ned, _POS_STD_M, _VEL_STD_M_S, course_rad))
 
     def _is_chosen(self, sysid: int, *, is_follow_target: bool) -> bool:
         """One target at a time: another takes over when it is silent, and FOLLOW_TARGET at once from a position."""
@@ -116,7 +116,7 @@ class TargetService(Service):
             if pos is None:
                 self._refuse_landing_target("the position is out of range")
             elif fields.frame == _LOCAL_NED:
-                self._endpoint.vehicle.report_landing_target(pos)
+                self._endpoint.vehicle.request(LandingTargetReport(pos))
             elif fields.frame in _BODY_FRAMES:
                 self._report_offset(pos)
             else:
@@ -139,7 +139,7 @@ class TargetService(Service):
             scale = height_m / turned[2]
             north, east, down = state.estimate.pos_ned
             pos = (north + turned[0] * scale, east + turned[1] * scale, down + height_m)
-            self._endpoint.vehicle.report_landing_target(pos)
+            self._endpoint.vehicle.request(LandingTargetReport(pos))
 
     def _refuse_landing_target(self, reason: str) -> None:
         self._endpoint.text_once(Severity.WARNING, f"Landing target: {reason}")
@@ -148,7 +148,7 @@ class TargetService(Service):
         estimate = self._endpoint.vehicle.state.estimate
         offset = rotated(estimate.q_ned_from_frd, offset_frd)
         north, east, down = estimate.pos_ned
-        self._endpoint.vehicle.report_landing_target((north + offset[0], east + offset[1], down + offset[2]))
+        self._endpoint.vehicle.request(LandingTargetReport((north + offset[0], east + offset[1], down + offset[2])))
 
     # Orbit
 
@@ -172,7 +172,7 @@ class TargetService(Service):
             return reply
         turns_rad = command.p4 if isfinite(command.p4) else 0.0
         request = OrbitRequest(command.p1, command.p2, yaw, turns_rad, command.x, command.y, altitude_m)
-        return self._endpoint.vehicle.orbit(request)
+        return self._endpoint.vehicle.request(request)
 
 
 def known_triple(limit: float, values: Sequence[float]) -> tuple[float, float, float] | None:

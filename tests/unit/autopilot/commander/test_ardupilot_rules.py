@@ -2,6 +2,7 @@
 
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode
 from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
 from autopilot.ports import POSITION_VALID, VELOCITY_VALID
 from tests.unit.autopilot.kinematic import Kinematic
@@ -19,31 +20,31 @@ def vehicle(**params):
 @pytest.mark.parametrize("mode", [*STICK_MODES, *NOT_ARMABLE, Mode.HOLD, Mode.GUIDED])
 def test_a_disarmed_vehicle_takes_any_mode_with_and_without_a_position(mode):
     rig = vehicle()
-    assert rig.fc.set_mode(mode).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(mode)).verdict is Verdict.ACCEPTED
     rig.run(2.0)
     assert rig.state.mode is mode
     rig.flags &= ~(POSITION_VALID | VELOCITY_VALID)
-    rig.fc.set_mode(Mode.STABILIZED)
+    rig.fc.request(ChangeMode(Mode.STABILIZED))
     rig.run(10.0)
-    assert rig.fc.set_mode(mode).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(mode)).verdict is Verdict.ACCEPTED
 
 
 @pytest.mark.parametrize("mode", NOT_ARMABLE)
 def test_arming_asks_for_a_mode_to_take_off_in(mode):
     rig = vehicle()
-    rig.fc.set_mode(mode)
+    rig.fc.request(ChangeMode(mode))
     rig.run(1.0)
     assert rig.state.is_ready_to_arm  # nothing else is wrong
     reply = rig.fc.arm(force=False)
     assert (reply.verdict, reply.reason) == (Verdict.TEMPORARILY_REJECTED, "Mode not armable")
-    rig.fc.set_mode(Mode.GUIDED)
+    rig.fc.request(ChangeMode(Mode.GUIDED))
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
 
 
 @pytest.mark.parametrize("mode", NOT_ARMABLE)
 def test_arming_by_force_in_such_a_mode_lifts_nothing(mode):
     rig = vehicle()
-    rig.fc.set_mode(mode)
+    rig.fc.request(ChangeMode(mode))
     assert rig.fc.arm(force=True).verdict is Verdict.ACCEPTED
     rig.run(30.0)
     assert not rig.state.is_armed
@@ -53,7 +54,7 @@ def test_arming_by_force_in_such_a_mode_lifts_nothing(mode):
 @pytest.mark.parametrize("mode", STICK_MODES)
 def test_an_untouched_radio_arms_and_lifts_nothing(mode):
     rig = vehicle()
-    assert rig.fc.set_mode(mode).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(mode)).verdict is Verdict.ACCEPTED
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     rig.run(30.0)
     assert not rig.state.is_armed
@@ -65,7 +66,7 @@ def test_an_untouched_radio_arms_and_lifts_nothing(mode):
 @pytest.mark.parametrize("mode", [Mode.LAND, Mode.RETURN])
 def test_after_a_landing_the_mode_stays(mode):
     rig = vehicle().flying(10.0)
-    assert rig.fc.set_mode(mode).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(mode)).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: not rig.state.is_armed)
     rig.run(5.0)
     assert rig.state.mode is mode
@@ -73,13 +74,13 @@ def test_after_a_landing_the_mode_stays(mode):
 
 
 def test_a_smart_return_needs_a_track_on_the_ground_too():
-    assert vehicle().fc.set_mode(Mode.SMART_RETURN).verdict is Verdict.TEMPORARILY_REJECTED
+    assert vehicle().fc.request(ChangeMode(Mode.SMART_RETURN)).verdict is Verdict.TEMPORARILY_REJECTED
 
 
 def test_loiter_holds_beside_a_radio_that_nobody_touches():
     rig = vehicle().flying(20.0)
     rig.run(10.0)
-    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     rig.run(10.0)
     assert rig.pos[2] == pytest.approx(-20.0, abs=0.5)
     assert not rig.recorder.has_text("Sticks lost")
@@ -95,7 +96,7 @@ def test_a_radio_that_fails_brings_it_home():
 
 def test_released_overrides_are_no_failure():
     rig = vehicle(NAV_RCL_ACT=2).flying(20.0)
-    rig.fc.set_mode(Mode.HOLD)
+    rig.fc.request(ChangeMode(Mode.HOLD))
     rig.piloted(2.0, pitch=1.0)
     rig.run(10.0)
     assert rig.state.mode is Mode.HOLD

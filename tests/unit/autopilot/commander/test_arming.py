@@ -5,7 +5,7 @@ from math import nan
 import pytest
 
 from autopilot.commander.arming import arming_reasons
-from autopilot.interface.client_requests import CalibrationKind
+from autopilot.interface.client_requests import CalibrationKind, ChangeMode, SetHome, TakeOff
 from autopilot.interface.vehicle_state import LandedState, Mode, Severity, Verdict
 from autopilot.ports import (
     HEIGHT_VALID,
@@ -169,7 +169,7 @@ def test_armed_vehicle_that_does_not_take_off_disarms():
 @pytest.mark.parametrize(("time_s", "expected_s"), [(2.0, 2.0), (5.0, 5.0)])
 def test_landed_vehicle_disarms_after_the_set_time(time_s, expected_s):
     rig = Kinematic(COM_DISARM_LAND=time_s).flying()
-    rig.fc.set_mode(Mode.LAND)
+    rig.fc.request(ChangeMode(Mode.LAND))
     rig.run_until(lambda: rig.state.landed_state is LandedState.ON_GROUND)
     assert rig.disarmed() == pytest.approx(expected_s, abs=0.1)
 
@@ -194,7 +194,7 @@ def test_disarming_in_the_air_needs_force():
 
 def test_takeoff_then_arm_and_arm_then_takeoff_both_fly():
     rig = Kinematic().ready()
-    rig.fc.takeoff(nan, nan)
+    rig.fc.request(TakeOff())
     assert not rig.state.is_armed
     rig.fc.arm(force=False)
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
@@ -202,7 +202,7 @@ def test_takeoff_then_arm_and_arm_then_takeoff_both_fly():
     rig = Kinematic().ready()
     rig.fc.arm(force=False)
     rig.run(0.5)
-    rig.fc.takeoff(nan, nan)
+    rig.fc.request(TakeOff())
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
     assert rig.pos[2] == pytest.approx(-2.5, abs=0.31)
 
@@ -225,17 +225,17 @@ def test_home_is_set_at_boot_and_again_at_arming():
 def test_home_given_by_a_client_survives_arming():
     rig = Kinematic().ready()
     lat, lon, _ = geo(30.0, 40.0)
-    assert rig.fc.set_home(lat, lon, 490.0).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(SetHome(lat, lon, 490.0)).verdict is Verdict.ACCEPTED
     rig.fc.arm(force=False)
     assert rig.state.home_ned[:2] == pytest.approx((30.0, 40.0), abs=1e-3)
-    assert rig.fc.set_home(95.0, 0.0, 0.0).verdict is Verdict.DENIED
-    assert rig.fc.set_home(nan, 0.0, 0.0).verdict is Verdict.DENIED
+    assert rig.fc.request(SetHome(95.0, 0.0, 0.0)).verdict is Verdict.DENIED
+    assert rig.fc.request(SetHome(nan, 0.0, 0.0)).verdict is Verdict.DENIED
 
 
 @pytest.mark.parametrize("mode", [Mode.RETURN, Mode.LAND])
 def test_return_and_land_are_refused_on_the_ground(mode):
     rig = Kinematic().ready()
-    assert "on the ground" in rig.fc.set_mode(mode).reason
+    assert "on the ground" in rig.fc.request(ChangeMode(mode)).reason
 
 
 @pytest.mark.parametrize("mode", [Mode.TAKEOFF, Mode.MISSION, Mode.RETURN])
@@ -243,7 +243,7 @@ def test_position_modes_are_refused_without_a_position(mode):
     rig = Kinematic()
     rig.flags = TILT_ALIGNED | YAW_ALIGNED
     rig.run(1.0)
-    reply = rig.fc.set_mode(mode)
+    reply = rig.fc.request(ChangeMode(mode))
     assert reply.verdict is Verdict.TEMPORARILY_REJECTED
     assert reply.reason
 

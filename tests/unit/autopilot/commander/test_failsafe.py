@@ -2,6 +2,7 @@
 
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode, GoTo, StartMission
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import BatteryLevel, LandedState, Mode, Severity, Verdict
 from autopilot.navigator.mission.mission import MissionState
@@ -19,7 +20,7 @@ def drain_to(rig, share):
 
 def flying_away(**params):
     rig = Kinematic(**params).flying()
-    rig.fc.reposition(*geo(60.0, 0.0, 10.0), NAN, NAN)
+    rig.fc.request(GoTo(*geo(60.0, 0.0, 10.0), NAN, NAN))
     rig.run(20.0)
     return rig
 
@@ -60,7 +61,7 @@ def test_pilot_may_take_over_from_a_failsafe():
     drain_to(rig, 0.06)
     rig.run(0.5)
     assert rig.state.is_failsafe
-    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     rig.run(2.0)
     assert rig.state.mode is Mode.HOLD
     assert not rig.state.is_failsafe
@@ -97,8 +98,8 @@ def test_position_modes_are_refused_while_it_is_lost():
     rig = flying_away()
     rig.flags &= ~POSITION_VALID
     rig.run(1.0)
-    assert rig.fc.set_mode(Mode.HOLD).reason == "no valid position"
-    assert rig.fc.set_mode(Mode.RETURN).reason == "no valid position"
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).reason == "no valid position"
+    assert rig.fc.request(ChangeMode(Mode.RETURN)).reason == "no valid position"
 
 
 def test_silent_battery_sensor_is_told_once_and_its_charge_still_falls():
@@ -113,7 +114,7 @@ def test_silent_battery_sensor_is_told_once_and_its_charge_still_falls():
 def test_mission_that_a_failsafe_ended_is_not_complete():
     rig = Kinematic().flying()
     rig.fc.lists.load(ListKind.MISSION, [item(0, 16, 50.0), item(1, 21, 50.0)])
-    rig.fc.start_mission(0)
+    rig.fc.request(StartMission(0))
     rig.run(2.0)
     drain_to(rig, 0.04)
     rig.disarmed()
@@ -180,7 +181,7 @@ def test_ground_station_that_comes_back_does_not_change_the_mode():
     rig.run(1.0)
     assert rig.recorder.has_text("Ground station is back")
     assert rig.state.mode is Mode.RETURN
-    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     rig.run(STATION_LOSS_S + 1.0)  # lost again: acts again
     assert rig.state.mode is Mode.RETURN
 
@@ -195,7 +196,7 @@ def test_vehicle_that_never_heard_a_ground_station_flies_on():
 def test_pilot_may_take_over_while_the_ground_station_is_still_lost():
     rig = with_station(2)
     rig.run(STATION_LOSS_S + 1.0)
-    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     rig.run(10.0)
     assert rig.state.mode is Mode.HOLD
 
@@ -205,7 +206,7 @@ def test_excepted_modes_go_on_without_a_ground_station(mode, bits):
     rig = with_station(2, COM_DLL_EXCEPT=bits)
     if mode is Mode.MISSION:
         rig.fc.lists.load(ListKind.MISSION, [item(0, 16, 200.0)])
-        rig.fc.start_mission(0)
+        rig.fc.request(StartMission(0))
     rig.run(STATION_LOSS_S + 2.0)
     assert rig.state.mode is mode
 
@@ -213,7 +214,7 @@ def test_excepted_modes_go_on_without_a_ground_station(mode, bits):
 @pytest.mark.parametrize(("mode", "action"), [(Mode.LAND, 2), (Mode.RETURN, 1), (Mode.LAND, 1)])
 def test_weaker_action_does_not_end_a_return_or_a_landing(mode, action):
     rig = with_station(action)
-    rig.fc.set_mode(mode)
+    rig.fc.request(ChangeMode(mode))
     rig.run(STATION_LOSS_S + 1.0)
     assert rig.state.mode is mode
 
@@ -267,12 +268,12 @@ def test_wind_without_a_limit_or_a_valid_estimate_is_not_judged():
 
 def test_flight_time_is_told_and_then_ends_the_flight_at_home():
     rig = Kinematic(COM_FLT_TIME_MAX=60.0).flying()
-    rig.fc.reposition(*geo(60.0, 0.0, 10.0), NAN, NAN)
+    rig.fc.request(GoTo(*geo(60.0, 0.0, 10.0), NAN, NAN))
     rig.run_until(lambda: rig.recorder.has_text("Flight time is nearly over"), 60.0)
     assert rig.state.mode is Mode.HOLD
     rig.run_until(lambda: rig.state.mode is Mode.RETURN, 10.0)
-    assert "flight time" in rig.fc.set_mode(Mode.HOLD).reason
-    assert rig.fc.set_mode(Mode.LAND).verdict is Verdict.ACCEPTED
+    assert "flight time" in rig.fc.request(ChangeMode(Mode.HOLD)).reason
+    assert rig.fc.request(ChangeMode(Mode.LAND)).verdict is Verdict.ACCEPTED
     rig.disarmed()
     rig.ready()  # the next flight has its own time
 
@@ -284,8 +285,8 @@ def test_flight_time_has_an_action_of_its_own(action, mode):
     rig.run(0.1)
     assert rig.state.mode is mode
     if action == 0:
-        assert rig.fc.set_mode(Mode.RETURN).verdict is Verdict.ACCEPTED
-        assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+        assert rig.fc.request(ChangeMode(Mode.RETURN)).verdict is Verdict.ACCEPTED
+        assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
 
 
 @pytest.mark.parametrize(("action", "mode"), [(3, Mode.LAND), (5, Mode.TERMINATION)])
@@ -315,7 +316,7 @@ def test_terminated_flight_stops_its_motors_and_disarms_once_it_is_down():
     assert rig.state.is_armed
     assert not rig.sp("is_armed")
     assert rig.state.landed_state is not LandedState.ON_GROUND
-    assert rig.fc.set_mode(Mode.HOLD).reason == "the flight is terminated"
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).reason == "the flight is terminated"
     fall_s = (2.0 * 10.0 / 9.81) ** 0.5
     assert rig.disarmed() < fall_s + 2.0
     assert rig.state.mode is Mode.HOLD
@@ -325,7 +326,7 @@ def test_termination_is_refused_on_the_ground_and_as_a_mode():
     rig = Kinematic().ready()
     assert rig.fc.terminate().reason == "not armed"
     rig = flying_away()
-    assert "by command" in rig.fc.set_mode(Mode.TERMINATION).reason
+    assert "by command" in rig.fc.request(ChangeMode(Mode.TERMINATION)).reason
     assert rig.state.mode is Mode.HOLD
 
 
@@ -361,18 +362,18 @@ def test_estimator_failure_has_an_action_of_its_own():
 
 def test_vehicle_that_holds_stays_where_it_is_when_the_estimate_jumps():
     rig = Kinematic().flying()
-    before = rig.fc.navigator.hold.target_ned
+    before = rig.fc.navigator.modes[Mode.HOLD].target_ned
     rig.estimate["pos_reset_ned"] = (100.0, -50.0, 0.0)
     rig.estimate["reset_count"] += 1
     rig.frame()
-    after = rig.fc.navigator.hold.target_ned
+    after = rig.fc.navigator.modes[Mode.HOLD].target_ned
     assert after == pytest.approx((before[0] + 100.0, before[1] - 50.0, before[2]))
     assert rig.sp("pos_ned")[:2] == pytest.approx(after[:2], abs=1e-3)
-    rig.fc.reposition(*geo(30.0, 0.0, 10.0), NAN, NAN)
-    sent_to = rig.fc.navigator.hold.target_ned
+    rig.fc.request(GoTo(*geo(30.0, 0.0, 10.0), NAN, NAN))
+    sent_to = rig.fc.navigator.modes[Mode.HOLD].target_ned
     rig.estimate["reset_count"] += 1
     rig.run(0.1)
-    assert rig.fc.navigator.hold.target_ned == sent_to
+    assert rig.fc.navigator.modes[Mode.HOLD].target_ned == sent_to
 
 
 def test_lost_station_sends_the_vehicle_back_along_its_track_or_directly_where_none_is_known():
@@ -392,7 +393,7 @@ def test_a_charge_estimate_that_wavers_does_not_take_control_from_the_pilot_agai
     drain_to(rig, 0.0695)
     rig.run(0.1)
     assert rig.state.mode is Mode.RETURN
-    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     for share in (0.0705, 0.0695, 0.0705, 0.0695):
         drain_to(rig, share)
         rig.run(0.1)

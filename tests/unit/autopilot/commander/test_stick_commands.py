@@ -4,6 +4,7 @@ from math import nan
 
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode, TakeOff
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
 from autopilot.ports import POSITION_VALID, VELOCITY_VALID
@@ -22,9 +23,9 @@ def in_mode(mode, **params):
     rig.flying(20.0)
     rig.piloted(0.2)
     if mode is Mode.OFFBOARD:
-        rig.fc.set_offboard(position_setpoint(0.0, 0.0, -20.0))
+        rig.fc.request(position_setpoint(0.0, 0.0, -20.0))
     if mode is not rig.state.mode:
-        assert rig.fc.set_mode(mode).verdict is Verdict.ACCEPTED
+        assert rig.fc.request(ChangeMode(mode)).verdict is Verdict.ACCEPTED
     rig.piloted(0.5)
     assert rig.state.mode is mode
     return rig
@@ -34,7 +35,7 @@ def lose(rig, seconds=6.0):
     """Without sticks, until COM_FAIL_ACT_T is over."""
     for _ in range(round(seconds / 0.02)):
         if rig.state.mode is Mode.OFFBOARD:
-            rig.fc.set_offboard(position_setpoint(0.0, 0.0, -20.0))
+            rig.fc.request(position_setpoint(0.0, 0.0, -20.0))
         rig.frame()
 
 
@@ -75,7 +76,7 @@ def test_sticks_that_come_back_in_time_are_no_failsafe():
 def test_a_mode_chosen_while_the_sticks_are_waited_for_is_flown():
     rig = in_mode(Mode.POSITION)
     lose(rig, 3.0)
-    assert rig.fc.set_mode(Mode.LAND).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.LAND)).verdict is Verdict.ACCEPTED
     lose(rig, 6.0)
     assert rig.state.mode is Mode.LAND
 
@@ -156,13 +157,13 @@ def test_one_stick_message_before_arming_makes_sticks_not_compulsory():
     rig.pilot()
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     rig.frame()
-    assert rig.fc.takeoff(ORIGIN.alt_m + 5.0, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(TakeOff(ORIGIN.alt_m + 5.0, nan)).verdict is Verdict.ACCEPTED
     rig.run(8.0)
     assert rig.state.landed_state is LandedState.IN_AIR
     assert not rig.recorder.has_text("Sticks lost")
     rig.pilot()
     rig.frame()
-    assert rig.fc.set_mode(Mode.POSITION).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.POSITION)).verdict is Verdict.ACCEPTED
     lose(rig)
     assert rig.state.mode is Mode.RETURN  # now they are missed
 
@@ -170,7 +171,7 @@ def test_one_stick_message_before_arming_makes_sticks_not_compulsory():
 def test_a_vehicle_armed_in_a_mode_flown_by_sticks_misses_them_at_once():
     rig = Kinematic().ready()
     rig.pilot(throttle=-1.0)
-    rig.fc.set_mode(Mode.POSITION)
+    rig.fc.request(ChangeMode(Mode.POSITION))
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     rig.run(1.0)
     assert rig.recorder.has_text("Sticks lost")
@@ -224,7 +225,7 @@ def test_a_pilot_flies_on_in_altitude_mode_when_the_position_is_lost():
 def test_throttle_down_and_yaw_right_arms_and_yaw_left_disarms():
     rig = Kinematic().ready()
     rig.piloted(0.2, throttle=-1.0)
-    rig.fc.set_mode(Mode.POSITION)
+    rig.fc.request(ChangeMode(Mode.POSITION))
     rig.piloted(0.9, throttle=-1.0, yaw=1.0)
     assert not rig.state.is_armed
     rig.piloted(0.3, throttle=-1.0, yaw=1.0)
@@ -255,9 +256,9 @@ def test_letting_the_channels_go_does_not_take_over():
         rig.frame()
 
     override(1500)
-    assert rig.fc.set_mode(Mode.POSITION).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.POSITION)).verdict is Verdict.ACCEPTED
     override(1900)
-    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     override(0)
     assert rig.state.mode is Mode.HOLD
 
@@ -272,7 +273,7 @@ def test_the_gesture_does_not_disarm_in_the_air():
 def test_the_gesture_can_be_switched_off():
     rig = Kinematic(MAN_ARM_GESTURE=0).ready()
     rig.piloted(0.2, throttle=-1.0)
-    rig.fc.set_mode(Mode.POSITION)
+    rig.fc.request(ChangeMode(Mode.POSITION))
     rig.piloted(1.5, throttle=-1.0, yaw=1.0)
     assert not rig.state.is_armed
 
@@ -292,6 +293,6 @@ def test_the_mode_switch_chooses_the_mode_when_it_moves():
     assert rig.state.mode is Mode.POSITION
     switch(2000)
     assert rig.state.mode is Mode.RETURN
-    assert rig.fc.takeoff(ORIGIN.alt_m + 30.0, 0.0).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(TakeOff(ORIGIN.alt_m + 30.0, 0.0)).verdict is Verdict.ACCEPTED
     switch(2000)  # it has not moved
     assert rig.state.mode is Mode.TAKEOFF

@@ -1,20 +1,17 @@
-"""A vehicle that records what it is asked, and a client at the other end of a memory link."""
+"""A vehicle that keeps what it is asked, and a client at the other end of a memory link."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from functools import partial
 from math import nan
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from autopilot.commander.failure_detector import StationLink
 from autopilot.estimator.state import EstimatorState
-from autopilot.inputs.external_position import ExternalPositions
-from autopilot.inputs.obstacles import Obstacles
-from autopilot.inputs.sticks import Sticks
-from autopilot.inputs.traffic import Traffic
+from autopilot.flight_controller import FlightController, HostPorts
 from autopilot.interface.aircraft import Aircraft
-from autopilot.interface.client_requests import CalibrationKind, OffboardSetpoint, OrbitRequest, TargetReport
+from autopilot.interface.client_requests import OffboardSetpoint, Request
 from autopilot.interface.item_lists import ItemLists, ItemRefusal, ListKind, MissionItem
 from autopilot.interface.platform import Host
 from autopilot.interface.vehicle_state import ACCEPTED, BatteryLevel, Mode, OrbitStatus, Reply, VehicleState
@@ -28,10 +25,6 @@ from autopilot.navigator.fence.fence_items import MAX_FENCE_ITEMS
 from autopilot.navigator.fence.rally_points import MAX_RALLY_POINTS
 from autopilot.navigator.mission.item_commands import MAX_ITEMS
 from autopilot.params import parameter_table
-from autopilot.payload.aux_outputs import AuxOutputs
-from autopilot.payload.camera.camera import Camera
-from autopilot.payload.gimbal.gimbal_control import GimbalControl
-from autopilot.payload.payloads import Payloads
 from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
@@ -44,8 +37,9 @@ from autopilot.ports import (
     Estimate,
     ExternalSample,
     Samples,
+    Setpoint,
 )
-from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
+from common.airframe import load_airframe
 from common.geodesy import GeoPoint
 from common.records import row_reader
 from sim.truth import Truth
@@ -68,12 +62,13 @@ def record(struct_type: Any, name: str, **values: Any) -> Any:
     return row_reader(rows, 0, name)()
 
 
-def flying_state() -> VehicleState:
-    """In the air over home, everything known."""
-    return VehicleState(
-        time_us=5_000_000,
-        orbit=OrbitStatus(20.0, 0, HOME),
-        estimate=record(
+def flying() -> dict[str, Any]:
+    """Fields of the state of a vehicle in the air over home, everything known."""
+    return {
+        "nearest_aircraft": Aircraft(1, "HB-ABC", 47.0, 8.0, 900.0, 1.0, 60.0, 0.0),
+        "time_us": 5_000_000,
+        "orbit": OrbitStatus(20.0, 0, HOME),
+        "estimate": record(
             Estimate,
             "Estimate",
             flags=ALL_VALID,
@@ -86,7 +81,7 @@ def flying_state() -> VehicleState:
             pos_h_std=0.4,
             pos_v_std=0.3,
         ),
-        samples=record(
+        "samples": record(
             Samples,
             "Samples",
             imu__time_us=4_996_000,
@@ -110,7 +105,7 @@ def flying_state() -> VehicleState:
             battery__voltage_v=15.8,
             battery__current_a=12.5,
         ),
-        actuators=record(
+        "actuators": record(
             Actuators,
             "Actuators",
             command=(0.5, 0.6, 0.5, 0.6, 0.0, 0.0, 0.0, 0.0),
@@ -120,23 +115,27 @@ def flying_state() -> VehicleState:
             q_sp_ned_from_frd=(0.0, 0.0, 0.0, 1.0),
             thrust_sp=0.42,
         ),
-        health=record(EstimatorState, "EstimatorState", gnss_pos__test_ratio_lpf=0.1, stillness__accel_var=0.3),
-        origin=HOME,
-        roll_rad=0.05,
-        pitch_rad=-0.02,
-        yaw_rad=1.2,
-        home=HOME,
-        mode=Mode.HOLD,
-        is_armed=True,
-        landed_state=2,
-        is_ready_to_arm=True,
-        battery_remaining=0.8,
-        battery_used_mah=400.0,
-        battery_level=BatteryLevel.OK,
-        goal_ned=(40.0, 20.0, -30.0),
-        mission_count=2,
-        mission_current=1,
-    )
+        "health": record(EstimatorState, "EstimatorState", gnss_pos__test_ratio_lpf=0.1, stillness__accel_var=0.3),
+        "origin": HOME,
+        "roll_rad": 0.05,
+        "pitch_rad": -0.02,
+        "yaw_rad": 1.2,
+        "home": HOME,
+        "mode": Mode.HOLD,
+        "is_armed": True,
+        "landed_state": 2,
+        "is_ready_to_arm": True,
+        "battery_remaining": 0.8,
+        "battery_used_mah": 400.0,
+        "battery_level": BatteryLevel.OK,
+        "goal_ned": (40.0, 20.0, -30.0),
+        "mission_count": 2,
+        "mission_current": 1,
+    }
+
+
+def flying_state() -> VehicleState:
+    return VehicleState(**flying())
 
 
 class RecordingList:
@@ -153,105 +152,32 @@ class RecordingList:
         return self.refusal
 
 
-class RecordingGuidance:
-    """Passes what is asked on to its vehicle's list."""
-
-    def __init__(self, record: Callable[..., Reply]) -> None:
-        self._record = record
-
-    def look_at(self, command: int, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
-        return self._record("look_at", command, lat_deg, lon_deg, alt_amsl_m)
-
-    def look_ahead(self, command: int, offset_deg: float) -> Reply:
-        return self._record("look_ahead", command, offset_deg)
-
-    def turn(self, angle_deg: float, rate_deg_s: float, direction: float, *, is_relative: bool) -> Reply:
-        return self._record("turn", angle_deg, rate_deg_s, direction, is_relative)
-
-    def pause(self) -> Reply:
-        return self._record("pause")
-
-    def resume(self) -> Reply:
-        return self._record("resume")
-
-    def fly_landing_sequence(self) -> Reply:
-        return self._record("fly_landing_sequence")
-
-    def fly_return_path(self) -> Reply:
-        return self._record("fly_return_path")
-
-    def abort_landing(self, height_m: float) -> Reply:
-        return self._record("abort_landing", height_m)
-
-
-class RecordingGuided:
-    """Mode Guided of a recording vehicle; its requests are in the vehicle's list."""
-
-    def __init__(self, record: Callable[..., Reply]) -> None:
-        self._record = record
-
-    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
-        return self._record("guided.takeoff", alt_amsl_m, yaw_rad)
-
-    def goto(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
-        return self._record("guided.goto", lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
-
-    def forget_goto(self) -> None:
-        self._record("guided.forget_goto")
-
-
-class RecordedMotorTest:
-    """The motor test of a recording vehicle with four rotors, numbered as those of an X are."""
-
-    rotor_count = 4
-    clockwise = (0, 3, 1, 2)
-
-    def __init__(self, record: Callable[..., Reply]) -> None:
-        self._record = record
-
-    def spin(self, rotors: Sequence[int], command: float, seconds: float, *, pause_s: float = 0.0) -> Reply:
-        return self._record("spin", list(rotors), command, seconds, pause_s)
-
-
-class RecordedCalibration:
-    """The calibration of a recording vehicle."""
-
-    def __init__(self, vehicle: Any) -> None:
-        self._vehicle = vehicle
-
-    def start(self, kind: CalibrationKind) -> Reply:
-        return self._vehicle._record("calibrate", kind)
-
-    def cancel(self) -> Reply:
-        return self._vehicle._record("cancel_calibration")
-
-    def set_offsets(self, sensor: str, offsets: tuple[float, float, float]) -> None:
-        self._vehicle._record("set_offsets", sensor, offsets)
-
-
 def record_of_truth() -> Any:
     """The simulator's truth: at rest."""
     return record(Truth, "Truth", q_ned_from_frd=(0.0, 0.0, 0.0, 1.0))
 
 
-class RecordingVehicle:
-    """Answers every request with `reply` and keeps a list of them."""
+def _ports() -> HostPorts:
+    setpoint, external = (np.zeros(1, dtype=struct.numpy_dtype()) for struct in (Setpoint, ExternalSample))
+    speeds = [500.0, 510.0, 520.0, 530.0, 0.0, 0.0, 0.0, 0.0]
+    nothing = [lambda: None] * 4
+    return HostPorts(*nothing, setpoint, read_rotor_speeds=lambda: speeds, external=external)
 
-    def __init__(self) -> None:
-        self.state = flying_state()
-        self.params = parameter_table()
-        self.station = StationLink()
-        self.calibration = RecordedCalibration(self)
-        self.host = Host(read_truth=record_of_truth)
-        self.camera: Camera | None = None
-        self.gimbal: GimbalControl | None = None
-        self.sticks = Sticks(self.params)
-        self.state.sticks = self.sticks.input
+
+class AskedVehicle(FlightController):
+    """A vehicle in the air that keeps a list of what it is asked, and answers `reply` instead of doing it."""
+
+    def __init__(self, host: Host | None = None) -> None:
+        ports = _ports()
+        host = host or Host(read_truth=record_of_truth)
+        super().__init__(ports, parameter_table(), load_airframe("x500"), HOME, host=host)
+        self.set(**flying())
+        self.external_row = ports.external
         self.sticks.joystick_moved((CLIENT_SYSID, CLIENT_COMPID), 5_000_000, (0.0, 0.0, 0.0, 0.0), 0)
-        self.modes = MULTIROTOR_MODES
+        self.obstacles.sensed(self.state.time_us, [5.0] * 71 + [float("inf")], 0.0)
         self.reply = ACCEPTED
         self.arming_problems: list[str] = []
-        self.calls: list[tuple[Any, ...]] = []
+        self.calls: list[Any] = []
         self.setpoints: list[OffboardSetpoint] = []
         self.stored = {
             ListKind.MISSION: RecordingList(MAX_ITEMS),
@@ -259,98 +185,36 @@ class RecordingVehicle:
             ListKind.RALLY: RecordingList(MAX_RALLY_POINTS),
         }
         self.lists = ItemLists(self.stored)
-        self.guided = RecordingGuided(self._record)
-        self.guidance = RecordingGuidance(self._record)
-        self.motor_test = RecordedMotorTest(self._record)
-        self.payload = Payloads()
-        self.payload.add(AuxOutputs(self.state))
-        self.traffic = Traffic(self.state, self.params)
-        self.obstacles = Obstacles(self.params)
-        self.external_row = np.zeros(1, dtype=ExternalSample.numpy_dtype())
-        self.external = ExternalPositions(
-            self.external_row,
-            self.params,
-            lambda: self.state.time_us,
-            lambda: (self.state.estimate, self.state.yaw_rad),
-        )
-        self.obstacles.sensed(self.state.time_us, [5.0] * 71 + [float("inf")], 0.0)
-        self.state.obstacles = self.obstacles
-        self.state.read_rotor_speeds = lambda: [500.0, 510.0, 520.0, 530.0, 0.0, 0.0, 0.0, 0.0]
-        self.state.nearest_aircraft = Aircraft(1, "HB-ABC", 47.0, 8.0, 900.0, 1.0, 60.0, 0.0)
+        self._keep(self, "arm", "disarm", "terminate", "inject_failure", "reboot", "give_corrections")
+        self.motor_test.spin = self._spin
+        self.guidance = self._keep(SimpleNamespace(), "look_at", "look_ahead", "turn", "pause", "resume",
+                                   "fly_landing_sequence", "fly_return_path", "abort_landing")  # fmt: skip
+        self.calibration = self._keep(SimpleNamespace(), "start", "cancel", "set_offsets")
+        self.fence = self._keep(SimpleNamespace(), "enable", "disable")
 
-    @property
-    def fence(self) -> "RecordingVehicle":
-        return self
+    def _keep(self, owner: Any, *names: str) -> Any:
+        for name in names:
+            setattr(owner, name, partial(self._note, name))
+        return owner
 
-    def enable(self, limits: int) -> Reply:
-        return self._record("fence.enable", limits)
+    def set(self, **values: Any) -> None:
+        """Changes fields of its state."""
+        for name, value in values.items():
+            setattr(self.state, name, value)
 
-    def disable(self, limits: int) -> Reply:
-        return self._record("fence.disable", limits)
-
-    def give_corrections(self, rtcm: bytes) -> None:
-        self._record("give_corrections", rtcm)
-
-    def _record(self, *call: Any) -> Reply:
-        self.calls.append(call)
+    def _note(self, name: str, *args: Any, **options: Any) -> Reply:
+        self.calls.append((name, *args, *options.values()))
         return self.reply
 
-    def follow_ardupilot(self) -> None:
-        self.sticks.follow_ardupilot()
+    def request(self, request: Request) -> Reply:
+        (self.setpoints if isinstance(request, OffboardSetpoint) else self.calls).append(request)
+        return self.reply
 
-    def arm(self, *, force: bool) -> Reply:
-        return self._record("arm", force)
-
-    def disarm(self, *, force: bool) -> Reply:
-        return self._record("disarm", force)
-
-    def terminate(self) -> Reply:
-        return self._record("terminate")
-
-    def inject_failure(self, unit: int, failure: int, instance: int) -> Reply:
-        return self._record("inject_failure", unit, failure, instance)
+    def _spin(self, rotors: Sequence[int], command: float, seconds: float, *, pause_s: float = 0.0) -> Reply:
+        return self._note("spin", list(rotors), command, seconds, pause_s)
 
     def check_arming(self) -> list[str]:
         return self.arming_problems
-
-    def set_mode(self, mode: Mode) -> Reply:
-        return self._record("set_mode", mode)
-
-    def takeoff(self, alt_amsl_m: float, yaw_rad: float) -> Reply:
-        return self._record("takeoff", alt_amsl_m, yaw_rad)
-
-    def land(self, lat_deg: float, lon_deg: float, yaw_rad: float) -> Reply:
-        return self._record("land", lat_deg, lon_deg, yaw_rad)
-
-    def reposition(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, yaw_rad: float, speed_m_s: float) -> Reply:
-        return self._record("reposition", lat_deg, lon_deg, alt_amsl_m, yaw_rad, speed_m_s)
-
-    def change_speed(self, speed_m_s: float, kind: int) -> Reply:
-        return self._record("change_speed", speed_m_s, kind)
-
-    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
-        return self._record("set_home", lat_deg, lon_deg, alt_amsl_m)
-
-    def set_offboard(self, setpoint: OffboardSetpoint) -> None:
-        self.setpoints.append(setpoint)
-
-    def orbit(self, request: OrbitRequest) -> Reply:
-        return self._record("orbit", request)
-
-    def report_target(self, report: TargetReport) -> None:
-        self._record("report_target", report)
-
-    def report_landing_target(self, pos_ned: tuple[float, float, float]) -> None:
-        self._record("report_landing_target", pos_ned)
-
-    def start_mission(self, first: int, last: int) -> Reply:
-        return self._record("start_mission", first, last)
-
-    def set_current_item(self, seq: int, *, is_reset: bool = False) -> Reply:
-        return self._record("set_current_item", seq, *([is_reset] if is_reset else []))
-
-    def reboot(self) -> Reply:
-        return self._record("reboot")
 
 
 class Client:
@@ -386,10 +250,10 @@ class Rig:
         self,
         role: LinkRole = LinkRole.GROUND,
         dialect: Dialect = PX4,
-        vehicle: RecordingVehicle | None = None,
+        vehicle: AskedVehicle | None = None,
         **options: bool,
     ) -> None:
-        self.vehicle = vehicle or RecordingVehicle()
+        self.vehicle = vehicle or AskedVehicle()
         vehicle_end, client_end = memory_pair(role)
         second_vehicle_end, second_client_end = memory_pair(LinkRole.ONBOARD)
         self.client = Client(client_end)
@@ -429,7 +293,7 @@ class Rig:
 
     def update(self, **values: Any) -> None:
         """Changes fields of the vehicle's state."""
-        self.vehicle.state = replace(self.vehicle.state, **values)
+        self.vehicle.set(**values)
 
 
 def texts(messages: list[Message]) -> list[str]:

@@ -1,8 +1,10 @@
+from dataclasses import replace
 from math import isnan, nan, radians
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.client_requests import ChangeMode, GoTo, SetHome, TakeOff
 from autopilot.interface.vehicle_state import Mode, Reply, Verdict
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from tests.unit.autopilot.mavlink.rig import HOME, Rig, texts
@@ -57,21 +59,22 @@ def test_arm_with_another_number_is_denied():
 def test_takeoff_altitude_is_above_sea_level():
     rig = Rig()
     assert rig.ack(22, -1.0, 0.0, 0.0, nan, nan, nan, 500.0).result == ACCEPTED
-    (name, alt_amsl_m, yaw_rad) = rig.vehicle.calls[0]
-    assert (name, alt_amsl_m) == ("takeoff", 500.0)
-    assert isnan(yaw_rad)
+    (asked,) = rig.vehicle.calls
+    assert isinstance(asked, TakeOff)
+    assert asked.alt_amsl_m == 500.0
+    assert isnan(asked.yaw_rad)
 
 
 def test_takeoff_without_altitude_leaves_it_to_the_vehicle():
     rig = Rig()
     rig.ack(22)
-    assert isnan(rig.vehicle.calls[0][1])
+    assert isnan(rig.vehicle.calls[0].alt_amsl_m)
 
 
 def test_takeoff_above_home_by_command_int():
     rig = Rig()
     assert send_int(rig, 22, 3, param4=90.0, z=10.0) == ACCEPTED
-    assert rig.vehicle.calls == [("takeoff", HOME.alt_m + 10.0, pytest.approx(radians(90.0)))]
+    assert rig.vehicle.calls == [TakeOff(HOME.alt_m + 10.0, pytest.approx(radians(90.0)))]
 
 
 @pytest.mark.parametrize("frame", [0, 3, 5, 6])
@@ -81,7 +84,7 @@ def test_orbit_home_and_region_of_interest_are_above_sea_level_in_any_frame_of_p
     for command in (34, 179, 195):
         assert send_int(rig, command, frame, **place) == ACCEPTED
     orbit, home, look_at = rig.vehicle.calls
-    assert (orbit[1].alt_amsl_m, home[3], look_at[4]) == (500.0, 500.0, 500.0)
+    assert (orbit.alt_amsl_m, home.alt_amsl_m, look_at[4]) == (500.0, 500.0, 500.0)
 
 
 def test_an_orbit_is_above_sea_level_and_home_and_roi_in_their_frame_in_ardupilot():
@@ -90,13 +93,15 @@ def test_an_orbit_is_above_sea_level_and_home_and_roi_in_their_frame_in_ardupilo
     for command in (34, 179, 195):
         assert send_int(rig, command, 3, **place) == ACCEPTED
     orbit, home, look_at = rig.vehicle.calls
-    assert (orbit[1].alt_amsl_m, home[3], look_at[4]) == (500.0, HOME.alt_m + 500.0, HOME.alt_m + 500.0)
+    assert (orbit.alt_amsl_m, home.alt_amsl_m, look_at[4]) == (500.0, HOME.alt_m + 500.0, HOME.alt_m + 500.0)
 
 
 def test_altitude_above_ground_counts_from_the_terrain():
     rig = Rig()
     assert send_int(rig, 22, 11, z=10.0) == ACCEPTED
-    assert rig.vehicle.calls[0][1] == pytest.approx(HOME.alt_m + 1.0 + 10.0)  # the ground is 1 m above the origin
+    assert rig.vehicle.calls[0].alt_amsl_m == pytest.approx(
+        HOME.alt_m + 1.0 + 10.0
+    )  # the ground is 1 m above the origin
 
 
 def test_altitude_above_home_needs_a_home():
@@ -115,28 +120,28 @@ def test_land_here_and_there():
     rig = Rig()
     rig.ack(21)
     rig.ack(21, 0, 0, 0, 0, 0, 0, 0)
-    assert all(isnan(call[1]) and isnan(call[2]) for call in rig.vehicle.calls)
+    assert all(isnan(call.lat_deg) and isnan(call.lon_deg) for call in rig.vehicle.calls)
     assert send_int(rig, 21, 0, x=473977420, y=85455940, param4=nan) == ACCEPTED
-    assert rig.vehicle.calls[2][1:3] == (47.397742, 8.545594)
+    assert (rig.vehicle.calls[2].lat_deg, rig.vehicle.calls[2].lon_deg) == (47.397742, 8.545594)
 
 
 def test_return_is_a_command_too():
     rig = Rig()
     assert rig.ack(20).result == ACCEPTED
-    assert rig.vehicle.calls == [("set_mode", Mode.RETURN)]
+    assert rig.vehicle.calls == [ChangeMode(Mode.RETURN)]
 
 
 @pytest.mark.parametrize("base_mode", [1.0, 129.0, 29.0, 81.0])
 def test_mode_by_command(base_mode):
     rig = Rig()
     assert rig.ack(176, base_mode, 4.0, 4.0).result == ACCEPTED
-    assert rig.vehicle.calls == [("set_mode", Mode.MISSION)]
+    assert rig.vehicle.calls == [ChangeMode(Mode.MISSION)]
 
 
 def test_offboard_mode_needs_no_sub_mode():
     rig = Rig()
     assert rig.ack(176, 1.0, 6.0, 0.0).result == ACCEPTED
-    assert rig.vehicle.calls == [("set_mode", Mode.OFFBOARD)]
+    assert rig.vehicle.calls == [ChangeMode(Mode.OFFBOARD)]
 
 
 @pytest.mark.parametrize("params", [(1.0, 3.0, 9.0), (0.0, 4.0, 4.0), (1.0, 4.0, 77.0), (1.0, nan, nan)])
@@ -153,7 +158,7 @@ def test_set_mode_message_has_no_acknowledgement():
     rig = Rig()
     rig.client.send("SET_MODE", base_mode=1, custom_mode=0x06040000)
     assert rig.all("COMMAND_ACK") == []
-    assert rig.vehicle.calls == [("set_mode", Mode.LAND)]
+    assert rig.vehicle.calls == [ChangeMode(Mode.LAND)]
 
 
 def test_set_mode_message_tells_a_refusal():
@@ -170,22 +175,22 @@ def test_goto_by_command_int_honours_the_frame():
     goto = {"param1": -1.0, "param2": 1.0, "param4": 0.5, "x": 473977420, "y": 85455940}
     assert send_int(rig, 192, 0, **goto, z=520.0) == ACCEPTED
     assert send_int(rig, 192, 6, **goto, z=32.0) == ACCEPTED
-    for call in rig.vehicle.calls:
-        assert call[:5] == ("reposition", 47.397742, 8.545594, 520.0, 0.5)
-        assert isnan(call[5])
+    for asked in rig.vehicle.calls:
+        assert replace(asked, speed_m_s=0.0) == GoTo(47.397742, 8.545594, 520.0, 0.5, 0.0)
+        assert isnan(asked.speed_m_s)
 
 
 def test_pause_is_a_goto_to_nowhere():
     rig = Rig()
     assert rig.ack(192, -1.0, 1.0).result == ACCEPTED
-    assert all(isnan(value) for value in rig.vehicle.calls[0][1:])
+    assert rig.vehicle.calls[0].is_pause
 
 
 def test_unset_integer_position_is_free():
     rig = Rig()
     assert send_int(rig, 192, 0, param2=1.0, x=INT32_MAX, y=INT32_MAX, z=520.0) == ACCEPTED
-    assert isnan(rig.vehicle.calls[0][1])
-    assert rig.vehicle.calls[0][3] == 520.0
+    assert isnan(rig.vehicle.calls[0].lat_deg)
+    assert rig.vehicle.calls[0].alt_amsl_m == 520.0
 
 
 def test_goto_may_not_change_mode_without_the_flag():
@@ -194,7 +199,7 @@ def test_goto_may_not_change_mode_without_the_flag():
     assert rig.ack(192, -1.0, 0.0, 0.0, nan, 47.0, 8.0, 500.0).result == DENIED
     rig.update(mode=Mode.HOLD)
     assert rig.ack(192, 3.0, 0.0, 0.0, nan, 47.0, 8.0, 500.0).result == ACCEPTED
-    assert rig.vehicle.calls[0][5] == 3.0
+    assert rig.vehicle.calls[0].speed_m_s == 3.0
 
 
 @pytest.mark.parametrize("position", [(91.0, 8.0), (47.0, 181.0), (47.0, nan), (float("inf"), 8.0)])
@@ -207,9 +212,9 @@ def test_position_that_does_not_exist_is_denied(position):
 def test_home_here_and_there():
     rig = Rig()
     rig.ack(179, 1.0)
-    assert isnan(rig.vehicle.calls[0][1])
+    assert isnan(rig.vehicle.calls[0].lat_deg)
     assert rig.ack(179, 0.0, 0, 0, 0, 47.5, 8.5, 400.0).result == ACCEPTED
-    assert rig.vehicle.calls[1] == ("set_home", 47.5, 8.5, 400.0)
+    assert rig.vehicle.calls[1] == SetHome(47.5, 8.5, 400.0)
     assert rig.ack(179, 0.0).result == DENIED
 
 
@@ -349,7 +354,7 @@ def test_longest_interval_fits_the_answer():
 def test_loiter_as_a_command_holds():
     rig = Rig()
     assert rig.ack(17, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0).result == ACCEPTED  # pymavlink's set_mode_loiter
-    assert rig.vehicle.calls == [("set_mode", Mode.HOLD)]
+    assert rig.vehicle.calls == [ChangeMode(Mode.HOLD)]
 
 
 def test_banner_is_sent_again_to_who_asks():

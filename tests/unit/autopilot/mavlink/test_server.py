@@ -8,7 +8,7 @@ from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.services.identity import project_version
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, encode
-from tests.unit.autopilot.mavlink.rig import HOME, Client, RecordingVehicle, Rig, texts
+from tests.unit.autopilot.mavlink.rig import HOME, AskedVehicle, Client, Rig, texts
 
 FRAMES_IN_100_MS = 5
 
@@ -145,7 +145,7 @@ def test_autopilot_version_says_who_we_are():
 
 
 def test_system_id_is_the_parameter():
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     vehicle.params.set("MAV_SYS_ID", 7)
     vehicle_end, client_end = memory_pair()
     MavlinkServer(vehicle, [vehicle_end]).frame(20_000)
@@ -267,5 +267,5 @@ def test_closing_closes_the_links():
         def close(self) -> None:
             closed.append(self)
 
-    MavlinkServer(RecordingVehicle(), [Door()]).close()
+    MavlinkServer(AskedVehicle(), [Door()]).close()
     assert len(closed) == 1

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.client_requests import OffboardSetpoint, SetHome
 from autopilot.interface.vehicle_state import Verdict
 from autopilot.navigator.takeoff_intent import Ask, standing_d, vertical_ask
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_RATE, SETPOINT_TRAJECTORY, TERRAIN_VALID
@@ -80,7 +80,7 @@ def test_home_set_in_the_air_is_not_taken_for_the_ground():
     """A held position at home's height would be one on the ground: the vehicle would sink to stand there."""
     rig = Kinematic().flying(10.0)
     rig.flags &= ~TERRAIN_VALID
-    assert rig.fc.set_home(nan, nan, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(SetHome(nan, nan, nan)).verdict is Verdict.ACCEPTED
     rig.run(1.0)
     assert rig.fc.navigator.ask is Ask.STAY
     assert rig.state.home_ned[2] == pytest.approx(-10.0, abs=0.3)

@@ -7,12 +7,9 @@ import numpy as np
 
 from autopilot.interface.platform import Host
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.payload.camera.camera import Camera
 from autopilot.payload.camera.ports import RawFrame, View
 from autopilot.payload.camera.storage import MediaFolder
-from autopilot.payload.gimbal.gimbal import Gimbal
-from autopilot.payload.gimbal.gimbal_control import GimbalControl
-from tests.unit.autopilot.mavlink.rig import FRAME_US, RecordingVehicle, Rig, flying_state
+from tests.unit.autopilot.mavlink.rig import FRAME_US, AskedVehicle, Rig
 
 CAMERA, GIMBAL = 100, 154
 
@@ -65,18 +62,13 @@ class Stream:
         return f"http://127.0.0.1:8554/media/{name}"
 
 
-class PayloadVehicle(RecordingVehicle):
+class PayloadVehicle(AskedVehicle):
     """With camera and gimbal."""
 
     def __init__(self, folder, stream, video=None):
-        super().__init__()
-        self.state = flying_state()
         self.light = Light()
         media = None if folder is None else MediaFolder(folder)
-        gimbal = Gimbal(self.state)
-        self.gimbal = GimbalControl(gimbal, self.state)
-        self.camera = Camera(self.state, gimbal, self.light, media)
-        self.host = Host(frames=self.light, media=media, stream=stream, video=video)
+        super().__init__(Host(frames=self.light, media=media, stream=stream, video=video))
 
 
 class PayloadRig(Rig):

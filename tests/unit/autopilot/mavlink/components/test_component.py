@@ -4,7 +4,7 @@ from autopilot.mavlink.components.component import Component
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.transport.links import memory_pair
 from autopilot.mavlink.wire.codec import known_type
-from tests.unit.autopilot.mavlink.rig import RecordingVehicle
+from tests.unit.autopilot.mavlink.rig import AskedVehicle
 
 _STATUS_ID = known_type("CAMERA_CAPTURE_STATUS").msg_id
 
@@ -30,7 +30,7 @@ class Device(Component):
 def test_intervals_of_a_client_that_has_gone_are_forgotten():
     vehicle_end, client_end = memory_pair()
     visitors = Visitors(vehicle_end)
-    server = MavlinkServer(RecordingVehicle(), [visitors])
+    server = MavlinkServer(AskedVehicle(), [visitors])
     endpoint = server._endpoint
     device = Device(endpoint, 100, 30, "Camera")
     device.set_interval(endpoint.channels[0], _STATUS_ID, 100_000)

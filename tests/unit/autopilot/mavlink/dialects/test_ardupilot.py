@@ -3,6 +3,7 @@ import struct
 import pytest
 from pymavlink import mavutil
 
+from autopilot.interface.client_requests import ChangeMode
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import UnknownModeError
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
@@ -73,14 +74,14 @@ def test_heartbeat_is_a_copter_of_ardupilot():
 def test_mode_is_set_by_its_number(p1):
     rig = Rig(dialect=ARDUPILOT)
     assert rig.ack(176, p1, 6.0, 0.0).result == 0
-    assert rig.vehicle.calls == [("set_mode", Mode.RETURN)]
+    assert rig.vehicle.calls == [ChangeMode(Mode.RETURN)]
 
 
 def test_mode_is_set_by_message():
     rig = Rig(dialect=ARDUPILOT)
     rig.client.send("SET_MODE", base_mode=1, custom_mode=5)
     rig.frame()
-    assert rig.vehicle.calls == [("set_mode", Mode.HOLD)]
+    assert rig.vehicle.calls == [ChangeMode(Mode.HOLD)]
 
 
 def test_version_tells_how_parameters_are_encoded():
@@ -103,9 +104,8 @@ def test_integers_travel_as_floats():
 def test_takeoff_altitude_is_above_home():
     rig = Rig(dialect=ARDUPILOT)
     assert rig.ack(22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 10.0).result == 0
-    call = rig.vehicle.calls[0]
-    assert call[0] == "takeoff"
-    assert call[1] == rig.vehicle.state.home.alt_m + 10.0
+    (takeoff,) = rig.vehicle.calls
+    assert takeoff.alt_amsl_m == rig.vehicle.state.home.alt_m + 10.0
 
 
 @pytest.mark.parametrize(("number", "result"), [(5, 0), (99, 2)])

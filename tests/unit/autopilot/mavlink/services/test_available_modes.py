@@ -1,11 +1,12 @@
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode
 from autopilot.interface.mode_spec import mode_table
 from autopilot.interface.vehicle_state import Mode, Verdict
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
-from tests.unit.autopilot.mavlink.rig import RecordingVehicle, Rig
+from tests.unit.autopilot.mavlink.rig import AskedVehicle, Rig
 
 REQUEST, AVAILABLE, CURRENT, MONITOR = 512, 435, 436, 437
 ADVANCED, NOT_SELECTABLE = 1, 2
@@ -36,7 +37,7 @@ def test_mode_beyond_the_last_is_denied():
 
 
 def test_modes_the_vehicle_does_not_have_are_not_listed():
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     vehicle.modes = mode_table(*(spec for mode, spec in MULTIROTOR_MODES.items() if mode is not Mode.ACRO))
     rig = Rig(vehicle=vehicle)
     rig.client.command(REQUEST, AVAILABLE, 0.0)
@@ -72,7 +73,7 @@ def test_monitor_stays_the_same():
 def test_mode_is_chosen_by_its_standard_number():
     rig = Rig()
     assert rig.ack(262, 7.0).result == 0
-    assert rig.vehicle.calls == [("set_mode", Mode.LAND)]
+    assert rig.vehicle.calls == [ChangeMode(Mode.LAND)]
     assert rig.ack(262, 3.0).result == Verdict.DENIED  # CRUISE
     assert rig.ack(262, 0.0).result == Verdict.DENIED  # none
 

@@ -1,5 +1,6 @@
 import pytest
 
+from autopilot.interface.client_requests import SetCurrentItem, StartMission
 from autopilot.interface.item_lists import ItemRefusal, ListKind, MissionItem
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
@@ -127,7 +128,7 @@ def test_current_item_is_set_by_the_clients_number():
     rig.frame()
     rig.ack(224, 1.0)
     rig.ack(300, 0.0, 0.0)
-    assert rig.vehicle.calls == [("set_current_item", 1), ("set_current_item", 0), ("start_mission", -1, -1)]
+    assert rig.vehicle.calls == [SetCurrentItem(1), SetCurrentItem(0), StartMission(-1, -1)]
 
 
 def test_refused_item_is_named_by_the_clients_number():

@@ -3,6 +3,7 @@ from math import isnan
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.client_requests import SetCurrentItem
 from autopilot.interface.item_lists import ItemRefusal, ListKind, MissionItem
 from autopilot.interface.vehicle_state import FenceLimit, FenceState, Reply, Verdict
 from autopilot.mavlink.services.mission_protocol import DOWNLOAD_IDLE_US, RETRIES_MAX
@@ -368,7 +369,7 @@ def test_set_current_is_answered_by_the_current_item():
     rig.frame(2)
     rig.client.send("MISSION_SET_CURRENT", target_component=1, seq=1)
     assert len(rig.all("MISSION_CURRENT")) == 1
-    assert rig.vehicle.calls == [("set_current_item", 1)]
+    assert rig.vehicle.calls == [SetCurrentItem(1)]
     rig.vehicle.reply = Reply(Verdict.DENIED, "there is no item 9")
     rig.client.send("MISSION_SET_CURRENT", target_component=1, seq=9)
     assert texts(rig.frame()) == ["Mission: there is no item 9"]
@@ -377,10 +378,10 @@ def test_set_current_is_answered_by_the_current_item():
 def test_fence_is_switched_by_command():
     rig = Rig()
     for params, call in (
-        ((1.0,), ("fence.enable", 15)),
-        ((0.0, 0.0), ("fence.disable", 15)),
-        ((1.0, 4.0), ("fence.enable", 4)),
-        ((2.0,), ("fence.disable", 8)),
+        ((1.0,), ("enable", 15)),
+        ((0.0, 0.0), ("disable", 15)),
+        ((1.0, 4.0), ("enable", 4)),
+        ((2.0,), ("disable", 8)),
     ):
         assert rig.ack(mavlink.MAV_CMD_DO_FENCE_ENABLE, *params).result == 0
         assert rig.vehicle.calls[-1] == call

@@ -11,7 +11,7 @@ from autopilot.mavlink.wire.codec import message_id
 from autopilot.ports import POSITION_VALID, TERRAIN_VALID
 from common.clock import SIMULATED_EPOCH_US
 from sim.truth import Truth
-from tests.unit.autopilot.mavlink.rig import HOME, RecordingVehicle, Rig, record
+from tests.unit.autopilot.mavlink.rig import HOME, AskedVehicle, Rig, record
 
 STREAMED = (
     *("RAW_IMU", "SCALED_IMU2", "AHRS", "AHRS2", "POWER_STATUS", "MEMINFO", "HWSTATUS", "MCU_STATUS", "SIMSTATE"),
@@ -102,7 +102,7 @@ def test_speed_controllers_tell_revolutions_and_voltage():
 
 
 def test_truth_comes_from_the_host():
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     truth = record(
         Truth,
         "Truth",
@@ -123,14 +123,14 @@ def test_truth_comes_from_the_host():
 
 @pytest.mark.parametrize("name", TRUTHS)
 def test_without_a_simulator_there_is_no_truth(name):
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     vehicle.host = Host()
     rig = Rig(dialect=ARDUPILOT, vehicle=vehicle)
     assert rig.ack(512, message_id(name)).result == 1
 
 
 def test_truth_is_nowhere_in_what_the_flight_controller_reads():
-    assert not [name for name in type(RecordingVehicle().state).__slots__ if "truth" in name]
+    assert not [name for name in type(AskedVehicle().state).__slots__ if "truth" in name]
 
 
 def test_date_goes_on_from_that_of_power_on():

@@ -5,11 +5,11 @@ import pytest
 from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS, STREAM_GROUPS
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.params import parameter_table
-from tests.unit.autopilot.mavlink.rig import RecordingVehicle, Rig
+from tests.unit.autopilot.mavlink.rig import AskedVehicle, Rig
 
 
 def rig_with(**values):
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     vehicle.params = parameter_table(None, ARDUPILOT_PARAMETERS)
     for name, value in values.items():
         vehicle.params.set(name, value)

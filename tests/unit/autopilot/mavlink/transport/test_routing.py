@@ -5,7 +5,7 @@ import pytest
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.transport.links import memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, encode, frame_bytes, known_type, unknown_type
-from tests.unit.autopilot.mavlink.rig import FRAME_US, RecordingVehicle
+from tests.unit.autopilot.mavlink.rig import FRAME_US, AskedVehicle
 
 OURS, STATION, SCRIPT, CAMERA = (1, 1), (255, 190), (245, 191), (1, 155)
 
@@ -15,7 +15,7 @@ class Network:
 
     def __init__(self):
         pairs = [memory_pair() for _ in range(3)]
-        self.vehicle = RecordingVehicle()
+        self.vehicle = AskedVehicle()
         self.server = MavlinkServer(self.vehicle, [vehicle_end for vehicle_end, _ in pairs])
         self.ends = [client_end for _, client_end in pairs]
         self.time_us = 5_000_000

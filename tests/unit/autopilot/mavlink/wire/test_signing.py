@@ -18,7 +18,7 @@ from autopilot.mavlink.wire.signing import (
     SigningState,
 )
 from common.clock import SIMULATED_EPOCH_US
-from tests.unit.autopilot.mavlink.rig import FRAME_US, RecordingVehicle
+from tests.unit.autopilot.mavlink.rig import FRAME_US, AskedVehicle
 
 KEY = bytes(range(32))
 NOW = (SIMULATED_EPOCH_US - EPOCH_UNIX_US) // 10  # [10 us]
@@ -44,7 +44,7 @@ class Station:
         self.time_us = 5_000_000
         self.store = store or MemoryStore(SigningState(key, 0))
         vehicle_end, self.end = memory_pair()
-        self.vehicle = RecordingVehicle()
+        self.vehicle = AskedVehicle()
         self.log = []
         self.server = MavlinkServer(
             self.vehicle,
@@ -219,7 +219,7 @@ def test_radio_may_not_know_the_key():
 
 def test_script_in_our_process_needs_no_signature():
     vehicle_end, client_end = memory_pair()
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     config = SigningConfig(MemoryStore(SigningState(KEY, 0)), lambda: SIMULATED_EPOCH_US, is_required=True)
     server = MavlinkServer(vehicle, [vehicle_end], signing=config)
     client_end.send(encode("COMMAND_LONG", 245, 190, 0, **ARM))
@@ -233,7 +233,7 @@ def test_script_in_our_process_needs_no_signature():
 def test_signatures_of_a_lockstep_flight_are_the_same_each_time():
     def sent():
         vehicle_end, client_end = memory_pair()
-        server = MavlinkServer(RecordingVehicle(), [vehicle_end])
+        server = MavlinkServer(AskedVehicle(), [vehicle_end])
         client_end.send(encode("SETUP_SIGNING", 255, 190, 0, target_system=1, secret_key=tuple(KEY)))
         for i in range(20):
             server.frame(i * FRAME_US)

@@ -5,7 +5,7 @@ from timeit import repeat
 
 import pytest
 
-from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.client_requests import ChangeMode, GoTo, LandAt, OffboardSetpoint, TakeOff
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import FenceLimit, Mode, Severity, Verdict
 from autopilot.navigator.fence.fence_items import FenceCommand
@@ -46,7 +46,7 @@ def test_fence_without_an_action_is_none():
     rig.run(0.1)
     assert not rig.state.fence.is_active
     assert not rig.state.fence.breached
-    assert rig.fc.reposition(*geo(80.0, 0.0, 10.0), nan, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(GoTo(*geo(80.0, 0.0, 10.0), nan, nan)).verdict is Verdict.ACCEPTED
 
 
 def test_breach_is_over_once_the_vehicle_is_well_inside_and_counts_again():
@@ -84,7 +84,7 @@ def test_limits_around_home_are_watched(params, pos, limit):
 
 def test_floor_does_not_hold_back_take_off_and_landing():
     rig = Kinematic(GF_ACTION=3, GF_MIN_ALT=8.0).flying(height_m=12.0)
-    rig.fc.set_mode(Mode.LAND)
+    rig.fc.request(ChangeMode(Mode.LAND))
     rig.disarmed()
     assert rig.state.fence.breach_count == 0
 
@@ -93,11 +93,11 @@ def test_prediction_stops_the_vehicle_inside():
     rig = fenced(Kinematic(GF_PREDICT=1, GF_MARGIN=3.0).flying(), polygon(SQUARE))
 
     def fly_north():
-        rig.fc.set_offboard(OffboardSetpoint(rig.time_us, int(SETPOINT_TRAJECTORY), vel_ned=(8.0, 0.0, 0.0)))
+        rig.fc.request(OffboardSetpoint(rig.time_us, int(SETPOINT_TRAJECTORY), vel_ned=(8.0, 0.0, 0.0)))
         return rig.recorder.has_text("close to shapes")
 
     fly_north()
-    assert rig.fc.set_mode(Mode.OFFBOARD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.OFFBOARD)).verdict is Verdict.ACCEPTED
     rig.run_until(fly_north, 20.0)
     rig.run(10.0)
     assert 35.0 < max(pos[0] for pos in rig.track) < 50.0
@@ -116,29 +116,29 @@ def test_vehicle_outside_may_not_be_armed():
 def test_places_outside_are_refused():
     rig = fenced(Kinematic(GF_MAX_VER_DIST=30.0).flying(), polygon(SQUARE))
     for place, part in (((60.0, 0.0, 10.0), "shapes"), ((0.0, 0.0, 31.0), "ceiling")):
-        reply = rig.fc.reposition(*geo(*place), nan, nan)
+        reply = rig.fc.request(GoTo(*geo(*place), nan, nan))
         assert reply.verdict is Verdict.DENIED
         assert f"target is outside fence: {part}" in reply.reason
-    assert rig.fc.land(*geo(60.0, 0.0)[:2], nan).verdict is Verdict.DENIED
-    assert rig.fc.reposition(*geo(40.0, 0.0, 20.0), nan, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(LandAt(*geo(60.0, 0.0)[:2], nan)).verdict is Verdict.DENIED
+    assert rig.fc.request(GoTo(*geo(40.0, 0.0, 20.0), nan, nan)).verdict is Verdict.ACCEPTED
 
 
 def test_take_off_above_the_ceiling_is_refused():
     rig = Kinematic(GF_MAX_VER_DIST=30.0).ready()
-    reply = rig.fc.takeoff(ORIGIN.alt_m + 40.0, nan)
+    reply = rig.fc.request(TakeOff(ORIGIN.alt_m + 40.0, nan))
     assert (reply.verdict, reply.reason) == (Verdict.DENIED, "takeoff would end outside fence: ceiling")
-    assert rig.fc.takeoff(ORIGIN.alt_m + 20.0, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(TakeOff(ORIGIN.alt_m + 20.0, nan)).verdict is Verdict.ACCEPTED
 
 
 def test_mission_with_an_item_outside_is_not_started():
     rig = fenced(Kinematic().flying(), polygon(SQUARE))
     assert rig.fc.lists.load(ListKind.MISSION, [item(0, 16, 20.0), item(1, 16, 60.0), item(2, 20, frame=2)]) is None
     assert rig.recorder.has_text("Mission: item 2 is outside fence: shapes")
-    reply = rig.fc.set_mode(Mode.MISSION)
+    reply = rig.fc.request(ChangeMode(Mode.MISSION))
     assert reply.verdict is Verdict.TEMPORARILY_REJECTED
     assert reply.reason == "item 2 is outside fence: shapes"
     fenced(rig, polygon([(1.5 * north, east) for north, east in SQUARE]))
-    assert rig.fc.set_mode(Mode.MISSION).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.MISSION)).verdict is Verdict.ACCEPTED
 
 
 def test_fence_is_switched_by_command_and_as_a_whole_by_its_parameter():

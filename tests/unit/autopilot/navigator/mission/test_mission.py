@@ -5,6 +5,7 @@ from math import nan, radians
 import numpy as np
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode, GoTo, SetCurrentItem, StartMission
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
 from autopilot.navigator.mission.mission import MissionState
@@ -26,7 +27,7 @@ WAYPOINT, LOITER, LOITER_TIME, RETURN, LAND, TAKEOFF, DELAY, JUMP, SPEED, HOME =
 
 def started(rig, *items):
     assert rig.fc.lists.load(ListKind.MISSION, items) is None
-    assert rig.fc.set_mode(Mode.MISSION).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.MISSION)).verdict is Verdict.ACCEPTED
     if not rig.state.is_armed:
         assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     return rig
@@ -208,7 +209,7 @@ def test_pause_holds_and_resume_goes_on_along_the_same_leg():
     stopped = rig.pos.copy()
     rig.run(3.0)
     assert rig.pos == pytest.approx(stopped, abs=0.05)
-    assert rig.fc.start_mission(-1).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(StartMission(-1)).verdict is Verdict.ACCEPTED
     rig.frame()
     assert rig.state.mission_current == 1
     assert rig.sp("path_start_ned") == pytest.approx([20.0, 0.0, -10.0], abs=0.1)
@@ -220,9 +221,9 @@ def test_resume_far_from_the_leg_goes_straight_to_the_item():
     rig = started(Kinematic().flying(), item(0, WAYPOINT, 100.0), item(1, WAYPOINT, 100.0, 20.0))
     rig.run_until(lambda: rig.pos[0] > 50.0)
     lat, lon, _ = geo(50.0, 40.0)
-    assert rig.fc.reposition(lat, lon, nan, nan, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(GoTo(lat, lon, nan, nan, nan)).verdict is Verdict.ACCEPTED
     rig.run(15.0)
-    assert rig.fc.start_mission(-1).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(StartMission(-1)).verdict is Verdict.ACCEPTED
     rig.frame()
     assert rig.sp("path_start_ned") == pytest.approx([50.0, 40.0, -10.0], abs=0.2)
 
@@ -235,10 +236,10 @@ def test_pause_without_a_mission_is_refused():
 def test_mission_starts_at_the_item_asked_for_and_a_complete_one_starts_again():
     rig = Kinematic().flying()
     rig.fc.lists.load(ListKind.MISSION, [item(0, WAYPOINT, 20.0), item(1, WAYPOINT, 0.0, 20.0)])
-    assert rig.fc.start_mission(1).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(StartMission(1)).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
     assert rig.recorder.reached == [1]
-    assert rig.fc.start_mission(-1).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(StartMission(-1)).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
     assert rig.recorder.reached == [1, 0, 1]
 
@@ -246,10 +247,10 @@ def test_mission_starts_at_the_item_asked_for_and_a_complete_one_starts_again():
 def test_current_item_can_be_changed_in_flight():
     rig = started(Kinematic().flying(), item(0, WAYPOINT, 100.0), item(1, WAYPOINT, 0.0, 100.0), item(2, LOITER, 0, 0))
     rig.run(3.0)
-    assert rig.fc.set_current_item(1).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(SetCurrentItem(1)).verdict is Verdict.ACCEPTED
     rig.frame()
     assert rig.sp("pos_ned")[1] == pytest.approx(100.0, abs=0.1)
-    reply = rig.fc.set_current_item(7)
+    reply = rig.fc.request(SetCurrentItem(7))
     assert (reply.verdict, reply.reason) == (Verdict.DENIED, "there is no item 8")
 
 
@@ -268,10 +269,10 @@ def test_a_new_mission_in_flight_replaces_the_one_being_flown():
 
 def test_mission_without_items_or_too_far_away_is_refused():
     rig = Kinematic().flying()
-    reply = rig.fc.set_mode(Mode.MISSION)
+    reply = rig.fc.request(ChangeMode(Mode.MISSION))
     assert (reply.verdict, reply.reason) == (Verdict.TEMPORARILY_REJECTED, "no mission is loaded")
     rig.fc.lists.load(ListKind.MISSION, [item(0, WAYPOINT, 20_000.0)])
-    assert "km away" in rig.fc.set_mode(Mode.MISSION).reason
+    assert "km away" in rig.fc.request(ChangeMode(Mode.MISSION)).reason
 
 
 def test_item_without_autocontinue_waits_in_hold():
@@ -279,7 +280,7 @@ def test_item_without_autocontinue_waits_in_hold():
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
     assert rig.state.mission_state == MissionState.PAUSED
     assert rig.state.mission_current == 1
-    rig.fc.start_mission(-1)
+    rig.fc.request(StartMission(-1))
     rig.run_until(lambda: rig.state.mode is Mode.HOLD)
     assert rig.recorder.reached == [0, 1]
 

@@ -5,6 +5,7 @@ from math import atan2, hypot, nan, pi, radians
 import numpy as np
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode, LandingTargetReport, SetHome
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
 from tests.unit.autopilot.kinematic import Kinematic, do, heading_error, item
@@ -33,7 +34,7 @@ class Camera:
 
 def started(rig, *items):
     assert rig.fc.lists.load(ListKind.MISSION, items) is None
-    assert rig.fc.set_mode(Mode.MISSION).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.MISSION)).verdict is Verdict.ACCEPTED
     if not rig.state.is_armed:
         assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     return rig
@@ -230,7 +231,7 @@ def test_waypoint_missed_by_a_change_of_home_is_turned_back_to():
     rig = started(Kinematic().flying(), item(0, WAYPOINT, 40.0, 0.0), item(1, WAYPOINT, 80.0, 0.0))
     rig.run_until(lambda: rig.pos[0] > 37.0)
     home = rig.state.home
-    assert rig.fc.set_home(home.lat_deg, home.lon_deg, home.alt_m + 15.0).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(SetHome(home.lat_deg, home.lon_deg, home.alt_m + 15.0)).verdict is Verdict.ACCEPTED
     furthest = 0.0
     while 0 not in rig.recorder.reached:
         rig.frame()
@@ -266,14 +267,14 @@ def test_same_current_item_in_a_new_mission_is_flown_on():
 def test_mission_entered_again_begins_anew_if_asked_to(restart, reached):
     rig = started(Kinematic(MIS_RESTART=restart).flying(), item(0, WAYPOINT, 20.0), item(1, WAYPOINT, 60.0))
     rig.run_until(lambda: rig.pos[0] > 40.0)
-    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     rig.run(4.0)
     finished(started_again(rig))
     assert rig.recorder.reached == reached
 
 
 def started_again(rig):
-    assert rig.fc.set_mode(Mode.MISSION).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.MISSION)).verdict is Verdict.ACCEPTED
     rig.frame()
     return rig
 
@@ -289,7 +290,7 @@ def test_mission_needs_the_ends_that_the_parameter_asks_for(asked, has_takeoff, 
     rig = Kinematic(MIS_TKO_LAND_REQ=asked).ready()
     places = [TAKEOFF] * has_takeoff + [WAYPOINT] + [LAND] * has_landing
     assert rig.fc.lists.load(ListKind.MISSION, [item(seq, command, 10.0) for seq, command in enumerate(places)]) is None
-    reply = rig.fc.set_mode(Mode.MISSION)
+    reply = rig.fc.request(ChangeMode(Mode.MISSION))
     assert (reply.verdict is Verdict.ACCEPTED) == (lacks is None)
     assert (lacks or "") in reply.reason
 
@@ -313,6 +314,6 @@ def test_landing_item_lands_on_a_target_that_is_seen():
     started(rig, item(0, WAYPOINT, 10.0), land)
     while rig.state.is_armed:
         rig.frame()
-        rig.fc.report_landing_target((21.0, 1.5, 0.0))
+        rig.fc.request(LandingTargetReport((21.0, 1.5, 0.0)))
     assert rig.pos[:2] == pytest.approx((21.0, 1.5), abs=0.3)
     assert rig.recorder.reached == [0, 1]

@@ -4,7 +4,7 @@ from math import hypot, nan, pi, radians
 
 import pytest
 
-from autopilot.interface.client_requests import OffboardSetpoint
+from autopilot.interface.client_requests import ChangeMode, ChangeSpeed, GoTo, LandAt, OffboardSetpoint, TakeOff
 from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
 from autopilot.ports import (
     HEIGHT_VALID,
@@ -21,10 +21,10 @@ def test_whole_flight_goes_through_every_landed_state_in_order():
     rig = Kinematic().flying(12.0)
     assert rig.pos[2] == pytest.approx(-12.0, abs=0.3)
     lat, lon, _ = geo(40.0, 30.0)
-    assert rig.fc.reposition(lat, lon, ORIGIN.alt_m + 15.0, nan, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(GoTo(lat, lon, ORIGIN.alt_m + 15.0, nan, nan)).verdict is Verdict.ACCEPTED
     rig.run(30.0)
     assert rig.pos == pytest.approx((40.0, 30.0, -15.0), abs=0.1)
-    assert rig.fc.set_mode(Mode.RETURN).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.RETURN)).verdict is Verdict.ACCEPTED
     rig.disarmed()
     assert hypot(rig.pos[0], rig.pos[1]) < 0.4
     assert rig.history == [
@@ -40,7 +40,7 @@ def test_whole_flight_goes_through_every_landed_state_in_order():
 def test_takeoff_climbs_vertically_at_the_takeoff_speed():
     rig = Kinematic(MPC_TKO_SPEED=1.5)
     rig.ready()
-    rig.fc.takeoff(ORIGIN.alt_m + 10.0, nan)
+    rig.fc.request(TakeOff(ORIGIN.alt_m + 10.0, nan))
     rig.fc.arm(force=False)
     rig.run_until(lambda: rig.state.landed_state is LandedState.TAKEOFF)
     took_s = rig.run_until(lambda: rig.state.mode is Mode.HOLD)
@@ -52,7 +52,7 @@ def test_takeoff_climbs_vertically_at_the_takeoff_speed():
 def test_setpoint_says_landed_until_the_rotors_had_their_spool_up_time():
     rig = Kinematic(COM_SPOOLUP_TIME=2.0)
     rig.ready()
-    rig.fc.takeoff(nan, nan)
+    rig.fc.request(TakeOff())
     rig.fc.arm(force=False)
     rig.run(1.9)
     assert rig.sp("is_armed") == 1
@@ -71,7 +71,7 @@ def test_takeoff_below_the_least_height_is_raised_and_told():
 
 def test_takeoff_in_flight_never_descends():
     rig = Kinematic().flying(20.0)
-    assert rig.fc.takeoff(ORIGIN.alt_m + 5.0, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(TakeOff(ORIGIN.alt_m + 5.0, nan)).verdict is Verdict.ACCEPTED
     rig.run(5.0)
     assert rig.pos[2] == pytest.approx(-20.0, abs=0.4)
     assert rig.state.mode is Mode.HOLD
@@ -80,11 +80,11 @@ def test_takeoff_in_flight_never_descends():
 def test_hold_brakes_ahead_and_stays():
     rig = Kinematic().flying()
     lat, lon, _ = geo(200.0, 0.0)
-    rig.fc.reposition(lat, lon, nan, nan, nan)
+    rig.fc.request(GoTo(lat, lon, nan, nan, nan))
     rig.run(10.0)
     north = rig.pos[0]
     assert rig.vel[0] == pytest.approx(5.0, abs=0.1)
-    rig.fc.reposition(nan, nan, nan, nan, nan)
+    rig.fc.request(GoTo())
     rig.frame()
     target = rig.sp("pos_ned")
     assert 2.0 < target[0] - north < 6.0
@@ -95,15 +95,15 @@ def test_hold_brakes_ahead_and_stays():
 def test_goto_turns_to_its_target_and_keeps_what_is_nan():
     rig = Kinematic().flying(10.0)
     lat, lon, _ = geo(0.0, -50.0)
-    rig.fc.reposition(lat, lon, nan, nan, 3.0)
+    rig.fc.request(GoTo(lat, lon, nan, nan, 3.0))
     rig.run(5.0)
     assert heading_error(rig.yaw, -pi / 2) < 0.05
     assert abs(rig.vel[1]) == pytest.approx(3.0, abs=0.1)
     rig.run(20.0)
-    rig.fc.reposition(nan, nan, ORIGIN.alt_m + 18.0, nan, nan)
+    rig.fc.request(GoTo(nan, nan, ORIGIN.alt_m + 18.0, nan, nan))
     rig.run(10.0)
     assert rig.pos == pytest.approx((0.0, -50.0, -18.0), abs=0.1)
-    rig.fc.reposition(nan, nan, nan, radians(100.0), nan)
+    rig.fc.request(GoTo(nan, nan, nan, radians(100.0), nan))
     rig.run(5.0)
     assert heading_error(rig.yaw, radians(100.0)) < 0.05
 
@@ -120,23 +120,23 @@ def test_goto_turns_to_its_target_and_keeps_what_is_nan():
 )
 def test_goto_refuses_what_it_cannot_reach(place, reason):
     rig = Kinematic().flying()
-    reply = rig.fc.reposition(*place, nan, nan)
+    reply = rig.fc.request(GoTo(*place, nan, nan))
     assert reply.verdict is Verdict.DENIED
     assert reason in reply.reason
 
 
 def test_goto_on_the_ground_is_refused():
     rig = Kinematic().ready()
-    reply = rig.fc.reposition(*geo(5.0, 5.0, 5.0), nan, nan)
+    reply = rig.fc.request(GoTo(*geo(5.0, 5.0, 5.0), nan, nan))
     assert (reply.verdict, reply.reason) == (Verdict.TEMPORARILY_REJECTED, "not in the air")
 
 
 def test_return_climbs_first_flies_home_and_lands():
     rig = Kinematic(RTL_RETURN_ALT=25.0).flying(10.0)
-    rig.fc.reposition(*geo(60.0, 0.0, 10.0), nan, nan)
+    rig.fc.request(GoTo(*geo(60.0, 0.0, 10.0), nan, nan))
     rig.run(25.0)
     start = len(rig.track)
-    rig.fc.set_mode(Mode.RETURN)
+    rig.fc.request(ChangeMode(Mode.RETURN))
     rig.disarmed()
     back = rig.track[start:]
     assert min(p[2] for p in back) == pytest.approx(-25.0, abs=0.6)
@@ -147,14 +147,14 @@ def test_return_climbs_first_flies_home_and_lands():
 def test_return_near_home_does_not_climb():
     rig = Kinematic().flying(6.0)
     start = len(rig.track)
-    rig.fc.set_mode(Mode.RETURN)
+    rig.fc.request(ChangeMode(Mode.RETURN))
     rig.disarmed()
     assert min(p[2] for p in rig.track[start:]) > -6.5
 
 
 def test_return_waits_before_landing_if_told_to():
     rig = Kinematic(RTL_LAND_DELAY=-1.0, RTL_DESCEND_ALT=8.0).flying(20.0)
-    rig.fc.set_mode(Mode.RETURN)
+    rig.fc.request(ChangeMode(Mode.RETURN))
     rig.run(60.0)
     assert rig.pos[2] == pytest.approx(-8.0, abs=0.5)
     assert rig.state.is_armed
@@ -162,7 +162,7 @@ def test_return_waits_before_landing_if_told_to():
 
 def test_landing_slows_down_near_the_ground():
     rig = Kinematic().flying(20.0)
-    rig.fc.land(nan, nan, nan)
+    rig.fc.request(LandAt())
     rig.run(2.0)
     assert rig.sp("vel_ned")[2] == pytest.approx(1.5)
     rig.run_until(lambda: rig.pos[2] > -4.5)
@@ -174,7 +174,7 @@ def test_landing_slows_down_near_the_ground():
 
 def test_vehicle_that_touches_the_ground_settles_level_under_little_thrust():
     rig = Kinematic().flying(5.0)
-    rig.fc.set_mode(Mode.LAND)
+    rig.fc.request(ChangeMode(Mode.LAND))
     rig.run_until(lambda: rig.state.has_ground_contact)
     rig.frame()
     assert rig.sp("kind") == SETPOINT_ATTITUDE
@@ -186,7 +186,7 @@ def test_vehicle_that_touches_the_ground_settles_level_under_little_thrust():
 def test_land_command_with_a_place_goes_there_first():
     rig = Kinematic().flying(10.0)
     lat, lon, _ = geo(30.0, -20.0)
-    assert rig.fc.land(lat, lon, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(LandAt(lat, lon, nan)).verdict is Verdict.ACCEPTED
     rig.disarmed()
     assert rig.pos[:2] == pytest.approx((30.0, -20.0), abs=0.4)
 
@@ -231,11 +231,11 @@ def test_blind_landing_without_height_hangs_level_below_hover_thrust():
 
 def test_landing_asked_for_before_the_vehicle_has_lifted_ends_at_once():
     rig = Kinematic().ready()
-    rig.fc.takeoff(nan, nan)
+    rig.fc.request(TakeOff())
     rig.fc.arm(force=False)
     rig.run_until(lambda: rig.state.landed_state is LandedState.TAKEOFF)
     rig.frame()
-    assert rig.fc.set_mode(Mode.LAND).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.LAND)).verdict is Verdict.ACCEPTED
     assert rig.disarmed() < 5.0
     assert not rig.recorder.has_text("failed")
 
@@ -244,7 +244,7 @@ def test_takeoff_that_does_not_leave_the_ground_is_given_up():
     rig = Kinematic(MPC_TKO_SPEED=0.5, MPC_Z_V_AUTO_UP=0.5)
     rig.ready()
     rig.gust_ned[2] = 5.0
-    rig.fc.takeoff(nan, nan)
+    rig.fc.request(TakeOff())
     rig.fc.arm(force=False)
     assert rig.disarmed() == pytest.approx(11.0, abs=0.2)
     assert rig.recorder.has_text("Takeoff failed")
@@ -265,26 +265,26 @@ def test_position_found_again_during_a_blind_landing_is_held():
 
 def stream(rig, setpoint, seconds):
     for _ in range(round(seconds / 0.1)):
-        rig.fc.set_offboard(setpoint)
+        rig.fc.request(setpoint)
         rig.run(0.1)
 
 
 def test_offboard_needs_a_stream_before_entry():
     rig = Kinematic().flying()
-    reply = rig.fc.set_mode(Mode.OFFBOARD)
+    reply = rig.fc.request(ChangeMode(Mode.OFFBOARD))
     assert reply.verdict is Verdict.TEMPORARILY_REJECTED
     assert "2 Hz" in reply.reason
-    rig.fc.set_offboard(position_setpoint(0.0, 0.0, -10.0))
+    rig.fc.request(position_setpoint(0.0, 0.0, -10.0))
     rig.run(0.8)
-    assert rig.fc.set_mode(Mode.OFFBOARD).verdict is Verdict.TEMPORARILY_REJECTED
-    rig.fc.set_offboard(position_setpoint(0.0, 0.0, -10.0))
-    assert rig.fc.set_mode(Mode.OFFBOARD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.OFFBOARD)).verdict is Verdict.TEMPORARILY_REJECTED
+    rig.fc.request(position_setpoint(0.0, 0.0, -10.0))
+    assert rig.fc.request(ChangeMode(Mode.OFFBOARD)).verdict is Verdict.ACCEPTED
 
 
 def test_offboard_takes_off_flies_and_lands_by_velocity():
     rig = Kinematic().ready()
     stream(rig, position_setpoint(0.0, 0.0, -2.0), 0.3)
-    assert rig.fc.set_mode(Mode.OFFBOARD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.OFFBOARD)).verdict is Verdict.ACCEPTED
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     stream(rig, position_setpoint(5.0, 0.0, -2.0, yaw=1.0), 8.0)
     assert rig.pos == pytest.approx((5.0, 0.0, -2.0), abs=0.1)
@@ -300,7 +300,7 @@ def test_offboard_attitude_needs_no_position():
     rig.run(1.0)
     up = OffboardSetpoint(0, int(SETPOINT_ATTITUDE), thrust=0.6)
     stream(rig, up, 0.3)
-    assert rig.fc.set_mode(Mode.OFFBOARD).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.OFFBOARD)).verdict is Verdict.ACCEPTED
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     stream(rig, up, 4.0)
     assert rig.state.landed_state is LandedState.IN_AIR
@@ -311,7 +311,7 @@ def test_offboard_attitude_needs_no_position():
 def test_offboard_loss_takes_the_chosen_action(action, mode):
     rig = Kinematic(COM_OBL_RC_ACT=action).flying()
     stream(rig, position_setpoint(10.0, 0.0, -10.0), 0.5)
-    rig.fc.set_mode(Mode.OFFBOARD)
+    rig.fc.request(ChangeMode(Mode.OFFBOARD))
     stream(rig, position_setpoint(10.0, 0.0, -10.0), 3.0)
     rig.run(0.85)
     assert rig.state.mode is Mode.OFFBOARD
@@ -324,8 +324,8 @@ def test_offboard_loss_takes_the_chosen_action(action, mode):
 def test_stopping_offboard_goes_to_hold():
     rig = Kinematic().flying()
     stream(rig, position_setpoint(10.0, 0.0, -10.0), 0.5)
-    rig.fc.set_mode(Mode.OFFBOARD)
-    assert rig.fc.set_mode(Mode.HOLD).verdict is Verdict.ACCEPTED
+    rig.fc.request(ChangeMode(Mode.OFFBOARD))
+    assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
     rig.run(3.0)
     assert not rig.state.is_failsafe
     assert rig.state.mode is Mode.HOLD
@@ -333,22 +333,22 @@ def test_stopping_offboard_goes_to_hold():
 
 def test_change_of_speed_applies_at_once_and_is_forgotten_by_default():
     rig = Kinematic().flying()
-    rig.fc.reposition(*geo(300.0, 0.0, 10.0), nan, nan)
+    rig.fc.request(GoTo(*geo(300.0, 0.0, 10.0), nan, nan))
     rig.run(5.0)
-    assert rig.fc.change_speed(2.0).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeSpeed(2.0)).verdict is Verdict.ACCEPTED
     rig.run(3.0)
     assert rig.vel[0] == pytest.approx(2.0, abs=0.1)
-    assert rig.fc.change_speed(nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeSpeed(nan)).verdict is Verdict.ACCEPTED
     rig.run(3.0)
     assert rig.vel[0] == pytest.approx(5.0, abs=0.1)
-    assert rig.fc.change_speed(-3.0).verdict is Verdict.DENIED
+    assert rig.fc.request(ChangeSpeed(-3.0)).verdict is Verdict.DENIED
 
 
 @pytest.mark.parametrize("down", [0.0, 0.8])
 def test_offboard_position_on_the_ground_is_a_landing(down):
     rig = Kinematic().flying(3.0)
     stream(rig, position_setpoint(0.0, 0.0, -3.0), 0.5)
-    rig.fc.set_mode(Mode.OFFBOARD)
+    rig.fc.request(ChangeMode(Mode.OFFBOARD))
     stream(rig, position_setpoint(0.0, 0.0, down), 10.0)
     assert not rig.state.is_armed
     assert rig.recorder.has_text("Landed")
@@ -357,7 +357,7 @@ def test_offboard_position_on_the_ground_is_a_landing(down):
 def test_contact_gives_way_to_a_climb_at_once():
     rig = Kinematic().flying(3.0)
     stream(rig, position_setpoint(0.0, 0.0, -3.0), 0.5)
-    rig.fc.set_mode(Mode.OFFBOARD)
+    rig.fc.request(ChangeMode(Mode.OFFBOARD))
     down = OffboardSetpoint(0, int(SETPOINT_TRAJECTORY), vel_ned=(0.0, 0.0, 1.0))
     while not rig.state.has_ground_contact:
         stream(rig, down, 0.1)

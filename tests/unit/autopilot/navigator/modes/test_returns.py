@@ -6,6 +6,7 @@ from math import hypot, nan
 import numpy as np
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode, GoTo, StartMission
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import Mode, Verdict
 from autopilot.navigator.fence.fence_items import FenceCommand
@@ -25,7 +26,7 @@ def at(north, east, height=10.0, **params):
 
 
 def go(rig, north, east, height=10.0):
-    assert rig.fc.reposition(*geo(north, east, height), nan, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(GoTo(*geo(north, east, height), nan, nan)).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: hypot(rig.pos[0] - north, rig.pos[1] - east) < 0.5)
     rig.run(1.0)
 
@@ -43,7 +44,7 @@ def load_block(rig, points=BLOCK):
 def returned(rig, mode=Mode.RETURN):
     """The track of the return, and where it ended."""
     start = len(rig.track)
-    assert rig.fc.set_mode(mode).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(mode)).verdict is Verdict.ACCEPTED
     rig.disarmed()
     return np.array(rig.track[start:])
 
@@ -102,7 +103,7 @@ def test_return_along_the_mission_goes_back_over_its_places():
     places = ((0.0, 30.0), (40.0, 30.0), (40.0, 80.0))
     items = [item(0, TAKEOFF), *(item(i + 1, WAYPOINT, *place) for i, place in enumerate(places))]
     assert rig.fc.lists.load(ListKind.MISSION, items) is None
-    assert rig.fc.start_mission(0).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(StartMission(0)).verdict is Verdict.ACCEPTED
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: rig.pos[1] > 60.0)
     track = returned(rig)
@@ -158,7 +159,7 @@ def test_way_back_stays_below_the_ceiling():
 
 def test_return_has_a_speed_of_its_own():
     rig = at(60.0, 0.0, RTL_RETURN_SPD=3.0)
-    rig.fc.set_mode(Mode.RETURN)
+    rig.fc.request(ChangeMode(Mode.RETURN))
     rig.run_until(lambda: rig.pos[0] < 40.0)
     assert hypot(*rig.vel[:2]) == pytest.approx(3.0, abs=0.1)
 
@@ -187,9 +188,9 @@ def test_smart_return_leaves_out_a_loop():
 def test_smart_return_that_was_broken_off_goes_on_from_there():
     rig = at(40.0, 0.0)
     go(rig, 40.0, 50.0)
-    rig.fc.set_mode(Mode.SMART_RETURN)
+    rig.fc.request(ChangeMode(Mode.SMART_RETURN))
     rig.run_until(lambda: rig.pos[1] < 20.0)
-    rig.fc.set_mode(Mode.HOLD)
+    rig.fc.request(ChangeMode(Mode.HOLD))
     go(rig, 60.0, 20.0)
     track = returned(rig, Mode.SMART_RETURN)
     assert nearest_m(track, 40.0, 0.0) < 2.0
@@ -200,7 +201,7 @@ def test_smart_return_without_a_track_is_refused():
     rig = at(0.0, 10.0)
     rig.fc.navigator.crumbs.points.clear()
     rig.fc.navigator.crumbs._next_us = 1 << 62
-    reply = rig.fc.set_mode(Mode.SMART_RETURN)
+    reply = rig.fc.request(ChangeMode(Mode.SMART_RETURN))
     assert (reply.verdict, reply.reason) == (Verdict.TEMPORARILY_REJECTED, "no way back is known")
 
 
@@ -238,13 +239,13 @@ def test_goto_goes_around_what_the_fence_excludes_and_holds_there():
     rig = at(0.0, 0.0)
     load_block(rig)
     start = len(rig.track)
-    assert rig.fc.reposition(*geo(70.0, 0.0, 14.0), 1.0, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(GoTo(*geo(70.0, 0.0, 14.0), 1.0, nan)).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: hypot(rig.pos[0] - 70.0, rig.pos[1]) < 0.3 and abs(rig.pos[2] + 14.0) < 0.3, 60.0)
     rig.run(3.0)
     assert nearest_m(np.array(rig.track[start:]), 30.0, 0.0) > 20.0
     assert not rig.state.fence.breach_count
     assert rig.yaw == pytest.approx(1.0, abs=0.05)
-    rig.fc.set_mode(Mode.HOLD)
+    rig.fc.request(ChangeMode(Mode.HOLD))
     rig.run(1.0)
     assert rig.pos[:2] == pytest.approx((70.0, 0.0), abs=0.3)
 
@@ -252,9 +253,9 @@ def test_goto_goes_around_what_the_fence_excludes_and_holds_there():
 def test_goto_can_be_stopped_on_its_way_around():
     rig = at(0.0, 0.0)
     load_block(rig)
-    rig.fc.reposition(*geo(70.0, 0.0, 10.0), nan, nan)
+    rig.fc.request(GoTo(*geo(70.0, 0.0, 10.0), nan, nan))
     rig.run(3.0)
-    assert rig.fc.reposition(nan, nan, nan, nan, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(GoTo()).verdict is Verdict.ACCEPTED
     rig.run(5.0)
     assert hypot(*rig.vel[:2]) < 0.05
     assert rig.pos[0] < 25.0
@@ -264,20 +265,23 @@ def test_goto_without_a_way_is_refused():
     rig = at(0.0, 0.0)
     wall = [item(i, FenceCommand.INCLUSION_CIRCLE, 100.0 * i, 0.0, 0.0, (30.0, 0, 0, 0), 5) for i in range(2)]
     assert rig.fc.lists.load(ListKind.FENCE, wall) is None
-    reply = rig.fc.reposition(*geo(100.0, 0.0, 10.0), nan, nan)
+    reply = rig.fc.request(GoTo(*geo(100.0, 0.0, 10.0), nan, nan))
     assert (reply.verdict, reply.reason) == (Verdict.DENIED, "there is no way to the target inside the fence")
 
 
 def test_guided_goto_goes_around_what_the_fence_excludes():
     rig = at(0.0, 0.0)
     load_block(rig)
-    assert rig.fc.set_mode(Mode.GUIDED).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.GUIDED)).verdict is Verdict.ACCEPTED
     start = len(rig.track)
-    assert rig.fc.navigator.guided.goto(*geo(70.0, 0.0, 10.0), nan, nan).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(GoTo(*geo(70.0, 0.0, 10.0), nan, nan, mode=Mode.GUIDED)).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: hypot(rig.pos[0] - 70.0, rig.pos[1]) < 0.3, 60.0)
     assert nearest_m(np.array(rig.track[start:]), 30.0, 0.0) > 20.0
-    assert rig.fc.navigator.guided.goto(*geo(30.0, 0.0, 10.0), nan, nan).reason == "target is outside fence: shapes"
-    rig.fc.navigator.guided.goto(*geo(0.0, 0.0, 10.0), nan, nan)
+    assert (
+        rig.fc.request(GoTo(*geo(30.0, 0.0, 10.0), nan, nan, mode=Mode.GUIDED)).reason
+        == "target is outside fence: shapes"
+    )
+    rig.fc.request(GoTo(*geo(0.0, 0.0, 10.0), nan, nan, mode=Mode.GUIDED))
     rig.run(2.0)
-    rig.fc.set_offboard(position_setpoint(60.0, 10.0, -10.0))  # a stream takes over at once
+    rig.fc.request(position_setpoint(60.0, 10.0, -10.0))  # a stream takes over at once
     rig.run_until(lambda: hypot(rig.pos[0] - 60.0, rig.pos[1] - 10.0) < 0.3, 30.0)

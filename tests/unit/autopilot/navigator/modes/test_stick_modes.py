@@ -4,6 +4,7 @@ from math import asin, cos, degrees, hypot, pi, radians, sin
 
 import pytest
 
+from autopilot.interface.client_requests import ChangeMode
 from autopilot.interface.vehicle_state import LandedState, Mode, Verdict
 from autopilot.ports import (
     HEIGHT_VALID,
@@ -27,7 +28,7 @@ def flown(mode, height_m=20.0, **params):
     rig.battery_v = 16.8
     rig.flying(height_m)
     rig.piloted(0.1)
-    assert rig.fc.set_mode(mode).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(mode)).verdict is Verdict.ACCEPTED
     rig.piloted(1.0)
     return rig
 
@@ -35,7 +36,7 @@ def flown(mode, height_m=20.0, **params):
 @pytest.mark.parametrize("mode", STICK_MODES)
 def test_without_sticks_it_is_refused(mode):
     rig = Kinematic().flying()
-    reply = rig.fc.set_mode(mode)
+    reply = rig.fc.request(ChangeMode(mode))
     assert reply.verdict is Verdict.TEMPORARILY_REJECTED
     assert reply.reason == "needs a pilot's sticks"
 
@@ -45,7 +46,7 @@ def test_throttle_takes_off_and_lands(mode):
     rig = Kinematic(MPC_THR_HOVER=0.4).ready()
     low = -1.0 if mode in THRUST_MODES else 0.0
     rig.piloted(0.1, throttle=low)
-    assert rig.fc.set_mode(mode).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(mode)).verdict is Verdict.ACCEPTED
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     rig.piloted(2.0, throttle=low)
     assert rig.state.landed_state is LandedState.ON_GROUND
@@ -64,7 +65,7 @@ def test_throttle_takes_off_and_lands(mode):
 def test_arming_needs_a_low_throttle_where_the_throttle_is_thrust(mode):
     rig = Kinematic().ready()
     rig.piloted(0.1)
-    rig.fc.set_mode(mode)
+    rig.fc.request(ChangeMode(mode))
     assert rig.fc.arm(force=False).reason == "throttle is not low"
     rig.piloted(0.1, throttle=-1.0)
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
@@ -74,14 +75,14 @@ def test_arming_needs_a_low_throttle_where_the_throttle_is_thrust(mode):
 def test_arming_needs_a_throttle_below_the_middle_where_it_is_climb_rate(mode):
     rig = Kinematic().ready()
     rig.piloted(0.1, throttle=0.5)
-    rig.fc.set_mode(mode)
+    rig.fc.request(ChangeMode(mode))
     assert rig.fc.arm(force=False).reason == "throttle above the middle"
 
 
 def test_a_pilot_who_leaves_a_vehicle_on_the_ground_leaves_it_in_hold():
     rig = Kinematic().ready()
     rig.piloted(0.1)
-    rig.fc.set_mode(Mode.POSITION)
+    rig.fc.request(ChangeMode(Mode.POSITION))
     rig.run(1.0)
     assert rig.state.mode is Mode.HOLD
 
@@ -159,11 +160,11 @@ def test_altitude_needs_a_height_but_no_position():
     rig.pilot()
     rig.flags &= ~(POSITION_VALID | VELOCITY_VALID)
     rig.piloted(0.2)
-    assert rig.fc.set_mode(Mode.ALTITUDE).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.ALTITUDE)).verdict is Verdict.ACCEPTED
     rig.flags &= ~HEIGHT_VALID
     rig.piloted(0.1)
-    assert rig.fc.set_mode(Mode.STABILIZED).verdict is Verdict.ACCEPTED
-    assert rig.fc.set_mode(Mode.ALTITUDE).reason == "no valid height"
+    assert rig.fc.request(ChangeMode(Mode.STABILIZED)).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.ALTITUDE)).reason == "no valid height"
 
 
 def test_position_flies_where_the_nose_points():
@@ -202,7 +203,7 @@ def test_position_with_the_sticks_let_go_asks_to_stand_still():
 def test_brake_ignores_the_sticks():
     rig = flown(Mode.POSITION)
     rig.piloted(3.0, pitch=1.0)
-    assert rig.fc.set_mode(Mode.BRAKE).verdict is Verdict.ACCEPTED
+    assert rig.fc.request(ChangeMode(Mode.BRAKE)).verdict is Verdict.ACCEPTED
     rig.piloted(3.0, pitch=1.0, yaw=1.0)
     assert rig.sp("vel_ned") == [0.0, 0.0, 0.0]
     assert rig.state.mode is Mode.BRAKE

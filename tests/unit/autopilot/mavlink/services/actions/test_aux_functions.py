@@ -5,11 +5,12 @@ from math import nan
 import pytest
 
 from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
+from autopilot.interface.client_requests import ChangeMode, SetCurrentItem
 from autopilot.interface.item_lists import ListKind
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.params import parameter_table
-from tests.unit.autopilot.mavlink.rig import RecordingVehicle, Rig, texts
+from tests.unit.autopilot.mavlink.rig import AskedVehicle, Rig, texts
 
 AUX = 218  # MAV_CMD_DO_AUX_FUNCTION
 LOW, MIDDLE, HIGH = 0, 1, 2
@@ -35,12 +36,12 @@ class Taker:
 
     def run(self, command, params, *_):
         self.taken.append((command, *params[:3]))
-        return RecordingVehicle().reply
+        return AskedVehicle().reply
 
 
 @pytest.fixture
 def rig():
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     vehicle.params = parameter_table(None, ARDUPILOT_PARAMETERS)
     rig = Rig(dialect=ARDUPILOT, vehicle=vehicle)
     rig.frame()
@@ -55,7 +56,7 @@ def done(rig, function, position):
 @pytest.mark.parametrize(("function", "mode"), MODES)
 def test_high_changes_the_mode(rig, function, mode):
     assert done(rig, function, HIGH) == ACCEPTED
-    assert rig.vehicle.calls == [("set_mode", mode)]
+    assert rig.vehicle.calls == [ChangeMode(mode)]
 
 
 @pytest.mark.parametrize("position", [LOW, MIDDLE])
@@ -64,7 +65,7 @@ def test_low_goes_back_to_the_mode_before_and_only_from_that_mode(rig, position)
     done(rig, 4, HIGH)
     rig.update(mode=Mode.RETURN)
     assert done(rig, 4, position) == ACCEPTED
-    assert rig.vehicle.calls == [("set_mode", Mode.RETURN), ("set_mode", Mode.GUIDED)]
+    assert rig.vehicle.calls == [ChangeMode(Mode.RETURN), ChangeMode(Mode.GUIDED)]
     rig.update(mode=Mode.LAND)
     done(rig, 4, position)
     assert len(rig.vehicle.calls) == 2
@@ -83,13 +84,13 @@ def test_disarms_stops_motors_and_begins_the_mission_anew_when_high_only(rig):
     assert not rig.vehicle.calls
     for function in (81, 31, 24):
         done(rig, function, HIGH)
-    assert rig.vehicle.calls == [("disarm", False), ("terminate",), ("set_current_item", 0)]
+    assert rig.vehicle.calls == [("disarm", False), ("terminate",), SetCurrentItem(0)]
 
 
 def test_fence_is_switched(rig):
     done(rig, 11, HIGH)
     done(rig, 11, LOW)
-    assert rig.vehicle.calls == [("fence.enable", 15), ("fence.disable", 15)]
+    assert rig.vehicle.calls == [("enable", 15), ("disable", 15)]
 
 
 @pytest.mark.parametrize(("function", "relay"), [(28, 0), (34, 1), (35, 2), (36, 3), (66, 4), (67, 5)])
@@ -149,7 +150,7 @@ def test_switch_on_a_channel_acts_when_it_moves(rig):
         sticks.channels[6] = pulse_us
         sticks.count += 1
         rig.frame()
-        return [call[1] for call in rig.vehicle.calls]
+        return [asked.mode for asked in rig.vehicle.calls]
 
     assert put(1900) == []  # where it stands at first does nothing
     assert put(1000) == []

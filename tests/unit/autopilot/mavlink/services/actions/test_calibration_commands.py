@@ -12,13 +12,13 @@ CALIBRATE, SET_OFFSETS, STORAGE = 241, 242, 245
 @pytest.mark.parametrize(
     ("params", "call"),
     [
-        ((1.0, 0.0, 0.0, 0.0, 0.0), ("calibrate", CalibrationKind.GYRO)),
-        ((0.0, 1.0, 0.0, 0.0, 0.0), ("calibrate", CalibrationKind.MAG)),
-        ((0.0, 0.0, 0.0, 0.0, 1.0), ("calibrate", CalibrationKind.ACCEL)),
-        ((0.0, 0.0, 0.0, 0.0, 2.0), ("calibrate", CalibrationKind.LEVEL)),
-        ((0.0, 0.0, 0.0, 0.0, 4.0), ("calibrate", CalibrationKind.ACCEL_SIMPLE)),
-        ((0.0, 0.0, 1.0), ("calibrate", CalibrationKind.BARO)),
-        ((0.0,) * 7, ("cancel_calibration",)),
+        ((1.0, 0.0, 0.0, 0.0, 0.0), ("start", CalibrationKind.GYRO)),
+        ((0.0, 1.0, 0.0, 0.0, 0.0), ("start", CalibrationKind.MAG)),
+        ((0.0, 0.0, 0.0, 0.0, 1.0), ("start", CalibrationKind.ACCEL)),
+        ((0.0, 0.0, 0.0, 0.0, 2.0), ("start", CalibrationKind.LEVEL)),
+        ((0.0, 0.0, 0.0, 0.0, 4.0), ("start", CalibrationKind.ACCEL_SIMPLE)),
+        ((0.0, 0.0, 1.0), ("start", CalibrationKind.BARO)),
+        ((0.0,) * 7, ("cancel",)),
     ],
 )
 def test_calibration_is_asked_of_the_vehicle(params, call):

@@ -25,7 +25,7 @@ def tell(rig, text):
 def test_calibration_is_followed_to_its_end(rig):
     rig.vehicle.params.set("CAL_MAG0_XOFF", 0.02)
     assert rig.ack(START, 0.0, 1.0, 1.0, 0.0, 0.0).result == ACCEPTED
-    assert rig.vehicle.calls == [("calibrate", CalibrationKind.MAG)]
+    assert rig.vehicle.calls == [("start", CalibrationKind.MAG)]
     assert rig.ack(ACCEPT, 0.0).result == TEMPORARILY_REJECTED
     (progress,) = tell(rig, "down side calibration: progress <40>")
     assert (progress.completion_pct, progress.cal_mask) == (40, 1)
@@ -40,7 +40,7 @@ def test_failure_and_cancelling_are_told(rig):
     assert [report.cal_status for report in tell(rig, "calibration failed: the field is too weak")] == [FAILED]
     rig.ack(START, 1.0)
     assert rig.ack(CANCEL, 0.0).result == ACCEPTED
-    assert rig.vehicle.calls[-1] == ("cancel_calibration",)
+    assert rig.vehicle.calls[-1] == ("cancel",)
     assert tell(rig, "calibration cancelled") == []
     assert tell(rig, "progress <50>") == []
 
@@ -50,4 +50,4 @@ def test_what_cannot_be_calibrated_is_refused(rig):
     rig.vehicle.reply = Reply(Verdict.TEMPORARILY_REJECTED, "the vehicle is armed")
     assert rig.ack(START, 0.0).result == TEMPORARILY_REJECTED
     assert rig.ack(CANCEL, 0.0).result == ACCEPTED
-    assert ("cancel_calibration",) not in rig.vehicle.calls
+    assert ("cancel",) not in rig.vehicle.calls

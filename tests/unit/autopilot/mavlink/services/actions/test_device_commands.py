@@ -9,7 +9,7 @@ from autopilot.interface.aircraft import Aircraft
 from autopilot.interface.vehicle_state import WinchStatus
 from autopilot.mavlink.wire.rtcm import FRAGMENT_LENGTH, RtcmAssembler, crc24q, is_rtcm
 from autopilot.mavlink.wire.tune import TuneError, tune_length_s
-from tests.unit.autopilot.mavlink.rig import HOME, RecordingVehicle, Rig, texts
+from tests.unit.autopilot.mavlink.rig import HOME, AskedVehicle, Rig, texts
 
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 SET_RELAY, SET_SERVO, SET_ACTUATOR, GRIPPER, WINCH = 181, 183, 187, 211, 42600
@@ -73,7 +73,7 @@ def test_winch_is_a_component_of_its_own():
     rig.client.send("COMMAND_LONG", target_component=169, command=WINCH, param2=4.0)
     assert [m for m in rig.frame() if m.name == "COMMAND_ACK"] == []  # there is none
 
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     vehicle.state.read_winch = lambda: WinchStatus(1.5, 0.5, 0.1, 16.0, 2.0, 7)
     rig = Rig(vehicle=vehicle)
     messages = rig.frame(60)

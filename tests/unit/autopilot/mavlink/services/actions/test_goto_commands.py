@@ -2,7 +2,7 @@ from math import isnan, nan
 
 import pytest
 
-from autopilot.interface.vehicle_state import Mode, Reply, Verdict
+from autopilot.interface.vehicle_state import Mode, Verdict
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from tests.unit.autopilot.mavlink.rig import HOME, Rig, texts
 
@@ -31,16 +31,14 @@ def reposition(rig: Rig, flags: float, **others):
 def test_goto_is_flown_in_mode_guided():
     rig = Rig(dialect=ARDUPILOT)
     assert reposition(rig, CHANGE_MODE) == 0
-    goto, mode = rig.vehicle.calls
-    assert goto[:4] == ("guided.goto", 47.4, 8.5, 500.0)
-    assert mode == ("set_mode", Mode.GUIDED)
+    (goto,) = rig.vehicle.calls
+    assert (goto.lat_deg, goto.lon_deg, goto.alt_amsl_m, goto.mode) == (47.4, 8.5, 500.0, Mode.GUIDED)
 
 
 def test_goto_in_mode_guided_leaves_the_mode_alone():
     rig = guided_rig()
     assert reposition(rig, 0.0, frame=3, z=20.0) == 0
-    assert [call[0] for call in rig.vehicle.calls] == ["guided.goto"]
-    assert rig.vehicle.calls[0][3] == HOME.alt_m + 20.0
+    assert [goto.alt_amsl_m for goto in rig.vehicle.calls] == [HOME.alt_m + 20.0]
 
 
 def test_goto_without_leave_to_change_the_mode_is_refused():
@@ -49,30 +47,24 @@ def test_goto_without_leave_to_change_the_mode_is_refused():
     assert rig.vehicle.calls == []
 
 
-def test_refused_mode_forgets_the_place():
-    rig = Rig(dialect=ARDUPILOT)
-    rig.vehicle.set_mode = lambda _: Reply(Verdict.TEMPORARILY_REJECTED, "no")
-    assert reposition(rig, CHANGE_MODE) == Verdict.TEMPORARILY_REJECTED
-    assert rig.vehicle.calls[-1] == ("guided.forget_goto",)
-
-
 @pytest.mark.parametrize("name", ["MISSION_ITEM", "MISSION_ITEM_INT"])
 def test_guided_item_is_a_goto(name):
     rig = guided_rig()
     scale = 1e7 if name.endswith("INT") else 1
     rig.client.send(name, current=2, frame=3, command=WAYPOINT, x=int(47 * scale), y=int(8 * scale), z=30.0)
     assert rig.only("MISSION_ACK").type == 0
-    assert rig.vehicle.calls[0][:4] == ("guided.goto", 47.0, 8.0, HOME.alt_m + 30.0)
+    (goto,) = rig.vehicle.calls
+    assert (goto.lat_deg, goto.lon_deg, goto.alt_amsl_m) == (47.0, 8.0, HOME.alt_m + 30.0)
 
 
 def test_guided_altitude_item_changes_the_height_alone():
     rig = guided_rig()
     rig.client.send("MISSION_ITEM", current=3, frame=3, command=WAYPOINT, x=47.0, y=8.0, z=30.0)
     assert rig.only("MISSION_ACK").type == 0
-    _, lat, lon, alt, *_ = rig.vehicle.calls[0]
-    assert isnan(lat)
-    assert isnan(lon)
-    assert alt == HOME.alt_m + 30.0
+    (goto,) = rig.vehicle.calls
+    assert isnan(goto.lat_deg)
+    assert isnan(goto.lon_deg)
+    assert goto.alt_amsl_m == HOME.alt_m + 30.0
 
 
 @pytest.mark.parametrize(

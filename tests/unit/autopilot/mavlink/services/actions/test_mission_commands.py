@@ -4,6 +4,7 @@ from math import isnan, nan
 
 import pytest
 
+from autopilot.interface.client_requests import ChangeSpeed, SetCurrentItem, StartMission
 from autopilot.interface.vehicle_state import Reply, Verdict
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from tests.unit.autopilot.mavlink.rig import Rig, texts
@@ -20,9 +21,9 @@ def test_speed():
     assert rig.ack(178, 3.0, 0.8, -1.0).result == ACCEPTED  # descent
     assert rig.ack(178, 4.0, 4.0, -1.0).result == DENIED
     assert rig.ack(178, 1.0, -5.0, -1.0).result == DENIED
-    assert rig.vehicle.calls[0] == ("change_speed", 4.0, 1)
-    assert isnan(rig.vehicle.calls[1][1])
-    assert rig.vehicle.calls[2:] == [("change_speed", 1.5, 2), ("change_speed", pytest.approx(0.8), 3)]
+    assert rig.vehicle.calls[0] == ChangeSpeed(4.0, 1)
+    assert isnan(rig.vehicle.calls[1].speed_m_s)
+    assert rig.vehicle.calls[2:] == [ChangeSpeed(1.5, 2), ChangeSpeed(pytest.approx(0.8), 3)]
 
 
 def test_mission_commands():
@@ -36,14 +37,14 @@ def test_mission_commands():
     rig.ack(224, 2.0, 1.0)
     rig.ack(224, -1.0, 1.0)
     assert rig.vehicle.calls == [
-        ("start_mission", 0, -1),
-        ("start_mission", -1, -1),
-        ("start_mission", 1, 3),
+        StartMission(0, -1),
+        StartMission(-1, -1),
+        StartMission(1, 3),
         ("pause",),
         ("resume",),
-        ("set_current_item", 2),
-        ("set_current_item", 2, True),
-        ("set_current_item", 1, True),
+        SetCurrentItem(2),
+        SetCurrentItem(2, True),
+        SetCurrentItem(1, True),
     ]
     assert rig.ack(193, 5.0).result == DENIED
     assert rig.ack(224, -1.0).result == DENIED
@@ -52,7 +53,7 @@ def test_mission_commands():
 def test_items_are_counted_from_home_in_ardupilots_dialect():
     rig = Rig(dialect=ARDUPILOT)
     rig.ack(300, 1.0, 3.0)
-    assert rig.vehicle.calls == [("start_mission", 0, 2)]
+    assert rig.vehicle.calls == [StartMission(0, 2)]
 
 
 def test_landing_sequence_return_path_and_aborted_landing():

@@ -5,6 +5,7 @@ from io import BytesIO
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.client_requests import ChangeMode, LandAt, TakeOff
 from autopilot.interface.item_lists import MissionItem
 from autopilot.interface.platform import LogFile
 from autopilot.interface.vehicle_state import Reply, Verdict
@@ -161,8 +162,8 @@ def test_wrong_use_says_what_is_right(shell, line, said):
         ("commander arm", ("arm", False)),
         ("commander arm -f", ("arm", True)),
         ("commander disarm", ("disarm", False)),
-        ("commander mode auto:loiter", ("set_mode", 0)),
-        ("commander mode Return", ("set_mode", 3)),
+        ("commander mode auto:loiter", ChangeMode(0)),
+        ("commander mode Return", ChangeMode(3)),
         ("reboot", ("reboot",)),
     ],
 )
@@ -177,7 +178,7 @@ def test_takeoff_and_land_take_their_defaults(rig, shell):
     rig.update(is_armed=False)
     assert shell.run("commander takeoff") == ["accepted"]
     assert shell.run("commander land") == ["accepted"]
-    assert [call[0] for call in rig.vehicle.calls] == ["takeoff", "arm", "land"]
+    assert rig.vehicle.calls == [TakeOff(), ("arm", False), LandAt()]
 
 
 def test_check_tells_why_it_will_not_arm(rig, shell):

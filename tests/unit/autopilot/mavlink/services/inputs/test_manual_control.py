@@ -7,7 +7,7 @@ from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
-from tests.unit.autopilot.mavlink.rig import Client, RecordingVehicle, Rig, texts
+from tests.unit.autopilot.mavlink.rig import AskedVehicle, Client, Rig, texts
 
 RC_RECEIVER = 65536  # MAV_SYS_STATUS_SENSOR
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 511, 512
@@ -139,7 +139,7 @@ def test_channels_are_empty_and_the_signal_unknown_without_a_pilot():
 
 
 def test_in_ardupilot_overrides_count_as_a_joystick_does_and_forward_is_a_short_pulse():
-    vehicle = RecordingVehicle()
+    vehicle = AskedVehicle()
     end, client_end = memory_pair(LinkRole.GROUND)
     server = MavlinkServer(vehicle, [end], ARDUPILOT)
     client = Client(client_end)
