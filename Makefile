@@ -39,7 +39,9 @@ reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch
 reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
 	@$(BIN)/python -m bench.follow $(ARGS)
 
-# loadfile keeps a test file's kernels in one process, so that each is compiled once.
+# loadfile keeps a test file's kernels in one process, so that each is compiled once. Bytecode is kept, also where the
+# environment says otherwise: tests start the command a hundred times, and their own files take longest to prepare.
+test test-all: export PYTHONDONTWRITEBYTECODE =
 test: $(STAMP) ## Run the tests that take seconds; flags: make test ARGS="-k plan"
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow" tests $(ARGS)
 
@@ -121,4 +123,4 @@ lock: $(STAMP) ## Pin the installed versions in constraints.txt
 
 clean: ## Remove the virtual environment, caches and build leftovers
 	rm -rf $(VENV) $(MAVPROXY) $(MAVSDK3) $(DRONEKIT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
-	find $(PACKAGES) tests bench -name __pycache__ -type d -prune -exec rm -rf {} +
+	find $(PACKAGES) tests bench docs -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,5 +1,6 @@
 """What every test process needs."""
 
+import gc
 import signal
 
 import pytest
@@ -7,6 +8,12 @@ import pytest
 # A shell that starts the tests in the background has them ignore Ctrl-C, and so would the vehicles they start and stop.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish():
+    """Lets the garbage collector leave alone what lasts: modules, kernels and tests are millions of objects."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,7 +1,7 @@
 """The estimator alone over recorded sensors, from the log to the folder with the results."""
 
 import json
-from io import StringIO
+from io import BytesIO, StringIO
 
 import numpy as np
 import pytest
@@ -11,11 +11,12 @@ from typer.testing import CliRunner
 
 from autopilot.ports import POSITION_VALID, VELOCITY_VALID, Estimate
 from mission.cli import app
-from mission.estimate.estimate import EstimateError, estimate_log
+from mission.estimate.estimate import EstimateError, _csv, _show, estimate_log, run_log
 from mission.estimate.estimate_difference import difference
 from mission.estimate.estimate_noise import SETTLE_US, found_noise
 from mission.estimate.estimate_plots import _broken
 from mission.estimate.estimate_run import EVENT_DTYPE, OUTPUT_DTYPE, SOURCES, Replay
+from mission.estimate.estimate_summary import summarise_replay
 from mission.estimate.sensor_log import Track, row_dtype
 from tests.unit.mission.estimate.synthetic_log import (
     BARO_STD,
@@ -41,16 +42,21 @@ def flight():
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory, flight):
-    """The folder with the results of a PX4 log."""
+def whole(tmp_path_factory, flight):
+    """The folder with the results of a PX4 log; and its summary, CSV columns and console text."""
     folder = tmp_path_factory.mktemp("flight")
     write_ulog(folder / "flight.ulg", px4_tables(flight))
-    estimated(folder / "flight.ulg", folder / "results")
-    return folder / "results"
+    return folder / "results", estimated(folder / "flight.ulg", folder / "results")
+
+
+@pytest.fixture(scope="module")
+def results(whole):
+    """The folder with the results of a PX4 log."""
+    return whole[0]
 
 
 def estimated(log, folder=None, **options):
-    """Summary, CSV columns and console text of a log's estimate."""
+    """Summary, CSV columns and console text of a log's estimate, whose folder holds all files."""
     console = Console(file=StringIO(), width=140)
     estimate_log(log, folder, console, **options)
     folder = folder or log.with_name(f"{log.stem}-estimate")
@@ -59,14 +65,27 @@ def estimated(log, folder=None, **options):
     return summary, np.genfromtxt(folder / "estimate.csv", delimiter=",", names=True), console.file.getvalue()
 
 
+def without_pictures(log, **options):
+    """The same without a folder: most of the time of an estimate goes into its pictures."""
+    console = Console(file=StringIO(), width=140)
+    estimation = run_log(log, {}, lambda *_: None, **options)
+    sensors, table = estimation.sensors, estimation.table
+    summary = summarise_replay(
+        sensors, estimation.replay, estimation.noise, {name: float(table[name]) for name in table}
+    )
+    columns = np.genfromtxt(BytesIO(_csv(sensors, estimation.replay)), delimiter=",", names=True)
+    _show(summary, log.parent, estimation.taken_s, console)
+    return json.loads(json.dumps(summary.as_json())), columns, console.file.getvalue()
+
+
 @pytest.mark.parametrize("form", ["new", "old", "csv"])
-def test_the_estimate_follows_a_recorded_flight(tmp_path, flight, form):
+def test_the_estimate_follows_a_recorded_flight(tmp_path, flight, whole, form):
     log = tmp_path / "flight.any"
     if form == "csv":
         log.write_text("\n".join(csv_lines(flight)))
     else:
         write_ulog(log, px4_tables(flight, is_old=form == "old"))
-    summary, columns, text = estimated(log)
+    summary, columns, text = whole[1] if form == "new" else estimated(log)
     truth = np.searchsorted(flight.time_us, columns["time_us"])
     # Home is found again to the mean of 30 fixes, the rest to a few of them.
     for name, true in zip(("north_m", "east_m", "down_m"), flight.pos_ned[truth].T, strict=True):
@@ -109,7 +128,7 @@ def test_innovations_of_known_noise_lie_in_their_band(tmp_path):
     fields, columns = tables["vehicle_gps_position"]
     tables["vehicle_gps_position"] = (fields, columns | {"eph": 0.1, "epv": 0.1, "s_variance_m_s": 0.1})
     write_ulog(log, tables, noise, sys_name="Honeyguide")
-    summary, _, _ = estimated(log)
+    summary, _, _ = without_pictures(log)
     for name in ("gnss_vel", "mag", "baro"):
         source = summary["sources"][name]
         components = {"gnss_vel": 3, "mag": 3, "baro": 1}[name]
@@ -156,7 +175,7 @@ def with_columns(tables, topic, **changes):
 def test_noise_is_found_from_the_log(tmp_path):
     log = tmp_path / "flight.ulg"
     write_ulog(log, px4_tables(Flight(60.0)))
-    summary, _, text = estimated(log)
+    summary, _, text = without_pictures(log)
     true = {"gnss_vel": GPS_VEL_STD, "baro": BARO_STD, "mag": MAG_STD}
     for name, std in true.items():
         source = summary["sources"][name]
@@ -225,14 +244,14 @@ def test_a_fix_without_velocity_gives_position_in_a_log(tmp_path, flight):
     assert summary["sources"]["gnss_pos"]["fused"] > 110
     assert summary["sources"]["gnss_vel"]["judged"] == 0
     assert "no GNSS velocity is used: the receiver calls it invalid" in text
-    summary, _, _ = estimated(log, tmp_path / "ignored", ignores_velocity_flag=True)
+    summary, _, _ = without_pictures(log, ignores_velocity_flag=True)
     assert summary["sources"]["gnss_vel"]["fused"] > 110
 
 
 def test_the_note_names_the_criterion_that_no_fix_meets(tmp_path, flight):
     log = tmp_path / "flight.ulg"
     write_ulog(log, with_columns(px4_tables(flight), "vehicle_gps_position", eph=25.0, satellites_used=4))
-    _, _, text = estimated(log)
+    _, _, text = without_pictures(log)
     assert (
         "no GNSS fix is accurate enough to be used (satellites at most 4, EKF2_REQ_NSATS asks for 6; "
         "horizontal accuracy at least 25 m, EKF2_REQ_EPH asks for 10 m)"
@@ -255,7 +274,7 @@ def test_one_damaged_record_of_the_logs_answer_changes_nothing(tmp_path, flight,
     x[60] = 512.0
     log = tmp_path / "flight.ulg"
     write_ulog(log, with_columns(tables, "vehicle_local_position", x=x))
-    summary, _, text = estimated(log)
+    summary, _, text = without_pictures(log)
     whole = json.loads((results / "summary.json").read_text())
     for figure in ("rms", "median", "largest"):
         found, expected = (s["differences"]["log's own estimate"][figure]["pos_n_m"] for s in (summary, whole))
@@ -263,7 +282,7 @@ def test_one_damaged_record_of_the_logs_answer_changes_nothing(tmp_path, flight,
     assert "1 damaged record(s) of the log's own estimate" in text
 
 
-def test_the_answer_is_compared_at_its_own_times(tmp_path):
+def test_the_answer_is_compared_at_its_own_times(tmp_path, whole):
     flight = Flight()
     tables = px4_tables(flight)
     rows = flight.every(0.1) + 3  # 12 ms after a row of ours
@@ -278,9 +297,8 @@ def test_the_answer_is_compared_at_its_own_times(tmp_path):
     tables["vehicle_attitude"] = (fields, {"timestamp": flight.time_us[rows], "q": q})
     log = tmp_path / "flight.ulg"
     write_ulog(log, tables)
-    late = estimated(log)[0]["differences"]["log's own estimate"]["median"]
-    write_ulog(log, px4_tables(flight))
-    same = estimated(log, tmp_path / "same")[0]["differences"]["log's own estimate"]["median"]
+    late = without_pictures(log)[0]["differences"]["log's own estimate"]["median"]
+    same = whole[1][0]["differences"]["log's own estimate"]["median"]
     assert late["vel_m_s"] == pytest.approx(same["vel_m_s"], abs=0.003)
     assert late["yaw_deg"] == pytest.approx(same["yaw_deg"], abs=0.02)
 
@@ -344,7 +362,7 @@ def test_a_truncated_log_is_estimated_as_far_as_it_goes(tmp_path, flight):
     # Rows are written topic by topic; cutting the last topic leaves the sensors whole and half of the attitudes.
     write_ulog(log, tables)
     log.write_bytes(log.read_bytes()[:-2_000])
-    summary, _, _ = estimated(log)
+    summary, _, _ = without_pictures(log)
     assert summary["duration_s"] == pytest.approx(24.0, abs=0.01)
 
 
