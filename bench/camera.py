@@ -1,4 +1,4 @@
-"""How many pictures a second does the fast camera take on one core, of any poses, of the worst, and beside Bullet?
+"""How many images a second does the fast camera take on one core, of any poses, of the worst, and beside Bullet?
 
 RGB, depth and classes of 64 x 64 pixels over hills with 200 trees and walls. Times are those of the thread's own work,
 the best of several, so that others on the machine do not count.
@@ -81,7 +81,7 @@ def mixed_poses(world: WorldMap) -> NDArray[Any]:
 
 
 def _worst(world: WorldMap, poses: NDArray[Any]) -> float:
-    """Pictures a second of the slowest pose: of the mixed ones, and of level flight at many pitches and heights."""
+    """Images a second of the slowest pose: of the mixed ones, and of level flight at many pitches and heights."""
     camera = QuickCamera(world, COPIES)
     lenses = camera.lenses.numpy()
     rates = []
@@ -92,13 +92,13 @@ def _worst(world: WorldMap, poses: NDArray[Any]) -> float:
 
 
 def _level_poses(world: WorldMap) -> NDArray[Any]:
-    places = [(0.0, 0.0), (70.0, -60.0), (110.0, 110.0)]
-    poses = np.zeros(len(places) * len(PITCHES_DEG) * len(HEIGHTS_M), mixed_poses(world).dtype)
+    positions = [(0.0, 0.0), (70.0, -60.0), (110.0, 110.0)]
+    poses = np.zeros(len(positions) * len(PITCHES_DEG) * len(HEIGHTS_M), mixed_poses(world).dtype)
     k = 0
-    for north, east in places:
+    for north, east in positions:
         for height in HEIGHTS_M:
             for pitch in PITCHES_DEG:
-                half = np.radians(pitch + 90.0) / 2.0  # from straight down, the picture's upper edge to the north
+                half = np.radians(pitch + 90.0) / 2.0  # from straight down, the image's upper edge to the north
                 poses[k]["pos_ned"] = (north, east, -float(world.height(north, east)) - height)
                 poses[k]["q_ned_from_rdf"] = (
                     0.5**0.5 * np.sin(half), 0.5**0.5 * np.sin(half), 0.5**0.5 * np.cos(half), 0.5**0.5 * np.cos(half)
@@ -108,7 +108,7 @@ def _level_poses(world: WorldMap) -> NDArray[Any]:
 
 
 def _bullet_rate(world: WorldMap, poses: NDArray[Any]) -> float:
-    """Pictures a second of Bullet's CPU renderer over the same ground and trees, from the same poses."""
+    """Images a second of Bullet's CPU renderer over the same ground and trees, from the same poses."""
     client = pybullet.connect(pybullet.DIRECT)
     try:
         _fill(client, world)

@@ -1,4 +1,4 @@
-"""How long a companion takes from a picture to its setpoint: a policy's step in flight."""
+"""How long a companion takes from an image to its setpoint: a policy's step in flight."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

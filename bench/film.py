@@ -1,6 +1,6 @@
 """How long does the film of a flight take, beside the flight itself?
 
-60 s of following somebody among trees, then its film with vehicle, onboard picture and caption, encoded; on all cores.
+60 s of following somebody among trees, then its film with vehicle, onboard image and caption, encoded; on all cores.
 """
 
 import io

@@ -33,7 +33,7 @@ def hovering(vehicle_count: int, *, has_estimator: bool = True, threads: int = 1
 
 
 def check(rig: Rig, *, has_estimator: bool) -> None:
-    """Every vehicle holds its place in truth, and by its own estimate where it has one.
+    """Every vehicle holds its position in truth, and by its own estimate where it has one.
 
     Raises:
         WrongResult: one does not.

@@ -26,7 +26,9 @@ def _row(name: str, value: float, unit: str, target: float | None, better: str =
 def _missions() -> list[Row]:
     """The default mission, default noise, 5 m/s wind with turbulence and gusts, 20 seeds."""
     flights = [mission_trial(FlightConfig(seed=seed, wind_m_s=WIND_M_S)) for seed in SEEDS]
-    shares = {name: [flight.innovations_in_band[name] for flight in flights] for name in flights[0].innovations_in_band}
+    fractions = {
+        name: [flight.innovations_in_band[name] for flight in flights] for name in flights[0].innovations_in_band
+    }
     return [
         _row("missions completed of 20", sum(flight.is_success for flight in flights), "", 20, "higher"),
         _row("mission cross-track, 95 %, worst of 20", _worst(flights, "cross_track_p95_m"), "m", 1.5),
@@ -35,13 +37,17 @@ def _missions() -> list[Row]:
         *_estimator(flights),
         *(
             row
-            for name, share in shares.items()
+            for name, fraction in fractions.items()
             for row in (
                 _row(
-                    f"innovations inside their 95 % band, {name}, mean", float(np.mean(share)), "", BAND_MIN, "higher"
+                    f"innovations inside their 95 % band, {name}, mean",
+                    float(np.mean(fraction)),
+                    "",
+                    BAND_MIN,
+                    "higher",
                 ),
-                _row(f"innovations inside their 95 % band, {name}, least of 20", min(share), "", BAND_MIN, "higher"),
-                _row(f"innovations inside their 95 % band, {name}, most of 20", max(share), "", BAND_MAX),
+                _row(f"innovations inside their 95 % band, {name}, least of 20", min(fraction), "", BAND_MIN, "higher"),
+                _row(f"innovations inside their 95 % band, {name}, most of 20", max(fraction), "", BAND_MAX),
             )
         ),
         _row("power-on to ready to arm, simulated, worst of 20", _worst(flights, "ready_s"), "s", 10.0),

@@ -1,7 +1,7 @@
 """`python -m bench.navigate [POLICY]`: how well does the trained policy cross forests? Writes docs/results/navigate.md.
 
 In: the policy that ships, or a policy file. Held-out forests of several densities, with estimator, wind, noise and
-varied vehicles, as many episodes each. Out: a table with 95 % intervals, and a picture of some flights from above.
+varied vehicles, as many episodes each. Out: a table with 95 % intervals, and an image of some flights from above.
 """
 
 import sys
@@ -72,7 +72,7 @@ class Flights:
     paths: list[NDArray[np.float64]]  # (decisions, 2) north and east, of the first few
     goals_ned: NDArray[np.float32]
 
-    def share(self, outcome: Outcome) -> Interval:
+    def fraction(self, outcome: Outcome) -> Interval:
         return rate(self.outcomes == outcome)
 
     def speed(self, is_straight: bool) -> Interval:
@@ -124,8 +124,8 @@ def row(trees_per_ha: float, flights: Flights) -> str:
     """A line of the table."""
 
     def percent(outcome: Outcome) -> str:
-        share = flights.share(outcome)
-        return f"{100 * share.value:.1f} % ({100 * share.low:.1f} to {100 * share.high:.1f})"
+        fraction = flights.fraction(outcome)
+        return f"{100 * fraction.value:.1f} % ({100 * fraction.low:.1f} to {100 * fraction.high:.1f})"
 
     def speed(is_straight: bool) -> str:
         mean = flights.speed(is_straight)

@@ -1,7 +1,7 @@
 """How far off is the track of an owner: with camera and phone, and after 3 s without one or both?
 
 People walk and run among trees, their phones report as phones do, and a camera about 2 m behind sees them ten times a
-second with the errors that the tracker expects. The vehicle's own place drifts by 0.6 m.
+second with the errors that the tracker expects. The vehicle's own position drifts by 0.6 m.
 """
 
 from collections.abc import Callable
@@ -21,14 +21,14 @@ DECISION_US = 100_000
 _OWNERS, _SECONDS = 20, 30.0
 _FIRST = 10  # decisions until the track stands
 _GAP_END = slice(99, None, 100)  # last decisions of the gaps below
-_OWN_STD_M, _OWN_TIME_S = 0.6, 60.0  # of the vehicle's own place
+_OWN_STD_M, _OWN_TIME_S = 0.6, 60.0  # of the vehicle's own position
 _Q_FRD_FROM_RDF = (0.5, 0.5, 0.5, 0.5)
 _S = TrackerSettings()
 _When = Callable[[int], bool]
 
 
 def measure() -> list[Row]:
-    """Root mean square errors of the place in three dimensions, and how they compare with the covariance."""
+    """Root mean square errors of the position in three dimensions, and how they compare with the covariance."""
     rows: list[Row] = []
     for word, speed in (("walking", WALK_SPEED_M_S), ("running", RUN_SPEED_M_S)):
         walks = Walks(speed, _OWNERS)
@@ -94,7 +94,7 @@ class Walks:
         return Sighting(
             float(np.arctan2(right, forward)) + _S.direction_std_rad * noise[0],
             float(np.arctan2(-down, np.hypot(forward, right))) + _S.direction_std_rad * noise[1],
-            distance + (_S.range_std_m + _S.range_std_share * distance) * noise[2] if has_range else None,
+            distance + (_S.range_std_m + _S.range_std_fraction * distance) * noise[2] if has_range else None,
             camera,
             product(quat_of(self.yaw_rad[i], 0.0), _Q_FRD_FROM_RDF),
         )
@@ -137,7 +137,7 @@ def not_the_last_3_s_of_10(k: int) -> bool:
 
 
 def _errors(walks: Walks, is_seen: _When, is_heard: _When, when: slice) -> tuple[float, float]:
-    """Root mean square error of the place, and the mean normalised squared one, at some decisions of all owners."""
+    """Root mean square error of the position, and the mean normalised squared one, at some decisions of all owners."""
     squares, nees = [], []
     for i in range(walks.owners):
         tracks = track(walks, i, is_seen, is_heard)

@@ -173,7 +173,7 @@ CHECKS = (
 
 
 def _accel(torque_nm: float) -> float:
-    """Of the car by a torque on its wheels, whose own turning takes a share of it."""
+    """Of the car by a torque on its wheels, whose own turning takes a fraction of it."""
     wheels_kg = 4.0 * 0.5 * NUMBER["wheel_mass_kg"]
     return torque_nm / NUMBER["wheel_radius_m"] / (NUMBER["mass_kg"] + wheels_kg)
 

@@ -30,7 +30,7 @@ _SOURCED = BeforeValidator(_value_with_source)
 Number = Annotated[float, Field(allow_inf_nan=False), _SOURCED]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False), _SOURCED]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False), _SOURCED]
-Share = Annotated[float, Field(ge=0.0, le=1.0), _SOURCED]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0), _SOURCED]
 Count = Annotated[int, Field(gt=0), _SOURCED]
 Spin = Annotated[Literal[-1, 1], _SOURCED]
 
@@ -72,9 +72,9 @@ class RotorModel(_Section):
     """Aerodynamic torque per squared speed."""
     max_speed_rad_s: Positive
     """Speed at full command and full battery."""
-    idle_command: Share
+    idle_command: Fraction
     """Command [0..1] at which an armed motor idles."""
-    command_curve: Share
+    command_curve: Fraction
     """a in omega / omega_max = a * u + (1 - a) * sqrt(u): 1 is a speed-linear ESC, 0 a thrust-linear one."""
     spin_up_time_s: Positive
     """First-order lag of rising speed."""

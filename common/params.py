@@ -104,7 +104,7 @@ class ParameterTable:
         self._listeners.append(listener)
 
     def si(self, name: str) -> float:
-        """The value in SI: degrees as radians, milliseconds as seconds, per cent as a share."""
+        """The value in SI: degrees as radians, milliseconds as seconds, per cent as a fraction."""
         scale = SCALE_TO_SI.get(self.declarations[name].unit)
         return self._values[name] if scale is None else self._values[name] * scale
 

@@ -1,6 +1,6 @@
-"""The owner in a picture, by the blue of their shirt: where, and how far away by the depth beside the colour.
+"""The owner in an image, by the blue of their shirt: where, and how far away by the depth beside the colour.
 
-In: one picture of the onboard camera, 10 Hz. Out: direction and range, or the place of the chest, for a scripted
+In: one image of the onboard camera, 10 Hz. Out: direction and range, or the place of the chest, for a scripted
 follower and policies that say nothing of the owner. What is blue and has a depth is taken for the shirt.
 """
 
@@ -31,7 +31,7 @@ class Sight:
     pixels: int  # that show it
 
     @property
-    def place_rdf(self) -> Vector:
+    def position_rdf(self) -> Vector:
         """Right, down, ahead [m]."""
         level_m = self.range_m * cos(self.elevation_rad)
         down_m = -self.range_m * sin(self.elevation_rad)
@@ -73,9 +73,9 @@ def chest_hfrd(pixels: NDArray[np.uint8], down_frd: tuple[float, float]) -> Vect
     sight = find_owner(pixels, HFOV_DEG, float(DEPTH_HALF_M))
     if sight is None:
         return None
-    place = np.array(rotated(camera_mount(), sight.place_rdf))  # from the lens, a decimetre from the vehicle's middle
+    position = np.array(rotated(camera_mount(), sight.position_rdf))  # from the lens, a decimetre off the middle
     down_x, down_y = down_frd
     down = np.array([down_x, down_y, sqrt(max(1.0 - down_x**2 - down_y**2, 0.0))])
     ahead = np.array([1.0, 0.0, 0.0]) - down_x * down
     ahead /= np.linalg.norm(ahead)
-    return float(place @ ahead), float(place @ np.cross(down, ahead)), float(place @ down) + SHIRT_OVER_CHEST_M
+    return float(position @ ahead), float(position @ np.cross(down, ahead)), float(position @ down) + SHIRT_OVER_CHEST_M

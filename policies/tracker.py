@@ -47,10 +47,10 @@ class TrackerSettings:
     manoeuvre_s: float = 1.0
     """Mean length of a manoeuvre [s]; guess."""
     direction_std_rad: float = 0.04
-    """Of a sighting: where in the picture, and how the camera is held; guess, 2.3 degrees."""
+    """Of a sighting: where in the image, and how the camera is held; guess, 2.3 degrees."""
     range_std_m: float = 0.15
     """Of the range, near; guess: half the depth of a body."""
-    range_std_share: float = 0.05
+    range_std_fraction: float = 0.05
     """What is added per metre of range; guess."""
     report_std_m: tuple[float, float] = (0.3, 0.6)
     """White error of reported places; the phone model's."""
@@ -66,7 +66,7 @@ class TrackerSettings:
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """The owner's chest in a picture."""
+    """The owner's chest in an image."""
 
     azimuth_rad: float  # in the camera frame rdf: from the optical axis to the right
     elevation_rad: float  # and up, from the plane of the axis and the right
@@ -95,7 +95,7 @@ class OwnerTrack:
     vel_cov: Array  # [m²/s²], (3, 3)
     seen_age_s: float  # since the last sighting that was believed; inf: never
     heard_age_s: float  # since the validity of the last report that was believed; inf: never
-    manoeuvre_share: float  # probability that the owner is manoeuvring
+    manoeuvre_probability: float  # probability that the owner is manoeuvring
 
     @property
     def is_known(self) -> bool:
@@ -152,7 +152,7 @@ class OwnerTracker:
         """Fuses a sighting; false if it was rejected: not plausible, or not a number.
 
         Args:
-            time_us: when the picture was taken.
+            time_us: when the image was taken.
             sighting: the owner in it.
         """
         self._advance(time_us)
@@ -249,7 +249,7 @@ class OwnerTracker:
         s = self._settings
         if sighting.range_m is not None:
             across = max(sighting.range_m, _NEAR_M) * s.direction_std_rad
-            return sighting.range_m, np.array([s.range_std_m + s.range_std_share * sighting.range_m, across, across])
+            return sighting.range_m, np.array([s.range_std_m + s.range_std_fraction * sighting.range_m, across, across])
         # the range says nothing, the direction is worth what it is at the expected range
         way = self._models.x[_POS] - camera_pos_ned
         expected = sqrt(float(way @ way) + float(np.trace(self._models.P[_POS, _POS])))
@@ -346,5 +346,5 @@ def _models(s: TrackerSettings) -> _Models:
         filters.append(model)
     leave_steady, leave_manoeuvre = 1.0 - exp(-_STEP_S / s.steady_s), 1.0 - exp(-_STEP_S / s.manoeuvre_s)
     chain = np.array([[1.0 - leave_steady, leave_steady], [leave_manoeuvre, 1.0 - leave_manoeuvre]])
-    share = np.array([s.steady_s, s.manoeuvre_s]) / (s.steady_s + s.manoeuvre_s)
-    return _Models(filters, share, chain)
+    fraction = np.array([s.steady_s, s.manoeuvre_s]) / (s.steady_s + s.manoeuvre_s)
+    return _Models(filters, fraction, chain)

@@ -15,7 +15,7 @@ wp.set_module_options({"enable_backward": False})
 # V(s) = -1.031 exp(-35 s) + 3.685 + 0.2156 s - 0.1178 s² + 0.3201 s³
 _CELL_EMPTY_V = wp.constant(2.654)  # V(0)
 _CELL_SPAN_V = wp.constant(1.4489)  # V(1) - V(0)
-_DEEPEST_CHARGE = wp.constant(-0.05)  # share of capacity below "empty" at which the voltage has collapsed
+_DEEPEST_CHARGE = wp.constant(-0.05)  # fraction of capacity below "empty" at which the voltage has collapsed
 
 
 @wp.struct
@@ -38,8 +38,8 @@ def open_circuit_voltage(model: BatteryModel, charge_c: float) -> float:
     """
     s = wp.clamp(charge_c / model.capacity_c, _DEEPEST_CHARGE, 1.0)
     cell_v = -1.031 * wp.exp(-35.0 * s) + 3.685 + s * (0.2156 + s * (-0.1178 + s * 0.3201))
-    share = (cell_v - _CELL_EMPTY_V) / _CELL_SPAN_V
-    return wp.max(model.empty_v + (model.full_v - model.empty_v) * share, 0.0)
+    fraction = (cell_v - _CELL_EMPTY_V) / _CELL_SPAN_V
+    return wp.max(model.empty_v + (model.full_v - model.empty_v) * fraction, 0.0)
 
 
 @wp.func

@@ -35,7 +35,7 @@ class CameraRig:
 
     @cached_property
     def renderer(self) -> Renderer:
-        """Made when the first picture is taken."""
+        """Made when the first image is taken."""
         return Renderer(self._world)
 
     def prepare(self) -> None:
@@ -66,8 +66,8 @@ class CameraRig:
         return done
 
     def _render(self, pose: CameraPose, view: View) -> RawFrame:
-        pictures = self.renderer.pictures([pose], view.width, view.height, samples=2 if view.is_smooth else 1)
-        return RawFrame(pictures.rgb[0], pictures.depth_m[0])
+        images = self.renderer.images([pose], view.width, view.height, samples=2 if view.is_smooth else 1)
+        return RawFrame(images.rgb[0], images.depth_m[0])
 
     def close(self) -> None:
         """Ends the thread; frames that it has not begun are lost."""

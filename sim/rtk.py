@@ -9,7 +9,7 @@ from sim.rig import Rig
 
 HOLD_US = 10_000_000  # corrections are good for that long; u-blox F9P: 60 s with growing error; guess
 _FIXED = 6  # GPS_FIX_TYPE_RTK_FIXED
-_ERROR_SHARE = 0.02  # of the errors without corrections: 0.6 m becomes 1.2 cm; u-blox F9P data sheet: 1 cm
+_ERROR_FRACTION = 0.02  # of the errors without corrections: 0.6 m becomes 1.2 cm; u-blox F9P data sheet: 1 cm
 _REPORTED_STD_M = 0.014
 
 
@@ -31,7 +31,7 @@ class RtkReceiver:
         if self._until_us < 0:
             row = self._row
             for name in ("pos_std_ned", "correlated_std_ned"):
-                row[name] = self._plain[name] * _ERROR_SHARE
+                row[name] = self._plain[name] * _ERROR_FRACTION
             row["pos_h_std"] = row["pos_v_std"] = _REPORTED_STD_M
             row["fix_type"] = _FIXED
         self._until_us = time_us + HOLD_US

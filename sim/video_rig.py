@@ -1,4 +1,4 @@
-"""Pictures for live video by the fast camera: a FrameSource that renders 640 x 360 at a tenth of the exact one's price.
+"""Images for live video by the fast camera: a FrameSource that renders 640 x 360 at a tenth of the exact one's price.
 
 In: views of the vehicle's camera. Out: frames of its true pose at that moment, made on a thread of their own. Who
 walks through the world is seen in them.
@@ -30,7 +30,7 @@ class VideoRig:
     def __init__(self, rig: Rig, world: WorldMap, people: Any = None) -> None:
         self._mount = CameraRig(rig, world)
         self._world, self._people = world, people
-        self._camera: QuickCamera | None = None  # made for the first picture, on its thread
+        self._camera: QuickCamera | None = None  # made for the first image, on its thread
         self._pool = ThreadPoolExecutor(1, "video_rig")
 
     def capture(self, view: View) -> "Future[RawFrame]":

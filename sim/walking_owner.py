@@ -1,4 +1,4 @@
-"""The owner of a flight: a person in the world with a phone, a batch of them for tests and pictures.
+"""The owner of a flight: a person in the world with a phone, a batch of them for tests and images.
 
 In: the tick. Out: `people`, which cameras draw, and the phone's newest report. Flights hold one owner; training steps
 `person_step` and `phone_step` in its own kernels, so that both get the same walk from the same seed and row.

@@ -16,7 +16,7 @@ from autopilot.mavlink.transport.client_links import open_client_link
 from autopilot.mavlink.transport.links import LinkError
 from common.clock import Pacer, wall_time_s
 from mission.console.terminal import print_line
-from policies.companion.companion import NO_PICTURES, Companion
+from policies.companion.companion import NO_IMAGES, Companion
 from policies.companion.image_client import CameraUrlError, StreamCamera
 from policies.companion.pilot import PilotError, load_pilot
 
@@ -92,7 +92,7 @@ def _shower(console: Console) -> Callable[[str], None]:
 
 def trouble_text(companion: Companion, camera: StreamCamera) -> str:
     """Why the companion does not fly, with what is wrong with the camera if it is that."""
-    is_dark = companion.trouble == NO_PICTURES and camera.trouble
+    is_dark = companion.trouble == NO_IMAGES and camera.trouble
     return f"{companion.trouble}: {camera.trouble}" if is_dark else companion.trouble
 
 
@@ -101,7 +101,7 @@ def progress_line(companion: Companion, camera: StreamCamera, time_us: int) -> s
     state = companion.phase.value + (f" ({trouble_text(companion, camera)})" if companion.trouble else "")
     return (
         f"{state} | owner {companion.owner_distance_m():.1f} m | "
-        f"picture {companion.picture_age_s(time_us) * 1e3:.0f} ms | {latency_text(companion)}"
+        f"picture {companion.image_age_s(time_us) * 1e3:.0f} ms | {latency_text(companion)}"
     )
 
 

@@ -17,7 +17,7 @@ from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import TICK_US
 from mission.flight_config import OwnerConfig
 from mission.flight_settings import Pace
-from policies.tasks.follow_me.world import STOP_SHARE
+from policies.tasks.follow_me.world import STOP_FRACTION
 from sim.sensors.phone import CORRELATED_STD_M, POSITION_STD_M, VERTICAL_FACTOR, phone_model
 from sim.walking_owner import Owner
 from sim.world.people import CHEST_M, RUN_SPEED_M_S, WALK_SPEED_M_S, person_model
@@ -46,7 +46,7 @@ class FollowedOwner:
         still.plan_min_s, still.plan_max_s = _SETS_OFF_S  # who then follows need not wait for a long plan to end
         self._home = home
         self._walking: Any = person_model(SPEEDS_M_S[config.pace])
-        self._walking.stop_share = STOP_SHARE
+        self._walking.stop_fraction = STOP_FRACTION
         towards_home_rad = np.pi
         self._owner = Owner(
             world,

@@ -78,7 +78,7 @@ def driven(task: Task, driver: KeyboardDriver, window: Window, options: DriveOpt
         pacer.wait_until(time_us)
         time_us += decision_us
         hint = "  (arrows or WASD, space, R: restart, Esc: end)" if is_waiting else ""
-        window.show(task.picture(0), f"{options.task}: {drive}{hint}")
+        window.show(task.top_view(0), f"{options.task}: {drive}{hint}")
         requests = window.requests()
         if Request.END in requests:
             break

@@ -151,7 +151,7 @@ def _showing(window: Window, decision_s: float) -> Callable[[NDArray[np.uint8]],
 
 def tiled(task: Task) -> NDArray[np.uint8]:
     """The pictures of all environments of a task side by side, as near to a square as they go."""
-    pictures = [task.picture(i) for i in range(task.env_count)]
+    pictures = [task.top_view(i) for i in range(task.env_count)]
     columns = ceil(sqrt(len(pictures)))
     pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % columns)
     rows = [np.concatenate(pictures[k : k + columns], axis=1) for k in range(0, len(pictures), columns)]

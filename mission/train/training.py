@@ -123,7 +123,7 @@ def evaluate_policy(
             seed=seed,
             params=params,
             is_greedy=not is_drawn,
-            place=str(path),
+            source=str(path),
             progress=lambda ended: say(f"episode {ended} of {episodes} of {task_name}"),
         )
     shown = ", ".join(f"{key}={value}" for key, value in settings.model_dump().items() if value not in ("", None, ()))

@@ -41,9 +41,9 @@ def take_picture(output: Path, world: WorldConfig, viewpoint: Viewpoint, size: s
     place = (viewpoint.north_m, viewpoint.east_m, -ground_m - viewpoint.above_ground_m)
     q_ned_from_frd = quat_of(radians(viewpoint.yaw_deg), radians(viewpoint.pitch_deg))
     pose = CameraPose(place, product(q_ned_from_frd, _RDF_IN_FRD), viewpoint.hfov_deg)
-    pictures = Renderer(world_map).pictures([pose], width, height, samples=2)
+    images = Renderer(world_map).images([pose], width, height, samples=2)
     try:
-        write_whole(output, jpeg_bytes(pictures.rgb[0]))
+        write_whole(output, jpeg_bytes(images.rgb[0]))
     except OSError as error:
         raise PictureError(f"{output}: {error.strerror}") from error
 

@@ -184,11 +184,11 @@ def _handler(stream: StreamServer) -> type[GuardedHandler]:
             self.end_headers()
 
         def _still(self) -> None:
-            picture = stream.next_picture(stream.serial)
-            if picture is None:
+            image = stream.next_picture(stream.serial)
+            if image is None:
                 self.send_error(HTTPStatus.SERVICE_UNAVAILABLE, "no picture")
             else:
-                self._answer("image/jpeg", picture[1])
+                self._answer("image/jpeg", image[1])
 
         def _stream(self) -> None:
             self.send_response(HTTPStatus.OK)
@@ -197,12 +197,12 @@ def _handler(stream: StreamServer) -> type[GuardedHandler]:
             self.end_headers()
             serial = stream.serial
             while True:  # until the browser goes, or takes nothing for too long
-                picture = stream.next_picture(serial)
-                if picture is None:
+                image = stream.next_picture(serial)
+                if image is None:
                     if stream.is_paused:
                         continue
                     return
-                serial, jpeg = picture
+                serial, jpeg = image
                 head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
                 self.wfile.write(head.encode() + jpeg + b"\r\n")
 

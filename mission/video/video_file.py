@@ -49,14 +49,14 @@ class Mp4:
         self._container: Any = None
         self._stream: Any = None
 
-    def show(self, picture: NDArray[np.uint8]) -> None:
+    def show(self, image: NDArray[np.uint8]) -> None:
         """Appends an RGB picture, shape (height, width, 3); odd sizes lose their last row or column.
 
         Raises:
             VideoError: the disk is full, or the file cannot be written.
         """
-        height, width = (size - size % 2 for size in picture.shape[:2])
-        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]), format="rgb24")
+        height, width = (size - size % 2 for size in image.shape[:2])
+        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image[:height, :width]), format="rgb24")
         try:
             if self._container is None:
                 self._container = self._av.open(str(part_path(self._target)), "w", format="mp4")

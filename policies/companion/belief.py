@@ -1,7 +1,7 @@
 """Where a policy believes the owner to be: its beliefs, read as a sighting for the tracker.
 
-In: the beliefs of one decision (policies/learn/networks/perception.py). Out: the place of the owner's chest from the
-vehicle in metres, if the policy believes to have them in the picture.
+In: the beliefs of one decision (policies/learn/networks/perception.py). Out: the position of the owner's chest from the
+vehicle in metres, if the policy believes to have them in the image.
 """
 
 from common.attitude import Vector
@@ -27,7 +27,7 @@ class OwnerBelief:
         self._place = [(perception.names.index(name), scales[name]) for name in PLACE]
         self._in_view = perception.names.index(IN_VIEW)
 
-    def place(self, beliefs: Beliefs) -> Vector | None:
+    def position(self, beliefs: Beliefs) -> Vector | None:
         """[m] Ahead, right and down of the vehicle; None: the owner is believed to be out of sight."""
         means = beliefs.means[0].tolist()
         if means[self._in_view] < SURE:

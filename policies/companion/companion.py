@@ -1,7 +1,7 @@
-"""The companion computer: telemetry and pictures in, Offboard setpoints out. Start here.
+"""The companion computer: telemetry and images in, Offboard setpoints out. Start here.
 
-In: bytes of a MAVLink link and pictures of the onboard camera, taken in at every step. Out: a decision of the policy
-for each new picture (10 Hz), sent at once and repeated at 20 Hz; a change of mode when the state machine asks for one;
+In: bytes of a MAVLink link and images of the onboard camera, taken in at every step. Out: a decision of the policy
+for each new image (10 Hz), sent at once and repeated at 20 Hz; a change of mode when the state machine asks for one;
 texts for the pilot. `frame(time_us)` is the whole loop: a process calls it on the wall clock, a lockstep flight on
 simulated time, and then the same flight gives the same bytes.
 """
@@ -27,15 +27,15 @@ from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, 
 
 SETPOINT_US = 50_000
 DECISION_US = 100_000
-DECISION_EARLY_US = 10_000  # a picture may come this much earlier than the decision period asks
-IMAGE_OLD_US = 500_000  # guess: five pictures missed, 3 m at full speed
+DECISION_EARLY_US = 10_000  # an image may come this much earlier than the decision period asks
+IMAGE_OLD_US = 500_000  # guess: five images missed, 3 m at full speed
 TELEMETRY_OLD_US = 500_000
 HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
-NO_PICTURES = "no new pictures"
+NO_IMAGES = "no new pictures"
 NO_DECISION = "the policy does not decide"
 LATENCIES_KEPT = 600  # a minute of decisions
-LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the pictures that policies are trained on
+LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
 LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
 
 Floats = NDArray[np.float32]
@@ -46,8 +46,8 @@ class Pilot(Protocol):
     """Whoever flies: a trained policy, or a script that sees the same."""
 
     kind: int  # of its vector: EGO or EGO_BLIND
-    image_shape: tuple[int, int, int]  # (height, width, channels) of the picture it needs
-    owner_hfrd: Vector | None  # [m] where the last picture showed the owner's chest, from the vehicle; None: nowhere
+    image_shape: tuple[int, int, int]  # (height, width, channels) of the image it needs
+    owner_hfrd: Vector | None  # [m] where the last image showed the owner's chest, from the vehicle; None: nowhere
 
     def reset(self) -> None:
         """Forgets what came before."""
@@ -80,7 +80,7 @@ class Companion:
     ) -> None:
         self.vehicle = VehicleLink(link)
         self.engagement = Engagement(is_told=is_told)
-        self.latencies_s: deque[float] = deque(maxlen=LATENCIES_KEPT)  # picture in to setpoint out
+        self.latencies_s: deque[float] = deque(maxlen=LATENCIES_KEPT)  # image in to setpoint out
         self.decision_count = 0
         self.seen: Floats = np.zeros(0, dtype=np.float32)  # the vector that was decided on last
         self.trouble = ""  # why it does not fly
@@ -89,9 +89,9 @@ class Companion:
         self._observer = Observer(pilot.kind)
         self._watch = OwnerWatch(hears=pilot.kind != EGO_BLIND)
         self._wall_s = wall_s
-        self._picture: ImageFrame | None = None  # the newest
-        self._picture_us = -1  # when it came in, on our clock; -1: never
-        self._decided_us = 0  # when the picture that was decided on was taken, on the vehicle's clock
+        self._image: ImageFrame | None = None  # the newest
+        self._image_us = -1  # when it came in, on our clock; -1: never
+        self._decided_us = 0  # when the image that was decided on was taken, on the vehicle's clock
         self._action: Floats = np.zeros(4, dtype=np.float32)
         self._setpoint = STILL
         self._is_undecided = False  # the pilot's last action was no number
@@ -106,11 +106,11 @@ class Companion:
         """
         self.vehicle.receive(time_us)
         self.vehicle.keep_alive(time_us)
-        picture = self._camera.take(time_us)
-        begun_s = self._wall_s() if self._wall_s is not None and picture is not None else None
-        if picture is not None:
-            self._picture, self._picture_us = picture, time_us
-            self.vehicle.clock.pictured(picture.time_us)
+        image = self._camera.take(time_us)
+        begun_s = self._wall_s() if self._wall_s is not None and image is not None else None
+        if image is not None:
+            self._image, self._image_us = image, time_us
+            self.vehicle.clock.pictured(image.time_us)
         blindness = self._blindness(time_us)
         self.trouble = blindness or self._loss() or (NO_DECISION if self._is_undecided else "")
         orders = self.engagement.step(self._situation(time_us))
@@ -119,20 +119,20 @@ class Companion:
         if orders.wish is not Wish.NONE:
             self.vehicle.ask_for(orders.wish)
         self._switch(orders.sending)
-        has_looked = picture is not None and not blindness and self._look(picture, time_us)
+        has_looked = image is not None and not blindness and self._look(image, time_us)
         has_decided = has_looked and orders.sending is Sending.POLICY
         if orders.sending is not Sending.NOTHING and (has_decided or time_us >= self._setpoint_due_us):
             self._setpoint_due_us = time_us + SETPOINT_US
             self.vehicle.send_setpoint(*self._setpoint)
         if has_decided and begun_s is not None and self._wall_s is not None:
             self.latencies_s.append(self._wall_s() - begun_s)
-        if picture is not None:  # only now: the setpoint does not wait for it
+        if image is not None:  # only now: the setpoint does not wait for it
             seen_hfrd = self._pilot.owner_hfrd if has_looked else None
-            self._watch.update(picture.time_us, self.vehicle.own, self.vehicle.owner, seen_hfrd)
+            self._watch.update(image.time_us, self.vehicle.own, self.vehicle.owner, seen_hfrd)
 
-    def picture_age_s(self, time_us: int) -> float:
-        """Since the newest picture came in; infinite without one."""
-        return (time_us - self._picture_us) * 1e-6 if self._picture_us >= 0 else float("inf")
+    def image_age_s(self, time_us: int) -> float:
+        """Since the newest image came in; infinite without one."""
+        return (time_us - self._image_us) * 1e-6 if self._image_us >= 0 else float("inf")
 
     def owner_distance_m(self) -> float:
         """From the vehicle to the owner as tracked; NaN while nothing is known."""
@@ -158,18 +158,18 @@ class Companion:
             self._setpoint = STILL
             self._action[:] = 0.0
 
-    def _look(self, picture: ImageFrame, time_us: int) -> bool:
-        """Lets the pilot see a picture, if one is due, and decide if it flies; whether it was due.
+    def _look(self, image: ImageFrame, time_us: int) -> bool:
+        """Lets the pilot see an image, if one is due, and decide if it flies; whether it was due.
 
         Who does not fly looks too: the owner must have been seen before anybody flies by sight.
         """
-        if 0 <= picture.time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
+        if 0 <= image.time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
             return False  # a clock that has gone back is that of a vehicle that has restarted
-        self._decided_us = picture.time_us
+        self._decided_us = image.time_us
         own = self.vehicle.own
         vector = self._observer.vector(own, self.vehicle.owner, self._action, time_us)
         self.seen = vector.copy()
-        action = self._pilot.act(vector, picture.pixels)
+        action = self._pilot.act(vector, image.pixels)
         self._is_undecided = not np.isfinite(action).all()
         if self._is_undecided:
             self._pilot.reset()  # what it remembers is no number either
@@ -201,12 +201,12 @@ class Companion:
         is_placed = isfinite(own.pos_ned[0])
         if not is_placed or time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
             return "no attitude or position from the vehicle"
-        picture = self._picture
-        if picture is None or max(time_us - self._picture_us, own.boot_us - picture.time_us) > IMAGE_OLD_US:
-            return NO_PICTURES  # none came in, or what came in was old
-        if picture.pixels.shape != self._pilot.image_shape:
+        image = self._image
+        if image is None or max(time_us - self._image_us, own.boot_us - image.time_us) > IMAGE_OLD_US:
+            return NO_IMAGES  # none came in, or what came in was old
+        if image.pixels.shape != self._pilot.image_shape:
             return "pictures of another size"
-        lens = (picture.hfov_deg, picture.pitch_deg, picture.depth_half_m)
+        lens = (image.hfov_deg, image.pitch_deg, image.depth_half_m)
         if not all(isclose(here, there, rel_tol=LENS_TOLERANCE) for here, there in zip(lens, LENS, strict=True)):
             return "pictures of another lens"
         return ""

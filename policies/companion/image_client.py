@@ -1,6 +1,6 @@
-"""Where the companion's pictures come from: a stream over TCP, or the memory of the same process.
+"""Where the companion's images come from: a stream over TCP, or the memory of the same process.
 
-In: a TCP stream of pictures (common/image_stream.py), or frames handed over in lockstep. Out: the newest picture, each
+In: a TCP stream of images (common/image_stream.py), or frames handed over in lockstep. Out: the newest image, each
 only once. The stream is read without waiting; a camera that is not there, or goes away, is looked for again and again.
 """
 
@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from common.image_stream import ImageFrame, ImageReader, ImageStreamError
 
 RETRY_US = 500_000
-_CHUNK = 1 << 18  # [byte] of one read: sixteen pictures of 64 x 64 x 4
+_CHUNK = 1 << 18  # [byte] of one read: sixteen images of 64 x 64 x 4
 READS_MAX = 4  # of one step: a camera that floods must not hold up the pilot
 _UNDER_WAY = {0, errno.EAGAIN, errno.EALREADY, errno.EINPROGRESS, errno.EISCONN, errno.ENOTCONN}
 
@@ -23,10 +23,10 @@ class CameraUrlError(ValueError):
 
 
 class ImageSource(Protocol):
-    """Pictures of the onboard camera."""
+    """Images of the onboard camera."""
 
     def take(self, time_us: int) -> ImageFrame | None:
-        """The newest picture since the last call, None if there is none.
+        """The newest image since the last call, None if there is none.
 
         Args:
             time_us: the companion's own clock.
@@ -37,7 +37,7 @@ class ImageSource(Protocol):
 
 
 class MemoryCamera:
-    """Pictures of a camera in this process."""
+    """Images of a camera in this process."""
 
     def __init__(self) -> None:
         self._newest: ImageFrame | None = None
@@ -55,7 +55,7 @@ class MemoryCamera:
 
 
 class StreamCamera:
-    """Pictures that come over TCP.
+    """Images that come over TCP.
 
     Args:
         url: `tcp://HOST:PORT`.
@@ -69,7 +69,7 @@ class StreamCamera:
         self._socket: socket.socket | None = None
         self._reader = ImageReader()
         self._retry_us = 0
-        self.trouble = ""  # why there are no pictures, as far as is known
+        self.trouble = ""  # why there are no images, as far as is known
 
     def take(self, time_us: int) -> ImageFrame | None:
         if self._socket is None:

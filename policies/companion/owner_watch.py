@@ -2,7 +2,7 @@
 
 In: where the pilot saw the owner, telemetry and reports as they come in. Out: the track, and the age of the last word
 of the owner. Only whether the companion may fly, and what its line of figures shows, depends on it: policies see
-pictures and reports.
+images and reports.
 """
 
 from math import asin, atan2, inf, isfinite, sqrt
@@ -29,10 +29,10 @@ class OwnerWatch:
         self._reports = 0  # fed so far
 
     def update(self, now_us: int, own: Own, owner: Owner, seen_hfrd: Vector | None) -> None:
-        """Takes in what a new picture showed, and the report that came since the last one.
+        """Takes in what a new image showed, and the report that came since the last one.
 
         Args:
-            now_us: when the picture was taken, on the vehicle's clock.
+            now_us: when the image was taken, on the vehicle's clock.
             own: the vehicle's newest telemetry.
             owner: the phone's newest report.
             seen_hfrd: [m] where it showed the owner's chest, from the vehicle; None: nowhere.
@@ -68,7 +68,7 @@ class OwnerWatch:
 
 
 def sighting_of(seen_hfrd: Vector, own: Own) -> Sighting:
-    """A place ahead, right and down of the vehicle [m] as the tracker takes it: seen by a level eye in its middle."""
+    """A position ahead, right and down of the vehicle [m] as the tracker takes it: seen by a level eye inside it."""
     ahead, right, down = seen_hfrd
     range_m = sqrt(ahead**2 + right**2 + down**2)
     elevation_rad = asin(-down / max(range_m, 1.0e-6))

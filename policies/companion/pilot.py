@@ -33,13 +33,13 @@ class PilotError(ValueError):
 
 
 class LearnedPilot:
-    """A trained policy: its most probable action, its memory kept from picture to picture.
+    """A trained policy: its most probable action, its memory kept from image to image.
 
-    Where the owner is seen is what it believes, or if it has no such beliefs where their shirt is in the picture.
+    Where the owner is seen is what it believes, or if it has no such beliefs where their shirt is in the image.
 
     Args:
         policy: made for FollowMe in a preset whose actions are setpoints.
-        place: where it came from, for the message.
+        source: where it came from, for the message.
 
     Raises:
         PilotError: it was made for something else.
@@ -47,14 +47,14 @@ class LearnedPilot:
 
     image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))
 
-    def __init__(self, policy: Policy, place: str) -> None:
+    def __init__(self, policy: Policy, source: str) -> None:
         layout = policy.layout
         is_blind = len(layout.frame) == len(vector_elements(int(EGO_BLIND)))
         self.kind = int(EGO_BLIND) if is_blind else int(EGO)
         image = ImageElement(IMAGE_SIZE, IMAGE_SIZE, IMAGE_CHANNELS)
         here = Layout(TASK, LAYOUT_VERSION, vector_elements(self.kind), ACTIONS, image=image)
         try:
-            here.require(layout, place)
+            here.require(layout, source)
         except LayoutError as error:
             raise PilotError(str(error)) from error
         self._policy = policy
@@ -62,7 +62,7 @@ class LearnedPilot:
         self._belief = owner_belief(policy)
         self._down = [k for k, element in enumerate(layout.frame) if element.name in ("down_frd_x", "down_frd_y")]
         self.owner_hfrd: Vector | None = None
-        torch.set_num_threads(1)  # one small picture: more threads only wait for each other
+        torch.set_num_threads(1)  # one small image: more threads only wait for each other
         self.act(np.zeros(layout.observation_size, np.float32), np.zeros(self.image_shape, np.uint8))  # warms up
         self.reset()
 
@@ -76,7 +76,7 @@ class LearnedPilot:
             actions, self._memory, beliefs = self._policy.act_and_believe(observation, self._memory)
             bounded: Floats = self._policy.bounded(actions)[0].numpy()
         if self._belief is not None and beliefs is not None:
-            self.owner_hfrd = self._belief.place(beliefs)
+            self.owner_hfrd = self._belief.position(beliefs)
         else:
             down_x, down_y = (float(vector[k]) for k in self._down)
             self.owner_hfrd = chest_hfrd(image, (down_x, down_y))

@@ -1,6 +1,6 @@
 """The vehicle's clock in full: messages carry 32 bits of its milliseconds since boot, which are over after 49.7 days.
 
-Pictures carry all of it: who connects to a vehicle that has been up for long learns it from them.
+Images carry all of it: who connects to a vehicle that has been up for long learns it from them.
 """
 
 SPAN_MS = 1 << 32
@@ -29,8 +29,8 @@ class VehicleClock:
             self._wide_ms = boot_ms
         return self._wide_ms * 1000
 
-    def pictured(self, picture_us: int) -> None:
-        """Takes the span that a picture is from."""
+    def pictured(self, image_us: int) -> None:
+        """Takes the span that an image is from."""
         if self._wide_ms is not None:
-            spans = round((picture_us // 1000 - self._wide_ms) / SPAN_MS)
+            spans = round((image_us // 1000 - self._wide_ms) / SPAN_MS)
             self._wide_ms = max(self._wide_ms + spans * SPAN_MS, self._wide_ms % SPAN_MS)

@@ -116,8 +116,8 @@ def record_episodes(
     """
     if task.layout.image is not None:
         raise RecordingError(f"{task.layout.task}: shows images as it is set, and demonstrations hold none")
-    shares = np.full(task.env_count, count // task.env_count)
-    shares[: count % task.env_count] += 1
+    fractions = np.full(task.env_count, count // task.env_count)
+    fractions[: count % task.env_count] += 1
     kept: list[list[Episode]] = [[] for _ in range(task.env_count)]
     tried = 0
     task.reset(seed)
@@ -130,7 +130,7 @@ def record_episodes(
         task.step()
         for i, episode in recorder.ended():
             tried += 1
-            if len(kept[i]) < shares[i] and (episode.is_success or has_failures):
+            if len(kept[i]) < fractions[i] and (episode.is_success or has_failures):
                 kept[i].append(episode)
         progress(sum(map(len, kept)))
     return [episode for episodes in kept for episode in episodes]

@@ -20,7 +20,7 @@ from policies.tasks.follow_me.observe import (
 )
 
 DISTANCE_M = 2.0  # to the owner's chest, level: the middle of the band
-HEIGHT_M = 1.6  # above the ground: over the chest, so that the owner is in the middle of a picture tilted down
+HEIGHT_M = 1.6  # above the ground: over the chest, so that the owner is in the middle of an image tilted down
 DISTANCE_GAIN = 1.0  # [1/s] from metres too far to metres per second; guess
 HEIGHT_GAIN = 1.0  # [1/s] guess
 YAW_GAIN = 2.0  # [1/s] guess
@@ -30,7 +30,7 @@ Floats = NDArray[np.float32]
 
 
 class ScriptedFollower:
-    """Flies on the picture where the owner is in it, on the phone's report where not, and on the range finder."""
+    """Flies on the image where the owner is in it, on the phone's report where not, and on the range finder."""
 
     kind = int(EGO)
     image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))

@@ -13,7 +13,7 @@ from policies.experts.expert import NewEpisodes
 from policies.experts.parking_field import NODES, Target, fill_field
 from policies.experts.parking_planner import Memory, Situation, next_command, write_command
 from policies.tasks.parking import level1, level2
-from policies.tasks.parking.arena import PORTAL_PLACES, STOREY_2_FROM_X, forward_of, place_of, pose, storey_of
+from policies.tasks.parking.arena import PORTAL_POSITIONS, STOREY_2_FROM_X, forward_of, pose, position_of, storey_of
 from policies.tasks.parking.parking_params import CAR_PARAMS, CarParams, Level1Params, Level2Params
 from policies.tasks.parking.scene import Scene, portal_half
 from policies.tasks.parking.settings import Rules
@@ -38,13 +38,13 @@ class Fields:
 
 @wp.func
 def parking_target(scene: Scene, rules: Rules, params: CarParams) -> Target:
-    """The pad, to be touched; or the place of the car's origin from which it turns into the pose on the spot."""
+    """The pad, to be touched; or the position of the car's origin from which it turns into the pose on the spot."""
     target = Target()
     target.pose = scene.goal
     target.half = scene.goal_half
     if rules.needs_pose:
-        place = place_of(scene.goal) - forward_of(scene.goal) * params.box_ahead_m
-        target.pose = wp.vec4(place[0], place[1], scene.goal[2], scene.goal[3])
+        position = position_of(scene.goal) - forward_of(scene.goal) * params.box_ahead_m
+        target.pose = wp.vec4(position[0], position[1], scene.goal[2], scene.goal[3])
         target.half = wp.vec2(0.0, 0.0)
     return target
 
@@ -83,11 +83,13 @@ def act_level1(
 
 
 @wp.func
-def situation_of(cars: CarState, movers: level2.Movers, places: level2.Level2Places, rules: Rules, i: int) -> Situation:
+def situation_of(
+    cars: CarState, movers: level2.Movers, positions: level2.Level2Positions, rules: Rules, i: int
+) -> Situation:
     """Level 2: the pad, or the portal if the pad is on the other storey."""
     now = Situation()
     now.storey = storey_of(cars.pos[i][0])
-    now.scene = level2.scene_of(cars, movers, places, i, now.storey)
+    now.scene = level2.scene_of(cars, movers, positions, i, now.storey)
     now.has_movers = True
     now.more = movers.params[i]
     now.through_portal = not now.scene.has_goal
@@ -105,13 +107,13 @@ def fill_level2(
     rows: wp.array(dtype=int),
     cars: CarState,
     movers: level2.Movers,
-    places: level2.Level2Places,
+    positions: level2.Level2Positions,
     rules: Rules,
     fields: Fields,
 ) -> None:
     """The fields of the rows that are in another episode or on another storey."""
     i = rows[wp.tid()]
-    now = situation_of(cars, movers, places, rules, i)
+    now = situation_of(cars, movers, positions, rules, i)
     standing = now.scene
     standing.obstacle_count = 0
     standing.has_portal = not now.through_portal
@@ -124,13 +126,13 @@ def act_level2(
     branches: wp.array2d(dtype=int),
     cars: CarState,
     movers: level2.Movers,
-    places: level2.Level2Places,
+    positions: level2.Level2Positions,
     rules: Rules,
     fields: Fields,
 ) -> None:
     """The next action of every row."""
     i = wp.tid()
-    now = situation_of(cars, movers, places, rules, i)
+    now = situation_of(cars, movers, positions, rules, i)
     motion = motion_of(cars, i)
     command = next_command(fields.angles_rad, fields.way, fields.memories, i, motion, now, rules, cars.params[i])
     write_command(branches, i, command, rules)
@@ -177,7 +179,7 @@ class Parking2Expert:
         if not isinstance(task, level2.Parking2):
             raise TypeError(f"{task.layout.task} is not Parking2")
         if not self._inputs:
-            self._inputs = [task.world, *_movers_and_places(task), task.rules, _fields(task)]
+            self._inputs = [task.world, *_movers_and_positions(task), task.rules, _fields(task)]
         storeys = task.world.pos.numpy()[:, 0] > float(STOREY_2_FROM_X)
         rows = self._new_episodes.rows(task)
         if len(self._storeys) == len(storeys):
@@ -193,14 +195,16 @@ def _blocks(task: level1.Parking1) -> Any:
     return blocks
 
 
-def _movers_and_places(task: level2.Parking2) -> tuple[Any, Any]:
+def _movers_and_positions(task: level2.Parking2) -> tuple[Any, Any]:
     movers = level2.Movers()
     movers.poses = task.movers
     movers.touching = wp.zeros((task.env_count, 2), dtype=int, device=task.device)  # not looked at by `scene_of`
     movers.params = typed_rows(task.buffers.params, Level2Params, first=len(CAR_PARAMS))
-    places = level2.Level2Places()
-    places.portals = wp.mat44(*np.vstack([*(pose(place) for place in PORTAL_PLACES), np.zeros((2, 4))]).ravel())
-    return movers, places
+    positions = level2.Level2Positions()
+    positions.portals = wp.mat44(
+        *np.vstack([*(pose(position) for position in PORTAL_POSITIONS), np.zeros((2, 4))]).ravel()
+    )
+    return movers, positions
 
 
 def _launch(task: Task, fill: Any, act: Any, rows: Any, inputs: list[Any]) -> None:

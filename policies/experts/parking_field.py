@@ -37,7 +37,7 @@ class Target:
 
 
 @wp.func
-def node_place(storey: int, x: int, z: int) -> wp.vec2:
+def node_position(storey: int, x: int, z: int) -> wp.vec2:
     """Where a node lies [m]."""
     return storey_centre(storey) + wp.vec2(_FIRST + _SPACING * float(x), _FIRST + _SPACING * float(z))
 
@@ -56,8 +56,8 @@ def slowness(clear_m: float) -> float:
     """What a metre counts at a clearance."""
     if clear_m < _TIGHT_M:
         return _TIGHT_COST
-    share = wp.clamp((_WIDE_M - clear_m) / (_WIDE_M - _TIGHT_M), 0.0, 1.0)
-    return 1.0 + _NEAR_COST * share * share
+    fraction = wp.clamp((_WIDE_M - clear_m) / (_WIDE_M - _TIGHT_M), 0.0, 1.0)
+    return 1.0 + _NEAR_COST * fraction * fraction
 
 
 @wp.func
@@ -83,7 +83,7 @@ def fill_field(
     """
     for z in range(_NODES):
         for x in range(_NODES):
-            point = node_place(storey, x, z)
+            point = node_position(storey, x, z)
             distance = box_distance(target.pose, target.half, point)
             clear_m = wp.min(clearance(scene, point), wall_clearance(storey, point))
             if scene.has_portal:

@@ -5,13 +5,13 @@ primitive is driven with the task's own motion, contacts and, where obstacles mo
 the others the one wins that is soonest at the target: its time, and the field's way (parking_field.py) from its end.
 Asked anew every few hundredths of a second this is a receding-horizon search of hybrid states (x, z, yaw, velocity)
 guided by the field: hybrid A* cut off after one expansion. Where a spot asks for a pose, the last metres are an
-analytic manoeuvre, itself driven in thought first: to the place where the car can turn on the spot, then turned.
+analytic manoeuvre, itself driven in thought first: to the position where the car can turn on the spot, then turned.
 """
 
 import warp as wp
 
 from policies.experts.parking_field import Target, way_at
-from policies.tasks.parking.arena import forward_of, place_of, right_of
+from policies.tasks.parking.arena import forward_of, position_of, right_of
 from policies.tasks.parking.car import DT
 from policies.tasks.parking.drive import Command, Motion, moved, wrapped
 from policies.tasks.parking.episode_end import is_in_pose
@@ -39,7 +39,7 @@ _CHANGE_COST_S = wp.constant(0.4)  # guess: more than what the field is wrong by
 _WAIT_COST_S = wp.constant(10.0)  # guess: only where nothing else is free of contacts
 _SHOT_M = wp.constant(5.0)  # guess: within this the last manoeuvre is tried
 _PLAN_TICKS = wp.constant(3)  # a plan is followed for 60 ms; guess: movers get 0.12 m further
-_SHOTS = wp.constant(7)  # the direct one, and by way of places 1, 2 and 3 m before and behind
+_SHOTS = wp.constant(7)  # the direct one, and by way of positions 1, 2 and 3 m before and behind
 
 
 @wp.struct
@@ -87,8 +87,8 @@ def cruise_m_s(rules: Rules, params: CarParams) -> float:
     """Mean speed of a car that is pushed at every decision."""
     keep = wp.max(0.0, 1.0 - params.drag_per_s * DT)
     push = params.push_n / params.mass_kg * DT
-    share = wp.where(rules.is_held or rules.actions == _STEER, 1.0, 1.0 / float(rules.tick_count))
-    return wp.max(share * push * keep / wp.max(1.0 - keep, 0.01), 0.01)
+    fraction = wp.where(rules.is_held or rules.actions == _STEER, 1.0, 1.0 / float(rules.tick_count))
+    return wp.max(fraction * push * keep / wp.max(1.0 - keep, 0.01), 0.01)
 
 
 @wp.func
@@ -145,11 +145,11 @@ def is_crash(contact: int, through_portal: bool) -> bool:
 
 @wp.func
 def is_arrival(contact: int, motion: Motion, now: Situation, params: CarParams) -> bool:
-    """Whether a contact, or a place, is what the plan is after."""
+    """Whether a contact, or a position, is what the plan is after."""
     if now.through_portal:
         return contact == PORTAL
     if now.needs_pose:
-        gap = motion.pos + coasting(motion.vel, params) - place_of(now.target.pose)
+        gap = motion.pos + coasting(motion.vel, params) - position_of(now.target.pose)
         return wp.length(gap) < 0.5 * params.reach_m
     return contact == PAD
 
@@ -213,18 +213,18 @@ def one_push_m(rules: Rules, params: CarParams) -> float:
 
 @wp.func
 def shot_command(motion: Motion, now: Situation, offset_m: float, rules: Rules, params: CarParams) -> Command:
-    """The analytic manoeuvre: straight to a place on the spot's axis, there into its direction, along it to the end.
+    """The analytic manoeuvre: straight to a position on the spot's axis, there into its direction, along it to the end.
 
     Args:
         motion: the car.
         now: what it is in.
-        offset_m: of that place ahead of the end; 0: the car turns at the end itself.
+        offset_m: of that position ahead of the end; 0: the car turns at the end itself.
         rules: what its actions do.
         params: of the car.
     """
     command = Command()
     target = now.target.pose
-    end = place_of(target) - motion.pos - coasting(motion.vel, params)
+    end = position_of(target) - motion.pos - coasting(motion.vel, params)
     error = wrapped(wp.atan2(target[2], target[3]) - motion.yaw)
     one_push = one_push_m(rules, params)
     slack = wp.clamp(0.55 * one_push, 0.4 * params.reach_m, 0.85 * params.reach_m)
@@ -324,7 +324,7 @@ def is_shot_possible(k: int, motion: Motion, now: Situation, rules: Rules, param
 @wp.func
 def chosen_shot(begun: int, motion: Motion, now: Situation, rules: Rules, params: CarParams) -> int:
     """The manoeuvre that was begun, as long as it is free; else the first that is; or -1."""
-    if not now.needs_pose or wp.length(place_of(now.target.pose) - motion.pos) > _SHOT_M:
+    if not now.needs_pose or wp.length(position_of(now.target.pose) - motion.pos) > _SHOT_M:
         return -1
     if begun >= 0 and is_shot_possible(begun, motion, now, rules, params):
         return begun

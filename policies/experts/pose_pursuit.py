@@ -77,7 +77,7 @@ class PosePursuitExpert:
             self._routes.pop(int(i), None)
         x, y, z, w = world.q.numpy().T.astype(float)
         yaws = np.arctan2(2.0 * (x * z + w * y), 1.0 - 2.0 * (x * x + y * y))
-        places = world.pos.numpy()[:, [0, 2]].astype(float)
+        positions = world.pos.numpy()[:, [0, 2]].astype(float)
         speeds = (world.vel.numpy()[:, [0, 2]] * np.stack([np.sin(yaws), np.cos(yaws)], axis=1)).sum(axis=1)
         mass_m = (params["mass_kg"] + 2.0 * params["wheel_mass_kg"]) * params["wheel_radius_m"] / 4.0
         goals = np.column_stack([world.target.numpy()[:, [0, 2]], world.target_yaw.numpy()]).astype(float)
@@ -85,7 +85,7 @@ class PosePursuitExpert:
         for i in range(task.env_count):
             half_base = 0.5 * params["wheelbase_m"][i]
             car = _Car(
-                rear=_shifted(np.array([*places[i], yaws[i]]), -half_base),
+                rear=_shifted(np.array([*positions[i], yaws[i]]), -half_base),
                 speed=float(speeds[i]),
                 wheelbase=2.0 * half_base,
                 steer_max=float(np.radians(params["steer_max_deg"][i])),
@@ -158,7 +158,7 @@ def _passed(route: _Route, car: _Car) -> int:
 
 
 def _steering(route: _Route, car: _Car, stop: int, direction: int) -> float:
-    """Towards a point ahead on the path, or beyond its stop in its direction; in shares of full steering."""
+    """Towards a point ahead on the path, or beyond its stop in its direction; in fractions of full steering."""
     ahead_m = 1.5 + 0.35 * abs(car.speed)
     k = route.at + round(ahead_m / _SPACING_M)
     aim = route.poses[min(k, stop)]

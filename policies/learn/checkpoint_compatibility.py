@@ -51,16 +51,18 @@ def flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return result
 
 
-def require_fit(here: Mapping[str, Any], there: Mapping[str, Any], place: str) -> None:
-    """Refuses what was made with other settings; `place` is where they come from.
+def require_fit(here: Mapping[str, Any], there: Mapping[str, Any], source: str) -> None:
+    """Refuses what was made with other settings; `source` is where they come from.
 
     Raises:
         CheckpointError: with the first difference.
     """
     for key in [*here, *(key for key in there if key not in here)]:
         if key not in there:
-            raise CheckpointError(f"{place}: made without {key}, which is {here[key]} here")
+            raise CheckpointError(f"{source}: made without {key}, which is {here[key]} here")
         if key not in here:
-            raise CheckpointError(f"{place}: made with {key} {there[key]}, which there is none of here")
+            raise CheckpointError(f"{source}: made with {key} {there[key]}, which there is none of here")
         if here[key] != there[key]:
-            raise CheckpointError(f"{place}: made for other settings: {key} is {there[key]} there and {here[key]} here")
+            raise CheckpointError(
+                f"{source}: made for other settings: {key} is {there[key]} there and {here[key]} here"
+            )

@@ -1,7 +1,7 @@
 """Curricula: which lesson each environment parameter is in, and when the next begins.
 
-In: the scores of ended episodes and the share of the training that is done. Out: numbers, or what they are drawn from,
-for `Task.set_params`. A number or a sampler without a curriculum is a single lesson that never ends.
+In: the scores of ended episodes and the fraction of the training that is done. Out: parameters, or what they are drawn
+from, for `Task.set_params`. A number or a sampler without a curriculum is a single lesson that never ends.
 """
 
 from collections import deque
@@ -82,7 +82,7 @@ class Curriculum:
 
         Args:
             scores: of the episodes that ended since the last call.
-            progress: share of the training's steps that are done.
+            progress: fraction of the training's steps that are done.
 
         Returns:
             A line for the user per parameter that moved on, and whether the environments are to start anew.

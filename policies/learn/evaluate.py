@@ -56,7 +56,7 @@ def evaluate(
     params: Mapping[str, Sampler] | None = None,
     is_greedy: bool = True,
     longest: int = LONGEST,
-    place: str = "policy",
+    source: str = "policy",
     progress: Callable[[int], None] | None = None,
 ) -> Evaluation:
     """Plays exactly so many episodes.
@@ -64,13 +64,13 @@ def evaluate(
     Args:
         policy: what acts; it is not changed.
         name: the task.
-        settings: of the task; its `split` says on which places.
+        settings: of the task; its `split` says on which positions.
         episodes: how many count.
         seed: of the episodes, and of the actions if they are drawn.
         params: of the task, if they are not the settings' own.
         is_greedy: takes the most probable action; else it is drawn.
         longest: decisions after which an episode is cut and counts as a timeout.
-        place: what messages call the policy.
+        source: what messages call the policy.
         progress: is told now and then how many have ended.
 
     Raises:
@@ -79,7 +79,7 @@ def evaluate(
     """
     device = next(policy.parameters()).device
     task = build_task(name, min(episodes, ENVIRONMENTS), settings, str(device))
-    task.layout.require(policy.layout, place)
+    task.layout.require(policy.layout, source)
     task.set_params(params or {})
     task.reset(seed)
     generator = None if is_greedy else torch.Generator(device).manual_seed(seed)

@@ -139,8 +139,8 @@ class Training:
         self._elapsed_before_s = 0.0
         self._events_position: dict[str, Any] | None = None
         self._saved: list[dict[str, Any]] = []
-        share = self.behavior.success_target
-        self._target = SuccessTarget(share, self.task_name, self.task_settings) if share is not None else None
+        fraction = self.behavior.success_target
+        self._target = SuccessTarget(fraction, self.task_name, self.task_settings) if fraction is not None else None
         self._judged: Evaluation | None = None
         self._moments: deque[tuple[float, int]] = deque(maxlen=_RATE_ITERATIONS + 1)
         if newest is not None and content is not None:

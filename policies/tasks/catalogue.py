@@ -36,8 +36,8 @@ class Entry:
         return cast("Callable[[Any, int, str], Task]", _found(self.task_at))
 
 
-def _found(place: object) -> object:
-    return resolve_name(f"policies.tasks.{place}") if isinstance(place, str) else place
+def _found(entry: object) -> object:
+    return resolve_name(f"policies.tasks.{entry}") if isinstance(entry, str) else entry
 
 
 CATALOGUE: dict[str, Entry] = {

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class PlaceGoal:
+class PositionGoal:
     """The episode ends with success as soon as the achieved place comes nearer to the goal than a radius.
 
     Both places are elements of the observation in the same unit and frame, and no other element tells of the goal.

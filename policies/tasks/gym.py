@@ -68,7 +68,7 @@ class TaskEnv(gymnasium.Env[Observation, Any]):
 
     def render(self) -> Any:
         """What is seen from above, RGB."""
-        return self.task.picture(0) if self.render_mode == "rgb_array" else None
+        return self.task.top_view(0) if self.render_mode == "rgb_array" else None
 
 
 class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
@@ -110,8 +110,8 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
         return views.observation(), rewards, views.is_terminated.copy(), views.is_truncated.copy(), info
 
     def render(self) -> Any:
-        """A tuple of pictures, RGB."""
-        return tuple(self.task.picture(i) for i in range(self.num_envs)) if self.render_mode == "rgb_array" else None
+        """A tuple of images, RGB."""
+        return tuple(self.task.top_view(i) for i in range(self.num_envs)) if self.render_mode == "rgb_array" else None
 
 
 class _Views:

@@ -32,7 +32,7 @@ def wilson_interval(successes: int, count: int) -> tuple[float, float]:
 
 
 def rate(is_success: NDArray[np.bool_]) -> Interval:
-    """The share of true values with Wilson's interval; NaN of none."""
+    """The fraction of true values with Wilson's interval; NaN of none."""
     count = len(is_success)
     if not count:
         return Interval(math.nan, math.nan, math.nan)

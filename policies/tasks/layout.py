@@ -97,19 +97,19 @@ class Layout:
             privileged=tuple(Element(**element) for element in record.get("privileged", ())),
         )
 
-    def require(self, other: "Layout", place: str) -> None:
+    def require(self, other: "Layout", source: str) -> None:
         """Refuses what was made for another layout; what only critics see may differ.
 
         Args:
             other: the layout that came with the policy, checkpoint or recording.
-            place: where it came from, for the message.
+            source: where it came from, for the message.
 
         Raises:
             LayoutError: they differ.
         """
         difference = _first_difference(self, other)
         if difference:
-            raise LayoutError(f"{place}: made for another task or preset: {difference}")
+            raise LayoutError(f"{source}: made for another task or preset: {difference}")
 
 
 def _image(record: dict[str, Any] | None) -> ImageElement | None:

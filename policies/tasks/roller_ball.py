@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from common.rng import draw_key
 from policies.tasks.episode import FELL, RUNNING, SUCCESS, TIMEOUT, StepBuffers, begin_episode, close_step, open_frame
-from policies.tasks.goals import PlaceGoal
+from policies.tasks.goals import PositionGoal
 from policies.tasks.layout import Element, Layout
 from policies.tasks.task import Task, TaskSettings
 from policies.tasks.task_params import TaskParam, typed_rows
@@ -137,7 +137,7 @@ class RollerBall(Task):
 
     params: ClassVar = PARAMS
     decision_s = _STEPS * _STEP_S
-    goal = PlaceGoal(goal=(0, 1, 2), achieved=(3, 4, 5), radius="reach_m", reward=1.0)
+    goal = PositionGoal(goal=(0, 1, 2), achieved=(3, 4, 5), radius="reach_m", reward=1.0)
 
     def __init__(self, settings: TaskSettings, env_count: int, device: str = "cpu") -> None:
         axes = ("x", "y", "z")
@@ -158,7 +158,7 @@ class RollerBall(Task):
         self.world = state
         self._record(begin, step, [state])
 
-    def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
+    def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """Floor, cube and ball from above."""
         canvas = Canvas((-6.0, 6.0), (-6.0, 6.0), height_px)
         half = float(self.buffers.params.numpy()[i_env, self.param_table.names.index("half_floor_m")])

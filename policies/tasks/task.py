@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Outcome, StepBuffers, keep_last_image_rows
-from policies.tasks.goals import PlaceGoal
+from policies.tasks.goals import PositionGoal
 from policies.tasks.layout import Layout
 from policies.tasks.task_params import Sampler, TaskParam, TaskParamTable
 
@@ -69,7 +69,7 @@ class Task:
     """The declared numbers, one per field of the task's struct."""
     decision_s: float
     """Simulated time between two decisions [s]."""
-    goal: PlaceGoal | None = None
+    goal: PositionGoal | None = None
     """How observations tell of the goal, for hindsight replay; none: they tell too little."""
 
     def __init__(
@@ -170,6 +170,6 @@ class Task:
         self.param_table.rows[:] = state["samplers"]
         self.param_table.array.assign(self.param_table.rows)
 
-    def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
+    def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """One environment seen from above, RGB, shape (height, width, 3)."""
         raise NotImplementedError

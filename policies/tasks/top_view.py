@@ -1,4 +1,4 @@
-"""Top-down pictures of a task, drawn with OpenCV in metres."""
+"""Top-down images of a task, drawn with OpenCV in metres."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ _SHIFT = 4  # OpenCV's sub-pixel bits
 
 
 class Canvas:
-    """A picture of a rectangle of the ground: x to the right, y up, both in metres."""
+    """An image of a rectangle of the ground: x to the right, y up, both in metres."""
 
     def __init__(self, x_m: tuple[float, float], y_m: tuple[float, float], height_px: int) -> None:
         self._left, self._top = x_m[0], y_m[1]
@@ -62,8 +62,8 @@ class Canvas:
 
     def text(self, words: str, row: int = 0) -> None:
         """A line of text at the top left."""
-        place = (8, 20 + 18 * row)
-        cv2.putText(self.pixels, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, INK, 1, cv2.LINE_AA)
+        position = (8, 20 + 18 * row)
+        cv2.putText(self.pixels, words, position, cv2.FONT_HERSHEY_SIMPLEX, 0.45, INK, 1, cv2.LINE_AA)
 
     def _points(self, points: "Sequence[tuple[float, float]] | NDArray[np.float64]") -> NDArray[np.int32]:
         metres = np.asarray(points, dtype=np.float64)

@@ -95,7 +95,7 @@ class StepInputs:
     """What acts on a body over the substeps of a tick."""
 
     rotor_target: vec8  # [rad/s] speeds the commands ask for
-    gain_up: float  # share of the way to its target a rotor goes in one substep
+    gain_up: float  # fraction of the way to its target a rotor goes in one substep
     gain_down: float
     density_ratio: float  # of the air, over that at sea level
     lift_ratio: float  # factor on thrust from ground effect; 0: broken rotors
@@ -133,8 +133,8 @@ def ground_effect(radius_m: float, height_m: float) -> float:
     I. C. Cheeseman, W. E. Bennett, "The effect of the ground on a helicopter rotor in forward flight", ARC R&M 3021,
     1955. Below half a radius, where it no longer holds, it stays as it is there.
     """
-    share = radius_m / (4.0 * wp.max(height_m, 0.5 * radius_m))
-    return 1.0 / (1.0 - share * share)
+    fraction = radius_m / (4.0 * wp.max(height_m, 0.5 * radius_m))
+    return 1.0 / (1.0 - fraction * fraction)
 
 
 @wp.func
@@ -145,7 +145,7 @@ def density_ratio(model: MultirotorModel, down_m: float) -> float:
 
 @wp.func
 def lag_gain(time_constant_s: float, dt: float) -> float:
-    """Share of the way to its target a first-order lag goes in dt: the bilinear form of 1 - exp(-dt / tau)."""
+    """Fraction of the way to its target a first-order lag goes in dt: the bilinear form of 1 - exp(-dt / tau)."""
     return 2.0 * dt / (2.0 * time_constant_s + dt)
 
 

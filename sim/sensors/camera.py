@@ -1,8 +1,8 @@
-"""Cameras: pictures of the world from any number of poses in one launch, with depth and classes beside the colours.
+"""Cameras: images of the world from any number of poses in one launch, with depth and classes beside the colours.
 
 In: poses and lenses of the cameras. Out: 8-bit sRGB, depth along the optical axis, and what each pixel shows. One ray
 per pixel (four for smooth edges), and one to the sun. The same source runs on CPU and GPU; asked for stills, for video
-at 10 Hz, and by training. The vehicle itself is not in the picture. Camera frame rdf: x right, y down, z ahead.
+at 10 Hz, and by training. The vehicle itself is not in the image. Camera frame rdf: x right, y down, z ahead.
 """
 
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ class CameraPose:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Pictures:
+class Images:
     """What the cameras see."""
 
     rgb: NDArray[np.uint8]  # (cameras, height, width, 3)
@@ -65,7 +65,7 @@ class Pictures:
 
 @wp.func
 def pixel_ray(lens: Lens, x: float, y: float, width: int, height: int) -> wp.vec3:
-    """Direction in ned through a place of the picture [pixels], 1 along the optical axis."""
+    """Direction in ned through a place of the image [pixels], 1 along the optical axis."""
     per_pixel = 2.0 * lens.half_width / float(width)
     right = (x - 0.5 * float(width)) * per_pixel
     down = (y - 0.5 * float(height)) * per_pixel
@@ -80,7 +80,7 @@ def encoded(light: float) -> wp.uint8:
 
 
 @wp.kernel
-def take_pictures(
+def render_images(
     w: World,
     skyline: Skyline,
     lenses: wp.array[Lens],
@@ -131,7 +131,7 @@ def take_pictures(
 
 
 class Renderer:
-    """Takes pictures of one world.
+    """Takes images of one world.
 
     Args:
         world: its kernel arrays must be on `device`.
@@ -144,16 +144,16 @@ class Renderer:
         self._device = device
 
     def prepare(self) -> None:
-        """Compiles or loads the kernel, so that the first picture takes no longer."""
-        wp.load_module(take_pictures.module, device=self._device)
+        """Compiles or loads the kernel, so that the first image takes no longer."""
+        wp.load_module(render_images.module, device=self._device)
 
-    def pictures(self, poses: Sequence[CameraPose], width: int, height: int, *, samples: int = 1) -> Pictures:
+    def images(self, poses: Sequence[CameraPose], width: int, height: int, *, samples: int = 1) -> Images:
         """What the cameras see, all at once.
 
         Args:
             poses: of the cameras.
-            width: of each picture [pixels].
-            height: of each picture [pixels].
+            width: of each image [pixels].
+            height: of each image [pixels].
             samples: rays per side of a pixel: 2 smooths the edges at four times the price. Depth and kind are those of
                 the first.
         """
@@ -163,8 +163,8 @@ class Renderer:
         depth_m = wp.empty((count, height, width), dtype=wp.float32, device=device)
         kinds = wp.empty((count, height, width), dtype=wp.uint8, device=device)
         inputs = [self._world, self._skyline, lenses, samples, rgb, depth_m, kinds]
-        wp.launch(take_pictures, dim=(count, height, width), inputs=inputs, device=device)
-        return Pictures(rgb.numpy(), depth_m.numpy(), kinds.numpy())
+        wp.launch(render_images, dim=(count, height, width), inputs=inputs, device=device)
+        return Images(rgb.numpy(), depth_m.numpy(), kinds.numpy())
 
 
 def _lens(pose: CameraPose) -> Any:

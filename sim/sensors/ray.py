@@ -14,7 +14,7 @@ from sim.world.world import World
 
 wp.set_module_options({"enable_backward": False})
 
-SKY = wp.constant(0)  # what is seen: the classes of the segmentation picture
+SKY = wp.constant(0)  # what is seen: the classes of the segmentation image
 GROUND = wp.constant(1)
 TRUNK = wp.constant(2)
 CROWN = wp.constant(3)

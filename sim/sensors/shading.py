@@ -36,9 +36,9 @@ _SEED = wp.constant(wp.uint32(11))
 
 
 @wp.func
-def mix(a: wp.vec3, b: wp.vec3, share: float) -> wp.vec3:
+def mix(a: wp.vec3, b: wp.vec3, fraction: float) -> wp.vec3:
     """`a` with a share [0..1] of `b`."""
-    s = wp.clamp(share, 0.0, 1.0)
+    s = wp.clamp(fraction, 0.0, 1.0)
     return a + s * (b - a)
 
 
@@ -75,7 +75,7 @@ def landing_pad(north: float, east: float) -> float:
 
 @wp.func
 def ground_albedo(point_ned: wp.vec3, normal_ned: wp.vec3, footprint_m: float) -> wp.vec3:
-    """Share of the light that the ground sends back: grass and meadow in patches, earth where it is bare or steep."""
+    """Fraction of light that the ground sends back: grass and meadow in patches, earth where it is bare or steep."""
     north = point_ned[0]
     east = point_ned[1]
     broad = detail(north, east, 47.0, footprint_m) + 0.5 * detail(east + 31.0, north, 17.0, footprint_m)
@@ -162,7 +162,7 @@ def surface_normal_ned(w: World, hit: Hit, point_ned: wp.vec3) -> wp.vec3:
 
 @wp.func
 def surface_albedo(w: World, hit: Hit, point_ned: wp.vec3, normal_ned: wp.vec3, footprint_m: float) -> wp.vec3:
-    """Share of the light that the surface hit sends back."""
+    """Fraction of the light that the surface hit sends back."""
     albedo = _CONCRETE
     if hit.kind == GROUND:
         albedo = ground_albedo(point_ned, normal_ned, footprint_m / wp.max(0.15, -normal_ned[2]))

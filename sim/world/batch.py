@@ -29,7 +29,7 @@ from sim.world.terrain import Terrain, TerrainMap
 from sim.world.trees import (
     BUCKET_M,
     CONTACT_MARGIN_M,
-    CROWN_RADIUS_SHARE,
+    CROWN_RADIUS_FRACTION,
     EDGE_M,
     NO_OBSTACLE_M,
     Forest,
@@ -222,7 +222,7 @@ def _room(size_m: float, trees_per_ha: float, tree_height_m: float) -> tuple[int
     """How many trees and how many entries of buckets one world has room for."""
     side_m = max(0.0, size_m - 2.0 * EDGE_M)
     trees = ceil(_PACKING * (side_m / _spacing_m(trees_per_ha)) ** 2) + _SPARE_TREES
-    reach_m = CROWN_RADIUS_SHARE[1] * tree_height_m + CONTACT_MARGIN_M
+    reach_m = CROWN_RADIUS_FRACTION[1] * tree_height_m + CONTACT_MARGIN_M
     # the mean over the places a tree can have
     entries_per_tree = (2.0 * reach_m / BUCKET_M + 1.0) ** 2
     return trees, ceil(trees * entries_per_tree)

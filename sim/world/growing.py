@@ -11,12 +11,12 @@ from sim.rng_streams import TREE_PLACES, TREE_SIZES
 from sim.world.terrain import Terrain, terrain_height
 from sim.world.trees import (
     CONTACT_MARGIN_M,
-    CROWN_BASE_SHARE,
-    CROWN_RADIUS_SHARE,
+    CROWN_BASE_FRACTION,
+    CROWN_RADIUS_FRACTION,
     EDGE_M,
     NO_OBSTACLE_M,
     ROOT_M,
-    TRUNK_RADIUS_SHARE,
+    TRUNK_RADIUS_FRACTION,
     Forest,
     Tree,
 )
@@ -30,10 +30,10 @@ PHASES = 9  # cells three apart cannot disturb each other (Wei 2008)
 COVERAGE = wp.constant(0.655)  # points per spacing² reached with these darts; measured
 EMPTY_M = wp.constant(1.0e9)  # coordinate of the point of an empty cell [m]
 
-_CROWN_RADIUS_LEAST = wp.constant(CROWN_RADIUS_SHARE[0])
-_CROWN_RADIUS_MOST = wp.constant(CROWN_RADIUS_SHARE[1])
-_CROWN_BASE = wp.constant(CROWN_BASE_SHARE)
-_TRUNK_RADIUS = wp.constant(TRUNK_RADIUS_SHARE)
+_CROWN_RADIUS_LEAST = wp.constant(CROWN_RADIUS_FRACTION[0])
+_CROWN_RADIUS_MOST = wp.constant(CROWN_RADIUS_FRACTION[1])
+_CROWN_BASE = wp.constant(CROWN_BASE_FRACTION)
+_TRUNK_RADIUS = wp.constant(TRUNK_RADIUS_FRACTION)
 _ROOT_M = wp.constant(ROOT_M)
 _EDGE_M = wp.constant(EDGE_M)
 _MARGIN_M = wp.constant(CONTACT_MARGIN_M)
@@ -174,14 +174,14 @@ def grown_tree(terrain: Terrain, params: WorldParams, height_max_m: float, place
     state = key
     height_min_m = wp.min(params.tree_height_min_m, height_max_m)
     height = height_min_m + (height_max_m - height_min_m) * wp.randf(state)
-    crown_share = _CROWN_RADIUS_LEAST + (_CROWN_RADIUS_MOST - _CROWN_RADIUS_LEAST) * wp.randf(state)
+    crown_fraction = _CROWN_RADIUS_LEAST + (_CROWN_RADIUS_MOST - _CROWN_RADIUS_LEAST) * wp.randf(state)
     ground = terrain_height(terrain, place[0], place[1])
     tree = Tree()
     tree.north = place[0]
     tree.east = place[1]
     tree.root_height = ground - _ROOT_M
     tree.trunk_radius = _TRUNK_RADIUS * height
-    tree.crown_radius = height * crown_share
+    tree.crown_radius = height * crown_fraction
     tree.crown_low = ground + _CROWN_BASE * height + tree.crown_radius
     tree.crown_high = ground + height - tree.crown_radius
     return tree

@@ -128,10 +128,10 @@ def shape_hills(growing: Growing, groups: int) -> None:
         for column in range(terrain.cells + 1):
             east = float(column) * cell_m - terrain.half_size_m
             beyond_m = wp.sqrt(north * north + east * east) - level_radius_m
-            share = smooth(wp.clamp(beyond_m / wp.max(params.clearing_blend_m, _LEAST_BLEND_M), 0.0, 1.0))
+            fraction = smooth(wp.clamp(beyond_m / wp.max(params.clearing_blend_m, _LEAST_BLEND_M), 0.0, 1.0))
             hill = (terrain.heights[row, column] - growing.middle[i_world]) * scale
             # the product may exceed the bound by a rounding
-            height = wp.clamp(hill, -params.hill_height_m, params.hill_height_m) * share + 0.0
+            height = wp.clamp(hill, -params.hill_height_m, params.hill_height_m) * fraction + 0.0
             terrain.heights[row, column] = height
             row_max = wp.max(row_max, height)
             if row == 0 or row == terrain.cells or column == 0 or column == terrain.cells:

@@ -47,14 +47,14 @@ class PersonModel:
 
     speed_min: float  # [m/s] the slowest they choose to go
     speed_max: float  # [m/s]
-    stop_share: float  # share of plans that are a stop
+    stop_fraction: float  # fraction of plans that are a stop
     stop_min_s: float
     stop_max_s: float
     plan_min_s: float  # how long a plan lasts
     plan_max_s: float
     course_std_rad: float  # change of course from plan to plan
     bend_std_rad_s: float  # how fast the course bends within a plan
-    graze_share: float  # share of plans that lead closely past a tree, if there is one in reach
+    graze_fraction: float  # fraction of plans that lead closely past a tree, if there is one in reach
     clearance_min_m: float  # from the body to the bark of trees they pass
     clearance_max_m: float
     speed_time_s: float  # relaxation time of the speed
@@ -87,12 +87,12 @@ def person_model(speed_max_m_s: float = WALK_SPEED_M_S) -> Any:
     model = PersonModel()
     model.speed_min = 0.4  # guess: strolling
     model.speed_max = speed_max_m_s
-    model.stop_share = 0.2  # guess, as are the next seven
+    model.stop_fraction = 0.2  # guess, as are the next seven
     model.stop_min_s, model.stop_max_s = 1.0, 4.0
     model.plan_min_s, model.plan_max_s = 2.0, 7.0
     model.course_std_rad = 0.9
     model.bend_std_rad_s = 0.12
-    model.graze_share = 0.3
+    model.graze_fraction = 0.3
     model.clearance_min_m, model.clearance_max_m = 0.05, 0.8
     model.speed_time_s = 0.66  # Liu et al. 2017, Physica A 468: 0.659 s
     model.accel_max = 2.5  # guess: brisk; sprinters start with 6 (di Prampero et al. 2005)
@@ -172,7 +172,7 @@ def person_step(w: World, model: PersonModel, person: Person, seed: int, i: int,
     )
     out.heading_rad = wrap_pi(out.heading_rad + out.turn_rate * dt_s)
     # speed: slower for a sharp turn, on a slope, and straight before a trunk
-    speed_sp = out.speed_sp * slope_share(w, out) * wp.max(0.25, 1.0 - wp.abs(error) / (0.5 * _PI))
+    speed_sp = out.speed_sp * slope_fraction(w, out) * wp.max(0.25, 1.0 - wp.abs(error) / (0.5 * _PI))
     accel = wp.clamp((speed_sp - out.speed) / model.speed_time_s, -model.accel_max, model.accel_max)
     # along the chord of a bend
     chord_rad = out.heading_rad + _CHORD_S * out.turn_rate
@@ -217,7 +217,7 @@ def planned(w: World, model: PersonModel, person: Person, seed: int, i: int, tic
     out.course_rad = wrap_pi(person.course_rad + person.bend_rad_s * dt_s)
     if out.plan_left_s <= 0.0:
         state = draw_key(seed, i, tick, OWNER_PLAN)
-        is_stop = wp.randf(state) < model.stop_share
+        is_stop = wp.randf(state) < model.stop_fraction
         # nobody stops twice in a row
         if is_stop and person.speed_sp > 0.0:
             out.speed_sp = 0.0
@@ -229,7 +229,7 @@ def planned(w: World, model: PersonModel, person: Person, seed: int, i: int, tic
             out.course_rad = wrap_pi(out.course_rad + model.course_std_rad * wp.randn(state))
             out.bend_rad_s = model.bend_std_rad_s * wp.randn(state)
             out.clearance_m = model.clearance_min_m + (model.clearance_max_m - model.clearance_min_m) * wp.randf(state)
-            if wp.randf(state) < model.graze_share:
+            if wp.randf(state) < model.graze_fraction:
                 place = wp.vec2(person.pos_ned[0], person.pos_ned[1])
                 out.course_rad = towards_tree(w.forest, place, out.course_rad, out.clearance_m)
                 out.bend_rad_s = 0.0
@@ -267,7 +267,7 @@ def within_map(w: World, north: float, east: float) -> wp.vec2:
 
 
 @wp.func
-def slope_share(w: World, person: Person) -> float:
+def slope_fraction(w: World, person: Person) -> float:
     """Speed on the slope ahead over that on the level; Tobler 1993, which gives 1.19 at best and 0.3 at 35 %."""
     north = person.pos_ned[0] + _SLOPE_STEP_M * wp.cos(person.heading_rad)
     east = person.pos_ned[1] + _SLOPE_STEP_M * wp.sin(person.heading_rad)

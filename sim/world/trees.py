@@ -22,9 +22,9 @@ BUCKET_M = 8.0  # about one tree per bucket at the default density
 CONTACT_MARGIN_M = 2.0  # largest radius that `forest_contact` accepts
 EDGE_M = 5.0  # trees stand at least this far inside the map, so that no crown reaches a wall
 # Proportions of a tree relative to its height; guess, after young mixed woodland.
-TRUNK_RADIUS_SHARE = 0.015
-CROWN_BASE_SHARE = 0.35
-CROWN_RADIUS_SHARE = (0.16, 0.26)
+TRUNK_RADIUS_FRACTION = 0.015
+CROWN_BASE_FRACTION = 0.35
+CROWN_RADIUS_FRACTION = (0.16, 0.26)
 ROOT_M = 1.0  # trunks go this far into the ground, so that none floats on a slope
 
 NO_OBSTACLE_M = -1.0e6  # height of the highest tree when there is none
@@ -260,17 +260,19 @@ def make_trees(
     points = np.zeros((0, 2))
     if density_per_ha > 0.0:
         spacing_m = sqrt(COVERAGE * 1.0e4 / density_per_ha)
-        keep_out_m = clearing_radius_m + CROWN_RADIUS_SHARE[1] * height_max_m
+        keep_out_m = clearing_radius_m + CROWN_RADIUS_FRACTION[1] * height_max_m
         points = poisson_disc(seed, terrain.size_m - 2.0 * EDGE_M, spacing_m, keep_out_m)
-    shares = np.random.default_rng([seed, 3]).random((len(points), 2))  # 3: stream of the tree sizes
-    height = height_min_m + (height_max_m - height_min_m) * shares[:, 0]
-    crown_radius = height * (CROWN_RADIUS_SHARE[0] + (CROWN_RADIUS_SHARE[1] - CROWN_RADIUS_SHARE[0]) * shares[:, 1])
+    fractions = np.random.default_rng([seed, 3]).random((len(points), 2))  # 3: stream of the tree sizes
+    height = height_min_m + (height_max_m - height_min_m) * fractions[:, 0]
+    crown_radius = height * (
+        CROWN_RADIUS_FRACTION[0] + (CROWN_RADIUS_FRACTION[1] - CROWN_RADIUS_FRACTION[0]) * fractions[:, 1]
+    )
     ground = terrain.height(points[:, 0], points[:, 1])
     trees: NDArray[np.void] = np.zeros(len(points), dtype=tree_type())
     trees["north"], trees["east"] = points[:, 0], points[:, 1]
     trees["root_height"] = ground - ROOT_M
-    trees["trunk_radius"] = TRUNK_RADIUS_SHARE * height
-    trees["crown_low"] = ground + CROWN_BASE_SHARE * height + crown_radius
+    trees["trunk_radius"] = TRUNK_RADIUS_FRACTION * height
+    trees["crown_low"] = ground + CROWN_BASE_FRACTION * height + crown_radius
     trees["crown_high"] = ground + height - crown_radius
     trees["crown_radius"] = crown_radius
     return trees

@@ -56,8 +56,8 @@ def test_hills_are_bounded_and_the_clearing_is_level_and_free_of_trees(seed, num
     world = grow(0, seed, numbers)
     assert np.isfinite(world.heights).all()
     assert np.abs(world.heights).max() <= numbers["hill_height_m"]
-    angle, share = np.meshgrid(np.linspace(0.0, 6.3, 30), np.linspace(0.0, 1.0, 10))
-    north, east = (share * numbers["clearing_radius_m"] * turn(angle) for turn in (np.cos, np.sin))
+    angle, fraction = np.meshgrid(np.linspace(0.0, 6.3, 30), np.linspace(0.0, 1.0, 10))
+    north, east = (fraction * numbers["clearing_radius_m"] * turn(angle) for turn in (np.cos, np.sin))
     is_inside = np.maximum(np.abs(north), np.abs(east)) <= 80.0
     assert np.all(world.height(north, east)[is_inside] == 0.0)
     trees = world.trees
@@ -90,11 +90,13 @@ def test_trees_keep_their_spacing_their_bounds_and_fit_the_store(seed, numbers):
         assert np.all((listed >= 0) & (listed < trees.size))
 
 
-@given(seed=seeds, numbers=rows, north=st.floats(-90.0, 90.0), east=st.floats(-90.0, 90.0), share=st.floats(-0.1, 1.2))
+@given(
+    seed=seeds, numbers=rows, north=st.floats(-90.0, 90.0), east=st.floats(-90.0, 90.0), fraction=st.floats(-0.1, 1.2)
+)
 @FEW
-def test_contact_depth_is_radius_less_the_distance_on_the_host(seed, numbers, north, east, share):
+def test_contact_depth_is_radius_less_the_distance_on_the_host(seed, numbers, north, east, fraction):
     world = grow(2, seed, numbers)
-    pos = np.array([north, east, -float(world.height(north, east)) - 20.0 * share])
+    pos = np.array([north, east, -float(world.height(north, east)) - 20.0 * fraction])
     height, _, contact = query_points((batch(), 2), pos[None], 1.0)
     # float32 positions on slopes of up to 60 m in 20 m
     assert abs(height[0] - world.height(north, east)) < 1e-3

@@ -125,12 +125,14 @@ def test_contact_depth_is_radius_less_distance(north, east, height, radius):
     assert abs(length - 1.0) < 1e-5 if contact[0, 3] > 0.0 else length == 0.0
 
 
-@given(i_tree=st.integers(0, 10_000), off=st.tuples(*[st.floats(-3.0, 3.0, width=32)] * 2), share=st.floats(0.1, 1.1))
+@given(
+    i_tree=st.integers(0, 10_000), off=st.tuples(*[st.floats(-3.0, 3.0, width=32)] * 2), fraction=st.floats(0.1, 1.1)
+)
 @FEW
-def test_pushing_out_along_the_normal_ends_the_contact(i_tree, off, share):
+def test_pushing_out_along_the_normal_ends_the_contact(i_tree, off, fraction):
     world = small_world(trees_per_ha=20.0)  # sparse: one tree at a time
     tree = world.trees[i_tree % len(world.trees)]
-    height = tree["root_height"] + share * (tree["crown_high"] + tree["crown_radius"] - tree["root_height"])
+    height = tree["root_height"] + fraction * (tree["crown_high"] + tree["crown_radius"] - tree["root_height"])
     pos = np.array([tree["north"] + off[0], tree["east"] + off[1], -height], np.float64)
     for _ in range(20):  # in the corner between trunk and crown each push gives way to the other
         _, _, contact = query_points(world, pos[None])

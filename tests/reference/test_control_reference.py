@@ -92,9 +92,9 @@ def test_desaturation_keeps_as_much_yaw_as_linear_programming_finds() -> None:
 @pytest.mark.parametrize("curve", [0.0, 0.3, 0.6, 1.0])
 def test_command_is_the_inverse_of_the_motor_curve(curve: float) -> None:
     for command in np.linspace(0.0, 1.0, 21):
-        share = curve * command + (1.0 - curve) * np.sqrt(command)
-        assert speed_share(float(command), curve) == pytest.approx(share, abs=1e-6)
-        assert command_for_speed(float(share), curve) == pytest.approx(command, abs=1e-6)
+        fraction = curve * command + (1.0 - curve) * np.sqrt(command)
+        assert speed_share(float(command), curve) == pytest.approx(fraction, abs=1e-6)
+        assert command_for_speed(float(fraction), curve) == pytest.approx(command, abs=1e-6)
 
 
 def test_control_airframe_carries_the_file() -> None:

@@ -7,7 +7,7 @@ import warp as wp
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.parking.arena import (
     INNER_FACES,
-    PORTAL_PLACES,
+    PORTAL_POSITIONS,
     PORTAL_SIZE,
     STOREY_X,
     STOREY_Z,
@@ -125,7 +125,7 @@ def scene_gaps(task, row, radius):
         movers = task.movers.numpy()[row, 2 * storey : 2 * storey + 2]
         surfaces += [("obstacle", rounded(mover, (0.0, 0.75), 0.75 + radius)) for mover in movers]
         portal = tuple(size / 2 for size in PORTAL_SIZE)
-        surfaces.append(("portal", rounded(pose(PORTAL_PLACES[storey]), portal, radius)))
+        surfaces.append(("portal", rounded(pose(PORTAL_POSITIONS[storey]), portal, radius)))
     else:
         block = tuple(size / 2 for size in (3.467, 1.0))
         surfaces += [("obstacle", rounded(box, block, radius)) for box in task.blocks.numpy()[row]]

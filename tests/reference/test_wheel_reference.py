@@ -17,11 +17,11 @@ def curve(slip, direction):
     extremum_slip, extremum = N[f"{direction}_extremum_slip"], N[f"{direction}_extremum"]
     asymptote_slip, asymptote = N[f"{direction}_asymptote_slip"], N[f"{direction}_asymptote"]
     if slip < extremum_slip:
-        share = slip / extremum_slip
-        value = extremum * share * (2.0 - share)
+        fraction = slip / extremum_slip
+        value = extremum * fraction * (2.0 - fraction)
     elif slip < asymptote_slip:
-        share = (slip - extremum_slip) / (asymptote_slip - extremum_slip)
-        value = extremum + (asymptote - extremum) * (3.0 * share**2 - 2.0 * share**3)
+        fraction = (slip - extremum_slip) / (asymptote_slip - extremum_slip)
+        value = extremum + (asymptote - extremum) * (3.0 * fraction**2 - 2.0 * fraction**3)
     else:
         value = asymptote
     return N[f"{direction}_stiffness"] * value

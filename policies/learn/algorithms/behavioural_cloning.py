@@ -57,11 +57,11 @@ class Cloning:
         Args:
             steps: decisions the algorithm has collected so far, which the learning rate falls with.
         """
-        share_left = max(0.0, 1.0 - steps / self._anneal_steps) if self._anneal_steps else 1.0
-        if share_left == 0.0:
+        fraction_left = max(0.0, 1.0 - steps / self._anneal_steps) if self._anneal_steps else 1.0
+        if fraction_left == 0.0:
             return {"Losses/Pretraining Loss": 0.0}
         for group in self._optimizer.param_groups:
-            group["lr"] = self._learning_rate * share_left
+            group["lr"] = self._learning_rate * fraction_left
         losses: list[float] = []
         for _ in range(self._epoch_count):
             for count, batch in enumerate(

@@ -71,13 +71,13 @@ class Dagger:
 
     def iterate(self) -> Iteration:
         """One round: collects and learns."""
-        teacher_share = self.hyperparameters.mixing**self._round
+        teacher_fraction = self.hyperparameters.mixing**self._round
         stretches = self._stretches_per_round
-        tags = [self._collect(teacher_share) for _ in range(stretches)]
+        tags = [self._collect(teacher_fraction) for _ in range(stretches)]
         self._round += 1
         count = stretches * self.ring.length * self.task.task.env_count
         self.steps += count
-        statistics = means(tags) | self._improve(count) | {"Policy/Teacher Share": teacher_share}
+        statistics = means(tags) | self._improve(count) | {"Policy/Teacher Share": teacher_fraction}
         return Iteration(count, self.task.task.take_scores(), statistics)
 
     def restart(self) -> None:
@@ -94,12 +94,12 @@ class Dagger:
         return min(max(wanted, 1), self.ring.slots)
 
     @torch.inference_mode()
-    def _collect(self, teacher_share: float) -> dict[str, float]:
+    def _collect(self, teacher_fraction: float) -> dict[str, float]:
         """One stretch of every environment; who drives an environment drives the whole stretch."""
         task, ring = self.task, self.ring
         slot = ring.open(self._memory)
         draws = torch.rand(task.task.env_count, generator=self._generator, device=task.device)
-        is_taught = (draws < teacher_share)[:, None]
+        is_taught = (draws < teacher_fraction)[:, None]
         rewards, ends = [], []
         for t in range(ring.length):
             labels = self.teacher.actions(task.privileged)

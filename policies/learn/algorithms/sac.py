@@ -185,9 +185,9 @@ class Sac:
 
     def _drawn(self) -> ReplayBatch:
         """A batch from the buffer."""
-        places = self.replay.draw(self.hyperparameters.batch_size, self._generator)
-        batch = self.replay.take(places)
-        return batch if self._hindsight is None else self._hindsight.relabel(batch, places, self._generator)
+        indices = self.replay.draw(self.hyperparameters.batch_size, self._generator)
+        batch = self.replay.take(indices)
+        return batch if self._hindsight is None else self._hindsight.relabel(batch, indices, self._generator)
 
     def _update(self) -> dict[str, float]:
         """Networks, and the clone if there is one."""

@@ -7,8 +7,8 @@ BETA_FLOOR = 1e-5
 EPSILON_FLOOR = 0.1
 
 
-def scheduled(initial: float, floor: float, schedule: Schedule, share_done: float) -> float:
+def scheduled(initial: float, floor: float, schedule: Schedule, fraction_done: float) -> float:
     """The number now: `linear` goes from `initial` to `floor`, where it arrives when all is done."""
     if schedule == "constant":
         return initial
-    return floor + (initial - floor) * max(1.0 - share_done, 0.0)
+    return floor + (initial - floor) * max(1.0 - fraction_done, 0.0)

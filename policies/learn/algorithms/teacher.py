@@ -18,18 +18,18 @@ from policies.tasks.layout import Element, Layout, LayoutError
 class Teacher:
     """A policy that is not trained any more."""
 
-    def __init__(self, policy: Policy, layout: Layout, place: str) -> None:
+    def __init__(self, policy: Policy, layout: Layout, source: str) -> None:
         """A teacher for a task.
 
         Args:
             policy: what it does.
             layout: of the student's task.
-            place: where the policy comes from, for messages.
+            source: where the policy comes from, for messages.
 
         Raises:
             LayoutError: it sees something else than the task's privileged elements, or acts otherwise.
         """
-        _require(policy, layout, place)
+        _require(policy, layout, source)
         self.policy = policy.eval().requires_grad_(False)
 
     @torch.inference_mode()
@@ -55,18 +55,18 @@ def load_teacher(name: str, layout: Layout, device: torch.device | str = "cpu") 
     return Teacher(policy.to(device), layout, str(path))
 
 
-def _require(policy: Policy, layout: Layout, place: str) -> None:
+def _require(policy: Policy, layout: Layout, source: str) -> None:
     there = policy.layout
     if not layout.privileged:
-        raise LayoutError(f"{place}: cannot teach {layout.task} as it is set: it shows a teacher nothing")
+        raise LayoutError(f"{source}: cannot teach {layout.task} as it is set: it shows a teacher nothing")
     if there.image is not None or there.stack != 1 or policy.memory_size:
-        raise LayoutError(f"{place}: a teacher sees the present state alone: no image, no stack, no memory")
+        raise LayoutError(f"{source}: a teacher sees the present state alone: no image, no stack, no memory")
     pairs = (("observation", there.frame, layout.privileged), ("action", there.continuous, layout.continuous))
     for what, elements, wanted in pairs:
         if difference := _difference(elements, wanted):
-            raise LayoutError(f"{place}: cannot teach {layout.task} as it is set: {what} {difference}")
+            raise LayoutError(f"{source}: cannot teach {layout.task} as it is set: {what} {difference}")
     if there.branches != layout.branches:
-        raise LayoutError(f"{place}: cannot teach {layout.task} as it is set: it has other discrete actions")
+        raise LayoutError(f"{source}: cannot teach {layout.task} as it is set: it has other discrete actions")
 
 
 def _difference(there: Sequence[Element], here: Sequence[Element]) -> str:

@@ -9,13 +9,13 @@ from policies.learn.config.config_block import (
     Block,
     Count,
     CountOrNone,
+    Fraction,
+    FractionOrNone,
     NotNegative,
     NotNegativeWhole,
     Positive,
     PositiveOrNone,
     Schedule,
-    Share,
-    ShareOrNone,
     own_key,
 )
 from policies.learn.config.network import NetworkSettings
@@ -62,7 +62,7 @@ class PpoHyperparameters(HyperparametersBase):
     """How far the ratio of new to old probability may move before it is clipped."""
     epsilon_schedule: Schedule = _as("learning_rate_schedule", "linear")
     """`linear`: falls to 0.1."""
-    lambd: Share = 0.95
+    lambd: Fraction = 0.95
     """λ of the generalised advantage estimate."""
     num_epoch: Count = 3
     """Passes over the buffer per update."""
@@ -104,7 +104,7 @@ class SacHyperparameters(HyperparametersBase):
     """Steps of random actions before the first update."""
     init_entcoef: Positive = 1.0
     """Entropy temperature at the start."""
-    tau: Share = 0.005
+    tau: Fraction = 0.005
     """How far the target network follows at each update."""
     steps_per_update: Positive = 1.0
     """Steps of experience per update."""
@@ -136,7 +136,7 @@ class DaggerHyperparameters(HyperparametersBase):
     """Steps collected before each update."""
     num_epoch: Count = own_key(4)
     """How often each step is learnt from, in the mean, if the buffer holds them all."""
-    mixing: Share = own_key(0.5)
+    mixing: Fraction = own_key(0.5)
     """In round i the teacher drives this to the power of i of the environments: all in the first round."""
     perception_strength: NotNegative = own_key(0.1)
     """Weight of the beliefs that `network_settings` names, next to that of the actions."""
@@ -206,8 +206,8 @@ class Behavior(Block):
     """Accepted; collecting and learning take turns here."""
     init_path: str | None = None
     """Whose networks this one starts from: a policy file or checkpoint, a run, or the name of one that ships."""
-    success_target: ShareOrNone = own_key(None)
-    """Training ends when this share of episodes succeeds; none: at max_steps only."""
+    success_target: FractionOrNone = own_key(None)
+    """Training ends when this fraction of episodes succeeds; none: at max_steps only."""
 
     @field_validator("self_play", mode="before")
     @classmethod

@@ -142,7 +142,7 @@ class CompletionCriteria(Block):
     behavior: str
     """The behaviour that is measured."""
     measure: Literal["reward", "progress", "success"] = "reward"
-    """Mean episode reward, steps / max_steps, or (ours) the share of episodes that succeeded."""
+    """Mean episode reward, steps / max_steps, or (ours) the fraction of episodes that succeeded."""
     threshold: Real = 0.0
     """The lesson is over when the measure is above this."""
     min_lesson_length: NotNegativeWhole = 0
@@ -153,7 +153,7 @@ class CompletionCriteria(Block):
     """Whether the environments start anew with the next lesson."""
 
     @model_validator(mode="after")
-    def _shares_lie_between_0_and_1(self) -> Self:
+    def _fractions_lie_between_0_and_1(self) -> Self:
         if self.measure != "reward" and not 0.0 <= self.threshold <= 1.0:
             raise ValueError(f"threshold {self.threshold:g} of {self.measure} is not between 0 and 1")
         return self

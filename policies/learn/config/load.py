@@ -17,12 +17,12 @@ from policies.learn.config.refusal import sentence, unknown_key
 from policies.learn.config.run import RunConfig
 from policies.learn.config.yaml_locations import (
     ConfigError,
-    Place,
-    Placed,
+    Located,
+    Location,
     error_at,
+    location_at,
     mapping_at,
     merged,
-    place_at,
     read_yaml,
 )
 
@@ -36,7 +36,7 @@ class Loaded:
 
     config: RunConfig
     warnings: tuple[str, ...] = ()
-    root: Placed = field(default_factory=lambda: Placed(Place("")))
+    root: Located = field(default_factory=lambda: Located(Location("")))
     """The file in its new form: where its keys stand."""
     options: Mapping[str, str] = field(default_factory=dict)
     """Keys that a flag has set, and the flag."""
@@ -46,8 +46,8 @@ class Loaded:
         option = self.options.get(".".join(map(str, loc)))
         if option is not None:
             return ConfigError(f"{option}: {sentence}")
-        place, path = place_at(self.root, loc)
-        return error_at(place, path, sentence)
+        location, path = location_at(self.root, loc)
+        return error_at(location, path, sentence)
 
 
 def load_config(
@@ -76,65 +76,65 @@ def load_config(
     for key, old_path in (("parameter_randomization", sampler_path), ("curriculum", curriculum_path)):
         if old_path is not None:
             old = read_yaml(old_path, notes)
-            root.put(key, old, old.place)
+            root.put(key, old, old.location)
     _move_old_parameters(root, notes)
     name = next(iter(root["behaviors"]))
     put_right(root, name, notes, is_strict=is_strict)
     return Loaded(_validated(root, name), tuple(notes), root)
 
 
-def _in_new_form(file: Placed, wanted: str | None, notes: list[str]) -> Placed:
+def _in_new_form(file: Located, wanted: str | None, notes: list[str]) -> Located:
     """The file with the one chosen behaviour in `behaviors`, defaults merged into it."""
-    root, behaviors = Placed(file.place), Placed(file.place)
+    root, behaviors = Located(file.location), Located(file.location)
     if is_flat(file):
-        name = _choose(flat_names(file), wanted, file.place, has_default="default" in file)
-        behaviors.put(name, behavior_from_flat(file, name, notes), file.place_of(name))
+        name = _choose(flat_names(file), wanted, file.location, has_default="default" in file)
+        behaviors.put(name, behavior_from_flat(file, name, notes), file.location_of(name))
         root.put("behaviors", behaviors)
         return root
     for key in file:
         if key not in (*_TOP_KEYS, *_MIDDLE_KEYS):
-            raise error_at(file.places[key], key, unknown_key(key, _TOP_KEYS))
+            raise error_at(file.locations[key], key, unknown_key(key, _TOP_KEYS))
         if file[key] is not None:
             root.take(key, file)
     given = mapping_at(root, "behaviors")
-    name = _choose(list(given), wanted, root.place_of("behaviors"), has_default="default_settings" in root)
-    behaviors.put(name, _with_defaults(root, given, name), given.place_of(name))
-    root.put("behaviors", behaviors, root.place_of("behaviors"))
+    name = _choose(list(given), wanted, root.location_of("behaviors"), has_default="default_settings" in root)
+    behaviors.put(name, _with_defaults(root, given, name), given.location_of(name))
+    root.put("behaviors", behaviors, root.location_of("behaviors"))
     if "default_settings" in root:
         root.drop("default_settings")
     return root
 
 
-def _choose(names: list[str], wanted: str | None, place: Place, *, has_default: bool) -> str:
+def _choose(names: list[str], wanted: str | None, location: Location, *, has_default: bool) -> str:
     if wanted is not None and (wanted in names or has_default):
         return wanted
     listed = ", ".join(names)
     if wanted is not None:
-        raise error_at(place, "behaviors", f"there is no behaviour {wanted}" + (f", only {listed}" if names else ""))
+        raise error_at(location, "behaviors", f"there is no behaviour {wanted}" + (f", only {listed}" if names else ""))
     if not names:
-        raise error_at(place, "behaviors", "there is no behaviour to train")
+        raise error_at(location, "behaviors", "there is no behaviour to train")
     if len(names) > 1:
-        raise error_at(place, "behaviors", f"there are {len(names)} behaviours, choose one: {listed}")
+        raise error_at(location, "behaviors", f"there are {len(names)} behaviours, choose one: {listed}")
     return names[0]
 
 
-def _with_defaults(root: Placed, behaviors: Placed, name: str) -> Placed:
+def _with_defaults(root: Located, behaviors: Located, name: str) -> Located:
     """One behaviour over `default_settings`, block by block."""
-    own = mapping_at(behaviors, name) if name in behaviors else Placed(root.place)
+    own = mapping_at(behaviors, name) if name in behaviors else Located(root.location)
     if "default_settings" not in root:
         if "hyperparameters" in own and "trainer_type" not in own:
-            raise error_at(own.places["hyperparameters"], f"behaviors.{name}.trainer_type", "is required")
+            raise error_at(own.locations["hyperparameters"], f"behaviors.{name}.trainer_type", "is required")
         return own.copy()
     default = mapping_at(root, "default_settings")
     if "reward_signals" not in default:  # the default of the defaults, which other signals come on top of
-        signals = Placed(default.place)
-        signals.put("extrinsic", Placed(default.place))
+        signals = Located(default.location)
+        signals.put("extrinsic", Located(default.location))
         default = default.copy()
         default.put("reward_signals", signals)
     return merged(default, own, is_deep=True)
 
 
-def _move_old_parameters(root: Placed, notes: list[str]) -> None:
+def _move_old_parameters(root: Located, notes: list[str]) -> None:
     """Curricula and samplers of the middle form, or of their own files, into `environment_parameters`."""
     old = [key for key in _MIDDLE_KEYS if key in root]
     if old:
@@ -145,7 +145,7 @@ def _move_old_parameters(root: Placed, notes: list[str]) -> None:
         root.drop(key)
 
 
-def _validated(root: Placed, name: str) -> RunConfig:
+def _validated(root: Located, name: str) -> RunConfig:
     values: dict[str, Any] = {key: value for key, value in root.items() if key != "behaviors"}
     try:
         return RunConfig.model_validate({"behavior_name": name, "behavior": root["behaviors"][name], **values})
@@ -153,13 +153,13 @@ def _validated(root: Placed, name: str) -> RunConfig:
         raise _first_refusal(error, root, name) from None
 
 
-def _first_refusal(error: ValidationError, root: Placed, name: str) -> ConfigError:
+def _first_refusal(error: ValidationError, root: Located, name: str) -> ConfigError:
     """The error that stands first in the file."""
     found: list[tuple[int, ConfigError]] = []
     for detail in error.errors():
         if detail["type"] == "default_factory_not_called":  # a default that is as another key, which is wrong itself
             continue
         loc = detail["loc"]
-        place, path = place_at(root, ("behaviors", name, *loc[1:]) if loc[:1] == ("behavior",) else loc)
-        found.append((place.line, error_at(place, path, sentence(detail, RunConfig))))
+        location, path = location_at(root, ("behaviors", name, *loc[1:]) if loc[:1] == ("behavior",) else loc)
+        found.append((location.line, error_at(location, path, sentence(detail, RunConfig))))
     return min(found, key=lambda item: item[0])[1]

@@ -8,7 +8,7 @@ from typing import Any
 
 from policies.learn.config.behavior import HYPERPARAMETERS
 from policies.learn.config.refusal import shown, unknown_key
-from policies.learn.config.yaml_locations import Place, Placed, error_at, mapping_at, merged, note_at
+from policies.learn.config.yaml_locations import Located, Location, error_at, mapping_at, merged, note_at
 
 MEMORY_KEYS = ("use_recurrent", "sequence_length", "memory_size")
 _NETWORK_KEYS = "num_layers hidden_units normalize vis_encode_type".split()
@@ -32,18 +32,18 @@ _KNOWN = {
 }
 
 
-def is_flat(root: Placed) -> bool:
+def is_flat(root: Located) -> bool:
     """Whether a file is in the flat form: no `behaviors`, and a block with a key that only that form has there."""
-    blocks = [value for value in root.values() if isinstance(value, Placed)]
+    blocks = [value for value in root.values() if isinstance(value, Located)]
     return "behaviors" not in root and any((_KNOWN - set(_BLOCK_KEYS)) & set(block) for block in blocks)
 
 
-def flat_names(root: Placed) -> list[str]:
+def flat_names(root: Located) -> list[str]:
     """The behaviours of a file in the flat form."""
     return [name for name in root if name != "default"]
 
 
-def behavior_from_flat(root: Placed, name: str, notes: list[str]) -> Placed:
+def behavior_from_flat(root: Located, name: str, notes: list[str]) -> Located:
     """One behaviour in the new form: its block, if it has one, over the default one.
 
     Args:
@@ -54,35 +54,37 @@ def behavior_from_flat(root: Placed, name: str, notes: list[str]) -> Placed:
     Raises:
         ConfigError: the block refers to one that does not exist, or lacks what its trainer needs.
     """
-    default = _block(root, "default") if "default" in root else Placed(root.place)
+    default = _block(root, "default") if "default" in root else Located(root.location)
     own = _block(root, name) if name in root else default
     flat = merged(default, own)
-    flat.place = root.place_of(name if name in root else "default")
+    flat.location = root.location_of(name if name in root else "default")
     return _in_new_form(name, flat, notes)
 
 
-def _block(root: Placed, name: str) -> Placed:
+def _block(root: Located, name: str) -> Located:
     """The mapping of a name, which may be text that names another block."""
     value, seen = root[name], [name]
     while isinstance(value, str):
         if value not in root or value in seen:
-            raise error_at(root.place_of(name), name, f"refers to {shown(value)}, which is no block of its own")
+            raise error_at(root.location_of(name), name, f"refers to {shown(value)}, which is no block of its own")
         seen.append(value)
         value = root[value]
-    if not isinstance(value, Placed):
-        raise error_at(root.place_of(name), name, f"must be a mapping or the name of another block, not {shown(value)}")
+    if not isinstance(value, Located):
+        raise error_at(
+            root.location_of(name), name, f"must be a mapping or the name of another block, not {shown(value)}"
+        )
     return value
 
 
-def _in_new_form(name: str, flat: Placed, notes: list[str]) -> Placed:
+def _in_new_form(name: str, flat: Located, notes: list[str]) -> Located:
     if "trainer" not in flat:
-        raise error_at(flat.place, f"{name}.trainer", "is required")
+        raise error_at(flat.location, f"{name}.trainer", "is required")
     trainer = str(flat["trainer"])
     for key in _REQUIRED_OF_PPO if trainer == "ppo" else ():
         if key not in flat:
-            raise error_at(flat.place, f"{name}.{key}", "is required in this old form of the file")
-    behavior, network, hyperparameters = Placed(flat.place), Placed(flat.place), Placed(flat.place)
-    behavior.put("trainer_type", flat["trainer"], flat.places["trainer"])
+            raise error_at(flat.location, f"{name}.{key}", "is required in this old form of the file")
+    behavior, network, hyperparameters = Located(flat.location), Located(flat.location), Located(flat.location)
+    behavior.put("trainer_type", flat["trainer"], flat.locations["trainer"])
     behavior.put("hyperparameters", hyperparameters)
     behavior.put("network_settings", network)
     own = HYPERPARAMETERS[trainer].model_fields if trainer in HYPERPARAMETERS else {}
@@ -95,19 +97,19 @@ def _in_new_form(name: str, flat: Placed, notes: list[str]) -> Placed:
             behavior.take(key, flat)
         elif key not in _KNOWN:
             sentence = f"{unknown_key(key, _KNOWN)} (dropped, as ML-Agents does in silence)"
-            notes.append(note_at(flat.places[key], f"{name}.{key}", sentence))
+            notes.append(note_at(flat.locations[key], f"{name}.{key}", sentence))
     if wants_memory(flat, name):
-        memory = Placed(flat.place)
+        memory = Located(flat.location)
         for key in ("sequence_length", "memory_size"):
             if key in flat:
                 memory.take(key, flat)
-        network.put("memory", memory, flat.places["use_recurrent"])
+        network.put("memory", memory, flat.locations["use_recurrent"])
     if trainer == "sac" and "steps_per_update" not in hyperparameters and set(_SAC_INTERVALS) & set(flat):
-        hyperparameters.put("steps_per_update", _steps_per_update(name, flat), _interval_place(flat))
+        hyperparameters.put("steps_per_update", _steps_per_update(name, flat), _interval_location(flat))
     return behavior
 
 
-def wants_memory(block: Placed, path: str) -> bool:
+def wants_memory(block: Located, path: str) -> bool:
     """Whether `use_recurrent` is there, and true.
 
     Raises:
@@ -115,45 +117,47 @@ def wants_memory(block: Placed, path: str) -> bool:
     """
     value = block.get("use_recurrent", False)
     if not isinstance(value, bool):
-        place = block.places["use_recurrent"]
-        raise error_at(place, f"{path}.use_recurrent", f"must be true or false, not {shown(value)}")
+        location = block.locations["use_recurrent"]
+        raise error_at(location, f"{path}.use_recurrent", f"must be true or false, not {shown(value)}")
     return value
 
 
-def _interval_place(flat: Placed) -> Place:
-    return flat.place_of("num_update" if "num_update" in flat else "train_interval")
+def _interval_location(flat: Located) -> Location:
+    return flat.location_of("num_update" if "num_update" in flat else "train_interval")
 
 
-def _steps_per_update(name: str, flat: Placed) -> float:
+def _steps_per_update(name: str, flat: Located) -> float:
     """Steps between updates over updates at a time."""
     try:
         return float(flat.get("train_interval", 1)) / float(flat.get("num_update", 1))
     except (TypeError, ValueError, ZeroDivisionError):
-        place = _interval_place(flat)
-        raise error_at(place, f"{name}.num_update", "num_update and train_interval must be numbers above 0") from None
+        location = _interval_location(flat)
+        raise error_at(
+            location, f"{name}.num_update", "num_update and train_interval must be numbers above 0"
+        ) from None
 
 
-def parameters_from_old(samplers: Placed, curricula: Placed, notes: list[str]) -> Placed:
+def parameters_from_old(samplers: Located, curricula: Located, notes: list[str]) -> Located:
     """`environment_parameters` from `parameter_randomization` and `curriculum`, or from the files they once were.
 
     Raises:
         ConfigError: a sampler or a curriculum that is none.
     """
-    parameters = Placed(samplers.place if samplers else curricula.place)
+    parameters = Located(samplers.location if samplers else curricula.location)
     for name in samplers:
         if name != "resampling-interval":  # every episode draws anew
-            parameters.put(name, _sampler_from_old(mapping_at(samplers, name)), samplers.places[name])
+            parameters.put(name, _sampler_from_old(mapping_at(samplers, name)), samplers.locations[name])
     for behavior in curricula:
         _add_curricula(parameters, behavior, curricula, notes)
     return parameters
 
 
-def _sampler_from_old(old: Placed) -> Placed:
-    sampler, drawn = Placed(old.place), Placed(old.place)
+def _sampler_from_old(old: Located) -> Located:
+    sampler, drawn = Located(old.location), Located(old.location)
     for key in old:
         if key in {"sampler-type", "sampler_type"}:
             kind = "multirangeuniform" if old[key] == "multirange_uniform" else old[key]
-            sampler.put("sampler_type", kind, old.places[key])
+            sampler.put("sampler_type", kind, old.locations[key])
         elif key == "sampler_parameters":
             sampler.take(key, old)
         else:
@@ -163,43 +167,45 @@ def _sampler_from_old(old: Placed) -> Placed:
     return sampler
 
 
-def _add_curricula(parameters: Placed, behavior: str, curricula: Placed, notes: list[str]) -> None:
+def _add_curricula(parameters: Located, behavior: str, curricula: Located, notes: list[str]) -> None:
     """One old curriculum sets several parameters by one row of thresholds: each becomes a curriculum of its own."""
     old = mapping_at(curricula, behavior)
     for key in ("measure", "thresholds", "parameters"):
         if key not in old:
-            raise error_at(curricula.places[behavior], f"curriculum.{behavior}.{key}", "is required")
+            raise error_at(curricula.locations[behavior], f"curriculum.{behavior}.{key}", "is required")
     unknown = [key for key in old if key not in {*_CURRICULUM_KEYS, "thresholds", "parameters"}]
     dropped = "unknown key (dropped, as ML-Agents does)"
-    notes.extend(note_at(old.places[key], f"curriculum.{behavior}.{key}", dropped) for key in unknown)
+    notes.extend(note_at(old.locations[key], f"curriculum.{behavior}.{key}", dropped) for key in unknown)
     thresholds = old["thresholds"] if isinstance(old["thresholds"], list) else [old["thresholds"]]
     values = mapping_at(old, "parameters")
     for name in values:
-        place = values.places[name]
+        location = values.locations[name]
         if name in parameters:
-            notes.append(note_at(place, f"curriculum.{behavior}.{name}", "has a sampler too, which counts"))
+            notes.append(note_at(location, f"curriculum.{behavior}.{name}", "has a sampler too, which counts"))
             continue
         lessons = values[name]
         if not isinstance(lessons, list) or len(lessons) != len(thresholds) + 1:
             wanted = f"must be a list of {len(thresholds) + 1} values, one more than there are thresholds"
-            raise error_at(place, f"curriculum.{behavior}.parameters.{name}", wanted)
-        curriculum = Placed(place)
-        curriculum.put("curriculum", [_lesson(behavior, old, thresholds, k, v, place) for k, v in enumerate(lessons)])
-        parameters.put(name, curriculum, place)
+            raise error_at(location, f"curriculum.{behavior}.parameters.{name}", wanted)
+        curriculum = Located(location)
+        curriculum.put(
+            "curriculum", [_lesson(behavior, old, thresholds, k, v, location) for k, v in enumerate(lessons)]
+        )
+        parameters.put(name, curriculum, location)
 
 
-def _lesson(behavior: str, old: Placed, thresholds: list[Any], k: int, value: Any, place: Place) -> Placed:
-    lesson = Placed(place)
+def _lesson(behavior: str, old: Located, thresholds: list[Any], k: int, value: Any, location: Location) -> Located:
+    lesson = Located(location)
     lesson.put("name", f"Lesson{k}")
     lesson.put("value", value)
     if k < len(thresholds):
-        criteria = Placed(old.place)
+        criteria = Located(old.location)
         criteria.put("behavior", behavior)
-        criteria.put("threshold", thresholds[k], old.places["thresholds"])
+        criteria.put("threshold", thresholds[k], old.locations["thresholds"])
         criteria.put("min_lesson_length", 1)  # the old defaults of these two
         criteria.put("signal_smoothing", False)
         for key in _CURRICULUM_KEYS:
             if key in old:
                 criteria.take(key, old)
-        lesson.put("completion_criteria", criteria, old.places["thresholds"])
+        lesson.put("completion_criteria", criteria, old.locations["thresholds"])
     return lesson

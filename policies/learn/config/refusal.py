@@ -28,7 +28,7 @@ _KINDS = {
 
 
 def sentence(error: ErrorDetails, model: type[BaseModel]) -> str:
-    """What is wrong, without the place.
+    """What is wrong, without the location.
 
     Args:
         error: as pydantic reports it.

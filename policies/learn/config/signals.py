@@ -4,14 +4,14 @@ from typing import Literal
 
 from pydantic import field_validator
 
-from policies.learn.config.config_block import Block, CountOrNone, NotNegative, Positive, Share, own_key
+from policies.learn.config.config_block import Block, CountOrNone, Fraction, NotNegative, Positive, own_key
 from policies.learn.config.network import NetworkSettings
 
 
 class SignalSettings(Block):
     """What every reward signal has."""
 
-    gamma: Share = 0.99
+    gamma: Fraction = 0.99
     """Discount of this signal's rewards."""
     strength: NotNegative = 1.0
     """The signal's rewards are multiplied by this."""

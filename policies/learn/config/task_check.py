@@ -86,17 +86,17 @@ def _check_demonstrations(loaded: Loaded, task: Task) -> None:
 
 def _check_teacher(loaded: Loaded, task: Task) -> None:
     behavior = loaded.config.behavior
-    place = ("behaviors", loaded.config.behavior_name)
-    with _refused_at(loaded, *place, "network_settings", "perceives"):
+    location = ("behaviors", loaded.config.behavior_name)
+    with _refused_at(loaded, *location, "network_settings", "perceives"):
         require_privileged(task.layout, behavior.network_settings.perceives)
     if isinstance(behavior.hyperparameters, DaggerHyperparameters):
-        with _refused_at(loaded, *place, "hyperparameters", "teacher"):
+        with _refused_at(loaded, *location, "hyperparameters", "teacher"):
             load_teacher(behavior.hyperparameters.teacher, task.layout)
 
 
 @contextmanager
 def _refused_at(loaded: Loaded, *loc: int | str) -> Iterator[None]:
-    """What the task refuses, with the place of the key that asks for it."""
+    """What the task refuses, with the location of the key that asks for it."""
     try:
         yield
     except (UnknownTask, NumberError, DemonstrationError, LayoutError, CheckpointError) as error:

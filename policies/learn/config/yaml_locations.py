@@ -1,7 +1,7 @@
 """YAML files read with the line of every key, so that each error and warning can say where.
 
-In: a file. Out: its mappings as `Placed`, which are plain dicts that remember where their keys stand. A merge of two
-of them keeps the place of each key, whichever file it came from.
+In: a file. Out: its mappings as `Located`, which are plain dicts that remember where their keys stand. A merge of two
+of them keeps the location of each key, whichever file it came from.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ class ConfigError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Location:
     """A line of a file; 0: the file as a whole."""
 
     file: str
@@ -30,48 +30,48 @@ class Place:
         return f"{self.file}:{self.line}" if self.line else self.file
 
 
-class Placed(dict[str, Any]):
-    """A mapping of the file; `place` is where it begins, `places` where its keys stand."""
+class Located(dict[str, Any]):
+    """A mapping of the file; `location` is where it begins, `locations` where its keys stand."""
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, location: Location) -> None:
         super().__init__()
-        self.place = place
-        self.places: dict[str, Place] = {}
+        self.location = location
+        self.locations: dict[str, Location] = {}
 
-    def put(self, key: str, value: Any, place: Place | None = None) -> None:
+    def put(self, key: str, value: Any, location: Location | None = None) -> None:
         """Sets a key, and where it stands."""
         self[key] = value
-        self.places[key] = place or self.place
+        self.locations[key] = location or self.location
 
-    def take(self, key: str, source: "Placed", source_key: str | None = None) -> None:
-        """Copies a key with its place from another mapping, which may call it otherwise."""
+    def take(self, key: str, source: "Located", source_key: str | None = None) -> None:
+        """Copies a key with its location from another mapping, which may call it otherwise."""
         name = source_key or key
-        self.put(key, source[name], source.places[name])
+        self.put(key, source[name], source.locations[name])
 
-    def place_of(self, key: str) -> Place:
+    def location_of(self, key: str) -> Location:
         """Where a key stands, or would stand."""
-        return self.places.get(key, self.place)
+        return self.locations.get(key, self.location)
 
     def drop(self, key: str) -> None:
         """Takes a key away."""
-        del self[key], self.places[key]
+        del self[key], self.locations[key]
 
-    def copy(self) -> "Placed":
+    def copy(self) -> "Located":
         """The same keys and values in a mapping of its own."""
-        return merged(Placed(self.place), self)
+        return merged(Located(self.location), self)
 
 
-def merged(base: Placed, over: Placed, *, is_deep: bool = False) -> Placed:
+def merged(base: Located, over: Located, *, is_deep: bool = False) -> Located:
     """`base` with the keys of `over` put over it; deep: mappings inside mappings are merged too."""
-    result = Placed(over.place)
+    result = Located(over.location)
     for source in (base, over):
         for key, value in source.items():
-            is_both = is_deep and isinstance(result.get(key), Placed) and isinstance(value, Placed)
-            result.put(key, merged(result[key], value, is_deep=True) if is_both else value, source.places[key])
+            is_both = is_deep and isinstance(result.get(key), Located) and isinstance(value, Located)
+            result.put(key, merged(result[key], value, is_deep=True) if is_both else value, source.locations[key])
     return result
 
 
-def mapping_at(parent: Placed, key: str) -> Placed:
+def mapping_at(parent: Located, key: str) -> Located:
     """The mapping of a key; an empty one where the key is missing or has no value.
 
     Raises:
@@ -79,20 +79,20 @@ def mapping_at(parent: Placed, key: str) -> Placed:
     """
     value = parent.get(key)
     if value is None:
-        return Placed(parent.place_of(key))
-    if not isinstance(value, Placed):
-        raise error_at(parent.place_of(key), key, f"must be a mapping of keys to values, not {shown(value)}")
+        return Located(parent.location_of(key))
+    if not isinstance(value, Located):
+        raise error_at(parent.location_of(key), key, f"must be a mapping of keys to values, not {shown(value)}")
     return value
 
 
-def error_at(place: Place, key: str, sentence: str) -> ConfigError:
+def error_at(location: Location, key: str, sentence: str) -> ConfigError:
     """The error for the user."""
-    return ConfigError(note_at(place, key, sentence))
+    return ConfigError(note_at(location, key, sentence))
 
 
-def note_at(place: Place, key: str, sentence: str) -> str:
+def note_at(location: Location, key: str, sentence: str) -> str:
     """`FILE:LINE: key: sentence`."""
-    return ": ".join(part for part in (str(place), key, sentence) if part)
+    return ": ".join(part for part in (str(location), key, sentence) if part)
 
 
 def _loader(text: str) -> Any:
@@ -105,7 +105,7 @@ def _loader(text: str) -> Any:
     return loader
 
 
-def read_yaml(path: Path | str, notes: list[str]) -> Placed:
+def read_yaml(path: Path | str, notes: list[str]) -> Located:
     """The file's mapping.
 
     Args:
@@ -118,13 +118,13 @@ def read_yaml(path: Path | str, notes: list[str]) -> Placed:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
-        raise error_at(Place(str(path)), "", "is not UTF-8 text") from None
+        raise error_at(Location(str(path)), "", "is not UTF-8 text") from None
     except OSError as error:
-        raise error_at(Place(str(path)), "", (error.strerror or "cannot be read").lower()) from None
+        raise error_at(Location(str(path)), "", (error.strerror or "cannot be read").lower()) from None
     return parse_yaml(text, str(path), notes)
 
 
-def parse_yaml(text: str, file: str, notes: list[str]) -> Placed:
+def parse_yaml(text: str, file: str, notes: list[str]) -> Located:
     """The text's mapping; `file` is what messages call it.
 
     Raises:
@@ -135,19 +135,19 @@ def parse_yaml(text: str, file: str, notes: list[str]) -> Placed:
         node = loader.get_single_node()
         if not isinstance(node, yaml.MappingNode):
             what = "is empty" if node is None else "must be a mapping of keys to values"
-            raise error_at(Place(file), "", what)
+            raise error_at(Location(file), "", what)
         return _Walk(loader, file, notes).mapping(node, "", ())
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        place = Place(file, mark.line + 1 if mark else 0)
+        location = Location(file, mark.line + 1 if mark else 0)
         raise error_at(
-            place, "", f"not YAML: {_one_line(error.problem or error.context or 'cannot be read')}"
+            location, "", f"not YAML: {_one_line(error.problem or error.context or 'cannot be read')}"
         ) from None
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
-        raise error_at(Place(file, line), "", f"not YAML: character {error.character:#x} is not allowed") from None
+        raise error_at(Location(file, line), "", f"not YAML: character {error.character:#x} is not allowed") from None
     except RecursionError:
-        raise error_at(Place(file), "", "not a configuration: nested too deeply") from None
+        raise error_at(Location(file), "", "not a configuration: nested too deeply") from None
 
 
 def _one_line(text: str) -> str:
@@ -155,7 +155,7 @@ def _one_line(text: str) -> str:
 
 
 class _Walk:
-    """Nodes of one file turned into plain values and `Placed` mappings."""
+    """Nodes of one file turned into plain values and `Located` mappings."""
 
     def __init__(self, loader: Any, file: str, notes: list[str]) -> None:
         self._loader = loader
@@ -164,13 +164,13 @@ class _Walk:
         self._nodes_left = MAX_NODES
         self._merged_sizes: dict[int, int] = {}
 
-    def mapping(self, node: yaml.MappingNode, path: str, above: tuple[int, ...]) -> Placed:
+    def mapping(self, node: yaml.MappingNode, path: str, above: tuple[int, ...]) -> Located:
         """One mapping; `above` are the nodes it lies in."""
         self._enter(node, path, above)
         self._note_duplicates(node, path)
         self._charge(node, path, self._merged_size(node, ()) - len(node.value))
         self._loader.flatten_mapping(node)  # the merge key <<
-        result = Placed(self._place(node))
+        result = Located(self._place(node))
         for key_node, value_node in node.value:
             if not isinstance(key_node, yaml.ScalarNode):
                 raise error_at(self._place(key_node), path, "a key must be plain text")
@@ -224,21 +224,21 @@ class _Walk:
                 self._notes.append(note_at(self._place(key_node), below, "stands here twice; the last one counts"))
             seen.add(str(key_node.value))
 
-    def _place(self, node: yaml.Node) -> Place:
-        return Place(self._file, node.start_mark.line + 1)
+    def _place(self, node: yaml.Node) -> Location:
+        return Location(self._file, node.start_mark.line + 1)
 
 
-def place_at(root: Placed, loc: tuple[int | str, ...]) -> tuple[Place, str]:
+def location_at(root: Located, loc: tuple[int | str, ...]) -> tuple[Location, str]:
     """Where the value of a path stands, as near as the file says, and the path as text."""
-    place, text = root.place, ""
+    location, text = root.location, ""
     value: Any = root
     for step in loc:
         if isinstance(step, int):
             text += f"[{step}]"
             value = value[step] if isinstance(value, list) and step < len(value) else None
-            place = value.place if isinstance(value, Placed) else place
+            location = value.location if isinstance(value, Located) else location
         else:
             text = f"{text}.{step}" if text else step
-            place = value.places.get(step, place) if isinstance(value, Placed) else place
-            value = value.get(step) if isinstance(value, Placed) else None
-    return place, text
+            location = value.locations.get(step, location) if isinstance(value, Located) else location
+            value = value.get(step) if isinstance(value, Located) else None
+    return location, text

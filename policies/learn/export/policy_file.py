@@ -84,8 +84,8 @@ def policy_record(policy: Policy) -> dict[str, Any]:
     }
 
 
-def policy_of(record: Mapping[str, Any], place: str) -> Policy:
-    """What `policy_record` returned; `place` is named if it does not fit together.
+def policy_of(record: Mapping[str, Any], source: str) -> Policy:
+    """What `policy_record` returned; `source` is named if it does not fit together.
 
     Raises:
         CheckpointError: written by another version of this program.
@@ -97,5 +97,5 @@ def policy_of(record: Mapping[str, Any], place: str) -> Policy:
         policy.load_state_dict(record["weights"])
     except (ValidationError, AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].strip()
-        raise CheckpointError(f"{place}: written by another version of honeyguide: {reason}") from error
+        raise CheckpointError(f"{source}: written by another version of honeyguide: {reason}") from error
     return policy.eval()

@@ -109,7 +109,7 @@ def _first_line(error: Exception) -> str:
     return (str(error) or type(error).__name__).splitlines()[0]
 
 
-def _columns(episode: dict[str, Any], layout: Layout, place: str) -> _Episode:
+def _columns(episode: dict[str, Any], layout: Layout, source: str) -> _Episode:
     observations = np.asarray(episode["observations"], np.float32)
     actions = np.asarray(episode["actions"])
     rewards = np.asarray(episode["rewards"], np.float32)
@@ -117,19 +117,19 @@ def _columns(episode: dict[str, Any], layout: Layout, place: str) -> _Episode:
     is_ended = np.asarray(episode["terminations"], np.bool_) | np.asarray(episode["truncations"], np.bool_)
     if observations.shape != (count + 1, layout.observation_size):
         raise DemonstrationError(
-            f"{place}: {count} rewards need observations of shape {(count + 1, layout.observation_size)}, "
+            f"{source}: {count} rewards need observations of shape {(count + 1, layout.observation_size)}, "
             f"not {observations.shape}"
         )
     width = len(layout.branches) or len(layout.continuous)
     if actions.size != count * width:
-        raise DemonstrationError(f"{place}: {count} rewards need {count * width} actions, not {actions.size}")
+        raise DemonstrationError(f"{source}: {count} rewards need {count * width} actions, not {actions.size}")
     actions = actions.reshape(count, width)
     if not (np.isfinite(observations).all() and np.isfinite(actions).all() and np.isfinite(rewards).all()):
-        raise DemonstrationError(f"{place}: holds a value that is not finite")
+        raise DemonstrationError(f"{source}: holds a value that is not finite")
     if layout.branches:
         continuous, branches = np.zeros((count, 0), np.float32), actions.astype(np.int64)
         if (branches < 0).any() or (branches >= np.array(layout.branch_sizes)).any():
-            raise DemonstrationError(f"{place}: holds a choice that no branch has")
+            raise DemonstrationError(f"{source}: holds a choice that no branch has")
     else:
         continuous, branches = actions.astype(np.float32).clip(-1.0, 1.0), np.zeros((count, 0), np.int64)
     return observations[:-1], observations[1:], continuous, branches, rewards, is_ended

@@ -1,8 +1,8 @@
 """Hindsight replay: some of the transitions that are drawn get a goal that their episode came to later.
 
-Andrychowicz et al. 2017 (arXiv 1707.01495), strategy `future`: of k + 1 transitions, k get as goal the place of a later
-observation of their own episode, and are paid and ended as the task would have done with that goal. Episodes that still
-run lend what they have seen so far.
+Andrychowicz et al. 2017 (arXiv 1707.01495), strategy `future`: of k + 1 transitions, k get as goal the position of a
+later observation of their own episode, and are paid and ended as the task would have done with that goal. Episodes that
+still run lend what they have seen so far.
 """
 
 from collections.abc import Mapping
@@ -13,13 +13,13 @@ import torch
 from torch import Tensor
 
 from policies.learn.rollout.replay_buffer import Replay, ReplayBatch
-from policies.tasks.goals import PlaceGoal
+from policies.tasks.goals import PositionGoal
 
 
 class Hindsight:
     """What is known of the episodes of a replay buffer, slot by slot, and the relabelling."""
 
-    def __init__(self, goal: PlaceGoal, replay: Replay, goals_per_transition: int) -> None:
+    def __init__(self, goal: PositionGoal, replay: Replay, goals_per_transition: int) -> None:
         """Knows of no episode yet.
 
         Args:
@@ -31,7 +31,7 @@ class Hindsight:
         device = replay.rows.device
         self.goal = goal
         self._replay = replay
-        self._share = goals_per_transition / (goals_per_transition + 1)
+        self._fraction = goals_per_transition / (goals_per_transition + 1)
         self._episode = torch.zeros(replay.env_count, dtype=torch.int64, device=device)  # running, modulo slots
         self._episodes = torch.zeros(shape, dtype=torch.int64, device=device)  # that a transition belongs to
         self._last_rounds = torch.zeros(shape, dtype=torch.int64, device=device)  # by episode, not by slot
@@ -58,27 +58,27 @@ class Hindsight:
         newest = (self._replay.rounds - 1) % self._replay.slots
         self._episode.add_(self._episodes[newest] == self._episode).remainder_(self._replay.slots)
 
-    def relabel(self, transitions: ReplayBatch, places: Tensor, generator: torch.Generator) -> ReplayBatch:
+    def relabel(self, transitions: ReplayBatch, indices: Tensor, generator: torch.Generator) -> ReplayBatch:
         """Drawn transitions, k of k + 1 with another goal.
 
         Args:
             transitions: B of them, left as they are.
-            places: where in the ring they lie, shape (B,).
+            indices: where in the ring they lie, shape (B,).
             generator: of all draws.
         """
-        chance = torch.rand(2, len(places), generator=generator, device=places.device)
+        chance = torch.rand(2, len(indices), generator=generator, device=indices.device)
         goals = torch.where(
-            (chance[0] < self._share)[:, None],
-            self._achieved_later(places, chance[1]),
+            (chance[0] < self._fraction)[:, None],
+            self._achieved_later(indices, chance[1]),
             transitions.observations[:, self.goal.goal],
         )
-        radii, is_success = self._radii.flatten()[places], self._is_success.flatten()[places]
+        radii, is_success = self._radii.flatten()[indices], self._is_success.flatten()[indices]
         return with_goals(transitions, goals, self.goal, radii, is_success)
 
-    def _achieved_later(self, places: Tensor, chance: Tensor) -> Tensor:
+    def _achieved_later(self, indices: Tensor, chance: Tensor) -> Tensor:
         """What was achieved by these or later transitions of their episodes, shape (B, elements of a goal)."""
         replay = self._replay
-        slots, envs = places // replay.env_count, places % replay.env_count
+        slots, envs = indices // replay.env_count, indices % replay.env_count
         newest = replay.rounds - 1
         rounds = newest - (newest - slots) % replay.slots  # the round that lies in the slot
         last = self._last_rounds[self._episodes[slots, envs], envs]
@@ -99,14 +99,14 @@ _STATE = ("_episode", "_episodes", "_last_rounds", "_radii", "_is_success")
 
 
 def with_goals(
-    transitions: ReplayBatch, goals: Tensor, goal: PlaceGoal, radii: Tensor, is_success: Tensor
+    transitions: ReplayBatch, goals: Tensor, goal: PositionGoal, radii: Tensor, is_success: Tensor
 ) -> ReplayBatch:
     """The transitions as they would have been with other goals; with their own goals, as they were.
 
     Args:
         transitions: B of them.
         goals: shape (B, elements of a goal).
-        goal: where goals and places lie in observations, and what reaching one pays.
+        goal: where goals and positions lie in observations, and what reaching one pays.
         radii: within which a goal counts as reached, shape (B,).
         is_success: which transitions reached the goals they had, shape (B,).
     """

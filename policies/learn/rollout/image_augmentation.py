@@ -1,7 +1,7 @@
 """Images changed at random while a policy learns from them: a camera may show the same things otherwise.
 
 In: sequences of images as bytes. Out: copies. One draw holds for a whole sequence, except for noise: a camera's
-exposure and mount do not change from one picture to the next.
+exposure and mount do not change from one image to the next.
 """
 
 import torch

@@ -89,9 +89,9 @@ class Replay:
         """Places in the ring, uniformly and with replacement, shape (count,): slot x environments + environment."""
         return torch.randint(len(self), (count,), generator=generator, device=self.rows.device)
 
-    def take(self, places: Tensor) -> ReplayBatch:
-        """Copies of the transitions at places."""
-        columns = torch.split(self.rows.flatten(0, 1)[places], self._widths, dim=1)
+    def take(self, indices: Tensor) -> ReplayBatch:
+        """Copies of the transitions at these indices."""
+        columns = torch.split(self.rows.flatten(0, 1)[indices], self._widths, dim=1)
         before, after, continuous, branches, rewards, is_terminated, is_ended = columns
         ends = is_terminated[:, 0], is_ended[:, 0] > 0.0
         return ReplayBatch(before, after, continuous, branches.long(), rewards[:, 0], *ends)

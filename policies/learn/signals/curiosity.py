@@ -19,7 +19,7 @@ from policies.learn.signals.signal_losses import half_squared_error, inverse_los
 from policies.tasks.layout import Layout
 
 HEAD_UNITS = 256  # all numbers here are ML-Agents'
-FORWARD_SHARE = 0.2
+FORWARD_FRACTION = 0.2
 LOSS_WEIGHT = 10.0
 
 
@@ -88,7 +88,7 @@ class CuriositySignal:
         before, after = network.features(batch.observations), network.features(batch.next_observations)
         forward_loss = network.forward_errors(before, after, batch).mean()
         guess_loss = network.inverse_loss(before, after, batch)
-        loss = LOSS_WEIGHT * (FORWARD_SHARE * forward_loss + (1.0 - FORWARD_SHARE) * guess_loss)
+        loss = LOSS_WEIGHT * (FORWARD_FRACTION * forward_loss + (1.0 - FORWARD_FRACTION) * guess_loss)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         self.optimizer.step()

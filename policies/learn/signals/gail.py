@@ -102,7 +102,7 @@ class GailSignal:
         policy = self._inputs(self._drawn(batch))
         count = len(policy)
         expert = self._expert_inputs[self._drawn_rows(len(self._expert_inputs), count)]
-        shares = torch.rand(policy.shape, generator=generator, device=policy.device)
+        fractions = torch.rand(policy.shape, generator=generator, device=policy.device)
 
         means = network.code_means(torch.cat([expert, policy]))
         logits = network.estimates(means, generator)
@@ -114,7 +114,7 @@ class GailSignal:
             "Policy/GAIL Policy Estimate": estimates[count:].mean().item(),
         }
         penalty = GRADIENT_PENALTY_WEIGHT * gradient_penalty(
-            lambda inputs: network.estimates(network.code_means(inputs), generator).sigmoid(), expert, policy, shares
+            lambda inputs: network.estimates(network.code_means(inputs), generator).sigmoid(), expert, policy, fractions
         )
         statistics["Policy/GAIL Grad Mag Loss"] = penalty.item()
         loss = loss + penalty

@@ -21,18 +21,18 @@ def discriminator_loss(expert_logits: Tensor, policy_logits: Tensor) -> Tensor:
     return functional.softplus(-expert_logits).mean() + functional.softplus(policy_logits).mean()
 
 
-def gradient_penalty(estimate: Callable[[Tensor], Tensor], expert: Tensor, policy: Tensor, shares: Tensor) -> Tensor:
+def gradient_penalty(estimate: Callable[[Tensor], Tensor], expert: Tensor, policy: Tensor, fractions: Tensor) -> Tensor:
     """How far the slope of D is from 1, squared, between the expert's inputs and the policy's (arXiv 1704.00028).
 
-    As in ML-Agents the slope is that of D itself, not of its logit, and each input has a share of its own.
+    As in ML-Agents the slope is that of D itself, not of its logit, and each input has a fraction of its own.
 
     Args:
         estimate: inputs (B, I) to D (B,).
         expert: inputs, (B, I).
         policy: inputs, (B, I).
-        shares: of the policy in the mixture, (B, I) in [0, 1].
+        fractions: of the policy in the mixture, (B, I) in [0, 1].
     """
-    inputs = torch.lerp(expert, policy, shares).requires_grad_()
+    inputs = torch.lerp(expert, policy, fractions).requires_grad_()
     (slope,) = torch.autograd.grad(estimate(inputs).sum(), inputs, create_graph=True)
     return ((slope.square().sum(dim=-1) + _TINY).sqrt() - 1.0).square().mean()
 

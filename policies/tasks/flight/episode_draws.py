@@ -26,8 +26,8 @@ def draw_seed(seed: int, i_env: int, episode: int, stream: int, is_test: int) ->
 @wp.func
 def draw_index(seed: int, i_env: int, episode: int, stream: int, count: int) -> int:
     """One of 0 to count - 1."""
-    share = wp.randf(draw_key(seed, i_env, episode, stream))
-    return wp.min(int(share * float(count)), count - 1)
+    fraction = wp.randf(draw_key(seed, i_env, episode, stream))
+    return wp.min(int(fraction * float(count)), count - 1)
 
 
 @wp.func

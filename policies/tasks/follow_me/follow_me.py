@@ -1,7 +1,7 @@
 """FollowMe: a drone keeps 1 to 3 m from its owner's chest, who walks and runs through hills and trees.
 
 In: an action, 10 Hz: velocity and yaw rate for the flight controller, or the document's three choices. Out: what the
-vehicle knows of itself and of the owner, and its camera's picture; of teachers, the truth. The simulator and the flight
+vehicle knows of itself and of the owner, and its camera's image; of teachers, the truth. The simulator and the flight
 controller are those of every flight.
 """
 
@@ -117,7 +117,7 @@ class FollowMe(FlightTask):
     def _sees_truth(self) -> bool:
         return self.settings.observation == "state" or bool(self.layout.privileged)
 
-    def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
+    def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """Drone and owner from above, and what the camera sees."""
         truth = self.rig.truth_row(i_env)
         owner = self.follow.people.numpy()[i_env]

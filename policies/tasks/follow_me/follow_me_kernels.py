@@ -2,10 +2,10 @@
 
 act       actions to setpoints                           (then the rig advances)
 walk      the owner and their phone, over the same time
-look      where the owner truly is from there            (then ranges and pictures are taken)
+look      where the owner truly is from there            (then ranges and images are taken)
 judge     the vector, the reward, the end                (rows that end start anew:)
 prepare   numbers and seeds of the new episode           (then worlds grow and vehicles take their hovers)
-place     wind, sensors and mass, the owner, their phone (then look, ranges and pictures again)
+place     wind, sensors and mass, the owner, their phone (then look, ranges and images again)
 show      the first vector
 """
 
@@ -61,7 +61,7 @@ MEASURES = (
     "distance_m", "bearing_rad", "is_in_view", "is_collided", "is_in_band", "room_m", "owner_speed_m_s", "speed_m_s",
 )  # fmt: skip
 """Of each decision, the simulator's truth: distance to the owner's chest, its bearing from the true heading, whether
-the picture shows some of the owner, whether anything was touched or the owner came too near, whether the distance is in
+the image shows some of the owner, whether anything was touched or the owner came too near, whether the distance is in
 the band, room to obstacles (at most 2 m), and both speeds."""
 
 
@@ -260,8 +260,8 @@ def person_of(model: PersonModel, n: FollowParams) -> PersonModel:
     """The owner of an episode."""
     model.speed_max = n.owner_speed_max
     model.speed_min = wp.min(model.speed_min, n.owner_speed_max)
-    model.stop_share = n.owner_stop_share
-    model.graze_share = n.owner_graze_share
+    model.stop_fraction = n.owner_stop_share
+    model.graze_fraction = n.owner_graze_share
     return model
 
 
@@ -304,8 +304,8 @@ def place(buffers: StepBuffers, rig: RigArrays, state: FollowState, start: Start
     nose = wp.quat_rotate(truth.q_ned_from_frd, wp.vec3(1.0, 0.0, 0.0))
     aside = draw_angle(seed, i, episode, _BEARING_STREAM) * params.start_bearing_deg / 180.0
     bearing = wp.atan2(nose[1], nose[0]) + aside
-    share = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
-    distance = params.start_distance_min_m + share * (params.start_distance_max_m - params.start_distance_min_m)
+    fraction = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
+    distance = params.start_distance_min_m + fraction * (params.start_distance_max_m - params.start_distance_min_m)
     north = truth.pos_ned[0] + distance * wp.cos(bearing)
     east = truth.pos_ned[1] + distance * wp.sin(bearing)
     heading = draw_angle(seed, i, episode, _HEADING_STREAM)

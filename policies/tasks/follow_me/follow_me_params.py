@@ -6,7 +6,7 @@ The numbers of the air and the vehicle come first (`FLIGHT_PARAMS`); all can be 
 import warp as wp
 
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
-from policies.tasks.follow_me.world import STOP_SHARE
+from policies.tasks.follow_me.world import STOP_FRACTION
 from policies.tasks.task_params import Sampler, TaskParam
 
 TREES_PER_HA_MAX = 300.0
@@ -63,7 +63,7 @@ FOLLOW_PARAMS = (
     TaskParam("hill_height_m", 8.0, 0.0, 30.0, "m", "bound of the hills above and valleys below the start", "guess"),
     TaskParam("trees_per_ha", 100.0, 0.0, TREES_PER_HA_MAX, "1/ha", "trees per hectare", "guess: open woodland"),
     TaskParam("owner_speed_max", 2.0, 0.4, 6.0, "m/s", "the owner's fastest walk or run", "2: walks, 5: runs"),
-    TaskParam("owner_stop_share", STOP_SHARE, 0.0, 1.0, "1", "share of the owner's plans that are a stop", "guess"),
+    TaskParam("owner_stop_share", STOP_FRACTION, 0.0, 1.0, "1", "share of the owner's plans that are a stop", "guess"),
     TaskParam(
         "owner_graze_share", 0.3, 0.0, 1.0, "1", "share of the owner's plans that lead closely past a tree", "guess"
     ),

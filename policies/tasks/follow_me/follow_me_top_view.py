@@ -51,7 +51,7 @@ def draw(
 
 
 def _near(world: WorldMap, north: float, east: float) -> Any:
-    """The trees that can be seen in the picture, the nearest to the ground first."""
+    """The trees that can be seen in the image, the nearest to the ground first."""
     trees = world.trees
     reach = _HALF_M + trees["crown_radius"]
     return trees[(np.abs(trees["north"] - north) < reach) & (np.abs(trees["east"] - east) < reach)]

@@ -38,8 +38,8 @@ DOCUMENT_SPEED_M_S = wp.constant(3.0)  # unpublished; guess, below the drone pac
 DOCUMENT_CLIMB_M_S = wp.constant(1.0)  # unpublished; guess
 DOCUMENT_YAW_RATE_RAD_S = wp.constant(1.0)  # unpublished; guess
 
-_PLACE_SCALE = wp.constant(5.0)  # [m]
-_PLACE_MAX = wp.constant(4.0)  # an owner reported farther than this many scales away is shown at that distance
+_POSITION_SCALE = wp.constant(5.0)  # [m]
+_POSITION_MAX = wp.constant(4.0)  # an owner reported farther than this many scales away is shown at that distance
 REPORT_OLD_S = wp.constant(5.0)  # a report older than this tells nothing; guess
 DEPTH_HALF_M = wp.constant(4.0)  # this far away the depth channel is at half of its range
 _SKY_M = wp.constant(1000.0)  # depths from here on are the sky's
@@ -94,11 +94,11 @@ def _write_owner(own: OwnState, report: OwnerReport, out: wp.array2d(dtype=float
     if report.is_known == 1:
         yaw = yaw_from_quat(own.q_ned_from_frd)
         age_s = wp.clamp(report.age_s, 0.0, REPORT_OLD_S)
-        place = level_from_ned(report.pos_ned + age_s * report.vel_ned - own.pos_ned, yaw) / _PLACE_SCALE
-        far = wp.length(place)
-        if far > _PLACE_MAX:
-            place = place * (_PLACE_MAX / far)
-        write3(out, i, at, place)
+        position = level_from_ned(report.pos_ned + age_s * report.vel_ned - own.pos_ned, yaw) / _POSITION_SCALE
+        far = wp.length(position)
+        if far > _POSITION_MAX:
+            position = position * (_POSITION_MAX / far)
+        write3(out, i, at, position)
         write3(out, i, at + 3, level_from_ned(report.vel_ned, yaw) / SPEED_SCALE)
         out[i, at + 6] = age_s
         out[i, at + 7] = 1.0
@@ -186,7 +186,7 @@ def vector_elements(kind: int) -> tuple[Element, ...]:
         return OWN_ELEMENTS
     return (
         *OWN_ELEMENTS,
-        *(Element(f"owner_pos_hfrd_{axis}", "m", float(_PLACE_SCALE), is_goal=True) for axis in "xyz"),
+        *(Element(f"owner_pos_hfrd_{axis}", "m", float(_POSITION_SCALE), is_goal=True) for axis in "xyz"),
         *(Element(f"owner_vel_hfrd_{axis}", "m/s", float(SPEED_SCALE), is_goal=True) for axis in "xyz"),
         Element("owner_age", "s"),
         Element("is_owner_known", "1"),

@@ -1,6 +1,6 @@
 """Where the owner truly is, seen from the vehicle: what rewards, measures and teachers are made from.
 
-Truth about one row. In the picture means the camera's true frame; hidden is what terrain, trees or walls stand before.
+Truth about one row. In the image means the camera's true frame; hidden is what terrain, trees or walls stand before.
 """
 
 import math
@@ -22,22 +22,22 @@ LENS_FRD = wp.constant(wp.vec3(*MOUNT_FRD))
 Q_FRD_FROM_RDF = wp.constant(wp.quat(*camera_mount()))
 HALF_WIDTH = wp.constant(math.tan(math.radians(0.5 * HFOV_DEG)))
 ROOM_MAX_M = wp.constant(2.0)  # the largest radius that contact is asked with
-_HEAD_SHARE = wp.constant(0.93)  # of the stature: the eyes
-_LEG_SHARE = wp.constant(0.25)
+_HEAD_FRACTION = wp.constant(0.93)  # of the stature: the eyes
+_LEG_FRACTION = wp.constant(0.25)
 
 
 @wp.struct
 class Sight:
     """One row."""
 
-    place_hfrd: wp.vec3  # [m] of the owner's chest
+    position_hfrd: wp.vec3  # [m] of the owner's chest
     vel_hfrd: wp.vec3  # [m/s] of the owner
     distance_m: float  # to the chest
     bearing_rad: float  # of the chest from the vehicle's heading, right positive
     reach_m: float  # to the nearest part of the owner's body
     room_m: float  # to the nearest trunk, crown, wall or ground, at most ROOM_MAX_M
     is_free: int  # nothing stands between lens and owner
-    is_in_view: int  # and the picture shows them
+    is_in_view: int  # and the image shows them
 
 
 @wp.func
@@ -54,7 +54,7 @@ def lens_of(truth: Truth, exposure: float) -> Lens:
 
 @wp.func
 def is_in_frame(lens: Lens, point_ned: wp.vec3) -> bool:
-    """Whether a square picture would show a point, were nothing in between."""
+    """Whether a square image would show a point, were nothing in between."""
     ray = wp.quat_rotate_inv(lens.q_ned_from_rdf, point_ned - lens.pos_ned)
     edge = lens.half_width * ray[2]
     return ray[2] > 0.0 and wp.abs(ray[0]) < edge and wp.abs(ray[1]) < edge
@@ -80,13 +80,13 @@ def see(w: World, truth: Truth, person: Person) -> Sight:
     """How a vehicle and its owner stand to each other."""
     sight = Sight()
     chest = chest_ned(person)
-    head = person.pos_ned - wp.vec3(0.0, 0.0, _HEAD_SHARE * person.stature_m)
-    legs = person.pos_ned - wp.vec3(0.0, 0.0, _LEG_SHARE * person.stature_m)
+    head = person.pos_ned - wp.vec3(0.0, 0.0, _HEAD_FRACTION * person.stature_m)
+    legs = person.pos_ned - wp.vec3(0.0, 0.0, _LEG_FRACTION * person.stature_m)
     yaw = yaw_from_quat(truth.q_ned_from_frd)
-    sight.place_hfrd = level_from_ned(chest - truth.pos_ned, yaw)
+    sight.position_hfrd = level_from_ned(chest - truth.pos_ned, yaw)
     sight.vel_hfrd = level_from_ned(person.vel_ned, yaw)
-    sight.distance_m = wp.length(sight.place_hfrd)
-    sight.bearing_rad = wp.atan2(sight.place_hfrd[1], sight.place_hfrd[0])
+    sight.distance_m = wp.length(sight.position_hfrd)
+    sight.bearing_rad = wp.atan2(sight.position_hfrd[1], sight.position_hfrd[0])
     sight.reach_m = reach_from(truth.pos_ned, person)
     sight.room_m = room_around(w, truth)
     lens = lens_of(truth, 1.0)

@@ -14,15 +14,15 @@ from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
 
-_PLACE_SCALE = wp.constant(5.0)  # [m]
-_PLACE_MAX = wp.constant(4.0)  # in scales
+_POSITION_SCALE = wp.constant(5.0)  # [m]
+_POSITION_MAX = wp.constant(4.0)  # in scales
 _DISTANCE_SCALE = wp.constant(3.0)  # [m]
 _UNSEEN_SCALE = wp.constant(5.0)  # [s]
 _RANGES = wp.constant(RANGES)
 
 PRIVILEGED_ELEMENTS = (
     *(Element(f"true_{e.name}", e.unit, e.scale) for e in OWN_ELEMENTS),
-    *(Element(f"true_owner_pos_hfrd_{axis}", "m", float(_PLACE_SCALE)) for axis in "xyz"),
+    *(Element(f"true_owner_pos_hfrd_{axis}", "m", float(_POSITION_SCALE)) for axis in "xyz"),
     *(Element(f"true_owner_vel_hfrd_{axis}", "m/s", float(SPEED_SCALE)) for axis in "xyz"),
     Element("true_distance", "m", float(_DISTANCE_SCALE)),
     Element("true_bearing_sin", "1"),
@@ -62,13 +62,13 @@ def write_privileged(
     """The elements of `PRIVILEGED_ELEMENTS`, scaled, into row i from column `first`."""
     write_own(true_own(truth), last_action, out, i, first)
     at = first + OWN_SIZE
-    place = sight.place_hfrd / _PLACE_SCALE
-    far = wp.length(place)
-    if far > _PLACE_MAX:
-        place = place * (_PLACE_MAX / far)
-    write3(out, i, at, place)
+    position = sight.position_hfrd / _POSITION_SCALE
+    far = wp.length(position)
+    if far > _POSITION_MAX:
+        position = position * (_POSITION_MAX / far)
+    write3(out, i, at, position)
     write3(out, i, at + 3, sight.vel_hfrd / SPEED_SCALE)
-    out[i, at + 6] = wp.min(sight.distance_m, _PLACE_MAX * _PLACE_SCALE) / _DISTANCE_SCALE
+    out[i, at + 6] = wp.min(sight.distance_m, _POSITION_MAX * _POSITION_SCALE) / _DISTANCE_SCALE
     out[i, at + 7] = wp.sin(sight.bearing_rad)
     out[i, at + 8] = wp.cos(sight.bearing_rad)
     out[i, at + 9] = float(sight.is_in_view)

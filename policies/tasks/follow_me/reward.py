@@ -69,7 +69,7 @@ def follow_reward(n: FollowParams, sight: Sight, outcome: int, action: wp.vec4, 
         reward += n.view_reward * bell(sight.bearing_rad, n.view_width_deg * _RADIANS)
     reward -= n.far_cost * wp.clamp(distance - n.far_m, 0.0, _FAR_MAX_M)
     reward -= n.near_cost * wp.max(_NEAR_MARGIN * n.near_m - distance, 0.0)
-    height = sight.place_hfrd[2] - n.best_height_m  # the chest lies this much lower than it should
+    height = sight.position_hfrd[2] - n.best_height_m  # the chest lies this much lower than it should
     reward -= n.height_cost * wp.min(wp.abs(height), _HEIGHT_MAX_M)
     change = action - last_action
     reward -= n.jerk_cost * wp.dot(change, change)

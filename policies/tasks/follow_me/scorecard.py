@@ -19,17 +19,17 @@ from policies.tasks.intervals import Interval, bootstrap, rate
 class Scorecard:
     """Figures of some episodes. Rates over episodes have Wilson's intervals, the others the bootstrap's."""
 
-    success: Interval  # share of episodes that end on time, in the band, the owner in view, without a collision (SR)
-    tracking: Interval  # share of planned time within `far_m` with the owner in view (TR)
-    collision: Interval  # share of episodes with a collision (CR)
-    in_band: Interval  # share of planned time in [near_m, far_m]: the requirement's "within 3 m"
+    success: Interval  # fraction of episodes that end on time, in the band, the owner in view, without a collision (SR)
+    tracking: Interval  # fraction of planned time within `far_m` with the owner in view (TR)
+    collision: Interval  # fraction of episodes with a collision (CR)
+    in_band: Interval  # fraction of planned time in [near_m, far_m]: the requirement's "within 3 m"
     distance_rmse_m: Interval  # of the distance to the middle of the band
     distance_median_m: Interval
     bearing_error_deg: Interval  # mean absolute bearing of the owner from the vehicle's heading
-    in_view: Interval  # share of pictures with the owner in them
+    in_view: Interval  # fraction of images with the owner in them
     losses_per_minute: Interval
     loss_s: Interval  # mean length of a loss
-    reacquired: Interval  # share of losses that end within `reacquired_s`
+    reacquired: Interval  # fraction of losses that end within `reacquired_s`
     episodes: int
     minutes: float  # flown
 
@@ -50,22 +50,22 @@ def scorecard(tracks: Sequence[Track], ranges: Ranges | None = None) -> Scorecar
     sums = np.array([_sums(track, ranges) for track in tracks])
     planned, count, in_band, tracked, squares, bearing, in_view, minutes, loss_count, loss_s, due, back = sums.T
 
-    def share(part: NDArray[np.float64], whole: NDArray[np.float64], scale: float = 1.0) -> Interval:
+    def fraction(part: NDArray[np.float64], whole: NDArray[np.float64], scale: float = 1.0) -> Interval:
         return bootstrap(len(tracks), lambda rows: scale * _ratio(part[rows].sum(), whole[rows].sum()))
 
     has_collision = np.array([track.has_collision(ranges) for track in tracks])
     return Scorecard(
         success=rate(np.array([_is_success(track, ranges) for track in tracks])),
-        tracking=share(tracked, planned),
+        tracking=fraction(tracked, planned),
         collision=rate(has_collision),
-        in_band=share(in_band, planned),
+        in_band=fraction(in_band, planned),
         distance_rmse_m=bootstrap(len(tracks), lambda rows: math.sqrt(squares[rows].sum() / count[rows].sum())),
         distance_median_m=bootstrap(len(tracks), _median_of(tracks)),
-        bearing_error_deg=share(bearing, count),
-        in_view=share(in_view, count),
-        losses_per_minute=share(loss_count, minutes),
-        loss_s=share(loss_s, loss_count),
-        reacquired=share(back, due),
+        bearing_error_deg=fraction(bearing, count),
+        in_view=fraction(in_view, count),
+        losses_per_minute=fraction(loss_count, minutes),
+        loss_s=fraction(loss_s, loss_count),
+        reacquired=fraction(back, due),
         episodes=len(tracks),
         minutes=float(minutes.sum()),
     )

@@ -1,4 +1,4 @@
-"""The pictures of a batch of follow-me drones: rendered with their cameras' noise, packed as the observation's image.
+"""The images of a batch of follow-me drones: rendered with their cameras' noise, packed as the observation's image.
 
 In: the lenses that `look` has placed, the worlds, the owners. Out: `buffers.images`. As a policy's companion gets them,
 but for their way over the network.
@@ -68,7 +68,7 @@ class Eyes:
 
     @property
     def lenses(self) -> Any:
-        """To be placed before pictures are taken."""
+        """To be placed before images are taken."""
         return self._camera.lenses
 
     def take(self, rows: Any = None) -> None:

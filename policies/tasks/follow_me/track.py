@@ -27,7 +27,7 @@ class Ranges:
     lost_m: float = 4.0
     """Farther than this the owner is being lost."""
     loss_s: float = 0.5
-    """Shorter losses are not counted: a trunk passing through the picture (guess)."""
+    """Shorter losses are not counted: a trunk passing through the image (guess)."""
     reacquired_s: float = 5.0
     """A loss that ends within this was made good."""
 
@@ -39,7 +39,7 @@ class Track:
     time_s: NDArray[np.float64]  # since the episode's start: the first sample one interval after it
     distance_m: NDArray[np.float64]  # vehicle to the owner's chest
     bearing_rad: NDArray[np.float64]  # of the owner from the vehicle's true heading, in [-pi, pi]
-    is_in_view: NDArray[np.bool_]  # some of the owner is in the camera's picture, not hidden
+    is_in_view: NDArray[np.bool_]  # some of the owner is in the camera's image, not hidden
     is_collided: NDArray[np.bool_]  # touches a tree, a wall or the ground, or is too near the owner
     planned_s: float  # how long the episode would have lasted had nothing ended it
     trees_per_ha: float = math.nan

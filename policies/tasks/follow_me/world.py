@@ -18,4 +18,4 @@ FOLLOW_WORLD = WorldConfig(
     has_walls=True,
 )
 """Hills and trees a person can walk in."""
-STOP_SHARE = 0.15  # of the owner's plans; guess
+STOP_FRACTION = 0.15  # of the owner's plans; guess

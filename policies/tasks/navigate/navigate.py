@@ -105,7 +105,7 @@ class Navigate(FlightTask):
         if self._eyes is not None:
             self._eyes.refresh()
 
-    def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
+    def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """Drone, trees, goal and ranges from above."""
         truth = self.rig.truth_row(i_env)
         x, y, z, w = (float(value) for value in truth["q_ned_from_frd"])

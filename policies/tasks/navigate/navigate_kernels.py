@@ -182,8 +182,8 @@ def place(buffers: StepBuffers, rig: RigArrays, state: NavigateState, start: Sta
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
     pos_ned = rig.truth[i].pos_ned
     bearing = draw_angle(seed, i, episode, _BEARING_STREAM)
-    share = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
-    away_m = params.goal_min_m + share * wp.max(params.goal_max_m - params.goal_min_m, 0.0)
+    fraction = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
+    away_m = params.goal_min_m + fraction * wp.max(params.goal_max_m - params.goal_min_m, 0.0)
     north = away_m * wp.cos(bearing)
     east = away_m * wp.sin(bearing)
     up = ground_height(rig.worlds[rig.i_world[i]], north, east) + params.goal_height_m

@@ -32,8 +32,8 @@ _RANGES = wp.constant(RANGES)
 _FIRST_RAD = wp.constant(-0.5 * SECTORS * math.radians(5.0))
 _ELEVATIONS = wp.constant(wp.vec4(*(math.radians(angle) for angle in BEAM_ELEVATIONS_DEG)))
 _STREAM = wp.constant(202)  # of the rig's seeds
-_STD_SHARE = wp.constant(0.02)  # of the range, for a noise of 1; Intel D435: below 2 % up to 2 m
-_MISSES = wp.constant(0.01)  # share of sectors without a return, for a noise of 1; guess
+_STD_FRACTION = wp.constant(0.02)  # of the range, for a noise of 1; Intel D435: below 2 % up to 2 m
+_MISSES = wp.constant(0.01)  # fraction of sectors without a return, for a noise of 1; guess
 _UNIFORM_HALF = wp.constant(math.sqrt(3.0))  # half the width of a uniform draw of unit variance
 
 RANGE_ELEMENTS = (
@@ -125,7 +125,7 @@ def scan(
     for k in range(_RANGES):
         error = _UNIFORM_HALF * (2.0 * wp.randf(state) - 1.0)
         if ranges_m[i, k] < RANGE_M:
-            ranges_m[i, k] = wp.min(ranges_m[i, k] * (1.0 + noise * _STD_SHARE * error), RANGE_M)
+            ranges_m[i, k] = wp.min(ranges_m[i, k] * (1.0 + noise * _STD_FRACTION * error), RANGE_M)
         if wp.randf(state) < noise * _MISSES:
             ranges_m[i, k] = RANGE_M
 

@@ -26,17 +26,17 @@ INNER_FACES = (  # [m] from a storey's centre; the gaps at the corners are narro
     WALL_CENTRES[3] - WALL_THICKNESS / 2,
 )
 
-BLOCK_PLACES = ((-3.28, 1.83, -32.3), (-1.99, -5.70, 31.5), (7.19, -1.03, 31.5))  # x, z [m], yaw [deg]
+BLOCK_POSITIONS = ((-3.28, 1.83, -32.3), (-1.99, -5.70, 31.5), (7.19, -1.03, 31.5))  # x, z [m], yaw [deg]
 
 PORTAL_SIZE = (6.0, 0.2)  # [m] a plate 6 x 3 tilted by 75 deg; taken as upright, thickness a guess
-PORTAL_PLACES = ((-11.75, 12.2, -45.0), (56.31, -11.96, -135.0))
+PORTAL_POSITIONS = ((-11.75, 12.2, -45.0), (56.31, -11.96, -135.0))
 PORTAL_HEIGHTS = (1.23, 1.36)  # [m] of their centres
 PORTAL_EXITS = (  # where a car comes out that went into portal 1, portal 2
-    (PORTAL_PLACES[1][0] + 1.0, PORTAL_PLACES[1][1] + 0.5, 45.0),
-    (PORTAL_PLACES[0][0] + 1.0, PORTAL_PLACES[0][1] - 1.0, 135.0),
+    (PORTAL_POSITIONS[1][0] + 1.0, PORTAL_POSITIONS[1][1] + 0.5, 45.0),
+    (PORTAL_POSITIONS[0][0] + 1.0, PORTAL_POSITIONS[0][1] - 1.0, 135.0),
 )
 
-MOVER_PLACES = ((-0.51, 3.82), (8.88, 0.0), (68.85, 8.91), (65.05, -0.49))  # x, z [m]; two on each storey
+MOVER_POSITIONS = ((-0.51, 3.82), (8.88, 0.0), (68.85, 8.91), (65.05, -0.49))  # x, z [m]; two on each storey
 MOVER_MOVES = ((0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (-1.0, 0.0))  # first directions of travel
 
 LEVEL1_START = (-12.70, -13.53, 0.0)
@@ -57,10 +57,10 @@ WALL_CENTRE_X_LOW, WALL_CENTRE_X_HIGH, WALL_CENTRE_Z_LOW, WALL_CENTRE_Z_HIGH = (
 PORTAL_HALF_X, PORTAL_HALF_Z = wp.constant(PORTAL_SIZE[0] / 2), wp.constant(PORTAL_SIZE[1] / 2)
 
 
-def pose(place: Sequence[float]) -> NDArray[np.float32]:
+def pose(position: Sequence[float]) -> NDArray[np.float32]:
     """(x, z, sin yaw, cos yaw) of x, z [m] and yaw [deg]."""
-    yaw_rad = math.radians(place[2])
-    return np.array([place[0], place[1], math.sin(yaw_rad), math.cos(yaw_rad)], dtype=np.float32)
+    yaw_rad = math.radians(position[2])
+    return np.array([position[0], position[1], math.sin(yaw_rad), math.cos(yaw_rad)], dtype=np.float32)
 
 
 @wp.func
@@ -88,19 +88,19 @@ def right_of(pose: wp.vec4) -> wp.vec2:
 
 
 @wp.func
-def place_of(pose: wp.vec4) -> wp.vec2:
+def position_of(pose: wp.vec4) -> wp.vec2:
     """[m] x and z."""
     return wp.vec2(pose[0], pose[1])
 
 
 @wp.func
-def pose_at(place: wp.vec2, yaw_rad: float) -> wp.vec4:
+def pose_at(position: wp.vec2, yaw_rad: float) -> wp.vec4:
     """A pose of a place and a yaw."""
-    return wp.vec4(place[0], place[1], wp.sin(yaw_rad), wp.cos(yaw_rad))
+    return wp.vec4(position[0], position[1], wp.sin(yaw_rad), wp.cos(yaw_rad))
 
 
 @wp.func
 def into_frame(pose: wp.vec4, point: wp.vec2) -> wp.vec2:
     """A point as (right, forward) of what stands at a pose [m]."""
-    gap = point - place_of(pose)
+    gap = point - position_of(pose)
     return wp.vec2(wp.dot(gap, right_of(pose)), wp.dot(gap, forward_of(pose)))

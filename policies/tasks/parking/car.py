@@ -13,7 +13,7 @@ from policies.tasks.parking.arena import (
     WALL_Z_LOW,
     forward_of,
     into_frame,
-    place_of,
+    position_of,
     right_of,
     storey_centre,
     storey_of,
@@ -40,7 +40,7 @@ def box_of_car(car: wp.vec4, ahead_m: float) -> wp.vec4:
 @wp.func
 def boxes_overlap(a: wp.vec4, half_a: wp.vec2, b: wp.vec4, half_b: wp.vec2) -> bool:
     """Whether two boxes overlap: no axis of either separates them. Half sizes along their own x and z [m]."""
-    gap = place_of(b) - place_of(a)
+    gap = position_of(b) - position_of(a)
     reach = wp.length(half_a) + wp.length(half_b)
     if wp.dot(gap, gap) > reach * reach:
         return False
@@ -87,8 +87,8 @@ def box_distance(box: wp.vec4, half: wp.vec2, point: wp.vec2) -> float:
 def nearest_on_line(a: wp.vec2, b: wp.vec2, point: wp.vec2) -> wp.vec2:
     """The point of the line from a to b that lies nearest to another."""
     along = b - a
-    share = wp.dot(point - a, along) / wp.max(wp.dot(along, along), 1.0e-9)
-    return a + along * wp.clamp(share, 0.0, 1.0)
+    fraction = wp.dot(point - a, along) / wp.max(wp.dot(along, along), 1.0e-9)
+    return a + along * wp.clamp(fraction, 0.0, 1.0)
 
 
 @wp.func
@@ -107,7 +107,7 @@ def crosses_box(half: wp.vec2, a: wp.vec2, b: wp.vec2) -> bool:
 @wp.func
 def box_meets_capsule(box: wp.vec4, half: wp.vec2, a_world: wp.vec2, b_world: wp.vec2, radius: float) -> bool:
     """Whether a box overlaps all that lies within a radius of the line from a to b."""
-    middle = 0.5 * (a_world + b_world) - place_of(box)
+    middle = 0.5 * (a_world + b_world) - position_of(box)
     reach = wp.length(half) + radius + 0.5 * wp.length(b_world - a_world)
     if wp.dot(middle, middle) > reach * reach:
         return False

@@ -12,7 +12,7 @@ from policies.tasks.parking.arena import (
     WALL_X_LOW,
     WALL_Z_HIGH,
     WALL_Z_LOW,
-    place_of,
+    position_of,
     storey_centre,
     storey_of,
 )
@@ -57,7 +57,7 @@ def obstacle_rows(car: wp.vec4, scene: Scene, height_m: float, params: CarParams
     for k in range(MAX_OBSTACLES):
         if k < scene.obstacle_count:
             obstacle = scene.obstacles[k]
-            distance = box_distance(obstacle, scene.obstacle_half, place_of(car)) - scene.obstacle_radius
+            distance = box_distance(obstacle, scene.obstacle_half, position_of(car)) - scene.obstacle_radius
             if is_coded:
                 distance = wp.length(gap_to(car, obstacle[0], height_m, obstacle[1]))
             reward += near_row(distance, params.obstacle_near_m, params.obstacle_reward)

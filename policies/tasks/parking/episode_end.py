@@ -3,7 +3,7 @@
 import warp as wp
 
 from policies.tasks.episode import HIT_OBSTACLE, HIT_WALL, RUNNING, SUCCESS, TIMEOUT
-from policies.tasks.parking.arena import forward_of, place_of, right_of
+from policies.tasks.parking.arena import forward_of, position_of, right_of
 from policies.tasks.parking.car import box_of_car
 from policies.tasks.parking.drive import Motion
 from policies.tasks.parking.parking_params import CarParams
@@ -24,7 +24,7 @@ def heading_error(car: wp.vec4, goal: wp.vec4) -> float:
 @wp.func
 def is_in_pose(motion: Motion, goal: wp.vec4, params: CarParams) -> bool:
     """Whether the car's box is at the pad's centre, aligned and slow."""
-    gap = place_of(box_of_car(motion.pose, params.box_ahead_m)) - place_of(goal)
+    gap = position_of(box_of_car(motion.pose, params.box_ahead_m)) - position_of(goal)
     return (
         wp.length(gap) < params.reach_m
         and wp.length(motion.vel) < params.stop_m_s

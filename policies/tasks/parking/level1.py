@@ -14,14 +14,14 @@ from policies.tasks.episode import RUNNING, SUCCESS, StepBuffers, begin_episode,
 from policies.tasks.layout import Layout
 from policies.tasks.parking.arena import (
     BLOCK_HEIGHT,
-    BLOCK_PLACES,
+    BLOCK_POSITIONS,
     LEVEL1_MARKER,
     LEVEL1_SPOTS,
     LEVEL1_START,
     SPOT_HEIGHT,
-    place_of,
     pose,
     pose_at,
+    position_of,
 )
 from policies.tasks.parking.car import TICK_S, box_of_car
 from policies.tasks.parking.decision_rows import table_reward
@@ -106,7 +106,7 @@ class Blocks:
 
 
 @wp.struct
-class Level1Places:
+class Level1Positions:
     """What is the same for all environments."""
 
     start: wp.vec4
@@ -136,14 +136,14 @@ def scene_of(cars: CarState, blocks: Blocks, i: int) -> Scene:
 def way_left(motion: Motion, scene: Scene, rules: Rules, params: CarParams) -> float:
     """From the car's box to the pad [m]."""
     box = box_of_car(motion.pose, params.box_ahead_m)
-    return way_of(box, scene.goal, wp.length(place_of(scene.goal) - place_of(box)), rules, params)
+    return way_of(box, scene.goal, wp.length(position_of(scene.goal) - position_of(box)), rules, params)
 
 
 @wp.func
 def place_blocks(
     buffers: StepBuffers,
     rules: Rules,
-    places: Level1Places,
+    positions: Level1Positions,
     blocks: Blocks,
     i: int,
     episode: int,
@@ -158,14 +158,14 @@ def place_blocks(
             blocks.poses[i, k] = others.obstacles[k]
     else:
         for k in range(BLOCK_COUNT):
-            blocks.poses[i, k] = places.blocks[k]
+            blocks.poses[i, k] = positions.blocks[k]
 
 
 @wp.func
 def place_goal(
     buffers: StepBuffers,
     rules: Rules,
-    places: Level1Places,
+    positions: Level1Positions,
     cars: CarState,
     blocks: Blocks,
     i: int,
@@ -173,22 +173,22 @@ def place_goal(
 ) -> None:
     """A new goal."""
     scene = scene_of(cars, blocks, i)
-    place = wp.vec2()
+    position = wp.vec2()
     if rules.are_goals_anywhere:
-        place = draw_goal(places.cells, scene, buffers.seed[0], i, episode, _GOAL_STREAM)
+        position = draw_goal(positions.cells, scene, buffers.seed[0], i, episode, _GOAL_STREAM)
     elif rules.is_reset_coded and episode == 0:
-        place = places.marker
+        position = positions.marker
     else:
         rng = draw_key(buffers.seed[0], i, episode, _GOAL_STREAM)
-        place = places.spots[wp.randi(rng, 0, _SPOT_COUNT)]
-    cars.goal[i] = pose_at(place, wp.radians(cars.params[i].goal_yaw_deg))
+        position = positions.spots[wp.randi(rng, 0, _SPOT_COUNT)]
+    cars.goal[i] = pose_at(position, wp.radians(cars.params[i].goal_yaw_deg))
 
 
 @wp.func
 def place_car(
     buffers: StepBuffers,
     rules: Rules,
-    places: Level1Places,
+    positions: Level1Positions,
     cars: CarState,
     blocks: Blocks,
     i: int,
@@ -201,15 +201,15 @@ def place_car(
         rng = draw_key(buffers.seed[0], i, episode, _YAW_STREAM)
         cars.yaw[i] = wp.pi * (2.0 * wp.randf(rng) - 1.0)
     else:
-        cars.pos[i] = place_of(places.start)
-        cars.yaw[i] = places.start_yaw
+        cars.pos[i] = position_of(positions.start)
+        cars.yaw[i] = positions.start_yaw
 
 
 @wp.func
 def begin_row(
     buffers: StepBuffers,
     rules: Rules,
-    places: Level1Places,
+    positions: Level1Positions,
     cars: CarState,
     blocks: Blocks,
     i: int,
@@ -219,11 +219,11 @@ def begin_row(
     episode = begin_episode(buffers, i)
     is_new = episode == 0 or outcome == SUCCESS or not rules.is_reset_coded
     if is_new:
-        place_blocks(buffers, rules, places, blocks, i, episode)
-        place_goal(buffers, rules, places, cars, blocks, i, episode)
+        place_blocks(buffers, rules, positions, blocks, i, episode)
+        place_goal(buffers, rules, positions, cars, blocks, i, episode)
         cars.vel[i] = wp.vec2(0.0, 0.0)
         cars.last_m[i] = 0.0  # a field of a new car
-    place_car(buffers, rules, places, cars, blocks, i, episode)
+    place_car(buffers, rules, positions, cars, blocks, i, episode)
     params = cars.params[i]
     motion = motion_of(cars, i)
     scene = scene_of(cars, blocks, i)
@@ -239,18 +239,18 @@ def begin(
     buffers: StepBuffers,
     is_chosen: wp.array(dtype=wp.bool),
     rules: Rules,
-    places: Level1Places,
+    positions: Level1Positions,
     cars: CarState,
     blocks: Blocks,
 ) -> None:
     """Starts an episode in the chosen rows."""
     i = wp.tid()
     if is_chosen[i]:
-        begin_row(buffers, rules, places, cars, blocks, i, RUNNING)
+        begin_row(buffers, rules, positions, cars, blocks, i, RUNNING)
 
 
 @wp.kernel(enable_backward=False)
-def step(buffers: StepBuffers, rules: Rules, places: Level1Places, cars: CarState, blocks: Blocks) -> None:
+def step(buffers: StepBuffers, rules: Rules, positions: Level1Positions, cars: CarState, blocks: Blocks) -> None:
     """One decision of every row."""
     i = wp.tid()
     params = cars.params[i]
@@ -275,7 +275,7 @@ def step(buffers: StepBuffers, rules: Rules, places: Level1Places, cars: CarStat
     keep_motion(cars, i, motion)
     observe(buffers, i, motion, scene, rules, params)
     if close_step(buffers, i, reward, outcome):
-        begin_row(buffers, rules, places, cars, blocks, i, outcome)
+        begin_row(buffers, rules, positions, cars, blocks, i, outcome)
 
 
 class Parking1(ParkingTask):
@@ -295,19 +295,19 @@ class Parking1(ParkingTask):
         super().__init__(layout, env_count, number_defaults=defaults, device=device)
         self.rules = rules
         self.world = self._car_state()
-        self.blocks = self._zeros("blocks", (env_count, len(BLOCK_PLACES)), wp.vec4)
+        self.blocks = self._zeros("blocks", (env_count, len(BLOCK_POSITIONS)), wp.vec4)
         blocks = Blocks()
         blocks.poses = self.blocks
         blocks.params = typed_rows(self.buffers.params, Level1Params, first=len(CAR_PARAMS))
-        self._record(begin, step, [rules, self._places(settings.split), self.world, blocks])
+        self._record(begin, step, [rules, self._positions(settings.split), self.world, blocks])
 
-    def _places(self, split: str) -> Any:
-        places = Level1Places()
-        places.start = wp.vec4(*pose(LEVEL1_START))
-        places.start_yaw = float(np.radians(LEVEL1_START[2]))
-        poses = [pose(place) for place in BLOCK_PLACES]
-        places.blocks = wp.mat44(*np.vstack([*poses, np.zeros(4)]).ravel())
-        places.marker = wp.vec2(*LEVEL1_MARKER)
-        places.spots = wp.array(np.array(LEVEL1_SPOTS, dtype=np.float32), dtype=wp.vec2, device=self.device)
-        places.cells = wp.array(cells(0, 1, split), dtype=wp.vec2, device=self.device)
-        return places
+    def _positions(self, split: str) -> Any:
+        positions = Level1Positions()
+        positions.start = wp.vec4(*pose(LEVEL1_START))
+        positions.start_yaw = float(np.radians(LEVEL1_START[2]))
+        poses = [pose(position) for position in BLOCK_POSITIONS]
+        positions.blocks = wp.mat44(*np.vstack([*poses, np.zeros(4)]).ravel())
+        positions.marker = wp.vec2(*LEVEL1_MARKER)
+        positions.spots = wp.array(np.array(LEVEL1_SPOTS, dtype=np.float32), dtype=wp.vec2, device=self.device)
+        positions.cells = wp.array(cells(0, 1, split), dtype=wp.vec2, device=self.device)
+        return positions

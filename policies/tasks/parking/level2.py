@@ -18,12 +18,12 @@ from policies.tasks.parking.arena import (
     LEVEL2_START,
     MOVER_HEIGHT,
     MOVER_MOVES,
-    MOVER_PLACES,
+    MOVER_POSITIONS,
     PORTAL_EXITS,
-    PORTAL_PLACES,
-    place_of,
+    PORTAL_POSITIONS,
     pose,
     pose_at,
+    position_of,
     storey_of,
 )
 from policies.tasks.parking.car import TICK_S, box_of_car
@@ -48,7 +48,7 @@ from policies.tasks.task_params import Sampler, typed_rows
 
 wp.set_module_options({"enable_backward": False})
 
-_MOVER_COUNT = wp.constant(len(MOVER_PLACES))
+_MOVER_COUNT = wp.constant(len(MOVER_POSITIONS))
 _AS_DOCUMENTED, _PROGRESS = wp.constant(AS_DOCUMENTED), wp.constant(PROGRESS)
 _MOVER_HEIGHT = wp.constant(MOVER_HEIGHT)
 _GOAL_STREAM, _START_STREAM, _YAW_STREAM = wp.constant(1), wp.constant(2), wp.constant(3)
@@ -100,7 +100,7 @@ _PRESET_PARAMS: dict[str, dict[str, float | Sampler]] = {
     "as-coded": {"goal_yaw_deg": 6.1, "step_limit": 50000.0},
     "improved": {"goal_yaw_deg": Sampler(intervals=((-180.0, 180.0),)), "step_limit": 2000.0},
 }
-_STOREY_2_SHARES = {"1": 0.0, "2": 1.0, "both": 0.5}
+_STOREY_2_FRACTIONS = {"1": 0.0, "2": 1.0, "both": 0.5}
 
 
 @wp.struct
@@ -113,7 +113,7 @@ class Movers:
 
 
 @wp.struct
-class Level2Places:
+class Level2Positions:
     """What is the same for all environments."""
 
     start: wp.vec4
@@ -128,7 +128,7 @@ class Level2Places:
 
 
 @wp.func
-def scene_of(cars: CarState, movers: Movers, places: Level2Places, i: int, storey: int) -> Scene:
+def scene_of(cars: CarState, movers: Movers, positions: Level2Positions, i: int, storey: int) -> Scene:
     """What is on a storey."""
     params = movers.params[i]
     scene = Scene()
@@ -140,30 +140,30 @@ def scene_of(cars: CarState, movers: Movers, places: Level2Places, i: int, store
     scene.goal = cars.goal[i]
     scene.goal_half = half_of_pad(cars.params[i])
     scene.has_goal = storey_of(scene.goal[0]) == storey
-    scene.portal = places.portals[storey]
+    scene.portal = positions.portals[storey]
     scene.has_portal = True
     return scene
 
 
 @wp.func
-def route_left(motion: Motion, goal: wp.vec4, places: Level2Places, rules: Rules, params: CarParams) -> float:
+def route_left(motion: Motion, goal: wp.vec4, positions: Level2Positions, rules: Rules, params: CarParams) -> float:
     """From the car's box to the pad, through the portal where it is on the other storey [m]."""
     box = box_of_car(motion.pose, params.box_ahead_m)
     storey = storey_of(motion.pos[0])
     if storey_of(goal[0]) == storey:
-        return way_of(box, goal, wp.length(place_of(goal) - place_of(box)), rules, params)
-    to_portal = wp.length(place_of(places.portals[storey]) - place_of(box))
-    way_out = wp.vec2(places.exits[storey, 0], places.exits[storey, 1])
-    return to_portal + wp.length(place_of(goal) - way_out)
+        return way_of(box, goal, wp.length(position_of(goal) - position_of(box)), rules, params)
+    to_portal = wp.length(position_of(positions.portals[storey]) - position_of(box))
+    way_out = wp.vec2(positions.exits[storey, 0], positions.exits[storey, 1])
+    return to_portal + wp.length(position_of(goal) - way_out)
 
 
 @wp.func
-def through_portal(motion: Motion, places: Level2Places) -> Motion:
+def through_portal(motion: Motion, positions: Level2Positions) -> Motion:
     """The car at the exit of its storey's portal."""
     storey = storey_of(motion.pos[0])
     out = motion
-    out.pos = wp.vec2(places.exits[storey, 0], places.exits[storey, 1])
-    out.yaw = places.exits[storey, 2]
+    out.pos = wp.vec2(positions.exits[storey, 0], positions.exits[storey, 1])
+    out.yaw = positions.exits[storey, 2]
     out.pose = pose_at(out.pos, out.yaw)
     return out
 
@@ -176,11 +176,11 @@ def portal_row(storey_before: int, goal: wp.vec4, more: Level2Params) -> float:
 
 @wp.func
 def place_movers(
-    buffers: StepBuffers, rules: Rules, places: Level2Places, movers: Movers, i: int, episode: int
+    buffers: StepBuffers, rules: Rules, positions: Level2Positions, movers: Movers, i: int, episode: int
 ) -> None:
     """The capsules of a new world: on storey 1 the first along z, as published; anywhere, one along each axis."""
     for k in range(_MOVER_COUNT):
-        mover = places.movers[k]
+        mover = positions.movers[k]
         if rules.are_obstacles_anywhere:
             mover = draw_mover(k // PER_STOREY, k % 2 == 1, buffers.seed[0], i, episode, _MOVER_STREAM + k)
         movers.poses[i, k] = mover
@@ -190,31 +190,31 @@ def place_movers(
 
 @wp.func
 def place_goal(
-    buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarState, movers: Movers, i: int, episode: int
+    buffers: StepBuffers, rules: Rules, positions: Level2Positions, cars: CarState, movers: Movers, i: int, episode: int
 ) -> None:
     """A new goal, on storey 2 with its chance."""
     seed = buffers.seed[0]
-    share = movers.params[i].storey_2_share
-    storey = wp.where(wp.randf(draw_key(seed, i, episode, _STOREY_STREAM)) < share, 1, 0)
-    place = wp.vec2()
+    fraction = movers.params[i].storey_2_share
+    storey = wp.where(wp.randf(draw_key(seed, i, episode, _STOREY_STREAM)) < fraction, 1, 0)
+    position = wp.vec2()
     if rules.are_goals_anywhere:
         nothing = Scene()  # movers come and go
         if storey == 1:
-            place = draw_goal(places.cells_2, nothing, seed, i, episode, _GOAL_STREAM)
+            position = draw_goal(positions.cells_2, nothing, seed, i, episode, _GOAL_STREAM)
         else:
-            place = draw_goal(places.cells_1, nothing, seed, i, episode, _GOAL_STREAM)
+            position = draw_goal(positions.cells_1, nothing, seed, i, episode, _GOAL_STREAM)
     else:
         rng = draw_key(seed, i, episode, _GOAL_STREAM)
         if storey == 1:
-            place = places.spots_2[wp.randi(rng, 0, places.spots_2.shape[0])]
+            position = positions.spots_2[wp.randi(rng, 0, positions.spots_2.shape[0])]
         else:
-            place = places.spots_1[wp.randi(rng, 0, places.spots_1.shape[0])]
-    cars.goal[i] = pose_at(place, wp.radians(cars.params[i].goal_yaw_deg))
+            position = positions.spots_1[wp.randi(rng, 0, positions.spots_1.shape[0])]
+    cars.goal[i] = pose_at(position, wp.radians(cars.params[i].goal_yaw_deg))
 
 
 @wp.func
 def place_car(
-    buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarState, movers: Movers, i: int, episode: int
+    buffers: StepBuffers, rules: Rules, positions: Level2Positions, cars: CarState, movers: Movers, i: int, episode: int
 ) -> None:
     """The start pose; the velocity is not touched."""
     if rules.are_starts_anywhere:
@@ -222,34 +222,34 @@ def place_car(
         storey = storey_of(cars.goal[i][0])
         if wp.randf(draw_key(seed, i, episode, _START_STOREY_STREAM)) < movers.params[i].start_elsewhere_share:
             storey = 1 - storey
-        scene = scene_of(cars, movers, places, i, storey)
+        scene = scene_of(cars, movers, positions, i, storey)
         cars.pos[i] = draw_start(scene, storey, cars.params[i].start_range_m, seed, i, episode, _START_STREAM)
         cars.yaw[i] = wp.pi * (2.0 * wp.randf(draw_key(seed, i, episode, _YAW_STREAM)) - 1.0)
     else:
-        cars.pos[i] = place_of(places.start)
-        cars.yaw[i] = places.start_yaw
+        cars.pos[i] = position_of(positions.start)
+        cars.yaw[i] = positions.start_yaw
 
 
 @wp.func
 def begin_row(
-    buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarState, movers: Movers, i: int, outcome: int
+    buffers: StepBuffers, rules: Rules, positions: Level2Positions, cars: CarState, movers: Movers, i: int, outcome: int
 ) -> None:
     """Begins an episode after an outcome. The capsules run on unless they are to be anywhere."""
     episode = begin_episode(buffers, i)
     if episode == 0 or rules.are_obstacles_anywhere:
-        place_movers(buffers, rules, places, movers, i, episode)
+        place_movers(buffers, rules, positions, movers, i, episode)
     if episode == 0 or outcome == SUCCESS or not rules.is_reset_coded:
-        place_goal(buffers, rules, places, cars, movers, i, episode)
+        place_goal(buffers, rules, positions, cars, movers, i, episode)
         cars.vel[i] = wp.vec2(0.0, 0.0)
         cars.last_m[i] = 0.0  # a field of a new car
-    place_car(buffers, rules, places, cars, movers, i, episode)
+    place_car(buffers, rules, positions, cars, movers, i, episode)
     params = cars.params[i]
     motion = motion_of(cars, i)
-    scene = scene_of(cars, movers, places, i, storey_of(motion.pos[0]))
+    scene = scene_of(cars, movers, positions, i, storey_of(motion.pos[0]))
     cars.best_m[i] = params.best_start_m
     if rules.reward == _AS_DOCUMENTED:
         cars.last_m[i] = wp.length(gap_to(motion.pose, scene.goal[0], GOAL_HEIGHT, scene.goal[1]))
-    cars.way_m[i] = route_left(motion, scene.goal, places, rules, params)
+    cars.way_m[i] = route_left(motion, scene.goal, positions, rules, params)
     observe(buffers, i, motion, movers.poses, scene, rules, params, movers.params[i])
 
 
@@ -258,18 +258,18 @@ def begin(
     buffers: StepBuffers,
     is_chosen: wp.array(dtype=wp.bool),
     rules: Rules,
-    places: Level2Places,
+    positions: Level2Positions,
     cars: CarState,
     movers: Movers,
 ) -> None:
     """Starts an episode in the chosen rows."""
     i = wp.tid()
     if is_chosen[i]:
-        begin_row(buffers, rules, places, cars, movers, i, RUNNING)
+        begin_row(buffers, rules, positions, cars, movers, i, RUNNING)
 
 
 @wp.kernel(enable_backward=False)
-def step(buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarState, movers: Movers) -> None:
+def step(buffers: StepBuffers, rules: Rules, positions: Level2Positions, cars: CarState, movers: Movers) -> None:
     """One decision of every row."""
     i = wp.tid()
     params = cars.params[i]
@@ -284,26 +284,26 @@ def step(buffers: StepBuffers, rules: Rules, places: Level2Places, cars: CarStat
             is_applied = rules.is_held or tick == 0
             storey = storey_of(motion.pos[0])
             if is_applied and rules.reward != _PROGRESS:
-                scene = scene_of(cars, movers, places, i, storey)
+                scene = scene_of(cars, movers, positions, i, storey)
                 reward += table_reward(cars, i, motion.pose, scene, GOAL_HEIGHT, _MOVER_HEIGHT, rules, params)
             run_movers(movers.poses, movers.touching, i, more)
             motion = moved(motion, command, is_applied, params)
-            contact = contact_of(motion.pose, scene_of(cars, movers, places, i, storey), params)
+            contact = contact_of(motion.pose, scene_of(cars, movers, positions, i, storey), params)
             if contact == PORTAL:
                 reward += portal_row(storey, goal, more)
-                motion = through_portal(motion, places)
+                motion = through_portal(motion, positions)
             outcome = outcome_of(contact, motion, goal, rules, params)
     outcome = capped(outcome, buffers.steps[i], params)
     reward += end_reward(outcome, params)
     if rules.reward == _PROGRESS:
-        way_m = route_left(motion, goal, places, rules, params)
+        way_m = route_left(motion, goal, positions, rules, params)
         reward += progress_reward(cars.way_m[i], way_m, outcome, params)
         cars.way_m[i] = way_m
     keep_motion(cars, i, motion)
-    scene = scene_of(cars, movers, places, i, storey_of(motion.pos[0]))
+    scene = scene_of(cars, movers, positions, i, storey_of(motion.pos[0]))
     observe(buffers, i, motion, movers.poses, scene, rules, params, more)
     if close_step(buffers, i, reward, outcome):
-        begin_row(buffers, rules, places, cars, movers, i, outcome)
+        begin_row(buffers, rules, positions, cars, movers, i, outcome)
 
 
 class Parking2(ParkingTask):
@@ -327,30 +327,32 @@ class Parking2(ParkingTask):
         defaults = {
             **reward_defaults(choices, 2),
             **_PRESET_PARAMS[settings.preset],
-            "storey_2_share": _STOREY_2_SHARES[storey],
+            "storey_2_share": _STOREY_2_FRACTIONS[storey],
         }
         super().__init__(layout, env_count, number_defaults=defaults, device=device)
         self.rules = rules
         self.world = self._car_state()
-        self.movers = self._zeros("movers", (env_count, len(MOVER_PLACES)), wp.vec4)
+        self.movers = self._zeros("movers", (env_count, len(MOVER_POSITIONS)), wp.vec4)
         movers = Movers()
         movers.poses = self.movers
         movers.touching = self._zeros("touching", (env_count, 2), int)
         movers.params = typed_rows(self.buffers.params, Level2Params, first=len(CAR_PARAMS))
-        self._record(begin, step, [rules, self._places(settings.split), self.world, movers])
+        self._record(begin, step, [rules, self._positions(settings.split), self.world, movers])
 
-    def _places(self, split: str) -> Any:
+    def _positions(self, split: str) -> Any:
         def points(of: Any) -> Any:
             return wp.array(np.array(of, dtype=np.float32), dtype=wp.vec2, device=self.device)
 
-        places = Level2Places()
-        places.start = wp.vec4(*pose(LEVEL2_START))
-        places.start_yaw = float(np.radians(LEVEL2_START[2]))
-        movers = [(*place, *move) for place, move in zip(MOVER_PLACES, MOVER_MOVES, strict=True)]
-        places.movers = wp.mat44(*np.ravel(movers))
-        places.portals = wp.mat44(*np.vstack([*(pose(place) for place in PORTAL_PLACES), np.zeros((2, 4))]).ravel())
+        positions = Level2Positions()
+        positions.start = wp.vec4(*pose(LEVEL2_START))
+        positions.start_yaw = float(np.radians(LEVEL2_START[2]))
+        movers = [(*position, *move) for position, move in zip(MOVER_POSITIONS, MOVER_MOVES, strict=True)]
+        positions.movers = wp.mat44(*np.ravel(movers))
+        positions.portals = wp.mat44(
+            *np.vstack([*(pose(position) for position in PORTAL_POSITIONS), np.zeros((2, 4))]).ravel()
+        )
         exits = [(x, z, np.radians(yaw_deg)) for x, z, yaw_deg in PORTAL_EXITS]
-        places.exits = wp.mat33(*np.ravel([*exits, (0.0, 0.0, 0.0)]))
-        places.spots_1, places.spots_2 = points(LEVEL2_SPOTS_BELOW), points([LEVEL2_SPOT])
-        places.cells_1, places.cells_2 = points(cells(0, 2, split)), points(cells(1, 2, split))
-        return places
+        positions.exits = wp.mat33(*np.ravel([*exits, (0.0, 0.0, 0.0)]))
+        positions.spots_1, positions.spots_2 = points(LEVEL2_SPOTS_BELOW), points([LEVEL2_SPOT])
+        positions.cells_1, positions.cells_2 = points(cells(0, 2, split)), points(cells(1, 2, split))
+        return positions

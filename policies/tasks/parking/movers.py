@@ -13,7 +13,7 @@ from policies.tasks.parking.arena import (
     WALL_Z_HIGH,
     WALL_Z_LOW,
     forward_of,
-    place_of,
+    position_of,
     storey_centre,
 )
 from policies.tasks.parking.car import DT, nearest_on_line
@@ -39,9 +39,9 @@ def line_distance(a0: wp.vec2, a1: wp.vec2, b0: wp.vec2, b1: wp.vec2) -> float:
     cross = along_a[0] * along_b[1] - along_a[1] * along_b[0]
     if wp.abs(cross) > 1.0e-9:
         gap = b0 - a0
-        share_a = (gap[0] * along_b[1] - gap[1] * along_b[0]) / cross
-        share_b = (gap[0] * along_a[1] - gap[1] * along_a[0]) / cross
-        if share_a >= 0.0 and share_a <= 1.0 and share_b >= 0.0 and share_b <= 1.0:
+        fraction_a = (gap[0] * along_b[1] - gap[1] * along_b[0]) / cross
+        fraction_b = (gap[0] * along_a[1] - gap[1] * along_a[0]) / cross
+        if fraction_a >= 0.0 and fraction_a <= 1.0 and fraction_b >= 0.0 and fraction_b <= 1.0:
             return 0.0
     near_a = wp.min(wp.length(a0 - nearest_on_line(b0, b1, a0)), wp.length(a1 - nearest_on_line(b0, b1, a1)))
     near_b = wp.min(wp.length(b0 - nearest_on_line(a0, a1, b0)), wp.length(b1 - nearest_on_line(a0, a1, b1)))
@@ -51,13 +51,13 @@ def line_distance(a0: wp.vec2, a1: wp.vec2, b0: wp.vec2, b1: wp.vec2) -> float:
 @wp.func
 def movers_touch(a: wp.vec4, b: wp.vec4, params: Level2Params) -> bool:
     """Whether two capsules overlap."""
-    gap = place_of(b) - place_of(a)
+    gap = position_of(b) - position_of(a)
     if wp.dot(gap, gap) > params.mover_length_m * params.mover_length_m:
         return False
     reach_a = forward_of(a) * half_line(params)
     reach_b = forward_of(b) * half_line(params)
-    at_a = place_of(a)
-    at_b = place_of(b)
+    at_a = position_of(a)
+    at_b = position_of(b)
     distance = line_distance(at_a - reach_a, at_a + reach_a, at_b - reach_b, at_b + reach_b)
     return distance <= 2.0 * params.mover_radius_m
 
@@ -73,7 +73,7 @@ def ran(mover: wp.vec4, storey: int, params: Level2Params) -> wp.vec4:
     """A mover one tick later; away from a wall that it reaches."""
     step = forward_of(mover) * (params.mover_speed_m_s * DT)
     out = wp.vec4(mover[0] + step[0], mover[1] + step[1], mover[2], mover[3])
-    local = place_of(out) - storey_centre(storey)
+    local = position_of(out) - storey_centre(storey)
     half = 0.5 * params.mover_length_m
     is_at_high = (out[2] > 0.5 and local[0] + half >= WALL_X_HIGH) or (out[3] > 0.5 and local[1] + half >= WALL_Z_HIGH)
     is_at_low = (out[2] < -0.5 and local[0] - half <= WALL_X_LOW) or (out[3] < -0.5 and local[1] - half <= WALL_Z_LOW)

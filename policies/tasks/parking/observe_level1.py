@@ -6,7 +6,7 @@ from policies.tasks.episode import StepBuffers, open_frame
 from policies.tasks.layout import Element
 from policies.tasks.parking.arena import (
     BLOCK_HEIGHT,
-    BLOCK_PLACES,
+    BLOCK_POSITIONS,
     SPOT_HEIGHT,
     WALL_CENTRE_X_HIGH,
     WALL_CENTRE_X_LOW,
@@ -33,14 +33,14 @@ from policies.tasks.parking.settings import AS_DOCUMENTED, RANGED, Choices, Rule
 
 wp.set_module_options({"enable_backward": False})
 
-BLOCK_COUNT = wp.constant(len(BLOCK_PLACES))
+BLOCK_COUNT = wp.constant(len(BLOCK_POSITIONS))
 _AS_DOCUMENTED, _RANGED = wp.constant(AS_DOCUMENTED), wp.constant(RANGED)
 _SPOT_HEIGHT, _BLOCK_HEIGHT, _WALL_HEIGHT = (wp.constant(h) for h in (SPOT_HEIGHT, BLOCK_HEIGHT, WALL_HEIGHT))
 
 
 def frame_of(choices: Choices, rules: Rules, tags: tuple[str, ...]) -> tuple[Element, ...]:
     """The elements of a frame, in order."""
-    blocks = tuple(f"block_{k + 1}" for k in range(len(BLOCK_PLACES)))
+    blocks = tuple(f"block_{k + 1}" for k in range(len(BLOCK_POSITIONS)))
     walls = ("wall_x_low", "wall_x_high", "wall_z_low", "wall_z_high")
     rays = ray_elements(rules, tags)
     if choices.observation == "ranged":

@@ -12,9 +12,9 @@ from policies.tasks.episode import StepBuffers, open_frame
 from policies.tasks.layout import Element
 from policies.tasks.parking.arena import (
     MOVER_HEIGHT,
-    MOVER_PLACES,
+    MOVER_POSITIONS,
     PORTAL_HEIGHTS,
-    PORTAL_PLACES,
+    PORTAL_POSITIONS,
     STOREY_X,
     STOREY_Z,
     WALL_CENTRES,
@@ -50,11 +50,13 @@ from policies.tasks.parking.settings import AS_DOCUMENTED, RANGED, Choices, Rule
 wp.set_module_options({"enable_backward": False})
 
 GOAL_HEIGHT = wp.constant(0.0)  # [m] of the published goal of storey 2; taken for all goals of level 2
-_MOVER_COUNT = wp.constant(len(MOVER_PLACES))
+_MOVER_COUNT = wp.constant(len(MOVER_POSITIONS))
 _AS_DOCUMENTED, _RANGED = wp.constant(AS_DOCUMENTED), wp.constant(RANGED)
 _MOVER_HEIGHT, _WALL_HEIGHT = wp.constant(MOVER_HEIGHT), wp.constant(WALL_HEIGHT)
 _PORTALS = wp.constant(  # x, y, z of each [m]
-    wp.mat33(*(x for (px, pz, _), y in zip(PORTAL_PLACES, PORTAL_HEIGHTS, strict=True) for x in (px, y, pz)), 0, 0, 0)
+    wp.mat33(
+        *(x for (px, pz, _), y in zip(PORTAL_POSITIONS, PORTAL_HEIGHTS, strict=True) for x in (px, y, pz)), 0, 0, 0
+    )
 )
 _WALL_LOW_X, _WALL_HIGH_X, _WALL_LOW_Z, _WALL_HIGH_Z = (wp.constant(c) for c in WALL_CENTRES)
 _STOREY_X_2, _STOREY_Z_2 = wp.constant(STOREY_X[1]), wp.constant(STOREY_Z[1])
@@ -80,7 +82,7 @@ def frame_of(choices: Choices, rules: Rules, tags: tuple[str, ...]) -> tuple[Ele
     if choices.observation == "as-documented":
         return (*goal, *rays)
     portals = [(*world_elements(f"portal_{k}"), *unit_elements(f"portal_{k}")) for k in (1, 2)]
-    movers = tuple(f"mover_{k + 1}" for k in range(len(MOVER_PLACES)))
+    movers = tuple(f"mover_{k + 1}" for k in range(len(MOVER_POSITIONS)))
     storey_walls = tuple(f"storey_{storey}_{wall}" for storey in (1, 2) for wall in walls)
     units = tuple(element for name in (*movers, *storey_walls) for element in unit_elements(name))
     return (*portals[0], *portals[1], *goal, *units, *world_elements("vel", "m/s"), *rays)

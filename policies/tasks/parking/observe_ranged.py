@@ -15,7 +15,7 @@ from policies.tasks.parking.arena import (
     WALL_Z_LOW,
     forward_of,
     into_frame,
-    place_of,
+    position_of,
     right_of,
     storey_centre,
     storey_of,
@@ -80,7 +80,7 @@ def write_velocity(buffers: StepBuffers, i: int, at: int, box: wp.vec4, vel: wp.
 @wp.func
 def write_box(buffers: StepBuffers, i: int, at: int, box: wp.vec4, other: wp.vec4, half: wp.vec2, radius: float) -> int:
     """The nearest surface of a rounded box; returns the next column."""
-    local = into_frame(other, place_of(box))
+    local = into_frame(other, position_of(box))
     gap = nearest_in_box(half, local) - local
     world = gap[0] * right_of(other) + gap[1] * forward_of(other)
     seen = wp.vec2(wp.dot(world, right_of(box)), wp.dot(world, forward_of(box)))
@@ -90,7 +90,7 @@ def write_box(buffers: StepBuffers, i: int, at: int, box: wp.vec4, other: wp.vec
 @wp.func
 def write_goal(buffers: StepBuffers, i: int, at: int, box: wp.vec4, goal: wp.vec4, half: wp.vec2) -> int:
     """The goal elements of what is to be driven to, with its half sizes; returns the next column."""
-    gap = into_frame(box, place_of(goal))
+    gap = into_frame(box, position_of(goal))
     distance = wp.length(gap)
     nose = forward_of(goal)
     next_at = write_pair(buffers, i, at, gap / wp.max(distance, 1.0e-6))
@@ -102,13 +102,13 @@ def write_goal(buffers: StepBuffers, i: int, at: int, box: wp.vec4, goal: wp.vec
 @wp.func
 def write_walls(buffers: StepBuffers, i: int, at: int, box: wp.vec4) -> int:
     """The four walls of the storey; returns the next column."""
-    place = place_of(box) - storey_centre(storey_of(box[0]))
+    position = position_of(box) - storey_centre(storey_of(box[0]))
     x = wp.vec2(box[3], box[2])  # the world's axes in the car's frame
     z = wp.vec2(-box[2], box[3])
-    next_at = write_pair(buffers, i, at, faded((WALL_X_LOW - place[0]) * x, 0.0))
-    next_at = write_pair(buffers, i, next_at, faded((WALL_X_HIGH - place[0]) * x, 0.0))
-    next_at = write_pair(buffers, i, next_at, faded((WALL_Z_LOW - place[1]) * z, 0.0))
-    return write_pair(buffers, i, next_at, faded((WALL_Z_HIGH - place[1]) * z, 0.0))
+    next_at = write_pair(buffers, i, at, faded((WALL_X_LOW - position[0]) * x, 0.0))
+    next_at = write_pair(buffers, i, next_at, faded((WALL_X_HIGH - position[0]) * x, 0.0))
+    next_at = write_pair(buffers, i, next_at, faded((WALL_Z_LOW - position[1]) * z, 0.0))
+    return write_pair(buffers, i, next_at, faded((WALL_Z_HIGH - position[1]) * z, 0.0))
 
 
 @wp.func

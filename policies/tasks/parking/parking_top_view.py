@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from policies.tasks.parking.arena import (
     INNER_FACES,
-    PORTAL_PLACES,
+    PORTAL_POSITIONS,
     PORTAL_SIZE,
     STOREY_X,
     STOREY_Z,
@@ -19,10 +19,10 @@ _FLOOR: Rgb = (255, 255, 255)
 _PORTAL: Rgb = (58, 140, 82)
 _RAY: Rgb = (214, 178, 108)
 _MARGIN_M = 1.5
-_GAP_M = 2.0 * 15.3 + 1.0  # [m] between the middles of storeys in the picture
+_GAP_M = 2.0 * 15.3 + 1.0  # [m] between the middles of storeys in the image
 
 
-class ParkingPicture:
+class ParkingView:
     """A canvas on which both storeys have room; places are given in the task's coordinates."""
 
     def __init__(self, storey_count: int, height_px: int) -> None:
@@ -37,7 +37,7 @@ class ParkingPicture:
                 middle = (centre[0] + (low_x + high_x) / 2, centre[1] + (low_z + high_z) / 2)
                 self.box((*middle, 0.0, 1.0), size, colour)
 
-    def place(self, x: float, z: float) -> tuple[float, float]:
+    def position(self, x: float, z: float) -> tuple[float, float]:
         """Where a point is drawn."""
         is_above = x > STOREY_X[1] / 2
         return (x - STOREY_X[1] + _GAP_M, z - STOREY_Z[1]) if is_above else (x, z)
@@ -45,11 +45,13 @@ class ParkingPicture:
     def box(self, pose: Any, size: tuple[float, float], colour: Rgb) -> None:
         """A rectangle at (x, z, sin yaw, cos yaw)."""
         yaw_rad = float(np.arctan2(pose[2], pose[3]))
-        self.canvas.box(self.place(float(pose[0]), float(pose[1])), size, -yaw_rad, colour)
+        self.canvas.box(self.position(float(pose[0]), float(pose[1])), size, -yaw_rad, colour)
 
     def line(self, a: Any, b: Any, colour: Rgb, width_px: int = 1) -> None:
         """From one point to another on the same storey."""
-        self.canvas.line([self.place(float(a[0]), float(a[1])), self.place(float(b[0]), float(b[1]))], colour, width_px)
+        self.canvas.line(
+            [self.position(float(a[0]), float(a[1])), self.position(float(b[0]), float(b[1]))], colour, width_px
+        )
 
     def car(self, pos: Any, yaw_rad: float, params: dict[str, float]) -> None:
         """Its box, and a line over its nose."""
@@ -80,32 +82,32 @@ def ray_fractions(task: Any, i_env: int) -> NDArray[np.float32]:
     return np.asarray(newest[size - 1 :: size], dtype=np.float32)
 
 
-def picture_of(task: Any, i_env: int, height_px: int) -> NDArray[np.uint8]:
+def top_view_of(task: Any, i_env: int, height_px: int) -> NDArray[np.uint8]:
     """One environment of either level."""
     world = task.world
     params = params_of(task, i_env)
     is_level_2 = hasattr(task, "movers")
-    picture = ParkingPicture(2 if is_level_2 else 1, height_px)
+    image = ParkingView(2 if is_level_2 else 1, height_px)
     pos, yaw_rad = world.pos.numpy()[i_env], float(world.yaw.numpy()[i_env])
-    picture.box(world.goal.numpy()[i_env], (params["pad_width_m"], params["pad_length_m"]), GOAL)
-    picture.rays(pos, yaw_rad, ray_fractions(task, i_env), params)
+    image.box(world.goal.numpy()[i_env], (params["pad_width_m"], params["pad_length_m"]), GOAL)
+    image.rays(pos, yaw_rad, ray_fractions(task, i_env), params)
     if is_level_2:
-        _draw_level_2(picture, task, i_env, params)
+        _draw_level_2(image, task, i_env, params)
     else:
         for block in task.blocks.numpy()[i_env]:
-            picture.box(block, (params["block_width_m"], params["block_length_m"]), OBSTACLE)
-    picture.car(pos, yaw_rad, params)
-    return picture.canvas.pixels
+            image.box(block, (params["block_width_m"], params["block_length_m"]), OBSTACLE)
+    image.car(pos, yaw_rad, params)
+    return image.canvas.pixels
 
 
-def _draw_level_2(picture: ParkingPicture, task: Any, i_env: int, params: dict[str, float]) -> None:
-    for x, z, yaw_deg in PORTAL_PLACES:
+def _draw_level_2(image: ParkingView, task: Any, i_env: int, params: dict[str, float]) -> None:
+    for x, z, yaw_deg in PORTAL_POSITIONS:
         yaw_rad = np.radians(yaw_deg)
-        picture.box((x, z, np.sin(yaw_rad), np.cos(yaw_rad)), (PORTAL_SIZE[0], 0.4), _PORTAL)
+        image.box((x, z, np.sin(yaw_rad), np.cos(yaw_rad)), (PORTAL_SIZE[0], 0.4), _PORTAL)
     radius = params["mover_radius_m"]
     reach = max(0.0, params["mover_length_m"] / 2 - radius)
     for mover in task.movers.numpy()[i_env]:
-        picture.box(mover, (2 * radius, 2 * reach), OBSTACLE)
+        image.box(mover, (2 * radius, 2 * reach), OBSTACLE)
         for side in (-1.0, 1.0):
-            end = picture.place(float(mover[0] + side * reach * mover[2]), float(mover[1] + side * reach * mover[3]))
-            picture.canvas.disc(end, radius, OBSTACLE)
+            end = image.position(float(mover[0] + side * reach * mover[2]), float(mover[1] + side * reach * mover[3]))
+            image.canvas.disc(end, radius, OBSTACLE)

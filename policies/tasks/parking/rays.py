@@ -15,7 +15,7 @@ from policies.tasks.parking.arena import (
     WALL_Z_HIGH,
     WALL_Z_LOW,
     forward_of,
-    place_of,
+    position_of,
     right_of,
     storey_centre,
     storey_of,
@@ -91,7 +91,7 @@ def ray_to_rounded_box(start: wp.vec2, ray: wp.vec2, half: wp.vec2, radius: floa
 @wp.func
 def ray_to_box(start: wp.vec2, ray: wp.vec2, box: wp.vec4, half: wp.vec2, radius: float) -> float:
     """How far a sphere goes until it reaches a box that stands anywhere [m], or FAR."""
-    gap = start - place_of(box)
+    gap = start - position_of(box)
     towards = -wp.dot(gap, ray)
     reach = wp.length(half) + radius
     aside = wp.dot(gap, gap) - towards * towards
@@ -159,7 +159,7 @@ def write_rays(
     buffers: StepBuffers, i: int, at: int, car: wp.vec4, scene: Scene, rules: Rules, params: CarParams
 ) -> int:
     """The whole sensor, from the car's origin; returns the next column."""
-    start = place_of(car)
+    start = position_of(car)
     radius = params.ray_radius_m
     length_m = params.ray_length_m
     right = forward_of(car)

@@ -17,7 +17,7 @@ wp.set_module_options({"enable_backward": False})
 
 ObservationKind = Literal["", "as-documented", "as-coded", "ranged"]
 RewardKind = Literal["", "as-documented", "as-documented-gail", "as-coded", "progress"]
-Places = Literal["", "published", "anywhere"]
+Positions = Literal["", "published", "anywhere"]
 Success = Literal["", "touch", "pose"]
 Actions = Literal["", "steer", "push-or-turn", "steer-and-drive", "steer-and-shift"]
 Repeat = Literal["", "once", "held"]
@@ -50,12 +50,12 @@ class ParkingSettings(TaskSettings):
     """`as-documented` and `as-coded`: unit vectors without ranges; `ranged`: what is where in the car's frame."""
     reward: RewardKind = ""
     """The documents' table (PPO column, PPO+GAIL column, or as the code applies it), or `progress`: ours."""
-    starts: Places = ""
+    starts: Positions = ""
     """The `published` pose, or `anywhere` free, with any yaw."""
-    goals: Places = ""
+    goals: Positions = ""
     """`published` places, or `anywhere` free in the cells of the chosen split. Published places are training spots:
     where nothing is chosen here, `split=test` draws from the test cells."""
-    obstacles: Places = ""
+    obstacles: Positions = ""
     """Blocks and moving obstacles at their `published` places, or `anywhere`, others in each episode."""
     success: Success = ""
     """`touch`: any overlap with the pad; `pose`: at its centre, aligned with it, and slow."""
@@ -94,9 +94,9 @@ class Choices:
 
     observation: ObservationKind
     reward: RewardKind
-    starts: Places
-    goals: Places
-    obstacles: Places
+    starts: Positions
+    goals: Positions
+    obstacles: Positions
     success: Success
     actions: Actions
     repeat: Repeat

@@ -17,14 +17,14 @@ from policies.tasks.parking.arena import (
     LEVEL1_START,
     LEVEL2_START,
     PORTAL_EXITS,
-    PORTAL_PLACES,
+    PORTAL_POSITIONS,
     STOREY_X,
     STOREY_Z,
     WALL_X_HIGH,
     WALL_X_LOW,
     WALL_Z_HIGH,
     WALL_Z_LOW,
-    place_of,
+    position_of,
     storey_centre,
 )
 from policies.tasks.parking.car import box_distance
@@ -33,7 +33,7 @@ from policies.tasks.parking.scene import MAX_OBSTACLES, Scene, portal_half
 wp.set_module_options({"enable_backward": False})
 
 SPLIT_SEED = 527  # of the train and test sets; never to be changed
-TEST_SHARE = 0.2
+TEST_FRACTION = 0.2
 _PAD_REACH = float(np.hypot(2.5, 1.0) / 2)  # [m] 1.35, from the published pad's centre to its corners
 _WALL_MARGIN = _PAD_REACH + 0.15  # [m] from a goal's centre to a wall
 _START_MARGIN = 3.5  # [m] from a goal to the published start
@@ -59,19 +59,19 @@ def cells(storey: int, level: int, split: str) -> NDArray[np.float32]:
     x = np.arange(np.ceil(INNER_FACES[0] + _WALL_MARGIN), np.floor(INNER_FACES[1] - _WALL_MARGIN))
     z = np.arange(np.ceil(INNER_FACES[2] + _WALL_MARGIN), np.floor(INNER_FACES[3] - _WALL_MARGIN))
     corners = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    is_test = np.random.default_rng((SPLIT_SEED, storey)).random(len(corners)) < TEST_SHARE
+    is_test = np.random.default_rng((SPLIT_SEED, storey)).random(len(corners)) < TEST_FRACTION
     corners = corners + np.array((STOREY_X[storey], STOREY_Z[storey]))
     is_free = np.ones(len(corners), dtype=np.bool_)
-    for place, margin in _kept_free(level):
-        is_free &= np.hypot(*(corners + 0.5 - np.array(place)).T) > margin + np.sqrt(0.5)
+    for position, margin in _kept_free(level):
+        is_free &= np.hypot(*(corners + 0.5 - np.array(position)).T) > margin + np.sqrt(0.5)
     return np.asarray(corners[is_free & (is_test == (split == "test"))], dtype=np.float32)
 
 
 def _kept_free(level: int) -> list[tuple[tuple[float, float], float]]:
     if level == 1:
         return [(LEVEL1_START[:2], _START_MARGIN)]
-    portals = [(place[0], place[1]) for place in (*PORTAL_PLACES, *PORTAL_EXITS)]
-    return [(LEVEL2_START[:2], _START_MARGIN), *((place, _PORTAL_MARGIN) for place in portals)]
+    portals = [(position[0], position[1]) for position in (*PORTAL_POSITIONS, *PORTAL_EXITS)]
+    return [(LEVEL2_START[:2], _START_MARGIN), *((position, _PORTAL_MARGIN) for position in portals)]
 
 
 @wp.func
@@ -103,7 +103,7 @@ def draw_start(scene: Scene, storey: int, range_m: float, seed: int, i_env: int,
     """A place on a storey, clear of walls, obstacles, portal and goal, within a range of the goal per axis [m]."""
     rng = draw_key(seed, i_env, episode, stream)
     centre = storey_centre(storey)
-    goal = place_of(scene.goal)
+    goal = position_of(scene.goal)
     low_x = centre[0] + WALL_X_LOW + _START_CLEARANCE
     high_x = centre[0] + WALL_X_HIGH - _START_CLEARANCE
     low_z = centre[1] + WALL_Z_LOW + _START_CLEARANCE
@@ -132,14 +132,14 @@ def draw_start(scene: Scene, storey: int, range_m: float, seed: int, i_env: int,
 def draw_block(others: Scene, seed: int, i_env: int, episode: int, stream: int) -> wp.vec4:
     """A pose for a block, far enough from the blocks that stand already."""
     rng = draw_key(seed, i_env, episode, stream)
-    place = wp.vec2()
+    position = wp.vec2()
     is_found = int(0)
     for _try in range(_TRIES):
         if is_found == 0:
-            place = wp.vec2(_BLOCK_RANGE * (2.0 * wp.randf(rng) - 1.0), _BLOCK_RANGE * (2.0 * wp.randf(rng) - 1.0))
+            position = wp.vec2(_BLOCK_RANGE * (2.0 * wp.randf(rng) - 1.0), _BLOCK_RANGE * (2.0 * wp.randf(rng) - 1.0))
             is_found = 1
             for k in range(MAX_OBSTACLES):
-                if k < others.obstacle_count and wp.length(place_of(others.obstacles[k]) - place) < _BLOCK_GAP:
+                if k < others.obstacle_count and wp.length(position_of(others.obstacles[k]) - position) < _BLOCK_GAP:
                     is_found = 0
     yaw_rad = wp.pi * (2.0 * wp.randf(rng) - 1.0)
-    return wp.vec4(place[0], place[1], wp.sin(yaw_rad), wp.cos(yaw_rad))
+    return wp.vec4(position[0], position[1], wp.sin(yaw_rad), wp.cos(yaw_rad))

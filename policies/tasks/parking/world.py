@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from policies.tasks.parking.arena import pose_at
 from policies.tasks.parking.drive import Motion
 from policies.tasks.parking.parking_params import CarParams
-from policies.tasks.parking.parking_top_view import picture_of
+from policies.tasks.parking.parking_top_view import top_view_of
 from policies.tasks.parking.settings import Rules
 from policies.tasks.task import Task
 from policies.tasks.task_params import typed_rows
@@ -67,6 +67,6 @@ class ParkingTask(Task):
         state.params = typed_rows(self.buffers.params, CarParams)
         return state
 
-    def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
+    def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """Storeys, obstacles, pad, portals, car and, where it has them, rays, from above."""
-        return picture_of(self, i_env, height_px)
+        return top_view_of(self, i_env, height_px)

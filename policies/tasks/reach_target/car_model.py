@@ -170,8 +170,8 @@ def force_per_slip(tyre: Tyre, slip: float) -> float:
     """
     if slip < 1.0:
         return tyre.peak * (2.0 - slip)
-    share = wp.min((slip - 1.0) / (tyre.knee - 1.0), 1.0)
-    return (tyre.peak + (tyre.tail - tyre.peak) * share * share * (3.0 - 2.0 * share)) / slip
+    fraction = wp.min((slip - 1.0) / (tyre.knee - 1.0), 1.0)
+    return (tyre.peak + (tyre.tail - tyre.peak) * fraction * fraction * (3.0 - 2.0 * fraction)) / slip
 
 
 @wp.func
@@ -246,8 +246,8 @@ def drop_to_ground(car: Car, pos: wp.vec3, turn: wp.mat33, up_car: wp.vec3, hub:
         return out_of_reach
     drop = (pos[1] + wp.dot(up_car, hub)) / up_car[1]
     if wp.max(wp.abs(pos[0]), wp.abs(pos[2])) > car.half_platform_m - car.span_m:
-        place = pos + turn @ (hub - wp.vec3(0.0, drop, 0.0))
-        if drop < 0.0 or wp.max(wp.abs(place[0]), wp.abs(place[2])) > car.half_platform_m:
+        position = pos + turn @ (hub - wp.vec3(0.0, drop, 0.0))
+        if drop < 0.0 or wp.max(wp.abs(position[0]), wp.abs(position[2])) > car.half_platform_m:
             return out_of_reach
     return drop
 
@@ -264,11 +264,11 @@ def scraped(car: Car, motion: Motion, turn: wp.mat33, vel_car: wp.vec3) -> wp.sp
             wp.where((k // 2) % 2 == 0, -car.half_size[1], car.half_size[1]),
             wp.where(k // 4 == 0, -car.half_size[2], car.half_size[2]),
         )
-        place = motion.pos + turn @ corner
-        if place[1] < 0.0 and wp.max(wp.abs(place[0]), wp.abs(place[2])) <= car.half_platform_m:
+        position = motion.pos + turn @ corner
+        if position[1] < 0.0 and wp.max(wp.abs(position[0]), wp.abs(position[2])) <= car.half_platform_m:
             vel = vel_car + wp.cross(motion.omega_car, corner)
             rise = wp.dot(vel, up_car)
-            load = wp.clamp(-car.contact_n_m * place[1] - car.contact_ns_m * rise, 0.0, car.weight_n)
+            load = wp.clamp(-car.contact_n_m * position[1] - car.contact_ns_m * rise, 0.0, car.weight_n)
             slide = vel - rise * up_car
             pull = load * (up_car - car.contact_friction * slide / wp.max(wp.length(slide), car.slip_speed_m_s))
             force += pull
@@ -368,7 +368,7 @@ def is_chassis_hit(car: Car, motion: Motion) -> bool:
                 wp.where((k // 2) % 2 == 0, -car.half_size[1], car.half_size[1]),
                 wp.where(k // 4 == 0, -car.half_size[2], car.half_size[2]),
             )
-            place = motion.pos + turn @ corner
-            if place[1] < 0.0 and wp.max(wp.abs(place[0]), wp.abs(place[2])) <= half:
+            position = motion.pos + turn @ corner
+            if position[1] < 0.0 and wp.max(wp.abs(position[0]), wp.abs(position[2])) <= half:
                 is_hit = True
     return is_hit

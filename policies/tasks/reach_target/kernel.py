@@ -58,7 +58,7 @@ _YAW_STREAM = wp.constant(1)
 _TARGET_STREAM = wp.constant(64)  # and one more for each target that follows in the same episode
 _SPLIT_SEED = wp.constant(20260)  # fixes which squares of the ground are test squares
 _SPLIT_SQUARE_M = wp.constant(2.0)
-_SPLIT_SHARE = wp.constant(10)  # one square in so many is a test square
+_SPLIT_PERIOD = wp.constant(10)  # one square in so many is a test square
 _SPLIT_TRIES = wp.constant(256)  # 0.9^256 = 2e-12: the chance that a test target lies in a training square
 _PLATFORMS = wp.constant(16)  # stacked in the published scene,
 _PLATFORM_DROP_M = wp.constant(20.0)  # so far apart
@@ -172,7 +172,7 @@ def is_test_square(x: float, z: float) -> bool:
     """Whether the ground there belongs to the test set."""
     a = int(wp.floor(x / _SPLIT_SQUARE_M))
     b = int(wp.floor(z / _SPLIT_SQUARE_M))
-    return wp.randi(draw_key(_SPLIT_SEED, a, b, 0), 0, _SPLIT_SHARE) == 0
+    return wp.randi(draw_key(_SPLIT_SEED, a, b, 0), 0, _SPLIT_PERIOD) == 0
 
 
 @wp.func

@@ -12,7 +12,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from policies.tasks.goals import PlaceGoal
+from policies.tasks.goals import PositionGoal
 from policies.tasks.layout import Element, Layout
 from policies.tasks.reach_target.car_model import STEP_S
 from policies.tasks.reach_target.kernel import (
@@ -51,7 +51,7 @@ _EGO = (
     Element("edge_behind", "m", RANGE_M),
     Element("edge_left", "m", RANGE_M),
 )
-_INSET_M = 8.0  # half of what the small picture around the car shows
+_INSET_M = 8.0  # half of what the small image around the car shows
 _ACTIONS = (Element("steering", "1"), Element("throttle", "1"), Element("brake", "1"))
 
 
@@ -67,7 +67,7 @@ class ReachTarget(Task):
         super().__init__(layout, env_count, number_defaults={}, device=device)
         self.settings = settings
         if (settings.observation, settings.reward, settings.success) == ("world", "sparse", "reach"):
-            self.goal = PlaceGoal(goal=(0, 1, 2), achieved=(3, 4, 5), radius="reach_m", reward=1.0)
+            self.goal = PositionGoal(goal=(0, 1, 2), achieved=(3, 4, 5), radius="reach_m", reward=1.0)
         state = ReachState()
         state.pos = self._zeros("pos", env_count, wp.vec3)
         state.q = self._zeros("q", env_count, wp.quat)
@@ -82,7 +82,7 @@ class ReachTarget(Task):
         self.world = state
         self._record(begin, step, [state, _rules(settings)])
 
-    def picture(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
+    def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """Platform, car and target from above, z upwards; beside it what is close to the car."""
         half = 1.1 * float(self._row(i_env)["half_platform_m"])
         canvas = Canvas((-half, 1.6 * half), (-half, half), height_px)

@@ -17,7 +17,7 @@ class View:
     """One camera."""
 
     pos_ned: wp.vec3  # [m]
-    right: wp.vec3  # the axes of the picture in ned, unit
+    right: wp.vec3  # the axes of the image in ned, unit
     down: wp.vec3
     ahead: wp.vec3
     sun_rdf: wp.vec3  # unit, in the camera's frame
@@ -31,9 +31,9 @@ class View:
     eye: wp.vec3  # cells from the south edge and from the west edge, metres above home
     steep_squared: float  # no ground in this world is steeper [m²/m²]
     angle_low: float  # pseudo-angle of the first column
-    left_edge: wp.vec2  # level normals of the picture's outermost directions, pointing inwards; 0 for all round
+    left_edge: wp.vec2  # level normals of the image's outermost directions, pointing inwards; 0 for all round
     right_edge: wp.vec2
-    columns: int  # 0: no ray of the picture needs one
+    columns: int  # 0: no ray of the image needs one
     columns_per_angle: float
     first_m: float  # distance of a column's first sample
     solids: int  # listed for this camera

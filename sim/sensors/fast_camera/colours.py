@@ -124,7 +124,7 @@ def _smooth_noise(rng: np.random.Generator, steepness: float, longest: float) ->
     Args:
         rng: draws it.
         steepness: that power.
-        longest: wavelengths above this share of the side are left out.
+        longest: wavelengths above this fraction of the side are left out.
     """
     along = np.fft.fftfreq(SIDE) * SIDE
     frequency = np.hypot(along[:, None], along[None, :])

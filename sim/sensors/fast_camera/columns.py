@@ -16,8 +16,8 @@ from sim.sensors.fast_camera.solids import NEVER
 wp.set_module_options(FAST)
 
 _PLANES = wp.constant(4)  # triangles tried in turn, as Newton's method goes from one to the next
-_STEP_M = wp.constant(0.02)  # the last step: exact on one triangle, and off by a share of itself where it leaves it
-_STEP_SHARE = wp.constant(0.004)
+_STEP_M = wp.constant(0.02)  # the last step: exact on one triangle, and off by a fraction of itself where it leaves it
+_STEP_FRACTION = wp.constant(0.004)
 _WALK_BACK = wp.constant(2)  # samples that a misled ray goes back
 _SECANT_STEPS = wp.constant(8)
 
@@ -110,14 +110,14 @@ def ground_depth(
         slope = ray.climb * inverse
         place = (pseudo_angle(ray.ahead, ray.right, inverse) - view.angle_low) * view.columns_per_angle
         left = wp.clamp(int(place), 0, view.columns - 2)
-        share = place - float(left)
+        fraction = place - float(left)
         first = (i_camera * columns.room + left) * columns.samples
         last = columns.samples - 1
         skyline_left = columns.slopes[first + last]
         skyline_right = columns.slopes[first + columns.samples + last]
-        if slope > skyline_left + share * (skyline_right - skyline_left):
+        if slope > skyline_left + fraction * (skyline_right - skyline_left):
             return found
-        if (share > 0.5 and slope <= skyline_right) or slope > skyline_left:
+        if (fraction > 0.5 and slope <= skyline_right) or slope > skyline_left:
             first = first + columns.samples
         k = first_at(columns, first, slope, before.k)
         found.k = k
@@ -144,7 +144,7 @@ def ground_depth(
             return found
         found.plane = plane_at(ground, view.cell_base, u, v, view.eye)
         t_next = plane_depth(found.plane, ray)
-        if wp.abs(t_next - t) < _STEP_M + _STEP_SHARE * t:
+        if wp.abs(t_next - t) < _STEP_M + _STEP_FRACTION * t:
             found.t = t_next
             return found
         t = wp.clamp(t_next, low, high)

@@ -1,4 +1,4 @@
-"""The fast camera: colours, depth and classes of many small pictures, thousands a second on one core, or on a GPU.
+"""The fast camera: colours, depth and classes of many small images, thousands a second on one core, or on a GPU.
 
 In: lenses, which kernels write, one per camera; the worlds; the person each camera looks for. Out: 8-bit sRGB, depth
 along the optical axis and classes, in arrays that stay where they are. For training and onboard cameras at 10 Hz; the
@@ -22,7 +22,7 @@ from sim.sensors.fast_camera.prepare import prepare_views
 from sim.sensors.fast_camera.rows import Outputs, draw_rows
 from sim.sensors.fast_camera.solids import Sights, Solid
 from sim.workers import Workers
-from sim.world.trees import CROWN_RADIUS_SHARE
+from sim.world.trees import CROWN_RADIUS_FRACTION
 from sim.world.world import World, WorldConfig, WorldMap
 
 RANGE_M = 80.0
@@ -52,14 +52,14 @@ class QuickCamera:
     Args:
         worlds: what is seen, its arrays on `device`.
         count: number of cameras.
-        width: of each picture [pixels].
-        height: of each picture [pixels].
+        width: of each image [pixels].
+        height: of each image [pixels].
         hfov_deg: horizontal field of view the lenses begin with.
         people: array of `Person`, shape (count,): row i is seen by camera i alone, stature 0 is nobody; None for none.
         i_world: the world of each camera; None: the only one, or camera i looks at world i.
         range_m: fog hides what is farther; farther ground and trees are not drawn.
-        has_optics: whether `optics` spoil the pictures; they are perfect otherwise.
-        threads: the cameras are split into as many launches; the pictures do not depend on it.
+        has_optics: whether `optics` spoil the images; they are perfect otherwise.
+        threads: the cameras are split into as many launches; the images do not depend on it.
         device: a Warp device.
 
     Attributes:
@@ -118,14 +118,14 @@ class QuickCamera:
         chosen = self._everyone
         seen = [self._worlds, self.i_world, self.lenses, people, chosen, ground, range_m, size, views, columns, sights]
         drawn = [ground, paints, views, chosen, columns, sights, range_m, outputs]
-        pictures = [array.flatten() for array in (*perfect, self.rgb, self.depth_m)]
+        images = [array.flatten() for array in (*perfect, self.rgb, self.depth_m)]
         passes: list[_Pass] = [
             (prepare_views, (), seen),
             (lay_columns, (columns.room,), [ground, views, chosen, columns]),
             (draw_rows, (height,), drawn),
         ]
         if has_optics:
-            passes.append((expose, (height,), [self.lenses, chosen, self.optics, size, *pictures]))
+            passes.append((expose, (height,), [self.lenses, chosen, self.optics, size, *images]))
         self._workers = Workers(count, threads)
         self._commands = [
             [_recorded(a_pass, chosen, first, rows, device) for a_pass in passes]
@@ -157,7 +157,7 @@ class QuickCamera:
             command.launch()
 
     def render(self, is_chosen: Any = None) -> None:
-        """Takes the pictures of the chosen cameras: array of bool, shape (count,); None for all."""
+        """Takes the images of the chosen cameras: array of bool, shape (count,); None for all."""
         chosen = self._everyone if is_chosen is None else is_chosen
 
         def render_chunk(k: int) -> None:
@@ -198,7 +198,7 @@ def _columns(count: int, width: int, range_m: float, device: str) -> Any:
 def _sights(count: int, config: WorldConfig, range_m: float, device: str) -> Any:
     sights = Sights()
     room = sights.room = _solids_room(config, range_m)
-    sights.crown_max_m = CROWN_RADIUS_SHARE[1] * config.tree_height_max_m
+    sights.crown_max_m = CROWN_RADIUS_FRACTION[1] * config.tree_height_max_m
     sights.solids = wp.zeros(count * room, dtype=Solid, device=device)
     sights.boxes = wp.zeros(count * room, dtype=wp.vec4i, device=device)
     return sights

@@ -1,7 +1,7 @@
 """A person as a camera sees them: ten limbs, a torso and a head, walking or running by the phase of their gait.
 
 Proportions are those of Drillis and Contini (1966, in Winter, Biomechanics and Motor Control of Human Movement, 2009,
-fig. 4.1), as shares of the stature; thicknesses, swings and colours are guesses by eye. The shirt is blue.
+fig. 4.1), as fractions of the stature; thicknesses, swings and colours are guesses by eye. The shirt is blue.
 """
 
 import warp as wp
@@ -32,7 +32,7 @@ _HAIR = wp.constant(wp.vec3(0.060, 0.035, 0.020))
 
 @wp.func
 def body_point(person: Person, forward: float, right: float, up: float) -> wp.vec3:
-    """A place on the body in ned [m], given in shares of the stature from the feet."""
+    """A place on the body in ned [m], given in fractions of the stature from the feet."""
     s = person.stature_m
     c = wp.cos(person.heading_rad) * s
     d = wp.sin(person.heading_rad) * s

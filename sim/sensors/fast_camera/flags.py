@@ -1,6 +1,6 @@
 """Compiler options of the fast camera's hot modules.
 
-A picture may differ by a rounding from machine to machine; physics and estimation may not and never use these. Modules
+An image may differ by a rounding from machine to machine; physics and estimation may not and never use these. Modules
 with these options must not test for NaN or infinity: the compiler takes it that there are none.
 """
 

@@ -126,7 +126,7 @@ def first_texel(ground: Ground, place_m: float) -> int:
 
 @wp.func
 def darken(ground: Ground, base: int, shadow: Shadow, first: int, end: int) -> None:
-    """Takes a shadow's share of the light from the texels of some rows, with a soft edge one texel wide."""
+    """Takes a shadow's fraction of the light from the texels of some rows, with a soft edge one texel wide."""
     texel_m = 1.0 / ground.texels_per_m
     j_first = first_texel(ground, shadow.low_ne[1])
     j_end = first_texel(ground, shadow.high_ne[1])

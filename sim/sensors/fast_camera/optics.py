@@ -1,6 +1,6 @@
-"""What a camera adds to a perfect picture: noise of its sensor and its depth, and the smear of what moves meanwhile.
+"""What a camera adds to a perfect image: noise of its sensor and its depth, and the smear of what moves meanwhile.
 
-In: perfect pictures, and per camera an `Optics` that kernels write before each. Out: the pictures as they are handed
+In: perfect images, and per camera an `Optics` that kernels write before each. Out: the images as they are handed
 on. Exposure and white balance belong to the `Lens`. Draws are named by a camera's seed and tick and the pixel.
 """
 
@@ -16,7 +16,7 @@ wp.set_module_options(FAST)
 
 _READ_STD = wp.constant(2.5)  # [levels] guess, a small sensor by day
 _SHOT_STD = wp.constant(4.5)  # [levels] of a white pixel; guess
-_DEPTH_STD_SHARE = wp.constant(0.02)  # Intel D435: below 2 % up to 2 m
+_DEPTH_STD_FRACTION = wp.constant(0.02)  # Intel D435: below 2 % up to 2 m
 _UNIFORM_WIDTH = wp.constant(3.4641016)  # of a uniform draw of unit variance
 _TAPS_MAX = wp.constant(6)  # places that a smeared pixel is the mean of
 _SMEAR_MAX = wp.constant(16.0)  # [pixels]
@@ -29,7 +29,7 @@ class Optics:
 
     read_std: float  # [levels] noise of a black pixel
     shot_std: float  # [levels] more noise of a white one, growing with the root of the level
-    depth_std_share: float  # error of a pixel's depth as a share of it
+    depth_std_fraction: float  # error of a pixel's depth as a fraction of it
     shutter_s: float  # time in which what moves is smeared; 0 smears nothing
     vel_rdf: wp.vec3  # [m/s] of the camera, while the shutter is open
     rate_rdf: wp.vec3  # [rad/s]
@@ -42,7 +42,7 @@ def sensor_noise(optics: Optics, scale: float, seed: int, tick: int) -> Optics:
     """The camera with the noise of a small sensor by day, times a factor, as drawn for one tick."""
     optics.read_std = scale * _READ_STD
     optics.shot_std = scale * _SHOT_STD
-    optics.depth_std_share = scale * _DEPTH_STD_SHARE
+    optics.depth_std_fraction = scale * _DEPTH_STD_FRACTION
     optics.seed = seed
     optics.tick = tick
     return optics
@@ -51,7 +51,7 @@ def sensor_noise(optics: Optics, scale: float, seed: int, tick: int) -> Optics:
 @wp.func
 def is_perfect(optics: Optics) -> bool:
     """Whether the camera neither errs nor smears."""
-    return optics.read_std + optics.shot_std + optics.depth_std_share + optics.shutter_s == 0.0
+    return optics.read_std + optics.shot_std + optics.depth_std_fraction + optics.shutter_s == 0.0
 
 
 @wp.func
@@ -75,7 +75,7 @@ def smear(optics: Optics, x: float, y: float, depth_m: float, per_pixel: float) 
 
 @wp.func
 def between(rgb: wp.array[wp.uint8], first: int, size: wp.vec2i, row: float, column: float) -> wp.vec3:
-    """Levels between four pixels of the picture that begins at an index; those of its edge beyond it."""
+    """Levels between four pixels of the image that begins at an index; those of its edge beyond it."""
     v = wp.clamp(row, 0.0, float(size[1]) - 1.001)
     u = wp.clamp(column, 0.0, float(size[0]) - 1.001)
     i = int(v)
@@ -101,8 +101,8 @@ def smeared(rgb: wp.array[wp.uint8], first: int, size: wp.vec2i, row: int, colum
     levels = wp.vec3()
     taps = wp.min(int(wp.length(way)) + 2, _TAPS_MAX)
     for tap in range(taps):
-        share = (float(tap) + 0.5) / float(taps) - 0.5
-        levels = levels + between(rgb, first, size, float(row) + share * way[1], float(column) + share * way[0])
+        fraction = (float(tap) + 0.5) / float(taps) - 0.5
+        levels = levels + between(rgb, first, size, float(row) + fraction * way[1], float(column) + fraction * way[0])
     return levels / float(taps)
 
 
@@ -149,5 +149,5 @@ def expose(
             level = levels[c] + wp.sqrt(read + shot * levels[c]) * even(bits, c)
             rgb[3 * k + c] = wp.uint8(wp.clamp(level + 0.5, 0.0, 255.0))
         if depth < RAY_MAX_M:
-            depth = depth * (1.0 + optics.depth_std_share * even(bits, 3))
+            depth = depth * (1.0 + optics.depth_std_fraction * even(bits, 3))
         depth_m[k] = depth

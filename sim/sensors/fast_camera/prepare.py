@@ -1,6 +1,6 @@
 """What is the same for all pixels of a camera: its axes, the columns it needs, the solids it may see.
 
-Runs once per picture, before its columns and rows.
+Runs once per image, before its columns and rows.
 """
 
 import warp as wp
@@ -58,7 +58,7 @@ def level_ned(view: View, ahead: float, right: float) -> wp.vec2:
 
 @wp.func
 def with_columns(view: View, width: int, height: int, room: int) -> View:
-    """The camera with the range of level directions in its picture: all of them if straight up or down is in it."""
+    """The camera with the range of level directions in its image: all of them if straight up or down is in it."""
     half_x = 0.5 * float(width) * view.per_pixel
     half_y = 0.5 * float(height) * view.per_pixel
     low = float(NEVER)
@@ -77,7 +77,7 @@ def with_columns(view: View, width: int, height: int, room: int) -> View:
         if ray[2] * ray[2] > view.steep_squared * (ahead * ahead + right * right):
             falling = falling + wp.where(ray[2] > 0.0, 1, 0)
             climbing = climbing + wp.where(ray[2] < 0.0, 1, 0)
-    depth = wp.max(wp.abs(view.up_rdf[2]), 1.0e-6)  # where straight up or down is in the picture
+    depth = wp.max(wp.abs(view.up_rdf[2]), 1.0e-6)  # where straight up or down is in the image
     is_upright = wp.abs(view.up_rdf[0]) <= half_x * depth and wp.abs(view.up_rdf[1]) <= half_y * depth
     if is_upright or high - low > 4.0:
         low = -4.0

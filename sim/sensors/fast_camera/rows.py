@@ -1,4 +1,4 @@
-"""The rows of the pictures: solids first, then the ground where they leave it free, then one colour per pixel.
+"""The rows of the images: solids first, then the ground where they leave it free, then one colour per pixel.
 
 One thread per row: neighbouring pixels share the search for the ground, and a GPU gets enough threads.
 """
@@ -26,7 +26,7 @@ _PARALLEL = wp.constant(1.0e-9)
 
 @wp.struct
 class Outputs:
-    """Pictures, flat."""
+    """Images, flat."""
 
     rgb: wp.array[wp.uint8]
     depth_m: wp.array[wp.float32]
@@ -171,8 +171,8 @@ def draw_rows(
         if found.t < t:
             t = found.t
             kind = GROUND
-        share = t * t * ray_squared * per_range
-        if share >= 1.0:
+        fraction = t * t * ray_squared * per_range
+        if fraction >= 1.0:
             kind = SKY
         colour = wp.vec3(0.0, 0.0, 0.0)
         if view.inside != SKY:
@@ -193,7 +193,7 @@ def draw_rows(
                 solid = sights.solids[i_camera * sights.room + outputs.front[start + column]]
                 kind = solid.kind
                 colour = solid_colour(paints, view, solid, wp.vec3(x, y, 1.0), t)
-            fog = share * (0.3 + 0.7 * share)
+            fog = fraction * (0.3 + 0.7 * fraction)
             colour = colour + fog * (HAZE - colour)
         outputs.depth_m[start + column] = t
         outputs.kind[start + column] = wp.uint8(kind)

@@ -1,7 +1,7 @@
 """Round things in front of a camera: trunks, crowns and limbs are all capsules, kept in the camera's own frame.
 
 A trunk's round ends are under ground and inside the crown, so the capsule is the world's cylinder where it can be seen.
-In: the camera, the world's trees, a person. Out: the list of what may be in the picture, with boxes in pixels.
+In: the camera, the world's trees, a person. Out: the list of what may be in the image, with boxes in pixels.
 """
 
 import warp as wp
@@ -38,7 +38,7 @@ class Sights:
     """The solids of all cameras, `room` each."""
 
     solids: wp.array[Solid]
-    boxes: wp.array[wp.vec4i]  # first and last column and row in the picture
+    boxes: wp.array[wp.vec4i]  # first and last column and row in the image
     room: int
     crown_max_m: float  # no crown has a larger radius
 
@@ -106,7 +106,7 @@ def is_in_solid(solid: Solid) -> bool:
 
 @wp.func
 def ball_span(across: float, depth: float, radius: float) -> wp.vec2:
-    """First and last x (or y) of a ball in the picture, as x = across / depth; first after last if it is behind."""
+    """First and last x (or y) of a ball in the image, as x = across / depth; first after last if it is behind."""
     if depth < -0.99 * radius:  # an end that was moved: the capsule goes on to the side from here
         return wp.vec2(wp.where(across < radius, -NEVER, NEVER), wp.where(across > -radius, NEVER, -NEVER))
     tangent_squared = across * across + depth * depth - radius * radius
@@ -163,7 +163,7 @@ def first_pixel(x: float, per_pixel: float, count: int) -> int:
 
 @wp.func
 def list_solid(sights: Sights, i_camera: int, view: View, solid: Solid, width: int, height: int) -> View:
-    """The camera with a capsule on its list, if that can be in the picture and there is room."""
+    """The camera with a capsule on its list, if that can be in the image and there is room."""
     box = solid_box(solid, view.per_pixel, width, height)
     if view.solids < sights.room and box[0] <= box[1] and box[2] <= box[3]:
         k = i_camera * sights.room + view.solids

@@ -1,4 +1,4 @@
-"""The owner found in a picture."""
+"""The owner found in an image."""
 
 from math import atan2, degrees, dist, hypot, sin
 
@@ -27,11 +27,11 @@ def packed(camera):
 
 @pytest.fixture(scope="module")
 def views():
-    """Owners at several places before a camera 1.6 m above the ground: the pictures, and where the shirts are."""
+    """Owners at several places before a camera 1.6 m above the ground: the images, and where the shirts are."""
     world = build_world(WorldConfig(seed=2, trees_per_ha=0.0, hill_height_m=0.0))
-    places = [(ahead, side * ahead, 0.5) for ahead in DISTANCES_M for side in SIDES_M]
-    owner = Owner(world, places, 5)
-    camera = QuickCamera(world, len(places), people=owner.people)
+    positions = [(ahead, side * ahead, 0.5) for ahead in DISTANCES_M for side in SIDES_M]
+    owner = Owner(world, positions, 5)
+    camera = QuickCamera(world, len(positions), people=owner.people)
     lenses = camera.lenses.numpy()
     eye = np.array([0.0, 0.0, -world.terrain.height(0.0, 0.0) - 1.6])
     q_ned_from_rdf = product(quat_of(0.0, 0.05), camera_mount())
@@ -48,7 +48,7 @@ def test_direction_and_range_are_those_of_the_shirt(views):
     for image, shirt in zip(images, shirts, strict=True):
         sight = find_owner(image, HFOV_DEG, float(DEPTH_HALF_M))
         to_shirt = shirt - eye
-        place = np.array(rotated(q_ned_from_rdf, sight.place_rdf))
+        place = np.array(rotated(q_ned_from_rdf, sight.position_rdf))
         far = float(np.linalg.norm(to_shirt))
         assert sight.range_m == pytest.approx(dist(shirt, eye), abs=0.15 + 0.04 * far)
         azimuth_error = atan2(place[1], place[0]) - atan2(to_shirt[1], to_shirt[0])

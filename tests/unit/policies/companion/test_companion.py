@@ -1,4 +1,4 @@
-"""The companion's loop in memory: a vehicle that flies in Offboard, pictures, and a pilot that stops deciding."""
+"""The companion's loop in memory: a vehicle that flies in Offboard, images, and a pilot that stops deciding."""
 
 import numpy as np
 import pytest
@@ -8,20 +8,20 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
-from policies.companion.companion import IMAGE_OLD_US, LENS, NO_DECISION, NO_PICTURES, Companion
+from policies.companion.companion import IMAGE_OLD_US, LENS, NO_DECISION, NO_IMAGES, Companion
 from policies.companion.engagement import Phase
 from policies.experts.follower import ScriptedFollower
 
 FRAME_US = 20_000
 
 
-class Pictures:
+class Images:
     """A camera that takes one at 10 Hz."""
 
     def __init__(self, shape):
         self._pixels = np.zeros(shape, np.uint8)
 
-    age_us = 0  # of each picture when it comes in
+    age_us = 0  # of each image when it comes in
 
     def take(self, time_us):
         return ImageFrame(time_us - self.age_us, 0, self._pixels, *LENS) if time_us % 100_000 == 0 else None
@@ -51,8 +51,8 @@ class Air:
     def __init__(self):
         companion_end, self.end = memory_pair(LinkRole.ONBOARD)
         self.pilot = Doubting()
-        self.pictures = Pictures(self.pilot.image_shape)
-        self.companion = Companion(companion_end, self.pictures, self.pilot)
+        self.images = Images(self.pilot.image_shape)
+        self.companion = Companion(companion_end, self.images, self.pilot)
         self.mode = Mode.HOLD
         self.time_us = 0
         self._reader = FrameReader()
@@ -107,7 +107,7 @@ def test_pictures_taken_long_ago_are_none_even_if_they_come_in_now(age_us, is_ta
     air.mode = Mode.OFFBOARD
     air.run(1.0)
     assert air.companion.phase is Phase.FLYING
-    air.pictures.age_us = age_us
+    air.images.age_us = age_us
     air.run(1.0)
-    assert (air.companion.trouble != NO_PICTURES) is is_taken
+    assert (air.companion.trouble != NO_IMAGES) is is_taken
     assert (air.companion.phase is Phase.FLYING) is is_taken

@@ -1,4 +1,4 @@
-"""Pictures in memory, as bytes, and over a stream."""
+"""Images in memory, as bytes, and over a stream."""
 
 import numpy as np
 import pytest

@@ -17,8 +17,8 @@ def report(count):
     return Owner(pos_ned=(10.0, 0.0, -2.0), count=count)
 
 
-def observation(watch, at_s, place=(3.0, 1.0, 1.0)):
-    watch.update(round(at_s * 1e6), OWN, NOBODY, place)
+def observation(watch, at_s, position=(3.0, 1.0, 1.0)):
+    watch.update(round(at_s * 1e6), OWN, NOBODY, position)
 
 
 def test_a_sighting_is_where_the_pilot_saw_the_owner():

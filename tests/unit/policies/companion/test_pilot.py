@@ -42,14 +42,14 @@ def saved(folder, made, task=TASK):
     return path
 
 
-def believer(folder, preset="improved", place=(3.0, -1.0, 1.5), in_view=5.0):
+def believer(folder, preset="improved", position=(3.0, -1.0, 1.5), in_view=5.0):
     """A pilot that always believes the same: the owner at a place [m], in view with these log odds."""
     layout = _layout(FollowSettings(preset=preset))
     made = policy(layout, (IN_VIEW, *PLACE))
     scales = [next(e.scale for e in layout.privileged if e.name == name) for name in PLACE]
     with torch.no_grad():
         made.perception.layer.weight.zero_()
-        made.perception.layer.bias[:4] = torch.tensor([in_view, *np.divide(place, scales)])
+        made.perception.layer.bias[:4] = torch.tensor([in_view, *np.divide(position, scales)])
     return load_pilot(str(saved(folder, made)))
 
 

@@ -127,9 +127,9 @@ def test_gymnasium_collects_the_pictures_of_an_episode():
     env.reset(seed=1)
     for _ in range(3):
         env.step(env.action_space.sample())
-    pictures = env.render()
-    assert len(pictures) == 4
-    assert all(picture.shape == pictures[0].shape and picture.dtype == np.uint8 for picture in pictures)
+    images = env.render()
+    assert len(images) == 4
+    assert all(image.shape == images[0].shape and image.dtype == np.uint8 for image in images)
 
 
 def test_existing_folder_is_left_alone(tmp_path):

@@ -6,7 +6,7 @@ from gymnasium.utils.env_checker import check_env
 import policies  # noqa: F401  (registers the tasks)
 from policies.tasks.hover import BALL_M, EPISODE_STEPS, HOVER_NED, RATE_MAX, HoverBatch, HoverEnv, HoverVectorEnv
 
-HOVER_THRUST = 0.47  # share of the x500's greatest thrust that carries it
+HOVER_THRUST = 0.47  # fraction of the x500's greatest thrust that carries it
 GRAVITY = 9.80665
 
 

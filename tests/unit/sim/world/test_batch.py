@@ -4,7 +4,7 @@ import warp as wp
 
 from sim.world.batch import WorldBatch, grown_world
 from sim.world.growing import COVERAGE
-from sim.world.trees import CROWN_RADIUS_SHARE, EDGE_M
+from sim.world.trees import CROWN_RADIUS_FRACTION, EDGE_M
 from sim.world.world import WorldConfig, build_world
 from tests.unit.sim.world.queries import query_points, query_rays
 
@@ -166,8 +166,8 @@ def test_trees_stand_on_the_ground_inside_the_map_and_outside_the_clearing():
         assert height.min() > 8.0 - 1e-3
         assert height.max() < 15.0 + 1e-3
         assert np.ptp(height) > 6.0
-        share = trees["crown_radius"] / height
-        assert CROWN_RADIUS_SHARE[0] - 1e-3 < share.min() < share.max() < CROWN_RADIUS_SHARE[1] + 1e-3
+        fraction = trees["crown_radius"] / height
+        assert CROWN_RADIUS_FRACTION[0] - 1e-3 < fraction.min() < fraction.max() < CROWN_RADIUS_FRACTION[1] + 1e-3
         np.testing.assert_allclose(trees["root_height"], ground - 1.0, atol=1e-4)
         assert max(np.abs(trees["north"]).max(), np.abs(trees["east"]).max()) <= 128.0 - EDGE_M
         assert np.all(np.hypot(trees["north"], trees["east"]) - trees["crown_radius"] > CONFIG.clearing_radius_m)

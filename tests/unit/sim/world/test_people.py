@@ -100,8 +100,8 @@ def test_people_slow_down_on_slopes(forest, running):
     moving = running["speed_sp"] > 0.5
     north, east, heading = running["pos_ned"][..., 0], running["pos_ned"][..., 1], running["heading_rad"]
     rise = forest.height(north + np.cos(heading), east + np.sin(heading)) - forest.height(north, east)
-    share = running["speed"] / np.maximum(running["speed_sp"], 0.5)
-    assert share[moving & (np.abs(rise) > 0.3)].mean() < 0.7 * share[moving & (np.abs(rise) < 0.05)].mean()
+    fraction = running["speed"] / np.maximum(running["speed_sp"], 0.5)
+    assert fraction[moving & (np.abs(rise) > 0.3)].mean() < 0.7 * fraction[moving & (np.abs(rise) < 0.05)].mean()
 
 
 def test_steps_follow_the_speed(running):

@@ -77,8 +77,8 @@ def test_beliefs_are_learnt_and_as_sure_as_they_are_right(trained):
 
 def test_teacher_drives_all_environments_first_and_ever_fewer_later():
     student = learner(Glimpses(32), mixing=0.5)
-    shares = [student.iterate().statistics["Policy/Teacher Share"] for _ in range(3)]
-    assert shares == [1.0, 0.5, 0.25]
+    fractions = [student.iterate().statistics["Policy/Teacher Share"] for _ in range(3)]
+    assert fractions == [1.0, 0.5, 0.25]
 
 
 def test_what_the_teacher_drives_costs_nothing():

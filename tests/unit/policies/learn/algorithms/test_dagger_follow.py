@@ -1,4 +1,4 @@
-"""DAgger on FollowMe itself: a small student comes to do what its teacher does, from pictures of a flight."""
+"""DAgger on FollowMe itself: a small student comes to do what its teacher does, from images of a flight."""
 
 import pytest
 import torch

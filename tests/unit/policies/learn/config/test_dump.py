@@ -32,7 +32,7 @@ texts = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=8
 counts = st.integers(1, 10**9)
 positives = st.floats(1e-12, 1e12)
 reals = st.floats(allow_nan=False, allow_infinity=False)
-shares = st.floats(0.0, 1.0)
+fractions = st.floats(0.0, 1.0)
 schedules = st.sampled_from(["linear", "constant"])
 
 
@@ -44,7 +44,7 @@ memories = st.builds(Memory, sequence_length=st.integers(1, 64), memory_size=st.
 networks = st.builds(NetworkSettings, hidden_units=counts, normalize=st.booleans(), deterministic=st.booleans())
 signals = st.builds(
     RewardSignals,
-    extrinsic=maybe(st.builds(ExtrinsicSettings, gamma=shares, strength=positives)),
+    extrinsic=maybe(st.builds(ExtrinsicSettings, gamma=fractions, strength=positives)),
     gail=maybe(
         st.builds(
             GailSettings,
@@ -67,7 +67,7 @@ ppo = st.builds(
     beta=positives,
     beta_schedule=schedules,
     epsilon=positives,
-    lambd=shares,
+    lambd=fractions,
     max_grad_norm=maybe(positives),
     target_kl=maybe(positives),
     joint_ratio=st.booleans(),
@@ -77,7 +77,7 @@ sac = st.builds(
     SacHyperparameters,
     batch_size=st.integers(64, 4096),
     buffer_size=st.integers(4096, 10**6),
-    tau=shares,
+    tau=fractions,
     steps_per_update=positives,
     hindsight=st.integers(0, 8),
 )
@@ -94,7 +94,7 @@ behaviors = st.one_of(
             behavioral_cloning=maybe(st.builds(BehavioralCloning, demo_path=texts, num_epoch=maybe(counts))),
             max_steps=counts,
             init_path=maybe(texts),
-            success_target=maybe(shares),
+            success_target=maybe(fractions),
         )
         for name, params in (("ppo", ppo), ("sac", sac))
     )

@@ -127,8 +127,8 @@ def refused(folder, text, *args, **kwargs):
     ],
 )
 def test_a_refusal_names_file_line_and_key(tmp_path, text, sentence):
-    place = sentence.replace("@.hyper", "@.hyperparameters").replace("@", "behaviors.Car")
-    assert refused(tmp_path, text) == f"config.yaml:{place}"
+    location = sentence.replace("@.hyper", "@.hyperparameters").replace("@", "behaviors.Car")
+    assert refused(tmp_path, text) == f"config.yaml:{location}"
 
 
 @pytest.mark.parametrize(
@@ -292,8 +292,8 @@ def test_a_junk_value_is_refused_with_file_and_line_or_taken_whole(k, junk, tmp_
     try:
         config = load_config(path).config
     except ConfigError as error:
-        place, _, sentence = str(error).removeprefix(f"{path}:").partition(": ")
-        assert place.isdigit()
+        location, _, sentence = str(error).removeprefix(f"{path}:").partition(": ")
+        assert location.isdigit()
         assert sentence
         assert "\n" not in sentence
     else:

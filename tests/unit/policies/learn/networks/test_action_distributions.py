@@ -44,8 +44,8 @@ def test_draws_have_the_frequencies_of_their_probabilities():
     actions = built(observation).draw(torch.Generator().manual_seed(3))
     gaussian, branches = parts(built, observation[:1])
     for k, branch in enumerate(branches):
-        share = torch.bincount(actions.branches[:, k], minlength=len(branch.probs[0])) / len(observation)
-        assert torch.allclose(share, branch.probs[0], atol=0.01)  # 4 deviations of a share of 40,000
+        fraction = torch.bincount(actions.branches[:, k], minlength=len(branch.probs[0])) / len(observation)
+        assert torch.allclose(fraction, branch.probs[0], atol=0.01)  # 4 deviations of a fraction of 40,000
     assert actions.continuous.mean().item() == pytest.approx(gaussian.mean.item(), abs=0.03 * gaussian.stddev.item())
     assert actions.continuous.std().item() == pytest.approx(gaussian.stddev.item(), rel=0.02)
 

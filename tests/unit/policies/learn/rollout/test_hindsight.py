@@ -6,9 +6,9 @@ from policies.learn.rollout.hindsight import Hindsight, with_goals
 from policies.learn.rollout.replay_buffer import Replay, ReplayBatch
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.episode import Outcome
-from policies.tasks.goals import PlaceGoal
+from policies.tasks.goals import PositionGoal
 
-GOAL = PlaceGoal(goal=(0,), achieved=(1,), radius="reach_m", reward=1.0)
+GOAL = PositionGoal(goal=(0,), achieved=(1,), radius="reach_m", reward=1.0)
 
 
 def transitions(goal, before, after, rewards, is_terminated):
@@ -31,18 +31,18 @@ def walked(rounds, capacity=1000, length=7, env_count=3):
     hindsight = Hindsight(GOAL, replay, 4)
     starts = 1000.0 * torch.arange(env_count)
     for number in range(rounds):
-        places = (starts + number).tolist()
+        indices = (starts + number).tolist()
         after = (starts + number + 1).tolist()
         is_over = torch.full((env_count,), number % length == length - 1)
         hindsight.add(torch.full((env_count,), 0.5), is_over, torch.zeros(env_count, dtype=torch.bool))
-        replay.add(transitions([-9.0] * env_count, places, after, [0.0] * env_count, [0.0] * env_count))
+        replay.add(transitions([-9.0] * env_count, indices, after, [0.0] * env_count, [0.0] * env_count))
     return replay, hindsight
 
 
 def relabelled(replay, hindsight, count=4000, seed=1):
     generator = torch.Generator().manual_seed(seed)
-    places = replay.draw(count, generator)
-    return hindsight.relabel(replay.take(places), places, generator)
+    indices = replay.draw(count, generator)
+    return hindsight.relabel(replay.take(indices), indices, generator)
 
 
 def test_reaching_the_new_goal_pays_and_ends():

@@ -38,8 +38,8 @@ def test_the_gradient_penalty_of_a_linear_discriminator_is_its_slope():
 
 def test_the_gradient_penalty_is_taken_between_expert_and_policy():
     expert, policy = torch.tensor([[0.0, 0.0]]), torch.tensor([[1.0, 2.0]])
-    shares = torch.tensor([[0.25, 0.5]])
-    penalty = gradient_penalty(lambda x: 0.5 * x.square().sum(dim=-1), expert, policy, shares)  # slope = input
+    fractions = torch.tensor([[0.25, 0.5]])
+    penalty = gradient_penalty(lambda x: 0.5 * x.square().sum(dim=-1), expert, policy, fractions)  # slope = input
     assert penalty.item() == pytest.approx((math.hypot(0.25, 1.0) - 1) ** 2, rel=1e-4)
 
 

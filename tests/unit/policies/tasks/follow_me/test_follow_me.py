@@ -272,7 +272,7 @@ def test_gymnasium_accepts_the_environment(preset: str) -> None:
 
 def test_picture_from_above_shows_the_camera_image() -> None:
     task = _task(1, **SMALL)
-    assert task.picture(0, 96).shape == (96, 96, 3)
+    assert task.top_view(0, 96).shape == (96, 96, 3)
 
 
 def test_settings_default_to_what_flies() -> None:

@@ -33,8 +33,8 @@ def track(distance=2.0, count=COUNT, *, hidden=(), collided=(), bearing=0.0, spe
 
 def test_perfect_follower_scores_full():
     card = scorecard([track(), track()])
-    shares = [card.success.value, card.tracking.value, card.in_band.value, card.in_view.value]
-    assert shares == [1.0, 1.0, 1.0, 1.0]
+    fractions = [card.success.value, card.tracking.value, card.in_band.value, card.in_view.value]
+    assert fractions == [1.0, 1.0, 1.0, 1.0]
     assert (card.collision.value, card.distance_rmse_m.value, card.losses_per_minute.value) == (0.0, 0.0, 0.0)
     assert card.minutes == pytest.approx(2.0, rel=1e-3)
     assert card.distance_median_m.value == pytest.approx(2.0)

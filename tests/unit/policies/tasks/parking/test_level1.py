@@ -6,7 +6,7 @@ from gymnasium.utils.env_checker import check_env
 import policies  # noqa: F401  (registers the tasks)
 from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.episode import Outcome
-from policies.tasks.parking.arena import BLOCK_PLACES, LEVEL1_MARKER, LEVEL1_SPOTS, LEVEL1_START, pose
+from policies.tasks.parking.arena import BLOCK_POSITIONS, LEVEL1_MARKER, LEVEL1_SPOTS, LEVEL1_START, pose
 from policies.tasks.parking.spots import cells
 from policies.tasks.task_params import Sampler
 
@@ -120,7 +120,7 @@ def test_as_documented_every_episode_draws_a_spot_and_starts_at_rest():
     assert len({tuple(goal) for goal in task.world.goal.numpy()[:, :2].tolist()}) == len(LEVEL1_SPOTS)
 
 
-@pytest.mark.parametrize(("x", "z", "yaw_deg"), BLOCK_PLACES)
+@pytest.mark.parametrize(("x", "z", "yaw_deg"), BLOCK_POSITIONS)
 def test_driving_into_a_block_ends_as_a_hit_of_an_obstacle(x, z, yaw_deg):
     task = built(goals="anywhere")
     put(task, 0, pos=(x, z - 4.0), yaw_deg=0.0, goal=(14.0, 14.0, 0.0))
@@ -186,30 +186,30 @@ def test_goals_of_train_and_test_lie_in_different_cells():
 
 @pytest.mark.parametrize("preset", ["as-documented", "as-coded"])
 def test_published_spots_are_for_training_and_lie_in_training_cells(preset):
-    def places(**settings):
+    def positions(**settings):
         return built(512, preset=preset, **settings).world.goal.numpy()[:, :2]
 
-    assert len(np.unique(places(), axis=0)) <= 3
+    assert len(np.unique(positions(), axis=0)) <= 3
     test_cells = {tuple(cell) for cell in cells(0, 1, "test").tolist()}
-    assert {tuple(np.floor(place)) for place in places(split="test").tolist()} <= test_cells
+    assert {tuple(np.floor(position)) for position in positions(split="test").tolist()} <= test_cells
     assert not {tuple(np.floor(spot)) for spot in (*LEVEL1_SPOTS, LEVEL1_MARKER)} & test_cells
-    assert len(np.unique(places(split="test", goals="published"), axis=0)) <= 3
+    assert len(np.unique(positions(split="test", goals="published"), axis=0)) <= 3
 
 
 @pytest.mark.parametrize(
-    ("place", "number", "sizes_m", "outcome"),
+    ("position", "number", "sizes_m", "outcome"),
     [
         ((8.0, 9.0, 0.0), "pad_width_m", (2.5, 3.0), Outcome.SUCCESS),
-        (BLOCK_PLACES[0], "block_width_m", (3.467, 5.0), Outcome.HIT_OBSTACLE),
+        (BLOCK_POSITIONS[0], "block_width_m", (3.467, 5.0), Outcome.HIT_OBSTACLE),
     ],
 )
-def test_pads_and_blocks_are_as_wide_as_their_numbers_say(place, number, sizes_m, outcome):
-    yaw_rad = np.radians(place[2])
+def test_pads_and_blocks_are_as_wide_as_their_numbers_say(position, number, sizes_m, outcome):
+    yaw_rad = np.radians(position[2])
     between = (sum(sizes_m) / 2 + 1.1317) / 2  # where a car beside it touches the wide one only
-    pos = np.array(place[:2]) + between * np.array([np.cos(yaw_rad), -np.sin(yaw_rad)])
+    pos = np.array(position[:2]) + between * np.array([np.cos(yaw_rad), -np.sin(yaw_rad)])
     for size_m, expected in zip(sizes_m, (Outcome.RUNNING, outcome), strict=True):
         task = built(params={number: size_m})
-        put(task, 0, pos=pos, yaw_deg=place[2], goal=(8.0, 9.0, 0.0))
+        put(task, 0, pos=pos, yaw_deg=position[2], goal=(8.0, 9.0, 0.0))
         act(task, RIGHT)
         assert task.buffers.outcomes.numpy()[0] == expected
 
@@ -262,6 +262,6 @@ def test_settings_that_do_not_exist_are_refused_in_one_sentence(settings, messag
 
 def test_pictures_show_every_preset():
     for preset in PRESETS:
-        picture = built(preset=preset, rays=4).picture(0, 240)
-        assert picture.shape[0] == 240
-        assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 5
+        image = built(preset=preset, rays=4).top_view(0, 240)
+        assert image.shape[0] == 240
+        assert len(np.unique(image.reshape(-1, 3), axis=0)) > 5

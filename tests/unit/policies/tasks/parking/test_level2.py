@@ -9,9 +9,9 @@ from policies.tasks.episode import Outcome
 from policies.tasks.parking.arena import (
     LEVEL2_SPOT,
     LEVEL2_SPOTS_BELOW,
-    MOVER_PLACES,
+    MOVER_POSITIONS,
     PORTAL_EXITS,
-    PORTAL_PLACES,
+    PORTAL_POSITIONS,
     pose,
 )
 
@@ -105,7 +105,7 @@ def test_movers_run_along_their_lines_at_two_metres_per_second():
     put(task, 0, pos=(-12.0, -12.0))
     for _ in range(25):
         act(task, STAY)
-    moved = task.movers.numpy()[0, :, :2] - np.array(MOVER_PLACES)
+    moved = task.movers.numpy()[0, :, :2] - np.array(MOVER_POSITIONS)
     assert moved == pytest.approx(np.array([[0, 1], [-1, 0], [0, -1], [-1, 0]]), abs=1e-4)
 
 
@@ -158,9 +158,9 @@ def test_published_goals_are_where_the_storey_says():
     assert 0.4 < both.mean() < 0.6
 
 
-def cells_of(places):
+def cells_of(positions):
     """The cells of 1 m of both storeys; places within rounding of an edge are left out."""
-    local = places - (68.86 - 68.0, 0.03) * (places[:, :1] > 34.0)
+    local = positions - (68.86 - 68.0, 0.03) * (positions[:, :1] > 34.0)
     inside = local[(np.abs(local - np.round(local)) > 1e-4).all(axis=1)]
     return {tuple(cell) for cell in np.floor(inside).astype(int).tolist()}
 
@@ -170,11 +170,11 @@ def test_goals_anywhere_lie_clear_of_portals_and_of_the_start_in_disjoint_cells(
         split: built(4096, goals="anywhere", split=split, storey="both").world.goal.numpy()[:, :2]
         for split in ("train", "test")
     }
-    train, test = (cells_of(places) for places in goals.values())
+    train, test = (cells_of(positions) for positions in goals.values())
     assert not train & test
-    for places in goals.values():
-        for x, z, _ in (*PORTAL_PLACES, *PORTAL_EXITS):
-            assert np.linalg.norm(places - (x, z), axis=1).min() > 3.4
+    for positions in goals.values():
+        for x, z, _ in (*PORTAL_POSITIONS, *PORTAL_EXITS):
+            assert np.linalg.norm(positions - (x, z), axis=1).min() > 3.4
 
 
 def test_improved_episodes_begin_clear_of_everything():
@@ -192,7 +192,7 @@ def test_progress_through_the_portal_is_the_length_of_the_route():
     world = task.world
     nose = np.array([np.sin(world.yaw.numpy()[0]), np.cos(world.yaw.numpy()[0])])
     box = world.pos.numpy()[0] + 0.29 * nose
-    route = np.linalg.norm(np.array(PORTAL_PLACES[0][:2]) - box)
+    route = np.linalg.norm(np.array(PORTAL_POSITIONS[0][:2]) - box)
     route += np.linalg.norm(np.array(LEVEL2_SPOT) - PORTAL_EXITS[0][:2])
     assert world.way_m.numpy()[0] == pytest.approx(route, rel=1e-5)
     task.movers.numpy()[0] = FAR_AWAY
@@ -211,6 +211,6 @@ def test_the_velocity_a_tracking_sensor_would_give_is_that_of_the_movers():
 
 
 def test_the_picture_shows_both_storeys():
-    picture = built(preset="as-documented").picture(0, 240)
-    assert picture.shape[1] > 1.8 * picture.shape[0]
-    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 6
+    image = built(preset="as-documented").top_view(0, 240)
+    assert image.shape[1] > 1.8 * image.shape[0]
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 6

@@ -17,7 +17,7 @@ def seen(*, pos=(0.0, 0.0), yaw_deg=0.0, blocks=(), goal=(-14.0, -14.0, 0.0), pa
     task.world.yaw.numpy()[0] = np.radians(yaw_deg)
     task.world.goal.numpy()[0] = pose(goal)
     aside = [(14.0, -14.0 + 2 * k, 0.0) for k in range(3)]
-    task.blocks.numpy()[0] = [pose(place) for place in (*blocks, *aside)][:3]
+    task.blocks.numpy()[0] = [pose(position) for position in (*blocks, *aside)][:3]
     task.step()  # a push of 0 N: nothing moves
     size = task.rules.tag_count + 2
     return task.buffers.observations.numpy()[0, -(2 * task.rules.ray_count + 1) * size :].reshape(-1, size)

@@ -23,7 +23,7 @@ def rewarded(*, pos, best=30.0, last=0.0, vel=(0.0, 0.0), params=None, goal=GOAL
     world.goal.numpy()[0] = pose(goal)
     world.best_m.numpy()[0], world.last_m.numpy()[0] = best, last
     if blocks is not None:
-        task.blocks.numpy()[0] = [pose(place) for place in blocks]
+        task.blocks.numpy()[0] = [pose(position) for position in blocks]
     task.step()
     return float(task.buffers.rewards.numpy()[0]), task
 

@@ -260,6 +260,6 @@ def test_wrong_settings_are_refused():
 def test_a_picture_shows_the_car_and_the_target():
     task = built()
     set_row(task, target=(30.0, 0.5, 30.0))
-    picture = task.picture(0, 400)
-    middle, corner = picture[200, 200], picture[400 - 200 - int(30 * 400 / 110) + 8, 200 + int(30 * 400 / 110)]
+    image = task.top_view(0, 400)
+    middle, corner = image[200, 200], image[400 - 200 - int(30 * 400 / 110) + 8, 200 + int(30 * 400 / 110)]
     assert not np.array_equal(middle, corner)

@@ -31,7 +31,7 @@ def look_around(camera, seed=2):
     lenses["q_ned_from_rdf"] = q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
-def pictures(camera):
+def images(camera):
     return [array.numpy().copy() for array in (camera.rgb, camera.depth_m, camera.kind)]
 
 
@@ -49,7 +49,7 @@ def test_each_camera_sees_its_own_world_as_it_would_alone():
         alone = QuickCamera(batch.map(world), 1)
         alone.lenses.numpy()[0] = camera.lenses.numpy()[i]
         alone.render()
-        assert same(pictures(camera), pictures(alone), i, 0)
+        assert same(images(camera), images(alone), i, 0)
 
 
 def test_a_new_world_is_seen_after_refresh_and_the_others_stay():
@@ -57,17 +57,17 @@ def test_a_new_world_is_seen_after_refresh_and_the_others_stay():
     camera = QuickCamera(batch, 2)
     look_around(camera)
     camera.render()
-    before = pictures(camera)
+    before = images(camera)
     batch.grow(flags(False, True), wp.array([0, 12], dtype=wp.int32))
     camera.refresh(flags(False, True))
     camera.render()
     fresh = QuickCamera(batch, 2)
     wp.copy(fresh.lenses, camera.lenses)
     fresh.render()
-    after = pictures(camera)
+    after = images(camera)
     assert same(after, before, 0, 0)
     assert not same(after, before, 1, 1)
-    assert same(after, pictures(fresh), 1, 1)
+    assert same(after, images(fresh), 1, 1)
 
 
 def test_refresh_packs_only_chosen_worlds():
@@ -85,15 +85,15 @@ def test_only_chosen_pictures_are_taken():
     camera = QuickCamera(grown(3), 3)
     look_around(camera)
     camera.render()
-    before = pictures(camera)
+    before = images(camera)
     look_around(camera, seed=5)
     camera.render(flags(False, True, False))
-    after = pictures(camera)
+    after = images(camera)
     assert same(after, before, 0, 0)
     assert same(after, before, 2, 2)
     assert not same(after, before, 1, 1)
     camera.render()
-    assert same(pictures(camera), after, 1, 1)
+    assert same(images(camera), after, 1, 1)
 
 
 def test_pictures_do_not_depend_on_the_number_of_threads():
@@ -104,7 +104,7 @@ def test_pictures_do_not_depend_on_the_number_of_threads():
         rows = camera.optics.numpy()
         rows["read_std"], rows["seed"] = 3.0, range(3)
         camera.render(flags(True, False, True))
-    assert all((a == b).all() for a, b in zip(pictures(alone), pictures(shared), strict=True))
+    assert all((a == b).all() for a, b in zip(images(alone), images(shared), strict=True))
     assert alone.rgb.numpy()[2].any()
 
 

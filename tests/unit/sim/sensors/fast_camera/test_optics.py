@@ -9,7 +9,7 @@ WORLD = build_world(WorldConfig(size_m=128.0, clearing_blend_m=20.0, trees_per_h
 
 
 def rendered(count=1, turn=(0.5, 0.5, 0.5, 0.5), **optics):
-    """Pictures of cameras that look north from 3 m above home, each with these optics."""
+    """Images of cameras that look north from 3 m above home, each with these optics."""
     camera = QuickCamera(WORLD, count, has_optics=True)
     lenses, rows = camera.lenses.numpy(), camera.optics.numpy()
     lenses["pos_ned"] = (0.0, 0.0, -3.0)
@@ -34,7 +34,7 @@ def test_optics_of_zero_change_nothing():
 
 
 def test_noise_has_its_variance_and_the_sky_keeps_its_depth():
-    spoilt, clear = rendered(64, read_std=3.0, shot_std=6.0, depth_std_share=0.02, seed=np.arange(64)), perfect()
+    spoilt, clear = rendered(64, read_std=3.0, shot_std=6.0, depth_std_fraction=0.02, seed=np.arange(64)), perfect()
     level = clear.rgb.numpy()[0].astype(float)
     errors = spoilt.rgb.numpy() - level
     is_inside = (level > 25.0) & (level < 230.0)  # of what 8 bits hold
@@ -42,13 +42,13 @@ def test_noise_has_its_variance_and_the_sky_keeps_its_depth():
     assert (errors.std(axis=0) / expected)[is_inside].mean() == pytest.approx(1.0, abs=0.02)
     assert abs(errors.mean(axis=0)[is_inside].mean()) < 0.1
     is_sky = clear.kind.numpy()[0] == SKY
-    shares = spoilt.depth_m.numpy() / clear.depth_m.numpy()[0] - 1.0
-    assert shares[:, ~is_sky].std() == pytest.approx(0.02, rel=0.02)
-    assert (shares[:, is_sky] == 0.0).all()
+    fractions = spoilt.depth_m.numpy() / clear.depth_m.numpy()[0] - 1.0
+    assert fractions[:, ~is_sky].std() == pytest.approx(0.02, rel=0.02)
+    assert (fractions[:, is_sky] == 0.0).all()
 
 
 def test_noise_is_named_by_seed_and_tick_whoever_else_is_there():
-    noise = {"read_std": 3.0, "depth_std_share": 0.02}
+    noise = {"read_std": 3.0, "depth_std_fraction": 0.02}
     many = rendered(3, seed=[5, 6, 5], tick=[7, 7, 8], **noise)
     alone = rendered(1, seed=6, tick=7, **noise)
     assert (many.rgb.numpy()[1] == alone.rgb.numpy()[0]).all()
