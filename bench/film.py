@@ -19,7 +19,7 @@ from mission.script import take_off
 from mission.view.chase_camera import PICTURE_S
 from mission.view.film import write_film
 from mission.view.film_images import HEIGHT, WIDTH
-from mission.view.replay_file import Recorder
+from mission.view.replay_file import keep_for_replay, load_recording
 from policies.companion.pilot import SCRIPTED, load_pilot
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
@@ -30,14 +30,14 @@ COMMAND = "python -m bench film"
 
 def measure() -> list[Row]:
     config = FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig())
-    flight, _ = flight_with_companion(config, load_pilot(SCRIPTED))
-    recorder = Recorder(flight)
-    flight.drone.start(take_off(flight.drone))
-    flight.run(lambda f: f.time_us >= FLOWN_S * 1e6, on_frame=lambda _: recorder.frame())
-    flight.close()
-    recording = recorder.recording()
     wall_s, cpu_s = [], []
     with TemporaryDirectory() as folder:
+        flight, _ = flight_with_companion(config, load_pilot(SCRIPTED), folder=Path(folder))
+        keep_for_replay(flight)
+        flight.drone.start(take_off(flight.drone))
+        flight.run(lambda f: f.time_us >= FLOWN_S * 1e6)
+        flight.close()
+        recording = load_recording(Path(folder))
         target = Path(folder) / "flight.mp4"
         for _ in range(TRIES):
             start = time.perf_counter(), time.process_time()

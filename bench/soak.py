@@ -49,7 +49,7 @@ def _soak(name: str, hours: float, options: list[str], run: Path) -> int:
         if path.is_file():
             print(f"  {path.name}: {path.stat().st_size / 1e6:.1f} MB")
     sys.stdout.flush()
-    is_whole = (run / "flight.png").exists() and (run / "replay.npz").exists()
+    is_whole = (run / "flight.png").exists() and (run / "flight.ulg").exists()
     return 0 if is_whole and memory_mb < MEMORY_MAX_MB else 1
 
 

@@ -154,6 +154,12 @@ class UlogWriter(LogFile):
         self._topics.append(topic)
         return topic
 
+    def inform(self, key: str, texts: Sequence[str]) -> None:
+        """Adds a multi information message; before the first row."""
+        if self._has_data:
+            raise ValueError(f"information {key} comes after the first row: readers would not find it")
+        self._info += _info_records(key, texts)
+
     def message(self, time_us: int, level: int, text: str) -> None:
         """Logs a text; level is a syslog and MAV_SEVERITY number, 0 emergency to 7 debug."""
         self.append(_record("L", pack("<BQ", ord("0") + level, time_us) + text.encode()))

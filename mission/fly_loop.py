@@ -14,7 +14,6 @@ from rich.table import Table
 
 from common.files import write_to_nowhere, write_whole
 from mission.client import Running
-from mission.console.name_checks import REPLAY_FILE
 from mission.console.progress_line import TABLE_PERIOD_S, Progress
 from mission.console.terminal import LINE_PERIOD_S, print_line
 from mission.flight import Flight
@@ -25,7 +24,7 @@ from mission.log.flight_summary import Summary, curved_items, planned_path, summ
 from mission.plan.plan_file import Plan
 from mission.run_folder import OwnFiles
 from mission.script import fly_plan
-from mission.view.replay_file import Recorder
+from mission.view.replay_file import keep_for_replay
 
 if TYPE_CHECKING:
     from mission.view.page import PageServer
@@ -44,8 +43,8 @@ def fly_to_the_end(
     path_ned = [] if plan is None else planned_path(plan, flight.config.home)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
     way_ned = [point for _, point in path_ned]
-    recorder = Recorder(flight, way_ned)
-    watchers = [recorder.frame]
+    keep_for_replay(flight, way_ned)
+    watchers: list[Callable[[], None]] = []
     if page is not None:
         from mission.view.live import LiveView
 
@@ -56,8 +55,6 @@ def fly_to_the_end(
         view.end(f"flight ended: logs in {folder}")
     history = flight.close()  # before what takes long: who is to stop may be killed soon
     files = OwnFiles(folder, console)
-    with files.writing(REPLAY_FILE):
-        recorder.recording().save(folder)
     exit_code = _finish(flight, history, running, plan, path_ned, folder, files, console)
     if page is not None:
         view.close()

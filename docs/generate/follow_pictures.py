@@ -18,7 +18,7 @@ from mission.view.chase_camera import PICTURE_S
 from mission.view.film_images import film
 from mission.view.live import LiveView
 from mission.view.page import PageServer
-from mission.view.replay_file import Recorder
+from mission.view.replay_file import keep_for_replay, load_recording
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 from tests.browser import Browser
 
@@ -32,14 +32,16 @@ QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 88)
 
 def main() -> None:
     pilot, _ = chosen_pilot(None)
-    flight, companion = flight_with_companion(FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(), seed=SEED), pilot)
-    recorder = Recorder(flight, action=lambda: companion.action)
+    run = tempfile.TemporaryDirectory()
+    config = FlightConfig(world=FOLLOW_WORLD, owner=OwnerConfig(), seed=SEED)
+    flight, companion = flight_with_companion(config, pilot, folder=Path(run.name))
+    keep_for_replay(flight, action=lambda: companion.action)
     watch = watch_of(flight, companion, FOLLOWED_S)
     page = PageServer(0, "Honeyguide")
     view = LiveView(
         flight, page, speed=None, action=lambda: companion.action, score=lambda: score_lines(watch, companion)
     )
-    watched = [recorder.frame, watch.frame, view.frame]
+    watched = [watch.frame, view.frame]
     flight.drone.start(take_off(flight.drone))
     with tempfile.TemporaryDirectory() as profile:
         browser = Browser(Path(profile), 1280, 800)
@@ -56,7 +58,7 @@ def main() -> None:
     flight.close()
     cv2.imwrite(str(IMAGES / "live.jpg"), picture[..., ::-1], QUALITY)
     chosen = {round(moment_s / PICTURE_S) for moment_s in MOMENTS_S}
-    shots = [shot for i, shot in enumerate(film(recorder.recording(), flight.world)) if i in chosen]
+    shots = [shot for i, shot in enumerate(film(load_recording(Path(run.name)), flight.world)) if i in chosen]
     small = [cv2.resize(shot, SHOT_SIZE, interpolation=cv2.INTER_AREA) for shot in shots]
     cv2.imwrite(str(IMAGES / "follow.jpg"), np.hstack(small)[..., ::-1], QUALITY)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from mission.console.command_refusal import refuse
 
-REPLAY_FILE = "replay.npz"  # in a run folder, what is shown of it afterwards
+LOG_FILE = "flight.ulg"  # in a run folder; what is shown of it afterwards
 
 
 def check_file(path: Path) -> None:
@@ -17,8 +17,8 @@ def check_file(path: Path) -> None:
 
 def check_run(folder: Path) -> None:
     """Refuses a folder that holds no run to be shown."""
-    if not (folder / REPLAY_FILE).exists():
-        refuse(f"{folder}: holds no run that can be shown: {REPLAY_FILE} is missing")
+    if not any(folder.glob("flight*.ulg")):
+        refuse(f"{folder}: holds no run that can be shown: {LOG_FILE} is missing")
 
 
 def check_task(name: str) -> None:

@@ -4,18 +4,12 @@ Sensors come from the topics PX4's own estimator reads, and from raw ones where 
 of validity: `timestamp_sample` where it is set, less the EKF2_*_DELAY of the log where it is not.
 """
 
-from collections import Counter
-from contextlib import redirect_stdout
-from io import BytesIO, StringIO
 from math import isfinite
 from pathlib import Path
-from struct import error as struct_error
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pyulog import ULog
-from pyulog.exceptions import ULogException
 
 from common.geodesy import GeoPoint
 from mission.estimate.sensor_log import (
@@ -32,9 +26,8 @@ from mission.estimate.sensor_log import (
     Track,
     empty,
 )
+from mission.log.ulog_file import UlogDamage, read_topics
 
-_DAMAGE = (ULogException, struct_error, EOFError, ValueError, KeyError, IndexError, TypeError, OverflowError)
-MAX_VISITS = 100  # of one place in the file, by seeking
 MAGIC = b"ULog\x01\x12\x35"
 OWN_NAME = "Honeyguide"  # sys_name of this project's logs
 PX4_GPS_DELAY_MS = 110.0  # PX4's default of EKF2_GPS_DELAY
@@ -52,21 +45,6 @@ TOPICS = (
     "sensor_mag distance_sensor vehicle_attitude vehicle_local_position vehicle_attitude_groundtruth "
     "vehicle_local_position_groundtruth"
 ).split()
-
-
-class _AdvancingStream(BytesIO):
-    """The bytes of a log; refuses to be read in circles, as pyulog would read some damaged headers for ever."""
-
-    def __init__(self, content: bytes) -> None:
-        super().__init__(content)
-        self._visits: Counter[int] = Counter()
-
-    def seek(self, offset: int, whence: int = 0, /) -> int:
-        position = super().seek(offset, whence)
-        self._visits[position] += 1
-        if self._visits[position] > MAX_VISITS:
-            raise EOFError  # not among the errors that pyulog swallows
-        return position
 
 
 class _Columns:
@@ -107,10 +85,9 @@ class _Log:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            with redirect_stdout(StringIO()):  # pyulog prints what it finds damaged
-                self.ulog = ULog(_AdvancingStream(path.read_bytes()), TOPICS)
-        except _DAMAGE as error:
-            raise SensorLogError(f"{path}: damaged so that no ULog reader can follow it") from error
+            self.ulog = read_topics(path, TOPICS)
+        except UlogDamage as error:
+            raise SensorLogError(str(error)) from error
         values = self.ulog.initial_parameters.items()  # bytes where the type is damaged
         self.parameters = {name: float(value) for name, value in values if isinstance(value, int | float)}
 

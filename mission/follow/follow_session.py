@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable
 from contextlib import ExitStack
 from math import isfinite
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -18,7 +19,6 @@ from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
 from mission.connections import open_links, open_page
-from mission.console.name_checks import REPLAY_FILE
 from mission.console.progress_line import Progress
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight, flight_parameters
@@ -33,7 +33,7 @@ from mission.kernel_loading import load_kernels
 from mission.run_folder import OwnFiles, run_folder
 from mission.script import Drone, take_off
 from mission.view.film import write_film
-from mission.view.replay_file import Recorder
+from mission.view.replay_file import RecordingError, keep_for_replay, load_recording
 from policies.companion.companion import Companion, Pilot
 from policies.companion.engagement import Phase
 from policies.companion.names import SCRIPTED, TASK
@@ -73,9 +73,9 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         load_kernels(say, has_camera=page is not None, has_owner=True)
         say("building the world")
         flight, companion = flight_with_companion(config, pilot, links=links, folder=folder, wall_s=wall_time_s)
-    recorder = Recorder(flight, action=lambda: companion.action)
+    keep_for_replay(flight, action=lambda: companion.action)
     watch = watch_of(flight, companion, options.seconds)
-    watchers: list[Callable[[], None]] = [recorder.frame, watch.frame]
+    watchers: list[Callable[[], None]] = [watch.frame]
     if page is not None:
         from mission.view.live import LiveView
 
@@ -98,8 +98,6 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     for trouble in flight.troubles.take():
         print_line(console, trouble)
     files = OwnFiles(folder, console)
-    with files.writing(REPLAY_FILE):
-        recorder.recording().save(folder)
     if running.error is not None:
         print_line(console, f"result: {running.error}")
     is_down = running.error is None and not flight.is_crashed
@@ -107,12 +105,22 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     if flight.is_crashed:
         print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
     print_line(console, latency_text(companion))
-    if options.has_film:
-        write_film(recorder.recording(), flight.world, folder / FILM, console)
-    print_line(console, f"{'logs, scorecard and film' if options.has_film else 'logs and scorecard'}: {folder}")
+    has_film = options.has_film and filmed(flight, folder, console)
+    print_line(console, f"{'logs, scorecard and film' if has_film else 'logs and scorecard'}: {folder}")
     if page is not None:
         view.close()
     return exit_code
+
+
+def filmed(flight: Flight, folder: Path, console: Console) -> bool:
+    """Whether the film could be made: from the log, which a full disk ends."""
+    try:
+        recording = load_recording(folder)
+    except RecordingError as error:
+        print_line(console, f"no film: {error}")
+        return False
+    write_film(recording, flight.world, folder / FILM, console)
+    return True
 
 
 def chosen_pilot(policy: str | None) -> tuple[Pilot, str]:

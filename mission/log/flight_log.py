@@ -102,6 +102,13 @@ class FlightLog:
         own = [self._imu_topic, self._status_topic, self._landed_topic, self._mission_topic]
         self._by_name = {topic.name: topic for topic in [*(topic for topic, _ in self._topics), *own]}
 
+    def add(self, topic: Topic, info: Mapping[str, Sequence[str]]) -> None:
+        """One more topic, and what it is read with; before the first row."""
+        self._topics.append((self._log.add_topic(topic.name, topic.fields), topic))
+        self._by_name[topic.name] = self._topics[-1][0]
+        for key, texts in info.items():
+            self._log.inform(key, texts)
+
     def text(self, time_us: int, severity: Severity, text: str) -> None:
         """Logs a text of the vehicle."""
         self._log.message(time_us, int(severity), text)

@@ -21,6 +21,7 @@ from common.params import Parameter
 from mission.log.flight_log import STATUS_DTYPE, FlightLog
 from mission.log.kept_frames import FrameChoice, KeptRows
 from mission.log.log_topics import Batch
+from mission.log.replay_topic import REPLAY_TOPIC, SHOWN
 from sim.rig import Rig
 
 PIECE_FRAMES = 50
@@ -122,6 +123,8 @@ class Recorder:
         self._airframe = airframe
         self._on_trouble = on_trouble
         self._log: FlightLog | None = None if path is None else self._new_log()
+        self._take_shown: Callable[[Rows], None] | None = None
+        self._shown = np.zeros(FRAMES_MAX, SHOWN)
         self._changed: dict[str, int | float] = {}  # parameters, since the last flush
         controller.params.on_change(self._parameter_changed)
 
@@ -129,6 +132,17 @@ class Recorder:
         params, before = self._controller.params, self._samples_before
         modes = self._controller.modes
         return FlightLog(self._path, self._airframe, params, modes, self._imu_limits, before, self._on_trouble)
+
+    def keep_for_replay(self, take: Callable[[Rows], None], info: Mapping[str, Sequence[str]]) -> None:
+        """The log, if there is one, shall also hold what a replay shows; before the first frame.
+
+        Args:
+            take: called once per frame, with the row of SHOWN to be filled.
+            info: what the replay is made with; texts by key.
+        """
+        if self._log is not None:
+            self._take_shown = take
+            self._log.add(REPLAY_TOPIC, info)
 
     def frame(self, time_us: int) -> None:
         """Notes the frame that is ending."""
@@ -158,6 +172,8 @@ class Recorder:
         for rows in self._raw:
             end = count * rows.size
             rows.target[end - rows.size : end] = rows.source
+        if self._take_shown is not None:
+            self._take_shown(self._shown[count - 1])
         if count - self._begins[-1] >= PIECE_FRAMES:
             self._end_piece(count)
 
@@ -210,6 +226,7 @@ class Recorder:
             truth=self._truth.copies[:count],
             vehicle=status,
             origin=self._controller.state.origin,
+            shown=None if self._take_shown is None else self._shown[:count],
             begins=tuple(begin for begin in self._begins if begin < count),
         )
         is_kept = np.array(self._is_kept[:count])
@@ -231,6 +248,7 @@ class Recorder:
         if rest:
             for rows in self._raw:
                 rows.copies[:rest] = rows.copies[count : count + rest]
+            self._shown[:rest] = self._shown[count : count + rest]
 
     def _parameter_changed(self, declaration: Parameter) -> None:
         self._changed[declaration.name] = self._controller.params[declaration.name]

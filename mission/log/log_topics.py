@@ -43,12 +43,15 @@ class Batch:
     truth: Rows  # Truth
     vehicle: Rows  # STATUS_DTYPE of mission.log.flight_log
     origin: GeoPoint
+    shown: Rows | None = None  # SHOWN of mission.log.replay_topic, in flights that are to be replayed
     begins: tuple[int, ...] = (0,)  # the log gets the frames in pieces: where each of them begins
 
     def only(self, frames: Rows | slice, samples_before: Rows) -> "Batch":
         """Some of the frames; `samples_before` as of the frame before the first of them."""
         names = ("time_us", "estimate", "samples", "actuators", "health", "yaw", "truth", "vehicle")
-        return replace(self, samples_before=samples_before, **{name: getattr(self, name)[frames] for name in names})
+        rows = {name: getattr(self, name)[frames] for name in names}
+        shown = None if self.shown is None else self.shown[frames]
+        return replace(self, samples_before=samples_before, shown=shown, **rows)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
-"""What is shown of a flight at one instant: a row that a recording keeps, and a `Moment` to read it.
+"""What is shown of a flight at one instant: a row, and a `Moment` to read it.
 
-In: the live rows of the simulator and the flight controller's state. Out: moments, which the live page shows at once
-and a recording keeps for replays and films. It is the truth: for people, nothing of it goes back into a flight.
+In: the live rows of the simulator and the flight controller's state. Out: moments, as the live page shows them; those
+of replays and films come from the log. It is the truth: for people, nothing of it goes back into a flight.
 """
 
 from dataclasses import dataclass
@@ -13,20 +13,18 @@ from numpy.typing import NDArray
 
 from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from mission.flight import Flight
-from sim.world.people import CHEST_M, Person
+from mission.log.replay_topic import ACTIONS, MOTORS, OWNER
+from sim.world.people import CHEST_M
 
 Row = NDArray[np.float32]
-ROTORS = 8  # as many as a vehicle can have
-ACTIONS = 4  # what a policy chooses: velocity ahead, right and down, and yaw rate, each in [-1, 1]
 MODE_TITLES = {int(mode): mode.name.replace("_", " ").title() for mode in sorted(MULTIROTOR_MODES)}
-_PERSON: Any = Person
 MOMENT = np.dtype(
     [
         ("time_s", "f8"),
         ("pos_ned", "f4", 3),  # [m]
         ("vel_ned", "f4", 3),  # [m/s]
         ("q_ned_from_frd", "f4", 4),  # x, y, z, w
-        ("rotor_speed", "f4", ROTORS),  # [rad/s]
+        ("motor_speed", "f4", MOTORS),  # [rad/s]
         ("height_m", "f4"),  # above the ground
         ("is_on_ground", "?"),
         ("battery", "f4"),  # [0..1] as the vehicle believes
@@ -34,10 +32,10 @@ MOMENT = np.dtype(
         ("is_armed", "?"),
         ("goal_ned", "f4", 3),  # [m] where the vehicle flies to; NaN: nowhere
         ("action", "f4", ACTIONS),  # of the policy on board; NaN: none
-        ("owner", _PERSON.numpy_dtype()),  # a stature of 0: nobody
+        ("owner", OWNER),  # a stature of 0: nobody
     ]
 )
-"""One row of a recording."""
+"""One row of a `Moment`, or of a recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +103,7 @@ def moment_of(flight: Flight, action: Row | None = None) -> Moment:
     row = np.zeros((), MOMENT)
     for name in ("pos_ned", "vel_ned", "q_ned_from_frd", "is_on_ground"):
         row[name] = truth[name]
-    row["rotor_speed"] = truth["motor_speed"]
+    row["motor_speed"] = truth["motor_speed"]
     row["time_s"] = flight.time_us * 1e-6
     row["height_m"] = truth["height_agl_m"]
     row["battery"] = state.battery_remaining

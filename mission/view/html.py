@@ -99,7 +99,7 @@ def _trees(world: WorldMap) -> Json:
 
 
 def _track(rows: NDArray[Any]) -> Json:
-    names = ("time_s", "pos_ned", "q_ned_from_frd", "rotor_speed", "mode", "is_armed")
+    names = ("time_s", "pos_ned", "q_ned_from_frd", "motor_speed", "mode", "is_armed")
     return {name: _array(rows[name]) for name in names} | {
         "owner_ned": _array(rows["owner"]["pos_ned"]),
         "owner_heading_rad": _array(rows["owner"]["heading_rad"]),

@@ -15,7 +15,8 @@ from viser import uplot
 
 from autopilot.interface.vehicle_state import Severity
 from mission.console.status_texts import Text
-from mission.view.flight_snapshot import ACTIONS, Moment
+from mission.log.replay_topic import ACTIONS
+from mission.view.flight_snapshot import Moment
 
 PLOT_PERIOD_S = 0.5  # simulated time between two points that are plotted
 PLOT_POINTS = 600

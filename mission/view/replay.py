@@ -1,6 +1,6 @@
 """`honeyguide replay`: a finished run in the live page's scene, with a slider for the time.
 
-In: the recording in a run folder. Out: the page until Ctrl-C, or one HTML file, or a film; nothing of the run changes.
+In: the log in a run folder. Out: the page until Ctrl-C, or one HTML file, or a film; nothing of the run changes.
 """
 
 from dataclasses import dataclass

@@ -1,29 +1,30 @@
-"""What a run keeps for those who look at it later: a moment of each frame, and what the flight was made from.
+"""A run as those see it who look at it later: moments read from its flight log, and what the flight was made from.
 
-Of a vehicle disarmed for long it is a moment each second (`mission.log.kept_frames`).
-
-In: a running flight. Out: `replay.npz` in the run folder, small enough to keep: 0.4 MB a minute. Replays, films,
-HTML files and the scorecard are made from it alone.
+In: the ULog of a run that was to be replayed. Out: `Recording`, which replays, films and HTML files are made from. Of a
+vehicle disarmed for long there is a moment each second (`mission.log.kept_frames`).
 """
 
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from io import BytesIO
+from functools import reduce
+from math import nan
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
+from pyulog import ULog
 
-from common.files import write_whole
-from mission.console.name_checks import REPLAY_FILE as FILE
+from mission.console.name_checks import LOG_FILE
 from mission.flight import Flight, FlightConfig
-from mission.log.kept_frames import FrameChoice, KeptRows
-from mission.view.flight_snapshot import MOMENT, Moment, Row, moment_of
+from mission.log.replay_topic import OWNER, REPLAY_TOPIC
+from mission.log.ulog_file import UlogDamage, read_topics
+from mission.view.flight_snapshot import MOMENT, Moment, Row
 
-_KEPT, _LEFT_OUT = np.ones(1, bool), np.zeros(1, bool)
+CONFIG_KEY, PATH_KEY = "replay_config", "replay_path"  # of the log's information
+TEXT_MAX = 60_000  # [byte] of one piece of information
+PLACE, ATTITUDE = "vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth"
 
 
 class RecordingError(ValueError):
@@ -52,12 +53,33 @@ class Recording:
         """The same with fewer moments."""
         return Recording(self.config, self.rows[::frames], self.path_ned)
 
-    def save(self, folder: Path) -> None:
-        """Writes it into the folder of its run."""
-        stream = BytesIO()
-        config = np.array(self.config.model_dump_json())
-        np.savez_compressed(stream, rows=self.rows, path_ned=self.path_ned, config=config)
-        write_whole(folder / FILE, stream.getvalue())
+
+def keep_for_replay(
+    flight: Flight, path_ned: Sequence[Any] = (), action: Callable[[], Row | None] = lambda: None
+) -> None:
+    """Lets the log of a flight that has not begun hold what its replay needs.
+
+    Args:
+        flight: what is flown.
+        path_ned: [m] (n, 3) of its plan.
+        action: what a policy on board chose last.
+    """
+    controller, owner = flight.controller, flight.owner
+
+    def take(row: Any) -> None:
+        chosen = action()
+        row["goal_ned"] = controller.state.goal_ned
+        row["action"] = nan if chosen is None else chosen
+        if owner is not None:
+            row["owner"] = owner.people.numpy()[0]
+
+    path = np.array(path_ned, np.float32).reshape(-1, 3).tolist()
+    info = {CONFIG_KEY: flight.config.model_dump_json(), PATH_KEY: json.dumps(path)}
+    flight.recorder.keep_for_replay(take, {key: _pieces(text) for key, text in info.items()})
+
+
+def _pieces(text: str) -> list[str]:
+    return [text[at : at + TEXT_MAX] for at in range(0, len(text), TEXT_MAX)]
 
 
 def load_recording(folder: Path) -> Recording:
@@ -66,45 +88,65 @@ def load_recording(folder: Path) -> Recording:
     Raises:
         RecordingError: there is none, or it cannot be read.
     """
-    path = folder / FILE
+    parts = [folder / LOG_FILE, *sorted(folder.glob("flight-*.ulg"), key=_part_number)]
+    parts = [path for path in parts if path.exists()]
+    if not parts:
+        raise RecordingError(f"{folder}: holds no run that can be shown: {LOG_FILE} is missing")
     try:
-        with np.load(BytesIO(path.read_bytes())) as data:
-            rows, path_ned, text = data["rows"], data["path_ned"], str(data["config"])
-        config = FlightConfig.model_validate(json.loads(text))
-    except FileNotFoundError:
-        raise RecordingError(f"{folder}: holds no run that can be shown: {FILE} is missing") from None
+        logs = [read_topics(path, (PLACE, ATTITUDE, REPLAY_TOPIC.name)) for path in parts]
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (EOFError, KeyError, ValueError, BadZipFile) as error:
-        raise RecordingError(f"{path}: cannot be read: damaged, or no recording") from error
-    if len(rows) == 0 or rows.dtype != MOMENT:
-        raise RecordingError(f"{path}: was written by another version, or holds nothing")
+        raise RecordingError(f"{folder / LOG_FILE}: cannot be read: {error.strerror or error}") from error
+    except UlogDamage as error:
+        raise RecordingError(str(error)) from error
+    if CONFIG_KEY not in logs[-1].msg_info_multiple_dict:
+        raise RecordingError(
+            f"{parts[-1]}: is no log of this version's honeyguide fly or follow: show it with the version that wrote it"
+        )
+    try:
+        config = FlightConfig.model_validate(json.loads(_info(logs[-1], CONFIG_KEY)))
+        path_ned = np.array(json.loads(_info(logs[-1], PATH_KEY)), np.float32).reshape(-1, 3)
+        rows = np.concatenate([_rows(log) for log in logs])
+    except (KeyError, ValueError) as error:
+        raise RecordingError(f"{parts[-1]}: cannot be shown: damaged, or of another version") from error
+    if len(rows) == 0:
+        raise RecordingError(f"{parts[-1]}: holds no moment of a flight")
     return Recording(config, rows, path_ned)
 
 
-class Recorder:
-    """Keeps what is shown of a flight.
+def _part_number(path: Path) -> int:
+    number = path.stem.rpartition("-")[2]
+    return int(number) if number.isdecimal() else 0
 
-    Args:
-        flight: what is recorded.
-        path_ned: [m] (n, 3) of its plan.
-        action: what a policy on board chose last.
-    """
 
-    def __init__(
-        self, flight: Flight, path_ned: Sequence[Any] = (), action: Callable[[], Row | None] = lambda: None
-    ) -> None:
-        self._flight, self._action = flight, action
-        self._path_ned = np.array(path_ned, np.float32).reshape(-1, 3)
-        self._choice = FrameChoice()
-        self._rows = KeptRows(MOMENT)
+def _info(log: ULog, key: str) -> str:
+    return "".join(log.msg_info_multiple_dict[key][0])
 
-    def frame(self) -> None:
-        """Notes the frame that is ending."""
-        is_kept = self._choice.keeps(self._flight.time_us, is_armed=self._flight.controller.state.is_armed)
-        row = moment_of(self._flight, self._action()).row
-        self._rows.add(row.reshape(1), _KEPT if is_kept else _LEFT_OUT)
 
-    def recording(self) -> Recording:
-        """Everything so far."""
-        return Recording(self._flight.config, self._rows.all(), self._path_ned)
+def _rows(log: ULog) -> NDArray[Any]:
+    """The moments of which the log has every topic."""
+    topics = {data.name: data.data for data in log.data_list}
+    if not {PLACE, ATTITUDE, REPLAY_TOPIC.name} <= set(topics):
+        return np.zeros(0, MOMENT)
+    time_us = reduce(np.intersect1d, (data["timestamp"] for data in topics.values()))
+    place, attitude, shown = (
+        {name: column[np.searchsorted(data["timestamp"], time_us)] for name, column in data.items()}
+        for data in (topics[PLACE], topics[ATTITUDE], topics[REPLAY_TOPIC.name])
+    )
+    rows = np.zeros(len(time_us), MOMENT)
+    rows["time_s"] = time_us * 1e-6
+    rows["pos_ned"] = np.stack([place[axis] for axis in ("x", "y", "z")], axis=1)
+    rows["vel_ned"] = np.stack([place[axis] for axis in ("vx", "vy", "vz")], axis=1)
+    rows["height_m"] = place["dist_bottom"]
+    rows["q_ned_from_frd"] = np.stack([attitude[f"q[{k}]"] for k in (1, 2, 3, 0)], axis=1)  # a log's begin with w
+    for name in ("motor_speed", "is_on_ground", "battery", "mode", "is_armed", "goal_ned", "action"):
+        rows[name] = _field(shown, name, rows.dtype[name])
+    for name in OWNER.names or ():
+        rows["owner"][name] = _field(shown, f"owner_{name}", OWNER[name])
+    return rows
+
+
+def _field(columns: dict[str, NDArray[Any]], name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """A field of a topic: a column, or one per element."""
+    if dtype.shape:
+        return np.stack([columns[f"{name}[{k}]"] for k in range(dtype.shape[0])], axis=1)
+    return columns[name]

@@ -138,7 +138,7 @@ class Scene:
         """Moves what moves."""
         self._vehicle.position = moment.pos_ned
         self._vehicle.wxyz = wxyz_of(moment.q_ned_from_frd)
-        speeds = moment.row["rotor_speed"][: len(self._rotors)]
+        speeds = moment.row["motor_speed"][: len(self._rotors)]
         for handle, spin, speed in zip(self._rotors, self._spins, speeds, strict=True):
             if speed > 1.0:
                 handle.wxyz = wxyz_of(quat_of(2.0 * np.pi * BLADE_TURNS_PER_S * spin * moment.time_s, 0.0))

@@ -27,7 +27,7 @@ def assert_refused(result, pattern):
     assert lines[0].startswith("honeyguide: ")
 
 
-RUN_FILES = ["flight.png", "flight.tlog", "flight.ulg", "replay.npz", "summary.json"]  # of a whole flight
+RUN_FILES = ["flight.png", "flight.tlog", "flight.ulg", "summary.json"]  # of a whole flight
 
 
 @pytest.fixture

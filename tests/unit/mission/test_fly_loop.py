@@ -12,7 +12,6 @@ from rich.console import Console
 from mission.console.progress_line import Progress
 from mission.flight import Flight, FlightConfig
 from mission.fly_loop import advance, fly_to_the_end
-from mission.view.replay_file import Recording
 
 OBJECTS_MAX = 50_000  # a full collection of so many takes a few milliseconds; a program that is loaded has 350,000
 
@@ -32,9 +31,11 @@ def test_no_frame_waits_for_the_garbage_of_all_that_was_loaded():
 
 
 @pytest.mark.usefixtures("unfrozen")
-def test_the_logs_are_complete_before_the_recording_of_a_long_flight_is_packed(tmp_path, monkeypatch):
+def test_the_logs_are_complete_before_the_flight_is_drawn(tmp_path, monkeypatch):
     found = []
-    monkeypatch.setattr(Recording, "save", lambda _, folder: found.extend(path.name for path in folder.iterdir()))
+    monkeypatch.setattr(
+        "mission.fly_loop.plot_flight", lambda *_: found.extend(path.name for path in tmp_path.iterdir())
+    )
     options = SimpleNamespace(seconds=0.2, once=False)
     flight = Flight(FlightConfig(), folder=tmp_path)
     assert fly_to_the_end(flight, None, options, None, None, tmp_path, Console(quiet=True)) == 0

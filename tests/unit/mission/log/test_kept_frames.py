@@ -8,7 +8,7 @@ import pytest
 from common.kernels import FRAME_US
 from mission.flight import Flight, FlightConfig
 from mission.log.kept_frames import QUIET_AFTER_US, FrameChoice, KeptRows
-from mission.view.replay_file import Recorder
+from mission.view.replay_file import keep_for_replay, load_recording
 from sim.world.world import WorldConfig
 
 ROW = np.dtype([("time_us", "u8"), ("pos_ned", "f4", 3)])
@@ -46,33 +46,35 @@ def test_rows_come_back_as_they_were_added_and_the_last_one_always(batch):
     assert len(KeptRows(ROW).all()) == 0
 
 
-def idle_flight():
-    flight = Flight(FlightConfig(world=WorldConfig(size_m=64.0, trees_per_ha=0.0)))
-    return flight, Recorder(flight)
+def idle_flight(folder):
+    flight = Flight(FlightConfig(world=WorldConfig(size_m=64.0, trees_per_ha=0.0)), folder=folder)
+    keep_for_replay(flight)
+    return flight
 
 
-def idle_until(flight, recorder, seconds):
-    flight.run(lambda f: f.time_us >= seconds * SECOND_US, on_frame=lambda _: recorder.frame())
+def idle_until(flight, seconds):
+    flight.run(lambda f: f.time_us >= seconds * SECOND_US)
 
 
-def test_a_flight_holds_less_than_half_a_kilobyte_per_frame():
-    flight, recorder = idle_flight()
+def test_a_flight_holds_less_than_half_a_kilobyte_per_frame(tmp_path):
+    flight = idle_flight(tmp_path)
     tracemalloc.start()
     try:
-        idle_until(flight, recorder, 6.0)  # the first chunk of rows is there
+        idle_until(flight, 6.0)  # the first chunk of rows is there
         before = tracemalloc.get_traced_memory()[0]
-        idle_until(flight, recorder, 14.0)
+        idle_until(flight, 14.0)
         assert (tracemalloc.get_traced_memory()[0] - before) / (8.0 * 50.0) < 500.0
     finally:
         tracemalloc.stop()
     flight.close()
 
 
-def test_history_and_recording_of_an_idle_vehicle_thin_out_alike_and_end_with_the_last_frame():
-    flight, recorder = idle_flight()
-    idle_until(flight, recorder, 130.5)
-    rows = recorder.recording().rows
-    assert len(rows) == 120 * 50 + 11
-    assert np.diff(rows["time_s"])[-11:] == pytest.approx([1.0] * 10 + [0.5])
+def test_history_and_recording_of_an_idle_vehicle_thin_out_alike(tmp_path):
+    flight = idle_flight(tmp_path)
+    idle_until(flight, 130.5)
     history = flight.close()
-    assert history.time_us.tolist() == np.round(rows["time_s"] * 1e6).astype(int).tolist()
+    rows = load_recording(tmp_path).rows
+    assert len(rows) == 120 * 50 + 10
+    assert np.diff(rows["time_s"])[-10:] == pytest.approx([1.0] * 10)
+    assert history.time_us[:-1].tolist() == np.round(rows["time_s"] * 1e6).astype(int).tolist()
+    assert history.time_us[-1] == 130_500_000  # how the flight ended

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from mission.cli import app
 from mission.flight import flight_world
 from mission.view.html import STRIDE, page_data
-from tests.unit.mission.view.rows import CONFIG, hovering
+from tests.unit.mission.view.rows import CONFIG, hovering, write_log
 
 
 def run(*arguments):
@@ -21,7 +21,7 @@ def run(*arguments):
 
 @pytest.fixture
 def folder(tmp_path):
-    hovering().save(tmp_path)
+    write_log(hovering(), tmp_path / "flight.ulg")
     return tmp_path
 
 
