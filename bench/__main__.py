@@ -17,24 +17,25 @@ from rich.table import Table
 from bench.row import Row, WrongResult, machine
 from common.files import write_whole
 
-SCRIPTS = (
-    "flights",
-    "flight",
-    "python_share",
-    "batch",
-    "threads",
-    "scaling",
-    "worlds",
-    "hover",
-    "environments",
-    "training",
-    "sac",
-    "companion",
-    "tracker",
-    "camera",
-    "film",
-    "startup",
-)
+SCRIPTS = {
+    "flights": "bench.flying.flights",
+    "flight": "bench.flying.flight",
+    "python_share": "bench.flying.python_share",
+    "batch": "bench.flying.batch",
+    "threads": "bench.flying.threads",
+    "scaling": "bench.flying.scaling",
+    "worlds": "bench.flying.worlds",
+    "hover": "bench.learning.hover",
+    "environments": "bench.learning.environments",
+    "training": "bench.learning.training",
+    "sac": "bench.learning.sac",
+    "companion": "bench.learning.companion",
+    "tracker": "bench.learning.tracker",
+    "camera": "bench.flying.camera",
+    "film": "bench.flying.film",
+    "startup": "bench.flying.startup",
+}
+"""Modules of the benchmarks by name, in the order of the table."""
 RESULTS = Path(__file__).parent / "results.json"
 
 
@@ -49,7 +50,7 @@ def main(names: list[str]) -> int:
     for name in names or SCRIPTS:
         console.print(f"[dim]{name} …[/dim]")
         try:
-            rows += import_module(f"bench.{name}").measure()
+            rows += import_module(SCRIPTS[name]).measure()
         except WrongResult as error:
             wrong.append(f"{name}: {error}")
     console.print(_table(rows))
@@ -83,7 +84,8 @@ def _write(rows: list[Row], kept: list[dict[str, Any]]) -> None:
     """Writes the rows measured now and those kept, in the order of the scripts."""
     here = machine()
     listed = kept + [asdict(row) | {"machine": here} for row in rows]
-    listed.sort(key=lambda row: SCRIPTS.index(row["command"].split()[-1]))
+    order = list(SCRIPTS)
+    listed.sort(key=lambda row: order.index(row["command"].split()[-1]))
     write_whole(RESULTS, (json.dumps(listed, indent=1, ensure_ascii=False) + "\n").encode())
 
 

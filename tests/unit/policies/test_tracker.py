@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bench.tracker import DECISION_US, Walks, always, errors, normalised, not_the_last_3_s_of_10, track
+from bench.learning.tracker import DECISION_US, Walks, always, errors, normalised, not_the_last_3_s_of_10, track
 from policies.tracker import OwnerTracker, PhoneReport, Sighting, sighting_axes_ned
 from sim.world.people import RUN_SPEED_M_S
 

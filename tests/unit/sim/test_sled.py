@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from autopilot.params import all_parameters
-from bench.fleet import same_bits
+from bench.flying.fleet import same_bits
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
 from common.kernels import FRAME_TICKS

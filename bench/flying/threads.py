@@ -2,7 +2,7 @@
 
 import time
 
-from bench.fleet import hovering, same_bits
+from bench.flying.fleet import hovering, same_bits
 from bench.row import Row, require
 from sim.rig import Rig
 

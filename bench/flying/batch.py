@@ -2,7 +2,7 @@
 
 import time
 
-from bench.fleet import check, hovering
+from bench.flying.fleet import check, hovering
 from bench.row import Row, best_of
 from common.kernels import TICK_S
 

@@ -40,7 +40,7 @@ WRONG = (
 EVERYTHING = """
 import gymnasium
 import policies
-from bench.fleet import hovering
+from bench.flying.fleet import hovering
 from mission.flight import Flight, FlightConfig
 Flight(FlightConfig()).frame()
 gymnasium.make("honeyguide/Hover-v0").reset(seed=0)

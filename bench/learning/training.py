@@ -89,7 +89,7 @@ def _peer_rate(envs: int, rollout: int, epochs: int, batch: int, iterations: int
     from stable_baselines3 import PPO
     from stable_baselines3.common.env_util import make_vec_env
 
-    from bench.sb3 import BatchVecEnv
+    from bench.learning.sb3 import BatchVecEnv
 
     networks = {"net_arch": [64, 64], "activation_fn": torch.nn.SiLU}
     environments = (

@@ -1,0 +1,1 @@
+"""How fast and how well learning and what was learned run."""
