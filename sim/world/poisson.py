@@ -7,6 +7,7 @@ import numpy as np
 from sim.world.terrain import FloatArray
 
 TRIALS = 12  # darts thrown at each empty cell
+FAR = 1.0e9  # [m] where the point of an empty cell lies
 COVERAGE = 0.64  # points per spacing² reached with these trials; measured, the limit is about 0.7 (Wei 2008)
 
 
@@ -28,21 +29,22 @@ def poisson_disc(seed: int, side_m: float, spacing_m: float, keep_out_m: float) 
     cell_m = spacing_m / sqrt(2.0)
     count = ceil(side_m / cell_m)
     far = 1.0e9
-    points = np.full((count + 4, count + 4, 2), far)  # two empty cells all round spare the edge cases
+    side = count + 4  # two empty cells all round spare the edge cases
+    north, east = np.full(side * side, FAR), np.full(side * side, FAR)
+    neighbours = [d_row * side + d_column for d_row in range(-2, 3) for d_column in range(-2, 3)]
     for _ in range(TRIALS):
         for phase in rng.permutation(9):
             rows, columns = np.meshgrid(np.arange(phase // 3, count, 3), np.arange(phase % 3, count, 3), indexing="ij")
             darts = (np.stack([rows, columns], axis=-1) + rng.random((*rows.shape, 2))) * cell_m
-            rows, columns = rows + 2, columns + 2
-            from_home = darts - 0.5 * side_m
-            is_good = (points[rows, columns, 0] == far) & (darts < side_m).all(axis=-1)
-            is_good &= (from_home**2).sum(axis=-1) > keep_out_m**2
-            rows, columns, darts = rows[is_good], columns[is_good], darts[is_good]
-            is_free = np.ones(len(darts), dtype=bool)
-            for d_row in range(-2, 3):
-                for d_column in range(-2, 3):
-                    other = points[rows + d_row, columns + d_column]
-                    is_free &= ((darts - other) ** 2).sum(axis=-1) >= spacing_m**2
-            points[rows[is_free], columns[is_free]] = darts[is_free]
-    inner = points[2:-2, 2:-2].reshape(-1, 2)
-    return np.asarray(inner[inner[:, 0] != far] - 0.5 * side_m)
+            x, y = darts[..., 0], darts[..., 1]
+            cells = (rows + 2) * side + columns + 2
+            is_good = (north[cells] == FAR) & (x < side_m) & (y < side_m)
+            is_good &= (x - 0.5 * side_m) ** 2 + (y - 0.5 * side_m) ** 2 > keep_out_m**2
+            cells, x, y = cells[is_good], x[is_good], y[is_good]
+            is_free = np.ones(len(cells), dtype=bool)
+            for neighbour in neighbours:
+                other = cells + neighbour
+                is_free &= (x - north[other]) ** 2 + (y - east[other]) ** 2 >= spacing_m**2
+            north[cells[is_free]], east[cells[is_free]] = x[is_free], y[is_free]
+    points = np.stack([north, east], axis=-1).reshape(side, side, 2)[2:-2, 2:-2].reshape(-1, 2)
+    return np.asarray(points[points[:, 0] != FAR] - 0.5 * side_m)

@@ -7,10 +7,12 @@ import socket
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 from pyulog import ULog
 
+from mission.cli import main
 from mission.plan.plan_file import DEFAULT_PLAN
 from tests.system.vehicle import HONEYGUIDE, ROOT, IdleVehicle, free_ports, honeyguide
 
@@ -31,12 +33,25 @@ RUN_FILES = ["flight.png", "flight.tlog", "flight.ulg", "summary.json"]  # of a 
 
 
 @pytest.fixture
-def fly(tmp_path):
-    """Runs a lockstep flight into a folder of the test."""
+def here(capfd, monkeypatch):
+    """Runs the console command to its end in this process, which has the program loaded already."""
 
     def run(*arguments):
-        folder = () if "--run-folder" in arguments else ("--run-folder", tmp_path / "flight")
-        return honeyguide("fly", *LOCKSTEP, *folder, *arguments)
+        monkeypatch.setattr(sys, "argv", ["honeyguide", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        stdout, stderr = capfd.readouterr()
+        return SimpleNamespace(returncode=end.value.code, stdout=stdout, stderr=stderr)
+
+    return run
+
+
+@pytest.fixture
+def fly(tmp_path, here):
+    """Runs a lockstep flight into a folder of the test."""
+
+    def run(*arguments, command=here):
+        return command("fly", *LOCKSTEP, "--run-folder", tmp_path / "flight", *arguments)
 
     return run
 
@@ -53,11 +68,11 @@ def test_missing_plan_is_refused(fly, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_port_in_use_is_refused(tmp_path):
+def test_port_in_use_is_refused(here, tmp_path):
     gcs_port, api_port = free_ports()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", api_port + 40))
-        result = honeyguide(
+        result = here(
             "fly", "--idle", "--gcs-port", gcs_port, "--api-port", api_port, "--run-folder", tmp_path / "flight"
         )
     assert_refused(result, rf"UDP port {api_port + 40} is in use .*: choose --gcs-port or --api-port$")
@@ -102,7 +117,7 @@ def test_folder_with_a_flight_is_left_alone(fly, tmp_path):
 
 
 def test_flown_mission_gives_0_and_a_whole_run_folder(fly, tmp_path):
-    result = fly("--wind", "5")
+    result = fly("--wind", "5", command=honeyguide)
     assert result.returncode == 0, result.stderr
     assert result.stderr == ""
     assert "mission completed" in result.stdout
@@ -114,9 +129,9 @@ def test_flown_mission_gives_0_and_a_whole_run_folder(fly, tmp_path):
     assert (folder / "flight.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_mission_is_flown_at_a_pace_too(tmp_path):
+def test_mission_is_flown_at_a_pace_too(here, tmp_path):
     gcs_port, api_port = free_ports()
-    result = honeyguide(
+    result = here(
         "fly", "--once", "--speed", "50", "--gcs-port", gcs_port, "--api-port", api_port, "--run-folder", tmp_path / "f"
     )
     assert result.returncode == 0, result.stderr
@@ -227,8 +242,8 @@ def test_interrupt_while_starting_is_no_traceback(tmp_path):
     assert process.returncode != 0
 
 
-def test_help_names_the_options():
-    result = honeyguide("fly", "--help")
+def test_help_names_the_options(here):
+    result = here("fly", "--help")
     assert result.returncode == 0
     for option in ("--plan", "--once", "--speed", "--seconds", "--seed", "--wind", "--airframe", "--home"):
         assert option in result.stdout
