@@ -61,7 +61,7 @@ class BoundedHttpServer(ThreadingHTTPServer):
     """
 
     daemon_threads = True
-    request_queue_size = 128
+    request_queue_size = 1024  # whom it does not hold tries again after a second only
 
     def __init__(self, address: tuple[str, int], handler: type["GuardedHandler"]) -> None:
         self._lock = Lock()

@@ -27,6 +27,7 @@ class HostRows:
         self._arrays = arrays
         self._is_mirrored = is_mirrored
         self._mirrors: dict[str, tuple[Any, Any]] = {}  # the array and its mirror, an array of the host
+        self._shown: dict[str, tuple[Any, Rows]] = {}  # the array of the host and its rows, whose type is slow to make
 
     def __getitem__(self, name: str) -> Rows:
         """The rows; the same memory each time.
@@ -37,13 +38,15 @@ class HostRows:
         array = self._arrays
         for part in name.split("."):
             array = getattr(array, part)
-        if not self._is_mirrored:
-            rows: Rows = array.numpy()
-            return rows
-        if name not in self._mirrors:
-            self._mirrors[name] = (array, wp.clone(array, device="cpu"))
-        mirror: Rows = self._mirrors[name][1].numpy()
-        return mirror
+        if self._is_mirrored:
+            if name not in self._mirrors:
+                self._mirrors[name] = (array, wp.clone(array, device="cpu"))
+            array = self._mirrors[name][1]
+        of_array, rows = self._shown.get(name, (None, None))
+        if rows is None or of_array is not array:
+            rows = array.numpy()
+            self._shown[name] = (array, rows)
+        return rows
 
     def send(self) -> None:
         """Gives the device what the host has written."""

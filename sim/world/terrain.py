@@ -185,8 +185,9 @@ def _gradient_noise(rng: np.random.Generator, along: FloatArray) -> FloatArray:
         return gradient[0, i + di, j + dj] * (u - di) + gradient[1, i + di, j + dj] * (v - dj)
 
     fade_u, fade_v = smootherstep(u), smootherstep(v)
-    south = ramp(0, 0) + fade_v * (ramp(0, 1) - ramp(0, 0))
-    north_side = ramp(1, 0) + fade_v * (ramp(1, 1) - ramp(1, 0))
+    south_west, north_west = ramp(0, 0), ramp(1, 0)
+    south = south_west + fade_v * (ramp(0, 1) - south_west)
+    north_side = north_west + fade_v * (ramp(1, 1) - north_west)
     noise: FloatArray = south + fade_u * (north_side - south)
     return noise
 
