@@ -28,7 +28,6 @@ def poisson_disc(seed: int, side_m: float, spacing_m: float, keep_out_m: float) 
         return np.zeros((0, 2))
     cell_m = spacing_m / sqrt(2.0)
     count = ceil(side_m / cell_m)
-    far = 1.0e9
     side = count + 4  # two empty cells all round spare the edge cases
     north, east = np.full(side * side, FAR), np.full(side * side, FAR)
     neighbours = [d_row * side + d_column for d_row in range(-2, 3) for d_column in range(-2, 3)]
