@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from common.geodesy import DEFAULT_HOME
 from common.kernels import TICK_S
+from policies.tasks.flight.episode_start import Start
 from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, Makes
-from policies.tasks.flight.hover_bank import LOW_M, build_rig, hover_bank
+from policies.tasks.flight.hover_bank import HOVER_COUNT, LOW_M, build_rig, hover_bank
 from policies.tasks.layout import Layout
 from policies.tasks.task import Task
 from policies.tasks.task_params import Sampler
@@ -68,6 +69,24 @@ class FlightTask(Task):
     def _begin_rows(self) -> None:
         """Starts the episodes of the rows that are starting."""
         raise NotImplementedError
+
+    def start(self, *, is_test: bool) -> Any:
+        """What episodes start with, for kernels: a `Start`."""
+        start = Start()
+        start.is_starting = self.is_starting
+        start.is_growing = self.is_growing
+        start.world_seeds = self.world_seeds
+        start.noise_seeds = self.noise_seeds
+        start.hovers = self.hovers
+        start.hover_count = HOVER_COUNT
+        start.is_test = int(is_test)
+        start.world_params = self.worlds.params
+        start.makes = self.makes
+        return start
+
+    def record(self, kernel: Any, *inputs: Any) -> Any:
+        """A launch of one thread per environment, recorded."""
+        return wp.launch(kernel, self.env_count, list(inputs), device=self.device, record_cmd=True)
 
     def take_off(self) -> None:
         """Grows the worlds that are to grow, and puts the vehicles of the rows that start into their hovers there."""

@@ -13,7 +13,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
-from policies.tasks.flight.hover_bank import HOVER_COUNT, LOW_M
+from policies.tasks.flight.hover_bank import LOW_M
 from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.flight.ranges import RANGES, measure_ranges
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
@@ -21,13 +21,11 @@ from policies.tasks.follow_me.follow_me_kernels import (
     MEASURES,
     FollowState,
     Rules,
-    Start,
     act,
     judge,
     look,
     place,
     prepare,
-    recorded,
     show,
     walk,
 )
@@ -78,7 +76,7 @@ class FollowMe(FlightTask):
         if self.layout.image is not None:
             self._eyes = Eyes(self.buffers, self.rig.arrays, self.follow.params, self.worlds, self.follow.people)
             self.follow.lenses = self._eyes.lenses
-        self._record_all(_rules(settings, self.layout), self._start())
+        self._record_all(_rules(settings, self.layout), self.start(is_test=settings.split == "test"))
 
     def step(self) -> None:
         """One decision of all environments, with the actions that lie in the buffers."""
@@ -154,28 +152,14 @@ class FollowMe(FlightTask):
         state.lenses = self._zeros("lenses", n, Lens)
         state.measures = self._zeros("measures", (n, len(MEASURES)), float)
         state.is_all = wp.full(n, value=True, dtype=wp.bool, device=self.device)
+        state.usual_person = wp.array([person_model()], dtype=PersonModel, device=self.device)
+        state.usual_phone = wp.array([phone_model()], dtype=PhoneModel, device=self.device)
         return state
-
-    def _start(self) -> Any:
-        start = Start()
-        start.is_starting = self.is_starting
-        start.is_growing = self.is_growing
-        start.world_seeds = self.world_seeds
-        start.noise_seeds = self.noise_seeds
-        start.hovers = self.hovers
-        start.hover_count = HOVER_COUNT
-        start.world_params = self.worlds.params
-        start.makes = self.makes
-        start.person = wp.array([person_model()], dtype=PersonModel, device=self.device)
-        start.phone = wp.array([phone_model()], dtype=PhoneModel, device=self.device)
-        return start
 
     def _record_all(self, rules: Any, start: Any) -> None:
         buffers, rig, state = self.buffers, self.rig.arrays, self.follow
 
-        def record(kernel: Any, *inputs: Any) -> Any:
-            return recorded(kernel, self.env_count, list(inputs), self.device)
-
+        record = self.record
         self._act = record(act, buffers, rules, rig)
         self._walk = record(walk, rules, rig, state)
         self._look_all = record(look, rig, state, state.is_all)
@@ -210,7 +194,6 @@ def _rules(settings: FollowSettings, layout: Layout) -> Any:
     rules.is_documented = int(settings.preset == "as-documented")
     rules.has_estimator = int(settings.has_estimator)
     rules.has_privileged = int(bool(layout.privileged))
-    rules.is_test = int(settings.split == "test")
     rules.is_kept = int(settings.terrain == "kept")
     rules.decision_ticks = DECISION_TICKS
     return rules

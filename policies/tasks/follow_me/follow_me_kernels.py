@@ -9,25 +9,15 @@ place     wind, sensors and mass, the owner, their phone (then look, ranges and 
 show      the first vector
 """
 
-from typing import Any
-
 import warp as wp
 
 from common.kernels import TICK_S, TICK_US
 from common.rng import draw_tick
-from policies.tasks.episode import StepBuffers, begin_episode, close_step_in_time, open_frame
-from policies.tasks.flight.episode_draws import (
-    HOVER_STREAM,
-    NOISE_STREAM,
-    PATH_STREAM,
-    WORLD_STREAM,
-    draw_angle,
-    draw_index,
-    draw_seed,
-)
+from policies.tasks.episode import StepBuffers, close_step_in_time, open_frame
+from policies.tasks.flight.episode_draws import PATH_STREAM, draw_angle, draw_seed
+from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight, continuous_action
 from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.flown_vehicle import (
-    Makes,
     own_state,
     vary_vehicle,
     vehicle_estimate,
@@ -43,7 +33,6 @@ from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_start, phone_step
 from sim.truth import has_touched
-from sim.world.growing import WorldParams
 from sim.world.people import PERSON_DT_S, PERSON_TICKS, Person, PersonModel, person_start, person_step
 
 wp.set_module_options({"enable_backward": False})
@@ -73,7 +62,6 @@ class Rules:
     is_documented: int
     has_estimator: int
     has_privileged: int
-    is_test: int
     is_kept: int  # terrain
     decision_ticks: int
 
@@ -97,22 +85,8 @@ class FollowState:
     lenses: wp.array(dtype=Lens)
     measures: wp.array2d(dtype=float)  # (envs, MEASURES)
     is_all: wp.array(dtype=wp.bool)  # every row
-
-
-@wp.struct
-class Start:
-    """What an episode starts with; one row per environment."""
-
-    is_starting: wp.array(dtype=wp.bool)
-    is_growing: wp.array(dtype=wp.bool)
-    world_seeds: wp.array(dtype=int)
-    noise_seeds: wp.array(dtype=int)
-    hovers: wp.array(dtype=int)
-    hover_count: int
-    world_params: wp.array(dtype=WorldParams)
-    makes: Makes
-    person: wp.array(dtype=PersonModel)  # (1,)
-    phone: wp.array(dtype=PhoneModel)  # (1,)
+    usual_person: wp.array(dtype=PersonModel)  # (1,), before an episode's parameters
+    usual_phone: wp.array(dtype=PhoneModel)  # (1,)
 
 
 @wp.func
@@ -120,10 +94,7 @@ def chosen_action(buffers: StepBuffers, rules: Rules, i: int) -> wp.vec4:
     """The action that lies in the buffers, in [-1, 1]."""
     if rules.is_documented == 1:
         return document_action(buffers.branches[i, 0], buffers.branches[i, 1], buffers.branches[i, 2])
-    action = wp.vec4()
-    for k in range(4):
-        action[k] = wp.clamp(buffers.continuous[i, k], -1.0, 1.0)
-    return action
+    return continuous_action(buffers, i)
 
 
 @wp.kernel(enable_backward=False)
@@ -238,21 +209,13 @@ def prepare(buffers: StepBuffers, rules: Rules, state: FollowState, start: Start
     start.is_growing[i] = False
     if not start.is_starting[i]:
         return
-    seed = buffers.seed[0]
-    episode = begin_episode(buffers, i)
+    episode = begin_flight(buffers, start, i)
     params = state.params[i]
     state.actions[i] = wp.vec4()
     state.unseen_s[i] = 0.0
-    start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, rules.is_test)
-    start.hovers[i] = draw_index(seed, i, episode, HOVER_STREAM, start.hover_count)
-    state.path_seeds[i] = draw_seed(seed, i, episode, PATH_STREAM, rules.is_test)
+    state.path_seeds[i] = draw_seed(buffers.seed[0], i, episode, PATH_STREAM, start.is_test)
     if rules.is_kept == 0 or episode == 0:
-        start.is_growing[i] = True
-        start.world_seeds[i] = draw_seed(seed, i, episode, WORLD_STREAM, rules.is_test)
-        world = start.world_params[i]
-        world.hill_height_m = params.hill_height_m
-        world.trees_per_ha = params.trees_per_ha
-        start.world_params[i] = world
+        ask_for_world(buffers, start, i, episode, params.hill_height_m, params.trees_per_ha)
 
 
 @wp.func
@@ -297,8 +260,8 @@ def place(buffers: StepBuffers, rig: RigArrays, state: FollowState, start: Start
     episode = buffers.episodes[i] - 1
     params = state.params[i]
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
-    state.person_models[i] = person_of(start.person[0], params)
-    state.phone_models[i] = phone_of(start.phone[0], params)
+    state.person_models[i] = person_of(state.usual_person[0], params)
+    state.phone_models[i] = phone_of(state.usual_phone[0], params)
     # ahead, some way to one side, looking anywhere
     truth = rig.truth[i]
     nose = wp.quat_rotate(truth.q_ned_from_frd, wp.vec3(1.0, 0.0, 0.0))
@@ -323,8 +286,3 @@ def show(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState,
     i = wp.tid()
     if start.is_starting[i]:
         write_frame(buffers, rules, rig, state, i)
-
-
-def recorded(kernel: Any, count: int, inputs: list[Any], device: str) -> Any:
-    """A launch of one thread per environment, recorded."""
-    return wp.launch(kernel, count, inputs, device=device, record_cmd=True)

@@ -12,7 +12,6 @@ import warp as wp
 from numpy.typing import NDArray
 
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
-from policies.tasks.flight.hover_bank import HOVER_COUNT
 from policies.tasks.flight.own_state import ACTIONS, OWN_ELEMENTS
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
 from policies.tasks.layout import ImageElement, Layout
@@ -21,7 +20,6 @@ from policies.tasks.navigate.navigate_kernels import (
     MEASURES,
     NavigateState,
     Rules,
-    Start,
     act,
     judge,
     place,
@@ -139,25 +137,14 @@ class Navigate(FlightTask):
         rules = Rules()
         rules.has_rays = int(self.settings.observation == "rays")
         rules.has_estimator = int(self.settings.has_estimator)
-        rules.is_test = int(self.settings.split == "test")
         rules.decision_s = self.decision_s
-        start = Start()
-        start.is_starting = self.is_starting
-        start.is_growing = self.is_growing
-        start.world_seeds = self.world_seeds
-        start.noise_seeds = self.noise_seeds
-        start.hovers = self.hovers
-        start.hover_count = HOVER_COUNT
-        start.world_params = self.worlds.params
-        start.makes = self.makes
+        start = self.start(is_test=self.settings.split == "test")
 
-        def record(kernel: Any, *inputs: Any) -> Any:
-            return wp.launch(kernel, self.env_count, list(inputs), device=self.device, record_cmd=True)
-
+        record = self.record
         self._act = record(act, buffers, rules, rig)
         self._scan = record(scan, rig, state.params, state.is_all, state.ranges_m)
         self._judge = record(judge, buffers, rules, rig, state, start)
-        self._prepare = record(prepare, buffers, rules, state, start)
+        self._prepare = record(prepare, buffers, state, start)
         self._place = record(place, buffers, rig, state, start)
         self._show = record(show, buffers, rules, rig, state, start)
 

@@ -9,18 +9,11 @@ show      the first vector
 
 import warp as wp
 
-from policies.tasks.episode import StepBuffers, begin_episode, close_step, open_frame
-from policies.tasks.flight.episode_draws import (
-    HOVER_STREAM,
-    NOISE_STREAM,
-    WORLD_STREAM,
-    draw_angle,
-    draw_index,
-    draw_seed,
-)
+from policies.tasks.episode import StepBuffers, close_step, open_frame
+from policies.tasks.flight.episode_draws import draw_angle
+from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight, continuous_action
 from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.flown_vehicle import (
-    Makes,
     own_state,
     vary_vehicle,
     vehicle_estimate,
@@ -33,7 +26,6 @@ from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
 from policies.tasks.navigate.scan import write_ranges
 from sim.advance import RigArrays
 from sim.truth import Truth, has_touched
-from sim.world.growing import WorldParams
 from sim.world.world import World, ground_height, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
@@ -53,7 +45,6 @@ class Rules:
 
     has_rays: int
     has_estimator: int
-    is_test: int
     decision_s: float
 
 
@@ -73,34 +64,13 @@ class NavigateState:
     is_all: wp.array(dtype=wp.bool)  # every row
 
 
-@wp.struct
-class Start:
-    """What an episode starts with; one row per environment."""
-
-    is_starting: wp.array(dtype=wp.bool)
-    is_growing: wp.array(dtype=wp.bool)
-    world_seeds: wp.array(dtype=int)
-    noise_seeds: wp.array(dtype=int)
-    hovers: wp.array(dtype=int)
-    hover_count: int
-    world_params: wp.array(dtype=WorldParams)
-    makes: Makes
-
-
-@wp.func
-def chosen_action(buffers: StepBuffers, i: int) -> wp.vec4:
-    """The action that lies in the buffers, in [-1, 1]."""
-    action = wp.vec4()
-    for k in range(4):
-        action[k] = wp.clamp(buffers.continuous[i, k], -1.0, 1.0)
-    return action
-
-
 @wp.kernel(enable_backward=False)
 def act(buffers: StepBuffers, rules: Rules, rig: RigArrays) -> None:
     i = wp.tid()
     estimate = vehicle_estimate(rig, i, rules.has_estimator)
-    rig.autopilot.setpoint[i] = velocity_setpoint(action_command(chosen_action(buffers, i), estimate.q_ned_from_frd))
+    rig.autopilot.setpoint[i] = velocity_setpoint(
+        action_command(continuous_action(buffers, i), estimate.q_ned_from_frd)
+    )
 
 
 @wp.func
@@ -127,7 +97,7 @@ def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateSta
     truth = rig.truth[i]
     last_pos_ned = state.pos_ned[i]
     last_action = state.actions[i]
-    action = chosen_action(buffers, i)
+    action = continuous_action(buffers, i)
     state.actions[i] = action
     state.pos_ned[i] = truth.pos_ned
     state.path_m[i] += wp.length(truth.pos_ned - last_pos_ned)
@@ -151,24 +121,16 @@ def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateSta
 
 
 @wp.kernel(enable_backward=False)
-def prepare(buffers: StepBuffers, rules: Rules, state: NavigateState, start: Start) -> None:
+def prepare(buffers: StepBuffers, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     start.is_growing[i] = False
     if not start.is_starting[i]:
         return
-    seed = buffers.seed[0]
-    episode = begin_episode(buffers, i)
+    episode = begin_flight(buffers, start, i)
     params = state.params[i]
     state.actions[i] = wp.vec4()
-    start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, rules.is_test)
-    start.hovers[i] = draw_index(seed, i, episode, HOVER_STREAM, start.hover_count)
     if episode % wp.max(int(params.episodes_per_world), 1) == 0:
-        start.is_growing[i] = True
-        start.world_seeds[i] = draw_seed(seed, i, episode, WORLD_STREAM, rules.is_test)
-        world = start.world_params[i]
-        world.hill_height_m = params.hill_height_m
-        world.trees_per_ha = params.trees_per_ha
-        start.world_params[i] = world
+        ask_for_world(buffers, start, i, episode, params.hill_height_m, params.trees_per_ha)
 
 
 @wp.kernel(enable_backward=False)
