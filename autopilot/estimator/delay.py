@@ -8,8 +8,8 @@ import warp as wp
 
 from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.predict import delta_velocity_ned
-from autopilot.estimator.state import IMU_RING, Ekf, Inbox, Nominal, Output, OutputSample
-from autopilot.ports import Estimate, ImuSample, Samples
+from autopilot.estimator.state import IMU_RING, Inbox, Nominal, Output, OutputSample
+from autopilot.ports import Estimate, ImuSample
 from common.kernels import GRAVITY_M_S2
 from common.rotation import quat_from_rotvec
 
@@ -34,26 +34,6 @@ def bounded_sample(imu: ImuSample) -> ImuSample:
 def is_number(imu: ImuSample) -> bool:
     """Nothing in the sample is NaN or infinite."""
     return wp.isfinite(imu.gyro_frd) and wp.isfinite(imu.accel_frd) and wp.isfinite(imu.dt_s)
-
-
-@wp.func
-def without_nan(ekf: Ekf, i: int, samples: Samples) -> Samples:
-    """The samples; a new one of a slow sensor that is no number has not come: no filter would ever forget it."""
-    gnss_us, baro_us = ekf.rows[i].gnss_inbox.arrived_time_us, ekf.rows[i].baro_inbox.arrived_time_us
-    mag_us, range_us = ekf.rows[i].mag_inbox.arrived_time_us, ekf.rows[i].range_inbox.arrived_time_us
-    if samples.gnss.time_us != gnss_us:
-        if not (wp.isfinite(samples.gnss.pos_ned) and wp.isfinite(samples.gnss.vel_ned)):
-            samples.gnss.time_us = gnss_us
-    if samples.baro.time_us != baro_us:
-        if not wp.isfinite(samples.baro.pressure_pa):
-            samples.baro.time_us = baro_us
-    if samples.mag.time_us != mag_us:
-        if not wp.isfinite(samples.mag.field_frd_gauss):
-            samples.mag.time_us = mag_us
-    if samples.range.time_us != range_us:
-        if not wp.isfinite(samples.range.distance_m):
-            samples.range.time_us = range_us
-    return samples
 
 
 @wp.func

@@ -22,10 +22,8 @@ from autopilot.estimator.delay import (
     output_sample,
     predicted_estimate,
     raw_estimate,
-    receive,
     start_output,
     with_jump,
-    without_nan,
 )
 from autopilot.estimator.generated import predict_covariance
 from autopilot.estimator.health import (
@@ -33,47 +31,29 @@ from autopilot.estimator.health import (
     flags,
     is_doubted,
     is_sound,
-    listen,
     with_deviations,
     with_doubt,
 )
 from autopilot.estimator.params import EstimatorParams, estimator_params
 from autopilot.estimator.predict import MANOEUVRE_ACCEL_NSD, manoeuvre_level, predict_nominal, process_variance
-from autopilot.estimator.sources.baro import (
-    BARO_STUCK_AFTER,
-    BARO_STUCK_MOVED,
-    baro_repeats,
-    start_baro,
-    take_baro,
+from autopilot.estimator.sensors import (
+    FUSED_SENSORS,
+    drop_waiting,
+    listen_sensors,
+    receive_samples,
+    take_samples,
+    without_nan,
 )
+from autopilot.estimator.sources.baro import start_baro
 from autopilot.estimator.sources.drag import drag_is_due, take_drag
 from autopilot.estimator.sources.external import listen_external, receive_external, take_external
-from autopilot.estimator.sources.gnss import (
-    GNSS_STUCK_AFTER,
-    GNSS_STUCK_MOVED,
-    gnss_repeats,
-    take_gnss,
-)
-from autopilot.estimator.sources.heading import take_heading
-from autopilot.estimator.sources.heights import compare_heights
-from autopilot.estimator.sources.mag import MAG_STUCK_AFTER, MAG_STUCK_MOVED, mag_repeats, take_mag
-from autopilot.estimator.sources.range import (
-    RANGE_STUCK_AFTER,
-    RANGE_STUCK_MOVED,
-    range_repeats,
-    take_range,
-)
 from autopilot.estimator.sources.rest import observe_stillness, take_rest
 from autopilot.estimator.state import (
-    BARO_RING,
     COV_ROWS,
     EXTERNAL_RING,
-    GNSS_RING,
     IMU_RING,
-    MAG_RING,
     PHASE_ALIGNING,
     PHASE_RUNNING,
-    RANGE_RING,
     VEL,
     Alignment,
     Ekf,
@@ -83,12 +63,8 @@ from autopilot.estimator.state import (
 )
 from autopilot.estimator.yaw_estimator import start_tilt, sum_imu
 from autopilot.ports import (
-    BaroSample,
     ExternalSample,
-    GnssSample,
     ImuSample,
-    MagSample,
-    RangeSample,
     Samples,
 )
 from common.kernels import GRAVITY_M_S2, vec24
@@ -97,74 +73,8 @@ from common.warp_start import start_warp
 wp.set_module_options({"enable_backward": False})
 
 SOUNDNESS_SAMPLES = wp.constant(256)  # the covariance is looked over once a second; at once if the state is no number
-COMPARE_SAMPLES = wp.constant(64)  # heights are compared four times a second
 WATCH_SAMPLES = wp.constant(4)  # flags and deviations are renewed at 62 Hz
 COUNTED_SAMPLES = wp.constant(1 << 30)  # 50 days; counted anew then: a multiple of the ring and of the three above
-
-
-@wp.func
-def receive_samples(ekf: Ekf, i: int, samples: Samples) -> None:
-    """New samples of the slow sensors are put into their rings."""
-    is_still = ekf.rows[i].stillness.is_still == 1
-    vel_ned = ekf.rows[i].nominal.vel_ned
-    climb = wp.vec3(0.0, 0.0, vel_ned[2])
-    omega_frd = samples.imu.gyro_frd - ekf.rows[i].nominal.gyro_bias_frd
-    if samples.gnss.time_us != ekf.rows[i].gnss_inbox.arrived_time_us:
-        head = ekf.rows[i].gnss_inbox.head
-        is_same_fix = head > 0 and gnss_repeats(samples.gnss, ekf.gnss_ring[i, (head - 1) % GNSS_RING])
-        ekf.gnss_ring[i, head % GNSS_RING] = samples.gnss
-        ekf.rows[i].gnss_inbox = receive(
-            ekf.rows[i].gnss_inbox,
-            samples.gnss.time_us,
-            GNSS_RING,
-            is_same_fix,
-            is_still,
-            vel_ned,
-            GNSS_STUCK_AFTER,
-            GNSS_STUCK_MOVED,
-        )
-    if samples.baro.time_us != ekf.rows[i].baro_inbox.arrived_time_us:
-        head = ekf.rows[i].baro_inbox.head
-        is_same_pressure = head > 0 and baro_repeats(samples.baro, ekf.baro_ring[i, (head - 1) % BARO_RING])
-        ekf.baro_ring[i, head % BARO_RING] = samples.baro
-        ekf.rows[i].baro_inbox = receive(
-            ekf.rows[i].baro_inbox,
-            samples.baro.time_us,
-            BARO_RING,
-            is_same_pressure,
-            is_still,
-            climb,
-            BARO_STUCK_AFTER,
-            BARO_STUCK_MOVED,
-        )
-    if samples.mag.time_us != ekf.rows[i].mag_inbox.arrived_time_us:
-        head = ekf.rows[i].mag_inbox.head
-        is_same_field = head > 0 and mag_repeats(samples.mag, ekf.mag_ring[i, (head - 1) % MAG_RING])
-        ekf.mag_ring[i, head % MAG_RING] = samples.mag
-        ekf.rows[i].mag_inbox = receive(
-            ekf.rows[i].mag_inbox,
-            samples.mag.time_us,
-            MAG_RING,
-            is_same_field,
-            is_still,
-            omega_frd,
-            MAG_STUCK_AFTER,
-            MAG_STUCK_MOVED,
-        )
-    if samples.range.time_us != ekf.rows[i].range_inbox.arrived_time_us:
-        head = ekf.rows[i].range_inbox.head
-        is_same_range = head > 0 and range_repeats(samples.range, ekf.range_ring[i, (head - 1) % RANGE_RING])
-        ekf.range_ring[i, head % RANGE_RING] = samples.range
-        ekf.rows[i].range_inbox = receive(
-            ekf.rows[i].range_inbox,
-            samples.range.time_us,
-            RANGE_RING,
-            is_same_range,
-            is_still,
-            climb,
-            RANGE_STUCK_AFTER,
-            RANGE_STUCK_MOVED,
-        )
 
 
 @wp.func
@@ -220,17 +130,7 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
     resets_before = ekf.rows[i].nominal.reset_count
     predict(ekf, i, lenient, imu)
     sum_imu(ekf, i, imu)
-    if is_waiting(ekf.rows[i].gnss_inbox):
-        take_heading(ekf, i, lenient, now_us)
-        take_gnss(ekf, i, lenient, now_us)
-    if is_waiting(ekf.rows[i].baro_inbox):
-        take_baro(ekf, i, lenient, now_us)
-    if ekf.rows[i].imu_tail % COMPARE_SAMPLES == 0:
-        compare_heights(ekf, i, lenient)
-    if is_waiting(ekf.rows[i].mag_inbox):
-        take_mag(ekf, i, lenient, now_us, imu.gyro_frd)
-    if is_waiting(ekf.rows[i].range_inbox):
-        take_range(ekf, i, lenient, now_us)
+    take_samples(ekf, i, lenient, now_us, imu.gyro_frd)
     if is_waiting(ekf.rows[i].external_inbox):
         take_external(ekf, i, lenient, now_us)
     if params.drag_ctrl > 0 and drag_is_due(ekf.rows[i].drag_sum):
@@ -251,12 +151,7 @@ def horizon_step(ekf: Ekf, i: int, params: EstimatorParams) -> None:
 def watch(ekf: Ekf, i: int, params: EstimatorParams) -> None:
     """Switches silent and frozen sources off, renews flags and deviations, and mends a broken covariance."""
     now_us = ekf.rows[i].horizon_time_us
-    ekf.rows[i].gnss_pos = listen(ekf.rows[i].gnss_pos, ekf.rows[i].gnss_inbox, now_us)
-    ekf.rows[i].gnss_vel = listen(ekf.rows[i].gnss_vel, ekf.rows[i].gnss_inbox, now_us)
-    ekf.rows[i].gnss_height = listen(ekf.rows[i].gnss_height, ekf.rows[i].gnss_inbox, now_us)
-    ekf.rows[i].baro = listen(ekf.rows[i].baro, ekf.rows[i].baro_inbox, now_us)
-    ekf.rows[i].mag = listen(ekf.rows[i].mag, ekf.rows[i].mag_inbox, now_us)
-    ekf.rows[i].range = listen(ekf.rows[i].range, ekf.rows[i].range_inbox, now_us)
+    listen_sensors(ekf, i, now_us)
     if ekf.rows[i].external_inbox.head > 0:
         listen_external(ekf, i, now_us)
     is_lost = not (wp.isfinite(ekf.rows[i].nominal.pos_ned) and wp.isfinite(ekf.rows[i].nominal.vel_ned))
@@ -295,10 +190,7 @@ def align(ekf: Ekf, i: int, params: EstimatorParams, imu: ImuSample, samples: Sa
     ekf.rows[i].output = output
     for k in range(IMU_RING):
         ekf.output_ring[i, k] = output_sample(output)
-    ekf.rows[i].gnss_inbox.tail = ekf.rows[i].gnss_inbox.head
-    ekf.rows[i].baro_inbox.tail = ekf.rows[i].baro_inbox.head
-    ekf.rows[i].mag_inbox.tail = ekf.rows[i].mag_inbox.head
-    ekf.rows[i].range_inbox.tail = ekf.rows[i].range_inbox.head
+    drop_waiting(ekf, i)
     ekf.rows[i].external_inbox.tail = ekf.rows[i].external_inbox.head
 
 
@@ -390,10 +282,9 @@ def make_ekf(vehicle_count: int, device: str = "cpu", params: Any = None) -> Ekf
     ekf.covariance = wp.zeros((vehicle_count, COV_ROWS), dtype=vec24, device=device)
     ekf.imu_ring = wp.zeros((vehicle_count, IMU_RING), dtype=ImuSample, device=device)
     ekf.output_ring = wp.zeros((vehicle_count, IMU_RING), dtype=OutputSample, device=device)
-    ekf.gnss_ring = wp.zeros((vehicle_count, GNSS_RING), dtype=GnssSample, device=device)
-    ekf.baro_ring = wp.zeros((vehicle_count, BARO_RING), dtype=BaroSample, device=device)
-    ekf.mag_ring = wp.zeros((vehicle_count, MAG_RING), dtype=MagSample, device=device)
-    ekf.range_ring = wp.zeros((vehicle_count, RANGE_RING), dtype=RangeSample, device=device)
+    for sensor in FUSED_SENSORS:
+        ring = wp.zeros((vehicle_count, sensor.ring_size), dtype=sensor.Sample, device=device)
+        setattr(ekf, f"{sensor.name}_ring", ring)
     ekf.external = wp.zeros(vehicle_count, dtype=ExternalSample, device=device)
     ekf.external_ring = wp.zeros((vehicle_count, EXTERNAL_RING), dtype=ExternalSample, device=device)
     wp.launch(reset_rows, dim=vehicle_count, inputs=[ekf], device=device)

@@ -7,7 +7,7 @@ the reference is moved if GNSS height agrees with the estimate, and the height i
 
 import warp as wp
 
-from autopilot.estimator.delay import MAX_AGE_S
+from autopilot.estimator.delay import MAX_AGE_S, receive
 from autopilot.estimator.fuse import (
     fuse,
     judge,
@@ -21,7 +21,8 @@ from autopilot.estimator.fuse import (
 )
 from autopilot.estimator.health import is_healthy
 from autopilot.estimator.params import HEIGHT_REF_GNSS, EstimatorParams
-from autopilot.estimator.state import BARO_RING, POS, SLOW_BARO, SLOW_COUNT, SLOW_COV, Aid, Ekf, Nominal
+from autopilot.estimator.sensor_spec import AidSpec, SampleTopic, SensorSpec
+from autopilot.estimator.state import BARO_RING, POS, SLOW_BARO, SLOW_COUNT, SLOW_COV, Aid, Ekf, Inbox, Nominal
 from autopilot.ports import BaroSample
 from common.kernels import vec24
 
@@ -46,6 +47,27 @@ def baro_height(pressure_pa: float) -> float:
 def baro_repeats(sample: BaroSample, previous: BaroSample) -> bool:
     """Both samples hold the same pressure."""
     return sample.pressure_pa == previous.pressure_pa
+
+
+@wp.func
+def baro_time(inbox: Inbox, sample: BaroSample) -> wp.int64:
+    """The time of the sample; that of the one before if it is no number."""
+    if wp.isfinite(sample.pressure_pa):
+        return sample.time_us
+    return inbox.arrived_time_us
+
+
+@wp.func
+def receive_baro(ekf: Ekf, i: int, sample: BaroSample, is_still: bool, vel_ned: wp.vec3) -> None:
+    """Puts a new sample into the ring."""
+    inbox = ekf.rows[i].baro_inbox
+    if sample.time_us != inbox.arrived_time_us:
+        is_repeat = inbox.head > 0 and baro_repeats(sample, ekf.baro_ring[i, (inbox.head - 1) % BARO_RING])
+        ekf.baro_ring[i, inbox.head % BARO_RING] = sample
+        rate = wp.vec3(0.0, 0.0, vel_ned[2])
+        ekf.rows[i].baro_inbox = receive(
+            inbox, sample.time_us, BARO_RING, is_repeat, is_still, rate, BARO_STUCK_AFTER, BARO_STUCK_MOVED
+        )
 
 
 @wp.func
@@ -138,3 +160,26 @@ def take_baro(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
     ekf.rows[i].nominal = nominal
     ekf.rows[i].baro = aid
     ekf.rows[i].origin_baro_height = origin_height
+
+
+BARO = SensorSpec(
+    name="baro",
+    label="barometer",
+    Sample=BaroSample,
+    ring_size=BARO_RING,
+    aids=(AidSpec("baro", 1, "m", {"baro_vpos": slice(0, 1)}),),
+    topic=SampleTopic(
+        "sensor_baro",
+        {"timestamp_sample": "uint64_t", "pressure": "float", "temperature": "float"},
+        lambda rows: {
+            "timestamp_sample": rows["time_us"],
+            "pressure": rows["pressure_pa"],
+            "temperature": rows["temperature_c"],
+        },
+    ),
+    is_needed_to_arm=True,
+    status_bit=1 << 3,
+    failure_unit=3,
+    bias_unit="Pa",
+    wrong_bias=-600.0,  # 50 m too high
+)

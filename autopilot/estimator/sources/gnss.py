@@ -12,7 +12,7 @@ nothing: two frames that differ would set the state in turn.
 
 import warp as wp
 
-from autopilot.estimator.delay import MAX_AGE_S
+from autopilot.estimator.delay import MAX_AGE_S, receive
 from autopilot.estimator.fuse import (
     fuse,
     fuse_state,
@@ -29,7 +29,21 @@ from autopilot.estimator.fuse import (
 )
 from autopilot.estimator.health import climb_innov_lpf, doubt_accel
 from autopilot.estimator.params import GPS_CTRL_HEIGHT, GPS_CTRL_POS, GPS_CTRL_VEL, EstimatorParams
-from autopilot.estimator.state import ATT, BODY, GNSS_RING, POS, SLOW, SLOW_COUNT, SLOW_COV, VEL, Aid, Ekf, Nominal
+from autopilot.estimator.sensor_spec import AidSpec, SensorSpec
+from autopilot.estimator.state import (
+    ATT,
+    BODY,
+    GNSS_RING,
+    POS,
+    SLOW,
+    SLOW_COUNT,
+    SLOW_COV,
+    VEL,
+    Aid,
+    Ekf,
+    Inbox,
+    Nominal,
+)
 from autopilot.ports import GnssSample
 from common.kernels import vec24
 
@@ -70,6 +84,27 @@ def gnss_vel_is_good(params: EstimatorParams, sample: GnssSample) -> bool:
 def gnss_repeats(sample: GnssSample, previous: GnssSample) -> bool:
     """Both samples hold the same solution."""
     return sample.pos_ned == previous.pos_ned and sample.vel_ned == previous.vel_ned
+
+
+@wp.func
+def gnss_time(inbox: Inbox, sample: GnssSample) -> wp.int64:
+    """The time of the sample; that of the one before if it is no number."""
+    if wp.isfinite(sample.pos_ned) and wp.isfinite(sample.vel_ned):
+        return sample.time_us
+    return inbox.arrived_time_us
+
+
+@wp.func
+def receive_gnss(ekf: Ekf, i: int, sample: GnssSample, is_still: bool, vel_ned: wp.vec3) -> None:
+    """Puts a new sample into the ring."""
+    inbox = ekf.rows[i].gnss_inbox
+    if sample.time_us != inbox.arrived_time_us:
+        is_repeat = inbox.head > 0 and gnss_repeats(sample, ekf.gnss_ring[i, (inbox.head - 1) % GNSS_RING])
+        ekf.gnss_ring[i, inbox.head % GNSS_RING] = sample
+        rate = vel_ned
+        ekf.rows[i].gnss_inbox = receive(
+            inbox, sample.time_us, GNSS_RING, is_repeat, is_still, rate, GNSS_STUCK_AFTER, GNSS_STUCK_MOVED
+        )
 
 
 @wp.func
@@ -279,3 +314,20 @@ def take_gnss(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> No
     )
     ekf.rows[i].gnss_height = height_aid
     ekf.rows[i].nominal = nominal
+
+
+GNSS = SensorSpec(
+    name="gnss",
+    label="GNSS",
+    Sample=GnssSample,
+    ring_size=GNSS_RING,
+    aids=(
+        AidSpec("gnss_pos", 2, "m", {"gps_hpos": slice(0, 2)}),
+        AidSpec("gnss_vel", 3, "m/s", {"gps_hvel": slice(0, 2), "gps_vvel": slice(2, 3)}),
+        AidSpec("gnss_height", 1, "m", {"gps_vpos": slice(0, 1)}),
+    ),
+    status_bit=1 << 5,
+    failure_unit=4,
+    bias_unit="m",
+    wrong_bias=100.0,
+)

@@ -11,11 +11,12 @@ reset (`heading.py`) is used again once it has agreed for a while.
 
 import warp as wp
 
-from autopilot.estimator.delay import MAX_AGE_S
+from autopilot.estimator.delay import MAX_AGE_S, receive
 from autopilot.estimator.fuse import fuse, judge, mark_fused, mark_reset, noise_variance, seconds_since, set_variance
 from autopilot.estimator.generated import mag_products
 from autopilot.estimator.params import MAG_CHECK_INCLINATION, MAG_CHECK_STRENGTH, MAG_TYPE_NONE, EstimatorParams
-from autopilot.estimator.state import ATT, BODY, EARTH, MAG_RING, Aid, Ekf, Nominal
+from autopilot.estimator.sensor_spec import AidSpec, SampleTopic, SensorSpec
+from autopilot.estimator.state import ATT, BODY, EARTH, MAG_RING, Aid, Ekf, Inbox, Nominal
 from autopilot.ports import MagSample
 from common.kernels import vec24
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
@@ -104,6 +105,27 @@ def start_field(
 def mag_repeats(sample: MagSample, previous: MagSample) -> bool:
     """Both samples hold the same field."""
     return sample.field_frd_gauss == previous.field_frd_gauss
+
+
+@wp.func
+def mag_time(inbox: Inbox, sample: MagSample) -> wp.int64:
+    """The time of the sample; that of the one before if it is no number."""
+    if wp.isfinite(sample.field_frd_gauss):
+        return sample.time_us
+    return inbox.arrived_time_us
+
+
+@wp.func
+def receive_mag(ekf: Ekf, i: int, sample: MagSample, is_still: bool, omega_frd: wp.vec3) -> None:
+    """Puts a new sample into the ring."""
+    inbox = ekf.rows[i].mag_inbox
+    if sample.time_us != inbox.arrived_time_us:
+        is_repeat = inbox.head > 0 and mag_repeats(sample, ekf.mag_ring[i, (inbox.head - 1) % MAG_RING])
+        ekf.mag_ring[i, inbox.head % MAG_RING] = sample
+        rate = omega_frd
+        ekf.rows[i].mag_inbox = receive(
+            inbox, sample.time_us, MAG_RING, is_repeat, is_still, rate, MAG_STUCK_AFTER, MAG_STUCK_MOVED
+        )
 
 
 @wp.func
@@ -212,3 +234,21 @@ def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_f
     nominal, aid = fuse_mag(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].mag, sample, omega_frd, age_s)
     ekf.rows[i].nominal = nominal
     ekf.rows[i].mag = aid
+
+
+MAG = SensorSpec(
+    name="mag",
+    label="magnetometer",
+    Sample=MagSample,
+    ring_size=MAG_RING,
+    aids=(AidSpec("mag", 3, "gauss", {"mag_field": slice(0, 3)}),),
+    topic=SampleTopic(
+        "vehicle_magnetometer",
+        {"timestamp_sample": "uint64_t", "magnetometer_ga": "float[3]"},
+        lambda rows: {"timestamp_sample": rows["time_us"], "magnetometer_ga": rows["field_frd_gauss"]},
+    ),
+    status_bit=1 << 2,
+    failure_unit=2,
+    bias_unit="gauss",
+    wrong_bias=0.3,
+)

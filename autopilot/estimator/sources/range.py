@@ -6,11 +6,12 @@ and sets it again when several samples in a row do not fit: the edge of a crown,
 
 import warp as wp
 
-from autopilot.estimator.delay import MAX_AGE_S
+from autopilot.estimator.delay import MAX_AGE_S, receive
 from autopilot.estimator.fuse import fuse_gain, judge, mark_fused, mark_reset, seconds_since, set_sum_variance
 from autopilot.estimator.generated import range_products
 from autopilot.estimator.params import EstimatorParams
-from autopilot.estimator.state import POS, RANGE_RING, TERRAIN, Aid, Ekf, Nominal
+from autopilot.estimator.sensor_spec import AidSpec, SensorSpec
+from autopilot.estimator.state import POS, RANGE_RING, TERRAIN, Aid, Ekf, Inbox, Nominal
 from autopilot.ports import RangeSample
 from common.kernels import vec24
 
@@ -27,6 +28,27 @@ _RESTART_AFTER_S = wp.constant(5.0)
 def range_repeats(sample: RangeSample, previous: RangeSample) -> bool:
     """Both samples hold the same distance; out of range, a live sensor repeats its limit."""
     return sample.is_valid == 1 and sample.distance_m == previous.distance_m
+
+
+@wp.func
+def range_time(inbox: Inbox, sample: RangeSample) -> wp.int64:
+    """The time of the sample; that of the one before if it is no number."""
+    if wp.isfinite(sample.distance_m):
+        return sample.time_us
+    return inbox.arrived_time_us
+
+
+@wp.func
+def receive_range(ekf: Ekf, i: int, sample: RangeSample, is_still: bool, vel_ned: wp.vec3) -> None:
+    """Puts a new sample into the ring."""
+    inbox = ekf.rows[i].range_inbox
+    if sample.time_us != inbox.arrived_time_us:
+        is_repeat = inbox.head > 0 and range_repeats(sample, ekf.range_ring[i, (inbox.head - 1) % RANGE_RING])
+        ekf.range_ring[i, inbox.head % RANGE_RING] = sample
+        rate = wp.vec3(0.0, 0.0, vel_ned[2])
+        ekf.rows[i].range_inbox = receive(
+            inbox, sample.time_us, RANGE_RING, is_repeat, is_still, rate, RANGE_STUCK_AFTER, RANGE_STUCK_MOVED
+        )
 
 
 @wp.func
@@ -77,3 +99,17 @@ def take_range(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> N
         nominal, aid = fuse_range(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].range, sample)
         ekf.rows[i].nominal = nominal
         ekf.rows[i].range = aid
+
+
+RANGE = SensorSpec(
+    name="range",
+    label="range finder",
+    Sample=RangeSample,
+    ring_size=RANGE_RING,
+    aids=(AidSpec("range", 1, "m", {"rng_vpos": slice(0, 1)}),),
+    status_bit=1 << 8,
+    is_optional=True,
+    failure_unit=7,
+    bias_unit="m",
+    wrong_bias=5.0,
+)
