@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from autopilot.estimator.sensors import FUSED_SENSORS
 from common.kernels import vec8
 
 wp.set_module_options({"enable_backward": False})
@@ -39,10 +40,7 @@ FAULT_MODES: dict[str, int] = {"none": 0, "off": 1, "stuck": 2, "biased": 3, "no
 BIAS_UNITS: dict[str, str] = {
     "gyro": "rad/s",
     "accel": "m/s²",
-    "gnss": "m",
-    "baro": "Pa",
-    "mag": "gauss",
-    "range": "m",
+    **{sensor.name: sensor.bias_unit for sensor in FUSED_SENSORS},
     "battery": "V",
 }
 """Sensors that can fail, with the unit in which a bias is given."""

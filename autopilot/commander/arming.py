@@ -7,6 +7,7 @@ from collections.abc import Callable
 from math import hypot, radians
 
 from autopilot.estimator.params import MAG_TYPE_NONE
+from autopilot.estimator.sensors import FUSED_SENSORS
 from autopilot.interface.vehicle_state import VehicleState
 from autopilot.ports import (
     EXTERNAL_POSITION,
@@ -20,6 +21,7 @@ from autopilot.ports import (
 )
 from common.params import ParameterTable
 
+_NEEDED_SENSORS = tuple(sensor for sensor in FUSED_SENSORS if sensor.is_needed_to_arm)
 _STALE_US = 1_000_000  # a sensor that has been silent for longer is off
 _GNSS_STALE_US = 2_000_000
 _STILL_RAD_S = 0.2  # faster than hands, wind or noise turn a vehicle that stands; guess
@@ -53,8 +55,11 @@ def _imu(state: VehicleState, _: ParameterTable) -> str:
     return "IMU: no data" if _is_stale(state, state.samples.imu.time_us, _STALE_US) else ""
 
 
-def _barometer(state: VehicleState, _: ParameterTable) -> str:
-    return "barometer: no data" if _is_stale(state, state.samples.baro.time_us, _STALE_US) else ""
+def _fused_sensors(state: VehicleState, _: ParameterTable) -> str:
+    for sensor in _NEEDED_SENSORS:
+        if _is_stale(state, getattr(state.samples, sensor.name).time_us, _STALE_US):
+            return f"{sensor.label}: no data"
+    return ""
 
 
 def _magnetometer(state: VehicleState, params: ParameterTable) -> str:
@@ -148,6 +153,7 @@ def _is_stale(state: VehicleState, sample_us: int, limit_us: int) -> bool:
 
 _Check = Callable[[VehicleState, ParameterTable], str]
 _ALWAYS: tuple[_Check, ...] = (
-    _calibration, _imu, _barometer, _magnetometer, _alignment, _heading, _height, _upright, _still, _biases, _battery,
+    _calibration, _imu, _fused_sensors, _magnetometer, _alignment, _heading, _height, _upright, _still, _biases,
+    _battery,
 )  # fmt: skip
 _POSITION: tuple[_Check, ...] = (_gnss, _position)

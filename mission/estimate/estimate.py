@@ -39,7 +39,8 @@ from mission.estimate.sensor_csv import HEADER, is_sensor_csv, read_csv
 from mission.estimate.sensor_log import Recording, SensorLog, SensorLogError, prepare
 from mission.estimate.sensor_ulog import MAGIC, read_ulog
 from mission.log.euler_angles import euler_rad
-from mission.log.log_topics import TOPICS, Batch
+from mission.log.log_topics import TOPICS
+from mission.log.topic import Batch
 
 LOGGED = (
     "vehicle_attitude vehicle_angular_velocity vehicle_local_position vehicle_global_position wind "

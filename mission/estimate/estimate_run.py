@@ -13,6 +13,7 @@ import warp as wp
 from autopilot.advance import estimate_samples
 from autopilot.estimator.ekf import make_ekf, reset_rows
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS, estimator_params
+from autopilot.estimator.sensors import FUSED_SENSORS
 from autopilot.estimator.state import PHASE_RUNNING, EstimatorState
 from autopilot.ports import Estimate, Samples
 from common.geomagnetic import field_ned_gauss
@@ -22,12 +23,10 @@ from mission.estimate.sensor_log import Recording, Rows, SensorLog, row_dtype
 
 CHUNK_TICKS = 1000
 OUTPUT_PERIOD_US = 20_000
-SENSORS = ("gnss", "baro", "mag", "range")
-SOURCES = {"gnss_pos": 2, "gnss_vel": 3, "gnss_height": 1, "baro": 1, "mag": 3, "range": 1, "drag": 2, "rest": 3}
-UNITS = {
-    "gnss_pos": "m", "gnss_vel": "m/s", "gnss_height": "m", "baro": "m", "mag": "gauss", "range": "m", "drag": "m/s²",
-    "rest": "m/s",
-}  # fmt: skip
+SENSORS = tuple(sensor.name for sensor in FUSED_SENSORS)
+_AIDS = tuple(aid for sensor in FUSED_SENSORS for aid in sensor.aids)
+SOURCES = {**{aid.name: aid.axes for aid in _AIDS}, "drag": 2, "rest": 3}
+UNITS = {**{aid.name: aid.unit for aid in _AIDS}, "drag": "m/s²", "rest": "m/s"}
 UNHEARD = (
     "external_pos",
     "external_height",

@@ -10,7 +10,7 @@ from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID, YAW_AL
 from common.geodesy import GeoPoint
 from mission.estimate.estimate_difference import Difference, difference
 from mission.estimate.estimate_noise import FoundNoise, in_flight, median_spread
-from mission.estimate.estimate_run import SOURCES, Replay
+from mission.estimate.estimate_run import SENSORS, SOURCES, Replay
 from mission.estimate.sensor_log import SensorLog
 
 BAND_SIGMA = 1.959964  # 95 % of a normal distribution lie within
@@ -72,7 +72,7 @@ def summarise_replay(
     return EstimateSummary(
         log=log.recording.path.name,
         duration_s=log.duration_s,
-        samples={name: len(getattr(log, name)) for name in ("imu", "gnss", "baro", "mag", "range")},
+        samples={name: len(getattr(log, name)) for name in ("imu", *SENSORS)},
         origin=log.origin,
         sources={name: _source(replay, name, components, noise.get(name)) for name, components in SOURCES.items()},
         valid={name: float(np.mean((estimate["flags"] & flag) != 0)) for name, flag in flags.items()},

@@ -19,7 +19,8 @@ from autopilot.mavlink.services.identity import project_version
 from common.airframe import Airframe
 from common.params import ParameterTable
 from common.ulog import UlogTopic, UlogWriter
-from mission.log.log_topics import TOPICS, Batch, Columns, Topic
+from mission.log.log_topics import TOPICS
+from mission.log.topic import Batch, Columns, Topic
 
 DISARMED, ARMED = 1, 2  # vehicle_status.arming_state
 NO_MISSION, NOT_STARTED, COMPLETE = 1, 2, 5  # MISSION_STATE

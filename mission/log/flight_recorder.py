@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from autopilot.estimator.sensors import FUSED_SENSORS
 from autopilot.flight_controller import FlightController
 from autopilot.interface.platform import LogListener
 from autopilot.interface.vehicle_state import Severity
@@ -20,13 +21,13 @@ from common.airframe import Airframe
 from common.params import Parameter
 from mission.log.flight_log import STATUS_DTYPE, FlightLog
 from mission.log.kept_frames import FrameChoice, KeptRows
-from mission.log.log_topics import Batch
 from mission.log.replay_topic import REPLAY_TOPIC, SHOWN
+from mission.log.topic import Batch
 from sim.rig import Rig
 
 PIECE_FRAMES = 50
 FRAMES_MAX = 5 * PIECE_FRAMES  # written at once
-AIDS = {"gnss_pos": 2, "gnss_vel": 3, "gnss_height": 1, "baro": 1, "mag": 3, "range": 1}  # and their components
+AIDS = {aid.name: aid.axes for sensor in FUSED_SENSORS for aid in sensor.aids}  # and their components
 BAND_SIGMA = 1.959964  # 95 % of a normal distribution lie within
 NO_MISSION, NOT_STARTED = 1, 2  # MISSION_STATE
 

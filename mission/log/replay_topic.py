@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mission.log.log_topics import Batch, Columns, Topic
+from mission.log.topic import Batch, Columns, Topic
 from sim.world.people import Person
 
 ACTIONS = 4  # what a policy chooses: velocity ahead, right and down, and yaw rate, each in [-1, 1]

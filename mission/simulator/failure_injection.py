@@ -14,6 +14,7 @@ Nothing can be delayed.
 
 from typing import Any
 
+from autopilot.estimator.sensors import FUSED_SENSORS
 from autopilot.interface.failure_requests import Failure, Unit
 from autopilot.interface.vehicle_state import ACCEPTED, Reply, Verdict
 from common.airframe import Airframe
@@ -24,19 +25,13 @@ from sim.rig import Rig
 SENSORS = {
     Unit.GYRO: "gyro",
     Unit.ACCELEROMETER: "accel",
-    Unit.MAGNETOMETER: "mag",
-    Unit.BAROMETER: "baro",
-    Unit.GNSS: "gnss",
-    Unit.DISTANCE_SENSOR: "range",
+    **{Unit(sensor.failure_unit): sensor.name for sensor in FUSED_SENSORS if sensor.failure_unit is not None},
     Unit.BATTERY: "battery",
 }
 WRONG = {
     "gyro": 0.3,  # rad/s
     "accel": 2.0,  # m/s²
-    "mag": 0.3,  # gauss
-    "baro": -600.0,  # Pa: 50 m too high
-    "gnss": 100.0,  # m north, east and down
-    "range": 5.0,  # m
+    **{sensor.name: sensor.wrong_bias for sensor in FUSED_SENSORS},
     "battery": -1.5,  # V
 }
 """By how much a wrong sensor is wrong, on each axis; guesses: far beyond any gate."""

@@ -5,6 +5,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.estimator.sensors import FUSED_SENSORS
 from autopilot.interface.platform import Host
 from autopilot.interface.vehicle_state import FenceLimit, LandedState, Mode, VehicleState
 from autopilot.mavlink.dialects import Dialect
@@ -53,9 +54,7 @@ _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 _GYRO_ACCEL = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
 _MAG = mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
-_BARO = mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
 _GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
-_RANGE = mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION
 _VISION = mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION  # present once a client's position was used
 _BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
 _AHRS = mavlink.MAV_SYS_STATUS_AHRS
@@ -70,7 +69,9 @@ _RC = mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER  # present once sticks were hear
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 # Always present, enabled while a fence is watched: without it MAVProxy announces a breach of a fence nobody has set.
 _GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
-_ALWAYS = _GYRO_ACCEL | _MAG | _BARO | _GPS | _BATTERY | _AHRS | _ATTITUDE_CONTROL | _POSITION_CONTROL | _PREARM
+_FUSED = sum(sensor.status_bit for sensor in FUSED_SENSORS if not sensor.is_optional)
+_OPTIONAL_SENSORS = tuple(sensor for sensor in FUSED_SENSORS if sensor.is_optional)
+_ALWAYS = _GYRO_ACCEL | _FUSED | _BATTERY | _AHRS | _ATTITUDE_CONTROL | _POSITION_CONTROL | _PREARM
 
 _BREACH_KINDS = {
     FenceLimit.SHAPES: mavlink.FENCE_BREACH_BOUNDARY,
@@ -111,7 +112,10 @@ def system_status(state: VehicleState, dialect: Dialect) -> int:
 
 def sys_status(state: VehicleState) -> bytes:
     """Which sensors work, whether it may be armed, battery, load."""
-    present = _ALWAYS | (_RANGE if state.samples.range.time_us else 0) | (_RC if state.sticks.heard_until_us else 0)
+    present = _ALWAYS | (_RC if state.sticks.heard_until_us else 0)
+    for sensor in _OPTIONAL_SENSORS:
+        if getattr(state.samples, sensor.name).time_us:
+            present |= sensor.status_bit
     if state.health and state.health.external_pos.fused_time_us:
         present |= _VISION
     fence = state.fence
@@ -133,16 +137,13 @@ def healthy_sensors(state: VehicleState) -> int:
     bits = 0
     if now_us - samples.imu.time_us < FRESH_IMU_US:
         bits |= _GYRO_ACCEL
-    is_mag_wrong = flags & (MAG_DISTURBED | MAG_FAULTY)
-    if not is_mag_wrong and _works(samples.mag, health and health.mag_inbox, now_us):
-        bits |= _MAG
-    if _works(samples.baro, health and health.baro_inbox, now_us):
-        bits |= _BARO
-    if _works(samples.range, health and health.range_inbox, now_us):
-        bits |= _RANGE
-    has_fix = samples.gnss.fix_type >= FIX_3D and _works(samples.gnss, health and health.gnss_inbox, now_us)
-    if has_fix and flags & POSITION_VALID:
-        bits |= _GPS
+    for sensor in FUSED_SENSORS:
+        if _works(getattr(samples, sensor.name), health and getattr(health, f"{sensor.name}_inbox"), now_us):
+            bits |= sensor.status_bit
+    if flags & (MAG_DISTURBED | MAG_FAULTY):
+        bits &= ~_MAG
+    if samples.gnss.fix_type < FIX_3D or not flags & POSITION_VALID:
+        bits &= ~_GPS
     if flags & EXTERNAL_POSITION:
         bits |= _VISION
     if samples.battery.time_us and now_us - samples.battery.time_us < FRESH_US:

@@ -10,7 +10,8 @@ from autopilot.interface.item_lists import MissionItem
 from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from common.geodesy import DEFAULT_HOME, geodetic_from_ned
 from mission.flight import Flight, FlightConfig
-from mission.log.log_topics import TOPICS, wxyz
+from mission.log.euler_angles import wxyz
+from mission.log.log_topics import TOPICS
 from sim.faults import set_fault
 from sim.world.world import WorldConfig
 

@@ -1,0 +1,109 @@
+"""Topics of the sensors: a row for each frame in which a new sample had arrived."""
+
+from functools import partial
+
+import numpy as np
+
+from autopilot.estimator.sensor_spec import SensorSpec
+from autopilot.estimator.sensors import FUSED_SENSORS
+from mission.log.topic import Batch, Columns, Topic, axes, fresh, geodetic, is_fresh
+from sim.sensors.range import MAX_DISTANCE_M, MIN_DISTANCE_M
+
+FIX_3D = 3  # fix_type
+LASER = 0  # distance_sensor.type
+FACING_DOWN = 25  # distance_sensor.orientation
+
+
+def _gps(batch: Batch) -> Columns:
+    gnss = fresh(batch, "gnss")
+    points = geodetic(gnss["pos_ned"], batch.origin)
+    velocity = gnss["vel_ned"]
+    return {
+        "timestamp": batch.time_us[is_fresh(batch, "gnss")],  # arrival
+        "timestamp_sample": gnss["time_us"],
+        "latitude_deg": points[:, 0],
+        "longitude_deg": points[:, 1],
+        "altitude_msl_m": points[:, 2],
+        "fix_type": gnss["fix_type"],
+        "satellites_used": gnss["satellites"],
+        "eph": gnss["pos_h_std"],
+        "epv": gnss["pos_v_std"],
+        "s_variance_m_s": gnss["vel_std"],
+        "vel_m_s": np.hypot(velocity[:, 0], velocity[:, 1]),
+        **axes("vel_n_m_s vel_e_m_s vel_d_m_s", velocity),
+        "cog_rad": np.arctan2(velocity[:, 1], velocity[:, 0]),
+        "vel_ned_valid": gnss["fix_type"] >= FIX_3D,
+    }
+
+
+def _range(batch: Batch) -> Columns:
+    ranges = fresh(batch, "range")
+    return {
+        "timestamp": ranges["time_us"],
+        "min_distance": MIN_DISTANCE_M,
+        "max_distance": MAX_DISTANCE_M,
+        "current_distance": ranges["distance_m"],
+        "signal_quality": np.where(ranges["is_valid"] != 0, 100, 0),
+        "type": LASER,
+        "orientation": FACING_DOWN,
+    }
+
+
+def _battery(batch: Batch) -> Columns:
+    is_new = is_fresh(batch, "battery")
+    battery = batch.samples["battery"][is_new]
+    return {
+        "timestamp": battery["time_us"],
+        "voltage_v": battery["voltage_v"],
+        "current_a": battery["current_a"],
+        "discharged_mah": batch.vehicle["battery_used_mah"][is_new],
+        "remaining": batch.vehicle["battery_remaining"][is_new],
+    }
+
+
+def _sampled(batch: Batch, sensor: SensorSpec) -> Columns:
+    rows = fresh(batch, sensor.name)
+    columns = {} if sensor.topic is None else sensor.topic.columns(rows)
+    return {"timestamp": rows["time_us"], **columns}
+
+
+_OWN_TOPICS = {
+    "gnss": Topic(
+        "vehicle_gps_position",
+        {
+            "timestamp_sample": "uint64_t",
+            **dict.fromkeys("latitude_deg longitude_deg altitude_msl_m".split(), "double"),
+            **dict.fromkeys("s_variance_m_s eph epv vel_m_s vel_n_m_s vel_e_m_s vel_d_m_s cog_rad".split(), "float"),
+            **dict.fromkeys("fix_type satellites_used".split(), "uint8_t"),
+            "vel_ned_valid": "bool",
+        },
+        _gps,
+        partial(is_fresh, sensor="gnss"),
+    ),
+    "range": Topic(
+        "distance_sensor",
+        {
+            **dict.fromkeys("min_distance max_distance current_distance".split(), "float"),
+            "signal_quality": "int8_t",
+            **dict.fromkeys("type orientation".split(), "uint8_t"),
+        },
+        _range,
+        partial(is_fresh, sensor="range"),
+    ),
+}
+_BATTERY = Topic(
+    "battery_status",
+    dict.fromkeys("voltage_v current_a discharged_mah remaining".split(), "float"),
+    _battery,
+    partial(is_fresh, sensor="battery"),
+)
+
+
+def _topic(sensor: SensorSpec) -> Topic:
+    if sensor.topic is None:
+        return _OWN_TOPICS[sensor.name]
+    is_new = partial(is_fresh, sensor=sensor.name)
+    return Topic(sensor.topic.name, dict(sensor.topic.fields), partial(_sampled, sensor=sensor), is_new)
+
+
+SENSOR_TOPICS = (*(_topic(sensor) for sensor in FUSED_SENSORS), _BATTERY)
