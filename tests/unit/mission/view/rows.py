@@ -8,7 +8,7 @@ from autopilot.interface.vehicle_state import Mode
 from common.ulog import UlogWriter
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
-from mission.log.topic import TRUE_LOCAL_POSITION_FIELDS
+from mission.log.motion_topics import TRUE_LOCAL_POSITION_FIELDS
 from mission.log.replay_topic import REPLAY_TOPIC
 from mission.view.flight_snapshot import MOMENT
 from mission.view.replay_file import ATTITUDE, CONFIG_KEY, PATH_KEY, PLACE, Recording
