@@ -16,7 +16,7 @@ from autopilot.mavlink.services.mission_protocol import item_from_fields, scaled
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode, frame_bytes, known_type, message_type
 from autopilot.mavlink.wire.convert import degrees_e7, degrees_from_e7, quat_from_wxyz, wxyz_from_quat
 from tests.unit.autopilot.mavlink.rig import Rig
-from tests.unit.autopilot.mavlink.services.files.test_ftp import FtpClient
+from tests.unit.autopilot.mavlink.services.files.ftp_rig import FtpClient
 
 HEARD = (
     "HEARTBEAT", "PING", "TIMESYNC", "REQUEST_DATA_STREAM", "COMMAND_LONG", "COMMAND_INT", "SET_MODE",

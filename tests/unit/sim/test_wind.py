@@ -47,11 +47,20 @@ def test_turbulence_intensity_and_scale_follow_the_specification():
     assert turbulence_scales(0.0)[0] == turbulence_scales(10.0 * FEET_M)[0]
 
 
-def test_turbulence_has_the_variance_of_dryden_from_the_start_on():
-    height_m = 20.0
-    std_w = 0.1 * 8.0
-    expected = np.array([std_w * turbulence_scales(height_m)[0]] * 2 + [std_w])
-    wind = air_at(height_m, wind_model(8.0, 180.0, turbulence=1.0), 1500, vehicles=4096) - [8.0, 0.0, 0.0]
+HEIGHT_M, SPEED_M_S = 10.0, 12.0
+
+
+@pytest.fixture(scope="module")
+def turbulence():
+    """Six seconds of it without the steady wind, at 4,096 vehicles."""
+    wind = wind_model(SPEED_M_S, 180.0, turbulence=1.0)
+    return air_at(HEIGHT_M, wind, 1500, vehicles=4096) - [SPEED_M_S, 0.0, 0.0]
+
+
+def test_turbulence_has_the_variance_of_dryden_from_the_start_on(turbulence):
+    std_w = 0.1 * SPEED_M_S
+    expected = np.array([std_w * turbulence_scales(HEIGHT_M)[0]] * 2 + [std_w])
+    wind = turbulence
     for k in (1, 750, 1499):  # the body tells its height from the first tick on
         np.testing.assert_allclose(wind[k].std(axis=0), expected, rtol=0.05)  # 4 sigma of 4,096 draws
         assert (np.abs(wind[k].mean(axis=0)) < 4 * expected / 64).all()
@@ -60,15 +69,14 @@ def test_turbulence_has_the_variance_of_dryden_from_the_start_on():
     np.testing.assert_allclose(fourth_moment.mean(axis=0), 3.0, rtol=0.15)  # normal though the noise is uniform
 
 
-def test_turbulence_decorrelates_as_dryden_says():
+def test_turbulence_decorrelates_as_dryden_says(turbulence):
     """Autocorrelations of the two shaping filters: exp(-s) and exp(-s) (1 - s / 2), s = V t / L."""
-    height_m, speed = 10.0, 12.0
-    wind = air_at(height_m, wind_model(speed, 180.0, turbulence=1.0), 1500, vehicles=4096) - [speed, 0.0, 0.0]
-    length_w = height_m
-    length_uv = length_w * turbulence_scales(height_m)[1]
+    wind = turbulence
+    length_w = HEIGHT_M
+    length_uv = length_w * turbulence_scales(HEIGHT_M)[1]
     for lag in (250, 700, 1499):
         got = (wind[0] * wind[lag]).mean(axis=0) / (wind[0].std(axis=0) * wind[lag].std(axis=0))
-        s_uv, s_w = speed * lag * TICK_S / length_uv, speed * lag * TICK_S / length_w
+        s_uv, s_w = SPEED_M_S * lag * TICK_S / length_uv, SPEED_M_S * lag * TICK_S / length_w
         want = [np.exp(-s_uv), np.exp(-s_uv) * (1 - s_uv / 2), np.exp(-s_w) * (1 - s_w / 2)]
         np.testing.assert_allclose(got, want, atol=4 / 64)
 

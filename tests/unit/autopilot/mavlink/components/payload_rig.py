@@ -101,3 +101,14 @@ class PayloadRig(Rig):
             for message in self.frame(1)
             if message.name == "COMMAND_ACK" and message.fields.command == command
         ]
+
+
+def from_camera(messages, name):
+    """The fields of the camera's messages of this name."""
+    return [message.fields for message in messages if message.name == name and message.compid == CAMERA]
+
+
+def requested(rig, command, *params):
+    """What comes in the frame after a command to the camera."""
+    rig.to(CAMERA, command, *params)
+    return rig.frame()

@@ -221,7 +221,7 @@ def test_it_learns_to_push_the_ball_to_the_cube(seed):
         num_epoch=2,
         width=64,
     )
-    while ppo.steps < 400_000:
+    while ppo.steps < 200_000:
         ppo.iterate()
     assert success_rate(ppo) > 0.98
 

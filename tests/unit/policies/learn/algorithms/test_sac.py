@@ -66,7 +66,7 @@ def mean_reward(task, policy, rounds=20):
 def test_it_learns_choices_points_and_both_together(branches, is_pointing):
     task = Signs(16, branches, is_pointing)
     sac = learner(task, steps_per_update=6, gamma=0.0)
-    while sac.steps < 4000:
+    while sac.steps < 3000:
         sac.iterate()
     assert mean_reward(task, sac.policy) > 0.5 * len(branches) - 0.06
 

@@ -71,7 +71,7 @@ IMAGE = ImageElement(40, 36, ("red", "green", "blue", "nearness"))  # of differe
 def test_exported_network_sees_images_as_the_policy_does(encoder, network):
     policy = make_policy("hybrid", network, vis_encode_type=encoder, image=IMAGE)
     content = onnx_bytes(policy)
-    assert largest_difference(policy, content) <= IMAGE_TOLERANCE
+    assert largest_difference(policy, content, row_count=16) <= IMAGE_TOLERANCE  # of eight decisions each
     inputs = {node.name: node.shape for node in onnxruntime.InferenceSession(content).get_inputs()}
     assert inputs["obs_0"] == ["batch", 4, 40, 36]
     assert inputs["obs_1"] == ["batch", 10]

@@ -12,7 +12,7 @@ from autopilot.mavlink.services.files.ftp import Opcode
 from autopilot.mavlink.services.files.ftp_files import Nak
 from common.folder import ConfinedFolder
 from tests.unit.autopilot.mavlink.rig import HOME, Rig, texts
-from tests.unit.autopilot.mavlink.services.files.test_ftp import FtpClient
+from tests.unit.autopilot.mavlink.services.files.ftp_rig import FtpClient
 
 ABOVE_HOME, TAKEOFF, WAYPOINT, JUMP, RALLY = 3, 22, 16, 177, 5100
 LOG = bytes(range(256)) * 5
