@@ -42,20 +42,28 @@ class Browser:
             text=True,
             start_new_session=True,
         )
-        self._number = 0
-        self.errors: list[str] = []
-        self.requests: list[str] = []
+        self._number, self._session = 0, ""
         try:
-            self._open(profile, width, height)
+            self._socket = connect(self._address(profile), max_size=None, ping_interval=None)
+            (target,) = (t for t in self._send("Target.getTargets")["targetInfos"] if t["type"] == "page")
+            self._show(target["targetId"], width, height)
         except BaseException:
             self._kill()
             raise
 
-    def _open(self, profile: Path, width: int, height: int) -> None:
-        self._socket = connect(self._address(profile), max_size=None, ping_interval=None)
-        (target,) = (t for t in self._send("Target.getTargets")["targetInfos"] if t["type"] == "page")
-        attached = self._send("Target.attachToTarget", targetId=target["targetId"], flatten=True)
-        self._session = attached["sessionId"]
+    def renew(self, width: int, height: int) -> None:
+        """Another empty page instead of this one: it knows nothing of what was opened before."""
+        before = self._target
+        context = self._send("Target.createBrowserContext")["browserContextId"]
+        made = self._send("Target.createTarget", url="about:blank", browserContextId=context)
+        self._show(made["targetId"], width, height)
+        self._send("Target.closeTarget", targetId=before)
+
+    def _show(self, target: str, width: int, height: int) -> None:
+        self._target = target
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        self._session = self._send("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Network"):
             self.send(f"{domain}.enable")
         self.send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
@@ -83,6 +91,8 @@ class Browser:
             self._note(answer)
 
     def _note(self, event) -> None:
+        if event.get("sessionId") != self._session:  # of the browser, or of a page before
+            return
         if event.get("method") == "Runtime.exceptionThrown":
             self.errors.append(event["params"]["exceptionDetails"]["exception"].get("description", "?"))
         if event.get("method") == "Network.requestWillBeSent":

@@ -16,11 +16,17 @@ from tests.unit.mission.view.rows import CONFIG, hovering
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: apt install chromium")
 
 
-@pytest.fixture
-def browser(tmp_path):
-    opened = Browser(tmp_path / "profile", 1000, 500)
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory):
+    opened = Browser(tmp_path_factory.mktemp("profile"))
     yield opened
     opened.close()
+
+
+@pytest.fixture
+def browser(chromium):
+    chromium.renew(1000, 500)
+    return chromium
 
 
 def recording():
@@ -86,22 +92,19 @@ def test_the_track_reaches_up_to_the_vehicle(browser, tmp_path):
     assert end == pytest.approx(place, abs=1e-3)
 
 
-def test_on_a_phone_the_scene_has_room_and_all_else_is_within_reach(tmp_path):
+def test_on_a_phone_the_scene_has_room_and_all_else_is_within_reach(chromium, tmp_path):
     page = tmp_path / "flight.html"
     write_html(recording(), flight_world(CONFIG), page, "x500")
-    phone = Browser(tmp_path / "profile", 390, 844)
-    try:
-        phone.open(page.as_uri())
-        phone.wait("typeof plots !== 'undefined' && document.getElementById('status').textContent.includes('Offboard')")
-        boxes = {
-            name: phone.evaluate(
-                f"(() => {{ const r = document.getElementById('{name}').getBoundingClientRect();"
-                " return [r.left, r.top, r.right, r.bottom]; })()"
-            )
-            for name in ("scene", "status", "onboard", "play", "time", "follow")
-        }
-    finally:
-        phone.close()
+    chromium.renew(390, 844)
+    chromium.open(page.as_uri())
+    chromium.wait("typeof plots !== 'undefined' && document.getElementById('status').textContent.includes('Offboard')")
+    boxes = {
+        name: chromium.evaluate(
+            f"(() => {{ const r = document.getElementById('{name}').getBoundingClientRect();"
+            " return [r.left, r.top, r.right, r.bottom]; })()"
+        )
+        for name in ("scene", "status", "onboard", "play", "time", "follow")
+    }
     left, top, right, bottom = boxes.pop("scene")
     assert (left, top, right) == (0, 0, 390)
     assert bottom > 350
