@@ -83,8 +83,9 @@ $(MAVSDK3)/.installed: tests/mavsdk3/requirements.txt
 	$(MAVSDK3)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/mavsdk3/requirements.txt
 	@touch $@
 
-test-mavsdk3: $(STAMP) $(MAVSDK3)/.installed ## Fly with MAVSDK 3, in an environment of its own (.venv-mavsdk3)
-	$(MAVSDK3)/bin/python -m pytest -q -p no:cacheprovider -W ignore::DeprecationWarning tests/mavsdk3 $(ARGS)
+test-mavsdk3: $(STAMP) $(MAVSDK3)/.installed ## Fly with MAVSDK 3, in .venv-mavsdk3; MAVSDK-Python's examples: EXAMPLES=FOLDER
+	$(if $(EXAMPLES),$(BIN)/python -m tests.mavsdk3.examples $(EXAMPLES) $(ARGS),\
+		$(MAVSDK3)/bin/python -m pytest -q -p no:cacheprovider -W ignore::DeprecationWarning tests/mavsdk3 $(ARGS))
 
 DRONEKIT := .venv-dronekit
 
