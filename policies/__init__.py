@@ -7,11 +7,6 @@ try:
 except ModuleNotFoundError:  # it comes with the extra `gym`; a policy flies without it
     pass
 else:
-    gymnasium.register(
-        id="honeyguide/Hover-v0",
-        entry_point="policies.tasks.hover:HoverEnv",
-        vector_entry_point="policies.tasks.hover:HoverVectorEnv",
-    )
     for _name in CATALOGUE:
         gymnasium.register(
             id=f"honeyguide/{_name}-v0",

@@ -1,8 +1,8 @@
 """How much faster than PyFlyt does the hover task step through Gymnasium, one vehicle, in the same run?
 
-A cascade by hand flies an episode of ten seconds of each environment; then the recorded actions are stepped again,
-against the clock. PyFlyt steps rigid-body physics at 240 Hz for 40 actions a second and lets its policy see the truth;
-ours steps at 1,000 Hz, with sensors and an estimator, for 50 actions a second.
+A cascade by hand (of ours the task's expert) flies an episode of ten seconds of each environment; then the recorded
+actions are stepped again, against the clock. PyFlyt steps rigid-body physics at 240 Hz for 40 actions a second and lets
+its policy see the truth; ours steps at 1,000 Hz, with sensors and an estimator, for 50 actions a second.
 """
 
 import os
@@ -17,7 +17,8 @@ import numpy as np
 
 import policies  # noqa: F401  (registers the task)
 from bench.row import Row, best_of, require
-from policies.tasks.hover import RATE_MAX, STEP_S
+from policies.experts.hover import cascade
+from policies.tasks.hover.hover import Hover
 
 Array = np.ndarray[Any, Any]
 
@@ -26,14 +27,13 @@ PEER = "PyFlyt/QuadX-Hover"
 PEER_STEP_S = 1.0 / 40.0
 PEER_POINT = np.array([0.0, 0.0, 1.0])
 GRAVITY = 9.81
-OUR_THRUST = 0.47  # that carries the vehicle; found by trial
 PEER_THRUST = 0.35
 COMMAND = "python -m bench hover"
 
 
 def measure() -> list[Row]:
     ours = gymnasium.make("honeyguide/Hover-v0")
-    rate = _rate(ours, our_action, STEP_S, lambda observation: float(np.linalg.norm(observation[:3])))
+    rate = _rate(ours, cascade, Hover.decision_s, lambda observation: float(np.linalg.norm(observation[:3])))
     reset_ms = 1e3 * best_of(20, lambda: _seconds(ours.reset))
     with _quiet():
         peer_rate = _rate(
@@ -51,16 +51,8 @@ def measure() -> list[Row]:
     ]
 
 
-def our_action(observation: Array) -> Array:
-    """Body rates and thrust towards the point, from an observation in frd."""
-    to_go, vel, down, _, _ = np.split(observation, [3, 6, 9, 12])
-    lift = np.clip(1.5 * to_go - 2.0 * vel, -3.0, 3.0) - GRAVITY * down
-    omega, thrust = _tilt(-lift, OUR_THRUST)  # towards which body down is to turn
-    return np.append(omega / np.array(RATE_MAX), 2.0 * thrust - 1.0).astype(np.float32)
-
-
 def peer_action(observation: Array) -> Array:
-    """The same for PyFlyt, whose world is z-up; its observation: rate, quaternion xyzw, velocity (body), position."""
+    """As ours, for PyFlyt, whose world is z-up; its observation: rate, quaternion xyzw, velocity (body), position."""
     x, y, z, w = observation[3:7]
     world_from_body = np.array(
         [
@@ -71,14 +63,10 @@ def peer_action(observation: Array) -> Array:
     )
     to_go = world_from_body.T @ (PEER_POINT - observation[10:13])
     up = world_from_body.T @ np.array([0.0, 0.0, 1.0])
-    omega, thrust = _tilt(np.clip(1.5 * to_go - 2.0 * observation[7:10], -3.0, 3.0) + GRAVITY * up, PEER_THRUST)
-    return np.append(omega, np.clip(thrust, 0.0, 0.8))
-
-
-def _tilt(lift: Array, hover_thrust: float) -> tuple[Array, float]:
-    """Body rates that turn the z axis towards `lift` (6 /s), and the thrust that gives its z part."""
+    lift = np.clip(1.5 * to_go - 2.0 * observation[7:10], -3.0, 3.0) + GRAVITY * up
     omega = 6.0 * np.cross([0.0, 0.0, 1.0], lift / np.linalg.norm(lift))
-    return omega, float(lift[2]) * hover_thrust / GRAVITY
+    thrust = float(lift[2]) * PEER_THRUST / GRAVITY
+    return np.append(omega, np.clip(thrust, 0.0, 0.8))
 
 
 def _rate(env: Any, policy: Callable[[Array], Array], step_s: float, distance: Callable[[Array], float]) -> float:

@@ -28,8 +28,8 @@ training configurations set or randomise the numbers by name under `environment_
 | [Parking1](#parking1) | park a car between three blocks: [more](../explanation/parking.md) |
 | [Parking2](#parking2) | park a car on one of two storeys, past moving obstacles: [more](../explanation/parking.md) |
 | [FollowMe](#followme) | a drone follows a person through hills and trees: [more](../explanation/following.md) |
+| [Hover](#hover) | hold a drone at a point by body rates and thrust; 1 per decision at the point |
 | [Navigate](#navigate) | fly a drone through forest to a goal, at speed: [more](../explanation/navigate.md) |
-| Hover | hold a drone at a point by body rates and thrust, on its estimate; in Gymnasium only |
 
 The linked pages say what the presets are made of, how rewards are paid, and which spots are held out for tests. Every
 reward is among the numbers. In the tables of observations `#` stands for a number, an element times its scale is the
@@ -41,13 +41,13 @@ ground are Unity's: x right, y up, z forward, yaw clockwise from +z seen from ab
 |---|---|
 """
 OUTCOMES = {
-    Outcome.SUCCESS: "reached what was to be reached",
+    Outcome.SUCCESS: "reached what was to be reached, or lasted until its time was up",
     Outcome.TIMEOUT: "was cut at its limit of decisions: a truncation",
     Outcome.HIT_WALL: "ended at a wall",
     Outcome.HIT_OBSTACLE: "ended at a block, a moving obstacle, a tree or, in flight, a wall or the ground",
     Outcome.FELL: "ended under the floor",
     Outcome.HIT_OTHER: "rolled over, struck an edge, or came too near a person",
-    Outcome.LOST: "lost whom it followed, or left the forest upwards",
+    Outcome.LOST: "lost whom it followed, or left the forest upwards or the ball it hovers in",
 }
 
 

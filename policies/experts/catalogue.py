@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from policies.experts.expert import Expert
+from policies.experts.hover import HoverExpert
 from policies.experts.parking import Parking1Expert, Parking2Expert
 from policies.experts.reach_target import ReachTargetExpert
 from policies.experts.roller_ball import RollerBallExpert
@@ -13,6 +14,7 @@ class NoExpert(ValueError):
 
 
 EXPERTS: dict[str, Callable[[], Expert]] = {
+    "Hover": HoverExpert,
     "Parking1": Parking1Expert,
     "Parking2": Parking2Expert,
     "RollerBall": RollerBallExpert,

@@ -40,6 +40,9 @@ _AXES = {
     "forward_sp": _Axis(Control.FORWARD, Control.BACK),
     "right_sp": _Axis(None, None),
     "down_sp": _Axis(None, Control.BRAKE),  # a drone climbs while the key is held that a car brakes with
+    "roll_rate_sp": _Axis(None, None),
+    "pitch_rate_sp": _Axis(Control.BACK, Control.FORWARD),  # nose down to go ahead
+    "thrust_sp": _Axis(Control.BRAKE, None),
     "yaw_rate_sp": _Axis(Control.RIGHT, Control.LEFT),
 }
 # In this order: whoever steers and pushes steers, where an action can do one of them only.

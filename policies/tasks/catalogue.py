@@ -46,6 +46,7 @@ CATALOGUE: dict[str, Entry] = {
     "Parking1": Entry("parking.settings:ParkingSettings", "parking.level1:Parking1"),
     "Parking2": Entry("parking.settings:Parking2Settings", "parking.level2:Parking2"),
     "FollowMe": Entry("follow_me.settings:FollowSettings", "follow_me.follow_me:FollowMe"),
+    "Hover": Entry("hover.hover:HoverSettings", "hover.hover:Hover"),
     "Navigate": Entry("navigate.settings:NavigateSettings", "navigate.navigate:Navigate"),
 }
 

@@ -21,6 +21,7 @@ from sim.world.world import WorldConfig, WorldMap, build_world
 AIRFRAME = "x500"
 HOVER_COUNT = 64
 LOW_M = (1.5, 2.5)  # heights of hovers
+PLAIN = WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0)
 _SPREAD_M = 0.5  # of the places they hover at, to the north and to the east
 
 
@@ -45,8 +46,7 @@ def build_rig(world: WorldMap | WorldBatch, count: int, *, has_estimator: bool, 
 @cache
 def hover_bank(has_estimator: bool, device: str, heights_m: tuple[float, float] = LOW_M) -> Rig:
     """Vehicles that hover above home, between two heights, each with a heading of its own."""
-    plain = WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0)
-    rig = build_rig(build_world(plain, device), HOVER_COUNT, has_estimator=has_estimator, threads=1, device=device)
+    rig = build_rig(build_world(PLAIN, device), HOVER_COUNT, has_estimator=has_estimator, threads=1, device=device)
     rng = np.random.default_rng(0)
     low, high = heights_m
     middle, spread = np.array([0.0, 0.0, -0.5 * (low + high)]), np.array([_SPREAD_M, _SPREAD_M, 0.5 * (high - low)])

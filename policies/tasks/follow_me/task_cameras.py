@@ -9,7 +9,7 @@ from typing import Any
 import warp as wp
 
 from common.rng import draw_tick
-from policies.tasks.flight.task import worker_count
+from policies.tasks.flight.rig_task import worker_count
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import HFOV_DEG, pack_images
 from sim.advance import RigArrays

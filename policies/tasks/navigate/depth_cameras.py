@@ -10,7 +10,7 @@ import warp as wp
 
 from common.rng import draw_tick
 from policies.tasks.episode import StepBuffers
-from policies.tasks.flight.task import worker_count
+from policies.tasks.flight.rig_task import worker_count
 from policies.tasks.follow_me.observe import HFOV_DEG, depth_byte
 from policies.tasks.follow_me.owner_visibility import lens_of
 from policies.tasks.navigate.navigate_params import NavigateParams

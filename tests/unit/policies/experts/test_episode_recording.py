@@ -141,5 +141,5 @@ def test_existing_folder_is_left_alone(tmp_path):
 
 
 def test_task_without_an_expert_is_named():
-    with pytest.raises(NoExpert, match="Hover: no scripted expert"):
-        build_expert("Hover")
+    with pytest.raises(NoExpert, match="Navigate: no scripted expert"):
+        build_expert("Navigate")

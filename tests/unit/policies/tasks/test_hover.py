@@ -1,96 +1,109 @@
+"""Hover: what is seen, paid and ended; its expert."""
+
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
 import policies  # noqa: F401  (registers the tasks)
-from policies.tasks.hover import BALL_M, EPISODE_STEPS, HOVER_NED, RATE_MAX, HoverBatch, HoverEnv, HoverVectorEnv
+from policies.experts.hover import HoverExpert, cascade
+from policies.tasks.catalogue import build_task, task_settings
+from policies.tasks.episode import Outcome
+from policies.tasks.hover.hover_kernels import POINT_NED
 
-HOVER_THRUST = 0.47  # fraction of the x500's greatest thrust that carries it
-GRAVITY = 9.80665
-
-
-def hover_action(observation):
-    """A cascade by hand: to the point with 1.5 /s², damped, thrust vector tilted with 6 /s."""
-    to_go, vel, down, _, _ = np.split(observation, [3, 6, 9, 12], axis=-1)
-    lift_frd = np.clip(1.5 * to_go - 2.0 * vel, -3.0, 3.0) - GRAVITY * down
-    wanted_down = -lift_frd / np.linalg.norm(lift_frd, axis=-1, keepdims=True)
-    omega_frd = 6.0 * np.cross([0.0, 0.0, 1.0], wanted_down)
-    thrust = -lift_frd[..., 2:] * HOVER_THRUST / GRAVITY
-    return np.concatenate([omega_frd / np.array(RATE_MAX), 2.0 * thrust - 1.0], axis=-1).astype(np.float32)
+STEP_LIMIT = 500
+BALL_M = 3.0
+UP, DOWN = (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, -0.5)
 
 
 def fly(env, action, seed=0):
     """Steps until the episode ends, with a constant action."""
     env.reset(seed=seed)
-    count = 0
-    is_terminated = is_truncated = False
-    while not (is_terminated or is_truncated):
-        _, reward, is_terminated, is_truncated, _ = env.step(action)
-        count += 1
-    return count, reward, is_terminated
+    count, is_over = 0, False
+    while not is_over:
+        _, reward, is_terminated, is_truncated, info = env.step(np.array(action, np.float32))
+        count, is_over = count + 1, is_terminated or is_truncated
+    return count, reward, info["outcome"]
 
 
 @pytest.fixture(scope="module")
 def env():
-    return HoverEnv()
+    return gymnasium.make("honeyguide/Hover-v0").unwrapped
 
 
 @pytest.mark.filterwarnings("ignore:.*A Box observation space m.*infinity.*:UserWarning")
 def test_hover_is_a_valid_gymnasium_environment():
-    check_env(gymnasium.make("honeyguide/Hover-v0").unwrapped, skip_render_check=True)
+    check_env(gymnasium.make("honeyguide/Hover-v0", render_mode="rgb_array").unwrapped)
 
 
-def test_a_hand_made_cascade_hovers_to_the_end_of_every_episode():
+def test_the_expert_hovers_to_the_end_of_every_episode():
     env = gymnasium.make_vec("honeyguide/Hover-v0", num_envs=16)
     observation, _ = env.reset(seed=3)
     rewards = []
-    for count in range(1, EPISODE_STEPS + 1):
-        observation, reward, is_terminated, is_truncated, info = env.step(hover_action(observation))
+    for count in range(1, STEP_LIMIT + 1):
+        observation, reward, is_terminated, is_truncated, info = env.step(cascade(observation))
         rewards.append(reward)
         assert not is_terminated.any()
-        assert is_truncated.all() == (count == EPISODE_STEPS)
+        assert is_truncated.all() == (count == STEP_LIMIT)
     assert np.mean(rewards) > 0.7  # GNSS alone is half a metre off: 0.17 of the reward
-    assert info["_final_obs"].all()
+    assert (info["outcome"] == Outcome.SUCCESS).all()
     assert not np.array_equal(info["final_obs"], observation)
 
 
+def test_the_expert_hovers_with_stacked_frames():
+    task = build_task("Hover", 8, task_settings("Hover", {"stack": "3", "has_estimator": "false"}))
+    task.reset(0)
+    expert = HoverExpert()
+    for _ in range(STEP_LIMIT):
+        expert.act(task)
+        task.step()
+    assert task.take_scores().count(Outcome.SUCCESS) == 8
+
+
 def test_an_episode_ends_outside_the_ball_and_on_the_ground(env):
-    up_count, _, is_lost_above = fly(env, np.array([0.0, 0.0, 0.0, 1.0], np.float32))
-    down_count, _, is_lost_below = fly(env, np.array([0.0, 0.0, 0.0, -0.5], np.float32))
-    assert is_lost_above
-    assert is_lost_below
+    up_count, _, above = fly(env, UP)
+    down_count, _, below = fly(env, DOWN)
+    assert (above, below) == ("lost", "hit_obstacle")
     assert up_count < 100
     assert down_count < 100
 
 
 def test_the_ball_ends_where_the_reward_of_position_is_used_up(env):
-    _, reward, is_lost = fly(env, np.array([0.0, 0.0, 0.0, 1.0], np.float32))
-    assert is_lost
+    _, reward, _ = fly(env, UP)
     assert -0.2 < reward <= 0.0  # the rest is what turning costs, and the overshoot of one step
 
 
+def flown_once(**settings):
+    task = build_task("Hover", 1, task_settings("Hover", settings))
+    task.reset(0)
+    task.step()
+    return task, task.buffers.observations.numpy()[0]
+
+
 def test_the_policy_sees_the_estimate_and_not_the_truth():
-    batch = HoverBatch(1)
-    batch.reset(np.zeros(1, dtype=np.int64), np.random.default_rng(0))
-    batch.step(np.zeros(4, np.float32))
-    distance = np.linalg.norm(batch.observations[0, :3])
-    estimate = batch.rig.arrays.autopilot.ekf.rows.numpy()["estimate"]["pos_ned"][0]
-    truth = batch.rig.rows["truth"]["pos_ned"][0]
-    assert distance == pytest.approx(np.linalg.norm(np.array(HOVER_NED) - estimate), rel=1e-5)
-    assert abs(distance - np.linalg.norm(np.array(HOVER_NED) - truth)) > 1e-3
-    assert batch.rewards[0] == pytest.approx(1.0 - np.linalg.norm(np.array(HOVER_NED) - truth) / BALL_M, abs=0.1)
+    task, observation = flown_once()
+    distance_m = np.linalg.norm(observation[:3])
+    estimate = task.rig.arrays.autopilot.ekf.rows.numpy()["estimate"]["pos_ned"][0]
+    true_m = np.linalg.norm(np.array(POINT_NED) - task.rig.rows["truth"]["pos_ned"][0])
+    assert distance_m == pytest.approx(np.linalg.norm(np.array(POINT_NED) - estimate), rel=1e-5)
+    assert abs(distance_m - true_m) > 1e-3
+    assert task.buffers.rewards.numpy()[0] == pytest.approx(1.0 - true_m / BALL_M, abs=0.1)
+
+
+def test_quick_training_sees_the_truth():
+    task, observation = flown_once(has_estimator="false")
+    true_m = np.linalg.norm(np.array(POINT_NED) - task.rig.rows["truth"]["pos_ned"][0])
+    assert np.linalg.norm(observation[:3]) == pytest.approx(true_m, rel=1e-5)
 
 
 def test_episodes_start_aligned_and_near_the_point():
-    batch = HoverBatch(64)
-    batch.reset(np.arange(64), np.random.default_rng(0))
-    down = batch.observations[:, 6:9]
-    speed = np.linalg.norm(batch.observations[:, 3:6], axis=1)
-    assert np.linalg.norm(batch.observations[:, :3], axis=1).max() < 1.2  # 0.87 to the corner of the start cube
-    assert speed.max() < 0.5
-    assert down[:, 2].min() > 0.99
-    assert len(np.unique(batch.observations[:, 0])) > 16
+    task = build_task("Hover", 64)
+    task.reset(0)
+    observations = task.buffers.observations.numpy()
+    assert np.linalg.norm(observations[:, :3], axis=1).max() < 1.2  # 0.87 to the corner of the start cube
+    assert np.linalg.norm(observations[:, 3:6], axis=1).max() < 0.5
+    assert observations[:, 8].min() > 0.99
+    assert len(np.unique(observations[:, 0])) > 16
 
 
 def test_the_seed_of_reset_decides_the_episode(env):
@@ -104,22 +117,22 @@ def test_the_seed_of_reset_decides_the_episode(env):
 
 
 def test_one_vehicle_equals_the_first_of_a_batch(env):
-    fleet = HoverVectorEnv(3)
+    fleet = gymnasium.make_vec("honeyguide/Hover-v0", num_envs=3)
     single, _ = env.reset(seed=7)
     batch, _ = fleet.reset(seed=7)
     for _ in range(20):
         assert np.array_equal(single, batch[0])
-        single, reward, *_ = env.step(hover_action(single))
-        batch, rewards, *_ = fleet.step(hover_action(batch))
+        single, reward, *_ = env.step(cascade(single))
+        batch, rewards, *_ = fleet.step(cascade(batch))
         assert reward == rewards[0]
 
 
 def test_an_ended_episode_restarts_alone():
-    fleet = HoverVectorEnv(2)
+    fleet = gymnasium.make_vec("honeyguide/Hover-v0", num_envs=2)
     observation, _ = fleet.reset(seed=1)
     for _ in range(200):
-        action = hover_action(observation)
-        action[1] = (0.0, 0.0, 0.0, 1.0)
+        action = cascade(observation)
+        action[1] = UP
         observation, _, is_terminated, _, info = fleet.step(action)
         if is_terminated.any():
             break
@@ -127,4 +140,12 @@ def test_an_ended_episode_restarts_alone():
     assert info["_final_obs"].tolist() == [False, True]
     assert np.linalg.norm(info["final_obs"][1, :3]) > 1.5
     assert np.linalg.norm(observation[1, :3]) < 1.2
-    assert np.array_equal(info["final_obs"][0], observation[0])
+
+
+def test_mass_and_wind_are_drawn_for_each_episode():
+    task = build_task("Hover", 4, task_settings("Hover", {"has_estimator": "false"}))
+    task.set_params({"mass_scale": 1.2, "wind_m_s": 5.0})
+    task.reset(0)
+    model = task.rig.arrays.model.numpy()["mass_kg"]
+    assert model == pytest.approx(1.2 * task.makes.body.numpy()["mass_kg"][0])
+    assert np.linalg.norm(task.rig.arrays.wind_model.numpy()["mean_ned"], axis=1) == pytest.approx(5.0)

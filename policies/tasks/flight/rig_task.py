@@ -1,0 +1,105 @@
+"""A task that is flown: vehicles of a rig with their flight controllers.
+
+An episode starts from a hover of the bank; everything happens on the device.
+"""
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from common.geodesy import DEFAULT_HOME
+from policies.tasks.flight.episode_start import Start
+from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, Makes
+from policies.tasks.flight.hover_bank import HOVER_COUNT, LOW_M, build_rig, hover_bank
+from policies.tasks.layout import Layout
+from policies.tasks.task import Task
+from policies.tasks.task_params import Sampler
+from sim.restore import RowRestore
+from sim.rig import Rig
+from sim.sensors.sensors import SensorModel, sensor_model
+from sim.world.batch import WorldBatch
+from sim.world.world import WorldMap
+
+_NOISE_MAX = 2
+
+
+class RigTask(Task):
+    """Vehicles in the air; a subclass adds what they are for."""
+
+    def __init__(
+        self,
+        layout: Layout,
+        env_count: int,
+        world: WorldMap | WorldBatch,
+        *,
+        has_estimator: bool,
+        number_defaults: Mapping[str, float | Sampler],
+        device: str,
+        hover_heights_m: tuple[float, float] = LOW_M,
+    ) -> None:
+        super().__init__(layout, env_count, number_defaults=number_defaults, device=device)
+        self.rig: Rig = build_rig(
+            world, env_count, has_estimator=has_estimator, threads=worker_count(device), device=device
+        )
+        self.noise_seeds = self._zeros("noise_seeds", env_count, int)
+        self.hovers = self._zeros("hovers", env_count, int)  # of the bank, that the episode started from
+        self.is_starting = self._zeros("is_starting", env_count, wp.bool)
+        bank = hover_bank(has_estimator, device, hover_heights_m)
+        self._restore = RowRestore(self.rig, bank, self.hovers, self.is_starting, self.noise_seeds)
+        self.makes = _makes(self.rig)
+
+    def start(self, *, is_test: bool) -> Any:
+        """What episodes start with, for kernels: a `Start`."""
+        start = Start()
+        start.is_starting = self.is_starting
+        start.noise_seeds = self.noise_seeds
+        start.hovers = self.hovers
+        start.hover_count = HOVER_COUNT
+        start.is_test = int(is_test)
+        start.makes = self.makes
+        return start
+
+    def record(self, kernel: Any, *inputs: Any) -> Any:
+        """A launch of one thread per environment, recorded."""
+        return wp.launch(kernel, self.env_count, list(inputs), device=self.device, record_cmd=True)
+
+    def begin(self, is_chosen: NDArray[np.bool_]) -> None:
+        """Starts an episode in the chosen rows, shape (envs,); the others are not touched."""
+        self.is_starting.assign(is_chosen)
+        self._begin_rows()
+
+    def _begin_rows(self) -> None:
+        """Starts the episodes of the rows that are starting."""
+        raise NotImplementedError
+
+    def take_off(self) -> None:
+        """Puts the vehicles of the rows that start into their hovers."""
+        self._restore.launch()
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """As every task's, and the rig."""
+        return super().state() | {f"rig{k}": rows for k, rows in enumerate(self.rig.snapshot())}
+
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Restores what `state` returned."""
+        super().load_state(state)
+        self.rig.restore([state[f"rig{k}"] for k in range(sum(name.startswith("rig") for name in state))])
+
+
+def worker_count(device: str) -> int:
+    """One thread per core that this process may use, of a GPU one; results do not depend on it."""
+    return len(os.sched_getaffinity(0)) if device == "cpu" else 1
+
+
+def _makes(rig: Rig) -> Makes:
+    makes = Makes()
+    makes.body = wp.clone(rig.models[:1])
+    levels = [
+        sensor_model(k / NOISE_LEVELS_PER_UNIT, DEFAULT_HOME) for k in range(_NOISE_MAX * NOISE_LEVELS_PER_UNIT + 1)
+    ]
+    makes.sensors = wp.array(levels, dtype=SensorModel, device=rig.device)
+    return makes

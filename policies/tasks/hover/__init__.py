@@ -1,0 +1,1 @@
+"""Hover: a drone stays at a point by body rates and thrust."""
