@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import warp as wp
 
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import parameter_table
@@ -183,3 +184,15 @@ def height_errors(rig):
     """[m] estimated minus true."""
     estimate = rig.arrays.autopilot.ekf.rows.numpy()["estimate"]
     return rig.arrays.body.numpy()["pos_ned"][:, 2] - estimate["pos_ned"][:, 2]
+
+
+@pytest.mark.parametrize("has_mirrors", [False, True])
+def test_rows_are_one_view_that_shows_the_present_and_follow_an_array_that_is_replaced(has_mirrors):
+    rig = make_rig(1, has_mirrors=has_mirrors)
+    ticks = rig.rows["tick"]
+    rig.advance(250)
+    assert rig.rows["tick"] is ticks
+    assert ticks.tolist() == [250]
+    if not has_mirrors:
+        rig.arrays.tick = wp.array([7], dtype=wp.int64, device="cpu")
+        assert rig.rows["tick"].tolist() == [7]
