@@ -1,4 +1,4 @@
-"""Hover: stay at a point two metres above home, by body rates and collective thrust, on the estimate alone.
+"""Hover: stay at a point two metres above home, by body rates and thrust, on the estimate alone.
 
 In: an action at 50 Hz, held over five ticks. Out: what the flight controller's estimate tells, and a reward and an end
 made from the truth, as the teacher sees it. An episode is a success if it lasts until its time is up.
@@ -45,7 +45,7 @@ class HoverSettings(TaskSettings):
 
 ACTIONS = (
     *(Element(f"{axis}_rate_sp", "rad/s", float(RATE_MAX[k])) for k, axis in enumerate(("roll", "pitch", "yaw"))),
-    Element("thrust_sp", "1"),  # of the greatest collective thrust: -1 is none, 1 all
+    Element("thrust_sp", "1"),  # of the greatest thrust: -1 is none, 1 all
 )
 ELEMENTS = (
     *(Element(f"to_point_frd_{axis}", "m") for axis in "xyz"),

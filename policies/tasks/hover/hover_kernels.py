@@ -60,7 +60,7 @@ class HoverState:
 
 @wp.func
 def rate_setpoint(action: wp.vec4) -> Setpoint:
-    """Body rates and collective thrust from an action in [-1, 1]: roll, pitch, yaw rate, thrust (-1 is none)."""
+    """Body rates and thrust from an action in [-1, 1]: roll, pitch, yaw rate, thrust (-1 is none)."""
     setpoint = Setpoint()
     setpoint.kind = SETPOINT_RATE
     setpoint.is_armed = 1
