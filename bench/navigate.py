@@ -136,7 +136,7 @@ def row(trees_per_ha: float, flights: Flights) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def picture(settings: dict[str, str], flights: Flights, trees_per_ha: float) -> NDArray[np.uint8]:
+def top_view(settings: dict[str, str], flights: Flights, trees_per_ha: float) -> NDArray[np.uint8]:
     """The first flights from above, three in a row, each with its goal straight up."""
     task = build(settings, trees_per_ha, PICTURES)  # the same forests: draws do not depend on the batch
     tiles = []
@@ -167,7 +167,7 @@ def main(arguments: list[str]) -> int:
         flights = fly(policy, task)
         lines.append(row(trees_per_ha, flights))
         print(lines[-1], flush=True)
-    image = picture(settings, flights, DENSITIES[-1])
+    image = top_view(settings, flights, DENSITIES[-1])
     (DOCS / "images").mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(DOCS / "images" / "navigate.jpg"), image[..., ::-1], (cv2.IMWRITE_JPEG_QUALITY, 82))
     page = PAGE.format(episodes=EPISODES, rows="\n".join(lines), machine=machine())

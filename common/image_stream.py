@@ -1,7 +1,7 @@
-"""Pictures of an onboard camera on their way to a companion computer: what one is, and as bytes of a stream.
+"""Images of an onboard camera on their way to a companion computer: what one is, and as bytes of a stream.
 
 In and out: `ImageFrame` and bytes. Each frame is a header of 48 bytes, little endian, and the pixels as they are: small
-pictures on one machine need no codec, and a policy sees in flight exactly what it saw in training. At 10 Hz.
+images on one machine need no codec, and a policy sees in flight exactly what it saw in training. At 10 Hz.
 """
 
 import struct
@@ -19,15 +19,15 @@ PAYLOAD_MAX = 64 << 20  # [byte] guess: beyond it the stream is none of ours
 
 
 class ImageStreamError(Exception):
-    """What came in is no stream of pictures; the text is one sentence."""
+    """What came in is no stream of images; the text is one sentence."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageFrame:
-    """One picture, and what a receiver must know of the camera to measure in it."""
+    """One image, and what a receiver must know of the camera to measure in it."""
 
     time_us: int  # when it was taken, on the vehicle's clock
-    sequence: int  # counts pictures taken: a gap is a picture that was not sent
+    sequence: int  # counts images taken: a gap is an image that was not sent
     pixels: NDArray[np.uint8]  # (height, width, channels): red, green, blue, depth
     hfov_deg: float  # horizontal field of view
     pitch_deg: float  # of the optical axis above the body's forward axis

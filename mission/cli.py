@@ -102,13 +102,13 @@ def picture(
 ) -> None:
     """Take a picture of the world from a place in it."""
     from mission.flight_config import TREELESS_M
-    from mission.video.image_command import PictureError, Viewpoint, take_picture
+    from mission.video.image_command import ImageError, Viewpoint, take_image
     from sim.world.world import WorldConfig
 
     world = WorldConfig(seed=world_seed, trees_per_ha=trees, hill_height_m=hills, treeless_radius_m=TREELESS_M)
     try:
-        take_picture(output, world, Viewpoint(north, east, up, yaw, pitch, fov), size)
-    except PictureError as error:
+        take_image(output, world, Viewpoint(north, east, up, yaw, pitch, fov), size)
+    except ImageError as error:
         refuse(str(error))
 
 

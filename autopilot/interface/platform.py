@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from autopilot.payload.camera.ports import FrameSource, PictureServer, VideoStream
+from autopilot.payload.camera.ports import FrameSource, ImageServer, VideoStream
 from autopilot.payload.camera.storage import MediaFolder
 from common.clock import SIMULATED_EPOCH_US
 from common.folder import ConfinedFolder
@@ -88,7 +88,7 @@ class Host:
     storage: Storage | None = None
     frames: FrameSource | None = None  # None: the vehicle carries no camera
     media: MediaFolder | None = None  # None: there is no card in the camera
-    stream: PictureServer | None = None  # the camera's picture and its files over HTTP
+    stream: ImageServer | None = None  # the camera's picture and its files over HTTP
     video: VideoStream | None = None  # for ground stations
     read_truth: Callable[[], Any] | None = None  # a simulator's body state: for telemetry, never for the controller
     boot_unix_us: int = SIMULATED_EPOCH_US  # the date of power-on

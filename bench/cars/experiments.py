@@ -16,7 +16,7 @@ _REPORTED = (
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class Image:
     """Curves of several experiments in one figure."""
 
     name: str
@@ -33,7 +33,7 @@ class Section:
     title: str
     words: str
     experiments: tuple[Experiment, ...]
-    pictures: tuple[Picture, ...] = ()
+    images: tuple[Image, ...] = ()
 
 
 ROLLER_BALL = Experiment(
@@ -189,11 +189,9 @@ SECTIONS = (
         "Our recipes (`policies/recipes/`), one core each. New spots are cells of the arena that training never used.",
         (ROLLER_BALL, REACH, PARKING1, PARKING1_GAIL, PARKING2, PARKING1_IMPROVED, PARKING2_IMPROVED),
         (
-            Picture(
-                "parking1", "Parking 1: from nothing to parked", {"PPO": "parking1", "PPO + GAIL": "parking1-gail"}
-            ),
-            Picture("parking2", "Parking 2: two storeys, portals, moving obstacles", {"PPO": "parking2"}),
-            Picture(
+            Image("parking1", "Parking 1: from nothing to parked", {"PPO": "parking1", "PPO + GAIL": "parking1-gail"}),
+            Image("parking2", "Parking 2: two storeys, portals, moving obstacles", {"PPO": "parking2"}),
+            Image(
                 "improved",
                 "Random starts, goals and obstacles; pose and speed count",
                 {"Parking 1": "parking1-improved", "Parking 2": "parking2-improved"},
@@ -205,14 +203,14 @@ SECTIONS = (
         "The document's settings, 2 million steps each: 16 areas, PPO in ML-Agents' form. A4 has the sparse reward.",
         REACH_CURVES,
         (
-            Picture(
+            Image(
                 "reach-target-512",
                 "Reach target, the document's settings (3 x 512)",
                 {variant: f"reach-{variant.lower()}-512" for variant in VARIANTS},
                 value="reward",
                 over="steps",
             ),
-            Picture(
+            Image(
                 "reach-target-128",
                 "Reach target, a smaller network (2 x 128), mean of three seeds",
                 {variant: f"reach-{variant.lower()}-128" for variant in VARIANTS},
@@ -229,13 +227,13 @@ _DONE_RIGHT = Section(
     "inert. Here each stands beside the same run without it, for as many steps.",
     (*SPARSE, *MEMORY, *OTHERS),
     (
-        Picture(
+        Image(
             "sparse",
             "Parking 1 paid at the end only",
             {"PPO": "parking1-sparse"} | {n: f"parking1-sparse-{n.lower()}" for n in ("Curiosity", "RND", "GAIL")},
             over="steps",
         ),
-        Picture(
+        Image(
             "memory",
             "Parking 1 seen as documented: without ranges and speed",
             {"feed-forward": "parking1-seen", "stack of 3": "parking1-seen-stack", "LSTM": "parking1-seen-lstm"},

@@ -16,7 +16,7 @@ from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_companion
 from mission.follow.owner_device import OwnerConfig
 from mission.script import take_off
-from mission.view.chase_camera import PICTURE_S
+from mission.view.chase_camera import IMAGE_S
 from mission.view.film import write_film
 from mission.view.film_images import HEIGHT, WIDTH
 from mission.view.replay_file import keep_for_replay, load_recording
@@ -45,8 +45,8 @@ def measure() -> list[Row]:
             wall_s.append(time.perf_counter() - start[0])
             cpu_s.append(time.process_time() - start[1])
         with av.open(str(target)) as film:
-            pictures = film.streams.video[0].frames
-    require(pictures == round(FLOWN_S / PICTURE_S), f"the film has {pictures} pictures")
+            images = film.streams.video[0].frames
+    require(images == round(FLOWN_S / IMAGE_S), f"the film has {images} pictures")
     name = f"film of {FLOWN_S:g} s, {WIDTH} x {HEIGHT}, over the flight's own time"
     return [
         Row(f"{name}, by the wall clock", min(wall_s) / FLOWN_S, "s/s", "lower", 1.0, COMMAND),

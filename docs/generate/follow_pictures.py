@@ -1,4 +1,4 @@
-"""The pictures of docs/how-to/follow-me.md and the README: the live page in Chromium, and three moments of the film.
+"""The images of docs/how-to/follow-me.md and the README: the live page in Chromium, and three moments of the film.
 
 `python -m docs.generate.follow_pictures`; needs Chromium. Writes docs/images/live.jpg and follow.jpg.
 """
@@ -14,7 +14,7 @@ from mission.flight_config import OwnerConfig
 from mission.follow.follow_session import chosen_pilot, score_lines, watch_of
 from mission.follow.lockstep import flight_with_companion
 from mission.script import take_off
-from mission.view.chase_camera import PICTURE_S
+from mission.view.chase_camera import IMAGE_S
 from mission.view.film_images import film
 from mission.view.live import LiveView
 from mission.view.page import PageServer
@@ -52,12 +52,12 @@ def main() -> None:
         browser.evaluate("document.querySelector('.mantine-Notification-closeButton')?.click()")
         shown_us = flight.time_us + 3_000_000
         flight.run(lambda f: f.time_us >= shown_us, speed=1.0, on_frame=lambda _: [watch() for watch in watched])
-        picture = browser.picture()
+        image = browser.picture()
         browser.close()
     view.close()
     flight.close()
-    cv2.imwrite(str(IMAGES / "live.jpg"), picture[..., ::-1], QUALITY)
-    chosen = {round(moment_s / PICTURE_S) for moment_s in MOMENTS_S}
+    cv2.imwrite(str(IMAGES / "live.jpg"), image[..., ::-1], QUALITY)
+    chosen = {round(moment_s / IMAGE_S) for moment_s in MOMENTS_S}
     shots = [shot for i, shot in enumerate(film(load_recording(Path(run.name)), flight.world)) if i in chosen]
     small = [cv2.resize(shot, SHOT_SIZE, interpolation=cv2.INTER_AREA) for shot in shots]
     cv2.imwrite(str(IMAGES / "follow.jpg"), np.hstack(small)[..., ::-1], QUALITY)

@@ -53,7 +53,7 @@ def follow(world: WorldMap) -> dict[str, np.ndarray]:
 
 
 def draw(world: WorldMap, rows: dict[str, np.ndarray]) -> None:
-    """Writes the picture."""
+    """Writes the image."""
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415  after the choice of the backend
 

@@ -1,7 +1,7 @@
 """`honeyguide estimate`: the estimator alone over the sensors of a recorded flight, real or simulated.
 
 In: a PX4 ULog or a sensor CSV. Out: a folder with the estimate, innovations and biases as ULog and CSV, a summary and
-pictures. Nothing is written before everything has been computed.
+images. Nothing is written before everything has been computed.
 """
 
 import json

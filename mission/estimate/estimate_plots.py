@@ -1,4 +1,4 @@
-"""Pictures of a replayed estimate: where it went, and how well the measurements agreed with it."""
+"""Plots of a replayed estimate: where it went, and how well the measurements agreed with it."""
 
 from io import BytesIO
 from math import nan
@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 ESTIMATE_COLOUR = "#e8590c"
 OTHER_COLOUR = "#0b7285"
 GNSS_COLOUR = "#adb5bd"
-MAX_POINTS = 3000  # per line: more than the picture has columns
+MAX_POINTS = 3000  # per line: more than the image has columns
 DPI = 80
 GAP_US, GAP_STEPS = 200_000, 5.0  # a line ends at a gap as long as that and of so many steps
 MAP_MARGIN = 0.15  # of the extent of the estimate

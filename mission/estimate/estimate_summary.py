@@ -39,7 +39,7 @@ class EstimateSummary:
     samples: dict[str, int]  # per sensor, as given to the estimator
     origin: GeoPoint | None
     sources: dict[str, SourceSummary]
-    valid: dict[str, float]  # share of the time in which a part of the estimate was valid
+    valid: dict[str, float]  # fraction of the time in which a part of the estimate was valid
     final_gyro_bias_frd_rad_s: tuple[float, ...]
     final_accel_bias_frd_m_s2: tuple[float, ...]
     final_body_field_frd_gauss: tuple[float, ...]

@@ -80,35 +80,35 @@ def read_csv(path: Path) -> Recording:
     )
 
 
-def _parsed(text: str, place: str) -> tuple[str, Line]:
+def _parsed(text: str, source: str) -> tuple[str, Line]:
     """Sensor, time and values of one line."""
     cells = [cell.strip() for cell in text.rstrip("\r\n").split(",")]
     sensor = cells[1] if len(cells) > 1 else ""
     if sensor not in VALUES:
-        raise SensorLogError(f"{place}: sensor '{sensor}' is none of {', '.join(VALUES)}")
+        raise SensorLogError(f"{source}: sensor '{sensor}' is none of {', '.join(VALUES)}")
     try:
         time_us = int(cells[0])
     except ValueError:
         time_us = -1
     if not 0 <= time_us < 2**63:
-        raise SensorLogError(f"{place}: time_us '{cells[0]}' is no whole number of microseconds from 0 on")
+        raise SensorLogError(f"{source}: time_us '{cells[0]}' is no whole number of microseconds from 0 on")
     names = VALUES[sensor]
     while len(cells) > 2 + len(names) and not cells[-1]:
         cells.pop()  # a spreadsheet pads its lines to the same number of columns
     if len(cells) != 2 + len(names):
-        raise SensorLogError(f"{place}: {sensor} needs {len(names)} values ({', '.join(names)}), not {len(cells) - 2}")
-    return sensor, (time_us, [_number(name, cell, place) for name, cell in zip(names, cells[2:], strict=True)])
+        raise SensorLogError(f"{source}: {sensor} needs {len(names)} values ({', '.join(names)}), not {len(cells) - 2}")
+    return sensor, (time_us, [_number(name, cell, source) for name, cell in zip(names, cells[2:], strict=True)])
 
 
-def _number(name: str, cell: str, place: str) -> float:
+def _number(name: str, cell: str, source: str) -> float:
     try:
         value = float(cell)
     except ValueError:
-        raise SensorLogError(f"{place}: {name} '{cell}' is no number") from None
+        raise SensorLogError(f"{source}: {name} '{cell}' is no number") from None
     if name == "distance_m" and not isfinite(value):
         return -1.0  # no return
     if not isfinite(value) or abs(value) > LIMITS.get(name, 1e9):
-        raise SensorLogError(f"{place}: {name} {cell} is out of range")
+        raise SensorLogError(f"{source}: {name} {cell} is out of range")
     return value
 
 

@@ -1,4 +1,4 @@
-"""Pictures of a flight: the track from above and from the side, and the estimator's errors over time."""
+"""Plots of a flight: the track from above and from the side, and the estimator's errors over time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,7 +26,7 @@ DRAWN_MAX = 60_000  # frames, 20 minutes: more are no more to see, and take memo
 def plot_flight(
     history: History, world: WorldMap, path_ned: Sequence[tuple[int, Rows]], title: str, target: Path
 ) -> None:
-    """Writes the picture of a flight as PNG; of a long one every few frames are drawn."""
+    """Writes the plots of a flight as PNG; of a long one every few frames are drawn."""
     every = -(-len(history.time_us) // DRAWN_MAX)
     history = History(*(getattr(history, name)[::every] for name in History.__dataclass_fields__))
     figure = Figure(figsize=(12, 8), layout="constrained")

@@ -1,6 +1,6 @@
 """What a value in a plan file may be, and the sentence its user reads when it is something else.
 
-A `Place` is where in the file a value stands; every getter returns the checked value or raises `PlanError`.
+A `Location` is where in the file a value stands; every getter returns the checked value or raises `PlanError`.
 """
 
 from collections.abc import Mapping
@@ -33,13 +33,13 @@ class PlanError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """A place in a file, as errors name it: `mission.plan: item 3`."""
+class Location:
+    """A location in a file, as errors name it: `mission.plan: item 3`."""
 
     text: str
 
-    def inside(self, part: str) -> "Place":
-        return Place(f"{self.text}: {part}")
+    def inside(self, part: str) -> "Location":
+        return Location(f"{self.text}: {part}")
 
     def error(self, sentence: str) -> PlanError:
         return PlanError(f"{self.text}: {sentence}")
@@ -104,18 +104,18 @@ class Place:
             self.fail(f"{field}: longitude {lon_deg:g} is not within ±180 degrees")
 
 
-def check_item(item: MissionItem, place: Place) -> MissionItem:
+def check_item(item: MissionItem, location: Location) -> MissionItem:
     """The item, if its frame is known and its position is on earth and as complete as its command needs."""
     if item.frame not in KNOWN_FRAMES:
-        place.fail(f"frame {item.frame} is not one of {', '.join(map(str, KNOWN_FRAMES))}")
+        location.fail(f"frame {item.frame} is not one of {', '.join(map(str, KNOWN_FRAMES))}")
     if item.command in FENCE_AND_RALLY_COMMANDS:
-        place.fail(f"command {item.command} belongs to a fence or rally file, not to a mission")
+        location.fail(f"command {item.command} belongs to a fence or rally file, not to a mission")
     if item.command in COMMANDS_WITH_POSITION:
-        place.check_lat_lon(item.x, item.y, "params")
+        location.check_lat_lon(item.x, item.y, "params")
     if item.command in COMMANDS_THAT_NEED_POSITION:
         for name, value in (("latitude", item.x), ("longitude", item.y), ("altitude", item.z)):
             if isnan(value):
-                place.fail(f"command {item.command} needs its {name}")
+                location.fail(f"command {item.command} needs its {name}")
     return item
 
 

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from autopilot.interface.item_lists import MissionItem
 from common.files import write_whole
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
-from mission.plan.plan_checks import COMMANDS_WITH_POSITION, DO_JUMP, Place, PlanError, check_item
+from mission.plan.plan_checks import COMMANDS_WITH_POSITION, DO_JUMP, Location, PlanError, check_item
 from mission.plan.waypoints import HEADER_START, parse_waypoints, waypoints_text
 
 __all__ = [
@@ -112,13 +112,13 @@ def read_plan(path: Path | str) -> Plan:
     Raises:
         PlanError: the file is missing or unreadable, or holds no valid plan.
     """
-    place = Place(str(path))
+    location = Location(str(path))
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
-        raise place.error("is not a text file") from None
+        raise location.error("is not a text file") from None
     except OSError as error:
-        raise place.error(error.strerror or str(error)) from None
+        raise location.error(error.strerror or str(error)) from None
     return parse_plan(text, str(path))
 
 
@@ -128,23 +128,23 @@ def parse_plan(text: str, name: str) -> Plan:
     Raises:
         PlanError: the text holds no valid plan.
     """
-    place = Place(name)
+    location = Location(name)
     if text.startswith(HEADER_START):
-        home, items = parse_waypoints(text, place)
+        home, items = parse_waypoints(text, location)
         return Plan(items=items, home=home)
-    raw = _json(text, place)
+    raw = _json(text, location)
     if not isinstance(raw, dict) or raw.get("fileType") != "Plan":
-        place.fail('is neither a QGroundControl plan ("fileType": "Plan") nor a QGC WPL 110 file')
-    place.version(raw, 1)
-    mission = place.section(raw, "mission")
-    in_mission = place.inside("mission")
+        location.fail('is neither a QGroundControl plan ("fileType": "Plan") nor a QGC WPL 110 file')
+    location.version(raw, 1)
+    mission = location.section(raw, "mission")
+    in_mission = location.inside("mission")
     in_mission.version(mission, 2)
-    items, complex_items = _items(mission, place)
+    items, complex_items = _items(mission, location)
     return Plan(
         items=items,
         home=_optional(mission, "plannedHomePosition", in_mission.geo_point, None),
-        fence=_fence(raw, place),
-        rally=_rally(raw, place),
+        fence=_fence(raw, location),
+        rally=_rally(raw, location),
         cruise_speed_m_s=_optional(mission, "cruiseSpeed", in_mission.number, 15.0),
         hover_speed_m_s=_optional(mission, "hoverSpeed", in_mission.number, 5.0),
         complex_items=complex_items,
@@ -199,27 +199,27 @@ def plan_text(plan: Plan) -> str:
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
-def _json(text: str, place: Place) -> Any:
+def _json(text: str, location: Location) -> Any:
     try:
-        return json.loads(text, parse_constant=lambda word: place.fail(f"{word} is not a JSON number"))
+        return json.loads(text, parse_constant=lambda word: location.fail(f"{word} is not a JSON number"))
     except json.JSONDecodeError as error:
-        raise place.error(f"line {error.lineno} is not valid JSON ({error.msg}): is the file complete?") from None
+        raise location.error(f"line {error.lineno} is not valid JSON ({error.msg}): is the file complete?") from None
     except PlanError:
         raise
     except (RecursionError, ValueError):  # nested too deep, or a whole number of thousands of digits
-        raise place.error("is not a plan: the JSON is nested too deep or holds an absurd number") from None
+        raise location.error("is not a plan: the JSON is nested too deep or holds an absurd number") from None
 
 
 def _optional(raw: dict[str, Any], key: str, getter: Callable[[Any, str], T], default: D) -> T | D:
     return default if raw.get(key) is None else getter(raw[key], key)
 
 
-def _items(mission: dict[str, Any], place: Place) -> tuple[tuple[PlanItem, ...], tuple[ComplexItem, ...]]:
+def _items(mission: dict[str, Any], location: Location) -> tuple[tuple[PlanItem, ...], tuple[ComplexItem, ...]]:
     """The uploaded items, and which of them stand for a complex item."""
-    raw_items: list[tuple[Any, Place]] = []
+    raw_items: list[tuple[Any, Location]] = []
     complex_items: list[ComplexItem] = []
-    for number, raw in enumerate(place.inside("mission").rows(mission, "items"), 1):
-        where = place.inside(f"item {number}")
+    for number, raw in enumerate(location.inside("mission").rows(mission, "items"), 1):
+        where = location.inside(f"item {number}")
         kind = raw.get("type") if isinstance(raw, dict) else None
         if kind == "ComplexItem":
             stored = raw.get("TransectStyleComplexItem")
@@ -233,7 +233,7 @@ def _items(mission: dict[str, Any], place: Place) -> tuple[tuple[PlanItem, ...],
         else:
             where.fail("type must be SimpleItem or ComplexItem")
     if not raw_items:
-        place.fail("the mission has no items")
+        location.fail("the mission has no items")
     items = tuple(_item(raw, seq, where) for seq, (raw, where) in enumerate(raw_items))
     seq_of_jump_id = {raw.get("doJumpId", seq + 1): seq for seq, (raw, _) in enumerate(raw_items)}
     return tuple(
@@ -241,46 +241,46 @@ def _items(mission: dict[str, Any], place: Place) -> tuple[tuple[PlanItem, ...],
     ), tuple(complex_items)
 
 
-def _item(raw: Any, seq: int, place: Place) -> PlanItem:
+def _item(raw: Any, seq: int, location: Location) -> PlanItem:
     if not isinstance(raw, dict):
-        place.fail("must be an object")
-    p1, p2, p3, p4, x, y, z = place.numbers_or_null(raw.get("params"), "params", 7)
+        location.fail("must be an object")
+    p1, p2, p3, p4, x, y, z = location.numbers_or_null(raw.get("params"), "params", 7)
     autocontinue = raw.get("autoContinue", True)
     if not isinstance(autocontinue, bool):
-        place.fail("autoContinue must be true or false")
+        location.fail("autoContinue must be true or false")
     if not isinstance(raw.get("doJumpId", 0), int):
-        place.fail("doJumpId must be a whole number")
-    frame = place.integer(raw.get("frame"), "frame", 0xFF)
-    command = place.integer(raw.get("command"), "command", 0xFFFF)
-    return check_item(PlanItem(seq, frame, command, (p1, p2, p3, p4), x, y, z, autocontinue), place)
+        location.fail("doJumpId must be a whole number")
+    frame = location.integer(raw.get("frame"), "frame", 0xFF)
+    command = location.integer(raw.get("command"), "command", 0xFFFF)
+    return check_item(PlanItem(seq, frame, command, (p1, p2, p3, p4), x, y, z, autocontinue), location)
 
 
-def _with_jump_target(item: PlanItem, seq_of_jump_id: dict[int, int], place: Place) -> PlanItem:
+def _with_jump_target(item: PlanItem, seq_of_jump_id: dict[int, int], location: Location) -> PlanItem:
     """The item; if it jumps, to the uploaded number of its target."""
     if item.command != DO_JUMP:
         return item
     if item.params[0] not in seq_of_jump_id:
-        place.fail(f"jumps to doJumpId {item.params[0]:g}, which no item has")
+        location.fail(f"jumps to doJumpId {item.params[0]:g}, which no item has")
     return replace(item, params=(float(seq_of_jump_id[int(item.params[0])]), *item.params[1:]))
 
 
-def _fence(raw: dict[str, Any], place: Place) -> tuple[FenceCircle | FencePolygon, ...]:
+def _fence(raw: dict[str, Any], location: Location) -> tuple[FenceCircle | FencePolygon, ...]:
     if raw.get("geoFence") is None:
         return ()
-    section = place.section(raw, "geoFence")
-    place = place.inside("geoFence")
-    place.version(section, 2)
+    section = location.section(raw, "geoFence")
+    location = location.inside("geoFence")
+    location.version(section, 2)
     shapes: list[FenceCircle | FencePolygon] = []
-    for number, row in enumerate(place.rows(section, "circles"), 1):
-        where = place.inside(f"circle {number}")
+    for number, row in enumerate(location.rows(section, "circles"), 1):
+        where = location.inside(f"circle {number}")
         circle = where.section(row, "circle")
         centre = where.lat_lon(circle.get("center"), "center")
         radius_m = where.number(circle.get("radius"), "radius")
         if radius_m <= 0.0:
             where.fail("radius must be positive")
         shapes.append(FenceCircle(*centre, radius_m, row.get("inclusion") is not False))
-    for number, row in enumerate(place.rows(section, "polygons"), 1):
-        where = place.inside(f"polygon {number}")
+    for number, row in enumerate(location.rows(section, "polygons"), 1):
+        where = location.inside(f"polygon {number}")
         vertices = where.rows(row, "polygon")
         if len(vertices) < 3:
             where.fail("a polygon needs at least 3 vertices")
@@ -289,13 +289,13 @@ def _fence(raw: dict[str, Any], place: Place) -> tuple[FenceCircle | FencePolygo
     return tuple(shapes)
 
 
-def _rally(raw: dict[str, Any], place: Place) -> tuple[GeoPoint, ...]:
+def _rally(raw: dict[str, Any], location: Location) -> tuple[GeoPoint, ...]:
     if raw.get("rallyPoints") is None:
         return ()
-    section = place.section(raw, "rallyPoints")
-    place = place.inside("rallyPoints")
-    place.version(section, 2)
-    return tuple(place.geo_point(row, f"point {k}") for k, row in enumerate(place.rows(section, "points"), 1))
+    section = location.section(raw, "rallyPoints")
+    location = location.inside("rallyPoints")
+    location.version(section, 2)
+    return tuple(location.geo_point(row, f"point {k}") for k, row in enumerate(location.rows(section, "points"), 1))
 
 
 def _items_to_json(plan: Plan) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""A window that shows pictures and says which keys are held; pygame is imported when it opens."""
+"""A window that shows images and says which keys are held; pygame is imported when it opens."""
 
 import os
 from enum import StrEnum
@@ -23,10 +23,10 @@ class Request(StrEnum):
 
 
 class Window:
-    """A picture on the screen. Arrow keys or WASD steer, space brakes, R restarts, Esc or closing the window ends."""
+    """An image on the screen. Arrow keys or WASD steer, space brakes, R restarts, Esc or closing the window ends."""
 
     def __init__(self, title: str) -> None:
-        """Opens nothing yet: the first picture says how large the window is.
+        """Opens nothing yet: the first image says how large the window is.
 
         Raises:
             WindowError: no display.
@@ -44,7 +44,7 @@ class Window:
             pygame.display.init()
         except pygame.error as error:
             raise WindowError(f"there is no display to open a window on ({error})") from None
-        # SDL falls back to pictures that nobody sees, unless it was asked for them.
+        # SDL falls back to images that nobody sees, unless it was asked for them.
         driver = pygame.display.get_driver()
         if driver == "offscreen" and os.environ.get("SDL_VIDEODRIVER") != driver:
             pygame.display.quit()
@@ -61,15 +61,15 @@ class Window:
             for key in keys
         }
 
-    def show(self, picture: NDArray[np.uint8], title: str = "") -> None:
-        """Shows an RGB picture, shape (height, width, 3), under a title."""
+    def show(self, image: NDArray[np.uint8], title: str = "") -> None:
+        """Shows an RGB image, shape (height, width, 3), under a title."""
         pygame = self._pygame
-        height, width = picture.shape[:2]
+        height, width = image.shape[:2]
         if self._surface is None:
             self._surface = pygame.display.set_mode((width, height))
         pygame.display.set_caption(title or self._title)
         self._surface.blit(
-            pygame.image.frombuffer(np.ascontiguousarray(picture).tobytes(), (width, height), "RGB"), (0, 0)
+            pygame.image.frombuffer(np.ascontiguousarray(image).tobytes(), (width, height), "RGB"), (0, 0)
         )
         pygame.display.flip()
 

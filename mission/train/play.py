@@ -122,14 +122,14 @@ def _shown(task: Task, driver: Expert, options: PlayOptions, show: Callable[[NDA
     return scores
 
 
-def _filming(film: Mp4, picture_s: float, say: Say) -> Callable[[NDArray[np.uint8]], bool]:
+def _filming(film: Mp4, image_s: float, say: Say) -> Callable[[NDArray[np.uint8]], bool]:
     count = 0
 
-    def show(picture: NDArray[np.uint8]) -> bool:
+    def show(image: NDArray[np.uint8]) -> bool:
         nonlocal count
-        film.show(picture)
+        film.show(image)
         count += 1
-        say(f"filming: picture {count}, {count * picture_s:.1f} s of film")
+        say(f"filming: picture {count}, {count * image_s:.1f} s of film")
         return True
 
     return show
@@ -139,22 +139,22 @@ def _showing(window: Window, decision_s: float) -> Callable[[NDArray[np.uint8]],
     pacer = Pacer(1.0)
     shown = 0
 
-    def show(picture: NDArray[np.uint8]) -> bool:
+    def show(image: NDArray[np.uint8]) -> bool:
         nonlocal shown
         pacer.wait_until(round(shown * decision_s * 1e6))
         shown += 1
-        window.show(picture)
+        window.show(image)
         return Request.END not in window.requests()
 
     return show
 
 
 def tiled(task: Task) -> NDArray[np.uint8]:
-    """The pictures of all environments of a task side by side, as near to a square as they go."""
-    pictures = [task.top_view(i) for i in range(task.env_count)]
-    columns = ceil(sqrt(len(pictures)))
-    pictures += [np.zeros_like(pictures[0])] * (-len(pictures) % columns)
-    rows = [np.concatenate(pictures[k : k + columns], axis=1) for k in range(0, len(pictures), columns)]
+    """The images of all environments of a task side by side, as near to a square as they go."""
+    images = [task.top_view(i) for i in range(task.env_count)]
+    columns = ceil(sqrt(len(images)))
+    images += [np.zeros_like(images[0])] * (-len(images) % columns)
+    rows = [np.concatenate(images[k : k + columns], axis=1) for k in range(0, len(images), columns)]
     return np.concatenate(rows, axis=0)
 
 

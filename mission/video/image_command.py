@@ -13,7 +13,7 @@ from sim.world.world import WorldConfig, build_world
 _RDF_IN_FRD = (0.5, 0.5, 0.5, 0.5)  # a camera that looks ahead
 
 
-class PictureError(ValueError):
+class ImageError(ValueError):
     """Something the user gave is wrong; the message is one sentence."""
 
 
@@ -29,11 +29,11 @@ class Viewpoint:
     hfov_deg: float
 
 
-def take_picture(output: Path, world: WorldConfig, viewpoint: Viewpoint, size: str) -> None:
-    """Writes the picture as a JPEG.
+def take_image(output: Path, world: WorldConfig, viewpoint: Viewpoint, size: str) -> None:
+    """Writes the image as a JPEG.
 
     Raises:
-        PictureError: the size makes no sense, or the file cannot be written.
+        ImageError: the size makes no sense, or the file cannot be written.
     """
     width, height = _size(size)
     world_map = build_world(world)
@@ -45,11 +45,11 @@ def take_picture(output: Path, world: WorldConfig, viewpoint: Viewpoint, size: s
     try:
         write_whole(output, jpeg_bytes(images.rgb[0]))
     except OSError as error:
-        raise PictureError(f"{output}: {error.strerror}") from error
+        raise ImageError(f"{output}: {error.strerror}") from error
 
 
 def _size(text: str) -> tuple[int, int]:
     width, _, height = text.partition("x")
     if not (width.isdecimal() and height.isdecimal() and 16 <= int(width) <= 4096 and 16 <= int(height) <= 4096):
-        raise PictureError(f"--size {text}: must be WIDTHxHEIGHT, both from 16 to 4096")
+        raise ImageError(f"--size {text}: must be WIDTHxHEIGHT, both from 16 to 4096")
     return int(width), int(height)

@@ -1,7 +1,7 @@
-"""The camera's live picture for any browser: multipart JPEG over HTTP, at 10 pictures a second.
+"""The camera's live image for any browser: multipart JPEG over HTTP, at 10 images a second.
 
-In: the camera's view, at each frame of the flight. Out: http://127.0.0.1:PORT/ with the picture, `/stream.mjpg`,
-`/still.jpg`, `/camera.xml` (the camera definition file) and `/media/` (what the camera has stored). A picture is
+In: the camera's view, at each frame of the flight. Out: http://127.0.0.1:PORT/ with the image, `/stream.mjpg`,
+`/still.jpg`, `/camera.xml` (the camera definition file) and `/media/` (what the camera has stored). An image is
 rendered only while somebody watches, on a thread of its own, paced by the wall clock.
 """
 
@@ -23,7 +23,7 @@ from mission.net_guard import LOOPBACK, BoundedHttpServer, GuardedHandler
 RATE_HZ = 10.0
 QUALITY = 80
 WATCHERS_MAX = 8
-WAIT_S = 10.0  # wall clock; the first picture may have to wait for its kernel to be compiled
+WAIT_S = 10.0  # wall clock; the first image may have to wait for its kernel to be compiled
 _BOUNDARY = "frame"
 _PAGE = b"""<!DOCTYPE html><html><head><title>Honeyguide camera</title>
 <style>body{margin:0;background:#111}img{width:100vw;height:100vh;object-fit:contain;image-rendering:auto}</style>
@@ -51,7 +51,7 @@ class StreamServer:
         self._pending: Future[RawFrame] | None = None
         self._next_s = 0.0
         self._jpeg = b""
-        self._serial = 0  # of the picture, from 1
+        self._serial = 0  # of the image, from 1
         self._watchers = 0
         self._is_closed = False
         self._news = Condition()
@@ -85,7 +85,7 @@ class StreamServer:
     # The flight's side
 
     def frame(self) -> None:
-        """Asks for the next picture, if somebody watches and it is due."""
+        """Asks for the next image, if somebody watches and it is due."""
         if not self._watchers or not self.is_running or self._camera is None or self._source is None:
             return
         if self._pending is not None:
@@ -133,15 +133,15 @@ class StreamServer:
             with self._news:
                 self._watchers -= has_room
 
-    def next_picture(self, after: int) -> tuple[int, bytes] | None:
-        """The newest picture and its number, when there is one after number `after`; None: the stream has ended."""
+    def next_image(self, after: int) -> tuple[int, bytes] | None:
+        """The newest image and its number, when there is one after number `after`; None: the stream has ended."""
         with self._news:
             self._news.wait_for(lambda: self._serial > after or self._is_closed, WAIT_S)
             return None if self._is_closed or self._serial <= after else (self._serial, self._jpeg)
 
     @property
     def is_paused(self) -> bool:
-        """Whether there is no picture because a client has stopped the stream."""
+        """Whether there is no image because a client has stopped the stream."""
         return not self.is_running and not self._is_closed
 
     @property
@@ -184,7 +184,7 @@ def _handler(stream: StreamServer) -> type[GuardedHandler]:
             self.end_headers()
 
         def _still(self) -> None:
-            image = stream.next_picture(stream.serial)
+            image = stream.next_image(stream.serial)
             if image is None:
                 self.send_error(HTTPStatus.SERVICE_UNAVAILABLE, "no picture")
             else:
@@ -197,7 +197,7 @@ def _handler(stream: StreamServer) -> type[GuardedHandler]:
             self.end_headers()
             serial = stream.serial
             while True:  # until the browser goes, or takes nothing for too long
-                image = stream.next_picture(serial)
+                image = stream.next_image(serial)
                 if image is None:
                     if stream.is_paused:
                         continue

@@ -1,7 +1,7 @@
 """The camera's live video for ground stations: H.264 in RTP packets over UDP, as QGroundControl expects it.
 
 In: the camera's view, at frames of the flight. Out: packets to one address, chosen when the flight is started; nobody
-can have them sent elsewhere. Rendering and encoding have threads of their own: the flight never waits, and a picture
+can have them sent elsewhere. Rendering and encoding have threads of their own: the flight never waits, and an image
 that is not ready when the next is due stands for it. Paced by the wall clock. PyAV encodes and sends (RFC 6184).
 """
 
@@ -83,7 +83,7 @@ class RtpVideo:
         self._camera, self._source = camera, source
 
     def frame(self) -> None:
-        """Has the next picture rendered and sent, if it is due."""
+        """Has the next image rendered and sent, if it is due."""
         if self._pending is not None:
             if not self._pending.done():
                 return
@@ -99,7 +99,7 @@ class RtpVideo:
             self._pending = self._pool.submit(self._send, self._source.capture(view), now_s)
 
     def _send(self, frame: "Future[RawFrame]", time_s: float) -> str:
-        """Encodes and sends a picture; what went wrong with the network, or nothing."""
+        """Encodes and sends an image; what went wrong with the network, or nothing."""
         rgb = frame.result().rgb
         try:
             if self._sender is None:
@@ -120,13 +120,13 @@ class RtpVideo:
         self._trouble = trouble
 
     def _end(self) -> None:
-        """Closes the sender; the next picture opens a new one, and begins with a key frame."""
+        """Closes the sender; the next image opens a new one, and begins with a key frame."""
         if self._sender is not None:
             self._sender.close()
             self._sender = None
 
     def close(self) -> None:
-        """Ends the stream; a picture that is not ready is not sent."""
+        """Ends the stream; an image that is not ready is not sent."""
         self._pool.shutdown(cancel_futures=True)
         self._end()
 
@@ -147,7 +147,7 @@ class _Sender:
         self._stream.width, self._stream.height, self._stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         context = self._stream.codec_context
         context.time_base = Fraction(1, CLOCK_HZ)
-        context.gop_size = RATE_HZ  # a station that comes later sees a picture within a second
+        context.gop_size = RATE_HZ  # a station that comes later sees an image within a second
         context.thread_count = 1
 
     def show(self, rgb: NDArray[np.uint8], time_s: float) -> None:
@@ -162,7 +162,7 @@ class _Sender:
 
 
 def check_encoder() -> None:
-    """Whether pictures can be encoded here.
+    """Whether images can be encoded here.
 
     Raises:
         VideoError: they cannot.

@@ -1,4 +1,4 @@
-"""Films: RGB pictures as an mp4 (H.264, yuv420p, what browsers play); PyAV is imported when one is begun."""
+"""Films: RGB images as an mp4 (H.264, yuv420p, what browsers play); PyAV is imported when one is begun."""
 
 from contextlib import suppress
 from fractions import Fraction
@@ -24,12 +24,12 @@ class VideoError(ValueError):
 class Mp4:
     """A film that takes its name when it is complete."""
 
-    def __init__(self, target: Path, picture_s: float) -> None:
-        """Checks what can be checked before the first picture.
+    def __init__(self, target: Path, image_s: float) -> None:
+        """Checks what can be checked before the first image.
 
         Args:
             target: the file; an existing one is replaced at the end.
-            picture_s: how long each picture is shown [s].
+            image_s: how long each image is shown [s].
 
         Raises:
             VideoError: no such folder, or a PyAV without the encoder.
@@ -45,12 +45,12 @@ class Mp4:
             raise VideoError(f"{target}: the installed PyAV has no H.264 encoder ({_CODEC})") from None
         self._av: Any = av
         self._target = target
-        self._rate = Fraction(1.0 / picture_s).limit_denominator(1000)
+        self._rate = Fraction(1.0 / image_s).limit_denominator(1000)
         self._container: Any = None
         self._stream: Any = None
 
     def show(self, image: NDArray[np.uint8]) -> None:
-        """Appends an RGB picture, shape (height, width, 3); odd sizes lose their last row or column.
+        """Appends an RGB image, shape (height, width, 3); odd sizes lose their last row or column.
 
         Raises:
             VideoError: the disk is full, or the file cannot be written.
@@ -67,7 +67,7 @@ class Mp4:
             raise VideoError(f"{self._target}: cannot be written: {error.strerror}") from error
 
     def close(self) -> None:
-        """Completes the file; without a picture there is none.
+        """Completes the file; without an image there is none.
 
         Raises:
             VideoError: the disk is full.

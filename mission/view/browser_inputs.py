@@ -35,7 +35,7 @@ def is_sound(raw: bytes | str) -> bool:
             return isinstance(updates, dict) and updates.keys() == {"value"} and _is_value(updates["value"])
         case "SceneNodeClickMessage" | "GuiButtonHoldMessage" | "CommandTriggerMessage":
             return True
-        case _:  # uploads, links to share, pictures: no page of ours asks for them
+        case _:  # uploads, links to share, images: no page of ours asks for them
             return False
 
 

@@ -1,6 +1,6 @@
 """The camera that flies with the vehicle of a film: where it is, and where it looks.
 
-In: a recording and its world. Out: a place and a target for each picture. The whole flight is known, so the camera
+In: a recording and its world. Out: a place and a target for each image. The whole flight is known, so the camera
 moves by averages over the time before and after; it comes nearer where a tree would stand before it. It is behind and
 above the vehicle, and beside it where somebody is followed: neither hides the other.
 """
@@ -16,8 +16,8 @@ from mission.log.euler_angles import yaw_rad
 from mission.view.replay_file import Recording
 from sim.world.world import WorldMap
 
-STRIDE = 2  # frames of the flight per picture
-PICTURE_S = STRIDE * FRAME_US * 1e-6
+STRIDE = 2  # frames of the flight per image
+IMAGE_S = STRIDE * FRAME_US * 1e-6
 BEHIND_M, ABOVE_M = 3.6, 1.6  # of the vehicle
 BESIDE_RAD = radians(40.0)  # round the vehicle, from behind it to the right, where somebody is followed
 NEAREST_M = 1.2
@@ -30,8 +30,8 @@ Floats = NDArray[np.float64]
 
 
 def camera_path(recording: Recording, world: WorldMap) -> tuple[Floats, Floats]:
-    """Where the camera is and where it looks at each moment [m], both (moments, 3); a moment each PICTURE_S."""
-    rows, sigma = recording.rows, SMOOTH_S / PICTURE_S
+    """Where the camera is and where it looks at each moment [m], both (moments, 3); a moment each IMAGE_S."""
+    rows, sigma = recording.rows, SMOOTH_S / IMAGE_S
     pos = rows["pos_ned"].astype(np.float64)
     has_owner = rows["owner"]["stature_m"] > 0.0
     towards = np.where(has_owner[:, None], rows["owner"]["pos_ned"] - rows["pos_ned"], 0.0)[:, :2].astype(np.float64)

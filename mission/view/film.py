@@ -15,7 +15,7 @@ from common.clock import wall_time_s
 from mission.console.terminal import LINE_PERIOD_S, print_line
 from mission.flight_options import UserError
 from mission.video.video_file import Mp4, VideoError
-from mission.view.chase_camera import PICTURE_S, STRIDE
+from mission.view.chase_camera import IMAGE_S, STRIDE
 from mission.view.film_images import film
 from mission.view.replay_file import Recording
 from sim.world.world import WorldMap
@@ -29,18 +29,18 @@ def write_film(recording: Recording, world: WorldMap, target: Path, console: Con
     """
     count = len(recording.rows[::STRIDE])
     try:
-        with Mp4(target, PICTURE_S) as mp4, told(console, count) as tell:
-            for i, picture in enumerate(film(recording, world)):
-                mp4.show(picture)
+        with Mp4(target, IMAGE_S) as mp4, told(console, count) as tell:
+            for i, image in enumerate(film(recording, world)):
+                mp4.show(image)
                 tell(i + 1)
     except VideoError as error:
         raise UserError(str(error)) from error
-    print_line(console, f"film of {count * PICTURE_S:.0f} s: {target}")
+    print_line(console, f"film of {count * IMAGE_S:.0f} s: {target}")
 
 
 @contextmanager
 def told(console: Console, count: int) -> Iterator[Callable[[int], None]]:
-    """Inside, whoever gives the number of pictures done has it shown, with the time passed and left."""
+    """Inside, whoever gives the number of images done has it shown, with the time passed and left."""
     if console.is_terminal:
         columns = (TextColumn("film"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
         with Progress(*columns, console=console, transient=True) as progress:

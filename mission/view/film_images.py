@@ -1,6 +1,6 @@
-"""The pictures of a film: the chase camera's view, what the vehicle itself sees, and a line of figures.
+"""The images of a film: the chase camera's view, what the vehicle itself sees, and a line of figures.
 
-In: a recording and its world. Out: pictures in their order, 25 a second of flight. Each is made on one core, and as
+In: a recording and its world. Out: images in their order, 25 a second of flight. Each is made on one core, and as
 many at a time as there are cores: the camera's kernels and OpenCV let other threads run.
 """
 
@@ -25,15 +25,15 @@ from sim.world.world import WorldMap
 
 WIDTH, HEIGHT, HFOV_DEG = 960, 540, 75.0
 RANGE_M = 150.0
-INSET = 192  # [pixels] side of the onboard picture
+INSET = 192  # [pixels] side of the onboard image
 MARGIN = 16
 STRIP, FONT_SCALE = 36, 0.7  # [pixels] height of the caption, and the size of its letters
-AHEAD = 4  # pictures that each core may be ahead of who takes them
-Picture = NDArray[np.uint8]
+AHEAD = 4  # images that each core may be ahead of who takes them
+Image = NDArray[np.uint8]
 
 
-def film(recording: Recording, world: WorldMap) -> Iterator[Picture]:
-    """The pictures, RGB, (HEIGHT, WIDTH, 3), one each `chase.PICTURE_S`."""
+def film(recording: Recording, world: WorldMap) -> Iterator[Image]:
+    """The images, RGB, (HEIGHT, WIDTH, 3), one each `chase.IMAGE_S`."""
     recording = recording.every(STRIDE)
     places, targets = camera_path(recording, world)
     cores = len(os.sched_getaffinity(0))
@@ -41,15 +41,15 @@ def film(recording: Recording, world: WorldMap) -> Iterator[Picture]:
     for _ in range(cores):
         studios.put(Studio(recording, world))
 
-    def taken(i: int) -> Picture:
+    def taken(i: int) -> Image:
         studio = studios.get()
         try:
-            return studio.picture(recording.rows[i], places[i], targets[i])
+            return studio.image(recording.rows[i], places[i], targets[i])
         finally:
             studios.put(studio)
 
     with ThreadPoolExecutor(cores, "film") as pool:
-        waiting: deque[Future[Picture]] = deque()
+        waiting: deque[Future[Image]] = deque()
         try:
             for i in range(len(recording)):
                 waiting.append(pool.submit(taken, i))
@@ -62,26 +62,26 @@ def film(recording: Recording, world: WorldMap) -> Iterator[Picture]:
 
 
 class Studio:
-    """Makes one picture at a time."""
+    """Makes one image at a time."""
 
     def __init__(self, recording: Recording, world: WorldMap) -> None:
         self._chase = Eye(world, WIDTH, HEIGHT, HFOV_DEG, range_m=RANGE_M)
         self._onboard = onboard_eye(world)
         self._model = VehicleModel(load_airframe(recording.config.airframe))
 
-    def picture(self, row: Any, place: Floats, target: Floats) -> Picture:
+    def image(self, row: Any, place: Floats, target: Floats) -> Image:
         """A recorded moment, seen from a place [m] towards a target."""
         q_ned_from_rdf = looking(place, target)
         self._chase.look(place, q_ned_from_rdf, row["owner"])
-        picture: Picture = self._chase.rgb.copy()
-        self._model.draw(picture, self._chase, row, place, q_ned_from_rdf)
+        image: Image = self._chase.rgb.copy()
+        self._model.draw(image, self._chase, row, place, q_ned_from_rdf)
         self._onboard.look_from(row)
         inset = cv2.resize(self._onboard.rgb, (INSET, INSET), interpolation=cv2.INTER_NEAREST)
-        picture[MARGIN : MARGIN + INSET, -MARGIN - INSET : -MARGIN] = inset
+        image[MARGIN : MARGIN + INSET, -MARGIN - INSET : -MARGIN] = inset
         corner = (WIDTH - MARGIN - INSET - 1, MARGIN - 1)
-        cv2.rectangle(picture, corner, (WIDTH - MARGIN, MARGIN + INSET), (255, 255, 255), 1)
-        write_caption(picture, caption(Moment(row)))
-        return picture
+        cv2.rectangle(image, corner, (WIDTH - MARGIN, MARGIN + INSET), (255, 255, 255), 1)
+        write_caption(image, caption(Moment(row)))
+        return image
 
 
 def caption(moment: Moment) -> str:
@@ -94,8 +94,8 @@ def caption(moment: Moment) -> str:
     return f"{minutes}:{0.1 * tenths:04.1f}   {moment.mode_name}   {figures}"
 
 
-def write_caption(picture: Picture, text: str) -> None:
+def write_caption(image: Image, text: str) -> None:
     """White letters on a darkened strip along the lower edge: to be read before sky and forest."""
-    picture[-STRIP:] >>= 1
+    image[-STRIP:] >>= 1
     foot = (MARGIN, HEIGHT - STRIP // 3)
-    cv2.putText(picture, text, foot, cv2.FONT_HERSHEY_SIMPLEX, FONT_SCALE, (255, 255, 255), 1, cv2.LINE_AA)
+    cv2.putText(image, text, foot, cv2.FONT_HERSHEY_SIMPLEX, FONT_SCALE, (255, 255, 255), 1, cv2.LINE_AA)

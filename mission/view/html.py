@@ -1,7 +1,7 @@
 """A recorded flight as one HTML file that needs nothing else: no network, no server, no library.
 
 In: a recording and its world. Out: the page `replay.html` of this folder with the data inside: scene, paths, plots and
-the onboard pictures, one sheet of small JPEGs. A minute's flight makes about half a megabyte.
+the onboard images, one sheet of small JPEGs. A minute's flight makes about half a megabyte.
 """
 
 import json
@@ -25,7 +25,7 @@ from mission.view.snapshot_images import onboard_eye
 from sim.world.world import WorldMap
 
 STRIDE = 5  # frames of the flight per moment of the page: 10 a second
-TILES_MOST = 600  # onboard pictures
+TILES_MOST = 600  # onboard images
 TILES_PER_S = 5
 TILE_COLUMNS = 20
 CELLS_MOST = 128
@@ -123,7 +123,7 @@ def _plots(recording: Recording) -> list[Json]:
 
 
 def _onboard(recording: Recording, world: WorldMap) -> Json:
-    """The onboard camera's pictures side by side, row by row."""
+    """The onboard camera's images side by side, row by row."""
     stride = max(10 // TILES_PER_S, -(-len(recording) // TILES_MOST))
     eye = onboard_eye(world)
     side = len(eye.rgb)

@@ -27,13 +27,13 @@ from sim.camera_rig import MOUNT_FRD, CameraRig
 UPDATE_S = 1.0 / 15.0
 STATUS_S = 0.25
 PLOTS_S = 0.5
-PICTURE_S = 0.2
+IMAGE_S = 0.2
 PAUSE_S = 0.05  # how often a paused flight looks whether it may go on
 TASKS_MAX = 64  # clicks that wait; what is beyond is not done
 TASKS_PER_FRAME_MAX = 4
-PICTURE_SIZE = (320, 180)
+IMAGE_SIZE = (320, 180)
 PHOTO_HFOV_DEG = 80.0
-ENLARGED = 4  # a policy's picture is small
+ENLARGED = 4  # a policy's image is small
 RDF_IN_FRD = (0.5, 0.5, 0.5, 0.5)  # a camera that looks ahead
 
 
@@ -62,8 +62,8 @@ class LiveView:
         self._flight, self._server, self._action, self._score = flight, server, action, score
         self._todo: Queue[Callable[[], None]] = Queue(TASKS_MAX)
         self._camera = flight.controller.camera
-        self._pixels: NDArray[np.uint8] | None = None  # newest picture of the camera that a policy sees through
-        mount = None if self._camera is None else Mount(MOUNT_FRD, RDF_IN_FRD, PHOTO_HFOV_DEG, *PICTURE_SIZE)
+        self._pixels: NDArray[np.uint8] | None = None  # newest image of the camera that a policy sees through
+        mount = None if self._camera is None else Mount(MOUNT_FRD, RDF_IN_FRD, PHOTO_HFOV_DEG, *IMAGE_SIZE)
         if flight.onboard is not None:
             flight.onboard.add_sink(self._seen)
             mount = Mount(MOUNT_FRD, flight.onboard.view.q_frd_from_rdf, flight.onboard.view.hfov_deg, 1, 1)
@@ -139,8 +139,8 @@ class LiveView:
             self._show_texts(moment)
         if self._is_due("plots", PLOTS_S):
             self._panel.draw_plots()
-        if self._is_due("picture", PICTURE_S):
-            self._renew_picture()
+        if self._is_due("picture", IMAGE_S):
+            self._renew_image()
 
     def _show_texts(self, moment: Moment, *more: str) -> None:
         crash = ("the vehicle has crashed: Restart puts it back on its pad",) if self._flight.is_crashed else ()
@@ -152,14 +152,14 @@ class LiveView:
     def _seen(self, frame: ImageFrame) -> None:
         self._pixels = frame.pixels[..., :3]
 
-    def _renew_picture(self) -> None:
+    def _renew_image(self) -> None:
         if self._pixels is not None:
-            self._show_picture(self._pixels.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1))
+            self._show_image(self._pixels.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1))
         if self._flight.onboard is not None:
             return
         if self._camera is None or (self._pending is not None and not self._pending.done()):
             return
-        view = self._camera.view(PICTURE_SIZE, is_smooth=False)
+        view = self._camera.view(IMAGE_SIZE, is_smooth=False)
         if self._scene.frustum is not None:
             self._scene.frustum.wxyz = wxyz_of(view.q_frd_from_rdf)
         self._pending = self._camera_rig.capture(view)
@@ -168,10 +168,10 @@ class LiveView:
     def _show_taken(self, future: "Future[RawFrame]") -> None:
         """On the camera's thread."""
         if not future.cancelled() and future.exception() is None:
-            self._show_picture(future.result().rgb)
+            self._show_image(future.result().rgb)
 
-    def _show_picture(self, rgb: NDArray[np.uint8]) -> None:
-        self._panel.show_picture(rgb)
+    def _show_image(self, rgb: NDArray[np.uint8]) -> None:
+        self._panel.show_image(rgb)
         if self._scene.frustum is not None:
             self._scene.frustum.image = rgb
 
@@ -182,7 +182,7 @@ class LiveView:
         client.camera.look_at = target_ned
 
     def _move_cameras(self, moment: Moment) -> None:
-        """Keeps the vehicle in the middle of each viewer's picture, seen from where they have turned to.
+        """Keeps the vehicle in the middle of each viewer's image, seen from where they have turned to.
 
         Place and target of a viewer come in one message of their browser: however late it is, their difference holds.
         """

@@ -28,7 +28,7 @@ MESSAGE_MAX = 1 << 20  # [byte] of one message of a browser; a click has some 20
 OPENING_S = 5.0  # wall clock, from a connection to its complete request
 
 # viser calls its page by its own name, and covers the scene on a phone with its controls. They get the lower part of
-# it, status and picture first.
+# it, status and image first.
 _PHONE_STYLE = """
 @media (max-width: 36em) {
   #root { height: 56% !important; }

@@ -1,4 +1,4 @@
-"""The column left of the scene: status, onboard picture and plots.
+"""The column left of the scene: status, onboard image and plots.
 
 In: moments. Out: viser's GUI elements, each renewed at its own slow rate: text at 4 Hz, plots at 2 Hz.
 """
@@ -36,7 +36,7 @@ PLOTS: dict[str, tuple[tuple[str, ...], Read]] = {
 
 
 class Panel:
-    """Status, picture and plots of one flight.
+    """Status, image and plots of one flight.
 
     Args:
         server: of the page.
@@ -45,14 +45,14 @@ class Panel:
 
     def __init__(self, server: viser.ViserServer, *, has_owner: bool) -> None:
         self._gui = server.gui
-        self._picture: viser.GuiImageHandle | None = None
+        self._image: viser.GuiImageHandle | None = None
         panel = self._gui.add_panel()
         with panel.add_tab("Flight"):
             self._status = self._gui.add_markdown("waiting for the flight")
             self._texts_folder = self._gui.add_folder("What the vehicle says", visible=False)
             with self._texts_folder:
                 self._texts = self._gui.add_markdown("")
-            self._picture_folder = self._gui.add_folder("Onboard camera", visible=False)
+            self._image_folder = self._gui.add_folder("Onboard camera", visible=False)
             self._plots = [
                 Plot(self._gui, title, names, read)
                 for title, (names, read) in PLOTS.items()
@@ -79,14 +79,14 @@ class Panel:
         self._texts_folder.visible = True
         self._texts.content = "  \n".join(_text_line(text) for text in reversed(texts[-TEXTS_SHOWN:]))
 
-    def show_picture(self, rgb: NDArray[np.uint8]) -> None:
-        """Renews the onboard picture; any thread may do so."""
-        if self._picture is None:
-            with self._picture_folder:
-                self._picture = self._gui.add_image(rgb, format="jpeg", jpeg_quality=80)
-            self._picture_folder.visible = True
+    def show_image(self, rgb: NDArray[np.uint8]) -> None:
+        """Renews the onboard image; any thread may do so."""
+        if self._image is None:
+            with self._image_folder:
+                self._image = self._gui.add_image(rgb, format="jpeg", jpeg_quality=80)
+            self._image_folder.visible = True
         else:
-            self._picture.image = rgb
+            self._image.image = rgb
 
     def note(self, moment: Moment) -> None:
         """Adds a point to each plot."""

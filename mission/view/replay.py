@@ -27,7 +27,7 @@ from sim.camera_rig import MOUNT_FRD
 from sim.world.world import WorldMap
 
 UPDATE_S = 0.05
-SLOW_UPDATES = 6  # updates of the scene per update of trails, picture and text
+SLOW_UPDATES = 6  # updates of the scene per update of trails, image and text
 ENLARGED = 4
 TRAIL_FRAMES = 12
 PACES = {"1/2 x": 0.5, "1 x": 1.0, "2 x": 2.0, "5 x": 5.0}
@@ -131,7 +131,7 @@ class ReplayView:
         self._panel.show_status(moment, (title_of(self._recording),))
         self._draw_trails(index)
         self._eye.look_from(self._recording.rows[index])
-        self._panel.show_picture(self._eye.rgb.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1))
+        self._panel.show_image(self._eye.rgb.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1))
 
     def _draw_trails(self, index: int) -> None:
         self._scene.draw_trails(self._recording.rows[: index + 1 : TRAIL_FRAMES])

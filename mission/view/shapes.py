@@ -14,7 +14,7 @@ from sim.world.walls import WALL_THICKNESS_M
 from sim.world.world import WorldMap
 
 Floats = NDArray[np.float32]
-SUN_NED = np.array([-0.60, 0.51, -0.62], np.float32)  # where the light comes from: as in the cameras' pictures, nearly
+SUN_NED = np.array([-0.60, 0.51, -0.62], np.float32)  # where the light comes from: as in the cameras' images, nearly
 GRASS, MEADOW, EARTH = (np.array(rgb, np.float32) for rgb in ((92, 122, 58), (140, 150, 82), (150, 130, 96)))  # sRGB
 SIDES = 7  # of a trunk: few triangles, and round enough
 

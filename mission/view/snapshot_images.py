@@ -1,6 +1,6 @@
-"""Pictures of recorded moments: the fast camera, pointed from the host.
+"""Images of recorded moments: the fast camera, pointed from the host.
 
-In: a place and an attitude, or a recorded moment. Out: colours and depth. The onboard camera's pictures of a recording
+In: a place and an attitude, or a recorded moment. Out: colours and depth. The onboard camera's images of a recording
 are what was seen then, without what a lens and a sensor add.
 """
 
@@ -23,8 +23,8 @@ class Eye:
 
     Args:
         world: what it sees.
-        width: of its pictures [pixels].
-        height: of its pictures [pixels].
+        width: of its images [pixels].
+        height: of its images [pixels].
         hfov_deg: horizontal field of view.
         range_m: fog hides what is farther.
     """
@@ -42,14 +42,14 @@ class Eye:
         self.depth_m: Any = self.camera.depth_m.numpy()[0]
 
     def look(self, pos_ned: Any, q_ned_from_rdf: Quat, owner: np.void) -> None:
-        """Takes the picture from there; the owner may have a stature of 0, which is nobody."""
+        """Takes the image from there; the owner may have a stature of 0, which is nobody."""
         self._lens["pos_ned"] = pos_ned
         self._lens["q_ned_from_rdf"] = q_ned_from_rdf
         self._person[0] = owner
         self.camera.render()
 
     def look_from(self, row: Any) -> None:
-        """Takes the picture that the vehicle's onboard camera takes at a recorded moment."""
+        """Takes the image that the vehicle's onboard camera takes at a recorded moment."""
         x, y, z, w = (float(value) for value in row["q_ned_from_frd"])
         q = (x, y, z, w)
         self.look(row["pos_ned"] + np.array(rotated(q, MOUNT_FRD)), product(q, camera_mount()), row["owner"])

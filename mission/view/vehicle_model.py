@@ -1,4 +1,4 @@
-"""The vehicle, drawn into a camera's picture: filled triangles, far ones first, and see-through rotor discs.
+"""The vehicle, drawn into a camera's image: filled triangles, far ones first, and see-through rotor discs.
 
 In: an airframe, then poses of vehicle and camera. Out: pixels, where nothing nearer hides the vehicle.
 """
@@ -18,7 +18,7 @@ NEAREST_M = 0.3  # a vehicle nearer than this is not drawn
 ROTOR_OPACITY = 0.35
 DISC_SIDES = 24
 DISC_RGB = (210, 214, 220)
-Picture = NDArray[np.uint8]
+Image = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 
 
@@ -33,8 +33,8 @@ class VehicleModel:
         disc = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(DISC_SIDES, -0.03)])
         self._discs = (hubs[:, None] + disc).reshape(-1, 3)
 
-    def draw(self, picture: Picture, eye: Eye, row: Any, place: Floats, q_ned_from_rdf: Quat) -> None:
-        """Draws it as it is at a recorded moment, into the picture that the eye takes from `place` [m]."""
+    def draw(self, image: Image, eye: Eye, row: Any, place: Floats, q_ned_from_rdf: Quat) -> None:
+        """Draws it as it is at a recorded moment, into the image that the eye takes from `place` [m]."""
         turn, body = matrix(q_ned_from_rdf), matrix(row["q_ned_from_frd"])
         points = np.concatenate([self._frame.vertices, self._discs]) @ body.T + (row["pos_ned"] - place)
         points_rdf = points @ turn
@@ -42,7 +42,7 @@ class VehicleModel:
         if distance < NEAREST_M:
             return
         pixels = _pixels(points_rdf, eye)
-        size = np.array(picture.shape[1::-1])
+        size = np.array(image.shape[1::-1])
         low = np.clip(pixels.min(axis=0) - 1, 0, size)
         high = np.clip(pixels.max(axis=0) + 2, 0, size)
         if (low >= high).any():
@@ -50,16 +50,16 @@ class VehicleModel:
         where = np.s_[low[1] : high[1], low[0] : high[0]]
         pixels = pixels - low
         count = len(self._frame.vertices)
-        drawn = picture[where].copy()
+        drawn = image[where].copy()
         self._fill(drawn, points_rdf[:count], pixels[:count])
         veiled = drawn.copy()
         for disc in pixels[count:].reshape(-1, DISC_SIDES, 2):
             cv2.fillPoly(veiled, [disc], DISC_RGB, cv2.LINE_AA)
         cv2.addWeighted(veiled, ROTOR_OPACITY, drawn, 1.0 - ROTOR_OPACITY, 0.0, dst=drawn)
         is_nearer = eye.depth_m[where] > distance - NEAREST_M
-        picture[where][is_nearer] = drawn[is_nearer]
+        image[where][is_nearer] = drawn[is_nearer]
 
-    def _fill(self, picture: Picture, vertices: Floats, pixels: NDArray[np.int32]) -> None:
+    def _fill(self, image: Image, vertices: Floats, pixels: NDArray[np.int32]) -> None:
         faces = self._frame.faces
         triangles = vertices[faces]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -69,7 +69,7 @@ class VehicleModel:
         rgb = np.clip(self._frame.colours[faces[:, 0]] * light, 0, 255).tolist()
         for i in np.argsort(-triangles[:, :, 2].mean(axis=1)):
             if is_front[i]:
-                cv2.fillConvexPoly(picture, pixels[faces[i]], rgb[i], cv2.LINE_AA)
+                cv2.fillConvexPoly(image, pixels[faces[i]], rgb[i], cv2.LINE_AA)
 
 
 def _pixels(points_rdf: Floats, eye: Eye) -> NDArray[np.int32]:

@@ -54,7 +54,7 @@ class VideoStream(Protocol):
     is_running: bool  # may be set: STOP_STREAMING pauses it
 
 
-class PictureServer(VideoStream, Protocol):
+class ImageServer(VideoStream, Protocol):
     """One that serves files as well."""
 
     definition_uri: str  # where the camera's definition file is; empty for nowhere

@@ -7,11 +7,11 @@ from common.geodesy import DEFAULT_HOME
 from common.kernels import FRAME_US
 from mission.flight_config import OwnerConfig
 from mission.follow.owner_device import FollowedOwner
-from policies.tasks.follow_me.follow_me_params import NUMBERS
+from policies.tasks.follow_me.follow_me_params import PARAMS
 from sim.world.world import WorldConfig, build_world
 
 WAITED_S = 20.0
-DEFAULTS = {number.name: number.default for number in NUMBERS}
+DEFAULTS = {number.name: number.default for number in PARAMS}
 
 
 @pytest.fixture(scope="module")

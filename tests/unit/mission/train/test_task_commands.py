@@ -128,19 +128,19 @@ def test_play_without_a_display_points_to_the_film(run, tmp_path, monkeypatch):
 def test_film_shows_every_decision_at_its_pace(run, tmp_path):
     result = run("play", "RollerBall", "--mp4", "a.mp4", "--episodes", 1, "--seed", 1)
     assert "1 episodes: 1 success" in result.output
-    rate, pictures = pictures_of(tmp_path / "a.mp4")
+    rate, images = pictures_of(tmp_path / "a.mp4")
     assert rate == 5.0
-    assert len(pictures) > 2
-    assert pictures[0].shape == (480, 480, 3)
-    assert np.abs(pictures[0].astype(int) - pictures[-1]).max() > 100
+    assert len(images) > 2
+    assert images[0].shape == (480, 480, 3)
+    assert np.abs(images[0].astype(int) - images[-1]).max() > 100
     assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
 
 
 def test_environments_are_tiled(run, tmp_path):
     run("play", "RollerBall", "--random", "--mp4", "a.mp4", "--episodes", 1, "--envs", 3)
-    _, pictures = pictures_of(tmp_path / "a.mp4")
-    assert pictures[0].shape == (960, 960, 3)
-    assert pictures[0][480:, 480:].max() < 30  # no fourth environment
+    _, images = pictures_of(tmp_path / "a.mp4")
+    assert images[0].shape == (960, 960, 3)
+    assert images[0][480:, 480:].max() < 30  # no fourth environment
 
 
 def policy_file(folder):

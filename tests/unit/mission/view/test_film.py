@@ -38,19 +38,19 @@ def test_the_vehicle_and_the_onboard_picture_are_in_the_film(world):
 def test_pictures_made_on_several_cores_come_in_their_order(world):
     recording = hovering(0.8)
     recording.rows["pos_ned"][:, 2] -= np.linspace(0.0, 30.0, len(recording))  # it climbs out of the owner's sight
-    pictures = [picture[:-40, : -INSET - 2 * MARGIN].astype(int) for picture in film(recording, world)]
-    assert len(pictures) == len(recording) // 2
-    steps = [np.abs(b - a).mean() for a, b in pairwise(pictures)]
-    assert max(steps) < np.abs(pictures[-1] - pictures[0]).mean()
-    again = [picture[:-40, : -INSET - 2 * MARGIN].astype(int) for picture in film(recording, world)]
-    assert all((a == b).all() for a, b in zip(pictures, again, strict=True))
+    images = [image[:-40, : -INSET - 2 * MARGIN].astype(int) for image in film(recording, world)]
+    assert len(images) == len(recording) // 2
+    steps = [np.abs(b - a).mean() for a, b in pairwise(images)]
+    assert max(steps) < np.abs(images[-1] - images[0]).mean()
+    again = [image[:-40, : -INSET - 2 * MARGIN].astype(int) for image in film(recording, world)]
+    assert all((a == b).all() for a, b in zip(images, again, strict=True))
 
 
 def test_a_film_is_large_and_who_stops_taking_pictures_is_not_waited_for(world):
-    pictures = film(hovering(1.0), world)
-    assert next(pictures).shape[0] >= 540
-    assert next(pictures).shape[1] >= 960
-    pictures.close()
+    images = film(hovering(1.0), world)
+    assert next(images).shape[0] >= 540
+    assert next(images).shape[1] >= 960
+    images.close()
 
 
 def test_the_caption_tells_clock_mode_and_distance_or_speed_and_height():
