@@ -4,7 +4,7 @@ In: estimate, samples, actuators and estimator health, read from the kernel rows
 Out: the setpoint row; telemetry through the attached servers. Time is the simulated time it is given.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -45,9 +45,8 @@ from autopilot.payload.gimbal.gimbal import Gimbal
 from autopilot.payload.gimbal.gimbal_control import GimbalControl
 from autopilot.payload.payloads import Payloads
 from autopilot.roi_and_pause import Guidance
-from autopilot.vehicles.multirotor.motor_failures import LeaveOut, MotorWatch, ReadSpeeds
 from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
-from autopilot.vehicles.vehicle_class import VehicleClass
+from autopilot.vehicles.vehicle_class import DriveParts, VehicleClass
 from common.airframe import Airframe
 from common.attitude import roll_pitch_yaw_of
 from common.geodesy import GeoPoint
@@ -65,8 +64,8 @@ class HostPorts:
     read_actuators: Callable[[], Any]  # Actuators
     read_health: Callable[[], Any]  # EstimatorState
     setpoint: np.ndarray[Any, Any]  # live structured view, shape (1,), of the Setpoint row
-    read_rotor_speeds: ReadSpeeds | None = None  # ESC telemetry
-    leave_out: LeaveOut | None = None  # rotors that the control allocation shall not use
+    read_motor_speeds: Callable[[], Sequence[float]] | None = None  # [rad/s] as the motors' controllers report them
+    airframe: np.ndarray[Any, Any] | None = None  # live structured view, shape (1,), of the law's Airframe row
     external: np.ndarray[Any, Any] | None = None  # live structured view, shape (1,), of the ExternalSample row
 
 
@@ -109,7 +108,7 @@ class FlightController:
     Args:
         ports: its kernel rows.
         params: its parameters.
-        airframe: its data: battery, hover thrust.
+        airframe: its data.
         origin: the geodetic origin of the ned frame.
         announcer: hears of events besides the attached servers (a log, a test).
         on_corrections: the GNSS receiver's input for RTCM corrections.
@@ -142,17 +141,17 @@ class FlightController:
         self.state = VehicleState(
             origin=origin,
             sticks=self.sticks.input,
-            rotor_count=len(airframe.rotors),
+            motor_count=len(vehicle.motors(airframe)),
             mav_type=vehicle.mav_type(airframe),
         )
         self.payload = Payloads()
         self.gimbal: GimbalControl | None = None
         self.camera = self._mount_camera()
-        self.state.read_rotor_speeds = ports.read_rotor_speeds
+        self.state.read_motor_speeds = ports.read_motor_speeds
         self._outputs = AuxOutputs(self.state)
         self.payload.add(self._outputs)
         self.traffic = Traffic(self.state, params)
-        self.obstacles = Obstacles(params)
+        self.obstacles = Obstacles(params, vehicle.limits.accel_hor)
         self.state.obstacles = self.obstacles
         self._read_estimate = ports.read_estimate
         self._read_samples = ports.read_samples
@@ -171,18 +170,8 @@ class FlightController:
         self.external = ExternalPositions(
             ports.external, params, lambda: state.time_us, lambda: (state.estimate, state.yaw_rad)
         )
-        hover, standing_m = vehicle.hover_thrust(airframe), airframe.contact.leg_z_m
-        self.commander = Commander(
-            self.state,
-            params,
-            self._relay,
-            BatteryEstimator(airframe.battery),
-            vehicle.ground_detector(params, airframe),
-            Pilot(self.state, params, self.sticks, vehicle.modes),
-            MotorWatch(self.state, params, self._relay, airframe, ports.read_rotor_speeds, ports.leave_out),
-            vehicle.modes,
-        )
-        context = NavContext(self.state, params, self._relay, self._setpoint, hover, standing_m)
+        self.commander = self._make_commander(vehicle, airframe, ports)
+        context = NavContext(self.state, params, self._relay, self._setpoint, vehicle.craft(airframe))
         mission = Mission(context, self.payload, self.commander.set_home)
         self.navigator = Navigator(context, mission, vehicle.modes)
         self.fence, self.rally = self.navigator.fence, self.navigator.rally
@@ -191,9 +180,24 @@ class FlightController:
         self.commander.connect(self.navigator)
         self.guidance = Guidance(self.commander, self.navigator, self.payload)
         self.station = self.commander.station
-        self.motor_test = MotorTest(self.state, self._setpoint, self._relay, airframe)
+        self.motor_test = MotorTest(self.state, self._setpoint, self._relay, vehicle.motors(airframe))
         self.calibration = Calibrator(self.state, params, self._relay, turntable)
         self._setpoint.write()
+
+    def _make_commander(self, vehicle: VehicleClass, airframe: Airframe, ports: HostPorts) -> Commander:
+        state, params = self.state, self.params
+        parts = DriveParts(state, params, self._relay, airframe, ports.read_motor_speeds, ports.airframe)
+        return Commander(
+            state,
+            params,
+            self._relay,
+            BatteryEstimator(airframe.battery),
+            None if vehicle.ground_detector is None else vehicle.ground_detector(params, airframe),
+            Pilot(state, params, self.sticks, vehicle.modes),
+            None if vehicle.drive_watch is None else vehicle.drive_watch(parts),
+            vehicle.modes,
+            vehicle.last_resort,
+        )
 
     def _mount_camera(self) -> Camera | None:
         """Hangs the camera on its gimbal, if the host has one."""

@@ -121,6 +121,8 @@ class Airframe(_Section):
 
     name: str
     description: str
+    vehicle: str = "multirotor"
+    """The class of vehicles that it is of."""
     body: Body
     rotor_model: RotorModel
     rotors: Annotated[list[Rotor], Field(min_length=3, max_length=8)]

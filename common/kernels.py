@@ -7,12 +7,12 @@ Array rows are `wp.struct`s: one row per vehicle, one field per physical quantit
 
 import warp as wp
 
-MAX_ROTORS = 8
+MAX_MOTORS = 8
 ERROR_STATES = 24
 YAW_MODELS = 5  # headings from which the yaw estimator starts
 
 vec5 = wp.types.vector(length=YAW_MODELS, dtype=wp.float32)
-vec8 = wp.types.vector(length=MAX_ROTORS, dtype=wp.float32)
+vec8 = wp.types.vector(length=MAX_MOTORS, dtype=wp.float32)
 vec24 = wp.types.vector(length=ERROR_STATES, dtype=wp.float32)
 
 TICK_US = 4_000

@@ -41,6 +41,7 @@ from mission.simulator.simulator_params import PREFIX as SIMULATOR_PREFIX
 from mission.simulator.simulator_params import TURBULENCE_SHARE, SimulatorParameters
 from mission.video.mjpeg_server import StreamServer
 from mission.video.rtp_video import RtpVideo
+from sim.bodies.vehicles import class_of
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.ring import RingSensor
@@ -98,6 +99,7 @@ class Flight:
     ) -> None:
         self.config = config
         self.airframe: Airframe = load_airframe(config.airframe)
+        vehicle, body = class_of(self.airframe)
         self.world: WorldMap = flight_world(config)
         self.rig = make_rig(
             self.airframe,
@@ -106,6 +108,8 @@ class Flight:
             flight_wind(config.wind_m_s, config.wind_from_deg),
             home=config.home,
             seed=config.seed,
+            body=body,
+            law=vehicle.law,
         )
         self.rig.prepare(FRAME_TICKS)
         self.time_us = 0
@@ -134,7 +138,7 @@ class Flight:
         )
         self.texts = Texts(lambda: self.time_us)
         self.controller = FlightController(
-            host_ports(self.rig, self.airframe),
+            host_ports(self.rig),
             self.params,
             self.airframe,
             config.home,
@@ -142,7 +146,8 @@ class Flight:
             on_reboot=self._reboot,
             injector=self.injector,
             host=self.host,
-            turntable=Turntable(self.rig.rows["body"]),
+            turntable=Turntable(rows) if "is_held" in (rows := self.rig.rows["body"]).dtype.names else None,
+            vehicle=vehicle,
             on_corrections=lambda _: self._surroundings.receiver.correct(self.time_us),
         )
         ring = RingSensor(self.rig, self.world, config.noise, config.seed) if config.has_lidar else None

@@ -13,6 +13,7 @@ from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.params import ParameterTable
 from mission.flight_settings import FlightSettings, Pace
 from mission.simulator.simulator_params import simulator_parameters
+from sim.bodies.vehicles import class_of
 from sim.world.world import WorldConfig
 
 TREELESS_M = 80.0  # round home, of the command line's worlds: clients' examples fly to 60 m from it, lower than trees
@@ -51,12 +52,13 @@ def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTabl
 
     Raises:
         ParameterError: an unknown name, or a value out of bounds.
+        AirframeError: an airframe of no known class of vehicles.
     """
     own = []
     if config.dialect == "ardupilot":
         simulated = simulator_parameters(airframe, config.home, config.wind_m_s, config.wind_from_deg)
         own = [*ARDUPILOT_PARAMETERS, *simulated]
-    table = parameter_table(airframe, own)
+    table = parameter_table(airframe, own, class_of(airframe).vehicle)
     for name, value in config.parameters.items():
         table.set_exactly(name, value)
     return table

@@ -1,4 +1,4 @@
-"""Arming checks: everything that must be right before the rotors may turn, each with the reason it gives.
+"""Arming checks: everything that must be right before the motors may turn, each with the reason it gives.
 
 In: the vehicle's state. Out: reasons, most important first; empty means ready. Run at 5 Hz while disarmed.
 """

@@ -4,13 +4,13 @@ In: the vehicle's state and what clients ask for. Out: mode, arming and landed s
 which mode to fly through `Flying`, and asks it what it alone can know.
 """
 
-from math import degrees, hypot, nan, pi, radians, sqrt
+from math import degrees, nan, radians, sqrt
 
 from autopilot.commander.arming import MAGNETIC_INTERFERENCE, WARN_ONLY, arming_reasons
 from autopilot.commander.battery import BatteryEstimator
-from autopilot.commander.failsafe import CRASHED
 from autopilot.commander.failsafe_executor import Guard
 from autopilot.commander.failure_detector import FailureWatch, StationLink
+from autopilot.commander.ground_phases import FRAME_LONGEST_S, Driving, GroundPhases, TakeoffAndLanding
 from autopilot.commander.home import Home
 from autopilot.commander.modes import NO_STICKS, mode_refusal
 from autopilot.commander.navigator_interface import Flying
@@ -18,7 +18,6 @@ from autopilot.commander.stick_commands import Pilot
 from autopilot.interface.mode_spec import Disarmed, ModeTable
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
-from autopilot.navigator.takeoff_intent import Ask
 from autopilot.ports import HEIGHT_VALID, MAG_DISTURBED, POSITION_VALID, VELOCITY_VALID
 from autopilot.vehicles.vehicle_class import DriveWatch, GroundDetector
 from common.params import Parameter, ParameterTable
@@ -28,12 +27,6 @@ _EPH_FLIGHT_FACTOR = 2.5  # in flight the position may be this much worse than f
 _CHECK_PERIOD_US = 200_000
 _TEXT_PERIOD_US = 30_000_000  # "PreArm:" texts, as ground stations expect them
 _FIRST_TEXT_US = 10_000_000  # until then the estimator may still be aligning
-_AIRBORNE_M = 0.5  # height over the take-off place from which the vehicle is in the air
-_LIFT_TIMEOUT_US = 10_000_000  # a take-off that has not left the ground by then has failed
-_FRAME_LONGEST_S = 0.1  # longer gaps do not count as landed time
-_ON_ITS_SIDE_RAD = 0.25 * pi  # lean from which a vehicle on the ground has not landed but crashed, as for arming
-_FALLEN_US = 10_000_000  # after its motors stopped in the air a vehicle is down, whatever the estimate says; guess
-_OFF_GROUND_M = 0.15  # a lower hover is not told from standing; guess
 _RESET_TOLD_RAD = radians(5.0)  # guess
 _RESET_TOLD_M = 0.5  # smaller jumps of the position are not worth a text; guess
 
@@ -46,10 +39,11 @@ class Commander:
         params: the vehicle's parameters.
         announcer: where texts and events go.
         battery: the charge estimator.
-        landing: the landing detector.
+        detector: says whether the vehicle stands on the ground; None: it never leaves it.
         pilot: what the pilot asks for by the sticks.
-        motors: the motor watch.
+        motors: the motor watch, if there is one.
         modes: those that the vehicle has.
+        last_resort: the mode of a failsafe that has no mode of its own.
     """
 
     def __init__(
@@ -58,10 +52,11 @@ class Commander:
         params: ParameterTable,
         announcer: Announcer,
         battery: BatteryEstimator,
-        landing: GroundDetector,
+        detector: GroundDetector | None,
         pilot: Pilot,
-        motors: DriveWatch,
+        motors: DriveWatch | None,
         modes: ModeTable,
+        last_resort: Mode,
     ) -> None:
         self.state = state
         self.params = params
@@ -69,22 +64,18 @@ class Commander:
         self.modes = modes
         self.has_position = False
         self.station = StationLink()
+        self.last_resort = last_resort
         self.guard = Guard(self)
         self.home = Home(state, announcer)
         self._battery = battery
         self._watch = FailureWatch(state, params, battery, self.station, motors, modes)
-        self._landing = landing
+        self._phases: GroundPhases = Driving(state) if detector is None else TakeoffAndLanding(self, detector)
         self._pilot = pilot
         self._flying: Flying
         self._position_seen_us = -1  # when the position was last valid
         self._next_check_us = 0
         self._next_text_us = _FIRST_TEXT_US
-        self._landed_since_us = 0
-        self._unpowered_us = 0
         self._reset_count = 0  # of the estimate
-        self._lift_since_us = 0
-        self._lift_d = 0.0
-        self._has_flown = False  # since arming
         self._is_ardupilot = False
         self._load()
         params.on_change(self._on_parameter)
@@ -109,17 +100,14 @@ class Commander:
         battery.count_on(state.time_us)
         self._watch.judge_battery(sample.voltage_v)
         if state.home is None and self.has_position and state.estimate.pos_h_std <= self._eph:
-            self.home.set_here(self._lift_d if state.is_flying else nan)  # without a compass it is known in flight only
-        if state.landed_state is LandedState.ON_GROUND:
-            if state.is_armed:
-                self._stand()
-        else:
-            self._fly(dt_s)
+            # Without a compass it is known in flight only.
+            self.home.set_here(self._phases.lift_d if state.is_flying else nan)
+        self._phases.frame(self._flying, dt_s)
         if state.estimate.reset_count != self._reset_count:
             self._tell_reset()
         self._pilot.frame(self)
         if state.is_armed:
-            self._watch_failures(min(dt_s, _FRAME_LONGEST_S))
+            self._watch_failures(min(dt_s, FRAME_LONGEST_S))
         elif state.time_us >= self._next_check_us:
             self._next_check_us = state.time_us + _CHECK_PERIOD_US
             self._check_before_arming()
@@ -128,7 +116,7 @@ class Commander:
         """Changes the mode without asking; for the navigator's wishes and for failsafes."""
         if mode is not self.state.mode:
             if mode is Mode.TERMINATION:
-                self._unpowered_us = self.state.time_us
+                self._phases.unpowered_us = self.state.time_us
             self.state.mode = mode
             self._flying.enter(mode)
             self.announcer.heartbeat_now()
@@ -152,11 +140,10 @@ class Commander:
             if not self.home.is_given:
                 self.home.set_here()
         state.is_armed = True
-        state.armed_since_us = self._landed_since_us = state.time_us
+        state.armed_since_us = state.time_us
         state.takeoff_us = 0
         state.flight_number += 1
-        self._lift_since_us = 0
-        self._has_flown = False
+        self._phases.armed()
         self._watch.reset()
         self.guard.reset()
         self._pilot.on_armed()
@@ -171,7 +158,7 @@ class Commander:
         state = self.state
         if not state.is_armed:
             return ACCEPTED
-        if not force and state.landed_state is not LandedState.ON_GROUND:
+        if not force and not self._phases.may_disarm():
             return Reply(Verdict.TEMPORARILY_REJECTED, "in the air")
         self.stop_motors("Disarmed by command")
         return ACCEPTED
@@ -224,7 +211,7 @@ class Commander:
         if not state.is_armed:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not armed")
         self.announcer.statustext(Severity.EMERGENCY, "Flight terminated by command")
-        if state.landed_state is LandedState.ON_GROUND:
+        if state.landed_state is LandedState.ON_GROUND or Mode.TERMINATION not in self.modes:
             self.stop_motors("Disarmed by termination")
         else:
             state.is_failsafe = True
@@ -255,83 +242,13 @@ class Commander:
         """Sets home; all NaN: here."""
         return self.home.set(lat_deg, lon_deg, alt_amsl_m, has_position=self.has_position)
 
-    # ---- on the ground and in the air ----
-
-    def _stand(self) -> None:
-        """Armed on the ground: releases a take-off, or disarms in time."""
-        state = self.state
-        now_us = state.time_us
-        if self._flying.wants_lift:
-            if now_us - state.armed_since_us >= self._spool_up_us:
-                state.landed_state = LandedState.TAKEOFF
-                state.takeoff_us = now_us
-                self._landing.reset()
-                state.has_ground_contact = False
-                self._lift_since_us = now_us
-                self._lift_d = state.estimate.pos_ned[2]
-            return
-        if state.mode is Mode.TERMINATION:
-            self.stop_motors("Disarmed after termination")
-            return
-        is_done = self._has_flown or not self.modes[self.state.mode].may_arm
-        limit_us = self._disarm_landed_us if is_done else self._disarm_preflight_us
-        if 0 <= limit_us <= now_us - self._landed_since_us:
-            self.stop_motors("Disarmed after landing" if is_done else "Disarmed: no take-off")
-
-    def _fly(self, dt_s: float) -> None:
-        """Off the ground: landed state, landing detection."""
-        state = self.state
-        if state.landed_state is LandedState.TAKEOFF and not self._has_flown:
-            if state.is_armed:
-                self._lift()
-            else:
-                self._touch_down()
-            return
-        ask = self._flying.ask
-        is_powered = state.is_armed and state.mode is not Mode.TERMINATION
-        thrust = state.actuators.thrust_sp if is_powered else 0.0
-        descent_sp = state.actuators.traj_vel_ned[2] if ask is Ask.DOWN else 0.0
-        is_landed = self._landing.update(state.estimate, thrust, descent_sp, min(dt_s, _FRAME_LONGEST_S))
-        if ask is Ask.UP and self._landing.has_contact:
-            self._landing.reset()  # off again
-            is_landed = False
-        state.has_ground_contact = self._landing.has_contact
-        if is_landed:
-            self._touch_down()
-            if hypot(state.roll_rad, state.pitch_rad) < _ON_ITS_SIDE_RAD:
-                self.announcer.statustext(Severity.INFO, "Landed")
-            elif is_powered:
-                self.guard.act(CRASHED)
-        elif not is_powered and (self._landing.is_down or state.time_us - self._unpowered_us > _FALLEN_US):
-            self._touch_down()
-        elif state.landed_state is not LandedState.TAKEOFF or state.mode is not Mode.TAKEOFF:
-            state.landed_state = LandedState.LANDING if self._flying.is_landing else LandedState.IN_AIR
-
-    def _lift(self) -> None:
-        """Released from the ground, but not yet off it."""
-        state = self.state
-        is_put_down = self.modes[self.state.mode].needs_sticks and self._flying.ask is Ask.DOWN
-        risen_m = self._lift_d - state.estimate.pos_ned[2]
-        if risen_m > _AIRBORNE_M or self._flying.is_landing or is_put_down:
-            self._has_flown = True
-        elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
-            is_hovering = self.modes[self.state.mode].needs_sticks or self._flying.ask is not Ask.UP
-            if is_hovering and risen_m > _OFF_GROUND_M:  # it shall not go higher
-                self._has_flown = True
-                return
-            self.announcer.statustext(Severity.CRITICAL, "Takeoff failed: still on the ground")
-            self._touch_down()
-            self.stop_motors("Disarmed: no take-off")
-
-    def _touch_down(self) -> None:
-        self.state.landed_state = LandedState.ON_GROUND
-        self._landed_since_us = self.state.time_us
+    # ---- disarming ----
 
     def stop_motors(self, text: str) -> None:
         """Disarms, whatever the vehicle is doing."""
         state = self.state
         state.is_armed = False
-        self._unpowered_us = state.time_us
+        self._phases.unpowered_us = state.time_us
         self.guard.release()
         self._next_check_us = 0
         self.hold_reasons_back()
@@ -405,9 +322,6 @@ class Commander:
         params = self.params
         self._eph = float(params["COM_POS_FS_EPH"])
         self._position_delay_us = int(params["COM_POS_FS_DELAY"] * 1e6)
-        self._spool_up_us = int(params["COM_SPOOLUP_TIME"] * 1e6)
-        self._disarm_landed_us = int(params["COM_DISARM_LAND"] * 1e6)
-        self._disarm_preflight_us = int(params["COM_DISARM_PRFLT"] * 1e6)
 
     def _on_parameter(self, parameter: Parameter) -> None:
         if parameter.name.startswith("COM_"):

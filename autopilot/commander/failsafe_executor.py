@@ -25,6 +25,7 @@ class Authority(Protocol):
     params: ParameterTable
     announcer: Announcer
     modes: ModeTable
+    last_resort: Mode
 
     def refusal(self, mode: Mode) -> str: ...
 
@@ -93,7 +94,7 @@ class Guard:
                 action = self._first(action)
             action = self._possible(action)
             strongest = max(strongest, action)
-            commander.announcer.statustext(rule.severity, rule.text + OUTCOMES.get(action, ""))
+            commander.announcer.statustext(rule.severity, rule.text + self._outcome(action))
         self._take(strongest)
 
     def _first(self, action: Action) -> Action:
@@ -110,7 +111,7 @@ class Guard:
         """The sticks have been given their time: acts if they are still lost."""
         action, self._waiting = self._possible(self._waiting), Action.WARN
         if is_lost:
-            self._commander.announcer.statustext(Severity.CRITICAL, "Sticks lost" + OUTCOMES[action])
+            self._commander.announcer.statustext(Severity.CRITICAL, "Sticks lost" + self._outcome(action))
             self._take(action)
 
     def _take(self, strongest: Action) -> None:
@@ -128,7 +129,7 @@ class Guard:
         state.is_failsafe = True
         if strongest > max(self._action, self._strength()):
             self._action = strongest
-            mode = self._modes[strongest]
+            mode = self._modes.get(strongest, commander.last_resort)
             if mode is state.mode:
                 commander.begin_here()  # not where a client has sent it
             else:
@@ -152,4 +153,12 @@ class Guard:
             mode = self._modes.get(action)
             if mode is None or (mode is not self._commander.state.mode and self._commander.refusal(mode)):
                 return Action.LAND
+        if action is Action.TERMINATE and action not in self._modes:
+            return Action.DISARM
         return action
+
+    def _outcome(self, action: Action) -> str:
+        """What the pilot is told of an action."""
+        if action is Action.LAND and action not in self._modes:
+            return f": {self._commander.last_resort.name.replace('_', ' ').lower()}"
+        return OUTCOMES.get(action, "")

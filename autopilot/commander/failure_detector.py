@@ -75,7 +75,7 @@ class FailureWatch:
         params: COM_*, BAT_*, BATT_*, FD_*.
         battery: the charge estimator.
         station: when a ground station was heard.
-        motors: the motor watch.
+        motors: the motor watch, if there is one.
     """
 
     __slots__ = (
@@ -91,7 +91,7 @@ class FailureWatch:
         params: ParameterTable,
         battery: BatteryEstimator,
         station: StationLink,
-        motors: DriveWatch,
+        motors: DriveWatch | None,
         modes: ModeTable,
     ) -> None:
         self._state = state
@@ -110,7 +110,8 @@ class FailureWatch:
     def reset(self) -> None:
         """The vehicle has just been armed."""
         self._attitude.reset()
-        self._motors.reset()
+        if self._motors is not None:
+            self._motors.reset()
         self._next_slow_us = 0
         self._reckoning_us = -_FIX_STEADY_US  # when GNSS was last missed
         self._resets_us: list[int] = []  # when the estimate was last set anew
@@ -131,7 +132,7 @@ class FailureWatch:
         mode = state.mode
         is_flying = state.landed_state is not LandedState.ON_GROUND
         failures = self._attitude.update(state, dt_s)
-        if self._motors.has_failure():
+        if self._motors is not None and self._motors.has_failure():
             failures |= MOTOR_FAILED
         if is_flying and self._battery.is_silent:
             failures |= BATTERY_SILENT

@@ -27,13 +27,25 @@ class Obstacles:
     """Distances by bearing, in ned: bin i is centred at i · 5 degrees, clockwise from north.
 
     Args:
-        params: CP_*, MPC_ACC_HOR.
+        params: CP_*.
+        accel: name of the parameter of the acceleration by which the vehicle stops.
     """
 
-    __slots__ = ("_accel", "_delay_s", "_distance_m", "_params", "_seen_us", "body_m", "keep_m", "sensed_us")
+    __slots__ = (
+        "_accel",
+        "_accel_name",
+        "_delay_s",
+        "_distance_m",
+        "_params",
+        "_seen_us",
+        "body_m",
+        "keep_m",
+        "sensed_us",
+    )
 
-    def __init__(self, params: ParameterTable) -> None:
+    def __init__(self, params: ParameterTable, accel: str) -> None:
         self._params = params
+        self._accel_name = accel
         self._distance_m = [nan] * BINS
         self._seen_us = [-FRESH_US - 1] * BINS
         self.body_m: Sequence[float] = ()  # [m] of the sensor on board, clockwise from the nose; inf: nothing there
@@ -99,8 +111,8 @@ class Obstacles:
     def _load(self) -> None:
         self.keep_m = float(self._params["CP_DIST"])
         self._delay_s = float(self._params["CP_DELAY"])
-        self._accel = float(self._params["MPC_ACC_HOR"])
+        self._accel = float(self._params[self._accel_name])
 
     def _on_parameter(self, parameter: Parameter) -> None:
-        if parameter.name.startswith("CP_") or parameter.name == "MPC_ACC_HOR":
+        if parameter.name.startswith("CP_") or parameter.name == self._accel_name:
             self._load()

@@ -59,13 +59,13 @@ class Calibration(Protocol):
 
 
 class MotorTests(Protocol):
-    """Rotors that are turned on the ground (autopilot.motor_test)."""
+    """Motors that are turned on the ground (autopilot.motor_test)."""
 
-    rotor_count: int
-    clockwise: Sequence[int]  # rotors from 0, from the nose on
+    motor_count: int
+    clockwise: Sequence[int]  # motors from 0, from the nose on
 
-    def spin(self, rotors: Sequence[int], command: float, seconds: float, *, pause_s: float = 0.0) -> Reply:
-        """Turns rotors one after the other, each so long."""
+    def spin(self, motors: Sequence[int], command: float, seconds: float, *, pause_s: float = 0.0) -> Reply:
+        """Turns motors one after the other, each so long."""
         ...
 
 

@@ -160,8 +160,8 @@ class VehicleState:
         None  # where it last stood; home may be set anywhere, also in the air
     )
     mode: Mode = Mode.HOLD
-    rotor_count: int = 4
-    mav_type: int = 2  # MAV_TYPE; 2: quadrotor
+    motor_count: int = 4
+    mav_type: int = 2  # MAV_TYPE
     is_armed: bool = False
     landed_state: LandedState = LandedState.ON_GROUND
     has_ground_contact: bool = False  # stands on something, though perhaps not landed yet
@@ -183,7 +183,7 @@ class VehicleState:
     aux_pulses_us: tuple[int, ...] = (0,) * 8  # of the outputs 9 to 16, 0: never set
     traffic_conflict_us: int = 0  # until then an aircraft counts as near
     nearest_aircraft: Aircraft | None = None
-    read_rotor_speeds: Callable[[], Sequence[float]] | None = None  # [rad/s] as the ESCs report them
+    read_motor_speeds: Callable[[], Sequence[float]] | None = None  # [rad/s] as the ESCs report them
     read_winch: Callable[[], WinchStatus] | None = None  # asked when it is sent
     obstacles: Obstacles | None = None
     relays: int = 0  # a bit for each that is on

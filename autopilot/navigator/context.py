@@ -9,6 +9,7 @@ from autopilot.interface.vehicle_state import LandedState, Mode, VehicleState
 from autopilot.navigator.heading import Heading
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import HEIGHT_VALID, TERRAIN_VALID
+from autopilot.vehicles.vehicle_class import Craft
 from common.geodesy import geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
 
@@ -23,15 +24,14 @@ class NavContext:
         params: its parameters.
         announcer: where texts and mission progress go.
         setpoint: the port to the control part.
-        hover_thrust: [0..1] collective thrust that carries the vehicle.
-        standing_height_m: of the vehicle's centre over level ground.
+        craft: what its class and its airframe say of how it moves.
     """
 
     __slots__ = (
-        "_numbers", "announcer", "climb_speed", "cruise_speed", "descend_speed", "fence_refusal", "find_way",
+        "_numbers", "announcer", "climb_speed", "craft", "cruise_speed", "descend_speed", "fence_refusal", "find_way",
         "flown",
-        "has_position", "heading", "hover_thrust", "is_landing", "leg_yaw", "next_hold", "params", "place_refusal",
-        "setpoint", "standing_height_m", "state", "wants_lift", "wish", "yaw_mode",
+        "has_position", "heading", "is_landing", "leg_yaw", "next_hold", "params", "place_refusal",
+        "setpoint", "state", "wants_lift", "wish", "yaw_mode",
     )  # fmt: skip
 
     def __init__(
@@ -40,15 +40,13 @@ class NavContext:
         params: ParameterTable,
         announcer: Announcer,
         setpoint: SetpointPort,
-        hover_thrust: float,
-        standing_height_m: float,
+        craft: Craft,
     ) -> None:
         self.state = state
         self.params = params
         self.announcer = announcer
         self.setpoint = setpoint
-        self.hover_thrust = hover_thrust
-        self.standing_height_m = standing_height_m
+        self.craft = craft
         self.has_position = False  # the commander's judgement, with its delay
         self.wants_lift = False  # the mode asks to leave the ground
         self.is_landing = False  # the mode is on its last descent
@@ -141,14 +139,15 @@ class NavContext:
         north, east, down = estimate.pos_ned
         vel_north, vel_east, vel_down = estimate.vel_ned
         numbers = self._numbers
-        jerk = numbers["MPC_JERK_MAX"]
+        limits = self.craft.limits
+        jerk = numbers[limits.jerk]
         speed = hypot(vel_north, vel_east)
         if speed > 0.1:  # below that it is noise
-            reach = braking_distance(speed, numbers["MPC_ACC_HOR"], jerk) / speed
+            reach = braking_distance(speed, numbers[limits.accel_hor], jerk) / speed
             north += vel_north * reach
             east += vel_east * reach
         if abs(vel_down) > 0.1:
-            accel = numbers["MPC_ACC_UP_MAX" if vel_down > 0.0 else "MPC_ACC_DOWN_MAX"]
+            accel = numbers[limits.accel_up if vel_down > 0.0 else limits.accel_down]
             reach = braking_distance(abs(vel_down), accel, jerk)
             down += reach if vel_down > 0.0 else -reach
         return north, east, down

@@ -12,6 +12,7 @@ from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, VehicleState, Verdict
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import SETPOINT_TRAJECTORY
+from autopilot.vehicles.vehicle_class import Craft
 from common.attitude import wrapped
 from common.kernels import FRAME_US
 
@@ -39,6 +40,9 @@ class FlownLeg(Protocol):
     is_landing: bool
     leg_yaw: float  # [rad] of the mission leg being flown
     yaw_mode: int  # MPC_YAW_MODE
+
+    @property
+    def craft(self) -> Craft: ...
 
     def number(self, name: str) -> float:
         """The value of a parameter in its own unit."""
@@ -99,7 +103,7 @@ class Heading:
             goal = here + way * radians(angle_deg)
         else:
             goal = radians(angle_deg)
-        fastest = context.number("MPC_YAWRAUTO_MAX")
+        fastest = context.number(context.craft.limits.yaw_rate)
         self._turn = wrapped(goal)
         self._turned = here
         self._rate = radians(min(rate_deg_s, fastest) if rate_deg_s > 0.0 else fastest)

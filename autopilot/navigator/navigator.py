@@ -176,7 +176,7 @@ class Navigator:
             setpoint.idle()
             setpoint.as_asked()
             self.ask = Ask.STAY
-        else:
+        elif context.craft.leaves_ground:
             self._respect_ground()
         state.goal_ned, state.path_start_ned = setpoint.pos_ned, setpoint.path_start_ned
         may_turn = state.is_armed and state.mode is not Mode.TERMINATION
@@ -208,8 +208,8 @@ class Navigator:
         """
         context = self.context
         state, setpoint = context.state, context.setpoint
-        stand_d = standing_d(state, context.standing_height_m)
-        ask = self.ask = vertical_ask(setpoint, state.estimate, stand_d, context.hover_thrust)
+        stand_d = standing_d(state, context.craft.standing_height_m)
+        ask = self.ask = vertical_ask(setpoint, state.estimate, stand_d, context.craft.lift_thrust)
         if state.has_ground_contact and ask is not Ask.UP:
             setpoint.settle(_SETTLE_THRUST, state.yaw_rad)
         elif (

@@ -12,7 +12,7 @@ import numpy as np
 
 from autopilot.interface.client_requests import OffboardSetpoint
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_LEAN, SETPOINT_RATE, SETPOINT_TRAJECTORY
-from common.kernels import MAX_ROTORS
+from common.kernels import MAX_MOTORS
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
@@ -20,7 +20,7 @@ FREE: Vector = (nan, nan, nan)
 _NOT_HOLDING_M_S = 0.01
 _LARGEST = 1.0e9  # its square is within single precision
 _LEVEL_NORTH = (0.0, 0.0, 0.0, 1.0)
-_LAYOUT = f"<3i{26 + MAX_ROTORS}f"  # kind, is_armed, is_landed, then the floats of autopilot.ports.Setpoint
+_LAYOUT = f"<3i{26 + MAX_MOTORS}f"  # kind, is_armed, is_landed, then the floats of autopilot.ports.Setpoint
 _FIELDS = (
     "kind", "is_armed", "is_landed", "pos_ned", "vel_ned", "accel_ned", "yaw", "yaw_rate", "path_start_ned",
     "cruise_speed", "climb_speed", "descend_speed", "exit_speed", "q_ned_from_frd", "omega_frd", "thrust", "motor_test",
@@ -47,7 +47,7 @@ class SetpointPort:
         self._buffer: Any = row.view(np.uint8).reshape(-1)
         self._pack_into = layout.pack_into
         self._is_changed = True
-        self._motor_test: tuple[float, ...] = (0.0,) * MAX_ROTORS
+        self._motor_test: tuple[float, ...] = (0.0,) * MAX_MOTORS
         self.is_armed = False
         self.is_landed = True
         self._settling: tuple[float, float] | None = None  # thrust [0..1] and heading [rad]

@@ -60,19 +60,19 @@ def is_near_start(state: VehicleState, north: float, east: float) -> bool:
     return stand is not None and hypot(north - stand[0], east - stand[1]) <= NEAR_START_M
 
 
-def vertical_ask(wanted: Wanted, estimate: Any, stand_d: float, hover_thrust: float) -> Ask:
+def vertical_ask(wanted: Wanted, estimate: Any, stand_d: float, lift_thrust: float) -> Ask:
     """What a setpoint asks for.
 
     Args:
         wanted: the setpoint.
         estimate: the Estimate record.
         stand_d: [m] down coordinate at which the vehicle stands, NaN: no place counts as being on the ground.
-        hover_thrust: [0..1] collective thrust that carries the vehicle.
+        lift_thrust: [0..1] thrust that carries the vehicle.
     """
     if wanted.kind == SETPOINT_IDLE:
         return Ask.STAY
     if wanted.kind in (SETPOINT_ATTITUDE, SETPOINT_RATE):
-        return Ask.UP if wanted.thrust > LIFT_SHARE * hover_thrust else Ask.DOWN
+        return Ask.UP if wanted.thrust > LIFT_SHARE * lift_thrust else Ask.DOWN
     north, east, down = wanted.pos_ned
     if down == down:
         here = estimate.pos_ned

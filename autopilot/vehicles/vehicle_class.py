@@ -1,15 +1,18 @@
 """A class of vehicles: its control law, and what the Python part of the flight controller must know of it.
 
-Adding a class is adding a folder beside `multirotor` whose `vehicle.py` has one of these.
+Adding a class is adding a folder beside the others whose `vehicle.py` has one of these.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+
 from autopilot.control.law import ControlLaw
 from autopilot.interface.mode_spec import ModeTable
-from autopilot.interface.vehicle_state import Mode
+from autopilot.interface.vehicle_interface import Announcer
+from autopilot.interface.vehicle_state import Mode, VehicleState
 from common.airframe import Airframe
 from common.params import Parameter, ParameterTable
 
@@ -35,7 +38,7 @@ class GroundDetector(Protocol):
 
         Args:
             estimate: the Estimate record.
-            thrust: [0..1] collective thrust setpoint.
+            thrust: [0..1] thrust setpoint.
             descent_sp: [m/s] downward speed asked for, 0 if it shall not end on the ground.
             dt_s: [s] since the last frame.
         """
@@ -51,6 +54,47 @@ class DriveWatch(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class DriveParts:
+    """What a drive watch may be made from."""
+
+    state: VehicleState
+    params: ParameterTable
+    announcer: Announcer
+    airframe: Airframe
+    read_speeds: Callable[[], Sequence[float]] | None  # [rad/s] of each motor, as its controller reports it
+    airframe_row: np.ndarray[Any, Any] | None  # live structured view, shape (1,), of the law's Airframe row
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionLimits:
+    """Names of the parameters that bound how a class of vehicles moves, where all modes need to know it."""
+
+    cruise_speed: str  # [m/s] where nothing else is asked for
+    climb_speed: str
+    descend_speed: str
+    speed_max: str  # [m/s]
+    climb_max: str
+    descend_max: str
+    accel_hor: str  # [m/s²]
+    accel_up: str
+    accel_down: str
+    jerk: str  # [m/s³]
+    jerk_auto: str  # [m/s³] on missions
+    path_error: str  # [m] by which the vehicle may lag behind what it tracks
+    yaw_rate: str  # [deg/s] of a turn that names none
+
+
+@dataclass(frozen=True, slots=True)
+class Craft:
+    """What the navigator knows of the vehicle itself."""
+
+    lift_thrust: float  # [0..1] that carries it; 0 where the ground does
+    standing_height_m: float  # of its centre over level ground
+    limits: MotionLimits
+    leaves_ground: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleClass:
     """One class of vehicles."""
 
@@ -61,12 +105,25 @@ class VehicleClass:
     """Those of the law and of the class's own detectors."""
     defaults: Callable[[Airframe], Mapping[str, int | float]]
     """Parameters whose default the airframe file decides."""
-    ground_detector: Callable[[ParameterTable, Airframe], GroundDetector]
     modes: ModeTable
-    """Its flight modes."""
+    """Its flight modes; one of them is Hold, in which it boots."""
     last_resort: Mode
     """Where a mode leads that cannot be flown on: down for what flies, a stop for what drives."""
-    hover_thrust: Callable[[Airframe], float]
-    """[0..1] collective thrust that carries the vehicle; 0 where the ground does."""
+    limits: MotionLimits
     mav_type: Callable[[Airframe], int]
     """MAV_TYPE of the heartbeat."""
+    motors: Callable[[Airframe], Sequence[int]]
+    """Its motors from 0, clockwise from the nose on, as ArduPilot counts them to test one."""
+    standing_height_m: Callable[[Airframe], float]
+    """Of the vehicle's centre over level ground."""
+    ground_detector: Callable[[ParameterTable, Airframe], GroundDetector] | None = None
+    """None: it never leaves the ground."""
+    lift_thrust: Callable[[Airframe], float] = lambda _: 0.0
+    """[0..1] Thrust that carries the vehicle; 0 where the ground does."""
+    drive_watch: Callable[[DriveParts], DriveWatch] | None = None
+    """None: nobody looks whether a motor has failed."""
+
+    def craft(self, airframe: Airframe) -> Craft:
+        """A vehicle of the class, as the navigator knows it."""
+        leaves_ground = self.ground_detector is not None
+        return Craft(self.lift_thrust(airframe), self.standing_height_m(airframe), self.limits, leaves_ground)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from common.kernels import MAX_ROTORS
+from common.kernels import MAX_MOTORS
 
 POLE_PAIRS = 7  # of the usual 14-pole outrunner
 _STEP_RAD_S = 100.0 / POLE_PAIRS * 2.0 * pi / 60.0
@@ -28,6 +28,6 @@ def esc_reader(truths: np.ndarray[Any, Any], i_vehicle: int) -> Callable[[], lis
     if fields is None:
         raise TypeError("not Truth rows")
     offset = i_vehicle * truths.dtype.itemsize + fields["motor_speed"][1]
-    unpack = struct.Struct(f"<{MAX_ROTORS}f").unpack_from
+    unpack = struct.Struct(f"<{MAX_MOTORS}f").unpack_from
     buffer = truths.view(np.uint8).data
     return lambda: [round(speed / _STEP_RAD_S) * _STEP_RAD_S for speed in unpack(buffer, offset)]

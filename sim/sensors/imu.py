@@ -15,7 +15,7 @@ from typing import Any
 import warp as wp
 
 from autopilot.ports import ImuSample
-from common.kernels import GRAVITY_M_S2, MAX_ROTORS, TICK_S, tick_end_us, vec8
+from common.kernels import GRAVITY_M_S2, MAX_MOTORS, TICK_S, tick_end_us, vec8
 from common.rng import draw_tick, normal3, normal6
 from common.vectors import clamp3
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias3, noise_gain
@@ -144,7 +144,7 @@ def imu_vibration(state: ImuState, rotor_speed: vec8, dt_s: float) -> ImuState:
     """The tone of the rotors over a sample of `dt_s`, integrated exactly at their mean speed (weighted by speed)."""
     speed_sum = float(0.0)
     square_sum = float(0.0)
-    for k in range(MAX_ROTORS):
+    for k in range(MAX_MOTORS):
         speed_sum += wp.abs(rotor_speed[k])
         square_sum += rotor_speed[k] * rotor_speed[k]
     out = state

@@ -1,13 +1,11 @@
 """The recipe "A mode" of CONTRIBUTING.md: the class that flies it and one row in the vehicle's table."""
 
 from dataclasses import replace
-from functools import partial
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 from pyulog import ULog
 
-from autopilot.flight_controller import FlightController
 from autopilot.interface.mode_spec import mode_table
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
@@ -15,7 +13,10 @@ from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
 from mission.flight import Flight, FlightConfig
 from mission.script import CommandRefused
+from sim.bodies.body import MULTIROTOR_BODY
+from sim.bodies.vehicles import SimulatedClass
 from sim.world.world import WorldConfig
+from tests.recipes.station import Station
 from tests.recipes.up_and_down_mode import SPAN_M, UP_AND_DOWN
 
 SET_MODE = mavlink.MAV_CMD_DO_SET_MODE
@@ -23,30 +24,10 @@ REQUEST_MESSAGE, AVAILABLE_MODES = mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVL
 FLIGHT = FlightConfig(world=WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0), dialect="ardupilot")
 
 
-class Station:
-    """A ground station of ArduPilot's, with pymavlink's encoding."""
-
-    def __init__(self, link):
-        self.link = link
-        self.reader = mavlink.MAVLink(None)
-        self.writer = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
-        self.heard = []
-
-    def command(self, number, *params):
-        self.receive()
-        fields = [*params, *[0.0] * (7 - len(params))]
-        self.link.send(mavlink.MAVLink_command_long_message(1, 1, number, 0, *fields).pack(self.writer))
-
-    def receive(self):
-        for data in self.link.receive():
-            self.heard += self.reader.parse_buffer(data) or []
-        return self.heard
-
-
 def flight_with(monkeypatch, specs, folder, *links, config=FLIGHT):
     """The vehicle's class has these rows; nothing else is told of them."""
     vehicle = replace(MULTIROTOR, modes=mode_table(*specs))
-    monkeypatch.setattr("mission.flight.FlightController", partial(FlightController, vehicle=vehicle))
+    monkeypatch.setattr("sim.bodies.vehicles.VEHICLES", [SimulatedClass(vehicle, MULTIROTOR_BODY)])
     return Flight(config, links=links, folder=folder)
 
 

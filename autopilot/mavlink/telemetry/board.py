@@ -46,19 +46,19 @@ def mcu_status(state: VehicleState) -> bytes:
 
 
 def esc_telemetry_1_to_4(state: VehicleState) -> bytes | None:
-    """How fast rotors 1 to 4 turn, and the voltage of the pack; currents and temperatures are not measured."""
+    """How fast motors 1 to 4 turn, and the voltage of the pack; currents and temperatures are not measured."""
     return _esc_telemetry(state, 0)
 
 
 def esc_telemetry_5_to_8(state: VehicleState) -> bytes | None:
-    """The same of rotors 5 to 8, where there are that many."""
+    """The same of motors 5 to 8, where there are that many."""
     return _esc_telemetry(state, _PER_MESSAGE)
 
 
 def _esc_telemetry(state: VehicleState, first: int) -> bytes | None:
-    if state.read_rotor_speeds is None or state.rotor_count <= first:
+    if state.read_motor_speeds is None or state.motor_count <= first:
         return None
-    speeds = list(state.read_rotor_speeds()[first : min(state.rotor_count, first + _PER_MESSAGE)])
+    speeds = list(state.read_motor_speeds()[first : min(state.motor_count, first + _PER_MESSAGE)])
     count, spare = len(speeds), (0,) * (_PER_MESSAGE - len(speeds))
     zeros = (0,) * _PER_MESSAGE
     pack = _esc_1_to_4 if first == 0 else _esc_5_to_8

@@ -31,8 +31,6 @@ from autopilot.navigator.setpoint import Vector
 from autopilot.payload.payloads import Payloads
 from common.params import Parameter
 
-_SPEED_PARAMETERS = frozenset(("MPC_XY_CRUISE", "MPC_Z_V_AUTO_UP", "MPC_Z_V_AUTO_DN", "MPC_XY_VEL_MAX"))
-
 
 class MissionState(IntEnum):
     """Numbered as MISSION_STATE."""
@@ -350,5 +348,6 @@ class Mission(FlightMode):
         self._context.announcer.mission_current_changed(index)
 
     def _on_parameter(self, parameter: Parameter) -> None:
-        if parameter.name in _SPEED_PARAMETERS:
+        limits = self._context.craft.limits
+        if parameter.name in (limits.cruise_speed, limits.climb_speed, limits.descend_speed, limits.speed_max):
             self.renew_speeds()

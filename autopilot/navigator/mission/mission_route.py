@@ -136,16 +136,17 @@ class Route:
         """How fast curves may be flown now."""
         context = self._context
         number = context.number
-        cruise = context.cruise_speed if isfinite(context.cruise_speed) else number("MPC_XY_CRUISE")
-        climb = context.climb_speed if isfinite(context.climb_speed) else number("MPC_Z_V_AUTO_UP")
-        descend = context.descend_speed if isfinite(context.descend_speed) else number("MPC_Z_V_AUTO_DN")
+        limits = context.craft.limits
+        cruise = context.cruise_speed if isfinite(context.cruise_speed) else number(limits.cruise_speed)
+        climb = context.climb_speed if isfinite(context.climb_speed) else number(limits.climb_speed)
+        descend = context.descend_speed if isfinite(context.descend_speed) else number(limits.descend_speed)
         return Pace(
-            min(cruise, number("MPC_XY_VEL_MAX")),
-            min(climb, number("MPC_Z_VEL_MAX_UP")),
-            min(descend, number("MPC_Z_VEL_MAX_DN")),
-            CORNER_ACCEL_SHARE * number("MPC_ACC_HOR"),
-            number("MPC_JERK_AUTO"),
-            number("MPC_XY_ERR_MAX"),
+            min(cruise, number(limits.speed_max)),
+            min(climb, number(limits.climb_max)),
+            min(descend, number(limits.descend_max)),
+            CORNER_ACCEL_SHARE * number(limits.accel_hor),
+            number(limits.jerk_auto),
+            number(limits.path_error),
         )
 
     def exit_speed(self, item: MissionItem, start: Vector, target: Vector, radius: float) -> float:

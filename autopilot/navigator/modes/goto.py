@@ -40,7 +40,7 @@ def reposition_target(context: NavContext, base: Vector, request: GoTo) -> tuple
 def ground_d(context: NavContext) -> float:
     """Down coordinate [m] of the ground: below the vehicle or where it stood last, whichever is lower."""
     stand_ned = context.state.stand_ned or context.state.home_ned
-    stood_d = stand_ned[2] + context.standing_height_m
+    stood_d = stand_ned[2] + context.craft.standing_height_m
     return max(stood_d, context.state.estimate.terrain_d) if context.state.estimate.flags & TERRAIN_VALID else stood_d
 
 

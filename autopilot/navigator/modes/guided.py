@@ -122,7 +122,9 @@ class Guided(FlightMode):
         if self._task is not _Task.SETPOINT or setpoint is None or self._is_stale:
             return
         if setpoint.kind != SETPOINT_TRAJECTORY:
-            context.wants_lift = vertical_ask(setpoint, context.state.estimate, nan, context.hover_thrust) is Ask.UP
+            context.wants_lift = (
+                vertical_ask(setpoint, context.state.estimate, nan, context.craft.lift_thrust) is Ask.UP
+            )
         elif not self._is_told:
             self._is_told = True
             context.announcer.statustext(Severity.WARNING, "Guided: on the ground, a takeoff comes first")

@@ -9,7 +9,7 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff_intent import is_near_start
 
-_BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against rotor inflow and drag; guess
+_BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against inflow and drag; guess
 _BLIND_STEADY_S = 20.0  # after that the thrust falls further, so that a vehicle that already stands notices it; guess
 _BLIND_FALL_1_S = 0.02  # share of the hover thrust per second; guess
 _TOUCHING_US = 700_000  # longer than it takes to begin a descent; guess
@@ -55,7 +55,7 @@ class Landing:
         elif context.has_height:
             context.setpoint.descend_level(self._pushed(self._speed()), self._yaw)
         else:
-            context.setpoint.hang_level(context.hover_thrust * self._blind_thrust_share(), self._yaw)
+            context.setpoint.hang_level(context.craft.lift_thrust * self._blind_thrust_share(), self._yaw)
 
     def _blind_thrust_share(self) -> float:
         """Share of the hover thrust for sinking without knowing the height."""

@@ -48,7 +48,7 @@ class Offboard(FlightMode):
             return
         context = self._context
         if context.is_on_ground:
-            ask = vertical_ask(latest, context.state.estimate, nan, context.hover_thrust)
+            ask = vertical_ask(latest, context.state.estimate, nan, context.craft.lift_thrust)
             context.wants_lift = ask is Ask.UP
             self._flown = None
         elif latest is not self._flown:

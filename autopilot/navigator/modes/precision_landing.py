@@ -98,7 +98,7 @@ class PrecisionLand(FlightMode):
         elif self._phase is _Phase.DESCEND and off_m > _CENTRED_SHARE * reach_m and self.sees_target:
             self._approach()
         if self._phase is _Phase.DESCEND:
-            if height_m < context.standing_height_m + context.number("PLD_FAPPR_ALT"):
+            if height_m < context.craft.standing_height_m + context.number("PLD_FAPPR_ALT"):
                 self._phase = _Phase.LAND
                 self._landing.start(place[0], place[1], self._yaw)
                 self._landing.frame()

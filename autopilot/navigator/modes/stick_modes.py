@@ -84,7 +84,7 @@ class Stabilized(ThrustMode):
         context = self._context
         thrust = self._throttle.thrust(context.number("MPC_MANTHR_MIN"))
         if context.is_on_ground:
-            context.wants_lift = thrust > LIFT_SHARE * context.hover_thrust
+            context.wants_lift = thrust > LIFT_SHARE * context.craft.lift_thrust
         else:
             context.setpoint.tilt(lean_of(context), yaw_rate_of(context), thrust)
 
@@ -98,7 +98,7 @@ class Acro(ThrustMode):
         context = self._context
         thrust = self._throttle.thrust(0.0)
         if context.is_on_ground:
-            context.wants_lift = thrust > LIFT_SHARE * context.hover_thrust
+            context.wants_lift = thrust > LIFT_SHARE * context.craft.lift_thrust
             return
         sticks, number = context.state.sticks, context.number
         expo, super_expo = number("MC_ACRO_EXPO"), number("MC_ACRO_SUPEXPO")

@@ -83,9 +83,10 @@ class Way:
         if in_length < max(0.5, abs(target[2] - start[2])) or out_length < max(0.5, abs(following[2] - target[2])):
             return 0.0  # a steep or very short stretch
         context = self._context
-        accel = CORNER_ACCEL_SHARE * context.number("MPC_ACC_HOR")
+        limits = context.craft.limits
+        accel = CORNER_ACCEL_SHARE * context.number(limits.accel_hor)
         cosine = (in_north * out_north + in_east * out_east) / (in_length * out_length)
         tan_half_sq = max(1.0 - cosine, 1e-9) / max(1.0 + cosine, 1e-6)
-        cruise = context.cruise_speed if isfinite(context.cruise_speed) else context.number("MPC_XY_CRUISE")
+        cruise = context.cruise_speed if isfinite(context.cruise_speed) else context.number(limits.cruise_speed)
         speed = min(sqrt(accel * CORNER_RADIUS_M / sqrt(tan_half_sq)), sqrt(accel * out_length), cruise)
         return speed if speed > _SLOWEST_CORNER_M_S else 0.0

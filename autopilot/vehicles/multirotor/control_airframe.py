@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 
 from common.airframe import Airframe
-from common.kernels import MAX_ROTORS, vec8
+from common.kernels import MAX_MOTORS, vec8
 
 wp.set_module_options({"enable_backward": False})
 
@@ -64,7 +64,7 @@ def mixing(airframe: Airframe, left_out: Collection[int] = ()) -> np.ndarray:
 
 
 def _vec8(values: np.ndarray) -> vec8:
-    return vec8(*np.concatenate([values, np.zeros(MAX_ROTORS - len(values))]).astype(float).tolist())
+    return vec8(*np.concatenate([values, np.zeros(MAX_MOTORS - len(values))]).astype(float).tolist())
 
 
 def control_airframe(airframe: Airframe, left_out: Collection[int] = ()) -> ControlAirframe:

@@ -1,12 +1,17 @@
 """The multirotor as a class of vehicles."""
 
+from collections.abc import Sequence
+from math import atan2, pi
+
 from autopilot.interface.vehicle_state import Mode
+from autopilot.vehicles.multirotor.control_airframe import rotors_leaver
 from autopilot.vehicles.multirotor.defaults import airframe_defaults, hover_thrust
 from autopilot.vehicles.multirotor.landing_detector import LandingDetector
 from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
 from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
+from autopilot.vehicles.multirotor.motor_failures import MotorWatch
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
-from autopilot.vehicles.vehicle_class import VehicleClass
+from autopilot.vehicles.vehicle_class import DriveParts, MotionLimits, VehicleClass
 from common.airframe import Airframe
 from common.params import ParameterTable
 
@@ -22,14 +27,46 @@ def _mav_type(airframe: Airframe) -> int:
     return _MAV_TYPES.get(len(airframe.rotors), _MAV_TYPE_QUADROTOR)
 
 
+_LIMITS = MotionLimits(
+    cruise_speed="MPC_XY_CRUISE",
+    climb_speed="MPC_Z_V_AUTO_UP",
+    descend_speed="MPC_Z_V_AUTO_DN",
+    speed_max="MPC_XY_VEL_MAX",
+    climb_max="MPC_Z_VEL_MAX_UP",
+    descend_max="MPC_Z_VEL_MAX_DN",
+    accel_hor="MPC_ACC_HOR",
+    accel_up="MPC_ACC_UP_MAX",
+    accel_down="MPC_ACC_DOWN_MAX",
+    jerk="MPC_JERK_MAX",
+    jerk_auto="MPC_JERK_AUTO",
+    path_error="MPC_XY_ERR_MAX",
+    yaw_rate="MPC_YAWRAUTO_MAX",
+)
+
+
+def _clockwise(airframe: Airframe) -> Sequence[int]:
+    angles = [atan2(rotor.y_m, rotor.x_m) % (2.0 * pi) for rotor in airframe.rotors]
+    return sorted(range(len(angles)), key=lambda rotor: round(angles[rotor], 6))
+
+
+def _motor_watch(parts: DriveParts) -> MotorWatch:
+    row = parts.airframe_row
+    leave_out = None if row is None else rotors_leaver(row, parts.airframe)
+    return MotorWatch(parts.state, parts.params, parts.announcer, parts.airframe, parts.read_speeds, leave_out)
+
+
 MULTIROTOR = VehicleClass(
     name="multirotor",
     law=MULTIROTOR_LAW,
     parameters=CONTROL_PARAMETERS,
     defaults=airframe_defaults,
-    ground_detector=_landing_detector,
     modes=MULTIROTOR_MODES,
     last_resort=Mode.LAND,
-    hover_thrust=hover_thrust,
+    limits=_LIMITS,
     mav_type=_mav_type,
+    motors=_clockwise,
+    standing_height_m=lambda airframe: airframe.contact.leg_z_m,
+    ground_detector=_landing_detector,
+    lift_thrust=hover_thrust,
+    drive_watch=_motor_watch,
 )

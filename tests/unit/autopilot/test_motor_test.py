@@ -5,6 +5,7 @@ from math import inf, nan
 import pytest
 
 from autopilot.interface.vehicle_state import LandedState, Verdict
+from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
 from common.airframe import load_airframe
 from tests.unit.autopilot.kinematic import Kinematic
 
@@ -93,11 +94,9 @@ def test_what_is_out_of_range_is_denied(rig, rotors, command, seconds):
 
 
 @pytest.mark.parametrize("name", ["x500", "f550"])
-def test_clockwise_begins_at_the_nose(rig, name):
-    from autopilot.motor_test import MotorTest
-
+def test_clockwise_begins_at_the_nose(name):
     airframe = load_airframe(name)
-    order = MotorTest(rig.fc.state, rig.fc._setpoint, rig.recorder, airframe).clockwise
+    order = MULTIROTOR.motors(airframe)
     places = [airframe.rotors[rotor] for rotor in order]
     assert places[0].x_m > 0.0
     assert places[0].y_m > 0.0

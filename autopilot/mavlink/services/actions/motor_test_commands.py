@@ -1,4 +1,4 @@
-"""Commands that turn single rotors on the ground: DO_MOTOR_TEST, and PX4's ACTUATOR_TEST."""
+"""Commands that turn single motors on the ground: DO_MOTOR_TEST, and PX4's ACTUATOR_TEST."""
 
 from collections.abc import Mapping, Sequence
 from math import isnan
@@ -12,7 +12,7 @@ from autopilot.mavlink.wire.convert import whole
 
 PX4_LONGEST_S = 3.0
 ARDUPILOT_LONGEST_S = 600.0
-_PAUSE = 0.5  # between two rotors, of a rotor's time (ArduPilot)
+_PAUSE = 0.5  # between two motors, of a motor's time (ArduPilot)
 _PULSE_MIN_US, _PULSE_SPAN_US = 1000.0, 1000.0
 _FIRST_MOTOR, _LAST_MOTOR = mavlink.ACTUATOR_OUTPUT_FUNCTION_MOTOR1, mavlink.ACTUATOR_OUTPUT_FUNCTION_MOTOR16
 
@@ -41,8 +41,8 @@ class MotorTestService(Service):
         """
         tests = self._endpoint.vehicle.motor_test
         first, count = whole(command.p1, 0) - 1, max(whole(command.x, 1), 1)
-        if not (first >= 0 and first + count <= tests.rotor_count):
-            return denied(f"motor test: there are motors 1 to {tests.rotor_count}")
+        if not (first >= 0 and first + count <= tests.motor_count):
+            return denied(f"motor test: there are motors 1 to {tests.motor_count}")
         throttle_type = whole(command.p2, -1)
         if throttle_type == mavlink.MOTOR_TEST_THROTTLE_PERCENT:
             throttle = command.p3 / 100.0
@@ -52,7 +52,7 @@ class MotorTestService(Service):
             return Reply(Verdict.UNSUPPORTED, "motor test: the throttle is given in per cent or as a pulse")
         seconds = 0.0 if isnan(command.p4) else command.p4
         by_number = not self._is_ardupilot or whole(command.y, 0) == mavlink.MOTOR_TEST_ORDER_BOARD
-        order: Sequence[int] = range(tests.rotor_count) if by_number else tests.clockwise
+        order: Sequence[int] = range(tests.motor_count) if by_number else tests.clockwise
         seconds = self._bounded_s(seconds)
         return tests.spin(order[first : first + count], throttle, seconds, pause_s=_PAUSE * seconds)
 

@@ -14,7 +14,7 @@ def obstacles(distances, **params):
     table = parameter_table()
     for name, value in ({"CP_DIST": 2.0} | params).items():
         table.set(name, value)
-    found = Obstacles(table)
+    found = Obstacles(table, "MPC_ACC_HOR")
     found.reported(0, distances, 0.0, ALL_ROUND)
     return found
 

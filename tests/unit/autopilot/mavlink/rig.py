@@ -161,7 +161,7 @@ def _ports() -> HostPorts:
     setpoint, external = (np.zeros(1, dtype=struct.numpy_dtype()) for struct in (Setpoint, ExternalSample))
     speeds = [500.0, 510.0, 520.0, 530.0, 0.0, 0.0, 0.0, 0.0]
     nothing = [lambda: None] * 4
-    return HostPorts(*nothing, setpoint, read_rotor_speeds=lambda: speeds, external=external)
+    return HostPorts(*nothing, setpoint, read_motor_speeds=lambda: speeds, external=external)
 
 
 class AskedVehicle(FlightController):

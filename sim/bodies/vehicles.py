@@ -1,0 +1,36 @@
+"""The classes of vehicles that can be simulated: who flies or drives them, and what body moves them.
+
+This list is the one place outside of its own folders where a class is named; an airframe file says of which it is.
+"""
+
+from typing import NamedTuple
+
+from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
+from autopilot.vehicles.vehicle_class import VehicleClass
+from common.airframe import Airframe, AirframeError
+from sim.bodies.body import MULTIROTOR_BODY, Body
+
+
+class SimulatedClass(NamedTuple):
+    """A class of vehicles, and its body in the native engine."""
+
+    vehicle: VehicleClass
+    body: Body
+
+
+VEHICLES = [
+    SimulatedClass(MULTIROTOR, MULTIROTOR_BODY),
+]
+
+
+def class_of(airframe: Airframe) -> SimulatedClass:
+    """The class of an airframe.
+
+    Raises:
+        AirframeError: there is no such class.
+    """
+    for each in VEHICLES:
+        if each.vehicle.name == airframe.vehicle:
+            return each
+    names = ", ".join(each.vehicle.name for each in VEHICLES)
+    raise AirframeError(f"airframe '{airframe.name}': unknown class of vehicles '{airframe.vehicle}'; known: {names}")

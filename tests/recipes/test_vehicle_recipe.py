@@ -1,0 +1,177 @@
+"""The recipe "A vehicle class" of CONTRIBUTING.md: a sled, one line in the list, driven over MAVLink by pymavlink."""
+
+from math import nan
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot.commander.failsafe import POSITION_LOST
+from autopilot.interface.vehicle_state import Mode
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from common.airframe import AIRFRAME_FOLDER, AirframeError, load_airframe
+from common.geodesy import geodetic_from_ned
+from mission.flight import Flight, FlightConfig
+from sim.bodies.vehicles import VEHICLES, class_of
+from sim.world.world import WorldConfig
+from tests.recipes.sled_class import DRIVE, MAV_TYPE_GROUND_ROVER, SIMULATED_SLED
+from tests.recipes.station import Station
+
+ACCEPTED, TEMPORARILY_REJECTED = 0, 1
+ARM, SET_MODE, TAKEOFF = (
+    mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+    mavlink.MAV_CMD_DO_SET_MODE,
+    mavlink.MAV_CMD_NAV_TAKEOFF,
+)
+VELOCITY_ONLY = 0b110111000111
+
+
+@pytest.fixture
+def airframe(tmp_path, monkeypatch):
+    """An airframe file of the class, and its line in the list."""
+    monkeypatch.setattr("sim.bodies.vehicles.VEHICLES", [*VEHICLES, SIMULATED_SLED])
+    text = (AIRFRAME_FOLDER / "x500.toml").read_text()
+    text = text.replace("cells = { value = 4", "cells = { value = 3", 1)
+    path = tmp_path / "sled.toml"
+    path.write_text('vehicle = "sled"\n' + text)
+    return str(path)
+
+
+class Sled:
+    """A flight of the sled, and a station."""
+
+    def __init__(self, airframe, dialect="px4"):
+        vehicle_end, station_end = memory_pair(LinkRole.GROUND)
+        world = WorldConfig(size_m=128.0, hill_height_m=0.0, trees_per_ha=0.0)
+        self.flight = Flight(FlightConfig(airframe=airframe, world=world, dialect=dialect), links=[vehicle_end])
+        self.station = Station(station_end)
+        self.state = self.flight.controller.state
+        commander = self.flight.controller.commander
+        self.until(lambda: self.state.is_ready_to_arm and commander.has_position, 40.0)
+
+    def run(self, seconds, velocity=None):
+        for i in range(round(50 * seconds)):
+            if velocity is not None and i % 5 == 0:
+                self.send(
+                    mavlink.MAVLink_set_position_target_local_ned_message(
+                        0, 1, 1, mavlink.MAV_FRAME_LOCAL_NED, VELOCITY_ONLY, 0, 0, 0, *velocity, 0, 0, 0, 0, 0
+                    )
+                )
+            self.flight.frame()
+
+    def until(self, condition, seconds):
+        for _ in range(round(50 * seconds)):
+            if condition():
+                return
+            self.flight.frame()
+        raise AssertionError(f"not within {seconds} s: {self.flight.controller.check_arming()}")
+
+    def send(self, message):
+        self.station.link.send(message.pack(self.station.writer))
+
+    def ask(self, number, *params):
+        """The result of a command."""
+        self.station.heard.clear()
+        self.station.command(number, *params)
+        self.run(0.1)
+        return [ack.result for ack in self.heard("COMMAND_ACK") if ack.command == number][-1]
+
+    def goto(self, north_m):
+        lat, lon, alt = geodetic_from_ned(north_m, 0.0, 0.0, self.flight.config.home)
+        x, y, kind = round(lat * 1e7), round(lon * 1e7), mavlink.MAV_CMD_DO_REPOSITION
+        self.station.heard.clear()
+        self.send(mavlink.MAVLink_command_int_message(1, 1, 0, kind, 0, 0, -1.0, 1.0, 0.0, nan, x, y, alt))
+        self.run(0.1)
+        return [ack.result for ack in self.heard("COMMAND_ACK")][-1]
+
+    def heard(self, kind):
+        return [message for message in self.station.receive() if message.get_type() == kind]
+
+    def texts(self):
+        return [message.text for message in self.heard("STATUSTEXT")]
+
+    @property
+    def pos_ned(self):
+        return self.flight.rig.rows["truth"]["pos_ned"][0]
+
+
+def test_a_class_that_is_not_in_the_list_is_told(tmp_path):
+    path = tmp_path / "sled.toml"
+    path.write_text('vehicle = "sled"\n' + (AIRFRAME_FOLDER / "x500.toml").read_text())
+    with pytest.raises(AirframeError, match="unknown class of vehicles 'sled'; known: multirotor"):
+        class_of(load_airframe(str(path)))
+
+
+def test_a_sled_is_driven_over_mavlink(airframe):
+    sled = Sled(airframe)
+    sled.run(1.0)
+    beat = next(each for each in sled.heard("HEARTBEAT") if each.autopilot == mavlink.MAV_AUTOPILOT_PX4)
+    assert (beat.type, beat.custom_mode) == (MAV_TYPE_GROUND_ROVER, 4 << 16 | 3 << 24)
+    assert sled.ask(TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, nan) == TEMPORARILY_REJECTED
+    assert "Takeoff: mode TAKEOFF is not supported" in sled.texts()
+    assert sled.goto(10.0) == TEMPORARILY_REJECTED  # not armed
+    assert sled.ask(ARM, 1.0) == ACCEPTED
+    sled.run(15.0)
+    assert sled.state.is_armed  # nobody waits for a take-off
+    assert np.abs(sled.pos_ned[:2]).max() < 1.0  # it stands as well as its estimate knows that it does
+    assert sled.ask(SET_MODE, 1.0, 4.0, 11.0) == ACCEPTED
+    assert sled.state.mode is DRIVE
+    assert sled.goto(10.0) == ACCEPTED
+    sled.run(20.0)
+    place = sled.heard("LOCAL_POSITION_NED")[-1]
+    assert (place.x, place.y) == pytest.approx((10.0, 0.0), abs=1.5)
+    assert sled.pos_ned[0] == pytest.approx(10.0, abs=1.5)
+    assert sled.ask(ARM, 0.0) == ACCEPTED
+    assert not sled.state.is_armed
+    assert sled.state.mode is Mode.HOLD
+
+
+def test_setpoints_of_a_client_drive_it_and_their_loss_stops_it(airframe):
+    sled = Sled(airframe)
+    assert sled.ask(ARM, 1.0) == ACCEPTED
+    sled.run(1.0, velocity=(-1.0, 0.0, 0.0))
+    assert sled.ask(SET_MODE, 1.0, 6.0, 0.0) == ACCEPTED
+    sled.run(8.0, velocity=(-1.0, 0.0, 0.0))
+    assert sled.pos_ned[0] < -3.0
+    sled.run(10.0)
+    assert "Offboard setpoints lost: hold" in sled.texts()
+    assert sled.state.mode is Mode.HOLD
+    assert abs(sled.flight.rig.rows["truth"]["vel_ned"][0][0]) < 0.1
+
+
+def test_the_last_resort_of_a_sled_is_to_stop(airframe):
+    sled = Sled(airframe)
+    assert sled.ask(ARM, 1.0) == ACCEPTED
+    assert sled.goto(30.0) == ACCEPTED
+    sled.run(2.0)
+    sled.flight.controller.commander.guard.act(POSITION_LOST)
+    assert sled.state.mode is Mode.HOLD
+    sled.run(1.0)
+    assert "Position lost: hold" in sled.texts()
+    assert sled.ask(mavlink.MAV_CMD_DO_FLIGHTTERMINATION, 1.0) == ACCEPTED
+    assert not sled.state.is_armed
+
+
+def test_ardupilots_clients_know_its_modes_by_their_own_numbers(airframe):
+    sled = Sled(airframe, dialect="ardupilot")
+    assert sled.ask(ARM, 1.0) == ACCEPTED
+    assert sled.ask(SET_MODE, 1.0, 15.0) == ACCEPTED
+    sled.run(1.0)
+    assert sled.state.mode is DRIVE
+    assert 15 in [each.custom_mode for each in sled.heard("HEARTBEAT") if each.autopilot == 3]
+    assert sled.goto(5.0) == ACCEPTED
+    sled.run(15.0)
+    assert sled.pos_ned[0] == pytest.approx(5.0, abs=1.5)
+
+
+@pytest.mark.parametrize("dialect", ["px4", "ardupilot"])
+def test_no_command_of_a_multirotors_stops_the_drive(airframe, dialect):
+    sled = Sled(airframe, dialect)
+    numbers = sorted(sled.flight.server.command_handlers())
+    for number in numbers:
+        for value in (0.0, 1.0, nan):
+            if not sled.state.is_armed:
+                sled.flight.controller.arm(force=True)
+            sled.station.command(number, *[value] * 7)
+            sled.run(0.06)
+    assert {ack.command for ack in sled.heard("COMMAND_ACK")} == set(numbers)
