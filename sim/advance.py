@@ -18,8 +18,8 @@ from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
 from common.kernels import TICK_S
 from common.rng import draw_tick
 from sim.bodies.body import MULTIROTOR_BODY, Body
-from sim.faults import Faults, weakened
-from sim.sensors.sensors import SensorModel, SensorState, sense
+from sim.faults import weakened
+from sim.sensors.sensors import Faults, SensorModel, SensorState, sense
 from sim.truth import Truth, true_battery, true_estimate
 from sim.wind import WindModel, WindState, wind_step
 from sim.world.world import World, ground_height

@@ -1,7 +1,7 @@
 """Faults of sensors and motors: what a test or a scenario may break, per vehicle and per sensor, at any tick.
 
-One `Faults` row per vehicle, written by the host (`set_fault`), read by `sim/sensors` and `sim/advance`. The magnitude
-means:
+One `Faults` row per vehicle (sim/sensors/sensors.py), written by the host (`set_fault`), read by the sensors. The
+magnitude means:
 
 | mode   | effect                                                        | magnitude                                  |
 |--------|---------------------------------------------------------------|--------------------------------------------|
@@ -50,20 +50,6 @@ BIAS_UNITS: dict[str, str] = {
 class SensorFault:
     mode: int  # FAULT_*
     magnitude: float  # see the module's table
-
-
-@wp.struct
-class Faults:
-    """The fault of each sensor of one vehicle; all zero is healthy."""
-
-    gyro: SensorFault
-    accel: SensorFault
-    gnss: SensorFault
-    baro: SensorFault
-    mag: SensorFault
-    range: SensorFault
-    battery: SensorFault
-    motor_loss: vec8  # [0..1] share of its command that each motor loses
 
 
 @wp.func

@@ -23,9 +23,8 @@ from common.params import ParameterTable
 from common.warp_start import start_warp
 from sim.advance import rig_kernels
 from sim.bodies.body import MULTIROTOR_BODY, Body
-from sim.faults import Faults
 from sim.rows import HostRows
-from sim.sensors.sensors import SensorModel, SensorState
+from sim.sensors.sensors import Faults, SensorModel, SensorState
 from sim.truth import Truth
 from sim.wind import WindModel, WindState
 from sim.workers import Workers

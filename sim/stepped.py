@@ -16,9 +16,9 @@ from sim.boards.board import Board
 from sim.boards.own import OwnBoard
 from sim.engines.engine import Engine
 from sim.engines.native import NativeEngine
-from sim.faults import Faults, weakened
+from sim.faults import weakened
 from sim.rig import Rig
-from sim.sensors.sensors import SensorModel, SensorState, sense
+from sim.sensors.sensors import Faults, SensorModel, SensorState, sense
 from sim.truth import Truth
 from sim.wind import WindModel, WindState, wind_step
 from sim.world.world import World, ground_height

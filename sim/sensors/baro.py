@@ -13,7 +13,7 @@ import warp as wp
 from autopilot.ports import BaroSample
 from common.kernels import TICK_S, tick_end_us
 from common.rng import draw_tick, normal
-from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
+from sim.faults import FAULT_STUCK, SensorFault, fault_bias, is_due, noise_gain, sampling_period
 from sim.rng_streams import BARO_DRIFT, BARO_DRIFT_START, BARO_OFFSET, BARO_WHITE
 
 wp.set_module_options({"enable_backward": False})
@@ -108,3 +108,25 @@ def baro_sample(
         sample.pressure_pa = isa_pressure_pa(alt_amsl_m) + state.offset_pa + state.drift_pa + noise + fault_bias(fault)
         sample.temperature_c = isa_temperature_k(alt_amsl_m) - _KELVIN
     return sample
+
+
+@wp.func
+def sense_baro(
+    model: BaroModel,
+    state: BaroState,
+    held: BaroSample,
+    fault: SensorFault,
+    alt_amsl_m: float,
+    seed: int,
+    i: int,
+    tick: wp.int64,
+) -> tuple[BaroState, BaroSample]:
+    """Drift and sample after a tick: new ones if they are due."""
+    count = draw_tick(tick)
+    drifted = state
+    sample = held
+    if is_due(model.period_ticks, count):
+        drifted = baro_drift(model, state, seed, i, count)
+    if is_due(sampling_period(model.period_ticks, fault), count):
+        sample = baro_sample(model, drifted, held, alt_amsl_m, fault, seed, i, tick)
+    return drifted, sample

@@ -15,6 +15,7 @@ from common.kernels import TICK_S, tick_end_us
 from common.rng import draw_tick, normal3
 from sim.faults import FAULT_OFF, FAULT_STUCK, SensorFault, fault_bias3, is_due, noise_gain, sampling_period
 from sim.rng_streams import GNSS_CORRELATED, GNSS_CORRELATED_START, GNSS_POSITION, GNSS_VELOCITY
+from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
 
@@ -180,3 +181,28 @@ def gnss_lost(held: GnssSample) -> GnssSample:
     sample.fix_type = 0
     sample.satellites = 0
     return sample
+
+
+@wp.func
+def sense_gnss(
+    model: GnssModel,
+    state: GnssState,
+    held: GnssSample,
+    fault: SensorFault,
+    truth: Truth,
+    seed: int,
+    i: int,
+    tick: wp.int64,
+) -> tuple[GnssState, GnssSample]:
+    """The receiver after a tick, and what it has delivered by then."""
+    out = state
+    sample = held
+    first_fix = state.boot_tick + wp.int64(model.first_fix_ticks)
+    if gnss_is_taken(model.period_ticks, first_fix, fault, tick):
+        out = gnss_take(model, out, truth.pos_ned, truth.vel_ned, fault, seed, i, tick)
+    if gnss_is_delivered(model.delay_ticks, out.queue_count, out.queue_tick[out.queue_head], tick):
+        sample = gnss_delivered(model, out, sample, fault)
+        out = gnss_drop_oldest(out)
+    if fault.mode == FAULT_OFF:
+        sample = gnss_lost(sample)
+    return out, sample

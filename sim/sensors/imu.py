@@ -18,7 +18,7 @@ from autopilot.ports import ImuSample
 from common.kernels import GRAVITY_M_S2, MAX_MOTORS, TICK_S, tick_end_us, vec8
 from common.rng import draw_tick, normal3, normal6
 from common.vectors import clamp3
-from sim.faults import FAULT_STUCK, SensorFault, fault_bias3, noise_gain
+from sim.faults import FAULT_STUCK, SensorFault, fault_bias3, is_due, noise_gain, sampling_period
 from sim.rng_streams import (
     ACCEL_DRIFT,
     ACCEL_DRIFT_START,
@@ -28,6 +28,7 @@ from sim.rng_streams import (
     GYRO_TURN_ON,
     IMU_WHITE,
 )
+from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
 
@@ -217,3 +218,38 @@ def imu_sample(
         if accel_fault.mode == FAULT_STUCK:
             sample.accel_frd = held.accel_frd
     return sample
+
+
+@wp.func
+def imu_period(gyro: SensorFault, accel: SensorFault) -> int:
+    """Ticks between samples of the chip that holds both; 0 if either is off."""
+    gyro_period = sampling_period(IMU_PERIOD_TICKS, gyro)
+    accel_period = sampling_period(IMU_PERIOD_TICKS, accel)
+    if gyro_period == 0 or accel_period == 0:
+        return 0
+    return wp.max(gyro_period, accel_period)
+
+
+@wp.func
+def sense_imu(
+    model: ImuModel,
+    state: ImuState,
+    held: ImuSample,
+    gyro_fault: SensorFault,
+    accel_fault: SensorFault,
+    truth: Truth,
+    seed: int,
+    i: int,
+    tick: wp.int64,
+) -> tuple[ImuState, ImuSample]:
+    """Errors and sample after a tick: new ones if they are due."""
+    count = draw_tick(tick)
+    out = state
+    sample = held
+    if is_due(DRIFT_PERIOD_TICKS, count):
+        out = imu_drift(model, out, seed, i, count)
+    period = imu_period(gyro_fault, accel_fault)
+    if is_due(period, count):
+        out = imu_vibration(out, truth.motor_speed, float(period) * TICK_S)
+        sample = imu_sample(model, out, sample, truth.gyro_frd, truth.accel_frd, gyro_fault, accel_fault, seed, i, tick)
+    return out, sample

@@ -13,7 +13,16 @@ import warp as wp
 from autopilot.ports import MagSample
 from common.kernels import tick_end_us
 from common.rng import draw_tick, normal3
-from sim.faults import FAULT_STUCK, FAULT_TURNED, SensorFault, fault_bias3, fault_turn, noise_gain
+from sim.faults import (
+    FAULT_STUCK,
+    FAULT_TURNED,
+    SensorFault,
+    fault_bias3,
+    fault_turn,
+    is_due,
+    noise_gain,
+    sampling_period,
+)
 from sim.rng_streams import MAG_HARD_IRON, MAG_SOFT_IRON_CROSS, MAG_SOFT_IRON_DIAGONAL, MAG_WHITE
 
 wp.set_module_options({"enable_backward": False})
@@ -88,3 +97,20 @@ def mag_sample(
         noise = noise_gain(fault) * model.white_std * normal3(seed, i, draw_tick(tick), MAG_WHITE)
         sample.field_frd_gauss = state.soft_iron * field_frd + state.hard_iron_frd + noise + fault_bias3(fault)
     return sample
+
+
+@wp.func
+def sense_mag(
+    model: MagModel,
+    state: MagState,
+    held: MagSample,
+    fault: SensorFault,
+    q_ned_from_frd: wp.quat,
+    seed: int,
+    i: int,
+    tick: wp.int64,
+) -> MagSample:
+    """The sample after a tick: a new one if one is due."""
+    if not is_due(sampling_period(model.period_ticks, fault), draw_tick(tick)):
+        return held
+    return mag_sample(model, state, held, q_ned_from_frd, fault, seed, i, tick)

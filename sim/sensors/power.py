@@ -10,8 +10,9 @@ import warp as wp
 from autopilot.ports import BatterySample
 from common.kernels import tick_end_us
 from common.rng import draw_tick, normal
-from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
+from sim.faults import FAULT_STUCK, SensorFault, fault_bias, is_due, noise_gain, sampling_period
 from sim.rng_streams import BATTERY_CURRENT, BATTERY_VOLTAGE
+from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
 
@@ -56,3 +57,19 @@ def battery_sample(
         sample.voltage_v = voltage_v + voltage_noise + fault_bias(fault)
         sample.current_a = current_a + gain * model.current_std * normal(seed, i, draw_tick(tick), BATTERY_CURRENT)
     return sample
+
+
+@wp.func
+def sense_battery(
+    model: BatteryMonitorModel,
+    held: BatterySample,
+    fault: SensorFault,
+    truth: Truth,
+    seed: int,
+    i: int,
+    tick: wp.int64,
+) -> BatterySample:
+    """The sample after a tick: a new one if one is due."""
+    if not is_due(sampling_period(model.period_ticks, fault), draw_tick(tick)):
+        return held
+    return battery_sample(model, held, truth.battery_voltage_v, truth.battery_current_a, fault, seed, i, tick)

@@ -11,8 +11,10 @@ import warp as wp
 from autopilot.ports import RangeSample
 from common.kernels import tick_end_us
 from common.rng import draw_tick, normal
-from sim.faults import FAULT_STUCK, SensorFault, fault_bias, noise_gain
+from sim.faults import FAULT_STUCK, SensorFault, fault_bias, is_due, noise_gain, sampling_period
 from sim.rng_streams import RANGE_WHITE
+from sim.truth import Truth
+from sim.world.world import World, ray_hit
 
 wp.set_module_options({"enable_backward": False})
 
@@ -67,3 +69,22 @@ def range_sample(
             sample.is_valid = 1
         sample.distance_m = wp.clamp(distance, model.min_distance, model.max_distance)
     return sample
+
+
+@wp.func
+def sense_range(
+    model: RangeModel,
+    held: RangeSample,
+    fault: SensorFault,
+    truth: Truth,
+    world: World,
+    seed: int,
+    i: int,
+    tick: wp.int64,
+) -> RangeSample:
+    """The sample after a tick: a new one if one is due."""
+    if not is_due(sampling_period(model.period_ticks, fault), draw_tick(tick)):
+        return held
+    down_ned = wp.quat_rotate(truth.q_ned_from_frd, wp.vec3(0.0, 0.0, 1.0))
+    distance_m = ray_hit(world, truth.pos_ned, down_ned, model.max_distance)
+    return range_sample(model, held, distance_m, fault, seed, i, tick)

@@ -11,38 +11,17 @@ import warp as wp
 from autopilot.ports import Samples
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from common.geomagnetic import field_ned_gauss
-from common.kernels import TICK_S
+from common.kernels import vec8
 from common.rng import draw_tick
-from sim.faults import FAULT_OFF, Faults, SensorFault, is_due, sampling_period
-from sim.sensors.baro import BaroModel, BaroState, baro_boot, baro_drift, baro_model, baro_sample
-from sim.sensors.gnss import (
-    GnssModel,
-    GnssState,
-    gnss_boot,
-    gnss_delivered,
-    gnss_drop_oldest,
-    gnss_is_delivered,
-    gnss_is_taken,
-    gnss_lost,
-    gnss_model,
-    gnss_take,
-)
-from sim.sensors.imu import (
-    DRIFT_PERIOD_TICKS,
-    IMU_PERIOD_TICKS,
-    ImuModel,
-    ImuState,
-    imu_boot,
-    imu_drift,
-    imu_model,
-    imu_sample,
-    imu_vibration,
-)
-from sim.sensors.mag import MagModel, MagState, mag_boot, mag_model, mag_sample
-from sim.sensors.power import BatteryMonitorModel, battery_monitor_model, battery_sample
-from sim.sensors.range import RangeModel, range_model, range_sample
+from sim.faults import SensorFault
+from sim.sensors.baro import BaroModel, BaroState, baro_boot, baro_model, sense_baro
+from sim.sensors.gnss import GnssModel, GnssState, gnss_boot, gnss_model, sense_gnss
+from sim.sensors.imu import ImuModel, ImuState, imu_boot, imu_model, sense_imu
+from sim.sensors.mag import MagModel, MagState, mag_boot, mag_model, sense_mag
+from sim.sensors.power import BatteryMonitorModel, battery_monitor_model, sense_battery
+from sim.sensors.range import RangeModel, range_model, sense_range
 from sim.truth import Truth
-from sim.world.world import World, ray_hit
+from sim.world.world import World
 
 wp.set_module_options({"enable_backward": False})
 
@@ -58,6 +37,20 @@ class SensorModel:
     mag: MagModel
     range: RangeModel
     battery: BatteryMonitorModel
+
+
+@wp.struct
+class Faults:
+    """The fault of each sensor of one vehicle; all zero is healthy."""
+
+    gyro: SensorFault
+    accel: SensorFault
+    gnss: SensorFault
+    baro: SensorFault
+    mag: SensorFault
+    range: SensorFault
+    battery: SensorFault
+    motor_loss: vec8  # [0..1] share of its command that each motor loses
 
 
 @wp.struct
@@ -110,16 +103,6 @@ def sensors_boot(model: SensorModel, seed: int, i: int, tick: wp.int64) -> Senso
 
 
 @wp.func
-def imu_period(gyro: SensorFault, accel: SensorFault) -> int:
-    """Ticks between samples of the chip that holds both; 0 if either is off."""
-    gyro_period = sampling_period(IMU_PERIOD_TICKS, gyro)
-    accel_period = sampling_period(IMU_PERIOD_TICKS, accel)
-    if gyro_period == 0 or accel_period == 0:
-        return 0
-    return wp.max(gyro_period, accel_period)
-
-
-@wp.func
 def sense(
     model: SensorModel,
     state: SensorState,
@@ -143,62 +126,19 @@ def sense(
         tick: index of the tick.
     """
     out = state
-    count = draw_tick(tick)
     if state.is_booted == 0:
         out = sensors_boot(model, seed, i, tick)
-
-    if is_due(DRIFT_PERIOD_TICKS, count):
-        out.imu = imu_drift(model.imu, out.imu, seed, i, count)
-    period = imu_period(faults.gyro, faults.accel)
-    if is_due(period, count):
-        out.imu = imu_vibration(out.imu, truth.motor_speed, float(period) * TICK_S)
-        out.samples.imu = imu_sample(
-            model.imu,
-            out.imu,
-            out.samples.imu,
-            truth.gyro_frd,
-            truth.accel_frd,
-            faults.gyro,
-            faults.accel,
-            seed,
-            i,
-            tick,
-        )
-
-    first_fix = out.gnss.boot_tick + wp.int64(model.gnss.first_fix_ticks)
-    if gnss_is_taken(model.gnss.period_ticks, first_fix, faults.gnss, tick):
-        out.gnss = gnss_take(model.gnss, out.gnss, truth.pos_ned, truth.vel_ned, faults.gnss, seed, i, tick)
-    if gnss_is_delivered(model.gnss.delay_ticks, out.gnss.queue_count, out.gnss.queue_tick[out.gnss.queue_head], tick):
-        out.samples.gnss = gnss_delivered(model.gnss, out.gnss, out.samples.gnss, faults.gnss)
-        out.gnss = gnss_drop_oldest(out.gnss)
-    if faults.gnss.mode == FAULT_OFF:
-        out.samples.gnss = gnss_lost(out.samples.gnss)
-
-    if is_due(model.baro.period_ticks, count):
-        out.baro = baro_drift(model.baro, out.baro, seed, i, count)
-    if is_due(sampling_period(model.baro.period_ticks, faults.baro), count):
-        alt_amsl_m = model.home_alt_amsl_m - truth.pos_ned[2]
-        out.samples.baro = baro_sample(model.baro, out.baro, out.samples.baro, alt_amsl_m, faults.baro, seed, i, tick)
-
-    if is_due(sampling_period(model.mag.period_ticks, faults.mag), count):
-        out.samples.mag = mag_sample(
-            model.mag, out.mag, out.samples.mag, truth.q_ned_from_frd, faults.mag, seed, i, tick
-        )
-
-    if is_due(sampling_period(model.range.period_ticks, faults.range), count):
-        down_ned = wp.quat_rotate(truth.q_ned_from_frd, wp.vec3(0.0, 0.0, 1.0))
-        distance_m = ray_hit(world, truth.pos_ned, down_ned, model.range.max_distance)
-        out.samples.range = range_sample(model.range, out.samples.range, distance_m, faults.range, seed, i, tick)
-
-    if is_due(sampling_period(model.battery.period_ticks, faults.battery), count):
-        out.samples.battery = battery_sample(
-            model.battery,
-            out.samples.battery,
-            truth.battery_voltage_v,
-            truth.battery_current_a,
-            faults.battery,
-            seed,
-            i,
-            tick,
-        )
+    imu, imu_now = sense_imu(model.imu, out.imu, out.samples.imu, faults.gyro, faults.accel, truth, seed, i, tick)
+    gnss, gnss_now = sense_gnss(model.gnss, out.gnss, out.samples.gnss, faults.gnss, truth, seed, i, tick)
+    alt_m = model.home_alt_amsl_m - truth.pos_ned[2]
+    baro, baro_now = sense_baro(model.baro, out.baro, out.samples.baro, faults.baro, alt_m, seed, i, tick)
+    out.imu = imu
+    out.samples.imu = imu_now
+    out.gnss = gnss
+    out.samples.gnss = gnss_now
+    out.baro = baro
+    out.samples.baro = baro_now
+    out.samples.mag = sense_mag(model.mag, out.mag, out.samples.mag, faults.mag, truth.q_ned_from_frd, seed, i, tick)
+    out.samples.range = sense_range(model.range, out.samples.range, faults.range, truth, world, seed, i, tick)
+    out.samples.battery = sense_battery(model.battery, out.samples.battery, faults.battery, truth, seed, i, tick)
     return out

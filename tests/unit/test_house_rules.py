@@ -29,7 +29,6 @@ LONG_FUNCTIONS = {
     "autopilot/estimator/sources/external.py fuse_external_axes": 67,
     "autopilot/estimator/sources/external.py take_external": 75,
     "sim/sensors/ray.py first_hit": 61,
-    "sim/sensors/sensors.py sense": 82,
     "sim/sensors/fast_camera/rows.py draw_rows": 71,
     "sim/sensors/fast_camera/columns.py ground_depth": 61,
     "sim/sensors/fast_camera/fast_camera.py QuickCamera.__init__": 76,

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from sim.faults import BIAS_UNITS, Faults, set_fault
+from sim.faults import BIAS_UNITS, set_fault
+from sim.sensors.sensors import Faults
 from tests.unit.sim.sensors.recorder import Recorder, arrivals
 
 VALUES = {

@@ -8,8 +8,8 @@ import warp as wp
 
 from autopilot.ports import Samples
 from common.kernels import TICK_US
-from sim.faults import Faults, set_fault
-from sim.sensors.sensors import SensorModel, SensorState, sense, sensor_model
+from sim.faults import set_fault
+from sim.sensors.sensors import Faults, SensorModel, SensorState, sense, sensor_model
 from sim.truth import Truth
 from sim.world.world import World, WorldConfig, build_world
 
