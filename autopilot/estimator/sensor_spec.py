@@ -3,7 +3,7 @@
 Each source file ends with the row of its sensor; `sensors.py` lists them.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,11 +25,11 @@ class AidSpec:
 
 @dataclass(frozen=True, slots=True)
 class SampleTopic:
-    """A log topic that has a row for each new sample, by the sample's time."""
+    """A log topic that has a row for each new sample, by the sample's time; recorded flights are read from it too."""
 
     name: str
     fields: Mapping[str, str]  # ULog's types
-    columns: Callable[[Rows], Mapping[str, npt.ArrayLike]]
+    holds: Mapping[str, str]  # fields of the sample, by their names in the log
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,7 +23,6 @@ from mission.estimate.sensor_log import Recording, Rows, SensorLog, row_dtype
 
 CHUNK_TICKS = 1000
 OUTPUT_PERIOD_US = 20_000
-SENSORS = tuple(sensor.name for sensor in FUSED_SENSORS)
 _AIDS = tuple(aid for sensor in FUSED_SENSORS for aid in sensor.aids)
 SOURCES = {**{aid.name: aid.axes for aid in _AIDS}, "drag": 2, "rest": 3}
 UNITS = {**{aid.name: aid.unit for aid in _AIDS}, "drag": "m/s²", "rest": "m/s"}
@@ -158,10 +157,10 @@ class _Delivery:
     def __init__(self, log: SensorLog, first: int) -> None:
         start_us = log.imu["time_us"][first]
         self._rows: dict[str, Rows] = {}
-        for name in SENSORS:
-            rows: Rows = getattr(log, name)
+        for sensor in FUSED_SENSORS:
+            rows = log.samples_of(sensor)
             rows = rows[rows["time_us"] >= start_us]
-            self._rows[name] = np.concatenate([rows, np.zeros(1, dtype=rows.dtype)])  # the last one: none yet
+            self._rows[sensor.name] = np.concatenate([rows, np.zeros(1, dtype=rows.dtype)])  # the last one: none yet
 
     def fill(self, samples: Rows, imu: Rows) -> None:
         samples["imu"] = imu

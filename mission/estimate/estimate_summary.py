@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from autopilot.estimator.sensors import FUSED_SENSORS
 from autopilot.ports import HEIGHT_VALID, POSITION_VALID, VELOCITY_VALID, YAW_ALIGNED
 from common.geodesy import GeoPoint
 from mission.estimate.estimate_difference import Difference, difference
 from mission.estimate.estimate_noise import FoundNoise, in_flight, median_spread
-from mission.estimate.estimate_run import SENSORS, SOURCES, Replay
+from mission.estimate.estimate_run import SOURCES, Replay
 from mission.estimate.sensor_log import SensorLog
 
 BAND_SIGMA = 1.959964  # 95 % of a normal distribution lie within
@@ -72,7 +73,7 @@ def summarise_replay(
     return EstimateSummary(
         log=log.recording.path.name,
         duration_s=log.duration_s,
-        samples={name: len(getattr(log, name)) for name in ("imu", *SENSORS)},
+        samples={"imu": len(log.imu), **{sensor.name: len(log.samples_of(sensor)) for sensor in FUSED_SENSORS}},
         origin=log.origin,
         sources={name: _source(replay, name, components, noise.get(name)) for name, components in SOURCES.items()},
         valid={name: float(np.mean((estimate["flags"] & flag) != 0)) for name, flag in flags.items()},

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from autopilot.estimator.sensor_spec import SensorSpec
+from autopilot.estimator.sensors import FUSED_SENSORS
 from autopilot.ports import BaroSample, GnssSample, ImuSample, MagSample, RangeSample
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from common.params import ParameterTable
@@ -76,6 +78,7 @@ class Recording:
     baro: Rows  # BARO_DTYPE
     mag: Rows  # MAG_DTYPE
     range: Rows  # RANGE_DTYPE
+    others: dict[str, Rows] = field(default_factory=dict)  # further fused sensors, by name
     is_own: bool = False  # written by this project: its parameters mean what they mean here
     parameters: dict[str, float] = field(default_factory=dict)
     gnss_delay_s: float = 0.0  # subtracted from the receiver's times already
@@ -107,7 +110,13 @@ class SensorLog:
     baro: Rows
     mag: Rows
     range: Rows
+    others: dict[str, Rows]  # further fused sensors, by name
     stretches: list[tuple[int, int]]  # first and last + 1 IMU sample of each part without a long gap
+
+    def samples_of(self, sensor: SensorSpec) -> Rows:
+        """The samples of a fused sensor."""
+        rows: Rows = getattr(self, sensor.name, self.others.get(sensor.name, empty(sensor.dtype)))
+        return rows
 
     @property
     def duration_s(self) -> float:
@@ -140,12 +149,16 @@ def prepare(recording: Recording, table: ParameterTable) -> SensorLog:
     for name, label in (("baro", "barometer"), ("mag", "magnetometer")):
         if not len(slow[name]):
             notes.append(f"no {label} samples")
+    labels = {sensor.name: sensor.label for sensor in FUSED_SENSORS}
+    others = {
+        name: _thinned(_sorted(rows, labels[name], notes), MIN_INTERVAL_S) for name, rows in recording.others.items()
+    }
     breaks = np.flatnonzero(np.diff(imu["time_us"]) > FILLED_GAP_S * 1e6) + 1
     bounds = [0, *breaks.tolist(), len(imu)]
     stretches = list(pairwise(bounds))
     if len(stretches) > 1:
         notes.append(f"{len(stretches) - 1} gap(s) above {FILLED_GAP_S:g} s: the estimator started anew after each")
-    return SensorLog(recording, origin, imu, _projected(fixes, origin), **slow, stretches=stretches)
+    return SensorLog(recording, origin, imu, _projected(fixes, origin), **slow, others=others, stretches=stretches)
 
 
 def _prepare_imu(recording: Recording) -> Rows:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from autopilot.estimator.sensor_spec import SensorSpec
+from autopilot.estimator.sensors import FUSED_SENSORS
 from common.geodesy import GeoPoint
 from mission.estimate.sensor_log import (
     BARO_DTYPE,
@@ -40,11 +42,13 @@ REF_ROWS = 5
 FACING_DOWN = 25  # distance_sensor.orientation
 SEA_LEVEL_PA, HEIGHT_SCALE_M, ISA_EXPONENT = 101325.0, 44330.77, 5.2558797  # ISO 2533, as in the barometer's fusion
 
+READ_HERE = {"gnss", "baro", "mag", "range"}  # from all forms that they have had
+OTHERS = tuple(sensor for sensor in FUSED_SENSORS if sensor.name not in READ_HERE)
 TOPICS = (
     "sensor_combined vehicle_imu vehicle_gps_position sensor_gps vehicle_air_data sensor_baro vehicle_magnetometer "
     "sensor_mag distance_sensor vehicle_attitude vehicle_local_position vehicle_attitude_groundtruth "
     "vehicle_local_position_groundtruth"
-).split()
+).split() + [sensor.topic.name for sensor in OTHERS if sensor.topic]
 
 
 class _Columns:
@@ -131,6 +135,7 @@ def read_ulog(path: Path, *, ignores_velocity_flag: bool = False) -> Recording:
         baro=_baro(log),
         mag=_mag(log),
         range=_range(log),
+        others={sensor.name: _sampled(log, sensor) for sensor in OTHERS},
         is_own=is_own,
         parameters=log.parameters,
         gnss_delay_s=gnss_delay_s,
@@ -274,6 +279,19 @@ def _range(log: _Log) -> Rows:
             downward: Rows = ranges[faces_down]
             return downward
     return empty(RANGE_DTYPE)
+
+
+def _sampled(log: _Log, sensor: SensorSpec) -> Rows:
+    """The samples of a sensor, from its topic as this project writes it."""
+    topic = sensor.topic
+    columns = log.topic(topic.name) if topic else None
+    if topic is None or columns is None:
+        return empty(sensor.dtype)
+    rows = np.zeros(len(columns["timestamp"]), dtype=sensor.dtype)
+    for field, part in topic.holds.items():
+        width = rows[part].shape[1:]
+        rows[part] = columns.vector(field, *width) if width else columns[field]
+    return rows
 
 
 def _track(log: _Log, name: str, suffix: str, notes: list[str]) -> Track | None:

@@ -1,5 +1,6 @@
 """Topics of the sensors: a row for each frame in which a new sample had arrived."""
 
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -61,10 +62,9 @@ def _battery(batch: Batch) -> Columns:
     }
 
 
-def _sampled(batch: Batch, sensor: SensorSpec) -> Columns:
-    rows = fresh(batch, sensor.name)
-    columns = {} if sensor.topic is None else sensor.topic.columns(rows)
-    return {"timestamp": rows["time_us"], **columns}
+def _sampled(batch: Batch, sensor: str, holds: Mapping[str, str]) -> Columns:
+    rows = fresh(batch, sensor)
+    return {"timestamp": rows["time_us"], **{field: rows[part] for field, part in holds.items()}}
 
 
 _OWN_TOPICS = {
@@ -103,7 +103,8 @@ def _topic(sensor: SensorSpec) -> Topic:
     if sensor.topic is None:
         return _OWN_TOPICS[sensor.name]
     is_new = partial(is_fresh, sensor=sensor.name)
-    return Topic(sensor.topic.name, dict(sensor.topic.fields), partial(_sampled, sensor=sensor), is_new)
+    columns = partial(_sampled, sensor=sensor.name, holds=sensor.topic.holds)
+    return Topic(sensor.topic.name, dict(sensor.topic.fields), columns, is_new)
 
 
 SENSOR_TOPICS = (*(_topic(sensor) for sensor in FUSED_SENSORS), _BATTERY)

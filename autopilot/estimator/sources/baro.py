@@ -171,11 +171,7 @@ BARO = SensorSpec(
     topic=SampleTopic(
         "sensor_baro",
         {"timestamp_sample": "uint64_t", "pressure": "float", "temperature": "float"},
-        lambda rows: {
-            "timestamp_sample": rows["time_us"],
-            "pressure": rows["pressure_pa"],
-            "temperature": rows["temperature_c"],
-        },
+        {"timestamp_sample": "time_us", "pressure": "pressure_pa", "temperature": "temperature_c"},
     ),
     is_needed_to_arm=True,
     status_bit=1 << 3,

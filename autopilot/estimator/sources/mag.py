@@ -245,7 +245,7 @@ MAG = SensorSpec(
     topic=SampleTopic(
         "vehicle_magnetometer",
         {"timestamp_sample": "uint64_t", "magnetometer_ga": "float[3]"},
-        lambda rows: {"timestamp_sample": rows["time_us"], "magnetometer_ga": rows["field_frd_gauss"]},
+        {"timestamp_sample": "time_us", "magnetometer_ga": "field_frd_gauss"},
     ),
     status_bit=1 << 2,
     failure_unit=2,
