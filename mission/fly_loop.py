@@ -1,22 +1,18 @@
-"""A flight of `honeyguide fly`, from its first frame to its run folder: progress, texts, summary, logs, picture."""
+"""A flight of `honeyguide fly`, from its plan to its run folder: summary, logs, picture."""
 
-import gc
 import json
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.live import Live
 from rich.table import Table
 
-from common.files import write_to_nowhere, write_whole
+from common.files import write_whole
 from mission.client import Running
-from mission.console.progress_line import TABLE_PERIOD_S, Progress
-from mission.console.terminal import LINE_PERIOD_S, print_line
+from mission.console.terminal import print_line
 from mission.flight import Flight
+from mission.flight_session import FlightSession
 from mission.flight_settings import FlightOptions
 from mission.log.flight_plots import plot_flight
 from mission.log.flight_recorder import History
@@ -24,7 +20,6 @@ from mission.log.flight_summary import Summary, curved_items, planned_path, summ
 from mission.plan.plan_file import Plan
 from mission.run_folder import OwnFiles
 from mission.script import fly_plan
-from mission.view.replay_file import keep_for_replay
 
 if TYPE_CHECKING:
     from mission.view.page import PageServer
@@ -42,22 +37,10 @@ def fly_to_the_end(
     """Flies the plan, or waits for ground stations; writes the run folder and returns the exit code."""
     path_ned = [] if plan is None else planned_path(plan, flight.config.home)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
-    way_ned = [point for _, point in path_ned]
-    keep_for_replay(flight, way_ned)
-    watchers: list[Callable[[], None]] = []
-    if page is not None:
-        from mission.view.live import LiveView
-
-        view = LiveView(flight, page, speed=speed, path_ned=way_ned)
-        watchers.append(view.frame)
-    advance(flight, _end(options, speed, running), speed, watchers, Progress(flight, running), console)
-    if page is not None:
-        view.end(f"flight ended: logs in {folder}")
-    history = flight.close()  # before what takes long: who is to stop may be killed soon
-    files = OwnFiles(folder, console)
-    exit_code = _finish(flight, history, running, plan, path_ned, folder, files, console)
-    if page is not None:
-        view.close()
+    session = FlightSession(flight, speed, page, folder, console, path_ned=[point for _, point in path_ned])
+    history = session.fly(_end(options, speed, running), running)
+    exit_code = _finish(flight, history, running, plan, path_ned, folder, session.files, console)
+    session.close()
     return exit_code
 
 
@@ -74,70 +57,6 @@ def _end(options: FlightOptions, speed: float | None, running: Running | None) -
     return is_over
 
 
-def advance(
-    flight: Flight,
-    is_over: Callable[[Flight], bool],
-    speed: float | None,
-    watchers: Sequence[Callable[[], None]],
-    progress: Progress,
-    console: Console,
-) -> None:
-    """Advances the flight until it is over or the user stops it, and shows a line of figures.
-
-    Args:
-        flight: what flies.
-        is_over: asked after each frame.
-        speed: simulated seconds per second; None: as fast as possible.
-        watchers: called after each frame.
-        progress: the line.
-        console: where it is shown.
-    """
-    gc.freeze()  # what is loaded by now stays: to look through it for garbage takes 0.2 s, in the middle of a flight
-    try:
-        with _signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
-            told = 0
-
-            def on_frame(_: Flight) -> None:
-                nonlocal told
-                for watch in watchers:
-                    watch()
-                for text in flight.texts.since(told):
-                    print_line(console, str(text))
-                told = flight.texts.count
-                if console.is_terminal and progress.is_due(TABLE_PERIOD_S):
-                    live.update(progress.table(), refresh=True)
-                elif not console.is_terminal and progress.is_due(LINE_PERIOD_S):
-                    print_line(console, progress.line())
-
-            flight.run(is_over, speed=speed, on_frame=on_frame)
-    except KeyboardInterrupt:
-        console.print("stopped by the user")
-    except SystemExit:  # rich's: who read what is printed has gone, which is as a terminal that was closed
-        write_to_nowhere(1)
-
-
-@contextmanager
-def _signals_interrupt() -> Iterator[None]:
-    """Inside, SIGTERM is what Ctrl-C is, and so is SIGHUP: a terminal that was closed takes no more lines."""
-
-    def interrupt(*_: object) -> NoReturn:
-        raise KeyboardInterrupt
-
-    def hang_up(*_: object) -> NoReturn:
-        write_to_nowhere(1, 2)
-        raise KeyboardInterrupt
-
-    before = {
-        number: signal.signal(number, handler)
-        for number, handler in ((signal.SIGTERM, interrupt), (signal.SIGHUP, hang_up))
-    }
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def _finish(
     flight: Flight,
     history: History,
@@ -149,8 +68,6 @@ def _finish(
     console: Console,
 ) -> int:
     """Writes the rest of the run folder and prints the summary; returns the exit code."""
-    for trouble in flight.troubles.take():
-        print_line(console, trouble)
     if len(history.time_us) == 0:
         console.print("the flight ended before its first frame")
         return 0 if running is None else 1

@@ -5,7 +5,6 @@ MAVLink over a link in memory, so that everything but ground stations and the li
 """
 
 import json
-from collections.abc import Callable
 from contextlib import ExitStack
 from math import isfinite
 from pathlib import Path
@@ -19,12 +18,11 @@ from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
 from mission.connections import open_links, open_page
-from mission.console.progress_line import Progress
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight, flight_parameters
 from mission.flight_options import UserError, speed_of
+from mission.flight_session import FlightSession
 from mission.flight_settings import FollowOptions
-from mission.fly_loop import advance
 from mission.follow.companion_process import latency_text
 from mission.follow.follow_options import follow_config
 from mission.follow.follow_scoring import FollowWatch, taken_over
@@ -33,7 +31,7 @@ from mission.kernel_loading import load_kernels
 from mission.run_folder import OwnFiles, run_folder
 from mission.script import Drone, take_off
 from mission.view.film import write_film
-from mission.view.replay_file import RecordingError, keep_for_replay, load_recording
+from mission.view.replay_file import RecordingError, load_recording
 from policies.companion.companion import Companion, Pilot
 from policies.companion.engagement import Phase
 from policies.companion.names import SCRIPTED, TASK
@@ -73,42 +71,35 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         load_kernels(say, has_camera=page is not None, has_owner=True)
         say("building the world")
         flight, companion = flight_with_companion(config, pilot, links=links, folder=folder, wall_s=wall_time_s)
-    keep_for_replay(flight, action=lambda: companion.action)
     watch = watch_of(flight, companion, options.seconds)
-    watchers: list[Callable[[], None]] = [watch.frame]
-    if page is not None:
-        from mission.view.live import LiveView
-
-        view = LiveView(
-            flight, page, speed=speed, action=lambda: companion.action, score=lambda: score_lines(watch, companion)
-        )
-        watchers.append(view.frame)
+    session = FlightSession(
+        flight,
+        speed,
+        page,
+        folder,
+        console,
+        action=lambda: companion.action,
+        score=lambda: score_lines(watch, companion),
+    )
     running = flight.drone.start(follow(flight.drone, companion, options.seconds))
     where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.gcs_port}"
     print_line(console, f"{name} follows an owner who {options.owner}s; {where}")
     print_line(console, f"logs: {folder}")
     if page is not None:
         print_line(console, f"live page: {page.url}")
-    advance(flight, lambda _: running.is_done, speed, watchers, Progress(flight, running), console)
-    if page is not None:
-        view.end(f"flight ended: logs in {folder}")
+    session.fly(lambda _: running.is_done, running, [watch.frame])
     is_stopped = not running.is_done
     running.cancel()
-    flight.close()
-    for trouble in flight.troubles.take():
-        print_line(console, trouble)
-    files = OwnFiles(folder, console)
     if running.error is not None:
         print_line(console, f"result: {running.error}")
     is_down = running.error is None and not flight.is_crashed
-    exit_code = finish(watch, files, console, is_down=is_down, is_stopped=is_stopped)
+    exit_code = finish(watch, session.files, console, is_down=is_down, is_stopped=is_stopped)
     if flight.is_crashed:
         print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
     print_line(console, latency_text(companion))
     has_film = options.has_film and filmed(flight, folder, console)
     print_line(console, f"{'logs, scorecard and film' if has_film else 'logs and scorecard'}: {folder}")
-    if page is not None:
-        view.close()
+    session.close()
     return exit_code
 
 

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from mission.console.progress_line import Progress
 from mission.flight import Flight, FlightConfig
-from mission.fly_loop import advance, fly_to_the_end
+from mission.flight_session import FlightSession
+from mission.fly_loop import fly_to_the_end
 
 OBJECTS_MAX = 50_000  # a full collection of so many takes a few milliseconds; a program that is loaded has 350,000
 
@@ -23,10 +23,11 @@ def unfrozen():
 
 
 @pytest.mark.usefixtures("unfrozen")
-def test_no_frame_waits_for_the_garbage_of_all_that_was_loaded():
+def test_no_frame_waits_for_the_garbage_of_all_that_was_loaded(tmp_path):
     flight, counts = Flight(FlightConfig()), []
     watch = [lambda: counts.append(len(gc.get_objects()))]
-    advance(flight, lambda _: flight.time_us >= 200_000, None, watch, Progress(flight, None), Console(quiet=True))
+    session = FlightSession(flight, None, None, tmp_path, Console(quiet=True))
+    session.fly(lambda _: flight.time_us >= 200_000, None, watch)
     assert 0 < max(counts) < OBJECTS_MAX
 
 

@@ -1,0 +1,137 @@
+"""The flight of a command, `honeyguide fly` or `follow`: shown, advanced to its end, and its logs closed.
+
+In: a flight that has not begun, and when it is over. Out: the line of progress, the vehicle's texts, the live page, and
+what its replay needs in its log. Ctrl-C, SIGTERM and a closed terminal end it as its own end does.
+"""
+
+import gc
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from rich.console import Console
+from rich.live import Live
+
+from common.files import write_to_nowhere
+from mission.client import Running
+from mission.console.progress_line import TABLE_PERIOD_S, Progress
+from mission.console.terminal import LINE_PERIOD_S, print_line
+from mission.flight import Flight
+from mission.log.flight_recorder import History
+from mission.run_folder import OwnFiles
+from mission.view.replay_file import keep_for_replay
+
+if TYPE_CHECKING:
+    from mission.view.page import PageServer
+
+
+class FlightSession:
+    """One flight, from before its first frame until its logs are complete.
+
+    Args:
+        flight: what flies.
+        speed: simulated seconds per second; None: as fast as possible.
+        page: where it is shown live; None: nowhere.
+        folder: of the run.
+        console: where progress is shown.
+        path_ned: [m] (n, 3) of its plan.
+        action: what a policy on board chose last.
+        score: lines about it on the live page.
+    """
+
+    def __init__(
+        self,
+        flight: Flight,
+        speed: float | None,
+        page: "PageServer | None",
+        folder: Path,
+        console: Console,
+        *,
+        path_ned: Sequence[Any] = (),
+        action: Callable[[], Any] = lambda: None,
+        score: Callable[[], tuple[str, ...]] = tuple,
+    ) -> None:
+        self.files = OwnFiles(folder, console)
+        self._flight, self._speed, self._folder, self._console = flight, speed, folder, console
+        keep_for_replay(flight, path_ned, action)
+        self._view = None
+        if page is not None:
+            from mission.view.live import LiveView
+
+            self._view = LiveView(flight, page, speed=speed, path_ned=path_ned, action=action, score=score)
+
+    def fly(
+        self, is_over: Callable[[Flight], bool], running: Running | None, watchers: Sequence[Callable[[], None]] = ()
+    ) -> History:
+        """Advances the flight to its end and closes its logs.
+
+        Args:
+            is_over: asked after each frame.
+            running: the script that flies it, for the line of progress.
+            watchers: called after each frame.
+        """
+        watching = [*watchers] if self._view is None else [*watchers, self._view.frame]
+        self._advance(is_over, watching, Progress(self._flight, running))
+        if self._view is not None:
+            self._view.end(f"flight ended: logs in {self._folder}")
+        history = self._flight.close()  # before what takes long: who is to stop may be killed soon
+        for trouble in self._flight.troubles.take():
+            print_line(self._console, trouble)
+        return history
+
+    def close(self) -> None:
+        """Ends the live page."""
+        if self._view is not None:
+            self._view.close()
+
+    def _advance(
+        self, is_over: Callable[[Flight], bool], watchers: Sequence[Callable[[], None]], progress: Progress
+    ) -> None:
+        """Until the flight is over or the user stops it; shows a line of figures."""
+        gc.freeze()  # what is loaded by now stays: to look through it takes 0.2 s, in the middle of a flight
+        flight, console = self._flight, self._console
+        try:
+            with _signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
+                told = 0
+
+                def on_frame(_: Flight) -> None:
+                    nonlocal told
+                    for watch in watchers:
+                        watch()
+                    for text in flight.texts.since(told):
+                        print_line(console, str(text))
+                    told = flight.texts.count
+                    if console.is_terminal and progress.is_due(TABLE_PERIOD_S):
+                        live.update(progress.table(), refresh=True)
+                    elif not console.is_terminal and progress.is_due(LINE_PERIOD_S):
+                        print_line(console, progress.line())
+
+                flight.run(is_over, speed=self._speed, on_frame=on_frame)
+        except KeyboardInterrupt:
+            console.print("stopped by the user")
+        except SystemExit:  # rich's: who read what is printed has gone, which is as a terminal that was closed
+            write_to_nowhere(1)
+
+
+@contextmanager
+def _signals_interrupt() -> Iterator[None]:
+    """Inside, SIGTERM is what Ctrl-C is, and so is SIGHUP: a terminal that was closed takes no more lines."""
+
+    def interrupt(*_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    def hang_up(*_: object) -> NoReturn:
+        write_to_nowhere(1, 2)
+        raise KeyboardInterrupt
+
+    before = {
+        number: signal.signal(number, handler)
+        for number, handler in ((signal.SIGTERM, interrupt), (signal.SIGHUP, hang_up))
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
