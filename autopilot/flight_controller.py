@@ -45,7 +45,7 @@ from autopilot.payload.gimbal.gimbal import Gimbal
 from autopilot.payload.gimbal.gimbal_control import GimbalControl
 from autopilot.payload.payloads import Payloads
 from autopilot.roi_and_pause import Guidance
-from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
+from autopilot.vehicles.default_class import DEFAULT_CLASS
 from autopilot.vehicles.vehicle_class import DriveParts, VehicleClass
 from common.airframe import Airframe
 from common.attitude import roll_pitch_yaw_of
@@ -131,7 +131,7 @@ class FlightController:
         host: Host | None = None,
         injector: FailureInjector | None = None,
         turntable: Turntable | None = None,
-        vehicle: VehicleClass = MULTIROTOR,
+        vehicle: VehicleClass = DEFAULT_CLASS,
     ) -> None:
         self._last_resort = vehicle.last_resort
         self.params = params

@@ -14,7 +14,7 @@ from autopilot.inputs.obstacles import OBSTACLE_PARAMETERS
 from autopilot.inputs.stick_params import STICK_PARAMETERS
 from autopilot.inputs.traffic import TRAFFIC_PARAMETERS
 from autopilot.navigator.params import NAVIGATOR_PARAMETERS
-from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
+from autopilot.vehicles.default_class import DEFAULT_CLASS
 from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import Airframe
 from common.params import Parameter, ParameterTable
@@ -38,7 +38,7 @@ SYSTEM_PARAMETERS: list[Parameter] = [
         "the end, -1 never",
         "PX4 default",
     ),
-    _constant("SYS_AUTOSTART", 4001, "airframe: PX4's generic one with as many rotors"),
+    _constant("SYS_AUTOSTART", 4001, "airframe: PX4's generic one with as many motors"),
     Parameter(
         "MAV_EVENTS",
         0,
@@ -66,7 +66,7 @@ SYSTEM_PARAMETERS: list[Parameter] = [
 ]
 
 
-def parameter_sections(vehicle: VehicleClass = MULTIROTOR) -> dict[str, Sequence[Parameter]]:
+def parameter_sections(vehicle: VehicleClass = DEFAULT_CLASS) -> dict[str, Sequence[Parameter]]:
     """Every declaration of the flight controller of a class of vehicles, by the headings of the page of parameters."""
     return {
         "Estimator": ESTIMATOR_PARAMETERS,
@@ -81,7 +81,7 @@ def parameter_sections(vehicle: VehicleClass = MULTIROTOR) -> dict[str, Sequence
     }
 
 
-def all_parameters(vehicle: VehicleClass = MULTIROTOR) -> list[Parameter]:
+def all_parameters(vehicle: VehicleClass = DEFAULT_CLASS) -> list[Parameter]:
     """Every declaration of the flight controller of a class of vehicles."""
     return [item for section in parameter_sections(vehicle).values() for item in section]
 
@@ -94,7 +94,7 @@ def _of_airframe(item: Parameter, value: int | float) -> Parameter:
 
 
 def parameter_table(
-    airframe: Airframe | None = None, more: Sequence[Parameter] = (), vehicle: VehicleClass = MULTIROTOR
+    airframe: Airframe | None = None, more: Sequence[Parameter] = (), vehicle: VehicleClass = DEFAULT_CLASS
 ) -> ParameterTable:
     """A vehicle's table, at the defaults of its airframe; `more` are those that only its dialect has."""
     own = {} if airframe is None else vehicle.defaults(airframe)

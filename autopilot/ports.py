@@ -13,10 +13,10 @@ from common.kernels import vec8
 wp.set_module_options({"enable_backward": False})
 
 # Setpoint.kind
-SETPOINT_IDLE = wp.constant(0)  # rotors stopped when disarmed, at idle when armed
+SETPOINT_IDLE = wp.constant(0)  # motors stopped when disarmed, at idle when armed
 SETPOINT_TRAJECTORY = wp.constant(1)  # position, velocity, acceleration, yaw; smoothed by the trajectory generator
-SETPOINT_ATTITUDE = wp.constant(2)  # attitude (yaw by rate where yaw_rate is finite) and collective thrust
-SETPOINT_RATE = wp.constant(3)  # body rates and collective thrust
+SETPOINT_ATTITUDE = wp.constant(2)  # attitude (yaw by rate where yaw_rate is finite) and thrust
+SETPOINT_RATE = wp.constant(3)  # body rates and thrust
 SETPOINT_LEAN = wp.constant(4)  # roll and pitch as an attitude; yaw rate, height or climb rate by the trajectory
 
 # What the commander says of the vehicle
@@ -145,8 +145,8 @@ class Setpoint:
     exit_speed: float  # [m/s] speed with which pos_ned may be passed, 0: stop there
     q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE; SETPOINT_LEAN: its heading is not used
     omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE
-    thrust: float  # [0..1] collective, share of the maximum thrust
-    motor_test: vec8  # [0..1] commands of the rotors while the vehicle is disarmed, not otherwise
+    thrust: float  # [0..1] share of the maximum thrust
+    motor_test: vec8  # [0..1] commands of the motors while the vehicle is disarmed, not otherwise
 
 
 @wp.func
@@ -190,7 +190,7 @@ class Estimate:
 class Actuators:
     """Motor commands, and the setpoints actually flown (for telemetry and logs)."""
 
-    command: vec8  # [0..1] per rotor, what an ESC receives
+    command: vec8  # [0..1] per motor, what an ESC receives
     traj_pos_ned: wp.vec3
     traj_vel_ned: wp.vec3
     traj_accel_ned: wp.vec3
@@ -198,6 +198,6 @@ class Actuators:
     traj_yaw_rate: float
     q_sp_ned_from_frd: wp.quat
     omega_sp_frd: wp.vec3
-    thrust_sp: float  # [0..1] collective
+    thrust_sp: float  # [0..1]
     torque_sp_frd: wp.vec3  # [N m]
     torque_unallocated_frd: wp.vec3  # [N m] asked for and not achieved

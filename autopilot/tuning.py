@@ -3,7 +3,7 @@
 The model is the airframe hovering: torque to body rate is an integrator behind the motors' first-order lag and the
 loop's delay; each outer loop sees the closed inner one. Gains are set from the inside out, each loop as fast as the
 design margins allow. The disturbance observer subtracts nothing that the model knows of, so it appears only in the
-rows "+25 %", where the rotors push that much more than modelled.
+rows "+25 %", where the motors push that much more than modelled.
 """
 
 from collections.abc import Callable, Mapping

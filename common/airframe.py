@@ -129,6 +129,10 @@ class Airframe(_Section):
     battery: Battery
     contact: Contact
 
+    @property
+    def motor_count(self) -> int:
+        return len(self.rotors)
+
     @model_validator(mode="after")
     def _lifts_itself(self) -> Self:
         rotor = self.rotor_model

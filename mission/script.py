@@ -215,7 +215,7 @@ class Drone(Client):
         self._stream_local(mask, frame, vel=(north_m_s, east_m_s, down_m_s), yaw_rad=yaw_rad)
 
     def offboard_attitude(self, wxyz: tuple[float, float, float, float], thrust: float) -> None:
-        """From now on streams this attitude (w, x, y, z: body frd to ned) and collective thrust [0..1]."""
+        """From now on streams this attitude (w, x, y, z: body frd to ned) and thrust [0..1]."""
         self._offboard = lambda time_ms: self.ask(
             "SET_ATTITUDE_TARGET",
             time_boot_ms=time_ms,
@@ -228,7 +228,7 @@ class Drone(Client):
         )
 
     def offboard_rates(self, omega_frd: tuple[float, float, float], thrust: float) -> None:
-        """From now on streams these body rates [rad/s] and collective thrust [0..1]."""
+        """From now on streams these body rates [rad/s] and thrust [0..1]."""
         self._offboard = lambda time_ms: self.ask(
             "SET_ATTITUDE_TARGET",
             time_boot_ms=time_ms,

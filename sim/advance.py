@@ -14,10 +14,9 @@ from autopilot.advance import autopilot_kernels
 from autopilot.control.law import ControlLaw
 from autopilot.estimator.ekf import estimator_step
 from autopilot.ports import contact
-from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
 from common.kernels import TICK_S
 from common.rng import draw_tick
-from sim.bodies.body import MULTIROTOR_BODY, Body
+from sim.bodies.body import DEFAULT_BODY, DEFAULT_LAW, Body
 from sim.faults import weakened
 from sim.sensors.sensors import Faults, SensorModel, SensorState, sense
 from sim.truth import Truth, true_battery, true_estimate
@@ -73,7 +72,7 @@ def rig_arrays(body: Body, law: ControlLaw) -> Any:
 
 
 @cache
-def rig_kernels(body: Body = MULTIROTOR_BODY, law: ControlLaw = MULTIROTOR_LAW) -> RigKernels:
+def rig_kernels(body: Body = DEFAULT_BODY, law: ControlLaw = DEFAULT_LAW) -> RigKernels:
     """The kernels of a class of vehicles, the same objects each time."""
     arrays = rig_arrays(body, law)
     truth_of, at_rest, standing_height = body.truth, body.at_rest, body.standing_height
@@ -162,5 +161,5 @@ def advance_kernel(body: Body, law: ControlLaw, has_estimator: bool) -> Any:
 
 
 RigArrays: TypeAlias = Any if TYPE_CHECKING else rig_kernels().Arrays
-"""Of multirotors, for the kernels of tasks: they read any row, and write `autopilot.setpoint` alone."""
+"""Of the default class, for the kernels of tasks: they read any row, and write `autopilot.setpoint` alone."""
 forget_impacts = rig_kernels().forget_impacts

@@ -139,12 +139,12 @@ def set_fault(row: Any, sensor: str, mode: str, magnitude: float = 0.0) -> None:
     setattr(row, sensor, fault)
 
 
-def set_motor_loss(row: Any, rotor: int, share: float) -> None:
+def set_motor_loss(row: Any, motor: int, share: float) -> None:
     """Sets what one motor loses of its command.
 
     Args:
         row: as for `set_fault`.
-        rotor: from 0.
+        motor: from 0.
         share: [0..1], 0 repairs.
 
     Raises:
@@ -153,6 +153,6 @@ def set_motor_loss(row: Any, rotor: int, share: float) -> None:
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"motor loss is a share between 0 and 1, not {share}")
     if isinstance(row, np.void | np.ndarray):
-        row["motor_loss"][rotor] = share
+        row["motor_loss"][motor] = share
     else:
-        row.motor_loss[rotor] = share
+        row.motor_loss[motor] = share

@@ -15,14 +15,13 @@ from autopilot.control.law import ControlLaw
 from autopilot.estimator.ekf import make_ekf
 from autopilot.estimator.params import estimator_fields
 from autopilot.ports import Setpoint
-from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
 from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.params import ParameterTable
 from common.warp_start import start_warp
 from sim.advance import rig_kernels
-from sim.bodies.body import MULTIROTOR_BODY, Body
+from sim.bodies.body import DEFAULT_BODY, DEFAULT_LAW, Body
 from sim.rows import HostRows
 from sim.sensors.sensors import Faults, SensorModel, SensorState
 from sim.truth import Truth
@@ -69,8 +68,8 @@ class Rig:
         threads: int = 1,
         device: str = "cpu",
         has_mirrors: bool = False,
-        body: Body = MULTIROTOR_BODY,
-        law: ControlLaw = MULTIROTOR_LAW,
+        body: Body = DEFAULT_BODY,
+        law: ControlLaw = DEFAULT_LAW,
     ) -> None:
         start_warp()
         self.body, self.law = body, law
@@ -106,7 +105,7 @@ class Rig:
 
     @property
     def models(self) -> Any:
-        """`MultirotorModel` of each vehicle, an array of the device, (vehicles,)."""
+        """The body's `Model` of each vehicle, an array of the device, (vehicles,)."""
         return self.arrays.model
 
     @property

@@ -30,7 +30,7 @@ class Truth:
     omega_frd: wp.vec3  # [rad/s]
     accel_frd: wp.vec3  # [m/s²] specific force, mean over the tick
     gyro_frd: wp.vec3  # [rad/s] mean over the tick
-    motor_speed: vec8  # [rad/s] of rotors or wheels; they shake the IMU, and their controllers report them
+    motor_speed: vec8  # [rad/s] of propellers or wheels; they shake the IMU, and their controllers report them
     height_agl_m: float  # of the centre of gravity over the ground below
     battery_voltage_v: float
     battery_current_a: float

@@ -62,7 +62,7 @@ COMMANDER_PARAMETERS: list[Parameter] = [
     Parameter("FD_ACT_MOT_THR", 0.2, 0.0, 1.0, "norm", "motor command from which a motor is judged", _PX4),
     Parameter("FD_ACT_MOT_TOUT", 100, 10, 10_000, "ms", "time for which a motor must be too slow", _PX4),
     Parameter("CA_FAILURE_MODE", 1, 0, 1, "",
-              "1: the control allocation does without a failed motor, if six or more rotors leave enough",
+              "1: the control allocation does without a failed motor, if six or more motors leave enough",
               "PX4's numbers; its default is 0"),
     Parameter("FD_FAIL_R", 60.0, 60.0, 180.0, "deg", "roll above which the vehicle has crashed, unless asked for",
               _PX4),

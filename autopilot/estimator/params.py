@@ -104,7 +104,7 @@ class EstimatorParams:
     external_vel_gate: float
 
 
-_BMI088 = "BMI088 data sheet and vibration of a 10-inch quadrotor (guess)"
+_BMI088 = "BMI088 data sheet and vibration of a 10-inch quadcopter (guess)"
 _TUNED = "tuned on simulated flights: innovations inside their 95 % band"
 _RECEIVER = "receiver model: 0.3 m white, 0.6 m over 60 s, 0.1 m/s"
 _PX4 = "PX4 default"
@@ -356,7 +356,7 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
     Parameter(
         "EKF2_DRAG_NOISE", 0.5, 0.05, 10.0, "m/s^2", "noise of the drag acceleration over 40 ms", _TUNED, "drag_noise"
     ),
-    Parameter("EKF2_MCOEF", 0.14, 0.0, 1.0, "1/s", "rotor drag per airspeed", "airframe: rotor drag", "drag_linear"),
+    Parameter("EKF2_MCOEF", 0.14, 0.0, 1.0, "1/s", "propeller drag per airspeed", "airframe: drag", "drag_linear"),
     Parameter(
         "EKF2_BCOEF_X",
         75.0,

@@ -60,14 +60,14 @@ class SetpointPort:
         self._free_all()
 
     def set_flags(self, *, is_armed: bool, is_landed: bool) -> None:
-        """Tells the control part whether to turn the rotors, and whether to keep its integrators reset."""
+        """Tells the control part whether to turn the motors, and whether to keep its integrators reset."""
         if is_armed is not self.is_armed or is_landed is not self.is_landed:
             self.is_armed = is_armed
             self.is_landed = is_landed
             self._is_changed = True
 
     def idle(self) -> None:
-        """Asks for nothing: rotors at idle when armed."""
+        """Asks for nothing: motors at idle when armed."""
         if self.kind != SETPOINT_IDLE:
             self._free_all()
             self.kind = SETPOINT_IDLE
@@ -152,7 +152,7 @@ class SetpointPort:
         self.yaw = yaw
 
     def hang_level(self, thrust: float, yaw: float) -> None:
-        """Asks for level attitude and a collective thrust [0..1]: what remains when the height is not known either."""
+        """Asks for level attitude and a thrust [0..1]: what remains when the height is not known either."""
         self._free_all()
         self.kind = SETPOINT_ATTITUDE
         self.q_ned_from_frd = (0.0, 0.0, sin(0.5 * yaw), cos(0.5 * yaw))
@@ -186,7 +186,7 @@ class SetpointPort:
         self.yaw_rate = yaw_rate
 
     def tilt(self, q_level_from_frd: Quaternion, yaw_rate: float, thrust: float) -> None:
-        """Asks for roll and pitch, a yaw rate [rad/s] and a collective thrust [0..1]."""
+        """Asks for roll and pitch, a yaw rate [rad/s] and a thrust [0..1]."""
         if (
             self.kind == SETPOINT_ATTITUDE
             and self.q_ned_from_frd == q_level_from_frd
@@ -201,7 +201,7 @@ class SetpointPort:
         self.thrust = thrust
 
     def turn(self, omega_frd: Vector, thrust: float) -> None:
-        """Asks for body rates [rad/s] and a collective thrust [0..1]."""
+        """Asks for body rates [rad/s] and a thrust [0..1]."""
         if self.kind == SETPOINT_RATE and self.omega_frd == omega_frd and self.thrust == thrust:
             return
         self._free_all()
@@ -233,7 +233,7 @@ class SetpointPort:
             self._is_changed = True
 
     def settle(self, thrust: float, yaw: float) -> None:
-        """From now on: level attitude and a collective thrust [0..1] under which the vehicle settles on its feet."""
+        """From now on: level attitude and a thrust [0..1] under which the vehicle settles on its feet."""
         self._settling = (thrust, yaw)
         self._is_changed = True
 
@@ -245,7 +245,7 @@ class SetpointPort:
             self._is_changed = True
 
     def test_motors(self, commands: tuple[float, ...]) -> None:
-        """From now on, while disarmed: the commands [0..1] of the rotors."""
+        """From now on, while disarmed: the commands [0..1] of the motors."""
         if commands != self._motor_test:
             self._motor_test = commands
             self._is_changed = True

@@ -11,7 +11,7 @@ from autopilot.interface.vehicle_state import ACCEPTED, Reply, VehicleState, Ver
 from autopilot.payload.payloads import Params
 
 SET_RELAY, REPEAT_RELAY, SET_SERVO, REPEAT_SERVO, SET_ACTUATOR = 181, 182, 183, 184, 187  # MAV_CMD
-FIRST_CHANNEL, CHANNELS = 9, 8  # outputs 1 to 8 are the rotors'
+FIRST_CHANNEL, CHANNELS = 9, 8  # outputs 1 to 8 are the motors'
 RELAYS = 6
 _PULSE_MIN_US, _PULSE_MID_US, _PULSE_MAX_US = 500, 1500, 2500
 _ACTUATOR_SWING_US = 500.0  # of the full range of an actuator, to either side

@@ -48,7 +48,7 @@ FIX_DTYPE = np.dtype(
     ]
 )
 
-MIN_IMU_RATE_HZ = 40.0  # guess: below it a multirotor's attitude cannot be integrated
+MIN_IMU_RATE_HZ = 40.0  # guess: below it an attitude cannot be integrated
 MIN_DURATION_S = 1.0
 STANDING_SPEED_M_S = 0.5  # guess: several deviations of a receiver's velocity at rest
 UNKNOWN_STD = 1.0e3  # [m/s] accuracy of a velocity that the receiver calls invalid

@@ -57,7 +57,7 @@ class RigInjector:
         self._body = rig.rows["body"][i_vehicle : i_vehicle + 1]
         self._battery = battery_model(airframe)
         self._capacity_c = 3.6 * airframe.battery.capacity_mah
-        self._rotor_count = len(airframe.rotors)
+        self._motor_count = airframe.motor_count
         self._has_noise = noise > 0.0
         self._taken_c = 0.0  # charge that an injected failure has taken from the battery
         self.failures: set[tuple[Unit, int]] = set()  # parts that fail now, as somebody asked for
@@ -67,10 +67,10 @@ class RigInjector:
     def inject(self, unit: Unit, failure: Failure, instance: int) -> Reply:
         """See autopilot.interface.failure_requests.FailureInjector."""
         if unit is Unit.MOTOR:
-            if not 0 <= instance <= self._rotor_count:
-                return Reply(Verdict.DENIED, f"there are motors 1 to {self._rotor_count}")
-            rotors = range(self._rotor_count) if instance == 0 else (instance - 1,)
-            replies = [self._inject_motor(rotor, failure) for rotor in rotors]
+            if not 0 <= instance <= self._motor_count:
+                return Reply(Verdict.DENIED, f"there are motors 1 to {self._motor_count}")
+            motors = range(self._motor_count) if instance == 0 else (instance - 1,)
+            replies = [self._inject_motor(motor, failure) for motor in motors]
             return replies[0]
         if unit not in SENSORS:
             return Reply(Verdict.UNSUPPORTED, f"there is no {unit.name.lower().replace('_', ' ')} that could fail")
@@ -83,19 +83,19 @@ class RigInjector:
         if not self._intermittent or time_us - self._toggled_us < INTERMITTENT_US:
             return
         self._toggled_us = time_us
-        for (unit, rotor), is_off in list(self._intermittent.items()):
-            self._intermittent[unit, rotor] = not is_off
+        for (unit, motor), is_off in list(self._intermittent.items()):
+            self._intermittent[unit, motor] = not is_off
             if unit is Unit.MOTOR:
-                set_motor_loss(self._faults, rotor, 0.0 if is_off else 1.0)
+                set_motor_loss(self._faults, motor, 0.0 if is_off else 1.0)
             else:
                 set_fault(self._faults, SENSORS[unit], "none" if is_off else "off")
 
-    def _inject_motor(self, rotor: int, failure: Failure) -> Reply:
+    def _inject_motor(self, motor: int, failure: Failure) -> Reply:
         losses = {Failure.OK: 0.0, Failure.OFF: 1.0, Failure.SLOW: WEAK_LOSS, Failure.INTERMITTENT: 1.0}
         if failure not in losses:
             return _impossible("a motor", failure)
-        set_motor_loss(self._faults, rotor, losses[failure])
-        self._note(Unit.MOTOR, rotor, failure)
+        set_motor_loss(self._faults, motor, losses[failure])
+        self._note(Unit.MOTOR, motor, failure)
         return ACCEPTED
 
     def _inject_sensor(self, unit: Unit, sensor: str, failure: Failure) -> Reply:
@@ -120,29 +120,29 @@ class RigInjector:
         self._note(unit, 0, failure)
         return ACCEPTED
 
-    def weaken(self, rotor: int, share: float) -> None:
+    def weaken(self, motor: int, share: float) -> None:
         """Gives a motor, from 0, a share of its command only."""
-        set_motor_loss(self._faults, rotor, 1.0 - share)
-        self._note(Unit.MOTOR, rotor, Failure.OK if share == 1.0 else Failure.SLOW)
+        set_motor_loss(self._faults, motor, 1.0 - share)
+        self._note(Unit.MOTOR, motor, Failure.OK if share == 1.0 else Failure.SLOW)
 
     def repair(self) -> None:
         """Ends every failure that was asked for."""
-        for unit, rotor in sorted(self.failures):
-            self.inject(unit, Failure.OK, rotor + 1 if unit is Unit.MOTOR else 0)
+        for unit, motor in sorted(self.failures):
+            self.inject(unit, Failure.OK, motor + 1 if unit is Unit.MOTOR else 0)
 
     def charge_to(self, rest_v: float) -> None:
         """Gives the battery the charge at which it rests at a voltage."""
         self._body["battery_charge_c"][0] = charge_at(self._battery, rest_v)
 
-    def _note(self, unit: Unit, rotor: int, failure: Failure) -> None:
+    def _note(self, unit: Unit, motor: int, failure: Failure) -> None:
         if failure is Failure.OK:
-            self.failures.discard((unit, rotor))
+            self.failures.discard((unit, motor))
         else:
-            self.failures.add((unit, rotor))
+            self.failures.add((unit, motor))
         if failure is Failure.INTERMITTENT:
-            self._intermittent[unit, rotor] = True
+            self._intermittent[unit, motor] = True
         else:
-            self._intermittent.pop((unit, rotor), None)
+            self._intermittent.pop((unit, motor), None)
 
     def _set_empty(self, is_empty: bool) -> None:
         """Takes the charge out of the battery, or gives back what was taken."""

@@ -56,7 +56,7 @@ class Injector(Protocol):
 
     def inject(self, unit: Unit, failure: Failure, instance: int) -> Reply: ...
 
-    def weaken(self, rotor: int, share: float) -> None: ...
+    def weaken(self, motor: int, share: float) -> None: ...
 
     def charge_to(self, rest_v: float) -> None: ...
 
@@ -136,8 +136,8 @@ class SimulatorParameters:
 
     def _weaken(self) -> None:
         weak, share = int(self._value("SIM_ENGINE_FAIL")), self._value("SIM_ENGINE_MUL")
-        for rotor in range(len(self._flight.airframe.rotors)):
-            self._flight.injector.weaken(rotor, share if weak >> rotor & 1 else 1.0)
+        for motor in range(self._flight.airframe.motor_count):
+            self._flight.injector.weaken(motor, share if weak >> motor & 1 else 1.0)
 
     def _charge(self) -> None:
         self._flight.injector.charge_to(self._value("SIM_BATT_VOLTAGE"))

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
+from autopilot.vehicles.default_class import DEFAULT_CLASS
 from mission.flight import Flight
 from mission.log.replay_topic import ACTIONS, MOTORS, OWNER
 from sim.world.people import CHEST_M
 
 Row = NDArray[np.float32]
-MODE_TITLES = {int(mode): mode.name.replace("_", " ").title() for mode in sorted(MULTIROTOR_MODES)}
+MODE_TITLES = {int(mode): mode.name.replace("_", " ").title() for mode in sorted(DEFAULT_CLASS.modes)}
 MOMENT = np.dtype(
     [
         ("time_s", "f8"),

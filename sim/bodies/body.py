@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
 from sim.bodies.multirotor import (
     BodyState,
     MultirotorModel,
@@ -34,3 +35,5 @@ class Body(NamedTuple):
 
 
 MULTIROTOR_BODY = Body(MultirotorModel, BodyState, body_tick, truth_of, body_at_rest, standing_height, multirotor_model)
+# Of a rig that is told of no other class.
+DEFAULT_BODY, DEFAULT_LAW = MULTIROTOR_BODY, MULTIROTOR_LAW

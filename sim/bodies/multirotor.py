@@ -13,7 +13,7 @@ from common.geodesy import DEFAULT_HOME
 from common.kernels import GRAVITY_M_S2, SUBSTEPS, TICK_S, vec8
 from common.rotation import quat_from_yaw
 from sim.battery import BatteryModel, battery_current, battery_model, open_circuit_voltage
-from sim.contact import (
+from sim.bodies.contact import (
     ContactForce,
     ContactModel,
     FootSlip,

@@ -1,1 +1,1 @@
-"""Engines: who moves the bodies. The native one is the multirotor of sim/bodies in Warp."""
+"""Engines: who moves the bodies. The native one is the bodies of sim/bodies in Warp."""

@@ -1,4 +1,4 @@
-"""ESC telemetry: how fast each rotor turns, as its speed controller counts it. Read by the host, when it asks.
+"""ESC telemetry: how fast each motor turns, as its speed controller counts it. Read by the host, when it asks.
 
 Errors: electrical revolutions are reported in whole hundreds per minute (bidirectional DShot and KISS telemetry). Left
 out: delay and loss of the telemetry line, current and temperature.
@@ -18,7 +18,7 @@ _STEP_RAD_S = 100.0 / POLE_PAIRS * 2.0 * pi / 60.0
 
 
 def esc_reader(truths: np.ndarray[Any, Any], i_vehicle: int) -> Callable[[], list[float]]:
-    """A function that returns the reported speeds [rad/s] of a vehicle's rotors.
+    """A function that returns the reported speeds [rad/s] of a vehicle's motors.
 
     Args:
         truths: live structured view of the Truth rows.

@@ -4,9 +4,9 @@ Defaults are a Bosch Sensortec BMI088 (data sheet BST-BMI088-DS001, table "Speci
 a factory calibration leaves), bias instability as a first-order Gauss-Markov process, white noise, vibration,
 saturation. Left out: temperature, scale factor and misalignment, g-sensitivity, quantisation.
 
-Vibration has two parts, both growing with the square of the rotor speed like the force of an imbalance: a tone at the
-mean rotor speed, whose mean over the tick is taken exactly (so it aliases as in a sensor that integrates over its
-sample), and broadband noise of frame and airflow, white at the sample rate. The rotors' tones do not beat.
+Vibration has two parts, both growing with the square of the motor speed like the force of an imbalance: a tone at the
+mean motor speed, whose mean over the tick is taken exactly (so it aliases as in a sensor that integrates over its
+sample), and broadband noise of frame and airflow, white at the sample rate. The motors' tones do not beat.
 """
 
 from math import exp, radians, sqrt
@@ -48,7 +48,7 @@ _ALLAN_PEAK = (
     0.617  # Allan deviation of a Gauss-Markov process at its maximum, over its std (IEEE Std 952-1997, C.1.1.4)
 )
 
-VIBRATION_SPEED_RAD_S = 600.0  # rotor speed at which the four figures below hold: hover of a 10-inch quadrotor
+VIBRATION_SPEED_RAD_S = 600.0  # motor speed at which the four figures below hold: hover of a 10-inch quadcopter
 ACCEL_TONE_RMS = 0.2  # [m/s²] guess, all with isolated flight controller
 ACCEL_BROADBAND_RMS = 0.2  # [m/s²] guess
 GYRO_TONE_RMS = 0.004  # [rad/s] guess
@@ -68,9 +68,9 @@ class ImuModel:
     gyro_drift_std: float  # [rad/s]
     accel_drift_std: float  # [m/s²]
     drift_keep: float  # share of the drift left after DRIFT_PERIOD_TICKS
-    gyro_tone: float  # [rad/s per (rad/s)²] amplitude over squared rotor speed
+    gyro_tone: float  # [rad/s per (rad/s)²] amplitude over squared motor speed
     accel_tone: float  # [m/s² per (rad/s)²]
-    gyro_broadband: float  # [rad/s per (rad/s)²] standard deviation over squared rotor speed
+    gyro_broadband: float  # [rad/s per (rad/s)²] standard deviation over squared motor speed
     accel_broadband: float  # [m/s² per (rad/s)²]
     gyro_limit: float  # [rad/s]
     accel_limit: float  # [m/s²]
@@ -87,7 +87,7 @@ class ImuState:
     tone_sin: float
     tone_mean_cos: float  # mean of the cosine over the tick
     tone_mean_sin: float
-    speed_squared: float  # [rad²/s²] of the mean rotor speed
+    speed_squared: float  # [rad²/s²] of the mean motor speed
     dt_s: float  # length of the sample
 
 
@@ -141,13 +141,13 @@ def imu_drift(model: ImuModel, state: ImuState, seed: int, i: int, tick: int) ->
 
 
 @wp.func
-def imu_vibration(state: ImuState, rotor_speed: vec8, dt_s: float) -> ImuState:
-    """The tone of the rotors over a sample of `dt_s`, integrated exactly at their mean speed (weighted by speed)."""
+def imu_vibration(state: ImuState, motor_speed: vec8, dt_s: float) -> ImuState:
+    """The tone of the motors over a sample of `dt_s`, integrated exactly at their mean speed (weighted by speed)."""
     speed_sum = float(0.0)
     square_sum = float(0.0)
     for k in range(MAX_MOTORS):
-        speed_sum += wp.abs(rotor_speed[k])
-        square_sum += rotor_speed[k] * rotor_speed[k]
+        speed_sum += wp.abs(motor_speed[k])
+        square_sum += motor_speed[k] * motor_speed[k]
     out = state
     out.dt_s = dt_s
     out.tone_mean_cos = 0.0
@@ -201,7 +201,7 @@ def imu_sample(
     accel_shake = model.accel_broadband * state.speed_squared
     gyro_std = noise_gain(gyro_fault) * wp.sqrt(model.gyro_std * model.gyro_std + gyro_shake * gyro_shake)
     accel_std = noise_gain(accel_fault) * wp.sqrt(model.accel_std * model.accel_std + accel_shake * accel_shake)
-    # an imbalance turns with the rotor in the rotor plane; the frame passes part of it on to the third axis
+    # an imbalance turns with the motor in the motor plane; the frame passes part of it on to the third axis
     tone = state.speed_squared * wp.vec3(
         state.tone_mean_cos, state.tone_mean_sin, 0.5 * (state.tone_mean_cos + state.tone_mean_sin)
     )

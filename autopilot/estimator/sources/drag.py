@@ -1,7 +1,7 @@
-"""Drag: the specific force across a multirotor's thrust axis is air drag, and so observes the wind.
+"""Drag: the specific force across the thrust axis of what hovers is air drag, and so observes the wind.
 
 In: specific force averaged over 40 ms. Model: -(m u + rho / (2 b) |u| u) along body x and y, u the speed through air
-(PX4 names: m rotor drag EKF2_MCOEF, b ballistic coefficient EKF2_BCOEF_X, _Y). Only wind is corrected, unless
+(PX4 names: m propeller drag EKF2_MCOEF, b ballistic coefficient EKF2_BCOEF_X, _Y). Only wind is corrected, unless
 EKF2_DRAG_CTRL is 2 and nothing else measures velocity. Runs in the air only.
 """
 

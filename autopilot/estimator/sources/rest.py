@@ -81,8 +81,8 @@ def observe_imu(still: Stillness, imu: ImuSample) -> Stillness:
 def observe_accel(still: Stillness, q_raw: wp.quat, step_s: float) -> Stillness:
     """Slower means of the running mean of the specific force, since the IMU is quiet, in a frame of the gyro alone.
 
-    A multirotor that drives leans, and feels nothing in its own frame; and what other sensors make of attitude, such as
-    a magnetometer on steel, is no motion. The means wait for the estimator to settle.
+    What drives by its thrust leans, and feels nothing in its own frame; and what other sensors make of attitude, such
+    as a magnetometer on steel, is no motion. The means wait for the estimator to settle.
 
     Args:
         still: after the newest IMU sample.

@@ -10,7 +10,7 @@ from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import Alias, Constant, ModeNumbers, ModeRow, UnknownModeError
 from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS, switch_aliases
-from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
+from autopilot.vehicles.default_class import DEFAULT_CLASS
 from common.params import Parameter
 
 _RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
@@ -78,4 +78,4 @@ class ArduPilotDialect:
         return value
 
 
-ARDUPILOT = ArduPilotDialect(MULTIROTOR_MODES)
+ARDUPILOT = ArduPilotDialect(DEFAULT_CLASS.modes)

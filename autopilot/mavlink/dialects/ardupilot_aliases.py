@@ -134,7 +134,7 @@ _NO_LIMIT = "not limited: the control allocation knows the voltage"
 CONSTANTS: tuple[Constant, ...] = (
     Constant("AHRS_EKF_TYPE", 3, INT8, "the estimator, of which there is one"),
     Constant("ARMING_CHECK", 1, INT32, "all checks; they cannot be switched off"),
-    Constant("ARMING_REQUIRE", 1, INT8, "it must be armed before the rotors turn"),
+    Constant("ARMING_REQUIRE", 1, INT8, "it must be armed before the motors turn"),
     Constant("ATC_ACCEL_P_MAX", 110_000.0, REAL32, _ACCEL),
     Constant("ATC_ACCEL_R_MAX", 110_000.0, REAL32, _ACCEL),
     Constant("ATC_ACCEL_Y_MAX", 27_000.0, REAL32, _ACCEL),

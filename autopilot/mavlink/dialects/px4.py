@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import Alias, Constant, ModeNumbers, ModeRow, UnknownModeError
-from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
+from autopilot.vehicles.default_class import DEFAULT_CLASS
 from common.params import Parameter
 
 
@@ -88,4 +88,4 @@ class Px4Dialect:
         return value
 
 
-PX4 = Px4Dialect(MULTIROTOR_MODES)
+PX4 = Px4Dialect(DEFAULT_CLASS.modes)

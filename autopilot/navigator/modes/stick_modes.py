@@ -23,7 +23,7 @@ class Throttle:
     """The throttle stick as thrust.
 
     Its middle carries the vehicle whatever charge the battery has left (PX4: MPC_USE_HTE): a thrust setpoint is a share
-    of what the rotors can do at the present voltage.
+    of what the motors can do at the present voltage.
     """
 
     __slots__ = ("_context", "_time_us", "_voltage_share")
@@ -34,7 +34,7 @@ class Throttle:
         self._time_us = 0
 
     def thrust(self, least: float) -> float:
-        """Collective thrust [0..1] from `least` at throttle down to MPC_THR_MAX."""
+        """Thrust [0..1] from `least` at throttle down to MPC_THR_MAX."""
         context = self._context
         throttle = context.state.sticks.throttle
         most = context.number("MPC_THR_MAX")

@@ -25,5 +25,5 @@ FLIGHT_PARAMS = (
     TaskParam("wind_gust_m_s", 0.0, 0.0, 8.0, "m/s", "largest gust on top of the mean", "guess"),
     TaskParam("sensor_noise", 1.0, 0.0, 2.0, "1", "factor on every sensor's errors, rounded to a quarter", "guess"),
     TaskParam("mass_scale", 1.0, 0.7, 1.4, "1", "factor on mass and moments of inertia", "guess"),
-    TaskParam("motor_scale", 1.0, 0.8, 1.2, "1", "factor on the rotors' thrust", "guess"),
+    TaskParam("motor_scale", 1.0, 0.8, 1.2, "1", "factor on the motors' thrust", "guess"),
 )

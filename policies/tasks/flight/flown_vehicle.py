@@ -10,7 +10,7 @@ from policies.tasks.flight.episode_draws import WIND_STREAM, draw_angle
 from policies.tasks.flight.flight_params import FlightParams
 from policies.tasks.flight.own_state import Command, OwnState
 from sim.advance import RigArrays, forget_impacts
-from sim.bodies.multirotor import MultirotorModel
+from sim.bodies.body import DEFAULT_BODY
 from sim.sensors.sensors import SensorModel
 from sim.truth import true_estimate
 from sim.wind import WindState
@@ -25,7 +25,7 @@ _LEVELS = wp.constant(float(NOISE_LEVELS_PER_UNIT))
 class Makes:
     """What vehicles are made of before they are varied."""
 
-    body: wp.array(dtype=MultirotorModel)  # (1,)
+    body: wp.array(dtype=DEFAULT_BODY.Model)  # (1,)
     sensors: wp.array(dtype=SensorModel)  # by noise scale: 0, 0.25, 0.5 ...
 
 

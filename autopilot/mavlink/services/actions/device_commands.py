@@ -53,7 +53,7 @@ class DeviceService(Service):
         """Sets the pulse of an auxiliary output.
 
         Params: p1 output, 9 to 16; p2 pulse [us], 500 to 2500.
-        Refused: DENIED for an output that is a rotor's or not there, and for a pulse out of range.
+        Refused: DENIED for an output that is a motor's or not there, and for a pulse out of range.
         """
         return self._run(command)
 
@@ -69,7 +69,7 @@ class DeviceService(Service):
         """Moves an auxiliary output to a pulse and back to the middle, several times.
 
         Params: p1 output, 9 to 16; p2 pulse [us], 500 to 2500; p3 how often; p4 period [s].
-        Refused: DENIED for an output that is a rotor's or not there, and for a pulse, number or period out of range.
+        Refused: DENIED for an output that is a motor's or not there, and for a pulse, number or period out of range.
         """
         return self._run(command)
 

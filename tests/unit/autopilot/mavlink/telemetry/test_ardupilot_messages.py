@@ -97,7 +97,7 @@ def test_speed_controllers_tell_revolutions_and_voltage():
     assert esc.rpm == (4775, 4870, 4966, 5061)
     assert esc.voltage == (1580,) * 4
     assert rig.ack(512, message_id("ESC_TELEMETRY_5_TO_8")).result == 1
-    rig.update(rotor_count=6)
+    rig.update(motor_count=6)
     assert asked(rig, "ESC_TELEMETRY_5_TO_8").voltage == (1580, 1580, 0, 0)
 
 

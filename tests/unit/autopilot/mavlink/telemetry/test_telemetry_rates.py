@@ -49,7 +49,7 @@ def test_messages_are_spread_over_the_frames():
 @pytest.mark.parametrize("stream", STREAMS, ids=lambda stream: stream.name)
 def test_every_stream_can_be_requested(stream):
     rig = Rig()
-    rig.update(rotor_count=8)
+    rig.update(motor_count=8)
     assert request(rig, stream.name) is not None
 
 
