@@ -78,8 +78,8 @@ class Server(Announcer, Protocol):
 class _Relay:
     """Passes events on to every attached server."""
 
-    def __init__(self) -> None:
-        self.targets: list[Announcer] = []
+    def __init__(self, first: Announcer | None) -> None:
+        self.targets: list[Announcer] = [] if first is None else [first]
 
     def statustext(self, severity: Severity, text: str) -> None:
         for target in self.targets:
@@ -153,14 +153,9 @@ class FlightController:
         self.traffic = Traffic(self.state, params)
         self.obstacles = Obstacles(params, vehicle.limits.accel_hor)
         self.state.obstacles = self.obstacles
-        self._read_estimate = ports.read_estimate
-        self._read_samples = ports.read_samples
-        self._read_actuators = ports.read_actuators
-        self._read_health = ports.read_health
+        self._ports = ports
         self._next_health_us = 0
-        self._relay = _Relay()
-        if announcer is not None:
-            self._relay.targets.append(announcer)
+        self._relay = _Relay(announcer)
         self._servers: list[Server] = []
         self._on_reboot = on_reboot
         self._injector = injector
@@ -257,13 +252,13 @@ class FlightController:
         self._read_motion(self.state, time_us)
         if time_us >= self._next_health_us:
             self._next_health_us = time_us + _HEALTH_PERIOD_US
-            self.state.health = self._read_health()
+            self.state.health = self._ports.read_health()
 
     def _read_motion(self, state: VehicleState, time_us: int) -> None:
         state.time_us = time_us
-        estimate = state.estimate = self._read_estimate()
-        state.samples = self._read_samples()
-        state.actuators = self._read_actuators()
+        estimate = state.estimate = self._ports.read_estimate()
+        state.samples = self._ports.read_samples()
+        state.actuators = self._ports.read_actuators()
         state.roll_rad, state.pitch_rad, state.yaw_rad = roll_pitch_yaw_of(estimate.q_ned_from_frd)
 
     def _follow_wish(self, mode: Mode) -> None:

@@ -22,7 +22,6 @@ LONG_FILES = {
     "sim/bodies/multirotor.py": 425,
 }
 LONG_FUNCTIONS = {
-    "autopilot/flight_controller.py FlightController.__init__": 75,
     "autopilot/estimator/generated.py predict_covariance": 379,
     "autopilot/estimator/generated.py mag_products": 61,
     "autopilot/estimator/generated.py drag_products": 80,
