@@ -161,12 +161,15 @@ def test_every_event_has_a_text_of_its_own():
 
 
 def written(node):
-    """A string of the source, its numbers as 5 and its word as it comes."""
+    """A string of the source, its numbers as 5 and its words as they come."""
     if isinstance(node, ast.Constant):
         return str(node.value)
     source = ast.unparse(node)
     if "%}" in source:
         return "5%"
+    if "label" in source:  # every sensor that arming needs has a reason of its own
+        (needed,) = arming._NEEDED_SENSORS
+        return needed.label
     return "vertical" if "word" in source else "5.0"
 
 
