@@ -28,8 +28,6 @@ class AutopilotKernels(NamedTuple):
     """`@wp.func (Arrays, i, Samples, tick: int64)`, one tick of vehicle i, on its rows in place."""
     power_on: Any
     """`@wp.func (Arrays, i)`: the state after power-on."""
-    run: Any
-    """`@wp.kernel (Arrays, samples, ticks, commands)`: one tick alone, on samples from anywhere."""
 
 
 @cache
@@ -62,9 +60,17 @@ def autopilot_kernels(law: ControlLaw) -> AutopilotKernels:
         autopilot.setpoint[i] = Setpoint()
         estimator_reset(autopilot.ekf, i)
 
+    return AutopilotKernels(Autopilot, autopilot_tick, power_on)
+
+
+@cache
+def autopilot_kernel(law: ControlLaw) -> Any:
+    """`@wp.kernel (Arrays, samples, ticks, commands)`: one tick alone, on samples from anywhere; made when asked for."""
+    arrays, autopilot_tick = autopilot_kernels(law).Arrays, autopilot_kernels(law).tick
+
     @wp.kernel(enable_backward=False, module="unique")
     def run_autopilot(
-        autopilot: Autopilot,
+        autopilot: arrays,
         samples: wp.array(dtype=Samples),
         ticks: wp.array(dtype=wp.int64),
         commands: wp.array(dtype=vec8),
@@ -73,7 +79,7 @@ def autopilot_kernels(law: ControlLaw) -> AutopilotKernels:
         autopilot_tick(autopilot, i, samples[i], ticks[i])
         commands[i] = autopilot.control[i].actuators.command
 
-    return AutopilotKernels(Autopilot, autopilot_tick, power_on, run_autopilot)
+    return run_autopilot
 
 
 @wp.kernel(enable_backward=False)

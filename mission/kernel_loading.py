@@ -6,7 +6,8 @@ import warp as wp
 
 from common.warp_start import start_warp
 from mission.console.terminal import Say
-from sim.advance import rig_kernels
+from sim.advance import advance_kernel, rig_kernels
+from sim.bodies.body import DEFAULT_BODY, DEFAULT_LAW
 
 _ALWAYS = ("autopilot.estimator.ekf",)
 _CAMERA = ("sim.sensors.camera",)
@@ -28,8 +29,9 @@ _OWNER = (
 
 def flight_kernels() -> tuple[Any, ...]:
     """Those that are in modules of their own."""
-    kernels = rig_kernels()
-    return kernels.place, kernels.power_on, kernels.forget_all_impacts, kernels.advance
+    vehicle = DEFAULT_BODY, DEFAULT_LAW
+    kernels = rig_kernels(*vehicle)
+    return kernels.place, kernels.power_on, kernels.forget_all_impacts, advance_kernel(*vehicle, has_estimator=True)
 
 
 def load_kernels(say: Say, *, has_camera: bool, has_owner: bool) -> None:

@@ -39,10 +39,6 @@ class RigKernels(NamedTuple):
     """`@wp.func (Arrays, i)`: only what vehicle i touches from now on counts."""
     forget_all_impacts: Any
     """`@wp.kernel (Arrays)`: the same of all."""
-    advance: Any
-    """`@wp.kernel (Arrays, first_vehicle, tick_count)`."""
-    advance_by_truth: Any
-    """The same without sensors and estimator: a training run need not pay for them."""
 
 
 @cache
@@ -72,8 +68,8 @@ def rig_arrays(body: Body, law: ControlLaw) -> Any:
 
 
 @cache
-def rig_kernels(body: Body = DEFAULT_BODY, law: ControlLaw = DEFAULT_LAW) -> RigKernels:
-    """The kernels of a class of vehicles, the same objects each time."""
+def rig_kernels(body: Body, law: ControlLaw) -> RigKernels:
+    """The kernels of a class of vehicles but the loop's own, the same objects each time."""
     arrays = rig_arrays(body, law)
     truth_of, at_rest, standing_height = body.truth, body.at_rest, body.standing_height
     power_autopilot = autopilot_kernels(law).power_on
@@ -107,12 +103,16 @@ def rig_kernels(body: Body = DEFAULT_BODY, law: ControlLaw = DEFAULT_LAW) -> Rig
     def forget_all_impacts(rig: arrays) -> None:
         forget_impacts(rig, wp.tid())
 
-    by_estimate, by_truth = (advance_kernel(body, law, has_estimator) for has_estimator in (True, False))
-    return RigKernels(arrays, place, power_on, forget_impacts, forget_all_impacts, by_estimate, by_truth)
+    return RigKernels(arrays, place, power_on, forget_impacts, forget_all_impacts)
 
 
-def advance_kernel(body: Body, law: ControlLaw, has_estimator: bool) -> Any:
-    """The whole loop, with the sensors and the estimator or without."""
+@cache
+def advance_kernel(body: Body, law: ControlLaw, *, has_estimator: bool) -> Any:
+    """`@wp.kernel (Arrays, first_vehicle, tick_count)`: the whole loop, the same object each time.
+
+    Without sensors and estimator it is what a training run need not pay more for. Each is made when it is first asked
+    for: Warp hashes all that a kernel calls, a tenth of a second for this one.
+    """
     arrays, body_tick, truth_of = rig_arrays(body, law), body.tick, body.truth
     control_tick = law.tick
 
@@ -160,6 +160,6 @@ def advance_kernel(body: Body, law: ControlLaw, has_estimator: bool) -> Any:
     return advance
 
 
-RigArrays: TypeAlias = Any if TYPE_CHECKING else rig_kernels().Arrays
+RigArrays: TypeAlias = Any if TYPE_CHECKING else rig_arrays(DEFAULT_BODY, DEFAULT_LAW)
 """Of the default class, for the kernels of tasks: they read any row, and write `autopilot.setpoint` alone."""
-forget_impacts = rig_kernels().forget_impacts
+forget_impacts = rig_kernels(DEFAULT_BODY, DEFAULT_LAW).forget_impacts

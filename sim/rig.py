@@ -20,7 +20,7 @@ from common.geodesy import GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.params import ParameterTable
 from common.warp_start import start_warp
-from sim.advance import rig_kernels
+from sim.advance import advance_kernel, rig_kernels
 from sim.bodies.body import DEFAULT_BODY, DEFAULT_LAW, Body
 from sim.rows import HostRows
 from sim.sensors.sensors import Faults, SensorModel, SensorState
@@ -93,7 +93,7 @@ class Rig:
         self._field_ned_gauss = field_ned_gauss(home.lat_deg, home.lon_deg, home.alt_m)
         self.rows = HostRows(self.arrays, is_mirrored=has_mirrors or wp.get_device(device).is_cuda)
         self._commands: dict[int, list[Any]] = {}
-        self._kernel = self._kernels.advance if has_estimator else self._kernels.advance_by_truth
+        self._kernel = advance_kernel(body, law, has_estimator=has_estimator)
         self._workers = Workers(vehicle_count, threads)
         self.compose()
         self.boot()

@@ -4,7 +4,7 @@ from typing import Any
 
 import warp as wp
 
-from autopilot.advance import autopilot_kernels
+from autopilot.advance import autopilot_kernel
 from sim.rig import Rig
 
 
@@ -17,7 +17,7 @@ class OwnBoard:
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
-        self._kernel = autopilot_kernels(rig.law).run
+        self._kernel = autopilot_kernel(rig.law)
 
     def boot(self, is_chosen: Any) -> None:
         """Its rows are the rig's, which has powered them on."""
