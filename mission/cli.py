@@ -3,7 +3,7 @@
 A wrong argument, file or port gives one sentence on standard error and exit code 2; a mission that failed gives 1.
 """
 
-from importlib.metadata import version
+import gc
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +19,8 @@ from mission.follow import follow_commands
 from mission.train import task_commands, training_commands
 from mission.view import replay_command
 
+LOADED_MOST = 50_000  # objects made until Python looks for garbage: at its own 700, that is a sixth of a start
+
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -29,11 +31,14 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point of the console command."""
+    gc.set_threshold(LOADED_MOST)
     app()
 
 
 def _print_version(is_asked: bool) -> None:
     if is_asked:
+        from importlib.metadata import version
+
         typer.echo(f"honeyguide {version('honeyguide')}")
         raise typer.Exit
 

@@ -14,7 +14,6 @@ from mission.console.terminal import print_line
 from mission.flight import Flight
 from mission.flight_session import FlightSession
 from mission.flight_settings import FlightOptions
-from mission.log.flight_plots import plot_flight
 from mission.log.flight_recorder import History
 from mission.log.flight_summary import Summary, curved_items, planned_path, summarise
 from mission.plan.plan_file import Plan
@@ -76,6 +75,8 @@ def _finish(
         write_whole(path, (json.dumps(summary.as_json(), indent=2) + "\n").encode())
     title = f"{flight.airframe.name}, wind {flight.config.wind_m_s:g} m/s, seed {flight.config.seed}: {summary.result}"
     with files.writing("flight.png") as path:
+        from mission.log.flight_plots import plot_flight  # matplotlib: nobody waits for it before the flight
+
         plot_flight(history, flight.world, path_ned, title, path)
     if summary.armed_s > 0.0:
         console.print(_summary_table(summary))

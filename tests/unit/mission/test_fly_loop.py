@@ -35,7 +35,7 @@ def test_no_frame_waits_for_the_garbage_of_all_that_was_loaded(tmp_path):
 def test_the_logs_are_complete_before_the_flight_is_drawn(tmp_path, monkeypatch):
     found = []
     monkeypatch.setattr(
-        "mission.fly_loop.plot_flight", lambda *_: found.extend(path.name for path in tmp_path.iterdir())
+        "mission.log.flight_plots.plot_flight", lambda *_: found.extend(path.name for path in tmp_path.iterdir())
     )
     options = SimpleNamespace(seconds=0.2, once=False)
     flight = Flight(FlightConfig(), folder=tmp_path)
