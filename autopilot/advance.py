@@ -65,7 +65,7 @@ def autopilot_kernels(law: ControlLaw) -> AutopilotKernels:
 
 @cache
 def autopilot_kernel(law: ControlLaw) -> Any:
-    """`@wp.kernel (Arrays, samples, ticks, commands)`: one tick alone, on samples from anywhere; made when asked for."""
+    """`@wp.kernel (Arrays, samples, ticks, commands)`: one tick alone, on samples from anywhere."""
     arrays, autopilot_tick = autopilot_kernels(law).Arrays, autopilot_kernels(law).tick
 
     @wp.kernel(enable_backward=False, module="unique")
