@@ -55,7 +55,7 @@ def rays_rdf(hfov_deg):
 
 def test_depth_is_that_of_the_exact_ray_cast(world, renderer):
     poses = random_poses(world, 80)
-    pictures = renderer.pictures(poses, WIDTH, HEIGHT)
+    pictures = renderer.images(poses, WIDTH, HEIGHT)
     rng = np.random.default_rng(6)
     wrong = compared = 0
     for i, pose in enumerate(poses):
@@ -76,13 +76,13 @@ def test_depth_is_that_of_the_exact_ray_cast(world, renderer):
 
 
 def test_picture_from_above_shows_ground_at_its_distance(renderer):
-    picture = renderer.pictures([CameraPose((0.0, 0.0, -10.0), STRAIGHT_DOWN, hfov_deg=60.0)], WIDTH, HEIGHT)
+    picture = renderer.images([CameraPose((0.0, 0.0, -10.0), STRAIGHT_DOWN, hfov_deg=60.0)], WIDTH, HEIGHT)
     assert (picture.kind == GROUND).all()
     assert picture.depth_m == pytest.approx(10.0, abs=1e-3)
 
 
 def test_upper_half_of_a_level_picture_over_the_trees_is_sky(renderer):
-    picture = renderer.pictures([CameraPose((0.0, 0.0, -80.0), LEVEL_NORTH)], WIDTH, HEIGHT)
+    picture = renderer.images([CameraPose((0.0, 0.0, -80.0), LEVEL_NORTH)], WIDTH, HEIGHT)
     assert (picture.kind[0, : HEIGHT // 2] == SKY).all()
     assert (picture.depth_m[0, : HEIGHT // 2] == SKY_DEPTH_M).all()
     assert (picture.kind[0, -4:] != SKY).all()
@@ -95,7 +95,7 @@ def test_tree_has_a_crown_above_its_trunk_and_right_is_east(world, renderer):
     tree = world.trees[np.argmin(np.hypot(world.trees["north"], world.trees["east"]))]
     mid_trunk = 0.5 * (tree["root_height"] + 1.0 + tree["crown_low"] - tree["crown_radius"])
     pos = (float(tree["north"]) - 6.0, float(tree["east"]) - 1.0, -float(mid_trunk))
-    picture = renderer.pictures([CameraPose(pos, LEVEL_NORTH, hfov_deg=90.0)], 320, 240)
+    picture = renderer.images([CameraPose(pos, LEVEL_NORTH, hfov_deg=90.0)], 320, 240)
     kind = picture.kind[0]
     column = round(160 + 160 / 6.0)  # 1 m to the east at 6 m
     assert kind[120, column] == TRUNK
@@ -105,16 +105,16 @@ def test_tree_has_a_crown_above_its_trunk_and_right_is_east(world, renderer):
 
 def test_walls_are_seen_at_the_edge(world, renderer):
     up = float(world.height(195.0, 0.0)) + 4.0
-    picture = renderer.pictures([CameraPose((195.0, 0.0, -up), LEVEL_NORTH)], WIDTH, HEIGHT)
+    picture = renderer.images([CameraPose((195.0, 0.0, -up), LEVEL_NORTH)], WIDTH, HEIGHT)
     assert picture.kind[0, HEIGHT // 2 + 5, WIDTH // 2] == WALL
     assert picture.depth_m[0, HEIGHT // 2 + 5, WIDTH // 2] == pytest.approx(5.0, abs=1e-3)
 
 
 def test_a_batch_is_the_pictures_one_by_one(world, renderer):
     poses = random_poses(world, 5)
-    together = renderer.pictures(poses, WIDTH, HEIGHT)
+    together = renderer.images(poses, WIDTH, HEIGHT)
     for i, pose in enumerate(poses):
-        alone = renderer.pictures([pose], WIDTH, HEIGHT)
+        alone = renderer.images([pose], WIDTH, HEIGHT)
         assert (alone.rgb[0] == together.rgb[i]).all()
         assert (alone.depth_m[0] == together.depth_m[i]).all()
 
@@ -123,7 +123,7 @@ def test_exposure_and_balance_change_the_light(renderer):
     pose = CameraPose((0.0, 0.0, -10.0), STRAIGHT_DOWN)
     dark = CameraPose(pose.pos_ned, pose.q_ned_from_rdf, exposure=0.5)
     warm = CameraPose(pose.pos_ned, pose.q_ned_from_rdf, balance=(1.3, 1.0, 0.7))
-    pictures = renderer.pictures([pose, dark, warm], WIDTH, HEIGHT)
+    pictures = renderer.images([pose, dark, warm], WIDTH, HEIGHT)
     normal, darker, warmer = pictures.rgb.astype(float).mean(axis=(1, 2))
     assert (darker < 0.85 * normal).all()
     assert warmer[0] > normal[0]
