@@ -88,8 +88,7 @@ def load_recording(folder: Path) -> Recording:
     Raises:
         RecordingError: there is none, or it cannot be read.
     """
-    parts = [folder / LOG_FILE, *sorted(folder.glob("flight-*.ulg"), key=_part_number)]
-    parts = [path for path in parts if path.exists()]
+    parts = sorted((path for path in folder.glob("flight*.ulg") if _part_number(path)), key=_part_number)
     if not parts:
         raise RecordingError(f"{folder}: holds no run that can be shown: {LOG_FILE} is missing")
     try:
@@ -114,7 +113,10 @@ def load_recording(folder: Path) -> Recording:
 
 
 def _part_number(path: Path) -> int:
-    number = path.stem.rpartition("-")[2]
+    """Which part of the flight's log a file is, from 1; 0: none."""
+    if path.name == LOG_FILE:
+        return 1
+    number = path.stem.removeprefix("flight-")
     return int(number) if number.isdecimal() else 0
 
 
@@ -128,10 +130,7 @@ def _rows(log: ULog) -> NDArray[Any]:
     if not {PLACE, ATTITUDE, REPLAY_TOPIC.name} <= set(topics):
         return np.zeros(0, MOMENT)
     time_us = reduce(np.intersect1d, (data["timestamp"] for data in topics.values()))
-    place, attitude, shown = (
-        {name: column[np.searchsorted(data["timestamp"], time_us)] for name, column in data.items()}
-        for data in (topics[PLACE], topics[ATTITUDE], topics[REPLAY_TOPIC.name])
-    )
+    place, attitude, shown = (_at(topics[name], time_us) for name in (PLACE, ATTITUDE, REPLAY_TOPIC.name))
     rows = np.zeros(len(time_us), MOMENT)
     rows["time_s"] = time_us * 1e-6
     rows["pos_ned"] = np.stack([place[axis] for axis in ("x", "y", "z")], axis=1)
@@ -143,6 +142,14 @@ def _rows(log: ULog) -> NDArray[Any]:
     for name in OWNER.names or ():
         rows["owner"][name] = _field(shown, f"owner_{name}", OWNER[name])
     return rows
+
+
+def _at(columns: dict[str, NDArray[Any]], time_us: NDArray[np.uint64]) -> dict[str, NDArray[Any]]:
+    """A topic's rows of these times; where the log is damaged its times need not be in order."""
+    times = columns["timestamp"]
+    order = np.argsort(times, kind="stable")
+    rows = order[np.searchsorted(times, time_us, sorter=order)]
+    return {name: column[rows] for name, column in columns.items()}
 
 
 def _field(columns: dict[str, NDArray[Any]], name: str, dtype: np.dtype[Any]) -> NDArray[Any]:

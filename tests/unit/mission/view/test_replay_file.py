@@ -50,6 +50,24 @@ def test_a_long_log_is_shown_from_the_first_of_its_parts_to_the_last(tmp_path):
     assert load_recording(tmp_path).rows.tobytes() == hovering().rows.tobytes()
 
 
+def test_a_copy_of_a_log_beside_it_is_no_part_of_it(tmp_path):
+    write_log(hovering(), tmp_path / "flight.ulg")
+    write_log(hovering(), tmp_path / "flight-copy.ulg")
+    assert load_recording(tmp_path).rows.tobytes() == hovering().rows.tobytes()
+
+
+@pytest.mark.parametrize("at", [0, 50, 98, 99])
+@pytest.mark.parametrize("time_us", [0, 1 << 60])
+def test_a_damaged_time_costs_the_moment_that_had_it(tmp_path, at, time_us):
+    recording = hovering()
+    recording.rows["pos_ned"][:, 0] = np.arange(100.0)
+    path = tmp_path / "flight.ulg"
+    write_log(recording, path)
+    content, time = path.read_bytes(), int(10_000_000 + 20_000 * at).to_bytes(8, "little")
+    path.write_bytes(content.replace(time, time_us.to_bytes(8, "little"), 1))  # of the first topic
+    assert load_recording(tmp_path).rows.tobytes() == np.delete(recording.rows, at).tobytes()
+
+
 def test_a_folder_without_a_run_is_refused(tmp_path):
     with pytest.raises(RecordingError, match=r"holds no run that can be shown: flight\.ulg is missing"):
         load_recording(tmp_path)
