@@ -54,10 +54,10 @@ class Navigator:
         built = {build: build(parts) for build in {spec.build: None for spec in modes.values()}}
         self._specs = modes
         self.modes = {mode: built[spec.build] for mode, spec in modes.items()}
-        self._listeners: dict[type, list[FlightMode]] = {}  # by the kind of report
+        self._listeners: dict[type, dict[FlightMode, None]] = {}  # by the kind of report
         for mode, spec in modes.items():
             for kind in spec.takes:
-                self._listeners.setdefault(kind, []).append(self.modes[mode])
+                self._listeners.setdefault(kind, {})[self.modes[mode]] = None
         self._takeoff = next((flown for flown in built.values() if isinstance(flown, Takeoff)), None)
         self._active = context.flown = self.modes[context.state.mode]
         self._climb: Climb | None = None  # of a take-off, which is finished before the active mode goes elsewhere
@@ -239,6 +239,8 @@ class Navigator:
 
     def take(self, mode: Mode, request: ModeRequest) -> Reply:
         """Hands a request to the mode that carries it out; the caller enters that."""
+        if type(request) not in self._specs[mode].takes:
+            return Reply(Verdict.UNSUPPORTED, "no mode of this vehicle does that")
         return self.modes[mode].take(request)
 
     def begin_request(self, mode: Mode) -> None:

@@ -29,6 +29,7 @@ from autopilot.ports import (
     Setpoint,
 )
 from autopilot.vehicles.multirotor.defaults import hover_thrust
+from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
 from common.airframe import load_airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import FRAME_US, GRAVITY_M_S2
@@ -77,7 +78,7 @@ class Recorder:
 class Kinematic:
     """One vehicle over flat ground at down = 0, and its flight controller."""
 
-    def __init__(self, **params):
+    def __init__(self, vehicle=MULTIROTOR, **params):
         self.table = ParameterTable(all_parameters())
         for name, value in params.items():
             self.table.set(name, value)
@@ -114,6 +115,7 @@ class Kinematic:
             self.airframe,
             ORIGIN,
             self.recorder,
+            vehicle=vehicle,
         )
         self.state = self.fc.state
 

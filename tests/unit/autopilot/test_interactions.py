@@ -1,5 +1,6 @@
 """What one mode was asked for, or had begun, does no harm when another takes over: whole sequences on flat ground."""
 
+from dataclasses import replace
 from math import hypot, nan
 
 from autopilot.commander.failsafe import BATTERY_CRITICAL, BATTERY_EMERGENCY
@@ -11,11 +12,15 @@ from autopilot.interface.client_requests import (
     OrbitRequest,
     SetHome,
     TakeOff,
+    TargetReport,
 )
 from autopilot.interface.item_lists import ListKind
+from autopilot.interface.mode_spec import mode_table
 from autopilot.interface.vehicle_state import Mode, Verdict
 from autopilot.navigator.mission.mission import MissionState
+from autopilot.navigator.modes.follow import Follow
 from autopilot.ports import POSITION_VALID, VELOCITY_VALID
+from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
 from tests.unit.autopilot.kinematic import DT_S, ORIGIN, Kinematic, do, geo, item, position_setpoint
 
 WAYPOINT, LAND, TAKEOFF, LAND_START = 16, 21, 22, 189
@@ -243,3 +248,25 @@ class TestHome:
         assert rig.fc.request(SetHome(lat, lon, alt)).verdict is Verdict.DENIED
         lat, lon, _ = place(10.0, 0.0)
         assert rig.fc.request(SetHome(lat, lon, ORIGIN.alt_m + 20_000.0)).verdict is Verdict.DENIED
+
+
+class TestOtherTables:
+    """Classes of vehicles whose modes take other requests than the multirotor's."""
+
+    def test_what_no_mode_takes_is_refused_and_changes_nothing(self):
+        specs = MULTIROTOR.modes.values()
+        modes = mode_table(*(replace(spec, takes=tuple({*spec.takes} - {GoTo})) for spec in specs))
+        rig = Kinematic(replace(MULTIROTOR, modes=modes)).flying()
+        rig.fc.request(ChangeMode(Mode.GUIDED))
+        reply = rig.fc.request(GoTo(*place(30.0, 0.0)))
+        assert (reply.verdict, reply.reason) == (Verdict.UNSUPPORTED, "no mode of this vehicle does that")
+        assert rig.state.mode is Mode.GUIDED
+
+    def test_a_report_reaches_an_object_that_flies_two_modes_once(self, monkeypatch):
+        follow = MULTIROTOR.modes[Mode.FOLLOW]
+        twin = replace(MULTIROTOR.modes[Mode.BRAKE], build=follow.build, takes=follow.takes)
+        modes = mode_table(*({**MULTIROTOR.modes, Mode.BRAKE: twin}).values())
+        rig, taken = Kinematic(replace(MULTIROTOR, modes=modes)).ready(), []
+        monkeypatch.setattr(Follow, "take", lambda _, report: taken.append(report))
+        rig.fc.request(TargetReport((10.0, 0.0, 0.0), None, 1.0, 1.0))
+        assert len(taken) == 1
