@@ -66,7 +66,9 @@ def autopilot_kernels(law: ControlLaw) -> AutopilotKernels:
 @cache
 def autopilot_kernel(law: ControlLaw) -> Any:
     """`@wp.kernel (Arrays, samples, ticks, commands)`: one tick alone, on samples from anywhere."""
-    arrays, autopilot_tick = autopilot_kernels(law).Arrays, autopilot_kernels(law).tick
+    kernels = autopilot_kernels(law)
+    autopilot_tick = kernels.tick
+    arrays: Any = kernels.Arrays
 
     @wp.kernel(enable_backward=False, module="unique")
     def run_autopilot(
