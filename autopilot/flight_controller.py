@@ -41,6 +41,7 @@ from autopilot.navigator.navigator import Navigator
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.payload.aux_outputs import AuxOutputs
 from autopilot.payload.camera.camera import Camera
+from autopilot.payload.camera.camera_commands import CameraCommands
 from autopilot.payload.gimbal.gimbal import Gimbal
 from autopilot.payload.gimbal.gimbal_control import GimbalControl
 from autopilot.payload.payloads import Payloads
@@ -133,54 +134,49 @@ class FlightController:
         turntable: Turntable | None = None,
         vehicle: VehicleClass = DEFAULT_CLASS,
     ) -> None:
-        self._last_resort = vehicle.last_resort
         self.params = params
         self.modes = vehicle.modes
         self.host = host or Host()
+        self._last_resort = vehicle.last_resort
+        self._ports = ports
+        self._on_reboot = on_reboot
+        self._on_corrections = on_corrections
+        self._injector = injector
+        self._relay = _Relay(announcer)
+        self._servers: list[Server] = []
+        self._next_health_us = 0
         self.sticks = Sticks(params)
-        self.state = VehicleState(
+        self.state = state = VehicleState(
             origin=origin,
             sticks=self.sticks.input,
             motor_count=len(vehicle.motors(airframe)),
             mav_type=vehicle.mav_type(airframe),
         )
-        self.payload = Payloads()
-        self.gimbal: GimbalControl | None = None
-        self.camera = self._mount_camera()
-        self.state.read_motor_speeds = ports.read_motor_speeds
-        self._outputs = AuxOutputs(self.state)
-        self.payload.add(self._outputs)
-        self.traffic = Traffic(self.state, params)
-        self.obstacles = Obstacles(params, vehicle.limits.accel_hor)
-        self.state.obstacles = self.obstacles
-        self._ports = ports
-        self._next_health_us = 0
-        self._relay = _Relay(announcer)
-        self._servers: list[Server] = []
-        self._on_reboot = on_reboot
-        self._injector = injector
-        self._on_corrections = on_corrections
-        self._setpoint = SetpointPort(ports.setpoint)
-        state = self.state
+        state.read_motor_speeds = ports.read_motor_speeds
+        self.obstacles = state.obstacles = Obstacles(params, vehicle.limits.accel_hor)
+        self.traffic = Traffic(state, params)
         self.external = ExternalPositions(
             ports.external, params, lambda: state.time_us, lambda: (state.estimate, state.yaw_rad)
         )
-        self.commander = self._make_commander(vehicle, airframe, ports)
-        context = NavContext(self.state, params, self._relay, self._setpoint, vehicle.craft(airframe))
-        mission = Mission(context, self.payload, self.commander.set_home)
-        self.navigator = Navigator(context, mission, vehicle.modes)
-        self.fence, self.rally = self.navigator.fence, self.navigator.rally
-        self.lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
-        self.lists.on_change(mission.warn_of_fence)
-        self.commander.connect(self.navigator)
-        self.guidance = Guidance(self.commander, self.navigator, self.payload)
+        self.payload = Payloads()
+        self.gimbal: GimbalControl | None = None
+        self.camera = self._mount_camera()
+        self._outputs = AuxOutputs(state)
+        self.payload.add(self._outputs)
+        self._setpoint = SetpointPort(ports.setpoint)
+        self.commander = self._make_commander(vehicle, airframe)
         self.station = self.commander.station
-        self.motor_test = MotorTest(self.state, self._setpoint, self._relay, vehicle.motors(airframe))
-        self.calibration = Calibrator(self.state, params, self._relay, turntable)
+        self.navigator = self._make_navigator(vehicle, airframe)
+        self.commander.connect(self.navigator)
+        self.fence, self.rally = self.navigator.fence, self.navigator.rally
+        self.lists = self._item_lists()
+        self.guidance = Guidance(self.commander, self.navigator, self.payload)
+        self.motor_test = MotorTest(state, self._setpoint, self._relay, vehicle.motors(airframe))
+        self.calibration = Calibrator(state, params, self._relay, turntable)
         self._setpoint.write()
 
-    def _make_commander(self, vehicle: VehicleClass, airframe: Airframe, ports: HostPorts) -> Commander:
-        state, params = self.state, self.params
+    def _make_commander(self, vehicle: VehicleClass, airframe: Airframe) -> Commander:
+        state, params, ports = self.state, self.params, self._ports
         parts = DriveParts(state, params, self._relay, airframe, ports.read_motor_speeds, ports.airframe)
         return Commander(
             state,
@@ -194,6 +190,18 @@ class FlightController:
             vehicle.last_resort,
         )
 
+    def _make_navigator(self, vehicle: VehicleClass, airframe: Airframe) -> Navigator:
+        context = NavContext(self.state, self.params, self._relay, self._setpoint, vehicle.craft(airframe))
+        mission = Mission(context, self.payload, self.commander.set_home)
+        return Navigator(context, mission, vehicle.modes)
+
+    def _item_lists(self) -> ItemLists:
+        """What clients upload; with each change the mission is held against the fence."""
+        mission = self.navigator.mission
+        lists = ItemLists({ListKind.MISSION: mission, ListKind.FENCE: self.fence, ListKind.RALLY: self.rally})
+        lists.on_change(mission.warn_of_fence)
+        return lists
+
     def _mount_camera(self) -> Camera | None:
         """Hangs the camera on its gimbal, if the host has one."""
         frames = self.host.frames
@@ -203,7 +211,7 @@ class FlightController:
         self.gimbal = GimbalControl(gimbal, self.state)
         camera = Camera(self.state, gimbal, frames, self.host.media)
         self.payload.add(self.gimbal)
-        self.payload.add(camera)
+        self.payload.add(CameraCommands(camera))
         return camera
 
     def follow_ardupilot(self) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from autopilot.estimator.calibration_params import CALIBRATION_PARAMETERS
 from common.params import Parameter, ParameterTable
 
 wp.set_module_options({"enable_backward": False})
@@ -109,28 +110,9 @@ _TUNED = "tuned on simulated flights: innovations inside their 95 % band"
 _RECEIVER = "receiver model: 0.3 m white, 0.6 m over 60 s, 0.1 m/s"
 _PX4 = "PX4 default"
 
-_CALIBRATED = "calibration"
-
-
-def _offset(sensor: str, axis: str, bound: float, unit: str, field: str) -> Parameter:
-    meaning = f"what the {field} reads too much along {axis.lower()}"
-    return Parameter(
-        f"CAL_{sensor}0_{axis}OFF", 0.0, -bound, bound, unit, meaning, _CALIBRATED, f"{field}_offset_{axis.lower()}"
-    )
-
 
 ESTIMATOR_PARAMETERS: list[Parameter] = [
-    *(_offset("GYRO", axis, 0.5, "rad/s", "gyro") for axis in "XYZ"),
-    *(_offset("ACC", axis, 5.0, "m/s^2", "accel") for axis in "XYZ"),
-    *(_offset("MAG", axis, 2.0, "gauss", "mag") for axis in "XYZ"),
-    Parameter("CAL_MAG0_YAW", 0.0, -180.0, 180.0, "deg", "yaw of the compass in the vehicle", _CALIBRATED, "mag_yaw"),
-    Parameter(
-        "SENS_BOARD_X_OFF", 0.0, -45.0, 45.0, "deg", "roll of the board in the vehicle", _CALIBRATED, "board_roll"
-    ),
-    Parameter(
-        "SENS_BOARD_Y_OFF", 0.0, -45.0, 45.0, "deg", "pitch of the board in the vehicle", _CALIBRATED, "board_pitch"
-    ),
-    Parameter("SENS_BOARD_Z_OFF", 0.0, -45.0, 45.0, "deg", "yaw of the board in the vehicle", _CALIBRATED, "board_yaw"),
+    *CALIBRATION_PARAMETERS,
     Parameter(
         "EKF2_DELAY_MAX",
         140.0,

@@ -6,13 +6,12 @@ refused or ignored.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.interface.vehicle_interface import Vehicle
 from autopilot.interface.vehicle_state import Severity
-from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, CLIENTS_MAX, Channel, Endpoint, Sender
+from autopilot.mavlink.channel import AUTOPILOT_COMPONENT, Channel, Endpoint, Sender
 from autopilot.mavlink.commands import CommandService
 from autopilot.mavlink.components.camera.camera_component import AttachedCamera, CameraComponent
 from autopilot.mavlink.components.component import Component
@@ -39,7 +38,6 @@ from autopilot.mavlink.services.files.ftp_virtual import virtual_folders
 from autopilot.mavlink.services.files.log_streaming import LogStreamingService
 from autopilot.mavlink.services.files.log_transfer import LogTransferService
 from autopilot.mavlink.services.files.shell import ShellService
-from autopilot.mavlink.services.identity import banner
 from autopilot.mavlink.services.inputs.external_position_messages import ExternalService
 from autopilot.mavlink.services.inputs.local_origin import OriginService
 from autopilot.mavlink.services.inputs.manual_control import ManualService
@@ -47,6 +45,7 @@ from autopilot.mavlink.services.inputs.obstacle_distances import ObstacleService
 from autopilot.mavlink.services.inputs.offboard_setpoints import OffboardService
 from autopilot.mavlink.services.inputs.target_reports import TargetService
 from autopilot.mavlink.services.inputs.traffic_reports import TrafficService
+from autopilot.mavlink.services.link_upkeep import LinkService
 from autopilot.mavlink.services.message_requests import MessageRequests
 from autopilot.mavlink.services.mission_protocol import MissionService
 from autopilot.mavlink.services.parameter_protocol import ParameterService
@@ -68,19 +67,9 @@ _EXTENDED_SYS_STATE = known_type("EXTENDED_SYS_STATE")
 _HOME_POSITION = known_type("HOME_POSITION")
 _MISSION_CURRENT = known_type("MISSION_CURRENT")
 _MISSION_ITEM_REACHED = known_type("MISSION_ITEM_REACHED")
-_PING = known_type("PING")
-_TIMESYNC = known_type("TIMESYNC")
 _SETUP_SIGNING_ID = known_type("SETUP_SIGNING").msg_id
 
 _COMMAND_IDS = (known_type("COMMAND_LONG").msg_id, known_type("COMMAND_INT").msg_id)  # handed on to components
-
-# What these say with a heartbeat is no client's first word: they want no greeting.
-_DEVICES = {
-    mavlink.MAV_TYPE_GIMBAL, mavlink.MAV_TYPE_ADSB, mavlink.MAV_TYPE_CAMERA, mavlink.MAV_TYPE_CHARGING_STATION,
-    mavlink.MAV_TYPE_FLARM, mavlink.MAV_TYPE_SERVO, mavlink.MAV_TYPE_ODID, mavlink.MAV_TYPE_BATTERY,
-    mavlink.MAV_TYPE_PARACHUTE, mavlink.MAV_TYPE_LOG, mavlink.MAV_TYPE_OSD, mavlink.MAV_TYPE_IMU,
-    mavlink.MAV_TYPE_GPS, mavlink.MAV_TYPE_WINCH,
-}  # fmt: skip
 
 SYSID_PARAMETER = "MAV_SYS_ID"
 
@@ -123,7 +112,6 @@ class MavlinkServer:
         self._messages: dict[str, Handler] = {}
         self._handlers: dict[int, Handler] = {}  # the same, by id
         self._frames: list[Callable[[], None]] = []  # of the services that have something to do each frame
-        self._add_messages(self._own_messages())
         for service in self._services():
             self._add(service)
         self._components = self._make_components()
@@ -143,6 +131,7 @@ class MavlinkServer:
         self._events = EventService(endpoint)
         self._compass = CompassService(endpoint)
         return [
+            LinkService(endpoint),
             self._commands,
             self._requests,
             FlightCommands(endpoint, self._events),
@@ -193,18 +182,15 @@ class MavlinkServer:
         return components
 
     def _add(self, service: Service) -> None:
-        self._add_messages(service.messages())
-        self._commands.add(service.commands())
-        self._requests.add(service.requests())
-        if type(service).frame is not Service.frame:
-            self._frames.append(service.frame)
-
-    def _add_messages(self, handlers: Mapping[str, Handler]) -> None:
-        for name, handler in handlers.items():
+        for name, handler in service.messages().items():
             if name in self._messages:
                 raise ValueError(f"message {name} has two handlers")
             self._messages[name] = handler
             self._handlers[known_type(name).msg_id] = handler
+        self._commands.add(service.commands())
+        self._requests.add(service.requests())
+        if type(service).frame is not Service.frame:
+            self._frames.append(service.frame)
 
     # What the documentation is made from
 
@@ -225,14 +211,6 @@ class MavlinkServer:
     def components(self) -> Sequence[Component]:
         """The vehicle's components besides the autopilot."""
         return self._components
-
-    def _own_messages(self) -> dict[str, Handler]:
-        return {
-            "HEARTBEAT": self._heartbeat_received,
-            "PING": self._ping_received,
-            "TIMESYNC": self._timesync_received,
-            "REQUEST_DATA_STREAM": self._data_stream_requested,
-        }
 
     @property
     def needs_ticks(self) -> bool:
@@ -318,35 +296,6 @@ class MavlinkServer:
             self._endpoint.signer.save(is_last=True)
         for source in self._endpoint.sources:
             source.close()
-
-    # Messages that belong to no service
-
-    def _heartbeat_received(self, sender: Sender, fields: Any) -> None:
-        """Greets a client that is new on its channel; of a ground station: keeps the link alive (NAV_DLL_ACT)."""
-        if fields.type == mavlink.MAV_TYPE_GCS and not sender.channel.is_mute:
-            self._endpoint.vehicle.station.heard(self._endpoint.time_us)
-        client, clients = (sender.sysid, sender.compid), sender.channel.clients
-        is_client = fields.type not in _DEVICES and sender.compid != AUTOPILOT_COMPONENT
-        if is_client and client not in clients and len(clients) < CLIENTS_MAX:
-            clients.add(client)
-            self._endpoint.text(Severity.INFO, banner(self._endpoint.dialect), to=sender)
-
-    def _ping_received(self, sender: Sender, fields: Any) -> None:
-        """Answers a request; a message with a target is itself an answer."""
-        if fields.target_system == 0 and fields.target_component == 0:
-            payload = _PING.pack(fields.time_usec, fields.seq, sender.sysid, sender.compid)
-            self._endpoint.reply(sender, _PING, payload)
-
-    def _timesync_received(self, sender: Sender, fields: Any) -> None:
-        """Answers a request with the time since boot; tc1 other than 0 is itself an answer."""
-        if fields.tc1 == 0:
-            time_us = self._endpoint.clock.shown_us(self._endpoint.time_us)
-            self._endpoint.reply(sender, _TIMESYNC, _TIMESYNC.pack(max(time_us, 1) * 1000, fields.ts1))
-
-    def _data_stream_requested(self, sender: Sender, fields: Any) -> None:
-        """Sets the rate of a group of messages on this link (the old way)."""
-        rate_hz = float(fields.req_message_rate) if fields.start_stop else 0.0
-        sender.channel.schedule.set_group(fields.req_stream_id, rate_hz)
 
     # Announcer
 

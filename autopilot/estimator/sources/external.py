@@ -40,6 +40,28 @@ _RESET_AFTER_S = wp.constant(5.0)  # nothing passed for so long: believe the sam
 _MIN_STD = wp.constant(1.0e-3)  # [m], [m/s], [rad]
 
 
+@wp.struct
+class ExternalAxes:
+    """Axes of a sample that pass or fail together: those of position, of velocity, or height alone."""
+
+    measured_ned: wp.vec3  # position [m] or velocity [m/s], of which the axes are a part
+    std: float  # of each axis
+    first: int  # their first error: VEL, POS, or POS + 2 for height alone
+    count: int
+    gate: float  # standard deviations beyond which the sample is rejected
+
+
+@wp.func
+def external_axes(measured_ned: wp.vec3, std: float, first: int, count: int, gate: float) -> ExternalAxes:
+    axes = ExternalAxes()
+    axes.measured_ned = measured_ned
+    axes.std = std
+    axes.first = first
+    axes.count = count
+    axes.gate = gate
+    return axes
+
+
 @wp.func
 def external_repeats(sample: ExternalSample, previous: ExternalSample) -> bool:
     """Both samples hold the same values."""
@@ -52,6 +74,29 @@ def external_repeats(sample: ExternalSample, previous: ExternalSample) -> bool:
 
 
 @wp.func
+def set_external_axes(
+    cov: wp.array2d(dtype=vec24), i: int, nominal: Nominal, axes: ExternalAxes, innov: wp.vec3, var: float
+) -> Nominal:
+    """The state as the axes measure it: moved by their innovations, as sure as they are."""
+    is_velocity = axes.first < POS
+    offset = axes.first - POS
+    if is_velocity:
+        offset = axes.first - VEL
+    nominal.reset_count += 1
+    for axis in range(axes.count):
+        jump = wp.vec3()
+        jump[offset + axis] = innov[axis]
+        if is_velocity:
+            nominal.vel_jump_ned = nominal.vel_jump_ned + jump
+            nominal.vel_ned = nominal.vel_ned + jump
+        else:
+            nominal.pos_jump_ned = nominal.pos_jump_ned + jump
+            nominal.pos_ned = nominal.pos_ned + jump
+        set_variance(cov, i, axes.first + axis, var)
+    return nominal
+
+
+@wp.func
 def fuse_external_axes(
     params: EstimatorParams,
     cov: wp.array2d(dtype=vec24),
@@ -59,14 +104,10 @@ def fuse_external_axes(
     nominal: Nominal,
     aid: Aid,
     time_us: wp.int64,
-    measured: wp.vec3,
-    std: float,
-    first: int,
-    count: int,
-    gate: float,
+    axes: ExternalAxes,
     is_anew: bool,
 ) -> tuple[Nominal, Aid]:
-    """`count` axes of position or velocity from error `first` on, which pass or fail together.
+    """Axes of position or velocity: fused if they pass; set if the state is lost or nothing has passed for long.
 
     Args:
         params: of the estimator.
@@ -75,14 +116,11 @@ def fuse_external_axes(
         nominal: the state.
         aid: of these axes.
         time_us: of the sample.
-        measured: position [m] or velocity [m/s] in ned, of which the axes are a part.
-        std: of each axis.
-        first: VEL, POS, or POS + 2 for height alone.
-        count: axes.
-        gate: standard deviations beyond which the sample is rejected.
+        axes: what is measured.
         is_anew: the client has set its answer anew: the state is set, whatever the gate says.
     """
-    var = noise_variance(aid, wp.max(std, _MIN_STD))
+    var = noise_variance(aid, wp.max(axes.std, _MIN_STD))
+    first = axes.first
     is_velocity = first < POS
     offset = first - POS
     predicted = nominal.pos_ned
@@ -91,32 +129,24 @@ def fuse_external_axes(
         predicted = nominal.vel_ned
     innov = wp.vec3()
     innov_var = wp.vec3(1.0, 1.0, 1.0)
-    for axis in range(count):
-        innov[axis] = measured[offset + axis] - predicted[offset + axis]
+    for axis in range(axes.count):
+        innov[axis] = axes.measured_ned[offset + axis] - predicted[offset + axis]
         innov_var[axis] = cov[i, first + axis][first + axis] + var
     starved_s = seconds_since(time_us, aid.fused_time_us)
-    aid = judge(aid, time_us, innov, innov_var, count, gate)
+    aid = judge(aid, time_us, innov, innov_var, axes.count, axes.gate)
     aid.is_active = 1
     is_set = is_anew or cov[i, first][first] > _LOST_VAR
     if aid.test_ratio <= 1.0 and not is_set:
-        for axis in range(count):
+        for axis in range(axes.count):
             believed = nominal.pos_ned[offset + axis]
             if is_velocity:
                 believed = nominal.vel_ned[offset + axis]
-            nominal = fuse_state(params, cov, i, nominal, first + axis, measured[offset + axis] - believed, var)
+            nominal = fuse_state(
+                params, cov, i, nominal, first + axis, axes.measured_ned[offset + axis] - believed, var
+            )
         aid = mark_fused(aid)
     elif is_set or starved_s > _RESET_AFTER_S:
-        nominal.reset_count += 1
-        for axis in range(count):
-            jump = wp.vec3()
-            jump[offset + axis] = innov[axis]
-            if is_velocity:
-                nominal.vel_jump_ned = nominal.vel_jump_ned + jump
-                nominal.vel_ned = nominal.vel_ned + jump
-            else:
-                nominal.pos_jump_ned = nominal.pos_jump_ned + jump
-                nominal.pos_ned = nominal.pos_ned + jump
-            set_variance(cov, i, first + axis, var)
+        nominal = set_external_axes(cov, i, nominal, axes, innov, var)
         aid = mark_reset(aid)
     return nominal, aid
 
@@ -199,54 +229,24 @@ def take_external(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -
     pos_ned = sample.pos_ned + nominal.vel_ned * age_s
     resets_before = nominal.reset_count
     if (held & EXTERNAL_HOLDS_HEIGHT) != 0:
+        axes = external_axes(pos_ned, sample.pos_v_std, POS + 2, 1, params.external_pos_gate)
         nominal, height_aid = fuse_external_axes(
-            params,
-            cov,
-            i,
-            nominal,
-            ekf.rows[i].external_height,
-            sample.time_us,
-            pos_ned,
-            sample.pos_v_std,
-            POS + 2,
-            1,
-            params.external_pos_gate,
-            is_anew,
+            params, cov, i, nominal, ekf.rows[i].external_height, sample.time_us, axes, is_anew
         )
         ekf.rows[i].external_height = height_aid
         if nominal.reset_count != resets_before:
             ekf.rows[i].baro.is_active = 0  # it starts anew, with a reference that fits
     if ekf.rows[i].is_yaw_aligned == 1:
         if (held & EXTERNAL_HOLDS_VEL) != 0:
+            axes = external_axes(sample.vel_ned, sample.vel_std, VEL, 3, params.external_vel_gate)
             nominal, vel_aid = fuse_external_axes(
-                params,
-                cov,
-                i,
-                nominal,
-                ekf.rows[i].external_vel,
-                sample.time_us,
-                sample.vel_ned,
-                sample.vel_std,
-                VEL,
-                3,
-                params.external_vel_gate,
-                is_anew,
+                params, cov, i, nominal, ekf.rows[i].external_vel, sample.time_us, axes, is_anew
             )
             ekf.rows[i].external_vel = vel_aid
         if (held & EXTERNAL_HOLDS_POS) != 0:
+            axes = external_axes(pos_ned, sample.pos_h_std, POS, 2, params.external_pos_gate)
             nominal, pos_aid = fuse_external_axes(
-                params,
-                cov,
-                i,
-                nominal,
-                ekf.rows[i].external_pos,
-                sample.time_us,
-                pos_ned,
-                sample.pos_h_std,
-                POS,
-                2,
-                params.external_pos_gate,
-                is_anew,
+                params, cov, i, nominal, ekf.rows[i].external_pos, sample.time_us, axes, is_anew
             )
             ekf.rows[i].external_pos = pos_aid
     ekf.rows[i].nominal = nominal

@@ -1,7 +1,7 @@
 """The camera: takes photos when asked or triggered, records video, and keeps both on its card.
 
-In: commands of clients and mission items (`run`), frames of the host's `FrameSource`. Out: files, and a `Shot` for each
-photo to whoever listens. It works when something is due, on simulated time; the controller calls `frame` then.
+In: what `CameraCommands` asks of it, frames of the host's `FrameSource`. Out: files, and a `Shot` for each photo to
+whoever listens. It works when something is due, on simulated time; the controller calls `frame` then.
 """
 
 from collections import deque
@@ -9,7 +9,6 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from enum import IntEnum
-from math import isfinite
 
 import numpy as np
 
@@ -22,13 +21,11 @@ from autopilot.payload.camera.storage import MediaFolder
 from autopilot.payload.camera.trigger import NEVER_US, Trigger
 from autopilot.payload.camera.video import Recording
 from autopilot.payload.gimbal.gimbal import Gimbal
-from autopilot.payload.payloads import Params
 from common.attitude import Quat
 from common.geodesy import GeoPoint
 
 CAMERA_ID = 100  # MAV_COMP_ID_CAMERA
 SHUTTER_US = 200_000  # from one photo to the next at the earliest; guess
-INTERVAL_MAX_S = 86_400.0
 PENDING_MAX = 2  # photos that wait for the host
 SHOTS_KEPT = 10_000
 VIDEO_BYTES_MIN = 1 << 20  # room a recording needs to begin
@@ -42,22 +39,6 @@ class CameraMode(IntEnum):
     IMAGE = 0
     VIDEO = 1
     IMAGE_SURVEY = 2
-
-
-class Command(IntEnum):
-    """What the camera takes, numbered as MAV_CMD."""
-
-    DIGICAM_CONTROL = 203
-    TRIGGER_DISTANCE = 206
-    TRIGGER_INTERVAL = 214
-    SET_MODE = 530
-    SET_ZOOM = 531
-    SET_FOCUS = 532
-    START_PHOTOS = 2000
-    STOP_PHOTOS = 2001
-    TRIGGER_CONTROL = 2003
-    START_VIDEO = 2500
-    STOP_VIDEO = 2501
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,19 +81,6 @@ class Camera:
         self._pending: deque[tuple[Shot, View, Future[RawFrame]]] = deque()
         self._listeners: list[ListensToShots] = []
         self._full_listeners: list[Callable[[], None]] = []
-        self._handlers: dict[int, Callable[[Params, float], Reply]] = {
-            Command.DIGICAM_CONTROL: self._digicam,
-            Command.TRIGGER_DISTANCE: self._trigger_distance,
-            Command.TRIGGER_INTERVAL: self._trigger_interval,
-            Command.TRIGGER_CONTROL: self._trigger_control,
-            Command.SET_MODE: lambda params, _: self.set_mode(params[1]),
-            Command.SET_ZOOM: lambda params, _: self._turn(self.lens.set_zoom, params),
-            Command.SET_FOCUS: lambda params, _: self._turn(self.lens.set_focus, params),
-            Command.START_PHOTOS: lambda params, _: self._start_photos(params),
-            Command.STOP_PHOTOS: lambda _, __: self.stop_photos(),
-            Command.START_VIDEO: lambda _, __: self.start_video(),
-            Command.STOP_VIDEO: lambda _, __: self.stop_video(),
-        }
 
     def on_shot(self, listener: ListensToShots) -> None:
         """`listener` hears of each photo when it is stored."""
@@ -121,14 +89,6 @@ class Camera:
     def on_full(self, listener: Callable[[], None]) -> None:
         """`listener` hears when a recording was stopped because the storage is full."""
         self._full_listeners.append(listener)
-
-    # autopilot.payload.payloads.Payload
-
-    def takes(self, command: int) -> bool:
-        return command in self._handlers
-
-    def run(self, command: int, params: Params, x: float, _: float, __: float) -> Reply:
-        return self._handlers[command](params, x)
 
     # What it is doing
 
@@ -199,18 +159,6 @@ class Camera:
         if self.media.free_bytes <= 0:
             return Reply(Verdict.FAILED, "the storage is full")
         return None
-
-    def _start_photos(self, params: Params) -> Reply:
-        interval_s, count = params[1], params[2]
-        if not isfinite(count) or count < 0 or count != int(count):
-            return Reply(Verdict.DENIED, "the number of photos must be 0 or more")
-        if count == 1:
-            return self.take_photo()
-        if not isfinite(interval_s) or interval_s * 1e6 < SHUTTER_US:
-            return Reply(Verdict.DENIED, f"the interval must be at least {SHUTTER_US * 1e-6:g} s")
-        if interval_s > INTERVAL_MAX_S:
-            return Reply(Verdict.DENIED, "the interval must be a day at most")
-        return self.start_photos(interval_s, int(count))
 
     def take_photo(self) -> Reply:
         """One photo now."""
@@ -287,14 +235,8 @@ class Camera:
 
     # Triggers
 
-    def _trigger_distance(self, params: Params, _: float) -> Reply:
-        distance_m, is_now = params[0], params[2] == 1.0
-        if not isfinite(distance_m) or distance_m < 0.0:
-            return Reply(Verdict.DENIED, "the trigger distance must be 0 or more")
-        if distance_m == 0.0:
-            self.trigger.stop_distance()
-            self._plan()
-            return self.take_photo() if is_now else ACCEPTED
+    def trigger_by_distance(self, distance_m: float, *, is_now: bool) -> Reply:
+        """A photo every so many metres of way, the first one here if `is_now`."""
         refusal = self._refusal()
         if refusal is not None:
             return refusal
@@ -302,16 +244,13 @@ class Camera:
         self._plan()
         return ACCEPTED
 
-    def _trigger_interval(self, params: Params, _: float) -> Reply:
-        interval_s = 1e-3 * params[0]
-        if not isfinite(interval_s):
-            return Reply(Verdict.DENIED, "the trigger interval is not a number")
-        if interval_s <= 0.0:
-            return self.stop_photos()
-        if interval_s * 1e6 < SHUTTER_US:
-            return Reply(Verdict.DENIED, f"the interval must be at least {SHUTTER_US * 1e-6:g} s")
-        if interval_s > INTERVAL_MAX_S:
-            return Reply(Verdict.DENIED, "the interval must be a day at most")
+    def stop_distance(self) -> None:
+        """No photos by distance any more; a series goes on."""
+        self.trigger.stop_distance()
+        self._plan()
+
+    def trigger_by_interval(self, interval_s: float) -> Reply:
+        """A photo every so many seconds from now on, in the place of any series."""
         self.trigger.stop_series()
         refusal = self._refusal()
         if refusal is not None:
@@ -320,21 +259,10 @@ class Camera:
         self._plan()
         return ACCEPTED
 
-    def _trigger_control(self, params: Params, _: float) -> Reply:
-        if params[1] == 1.0:
-            self.shot_count = 0
-            self.shots.clear()
-        if params[0] == 0.0 or params[2] == 1.0:
-            return self.stop_photos()
-        if params[0] == 1.0 and not self.trigger.is_active:
-            return Reply(Verdict.DENIED, "say how: by a trigger distance or interval")
-        return ACCEPTED
-
-    def _digicam(self, params: Params, shoot: float) -> Reply:
-        if isfinite(params[2]) and params[2] != 0.0:
-            self.lens.update(self._state.time_us)
-            self.lens.set_zoom(0, params[2])
-        return self.take_photo() if shoot == 1.0 else ACCEPTED
+    def count_anew(self) -> None:
+        """The next photo is the first."""
+        self.shot_count = 0
+        self.shots.clear()
 
     # Video, mode, lens
 
@@ -380,11 +308,10 @@ class Camera:
         self.settings.set(MODE, mode)
         return ACCEPTED
 
-    def _turn(self, motor: Callable[[int, float], Reply], params: Params) -> Reply:
+    def turn(self, motor: Callable[[int, float], Reply], kind: int, value: float) -> Reply:
+        """Has a motor of the lens zoom or focus from where the lens is now."""
         self.lens.update(self._state.time_us)
-        if not isfinite(params[0]) or params[0] != int(params[0]):
-            return Reply(Verdict.DENIED, "the type is not a number")
-        return motor(int(params[0]), params[1])
+        return motor(kind, value)
 
     def reset(self) -> Reply:
         """Everything that can be set, as it came."""
@@ -401,6 +328,5 @@ class Camera:
         if self.recording is not None or self.trigger.is_active or self.is_taking_photo:
             return Reply(Verdict.TEMPORARILY_REJECTED, "busy taking pictures")
         self.media.format()
-        self.shots.clear()
-        self.shot_count = 0
+        self.count_anew()
         return ACCEPTED

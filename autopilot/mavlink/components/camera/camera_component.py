@@ -14,7 +14,8 @@ from autopilot.mavlink.service import Command, CommandHandler, Handler, Service,
 from autopilot.mavlink.wire.codec import known_type
 from autopilot.mavlink.wire.convert import whole
 from autopilot.payload.camera.camera import CAMERA_ID, Camera, Shot
-from autopilot.payload.camera.camera import Command as CameraCommand
+from autopilot.payload.camera.camera_commands import CameraCommands
+from autopilot.payload.camera.camera_commands import Command as CameraCommand
 
 REPEAT_US = 3_000_000  # a single photo of the same number from the same client is a repeat that long; guess
 _CAPTURE_STATUS = known_type("CAMERA_CAPTURE_STATUS")
@@ -59,6 +60,7 @@ class CameraComponent(Component):
 
     def __init__(self, endpoint: Endpoint, camera: Camera) -> None:
         self._camera = camera
+        self._camera_commands = CameraCommands(camera)
         self._stream = endpoint.vehicle.host.live_stream
         self._messages = CameraMessages(camera, endpoint.vehicle.state, endpoint.vehicle.host)
         self._settings = SettingsService(camera.settings, self.reply)
@@ -125,7 +127,7 @@ class CameraComponent(Component):
         target = 0.0 if i_target is None else params[i_target - 1]
         if target == target and target not in (0.0, 1.0, float(CAMERA_ID)):
             return denied(f"there is no camera {target:g}")
-        return self._camera.run(command.command, params, command.x, command.y, command.z)
+        return self._camera_commands.run(command.command, params, command.x, command.y, command.z)
 
     def _start_photos(self, command: Command) -> Reply:
         """Takes one photo or a series.
