@@ -6,13 +6,12 @@ from typing import Any, NamedTuple
 from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
 from sim.bodies.multirotor import (
     BodyState,
-    MultirotorModel,
     body_at_rest,
     body_tick,
-    multirotor_model,
     standing_height,
     truth_of,
 )
+from sim.bodies.multirotor_model import MultirotorModel, multirotor_model
 
 
 class Body(NamedTuple):

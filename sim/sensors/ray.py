@@ -88,6 +88,19 @@ def map_entry(start: float, rate: float, half_size_m: float) -> float:
 
 
 @wp.func
+def scenery_entry(origin_ned: wp.vec3, dir_ned: wp.vec3, half_size_m: float, top_m: float) -> float:
+    """Ray parameter [m] from which a ray is inside the map and below all that stands there; never if it is not."""
+    t = wp.max(map_entry(origin_ned[0], dir_ned[0], half_size_m), map_entry(origin_ned[1], dir_ned[1], half_size_m))
+    height = -origin_ned[2]
+    climb = -dir_ned[2]
+    if height > top_m:
+        if climb >= -_PARALLEL:
+            return _NEVER
+        return wp.max(t, (height - top_m) / -climb)
+    return t
+
+
+@wp.func
 def first_hit(w: World, skyline: Skyline, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float) -> Hit:
     """The first thing a ray of unit direction meets within `max_m` [m]; kind SKY and `max_m` if nothing."""
     hit = Hit()
@@ -100,12 +113,7 @@ def first_hit(w: World, skyline: Skyline, origin_ned: wp.vec3, dir_ned: wp.vec3,
     height = -origin_ned[2]
     climb = -dir_ned[2]
     top = wp.max(w.terrain.ground_max_m, w.forest.top_m)
-    t = wp.max(map_entry(origin_ned[0], dir_ned[0], half), map_entry(origin_ned[1], dir_ned[1], half))
-    if height > top:
-        if climb >= -_PARALLEL:
-            t = _NEVER
-        else:
-            t = wp.max(t, (height - top) / -climb)
+    t = scenery_entry(origin_ned, dir_ned, half, top)
     wall = walls_ray_hit(w.walls, origin_ned, dir_ned, max_m)
     if wall < hit.t:
         hit.t = wall

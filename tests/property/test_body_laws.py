@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 
 from common.airframe import load_airframe
 from common.kernels import GRAVITY_M_S2, TICK_S
-from sim.bodies.multirotor import density_ratio, multirotor_model
+from sim.bodies.multirotor import density_ratio
+from sim.bodies.multirotor_model import multirotor_model
 from sim.wind import wind_model
 from tests.unit.sim.fleet import SEA_LEVEL_M, Fleet, rotated
 

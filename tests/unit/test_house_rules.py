@@ -16,16 +16,11 @@ SIBLINGS_MAX, FILE_LINES_MAX, FUNCTION_LINES_MAX = 20, 400, 60
 
 LONG_FILES = {
     "autopilot/estimator/generated.py": 581,  # written by derive.py
-    "sim/bodies/multirotor.py": 425,
 }
 LONG_FUNCTIONS = {
     "autopilot/estimator/generated.py predict_covariance": 379,
     "autopilot/estimator/generated.py mag_products": 61,
     "autopilot/estimator/generated.py drag_products": 80,
-    "sim/sensors/ray.py first_hit": 61,
-    "sim/sensors/fast_camera/rows.py draw_rows": 71,
-    "sim/sensors/fast_camera/columns.py ground_depth": 61,
-    "sim/sensors/fast_camera/fast_camera.py QuickCamera.__init__": 76,
     "mission/flight.py Flight.__init__": 110,
     "mission/train/training_commands.py train": 72,
     "mission/video/mjpeg_server.py _handler": 69,

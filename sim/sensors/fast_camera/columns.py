@@ -108,17 +108,9 @@ def ground_depth(
         major = face_length(ray.ahead, ray.right)
         inverse = 1.0 / major
         slope = ray.climb * inverse
-        place = (pseudo_angle(ray.ahead, ray.right, inverse) - view.angle_low) * view.columns_per_angle
-        left = wp.clamp(int(place), 0, view.columns - 2)
-        fraction = place - float(left)
-        first = (i_camera * columns.room + left) * columns.samples
-        last = columns.samples - 1
-        skyline_left = columns.slopes[first + last]
-        skyline_right = columns.slopes[first + columns.samples + last]
-        if slope > skyline_left + fraction * (skyline_right - skyline_left):
+        first = column_beside(columns, view, i_camera, ray, inverse, slope)
+        if first < 0:
             return found
-        if (fraction > 0.5 and slope <= skyline_right) or slope > skyline_left:
-            first = first + columns.samples
         k = first_at(columns, first, slope, before.k)
         found.k = k
         first_distance = i_camera * columns.samples
@@ -151,6 +143,26 @@ def ground_depth(
         if t != t_next:
             found.plane.i = -1
     return walk(ground, columns, view, i_camera, ray, found, t_max)
+
+
+@wp.func
+def column_beside(columns: Columns, view: View, i_camera: int, ray: LevelRay, inverse: float, slope: float) -> int:
+    """Where, of the two columns beside a ray, that begins in which its slope is reached; -1 if it passes over both.
+
+    `inverse` is one over the length that the ray goes along its cube face.
+    """
+    place = (pseudo_angle(ray.ahead, ray.right, inverse) - view.angle_low) * view.columns_per_angle
+    left = wp.clamp(int(place), 0, view.columns - 2)
+    fraction = place - float(left)
+    first = (i_camera * columns.room + left) * columns.samples
+    last = columns.samples - 1
+    skyline_left = columns.slopes[first + last]
+    skyline_right = columns.slopes[first + columns.samples + last]
+    if slope > skyline_left + fraction * (skyline_right - skyline_left):
+        return -1
+    if (fraction > 0.5 and slope <= skyline_right) or slope > skyline_left:
+        return first + columns.samples
+    return first
 
 
 @wp.func

@@ -94,11 +94,7 @@ class QuickCamera:
         else:
             self._worlds = worlds.kernels
         world_count = len(self._worlds)
-        if i_world is None:
-            if world_count not in (1, count):
-                raise ValueError(f"{count} cameras and {world_count} worlds: say which camera looks at which world")
-            i_world = np.arange(count) % world_count
-        self.i_world = wp.array(i_world, dtype=wp.int32, device=device)
+        self.i_world = wp.array(_worlds_of(i_world, count, world_count), dtype=wp.int32, device=device)
         self.lenses = wp.array(_first_lens(hfov_deg, count), dtype=Lens, device=device)
         self.rgb = wp.zeros((count, height, width, 3), dtype=wp.uint8, device=device)
         self.depth_m = wp.zeros((count, height, width), dtype=wp.float32, device=device)
@@ -131,22 +127,8 @@ class QuickCamera:
             [_recorded(a_pass, chosen, first, rows, device) for a_pass in passes]
             for first, rows in self._workers.chunks
         ]
-        strips = 1 if self.rgb.device.is_cpu else STRIPS  # each thread goes through all trees
-        every_world = wp.full(world_count, value=True, dtype=wp.bool, device=device)
-        self._every_world = every_world
-        fresh = [self._worlds, every_world, ground]
-        self._pack = [
-            wp.launch(pack_cells, dim=(world_count, ground.side), inputs=fresh, device=device, record_cmd=True),
-            wp.launch(light_corners, dim=(world_count, ground.side + 1), inputs=fresh, device=device, record_cmd=True),
-            wp.launch(light_strips, dim=(world_count, strips), inputs=[*fresh, strips], device=device, record_cmd=True),
-            wp.launch(
-                pack_light,
-                dim=(world_count, ground.texels),
-                inputs=[ground, every_world],
-                device=device,
-                record_cmd=True,
-            ),
-        ]
+        self._every_world = wp.full(world_count, value=True, dtype=wp.bool, device=device)
+        self._pack = _pack_commands(self._worlds, self._every_world, ground, device)
         self.refresh()
 
     def refresh(self, is_chosen: Any = None) -> None:
@@ -173,6 +155,31 @@ def _recorded(a_pass: _Pass, chosen: Any, first: int, count: int, device: str) -
     kernel, dim, inputs = a_pass
     i_chosen = 1 + next(k for k, value in enumerate(inputs) if value is chosen)
     return wp.launch(kernel, (count, *dim), [first, *inputs], device=device, record_cmd=True), i_chosen
+
+
+def _worlds_of(i_world: Any, count: int, world_count: int) -> Any:
+    """Which world each camera looks at."""
+    if i_world is not None:
+        return i_world
+    if world_count not in (1, count):
+        raise ValueError(f"{count} cameras and {world_count} worlds: say which camera looks at which world")
+    return np.arange(count) % world_count
+
+
+def _pack_commands(worlds: Any, chosen: Any, ground: Any, device: str) -> list[Any]:
+    """Launches that pack the chosen worlds, which are the second input of each."""
+    world_count = len(worlds)
+    strips = 1 if worlds.device.is_cpu else STRIPS  # each thread goes through all trees
+    launches: list[tuple[Any, int, list[Any]]] = [
+        (pack_cells, ground.side, [worlds, chosen, ground]),
+        (light_corners, ground.side + 1, [worlds, chosen, ground]),
+        (light_strips, strips, [worlds, chosen, ground, strips]),
+        (pack_light, ground.texels, [ground, chosen]),
+    ]
+    return [
+        wp.launch(kernel, (world_count, threads), inputs, device=device, record_cmd=True)
+        for kernel, threads, inputs in launches
+    ]
 
 
 def _first_lens(hfov_deg: float, count: int) -> Any:

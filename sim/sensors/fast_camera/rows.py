@@ -129,6 +129,39 @@ def land_colour(paints: Paints, ground: Ground, view: View, north: float, east: 
     return ground_colour(paints, north, east, sun, footprint_m)
 
 
+@wp.func
+def surface_colour(
+    ground: Ground,
+    paints: Paints,
+    view: View,
+    sights: Sights,
+    i_solid: int,
+    kind: int,
+    ray: wp.vec3,
+    ray_rdf: wp.vec3,
+    t: float,
+) -> wp.vec3:
+    """Light sent back by what a ray meets."""
+    north = view.pos_ned[0] + t * ray[0]
+    east = view.pos_ned[1] + t * ray[1]
+    if kind == GROUND:
+        return land_colour(paints, ground, view, north, east, t * view.per_pixel)
+    if kind == WALL:
+        return wall_colour(paints, north, east, t * -ray[2] - view.pos_ned[2])
+    return solid_colour(paints, view, sights.solids[i_solid], ray_rdf, t)
+
+
+@wp.func
+def store(outputs: Outputs, paints: Paints, view: View, i_pixel: int, t: float, kind: int, colour: wp.vec3) -> None:
+    """Writes one pixel of all images."""
+    outputs.depth_m[i_pixel] = t
+    outputs.kind[i_pixel] = wp.uint8(kind)
+    first = 3 * i_pixel
+    outputs.rgb[first] = code(paints, colour[0] * view.gain[0])
+    outputs.rgb[first + 1] = code(paints, colour[1] * view.gain[1])
+    outputs.rgb[first + 2] = code(paints, colour[2] * view.gain[2])
+
+
 @wp.kernel
 def draw_rows(
     first_camera: int,
@@ -157,11 +190,11 @@ def draw_rows(
         x = (float(column) + 0.5 - 0.5 * float(outputs.width)) * view.per_pixel
         ray = middle + x * view.right
         ray_squared = x * x + y * y + 1.0
-        t_solid = outputs.depth_m[start + column]
-        t = t_solid
+        i_solid = i_camera * sights.room + outputs.front[start + column]
+        t = outputs.depth_m[start + column]
         kind = int(SKY)
         if t < NEVER:
-            kind = CROWN
+            kind = sights.solids[i_solid].kind
         if view.has_wall:
             t_wall = wall_depth(ground, view, ray[0], ray[1], -ray[2])
             if t_wall < t:
@@ -183,21 +216,7 @@ def draw_rows(
             t = RAY_MAX_M
             colour = sky_light(paints, ray[0], ray[1], -ray[2], wp.sqrt(ray_squared))
         else:
-            north = view.pos_ned[0] + t * ray[0]
-            east = view.pos_ned[1] + t * ray[1]
-            if kind == GROUND:
-                colour = land_colour(paints, ground, view, north, east, t * view.per_pixel)
-            elif kind == WALL:
-                colour = wall_colour(paints, north, east, t * -ray[2] - view.pos_ned[2])
-            else:
-                solid = sights.solids[i_camera * sights.room + outputs.front[start + column]]
-                kind = solid.kind
-                colour = solid_colour(paints, view, solid, wp.vec3(x, y, 1.0), t)
+            colour = surface_colour(ground, paints, view, sights, i_solid, kind, ray, wp.vec3(x, y, 1.0), t)
             fog = fraction * (0.3 + 0.7 * fraction)
             colour = colour + fog * (HAZE - colour)
-        outputs.depth_m[start + column] = t
-        outputs.kind[start + column] = wp.uint8(kind)
-        pixel = 3 * (start + column)
-        outputs.rgb[pixel] = code(paints, colour[0] * view.gain[0])
-        outputs.rgb[pixel + 1] = code(paints, colour[1] * view.gain[1])
-        outputs.rgb[pixel + 2] = code(paints, colour[2] * view.gain[2])
+        store(outputs, paints, view, start + column, t, kind, colour)

@@ -4,7 +4,7 @@ import pytest
 
 from autopilot.vehicles.multirotor.control_airframe import control_airframe
 from common.airframe import AIRFRAME_FOLDER, AirframeError, airframe_names, load_airframe
-from sim.bodies.multirotor import multirotor_model
+from sim.bodies.multirotor_model import multirotor_model
 
 X500 = (AIRFRAME_FOLDER / "x500.toml").read_text()
 

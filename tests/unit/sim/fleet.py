@@ -6,7 +6,8 @@ from numpy.typing import ArrayLike
 
 from common.airframe import load_airframe
 from common.kernels import TICK_S, vec8
-from sim.bodies.multirotor import BodyState, MultirotorModel, body_at_rest, body_tick, multirotor_model
+from sim.bodies.multirotor import BodyState, body_at_rest, body_tick
+from sim.bodies.multirotor_model import MultirotorModel, multirotor_model
 from sim.wind import WindModel, WindState, wind_model, wind_step
 from sim.world.world import World, WorldConfig, WorldMap, build_world
 

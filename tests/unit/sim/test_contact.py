@@ -6,7 +6,7 @@ import pytest
 from common.airframe import load_airframe
 from common.kernels import GRAVITY_M_S2, TICK_S
 from sim.bodies.contact import resting_height_m
-from sim.bodies.multirotor import multirotor_model
+from sim.bodies.multirotor_model import multirotor_model
 from sim.world.world import WorldConfig, build_world
 from tests.unit.sim.fleet import Fleet, rotated
 

@@ -3,7 +3,8 @@ import pytest
 
 from common.airframe import AirframeError, airframe_names, load_airframe
 from common.kernels import GRAVITY_M_S2, TICK_S
-from sim.bodies.multirotor import density_ratio, ground_effect, multirotor_model
+from sim.bodies.multirotor import density_ratio, ground_effect
+from sim.bodies.multirotor_model import multirotor_model
 from tests.unit.sim.fleet import SEA_LEVEL_M, Fleet, rotated
 
 HIGH = [0.0, 0.0, -200.0]
