@@ -123,7 +123,7 @@ class Flight:
         self._load_parameters()
         self.params.on_change(self._parameter_changed)
         self.troubles = Troubles(lambda: self.time_us)
-        self.injector = RigInjector(self.rig, self.airframe, config.noise)
+        self.injector = RigInjector(self.rig, self.airframe, config.noise, len(vehicle.motors(self.airframe)))
         self._camera_rig = CameraRig(self.rig, self.world, has_thread=has_camera_thread)
         self._camera_rig.prepare()
         media = None if folder is None else MediaFolder(folder / "media")

@@ -49,15 +49,17 @@ class RigInjector:
         rig: the simulator.
         airframe: of the vehicle.
         noise: scale of its sensors' noise; without noise there is none to amplify.
+        motor_count: of the vehicle.
         i_vehicle: which row.
     """
 
-    def __init__(self, rig: Rig, airframe: Airframe, noise: float, i_vehicle: int = 0) -> None:
+    def __init__(self, rig: Rig, airframe: Airframe, noise: float, motor_count: int, i_vehicle: int = 0) -> None:
         self._faults = rig.rows["faults"][i_vehicle]
-        self._body = rig.rows["body"][i_vehicle : i_vehicle + 1]
+        body = rig.rows["body"][i_vehicle : i_vehicle + 1]
+        self._charge: Any = body["battery_charge_c"] if "battery_charge_c" in body.dtype.names else None  # [C]
         self._battery = battery_model(airframe)
         self._capacity_c = 3.6 * airframe.battery.capacity_mah
-        self._motor_count = airframe.motor_count
+        self._motor_count = motor_count
         self._has_noise = noise > 0.0
         self._taken_c = 0.0  # charge that an injected failure has taken from the battery
         self.failures: set[tuple[Unit, int]] = set()  # parts that fail now, as somebody asked for
@@ -76,6 +78,8 @@ class RigInjector:
             return Reply(Verdict.UNSUPPORTED, f"there is no {unit.name.lower().replace('_', ' ')} that could fail")
         if instance not in (0, 1):
             return Reply(Verdict.DENIED, "there is only one of it")
+        if unit is Unit.BATTERY and failure is Failure.OFF and self._charge is None:
+            return Reply(Verdict.UNSUPPORTED, "the battery has no charge that could be taken")
         return self._inject_sensor(unit, SENSORS[unit], failure)
 
     def frame(self, time_us: int) -> None:
@@ -131,8 +135,9 @@ class RigInjector:
             self.inject(unit, Failure.OK, motor + 1 if unit is Unit.MOTOR else 0)
 
     def charge_to(self, rest_v: float) -> None:
-        """Gives the battery the charge at which it rests at a voltage."""
-        self._body["battery_charge_c"][0] = charge_at(self._battery, rest_v)
+        """Gives the battery the charge at which it rests at a voltage; of a body without one nothing changes."""
+        if self._charge is not None:
+            self._charge[0] = charge_at(self._battery, rest_v)
 
     def _note(self, unit: Unit, motor: int, failure: Failure) -> None:
         if failure is Failure.OK:
@@ -146,7 +151,9 @@ class RigInjector:
 
     def _set_empty(self, is_empty: bool) -> None:
         """Takes the charge out of the battery, or gives back what was taken."""
-        charge: Any = self._body["battery_charge_c"]
+        charge = self._charge
+        if charge is None:
+            return
         if is_empty:
             left_c = EMPTY_SHARE * self._capacity_c
             taken_c = max(float(charge[0]) - left_c, 0.0)

@@ -136,7 +136,7 @@ class SimulatorParameters:
 
     def _weaken(self) -> None:
         weak, share = int(self._value("SIM_ENGINE_FAIL")), self._value("SIM_ENGINE_MUL")
-        for motor in range(self._flight.airframe.motor_count):
+        for motor in range(self._flight.controller.state.motor_count):
             self._flight.injector.weaken(motor, share if weak >> motor & 1 else 1.0)
 
     def _charge(self) -> None:

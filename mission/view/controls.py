@@ -109,7 +109,7 @@ class Controls:
         with gui.add_folder("Trouble"):
             wind = gui.add_slider("Wind [m/s]", min=0.0, max=WIND_MAX_M_S, step=0.5, initial_value=config.wind_m_s)
             wind_from = gui.add_slider("from [deg]", min=0.0, max=360.0, step=5.0, initial_value=config.wind_from_deg)
-            numbers = tuple(str(i + 1) for i in range(self._flight.airframe.motor_count))
+            numbers = tuple(str(i + 1) for i in range(self._flight.controller.state.motor_count))
             motor = gui.add_dropdown("Motor", numbers)
             kill = gui.add_button("Kill the motor", color="red")
             repair = gui.add_button("Repair all motors")

@@ -20,7 +20,10 @@ class Body(NamedTuple):
     Model: type
     """Kernel struct of the constants of one airframe at one place."""
     State: type
-    """Kernel struct of all that the body needs to go on; with `pos_ned`, `vel_ned` and `impact_speed` as in `Truth`."""
+    """Kernel struct of all that the body needs to go on; with `pos_ned`, `vel_ned` and `impact_speed` as in `Truth`.
+
+    One whose battery can be emptied has `battery_charge_c`, one that can be held in the hand `is_held`.
+    """
     tick: Any
     """`@wp.func (Model, State, command: vec8, wind_ned: vec3, World) -> State`, every 4 ms."""
     truth: Any

@@ -17,7 +17,7 @@ from sim.world.world import WorldConfig
 from tests.recipes.sled_class import DRIVE, MAV_TYPE_GROUND_ROVER, SIMULATED_SLED
 from tests.recipes.station import Station
 
-ACCEPTED, TEMPORARILY_REJECTED = 0, 1
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 ARM, SET_MODE, TAKEOFF = (
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
     mavlink.MAV_CMD_DO_SET_MODE,
@@ -150,6 +150,19 @@ def test_the_last_resort_of_a_sled_is_to_stop(airframe):
     assert "Position lost: hold" in sled.texts()
     assert sled.ask(mavlink.MAV_CMD_DO_FLIGHTTERMINATION, 1.0) == ACCEPTED
     assert not sled.state.is_armed
+
+
+def test_what_a_sled_does_not_have_cannot_fail(airframe):
+    sled = Sled(airframe)
+    sled.flight.params.set("SYS_FAILURE_EN", 1)
+    assert sled.ask(ARM, 1.0) == ACCEPTED
+    inject, battery, motor, ok, off = mavlink.MAV_CMD_INJECT_FAILURE, 100, 101, 0, 1
+    assert sled.ask(inject, battery, off) == UNSUPPORTED
+    assert sled.ask(inject, battery, ok) == ACCEPTED
+    assert sled.ask(inject, motor, off, 2.0) == DENIED
+    assert "there are motors 1 to 1" in " ".join(sled.texts())
+    assert sled.ask(inject, motor, off, 1.0) == ACCEPTED
+    sled.flight.injector.charge_to(11.0)
 
 
 def test_ardupilots_clients_know_its_modes_by_their_own_numbers(airframe):
