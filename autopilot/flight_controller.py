@@ -350,7 +350,7 @@ class FlightController:
     def _change_mode(self, mode: Mode) -> Reply:
         reply = self.commander.request_mode(mode)
         if reply.verdict is Verdict.ACCEPTED and self.navigator.is_underway:
-            self.navigator.stay()  # here, not at the place it was sent to
+            self.navigator.stay()  # here, not at the position it was sent to
         return reply
 
     def _start_mission(self, request: StartMission) -> Reply:

@@ -35,7 +35,7 @@ WIND_VALID = wp.constant(64)
 DEAD_RECKONING = wp.constant(128)
 EXTERNAL_POSITION = wp.constant(256)  # a client's horizontal position is being fused
 ACCEL_DOUBTED = wp.constant(512)
-MAG_DISTURBED = wp.constant(1024)  # the field is not that of the place
+MAG_DISTURBED = wp.constant(1024)  # the field is not that of the position
 MAG_FAULTY = wp.constant(2048)  # heading was reset against the magnetometer, which does not agree yet
 
 # ExternalSample.holds: the bits of EKF2_EV_CTRL
@@ -145,7 +145,7 @@ class Setpoint:
     exit_speed: float  # [m/s] speed with which pos_ned may be passed, 0: stop there
     q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE; SETPOINT_LEAN: its heading is not used
     omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE
-    thrust: float  # [0..1] share of the maximum thrust
+    thrust: float  # [0..1] fraction of the maximum thrust
     motor_test: vec8  # [0..1] commands of the motors while the vehicle is disarmed, not otherwise
 
 

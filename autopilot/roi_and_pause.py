@@ -1,4 +1,4 @@
-"""What clients ask of the flight besides a mode, a place or a mission: where to look, how to land after all.
+"""What clients ask of the flight besides a mode, a position or a mission: where to look, how to land after all.
 
 In: requests of MAVLink commands. Out: the navigator's heading, the mission's current item, another mode.
 """
@@ -12,7 +12,7 @@ from autopilot.navigator.navigator import Navigator
 from autopilot.payload.payloads import Params, Payloads
 
 _NOT_FLYING = Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
-_AT_PLACE: Params = (3.0, 0.0, 0.0, 0.0)  # MAV_ROI_LOCATION in parameter 1, for the command's older form
+_AT_POSITION: Params = (3.0, 0.0, 0.0, 0.0)  # MAV_ROI_LOCATION in parameter 1, for the command's older form
 _NOWHERE: Params = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -29,7 +29,7 @@ class Guidance:
     # ---- where to look ----
 
     def look_at(self, command: int, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
-        """The vehicle's nose, and a gimbal if it carries one, towards a place from now on."""
+        """The vehicle's nose, and a gimbal if it carries one, towards a position from now on."""
         if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
             return Reply(Verdict.DENIED, "a region of interest needs a place on earth")
         context = self._navigator.context
@@ -50,7 +50,7 @@ class Guidance:
 
     def _aim(self, command: int, lat_deg: float, lon_deg: float, alt_m: float) -> Reply:
         if self._payload.takes(command):
-            return self._payload.run(command, _AT_PLACE if isfinite(lat_deg) else _NOWHERE, lat_deg, lon_deg, alt_m)
+            return self._payload.run(command, _AT_POSITION if isfinite(lat_deg) else _NOWHERE, lat_deg, lon_deg, alt_m)
         return ACCEPTED
 
     # ---- the way ----
@@ -107,10 +107,10 @@ class Guidance:
         least_m = context.number("MIS_TAKEOFF_ALT")
         climb_m = max(height_m, least_m) if isfinite(height_m) else least_m
         north, east, down = context.stop_point()
-        place = (north, east, min(down, self._state.home_ned[2] - climb_m))
-        refusal = target_refusal(context, place)
+        position = (north, east, min(down, self._state.home_ned[2] - climb_m))
+        refusal = target_refusal(context, position)
         if refusal is not ACCEPTED:
             return refusal
-        context.next_hold = (place, self._state.yaw_rad, False)
+        context.next_hold = (position, self._state.yaw_rad, False)
         context.announcer.statustext(Severity.WARNING, "Landing aborted: climbing")
         return self._commander.request_mode(Mode.HOLD)

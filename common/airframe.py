@@ -167,6 +167,6 @@ def load_airframe(name_or_path: str) -> Airframe:
         raise AirframeError(f"{path}: {error.strerror}") from error
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        parts = (str(path), place, first["msg"].removeprefix("Value error, "))
+        position = ".".join(map(str, first["loc"]))
+        parts = (str(path), position, first["msg"].removeprefix("Value error, "))
         raise AirframeError(": ".join(part for part in parts if part)) from error

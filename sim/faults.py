@@ -12,7 +12,7 @@ magnitude means:
 | slow   | the period of the samples is multiplied by the magnitude      | factor, rounded down, at least 1           |
 | turned | the magnetometer is mounted turned about the vehicle's down   | deg                                        |
 
-A motor that fails loses a share of its command: 1 stops it, 0.4 leaves it weak (`set_motor_loss`).
+A motor that fails loses a fraction of its command: 1 stops it, 0.4 leaves it weak (`set_motor_loss`).
 
 Gyro and accelerometer share a chip and a data-ready line: off or slow of one silences or slows both.
 """
@@ -139,20 +139,20 @@ def set_fault(row: Any, sensor: str, mode: str, magnitude: float = 0.0) -> None:
     setattr(row, sensor, fault)
 
 
-def set_motor_loss(row: Any, motor: int, share: float) -> None:
+def set_motor_loss(row: Any, motor: int, fraction: float) -> None:
     """Sets what one motor loses of its command.
 
     Args:
         row: as for `set_fault`.
         motor: from 0.
-        share: [0..1], 0 repairs.
+        fraction: [0..1], 0 repairs.
 
     Raises:
-        ValueError: the share is out of range.
+        ValueError: the fraction is out of range.
     """
-    if not 0.0 <= share <= 1.0:
-        raise ValueError(f"motor loss is a share between 0 and 1, not {share}")
+    if not 0.0 <= fraction <= 1.0:
+        raise ValueError(f"motor loss is a share between 0 and 1, not {fraction}")
     if isinstance(row, np.void | np.ndarray):
-        row["motor_loss"][motor] = share
+        row["motor_loss"][motor] = fraction
     else:
-        row.motor_loss[motor] = share
+        row.motor_loss[motor] = fraction

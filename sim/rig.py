@@ -184,7 +184,7 @@ class Rig:
         self.rows.fetch()
 
     def load_parameters(self, table: ParameterTable) -> None:
-        """Gives every flight controller the values of a parameter table, and the magnetic field of the place."""
+        """Gives every flight controller the values of a parameter table, and the local magnetic field."""
         estimator = estimator_fields(table) | {"earth_field_ned_gauss": self._field_ned_gauss}
         self._write_rows(self.arrays.autopilot.ekf.params, estimator)
         self._write_rows(self.arrays.autopilot.control_params, table.fields(self.law.parameters))

@@ -132,10 +132,10 @@ class SteppedRig(Rig):
 
     def _tick(self) -> None:
         a, air = self.arrays, [self._board_commands, self.arrays.seed, self.arrays.tick, self.arrays.wind]
-        place = [a.worlds, a.i_world]
-        self._launch(blow, [*place, a.wind_model, a.truth, a.faults, *air, self._wind_ned, self._commands])
+        where = [a.worlds, a.i_world]
+        self._launch(blow, [*where, a.wind_model, a.truth, a.faults, *air, self._wind_ned, self._commands])
         self._engine.step(self._commands, self._wind_ned)
-        self._launch(sense_all, [*place, a.sensor_model, a.faults, a.truth, a.seed, a.tick, a.sensors, self._samples])
+        self._launch(sense_all, [*where, a.sensor_model, a.faults, a.truth, a.seed, a.tick, a.sensors, self._samples])
         self._board.exchange(self._samples, a.truth, self._board_commands)
         self._launch(count_on, [a.tick])
 

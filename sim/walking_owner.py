@@ -24,14 +24,14 @@ def _start(
     world: World,
     model: PersonModel,
     phone: PhoneModel,
-    places: wp.array[wp.vec3],  # north [m], east [m], heading [rad]
+    positions: wp.array[wp.vec3],  # north [m], east [m], heading [rad]
     seed: int,
     people: wp.array[Person],
     phones: wp.array[PhoneState],
 ) -> None:
     i = wp.tid()
-    place = places[i]
-    people[i] = person_start(world, model, place[0], place[1], place[2], seed, i, 0)
+    position = positions[i]
+    people[i] = person_start(world, model, position[0], position[1], position[2], seed, i, 0)
     phones[i] = phone_step(phone, phone_start(phone, seed, i, 0), people[i], seed, i, 0)
 
 
@@ -65,25 +65,25 @@ class Owner:
     def __init__(
         self,
         world: WorldMap,
-        places: Any,
+        positions: Any,
         seed: int,
         *,
         model: Any = None,
         phone: Any = None,
         device: str = "cpu",
     ) -> None:
-        start = np.asarray(places, np.float32).reshape(-1, 3)
+        start = np.asarray(positions, np.float32).reshape(-1, 3)
         self.people = wp.zeros(len(start), dtype=Person, device=device)
         self.phones = wp.zeros(len(start), dtype=PhoneState, device=device)
         self._device = device
         self._given = [world.kernel, model or person_model(), phone or phone_model()]
         self._seed = seed
         self._tick = 0
-        places_array = wp.array(start, dtype=wp.vec3, device=device)
+        positions_array = wp.array(start, dtype=wp.vec3, device=device)
         wp.launch(
             _start,
             dim=len(start),
-            inputs=[*self._given, places_array, seed],
+            inputs=[*self._given, positions_array, seed],
             outputs=[self.people, self.phones],
             device=device,
         )

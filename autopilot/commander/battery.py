@@ -1,6 +1,6 @@
 """Charge left in the battery, counted from current and started and corrected by voltage.
 
-In: battery samples. Out: share of the capacity left and charge used. While the sensor is silent, or frozen, the last
+In: battery samples. Out: fraction of the capacity left and charge used. While the sensor is silent, or frozen, the last
 current is counted on. Left out: temperature and ageing.
 """
 
@@ -32,8 +32,8 @@ class BatteryEstimator:
         self._resistance_ohm = battery.internal_resistance_ohm
         empty_v = battery.cells * battery.empty_cell_v
         span_v = battery.cells * (battery.full_cell_v - battery.empty_cell_v)
-        shares = [i / (_CURVE_POINTS - 1) for i in range(_CURVE_POINTS)]
-        self._curve_v = [empty_v + span_v * _rest_voltage_share(share) for share in shares]
+        fractions = [i / (_CURVE_POINTS - 1) for i in range(_CURVE_POINTS)]
+        self._curve_v = [empty_v + span_v * _rest_voltage_fraction(fraction) for fraction in fractions]
         self.restart()
 
     def restart(self) -> None:
@@ -86,7 +86,7 @@ class BatteryEstimator:
         self.remaining = max(self.remaining - used_mah / self._pack_mah, 0.0)
 
     def _charge_at(self, rest_voltage_v: float) -> float:
-        """Share of the capacity [0..1] at which the pack rests at this voltage."""
+        """Fraction of the capacity [0..1] at which the pack rests at this voltage."""
         curve = self._curve_v
         if rest_voltage_v >= curve[-1]:
             return 1.0
@@ -103,7 +103,7 @@ class BatteryEstimator:
         return (low + part) / (len(curve) - 1)
 
 
-def _rest_voltage_share(charge: float) -> float:
+def _rest_voltage_fraction(charge: float) -> float:
     """Rest voltage between empty (0) and full (1) of a lithium polymer cell at a charge [0..1].
 
     M. Chen, G. A. Rincon-Mora, IEEE Trans. Energy Conversion 21(2), 2006, equation 2, scaled to [0, 1].

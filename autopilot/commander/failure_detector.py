@@ -39,9 +39,9 @@ from autopilot.vehicles.vehicle_class import DriveWatch
 from common.params import Parameter, ParameterTable
 
 _SLOW_PERIOD_US = 200_000
-_WIND_EASED = 0.8  # share of a limit below which the wind counts as over; gusts would toggle it otherwise; guess
+_WIND_EASED = 0.8  # fraction of a limit below which the wind counts as over; gusts would toggle it otherwise; guess
 _WIND_TIME_S = 2.0  # gusts shorter than that do not count; guess
-_TIME_NEAR_SHARE = 0.9  # of COM_FLT_TIME_MAX, from which the pilot is told (PX4)
+_TIME_NEAR_FRACTION = 0.9  # of COM_FLT_TIME_MAX, from which the pilot is told (PX4)
 _FIX_STEADY_US = 3_000_000  # after dead reckoning, GNSS counts as used again after so long; guess
 # An estimate that is set anew so often is not to be believed: a sensor contradicts the others. Guesses.
 _RESETS_MAX = 3
@@ -197,7 +197,7 @@ class FailureWatch:
             self.airborne_us = state.time_us
         bits |= self._wind_failures()
         flown_us = state.time_us - self.airborne_us
-        if self._time_max_us > 0 and flown_us > _TIME_NEAR_SHARE * self._time_max_us:
+        if self._time_max_us > 0 and flown_us > _TIME_NEAR_FRACTION * self._time_max_us:
             bits |= FLIGHT_TIME_OVER | FLIGHT_TIME_NEAR if flown_us > self._time_max_us else FLIGHT_TIME_NEAR
         if len(self._resets_us) == _RESETS_MAX and state.time_us - self._resets_us[0] < _RESETS_WITHIN_US:
             bits |= ESTIMATOR_FAILED
@@ -212,8 +212,8 @@ class FailureWatch:
             self._wind_speed += (speed - self._wind_speed) * min(_SLOW_PERIOD_US * 1e-6 / _WIND_TIME_S, 1.0)
         bits = 0
         for bit, limit in ((WIND_HIGH, self._wind_max), (WIND_STRONG, self._wind_warn)):
-            share = _WIND_EASED if self._slow & bit else 1.0
-            if limit > 0.0 and self._wind_speed > share * limit:
+            fraction = _WIND_EASED if self._slow & bit else 1.0
+            if limit > 0.0 and self._wind_speed > fraction * limit:
                 bits |= bit
         return bits
 

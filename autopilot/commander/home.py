@@ -1,4 +1,4 @@
-"""Home: where the vehicle returns to. It is where it was armed, unless a client names a place."""
+"""Home: where the vehicle returns to. It is where it was armed, unless a client names a position."""
 
 from collections.abc import Callable
 from math import hypot, isfinite, nan
@@ -44,7 +44,7 @@ class Home:
             if hypot(home_ned[0], home_ned[1]) > _FAR_M or abs(alt_m - state.origin.alt_m) > _HIGH_M:
                 return Reply(Verdict.DENIED, "home would be too far away to return to")
             state.home, state.home_ned = GeoPoint(lat_deg, lon_deg, alt_m), home_ned
-            state.home_yaw_rad = state.yaw_rad  # of the vehicle: a place has none
+            state.home_yaw_rad = state.yaw_rad  # of the vehicle: a position has none
             self._announcer.home_changed()
         self.is_given = True
         if state.home is not None:
@@ -52,7 +52,7 @@ class Home:
         return ACCEPTED
 
     def set_here(self, down: float = nan) -> None:
-        """The vehicle's own place; in the air `down` [m] is the height of the ground that it left, if that is known."""
+        """The vehicle's own position; in the air `down` [m] is the height of the ground that it left, if known."""
         state = self._state
         north, east, own_down = state.estimate.pos_ned
         state.home_ned = (north, east, down if isfinite(down) else own_down)

@@ -26,8 +26,8 @@ _SIDE_TIMEOUT_FRAMES = 3000  # 60 s until somebody has turned the vehicle; guess
 _SETTLE_FRAMES = 25  # at rest on a side before it counts
 _SPIN_FRAMES = 300  # 6 s of turning on each side
 _CANCEL_FRAMES = 50  # until "cancelled" is told: MAVSDK hangs if it hears that before its command is acknowledged
-_SIDE_SHARE = 0.85  # of gravity along an axis, from which that side is down: 32 deg
-_GRAVITY_ERROR = 0.1  # share of gravity by which a side may differ
+_SIDE_FRACTION = 0.85  # of gravity along an axis, from which that side is down: 32 deg
+_GRAVITY_ERROR = 0.1  # fraction of gravity by which a side may differ
 _FIELD_GAUSS = (0.15, 0.8)  # of the Earth, with room
 _FIT_ERROR_GAUSS = 0.03  # root mean square by which the field may differ from a sphere; guess
 _UPRIGHT_RAD = radians(15.0)  # a board that leans more is not level; guess
@@ -270,8 +270,8 @@ class Calibrator:
         self._announcer.statustext(Severity.INFO, f"[cal] {text}")
 
 
-def _between(span: tuple[int, int], share: float) -> int:
-    return int(span[0] + (span[1] - span[0]) * share)
+def _between(span: tuple[int, int], fraction: float) -> int:
+    return int(span[0] + (span[1] - span[0]) * fraction)
 
 
 def _is_still(gyro_frd: Vector) -> bool:
@@ -281,7 +281,7 @@ def _is_still(gyro_frd: Vector) -> bool:
 def _side_down(accel_frd: Vector) -> str:
     """The side that is down, by the specific force at rest; empty if none is."""
     for side, (axis, sign, _, _) in SIDES.items():
-        if sign * accel_frd[axis] > _SIDE_SHARE * GRAVITY_M_S2:
+        if sign * accel_frd[axis] > _SIDE_FRACTION * GRAVITY_M_S2:
             return side
     return ""
 

@@ -10,8 +10,8 @@ _TWO_PI = wp.constant(6.2831853)
 
 
 @wp.func
-def low_pass_share(cutoff_hz: float, dt_s: float) -> float:
-    """Share of a new sample in a first-order low-pass (implicit Euler: stable for any cutoff)."""
+def low_pass_fraction(cutoff_hz: float, dt_s: float) -> float:
+    """Fraction of a new sample in a first-order low-pass (implicit Euler: stable for any cutoff)."""
     step = _TWO_PI * cutoff_hz * dt_s
     return step / (1.0 + step)
 

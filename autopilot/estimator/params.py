@@ -90,7 +90,7 @@ class EstimatorParams:
     boot_std: float
     range_ctrl: int
     range_noise: float
-    range_noise_share: float
+    range_noise_fraction: float
     range_gate: float
     terrain_walk: float
     terrain_gradient: float
@@ -325,7 +325,7 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
         "m/m",
         "range finder noise per distance",
         "TF02-Pro data sheet: 1 %",
-        "range_noise_share",
+        "range_noise_fraction",
     ),
     Parameter("EKF2_RNG_GATE", 5.0, 1.0, 50.0, "SD", "range finder gate", _PX4, "range_gate"),
     Parameter(

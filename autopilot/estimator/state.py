@@ -245,7 +245,7 @@ class EstimatorState:
     wander_time_us: wp.int64  # to which the GNSS wander was propagated
     drag_sum: DragSum
     is_yaw_aligned: int
-    is_mag_disturbed: int  # the field is not that of the place
+    is_mag_disturbed: int  # not the local field
     is_mag_faulty: int  # heading was reset against the magnetometer; it is not used until it agrees again
     mag_stale_s: float  # for how long it has contradicted the heading that it alone had set
     mag_agree_s: float  # for how long a faulty magnetometer has agreed

@@ -247,9 +247,9 @@ class Sticks:
             now.speed = 0.0
         elif dt_s > 0.0:
             way = (roll - now.roll, pitch - now.pitch, yaw - now.yaw, throttle - now.throttle)
-            share = 1.0 / (dt_s + _MOVED_S)
+            fraction = 1.0 / (dt_s + _MOVED_S)
             self._speeds = [
-                speed * _MOVED_S * share + moved * share for speed, moved in zip(self._speeds, way, strict=True)
+                speed * _MOVED_S * fraction + moved * fraction for speed, moved in zip(self._speeds, way, strict=True)
             ]
             now.speed = max(map(abs, self._speeds))
         self._heard_us = now_us
@@ -262,8 +262,8 @@ class Sticks:
         """Which of some positions (1..) a switch on a channel is in; 0: not known."""
         if not 0 < channel <= CHANNELS or self.input.channels[channel - 1] == _RELEASED:
             return 0
-        share = 0.5 * (self._deflection(channel) + 1.0)
-        return min(int(share * positions), positions - 1) + 1
+        fraction = 0.5 * (self._deflection(channel) + 1.0)
+        return min(int(fraction * positions), positions - 1) + 1
 
     def _deflection(self, channel: int) -> float:
         """-1..1 of a channel by its calibration; 0 without a value."""

@@ -23,7 +23,7 @@ class ModeRequest:
 
 @dataclass(frozen=True, slots=True)
 class TakeOff(ModeRequest):
-    """To an altitude over the place where the vehicle stands."""
+    """To an altitude over the position where the vehicle stands."""
 
     stays: ClassVar[bool] = True
     alt_amsl_m: float = nan
@@ -33,7 +33,7 @@ class TakeOff(ModeRequest):
 
 @dataclass(frozen=True, slots=True)
 class LandAt(ModeRequest):
-    """At a place; NaN: here."""
+    """At a position; NaN: here."""
 
     lat_deg: float = nan
     lon_deg: float = nan
@@ -43,7 +43,7 @@ class LandAt(ModeRequest):
 
 @dataclass(frozen=True, slots=True)
 class GoTo(ModeRequest):
-    """To a place, a height or a heading, and hold there; what is NaN stays as it is, all NaN: hold here."""
+    """To a position, a height or a heading, and hold there; what is NaN stays as it is, all NaN: hold here."""
 
     in_air: ClassVar[bool] = True
     lat_deg: float = nan

@@ -53,7 +53,7 @@ class FlightMode:
 
     @property
     def is_underway(self) -> bool:
-        """Whether the vehicle has been sent to a place, and is still on its way there."""
+        """Whether the vehicle has been sent to a position, and is still on its way there."""
         return False
 
     def stream_age_us(self) -> int:

@@ -88,7 +88,7 @@ class Host:
     storage: Storage | None = None
     frames: FrameSource | None = None  # None: the vehicle carries no camera
     media: MediaFolder | None = None  # None: there is no card in the camera
-    stream: ImageServer | None = None  # the camera's picture and its files over HTTP
+    stream: ImageServer | None = None  # the camera's image and its files over HTTP
     video: VideoStream | None = None  # for ground stations
     read_truth: Callable[[], Any] | None = None  # a simulator's body state: for telemetry, never for the controller
     boot_unix_us: int = SIMULATED_EPOCH_US  # the date of power-on

@@ -78,10 +78,10 @@ class FenceSwitch(Protocol):
 
 
 class Guidance(Protocol):
-    """What may be asked of the flight besides a mode, a place or a mission (autopilot.roi_and_pause)."""
+    """What may be asked of the flight besides a mode, a position or a mission (autopilot.roi_and_pause)."""
 
     def look_at(self, command: int, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Reply:
-        """Nose and gimbal towards a place from now on; `command` is handed to the payload."""
+        """Nose and gimbal towards a position from now on; `command` is handed to the payload."""
         ...
 
     def look_ahead(self, command: int, offset_deg: float) -> Reply:

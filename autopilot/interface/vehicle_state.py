@@ -176,7 +176,7 @@ class VehicleState:
     battery_remaining: float = nan  # [0..1]
     battery_used_mah: float = 0.0
     battery_level: BatteryLevel = BatteryLevel.UNDEFINED
-    load: float = 0.0  # [0..1] share of the frame time the Python part took; 0 in lockstep
+    load: float = 0.0  # [0..1] fraction of the frame time the Python part took; 0 in lockstep
     mission_count: int = 0
     mission_current: int = 0  # seq
     mission_state: int = 0  # MISSION_STATE
@@ -193,18 +193,18 @@ class VehicleState:
     ticks: "list[VehicleState]" = field(
         default_factory=list
     )  # the moments since the last frame, while somebody listens
-    _placed: Any = None  # the estimate that `_place` belongs to
-    _place: GeoPoint | None = None
+    _placed: Any = None  # the estimate that `_position` belongs to
+    _position: GeoPoint | None = None
 
     @property
     def position(self) -> GeoPoint:
         """Where it is: latitude, longitude, altitude above sea level; worked out when it is asked for."""
         estimate = self.estimate
-        if self._place is None or estimate is not self._placed:
+        if self._position is None or estimate is not self._placed:
             north, east, down = (0.0, 0.0, 0.0) if estimate is None else estimate.pos_ned
             self._placed = estimate
-            self._place = GeoPoint(*geodetic_from_ned(north, east, down, self.origin))
-        return self._place
+            self._position = GeoPoint(*geodetic_from_ned(north, east, down, self.origin))
+        return self._position
 
     @property
     def is_flying(self) -> bool:

@@ -55,7 +55,7 @@ from autopilot.mavlink.telemetry.stream_rate_params import StreamRateService
 from autopilot.mavlink.telemetry.telemetry_rates import Stream
 from autopilot.mavlink.transport.frame_log import OnFrame
 from autopilot.mavlink.transport.links import Link, LinkSource
-from autopilot.mavlink.transport.receive_queue import share
+from autopilot.mavlink.transport.receive_queue import fraction
 from autopilot.mavlink.transport.routing import Router
 from autopilot.mavlink.wire.codec import Frame, known_type
 from autopilot.mavlink.wire.signing import Judgement, Signer, SigningConfig
@@ -248,7 +248,7 @@ class MavlinkServer:
     def _serve(self, busy: list[Channel]) -> None:
         """Handles what has come in, of each channel as much as its share allows; another is first each time."""
         endpoint = self._endpoint
-        work_max = share(len(busy))
+        work_max = fraction(len(busy))
         self._turn += 1
         first = self._turn % len(busy)
         for channel in busy[first:] + busy[:first]:

@@ -1,4 +1,4 @@
-"""What every MAVLink service is: the messages and the commands it answers, and its share of the frame."""
+"""What every MAVLink service is: the messages and the commands it answers, and its fraction of the frame."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -30,7 +30,7 @@ class NavContext:
     __slots__ = (
         "_numbers", "announcer", "climb_speed", "craft", "cruise_speed", "descend_speed", "fence_refusal", "find_way",
         "flown",
-        "has_position", "heading", "is_landing", "leg_yaw", "next_hold", "params", "place_refusal",
+        "has_position", "heading", "is_landing", "leg_yaw", "next_hold", "params", "position_refusal",
         "setpoint", "state", "wants_lift", "wish", "yaw_mode",
     )  # fmt: skip
 
@@ -50,8 +50,10 @@ class NavContext:
         self.has_position = False  # the commander's judgement, with its delay
         self.wants_lift = False  # the mode asks to leave the ground
         self.is_landing = False  # the mode is on its last descent
-        self.place_refusal: Callable[[Vector], str] = lambda _place: ""  # why the fence lets nobody stay at a place [m]
-        self.fence_refusal: Callable[[Vector], str] = lambda _place: ""  # why it lets nobody go to a place [m]
+        self.position_refusal: Callable[[Vector], str] = lambda _position: (
+            ""
+        )  # why the fence lets nobody stay at a position [m]
+        self.fence_refusal: Callable[[Vector], str] = lambda _position: ""  # why it lets nobody go to a position [m]
         self.find_way: Callable[[Vector, Vector], list[Vector] | None] = lambda _start, goal: [goal]  # inside the fence
         self.flown = FlightMode()  # the present mode
         self.wish: Mode | None = None  # the mode that shall follow this one
@@ -102,11 +104,11 @@ class NavContext:
         return ned_from_geodetic(lat_deg, lon_deg, alt_amsl_m, self.state.origin)
 
     def geodetic_of(self, pos_ned: Vector) -> tuple[float, float, float]:
-        """Latitude [deg], longitude [deg] and altitude above sea level [m] of a place [m]."""
+        """Latitude [deg], longitude [deg] and altitude above sea level [m] of a position [m]."""
         return geodetic_from_ned(*pos_ned, self.state.origin)
 
     def down_of(self, alt_amsl_m: float) -> float:
-        """Down coordinate [m] of an altitude above the present place."""
+        """Down coordinate [m] of an altitude above the present position."""
         position = self.state.position
         return ned_from_geodetic(position.lat_deg, position.lon_deg, alt_amsl_m, self.state.origin)[2]
 
@@ -169,7 +171,7 @@ class NavContext:
         return atan2(east, north) if hypot(north, east) > 1.0 else self.state.yaw_rad
 
     def hold_next(self, pos_ned: Vector, yaw: float) -> None:
-        """Goes over to Hold, at the given place."""
+        """Goes over to Hold, at the given position."""
         self.next_hold = (pos_ned, yaw, False)
         self.wish = Mode.HOLD
 

@@ -1,4 +1,4 @@
-"""Heading on the way: towards the next place, home or away from it, at a region of interest, or as turned to.
+"""Heading on the way: towards the next position, home or away from it, at a region of interest, or as turned to.
 
 In: what mission items, clients and MPC_YAW_MODE ask for. Out: the yaw of the setpoint, after the mode has written it.
 Whatever has to do with the payload's own aim is not here.
@@ -68,7 +68,7 @@ class Heading:
     # ---- what is asked for ----
 
     def look_at(self, pos_ned: Vector) -> None:
-        """From now on towards a place [m], whatever the way."""
+        """From now on towards a position [m], whatever the way."""
         self._roi = pos_ned
         self._offset = 0.0
         self.is_active = True
@@ -163,9 +163,9 @@ class Heading:
                 return wrapped(context.leg_yaw + self._offset)
         return nan
 
-    def _towards(self, place: Vector) -> float:
+    def _towards(self, position: Vector) -> float:
         here = self._context.state.estimate.pos_ned
-        north, east = place[0] - here[0], place[1] - here[1]
+        north, east = position[0] - here[0], position[1] - here[1]
         return atan2(east, north) if hypot(north, east) > _NEAR_M else nan
 
     def _step(self) -> float:

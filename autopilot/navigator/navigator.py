@@ -13,8 +13,10 @@ from autopilot.navigator.paths.breadcrumbs import Breadcrumbs
 from autopilot.navigator.takeoff_intent import Ask, standing_d, vertical_ask
 from autopilot.ports import TERRAIN_VALID
 
-_WAITS_US = 2_000_000  # a take-off that is interrupted on the ground, for a place to go to; guess
-_SETTLE_THRUST = 0.06  # share of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
+_WAITS_US = 2_000_000  # a take-off that is interrupted on the ground, for a position to go to; guess
+_SETTLE_THRUST = (
+    0.06  # fraction of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
+)
 
 
 class Navigator:
@@ -94,7 +96,7 @@ class Navigator:
 
     @property
     def is_underway(self) -> bool:
-        """Whether the present mode has been sent to a place, and the vehicle is still on its way there."""
+        """Whether the present mode has been sent to a position, and the vehicle is still on its way there."""
         return self._active.is_underway
 
     @property
@@ -140,7 +142,7 @@ class Navigator:
         self.enter(mode)
 
     def _forget_requests(self, kept: Mode | None) -> None:
-        """A place or a height that was asked of a mode does not wait for the next time it is entered."""
+        """A position or a height that was asked of a mode does not wait for the next time it is entered."""
         for mode, flown in self.modes.items():
             if mode is not kept:
                 flown.forget()
@@ -202,7 +204,7 @@ class Navigator:
         return True
 
     def _respect_ground(self) -> None:
-        """Lets the vehicle settle where it touches the ground, and go down gently to a place on the ground.
+        """Lets the vehicle settle where it touches the ground, and go down gently to a position on the ground.
 
         Leaning into the wind against the ground would tip it over, and so would a sideways touch without any control.
         """

@@ -1,4 +1,4 @@
-"""The setpoint row: the one place where missions, offboard clients and failsafes say what the vehicle shall do.
+"""The setpoint row: the one position where missions, offboard clients and failsafes say what the vehicle shall do.
 
 In: calls of the navigator's modes. Out: the live kernel row `Setpoint` (autopilot.ports), packed at once per frame and
 only if something changed. The control part limits and smooths what is asked here.
@@ -95,7 +95,7 @@ class SetpointPort:
         self.exit_speed = exit_speed
 
     def track(self, pos_ned: Vector, vel_ned: Vector, yaw: float, yaw_rate: float = nan) -> None:
-        """Asks for a place [m] that moves with a velocity [m/s]; renewed each frame."""
+        """Asks for a position [m] that moves with a velocity [m/s]; renewed each frame."""
         self._free_all()
         self.kind = SETPOINT_TRAJECTORY
         self.pos_ned = pos_ned
@@ -103,9 +103,9 @@ class SetpointPort:
         self.yaw = yaw
         self.yaw_rate = yaw_rate
 
-    def track_down(self, place: tuple[float, float], vel_ned: Vector, speed_down: float, yaw: float) -> None:
-        """Asks for a vertical speed [m/s] over a place [m] that moves with a velocity [m/s]; renewed each frame."""
-        self.track((place[0], place[1], nan), (vel_ned[0], vel_ned[1], speed_down), yaw)
+    def track_down(self, position: tuple[float, float], vel_ned: Vector, speed_down: float, yaw: float) -> None:
+        """Asks for a vertical speed [m/s] over a position [m] that moves with a velocity [m/s]; renewed each frame."""
+        self.track((position[0], position[1], nan), (vel_ned[0], vel_ned[1], speed_down), yaw)
 
     def drift(self, vel_north: float, vel_east: float, down: float, yaw: float) -> None:
         """Asks for a horizontal velocity [m/s] and a height [m]."""
@@ -116,7 +116,7 @@ class SetpointPort:
         self.yaw = yaw
 
     def descend_at(self, north: float, east: float, speed_down: float, yaw: float, cruise_speed: float = nan) -> None:
-        """Asks for a vertical speed [m/s] over a place [m]."""
+        """Asks for a vertical speed [m/s] over a position [m]."""
         if (
             self.kind == SETPOINT_TRAJECTORY
             and self.vel_ned[2] == speed_down
@@ -135,7 +135,7 @@ class SetpointPort:
     def descend_braking(self, speed_down: float, yaw: float) -> None:
         """Asks for a vertical speed [m/s] without moving over ground: the position is lost, the velocity is not.
 
-        The horizontal speed is not quite zero: the control part would hold the place then, and chase a position that
+        The horizontal speed is not quite zero: the control part would hold the position then, and chase a position that
         jumps about by decimetres once nothing measures it.
         """
         self._free_all()
@@ -161,7 +161,7 @@ class SetpointPort:
     # ---- what a pilot asks for: called each frame, written only if something changed ----
 
     def move(self, vel_ned: Vector, yaw_rate: float) -> None:
-        """Asks for a velocity [m/s] and a yaw rate [rad/s]; the place is held where the velocity is zero."""
+        """Asks for a velocity [m/s] and a yaw rate [rad/s]; the position is held where the velocity is zero."""
         if self.kind == SETPOINT_TRAJECTORY and self.vel_ned == vel_ned and self.yaw_rate == yaw_rate:
             return
         self._free_all()
@@ -238,7 +238,7 @@ class SetpointPort:
         self._is_changed = True
 
     def press(self, speed_down: float) -> None:
-        """From now on: down to the ground with a speed [m/s], over the place that the mode asks for."""
+        """From now on: down to the ground with a speed [m/s], over the position that the mode asks for."""
         if self._settling or self._press_speed != speed_down:
             self._settling = None
             self._press_speed = speed_down

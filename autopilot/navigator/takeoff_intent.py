@@ -13,11 +13,11 @@ from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_RATE, TER
 
 NEAR_START_M = 30.0  # the ground level where it last stood is trusted this far around; guess
 _ROUGH_M = 3.0  # ground farther above or below than this is not believed near there: a range finder can lie; guess
-_STAND_M = 0.05  # a place lower than this above standing height is on the ground; guess
-_LIFT_M = 0.1  # a place this far above the vehicle asks to climb
+_STAND_M = 0.05  # a position lower than this above standing height is on the ground; guess
+_LIFT_M = 0.1  # a position this far above the vehicle asks to climb
 _SPEED_M_S = 0.05  # vertical speed below which a setpoint asks to stay
-_NEAR_M = 2.0  # a place on the ground farther away than this is still to be reached; guess
-LIFT_SHARE = 0.5  # of the hover thrust from which a thrust setpoint asks to climb; above LandingDetector's shares
+_NEAR_M = 2.0  # a position on the ground farther away than this is still to be reached; guess
+LIFT_FRACTION = 0.5  # of the hover thrust from which a thrust setpoint asks to climb; above LandingDetector's shares
 
 
 class Ask(IntEnum):
@@ -66,13 +66,13 @@ def vertical_ask(wanted: Wanted, estimate: Any, stand_d: float, lift_thrust: flo
     Args:
         wanted: the setpoint.
         estimate: the Estimate record.
-        stand_d: [m] down coordinate at which the vehicle stands, NaN: no place counts as being on the ground.
+        stand_d: [m] down coordinate at which the vehicle stands, NaN: no position counts as being on the ground.
         lift_thrust: [0..1] thrust that carries the vehicle.
     """
     if wanted.kind == SETPOINT_IDLE:
         return Ask.STAY
     if wanted.kind in (SETPOINT_ATTITUDE, SETPOINT_RATE):
-        return Ask.UP if wanted.thrust > LIFT_SHARE * lift_thrust else Ask.DOWN
+        return Ask.UP if wanted.thrust > LIFT_FRACTION * lift_thrust else Ask.DOWN
     north, east, down = wanted.pos_ned
     if down == down:
         here = estimate.pos_ned

@@ -24,7 +24,7 @@ class Payload(Protocol):
         Args:
             command: MAV_CMD.
             params: parameters 1 to 4.
-            x: parameter 5; latitude [deg] where the command has a place.
+            x: parameter 5; latitude [deg] where the command has a position.
             y: parameter 6; longitude [deg] likewise.
             z: parameter 7; altitude above sea level [m] likewise.
         """

@@ -72,11 +72,11 @@ def mixed_poses(world: WorldMap) -> NDArray[Any]:
     for pose in poses:
         while True:
             north, east = rng.uniform(-110.0, 110.0, 2)
-            place = np.array([north, east, -float(world.height(north, east)) - rng.uniform(1.0, 8.0)])
-            if world.obstacle_distance(place) > 0.1:
+            position = np.array([north, east, -float(world.height(north, east)) - rng.uniform(1.0, 8.0)])
+            if world.obstacle_distance(position) > 0.1:
                 break
         q = rng.normal(size=4)
-        pose["pos_ned"], pose["q_ned_from_rdf"] = place, q / np.linalg.norm(q)
+        pose["pos_ned"], pose["q_ned_from_rdf"] = position, q / np.linalg.norm(q)
     return poses
 
 

@@ -99,10 +99,10 @@ def cross_track_m(
         curved: items that are not flown to in a straight line: NaN there.
     """
     distance = np.full(len(pos_ned), np.nan)
-    places = dict(path_ned)
+    positions = dict(path_ned)
     here, leg_before = path_ned[0][1] if path_ned else np.zeros(3), None
     for frames in np.split(np.arange(len(seq)), np.flatnonzero(np.diff(seq)) + 1):
-        there = places.get(int(seq[frames[0]])) if len(frames) else None
+        there = positions.get(int(seq[frames[0]])) if len(frames) else None
         if there is None:
             continue
         if int(seq[frames[0]]) in curved:
@@ -120,8 +120,8 @@ def segment_distance_m(points: Rows, start: Rows, end: Rows) -> Rows:
     """Distance of points, shape (n, 3), to the segment from start to end."""
     leg = np.asarray(end, float) - start
     length_sq = float(leg @ leg)
-    share = np.clip((points - start) @ leg / length_sq, 0.0, 1.0) if length_sq > 0.0 else np.zeros(len(points))
-    distance: Rows = np.linalg.norm(points - (start + share[:, None] * leg), axis=1)
+    fraction = np.clip((points - start) @ leg / length_sq, 0.0, 1.0) if length_sq > 0.0 else np.zeros(len(points))
+    distance: Rows = np.linalg.norm(points - (start + fraction[:, None] * leg), axis=1)
     return distance
 
 
@@ -174,12 +174,12 @@ def item_ned(item: Any, origin: GeoPoint, previous: Any) -> Any:
     if item.command not in PLACES:
         return None
     alt_amsl_m = item.z + (origin.alt_m if item.frame in (3, 6) else 0.0)
-    has_place = np.isfinite(item.x) and np.isfinite(item.y) and (item.x, item.y) != (0.0, 0.0)
+    has_position = np.isfinite(item.x) and np.isfinite(item.y) and (item.x, item.y) != (0.0, 0.0)
     north, east, down = ned_from_geodetic(
-        item.x if has_place else origin.lat_deg, item.y if has_place else origin.lon_deg, alt_amsl_m, origin
+        item.x if has_position else origin.lat_deg, item.y if has_position else origin.lon_deg, alt_amsl_m, origin
     )
-    if item.command == CMD_TAKEOFF or not has_place:  # climbs and lands where it is
-        north, east = previous[:2] if not has_place else (north, east)
+    if item.command == CMD_TAKEOFF or not has_position:  # climbs and lands where it is
+        north, east = previous[:2] if not has_position else (north, east)
     if item.command == CMD_LAND:
         down = min(down, 0.0)
     return np.array([north, east, down])

@@ -124,10 +124,10 @@ class RigInjector:
         self._note(unit, 0, failure)
         return ACCEPTED
 
-    def weaken(self, motor: int, share: float) -> None:
+    def weaken(self, motor: int, fraction: float) -> None:
         """Gives a motor, from 0, a share of its command only."""
-        set_motor_loss(self._faults, motor, 1.0 - share)
-        self._note(Unit.MOTOR, motor, Failure.OK if share == 1.0 else Failure.SLOW)
+        set_motor_loss(self._faults, motor, 1.0 - fraction)
+        self._note(Unit.MOTOR, motor, Failure.OK if fraction == 1.0 else Failure.SLOW)
 
     def repair(self) -> None:
         """Ends every failure that was asked for."""

@@ -56,7 +56,7 @@ class Injector(Protocol):
 
     def inject(self, unit: Unit, failure: Failure, instance: int) -> Reply: ...
 
-    def weaken(self, motor: int, share: float) -> None: ...
+    def weaken(self, motor: int, fraction: float) -> None: ...
 
     def charge_to(self, rest_v: float) -> None: ...
 
@@ -135,9 +135,9 @@ class SimulatorParameters:
         self._flight.injector.inject(unit, Failure.OFF if is_off else Failure.OK, 1)
 
     def _weaken(self) -> None:
-        weak, share = int(self._value("SIM_ENGINE_FAIL")), self._value("SIM_ENGINE_MUL")
+        weak, fraction = int(self._value("SIM_ENGINE_FAIL")), self._value("SIM_ENGINE_MUL")
         for motor in range(self._flight.controller.state.motor_count):
-            self._flight.injector.weaken(motor, share if weak >> motor & 1 else 1.0)
+            self._flight.injector.weaken(motor, fraction if weak >> motor & 1 else 1.0)
 
     def _charge(self) -> None:
         self._flight.injector.charge_to(self._value("SIM_BATT_VOLTAGE"))

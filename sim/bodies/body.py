@@ -18,7 +18,7 @@ class Body(NamedTuple):
     """A class of bodies, one row of each struct per vehicle."""
 
     Model: type
-    """Kernel struct of the constants of one airframe at one place."""
+    """Kernel struct of the constants of one airframe at one position."""
     State: type
     """Kernel struct of all that the body needs to go on; with `pos_ned`, `vel_ned` and `impact_speed` as in `Truth`.
 

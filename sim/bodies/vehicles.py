@@ -1,6 +1,6 @@
 """The classes of vehicles that can be simulated: who flies or drives them, and what body moves them.
 
-This list is the one place outside of its own folders where a class is named; an airframe file says of which it is.
+This list is the one position outside of its own folders where a class is named; an airframe file says of which it is.
 """
 
 from typing import NamedTuple

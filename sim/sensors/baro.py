@@ -38,7 +38,7 @@ class BaroModel:
     white_std: float  # [Pa]
     offset_std: float  # [Pa]
     drift_std: float  # [Pa]
-    drift_keep: float  # share of the drift left after one period
+    drift_keep: float  # fraction of the drift left after one period
 
 
 @wp.struct

@@ -65,7 +65,7 @@ class Images:
 
 @wp.func
 def pixel_ray(lens: Lens, x: float, y: float, width: int, height: int) -> wp.vec3:
-    """Direction in ned through a place of the image [pixels], 1 along the optical axis."""
+    """Direction in ned through a position of the image [pixels], 1 along the optical axis."""
     per_pixel = 2.0 * lens.half_width / float(width)
     right = (x - 0.5 * float(width)) * per_pixel
     down = (y - 0.5 * float(height)) * per_pixel

@@ -67,7 +67,7 @@ class ImuModel:
     accel_turn_on_std: float  # [m/s²]
     gyro_drift_std: float  # [rad/s]
     accel_drift_std: float  # [m/s²]
-    drift_keep: float  # share of the drift left after DRIFT_PERIOD_TICKS
+    drift_keep: float  # fraction of the drift left after DRIFT_PERIOD_TICKS
     gyro_tone: float  # [rad/s per (rad/s)²] amplitude over squared motor speed
     accel_tone: float  # [m/s² per (rad/s)²]
     gyro_broadband: float  # [rad/s per (rad/s)²] standard deviation over squared motor speed

@@ -31,7 +31,7 @@ class RangeModel:
     min_distance: float  # [m]
     max_distance: float  # [m]
     near_std: float  # [m]
-    far_std_share: float  # standard deviation over distance
+    far_std_fraction: float  # standard deviation over distance
 
 
 def range_model(noise_scale: float = 1.0) -> Any:
@@ -41,7 +41,7 @@ def range_model(noise_scale: float = 1.0) -> Any:
     model.min_distance = MIN_DISTANCE_M
     model.max_distance = MAX_DISTANCE_M
     model.near_std = noise_scale * NEAR_STD_M
-    model.far_std_share = noise_scale * FAR_STD_SHARE
+    model.far_std_fraction = noise_scale * FAR_STD_SHARE
     return model
 
 
@@ -62,7 +62,7 @@ def range_sample(
     sample = held
     sample.time_us = tick_end_us(tick)
     if fault.mode != FAULT_STUCK or held.time_us == wp.int64(0):
-        std = noise_gain(fault) * wp.max(model.near_std, model.far_std_share * distance_m)
+        std = noise_gain(fault) * wp.max(model.near_std, model.far_std_fraction * distance_m)
         distance = distance_m + std * normal(seed, i, draw_tick(tick), RANGE_WHITE) + fault_bias(fault)
         sample.is_valid = 0
         if distance >= model.min_distance and distance_m < model.max_distance:

@@ -50,7 +50,7 @@ class Faults:
     mag: SensorFault
     range: SensorFault
     battery: SensorFault
-    motor_loss: vec8  # [0..1] share of its command that each motor loses
+    motor_loss: vec8  # [0..1] fraction of its command that each motor loses
 
 
 @wp.struct

@@ -191,11 +191,11 @@ class WorldBatch:
         growing = self._growing
         groups = 1 if growing.seeds.device.is_cpu else min(self.count, _GROUPS)
         rows = self._heights.shape[1]
-        places = ceil(growing.most_cells / 3)
+        positions = ceil(growing.most_cells / 3)
         launches: list[tuple[Any, tuple[int, ...], list[Any]]] = [
             (kernel, (groups, rows), []) for kernel in (raise_noise, find_highest, shape_hills)
         ]
-        launches += [(plant, (groups, places, places), [visit]) for visit in range(ROUNDS * PHASES)]
+        launches += [(plant, (groups, positions, positions), [visit]) for visit in range(ROUNDS * PHASES)]
         launches.append((settle, (groups,), []))
         return [
             wp.launch(kernel, dim, inputs=[growing, groups, *more], device=self.device, record_cmd=True)

@@ -1,7 +1,7 @@
 """Ways for feet between trunks: what is in the way, how to get round it, and never into it.
 
-In: a place, a course, how far to look. Out: a course, a distance or a place. Trees are found through the buckets of
-`trees.py`; crowns do not matter, people pass under them. Asked at 50 Hz per person.
+In: a position, a course, how far to look. Out: a course, a distance or a position. Trees are found through the buckets
+of `trees.py`; crowns do not matter, people pass under them. Asked at 50 Hz per person.
 """
 
 import warp as wp
@@ -19,7 +19,7 @@ _NONE_M = wp.constant(1.0e9)
 
 @wp.func
 def bucket_at(forest: Forest, north: float, east: float) -> int:
-    """The bucket that lists every tree near a place [m], -1 beyond the map."""
+    """The bucket that lists every tree near a position [m], -1 beyond the map."""
     row = outer_cell(grid_coordinate(north, forest.half_size_m, forest.buckets_per_m), forest.buckets)
     column = outer_cell(grid_coordinate(east, forest.half_size_m, forest.buckets_per_m), forest.buckets)
     if row < 0 or column < 0 or row >= forest.buckets or column >= forest.buckets:
@@ -28,10 +28,10 @@ def bucket_at(forest: Forest, north: float, east: float) -> int:
 
 
 @wp.func
-def clear_of_trunks(forest: Forest, place: wp.vec2) -> wp.vec2:
-    """A place [m] moved straight out of the trunk it is nearest to, if that is nearer than BODY_CLEARANCE_M."""
-    out = place
-    bucket = bucket_at(forest, place[0], place[1])
+def clear_of_trunks(forest: Forest, position: wp.vec2) -> wp.vec2:
+    """A position [m] moved straight out of the trunk it is nearest to, if that is nearer than BODY_CLEARANCE_M."""
+    out = position
+    bucket = bucket_at(forest, position[0], position[1])
     if bucket < 0:
         return out
     for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
@@ -48,12 +48,12 @@ def clear_of_trunks(forest: Forest, place: wp.vec2) -> wp.vec2:
 
 
 @wp.func
-def around_nearest(forest: Forest, place: wp.vec2, course_rad: float, look_m: float, clearance_m: float) -> float:
+def around_nearest(forest: Forest, position: wp.vec2, course_rad: float, look_m: float, clearance_m: float) -> float:
     """The course [rad], turned to the nearer tangent of the first tree that it would bring too close.
 
     Args:
         forest: the trees.
-        place: north, east [m].
+        position: north, east [m].
         course_rad: where to.
         look_m: how far ahead trees count.
         clearance_m: to keep between body and bark.
@@ -62,12 +62,12 @@ def around_nearest(forest: Forest, place: wp.vec2, course_rad: float, look_m: fl
     nearest = _NONE_M
     out = course_rad
     for i_point in range(3):  # buckets list trees 2 m and more beyond their borders: no gap between these points
-        point = place + (0.5 * float(i_point) * look_m) * along
+        point = position + (0.5 * float(i_point) * look_m) * along
         bucket = bucket_at(forest, point[0], point[1])
         if bucket >= 0:
             for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
                 tree = forest.trees[forest.bucket_trees[k]]
-                off = wp.vec2(tree.north, tree.east) - place
+                off = wp.vec2(tree.north, tree.east) - position
                 forward = wp.dot(off, along)
                 keep = tree.trunk_radius + BODY_CLEARANCE_M + clearance_m
                 side = along[0] * off[1] - along[1] * off[0]
@@ -81,17 +81,17 @@ def around_nearest(forest: Forest, place: wp.vec2, course_rad: float, look_m: fl
 
 
 @wp.func
-def free_way_m(forest: Forest, place: wp.vec2, course_rad: float, look_m: float) -> float:
+def free_way_m(forest: Forest, position: wp.vec2, course_rad: float, look_m: float) -> float:
     """How far a body can go along a course before it touches a trunk [m], at most `look_m`."""
     along = wp.vec2(wp.cos(course_rad), wp.sin(course_rad))
     free = float(look_m)
     for i_point in range(3):
-        point = place + (0.5 * float(i_point) * look_m) * along
+        point = position + (0.5 * float(i_point) * look_m) * along
         bucket = bucket_at(forest, point[0], point[1])
         if bucket >= 0:
             for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
                 tree = forest.trees[forest.bucket_trees[k]]
-                off = wp.vec2(tree.north, tree.east) - place
+                off = wp.vec2(tree.north, tree.east) - position
                 forward = wp.dot(off, along)
                 side = along[0] * off[1] - along[1] * off[0]
                 keep = tree.trunk_radius + BODY_CLEARANCE_M
@@ -101,16 +101,16 @@ def free_way_m(forest: Forest, place: wp.vec2, course_rad: float, look_m: float)
 
 
 @wp.func
-def towards_tree(forest: Forest, place: wp.vec2, course_rad: float, clearance_m: float) -> float:
-    """The course [rad] that just passes the first tree listed around a place ahead; unchanged if there is none."""
+def towards_tree(forest: Forest, position: wp.vec2, course_rad: float, clearance_m: float) -> float:
+    """The course [rad] that just passes the first tree listed around a position ahead; unchanged if there is none."""
     along = wp.vec2(wp.cos(course_rad), wp.sin(course_rad))
-    point = place + _GRAZE_M * along
+    point = position + _GRAZE_M * along
     bucket = bucket_at(forest, point[0], point[1])
     out = course_rad
     if bucket >= 0:
         for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
             tree = forest.trees[forest.bucket_trees[k]]
-            off = wp.vec2(tree.north, tree.east) - place
+            off = wp.vec2(tree.north, tree.east) - position
             distance = wp.length(off)
             keep = tree.trunk_radius + BODY_CLEARANCE_M + clearance_m
             if out == course_rad and wp.dot(off, along) > 2.0 and distance > keep:

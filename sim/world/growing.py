@@ -144,15 +144,15 @@ def is_free(points: wp.array2d[wp.vec2], i_world: int, grid: Grid, row: int, col
 @wp.kernel(enable_backward=False)
 def plant(growing: Growing, groups: int, visit: int) -> None:
     """One visit to a ninth of the cells of each planting grid: darts until one lands free, DARTS at most."""
-    group, place_row, place_column = wp.tid()
+    group, grid_row, grid_column = wp.tid()
     for slot in range(group, growing.chosen_count[0], groups):
         i_world = growing.chosen[slot]
         grid = growing.grids[i_world]
         key = wp.rand_init(growing.seeds[i_world], TREE_PLACES)
         # each world and round begins at another ninth
         phase = (visit + int(wp.rand_init(int(key), visit // PHASES) % wp.uint32(PHASES))) % PHASES
-        row = 3 * place_row + phase // 3
-        column = 3 * place_column + phase % 3
+        row = 3 * grid_row + phase // 3
+        column = 3 * grid_column + phase % 3
         cell = row * grid.cells + column
         if row < grid.cells and column < grid.cells and growing.points[i_world, cell][0] == EMPTY_M:
             middle = wp.vec2(0.5 * grid.side_m, 0.5 * grid.side_m)
@@ -169,16 +169,16 @@ def plant(growing: Growing, groups: int, visit: int) -> None:
 
 
 @wp.func
-def grown_tree(terrain: Terrain, params: WorldParams, height_max_m: float, place: wp.vec2, key: wp.uint32) -> Tree:
-    """The tree at a place [m], with the proportions of `trees.make_trees`."""
+def grown_tree(terrain: Terrain, params: WorldParams, height_max_m: float, position: wp.vec2, key: wp.uint32) -> Tree:
+    """The tree at a position [m], with the proportions of `trees.make_trees`."""
     state = key
     height_min_m = wp.min(params.tree_height_min_m, height_max_m)
     height = height_min_m + (height_max_m - height_min_m) * wp.randf(state)
     crown_fraction = _CROWN_RADIUS_LEAST + (_CROWN_RADIUS_MOST - _CROWN_RADIUS_LEAST) * wp.randf(state)
-    ground = terrain_height(terrain, place[0], place[1])
+    ground = terrain_height(terrain, position[0], position[1])
     tree = Tree()
-    tree.north = place[0]
-    tree.east = place[1]
+    tree.north = position[0]
+    tree.east = position[1]
     tree.root_height = ground - _ROOT_M
     tree.trunk_radius = _TRUNK_RADIUS * height
     tree.crown_radius = height * crown_fraction

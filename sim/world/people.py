@@ -121,7 +121,7 @@ def is_line_free(w: World, from_ned: wp.vec3, to_ned: wp.vec3) -> bool:
 def person_start(
     w: World, model: PersonModel, north: float, east: float, heading_rad: float, seed: int, i: int, tick: int
 ) -> Person:
-    """A person who stands near a place, looks along a heading, and will soon set off.
+    """A person who stands near a position, looks along a heading, and will soon set off.
 
     Args:
         w: the world.
@@ -141,8 +141,8 @@ def person_start(
     person.heading_rad = wrap_pi(heading_rad)
     person.course_rad = person.heading_rad
     person.clearance_m = model.clearance_max_m
-    place = clear_of_trunks(w.forest, within_map(w, north, east))
-    person.pos_ned = wp.vec3(place[0], place[1], -ground_height(w, place[0], place[1]))
+    position = clear_of_trunks(w.forest, within_map(w, north, east))
+    person.pos_ned = wp.vec3(position[0], position[1], -ground_height(w, position[0], position[1]))
     return person
 
 
@@ -191,8 +191,8 @@ def stepped(w: World, person: Person, dt_s: float) -> Person:
     start = person.pos_ned
     north = start[0] + person.speed * wp.cos(person.heading_rad) * dt_s
     east = start[1] + person.speed * wp.sin(person.heading_rad) * dt_s
-    place = clear_of_trunks(w.forest, within_map(w, north, east))
-    out.pos_ned = wp.vec3(place[0], place[1], -ground_height(w, place[0], place[1]))
+    position = clear_of_trunks(w.forest, within_map(w, north, east))
+    out.pos_ned = wp.vec3(position[0], position[1], -ground_height(w, position[0], position[1]))
     out.vel_ned = (out.pos_ned - start) / dt_s
     # a trunk that was touched takes the speed towards it
     out.speed = wp.min(person.speed, wp.length(wp.vec2(out.vel_ned[0], out.vel_ned[1])))
@@ -230,8 +230,8 @@ def planned(w: World, model: PersonModel, person: Person, seed: int, i: int, tic
             out.bend_rad_s = model.bend_std_rad_s * wp.randn(state)
             out.clearance_m = model.clearance_min_m + (model.clearance_max_m - model.clearance_min_m) * wp.randf(state)
             if wp.randf(state) < model.graze_fraction:
-                place = wp.vec2(person.pos_ned[0], person.pos_ned[1])
-                out.course_rad = towards_tree(w.forest, place, out.course_rad, out.clearance_m)
+                position = wp.vec2(person.pos_ned[0], person.pos_ned[1])
+                out.course_rad = towards_tree(w.forest, position, out.course_rad, out.clearance_m)
                 out.bend_rad_s = 0.0
     out.course_rad = inward_course(w, out)
     return out
@@ -261,7 +261,7 @@ def inward_course(w: World, person: Person) -> float:
 
 @wp.func
 def within_map(w: World, north: float, east: float) -> wp.vec2:
-    """The place [m], at least a body's width inside the map."""
+    """The position [m], at least a body's width inside the map."""
     limit = w.terrain.half_size_m - 2.0 * BODY_CLEARANCE_M
     return wp.vec2(wp.clamp(north, -limit, limit), wp.clamp(east, -limit, limit))
 
@@ -278,8 +278,8 @@ def slope_fraction(w: World, person: Person) -> float:
 @wp.func
 def free_course(w: World, person: Person) -> float:
     """The course [rad], turned to the nearer tangent of a tree that is in the way; and once more for the next tree."""
-    place = wp.vec2(person.pos_ned[0], person.pos_ned[1])
-    once = around_nearest(w.forest, place, person.course_rad, ahead_m(person), person.clearance_m)
+    position = wp.vec2(person.pos_ned[0], person.pos_ned[1])
+    once = around_nearest(w.forest, position, person.course_rad, ahead_m(person), person.clearance_m)
     if once == person.course_rad:
         return once
-    return around_nearest(w.forest, place, once, ahead_m(person), person.clearance_m)
+    return around_nearest(w.forest, position, once, ahead_m(person), person.clearance_m)

@@ -267,7 +267,7 @@ class TerrainMap:
     def _triangles(
         self, u_map: FloatArray, v_map: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """South-west corner height, its rise per cell to the north and east, and the place in the cell."""
+        """South-west corner height, its rise per cell to the north and east, and the position in the cell."""
         u, v = np.clip(u_map, 0.0, self.cells), np.clip(v_map, 0.0, self.cells)
         i = np.minimum(u.astype(np.int64), self.cells - 1)
         j = np.minimum(v.astype(np.int64), self.cells - 1)

@@ -154,10 +154,10 @@ class WallsMap:
         if not self.is_built:
             return np.full(len(pos_ned), np.inf)
         low, high = self._boxes_ned()
-        place = (pos_ned * np.array([1.0, 1.0, -1.0]))[:, None, :]
-        outside = np.maximum(np.maximum(low - place, place - high), 0.0)
+        position = (pos_ned * np.array([1.0, 1.0, -1.0]))[:, None, :]
+        outside = np.maximum(np.maximum(low - position, position - high), 0.0)
         # across its thickness and up: the ends of a wall lie in its neighbours
-        faces = np.minimum(place - low, high - place)
+        faces = np.minimum(position - low, high - position)
         across = np.where(np.arange(WALL_COUNT) < 2, faces[:, :, 0], faces[:, :, 1])
         inside = np.maximum(np.minimum(across, faces[:, :, 2]), 0.0)
         off = np.sqrt((outside**2).sum(axis=-1))

@@ -74,12 +74,12 @@ def test_trees_keep_their_spacing_their_bounds_and_fit_the_store(seed, numbers):
     if density == 0.0:
         assert trees.size == 0
         return
-    places = np.stack([trees["north"], trees["east"]], axis=-1).astype(float)
-    distance = np.linalg.norm(places[:, None] - places, axis=-1)[~np.eye(len(places), dtype=bool)]
+    positions = np.stack([trees["north"], trees["east"]], axis=-1).astype(float)
+    distance = np.linalg.norm(positions[:, None] - positions, axis=-1)[~np.eye(len(positions), dtype=bool)]
     assert distance.min(initial=np.inf) > np.sqrt(COVERAGE * 1.0e4 / density) - 1e-4
     height = trees["crown_high"] + trees["crown_radius"] - trees["root_height"] - 1.0
     assert height.max(initial=0.0) < min(numbers["tree_height_max_m"], 20.0) + 1e-3
-    assert np.abs(places).max(initial=0.0) <= 80.0 - EDGE_M
+    assert np.abs(positions).max(initial=0.0) <= 80.0 - EDGE_M
     starts = batch()._bucket_start.numpy()[1]
     assert starts[0] == 0
     assert np.all(np.diff(starts) >= 0)

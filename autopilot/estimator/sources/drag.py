@@ -32,7 +32,7 @@ def drag_is_due(drag: DragSum) -> bool:
 
 @wp.func
 def is_airborne(drag: DragSum, nominal: Nominal) -> bool:
-    """The vehicle has left the place where it last stood still."""
+    """The vehicle has left the position where it last stood still."""
     return (
         nominal.pos_ned[2] < drag.ground_d - _AIRBORNE_HEIGHT_M
         or wp.length_sq(nominal.vel_ned) > _AIRBORNE_SPEED * _AIRBORNE_SPEED

@@ -35,7 +35,7 @@ wp.set_module_options({"enable_backward": False})
 
 EXTERNAL_STUCK_AFTER = wp.constant(5)  # equal samples in a row: floats of a camera system never repeat
 EXTERNAL_STUCK_MOVED = wp.constant(1.0)  # [m]
-_LOST_VAR = wp.constant(1.1e4)  # [m²] beyond 100 m the place is set: float32 would not subtract well
+_LOST_VAR = wp.constant(1.1e4)  # [m²] beyond 100 m the position is set: float32 would not subtract well
 _RESET_AFTER_S = wp.constant(5.0)  # nothing passed for so long: believe the sample rather than the dead reckoning
 _MIN_STD = wp.constant(1.0e-3)  # [m], [m/s], [rad]
 

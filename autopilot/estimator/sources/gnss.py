@@ -52,14 +52,14 @@ wp.set_module_options({"enable_backward": False})
 GNSS_STUCK_AFTER = wp.constant(3)  # equal solutions in a row: floats of a live receiver never repeat
 VERTICAL_FACTOR = wp.constant(1.5)  # vertical over horizontal error, from satellite geometry
 # The receiver's accuracy figures hold both errors; guess at how they divide, for receivers worse than the parameters
-_WHITE_SHARE_POS = wp.constant(0.3)
-_SLOW_SHARE_POS = wp.constant(0.6)
-_WHITE_SHARE_VEL = wp.constant(0.5)
+_WHITE_FRACTION_POS = wp.constant(0.3)
+_SLOW_FRACTION_POS = wp.constant(0.6)
+_WHITE_FRACTION_VEL = wp.constant(0.5)
 GNSS_STUCK_MOVED = wp.constant(3.0)  # [m]
 # Acceleration turned to ned with a wrong heading is the ordinary cause of a velocity that does not fit: guess
 _DOUBTED_HEADING_STD = wp.constant(0.2)  # [rad]
-_DOUBTED_BODY_SHARE = wp.constant(4.0)  # of the body field's deviation at the start
-_LOST_VAR = wp.constant(1.1e4)  # [m²] beyond 100 m the place is set by a fix: float32 would not subtract well
+_DOUBTED_BODY_FRACTION = wp.constant(4.0)  # of the body field's deviation at the start
+_LOST_VAR = wp.constant(1.1e4)  # [m²] beyond 100 m the position is set by a fix: float32 would not subtract well
 _RESET_AFTER_S = wp.constant(5.0)  # nothing passed for so long: believe the receiver rather than the dead reckoning
 
 
@@ -110,13 +110,13 @@ def receive_gnss(ekf: Ekf, i: int, sample: GnssSample, is_still: bool, vel_ned: 
 @wp.func
 def gnss_pos_std(params: EstimatorParams, sample: GnssSample) -> float:
     """[m] noise per horizontal axis from sample to sample."""
-    return wp.max(params.gnss_pos_noise, _WHITE_SHARE_POS * sample.pos_h_std)
+    return wp.max(params.gnss_pos_noise, _WHITE_FRACTION_POS * sample.pos_h_std)
 
 
 @wp.func
 def gnss_vel_std(params: EstimatorParams, sample: GnssSample) -> float:
     """[m/s] noise per axis."""
-    return wp.max(params.gnss_vel_noise, _WHITE_SHARE_VEL * sample.vel_std)
+    return wp.max(params.gnss_vel_noise, _WHITE_FRACTION_VEL * sample.vel_std)
 
 
 @wp.func
@@ -148,7 +148,7 @@ def fuse_gnss_vel(
             nominal.reset_count += 1
             for axis in range(3):
                 set_variance(cov, i, VEL + axis, var)
-                body_std = _DOUBTED_BODY_SHARE * params.body_field_init
+                body_std = _DOUBTED_BODY_FRACTION * params.body_field_init
                 set_variance(cov, i, BODY + axis, body_std * body_std)
             set_variance(cov, i, ATT + 2, _DOUBTED_HEADING_STD * _DOUBTED_HEADING_STD)
             aid = mark_reset(aid)
@@ -158,7 +158,7 @@ def fuse_gnss_vel(
 @wp.func
 def gnss_wander_var(params: EstimatorParams, sample: GnssSample, axis: int) -> float:
     """[m²] variance of the slow error."""
-    std = wp.max(params.gnss_wander, _SLOW_SHARE_POS * sample.pos_h_std)
+    std = wp.max(params.gnss_wander, _SLOW_FRACTION_POS * sample.pos_h_std)
     if axis == 2:
         std = VERTICAL_FACTOR * std
     return std * std

@@ -18,7 +18,7 @@ wp.set_module_options({"enable_backward": False})
 
 _SLOW_GNSS = wp.constant(2)  # slow error of GNSS height
 _SIGMA = wp.constant(3.5)  # of what both say together
-_LEAST_SHARE = wp.constant(0.5)  # of the common error, in each of both
+_LEAST_FRACTION = wp.constant(0.5)  # of the common error, in each of both
 
 
 @wp.func
@@ -26,7 +26,7 @@ def common_error(baro: float, baro_var: float, gnss: float, gnss_var: float) -> 
     """[m, m²] error of the state that both slow errors share, and its variance; 0 if they may be the sensors' own."""
     var = baro_var * gnss_var / (baro_var + gnss_var)
     shared = var * (baro / baro_var + gnss / gnss_var)
-    least = _LEAST_SHARE * wp.abs(shared)
+    least = _LEAST_FRACTION * wp.abs(shared)
     if shared * shared < _SIGMA * _SIGMA * var or baro * wp.sign(shared) < least or gnss * wp.sign(shared) < least:
         shared = 0.0
     return shared, var

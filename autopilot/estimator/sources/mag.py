@@ -1,7 +1,7 @@
 """Magnetometer: three body axes, observing heading, the earth field and the field of the body (hard iron).
 
 Starts with heading from the levelled field and the declination of the world model. Stops when its values freeze, it
-falls silent, or its field is not that of the place; the gyro then carries heading, which GNSS velocity holds while the
+falls silent, or its field is not the local one; the gyro then carries heading, which GNSS velocity holds while the
 vehicle accelerates. When its samples were rejected for long, the field of the body is learned anew from the attitude.
 
 A vehicle that has not moved since it was aligned knows its heading from the magnetometer alone: there heading is set
@@ -44,7 +44,7 @@ def has_field_model(params: EstimatorParams) -> bool:
 
 @wp.func
 def is_disturbed(params: EstimatorParams, q_ned_from_frd: wp.quat, field_frd: wp.vec3) -> bool:
-    """The field differs from that of the place by more than EKF2_MAG_CHK_STR or EKF2_MAG_CHK_INC."""
+    """The field differs from the local one by more than EKF2_MAG_CHK_STR or EKF2_MAG_CHK_INC."""
     earth_ned = params.earth_field_ned_gauss
     strength = wp.length(field_frd)
     is_wrong = bool(False)
@@ -54,8 +54,8 @@ def is_disturbed(params: EstimatorParams, q_ned_from_frd: wp.quat, field_frd: wp
         if (params.mag_check & MAG_CHECK_INCLINATION) != 0:
             down = wp.quat_rotate(q_ned_from_frd, field_frd)[2] / wp.max(strength, 1.0e-6)
             inclination = wp.asin(wp.clamp(down, -1.0, 1.0))
-            at_place = wp.asin(wp.clamp(earth_ned[2] / wp.length(earth_ned), -1.0, 1.0))
-            is_wrong = is_wrong or wp.abs(inclination - at_place) > params.mag_check_inclination
+            at_position = wp.asin(wp.clamp(earth_ned[2] / wp.length(earth_ned), -1.0, 1.0))
+            is_wrong = is_wrong or wp.abs(inclination - at_position) > params.mag_check_inclination
     return is_wrong
 
 

@@ -63,7 +63,7 @@ def fuse_range(
     """The terrain's down coordinate."""
     down_ned = wp.quat_rotate(nominal.q_ned_from_frd, wp.vec3(0.0, 0.0, 1.0))
     if sample.is_valid == 1 and down_ned[2] > _MIN_DOWN:
-        std = wp.max(params.range_noise, params.range_noise_share * sample.distance_m)
+        std = wp.max(params.range_noise, params.range_noise_fraction * sample.distance_m)
         var = std * std
         measured_d = nominal.pos_ned[2] + sample.distance_m * down_ned[2]
         if seconds_since(sample.time_us, aid.fused_time_us) > _RESTART_AFTER_S:

@@ -118,10 +118,10 @@ def observe_baro(still: Stillness, sample: BaroSample, step_s: float) -> Stillne
         still.baro_height = height
         still.baro_climb = 0.0
     else:
-        share = step_s / _BARO_S
+        fraction = step_s / _BARO_S
         error = height - still.baro_height - still.baro_climb * step_s
-        still.baro_height = still.baro_height + still.baro_climb * step_s + 2.0 * share * error
-        still.baro_climb = still.baro_climb + share / _BARO_S * error
+        still.baro_height = still.baro_height + still.baro_climb * step_s + 2.0 * fraction * error
+        still.baro_climb = still.baro_climb + fraction / _BARO_S * error
     return still
 
 

@@ -193,6 +193,6 @@ class GimbalManager(Service):
         self._point(sender, f, f.pitch, f.yaw, f.pitch_rate, f.yaw_rate)
 
     def manual_received(self, sender: Sender, f: Any) -> None:
-        """Points the gimbal by a pilot's stick: shares of its range, or of its largest rate."""
+        """Points the gimbal by a pilot's stick: fractions of its range, or of its largest rate."""
         pitch = f.pitch * (PITCH_MAX if f.pitch > 0.0 else -PITCH_MIN)
         self._point(sender, f, pitch, f.yaw * YAW_MAX, f.pitch_rate * RATE_MAX, f.yaw_rate * RATE_MAX)

@@ -102,7 +102,7 @@ class Dialect(Protocol):
     flight_sw_version: int  # of the autopilot this dialect is compatible with
     mode_table: ModeTable  # of the vehicle
     modes: Sequence[ModeRow]  # that a client may ask for
-    goto_mode: Mode  # in which a place is held to which a client sends the vehicle
+    goto_mode: Mode  # in which a position is held to which a client sends the vehicle
     first_seq: int  # of a mission in the lists that clients see; 1 where item 0 is home
     item_request: str  # the message by which it asks for the items of a list that is uploaded
     acknowledges_set_mode: bool  # the old message SET_MODE is answered by COMMAND_ACK with the message's own number

@@ -21,7 +21,7 @@ _COMPONENTS = (
     "none", "system", "imu", "absolute_pressure", "magnetometer", "attitude_estimate", "local_position_estimate",
     "gps", "battery", "remote_control",
 )  # fmt: skip
-"""Health components; the place in this list is the number of their bit."""
+"""Health components; the position in this list is the number of their bit."""
 
 # A reason's text with its numbers as arguments, and the component it is about.
 _REASONS = (

@@ -19,7 +19,7 @@ def with_home(items: Sequence[MissionItem], state: VehicleState) -> list[Mission
 
 
 def home_item(state: VehicleState) -> MissionItem:
-    """Home as item 0; the place of power-on while there is no home."""
+    """Home as item 0; the position of power-on while there is no home."""
     home = state.home or state.origin
     return MissionItem(
         0, mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_CMD_NAV_WAYPOINT, (0.0,) * 4, home.lat_deg, home.lon_deg, home.alt_m

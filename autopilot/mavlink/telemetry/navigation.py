@@ -1,4 +1,4 @@
-"""Telemetry of where the vehicle is going: the place asked for, seen from where it is."""
+"""Telemetry of where the vehicle is going: the position asked for, seen from where it is."""
 
 from math import asin, atan2, degrees, hypot, isfinite
 
@@ -12,7 +12,7 @@ _MOVES_M_S = 0.2  # slower than this the way has no direction; guess
 
 
 def nav_controller_output(state: VehicleState) -> bytes | None:
-    """Distance, bearing and height error to the place flown to, and the lean asked for; while there is such a place."""
+    """Distance, bearing and height error to the position flown to, and the lean asked for; while there is one."""
     north, east, down = state.goal_ned
     if not state.is_armed or not (isfinite(north) and isfinite(east)):
         return None

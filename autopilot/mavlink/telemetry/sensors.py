@@ -200,7 +200,7 @@ def servo_output_raw(state: VehicleState) -> bytes:
 
 
 def actuator_output_status(state: VehicleState) -> bytes:
-    """Motor commands as shares of the greatest."""
+    """Motor commands as fractions of the greatest."""
     commands = tuple(state.actuators.command)
     active = sum(1 << i for i, command in enumerate(commands) if command > 0.0)
     return _actuator_output_status(state.time_us, active, commands + (0.0,) * (32 - len(commands)))

@@ -165,9 +165,9 @@ def _works(sample: Any, inbox: Any, now_us: int) -> bool:
     return is_fresh and not (inbox and inbox.is_stuck)
 
 
-def _percent(share: float) -> int:
+def _percent(fraction: float) -> int:
     """[%], -1 if unknown."""
-    return bounded_int(share * 100.0, 0, 100) if isfinite(share) else -1
+    return bounded_int(fraction * 100.0, 0, 100) if isfinite(fraction) else -1
 
 
 def battery_status(state: VehicleState) -> bytes | None:
@@ -210,7 +210,7 @@ def home_position(state: VehicleState) -> bytes | None:
 
 
 def gps_global_origin(state: VehicleState) -> bytes:
-    """Where the local frame has its origin: the place of power-on."""
+    """Where the local frame has its origin: the position of power-on."""
     origin = state.origin
     return _gps_global_origin(
         degrees_e7(origin.lat_deg), degrees_e7(origin.lon_deg), i32(origin.alt_m * 1000.0), state.time_us

@@ -68,6 +68,6 @@ class Intake:
             self._waste %= WASTE_PER_UNIT
 
 
-def share(busy_count: int) -> int:
+def fraction(busy_count: int) -> int:
     """Units of work each channel gets in this frame if so many have something to do."""
     return min(WORK_MAX, max(WORK_TOTAL // busy_count, WORK_MIN))

@@ -26,7 +26,7 @@ def is_known(limit: float, *values: float) -> bool:
 
 
 def first_outside(limit: float, values: Iterable[float]) -> int | None:
-    """The place of the first value that is neither NaN nor of a size there is."""
+    """The position of the first value that is neither NaN nor of a size there is."""
     for i, value in enumerate(values):
         if not (value != value or -limit <= value <= limit):
             return i

@@ -1,7 +1,7 @@
 """The geofence: shapes that clients upload and limits around home, watched in every frame.
 
 In: the fence as uploaded, its parameters, where the vehicle is. Out: which limits are breached (`VehicleState.fence`),
-and whether a place may be flown to. What a breach leads to is the commander's to say (GF_ACTION).
+and whether a position may be flown to. What a breach leads to is the commander's to say (GF_ACTION).
 """
 
 from collections.abc import Sequence
@@ -53,7 +53,7 @@ class Fence:
         context.params.on_change(self._on_parameter)
         context.find_way = self.way
         context.fence_refusal = self.refusal
-        context.place_refusal = lambda place: self.refusal(place, is_to_stay=True)
+        context.position_refusal = lambda position: self.refusal(position, is_to_stay=True)
         self._switch_by_parameter()
 
     # ---- what clients ask for ----
@@ -87,15 +87,15 @@ class Fence:
     def is_active(self) -> bool:
         return self._limits != 0
 
-    def refusal(self, place: Vector, *, is_to_stay: bool = False) -> str:
-        """Why the vehicle may not go to a place [m]; empty if it may. The floor counts only if it is to stay there."""
+    def refusal(self, position: Vector, *, is_to_stay: bool = False) -> str:
+        """Why the vehicle may not go to a position [m]; empty if it may. The floor counts only if it is to stay."""
         limits = self._limits
         if not limits:
             return ""
-        breached = limits & self._beyond(place, 0.0)
-        if limits & _SHAPES and self.region.clearance(place[0], place[1]) < 0.0:
+        breached = limits & self._beyond(position, 0.0)
+        if limits & _SHAPES and self.region.clearance(position[0], position[1]) < 0.0:
             breached |= _SHAPES
-        height = self._context.state.home_ned[2] - place[2]
+        height = self._context.state.home_ned[2] - position[2]
         if is_to_stay and limits & _FLOOR and height < self._context.number("GF_MIN_ALT"):
             breached |= _FLOOR
         return f"outside fence: {_names(breached)}" if breached else ""
@@ -144,23 +144,23 @@ class Fence:
             return
         context = self._context
         state = context.state
-        place = self._place()
+        position = self._position()
         needed = context.number("GF_MARGIN") if context.number("GF_PREDICT") else 0.0
         had = state.fence.breached
         estimate = state.estimate
         breached = 0
         if estimate.flags & HEIGHT_VALID and state.home is not None:
-            breached = self._beyond(place, needed, had)
+            breached = self._beyond(position, needed, had)
             if self._limits & _FLOOR:
-                breached |= self._below_floor(place[2], had)
+                breached |= self._below_floor(position[2], had)
         if not estimate.flags & POSITION_VALID:
             breached = breached & ~(_RADIUS | _SHAPES) | had & (_RADIUS | _SHAPES)
-        elif self._limits & _SHAPES and self._is_outside(place, needed, had):
+        elif self._limits & _SHAPES and self._is_outside(position, needed, had):
             breached |= _SHAPES
         if breached != had:
             self._tell(breached, had)
 
-    def _place(self) -> Vector:
+    def _position(self) -> Vector:
         """Where to look: where the vehicle is, or with GF_PREDICT where it can stop."""
         context = self._context
         state = context.state
@@ -172,19 +172,19 @@ class Fence:
         north, east, down = state.estimate.pos_ned
         return north, east, down
 
-    def _is_outside(self, place: Vector, needed: float, had: int) -> bool:
-        """Whether a place is outside the shapes, computed anew only if the vehicle may have crossed a border."""
-        moved_north, moved_east = place[0] - self._at[0], place[1] - self._at[1]
+    def _is_outside(self, position: Vector, needed: float, had: int) -> bool:
+        """Whether a position is outside the shapes, computed anew only if the vehicle may have crossed a border."""
+        moved_north, moved_east = position[0] - self._at[0], position[1] - self._at[1]
         if moved_north * moved_north + moved_east * moved_east >= self._safe_sq:
             if had & _SHAPES:
                 needed += _HYSTERESIS_M
-            self._at = place[:2]
-            self._clearance = self.region.clearance(place[0], place[1]) - needed
+            self._at = position[:2]
+            self._clearance = self.region.clearance(position[0], position[1]) - needed
             self._safe_sq = self._clearance * self._clearance
         return self._clearance < 0.0
 
-    def _beyond(self, place: Vector, needed: float, had: int = 0) -> int:
-        """Which of radius and ceiling a place is beyond."""
+    def _beyond(self, position: Vector, needed: float, had: int = 0) -> int:
+        """Which of radius and ceiling a position is beyond."""
         limits = self._limits
         if not limits & (_RADIUS | _CEILING):
             return 0
@@ -193,11 +193,11 @@ class Fence:
         breached = 0
         if limits & _RADIUS:
             longest = context.number("GF_MAX_HOR_DIST") - needed - (_HYSTERESIS_M if had & _RADIUS else 0.0)
-            if hypot(place[0] - north, place[1] - east) > longest:
+            if hypot(position[0] - north, position[1] - east) > longest:
                 breached = _RADIUS
         if limits & _CEILING:
             highest = context.number("GF_MAX_VER_DIST") - needed - (_HYSTERESIS_M if had & _CEILING else 0.0)
-            if down - place[2] > highest:
+            if down - position[2] > highest:
                 breached |= _CEILING
         return breached
 

@@ -84,8 +84,8 @@ def fence_shapes(items: Sequence[MissionItem]) -> tuple[GeoShape, ...] | ItemRef
     return tuple(shapes)
 
 
-def place_refusal(i_item: int, item: MissionItem) -> ItemRefusal | None:
-    """Why a fence item or a rally point is at no place on the earth."""
+def position_refusal(i_item: int, item: MissionItem) -> ItemRefusal | None:
+    """Why a fence item or a rally point is at no position on the earth."""
     if item.seq != i_item:
         return ItemRefusal(i_item, Result.INVALID_SEQUENCE, f"has the number {item.seq}")
     if item.frame not in _LATLON_FRAMES:
@@ -107,7 +107,7 @@ def _item_refusal(i_item: int, item: MissionItem) -> ItemRefusal | None:
             return ItemRefusal(i_item, Result.PARAM1, f"radius {first} m is out of range")
     elif item.command != FenceCommand.RETURN_POINT:
         return ItemRefusal(i_item, Result.UNSUPPORTED, f"command {item.command} is no fence item")
-    return place_refusal(i_item, item)
+    return position_refusal(i_item, item)
 
 
 def _polygon_refusal(items: Sequence[MissionItem], start: int, count: int) -> ItemRefusal | None:

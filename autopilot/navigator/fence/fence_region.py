@@ -83,10 +83,10 @@ class Region:
         """Distance [m] from each point to the border of each polygon, positive inside."""
         north, east = points[:, :1], points[:, 1:]
         to_north, to_east = north - self._north, east - self._east
-        share = (to_north * self._to_north + to_east * self._to_east) * self._inverse_length_sq
-        share = np.minimum(np.maximum(share, 0.0), 1.0)
-        off_north = to_north - share * self._to_north
-        off_east = to_east - share * self._to_east
+        fraction = (to_north * self._to_north + to_east * self._to_east) * self._inverse_length_sq
+        fraction = np.minimum(np.maximum(fraction, 0.0), 1.0)
+        off_north = to_north - fraction * self._to_north
+        off_east = to_east - fraction * self._to_east
         off_sq = off_north * off_north + off_east * off_east
         nearest = np.sqrt(np.minimum.reduceat(off_sq, self._starts, axis=1))
         # An eastward ray crosses the border an odd number of times from inside.

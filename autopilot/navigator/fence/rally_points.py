@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import isfinite
 
 from autopilot.interface.item_lists import ItemRefusal, MissionItem
-from autopilot.navigator.fence.fence_items import place_refusal
+from autopilot.navigator.fence.fence_items import position_refusal
 from autopilot.navigator.mission.item_commands import Result
 
 RALLY_POINT = 5100  # MAV_CMD
@@ -39,4 +39,4 @@ def _refusal(i_item: int, item: MissionItem) -> ItemRefusal | None:
         return ItemRefusal(i_item, Result.UNSUPPORTED, f"command {item.command} is no rally point")
     if not (isfinite(item.z) and abs(item.z) <= 10_000.0):
         return ItemRefusal(i_item, Result.PARAM7, f"altitude {item.z} m is out of range")
-    return place_refusal(i_item, item)
+    return position_refusal(i_item, item)

@@ -66,7 +66,7 @@ def _sequence_problem(i_item: int, item: MissionItem) -> _Problem | None:
 def _item_problem(item: MissionItem, items: Sequence[MissionItem], takes: Callable[[int], bool]) -> _Problem | None:
     check = _CHECKS.get(item.command)
     if check is not None:
-        return _frame_problem(item) or _place_problem(item) or check(item, items)
+        return _frame_problem(item) or _position_problem(item) or check(item, items)
     if takes(item.command):
         return None
     if item.command in _PAYLOAD_COMMANDS:
@@ -82,7 +82,7 @@ def _frame_problem(item: MissionItem) -> _Problem | None:
     return Result.UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for command {item.command}"
 
 
-def _place_problem(item: MissionItem) -> _Problem | None:
+def _position_problem(item: MissionItem) -> _Problem | None:
     may_be_here = item.command in PLACED_OR_HERE
     if not (may_be_here or item.command in PLACED):
         return None

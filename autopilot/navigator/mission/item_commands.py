@@ -91,7 +91,7 @@ ROI_BY_INDEX, ROI_OF_TARGET = 2.0, 4.0  # MAV_ROI of DO_SET_ROI that have no mea
 
 
 def is_here(item: MissionItem) -> bool:
-    """Whether a take-off or landing names no place of its own (NaN, or 0, 0 as ground stations send)."""
+    """Whether a take-off or landing names no position of its own (NaN, or 0, 0 as ground stations send)."""
     return not (isfinite(item.x) and isfinite(item.y)) or (item.x == 0.0 and item.y == 0.0)
 
 

@@ -162,10 +162,10 @@ class Mission(FlightMode):
         state = self._context.state.mission_state
         return state in (MissionState.ACTIVE, MissionState.PAUSED, MissionState.COMPLETE)
 
-    def place_after(self, first: int) -> Vector:
-        """The place [m] of the first item from `first` on that has one; the present one if none has."""
+    def position_after(self, first: int) -> Vector:
+        """The position [m] of the first item from `first` on that has one; the present one if none has."""
         north, east, down = self._context.state.estimate.pos_ned
-        return next((place for seq, place in self.places() if seq >= first), (north, east, down))
+        return next((position for seq, position in self.positions() if seq >= first), (north, east, down))
 
     def landing_sequence(self) -> int | None:
         """Number of the nearest DO_LAND_START."""
@@ -202,8 +202,8 @@ class Mission(FlightMode):
         first = next((item for item in self.items if item.command == Command.WAYPOINT), None)
         if first is not None and longest_m >= 0.0:
             here = self._context.state.estimate.pos_ned
-            place = self._route.place_of(first)
-            way_m = hypot(place[0] - here[0], place[1] - here[1])
+            position = self._route.position_of(first)
+            way_m = hypot(position[0] - here[0], position[1] - here[1])
             if way_m > longest_m:
                 return f"first waypoint is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed"
         return ""
@@ -217,8 +217,8 @@ class Mission(FlightMode):
         if checked != self._fence_checked:
             self._fence_checked = checked
             self._fence_problem = ""
-            for seq, place in self.places():
-                reason = fence.refusal(place)
+            for seq, position in self.positions():
+                reason = fence.refusal(position)
                 if reason:
                     self._fence_problem = f"{item_name(seq)} is {reason}"
                     break
@@ -230,13 +230,13 @@ class Mission(FlightMode):
         if problem:
             self._context.announcer.statustext(Severity.WARNING, f"Mission: {problem}")
 
-    def places(self) -> Iterator[tuple[int, Vector]]:
+    def positions(self) -> Iterator[tuple[int, Vector]]:
         """Number and place [m] of every item that the vehicle flies to."""
         for item in self.items:
             if item.command in PLACED | PLACED_OR_HERE and not is_here(item):
-                place = self._route.place_of(item)
+                position = self._route.position_of(item)
                 home = self._context.state.home_ned
-                yield item.seq, (place[0], place[1], home[2]) if item.command == Command.LAND else place
+                yield item.seq, (position[0], position[1], home[2]) if item.command == Command.LAND else position
 
     # ---- flying ----
 
@@ -246,7 +246,7 @@ class Mission(FlightMode):
         return self._is_flying
 
     def start(self) -> None:
-        """Begins, or goes on at the current item from the present place."""
+        """Begins, or goes on at the current item from the present position."""
         state = self._context.state
         is_over = state.mission_state == MissionState.COMPLETE
         if is_over or (int(self._context.number("MIS_RESTART")) and not self._is_chosen):
@@ -278,7 +278,7 @@ class Mission(FlightMode):
             self._actions.frame()
 
     def _begin(self, index: int, *, is_joined: bool) -> None:
-        """Makes `index` current and starts it; joined: from the place of the item before."""
+        """Makes `index` current and starts it; joined: from the position of the item before."""
         context = self._context
         context.heading.end_turn()
         self._is_flying = False

@@ -115,11 +115,11 @@ class Actions:
         return self._is_through(item)
 
     def _is_through(self, item: MissionItem) -> bool:
-        """Whether the vehicle is beyond the plane through the gate, across the way from it to the next place."""
+        """Whether the vehicle is beyond the plane through the gate, across the way from it to the next position."""
         target = self._leg.target
         if target is None:
             return False
-        gate = self._route.place_of(item)
+        gate = self._route.position_of(item)
         here = self._context.state.estimate.pos_ned
         north, east = target[0] - gate[0], target[1] - gate[1]
         return bool((here[0] - gate[0]) * north + (here[1] - gate[1]) * east >= 0.0)
@@ -153,7 +153,7 @@ class Actions:
 
     def _pay(self, item: MissionItem) -> None:
         """Hands the item to the payload; a mission goes on if that cannot do it."""
-        # parameter 7 is an altitude where there is a place; plans give other items a frame all the same
+        # parameter 7 is an altitude where there is a position; plans give other items a frame all the same
         z = self._alt_amsl_m(item) if item.command in _ROI_COMMANDS else item.z
         reply = self._payload.run(item.command, item.params, item.x, item.y, z)
         self._tell(item, reply)
@@ -180,12 +180,12 @@ class Actions:
 
     def _look(self, item: MissionItem) -> None:
         heading = self._context.heading
-        has_place = item.command in ROI_AS_ASKED | {Command.ROI_LOCATION} and not is_here(item)
+        has_position = item.command in ROI_AS_ASKED | {Command.ROI_LOCATION} and not is_here(item)
         if item.command in ROI_AS_ASKED and item.params[0] == _ROI_NEXT:
             heading.look_ahead()
-        elif has_place:
-            place: Vector = self._route.place_of(item)
-            heading.look_at(place)
+        elif has_position:
+            position: Vector = self._route.position_of(item)
+            heading.look_at(position)
         else:
             offset_deg = item.z if item.command == Command.ROI_NEXT_OFFSET else 0.0
             heading.look_ahead(radians(offset_deg) if isfinite(offset_deg) else 0.0)

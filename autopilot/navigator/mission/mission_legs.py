@@ -50,7 +50,7 @@ class Leg:
         self._start: Vector = _STANDING  # [m] where the way to the target begins
         self._goal: Vector = _STANDING  # [m] where it ends, also after an interruption
         self._exit_speed = 0.0
-        self._radius_sq = 0.0  # [m²] in which the place counts as reached
+        self._radius_sq = 0.0  # [m²] in which the position counts as reached
         self._alt_radius = 0.0  # [m]
         self._until_us = 0
         self._runner: Runner | None = None
@@ -75,7 +75,7 @@ class Leg:
 
         Args:
             item: to fly.
-            is_joined: from the place of the item before, rather than from where the vehicle is.
+            is_joined: from the position of the item before, rather than from where the vehicle is.
         """
         context = self._context
         command = item.command
@@ -91,13 +91,13 @@ class Leg:
             self._wait(0.0)
         elif command == Command.TAKEOFF:
             self._stage = _Stage.CLIMB
-            self._climb.start(self._route.place_of(item)[2], radians(item.params[3]))
+            self._climb.start(self._route.position_of(item)[2], radians(item.params[3]))
         elif command == Command.CONTINUE_AND_CHANGE_ALT:
             self._change_alt(item)
         elif context.is_on_ground:
             lowest = context.state.home_ned[2] - context.number("MIS_TAKEOFF_ALT")
             self._stage = _Stage.CLIMB
-            self._climb.start(min(self._route.place_of(item)[2], lowest), nan)
+            self._climb.start(min(self._route.position_of(item)[2], lowest), nan)
         elif start is None and before is item and item.command != Command.SPLINE_WAYPOINT and self._is_on_path():
             self._travel(item, self._start)
         else:
@@ -142,11 +142,11 @@ class Leg:
             left = self._runner.curve.length - self._runner.way
             self._circle(item, self.target, left)
         elif self._stage is _Stage.CURVE and item.command == Command.SPLINE_WAYPOINT and self._runner is not None:
-            place, along = self._runner.curve.at(self._runner.way)
-            self._spline(item, place, along, self.target, self._runner.speed)
+            position, along = self._runner.curve.at(self._runner.way)
+            self._spline(item, position, along, self.target, self._runner.speed)
 
     def distance_left(self) -> float:
-        """Horizontal way [m] to the place of the leg; 0 without one."""
+        """Horizontal way [m] to the position of the leg; 0 without one."""
         if self.target is None:
             return 0.0
         here = self._context.state.estimate.pos_ned
@@ -194,14 +194,14 @@ class Leg:
 
     def _goal_of(self, item: MissionItem, start: Vector) -> Vector:
         """Where the way of an item ends [m]."""
-        place = start if item.command == Command.LAND and is_here(item) else self._route.place_of(item)
+        position = start if item.command == Command.LAND and is_here(item) else self._route.position_of(item)
         if item.command in (Command.LAND, Command.LOITER_TO_ALT):  # goes there at the height it comes from
-            return place[0], place[1], start[2]
+            return position[0], position[1], start[2]
         if item.command == Command.LOITER_TURNS:
             radius = abs(self._circle_radius(item))
-            angle = bearing(place, start) if hypot(place[0] - start[0], place[1] - start[1]) > 0.1 else 0.0
-            return place[0] + radius * cos(angle), place[1] + radius * sin(angle), place[2]
-        return place
+            angle = bearing(position, start) if hypot(position[0] - start[0], position[1] - start[1]) > 0.1 else 0.0
+            return position[0] + radius * cos(angle), position[1] + radius * sin(angle), position[2]
+        return position
 
     def _check_travel(self) -> None:
         item, target, context = self._item, self.target, self._context
@@ -235,8 +235,8 @@ class Leg:
             self._circle(item, target, 2.0 * pi * abs(self._circle_radius(item)) * turns)
         elif command == Command.LOITER_TO_ALT:
             self._stage = _Stage.LEVEL
-            place = self._route.place_of(item)
-            self.target = self._goal = (place[0], place[1], place[2])
+            position = self._route.position_of(item)
+            self.target = self._goal = (position[0], position[1], position[2])
             self._context.fly_to(self.target, self.yaw)
         elif (command in WAYPOINTS or command == Command.LOITER_TIME) and hold_time_s(item) > 0.0:
             self._wait(hold_time_s(item))
@@ -268,8 +268,8 @@ class Leg:
     def _is_elsewhere(self, item: MissionItem) -> bool:
         if is_here(item) or self.target is None:
             return False
-        place = self._route.place_of(item)
-        return hypot(place[0] - self.target[0], place[1] - self.target[1]) > self._context.number("NAV_ACC_RAD")
+        position = self._route.position_of(item)
+        return hypot(position[0] - self.target[0], position[1] - self.target[1]) > self._context.number("NAV_ACC_RAD")
 
     def _wait(self, time_s: float) -> None:
         context = self._context
@@ -286,7 +286,7 @@ class Leg:
         context = self._context
         estimate = context.state.estimate
         vel_north, vel_east, _ = estimate.vel_ned
-        down = self._route.place_of(item)[2]
+        down = self._route.position_of(item)[2]
         self._alt_radius = context.number("NAV_MC_ALT_RAD")
         north, east, _ = context.stop_point()
         self.target = self._goal = (north, east, down)
@@ -307,20 +307,20 @@ class Leg:
     def _circle(self, item: MissionItem, edge: Vector, length: float) -> None:
         """Flies `length` metres around the item's place, from `edge`."""
         radius = self._circle_radius(item)
-        place = self._route.place_of(item)
+        position = self._route.position_of(item)
         pace = self._route.pace()
         speed = 0.0 if self._runner is None or self._stage is not _Stage.CURVE else self._runner.speed
         here = edge
         if self._stage is _Stage.CURVE and self._runner is not None:
             here, _ = self._runner.curve.at(self._runner.way)
         turns = length / (2.0 * pi * abs(radius))
-        self._runner = Runner(Turns(place, bearing(place, here), radius, turns, pace), pace, speed)
+        self._runner = Runner(Turns(position, bearing(position, here), radius, turns, pace), pace, speed)
         self._stage = _Stage.CURVE
 
     def _spline(self, item: MissionItem, start: Vector, along: Vector, target: Vector, speed: float) -> None:
         """Flies the smooth curve from `start`, left in the direction `along`, to `target` [m]."""
         context, route = self._context, self._route
-        following = route.next_place(item.seq + 1, target) if passes_through(item) else None
+        following = route.next_position(item.seq + 1, target) if passes_through(item) else None
         arrive, exit_speed = _STANDING, 0.0
         pace = route.pace()
         if following is not None:
@@ -349,7 +349,7 @@ class Leg:
     def _entry_speed(self, item: MissionItem, start: Vector, along: Vector, target: Vector) -> float:
         """Speed [m/s] at which the spline of the next item may be entered."""
         route = self._route
-        following = route.next_place(item.seq + 1, target) if passes_through(item) else None
+        following = route.next_position(item.seq + 1, target) if passes_through(item) else None
         arrive = _STANDING if following is None else between(start, following)
         pace = route.pace()
         points = _distinct(spline(start, along, target, arrive))
@@ -360,30 +360,30 @@ class Leg:
         if item is None or runner is None:
             return
         here = context.state.estimate.pos_ned
-        place, vel = runner.step(here)
+        position, vel = runner.step(here)
         if runner.is_at_end:
             if self._exit_speed > 0.0:
                 self._is_done = True
             else:
-                self._end_curve(item, place, here)
+                self._end_curve(item, position, here)
             return
         yaw = self.yaw
         if item.command == Command.LOITER_TURNS:
-            yaw = bearing(place, self._route.place_of(item))
+            yaw = bearing(position, self._route.position_of(item))
         elif not context.heading.is_item_yaw and hypot(vel[0], vel[1]) > 0.1:
             yaw = bearing(_STANDING, vel)
         self.yaw = context.leg_yaw = yaw
-        context.setpoint.track(place, vel, yaw)
+        context.setpoint.track(position, vel, yaw)
 
-    def _end_curve(self, item: MissionItem, place: Vector, here: Vector) -> None:
+    def _end_curve(self, item: MissionItem, position: Vector, here: Vector) -> None:
         """The moving point has come to rest: waits for the vehicle."""
         context = self._context
         self._along = _STANDING
-        if self.target != place:
-            self.target = self._goal = place
-            context.fly_to(place, self.yaw)
-        north, east = here[0] - place[0], here[1] - place[1]
-        if north * north + east * east < max(self._radius_sq, 0.25) and abs(here[2] - place[2]) < self._alt_radius:
+        if self.target != position:
+            self.target = self._goal = position
+            context.fly_to(position, self.yaw)
+        north, east = here[0] - position[0], here[1] - position[1]
+        if north * north + east * east < max(self._radius_sq, 0.25) and abs(here[2] - position[2]) < self._alt_radius:
             if item.command != Command.LOITER_TURNS and hold_time_s(item) > 0.0:
                 self._wait(hold_time_s(item))
             else:

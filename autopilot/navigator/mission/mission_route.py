@@ -20,7 +20,7 @@ from autopilot.navigator.mission.item_commands import (
 from autopilot.navigator.paths.spline import Pace, between
 from autopilot.navigator.setpoint import Vector
 
-CORNER_ACCEL_SHARE = 0.5  # of MPC_ACC_HOR, used to turn from one leg to the next; the rest keeps to the line: guess
+CORNER_ACCEL_FRACTION = 0.5  # of MPC_ACC_HOR, used to turn from one leg to the next; the rest keeps to the line: guess
 _SLOWEST_CORNER_M_S = 0.5  # slower than this it is simpler to stop
 
 
@@ -71,15 +71,15 @@ class Route:
         return item.seq + 1 if target is None else int(target)
 
     def nearest_after_marker(self, marker: Command) -> int | None:
-        """Number of the item after the nearest marker (DO_LAND_START), or the marker's if it names no place."""
+        """Number of the item after the nearest marker (DO_LAND_START), or the marker's if it names no position."""
         here = self._context.state.estimate.pos_ned
         best, best_m = None, inf
         for item in self.items:
             if item.command != marker:
                 continue
             first = item if not is_here(item) else self._first_placed(item.seq)
-            place = here if first is None else self.place_of(first)
-            way_m = hypot(place[0] - here[0], place[1] - here[1])
+            position = here if first is None else self.position_of(first)
+            way_m = hypot(position[0] - here[0], position[1] - here[1])
             if way_m < best_m:
                 best, best_m = item.seq, way_m
         return best
@@ -94,11 +94,11 @@ class Route:
         for item in self.items[begin:]:
             if item.command not in PLACED and not (item.command == Command.LAND and not is_here(item)):
                 continue
-            place = self.place_of(item)
-            way_m = distance_to_line(here, before or place, place)
+            position = self.position_of(item)
+            way_m = distance_to_line(here, before or position, position)
             if way_m < best_m:
                 best, best_m = item.seq, way_m
-            before = place
+            before = position
         return best
 
     def _first_placed(self, index: int) -> MissionItem | None:
@@ -106,7 +106,7 @@ class Route:
 
     # ---- places ----
 
-    def place_of(self, item: MissionItem) -> Vector:
+    def position_of(self, item: MissionItem) -> Vector:
         """The item's place in the ned frame [m]; the present one where it names none."""
         state = self._context.state
         alt_m = item.z
@@ -117,17 +117,17 @@ class Route:
             return north, east, self._context.down_of(alt_m)
         return self._context.pos_ned_of(item.x, item.y, alt_m)
 
-    def next_place(self, index: int, place: Vector) -> Vector | None:
-        """Where the flight goes on from `place` [m], None if it stops there."""
+    def next_position(self, index: int, position: Vector) -> Vector | None:
+        """Where the flight goes on from `position` [m], None if it stops there."""
         item = self.next_nav(index)
         if item is None:
             return None
         if item.command in PLACED and item.command != Command.LOITER_TURNS:  # a circle is entered sideways
-            target = self.place_of(item)
-            return (target[0], target[1], place[2]) if item.command == Command.LOITER_TO_ALT else target
+            target = self.position_of(item)
+            return (target[0], target[1], position[2]) if item.command == Command.LOITER_TO_ALT else target
         if item.command == Command.LAND and not is_here(item):
-            target = self.place_of(item)
-            return target[0], target[1], place[2]
+            target = self.position_of(item)
+            return target[0], target[1], position[2]
         return None
 
     # ---- speeds ----
@@ -144,7 +144,7 @@ class Route:
             min(cruise, number(limits.speed_max)),
             min(climb, number(limits.climb_max)),
             min(descend, number(limits.descend_max)),
-            CORNER_ACCEL_SHARE * number(limits.accel_hor),
+            CORNER_ACCEL_FRACTION * number(limits.accel_hor),
             number(limits.jerk_auto),
             number(limits.path_error),
         )
@@ -156,7 +156,7 @@ class Route:
         sqrt(a r / tan(θ/2)). It is also bounded by what can be braked on the next leg. A spline leaves a waypoint in
         the direction in which it was reached: there is no corner.
         """
-        following = self.next_place(item.seq + 1, target) if passes_through(item) else None
+        following = self.next_position(item.seq + 1, target) if passes_through(item) else None
         if following is None:
             return 0.0
         into, out = between(start, target), between(target, following)
@@ -179,8 +179,8 @@ def distance_to_line(here: Vector, start: Vector, end: Vector) -> float:
     """Horizontal distance [m] to the straight way between two places."""
     north, east = end[0] - start[0], end[1] - start[1]
     length_sq = north * north + east * east
-    share = 0.0
+    fraction = 0.0
     if length_sq > 0.0:
-        share = ((here[0] - start[0]) * north + (here[1] - start[1]) * east) / length_sq
-        share = min(max(share, 0.0), 1.0)
-    return hypot(here[0] - start[0] - share * north, here[1] - start[1] - share * east)
+        fraction = ((here[0] - start[0]) * north + (here[1] - start[1]) * east) / length_sq
+        fraction = min(max(fraction, 0.0), 1.0)
+    return hypot(here[0] - start[0] - fraction * north, here[1] - start[1] - fraction * east)

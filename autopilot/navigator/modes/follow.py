@@ -93,7 +93,7 @@ class Follow(FlightMode):
         self._track(target, now_us, dt_s)
 
     def _wait(self) -> None:
-        """Holds the place until the target is heard of."""
+        """Holds the position until the target is heard of."""
         context = self._context
         if self._is_waiting:
             return
@@ -105,26 +105,26 @@ class Follow(FlightMode):
 
     def _track(self, target: TargetFilter, now_us: int, dt_s: float) -> None:
         context = self._context
-        place = target.at(now_us)
+        position = target.at(now_us)
         here = context.state.estimate.pos_ned
         if self._bearing != self._bearing:
-            self._bearing = atan2(here[1] - place[1], here[0] - place[0])
+            self._bearing = atan2(here[1] - position[1], here[0] - position[0])
         self._follow_course(target, dt_s)
         sticks = context.state.sticks
         self._speed_away = self._speed_down = 0.0
         if now_us <= sticks.heard_until_us and not sticks.is_ardupilot:
-            self._adjust(sticks, place, here, dt_s)
+            self._adjust(sticks, position, here, dt_s)
         distance_m = self._distance_m
         rate = self._turn(distance_m, dt_s)
         north, east = cos(self._bearing), sin(self._bearing)
-        pos_ned = (place[0] + distance_m * north, place[1] + distance_m * east, self._down(place))
+        pos_ned = (position[0] + distance_m * north, position[1] + distance_m * east, self._down(position))
         round_m_s, away_m_s = rate * distance_m, self._speed_away
         vel_ned = (
             target.vel_ned[0] - round_m_s * east + away_m_s * north,
             target.vel_ned[1] + round_m_s * north + away_m_s * east,
             self._speed_down,
         )
-        way = (place[0] - here[0], place[1] - here[1])
+        way = (position[0] - here[0], position[1] - here[1])
         yaw = atan2(way[1], way[0]) if hypot(*way) > 0.5 else context.state.yaw_rad
         context.setpoint.track(pos_ned, vel_ned, yaw)
 
@@ -135,10 +135,10 @@ class Follow(FlightMode):
         self._angle_rad = radians(number("FLW_TGT_FA"))
         self._height_m = number("FLW_TGT_HT")
 
-    def _adjust(self, sticks: StickInput, place: Vector, here: Vector, dt_s: float) -> None:
+    def _adjust(self, sticks: StickInput, position: Vector, here: Vector, dt_s: float) -> None:
         """Lets the pilot change what is asked for, as fast as the vehicle comes along."""
-        north, east = here[0] - place[0], here[1] - place[1]
-        if abs(sticks.throttle) > _STICK_DEAD and abs(self._down(place) - here[2]) < _CLIMB_M_S * _AHEAD_S:
+        north, east = here[0] - position[0], here[1] - position[1]
+        if abs(sticks.throttle) > _STICK_DEAD and abs(self._down(position) - here[2]) < _CLIMB_M_S * _AHEAD_S:
             height_m = self._height_m + _CLIMB_M_S * sticks.throttle * dt_s
             self._height_m = min(max(height_m, _LOWEST_M), max(_HEIGHT_MAX_M, self._height_m))
             self._speed_down = -_CLIMB_M_S * sticks.throttle if self._height_m == height_m else 0.0
@@ -181,14 +181,14 @@ class Follow(FlightMode):
         self._bearing += rate * dt_s
         return rate
 
-    def _down(self, place: Vector) -> float:
+    def _down(self, position: Vector) -> float:
         """Down coordinate [m] of the height asked for."""
         context = self._context
         home_d = context.state.home_ned[2]
         kind = int(context.number("FLW_TGT_ALT_M"))
         base_d = home_d
         if kind == FULL:
-            base_d = place[2]
+            base_d = position[2]
         elif kind == TERRAIN:
             height_above_m, is_measured = context.height_above_ground()
             if is_measured:

@@ -1,4 +1,4 @@
-"""Goto: a client sends the vehicle to a place, a height or a heading, where it holds."""
+"""Goto: a client sends the vehicle to a position, a height or a heading, where it holds."""
 
 from math import hypot, isfinite
 
@@ -14,7 +14,7 @@ _BELOW_GROUND_M = 1.0  # below home and below the ground under the vehicle: more
 def reposition_target(context: NavContext, base: Vector, request: GoTo) -> tuple[Vector, float] | Reply:
     """Place and heading that are asked for, or why not.
 
-    What is NaN stays as it is at `base` [m]: the place being held, or the place where the vehicle can stop.
+    What is NaN stays as it is at `base` [m]: the position being held, or the position where the vehicle can stop.
     """
     state = context.state
     lat_deg, lon_deg, alt_amsl_m = request.lat_deg, request.lon_deg, request.alt_amsl_m
@@ -45,7 +45,7 @@ def ground_d(context: NavContext) -> float:
 
 
 def target_refusal(context: NavContext, target: Vector) -> Reply:
-    """Why the vehicle may not be sent to a place [m]; ACCEPTED if it may."""
+    """Why the vehicle may not be sent to a position [m]; ACCEPTED if it may."""
     here = context.state.estimate.pos_ned
     way_m = hypot(target[0] - here[0], target[1] - here[1])
     longest_m = context.number("MIS_DIST_1WP")
@@ -56,7 +56,7 @@ def target_refusal(context: NavContext, target: Vector) -> Reply:
     lowest_d = ground_d(context)
     if target[2] > lowest_d + _BELOW_GROUND_M:
         return Reply(Verdict.DENIED, f"target is {target[2] - lowest_d:.0f} m below the ground")
-    reason = context.place_refusal(target)
+    reason = context.position_refusal(target)
     if reason:
         return Reply(Verdict.DENIED, f"target is {reason}")
     return ACCEPTED

@@ -20,7 +20,7 @@ from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_LEAN, SETPOINT_TRAJECTOR
 from common.attitude import yaw_of
 
 THRUST_IS_THRUST = 8  # bit of GUID_OPTIONS
-_LEAST_TAKEOFF_M = 0.5  # above the place where it stands; guess
+_LEAST_TAKEOFF_M = 0.5  # above the position where it stands; guess
 _HIGHEST_M = 10_000.0
 
 
@@ -35,7 +35,7 @@ class Guided(FlightMode):
 
     __slots__ = (
         "_climb", "_context", "_is_active", "_is_flown", "_is_line", "_is_told", "_next",
-        "_place", "_received_us", "_setpoint", "_task", "_way", "_yaw",
+        "_position", "_received_us", "_setpoint", "_task", "_way", "_yaw",
     )  # fmt: skip
 
     takes_heading = True
@@ -46,13 +46,15 @@ class Guided(FlightMode):
         self._climb = Climb(context)
         self._is_active = False
         self._task = _Task.PLACE
-        self._place: Vector = (0.0, 0.0, 0.0)  # [m]
+        self._position: Vector = (0.0, 0.0, 0.0)  # [m]
         self._yaw = 0.0  # [rad]
-        self._is_line = False  # on a straight line to the place
+        self._is_line = False  # on a straight line to the position
         self._is_flown = False  # what is asked for is in the setpoint
         self._is_told = False  # that it stands on the ground
         self._way = Way(context)  # around what the fence excludes
-        self._next: tuple[Vector, float] | None = None  # a place asked for before the mode was entered, or on take-off
+        self._next: tuple[Vector, float] | None = (
+            None  # a position asked for before the mode was entered, or on take-off
+        )
         self._setpoint: OffboardSetpoint | None = None
         self._received_us = 0
 
@@ -64,9 +66,9 @@ class Guided(FlightMode):
         self._is_active = True
         self._is_told = False
         if self._next is not None:
-            place, yaw = self._next
+            position, yaw = self._next
             self._next = None
-            self._go(place, yaw, is_line=True)
+            self._go(position, yaw, is_line=True)
         else:
             self._go(context.stop_point(), context.state.yaw_rad, is_line=False)
 
@@ -93,7 +95,7 @@ class Guided(FlightMode):
             self._is_flown = not self._way.frame()
         elif not self._is_flown:
             self._is_flown = True
-            context.fly_to(self._place, self._yaw, context.state.estimate.pos_ned if self._is_line else None)
+            context.fly_to(self._position, self._yaw, context.state.estimate.pos_ned if self._is_line else None)
 
     def _climbed(self) -> None:
         """A take-off is over: stays there, or goes where a client has sent it meanwhile."""
@@ -101,16 +103,16 @@ class Guided(FlightMode):
             self._go(self._climb.target_ned, self._climb.yaw, is_line=False)
             self._is_flown = True
         else:
-            place, self._next = self._next, None
-            self._go(*place, is_line=True)
+            position, self._next = self._next, None
+            self._go(*position, is_line=True)
 
-    def _go(self, place: Vector, yaw: float, *, is_line: bool) -> None:
+    def _go(self, position: Vector, yaw: float, *, is_line: bool) -> None:
         self._task = _Task.PLACE
-        self._place, self._yaw, self._is_line = place, yaw, is_line
+        self._position, self._yaw, self._is_line = position, yaw, is_line
         self._is_flown = False
         self._way.stop()
-        here = self._context.stop_point() if is_line else place
-        points = self._context.find_way(here, place) if is_line else None
+        here = self._context.stop_point() if is_line else position
+        points = self._context.find_way(here, position) if is_line else None
         if points is not None and len(points) > 1:
             self._way.start(here, points)
             self._is_flown = True
@@ -140,7 +142,7 @@ class Guided(FlightMode):
         if not self._is_flown:
             self._is_flown = True
             context.setpoint.follow(setpoint, context.cruise_speed)
-        elif not _is_place(setpoint) and self._is_stale:
+        elif not _is_position(setpoint) and self._is_stale:
             self._go(context.stop_point(), context.state.yaw_rad, is_line=False)
 
     # ---- what clients ask for ----
@@ -157,7 +159,7 @@ class Guided(FlightMode):
                 return self._take_off(request.alt_amsl_m, request.yaw_rad)
 
     def _take_off(self, alt_amsl_m: float, yaw: float) -> Reply:
-        """Climbs to an altitude over the place where it stands, and stays in the mode."""
+        """Climbs to an altitude over the position where it stands, and stays in the mode."""
         context = self._context
         refusal = takeoff_refusal(context, alt_amsl_m)
         if refusal:
@@ -179,14 +181,14 @@ class Guided(FlightMode):
         return ACCEPTED
 
     def _go_to(self, request: GoTo) -> Reply:
-        """Goes to a place; what is NaN stays as it is."""
+        """Goes to a position; what is NaN stays as it is."""
         context = self._context
         if not context.has_position:
             return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")
         if request.is_pause:
             return self._take((context.stop_point(), context.state.yaw_rad))
         is_held = self._is_active and self._task is _Task.PLACE
-        base = self._place if is_held else context.stop_point()
+        base = self._position if is_held else context.stop_point()
         target = reposition_target(context, base, request)
         if isinstance(target, Reply):
             return target
@@ -225,13 +227,13 @@ class Guided(FlightMode):
         context = self._context
         if setpoint.kind != SETPOINT_ATTITUDE or int(context.number("GUID_OPTIONS")) & THRUST_IS_THRUST:
             return setpoint
-        share = 2.0 * setpoint.thrust - 1.0
-        speed = context.number("MPC_Z_V_AUTO_UP" if share > 0.0 else "MPC_Z_V_AUTO_DN")
+        fraction = 2.0 * setpoint.thrust - 1.0
+        speed = context.number("MPC_Z_V_AUTO_UP" if fraction > 0.0 else "MPC_Z_V_AUTO_DN")
         has_yaw_rate = isfinite(setpoint.yaw_rate)
         return OffboardSetpoint(
             setpoint.time_us,
             SETPOINT_LEAN,
-            vel_ned=(nan, nan, -share * speed),
+            vel_ned=(nan, nan, -fraction * speed),
             accel_ned=(0.0, 0.0, nan),  # over ground the trajectory goes along with the vehicle
             yaw=nan if has_yaw_rate else yaw_of(setpoint.q_ned_from_frd),
             yaw_rate=setpoint.yaw_rate,
@@ -239,7 +241,7 @@ class Guided(FlightMode):
         )
 
 
-def _is_place(setpoint: OffboardSetpoint) -> bool:
-    """Whether a setpoint names a place or a height, and nothing that moves."""
+def _is_position(setpoint: OffboardSetpoint) -> bool:
+    """Whether a setpoint names a position or a height, and nothing that moves."""
     moves = (*setpoint.vel_ned, *setpoint.accel_ned, setpoint.yaw_rate)
     return setpoint.kind == SETPOINT_TRAJECTORY and not any(isfinite(element) and element for element in moves)

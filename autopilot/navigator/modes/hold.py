@@ -1,4 +1,4 @@
-"""Hold: stays at one place, or goes to one and stays there."""
+"""Hold: stays at one position, or goes to one and stays there."""
 
 from math import isfinite
 
@@ -13,7 +13,7 @@ from autopilot.navigator.setpoint import Vector
 
 
 class Hold(FlightMode):
-    """Mode Hold: the place is where the mode before ended, where a client sent the vehicle, or where it can stop.
+    """Mode Hold: the position is where the mode before ended, where a client sent the vehicle, or where it can stop.
 
     Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as he steers.
     """
@@ -27,17 +27,17 @@ class Hold(FlightMode):
         self._context = context
         self._is_active = False  # not while a take-off is finished first
         self._is_flown = False
-        self._is_goto = False  # on a straight line to the place
+        self._is_goto = False  # on a straight line to the position
         self._steered = Position(context)
         self._way = Way(context)
-        self._via: list[Vector] = []  # [m] points to go over on the next way to a place
+        self._via: list[Vector] = []  # [m] points to go over on the next way to a position
         self._is_steered = False
         self._reset_count = 0  # of the estimate
         self.target_ned: Vector = (0.0, 0.0, 0.0)  # [m]
         self.yaw = 0.0  # [rad]
 
     def take(self, request: GoTo) -> Reply:
-        """Chooses the next place to hold."""
+        """Chooses the next position to hold."""
         context = self._context
         if not context.has_position:
             return Reply(Verdict.TEMPORARILY_REJECTED, "no valid position")

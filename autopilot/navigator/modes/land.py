@@ -1,4 +1,4 @@
-"""Landing: straight down over one place, slower near the ground; blind if the position is lost."""
+"""Landing: straight down over one position, slower near the ground; blind if the position is lost."""
 
 from math import hypot, isfinite, nan
 
@@ -9,9 +9,9 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff_intent import is_near_start
 
-_BLIND_THRUST_SHARE = 0.92  # of the hover thrust: sinks at a few m/s against inflow and drag; guess
+_BLIND_THRUST_FRACTION = 0.92  # of the hover thrust: sinks at a few m/s against inflow and drag; guess
 _BLIND_STEADY_S = 20.0  # after that the thrust falls further, so that a vehicle that already stands notices it; guess
-_BLIND_FALL_1_S = 0.02  # share of the hover thrust per second; guess
+_BLIND_FALL_1_S = 0.02  # fraction of the hover thrust per second; guess
 _TOUCHING_US = 700_000  # longer than it takes to begin a descent; guess
 _SLOW_BELOW_M = 30.0  # height above home below which ground may be anywhere, far from home; guess
 
@@ -29,7 +29,7 @@ class Landing:
         self._blind_since_us = 0
 
     def start(self, north: float, east: float, yaw: float) -> None:
-        """Descends over a place [m] with a heading [rad], NaN: the present one."""
+        """Descends over a position [m] with a heading [rad], NaN: the present one."""
         self._north, self._east = north, east
         self._yaw = yaw if isfinite(yaw) else self._context.state.yaw_rad
         self._is_blind = False
@@ -55,12 +55,12 @@ class Landing:
         elif context.has_height:
             context.setpoint.descend_level(self._pushed(self._speed()), self._yaw)
         else:
-            context.setpoint.hang_level(context.craft.lift_thrust * self._blind_thrust_share(), self._yaw)
+            context.setpoint.hang_level(context.craft.lift_thrust * self._blind_thrust_fraction(), self._yaw)
 
-    def _blind_thrust_share(self) -> float:
-        """Share of the hover thrust for sinking without knowing the height."""
+    def _blind_thrust_fraction(self) -> float:
+        """Fraction of the hover thrust for sinking without knowing the height."""
         blind_s = (self._context.state.time_us - self._blind_since_us) * 1e-6
-        return max(_BLIND_THRUST_SHARE - _BLIND_FALL_1_S * max(blind_s - _BLIND_STEADY_S, 0.0), 0.0)
+        return max(_BLIND_THRUST_FRACTION - _BLIND_FALL_1_S * max(blind_s - _BLIND_STEADY_S, 0.0), 0.0)
 
     def _pushed(self, speed: float) -> float:
         """The speed, or more of it once the vehicle no longer sinks: on the ground the thrust falls at once then."""
@@ -105,45 +105,45 @@ def slowed_near_ground(context: NavContext, fast: float) -> float:
 
 
 class Land(FlightMode):
-    """Mode Land: at a given place if one was asked for, otherwise here."""
+    """Mode Land: at a given position if one was asked for, otherwise here."""
 
-    __slots__ = ("_context", "_landing", "_place", "_yaw")
+    __slots__ = ("_context", "_landing", "_position", "_yaw")
 
     is_below_floor = True
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
         self._landing = Landing(context)
-        self._place: Vector | None = None  # still to be reached
+        self._position: Vector | None = None  # still to be reached
         self._yaw = nan
 
     def take(self, request: LandAt) -> Reply:
-        """Sets place and heading of the next landing; without a place it is where the vehicle can stop."""
+        """Sets place and heading of the next landing; without a position it is where the vehicle can stop."""
         lat_deg, lon_deg = request.lat_deg, request.lon_deg
         if isfinite(lat_deg) != isfinite(lon_deg) or abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
             return Reply(Verdict.DENIED, "there is no such latitude and longitude")
-        context, place = self._context, None
+        context, position = self._context, None
         if isfinite(lat_deg) and not (lat_deg == 0.0 and lon_deg == 0.0):
-            place = context.pos_ned_of(lat_deg, lon_deg, context.state.position.alt_m)
-            refusal = context.fence_refusal(place)
+            position = context.pos_ned_of(lat_deg, lon_deg, context.state.position.alt_m)
+            refusal = context.fence_refusal(position)
             if refusal:
                 return Reply(Verdict.DENIED, f"landing place is {refusal}")
-        self._place = place
+        self._position = position
         self._yaw = request.yaw_rad
         return ACCEPTED
 
     def forget(self) -> None:
-        self._place, self._yaw = None, nan
+        self._position, self._yaw = None, nan
 
     def start(self) -> None:
         context = self._context
-        place, yaw = self._place, self._yaw
-        if place is not None and context.has_position:
+        position, yaw = self._position, self._yaw
+        if position is not None and context.has_position:
             start = context.stop_point()
-            self._place = (place[0], place[1], start[2])
-            context.fly_to(self._place, context.heading_to(start, self._place, yaw), start)
+            self._position = (position[0], position[1], start[2])
+            context.fly_to(self._position, context.heading_to(start, self._position, yaw), start)
             return
-        self._place = None
+        self._position = None
         self._yaw = nan
         if context.has_position:
             north, east, _ = context.stop_point()
@@ -152,14 +152,14 @@ class Land(FlightMode):
         self._landing.start(north, east, yaw)
 
     def frame(self) -> None:
-        place = self._place
-        if place is None:
+        position = self._position
+        if position is None:
             self._landing.frame()
             return
         here = self._context.state.estimate.pos_ned
-        is_there = hypot(here[0] - place[0], here[1] - place[1]) < 0.5 * self._context.number("NAV_ACC_RAD")
+        is_there = hypot(here[0] - position[0], here[1] - position[1]) < 0.5 * self._context.number("NAV_ACC_RAD")
         if is_there or not self._context.has_position:
-            self._place = None
-            self._landing.start(place[0], place[1], self._yaw)
+            self._position = None
+            self._landing.start(position[0], position[1], self._yaw)
             self._yaw = nan
             self._landing.frame()

@@ -115,10 +115,10 @@ class Orbit(FlightMode):
         self._time_us = now_us
         if not self._is_on_circle:
             north, east, down = context.state.estimate.pos_ned
-            place = circle.pos_ned
+            position = circle.pos_ned
             self._is_on_circle = (
-                hypot(north - place[0], east - place[1]) < _NEAR_M
-                and abs(down - place[2]) < context.number("NAV_MC_ALT_RAD")
+                hypot(north - position[0], east - position[1]) < _NEAR_M
+                and abs(down - position[2]) < context.number("NAV_MC_ALT_RAD")
                 and down < self._lowest_d() + _CLEAR_M
             )
             return
@@ -209,8 +209,8 @@ class Orbit(FlightMode):
         radius_m = context.number("MC_ORBIT_RAD")
         yaw = context.state.yaw_rad
         north, east, _ = context.stop_point()
-        place = context.geodetic_of((north + radius_m * cos(yaw), east + radius_m * sin(yaw), 0.0))
-        return OrbitRequest(lat_deg=place[0], lon_deg=place[1])
+        position = context.geodetic_of((north + radius_m * cos(yaw), east + radius_m * sin(yaw), 0.0))
+        return OrbitRequest(lat_deg=position[0], lon_deg=position[1])
 
 
 def _denied(reason: str) -> Reply:

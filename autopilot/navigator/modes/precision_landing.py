@@ -20,7 +20,7 @@ FRESH_US = 1_000_000  # older sightings say nothing about now
 _ACCEL_STD_M_S2 = 0.3  # of a platform that stands or moves steadily; guess
 _SIGHT_STD_M = 0.1  # of one sighting; guess
 _LOWEST_M = 1.0  # height above the ground of the approach, at least: nobody flies sideways below that; guess
-_CENTRED_SHARE = 3.0  # times PLD_HACC_RAD: further off the descent stops until it is centred again; guess
+_CENTRED_FRACTION = 3.0  # times PLD_HACC_RAD: further off the descent stops until it is centred again; guess
 
 
 class _Phase(IntEnum):
@@ -88,26 +88,26 @@ class PrecisionLand(FlightMode):
         if now_us - target.heard_us > context.number("PLD_BTOUT") * 1e6:
             self._search()
             return
-        place = target.at(now_us)
+        position = target.at(now_us)
         here = context.state.estimate.pos_ned
-        off_m = hypot(here[0] - place[0], here[1] - place[1])
+        off_m = hypot(here[0] - position[0], here[1] - position[1])
         height_m, _ = context.height_above_ground()
         reach_m = max(context.number("PLD_HACC_RAD"), 0.05)
         if self._phase is _Phase.APPROACH and off_m < reach_m:
             self._phase = _Phase.DESCEND
-        elif self._phase is _Phase.DESCEND and off_m > _CENTRED_SHARE * reach_m and self.sees_target:
+        elif self._phase is _Phase.DESCEND and off_m > _CENTRED_FRACTION * reach_m and self.sees_target:
             self._approach()
         if self._phase is _Phase.DESCEND:
             if height_m < context.craft.standing_height_m + context.number("PLD_FAPPR_ALT"):
                 self._phase = _Phase.LAND
-                self._landing.start(place[0], place[1], self._yaw)
+                self._landing.start(position[0], position[1], self._yaw)
                 self._landing.frame()
                 return
             context.is_landing = True
             speed = context.number("MPC_LAND_SPEED")
-            context.setpoint.track_down((place[0], place[1]), target.vel_ned, speed, self._yaw)
+            context.setpoint.track_down((position[0], position[1]), target.vel_ned, speed, self._yaw)
         else:
-            context.setpoint.track((place[0], place[1], self._approach_d), target.vel_ned, self._yaw)
+            context.setpoint.track((position[0], position[1], self._approach_d), target.vel_ned, self._yaw)
 
     def _approach(self) -> None:
         context = self._context

@@ -106,7 +106,7 @@ class Return(FlightMode):
         """Down coordinate [m] of the way back, from the heights and the cone that the parameters give."""
         context = self._context
         destination = self._destination
-        way_m = hypot(here[0] - destination.place[0], here[1] - destination.place[1])
+        way_m = hypot(here[0] - destination.position[0], here[1] - destination.position[1])
         if way_m < context.number("RTL_MIN_DIST"):
             return here[2]
         height = context.number("RTL_RETURN_ALT")
@@ -115,17 +115,17 @@ class Return(FlightMode):
             lowest = min(context.number("RTL_DESCEND_ALT"), height)
             height = max(min(height, way_m / tan(radians(min(cone_deg, 89.9)))), lowest)
         home_d = context.state.home_ned[2]
-        down = (home_d if destination.landing_item is not None else destination.place[2]) - height
+        down = (home_d if destination.landing_item is not None else destination.position[2]) - height
         if destination.landing_item is not None:
-            down = min(down, destination.place[2])
+            down = min(down, destination.position[2])
         if isfinite(destination.lowest_d):
             down = min(down, destination.lowest_d)
         return down
 
     def _cruise(self) -> None:
         """Flies to the destination, around what the fence excludes."""
-        place = self._destination.place
-        goal = (place[0], place[1], self._back_d)
+        position = self._destination.position
+        goal = (position[0], position[1], self._back_d)
         points = self._fence.way(self._start, goal)
         say = self._context.announcer.statustext
         if points is None:
@@ -138,7 +138,7 @@ class Return(FlightMode):
     def _fly_back(self, here: Vector) -> None:
         """Along the mission's places, at their heights."""
         *_, last = self._destination.back
-        home = self._destination.place
+        home = self._destination.position
         self._back_d = last[2]
         self._phase = _Phase.WAY
         self._way.start(here, [*self._destination.back, (home[0], home[1], last[2])])
@@ -147,7 +147,7 @@ class Return(FlightMode):
         destination = self._destination
         if destination.landing_item is None:
             self._phase = _Phase.ARRIVED
-            self._arrival.start(destination.place, destination.yaw, self._back_d)
+            self._arrival.start(destination.position, destination.yaw, self._back_d)
             return
         self._phase = _Phase.MISSION
         self._mission.set_current(destination.landing_item)

@@ -28,7 +28,7 @@ class ReturnType(IntEnum):
 class Destination:
     """The end of a return."""
 
-    place: Vector  # [m] on the ground, or of the mission item where a landing begins
+    position: Vector  # [m] on the ground, or of the mission item where a landing begins
     name: str
     yaw: float = nan  # [rad] to land with
     lowest_d: float = nan  # [m] down coordinate below which the way there does not lead
@@ -43,7 +43,7 @@ class Destinations:
         context: what the navigator's modes share.
         rally: the stored rally points.
         mission: the stored mission.
-        fence: what lies outside of it is no place to return to.
+        fence: what lies outside of it is no position to return to.
     """
 
     __slots__ = ("_context", "_fence", "_mission", "_rally")
@@ -55,38 +55,38 @@ class Destinations:
         self._fence = fence
 
     def choose(self) -> Destination:
-        """The destination for RTL_TYPE and the present place; home if there is nothing else."""
+        """The destination for RTL_TYPE and the present position; home if there is nothing else."""
         kind = ReturnType(int(self._context.number("RTL_TYPE")))
         home = self.home()
         if kind in (ReturnType.ALONG_MISSION, ReturnType.ALONG_MISSION_SHORTER):
             return self._along_mission(home, is_shorter_chosen=kind is ReturnType.ALONG_MISSION_SHORTER)
-        places = self._rally_places()
+        positions = self._rally_positions()
         if kind in (ReturnType.RALLY_OR_LANDING, ReturnType.NEAREST_OF_ALL):
-            places += self._landings()
+            positions += self._landings()
         if kind in (ReturnType.NEAREST_SAFE_POINT, ReturnType.NEAREST_OF_ALL):
-            places.insert(0, home)  # first: of equal ways the one home
-        return min(places, key=self._way_m, default=home)
+            positions.insert(0, home)  # first: of equal ways the one home
+        return min(positions, key=self._way_m, default=home)
 
     def home(self) -> Destination:
-        """The place of the take-off, or the one a client has set."""
+        """The position of the take-off, or the one a client has set."""
         state = self._context.state
         return Destination(state.home_ned, "home", state.home_yaw_rad)
 
-    def _rally_places(self) -> list[Destination]:
+    def _rally_positions(self) -> list[Destination]:
         home_d = self._context.state.home_ned[2]
-        places = []
+        positions = []
         for item in self._rally.items:
-            north, east, down = self._place_of(item)
+            north, east, down = self._position_of(item)
             if not self._fence.refusal((north, east, home_d)):
                 name = f"rally point {item.seq + 1}"
-                places.append(Destination((north, east, home_d), name, lowest_d=min(down, home_d)))
-        return places
+                positions.append(Destination((north, east, home_d), name, lowest_d=min(down, home_d)))
+        return positions
 
     def _landings(self) -> list[Destination]:
         item = self._mission.landing_sequence()
         if item is None:
             return []
-        return [Destination(self._mission.place_after(item), "mission landing", landing_item=item)]
+        return [Destination(self._mission.position_after(item), "mission landing", landing_item=item)]
 
     def _along_mission(self, home: Destination, *, is_shorter_chosen: bool) -> Destination:
         state = self._context.state
@@ -94,13 +94,13 @@ class Destinations:
         current = state.mission_current if self._mission.is_begun else 0
         if landing is not None and not (is_shorter_chosen and current < landing - current):
             first = current if self._mission.is_begun and current < landing else landing
-            return Destination(self._mission.place_after(first), "mission landing", landing_item=first)
+            return Destination(self._mission.position_after(first), "mission landing", landing_item=first)
         if not self._mission.is_begun:
             return home
-        back = tuple(place for seq, place in self._mission.places() if seq < current)
-        return Destination(home.place, "home along the mission", home.yaw, back=back[::-1])
+        back = tuple(position for seq, position in self._mission.positions() if seq < current)
+        return Destination(home.position, "home along the mission", home.yaw, back=back[::-1])
 
-    def _place_of(self, item: MissionItem) -> Vector:
+    def _position_of(self, item: MissionItem) -> Vector:
         context = self._context
         alt_m = item.z
         if item.frame in RELATIVE_FRAMES:
@@ -109,4 +109,4 @@ class Destinations:
 
     def _way_m(self, destination: Destination) -> float:
         north, east, _ = self._context.state.estimate.pos_ned
-        return hypot(destination.place[0] - north, destination.place[1] - east)
+        return hypot(destination.position[0] - north, destination.position[1] - east)

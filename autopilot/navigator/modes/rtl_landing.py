@@ -1,4 +1,4 @@
-"""The end of a return: over the place, down to a waiting height, wait, land."""
+"""The end of a return: over the position, down to a waiting height, wait, land."""
 
 from enum import IntEnum
 from math import isfinite
@@ -29,16 +29,16 @@ class Arrival:
         self._yaw = 0.0
         self._until_us = 0
 
-    def start(self, place: Vector, yaw: float, from_d: float) -> None:
-        """Begins over a place on the ground [m], at a height (down coordinate), to land with a heading (NaN: any)."""
+    def start(self, position: Vector, yaw: float, from_d: float) -> None:
+        """Begins over a position on the ground [m], at a height (down coordinate), to land with a heading, NaN: any."""
         context = self._context
         self._yaw = yaw if isfinite(yaw) else context.state.yaw_rad
         if context.number("RTL_LAND_DELAY") == 0.0:
-            self._target = place
+            self._target = position
             self._land()
             return
-        wait_d = place[2] - context.number("RTL_DESCEND_ALT")
-        self._target = (place[0], place[1], max(from_d, wait_d))
+        wait_d = position[2] - context.number("RTL_DESCEND_ALT")
+        self._target = (position[0], position[1], max(from_d, wait_d))
         self._phase = _Phase.DESCEND
         context.fly_to(self._target, self._yaw)
 

@@ -11,10 +11,10 @@ from autopilot.interface.mode_spec import FlightMode
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.land import slowed_near_ground
 from autopilot.navigator.setpoint import Quaternion
-from autopilot.navigator.takeoff_intent import LIFT_SHARE
+from autopilot.navigator.takeoff_intent import LIFT_FRACTION
 
 _TAKEOFF_THROTTLE = 0.3  # of the way from the middle to the top, from which a vehicle on the ground takes off (PX4)
-_VOLTAGE_SHARE_MIN = 0.6  # as the control part
+_VOLTAGE_FRACTION_MIN = 0.6  # as the control part
 _VOLTAGE_TIME_S = 1.0  # guess
 _LEVEL: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
@@ -26,11 +26,11 @@ class Throttle:
     of what the motors can do at the present voltage.
     """
 
-    __slots__ = ("_context", "_time_us", "_voltage_share")
+    __slots__ = ("_context", "_time_us", "_voltage_fraction")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
-        self._voltage_share = 1.0  # of a full battery
+        self._voltage_fraction = 1.0  # of a full battery
         self._time_us = 0
 
     def thrust(self, least: float) -> float:
@@ -40,20 +40,20 @@ class Throttle:
         most = context.number("MPC_THR_MAX")
         if context.number("MPC_THR_CURVE"):
             return least + 0.5 * (throttle + 1.0) * (most - least)
-        hover = min(context.number("MPC_THR_HOVER") / self._share() ** 2, most)
+        hover = min(context.number("MPC_THR_HOVER") / self._fraction() ** 2, most)
         return hover + throttle * (most - hover if throttle > 0.0 else hover - least)
 
-    def _share(self) -> float:
+    def _fraction(self) -> float:
         """Voltage over that of the full battery, low-passed: the load's own ups and downs do not count."""
         context = self._context
         now_us, voltage_v = context.state.time_us, context.state.samples.battery.voltage_v
         full_v = context.number("BAT1_N_CELLS") * context.number("BAT1_V_CHARGED")
         if voltage_v > 0.0 and full_v > 0.0:
-            measured = min(max(voltage_v / full_v, _VOLTAGE_SHARE_MIN), 1.0)
+            measured = min(max(voltage_v / full_v, _VOLTAGE_FRACTION_MIN), 1.0)
             dt_s = (now_us - self._time_us) * 1e-6  # long since it was last flown: begins anew
-            self._voltage_share += (measured - self._voltage_share) * min(dt_s / _VOLTAGE_TIME_S, 1.0)
+            self._voltage_fraction += (measured - self._voltage_fraction) * min(dt_s / _VOLTAGE_TIME_S, 1.0)
         self._time_us = now_us
-        return self._voltage_share
+        return self._voltage_fraction
 
 
 class StickMode(FlightMode):
@@ -84,7 +84,7 @@ class Stabilized(ThrustMode):
         context = self._context
         thrust = self._throttle.thrust(context.number("MPC_MANTHR_MIN"))
         if context.is_on_ground:
-            context.wants_lift = thrust > LIFT_SHARE * context.craft.lift_thrust
+            context.wants_lift = thrust > LIFT_FRACTION * context.craft.lift_thrust
         else:
             context.setpoint.tilt(lean_of(context), yaw_rate_of(context), thrust)
 
@@ -98,7 +98,7 @@ class Acro(ThrustMode):
         context = self._context
         thrust = self._throttle.thrust(0.0)
         if context.is_on_ground:
-            context.wants_lift = thrust > LIFT_SHARE * context.craft.lift_thrust
+            context.wants_lift = thrust > LIFT_FRACTION * context.craft.lift_thrust
             return
         sticks, number = context.state.sticks, context.number
         expo, super_expo = number("MC_ACRO_EXPO"), number("MC_ACRO_SUPEXPO")
@@ -127,7 +127,7 @@ class Altitude(StickMode):
 
 
 class Position(StickMode):
-    """Mode Position: velocity by sticks, forward being where the nose points; sticks in the middle hold the place."""
+    """Mode Position: velocity by sticks, forward where the nose points; sticks in the middle hold the position."""
 
     __slots__ = ()
 
@@ -160,8 +160,8 @@ def lean_of(context: NavContext) -> Quaternion:
     if length == 0.0:
         return _LEVEL
     half = 0.5 * radians(context.number("MPC_MAN_TILT_MAX")) * min(length, 1.0)
-    share = sin(half) / length
-    return (sticks.roll * share, -sticks.pitch * share, 0.0, cos(half))
+    fraction = sin(half) / length
+    return (sticks.roll * fraction, -sticks.pitch * fraction, 0.0, cos(half))
 
 
 def yaw_rate_of(context: NavContext) -> float:

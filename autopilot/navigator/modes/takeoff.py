@@ -1,4 +1,4 @@
-"""Take-off: a vertical climb over the place where it began."""
+"""Take-off: a vertical climb over the position where it began."""
 
 from math import isfinite, nan
 

@@ -1,6 +1,6 @@
 """The vehicle's own track since take-off, kept short enough to remember: what a smart return flies back along.
 
-A place is kept every SRTL_ACCURACY metres. When SRTL_POINTS are full, what lies on a straight line is dropped (Ramer,
+A position is kept every SRTL_ACCURACY metres. When SRTL_POINTS are full, points on a straight line are dropped (Ramer,
 1972; Douglas and Peucker, 1973), and loops are cut where the track comes close to itself.
 """
 
@@ -12,7 +12,7 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 
 _PERIOD_US = 200_000  # between two looks; at the highest speed that is within the default accuracy
-_ROOM_SHARE = 0.9  # of the points: if tidying leaves more, there is no room to go on
+_ROOM_FRACTION = 0.9  # of the points: if tidying leaves more, there is no room to go on
 _DENSE_MAX = 600  # points among which loops are looked for; bounds the time that takes
 _ROWS = 32  # points whose passages are looked for at once
 _Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Breadcrumbs:
         most = context.number("SRTL_POINTS")
         if len(points) >= most:
             self.tidy()
-            if len(self.points) > _ROOM_SHARE * most:
+            if len(self.points) > _ROOM_FRACTION * most:
                 self._is_full = True
                 context.announcer.statustext(Severity.WARNING, "Smart return is not possible any more: track too long")
 
@@ -83,8 +83,8 @@ def with_steps(points: _Array, longest_m: float) -> _Array:
     step_m = max(longest_m, float(lengths.sum()) / _DENSE_MAX)
     counts = np.maximum(np.ceil(lengths / step_m).astype(np.int64), 1)
     i_leg = np.repeat(np.arange(len(counts)), counts)
-    share = (np.arange(len(i_leg)) - (np.cumsum(counts) - counts)[i_leg]) / counts[i_leg]
-    between = points[i_leg] + share[:, None] * (points[1:] - points[:-1])[i_leg]
+    fraction = (np.arange(len(i_leg)) - (np.cumsum(counts) - counts)[i_leg]) / counts[i_leg]
+    between = points[i_leg] + fraction[:, None] * (points[1:] - points[:-1])[i_leg]
     return np.concatenate([between, points[-1:]])
 
 
@@ -134,9 +134,9 @@ def _last_passages(points: _Array, first: int, near_m: float) -> NDArray[np.int6
     way = ends - starts
     length_sq = np.maximum(np.sum(way * way, axis=1), 1e-9)
     along = here @ way.T - np.sum(starts * way, axis=1)
-    share = np.minimum(np.maximum(along / length_sq, 0.0), 1.0)
+    fraction = np.minimum(np.maximum(along / length_sq, 0.0), 1.0)
     off_sq = np.sum(here * here, axis=1)[:, None] - 2.0 * here @ starts.T + np.sum(starts * starts, axis=1)
-    off_sq += share * (share * length_sq - 2.0 * along)
+    off_sq += fraction * (fraction * length_sq - 2.0 * along)
     is_later = np.arange(len(starts)) >= np.arange(len(here))[:, None]
     is_near = is_later & (off_sq < near_m * near_m)
     last = len(starts) - 1 - np.argmax(is_near[:, ::-1], axis=1)
@@ -148,6 +148,6 @@ def _off_segment_sq(points: _Array, start: _Array, end: _Array) -> _Array:
     way, there = end - start, points - start
     length_sq = max(float(way @ way), 1e-9)
     along = there @ way
-    share = np.minimum(np.maximum(along / length_sq, 0.0), 1.0)
-    off_sq: _Array = np.einsum("ij,ij->i", there, there) + share * (share * length_sq - 2.0 * along)
+    fraction = np.minimum(np.maximum(along / length_sq, 0.0), 1.0)
+    off_sq: _Array = np.einsum("ij,ij->i", there, there) + fraction * (fraction * length_sq - 2.0 * along)
     return off_sq

@@ -18,7 +18,9 @@ from common.attitude import wrapped
 
 _NODES_MAX = 160  # corners of a way, those nearest to the direct one first
 _STEPS_MAX = 600  # per stretch; a longer one counts as closed
-_CORNER_SHARE = 1.5  # corners are passed at this multiple of the margin, so that the stretches between keep the margin
+_CORNER_FRACTION = (
+    1.5  # corners are passed at this multiple of the margin, so that the stretches between keep the margin
+)
 _CIRCLE_CORNERS = 12
 _TURN_PER_CORNER = 0.5 * pi
 _EXIT_COURSES = 48
@@ -54,7 +56,7 @@ class Bounds:
         done = np.zeros(len(ends))
         is_open = np.ones(len(ends), dtype=bool)
         left = np.flatnonzero(length > 0.0)
-        step = 0.5 * self.margin_m * (_CORNER_SHARE - 1.0)
+        step = 0.5 * self.margin_m * (_CORNER_FRACTION - 1.0)
         for _ in range(_STEPS_MAX):
             if not len(left):
                 return is_open
@@ -85,16 +87,16 @@ def detour(bounds: Bounds, start: Point, goal: Point) -> list[Point] | None:
     return way
 
 
-def _nearest_open(bounds: Bounds, place: Point, other: Point) -> Point | None:
-    """The place, or the nearest one that keeps the margin: of several the nearest to `other`."""
-    clearance = float(bounds.clearances(np.array([place]))[0])
+def _nearest_open(bounds: Bounds, position: Point, other: Point) -> Point | None:
+    """The position, or the nearest one that keeps the margin: of several the nearest to `other`."""
+    clearance = float(bounds.clearances(np.array([position]))[0])
     if clearance >= bounds.margin_m:
-        return place
+        return position
     courses = np.linspace(0.0, 2.0 * pi, _EXIT_COURSES, endpoint=False)
     ring = np.stack((np.cos(courses), np.sin(courses)), axis=1)
     radius = bounds.margin_m - clearance
     for _ in range(_EXIT_RINGS):
-        points = np.array(place) + radius * ring
+        points = np.array(position) + radius * ring
         is_open = bounds.clearances(points) >= bounds.margin_m
         if is_open.any():
             candidates = points[is_open]
@@ -144,7 +146,7 @@ def _traced(nodes: FloatArray, came_from: NDArray[np.int64]) -> list[Point]:
 
 def _corners(bounds: Bounds, start: Point, goal: Point) -> list[Point]:
     """Points around every corner, those that keep the margin, nearest to the direct way first."""
-    distance = _CORNER_SHARE * bounds.margin_m
+    distance = _CORNER_FRACTION * bounds.margin_m
     points: list[Point] = []
     for vertices, is_inclusion in bounds.region.polygons:
         points += _around_polygon(vertices, distance, is_inclusion=is_inclusion)

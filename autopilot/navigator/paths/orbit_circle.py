@@ -8,11 +8,11 @@ from math import atan2, cos, hypot, pi, sin, sqrt
 from autopilot.navigator.setpoint import Vector
 from common.attitude import wrapped
 
-ACCEL_SHARE = 0.6  # of MPC_ACC_HOR that a circle may take; the rest keeps to it in wind: guess
+ACCEL_FRACTION = 0.6  # of MPC_ACC_HOR that a circle may take; the rest keeps to it in wind: guess
 
 
 class Circle:
-    """A circle flown at a constant speed, starting at the point of it nearest to a place.
+    """A circle flown at a constant speed, starting at the point of it nearest to a position.
 
     Args:
         centre_ned: [m]; its height is that of the circle.
@@ -66,4 +66,4 @@ class Circle:
 
 def speed_limit(radius_m: float, accel_max: float) -> float:
     """The speed [m/s] with which a circle can be flown with an acceleration [m/s²] of the vehicle."""
-    return sqrt(ACCEL_SHARE * accel_max * abs(radius_m))
+    return sqrt(ACCEL_FRACTION * accel_max * abs(radius_m))

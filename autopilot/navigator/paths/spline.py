@@ -1,4 +1,4 @@
-"""Curved ways: splines, turns round a place, and a point that moves along them as fast as the bends allow.
+"""Curved ways: splines, turns round a position, and a point that moves along them as fast as the bends allow.
 
 The vehicle is asked to be with that point, at its velocity; the point waits for a vehicle that lags behind.
 """
@@ -70,15 +70,15 @@ class Polyline:
             self._speeds[k] = min(self._speeds[k], sqrt(self._speeds[k + 1] ** 2 + self._brake * reach))
 
     def at(self, way: float) -> tuple[Vector, Vector]:
-        k, share = self._find(way)
-        return _mix(self._points[k], self._points[k + 1], share), _mix(
-            self._directions[k], self._directions[k + 1], share
+        k, fraction = self._find(way)
+        return _mix(self._points[k], self._points[k + 1], fraction), _mix(
+            self._directions[k], self._directions[k + 1], fraction
         )
 
     def top_speed(self, way: float) -> float:
-        k, share = self._find(way)
+        k, fraction = self._find(way)
         speeds = self._speeds
-        return speeds[k] + (speeds[k + 1] - speeds[k]) * share
+        return speeds[k] + (speeds[k + 1] - speeds[k]) * fraction
 
     def _find(self, way: float) -> tuple[int, float]:
         k = min(max(bisect_right(self._ways, way) - 1, 0), len(self._ways) - 2)
@@ -150,8 +150,8 @@ class Runner:
     def step(self, here: Vector) -> tuple[Vector, Vector]:
         """Moves on by one frame and returns place [m] and velocity [m/s]; `here` is where the vehicle is."""
         pace, curve = self._pace, self.curve
-        place, _ = curve.at(self.way)
-        share = min(max(2.0 - 2.0 * distance(place, here) / pace.lag_max, 0.0), 1.0)
+        position, _ = curve.at(self.way)
+        fraction = min(max(2.0 - 2.0 * distance(position, here) / pace.lag_max, 0.0), 1.0)
         top = curve.top_speed(self.way)
         if self.speed < top:
             self._accel = min(self._accel + pace.jerk * _FRAME_S, pace.accel)
@@ -159,10 +159,10 @@ class Runner:
         else:
             self._accel = 0.0
             self.speed = max(self.speed - pace.accel * _FRAME_S, top)
-        self.way = min(self.way + share * self.speed * _FRAME_S, curve.length)
-        place, (north, east, down) = curve.at(self.way)
-        flown = 0.0 if self.way >= curve.length else share * self.speed
-        return place, (north * flown, east * flown, down * flown)
+        self.way = min(self.way + fraction * self.speed * _FRAME_S, curve.length)
+        position, (north, east, down) = curve.at(self.way)
+        flown = 0.0 if self.way >= curve.length else fraction * self.speed
+        return position, (north * flown, east * flown, down * flown)
 
 
 def spline(start: Vector, start_along: Vector, end: Vector, end_along: Vector) -> list[Vector]:
@@ -192,7 +192,7 @@ def spline(start: Vector, start_along: Vector, end: Vector, end_along: Vector) -
 
 
 def bearing(from_ned: Vector, to_ned: Vector) -> float:
-    """Direction [rad] from one place to another."""
+    """Direction [rad] from one position to another."""
     return atan2(to_ned[1] - from_ned[1], to_ned[0] - from_ned[0])
 
 
@@ -207,9 +207,9 @@ def _direction(a: Vector, b: Vector) -> Vector:
 
 def _scaled(vector: Vector, length: float) -> Vector:
     size = sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    share = length / size if size > 1e-6 else 0.0
-    return vector[0] * share, vector[1] * share, vector[2] * share
+    fraction = length / size if size > 1e-6 else 0.0
+    return vector[0] * fraction, vector[1] * fraction, vector[2] * fraction
 
 
-def _mix(a: Vector, b: Vector, share: float) -> Vector:
-    return a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share, a[2] + (b[2] - a[2]) * share
+def _mix(a: Vector, b: Vector, fraction: float) -> Vector:
+    return a[0] + (b[0] - a[0]) * fraction, a[1] + (b[1] - a[1]) * fraction, a[2] + (b[2] - a[2]) * fraction

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from math import hypot, isfinite, nan, sqrt
 
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.mission.mission_route import CORNER_ACCEL_SHARE
+from autopilot.navigator.mission.mission_route import CORNER_ACCEL_FRACTION
 from autopilot.navigator.setpoint import Vector
 
 CORNER_RADIUS_M = 1.0  # a corner counts as reached; below the margin by which ways keep off a fence; guess
@@ -36,7 +36,7 @@ class Way:
         return len(self.points) - self._i_point
 
     def start(self, start: Vector, points: Sequence[Vector]) -> None:
-        """Begins at a place [m] to fly over the points; there is at least one."""
+        """Begins at a position [m] to fly over the points; there is at least one."""
         self.points = list(points)
         self._i_point = 0
         self._from = start
@@ -84,7 +84,7 @@ class Way:
             return 0.0  # a steep or very short stretch
         context = self._context
         limits = context.craft.limits
-        accel = CORNER_ACCEL_SHARE * context.number(limits.accel_hor)
+        accel = CORNER_ACCEL_FRACTION * context.number(limits.accel_hor)
         cosine = (in_north * out_north + in_east * out_east) / (in_length * out_length)
         tan_half_sq = max(1.0 - cosine, 1e-9) / max(1.0 + cosine, 1e-6)
         cruise = context.cruise_speed if isfinite(context.cruise_speed) else context.number(limits.cruise_speed)

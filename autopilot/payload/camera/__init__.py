@@ -1,1 +1,1 @@
-"""The camera the vehicle carries: pictures, video, lens, storage."""
+"""The camera the vehicle carries: images, video, lens, storage."""

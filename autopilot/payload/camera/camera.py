@@ -47,7 +47,7 @@ class Shot:
 
     index: int
     time_us: int
-    place: GeoPoint
+    position: GeoPoint
     above_home_m: float
     q_ned_from_frd: Quat  # of the camera body: x ahead
     name: str
@@ -209,7 +209,7 @@ class Camera:
             shot, view, frame = self._pending.popleft()
             is_stored = self._store(shot.name, view, frame.result())
             shot = Shot(
-                shot.index, shot.time_us, shot.place, shot.above_home_m, shot.q_ned_from_frd, shot.name, is_stored
+                shot.index, shot.time_us, shot.position, shot.above_home_m, shot.q_ned_from_frd, shot.name, is_stored
             )
             self.shots.append(shot)
             for listener in self._listeners:
@@ -302,7 +302,7 @@ class Camera:
         return CameraMode(int(self.settings[MODE]))
 
     def set_mode(self, mode: float) -> Reply:
-        """Image, video or survey; both kinds of picture can be taken in each."""
+        """Image, video or survey; both kinds of image can be taken in each."""
         if mode not in (0.0, 1.0, 2.0):
             return Reply(Verdict.DENIED, f"there is no camera mode {mode:g}")
         self.settings.set(MODE, mode)
@@ -322,7 +322,7 @@ class Camera:
         return ACCEPTED
 
     def format_storage(self) -> Reply:
-        """Removes all pictures."""
+        """Removes all images."""
         if self.media is None:
             return Reply(Verdict.FAILED, "no storage")
         if self.recording is not None or self.trigger.is_active or self.is_taking_photo:

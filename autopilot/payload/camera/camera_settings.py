@@ -1,4 +1,4 @@
-"""What a client may set on the camera (PARAM_EXT, and the definition file): each changes the pictures."""
+"""What a client may set on the camera (PARAM_EXT, and the definition file): each changes the images."""
 
 from dataclasses import dataclass
 

@@ -1,6 +1,6 @@
 """From the sensor's frame to a file: the lens's blur, JPEG, video.
 
-OpenCV does the work; it is imported when the first picture is taken.
+OpenCV does the work; it is imported when the first image is taken.
 """
 
 from math import radians, tan
@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from autopilot.payload.camera.lens import APERTURE_M
 from autopilot.payload.camera.ports import RawFrame, Writer
 
-_BLUR_PIXELS = (1.5, 3.0, 6.0)  # diameters of the blurred copies that the picture is put together from
+_BLUR_PIXELS = (1.5, 3.0, 6.0)  # diameters of the blurred copies that the image is put together from
 _SHARP_PIXELS = 0.75  # blur below it cannot be seen
 
 
 def prepare() -> None:
-    """Imports OpenCV, so that the first picture need not wait for it."""
+    """Imports OpenCV, so that the first image need not wait for it."""
     import cv2
 
-    cv2.setNumThreads(1)  # small pictures: the other cores belong to the flight
+    cv2.setNumThreads(1)  # small images: the other cores belong to the flight
 
 
 def defocused(frame: RawFrame, hfov_deg: float, zoom: float, focus_m: float) -> NDArray[np.uint8]:
-    """The picture of a thin lens: what is not at the distance in focus becomes a disc of confusion.
+    """The image of a thin lens: what is not at the distance in focus becomes a disc of confusion.
 
     Args:
         frame: the sharp frame.
@@ -38,17 +38,17 @@ def defocused(frame: RawFrame, hfov_deg: float, zoom: float, focus_m: float) -> 
         return frame.rgb
     import cv2
 
-    picture = frame.rgb.copy()
+    image = frame.rgb.copy()
     for diameter in _BLUR_PIXELS:
         is_blurred = disc >= _SHARP_PIXELS * diameter
         if is_blurred.any():
             blurred = cv2.GaussianBlur(frame.rgb, (0, 0), 0.5 * diameter)
-            picture[is_blurred] = blurred[is_blurred]
-    return picture
+            image[is_blurred] = blurred[is_blurred]
+    return image
 
 
 def jpeg_bytes(rgb: NDArray[np.uint8], quality: int = 85) -> bytes:
-    """The picture as a JPEG file.
+    """The image as a JPEG file.
 
     Raises:
         ValueError: it cannot be encoded.

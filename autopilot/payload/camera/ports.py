@@ -43,10 +43,10 @@ class FrameSource(Protocol):
 
 
 class VideoStream(Protocol):
-    """A live picture that clients may watch."""
+    """A live image that clients may watch."""
 
     uri: str  # its address; of RTP: the UDP port that a station listens on
-    is_rtp: bool  # H.264 in RTP packets over UDP; otherwise pictures over HTTP
+    is_rtp: bool  # H.264 in RTP packets over UDP; otherwise images over HTTP
     width: int
     height: int
     rate_hz: float

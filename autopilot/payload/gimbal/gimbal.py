@@ -1,6 +1,6 @@
 """The gimbal: keeps the camera level and pointed, whatever the vehicle does.
 
-In: where to point (angles, rates, a place on earth), the vehicle's attitude by estimate. Out: the camera's attitude.
+In: where to point (angles, rates, a position on earth), the vehicle's attitude by estimate. Out: the camera's attitude.
 Its motors have a largest rate and a range. It is worked out when somebody asks for it, not in every frame: it has moved
 then by what its motors could do since. Left out: motor dynamics, the error of its own gyro.
 """
@@ -102,12 +102,12 @@ class Gimbal:
         self.point(0.0, 0.0, is_yaw_locked=False)
 
     def look_at(self, pos_ned: tuple[float, float, float]) -> None:
-        """Follows a place on earth [m]."""
+        """Follows a position on earth [m]."""
         self.update()
         self.aim = Aim(pitch=self.pitch, yaw=self.yaw, roi_ned=pos_ned)
 
     def look_away(self) -> None:
-        """Stops following a place; back to neutral."""
+        """Stops following a position; back to neutral."""
         if self.aim.roi_ned is not None:
             self.neutral()
 

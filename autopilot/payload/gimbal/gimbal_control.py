@@ -177,9 +177,9 @@ class GimbalControl:
         return refusal or ACCEPTED
 
     def _set_roi(self, params: Params, x: float, y: float, z: float, client: Client) -> Reply:
-        """The older forms: MAV_ROI in parameter 1, 0 none (but some send a place with it), 1 ahead, 3 a place."""
-        has_place = isfinite(x) and isfinite(y) and (x != 0.0 or y != 0.0)
-        if params[0] == 3.0 or (params[0] == 0.0 and has_place):
+        """The older forms: MAV_ROI in parameter 1, 0 none (but some send a position with it), 1 ahead, 3 a position."""
+        has_position = isfinite(x) and isfinite(y) and (x != 0.0 or y != 0.0)
+        if params[0] == 3.0 or (params[0] == 0.0 and has_position):
             return self._look_at(x, y, z, client)
         if params[0] in (0.0, 1.0):
             return self._look_away(client)
@@ -209,7 +209,7 @@ class GimbalControl:
         if mode == 2.0:
             self.gimbal.point(radians(params[0]), radians(params[2]), is_yaw_locked=False)
             return ACCEPTED
-        if mode == 4.0:  # a place; its altitude is parameter 4
+        if mode == 4.0:  # a position; its altitude is parameter 4
             scale = 1e-7 if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0 else 1.0  # sent either way
             return self._look_at(lat_deg * scale, lon_deg * scale, params[3], client)
         if mode == 6.0 and self._state.home is not None:

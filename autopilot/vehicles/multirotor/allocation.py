@@ -30,10 +30,10 @@ def speed_share(command: float, curve: float) -> float:
 
 
 @wp.func
-def command_for_speed(share: float, curve: float) -> float:
+def command_for_speed(fraction: float, curve: float) -> float:
     """Motor command for a rotor speed over greatest speed: the inverse of `speed_share`."""
     straight = 1.0 - curve
-    root = 2.0 * share / wp.max(straight + wp.sqrt(straight * straight + 4.0 * curve * share), _TINY)
+    root = 2.0 * fraction / wp.max(straight + wp.sqrt(straight * straight + 4.0 * curve * fraction), _TINY)
     return root * root
 
 
@@ -65,22 +65,22 @@ def fitting_collective(airframe: ControlAirframe, thrusts: vec8, collective_n: f
     most = float(_BIG)
     for i in range(airframe.rotor_count):
         if is_used(airframe, i):
-            share = wp.max(airframe.mix_thrust[i], _TINY)
-            least = wp.max(least, (low - thrusts[i]) / share)
-            most = wp.min(most, (high - thrusts[i]) / share)
+            fraction = wp.max(airframe.mix_thrust[i], _TINY)
+            least = wp.max(least, (low - thrusts[i]) / fraction)
+            most = wp.min(most, (high - thrusts[i]) / fraction)
     return wp.min(wp.max(collective_n, least), most)
 
 
 @wp.func
 def fitting_share(airframe: ControlAirframe, thrusts: vec8, change: vec8, low: float, high: float) -> float:
     """The greatest share [0..1] of `change` that keeps every rotor within [low, high]."""
-    share = float(1.0)
+    fraction = float(1.0)
     for i in range(airframe.rotor_count):
         if change[i] > _TINY:
-            share = wp.min(share, (high - thrusts[i]) / change[i])
+            fraction = wp.min(fraction, (high - thrusts[i]) / change[i])
         if change[i] < -_TINY:
-            share = wp.min(share, (low - thrusts[i]) / change[i])
-    return wp.clamp(share, 0.0, 1.0)
+            fraction = wp.min(fraction, (low - thrusts[i]) / change[i])
+    return wp.clamp(fraction, 0.0, 1.0)
 
 
 @wp.func
@@ -131,13 +131,13 @@ def allocate(
 
 
 @wp.func
-def motor_commands(airframe: ControlAirframe, thrusts_n: vec8, voltage_share: float) -> vec8:
+def motor_commands(airframe: ControlAirframe, thrusts_n: vec8, voltage_fraction: float) -> vec8:
     """Motor commands [0..1] for rotor thrusts at a battery voltage over the full one."""
     commands = vec8()
-    top = airframe.max_speed_rad_s * voltage_share
+    top = airframe.max_speed_rad_s * voltage_fraction
     per_newton = 1.0 / (airframe.thrust_n_s2 * top * top)
     for i in range(airframe.rotor_count):
-        share = wp.sqrt(wp.clamp(thrusts_n[i] * per_newton, 0.0, 1.0))
-        command = command_for_speed(share, airframe.command_curve)
+        fraction = wp.sqrt(wp.clamp(thrusts_n[i] * per_newton, 0.0, 1.0))
+        command = command_for_speed(fraction, airframe.command_curve)
         commands[i] = wp.clamp(command, airframe.idle_command, 1.0)
     return commands

@@ -38,9 +38,9 @@ _TICK_S = wp.constant(TICK_S)
 _FRAME_TICKS = wp.constant(FRAME_TICKS)
 _FRAME_S = wp.constant(TICK_S * FRAME_TICKS)
 _VOLTAGE_TIME_S = wp.constant(0.25)  # slower than the loops that load the battery, faster than it empties
-_VOLTAGE_SHARE_MIN = wp.constant(0.6)
+_VOLTAGE_FRACTION_MIN = wp.constant(0.6)
 _UPRIGHT_MIN = wp.constant(0.3)  # cosine of tilt below which thrust no longer holds height
-_SLACK = wp.constant(1.0e-4)  # share of the asked torque below which a remainder is rounding
+_SLACK = wp.constant(1.0e-4)  # fraction of the asked torque below which a remainder is rounding
 
 
 @wp.struct
@@ -58,8 +58,8 @@ class ControlState:
 
     kind: int  # of the last tick's setpoint, to see it change
     was_landed: int
-    ramp: float  # share of the greatest thrust allowed, grows at take-off
-    voltage_share: float  # filtered battery voltage over the full one, 0: not started
+    ramp: float  # fraction of the greatest thrust allowed, grows at take-off
+    voltage_fraction: float  # filtered battery voltage over the full one, 0: not started
     trajectory: TrajectoryState
     velocity: VelocityState
     rate: RateState
@@ -69,28 +69,28 @@ class ControlState:
 
 
 @wp.func
-def voltage_step(share: float, airframe: ControlAirframe, battery: BatterySample) -> float:
+def voltage_step(fraction: float, airframe: ControlAirframe, battery: BatterySample) -> float:
     """Filtered battery voltage over the full one; 1 without a battery sample."""
     if battery.voltage_v <= 0.0 or airframe.full_voltage_v <= 0.0:
         return 1.0
-    measured = wp.clamp(battery.voltage_v / airframe.full_voltage_v, _VOLTAGE_SHARE_MIN, 1.05)
-    if share == 0.0:
+    measured = wp.clamp(battery.voltage_v / airframe.full_voltage_v, _VOLTAGE_FRACTION_MIN, 1.05)
+    if fraction == 0.0:
         return measured
-    return share + (measured - share) * _TICK_S / _VOLTAGE_TIME_S
+    return fraction + (measured - fraction) * _TICK_S / _VOLTAGE_TIME_S
 
 
 @wp.func
-def rotor_thrust(airframe: ControlAirframe, share: float, voltage_share: float) -> float:
-    """Thrust [N] of one rotor at a share of its greatest speed and of the full battery voltage."""
-    speed = airframe.max_speed_rad_s * voltage_share * share
+def rotor_thrust(airframe: ControlAirframe, fraction: float, voltage_fraction: float) -> float:
+    """Thrust [N] of one rotor at a fraction of its greatest speed and of the full battery voltage."""
+    speed = airframe.max_speed_rad_s * voltage_fraction * fraction
     return airframe.thrust_n_s2 * speed * speed
 
 
 @wp.func
-def rest(voltage_share: float, airframe: ControlAirframe, est: Estimate, sp: Setpoint) -> ControlState:
+def rest(voltage_fraction: float, airframe: ControlAirframe, est: Estimate, sp: Setpoint) -> ControlState:
     """The state with the rotors stopped or tested, or idling when armed; everything else remembered is forgotten."""
     still = ControlState()
-    still.voltage_share = voltage_share
+    still.voltage_fraction = voltage_fraction
     still.trajectory = trajectory_at_estimate(est, 0)
     still.was_landed = 1
     still.actuators.command = sp.motor_test
@@ -99,7 +99,7 @@ def rest(voltage_share: float, airframe: ControlAirframe, est: Estimate, sp: Set
         for i in range(airframe.rotor_count):
             command[i] = airframe.idle_command
         still.actuators.command = command
-        idle_n = rotor_thrust(airframe, airframe.idle_speed_share, voltage_share)
+        idle_n = rotor_thrust(airframe, airframe.idle_speed_fraction, voltage_fraction)
         still.collective_n = float(airframe.rotor_count) * idle_n
         still.velocity.thrust_model_n = still.collective_n
     still.actuators.traj_pos_ned = est.pos_ned
@@ -166,15 +166,15 @@ def actuators_of(
     airframe: ControlAirframe,
     trajectory: TrajectoryState,
     torque_frd: wp.vec3,
-    thrust_share: float,
+    thrust_fraction: float,
     result: Allocation,
-    voltage_share: float,
+    voltage_fraction: float,
 ) -> Actuators:
     """Motor commands of an allocation and the setpoints behind it; the attitude and rate setpoints stay unset."""
     actuators = Actuators()
-    actuators.command = motor_commands(airframe, result.thrust_n, voltage_share)
+    actuators.command = motor_commands(airframe, result.thrust_n, voltage_fraction)
     actuators.torque_sp_frd = torque_frd
-    actuators.thrust_sp = thrust_share
+    actuators.thrust_sp = thrust_fraction
     short = result.torque_short_frd
     for k in range(3):
         if wp.abs(short[k]) < _SLACK * wp.abs(torque_frd[k]):
@@ -190,11 +190,11 @@ def actuators_of(
 
 @wp.func
 def started(
-    airframe: ControlAirframe, state: ControlState, est: Estimate, sp: Setpoint, voltage_share: float
+    airframe: ControlAirframe, state: ControlState, est: Estimate, sp: Setpoint, voltage_fraction: float
 ) -> ControlState:
     """The state at the beginning of an active tick: the trajectory starts afresh where control of a kind begins."""
     now = state
-    now.voltage_share = voltage_share
+    now.voltage_fraction = voltage_fraction
     now.kind = sp.kind
     now.was_landed = sp.is_landed
     if sp.kind != state.kind or state.was_landed == 1:
@@ -257,11 +257,11 @@ def inner_loops(
     if sp.is_landed == 0 and is_light(airframe, now.ramp, float(airframe.rotor_count) * rotor_max_n):
         now.rate = rate_step(params, now.rate, omega_sp_frd, now.actuators.torque_unallocated_frd, _TICK_S)
     torque_frd = rate_torque(params, now.rate, omega_sp_frd, airframe.inertia_kg_m2)
-    rotor_min_n = rotor_thrust(airframe, airframe.idle_speed_share, now.voltage_share)
+    rotor_min_n = rotor_thrust(airframe, airframe.idle_speed_fraction, now.voltage_fraction)
     result = allocate(airframe, torque_frd, collective_n, rotor_min_n, rotor_max_n)
     now.collective_n = result.collective_n
-    thrust_share = collective_n / (float(airframe.rotor_count) * rotor_max_n)
-    now.actuators = actuators_of(airframe, now.trajectory, torque_frd, thrust_share, result, now.voltage_share)
+    thrust_fraction = collective_n / (float(airframe.rotor_count) * rotor_max_n)
+    now.actuators = actuators_of(airframe, now.trajectory, torque_frd, thrust_fraction, result, now.voltage_fraction)
     now.actuators.omega_sp_frd = omega_sp_frd
     now.actuators.q_sp_ned_from_frd = now.aim.q_ned_from_frd
     return now
@@ -281,15 +281,15 @@ def control_tick(
 
     Inside branches the state is changed field by field: Warp copies a whole struct where a branch assigns it.
     """
-    voltage_share = voltage_step(state.voltage_share, airframe, battery)
+    voltage_fraction = voltage_step(state.voltage_fraction, airframe, battery)
     is_direct = sp.kind == SETPOINT_ATTITUDE or sp.kind == SETPOINT_RATE
     is_idle = sp.is_armed == 0 or sp.kind == SETPOINT_IDLE
     if is_idle or (sp.is_landed == 1 and (not is_direct or sp.thrust <= 0.0)):
-        return rest(voltage_share, airframe, est, sp)
+        return rest(voltage_fraction, airframe, est, sp)
 
-    rotor_max_n = rotor_thrust(airframe, 1.0, voltage_share)
+    rotor_max_n = rotor_thrust(airframe, 1.0, voltage_fraction)
     thrust_max_n = float(airframe.rotor_count) * rotor_max_n
-    now = started(airframe, state, est, sp, voltage_share)
+    now = started(airframe, state, est, sp, voltage_fraction)
     now.rate = filter_rates(params, now.rate, est.omega_frd, _TICK_S)
     if now.ramp >= 1.0:
         now.velocity = observe(params, airframe, now.velocity, est, now.collective_n, _TICK_S)

@@ -32,7 +32,7 @@ class ControlAirframe:
     max_speed_rad_s: float  # at full command and full battery
     command_curve: float  # a in speed share = a u + (1 - a) sqrt(u)
     idle_command: float
-    idle_speed_share: float  # speed at that command over the greatest
+    idle_speed_fraction: float  # speed at that command over the greatest
     motor_time_s: float  # first-order lag, mean of rise and fall
     full_voltage_v: float
     left_out: int  # rotors not to be used, as bits; they stay at idle and count for nothing
@@ -83,7 +83,7 @@ def control_airframe(airframe: Airframe, left_out: Collection[int] = ()) -> Cont
     row.command_curve = rotor.command_curve
     row.idle_command = rotor.idle_command
     curve = rotor.command_curve
-    row.idle_speed_share = curve * rotor.idle_command + (1.0 - curve) * rotor.idle_command**0.5
+    row.idle_speed_fraction = curve * rotor.idle_command + (1.0 - curve) * rotor.idle_command**0.5
     row.motor_time_s = 0.5 * (rotor.spin_up_time_s + rotor.spin_down_time_s)
     row.left_out = sum(1 << rotor for rotor in left_out)
     row.full_voltage_v = airframe.battery.cells * airframe.battery.full_cell_v

@@ -16,7 +16,7 @@ _PERIOD_US = 100_000
 _SLOW_SHARE = 0.5  # of the speed asked for, below which a motor has failed; a weak one still flies; guess
 _BACK_US = 500_000  # for which a failed motor must turn as asked before it is used again; guess
 _ROTORS_SPARE = 5  # with fewer, nothing can be left out
-_VOLTAGE_SHARE_MIN = 0.6
+_VOLTAGE_FRACTION_MIN = 0.6
 
 ReadSpeeds = Callable[[], Sequence[float]]  # [rad/s] of each rotor, as its ESC reports it
 LeaveOut = Callable[[Sequence[int]], None]  # tells the control allocation which rotors not to use, from 0
@@ -120,8 +120,8 @@ class MotorWatch:
     def _top_speed(self) -> float:
         """[rad/s] at full command and the present voltage."""
         battery = self._airframe.battery
-        share = self._state.samples.battery.voltage_v / (battery.cells * battery.full_cell_v)
-        return self._airframe.rotor_model.max_speed_rad_s * min(max(float(share), _VOLTAGE_SHARE_MIN), 1.0)
+        fraction = self._state.samples.battery.voltage_v / (battery.cells * battery.full_cell_v)
+        return self._airframe.rotor_model.max_speed_rad_s * min(max(float(fraction), _VOLTAGE_FRACTION_MIN), 1.0)
 
     def _load(self) -> None:
         self._is_enabled = bool(self._params["FD_ACT_EN"])

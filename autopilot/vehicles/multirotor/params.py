@@ -39,7 +39,7 @@ class ControlParams:
     lag_max_m: float
     tilt_max: float  # [rad]
     tilt_max_ramp: float  # [rad] while the thrust of a take-off grows
-    thrust_min: float  # share of the maximum
+    thrust_min: float  # fraction of the maximum
     thrust_max: float
     takeoff_ramp_s: float
     yaw_rate_auto: float  # [rad/s]

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from autopilot.control.pid import integrate_unless_short, low_pass_share
+from autopilot.control.pid import integrate_unless_short, low_pass_fraction
 from autopilot.vehicles.multirotor.params import ControlParams
 
 wp.set_module_options({"enable_backward": False})
@@ -25,11 +25,11 @@ def filter_rates(params: ControlParams, state: RateState, omega_frd: wp.vec3, dt
         seen.omega_dot_frd = wp.vec3(0.0, 0.0, 0.0)
         seen.is_started = 1
         return seen
-    smooth_frd = state.omega_frd + (omega_frd - state.omega_frd) * low_pass_share(params.gyro_cutoff_hz, dt_s)
+    smooth_frd = state.omega_frd + (omega_frd - state.omega_frd) * low_pass_fraction(params.gyro_cutoff_hz, dt_s)
     slope = (smooth_frd - state.omega_frd) / dt_s
     seen.omega_frd = smooth_frd
-    share = low_pass_share(params.gyro_rate_cutoff_hz, dt_s)
-    seen.omega_dot_frd = state.omega_dot_frd + (slope - state.omega_dot_frd) * share
+    fraction = low_pass_fraction(params.gyro_rate_cutoff_hz, dt_s)
+    seen.omega_dot_frd = state.omega_dot_frd + (slope - state.omega_dot_frd) * fraction
     return seen
 
 

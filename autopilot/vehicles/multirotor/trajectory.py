@@ -1,7 +1,7 @@
 """The setpoint trajectory: smooth position, velocity and acceleration towards what the setpoint asks, 50 Hz.
 
 NaN frees an element. Per axis: a finite position is a goal (with a finite velocity: a moving one), else a finite
-velocity is followed (zero: brake, then hold the place), else a finite acceleration; nothing finite means hold.
+velocity is followed (zero: brake, then hold the position), else a finite acceleration; nothing finite means hold.
 A finite path start makes the way to the position a straight line. Motion is planned along and across the way,
 each within speed, acceleration and jerk limits; up and down have their own.
 
@@ -42,14 +42,14 @@ class TrajectoryState:
     pos_ned: wp.vec3
     vel_ned: wp.vec3  # per time on the trajectory, as is the acceleration
     accel_ned: wp.vec3
-    time_share: wp.vec3  # share of time that passed on the trajectory in the last step, per ned axis
+    time_fraction: wp.vec3  # fraction of time that passed on the trajectory in the last step, per ned axis
     jerk_ned: wp.vec3  # per time of the vehicle, mean over the last step
     along_ned: wp.vec3  # horizontal direction of motion to the present goal
     goal_ned: wp.vec3  # the last goal asked for, each element a position, velocity or acceleration as `mode` says
     goal_now_ned: wp.vec3  # the same, a moving position carried on between setpoints
     goal_age_s: float
     mode: wp.vec3i  # FOLLOW_* of each axis
-    is_locked_xy: int  # braked: the place is held although the position is free
+    is_locked_xy: int  # braked: the position is held although the position is free
     is_locked_z: int
     yaw: float
     yaw_rate: float
@@ -66,7 +66,7 @@ def trajectory_at_estimate(est: Estimate, is_moving: int) -> TrajectoryState:
     state.goal_now_ned = est.pos_ned
     if is_moving == 1:
         state.vel_ned = est.vel_ned
-    state.time_share = wp.vec3(1.0, 1.0, 1.0)
+    state.time_fraction = wp.vec3(1.0, 1.0, 1.0)
     state.along_ned = wp.vec3(1.0, 0.0, 0.0)
     state.yaw = yaw_from_quat(est.q_ned_from_frd)
     state.yaw_goal = state.yaw
@@ -77,13 +77,13 @@ def trajectory_at_estimate(est: Estimate, is_moving: int) -> TrajectoryState:
 @wp.func
 def flown_velocity(state: TrajectoryState) -> wp.vec3:
     """Velocity [m/s], ned, of the trajectory per time of the vehicle."""
-    return wp.cw_mul(state.time_share, state.vel_ned)
+    return wp.cw_mul(state.time_fraction, state.vel_ned)
 
 
 @wp.func
 def flown_acceleration(state: TrajectoryState) -> wp.vec3:
-    """Acceleration [m/s²], ned, of the trajectory per time of the vehicle, where the share of time does not change."""
-    return wp.cw_mul(state.time_share, wp.cw_mul(state.time_share, state.accel_ned))
+    """Acceleration [m/s²], ned, of the trajectory per time of the vehicle, at a constant fraction of time."""
+    return wp.cw_mul(state.time_fraction, wp.cw_mul(state.time_fraction, state.accel_ned))
 
 
 @wp.func
@@ -286,7 +286,7 @@ def follows_position(state: TrajectoryState, axis: int) -> bool:
 
 @wp.func
 def waiting(state: TrajectoryState, est: Estimate, lag_max_m: float, is_one_way: bool) -> TrajectoryState:
-    """The state with its share of time, and drawn along by a vehicle further away than `lag_max_m`, at rest there.
+    """The state with its fraction of time, and drawn along by a vehicle further away than `lag_max_m`, at rest there.
 
     Up and down wait for themselves, so that a vehicle blown aside at take-off still climbs; but a path is one way.
     """
@@ -300,9 +300,9 @@ def waiting(state: TrajectoryState, est: Estimate, lag_max_m: float, is_one_way:
     if is_one_way:
         away = wp.vec3(1.0, 1.0, 1.0) * wp.length(lag)
     for k in range(3):
-        waits.time_share[k] = 1.0
+        waits.time_fraction[k] = 1.0
         if follows_position(state, k):
-            waits.time_share[k] = wp.clamp(2.0 - 2.0 * away[k] / lag_max_m, 0.0, 1.0)
+            waits.time_fraction[k] = wp.clamp(2.0 - 2.0 * away[k] / lag_max_m, 0.0, 1.0)
         if state.mode[k] == FOLLOW_POSITION and away[k] > lag_max_m:
             waits.pos_ned[k] = est.pos_ned[k] + lag[k] * lag_max_m / away[k]
             waits.vel_ned[k] = 0.0
@@ -335,8 +335,8 @@ def yaw_step(params: ControlParams, state: TrajectoryState, sp: Setpoint, dt_s: 
     rate = wp.clamp(rate, -rate_max, rate_max)
     turned.yaw_rate = state.yaw_rate + wp.clamp(rate - state.yaw_rate, -accel * dt_s, accel * dt_s)
     if not wp.isfinite(sp.yaw) and wp.isfinite(sp.yaw_rate):  # somebody steers: it starts and stops at once
-        share = dt_s / (dt_s + params.yaw_rate_time_s)
-        turned.yaw_rate = state.yaw_rate + (rate - state.yaw_rate) * share
+        fraction = dt_s / (dt_s + params.yaw_rate_time_s)
+        turned.yaw_rate = state.yaw_rate + (rate - state.yaw_rate) * fraction
     turned.yaw = wrap_pi(state.yaw + 0.5 * (state.yaw_rate + turned.yaw_rate) * dt_s)
     if not wp.isfinite(sp.yaw) and wp.isfinite(sp.yaw_rate):
         turned.yaw_goal = turned.yaw
@@ -351,7 +351,7 @@ def trajectory_step(
     now = shift_by_reset(params, state, est)
     now = take_goal(now, sp, 0.9 * params.speed_max_xy, frame_s)
     now = waiting(anchored(now, est), est, params.lag_max_m, is_path(sp))
-    dt_s = now.time_share * frame_s
+    dt_s = now.time_fraction * frame_s
     goal_vel = goal_velocity(sp, now.mode, now.goal_age_s, 0.9 * params.speed_max_xy)
     along = now.along_ned
     across = wp.vec3(-along[1], along[0], 0.0)

@@ -8,7 +8,7 @@ The integral then only meets what the accelerometer cannot see, such as a tilt e
 
 import warp as wp
 
-from autopilot.control.pid import clamp_horizontal, low_pass_share
+from autopilot.control.pid import clamp_horizontal, low_pass_fraction
 from autopilot.ports import Estimate
 from autopilot.vehicles.multirotor.control_airframe import ControlAirframe
 from autopilot.vehicles.multirotor.params import ControlParams
@@ -50,16 +50,16 @@ def observe(
     )
     other_frd = est.accel_frd + wp.vec3(0.0, 0.0, state.thrust_model_n / airframe.mass_kg)
     other_ned = wp.quat_rotate(est.q_ned_from_frd, other_frd)
-    share = low_pass_share(params.disturbance_cutoff_hz, dt_s)
+    fraction = low_pass_fraction(params.disturbance_cutoff_hz, dt_s)
     if params.disturbance_cutoff_hz > 0.0:
-        disturbance = state.disturbance_ned + (other_ned - state.disturbance_ned) * share
+        disturbance = state.disturbance_ned + (other_ned - state.disturbance_ned) * fraction
         disturbance = clamp_horizontal(disturbance, _DISTURBANCE_MAX_XY)
         disturbance[2] = wp.clamp(disturbance[2], -_DISTURBANCE_MAX_Z, _DISTURBANCE_MAX_Z)
         seen.disturbance_ned = disturbance
     else:
         seen.disturbance_ned = wp.vec3(0.0, 0.0, 0.0)
-    share = low_pass_share(params.accel_cutoff_hz, dt_s)
-    seen.accel_ned = state.accel_ned + (est.accel_ned - state.accel_ned) * share
+    fraction = low_pass_fraction(params.accel_cutoff_hz, dt_s)
+    seen.accel_ned = state.accel_ned + (est.accel_ned - state.accel_ned) * fraction
     return seen
 
 

@@ -140,10 +140,10 @@ def _bytes(values: NDArray[np.float64]) -> NDArray[np.uint8]:
 def make_paints(device: str) -> Any:
     """The tables on a device."""
     rng = np.random.default_rng(11)
-    place = np.linspace(0.0, 1.0, _TONES)
+    position = np.linspace(0.0, 1.0, _TONES)
     stops = [0.0, 0.45, 0.80, 1.0]
     colours = np.array([[0.060, 0.118, 0.024], [0.092, 0.150, 0.034], [0.160, 0.185, 0.058], [0.170, 0.140, 0.075]])
-    tones = np.stack([np.interp(place, stops, colours[:, i]) for i in range(3)], axis=-1)
+    tones = np.stack([np.interp(position, stops, colours[:, i]) for i in range(3)], axis=-1)
     steps = np.arange(2048)
     light = 2.0 ** (steps // 128 - 12) * (1.0 + (steps % 128 + 0.5) / 128.0)
     rolled = light * (1.0 + 0.12 * light) / (1.0 + light)

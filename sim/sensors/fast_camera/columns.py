@@ -151,9 +151,9 @@ def column_beside(columns: Columns, view: View, i_camera: int, ray: LevelRay, in
 
     `inverse` is one over the length that the ray goes along its cube face.
     """
-    place = (pseudo_angle(ray.ahead, ray.right, inverse) - view.angle_low) * view.columns_per_angle
-    left = wp.clamp(int(place), 0, view.columns - 2)
-    fraction = place - float(left)
+    position = (pseudo_angle(ray.ahead, ray.right, inverse) - view.angle_low) * view.columns_per_angle
+    left = wp.clamp(int(position), 0, view.columns - 2)
+    fraction = position - float(left)
     first = (i_camera * columns.room + left) * columns.samples
     last = columns.samples - 1
     skyline_left = columns.slopes[first + last]

@@ -32,7 +32,7 @@ _HAIR = wp.constant(wp.vec3(0.060, 0.035, 0.020))
 
 @wp.func
 def body_point(person: Person, forward: float, right: float, up: float) -> wp.vec3:
-    """A place on the body in ned [m], given in fractions of the stature from the feet."""
+    """A position on the body in ned [m], given in fractions of the stature from the feet."""
     s = person.stature_m
     c = wp.cos(person.heading_rad) * s
     d = wp.sin(person.heading_rad) * s

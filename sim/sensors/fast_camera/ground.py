@@ -67,7 +67,7 @@ class Plane:
 
 @wp.func
 def triangle_at(ground: Ground, base: int, u: float, v: float) -> int:
-    """Index of the triangle under a place in cells from the south and west edges; -2 beyond the edges."""
+    """Index of the triangle under a position in cells from the south and west edges; -2 beyond the edges."""
     edge = float(ground.side)
     if wp.min(u, v) < 0.0 or wp.max(u, v) >= edge:
         return -2
@@ -78,7 +78,7 @@ def triangle_at(ground: Ground, base: int, u: float, v: float) -> int:
 
 @wp.func
 def plane_at(ground: Ground, base: int, u: float, v: float, eye: wp.vec3) -> Plane:
-    """The plane of the triangle at a place, given in cells from the south and west edges; level beyond them.
+    """The plane of the triangle at a position, given in cells from the south and west edges; level beyond them.
 
     Args:
         ground: all worlds.

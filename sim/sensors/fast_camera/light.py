@@ -118,9 +118,9 @@ def crown_shadow(terrain: Terrain, tree: Tree) -> Shadow:
 
 
 @wp.func
-def first_texel(ground: Ground, place_m: float) -> int:
-    """The first texel whose middle is at or beyond a place, along one side of the map; 0..texels."""
-    texel = (place_m + ground.half_size_m) * ground.texels_per_m - 0.5
+def first_texel(ground: Ground, position_m: float) -> int:
+    """The first texel whose middle is at or beyond a position, along one side of the map; 0..texels."""
+    texel = (position_m + ground.half_size_m) * ground.texels_per_m - 0.5
     return int(wp.ceil(wp.clamp(texel, 0.0, float(ground.texels))))
 
 

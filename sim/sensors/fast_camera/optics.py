@@ -64,8 +64,8 @@ def even(bits: wp.uint32, byte: int) -> float:
 @wp.func
 def smear(optics: Optics, x: float, y: float, depth_m: float, per_pixel: float) -> wp.vec2:
     """Columns and rows that a point which stands still moves by while the shutter is open."""
-    place = wp.vec3(x, y, 1.0)
-    flow = -optics.vel_rdf / wp.max(depth_m, 0.05) - wp.cross(optics.rate_rdf, place)
+    position = wp.vec3(x, y, 1.0)
+    flow = -optics.vel_rdf / wp.max(depth_m, 0.05) - wp.cross(optics.rate_rdf, position)
     way = wp.vec2(flow[0] - x * flow[2], flow[1] - y * flow[2]) * (optics.shutter_s / per_pixel)
     length = wp.length(way)
     if length > _SMEAR_MAX:

@@ -79,13 +79,13 @@ def solid_depth(solid: Solid, ray: wp.vec3, ray_squared: float) -> float:
     if spare <= 0.0:
         return NEVER
     t = (half - wp.sqrt(spare)) / level
-    place = t * along - solid.foot_along
-    if place < 0.0:
+    position = t * along - solid.foot_along
+    if position < 0.0:
         spare = towards * towards - ray_squared * solid.foot_squared
         if spare <= 0.0:
             return NEVER
         t = (towards - wp.sqrt(spare)) / ray_squared
-    elif place > solid.length:
+    elif position > solid.length:
         half = towards + solid.length * along
         spare = half * half - ray_squared * solid.tip_squared
         if spare <= 0.0:
@@ -157,8 +157,8 @@ def solid_box(solid: Solid, per_pixel: float, width: int, height: int) -> wp.vec
 @wp.func
 def first_pixel(x: float, per_pixel: float, count: int) -> int:
     """The first of `count` pixels whose middle is at or beyond x, 0..count."""
-    place = x / per_pixel + 0.5 * float(count) - 0.5
-    return int(wp.ceil(wp.clamp(place, 0.0, float(count))))
+    position = x / per_pixel + 0.5 * float(count) - 0.5
+    return int(wp.ceil(wp.clamp(position, 0.0, float(count))))
 
 
 @wp.func

@@ -76,17 +76,17 @@ def test_depth_is_that_of_the_exact_ray_cast(world, renderer):
 
 
 def test_picture_from_above_shows_ground_at_its_distance(renderer):
-    picture = renderer.images([CameraPose((0.0, 0.0, -10.0), STRAIGHT_DOWN, hfov_deg=60.0)], WIDTH, HEIGHT)
-    assert (picture.kind == GROUND).all()
-    assert picture.depth_m == pytest.approx(10.0, abs=1e-3)
+    image = renderer.images([CameraPose((0.0, 0.0, -10.0), STRAIGHT_DOWN, hfov_deg=60.0)], WIDTH, HEIGHT)
+    assert (image.kind == GROUND).all()
+    assert image.depth_m == pytest.approx(10.0, abs=1e-3)
 
 
 def test_upper_half_of_a_level_picture_over_the_trees_is_sky(renderer):
-    picture = renderer.images([CameraPose((0.0, 0.0, -80.0), LEVEL_NORTH)], WIDTH, HEIGHT)
-    assert (picture.kind[0, : HEIGHT // 2] == SKY).all()
-    assert (picture.depth_m[0, : HEIGHT // 2] == SKY_DEPTH_M).all()
-    assert (picture.kind[0, -4:] != SKY).all()
-    sky, ground = picture.rgb[0, 0].mean(axis=0), picture.rgb[0, -1].mean(axis=0)
+    image = renderer.images([CameraPose((0.0, 0.0, -80.0), LEVEL_NORTH)], WIDTH, HEIGHT)
+    assert (image.kind[0, : HEIGHT // 2] == SKY).all()
+    assert (image.depth_m[0, : HEIGHT // 2] == SKY_DEPTH_M).all()
+    assert (image.kind[0, -4:] != SKY).all()
+    sky, ground = image.rgb[0, 0].mean(axis=0), image.rgb[0, -1].mean(axis=0)
     assert sky[2] > sky[0]  # blue
     assert ground[1] > ground[2]  # green
 
@@ -95,19 +95,19 @@ def test_tree_has_a_crown_above_its_trunk_and_right_is_east(world, renderer):
     tree = world.trees[np.argmin(np.hypot(world.trees["north"], world.trees["east"]))]
     mid_trunk = 0.5 * (tree["root_height"] + 1.0 + tree["crown_low"] - tree["crown_radius"])
     pos = (float(tree["north"]) - 6.0, float(tree["east"]) - 1.0, -float(mid_trunk))
-    picture = renderer.images([CameraPose(pos, LEVEL_NORTH, hfov_deg=90.0)], 320, 240)
-    kind = picture.kind[0]
+    image = renderer.images([CameraPose(pos, LEVEL_NORTH, hfov_deg=90.0)], 320, 240)
+    kind = image.kind[0]
     column = round(160 + 160 / 6.0)  # 1 m to the east at 6 m
     assert kind[120, column] == TRUNK
     assert CROWN in kind[:120, column]
-    assert picture.depth_m[0, 120, column] == pytest.approx(6.0 - tree["trunk_radius"], abs=0.1)
+    assert image.depth_m[0, 120, column] == pytest.approx(6.0 - tree["trunk_radius"], abs=0.1)
 
 
 def test_walls_are_seen_at_the_edge(world, renderer):
     up = float(world.height(195.0, 0.0)) + 4.0
-    picture = renderer.images([CameraPose((195.0, 0.0, -up), LEVEL_NORTH)], WIDTH, HEIGHT)
-    assert picture.kind[0, HEIGHT // 2 + 5, WIDTH // 2] == WALL
-    assert picture.depth_m[0, HEIGHT // 2 + 5, WIDTH // 2] == pytest.approx(5.0, abs=1e-3)
+    image = renderer.images([CameraPose((195.0, 0.0, -up), LEVEL_NORTH)], WIDTH, HEIGHT)
+    assert image.kind[0, HEIGHT // 2 + 5, WIDTH // 2] == WALL
+    assert image.depth_m[0, HEIGHT // 2 + 5, WIDTH // 2] == pytest.approx(5.0, abs=1e-3)
 
 
 def test_a_batch_is_the_pictures_one_by_one(world, renderer):

@@ -50,20 +50,20 @@ def exact(world, camera):
 
 def random_places(world, count, rng, low_m=0.3, high_m=10.0):
     """In the open, so many metres above the ground."""
-    places = []
-    while len(places) < count:
+    positions = []
+    while len(positions) < count:
         north, east = rng.uniform(-0.48, 0.48, 2) * world.config.size_m
-        place = np.array([north, east, -float(world.height(north, east)) - rng.uniform(low_m, high_m)])
-        if world.obstacle_distance(place) > 0.1:
-            places.append(place)
-    return np.array(places)
+        position = np.array([north, east, -float(world.height(north, east)) - rng.uniform(low_m, high_m)])
+        if world.obstacle_distance(position) > 0.1:
+            positions.append(position)
+    return np.array(positions)
 
 
-def pointed(camera, places, rng):
+def pointed(camera, positions, rng):
     """Gives the cameras their places, and any attitude."""
     lenses = camera.lenses.numpy()
-    q = rng.normal(size=(len(places), 4))
-    lenses["pos_ned"] = places
+    q = rng.normal(size=(len(positions), 4))
+    lenses["pos_ned"] = positions
     lenses["q_ned_from_rdf"] = q / np.linalg.norm(q, axis=1, keepdims=True)
 
 

@@ -211,13 +211,13 @@ class Kinematic:
             wanted[2] = min(max(1.0 * way[2], -up), self.table["MPC_Z_V_AUTO_DN"])
         elif isfinite(vel_sp[2]):
             wanted[2] = vel_sp[2]
-        share = DT_S / _LAG_S
+        fraction = DT_S / _LAG_S
         is_pressed = self.pos[2] >= 0.0 and wanted[2] > 0.0  # the ground carries it: the thrust falls away
-        self.thrust += ((self.table["MPC_THR_MIN"] if is_pressed else self.hover) - self.thrust) * share
-        self.vel += (wanted + self.gust_ned - self.vel) * share
+        self.thrust += ((self.table["MPC_THR_MIN"] if is_pressed else self.hover) - self.thrust) * fraction
+        self.vel += (wanted + self.gust_ned - self.vel) * fraction
         yaw = self.sp("yaw")
         if isfinite(yaw):
-            self.yaw += ((yaw - self.yaw + pi) % (2 * pi) - pi) * share
+            self.yaw += ((yaw - self.yaw + pi) % (2 * pi) - pi) * fraction
 
     def _follow_thrust(self):
         self.thrust = self.sp("thrust")

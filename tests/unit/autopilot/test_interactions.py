@@ -27,7 +27,7 @@ WAYPOINT, LAND, TAKEOFF, LAND_START = 16, 21, 22, 189
 INCLUSION_CIRCLE = 5003
 
 
-def place(north, east, height=10.0):
+def position(north, east, height=10.0):
     lat, lon, _ = geo(north, east)
     return lat, lon, ORIGIN.alt_m + height
 
@@ -35,7 +35,7 @@ def place(north, east, height=10.0):
 class TestLeftOver:
     def test_a_landing_place_given_up_is_not_flown_to_by_the_next_landing(self):
         rig = Kinematic().flying()
-        lat, lon, _ = place(200.0, 0.0)
+        lat, lon, _ = position(200.0, 0.0)
         assert rig.fc.request(LandAt(lat, lon, nan)).verdict is Verdict.ACCEPTED
         rig.run(3.0)
         rig.fc.request(ChangeMode(Mode.HOLD))
@@ -48,13 +48,13 @@ class TestLeftOver:
     def test_a_goto_refused_leaves_no_place_behind(self):
         rig = Kinematic(COM_FLT_TIME_MAX=30.0).flying()
         rig.run_until(lambda: rig.state.mode is Mode.RETURN, 60.0)
-        assert rig.fc.request(GoTo(*place(300.0, 0.0), nan, nan)).verdict is Verdict.TEMPORARILY_REJECTED
+        assert rig.fc.request(GoTo(*position(300.0, 0.0), nan, nan)).verdict is Verdict.TEMPORARILY_REJECTED
         assert rig.fc.navigator.context.next_hold is None
 
     def test_an_orbit_refused_is_not_the_next_one(self):
         rig = Kinematic(COM_FLT_TIME_MAX=30.0).flying()
         rig.run_until(lambda: rig.state.mode is Mode.RETURN, 60.0)
-        lat, lon, _ = place(300.0, 0.0)
+        lat, lon, _ = position(300.0, 0.0)
         assert rig.fc.request(OrbitRequest(20.0, 3.0, lat_deg=lat, lon_deg=lon)).verdict is Verdict.TEMPORARILY_REJECTED
         rig.table.set("COM_FLT_TIME_MAX", -1.0)
         rig.run(1.0)
@@ -106,7 +106,7 @@ class TestLandingGoesOn:
 
     def test_an_emergency_ends_the_way_to_a_landing_place(self):
         rig = Kinematic(COM_LOW_BAT_ACT=3).flying(10.0)
-        lat, lon, _ = place(2000.0, 0.0)
+        lat, lon, _ = position(2000.0, 0.0)
         rig.fc.request(LandAt(lat, lon, nan))
         rig.run(5.0)
         rig.fc.commander.guard.act(BATTERY_EMERGENCY)
@@ -150,7 +150,7 @@ class TestReturnByMission:
 class TestHoldAgain:
     def test_a_fence_that_asks_to_hold_stops_a_goto(self):
         rig = Kinematic(GF_ACTION=2).flying(10.0)
-        rig.fc.request(GoTo(*place(300.0, 0.0), nan, nan))
+        rig.fc.request(GoTo(*position(300.0, 0.0), nan, nan))
         rig.run(5.0)
         fence = [item(0, INCLUSION_CIRCLE, params=(60.0, 0.0, 0.0, 0.0), frame=0)]
         assert rig.fc.lists.load(ListKind.FENCE, fence) is None
@@ -244,9 +244,9 @@ class TestArmedInTheAir:
 class TestHome:
     def test_home_is_not_set_where_no_return_could_lead(self):
         rig = Kinematic().flying()
-        lat, lon, alt = place(60_000.0, 0.0)
+        lat, lon, alt = position(60_000.0, 0.0)
         assert rig.fc.request(SetHome(lat, lon, alt)).verdict is Verdict.DENIED
-        lat, lon, _ = place(10.0, 0.0)
+        lat, lon, _ = position(10.0, 0.0)
         assert rig.fc.request(SetHome(lat, lon, ORIGIN.alt_m + 20_000.0)).verdict is Verdict.DENIED
 
 

@@ -97,8 +97,8 @@ def test_what_is_out_of_range_is_denied(rig, rotors, command, seconds):
 def test_clockwise_begins_at_the_nose(name):
     airframe = load_airframe(name)
     order = MULTIROTOR.motors(airframe)
-    places = [airframe.rotors[rotor] for rotor in order]
-    assert places[0].x_m > 0.0
-    assert places[0].y_m > 0.0
-    assert places[-1].x_m > 0.0
-    assert places[-1].y_m < 0.0
+    positions = [airframe.rotors[rotor] for rotor in order]
+    assert positions[0].x_m > 0.0
+    assert positions[0].y_m > 0.0
+    assert positions[-1].x_m > 0.0
+    assert positions[-1].y_m < 0.0

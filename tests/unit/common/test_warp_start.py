@@ -31,8 +31,8 @@ def test_a_cache_that_cannot_be_written_is_told_and_replaced_for_this_process():
 
 
 def test_closed_standard_error_is_no_place_for_another_file():
-    (_, place), _ = started("2>&-")
-    assert place == os.devnull
+    (_, position), _ = started("2>&-")
+    assert position == os.devnull
 
 
 def output_of(program):

@@ -17,7 +17,7 @@ def test_full_and_empty_packs_have_the_voltages_of_the_file(pack):
 
 
 def test_voltage_only_falls_as_charge_leaves(pack):
-    voltages = [open_circuit_voltage(pack, share / 100 * pack.capacity_c) for share in range(100, -6, -1)]
+    voltages = [open_circuit_voltage(pack, fraction / 100 * pack.capacity_c) for fraction in range(100, -6, -1)]
     assert all(after < before for before, after in itertools.pairwise(voltages))
 
 

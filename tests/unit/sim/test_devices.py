@@ -81,7 +81,7 @@ def test_aircraft_fly_straight_at_their_speed_and_come_again():
     traffic = SimulatedTraffic(5, DEFAULT_HOME, 1)
     before, after = traffic.heard(0), traffic.heard(1_000_000)
     for a, b in zip(before, after, strict=True):
-        places = [np.array(ned_from_geodetic(c.lat_deg, c.lon_deg, c.alt_amsl_m, DEFAULT_HOME)) for c in (a, b)]
-        moved = hypot(*(places[1] - places[0])[:2])
+        positions = [np.array(ned_from_geodetic(c.lat_deg, c.lon_deg, c.alt_amsl_m, DEFAULT_HOME)) for c in (a, b)]
+        moved = hypot(*(positions[1] - positions[0])[:2])
         assert moved == pytest.approx(a.speed_m_s, rel=0.01) or moved > HEARD_WITHIN_M
     assert traffic.heard(77_000_000) == SimulatedTraffic(5, DEFAULT_HOME, 1).heard(77_000_000)

@@ -113,7 +113,7 @@ class CameraComponent(Component):
             mavlink.MAV_CMD_VIDEO_STOP_STREAMING: self._stop_stream,
         }
 
-    # Pictures
+    # Images
 
     def run(self, command: Command) -> Reply:
         """Has the camera carry a command out.
@@ -240,15 +240,15 @@ class CameraComponent(Component):
     def _reset(self, _: Command) -> Reply:
         """Sets the camera's settings, lens and mode to what they were at first.
 
-        Refused: TEMPORARILY_REJECTED: it is taking pictures.
+        Refused: TEMPORARILY_REJECTED: it is taking images.
         """
         return self._camera.reset()
 
     def _format(self, command: Command) -> Reply:
-        """Removes all pictures from the storage.
+        """Removes all images from the storage.
 
         Params: p1 storage (1, or 0 all); p2 1 to confirm.
-        Refused: DENIED: no such storage, or not confirmed; TEMPORARILY_REJECTED: it is taking pictures.
+        Refused: DENIED: no such storage, or not confirmed; TEMPORARILY_REJECTED: it is taking images.
         """
         if command.p1 not in (0.0, 1.0):
             return denied(f"there is no storage {command.p1:g}")

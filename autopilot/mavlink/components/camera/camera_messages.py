@@ -53,7 +53,7 @@ class CameraMessages:
     Args:
         camera: the camera.
         state: the vehicle that carries it.
-        host: where its picture and its files are.
+        host: where its image and its files are.
     """
 
     def __init__(self, camera: Camera, state: VehicleState, host: Host) -> None:
@@ -130,9 +130,9 @@ class CameraMessages:
             time_boot_ms=boot_ms(shot.time_us),
             time_utc=self._host.boot_unix_us + shot.time_us,
             camera_id=0,
-            lat=degrees_e7(shot.place.lat_deg),
-            lon=degrees_e7(shot.place.lon_deg),
-            alt=i32(1000.0 * shot.place.alt_m),
+            lat=degrees_e7(shot.position.lat_deg),
+            lon=degrees_e7(shot.position.lon_deg),
+            alt=i32(1000.0 * shot.position.alt_m),
             relative_alt=i32(1000.0 * shot.above_home_m),
             q=wxyz_from_quat(shot.q_ned_from_frd),
             image_index=shot.index,
@@ -146,9 +146,9 @@ class CameraMessages:
         return _feedback(
             time_usec=self._host.boot_unix_us + shot.time_us,
             img_idx=shot.index + 1 & 0xFFFF,
-            lat=degrees_e7(shot.place.lat_deg),
-            lng=degrees_e7(shot.place.lon_deg),
-            alt_msl=shot.place.alt_m,
+            lat=degrees_e7(shot.position.lat_deg),
+            lng=degrees_e7(shot.position.lon_deg),
+            alt_msl=shot.position.alt_m,
             alt_rel=shot.above_home_m,
             pitch=degrees(pitch),
             yaw=degrees(yaw) % 360.0,
@@ -158,7 +158,7 @@ class CameraMessages:
         )
 
     def stream_information(self, stream: VideoStream) -> bytes:
-        """The live picture and where it is."""
+        """The live image and where it is."""
         return _stream_information(
             stream_id=STREAM_ID,
             count=1,
@@ -177,7 +177,7 @@ class CameraMessages:
         )
 
     def stream_status(self, stream: VideoStream) -> bytes:
-        """Whether the live picture runs."""
+        """Whether the live image runs."""
         return _stream_status(
             stream_id=STREAM_ID,
             flags=self._stream_flags(stream),
@@ -194,20 +194,20 @@ class CameraMessages:
         return mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING if stream.is_running else 0
 
     def fov_status(self) -> bytes:
-        """Where the camera is, and the place on the ground in the middle of the picture."""
+        """Where the camera is, and the position on the ground in the middle of the image."""
         camera, state = self._camera, self._state
         camera.lens.update(state.time_us)
         q = camera.gimbal.q_ned_from_frd()
         width, height = camera.settings.photo_size
         hfov_deg = camera.lens.hfov_deg
         vfov_deg = degrees(2.0 * atan(tan(radians(0.5 * hfov_deg)) * height / width))
-        place, middle = state.position, self._middle_ned()
+        position, middle = state.position, self._middle_ned()
         image = (nan, nan, nan) if middle is None else geodetic_from_ned(*middle, state.origin)
         return _fov_status(
             time_boot_ms=boot_ms(state.time_us),
-            lat_camera=degrees_e7(place.lat_deg),
-            lon_camera=degrees_e7(place.lon_deg),
-            alt_camera=i32(1000.0 * place.alt_m, INT32_MAX),
+            lat_camera=degrees_e7(position.lat_deg),
+            lon_camera=degrees_e7(position.lon_deg),
+            alt_camera=i32(1000.0 * position.alt_m, INT32_MAX),
             lat_image=degrees_e7(image[0]),
             lon_image=degrees_e7(image[1]),
             alt_image=i32(1000.0 * image[2], INT32_MAX),

@@ -172,9 +172,9 @@ class AuxFunctions(Service):
             return Reply(Verdict.TEMPORARILY_REJECTED, "waypoints are saved in the air, and not in Auto")
         home = state.home or state.origin
         items = list(vehicle.lists.items(ListKind.MISSION))
-        place = (state.position.lat_deg, state.position.lon_deg, state.position.alt_m - home.alt_m)
+        position = (state.position.lat_deg, state.position.lon_deg, state.position.alt_m - home.alt_m)
         for command in (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_WAYPOINT)[1 if items else 0 :]:
             frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
-            items.append(MissionItem(len(items), frame, command, (0.0, 0.0, 0.0, _NAN), *place))
+            items.append(MissionItem(len(items), frame, command, (0.0, 0.0, 0.0, _NAN), *position))
         refusal = vehicle.lists.load(ListKind.MISSION, items)
         return ACCEPTED if refusal is None else denied(refusal.reason)

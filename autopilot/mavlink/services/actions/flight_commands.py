@@ -75,7 +75,7 @@ class FlightCommands(Service):
         """Lands.
 
         Params: p4 heading [deg], NaN: as it is; p5, p6 place, NaN or 0, 0: here.
-        Refused: TEMPORARILY_REJECTED on the ground; DENIED for a place that is not on earth.
+        Refused: TEMPORARILY_REJECTED on the ground; DENIED for a position that is not on earth.
         """
         lat_deg, lon_deg = command.x, command.y
         if lat_deg == 0.0 and lon_deg == 0.0:  # what scripts that leave them out send; landing there is never meant
@@ -116,7 +116,7 @@ class FlightCommands(Service):
         """Sets home.
 
         Params: p1 1: here; otherwise p5, p6 place and p7 altitude; above sea level in any frame in PX4's dialect.
-        Refused: TEMPORARILY_REJECTED without a position; DENIED for a place that is not on earth, more than 50 km from
+        Refused: TEMPORARILY_REJECTED without a position; DENIED for a position not on earth, more than 50 km from
         where the vehicle was switched on, or more than 10 km higher or lower.
         """
         if command.p1 == 1.0:

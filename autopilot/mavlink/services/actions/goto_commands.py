@@ -1,7 +1,7 @@
 """Places, heights and headings a client sends the vehicle to: DO_REPOSITION, guided mission items.
 
-In: commands and items. Out: a place to hold, in mode Hold or Guided as the dialect has it. Guided items are ArduPilot's
-and known in its dialect only.
+In: commands and items. Out: a position to hold, in mode Hold or Guided as the dialect has it. Guided items are
+ArduPilot's and known in its dialect only.
 """
 
 from collections.abc import Mapping
@@ -34,11 +34,11 @@ class GotoService(Service):
         return {mavlink.MAV_CMD_DO_REPOSITION: self._reposition}
 
     def _reposition(self, command: Command) -> Reply:
-        """Goes to a place, height or heading and holds there.
+        """Goes to a position, height or heading and holds there.
 
         Params: p1 ground speed [m/s], -1: as it is; p2 bit 1 allows the change of mode; p4 heading [rad], NaN: towards
-        the place; p5, p6 place, NaN: where it is; p7 altitude, NaN: as it is. All NaN: stops here.
-        Refused: TEMPORARILY_REJECTED on the ground or without a position; DENIED for a place that is out of reach or
+        the position; p5, p6 place, NaN: where it is; p7 altitude, NaN: as it is. All NaN: stops here.
+        Refused: TEMPORARILY_REJECTED on the ground or without a position; DENIED for a position that is out of reach or
         below the ground, or if the mode may not be changed.
         """
         state = self._endpoint.vehicle.state
@@ -58,11 +58,11 @@ class GotoService(Service):
         return self._is_guided and fields.current in (GUIDED_GOTO, GUIDED_ALTITUDE)
 
     def item_received(self, sender: Sender, fields: Any) -> int:
-        """Goes to the place or the height of an item; returns the MAV_MISSION_RESULT."""
+        """Goes to the position or the height of an item; returns the MAV_MISSION_RESULT."""
         item = item_from_fields(fields)
         vehicle = self._endpoint.vehicle
-        place = Command(item.command, item.frame, 0.0, 0.0, 0.0, nan, item.x, item.y, item.z, sender)
-        alt_amsl_m, reply = command_alt_amsl_m(vehicle.state, place)
+        position = Command(item.command, item.frame, 0.0, 0.0, 0.0, nan, item.x, item.y, item.z, sender)
+        alt_amsl_m, reply = command_alt_amsl_m(vehicle.state, position)
         if vehicle.state.mode is not Mode.GUIDED:
             reply = Reply(Verdict.TEMPORARILY_REJECTED, "needs mode Guided")
         elif item.command != mavlink.MAV_CMD_NAV_WAYPOINT:

@@ -17,7 +17,7 @@ from autopilot.mavlink.wire.convert import whole
 
 UNCHANGED = -1.0
 BY_DEFAULT = -2.0
-_LOCATION = (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_LOCATION)  # ArduPilot's clients send 0 with a place
+_LOCATION = (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_LOCATION)  # ArduPilot's clients send 0 with a position
 
 
 class MissionCommands(Service):
@@ -128,7 +128,7 @@ class MissionCommands(Service):
     # Heading
 
     def _turn(self, command: Command) -> Reply:
-        """Turns to a heading, or by an angle, and keeps it until the next place, mission leg or mode.
+        """Turns to a heading, or by an angle, and keeps it until the next position, mission leg or mode.
 
         Params: p1 heading or angle [deg]; p2 rate [deg/s], 0: MPC_YAWRAUTO_MAX; p3 1 clockwise, -1 counter-clockwise,
         0 the short way; p4 1: p1 is an angle to turn by.
@@ -137,24 +137,24 @@ class MissionCommands(Service):
         return self._endpoint.vehicle.guidance.turn(command.p1, command.p2, command.p3, is_relative=command.p4 == 1.0)
 
     def _roi(self, command: Command) -> Reply:
-        """Points the vehicle, and a gimbal, at a place, or as the mode has it; the older form.
+        """Points the vehicle, and a gimbal, at a position, or as the mode has it; the older form.
 
-        Params: p1 0 or 3: the place in p5, p6, p7 (0 without a place: none), 1: the next waypoint.
+        Params: p1 0 or 3: the position in p5, p6, p7 (0 without a position: none), 1: the next waypoint.
         Refused: DENIED for another kind of region.
         """
         kind = whole(command.p1, mavlink.MAV_ROI_LOCATION)
-        has_place = isfinite(command.x) and isfinite(command.y) and (command.x != 0.0 or command.y != 0.0)
-        if kind in _LOCATION and has_place:
+        has_position = isfinite(command.x) and isfinite(command.y) and (command.x != 0.0 or command.y != 0.0)
+        if kind in _LOCATION and has_position:
             return self._roi_location(command)
         if kind in (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_WPNEXT):
             return self._endpoint.vehicle.guidance.look_ahead(command.command, 0.0)
         return denied("only a place or the next waypoint can be a region of interest")
 
     def _roi_location(self, command: Command) -> Reply:
-        """Points the vehicle, and a gimbal, at a place from now on, in every mode that flies itself.
+        """Points the vehicle, and a gimbal, at a position from now on, in every mode that flies itself.
 
         Params: p5, p6 place; p7 altitude, above sea level in any frame in PX4's dialect; NaN: that of home.
-        Refused: DENIED for a place that is not on earth.
+        Refused: DENIED for a position that is not on earth.
         """
         if isnan(command.z):
             alt_amsl_m: float = nan

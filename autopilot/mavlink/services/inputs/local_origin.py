@@ -20,7 +20,7 @@ class OriginService(Service):
         return {"SET_GPS_GLOBAL_ORIGIN": self.origin_received}
 
     def origin_received(self, sender: Sender, _: Any) -> None:
-        """Sends the origin as it is: it is the place where the vehicle was switched on, and stays so."""
+        """Sends the origin as it is: it is the position where the vehicle was switched on, and stays so."""
         telemetry = self._endpoint.telemetry
         payload = telemetry.builders[_GPS_GLOBAL_ORIGIN_ID](self._endpoint.vehicle.state)
         if payload is not None:

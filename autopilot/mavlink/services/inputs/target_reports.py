@@ -77,7 +77,7 @@ class TargetService(Service):
         self._endpoint.vehicle.request(TargetReport(pos_ned, vel_ned, pos_std, _VEL_STD_M_S, course_rad))
 
     def station_position_received(self, sender: Sender, fields: Any) -> None:
-        """Takes the place of a ground station or of another vehicle as the target that mode Follow follows."""
+        """Takes the position of a ground station or of another vehicle as the target that mode Follow follows."""
         if sender.sysid == self._endpoint.sysid or not self._is_chosen(sender.sysid, is_follow_target=False):
             return
         pos_ned = self._pos_ned(fields.lat, fields.lon, fields.alt * 1.0e-3)

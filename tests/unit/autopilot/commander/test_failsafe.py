@@ -12,9 +12,9 @@ from tests.unit.autopilot.kinematic import Kinematic, geo, item
 NAN = float("nan")
 
 
-def drain_to(rig, share):
+def drain_to(rig, fraction):
     """Sets the charge the estimator believes in."""
-    rig.fc.commander._battery.remaining = share
+    rig.fc.commander._battery.remaining = fraction
     rig.battery_v = 0.0  # no more voltage samples
 
 
@@ -26,7 +26,7 @@ def flying_away(**params):
 
 
 @pytest.mark.parametrize(
-    ("action", "share", "mode", "severity"),
+    ("action", "fraction", "mode", "severity"),
     [
         (3, 0.10, Mode.HOLD, Severity.WARNING),
         (3, 0.06, Mode.RETURN, Severity.CRITICAL),
@@ -35,9 +35,9 @@ def flying_away(**params):
         (1, 0.04, Mode.HOLD, Severity.EMERGENCY),
     ],
 )
-def test_battery_levels_lead_to_their_actions(action, share, mode, severity):
+def test_battery_levels_lead_to_their_actions(action, fraction, mode, severity):
     rig = flying_away(COM_LOW_BAT_ACT=action)
-    drain_to(rig, share)
+    drain_to(rig, fraction)
     rig.run(0.1)
     assert rig.state.mode is mode
     assert any(level is severity and "attery" in text for level, text in rig.recorder.texts)
@@ -333,8 +333,8 @@ def test_termination_is_refused_on_the_ground_and_as_a_mode():
 def test_charge_level_is_known_before_and_after_arming():
     rig = Kinematic().ready()
     assert rig.state.battery_level is BatteryLevel.OK
-    for share, level in ((0.1, BatteryLevel.LOW), (0.06, BatteryLevel.CRITICAL), (0.04, BatteryLevel.EMERGENCY)):
-        drain_to(rig, share)
+    for fraction, level in ((0.1, BatteryLevel.LOW), (0.06, BatteryLevel.CRITICAL), (0.04, BatteryLevel.EMERGENCY)):
+        drain_to(rig, fraction)
         rig.run(0.1)
         assert rig.state.battery_level is level
 
@@ -394,8 +394,8 @@ def test_a_charge_estimate_that_wavers_does_not_take_control_from_the_pilot_agai
     rig.run(0.1)
     assert rig.state.mode is Mode.RETURN
     assert rig.fc.request(ChangeMode(Mode.HOLD)).verdict is Verdict.ACCEPTED
-    for share in (0.0705, 0.0695, 0.0705, 0.0695):
-        drain_to(rig, share)
+    for fraction in (0.0705, 0.0695, 0.0705, 0.0695):
+        drain_to(rig, fraction)
         rig.run(0.1)
     assert rig.state.mode is Mode.HOLD
     assert sum("Battery critical" in text for _, text in rig.recorder.texts) == 1

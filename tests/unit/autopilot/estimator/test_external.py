@@ -78,8 +78,8 @@ def test_cameras_alone_give_everything_that_flying_needs(flights, traces):
 
 @pytest.mark.parametrize(("aid", "components"), [("pos", 2), ("height", 1), ("vel", 3), ("yaw", 1)])
 def test_normalised_innovations_are_in_their_band(traces, aid, components):
-    share = np.mean([share_in_band(trace, f"external_{aid}", components, AIRBORNE) for trace in traces])
-    assert 0.92 < share < 0.98
+    fraction = np.mean([share_in_band(trace, f"external_{aid}", components, AIRBORNE) for trace in traces])
+    assert 0.92 < fraction < 0.98
 
 
 def test_errors_are_as_large_as_the_filter_says(flights, traces):

@@ -80,18 +80,18 @@ def test_takeoff_above_home_by_command_int():
 @pytest.mark.parametrize("frame", [0, 3, 5, 6])
 def test_orbit_home_and_region_of_interest_are_above_sea_level_in_any_frame_of_px4(frame):
     rig = Rig()
-    place = {"x": round(HOME.lat_deg * 1e7), "y": round(HOME.lon_deg * 1e7), "z": 500.0}
+    position = {"x": round(HOME.lat_deg * 1e7), "y": round(HOME.lon_deg * 1e7), "z": 500.0}
     for command in (34, 179, 195):
-        assert send_int(rig, command, frame, **place) == ACCEPTED
+        assert send_int(rig, command, frame, **position) == ACCEPTED
     orbit, home, look_at = rig.vehicle.calls
     assert (orbit.alt_amsl_m, home.alt_amsl_m, look_at[4]) == (500.0, 500.0, 500.0)
 
 
 def test_an_orbit_is_above_sea_level_and_home_and_roi_in_their_frame_in_ardupilot():
     rig = Rig(dialect=ARDUPILOT)
-    place = {"x": round(HOME.lat_deg * 1e7), "y": round(HOME.lon_deg * 1e7), "z": 500.0}
+    position = {"x": round(HOME.lat_deg * 1e7), "y": round(HOME.lon_deg * 1e7), "z": 500.0}
     for command in (34, 179, 195):
-        assert send_int(rig, command, 3, **place) == ACCEPTED
+        assert send_int(rig, command, 3, **position) == ACCEPTED
     orbit, home, look_at = rig.vehicle.calls
     assert (orbit.alt_amsl_m, home.alt_amsl_m, look_at[4]) == (500.0, HOME.alt_m + 500.0, HOME.alt_m + 500.0)
 

@@ -65,12 +65,12 @@ def test_no_report_of_a_speed_that_nobody_has_is_believed_not_even_the_first(spe
     assert target.at(4 * S) == pytest.approx((3.0, 2.0, -3.0))
 
 
-@pytest.mark.parametrize("place", [float("nan"), float("inf"), 3.4e38])
-def test_a_place_that_is_none_does_not_stay(place):
+@pytest.mark.parametrize("position", [float("nan"), float("inf"), 3.4e38])
+def test_a_place_that_is_none_does_not_stay(position):
     target = TargetFilter(0.3)
     for i in range(5):
-        target.report(i * S, (0.0, place, 0.0), None, 0.5)
-        target.report(i * S, (0.0, 0.0, place), None, 0.5)
+        target.report(i * S, (0.0, position, 0.0), None, 0.5)
+        target.report(i * S, (0.0, 0.0, position), None, 0.5)
     for i in range(5, 40):
         target.report(i * S, (10.0, 20.0, -3.0), None, 0.5)
     assert target.pos_ned == pytest.approx((10.0, 20.0, -3.0), abs=0.01)

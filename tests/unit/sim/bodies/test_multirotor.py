@@ -24,8 +24,8 @@ def bare_model(name="x500"):
 @pytest.mark.parametrize("name", ["x500", "f450"])
 def test_airframes_are_plausible_px4_quads(name):
     airframe = load_airframe(name)
-    places = [(np.sign(r.x_m), np.sign(r.y_m), r.spin) for r in airframe.rotors]
-    assert places == [(1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1)]
+    positions = [(np.sign(r.x_m), np.sign(r.y_m), r.spin) for r in airframe.rotors]
+    assert positions == [(1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1)]
     rotor = airframe.rotor_model
     thrust_to_weight = 4 * rotor.thrust_n_s2 * rotor.max_speed_rad_s**2 / (airframe.body.mass_kg * GRAVITY_M_S2)
     assert 2.0 < thrust_to_weight < 3.0
@@ -62,11 +62,11 @@ def test_rotors_follow_first_order_lags_of_their_own_rise_and_fall():
 def test_command_curve_joins_linear_speed_and_linear_thrust():
     model = bare_model()
     commands = np.array([[0.25, 0.25, 0.25, 0.25]])
-    for curve, share in ((1.0, 0.25), (0.0, 0.5), (0.6, 0.6 * 0.25 + 0.4 * 0.5)):
+    for curve, fraction in ((1.0, 0.25), (0.0, 0.5), (0.6, 0.6 * 0.25 + 0.4 * 0.5)):
         model.command_curve = curve
         fleet = Fleet(HIGH, model)
         fleet.fly(100, commands)
-        assert fleet.state["rotor_speed"][0, 0] == pytest.approx(share * 1000.0, rel=5e-3)  # battery a little down
+        assert fleet.state["rotor_speed"][0, 0] == pytest.approx(fraction * 1000.0, rel=5e-3)  # battery a little down
 
 
 def test_commands_outside_their_range_are_clipped():

@@ -99,17 +99,17 @@ def test_a_batch_is_level_and_empty_until_it_is_grown():
 
 def test_kernels_meet_what_the_host_meets():
     batch = grown(3)
-    world, place = batch.map(1), (batch, 1)
+    world, position = batch.map(1), (batch, 1)
     rng = np.random.default_rng(0)
     pos = rng.uniform([-135, -135, -22], [135, 135, 9], (10_000, 3)).astype(np.float32)
-    height, _, contact = query_points(place, pos, radius=1.5)
+    height, _, contact = query_points(position, pos, radius=1.5)
     np.testing.assert_allclose(height, world.height(pos[:, 0], pos[:, 1]), atol=5e-5)
     depth = np.maximum(1.5 - world.obstacle_distance(pos.astype(float)), 0.0)
     assert (depth > 0.0).sum() > 500
     np.testing.assert_allclose(contact[:, 3], depth, atol=1e-4)
     direction = rng.normal(size=(800, 3)) * [1.0, 1.0, 0.4]
     direction = (direction / np.linalg.norm(direction, axis=1, keepdims=True)).astype(np.float32)
-    kernel = query_rays(place, pos[:800], direction, 150.0)
+    kernel = query_rays(position, pos[:800], direction, 150.0)
     error = np.abs(kernel - [world.ray_hit(o, d, 150.0) for o, d in zip(pos[:800], direction, strict=True)])
     assert np.percentile(error, 99) < 1e-3  # float32 over 150 m
     assert np.mean(error > 0.02) < 3e-3  # grazing rays may hit or miss within rounding
@@ -122,7 +122,7 @@ def test_the_map_of_a_world_answers_as_its_row_of_the_batch():
     direction = np.tile([0.6, 0.64, 0.48], (5000, 1))
     for a, b in zip(query_points(batch.map(1), pos, 1.0), query_points((batch, 1), pos, 1.0), strict=True):
         np.testing.assert_array_equal(a, b)
-    hits = [query_rays(place, pos, direction, 60.0) for place in (batch.map(1), (batch, 1))]
+    hits = [query_rays(position, pos, direction, 60.0) for position in (batch.map(1), (batch, 1))]
     np.testing.assert_array_equal(*hits)
 
 

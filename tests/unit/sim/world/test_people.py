@@ -129,8 +129,8 @@ def test_a_trunk_hides_a_person_who_stands_behind_it(forest):
     # behind the trunk, beside it, and behind a hill of the ground
     off_m = tree["trunk_radius"] + 0.35
     for row, (north, east) in enumerate([(off_m, 0.0), (0.0, 1.5), (off_m, 0.0)]):
-        place = np.array([tree["north"] + north, tree["east"] + east])
-        people[row]["pos_ned"] = [*place, -forest.height(*place)]
+        position = np.array([tree["north"] + north, tree["east"] + east])
+        people[row]["pos_ned"] = [*position, -forest.height(*position)]
         people[row]["stature_m"] = 1.75
     eyes = people["pos_ned"] - [2.0 * off_m, 0.0, 1.2]
     eyes[2] = people["pos_ned"][2] + [0.0, 0.0, 0.5]  # from under ground

@@ -1,7 +1,7 @@
 """No client gets more of a frame than its share."""
 
 from autopilot.mavlink.transport.links import memory_pair
-from autopilot.mavlink.transport.receive_queue import BYTES_MAX, WORK_MAX, WORK_MIN, Intake, share
+from autopilot.mavlink.transport.receive_queue import BYTES_MAX, WORK_MAX, WORK_MIN, Intake, fraction
 from autopilot.mavlink.wire.codec import encode
 from tests.unit.autopilot.mavlink.rig import Rig
 
@@ -58,9 +58,9 @@ def test_bytes_of_one_frame_are_bounded():
 
 
 def test_shares_are_fair_and_never_nothing():
-    assert share(1) == WORK_MAX
-    assert share(8) == 32
-    assert share(1000) == WORK_MIN
+    assert fraction(1) == WORK_MAX
+    assert fraction(8) == 32
+    assert fraction(1000) == WORK_MIN
 
 
 def test_flood_of_one_client_does_not_delay_the_answer_to_another():

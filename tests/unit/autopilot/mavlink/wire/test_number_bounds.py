@@ -131,8 +131,8 @@ def test_body_rates_out_of_range_are_refused_with_the_reason():
 
 
 def follow_target(rig, **fields):
-    place = {"lat": 473977420, "lon": 85455940, "alt": 490.0}
-    rig.client.send("FOLLOW_TARGET", **place | fields)
+    position = {"lat": 473977420, "lon": 85455940, "alt": 490.0}
+    rig.client.send("FOLLOW_TARGET", **position | fields)
     told = texts(rig.frame())
     return [call for call in rig.vehicle.calls if isinstance(call, TargetReport)], told
 

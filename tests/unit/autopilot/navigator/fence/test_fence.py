@@ -115,8 +115,8 @@ def test_vehicle_outside_may_not_be_armed():
 
 def test_places_outside_are_refused():
     rig = fenced(Kinematic(GF_MAX_VER_DIST=30.0).flying(), polygon(SQUARE))
-    for place, part in (((60.0, 0.0, 10.0), "shapes"), ((0.0, 0.0, 31.0), "ceiling")):
-        reply = rig.fc.request(GoTo(*geo(*place), nan, nan))
+    for position, part in (((60.0, 0.0, 10.0), "shapes"), ((0.0, 0.0, 31.0), "ceiling")):
+        reply = rig.fc.request(GoTo(*geo(*position), nan, nan))
         assert reply.verdict is Verdict.DENIED
         assert f"target is outside fence: {part}" in reply.reason
     assert rig.fc.request(LandAt(*geo(60.0, 0.0)[:2], nan)).verdict is Verdict.DENIED

@@ -19,11 +19,11 @@ REGIONS = {
     "two": Region([(SQUARE, True)], [((50.0, 130.0), 50.0, True)]),
     "keep out": Region([(HOLE, False)], [((0.0, 0.0), 10.0, False)]),
 }
-places = st.tuples(st.floats(-50.0, 200.0), st.floats(-50.0, 200.0))
+positions = st.tuples(st.floats(-50.0, 200.0), st.floats(-50.0, 200.0))
 
 
 @pytest.mark.parametrize(
-    ("name", "place", "clearance"),
+    ("name", "position", "clearance"),
     [
         ("square", (50.0, 20.0), 20.0),
         ("square", (-10.0, 50.0), -10.0),
@@ -37,8 +37,8 @@ places = st.tuples(st.floats(-50.0, 200.0), st.floats(-50.0, 200.0))
         ("keep out", (5.0, 0.0), -5.0),
     ],
 )
-def test_clearance_is_the_distance_to_the_border_that_counts(name, place, clearance):
-    found = REGIONS[name].clearance(*place)
+def test_clearance_is_the_distance_to_the_border_that_counts(name, position, clearance):
+    found = REGIONS[name].clearance(*position)
     assert found < 0.0 if clearance is None else found == pytest.approx(clearance)
 
 
@@ -47,7 +47,7 @@ def test_region_without_shapes_ends_nowhere():
     assert Region([], [((0.0, 0.0), 0.0, True)]).clearance(1e6, 0.0) > 1e9  # a circle without a radius is none
 
 
-@given(st.sampled_from(sorted(REGIONS)), places, places)
+@given(st.sampled_from(sorted(REGIONS)), positions, positions)
 def test_clearance_changes_by_at_most_the_way(name, a, b):
     region = REGIONS[name]
     way = hypot(a[0] - b[0], a[1] - b[1])
@@ -56,22 +56,22 @@ def test_clearance_changes_by_at_most_the_way(name, a, b):
     )
 
 
-@given(st.sampled_from(sorted(REGIONS)), places, st.floats(0.0, 2.0 * pi), st.floats(0.0, 0.999))
-def test_side_does_not_change_within_the_clearance(name, place, course, share):
+@given(st.sampled_from(sorted(REGIONS)), positions, st.floats(0.0, 2.0 * pi), st.floats(0.0, 0.999))
+def test_side_does_not_change_within_the_clearance(name, position, course, fraction):
     region = REGIONS[name]
-    clearance = region.clearance(*place)
-    way = abs(clearance) * share
-    moved = region.clearance(place[0] + way * cos(course), place[1] + way * sin(course))
+    clearance = region.clearance(*position)
+    way = abs(clearance) * fraction
+    moved = region.clearance(position[0] + way * cos(course), position[1] + way * sin(course))
     assert (moved >= 0.0) == (clearance >= 0.0) or abs(moved) < 1e-6 or abs(clearance) < 1e-6
 
 
-@given(places)
-def test_star_shaped_polygon_has_the_inside_that_its_radius_says(place):
+@given(positions)
+def test_star_shaped_polygon_has_the_inside_that_its_radius_says(position):
     courses = np.linspace(0.0, 2.0 * pi, 60, endpoint=False)
     radii = 60.0 + 30.0 * np.sin(5.0 * courses)
     star = [(float(r * cos(c)), float(r * sin(c))) for r, c in zip(radii, courses, strict=True)]
-    course = np.arctan2(place[1], place[0]) % (2.0 * pi)
+    course = np.arctan2(position[1], position[0]) % (2.0 * pi)
     limit = np.interp(course, [*courses, 2.0 * pi], [*radii, radii[0]])
-    distance = hypot(*place)
+    distance = hypot(*position)
     if abs(distance - limit) > 2.0:  # the border is made of chords
-        assert (Region([(star, True)], []).clearance(*place) > 0.0) == (distance < limit)
+        assert (Region([(star, True)], []).clearance(*position) > 0.0) == (distance < limit)

@@ -288,8 +288,10 @@ def started_again(rig):
 )  # fmt: skip
 def test_mission_needs_the_ends_that_the_parameter_asks_for(asked, has_takeoff, has_landing, lacks):
     rig = Kinematic(MIS_TKO_LAND_REQ=asked).ready()
-    places = [TAKEOFF] * has_takeoff + [WAYPOINT] + [LAND] * has_landing
-    assert rig.fc.lists.load(ListKind.MISSION, [item(seq, command, 10.0) for seq, command in enumerate(places)]) is None
+    positions = [TAKEOFF] * has_takeoff + [WAYPOINT] + [LAND] * has_landing
+    assert (
+        rig.fc.lists.load(ListKind.MISSION, [item(seq, command, 10.0) for seq, command in enumerate(positions)]) is None
+    )
     reply = rig.fc.request(ChangeMode(Mode.MISSION))
     assert (reply.verdict is Verdict.ACCEPTED) == (lacks is None)
     assert (lacks or "") in reply.reason

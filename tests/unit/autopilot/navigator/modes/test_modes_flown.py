@@ -109,7 +109,7 @@ def test_goto_turns_to_its_target_and_keeps_what_is_nan():
 
 
 @pytest.mark.parametrize(
-    ("place", "reason"),
+    ("position", "reason"),
     [
         ((47.0, nan, 500.0), "both latitude and longitude"),
         ((95.0, 8.0, 500.0), "no such latitude"),
@@ -118,9 +118,9 @@ def test_goto_turns_to_its_target_and_keeps_what_is_nan():
         ((nan, nan, ORIGIN.alt_m - 5.0), "below the ground"),
     ],
 )
-def test_goto_refuses_what_it_cannot_reach(place, reason):
+def test_goto_refuses_what_it_cannot_reach(position, reason):
     rig = Kinematic().flying()
-    reply = rig.fc.request(GoTo(*place, nan, nan))
+    reply = rig.fc.request(GoTo(*position, nan, nan))
     assert reply.verdict is Verdict.DENIED
     assert reason in reply.reason
 

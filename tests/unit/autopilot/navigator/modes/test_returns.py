@@ -31,8 +31,8 @@ def go(rig, north, east, height=10.0):
     rig.run(1.0)
 
 
-def load_rally(rig, *places):
-    items = [item(i, RALLY_POINT, *place, frame=3) for i, place in enumerate(places)]
+def load_rally(rig, *positions):
+    items = [item(i, RALLY_POINT, *position, frame=3) for i, position in enumerate(positions)]
     assert rig.fc.lists.load(ListKind.RALLY, items) is None
 
 
@@ -100,14 +100,14 @@ def test_return_with_a_mission_landing_flies_it():
 
 def test_return_along_the_mission_goes_back_over_its_places():
     rig = Kinematic(RTL_TYPE=2).ready()
-    places = ((0.0, 30.0), (40.0, 30.0), (40.0, 80.0))
-    items = [item(0, TAKEOFF), *(item(i + 1, WAYPOINT, *place) for i, place in enumerate(places))]
+    positions = ((0.0, 30.0), (40.0, 30.0), (40.0, 80.0))
+    items = [item(0, TAKEOFF), *(item(i + 1, WAYPOINT, *position) for i, position in enumerate(positions))]
     assert rig.fc.lists.load(ListKind.MISSION, items) is None
     assert rig.fc.request(StartMission(0)).verdict is Verdict.ACCEPTED
     assert rig.fc.arm(force=False).verdict is Verdict.ACCEPTED
     rig.run_until(lambda: rig.pos[1] > 60.0)
     track = returned(rig)
-    for north, east in places[:2]:
+    for north, east in positions[:2]:
         assert nearest_m(track, north, east) < 1.2
     assert rig.pos[:2] == pytest.approx((0.0, 0.0), abs=0.6)
 
@@ -177,8 +177,8 @@ def test_smart_return_goes_back_through_the_corner():
 
 def test_smart_return_leaves_out_a_loop():
     rig = at(20.0, 0.0)
-    for place in ((60.0, 0.0), (60.0, 40.0), (20.0, 40.0), (20.0, 1.0), (-10.0, 20.0)):
-        go(rig, *place)
+    for position in ((60.0, 0.0), (60.0, 40.0), (20.0, 40.0), (20.0, 1.0), (-10.0, 20.0)):
+        go(rig, *position)
     track = returned(rig, Mode.SMART_RETURN)
     assert nearest_m(track, 60.0, 40.0) > 30.0
     assert nearest_m(track, 20.0, 0.0) < 3.0

@@ -240,6 +240,6 @@ def test_hold_takes_off_and_lands_by_throttle_in_ardupilot():
 
 def test_hold_ignores_sticks_in_px4_where_they_may_not_take_over():
     rig = Kinematic(COM_RC_OVERRIDE=0).flying(20.0)
-    place = rig.pos.copy()
+    position = rig.pos.copy()
     rig.piloted(5.0, pitch=1.0, throttle=-1.0)
-    assert rig.pos == pytest.approx(place, abs=0.5)
+    assert rig.pos == pytest.approx(position, abs=0.5)

@@ -28,7 +28,7 @@ def bounds(polygons=(), circles=(), reach=inf):
 
 def least_clearance(where, start, way):
     points = np.array([start, *way])
-    along = [a + (b - a) * share for a, b in itertools.pairwise(points) for share in np.linspace(0, 1, 400)]
+    along = [a + (b - a) * fraction for a, b in itertools.pairwise(points) for fraction in np.linspace(0, 1, 400)]
     return float(where.clearances(np.array(along)).min())
 
 

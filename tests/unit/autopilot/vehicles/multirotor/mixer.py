@@ -19,17 +19,17 @@ def mixer_kernel(
     collective_n: wp.array(dtype=float),
     low: float,
     high: float,
-    voltage_share: float,
+    voltage_fraction: float,
     results: wp.array(dtype=Allocation),
     commands: wp.array(dtype=vec8),
     made_n: wp.array(dtype=vec8),
 ):
     i = wp.tid()
     result = allocate(airframe, torque_frd[i], collective_n[i], low, high)
-    command = motor_commands(airframe, result.thrust_n, voltage_share)
+    command = motor_commands(airframe, result.thrust_n, voltage_fraction)
     made = vec8()
     for k in range(airframe.rotor_count):
-        speed = airframe.max_speed_rad_s * voltage_share * speed_share(command[k], airframe.command_curve)
+        speed = airframe.max_speed_rad_s * voltage_fraction * speed_share(command[k], airframe.command_curve)
         made[k] = airframe.thrust_n_s2 * speed * speed
     results[i] = result
     commands[i] = command
@@ -42,7 +42,7 @@ def mix(
     collective_n: npt.ArrayLike,
     low: float,
     high: float,
-    voltage_share: float = 1.0,
+    voltage_fraction: float = 1.0,
 ) -> tuple[npt.NDArray[np.void], npt.NDArray[np.float32], npt.NDArray[np.float32]]:
     """Allocations, motor commands and the rotor thrusts those make, for demands of shape (n, 3) and (n,)."""
     torque = wp.array(np.atleast_2d(np.asarray(torque_frd, np.float32)), dtype=wp.vec3, device="cpu")
@@ -50,7 +50,7 @@ def mix(
     count = len(collective)
     results = wp.zeros(count, dtype=Allocation, device="cpu")
     commands, made = (wp.zeros(count, dtype=vec8, device="cpu") for _ in range(2))
-    inputs = [control_airframe(airframe), torque, collective, low, high, voltage_share, results, commands, made]
+    inputs = [control_airframe(airframe), torque, collective, low, high, voltage_fraction, results, commands, made]
     wp.launch(mixer_kernel, dim=count, inputs=inputs, device="cpu")
     return results.numpy().copy(), commands.numpy().copy(), made.numpy().copy()
 

@@ -42,7 +42,7 @@ class RigModel:
     drag_linear: float  # [1/s]
     drag_square: float  # [1/m]
     thrust_scale: float  # true over modelled thrust
-    voltage_share: float
+    voltage_fraction: float
     has_ground: int  # a floor at height 0 that carries but does not rub
     estimate_offset_ned: wp.vec3
     reset_count: int
@@ -54,7 +54,9 @@ def rig_substep(airframe: ControlAirframe, model: RigModel, body: RigBody, wind_
     collective = float(0.0)
     torque = wp.vec3(0.0, 0.0, 0.0)
     for i in range(airframe.rotor_count):
-        wanted = airframe.max_speed_rad_s * model.voltage_share * speed_share(body.command[i], airframe.command_curve)
+        wanted = (
+            airframe.max_speed_rad_s * model.voltage_fraction * speed_share(body.command[i], airframe.command_curve)
+        )
         time_s = model.fall_s
         if wanted > body.speed[i]:
             time_s = model.rise_s
@@ -114,7 +116,7 @@ def rig_kernel(
     body = bodies[i]
     state = states[i]
     battery = BatterySample()
-    battery.voltage_v = model.voltage_share * airframe.full_voltage_v
+    battery.voltage_v = model.voltage_fraction * airframe.full_voltage_v
     for step in range(ticks):
         tick = first_tick + step
         wind = wind_ned[i, tick % wind_ned.shape[1]]
@@ -139,7 +141,7 @@ class Rig:
     drag_linear: float = 0.25
     drag_square: float = 0.02
     thrust_scale: float = 1.0
-    voltage_share: float = 1.0
+    voltage_fraction: float = 1.0
     has_ground: bool = False
     start_ned: tuple[float, float, float] = (0.0, 0.0, -10.0)
 
@@ -150,7 +152,7 @@ class Rig:
         self.model.rise_s = data.rotor_model.spin_up_time_s
         self.model.fall_s = data.rotor_model.spin_down_time_s
         self.model.drag_linear, self.model.drag_square = self.drag_linear, self.drag_square
-        self.model.thrust_scale, self.model.voltage_share = self.thrust_scale, self.voltage_share
+        self.model.thrust_scale, self.model.voltage_fraction = self.thrust_scale, self.voltage_fraction
         self.model.has_ground = int(self.has_ground)
         self.control_params = wp.array([control_params(self.params)], dtype=ControlParams, device="cpu")
         self.airframes = wp.array([airframe], dtype=ControlAirframe, device="cpu")
@@ -163,9 +165,9 @@ class Rig:
         rows["pos_ned"] = self.start_ned
         thrust = airframe.mass_kg * GRAVITY_M_S2 / airframe.rotor_count / self.thrust_scale
         rows["speed"][:, : airframe.rotor_count] = np.sqrt(thrust / airframe.thrust_n_s2)
-        share = np.sqrt(thrust / airframe.thrust_n_s2) / airframe.max_speed_rad_s / self.voltage_share
+        fraction = np.sqrt(thrust / airframe.thrust_n_s2) / airframe.max_speed_rad_s / self.voltage_fraction
         straight = 1.0 - airframe.command_curve
-        root = 2.0 * share / (straight + np.sqrt(straight**2 + 4.0 * airframe.command_curve * share))
+        root = 2.0 * fraction / (straight + np.sqrt(straight**2 + 4.0 * airframe.command_curve * fraction))
         rows["command"][:, : airframe.rotor_count] = root**2
         rows["accel_frd"] = (0.0, 0.0, -GRAVITY_M_S2)
         self.idle_command = data.rotor_model.idle_command

@@ -68,11 +68,11 @@ def test_three_rotors_achieve_all_but_yaw(x500: Airframe) -> None:
 
 
 @pytest.mark.parametrize("name", ["x500", "f450"])
-@pytest.mark.parametrize("voltage_share", [0.75, 1.0])
-def test_commands_make_the_thrusts_asked_for(name: str, voltage_share: float) -> None:
+@pytest.mark.parametrize("voltage_fraction", [0.75, 1.0])
+def test_commands_make_the_thrusts_asked_for(name: str, voltage_fraction: float) -> None:
     airframe = load_airframe(name)
     demand = np.linspace(2.0, 18.0, 30)
-    results, commands, made = mix(airframe, np.zeros((30, 3)), demand, 0.3, 8.0, voltage_share)
+    results, commands, made = mix(airframe, np.zeros((30, 3)), demand, 0.3, 8.0, voltage_fraction)
     inside = (commands[:, :4] > airframe.rotor_model.idle_command).all(axis=1) & (commands[:, :4] < 1.0).all(axis=1)
     assert inside.sum() > 15
     np.testing.assert_allclose(made[inside], results["thrust_n"][inside], rtol=1e-4)

@@ -42,7 +42,7 @@ def test_hold_bears_thrust_that_differs_from_the_model(thrust_scale: float) -> N
 
 
 def test_hold_bears_a_battery_at_its_end() -> None:
-    assert hold_error_95_m(blown_rig(WIND, voltage_share=0.8)) < 0.05
+    assert hold_error_95_m(blown_rig(WIND, voltage_fraction=0.8)) < 0.05
 
 
 @pytest.mark.parametrize("wind_m_s", [NO_WIND, WIND])
@@ -251,7 +251,7 @@ def test_wind_beyond_the_limits_carries_the_vehicle_downwind_at_its_height() -> 
 
 
 def test_height_is_kept_before_the_place_when_thrust_is_short() -> None:
-    rig = blown_rig(NO_WIND, voltage_share=0.665)  # greatest thrust 1.03 times the weight
+    rig = blown_rig(NO_WIND, voltage_fraction=0.665)  # greatest thrust 1.03 times the weight
     rig.set(pos_ned=rig.start_ned)
     rig.blow(np.array([[8.0, 0.0, 0.0]]))
     bodies, _ = rig.run(10.0)

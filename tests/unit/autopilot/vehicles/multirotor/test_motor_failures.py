@@ -66,10 +66,10 @@ def test_motor_that_works_again_is_used_again():
     assert bench.left_out == [(2,), ()]
 
 
-@pytest.mark.parametrize("share", [0.6, 0.8])
-def test_weak_motor_has_not_failed(share):
+@pytest.mark.parametrize("fraction", [0.6, 0.8])
+def test_weak_motor_has_not_failed(fraction):
     bench = Bench()
-    bench.speeds[0] = share * bench.asked
+    bench.speeds[0] = fraction * bench.asked
     assert not bench.run(2.0)
 
 

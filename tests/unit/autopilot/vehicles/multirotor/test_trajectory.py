@@ -201,10 +201,10 @@ def test_vehicle_blown_away_draws_the_trajectory_along_and_flies_on_from_there()
     generator.ask(pos_ned=(40.0, 0.0, 0.0), path_start_ned=(0.0, 0.0, 0.0))
     generator.run(3.0)
     generator.estimates.numpy()["pos_ned"][0, 1] += 15.0
-    place = generator.estimates.numpy()["pos_ned"][0].copy()
+    position = generator.estimates.numpy()["pos_ned"][0].copy()
     generator.command()
     drawn = generator.states.numpy()[0]
-    assert np.linalg.norm(drawn["pos_ned"] - place) == pytest.approx(2.0, abs=1e-3)  # MPC_XY_ERR_MAX
+    assert np.linalg.norm(drawn["pos_ned"] - position) == pytest.approx(2.0, abs=1e-3)  # MPC_XY_ERR_MAX
     np.testing.assert_array_equal(drawn["vel_ned"], 0.0)
     log = generator.run(20.0)
     vel, accel = log["vel_ned"][0].astype(float), log["accel_ned"][0].astype(float)

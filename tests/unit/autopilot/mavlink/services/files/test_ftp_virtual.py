@@ -53,7 +53,7 @@ def decoded(data):
     """Header and items of a file, as MAVProxy decodes them."""
     header = struct.unpack("<5H", data[:10])
     values = MESSAGE.unpacker.iter_unpack(data[10:])
-    items = [MESSAGE(*(item[place] for place in MESSAGE.orders)) for item in values]
+    items = [MESSAGE(*(item[position] for position in MESSAGE.orders)) for item in values]
     return header, items
 
 

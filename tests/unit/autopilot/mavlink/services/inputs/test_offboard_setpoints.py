@@ -146,8 +146,8 @@ def test_global_altitude_alone_and_place_alone():
     rig = Rig()
     altitude = position(rig, frame=0, mask=ONLY_POS | 3)
     assert altitude.pos_ned == pytest.approx((nan, nan, -12.0), nan_ok=True)
-    place = position(rig, frame=0, mask=ONLY_POS | 4)
-    assert place.pos_ned == pytest.approx((0.0, 0.0, nan), nan_ok=True, abs=0.02)
+    level = position(rig, frame=0, mask=ONLY_POS | 4)
+    assert level.pos_ned == pytest.approx((0.0, 0.0, nan), nan_ok=True, abs=0.02)
 
 
 def test_half_a_place_or_none_on_earth_is_refused():
