@@ -258,7 +258,7 @@ class TestOtherTables:
         modes = mode_table(*(replace(spec, takes=tuple({*spec.takes} - {GoTo})) for spec in specs))
         rig = Kinematic(replace(MULTIROTOR, modes=modes)).flying()
         rig.fc.request(ChangeMode(Mode.GUIDED))
-        reply = rig.fc.request(GoTo(*place(30.0, 0.0)))
+        reply = rig.fc.request(GoTo(*position(30.0, 0.0)))
         assert (reply.verdict, reply.reason) == (Verdict.UNSUPPORTED, "no mode of this vehicle does that")
         assert rig.state.mode is Mode.GUIDED
 
