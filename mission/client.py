@@ -133,6 +133,11 @@ class Client:
         self._next_offboard_us = 0
         self._offboard: Callable[[int], None] | None = None
 
+    @property
+    def system_id(self) -> int:
+        """Of the vehicle."""
+        return self._end.vehicle_id
+
     def frame(self, time_us: int) -> None:
         """Takes in what has arrived, sends what is due and runs the scripts to their next wait."""
         self.time_us = time_us
@@ -300,7 +305,7 @@ class Client:
 
     def _receive(self) -> None:
         for msg_id, sysid, compid, frame in self._end.arrived():
-            if sysid == self._end.vehicle_id:
+            if sysid == self.system_id:
                 self._take(msg_id, compid, frame)
 
     def _take(self, msg_id: int, compid: int, frame: Frame | bytes) -> None:

@@ -214,6 +214,14 @@ def test_a_command_is_sent_three_times_before_it_is_given_up(peer):
     assert [sent.confirmation for sent in peer.of("COMMAND_LONG")] == [0, 1, 2]
 
 
+def test_any_message_can_be_addressed_to_the_vehicle():
+    vehicle_end, client_end = memory_pair()
+    client = Client(client_end, system_id=7)
+    client.send("PARAM_REQUEST_LIST", target_system=client.system_id, target_component=1)
+    (data,) = vehicle_end.receive()
+    assert [decode(frame).fields.target_system for frame in FrameReader().feed(data)] == [7]
+
+
 def test_progress_and_other_commands_answers_are_waited_through(peer):
     def answer(message):
         if message.name == "COMMAND_LONG":
