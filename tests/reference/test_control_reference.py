@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from autopilot.control.profile import AxisLimits, distance_via, ramp_distance, ramp_to, step_to_position
 from autopilot.tuning import Cascade, default_gains, motor_time_s
-from autopilot.vehicles.multirotor.allocation import command_for_speed, speed_share
+from autopilot.vehicles.multirotor.allocation import command_for_speed, speed_fraction
 from autopilot.vehicles.multirotor.attitude import attitude_error
 from autopilot.vehicles.multirotor.control_airframe import control_airframe, effectiveness
 from common.airframe import load_airframe
@@ -93,7 +93,7 @@ def test_desaturation_keeps_as_much_yaw_as_linear_programming_finds() -> None:
 def test_command_is_the_inverse_of_the_motor_curve(curve: float) -> None:
     for command in np.linspace(0.0, 1.0, 21):
         fraction = curve * command + (1.0 - curve) * np.sqrt(command)
-        assert speed_share(float(command), curve) == pytest.approx(fraction, abs=1e-6)
+        assert speed_fraction(float(command), curve) == pytest.approx(fraction, abs=1e-6)
         assert command_for_speed(float(fraction), curve) == pytest.approx(command, abs=1e-6)
 
 

@@ -24,14 +24,14 @@ class Allocation:
 
 
 @wp.func
-def speed_share(command: float, curve: float) -> float:
+def speed_fraction(command: float, curve: float) -> float:
     """Rotor speed over greatest speed at a motor command [0..1]."""
     return curve * command + (1.0 - curve) * wp.sqrt(command)
 
 
 @wp.func
 def command_for_speed(fraction: float, curve: float) -> float:
-    """Motor command for a rotor speed over greatest speed: the inverse of `speed_share`."""
+    """Motor command for a rotor speed over greatest speed: the inverse of `speed_fraction`."""
     straight = 1.0 - curve
     root = 2.0 * fraction / wp.max(straight + wp.sqrt(straight * straight + 4.0 * curve * fraction), _TINY)
     return root * root
@@ -72,7 +72,7 @@ def fitting_collective(airframe: ControlAirframe, thrusts: vec8, collective_n: f
 
 
 @wp.func
-def fitting_share(airframe: ControlAirframe, thrusts: vec8, change: vec8, low: float, high: float) -> float:
+def fitting_fraction(airframe: ControlAirframe, thrusts: vec8, change: vec8, low: float, high: float) -> float:
     """The greatest share [0..1] of `change` that keeps every rotor within [low, high]."""
     fraction = float(1.0)
     for i in range(airframe.rotor_count):
@@ -89,7 +89,7 @@ def desaturate(airframe: ControlAirframe, torque_frd: wp.vec3, collective_n: flo
     thrusts = tilt_thrusts(airframe, torque_frd, high - low)
     thrusts = thrusts + airframe.mix_thrust * fitting_collective(airframe, thrusts, collective_n, low, high)
     turn = airframe.mix_yaw * torque_frd[2]
-    thrusts = thrusts + turn * fitting_share(airframe, thrusts, turn, low, high)
+    thrusts = thrusts + turn * fitting_fraction(airframe, thrusts, turn, low, high)
     for i in range(airframe.rotor_count):
         thrusts[i] = wp.clamp(thrusts[i], low, high)
     return thrusts

@@ -13,7 +13,7 @@ from common.airframe import Airframe
 from common.params import Parameter, ParameterTable
 
 _PERIOD_US = 100_000
-_SLOW_SHARE = 0.5  # of the speed asked for, below which a motor has failed; a weak one still flies; guess
+_SLOW_FRACTION = 0.5  # of the speed asked for, below which a motor has failed; a weak one still flies; guess
 _BACK_US = 500_000  # for which a failed motor must turn as asked before it is used again; guess
 _ROTORS_SPARE = 5  # with fewer, nothing can be left out
 _VOLTAGE_FRACTION_MIN = 0.6
@@ -95,7 +95,7 @@ class MotorWatch:
         failed = set(self.failed)
         for rotor in range(len(self._since_us)):
             command = commands[rotor]
-            is_slow = speeds[rotor] < _SLOW_SHARE * self._speed_share(command) * top
+            is_slow = speeds[rotor] < _SLOW_FRACTION * self._speed_fraction(command) * top
             has_failed = rotor in self.failed
             if is_slow == has_failed or (not has_failed and command < self._least_command):
                 self._since_us[rotor] = now_us
@@ -113,7 +113,7 @@ class MotorWatch:
             if len(self._since_us) >= _ROTORS_SPARE and int(self._params["CA_FAILURE_MODE"]):
                 self._leave_out(failed)
 
-    def _speed_share(self, command: float) -> float:
+    def _speed_fraction(self, command: float) -> float:
         curve = self._airframe.rotor_model.command_curve
         return curve * command + (1.0 - curve) * sqrt(max(command, 0.0))
 

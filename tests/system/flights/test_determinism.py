@@ -10,8 +10,10 @@ from pyulog import ULog
 
 from mission.flight import Flight, FlightConfig
 from mission.flight_config import TREELESS_M
-from mission.plan.plan_file import DEFAULT_PLAN, read_plan
+from mission.log.flight_summary import planned_path
+from mission.plan.plan_file import DEFAULT_PLAN, moved_plan, read_plan
 from mission.script import fly_plan
+from mission.view.replay_file import keep_for_replay
 from sim.world.world import WorldConfig
 from tests.system.vehicle import HONEYGUIDE, ROOT
 
@@ -55,7 +57,8 @@ def test_two_processes_write_the_same_bytes(folders, name):
 def test_a_flight_inside_a_program_writes_the_same_bytes_as_the_command(folders, tmp_path):
     world = WorldConfig(treeless_radius_m=TREELESS_M)  # the command's: no trees where clients fly first
     flight = Flight(FlightConfig(seed=3, wind_m_s=5.0, world=world), folder=tmp_path)
-    plan = read_plan(DEFAULT_PLAN)
+    plan = moved_plan(read_plan(DEFAULT_PLAN), flight.config.home)
+    keep_for_replay(flight, [point for _, point in planned_path(plan, flight.config.home)])  # as the command does
     flight.fly(lambda drone: fly_plan(drone, plan), seconds=40.0)
     flight.close()
     for name in LOGS:

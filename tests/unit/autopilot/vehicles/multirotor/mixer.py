@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-from autopilot.vehicles.multirotor.allocation import Allocation, allocate, motor_commands, speed_share
+from autopilot.vehicles.multirotor.allocation import Allocation, allocate, motor_commands, speed_fraction
 from autopilot.vehicles.multirotor.control_airframe import ControlAirframe, control_airframe
 from common.airframe import Airframe
 from common.kernels import vec8
@@ -29,7 +29,7 @@ def mixer_kernel(
     command = motor_commands(airframe, result.thrust_n, voltage_fraction)
     made = vec8()
     for k in range(airframe.rotor_count):
-        speed = airframe.max_speed_rad_s * voltage_fraction * speed_share(command[k], airframe.command_curve)
+        speed = airframe.max_speed_rad_s * voltage_fraction * speed_fraction(command[k], airframe.command_curve)
         made[k] = airframe.thrust_n_s2 * speed * speed
     results[i] = result
     commands[i] = command

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import warp as wp
 
 from autopilot.ports import SETPOINT_TRAJECTORY, BatterySample, Estimate, Setpoint
-from autopilot.vehicles.multirotor.allocation import speed_share
+from autopilot.vehicles.multirotor.allocation import speed_fraction
 from autopilot.vehicles.multirotor.cascade import ControlState, control_tick
 from autopilot.vehicles.multirotor.control_airframe import ControlAirframe, control_airframe
 from autopilot.vehicles.multirotor.params import ControlParams, control_params
@@ -55,7 +55,7 @@ def rig_substep(airframe: ControlAirframe, model: RigModel, body: RigBody, wind_
     torque = wp.vec3(0.0, 0.0, 0.0)
     for i in range(airframe.rotor_count):
         wanted = (
-            airframe.max_speed_rad_s * model.voltage_fraction * speed_share(body.command[i], airframe.command_curve)
+            airframe.max_speed_rad_s * model.voltage_fraction * speed_fraction(body.command[i], airframe.command_curve)
         )
         time_s = model.fall_s
         if wanted > body.speed[i]:
