@@ -151,7 +151,8 @@ class Follow(FlightMode):
                 self._course = self._bearing - self._angle_rad
             ahead = wrapped(self._course + self._angle_rad - atan2(east, north))
             if abs(ahead) < _TURN_RAD_S * _AHEAD_S:
-                rate = min(_TURN_RAD_S, self._context.number("MPC_XY_VEL_MAX") / self._distance_m)
+                fastest = self._context.number(self._context.craft.limits.speed_max)
+                rate = min(_TURN_RAD_S, fastest / self._distance_m)
                 self._angle_rad = wrapped(self._angle_rad + rate * sticks.roll * dt_s)
 
     def _follow_course(self, target: TargetFilter, dt_s: float) -> None:

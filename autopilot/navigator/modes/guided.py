@@ -228,7 +228,8 @@ class Guided(FlightMode):
         if setpoint.kind != SETPOINT_ATTITUDE or int(context.number("GUID_OPTIONS")) & THRUST_IS_THRUST:
             return setpoint
         fraction = 2.0 * setpoint.thrust - 1.0
-        speed = context.number("MPC_Z_V_AUTO_UP" if fraction > 0.0 else "MPC_Z_V_AUTO_DN")
+        limits = context.craft.limits
+        speed = context.number(limits.climb_speed if fraction > 0.0 else limits.descend_speed)
         has_yaw_rate = isfinite(setpoint.yaw_rate)
         return OffboardSetpoint(
             setpoint.time_us,

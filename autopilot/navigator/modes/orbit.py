@@ -136,7 +136,7 @@ class Orbit(FlightMode):
 
     def _adjust(self, circle: Circle, sticks: StickInput, dt_s: float) -> tuple[float, float]:
         """Lets the pilot change the circle; returns the speeds [m/s] outwards and down with which it changes."""
-        number = self._context.number
+        number, limits = self._context.number, self._context.craft.limits
         dead, expo = number("MAN_DEADZONE"), number("MPC_XY_MAN_EXPO")
         forward = curved(without_centre(sticks.pitch, dead), expo)
         right = curved(without_centre(sticks.roll, dead), expo)
@@ -147,10 +147,10 @@ class Orbit(FlightMode):
             inwards, faster = circle.direction * right, circle.direction * forward
         else:
             inwards, faster = forward, right if sticks.is_ardupilot else -right
-        away_m_s = -inwards * number("MPC_XY_CRUISE")
+        away_m_s = -inwards * number(limits.cruise_speed)
         radius_m = circle.radius_m + away_m_s * dt_s
         circle.radius_m = min(max(radius_m, _RADIUS_MIN_M), _RADIUS_MAX_M)
-        speed = circle.direction * circle.speed_m_s + faster * number("MPC_ACC_HOR") * dt_s  # clockwise
+        speed = circle.direction * circle.speed_m_s + faster * number(limits.accel_hor) * dt_s  # clockwise
         circle.speed_m_s = min(abs(speed), self._fastest(circle.radius_m))
         if speed != 0.0 and self._yaw is not OrbitYaw.ALONG:
             circle.direction = 1.0 if speed > 0.0 else -1.0
@@ -186,8 +186,8 @@ class Orbit(FlightMode):
 
     def _fastest(self, radius_m: float) -> float:
         """The speed [m/s] with which a circle can be flown."""
-        number = self._context.number
-        return min(speed_limit(radius_m, number("MPC_ACC_HOR")), number("MPC_XY_VEL_MAX"))
+        number, limits = self._context.number, self._context.craft.limits
+        return min(speed_limit(radius_m, number(limits.accel_hor)), number(limits.speed_max))
 
     def _radius_of(self, request: OrbitRequest) -> float:
         return request.radius_m if isfinite(request.radius_m) else self._context.number("MC_ORBIT_RAD")

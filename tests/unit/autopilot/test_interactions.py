@@ -270,3 +270,9 @@ class TestOtherTables:
         monkeypatch.setattr(Follow, "take", lambda _, report: taken.append(report))
         rig.fc.request(TargetReport((10.0, 0.0, 0.0), None, 1.0, 1.0))
         assert len(taken) == 1
+
+    def test_shared_modes_move_within_the_limits_that_the_class_names(self):
+        limits = replace(MULTIROTOR.limits, speed_max="MPC_LAND_SPEED")  # 0.7 m/s
+        rig = Kinematic(replace(MULTIROTOR, limits=limits)).flying()
+        reply = rig.fc.request(OrbitRequest(radius_m=20.0, speed_m_s=5.0))
+        assert reply.reason == "5.0 m/s is too fast for this circle: 0.7 m/s at most"
