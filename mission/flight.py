@@ -38,7 +38,7 @@ from mission.simulator.failure_injection import RigInjector
 from mission.simulator.host_ports import host_ports
 from mission.simulator.onboard_devices import Surroundings
 from mission.simulator.simulator_params import PREFIX as SIMULATOR_PREFIX
-from mission.simulator.simulator_params import TURBULENCE_SHARE, SimulatorParameters
+from mission.simulator.simulator_params import TURBULENCE_FRACTION, SimulatorParameters
 from mission.video.mjpeg_server import StreamServer
 from mission.video.rtp_video import RtpVideo
 from sim.bodies.vehicles import class_of
@@ -60,7 +60,7 @@ __all__ = ["Flight", "FlightConfig", "flight_parameters"]
 
 TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
 DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (PX4, ARDUPILOT)}
-GUST_SHARE = 0.3  # guess: a gust adds up to this share of the mean wind
+GUST_FRACTION = 0.3  # guess: a gust adds up to this share of the mean wind
 
 
 class Computer(Protocol):
@@ -312,16 +312,16 @@ class Flight:
 
     def set_wind(self, speed_m_s: float, from_deg: float) -> None:
         """From the next frame on the mean blows so, with turbulence and gusts to match."""
-        self.set_air(speed_m_s, from_deg, TURBULENCE_SHARE * speed_m_s)
+        self.set_air(speed_m_s, from_deg, TURBULENCE_FRACTION * speed_m_s)
         self.simulator_params.tell(
-            SIM_WIND_SPD=speed_m_s, SIM_WIND_DIR=from_deg, SIM_WIND_TURB=TURBULENCE_SHARE * speed_m_s
+            SIM_WIND_SPD=speed_m_s, SIM_WIND_DIR=from_deg, SIM_WIND_TURB=TURBULENCE_FRACTION * speed_m_s
         )
 
     def set_air(self, speed_m_s: float, from_deg: float, turbulence_m_s: float) -> None:
         """From the next frame on the mean blows so; the vertical wind deviates so much, and gusts go with it."""
         air = flight_wind(speed_m_s, from_deg)
         air.turbulence_w_std = turbulence_m_s
-        air.gust_m_s = GUST_SHARE / TURBULENCE_SHARE * turbulence_m_s
+        air.gust_m_s = GUST_FRACTION / TURBULENCE_FRACTION * turbulence_m_s
         self.rig.set_air(air)
 
     def cut_sticks(self, *, is_cut: bool) -> None:
@@ -383,7 +383,7 @@ def flight_world(config: FlightConfig) -> WorldMap:
 
 def flight_wind(speed_m_s: float, from_deg: float) -> WindModel:
     """The air of a flight: the mean, and the turbulence and gusts that go with it."""
-    return wind_model(speed_m_s, from_deg, TURBULENCE, GUST_SHARE * speed_m_s)
+    return wind_model(speed_m_s, from_deg, TURBULENCE, GUST_FRACTION * speed_m_s)
 
 
 def host_files(folder: Path | None, state: StateFolder | None) -> ConfinedFolder | None:

@@ -246,10 +246,11 @@ class Sticks:
             self._speeds = [0.0, 0.0, 0.0, 0.0]
             now.speed = 0.0
         elif dt_s > 0.0:
-            way = (roll - now.roll, pitch - now.pitch, yaw - now.yaw, throttle - now.throttle)
+            moved_by = (roll - now.roll, pitch - now.pitch, yaw - now.yaw, throttle - now.throttle)
             fraction = 1.0 / (dt_s + _MOVED_S)
             self._speeds = [
-                speed * _MOVED_S * fraction + moved * fraction for speed, moved in zip(self._speeds, way, strict=True)
+                speed * _MOVED_S * fraction + moved * fraction
+                for speed, moved in zip(self._speeds, moved_by, strict=True)
             ]
             now.speed = max(map(abs, self._speeds))
         self._heard_us = now_us

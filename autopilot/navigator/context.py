@@ -28,7 +28,7 @@ class NavContext:
     """
 
     __slots__ = (
-        "_numbers", "announcer", "climb_speed", "craft", "cruise_speed", "descend_speed", "fence_refusal", "find_way",
+        "_numbers", "announcer", "climb_speed", "craft", "cruise_speed", "descend_speed", "fence_refusal", "find_path",
         "flown",
         "has_position", "heading", "is_landing", "leg_yaw", "next_hold", "params", "position_refusal",
         "setpoint", "state", "wants_lift", "wish", "yaw_mode",
@@ -54,7 +54,9 @@ class NavContext:
             ""
         )  # why the fence lets nobody stay at a position [m]
         self.fence_refusal: Callable[[Vector], str] = lambda _position: ""  # why it lets nobody go to a position [m]
-        self.find_way: Callable[[Vector, Vector], list[Vector] | None] = lambda _start, goal: [goal]  # inside the fence
+        self.find_path: Callable[[Vector, Vector], list[Vector] | None] = lambda _start, goal: [
+            goal
+        ]  # inside the fence
         self.flown = FlightMode()  # the present mode
         self.wish: Mode | None = None  # the mode that shall follow this one
         self.next_hold: tuple[Vector, float, bool] | None = None  # place, heading, whether to go there in a line
@@ -186,6 +188,6 @@ def distance(a: Vector, b: Vector) -> float:
 
 
 def braking_distance(speed: float, accel: float, jerk: float) -> float:
-    """Way [m] from a speed to rest with limited acceleration and jerk, starting without acceleration."""
+    """WaypointPath [m] from a speed to rest with limited acceleration and jerk, starting without acceleration."""
     peak = min(accel, sqrt(speed * jerk))
     return speed * (0.5 * speed / peak + 0.5 * peak / jerk)

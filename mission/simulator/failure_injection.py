@@ -38,7 +38,7 @@ WRONG = {
 GARBAGE_FACTOR = 30.0
 SLOW_FACTOR = 5.0
 WEAK_LOSS = 0.4  # share of its command that a slow motor loses: ArduPilot's weak motor runs at 60 %
-EMPTY_SHARE = 0.04  # of the charge that an empty battery has left: below BAT_EMERGEN_THR
+EMPTY_FRACTION = 0.04  # of the charge that an empty battery has left: below BAT_EMERGEN_THR
 INTERMITTENT_US = 1_000_000  # off for so long, then on for so long
 
 
@@ -155,7 +155,7 @@ class RigInjector:
         if charge is None:
             return
         if is_empty:
-            left_c = EMPTY_SHARE * self._capacity_c
+            left_c = EMPTY_FRACTION * self._capacity_c
             taken_c = max(float(charge[0]) - left_c, 0.0)
             self._taken_c += taken_c
             charge[0] -= taken_c

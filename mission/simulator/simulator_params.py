@@ -7,6 +7,7 @@ They are those of one flight: none is kept for the next.
 from collections.abc import Callable
 from typing import Protocol
 
+from autopilot.flight_controller import FlightController
 from autopilot.interface.failure_requests import Failure, Unit
 from autopilot.interface.vehicle_state import Reply
 from common.airframe import Airframe
@@ -15,7 +16,7 @@ from common.params import Parameter, ParameterTable
 
 PREFIX = "SIM_"
 SPEEDUP = "SIM_SPEEDUP"
-TURBULENCE_SHARE = 0.1  # of the mean wind: MIL-F-8785C's vertical deviation
+TURBULENCE_FRACTION = 0.1  # of the mean wind: MIL-F-8785C's vertical deviation
 _OURS = "the flight's options"
 _ARDUPILOT = "ArduPilot default"
 
@@ -23,7 +24,7 @@ _ARDUPILOT = "ArduPilot default"
 def simulator_parameters(airframe: Airframe, home: GeoPoint, wind_m_s: float, wind_from_deg: float) -> list[Parameter]:
     """The declarations; the defaults are what the flight is made from."""
     battery = airframe.battery
-    turbulence = TURBULENCE_SHARE * wind_m_s
+    turbulence = TURBULENCE_FRACTION * wind_m_s
     full_v, empty_v = (battery.cells * volts for volts in (battery.full_cell_v, battery.empty_cell_v))
     return [
         Parameter(SPEEDUP, 1.0, 0.0, 1000.0, "", "simulated seconds per second, 0: as fast as possible", _OURS),
@@ -65,7 +66,7 @@ class SimulatedFlight(Protocol):
     """What the parameters act on (mission.flight)."""
 
     params: ParameterTable
-    airframe: Airframe
+    controller: FlightController
 
     @property
     def injector(self) -> Injector: ...

@@ -51,7 +51,7 @@ class Fence:
         self._clearance = 0.0
         self._safe_sq = -1.0  # [m²] moves shorter than this change nothing
         context.params.on_change(self._on_parameter)
-        context.find_way = self.way
+        context.find_path = self.path
         context.fence_refusal = self.refusal
         context.position_refusal = lambda position: self.refusal(position, is_to_stay=True)
         self._switch_by_parameter()
@@ -111,7 +111,7 @@ class Fence:
             number("GF_MAX_HOR_DIST") if limits & _RADIUS else inf,
         )
 
-    def way(self, start: Vector, goal: Vector) -> list[Vector] | None:
+    def path(self, start: Vector, goal: Vector) -> list[Vector] | None:
         """The points [m] of a way to the goal, at its height, that keeps inside; None if there is none."""
         if not self._limits & _SHAPES:
             return [goal]

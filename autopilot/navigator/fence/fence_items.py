@@ -153,6 +153,6 @@ def _meet(start: _Array, end: _Array, starts: _Array, ends: _Array) -> NDArray[n
 
 
 def _side(start: _Array, end: _Array, point: _Array) -> _Array:
-    way, to_point = end - start, point - start
-    sides: _Array = np.sign(way[..., 0] * to_point[..., 1] - way[..., 1] * to_point[..., 0])
+    edge, to_point = end - start, point - start
+    sides: _Array = np.sign(edge[..., 0] * to_point[..., 1] - edge[..., 1] * to_point[..., 0])
     return sides

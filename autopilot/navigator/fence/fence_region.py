@@ -38,12 +38,12 @@ class Region:
         corners = [np.array(vertices, dtype=np.float64) for vertices, _ in self.polygons]
         starts = np.concatenate(corners) if corners else np.zeros((0, 2))
         ends = np.concatenate([np.roll(vertices, -1, axis=0) for vertices in corners]) if corners else starts
-        way = ends - starts
+        edge = ends - starts
         self._north, self._east = starts.T
         self._end_north = ends[:, 0].copy()
-        self._to_north, self._to_east = way.T
-        self._inverse_length_sq = 1.0 / np.maximum(np.sum(way * way, axis=1), 1e-9)
-        self._slope = way[:, 1] / np.where(way[:, 0] == 0.0, inf, way[:, 0])  # east per north; 0 along a parallel
+        self._to_north, self._to_east = edge.T
+        self._inverse_length_sq = 1.0 / np.maximum(np.sum(edge * edge, axis=1), 1e-9)
+        self._slope = edge[:, 1] / np.where(edge[:, 0] == 0.0, inf, edge[:, 0])  # east per north; 0 along a parallel
         counts = [len(vertices) for vertices in corners]
         self._starts = np.cumsum([0, *counts[:-1]]) if counts else np.zeros(0, dtype=np.int64)
         self._is_inclusion = np.array([is_inclusion for _, is_inclusion in self.polygons], dtype=bool)

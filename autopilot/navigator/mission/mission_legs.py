@@ -139,10 +139,10 @@ class Leg:
         if self._stage is _Stage.TRAVEL and not self._context.is_on_ground:
             self._fly(item, self.target)
         elif self._stage is _Stage.CURVE and item.command == Command.LOITER_TURNS and self._runner is not None:
-            left = self._runner.curve.length - self._runner.way
+            left = self._runner.curve.length - self._runner.arc_length
             self._circle(item, self.target, left)
         elif self._stage is _Stage.CURVE and item.command == Command.SPLINE_WAYPOINT and self._runner is not None:
-            position, along = self._runner.curve.at(self._runner.way)
+            position, along = self._runner.curve.at(self._runner.arc_length)
             self._spline(item, position, along, self.target, self._runner.speed)
 
     def distance_left(self) -> float:
@@ -312,7 +312,7 @@ class Leg:
         speed = 0.0 if self._runner is None or self._stage is not _Stage.CURVE else self._runner.speed
         here = edge
         if self._stage is _Stage.CURVE and self._runner is not None:
-            here, _ = self._runner.curve.at(self._runner.way)
+            here, _ = self._runner.curve.at(self._runner.arc_length)
         turns = length / (2.0 * pi * abs(radius))
         self._runner = Runner(Turns(position, bearing(position, here), radius, turns, pace), pace, speed)
         self._stage = _Stage.CURVE

@@ -124,8 +124,8 @@ class Follow(FlightMode):
             target.vel_ned[1] + round_m_s * north + away_m_s * east,
             self._speed_down,
         )
-        way = (position[0] - here[0], position[1] - here[1])
-        yaw = atan2(way[1], way[0]) if hypot(*way) > 0.5 else context.state.yaw_rad
+        offset = (position[0] - here[0], position[1] - here[1])
+        yaw = atan2(offset[1], offset[0]) if hypot(*offset) > 0.5 else context.state.yaw_rad
         context.setpoint.track(pos_ned, vel_ned, yaw)
 
     def _ask(self) -> None:

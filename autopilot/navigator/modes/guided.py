@@ -13,7 +13,7 @@ from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.goto import reposition_target
 from autopilot.navigator.modes.takeoff import Climb, is_high, takeoff_refusal
-from autopilot.navigator.paths.waypoint_path import Way
+from autopilot.navigator.paths.waypoint_path import WaypointPath
 from autopilot.navigator.setpoint import Vector
 from autopilot.navigator.takeoff_intent import Ask, vertical_ask
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_LEAN, SETPOINT_TRAJECTORY
@@ -34,8 +34,19 @@ class Guided(FlightMode):
     """Mode Guided, and what clients ask of it."""
 
     __slots__ = (
-        "_climb", "_context", "_is_active", "_is_flown", "_is_line", "_is_told", "_next",
-        "_position", "_received_us", "_setpoint", "_task", "_way", "_yaw",
+        "_climb",
+        "_context",
+        "_is_active",
+        "_is_flown",
+        "_is_line",
+        "_is_told",
+        "_next",
+        "_path",
+        "_position",
+        "_received_us",
+        "_setpoint",
+        "_task",
+        "_yaw",
     )  # fmt: skip
 
     takes_heading = True
@@ -51,7 +62,7 @@ class Guided(FlightMode):
         self._is_line = False  # on a straight line to the position
         self._is_flown = False  # what is asked for is in the setpoint
         self._is_told = False  # that it stands on the ground
-        self._way = Way(context)  # around what the fence excludes
+        self._path = WaypointPath(context)  # around what the fence excludes
         self._next: tuple[Vector, float] | None = (
             None  # a position asked for before the mode was entered, or on take-off
         )
@@ -91,8 +102,8 @@ class Guided(FlightMode):
             self._stand()
         elif self._task is _Task.SETPOINT:
             self._follow()
-        elif self._way.left:
-            self._is_flown = not self._way.frame()
+        elif self._path.left:
+            self._is_flown = not self._path.frame()
         elif not self._is_flown:
             self._is_flown = True
             context.fly_to(self._position, self._yaw, context.state.estimate.pos_ned if self._is_line else None)
@@ -110,11 +121,11 @@ class Guided(FlightMode):
         self._task = _Task.PLACE
         self._position, self._yaw, self._is_line = position, yaw, is_line
         self._is_flown = False
-        self._way.stop()
+        self._path.stop()
         here = self._context.stop_point() if is_line else position
-        points = self._context.find_way(here, position) if is_line else None
+        points = self._context.find_path(here, position) if is_line else None
         if points is not None and len(points) > 1:
-            self._way.start(here, points)
+            self._path.start(here, points)
             self._is_flown = True
 
     def _stand(self) -> None:
@@ -192,7 +203,7 @@ class Guided(FlightMode):
         target = reposition_target(context, base, request)
         if isinstance(target, Reply):
             return target
-        if context.find_way(context.stop_point(), target[0]) is None:
+        if context.find_path(context.stop_point(), target[0]) is None:
             return Reply(Verdict.DENIED, "there is no way to the target inside the fence")
         if isfinite(request.speed_m_s) and request.speed_m_s > 0.0:
             context.cruise_speed = request.speed_m_s

@@ -8,7 +8,7 @@ from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
 from autopilot.navigator.context import NavContext, distance
 from autopilot.navigator.modes.goto import reposition_target
 from autopilot.navigator.modes.stick_modes import Position
-from autopilot.navigator.paths.waypoint_path import Way
+from autopilot.navigator.paths.waypoint_path import WaypointPath
 from autopilot.navigator.setpoint import Vector
 
 
@@ -18,8 +18,19 @@ class Hold(FlightMode):
     Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as he steers.
     """
 
-    __slots__ = ("_context", "_is_active", "_is_flown", "_is_goto", "_is_steered", "_reset_count", "_steered", "_via",
-                 "_way", "target_ned", "yaw")  # fmt: skip
+    __slots__ = (
+        "_context",
+        "_is_active",
+        "_is_flown",
+        "_is_goto",
+        "_is_steered",
+        "_path",
+        "_reset_count",
+        "_steered",
+        "_via",
+        "target_ned",
+        "yaw",
+    )  # fmt: skip
 
     finishes_takeoff = takes_heading = True
 
@@ -29,7 +40,7 @@ class Hold(FlightMode):
         self._is_flown = False
         self._is_goto = False  # on a straight line to the position
         self._steered = Position(context)
-        self._way = Way(context)
+        self._path = WaypointPath(context)
         self._via: list[Vector] = []  # [m] points to go over on the next way to a position
         self._is_steered = False
         self._reset_count = 0  # of the estimate
@@ -47,7 +58,7 @@ class Hold(FlightMode):
             target = reposition_target(context, self.target_ned if self._is_active else context.stop_point(), request)
             if isinstance(target, Reply):
                 return target
-            points = context.find_way(context.stop_point(), target[0])
+            points = context.find_path(context.stop_point(), target[0])
             if points is None:
                 return Reply(Verdict.DENIED, "there is no way to the target inside the fence")
             self._via = points[:-1]
@@ -86,9 +97,9 @@ class Hold(FlightMode):
         via, self._via = self._via if self._is_goto else [], []
         self._is_flown = bool(via)
         if via:
-            self._way.start(context.stop_point(), [*via, self.target_ned])
+            self._path.start(context.stop_point(), [*via, self.target_ned])
         else:
-            self._way.stop()
+            self._path.stop()
         self._reset_count = context.state.estimate.reset_count
 
     def frame(self) -> None:
@@ -97,8 +108,8 @@ class Hold(FlightMode):
             return
         if context.state.estimate.reset_count != self._reset_count:
             self._follow_reset()
-        if self._way.left:
-            self._is_flown = not self._way.frame()
+        if self._path.left:
+            self._is_flown = not self._path.frame()
         elif context.is_on_ground:
             self._is_flown = False
         elif not self._is_flown:

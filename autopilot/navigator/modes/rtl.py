@@ -10,7 +10,7 @@ from autopilot.navigator.fence.fence import Fence
 from autopilot.navigator.mission.mission import Mission
 from autopilot.navigator.modes.rtl_destination import Destination, Destinations
 from autopilot.navigator.modes.rtl_landing import Arrival
-from autopilot.navigator.paths.waypoint_path import Way
+from autopilot.navigator.paths.waypoint_path import WaypointPath
 from autopilot.navigator.setpoint import Vector
 
 _HEIGHT_M = 0.5  # height error at which the climb ends
@@ -33,8 +33,19 @@ class Return(FlightMode):
         mission: flown from its landing part, if that is where it leads.
     """
 
-    __slots__ = ("_arrival", "_back_d", "_context", "_destination", "_destinations", "_fence", "_items", "_mission",
-                 "_phase", "_start", "_way")  # fmt: skip
+    __slots__ = (
+        "_arrival",
+        "_back_d",
+        "_context",
+        "_destination",
+        "_destinations",
+        "_fence",
+        "_items",
+        "_mission",
+        "_path",
+        "_phase",
+        "_start",
+    )  # fmt: skip
 
     is_below_floor = takes_heading = True
 
@@ -43,7 +54,7 @@ class Return(FlightMode):
         self._destinations = destinations
         self._fence = fence
         self._mission = mission
-        self._way = Way(context)
+        self._path = WaypointPath(context)
         self._arrival = Arrival(context)
         self._phase = _Phase.CLIMB
         self._items = mission.items  # when the destination was chosen
@@ -85,7 +96,7 @@ class Return(FlightMode):
             if context.state.estimate.pos_ned[2] < self._back_d + _HEIGHT_M:
                 self._cruise()
         elif self._phase is _Phase.WAY:
-            if self._way.frame():
+            if self._path.frame():
                 self._arrive()
         elif self._phase is _Phase.ARRIVED:
             self._arrival.frame()
@@ -126,14 +137,14 @@ class Return(FlightMode):
         """Flies to the destination, around what the fence excludes."""
         position = self._destination.position
         goal = (position[0], position[1], self._back_d)
-        points = self._fence.way(self._start, goal)
+        points = self._fence.path(self._start, goal)
         say = self._context.announcer.statustext
         if points is None:
             say(Severity.WARNING, "No way back inside the fence: returning directly")
         elif len(points) > 1:
             say(Severity.INFO, f"Return around the fence, {len(points) - 1} corners")
         self._phase = _Phase.WAY
-        self._way.start(self._start, points or [goal])
+        self._path.start(self._start, points or [goal])
 
     def _fly_back(self, here: Vector) -> None:
         """Along the mission's places, at their heights."""
@@ -141,7 +152,7 @@ class Return(FlightMode):
         home = self._destination.position
         self._back_d = last[2]
         self._phase = _Phase.WAY
-        self._way.start(here, [*self._destination.back, (home[0], home[1], last[2])])
+        self._path.start(here, [*self._destination.back, (home[0], home[1], last[2])])
 
     def _arrive(self) -> None:
         destination = self._destination

@@ -6,7 +6,7 @@ from autopilot.interface.mode_spec import FlightMode
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.rtl_landing import Arrival
 from autopilot.navigator.paths.breadcrumbs import Breadcrumbs
-from autopilot.navigator.paths.waypoint_path import Way
+from autopilot.navigator.paths.waypoint_path import WaypointPath
 from autopilot.navigator.setpoint import Vector
 
 
@@ -16,14 +16,14 @@ class SmartReturn(FlightMode):
     What has been flown back is forgotten, so that a pilot who takes over and flies elsewhere returns from there.
     """
 
-    __slots__ = ("_arrival", "_column", "_context", "_crumbs", "_has_arrived", "_way")
+    __slots__ = ("_arrival", "_column", "_context", "_crumbs", "_has_arrived", "_path")
 
     is_below_floor = takes_heading = True
 
     def __init__(self, context: NavContext, crumbs: Breadcrumbs) -> None:
         self._context = context
         self._crumbs = crumbs
-        self._way = Way(context)
+        self._path = WaypointPath(context)
         self._arrival = Arrival(context)
         self._column = 0  # points of the take-off, which are not flown back
         self._has_arrived = False
@@ -44,7 +44,7 @@ class SmartReturn(FlightMode):
         self._column = len(self._crumbs.points) - 1 - len(back)
         self._has_arrived = False
         if back:
-            self._way.start(here, back)
+            self._path.start(here, back)
         else:
             self._arrive()
 
@@ -54,8 +54,8 @@ class SmartReturn(FlightMode):
         if self._has_arrived:
             self._arrival.frame()
             return
-        is_done = self._way.frame()
-        del self._crumbs.points[max(self._way.left + self._column, 1) :]
+        is_done = self._path.frame()
+        del self._crumbs.points[max(self._path.left + self._column, 1) :]
         if is_done:
             self._arrive()
 

@@ -131,9 +131,9 @@ def _last_passages(points: _Array, first: int, near_m: float) -> NDArray[np.int6
     starts, ends = points[first + 2 : -1] - points[first], points[first + 3 :] - points[first]
     if not len(starts):
         return np.zeros(len(here), np.int64)
-    way = ends - starts
-    length_sq = np.maximum(np.sum(way * way, axis=1), 1e-9)
-    along = here @ way.T - np.sum(starts * way, axis=1)
+    edge = ends - starts
+    length_sq = np.maximum(np.sum(edge * edge, axis=1), 1e-9)
+    along = here @ edge.T - np.sum(starts * edge, axis=1)
     fraction = np.minimum(np.maximum(along / length_sq, 0.0), 1.0)
     off_sq = np.sum(here * here, axis=1)[:, None] - 2.0 * here @ starts.T + np.sum(starts * starts, axis=1)
     off_sq += fraction * (fraction * length_sq - 2.0 * along)
@@ -145,9 +145,9 @@ def _last_passages(points: _Array, first: int, near_m: float) -> NDArray[np.int6
 
 def _off_segment_sq(points: _Array, start: _Array, end: _Array) -> _Array:
     """Square of the distance [m²] of each point from a straight stretch."""
-    way, there = end - start, points - start
-    length_sq = max(float(way @ way), 1e-9)
-    along = there @ way
+    edge, there = end - start, points - start
+    length_sq = max(float(edge @ edge), 1e-9)
+    along = there @ edge
     fraction = np.minimum(np.maximum(along / length_sq, 0.0), 1.0)
     off_sq: _Array = np.einsum("ij,ij->i", there, there) + fraction * (fraction * length_sq - 2.0 * along)
     return off_sq

@@ -50,9 +50,9 @@ class Bounds:
 
     def are_open(self, start: FloatArray, ends: FloatArray) -> NDArray[np.bool_]:
         """Whether the straight stretches from a point to others keep the margin."""
-        way = ends - start
-        length = np.hypot(way[:, 0], way[:, 1])
-        course = way / np.maximum(length, 1e-9)[:, None]
+        path = ends - start
+        length = np.hypot(path[:, 0], path[:, 1])
+        course = path / np.maximum(length, 1e-9)[:, None]
         done = np.zeros(len(ends))
         is_open = np.ones(len(ends), dtype=bool)
         left = np.flatnonzero(length > 0.0)
@@ -77,14 +77,14 @@ def detour(bounds: Bounds, start: Point, goal: Point) -> list[Point] | None:
     entered = _nearest_open(bounds, goal, start)
     if left is None or entered is None:
         return None
-    way = _shortest(bounds, left, entered)
-    if way is None:
+    path = _shortest(bounds, left, entered)
+    if path is None:
         return None
     if left != start:
-        way.insert(0, left)
+        path.insert(0, left)
     if entered != goal:
-        way.append(goal)
-    return way
+        path.append(goal)
+    return path
 
 
 def _nearest_open(bounds: Bounds, position: Point, other: Point) -> Point | None:
@@ -136,12 +136,12 @@ def _shortest(bounds: Bounds, start: Point, goal: Point) -> list[Point] | None:
 
 
 def _traced(nodes: FloatArray, came_from: NDArray[np.int64]) -> list[Point]:
-    way: list[Point] = []
+    path: list[Point] = []
     i_node = 1
     while i_node != 0:
-        way.append((float(nodes[i_node, 0]), float(nodes[i_node, 1])))
+        path.append((float(nodes[i_node, 0]), float(nodes[i_node, 1])))
         i_node = int(came_from[i_node])
-    return way[::-1]
+    return path[::-1]
 
 
 def _corners(bounds: Bounds, start: Point, goal: Point) -> list[Point]:

@@ -36,11 +36,11 @@ class Curve(Protocol):
 
     length: float  # [m]
 
-    def at(self, way: float) -> tuple[Vector, Vector]:
-        """Place [m] and unit direction after `way` metres."""
+    def at(self, arc_length: float) -> tuple[Vector, Vector]:
+        """Place [m] and unit direction after `arc_length` metres."""
         ...
 
-    def top_speed(self, way: float) -> float:
+    def top_speed(self, arc_length: float) -> float:
         """The speed [m/s] that is allowed there, so that all that follows can be braked for."""
         ...
 
@@ -56,33 +56,35 @@ class Polyline:
 
     def __init__(self, points: Sequence[Vector], pace: Pace, exit_speed: float) -> None:
         self._points = points
-        self._ways = [0.0]
+        self._arc_lengths = [0.0]
         for a, b in pairwise(points):
-            self._ways.append(self._ways[-1] + distance(a, b))
-        self.length = self._ways[-1]
+            self._arc_lengths.append(self._arc_lengths[-1] + distance(a, b))
+        self.length = self._arc_lengths[-1]
         last = len(points) - 1
         self._directions = [_direction(points[max(k - 1, 0)], points[min(k + 1, last)]) for k in range(last + 1)]
         self._speeds = [self._bend_speed(k, pace) for k in range(last + 1)]
         self._speeds[last] = min(self._speeds[last], max(exit_speed, _SLOWEST_M_S))
         self._brake = 2.0 * pace.accel
         for k in range(last - 1, -1, -1):
-            reach = self._ways[k + 1] - self._ways[k]
+            reach = self._arc_lengths[k + 1] - self._arc_lengths[k]
             self._speeds[k] = min(self._speeds[k], sqrt(self._speeds[k + 1] ** 2 + self._brake * reach))
 
-    def at(self, way: float) -> tuple[Vector, Vector]:
-        k, fraction = self._find(way)
+    def at(self, arc_length: float) -> tuple[Vector, Vector]:
+        k, fraction = self._find(arc_length)
         return _mix(self._points[k], self._points[k + 1], fraction), _mix(
             self._directions[k], self._directions[k + 1], fraction
         )
 
-    def top_speed(self, way: float) -> float:
-        k, fraction = self._find(way)
+    def top_speed(self, arc_length: float) -> float:
+        k, fraction = self._find(arc_length)
         speeds = self._speeds
         return speeds[k] + (speeds[k + 1] - speeds[k]) * fraction
 
-    def _find(self, way: float) -> tuple[int, float]:
-        k = min(max(bisect_right(self._ways, way) - 1, 0), len(self._ways) - 2)
-        return k, min(max((way - self._ways[k]) / (self._ways[k + 1] - self._ways[k]), 0.0), 1.0)
+    def _find(self, arc_length: float) -> tuple[int, float]:
+        k = min(max(bisect_right(self._arc_lengths, arc_length) - 1, 0), len(self._arc_lengths) - 2)
+        return k, min(
+            max((arc_length - self._arc_lengths[k]) / (self._arc_lengths[k + 1] - self._arc_lengths[k]), 0.0), 1.0
+        )
 
     def _bend_speed(self, k: int, pace: Pace) -> float:
         """The speed at which the bend at a point needs no more than the acceleration allowed."""
@@ -93,7 +95,7 @@ class Polyline:
         if 0 < k < len(self._points) - 1:
             before = _direction(self._points[k - 1], self._points[k])
             after = _direction(self._points[k], self._points[k + 1])
-            bend = distance(before, after) / (0.5 * (self._ways[k + 1] - self._ways[k - 1]))
+            bend = distance(before, after) / (0.5 * (self._arc_lengths[k + 1] - self._arc_lengths[k - 1]))
             speed = min(speed, sqrt(pace.accel / bend) if bend > 1e-6 else inf)
         return max(speed, _SLOWEST_M_S)
 
@@ -118,8 +120,8 @@ class Turns:
         self._accel = pace.accel
         self._speed = max(min(pace.cruise, sqrt(pace.accel * self._radius)), _SLOWEST_M_S)
 
-    def at(self, way: float) -> tuple[Vector, Vector]:
-        angle = self._start + self._sign * way / self._radius
+    def at(self, arc_length: float) -> tuple[Vector, Vector]:
+        angle = self._start + self._sign * arc_length / self._radius
         north, east, down = self._centre
         c, s = cos(angle), sin(angle)
         return (
@@ -127,41 +129,41 @@ class Turns:
             (-self._sign * s, self._sign * c, 0.0),
         )
 
-    def top_speed(self, way: float) -> float:
-        return min(self._speed, sqrt(2.0 * self._accel * max(self.length - way, 0.0)) + _SLOWEST_M_S)
+    def top_speed(self, arc_length: float) -> float:
+        return min(self._speed, sqrt(2.0 * self._accel * max(self.length - arc_length, 0.0)) + _SLOWEST_M_S)
 
 
 class Runner:
     """The point that moves along a curve."""
 
-    __slots__ = ("_accel", "_pace", "curve", "speed", "way")
+    __slots__ = ("_accel", "_pace", "arc_length", "curve", "speed")
 
     def __init__(self, curve: Curve, pace: Pace, speed: float) -> None:
         self.curve = curve
         self._pace = pace
-        self.way = 0.0  # [m]
+        self.arc_length = 0.0  # [m]
         self.speed = speed  # [m/s]
         self._accel = 0.0
 
     @property
     def is_at_end(self) -> bool:
-        return self.way >= self.curve.length
+        return self.arc_length >= self.curve.length
 
     def step(self, here: Vector) -> tuple[Vector, Vector]:
         """Moves on by one frame and returns place [m] and velocity [m/s]; `here` is where the vehicle is."""
         pace, curve = self._pace, self.curve
-        position, _ = curve.at(self.way)
+        position, _ = curve.at(self.arc_length)
         fraction = min(max(2.0 - 2.0 * distance(position, here) / pace.lag_max, 0.0), 1.0)
-        top = curve.top_speed(self.way)
+        top = curve.top_speed(self.arc_length)
         if self.speed < top:
             self._accel = min(self._accel + pace.jerk * _FRAME_S, pace.accel)
             self.speed = min(self.speed + self._accel * _FRAME_S, top)
         else:
             self._accel = 0.0
             self.speed = max(self.speed - pace.accel * _FRAME_S, top)
-        self.way = min(self.way + fraction * self.speed * _FRAME_S, curve.length)
-        position, (north, east, down) = curve.at(self.way)
-        flown = 0.0 if self.way >= curve.length else fraction * self.speed
+        self.arc_length = min(self.arc_length + fraction * self.speed * _FRAME_S, curve.length)
+        position, (north, east, down) = curve.at(self.arc_length)
+        flown = 0.0 if self.arc_length >= curve.length else fraction * self.speed
         return position, (north * flown, east * flown, down * flown)
 
 

@@ -15,7 +15,7 @@ END_RADIUS_M = 1.0  # horizontally; what follows corrects the rest
 _SLOWEST_CORNER_M_S = 0.5  # slower than this it is simpler to stop
 
 
-class Way:
+class WaypointPath:
     """The way being flown.
 
     Args:

@@ -12,10 +12,10 @@ from autopilot.ports import TERRAIN_VALID, VELOCITY_VALID
 from common.kernels import GRAVITY_M_S2
 from common.params import Parameter, ParameterTable
 
-_CONTACT_SHARE = 0.3  # of the way from least to hover thrust (PX4: MulticopterLandDetector)
-_LANDED_SHARE = 0.15  # PX4 has 0.1; the thrust floor of the control part is approached slowly
+_CONTACT_FRACTION = 0.3  # of the way from least to hover thrust (PX4: MulticopterLandDetector)
+_LANDED_FRACTION = 0.15  # PX4 has 0.1; the thrust floor of the control part is approached slowly
 _TOUCH_HEIGHT_M = 0.1  # above standing height, as measured, from which a descent that stalls is a touch; guess
-_TOUCH_SINK_SHARE = 0.5  # of the wanted descent below which it stalls
+_TOUCH_SINK_FRACTION = 0.5  # of the wanted descent below which it stalls
 _TOUCH_DESCENT_M_S = 0.1  # a slower descent is a hover
 _TOUCH_S = 0.1  # a gust near the ground stalls a descent for less than that, or it does no harm to stop there
 _FALL_M_S = (
@@ -25,7 +25,7 @@ _FALLS_MAX = 3  # a range finder that told of ground so often where there is non
 # What lies still with its motors off is down, even if the impact has upset the estimate of its speed. In the air it
 # would feel 1 g only near its terminal velocity, which is well above this speed. Guesses.
 _STILL_M_S = 10.0
-_STILL_FORCE_SHARE = 0.2  # of gravity, by which the specific force may differ from it
+_STILL_FORCE_FRACTION = 0.2  # of gravity, by which the specific force may differ from it
 _STILL_S = 1.0
 _BLOW_M_S2 = 4.0 * GRAVITY_M_S2  # without thrust nothing in the air pushes that hard, drag at most as hard as gravity
 _AIR_BELOW_M = 1.0  # range finder reading that speaks against a landing; guess
@@ -122,7 +122,7 @@ class LandingDetector:
             and descent_sp > _TOUCH_DESCENT_M_S
             and estimate.flags & TERRAIN_VALID
             and estimate.terrain_d - estimate.pos_ned[2] < self._touch_height
-            and estimate.vel_ned[2] < _TOUCH_SINK_SHARE * descent_sp
+            and estimate.vel_ned[2] < _TOUCH_SINK_FRACTION * descent_sp
         )
         self._touch_s = self._touch_s + dt_s if is_stalled else 0.0
         return self._touch_s >= _TOUCH_S
@@ -142,7 +142,7 @@ class LandingDetector:
         return bool(
             estimate.flags & VELOCITY_VALID
             and north * north + east * east + down * down < _STILL_M_S**2
-            and abs(sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) < _STILL_FORCE_SHARE * GRAVITY_M_S2
+            and abs(sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) < _STILL_FORCE_FRACTION * GRAVITY_M_S2
             and not self._is_turning(estimate)
         )
 
@@ -153,8 +153,8 @@ class LandingDetector:
     def _load(self) -> None:
         params = self._params
         least = float(params["MPC_THR_MIN"])
-        self._contact_thrust = least + _CONTACT_SHARE * (self._hover_thrust - least)
-        self._landed_thrust = least + _LANDED_SHARE * (self._hover_thrust - least)
+        self._contact_thrust = least + _CONTACT_FRACTION * (self._hover_thrust - least)
+        self._landed_thrust = least + _LANDED_FRACTION * (self._hover_thrust - least)
         self._rate_max_sq = radians(float(params["LNDMC_ROT_MAX"])) ** 2
         self._speed_z_max = float(params["LNDMC_Z_VEL_MAX"])
         self._speed_xy_max_sq = float(params["LNDMC_XY_VEL_MAX"]) ** 2
