@@ -195,7 +195,7 @@ def distance_sensor(state: VehicleState) -> bytes | None:
 
 def servo_output_raw(state: VehicleState) -> bytes:
     """Motor commands and auxiliary outputs as pulse widths."""
-    pulses = (PULSE_IDLE_US + u16(command * 1000.0) for command in state.actuators.command)
+    pulses = (PULSE_IDLE_US + u16(min(command, 1.0) * 1000.0) for command in state.actuators.command)
     return _servo_output_raw(state.time_us & 0xFFFFFFFF, 0, *pulses, *state.aux_pulses_us)
 
 

@@ -8,8 +8,8 @@ from autopilot.interface.vehicle_state import LandedState, Mode
 from autopilot.mavlink.telemetry.telemetry_rates import STREAMS
 from autopilot.mavlink.transport.links import LinkRole
 from autopilot.mavlink.wire.codec import message_id
-from autopilot.ports import POSITION_VALID, WIND_VALID
-from tests.unit.autopilot.mavlink.rig import HOME, Rig
+from autopilot.ports import POSITION_VALID, WIND_VALID, Actuators
+from tests.unit.autopilot.mavlink.rig import HOME, Rig, record
 
 
 def request(rig: Rig, name: str) -> Any:
@@ -239,6 +239,13 @@ def test_motors():
     outputs = request(rig, "ACTUATOR_OUTPUT_STATUS")
     assert outputs.active == 0b1111
     assert outputs.actuator[:4] == pytest.approx((0.5, 0.6, 0.5, 0.6))
+
+
+def test_a_command_out_of_bounds_is_told_as_a_pulse_within_them():
+    rig = Rig()
+    rig.update(actuators=record(Actuators, "Actuators", command=(70.0, nan, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0)))
+    servos = request(rig, "SERVO_OUTPUT_RAW")
+    assert (servos.servo1_raw, servos.servo2_raw, servos.servo3_raw, servos.servo4_raw) == (2000, 1000, 1000, 2000)
 
 
 def test_flown_trajectory_marks_free_elements():
