@@ -5,14 +5,16 @@ They are those of one flight: none is kept for the next.
 """
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from autopilot.flight_controller import FlightController
 from autopilot.interface.failure_requests import Failure, Unit
 from autopilot.interface.vehicle_state import Reply
 from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from common.params import Parameter, ParameterTable
+
+if TYPE_CHECKING:
+    from autopilot.flight_controller import FlightController
 
 PREFIX = "SIM_"
 SPEEDUP = "SIM_SPEEDUP"
@@ -66,7 +68,7 @@ class SimulatedFlight(Protocol):
     """What the parameters act on (mission.flight)."""
 
     params: ParameterTable
-    controller: FlightController
+    controller: "FlightController"
 
     @property
     def injector(self) -> Injector: ...
