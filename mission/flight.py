@@ -20,6 +20,7 @@ from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory
 from autopilot.mavlink.wire.signing import SigningConfig
 from autopilot.payload.camera.storage import MediaFolder
 from autopilot.persistence import Persistence
+from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import Airframe, load_airframe
 from common.clock import Pacer, wall_unix_us
 from common.folder import ConfinedFolder
@@ -35,6 +36,7 @@ from mission.log.flight_recorder import History, Recorder
 from mission.log.stored_logs import FlightLogs, RunLog
 from mission.script import Drone, Script
 from mission.simulator.failure_injection import RigInjector
+from mission.simulator.flight_rig import GUST_FRACTION, flight_rig, flight_wind, flight_world
 from mission.simulator.host_ports import host_ports
 from mission.simulator.onboard_devices import Surroundings
 from mission.simulator.simulator_params import PREFIX as SIMULATOR_PREFIX
@@ -44,13 +46,11 @@ from mission.video.rtp_video import RtpVideo
 from sim.bodies.vehicles import class_of
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
+from sim.rtk import RtkReceiver
 from sim.sensors.ring import RingSensor
-from sim.sensors.sensors import sensor_model
 from sim.turntable import Turntable
 from sim.video_rig import VideoRig
-from sim.wind import WindModel, wind_model
-from sim.world.batch import grown_world
-from sim.world.world import WorldMap, build_world
+from sim.world.world import WorldMap
 
 if TYPE_CHECKING:
     from mission.follow.onboard_camera import OnboardCamera
@@ -58,9 +58,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Flight", "FlightConfig", "flight_parameters"]
 
-TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
 DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (PX4, ARDUPILOT)}
-GUST_FRACTION = 0.3  # guess: a gust adds up to this share of the mean wind
 
 
 class Computer(Protocol):
@@ -97,111 +95,115 @@ class Flight:
         has_camera_thread: bool = False,
         make_rig: Callable[..., Rig] = Rig,
     ) -> None:
-        self.config = config
-        self.airframe: Airframe = load_airframe(config.airframe)
-        vehicle, body = class_of(self.airframe)
-        self.world: WorldMap = flight_world(config)
-        self.rig = make_rig(
-            self.airframe,
-            self.world,
-            sensor_model(noise_scale=config.noise, home=config.home),
-            flight_wind(config.wind_m_s, config.wind_from_deg),
-            home=config.home,
-            seed=config.seed,
-            body=body,
-            law=vehicle.law,
-        )
-        self.rig.prepare(FRAME_TICKS)
+        self.config, self.stream, self.video = config, stream, video
         self.time_us = 0
-        self._pacer = Pacer(None)
         self.ready_s = nan  # power-on to ready to arm
         self.restart_count = 0
+        self._pacer = Pacer(None)
+        self.texts, self.troubles = Texts(lambda: self.time_us), Troubles(lambda: self.time_us)
+        self.airframe: Airframe = load_airframe(config.airframe)
+        vehicle, _ = class_of(self.airframe)
+        self.world: WorldMap = flight_world(config)
+        self.rig = flight_rig(config, self.airframe, self.world, make_rig)
         self.params = flight_parameters(config, self.airframe)
-        passing = {name for name in self.params if name.startswith(SIMULATOR_PREFIX)}
-        self.persistence = None if state is None else Persistence(state, self.params, config.parameters, passing)
+        self.persistence = None if state is None else self._restore_parameters(state)
         self._has_new_parameters = True
         self._load_parameters()
         self.params.on_change(self._parameter_changed)
-        self.troubles = Troubles(lambda: self.time_us)
         self.injector = RigInjector(self.rig, self.airframe, config.noise, len(vehicle.motors(self.airframe)))
         self._camera_rig = CameraRig(self.rig, self.world, has_thread=has_camera_thread)
         self._camera_rig.prepare()
-        media = None if folder is None else MediaFolder(folder / "media")
-        self.host = Host(
-            files=host_files(folder, state),
-            storage=state,
-            frames=self._camera_rig,
-            media=media,
-            stream=stream,
-            video=video,
-            boot_unix_us=config.boot_unix_us,
-        )
-        self.texts = Texts(lambda: self.time_us)
-        self.controller = FlightController(
-            host_ports(self.rig),
-            self.params,
-            self.airframe,
-            config.home,
-            self.texts,
-            on_reboot=self._reboot,
-            injector=self.injector,
-            host=self.host,
-            turntable=Turntable(rows) if "is_held" in (rows := self.rig.rows["body"]).dtype.names else None,
-            vehicle=vehicle,
-            on_corrections=lambda _: self._surroundings.receiver.correct(self.time_us),
-        )
-        ring = RingSensor(self.rig, self.world, config.noise, config.seed) if config.has_lidar else None
-        self._surroundings = Surroundings(
-            self.controller, self.rig, config.traffic_count, ring, config.home, config.seed
-        )
+        self.host = self._make_host(folder, state)
+        receiver = RtkReceiver(self.rig)
+        self.controller = self._make_controller(vehicle, receiver)
+        self._surroundings = self._surround(receiver)
         self.owner: FollowedOwner | None = None
         self.onboard: OnboardCamera | None = None
         if config.owner is not None:
             links = [*links, *self._carry_camera(config.owner)]
         self.computers: list[Computer] = []
-        vehicle_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog", self.troubles.note)
-        on_frame = None if self._tlog is None else self._tlog.frame
-        dialect = DIALECTS[config.dialect]
-        if dialect is PX4:
-            self.server = MavlinkServer(self.controller, [vehicle_end, *links], on_frame=on_frame, signing=signing)
-            self._servers = [self.server]
-        else:  # the script is not asked to know two languages: it has a server of its own
-            self.server = MavlinkServer(
-                self.controller,
-                links,
-                dialect,
-                on_frame,
-                signing,
-                announces_components=config.announces_components,
-            )
-            self._servers = [self.server, MavlinkServer(self.controller, [vehicle_end])]
-        self.server.prepare()
+        script_end, client_end = memory_pair(LinkRole.ONBOARD)
+        self._servers = self._make_servers(script_end, links, signing)
+        self.server = self._servers[0]
         self.drone = Drone(client_end)
         log = None if folder is None else folder / "flight.ulg"
         self.recorder = Recorder(log, self.rig, self.controller, self.airframe, self.troubles.note)
-        for server in self._servers:
-            server.signer.on_trouble = self.troubles.note
-            self.controller.attach(server)
         self.controller.attach(self.recorder)
-        self.stream = stream
-        self._stream_rig = None if stream is None else CameraRig(self.rig, self.world, has_thread=True)
-        if stream is not None and self._stream_rig is not None and self.controller.camera is not None:
-            stream.start(self.controller.camera, self._stream_rig)
+        self._stream_rig = None if stream is None else self._start_stream(stream)
         self.simulator_params = SimulatorParameters(self)
-        self.video = video
         self._video_rig = None if video is None else self._start_video(video)
-        self._flight_logs: FlightLogs | None = None
-        self._connect_host(log, state)
+        self._flight_logs = None if state is None else self._shelve_logs(state)
+        self._lend_logs(log)
 
-    def _connect_host(self, log: Path | None, state: StateFolder | None) -> None:
+    def _restore_parameters(self, state: StateFolder) -> Persistence:
+        """What an earlier flight has set, but the simulator's and what this flight was given."""
+        passing = {name for name in self.params if name.startswith(SIMULATOR_PREFIX)}
+        return Persistence(state, self.params, self.config.parameters, passing)
+
+    def _make_host(self, folder: Path | None, state: StateFolder | None) -> Host:
+        root = folder if state is None else state.folder
+        return Host(
+            files=None if root is None else ConfinedFolder(root / "files"),
+            storage=state,
+            frames=self._camera_rig,
+            media=None if folder is None else MediaFolder(folder / "media"),
+            stream=self.stream,
+            video=self.video,
+            boot_unix_us=self.config.boot_unix_us,
+        )
+
+    def _make_controller(self, vehicle: VehicleClass, receiver: RtkReceiver) -> FlightController:
+        body = self.rig.rows["body"]
+        return FlightController(
+            host_ports(self.rig),
+            self.params,
+            self.airframe,
+            self.config.home,
+            self.texts,
+            on_reboot=self._reboot,
+            on_corrections=lambda _: receiver.correct(self.time_us),
+            host=self.host,
+            injector=self.injector,
+            turntable=Turntable(body) if "is_held" in body.dtype.names else None,
+            vehicle=vehicle,
+        )
+
+    def _surround(self, receiver: RtkReceiver) -> Surroundings:
+        config = self.config
+        ring = RingSensor(self.rig, self.world, config.noise, config.seed) if config.has_lidar else None
+        return Surroundings(self.controller, self.rig, receiver, config.traffic_count, ring, config.home, config.seed)
+
+    def _make_servers(
+        self, script_end: Link, links: Sequence[Link | LinkSource], signing: SigningConfig | None
+    ) -> list[MavlinkServer]:
+        """What serves the links, and what serves the script, which is not asked to know two languages."""
+        config, controller, dialect = self.config, self.controller, DIALECTS[self.config.dialect]
+        on_frame = None if self._tlog is None else self._tlog.frame
+        if dialect is PX4:
+            servers = [MavlinkServer(controller, [script_end, *links], on_frame=on_frame, signing=signing)]
+        else:
+            announces = config.announces_components
+            servers = [
+                MavlinkServer(controller, links, dialect, on_frame, signing, announces_components=announces),
+                MavlinkServer(controller, [script_end]),
+            ]
+        servers[0].prepare()
+        for server in servers:
+            server.signer.on_trouble = self.troubles.note
+            controller.attach(server)
+        return servers
+
+    def _shelve_logs(self, state: StateFolder) -> FlightLogs:
+        return FlightLogs(state.folder / "logs", self.recorder, self.params, self.troubles.note)
+
+    def _lend_logs(self, log: Path | None) -> None:
         """Gives the flight controller the logs, and what it remembers of earlier flights."""
         self.host.log_stream = self.recorder
-        if log is not None:
+        if self._flight_logs is not None:
+            self.host.logs = self._flight_logs
+        elif log is not None:
             self.host.logs = RunLog(self.recorder)
-        if state is not None:
-            logs = FlightLogs(state.folder / "logs", self.recorder, self.params, self.troubles.note)
-            self.host.logs = self._flight_logs = logs
         if self.persistence is not None:
             self.persistence.keep_lists(self.controller.lists)
             self.persistence.keep_home(self.controller.commander.home)
@@ -215,6 +217,13 @@ class Flight:
         self.owner = FollowedOwner(config, self.world, self.config.seed, self.config.home)
         self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)
         return [self.owner.vehicle_end]
+
+    def _start_stream(self, stream: StreamServer) -> CameraRig:
+        """Gives the live picture something to show; what renders it."""
+        rig = CameraRig(self.rig, self.world, has_thread=True)
+        if self.controller.camera is not None:
+            stream.start(self.controller.camera, rig)
+        return rig
 
     def _start_video(self, video: RtpVideo) -> VideoRig:
         """Gives the video something to show; what renders it."""
@@ -372,21 +381,3 @@ class Flight:
         if self._tlog is not None:
             self._tlog.close()
         return self.recorder.close()
-
-
-def flight_world(config: FlightConfig) -> WorldMap:
-    """The ground of a flight."""
-    if config.owner is not None:
-        return grown_world(config.world, config.world.seed)
-    return build_world(config.world)
-
-
-def flight_wind(speed_m_s: float, from_deg: float) -> WindModel:
-    """The air of a flight: the mean, and the turbulence and gusts that go with it."""
-    return wind_model(speed_m_s, from_deg, TURBULENCE, GUST_FRACTION * speed_m_s)
-
-
-def host_files(folder: Path | None, state: StateFolder | None) -> ConfinedFolder | None:
-    """Where files of clients go: with the state, or else with the run."""
-    root = folder if state is None else state.folder
-    return None if root is None else ConfinedFolder(root / "files")

@@ -7,7 +7,7 @@ browsers say which page asks, and pages cannot change it. A token in the address
 
 import secrets
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socket import SHUT_RDWR, socket
 from threading import Lock
@@ -63,7 +63,7 @@ class BoundedHttpServer(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = 1024  # whom it does not hold tries again after a second only
 
-    def __init__(self, address: tuple[str, int], handler: type["GuardedHandler"]) -> None:
+    def __init__(self, address: tuple[str, int], handler: Callable[..., "GuardedHandler"]) -> None:
         self._lock = Lock()
         self._connections: dict[socket, bool] = {}  # whether it has sent its request; oldest first
         super().__init__(address, handler)

@@ -19,6 +19,7 @@ class Surroundings:
     Args:
         controller: gets them.
         rig: its sensors.
+        receiver: gets the corrections.
         traffic_count: aircraft in the sky.
         ring: looks round the vehicle, if it carries one.
         home: the middle of their area.
@@ -29,6 +30,7 @@ class Surroundings:
         self,
         controller: FlightController,
         rig: Rig,
+        receiver: RtkReceiver,
         traffic_count: int,
         ring: RingSensor | None,
         home: GeoPoint,
@@ -40,7 +42,7 @@ class Surroundings:
         self._ring = ring
         self._next_ring_us = 0 if ring is not None else 1 << 62
         self._next_traffic_us = 0 if traffic_count else 1 << 62
-        self.receiver = RtkReceiver(rig)
+        self._receiver = receiver
         winch = Winch(lambda: state.time_us)
         controller.payload.add(Gripper())
         controller.payload.add(winch)
@@ -49,7 +51,7 @@ class Surroundings:
 
     def frame(self, time_us: int) -> None:
         """What happens by itself; before the flight controller's frame."""
-        self.receiver.frame(time_us)
+        self._receiver.frame(time_us)
         if self._ring is not None and time_us >= self._next_ring_us:
             self._next_ring_us = time_us + RING_PERIOD_US
             yaw = self._controller.state.yaw_rad

@@ -3,8 +3,10 @@
 `train` has every flag of ML-Agents' `mlagents-learn`; those that make no sense without Unity are accepted and say so.
 """
 
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -12,6 +14,9 @@ from rich.console import Console
 from mission.console.command_refusal import learn_extra, refuse
 from mission.console.name_checks import check_policy, check_recipe
 from mission.console.terminal import busy
+
+if TYPE_CHECKING:
+    from policies.learn.config.command_line import CommandLine
 
 _EnvArgs = Annotated[
     list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as preset=improved. Repeatable.")
@@ -69,30 +74,33 @@ def train(
     tensorflow: Annotated[bool, typer.Option("--tensorflow", help=_NO_EFFECT)] = False,
 ) -> None:
     """Train a policy on a task, by one of our recipes or by an ML-Agents configuration."""
+    options = locals()  # all that was given: nothing else has a name yet
     with learn_extra():
         check_recipe(task_or_config)
         with busy(Console(), "loading the program"):
             from mission.train.training import USER_ERRORS, TrainingRequest, train_run
-            from policies.learn.config.command_line import CommandLine
-
-        if context.args and env_args is None:
-            refuse(f"{context.args[0]}: not expected; settings of the task go after --env-args")
-        pairs = (*env_args, *context.args) if env_args is not None else None  # ML-Agents takes all that follow
-        given = CommandLine(
-            env=env, run_id=run_id, resume=resume, force=force, initialize_from=initialize_from, inference=inference,
-            deterministic=deterministic, seed=seed, num_envs=num_envs, num_areas=num_areas, env_args=pairs,
-            results_dir=results_dir, torch_device=torch_device, keep_checkpoints=keep_checkpoints,
-            save_freq=save_freq, curriculum=curriculum, sampler=sampler, lesson=lesson, load=load, cpu=cpu,
-            train=train, debug=debug, base_port=base_port, timeout_wait=timeout_wait, width=width, height=height,
-            quality_level=quality_level, time_scale=time_scale, target_frame_rate=target_frame_rate,
-            capture_frame_rate=capture_frame_rate, no_graphics=no_graphics, no_graphics_monitor=no_graphics_monitor,
-            max_lifetime_restarts=max_lifetime_restarts, restarts_rate_limit_n=restarts_rate_limit_n,
-            restarts_rate_limit_period_s=restarts_rate_limit_period_s, torch=torch, tensorflow=tensorflow,
-        )  # fmt: skip
+        given = _command_line(options, context.args)
         try:
             train_run(TrainingRequest(task_or_config, given, behavior, strict), Console())
         except USER_ERRORS as error:
             refuse(str(error))
+
+
+def _command_line(options: Mapping[str, Any], further: Sequence[str]) -> "CommandLine":
+    """ML-Agents' flags as they were given: the options of `train` that have their names.
+
+    Args:
+        options: of `train`, and their values.
+        further: what follows them.
+    """
+    from policies.learn.config.command_line import CommandLine
+
+    env_args = options["env_args"]
+    if further and env_args is None:
+        refuse(f"{further[0]}: not expected; settings of the task go after --env-args")
+    pairs = (*env_args, *further) if env_args is not None else None  # ML-Agents takes all that follow
+    flags = {flag.name: options[flag.name] for flag in fields(CommandLine)}
+    return CommandLine(**flags | {"env_args": pairs})
 
 
 def evaluate(

@@ -9,8 +9,10 @@ import shutil
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
+from functools import partial
 from http import HTTPStatus
 from threading import Condition, Thread
+from typing import Any
 
 from autopilot.mavlink.components.camera.camera_definition import FILE_NAME, definition_xml
 from autopilot.payload.camera.camera import Camera
@@ -55,7 +57,7 @@ class StreamServer:
         self._watchers = 0
         self._is_closed = False
         self._news = Condition()
-        self._http = BoundedHttpServer((host, port), _handler(self))
+        self._http = BoundedHttpServer((host, port), partial(StreamHandler, self))
         self._address = f"http://{host}:{self._http.server_address[1]}"
         self.uri = f"{self._address}/stream.mjpg"
         self.definition_uri = f"{self._address}/{FILE_NAME}"
@@ -149,72 +151,77 @@ class StreamServer:
         return self._serial
 
 
-def _handler(stream: StreamServer) -> type[GuardedHandler]:
-    """The request handler of one server."""
+class StreamHandler(GuardedHandler):
+    """Answers one connection of a stream server's."""
 
-    class Handler(GuardedHandler):
-        def answer(self) -> None:
-            path = self.path.partition("?")[0]
-            if path == "/":
-                self._answer("text/html; charset=utf-8", _PAGE)
-            elif path == f"/{FILE_NAME}":
-                self._answer("application/xml", definition_xml().encode())
-            elif path in ("/stream.mjpg", "/still.jpg"):
-                with stream.watching() as has_room:
-                    if not has_room:
-                        self.send_error(HTTPStatus.SERVICE_UNAVAILABLE, "too many watchers")
-                    elif path == "/still.jpg":
-                        self._still()
-                    else:
-                        self._stream()
-            elif path.startswith("/media/"):
-                self._media(path.removeprefix("/media/"))
-            else:
-                self.send_error(HTTPStatus.NOT_FOUND)
+    def __init__(self, stream: StreamServer, *connection: Any) -> None:
+        self._stream = stream
+        super().__init__(*connection)  # which answers
 
-        def _answer(self, kind: str, content: bytes) -> None:
-            self._answer_head(kind, len(content))
-            self.wfile.write(content)
+    def answer(self) -> None:
+        path = self.path.partition("?")[0]
+        if path == "/":
+            self._answer("text/html; charset=utf-8", _PAGE)
+        elif path == f"/{FILE_NAME}":
+            self._answer("application/xml", definition_xml().encode())
+        elif path in ("/stream.mjpg", "/still.jpg"):
+            with self._stream.watching() as has_room:
+                if not has_room:
+                    self.send_error(HTTPStatus.SERVICE_UNAVAILABLE, "too many watchers")
+                elif path == "/still.jpg":
+                    self._still()
+                else:
+                    self._images()
+        elif path.startswith("/media/"):
+            self._media(path.removeprefix("/media/"))
+        else:
+            self.send_error(HTTPStatus.NOT_FOUND)
 
-        def _answer_head(self, kind: str, size: int) -> None:
-            self.send_response(HTTPStatus.OK)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(size))
-            self.send_header("Cache-Control", "no-store")
-            self.end_headers()
+    def _answer(self, kind: str, content: bytes) -> None:
+        self._answer_head(kind, len(content))
+        self.wfile.write(content)
 
-        def _still(self) -> None:
-            image = stream.next_image(stream.serial)
+    def _answer_head(self, kind: str, size: int) -> None:
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(size))
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+
+    def _still(self) -> None:
+        image = self._stream.next_image(self._stream.serial)
+        if image is None:
+            self.send_error(HTTPStatus.SERVICE_UNAVAILABLE, "no picture")
+        else:
+            self._answer("image/jpeg", image[1])
+
+    def _images(self) -> None:
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", f"multipart/x-mixed-replace; boundary={_BOUNDARY}")
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        serial = self._stream.serial
+        while True:  # until the browser goes, or takes nothing for too long
+            image = self._stream.next_image(serial)
             if image is None:
-                self.send_error(HTTPStatus.SERVICE_UNAVAILABLE, "no picture")
-            else:
-                self._answer("image/jpeg", image[1])
+                if self._stream.is_paused:
+                    continue
+                return
+            serial, jpeg = image
+            head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
+            self.wfile.write(head.encode() + jpeg + b"\r\n")
 
-        def _stream(self) -> None:
-            self.send_response(HTTPStatus.OK)
-            self.send_header("Content-Type", f"multipart/x-mixed-replace; boundary={_BOUNDARY}")
-            self.send_header("Cache-Control", "no-store")
-            self.end_headers()
-            serial = stream.serial
-            while True:  # until the browser goes, or takes nothing for too long
-                image = stream.next_image(serial)
-                if image is None:
-                    if stream.is_paused:
-                        continue
-                    return
-                serial, jpeg = image
-                head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
-                self.wfile.write(head.encode() + jpeg + b"\r\n")
-
-        def _media(self, name: str) -> None:
-            """A stored file, by a name that the camera itself would list."""
-            path = None if stream.media is None else next((p for p in stream.media.files() if p.name == name), None)
-            if path is None:
-                self.send_error(HTTPStatus.NOT_FOUND)
-            else:
-                with path.open("rb") as file:
-                    kind = "image/jpeg" if path.suffix == ".jpg" else "video/mp4"
-                    self._answer_head(kind, path.stat().st_size)
-                    shutil.copyfileobj(file, self.wfile)
-
-    return Handler
+    def _media(self, name: str) -> None:
+        """A stored file, by a name that the camera itself would list."""
+        path = (
+            None
+            if self._stream.media is None
+            else next((p for p in self._stream.media.files() if p.name == name), None)
+        )
+        if path is None:
+            self.send_error(HTTPStatus.NOT_FOUND)
+        else:
+            with path.open("rb") as file:
+                kind = "image/jpeg" if path.suffix == ".jpg" else "video/mp4"
+                self._answer_head(kind, path.stat().st_size)
+                shutil.copyfileobj(file, self.wfile)

@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from mission.flight import flight_world
+from mission.simulator.flight_rig import flight_world
 from mission.view.html import write_html
 from mission.view.page import PageServer
 from mission.view.replay import ReplayView

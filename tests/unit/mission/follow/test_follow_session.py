@@ -7,7 +7,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from mission.cli import app
-from mission.flight import flight_world
+from mission.simulator.flight_rig import flight_world
 from mission.view.film import write_film
 from mission.view.film_images import HEIGHT, WIDTH
 from mission.view.replay_file import load_recording

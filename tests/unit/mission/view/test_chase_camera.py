@@ -7,7 +7,7 @@ import pytest
 
 from common.airframe import load_airframe
 from common.attitude import rotated
-from mission.flight import flight_world
+from mission.simulator.flight_rig import flight_world
 from mission.view.chase_camera import BEHIND_M, BESIDE_RAD, averaged, camera_path, looking
 from mission.view.film_images import HEIGHT, HFOV_DEG, WIDTH
 from mission.view.snapshot_images import Eye, onboard_eye

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from mission.flight import flight_world
+from mission.simulator.flight_rig import flight_world
 from mission.view import film as film_file
 from mission.view.film import write_film
 from mission.view.film_images import HEIGHT, INSET, MARGIN, WIDTH, caption, film

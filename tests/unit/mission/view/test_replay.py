@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mission.cli import app
-from mission.flight import flight_world
+from mission.simulator.flight_rig import flight_world
 from mission.view.html import STRIDE, page_data
 from tests.unit.mission.view.rows import CONFIG, hovering, write_log
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from common.airframe import load_airframe
-from mission.flight import flight_world
+from mission.simulator.flight_rig import flight_world
 from mission.view.page import PageServer
 from mission.view.scene import PLAN_M, TRAIL_M, Scene
 from tests.unit.mission.view.rows import CONFIG, hovering

@@ -1,0 +1,45 @@
+"""The simulation of a flight: the world it is in, the air over it, and the vehicle's rig in both."""
+
+from collections.abc import Callable
+
+from common.airframe import Airframe
+from common.kernels import FRAME_TICKS
+from mission.flight_config import FlightConfig
+from sim.bodies.vehicles import class_of
+from sim.rig import Rig
+from sim.sensors.sensors import sensor_model
+from sim.wind import WindModel, wind_model
+from sim.world.batch import grown_world
+from sim.world.world import WorldMap, build_world
+
+TURBULENCE = 1.0  # MIL-F-8785C's intensity at the wind's speed
+GUST_FRACTION = 0.3  # guess: a gust adds up to this fraction of the mean wind
+
+
+def flight_world(config: FlightConfig) -> WorldMap:
+    """The ground of a flight."""
+    if config.owner is not None:
+        return grown_world(config.world, config.world.seed)
+    return build_world(config.world)
+
+
+def flight_wind(speed_m_s: float, from_deg: float) -> WindModel:
+    """The air of a flight: the mean, and the turbulence and gusts that go with it."""
+    return wind_model(speed_m_s, from_deg, TURBULENCE, GUST_FRACTION * speed_m_s)
+
+
+def flight_rig(config: FlightConfig, airframe: Airframe, world: WorldMap, make_rig: Callable[..., Rig]) -> Rig:
+    """The vehicle of a flight with its sensors, ready to advance by frames; `make_rig` takes the arguments of `Rig`."""
+    vehicle, body = class_of(airframe)
+    rig = make_rig(
+        airframe,
+        world,
+        sensor_model(noise_scale=config.noise, home=config.home),
+        flight_wind(config.wind_m_s, config.wind_from_deg),
+        home=config.home,
+        seed=config.seed,
+        body=body,
+        law=vehicle.law,
+    )
+    rig.prepare(FRAME_TICKS)
+    return rig
