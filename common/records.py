@@ -102,3 +102,23 @@ def _record_expression(
         arguments.append(f"v[{i_value}:{i_value + count}]" if field_type.shape else f"v[{i_value}]")
     scope[name] = namedtuple(name, dtype.names)  # noqa: PYI024
     return f"_new({name}, ({', '.join(arguments)},))"
+
+
+def assign_rows(array: Any, rows: np.ndarray[Any, Any]) -> None:
+    """Puts rows that were saved into a Warp array; those of structs by their place: their fields may have been renamed.
+
+    Raises:
+        RuntimeError: they are of another size or type.
+    """
+    if rows.dtype.names is not None:
+        dtype = np.dtype(array.dtype.numpy_dtype())
+        if _types(dtype) == _types(rows.dtype):
+            rows = rows.view(dtype)
+    array.assign(rows)
+
+
+def _types(dtype: np.dtype[Any]) -> Any:
+    """Type and offset of each field, without its name."""
+    if dtype.names is None or dtype.fields is None:
+        return dtype
+    return [(_types(dtype.fields[name][0]), dtype.fields[name][1]) for name in dtype.names], dtype.itemsize

@@ -19,6 +19,7 @@ from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from common.geomagnetic import field_ned_gauss
 from common.params import ParameterTable
+from common.records import assign_rows
 from common.warp_start import start_warp
 from sim.advance import advance_kernel, rig_kernels
 from sim.bodies.body import DEFAULT_BODY, DEFAULT_LAW, Body
@@ -173,7 +174,7 @@ class Rig:
     def restore(self, snapshot: Snapshot) -> None:
         """Puts every vehicle where the snapshot found it; of some vehicles, `sim.restore.RowRestore` does it."""
         for array, rows in zip(row_arrays(self.arrays), snapshot, strict=True):
-            array.assign(rows)
+            assign_rows(array, rows)
         self.rows.fetch()
 
     def reboot(self, i_vehicle: int = 0) -> None:

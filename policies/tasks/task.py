@@ -17,6 +17,7 @@ import warp as wp
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from common.records import assign_rows
 from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Outcome, StepBuffers, keep_last_image_rows
 from policies.tasks.goals import PositionGoal
 from policies.tasks.layout import Layout
@@ -166,7 +167,7 @@ class Task:
         """Restores what `state` returned, of a task with the same settings and size."""
         for name, array in self._arrays.items():
             if array.size:
-                array.assign(state[name])
+                assign_rows(array, state[name])
         self.param_table.rows[:] = state["samplers"]
         self.param_table.array.assign(self.param_table.rows)
 

@@ -11,6 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from common.kernels import TICK_S
+from common.records import assign_rows
 from policies.tasks.flight.hover_bank import LOW_M
 from policies.tasks.flight.rig_task import RigTask
 from policies.tasks.layout import Layout
@@ -71,6 +72,6 @@ class FlightTask(RigTask):
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Restores what `state` returned."""
         super().load_state(state)
-        self.worlds.params.assign(state["world_numbers"])
+        assign_rows(self.worlds.params, state["world_numbers"])
         everyone = wp.full(self.env_count, value=True, dtype=wp.bool, device=self.device)
         self.worlds.grow(everyone, self.world_seeds)
