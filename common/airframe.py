@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2
 
 AIRFRAME_FOLDER = Path(str(files("common"))) / "airframes"
 

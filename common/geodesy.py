@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import atan2, cos, degrees, hypot, radians, sin, sqrt
 
+GRAVITY_M_S2 = 9.80665  # standard gravity, CGPM 1901
 # WGS-84 (NIMA TR8350.2, 2000, table 3.1)
 SEMI_MAJOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563

@@ -21,8 +21,6 @@ SUBSTEPS = 4  # body steps of 1 ms in a tick
 FRAME_TICKS = 5  # ticks in a 50 Hz frame of commander, navigator and MAVLink
 FRAME_US = TICK_US * FRAME_TICKS
 
-GRAVITY_M_S2 = 9.80665  # standard gravity, CGPM 1901
-
 
 @wp.func
 def tick_end_us(tick: wp.int64) -> wp.int64:

@@ -3,23 +3,23 @@
 A wrong argument, file or port gives one sentence on standard error and exit code 2; a mission that failed gives 1.
 """
 
-import gc
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from mission.console.command_refusal import refuse
-from mission.console.model_command import model_command
+from mission.console.late_command import LateCommand
 from mission.console.name_checks import check_file
-from mission.console.terminal import busy
-from mission.flight_settings import FOLLOWED_WITH, FlightOptions, FollowOptions
+from mission.console.terminal import loading
 from mission.follow import follow_commands
 from mission.train import task_commands, training_commands
 from mission.view import replay_command
 
-LOADED_MOST = 50_000  # objects made until Python looks for garbage: at its own 700, that is a sixth of a start
+if TYPE_CHECKING:
+    from mission.flight_settings import FlightOptions
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -31,7 +31,6 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point of the console command."""
-    gc.set_threshold(LOADED_MOST)
     app()
 
 
@@ -52,20 +51,28 @@ def _root(
     """Fly a simulated drone and its flight controller over MAVLink."""
 
 
-def fly(options: FlightOptions) -> int:
+@app.command(cls=LateCommand)
+def fly() -> Callable[..., None]:
     """Fly: world, vehicle, flight controller and MAVLink links, in real time or faster."""
-    from mission.flight_options import UserError, check_options
+    from mission.console.model_command import model_command
+    from mission.flight_settings import FlightOptions
+
+    return model_command(FlightOptions, _fly)
+
+
+def _fly(options: "FlightOptions") -> int:
+    from mission.console.option_checks import UserError, check_options
 
     try:
         check_options(options)
+        from mission.flight_options import check_parameters
+
+        check_parameters(options)
         from mission.fly_session import fly_session
 
         return fly_session(options)
     except UserError as error:
         refuse(str(error))
-
-
-app.command()(model_command(FlightOptions, fly))
 
 
 @app.command()
@@ -82,7 +89,7 @@ def estimate(
 ) -> None:
     """Run the estimator alone over the sensors recorded in a log."""
     check_file(log)
-    with busy(Console(), "loading the program"):
+    with loading(Console()):
         from mission.estimate.estimate import EstimateError, estimate_log
 
     try:
@@ -119,7 +126,7 @@ def picture(
 
 for _command in (task_commands.demonstrate, task_commands.play, task_commands.drive):
     app.command()(_command)
-app.command()(model_command(FollowOptions, follow_commands.follow, names=FOLLOWED_WITH))
+app.command(cls=LateCommand)(follow_commands.follow)
 app.command()(follow_commands.companion)
 app.command()(replay_command.replay)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)

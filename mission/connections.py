@@ -8,7 +8,7 @@ from autopilot.mavlink.transport.udp_port import SILENCE_US, UdpPort, address_to
 from autopilot.mavlink.wire.signing import FileStore, MemoryStore, SigningConfig
 from common.clock import wall_unix_us
 from common.state_folder import StateFolder
-from mission.flight_options import UserError
+from mission.console.option_checks import UserError
 from mission.flight_settings import FlightOptions
 from mission.follow.image_server import ImageServer
 from mission.video.mjpeg_server import StreamServer

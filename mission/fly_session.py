@@ -12,8 +12,9 @@ from common.files import write_whole
 from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
 from mission.connections import open_images, open_links, open_page, open_stream, open_video, signing_config
-from mission.console.terminal import busy, print_line
-from mission.flight_options import UserError, flight_config, speed_of
+from mission.console.option_checks import UserError, speed_of
+from mission.console.terminal import loading, print_line
+from mission.flight_options import flight_config
 from mission.flight_settings import FlightOptions
 from mission.flight_state_folder import StateError, keep_home, open_state
 from mission.net_guard import LOOPBACK
@@ -57,7 +58,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     folder = held.enter_context(run_folder(options.run_folder))
     if state is not None and options.home is not None:
         keep_home(state, config.home)
-    with busy(console, "loading the program") as say:
+    with loading(console) as say:
         from mission.flight import Flight
         from mission.fly_loop import fly_to_the_end
         from mission.kernel_loading import load_kernels

@@ -11,8 +11,8 @@ from rich.console import Console
 
 from common.clock import wall_date_text
 from common.files import write_whole
+from mission.console.option_checks import UserError
 from mission.console.terminal import print_line
-from mission.flight_options import UserError
 
 _OF_A_FLIGHT = ("flight*.ulg", "flight*.tlog", "summary.json")
 

@@ -15,7 +15,8 @@ from autopilot.ports import (
     BatterySample,
     Estimate,
 )
-from common.kernels import GRAVITY_M_S2, tick_end_us, vec8
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import tick_end_us, vec8
 
 wp.set_module_options({"enable_backward": False})
 

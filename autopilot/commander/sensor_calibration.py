@@ -14,7 +14,7 @@ import numpy as np
 from autopilot.interface.client_requests import CalibrationKind
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import ACCEPTED, Reply, Severity, VehicleState, Verdict
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2
 from common.params import ParameterTable
 
 Vector = tuple[float, float, float]

@@ -10,7 +10,7 @@ from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.predict import delta_velocity_ned
 from autopilot.estimator.state import IMU_RING, Inbox, Nominal, Output, OutputSample
 from autopilot.ports import Estimate, ImuSample
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2
 from common.rotation import quat_from_rotvec
 
 wp.set_module_options({"enable_backward": False})

@@ -67,7 +67,8 @@ from autopilot.ports import (
     ImuSample,
     Samples,
 )
-from common.kernels import GRAVITY_M_S2, vec24
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import vec24
 from common.warp_start import start_warp
 
 wp.set_module_options({"enable_backward": False})

@@ -9,7 +9,8 @@ import warp as wp
 from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.state import ACCEL_BIAS, ATT, BODY, EARTH, GYRO_BIAS, TERRAIN, VEL, WIND, Nominal
 from autopilot.ports import ImuSample
-from common.kernels import GRAVITY_M_S2, TICK_S, vec24
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import TICK_S, vec24
 from common.rotation import quat_from_rotvec
 
 wp.set_module_options({"enable_backward": False})

@@ -13,7 +13,8 @@ import warp as wp
 
 from autopilot.estimator.state import Ekf, YawEstimator
 from autopilot.ports import ImuSample
-from common.kernels import GRAVITY_M_S2, YAW_MODELS
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import YAW_MODELS
 from common.rotation import quat_from_rotvec, quat_from_yaw, wrap_pi, yaw_from_quat
 from common.vectors import clamp3
 

@@ -43,7 +43,7 @@ def model_command(
 
     Args:
         model: whose fields are the options.
-        run: what the command does; its name and docstring are those of the command.
+        run: what the command does.
         names: the fields that are options, in this order; all of them if empty.
     """
     fields = {_argument(name, model.model_fields[name]): name for name in names or option_fields(model)}
@@ -56,7 +56,6 @@ def model_command(
         raise typer.Exit(run(options))
 
     parameters = [_parameter(argument, model.model_fields[name]) for argument, name in fields.items()]
-    command.__name__, command.__doc__ = run.__name__, run.__doc__
     command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]  # what Typer reads
     return command
 

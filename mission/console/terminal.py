@@ -1,5 +1,6 @@
 """What a command shows on the terminal: whole lines, and what it is busy with while nothing else can be seen."""
 
+import gc
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -12,6 +13,7 @@ from common.clock import wall_time_s
 from common.files import write_to_nowhere
 
 LINE_PERIOD_S = 5.0  # between lines where there is no terminal
+LOADED_MOST = 50_000  # objects made until Python looks for garbage: at its own 700, that is a sixth of a start
 Say = Callable[[str], None]
 
 
@@ -47,6 +49,18 @@ def busy(console: Console, text: str) -> Iterator[Say]:
         yield lines.say
     finally:
         lines.end()
+
+
+@contextmanager
+def loading(console: Console) -> Iterator[Say]:
+    """Shows that the program is loaded until the block ends; meanwhile Python looks for garbage less: modules stay."""
+    usual = gc.get_threshold()
+    gc.set_threshold(LOADED_MOST)
+    try:
+        with busy(console, "loading the program") as say:
+            yield say
+    finally:
+        gc.set_threshold(*usual)
 
 
 class _Lines:

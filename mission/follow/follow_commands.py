@@ -1,14 +1,17 @@
 """The commands that follow somebody: `honeyguide follow`, and the companion computer alone, `companion`."""
 
-from typing import Annotated
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from mission.console.command_refusal import learn_extra, refuse
 from mission.console.name_checks import check_policy
-from mission.console.terminal import busy
-from mission.flight_settings import FollowOptions
+from mission.console.terminal import loading
+
+if TYPE_CHECKING:
+    from mission.flight_settings import FollowOptions
 
 
 def companion(
@@ -31,7 +34,7 @@ def companion(
     with learn_extra():
         if policy != "scripted":
             check_policy(policy)
-        with busy(Console(), "loading the program"):
+        with loading(Console()):
             from mission.follow.companion_process import CompanionError, CompanionOptions, run_companion
 
         try:
@@ -40,15 +43,22 @@ def companion(
             refuse(str(error))
 
 
-def follow(options: FollowOptions) -> int:
+def follow() -> Callable[..., None]:
     """Let the drone follow somebody who walks through hills and trees."""
+    from mission.console.model_command import model_command
+    from mission.flight_settings import FOLLOWED_WITH, FollowOptions
+
+    return model_command(FollowOptions, _follow, names=FOLLOWED_WITH)
+
+
+def _follow(options: "FollowOptions") -> int:
     with learn_extra():
-        from mission.flight_options import UserError
+        from mission.console.option_checks import UserError
         from mission.follow.follow_options import check_follow_options
 
         try:
             check_follow_options(options)
-            with busy(Console(), "loading the program"):
+            with loading(Console()):
                 from mission.follow.follow_session import follow_session
             return follow_session(options)
         except UserError as error:

@@ -7,8 +7,9 @@ from typing import cast
 
 from common.airframe import AirframeError, load_airframe
 from common.params import ParameterError
+from mission.console.option_checks import UserError, check_owner, speed_of
 from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
-from mission.flight_options import UserError, check_owner, flight_config, speed_of
+from mission.flight_options import flight_config
 from mission.flight_settings import FollowOptions, Pace
 from policies.companion.names import SCRIPTED
 from policies.learn.export.policy_path import CheckpointError, find_policy

@@ -18,9 +18,9 @@ from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
 from mission.connections import open_links, open_page
+from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight, flight_parameters
-from mission.flight_options import UserError, speed_of
 from mission.flight_session import FlightSession
 from mission.flight_settings import FollowOptions
 from mission.follow.companion_process import latency_text

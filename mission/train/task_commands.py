@@ -8,7 +8,7 @@ from rich.console import Console
 
 from mission.console.command_refusal import learn_extra, refuse
 from mission.console.name_checks import check_task, check_task_or_policy
-from mission.console.terminal import busy
+from mission.console.terminal import loading
 
 _TASK = typer.Argument(help="A task's name: RollerBall, ReachTarget, Parking1, Parking2, FollowMe, Hover, Navigate.")
 _EnvArgs = Annotated[
@@ -55,7 +55,7 @@ def play(
     """Watch a trained policy, a task's expert, or chance, in a window or as a film."""
     with learn_extra():
         check_task_or_policy(task_or_policy)
-        with busy(Console(), "loading the program"):
+        with loading(Console()):
             from mission.train.keyboard_window import WindowError
             from mission.train.play import PlayError, PlayOptions, play_task
             from mission.video.video_file import VideoError

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from mission.console.command_refusal import learn_extra, refuse
 from mission.console.name_checks import check_policy, check_recipe
-from mission.console.terminal import busy
+from mission.console.terminal import loading
 
 if TYPE_CHECKING:
     from policies.learn.config.command_line import CommandLine
@@ -77,7 +77,7 @@ def train(
     options = locals()  # all that was given: nothing else has a name yet
     with learn_extra():
         check_recipe(task_or_config)
-        with busy(Console(), "loading the program"):
+        with loading(Console()):
             from mission.train.training import USER_ERRORS, TrainingRequest, train_run
         given = _command_line(options, context.args)
         try:
@@ -114,7 +114,7 @@ def evaluate(
     """Play a policy on episodes it was not trained on, and count how they end."""
     with learn_extra():
         check_policy(policy)
-        with busy(Console(), "loading the program"):
+        with loading(Console()):
             from mission.train.training import USER_ERRORS, evaluate_policy
 
         try:
@@ -130,7 +130,7 @@ def export(
     """Write a policy as an ONNX network with ML-Agents' names."""
     with learn_extra():
         check_policy(policy)
-        with busy(Console(), "loading the program"):
+        with loading(Console()):
             from mission.train.training import USER_ERRORS, export_network
 
         try:

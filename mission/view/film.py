@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from common.clock import wall_time_s
+from mission.console.option_checks import UserError
 from mission.console.terminal import LINE_PERIOD_S, print_line
-from mission.flight_options import UserError
 from mission.video.video_file import Mp4, VideoError
 from mission.view.chase_camera import IMAGE_S, STRIDE
 from mission.view.film_images import film

@@ -14,7 +14,7 @@ from rich.console import Console
 from common.airframe import load_airframe
 from common.clock import wall_sleep_s, wall_time_s
 from common.kernels import FRAME_US
-from mission.flight_options import UserError
+from mission.console.option_checks import UserError
 from mission.simulator.flight_rig import flight_world
 from mission.view.film import write_film
 from mission.view.html import write_html

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from mission.console.command_refusal import learn_extra, refuse
 from mission.console.name_checks import check_run
-from mission.console.terminal import busy
+from mission.console.terminal import loading
 
 
 def replay(
@@ -20,8 +20,8 @@ def replay(
     """Show a finished flight in the browser, or write it as an HTML file or a film."""
     check_run(run)
     with learn_extra():
-        with busy(Console(), "loading the program"):
-            from mission.flight_options import UserError
+        with loading(Console()):
+            from mission.console.option_checks import UserError
             from mission.view.replay import ReplayOptions
             from mission.view.replay import replay as show
 

@@ -11,7 +11,8 @@ import math
 import warp as wp
 
 from common.airframe import Airframe
-from common.kernels import GRAVITY_M_S2, vec8
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import vec8
 from sim.world.world import World, ground_height, ground_normal_ned, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})

@@ -8,7 +8,8 @@ effect on tilt.
 
 import warp as wp
 
-from common.kernels import GRAVITY_M_S2, SUBSTEPS, TICK_S, vec8
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import SUBSTEPS, TICK_S, vec8
 from common.rotation import quat_from_yaw
 from sim.battery import battery_current, open_circuit_voltage
 from sim.bodies.contact import (

@@ -15,7 +15,8 @@ from typing import Any
 import warp as wp
 
 from autopilot.ports import ImuSample
-from common.kernels import GRAVITY_M_S2, MAX_MOTORS, TICK_S, tick_end_us, vec8
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import MAX_MOTORS, TICK_S, tick_end_us, vec8
 from common.rng import draw_tick, normal3, normal6
 from common.vectors import clamp3
 from sim.faults import FAULT_STUCK, SensorFault, fault_bias3, is_due, noise_gain, sampling_period

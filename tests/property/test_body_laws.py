@@ -5,7 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.airframe import load_airframe
-from common.kernels import GRAVITY_M_S2, TICK_S
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import TICK_S
 from sim.bodies.multirotor import density_ratio
 from sim.bodies.multirotor_model import multirotor_model
 from sim.wind import wind_model

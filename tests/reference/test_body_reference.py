@@ -6,7 +6,7 @@ import warp as wp
 from scipy.spatial.transform import Rotation
 
 from common.airframe import load_airframe
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2
 from sim.bodies.contact import ContactForce, ContactModel, FootSlip, Surroundings, contact_model, ground_contact
 from sim.bodies.multirotor_model import multirotor_model
 from sim.wind import wind_model

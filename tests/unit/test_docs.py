@@ -1,12 +1,13 @@
 """The documentation tells the truth: folder maps, links, commands, examples and the parameter list."""
 
-import inspect
 import json
 import re
 import shlex
 import socket
 
 import pytest
+from typer import Context
+from typer.main import get_command
 from typer.testing import CliRunner
 
 from bench.figures import RESULTS, with_figures
@@ -249,17 +250,9 @@ def test_options_are_all_described(name):
     if heading:
         text = text.partition(f"# {heading}\n")[2].partition("\n## ")[0]
     described = set(re.findall(r"^\| `(--[\w-]+)", text, re.MULTILINE))
-    command = next(command for command in app.registered_commands if command.callback.__name__ == name)
-    options = {
-        parameter.name.replace("_", "-")
-        for parameter in inspect.signature(command.callback).parameters.values()
-        if not is_argument(parameter)
-    }
-    assert described == {f"--{option}" for option in options}
-
-
-def is_argument(parameter):
-    return any(type(mark).__name__ == "ArgumentInfo" for mark in parameter.annotation.__metadata__)
+    command = get_command(app).commands[name]
+    options = [parameter for parameter in command.get_params(Context(command)) if parameter.param_type_name == "option"]
+    assert described == {f"--{option.name.replace('_', '-')}" for option in options if option.name != "help"}
 
 
 def test_options_of_train_are_all_described():

@@ -62,6 +62,24 @@ def option_modules() -> set[str]:
     return loaded("import mission.flight_options")
 
 
+def test_no_command_waits_for_the_options_of_another():
+    modules = loaded("from typer.main import get_command\nfrom mission.cli import app\nget_command(app)")
+    assert "typer" in modules
+    assert "pydantic" not in modules
+
+
+def test_warp_is_not_imported_to_check_options_that_need_it_not():
+    modules = loaded("import mission.console.option_checks")
+    assert "mission.plan.plan_file" in modules
+    assert not {"numpy", "warp"} & modules
+
+
+def test_matplotlib_is_not_imported_before_a_flight_ends():
+    modules = loaded("import mission.fly_session, mission.fly_loop, mission.kernel_loading, mission.flight")
+    assert "sim.rig" in modules
+    assert "matplotlib" not in modules
+
+
 def test_the_companion_imports_nothing_of_the_simulator():
     modules = loaded(
         "from mission.follow.companion_process import load_pilot, run_companion\n"

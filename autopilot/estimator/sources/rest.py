@@ -16,7 +16,8 @@ from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.sources.baro import baro_height
 from autopilot.estimator.state import PHASE_RUNNING, VEL, Aid, Ekf, Nominal, Stillness
 from autopilot.ports import CONTACT_GROUND, CONTACT_NONE, BaroSample, GnssSample, ImuSample, Samples
-from common.kernels import GRAVITY_M_S2, vec24
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import vec24
 
 wp.set_module_options({"enable_backward": False})
 

@@ -24,8 +24,7 @@ from autopilot.ports import (
     TILT_ALIGNED,
     VELOCITY_VALID,
 )
-from common.geodesy import geodetic_from_ned
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2, geodetic_from_ned
 
 _gps_raw_int = known_type("GPS_RAW_INT").pack
 _highres_imu = known_type("HIGHRES_IMU").pack

@@ -9,8 +9,7 @@ from autopilot.interface.vehicle_state import VehicleState
 from autopilot.mavlink.wire.codec import known_type
 from autopilot.mavlink.wire.convert import degrees_e7, i16, i32, wxyz_from_quat
 from common.attitude import roll_pitch_yaw_of
-from common.geodesy import geodetic_from_ned
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2, geodetic_from_ned
 
 _hil_state_quaternion = known_type("HIL_STATE_QUATERNION").pack
 _simstate = known_type("SIMSTATE").pack

@@ -27,7 +27,8 @@ from autopilot.vehicles.multirotor.trajectory import (
     trajectory_step,
 )
 from autopilot.vehicles.multirotor.velocity import VelocityState, observe, velocity_step
-from common.kernels import FRAME_TICKS, GRAVITY_M_S2, TICK_S, vec8
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import FRAME_TICKS, TICK_S, vec8
 from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
 from common.vectors import clamp3
 

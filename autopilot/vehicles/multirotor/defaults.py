@@ -3,7 +3,7 @@
 from math import sqrt
 
 from common.airframe import Airframe
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2
 
 _AUTOSTART = {4: 4001, 6: 6001, 8: 8001}  # PX4's generic airframes by their number of rotors
 

@@ -9,7 +9,7 @@ from math import nan, radians, sqrt
 from typing import Any
 
 from autopilot.ports import TERRAIN_VALID, VELOCITY_VALID
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2
 from common.params import Parameter, ParameterTable
 
 _CONTACT_FRACTION = 0.3  # of the way from least to hover thrust (PX4: MulticopterLandDetector)

@@ -13,7 +13,7 @@ from autopilot.ports import Estimate
 from autopilot.vehicles.multirotor.control_airframe import ControlAirframe
 from autopilot.vehicles.multirotor.params import ControlParams
 from autopilot.vehicles.multirotor.trajectory import FOLLOW_ACCEL, TrajectoryState, flown_acceleration
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2
 
 wp.set_module_options({"enable_backward": False})
 

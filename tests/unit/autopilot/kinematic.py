@@ -31,8 +31,8 @@ from autopilot.ports import (
 from autopilot.vehicles.multirotor.defaults import hover_thrust
 from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
 from common.airframe import load_airframe
-from common.geodesy import GeoPoint, geodetic_from_ned
-from common.kernels import FRAME_US, GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2, GeoPoint, geodetic_from_ned
+from common.kernels import FRAME_US
 from common.params import ParameterTable
 from common.records import row_reader
 

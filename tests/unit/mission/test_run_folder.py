@@ -9,7 +9,7 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from mission.flight_options import UserError
+from mission.console.option_checks import UserError
 from mission.run_folder import OwnFiles, run_folder
 
 HOLDER = """

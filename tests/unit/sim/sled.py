@@ -8,7 +8,8 @@ import warp as wp
 
 from autopilot.control.law import ControlLaw
 from autopilot.ports import Actuators, BatterySample, Estimate, Setpoint
-from common.kernels import GRAVITY_M_S2, TICK_S, vec8
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import TICK_S, vec8
 from common.params import Parameter
 from common.rotation import quat_from_yaw
 from sim.bodies.body import Body

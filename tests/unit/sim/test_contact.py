@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from common.airframe import load_airframe
-from common.kernels import GRAVITY_M_S2, TICK_S
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import TICK_S
 from sim.bodies.contact import resting_height_m
 from sim.bodies.multirotor_model import multirotor_model
 from sim.world.world import WorldConfig, build_world

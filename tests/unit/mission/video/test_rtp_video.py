@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from mission.connections import open_video
-from mission.flight_options import UserError
+from mission.console.option_checks import UserError
 from mission.video.rtp_video import VideoError, check_encoder, session_description
 
 HOST = "127.0.0.1"

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from common.airframe import AirframeError, airframe_names, load_airframe
-from common.kernels import GRAVITY_M_S2, TICK_S
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import TICK_S
 from sim.bodies.multirotor import density_ratio, ground_effect
 from sim.bodies.multirotor_model import multirotor_model
 from tests.unit.sim.fleet import SEA_LEVEL_M, Fleet, rotated

@@ -15,7 +15,8 @@ from autopilot.vehicles.multirotor.cascade import ControlState, control_tick
 from autopilot.vehicles.multirotor.control_airframe import ControlAirframe, control_airframe
 from autopilot.vehicles.multirotor.params import ControlParams, control_params
 from common.airframe import load_airframe
-from common.kernels import GRAVITY_M_S2, TICK_S, vec8
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import TICK_S, vec8
 from common.rotation import quat_from_rotvec
 
 wp.set_module_options({"enable_backward": False})

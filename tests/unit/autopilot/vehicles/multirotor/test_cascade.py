@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_LEAN, SETPOINT_RATE
-from common.kernels import GRAVITY_M_S2
+from common.geodesy import GRAVITY_M_S2
 from tests.unit.autopilot.vehicles.multirotor.rig import Rig, turbulence
 
 NAN = float("nan")
