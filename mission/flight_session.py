@@ -94,15 +94,15 @@ class FlightSession:
         flight, console = self._flight, self._console
         try:
             with _signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
-                told = 0
+                reported = 0
 
                 def on_frame(_: Flight) -> None:
-                    nonlocal told
+                    nonlocal reported
                     for watch in watchers:
                         watch()
-                    for text in flight.texts.since(told):
+                    for text in flight.texts.since(reported):
                         print_line(console, str(text))
-                    told = flight.texts.count
+                    reported = flight.texts.count
                     if console.is_terminal and progress.is_due(TABLE_PERIOD_S):
                         live.update(progress.table(), refresh=True)
                     elif not console.is_terminal and progress.is_due(LINE_PERIOD_S):

@@ -9,7 +9,7 @@ from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import Severity
 
 SILENCE_US = 60_000_000  # what has not been noted for so long is told again
-TOLD_MAX = 100
+REPORTED_MAX = 100
 
 
 class Troubles:
@@ -28,7 +28,7 @@ class Troubles:
         """Is to be told, if it is new."""
         now_us = self._now_us()
         is_new = text not in self._noted_us or now_us - self._noted_us[text] > SILENCE_US
-        if len(self._noted_us) >= TOLD_MAX:
+        if len(self._noted_us) >= REPORTED_MAX:
             self._noted_us.clear()
         self._noted_us[text] = now_us
         if is_new:

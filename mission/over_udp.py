@@ -44,16 +44,16 @@ def fly_over_udp(
 def _run(drone: Drone, script: Script, place: str, silence_s: float) -> Running:
     running = drone.start(script(drone))
     pacer, polled_us = Pacer(1.0), 0
-    time_us, told_us, boot_us = 0, 0, 0  # simulated time; the vehicle's clock, and when that began
+    time_us, reported_us, boot_us = 0, 0, 0  # simulated time; the vehicle's clock, and when that began
     heard_s = wall_time_s()
     while not running.is_done:
         drone.frame(time_us)
         attitude = drone.latest("ATTITUDE")
-        if attitude is not None and attitude.time_boot_ms * 1000 != told_us:
-            if attitude.time_boot_ms * 1000 < told_us:  # restarted: the script's time goes on
+        if attitude is not None and attitude.time_boot_ms * 1000 != reported_us:
+            if attitude.time_boot_ms * 1000 < reported_us:  # restarted: the script's time goes on
                 boot_us = time_us
-            told_us, heard_s = attitude.time_boot_ms * 1000, wall_time_s()
-            time_us = boot_us + told_us
+            reported_us, heard_s = attitude.time_boot_ms * 1000, wall_time_s()
+            time_us = boot_us + reported_us
         elif wall_time_s() - heard_s > silence_s:
             running.cancel()
             raise ScriptError(f"{place}: no vehicle has been heard for {silence_s:g} s")

@@ -46,5 +46,5 @@ PHONE_CORRELATED_START = wp.constant(58)
 PHONE_DROPOUT = wp.constant(59)
 
 HILLS = wp.constant(90)
-TREE_PLACES = wp.constant(91)
+TREE_POSITIONS = wp.constant(91)
 TREE_SIZES = wp.constant(92)

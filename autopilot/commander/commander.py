@@ -27,8 +27,8 @@ _EPH_FLIGHT_FACTOR = 2.5  # in flight the position may be this much worse than f
 _CHECK_PERIOD_US = 200_000
 _TEXT_PERIOD_US = 30_000_000  # "PreArm:" texts, as ground stations expect them
 _FIRST_TEXT_US = 10_000_000  # until then the estimator may still be aligning
-_RESET_TOLD_RAD = radians(5.0)  # guess
-_RESET_TOLD_M = 0.5  # smaller jumps of the position are not worth a text; guess
+_RESET_REPORTED_RAD = radians(5.0)  # guess
+_RESET_REPORTED_M = 0.5  # smaller jumps of the position are not worth a text; guess
 
 
 class Commander:
@@ -301,9 +301,9 @@ class Commander:
         if not self.state.is_flying:
             return
         self._watch.note_reset(jump_m)
-        if jump_m > _RESET_TOLD_M:
+        if jump_m > _RESET_REPORTED_M:
             self.announcer.statustext(Severity.NOTICE, f"Estimator: position reset by {jump_m:.1f} m")
-        if abs(estimate.yaw_reset) > _RESET_TOLD_RAD:
+        if abs(estimate.yaw_reset) > _RESET_REPORTED_RAD:
             text = f"Estimator: heading reset by {degrees(estimate.yaw_reset):.0f} deg"
             self.announcer.statustext(Severity.NOTICE, text)
 

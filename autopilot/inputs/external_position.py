@@ -189,12 +189,12 @@ class ExternalPositions:
             yaw_std,
         )
 
-    def _std(self, name: str, told: float) -> float:
+    def _std(self, name: str, reported: float) -> float:
         """The standard deviation that is used; the parameter's where none is told."""
         least = float(self._params[name])
-        if isnan(told) or int(self._params["EKF2_EV_NOISE_MD"]):
+        if isnan(reported) or int(self._params["EKF2_EV_NOISE_MD"]):
             return least
-        return max(told, least)
+        return max(reported, least)
 
     def _queue(self, sample: _Sample) -> None:
         """The newest of its kind takes the place of one that still waits; no two have the same time."""

@@ -24,7 +24,7 @@ class LogFile:
     time_s: int  # Unix time of its beginning
 
 
-class LogShelf(Protocol):
+class StoredLogs(Protocol):
     """The logs of this flight and of earlier ones."""
 
     def logs(self) -> Sequence[LogFile]:
@@ -83,7 +83,7 @@ class Host:
     """All of it."""
 
     files: ConfinedFolder | None = None
-    logs: LogShelf | None = None
+    logs: StoredLogs | None = None
     log_stream: LogStream | None = None
     storage: Storage | None = None
     frames: FrameSource | None = None  # None: the vehicle carries no camera

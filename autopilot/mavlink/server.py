@@ -306,8 +306,8 @@ class MavlinkServer:
 
     def statustext(self, severity: Severity, text: str) -> None:
         self._endpoint.text(severity, text)
-        self._events.text_told(severity, text)
-        self._compass.text_told(text)
+        self._events.reported_text(severity, text)
+        self._compass.reported_text(text)
 
     def mission_item_reached(self, seq: int) -> None:
         payload = _MISSION_ITEM_REACHED.pack(seq + self._endpoint.dialect.first_seq)

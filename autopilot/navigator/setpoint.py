@@ -151,7 +151,7 @@ class SetpointPort:
         self.accel_ned = (0.0, 0.0, nan)
         self.yaw = yaw
 
-    def hang_level(self, thrust: float, yaw: float) -> None:
+    def hover_level(self, thrust: float, yaw: float) -> None:
         """Asks for level attitude and a thrust [0..1]: what remains when the height is not known either."""
         self._free_all()
         self.kind = SETPOINT_ATTITUDE

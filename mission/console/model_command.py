@@ -74,13 +74,13 @@ def _argument(name: str, field: FieldInfo) -> str:
 
 def _parameter(argument: str, field: FieldInfo) -> Parameter:
     """The field as an argument that Typer understands."""
-    told = cast(dict[str, str], field.json_schema_extra)
-    flag = told["flag"] or f"--{argument.replace('_', '-')}"
+    reported = cast(dict[str, str], field.json_schema_extra)
+    flag = reported["flag"] or f"--{argument.replace('_', '-')}"
     bounds = {end: getattr(rule, end) for rule in field.metadata for end in ("ge", "le") if hasattr(rule, end)}
     info = typer.Option(
         flag,
         help=field.description,
-        show_default=told["shown"] or True,
+        show_default=reported["shown"] or True,
         min=bounds.get("ge"),
         max=bounds.get("le"),
     )

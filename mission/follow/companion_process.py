@@ -35,7 +35,7 @@ class CompanionOptions:
     policy: str
     link: str
     camera: str
-    is_told: bool
+    is_reported: bool
     seconds: float | None
 
 
@@ -51,7 +51,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         link = open_client_link(options.link)
     except (PilotError, CameraUrlError, LinkError) as error:
         raise CompanionError(str(error)) from error
-    companion = Companion(link, camera, pilot, is_told=options.is_told, wall_s=wall_time_s)
+    companion = Companion(link, camera, pilot, is_reported=options.is_reported, wall_s=wall_time_s)
     _shower(console)(f"{options.policy} flies; vehicle: {options.link}, pictures: {options.camera}; Ctrl-C ends it")
     try:
         _loop(companion, camera, options.seconds, console)

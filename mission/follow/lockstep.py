@@ -17,7 +17,7 @@ def flight_with_companion(
     config: FlightConfig,
     pilot: Pilot,
     *,
-    is_told: bool = True,
+    is_reported: bool = True,
     links: Sequence[Link | LinkSource] = (),
     folder: Path | None = None,
     wall_s: Callable[[], float] | None = None,
@@ -27,7 +27,7 @@ def flight_with_companion(
     Args:
         config: with an owner.
         pilot: who flies.
-        is_told: False: it waits for the pilot to choose Offboard.
+        is_reported: False: it waits for the pilot to choose Offboard.
         links: of ground stations.
         folder: of the logs.
         wall_s: a clock that the companion's latency is measured with.
@@ -38,6 +38,6 @@ def flight_with_companion(
         raise ValueError("a companion needs a flight with an owner")
     camera = MemoryCamera()
     flight.onboard.add_sink(camera.publish)
-    companion = Companion(companion_end, camera, pilot, is_told=is_told, wall_s=wall_s)
+    companion = Companion(companion_end, camera, pilot, is_reported=is_reported, wall_s=wall_s)
     flight.computers.append(companion)
     return flight, companion

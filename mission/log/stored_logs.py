@@ -134,7 +134,7 @@ class FlightLogs:
     def _names(self) -> list[str]:
         return sorted(path.name for path in self._folder.glob("log_*.ulg") if _number(path.name))
 
-    # ---- autopilot.interface.platform.LogShelf ----
+    # ---- autopilot.interface.platform.StoredLogs ----
 
     def logs(self) -> Sequence[LogFile]:
         if self._file is not None:

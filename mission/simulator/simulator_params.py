@@ -89,7 +89,7 @@ class SimulatorParameters:
 
     def __init__(self, flight: SimulatedFlight) -> None:
         self._flight = flight
-        self._is_told = False  # by the flight itself: it has been done already
+        self._is_reported = False  # by the flight itself: it has been done already
         self._actions: dict[str, Callable[[], None]] = {
             SPEEDUP: self._change_pace,
             "SIM_WIND_SPD": self._blow,
@@ -112,15 +112,15 @@ class SimulatorParameters:
     def tell(self, **values: float) -> None:
         """Shows what the flight has done by itself; parameters that it does not have are left out."""
         params = self._flight.params
-        self._is_told = True
+        self._is_reported = True
         for name, value in values.items():
             if name in params:
                 params.set(name, value)
-        self._is_told = False
+        self._is_reported = False
 
     def _changed(self, declaration: Parameter) -> None:
         action = self._actions.get(declaration.name)
-        if action is not None and not self._is_told:
+        if action is not None and not self._is_reported:
             action()
 
     def _value(self, name: str) -> float:

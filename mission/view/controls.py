@@ -142,9 +142,9 @@ class Controls:
         """Runs a script; the one that a click has started before is given up."""
         if self._running is not None:
             self._running.cancel()
-        self._running = self._flight.drone.start(self._told(name, script))
+        self._running = self._flight.drone.start(self._reported(name, script))
 
-    async def _told(self, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
+    async def _reported(self, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
         self._say(f"{name} …")
         try:
             await script(self._flight.drone)

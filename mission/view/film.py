@@ -29,7 +29,7 @@ def write_film(recording: Recording, world: WorldMap, target: Path, console: Con
     """
     count = len(recording.rows[::STRIDE])
     try:
-        with Mp4(target, IMAGE_S) as mp4, told(console, count) as tell:
+        with Mp4(target, IMAGE_S) as mp4, reported(console, count) as tell:
             for i, image in enumerate(film(recording, world)):
                 mp4.show(image)
                 tell(i + 1)
@@ -39,7 +39,7 @@ def write_film(recording: Recording, world: WorldMap, target: Path, console: Con
 
 
 @contextmanager
-def told(console: Console, count: int) -> Iterator[Callable[[int], None]]:
+def reported(console: Console, count: int) -> Iterator[Callable[[int], None]]:
     """Inside, whoever gives the number of images done has it shown, with the time passed and left."""
     if console.is_terminal:
         columns = (TextColumn("film"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())

@@ -75,11 +75,11 @@ class Companion:
         camera: ImageSource,
         pilot: Pilot,
         *,
-        is_told: bool = False,
+        is_reported: bool = False,
         wall_s: Callable[[], float] | None = None,
     ) -> None:
         self.vehicle = VehicleLink(link)
-        self.engagement = Engagement(is_told=is_told)
+        self.engagement = Engagement(is_reported=is_reported)
         self.latencies_s: deque[float] = deque(maxlen=LATENCIES_KEPT)  # image in to setpoint out
         self.decision_count = 0
         self.seen: Floats = np.zeros(0, dtype=np.float32)  # the vector that was decided on last

@@ -72,16 +72,16 @@ class Engagement:
         is_told: to engage as soon as everything is there and the vehicle holds in the air; once.
     """
 
-    def __init__(self, *, is_told: bool = False) -> None:
+    def __init__(self, *, is_reported: bool = False) -> None:
         self.phase = Phase.WAITING
-        self._is_told = is_told
+        self._is_reported = is_reported
         self._since_us = 0  # when this phase began
         self._asked_us = 0  # when a mode was last asked for
         self._was_offboard = True  # until seen otherwise: a vehicle found in Offboard is flown by somebody else
 
     def engage(self) -> None:
         """Tells the companion to take control as soon as everything is there."""
-        self._is_told = True
+        self._is_reported = True
 
     def step(self, now: Situation) -> Orders:
         """Takes the next step; at most one change of phase."""
@@ -113,8 +113,8 @@ class Engagement:
             return self._go(Phase.WAITING, now, text=f"Companion: not ready: {now.trouble}")
         if is_chosen and now.is_airborne:
             return self._follow(now)
-        if self._is_told and now.is_airborne and now.is_holding:  # never out of a takeoff, a landing or a return
-            self._is_told = False
+        if self._is_reported and now.is_airborne and now.is_holding:  # never out of a takeoff, a landing or a return
+            self._is_reported = False
             return self._ask(Phase.ENGAGING, now, Wish.OFFBOARD)
         return Orders(_offered(now))
 

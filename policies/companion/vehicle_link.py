@@ -109,7 +109,7 @@ class VehicleLink:
             if name == "FOLLOW_TARGET":
                 self._owner_reported(decode(frame_of(frame)).fields, time_us)
             elif name is not None and sysid == self.system_id and compid == AUTOPILOT_COMPONENT:
-                self._vehicle_told(name, decode(frame_of(frame)).fields, time_us)
+                self._vehicle_reported(name, decode(frame_of(frame)).fields, time_us)
 
     def keep_alive(self, time_us: int) -> None:
         """Sends the heartbeat, and asks for telemetry, when they are due."""
@@ -161,18 +161,18 @@ class VehicleLink:
     def close(self) -> None:
         self._client.link.close()
 
-    def _vehicle_told(self, name: str, fields: Any, time_us: int) -> None:
+    def _vehicle_reported(self, name: str, fields: Any, time_us: int) -> None:
         own = self.own
         if name == "ATTITUDE_QUATERNION":
-            self._attitude_told(fields, time_us)
+            self._attitude_reported(fields, time_us)
         elif name == "LOCAL_POSITION_NED":
             pos_ned, vel_ned = (fields.x, fields.y, fields.z), (fields.vx, fields.vy, fields.vz)
             if is_known(POSITION_MAX_M, *pos_ned) and is_known(SPEED_MAX_M_S, *vel_ned):
                 own.pos_ned, own.vel_ned, own.position_us = pos_ned, vel_ned, time_us
         elif name == "DISTANCE_SENSOR":
-            self._distance_told(fields, time_us)
+            self._distance_reported(fields, time_us)
         elif name == "HEARTBEAT":
-            self._heartbeat_told(fields, time_us)
+            self._heartbeat_reported(fields, time_us)
         elif name == "EXTENDED_SYS_STATE":
             own.is_on_ground = fields.landed_state != LandedState.IN_AIR
         elif name == "GPS_GLOBAL_ORIGIN":
@@ -186,7 +186,7 @@ class VehicleLink:
                     self._enter(self._asked_for)  # known now: its next heartbeat may be a second away
                 self._asked_for = None
 
-    def _attitude_told(self, fields: Any, time_us: int) -> None:
+    def _attitude_reported(self, fields: Any, time_us: int) -> None:
         wxyz = (fields.q1, fields.q2, fields.q3, fields.q4)
         omega_frd = (fields.rollspeed, fields.pitchspeed, fields.yawspeed)
         if is_known(1.1, *wxyz) and is_known(RATE_MAX_RAD_S, *omega_frd):  # of unit length, but for rounding
@@ -194,14 +194,14 @@ class VehicleLink:
             own.q_ned_from_frd, own.omega_frd = quat_from_wxyz(wxyz), omega_frd
             own.boot_us, own.attitude_us = self.clock.time_us(fields.time_boot_ms), time_us
 
-    def _distance_told(self, fields: Any, time_us: int) -> None:
+    def _distance_reported(self, fields: Any, time_us: int) -> None:
         if fields.orientation != _LOOKS_DOWN:
             return
         is_inside = fields.min_distance <= fields.current_distance <= fields.max_distance
         self.own.range_m = fields.current_distance * 0.01 if is_inside else nan
         self.own.range_us = time_us
 
-    def _heartbeat_told(self, fields: Any, time_us: int) -> None:
+    def _heartbeat_reported(self, fields: Any, time_us: int) -> None:
         own = self.own
         self._dialect = _DIALECTS.get(fields.autopilot, PX4)
         own.heartbeat_us = time_us

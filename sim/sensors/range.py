@@ -22,7 +22,7 @@ RANGE_PERIOD_TICKS = 10  # 25 Hz
 MIN_DISTANCE_M = 0.1  # TF02-Pro
 MAX_DISTANCE_M = 40.0  # TF02-Pro, 90 % reflectivity
 NEAR_STD_M = 0.02  # TF02-Pro: ±6 cm, read as three standard deviations
-FAR_STD_SHARE = 0.01 / 3.0  # TF02-Pro: ±1 % of the distance, read as three standard deviations
+FAR_STD_FRACTION = 0.01 / 3.0  # TF02-Pro: ±1 % of the distance, read as three standard deviations
 
 
 @wp.struct
@@ -41,7 +41,7 @@ def range_model(noise_scale: float = 1.0) -> Any:
     model.min_distance = MIN_DISTANCE_M
     model.max_distance = MAX_DISTANCE_M
     model.near_std = noise_scale * NEAR_STD_M
-    model.far_std_fraction = noise_scale * FAR_STD_SHARE
+    model.far_std_fraction = noise_scale * FAR_STD_FRACTION
     return model
 
 

@@ -7,7 +7,7 @@ planting grid or a whole world. The trees stand on Poisson-disc points, planted 
 
 import warp as wp
 
-from sim.rng_streams import TREE_PLACES, TREE_SIZES
+from sim.rng_streams import TREE_POSITIONS, TREE_SIZES
 from sim.world.terrain import Terrain, terrain_height
 from sim.world.trees import (
     CONTACT_MARGIN_M,
@@ -148,7 +148,7 @@ def plant(growing: Growing, groups: int, visit: int) -> None:
     for slot in range(group, growing.chosen_count[0], groups):
         i_world = growing.chosen[slot]
         grid = growing.grids[i_world]
-        key = wp.rand_init(growing.seeds[i_world], TREE_PLACES)
+        key = wp.rand_init(growing.seeds[i_world], TREE_POSITIONS)
         # each world and round begins at another ninth
         phase = (visit + int(wp.rand_init(int(key), visit // PHASES) % wp.uint32(PHASES))) % PHASES
         row = 3 * grid_row + phase // 3

@@ -29,8 +29,8 @@ def test_a_change_of_one_bit_is_told_and_rounding_is_told_apart():
     old = {"figures": {"landing": 1.0, "result": "landed"}, "topics": {"attitude 0": "a"}, "logs": {"flight.ulg": "b"}}
     new = {"figures": {"landing": 1.01, "result": "landed"}, "topics": {"attitude 0": "c"}, "logs": {"flight.ulg": "d"}}
     assert differences(old, old, is_same_machine=True) == []
-    told = ["landing: 1.0 -> 1.01 (rounding)", "attitude 0: has other bytes", "flight.ulg: has other bytes"]
-    assert differences(old, new, is_same_machine=True) == told
+    reported = ["landing: 1.0 -> 1.01 (rounding)", "attitude 0: has other bytes", "flight.ulg: has other bytes"]
+    assert differences(old, new, is_same_machine=True) == reported
     assert differences(old, new, is_same_machine=False) == []
     new["figures"]["result"] = "crashed"
     assert differences(old, new, is_same_machine=False) == ["result: landed -> crashed"]

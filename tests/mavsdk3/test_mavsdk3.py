@@ -153,8 +153,8 @@ async def circle(drone, home):
         watcher.cancel()
     assert max(heights_m) < 13.0
     assert heights_m[-1] == pytest.approx(10.0, abs=2.0)
-    told_us = sorted(after - before for before, after in pairwise(times_us))
-    assert told_us[len(told_us) // 2] <= 8_000  # 200 Hz out of ticks of 4 ms
+    reported_us = sorted(after - before for before, after in pairwise(times_us))
+    assert reported_us[len(reported_us) // 2] <= 8_000  # 200 Hz out of ticks of 4 ms
     await drone.action.return_to_launch()
     await first(telemetry.armed(), lambda armed: not armed, 180.0)
 

@@ -36,7 +36,7 @@ def test_a_command_that_is_added_is_carried_out_and_refused_with_a_reason(rig):
 
 
 def test_the_page_of_commands_is_made_from_the_handler(rig):
-    told = sections(rig.server.command_handlers()[PARACHUTE])
-    assert told[""] == "Makes the parachute ready or safe, or releases it, which stops the motors."
-    assert told["Params"] == "p1 0 safe, 1 ready, 2 release."
-    assert "released while it is safe" in told["Refused"]
+    reported = sections(rig.server.command_handlers()[PARACHUTE])
+    assert reported[""] == "Makes the parachute ready or safe, or releases it, which stops the motors."
+    assert reported["Params"] == "p1 0 safe, 1 ready, 2 release."
+    assert "released while it is safe" in reported["Refused"]

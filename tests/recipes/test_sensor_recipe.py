@@ -37,9 +37,9 @@ def test_a_fused_sensor_touches_six_files_and_they_are_those_of_the_recipe():
     touched = {name for name, _, _ in ADDED}
     assert len(touched) <= FILES_MAX
     recipe = (ROOT / "CONTRIBUTING.md").read_text().partition("### A sensor\n")[2].partition("\n### ")[0]
-    told = set(re.findall(r"`([\w./]+\.py)`", recipe.partition("\nBesides")[0]))
-    assert touched <= told
-    assert {name for name in told if (ROOT / name).exists()} == touched
+    reported = set(re.findall(r"`([\w./]+\.py)`", recipe.partition("\nBesides")[0]))
+    assert touched <= reported
+    assert {name for name in reported if (ROOT / name).exists()} == touched
 
 
 def test_lines_that_the_recipe_adds_have_their_place(tmp_path):
@@ -53,11 +53,11 @@ def test_a_sensor_that_is_added_is_simulated_fused_shown_logged_broken_and_repla
     command = [sys.executable, HERE / "flight.py", tmp_path]
     ended = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
-    told = json.loads(ended.stdout.splitlines()[-1])
-    assert told["sensors"][-1] == "flow"
-    assert told["present"]
-    assert told["healthy"][-3:] == [False] * 3
-    assert any(told["healthy"])
+    reported = json.loads(ended.stdout.splitlines()[-1])
+    assert reported["sensors"][-1] == "flow"
+    assert reported["present"]
+    assert reported["healthy"][-3:] == [False] * 3
+    assert any(reported["healthy"])
 
     log = ULog(str(tmp_path / "flight.ulg"))
     (flow,) = [data for data in log.data_list if data.name == "vehicle_optical_flow_vel"]
@@ -68,4 +68,4 @@ def test_a_sensor_that_is_added_is_simulated_fused_shown_logged_broken_and_repla
     is_judged = variances.data["flow[0]"] > 0.0
     judged = innovations.data["flow[0]"][is_judged] / np.sqrt(variances.data["flow[0]"][is_judged])
     assert 0.2 < np.std(judged) < 1.5
-    assert told["replayed"] > 0.8 * len(flow.data["timestamp"])
+    assert reported["replayed"] > 0.8 * len(flow.data["timestamp"])

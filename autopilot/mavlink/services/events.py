@@ -94,7 +94,7 @@ class EventService(Service):
             custom_mode = self._endpoint.dialect.custom_mode(state.mode)
             self._tell(MODE_CHANGED, Severity.INFO, custom_mode.to_bytes(4, "little"))
 
-    def text_told(self, severity: Severity, text: str) -> None:
+    def reported_text(self, severity: Severity, text: str) -> None:
         """A text to everyone: a failsafe's is an event, too."""
         if severity > Severity.WARNING or not self._is_on:
             return
@@ -146,15 +146,15 @@ class EventService(Service):
         if not self._is_on:
             return
         count = (fields.last_sequence - fields.first_sequence) % _SEQUENCES
-        is_missing_told = False
+        is_missing_reported = False
         found = {event.sequence: event for event in self._kept}
         for i in range(min(count, KEPT) + 1):
             sequence = (fields.first_sequence + i) % _SEQUENCES
             event = found.get(sequence)
             if event is not None:
                 self._endpoint.reply(sender, _EVENT, event.payload)
-            elif not is_missing_told:
-                is_missing_told = True
+            elif not is_missing_reported:
+                is_missing_reported = True
                 oldest = self._kept[0].sequence if self._kept else self._sequence
                 payload = _RESPONSE_EVENT_ERROR.pack(sender.sysid, sender.compid, sequence, oldest, UNAVAILABLE)
                 self._endpoint.reply(sender, _RESPONSE_EVENT_ERROR, payload)

@@ -39,7 +39,7 @@ class Guided(FlightMode):
         "_is_active",
         "_is_flown",
         "_is_line",
-        "_is_told",
+        "_is_reported",
         "_next",
         "_path",
         "_position",
@@ -61,7 +61,7 @@ class Guided(FlightMode):
         self._yaw = 0.0  # [rad]
         self._is_line = False  # on a straight line to the position
         self._is_flown = False  # what is asked for is in the setpoint
-        self._is_told = False  # that it stands on the ground
+        self._is_reported = False  # that it stands on the ground
         self._path = WaypointPath(context)  # around what the fence excludes
         self._next: tuple[Vector, float] | None = (
             None  # a position asked for before the mode was entered, or on take-off
@@ -75,7 +75,7 @@ class Guided(FlightMode):
         """Holds where the vehicle can stop, or goes where a client has just asked it to go."""
         context = self._context
         self._is_active = True
-        self._is_told = False
+        self._is_reported = False
         if self._next is not None:
             position, yaw = self._next
             self._next = None
@@ -138,8 +138,8 @@ class Guided(FlightMode):
             context.wants_lift = (
                 vertical_ask(setpoint, context.state.estimate, nan, context.craft.lift_thrust) is Ask.UP
             )
-        elif not self._is_told:
-            self._is_told = True
+        elif not self._is_reported:
+            self._is_reported = True
             context.announcer.statustext(Severity.WARNING, "Guided: on the ground, a takeoff comes first")
 
     @property

@@ -55,7 +55,7 @@ class Landing:
         elif context.has_height:
             context.setpoint.descend_level(self._pushed(self._speed()), self._yaw)
         else:
-            context.setpoint.hang_level(context.craft.lift_thrust * self._blind_thrust_fraction(), self._yaw)
+            context.setpoint.hover_level(context.craft.lift_thrust * self._blind_thrust_fraction(), self._yaw)
 
     def _blind_thrust_fraction(self) -> float:
         """Fraction of the hover thrust for sinking without knowing the height."""

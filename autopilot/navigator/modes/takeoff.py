@@ -97,7 +97,7 @@ class Takeoff(FlightMode):
             return Reply(Verdict.DENIED, f"altitude {request.alt_amsl_m:.0f} m is out of range")
         self._alt_amsl_m = request.alt_amsl_m
         self._yaw = request.yaw_rad
-        self._target_alt_m(is_told=True)
+        self._target_alt_m(is_reported=True)
         return ACCEPTED
 
     def forget(self) -> None:
@@ -105,7 +105,7 @@ class Takeoff(FlightMode):
 
     def start(self) -> None:
         context = self._context
-        self.climb.start(context.down_of(self._target_alt_m(is_told=False)), self._yaw)
+        self.climb.start(context.down_of(self._target_alt_m(is_reported=False)), self._yaw)
 
     def frame(self) -> None:
         if self.climb.frame():
@@ -115,12 +115,12 @@ class Takeoff(FlightMode):
         state = self._context.state
         return (state.home or state.position).alt_m
 
-    def _target_alt_m(self, *, is_told: bool) -> float:
+    def _target_alt_m(self, *, is_reported: bool) -> float:
         """The altitude to climb to: never less than MIS_TAKEOFF_ALT above home."""
         lowest = self._base_alt_m() + self._context.number("MIS_TAKEOFF_ALT")
         if not isfinite(self._alt_amsl_m):
             return lowest
-        if self._alt_amsl_m < lowest - 0.05 and is_told:
+        if self._alt_amsl_m < lowest - 0.05 and is_reported:
             height = self._context.number("MIS_TAKEOFF_ALT")
             self._context.announcer.statustext(Severity.INFO, f"Takeoff altitude raised to {height:.1f} m above home")
         return max(self._alt_amsl_m, lowest)

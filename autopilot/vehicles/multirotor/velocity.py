@@ -22,7 +22,7 @@ _INTEGRAL_MAX_XY = wp.constant(4.0)  # [m/s²] guess: 22 deg of lean
 _INTEGRAL_MAX_Z = wp.constant(4.0)
 _DISTURBANCE_MAX_XY = wp.constant(6.0)  # [m/s²] guess: drag at about 20 m/s
 _DISTURBANCE_MAX_Z = wp.constant(4.0)  # bounds what contact with the ground is taken for
-_HORIZONTAL_SHARE_MIN = wp.constant(0.3)  # of the greatest thrust, kept for going sideways (as PX4's 0.3)
+_HORIZONTAL_FRACTION_MIN = wp.constant(0.3)  # of the greatest thrust, kept for going sideways (as PX4's 0.3)
 
 
 @wp.struct
@@ -75,7 +75,7 @@ def limit_thrust(thrust_ned: wp.vec3, lean_max: float, least: float, most: float
     """
     up = wp.clamp(-thrust_ned[2], least, most)
     level_max = wp.sqrt(wp.max(most * most - up * up, 0.0))
-    reserve = _HORIZONTAL_SHARE_MIN * most
+    reserve = _HORIZONTAL_FRACTION_MIN * most
     level = wp.sqrt(thrust_ned[0] * thrust_ned[0] + thrust_ned[1] * thrust_ned[1])
     if level_max < reserve and level > level_max:
         up = wp.min(up, wp.max(wp.sqrt(most * most - reserve * reserve), _GRAVITY))  # climbing gives way, not height

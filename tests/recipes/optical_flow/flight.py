@@ -57,13 +57,13 @@ def main():
     folder = Path(sys.argv[1])
     bit = mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW
     statuses = flown(folder)
-    told = {
+    reported = {
         "sensors": [sensor.name for sensor in FUSED_SENSORS],
         "present": bool(statuses[-1].onboard_control_sensors_present & bit),
         "healthy": [bool(status.onboard_control_sensors_health & bit) for status in statuses],
         "replayed": replayed(folder / "flight.ulg"),
     }
-    print(json.dumps(told))
+    print(json.dumps(reported))
 
 
 if __name__ == "__main__":

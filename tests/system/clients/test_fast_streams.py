@@ -47,10 +47,10 @@ def fast():
 
 
 def test_as_many_come_as_were_asked_for(fast):
-    _, came, told = fast
+    _, came, reported = fast
     for name, rate_hz in (("HIGHRES_IMU", 200), ("ATTITUDE", 250), ("ATTITUDE_QUATERNION", 100), ("SCALED_IMU", 125)):
         assert len(came[name]) == pytest.approx(rate_hz * SECONDS, abs=2), name
-    assert [each.interval_us for each in told] == [5_000, 4_000, 10_000, 8_000]
+    assert [each.interval_us for each in reported] == [5_000, 4_000, 10_000, 8_000]
 
 
 def test_each_has_its_own_time_and_its_own_sample(fast):

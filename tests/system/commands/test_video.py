@@ -80,10 +80,10 @@ def test_a_stopped_stream_sends_nothing_until_it_is_started(tmp_path, port):
 def test_a_network_that_takes_nothing_is_told_once_and_the_flight_goes_on():
     video = RtpVideo("255.255.255.255", 5600)  # broadcast: the system refuses it
     flight = Flight(SMALL, video=video)
-    told, tell = [], video.on_trouble
-    video.on_trouble = lambda text: (told.append(text), tell(text))
+    reported, tell = [], video.on_trouble
+    video.on_trouble = lambda text: (reported.append(text), tell(text))
     with closing(flight):
-        run_until(flight, lambda: told)
+        run_until(flight, lambda: reported)
         later_us = flight.time_us + 3_000_000
         flight.run(lambda f: f.time_us >= later_us, speed=2.0)
-    assert told == ["Video: not sent to 255.255.255.255, port 5600: Permission denied"]
+    assert reported == ["Video: not sent to 255.255.255.255, port 5600: Permission denied"]

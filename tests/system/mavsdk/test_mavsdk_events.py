@@ -42,8 +42,8 @@ def test_parameters_are_described(vehicle):
 
 
 def test_arming_checks_and_events_have_texts(vehicle):
-    events, told = vehicle.plugin(Events), []
-    events.subscribe_events(lambda event, _: told.append((event.event_name, event.message)))
+    events, reported = vehicle.plugin(Events), []
+    events.subscribe_events(lambda event, _: reported.append((event.event_name, event.message)))
     vehicle.until(lambda: vehicle.state.is_ready_to_arm, 30.0, "ready")
     vehicle.until(lambda: (report := report_of(events)) and not report.all_problems, 60.0, "reported as ready")
     report = report_of(events)
@@ -65,6 +65,6 @@ def test_arming_checks_and_events_have_texts(vehicle):
     vehicle.flight.params.set("COM_POS_FS_EPH", 5.0)
     vehicle.until(lambda: vehicle.state.is_ready_to_arm, 5.0, "ready again")
     vehicle.plugin(Action).arm()
-    vehicle.until(lambda: ("armed", "Armed") in told, 10.0, "told as armed")
+    vehicle.until(lambda: ("armed", "Armed") in reported, 10.0, "told as armed")
     vehicle.plugin(Action).takeoff()
-    vehicle.until(lambda: ("mode_changed", "Mode: Takeoff") in told, 10.0, "told of the mode")
+    vehicle.until(lambda: ("mode_changed", "Mode: Takeoff") in reported, 10.0, "told of the mode")

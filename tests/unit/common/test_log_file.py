@@ -47,21 +47,21 @@ def names(folder):
 
 @pytest.mark.parametrize("at_flush", [False, True])
 def test_a_full_disk_ends_the_log_and_is_told_once(at_flush):
-    told = []
-    log = LogFile(FullDisk(1000, at_flush=at_flush), told.append)
+    reported = []
+    log = LogFile(FullDisk(1000, at_flush=at_flush), reported.append)
     for _ in range(50):
         assert log.write(bytes(100)) == 100
         log.flush()
     log.close()
-    assert told == ["log ended: No space left on device"]
+    assert reported == ["log ended: No space left on device"]
 
 
 def test_a_full_disk_noticed_when_the_log_is_closed_is_told():
-    told = []
-    log = LogFile(FullDisk(10, at_flush=True), told.append)
+    reported = []
+    log = LogFile(FullDisk(10, at_flush=True), reported.append)
     log.write(bytes(100))
     log.close()
-    assert told == ["log ended: No space left on device"]
+    assert reported == ["log ended: No space left on device"]
 
 
 def test_who_does_not_listen_gets_the_exception():

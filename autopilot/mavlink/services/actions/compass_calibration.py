@@ -65,7 +65,7 @@ class CompassService(Service):
         """Ends the calibration that was started so; without one there is nothing to do."""
         return self._endpoint.vehicle.calibration.cancel() if self._is_running else ACCEPTED
 
-    def text_told(self, text: str) -> None:
+    def reported_text(self, text: str) -> None:
         """A text of the vehicle to everyone: the calibration's are its progress."""
         if not self._is_running or not text.startswith("[cal] "):
             return

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from autopilot.interface.item_lists import ListKind
-from autopilot.interface.platform import LogFile, LogShelf
+from autopilot.interface.platform import LogFile, StoredLogs
 from autopilot.interface.vehicle_state import Severity
 from autopilot.mavlink.channel import Endpoint
 from autopilot.mavlink.services.files.ftp_files import FtpError, Nak, OpenFile, Snapshot, VirtualEntry, VirtualFolder
@@ -154,35 +154,35 @@ class LogFolder(_ReadOnly):
         self._endpoint = endpoint
 
     @property
-    def _shelf(self) -> LogShelf:
-        shelf = self._endpoint.vehicle.host.logs
-        if shelf is None:
+    def _stored(self) -> StoredLogs:
+        stored = self._endpoint.vehicle.host.logs
+        if stored is None:
             raise FileNotFoundError
-        return shelf
+        return stored
 
     def entries(self) -> list[VirtualEntry]:
         if self._endpoint.vehicle.host.logs is None:
             return []
-        logs = self._shelf.logs()
+        logs = self._stored.logs()
         files = [VirtualEntry(log.name, log.size, log.time_s) for log in logs]
         return [*files, VirtualEntry(LAST_LOG, len(str(len(logs))) + 1)]
 
     def open(self, name: str) -> OpenFile:
-        logs = self._shelf.logs()
+        logs = self._stored.logs()
         if name == LAST_LOG:
             return Snapshot(f"{len(logs)}\n".encode("ascii"))
         log = next((log for log in logs if log.name == name), None)
         if log is None:
             raise FileNotFoundError
-        return _LogReader(self._shelf, log)
+        return _LogReader(self._stored, log)
 
 
 class _LogReader:
     """A log while it is read."""
 
-    def __init__(self, shelf: LogShelf, log: LogFile) -> None:
+    def __init__(self, stored: StoredLogs, log: LogFile) -> None:
         self.size = log.size
-        self._read = partial(shelf.read, log.name)
+        self._read = partial(stored.read, log.name)
 
     def read(self, offset: int, count: int) -> bytes:
         return self._read(offset, max(min(count, self.size - offset), 0))

@@ -63,8 +63,8 @@ class LogTransferService(Service):
         """Takes the list from which this client's numbers are; the client heard first gives way if there are many."""
         if sender not in self._listed and len(self._listed) >= CLIENTS_MAX:
             self._forget(next(iter(self._listed)))
-        shelf = self._endpoint.vehicle.host.logs
-        logs = self._listed[sender] = () if shelf is None else shelf.logs()
+        stored = self._endpoint.vehicle.host.logs
+        logs = self._listed[sender] = () if stored is None else stored.logs()
         return logs
 
     def _entries(self, logs: Sequence[LogFile], start: int, end: int) -> Iterator[bytes]:
@@ -90,8 +90,8 @@ class LogTransferService(Service):
 
     def erase_requested(self, sender: Sender, _: Any) -> None:
         """Removes all logs but the one being written."""
-        shelf = self._endpoint.vehicle.host.logs
-        count = 0 if shelf is None else shelf.erase()
+        stored = self._endpoint.vehicle.host.logs
+        count = 0 if stored is None else stored.erase()
         self._forget(sender)
         self._endpoint.text(Severity.NOTICE, f"{count} logs erased" if count != 1 else "1 log erased")
 
@@ -115,9 +115,9 @@ class LogTransferService(Service):
             self._send_bins(sender, transfer, max(BINS_PER_FRAME // len(self._transfers), 1))
 
     def _send_bins(self, sender: Sender, transfer: _Transfer, count: int) -> None:
-        shelf = self._endpoint.vehicle.host.logs
+        stored = self._endpoint.vehicle.host.logs
         wanted = min(count * BIN_BYTES, transfer.end - transfer.offset)
-        data = b"" if shelf is None else shelf.read(transfer.name, transfer.offset, wanted)
+        data = b"" if stored is None else stored.read(transfer.name, transfer.offset, wanted)
         pieces = [data[at : at + BIN_BYTES] for at in range(0, len(data), BIN_BYTES)]
         is_end = len(data) < wanted
         if is_end and len(data) % BIN_BYTES == 0:

@@ -147,8 +147,8 @@ class ShellCommands:
     def _logger(self, arguments: Sequence[str]) -> Lines:
         if list(arguments) != ["status"]:
             return self._usage("logger")
-        shelf = self._vehicle.host.logs
-        logs = () if shelf is None else shelf.logs()
+        stored = self._vehicle.host.logs
+        logs = () if stored is None else stored.logs()
         total = sum(log.size for log in logs)
         newest = f"; the newest is {logs[-1].name}, {logs[-1].size} bytes" if logs else ""
         return (f"{len(logs)} logs, {total} bytes{newest}",)

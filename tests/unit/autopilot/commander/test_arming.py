@@ -126,13 +126,13 @@ def test_failing_checks_are_told_every_30_s():
     assert texts[0].startswith("PreArm: ")
 
 
-@pytest.mark.parametrize(("check", "may_arm", "is_told"), [(0, True, False), (1, False, False), (2, True, True)])
-def test_disturbed_compass_is_told_or_refused_by_com_arm_mag_str(check, may_arm, is_told):
+@pytest.mark.parametrize(("check", "may_arm", "is_reported"), [(0, True, False), (1, False, False), (2, True, True)])
+def test_disturbed_compass_is_told_or_refused_by_com_arm_mag_str(check, may_arm, is_reported):
     rig = Kinematic(COM_ARM_MAG_STR=check)
     rig.flags = ALL_VALID | MAG_DISTURBED
     rig.run(4.0)
     assert (rig.fc.arm(force=False).verdict is Verdict.ACCEPTED) is may_arm
-    assert rig.recorder.has_text("Strong magnetic interference") is is_told
+    assert rig.recorder.has_text("Strong magnetic interference") is is_reported
 
 
 def test_heading_that_waits_for_a_disturbed_compass_names_the_reason():

@@ -122,13 +122,13 @@ def test_mission_that_a_failsafe_ended_is_not_complete():
     assert rig.state.mission_state == MissionState.PAUSED
 
 
-@pytest.mark.parametrize(("jump_m", "is_told"), [(5.2, True), (0.2, False)])
-def test_jump_of_the_position_is_told(jump_m, is_told):
+@pytest.mark.parametrize(("jump_m", "is_reported"), [(5.2, True), (0.2, False)])
+def test_jump_of_the_position_is_told(jump_m, is_reported):
     rig = Kinematic().flying()
     rig.estimate["pos_reset_ned"] = (0.0, jump_m, 0.0)
     rig.estimate["reset_count"] += 1
     rig.run(1.0)
-    assert rig.recorder.has_text(f"position reset by {jump_m} m") == is_told
+    assert rig.recorder.has_text(f"position reset by {jump_m} m") == is_reported
 
 
 STATION_LOSS_S = 5.0

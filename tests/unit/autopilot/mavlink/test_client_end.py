@@ -77,11 +77,11 @@ def test_frames_arrive_whatever_pieces_they_come_in(size):
     pipe = Pipe()
     client = ClientEnd(pipe, 245, 190)
     stream = b"".join(encode("SYSTEM_TIME", 1, 1, seq, time_boot_ms=seq) for seq in range(3))
-    told = []
+    reported = []
     for at in range(0, len(stream), size):
         pipe.pieces = [stream[at : at + size]]
-        told += [decode(frame_of(each.frame)).fields.time_boot_ms for each in client.arrived()]
-    assert told == [0, 1, 2]
+        reported += [decode(frame_of(each.frame)).fields.time_boot_ms for each in client.arrived()]
+    assert reported == [0, 1, 2]
 
 
 def test_what_arrives_in_memory_is_what_was_sent_by_whom(ends):

@@ -257,9 +257,9 @@ def test_message_request_that_means_nothing_is_told_in_one_short_text():
     for params in ((511, 0.0, -1.0), (511, 30.0, nan), (512, float("inf"))):
         rig = Rig()
         rig.client.command(*params)
-        told = [m.fields for m in rig.frame() if m.name == "STATUSTEXT"]
-        assert [text.chunk_seq for text in told] == [0]
-        assert told[0].severity == mavlink.MAV_SEVERITY_NOTICE
+        reported = [m.fields for m in rig.frame() if m.name == "STATUSTEXT"]
+        assert [text.chunk_seq for text in reported] == [0]
+        assert reported[0].severity == mavlink.MAV_SEVERITY_NOTICE
 
 
 def test_prearm_checks_on_request():

@@ -34,12 +34,12 @@ def test_without_a_terminal_the_first_line_comes_at_once():
 
 def test_without_a_terminal_a_line_comes_every_few_seconds_with_what_is_under_way(monkeypatch):
     monkeypatch.setattr(terminal, "LINE_PERIOD_S", 0.01)
-    console, is_told = Console(file=StringIO(), width=80), Event()
+    console, is_reported = Console(file=StringIO(), width=80), Event()
     write = console.file.write
-    console.file.write = lambda text: (write(text), is_told.set() if "so far" in text else None)
+    console.file.write = lambda text: (write(text), is_reported.set() if "so far" in text else None)
     with busy(console, "loading") as say:
         say("kernel 2 of 3")
-        assert is_told.wait(10.0)
+        assert is_reported.wait(10.0)
     assert "kernel 2 of 3: 0 s so far" in console.file.getvalue()
 
 

@@ -46,7 +46,7 @@ def flown():
 
 
 def test_the_owner_waits_until_the_vehicle_follows():
-    flight, companion = flight_with_companion(config(), ScriptedFollower(), is_told=False)
+    flight, companion = flight_with_companion(config(), ScriptedFollower(), is_reported=False)
     flight.fly(take_off, seconds=40.0)
     advance(flight, 5.0)
     assert companion.phase is Phase.READY
@@ -156,7 +156,7 @@ def test_an_owner_who_is_only_seen_is_not_lost():
 @pytest.mark.parametrize(("in_view", "phase"), [(5.0, Phase.READY), (-5.0, Phase.WAITING)])
 def test_who_flies_by_sight_alone_is_ready_when_it_believes_to_see_the_owner(tmp_path, in_view, phase):
     pilot = believer(tmp_path, "vision-only", in_view=in_view)
-    flight, companion = flight_with_companion(config(), pilot, is_told=False)
+    flight, companion = flight_with_companion(config(), pilot, is_reported=False)
     advance(flight, 4.0)
     assert companion.phase is phase
     assert companion.decision_count == 0

@@ -256,11 +256,11 @@ def test_log_of_a_long_flight_goes_on_in_parts_that_clients_can_download(tmp_pat
     monkeypatch.setattr("common.log_file.PART_BYTES_MAX", 400_000)
     flight = Flight(FlightConfig(world=WorldConfig(size_m=64.0, trees_per_ha=0.0)), folder=tmp_path)
     flight.fly(lambda drone: drone.sleep(15.0))
-    shelf = flight.host.logs
-    listed = {log.name: log.size for log in shelf.logs()}
+    stored = flight.host.logs
+    listed = {log.name: log.size for log in stored.logs()}
     assert list(listed) == ["flight.ulg", "flight-2.ulg", "flight-3.ulg"]
     for name, size in listed.items():
-        (tmp_path / f"copy-{name}").write_bytes(shelf.read(name, 0, size))
+        (tmp_path / f"copy-{name}").write_bytes(stored.read(name, 0, size))
     times = [ULog(str(tmp_path / f"copy-{name}")).get_dataset("vehicle_attitude").data["timestamp"] for name in listed]
     np.testing.assert_array_equal(np.concatenate(times), np.arange(1, len(np.concatenate(times)) + 1) * 20_000)
     flight.close()

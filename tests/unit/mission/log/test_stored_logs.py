@@ -9,7 +9,7 @@ from pyulog import ULog
 from autopilot.params import parameter_table
 from common.state_folder import StateFolder
 from mission.flight import Flight, FlightConfig
-from mission.host_troubles import SILENCE_US, TOLD_MAX, Troubles
+from mission.host_troubles import REPORTED_MAX, SILENCE_US, Troubles
 from mission.log.stored_logs import LOGS_KEPT_MAX, FlightLogs
 from sim.world.world import WorldConfig
 
@@ -33,7 +33,7 @@ class Stream:
         pass
 
 
-def shelf(folder, mode, stream=None):
+def stored(folder, mode, stream=None):
     params = parameter_table()
     params.set("SDLOG_MODE", mode)
     return FlightLogs(folder, stream or Stream(), params, print)
@@ -48,7 +48,7 @@ def names(logs):
     [(-1, 0, 0), (0, 0, 2), (1, 1, 2), (2, 1, 1)],
 )
 def test_mode_says_when_logs_begin_and_end(tmp_path, mode, after_boot, armed_twice):
-    logs = shelf(tmp_path, mode)
+    logs = stored(tmp_path, mode)
     assert len(names(logs)) == after_boot
     for is_armed in (False, True, True, False, True, False):
         logs.frame(is_armed=is_armed)
@@ -58,7 +58,7 @@ def test_mode_says_when_logs_begin_and_end(tmp_path, mode, after_boot, armed_twi
 
 def test_names_count_on_over_runs(tmp_path):
     for _ in range(2):
-        logs = shelf(tmp_path, 2)
+        logs = stored(tmp_path, 2)
         logs.end()
     assert names(logs) == ["log_00001.ulg", "log_00002.ulg"]
 
@@ -66,7 +66,7 @@ def test_names_count_on_over_runs(tmp_path):
 def test_oldest_log_gives_way(tmp_path):
     for i in range(1, LOGS_KEPT_MAX + 1):
         (tmp_path / f"log_{i:05}.ulg").touch()
-    logs = shelf(tmp_path, 2)
+    logs = stored(tmp_path, 2)
     assert len(names(logs)) == LOGS_KEPT_MAX
     assert names(logs)[0] == "log_00002.ulg"
     logs.end()
@@ -74,7 +74,7 @@ def test_oldest_log_gives_way(tmp_path):
 
 def test_log_without_its_definitions_is_removed(tmp_path):
     (tmp_path / "log_00003.ulg.part").write_bytes(b"hea")
-    logs = shelf(tmp_path, 0)
+    logs = stored(tmp_path, 0)
     assert list(tmp_path.iterdir()) == []
     assert names(logs) == []
 
@@ -82,7 +82,7 @@ def test_log_without_its_definitions_is_removed(tmp_path):
 def test_erase_keeps_the_log_being_written_and_what_is_no_log(tmp_path):
     (tmp_path / "log_00001.ulg").touch()
     (tmp_path / "notes.txt").touch()
-    logs = shelf(tmp_path, 2)
+    logs = stored(tmp_path, 2)
     assert logs.erase() == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["log_00002.ulg", "notes.txt"]
     logs.end()
@@ -134,7 +134,7 @@ def test_parameter_change_is_in_the_log(tmp_path):
 def test_log_from_boot_goes_on_in_the_next_one_when_it_is_large(tmp_path, monkeypatch):
     monkeypatch.setattr("mission.log.stored_logs.PART_BYTES_MAX", 1000)
     stream = Stream()
-    logs = shelf(tmp_path, 2, stream)
+    logs = stored(tmp_path, 2, stream)
     for _ in range(3):
         for listener in list(stream.listeners):
             listener(bytes(994))
@@ -145,19 +145,19 @@ def test_log_from_boot_goes_on_in_the_next_one_when_it_is_large(tmp_path, monkey
 
 
 def test_log_that_cannot_be_written_ends_and_the_next_one_is_tried(tmp_path, monkeypatch):
-    told, stream, params = [], Stream(), parameter_table()
-    logs = FlightLogs(tmp_path, stream, params, told.append)
+    reported, stream, params = [], Stream(), parameter_table()
+    logs = FlightLogs(tmp_path, stream, params, reported.append)
     logs.frame(is_armed=True)
     logs._file.close()
     monkeypatch.setattr(logs, "_file", FullFile())
     for _ in range(3):
         stream.listeners[0](b"row")
     logs.frame(is_armed=True)
-    assert (told, stream.listeners) == (["log_00001.ulg ended: No space left on device"], [])
+    assert (reported, stream.listeners) == (["log_00001.ulg ended: No space left on device"], [])
     for is_armed in (True, False, True):
         logs.frame(is_armed=is_armed)
     assert names(logs) == ["log_00001.ulg", "log_00002.ulg"]
-    assert len(told) == 1
+    assert len(reported) == 1
     logs.end()
 
 
@@ -173,11 +173,11 @@ class FullFile:
 def test_a_disk_that_becomes_read_only_is_told_and_ends_no_flight(tmp_path, monkeypatch):
     for i in range(1, LOGS_KEPT_MAX + 1):
         (tmp_path / f"log_{i:05}.ulg").touch()
-    told = []
+    reported = []
     params = parameter_table()
     params.set("SDLOG_MODE", 0)
     stream = Stream()
-    logs = FlightLogs(tmp_path, stream, params, told.append)
+    logs = FlightLogs(tmp_path, stream, params, reported.append)
 
     def refuse(*_, **__):
         raise OSError(errno.EROFS, "Read-only file system")
@@ -188,7 +188,7 @@ def test_a_disk_that_becomes_read_only_is_told_and_ends_no_flight(tmp_path, monk
         logs.frame(is_armed=is_armed)
     assert logs.erase() == 0
     assert logs.read("log_00001.ulg", 0, 10) == b""
-    assert told == [f"log_{LOGS_KEPT_MAX + 1:05}.ulg ended: Read-only file system"]
+    assert reported == [f"log_{LOGS_KEPT_MAX + 1:05}.ulg ended: Read-only file system"]
     assert len(logs.logs()) == LOGS_KEPT_MAX
     assert stream.listeners == []
 
@@ -214,10 +214,10 @@ def test_troubles_are_told_once_and_of_many_kinds_few_are_remembered():
         now_us += SILENCE_US // 10
         troubles.note("flight.ulg ended")
     assert troubles.take() == ["flight.ulg ended"]
-    for k in range(10 * TOLD_MAX):
+    for k in range(10 * REPORTED_MAX):
         troubles.note(f"photo {k} not stored")
-    assert len(troubles.take()) == 10 * TOLD_MAX
-    assert len(troubles._noted_us) <= TOLD_MAX
+    assert len(troubles.take()) == 10 * REPORTED_MAX
+    assert len(troubles._noted_us) <= REPORTED_MAX
     now_us += SILENCE_US + 1
-    troubles.note(f"photo {10 * TOLD_MAX - 1} not stored")
+    troubles.note(f"photo {10 * REPORTED_MAX - 1} not stored")
     assert len(troubles.take()) == 1

@@ -59,7 +59,7 @@ class Air:
 
     def run(self, seconds):
         """The messages the companion sends meanwhile."""
-        told = []
+        reported = []
         for _ in range(round(seconds * 1e6) // FRAME_US):
             self.time_us += FRAME_US
             mode = PX4.custom_mode(self.mode)
@@ -68,8 +68,8 @@ class Air:
             self._tell("ATTITUDE_QUATERNION", time_boot_ms=self.time_us // 1000, q1=1.0)
             self._tell("LOCAL_POSITION_NED", x=1.0, z=-5.0)
             self.companion.frame(self.time_us)
-            told += [decode(frame) for data in self.end.receive() for frame in self._reader.feed(data)]
-        return told
+            reported += [decode(frame) for data in self.end.receive() for frame in self._reader.feed(data)]
+        return reported
 
     def _tell(self, name, **fields):
         self.end.send(encode(name, 1, 1, 0, **fields))
@@ -82,11 +82,11 @@ def test_a_policy_that_does_not_decide_hands_back_and_sends_no_number_that_is_no
     air.run(1.0)
     assert air.companion.phase is Phase.FLYING
     air.pilot.is_lost, air.pilot.resets = True, 0
-    told = air.run(0.5)
+    reported = air.run(0.5)
     assert air.companion.trouble == NO_DECISION
     assert air.companion.phase is Phase.HANDING_BACK
     assert air.pilot.resets > 0
-    sent = [m.fields for m in told if m.name == "SET_POSITION_TARGET_LOCAL_NED"]
+    sent = [m.fields for m in reported if m.name == "SET_POSITION_TARGET_LOCAL_NED"]
     assert sent
     assert np.isfinite([(f.vx, f.vy, f.vz, f.yaw_rate) for f in sent]).all()
     assert (sent[-1].vx, sent[-1].vy, sent[-1].vz, sent[-1].yaw_rate) == (0.0, 0.0, 0.0, 0.0)

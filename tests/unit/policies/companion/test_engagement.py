@@ -20,8 +20,8 @@ STEP_US = 20_000
 class Bench:
     """Steps a state machine through situations, 20 ms apart."""
 
-    def __init__(self, *, is_told=False):
-        self.machine = Engagement(is_told=is_told)
+    def __init__(self, *, is_reported=False):
+        self.machine = Engagement(is_reported=is_reported)
         self.time_us = 0
 
     def step(self, *, trouble="", offboard=False, airborne=True, holding=True, refused=False, after_us=STEP_US):
@@ -97,7 +97,7 @@ def test_offboard_chosen_before_everything_was_there_does_not_engage_later():
 
 
 def test_told_to_engage_it_asks_for_offboard_once_airborne_and_again_until_it_comes():
-    bench = Bench(is_told=True).ready()
+    bench = Bench(is_reported=True).ready()
     assert bench.step(airborne=False).wish is Wish.NONE
     assert bench.step(holding=False).wish is Wish.NONE
     orders = bench.step()
@@ -110,7 +110,7 @@ def test_told_to_engage_it_asks_for_offboard_once_airborne_and_again_until_it_co
 
 @pytest.mark.parametrize("how", [{"refused": True}, {"after_us": ENGAGE_PATIENCE_US + 1}])
 def test_a_refused_offboard_is_not_asked_for_again(how):
-    bench = Bench(is_told=True).ready()
+    bench = Bench(is_reported=True).ready()
     bench.step()
     assert "refused" in bench.step(**how).text
     assert bench.phase is Phase.READY
@@ -118,7 +118,7 @@ def test_a_refused_offboard_is_not_asked_for_again(how):
 
 
 def test_trouble_while_engaging_ends_it():
-    bench = Bench(is_told=True).ready()
+    bench = Bench(is_reported=True).ready()
     bench.step()
     assert "no pictures" in bench.step(trouble="no pictures").text
     assert bench.phase is Phase.WAITING
@@ -165,7 +165,7 @@ def test_landing_stops_it():
 
 
 def test_released_it_is_silent_and_flies_again_only_when_offboard_is_chosen_anew():
-    bench = Bench(is_told=False).released()
+    bench = Bench(is_reported=False).released()
     assert bench.step(after_us=SILENCE_US - STEP_US).sending is Sending.NOTHING
     for _ in range(500):
         orders = bench.step()
@@ -189,7 +189,7 @@ def test_offboard_chosen_again_without_pictures_is_not_flown():
 
 
 def test_told_once_it_does_not_engage_again_after_the_pilot_took_over():
-    bench = Bench(is_told=True).ready()
+    bench = Bench(is_reported=True).ready()
     bench.step()
     bench.step(offboard=True)
     bench.step(offboard=False)

@@ -10,19 +10,19 @@ from policies.companion.vehicle_link import VehicleLink
 DAY_MS = 86_400_000
 
 
-def told(*times_ms):
+def reported(*times_ms):
     clock = VehicleClock()
     return [clock.time_us(time_ms % SPAN_MS) // 1000 for time_ms in times_ms]
 
 
 def test_time_goes_on_after_49_days():
     times_ms = [SPAN_MS - 40, SPAN_MS - 20, SPAN_MS, SPAN_MS + 20, SPAN_MS + 20 * DAY_MS, 3 * SPAN_MS // 2]
-    assert told(*times_ms) == times_ms
+    assert reported(*times_ms) == times_ms
 
 
 def test_messages_that_overtook_each_other_change_nothing():
     times_ms = [SPAN_MS - 20, SPAN_MS + 20, SPAN_MS - 10, SPAN_MS + 40, SPAN_MS + 30]
-    assert told(*times_ms) == times_ms
+    assert reported(*times_ms) == times_ms
 
 
 @pytest.mark.parametrize("up_ms", [60_000, 30 * DAY_MS, SPAN_MS + 5 * DAY_MS])

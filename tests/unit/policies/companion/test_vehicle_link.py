@@ -102,9 +102,9 @@ def test_telemetry_that_is_no_number_changes_nothing(vehicle, value):
     end, link = vehicle
     tell(end, link, "ATTITUDE_QUATERNION", q1=1.0, yawspeed=0.5)
     tell(end, link, "LOCAL_POSITION_NED", x=1.0, vx=2.0)
-    told = (link.own.pos_ned, link.own.vel_ned, link.own.q_ned_from_frd, link.own.omega_frd)
+    reported = (link.own.pos_ned, link.own.vel_ned, link.own.q_ned_from_frd, link.own.omega_frd)
     tell(end, link, "ATTITUDE_QUATERNION", q1=value)
     tell(end, link, "ATTITUDE_QUATERNION", q1=1.0, rollspeed=value)
     tell(end, link, "LOCAL_POSITION_NED", x=value)
     tell(end, link, "LOCAL_POSITION_NED", vz=value)
-    assert told == (link.own.pos_ned, link.own.vel_ned, link.own.q_ned_from_frd, link.own.omega_frd)
+    assert reported == (link.own.pos_ned, link.own.vel_ned, link.own.q_ned_from_frd, link.own.omega_frd)

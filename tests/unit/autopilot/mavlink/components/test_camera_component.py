@@ -213,8 +213,8 @@ def test_everyone_is_told_when_the_video_starts_and_stops(rig):
         rig.to(CAMERA, command, 1)
         (status,) = from_camera(rig.frame(), "VIDEO_STREAM_STATUS")
         assert status.flags == flags
-        (told,) = [m for m in rig.second_client.received() if m.name == "VIDEO_STREAM_STATUS"]
-        assert told.fields.flags == flags
+        (reported,) = [m for m in rig.second_client.received() if m.name == "VIDEO_STREAM_STATUS"]
+        assert reported.fields.flags == flags
 
 
 def test_without_video_its_start_is_refused_with_the_option_that_gives_it():

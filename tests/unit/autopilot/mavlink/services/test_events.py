@@ -89,9 +89,9 @@ def test_numbers_of_events_differ():
 
 def test_sequence_is_told_every_second_with_its_reset_once(rig):
     change(rig, mode=Mode.RETURN)
-    told = rig.all("CURRENT_EVENT_SEQUENCE", 150)
-    assert [each.sequence for each in told] == [3, 3, 3]
-    assert {each.flags for each in told} == {0}
+    reported = rig.all("CURRENT_EVENT_SEQUENCE", 150)
+    assert [each.sequence for each in reported] == [3, 3, 3]
+    assert {each.flags for each in reported} == {0}
     fresh = Rig()
     fresh.vehicle.params.set("MAV_EVENTS", 1)
     assert [each.flags for each in fresh.all("CURRENT_EVENT_SEQUENCE", 60)] == [1, 0]

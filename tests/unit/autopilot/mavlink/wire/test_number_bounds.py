@@ -94,10 +94,10 @@ def refused(name, rig=None, **fields):
     """The texts that a message causes, with nothing asked of the vehicle."""
     rig = rig or Rig()
     rig.client.send(name, **fields)
-    told = texts(rig.frame())
+    reported = texts(rig.frame())
     assert not rig.vehicle.calls
     assert not rig.vehicle.setpoints
-    return told
+    return reported
 
 
 @pytest.mark.parametrize(
@@ -113,8 +113,8 @@ def refused(name, rig=None, **fields):
 )
 @pytest.mark.parametrize("frame", [1, 8])
 def test_setpoints_out_of_range_are_refused_with_the_reason(mask, fields, what, frame):
-    told = refused("SET_POSITION_TARGET_LOCAL_NED", coordinate_frame=frame, type_mask=mask, **fields)
-    assert told == [f"Offboard: the {what} is out of range"]
+    reported = refused("SET_POSITION_TARGET_LOCAL_NED", coordinate_frame=frame, type_mask=mask, **fields)
+    assert reported == [f"Offboard: the {what} is out of range"]
 
 
 def test_what_is_masked_may_be_anything():
@@ -126,21 +126,21 @@ def test_what_is_masked_may_be_anything():
 
 
 def test_body_rates_out_of_range_are_refused_with_the_reason():
-    told = refused("SET_ATTITUDE_TARGET", type_mask=128, body_yaw_rate=2.0 * RATE_MAX_RAD_S, thrust=0.5)
-    assert told == ["Offboard: the body rate is out of range"]
+    reported = refused("SET_ATTITUDE_TARGET", type_mask=128, body_yaw_rate=2.0 * RATE_MAX_RAD_S, thrust=0.5)
+    assert reported == ["Offboard: the body rate is out of range"]
 
 
 def follow_target(rig, **fields):
     position = {"lat": 473977420, "lon": 85455940, "alt": 490.0}
     rig.client.send("FOLLOW_TARGET", **position | fields)
-    told = texts(rig.frame())
-    return [call for call in rig.vehicle.calls if isinstance(call, TargetReport)], told
+    reported = texts(rig.frame())
+    return [call for call in rig.vehicle.calls if isinstance(call, TargetReport)], reported
 
 
 def test_target_faster_than_anything_is_refused_with_the_reason():
-    reports, told = follow_target(Rig(), est_capabilities=3, vel=(3.4e38, 0.0, 0.0))
+    reports, reported = follow_target(Rig(), est_capabilities=3, vel=(3.4e38, 0.0, 0.0))
     assert not reports
-    assert told == ["Follow: the target's velocity is out of range"]
+    assert reported == ["Follow: the target's velocity is out of range"]
 
 
 def test_target_without_a_velocity_is_still_a_place():
@@ -159,9 +159,9 @@ def test_target_without_a_velocity_is_still_a_place():
     ],
 )
 def test_landing_target_out_of_range_is_refused_with_the_reason(fields):
-    (told,) = refused("LANDING_TARGET", **fields)
-    assert told.startswith("Landing target: the ")
-    assert told.endswith(" is out of range")
+    (reported,) = refused("LANDING_TARGET", **fields)
+    assert reported.startswith("Landing target: the ")
+    assert reported.endswith(" is out of range")
 
 
 @pytest.mark.parametrize("value", [inf, 3.4e38, -2e10])

@@ -313,9 +313,9 @@ def test_mission_that_ends_with_a_return_is_announced_as_complete():
 
 
 @pytest.mark.parametrize(
-    ("height", "command", "is_told"), [(-20.0, WAYPOINT, True), (-4.0, WAYPOINT, False), (-20.0, LAND, False)]
+    ("height", "command", "is_reported"), [(-20.0, WAYPOINT, True), (-4.0, WAYPOINT, False), (-20.0, LAND, False)]
 )
-def test_item_far_below_home_is_taken_with_a_warning(height, command, is_told):
+def test_item_far_below_home_is_taken_with_a_warning(height, command, is_reported):
     rig = Kinematic().ready()
     assert rig.fc.lists.load(ListKind.MISSION, [item(0, TAKEOFF), item(1, command, 30.0, 0.0, height)]) is None
-    assert rig.recorder.has_text("Mission: item 2 is 20 m below home") == is_told
+    assert rig.recorder.has_text("Mission: item 2 is 20 m below home") == is_reported

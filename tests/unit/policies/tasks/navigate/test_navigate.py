@@ -117,7 +117,7 @@ def test_sectors_tell_the_nearest_that_a_fan_of_fine_rays_meets() -> None:
         heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         world = task.worlds.map(row)
         for k in range(SECTORS):
-            told = float(ranges_m[row, k])
+            reported = float(ranges_m[row, k])
             fan = np.radians(np.linspace(5 * k - 119.99, 5 * k - 115.01, 40)) + heading
             north, east = np.cos(fan), np.sin(fan)
             met = [
@@ -125,8 +125,8 @@ def test_sectors_tell_the_nearest_that_a_fan_of_fine_rays_meets() -> None:
                 for n, e in zip(north, east, strict=True)
                 for up in (-BAND_M, BAND_M)
             ]
-            assert told <= min(met) + 1e-3
-            assert told > min(met) - 0.25 or min(met) == RANGE_M  # a crown's edge between the rays
+            assert reported <= min(met) + 1e-3
+            assert reported > min(met) - 0.25 or min(met) == RANGE_M  # a crown's edge between the rays
 
 
 def test_goal_is_told_by_estimate_in_the_heading_frame() -> None:

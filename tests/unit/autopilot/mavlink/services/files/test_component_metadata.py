@@ -50,9 +50,9 @@ def metadata(rig):
     rig.client.command(512, 397)
     messages = {message.name: message.fields for message in rig.frame()}
     assert messages["COMMAND_ACK"].result == ACCEPTED
-    told, ftp = messages["COMPONENT_METADATA"], Ftp(rig)
-    packed = ftp.read(told.uri)
-    assert checksum(packed) == told.file_crc
+    reported, ftp = messages["COMPONENT_METADATA"], Ftp(rig)
+    packed = ftp.read(reported.uri)
+    assert checksum(packed) == reported.file_crc
     general = json.loads(lzma.decompress(packed))
     files = {0: general}
     for each in general["metadataTypes"]:

@@ -65,9 +65,9 @@ def test_long_list_is_spread_over_frames(rig):
     assert [entry.id for entry in rig.all("LOG_ENTRY", 2)] == list(range(20, 50))
 
 
-@pytest.mark.parametrize("shelf", [None, Shelf()])
-def test_no_logs_are_one_entry_that_says_so(rig, shelf):
-    rig.vehicle.host.logs = shelf
+@pytest.mark.parametrize("stored", [None, Shelf()])
+def test_no_logs_are_one_entry_that_says_so(rig, stored):
+    rig.vehicle.host.logs = stored
     rig.client.send("LOG_REQUEST_LIST", start=0, end=0xFFFF)
     entry = rig.only("LOG_ENTRY")
     assert (entry.num_logs, entry.id, entry.size) == (0, 0, 0)

@@ -23,8 +23,8 @@ def local(rig: Rig, mask: int, frame: int = 1, **fields: float) -> OffboardSetpo
 
 def outcome(rig: Rig) -> OffboardSetpoint | str:
     count = len(rig.vehicle.setpoints)
-    told = texts(rig.frame())
-    return rig.vehicle.setpoints[-1] if len(rig.vehicle.setpoints) > count else told[0]
+    reported = texts(rig.frame())
+    return rig.vehicle.setpoints[-1] if len(rig.vehicle.setpoints) > count else reported[0]
 
 
 def position(rig: Rig, frame: int, mask: int = ONLY_POS, **fields: float) -> OffboardSetpoint | str:
@@ -112,11 +112,11 @@ def test_infinite_element_is_refused_and_nan_is_free():
 
 def test_refusals_are_told_once_in_10_s():
     rig = Rig()
-    told = []
+    reported = []
     for _ in range(100):
         rig.client.send("SET_POSITION_TARGET_LOCAL_NED", coordinate_frame=99, type_mask=ONLY_POS)
-        told += texts(rig.frame(10))
-    assert len(told) == 2
+        reported += texts(rig.frame(10))
+    assert len(reported) == 2
 
 
 def test_global_position_above_sea_level():
