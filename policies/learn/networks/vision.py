@@ -61,7 +61,7 @@ class ImageEncoder(nn.Module):
             images.flatten(0, -4).permute(0, 3, 1, 2).float().mul_(1.0 / 255.0)
         )  # one product takes three times as long
         features: Tensor = self.layers(rows)
-        return features.view(*images.shape[:-3], -1)
+        return features.view(*images.shape[:-3], features.shape[-1])
 
 
 class Residual(nn.Module):

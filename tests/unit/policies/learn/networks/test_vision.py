@@ -38,6 +38,12 @@ def learner(task=None, seed=1, network=None, learning_rate_schedule="constant", 
     return Ppo(task, policy, behavior, [ExtrinsicSignal(gamma=0.5)], seed=seed)
 
 
+@pytest.mark.parametrize("kind", ["simple", "nature_cnn", "resnet"])
+def test_no_image_has_no_features(kind):  # no episode ended in what was rolled out
+    encoder = ImageEncoder(kind, (64, 64, 3), 8, generator())
+    assert encoder(torch.zeros((0, 64, 64, 3), dtype=torch.uint8)).shape == (0, 8)
+
+
 def test_simple_has_ml_agents_shapes():
     shapes = [tuple(p.shape) for p in ImageEncoder("simple", (64, 64, 3), 256, generator()).parameters()]
     assert shapes == [(16, 3, 8, 8), (16,), (32, 16, 4, 4), (32,), (256, 1152), (256,)]
