@@ -136,6 +136,7 @@ class FlightController:
     ) -> None:
         self.params = params
         self.modes = vehicle.modes
+        self.ardupilot = vehicle.ardupilot
         self.host = host or Host()
         self._last_resort = vehicle.last_resort
         self._ports = ports

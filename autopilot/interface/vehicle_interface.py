@@ -11,6 +11,7 @@ from autopilot.inputs.external_position import ExternalPositions
 from autopilot.inputs.obstacles import Obstacles
 from autopilot.inputs.sticks import Sticks
 from autopilot.inputs.traffic import Traffic
+from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
 from autopilot.interface.client_requests import CalibrationKind, Request
 from autopilot.interface.item_lists import ItemLists
 from autopilot.interface.mode_spec import ModeTable
@@ -116,6 +117,7 @@ class Vehicle(Protocol):
     camera: Camera | None
     gimbal: GimbalControl | None
     modes: ModeTable
+    ardupilot: ArduPilotVehicle
 
     @property
     def lists(self) -> ItemLists:

@@ -133,7 +133,7 @@ class Endpoint:
         signing: SigningConfig | None = None,
     ) -> None:
         self.vehicle = vehicle
-        self.dialect = dialect = dialect.with_modes(vehicle.modes)
+        self.dialect = dialect = dialect.of_vehicle(vehicle.modes, vehicle.ardupilot)
         self.sysid = sysid
         self.time_us = 0
         self.clock = BootClock()

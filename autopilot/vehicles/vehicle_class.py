@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from autopilot.control.law import ControlLaw
+from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
 from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import Mode, VehicleState
@@ -112,6 +113,7 @@ class VehicleClass:
     limits: MotionLimits
     mav_type: Callable[[Airframe], int]
     """MAV_TYPE of the heartbeat."""
+    ardupilot: ArduPilotVehicle
     motors: Callable[[Airframe], Sequence[int]]
     """Its motors from 0, clockwise from the nose on, as ArduPilot counts them to test one."""
     standing_height_m: Callable[[Airframe], float]

@@ -5,6 +5,7 @@ Its body and its control law are those of tests/unit/sim/sled.py. Here is what t
 
 from math import cos, sin
 
+from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
 from autopilot.interface.client_requests import GoTo, OffboardSetpoint
 from autopilot.interface.failsafe_action import Action
 from autopilot.interface.mode_spec import (
@@ -134,6 +135,7 @@ SLED = VehicleClass(
         yaw_rate="SLED_YAW_RATE",
     ),
     mav_type=lambda _: MAV_TYPE_GROUND_ROVER,
+    ardupilot=ArduPilotVehicle("Rover", (4, 6, 3)),
     motors=lambda _: (0,),
     standing_height_m=lambda _: 0.1,
 )

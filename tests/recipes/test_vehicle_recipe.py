@@ -5,6 +5,7 @@ from math import nan
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
+from pymavlink.mavutil import mode_mapping_byname, mode_string_v10
 
 from autopilot.commander.failsafe import POSITION_LOST
 from autopilot.interface.vehicle_state import Mode
@@ -175,6 +176,23 @@ def test_ardupilots_clients_know_its_modes_by_their_own_numbers(airframe):
     assert sled.goto(5.0) == ACCEPTED
     sled.run(15.0)
     assert sled.pos_ned[0] == pytest.approx(5.0, abs=1.5)
+
+
+def test_ardupilots_clients_take_it_for_a_rover(airframe):
+    sled = Sled(airframe, dialect="ardupilot")
+    sled.run(1.1)
+    beat = next(each for each in sled.heard("HEARTBEAT") if each.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
+    assert mode_string_v10(beat) == "HOLD"
+    assert sled.ask(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, 0.0) == ACCEPTED
+    sled.run(0.5)
+    listed = {each.mode_name.upper(): each.custom_mode for each in sled.heard("AVAILABLE_MODES")}
+    theirs = mode_mapping_byname(beat.type)
+    assert listed == {name: theirs[name] for name in ("HOLD", "GUIDED")}
+    assert sled.ask(SET_MODE, 1.0, theirs["STEERING"]) == DENIED
+    assert "there is no mode STEERING" in " ".join(sled.texts())
+    assert sled.ask(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION) == ACCEPTED
+    (version,) = sled.heard("AUTOPILOT_VERSION")
+    assert version.flight_sw_version >> 8 == 0x040603
 
 
 @pytest.mark.parametrize("dialect", ["px4", "ardupilot"])

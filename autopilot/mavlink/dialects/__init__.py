@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, Self
 
+from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
 from autopilot.interface.mode_spec import DialectMode, ModeSpec, ModeTable
 from autopilot.interface.vehicle_state import Mode
 from common.params import Parameter
@@ -113,8 +114,8 @@ class Dialect(Protocol):
     aliases: Sequence[Alias]
     constants: Sequence[Constant]
 
-    def with_modes(self, table: ModeTable) -> Self:
-        """The same dialect for a vehicle with these modes."""
+    def of_vehicle(self, modes: ModeTable, ardupilot: ArduPilotVehicle, /) -> Self:
+        """The same dialect for a vehicle with these modes that is one of ArduPilot's."""
         ...
 
     def custom_mode(self, mode: Mode) -> int:

@@ -1,4 +1,4 @@
-"""ArduPilot's numbers: plain mode numbers of a copter, every parameter as a float, home as item 0 of a mission."""
+"""ArduPilot's numbers: plain mode numbers by its vehicle, every parameter as a float, home as item 0 of a mission."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -6,6 +6,7 @@ from typing import Self
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
 from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import Alias, Constant, ModeNumbers, ModeRow, UnknownModeError
@@ -17,14 +18,11 @@ _RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
 class ArduPilotDialect:
-    """An ArduPilot multicopter, as far as clients can tell."""
+    """One of ArduPilot's vehicles, as far as clients can tell."""
 
     name = "ardupilot"
     autopilot = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     capabilities = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
-    # Copter 4.7.0, a development version: newer than any release, so that no station asks for an update. It names the
-    # interface we are compatible with; our own version is the custom version.
-    flight_sw_version = 4 << 24 | 7 << 16 | 0 << 8 | mavlink.FIRMWARE_VERSION_TYPE_DEV
     goto_mode = Mode.GUIDED
     first_seq = 1
     item_request = "MISSION_REQUEST"  # clients made for ArduPilot may know no other
@@ -39,14 +37,19 @@ class ArduPilotDialect:
     amsl_commands: frozenset[int] = frozenset({mavlink.MAV_CMD_DO_ORBIT})  # a command of PX4's: see there
     constants: Sequence[Constant] = CONSTANTS
 
-    def __init__(self, modes: ModeTable) -> None:
+    def __init__(self, modes: ModeTable, vehicle: ArduPilotVehicle) -> None:
         self.mode_table = modes
+        self._vehicle = vehicle
+        # It names the interface we are compatible with; our own version is the custom version.
+        major, minor, patch = vehicle.version
+        self.flight_sw_version = major << 24 | minor << 16 | patch << 8 | mavlink.FIRMWARE_VERSION_TYPE_DEV
         self._numbers = ModeNumbers(modes, lambda spec: spec.ardupilot)
         self.modes: Sequence[ModeRow] = sorted(self._numbers.rows, key=lambda row: self._numbers.number_of(row.mode))
         self.aliases: Sequence[Alias] = (*ALIASES, *switch_aliases(modes))
 
-    def with_modes(self, table: ModeTable) -> Self:
-        return self if table is self.mode_table else type(self)(table)
+    def of_vehicle(self, modes: ModeTable, ardupilot: ArduPilotVehicle) -> Self:
+        is_same = modes is self.mode_table and ardupilot == self._vehicle
+        return self if is_same else type(self)(modes, ardupilot)
 
     def custom_mode(self, mode: Mode) -> int:
         return self._numbers.number_of(mode)
@@ -54,8 +57,9 @@ class ArduPilotDialect:
     def mode_from_custom(self, custom_mode: int) -> Mode:
         mode = self._numbers.mode_of(custom_mode)
         if mode is None:
-            entry = mavlink.enums["COPTER_MODE"].get(custom_mode)
-            name = entry.name.removeprefix("COPTER_MODE_") if entry and "ENUM_END" not in entry.name else custom_mode
+            enum = f"{self._vehicle.name.upper()}_MODE"
+            entry = mavlink.enums[enum].get(custom_mode)
+            name = entry.name.removeprefix(f"{enum}_") if entry and "ENUM_END" not in entry.name else custom_mode
             raise UnknownModeError(f"there is no mode {name}")
         return mode
 
@@ -78,4 +82,4 @@ class ArduPilotDialect:
         return value
 
 
-ARDUPILOT = ArduPilotDialect(DEFAULT_CLASS.modes)
+ARDUPILOT = ArduPilotDialect(DEFAULT_CLASS.modes, DEFAULT_CLASS.ardupilot)

@@ -8,6 +8,7 @@ from typing import Self
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
 from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.dialects import Alias, Constant, ModeNumbers, ModeRow, UnknownModeError
@@ -16,7 +17,7 @@ from common.params import Parameter
 
 
 class Px4Dialect:
-    """A PX4 multicopter, as far as clients can tell."""
+    """A vehicle of PX4's, as far as clients can tell."""
 
     name = "px4"
     autopilot = mavlink.MAV_AUTOPILOT_PX4
@@ -48,8 +49,8 @@ class Px4Dialect:
             main for main in mains if mains.count(main) == 1 and self._numbers.mode_of(main << 16) is not None
         }
 
-    def with_modes(self, table: ModeTable) -> Self:
-        return self if table is self.mode_table else type(self)(table)
+    def of_vehicle(self, modes: ModeTable, _ardupilot: ArduPilotVehicle) -> Self:
+        return self if modes is self.mode_table else type(self)(modes)
 
     def custom_mode(self, mode: Mode) -> int:
         return self._numbers.number_of(mode)
