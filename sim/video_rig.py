@@ -6,14 +6,16 @@ walks through the world is seen in them.
 
 from concurrent.futures import Future, ThreadPoolExecutor
 from math import radians, tan
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from autopilot.payload.camera.ports import RawFrame, View
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.sensors.camera import CameraPose
-from sim.sensors.fast_camera.fast_camera import QuickCamera
 from sim.world.world import WorldMap
+
+if TYPE_CHECKING:
+    from sim.sensors.fast_camera.fast_camera import QuickCamera
 
 RANGE_M = 150.0  # fog hides what is farther
 
@@ -40,6 +42,8 @@ class VideoRig:
     def _render(self, pose: CameraPose, view: View) -> RawFrame:
         camera = self._camera
         if camera is None:
+            from sim.sensors.fast_camera.fast_camera import QuickCamera  # no flight waits for it that nobody watches
+
             camera = self._camera = QuickCamera(
                 self._world, 1, width=view.width, height=view.height, people=self._people, range_m=RANGE_M
             )

@@ -51,8 +51,8 @@ def plain_flight(tmp_path_factory) -> set[str]:
     return loaded(f"from mission.cli import app\napp({arguments!r}, standalone_mode=False)")
 
 
-@pytest.mark.parametrize("unneeded", ["policies", "mission.follow.owner_device", *EXTRAS])
-def test_a_flight_without_an_owner_imports_no_policies_and_no_extra(unneeded, plain_flight):
+@pytest.mark.parametrize("unneeded", ["policies", "mission.follow.owner_device", "sim.sensors.fast_camera", *EXTRAS])
+def test_a_flight_without_an_owner_imports_no_policies_no_fast_camera_and_no_extra(unneeded, plain_flight):
     assert "mission.flight" in plain_flight
     assert unneeded not in plain_flight
 
