@@ -189,6 +189,7 @@ class FlightController:
             None if vehicle.drive_watch is None else vehicle.drive_watch(parts),
             vehicle.modes,
             vehicle.last_resort,
+            vehicle.arming_checks,
         )
 
     def _make_navigator(self, vehicle: VehicleClass, airframe: Airframe) -> Navigator:

@@ -1,9 +1,10 @@
 """Arming checks: everything that must be right before the motors may turn, each with the reason it gives.
 
-In: the vehicle's state. Out: reasons, most important first; empty means ready. Run at 5 Hz while disarmed.
+In: the vehicle's state. Out: reasons, most important first; empty means ready. Run at 5 Hz while disarmed. What a class
+of vehicles checks besides is in its folder.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from math import hypot, radians
 
 from autopilot.estimator.params import MAG_TYPE_NONE
@@ -11,7 +12,6 @@ from autopilot.estimator.sensors import FUSED_SENSORS
 from autopilot.interface.vehicle_state import VehicleState
 from autopilot.ports import (
     EXTERNAL_POSITION,
-    HEIGHT_VALID,
     MAG_DISTURBED,
     MAG_FAULTY,
     POSITION_VALID,
@@ -19,6 +19,7 @@ from autopilot.ports import (
     VELOCITY_VALID,
     YAW_ALIGNED,
 )
+from autopilot.vehicles.vehicle_class import ArmingCheck
 from common.params import ParameterTable
 
 _NEEDED_SENSORS = tuple(sensor for sensor in FUSED_SENSORS if sensor.is_needed_to_arm)
@@ -30,20 +31,24 @@ MAGNETIC_INTERFERENCE = "strong magnetic interference"
 _UPRIGHT_RAD = radians(45.0)  # PX4 and ArduPilot refuse a steeper stand
 
 
-def arming_reasons(state: VehicleState, params: ParameterTable, *, needs_position: bool) -> list[str]:
+def arming_reasons(
+    state: VehicleState, params: ParameterTable, own: Sequence[ArmingCheck] = (), *, needs_position: bool
+) -> list[str]:
     """Why the vehicle may not be armed.
 
     Args:
         state: the vehicle as of this frame.
         params: its parameters.
+        own: what its class checks besides.
         needs_position: whether the mode it would be armed in needs a position.
     """
     if state.estimate is None or state.samples is None:
         return ["no data from the sensors yet"]
     if needs_position:
-        checks = (*_ALWAYS, *_POSITION)
+        of_position = _POSITION
     else:
-        checks = _ALWAYS if int(params["COM_ARM_WO_GPS"]) else (*_ALWAYS, _gnss)
+        of_position = () if int(params["COM_ARM_WO_GPS"]) else (_gnss,)
+    checks = (*_SENSORS_AND_ESTIMATE, *own, *_STAND_AND_SUPPLY, *of_position)
     return [reason for check in checks if (reason := check(state, params))]
 
 
@@ -86,10 +91,6 @@ def _heading(state: VehicleState, params: ParameterTable) -> str:
 
 def _has_compass(params: ParameterTable) -> bool:
     return bool(int(params["EKF2_MAG_TYPE"]) != MAG_TYPE_NONE)
-
-
-def _height(state: VehicleState, _: ParameterTable) -> str:
-    return "" if state.estimate.flags & HEIGHT_VALID else "estimator: no valid height"
 
 
 def _still(state: VehicleState, _: ParameterTable) -> str:
@@ -151,9 +152,8 @@ def _is_stale(state: VehicleState, sample_us: int, limit_us: int) -> bool:
     return sample_us == 0 or state.time_us - sample_us > limit_us
 
 
-_Check = Callable[[VehicleState, ParameterTable], str]
-_ALWAYS: tuple[_Check, ...] = (
-    _calibration, _imu, _fused_sensors, _magnetometer, _alignment, _heading, _height, _upright, _still, _biases,
-    _battery,
+_SENSORS_AND_ESTIMATE: tuple[ArmingCheck, ...] = (
+    _calibration, _imu, _fused_sensors, _magnetometer, _alignment, _heading,
 )  # fmt: skip
-_POSITION: tuple[_Check, ...] = (_gnss, _position)
+_STAND_AND_SUPPLY: tuple[ArmingCheck, ...] = (_upright, _still, _biases, _battery)
+_POSITION: tuple[ArmingCheck, ...] = (_gnss, _position)

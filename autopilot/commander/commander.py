@@ -4,6 +4,7 @@ In: the vehicle's state and what clients ask for. Out: mode, arming and landed s
 which mode to fly through `Flying`, and asks it what it alone can know.
 """
 
+from collections.abc import Sequence
 from math import degrees, nan, radians, sqrt
 
 from autopilot.commander.arming import MAGNETIC_INTERFERENCE, WARN_ONLY, arming_reasons
@@ -19,7 +20,7 @@ from autopilot.interface.mode_spec import Disarmed, ModeTable
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
 from autopilot.ports import HEIGHT_VALID, MAG_DISTURBED, POSITION_VALID, VELOCITY_VALID
-from autopilot.vehicles.vehicle_class import DriveWatch, GroundDetector
+from autopilot.vehicles.vehicle_class import ArmingCheck, DriveWatch, GroundDetector
 from common.params import Parameter, ParameterTable
 
 _POSITION_FLAGS = POSITION_VALID | VELOCITY_VALID | HEIGHT_VALID
@@ -44,6 +45,7 @@ class Commander:
         motors: the motor watch, if there is one.
         modes: those that the vehicle has.
         last_resort: the mode of a failsafe that has no mode of its own.
+        arming_checks: those of its class.
     """
 
     def __init__(
@@ -57,6 +59,7 @@ class Commander:
         motors: DriveWatch | None,
         modes: ModeTable,
         last_resort: Mode,
+        arming_checks: Sequence[ArmingCheck],
     ) -> None:
         self.state = state
         self.params = params
@@ -65,6 +68,7 @@ class Commander:
         self.has_position = False
         self.station = StationLink()
         self.last_resort = last_resort
+        self._arming_checks = arming_checks
         self.guard = Guard(self)
         self.home = Home(state, announcer)
         self._battery = battery
@@ -176,7 +180,9 @@ class Commander:
         """Those besides the mode."""
         state = self.state
         mode = state.mode
-        reasons = arming_reasons(state, self.params, needs_position=self._flying.needs_position(mode))
+        reasons = arming_reasons(
+            state, self.params, self._arming_checks, needs_position=self._flying.needs_position(mode)
+        )
         if state.landed_state is not LandedState.ON_GROUND:
             reasons.append("not on the ground")
         if self.modes[self.state.mode].needs_sticks and not self._pilot.is_heard:

@@ -17,6 +17,9 @@ from autopilot.interface.vehicle_state import Mode, VehicleState
 from common.airframe import Airframe
 from common.params import Parameter, ParameterTable
 
+ArmingCheck = Callable[[VehicleState, ParameterTable], str]
+"""Says why the vehicle may not be armed; empty if it may."""
+
 
 class GroundDetector(Protocol):
     """Says whether the vehicle stands on the ground."""
@@ -122,6 +125,8 @@ class VehicleClass:
     """None: it never leaves the ground."""
     lift_thrust: Callable[[Airframe], float] = lambda _: 0.0
     """[0..1] Thrust that carries the vehicle; 0 where the ground does."""
+    arming_checks: Sequence[ArmingCheck] = ()
+    """Its own, besides those of all vehicles (autopilot.commander.arming)."""
     drive_watch: Callable[[DriveParts], DriveWatch] | None = None
     """None: nobody looks whether a motor has failed."""
 

@@ -3,7 +3,7 @@
 Its body and its control law are those of tests/unit/sim/sled.py. Here is what the Python part must know of it.
 """
 
-from math import cos, sin
+from math import cos, degrees, hypot, sin
 
 from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
 from autopilot.interface.client_requests import GoTo, OffboardSetpoint
@@ -36,6 +36,7 @@ PARAMETERS = (
     Parameter("SLED_JERK", 5.0, 0.1, 50.0, "m/s3", "change of acceleration", "guess"),
     Parameter("SLED_LAG", 2.0, 0.1, 10.0, "m", "by which it may lag behind", "guess"),
     Parameter("SLED_YAW_RATE", 10.0, 0.1, 90.0, "deg/s", "turning rate", "guess"),
+    Parameter("SLED_SLOPE", 15.0, -1.0, 45.0, "deg", "steepest slope on which it is armed", "guess"),
 )
 
 
@@ -76,6 +77,11 @@ class Drive(FlightMode):
             ahead_m = north * (self._place[0] - here[0]) + east * (self._place[1] - here[1])
             speed = min(max(0.5 * ahead_m, -limit), limit)
         context.setpoint.move((speed * north, speed * east, 0.0), 0.0)
+
+
+def stands_level(state, params):
+    slope_deg = degrees(hypot(state.roll_rad, state.pitch_rad))
+    return f"the slope of {slope_deg:.0f} degrees is too steep" if slope_deg > params["SLED_SLOPE"] else ""
 
 
 SLED = VehicleClass(
@@ -137,6 +143,7 @@ SLED = VehicleClass(
     mav_type=lambda _: MAV_TYPE_GROUND_ROVER,
     ardupilot=ArduPilotVehicle("Rover", (4, 6, 3)),
     motors=lambda _: (0,),
+    arming_checks=(stands_level,),
     standing_height_m=lambda _: 0.1,
 )
 SIMULATED_SLED = SimulatedClass(SLED, SLED_BODY)

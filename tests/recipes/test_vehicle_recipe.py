@@ -140,6 +140,15 @@ def test_setpoints_of_a_client_drive_it_and_their_loss_stops_it(airframe):
     assert abs(sled.flight.rig.rows["truth"]["vel_ned"][0][0]) < 0.1
 
 
+def test_it_is_armed_by_its_own_checks_besides_those_of_all(airframe):
+    sled = Sled(airframe)
+    sled.flight.params.set("SLED_SLOPE", -1.0)
+    assert sled.ask(ARM, 1.0) == TEMPORARILY_REJECTED
+    assert "the slope of 0 degrees is too steep" in " ".join(sled.texts())
+    sled.flight.params.set("SLED_SLOPE", 15.0)
+    assert sled.ask(ARM, 1.0) == ACCEPTED
+
+
 def test_the_last_resort_of_a_sled_is_to_stop(airframe):
     sled = Sled(airframe)
     assert sled.ask(ARM, 1.0) == ACCEPTED

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from math import atan2, pi
 
 from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
-from autopilot.interface.vehicle_state import Mode
+from autopilot.interface.vehicle_state import Mode, VehicleState
+from autopilot.ports import HEIGHT_VALID
 from autopilot.vehicles.multirotor.control_airframe import rotors_leaver
 from autopilot.vehicles.multirotor.defaults import airframe_defaults, hover_thrust
 from autopilot.vehicles.multirotor.landing_detector import LandingDetector
@@ -46,6 +47,10 @@ _LIMITS = MotionLimits(
 )
 
 
+def _height(state: VehicleState, _: ParameterTable) -> str:
+    return "" if state.estimate.flags & HEIGHT_VALID else "estimator: no valid height"
+
+
 def _clockwise(airframe: Airframe) -> Sequence[int]:
     angles = [atan2(rotor.y_m, rotor.x_m) % (2.0 * pi) for rotor in airframe.rotors]
     return sorted(range(len(angles)), key=lambda rotor: round(angles[rotor], 6))
@@ -71,5 +76,6 @@ MULTIROTOR = VehicleClass(
     standing_height_m=lambda airframe: airframe.contact.leg_z_m,
     ground_detector=_landing_detector,
     lift_thrust=hover_thrust,
+    arming_checks=(_height,),
     drive_watch=_motor_watch,
 )

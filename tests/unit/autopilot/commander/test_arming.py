@@ -16,6 +16,7 @@ from autopilot.ports import (
     VELOCITY_VALID,
     YAW_ALIGNED,
 )
+from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
 from tests.unit.autopilot.kinematic import ALL_VALID, ORIGIN, Kinematic, geo
 
 
@@ -150,6 +151,15 @@ def test_vehicle_without_compass_is_armed_in_modes_that_need_no_position():
     needing, other = (arming_reasons(rig.state, rig.table, needs_position=needs) for needs in (True, False))
     assert not other
     assert "heading not aligned" in needing[0]
+
+
+def test_only_what_flies_must_know_its_height_to_be_armed():
+    rig = Kinematic()
+    rig.flags = ALL_VALID & ~HEIGHT_VALID
+    rig.run(4.0)
+    assert arming_reasons(rig.state, rig.table, needs_position=True) == []
+    flying = arming_reasons(rig.state, rig.table, MULTIROTOR.arming_checks, needs_position=True)
+    assert flying == ["estimator: no valid height"]
 
 
 def test_forced_arming_skips_the_checks():
