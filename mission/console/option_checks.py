@@ -57,12 +57,20 @@ def check_options(options: FlightOptions) -> None:
     try:
         if options.plan is not None:
             read_plan(options.plan)
-        if options.home is not None:
-            home_of(options.home)
-        for text in options.parameters:
-            parameter_of(text)
+    except PlanError as error:
+        raise UserError(str(error)) from error
+    check_vehicle(options)
+
+
+def check_vehicle(options: FlightOptions) -> None:
+    """Refuses a home, a parameter or an airframe that cannot be read."""
+    if options.home is not None:
+        home_of(options.home)
+    for text in options.parameters:
+        parameter_of(text)
+    try:
         load_airframe(options.airframe)
-    except (AirframeError, PlanError) as error:
+    except AirframeError as error:
         raise UserError(str(error)) from error
 
 

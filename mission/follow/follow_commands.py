@@ -53,11 +53,18 @@ def follow() -> Callable[..., None]:
 
 def _follow(options: "FollowOptions") -> int:
     with learn_extra():
-        from mission.console.option_checks import UserError
-        from mission.follow.follow_options import check_follow_options
+        from mission.console.option_checks import UserError, check_owner, check_vehicle, speed_of
+        from policies.companion.names import SCRIPTED
 
         try:
-            check_follow_options(options)
+            check_owner(options)
+            speed_of(options.speed)
+            check_vehicle(options)
+            if options.policy is not None and options.policy != SCRIPTED:
+                check_policy(options.policy)
+            from mission.flight_options import check_parameters
+
+            check_parameters(options)
             with loading(Console()):
                 from mission.follow.follow_session import follow_session
             return follow_session(options)
