@@ -12,8 +12,9 @@ class LateCommand(TyperCommand):
 
     @cached_property
     def _made(self) -> Any:
+        made_by: Any = self.callback
         one = typer.Typer(add_completion=False, rich_markup_mode=None)
-        one.command(name=self.name)(self.callback() if self.callback else None)
+        one.command(name=self.name)(made_by())
         return typer.main.get_command(one)
 
     def get_params(self, ctx: Any) -> list[Any]:
