@@ -17,7 +17,8 @@ from rich.console import Console
 from rich.table import Table
 
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
-from common.airframe import Airframe, AirframeError, load_airframe
+from common.airframe import AirframeError, load_airframe
+from common.airframes.multirotor import MultirotorAirframe
 from common.kernels import FRAME_TICKS, TICK_S
 from common.params import ParameterTable
 
@@ -78,7 +79,7 @@ def _pi(gain_p: float, gain_i: float) -> System:
 _INTEGRATOR = _fraction([1.0], [1.0, 0.0])
 
 
-def motor_time_s(airframe: Airframe) -> float:
+def motor_time_s(airframe: MultirotorAirframe) -> float:
     """Mean of the lags of rising and falling speed."""
     return 0.5 * (airframe.rotor_model.spin_up_time_s + airframe.rotor_model.spin_down_time_s)
 
@@ -86,7 +87,7 @@ def motor_time_s(airframe: Airframe) -> float:
 class Cascade:
     """The open loops of an airframe with given gains, each with the loops inside it closed."""
 
-    def __init__(self, airframe: Airframe, gains: Mapping[str, float]) -> None:
+    def __init__(self, airframe: MultirotorAirframe, gains: Mapping[str, float]) -> None:
         self.gains = gains
         self.actuator = _lag(motor_time_s(airframe)) * _delay(FAST_DELAY_S)
 
@@ -164,7 +165,7 @@ def default_gains() -> Gains:
     return ParameterTable(CONTROL_PARAMETERS).fields(CONTROL_PARAMETERS)
 
 
-def all_margins(airframe: Airframe, gains: Mapping[str, float] | None = None) -> list[Margins]:
+def all_margins(airframe: MultirotorAirframe, gains: Mapping[str, float] | None = None) -> list[Margins]:
     """Margins of every loop with the given gains, or the defaults."""
     cascade = Cascade(airframe, default_gains() if gains is None else gains)
     return [cascade.margins(loop) for loop in cascade.loops()]
@@ -213,7 +214,7 @@ def greatest_gain(loop: System, phase_deg: float, gain_db: float) -> float:
     return float(min(1.0 / size[last_ok], 10.0 ** (-gain_db / 20.0) / size[reversal]))
 
 
-def design(airframe: Airframe) -> Gains:
+def design(airframe: MultirotorAirframe) -> Gains:
     """Gains for an airframe, from the inside out; what no rule names keeps its default."""
     gains = default_gains()
     for rule in RULES:
@@ -230,7 +231,7 @@ def design(airframe: Airframe) -> Gains:
     return gains
 
 
-def _margin_table(airframe: Airframe, rows: list[Margins]) -> Table:
+def _margin_table(airframe: MultirotorAirframe, rows: list[Margins]) -> Table:
     table = Table(title=f"{airframe.name}: margins with the default gains")
     for heading in ("loop", "crossover\nrad/s", "gain\ndB", "phase\ndeg", "disk gain\ndB", "disk phase\ndeg", "enough"):
         table.add_column(heading, justify="left" if heading == "loop" else "right")
@@ -241,7 +242,7 @@ def _margin_table(airframe: Airframe, rows: list[Margins]) -> Table:
     return table
 
 
-def _gain_table(airframe: Airframe, designed: Mapping[str, float]) -> Table:
+def _gain_table(airframe: MultirotorAirframe, designed: Mapping[str, float]) -> Table:
     table = Table(title=f"{airframe.name}: gains")
     for heading in ("parameter", "default", "designed for this airframe"):
         table.add_column(heading, justify="left" if heading == "parameter" else "right")
@@ -262,6 +263,8 @@ def main(
     console = Console()
     try:
         frame = load_airframe(airframe)
+        if not isinstance(frame, MultirotorAirframe):
+            raise AirframeError(f"airframe '{frame.name}': a {frame.vehicle} has other gains than a multirotor")
     except AirframeError as error:
         console.print(str(error), style="red", highlight=False)
         raise typer.Exit(2) from error

@@ -64,7 +64,7 @@ class DriveParts:
     state: VehicleState
     params: ParameterTable
     announcer: Announcer
-    airframe: Airframe
+    airframe: Any  # the class's
     read_speeds: Callable[[], Sequence[float]] | None  # [rad/s] of each motor, as its controller reports it
     airframe_row: np.ndarray[Any, Any] | None  # live structured view, shape (1,), of the law's Airframe row
 
@@ -100,30 +100,30 @@ class Craft:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleClass:
-    """One class of vehicles."""
+    """One class of vehicles; its functions get the airframe that `common/airframes/NAME.py` makes of a file."""
 
     name: str
     law: ControlLaw
     """The kernel half."""
     parameters: Sequence[Parameter]
     """Those of the law and of the class's own detectors."""
-    defaults: Callable[[Airframe], Mapping[str, int | float]]
+    defaults: Callable[[Any], Mapping[str, int | float]]
     """Parameters whose default the airframe file decides."""
     modes: ModeTable
     """Its flight modes; one of them is Hold, in which it boots."""
     last_resort: Mode
     """Where a mode leads that cannot be flown on: down for what flies, a stop for what drives."""
     limits: MotionLimits
-    mav_type: Callable[[Airframe], int]
+    mav_type: Callable[[Any], int]
     """MAV_TYPE of the heartbeat."""
     ardupilot: ArduPilotVehicle
-    motors: Callable[[Airframe], Sequence[int]]
+    motors: Callable[[Any], Sequence[int]]
     """Its motors from 0, clockwise from the nose on, as ArduPilot counts them to test one."""
-    standing_height_m: Callable[[Airframe], float]
+    standing_height_m: Callable[[Any], float]
     """Of the vehicle's centre over level ground."""
-    ground_detector: Callable[[ParameterTable, Airframe], GroundDetector] | None = None
+    ground_detector: Callable[[ParameterTable, Any], GroundDetector] | None = None
     """None: it never leaves the ground."""
-    lift_thrust: Callable[[Airframe], float] = lambda _: 0.0
+    lift_thrust: Callable[[Any], float] = lambda _: 0.0
     """[0..1] Thrust that carries the vehicle; 0 where the ground does."""
     arming_checks: Sequence[ArmingCheck] = ()
     """Its own, besides those of all vehicles (autopilot.commander.arming)."""

@@ -47,7 +47,7 @@ def write_html(recording: Recording, world: WorldMap, target: Path, title: str) 
 
 def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
     """Everything the page shows; the border to its JavaScript, hence a dict."""
-    airframe = load_airframe(recording.config.airframe)
+    shape = shapes.vehicle(load_airframe(recording.config.airframe))
     rows = recording.rows
     return {
         "title": title,
@@ -59,11 +59,11 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
         "ground": _mesh(shapes.ground(world, CELLS_MOST)),
         "walls": None if (walls := shapes.walls(world)) is None else _mesh(walls),
         **_trees(world),
-        "vehicle": _mesh(shapes.quadrotor(airframe)),
-        "blade": _mesh(shapes.rotor(airframe)),
+        "vehicle": _mesh(shape.body),
+        "blade": _mesh(shape.blade),
         "person": _mesh(shapes.person(STATURE_M)),
-        "hubs": _array(shapes.hubs_frd(airframe)),
-        "spins": [rotor.spin for rotor in airframe.rotors],
+        "hubs": _array(shape.hubs),
+        "spins": list(shape.spins),
         "path_ned": _array(recording.path_ned) if len(recording.path_ned) > 1 else None,
         "track": _track(rows),
         "plots": _plots(recording),

@@ -69,15 +69,16 @@ class Scene:
         self._api.set_background_image(np.full((2, 2, 3), SKY_RGB, np.uint8))
         self._add_world(world)
         self._vehicle = self._api.add_frame("/vehicle", axes_length=0.4, axes_radius=0.008)
-        self._add_mesh("/vehicle/frame", shapes.quadrotor(airframe))
-        blade = shapes.rotor(airframe)
-        self._rotors = [
+        shape = shapes.vehicle(airframe)
+        blade = shape.blade
+        self._add_mesh("/vehicle/frame", shape.body)
+        self._blades = [
             self._api.add_mesh_simple(
-                f"/vehicle/rotor{i}", blade.vertices, blade.faces, color=shapes.BLADE, position=hub - (0, 0, 0.03)
+                f"/vehicle/blade{i}", blade.vertices, blade.faces, color=shapes.BLADE, position=hub - (0, 0, 0.03)
             )
-            for i, hub in enumerate(shapes.hubs_frd(airframe))
+            for i, hub in enumerate(shape.hubs)
         ]
-        self._spins = [rotor.spin for rotor in airframe.rotors]
+        self._spins = shape.spins
         self._owner = self._api.add_frame("/owner", show_axes=False, visible=False)
         self._add_mesh("/owner/body", shapes.person(STATURE_M))
         self._goal = self._api.add_icosphere("/goal", radius=0.35, color=GOAL_RGB, opacity=0.7, visible=False)
@@ -138,8 +139,8 @@ class Scene:
         """Moves what moves."""
         self._vehicle.position = moment.pos_ned
         self._vehicle.wxyz = wxyz_of(moment.q_ned_from_frd)
-        speeds = moment.row["motor_speed"][: len(self._rotors)]
-        for handle, spin, speed in zip(self._rotors, self._spins, speeds, strict=True):
+        speeds = moment.row["motor_speed"][: len(self._blades)]
+        for handle, spin, speed in zip(self._blades, self._spins, speeds, strict=True):
             if speed > 1.0:
                 handle.wxyz = wxyz_of(quat_of(2.0 * np.pi * BLADE_TURNS_PER_S * spin * moment.time_s, 0.0))
         if moment.has_owner:

@@ -4,12 +4,15 @@ In: a `WorldMap`, an airframe. Out: vertices in ned [m] (or in the body's frd), 
 from outside, and colours with the light already in them where nobody lights them later. Made once per flight.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.airframe import Airframe
+from common.airframes.multirotor import MultirotorAirframe
 from sim.world.walls import WALL_THICKNESS_M
 from sim.world.world import WorldMap
 
@@ -22,6 +25,7 @@ BARK = (104, 82, 62)
 LEAVES = ((58, 98, 44), (94, 132, 62))  # darkest and lightest
 CONCRETE = (168, 164, 158)
 JACKET, TROUSERS, SKIN = (24, 74, 196), (52, 58, 74), (222, 184, 152)
+BOX_M, NOSE_M = (0.5, 0.3, 0.15), (0.1, 0.15, 0.1)  # of a vehicle whose shape is not known
 FRAME, BLADE = (48, 52, 60), (30, 32, 36)
 
 
@@ -105,7 +109,29 @@ def walls(world: WorldMap) -> Mesh | None:
     return joined(boxes)
 
 
-def quadrotor(airframe: Airframe) -> Mesh:
+class VehicleShape(NamedTuple):
+    """What a vehicle looks like, in frd."""
+
+    body: Mesh
+    blade: Mesh
+    """What turns at each hub."""
+    hubs: Floats
+    """[m] (hubs, 3)"""
+    spins: Sequence[int]
+    """Of each hub: +1 counter-clockwise seen from above, -1 clockwise."""
+    blade_radius_m: float
+
+
+def vehicle(airframe: Airframe) -> VehicleShape:
+    """The shape of a vehicle; a plain box where its class's is not known."""
+    if not isinstance(airframe, MultirotorAirframe):
+        body = joined([box((0.0, 0.0, 0.0), BOX_M, FRAME), box((0.5 * BOX_M[0], 0.0, 0.0), NOSE_M, JACKET)])
+        return VehicleShape(body, box((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), BLADE), np.zeros((0, 3), np.float32), (), 0.0)
+    spins = [rotor.spin for rotor in airframe.rotors]
+    return VehicleShape(multirotor(airframe), blade(airframe), hubs_frd(airframe), spins, blade_radius_m(airframe))
+
+
+def multirotor(airframe: MultirotorAirframe) -> Mesh:
     """The vehicle without its rotors, in frd: a hull, a nose that shows the heading, an arm and a motor for each."""
     hubs = hubs_frd(airframe)
     span_m = float(np.abs(hubs[:, :2]).max())
@@ -119,18 +145,18 @@ def quadrotor(airframe: Airframe) -> Mesh:
     return joined(parts)
 
 
-def rotor(airframe: Airframe) -> Mesh:
+def blade(airframe: MultirotorAirframe) -> Mesh:
     """Two blades across the hub, along x, in frd."""
-    radius_m = rotor_radius_m(airframe)
+    radius_m = blade_radius_m(airframe)
     return box((0.0, 0.0, 0.0), (2.0 * radius_m, 0.12 * radius_m, 0.02 * radius_m), BLADE)
 
 
-def hubs_frd(airframe: Airframe) -> Floats:
+def hubs_frd(airframe: MultirotorAirframe) -> Floats:
     """Places of the rotors [m], (rotors, 3)."""
     return np.array([(rotor.x_m, rotor.y_m, rotor.z_m) for rotor in airframe.rotors], np.float32)
 
 
-def rotor_radius_m(airframe: Airframe) -> float:
+def blade_radius_m(airframe: MultirotorAirframe) -> float:
     """As large as neighbours leave room for; the flight model knows thrust, not size."""
     hubs = hubs_frd(airframe)
     gaps = np.linalg.norm(hubs[:, None] - hubs[None, :], axis=2)

@@ -1,4 +1,4 @@
-"""The vehicle, drawn into a camera's image: filled triangles, far ones first, and see-through rotor discs.
+"""The vehicle, drawn into a camera's image: filled triangles, far ones first, and see-through discs of what turns.
 
 In: an airframe, then poses of vehicle and camera. Out: pixels, where nothing nearer hides the vehicle.
 """
@@ -15,7 +15,7 @@ from mission.view import shapes
 from mission.view.snapshot_images import Eye
 
 NEAREST_M = 0.3  # a vehicle nearer than this is not drawn
-ROTOR_OPACITY = 0.35
+DISC_OPACITY = 0.35
 DISC_SIDES = 24
 DISC_RGB = (210, 214, 220)
 Image = NDArray[np.uint8]
@@ -26,12 +26,12 @@ class VehicleModel:
     """What a vehicle looks like."""
 
     def __init__(self, airframe: Airframe) -> None:
-        self._frame = shapes.quadrotor(airframe)
-        hubs = shapes.hubs_frd(airframe)
+        shape = shapes.vehicle(airframe)
+        self._frame = shape.body
         angle = np.linspace(0.0, 2.0 * np.pi, DISC_SIDES, endpoint=False)
-        radius = shapes.rotor_radius_m(airframe)
+        radius = shape.blade_radius_m
         disc = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(DISC_SIDES, -0.03)])
-        self._discs = (hubs[:, None] + disc).reshape(-1, 3)
+        self._discs = (shape.hubs[:, None] + disc).reshape(-1, 3)
 
     def draw(self, image: Image, eye: Eye, row: Any, place: Floats, q_ned_from_rdf: Quat) -> None:
         """Draws it as it is at a recorded moment, into the image that the eye takes from `place` [m]."""
@@ -55,7 +55,7 @@ class VehicleModel:
         veiled = drawn.copy()
         for disc in pixels[count:].reshape(-1, DISC_SIDES, 2):
             cv2.fillPoly(veiled, [disc], DISC_RGB, cv2.LINE_AA)
-        cv2.addWeighted(veiled, ROTOR_OPACITY, drawn, 1.0 - ROTOR_OPACITY, 0.0, dst=drawn)
+        cv2.addWeighted(veiled, DISC_OPACITY, drawn, 1.0 - DISC_OPACITY, 0.0, dst=drawn)
         is_nearer = eye.depth_m[where] > distance - NEAREST_M
         image[where][is_nearer] = drawn[is_nearer]
 

@@ -10,7 +10,7 @@ import math
 
 import warp as wp
 
-from common.airframe import Airframe
+from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import vec8
 from sim.world.world import World, ground_height, ground_normal_ned, obstacle_contact
@@ -184,7 +184,7 @@ def obstacle_force(
     return contact
 
 
-def contact_model(airframe: Airframe) -> ContactModel:
+def contact_model(airframe: MultirotorAirframe) -> ContactModel:
     """Contact constants of an airframe; stiffness follows from its mass and inertia."""
     data = airframe.contact
     mass_kg = airframe.body.mass_kg
@@ -212,6 +212,6 @@ def contact_model(airframe: Airframe) -> ContactModel:
     return model
 
 
-def resting_height_m(airframe: Airframe) -> float:
+def resting_height_m(airframe: MultirotorAirframe) -> float:
     """Height of the centre of gravity over level ground at rest, the legs' yielding included."""
     return airframe.contact.leg_z_m - GRAVITY_M_S2 / _NORMAL_RATE_RAD_S**2

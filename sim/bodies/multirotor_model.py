@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from common.airframe import Airframe
+from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import DEFAULT_HOME
 from common.kernels import vec8
 from sim.battery import BatteryModel, battery_model
@@ -42,7 +42,7 @@ class MultirotorModel:
     contact: ContactModel
 
 
-def multirotor_model(airframe: Airframe, home_alt_amsl_m: float = DEFAULT_HOME.alt_m) -> MultirotorModel:
+def multirotor_model(airframe: MultirotorAirframe, home_alt_amsl_m: float = DEFAULT_HOME.alt_m) -> MultirotorModel:
     """Constants of an airframe whose home lies home_alt_amsl_m above sea level."""
     body, rotor = airframe.body, airframe.rotor_model
     model = MultirotorModel()

@@ -88,7 +88,10 @@ SLED = VehicleClass(
     name="sled",
     law=SLED_LAW,
     parameters=PARAMETERS,
-    defaults=lambda airframe: {"BAT1_N_CELLS": airframe.battery.cells},
+    defaults=lambda airframe: {
+        "BAT1_N_CELLS": airframe.battery.cells,
+        "SLED_SPEED": airframe.runners.speed_m_s,
+    },
     modes=mode_table(
         ModeSpec(
             mode=Mode.HOLD,

@@ -1,18 +1,24 @@
 """The recipe "A vehicle class" of CONTRIBUTING.md: a sled, one line in the list, driven over MAVLink by pymavlink."""
 
 from math import nan
+from pathlib import Path
 
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 from pymavlink.mavutil import mode_mapping_byname, mode_string_v10
+from typer.testing import CliRunner
 
+import common.airframes
+from autopilot import tuning
 from autopilot.commander.failsafe import POSITION_LOST
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from common.airframe import AIRFRAME_FOLDER, AirframeError, load_airframe
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
+from mission.view import shapes
+from mission.view.vehicle_model import VehicleModel
 from sim.bodies.vehicles import VEHICLES, class_of
 from sim.world.world import WorldConfig
 from tests.recipes.sled_class import DRIVE, MAV_TYPE_GROUND_ROVER, SIMULATED_SLED
@@ -27,15 +33,15 @@ ARM, SET_MODE, TAKEOFF = (
 VELOCITY_ONLY = 0b110111000111
 
 
+SLED_AIRFRAMES = Path(__file__).parent / "airframes"
+
+
 @pytest.fixture
-def airframe(tmp_path, monkeypatch):
-    """An airframe file of the class, and its line in the list."""
+def airframe(monkeypatch):
+    """The class's line in the list, its sections of airframe files, and one such file."""
     monkeypatch.setattr("sim.bodies.vehicles.VEHICLES", [*VEHICLES, SIMULATED_SLED])
-    text = (AIRFRAME_FOLDER / "x500.toml").read_text()
-    text = text.replace("cells = { value = 4", "cells = { value = 3", 1)
-    path = tmp_path / "sled.toml"
-    path.write_text('vehicle = "sled"\n' + text)
-    return str(path)
+    monkeypatch.setattr("common.airframes.__path__", [*common.airframes.__path__, str(SLED_AIRFRAMES)])
+    return str(SLED_AIRFRAMES / "sled.toml")
 
 
 class Sled:
@@ -101,6 +107,43 @@ def test_a_class_that_is_not_in_the_list_is_told(tmp_path):
     path.write_text('vehicle = "sled"\n' + (AIRFRAME_FOLDER / "x500.toml").read_text())
     with pytest.raises(AirframeError, match="unknown class of vehicles 'sled'; known: multirotor"):
         class_of(load_airframe(str(path)))
+
+
+def test_its_airframe_file_has_the_sections_of_its_class(airframe):
+    assert load_airframe(airframe).runners.speed_m_s == 3.0
+    assert Flight(FlightConfig(airframe=airframe)).params["SLED_SPEED"] == 3.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("[runners]\nspeed_m_s", "[wheels]\nradius_m", "runners: Field required"),
+        ("[runners]", "[wheels]\n[runners]", "wheels: Extra inputs are not permitted"),
+        ("value = 3.0, source", "value = 0.0, source", "empty_cell_v: Input should be greater than 0"),
+        ('"sled"\n\n', '["sled"]\n\n', "vehicle: Input should be a valid string"),
+        ('vehicle = "sled"', "", "rotor_model: Field required"),
+    ],
+)
+def test_what_its_file_lacks_or_has_too_much_is_named_in_one_sentence(airframe, tmp_path, old, new, sentence):
+    path, text = tmp_path / "mine.toml", Path(airframe).read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(AirframeError, match=rf"^{path}: (battery\.)?{sentence}[^\n]*$"):
+        load_airframe(str(path))
+
+
+def test_its_shape_is_a_plain_box_to_who_knows_no_better(airframe):
+    shape = shapes.vehicle(load_airframe(airframe))
+    assert len(shape.body.vertices) == 2 * 24  # a hull and a nose
+    assert shape.body.vertices[:, 0].max() > -shape.body.vertices[:, 0].min()  # which shows the heading
+    assert (shape.hubs.shape, shape.spins) == ((0, 3), ())
+    VehicleModel(load_airframe(airframe))
+
+
+def test_gains_are_designed_for_multirotors_only(airframe):
+    result = CliRunner().invoke(tuning.app, ["--airframe", airframe])
+    assert result.exit_code == 2
+    assert "airframe 'sled': a sled has other gains than a multirotor" in " ".join(result.output.split())
 
 
 def test_a_sled_is_driven_over_mavlink(airframe):

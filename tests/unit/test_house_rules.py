@@ -25,14 +25,11 @@ LONG_FUNCTIONS = {
 ROTOR_WORDS = re.compile(r"rotor|collective|hover_thrust", re.IGNORECASE)
 ROTOR_FOLDERS = ("autopilot/vehicles/multirotor/", "sim/bodies/", "common/airframes/")
 SPEAK_OF_ROTORS = {
-    "common/airframe.py": "the sections of a multirotor's airframe file; every airframe file has them so far",
+    "common/airframe.py": "names the class of airframe files that name none",
     "autopilot/tuning.py": "designs the gains of the multirotor's law, and of no other",
     "autopilot/vehicles/default_class.py": "names the class of airframe files that name none",
     "mission/plan/plan_file.py": "MAVLink's name of a vehicle type, in QGroundControl's files",
     "mission/view/shapes.py": "the shape of a multirotor",
-    "mission/view/scene.py": "shows that shape, with what turns on it",
-    "mission/view/html.py": "writes that shape",
-    "mission/view/vehicle_model.py": "draws that shape",
 }
 """Files outside of the multirotor's folders that speak of rotors, and why."""
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from common.airframe import Airframe
+from common.airframes.multirotor import MultirotorAirframe
 from common.kernels import MAX_MOTORS, vec8
 
 wp.set_module_options({"enable_backward": False})
@@ -38,7 +38,7 @@ class ControlAirframe:
     left_out: int  # rotors not to be used, as bits; they stay at idle and count for nothing
 
 
-def effectiveness(airframe: Airframe) -> np.ndarray:
+def effectiveness(airframe: MultirotorAirframe) -> np.ndarray:
     """Roll, pitch, yaw torque [N m] and collective thrust [N] per newton of each rotor, shape (4, rotors).
 
     A rotor pushes along -z of frd; a rotor turning counter-clockwise seen from above (spin +1) drags the body
@@ -49,7 +49,7 @@ def effectiveness(airframe: Airframe) -> np.ndarray:
     return np.array(columns, dtype=np.float64).T
 
 
-def mixing(airframe: Airframe, left_out: Collection[int] = ()) -> np.ndarray:
+def mixing(airframe: MultirotorAirframe, left_out: Collection[int] = ()) -> np.ndarray:
     """Rotor thrusts [N] per unit of roll, pitch, yaw torque and collective thrust, shape (rotors, 4).
 
     The least-effort inverse, without the rotors `left_out`. Where the rest cannot make all four (three rotors), yaw is
@@ -67,7 +67,7 @@ def _vec8(values: np.ndarray) -> vec8:
     return vec8(*np.concatenate([values, np.zeros(MAX_MOTORS - len(values))]).astype(float).tolist())
 
 
-def control_airframe(airframe: Airframe, left_out: Collection[int] = ()) -> ControlAirframe:
+def control_airframe(airframe: MultirotorAirframe, left_out: Collection[int] = ()) -> ControlAirframe:
     """The controller's view of an airframe file, whose rotors `left_out` (from 0) have failed."""
     forward, inverse = effectiveness(airframe), mixing(airframe, left_out)
     forward[:, list(left_out)] = 0.0
@@ -90,7 +90,7 @@ def control_airframe(airframe: Airframe, left_out: Collection[int] = ()) -> Cont
     return row
 
 
-def opposite_rotor(airframe: Airframe, rotor: int) -> int:
+def opposite_rotor(airframe: MultirotorAirframe, rotor: int) -> int:
     """The rotor that is nearest to the other side of the centre: left out together, the rest stays balanced."""
     hub = airframe.rotors[rotor]
     return min(
@@ -99,7 +99,7 @@ def opposite_rotor(airframe: Airframe, rotor: int) -> int:
     )
 
 
-def rotors_leaver(rows: np.ndarray[Any, Any], airframe: Airframe) -> Callable[[Collection[int]], None]:
+def rotors_leaver(rows: np.ndarray[Any, Any], airframe: MultirotorAirframe) -> Callable[[Collection[int]], None]:
     """A function that lets the control allocation of a vehicle do without some of its rotors.
 
     Args:

@@ -2,20 +2,20 @@
 
 from math import sqrt
 
-from common.airframe import Airframe
+from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import GRAVITY_M_S2
 
 _AUTOSTART = {4: 4001, 6: 6001, 8: 8001}  # PX4's generic airframes by their number of rotors
 
 
-def hover_thrust(airframe: Airframe) -> float:
+def hover_thrust(airframe: MultirotorAirframe) -> float:
     """Share [0..1] of the maximum collective thrust that carries the vehicle, at full battery and sea level."""
     model = airframe.rotor_model
     thrust_max_n = len(airframe.rotors) * model.thrust_n_s2 * model.max_speed_rad_s**2
     return airframe.body.mass_kg * GRAVITY_M_S2 / thrust_max_n
 
 
-def airframe_defaults(airframe: Airframe) -> dict[str, int | float]:
+def airframe_defaults(airframe: MultirotorAirframe) -> dict[str, int | float]:
     """Parameters whose default is the airframe's own: battery, landing gear, and drag for the wind estimate."""
     body, rotor, battery = airframe.body, airframe.rotor_model, airframe.battery
     count = len(airframe.rotors)

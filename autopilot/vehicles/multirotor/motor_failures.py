@@ -9,7 +9,7 @@ from math import sqrt
 
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import LandedState, Severity, VehicleState
-from common.airframe import Airframe
+from common.airframes.multirotor import MultirotorAirframe
 from common.params import Parameter, ParameterTable
 
 _PERIOD_US = 100_000
@@ -55,7 +55,7 @@ class MotorWatch:
         state: VehicleState,
         params: ParameterTable,
         announcer: Announcer,
-        airframe: Airframe,
+        airframe: MultirotorAirframe,
         read_speeds: ReadSpeeds | None,
         leave_out: LeaveOut | None,
     ) -> None:

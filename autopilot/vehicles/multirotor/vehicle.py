@@ -14,7 +14,7 @@ from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from autopilot.vehicles.multirotor.motor_failures import MotorWatch
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
 from autopilot.vehicles.vehicle_class import DriveParts, MotionLimits, VehicleClass
-from common.airframe import Airframe
+from common.airframes.multirotor import MultirotorAirframe
 from common.params import ParameterTable
 
 _MAV_TYPES = {3: 15, 4: 2, 6: 13, 8: 14}  # MAV_TYPE_TRICOPTER, _QUADROTOR, _HEXAROTOR, _OCTOROTOR
@@ -22,11 +22,11 @@ _MAV_TYPE_QUADROTOR = 2
 _ARDUPILOT = ArduPilotVehicle("Copter", (4, 7, 0))  # newer than any release: no station asks for an update
 
 
-def _landing_detector(params: ParameterTable, airframe: Airframe) -> LandingDetector:
+def _landing_detector(params: ParameterTable, airframe: MultirotorAirframe) -> LandingDetector:
     return LandingDetector(params, hover_thrust(airframe), airframe.contact.leg_z_m)
 
 
-def _mav_type(airframe: Airframe) -> int:
+def _mav_type(airframe: MultirotorAirframe) -> int:
     return _MAV_TYPES.get(len(airframe.rotors), _MAV_TYPE_QUADROTOR)
 
 
@@ -51,7 +51,7 @@ def _height(state: VehicleState, _: ParameterTable) -> str:
     return "" if state.estimate.flags & HEIGHT_VALID else "estimator: no valid height"
 
 
-def _clockwise(airframe: Airframe) -> Sequence[int]:
+def _clockwise(airframe: MultirotorAirframe) -> Sequence[int]:
     angles = [atan2(rotor.y_m, rotor.x_m) % (2.0 * pi) for rotor in airframe.rotors]
     return sorted(range(len(angles)), key=lambda rotor: round(angles[rotor], 6))
 

@@ -80,8 +80,8 @@ def test_a_person_is_as_tall_as_asked_and_stands_on_the_feet():
 @pytest.mark.parametrize("name", ["x500", "f550"])
 def test_a_vehicle_has_an_arm_to_each_rotor(name):
     airframe = load_airframe(name)
-    frame = shapes.quadrotor(airframe)
+    frame = shapes.multirotor(airframe)
     for hub in shapes.hubs_frd(airframe):
         assert np.linalg.norm(frame.vertices - hub, axis=1).min() < 0.1
-    radius = shapes.rotor_radius_m(airframe)
+    radius = shapes.blade_radius_m(airframe)
     assert 0.05 < radius < 0.3
