@@ -22,6 +22,7 @@ from policies.learn.curriculum import Curriculum, RecentEpisodes
 from policies.learn.evaluate import Evaluation
 from policies.learn.export.onnx_export import ParityError, export_policy
 from policies.learn.export.policy_file import CHECKPOINT, POLICY, PolicyCard, policy_record, save_policy
+from policies.learn.export.policy_path import CheckpointError
 from policies.learn.success_target import SuccessTarget
 from policies.learn.torch_threads import few_threads
 from policies.learn.training_curves import EventFile, Period
@@ -295,7 +296,13 @@ class Training:
         """Goes on where the checkpoint was taken."""
         self.task.layout.require(Layout.from_record(content["policy"]["layout"]), str(path))
         require_fit(settings_that_must_fit(self.config, self.task_settings), content["must_fit"], str(path))
-        self.learner.load_state(content["learner"])
+        try:
+            self.learner.load_state(content["learner"])
+        except (KeyError, RuntimeError, ValueError) as error:  # rows or buffers that this version has otherwise
+            raise CheckpointError(
+                f"{path}: the state of its task was saved by another version of honeyguide; "
+                f"--initialize-from goes on with its networks"
+            ) from error
         self.curriculum.load_state(content["curriculum"])
         self._set_params()  # the configuration may have other ones than those the task was saved with
         self.period.load_state(content["period"])

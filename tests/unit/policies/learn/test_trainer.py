@@ -5,9 +5,9 @@ import json
 import pytest
 import torch
 
-from policies.learn.checkpoint import checkpoints, load
+from policies.learn.checkpoint import checkpoints, load, save
 from policies.learn.config.run import RunConfig
-from policies.learn.export.policy_file import load_policy
+from policies.learn.export.policy_file import CHECKPOINT, load_policy
 from policies.learn.export.policy_path import CheckpointError
 from policies.learn.trainer import Training, train
 
@@ -200,6 +200,20 @@ def test_networks_that_do_not_fit_are_refused_with_the_first_difference(tmp_path
         Training(config(tmp_path, "ppo with memory", initialize_from="run", run_id="next"), StopAfter())
     with pytest.raises(CheckpointError, match="trainer_type is ppo there and sac here"):
         Training(config(tmp_path, "sac", initialize_from="run", run_id="next"), StopAfter())
+
+
+@pytest.mark.parametrize("change", ["without a row", "of another size"])
+def test_a_state_that_another_version_saved_otherwise_is_refused_in_one_sentence(tmp_path, change):
+    train(config(tmp_path), StopAfter(1))
+    path = checkpoints(tmp_path / "run" / "B", "B")[-1]
+    content = load(path, CHECKPOINT)
+    rows = content["learner"]["task"]
+    rows["target"] = rows["target"][:3]
+    if change == "without a row":
+        del rows["target"]
+    save(path, content, CHECKPOINT)
+    with pytest.raises(CheckpointError, match="another version of honeyguide; --initialize-from"):
+        Training(config(tmp_path, resume=True), StopAfter())
 
 
 def test_policy_starts_alone_where_the_critic_has_other_signals(tmp_path):
