@@ -114,6 +114,8 @@ def assign_rows(array: Any, rows: np.ndarray[Any, Any]) -> None:
         dtype = np.dtype(array.dtype.numpy_dtype())
         if _types(dtype) == _types(rows.dtype):
             rows = rows.view(dtype)
+    if rows.shape[: array.ndim] != array.shape:
+        raise RuntimeError(f"there are rows of shape {rows.shape}, here of shape {array.shape}")
     array.assign(rows)
 
 
