@@ -5,7 +5,6 @@ from pathlib import Path
 
 from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
-from autopilot.mavlink.dialects.ardupilot_aliases import CONSTANTS
 from autopilot.params import parameter_sections, parameter_table
 from common.airframe import load_airframe
 from common.params import Parameter
@@ -82,7 +81,7 @@ def generated_pages() -> dict[Path, str]:
 def _alias_table() -> str:
     rows = ["| name | stands for | in units of | value |", "|---|---|---|---|"]
     lines = {}
-    for constant in CONSTANTS:
+    for constant in ARDUPILOT.constants:
         lines[constant.name] = f"| {constant.name} | | | {constant.value:g}: {constant.meaning} |"
     known = parameter_table().declarations
     for alias in ARDUPILOT.aliases:

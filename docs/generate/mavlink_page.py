@@ -8,9 +8,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as definitions
 
+from autopilot.interface.ardupilot_vehicle import Alias
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.components.component import Component
-from autopilot.mavlink.dialects import Alias, Dialect
+from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.server import MavlinkServer

@@ -5,7 +5,7 @@ Its body and its control law are those of tests/unit/sim/sled.py. Here is what t
 
 from math import cos, degrees, hypot, sin
 
-from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
+from autopilot.interface.ardupilot_vehicle import Alias, ArduPilotVehicle
 from autopilot.interface.client_requests import GoTo, OffboardSetpoint
 from autopilot.interface.failsafe_action import Action
 from autopilot.interface.mode_spec import (
@@ -28,6 +28,7 @@ from sim.bodies.vehicles import SimulatedClass
 from tests.unit.sim.sled import SLED_BODY, SLED_LAW, SLED_PARAMETERS
 
 MAV_TYPE_GROUND_ROVER = 10
+MAV_PARAM_TYPE_REAL32 = 9
 DRIVE = further_mode(100, "DRIVE")
 PARAMETERS = (
     *SLED_PARAMETERS,
@@ -84,6 +85,7 @@ def stands_level(state, params):
     return f"the slope of {slope_deg:.0f} degrees is too steep" if slope_deg > params["SLED_SLOPE"] else ""
 
 
+ROVER = ArduPilotVehicle("Rover", (4, 6, 3), aliases=(Alias("CRUISE_SPEED", "SLED_SPEED", MAV_PARAM_TYPE_REAL32),))
 SLED = VehicleClass(
     name="sled",
     law=SLED_LAW,
@@ -144,7 +146,9 @@ SLED = VehicleClass(
         yaw_rate="SLED_YAW_RATE",
     ),
     mav_type=lambda _: MAV_TYPE_GROUND_ROVER,
-    ardupilot=ArduPilotVehicle("Rover", (4, 6, 3)),
+    ardupilot=ArduPilotVehicle(
+        "Rover", (4, 6, 3), aliases=(Alias("CRUISE_SPEED", "SLED_SPEED", MAV_PARAM_TYPE_REAL32),)
+    ),
     motors=lambda _: (0,),
     arming_checks=(stands_level,),
     standing_height_m=lambda _: 0.1,

@@ -247,6 +247,18 @@ def test_ardupilots_clients_take_it_for_a_rover(airframe):
     assert version.flight_sw_version >> 8 == 0x040603
 
 
+def test_ardupilots_clients_find_a_rovers_parameters_and_none_of_a_copters(airframe):
+    sled = Sled(airframe, dialect="ardupilot")
+    sled.send(mavlink.MAVLink_param_set_message(1, 1, b"CRUISE_SPEED", 1.5, mavlink.MAV_PARAM_TYPE_REAL32))
+    sled.run(0.1)
+    assert sled.flight.params["SLED_SPEED"] == 1.5
+    sled.send(mavlink.MAVLink_param_request_list_message(1, 1))
+    sled.run(60.0)
+    names = {each.param_id for each in sled.heard("PARAM_VALUE")}
+    assert {"CRUISE_SPEED", "SLED_SPEED", "FENCE_ENABLE"} <= names
+    assert not [name for name in names if name.startswith(("ATC_RAT", "ATC_ACCEL", "MOT_SPIN", "MC_PITCH"))]
+
+
 @pytest.mark.parametrize("dialect", ["px4", "ardupilot"])
 def test_no_command_of_a_multirotors_stops_the_drive(airframe, dialect):
     sled = Sled(airframe, dialect)

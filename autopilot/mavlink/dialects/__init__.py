@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, Self
 
-from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
+from autopilot.interface.ardupilot_vehicle import Alias, ArduPilotVehicle, Constant
 from autopilot.interface.mode_spec import DialectMode, ModeSpec, ModeTable
 from autopilot.interface.vehicle_state import Mode
 from common.params import Parameter
@@ -59,39 +59,6 @@ class ModeNumbers:
     def numbers(self) -> Sequence[int]:
         """Those that clients may ask for."""
         return list(self._modes)
-
-
-@dataclass(frozen=True, slots=True)
-class Alias:
-    """A parameter of ours under the name and in the unit of another autopilot."""
-
-    name: str
-    of: str  # our name
-    param_type: int  # MAV_PARAM_TYPE
-    scale: float = 1.0  # our unit to theirs
-    numbers: Mapping[int, int] | None = None  # where the meaning is a number: ours to theirs
-
-    def shown(self, value: float) -> float:
-        """Our value as clients see it; a number of ours that they do not have becomes their lowest."""
-        if self.numbers is not None:
-            return self.numbers.get(round(value), min(self.numbers.values()))
-        return value * self.scale
-
-    def ours(self, shown: float) -> float | None:
-        """A client's value as we keep it; None: there is nothing of ours that means this."""
-        if self.numbers is None:
-            return shown / self.scale
-        return next((ours for ours, theirs in self.numbers.items() if theirs == shown), None)
-
-
-@dataclass(frozen=True, slots=True)
-class Constant:
-    """A name that clients look for and that has no meaning here: it can be read, and setting it changes nothing."""
-
-    name: str
-    value: int | float
-    param_type: int  # MAV_PARAM_TYPE
-    meaning: str
 
 
 class Dialect(Protocol):

@@ -6,10 +6,10 @@ from typing import Self
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
+from autopilot.interface.ardupilot_vehicle import Alias, ArduPilotVehicle, Constant
 from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import Mode
-from autopilot.mavlink.dialects import Alias, Constant, ModeNumbers, ModeRow, UnknownModeError
+from autopilot.mavlink.dialects import ModeNumbers, ModeRow, UnknownModeError
 from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS, switch_aliases
 from autopilot.vehicles.default_class import DEFAULT_CLASS
 from common.params import Parameter
@@ -35,7 +35,6 @@ class ArduPilotDialect:
         mavlink.MAV_CMD_DO_SET_ROI_LOCATION: _RELATIVE,
     }
     amsl_commands: frozenset[int] = frozenset({mavlink.MAV_CMD_DO_ORBIT})  # a command of PX4's: see there
-    constants: Sequence[Constant] = CONSTANTS
 
     def __init__(self, modes: ModeTable, vehicle: ArduPilotVehicle) -> None:
         self.mode_table = modes
@@ -44,8 +43,9 @@ class ArduPilotDialect:
         major, minor, patch = vehicle.version
         self.flight_sw_version = major << 24 | minor << 16 | patch << 8 | mavlink.FIRMWARE_VERSION_TYPE_DEV
         self._numbers = ModeNumbers(modes, lambda spec: spec.ardupilot)
+        self.constants: Sequence[Constant] = sorted((*CONSTANTS, *vehicle.constants), key=lambda each: each.name)
         self.modes: Sequence[ModeRow] = sorted(self._numbers.rows, key=lambda row: self._numbers.number_of(row.mode))
-        self.aliases: Sequence[Alias] = (*ALIASES, *switch_aliases(modes))
+        self.aliases: Sequence[Alias] = (*ALIASES, *switch_aliases(modes), *vehicle.aliases)
 
     def of_vehicle(self, modes: ModeTable, ardupilot: ArduPilotVehicle) -> Self:
         is_same = modes is self.mode_table and ardupilot == self._vehicle

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.ardupilot_only_params import STREAM_GROUPS
+from autopilot.interface.ardupilot_vehicle import Alias, Constant
 from autopilot.interface.mode_spec import DialectMode, ModeTable
 from autopilot.interface.vehicle_state import Mode
-from autopilot.mavlink.dialects import Alias, Constant
 
 INT8 = mavlink.MAV_PARAM_TYPE_INT8
 INT16 = mavlink.MAV_PARAM_TYPE_INT16
@@ -113,7 +113,7 @@ ALIASES: tuple[Alias, ...] = (
 
 
 def switch_aliases(modes: ModeTable) -> Sequence[Alias]:
-    """The modes of a switch: PX4's COM_FLTMODE numbers to ArduPilot's mode numbers."""
+    """The modes of a switch: PX4's COM_FLTMODE numbers to ArduPilot's mode numbers; none for a vehicle without any."""
     numbers = {
         spec.switch: spec.ardupilot.number
         for spec in modes.values()
@@ -122,32 +122,17 @@ def switch_aliases(modes: ModeTable) -> Sequence[Alias]:
     offboard, guided = modes.get(Mode.OFFBOARD), modes.get(Mode.GUIDED)
     if offboard and offboard.switch is not None and guided and isinstance(guided.ardupilot, DialectMode):
         numbers[offboard.switch] = guided.ardupilot.number  # no number of a switch means Guided
+    if not numbers:
+        return []
     numbers = dict(sorted(numbers.items(), key=lambda item: item[1]))
     return [Alias(f"FLTMODE{i}", f"COM_FLTMODE{i}", INT8, numbers=numbers) for i in range(1, 7)]
 
 
 _AXES = "XYZ"
-_RATE_LOOP = "ArduPilot's default; the rate loop's own gains are MC_RPRATE_*_ACC and MC_YAWRATE_*_ACC"
-_CURVE = "ArduPilot's default; the airframe file has the motors' curve"
-_ACCEL = "ArduPilot's default; the motors limit the angular acceleration"
-_NO_LIMIT = "not limited: the control allocation knows the voltage"
 CONSTANTS: tuple[Constant, ...] = (
     Constant("AHRS_EKF_TYPE", 3, INT8, "the estimator, of which there is one"),
     Constant("ARMING_CHECK", 1, INT32, "all checks; they cannot be switched off"),
     Constant("ARMING_REQUIRE", 1, INT8, "it must be armed before the motors turn"),
-    Constant("ATC_ACCEL_P_MAX", 110_000.0, REAL32, _ACCEL),
-    Constant("ATC_ACCEL_R_MAX", 110_000.0, REAL32, _ACCEL),
-    Constant("ATC_ACCEL_Y_MAX", 27_000.0, REAL32, _ACCEL),
-    Constant("ATC_INPUT_TC", 0.15, REAL32, "ArduPilot's default; see MPC_MAN_Y_TAU"),
-    *(
-        Constant(f"ATC_RAT_{axis}_{gain}", value, REAL32, _RATE_LOOP)
-        for axis, values in (
-            ("RLL", (0.135, 0.135, 0.0036)),
-            ("PIT", (0.135, 0.135, 0.0036)),
-            ("YAW", (0.18, 0.018, 0.0)),
-        )
-        for gain, value in zip("PID", values, strict=True)
-    ),
     Constant("AVOID_ENABLE", 7, INT8, "fence and distances are kept to; see GF_ACTION and CP_DIST"),
     Constant("BATT_ARM_VOLT", 0.0, REAL32, "no voltage forbids arming; see BAT_LOW_THR"),
     Constant("BATT_CRT_MAH", 0.0, REAL32, "see BAT_CRIT_THR, a share of the capacity"),
@@ -178,7 +163,6 @@ CONSTANTS: tuple[Constant, ...] = (
     Constant("FOLL_POS_P", 0.1, REAL32, "see FLW_TGT_RS"),
     Constant("FOLL_SYSID", 0, INT16, "any target"),
     Constant("FOLL_YAW_BEHAVE", 1, INT8, "faces the target"),
-    Constant("FRAME_TYPE", 1, INT8, "as an X"),
     Constant("FS_DR_ENABLE", 0, INT8, "dead reckoning is told; see COM_POS_LOST_ACT"),
     Constant("FS_EKF_THRESH", 0.8, REAL32, "ArduPilot's default; the estimator fails by resets, see COM_EST_FAIL_ACT"),
     Constant("FS_OPTIONS", 0, INT32, "no exceptions; see COM_DLL_EXCEPT and COM_RCL_EXCEPT"),
@@ -187,20 +171,10 @@ CONSTANTS: tuple[Constant, ...] = (
     Constant("GPS_TYPE", 1, INT8, "a GNSS receiver"),
     *(Constant(f"INS_ACCOFFS_{axis}", 0.001, REAL32, "calibrated") for axis in _AXES),
     *(Constant(f"INS_ACCSCAL_{axis}", 1.0, REAL32, "calibrated") for axis in _AXES),
-    Constant("LAND_SPEED_HIGH", 0, INT16, "as WPNAV_SPEED_DN"),
     Constant("LOG_BACKEND_TYPE", 1, INT8, "files, in PX4's format"),
     Constant("LOG_BITMASK", 180_222, INT32, "everything is logged"),
     Constant("LOG_FILE_DSRMROT", 0, INT8, "see SDLOG_MODE"),
     Constant("LOG_REPLAY", 1, INT8, "logs hold what `honeyguide estimate` needs"),
-    Constant("MOT_BAT_VOLT_MAX", 0.0, REAL32, _NO_LIMIT),
-    Constant("MOT_BAT_VOLT_MIN", 0.0, REAL32, _NO_LIMIT),
-    Constant("MOT_PWM_MAX", 2000, INT16, "pulse of a motor at full command"),
-    Constant("MOT_PWM_MIN", 1000, INT16, "pulse of a motor that stands"),
-    Constant("MOT_SPIN_ARM", 0.1, REAL32, _CURVE),
-    Constant("MOT_SPIN_MAX", 0.95, REAL32, _CURVE),
-    Constant("MOT_SPIN_MIN", 0.15, REAL32, _CURVE),
-    Constant("MOT_THST_EXPO", 0.65, REAL32, _CURVE),
-    Constant("MOT_HOVER_LEARN", 0, INT8, "the hover thrust is not learned"),
     Constant("RNGFND1_TYPE", 10, INT8, "a range finder that looks down"),
     Constant("SCHED_LOOP_RATE", 250, INT16, "rate of the control loops"),
     Constant("SERIAL0_BAUD", 115, INT32, "links have no baud rate"),
@@ -212,13 +186,11 @@ CONSTANTS: tuple[Constant, ...] = (
         for i in range(1, 17)
         for name, value in (("MIN", 1000), ("MAX", 2000), ("TRIM", 1500))
     ),
-    Constant("SIMPLE", 0, INT8, "no simple mode"),
     *(Constant(f"SR{i}_ADSB", 1, INT16, "aircraft are told when they are heard") for i in (0, 1)),
     *(Constant(f"SR{i}_PARAMS", 50, INT16, "20 parameters per frame") for i in (0, 1)),
     Constant("STAT_FLTTIME", 0, INT32, "flight time is not counted from one start to the next"),
     Constant("STAT_BOOTCNT", 1, INT16, "starts are not counted"),
     Constant("STAT_RUNTIME", 0, INT32, "running time is not counted from one start to the next"),
-    Constant("SUPER_SIMPLE", 0, INT8, "no simple mode"),
     Constant("TERRAIN_ENABLE", 0, INT8, "no terrain tiles: the range finder measures the ground"),
     Constant("SYSID_MYGCS", 255, INT16, "any ground station may fly it"),
 )

@@ -8,10 +8,10 @@ from typing import Self
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
+from autopilot.interface.ardupilot_vehicle import Alias, ArduPilotVehicle, Constant
 from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_state import Mode
-from autopilot.mavlink.dialects import Alias, Constant, ModeNumbers, ModeRow, UnknownModeError
+from autopilot.mavlink.dialects import ModeNumbers, ModeRow, UnknownModeError
 from autopilot.vehicles.default_class import DEFAULT_CLASS
 from common.params import Parameter
 

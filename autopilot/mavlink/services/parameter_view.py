@@ -6,7 +6,8 @@ say. Values are the clients' own: in their unit, under their name. Our own names
 
 from collections.abc import Callable
 
-from autopilot.mavlink.dialects import Alias, Constant, Dialect
+from autopilot.interface.ardupilot_vehicle import Alias, Constant
+from autopilot.mavlink.dialects import Dialect
 from common.params import Parameter, ParameterTable
 
 _INTEGER_BOUNDS = {2: 127, 4: 32_767, 6: 2_147_483_647}  # by MAV_PARAM_TYPE

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from math import atan2, pi
 
-from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
 from autopilot.interface.vehicle_state import Mode, VehicleState
 from autopilot.ports import HEIGHT_VALID
+from autopilot.vehicles.multirotor.ardupilot import COPTER
 from autopilot.vehicles.multirotor.control_airframe import rotors_leaver
 from autopilot.vehicles.multirotor.defaults import airframe_defaults, hover_thrust
 from autopilot.vehicles.multirotor.landing_detector import LandingDetector
@@ -19,7 +19,6 @@ from common.params import ParameterTable
 
 _MAV_TYPES = {3: 15, 4: 2, 6: 13, 8: 14}  # MAV_TYPE_TRICOPTER, _QUADROTOR, _HEXAROTOR, _OCTOROTOR
 _MAV_TYPE_QUADROTOR = 2
-_ARDUPILOT = ArduPilotVehicle("Copter", (4, 7, 0))  # newer than any release: no station asks for an update
 
 
 def _landing_detector(params: ParameterTable, airframe: MultirotorAirframe) -> LandingDetector:
@@ -71,7 +70,7 @@ MULTIROTOR = VehicleClass(
     last_resort=Mode.LAND,
     limits=_LIMITS,
     mav_type=_mav_type,
-    ardupilot=_ARDUPILOT,
+    ardupilot=COPTER,
     motors=_clockwise,
     standing_height_m=lambda airframe: airframe.contact.leg_z_m,
     ground_detector=_landing_detector,

@@ -4,7 +4,6 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
-from autopilot.mavlink.dialects.ardupilot_aliases import CONSTANTS
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.services.parameter_view import ParameterView
 from autopilot.params import parameter_table
@@ -70,9 +69,9 @@ def test_every_alias_stands_for_a_parameter_and_has_no_other_meaning():
     airframe = load_airframe("x500")
     table = flight_parameters(FlightConfig(dialect="ardupilot"), airframe)
     assert [alias.name for alias in ARDUPILOT.aliases if alias.of not in table or alias.name in table] == []
-    names = [alias.name for alias in ARDUPILOT.aliases] + [constant.name for constant in CONSTANTS]
+    names = [alias.name for alias in ARDUPILOT.aliases] + [constant.name for constant in ARDUPILOT.constants]
     assert len(set(names)) == len(names)
-    assert [constant.name for constant in CONSTANTS if constant.name in table] == []
+    assert [constant.name for constant in ARDUPILOT.constants if constant.name in table] == []
 
 
 def test_stations_find_nothing_to_complain_about():
