@@ -21,6 +21,7 @@ from common.files import write_whole
 from common.geodesy import GeoPoint, geodetic_from_ned
 from common.params import ParameterError, ParameterTable
 from common.ulog import UlogWriter
+from mission.console.option_checks import UserError, parameter_of
 from mission.console.terminal import print_line
 from mission.estimate.estimate_difference import Difference
 from mission.estimate.estimate_noise import FoundNoise, found_noise
@@ -149,11 +150,10 @@ def run_log(
 
 
 def _parameter(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
     try:
-        return name.strip(), float(value)
-    except ValueError as error:
-        raise EstimateError(f"--param {text}: must be NAME=VALUE, with a number") from error
+        return parameter_of(text)
+    except UserError as error:
+        raise EstimateError(str(error)) from error
 
 
 def _check_folder(folder: Path) -> None:

@@ -4,14 +4,25 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot.interface.platform import Host
+from autopilot.interface.vehicle_state import Verdict
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.payload.camera.ports import RawFrame, View
 from autopilot.payload.camera.storage import MediaFolder
 from tests.unit.autopilot.mavlink.rig import FRAME_US, AskedVehicle, Rig
 
 CAMERA, GIMBAL = 100, 154
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = (
+    Verdict.ACCEPTED,
+    Verdict.TEMPORARILY_REJECTED,
+    Verdict.DENIED,
+    Verdict.UNSUPPORTED,
+    Verdict.FAILED,
+)
+REQUEST, START, STOP = 512, mavlink.MAV_CMD_IMAGE_START_CAPTURE, mavlink.MAV_CMD_IMAGE_STOP_CAPTURE
+INFORMATION, SETTINGS_ID, STORAGE, STATUS, CAPTURED = 259, 260, 261, 262, 263
 
 
 @dataclass

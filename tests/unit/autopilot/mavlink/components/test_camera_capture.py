@@ -7,31 +7,25 @@ import cv2
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.interface.vehicle_state import Verdict
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from tests.unit.autopilot.mavlink.components.payload_rig import (
+    ACCEPTED,
     CAMERA,
+    CAPTURED,
+    DENIED,
+    FAILED,
+    REJECTED,
+    REQUEST,
+    START,
+    STATUS,
+    STOP,
+    STORAGE,
+    UNSUPPORTED,
     PayloadRig,
-    Stream,
     from_camera,
     requested,
 )
 from tests.unit.autopilot.mavlink.rig import texts
-
-ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = (
-    Verdict.ACCEPTED,
-    Verdict.TEMPORARILY_REJECTED,
-    Verdict.DENIED,
-    Verdict.UNSUPPORTED,
-    Verdict.FAILED,
-)
-REQUEST, START, STOP = 512, mavlink.MAV_CMD_IMAGE_START_CAPTURE, mavlink.MAV_CMD_IMAGE_STOP_CAPTURE
-INFORMATION, SETTINGS_ID, STORAGE, STATUS, CAPTURED = 259, 260, 261, 262, 263
-
-
-@pytest.fixture
-def rig(tmp_path):
-    return PayloadRig(tmp_path / "media", Stream())
 
 
 def test_photo_is_a_jpeg_file_and_is_reported_with_its_place(rig, tmp_path):

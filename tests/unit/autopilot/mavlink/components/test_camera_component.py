@@ -7,7 +7,6 @@ from xml.etree import ElementTree as ET
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.interface.vehicle_state import Verdict
 from autopilot.mavlink.components.camera.camera_definition import definition_xml
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
@@ -15,8 +14,16 @@ from autopilot.mavlink.server import MavlinkServer
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.payload.camera.camera_settings import SETTINGS
 from tests.unit.autopilot.mavlink.components.payload_rig import (
+    ACCEPTED,
     CAMERA,
+    DENIED,
     GIMBAL,
+    INFORMATION,
+    REQUEST,
+    SETTINGS_ID,
+    START,
+    STATUS,
+    UNSUPPORTED,
     PayloadRig,
     PayloadVehicle,
     Stream,
@@ -24,21 +31,6 @@ from tests.unit.autopilot.mavlink.components.payload_rig import (
     requested,
 )
 from tests.unit.autopilot.mavlink.rig import Client
-
-ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = (
-    Verdict.ACCEPTED,
-    Verdict.TEMPORARILY_REJECTED,
-    Verdict.DENIED,
-    Verdict.UNSUPPORTED,
-    Verdict.FAILED,
-)
-REQUEST, START, STOP = 512, mavlink.MAV_CMD_IMAGE_START_CAPTURE, mavlink.MAV_CMD_IMAGE_STOP_CAPTURE
-INFORMATION, SETTINGS_ID, STORAGE, STATUS, CAPTURED = 259, 260, 261, 262, 263
-
-
-@pytest.fixture
-def rig(tmp_path):
-    return PayloadRig(tmp_path / "media", Stream())
 
 
 def test_each_component_has_a_heartbeat_of_its_own_once_a_second(rig):
