@@ -228,7 +228,10 @@ def main():
         parser.error(f"{asked.folder if asked.python.exists() else asked.python}: there is none")
     kept = Path(mkdtemp(prefix="examples-"))
     copies = shutil.copytree(asked.folder, kept / "examples")  # they write beside themselves
-    scripts = {path.stem: path for path in sorted(copies.rglob("*.py")) if not asked.only or path.stem in asked.only}
+    only = {name.removesuffix(".py") for name in asked.only}
+    scripts = {path.stem: path for path in sorted(copies.rglob("*.py")) if not only or path.stem in only}
+    if missing := sorted(only - scripts.keys()):
+        parser.error(f"{asked.folder} has no example {missing[0]}")
     console, table = Console(), Table("example", "verdict", "highest [m]", "took [s]")
     faults = 0
     for name, script in scripts.items():
