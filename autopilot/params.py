@@ -70,7 +70,7 @@ def parameter_sections(vehicle: VehicleClass = DEFAULT_CLASS) -> dict[str, Seque
     """Every declaration of the flight controller of a class of vehicles, by the headings of the page of parameters."""
     return {
         "Estimator": ESTIMATOR_PARAMETERS,
-        "Control": vehicle.parameters,
+        "Control and flight modes": vehicle.parameters,
         "Arming, landing detection, failsafes": COMMANDER_PARAMETERS,
         "Take-off, missions, return, landing": NAVIGATOR_PARAMETERS,
         "The pilot's sticks": STICK_PARAMETERS,

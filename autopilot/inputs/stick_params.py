@@ -1,4 +1,4 @@
-"""Parameters of the pilot's sticks: who may send them, how channels are read, what a deflection asks for."""
+"""Parameters of the pilot's sticks: who may send them, how channels are read."""
 
 from autopilot.inputs.sticks import CALIBRATED, CHANNELS
 from common.params import Parameter
@@ -47,25 +47,6 @@ STICK_PARAMETERS: list[Parameter] = [
               "1: throttle down and yaw right for COM_RC_ARM_HYST arms, yaw left disarms", _PX4),
     Parameter("COM_RC_ARM_HYST", 1000, 100, 1500, "ms", "time for which the arming gesture is held", _PX4),
     Parameter("MAN_DEADZONE", 0.1, 0.0, 1.0, "", "dead zone around the middle of each stick", _PX4),
-    Parameter("MPC_VEL_MANUAL", 10.0, 3.0, 20.0, "m/s", "speed at full stick in Position", _PX4),
-    Parameter("MPC_VEL_MAN_BACK", -1.0, -1.0, 20.0, "m/s", "the same backwards, negative: as forward", _PX4),
-    Parameter("MPC_VEL_MAN_SIDE", -1.0, -1.0, 20.0, "m/s", "the same sideways, negative: as forward", _PX4),
-    Parameter("MPC_MAN_Y_MAX", 150.0, 0.0, 400.0, "deg/s", "yaw rate at full stick", _PX4),
-    Parameter("MPC_MAN_TILT_MAX", 35.0, 1.0, 70.0, "deg", "lean at full stick in Altitude and Stabilized", _PX4),
-    Parameter("MPC_XY_MAN_EXPO", 0.6, 0.0, 1.0, "", "curve of roll and pitch stick in Position, 0: straight", _PX4),
-    Parameter("MPC_Z_MAN_EXPO", 0.6, 0.0, 1.0, "", "curve of the throttle stick to climb rate", _PX4),
-    Parameter("MPC_YAW_EXPO", 0.6, 0.0, 1.0, "", "curve of the yaw stick to yaw rate", _PX4),
-    Parameter("MPC_THR_CURVE", 0, 0, 1, "",
-              "throttle stick in Stabilized and Acro: 0 hover thrust in the middle, 1 straight", _PX4),
-    Parameter("MPC_THR_HOVER", 0.5, 0.1, 0.8, "norm", "thrust that carries the vehicle", _PX4),
-    Parameter("MPC_MANTHR_MIN", 0.08, 0.0, 1.0, "norm", "thrust at throttle down in Stabilized", _PX4),
-    Parameter("MC_ACRO_R_MAX", 100.0, 0.0, 1800.0, "deg/s", "roll rate at full stick in Acro", _PX4),
-    Parameter("MC_ACRO_P_MAX", 100.0, 0.0, 1800.0, "deg/s", "pitch rate at full stick in Acro", _PX4),
-    Parameter("MC_ACRO_Y_MAX", 100.0, 0.0, 1800.0, "deg/s", "yaw rate at full stick in Acro", _PX4),
-    Parameter("MC_ACRO_EXPO", 0.0, 0.0, 1.0, "", "curve of roll and pitch stick in Acro", _PX4),
-    Parameter("MC_ACRO_EXPO_Y", 0.0, 0.0, 1.0, "", "curve of the yaw stick in Acro", _PX4),
-    Parameter("MC_ACRO_SUPEXPO", 0.0, 0.0, 0.95, "", "steepness at the ends of that curve, roll and pitch", _PX4),
-    Parameter("MC_ACRO_SUPEXPOY", 0.0, 0.0, 0.95, "", "steepness at the ends of that curve, yaw", _PX4),
     Parameter("RC_MAP_ROLL", 1, 0, CHANNELS, "", "channel of the roll stick, 0: none", _USUAL),
     Parameter("RC_MAP_PITCH", 2, 0, CHANNELS, "", "channel of the pitch stick, 0: none", _USUAL),
     Parameter("RC_MAP_THROTTLE", 3, 0, CHANNELS, "", "channel of the throttle stick, 0: none", _USUAL),

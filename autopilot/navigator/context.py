@@ -9,7 +9,7 @@ from autopilot.interface.vehicle_state import LandedState, Mode, VehicleState
 from autopilot.navigator.heading import Heading
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import HEIGHT_VALID, TERRAIN_VALID
-from autopilot.vehicles.vehicle_class import Craft
+from autopilot.vehicles.vehicle_class import Craft, LandingLimits
 from common.geodesy import geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
 
@@ -65,7 +65,7 @@ class NavContext:
         self.descend_speed = nan
         self.leg_yaw = nan  # [rad] of the mission leg being flown
         self._numbers = {name: float(params[name]) for name in params}
-        self.yaw_mode = int(params["MPC_YAW_MODE"])
+        self.yaw_mode = self._yaw_mode()
         self.heading = Heading(self)
         params.on_change(self._on_parameter)
 
@@ -76,6 +76,14 @@ class NavContext:
     @property
     def is_on_ground(self) -> bool:
         return self.state.landed_state is LandedState.ON_GROUND
+
+    @property
+    def landing(self) -> LandingLimits:
+        """Names of the parameters of take-offs and landings; not for a vehicle that never leaves the ground."""
+        limits = self.craft.landing
+        if limits is None:
+            raise LookupError("a vehicle that never leaves the ground has no limits of landing")
+        return limits
 
     @property
     def has_height(self) -> bool:
@@ -179,7 +187,11 @@ class NavContext:
 
     def _on_parameter(self, parameter: Parameter) -> None:
         self._numbers[parameter.name] = float(self.params[parameter.name])
-        self.yaw_mode = int(self._numbers["MPC_YAW_MODE"])
+        self.yaw_mode = self._yaw_mode()
+
+    def _yaw_mode(self) -> int:
+        name = self.craft.yaw_mode
+        return int(self._numbers[name]) if name else 0
 
 
 def distance(a: Vector, b: Vector) -> float:

@@ -1,6 +1,6 @@
 """Heading on the way: towards the next position, home or away from it, at a region of interest, or as turned to.
 
-In: what mission items, clients and MPC_YAW_MODE ask for. Out: the yaw of the setpoint, after the mode has written it.
+In: what mission items, clients and the yaw mode ask for. Out: the yaw of the setpoint, after the mode has written it.
 Whatever has to do with the payload's own aim is not here.
 """
 
@@ -23,7 +23,7 @@ _TURNED_RAD = radians(2.0)  # as ArduPilot judges CONDITION_YAW
 
 
 class YawMode(IntEnum):
-    """Numbered as MPC_YAW_MODE."""
+    """Where the nose points on mission legs: a class's parameter `yaw_mode`, numbered as PX4's copters do."""
 
     TOWARDS_WAYPOINT = 0
     TOWARDS_HOME = 1
@@ -39,7 +39,7 @@ class FlownLeg(Protocol):
     setpoint: SetpointPort
     is_landing: bool
     leg_yaw: float  # [rad] of the mission leg being flown
-    yaw_mode: int  # MPC_YAW_MODE
+    yaw_mode: int  # YawMode
 
     @property
     def craft(self) -> Craft: ...
@@ -87,7 +87,7 @@ class Heading:
 
         Args:
             angle_deg: heading, or angle to turn by.
-            rate_deg_s: how fast; 0 or NaN: MPC_YAWRAUTO_MAX.
+            rate_deg_s: how fast; 0 or NaN: the class's `limits.yaw_rate`.
             direction: 1 clockwise, -1 counter-clockwise, 0 or NaN the short way (relative: clockwise).
             is_relative: whether it is an angle to turn by.
         """

@@ -88,6 +88,18 @@ class MotionLimits:
     yaw_rate: str  # [deg/s] of a turn that names none
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LandingLimits:
+    """Names of the parameters by which a class of vehicles leaves the ground and comes back to it."""
+
+    takeoff_speed: str  # [m/s]
+    land_speed: str  # [m/s] low over the ground
+    crawl_speed: str  # [m/s] just above the ground, where its height is measured
+    slowing_height: str  # [m] above ground, from which a descent slows down
+    slow_height: str  # [m] at which it has slowed down to `land_speed`
+    crawl_height: str  # [m] from which it crawls
+
+
 @dataclass(frozen=True, slots=True)
 class Craft:
     """What the navigator knows of the vehicle itself."""
@@ -95,7 +107,8 @@ class Craft:
     lift_thrust: float  # [0..1] that carries it; 0 where the ground does
     standing_height_m: float  # of its centre over level ground
     limits: MotionLimits
-    leaves_ground: bool
+    landing: LandingLimits | None  # None: it never leaves the ground
+    yaw_mode: str  # parameter, empty if the class has none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,6 +136,10 @@ class VehicleClass:
     """Of the vehicle's centre over level ground."""
     ground_detector: Callable[[ParameterTable, Any], GroundDetector] | None = None
     """None: it never leaves the ground."""
+    landing: LandingLimits | None = None
+    """None as well."""
+    yaw_mode: str = ""
+    """Parameter that says where the nose points on mission legs (autopilot.navigator.heading); empty: along the leg."""
     lift_thrust: Callable[[Any], float] = lambda _: 0.0
     """[0..1] Thrust that carries the vehicle; 0 where the ground does."""
     arming_checks: Sequence[ArmingCheck] = ()
@@ -132,5 +149,6 @@ class VehicleClass:
 
     def craft(self, airframe: Airframe) -> Craft:
         """A vehicle of the class, as the navigator knows it."""
-        leaves_ground = self.ground_detector is not None
-        return Craft(self.lift_thrust(airframe), self.standing_height_m(airframe), self.limits, leaves_ground)
+        return Craft(
+            self.lift_thrust(airframe), self.standing_height_m(airframe), self.limits, self.landing, self.yaw_mode
+        )

@@ -31,30 +31,8 @@ _VISION_TYPES: Mapping[int, int] = {0: 0, 7: 1} | dict.fromkeys(range(1, 16), 1)
 _ESTIMATOR_ACTIONS: Mapping[int, int] = {0: 0, 3: 1}
 # Logs: while armed, or always.
 _LOG_MODES: Mapping[int, int] = {0: 0, 1: 1, 2: 1, -1: 0}
-# Functions of outputs 5 to 8: motors, where the airframe has so many.
-_SIX, _EIGHT = 6001, 8001
-# Heading on mission legs: towards the next waypoint, along the way.
-_YAW_MODES: Mapping[int, int] = {0: 1, 3: 3}
-
-# Gains from position and velocity; ArduPilot's have the same units, under its names up to 4.6 and since.
-_POSITION_GAINS: Mapping[str, str] = {
-    "POSXY_P": "XY_P", "NE_POS_P": "XY_P", "POSZ_P": "Z_P", "D_POS_P": "Z_P",
-    "VELXY_P": "XY_VEL_P_ACC", "VELXY_I": "XY_VEL_I_ACC", "VELXY_D": "XY_VEL_D_ACC",
-    "NE_VEL_P": "XY_VEL_P_ACC", "NE_VEL_I": "XY_VEL_I_ACC", "NE_VEL_D": "XY_VEL_D_ACC",
-    "VELZ_P": "Z_VEL_P_ACC", "VELZ_I": "Z_VEL_I_ACC", "VELZ_D": "Z_VEL_D_ACC",
-    "D_VEL_P": "Z_VEL_P_ACC", "D_VEL_I": "Z_VEL_I_ACC", "D_VEL_D": "Z_VEL_D_ACC",
-}  # fmt: skip
 
 ALIASES: tuple[Alias, ...] = (
-    Alias("ACRO_Y_RATE", "MC_ACRO_Y_MAX", REAL32),
-    Alias("ANGLE_MAX", "MPC_TILTMAX_AIR", INT16, 100.0),
-    Alias("ATC_RATE_P_MAX", "MC_PITCHRATE_MAX", REAL32),
-    Alias("ATC_RATE_R_MAX", "MC_ROLLRATE_MAX", REAL32),
-    Alias("ATC_RATE_Y_MAX", "MC_YAWRATE_MAX", REAL32),
-    Alias("ATC_ANG_PIT_P", "MC_PITCH_P", REAL32),
-    Alias("ATC_ANG_RLL_P", "MC_ROLL_P", REAL32),
-    Alias("ATC_ANG_YAW_P", "MC_YAW_P", REAL32),
-    Alias("ATC_SLEW_YAW", "MPC_YAWRAUTO_MAX", REAL32, 100.0),
     Alias("BATT_CAPACITY", "BAT1_CAPACITY", INT32),
     Alias("BATT_FS_CRT_ACT", "COM_LOW_BAT_ACT", INT8, numbers=_BATTERY_ACTIONS),
     Alias("CIRCLE_RADIUS", "NAV_LOITER_RAD", REAL32, CM),
@@ -67,22 +45,12 @@ ALIASES: tuple[Alias, ...] = (
     Alias("FENCE_RADIUS", "GF_MAX_HOR_DIST", REAL32),
     Alias("FENCE_TYPE", "GF_TYPES", INT8),
     Alias("FLTMODE_CH", "RC_MAP_FLTMODE", INT8),
-    Alias("FRAME_CLASS", "SYS_AUTOSTART", INT8, numbers={4001: 1, 6001: 2, 8001: 3}),
     Alias("FS_CRASH_CHECK", "CBRK_FLIGHTTERM", INT8, numbers={0: 1, 121212: 0}),
     Alias("FS_EKF_ACTION", "COM_EST_FAIL_ACT", INT8, numbers=_ESTIMATOR_ACTIONS),
     Alias("FS_GCS_ENABLE", "NAV_DLL_ACT", INT8, numbers=_STATION_ACTIONS),
     Alias("FS_GCS_TIMEOUT", "COM_DL_LOSS_T", REAL32),
     Alias("FS_THR_ENABLE", "NAV_RCL_ACT", INT8, numbers=_THROTTLE_ACTIONS),
-    Alias("LAND_SPEED", "MPC_LAND_SPEED", INT16, CM),
     Alias("LOG_DISARMED", "SDLOG_MODE", INT8, numbers=_LOG_MODES),
-    Alias("LOIT_SPEED", "MPC_XY_VEL_MAX", REAL32, CM),
-    Alias("MOT_THST_HOVER", "MPC_THR_HOVER", REAL32),
-    Alias("PILOT_SPEED_DN", "MPC_Z_VEL_MAX_DN", INT16, CM),
-    Alias("PILOT_SPEED_UP", "MPC_Z_VEL_MAX_UP", INT16, CM),
-    Alias("PILOT_Y_RATE", "MPC_MAN_Y_MAX", REAL32),
-    Alias("PILOT_TKOFF_ALT", "MIS_TAKEOFF_ALT", REAL32, CM),
-    Alias("PSC_JERK_XY", "MPC_JERK_AUTO", REAL32),
-    *(Alias(f"PSC_{theirs}", f"MPC_{ours}", REAL32) for theirs, ours in _POSITION_GAINS.items()),
     *(Alias(f"RC{i}_REVERSED", f"RC{i}_REV", INT8, numbers={1: 0, -1: 1}) for i in range(1, 9)),
     *(Alias(f"RCMAP_{stick}", f"RC_MAP_{stick}", INT8) for stick in ("ROLL", "PITCH", "THROTTLE", "YAW")),
     Alias("RC_FS_TIMEOUT", "COM_RC_LOSS_T", REAL32),
@@ -90,11 +58,6 @@ ALIASES: tuple[Alias, ...] = (
     Alias("RTL_ALT_FINAL", "RTL_DESCEND_ALT", INT16, CM),
     Alias("RTL_LOIT_TIME", "RTL_LAND_DELAY", INT32, MS),
     Alias("RTL_SPEED", "RTL_RETURN_SPD", INT16, CM),
-    *(
-        Alias(f"SERVO{i}_FUNCTION", "SYS_AUTOSTART", INT16, numbers={4001: 0, _SIX: 32 + i, _EIGHT: 32 + i})
-        for i in (5, 6)
-    ),
-    *(Alias(f"SERVO{i}_FUNCTION", "SYS_AUTOSTART", INT16, numbers={4001: 0, _SIX: 0, _EIGHT: 32 + i}) for i in (7, 8)),
     Alias("SIM_GPS_DISABLE", "SIM_GPS1_ENABLE", INT8, numbers={1: 0, 0: 1}),
     *(Alias(name.replace("SR0", "SR1"), name, INT16) for name in STREAM_GROUPS),
     Alias("SYSID_THISMAV", "MAV_SYS_ID", INT16),
@@ -103,12 +66,7 @@ ALIASES: tuple[Alias, ...] = (
     Alias("VISO_TYPE", "EKF2_EV_CTRL", INT8, numbers=_VISION_TYPES),
     Alias("VISO_VEL_M_NSE", "EKF2_EVV_NOISE", REAL32),
     Alias("VISO_YAW_M_NSE", "EKF2_EVA_NOISE", REAL32),
-    Alias("WPNAV_ACCEL", "MPC_ACC_HOR", REAL32, CM),
     Alias("WPNAV_RADIUS", "NAV_ACC_RAD", REAL32, CM),
-    Alias("WPNAV_SPEED", "MPC_XY_CRUISE", REAL32, CM),
-    Alias("WPNAV_SPEED_DN", "MPC_Z_V_AUTO_DN", REAL32, CM),
-    Alias("WPNAV_SPEED_UP", "MPC_Z_V_AUTO_UP", REAL32, CM),
-    Alias("WP_YAW_BEHAVIOR", "MPC_YAW_MODE", INT8, numbers=_YAW_MODES),
 )
 
 
@@ -179,7 +137,6 @@ CONSTANTS: tuple[Constant, ...] = (
     Constant("SCHED_LOOP_RATE", 250, INT16, "rate of the control loops"),
     Constant("SERIAL0_BAUD", 115, INT32, "links have no baud rate"),
     Constant("SERIAL0_PROTOCOL", 2, INT8, "MAVLink 2"),
-    *(Constant(f"SERVO{i}_FUNCTION", 32 + i, INT16, f"motor {i}") for i in range(1, 5)),
     *(Constant(f"SERVO{i}_FUNCTION", 0, INT16, "set by DO_SET_SERVO") for i in range(9, 17)),
     *(
         Constant(f"SERVO{i}_{name}", value, INT16, "pulse [us]; outputs are not calibrated")

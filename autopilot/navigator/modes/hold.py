@@ -7,7 +7,6 @@ from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
 from autopilot.navigator.context import NavContext, distance
 from autopilot.navigator.modes.goto import reposition_target
-from autopilot.navigator.modes.stick_modes import Position
 from autopilot.navigator.paths.waypoint_path import WaypointPath
 from autopilot.navigator.setpoint import Vector
 
@@ -15,7 +14,11 @@ from autopilot.navigator.setpoint import Vector
 class Hold(FlightMode):
     """Mode Hold: the position is where the mode before ended, where a client sent the vehicle, or where it can stop.
 
-    Where a pilot's sticks steer it (ArduPilot's LOITER), it is Position as long as he steers.
+    Where a pilot's sticks steer it (ArduPilot's LOITER), it is another mode as long as he steers.
+
+    Args:
+        context: shared by the modes.
+        steered: the mode that follows his sticks.
     """
 
     __slots__ = (
@@ -34,12 +37,12 @@ class Hold(FlightMode):
 
     finishes_takeoff = takes_heading = True
 
-    def __init__(self, context: NavContext) -> None:
+    def __init__(self, context: NavContext, steered: FlightMode) -> None:
         self._context = context
         self._is_active = False  # not while a take-off is finished first
         self._is_flown = False
         self._is_goto = False  # on a straight line to the position
-        self._steered = Position(context)
+        self._steered = steered
         self._path = WaypointPath(context)
         self._via: list[Vector] = []  # [m] points to go over on the next way to a position
         self._is_steered = False

@@ -1,8 +1,25 @@
-"""What ArduPilot's clients look for on a Copter: names of parameters that have no meaning here and can be read only."""
+"""What ArduPilot's clients look for on a Copter: its names of our parameters, and names that can be read only."""
 
-from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle, Constant
+from collections.abc import Mapping
+
+from autopilot.interface.ardupilot_vehicle import Alias, ArduPilotVehicle, Constant
 
 INT8, INT16, REAL32 = 2, 4, 9  # MAV_PARAM_TYPE
+CM = 100.0  # per metre
+
+# Functions of outputs 5 to 8: motors, where the airframe has so many.
+_SIX, _EIGHT = 6001, 8001
+# Heading on mission legs: towards the next waypoint, along the way.
+_YAW_MODES: Mapping[int, int] = {0: 1, 3: 3}
+
+# Gains from position and velocity; ArduPilot's have the same units, under its names up to 4.6 and since.
+_POSITION_GAINS: Mapping[str, str] = {
+    "POSXY_P": "XY_P", "NE_POS_P": "XY_P", "POSZ_P": "Z_P", "D_POS_P": "Z_P",
+    "VELXY_P": "XY_VEL_P_ACC", "VELXY_I": "XY_VEL_I_ACC", "VELXY_D": "XY_VEL_D_ACC",
+    "NE_VEL_P": "XY_VEL_P_ACC", "NE_VEL_I": "XY_VEL_I_ACC", "NE_VEL_D": "XY_VEL_D_ACC",
+    "VELZ_P": "Z_VEL_P_ACC", "VELZ_I": "Z_VEL_I_ACC", "VELZ_D": "Z_VEL_D_ACC",
+    "D_VEL_P": "Z_VEL_P_ACC", "D_VEL_I": "Z_VEL_I_ACC", "D_VEL_D": "Z_VEL_D_ACC",
+}  # fmt: skip
 
 _RATE_LOOP = "ArduPilot's default; the rate loop's own gains are MC_RPRATE_*_ACC and MC_YAWRATE_*_ACC"
 _CURVE = "ArduPilot's default; the airframe file has the motors' curve"
@@ -12,6 +29,40 @@ _NO_LIMIT = "not limited: the control allocation knows the voltage"
 COPTER = ArduPilotVehicle(
     name="Copter",
     version=(4, 7, 0),  # newer than any release: no station asks for an update
+    aliases=(
+        Alias("ACRO_Y_RATE", "MC_ACRO_Y_MAX", REAL32),
+        Alias("ANGLE_MAX", "MPC_TILTMAX_AIR", INT16, 100.0),
+        Alias("ATC_ANG_PIT_P", "MC_PITCH_P", REAL32),
+        Alias("ATC_ANG_RLL_P", "MC_ROLL_P", REAL32),
+        Alias("ATC_ANG_YAW_P", "MC_YAW_P", REAL32),
+        Alias("ATC_RATE_P_MAX", "MC_PITCHRATE_MAX", REAL32),
+        Alias("ATC_RATE_R_MAX", "MC_ROLLRATE_MAX", REAL32),
+        Alias("ATC_RATE_Y_MAX", "MC_YAWRATE_MAX", REAL32),
+        Alias("ATC_SLEW_YAW", "MPC_YAWRAUTO_MAX", REAL32, 100.0),
+        Alias("FRAME_CLASS", "SYS_AUTOSTART", INT8, numbers={4001: 1, 6001: 2, 8001: 3}),
+        Alias("LAND_SPEED", "MPC_LAND_SPEED", INT16, CM),
+        Alias("LOIT_SPEED", "MPC_XY_VEL_MAX", REAL32, CM),
+        Alias("MOT_THST_HOVER", "MPC_THR_HOVER", REAL32),
+        Alias("PILOT_SPEED_DN", "MPC_Z_VEL_MAX_DN", INT16, CM),
+        Alias("PILOT_SPEED_UP", "MPC_Z_VEL_MAX_UP", INT16, CM),
+        Alias("PILOT_TKOFF_ALT", "MIS_TAKEOFF_ALT", REAL32, CM),
+        Alias("PILOT_Y_RATE", "MPC_MAN_Y_MAX", REAL32),
+        Alias("PSC_JERK_XY", "MPC_JERK_AUTO", REAL32),
+        *(Alias(f"PSC_{theirs}", f"MPC_{ours}", REAL32) for theirs, ours in _POSITION_GAINS.items()),
+        *(
+            Alias(f"SERVO{i}_FUNCTION", "SYS_AUTOSTART", INT16, numbers={4001: 0, _SIX: 32 + i, _EIGHT: 32 + i})
+            for i in (5, 6)
+        ),
+        *(
+            Alias(f"SERVO{i}_FUNCTION", "SYS_AUTOSTART", INT16, numbers={4001: 0, _SIX: 0, _EIGHT: 32 + i})
+            for i in (7, 8)
+        ),
+        Alias("WPNAV_ACCEL", "MPC_ACC_HOR", REAL32, CM),
+        Alias("WPNAV_SPEED", "MPC_XY_CRUISE", REAL32, CM),
+        Alias("WPNAV_SPEED_DN", "MPC_Z_V_AUTO_DN", REAL32, CM),
+        Alias("WPNAV_SPEED_UP", "MPC_Z_V_AUTO_UP", REAL32, CM),
+        Alias("WP_YAW_BEHAVIOR", "MPC_YAW_MODE", INT8, numbers=_YAW_MODES),
+    ),
     constants=(
         Constant("ATC_ACCEL_P_MAX", 110_000.0, REAL32, _ACCEL),
         Constant("ATC_ACCEL_R_MAX", 110_000.0, REAL32, _ACCEL),
@@ -37,6 +88,7 @@ COPTER = ArduPilotVehicle(
         Constant("MOT_SPIN_MIN", 0.15, REAL32, _CURVE),
         Constant("MOT_THST_EXPO", 0.65, REAL32, _CURVE),
         Constant("MOT_HOVER_LEARN", 0, INT8, "the hover thrust is not learned"),
+        *(Constant(f"SERVO{i}_FUNCTION", 32 + i, INT16, f"motor {i}") for i in range(1, 5)),
         Constant("SIMPLE", 0, INT8, "no simple mode"),
         Constant("SUPER_SIMPLE", 0, INT8, "no simple mode"),
     ),

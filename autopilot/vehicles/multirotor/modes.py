@@ -27,22 +27,27 @@ from autopilot.interface.mode_spec import (
 )
 from autopilot.interface.vehicle_state import Mode
 from autopilot.navigator.mode_parts import ModeParts, of_context
+from autopilot.navigator.modes.brake import Brake
 from autopilot.navigator.modes.follow import Follow
 from autopilot.navigator.modes.guided import Guided
 from autopilot.navigator.modes.hold import Hold
 from autopilot.navigator.modes.land import Land
 from autopilot.navigator.modes.offboard import Offboard
-from autopilot.navigator.modes.orbit import Orbit
 from autopilot.navigator.modes.rtl import Return
 from autopilot.navigator.modes.rtl_destination import Destinations
 from autopilot.navigator.modes.smart_return import SmartReturn
-from autopilot.navigator.modes.stick_modes import Acro, Altitude, Brake, Position, Stabilized
 from autopilot.navigator.modes.takeoff import Takeoff
 from autopilot.navigator.modes.termination import Termination
+from autopilot.vehicles.multirotor.orbit import Orbit
+from autopilot.vehicles.multirotor.stick_modes import Acro, Altitude, Position, Stabilized
 
 
 def _mission(parts: ModeParts) -> FlightMode:
     return parts.mission
+
+
+def _hold(parts: ModeParts) -> FlightMode:
+    return Hold(parts.context, steered=Position(parts.context))
 
 
 def _precision_land(parts: ModeParts) -> FlightMode:
@@ -98,7 +103,7 @@ MULTIROTOR_MODES = mode_table(
     ),
     ModeSpec(
         mode=Mode.HOLD,
-        build=of_context(Hold),
+        build=_hold,
         needs_position=True,
         may_arm=True,
         on_ground=True,

@@ -10,10 +10,11 @@ from autopilot.vehicles.multirotor.control_airframe import rotors_leaver
 from autopilot.vehicles.multirotor.defaults import airframe_defaults, hover_thrust
 from autopilot.vehicles.multirotor.landing_detector import LandingDetector
 from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
+from autopilot.vehicles.multirotor.mode_params import MODE_PARAMETERS
 from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from autopilot.vehicles.multirotor.motor_failures import MotorWatch
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
-from autopilot.vehicles.vehicle_class import DriveParts, MotionLimits, VehicleClass
+from autopilot.vehicles.vehicle_class import DriveParts, LandingLimits, MotionLimits, VehicleClass
 from common.airframes.multirotor import MultirotorAirframe
 from common.params import ParameterTable
 
@@ -44,6 +45,14 @@ _LIMITS = MotionLimits(
     path_error="MPC_XY_ERR_MAX",
     yaw_rate="MPC_YAWRAUTO_MAX",
 )
+_LANDING = LandingLimits(
+    takeoff_speed="MPC_TKO_SPEED",
+    land_speed="MPC_LAND_SPEED",
+    crawl_speed="MPC_LAND_CRWL",
+    slowing_height="MPC_LAND_ALT1",
+    slow_height="MPC_LAND_ALT2",
+    crawl_height="MPC_LAND_ALT3",
+)
 
 
 def _height(state: VehicleState, _: ParameterTable) -> str:
@@ -64,7 +73,7 @@ def _motor_watch(parts: DriveParts) -> MotorWatch:
 MULTIROTOR = VehicleClass(
     name="multirotor",
     law=MULTIROTOR_LAW,
-    parameters=CONTROL_PARAMETERS,
+    parameters=(*CONTROL_PARAMETERS, *MODE_PARAMETERS),
     defaults=airframe_defaults,
     modes=MULTIROTOR_MODES,
     last_resort=Mode.LAND,
@@ -74,6 +83,8 @@ MULTIROTOR = VehicleClass(
     motors=_clockwise,
     standing_height_m=lambda airframe: airframe.contact.leg_z_m,
     ground_detector=_landing_detector,
+    landing=_LANDING,
+    yaw_mode="MPC_YAW_MODE",
     lift_thrust=hover_thrust,
     arming_checks=(_height,),
     drive_watch=_motor_watch,

@@ -143,16 +143,6 @@ class Position(StickMode):
         context.setpoint.move((north, east, speed_down_of(context)), yaw_rate_of(context))
 
 
-class Brake(StickMode):
-    """Mode Brake: stops as fast as the limits allow, whatever the sticks say, and holds there."""
-
-    __slots__ = ()
-
-    def frame(self) -> None:
-        if not self._context.is_on_ground:
-            self._context.setpoint.move((0.0, 0.0, 0.0), 0.0)
-
-
 def lean_of(context: NavContext) -> Quaternion:
     """Roll and pitch as one rotation about a level axis, up to MPC_MAN_TILT_MAX in every direction."""
     sticks = context.state.sticks

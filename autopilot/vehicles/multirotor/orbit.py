@@ -13,9 +13,9 @@ from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, OrbitStatus, Reply, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.goto import ground_d
-from autopilot.navigator.modes.stick_modes import speed_down_of, yaw_rate_of
 from autopilot.navigator.paths.orbit_circle import Circle, speed_limit
 from autopilot.navigator.setpoint import Vector
+from autopilot.vehicles.multirotor.stick_modes import speed_down_of, yaw_rate_of
 from common.geodesy import GeoPoint
 
 _RADIUS_MIN_M, _RADIUS_MAX_M = 1.0, 1000.0
