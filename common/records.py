@@ -6,6 +6,7 @@ A row of an array of structs becomes a named tuple whose vectors are tuples, wit
 import struct
 from collections import namedtuple
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,13 @@ import numpy as np
 _CODES = {"f4": "f", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f8": "d", "i2": "h", "u2": "H", "i1": "b", "u1": "B"}
 
 
+@lru_cache(maxsize=1024)  # of a type once: a test makes hundreds of vehicles, a batch as many readers
 def record_reader(dtype: np.dtype[Any], name: str) -> Callable[[Any, int], Any]:
     """A function `read(buffer, offset)` that returns one row as a named tuple.
 
     Args:
         dtype: structured type of the row, as `array.numpy().dtype` of a Warp array of structs gives it.
-        name: name of the record type.
+        name: name of the record type; the same type and name give the same function.
     """
     leaves: list[tuple[int, int, str]] = []  # byte offset, count, code
     scope: dict[str, Any] = {"_new": tuple.__new__}  # a named tuple's own __new__ is one more call of Python
