@@ -200,6 +200,6 @@ def distance(a: Vector, b: Vector) -> float:
 
 
 def braking_distance(speed: float, accel: float, jerk: float) -> float:
-    """WaypointPath [m] from a speed to rest with limited acceleration and jerk, starting without acceleration."""
+    """Distance [m] from a speed to rest with limited acceleration and jerk, starting without acceleration."""
     peak = min(accel, sqrt(speed * jerk))
     return speed * (0.5 * speed / peak + 0.5 * peak / jerk)

@@ -111,7 +111,7 @@ class TaskParamTable:
 
 @wp.func
 def draw_param(samplers: wp.array2d(dtype=float), k: int, seed: int, i_env: int, episode: int) -> float:
-    """TaskParam k of an environment's episode."""
+    """Parameter k of an environment's episode."""
     count = int(samplers[k, 0])
     low = samplers[k, _FIRST]
     high = samplers[k, _FIRST + 1]

@@ -1,5 +1,6 @@
 """Poisson-disc points: random, yet never closer together than a given spacing. Trees stand on them."""
 
+from functools import lru_cache
 from math import ceil, sqrt
 
 import numpy as np
@@ -11,8 +12,9 @@ FAR = 1.0e9  # [m] where the point of an empty cell lies
 COVERAGE = 0.64  # points per spacing² reached with these trials; measured, the limit is about 0.7 (Wei 2008)
 
 
+@lru_cache(maxsize=8)  # one flight after another has the same trees
 def poisson_disc(seed: int, side_m: float, spacing_m: float, keep_out_m: float) -> FloatArray:
-    """Seeded points [m] at least `spacing_m` apart that fill a square, shape (points, 2), north and east.
+    """Seeded points [m] at least `spacing_m` apart that fill a square, shape (points, 2), north and east; read-only.
 
     Parallel dart throwing on a grid whose cells hold at most one point (Wei 2008, "Parallel Poisson disk sampling"):
     cells three apart cannot disturb each other, so each ninth of the grid is filled at once.
@@ -46,4 +48,6 @@ def poisson_disc(seed: int, side_m: float, spacing_m: float, keep_out_m: float) 
                 is_free &= (x - north[other]) ** 2 + (y - east[other]) ** 2 >= spacing_m**2
             north[cells[is_free]], east[cells[is_free]] = x[is_free], y[is_free]
     points = np.stack([north, east], axis=-1).reshape(side, side, 2)[2:-2, 2:-2].reshape(-1, 2)
-    return np.asarray(points[points[:, 0] != FAR] - 0.5 * side_m)
+    found = np.asarray(points[points[:, 0] != FAR] - 0.5 * side_m)
+    found.setflags(write=False)
+    return found

@@ -7,6 +7,7 @@ Made once per world from a seed; queried at up to 1 kHz per vehicle. Heights are
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import warp as wp
@@ -197,6 +198,7 @@ def smootherstep(x: FloatArray) -> FloatArray:
     return x * x * x * (x * (x * 6.0 - 15.0) + 10.0)
 
 
+@lru_cache(maxsize=8)  # one flight after another is over the same ground
 def make_heights(
     seed: int,
     cells: int,
@@ -207,7 +209,9 @@ def make_heights(
     clearing_radius_m: float,
     blend_m: float,
 ) -> NDArray[np.float32]:
-    """Seeded heights [m] of the grid points, shape (cells + 1, cells + 1): 0 in the clearing, within ±hill_height_m.
+    """Seeded heights [m] of the grid points, shape (cells + 1, cells + 1), read-only.
+
+    They are 0 in the clearing and within ±hill_height_m.
 
     Args:
         seed: same seed, same bytes.
@@ -232,7 +236,9 @@ def make_heights(
     level_radius = clearing_radius_m + 1.5 * size_m / cells
     highest = float(np.abs(noise).max())
     hills = noise * (hill_height_m / highest if highest > 0.0 else 0.0)
-    return (hills * smootherstep(np.clip((distance - level_radius) / blend_m, 0.0, 1.0)) + 0.0).astype(np.float32)
+    heights = (hills * smootherstep(np.clip((distance - level_radius) / blend_m, 0.0, 1.0)) + 0.0).astype(np.float32)
+    heights.setflags(write=False)
+    return heights
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -244,7 +250,7 @@ class TerrainMap:
 
     @property
     def cells(self) -> int:
-        """TaskParam of cells per side."""
+        """Number of cells per side."""
         return self.heights.shape[0] - 1
 
     def kernel(self, device: str) -> Terrain:

@@ -206,7 +206,6 @@ def build_world(config: WorldConfig | None = None, device: str = "cpu") -> World
         config.clearing_radius_m,
         config.clearing_blend_m,
     )
-    heights.setflags(write=False)
     terrain = TerrainMap(heights, config.size_m)
     trees = make_trees(
         config.seed,

@@ -8,7 +8,7 @@ import json
 import lzma
 import zlib
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 from autopilot.interface.vehicle_state import Reply
@@ -57,10 +57,10 @@ class MetadataService(Service):
     def files(self) -> dict[str, bytes]:
         """Every file, by name."""
         dialect = self._endpoint.dialect
-        files = {_EVENTS: _packed(events_metadata(dialect))}
+        files = {_EVENTS: _packed_json(events_metadata(dialect))}
         kinds = {_EVENTS: _TYPE_EVENTS}
         if dialect.name == "px4":  # stations know ArduPilot's parameters, and ArduPilot itself tells them nothing
-            files[_PARAMETERS] = _packed(parameter_metadata(self._endpoint.parameters))
+            files[_PARAMETERS] = _packed_json(parameter_metadata(self._endpoint.parameters))
             kinds[_PARAMETERS] = _TYPE_PARAMETER
         described = [
             {"type": kind, "uri": _uri(name), "fileCrc": checksum(files[name])} for name, kind in kinds.items()
@@ -69,7 +69,7 @@ class MetadataService(Service):
             "version": 1, "vendorName": PROJECT, "modelName": PROJECT, "firmwareVersion": project_version(),
             "metadataTypes": described,
         }  # fmt: skip
-        files[GENERAL] = _packed(general)
+        files[GENERAL] = _packed_json(general)
         return files
 
 
@@ -77,6 +77,10 @@ def _uri(name: str) -> str:
     return f"mftp:///{METADATA_FOLDER}/{name}"
 
 
-def _packed(content: Mapping[str, Any]) -> bytes:
-    text = json.dumps(content, separators=(",", ":"), allow_nan=False)
+def _packed_json(content: Mapping[str, Any]) -> bytes:
+    return _packed(json.dumps(content, separators=(",", ":"), allow_nan=False))
+
+
+@lru_cache(maxsize=8)  # one vehicle after another has the same files
+def _packed(text: str) -> bytes:
     return lzma.compress(text.encode("utf-8"), format=lzma.FORMAT_XZ, check=lzma.CHECK_CRC32, filters=_FILTERS)
