@@ -43,10 +43,10 @@ reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow
 # environment says otherwise: tests start the command a hundred times, and their own files take longest to prepare.
 test test-all: export PYTHONDONTWRITEBYTECODE =
 test: $(STAMP) ## Run the tests that take seconds; flags: make test ARGS="-k plan"
-	$(BIN)/python -m pytest -q -n 3 --dist loadfile -m "not slow" tests $(ARGS)
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow" tests $(ARGS)
 
 test-all: $(STAMP) ## Run every test, the slow ones too
-	$(BIN)/python -m pytest -q -n 3 --dist loadfile tests $(ARGS)
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile tests $(ARGS)
 
 golden: $(STAMP) ## Renew tests/golden/golden.json and show what has changed in the golden flights; flags: ARGS="--check"
 	@$(BIN)/python -m tests.golden $(ARGS)
