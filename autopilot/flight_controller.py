@@ -184,7 +184,7 @@ class FlightController:
             params,
             self._relay,
             BatteryEstimator(airframe.battery),
-            None if vehicle.ground_detector is None else vehicle.ground_detector(params, airframe),
+            None if vehicle.ground is None else vehicle.ground.detector(params, airframe),
             Pilot(state, params, self.sticks, vehicle.modes),
             None if vehicle.drive_watch is None else vehicle.drive_watch(parts),
             vehicle.modes,

@@ -70,8 +70,8 @@ def parameter_sections(vehicle: VehicleClass = DEFAULT_CLASS) -> dict[str, Seque
     """Every declaration of the flight controller of a class of vehicles, by the headings of the page of parameters."""
     return {
         "Estimator": ESTIMATOR_PARAMETERS,
-        "Control and flight modes": vehicle.parameters,
-        "Arming, landing detection, failsafes": COMMANDER_PARAMETERS,
+        f"{vehicle.name.capitalize()}: control, flight modes, detectors": vehicle.parameters,
+        "Arming, failsafes": COMMANDER_PARAMETERS,
         "Take-off, missions, return, landing": NAVIGATOR_PARAMETERS,
         "The pilot's sticks": STICK_PARAMETERS,
         "Other aircraft": TRAFFIC_PARAMETERS,

@@ -139,9 +139,9 @@ class Setpoint:
     yaw: float  # [rad]
     yaw_rate: float  # [rad/s]
     path_start_ned: wp.vec3  # [m] finite: keep to the straight line from here to pos_ned
-    cruise_speed: float  # [m/s] horizontal, NaN: MPC_XY_CRUISE
-    climb_speed: float  # [m/s] up, NaN: MPC_Z_V_AUTO_UP
-    descend_speed: float  # [m/s] down, NaN: MPC_Z_V_AUTO_DN
+    cruise_speed: float  # [m/s] horizontal, NaN: the class's own
+    climb_speed: float  # [m/s] up, NaN: the class's own
+    descend_speed: float  # [m/s] down, NaN: the class's own
     exit_speed: float  # [m/s] speed with which pos_ned may be passed, 0: stop there
     q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE; SETPOINT_LEAN: its heading is not used
     omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE

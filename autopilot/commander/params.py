@@ -1,4 +1,4 @@
-"""Parameters of arming, landing detection and failsafes."""
+"""Parameters of arming and failsafes."""
 
 from common.params import Parameter
 
@@ -58,20 +58,10 @@ COMMANDER_PARAMETERS: list[Parameter] = [
     Parameter("BAT_LOW_THR", 0.15, 0.12, 0.5, "norm", "charge left at which to warn, and below which not to arm", _PX4),
     Parameter("BAT_CRIT_THR", 0.07, 0.05, 0.5, "norm", "charge left that is critical", _PX4),
     Parameter("BAT_EMERGEN_THR", 0.05, 0.03, 0.5, "norm", "charge left that is an emergency", _PX4),
-    Parameter("FD_ACT_EN", 1, 0, 1, "", "1: motors are watched by the speed their ESCs report", _PX4),
-    Parameter("FD_ACT_MOT_THR", 0.2, 0.0, 1.0, "norm", "motor command from which a motor is judged", _PX4),
-    Parameter("FD_ACT_MOT_TOUT", 100, 10, 10_000, "ms", "time for which a motor must be too slow", _PX4),
-    Parameter("CA_FAILURE_MODE", 1, 0, 1, "",
-              "1: the control allocation does without a failed motor, if six or more motors leave enough",
-              "PX4's numbers; its default is 0"),
     Parameter("FD_FAIL_R", 60.0, 60.0, 180.0, "deg", "roll above which the vehicle has crashed, unless asked for",
               _PX4),
     Parameter("FD_FAIL_P", 60.0, 60.0, 180.0, "deg", "pitch above which the vehicle has crashed, unless asked for",
               _PX4),
     Parameter("FD_FAIL_R_TTRI", 0.3, 0.02, 5.0, "s", "time for which the roll must be that large", _PX4),
     Parameter("FD_FAIL_P_TTRI", 0.3, 0.02, 5.0, "s", "time for which the pitch must be that large", _PX4),
-    Parameter("LNDMC_Z_VEL_MAX", 0.25, 0.1, 1.0, "m/s", "largest vertical speed of a landed vehicle", _PX4),
-    Parameter("LNDMC_XY_VEL_MAX", 1.5, 0.5, 5.0, "m/s", "largest horizontal speed of a landed vehicle", _PX4),
-    Parameter("LNDMC_ROT_MAX", 20.0, 5.0, 100.0, "deg/s", "largest body rate of a landed vehicle", _PX4),
-    Parameter("LNDMC_TRIG_TIME", 1.0, 0.1, 10.0, "s", "time for which a vehicle must look landed", _PX4),
 ]  # fmt: skip

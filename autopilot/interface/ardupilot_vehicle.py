@@ -3,6 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+INT8, INT16, INT32, REAL32 = 2, 4, 6, 9  # MAV_PARAM_TYPE
+CM = 100.0  # per metre
+
 
 @dataclass(frozen=True, slots=True)
 class Alias:

@@ -9,7 +9,7 @@ from autopilot.interface.vehicle_state import LandedState, Mode, VehicleState
 from autopilot.navigator.heading import Heading
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import HEIGHT_VALID, TERRAIN_VALID
-from autopilot.vehicles.vehicle_class import Craft, LandingLimits
+from autopilot.vehicles.vehicle_class import Craft, GroundHandling
 from common.geodesy import geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
 
@@ -78,12 +78,12 @@ class NavContext:
         return self.state.landed_state is LandedState.ON_GROUND
 
     @property
-    def landing(self) -> LandingLimits:
-        """Names of the parameters of take-offs and landings; not for a vehicle that never leaves the ground."""
-        limits = self.craft.landing
-        if limits is None:
-            raise LookupError("a vehicle that never leaves the ground has no limits of landing")
-        return limits
+    def ground(self) -> GroundHandling:
+        """How the vehicle leaves the ground and comes back; not for one that never does."""
+        ground = self.craft.ground
+        if ground is None:
+            raise LookupError("a vehicle that never leaves the ground neither takes off nor lands")
+        return ground
 
     @property
     def has_height(self) -> bool:
@@ -190,7 +190,7 @@ class NavContext:
         self.yaw_mode = self._yaw_mode()
 
     def _yaw_mode(self) -> int:
-        name = self.craft.yaw_mode
+        name = self.craft.yaw_mode_param
         return int(self._numbers[name]) if name else 0
 
 

@@ -23,7 +23,7 @@ _TURNED_RAD = radians(2.0)  # as ArduPilot judges CONDITION_YAW
 
 
 class YawMode(IntEnum):
-    """Where the nose points on mission legs: a class's parameter `yaw_mode`, numbered as PX4's copters do."""
+    """Where the nose points on mission legs: the class's `yaw_mode_param`, numbered as PX4's copters do."""
 
     TOWARDS_WAYPOINT = 0
     TOWARDS_HOME = 1

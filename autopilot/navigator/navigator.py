@@ -178,7 +178,7 @@ class Navigator:
             setpoint.idle()
             setpoint.as_asked()
             self.ask = Ask.STAY
-        elif context.craft.landing is not None:
+        elif context.craft.ground is not None:
             self._respect_ground()
         state.goal_ned, state.path_start_ned = setpoint.pos_ned, setpoint.path_start_ned
         may_turn = state.is_armed and state.mode is not Mode.TERMINATION
@@ -209,7 +209,7 @@ class Navigator:
         Leaning into the wind against the ground would tip it over, and so would a sideways touch without any control.
         """
         context = self.context
-        state, setpoint, landing = context.state, context.setpoint, context.landing
+        state, setpoint, ground = context.state, context.setpoint, context.ground
         stand_d = standing_d(state, context.craft.standing_height_m)
         ask = self.ask = vertical_ask(setpoint, state.estimate, stand_d, context.craft.lift_thrust)
         if state.has_ground_contact and ask is not Ask.UP:
@@ -217,10 +217,10 @@ class Navigator:
         elif (
             ask is Ask.DOWN
             and setpoint.pos_ned[2] == setpoint.pos_ned[2]
-            and stand_d - state.estimate.pos_ned[2] < context.number(landing.crawl_height)
+            and stand_d - state.estimate.pos_ned[2] < context.number(ground.crawl_height)
         ):
             is_measured = state.estimate.flags & TERRAIN_VALID
-            setpoint.press(context.number(landing.crawl_speed if is_measured else landing.land_speed))
+            setpoint.press(context.number(ground.crawl_speed if is_measured else ground.land_speed))
         else:
             setpoint.as_asked()
 

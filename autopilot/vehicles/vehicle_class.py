@@ -11,6 +11,7 @@ import numpy as np
 
 from autopilot.control.law import ControlLaw
 from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
+from autopilot.interface.client_requests import LandAt, TakeOff
 from autopilot.interface.mode_spec import ModeTable
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import Mode, VehicleState
@@ -84,14 +85,17 @@ class MotionLimits:
     accel_down: str
     jerk: str  # [m/s³]
     jerk_auto: str  # [m/s³] on missions
+    alt_radius: str  # [m] height error at which a place counts as reached
     path_error: str  # [m] by which the vehicle may lag behind what it tracks
     yaw_rate: str  # [deg/s] of a turn that names none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LandingLimits:
-    """Names of the parameters by which a class of vehicles leaves the ground and comes back to it."""
+class GroundHandling:
+    """How a class of vehicles leaves the ground and comes back to it; speeds and heights are names of parameters."""
 
+    detector: Callable[[ParameterTable, Any], GroundDetector]
+    lift_thrust: Callable[[Any], float]  # [0..1] that carries the vehicle
     takeoff_speed: str  # [m/s]
     land_speed: str  # [m/s] low over the ground
     crawl_speed: str  # [m/s] just above the ground, where its height is measured
@@ -107,8 +111,8 @@ class Craft:
     lift_thrust: float  # [0..1] that carries it; 0 where the ground does
     standing_height_m: float  # of its centre over level ground
     limits: MotionLimits
-    landing: LandingLimits | None  # None: it never leaves the ground
-    yaw_mode: str  # parameter, empty if the class has none
+    ground: GroundHandling | None  # None: it never leaves the ground
+    yaw_mode_param: str  # empty if the class has none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,7 +123,7 @@ class VehicleClass:
     law: ControlLaw
     """The kernel half."""
     parameters: Sequence[Parameter]
-    """Those of the law and of the class's own detectors."""
+    """Those of the law, and of the class's own modes and detectors."""
     defaults: Callable[[Any], Mapping[str, int | float]]
     """Parameters whose default the airframe file decides."""
     modes: ModeTable
@@ -134,21 +138,23 @@ class VehicleClass:
     """Its motors from 0, clockwise from the nose on, as ArduPilot counts them to test one."""
     standing_height_m: Callable[[Any], float]
     """Of the vehicle's centre over level ground."""
-    ground_detector: Callable[[ParameterTable, Any], GroundDetector] | None = None
-    """None: it never leaves the ground."""
-    landing: LandingLimits | None = None
-    """None as well."""
-    yaw_mode: str = ""
-    """Parameter that says where the nose points on mission legs (autopilot.navigator.heading); empty: along the leg."""
-    lift_thrust: Callable[[Any], float] = lambda _: 0.0
-    """[0..1] Thrust that carries the vehicle; 0 where the ground does."""
+    ground: GroundHandling | None = None
+    """None: it never leaves the ground, and has no modes that take off or land."""
+    yaw_mode_param: str = ""
+    """Parameter that says where the nose points on mission legs, as autopilot.navigator.heading.YawMode; empty: towards
+    the waypoint."""
     arming_checks: Sequence[ArmingCheck] = ()
     """Its own, besides those of all vehicles (autopilot.commander.arming)."""
     drive_watch: Callable[[DriveParts], DriveWatch] | None = None
     """None: nobody looks whether a motor has failed."""
 
+    def __post_init__(self) -> None:
+        if self.ground is None:
+            for mode, spec in self.modes.items():
+                if not {TakeOff, LandAt}.isdisjoint(spec.takes):
+                    raise ValueError(f"{self.name}: mode {mode.name} takes off or lands, and the class has no `ground`")
+
     def craft(self, airframe: Airframe) -> Craft:
         """A vehicle of the class, as the navigator knows it."""
-        return Craft(
-            self.lift_thrust(airframe), self.standing_height_m(airframe), self.limits, self.landing, self.yaw_mode
-        )
+        lift_thrust = 0.0 if self.ground is None else self.ground.lift_thrust(airframe)
+        return Craft(lift_thrust, self.standing_height_m(airframe), self.limits, self.ground, self.yaw_mode_param)

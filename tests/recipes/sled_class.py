@@ -142,6 +142,7 @@ SLED = VehicleClass(
         accel_down="SLED_ACCEL",
         jerk="SLED_JERK",
         jerk_auto="SLED_JERK",
+        alt_radius="SLED_LAG",
         path_error="SLED_LAG",
         yaw_rate="SLED_YAW_RATE",
     ),

@@ -1,5 +1,6 @@
 """The recipe "A vehicle class" of CONTRIBUTING.md: a sled, one line in the list, driven over MAVLink by pymavlink."""
 
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from autopilot import tuning
 from autopilot.commander.failsafe import POSITION_LOST
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
+from autopilot.vehicles.multirotor.ardupilot import COPTER
+from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from common.airframe import AIRFRAME_FOLDER, AirframeError, load_airframe
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
@@ -21,8 +24,9 @@ from mission.view import shapes
 from mission.view.vehicle_model import VehicleModel
 from sim.bodies.vehicles import VEHICLES, class_of
 from sim.world.world import WorldConfig
-from tests.recipes.sled_class import DRIVE, MAV_TYPE_GROUND_ROVER, SIMULATED_SLED
+from tests.recipes.sled_class import DRIVE, MAV_TYPE_GROUND_ROVER, SIMULATED_SLED, SLED
 from tests.recipes.station import Station
+from tests.unit.autopilot.kinematic import item
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 ARM, SET_MODE, TAKEOFF = (
@@ -257,6 +261,19 @@ def test_ardupilots_clients_find_a_rovers_parameters_and_none_of_a_copters(airfr
     names = {each.param_id for each in sled.heard("PARAM_VALUE")}
     assert {"CRUISE_SPEED", "SLED_SPEED", "FENCE_ENABLE"} <= names
     assert not [name for name in names if name.startswith(("ATC_RAT", "ATC_ACCEL", "MOT_SPIN", "MC_PITCH"))]
+    assert not [name for name in names if name.startswith(("MC_", "MPC_", "LNDMC_", "FD_ACT_", "NAV_MC_"))]
+    assert names.isdisjoint({each.name for each in (*COPTER.aliases, *COPTER.constants)})
+
+
+def test_a_class_that_never_leaves_the_ground_has_no_modes_and_no_mission_items_that_do(airframe):
+    with pytest.raises(ValueError, match="sled: mode LAND takes off or lands, and the class has no `ground`"):
+        replace(SLED, modes=MULTIROTOR_MODES)
+    mission = Sled(airframe).flight.controller.navigator.mission
+    for command in (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND):
+        refusal = mission.load([item(0, mavlink.MAV_CMD_NAV_WAYPOINT, 10.0), item(1, command, 20.0)])
+        assert (refusal.seq, refusal.result) == (1, mavlink.MAV_MISSION_UNSUPPORTED)
+        assert "vehicles that leave the ground" in refusal.reason
+    assert mission.load([item(0, mavlink.MAV_CMD_NAV_WAYPOINT, 10.0)]) is None
 
 
 @pytest.mark.parametrize("dialect", ["px4", "ardupilot"])

@@ -1,4 +1,4 @@
-"""The names under which ArduPilot's users and ground stations look for parameters.
+"""The names under which ArduPilot's users and ground stations look for parameters, on any vehicle.
 
 An alias is one of our parameters under ArduPilot's name, in ArduPilot's unit: setting it sets ours. A constant is there
 to be read only. Names that are ArduPilot's and ours alike (RC1_MIN) are in neither list.
@@ -6,19 +6,10 @@ to be read only. Names that are ArduPilot's and ours alike (RC1_MIN) are in neit
 
 from collections.abc import Mapping, Sequence
 
-from pymavlink.dialects.v20 import all as mavlink
-
 from autopilot.ardupilot_only_params import STREAM_GROUPS
-from autopilot.interface.ardupilot_vehicle import Alias, Constant
+from autopilot.interface.ardupilot_vehicle import CM, INT8, INT16, INT32, REAL32, Alias, Constant
 from autopilot.interface.mode_spec import DialectMode, ModeTable
 from autopilot.interface.vehicle_state import Mode
-
-INT8 = mavlink.MAV_PARAM_TYPE_INT8
-INT16 = mavlink.MAV_PARAM_TYPE_INT16
-INT32 = mavlink.MAV_PARAM_TYPE_INT32
-REAL32 = mavlink.MAV_PARAM_TYPE_REAL32
-CM = 100.0  # per metre
-MS = 1000.0  # per second
 
 # Failsafe actions. Ours are PX4's: 0 none, 1 hold, 2 return, 3 land; for the fence 1 warn, 2 hold, 3 return, 5 land.
 _THROTTLE_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 3, 7: 4, 1: 7}
@@ -35,7 +26,6 @@ _LOG_MODES: Mapping[int, int] = {0: 0, 1: 1, 2: 1, -1: 0}
 ALIASES: tuple[Alias, ...] = (
     Alias("BATT_CAPACITY", "BAT1_CAPACITY", INT32),
     Alias("BATT_FS_CRT_ACT", "COM_LOW_BAT_ACT", INT8, numbers=_BATTERY_ACTIONS),
-    Alias("CIRCLE_RADIUS", "NAV_LOITER_RAD", REAL32, CM),
     Alias("DISARM_DELAY", "COM_DISARM_LAND", INT8),
     Alias("FENCE_ACTION", "GF_ACTION", INT8, numbers=_FENCE_ACTIONS),
     Alias("FENCE_ALT_MAX", "GF_MAX_VER_DIST", REAL32),
@@ -54,9 +44,6 @@ ALIASES: tuple[Alias, ...] = (
     *(Alias(f"RC{i}_REVERSED", f"RC{i}_REV", INT8, numbers={1: 0, -1: 1}) for i in range(1, 9)),
     *(Alias(f"RCMAP_{stick}", f"RC_MAP_{stick}", INT8) for stick in ("ROLL", "PITCH", "THROTTLE", "YAW")),
     Alias("RC_FS_TIMEOUT", "COM_RC_LOSS_T", REAL32),
-    Alias("RTL_ALT", "RTL_RETURN_ALT", INT32, CM),
-    Alias("RTL_ALT_FINAL", "RTL_DESCEND_ALT", INT16, CM),
-    Alias("RTL_LOIT_TIME", "RTL_LAND_DELAY", INT32, MS),
     Alias("RTL_SPEED", "RTL_RETURN_SPD", INT16, CM),
     Alias("SIM_GPS_DISABLE", "SIM_GPS1_ENABLE", INT8, numbers={1: 0, 0: 1}),
     *(Alias(name.replace("SR0", "SR1"), name, INT16) for name in STREAM_GROUPS),
@@ -66,7 +53,6 @@ ALIASES: tuple[Alias, ...] = (
     Alias("VISO_TYPE", "EKF2_EV_CTRL", INT8, numbers=_VISION_TYPES),
     Alias("VISO_VEL_M_NSE", "EKF2_EVV_NOISE", REAL32),
     Alias("VISO_YAW_M_NSE", "EKF2_EVA_NOISE", REAL32),
-    Alias("WPNAV_RADIUS", "NAV_ACC_RAD", REAL32, CM),
 )
 
 

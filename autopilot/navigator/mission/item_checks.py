@@ -27,22 +27,29 @@ _PAYLOAD_COMMANDS = frozenset(
     (181, 182, 183, 184, 187, 203, 204, 205, 206, 208, 211, 214, 530, 531, 532, 1000, 1001, 2000, 2001, 2500, 2501)
 ) | {42_600}
 
+_OFF_GROUND = frozenset((Command.TAKEOFF, Command.LAND))
+
 _Problem = tuple[Result, str]
 _Check = Callable[[MissionItem, Sequence[MissionItem]], _Problem | None]
 
 
-def refuse_items(items: Sequence[MissionItem], takes: Callable[[int], bool]) -> ItemRefusal | None:
+def refuse_items(
+    items: Sequence[MissionItem], takes: Callable[[int], bool], *, leaves_ground: bool = True
+) -> ItemRefusal | None:
     """The first reason not to take a mission, naming the item; None if all of it can be flown.
 
     Args:
         items: the mission.
         takes: whether the payload takes a command (autopilot.payload.payloads).
+        leaves_ground: whether the vehicle can take off and land.
     """
     if len(items) > MAX_ITEMS:
         reason = f"a mission has at most {MAX_ITEMS} items"
         return ItemRefusal(MAX_ITEMS, Result.NO_SPACE, reason)
     for i_item, item in enumerate(items):
         problem = _sequence_problem(i_item, item) or _item_problem(item, items, takes)
+        if problem is None and not leaves_ground and item.command in _OFF_GROUND:
+            problem = Result.UNSUPPORTED, f"command {item.command} is for vehicles that leave the ground"
         if problem is not None:
             return ItemRefusal(i_item, int(problem[0]), problem[1])
     return None

@@ -89,7 +89,7 @@ class Mission(FlightMode):
         A mission being flown goes on where it is if the current item is the same in the new one, else from the
         beginning.
         """
-        refusal = refuse_items(items, self._payload.takes)
+        refusal = refuse_items(items, self._payload.takes, leaves_ground=self._context.craft.ground is not None)
         if refusal is not None:
             return refusal
         state = self._context.state

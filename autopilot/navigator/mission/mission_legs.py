@@ -163,7 +163,7 @@ class Leg:
         context = self._context
         self._start = start
         self._home = context.state.home
-        self._alt_radius = context.number("NAV_MC_ALT_RAD")
+        self._alt_radius = context.number(context.craft.limits.alt_radius)
         target = self._goal_of(item, start)
         asked = radians(item.params[3]) if item.command in WAYPOINTS | {Command.LAND, Command.TAKEOFF} else nan
         if item.command == Command.LOITER_UNLIMITED:
@@ -287,7 +287,7 @@ class Leg:
         estimate = context.state.estimate
         vel_north, vel_east, _ = estimate.vel_ned
         down = self._route.position_of(item)[2]
-        self._alt_radius = context.number("NAV_MC_ALT_RAD")
+        self._alt_radius = context.number(context.craft.limits.alt_radius)
         north, east, _ = context.stop_point()
         self.target = self._goal = (north, east, down)
         self._stage = _Stage.LEVEL

@@ -20,7 +20,9 @@ from autopilot.navigator.mission.item_commands import (
 from autopilot.navigator.paths.spline import Pace, between
 from autopilot.navigator.setpoint import Vector
 
-CORNER_ACCEL_FRACTION = 0.5  # of MPC_ACC_HOR, used to turn from one leg to the next; the rest keeps to the line: guess
+CORNER_ACCEL_FRACTION = (
+    0.5  # of `limits.accel_hor`, used to turn from one leg to the next; the rest keeps to the line: guess
+)
 _SLOWEST_CORNER_M_S = 0.5  # slower than this it is simpler to stop
 
 

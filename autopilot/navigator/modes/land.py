@@ -73,21 +73,21 @@ class Landing:
     def _speed(self) -> float:
         """Descent speed [m/s]: the usual one high up, the landing's low, the crawl speed just above the ground."""
         context = self._context
-        slow = context.number(context.landing.land_speed)
+        slow = context.number(context.ground.land_speed)
         fast = context.number(context.craft.limits.descend_speed)
         height, is_measured = context.height_above_ground()
         if not is_measured:
             is_known_ground = is_near_start(context.state, self._north, self._east)
             return slow if height < _SLOW_BELOW_M and not is_known_ground else _blend(context, height, slow, fast)
-        if height < context.number(context.landing.crawl_height):
-            return min(slow, context.number(context.landing.crawl_speed))
+        if height < context.number(context.ground.crawl_height):
+            return min(slow, context.number(context.ground.crawl_speed))
         return _blend(context, height, slow, fast)
 
 
 def _blend(context: NavContext, height: float, slow: float, fast: float) -> float:
     """Speed between the heights where a descent is slow and where it begins to slow down, in steps of 0.05 m/s."""
-    high = context.number(context.landing.slowing_height)
-    low = context.number(context.landing.slow_height)
+    high = context.number(context.ground.slowing_height)
+    low = context.number(context.ground.slow_height)
     if height >= high:
         return max(slow, fast)
     if not height > low or fast <= slow:  # also where the height is not a number
@@ -101,7 +101,7 @@ def slowed_near_ground(context: NavContext, fast: float) -> float:
     here = context.state.estimate.pos_ned
     if not is_measured and not is_near_start(context.state, here[0], here[1]):
         return fast
-    return _blend(context, height, min(context.number(context.landing.land_speed), fast), fast)
+    return _blend(context, height, min(context.number(context.ground.land_speed), fast), fast)
 
 
 class Land(FlightMode):

@@ -104,7 +104,7 @@ class PrecisionLand(FlightMode):
                 self._landing.frame()
                 return
             context.is_landing = True
-            speed = context.number(context.landing.land_speed)
+            speed = context.number(context.ground.land_speed)
             context.setpoint.track_down((position[0], position[1]), target.vel_ned, speed, self._yaw)
         else:
             context.setpoint.track((position[0], position[1], self._approach_d), target.vel_ned, self._yaw)

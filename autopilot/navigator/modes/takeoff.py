@@ -56,7 +56,7 @@ class Climb:
 
     def _fly(self) -> None:
         context = self._context
-        context.setpoint.fly_to(self.target_ned, self.yaw, climb_speed=context.number(context.landing.takeoff_speed))
+        context.setpoint.fly_to(self.target_ned, self.yaw, climb_speed=context.number(context.ground.takeoff_speed))
 
 
 def is_high(context: NavContext) -> bool:

@@ -8,7 +8,7 @@ from math import atan2, cos, hypot, pi, sin, sqrt
 from autopilot.navigator.setpoint import Vector
 from common.attitude import wrapped
 
-ACCEL_FRACTION = 0.6  # of MPC_ACC_HOR that a circle may take; the rest keeps to it in wind: guess
+ACCEL_FRACTION = 0.6  # of `limits.accel_hor` that a circle may take; the rest keeps to it in wind: guess
 
 
 class Circle:

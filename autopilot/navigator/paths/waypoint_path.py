@@ -58,7 +58,7 @@ class WaypointPath:
         radius = END_RADIUS_M if is_last else CORNER_RADIUS_M
         if hypot(north - target[0], east - target[1]) > radius:
             return False
-        if abs(down - target[2]) > context.number("NAV_MC_ALT_RAD"):
+        if abs(down - target[2]) > context.number(context.craft.limits.alt_radius):
             return False
         self._i_point += 1
         if is_last:

@@ -2,10 +2,9 @@
 
 from collections.abc import Mapping
 
-from autopilot.interface.ardupilot_vehicle import Alias, ArduPilotVehicle, Constant
+from autopilot.interface.ardupilot_vehicle import CM, INT8, INT16, INT32, REAL32, Alias, ArduPilotVehicle, Constant
 
-INT8, INT16, REAL32 = 2, 4, 9  # MAV_PARAM_TYPE
-CM = 100.0  # per metre
+MS = 1000.0  # per second
 
 # Functions of outputs 5 to 8: motors, where the airframe has so many.
 _SIX, _EIGHT = 6001, 8001
@@ -39,6 +38,7 @@ COPTER = ArduPilotVehicle(
         Alias("ATC_RATE_R_MAX", "MC_ROLLRATE_MAX", REAL32),
         Alias("ATC_RATE_Y_MAX", "MC_YAWRATE_MAX", REAL32),
         Alias("ATC_SLEW_YAW", "MPC_YAWRAUTO_MAX", REAL32, 100.0),
+        Alias("CIRCLE_RADIUS", "NAV_LOITER_RAD", REAL32, CM),
         Alias("FRAME_CLASS", "SYS_AUTOSTART", INT8, numbers={4001: 1, 6001: 2, 8001: 3}),
         Alias("LAND_SPEED", "MPC_LAND_SPEED", INT16, CM),
         Alias("LOIT_SPEED", "MPC_XY_VEL_MAX", REAL32, CM),
@@ -49,6 +49,9 @@ COPTER = ArduPilotVehicle(
         Alias("PILOT_Y_RATE", "MPC_MAN_Y_MAX", REAL32),
         Alias("PSC_JERK_XY", "MPC_JERK_AUTO", REAL32),
         *(Alias(f"PSC_{theirs}", f"MPC_{ours}", REAL32) for theirs, ours in _POSITION_GAINS.items()),
+        Alias("RTL_ALT", "RTL_RETURN_ALT", INT32, CM),
+        Alias("RTL_ALT_FINAL", "RTL_DESCEND_ALT", INT16, CM),
+        Alias("RTL_LOIT_TIME", "RTL_LAND_DELAY", INT32, MS),
         *(
             Alias(f"SERVO{i}_FUNCTION", "SYS_AUTOSTART", INT16, numbers={4001: 0, _SIX: 32 + i, _EIGHT: 32 + i})
             for i in (5, 6)
@@ -58,6 +61,7 @@ COPTER = ArduPilotVehicle(
             for i in (7, 8)
         ),
         Alias("WPNAV_ACCEL", "MPC_ACC_HOR", REAL32, CM),
+        Alias("WPNAV_RADIUS", "NAV_ACC_RAD", REAL32, CM),
         Alias("WPNAV_SPEED", "MPC_XY_CRUISE", REAL32, CM),
         Alias("WPNAV_SPEED_DN", "MPC_Z_V_AUTO_DN", REAL32, CM),
         Alias("WPNAV_SPEED_UP", "MPC_Z_V_AUTO_UP", REAL32, CM),

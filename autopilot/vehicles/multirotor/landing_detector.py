@@ -32,6 +32,16 @@ _AIR_BELOW_M = 1.0  # range finder reading that speaks against a landing; guess
 _AIR_BELOW_FACTOR = 5.0  # by which such a reading stretches the time needed
 
 
+_PX4 = "PX4 1.15 default"
+
+LANDING_DETECTOR_PARAMETERS: list[Parameter] = [
+    Parameter("LNDMC_Z_VEL_MAX", 0.25, 0.1, 1.0, "m/s", "largest vertical speed of a landed vehicle", _PX4),
+    Parameter("LNDMC_XY_VEL_MAX", 1.5, 0.5, 5.0, "m/s", "largest horizontal speed of a landed vehicle", _PX4),
+    Parameter("LNDMC_ROT_MAX", 20.0, 5.0, 100.0, "deg/s", "largest body rate of a landed vehicle", _PX4),
+    Parameter("LNDMC_TRIG_TIME", 1.0, 0.1, 10.0, "s", "time for which a vehicle must look landed", _PX4),
+]  # fmt: skip
+
+
 class LandingDetector:
     """Landing detection of one vehicle.
 

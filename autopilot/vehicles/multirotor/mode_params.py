@@ -13,6 +13,7 @@ MODE_PARAMETERS: list[Parameter] = [
     Parameter("MPC_LAND_ALT1", 10.0, 0.0, 122.0, "m", "height above ground from which a descent slows down", _PX4),
     Parameter("MPC_LAND_ALT2", 5.0, 0.0, 122.0, "m", "height above ground at which MPC_LAND_SPEED is reached", _PX4),
     Parameter("MPC_LAND_ALT3", 1.0, 0.0, 122.0, "m", "height above ground of the slow last part", _PX4),
+    Parameter("NAV_MC_ALT_RAD", 0.8, 0.05, 200.0, "m", "height error at which a waypoint counts as reached", _PX4),
     Parameter("MC_ORBIT_RAD", 20.0, 1.0, 1000.0, "m", "radius of an orbit that names none", "guess"),
     Parameter("MC_ORBIT_YAW_MOD", 0, 0, 3, "",
               "heading in an orbit: 0 to the centre, 1 as it was, 2 free, 3 along the circle", _PX4),

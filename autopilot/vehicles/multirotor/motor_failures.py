@@ -22,6 +22,18 @@ ReadSpeeds = Callable[[], Sequence[float]]  # [rad/s] of each rotor, as its ESC 
 LeaveOut = Callable[[Sequence[int]], None]  # tells the control allocation which rotors not to use, from 0
 
 
+_PX4 = "PX4 1.15 default"
+
+MOTOR_WATCH_PARAMETERS: list[Parameter] = [
+    Parameter("FD_ACT_EN", 1, 0, 1, "", "1: motors are watched by the speed their ESCs report", _PX4),
+    Parameter("FD_ACT_MOT_THR", 0.2, 0.0, 1.0, "norm", "motor command from which a motor is judged", _PX4),
+    Parameter("FD_ACT_MOT_TOUT", 100, 10, 10_000, "ms", "time for which a motor must be too slow", _PX4),
+    Parameter("CA_FAILURE_MODE", 1, 0, 1, "",
+              "1: the control allocation does without a failed motor, if six or more motors leave enough",
+              "PX4's numbers; its default is 0"),
+]  # fmt: skip
+
+
 class MotorWatch:
     """The motors of one vehicle.
 

@@ -8,13 +8,13 @@ from autopilot.ports import HEIGHT_VALID
 from autopilot.vehicles.multirotor.ardupilot import COPTER
 from autopilot.vehicles.multirotor.control_airframe import rotors_leaver
 from autopilot.vehicles.multirotor.defaults import airframe_defaults, hover_thrust
-from autopilot.vehicles.multirotor.landing_detector import LandingDetector
+from autopilot.vehicles.multirotor.landing_detector import LANDING_DETECTOR_PARAMETERS, LandingDetector
 from autopilot.vehicles.multirotor.law import MULTIROTOR_LAW
 from autopilot.vehicles.multirotor.mode_params import MODE_PARAMETERS
 from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
-from autopilot.vehicles.multirotor.motor_failures import MotorWatch
+from autopilot.vehicles.multirotor.motor_failures import MOTOR_WATCH_PARAMETERS, MotorWatch
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
-from autopilot.vehicles.vehicle_class import DriveParts, LandingLimits, MotionLimits, VehicleClass
+from autopilot.vehicles.vehicle_class import DriveParts, GroundHandling, MotionLimits, VehicleClass
 from common.airframes.multirotor import MultirotorAirframe
 from common.params import ParameterTable
 
@@ -42,10 +42,13 @@ _LIMITS = MotionLimits(
     accel_down="MPC_ACC_DOWN_MAX",
     jerk="MPC_JERK_MAX",
     jerk_auto="MPC_JERK_AUTO",
+    alt_radius="NAV_MC_ALT_RAD",
     path_error="MPC_XY_ERR_MAX",
     yaw_rate="MPC_YAWRAUTO_MAX",
 )
-_LANDING = LandingLimits(
+_GROUND = GroundHandling(
+    detector=_landing_detector,
+    lift_thrust=hover_thrust,
     takeoff_speed="MPC_TKO_SPEED",
     land_speed="MPC_LAND_SPEED",
     crawl_speed="MPC_LAND_CRWL",
@@ -73,7 +76,7 @@ def _motor_watch(parts: DriveParts) -> MotorWatch:
 MULTIROTOR = VehicleClass(
     name="multirotor",
     law=MULTIROTOR_LAW,
-    parameters=(*CONTROL_PARAMETERS, *MODE_PARAMETERS),
+    parameters=(*CONTROL_PARAMETERS, *MODE_PARAMETERS, *LANDING_DETECTOR_PARAMETERS, *MOTOR_WATCH_PARAMETERS),
     defaults=airframe_defaults,
     modes=MULTIROTOR_MODES,
     last_resort=Mode.LAND,
@@ -82,10 +85,8 @@ MULTIROTOR = VehicleClass(
     ardupilot=COPTER,
     motors=_clockwise,
     standing_height_m=lambda airframe: airframe.contact.leg_z_m,
-    ground_detector=_landing_detector,
-    landing=_LANDING,
-    yaw_mode="MPC_YAW_MODE",
-    lift_thrust=hover_thrust,
+    ground=_GROUND,
+    yaw_mode_param="MPC_YAW_MODE",
     arming_checks=(_height,),
     drive_watch=_motor_watch,
 )

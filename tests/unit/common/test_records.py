@@ -33,6 +33,16 @@ def test_record_holds_every_number_of_its_row(struct):
         assert_same(late_reader(rows, i_row, "Row")(), rows[i_row])
 
 
+def test_rows_of_the_same_names_and_other_places_are_told_apart():
+    """A reader is made once per type and name."""
+    packed = np.dtype([("a", "<f4"), ("b", "<f4")])
+    spread = np.dtype({"names": ["a", "b"], "formats": ["<f4", "<f4"], "offsets": [4, 12], "itemsize": 16})
+    for dtype in (packed, spread):
+        rows = np.zeros(2, dtype)
+        rows["a"], rows["b"] = (1.0, 2.0), (3.0, 4.0)
+        assert [tuple(row_reader(rows, i_row, "Row")()) for i_row in (0, 1)] == [(1.0, 3.0), (2.0, 4.0)]
+
+
 def test_reader_follows_the_live_row():
     rows = np.zeros(2, dtype=np.dtype(Estimate.numpy_dtype()))
     read = row_reader(rows, 1, "Estimate")

@@ -130,7 +130,7 @@ class MissionCommands(Service):
     def _turn(self, command: Command) -> Reply:
         """Turns to a heading, or by an angle, and keeps it until the next position, mission leg or mode.
 
-        Params: p1 heading or angle [deg]; p2 rate [deg/s], 0: MPC_YAWRAUTO_MAX; p3 1 clockwise, -1 counter-clockwise,
+        Params: p1 heading or angle [deg]; p2 rate [deg/s], 0: the fastest; p3 1 clockwise, -1 counter-clockwise,
         0 the short way; p4 1: p1 is an angle to turn by.
         Refused: TEMPORARILY_REJECTED on the ground; DENIED for an angle or rate out of range.
         """

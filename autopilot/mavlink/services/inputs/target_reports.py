@@ -155,7 +155,7 @@ class TargetService(Service):
     def _orbit(self, command: Command) -> Reply:
         """Flies round a point until another mode is chosen, or for a number of turns.
 
-        Params: p1 radius [m], positive is clockwise, NaN: MC_ORBIT_RAD; p2 speed [m/s], negative turns the other way,
+        Params: p1 radius [m], positive is clockwise, NaN: the usual one; p2 speed [m/s], negative turns the other way,
         NaN: 5 or what the circle allows; p3 heading: 0 to the centre, 1 as it was, 2 free, 3 along the circle, 4 by the
         yaw stick, 5 as before; p4 turns [rad], 0 or NaN: for ever; p5, p6 centre, NaN: here, or the present centre; p7
         altitude above sea level, in frames relative to home too (PX4), NaN: as it is.

@@ -5,9 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.ports import TERRAIN_VALID, VELOCITY_VALID
-from autopilot.vehicles.multirotor.landing_detector import LandingDetector
+from autopilot.vehicles.multirotor.landing_detector import LANDING_DETECTOR_PARAMETERS, LandingDetector
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
 from common.params import ParameterTable
 
@@ -16,7 +15,7 @@ DT_S = 0.02
 
 
 def detector():
-    return LandingDetector(ParameterTable([*COMMANDER_PARAMETERS, *CONTROL_PARAMETERS]), HOVER)
+    return LandingDetector(ParameterTable([*LANDING_DETECTOR_PARAMETERS, *CONTROL_PARAMETERS]), HOVER)
 
 
 def estimate(vel=(0.0, 0.0, 0.0), omega=(0.0, 0.0, 0.0), flags=VELOCITY_VALID, down=0.0, accel_z=-9.8):
@@ -90,7 +89,7 @@ def test_descent_in_strong_turbulence_is_never_taken_for_a_landing():
 def test_descent_that_stalls_just_above_the_ground_is_contact_though_the_thrust_is_still_high(
     height, sink, descent_sp, is_felt
 ):
-    landing = LandingDetector(ParameterTable([*COMMANDER_PARAMETERS, *CONTROL_PARAMETERS]), HOVER, 0.22)
+    landing = LandingDetector(ParameterTable([*LANDING_DETECTOR_PARAMETERS, *CONTROL_PARAMETERS]), HOVER, 0.22)
     row = estimate(vel=(0.0, 0.0, sink), flags=VELOCITY_VALID | TERRAIN_VALID, down=-height)
     for _ in range(10):
         landing.update(row, HOVER, descent_sp, DT_S)
@@ -109,7 +108,7 @@ def test_contact_outlasts_a_bounce_and_ends_with_a_fall():
 
 
 def test_range_finder_that_tells_of_ground_where_there_is_none_is_not_believed_for_long():
-    landing = LandingDetector(ParameterTable([*COMMANDER_PARAMETERS, *CONTROL_PARAMETERS]), HOVER, 0.22)
+    landing = LandingDetector(ParameterTable([*LANDING_DETECTOR_PARAMETERS, *CONTROL_PARAMETERS]), HOVER, 0.22)
     flags = VELOCITY_VALID | TERRAIN_VALID
     stalled = estimate(flags=flags, down=-0.2)
 

@@ -4,9 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from autopilot.commander.params import COMMANDER_PARAMETERS
 from autopilot.interface.vehicle_state import LandedState
-from autopilot.vehicles.multirotor.motor_failures import MotorWatch
+from autopilot.vehicles.multirotor.motor_failures import MOTOR_WATCH_PARAMETERS, MotorWatch
 from common.airframe import load_airframe
 from common.params import ParameterTable
 from tests.unit.autopilot.kinematic import Recorder
@@ -27,7 +26,7 @@ class Bench:
         self.speeds = [self.asked] * 8
         self.left_out = []
         self.recorder = Recorder()
-        table = ParameterTable(COMMANDER_PARAMETERS)
+        table = ParameterTable(MOTOR_WATCH_PARAMETERS)
         for name_, value in params.items():
             table.set(name_, value)
         self.state = SimpleNamespace(
