@@ -18,6 +18,7 @@ SETPOINT_TRAJECTORY = wp.constant(1)  # position, velocity, acceleration, yaw; s
 SETPOINT_ATTITUDE = wp.constant(2)  # attitude (yaw by rate where yaw_rate is finite) and thrust
 SETPOINT_RATE = wp.constant(3)  # body rates and thrust
 SETPOINT_LEAN = wp.constant(4)  # roll and pitch as an attitude; yaw rate, height or climb rate by the trajectory
+SETPOINT_DRIVE = wp.constant(5)  # along the nose: speed, or throttle; and heading, yaw rate or steering
 
 # What the commander says of the vehicle
 CONTACT_UNKNOWN = wp.constant(0)  # nobody says, as in a replay
@@ -108,6 +109,15 @@ class ExternalSample:
 
 
 @wp.struct
+class WheelSample:
+    """How fast the ground goes by under the wheels of either side, as their encoders count it; slip included."""
+
+    time_us: wp.int64
+    left_m_s: float  # forward
+    right_m_s: float
+
+
+@wp.struct
 class BatterySample:
     time_us: wp.int64
     voltage_v: float
@@ -123,6 +133,7 @@ class Samples:
     baro: BaroSample
     mag: MagSample
     range: RangeSample
+    wheels: WheelSample
     battery: BatterySample
 
 
@@ -139,13 +150,15 @@ class Setpoint:
     yaw: float  # [rad]
     yaw_rate: float  # [rad/s]
     path_start_ned: wp.vec3  # [m] finite: keep to the straight line from here to pos_ned
-    cruise_speed: float  # [m/s] horizontal, NaN: the class's own
+    cruise_speed: float  # [m/s] horizontal, NaN: the class's own; negative: backwards, for what can
     climb_speed: float  # [m/s] up, NaN: the class's own
     descend_speed: float  # [m/s] down, NaN: the class's own
     exit_speed: float  # [m/s] speed with which pos_ned may be passed, 0: stop there
     q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE; SETPOINT_LEAN: its heading is not used
     omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE
-    thrust: float  # [0..1] fraction of the maximum thrust
+    thrust: float  # [0..1] fraction of the maximum thrust; SETPOINT_DRIVE: throttle [-1..1] where `speed` is NaN
+    speed: float  # [m/s] SETPOINT_DRIVE: along the nose, negative backwards
+    steering: float  # [-1..1] SETPOINT_DRIVE: to the right, where `yaw` and `yaw_rate` are NaN
     motor_test: vec8  # [0..1] commands of the motors while the vehicle is disarmed, not otherwise
 
 
@@ -190,7 +203,7 @@ class Estimate:
 class Actuators:
     """Motor commands, and the setpoints actually flown (for telemetry and logs)."""
 
-    command: vec8  # [0..1] per motor, what an ESC receives
+    command: vec8  # [0..1] or [-1..1] per output, as its class says: what an ESC or a servo receives
     traj_pos_ned: wp.vec3
     traj_vel_ned: wp.vec3
     traj_accel_ned: wp.vec3

@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 
 from autopilot.interface.client_requests import OffboardSetpoint
-from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_IDLE, SETPOINT_LEAN, SETPOINT_RATE, SETPOINT_TRAJECTORY
+from autopilot.ports import (
+    SETPOINT_ATTITUDE,
+    SETPOINT_DRIVE,
+    SETPOINT_IDLE,
+    SETPOINT_LEAN,
+    SETPOINT_RATE,
+    SETPOINT_TRAJECTORY,
+)
 from common.kernels import MAX_MOTORS
 
 Vector = tuple[float, float, float]
@@ -20,10 +27,11 @@ FREE: Vector = (nan, nan, nan)
 _NOT_HOLDING_M_S = 0.01
 _LARGEST = 1.0e9  # its square is within single precision
 _LEVEL_NORTH = (0.0, 0.0, 0.0, 1.0)
-_LAYOUT = f"<3i{26 + MAX_MOTORS}f"  # kind, is_armed, is_landed, then the floats of autopilot.ports.Setpoint
+_LAYOUT = f"<3i{28 + MAX_MOTORS}f"  # kind, is_armed, is_landed, then the floats of autopilot.ports.Setpoint
 _FIELDS = (
     "kind", "is_armed", "is_landed", "pos_ned", "vel_ned", "accel_ned", "yaw", "yaw_rate", "path_start_ned",
-    "cruise_speed", "climb_speed", "descend_speed", "exit_speed", "q_ned_from_frd", "omega_frd", "thrust", "motor_test",
+    "cruise_speed", "climb_speed", "descend_speed", "exit_speed", "q_ned_from_frd", "omega_frd", "thrust", "speed",
+    "steering", "motor_test",
 )  # fmt: skip
 
 
@@ -37,7 +45,7 @@ class SetpointPort:
     __slots__ = (
         "_buffer", "_is_changed", "_motor_test", "_pack_into", "_press_speed", "_settling", "accel_ned", "climb_speed",
         "cruise_speed", "descend_speed", "exit_speed", "is_armed", "is_landed", "kind", "omega_frd", "path_start_ned",
-        "pos_ned", "q_ned_from_frd", "thrust", "vel_ned", "yaw", "yaw_rate",
+        "pos_ned", "q_ned_from_frd", "speed", "steering", "thrust", "vel_ned", "yaw", "yaw_rate",
     )  # fmt: skip
 
     def __init__(self, row: np.ndarray[Any, Any]) -> None:
@@ -209,6 +217,31 @@ class SetpointPort:
         self.omega_frd = omega_frd
         self.thrust = thrust
 
+    def drive(
+        self,
+        *,
+        speed: float = nan,
+        throttle: float = nan,
+        yaw: float = nan,
+        yaw_rate: float = nan,
+        steering: float = nan,
+    ) -> None:
+        """Asks for a speed along the nose [m/s] or a throttle [-1..1], and where to: by one of the other three.
+
+        Args:
+            speed: [m/s] negative backwards.
+            throttle: [-1..1] where the speed is NaN.
+            yaw: [rad] heading of the nose.
+            yaw_rate: [rad/s] where the heading is NaN; with it, added to what the heading asks for.
+            steering: [-1..1] to the right, where both are NaN.
+        """
+        asked = (speed, throttle, yaw, yaw_rate, steering)
+        if self.kind == SETPOINT_DRIVE and asked == (self.speed, self.thrust, self.yaw, self.yaw_rate, self.steering):
+            return
+        self._free_all()
+        self.kind = SETPOINT_DRIVE
+        self.speed, self.thrust, self.yaw, self.yaw_rate, self.steering = asked
+
     def follow(self, setpoint: OffboardSetpoint, cruise_speed: float) -> None:
         """Asks for what an external client sent."""
         self._free_all()
@@ -279,7 +312,8 @@ class SetpointPort:
         values = (
             *pos_ned, *vel_ned, *self.accel_ned, self.yaw,
             yaw_rate, *path_start_ned, self.cruise_speed, self.climb_speed, self.descend_speed, self.exit_speed,
-            *q_ned_from_frd, *self.omega_frd, thrust, *self._motor_test,
+            *q_ned_from_frd, *self.omega_frd, thrust, self.speed, self.steering,
+            *self._motor_test,
         )  # fmt: skip
         try:
             self._pack_into(self._buffer, 0, *flags, *values)
@@ -293,4 +327,5 @@ class SetpointPort:
         self.pos_ned = self.vel_ned = self.accel_ned = self.path_start_ned = self.omega_frd = FREE
         self.q_ned_from_frd = _LEVEL_NORTH
         self.yaw = self.yaw_rate = self.cruise_speed = self.climb_speed = self.descend_speed = self.thrust = nan
+        self.speed = self.steering = nan
         self.exit_speed = 0.0
