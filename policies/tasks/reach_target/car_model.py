@@ -10,6 +10,7 @@ relaxation, camber, air drag (Unity's default is none).
 import warp as wp
 
 from policies.tasks.reach_target.reach_target_params import ReachParams
+from sim.bodies.tyre import Tyre, force_per_slip, tyre_of
 
 wp.set_module_options({"enable_backward": False})
 
@@ -22,16 +23,6 @@ _SUBSTEP_S = wp.constant(STEP_S / SUBSTEPS)
 _RAD = wp.constant(0.017453292519943295)
 _UPRIGHT = wp.constant(0.2)  # up·y below which no wheel reaches the ground beside the chassis (guess: 78 deg of tilt)
 _TINY = wp.constant(1e-6)
-
-
-@wp.struct
-class Tyre:
-    """One direction of a tyre: force over load, by slip over the slip of the peak."""
-
-    peak: float  # force over load at the extremum
-    tail: float  # force over load from the asymptote on
-    knee: float  # asymptote slip over extremum slip
-    per_slip: float  # 1 over extremum slip
 
 
 @wp.struct
@@ -139,17 +130,6 @@ def car_of(n: ReachParams) -> Car:
 
 
 @wp.func
-def tyre_of(extremum_slip: float, extremum: float, asymptote_slip: float, asymptote: float) -> Tyre:
-    """One direction of a tyre of stiffness 1."""
-    tyre = Tyre()
-    tyre.peak = extremum
-    tyre.tail = asymptote
-    tyre.per_slip = 1.0 / extremum_slip
-    tyre.knee = wp.max(asymptote_slip * tyre.per_slip, 1.001)
-    return tyre
-
-
-@wp.func
 def controls_of(n: ReachParams, steer: float, throttle: float, brake: float) -> Controls:
     """What the clipped actions do: steering in [-1, 1] (right is positive), throttle in [-1, 1], brake in [0, 1]."""
     controls = Controls()
@@ -159,19 +139,6 @@ def controls_of(n: ReachParams, steer: float, throttle: float, brake: float) -> 
     controls.motor_nm = wp.clamp(throttle, -1.0, 1.0) * n.motor_torque_nm
     controls.brake_nm = wp.clamp(brake, 0.0, 1.0) * n.brake_torque_nm
     return controls
-
-
-@wp.func
-def force_per_slip(tyre: Tyre, slip: float) -> float:
-    """Force over load, divided by `slip` (at least 0; 1 is the peak).
-
-    Unity's curve is a two-piece spline, flat at the extremum and at the asymptote; from the origin to the extremum we
-    take the parabola, the only quadratic that is.
-    """
-    if slip < 1.0:
-        return tyre.peak * (2.0 - slip)
-    fraction = wp.min((slip - 1.0) / (tyre.knee - 1.0), 1.0)
-    return (tyre.peak + (tyre.tail - tyre.peak) * fraction * fraction * (3.0 - 2.0 * fraction)) / slip
 
 
 @wp.func

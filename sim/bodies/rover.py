@@ -1,0 +1,356 @@
+"""A rover's body: motors, servo, brakes, four sprung wheels with tyres, hull, 1,000 steps a second.
+
+In: commands (steering or left side, throttle or right side, brake), the wind, the world. Out: true motion, what an
+ideal IMU would measure, wheel speeds, battery. `rover_tick` is one 4 ms tick of four substeps.
+
+A tyre is a spring between the wheel and the ground that the wheel's rolling unwinds (first-order relaxation, H. B.
+Pacejka, "Tire and Vehicle Dynamics", 2012, chapter 7): at speed its deflection is the slip times the relaxation length,
+at standstill it holds like a spring, so that a braked rover stands on a slope. The slip curve takes the length of the
+deflection, so that what is used along the wheel is missing across it.
+Left out: unsprung masses, momentum of the wheels, camber, roll steer, roughness of the ground below its grid.
+"""
+
+import warp as wp
+
+from common.geodesy import GRAVITY_M_S2
+from common.kernels import SUBSTEPS, TICK_S, vec8
+from common.rotation import quat_from_yaw
+from sim.battery import battery_current, open_circuit_voltage
+from sim.bodies.body import Body
+from sim.bodies.multirotor import turned_by
+from sim.bodies.rover_hull import HullContact, hull_contact, is_near_obstacle, look_at_hull
+from sim.bodies.rover_model import RoverModel, rover_model
+from sim.bodies.tyre import force_per_slip
+from sim.truth import Truth
+from sim.world.world import World, ground_height, ground_normal_ned
+
+wp.set_module_options({"enable_backward": False})
+
+_GRAVITY_NED = wp.constant(wp.vec3(0.0, 0.0, GRAVITY_M_S2))
+_SEA_LEVEL_DENSITY_KG_M3 = wp.constant(1.225)  # ISO 2533 standard atmosphere
+_SUBSTEP_S = wp.constant(TICK_S / SUBSTEPS)
+_SUBSTEP_COUNT = wp.constant(SUBSTEPS)
+_WHEELS = wp.constant(4)
+_TINY = wp.constant(1.0e-6)
+_ROLLING_M_S = wp.constant(0.3)  # tread speed at which the damping of a standing tyre has halved
+_UPRIGHT = wp.constant(0.17)  # cosine of the tilt below which it lies on its side, or its roof: 80 deg
+
+
+@wp.struct
+class RoverState:
+    """All that a rover's body needs to go on; what others may read of it is its `Truth`."""
+
+    pos_ned: wp.vec3  # [m]
+    vel_ned: wp.vec3  # [m/s]
+    q_ned_from_frd: wp.quat
+    omega_frd: wp.vec3  # [rad/s]
+    wheel_speed: wp.vec4  # [rad/s] positive forward
+    deflection_x: wp.vec4  # [m] of each tyre along its wheel, forward
+    deflection_y: wp.vec4  # [m] across it, to the right
+    drive_n: wp.vec4  # [N] of the motor at each tread
+    tread_m_s: wp.vec2  # of the rear wheels, left and right
+    steering_rad: float  # of a wheel in the middle, to the right
+    accel_frd: wp.vec3  # [m/s²] specific force, mean over the last tick
+    gyro_frd: wp.vec3  # [rad/s] mean over the last tick
+    height_agl_m: float  # of the centre of gravity over the ground below
+    battery_charge_c: float  # [C] left
+    battery_rounding_c: float  # [C] what rounding has added to it, to be taken off (Kahan's sum)
+    battery_voltage_v: float
+    battery_current_a: float
+    is_on_ground: int  # a wheel touches
+    is_crashed: int  # for good: struck something too fast, or tipped over
+    impact_speed: float  # [m/s] largest speed along a contact normal of the hull so far
+    is_held: int  # in somebody's hands: stays in its place and turns with omega_frd alone
+
+
+@wp.struct
+class DriveInputs:
+    """What acts on a rover over the substeps of a tick."""
+
+    side_speed_m_s: wp.vec2  # [m/s] treads of either side, that the motors would reach without load
+    steering_rad: float  # asked for
+    brake_nm: wp.vec2  # of each front and each rear wheel
+    ground_m: wp.vec4  # [m] height of the ground below each hub
+    normal_ned: wp.vec3  # of the ground, pointing up
+    wind_ned: wp.vec3  # [m/s]
+    density_ratio: float
+    is_near_obstacle: int
+
+
+@wp.struct
+class WheelsForce:
+    """What the ground does to the wheels, and those to the body."""
+
+    force_frd: wp.vec3  # [N]
+    torque_frd: wp.vec3  # [N m]
+    touching: int  # wheels
+
+
+@wp.func
+def drive_inputs(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.vec3, world: World) -> DriveInputs:
+    """All that stays the same over the substeps of a tick."""
+    inputs = DriveInputs()
+    rot = wp.quat_to_matrix(body.q_ned_from_frd)
+    inputs.normal_ned = ground_normal_ned(world, body.pos_ned[0], body.pos_ned[1])
+    for k in range(_WHEELS):
+        hub_ned = body.pos_ned + rot * wp.vec3(model.hub_x[k], model.hub_y[k], model.hub_z)
+        inputs.ground_m[k] = ground_height(world, hub_ned[0], hub_ned[1])
+    inputs.wind_ned = wind_ned
+    inputs.density_ratio = model.home_density_ratio
+    inputs.is_near_obstacle = is_near_obstacle(model, world, body.pos_ned)
+    inputs.brake_nm = (model.radius_m * wp.clamp(command[2], 0.0, 1.0)) * model.brake_max_n
+    if body.is_crashed == 0:
+        top = model.motor_speed_m_s * body.battery_voltage_v / model.battery.full_v
+        left = command[1]
+        if model.is_skid == 1:
+            left = command[0]
+        else:
+            inputs.steering_rad = model.steering_max_rad * wp.clamp(command[0], -1.0, 1.0)
+        inputs.side_speed_m_s = top * wp.vec2(wp.clamp(left, -1.0, 1.0), wp.clamp(command[1], -1.0, 1.0))
+    return inputs
+
+
+@wp.func
+def steered(model: RoverModel, steering_rad: float, wheel: int) -> float:
+    """Angle of a front wheel [rad]: both stand across the radius of the same circle (Ackermann)."""
+    tangent = wp.tan(steering_rad)
+    offset = model.half_track_m
+    if wheel % 2 == 0:  # left: the farther out in a turn to the right
+        offset = -offset
+    return wp.atan(tangent * model.wheel_base_m / (model.wheel_base_m - tangent * offset))
+
+
+@wp.func
+def servo_step(model: RoverModel, angle: float, asked: float) -> float:
+    """The steering angle after a substep [rad]: a lag, and a greatest rate."""
+    most = model.steering_rate_rad_s * _SUBSTEP_S
+    return angle + wp.clamp(model.steering_gain * (asked - angle), -most, most)
+
+
+@wp.func
+def motor_target_n(model: RoverModel, inputs: DriveInputs, wheel_speed: wp.vec4, wheel: int) -> float:
+    """Force [N] that a motor gives at a tread: by the speed that is missing, within its current limit.
+
+    One motor drives a rear axle by its mean speed; a wheel with a motor of its own by its own.
+    """
+    rolling = model.radius_m * wheel_speed[wheel]
+    if model.is_driven[0] == 0.0:
+        rolling = 0.5 * model.radius_m * (wheel_speed[2] + wheel_speed[3])
+    free = inputs.side_speed_m_s[wheel % 2]
+    force = model.motor_n_s_m * (free - rolling)
+    return model.is_driven[wheel] * wp.clamp(force, -model.motor_max_n, model.motor_max_n)
+
+
+@wp.func
+def add_wheel(
+    model: RoverModel,
+    body: RoverState,
+    inputs: DriveInputs,
+    total: WheelsForce,
+    wheel: int,
+    heading_frd: wp.vec3,
+    normal_frd: wp.vec3,
+    normal_ned: wp.vec3,
+    rot: wp.mat33,
+    vel_frd: wp.vec3,
+) -> tuple[RoverState, WheelsForce]:
+    """Advances one wheel by a substep and adds its force and torque on the body."""
+    dt = _SUBSTEP_S
+    drive_n = body.drive_n[wheel]
+    drive_n = drive_n + model.motor_gain * (motor_target_n(model, inputs, body.wheel_speed, wheel) - drive_n)
+    body.drive_n[wheel] = drive_n
+    hub_frd = wp.vec3(model.hub_x[wheel], model.hub_y[wheel], model.hub_z)
+    hub_ned = body.pos_ned + rot * hub_frd
+    drop_m = (-hub_ned[2] - inputs.ground_m[wheel]) * (-normal_ned[2])  # along the normal
+    squeeze_m = model.radius_m - drop_m
+    radius = model.radius_m
+    rolling = radius * body.wheel_speed[wheel]
+    along_n = float(0.0)
+    load = float(0.0)
+    if squeeze_m > 0.0:
+        arm_frd = hub_frd - normal_frd * drop_m
+        vel_point_frd = vel_frd + wp.cross(body.omega_frd, arm_frd)
+        load = wp.max(model.spring_n_m * squeeze_m - model.damper_n_s_m * wp.dot(vel_point_frd, normal_frd), 0.0)
+        ahead = wp.normalize(heading_frd - wp.dot(heading_frd, normal_frd) * normal_frd)
+        right = wp.cross(ahead, normal_frd)
+        slide_x = rolling - wp.dot(vel_point_frd, ahead)
+        slide_y = -wp.dot(vel_point_frd, right)
+        unwind = 1.0 / (1.0 + dt * wp.abs(rolling) * model.relaxation_inv)
+        x = (body.deflection_x[wheel] + dt * slide_x) * unwind
+        y = (body.deflection_y[wheel] + dt * slide_y) * unwind
+        slip = wp.sqrt(x * x + y * y) / model.peak_deflection_m
+        if slip > model.tyre.knee:
+            x = x * model.tyre.knee / slip
+            y = y * model.tyre.knee / slip
+            slip = model.tyre.knee
+        per_m = load * force_per_slip(model.tyre, slip) / model.peak_deflection_m
+        standing = load * model.standstill_n_s_m / (1.0 + wp.abs(rolling) / _ROLLING_M_S)
+        if slip >= 1.0:
+            standing = 0.0
+        along_n = per_m * x + standing * slide_x
+        across_n = per_m * y + standing * slide_y
+        most = load * model.tyre.peak
+        size = wp.sqrt(along_n * along_n + across_n * across_n)
+        if size > most:
+            along_n = along_n * most / size
+            across_n = across_n * most / size
+        body.deflection_x[wheel] = x
+        body.deflection_y[wheel] = y
+        force_frd = load * normal_frd + along_n * ahead + across_n * right
+        total.force_frd += force_frd
+        total.torque_frd += wp.cross(arm_frd, force_frd)
+        total.touching += 1
+    else:
+        body.deflection_x[wheel] = 0.0
+        body.deflection_y[wheel] = 0.0
+    free = body.wheel_speed[wheel] + dt * model.wheel_inertia_inv * radius * (drive_n - along_n)
+    friction_nm = inputs.brake_nm[wheel // 2] + model.rolling_resistance * load * radius
+    most_change = dt * model.wheel_inertia_inv * friction_nm
+    body.wheel_speed[wheel] = wp.sign(free) * wp.max(wp.abs(free) - most_change, 0.0)
+    return body, total
+
+
+@wp.func
+def angular_accel(model: RoverModel, omega_frd: wp.vec3, torque_frd: wp.vec3) -> wp.vec3:
+    """Euler's equation [rad/s²]."""
+    momentum = wp.cw_mul(model.inertia_frd, omega_frd)
+    return wp.cw_mul(torque_frd - wp.cross(omega_frd, momentum), model.inertia_inv_frd)
+
+
+@wp.func
+def _substep(model: RoverModel, body: RoverState, inputs: DriveInputs, hull: HullContact) -> RoverState:
+    dt = _SUBSTEP_S
+    rot = wp.quat_to_matrix(body.q_ned_from_frd)
+    to_frd = wp.transpose(rot)
+    normal_frd = to_frd * inputs.normal_ned
+    vel_frd = to_frd * body.vel_ned
+    air_vel_frd = to_frd * (body.vel_ned - inputs.wind_ned)
+    pressure = -0.5 * _SEA_LEVEL_DENSITY_KG_M3 * inputs.density_ratio * wp.length(air_vel_frd)
+    body.steering_rad = servo_step(model, body.steering_rad, inputs.steering_rad)
+    total = WheelsForce()
+    total.force_frd = pressure * wp.cw_mul(model.drag_area_frd, air_vel_frd)
+    nose = wp.vec3(1.0, 0.0, 0.0)
+    for wheel in range(_WHEELS):
+        heading = nose
+        if wheel < 2 and model.is_skid == 0:
+            angle = steered(model, body.steering_rad, wheel)
+            heading = wp.vec3(wp.cos(angle), wp.sin(angle), 0.0)
+        body, total = add_wheel(model, body, inputs, total, wheel, heading, normal_frd, inputs.normal_ned, rot, vel_frd)
+    if total.touching > 0:
+        body.is_on_ground = 1
+    force_frd = total.force_frd
+    torque_frd = total.torque_frd
+    touch = hull_contact(model, hull, body.pos_ned, vel_frd, rot, body.omega_frd)
+    force_frd += touch.force_frd
+    torque_frd += touch.torque_frd
+    body.impact_speed = wp.max(body.impact_speed, touch.impact_speed_m_s)
+    if touch.impact_speed_m_s > model.crash_speed_m_s:
+        body.is_crashed = 1
+    omega = body.omega_frd
+    body.accel_frd = force_frd * model.mass_inv
+    middle_accel_frd = body.accel_frd + wp.cross((0.5 * dt) * omega, body.accel_frd)  # the body turns meanwhile
+    accel_ned = rot * middle_accel_frd + _GRAVITY_NED
+    body.pos_ned = body.pos_ned + dt * (body.vel_ned + (0.5 * dt) * accel_ned)
+    body.vel_ned = body.vel_ned + dt * accel_ned
+    body.omega_frd = omega + dt * angular_accel(model, omega, torque_frd)
+    body.gyro_frd = 0.5 * (omega + body.omega_frd)
+    body.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.gyro_frd * dt)
+    return body
+
+
+@wp.func
+def drain_battery(model: RoverModel, body: RoverState, inputs: DriveInputs, dt: float) -> RoverState:
+    """Voltage, current and charge after dt [s]: a motor takes its force times the speed it was asked for."""
+    power_w = model.battery.avionics_w
+    for k in range(_WHEELS):
+        power_w += wp.max(body.drive_n[k] * inputs.side_speed_m_s[k % 2], 0.0) / model.battery.motor_efficiency
+    open_v = open_circuit_voltage(model.battery, body.battery_charge_c)
+    body.battery_current_a = battery_current(model.battery, open_v, power_w)
+    body.battery_voltage_v = open_v - model.battery.resistance_ohm * body.battery_current_a
+    taken_c = body.battery_current_a * dt + body.battery_rounding_c
+    left_c = body.battery_charge_c - taken_c
+    body.battery_rounding_c = (left_c - body.battery_charge_c) + taken_c
+    body.battery_charge_c = left_c
+    return body
+
+
+@wp.func
+def held_tick(body: RoverState) -> RoverState:
+    """A tick of a vehicle that is held in its place and turned at omega_frd, wheels stopped."""
+    out = body
+    out.vel_ned = wp.vec3()
+    out.gyro_frd = body.omega_frd
+    out.accel_frd = wp.quat_rotate_inv(body.q_ned_from_frd, -_GRAVITY_NED)
+    out.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.omega_frd * TICK_S)
+    out.wheel_speed = wp.vec4()
+    out.tread_m_s = wp.vec2()
+    return out
+
+
+@wp.func
+def rover_tick(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.vec3, world: World) -> RoverState:
+    """One tick: four substeps, accel_frd and gyro_frd as means over them, then the battery."""
+    if body.is_held == 1:
+        return held_tick(body)
+    inputs = drive_inputs(model, body, command, wind_ned, world)
+    hull = look_at_hull(model, world, body.pos_ned, body.q_ned_from_frd, inputs.normal_ned, inputs.is_near_obstacle)
+    body.height_agl_m = hull.height_agl_m
+    body.is_on_ground = 0
+    accel_sum = wp.vec3()
+    gyro_sum = wp.vec3()
+    substeps = int(_SUBSTEP_COUNT)  # a dynamic loop, as the multirotor's
+    for _step in range(substeps):
+        body = _substep(model, body, inputs, hull)
+        accel_sum += body.accel_frd
+        gyro_sum += body.gyro_frd
+    body.accel_frd = accel_sum / float(_SUBSTEP_COUNT)
+    body.gyro_frd = gyro_sum / float(_SUBSTEP_COUNT)
+    body.tread_m_s = model.radius_m * wp.vec2(body.wheel_speed[2], body.wheel_speed[3])
+    up = wp.quat_rotate(body.q_ned_from_frd, wp.vec3(0.0, 0.0, -1.0))
+    if wp.dot(up, inputs.normal_ned) < _UPRIGHT:
+        body.is_crashed = 1
+    return drain_battery(model, body, inputs, TICK_S)
+
+
+@wp.func
+def rover_truth(body: RoverState) -> Truth:
+    """What others may read of the body."""
+    truth = Truth()
+    truth.pos_ned = body.pos_ned
+    truth.vel_ned = body.vel_ned
+    truth.q_ned_from_frd = body.q_ned_from_frd
+    truth.omega_frd = body.omega_frd
+    truth.accel_frd = body.accel_frd
+    truth.gyro_frd = body.gyro_frd
+    for k in range(_WHEELS):
+        truth.motor_speed[k] = body.wheel_speed[k]
+    truth.wheel_speed_m_s = body.tread_m_s
+    truth.steering_rad = body.steering_rad
+    truth.height_agl_m = body.height_agl_m
+    truth.battery_voltage_v = body.battery_voltage_v
+    truth.battery_current_a = body.battery_current_a
+    truth.is_on_ground = body.is_on_ground
+    truth.is_crashed = body.is_crashed
+    truth.impact_speed = body.impact_speed
+    return truth
+
+
+@wp.func
+def rover_at_rest(model: RoverModel, pos_ned: wp.vec3, yaw_rad: float) -> RoverState:
+    """A rover level and still at pos_ned, battery full."""
+    body = RoverState()
+    body.pos_ned = pos_ned
+    body.q_ned_from_frd = quat_from_yaw(yaw_rad)
+    body.accel_frd = -_GRAVITY_NED
+    body.battery_charge_c = model.battery.capacity_c
+    body.battery_voltage_v = model.battery.full_v
+    return body
+
+
+@wp.func
+def rover_standing_height(model: RoverModel) -> float:
+    """Of the centre of gravity over the ground [m] that its wheels stand on."""
+    return model.standing_m
+
+
+ROVER_BODY = Body(RoverModel, RoverState, rover_tick, rover_truth, rover_at_rest, rover_standing_height, rover_model)

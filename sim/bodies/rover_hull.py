@@ -1,0 +1,152 @@
+"""A rover's hull against ground and obstacles: springs with dampers and friction, at points of a box.
+
+In: pose and motion, each 1 ms. Out: force and torque. The surroundings are looked up once a tick and treated as planes
+for its four substeps: one for the ground, and one for each point of the outline that is near an obstacle. The outline
+is ten balls round the box at the height of the hubs, so that corners, sides and ends are stopped and turned.
+"""
+
+import warp as wp
+
+from sim.bodies.rover_model import RoverModel
+from sim.world.world import World, ground_height, obstacle_contact
+
+wp.set_module_options({"enable_backward": False})
+
+POINTS = 10
+_POINTS = wp.constant(POINTS)
+vec10 = wp.types.vector(length=POINTS, dtype=wp.float32)
+
+_MARGIN_M = wp.constant(0.2)  # an obstacle nearer than this is found before the substeps reach it
+_FRICTION = wp.constant(0.4)  # guess: plastic on bark, steel on stone
+_STICKING_M_S = wp.constant(0.05)  # speed below which friction falls to nothing
+_BALL = wp.constant(0.25)  # radius of a ball over the half width
+_THIRD = wp.constant(1.0 / 3.0)
+
+
+@wp.struct
+class HullContact:
+    """What is near a hull, valid for one tick."""
+
+    height_agl_m: float  # of the centre of gravity, vertically
+    normal_ned: wp.vec3  # of the ground, pointing up
+    ground_offset_m: float  # of the ground's plane along its normal
+    is_near_obstacle: int
+    normal_x: vec10  # ned, from the obstacle to the ball
+    normal_y: vec10
+    normal_z: vec10
+    offset_m: vec10  # of each plane along its normal: a ball's centre below it touches
+
+
+@wp.struct
+class HullForce:
+    """Sum over all touching points."""
+
+    force_frd: wp.vec3  # [N]
+    torque_frd: wp.vec3  # [N m]
+    impact_speed_m_s: float  # largest approach speed along a normal
+
+
+@wp.func
+def outline_frd(model: RoverModel, point: int) -> wp.vec3:
+    """The centre of a ball [m]: three at the front, three at the rear, two on either side between."""
+    ball_m = _BALL * model.hull_half_width_m
+    half = model.hull_half_width_m - ball_m
+    front = model.hull_front_m - ball_m
+    rear = ball_m - model.hull_rear_m
+    if point < 3:
+        return wp.vec3(front, half * float(point - 1), model.hub_z)
+    if point < 6:
+        return wp.vec3(rear, half * float(point - 4), model.hub_z)
+    x = rear + (front - rear) * _THIRD
+    if point % 2 == 1:
+        x = rear + (front - rear) * 2.0 * _THIRD
+    if point < 8:
+        return wp.vec3(x, half, model.hub_z)
+    return wp.vec3(x, -half, model.hub_z)
+
+
+@wp.func
+def is_near_obstacle(model: RoverModel, world: World, pos_ned: wp.vec3) -> int:
+    """Whether a trunk, crown or wall may be reached within a tick."""
+    touch = obstacle_contact(world, pos_ned, model.hull_reach_m + _MARGIN_M)
+    if touch[3] > 0.0:
+        return 1
+    return 0
+
+
+@wp.func
+def look_at_hull(
+    model: RoverModel, world: World, pos_ned: wp.vec3, q_ned_from_frd: wp.quat, normal_ned: wp.vec3, is_near: int
+) -> HullContact:
+    """Ground plane, and the nearest obstacle of each point of the outline."""
+    hull = HullContact()
+    ground_m = ground_height(world, pos_ned[0], pos_ned[1])
+    hull.height_agl_m = -pos_ned[2] - ground_m
+    hull.normal_ned = normal_ned
+    hull.ground_offset_m = wp.dot(normal_ned, wp.vec3(pos_ned[0], pos_ned[1], -ground_m))
+    hull.is_near_obstacle = is_near
+    if is_near == 1:
+        ball_m = _BALL * model.hull_half_width_m
+        for point in range(int(_POINTS)):
+            centre_ned = pos_ned + wp.quat_rotate(q_ned_from_frd, outline_frd(model, point))
+            touch = obstacle_contact(world, centre_ned, ball_m + _MARGIN_M)
+            normal = wp.vec3(touch[0], touch[1], touch[2])
+            hull.normal_x[point] = normal[0]
+            hull.normal_y[point] = normal[1]
+            hull.normal_z[point] = normal[2]
+            hull.offset_m[point] = wp.dot(normal, centre_ned) + touch[3] - _MARGIN_M
+    return hull
+
+
+@wp.func
+def add_point(
+    model: RoverModel,
+    total: HullForce,
+    depth_m: float,
+    arm_frd: wp.vec3,
+    normal_frd: wp.vec3,
+    vel_frd: wp.vec3,
+    omega_frd: wp.vec3,
+) -> HullForce:
+    """Adds the push and the friction at one point that lies `depth_m` deep."""
+    vel_point = vel_frd + wp.cross(omega_frd, arm_frd)
+    normal_speed = wp.dot(vel_point, normal_frd)
+    push = wp.max(model.scrape_n_m * depth_m - model.scrape_n_s_m * normal_speed, 0.0)
+    slide = vel_point - normal_speed * normal_frd
+    drag = _FRICTION * push / wp.max(wp.length(slide), _STICKING_M_S)
+    force = push * normal_frd - drag * slide
+    total.force_frd += force
+    total.torque_frd += wp.cross(arm_frd, force)
+    total.impact_speed_m_s = wp.max(total.impact_speed_m_s, -normal_speed)
+    return total
+
+
+@wp.func
+def hull_contact(
+    model: RoverModel, hull: HullContact, pos_ned: wp.vec3, vel_frd: wp.vec3, rot: wp.mat33, omega_frd: wp.vec3
+) -> HullForce:
+    """What ground and obstacles do to the hull."""
+    total = HullForce()
+    to_frd = wp.transpose(rot)
+    height_m = wp.dot(hull.normal_ned, pos_ned) - hull.ground_offset_m
+    if height_m < model.hull_reach_m:
+        normal_frd = to_frd * hull.normal_ned
+        for corner in range(8):
+            x = wp.where(corner % 2 == 0, model.hull_front_m, -model.hull_rear_m)
+            y = wp.where((corner // 2) % 2 == 0, model.hull_half_width_m, -model.hull_half_width_m)
+            z = wp.where(corner // 4 == 0, model.hull_bottom_m, -model.hull_top_m)
+            arm_frd = wp.vec3(x, y, z)
+            depth_m = -height_m - wp.dot(normal_frd, arm_frd)
+            if depth_m > 0.0:
+                total = add_point(model, total, depth_m, arm_frd, normal_frd, vel_frd, omega_frd)
+    if hull.is_near_obstacle == 1:
+        ball_m = _BALL * model.hull_half_width_m
+        for point in range(int(_POINTS)):
+            normal_ned = wp.vec3(hull.normal_x[point], hull.normal_y[point], hull.normal_z[point])
+            arm_frd = outline_frd(model, point)
+            centre_ned = pos_ned + rot * arm_frd
+            depth_m = hull.offset_m[point] - wp.dot(normal_ned, centre_ned)
+            if depth_m > 0.0 and wp.length_sq(normal_ned) > 0.5:
+                normal_frd = to_frd * normal_ned
+                total = add_point(model, total, depth_m, arm_frd - ball_m * normal_frd, normal_frd, vel_frd, omega_frd)
+    return total
