@@ -154,6 +154,7 @@ class Setpoint:
     climb_speed: float  # [m/s] up, NaN: the class's own
     descend_speed: float  # [m/s] down, NaN: the class's own
     exit_speed: float  # [m/s] speed with which pos_ned may be passed, 0: stop there
+    pass_radius: float  # [m] from pos_ned, where exit_speed shall be reached: a vehicle on wheels turns from there on
     q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE; SETPOINT_LEAN: its heading is not used
     omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE
     thrust: float  # [0..1] fraction of the maximum thrust; SETPOINT_DRIVE: throttle [-1..1] where `speed` is NaN

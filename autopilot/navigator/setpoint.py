@@ -27,11 +27,11 @@ FREE: Vector = (nan, nan, nan)
 _NOT_HOLDING_M_S = 0.01
 _LARGEST = 1.0e9  # its square is within single precision
 _LEVEL_NORTH = (0.0, 0.0, 0.0, 1.0)
-_LAYOUT = f"<3i{28 + MAX_MOTORS}f"  # kind, is_armed, is_landed, then the floats of autopilot.ports.Setpoint
+_LAYOUT = f"<3i{29 + MAX_MOTORS}f"  # kind, is_armed, is_landed, then the floats of autopilot.ports.Setpoint
 _FIELDS = (
     "kind", "is_armed", "is_landed", "pos_ned", "vel_ned", "accel_ned", "yaw", "yaw_rate", "path_start_ned",
-    "cruise_speed", "climb_speed", "descend_speed", "exit_speed", "q_ned_from_frd", "omega_frd", "thrust", "speed",
-    "steering", "motor_test",
+    "cruise_speed", "climb_speed", "descend_speed", "exit_speed", "pass_radius", "q_ned_from_frd", "omega_frd",
+    "thrust", "speed", "steering", "motor_test",
 )  # fmt: skip
 
 
@@ -44,8 +44,8 @@ class SetpointPort:
 
     __slots__ = (
         "_buffer", "_is_changed", "_motor_test", "_pack_into", "_press_speed", "_settling", "accel_ned", "climb_speed",
-        "cruise_speed", "descend_speed", "exit_speed", "is_armed", "is_landed", "kind", "omega_frd", "path_start_ned",
-        "pos_ned", "q_ned_from_frd", "speed", "steering", "thrust", "vel_ned", "yaw", "yaw_rate",
+        "cruise_speed", "descend_speed", "exit_speed", "is_armed", "is_landed", "kind", "omega_frd", "pass_radius",
+        "path_start_ned", "pos_ned", "q_ned_from_frd", "speed", "steering", "thrust", "vel_ned", "yaw", "yaw_rate",
     )  # fmt: skip
 
     def __init__(self, row: np.ndarray[Any, Any]) -> None:
@@ -90,6 +90,7 @@ class SetpointPort:
         climb_speed: float = nan,
         descend_speed: float = nan,
         exit_speed: float = 0.0,
+        pass_radius: float = 0.0,
     ) -> None:
         """Asks for a position [m]: on the straight line from `path_start_ned` if that is finite."""
         self._free_all()
@@ -101,6 +102,7 @@ class SetpointPort:
         self.climb_speed = climb_speed
         self.descend_speed = descend_speed
         self.exit_speed = exit_speed
+        self.pass_radius = pass_radius
 
     def track(self, pos_ned: Vector, vel_ned: Vector, yaw: float, yaw_rate: float = nan) -> None:
         """Asks for a position [m] that moves with a velocity [m/s]; renewed each frame."""
@@ -312,6 +314,7 @@ class SetpointPort:
         values = (
             *pos_ned, *vel_ned, *self.accel_ned, self.yaw,
             yaw_rate, *path_start_ned, self.cruise_speed, self.climb_speed, self.descend_speed, self.exit_speed,
+            self.pass_radius,
             *q_ned_from_frd, *self.omega_frd, thrust, self.speed, self.steering,
             *self._motor_test,
         )  # fmt: skip
@@ -328,4 +331,4 @@ class SetpointPort:
         self.q_ned_from_frd = _LEVEL_NORTH
         self.yaw = self.yaw_rate = self.cruise_speed = self.climb_speed = self.descend_speed = self.thrust = nan
         self.speed = self.steering = nan
-        self.exit_speed = 0.0
+        self.exit_speed = self.pass_radius = 0.0
