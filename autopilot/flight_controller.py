@@ -150,6 +150,7 @@ class FlightController:
         self.state = state = VehicleState(
             origin=origin,
             sticks=self.sticks.input,
+            outputs=tuple(vehicle.outputs(airframe)),
             motor_count=len(vehicle.motors(airframe)),
             mav_type=vehicle.mav_type(airframe),
         )
@@ -336,7 +337,8 @@ class FlightController:
         mode = self.navigator.mode_for(request)
         is_flown = mode is self.state.mode
         if request.in_air and not self.navigator.may_go(mode):
-            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air")
+            is_driver = self.navigator.context.craft.ground is None
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not armed" if is_driver else "not in the air")
         reason = self.commander.request_refusal(mode)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)

@@ -13,6 +13,7 @@ from typing import Any
 from autopilot.inputs.obstacles import Obstacles
 from autopilot.inputs.sticks import StickInput
 from autopilot.interface.aircraft import Aircraft
+from autopilot.interface.outputs import Output
 from common.geodesy import GeoPoint, geodetic_from_ned
 
 
@@ -160,6 +161,7 @@ class VehicleState:
         None  # where it last stood; home may be set anywhere, also in the air
     )
     mode: Mode = Mode.HOLD
+    outputs: Sequence[Output] = ()  # what the motor commands are for
     motor_count: int = 4
     mav_type: int = 2  # MAV_TYPE
     is_armed: bool = False

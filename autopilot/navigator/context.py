@@ -1,7 +1,7 @@
 """What every navigator mode works with: the vehicle's state, the setpoint, and what it tells the commander."""
 
 from collections.abc import Callable
-from math import atan2, hypot, isfinite, nan, sqrt
+from math import atan2, hypot, inf, isfinite, nan, sqrt
 
 from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_interface import Announcer
@@ -9,7 +9,7 @@ from autopilot.interface.vehicle_state import LandedState, Mode, VehicleState
 from autopilot.navigator.heading import Heading
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import HEIGHT_VALID, TERRAIN_VALID
-from autopilot.vehicles.vehicle_class import Craft, GroundHandling
+from autopilot.vehicles.vehicle_class import Craft, GroundHandling, VerticalLimits
 from common.geodesy import geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
 
@@ -86,6 +86,19 @@ class NavContext:
         return ground
 
     @property
+    def vertical(self) -> VerticalLimits:
+        """How the vehicle climbs and descends; not for one whose heights are the ground's."""
+        vertical = self.craft.limits.vertical
+        if vertical is None:
+            raise LookupError("a vehicle that stays on the ground neither climbs nor descends")
+        return vertical
+
+    def alt_radius(self) -> float:
+        """Height error [m] at which a place counts as reached; on the ground any."""
+        vertical = self.craft.limits.vertical
+        return inf if vertical is None else self.number(vertical.alt_radius)
+
+    @property
     def has_height(self) -> bool:
         return bool(self.state.estimate.flags & HEIGHT_VALID)
 
@@ -123,7 +136,12 @@ class NavContext:
         return ned_from_geodetic(position.lat_deg, position.lon_deg, alt_amsl_m, self.state.origin)[2]
 
     def fly_to(
-        self, pos_ned: Vector, yaw: float, path_start_ned: Vector | None = None, exit_speed: float = 0.0
+        self,
+        pos_ned: Vector,
+        yaw: float,
+        path_start_ned: Vector | None = None,
+        exit_speed: float = 0.0,
+        pass_radius: float = 0.0,
     ) -> None:
         """Asks for a position with the speeds asked for; along a straight line if its start is given and not near."""
         if path_start_ned is not None and distance(path_start_ned, pos_ned) > 0.5:  # below that a line means nothing
@@ -135,6 +153,7 @@ class NavContext:
                 climb_speed=self.climb_speed,
                 descend_speed=self.descend_speed,
                 exit_speed=exit_speed,
+                pass_radius=pass_radius,
             )
         else:
             self.setpoint.fly_to(
@@ -158,8 +177,9 @@ class NavContext:
             reach = braking_distance(speed, numbers[limits.accel_hor], jerk) / speed
             north += vel_north * reach
             east += vel_east * reach
-        if abs(vel_down) > 0.1:
-            accel = numbers[limits.accel_up if vel_down > 0.0 else limits.accel_down]
+        vertical = limits.vertical
+        if vertical is not None and abs(vel_down) > 0.1:
+            accel = numbers[vertical.accel_up if vel_down > 0.0 else vertical.accel_down]
             reach = braking_distance(abs(vel_down), accel, jerk)
             down += reach if vel_down > 0.0 else -reach
         return north, east, down

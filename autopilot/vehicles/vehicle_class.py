@@ -13,6 +13,7 @@ from autopilot.control.law import ControlLaw
 from autopilot.interface.ardupilot_vehicle import ArduPilotVehicle
 from autopilot.interface.client_requests import LandAt, TakeOff
 from autopilot.interface.mode_spec import ModeTable
+from autopilot.interface.outputs import Output
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import Mode, VehicleState
 from common.airframe import Airframe
@@ -71,21 +72,39 @@ class DriveParts:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class VerticalLimits:
+    """Names of the parameters that bound how it climbs and descends."""
+
+    climb_speed: str  # [m/s] where nothing else is asked for
+    descend_speed: str
+    climb_max: str  # [m/s]
+    descend_max: str
+    accel_up: str  # [m/s²]
+    accel_down: str
+    alt_radius: str  # [m] height error at which a place counts as reached
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turning:
+    """How a vehicle that cannot turn on the spot goes round a corner."""
+
+    radius: Callable[[Callable[[str], float]], float]  # [m] of its smallest circle, from the numbers of parameters
+    gain: str  # factor on the distance from a corner at which the turn begins
+    largest: str  # [m] of that distance; negative: it is the acceptance radius always
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
     """Names of the parameters that bound how a class of vehicles moves, where all modes need to know it."""
 
     cruise_speed: str  # [m/s] where nothing else is asked for
-    climb_speed: str
-    descend_speed: str
     speed_max: str  # [m/s]
-    climb_max: str
-    descend_max: str
     accel_hor: str  # [m/s²]
-    accel_up: str
-    accel_down: str
+    accel_across: str = ""  # [m/s²] in turns; empty: half of `accel_hor`
     jerk: str  # [m/s³]
     jerk_auto: str  # [m/s³] on missions
-    alt_radius: str  # [m] height error at which a place counts as reached
+    vertical: VerticalLimits | None = None  # None: heights are the ground's
+    turning: Turning | None = None  # None: it goes round any corner
     path_error: str  # [m] by which the vehicle may lag behind what it tracks
     yaw_rate: str  # [deg/s] of a turn that names none
 
@@ -134,8 +153,10 @@ class VehicleClass:
     mav_type: Callable[[Any], int]
     """MAV_TYPE of the heartbeat."""
     ardupilot: ArduPilotVehicle
+    outputs: Callable[[Any], Sequence[Output]]
+    """What the elements of `Actuators.command` are, in their order."""
     motors: Callable[[Any], Sequence[int]]
-    """Its motors from 0, clockwise from the nose on, as ArduPilot counts them to test one."""
+    """Its motors among the outputs, clockwise from the nose on, as ArduPilot counts them to test one."""
     standing_height_m: Callable[[Any], float]
     """Of the vehicle's centre over level ground."""
     ground: GroundHandling | None = None

@@ -19,6 +19,7 @@ from autopilot.interface.mode_spec import (
     mode_table,
     px4_mode,
 )
+from autopilot.interface.outputs import Output, OutputKind
 from autopilot.interface.vehicle_state import ACCEPTED, Mode
 from autopilot.navigator.mode_parts import of_context
 from autopilot.navigator.modes.offboard import Offboard
@@ -132,17 +133,10 @@ SLED = VehicleClass(
     last_resort=Mode.HOLD,
     limits=MotionLimits(
         cruise_speed="SLED_SPEED",
-        climb_speed="SLED_SPEED",
-        descend_speed="SLED_SPEED",
         speed_max="SLED_SPEED",
-        climb_max="SLED_SPEED",
-        descend_max="SLED_SPEED",
         accel_hor="SLED_ACCEL",
-        accel_up="SLED_ACCEL",
-        accel_down="SLED_ACCEL",
         jerk="SLED_JERK",
         jerk_auto="SLED_JERK",
-        alt_radius="SLED_LAG",
         path_error="SLED_LAG",
         yaw_rate="SLED_YAW_RATE",
     ),
@@ -150,6 +144,7 @@ SLED = VehicleClass(
     ardupilot=ArduPilotVehicle(
         "Rover", (4, 6, 3), aliases=(Alias("CRUISE_SPEED", "SLED_SPEED", MAV_PARAM_TYPE_REAL32),)
     ),
+    outputs=lambda _: (Output("pusher", OutputKind.MOTOR, is_signed=True),),
     motors=lambda _: (0,),
     arming_checks=(stands_level,),
     standing_height_m=lambda _: 0.1,

@@ -192,16 +192,22 @@ def distance_sensor(state: VehicleState) -> bytes | None:
     )
 
 
+_PULSE_MIDDLE_US = 1500  # of an output that goes both ways
+
+
 def servo_output_raw(state: VehicleState) -> bytes:
     """Motor commands and auxiliary outputs as pulse widths."""
-    pulses = (PULSE_IDLE_US + u16(min(command, 1.0) * 1000.0) for command in state.actuators.command)
+    pulses = [PULSE_IDLE_US + u16(min(command, 1.0) * 1000.0) for command in state.actuators.command]
+    for i, output in enumerate(state.outputs):
+        if output.is_signed:
+            pulses[i] = _PULSE_MIDDLE_US + round(500.0 * min(max(state.actuators.command[i], -1.0), 1.0))
     return _servo_output_raw(state.time_us & 0xFFFFFFFF, 0, *pulses, *state.aux_pulses_us)
 
 
 def actuator_output_status(state: VehicleState) -> bytes:
     """Motor commands as fractions of the greatest."""
     commands = tuple(state.actuators.command)
-    active = sum(1 << i for i, command in enumerate(commands) if command > 0.0)
+    active = sum(1 << i for i, command in enumerate(commands) if command != 0.0)
     return _actuator_output_status(state.time_us, active, commands + (0.0,) * (32 - len(commands)))
 
 

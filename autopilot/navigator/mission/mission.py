@@ -349,5 +349,7 @@ class Mission(FlightMode):
 
     def _on_parameter(self, parameter: Parameter) -> None:
         limits = self._context.craft.limits
-        if parameter.name in (limits.cruise_speed, limits.climb_speed, limits.descend_speed, limits.speed_max):
+        vertical = limits.vertical
+        climbing = () if vertical is None else (vertical.climb_speed, vertical.descend_speed)
+        if parameter.name in (limits.cruise_speed, limits.speed_max, *climbing):
             self.renew_speeds()

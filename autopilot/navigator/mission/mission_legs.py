@@ -50,6 +50,7 @@ class Leg:
         self._start: Vector = _STANDING  # [m] where the way to the target begins
         self._goal: Vector = _STANDING  # [m] where it ends, also after an interruption
         self._exit_speed = 0.0
+        self._acceptance = 0.0  # [m] that the item or NAV_ACC_RAD asks for
         self._radius_sq = 0.0  # [m²] in which the position counts as reached
         self._alt_radius = 0.0  # [m]
         self._until_us = 0
@@ -163,7 +164,7 @@ class Leg:
         context = self._context
         self._start = start
         self._home = context.state.home
-        self._alt_radius = context.number(context.craft.limits.alt_radius)
+        self._alt_radius = context.alt_radius()
         target = self._goal_of(item, start)
         asked = radians(item.params[3]) if item.command in WAYPOINTS | {Command.LAND, Command.TAKEOFF} else nan
         if item.command == Command.LOITER_UNLIMITED:
@@ -174,6 +175,7 @@ class Leg:
         radius = acceptance if acceptance > 0.0 else context.number("NAV_ACC_RAD")
         if item.command in (Command.LAND, Command.LOITER_TURNS):
             radius = min(radius, _LANDING_RADIUS_M)
+        self._acceptance = radius
         self._radius_sq = radius * radius
         if item.command == Command.SPLINE_WAYPOINT:
             self.target = self._goal = target
@@ -187,10 +189,10 @@ class Leg:
     def _fly(self, item: MissionItem, target: Vector) -> None:
         """Asks for the straight way from the leg's start to `target` [m]."""
         self.target = self._goal = target
-        radius = self._radius_sq**0.5
-        self._exit_speed = self._route.exit_speed(item, self._start, target, radius)
+        self._exit_speed, radius = self._route.passage(item, self._start, target, self._acceptance)
+        self._radius_sq = radius * radius
         self._along = between(self._start, target) if self._exit_speed > 0.0 else _STANDING
-        self._context.fly_to(target, self.yaw, self._start, self._exit_speed)
+        self._context.fly_to(target, self.yaw, self._start, self._exit_speed, radius)
 
     def _goal_of(self, item: MissionItem, start: Vector) -> Vector:
         """Where the way of an item ends [m]."""
@@ -287,7 +289,7 @@ class Leg:
         estimate = context.state.estimate
         vel_north, vel_east, _ = estimate.vel_ned
         down = self._route.position_of(item)[2]
-        self._alt_radius = context.number(context.craft.limits.alt_radius)
+        self._alt_radius = context.alt_radius()
         north, east, _ = context.stop_point()
         self.target = self._goal = (north, east, down)
         self._stage = _Stage.LEVEL

@@ -140,19 +140,27 @@ class Route:
         number = context.number
         limits = context.craft.limits
         cruise = context.cruise_speed if isfinite(context.cruise_speed) else number(limits.cruise_speed)
-        climb = context.climb_speed if isfinite(context.climb_speed) else number(limits.climb_speed)
-        descend = context.descend_speed if isfinite(context.descend_speed) else number(limits.descend_speed)
+        climb = descend = cruise
+        vertical = limits.vertical
+        if vertical is not None:
+            climb = context.climb_speed if isfinite(context.climb_speed) else number(vertical.climb_speed)
+            descend = context.descend_speed if isfinite(context.descend_speed) else number(vertical.descend_speed)
+            climb = min(climb, number(vertical.climb_max))
+            descend = min(descend, number(vertical.descend_max))
         return Pace(
             min(cruise, number(limits.speed_max)),
-            min(climb, number(limits.climb_max)),
-            min(descend, number(limits.descend_max)),
-            CORNER_ACCEL_FRACTION * number(limits.accel_hor),
+            climb,
+            descend,
+            corner_accel(context),
             number(limits.jerk_auto),
             number(limits.path_error),
         )
 
-    def exit_speed(self, item: MissionItem, start: Vector, target: Vector, radius: float) -> float:
-        """Speed [m/s] with which a waypoint may be passed so that the turn fits into its acceptance radius.
+    def passage(self, item: MissionItem, start: Vector, target: Vector, radius: float) -> tuple[float, float]:
+        """Speed [m/s] with which a waypoint may be passed, and how far before it [m] the turn begins.
+
+        It fits into the waypoint's acceptance radius, but for a vehicle whose smallest circle does not: that begins
+        earlier, as far as its parameters allow.
 
         A turn by θ that begins at the distance r from the corner has the radius r / tan(θ/2), hence the speed
         sqrt(a r / tan(θ/2)). It is also bounded by what can be braked on the next leg. A spline leaves a waypoint in
@@ -160,11 +168,11 @@ class Route:
         """
         following = self.next_position(item.seq + 1, target) if passes_through(item) else None
         if following is None:
-            return 0.0
+            return 0.0, radius
         into, out = between(start, target), between(target, following)
         in_length, out_length = hypot(into[0], into[1]), hypot(out[0], out[1])
         if in_length < max(0.5, abs(into[2])) or out_length < max(0.5, abs(out[2])):
-            return 0.0  # a steep or very short leg
+            return 0.0, radius  # a steep or very short leg
         pace = self.pace()
         corner = inf
         after = self.next_nav(item.seq + 1)
@@ -172,9 +180,27 @@ class Route:
             cosine = (into[0] * out[0] + into[1] * out[1]) / (in_length * out_length)
             tan_half_sq = (1.0 - cosine) / max(1.0 + cosine, 1e-6)
             if tan_half_sq > 1e-12:
+                radius = turn_begin(self._context, sqrt(tan_half_sq), radius)
                 corner = sqrt(pace.accel * radius / sqrt(tan_half_sq))
         speed = min(corner, sqrt(pace.accel * out_length), pace.cruise)
-        return speed if speed > _SLOWEST_CORNER_M_S else 0.0
+        return speed if speed > _SLOWEST_CORNER_M_S else 0.0, radius
+
+
+def corner_accel(context: NavContext) -> float:
+    """Acceleration [m/s²] used to turn from one leg to the next."""
+    limits = context.craft.limits
+    if limits.accel_across:
+        return context.number(limits.accel_across)
+    return CORNER_ACCEL_FRACTION * context.number(limits.accel_hor)
+
+
+def turn_begin(context: NavContext, tan_half: float, radius: float) -> float:
+    """How far before a corner [m] a turn begins that shall begin `radius` before it, if the vehicle can turn so."""
+    turning = context.craft.limits.turning
+    if turning is None or context.number(turning.largest) < 0.0:
+        return radius
+    needed = context.number(turning.gain) * turning.radius(context.number) * tan_half
+    return max(radius, min(needed, context.number(turning.largest)))
 
 
 def distance_to_line(here: Vector, start: Vector, end: Vector) -> float:

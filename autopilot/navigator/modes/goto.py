@@ -51,11 +51,12 @@ def target_refusal(context: NavContext, target: Vector) -> Reply:
     longest_m = context.number("MIS_DIST_1WP")
     if 0.0 <= longest_m < way_m:
         return Reply(Verdict.DENIED, f"target is {way_m / 1000.0:.1f} km away, {longest_m / 1000.0:.1f} km allowed")
-    if abs(target[2]) > 10_000.0:
-        return Reply(Verdict.DENIED, "altitude is out of range")
-    lowest_d = ground_d(context)
-    if target[2] > lowest_d + _BELOW_GROUND_M:
-        return Reply(Verdict.DENIED, f"target is {target[2] - lowest_d:.0f} m below the ground")
+    if context.craft.ground is not None:  # what stays on the ground takes its height
+        if abs(target[2]) > 10_000.0:
+            return Reply(Verdict.DENIED, "altitude is out of range")
+        lowest_d = ground_d(context)
+        if target[2] > lowest_d + _BELOW_GROUND_M:
+            return Reply(Verdict.DENIED, f"target is {target[2] - lowest_d:.0f} m below the ground")
     reason = context.position_refusal(target)
     if reason:
         return Reply(Verdict.DENIED, f"target is {reason}")

@@ -239,8 +239,8 @@ class Guided(FlightMode):
         if setpoint.kind != SETPOINT_ATTITUDE or int(context.number("GUID_OPTIONS")) & THRUST_IS_THRUST:
             return setpoint
         fraction = 2.0 * setpoint.thrust - 1.0
-        limits = context.craft.limits
-        speed = context.number(limits.climb_speed if fraction > 0.0 else limits.descend_speed)
+        vertical = context.vertical
+        speed = context.number(vertical.climb_speed if fraction > 0.0 else vertical.descend_speed)
         has_yaw_rate = isfinite(setpoint.yaw_rate)
         return OffboardSetpoint(
             setpoint.time_us,

@@ -68,13 +68,13 @@ class Landing:
         if context.state.estimate.vel_ned[2] > 0.5 * speed:
             self._moving_us = context.state.time_us
         is_touching = context.state.time_us - self._moving_us > _TOUCHING_US
-        return max(speed, context.number(context.craft.limits.descend_speed)) if is_touching else speed
+        return max(speed, context.number(context.vertical.descend_speed)) if is_touching else speed
 
     def _speed(self) -> float:
         """Descent speed [m/s]: the usual one high up, the landing's low, the crawl speed just above the ground."""
         context = self._context
         slow = context.number(context.ground.land_speed)
-        fast = context.number(context.craft.limits.descend_speed)
+        fast = context.number(context.vertical.descend_speed)
         height, is_measured = context.height_above_ground()
         if not is_measured:
             is_known_ground = is_near_start(context.state, self._north, self._east)

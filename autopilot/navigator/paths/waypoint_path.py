@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from math import hypot, isfinite, nan, sqrt
 
 from autopilot.navigator.context import NavContext
-from autopilot.navigator.mission.mission_route import CORNER_ACCEL_FRACTION
+from autopilot.navigator.mission.mission_route import corner_accel
 from autopilot.navigator.setpoint import Vector
 
 CORNER_RADIUS_M = 1.0  # a corner counts as reached; below the margin by which ways keep off a fence; guess
@@ -58,7 +58,7 @@ class WaypointPath:
         radius = END_RADIUS_M if is_last else CORNER_RADIUS_M
         if hypot(north - target[0], east - target[1]) > radius:
             return False
-        if abs(down - target[2]) > context.number(context.craft.limits.alt_radius):
+        if abs(down - target[2]) > context.alt_radius():
             return False
         self._i_point += 1
         if is_last:
@@ -70,7 +70,8 @@ class WaypointPath:
     def _fly(self) -> None:
         context = self._context
         target = self.points[self._i_point]
-        context.fly_to(target, context.heading_to(self._from, target, nan), self._from, self._exit_speed(target))
+        yaw = context.heading_to(self._from, target, nan)
+        context.fly_to(target, yaw, self._from, self._exit_speed(target), CORNER_RADIUS_M)
 
     def _exit_speed(self, target: Vector) -> float:
         """Speed [m/s] at the corner: the turn fits into its radius, and the next stretch is long enough to brake."""
@@ -84,7 +85,7 @@ class WaypointPath:
             return 0.0  # a steep or very short stretch
         context = self._context
         limits = context.craft.limits
-        accel = CORNER_ACCEL_FRACTION * context.number(limits.accel_hor)
+        accel = corner_accel(context)
         cosine = (in_north * out_north + in_east * out_east) / (in_length * out_length)
         tan_half_sq = max(1.0 - cosine, 1e-9) / max(1.0 + cosine, 1e-6)
         cruise = context.cruise_speed if isfinite(context.cruise_speed) else context.number(limits.cruise_speed)

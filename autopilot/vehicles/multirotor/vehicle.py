@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import atan2, pi
 
+from autopilot.interface.outputs import Output, OutputKind
 from autopilot.interface.vehicle_state import Mode, VehicleState
 from autopilot.ports import HEIGHT_VALID
 from autopilot.vehicles.multirotor.ardupilot import COPTER
@@ -14,7 +15,13 @@ from autopilot.vehicles.multirotor.mode_params import MODE_PARAMETERS
 from autopilot.vehicles.multirotor.modes import MULTIROTOR_MODES
 from autopilot.vehicles.multirotor.motor_failures import MOTOR_WATCH_PARAMETERS, MotorWatch
 from autopilot.vehicles.multirotor.params import CONTROL_PARAMETERS
-from autopilot.vehicles.vehicle_class import DriveParts, GroundHandling, MotionLimits, VehicleClass
+from autopilot.vehicles.vehicle_class import (
+    DriveParts,
+    GroundHandling,
+    MotionLimits,
+    VehicleClass,
+    VerticalLimits,
+)
 from common.airframes.multirotor import MultirotorAirframe
 from common.params import ParameterTable
 
@@ -32,17 +39,19 @@ def _mav_type(airframe: MultirotorAirframe) -> int:
 
 _LIMITS = MotionLimits(
     cruise_speed="MPC_XY_CRUISE",
-    climb_speed="MPC_Z_V_AUTO_UP",
-    descend_speed="MPC_Z_V_AUTO_DN",
     speed_max="MPC_XY_VEL_MAX",
-    climb_max="MPC_Z_VEL_MAX_UP",
-    descend_max="MPC_Z_VEL_MAX_DN",
     accel_hor="MPC_ACC_HOR",
-    accel_up="MPC_ACC_UP_MAX",
-    accel_down="MPC_ACC_DOWN_MAX",
     jerk="MPC_JERK_MAX",
     jerk_auto="MPC_JERK_AUTO",
-    alt_radius="NAV_MC_ALT_RAD",
+    vertical=VerticalLimits(
+        climb_speed="MPC_Z_V_AUTO_UP",
+        descend_speed="MPC_Z_V_AUTO_DN",
+        climb_max="MPC_Z_VEL_MAX_UP",
+        descend_max="MPC_Z_VEL_MAX_DN",
+        accel_up="MPC_ACC_UP_MAX",
+        accel_down="MPC_ACC_DOWN_MAX",
+        alt_radius="NAV_MC_ALT_RAD",
+    ),
     path_error="MPC_XY_ERR_MAX",
     yaw_rate="MPC_YAWRAUTO_MAX",
 )
@@ -60,6 +69,10 @@ _GROUND = GroundHandling(
 
 def _height(state: VehicleState, _: ParameterTable) -> str:
     return "" if state.estimate.flags & HEIGHT_VALID else "estimator: no valid height"
+
+
+def _outputs(airframe: MultirotorAirframe) -> Sequence[Output]:
+    return [Output(f"motor {rotor + 1}", OutputKind.MOTOR) for rotor in range(len(airframe.rotors))]
 
 
 def _clockwise(airframe: MultirotorAirframe) -> Sequence[int]:
@@ -83,6 +96,7 @@ MULTIROTOR = VehicleClass(
     limits=_LIMITS,
     mav_type=_mav_type,
     ardupilot=COPTER,
+    outputs=_outputs,
     motors=_clockwise,
     standing_height_m=lambda airframe: airframe.contact.leg_z_m,
     ground=_GROUND,

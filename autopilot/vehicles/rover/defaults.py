@@ -5,6 +5,7 @@ from math import degrees
 from common.airframes.rover import RoverAirframe
 
 _ACKERMANN, _DIFFERENTIAL = 5, 6  # CA_AIRFRAME
+_AUTOSTART, _AUTOSTART_SKID = 51_000, 50_000  # PX4's generic rovers
 _SKID_SLIP = 1.6  # of our skid-steer airframe on firm ground, measured: its wheels scrub
 
 
@@ -18,6 +19,8 @@ def rover_defaults(airframe: RoverAirframe) -> dict[str, int | float]:
         "BAT1_V_EMPTY": battery.empty_cell_v,
         "EKF2_BCOEF_X": body.mass_kg / body.drag_area_x_m2,
         "EKF2_BCOEF_Y": body.mass_kg / body.drag_area_y_m2,
+        "SYS_AUTOSTART": _AUTOSTART_SKID if airframe.is_skid else _AUTOSTART,
+        "NAV_ACC_RAD": 0.5,  # PX4's rovers
         "CA_AIRFRAME": _DIFFERENTIAL if airframe.is_skid else _ACKERMANN,
         "CA_R_REV": 3 if airframe.is_skid else 1,
         "RO_MAX_THR_SPEED": airframe.drive.max_speed_m_s,

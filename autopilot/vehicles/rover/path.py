@@ -165,7 +165,9 @@ def follow_path(  # noqa: PLR0912, PLR0915
     cruise = params.speed_limit
     if wp.isfinite(sp.cruise_speed):
         cruise = wp.min(wp.abs(sp.cruise_speed), params.speed_limit)
-    to_end = wp.max(wp.max(left, distance * wp.where(wp.abs(error) > _HALF_PI, 1.0, 0.0)) - sp.pass_radius, 0.0)
+    to_end = wp.max(left, distance * wp.where(wp.abs(error) > _HALF_PI, 1.0, 0.0))
+    if sp.exit_speed > 0.0:
+        to_end = wp.max(to_end - sp.pass_radius, 0.0)
     fastest = wp.min(cruise, stopping_speed(params, to_end, sp.exit_speed))
     if airframe.is_skid == 1:
         if wp.abs(error) > params.turn_from:

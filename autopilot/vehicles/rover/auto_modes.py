@@ -1,0 +1,73 @@
+"""The modes in which a rover drives by itself, where they differ from those of vehicles that fly: Hold and Return."""
+
+from autopilot.interface.client_requests import GoTo
+from autopilot.interface.mode_spec import FlightMode
+from autopilot.interface.vehicle_state import Mode, Reply, Severity, Verdict
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.fence.fence import Fence
+from autopilot.navigator.modes.hold import Hold
+from autopilot.navigator.modes.rtl_destination import Destinations
+from autopilot.navigator.paths.waypoint_path import WaypointPath
+from autopilot.vehicles.rover.stick_modes import Position
+
+
+class RoverHold(Hold):
+    """Mode Hold: stands where it can stop, or at a place that it was sent to. Without a position it stands braked."""
+
+    __slots__ = ("_is_blind",)
+
+    def __init__(self, context: NavContext) -> None:
+        super().__init__(context, steered=Position(context))
+        self._is_blind = False
+
+    def take(self, request: GoTo) -> Reply:
+        if not self._context.state.is_armed:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not armed")
+        return super().take(request)
+
+    def frame(self) -> None:
+        context = self._context
+        if not context.has_position:
+            self._is_blind = True
+            context.setpoint.idle()
+            return
+        if self._is_blind:
+            self._is_blind = False
+            self.start()
+        super().frame()
+
+
+class RoverReturn(FlightMode):
+    """Mode Return: drives to where RTL_TYPE says, around what the fence excludes, and stands there."""
+
+    __slots__ = ("_context", "_destinations", "_fence", "_path")
+
+    def __init__(self, context: NavContext, destinations: Destinations, fence: Fence) -> None:
+        self._context = context
+        self._destinations = destinations
+        self._fence = fence
+        self._path = WaypointPath(context)
+
+    def start(self) -> None:
+        context = self._context
+        context.use_return_speed()
+        destination = self._destinations.choose()
+        say = context.announcer.statustext
+        if destination.name != "home":
+            say(Severity.INFO, f"Return to {destination.name}")
+        here = context.stop_point()
+        if destination.back:
+            self._path.start(here, [*destination.back, destination.position])
+            return
+        points = self._fence.path(here, destination.position)
+        if points is None:
+            say(Severity.WARNING, "No way back inside the fence: returning directly")
+        elif len(points) > 1:
+            say(Severity.INFO, f"Return around the fence, {len(points) - 1} corners")
+        self._path.start(here, points or [destination.position])
+
+    def leave(self, following: Mode) -> None:  # noqa: ARG002
+        self._path.stop()
+
+    def frame(self) -> None:
+        self._path.frame()  # its last setpoint ends at the destination
