@@ -49,7 +49,7 @@ def average(align: Alignment, still: Stillness, imu: ImuSample, samples: Samples
     """The sums with the newest samples; they start anew with each motion while there is patience."""
     align.waited_s = align.waited_s + imu.dt_s
     align.is_moving = 1
-    if still.still_s > 0.0:
+    if still.still_s > 0.0 and still.is_rolling == 0:
         align.is_moving = 0
     if align.is_moving == 1 and align.waited_s < _PATIENCE_S:
         align.time_s = 0.0

@@ -165,6 +165,12 @@ def observations() -> dict[str, tuple[str, str, sp.Expr, str]]:
             height / down,
             "",
         ),
+        "speed": (
+            "axis_ned: wp.vec3, vel_ned: wp.vec3",
+            "speed over ground along a body axis: axis . velocity",
+            axis.dot(_vector("vel_ned") + errors["vel"]),
+            "",
+        ),
     }
 
 

@@ -579,3 +579,60 @@ def range_products(
     s3 = s3 + h8 * c3[8]
     s3 = s3 + h23 * c3[23]
     return ph, wp.vec4(s0, s1, s2, s3), hph
+
+
+@wp.func
+def speed_products(
+    cov: wp.array2d(dtype=vec24),
+    i: int,
+    axis_ned: wp.vec3,
+    vel_ned: wp.vec3,
+) -> tuple[vec24, wp.vec4, float]:
+    """P H' (of the error state and of the slow errors) and H P H' of the speed over ground along a body axis: axis . velocity."""
+    h0 = axis_ned[1] * vel_ned[2] - axis_ned[2] * vel_ned[1]
+    h1 = -axis_ned[0] * vel_ned[2] + axis_ned[2] * vel_ned[0]
+    h2 = axis_ned[0] * vel_ned[1] - axis_ned[1] * vel_ned[0]
+    h3 = axis_ned[0]
+    h4 = axis_ned[1]
+    h5 = axis_ned[2]
+    ph = h0 * cov[i, 0]
+    ph = ph + h1 * cov[i, 1]
+    ph = ph + h2 * cov[i, 2]
+    ph = ph + h3 * cov[i, 3]
+    ph = ph + h4 * cov[i, 4]
+    ph = ph + h5 * cov[i, 5]
+    hph = h0 * ph[0]
+    hph = hph + h1 * ph[1]
+    hph = hph + h2 * ph[2]
+    hph = hph + h3 * ph[3]
+    hph = hph + h4 * ph[4]
+    hph = hph + h5 * ph[5]
+    c0 = cov[i, 24]
+    s0 = h0 * c0[0]
+    s0 = s0 + h1 * c0[1]
+    s0 = s0 + h2 * c0[2]
+    s0 = s0 + h3 * c0[3]
+    s0 = s0 + h4 * c0[4]
+    s0 = s0 + h5 * c0[5]
+    c1 = cov[i, 25]
+    s1 = h0 * c1[0]
+    s1 = s1 + h1 * c1[1]
+    s1 = s1 + h2 * c1[2]
+    s1 = s1 + h3 * c1[3]
+    s1 = s1 + h4 * c1[4]
+    s1 = s1 + h5 * c1[5]
+    c2 = cov[i, 26]
+    s2 = h0 * c2[0]
+    s2 = s2 + h1 * c2[1]
+    s2 = s2 + h2 * c2[2]
+    s2 = s2 + h3 * c2[3]
+    s2 = s2 + h4 * c2[4]
+    s2 = s2 + h5 * c2[5]
+    c3 = cov[i, 27]
+    s3 = h0 * c3[0]
+    s3 = s3 + h1 * c3[1]
+    s3 = s3 + h2 * c3[2]
+    s3 = s3 + h3 * c3[3]
+    s3 = s3 + h4 * c3[4]
+    s3 = s3 + h5 * c3[5]
+    return ph, wp.vec4(s0, s1, s2, s3), hph

@@ -176,9 +176,13 @@ def flags(params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, state: 
         pos_s = wp.min(pos_s, external_pos_s)
         vel_s = wp.min(pos_s, seconds_since(now_us, state.gnss_vel.fused_time_us))
         vel_s = wp.min(vel_s, seconds_since(now_us, state.external_vel.fused_time_us))
-        if pos_s < params.no_aid_s and cov[i, POS][POS] < _MAX_POS_VAR:
+        wheels_s = seconds_since(now_us, state.wheels.fused_time_us)
+        valid_s = params.no_aid_s
+        if wheels_s < params.no_aid_s:
+            valid_s = wp.max(valid_s, params.wheel_valid_s)
+        if pos_s < valid_s and cov[i, POS][POS] < _MAX_POS_VAR:
             bits = bits | POSITION_VALID
-        if vel_s < params.no_aid_s:
+        if wp.min(vel_s, wheels_s) < params.no_aid_s:
             bits = bits | VELOCITY_VALID
         if vel_s > DEAD_RECKONING_AFTER_S:
             bits = bits | DEAD_RECKONING

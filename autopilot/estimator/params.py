@@ -9,6 +9,8 @@ from typing import Any
 import warp as wp
 
 from autopilot.estimator.calibration_params import CALIBRATION_PARAMETERS
+from autopilot.estimator.mag_params import MAG_PARAMETERS
+from autopilot.estimator.wheel_params import wheel_fields
 from common.params import Parameter, ParameterTable
 
 wp.set_module_options({"enable_backward": False})
@@ -103,6 +105,15 @@ class EstimatorParams:
     external_ctrl: int
     external_pos_gate: float
     external_vel_gate: float
+    wheel_ctrl: int
+    wheel_noise: float
+    wheel_scale_std: float
+    wheel_slip: float
+    wheel_side_noise: float
+    wheel_gate: float
+    wheel_x: float
+    wheel_track: float
+    wheel_valid_s: float
 
 
 _BMI088 = "BMI088 data sheet and vibration of a 10-inch quadcopter (guess)"
@@ -251,57 +262,7 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
         "baro_walk",
     ),
     Parameter("EKF2_BARO_GATE", 5.0, 1.0, 50.0, "SD", "barometer gate", _PX4, "baro_gate"),
-    Parameter("EKF2_MAG_TYPE", 0, 0, 5, "", "magnetometer use: 0 field states and heading, 5 none", _PX4, "mag_type"),
-    Parameter(
-        "EKF2_MAG_NOISE", 1.5e-4, 1.0e-5, 1.0, "gauss", "magnetometer noise", "RM3100 data sheet: 15 nT", "mag_noise"
-    ),
-    Parameter("EKF2_MAG_GATE", 5.0, 1.0, 50.0, "SD", "magnetometer gate", "3 in PX4, whose noise is wider", "mag_gate"),
-    Parameter(
-        "EKF2_MAG_E_NOISE",
-        1.0e-5,
-        0.0,
-        0.1,
-        "gauss/sqrt(s)",
-        "random walk of the earth field",
-        "1e-5 gauss per kilometre",
-        "earth_field_walk",
-    ),
-    Parameter(
-        "EKF2_MAG_B_NOISE",
-        4.0e-4,
-        0.0,
-        0.1,
-        "gauss/sqrt(s)",
-        "random walk of the body field",
-        _TUNED,
-        "body_field_walk",
-    ),
-    Parameter(
-        "EKF2_MAG_B_INIT", 5.0e-3, 0.0, 0.3, "gauss", "body field left after calibration", "guess", "body_field_init"
-    ),
-    Parameter(
-        "EKF2_MAG_CHECK",
-        3,
-        0,
-        3,
-        "",
-        "a field that is not that of the place is not used, by: 1 strength, 2 inclination",
-        "PX4's numbers; its default is 1",
-        "mag_check",
-    ),
-    Parameter(
-        "EKF2_MAG_CHK_STR", 0.2, 0.0, 1.0, "gauss", "largest error of the field's strength", _PX4, "mag_check_strength"
-    ),
-    Parameter(
-        "EKF2_MAG_CHK_INC",
-        20.0,
-        0.0,
-        90.0,
-        "deg",
-        "largest error of the field's inclination",
-        _PX4,
-        "mag_check_inclination",
-    ),
+    *MAG_PARAMETERS,
     Parameter(
         "EKF2_MIN_RNG", 0.2, 0.0, 2.0, "m", "height above ground at boot", "airframe: landing gear", "rest_height"
     ),
@@ -379,7 +340,7 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
 
 def estimator_fields(table: ParameterTable) -> dict[str, float]:
     """Fields of `EstimatorParams` and their values in SI."""
-    fields = table.fields(ESTIMATOR_PARAMETERS)
+    fields = table.fields(ESTIMATOR_PARAMETERS) | wheel_fields(table)
     fields["predict_s"] *= 1.0e-6
     return fields
 

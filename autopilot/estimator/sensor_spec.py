@@ -45,6 +45,7 @@ class SensorSpec:
     is_needed_to_arm: bool = False
     status_bit: int = 0  # MAV_SYS_STATUS_SENSOR
     is_optional: bool = False  # shown as present once it has delivered a sample
+    parameter: str = ""  # only vehicles that have this parameter have the sensor; empty: all
     failure_unit: int | None = None  # FAILURE_UNIT
     bias_unit: str  # of a fault's bias
     wrong_bias: float  # of a sensor that is made wrong, on each axis; a guess far beyond any gate

@@ -3,6 +3,8 @@
 Adding one adds a row to `FUSED_SENSORS` and a line to each function below, which call its file in `sources`.
 """
 
+from collections.abc import Container
+
 import warp as wp
 
 from autopilot.estimator.delay import is_waiting
@@ -15,14 +17,20 @@ from autopilot.estimator.sources.heading import take_heading
 from autopilot.estimator.sources.heights import compare_heights
 from autopilot.estimator.sources.mag import MAG, mag_time, receive_mag, take_mag
 from autopilot.estimator.sources.range import RANGE, range_time, receive_range, take_range
+from autopilot.estimator.sources.wheels import WHEELS, receive_wheels, take_wheels, wheels_time
 from autopilot.estimator.state import Ekf
 from autopilot.ports import Samples
 
 wp.set_module_options({"enable_backward": False})
 
-FUSED_SENSORS: tuple[SensorSpec, ...] = (GNSS, BARO, MAG, RANGE)
+FUSED_SENSORS: tuple[SensorSpec, ...] = (GNSS, BARO, MAG, RANGE, WHEELS)
 
 COMPARE_SAMPLES = wp.constant(64)  # heights are compared four times a second
+
+
+def sensors_of(parameters: Container[str]) -> tuple[SensorSpec, ...]:
+    """The fused sensors that a vehicle with these parameters has or may have."""
+    return tuple(sensor for sensor in FUSED_SENSORS if not sensor.parameter or sensor.parameter in parameters)
 
 
 @wp.func
@@ -32,6 +40,7 @@ def without_nan(ekf: Ekf, i: int, samples: Samples) -> Samples:
     samples.baro.time_us = baro_time(ekf.rows[i].baro_inbox, samples.baro)
     samples.mag.time_us = mag_time(ekf.rows[i].mag_inbox, samples.mag)
     samples.range.time_us = range_time(ekf.rows[i].range_inbox, samples.range)
+    samples.wheels.time_us = wheels_time(ekf.rows[i].wheels_inbox, samples.wheels)
     return samples
 
 
@@ -45,6 +54,7 @@ def receive_samples(ekf: Ekf, i: int, samples: Samples) -> None:
     receive_baro(ekf, i, samples.baro, is_still, vel_ned)
     receive_mag(ekf, i, samples.mag, is_still, omega_frd)
     receive_range(ekf, i, samples.range, is_still, vel_ned)
+    receive_wheels(ekf, i, samples.wheels, is_still)
 
 
 @wp.func
@@ -61,6 +71,8 @@ def take_samples(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gy
         take_mag(ekf, i, params, now_us, gyro_frd)
     if is_waiting(ekf.rows[i].range_inbox):
         take_range(ekf, i, params, now_us)
+    if is_waiting(ekf.rows[i].wheels_inbox):
+        take_wheels(ekf, i, params, now_us, gyro_frd)
 
 
 @wp.func
@@ -72,6 +84,8 @@ def listen_sensors(ekf: Ekf, i: int, now_us: wp.int64) -> None:
     ekf.rows[i].baro = listen(ekf.rows[i].baro, ekf.rows[i].baro_inbox, now_us)
     ekf.rows[i].mag = listen(ekf.rows[i].mag, ekf.rows[i].mag_inbox, now_us)
     ekf.rows[i].range = listen(ekf.rows[i].range, ekf.rows[i].range_inbox, now_us)
+    ekf.rows[i].wheels = listen(ekf.rows[i].wheels, ekf.rows[i].wheels_inbox, now_us)
+    ekf.rows[i].wheel_side = listen(ekf.rows[i].wheel_side, ekf.rows[i].wheels_inbox, now_us)
 
 
 @wp.func
@@ -81,3 +95,4 @@ def drop_waiting(ekf: Ekf, i: int) -> None:
     ekf.rows[i].baro_inbox.tail = ekf.rows[i].baro_inbox.head
     ekf.rows[i].mag_inbox.tail = ekf.rows[i].mag_inbox.head
     ekf.rows[i].range_inbox.tail = ekf.rows[i].range_inbox.head
+    ekf.rows[i].wheels_inbox.tail = ekf.rows[i].wheels_inbox.head

@@ -13,7 +13,16 @@ covariances with the 24 errors, row 28 holds those among themselves, 4 x 4.
 import warp as wp
 
 from autopilot.estimator.params import EstimatorParams
-from autopilot.ports import BaroSample, Estimate, ExternalSample, GnssSample, ImuSample, MagSample, RangeSample
+from autopilot.ports import (
+    BaroSample,
+    Estimate,
+    ExternalSample,
+    GnssSample,
+    ImuSample,
+    MagSample,
+    RangeSample,
+    WheelSample,
+)
 from common.kernels import vec5, vec24
 
 wp.set_module_options({"enable_backward": False})
@@ -41,6 +50,7 @@ GNSS_RING = wp.constant(4)
 BARO_RING = wp.constant(16)
 MAG_RING = wp.constant(16)
 RANGE_RING = wp.constant(16)
+WHEELS_RING = wp.constant(16)
 EXTERNAL_RING = wp.constant(16)  # one in each 20 ms frame
 
 PHASE_ALIGNING = wp.constant(0)
@@ -131,7 +141,11 @@ class Stillness:
     baro_climb: float  # [m/s]
     contact: int  # CONTACT_*: what the commander says
     calm_s: float  # for how long nothing has spoken of motion
-    has_moved: int  # since power-on, or since the commander said that the vehicle has landed
+    stand_s: float  # for how long the wheels of both sides have stood
+    stand_m: wp.vec2  # [m] left, right: what they have crept meanwhile
+    is_rolling: int  # the wheels of both sides turn
+    is_parked: int  # they have stood for some tenths of a second
+    has_moved: int  # since power-on, since the commander said that the vehicle has landed, or its wheels stopped
     is_still: int  # at rest: velocity is zero
 
 
@@ -167,6 +181,16 @@ class DragSum:
     accel_frd: wp.vec3  # [m/s² s]
     time_s: float
     ground_d: float  # [m] down coordinate where the vehicle last stood still
+
+
+@wp.struct
+class Odometer:
+    """What is known of the wheels themselves, left and right."""
+
+    scale: wp.vec2  # by which fraction they turn too little
+    scale_var: wp.vec2
+    learned_time_us: wp.int64  # of the GNSS velocity that the scale was last learned from, 0: never
+    doubted_time_us: wp.int64  # when GNSS velocity last contradicted them, 0: never
 
 
 @wp.struct
@@ -226,6 +250,7 @@ class EstimatorState:
     baro_inbox: Inbox
     mag_inbox: Inbox
     range_inbox: Inbox
+    wheels_inbox: Inbox
     external_inbox: Inbox
     gnss_pos: Aid  # north, east [m]
     gnss_vel: Aid  # north, east, down [m/s]
@@ -233,6 +258,9 @@ class EstimatorState:
     baro: Aid  # down [m]
     mag: Aid  # x, y, z [gauss]
     range: Aid  # along body down [m]
+    wheels: Aid  # along body x [m/s]
+    wheel_side: Aid  # none along body y, z [m/s]
+    odometer: Odometer
     drag: Aid  # x, y [m/s²]
     rest: Aid  # zero velocity while the vehicle stands still [m/s]
     external_pos: Aid  # north, east [m]
@@ -269,5 +297,6 @@ class Ekf:
     baro_ring: wp.array2d(dtype=BaroSample)
     mag_ring: wp.array2d(dtype=MagSample)
     range_ring: wp.array2d(dtype=RangeSample)
+    wheels_ring: wp.array2d(dtype=WheelSample)
     external: wp.array(dtype=ExternalSample)  # the newest, written by the Python part
     external_ring: wp.array2d(dtype=ExternalSample)

@@ -284,7 +284,11 @@ def _range(log: _Log) -> Rows:
 def _sampled(log: _Log, sensor: SensorSpec) -> Rows:
     """The samples of a sensor, from its topic as this project writes it."""
     topic = sensor.topic
-    columns = log.topic(topic.name) if topic else None
+    columns = (
+        log.topic(topic.name, *(f"{field}[0]" if kind.endswith("]") else field for field, kind in topic.fields.items()))
+        if topic
+        else None
+    )
     if topic is None or columns is None:
         return empty(sensor.dtype)
     rows = np.zeros(len(columns["timestamp"]), dtype=sensor.dtype)

@@ -94,7 +94,9 @@ class FlightLog:
         self._samples_before = samples_before
         self._status_before = np.zeros(1, STATUS_DTYPE)
         self._topics: list[tuple[UlogTopic, Topic]] = [
-            (self._log.add_topic(topic.name, topic.fields), topic) for topic in TOPICS
+            (self._log.add_topic(topic.name, topic.fields), topic)
+            for topic in TOPICS
+            if not topic.parameter or topic.parameter in params
         ]
         self._imu_topic = self._log.add_topic("sensor_combined", _IMU_FIELDS)
         self._status_topic = self._log.add_topic("vehicle_status", _STATUS_FIELDS)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from autopilot.estimator.sensors import FUSED_SENSORS
+from autopilot.estimator.sensors import sensors_of
 from autopilot.flight_controller import FlightController
 from autopilot.interface.platform import LogListener
 from autopilot.interface.vehicle_state import Severity
@@ -27,7 +27,6 @@ from sim.rig import Rig
 
 PIECE_FRAMES = 50
 FRAMES_MAX = 5 * PIECE_FRAMES  # written at once
-AIDS = {aid.name: aid.axes for sensor in FUSED_SENSORS for aid in sensor.aids}  # and their components
 BAND_SIGMA = 1.959964  # 95 % of a normal distribution lie within
 NO_MISSION, NOT_STARTED = 1, 2  # MISSION_STATE
 
@@ -113,8 +112,10 @@ class Recorder:
         imu_model = live["sensor_model"]["imu"][0]
         self._imu_limits = (float(imu_model["gyro_limit"]), float(imu_model["accel_limit"]))
         self._samples_before = np.zeros(1, dtype=live["sensors"]["samples"].dtype)
-        self._judged_us = dict.fromkeys(AIDS, 0)
-        self._in_band = {name: [0, 0] for name in AIDS}
+        sensors = sensors_of(controller.params)
+        self._aids = {aid.name: aid.axes for sensor in sensors for aid in sensor.aids}  # and their components
+        self._judged_us = dict.fromkeys(self._aids, 0)
+        self._in_band = {name: [0, 0] for name in self._aids}
         self._choice = FrameChoice()
         self._is_kept: list[bool] = []
         self._begins = [0]  # the pieces, as indices of the frames noted
@@ -294,7 +295,7 @@ class Recorder:
         return {name: inside / total if total else float("nan") for name, (inside, total) in self._in_band.items()}
 
     def _count_innovations(self, health: Rows, is_armed: Rows) -> None:
-        for name, components in AIDS.items():
+        for name, components in self._aids.items():
             judged_us = health[name]["judged_time_us"]
             is_new = is_armed & (np.diff(judged_us, prepend=self._judged_us[name]) != 0)
             self._judged_us[name] = int(judged_us[-1])

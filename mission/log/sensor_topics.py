@@ -104,7 +104,7 @@ def _topic(sensor: SensorSpec) -> Topic:
         return _OWN_TOPICS[sensor.name]
     is_new = partial(is_fresh, sensor=sensor.name)
     columns = partial(_sampled, sensor=sensor.name, holds=sensor.topic.holds)
-    return Topic(sensor.topic.name, dict(sensor.topic.fields), columns, is_new)
+    return Topic(sensor.topic.name, dict(sensor.topic.fields), columns, is_new, sensor.parameter)
 
 
 SENSOR_TOPICS = (*(_topic(sensor) for sensor in FUSED_SENSORS), _BATTERY)

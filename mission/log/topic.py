@@ -46,6 +46,7 @@ class Topic:
     fields: dict[str, str]
     columns: Callable[[Batch], Columns]
     frames: Callable[[Batch], Rows] | None = None  # marks those that have a row; None: all have
+    parameter: str = ""  # only vehicles that have this parameter have the topic; empty: all
 
 
 def is_fresh(batch: Batch, sensor: str) -> Rows:

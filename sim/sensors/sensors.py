@@ -49,6 +49,7 @@ class Faults:
     baro: SensorFault
     mag: SensorFault
     range: SensorFault
+    wheels: SensorFault
     battery: SensorFault
     motor_loss: vec8  # [0..1] fraction of its command that each motor loses
 

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("common", "autopilot", "sim", "policies", "mission")
 SIBLINGS_MAX, FILE_LINES_MAX, FUNCTION_LINES_MAX = 20, 400, 60
 
-LONG_FILES = {"autopilot/estimator/generated.py": 581}  # written by derive.py
+LONG_FILES = {"autopilot/estimator/generated.py": 638}  # written by derive.py
 LONG_FUNCTIONS = {
     "autopilot/estimator/generated.py predict_covariance": 379,
     "autopilot/estimator/generated.py mag_products": 61,

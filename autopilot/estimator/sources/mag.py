@@ -188,6 +188,12 @@ def knows_heading_by_mag_alone(ekf: Ekf, i: int) -> bool:
 
 
 @wp.func
+def keeps_heading(ekf: Ekf, i: int) -> bool:
+    """The vehicle stands on its wheels after a drive: a field that changes now is that of steel beside it."""
+    return ekf.rows[i].stillness.is_parked == 1 and ekf.rows[i].stillness.is_still == 1 and ekf.yaw[i].has_moved == 1
+
+
+@wp.func
 def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_frd: wp.vec3) -> None:
     """Fuses the oldest waiting field if the horizon has passed it; the first one ever sets heading."""
     sample = ekf.mag_ring[i, ekf.rows[i].mag_inbox.tail % MAG_RING]
@@ -196,6 +202,9 @@ def take_mag(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_f
     ekf.rows[i].mag_inbox.tail += 1
     age_s = seconds_since(now_us, sample.time_us)
     if params.mag_type == MAG_TYPE_NONE or age_s > MAX_AGE_S:
+        return
+    if keeps_heading(ekf, i):
+        ekf.rows[i].mag.judged_time_us = sample.time_us
         return
     nominal = ekf.rows[i].nominal
     ekf.rows[i].is_mag_disturbed = 0

@@ -7,6 +7,10 @@ any sign of motion: vibration, a turn, velocity gained by the accelerometer, GNS
 is while the commander says that the vehicle is in the air. It comes back when all of them, filtered, and the estimate
 have been quiet for seconds, or at once with a landing that the commander tells of. GNSS alone would not do: a
 threshold above its noise lets a slow climb pass.
+
+Wheels say it better: where they turn the vehicle moves, and where both sides stand it is at rest as soon as the IMU is
+quiet, whatever the commander says, unless GNSS velocity contradicts (it slides, or is carried). What stands on its
+wheels does not turn either: the gyro shows its bias, and so heading is held for as long as it is parked.
 """
 
 import warp as wp
@@ -14,10 +18,11 @@ import warp as wp
 from autopilot.estimator.fuse import fuse_state, judge, mark_fused, seconds_since
 from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.sources.baro import baro_height
-from autopilot.estimator.state import PHASE_RUNNING, VEL, Aid, Ekf, Nominal, Stillness
-from autopilot.ports import CONTACT_GROUND, CONTACT_NONE, BaroSample, GnssSample, ImuSample, Samples
+from autopilot.estimator.state import GYRO_BIAS, PHASE_RUNNING, VEL, Aid, Ekf, Nominal, Stillness
+from autopilot.estimator.wheel_params import WHEEL_CTRL_REST
+from autopilot.ports import CONTACT_GROUND, CONTACT_NONE, BaroSample, GnssSample, ImuSample, Samples, WheelSample
 from common.geodesy import GRAVITY_M_S2
-from common.kernels import vec24
+from common.kernels import TICK_S, vec24
 
 wp.set_module_options({"enable_backward": False})
 
@@ -50,6 +55,12 @@ _MAX_CLIMB = wp.constant(0.1)  # [m/s] noise 0.01
 _MAX_SPEED = wp.constant(0.2)  # [m/s] by the estimate, to be found at rest again
 _STILL_AFTER_S = wp.constant(0.4)  # from power-on
 _STILL_AGAIN_AFTER_S = wp.constant(3.0)  # the filters have forgotten most of a motion
+
+_ROLL_SPEED = wp.constant(0.05)  # [m/s] above one step of an encoder in 20 ms; guess
+_STAND_M = wp.constant(0.004)  # [m] crept while they stand: 0.013 m/s are not called rest; guess
+_PARKED_AFTER_S = wp.constant(0.3)
+_WHEELS_SILENT_S = wp.constant(0.5)
+_TICK_S = wp.constant(TICK_S)
 
 
 @wp.func
@@ -127,6 +138,40 @@ def observe_baro(still: Stillness, sample: BaroSample, step_s: float) -> Stillne
 
 
 @wp.func
+def observe_wheels(still: Stillness, sample: WheelSample, step_s: float) -> Stillness:
+    """Whether the wheels of both sides turn, and for how long they have stood; neither if only one side turns."""
+    left, right = wp.abs(sample.left_m_s), wp.abs(sample.right_m_s)
+    still.is_rolling = 0
+    if wp.min(left, right) > _ROLL_SPEED:
+        still.is_rolling = 1
+    crept = still.stand_m + wp.vec2(sample.left_m_s, sample.right_m_s) * wp.min(step_s, _WHEELS_SILENT_S)
+    still.stand_s = still.stand_s + wp.clamp(step_s, 0.0, _WHEELS_SILENT_S)
+    if wp.max(left, right) > _ROLL_SPEED or wp.max(wp.abs(crept[0]), wp.abs(crept[1])) > _STAND_M:
+        crept = wp.vec2()
+        still.stand_s = 0.0
+    still.stand_m = crept
+    return still
+
+
+@wp.func
+def without_wheels(still: Stillness) -> Stillness:
+    """The wheels say nothing."""
+    still.is_rolling = 0
+    still.stand_s = 0.0
+    still.stand_m = wp.vec2()
+    return still
+
+
+@wp.func
+def forgotten(still: Stillness) -> Stillness:
+    """All signs of a motion that is over, and that linger in the filters, are forgotten."""
+    still.has_moved = 0
+    still.gnss_vel_ned = wp.vec3()
+    still.baro_climb = 0.0
+    return still
+
+
+@wp.func
 def shows_motion(still: Stillness, vel_ned: wp.vec3) -> bool:
     """Something other than vibration says that the vehicle moves.
 
@@ -148,12 +193,15 @@ def shows_motion(still: Stillness, vel_ned: wp.vec3) -> bool:
 @wp.func
 def conclude(still: Stillness, vel_ned: wp.vec3, contact: int, dt_s: float) -> Stillness:
     """Whether the vehicle is at rest."""
-    if contact == CONTACT_GROUND and still.contact != CONTACT_GROUND:
-        still.has_moved = 0
-        still.gnss_vel_ned = wp.vec3()
-        still.baro_climb = 0.0
+    was_parked = still.is_parked
+    still.is_parked = 0
+    if still.stand_s > _PARKED_AFTER_S:
+        still.is_parked = 1
+    if (contact == CONTACT_GROUND and still.contact != CONTACT_GROUND) or still.is_parked > was_parked:
+        still = forgotten(still)
     still.contact = contact
-    if contact == CONTACT_NONE or shows_motion(still, vel_ned):
+    is_driving = still.is_rolling == 1 or (contact == CONTACT_NONE and still.is_parked == 0)
+    if is_driving or shows_motion(still, vel_ned):
         still.has_moved = 1
         still.calm_s = 0.0
     elif still.still_s == 0.0:
@@ -192,6 +240,15 @@ def observe_stillness(ekf: Ekf, i: int, params: EstimatorParams, samples: Sample
     if samples.baro.time_us != ekf.rows[i].baro_inbox.arrived_time_us:
         step_s = seconds_since(samples.baro.time_us, ekf.rows[i].baro_inbox.arrived_time_us)
         still = observe_baro(still, samples.baro, step_s)
+    if samples.wheels.time_us != wp.int64(0):
+        wheels_inbox = ekf.rows[i].wheels_inbox
+        silent_s = seconds_since(samples.imu.time_us, samples.wheels.time_us)
+        if (params.wheel_ctrl & WHEEL_CTRL_REST) == 0 or wheels_inbox.is_stuck == 1 or silent_s > _WHEELS_SILENT_S:
+            still = without_wheels(still)
+        elif samples.wheels.time_us != wheels_inbox.arrived_time_us:
+            still = observe_wheels(
+                still, samples.wheels, seconds_since(samples.wheels.time_us, wheels_inbox.arrived_time_us)
+            )
     was_still = still.is_still
     still = conclude(still, ekf.rows[i].nominal.vel_ned, contact, samples.imu.dt_s)
     if was_still == 1 and still.calm_s == 0.0:
@@ -224,12 +281,28 @@ def fuse_rest(
 
 
 @wp.func
+def fuse_no_turn(
+    params: EstimatorParams, cov: wp.array2d(dtype=vec24), i: int, nominal: Nominal, gyro_frd: wp.vec3
+) -> Nominal:
+    """What the gyro shows of a vehicle that does not turn is its bias: as well known as a mean over the period."""
+    var = params.gyro_noise * params.gyro_noise * _TICK_S / _PERIOD_S
+    for axis in range(3):
+        k = GYRO_BIAS + axis
+        innov = gyro_frd[axis] - nominal.gyro_bias_frd[axis]
+        if innov * innov < _GATE_SIGMA * _GATE_SIGMA * (cov[i, k][k] + var):
+            nominal = fuse_state(params, cov, i, nominal, k, innov, var)
+    return nominal
+
+
+@wp.func
 def take_rest(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64) -> None:
     """Fuses zero velocity, 25 times a second."""
     if seconds_since(now_us, ekf.rows[i].rest.judged_time_us) > _PERIOD_S:
         creep_std = _CREEP_STD
-        if ekf.rows[i].stillness.contact == CONTACT_GROUND:
+        if ekf.rows[i].stillness.contact == CONTACT_GROUND or ekf.rows[i].stillness.is_parked == 1:
             creep_std = _LANDED_CREEP_STD
         nominal, aid = fuse_rest(params, ekf.covariance, i, ekf.rows[i].nominal, ekf.rows[i].rest, now_us, creep_std)
+        if ekf.rows[i].stillness.is_parked == 1:
+            nominal = fuse_no_turn(params, ekf.covariance, i, nominal, ekf.rows[i].stillness.gyro_mean_frd)
         ekf.rows[i].nominal = nominal
         ekf.rows[i].rest = aid

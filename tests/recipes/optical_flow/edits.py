@@ -35,7 +35,7 @@ class FlowSample:
     ),
     (
         "autopilot/estimator/sensors.py",
-        "FUSED_SENSORS: tuple[SensorSpec, ...] = (GNSS, BARO, MAG, RANGE)",
+        "FUSED_SENSORS: tuple[SensorSpec, ...] = (GNSS, BARO, MAG, RANGE, WHEELS)",
         "FUSED_SENSORS = (*FUSED_SENSORS, FLOW)",
     ),
     (
