@@ -169,19 +169,47 @@ def make_flight(
     vel = (after - before) / (2.0 * h)
     accel = (after - 2.0 * pos + before) / h**2
     q = attitude(accel - GRAVITY if leans else np.broadcast_to(-GRAVITY, accel.shape), yaw)
-    dt = dt_us * 1e-6
+    return sensed(rng, edges, pos, vel, q, yaw, edges > rest_s, noise, gnss_delay_s)
+
+
+def sensed(
+    rng: np.random.Generator,
+    edges: Array,
+    pos: Array,
+    vel: Array,
+    q: Array,
+    yaw: Array,
+    is_moving: Array,
+    noise: SensorNoise,
+    gnss_delay_s: float = 0.12,
+) -> Flight:
+    """What the sensors give of a true motion.
+
+    Args:
+        rng: of all noise.
+        edges: [s] from zero, the ends of the IMU intervals, in whole microseconds.
+        pos: [m] ned, at each of them, as all that follow.
+        vel: [m/s] ned.
+        q: q_ned_from_frd as x, y, z, w.
+        yaw: [rad]
+        is_moving: the vehicle shakes then.
+        noise: of the sensors.
+        gnss_delay_s: from validity to delivery.
+    """
+    count = len(edges) - 1
+    time_us = np.round(edges[1:] * 1e6).astype(np.int64)
+    dt = np.diff(time_us, prepend=0) * 1e-6
     turn = rotvec_from_quat(quat_multiply(quat_conjugate(q[:-1]), q[1:]))
     middle = quat_multiply(q[:-1], np.concatenate([0.25 * turn * 2.0 / 2.0, np.ones((count, 1))], -1))
     middle /= np.linalg.norm(middle, axis=-1, keepdims=True)
     force = quat_rotate(quat_conjugate(middle), (vel[1:] - vel[:-1]) / dt[:, None] - GRAVITY)
     gyro_bias = rng.normal(0.0, noise.gyro_bias, 3)
     accel_bias = rng.normal(0.0, noise.accel_bias, 3)
-    is_flying = (edges[1:] > rest_s)[:, None]
     samples = np.zeros(count, dtype=SAMPLES)
     imu = samples["imu"]
     imu["time_us"] = time_us
     imu["dt_s"] = dt
-    quiet = np.where(is_flying, 1.0, 0.3)
+    quiet = np.where(is_moving[1:, None], 1.0, 0.3)
     imu["gyro_frd"] = turn / dt[:, None] + gyro_bias + quiet * rng.normal(0.0, max(noise.gyro, 1e-12), (count, 3))
     imu["accel_frd"] = force + accel_bias + quiet * rng.normal(0.0, max(noise.accel, 1e-12), (count, 3))
     true_pos, true_vel, true_q = pos[1:], vel[1:], q[1:]

@@ -9,6 +9,7 @@ import warp as wp
 from autopilot.estimator.ekf import Ekf, estimator_reset, estimator_step, make_ekf
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS, estimator_params
 from autopilot.estimator.state import EstimatorState
+from autopilot.estimator.wheel_params import WHEEL_PARAMETERS
 from autopilot.ports import CONTACT_UNKNOWN, ExternalSample, Samples
 from common.params import ParameterTable
 from tests.unit.autopilot.estimator.flights import (
@@ -27,13 +28,14 @@ def run_samples(
     ekf: Ekf,
     samples: wp.array2d(dtype=Samples),
     external: wp.array2d(dtype=ExternalSample),
+    contact: int,
     trace: wp.array2d(dtype=EstimatorState),
 ):
     i = wp.tid()
     for k in range(samples.shape[1]):
         if k < external.shape[1]:
             ekf.external[i] = external[i, k]
-        estimator_step(ekf, i, samples[i, k], CONTACT_UNKNOWN)
+        estimator_step(ekf, i, samples[i, k], contact)
         if k < trace.shape[1]:
             trace[i, k] = ekf.rows[i]
 
@@ -45,21 +47,24 @@ def reset_one(ekf: Ekf, chosen: int):
 
 def default_ekf(vehicle_count: int = 1, **changes: float) -> Ekf:
     """Estimators at power-on in the field of the flights, on vehicles without legs, with some parameters changed."""
-    table = ParameterTable(ESTIMATOR_PARAMETERS)
+    table = ParameterTable([*ESTIMATOR_PARAMETERS, *WHEEL_PARAMETERS])
     table.set("EKF2_MIN_RNG", 0.0)
     for name, value in changes.items():
         table.set(name, value)
     return make_ekf(vehicle_count, "cpu", estimator_params(table, FIELD_NED_GAUSS))
 
 
-def run(ekf: Ekf, samples: Any, *, external: Any = None, keep_trace: bool = True) -> Any:
+def run(
+    ekf: Ekf, samples: Any, *, external: Any = None, contact: int = CONTACT_UNKNOWN, keep_trace: bool = True
+) -> Any:
     """The states after each tick, shape (vehicles, ticks), for samples of that shape (or of one vehicle)."""
     rows = np.atleast_2d(samples)
     trace = wp.zeros((rows.shape[0], rows.shape[1] if keep_trace else 0), dtype=EstimatorState, device="cpu")
     device_samples = wp.array(rows, dtype=Samples, device="cpu")
     held = np.zeros((rows.shape[0], 0), ExternalSample.numpy_dtype()) if external is None else np.atleast_2d(external)
     device_external = wp.array(held, dtype=ExternalSample, device="cpu")
-    wp.launch(run_samples, rows.shape[0], inputs=[ekf, device_samples, device_external, trace], device="cpu")
+    inputs = [ekf, device_samples, device_external, contact, trace]
+    wp.launch(run_samples, rows.shape[0], inputs=inputs, device="cpu")
     return trace.numpy()
 
 

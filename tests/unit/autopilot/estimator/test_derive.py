@@ -63,7 +63,7 @@ def body_axis(error: np.ndarray, q: np.ndarray, k: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("k", [0, 1, 2])
-@pytest.mark.parametrize("name", ["mag", "drag", "range"])
+@pytest.mark.parametrize("name", ["mag", "drag", "range", "speed"])
 def test_observation_rows_are_the_derivatives_of_the_measurements(name: str, k: int) -> None:
     rng = np.random.default_rng(k)
     q = from_rotvec(rng.normal(0.0, 0.3, 3))
@@ -76,13 +76,20 @@ def test_observation_rows_are_the_derivatives_of_the_measurements(name: str, k: 
             return float(axis @ (earth + error[15:18]) + error[18 + k])
         if name == "range":
             return float((height + error[23] - error[8]) / body_axis(error, q, 2)[2])
+        if name == "speed":
+            return float(axis @ (vel + error[3:6]))
         speed = axis @ (vel + error[3:6] - wind - np.append(error[21:23], 0.0))
         return float(-(linear * speed + square * abs(speed) * speed) + error[12 + k])
 
     axis = body_axis(np.zeros(COUNT), q, 2 if name == "range" else k)
     speed = abs(float(axis @ (vel - wind)))
     values: dict[sp.Symbol, float] = {}
-    for vector, numbers in (("axis_ned", axis), ("earth_field_ned", earth), ("vel_air_ned", vel - wind)):
+    for vector, numbers in (
+        ("axis_ned", axis),
+        ("earth_field_ned", earth),
+        ("vel_air_ned", vel - wind),
+        ("vel_ned", vel),
+    ):
         values |= {sp.Symbol(f"{vector}[{m}]", real=True): numbers[m] for m in range(3)}
     for scalar, number in (("linear", linear), ("square", square), ("speed_abs", speed)):
         values[sp.Symbol(scalar, real=True)] = number
