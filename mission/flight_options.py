@@ -12,6 +12,7 @@ from mission.console.option_checks import UserError, home_of, parameter_of
 from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, flight_parameters
 from mission.flight_settings import FlightOptions, FlightSettings, Pace
 from mission.flight_state_folder import stored_home
+from sim.world.driving_worlds import CAR_PARK, COURSE
 from sim.world.world import WorldConfig
 
 
@@ -44,12 +45,15 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
 
 
 def _world(options: FlightOptions) -> WorldConfig:
-    """With an owner the world of training: its hills can be walked; otherwise no trees near home."""
+    """With an owner the world of training: its hills can be walked; to fly alone no trees near home."""
     given: dict[str, Any] = {"seed": options.world_seed, "trees_per_ha": options.trees_per_ha}
     if options.owner is not None:
         from policies.tasks.follow_me.world import FOLLOW_WORLD
 
         return FOLLOW_WORLD.model_copy(update=given)
+    if options.world_kind != "hills":
+        driven = {"course": COURSE, "car-park": CAR_PARK}[options.world_kind]
+        return driven.model_copy(update={"seed": options.world_seed})
     return WorldConfig(
         **given, hill_height_m=options.hill_height_m, has_walls=options.has_walls, treeless_radius_m=TREELESS_M
     )

@@ -134,6 +134,7 @@ def advance_kernel(body: Body, law: ControlLaw, *, has_estimator: bool) -> Any:
         motor_loss = rig.faults[i].motor_loss
         for _ in range(tick_count):
             count = draw_tick(tick)
+            world.boxes.tick = count
             height = -state.pos_ned[2] - ground_height(world, state.pos_ned[0], state.pos_ned[1])
             wind = wind_step(wind_model, wind, state.vel_ned, height, seed, i, count, TICK_S)
             command = weakened(control.actuators.command, motor_loss)

@@ -21,7 +21,7 @@ from sim.rig import Rig
 from sim.sensors.sensors import Faults, SensorModel, SensorState, sense
 from sim.truth import Truth
 from sim.wind import WindModel, WindState, wind_step
-from sim.world.world import World, ground_height
+from sim.world.world import World, ground_height, world_at
 
 wp.set_module_options({"enable_backward": False})
 
@@ -65,7 +65,8 @@ def sense_all(
 ) -> None:
     """The sensors after a tick."""
     i = wp.tid()
-    state = sense(models[i], states[i], faults[i], truths[i], worlds[i_world[i]], seeds[i], i, ticks[i])
+    world = world_at(worlds[i_world[i]], draw_tick(ticks[i]))
+    state = sense(models[i], states[i], faults[i], truths[i], world, seeds[i], i, ticks[i])
     states[i] = state
     samples[i] = state.samples
 

@@ -102,6 +102,9 @@ class Scene:
         ring = shapes.walls(world)
         if ring is not None:
             self._add_mesh("/world/walls", ring)
+        boxes = shapes.boxes(world)
+        if boxes is not None:
+            self._add_mesh("/world/boxes", boxes)
         forest = shapes.trees(world)
         count = len(forest.trunk_ned)
         if count == 0:

@@ -109,6 +109,23 @@ def walls(world: WorldMap) -> Mesh | None:
     return joined(boxes)
 
 
+def boxes(world: WorldMap, tick: int = 0) -> Mesh | None:
+    """The boxes that stand in the world, as they are at a tick, if there are any."""
+    rows = world.boxes.rows
+    if rows.size == 0:
+        return None
+    meshes = []
+    for row, (north, east) in zip(rows, world.boxes.middle(tick), strict=True):
+        size = (2.0 * float(row["half_length"]), 2.0 * float(row["half_width"]), float(row["high"] - row["low"]))
+        colour = CONCRETE if row["period_ticks"] == 0 else JACKET
+        mesh = box((0.0, 0.0, -0.5 * float(row["high"] + row["low"])), size, colour)
+        cos, sin = float(row["cos_yaw"]), float(row["sin_yaw"])
+        turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]], np.float32)
+        place = np.array([north, east, 0.0], np.float32)
+        meshes.append(Mesh((mesh.vertices @ turn + place).astype(np.float32), mesh.faces, mesh.colours))
+    return joined(meshes)
+
+
 class VehicleShape(NamedTuple):
     """What a vehicle looks like, in frd."""
 

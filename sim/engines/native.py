@@ -6,10 +6,11 @@ from typing import Any
 import warp as wp
 
 from common.kernels import vec8
+from common.rng import draw_tick
 from sim.bodies.body import Body
 from sim.rig import Rig
 from sim.truth import Truth
-from sim.world.world import World
+from sim.world.world import World, world_at
 
 wp.set_module_options({"enable_backward": False})
 
@@ -26,10 +27,12 @@ def _step_kernel(body: Body) -> Any:
         i_world: wp.array(dtype=int),
         commands: wp.array(dtype=vec8),
         wind_ned: wp.array(dtype=wp.vec3),
+        ticks: wp.array(dtype=wp.int64),
         truths: wp.array(dtype=Truth),
     ) -> None:
         i = wp.tid()
-        state = body_tick(models[i], states[i], commands[i], wind_ned[i], worlds[i_world[i]])
+        world = world_at(worlds[i_world[i]], draw_tick(ticks[i]))
+        state = body_tick(models[i], states[i], commands[i], wind_ned[i], world)
         states[i] = state
         truths[i] = truth_of(state)
 
@@ -52,5 +55,6 @@ class NativeEngine:
 
     def step(self, commands: Any, wind_ned: Any) -> None:
         arrays = self._rig.arrays
-        rows = [arrays.model, arrays.body, arrays.worlds, arrays.i_world, commands, wind_ned, arrays.truth]
+        places = [arrays.model, arrays.body, arrays.worlds, arrays.i_world]
+        rows = [*places, commands, wind_ned, arrays.tick, arrays.truth]
         wp.launch(self._kernel, dim=self._rig.vehicle_count, inputs=rows, device=self._rig.device)

@@ -40,6 +40,7 @@ class RingSensor:
     def __init__(self, rig: Rig, world: WorldMap, noise: float, seed: int, i_vehicle: int = 0) -> None:
         self._world = world.kernel
         self._truth: Any = rig.rows["truth"]
+        self._tick: Any = rig.rows["tick"]
         self._i_vehicle = i_vehicle
         self._distance = wp.zeros(RAYS, dtype=float, device="cpu")
         self._noise_std_m = noise * NOISE_STD_M
@@ -52,6 +53,7 @@ class RingSensor:
             yaw_rad: heading of the ring.
         """
         pos = self._truth[self._i_vehicle]["pos_ned"]
+        self._world.boxes.tick = int(self._tick[self._i_vehicle]) & 0x7FFFFFFF
         inputs = [self._world, wp.vec3(*(float(axis) for axis in pos)), yaw_rad, MAX_M]
         wp.launch(ring_rays, dim=RAYS, inputs=inputs, outputs=[self._distance], device="cpu")
         exact = self._distance.numpy()

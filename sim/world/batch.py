@@ -12,6 +12,8 @@ import numpy as np
 import warp as wp
 
 from common.warp_start import start_warp
+from sim.world.boxes import Box, Boxes, BoxesMap
+from sim.world.building import build, most_boxes
 from sim.world.growing import (
     COVERAGE,
     EMPTY_M,
@@ -50,8 +52,8 @@ _FIELDS = tuple(WorldParams.cls.__annotations__)  # type: ignore[attr-defined]
 class WorldBatch:
     """Worlds of one size, grown in kernels; level and empty until they are.
 
-    There is room for the configuration's trees at their greatest. A world whose numbers ask for a higher density or
-    higher trees than the limits below gets the limit; no array is ever overrun.
+    There is room for the configuration's trees and boxes at their greatest. A world whose numbers ask for more or
+    higher trees or for more boxes than the limits gets the limit; no array is ever overrun.
 
     Args:
         config: size, grid and octaves of all worlds, and the numbers each begins with; its seed is not used.
@@ -129,11 +131,13 @@ class WorldBatch:
         terrain = TerrainMap(heights, size_m)
         forest = ForestMap(self._trees[i_world].numpy()[: int(world["forest"]["tree_count"])].copy(), size_m)
         walls = WallsMap(bool(world["walls"]["is_built"]), 0.5 * size_m, float(world["walls"]["top_m"]))
+        boxes = BoxesMap(self._boxes[i_world].numpy()[: int(world["boxes"]["box_count"])].copy())
         kernel = World()
         kernel.terrain = terrain.kernel(self.device)
         kernel.forest = forest.kernel(self.device)
         kernel.walls = walls.kernel()
-        return WorldMap(self.config.model_copy(update=params | {"seed": seed}), terrain, forest, walls, kernel)
+        kernel.boxes = boxes.kernel(self.device)
+        return WorldMap(self.config.model_copy(update=params | {"seed": seed}), terrain, forest, walls, kernel, boxes)
 
     def _make_worlds(self) -> None:
         """The `World` rows, whose arrays are slices of stores for all worlds."""
@@ -145,6 +149,9 @@ class WorldBatch:
         self._trees = self._zeros((self.count, most_trees), Tree)
         self._bucket_start = self._zeros((self.count, buckets * buckets + 1), wp.int32)
         self._bucket_trees = self._zeros((self.count, most_entries), wp.int32)
+        most = most_boxes(config.wall_count, config.mover_count, config.spot_count)
+        self._has_boxes = most > 0
+        self._boxes = self._zeros((self.count, max(most, 1)), Box)
         walls = WallsMap(is_built=False, half_size_m=0.5 * config.size_m, top_m=0.0).kernel()
         worlds = []
         for i_world in range(self.count):
@@ -161,8 +168,11 @@ class WorldBatch:
             forest.buckets_per_m = buckets / config.size_m
             forest.half_size_m = 0.5 * config.size_m
             forest.top_m = NO_OBSTACLE_M
+            boxes = Boxes()
+            boxes.boxes = self._boxes[i_world]
+            boxes.top_m = NO_OBSTACLE_M
             world = World()
-            world.terrain, world.forest, world.walls = terrain, forest, walls
+            world.terrain, world.forest, world.walls, world.boxes = terrain, forest, walls, boxes
             worlds.append(world)
         growing.worlds = wp.array(worlds, dtype=World, device=self.device)
 
@@ -197,6 +207,8 @@ class WorldBatch:
         ]
         launches += [(plant, (groups, positions, positions), [visit]) for visit in range(ROUNDS * PHASES)]
         launches.append((settle, (groups,), []))
+        if self._has_boxes:
+            launches.append((build, (groups,), []))
         return [
             wp.launch(kernel, dim, inputs=[growing, groups, *more], device=self.device, record_cmd=True)
             for kernel, dim, more in launches

@@ -55,6 +55,9 @@ class WorldParams:
     tree_height_max_m: float
     has_walls: int
     wall_height_m: float
+    wall_count: int
+    mover_count: int
+    spot_count: int
 
 
 @wp.struct

@@ -1,11 +1,11 @@
-"""The world a vehicle flies in: terrain, trees and walls, asked together.
+"""The world a vehicle is in: terrain, trees, walls and boxes, asked together.
 
 In: a `WorldConfig` with a seed. Out: a `WorldMap` with float64 queries for the host, and its `kernel`, the `World`
 struct that every kernel gets. Body contact asks at 1 kHz, sensors at their own rates, summaries once per flight.
 World frame ned with its origin at home; ground heights are metres up from the home plane: the ground is at d = -height.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from common.warp_start import start_warp
+from sim.world.boxes import Boxes, BoxesMap, boxes_contact, boxes_ray_hit, no_boxes
 from sim.world.terrain import (
     FloatArray,
     Terrain,
@@ -38,6 +39,15 @@ class World:
     terrain: Terrain
     forest: Forest
     walls: Walls
+    boxes: Boxes
+
+
+@wp.func
+def world_at(w: World, tick: int) -> World:
+    """A world with its movers where they are at a tick, as `common.rng.draw_tick` counts."""
+    at_tick = w
+    at_tick.boxes.tick = tick
+    return at_tick
 
 
 @wp.func
@@ -54,7 +64,7 @@ def ground_normal_ned(w: World, north: float, east: float) -> wp.vec3:
 
 @wp.func
 def ray_hit(w: World, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float) -> float:
-    """Distance [m] along a ray to the first ground, trunk, crown or wall; `max_m` if none, 0 from inside one.
+    """Distance [m] along a ray to the first ground, trunk, crown, wall or box; `max_m` if none, 0 from inside.
 
     Args:
         w: the world.
@@ -64,12 +74,13 @@ def ray_hit(w: World, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float) -> fl
     """
     ground = terrain_ray_hit(w.terrain, origin_ned, dir_ned, max_m)
     forest = forest_ray_hit(w.forest, origin_ned, dir_ned, ground)
-    return walls_ray_hit(w.walls, origin_ned, dir_ned, forest)
+    wall = walls_ray_hit(w.walls, origin_ned, dir_ned, forest)
+    return boxes_ray_hit(w.boxes, origin_ned, dir_ned, wall)
 
 
 @wp.func
 def obstacle_contact(w: World, pos_ned: wp.vec3, radius: float) -> wp.vec4:
-    """Deepest contact of a sphere with a trunk, crown or wall; the ground is not an obstacle.
+    """Deepest contact of a sphere with a trunk, crown, wall or box; the ground is not an obstacle.
 
     Args:
         w: the world.
@@ -82,7 +93,10 @@ def obstacle_contact(w: World, pos_ned: wp.vec3, radius: float) -> wp.vec4:
     contact = forest_contact(w.forest, pos_ned, radius)
     wall = walls_contact(w.walls, pos_ned, radius)
     if wall[3] > contact[3]:
-        return wall
+        contact = wall
+    box = boxes_contact(w.boxes, pos_ned, radius)
+    if box[3] > contact[3]:
+        contact = box
     return contact
 
 
@@ -120,6 +134,17 @@ class WorldConfig(BaseModel):
     """Whether walls stand along the edges of the map."""
     wall_height_m: float = Field(default=10.0, ge=1.0, le=200.0)
     """Height of the walls above the highest ground at the edges of the map [m]."""
+    wall_count: int = Field(default=0, ge=0, le=100)
+    """Free-standing walls, a fifth of them kerbs, scattered over the map; in worlds grown in batches alone."""
+    mover_count: int = Field(default=0, ge=0, le=20)
+    """Obstacles that run to and fro, in a car park along its aisle; in worlds grown in batches alone."""
+    spot_count: int = Field(default=0, ge=0, le=20)
+    """Spots in each of the two rows of a car park beside home, 0: none; in worlds grown in batches alone."""
+
+    @property
+    def has_boxes(self) -> bool:
+        """Whether walls, movers or a car park stand in it: it is grown in a batch then."""
+        return self.wall_count + self.mover_count + self.spot_count > 0
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -140,6 +165,7 @@ class WorldMap:
     forest: ForestMap
     walls: WallsMap
     kernel: World
+    boxes: BoxesMap = field(default_factory=lambda: BoxesMap(no_boxes()))
 
     @property
     def heights(self) -> NDArray[np.float32]:
@@ -159,27 +185,31 @@ class WorldMap:
         """Unit normals of the ground pointing up (z < 0), shape (..., 3)."""
         return self.terrain.normal_ned(north, east)
 
-    def ray_hit(self, origin_ned: ArrayLike, dir_ned: ArrayLike, max_m: float) -> float:
-        """Distance [m] along a ray to the first ground, trunk, crown or wall; `max_m` if none, 0 from inside one.
+    def ray_hit(self, origin_ned: ArrayLike, dir_ned: ArrayLike, max_m: float, tick: int = 0) -> float:
+        """Distance [m] along a ray to the first ground, trunk, crown, wall or box; `max_m` if none, 0 from inside.
 
         Args:
             origin_ned: start of the ray [m], shape (3,).
             dir_ned: direction, unit, shape (3,).
             max_m: length of the ray [m].
+            tick: at which the movers are where they are then.
         """
         origin, direction = np.asarray(origin_ned, np.float64), np.asarray(dir_ned, np.float64)
         ground = self.terrain.ray_hit(origin, direction, max_m)
-        return self.walls.ray_hit(origin, direction, self.forest.ray_hit(origin, direction, ground))
+        wall = self.walls.ray_hit(origin, direction, self.forest.ray_hit(origin, direction, ground))
+        return self.boxes.ray_hit(origin, direction, wall, tick)
 
-    def obstacle_distance(self, pos_ned: ArrayLike) -> FloatArray:
-        """Distance [m] to the nearest trunk, crown or wall, negative inside, inf for none.
+    def obstacle_distance(self, pos_ned: ArrayLike, tick: int = 0) -> FloatArray:
+        """Distance [m] to the nearest trunk, crown, wall or box, negative inside, inf for none.
 
         Args:
             pos_ned: [m], shape (..., 3).
+            tick: at which the movers are where they are then.
         """
         pos = np.asarray(pos_ned, np.float64)
         flat = pos.reshape(-1, 3)
-        return np.minimum(self.forest.distance(flat), self.walls.distance(flat)).reshape(pos.shape[:-1])
+        nearest = np.minimum(self.forest.distance(flat), self.walls.distance(flat))
+        return np.minimum(nearest, self.boxes.distance(flat, tick)).reshape(pos.shape[:-1])
 
     def clearance(self, pos_ned: ArrayLike) -> FloatArray:
         """Distance [m] to the nearest trunk, crown, wall or ground; that to the ground is its height above ground.
@@ -222,4 +252,5 @@ def build_world(config: WorldConfig | None = None, device: str = "cpu") -> World
     kernel.terrain = terrain.kernel(device)
     kernel.forest = forest.kernel(device)
     kernel.walls = walls.kernel()
+    kernel.boxes = BoxesMap(no_boxes()).kernel(device)
     return WorldMap(config, terrain, forest, walls, kernel)

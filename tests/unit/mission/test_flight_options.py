@@ -12,7 +12,9 @@ from mission.console.model_command import option_fields
 from mission.flight_config import FlightConfig
 from mission.flight_options import flight_config
 from mission.flight_settings import FOLLOWED_WITH, FlightOptions, FlightSettings, FollowOptions
+from mission.simulator.flight_rig import flight_world
 from policies.tasks.follow_me.world import FOLLOW_WORLD
+from sim.world.driving_worlds import CAR_PARK, COURSE
 from sim.world.world import build_world
 from tests.documents import ROOT
 
@@ -80,3 +82,10 @@ def test_what_is_an_option_and_a_setting_has_one_default_and_one_range():
     """The command line and a script that builds a flight say the same."""
     for name in FlightSettings.model_fields:
         assert repr(FlightConfig.model_fields[name]) == repr(FlightOptions.model_fields[name])
+
+
+@pytest.mark.parametrize(("kind", "made"), [("course", COURSE), ("car-park", CAR_PARK)])
+def test_a_world_to_drive_in_is_made_from_its_seed_alone(kind, made):
+    config = flight_config(options(world_kind=kind, world_seed=7, trees_per_ha=1.0), None)
+    assert config.world == made.model_copy(update={"seed": 7})
+    assert flight_world(config).boxes.rows.size > 0

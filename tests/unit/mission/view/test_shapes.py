@@ -5,6 +5,8 @@ import pytest
 
 from common.airframe import load_airframe
 from mission.view import shapes
+from sim.world.batch import grown_world
+from sim.world.driving_worlds import COURSE
 from sim.world.world import WorldConfig, build_world
 
 WORLD = build_world(WorldConfig(size_m=200.0, has_walls=True, hill_height_m=8.0))
@@ -85,3 +87,15 @@ def test_a_vehicle_has_an_arm_to_each_rotor(name):
         assert np.linalg.norm(frame.vertices - hub, axis=1).min() < 0.1
     radius = shapes.blade_radius_m(airframe)
     assert 0.05 < radius < 0.3
+
+
+def test_every_box_is_drawn_where_it_stands():
+    world = grown_world(COURSE.model_copy(update={"trees_per_ha": 0.0}), 3)
+    mesh = shapes.boxes(world, tick=500)
+    rows = world.boxes.rows
+    corners = mesh.vertices.reshape(len(rows), -1, 3)
+    np.testing.assert_allclose(corners.mean(axis=1)[:, :2], world.boxes.middle(500), atol=1e-4)
+    np.testing.assert_allclose(-corners[:, :, 2].min(axis=1), rows["high"], atol=1e-4)
+    lengths = np.hypot(*(corners[:, :, :2] - world.boxes.middle(500)[:, None]).transpose(2, 0, 1)).max(axis=1)
+    np.testing.assert_allclose(lengths, np.hypot(rows["half_length"], rows["half_width"]), atol=1e-4)
+    assert shapes.boxes(WORLD) is None
