@@ -15,7 +15,7 @@ from autopilot.interface.vehicle_state import Severity
 from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
-from autopilot.mavlink.server import MavlinkServer
+from autopilot.mavlink.server import SYSID_PARAMETER, MavlinkServer
 from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
 from autopilot.mavlink.wire.signing import SigningConfig
 from autopilot.payload.camera.storage import MediaFolder
@@ -39,6 +39,7 @@ from mission.simulator.failure_injection import RigInjector
 from mission.simulator.flight_rig import GUST_FRACTION, flight_rig, flight_wind, flight_world
 from mission.simulator.host_ports import host_ports
 from mission.simulator.onboard_devices import Surroundings
+from mission.simulator.scanner_device import ScannerDevice
 from mission.simulator.simulator_params import PREFIX as SIMULATOR_PREFIX
 from mission.simulator.simulator_params import TURBULENCE_FRACTION, SimulatorParameters
 from mission.video.mjpeg_server import StreamServer
@@ -48,6 +49,7 @@ from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.rtk import RtkReceiver
 from sim.sensors.ring import RingSensor
+from sim.sensors.scanner import Scanner
 from sim.turntable import Turntable
 from sim.video_rig import VideoRig
 from sim.world.world import WorldMap
@@ -121,6 +123,9 @@ class Flight:
         self.onboard: OnboardCamera | None = None
         if config.owner is not None:
             links = [*links, *self._carry_camera(config.owner)]
+        self._scanner: ScannerDevice | None = None
+        if config.is_forest:
+            links = [*links, self._carry_scanner()]
         self.computers: list[Computer] = []
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog", self.troubles.note)
         script_end, client_end = memory_pair(LinkRole.ONBOARD)
@@ -218,6 +223,13 @@ class Flight:
         self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)
         return [self.owner.vehicle_end]
 
+    def _carry_scanner(self) -> Link:
+        """Brings the scanner on board; its link."""
+        self._scanner = ScannerDevice(
+            Scanner(self.rig, self.world, self.config.noise, self.config.seed), int(self.params[SYSID_PARAMETER])
+        )
+        return self._scanner.vehicle_end
+
     def _start_stream(self, stream: StreamServer) -> CameraRig:
         """Gives the live picture something to show; what renders it."""
         rig = CameraRig(self.rig, self.world, has_thread=True)
@@ -259,6 +271,8 @@ class Flight:
         if self.owner is not None:
             is_followed = self.controller.modes[self.controller.state.mode].is_offboard
             self.owner.frame(self.time_us, is_followed=is_followed)
+        if self._scanner is not None:
+            self._scanner.frame(self.time_us)
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
         if self.onboard is not None:

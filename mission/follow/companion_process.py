@@ -16,9 +16,10 @@ from autopilot.mavlink.transport.client_links import open_client_link
 from autopilot.mavlink.transport.links import LinkError
 from common.clock import Pacer, wall_time_s
 from mission.console.terminal import print_line
-from policies.companion.companion import NO_IMAGES, Companion
-from policies.companion.image_client import CameraUrlError, StreamCamera
-from policies.companion.pilot import PilotError, load_pilot
+from policies.companion.companion import Companion
+from policies.companion.image_client import CameraUrlError
+from policies.companion.load_skill import load_skill
+from policies.companion.pilot import PilotError
 
 POLL_US = 2_000
 PROGRESS_US = 500_000
@@ -46,15 +47,14 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         CompanionError: the policy, or an address, cannot be used; nothing has been sent.
     """
     try:
-        pilot = load_pilot(options.policy)
-        camera = StreamCamera(options.camera)
+        skill = load_skill(options.policy, options.camera, is_ordered_by_goto=options.is_reported)
         link = open_client_link(options.link)
     except (PilotError, CameraUrlError, LinkError) as error:
         raise CompanionError(str(error)) from error
-    companion = Companion(link, camera, pilot, is_reported=options.is_reported, wall_s=wall_time_s)
+    companion = Companion(link, skill, is_reported=options.is_reported, wall_s=wall_time_s)
     _shower(console)(f"{options.policy} flies; vehicle: {options.link}, pictures: {options.camera}; Ctrl-C ends it")
     try:
-        _loop(companion, camera, options.seconds, console)
+        _loop(companion, options.seconds, console)
     except KeyboardInterrupt:
         pass
     finally:
@@ -62,7 +62,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     return f"{companion.decision_count} decisions; {latency_text(companion)}"
 
 
-def _loop(companion: Companion, camera: StreamCamera, seconds: float | None, console: Console) -> None:
+def _loop(companion: Companion, seconds: float | None, console: Console) -> None:
     pacer = Pacer(1.0)
     start_s, shown_us = wall_time_s(), 0
     polled_us = 0
@@ -74,11 +74,11 @@ def _loop(companion: Companion, camera: StreamCamera, seconds: float | None, con
             before = companion.phase
             companion.frame(time_us)
             if companion.phase is not before:
-                why = f": {trouble_text(companion, camera)}" if companion.trouble else ""
+                why = f": {trouble_text(companion)}" if companion.trouble else ""
                 show(f"{time_us * 1e-6:7.1f} s  {companion.phase.value}{why}")
             if console.is_terminal and time_us - shown_us >= PROGRESS_US:
                 shown_us = time_us
-                live.update(progress_line(companion, camera, time_us), refresh=True)
+                live.update(progress_line(companion, time_us), refresh=True)
             polled_us = max(polled_us + POLL_US, time_us)
             pacer.wait_until(polled_us)
 
@@ -90,19 +90,17 @@ def _shower(console: Console) -> Callable[[str], None]:
     return show
 
 
-def trouble_text(companion: Companion, camera: StreamCamera) -> str:
+def trouble_text(companion: Companion) -> str:
     """Why the companion does not fly, with what is wrong with the camera if it is that."""
-    is_dark = companion.trouble == NO_IMAGES and camera.trouble
-    return f"{companion.trouble}: {camera.trouble}" if is_dark else companion.trouble
+    hint = companion.skill.hint(companion.trouble)
+    return f"{companion.trouble}: {hint}" if hint else companion.trouble
 
 
-def progress_line(companion: Companion, camera: StreamCamera, time_us: int) -> str:
-    """State, how far the owner is, how old the picture is, and how long a decision takes."""
-    state = companion.phase.value + (f" ({trouble_text(companion, camera)})" if companion.trouble else "")
-    return (
-        f"{state} | owner {companion.owner_distance_m():.1f} m | "
-        f"picture {companion.image_age_s(time_us) * 1e3:.0f} ms | {latency_text(companion)}"
-    )
+def progress_line(companion: Companion, time_us: int) -> str:
+    """State, how far the owner or the goal is, how old the picture or the scan is, and how long a decision takes."""
+    state = companion.phase.value + (f" ({trouble_text(companion)})" if companion.trouble else "")
+    figures = companion.skill.figures(companion.vehicle.own, time_us)
+    return f"{state} | {figures} | {latency_text(companion)}"
 
 
 def latency_text(companion: Companion) -> str:

@@ -32,8 +32,9 @@ from mission.run_folder import OwnFiles, run_folder
 from mission.script import Drone, take_off
 from mission.view.film import write_film
 from mission.view.replay_file import RecordingError, load_recording
-from policies.companion.companion import Companion, Pilot
+from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
+from policies.companion.following import Pilot
 from policies.companion.names import SCRIPTED, TASK
 from policies.companion.pilot import PilotError, load_pilot
 from policies.pretrained.pretrained_policies import pretrained

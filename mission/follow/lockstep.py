@@ -9,8 +9,11 @@ from pathlib import Path
 
 from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
 from mission.flight import Flight, FlightConfig
-from policies.companion.companion import Companion, Pilot
+from policies.companion.companion import Companion
+from policies.companion.following import Following, Pilot
 from policies.companion.image_client import MemoryCamera
+from policies.companion.navigating import Navigating
+from policies.companion.navigation_pilot import NavigationPilot
 
 
 def flight_with_companion(
@@ -22,7 +25,7 @@ def flight_with_companion(
     folder: Path | None = None,
     wall_s: Callable[[], float] | None = None,
 ) -> tuple[Flight, Companion]:
-    """A flight, and the companion on board, which engages as soon as the vehicle hovers.
+    """A flight, and the companion on board that follows, which engages as soon as the vehicle hovers.
 
     Args:
         config: with an owner.
@@ -38,6 +41,30 @@ def flight_with_companion(
         raise ValueError("a companion needs a flight with an owner")
     camera = MemoryCamera()
     flight.onboard.add_sink(camera.publish)
-    companion = Companion(companion_end, camera, pilot, is_reported=is_reported, wall_s=wall_s)
+    companion = Companion(companion_end, Following(camera, pilot), is_reported=is_reported, wall_s=wall_s)
+    flight.computers.append(companion)
+    return flight, companion
+
+
+def flight_with_navigator(
+    config: FlightConfig,
+    pilot: NavigationPilot,
+    *,
+    is_reported: bool = True,
+    links: Sequence[Link | LinkSource] = (),
+    folder: Path | None = None,
+) -> tuple[Flight, Companion]:
+    """A flight, and the companion on board that navigates to each goto, and along the plan.
+
+    Args:
+        config: of a forest.
+        pilot: who flies.
+        is_reported: False: it waits for the pilot to choose Offboard.
+        links: of ground stations.
+        folder: of the logs.
+    """
+    vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
+    flight = Flight(config, links=[vehicle_end, *links], folder=folder)
+    companion = Companion(companion_end, Navigating(pilot, is_ordered_by_goto=is_reported), is_reported=is_reported)
     flight.computers.append(companion)
     return flight, companion

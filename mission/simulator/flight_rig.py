@@ -18,7 +18,7 @@ GUST_FRACTION = 0.3  # guess: a gust adds up to this fraction of the mean wind
 
 def flight_world(config: FlightConfig) -> WorldMap:
     """The ground of a flight."""
-    if config.owner is not None or config.world.has_boxes:
+    if config.owner is not None or config.is_forest or config.world.has_boxes:
         return grown_world(config.world, config.world.seed)
     return build_world(config.world)
 

@@ -70,9 +70,12 @@ class Engagement:
 
     Args:
         is_told: to engage as soon as everything is there and the vehicle holds in the air; once.
+        ready: what it could do, for the pilot to read.
+        flying: what it does.
     """
 
-    def __init__(self, *, is_reported: bool = False) -> None:
+    def __init__(self, *, is_reported: bool = False, ready: str = "ready to follow", flying: str = "following") -> None:
+        self._ready_text, self._flying_text = f"Companion: {ready}", f"Companion: {flying}"
         self.phase = Phase.WAITING
         self._is_reported = is_reported
         self._since_us = 0  # when this phase began
@@ -80,8 +83,10 @@ class Engagement:
         self._was_offboard = True  # until seen otherwise: a vehicle found in Offboard is flown by somebody else
 
     def engage(self) -> None:
-        """Tells the companion to take control as soon as everything is there."""
+        """Tells the companion to take control as soon as everything is there; also if it has just let go."""
         self._is_reported = True
+        if self.phase is Phase.RELEASED:
+            self.phase = Phase.WAITING
 
     def step(self, now: Situation) -> Orders:
         """Takes the next step; at most one change of phase."""
@@ -105,14 +110,14 @@ class Engagement:
         if now.trouble:
             return Orders()
         if is_chosen and now.is_airborne:
-            return self._follow(now)
-        return self._go(Phase.READY, now, _offered(now), text="Companion: ready to follow")
+            return self._fly(now)
+        return self._go(Phase.READY, now, _offered(now), text=self._ready_text)
 
     def _ready(self, now: Situation, is_chosen: bool) -> Orders:
         if now.trouble:
             return self._go(Phase.WAITING, now, text=f"Companion: not ready: {now.trouble}")
         if is_chosen and now.is_airborne:
-            return self._follow(now)
+            return self._fly(now)
         if self._is_reported and now.is_airborne and now.is_holding:  # never out of a takeoff, a landing or a return
             self._is_reported = False
             return self._ask(Phase.ENGAGING, now, Wish.OFFBOARD)
@@ -122,7 +127,7 @@ class Engagement:
         if now.trouble:
             return self._go(Phase.WAITING, now, text=f"Companion: not engaged: {now.trouble}")
         if now.is_offboard:
-            return self._follow(now)
+            return self._fly(now)
         if now.is_refused or now.time_us - self._since_us > ENGAGE_PATIENCE_US:
             return self._go(Phase.READY, now, Sending.STAY, text="Companion: not engaged: Offboard was refused")
         if now.time_us - self._asked_us >= ASK_AGAIN_US:
@@ -152,13 +157,13 @@ class Engagement:
 
     def _released(self, now: Situation, is_chosen: bool) -> Orders:
         if is_chosen and now.is_airborne and not now.trouble:  # the last setpoints were recent enough to be flown on
-            return self._follow(now)
+            return self._fly(now)
         if now.time_us - self._since_us >= SILENCE_US:
             return self._go(Phase.WAITING, now)
         return Orders()
 
-    def _follow(self, now: Situation) -> Orders:
-        return self._go(Phase.FLYING, now, Sending.POLICY, text="Companion: following")
+    def _fly(self, now: Situation) -> Orders:
+        return self._go(Phase.FLYING, now, Sending.POLICY, text=self._flying_text)
 
     def _go(self, phase: Phase, now: Situation, sending: Sending = Sending.NOTHING, text: str = "") -> Orders:
         self.phase, self._since_us = phase, now.time_us

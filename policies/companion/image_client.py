@@ -25,6 +25,8 @@ class CameraUrlError(ValueError):
 class ImageSource(Protocol):
     """Images of the onboard camera."""
 
+    trouble: str  # why there are no images, as far as is known
+
     def take(self, time_us: int) -> ImageFrame | None:
         """The newest image since the last call, None if there is none.
 
@@ -38,6 +40,8 @@ class ImageSource(Protocol):
 
 class MemoryCamera:
     """Images of a camera in this process."""
+
+    trouble = ""
 
     def __init__(self) -> None:
         self._newest: ImageFrame | None = None

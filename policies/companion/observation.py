@@ -22,41 +22,16 @@ REPORT_LAG_S = 0.3  # of a phone's position when it arrives; guess: phones do no
 Floats = NDArray[np.float32]
 
 
-class Observer:
-    """One vehicle's observations and commands.
+class CommandKernel:
+    """What actions ask for, by the kernel function of training."""
 
-    Args:
-        kind: which vector: EGO or EGO_BLIND of the task's observe.py.
-    """
-
-    def __init__(self, kind: int) -> None:
+    def __init__(self) -> None:
         start_warp()
-        own, report = wp.zeros(1, dtype=OwnState), wp.zeros(1, dtype=OwnerReport)
-        action, command = wp.zeros(1, dtype=wp.vec4), wp.zeros(1, dtype=Command)
-        out = wp.zeros((1, len(vector_elements(kind))), dtype=float)
+        own, action, command = wp.zeros(1, dtype=OwnState), wp.zeros(1, dtype=wp.vec4), wp.zeros(1, dtype=Command)
         self._own: NDArray[Any] = own.numpy()  # live views, as of the others
-        self._report: NDArray[Any] = report.numpy()
         self._action: Floats = action.numpy()
         self._command: NDArray[Any] = command.numpy()
-        self._out: Floats = out.numpy()
-        self._observe = wp.launch(observe_rows, 1, [kind, own, report, action, out], record_cmd=True)
         self._ask = wp.launch(command_rows, 1, [action, own, command], record_cmd=True)
-
-    def vector(self, own: Own, owner: Owner, last_action: Floats, time_us: int) -> Floats:
-        """The observation as of now.
-
-        Args:
-            own: telemetry.
-            owner: the phone's last report.
-            last_action: in [-1, 1], shape (4,).
-            time_us: the companion's own clock.
-        """
-        self._write_own(own, time_us)
-        self._write_report(owner, time_us)
-        self._action[0] = last_action
-        self._observe.launch()
-        vector: Floats = self._out[0]
-        return vector
 
     def setpoint(self, action: Floats, own: Own) -> tuple[Vector, float]:
         """Velocity in ned [m/s] and yaw rate [rad/s] of an action in [-1, 1], shape (4,)."""
@@ -67,15 +42,62 @@ class Observer:
         north, east, down = (float(element) for element in row["vel_ned"])
         return (north, east, down), float(row["yaw_rate"])
 
-    def _write_own(self, own: Own, time_us: int) -> None:
-        row = self._own[0]
-        row["pos_ned"] = own.pos_ned
-        row["vel_ned"] = own.vel_ned
-        row["q_ned_from_frd"] = own.q_ned_from_frd
-        row["yaw_rate"] = rotated(own.q_ned_from_frd, own.omega_frd)[2]
-        is_valid = own.range_m == own.range_m and time_us - own.range_us < HEIGHT_OLD_US
-        row["height_m"] = own.range_m * rotated(own.q_ned_from_frd, (0.0, 0.0, 1.0))[2] if is_valid else 0.0
-        row["is_height_valid"] = int(is_valid)
+
+def write_own_row(row: Any, own: Own, time_us: int) -> None:
+    """Telemetry as a row of `OwnState`.
+
+    Args:
+        row: to be written.
+        own: telemetry.
+        time_us: the companion's own clock.
+    """
+    row["pos_ned"] = own.pos_ned
+    row["vel_ned"] = own.vel_ned
+    row["q_ned_from_frd"] = own.q_ned_from_frd
+    row["yaw_rate"] = rotated(own.q_ned_from_frd, own.omega_frd)[2]
+    is_valid = own.range_m == own.range_m and time_us - own.range_us < HEIGHT_OLD_US
+    row["height_m"] = own.range_m * rotated(own.q_ned_from_frd, (0.0, 0.0, 1.0))[2] if is_valid else 0.0
+    row["is_height_valid"] = int(is_valid)
+
+
+class Observer:
+    """One vehicle's observations and commands.
+
+    Args:
+        kind: which vector: EGO or EGO_BLIND of the task's observe.py.
+    """
+
+    def __init__(self, kind: int) -> None:
+        start_warp()
+        own, report = wp.zeros(1, dtype=OwnState), wp.zeros(1, dtype=OwnerReport)
+        action = wp.zeros(1, dtype=wp.vec4)
+        out = wp.zeros((1, len(vector_elements(kind))), dtype=float)
+        self._own: NDArray[Any] = own.numpy()  # live views, as of the others
+        self._report: NDArray[Any] = report.numpy()
+        self._action: Floats = action.numpy()
+        self._out: Floats = out.numpy()
+        self._observe = wp.launch(observe_rows, 1, [kind, own, report, action, out], record_cmd=True)
+        self._command = CommandKernel()
+
+    def vector(self, own: Own, owner: Owner, last_action: Floats, time_us: int) -> Floats:
+        """The observation as of now.
+
+        Args:
+            own: telemetry.
+            owner: the phone's last report.
+            last_action: in [-1, 1], shape (4,).
+            time_us: the companion's own clock.
+        """
+        write_own_row(self._own[0], own, time_us)
+        self._write_report(owner, time_us)
+        self._action[0] = last_action
+        self._observe.launch()
+        vector: Floats = self._out[0]
+        return vector
+
+    def setpoint(self, action: Floats, own: Own) -> tuple[Vector, float]:
+        """Velocity in ned [m/s] and yaw rate [rad/s] of an action in [-1, 1], shape (4,)."""
+        return self._command.setpoint(action, own)
 
     def _write_report(self, owner: Owner, time_us: int) -> None:
         row = self._report[0]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector
 from policies.companion.belief import owner_belief
-from policies.companion.companion import Pilot
+from policies.companion.following import Pilot
 from policies.companion.names import SCRIPTED, TASK
 from policies.experts.follower import ScriptedFollower
 from policies.learn.export.policy_file import load_policy

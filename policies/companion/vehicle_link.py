@@ -5,6 +5,7 @@ setpoints, mode changes and texts. The companion is a component of the vehicle's
 Any autopilot with PX4's or ArduPilot's modes will do.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
@@ -21,6 +22,9 @@ from common.attitude import Quat, Vector
 from common.geodesy import GeoPoint, ned_from_geodetic
 from policies.companion.engagement import Wish
 from policies.companion.vehicle_clock import VehicleClock
+
+Listener = Callable[[int, int, Any, int], None]
+"""Called with who sent a message (system, component), its fields, and when it came in [us]."""
 
 COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 REQUEST_US = 5_000_000  # rates are asked for again: the vehicle may have restarted
@@ -97,6 +101,8 @@ class VehicleLink:
         self.system_id = system_id
         self._client = ClientEnd(link, system_id, COMPONENT, vehicle_id=system_id)
         self._dialect: Dialect = PX4
+        self._listeners: dict[int, Listener] = {}
+        self._rates_hz = {**RATES_HZ}
         self._text_id = 0
         self._is_refused = False
         self._asked_for: Mode | None = None  # and not answered yet
@@ -106,23 +112,50 @@ class VehicleLink:
         """Takes in what has arrived."""
         for msg_id, sysid, compid, frame in self._client.arrived():
             name = _NAMES.get(msg_id)
+            listener = self._listeners.get(msg_id)
+            if listener is not None:
+                listener(sysid, compid, decode(frame_of(frame)).fields, time_us)
             if name == "FOLLOW_TARGET":
                 self._owner_reported(decode(frame_of(frame)).fields, time_us)
             elif name is not None and sysid == self.system_id and compid == AUTOPILOT_COMPONENT:
                 self._vehicle_reported(name, decode(frame_of(frame)).fields, time_us)
+
+    def listen(self, name: str, listener: Listener, rate_hz: float = 0.0) -> None:
+        """Has a listener called with messages of one kind, whoever sent them.
+
+        Args:
+            name: of the message.
+            listener: the only one of this kind.
+            rate_hz: what the vehicle is asked for; 0: nothing.
+        """
+        self._listeners[message_id(name)] = listener
+        if rate_hz > 0.0:
+            self._rates_hz[name] = max(rate_hz, self._rates_hz.get(name, 0.0))
 
     def keep_alive(self, time_us: int) -> None:
         """Sends the heartbeat, and asks for telemetry, when they are due."""
         self._client.keep_alive(time_us)
         if self.own.heartbeat_us != NEVER_US and time_us - self._request_us >= REQUEST_US:
             self._request_us = time_us
-            for name, rate_hz in RATES_HZ.items():
+            for name, rate_hz in self._rates_hz.items():
                 self._client.command(_COMMAND_SET_INTERVAL, float(message_id(name)), 1.0e6 / rate_hz)
 
     def take_refusal(self) -> bool:
         """Whether the vehicle has refused a change of mode since the last call."""
         is_refused, self._is_refused = self._is_refused, False
         return is_refused
+
+    @property
+    def is_ardupilot(self) -> bool:
+        return self._dialect is ARDUPILOT
+
+    def send(self, name: str, **fields: Any) -> None:
+        """A message to everybody, or to whom its fields name."""
+        self._client.send(name, **fields)
+
+    def ask(self, name: str, **fields: Any) -> None:
+        """A message to the autopilot."""
+        self._client.ask(name, **fields)
 
     def send_setpoint(self, vel_ned: Vector, yaw_rate: float) -> None:
         """A velocity [m/s] and a yaw rate [rad/s], flown in Offboard."""

@@ -22,8 +22,6 @@ from sim.world.batch import WorldBatch
 
 wp.set_module_options({"enable_backward": False})
 
-DEPTH_CHANNELS = ("nearness",)
-
 
 @wp.kernel(enable_backward=False)
 def aim(

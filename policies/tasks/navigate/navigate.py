@@ -11,11 +11,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from common.range_sectors import RANGES
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
-from policies.tasks.flight.own_state import ACTIONS, OWN_ELEMENTS
+from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
 from policies.tasks.layout import ImageElement, Layout
-from policies.tasks.navigate.depth_cameras import DEPTH_CHANNELS, DepthEyes
+from policies.tasks.navigate.depth_cameras import DepthEyes
 from policies.tasks.navigate.navigate_kernels import (
     MEASURES,
     NavigateState,
@@ -26,29 +27,17 @@ from policies.tasks.navigate.navigate_kernels import (
     prepare,
     show,
 )
-from policies.tasks.navigate.navigate_params import IMPROVED, PARAMS, TREES_PER_HA_MAX, NavigateParams
+from policies.tasks.navigate.navigate_params import IMPROVED, PARAMS, NavigateParams
 from policies.tasks.navigate.navigate_top_view import draw
-from policies.tasks.navigate.observe import GOAL_ELEMENTS
-from policies.tasks.navigate.scan import RANGE_ELEMENTS, RANGES, scan
+from policies.tasks.navigate.observe import DEPTH_CHANNELS, LAYOUT_VERSION, RAY_STACK, frame_elements
+from policies.tasks.navigate.scan import scan
 from policies.tasks.navigate.settings import NavigateSettings
+from policies.tasks.navigate.world import NAVIGATE_WORLD, TREES_PER_HA_MAX
 from policies.tasks.task_params import typed_rows
-from sim.world.world import WorldConfig
-
-WORLD = WorldConfig(
-    size_m=192.0,
-    cell_m=4.0,
-    hill_height_m=4.0,
-    hill_wavelength_m=120.0,
-    clearing_radius_m=5.0,
-    clearing_blend_m=60.0,
-    trees_per_ha=TREES_PER_HA_MAX,
-    tree_height_min_m=10.0,
-    tree_height_max_m=14.0,
-)
 
 
 class Navigate(FlightTask):
-    """The task. Layout version 1."""
+    """The task. Layout version 2; in version 1 ranges were levelled by the truth."""
 
     params: ClassVar = PARAMS
 
@@ -56,7 +45,7 @@ class Navigate(FlightTask):
         super().__init__(
             _layout(settings),
             env_count,
-            WORLD,
+            NAVIGATE_WORLD,
             trees_per_ha_max=TREES_PER_HA_MAX,
             has_estimator=settings.has_estimator,
             number_defaults=IMPROVED,
@@ -142,7 +131,7 @@ class Navigate(FlightTask):
 
         record = self.record
         self._act = record(act, buffers, rules, rig)
-        self._scan = record(scan, rig, state.params, state.is_all, state.ranges_m)
+        self._scan = record(scan, rig, state.params, state.is_all, rules.has_estimator, state.ranges_m)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, state, start)
         self._place = record(place, buffers, rig, state, start)
@@ -154,9 +143,9 @@ def _layout(settings: NavigateSettings) -> Layout:
     size = settings.image_size
     return Layout(
         "Navigate",
-        1,
-        (*OWN_ELEMENTS, *GOAL_ELEMENTS, *(RANGE_ELEMENTS if has_rays else ())),
+        LAYOUT_VERSION,
+        frame_elements(has_rays=has_rays),
         continuous=ACTIONS,
-        stack=settings.stack or (2 if has_rays else 1),
+        stack=settings.stack or (RAY_STACK if has_rays else 1),
         image=None if has_rays else ImageElement(size, size, DEPTH_CHANNELS),
     )

@@ -19,11 +19,10 @@ from policies.tasks.flight.flown_vehicle import (
     vehicle_estimate,
     velocity_setpoint,
 )
-from policies.tasks.flight.own_state import OWN_SIZE, action_command, write_own
+from policies.tasks.flight.own_state import action_command
 from policies.tasks.navigate.navigate_params import NavigateParams
-from policies.tasks.navigate.observe import GOAL_SIZE, write_goal
+from policies.tasks.navigate.observe import write_frame
 from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
-from policies.tasks.navigate.scan import write_ranges
 from sim.advance import RigArrays
 from sim.truth import Truth, has_touched
 from sim.world.world import World, ground_height, obstacle_contact
@@ -80,14 +79,11 @@ def room_beside(world: World, truth: Truth) -> float:
 
 
 @wp.func
-def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, i: int) -> None:
+def observe(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, i: int) -> None:
     """The newest frame of the observation."""
     at = open_frame(buffers, i)
     own = own_state(rig, i, rules.has_estimator)
-    write_own(own, state.actions[i], buffers.observations, i, at)
-    write_goal(own, state.goals_ned[i], buffers.observations, i, at + OWN_SIZE)
-    if rules.has_rays == 1:
-        write_ranges(state.ranges_m, buffers.observations, i, at + OWN_SIZE + GOAL_SIZE)
+    write_frame(rules.has_rays, own, state.actions[i], state.goals_ned[i], state.ranges_m, buffers.observations, i, at)
 
 
 @wp.kernel(enable_backward=False)
@@ -116,7 +112,7 @@ def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateSta
     state.measures[i, 3] = state.path_m[i]
     state.measures[i, 4] = time_s
     state.measures[i, 5] = state.start_distance_m[i]
-    write_frame(buffers, rules, rig, state, i)
+    observe(buffers, rules, rig, state, i)
     start.is_starting[i] = close_step(buffers, i, reward, outcome)
 
 
@@ -160,4 +156,4 @@ def place(buffers: StepBuffers, rig: RigArrays, state: NavigateState, start: Sta
 def show(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     if start.is_starting[i]:
-        write_frame(buffers, rules, rig, state, i)
+        observe(buffers, rules, rig, state, i)

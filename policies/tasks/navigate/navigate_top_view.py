@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.tasks.navigate.scan import RANGE_M, SECTOR_RAD, SECTORS
+from common.range_sectors import FIRST_EDGE_DEG, RANGE_M, SECTOR_DEG, SECTORS
 from policies.tasks.top_view import GOAL, GOOD, INK, VEHICLE, Canvas, Rgb
 from sim.world.world import WorldMap
 
@@ -30,7 +30,7 @@ def draw(
     plant(canvas, world.trees, north, east, _HALF_M)
     for k in range(SECTORS):
         if ranges_m[k] < RANGE_M:
-            bearing = yaw + (k + 0.5 - 0.5 * SECTORS) * float(SECTOR_RAD)
+            bearing = yaw + np.radians(FIRST_EDGE_DEG + (k + 0.5) * SECTOR_DEG)
             end = (east + float(ranges_m[k]) * np.sin(bearing), north + float(ranges_m[k]) * np.cos(bearing))
             canvas.line([(east, north), end], INK, 1)
     canvas.disc((float(goal_ned[1]), float(goal_ned[0])), 0.5, GOAL)

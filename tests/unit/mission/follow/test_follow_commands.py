@@ -10,6 +10,7 @@ from autopilot.mavlink.wire.codec import encode
 from mission.cli import app
 from mission.follow.companion_process import trouble_text
 from policies.companion.companion import Companion
+from policies.companion.following import Following
 from policies.companion.image_client import StreamCamera
 from policies.companion.pilot import load_pilot
 from tests.system.vehicle import free_ports
@@ -70,11 +71,11 @@ def test_it_says_who_flies_and_where_and_what_is_missing():
 def test_a_camera_that_is_not_there_is_named():
     camera = StreamCamera(f"tcp://127.0.0.1:{free_ports()[0]}")
     own_end, vehicle_end = memory_pair(LinkRole.ONBOARD)
-    companion = Companion(own_end, camera, load_pilot("scripted"))
+    companion = Companion(own_end, Following(camera, load_pilot("scripted")))
     vehicle_end.send(encode("HEARTBEAT", 1, 1, 0, type=2, autopilot=12, system_status=4, mavlink_version=3))
     vehicle_end.send(encode("ATTITUDE_QUATERNION", 1, 1, 1, time_boot_ms=1, q1=1.0))
     vehicle_end.send(encode("LOCAL_POSITION_NED", 1, 1, 2, time_boot_ms=1))
     for time_us in range(0, 100_000, 20_000):
         companion.frame(time_us)
-    assert trouble_text(companion, camera) == "no new pictures: nobody there"
+    assert trouble_text(companion) == "no new pictures: nobody there"
     companion.close()

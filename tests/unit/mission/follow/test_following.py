@@ -14,8 +14,9 @@ from common.geodesy import ned_from_geodetic
 from mission.follow.lockstep import flight_with_companion
 from mission.follow.owner_device import PHONE_SYSTEM
 from mission.script import take_off
-from policies.companion.companion import IMAGE_OLD_US, OWNER_LOST_S, TELEMETRY_OLD_US
+from policies.companion.companion import TELEMETRY_OLD_US
 from policies.companion.engagement import Phase
+from policies.companion.following import IMAGE_OLD_US, OWNER_LOST_S
 from policies.companion.observation import REPORT_LAG_S
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.flight.flown_vehicle import own_state
@@ -80,9 +81,9 @@ def test_the_companion_sees_what_training_sees(flown):
     actions = wp.array([action], dtype=wp.vec4)
     wp.launch(observe_rows, 1, [int(EGO), own, report, actions, out])
     # a frame of 20 ms of the report's way, centimetres of the range finder and of latitudes
-    assert companion.seen == pytest.approx(out.numpy()[0], abs=0.025)
+    assert companion.skill.seen == pytest.approx(out.numpy()[0], abs=0.025)
     exact = [k for k, element in enumerate(vector_elements(int(EGO))) if "owner" not in element.name]
-    assert companion.seen[exact] == pytest.approx(out.numpy()[0][exact], abs=2e-3)
+    assert companion.skill.seen[exact] == pytest.approx(out.numpy()[0][exact], abs=2e-3)
 
 
 def test_training_flies_with_the_parameters_of_flights(flown):
@@ -162,7 +163,7 @@ def test_who_flies_by_sight_alone_is_ready_when_it_believes_to_see_the_owner(tmp
     assert companion.decision_count == 0
     assert not companion.action.any()
     if phase is Phase.READY:
-        assert companion.owner_distance_m() == pytest.approx(3.5, abs=0.1)  # as believed
+        assert companion.skill.owner_distance_m(companion.vehicle.own) == pytest.approx(3.5, abs=0.1)  # as believed
 
 
 def test_in_the_ardupilot_dialect_it_flies_in_guided_and_hands_back_by_loiter():
@@ -180,7 +181,7 @@ def test_in_the_ardupilot_dialect_it_flies_in_guided_and_hands_back_by_loiter():
 def test_pictures_of_another_lens_end_in_hold():
     flight, companion = following()
     flight.onboard._sinks.clear()
-    flight.onboard.add_sink(lambda frame: companion._camera.publish(replace(frame, hfov_deg=60.0)))
+    flight.onboard.add_sink(lambda frame: companion.skill.camera.publish(replace(frame, hfov_deg=60.0)))
     advance(flight, 1.0, lambda: flight.controller.state.mode is Mode.HOLD)
     assert flight.controller.state.mode is Mode.HOLD
     assert companion.trouble == "pictures of another lens"

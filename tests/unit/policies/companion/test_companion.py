@@ -8,8 +8,9 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
-from policies.companion.companion import IMAGE_OLD_US, LENS, NO_DECISION, NO_IMAGES, Companion
+from policies.companion.companion import NO_DECISION, Companion
 from policies.companion.engagement import Phase
+from policies.companion.following import IMAGE_OLD_US, LENS, NO_IMAGES, Following
 from policies.experts.follower import ScriptedFollower
 
 FRAME_US = 20_000
@@ -52,7 +53,7 @@ class Air:
         companion_end, self.end = memory_pair(LinkRole.ONBOARD)
         self.pilot = Doubting()
         self.images = Images(self.pilot.image_shape)
-        self.companion = Companion(companion_end, self.images, self.pilot)
+        self.companion = Companion(companion_end, Following(self.images, self.pilot))
         self.mode = Mode.HOLD
         self.time_us = 0
         self._reader = FrameReader()

@@ -9,11 +9,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
+from common.range_sectors import RANGE_M, SECTORS
 from policies.tasks.catalogue import UnknownTask, build_task, task_settings
 from policies.tasks.episode import Outcome
 from policies.tasks.navigate.navigate import Navigate
 from policies.tasks.navigate.navigate_kernels import MEASURES
-from policies.tasks.navigate.scan import BAND_M, RANGE_M, SECTORS
+from sim.sensors.scanner import BAND_M
 
 QUICK = {"has_estimator": "false"}
 DEPTH = {"observation": "depth", "image_size": "8"}
@@ -109,7 +110,7 @@ def test_observation_does_not_change_when_the_truth_does() -> None:
 
 
 def test_sectors_tell_the_nearest_that_a_fan_of_fine_rays_meets() -> None:
-    task = _task(4, params={"range_noise": 0.0, "hill_height_m": 0.0})
+    task = _task(4, params={"range_noise": 0.0, "hill_height_m": 0.0}, **QUICK)  # levelled by the truth
     ranges_m = task.navigation.ranges_m.numpy()
     bodies = task.rig.rows["truth"]
     for row, body in enumerate(bodies):

@@ -1,0 +1,142 @@
+"""To follow somebody: images of the onboard camera and the reports of a phone in, the actions of a pilot out.
+
+A decision for each new image (10 Hz). Where the owner is lost, it does not fly.
+"""
+
+from math import isclose
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.attitude import Vector
+from common.image_stream import ImageFrame
+from policies.companion.image_client import ImageSource
+from policies.companion.observation import Observer
+from policies.companion.owner_watch import OwnerWatch
+from policies.companion.skill import Floats, Velocity
+from policies.companion.vehicle_link import Own, Owner, VehicleLink
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG
+
+DECISION_US = 100_000
+DECISION_EARLY_US = 10_000  # an image may come this much earlier than the decision period asks
+IMAGE_OLD_US = 500_000  # guess: five images missed, 3 m at full speed
+OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
+NO_IMAGES = "no new pictures"
+LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
+LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
+
+
+class Pilot(Protocol):
+    """Whoever follows: a trained policy, or a script that sees the same."""
+
+    kind: int  # of its vector: EGO or EGO_BLIND
+    image_shape: tuple[int, int, int]  # (height, width, channels) of the image it needs
+    owner_hfrd: Vector | None  # [m] where the last image showed the owner's chest, from the vehicle; None: nowhere
+
+    def reset(self) -> None:
+        """Forgets what came before."""
+        ...
+
+    def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:
+        """The action for an observation: four numbers in [-1, 1]."""
+        ...
+
+
+class Following:
+    """One vehicle's skill to follow.
+
+    Args:
+        camera: the onboard camera.
+        pilot: who decides.
+    """
+
+    ready, flying = "ready to follow", "following"
+
+    def __init__(self, camera: ImageSource, pilot: Pilot) -> None:
+        self.seen: Floats = np.zeros(0, dtype=np.float32)
+        self.camera = camera
+        self._pilot = pilot
+        self._observer = Observer(pilot.kind)
+        self._watch = OwnerWatch(hears=pilot.kind != EGO_BLIND)
+        self._owner = Owner()
+        self._image: ImageFrame | None = None  # the newest
+        self._image_us = -1  # when it came in, on our clock; -1: never
+        self._decided_us = 0  # when the image that was decided on was taken, on the vehicle's clock
+        self._has_looked = False  # at the newest image
+
+    def attach(self, vehicle: VehicleLink) -> None:
+        """Hears nothing that the link does not know of by itself."""
+
+    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
+        self._owner = vehicle.owner
+        image = self.camera.take(time_us)
+        if image is None:
+            return False
+        self._image, self._image_us, self._has_looked = image, time_us, False
+        vehicle.clock.pictured(image.time_us)
+        return True
+
+    def is_ordered(self) -> bool:
+        return False
+
+    def blindness(self, own: Own, time_us: int) -> str:
+        image = self._image
+        if image is None or max(time_us - self._image_us, own.boot_us - image.time_us) > IMAGE_OLD_US:
+            return NO_IMAGES  # none came in, or what came in was old
+        if image.pixels.shape != self._pilot.image_shape:
+            return "pictures of another size"
+        lens = (image.hfov_deg, image.pitch_deg, image.depth_half_m)
+        if not all(isclose(here, there, rel_tol=LENS_TOLERANCE) for here, there in zip(lens, LENS, strict=True)):
+            return "pictures of another lens"
+        return ""
+
+    def loss(self, own: Own) -> str:
+        return "owner lost" if self._watch.silence_s(own.boot_us) > OWNER_LOST_S else ""
+
+    def begin(self, own: Own) -> None:  # noqa: ARG002  (others need it)
+        self._pilot.reset()
+        self._decided_us = -DECISION_US
+
+    def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:  # noqa: ARG002
+        """Lets the pilot see the newest image, if one is due.
+
+        Who does not fly looks too: the owner must have been seen before anybody flies by sight.
+        """
+        image = self._image
+        if image is None or 0 <= image.time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
+            return None  # a clock that has gone back is that of a vehicle that has restarted
+        self._decided_us = image.time_us
+        vector = self._observer.vector(own, self._owner, last_action, time_us)
+        self.seen = vector.copy()
+        action = self._pilot.act(vector, image.pixels)
+        self._has_looked = bool(np.isfinite(action).all())
+        if not self._has_looked:
+            self._pilot.reset()  # what it remembers is no number either
+        return action
+
+    def setpoint(self, action: Floats, own: Own) -> Velocity:
+        return self._observer.setpoint(action, own)
+
+    def conclude(self, own: Own) -> None:
+        """Tracks the owner: by the newest image, and by the phone."""
+        if self._image is not None:
+            seen_hfrd = self._pilot.owner_hfrd if self._has_looked else None
+            self._watch.update(self._image.time_us, own, self._owner, seen_hfrd)
+
+    def owner_distance_m(self, own: Own) -> float:
+        """From the vehicle to the owner as tracked; NaN while nothing is known."""
+        return self._watch.distance_m(own)
+
+    def image_age_s(self, time_us: int) -> float:
+        """Since the newest image came in; infinite without one."""
+        return (time_us - self._image_us) * 1e-6 if self._image_us >= 0 else float("inf")
+
+    def hint(self, trouble: str) -> str:
+        return self.camera.trouble if trouble == NO_IMAGES else ""
+
+    def figures(self, own: Own, time_us: int) -> str:
+        return f"owner {self.owner_distance_m(own):.1f} m | picture {self.image_age_s(time_us) * 1e3:.0f} ms"
+
+    def close(self) -> None:
+        self.camera.close()

@@ -1,0 +1,191 @@
+"""Where to navigate to: a goto of a client, or the waypoints of the vehicle's plan, one after the other.
+
+In: a DO_REPOSITION sent to the companion itself; the place that the vehicle says it goes to in Hold or Guided
+(POSITION_TARGET_GLOBAL_INT), which is how a ground station's or MAVSDK's goto to the autopilot is heard; the plan. Out:
+the next goal in the vehicle's ned frame. A goto comes before the plan, and is over when it has been reached.
+"""
+
+from dataclasses import dataclass
+from math import dist, isfinite, isnan, nan
+from typing import Any
+
+from autopilot.interface.item_lists import MissionItem
+from autopilot.interface.vehicle_state import Mode, Severity
+from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT
+from autopilot.mavlink.wire.convert import INT32_MAX, degrees_from_e7, is_position
+from autopilot.mavlink.wire.number_bounds import POSITION_MAX_M, is_known, is_within
+from common.attitude import Vector
+from common.geodesy import ned_from_geodetic
+from policies.companion.plan_download import PlanDownload
+from policies.companion.vehicle_link import COMPONENT, VehicleLink
+
+FAR_M = 1000.0  # guess: farther is a mistake
+NEAR_M = 10.0  # a place nearer than this that the vehicle holds is where it stopped, not where it was sent; guess
+MOVED_M = 1.0  # a place that the vehicle goes to has changed if it is so far from the last
+_DO_REPOSITION, _NAV_WAYPOINT = 192, 16
+_ACCEPTED, _TEMPORARILY_REJECTED, _DENIED = 0, 1, 2  # MAV_RESULT
+_ABOVE_SEA, _ABOVE_HOME = frozenset({0, 5}), frozenset({3, 6})  # MAV_FRAME
+_FREE_POSITION = 0b111  # type_mask
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A place to navigate to."""
+
+    pos_ned: Vector  # [m]; down is NaN where the height does not matter
+    name: str  # for the pilot: "goto", "waypoint 2 of 5"
+    is_last: bool = True  # nothing comes after it
+
+
+class Goals:
+    """What one vehicle's companion has been asked to reach.
+
+    Args:
+        vehicle: whose links it hears.
+        is_ordered_by_goto: the vehicle's own goto is an order to fly there; otherwise only a place to fly to.
+    """
+
+    def __init__(self, vehicle: VehicleLink, *, is_ordered_by_goto: bool) -> None:
+        self._is_ordered_by_goto = is_ordered_by_goto
+        self._is_ordered = False
+        self._goto: Goal | None = None
+        self._target_ned: Vector = (nan, nan, nan)  # that the vehicle went to when it was last heard
+        self._home_alt_m = nan
+        self._items: tuple[MissionItem, ...] = ()  # of the plan as it was last looked at
+        self._seq = -1  # that was current then
+        self._waypoints: list[Goal] = []  # that are left
+        self.done = ""  # what has been reached, once nothing is left
+        self._vehicle = vehicle
+        self._plan = PlanDownload(vehicle)
+        vehicle.listen("HOME_POSITION", self._home_reported, 0.5)
+        vehicle.listen("POSITION_TARGET_GLOBAL_INT", self._target_reported, 10.0)
+        vehicle.listen("COMMAND_INT", self._command_int)
+        vehicle.listen("COMMAND_LONG", self._command_long)
+
+    def frame(self, time_us: int) -> None:
+        """Keeps the plan; before `goal`."""
+        self._plan.frame(time_us)
+        if (self._plan.items, self._plan.current_seq) != (self._items, self._seq):
+            self._items, self._seq = self._plan.items, self._plan.current_seq
+            self._waypoints = self._waypoints_of(self._items, self._seq)
+            if self._waypoints:
+                self.done = ""
+
+    def is_ordered(self) -> bool:
+        """Whether a goto has asked to be flown since the last call."""
+        is_ordered, self._is_ordered = self._is_ordered, False
+        return is_ordered
+
+    @property
+    def goal(self) -> Goal | None:
+        """Where to go next; None: nowhere."""
+        return self._goto or (self._waypoints[0] if self._waypoints else None)
+
+    def reached(self) -> Goal | None:
+        """Takes note that the goal has been reached, and returns what was."""
+        reached = self.goal
+        if self._goto is not None:
+            self._goto = None
+            self._waypoints = []  # the plan was not asked for
+        elif self._waypoints:
+            self._waypoints = self._waypoints[1:]
+        if reached is not None and reached.is_last:
+            self.done = f"{reached.name} reached"
+        return reached
+
+    # ---- what comes in ----
+
+    def _home_reported(self, sysid: int, compid: int, fields: Any, _: int) -> None:
+        if (sysid, compid) == (self._vehicle.system_id, AUTOPILOT_COMPONENT):
+            self._home_alt_m = fields.altitude * 1.0e-3
+
+    def _target_reported(self, sysid: int, compid: int, fields: Any, _: int) -> None:
+        """The vehicle has said where it goes: a new place far from it, in Hold or Guided, is a goto."""
+        vehicle = self._vehicle
+        if (sysid, compid) != (vehicle.system_id, AUTOPILOT_COMPONENT):
+            return
+        own = vehicle.own
+        is_goto_mode = own.mode in (Mode.HOLD, Mode.GUIDED)
+        if not is_goto_mode or fields.type_mask & _FREE_POSITION or not (fields.lat_int or fields.lon_int):
+            return
+        target_ned = self._ned_of(degrees_from_e7(fields.lat_int), degrees_from_e7(fields.lon_int), fields.alt)
+        if isinstance(target_ned, str) or dist(target_ned, self._target_ned) < MOVED_M:
+            return
+        is_heard_first = isnan(self._target_ned[0])
+        self._target_ned = target_ned
+        if dist(target_ned[:2], own.pos_ned[:2]) > NEAR_M and not is_heard_first:
+            self._take(target_ned, is_ordered=self._is_ordered_by_goto)
+
+    def _command_int(self, sysid: int, compid: int, fields: Any, _: int) -> None:
+        if self._is_goto_to_us(fields):
+            lat_deg, lon_deg = degrees_from_e7(fields.x), degrees_from_e7(fields.y)
+            is_given = INT32_MAX not in (fields.x, fields.y)
+            alt_m = self._alt_amsl_m(fields.frame, fields.z)
+            self._goto_received(sysid, compid, lat_deg if is_given else nan, lon_deg if is_given else nan, alt_m)
+
+    def _command_long(self, sysid: int, compid: int, fields: Any, _: int) -> None:
+        if self._is_goto_to_us(fields):
+            self._goto_received(sysid, compid, fields.param5, fields.param6, fields.param7)
+
+    def _is_goto_to_us(self, fields: Any) -> bool:
+        is_ours = fields.target_system == self._vehicle.system_id
+        return is_ours and fields.target_component == COMPONENT and fields.command == _DO_REPOSITION
+
+    def _goto_received(self, sysid: int, compid: int, lat_deg: float, lon_deg: float, alt_m: float) -> None:
+        """A goto to the companion itself: always an order."""
+        vehicle = self._vehicle
+        own = vehicle.own
+        result, reason = _DENIED, "there is no such place"
+        if is_within(POSITION_MAX_M, alt_m) and is_position(lat_deg, lon_deg) and isfinite(lat_deg + lon_deg):
+            target_ned = self._ned_of(lat_deg, lon_deg, alt_m)
+            if isinstance(target_ned, str):
+                result, reason = _TEMPORARILY_REJECTED, target_ned
+            elif not own.is_armed or own.is_on_ground:
+                result, reason = _TEMPORARILY_REJECTED, "the vehicle is not in the air"
+            else:
+                reason = self._take(target_ned, is_ordered=True)
+                result = _DENIED if reason else _ACCEPTED
+        if result != _ACCEPTED:
+            vehicle.say(f"Companion: goto refused: {reason}", Severity.WARNING)
+        vehicle.send("COMMAND_ACK", command=_DO_REPOSITION, result=result, target_system=sysid, target_component=compid)
+
+    def _take(self, target_ned: Vector, *, is_ordered: bool) -> str:
+        """Makes a place the goal; why not, "" if it is."""
+        vehicle = self._vehicle
+        away_m = dist(target_ned[:2], vehicle.own.pos_ned[:2])
+        if away_m > FAR_M:
+            return f"it is {away_m / 1000.0:.1f} km away, {FAR_M / 1000.0:.1f} km allowed"
+        self._goto, self.done = Goal(target_ned, "goto"), ""
+        self._is_ordered = is_ordered
+        return ""
+
+    # ---- where places are ----
+
+    def _ned_of(self, lat_deg: float, lon_deg: float, alt_m: float) -> Vector | str:
+        """A place in the vehicle's ned frame, or why it is not known."""
+        own = self._vehicle.own
+        if own.origin is None or not isfinite(own.pos_ned[0]):
+            return "the vehicle's position is not known"
+        north, east, down = ned_from_geodetic(lat_deg, lon_deg, own.origin.alt_m if isnan(alt_m) else alt_m, own.origin)
+        if not is_known(POSITION_MAX_M, north, east, down):
+            return "there is no such place"
+        return north, east, nan if isnan(alt_m) else down
+
+    def _alt_amsl_m(self, frame: int, alt_m: float) -> float:
+        """Altitude [m]; NaN where it is not known, as of what is given above the ground."""
+        if frame in _ABOVE_SEA:
+            return alt_m
+        return self._home_alt_m + alt_m if frame in _ABOVE_HOME else nan
+
+    def _waypoints_of(self, items: tuple[MissionItem, ...], current_seq: int) -> list[Goal]:
+        """The waypoints from the current item on."""
+        is_ardupilot = self._vehicle.is_ardupilot  # its item 0 is home
+        places = []
+        for item in items:
+            if item.command != _NAV_WAYPOINT or item.seq < current_seq or (is_ardupilot and item.seq == 0):
+                continue
+            place = self._ned_of(item.x, item.y, self._alt_amsl_m(item.frame, item.z))
+            if not isinstance(place, str):
+                places.append(place)
+        names = [f"waypoint {k + 1} of {len(places)}" for k in range(len(places))]
+        return [Goal(place, name, name == names[-1]) for place, name in zip(places, names, strict=True)]

@@ -1,0 +1,127 @@
+"""What range finders on board tell, as a navigating policy takes it: sectors round the nose, and tilted beams.
+
+In: OBSTACLE_DISTANCE and DISTANCE_SENSOR, of whichever component of the vehicle's system. Out: ranges in the order of
+training. A tilted beam is a DISTANCE_SENSOR of orientation MAV_SENSOR_ROTATION_CUSTOM whose quaternion says where it
+looks; it counts for the elevation of the layout that it is nearest to once it is levelled.
+"""
+
+from math import asin, atan2, cos, degrees, isfinite, isnan, sin
+from typing import Any
+
+import numpy as np
+
+from autopilot.mavlink.wire.convert import UINT16_MAX, quat_from_wxyz
+from autopilot.mavlink.wire.number_bounds import is_known
+from common.attitude import rotated, yaw_of
+from common.range_sectors import (
+    BEAM_ELEVATIONS_DEG,
+    FIRST_EDGE_DEG,
+    RANGE_M,
+    RANGES,
+    SECTOR_DEG,
+    SECTORS,
+)
+from policies.companion.skill import Floats
+from policies.companion.vehicle_link import NEVER_US, VehicleLink
+
+SCAN_HZ = 20.0  # that the vehicle is asked for
+OLD_US = 500_000  # guess, as of images: five scans missed
+UNKNOWN_MAX = 6  # sectors; guess: an eighth, six times what training has lost
+_NORTH_FRAMES, _BODY_FRAMES = frozenset({0, 1}), frozenset({8, 12})  # MAV_FRAME
+_CUSTOM_ROTATION = 100  # MAV_SENSOR_ROTATION_CUSTOM
+_ELEVATION_OFF_DEG, _BEARING_OFF_DEG = 6.0, 20.0  # guess: the attitude is a frame older than the beam
+_OVERLAP_DEG = 0.1  # by which a bin must reach into a sector to count there: rounding
+
+
+class Ranges:
+    """The newest ranges of one vehicle.
+
+    Args:
+        vehicle: whose links it hears.
+    """
+
+    def __init__(self, vehicle: VehicleLink) -> None:
+        self.ranges_m: Floats = np.full(RANGES, RANGE_M, dtype=np.float32)
+        self.scan_us = NEVER_US  # when the newest sectors came in
+        self._beam_us = [NEVER_US] * len(BEAM_ELEVATIONS_DEG)
+        self._unknown_count = SECTORS
+        self._stamp = -1  # the sender's time of the newest sectors
+        self._is_new = False
+        self._own = vehicle.own
+        system_id = vehicle.system_id
+
+        def sectors(sysid: int, _: int, fields: Any, time_us: int) -> None:
+            if sysid == system_id:
+                self._sectors_reported(fields, time_us)
+
+        def beam(sysid: int, _: int, fields: Any, time_us: int) -> None:
+            if sysid == system_id:
+                self._beam_reported(fields, time_us)
+
+        vehicle.listen("OBSTACLE_DISTANCE", sectors, SCAN_HZ)
+        vehicle.listen("DISTANCE_SENSOR", beam)
+
+    def take_new(self) -> bool:
+        """Whether new sectors have come in since the last call."""
+        is_new, self._is_new = self._is_new, False
+        return is_new
+
+    def trouble(self, time_us: int) -> str:
+        """Why nothing can be decided on them; "" if it can."""
+        if time_us - self.scan_us > OLD_US:
+            return "no ranges all round"
+        if self._unknown_count > UNKNOWN_MAX:
+            return "the range finder does not look round far enough"
+        if any(time_us - beam_us > OLD_US for beam_us in self._beam_us):
+            return "no ranges of the tilted beams"
+        return ""
+
+    def _sectors_reported(self, fields: Any, time_us: int) -> None:
+        increment_deg = fields.increment if isnan(fields.increment_f) else fields.increment_f or fields.increment
+        first_deg = fields.angle_offset
+        if not is_known(360.0, increment_deg, first_deg) or not increment_deg or fields.time_usec == self._stamp:
+            return
+        if fields.frame in _NORTH_FRAMES:
+            first_deg -= degrees(yaw_of(self._own.q_ned_from_frd))
+        elif fields.frame not in _BODY_FRAMES:
+            return
+        nearest = np.full(SECTORS, np.inf, dtype=np.float32)
+        for i, distance_cm in enumerate(fields.distances):
+            if distance_cm == UINT16_MAX:
+                continue
+            distance_m = RANGE_M if distance_cm > fields.max_distance else min(distance_cm * 0.01, RANGE_M)
+            for k in _sectors_of(first_deg + i * increment_deg, abs(increment_deg)):
+                nearest[k] = min(nearest[k], distance_m)
+        is_unknown = np.isinf(nearest)
+        self._unknown_count = int(is_unknown.sum())
+        self.ranges_m[:SECTORS] = np.where(is_unknown, RANGE_M, nearest)
+        self._stamp, self.scan_us, self._is_new = fields.time_usec, time_us, True
+
+    def _beam_reported(self, fields: Any, time_us: int) -> None:
+        if fields.orientation != _CUSTOM_ROTATION or not is_known(1.1, *fields.quaternion):
+            return
+        forward = rotated(quat_from_wxyz(tuple(fields.quaternion)), (1.0, 0.0, 0.0))
+        north, east, down = rotated(self._own.q_ned_from_frd, forward)
+        if not isfinite(down) or abs(down) > 1.0:
+            return
+        off_rad = atan2(east, north) - yaw_of(self._own.q_ned_from_frd)
+        if abs(degrees(atan2(sin(off_rad), cos(off_rad)))) > _BEARING_OFF_DEG:
+            return
+        elevation_deg = degrees(asin(-down))
+        k = min(range(len(BEAM_ELEVATIONS_DEG)), key=lambda k: abs(BEAM_ELEVATIONS_DEG[k] - elevation_deg))
+        if abs(BEAM_ELEVATIONS_DEG[k] - elevation_deg) > _ELEVATION_OFF_DEG:
+            return
+        is_inside = fields.min_distance <= fields.current_distance <= fields.max_distance
+        self.ranges_m[SECTORS + k] = min(fields.current_distance * 0.01, RANGE_M) if is_inside else RANGE_M
+        self._beam_us[k] = time_us
+
+
+def _sectors_of(middle_deg: float, width_deg: float) -> list[int]:
+    """The sectors that a bin reaches into."""
+    found = []
+    for k in range(SECTORS):
+        sector_deg = FIRST_EDGE_DEG + (k + 0.5) * SECTOR_DEG
+        apart_deg = abs((middle_deg - sector_deg + 180.0) % 360.0 - 180.0)
+        if apart_deg < 0.5 * (width_deg + SECTOR_DEG) - _OVERLAP_DEG:
+            found.append(k)
+    return found

@@ -1,0 +1,71 @@
+"""What a companion can do with one kind of policy: to follow somebody, to navigate to a goal.
+
+The companion itself (companion.py) knows the link, who flies and when setpoints are due. A skill knows its sensors, its
+task, and who decides.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.attitude import Vector
+from policies.companion.vehicle_link import Own, VehicleLink
+
+Floats = NDArray[np.float32]
+Velocity = tuple[Vector, float]
+"""A velocity in ned [m/s] and a yaw rate [rad/s]."""
+
+
+class Skill(Protocol):
+    """One kind of policy in flight. Times are on the companion's clock unless they are said to be the vehicle's."""
+
+    ready: str  # what a pilot is told when it could fly: "ready to follow"
+    flying: str  # and while it does: "following"
+    seen: Floats  # the vector that was decided on last
+
+    def attach(self, vehicle: VehicleLink) -> None:
+        """Says what it has to hear; once, before anything is received."""
+        ...
+
+    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
+        """Takes in what its sensors and its clients have sent; whether there is something new to decide on."""
+        ...
+
+    def is_ordered(self) -> bool:
+        """Whether somebody has asked it to fly since the last call, other than by choosing Offboard."""
+        ...
+
+    def blindness(self, own: Own, time_us: int) -> str:
+        """Why there is nothing to decide on; "" if there is."""
+        ...
+
+    def loss(self, own: Own) -> str:
+        """Why it cannot fly, or need not any more, though it sees; "" if it can."""
+        ...
+
+    def begin(self, own: Own) -> None:
+        """It takes over: an episode begins, as in training, without memory."""
+        ...
+
+    def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
+        """The action on what was received last, in [-1, 1]; None if none was due, or none came out as a number."""
+        ...
+
+    def setpoint(self, action: Floats, own: Own) -> Velocity:
+        """What an action asks for."""
+        ...
+
+    def conclude(self, own: Own) -> None:
+        """Called after the setpoint has been sent, when something new was received: nobody waits for it."""
+        ...
+
+    def hint(self, trouble: str) -> str:
+        """What more is known of why there is this trouble; "" if nothing is."""
+        ...
+
+    def figures(self, own: Own, time_us: int) -> str:
+        """Its figures of now, for a line of progress."""
+        ...
+
+    def close(self) -> None: ...

@@ -1,0 +1,20 @@
+"""The forest that a drone navigates through: the same in training and in flights.
+
+Light to import: flights need it before they need a policy.
+"""
+
+from sim.world.world import WorldConfig
+
+TREES_PER_HA_MAX = 600.0
+NAVIGATE_WORLD = WorldConfig(
+    size_m=192.0,
+    cell_m=4.0,
+    hill_height_m=4.0,
+    hill_wavelength_m=120.0,
+    clearing_radius_m=5.0,
+    clearing_blend_m=60.0,
+    trees_per_ha=TREES_PER_HA_MAX,
+    tree_height_min_m=10.0,
+    tree_height_max_m=14.0,
+)
+"""Worlds of even seeds are trained in, those of odd seeds are held out."""
