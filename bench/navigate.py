@@ -1,7 +1,8 @@
 """`python -m bench.navigate [POLICY]`: how well does the trained policy cross forests? Writes docs/results/navigate.md.
 
 In: the policy that ships, or a policy file. Held-out forests of several densities, with estimator, wind, noise and
-varied vehicles, as many episodes each. Out: a table with 95 % intervals, and an image of some flights from above.
+varied vehicles, as many episodes each. Out: a table with 95 % intervals, and an image of some flights from above. The
+section of flights over MAVLink stays as it is.
 """
 
 import sys
@@ -28,6 +29,7 @@ from policies.tasks.navigate.navigate_kernels import MEASURES
 from policies.tasks.navigate.navigate_top_view import plant
 from policies.tasks.top_view import GOAL, OBSTACLE, VEHICLE, Canvas
 
+FLOWN = "## Over MAVLink"  # the section of bench.navigate_mavlink
 DENSITIES = (200.0, 400.0, 600.0)
 EPISODES = 500  # of each density, side by side: each environment plays one
 SEED = 1_000_003  # no training run is given it
@@ -157,6 +159,12 @@ def top_view(settings: dict[str, str], flights: Flights, trees_per_ha: float) ->
     return np.vstack([np.hstack(tiles[k : k + 3]) for k in range(0, len(tiles) - 2, 3)])
 
 
+def flown_section(page: str) -> str:
+    """What bench.navigate_mavlink has written at the page's end."""
+    at = page.find(FLOWN)
+    return "" if at < 0 else f"\n{page[at:]}"
+
+
 def main(arguments: list[str]) -> int:
     policy, card = load_policy(Path(arguments[0]) if arguments else find_policy("navigate"))
     settings = {key: str(value) for key, value in card.settings.items()} | {"has_estimator": "true"}
@@ -171,7 +179,7 @@ def main(arguments: list[str]) -> int:
     (DOCS / "images").mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(DOCS / "images" / "navigate.jpg"), image[..., ::-1], (cv2.IMWRITE_JPEG_QUALITY, 82))
     page = PAGE.format(episodes=EPISODES, rows="\n".join(lines), machine=machine())
-    write_whole(DOCS / "navigate.md", page.encode())
+    write_whole(DOCS / "navigate.md", (page + flown_section((DOCS / "navigate.md").read_text())).encode())
     return 0
 
 

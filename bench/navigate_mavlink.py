@@ -1,24 +1,29 @@
 """`python -m bench.navigate_mavlink [POLICY]`: how well does the trained policy cross forests over MAVLink?
 
 One vehicle at a time, in lockstep: the whole flight controller, the scanner's messages, a companion computer with the
-policy, a goto sent to it. In: the policy that ships, or a policy file. Held-out forests, goals, wind, noise and vehicles
-drawn as the batch draws them. Out: the table of flights over MAVLink of docs/results/navigate.md.
+policy, a goto sent to it. In: the policy that ships, or a policy file. Held-out forests, goals, wind, noise and
+vehicles drawn as the batch draws them. Out: the table of flights over MAVLink of docs/results/navigate.md.
 """
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, dist, nan, pi, sin
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from autopilot.mavlink.wire.convert import degrees_e7
+from bench.navigate import FLOWN
 from bench.row import machine
+from common.attitude import Vector
 from common.files import write_whole
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from mission.follow.lockstep import flight_with_navigator
 from mission.script import take_off
+from mission.simulator.flight_rig import TURBULENCE
+from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
 from policies.companion.navigation_pilot import NavigationPilot
 from policies.companion.vehicle_link import COMPONENT
@@ -27,31 +32,31 @@ from policies.learn.export.policy_path import find_policy
 from policies.tasks.intervals import Interval, bootstrap, rate
 from policies.tasks.navigate.navigate_params import GOAL_MAX_M
 from policies.tasks.navigate.world import NAVIGATE_WORLD
-from sim.sensors.sensors import sensor_model
+from sim.wind import wind_model
 
 DENSITIES = (200.0, 400.0, 600.0)
 FLIGHTS = 100  # of each density
 FIRST_SEED = 1_000_003  # odd, as all worlds that are not trained in
 GOAL_MIN_M, GOAL_HEIGHT_M, GOAL_RADIUS_M, CEILING_M, SLOWEST_M_S = 60.0, 2.0, 3.0, 4.0, 3.0  # the task's
 PAGE = Path(__file__).parent.parent / "docs" / "results" / "navigate.md"
-BEGIN, END = "<!-- flown: made by bench.navigate_mavlink -->", "<!-- /flown -->"
 _TAKEOFF_S, _SETTLE_S, _REST_S = 40.0, 2.0, 4.0
 _DO_REPOSITION = 192
+ARRIVED = "goto reached"
 
-SECTION = """\
-## Over MAVLink
+SECTION = f"""\
+{FLOWN}
 
 The same policy, flown by its [companion](../how-to/companion.md): a goto is sent to it, the scanner's messages come to
-it through the vehicle, its setpoints go to mode Offboard. {flights} flights of each density, one vehicle at a time, in
-lockstep; forests, goals, wind, noise and vehicles are drawn as above. A flight has arrived when the companion hands back
-within 3 m of the goal, by the truth, and the vehicle then stays untouched for 4 s. Made by
+it through the vehicle, its setpoints go to mode Offboard. {{flights}} flights of each density, one vehicle at a time, in
+lockstep; forests, goals, wind, noise and vehicles are drawn as above. A flight has arrived when the companion
+hands back within 3 m of the goal, by the truth, and the vehicle then stays untouched for 4 s. Made by
 `python -m bench.navigate_mavlink`.
 
 | trees/ha | success | mean speed | collisions | over the forest | other |
 |---|---|---|---|---|---|
-{rows}
+{{rows}}
 
-Measured on {machine}.
+Measured on {{machine}}.
 """
 
 
@@ -78,28 +83,124 @@ def cross(pilot: NavigationPilot, trees_per_ha: float, seed: int) -> Crossing:
     world = NAVIGATE_WORLD.model_copy(
         update={"seed": seed, "trees_per_ha": trees_per_ha, "hill_height_m": rng.uniform(0.0, 6.0)}
     )
-    config = FlightConfig(is_forest=True, world=world, seed=seed)
+    config = FlightConfig(is_forest=True, world=world, seed=seed, noise=noise)
     flight, companion = flight_with_navigator(config, pilot)
     try:
         flight.fly(take_off, seconds=_TAKEOFF_S)
         _advance(flight, _SETTLE_S)
-        _vary(flight, rng, wind_m_s, gust_m_s, noise)
+        flight.rig.set_air(wind_model(wind_m_s, rng.uniform(0.0, 360.0), TURBULENCE, gust_m_s))
+        _vary_vehicle(flight, mass_scale=rng.uniform(0.9, 1.15), motor_scale=rng.uniform(0.93, 1.07))
         bearing, away_m = rng.uniform(-pi, pi), rng.uniform(GOAL_MIN_M, GOAL_MAX_M)
         north, east = away_m * cos(bearing), away_m * sin(bearing)
         goal_ned = (north, east, -float(flight.world.height(north, east)) - GOAL_HEIGHT_M)
+        flight.rig.forget_impacts()
         _send_goto(flight, goal_ned)
-        return _watched(flight, lambda: companion.phase, goal_ned, seed)
+        return _judged(flight, companion, goal_ned, seed)
     finally:
         flight.close()
 
 
-def _vary(flight: Flight, rng: np.random.Generator, wind_m_s: float, gust_m_s: float, noise: float) -> None:
-    """Gives the flight the air, the sensors, the mass and the motors of its draw, as an episode of the task has them."""
-    flight.set_wind(wind_m_s, float(rng.uniform(0.0, 360.0)))
-    mass_scale, motor_scale = rng.uniform(0.9, 1.15), rng.uniform(0.93, 1.07)
-    model = flight.rig.models.numpy()  # live
+def _judged(flight: Flight, companion: Companion, goal_ned: Vector, seed: int) -> Crossing:
+    """Flies to the goal, or to wherever it ends."""
+    truth = flight.rig.rows["truth"][0]
+    begun_us, way_m = flight.time_us, 0.0
+    last_ned = pos_ned = _place(truth)
+    longest_us = begun_us + round(dist(pos_ned, goal_ned) / SLOWEST_M_S * 1e6)
+    outcome, has_flown, speed = "", False, nan
+    over_us = longest_us
+    while not outcome and flight.time_us < over_us:
+        flight.frame()
+        pos_ned = _place(truth)
+        is_under_way = over_us == longest_us
+        if is_under_way:
+            way_m += dist(pos_ned, last_ned)
+        last_ned = pos_ned
+        has_flown |= companion.phase is Phase.FLYING
+        if float(truth["impact_speed"]) > 0.0:
+            outcome = "collision" if is_under_way else "collision after"
+        elif float(truth["height_agl_m"]) > CEILING_M:
+            outcome = "over the forest"
+        elif is_under_way and has_flown and companion.phase is not Phase.FLYING:
+            if companion.trouble != ARRIVED or dist(pos_ned, goal_ned) >= GOAL_RADIUS_M:
+                outcome = "other"
+            speed = way_m / (flight.time_us - begun_us) * 1e6
+            over_us = flight.time_us + round(_REST_S * 1e6)
+    if not outcome:
+        outcome = "other" if over_us == longest_us else "arrived"
+    detail = f"{companion.trouble}, {dist(pos_ned, goal_ned):.1f} m from the goal, {flight.drone.texts[-1]}"
+    return Crossing(seed, outcome, speed, detail)
+
+
+def _place(truth: np.void) -> Vector:
+    north, east, down = (float(element) for element in truth["pos_ned"])
+    return north, east, down
+
+
+def _vary_vehicle(flight: Flight, mass_scale: float, motor_scale: float) -> None:
+    """Gives the vehicle another mass and other motors, as an episode of the task has them."""
+    model = flight.rig.rows["model"]  # live
     model["mass_kg"] *= mass_scale
     model["mass_inv"] /= mass_scale
     model["inertia_frd"] *= mass_scale
     model["inertia_inv_frd"] /= mass_scale
     model["thrust_n_s2"] *= motor_scale
+
+
+def _send_goto(flight: Flight, goal_ned: Vector) -> None:
+    lat_deg, lon_deg, alt_amsl_m = geodetic_from_ned(*goal_ned, flight.config.home)
+    flight.drone.send(
+        "COMMAND_INT",
+        target_system=1,
+        target_component=COMPONENT,
+        command=_DO_REPOSITION,
+        frame=0,
+        param1=-1.0,
+        param4=nan,
+        x=degrees_e7(lat_deg),
+        y=degrees_e7(lon_deg),
+        z=alt_amsl_m,
+    )
+
+
+def _advance(flight: Flight, seconds: float) -> None:
+    end_us = flight.time_us + round(seconds * 1e6)
+    flight.run(lambda _: flight.time_us >= end_us)
+
+
+def row(trees_per_ha: float, crossings: Sequence[Crossing]) -> str:
+    """A line of the table."""
+    outcomes = np.array([crossing.outcome for crossing in crossings])
+    speeds = np.array([crossing.speed_m_s for crossing in crossings])[outcomes == "arrived"]
+
+    def percent(*names: str) -> str:
+        fraction: Interval = rate(np.isin(outcomes, names))
+        return f"{100 * fraction.value:.1f} % ({100 * fraction.low:.1f} to {100 * fraction.high:.1f})"
+
+    mean = bootstrap(len(speeds), lambda rows: float(speeds[rows].mean()) if len(rows) else nan)
+    cells = [f"{trees_per_ha:.0f}", percent("arrived"), f"{mean.value:.2f} m/s ({mean.low:.2f} to {mean.high:.2f})"]
+    cells += [percent("collision", "collision after"), percent("over the forest"), percent("other")]
+    return "| " + " | ".join(cells) + " |"
+
+
+def main(arguments: list[str]) -> int:
+    path = Path(arguments[0]) if arguments else find_policy("navigate")
+    pilot = NavigationPilot(load_policy(path)[0], str(path))
+    count = int(arguments[1]) if len(arguments) > 1 else FLIGHTS
+    densities = [float(text) for text in arguments[2:]] or DENSITIES
+    lines = []
+    for k, trees_per_ha in enumerate(densities):
+        crossings = [cross(pilot, trees_per_ha, FIRST_SEED + 2 * (i + k * FLIGHTS)) for i in range(count)]
+        for crossing in crossings:
+            if crossing.outcome != "arrived":
+                print(crossing, flush=True)
+        lines.append(row(trees_per_ha, crossings))
+        print(lines[-1], flush=True)
+    page = PAGE.read_text()
+    section = SECTION.format(flights=count, rows="\n".join(lines), machine=machine())
+    before = page[: page.find(FLOWN)] if FLOWN in page else f"{page}\n"
+    write_whole(PAGE, f"{before}{section}".encode())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

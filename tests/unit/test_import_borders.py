@@ -82,12 +82,11 @@ def test_matplotlib_is_not_imported_before_a_flight_ends():
 
 def test_the_companion_imports_nothing_of_the_simulator():
     modules = loaded(
-        "from mission.follow.companion_process import load_pilot, run_companion\n"
-        "from policies.pretrained.pretrained_policies import pretrained\n"
-        "load_pilot('scripted')\n"
-        "load_pilot(str(pretrained('FollowMe')))"
+        "from mission.follow.companion_process import load_skill, run_companion\n"
+        "for name in ('scripted', 'FollowMe', 'Navigate'):\n"
+        "    load_skill(name, 'tcp://127.0.0.1:1', is_ordered_by_goto=True)\n"
     )
-    assert "policies.companion.pilot" in modules
+    assert "policies.companion.navigation_pilot" in modules
     assert not of_package(modules, "sim")
 
 
@@ -107,5 +106,5 @@ def test_tasks_are_registered_with_gymnasium_before_their_kernels_are_imported()
 
 
 def test_policies_are_there_without_gymnasium():
-    modules = loaded("import sys\nsys.modules['gymnasium'] = None\nimport policies.companion.companion")
+    modules = loaded("import sys\nsys.modules['gymnasium'] = None\nimport policies.companion.following")
     assert "policies.tasks.follow_me.observe" in modules
