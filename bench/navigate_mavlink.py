@@ -47,9 +47,9 @@ SECTION = f"""\
 {FLOWN}
 
 The same policy, flown by its [companion](../how-to/companion.md): a goto is sent to it, the scanner's messages come to
-it through the vehicle, its setpoints go to mode Offboard. {{flights}} flights of each density, one vehicle at a time, in
-lockstep; forests, goals, wind, noise and vehicles are drawn as above. A flight has arrived when the companion
-hands back within 3 m of the goal, by the truth, and the vehicle then stays untouched for 4 s. Made by
+it through the vehicle, its setpoints go to mode Offboard. {{flights}} flights of each density, one vehicle at a time,
+in lockstep; forests, goals, wind, noise and vehicles are drawn as above. A flight has arrived when the companion hands
+back within 3 m of the goal, by the truth, and the vehicle then stays untouched for 4 s. Made by
 `python -m bench.navigate_mavlink`.
 
 | trees/ha | success | mean speed | collisions | over the forest | other |
