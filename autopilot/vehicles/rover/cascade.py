@@ -1,10 +1,13 @@
-"""One tick of a rover's control law: setpoint and estimate in, steering, throttle and brake out, 250 Hz."""
+"""One tick of a rover's control law: setpoint and estimate in, steering, throttle and brake out.
+
+The yaw rate is filtered at each tick of 250 Hz; the loops run each fifth: a rover is slower than an aircraft.
+"""
 
 import warp as wp
 
+from autopilot.control.pid import low_pass_fraction
 from autopilot.ports import (
     SETPOINT_DRIVE,
-    SETPOINT_IDLE,
     SETPOINT_TRAJECTORY,
     Actuators,
     BatterySample,
@@ -12,18 +15,24 @@ from autopilot.ports import (
     Setpoint,
 )
 from autopilot.vehicles.rover.control_airframe import RoverControlAirframe
+from autopilot.vehicles.rover.course import take_course
+from autopilot.vehicles.rover.manoeuvre import PathState
+from autopilot.vehicles.rover.motion import Asked, Measured, measured
 from autopilot.vehicles.rover.params import RoverParams
-from autopilot.vehicles.rover.path import Motion, PathState, follow_path, horizontal
-from autopilot.vehicles.rover.speed import SpeedState, follow_speed, stopped
+from autopilot.vehicles.rover.path import follow_path
+from autopilot.vehicles.rover.speed import SpeedState, follow_speed, open_throttle
 from autopilot.vehicles.rover.steering import SteeringState, follow_yaw_rate, slewed
-from common.kernels import TICK_S, vec8
-from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
+from common.kernels import FRAME_TICKS, TICK_S, vec8
+from common.rotation import quat_from_yaw, wrap_pi
 
 wp.set_module_options({"enable_backward": False})
 
 _TICK_S = wp.constant(TICK_S)
+_FRAME_TICKS = wp.constant(FRAME_TICKS)
+_FRAME_S = wp.constant(TICK_S * FRAME_TICKS)
 _VOLTAGE_TIME_S = wp.constant(0.25)  # slower than the motor that loads the battery, faster than it empties
-_COURSE_M_S = wp.constant(0.05)  # velocity asked for, below which it has no course
+_VOLTAGE_FRACTION_MIN = wp.constant(0.5)
+YAW_RATE_CUTOFF_HZ = wp.constant(15.0)  # below the shaking of wheels and motor
 
 
 @wp.struct
@@ -31,7 +40,9 @@ class RoverControlState:
     """All the law remembers between ticks; all zero is the state after power-on."""
 
     kind: int  # of the last tick's setpoint
+    was_armed: int
     voltage_fraction: float  # filtered battery voltage over the full one, 0: not started
+    yaw_rate: float  # [rad/s] filtered
     path: PathState
     speed: SpeedState
     steering: SteeringState
@@ -43,56 +54,68 @@ def voltage_step(fraction: float, airframe: RoverControlAirframe, battery: Batte
     """Filtered battery voltage over the full one; 1 without a battery sample."""
     if battery.voltage_v <= 0.0 or airframe.full_voltage_v <= 0.0:
         return 1.0
-    measured = wp.clamp(battery.voltage_v / airframe.full_voltage_v, 0.5, 1.05)
+    seen = wp.clamp(battery.voltage_v / airframe.full_voltage_v, _VOLTAGE_FRACTION_MIN, 1.05)
     if fraction == 0.0:
-        return measured
-    return fraction + (measured - fraction) * _TICK_S / _VOLTAGE_TIME_S
+        return seen
+    return fraction + (seen - fraction) * _TICK_S / _VOLTAGE_TIME_S
 
 
 @wp.func
-def asked_motion(
-    params: RoverParams, airframe: RoverControlAirframe, state: PathState, est: Estimate, sp: Setpoint, speed: float
-) -> tuple[PathState, Motion]:
-    """Speed and yaw rate that a setpoint asks for; `speed` is the estimated one along the nose [m/s]."""
-    motion = Motion()
-    yaw = yaw_from_quat(est.q_ned_from_frd)
-    motion.course = yaw
-    if sp.kind == SETPOINT_TRAJECTORY and wp.isfinite(sp.pos_ned[0]) and wp.isfinite(sp.pos_ned[1]):
-        now, motion = follow_path(params, airframe, state, est, sp, speed)
-        return now, motion
-    now = PathState()
-    if sp.kind == SETPOINT_TRAJECTORY:
-        asked = horizontal(sp.vel_ned)
-        size = wp.length(asked)
-        if not (size > _COURSE_M_S):  # NaN, too: nothing is asked for
-            motion.is_stop = 1
-            return now, motion
-        motion.speed = size
-        motion.course = wp.atan2(asked[1], asked[0])
-        error = wrap_pi(motion.course - yaw)
-        motion.yaw_rate = params.yaw_p * error
-        if airframe.is_skid == 1:
-            now.is_turning = state.is_turning
-            if wp.abs(error) > params.turn_from:
-                now.is_turning = 1
-            elif wp.abs(error) < params.turn_until:
-                now.is_turning = 0
-            if now.is_turning == 1:
-                motion.speed = 0.0
-        elif params.speed_reduction > 0.0:
-            slowed = 1.0 - params.speed_reduction * wp.abs(error) / wp.pi
-            motion.speed = wp.max(size * slowed, wp.min(size, 0.6))
-        return now, motion
-    motion.speed = sp.speed
+def asked_velocity(params: RoverParams, sp: Setpoint, here: Measured) -> Asked:
+    """A velocity over ground: its course, forward; one below the standstill threshold is a stop."""
+    asked = Asked()
+    asked.course = here.yaw
+    size = wp.sqrt(sp.vel_ned[0] * sp.vel_ned[0] + sp.vel_ned[1] * sp.vel_ned[1])
+    if not (size >= params.stop_speed):  # NaN, too
+        asked.is_stop = 1
+        return asked
+    asked.speed = wp.min(size, wp.max(params.speed_limit, 0.0))
+    asked.course = wp.atan2(sp.vel_ned[1], sp.vel_ned[0])
+    return asked
+
+
+@wp.func
+def asked_drive(params: RoverParams, airframe: RoverControlAirframe, sp: Setpoint, here: Measured) -> Asked:
+    """Along the nose: a speed, and a course with or without a yaw rate, or a yaw rate alone."""
+    asked = Asked()
+    asked.course = here.yaw
+    asked.speed = sp.speed
+    if wp.abs(sp.speed) < params.stop_speed:
+        asked.speed = 0.0
     if wp.isfinite(sp.yaw):
-        motion.course = sp.yaw
-        motion.yaw_rate = params.yaw_p * wrap_pi(sp.yaw - yaw)
+        asked.course = sp.yaw
+        if wp.isfinite(sp.yaw_rate):
+            asked.yaw_rate = sp.yaw_rate
+        return asked
+    asked.is_rate = 1
     if wp.isfinite(sp.yaw_rate):
-        motion.yaw_rate += sp.yaw_rate
-    is_still = sp.speed == 0.0 and (airframe.is_skid == 0 or wp.abs(motion.yaw_rate) < 0.02)
-    if is_still:
-        motion.is_stop = 1
-    return now, motion
+        asked.yaw_rate = sp.yaw_rate
+    if asked.speed == 0.0 and (airframe.is_skid == 0 or wp.abs(asked.yaw_rate) < params.still_yaw_rate):
+        asked.is_stop = 1
+    return asked
+
+
+@wp.func
+def ask(
+    params: RoverParams, airframe: RoverControlAirframe, state: PathState, here: Measured, sp: Setpoint
+) -> tuple[PathState, Asked]:
+    """What a setpoint asks for; the course already taken to a yaw rate and the speed for it."""
+    path = PathState()
+    asked = Asked()
+    asked.course = here.yaw
+    if sp.kind == SETPOINT_TRAJECTORY:
+        if wp.isfinite(sp.pos_ned[0]) and wp.isfinite(sp.pos_ned[1]):
+            path, asked = follow_path(params, airframe, state, here, sp, _FRAME_S)
+        else:
+            asked = asked_velocity(params, sp, here)
+    elif sp.kind == SETPOINT_DRIVE:
+        asked = asked_drive(params, airframe, sp, here)
+    else:
+        asked.is_stop = 1
+    if asked.is_stop == 0 and asked.is_rate == 0:
+        asked, is_turning = take_course(params, airframe, asked, here, state.is_turning)
+        path.is_turning = is_turning
+    return path, asked
 
 
 @wp.func
@@ -106,90 +129,114 @@ def mixed(airframe: RoverControlAirframe, steering: float, throttle: float, brak
         return command
     room = 1.0 - wp.abs(steering)
     middle = wp.clamp(throttle, -room, room)
-    command[0] = wp.clamp(middle + steering, -1.0, 1.0)
-    command[1] = wp.clamp(middle - steering, -1.0, 1.0)
+    command[0] = middle + steering
+    command[1] = middle - steering
     return command
 
 
 @wp.func
-def rover_control_tick(  # noqa: PLR0912, PLR0915
+def steering_step(
+    params: RoverParams,
+    airframe: RoverControlAirframe,
+    state: SteeringState,
+    here: Measured,
+    sp: Setpoint,
+    asked: Asked,
+    speed_sp: float,
+) -> SteeringState:
+    """The steering after a frame: as a client sets it, left as it is where the vehicle stands, or by the yaw rate."""
+    now = state
+    is_direct = sp.kind == SETPOINT_DRIVE and wp.isfinite(sp.steering) and not wp.isfinite(sp.yaw)
+    if is_direct and not wp.isfinite(sp.yaw_rate):
+        now.integral = 0.0
+        now.yaw_rate_sp = here.yaw_rate
+        now.steering = slewed(params, state, wp.clamp(sp.steering, -1.0, 1.0), _FRAME_S)
+        return now
+    if asked.is_stop == 1 and (airframe.is_skid == 1 or wp.abs(here.speed) < params.stop_speed):
+        now.yaw_rate_sp = 0.0
+        if airframe.is_skid == 1:
+            now.integral = 0.0
+            now.steering = 0.0
+        return now
+    return follow_yaw_rate(params, airframe, state, here, asked.yaw_rate, speed_sp, _FRAME_S)
+
+
+@wp.func
+def loops(
+    params: RoverParams, airframe: RoverControlAirframe, state: RoverControlState, est: Estimate, sp: Setpoint
+) -> RoverControlState:
+    """The state with all loops advanced by a frame."""
+    now = state
+    here = measured(airframe, est, state.yaw_rate)
+    if sp.kind != state.kind or state.was_armed == 0:
+        now.path = PathState()
+        if state.was_armed == 0:
+            now.speed.speed_sp = here.speed
+    path, asked = ask(params, airframe, now.path, here, sp)
+    now.path = path
+    is_open = sp.kind == SETPOINT_DRIVE and not wp.isfinite(sp.speed)
+    goal = wp.where(asked.is_stop == 1, 0.0, asked.speed)
+    if is_open:
+        now.speed = open_throttle(params, sp.thrust, here.speed)
+        goal = wp.where(wp.abs(sp.thrust) > 0.0, sp.thrust, here.speed)
+    else:
+        may_park = airframe.is_skid == 0 or asked.is_stop == 1
+        now.speed = follow_speed(params, airframe, now.speed, here, goal, now.voltage_fraction, may_park, _FRAME_S)
+    now.steering = steering_step(params, airframe, now.steering, here, sp, asked, goal)
+    actuators = Actuators()
+    actuators.command = mixed(airframe, now.steering.steering, now.speed.throttle, now.speed.brake)
+    actuators.thrust_sp = now.speed.throttle
+    actuators.traj_pos_ned = est.pos_ned
+    if now.path.has_place == 1:
+        actuators.traj_pos_ned = wp.vec3(now.path.pos_ned[0], now.path.pos_ned[1], est.pos_ned[2])
+    actuators.traj_vel_ned = here.nose_ned * now.speed.speed_sp
+    actuators.traj_accel_ned = here.nose_ned * now.speed.accel_sp
+    actuators.traj_yaw = wrap_pi(asked.course)
+    actuators.traj_yaw_rate = now.steering.yaw_rate_sp
+    actuators.omega_sp_frd = wp.vec3(0.0, 0.0, now.steering.yaw_rate_sp)
+    actuators.q_sp_ned_from_frd = quat_from_yaw(asked.course - here.yaw) * est.q_ned_from_frd
+    now.actuators = actuators
+    return now
+
+
+@wp.func
+def disarmed(state: RoverControlState, est: Estimate, sp: Setpoint) -> RoverControlState:
+    """The state with the motor off and the brake on, or a motor tested; all else but the filters is forgotten."""
+    still = RoverControlState()
+    still.kind = sp.kind
+    still.voltage_fraction = state.voltage_fraction
+    still.yaw_rate = state.yaw_rate
+    still.actuators.command = sp.motor_test
+    if sp.motor_test[0] == 0.0 and sp.motor_test[1] == 0.0:
+        still.actuators.command[2] = 1.0
+    still.actuators.traj_pos_ned = est.pos_ned
+    still.actuators.q_sp_ned_from_frd = est.q_ned_from_frd
+    return still
+
+
+@wp.func
+def rover_control_tick(
     params: RoverParams,
     airframe: RoverControlAirframe,
     state: RoverControlState,
     est: Estimate,
     sp: Setpoint,
     battery: BatterySample,
-    tick: int,  # noqa: ARG001
+    tick: int,
 ) -> RoverControlState:
     """The law's state, with `actuators`, after one 4 ms tick."""
     now = state
-    now.kind = sp.kind
     now.voltage_fraction = voltage_step(state.voltage_fraction, airframe, battery)
-    nose_ned = wp.quat_rotate(est.q_ned_from_frd, wp.vec3(1.0, 0.0, 0.0))
-    speed = wp.dot(est.vel_ned, nose_ned)
-    yaw_rate = est.omega_frd[2]
-    motion = Motion()
-    motion.course = yaw_from_quat(est.q_ned_from_frd)
-    is_idle = sp.is_armed == 0 or sp.kind == SETPOINT_IDLE
-    is_idle = is_idle or (sp.kind != SETPOINT_TRAJECTORY and sp.kind != SETPOINT_DRIVE)
-    if is_idle:
-        now.path = PathState()
-        motion.is_stop = 1
-    else:
-        path, motion = asked_motion(params, airframe, state.path, est, sp, speed)
-        now.path = path
-    is_open = sp.kind == SETPOINT_DRIVE and not wp.isfinite(sp.speed) and not is_idle
-    if is_open:
-        now.speed = SpeedState()
-        now.speed.speed_sp = speed
-        now.speed.throttle = wp.clamp(sp.thrust, -1.0, 1.0)
-        if not wp.isfinite(sp.thrust):
-            now.speed.throttle = 0.0
-    elif motion.is_stop == 1:
-        now.speed = stopped(params, airframe, state.speed, speed, _TICK_S)
-    else:
-        if state.speed.brake == 1.0 or state.kind != sp.kind:  # begins to move, or another loop had the motor
-            now.speed = SpeedState()
-            now.speed.speed_sp = speed
-        now.speed = follow_speed(params, airframe, now.speed, motion.speed, speed, now.voltage_fraction, _TICK_S)
-    is_steered = is_open or sp.kind == SETPOINT_DRIVE
-    if (
-        is_steered
-        and not is_idle
-        and wp.isfinite(sp.steering)
-        and not wp.isfinite(sp.yaw)
-        and not wp.isfinite(sp.yaw_rate)
-    ):
-        now.steering.integral = 0.0
-        now.steering.yaw_rate_sp = yaw_rate
-        now.steering.steering = slewed(params, state.steering, wp.clamp(sp.steering, -1.0, 1.0), _TICK_S)
-    elif motion.is_stop == 1:
-        now.steering.integral = 0.0
-        now.steering.yaw_rate_sp = 0.0
-        if airframe.is_skid == 1:
-            now.steering.steering = 0.0
-        elif is_idle:
-            now.steering.steering = slewed(params, state.steering, 0.0, _TICK_S)
-    else:
-        way = motion.speed
-        if is_open:
-            way = now.speed.throttle
-        now.steering = follow_yaw_rate(params, airframe, state.steering, motion.yaw_rate, yaw_rate, speed, way, _TICK_S)
-    now.actuators = Actuators()
-    now.actuators.command = mixed(airframe, now.steering.steering, now.speed.throttle, now.speed.brake)
+    turning = wp.quat_rotate(est.q_ned_from_frd, est.omega_frd)[2]
+    now.yaw_rate = state.yaw_rate + (turning - state.yaw_rate) * low_pass_fraction(YAW_RATE_CUTOFF_HZ, _TICK_S)
     if sp.is_armed == 0:
-        for k in range(8):
-            now.actuators.command[k] = sp.motor_test[k]
-        if sp.motor_test[0] == 0.0 and sp.motor_test[1] == 0.0:
-            now.actuators.command[2] = 1.0
-    now.actuators.thrust_sp = now.speed.throttle
-    now.actuators.traj_pos_ned = est.pos_ned
-    if now.path.has_place == 1:
-        now.actuators.traj_pos_ned = now.path.pos_ned
-    now.actuators.traj_vel_ned = nose_ned * now.speed.speed_sp
-    now.actuators.traj_accel_ned = nose_ned * now.speed.accel_sp
-    now.actuators.traj_yaw = wrap_pi(motion.course)
-    now.actuators.traj_yaw_rate = now.steering.yaw_rate_sp
-    now.actuators.omega_sp_frd = wp.vec3(0.0, 0.0, now.steering.yaw_rate_sp)
-    now.actuators.q_sp_ned_from_frd = quat_from_yaw(motion.course)
+        return disarmed(now, est, sp)
+    if tick % _FRAME_TICKS == 0 or sp.kind != state.kind or state.was_armed == 0:
+        after = loops(params, airframe, now, est, sp)
+        now.path = after.path
+        now.speed = after.speed
+        now.steering = after.steering
+        now.actuators = after.actuators
+    now.kind = sp.kind
+    now.was_armed = 1
     return now

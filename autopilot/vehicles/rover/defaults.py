@@ -24,7 +24,7 @@ def rover_defaults(airframe: RoverAirframe) -> dict[str, int | float]:
         "CA_AIRFRAME": _DIFFERENTIAL if airframe.is_skid else _ACKERMANN,
         "CA_R_REV": 3 if airframe.is_skid else 1,
         "RO_MAX_THR_SPEED": airframe.drive.max_speed_m_s,
-        "RO_SPEED_LIM": 0.6 * airframe.drive.max_speed_m_s,
+        "RO_SPEED_LIM": 0.625 * airframe.drive.max_speed_m_s,
         "RO_YAW_RATE_CORR": _SKID_SLIP if airframe.is_skid else 1.0,
         "RA_WHEEL_BASE": airframe.wheel_base_m,
         "RA_MAX_STR_ANG": airframe.steering.max_angle_rad,

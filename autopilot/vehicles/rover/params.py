@@ -28,7 +28,9 @@ class RoverParams:
     yaw_rate_i: float  # [1/s]
     yaw_rate_limit: float  # [rad/s]
     yaw_rate_correction: float
-    yaw_accel_limit: float  # [rad/s²]
+    yaw_accel_limit: float  # [rad/s²] 0 or less: none, as of the three above
+    yaw_decel_limit: float
+    still_yaw_rate: float  # [rad/s]
     lateral_accel: float  # [m/s²]
     lookahead_s: float
     lookahead_min: float  # [m]
@@ -51,18 +53,18 @@ ROVER_PARAMETERS: list[Parameter] = [
               "guess", "speed_limit"),
     Parameter("RO_MAX_THR_SPEED", 8.0, 0.0, 100.0, "m/s", "speed at full throttle; 0: does not drive", _AIRFRAME,
               "throttle_speed"),
-    Parameter("RO_ACCEL_LIM", 2.5, 0.1, 100.0, "m/s^2", "acceleration", "guess: passengers keep their coffee",
-              "accel_limit"),
-    Parameter("RO_DECEL_LIM", 2.5, 0.1, 100.0, "m/s^2", "deceleration; the brake helps above 2 m/s^2", "guess",
-              "decel_limit"),
-    Parameter("RO_JERK_LIM", 20.0, 0.5, 1000.0, "m/s^3", "change of acceleration", "guess", "jerk_limit"),
-    Parameter("RO_SPEED_P", 1.0, 0.0, 20.0, "", "speed error to speed asked of the motor", _TUNED, "speed_p"),
-    Parameter("RO_SPEED_I", 1.5, 0.0, 20.0, "1/s", "its integral", _TUNED, "speed_i"),
+    Parameter("RO_ACCEL_LIM", 2.5, -1.0, 100.0, "m/s^2", "acceleration; 0 or less: any",
+              "guess: passengers keep their coffee", "accel_limit"),
+    Parameter("RO_DECEL_LIM", 2.5, -1.0, 100.0, "m/s^2", "deceleration; 0 or less: any", "guess", "decel_limit"),
+    Parameter("RO_JERK_LIM", 20.0, -1.0, 1000.0, "m/s^3", "change of acceleration; 0 or less: any", "guess",
+              "jerk_limit"),
+    Parameter("RO_SPEED_P", 2.0, 0.0, 20.0, "", "speed error to speed asked of the motor", _TUNED, "speed_p"),
+    Parameter("RO_SPEED_I", 3.0, 0.0, 20.0, "1/s", "its integral", _TUNED, "speed_i"),
     Parameter("RO_SPEED_TH", 0.1, 0.0, 2.0, "m/s", "slower than this counts as standing", _PX4, "stop_speed"),
     Parameter("RO_SPEED_RED", 1.0, -1.0, 1.0, "",
               "part of the speed that is taken off at a course error of half a turn, and less for less; negative: none",
               "guess", "speed_reduction"),
-    Parameter("RO_YAW_P", 2.0, 0.0, 10.0, "1/s", "heading to yaw rate", _TUNED, "yaw_p"),
+    Parameter("RO_YAW_P", 3.0, 0.0, 10.0, "1/s", "heading to yaw rate", _TUNED, "yaw_p"),
     Parameter("RO_YAW_RATE_P", 0.5, 0.0, 10.0, "", "yaw rate error to yaw rate asked of the steering", _TUNED,
               "yaw_rate_p"),
     Parameter("RO_YAW_RATE_I", 2.0, 0.0, 20.0, "1/s", "its integral", _TUNED, "yaw_rate_i"),
@@ -70,20 +72,23 @@ ROVER_PARAMETERS: list[Parameter] = [
               "yaw_rate_limit"),
     Parameter("RO_YAW_RATE_CORR", 1.0, 0.01, 100.0, "", "yaw rate without slip over the real one", _AIRFRAME,
               "yaw_rate_correction"),
-    Parameter("RO_YAW_ACCEL_LIM", 400.0, 1.0, 10_000.0, "deg/s^2", "change of the yaw rate", "guess",
+    Parameter("RO_YAW_ACCEL_LIM", 400.0, -1.0, 10_000.0, "deg/s^2", "growth of the yaw rate; 0 or less: any", "guess",
               "yaw_accel_limit"),
-    Parameter("RO_YAW_RATE_TH", 3.0, 0.0, 100.0, "deg/s", "slower than this counts as not turning", _PX4),
+    Parameter("RO_YAW_DECEL_LIM", 400.0, -1.0, 10_000.0, "deg/s^2", "its decline; 0 or less: any", "guess",
+              "yaw_decel_limit"),
+    Parameter("RO_YAW_RATE_TH", 3.0, 0.0, 100.0, "deg/s", "slower than this counts as not turning", _PX4,
+              "still_yaw_rate"),
     Parameter("RO_YAW_STICK_DZ", 0.1, 0.0, 1.0, "", "part of the stick's way round the middle that steers nothing",
               _PX4),
     Parameter("HG_RO_LAT_ACC", 3.0, 0.1, 20.0, "m/s^2", "lateral acceleration in turns", "guess: a third of the grip",
               "lateral_accel"),
-    Parameter("HG_RO_HOLD_RAD", 1.0, 0.1, 100.0, "m", "distance from a place held at which the rover drives back",
+    Parameter("HG_RO_HOLD_RAD", 0.4, 0.1, 100.0, "m", "distance from a place held at which the rover drives back",
               "guess", "hold_radius"),
     Parameter("HG_RO_OFFB_BODY", 0, 0, 1, "",
               "Offboard: 0 as PX4, a velocity is a course and a speed forward; 1: along the nose, backwards too, and "
               "yaw and yaw rate are followed", _PX4),
-    Parameter("PP_LOOKAHD_GAIN", 0.45, 0.1, 100.0, "s", "look-ahead over speed", "measured", "lookahead_s"),
-    Parameter("PP_LOOKAHD_MIN", 0.8, 0.1, 100.0, "m", "least look-ahead", "measured", "lookahead_min"),
+    Parameter("PP_LOOKAHD_GAIN", 0.7, 0.1, 100.0, "s", "look-ahead over speed", _TUNED, "lookahead_s"),
+    Parameter("PP_LOOKAHD_MIN", 0.8, 0.1, 100.0, "m", "least look-ahead", "guess", "lookahead_min"),
     Parameter("PP_LOOKAHD_MAX", 10.0, 0.1, 100.0, "m", "greatest look-ahead", _PX4, "lookahead_max"),
     Parameter("RA_WHEEL_BASE", 0.5, 0.0, 100.0, "m", "front to rear axle", _AIRFRAME, "wheel_base"),
     Parameter("RA_MAX_STR_ANG", 0.5236, 0.0, 1.5708, "rad", "greatest steering angle", _AIRFRAME, "steering_max"),
