@@ -36,6 +36,11 @@ CAMERA = wp.constant(43)
 BATTERY_VOLTAGE = wp.constant(45)
 BATTERY_CURRENT = wp.constant(46)
 
+WHEEL_SCALE_LEFT = wp.constant(47)
+WHEEL_SCALE_RIGHT = wp.constant(48)
+WHEEL_LEFT_WHITE = wp.constant(49)
+WHEEL_RIGHT_WHITE = wp.constant(44)
+
 OWNER_BODY = wp.constant(50)
 OWNER_PLAN = wp.constant(51)
 

@@ -32,6 +32,7 @@ class Truth:
     accel_frd: wp.vec3  # [m/s²] specific force, mean over the tick
     gyro_frd: wp.vec3  # [rad/s] mean over the tick
     motor_speed: vec8  # [rad/s] of propellers or wheels; they shake the IMU, and their controllers report them
+    has_wheels: int  # 0: it stands on feet, and has no encoders
     wheel_speed_m_s: wp.vec2  # of the treads, left and right, where the encoders are; positive forward
     steering_rad: float  # angle of the steered wheels to the right, of a bicycle between them
     height_agl_m: float  # of the centre of gravity over the ground below

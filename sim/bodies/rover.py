@@ -324,6 +324,7 @@ def rover_truth(body: RoverState) -> Truth:
     truth.gyro_frd = body.gyro_frd
     for k in range(_WHEELS):
         truth.motor_speed[k] = body.wheel_speed[k]
+    truth.has_wheels = 1
     truth.wheel_speed_m_s = body.tread_m_s
     truth.steering_rad = body.steering_rad
     truth.height_agl_m = body.height_agl_m

@@ -20,6 +20,7 @@ from sim.sensors.imu import ImuModel, ImuState, imu_boot, imu_model, sense_imu
 from sim.sensors.mag import MagModel, MagState, mag_boot, mag_model, sense_mag
 from sim.sensors.power import BatteryMonitorModel, battery_monitor_model, sense_battery
 from sim.sensors.range import RangeModel, range_model, sense_range
+from sim.sensors.wheels import WheelModel, WheelState, sense_wheels, wheel_model, wheels_boot
 from sim.truth import Truth
 from sim.world.world import World
 
@@ -36,6 +37,7 @@ class SensorModel:
     baro: BaroModel
     mag: MagModel
     range: RangeModel
+    wheels: WheelModel
     battery: BatteryMonitorModel
 
 
@@ -63,6 +65,7 @@ class SensorState:
     gnss: GnssState
     baro: BaroState
     mag: MagState
+    wheels: WheelState
     samples: Samples  # what the drivers have delivered so far
 
 
@@ -86,6 +89,7 @@ def sensor_model(noise_scale: float = 1.0, home: GeoPoint = DEFAULT_HOME) -> Any
     model.baro = baro_model(noise_scale)
     model.mag = mag_model(field_ned_gauss(home.lat_deg, home.lon_deg, home.alt_m), noise_scale)
     model.range = range_model(noise_scale)
+    model.wheels = wheel_model(noise_scale)
     model.battery = battery_monitor_model(noise_scale)
     return model
 
@@ -99,6 +103,7 @@ def sensors_boot(model: SensorModel, seed: int, i: int, tick: wp.int64) -> Senso
     state.gnss = gnss_boot(model.gnss, seed, i, tick)
     state.baro = baro_boot(model.baro, seed, i, draw_tick(tick))
     state.mag = mag_boot(model.mag, seed, i, draw_tick(tick))
+    state.wheels = wheels_boot(model.wheels, seed, i, draw_tick(tick))
     state.samples.gnss.fix_type = 1
     return state
 
@@ -141,5 +146,8 @@ def sense(
     out.samples.baro = baro_now
     out.samples.mag = sense_mag(model.mag, out.mag, out.samples.mag, faults.mag, truth.q_ned_from_frd, seed, i, tick)
     out.samples.range = sense_range(model.range, out.samples.range, faults.range, truth, world, seed, i, tick)
+    wheels, wheels_now = sense_wheels(model.wheels, out.wheels, out.samples.wheels, faults.wheels, truth, seed, i, tick)
+    out.wheels = wheels
+    out.samples.wheels = wheels_now
     out.samples.battery = sense_battery(model.battery, out.samples.battery, faults.battery, truth, seed, i, tick)
     return out

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from math import tan
 
+from autopilot.estimator.wheel_params import WHEEL_PARAMETERS
 from autopilot.interface.outputs import Output, OutputKind
 from autopilot.interface.vehicle_state import Mode, VehicleState
 from autopilot.vehicles.rover.ardupilot import APM_ROVER
@@ -55,7 +56,7 @@ def _can_drive(_: VehicleState, params: ParameterTable) -> str:
 ROVER = VehicleClass(
     name="rover",
     law=ROVER_LAW,
-    parameters=ROVER_PARAMETERS,
+    parameters=(*ROVER_PARAMETERS, *WHEEL_PARAMETERS),
     defaults=rover_defaults,
     modes=ROVER_MODES,
     last_resort=Mode.HOLD,
