@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from common.airframe import load_airframe
 from common.files import write_whole
 from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
@@ -18,7 +19,7 @@ from mission.flight_options import flight_config
 from mission.flight_settings import FlightOptions
 from mission.flight_state_folder import StateError, keep_home, open_state
 from mission.net_guard import LOOPBACK
-from mission.plan.plan_file import DEFAULT_PLAN, Plan, PlanError, moved_plan, read_plan
+from mission.plan.plan_file import Plan, PlanError, default_plan, moved_plan, read_plan
 from mission.run_folder import OwnFiles, run_folder
 from mission.video.rtp_video import session_description
 
@@ -47,7 +48,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     """The flight, with what must be held until its end."""
     console = Console()
     config = flight_config(options, state)
-    plan = None if options.is_idle else _plan(options.plan, config.home)
+    plan = None if options.is_idle else _plan(options.plan, options.airframe, config.home)
     signing = signing_config(options, speed, state)
     links = [] if speed is None else open_links(options, speed)
     stream = open_stream(options.stream_port)
@@ -96,10 +97,12 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
             images.close()
 
 
-def _plan(path: Path | None, home: GeoPoint) -> Plan:
-    """The user's plan as it is, or the default one at the vehicle's home."""
+def _plan(path: Path | None, airframe: str, home: GeoPoint) -> Plan:
+    """The user's plan as it is, or the default one of the vehicle's class at its home."""
     try:
-        return moved_plan(read_plan(DEFAULT_PLAN), home) if path is None else read_plan(path)
+        if path is not None:
+            return read_plan(path)
+        return moved_plan(read_plan(default_plan(load_airframe(airframe).vehicle)), home)
     except PlanError as error:
         raise UserError(str(error)) from error
 

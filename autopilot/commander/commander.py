@@ -73,7 +73,7 @@ class Commander:
         self.home = Home(state, announcer)
         self._battery = battery
         self._watch = FailureWatch(state, params, battery, self.station, motors, modes)
-        self._phases: GroundPhases = Driving(state) if detector is None else TakeoffAndLanding(self, detector)
+        self._phases: GroundPhases = Driving(self) if detector is None else TakeoffAndLanding(self, detector)
         self._pilot = pilot
         self._flying: Flying
         self._position_seen_us = -1  # when the position was last valid

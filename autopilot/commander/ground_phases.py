@@ -63,23 +63,35 @@ class GroundPhases(Protocol):
 
 
 class Driving:
-    """Of a vehicle that never leaves the ground."""
+    """Of a vehicle that never leaves the ground: at the end of a return it is disarmed, as PX4's rovers.
 
-    def __init__(self, state: VehicleState) -> None:
-        self._state = state
+    Args:
+        commander: whose state is written.
+    """
+
+    def __init__(self, commander: Authority) -> None:
+        self._commander = commander
+        self._state = commander.state
+        self._ended_s = 0.0
         self.lift_d = 0.0
         self.unpowered_us = 0
-        state.has_ground_contact = True
+        commander.state.has_ground_contact = True
 
     def armed(self) -> None:
+        self._state.landed_state = LandedState.IN_AIR
         self._state.takeoff_us = self._state.time_us
         self.lift_d = self._state.estimate.pos_ned[2]
 
     def may_disarm(self) -> bool:
         return True
 
-    def frame(self, _flying: Flying, _dt_s: float) -> None:
-        self._state.landed_state = LandedState.IN_AIR if self._state.is_armed else LandedState.ON_GROUND
+    def frame(self, flying: Flying, dt_s: float) -> None:
+        state = self._state
+        self._ended_s = self._ended_s + dt_s if state.is_armed and flying.has_ended else 0.0
+        after_s = float(self._commander.params["COM_DISARM_LAND"])
+        if 0.0 <= after_s < self._ended_s:
+            self._commander.stop_motors("Disarmed at the end of the way")
+        state.landed_state = LandedState.IN_AIR if state.is_armed else LandedState.ON_GROUND
 
 
 class TakeoffAndLanding:

@@ -33,6 +33,11 @@ class Flying(Protocol):
     def is_landing(self) -> bool: ...
 
     @property
+    def has_ended(self) -> bool:
+        """Whether a vehicle that stays on the ground stands where its mode was to lead it."""
+        ...
+
+    @property
     def ask(self) -> Ask:
         """Vertically, what the setpoint being flown asks for."""
         ...

@@ -30,7 +30,7 @@ class NavContext:
     __slots__ = (
         "_numbers", "announcer", "climb_speed", "craft", "cruise_speed", "descend_speed", "fence_refusal", "find_path",
         "flown",
-        "has_position", "heading", "is_landing", "leg_yaw", "next_hold", "params", "position_refusal",
+        "has_ended", "has_position", "heading", "is_landing", "leg_yaw", "next_hold", "params", "position_refusal",
         "setpoint", "state", "wants_lift", "wish", "yaw_mode",
     )  # fmt: skip
 
@@ -50,6 +50,7 @@ class NavContext:
         self.has_position = False  # the commander's judgement, with its delay
         self.wants_lift = False  # the mode asks to leave the ground
         self.is_landing = False  # the mode is on its last descent
+        self.has_ended = False  # the mode stands where it was to lead; of a vehicle that stays on the ground
         self.position_refusal: Callable[[Vector], str] = lambda _position: (
             ""
         )  # why the fence lets nobody stay at a position [m]

@@ -100,6 +100,11 @@ class Navigator:
         return self._active.is_underway
 
     @property
+    def has_ended(self) -> bool:
+        """Whether a vehicle that stays on the ground stands where its mode was to lead it."""
+        return self.context.has_ended
+
+    @property
     def is_landing(self) -> bool:
         """Whether the mode is on its last descent."""
         return self.context.is_landing
@@ -162,7 +167,7 @@ class Navigator:
         context = self.context
         state = context.state
         context.wants_lift = False
-        context.is_landing = False
+        context.is_landing = context.has_ended = False
         setpoint = context.setpoint
         wish: Mode | None = None
         if state.is_armed:

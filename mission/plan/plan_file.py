@@ -27,6 +27,7 @@ __all__ = [
     "Plan",
     "PlanError",
     "PlanItem",
+    "default_plan",
     "moved_plan",
     "parse_plan",
     "plan_text",
@@ -83,6 +84,12 @@ class Plan:
     cruise_speed_m_s: float = 15.0  # QGroundControl's default; in flight the vehicle's parameters count
     hover_speed_m_s: float = 5.0
     complex_items: tuple[ComplexItem, ...] = ()
+
+
+def default_plan(vehicle: str) -> Path:
+    """The plan of a class of vehicles that fits the default world."""
+    own = DEFAULT_PLAN.with_name(f"default-{vehicle}.plan")
+    return own if own.is_file() else DEFAULT_PLAN
 
 
 def moved_plan(plan: Plan, home: GeoPoint) -> Plan:

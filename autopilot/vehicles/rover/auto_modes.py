@@ -1,5 +1,7 @@
 """The modes in which a rover drives by itself, where they differ from those of vehicles that fly: Hold and Return."""
 
+from math import hypot
+
 from autopilot.interface.client_requests import GoTo
 from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import Mode, Reply, Severity, Verdict
@@ -9,6 +11,8 @@ from autopilot.navigator.modes.hold import Hold
 from autopilot.navigator.modes.rtl_destination import Destinations
 from autopilot.navigator.paths.waypoint_path import WaypointPath
 from autopilot.vehicles.rover.stick_modes import Position
+
+_STANDING_M_S = 0.1
 
 
 class RoverHold(Hold):
@@ -70,4 +74,7 @@ class RoverReturn(FlightMode):
         self._path.stop()
 
     def frame(self) -> None:
-        self._path.frame()  # its last setpoint ends at the destination
+        context = self._context
+        if self._path.frame():  # its last setpoint ends at the destination
+            vel_north, vel_east, _ = context.state.estimate.vel_ned
+            context.has_ended = hypot(vel_north, vel_east) < _STANDING_M_S and context.number("RTL_LAND_DELAY") >= 0.0
