@@ -15,6 +15,9 @@ from mission.flight_state_folder import stored_home
 from sim.world.driving_worlds import CAR_PARK, COURSE
 from sim.world.world import WorldConfig
 
+FIELD_TREES_PER_HA = 60.0  # where an owner walks, if nothing else is asked for
+FOREST_TREES_PER_HA = 400.0
+
 
 def check_parameters(options: FlightOptions) -> None:
     """Refuses parameters that the vehicle does not have, or values that they cannot have, before kernels are loaded.
@@ -39,6 +42,7 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
             parameters=dict(parameter_of(text) for text in options.parameters),
             owner=None if options.owner is None else OwnerConfig(pace=cast(Pace, options.owner)),
             world=_world(options),
+            is_forest=options.world_kind == "forest",
         )
     except ValidationError as error:
         raise UserError(first_fault(error)) from error
@@ -46,14 +50,19 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
 
 def _world(options: FlightOptions) -> WorldConfig:
     """With an owner the world of training: its hills can be walked; to fly alone no trees near home."""
-    given: dict[str, Any] = {"seed": options.world_seed, "trees_per_ha": options.trees_per_ha}
+    numbers = {"trees_per_ha": options.trees_per_ha, "hill_height_m": options.hill_height_m}
+    chosen: dict[str, Any] = {name: number for name, number in numbers.items() if number is not None}
+    given: dict[str, Any] = {"seed": options.world_seed} | chosen
     if options.owner is not None:
         from policies.tasks.follow_me.world import FOLLOW_WORLD
 
-        return FOLLOW_WORLD.model_copy(update=given)
+        trees = FIELD_TREES_PER_HA if options.trees_per_ha is None else options.trees_per_ha
+        return FOLLOW_WORLD.model_copy(update={"seed": options.world_seed, "trees_per_ha": trees})
+    if options.world_kind == "forest":
+        from policies.tasks.navigate.world import NAVIGATE_WORLD
+
+        return NAVIGATE_WORLD.model_copy(update={"trees_per_ha": FOREST_TREES_PER_HA} | given)
     if options.world_kind != "hills":
         driven = {"course": COURSE, "car-park": CAR_PARK}[options.world_kind]
         return driven.model_copy(update={"seed": options.world_seed})
-    return WorldConfig(
-        **given, hill_height_m=options.hill_height_m, has_walls=options.has_walls, treeless_radius_m=TREELESS_M
-    )
+    return WorldConfig(**given, has_walls=options.has_walls, treeless_radius_m=TREELESS_M)

@@ -14,7 +14,7 @@ from common.geodesy import DEFAULT_HOME
 from mission.console.model_command import option
 
 Pace = Literal["walk", "run"]
-WorldKind = Literal["hills", "course", "car-park"]
+WorldKind = Literal["hills", "forest", "course", "car-park"]
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
 
 
@@ -51,10 +51,16 @@ class FlightOptions(FlightSettings):
     seconds: float | None = option(None, "End after this much simulated time.", ge=0.1)
     home: str | None = option(None, "Latitude,longitude[,altitude AMSL].", shown=f"{_HOME}, or as stored")
     world_seed: int = option(1, "Seed of hills and trees.", ge=0)
-    trees_per_ha: float = option(60.0, "Trees per hectare.", "--trees", ge=0.0, le=1000.0)
-    hill_height_m: float = option(12.0, "Height of the hills [m].", "--hills", ge=0.0, le=300.0)
+    trees_per_ha: float | None = option(
+        None, "Trees per hectare.", "--trees", shown="60; in the forest 400", ge=0.0, le=1000.0
+    )
+    hill_height_m: float | None = option(
+        None, "Height of the hills [m].", "--hills", shown="12; in the forest 4", ge=0.0, le=300.0
+    )
     has_walls: bool = option(False, "Walls along the edges of the map.", "--walls")
-    world_kind: WorldKind = option("hills", "hills, course (walls, trees, movers) or car-park.", "--world")
+    world_kind: WorldKind = option(
+        "hills", "hills, forest (to navigate through), course (walls, trees, movers) or car-park.", "--world"
+    )
     """The last two are to be driven in: of the options about the world they take its seed alone."""
     host: str = option("127.0.0.1", "Address ground stations are sent to.")
     bind: str = option("", "Address the vehicle's ports are open at. Default: loopback.")

@@ -45,6 +45,8 @@ def check_owner(options: FlightOptions) -> None:
     """Refuses an owner who does not move as owners do."""
     if options.owner not in (None, *get_args(Pace)):
         raise UserError(f"--owner {options.owner}: must be walk or run")
+    if options.owner is not None and options.world_kind == "forest":
+        raise UserError("--owner and --world forest: choose one, owners walk where more room is")
 
 
 def check_options(options: FlightOptions) -> None:

@@ -57,6 +57,7 @@ class Companion:
         self._setpoint = STILL
         self._is_undecided = False  # the last action was no number
         self._setpoint_due_us = 0
+        self._is_sent_in_guided = False  # ArduPilot's own goto is flown in the mode that setpoints are flown in
         self._sending = Sending.NOTHING
 
     def frame(self, time_us: int) -> None:
@@ -72,6 +73,7 @@ class Companion:
         begun_s = self._wall_s() if self._wall_s is not None and has_sensed else None
         if skill.is_ordered():
             self.engagement.engage()
+            self._is_sent_in_guided = vehicle.own.mode is Mode.GUIDED
         blindness = self._blindness(time_us)
         self.trouble = blindness or skill.loss(vehicle.own) or (NO_DECISION if self._is_undecided else "")
         orders = self.engagement.step(self._situation(time_us))
@@ -130,7 +132,7 @@ class Companion:
             time_us=time_us,
             is_offboard=own.mode in (Mode.OFFBOARD, Mode.GUIDED),
             is_airborne=own.is_armed and not own.is_on_ground,
-            is_holding=own.mode is Mode.HOLD,
+            is_holding=own.mode is Mode.HOLD or (self._is_sent_in_guided and own.mode is Mode.GUIDED),
             mode_name=own.mode_name,
             trouble=self.trouble,
             is_refused=self.vehicle.take_refusal(),

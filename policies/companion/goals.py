@@ -25,6 +25,7 @@ MOVED_M = 1.0  # a place that the vehicle goes to has changed if it is so far fr
 _DO_REPOSITION, _NAV_WAYPOINT = 192, 16
 _ACCEPTED, _TEMPORARILY_REJECTED, _DENIED = 0, 1, 2  # MAV_RESULT
 _ABOVE_SEA, _ABOVE_HOME = frozenset({0, 5}), frozenset({3, 6})  # MAV_FRAME
+_GOTO_MODES = (Mode.HOLD, Mode.GUIDED)
 _FREE_POSITION = 0b111  # type_mask
 
 
@@ -50,6 +51,7 @@ class Goals:
         self._is_ordered = False
         self._goto: Goal | None = None
         self._target_ned: Vector = (nan, nan, nan)  # that the vehicle went to when it was last heard
+        self._has_heard_target = False  # the first may be of a way that had begun before we were there
         self._home_alt_m = nan
         self._items: tuple[MissionItem, ...] = ()  # of the plan as it was last looked at
         self._seq = -1  # that was current then
@@ -105,16 +107,17 @@ class Goals:
         if (sysid, compid) != (vehicle.system_id, AUTOPILOT_COMPONENT):
             return
         own = vehicle.own
-        is_goto_mode = own.mode in (Mode.HOLD, Mode.GUIDED)
-        if not is_goto_mode or fields.type_mask & _FREE_POSITION or not (fields.lat_int or fields.lon_int):
+        has_heard, self._has_heard_target = self._has_heard_target, True
+        if own.mode not in _GOTO_MODES or fields.type_mask & _FREE_POSITION or not (fields.lat_int or fields.lon_int):
             return
         target_ned = self._ned_of(degrees_from_e7(fields.lat_int), degrees_from_e7(fields.lon_int), fields.alt)
         if isinstance(target_ned, str) or dist(target_ned, self._target_ned) < MOVED_M:
             return
-        is_heard_first = isnan(self._target_ned[0])
         self._target_ned = target_ned
-        if dist(target_ned[:2], own.pos_ned[:2]) > NEAR_M and not is_heard_first:
-            self._take(target_ned, is_ordered=self._is_ordered_by_goto)
+        if has_heard and dist(target_ned[:2], own.pos_ned[:2]) > NEAR_M:
+            refusal = self._take(target_ned, is_ordered=self._is_ordered_by_goto)
+            if refusal:
+                vehicle.say(f"Companion: goto refused: {refusal}", Severity.WARNING)
 
     def _command_int(self, sysid: int, compid: int, fields: Any, _: int) -> None:
         if self._is_goto_to_us(fields):
@@ -128,8 +131,8 @@ class Goals:
             self._goto_received(sysid, compid, fields.param5, fields.param6, fields.param7)
 
     def _is_goto_to_us(self, fields: Any) -> bool:
-        is_ours = fields.target_system == self._vehicle.system_id
-        return is_ours and fields.target_component == COMPONENT and fields.command == _DO_REPOSITION
+        is_to_us = (fields.target_system, fields.target_component) == (self._vehicle.system_id, COMPONENT)
+        return is_to_us and bool(fields.command == _DO_REPOSITION)
 
     def _goto_received(self, sysid: int, compid: int, lat_deg: float, lon_deg: float, alt_m: float) -> None:
         """A goto to the companion itself: always an order."""

@@ -6,8 +6,9 @@ items, and the one that is current. It is asked for anew now and then: not every
 
 from typing import Any
 
+from autopilot.interface.item_lists import MissionItem
 from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT
-from autopilot.mavlink.wire.item_messages import MissionItem, item_from_fields
+from autopilot.mavlink.wire.item_messages import item_from_fields
 from policies.companion.vehicle_link import COMPONENT, NEVER_US, VehicleLink
 
 RENEW_US = 5_000_000

@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from common.attitude import Quat, Vector
+from common.attitude import Quat
 from common.kernels import TICK_US
 from common.range_sectors import BEAM_ELEVATIONS_DEG, FIRST_EDGE_DEG, RANGE_M, RANGES, SECTOR_DEG, SECTORS
 from common.rng import draw_key
@@ -203,10 +203,10 @@ class Scanner:
 
     def measure(self, time_us: int) -> NDArray[np.float32]:
         """Ranges [m] of the sectors and then of the beams, `RANGE_M` for no return, shape (RANGES,)."""
-        pos_ned: Vector = tuple(float(element) for element in self._truth["pos_ned"])
+        pos_ned = wp.vec3(*(float(element) for element in self._truth["pos_ned"]))
         q_true = wp.quat(*(float(element) for element in self._truth["q_ned_from_frd"]))
         q_est = wp.quat(*self.q_ned_from_frd)
-        inputs = [self._world, wp.vec3(*pos_ned), q_true, q_est, self._noise, self._seed, time_us // TICK_US]
+        inputs = [self._world, pos_ned, q_true, q_est, self._noise, self._seed, time_us // TICK_US]
         wp.launch(scan_once, dim=1, inputs=inputs, outputs=[self._ranges], device="cpu")
         ranges: NDArray[np.float32] = self._ranges.numpy()[0].copy()
         return ranges

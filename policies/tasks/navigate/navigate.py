@@ -11,9 +11,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from common.kernels import TICK_S
 from common.range_sectors import RANGES
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
-from policies.tasks.flight.own_state import ACTIONS
+from policies.tasks.flight.own_state import ACTIONS, Command
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
 from policies.tasks.layout import ImageElement, Layout
 from policies.tasks.navigate.depth_cameras import DepthEyes
@@ -22,6 +23,7 @@ from policies.tasks.navigate.navigate_kernels import (
     NavigateState,
     Rules,
     act,
+    command,
     judge,
     place,
     prepare,
@@ -52,6 +54,7 @@ class Navigate(FlightTask):
             device=device,
         )
         self.settings = settings
+        self._delay_ticks = round(settings.delay_ms / (1000.0 * TICK_S))
         self.navigation = self._state()
         self.measures = self.navigation.measures
         self._eyes: DepthEyes | None = None
@@ -62,7 +65,10 @@ class Navigate(FlightTask):
     def step(self) -> None:
         """One decision of all environments, with the actions that lie in the buffers."""
         self._act.launch()
-        self.rig.advance(DECISION_TICKS)
+        if self._delay_ticks > 0:
+            self.rig.advance(self._delay_ticks)
+        self._command.launch()
+        self.rig.advance(DECISION_TICKS - self._delay_ticks)
         self._see(self.navigation.is_all)
         self._judge.launch()
         self.keep_last_images()
@@ -130,7 +136,9 @@ class Navigate(FlightTask):
         start = self.start(is_test=self.settings.split == "test")
 
         record = self.record
-        self._act = record(act, buffers, rules, rig)
+        commands = wp.zeros(self.env_count, dtype=Command, device=self.device)  # of the running decision
+        self._act = record(act, buffers, rules, rig, commands)
+        self._command = record(command, rig, commands)
         self._scan = record(scan, rig, state.params, state.is_all, rules.has_estimator, state.ranges_m)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, state, start)

@@ -1,6 +1,7 @@
 """Navigate's kernels, one thread per environment, in the order of a decision.
 
-act       actions to setpoints                           (then the rig advances, ranges or depths are taken)
+act       actions to commands                            (then the rig advances by the delay)
+command   commands to setpoints                          (then it advances on, ranges or depths are taken)
 judge     the vector, the reward, the end                (rows that end start anew:)
 prepare   numbers and seeds of the new episode           (then worlds grow and vehicles take their hovers)
 place     wind, sensors and mass, the goal               (then ranges or depths again)
@@ -19,7 +20,7 @@ from policies.tasks.flight.flown_vehicle import (
     vehicle_estimate,
     velocity_setpoint,
 )
-from policies.tasks.flight.own_state import action_command
+from policies.tasks.flight.own_state import Command, action_command
 from policies.tasks.navigate.navigate_params import NavigateParams
 from policies.tasks.navigate.observe import write_frame
 from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
@@ -64,12 +65,16 @@ class NavigateState:
 
 
 @wp.kernel(enable_backward=False)
-def act(buffers: StepBuffers, rules: Rules, rig: RigArrays) -> None:
+def act(buffers: StepBuffers, rules: Rules, rig: RigArrays, commands: wp.array(dtype=Command)) -> None:
     i = wp.tid()
     estimate = vehicle_estimate(rig, i, rules.has_estimator)
-    rig.autopilot.setpoint[i] = velocity_setpoint(
-        action_command(continuous_action(buffers, i), estimate.q_ned_from_frd)
-    )
+    commands[i] = action_command(continuous_action(buffers, i), estimate.q_ned_from_frd)
+
+
+@wp.kernel(enable_backward=False)
+def command(rig: RigArrays, commands: wp.array(dtype=Command)) -> None:
+    i = wp.tid()
+    rig.autopilot.setpoint[i] = velocity_setpoint(commands[i])
 
 
 @wp.func

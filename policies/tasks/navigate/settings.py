@@ -19,5 +19,7 @@ class NavigateSettings(TaskSettings):
     """`rays`: what is nearest in each direction, as a scanning rangefinder tells; `depth`: a depth camera's image."""
     has_estimator: bool = True
     """Whether the flight controller flies on its estimate; if not, on the truth: quicker, in training only."""
+    delay_ms: int = Field(default=40, ge=0, le=96)
+    """From what is seen to the setpoint that is flown, rounded to 4 ms; 40 ms is what it takes over MAVLink."""
     image_size: int = Field(default=64, ge=8, le=256)
     """Width and height of the depth image [pixels]."""

@@ -9,11 +9,13 @@ import pytest
 
 from mission import flight_settings
 from mission.console.model_command import option_fields
+from mission.console.option_checks import UserError, check_owner
 from mission.flight_config import FlightConfig
 from mission.flight_options import flight_config
 from mission.flight_settings import FOLLOWED_WITH, FlightOptions, FlightSettings, FollowOptions
 from mission.simulator.flight_rig import flight_world
 from policies.tasks.follow_me.world import FOLLOW_WORLD
+from policies.tasks.navigate.world import NAVIGATE_WORLD
 from sim.world.driving_worlds import CAR_PARK, COURSE
 from sim.world.world import build_world
 from tests.documents import ROOT
@@ -89,3 +91,17 @@ def test_a_world_to_drive_in_is_made_from_its_seed_alone(kind, made):
     config = flight_config(options(world_kind=kind, world_seed=7, trees_per_ha=1.0), None)
     assert config.world == made.model_copy(update={"seed": 7})
     assert flight_world(config).boxes.rows.size > 0
+
+
+def test_the_forest_is_that_of_training_and_its_vehicle_carries_the_scanner():
+    config = flight_config(options(world_kind="forest", world_seed=7), None)
+    assert config.world == NAVIGATE_WORLD.model_copy(update={"seed": 7, "trees_per_ha": 400.0})
+    assert config.is_forest
+    level = flight_config(options(world_kind="forest", trees_per_ha=200.0, hill_height_m=0.0), None).world
+    assert (level.trees_per_ha, level.hill_height_m) == (200.0, 0.0)
+    assert len(flight_world(config).trees) > 1000
+
+
+def test_owners_do_not_walk_in_the_forest():
+    with pytest.raises(UserError, match="--owner and --world forest: choose one"):
+        check_owner(options(owner="walk", world_kind="forest"))
