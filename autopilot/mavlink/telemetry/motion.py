@@ -2,7 +2,7 @@
 
 from math import hypot, isfinite, nan
 
-from autopilot.interface.vehicle_state import VehicleState
+from autopilot.interface.vehicle_state import Mode, VehicleState
 from autopilot.mavlink.wire.codec import known_type
 from autopilot.mavlink.wire.convert import (
     degrees_e7,
@@ -32,6 +32,7 @@ LOCAL_NED = 1  # MAV_FRAME
 GLOBAL_INT = 5
 BODY_FRD = 12
 NO_ROTATION = (0.0, 0.0, 0.0, 0.0)  # repr_offset_q: not used
+_GOTO_MODES = frozenset({Mode.HOLD, Mode.GUIDED})
 ESTIMATOR_TYPE_AUTOPILOT = 8  # MAV_ESTIMATOR_TYPE
 UPPER_TRIANGLE = 21  # entries of a 6 x 6 symmetric matrix
 
@@ -194,11 +195,12 @@ def position_target_local_ned(state: VehicleState) -> bytes | None:
 
 
 def position_target_global_int(state: VehicleState) -> bytes | None:
-    """The trajectory being flown, in global coordinates."""
+    """The trajectory being flown, in global coordinates; on the way to a goto's target its position is the target's."""
     if not state.is_armed:
         return None
     actuators = state.actuators
-    north, east, down = actuators.traj_pos_ned
+    is_goto = state.mode in _GOTO_MODES and isfinite(state.path_start_ned[0])
+    north, east, down = state.goal_ned if is_goto else actuators.traj_pos_ned
     lat_deg = lon_deg = nan
     alt_amsl_m = state.origin.alt_m - down
     if isfinite(north) and isfinite(east) and isfinite(down):

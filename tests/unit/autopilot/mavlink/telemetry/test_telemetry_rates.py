@@ -258,6 +258,17 @@ def test_flown_trajectory_marks_free_elements():
     assert there.alt == pytest.approx(518.0, abs=0.01)
 
 
+def test_on_the_way_to_a_goto_the_position_target_is_the_place_gone_to():
+    """As PX4 and ArduPilot have it: whoever did not send the goto reads there where it leads."""
+    rig = Rig()
+    rig.update(mode=Mode.HOLD, goal_ned=(100.0, 0.0, -12.0), path_start_ned=(0.0, 0.0, -10.0))
+    there = request(rig, "POSITION_TARGET_GLOBAL_INT")
+    assert there.lat_int == pytest.approx(round(HOME.lat_deg * 1e7) + 8994, abs=20)
+    assert there.alt == pytest.approx(500.0, abs=0.01)
+    rig.update(path_start_ned=(nan, nan, nan))
+    assert request(rig, "POSITION_TARGET_GLOBAL_INT").alt == pytest.approx(518.0, abs=0.01)
+
+
 def test_attitude_target():
     target = request(Rig(), "ATTITUDE_TARGET")
     assert target.q == pytest.approx((1.0, 0.0, 0.0, 0.0))
