@@ -67,7 +67,7 @@ class Drive(Section):
 class Brake(Section):
     max_force_n: Positive
     """Of all treads together, by friction."""
-    front_share: Fraction
+    front_fraction: Fraction
     """Of it that the front wheels have."""
 
 

@@ -142,6 +142,35 @@ def motor_target_n(model: RoverModel, inputs: DriveInputs, wheel_speed: wp.vec4,
 
 
 @wp.func
+def tyre_step(
+    model: RoverModel, deflection: wp.vec2, slide: wp.vec2, rolling: float, load: float
+) -> tuple[wp.vec2, wp.vec2]:
+    """The deflection of a tyre [m] after a substep, and its force on the wheel [N], both along it and across it.
+
+    Args:
+        model: the tyre.
+        deflection: [m] before.
+        slide: [m/s] of the tread over the ground, against it.
+        rolling: [m/s] speed of the tread.
+        load: [N].
+    """
+    unwind = 1.0 / (1.0 + _SUBSTEP_S * wp.abs(rolling) * model.relaxation_inv)
+    now = (deflection + _SUBSTEP_S * slide) * unwind
+    slip = wp.length(now) / model.peak_deflection_m
+    if slip > model.tyre.knee:
+        now = now * (model.tyre.knee / slip)
+        slip = model.tyre.knee
+    force = now * (load * force_per_slip(model.tyre, slip) / model.peak_deflection_m)
+    if slip < 1.0:
+        force += slide * (load * model.standstill_n_s_m / (1.0 + wp.abs(rolling) / _ROLLING_M_S))
+    most = load * model.tyre.peak
+    size = wp.length(force)
+    if size > most:
+        force = force * (most / size)
+    return now, force
+
+
+@wp.func
 def add_wheel(
     model: RoverModel,
     body: RoverState,
@@ -173,30 +202,13 @@ def add_wheel(
         load = wp.max(model.spring_n_m * squeeze_m - model.damper_n_s_m * wp.dot(vel_point_frd, normal_frd), 0.0)
         ahead = wp.normalize(heading_frd - wp.dot(heading_frd, normal_frd) * normal_frd)
         right = wp.cross(ahead, normal_frd)
-        slide_x = rolling - wp.dot(vel_point_frd, ahead)
-        slide_y = -wp.dot(vel_point_frd, right)
-        unwind = 1.0 / (1.0 + dt * wp.abs(rolling) * model.relaxation_inv)
-        x = (body.deflection_x[wheel] + dt * slide_x) * unwind
-        y = (body.deflection_y[wheel] + dt * slide_y) * unwind
-        slip = wp.sqrt(x * x + y * y) / model.peak_deflection_m
-        if slip > model.tyre.knee:
-            x = x * model.tyre.knee / slip
-            y = y * model.tyre.knee / slip
-            slip = model.tyre.knee
-        per_m = load * force_per_slip(model.tyre, slip) / model.peak_deflection_m
-        standing = load * model.standstill_n_s_m / (1.0 + wp.abs(rolling) / _ROLLING_M_S)
-        if slip >= 1.0:
-            standing = 0.0
-        along_n = per_m * x + standing * slide_x
-        across_n = per_m * y + standing * slide_y
-        most = load * model.tyre.peak
-        size = wp.sqrt(along_n * along_n + across_n * across_n)
-        if size > most:
-            along_n = along_n * most / size
-            across_n = across_n * most / size
-        body.deflection_x[wheel] = x
-        body.deflection_y[wheel] = y
-        force_frd = load * normal_frd + along_n * ahead + across_n * right
+        slide = wp.vec2(rolling - wp.dot(vel_point_frd, ahead), -wp.dot(vel_point_frd, right))
+        before = wp.vec2(body.deflection_x[wheel], body.deflection_y[wheel])
+        deflection, grip_n = tyre_step(model, before, slide, rolling, load)
+        body.deflection_x[wheel] = deflection[0]
+        body.deflection_y[wheel] = deflection[1]
+        along_n = grip_n[0]
+        force_frd = load * normal_frd + grip_n[0] * ahead + grip_n[1] * right
         total.force_frd += force_frd
         total.torque_frd += wp.cross(arm_frd, force_frd)
         total.touching += 1

@@ -17,15 +17,15 @@ class RoverOffboard(Offboard):
     backwards, and yaw or yaw rate are followed.
     """
 
-    __slots__ = ("_is_told",)
+    __slots__ = ("_is_reported",)
 
     def __init__(self, context: NavContext) -> None:
         super().__init__(context)
-        self._is_told = False
+        self._is_reported = False
 
     def start(self) -> None:
         super().start()
-        self._is_told = False
+        self._is_reported = False
 
     def frame(self) -> None:
         latest = self.latest
@@ -45,8 +45,8 @@ class RoverOffboard(Offboard):
 
     def _stand(self, reason: str) -> None:
         self._context.setpoint.drive(speed=0.0, yaw_rate=0.0)
-        if not self._is_told:
-            self._is_told = True
+        if not self._is_reported:
+            self._is_reported = True
             self._context.announcer.statustext(Severity.WARNING, f"Offboard: {reason}")
 
 
