@@ -171,12 +171,11 @@ class Leg:
             asked = radians(item.params[3])
         context.heading.is_item_yaw = isfinite(asked)
         self.yaw = context.leg_yaw = context.heading_to(start, target, asked)
-        acceptance = max(item.params[1], abs(item.params[2])) if item.command in WAYPOINTS else 0.0
-        radius = acceptance if acceptance > 0.0 else context.number("NAV_ACC_RAD")
+        asked_m = max(item.params[1], abs(item.params[2])) if item.command in WAYPOINTS else 0.0
+        radius = asked_m if asked_m > 0.0 else context.number("NAV_ACC_RAD")
         if item.command in (Command.LAND, Command.LOITER_TURNS):
             radius = min(radius, _LANDING_RADIUS_M)
-        self._acceptance = radius
-        self._radius_sq = radius * radius
+        self._acceptance, self._radius_sq = radius, radius * radius
         if item.command == Command.SPLINE_WAYPOINT:
             self.target = self._goal = target
             estimate = context.state.estimate

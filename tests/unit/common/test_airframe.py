@@ -2,9 +2,8 @@ import re
 
 import pytest
 
-from autopilot.vehicles.multirotor.control_airframe import control_airframe
 from common.airframe import AIRFRAME_FOLDER, AirframeError, airframe_names, load_airframe
-from sim.bodies.multirotor_model import multirotor_model
+from sim.bodies.vehicles import class_of
 
 X500 = (AIRFRAME_FOLDER / "x500.toml").read_text()
 
@@ -26,8 +25,9 @@ def load(tmp_path):
 def test_every_shipped_airframe_makes_a_body_and_a_controller(name):
     airframe = load_airframe(name)
     assert airframe.name == name
-    multirotor_model(airframe, 0.0)
-    control_airframe(airframe)
+    vehicle, body = class_of(airframe)
+    body.model(airframe, 0.0)
+    vehicle.law.airframe_row(airframe)
 
 
 def test_a_light_and_a_common_quadrotor_are_shipped():
