@@ -31,8 +31,8 @@ from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
 from policies.tasks.intervals import Interval, bootstrap, rate
 from policies.tasks.navigate.navigate_params import GOAL_MAX_M
-from policies.tasks.navigate.world import NAVIGATE_WORLD
 from sim.wind import wind_model
+from sim.world.forest_world import FOREST
 
 DENSITIES = (200.0, 400.0, 600.0)
 FLIGHTS = 100  # of each density
@@ -80,7 +80,7 @@ def cross(pilot: NavigationPilot, trees_per_ha: float, seed: int) -> Crossing:
     """
     rng = np.random.default_rng([seed, 0x4E41])
     wind_m_s, gust_m_s, noise = rng.uniform(0.0, 6.0), rng.uniform(0.0, 3.0), rng.uniform(0.5, 1.5)
-    world = NAVIGATE_WORLD.model_copy(
+    world = FOREST.model_copy(
         update={"seed": seed, "trees_per_ha": trees_per_ha, "hill_height_m": rng.uniform(0.0, 6.0)}
     )
     config = FlightConfig(is_forest=True, world=world, seed=seed, noise=noise)

@@ -13,6 +13,7 @@ from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, flight_
 from mission.flight_settings import FlightOptions, FlightSettings, Pace
 from mission.flight_state_folder import stored_home
 from sim.world.driving_worlds import CAR_PARK, COURSE
+from sim.world.forest_world import FOREST
 from sim.world.world import WorldConfig
 
 FIELD_TREES_PER_HA = 60.0  # where an owner walks, if nothing else is asked for
@@ -59,9 +60,7 @@ def _world(options: FlightOptions) -> WorldConfig:
         trees = FIELD_TREES_PER_HA if options.trees_per_ha is None else options.trees_per_ha
         return FOLLOW_WORLD.model_copy(update={"seed": options.world_seed, "trees_per_ha": trees})
     if options.world_kind == "forest":
-        from policies.tasks.navigate.world import NAVIGATE_WORLD
-
-        return NAVIGATE_WORLD.model_copy(update={"trees_per_ha": FOREST_TREES_PER_HA} | given)
+        return FOREST.model_copy(update={"trees_per_ha": FOREST_TREES_PER_HA} | given)
     if options.world_kind != "hills":
         driven = {"course": COURSE, "car-park": CAR_PARK}[options.world_kind]
         return driven.model_copy(update={"seed": options.world_seed})

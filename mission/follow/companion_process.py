@@ -16,7 +16,7 @@ from autopilot.mavlink.transport.client_links import open_client_link
 from autopilot.mavlink.transport.links import LinkError
 from common.clock import Pacer, wall_time_s
 from mission.console.terminal import print_line
-from policies.companion.companion import Companion
+from policies.companion.companion import MISFIT, Companion
 from policies.companion.image_client import CameraUrlError
 from policies.companion.load_skill import load_skill
 from policies.companion.pilot import PilotError
@@ -44,7 +44,8 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     """Runs until it is stopped; returns what it did, in one sentence.
 
     Raises:
-        CompanionError: the policy, or an address, cannot be used; nothing has been sent.
+        CompanionError: the policy, or an address, cannot be used, and nothing has been sent; or the policy is not for
+            the vehicle that was found, and no setpoint has been.
     """
     try:
         skill = load_skill(options.policy, options.camera, is_ordered_by_goto=options.is_reported)
@@ -54,7 +55,7 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     companion = Companion(link, skill, is_reported=options.is_reported, wall_s=wall_time_s)
     _shower(console)(f"{options.policy} flies; vehicle: {options.link}, pictures: {options.camera}; Ctrl-C ends it")
     try:
-        _loop(companion, options.seconds, console)
+        _loop(companion, options, console)
     except KeyboardInterrupt:
         pass
     finally:
@@ -62,7 +63,8 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     return f"{companion.decision_count} decisions; {latency_text(companion)}"
 
 
-def _loop(companion: Companion, seconds: float | None, console: Console) -> None:
+def _loop(companion: Companion, options: CompanionOptions, console: Console) -> None:
+    seconds = options.seconds
     pacer = Pacer(1.0)
     start_s, shown_us = wall_time_s(), 0
     polled_us = 0
@@ -73,6 +75,8 @@ def _loop(companion: Companion, seconds: float | None, console: Console) -> None
             time_us = int((wall_time_s() - start_s) * 1e6)
             before = companion.phase
             companion.frame(time_us)
+            if companion.trouble == MISFIT:
+                raise CompanionError(f"{options.policy}: {MISFIT} than the one at {options.link}")
             if companion.phase is not before:
                 why = f": {trouble_text(companion)}" if companion.trouble else ""
                 show(f"{time_us * 1e-6:7.1f} s  {companion.phase.value}{why}")

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 
 def companion(
-    policy: Annotated[str, typer.Option(help="A policy of FollowMe: a file or a run's folder; or 'scripted'.")],
+    policy: Annotated[
+        str, typer.Option(help="A policy of FollowMe or Navigate: a file or a run's folder; or 'scripted', a follower.")
+    ],
     link: Annotated[
         str,
         typer.Option(
@@ -26,7 +28,8 @@ def companion(
         "tcp://127.0.0.1:14600"
     ),
     engage: Annotated[
-        bool, typer.Option("--engage", help="Take control once, as soon as everything is there.")
+        bool,
+        typer.Option("--engage", help="Take control once, as soon as everything is there; to navigate, at each goto."),
     ] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this much wall clock time.")] = None,
 ) -> None:

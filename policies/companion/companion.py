@@ -16,11 +16,12 @@ from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.client_end import ByteLink
 from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
 from policies.companion.skill import Floats, Skill, Velocity
-from policies.companion.vehicle_link import VehicleLink
+from policies.companion.vehicle_link import NEVER_US, VehicleLink
 
 SETPOINT_US = 50_000
 TELEMETRY_OLD_US = 500_000
 HEARTBEAT_OLD_US = 3_000_000  # sent at 1 Hz
+MISFIT = "the policy was made for another kind of vehicle"
 NO_DECISION = "the policy does not decide"
 LATENCIES_KEPT = 600  # a minute of decisions
 
@@ -141,6 +142,8 @@ class Companion:
     def _blindness(self, time_us: int) -> str:
         """Why there is nothing to decide on; "" if there is."""
         own = self.vehicle.own
+        if own.is_ground_vehicle != self.skill.drives and own.heartbeat_us != NEVER_US:
+            return MISFIT
         if time_us - own.heartbeat_us > HEARTBEAT_OLD_US:
             return "no heartbeat of the vehicle"
         is_placed = isfinite(own.pos_ned[0])

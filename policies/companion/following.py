@@ -51,7 +51,7 @@ class Following:
         pilot: who decides.
     """
 
-    ready, flying = "ready to follow", "following"
+    ready, flying, drives = "ready to follow", "following", False
 
     def __init__(self, camera: ImageSource, pilot: Pilot) -> None:
         self.seen: Floats = np.zeros(0, dtype=np.float32)

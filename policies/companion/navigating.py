@@ -39,7 +39,7 @@ class Navigating:
         is_ordered_by_goto: a goto to the vehicle is an order to fly there.
     """
 
-    ready, flying = "ready to navigate", "navigating"
+    ready, flying, drives = "ready to navigate", "navigating", False
     goals: Goals  # this and the next from `attach` on
     ranges: Ranges
     _vehicle: VehicleLink

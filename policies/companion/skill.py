@@ -22,6 +22,7 @@ class Skill(Protocol):
 
     ready: str  # what a pilot is told when it could fly: "ready to follow"
     flying: str  # and while it does: "following"
+    drives: bool  # ground vehicles, and flies none
     seen: Floats  # the vector that was decided on last
 
     def attach(self, vehicle: VehicleLink) -> None:

@@ -41,6 +41,7 @@ RATES_HZ = {
 }
 _COMMAND_SET_MODE, _COMMAND_SET_INTERVAL = 176, 511
 _CUSTOM_MODE = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+_GROUND_VEHICLES = (10, 11)  # MAV_TYPE: rover, boat
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _LOCAL_NED = 1
 _VELOCITY_AND_YAW_RATE = 0b0101_1100_0111  # type_mask: position, acceleration and yaw are free
@@ -68,6 +69,7 @@ class Own:
     range_m: float = nan  # along the body's down axis; NaN: no return
     range_us: int = NEVER_US
     heartbeat_us: int = NEVER_US
+    is_ground_vehicle: bool = False
     is_armed: bool = False
     is_on_ground: bool = True  # or just taking off, or landing
     mode: Mode | None = None
@@ -238,6 +240,7 @@ class VehicleLink:
         own = self.own
         self._dialect = _DIALECTS.get(fields.autopilot, PX4)
         own.heartbeat_us = time_us
+        own.is_ground_vehicle = fields.type in _GROUND_VEHICLES
         own.is_armed = bool(fields.base_mode & _ARMED)
         try:
             self._enter(self._dialect.mode_from_custom(fields.custom_mode))

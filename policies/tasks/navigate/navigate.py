@@ -34,8 +34,8 @@ from policies.tasks.navigate.navigate_top_view import draw
 from policies.tasks.navigate.observe import DEPTH_CHANNELS, LAYOUT_VERSION, RAY_STACK, frame_elements
 from policies.tasks.navigate.scan import scan
 from policies.tasks.navigate.settings import NavigateSettings
-from policies.tasks.navigate.world import NAVIGATE_WORLD, TREES_PER_HA_MAX
 from policies.tasks.task_params import typed_rows
+from sim.world.forest_world import FOREST, TREES_PER_HA_MAX
 
 
 class Navigate(FlightTask):
@@ -47,7 +47,7 @@ class Navigate(FlightTask):
         super().__init__(
             _layout(settings),
             env_count,
-            NAVIGATE_WORLD,
+            FOREST,
             trees_per_ha_max=TREES_PER_HA_MAX,
             has_estimator=settings.has_estimator,
             number_defaults=IMPROVED,

@@ -6,8 +6,8 @@ The numbers of the air and the vehicle come first (`FLIGHT_PARAMS`); all can be 
 import warp as wp
 
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
-from policies.tasks.navigate.world import TREES_PER_HA_MAX
 from policies.tasks.task_params import Sampler, TaskParam
+from sim.world.forest_world import TREES_PER_HA_MAX
 
 GOAL_MAX_M = 85.0  # trees stand up to 91 m from home
 _WANTED = "the requirement: 600 trees/ha at 5 m/s"

@@ -15,8 +15,8 @@ from mission.flight_options import flight_config
 from mission.flight_settings import FOLLOWED_WITH, FlightOptions, FlightSettings, FollowOptions
 from mission.simulator.flight_rig import flight_world
 from policies.tasks.follow_me.world import FOLLOW_WORLD
-from policies.tasks.navigate.world import NAVIGATE_WORLD
 from sim.world.driving_worlds import CAR_PARK, COURSE
+from sim.world.forest_world import FOREST
 from sim.world.world import build_world
 from tests.documents import ROOT
 
@@ -95,7 +95,7 @@ def test_a_world_to_drive_in_is_made_from_its_seed_alone(kind, made):
 
 def test_the_forest_is_that_of_training_and_its_vehicle_carries_the_scanner():
     config = flight_config(options(world_kind="forest", world_seed=7), None)
-    assert config.world == NAVIGATE_WORLD.model_copy(update={"seed": 7, "trees_per_ha": 400.0})
+    assert config.world == FOREST.model_copy(update={"seed": 7, "trees_per_ha": 400.0})
     assert config.is_forest
     level = flight_config(options(world_kind="forest", trees_per_ha=200.0, hill_height_m=0.0), None).world
     assert (level.trees_per_ha, level.hill_height_m) == (200.0, 0.0)

@@ -10,12 +10,12 @@ from mission.script import take_off
 from policies.companion.navigation_pilot import NavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.pretrained.pretrained_policies import pretrained
-from policies.tasks.navigate.world import NAVIGATE_WORLD
+from sim.world.forest_world import FOREST
 
 AUTOPILOT, COMPANION = 1, 191
 DO_REPOSITION = 192
 CHANGE_MODE = 1.0
-SPARSE = NAVIGATE_WORLD.model_copy(update={"seed": 3, "trees_per_ha": 100.0})
+SPARSE = FOREST.model_copy(update={"seed": 3, "trees_per_ha": 100.0})
 
 
 def config(**changed):

@@ -8,7 +8,7 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
-from policies.companion.companion import NO_DECISION, Companion
+from policies.companion.companion import MISFIT, NO_DECISION, Companion
 from policies.companion.engagement import Phase
 from policies.companion.following import IMAGE_OLD_US, LENS, NO_IMAGES, Following
 from policies.experts.follower import ScriptedFollower
@@ -49,6 +49,8 @@ class Doubting(ScriptedFollower):
 class Air:
     """What the vehicle tells, and what it is told."""
 
+    mav_type = 2  # a quadrotor
+
     def __init__(self):
         companion_end, self.end = memory_pair(LinkRole.ONBOARD)
         self.pilot = Doubting()
@@ -64,7 +66,7 @@ class Air:
         for _ in range(round(seconds * 1e6) // FRAME_US):
             self.time_us += FRAME_US
             mode = PX4.custom_mode(self.mode)
-            self._tell("HEARTBEAT", autopilot=12, base_mode=128, custom_mode=mode, system_status=4)
+            self._tell("HEARTBEAT", type=self.mav_type, autopilot=12, base_mode=128, custom_mode=mode, system_status=4)
             self._tell("EXTENDED_SYS_STATE", landed_state=2)
             self._tell("ATTITUDE_QUATERNION", time_boot_ms=self.time_us // 1000, q1=1.0)
             self._tell("LOCAL_POSITION_NED", x=1.0, z=-5.0)
@@ -112,3 +114,14 @@ def test_pictures_taken_long_ago_are_none_even_if_they_come_in_now(age_us, is_ta
     air.run(1.0)
     assert (air.companion.trouble != NO_IMAGES) is is_taken
     assert (air.companion.phase is Phase.FLYING) is is_taken
+
+
+def test_a_policy_that_flies_is_not_given_a_rover():
+    air = Air()
+    air.mav_type = 10
+    reported = air.run(1.0)
+    assert air.companion.trouble == MISFIT
+    air.mode = Mode.OFFBOARD
+    reported += air.run(1.0)
+    assert air.companion.phase is Phase.WAITING
+    assert "SET_POSITION_TARGET_LOCAL_NED" not in {message.name for message in reported}

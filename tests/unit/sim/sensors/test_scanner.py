@@ -6,9 +6,9 @@ import warp as wp
 
 from common.attitude import product, quat_of
 from common.range_sectors import BEAM_ELEVATIONS_DEG, RANGE_M, RANGES, SECTORS
-from policies.tasks.navigate.world import NAVIGATE_WORLD
 from sim.sensors.scanner import scan_once
 from sim.world.batch import grown_world
+from sim.world.forest_world import FOREST
 from sim.world.world import WorldConfig, build_world
 
 LEVEL = quat_of(0.0, 0.0)
@@ -21,7 +21,7 @@ def plain():
 
 @pytest.fixture(scope="module")
 def forest():
-    return grown_world(NAVIGATE_WORLD.model_copy(update={"hill_height_m": 0.0}), 5)
+    return grown_world(FOREST.model_copy(update={"hill_height_m": 0.0}), 5)
 
 
 def scanned(world, q_true=LEVEL, q_est=LEVEL, pos_ned=(0.0, 0.0, -2.0), noise=0.0):

@@ -1,12 +1,9 @@
-"""The forest that a drone navigates through: the same in training and in flights.
-
-Light to import: flights need it before they need a policy.
-"""
+"""The forest that a drone navigates through: the same in training of Navigate and in flights."""
 
 from sim.world.world import WorldConfig
 
 TREES_PER_HA_MAX = 600.0
-NAVIGATE_WORLD = WorldConfig(
+FOREST = WorldConfig(
     size_m=192.0,
     cell_m=4.0,
     hill_height_m=4.0,
