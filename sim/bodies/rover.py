@@ -30,6 +30,7 @@ _GRAVITY_NED = wp.constant(wp.vec3(0.0, 0.0, GRAVITY_M_S2))
 _SEA_LEVEL_DENSITY_KG_M3 = wp.constant(1.225)  # ISO 2533 standard atmosphere
 _SUBSTEP_S = wp.constant(TICK_S / SUBSTEPS)
 _SUBSTEP_COUNT = wp.constant(SUBSTEPS)
+_TICK_S = wp.constant(TICK_S)
 _WHEELS = wp.constant(4)
 _TINY = wp.constant(1.0e-6)
 _ROLLING_M_S = wp.constant(0.3)  # tread speed at which the damping of a standing tyre has halved
@@ -68,7 +69,8 @@ class DriveInputs:
     """What acts on a rover over the substeps of a tick."""
 
     side_speed_m_s: wp.vec2  # [m/s] treads of either side, that the motors would reach without load
-    steering_rad: float  # asked for
+    left_frd: wp.vec3  # where the front wheels point
+    right_frd: wp.vec3
     brake_nm: wp.vec2  # of each front and each rear wheel
     ground_m: wp.vec4  # [m] height of the ground below each hub
     normal_ned: wp.vec3  # of the ground, pointing up
@@ -78,12 +80,15 @@ class DriveInputs:
 
 
 @wp.struct
-class WheelsForce:
-    """What the ground does to the wheels, and those to the body."""
+class WheelStep:
+    """One wheel, and what it does to the body."""
 
+    speed: float  # [rad/s]
+    deflection: wp.vec2  # [m] of the tyre, along the wheel and across it
+    drive_n: float  # [N] of the motor at the tread
     force_frd: wp.vec3  # [N]
     torque_frd: wp.vec3  # [N m]
-    touching: int  # wheels
+    is_touching: int
 
 
 @wp.func
@@ -95,6 +100,8 @@ def drive_inputs(model: RoverModel, body: RoverState, command: vec8, wind_ned: w
     for k in range(_WHEELS):
         hub_ned = body.pos_ned + rot * wp.vec3(model.hub_x[k], model.hub_y[k], model.hub_z)
         inputs.ground_m[k] = ground_height(world, hub_ned[0], hub_ned[1])
+    inputs.left_frd = steered_frd(model, body.steering_rad, -model.half_track_m)
+    inputs.right_frd = steered_frd(model, body.steering_rad, model.half_track_m)
     inputs.wind_ned = wind_ned
     inputs.density_ratio = model.home_density_ratio
     inputs.is_near_obstacle = is_near_obstacle(model, world, body.pos_ned)
@@ -104,26 +111,29 @@ def drive_inputs(model: RoverModel, body: RoverState, command: vec8, wind_ned: w
         left = command[1]
         if model.is_skid == 1:
             left = command[0]
-        else:
-            inputs.steering_rad = model.steering_max_rad * wp.clamp(command[0], -1.0, 1.0)
         inputs.side_speed_m_s = top * wp.vec2(wp.clamp(left, -1.0, 1.0), wp.clamp(command[1], -1.0, 1.0))
     return inputs
 
 
 @wp.func
-def steered(model: RoverModel, steering_rad: float, wheel: int) -> float:
-    """Angle of a front wheel [rad]: both stand across the radius of the same circle (Ackermann)."""
+def steered_frd(model: RoverModel, steering_rad: float, offset_m: float) -> wp.vec3:
+    """Where a front wheel points: both stand across the radius of the same circle (Ackermann).
+
+    Args:
+        model: of the vehicle.
+        steering_rad: of a wheel in the middle.
+        offset_m: of this one from the middle, to the right.
+    """
     tangent = wp.tan(steering_rad)
-    offset = model.half_track_m
-    if wheel % 2 == 0:  # left: the farther out in a turn to the right
-        offset = -offset
-    return wp.atan(tangent * model.wheel_base_m / (model.wheel_base_m - tangent * offset))
+    along = model.wheel_base_m - tangent * offset_m
+    across = tangent * model.wheel_base_m
+    return wp.normalize(wp.vec3(along, across, 0.0))
 
 
 @wp.func
 def servo_step(model: RoverModel, angle: float, asked: float) -> float:
-    """The steering angle after a substep [rad]: a lag, and a greatest rate."""
-    most = model.steering_rate_rad_s * _SUBSTEP_S
+    """The steering angle after a tick [rad]: a lag, and a greatest rate."""
+    most = model.steering_rate_rad_s * _TICK_S
     return angle + wp.clamp(model.steering_gain * (asked - angle), -most, most)
 
 
@@ -171,55 +181,57 @@ def tyre_step(
 
 
 @wp.func
-def add_wheel(
+def wheel_step(
     model: RoverModel,
-    body: RoverState,
-    inputs: DriveInputs,
-    total: WheelsForce,
     wheel: int,
+    now: WheelStep,
     heading_frd: wp.vec3,
+    drop_m: float,
+    brake_nm: float,
+    target_n: float,
     normal_frd: wp.vec3,
-    normal_ned: wp.vec3,
-    rot: wp.mat33,
     vel_frd: wp.vec3,
-) -> tuple[RoverState, WheelsForce]:
-    """Advances one wheel by a substep and adds its force and torque on the body."""
-    dt = _SUBSTEP_S
-    drive_n = body.drive_n[wheel]
-    drive_n = drive_n + model.motor_gain * (motor_target_n(model, inputs, body.wheel_speed, wheel) - drive_n)
-    body.drive_n[wheel] = drive_n
-    hub_frd = wp.vec3(model.hub_x[wheel], model.hub_y[wheel], model.hub_z)
-    hub_ned = body.pos_ned + rot * hub_frd
-    drop_m = (-hub_ned[2] - inputs.ground_m[wheel]) * (-normal_ned[2])  # along the normal
+    omega_frd: wp.vec3,
+) -> WheelStep:
+    """One wheel a substep later, with its force and torque on the body.
+
+    Args:
+        model: of the vehicle.
+        wheel: which.
+        now: its state before.
+        heading_frd: where it points.
+        drop_m: from its hub to the ground, along the ground's normal.
+        brake_nm: friction of its brake.
+        target_n: [N] that its motor tends to.
+        normal_frd: of the ground, pointing up.
+        vel_frd: [m/s] of the centre of gravity.
+        omega_frd: [rad/s]
+    """
+    out = WheelStep()
+    out.drive_n = now.drive_n + model.motor_gain * (target_n - now.drive_n)
     squeeze_m = model.radius_m - drop_m
     radius = model.radius_m
-    rolling = radius * body.wheel_speed[wheel]
+    friction_nm = brake_nm
     along_n = float(0.0)
-    load = float(0.0)
     if squeeze_m > 0.0:
-        arm_frd = hub_frd - normal_frd * drop_m
-        vel_point_frd = vel_frd + wp.cross(body.omega_frd, arm_frd)
+        arm_frd = wp.vec3(model.hub_x[wheel], model.hub_y[wheel], model.hub_z) - normal_frd * drop_m
+        vel_point_frd = vel_frd + wp.cross(omega_frd, arm_frd)
         load = wp.max(model.spring_n_m * squeeze_m - model.damper_n_s_m * wp.dot(vel_point_frd, normal_frd), 0.0)
         ahead = wp.normalize(heading_frd - wp.dot(heading_frd, normal_frd) * normal_frd)
         right = wp.cross(ahead, normal_frd)
+        rolling = radius * now.speed
         slide = wp.vec2(rolling - wp.dot(vel_point_frd, ahead), -wp.dot(vel_point_frd, right))
-        before = wp.vec2(body.deflection_x[wheel], body.deflection_y[wheel])
-        deflection, grip_n = tyre_step(model, before, slide, rolling, load)
-        body.deflection_x[wheel] = deflection[0]
-        body.deflection_y[wheel] = deflection[1]
+        deflection, grip_n = tyre_step(model, now.deflection, slide, rolling, load)
+        out.deflection = deflection
         along_n = grip_n[0]
-        force_frd = load * normal_frd + grip_n[0] * ahead + grip_n[1] * right
-        total.force_frd += force_frd
-        total.torque_frd += wp.cross(arm_frd, force_frd)
-        total.touching += 1
-    else:
-        body.deflection_x[wheel] = 0.0
-        body.deflection_y[wheel] = 0.0
-    free = body.wheel_speed[wheel] + dt * model.wheel_inertia_inv * radius * (drive_n - along_n)
-    friction_nm = inputs.brake_nm[wheel // 2] + model.rolling_resistance * load * radius
-    most_change = dt * model.wheel_inertia_inv * friction_nm
-    body.wheel_speed[wheel] = wp.sign(free) * wp.max(wp.abs(free) - most_change, 0.0)
-    return body, total
+        out.force_frd = load * normal_frd + grip_n[0] * ahead + grip_n[1] * right
+        out.torque_frd = wp.cross(arm_frd, out.force_frd)
+        out.is_touching = 1
+        friction_nm += model.rolling_resistance * load * radius
+    per_nm = _SUBSTEP_S * model.wheel_inertia_inv
+    free = now.speed + per_nm * radius * (out.drive_n - along_n)
+    out.speed = wp.sign(free) * wp.max(wp.abs(free) - per_nm * friction_nm, 0.0)
+    return out
 
 
 @wp.func
@@ -238,26 +250,44 @@ def _substep(model: RoverModel, body: RoverState, inputs: DriveInputs, hull: Hul
     vel_frd = to_frd * body.vel_ned
     air_vel_frd = to_frd * (body.vel_ned - inputs.wind_ned)
     pressure = -0.5 * _SEA_LEVEL_DENSITY_KG_M3 * inputs.density_ratio * wp.length(air_vel_frd)
-    body.steering_rad = servo_step(model, body.steering_rad, inputs.steering_rad)
-    total = WheelsForce()
-    total.force_frd = pressure * wp.cw_mul(model.drag_area_frd, air_vel_frd)
+    force_frd = pressure * wp.cw_mul(model.drag_area_frd, air_vel_frd)
+    torque_frd = wp.vec3()
     nose = wp.vec3(1.0, 0.0, 0.0)
+    speeds = body.wheel_speed
+    is_touching = int(0)
     for wheel in range(_WHEELS):
         heading = nose
-        if wheel < 2 and model.is_skid == 0:
-            angle = steered(model, body.steering_rad, wheel)
-            heading = wp.vec3(wp.cos(angle), wp.sin(angle), 0.0)
-        body, total = add_wheel(model, body, inputs, total, wheel, heading, normal_frd, inputs.normal_ned, rot, vel_frd)
-    if total.touching > 0:
+        if wheel == 0:
+            heading = inputs.left_frd
+        elif wheel == 1:
+            heading = inputs.right_frd
+        hub_d = (
+            body.pos_ned[2] + rot[2, 0] * model.hub_x[wheel] + rot[2, 1] * model.hub_y[wheel] + rot[2, 2] * model.hub_z
+        )
+        drop_m = (hub_d + inputs.ground_m[wheel]) * inputs.normal_ned[2]  # along the normal
+        step = WheelStep()
+        step.speed = speeds[wheel]
+        step.deflection = wp.vec2(body.deflection_x[wheel], body.deflection_y[wheel])
+        step.drive_n = body.drive_n[wheel]
+        target_n = motor_target_n(model, inputs, speeds, wheel)
+        brake_nm = inputs.brake_nm[wheel // 2]
+        step = wheel_step(model, wheel, step, heading, drop_m, brake_nm, target_n, normal_frd, vel_frd, body.omega_frd)
+        body.wheel_speed[wheel] = step.speed
+        body.deflection_x[wheel] = step.deflection[0]
+        body.deflection_y[wheel] = step.deflection[1]
+        body.drive_n[wheel] = step.drive_n
+        force_frd += step.force_frd
+        torque_frd += step.torque_frd
+        is_touching += step.is_touching
+    if is_touching > 0:
         body.is_on_ground = 1
-    force_frd = total.force_frd
-    torque_frd = total.torque_frd
-    touch = hull_contact(model, hull, body.pos_ned, vel_frd, rot, body.omega_frd)
-    force_frd += touch.force_frd
-    torque_frd += touch.torque_frd
-    body.impact_speed = wp.max(body.impact_speed, touch.impact_speed_m_s)
-    if touch.impact_speed_m_s > model.crash_speed_m_s:
-        body.is_crashed = 1
+    if hull.is_near == 1:
+        touch = hull_contact(model, hull, body.pos_ned, vel_frd, rot, body.omega_frd)
+        force_frd += touch.force_frd
+        torque_frd += touch.torque_frd
+        body.impact_speed = wp.max(body.impact_speed, touch.impact_speed_m_s)
+        if touch.impact_speed_m_s > model.crash_speed_m_s:
+            body.is_crashed = 1
     omega = body.omega_frd
     body.accel_frd = force_frd * model.mass_inv
     middle_accel_frd = body.accel_frd + wp.cross((0.5 * dt) * omega, body.accel_frd)  # the body turns meanwhile
@@ -304,6 +334,10 @@ def rover_tick(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.
     """One tick: four substeps, accel_frd and gyro_frd as means over them, then the battery."""
     if body.is_held == 1:
         return held_tick(body)
+    if model.is_skid == 0:
+        asked = model.steering_max_rad * wp.clamp(command[0], -1.0, 1.0)
+        if body.is_crashed == 0:
+            body.steering_rad = servo_step(model, body.steering_rad, asked)
     inputs = drive_inputs(model, body, command, wind_ned, world)
     hull = look_at_hull(model, world, body.pos_ned, body.q_ned_from_frd, inputs.normal_ned, inputs.is_near_obstacle)
     body.height_agl_m = hull.height_agl_m

@@ -16,6 +16,7 @@ POINTS = 10
 _POINTS = wp.constant(POINTS)
 vec10 = wp.types.vector(length=POINTS, dtype=wp.float32)
 
+_GROUND_MARGIN_M = wp.constant(0.05)  # lower within a tick than this it does not get
 _MARGIN_M = wp.constant(0.2)  # an obstacle nearer than this is found before the substeps reach it
 _FRICTION = wp.constant(0.4)  # guess: plastic on bark, steel on stone
 _STICKING_M_S = wp.constant(0.05)  # speed below which friction falls to nothing
@@ -27,9 +28,11 @@ _THIRD = wp.constant(1.0 / 3.0)
 class HullContact:
     """What is near a hull, valid for one tick."""
 
+    is_near: int  # ground or an obstacle may be touched
     height_agl_m: float  # of the centre of gravity, vertically
     normal_ned: wp.vec3  # of the ground, pointing up
     ground_offset_m: float  # of the ground's plane along its normal
+    is_near_ground: int
     is_near_obstacle: int
     normal_x: vec10  # ned, from the obstacle to the ball
     normal_y: vec10
@@ -85,6 +88,14 @@ def look_at_hull(
     hull.normal_ned = normal_ned
     hull.ground_offset_m = wp.dot(normal_ned, wp.vec3(pos_ned[0], pos_ned[1], -ground_m))
     hull.is_near_obstacle = is_near
+    up_frd = wp.quat_rotate_inv(q_ned_from_frd, normal_ned)
+    low_m = wp.abs(up_frd[0]) * wp.max(model.hull_front_m, model.hull_rear_m)
+    low_m += wp.abs(up_frd[1]) * model.hull_half_width_m
+    low_m += wp.where(up_frd[2] < 0.0, -up_frd[2] * model.hull_bottom_m, up_frd[2] * model.hull_top_m)
+    hull.is_near_ground = 0
+    if hull.height_agl_m < low_m + _GROUND_MARGIN_M:
+        hull.is_near_ground = 1
+    hull.is_near = wp.max(hull.is_near_ground, is_near)
     if is_near == 1:
         ball_m = _BALL * model.hull_half_width_m
         for point in range(int(_POINTS)):
@@ -129,7 +140,7 @@ def hull_contact(
     total = HullForce()
     to_frd = wp.transpose(rot)
     height_m = wp.dot(hull.normal_ned, pos_ned) - hull.ground_offset_m
-    if height_m < model.hull_reach_m:
+    if hull.is_near_ground == 1:
         normal_frd = to_frd * hull.normal_ned
         for corner in range(8):
             x = wp.where(corner % 2 == 0, model.hull_front_m, -model.hull_rear_m)

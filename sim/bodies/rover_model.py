@@ -4,6 +4,7 @@ import warp as wp
 
 from common.airframes.rover import RoverAirframe
 from common.geodesy import DEFAULT_HOME, GRAVITY_M_S2
+from common.kernels import SUBSTEPS, TICK_S
 from sim.battery import BatteryModel, battery_model
 from sim.bodies.tyre import Tyre, tyre_of
 
@@ -40,7 +41,7 @@ class RoverModel:
     half_track_m: float
     steering_max_rad: float
     steering_rate_rad_s: float
-    steering_gain: float  # fraction of the way to its target that the servo goes in a substep
+    steering_gain: float  # fraction of the way to its target that the servo goes in a tick
     is_driven: wp.vec4  # share of the driving force that each wheel has
     motor_speed_m_s: float  # of the treads, at full command and full battery
     motor_n_s_m: float  # force over missing speed, all treads together
@@ -69,7 +70,7 @@ def _gain(lag_s: float, step_s: float) -> float:
 def rover_model(airframe: RoverAirframe, home_alt_amsl_m: float = DEFAULT_HOME.alt_m) -> RoverModel:
     """Constants of an airframe whose home lies home_alt_amsl_m above sea level."""
     body, wheels, tyres, drive, hull = airframe.body, airframe.wheels, airframe.tyres, airframe.drive, airframe.hull
-    step_s = 0.001
+    step_s = TICK_S / SUBSTEPS
     model = RoverModel()
     model.mass_kg = body.mass_kg
     model.mass_inv = 1.0 / body.mass_kg
@@ -95,7 +96,7 @@ def rover_model(airframe: RoverAirframe, home_alt_amsl_m: float = DEFAULT_HOME.a
     model.half_track_m = half_m
     model.steering_max_rad = airframe.steering.max_angle_rad
     model.steering_rate_rad_s = airframe.steering.rate_rad_s
-    model.steering_gain = _gain(airframe.steering.lag_s, step_s)
+    model.steering_gain = _gain(airframe.steering.lag_s, TICK_S)
     is_rear = drive.driven == "rear"
     model.is_driven = wp.vec4(0.0, 0.0, 0.5, 0.5) if is_rear else wp.vec4(0.25, 0.25, 0.25, 0.25)
     model.motor_speed_m_s = drive.max_speed_m_s
