@@ -1,10 +1,11 @@
 """The pages of docs that come from the code, written by `python -m docs.generate`. A test keeps them current."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
-from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT, ArduPilotDialect
+from autopilot.mavlink.dialects.ardupilot_aliases import ALIASES, CONSTANTS
 from autopilot.params import parameter_sections, parameter_table
 from common.airframe import load_airframe
 from common.params import Parameter
@@ -13,6 +14,7 @@ from docs.generate.tasks_page import tasks_text
 from docs.generate.training_page import training_text
 from mission.flight import Flight, FlightConfig
 from mission.simulator.simulator_params import simulator_parameters
+from sim.bodies.vehicles import class_of
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 HEADER = """# Parameters
@@ -46,6 +48,18 @@ nothing can only be read.
 """
 
 
+OTHER_AIRFRAMES = ("rover",)  # one of each class of vehicles besides the multirotor
+OTHER_HEADER = """## {title}: control, flight modes, detectors
+
+In the place of the multirotor's. Defaults are those of the {airframe}.
+
+{own}
+In the ArduPilot dialect it has the names of a {theirs}, in the place of a Copter's:
+
+"""
+ARDUPILOT_SHARED = frozenset(alias.name for alias in ALIASES)
+
+
 def parameters_text() -> str:
     """The whole page."""
     x500 = parameter_table(load_airframe("x500")).declarations
@@ -56,7 +70,22 @@ def parameters_text() -> str:
     config = FlightConfig()
     simulator = simulator_parameters(load_airframe(config.airframe), config.home, config.wind_m_s, config.wind_from_deg)
     ardupilot = [ARDUPILOT_HEADER + _table(ARDUPILOT_PARAMETERS), SIMULATOR_HEADER + _table(simulator)]
-    return "\n".join([HEADER, *sections, *ardupilot, ALIAS_HEADER + _alias_table()])
+    others = [_of_other_class(name) for name in OTHER_AIRFRAMES]
+    return "\n".join([HEADER, *sections, *others, *ardupilot, ALIAS_HEADER + _alias_table(ARDUPILOT)])
+
+
+def _of_other_class(airframe_name: str) -> str:
+    """What another class has in the place of the multirotor's parameters, and ArduPilot's names of them."""
+    airframe = load_airframe(airframe_name)
+    vehicle = class_of(airframe).vehicle
+    declarations = parameter_table(airframe, vehicle=vehicle).declarations
+    own = _table(declarations[item.name] for item in vehicle.parameters)
+    dialect = ARDUPILOT.of_vehicle(vehicle.modes, vehicle.ardupilot)
+    shared = {*ARDUPILOT_SHARED, *(each.name for each in CONSTANTS)}
+    title = vehicle.name.capitalize()
+    return OTHER_HEADER.format(title=title, airframe=airframe_name, theirs=vehicle.ardupilot.name, own=own) + (
+        _alias_table(dialect, declarations, shared)
+    )
 
 
 def _table(declarations: Iterable[Parameter]) -> str:
@@ -78,13 +107,15 @@ def generated_pages() -> dict[Path, str]:
     }
 
 
-def _alias_table() -> str:
+def _alias_table(
+    dialect: ArduPilotDialect, known: Mapping[str, Parameter] | None = None, without: Collection[str] = ()
+) -> str:
+    known = parameter_table().declarations if known is None else known
     rows = ["| name | stands for | in units of | value |", "|---|---|---|---|"]
     lines = {}
-    for constant in ARDUPILOT.constants:
+    for constant in dialect.constants:
         lines[constant.name] = f"| {constant.name} | | | {constant.value:g}: {constant.meaning} |"
-    known = parameter_table().declarations
-    for alias in ARDUPILOT.aliases:
+    for alias in dialect.aliases:
         if alias.of not in known:
             continue
         if alias.numbers is None:
@@ -93,4 +124,4 @@ def _alias_table() -> str:
         else:
             numbers = ", ".join(f"{theirs} = {ours}" for ours, theirs in alias.numbers.items())
             lines[alias.name] = f"| {alias.name} | {alias.of} | | {numbers} |"
-    return "\n".join([*rows, *(lines[name] for name in sorted(lines))]) + "\n"
+    return "\n".join([*rows, *(lines[name] for name in sorted(lines) if name not in without)]) + "\n"

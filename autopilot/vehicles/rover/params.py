@@ -54,7 +54,7 @@ ROVER_PARAMETERS: list[Parameter] = [
     Parameter("RO_MAX_THR_SPEED", 8.0, 0.0, 100.0, "m/s", "speed at full throttle; 0: does not drive", _AIRFRAME,
               "throttle_speed"),
     Parameter("RO_ACCEL_LIM", 2.5, -1.0, 100.0, "m/s^2", "acceleration; 0 or less: any",
-              "guess: passengers keep their coffee", "accel_limit"),
+              "guess", "accel_limit"),
     Parameter("RO_DECEL_LIM", 2.5, -1.0, 100.0, "m/s^2", "deceleration; 0 or less: any", "guess", "decel_limit"),
     Parameter("RO_JERK_LIM", 20.0, -1.0, 1000.0, "m/s^3", "change of acceleration; 0 or less: any", "guess",
               "jerk_limit"),
