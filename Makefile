@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow
+.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -38,6 +38,9 @@ reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch
 
 reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
 	@$(BIN)/python -m bench.follow $(ARGS)
+
+reproduce-drive: $(STAMP) ## Train and judge the policies of docs/results/drive.md (half an hour); only judge: ARGS="judge"
+	@$(BIN)/python -m bench.drive $(ARGS)
 
 # loadfile keeps a test file's kernels in one process, so that each is compiled once. Bytecode is kept, also where the
 # environment says otherwise: tests start the command a hundred times, and their own files take longest to prepare.

@@ -13,6 +13,15 @@ _ERROR_FRACTION = 0.02  # of the errors without corrections: 0.6 m becomes 1.2 c
 _REPORTED_STD_M = 0.014
 
 
+def corrected(model: Any) -> Any:
+    """The error model of a receiver (`sim.sensors.gnss.GnssModel`) that gets corrections all the time, changed."""
+    for name in ("pos_std_ned", "correlated_std_ned"):
+        setattr(model, name, getattr(model, name) * _ERROR_FRACTION)
+    model.pos_h_std = model.pos_v_std = _REPORTED_STD_M
+    model.fix_type = _FIXED
+    return model
+
+
 class RtkReceiver:
     """The receiver of one vehicle.
 

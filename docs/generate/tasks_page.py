@@ -29,6 +29,7 @@ training configurations set or randomise the numbers by name under `environment_
 | [Parking2](#parking2) | park a car on one of two storeys, past moving obstacles: [more](../explanation/parking.md) |
 | [FollowMe](#followme) | a drone follows a person through hills and trees: [more](../explanation/following.md) |
 | [Hover](#hover) | hold a drone at a point by body rates and thrust; 1 per decision at the point |
+| [Drive](#drive) | drive a rover to a pose on hills, or into a spot of a car park: [more](../explanation/drive.md) |
 | [Navigate](#navigate) | fly a drone through forest to a goal, at speed: [more](../explanation/navigate.md) |
 
 The linked pages say what the presets are made of, how rewards are paid, and which spots are held out for tests. Every
@@ -44,10 +45,10 @@ OUTCOMES = {
     Outcome.SUCCESS: "reached what was to be reached, or lasted until its time was up",
     Outcome.TIMEOUT: "was cut at its limit of decisions: a truncation",
     Outcome.HIT_WALL: "ended at a wall",
-    Outcome.HIT_OBSTACLE: "ended at a block, a moving obstacle, a tree or, in flight, a wall or the ground",
+    Outcome.HIT_OBSTACLE: "ended at a block, a moving obstacle, a tree or, of flights and rovers, a wall or ground",
     Outcome.FELL: "ended under the floor",
     Outcome.HIT_OTHER: "rolled over, struck an edge, or came too near a person",
-    Outcome.LOST: "lost whom it followed, or left the forest upwards or the ball it hovers in",
+    Outcome.LOST: "lost whom it followed, or left the forest upwards, the ball it hovers in, or the way to its goal",
 }
 
 

@@ -47,6 +47,7 @@ CATALOGUE: dict[str, Entry] = {
     "Parking2": Entry("parking.settings:Parking2Settings", "parking.level2:Parking2"),
     "FollowMe": Entry("follow_me.settings:FollowSettings", "follow_me.follow_me:FollowMe"),
     "Hover": Entry("hover.hover:HoverSettings", "hover.hover:Hover"),
+    "Drive": Entry("drive.settings:DriveSettings", "drive.drive:Drive"),
     "Navigate": Entry("navigate.settings:NavigateSettings", "navigate.navigate:Navigate"),
 }
 

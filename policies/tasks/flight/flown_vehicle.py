@@ -3,6 +3,8 @@
 Kernel functions over the arrays of a rig; truth and estimate are told apart by name.
 """
 
+from typing import Any
+
 import warp as wp
 
 from autopilot.ports import SETPOINT_TRAJECTORY, Estimate, Setpoint
@@ -73,7 +75,7 @@ def velocity_setpoint(command: Command) -> Setpoint:
 
 
 @wp.func
-def vehicle_estimate(rig: RigArrays, i: int, has_estimator: int) -> Estimate:
+def vehicle_estimate(rig: Any, i: int, has_estimator: int) -> Estimate:
     """What the flight controller takes for its state: its estimate, or in quick training the truth in its place."""
     if has_estimator == 1:
         return rig.autopilot.ekf.rows[i].estimate

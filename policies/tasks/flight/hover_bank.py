@@ -4,6 +4,7 @@ Every estimator has converged then and every integrator has settled. A row that 
 over, and flies on in a world, with a wind and with noise of its own.
 """
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -11,9 +12,10 @@ import numpy as np
 from autopilot.params import parameter_table
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
+from sim.bodies.vehicles import class_of
 from sim.hovering import Hover, fly_to_hover
 from sim.rig import Rig
-from sim.sensors.sensors import sensor_model
+from sim.sensors.sensors import SensorModel, sensor_model
 from sim.wind import wind_model
 from sim.world.batch import WorldBatch
 from sim.world.world import WorldConfig, WorldMap, build_world
@@ -25,21 +27,33 @@ PLAIN = WorldConfig(size_m=64.0, hill_height_m=0.0, trees_per_ha=0.0)
 _SPREAD_M = 0.5  # of the places they hover at, to the north and to the east
 
 
-def build_rig(world: WorldMap | WorldBatch, count: int, *, has_estimator: bool, threads: int, device: str) -> Rig:
-    """Vehicles with the default flight controller, powered on at home."""
-    airframe = load_airframe(AIRFRAME)
+def build_rig(
+    world: WorldMap | WorldBatch,
+    count: int,
+    *,
+    has_estimator: bool,
+    threads: int,
+    device: str,
+    airframe_name: str = AIRFRAME,
+    sensors: Callable[[float], SensorModel] = sensor_model,
+) -> Rig:
+    """Vehicles with the default flight controller of their class, powered on at home."""
+    airframe = load_airframe(airframe_name)
+    vehicle, body = class_of(airframe)
     rig = Rig(
         airframe,
         world,
-        sensor_model(home=DEFAULT_HOME),
+        sensors(1.0),
         wind_model(0.0),
         home=DEFAULT_HOME,
         vehicle_count=count,
         has_estimator=has_estimator,
         threads=threads,
         device=device,
+        body=body,
+        law=vehicle.law,
     )
-    rig.load_parameters(parameter_table(airframe))
+    rig.load_parameters(parameter_table(airframe, vehicle=vehicle))
     return rig
 
 

@@ -1,23 +1,23 @@
-"""A task that is flown: vehicles of a rig with their flight controllers.
+"""A task that is flown or driven: vehicles of a rig with their flight controllers.
 
-An episode starts from a hover of the bank; everything happens on the device.
+An episode starts from a hover of the bank, or standing; everything happens on the device.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from common.geodesy import DEFAULT_HOME
 from policies.tasks.flight.episode_start import Start
-from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, Makes
-from policies.tasks.flight.hover_bank import HOVER_COUNT, LOW_M, build_rig, hover_bank
+from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT
+from policies.tasks.flight.hover_bank import AIRFRAME, LOW_M, build_rig, hover_bank
 from policies.tasks.layout import Layout
 from policies.tasks.task import Task
 from policies.tasks.task_params import Sampler
+from sim.bodies.body import DEFAULT_BODY
 from sim.restore import RowRestore
 from sim.rig import Rig
 from sim.sensors.sensors import SensorModel, sensor_model
@@ -28,7 +28,7 @@ _NOISE_MAX = 2
 
 
 class RigTask(Task):
-    """Vehicles in the air; a subclass adds what they are for."""
+    """Vehicles in the air or on wheels; a subclass adds what they are for."""
 
     def __init__(
         self,
@@ -40,17 +40,28 @@ class RigTask(Task):
         number_defaults: Mapping[str, float | Sampler],
         device: str,
         hover_heights_m: tuple[float, float] = LOW_M,
+        airframe_name: str = AIRFRAME,
+        sensors: Callable[[float], SensorModel] = sensor_model,
+        bank: Rig | None = None,
     ) -> None:
         super().__init__(layout, env_count, number_defaults=number_defaults, device=device)
         self.rig: Rig = build_rig(
-            world, env_count, has_estimator=has_estimator, threads=worker_count(device), device=device
+            world,
+            env_count,
+            has_estimator=has_estimator,
+            threads=worker_count(device),
+            device=device,
+            airframe_name=airframe_name,
+            sensors=sensors,
         )
         self.noise_seeds = self._zeros("noise_seeds", env_count, int)
         self.hovers = self._zeros("hovers", env_count, int)  # of the bank, that the episode started from
         self.is_starting = self._zeros("is_starting", env_count, wp.bool)
-        bank = hover_bank(has_estimator, device, hover_heights_m)
+        bank = bank or hover_bank(has_estimator, device, hover_heights_m)
+        self._bank_count = bank.vehicle_count
         self._restore = RowRestore(self.rig, bank, self.hovers, self.is_starting, self.noise_seeds)
-        self.makes = _makes(self.rig)
+        levels = [sensors(k / NOISE_LEVELS_PER_UNIT) for k in range(_NOISE_MAX * NOISE_LEVELS_PER_UNIT + 1)]
+        self.sensor_levels = wp.array(levels, dtype=SensorModel, device=device)
 
     def start(self, *, is_test: bool) -> Any:
         """What episodes start with, for kernels: a `Start`."""
@@ -58,9 +69,11 @@ class RigTask(Task):
         start.is_starting = self.is_starting
         start.noise_seeds = self.noise_seeds
         start.hovers = self.hovers
-        start.hover_count = HOVER_COUNT
+        start.hover_count = self._bank_count
         start.is_test = int(is_test)
-        start.makes = self.makes
+        if self.rig.body is DEFAULT_BODY:
+            start.makes.body = wp.clone(self.rig.models[:1])
+        start.makes.sensors = self.sensor_levels
         return start
 
     def record(self, kernel: Any, *inputs: Any) -> Any:
@@ -93,13 +106,3 @@ class RigTask(Task):
 def worker_count(device: str) -> int:
     """One thread per core that this process may use, of a GPU one; results do not depend on it."""
     return len(os.sched_getaffinity(0)) if device == "cpu" else 1
-
-
-def _makes(rig: Rig) -> Makes:
-    makes = Makes()
-    makes.body = wp.clone(rig.models[:1])
-    levels = [
-        sensor_model(k / NOISE_LEVELS_PER_UNIT, DEFAULT_HOME) for k in range(_NOISE_MAX * NOISE_LEVELS_PER_UNIT + 1)
-    ]
-    makes.sensors = wp.array(levels, dtype=SensorModel, device=rig.device)
-    return makes

@@ -1,4 +1,4 @@
-"""A task that is flown in worlds of its own: each vehicle in one that is grown afresh at an episode's start.
+"""A task that is flown or driven in worlds of its own: each vehicle in one that is grown afresh at an episode's start.
 
 One decision is: actions to setpoints, `DECISION_TICKS` of the rig, then what the task's subclass makes of where they
 are. Everything happens on the device.
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from common.kernels import TICK_S
 from common.records import assign_rows
-from policies.tasks.flight.hover_bank import LOW_M
 from policies.tasks.flight.rig_task import RigTask
 from policies.tasks.layout import Layout
 from policies.tasks.task_params import Sampler
@@ -37,7 +36,7 @@ class FlightTask(RigTask):
         has_estimator: bool,
         number_defaults: Mapping[str, float | Sampler],
         device: str,
-        hover_heights_m: tuple[float, float] = LOW_M,
+        **vehicle: Any,
     ) -> None:
         self.worlds = WorldBatch(world, env_count, device, trees_per_ha_max=trees_per_ha_max)
         super().__init__(
@@ -47,7 +46,7 @@ class FlightTask(RigTask):
             has_estimator=has_estimator,
             number_defaults=number_defaults,
             device=device,
-            hover_heights_m=hover_heights_m,
+            **vehicle,
         )
         self.world_seeds = self._zeros("world_seeds", env_count, int)
         self.is_growing = self._zeros("is_growing", env_count, wp.bool)

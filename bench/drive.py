@@ -1,0 +1,135 @@
+"""`python -m bench.drive [judge]`: trains Drive's policies from nothing, and judges them. Writes docs/results/drive.md.
+
+In: the recipes `drive-park` and `drive-reach`; with `judge` the policies that ship. Held-out worlds with estimator, wind,
+noise and varied vehicles, as many episodes each. Out: the policies in `results/drive/`, and a table with 95 % intervals.
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from bench.cars.run import Curve, changed
+from bench.row import machine
+from common.files import write_whole
+from policies.learn.config.load import load_config
+from policies.learn.config.recipes import recipe
+from policies.learn.export.policy_file import load_policy, save_policy
+from policies.learn.export.policy_path import CheckpointError, find_policy
+from policies.learn.networks.policy import Policy
+from policies.learn.rollout.task_tensors import TaskTensors
+from policies.learn.torch_threads import few_threads
+from policies.learn.trainer import train
+from policies.tasks.catalogue import build_task, settings_of, task_settings
+from policies.tasks.drive.drive import Drive
+from policies.tasks.drive.drive_kernels import MEASURES
+from policies.tasks.episode import Outcome
+from policies.tasks.intervals import bootstrap, rate
+
+AIMS = {"park": "97 %", "reach": "95 %"}
+EPISODES = 1000  # side by side: each environment plays one
+SEED = 1_000_003  # no training run is given it
+TRAINING_SEED = 1
+LONGEST = 1500  # decisions; time is up before
+FOLDER = Path("results") / "drive"
+PAGE_FILE = Path(__file__).parent.parent / "docs" / "results" / "drive.md"
+PAGE = """\
+# Drive: parking, and poses on hills
+
+Policies of a rover ([drive.md](../explanation/drive.md)) in held-out worlds, {episodes} episodes of each kind: on the
+estimator, with sensor noise, wind and gusts, and masses, motors and tyres that differ. Success is to stand within 0.3 m
+and 10 degrees of the goal, slower than 0.3 m/s, without having touched anything. Actions are the most probable ones;
+rates have Wilson's 95 % interval, times the bootstrap's. Made by `make reproduce-drive`, which trains each from nothing
+by its recipe (`honeyguide train drive-park`, `drive-reach`) and judges what comes of it.
+
+| policy | aim | success | touched | out of time | other | time to the goal | trained in |
+|---|---|---|---|---|---|---|---|
+{rows}
+
+Measured on {machine}.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Drives:
+    """What the episodes came to; one element per episode."""
+
+    outcomes: NDArray[np.int32]
+    times_s: NDArray[np.float32]
+
+
+def trained(preset: str) -> tuple[Path, float]:
+    """A policy trained anew, and how long that took [s]."""
+    config = load_config(recipe(f"drive-{preset}")).config
+    changes = {
+        "env_settings.seed": TRAINING_SEED,
+        "checkpoint_settings.run_id": preset,
+        "checkpoint_settings.results_dir": str(FOLDER),
+        "checkpoint_settings.force": True,
+    }
+    config = changed(config, changes)
+    build_task("Drive", 1, settings_of("Drive", config.env_settings.env_args)).reset(0)  # compiles, not on the clock
+    result = train(config, Curve(config.behavior.max_steps))
+    path = FOLDER / f"drive-{preset}.pt"
+    save_policy(path, *load_policy(result.policy), is_half=True)
+    return path, result.progress.elapsed_s
+
+
+def judged(policy: Policy, preset: str) -> Drives:
+    """Every environment plays its first episode."""
+    settings = {"preset": preset, "has_estimator": True, "split": "test"}
+    task = build_task("Drive", EPISODES, task_settings("Drive", settings))
+    if not isinstance(task, Drive):
+        raise TypeError(task)
+    task.layout.require(policy.layout, "the policy")
+    task.reset(SEED)
+    outcomes, times_s = np.zeros(EPISODES, dtype=np.int32), np.zeros(EPISODES, dtype=np.float32)
+    tensors, memory = TaskTensors(task), policy.start_memory(EPISODES)
+    with few_threads(), torch.inference_mode():
+        for _ in range(LONGEST):
+            actions, memory = policy.act(tensors.observation, memory, None)
+            tensors.step(policy.bounded(actions), actions.branches)
+            ended = (outcomes == Outcome.RUNNING) & (task.buffers.outcomes.numpy() != Outcome.RUNNING)
+            outcomes[ended] = task.buffers.outcomes.numpy()[ended]
+            times_s[ended] = task.measures.numpy()[ended, MEASURES.index("time_s")]
+            if (outcomes != Outcome.RUNNING).all():
+                break
+    return Drives(outcomes, times_s)
+
+
+def row(preset: str, drives: Drives, took_s: float | None) -> str:
+    """A line of the table."""
+    named = (Outcome.SUCCESS, Outcome.HIT_OBSTACLE, Outcome.TIMEOUT)
+    cells = [preset, AIMS[preset]]
+    for is_it in (*(drives.outcomes == outcome for outcome in named), ~np.isin(drives.outcomes, named)):
+        fraction = rate(is_it)
+        cells.append(f"{100 * fraction.value:.1f} % ({100 * fraction.low:.1f} to {100 * fraction.high:.1f})")
+    times = drives.times_s[drives.outcomes == Outcome.SUCCESS]
+    mean = bootstrap(len(times), lambda rows: float(times[rows].mean()) if len(rows) else float("nan"))
+    cells.append(f"{mean.value:.1f} s ({mean.low:.1f} to {mean.high:.1f})")
+    cells.append("-" if took_s is None else f"{took_s / 60.0:.1f} min")
+    return "| " + " | ".join(cells) + " |"
+
+
+def main(arguments: list[str]) -> int:
+    lines = []
+    for preset in AIMS:
+        try:
+            path, took_s = (find_policy(f"drive-{preset}"), None) if "judge" in arguments else trained(preset)
+        except CheckpointError as error:
+            print(error)
+            continue
+        policy, _ = load_policy(path)
+        lines.append(row(preset, judged(policy, preset), took_s))
+        print(lines[-1], flush=True)
+    if lines:
+        page = PAGE.format(episodes=EPISODES, rows="\n".join(lines), machine=machine())
+        write_whole(PAGE_FILE, page.encode())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

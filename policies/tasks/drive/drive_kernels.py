@@ -1,0 +1,238 @@
+"""Drive's kernels, one thread per environment, in the order of a decision.
+
+act       actions to setpoints                           (then the rig advances)
+judge     ranges, the vector, the reward, the end        (rows that end start anew:)
+prepare   numbers and seeds of the new episode           (then worlds grow and vehicles stand in them)
+place     air, sensors, mass and tyres, the goal, the first vector
+"""
+
+import warp as wp
+
+from autopilot.ports import SETPOINT_DRIVE, Setpoint
+from autopilot.vehicles.rover.law import ROVER_LAW
+from common.rng import draw_tick
+from common.rotation import wrap_pi, yaw_from_quat
+from policies.tasks.drive.drive_params import DriveParams
+from policies.tasks.drive.goals import course_goal, spot_goal, way_left_m, way_out
+from policies.tasks.drive.observe import drive_command, own_drive, write_frame
+from policies.tasks.drive.reward import drive_outcome, drive_reward
+from policies.tasks.episode import StepBuffers, close_step, open_frame
+from policies.tasks.flight.episode_draws import WIND_STREAM, draw_angle
+from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight
+from policies.tasks.flight.flight_params import FlightParams
+from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, vehicle_estimate
+from sim.advance import rig_arrays, rig_kernels
+from sim.bodies.rover import ROVER_BODY
+from sim.bodies.rover_model import RoverModel
+from sim.sensors.ground_ring import ring_ranges
+from sim.truth import Truth
+from sim.wind import WindState
+from sim.world.world import World, obstacle_contact, world_at
+
+wp.set_module_options({"enable_backward": False})
+
+RoverArrays = rig_arrays(ROVER_BODY, ROVER_LAW)
+_forget_impacts = rig_kernels(ROVER_BODY, ROVER_LAW).forget_impacts
+_LEVELS = wp.constant(float(NOISE_LEVELS_PER_UNIT))
+_HALF_WIDTH_M = wp.constant(0.22)  # of the hull
+_END_M = wp.constant(0.15)  # from its middle to those of the circles at its ends
+_ROOM_MAX_M = wp.constant(1.0)
+
+MEASURES = ("distance_m", "heading_error_rad", "speed_m_s", "room_m", "way_left_m", "time_s", "start_way_m")
+"""After each decision, the simulator's truth: distance and heading from the goal's, speed, room round the hull (at most
+1 m), the way that is left, the time since the start and the way that was left then."""
+
+
+@wp.struct
+class DriveRules:
+    """What the settings choose; the same for all rows."""
+
+    has_estimator: int
+    spot_count: int  # in a row of the car park, 0: a course
+    decision_s: float
+
+
+@wp.struct
+class DriveState:
+    """All that an episode has beside the rig and its world."""
+
+    flight: wp.array(dtype=FlightParams)
+    params: wp.array(dtype=DriveParams)
+    model: wp.array(dtype=RoverModel)  # (1,) before it is varied
+    actions: wp.array(dtype=wp.vec2)  # the last
+    goals: wp.array(dtype=wp.vec3)  # north, east, heading
+    outs: wp.array(dtype=float)  # of goals: see `way_left_m`
+    left_m: wp.array(dtype=float)  # of the way, at the last decision
+    start_left_m: wp.array(dtype=float)
+    ranges_m: wp.array2d(dtype=float)  # (envs, SECTORS)
+    measures: wp.array2d(dtype=float)  # (envs, MEASURES)
+
+
+@wp.func
+def drive_setpoint(speed: float, yaw_rate: float) -> Setpoint:
+    """As of an offboard client's velocity along the nose and yaw rate."""
+    free = wp.vec3(wp.nan, wp.nan, wp.nan)
+    setpoint = Setpoint()
+    setpoint.kind = SETPOINT_DRIVE
+    setpoint.is_armed = 1
+    setpoint.pos_ned = free
+    setpoint.vel_ned = free
+    setpoint.accel_ned = free
+    setpoint.yaw = wp.nan
+    setpoint.yaw_rate = yaw_rate
+    setpoint.path_start_ned = free
+    setpoint.cruise_speed = wp.nan
+    setpoint.climb_speed = wp.nan
+    setpoint.descend_speed = wp.nan
+    setpoint.omega_frd = free
+    setpoint.thrust = wp.nan
+    setpoint.speed = speed
+    setpoint.steering = wp.nan
+    return setpoint
+
+
+@wp.func
+def action_of(buffers: StepBuffers, i: int) -> wp.vec2:
+    """The two continuous actions that lie in the buffers, in [-1, 1]."""
+    return wp.vec2(wp.clamp(buffers.continuous[i, 0], -1.0, 1.0), wp.clamp(buffers.continuous[i, 1], -1.0, 1.0))
+
+
+@wp.func
+def true_pose(truth: Truth) -> wp.vec3:
+    """North, east and heading."""
+    return wp.vec3(truth.pos_ned[0], truth.pos_ned[1], yaw_from_quat(truth.q_ned_from_frd))
+
+
+@wp.func
+def world_now(rig: RoverArrays, i: int) -> World:
+    """The world of a vehicle, the movers where they are."""
+    return world_at(rig.worlds[rig.i_world[i]], draw_tick(rig.tick[i]))
+
+
+@wp.func
+def room_round(world: World, truth: Truth) -> float:
+    """Distance [m] from the hull, taken for two circles, to the nearest thing, at most 1 m."""
+    deepest = float(0.0)
+    for end in range(2):
+        ahead = wp.vec3((2.0 * float(end) - 1.0) * _END_M, 0.0, 0.0)
+        place_ned = truth.pos_ned + wp.quat_rotate(truth.q_ned_from_frd, ahead)
+        deepest = wp.max(deepest, obstacle_contact(world, place_ned, _HALF_WIDTH_M + _ROOM_MAX_M)[3])
+    return _ROOM_MAX_M - deepest
+
+
+@wp.func
+def show_frame(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: DriveState, i: int) -> None:
+    """The newest frame of the observation."""
+    truth = rig.truth[i]
+    tick = draw_tick(rig.tick[i])
+    place = wp.vec2(truth.pos_ned[0], truth.pos_ned[1])
+    heading = yaw_from_quat(truth.q_ned_from_frd)
+    ring_ranges(world_now(rig, i), place, heading, state.params[i].range_noise, rig.seed[i], tick, state.ranges_m, i)
+    own = own_drive(vehicle_estimate(rig, i, rules.has_estimator))
+    at = open_frame(buffers, i)
+    write_frame(own, state.actions[i], state.goals[i], state.ranges_m, buffers.observations, i, at)
+
+
+@wp.kernel(enable_backward=False)
+def act(buffers: StepBuffers, rig: RoverArrays) -> None:
+    i = wp.tid()
+    command = drive_command(action_of(buffers, i))
+    rig.autopilot.setpoint[i] = drive_setpoint(command.speed, command.yaw_rate)
+
+
+@wp.kernel(enable_backward=False)
+def judge(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: DriveState, start: Start) -> None:
+    i = wp.tid()
+    params = state.params[i]
+    truth = rig.truth[i]
+    last_action = state.actions[i]
+    action = action_of(buffers, i)
+    state.actions[i] = action
+    pose = true_pose(truth)
+    goal = state.goals[i]
+    distance_m = wp.length(wp.vec2(goal[0] - pose[0], goal[1] - pose[1]))
+    turn_rad = wrap_pi(goal[2] - pose[2])
+    left_m = way_left_m(pose, goal, state.outs[i])
+    time_s = float(buffers.steps[i] + 1) * rules.decision_s
+    room_m = room_round(world_now(rig, i), truth)
+    outcome = drive_outcome(params, truth, distance_m, turn_rad, left_m, state.start_left_m[i], time_s)
+    reward = drive_reward(params, state.left_m[i] - left_m, room_m, outcome, action, last_action)
+    state.left_m[i] = left_m
+    state.measures[i, 0] = distance_m
+    state.measures[i, 1] = turn_rad
+    state.measures[i, 2] = wp.length(truth.vel_ned)
+    state.measures[i, 3] = room_m
+    state.measures[i, 4] = left_m
+    state.measures[i, 5] = time_s
+    state.measures[i, 6] = state.start_left_m[i]
+    show_frame(buffers, rules, rig, state, i)
+    start.is_starting[i] = close_step(buffers, i, reward, outcome)
+
+
+@wp.kernel(enable_backward=False)
+def prepare(buffers: StepBuffers, state: DriveState, start: Start) -> None:
+    i = wp.tid()
+    start.is_growing[i] = False
+    if not start.is_starting[i]:
+        return
+    episode = begin_flight(buffers, start, i)
+    params = state.params[i]
+    state.actions[i] = wp.vec2()
+    if episode % wp.max(int(params.episodes_per_world), 1) == 0:
+        ask_for_world(buffers, start, i, episode, params.hill_height_m, params.trees_per_ha)
+        world = start.world_params[i]
+        world.wall_count = int(params.wall_count)
+        world.mover_count = int(params.mover_count)
+        start.world_params[i] = world
+
+
+@wp.func
+def vary_rover(rig: RoverArrays, state: DriveState, start: Start, seed: int, i: int, episode: int) -> None:
+    """Gives row i the air, the sensors, the mass, the motors and the tyres of its episode."""
+    flight = state.flight[i]
+    params = state.params[i]
+    model = state.model[0]
+    model.mass_kg = model.mass_kg * flight.mass_scale
+    model.mass_inv = model.mass_inv / flight.mass_scale
+    model.inertia_frd = model.inertia_frd * flight.mass_scale
+    model.inertia_inv_frd = model.inertia_inv_frd / flight.mass_scale
+    model.motor_n_s_m = model.motor_n_s_m * flight.motor_scale
+    model.motor_max_n = model.motor_max_n * flight.motor_scale
+    model.tyre.peak = model.tyre.peak * params.friction_scale
+    model.tyre.tail = model.tyre.tail * params.friction_scale
+    model.rolling_resistance = model.rolling_resistance * params.rolling_scale
+    rig.model[i] = model
+    level = int(wp.round(flight.sensor_noise * _LEVELS))
+    rig.sensor_model[i] = start.makes.sensors[wp.min(level, start.makes.sensors.shape[0] - 1)]
+    towards = draw_angle(seed, i, episode, WIND_STREAM)
+    wind = rig.wind_model[i]
+    wind.along_ned = wp.vec3(wp.cos(towards), wp.sin(towards), 0.0)
+    wind.mean_ned = wind.along_ned * flight.wind_m_s
+    wind.gust_m_s = flight.wind_gust_m_s
+    wind.turbulence_w_std = 0.1 * flight.wind_m_s * flight.wind_turbulence  # MIL-F-8785C: a tenth of W20
+    rig.wind_model[i] = wind
+    rig.wind[i] = WindState()
+    _forget_impacts(rig, i)
+
+
+@wp.kernel(enable_backward=False)
+def place(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: DriveState, start: Start) -> None:
+    i = wp.tid()
+    if not start.is_starting[i]:
+        return
+    seed = buffers.seed[0]
+    episode = buffers.episodes[i] - 1
+    params = state.params[i]
+    vary_rover(rig, state, start, seed, i, episode)
+    world = world_now(rig, i)
+    goal = course_goal(world, params.goal_min_m, params.goal_max_m, seed, i, episode)
+    out = float(0.0)
+    if rules.spot_count > 0:
+        goal = spot_goal(world, start.world_seeds[i], rules.spot_count, seed, i, episode)
+        out = way_out(goal, start.world_seeds[i])
+    state.goals[i] = goal
+    state.outs[i] = out
+    left_m = way_left_m(true_pose(rig.truth[i]), goal, out)
+    state.left_m[i] = left_m
+    state.start_left_m[i] = left_m
+    show_frame(buffers, rules, rig, state, i)

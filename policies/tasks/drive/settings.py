@@ -1,0 +1,16 @@
+"""Drive's settings: what is to be reached, and what a quick training may leave out."""
+
+from typing import Literal
+
+from policies.tasks.task import TaskSettings
+
+DrivePreset = Literal["reach", "park"]
+
+
+class DriveSettings(TaskSettings):
+    """What a user may choose of Drive."""
+
+    preset: DrivePreset = "reach"
+    """`reach`: a pose 5 to 30 m away on a course through hills; `park`: a free spot of a car park."""
+    has_estimator: bool = True
+    """Whether the flight controller drives on its estimate; if not, on the truth: quicker, in training only."""

@@ -1,0 +1,150 @@
+"""A scanner with many layers on a rover: what stands round it in 72 sectors of 5 degrees, the ground left out.
+
+Sectors are those of MAVLink's OBSTACLE_DISTANCE, clockwise, the first one's middle at the nose. Each tells the nearest
+of its rays to anything that stands on the ground, seen from above: trunks, walls, boxes and movers, however low and
+whatever the slope. What is left out: hills that hide things, and the time that a turn takes. True places, since it is a
+sensor; each value has an error of its own, and now and then there is no return. Asked for every decision, so each thing
+is cast against the rays that can meet it alone.
+"""
+
+import math
+
+import warp as wp
+
+from common.rng import draw_key
+from sim.world.boxes import Box, box_middle, in_box_axes
+from sim.world.growing import bucket_of
+from sim.world.trees import Forest, Tree
+from sim.world.walls import slab
+from sim.world.world import World
+
+wp.set_module_options({"enable_backward": False})
+
+SECTORS = 72
+RAYS_PER_SECTOR = 3
+RING_MAX_M = wp.constant(10.0)  # guess: of what is called sure on dark bark
+_SECTORS = wp.constant(SECTORS)
+_PER_SECTOR = wp.constant(RAYS_PER_SECTOR)
+_RAYS = wp.constant(SECTORS * RAYS_PER_SECTOR)
+_RAY_RAD = wp.constant(2.0 * math.pi / (SECTORS * RAYS_PER_SECTOR))
+_STREAM = wp.constant(203)  # of the rig's seeds
+_STD_M = wp.constant(0.02)  # for a noise of 1; Slamtec RPLIDAR S2 data sheet: 3 cm
+_MISSES = wp.constant(0.01)  # fraction of sectors without a return, for a noise of 1; guess
+_UNIFORM_HALF = wp.constant(math.sqrt(3.0))  # half the width of a uniform draw of unit variance
+
+
+@wp.func
+def shorten(ranges_m: wp.array2d(dtype=float), i: int, ray: int, distance_m: float) -> None:
+    """Takes a ray's return into its sector: the rays of a sector lie round its middle."""
+    k = ((ray + _RAYS + _PER_SECTOR // 2) // _PER_SECTOR) % _SECTORS
+    ranges_m[i, k] = wp.min(ranges_m[i, k], distance_m)
+
+
+@wp.func
+def add_box(box: Box, tick: int, place: wp.vec2, heading: float, ranges_m: wp.array2d(dtype=float), i: int) -> None:
+    """Casts the rays that can meet a box, seen from above."""
+    middle = box_middle(box, tick)
+    off = middle - place
+    distance = wp.length(off)
+    radius = wp.sqrt(box.half_length * box.half_length + box.half_width * box.half_width)
+    if distance - radius > RING_MAX_M:
+        return
+    first = int(0)
+    last = int(_RAYS) - 1
+    if distance > radius:
+        bearing = wp.atan2(off[1], off[0]) - heading
+        half = wp.asin(radius / distance)
+        first = int(wp.ceil((bearing - half) / _RAY_RAD))
+        last = int(wp.floor((bearing + half) / _RAY_RAD))
+    start = in_box_axes(box, -off[0], -off[1])
+    for ray in range(first, last + 1):
+        angle = heading + float(ray) * _RAY_RAD
+        rate = in_box_axes(box, wp.cos(angle), wp.sin(angle))
+        lengthwise = slab(start[0], rate[0], -box.half_length, box.half_length)
+        across = slab(start[1], rate[1], -box.half_width, box.half_width)
+        entry = wp.max(0.0, wp.max(lengthwise[0], across[0]))
+        if entry <= wp.min(lengthwise[1], across[1]):
+            # rays are numbered from -RAYS up to twice as many: one turn more makes them positive
+            shorten(ranges_m, i, ray + _RAYS, entry)
+
+
+@wp.func
+def add_trunk(tree: Tree, place: wp.vec2, heading: float, ranges_m: wp.array2d(dtype=float), i: int) -> None:
+    """Takes a trunk into the sectors that it reaches into."""
+    off = wp.vec2(tree.north, tree.east) - place
+    distance = wp.length(off)
+    if distance - tree.trunk_radius > RING_MAX_M or distance <= tree.trunk_radius:
+        return
+    bearing = wp.atan2(off[1], off[0]) - heading
+    half = wp.asin(tree.trunk_radius / distance)
+    first = int(wp.ceil((bearing - half) / _RAY_RAD))
+    last = int(wp.floor((bearing + half) / _RAY_RAD))
+    for ray in range(first, last + 1):
+        aside = distance * wp.sin(float(ray) * _RAY_RAD - bearing)
+        along = distance * wp.cos(float(ray) * _RAY_RAD - bearing)
+        depth = wp.sqrt(wp.max(tree.trunk_radius * tree.trunk_radius - aside * aside, 0.0))
+        shorten(ranges_m, i, ray + _RAYS, along - depth)
+
+
+@wp.func
+def add_trunks(forest: Forest, place: wp.vec2, heading: float, ranges_m: wp.array2d(dtype=float), i: int) -> None:
+    """All trees that can be in range, each once: where its bucket is that of its axis."""
+    if forest.tree_count == 0:
+        return
+    row_low = bucket_of(forest, place[0] - RING_MAX_M)
+    row_high = bucket_of(forest, place[0] + RING_MAX_M)
+    column_low = bucket_of(forest, place[1] - RING_MAX_M)
+    column_high = bucket_of(forest, place[1] + RING_MAX_M)
+    for row in range(row_low, row_high + 1):
+        for column in range(column_low, column_high + 1):
+            bucket = row * forest.buckets + column
+            for k in range(forest.bucket_start[bucket], forest.bucket_start[bucket + 1]):
+                tree = forest.trees[forest.bucket_trees[k]]
+                if bucket_of(forest, tree.north) == row and bucket_of(forest, tree.east) == column:
+                    add_trunk(tree, place, heading, ranges_m, i)
+
+
+@wp.func
+def ring_ranges(
+    world: World,
+    place: wp.vec2,
+    heading: float,
+    noise: float,
+    seed: int,
+    tick: int,
+    ranges_m: wp.array2d(dtype=float),
+    i: int,
+) -> None:
+    """The ranges of a ring into row i [m], RING_MAX_M for no return.
+
+    Args:
+        world: what stands there, the movers where they are now.
+        place: north and east of the ring [m].
+        heading: of its first sector's middle [rad].
+        noise: factor on its errors.
+        seed: of its errors.
+        tick: now.
+        ranges_m: shape (rows, SECTORS).
+        i: the row.
+    """
+    for k in range(_SECTORS):
+        ranges_m[i, k] = RING_MAX_M
+    boxes = world.boxes
+    for i_box in range(boxes.box_count):
+        add_box(boxes.boxes[i_box], boxes.tick, place, heading, ranges_m, i)
+    add_trunks(world.forest, place, heading, ranges_m, i)
+    if world.walls.is_built == 1:
+        inner = world.walls.half_size_m
+        if wp.max(wp.abs(place[0]), wp.abs(place[1])) > inner - RING_MAX_M:
+            for ray in range(_RAYS):
+                angle = heading + float(ray) * _RAY_RAD
+                north = slab(place[0], wp.cos(angle), -inner, inner)
+                east = slab(place[1], wp.sin(angle), -inner, inner)
+                shorten(ranges_m, i, ray, wp.clamp(wp.min(north[1], east[1]), 0.0, RING_MAX_M))
+    state = draw_key(seed, 0, tick, _STREAM)
+    for k in range(_SECTORS):
+        error = _UNIFORM_HALF * (2.0 * wp.randf(state) - 1.0)
+        if ranges_m[i, k] < RING_MAX_M:
+            ranges_m[i, k] = wp.clamp(ranges_m[i, k] + noise * _STD_M * error, 0.0, RING_MAX_M)
+        if wp.randf(state) < noise * _MISSES:
+            ranges_m[i, k] = RING_MAX_M
