@@ -1,7 +1,8 @@
 """`python -m bench.drive [judge]`: trains Drive's policies from nothing, and judges them. Writes docs/results/drive.md.
 
-In: the recipes `drive-park` and `drive-reach`; with `judge` the policies that ship. Held-out worlds with estimator, wind,
-noise and varied vehicles, as many episodes each. Out: the policies in `results/drive/`, and a table with 95 % intervals.
+In: the recipes `drive-park` and `drive-reach`; with `judge` the policies that ship. Held-out worlds with estimator,
+wind, noise and varied vehicles, as many episodes each. Out: the policies in `results/drive/`, and a table with 95 %
+intervals.
 """
 
 import sys
