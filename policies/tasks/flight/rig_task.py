@@ -12,7 +12,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from policies.tasks.flight.episode_start import Start
-from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT
+from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, Makes
 from policies.tasks.flight.hover_bank import AIRFRAME, LOW_M, build_rig, hover_bank
 from policies.tasks.layout import Layout
 from policies.tasks.task import Task
@@ -61,7 +61,10 @@ class RigTask(Task):
         self._bank_count = bank.vehicle_count
         self._restore = RowRestore(self.rig, bank, self.hovers, self.is_starting, self.noise_seeds)
         levels = [sensors(k / NOISE_LEVELS_PER_UNIT) for k in range(_NOISE_MAX * NOISE_LEVELS_PER_UNIT + 1)]
-        self.sensor_levels = wp.array(levels, dtype=SensorModel, device=device)
+        self.makes: Any = Makes()
+        self.makes.sensors = wp.array(levels, dtype=SensorModel, device=device)
+        if self.rig.body is DEFAULT_BODY:
+            self.makes.body = wp.clone(self.rig.models[:1])
 
     def start(self, *, is_test: bool) -> Any:
         """What episodes start with, for kernels: a `Start`."""
@@ -71,9 +74,7 @@ class RigTask(Task):
         start.hovers = self.hovers
         start.hover_count = self._bank_count
         start.is_test = int(is_test)
-        if self.rig.body is DEFAULT_BODY:
-            start.makes.body = wp.clone(self.rig.models[:1])
-        start.makes.sensors = self.sensor_levels
+        start.makes = self.makes
         return start
 
     def record(self, kernel: Any, *inputs: Any) -> Any:
