@@ -19,6 +19,7 @@ from common.files import write_whole
 
 SCRIPTS = {
     "flights": "bench.flying.flights",
+    "drives": "bench.flying.drives",
     "flight": "bench.flying.flight",
     "python_share": "bench.flying.python_share",
     "batch": "bench.flying.batch",

@@ -42,6 +42,7 @@ AUTO_LAND = 6
 FRAME_GLOBAL = 0
 FRAME_LOCAL_NED = 1
 LANDED_ON_GROUND = 1
+GROUND_ROVER = 10  # MAV_TYPE
 MISSION_COMPLETE = 5
 
 # SET_POSITION_TARGET_LOCAL_NED type_mask: a set bit frees the element
@@ -149,7 +150,7 @@ class Drone(Client):
         acceptance_m: float = 0.5,
         timeout_s: float = 120.0,
     ) -> None:
-        """Flies to a place and returns when it is within `acceptance_m` of it."""
+        """Goes to a place and returns when it is within `acceptance_m` of it; what drives takes the ground's height."""
         await self.command_int(
             CMD_REPOSITION,
             FRAME_GLOBAL,
@@ -160,7 +161,7 @@ class Drone(Client):
             name="goto",
         )
         target = ned_from_geodetic(lat_deg, lon_deg, alt_amsl_m, self._origin())
-        await self.until(lambda: dist(self.pos_ned, target) < acceptance_m, timeout_s, "goto")
+        await self.until(lambda: self._way_left_m(target) < acceptance_m, timeout_s, "goto")
 
     async def goto_ned(self, north_m: float, east_m: float, down_m: float, **options: Any) -> None:
         """`goto` for a place in the vehicle's local frame."""
@@ -291,6 +292,11 @@ class Drone(Client):
     async def _set_mode(self, main: int, sub: int, name: str) -> None:
         await self.command(CMD_SET_MODE, 1.0, float(main), float(sub), name=name)
         await self.until(lambda: self.px4_mode == (main, sub), 3.0, f"mode {name}")
+
+    def _way_left_m(self, target_ned: tuple[float, float, float]) -> float:
+        heartbeat = self.latest("HEARTBEAT")
+        axes = 2 if heartbeat is not None and heartbeat.type == GROUND_ROVER else 3
+        return dist(self.pos_ned[:axes], target_ned[:axes])
 
     def _height_m(self) -> float:
         """Above home."""

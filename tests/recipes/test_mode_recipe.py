@@ -111,7 +111,7 @@ def test_a_class_of_vehicles_may_have_fewer_modes(monkeypatch, tmp_path):
     flight.close()
     assert running.error is None
     takeoff, return_home, mission = refusals
-    assert "mode TAKEOFF is not supported" in takeoff
+    assert "no mode of this vehicle does that" in takeoff
     assert "there is no mode 4/5" in return_home
     assert "mode MISSION is not supported" in mission
 

@@ -155,8 +155,8 @@ def test_a_sled_is_driven_over_mavlink(airframe):
     sled.run(1.0)
     beat = next(each for each in sled.heard("HEARTBEAT") if each.autopilot == mavlink.MAV_AUTOPILOT_PX4)
     assert (beat.type, beat.custom_mode) == (MAV_TYPE_GROUND_ROVER, 4 << 16 | 3 << 24)
-    assert sled.ask(TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, nan) == TEMPORARILY_REJECTED
-    assert "Takeoff: mode TAKEOFF is not supported" in sled.texts()
+    assert sled.ask(TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, nan) == UNSUPPORTED
+    assert "Takeoff: no mode of this vehicle does that" in sled.texts()
     assert sled.goto(10.0) == TEMPORARILY_REJECTED  # not armed
     assert sled.ask(ARM, 1.0) == ACCEPTED
     sled.run(15.0)
