@@ -65,6 +65,7 @@ class SetpointPort:
         self.vel_ned: Vector = FREE
         self.omega_frd: Vector = FREE
         self.yaw_rate = nan
+        self.speed = self.steering = nan
         self._free_all()
 
     def set_flags(self, *, is_armed: bool, is_landed: bool) -> None:

@@ -5,6 +5,8 @@ for its four substeps: one for the ground, and one for each point of the outline
 is ten balls round the box at the height of the hubs, so that corners, sides and ends are stopped and turned.
 """
 
+from typing import TYPE_CHECKING, Any, TypeAlias
+
 import warp as wp
 
 from sim.bodies.rover_model import RoverModel
@@ -14,7 +16,7 @@ wp.set_module_options({"enable_backward": False})
 
 POINTS = 10
 _POINTS = wp.constant(POINTS)
-vec10 = wp.types.vector(length=POINTS, dtype=wp.float32)
+Vec10: TypeAlias = Any if TYPE_CHECKING else wp.types.vector(length=POINTS, dtype=wp.float32)
 
 _GROUND_MARGIN_M = wp.constant(0.05)  # lower within a tick than this it does not get
 _MARGIN_M = wp.constant(0.2)  # an obstacle nearer than this is found before the substeps reach it
@@ -34,10 +36,10 @@ class HullContact:
     ground_offset_m: float  # of the ground's plane along its normal
     is_near_ground: int
     is_near_obstacle: int
-    normal_x: vec10  # ned, from the obstacle to the ball
-    normal_y: vec10
-    normal_z: vec10
-    offset_m: vec10  # of each plane along its normal: a ball's centre below it touches
+    normal_x: Vec10  # ned, from the obstacle to the ball
+    normal_y: Vec10
+    normal_z: Vec10
+    offset_m: Vec10  # of each plane along its normal: a ball's centre below it touches
 
 
 @wp.struct

@@ -6,6 +6,8 @@ prepare   numbers and seeds of the new episode           (then worlds grow and v
 place     air, sensors, mass and tyres, the goal, the first vector
 """
 
+from typing import TYPE_CHECKING, Any, TypeAlias
+
 import warp as wp
 
 from autopilot.ports import SETPOINT_DRIVE, Setpoint
@@ -31,7 +33,7 @@ from sim.world.world import World, obstacle_contact, world_at
 
 wp.set_module_options({"enable_backward": False})
 
-RoverArrays = rig_arrays(ROVER_BODY, ROVER_LAW)
+RoverArrays: TypeAlias = Any if TYPE_CHECKING else rig_arrays(ROVER_BODY, ROVER_LAW)
 _forget_impacts = rig_kernels(ROVER_BODY, ROVER_LAW).forget_impacts
 _LEVELS = wp.constant(float(NOISE_LEVELS_PER_UNIT))
 _HALF_WIDTH_M = wp.constant(0.22)  # of the hull

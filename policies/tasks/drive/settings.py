@@ -10,7 +10,7 @@ DrivePreset = Literal["reach", "park"]
 class DriveSettings(TaskSettings):
     """What a user may choose of Drive."""
 
-    preset: DrivePreset = "reach"
+    preset: DrivePreset = "reach"  # type: ignore[assignment]  # of its own, not the documents'
     """`reach`: a pose 5 to 30 m away on a course through hills; `park`: a free spot of a car park."""
     has_estimator: bool = True
     """Whether the flight controller drives on its estimate; if not, on the truth: quicker, in training only."""

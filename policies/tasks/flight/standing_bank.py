@@ -27,7 +27,8 @@ _SETTLE_TICKS = 1000  # 4 s more, with the brake on
 @cache
 def _stand_kernel(body: Body, law: ControlLaw) -> Any:
     """`@wp.kernel (Arrays, yaw_rad)`: puts vehicles at home, each with a heading of its own."""
-    arrays, at_rest, truth_of, standing_height = rig_arrays(body, law), body.at_rest, body.truth, body.standing_height
+    arrays: Any = rig_arrays(body, law)
+    at_rest, truth_of, standing_height = body.at_rest, body.truth, body.standing_height
 
     @wp.kernel(enable_backward=False, module="unique")
     def stand(rig: arrays, yaw_rad: wp.array(dtype=float)) -> None:
