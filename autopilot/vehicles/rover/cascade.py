@@ -177,7 +177,8 @@ def loops(
     is_open = sp.kind == SETPOINT_DRIVE and not wp.isfinite(sp.speed)
     goal = wp.where(asked.is_stop == 1, 0.0, asked.speed)
     if is_open:
-        now.speed = open_throttle(params, sp.thrust, here.speed)
+        is_turned = wp.abs(sp.steering) > 0.0 or wp.abs(asked.yaw_rate) > 0.0
+        now.speed = open_throttle(params, sp.thrust, here.speed, airframe.is_skid == 0 or not is_turned)
         goal = wp.where(wp.abs(sp.thrust) > 0.0, sp.thrust, here.speed)
     else:
         may_park = airframe.is_skid == 0 or asked.is_stop == 1

@@ -46,14 +46,14 @@ def parked() -> SpeedState:
 
 
 @wp.func
-def open_throttle(params: RoverParams, throttle: float, speed: float) -> SpeedState:
-    """A throttle as it is; parked where it is zero and the vehicle stands."""
+def open_throttle(params: RoverParams, throttle: float, speed: float, may_park: bool) -> SpeedState:
+    """A throttle as it is; parked, if it may be, where it is zero and the vehicle stands."""
     state = SpeedState()
     state.speed_sp = speed
     state.throttle = wp.clamp(throttle, -1.0, 1.0)
     if not (wp.abs(throttle) > 0.0):  # NaN, too
         state.throttle = 0.0
-        if wp.abs(speed) < params.stop_speed:
+        if may_park and wp.abs(speed) < params.stop_speed:
             return parked()
     return state
 
