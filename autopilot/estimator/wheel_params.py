@@ -27,7 +27,7 @@ WHEEL_PARAMETERS: list[Parameter] = [
         "wheel_ctrl",
     ),
     Parameter(
-        "EKF2_WHL_NOISE", 0.05, 0.005, 1.0, "m/s", "noise of a wheel's speed", "guess: encoder steps", "wheel_noise"
+        "EKF2_WHL_NOISE", 0.03, 0.005, 1.0, "m/s", "noise of a wheel's speed", "guess: encoder steps", "wheel_noise"
     ),
     Parameter(
         "EKF2_WHL_SFE",
@@ -41,17 +41,17 @@ WHEEL_PARAMETERS: list[Parameter] = [
     ),
     Parameter(
         "EKF2_WHL_SLIP",
-        0.01,
+        0.007,
         0.0,
         0.2,
         "s^2/m",
-        "slip, as a fraction of the speed, per specific force that the tyres bear",
-        "guess: a tyre's stiffness of 10 times its load",
+        "slip expected, along and across, as a fraction of the speed per specific force that the tyres bear",
+        "a tyre whose force is 14 times its load per slip, as those of cars",
         "wheel_slip",
     ),
     Parameter(
         "EKF2_WHL_SIDE_N",
-        0.05,
+        0.03,
         0.005,
         1.0,
         "m/s",

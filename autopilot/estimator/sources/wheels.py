@@ -6,7 +6,8 @@ model constraints for land vehicle applications"): none along body y and z at th
 turn. Along the body's axes, so slopes are no matter. Where the sides differ by more than the vehicle turns, one of them
 spins, slides or is broken: the one that is nearer to the estimate is believed.
 
-What is wrong with a wheel lasts: its scale, the slip of a slope or of a bend. So the samples of a third of a second
+Tyres slip by what they bear, along and across, on slopes and in bends: as much as EKF2_WHL_SLIP says is expected. What
+is wrong with a wheel lasts: its scale, the rest of its slip. So the samples of a third of a second
 tell no more than one, while the gate is as narrow as the noise of each. The scale of each side is learned from GNSS
 velocity by a filter of its own. Not fused: off the ground or tipped over, without heading, and for seconds after GNSS
 velocity has been rejected for two (sliding, carried, spinning on ice): GNSS is believed then. Never sets the state;
@@ -33,6 +34,7 @@ wp.set_module_options({"enable_backward": False})
 _STUCK_AFTER = wp.constant(12)
 _STUCK_MOVED = wp.constant(0.5)  # [m/s] by the estimate, within which no encoder of use repeats its value
 _LASTS_S = wp.constant(0.3)  # within which all samples have the same error; tuned on simulated drives
+_SLIP_ERROR = wp.constant(0.7)  # of the slip that is expected; guess: loose ground has twice that of firm
 _TURN_SLIP = wp.constant(0.2)  # of what a side moves in a turn on the spot; guess: skid steer
 _LEAST_LOAD = wp.constant(4.0)  # [m/s²] that the ground bears: less of it, and the wheels are in the air; guess
 _MOST_LOAD = wp.constant(20.0)
@@ -122,11 +124,12 @@ def rolling(
         expected: [m/s] speed along body x by the estimate.
     """
     out = Rolling()
-    out.left = sample.left_m_s * (1.0 + odometer.scale[0])
-    out.right = sample.right_m_s * (1.0 + odometer.scale[1])
+    grip = 1.0 - params.wheel_slip * accel_frd[0]
+    out.left = sample.left_m_s * (1.0 + odometer.scale[0]) * grip
+    out.right = sample.right_m_s * (1.0 + odometer.scale[1]) * grip
     out.turn = omega_frd[2] * params.wheel_track
     run = 0.5 * (wp.abs(out.left) + wp.abs(out.right))
-    slip = params.wheel_slip * wp.sqrt(accel_frd[0] * accel_frd[0] + accel_frd[1] * accel_frd[1]) * run
+    slip = _SLIP_ERROR * params.wheel_slip * wp.sqrt(accel_frd[0] * accel_frd[0] + accel_frd[1] * accel_frd[1]) * run
     scale_var = wp.max(odometer.scale_var[0], odometer.scale_var[1])
     turn_slip = _TURN_SLIP * out.turn
     var = params.wheel_noise * params.wheel_noise + scale_var * run * run + slip * slip + turn_slip * turn_slip
@@ -140,8 +143,9 @@ def rolling(
         if wp.abs(by_right - expected) < wp.abs(by_left - expected):
             out.speed = by_right
     side_slip = params.wheel_slip * accel_frd[1] * run
-    side_var = params.wheel_side_noise * params.wheel_side_noise + side_slip * side_slip + turn_slip * turn_slip
-    out.side = -omega_frd[2] * params.wheel_x
+    side_error = _SLIP_ERROR * side_slip
+    side_var = params.wheel_side_noise * params.wheel_side_noise + side_error * side_error + turn_slip * turn_slip
+    out.side = -omega_frd[2] * params.wheel_x - side_slip
     out.side_std = wp.sqrt(side_var)
     out.up = omega_frd[1] * params.wheel_x
     out.up_std = _UP_FACTOR * params.wheel_side_noise + _UP_FRACTION * run
