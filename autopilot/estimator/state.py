@@ -191,6 +191,7 @@ class Odometer:
     scale_var: wp.vec2
     learned_time_us: wp.int64  # of the GNSS velocity that the scale was last learned from, 0: never
     doubted_time_us: wp.int64  # when GNSS velocity last contradicted them, 0: never
+    struck_time_us: wp.int64  # of the last blow, 0: none
 
 
 @wp.struct

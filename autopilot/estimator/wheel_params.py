@@ -27,7 +27,7 @@ WHEEL_PARAMETERS: list[Parameter] = [
         "wheel_ctrl",
     ),
     Parameter(
-        "EKF2_WHL_NOISE", 0.03, 0.005, 1.0, "m/s", "noise of a wheel's speed", "guess: encoder steps", "wheel_noise"
+        "EKF2_WHL_NOISE", 0.05, 0.005, 1.0, "m/s", "noise of a wheel's speed", "guess: encoder steps", "wheel_noise"
     ),
     Parameter(
         "EKF2_WHL_SFE",
@@ -51,7 +51,7 @@ WHEEL_PARAMETERS: list[Parameter] = [
     ),
     Parameter(
         "EKF2_WHL_SIDE_N",
-        0.03,
+        0.05,
         0.005,
         1.0,
         "m/s",

@@ -44,6 +44,7 @@ _UP_FRACTION = wp.constant(0.03)  # and of the speed: bumps; guess
 _DOUBT_REJECTS = wp.constant(10)  # GNSS velocities in a row
 _DOUBT_S = wp.constant(5.0)
 _STARVED_S = wp.constant(20.0)  # a velocity that the IMU alone has carried on so long is worth no more; guess
+_STRUCK_S = wp.constant(0.5)  # the same after a blow, which an IMU does not measure well
 _SCALE_SPEED = wp.constant(0.7)  # [m/s] below which a scale is not learned
 _SCALE_FORCE = wp.constant(2.0)  # [m/s²] along the ground, above which slip would be taken for scale
 _SCALE_TURN = wp.constant(0.5)  # [rad/s]
@@ -275,6 +276,29 @@ def is_contradicted(ekf: Ekf, i: int, now_us: wp.int64) -> bool:
 
 
 @wp.func
+def give_way(ekf: Ekf, i: int, now_us: wp.int64, roll: Rolling, vel_frd: wp.vec3) -> None:
+    """Velocity becomes as uncertain as the wheels have long found it wrong, where nothing else measures it."""
+    if ekf.rows[i].manoeuvre_level > 1.0:
+        ekf.rows[i].odometer.struck_time_us = now_us
+    if ekf.rows[i].external_vel.is_active == 1:
+        return
+    if seconds_since(now_us, ekf.rows[i].gnss_vel.fused_time_us) < DEAD_RECKONING_AFTER_S:
+        return
+    patience_s = _STARVED_S
+    if seconds_since(now_us, ekf.rows[i].odometer.struck_time_us) < _STARVED_S:
+        patience_s = _STRUCK_S
+    error_frd = wp.vec3()
+    if seconds_since(now_us, ekf.rows[i].wheels.fused_time_us) > patience_s:
+        error_frd[0] = roll.speed - vel_frd[0]
+    if seconds_since(now_us, ekf.rows[i].wheel_side.fused_time_us) > patience_s:
+        error_frd[1] = roll.side - vel_frd[1]
+        error_frd[2] = roll.up - vel_frd[2]
+    if wp.length_sq(error_frd) > 0.0:
+        error_ned = wp.quat_rotate(ekf.rows[i].nominal.q_ned_from_frd, error_frd)
+        add_velocity_variance(ekf.covariance, i, error_ned)
+
+
+@wp.func
 def take_wheels(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyro_frd: wp.vec3) -> None:
     """Fuses the oldest waiting sample if the horizon has passed it."""
     sample = ekf.wheels_ring[i, ekf.rows[i].wheels_inbox.tail % WHEELS_RING]
@@ -297,11 +321,7 @@ def take_wheels(ekf: Ekf, i: int, params: EstimatorParams, now_us: wp.int64, gyr
     roll = rolling(params, ekf.rows[i].odometer, sample, omega_frd, force, vel_frd[0])
     if (params.wheel_ctrl & WHEEL_CTRL_SCALE) != 0:
         learn_scale(ekf, i, params, sample, roll, wp.abs(omega_frd[2]))
-    is_alone = seconds_since(now_us, ekf.rows[i].gnss_vel.fused_time_us) > DEAD_RECKONING_AFTER_S
-    is_starved = seconds_since(sample.time_us, ekf.rows[i].wheels.fused_time_us) > _STARVED_S
-    if is_alone and is_starved and ekf.rows[i].external_vel.is_active == 0:
-        nose_ned = wp.quat_rotate(nominal.q_ned_from_frd, wp.vec3(1.0, 0.0, 0.0))
-        add_velocity_variance(ekf.covariance, i, (roll.speed - vel_frd[0]) * nose_ned)
+    give_way(ekf, i, now_us, roll, vel_frd)
     if (params.wheel_ctrl & WHEEL_CTRL_SPEED) != 0:
         measured, std = wp.vec2(roll.speed, 0.0), wp.vec2(roll.std, 0.0)
         nominal, aid = fuse_axes(

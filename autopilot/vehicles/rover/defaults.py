@@ -18,7 +18,9 @@ def rover_defaults(airframe: RoverAirframe) -> dict[str, int | float]:
         "BAT1_V_CHARGED": battery.full_cell_v,
         "BAT1_V_EMPTY": battery.empty_cell_v,
         "EKF2_WHL_POS_X": 0.0 if airframe.is_skid else -airframe.wheels.rear_x_m,
-        "EKF2_WHL_TRACK": airframe.wheels.track_m,
+        "EKF2_WHL_TRACK": airframe.wheels.track_m * (_SKID_SLIP if airframe.is_skid else 1.0),
+        "EKF2_DRAG_CTRL": 0,  # what slopes and tyres do to the accelerometer is no wind
+        "EKF2_MIN_RNG": airframe.wheels.hub_z_m + airframe.wheels.radius_m,
         "EKF2_BCOEF_X": body.mass_kg / body.drag_area_x_m2,
         "EKF2_BCOEF_Y": body.mass_kg / body.drag_area_y_m2,
         "SYS_AUTOSTART": _AUTOSTART_SKID if airframe.is_skid else _AUTOSTART,

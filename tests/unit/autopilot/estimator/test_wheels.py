@@ -234,3 +234,12 @@ def test_rolling_wheels_end_rest_at_once() -> None:
     is_still = driven([flight])[0]["stillness"]["is_still"]
     assert is_still[7 * TICKS]
     assert not is_still[int(9.5 * TICKS) :].any()
+
+
+def test_what_a_blow_leaves_of_velocity_is_mended_by_the_wheels_without_gnss() -> None:
+    flight = varied(1, Drive(duration_s=60.0))
+    flight.samples["imu"]["accel_frd"][FAULT_AT : FAULT_AT + 12, :2] += (-35.0, 35.0)
+    outage(flight, FAULT_AT / TICKS - 2.0, 20.0)
+    found = errors(flight, driven([flight])[0])
+    assert np.linalg.norm(found.vel[FAULT_AT + 30, :2]) > 1.0
+    assert np.linalg.norm(found.vel[FAULT_AT + 3 * TICKS : FAULT_AT + 18 * TICKS, :2], axis=1).max() < 0.3
