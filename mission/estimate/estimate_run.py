@@ -15,6 +15,7 @@ from autopilot.estimator.ekf import make_ekf, reset_rows
 from autopilot.estimator.params import ESTIMATOR_PARAMETERS, estimator_params
 from autopilot.estimator.sensors import FUSED_SENSORS
 from autopilot.estimator.state import PHASE_RUNNING, EstimatorState
+from autopilot.estimator.wheel_params import WHEEL_PARAMETERS
 from autopilot.ports import Estimate, Samples
 from common.geomagnetic import field_ned_gauss
 from common.params import ParameterTable
@@ -99,7 +100,8 @@ def estimator_table(recording: Recording, given: Mapping[str, float]) -> Paramet
     Raises:
         ParameterError: there is none of a given name, or it cannot have that value.
     """
-    table = ParameterTable(ESTIMATOR_PARAMETERS)
+    has_wheels = len(recording.others.get("wheels", ())) > 0
+    table = ParameterTable([*ESTIMATOR_PARAMETERS, *(WHEEL_PARAMETERS if has_wheels else ())])
     for name, value in (recording.parameters if recording.is_own else REAL_SENSORS).items():
         if name in table:
             table.set(name, value)
