@@ -158,7 +158,9 @@ def judge(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: Driv
     time_s = float(buffers.steps[i] + 1) * rules.decision_s
     room_m = room_round(world_now(rig, i), truth)
     outcome = drive_outcome(params, truth, distance_m, turn_rad, left_m, state.start_left_m[i], time_s)
-    reward = drive_reward(params, state.left_m[i] - left_m, room_m, outcome, action, last_action)
+    speed_m_s = wp.length(truth.vel_ned)
+    progress_m = state.left_m[i] - left_m
+    reward = drive_reward(params, progress_m, speed_m_s, room_m, outcome, action, last_action)
     state.left_m[i] = left_m
     state.measures[i, 0] = distance_m
     state.measures[i, 1] = turn_rad

@@ -28,6 +28,7 @@ class DriveParams:
     progress_reward: float
     arrive_reward: float
     time_cost: float
+    idle_cost: float
     clearance_m: float
     clearance_cost: float
     jerk_cost: float
@@ -53,6 +54,7 @@ DRIVE_PARAMS = (
     TaskParam("progress_reward", 2.0, 0.0, 100.0, "1/m", "for each metre of way that is left less", "tuned"),
     TaskParam("arrive_reward", 20.0, 0.0, 1000.0, "1", "for standing at the goal", "tuned"),
     TaskParam("time_cost", 0.03, 0.0, 10.0, "1", "per decision", "tuned"),
+    TaskParam("idle_cost", 0.05, 0.0, 10.0, "1", "per decision of standing elsewhere", "tuned"),
     TaskParam("clearance_m", 0.15, 0.0, 1.0, "m", "room round the hull below which there is a cost", "tuned"),
     TaskParam("clearance_cost", 0.1, 0.0, 10.0, "1", "per decision for no room at all", "tuned"),
     TaskParam("jerk_cost", 0.002, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),

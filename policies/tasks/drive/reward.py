@@ -13,6 +13,7 @@ from sim.truth import Truth
 wp.set_module_options({"enable_backward": False})
 
 _TIPPED = wp.constant(0.5)  # cosine of the tilt: 60 deg
+_IDLE_M_S = wp.constant(0.1)
 _STRAYED_M = wp.constant(10.0)  # more way to go than at first
 
 
@@ -37,13 +38,21 @@ def drive_outcome(
 
 @wp.func
 def drive_reward(
-    p: DriveParams, progress_m: float, room_m: float, outcome: int, action: wp.vec2, last_action: wp.vec2
+    p: DriveParams,
+    progress_m: float,
+    speed_m_s: float,
+    room_m: float,
+    outcome: int,
+    action: wp.vec2,
+    last_action: wp.vec2,
 ) -> float:
-    """Of one decision that made the way shorter by `progress_m` and left `room_m` round the hull."""
+    """Of one decision that made the way shorter by `progress_m` and left `room_m` round the hull, at a speed."""
     change = action - last_action
     tight = wp.clamp(1.0 - room_m / wp.max(p.clearance_m, 1.0e-3), 0.0, 1.0)
     reward = p.progress_reward * progress_m - p.time_cost
     reward -= p.clearance_cost * tight * tight + p.jerk_cost * wp.dot(change, change)
+    if speed_m_s < _IDLE_M_S and outcome != SUCCESS:
+        reward -= p.idle_cost  # or a greedy policy waits for ever where it does not know what to do
     if outcome == SUCCESS:
         reward += p.arrive_reward
     elif outcome != RUNNING and outcome != TIMEOUT:
