@@ -8,10 +8,10 @@ from scipy.optimize import brentq, linprog
 from scipy.spatial.transform import Rotation
 
 from autopilot.control.profile import AxisLimits, distance_via, ramp_distance, ramp_to, step_to_position
-from autopilot.tuning import Cascade, default_gains, motor_time_s
 from autopilot.vehicles.multirotor.allocation import command_for_speed, speed_fraction
 from autopilot.vehicles.multirotor.attitude import attitude_error
 from autopilot.vehicles.multirotor.control_airframe import control_airframe, effectiveness
+from autopilot.vehicles.multirotor.tuning import Cascade, default_gains, motor_time_s
 from common.airframe import load_airframe
 from tests.unit.autopilot.vehicles.multirotor.mixer import mix
 from tests.unit.autopilot.vehicles.multirotor.rig import Rig
@@ -116,7 +116,7 @@ def test_closed_loop_answers_a_small_step_as_the_linear_design_does() -> None:
     rig.run(0.4)
     rig.set(kind=3, omega_frd=(0.05, 0.0, 0.0), thrust=rig.hover_share)
     flown = rig.run(0.4)[0]["omega_frd"][0, :, 0] / 0.05
-    closed = Cascade(airframe, default_gains()).closed_rate("tilt")
+    closed = Cascade(airframe, default_gains()).rate("tilt")[1]
     time_s = np.arange(100) * 0.004
     model = control.step_response(closed, time_s).outputs
     assert np.abs(flown - model).max() < 0.15  # delay and lag of the rig differ by half a tick and rise from fall

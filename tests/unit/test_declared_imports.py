@@ -18,7 +18,10 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 # Where an extra may be imported; everywhere else is what a plain install has.
 PLACES = {
     "viewer": ("mission/view",),
-    "tune": ("autopilot/tuning.py", "autopilot/estimator/derive.py"),
+    "tune": (
+        *("autopilot/control/margins.py", "autopilot/estimator/derive.py"),
+        *("autopilot/vehicles/multirotor/tuning.py", "autopilot/vehicles/rover/tuning.py"),
+    ),
     "gym": ("policies/__init__.py", "policies/tasks"),
     "learn": (
         *("policies/companion", "policies/experts", "policies/learn", "policies/tracker.py"),

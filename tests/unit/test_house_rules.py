@@ -26,7 +26,7 @@ ROTOR_WORDS = re.compile(r"(?i:rotor|collective|hover_thrust)|\b(MC|MPC|LNDMC|NA
 ROTOR_FOLDERS = ("autopilot/vehicles/multirotor/", "sim/bodies/", "common/airframes/")
 SPEAK_OF_ROTORS = {
     "common/airframe.py": "names the class of airframe files that name none",
-    "autopilot/tuning.py": "designs the gains of the multirotor's law, and of no other",
+    "autopilot/tuning.py": "names the classes whose gains are designed",
     "autopilot/vehicles/default_class.py": "names the class of airframe files that name none",
     "mission/plan/plan_file.py": "MAVLink's name of a vehicle type, in QGroundControl's files",
     "mission/view/shapes.py": "the shape of a multirotor",

@@ -59,7 +59,7 @@ ROVER_PARAMETERS: list[Parameter] = [
     Parameter("RO_JERK_LIM", 20.0, -1.0, 1000.0, "m/s^3", "change of acceleration; 0 or less: any", "guess",
               "jerk_limit"),
     Parameter("RO_SPEED_P", 2.0, 0.0, 20.0, "", "speed error to speed asked of the motor", _TUNED, "speed_p"),
-    Parameter("RO_SPEED_I", 3.0, 0.0, 20.0, "1/s", "its integral", _TUNED, "speed_i"),
+    Parameter("RO_SPEED_I", 3.1, 0.0, 20.0, "1/s", "its integral", _TUNED, "speed_i"),
     Parameter("RO_SPEED_TH", 0.1, 0.0, 2.0, "m/s", "slower than this counts as standing", _PX4, "stop_speed"),
     Parameter("RO_SPEED_RED", 1.0, -1.0, 1.0, "",
               "part of the speed that is taken off at a course error of half a turn, and less for less; negative: none",
@@ -87,7 +87,7 @@ ROVER_PARAMETERS: list[Parameter] = [
     Parameter("HG_RO_OFFB_BODY", 0, 0, 1, "",
               "Offboard: 0 as PX4, a velocity is a course and a speed forward; 1: along the nose, backwards too, and "
               "yaw and yaw rate are followed", _PX4),
-    Parameter("PP_LOOKAHD_GAIN", 0.7, 0.1, 100.0, "s", "look-ahead over speed", _TUNED, "lookahead_s"),
+    Parameter("PP_LOOKAHD_GAIN", 0.7, 0.1, 100.0, "s", "look-ahead over speed", "guess", "lookahead_s"),
     Parameter("PP_LOOKAHD_MIN", 0.8, 0.1, 100.0, "m", "least look-ahead", "guess", "lookahead_min"),
     Parameter("PP_LOOKAHD_MAX", 10.0, 0.1, 100.0, "m", "greatest look-ahead", _PX4, "lookahead_max"),
     Parameter("RA_WHEEL_BASE", 0.5, 0.0, 100.0, "m", "front to rear axle", _AIRFRAME, "wheel_base"),

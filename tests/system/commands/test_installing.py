@@ -15,7 +15,8 @@ PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 # Where what an extra brings is imported, when its commands are run.
 OF_EXTRAS = (
     *("policies.", "mission.view.", "mission.train.", "mission.follow."),
-    *("autopilot.tuning", "autopilot.estimator.derive"),
+    *("autopilot.tuning", "autopilot.control.margins", "autopilot.estimator.derive"),
+    *("autopilot.vehicles.multirotor.tuning", "autopilot.vehicles.rover.tuning"),
 )
 IMPORT_ALL = """
 import importlib, pkgutil
