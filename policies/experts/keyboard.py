@@ -37,6 +37,7 @@ _AXES = {
     "brake": _Axis(Control.BRAKE, None),
     "force_x": _Axis(Control.RIGHT, Control.LEFT),
     "force_z": _Axis(Control.FORWARD, Control.BACK),
+    "speed_sp": _Axis(Control.FORWARD, Control.BACK),
     "forward_sp": _Axis(Control.FORWARD, Control.BACK),
     "right_sp": _Axis(None, None),
     "down_sp": _Axis(None, Control.BRAKE),  # a drone climbs while the key is held that a car brakes with

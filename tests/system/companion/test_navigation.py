@@ -63,7 +63,7 @@ def test_a_goto_is_flown_through_the_forest_over_udp(scene):
     goal_ned = place(flight, 30.0, 10.0)
     flight.rig.forget_impacts()
     send_goto(flight, goal_ned, AUTOPILOT)
-    scene.wait_for(lambda: heard.mode is Mode.OFFBOARD, 5.0)
-    scene.wait_for(lambda: scene.has_said("hold: goto reached") and heard.mode is Mode.HOLD, 20.0)
+    scene.wait_for(lambda: heard.mode is Mode.OFFBOARD, 30.0)
+    scene.wait_for(lambda: scene.has_said("hold: goto reached") and heard.mode is Mode.HOLD, 60.0)
     assert miss_m(flight, goal_ned) < 4.5
     assert float(flight.rig.rows["truth"][0]["impact_speed"]) == 0.0
