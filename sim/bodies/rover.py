@@ -2,7 +2,9 @@
 
 In: commands (steering or left side, throttle or right side, brake), the wind, the world. Out: true motion, what an
 ideal IMU would measure, wheel speeds, battery. `rover_tick` is one 4 ms tick of four substeps.
-Left out: unsprung masses, momentum of the wheels, camber, roll steer, roughness of the ground below its grid.
+The ground is as high below each hub as it is, and as steep as those four points say together, so that a crest pushes
+both axles half each. Left out: unsprung masses, momentum of the wheels, camber, roll steer, roughness of the ground
+below its grid, wheels on top of kerbs and other boxes (the hull stops at them).
 """
 
 import warp as wp
@@ -27,6 +29,8 @@ _SUBSTEP_S = wp.constant(TICK_S / SUBSTEPS)
 _SUBSTEP_COUNT = wp.constant(SUBSTEPS)
 _TICK_S = wp.constant(TICK_S)
 _WHEELS = wp.constant(4)
+_ON_WHEELS = wp.constant(0.5)  # cosine of the tilt above which the ground under the wheels makes a plane
+_NO_MOTOR_N_S_M = wp.constant(1.0e-3)
 _UPRIGHT = wp.constant(0.17)  # cosine of the tilt below which it lies on its side, or its roof: 80 deg
 
 
@@ -67,9 +71,17 @@ class DriveInputs:
     brake_nm: wp.vec2  # of each front and each rear wheel
     ground_m: wp.vec4  # [m] height of the ground below each hub
     normal_ned: wp.vec3  # of the ground, pointing up
+    ground_offset_m: float  # of the ground's plane along it
     wind_ned: wp.vec3  # [m/s]
     density_ratio: float
     is_near_obstacle: int
+
+
+@wp.func
+def ground_below(model: RoverModel, world: World, pos_ned: wp.vec3, rot: wp.mat33, wheel: int) -> wp.vec3:
+    """The ground below a hub, ned [m]."""
+    hub_ned = pos_ned + rot * wp.vec3(model.hub_x[wheel], model.hub_y[wheel], model.hub_z)
+    return wp.vec3(hub_ned[0], hub_ned[1], -ground_height(world, hub_ned[0], hub_ned[1]))
 
 
 @wp.func
@@ -77,10 +89,18 @@ def drive_inputs(model: RoverModel, body: RoverState, command: vec8, wind_ned: w
     """All that stays the same over the substeps of a tick."""
     inputs = DriveInputs()
     rot = wp.quat_to_matrix(body.q_ned_from_frd)
-    inputs.normal_ned = ground_normal_ned(world, body.pos_ned[0], body.pos_ned[1])
-    for k in range(_WHEELS):
-        hub_ned = body.pos_ned + rot * wp.vec3(model.hub_x[k], model.hub_y[k], model.hub_z)
-        inputs.ground_m[k] = ground_height(world, hub_ned[0], hub_ned[1])
+    front_left = ground_below(model, world, body.pos_ned, rot, 0)
+    front_right = ground_below(model, world, body.pos_ned, rot, 1)
+    rear_left = ground_below(model, world, body.pos_ned, rot, 2)
+    rear_right = ground_below(model, world, body.pos_ned, rot, 3)
+    inputs.ground_m = -wp.vec4(front_left[2], front_right[2], rear_left[2], rear_right[2])
+    middle = 0.25 * (front_left + front_right + rear_left + rear_right)
+    if rot[2, 2] > _ON_WHEELS:
+        inputs.normal_ned = wp.normalize(wp.cross(front_right - rear_left, front_left - rear_right))
+    else:
+        middle = wp.vec3(body.pos_ned[0], body.pos_ned[1], -ground_height(world, body.pos_ned[0], body.pos_ned[1]))
+        inputs.normal_ned = ground_normal_ned(world, body.pos_ned[0], body.pos_ned[1])
+    inputs.ground_offset_m = wp.dot(inputs.normal_ned, middle)
     inputs.left_frd = steered_frd(model, body.steering_rad, -model.half_track_m)
     inputs.right_frd = steered_frd(model, body.steering_rad, model.half_track_m)
     inputs.wind_ned = wind_ned
@@ -184,11 +204,13 @@ def _substep(model: RoverModel, body: RoverState, inputs: DriveInputs, hull: Hul
 
 
 @wp.func
-def drain_battery(model: RoverModel, body: RoverState, inputs: DriveInputs, dt: float) -> RoverState:
-    """Voltage, current and charge after dt [s]: a motor takes its force times the speed it was asked for."""
+def drain_battery(model: RoverModel, body: RoverState, dt: float) -> RoverState:
+    """Voltage, current and charge after dt [s]: a motor takes what moves the tread, and the heat of its current."""
     power_w = model.battery.avionics_w
     for k in range(_WHEELS):
-        power_w += wp.max(body.drive_n[k] * inputs.side_speed_m_s[k % 2], 0.0) / model.battery.motor_efficiency
+        heating_m_s = body.drive_n[k] / wp.max(model.is_driven[k] * model.motor_n_s_m, _NO_MOTOR_N_S_M)
+        taken_w = body.drive_n[k] * (model.radius_m * body.wheel_speed[k] + heating_m_s)
+        power_w += wp.max(taken_w, 0.0) / model.battery.motor_efficiency
     open_v = open_circuit_voltage(model.battery, body.battery_charge_c)
     body.battery_current_a = battery_current(model.battery, open_v, power_w)
     body.battery_voltage_v = open_v - model.battery.resistance_ohm * body.battery_current_a
@@ -222,7 +244,10 @@ def rover_tick(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.
         if body.is_crashed == 0:
             body.steering_rad = servo_step(model, body.steering_rad, asked)
     inputs = drive_inputs(model, body, command, wind_ned, world)
-    hull = look_at_hull(model, world, body.pos_ned, body.q_ned_from_frd, inputs.normal_ned, inputs.is_near_obstacle)
+    hull = look_at_hull(
+        model, world, body.pos_ned, body.q_ned_from_frd, inputs.normal_ned, inputs.ground_offset_m,
+        inputs.is_near_obstacle,
+    )  # fmt: skip
     body.height_agl_m = hull.height_agl_m
     body.is_on_ground = 0
     accel_sum = wp.vec3()
@@ -238,7 +263,7 @@ def rover_tick(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.
     up = wp.quat_rotate(body.q_ned_from_frd, wp.vec3(0.0, 0.0, -1.0))
     if wp.dot(up, inputs.normal_ned) < _UPRIGHT:
         body.is_crashed = 1
-    return drain_battery(model, body, inputs, TICK_S)
+    return drain_battery(model, body, TICK_S)
 
 
 @wp.func

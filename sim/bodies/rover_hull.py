@@ -2,7 +2,8 @@
 
 In: pose and motion, each 1 ms. Out: force and torque. The surroundings are looked up once a tick and treated as planes
 for its four substeps: one for the ground, and one for each point of the outline that is near an obstacle. The outline
-is ten balls round the box at the height of the hubs, so that corners, sides and ends are stopped and turned.
+is ten balls round the box at the height of the hubs, so that corners, sides and ends are stopped and turned: a small
+one at each corner, and six between that slide along their side to where the obstacle is nearest, each tick anew.
 """
 
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -22,8 +23,8 @@ _GROUND_MARGIN_M = wp.constant(0.05)  # lower within a tick than this it does no
 _MARGIN_M = wp.constant(0.2)  # an obstacle nearer than this is found before the substeps reach it
 _FRICTION = wp.constant(0.4)  # guess: plastic on bark, steel on stone
 _STICKING_M_S = wp.constant(0.05)  # speed below which friction falls to nothing
-_BALL = wp.constant(0.25)  # radius of a ball over the half width
-_THIRD = wp.constant(1.0 / 3.0)
+_CORNER_BALL = wp.constant(0.25)  # radius over the half width: how round a corner is
+_SIDE_BALL = wp.constant(0.5)  # as deep may a blow go before its obstacle is taken to be on the other side
 
 
 @wp.struct
@@ -40,6 +41,7 @@ class HullContact:
     normal_y: Vec10
     normal_z: Vec10
     offset_m: Vec10  # of each plane along its normal: a ball's centre below it touches
+    slid_m: Vec10  # of each ball along its side, from where `outline_frd` has it
 
 
 @wp.struct
@@ -52,9 +54,21 @@ class HullForce:
 
 
 @wp.func
+def is_corner(point: int) -> bool:
+    """Whether a ball of the outline is at a corner, where it stays."""
+    return point < 6 and point % 3 != 1
+
+
+@wp.func
+def ball_radius(model: RoverModel, point: int) -> float:
+    """Of a ball of the outline [m]."""
+    return model.hull_half_width_m * wp.where(is_corner(point), _CORNER_BALL, _SIDE_BALL)
+
+
+@wp.func
 def outline_frd(model: RoverModel, point: int) -> wp.vec3:
-    """The centre of a ball [m]: three at the front, three at the rear, two on either side between."""
-    ball_m = _BALL * model.hull_half_width_m
+    """The centre of a ball [m] before it slides: three at the front, three at the rear, two on either side between."""
+    ball_m = ball_radius(model, point)
     half = model.hull_half_width_m - ball_m
     front = model.hull_front_m - ball_m
     rear = ball_m - model.hull_rear_m
@@ -62,12 +76,25 @@ def outline_frd(model: RoverModel, point: int) -> wp.vec3:
         return wp.vec3(front, half * float(point - 1), model.hub_z)
     if point < 6:
         return wp.vec3(rear, half * float(point - 4), model.hub_z)
-    x = rear + (front - rear) * _THIRD
-    if point % 2 == 1:
-        x = rear + (front - rear) * 2.0 * _THIRD
-    if point < 8:
-        return wp.vec3(x, half, model.hub_z)
-    return wp.vec3(x, -half, model.hub_z)
+    x = rear + (front - rear) * wp.where(point % 2 == 1, 0.75, 0.25)
+    return wp.vec3(x, wp.where(point < 8, half, -half), model.hub_z)
+
+
+@wp.func
+def slide_frd(point: int) -> wp.vec3:
+    """The direction of the side along which a ball slides."""
+    return wp.where(point < 6, wp.vec3(0.0, 1.0, 0.0), wp.vec3(1.0, 0.0, 0.0))
+
+
+@wp.func
+def most_slide(model: RoverModel, point: int) -> float:
+    """How far a ball slides to either way at most [m]: over half of its side, or over all of the front or rear."""
+    if is_corner(point):
+        return 0.0
+    ball_m = ball_radius(model, point)
+    if point < 6:
+        return model.hull_half_width_m - ball_m
+    return 0.25 * (model.hull_front_m + model.hull_rear_m) - 0.5 * ball_m
 
 
 @wp.func
@@ -81,28 +108,44 @@ def is_near_obstacle(model: RoverModel, world: World, pos_ned: wp.vec3) -> int:
 
 @wp.func
 def look_at_hull(
-    model: RoverModel, world: World, pos_ned: wp.vec3, q_ned_from_frd: wp.quat, normal_ned: wp.vec3, is_near: int
+    model: RoverModel,
+    world: World,
+    pos_ned: wp.vec3,
+    q_ned_from_frd: wp.quat,
+    normal_ned: wp.vec3,
+    ground_offset_m: float,
+    is_near: int,
 ) -> HullContact:
-    """Ground plane, and the nearest obstacle of each point of the outline."""
+    """The ground's plane (its normal and its offset along it), and the nearest obstacle of each point of the outline.
+
+    `is_near`: an obstacle may be touched.
+    """
     hull = HullContact()
     ground_m = ground_height(world, pos_ned[0], pos_ned[1])
     hull.height_agl_m = -pos_ned[2] - ground_m
     hull.normal_ned = normal_ned
-    hull.ground_offset_m = wp.dot(normal_ned, wp.vec3(pos_ned[0], pos_ned[1], -ground_m))
+    hull.ground_offset_m = ground_offset_m
     hull.is_near_obstacle = is_near
     up_frd = wp.quat_rotate_inv(q_ned_from_frd, normal_ned)
     low_m = wp.abs(up_frd[0]) * wp.max(model.hull_front_m, model.hull_rear_m)
     low_m += wp.abs(up_frd[1]) * model.hull_half_width_m
     low_m += wp.where(up_frd[2] < 0.0, -up_frd[2] * model.hull_bottom_m, up_frd[2] * model.hull_top_m)
     hull.is_near_ground = 0
-    if hull.height_agl_m < low_m + _GROUND_MARGIN_M:
+    if wp.dot(normal_ned, pos_ned) - ground_offset_m < low_m + _GROUND_MARGIN_M:
         hull.is_near_ground = 1
     hull.is_near = wp.max(hull.is_near_ground, is_near)
     if is_near == 1:
-        ball_m = _BALL * model.hull_half_width_m
         for point in range(int(_POINTS)):
             centre_ned = pos_ned + wp.quat_rotate(q_ned_from_frd, outline_frd(model, point))
-            touch = obstacle_contact(world, centre_ned, ball_m + _MARGIN_M)
+            most_m = most_slide(model, point)
+            seen_m = ball_radius(model, point) + _MARGIN_M
+            touch = obstacle_contact(world, centre_ned, seen_m + most_m)
+            if touch[3] > 0.0 and most_m > 0.0:
+                to_obstacle_ned = (touch[3] - seen_m - most_m) * wp.vec3(touch[0], touch[1], touch[2])
+                along_ned = wp.quat_rotate(q_ned_from_frd, slide_frd(point))
+                hull.slid_m[point] = wp.clamp(wp.dot(along_ned, to_obstacle_ned), -most_m, most_m)
+                centre_ned += hull.slid_m[point] * along_ned
+                touch = obstacle_contact(world, centre_ned, seen_m)
             normal = wp.vec3(touch[0], touch[1], touch[2])
             hull.normal_x[point] = normal[0]
             hull.normal_y[point] = normal[1]
@@ -153,13 +196,13 @@ def hull_contact(
             if depth_m > 0.0:
                 total = add_point(model, total, depth_m, arm_frd, normal_frd, vel_frd, omega_frd)
     if hull.is_near_obstacle == 1:
-        ball_m = _BALL * model.hull_half_width_m
         for point in range(int(_POINTS)):
             normal_ned = wp.vec3(hull.normal_x[point], hull.normal_y[point], hull.normal_z[point])
-            arm_frd = outline_frd(model, point)
+            arm_frd = outline_frd(model, point) + hull.slid_m[point] * slide_frd(point)
             centre_ned = pos_ned + rot * arm_frd
             depth_m = hull.offset_m[point] - wp.dot(normal_ned, centre_ned)
             if depth_m > 0.0 and wp.length_sq(normal_ned) > 0.5:
                 normal_frd = to_frd * normal_ned
-                total = add_point(model, total, depth_m, arm_frd - ball_m * normal_frd, normal_frd, vel_frd, omega_frd)
+                arm_frd -= ball_radius(model, point) * normal_frd
+                total = add_point(model, total, depth_m, arm_frd, normal_frd, vel_frd, omega_frd)
     return total

@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 
+from autopilot.ports import SETPOINT_DRIVE
 from common.airframe import AIRFRAME_FOLDER, AirframeError, load_airframe
-from common.geodesy import GRAVITY_M_S2
+from common.geodesy import DEFAULT_HOME, GRAVITY_M_S2
 from sim.bodies.rover_model import rover_model
+from sim.bodies.vehicles import class_of
+from sim.rig import Rig
+from sim.sensors.sensors import sensor_model
+from sim.wind import wind_model
 from sim.world.world import WorldConfig, build_world
-from tests.unit.sim.rover_fleet import RoverFleet, nose_ned, up_ned
+from tests.unit.sim.rover_fleet import FLAT, RoverFleet, nose_ned, up_ned
+from tests.unit.sim.test_rig import same_bits
 
 STAND, ROLL = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 ROVER, SKID = load_airframe("rover"), load_airframe("rover-skid")
@@ -68,6 +74,41 @@ def test_full_throttle_reaches_the_motors_speed_and_reverse_the_same_backwards()
     ahead, back = fleet.speeds()
     assert 0.95 * ROVER.drive.max_speed_m_s < ahead <= ROVER.drive.max_speed_m_s
     assert back == pytest.approx(-ahead, rel=0.01)
+
+
+def test_its_motor_gives_it_the_acceleration_of_its_current_limit():
+    fleet = RoverFleet([(0.0, 0.0)])
+    fleet.drive(1.0, STAND)
+    fleet.drive(0.2, (0.0, 1.0, 0.0))  # the force builds up
+    before = fleet.speeds()[0]
+    fleet.drive(0.3, (0.0, 1.0, 0.0))
+    body, wheels = ROVER.body, ROVER.wheels
+    force = ROVER.drive.max_force_n - wheels.rolling_resistance * body.mass_kg * GRAVITY_M_S2
+    expected = force / (body.mass_kg + 4 * wheels.inertia_kg_m2 / wheels.radius_m**2)
+    assert (fleet.speeds()[0] - before) / 0.3 == pytest.approx(expected, rel=0.02)
+
+
+def test_a_fast_bend_is_wider_than_the_wheels_point_and_the_wider_the_faster():
+    fleet = RoverFleet([(0.0, 30.0 * k) for k in range(4)])
+    throttle = np.array([0.1, 0.35, 0.6, 0.7])
+    fleet.drive(4.0, np.column_stack([np.zeros(4), throttle, np.zeros(4)]))
+    state = fleet.drive(4.0, np.column_stack([np.full(4, 0.25), throttle, np.zeros(4)]))
+    curvature = np.tan(0.25 * ROVER.steering.max_angle_rad) / ROVER.wheel_base_m
+    followed = state["omega_frd"][:, 2] / (fleet.speeds() * curvature)
+    assert followed[0] == pytest.approx(1.0, abs=0.01)
+    assert np.all(np.diff(followed) < -0.004)
+    assert followed[-1] < 0.95
+
+
+def test_what_brakes_is_missing_for_turning():
+    low = model_of(hub_z=0.0, standing_m=0.09, brake_max_n=(400.0, 400.0))  # locks, and slides rather than tips
+    fleet = RoverFleet([(0.0, 0.0), (0.0, 30.0)], low)
+    fleet.drive(4.0, (0.0, 0.8, 0.0))
+    fleet.drive(0.1, [(0.3, 0.8, 0.0), (0.3, 0.0, 1.0)])
+    for _ in range(10):
+        accel = fleet.drive(0.05, [(0.3, 0.8, 0.0), (0.3, 0.0, 1.0)])["accel_frd"]
+        assert np.hypot(accel[1, 0], accel[1, 1]) < 1.05 * ROVER.tyres.friction * GRAVITY_M_S2
+        assert abs(accel[1, 1]) < 0.6 * abs(accel[0, 1])
 
 
 def test_slow_circles_have_the_radius_of_ackermann():
@@ -158,6 +199,52 @@ def test_without_brake_it_rolls_down(hills):
     assert (fleet.speeds()[0] - before) / 0.3 == pytest.approx(expected, rel=0.1)
 
 
+def test_rolling_over_crests_it_gains_no_energy_to_speak_of(hills):
+    """Steps of slope of up to 39 degrees, at which no side of the hull may be taken to be below ground."""
+    fleet = RoverFleet([(0.0, 0.0), (8.0, -9.0), (-7.0, 12.0)], free_rolling(), world=hills, yaws=[0.0, 1.0, 2.5])
+    inertia = (ROVER.body.inertia_xx_kg_m2, ROVER.body.inertia_yy_kg_m2, ROVER.body.inertia_zz_kg_m2)
+    fleet.drive(1.0, STAND)
+    pushed(fleet, 3.0)
+    fleet.drive(0.5, ROLL)  # the wheels settle
+    least = np.full(3, np.inf)
+    for _ in range(100):
+        state = fleet.drive(0.1, ROLL)
+        moving = 0.5 * ROVER.body.mass_kg * np.sum(state["vel_ned"] ** 2, axis=1)
+        turning = 0.5 * state["omega_frd"] ** 2 @ inertia
+        turning += 0.5 * ROVER.wheels.inertia_kg_m2 * np.sum(state["wheel_speed"] ** 2, axis=1)
+        energy = moving + turning - ROVER.body.mass_kg * GRAVITY_M_S2 * state["pos_ned"][:, 2]
+        assert np.all(energy < least + 3.0)  # J of 45 and more; the springs store some of it for a while
+        least = np.minimum(least, energy)
+
+
+def test_one_alone_drives_as_it_does_among_others_to_the_bit(hills):
+    places = [(0.0, 0.0), (8.0, -9.0), (-7.0, 12.0)]
+    commands = [(0.3, 0.4, 0.0), (-0.8, -0.3, 0.0), (0.0, 0.9, 0.2)]
+    together = RoverFleet(places, world=hills).drive(3.0, commands)
+    for row, (place, command) in enumerate(zip(places, commands, strict=True)):
+        assert RoverFleet([place], world=hills).drive(3.0, command)[0].tobytes() == together[row].tobytes()
+
+
+@pytest.mark.parametrize("name", ["rover", "rover-skid"])
+def test_threads_do_not_change_a_bit(name):
+    snapshots = []
+    for threads in (1, 2):
+        airframe = load_airframe(name)
+        vehicle, body = class_of(airframe)
+        rig = Rig(
+            airframe, build_world(FLAT), sensor_model(), wind_model(4.0), home=DEFAULT_HOME, vehicle_count=5,
+            threads=threads, body=body, law=vehicle.law,
+        )  # fmt: skip
+        rig.advance(750)  # the estimator aligns
+        setpoint = rig.rows["autopilot.setpoint"]
+        for field, value in {"kind": SETPOINT_DRIVE, "is_armed": 1, "speed": 2.0, "yaw_rate": 0.5}.items():
+            setpoint[field] = value
+        rig.advance(750)
+        assert np.all(np.linalg.norm(rig.rows["truth"]["vel_ned"], axis=1) > 0.5)
+        snapshots.append(rig.snapshot())
+    assert same_bits(*snapshots)
+
+
 def test_a_skid_steer_rover_turns_on_the_spot():
     fleet = RoverFleet([(0.0, 0.0)], rover_model(SKID, 0.0))
     state = fleet.drive(6.0, (0.3, -0.3, 0.0))
@@ -211,6 +298,18 @@ def test_the_battery_drains_faster_at_work():
     state = fleet.drive(10.0, [STAND, (0.0, 1.0, 0.0)])
     assert state["battery_charge_c"][1] < state["battery_charge_c"][0]
     assert state["battery_current_a"][1] > state["battery_current_a"][0]
+
+
+def test_a_limited_current_takes_no_more_power_than_the_motor_turns_into_force_and_heat():
+    fleet = RoverFleet([(0.0, 0.0)])
+    fleet.drive(1.0, STAND)
+    for _ in range(10):
+        state = fleet.drive(0.1, (0.0, 1.0, 0.0))[0]
+        force = float(state["drive_n"].sum())
+        heat_w = force**2 / (ROVER.drive.stall_force_n / ROVER.drive.max_speed_m_s)
+        motor_w = (force * float(np.mean(state["tread_m_s"])) + heat_w) / ROVER.battery.motor_efficiency
+        drawn_w = float(state["battery_voltage_v"] * state["battery_current_a"]) - ROVER.battery.avionics_w
+        assert drawn_w == pytest.approx(motor_w, rel=0.03)
 
 
 @pytest.mark.parametrize(
