@@ -24,6 +24,10 @@ def _rates_true(batch: Batch) -> Columns:
     return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "xyz": batch.truth["omega_frd"]}
 
 
+def _steering_true(batch: Batch) -> Columns:
+    return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "angle": batch.truth["steering_rad"]}
+
+
 REFERENCE_FIELDS = {"ref_lat": "double", "ref_lon": "double", "ref_alt": "float"}
 LOCAL_POSITION_FIELDS = {
     "timestamp_sample": "uint64_t",
@@ -100,6 +104,9 @@ def _global_position(batch: Batch) -> Columns:
     }
 
 
+STEERING_TOPIC = Topic(
+    "steering_groundtruth", {**SAMPLED, "angle": "float"}, _steering_true, parameter="RA_MAX_STR_ANG"
+)
 MOTION_TOPICS = (
     Topic("vehicle_attitude", {**SAMPLED, "q": "float[4]"}, _attitude),
     Topic("vehicle_attitude_groundtruth", {**SAMPLED, "q": "float[4]"}, _attitude_true),
@@ -118,4 +125,5 @@ MOTION_TOPICS = (
         },
         _global_position,
     ),
+    STEERING_TOPIC,
 )

@@ -10,15 +10,18 @@ from math import atan2, radians
 import numpy as np
 from numpy.typing import NDArray
 
+from common.airframe import load_airframe
 from common.attitude import Quat, product, quat_of
 from common.kernels import FRAME_US
 from mission.log.euler_angles import yaw_rad
+from mission.view import shapes
 from mission.view.replay_file import Recording
 from sim.world.world import WorldMap
 
 STRIDE = 2  # frames of the flight per image
 IMAGE_S = STRIDE * FRAME_US * 1e-6
 BEHIND_M, ABOVE_M = 3.6, 1.6  # of the vehicle
+BEHIND_CAR_M, ABOVE_CAR_M = 2.2, 0.9
 BESIDE_RAD = radians(40.0)  # round the vehicle, from behind it to the right, where somebody is followed
 NEAREST_M = 1.2
 ROOM_M = 0.4  # between the camera and a crown
@@ -32,6 +35,8 @@ Floats = NDArray[np.float64]
 def camera_path(recording: Recording, world: WorldMap) -> tuple[Floats, Floats]:
     """Where the camera is and where it looks at each moment [m], both (moments, 3); a moment each IMAGE_S."""
     rows, sigma = recording.rows, SMOOTH_S / IMAGE_S
+    drives = shapes.vehicle(load_airframe(recording.config.airframe)).drives
+    behind_m, above_m = (BEHIND_CAR_M, ABOVE_CAR_M) if drives else (BEHIND_M, ABOVE_M)
     pos = rows["pos_ned"].astype(np.float64)
     has_owner = rows["owner"]["stature_m"] > 0.0
     towards = np.where(has_owner[:, None], rows["owner"]["pos_ned"] - rows["pos_ned"], 0.0)[:, :2].astype(np.float64)
@@ -43,9 +48,9 @@ def camera_path(recording: Recording, world: WorldMap) -> tuple[Floats, Floats]:
     middle = averaged(pos, sigma)
     beside_rad = averaged(np.where(has_owner, BESIDE_RAD, 0.0)[:, None], sigma)
     right = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-    level = BEHIND_M * (np.sin(beside_rad) * right - np.cos(beside_rad) * ahead)
-    back = np.column_stack([level, np.full(len(rows), -ABOVE_M)])
-    length = float(np.hypot(BEHIND_M, ABOVE_M))
+    level = behind_m * (np.sin(beside_rad) * right - np.cos(beside_rad) * ahead)
+    back = np.column_stack([level, np.full(len(rows), -above_m)])
+    length = float(np.hypot(behind_m, above_m))
     free = np.array([world.ray_hit(m, b / length, length + ROOM_M) for m, b in zip(middle, back, strict=True)])
     room = np.clip(free - ROOM_M, NEAREST_M, length)
     window = int(2 * sigma) | 1

@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
-from typing import Any
 
 import cv2
 import numpy as np
@@ -20,7 +19,7 @@ from mission.view.chase_camera import STRIDE, Floats, camera_path, looking
 from mission.view.flight_snapshot import Moment
 from mission.view.replay_file import Recording
 from mission.view.snapshot_images import Eye, onboard_eye
-from mission.view.vehicle_model import VehicleModel
+from mission.view.vehicle_model import VehicleModel, turned_rad
 from sim.world.world import WorldMap
 
 WIDTH, HEIGHT, HFOV_DEG = 960, 540, 75.0
@@ -36,6 +35,7 @@ def film(recording: Recording, world: WorldMap) -> Iterator[Image]:
     """The images, RGB, (HEIGHT, WIDTH, 3), one each `chase.IMAGE_S`."""
     recording = recording.every(STRIDE)
     places, targets = camera_path(recording, world)
+    turned = turned_rad(recording.rows)
     cores = len(os.sched_getaffinity(0))
     studios: SimpleQueue[Studio] = SimpleQueue()
     for _ in range(cores):
@@ -44,7 +44,7 @@ def film(recording: Recording, world: WorldMap) -> Iterator[Image]:
     def taken(i: int) -> Image:
         studio = studios.get()
         try:
-            return studio.image(recording.rows[i], places[i], targets[i])
+            return studio.image(recording.moment(i), places[i], targets[i], turned[i])
         finally:
             studios.put(studio)
 
@@ -69,26 +69,29 @@ class Studio:
         self._onboard = onboard_eye(world)
         self._model = VehicleModel(load_airframe(recording.config.airframe))
 
-    def image(self, row: Any, place: Floats, target: Floats) -> Image:
-        """A recorded moment, seen from a place [m] towards a target."""
+    def image(self, moment: Moment, place: Floats, target: Floats, turned: Floats) -> Image:
+        """A recorded moment, seen from a place [m] towards a target; `turned` [rad] are the wheels."""
+        row = moment.row
         q_ned_from_rdf = looking(place, target)
         self._chase.look(place, q_ned_from_rdf, row["owner"])
         image: Image = self._chase.rgb.copy()
-        self._model.draw(image, self._chase, row, place, q_ned_from_rdf)
+        self._model.draw(image, self._chase, row, place, q_ned_from_rdf, turned)
         self._onboard.look_from(row)
         inset = cv2.resize(self._onboard.rgb, (INSET, INSET), interpolation=cv2.INTER_NEAREST)
         image[MARGIN : MARGIN + INSET, -MARGIN - INSET : -MARGIN] = inset
         corner = (WIDTH - MARGIN - INSET - 1, MARGIN - 1)
         cv2.rectangle(image, corner, (WIDTH - MARGIN, MARGIN + INSET), (255, 255, 255), 1)
-        write_caption(image, caption(Moment(row)))
+        write_caption(image, caption(moment, drives=self._model.drives))
         return image
 
 
-def caption(moment: Moment) -> str:
-    """Clock and mode; the distance to the owner, or speed and height where nobody is followed."""
+def caption(moment: Moment, *, drives: bool = False) -> str:
+    """Clock and mode; the distance to the owner, or speed and, of what flies, height where nobody is followed."""
     minutes, tenths = divmod(int(10.0 * moment.time_s), 600)
     if moment.has_owner:
         figures = f"{moment.distance_m:.1f} m to the owner"
+    elif drives:
+        figures = f"{moment.speed_m_s:.1f} m/s"
     else:
         figures = f"{moment.speed_m_s:.1f} m/s   {float(moment.row['height_m']):.1f} m high"
     return f"{minutes}:{0.1 * tenths:04.1f}   {moment.mode_name}   {figures}"

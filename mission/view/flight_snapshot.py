@@ -4,7 +4,8 @@ In: the live rows of the simulator and the flight controller's state. Out: momen
 of replays and films come from the log. It is the truth: for people, nothing of it goes back into a flight.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from math import nan
 from typing import Any
 
@@ -12,12 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.vehicles.default_class import DEFAULT_CLASS
+from autopilot.vehicles.vehicle_class import VehicleClass
+from common.airframe import Airframe
 from mission.flight import Flight
 from mission.log.replay_topic import ACTIONS, MOTORS, OWNER
+from sim.bodies.vehicles import class_of
 from sim.world.people import CHEST_M
 
 Row = NDArray[np.float32]
-MODE_TITLES = {int(mode): mode.name.replace("_", " ").title() for mode in sorted(DEFAULT_CLASS.modes)}
+
+
+def _titles(vehicle: VehicleClass) -> dict[int, str]:
+    return {int(mode): mode.name.replace("_", " ").title() for mode in sorted(vehicle.modes)}
+
+
+DEFAULT_TITLES = _titles(DEFAULT_CLASS)
 MOMENT = np.dtype(
     [
         ("time_s", "f8"),
@@ -25,6 +35,7 @@ MOMENT = np.dtype(
         ("vel_ned", "f4", 3),  # [m/s]
         ("q_ned_from_frd", "f4", 4),  # x, y, z, w
         ("motor_speed", "f4", MOTORS),  # [rad/s]
+        ("steering_rad", "f4"),  # of steered wheels, to the right
         ("height_m", "f4"),  # above the ground
         ("is_on_ground", "?"),
         ("battery", "f4"),  # [0..1] as the vehicle believes
@@ -43,6 +54,8 @@ class Moment:
     """One instant, read from a row of `MOMENT`."""
 
     row: Any
+    modes: Mapping[int, str] = field(default_factory=lambda: DEFAULT_TITLES)
+    """Titles of the vehicle's."""
 
     @property
     def time_s(self) -> float:
@@ -68,7 +81,7 @@ class Moment:
     @property
     def mode_name(self) -> str:
         number = int(self.row["mode"])
-        return MODE_TITLES.get(number, f"Mode {number}")
+        return self.modes.get(number, f"Mode {number}")
 
     @property
     def speed_m_s(self) -> float:
@@ -90,6 +103,11 @@ class Moment:
         return float(distances_m(self.row)) if self.has_owner else nan
 
 
+def mode_titles(airframe: Airframe) -> dict[int, str]:
+    """What the modes of a vehicle are called, by number."""
+    return _titles(class_of(airframe).vehicle)
+
+
 def distances_m(rows: Any) -> Any:
     """From the vehicle to its owner's chest [m], for one row or many."""
     off = rows["owner"]["pos_ned"] - rows["pos_ned"] - np.array([0.0, 0.0, float(CHEST_M)], np.float32)
@@ -104,6 +122,7 @@ def moment_of(flight: Flight, action: Row | None = None) -> Moment:
     for name in ("pos_ned", "vel_ned", "q_ned_from_frd", "is_on_ground"):
         row[name] = truth[name]
     row["motor_speed"] = truth["motor_speed"]
+    row["steering_rad"] = truth["steering_rad"]
     row["time_s"] = flight.time_us * 1e-6
     row["height_m"] = truth["height_agl_m"]
     row["battery"] = state.battery_remaining
@@ -112,4 +131,4 @@ def moment_of(flight: Flight, action: Row | None = None) -> Moment:
     row["action"] = nan if action is None else action
     if flight.owner is not None:
         row["owner"] = flight.owner.people.numpy()[0]
-    return Moment(row)
+    return Moment(row, mode_titles(flight.airframe))

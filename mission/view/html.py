@@ -18,10 +18,11 @@ from common.airframe import load_airframe
 from common.files import write_whole
 from mission.log.euler_angles import yaw_rad
 from mission.view import shapes
-from mission.view.flight_snapshot import MODE_TITLES, distances_m
+from mission.view.flight_snapshot import distances_m
 from mission.view.panel import ACTION_NAMES
 from mission.view.replay_file import Recording
 from mission.view.snapshot_images import onboard_eye
+from mission.view.vehicle_model import turned_rad
 from sim.world.world import WorldMap
 
 STRIDE = 5  # frames of the flight per moment of the page: 10 a second
@@ -51,7 +52,7 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
     rows = recording.rows
     return {
         "title": title,
-        "modes": MODE_TITLES,
+        "modes": recording.modes,
         "size_m": world.config.size_m,
         "sun_ned": shapes.SUN_NED.tolist(),
         "heading_rad": float(yaw_rad(rows["q_ned_from_frd"][:1].astype(float))[0]),
@@ -61,6 +62,11 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
         **_trees(world),
         "vehicle": _mesh(shape.body),
         "blade": _mesh(shape.blade),
+        "boxes": None if (boxes := shapes.boxes(world)) is None else _mesh(boxes),
+        "wheel": _mesh(shape.wheels[0]) if shape.drives else None,
+        "wheel_hubs": _array(shape.wheel_hubs),
+        "is_steered": list(shape.is_steered),
+        "away_m": 3.0 if shape.drives else 7.0,
         "person": _mesh(shapes.person(STATURE_M)),
         "hubs": _array(shape.hubs),
         "spins": list(shape.spins),
@@ -99,8 +105,9 @@ def _trees(world: WorldMap) -> Json:
 
 
 def _track(rows: NDArray[Any]) -> Json:
-    names = ("time_s", "pos_ned", "q_ned_from_frd", "motor_speed", "mode", "is_armed")
+    names = ("time_s", "pos_ned", "q_ned_from_frd", "motor_speed", "steering_rad", "mode", "is_armed")
     return {name: _array(rows[name]) for name in names} | {
+        "turned_rad": _array(turned_rad(rows).astype(np.float32)),
         "owner_ned": _array(rows["owner"]["pos_ned"]),
         "owner_heading_rad": _array(rows["owner"]["heading_rad"]),
     }

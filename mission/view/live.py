@@ -176,7 +176,7 @@ class LiveView:
             self._scene.frustum.image = rgb
 
     def _place_camera(self, client: viser.ClientHandle) -> None:
-        eye_ned, target_ned = chase_of(self._moment())
+        eye_ned, target_ned = chase_of(self._moment(), drives=self._scene.drives)
         client.camera.up_direction = (0.0, 0.0, -1.0)
         client.camera.position = eye_ned
         client.camera.look_at = target_ned

@@ -137,7 +137,7 @@ class ReplayView:
         self._scene.draw_trails(self._recording.rows[: index + 1 : TRAIL_FRAMES])
 
     def _place_camera(self, client: viser.ClientHandle) -> None:
-        eye_ned, target_ned = chase_of(self._recording.moment(max(self._shown, 0)))
+        eye_ned, target_ned = chase_of(self._recording.moment(max(self._shown, 0)), drives=self._scene.drives)
         client.camera.up_direction = (0.0, 0.0, -1.0)
         client.camera.position = eye_ned
         client.camera.look_at = target_ned

@@ -7,7 +7,7 @@ vehicle disarmed for long there is a moment each second (`mission.log.kept_frame
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
+from common.airframe import load_airframe
 from mission.console.name_checks import LOG_FILE
 from mission.flight import Flight, FlightConfig
+from mission.log.motion_topics import STEERING_TOPIC
 from mission.log.replay_topic import OWNER, REPLAY_TOPIC
 from mission.log.ulog_file import UlogDamage, read_topics
-from mission.view.flight_snapshot import MOMENT, Moment, Row
+from mission.view.flight_snapshot import MOMENT, Moment, Row, mode_titles
 
 CONFIG_KEY, PATH_KEY = "replay_config", "replay_path"  # of the log's information
 TEXT_MAX = 60_000  # [byte] of one piece of information
@@ -31,7 +33,7 @@ class RecordingError(ValueError):
     """A folder without a run that can be shown; the message is one sentence."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """One flight, as it is shown."""
 
@@ -43,7 +45,12 @@ class Recording:
         return len(self.rows)
 
     def moment(self, index: int) -> Moment:
-        return Moment(self.rows[index])
+        return Moment(self.rows[index], self.modes)
+
+    @cached_property
+    def modes(self) -> dict[int, str]:
+        """Titles of the vehicle's modes."""
+        return mode_titles(load_airframe(self.config.airframe))
 
     @property
     def has_owner(self) -> bool:
@@ -92,7 +99,7 @@ def load_recording(folder: Path) -> Recording:
     if not parts:
         raise RecordingError(f"{folder}: holds no run that can be shown: {LOG_FILE} is missing")
     try:
-        logs = [read_topics(path, (PLACE, ATTITUDE, REPLAY_TOPIC.name)) for path in parts]
+        logs = [read_topics(path, (PLACE, ATTITUDE, REPLAY_TOPIC.name, STEERING_TOPIC.name)) for path in parts]
     except OSError as error:
         raise RecordingError(f"{folder / LOG_FILE}: cannot be read: {error.strerror or error}") from error
     except UlogDamage as error:
@@ -137,6 +144,8 @@ def _rows(log: ULog) -> NDArray[Any]:
     rows["vel_ned"] = np.stack([place[axis] for axis in ("vx", "vy", "vz")], axis=1)
     rows["height_m"] = place["dist_bottom"]
     rows["q_ned_from_frd"] = np.stack([attitude[f"q[{k}]"] for k in (1, 2, 3, 0)], axis=1)  # a log's begin with w
+    if STEERING_TOPIC.name in topics:
+        rows["steering_rad"] = _at(topics[STEERING_TOPIC.name], time_us)["angle"]
     for name in ("motor_speed", "is_on_ground", "battery", "mode", "is_armed", "goal_ned", "action"):
         rows[name] = _field(shown, name, rows.dtype[name])
     for name in OWNER.names or ():

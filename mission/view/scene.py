@@ -28,6 +28,7 @@ TRAIL_LIFT_M = 0.1  # of what walks on the ground, which would hide its trail
 TRAIL_POINTS = 600
 TRAIL_PERIOD_S = 0.25
 BLADE_TURNS_PER_S = 2.7  # shown; at their true speed blades would stand still or seem to turn backwards
+JUMP_S = 1.0  # wheels do not catch up with more
 SKY_RGB = (190, 212, 232)
 
 
@@ -68,6 +69,8 @@ class Scene:
         self._api.configure_fog(0.4 * world.config.size_m, 1.4 * world.config.size_m, color=SKY_RGB)
         self._api.set_background_image(np.full((2, 2, 3), SKY_RGB, np.uint8))
         self._add_world(world)
+        self._shown_s: float | None = None
+        self._wheels: list[viser.FrameHandle] = []
         self._vehicle = self._api.add_frame("/vehicle", axes_length=0.4, axes_radius=0.008)
         shape = shapes.vehicle(airframe)
         blade = shape.blade
@@ -79,6 +82,11 @@ class Scene:
             for i, hub in enumerate(shape.hubs)
         ]
         self._spins = shape.spins
+        for i, (mesh, hub) in enumerate(zip(shape.wheels, shape.wheel_hubs, strict=True)):
+            self._add_mesh(f"/vehicle/wheel{i}/mesh", mesh)
+            self._wheels.append(self._api.add_frame(f"/vehicle/wheel{i}", show_axes=False, position=hub))
+        self._is_steered = shape.is_steered
+        self._turned_rad = np.zeros(len(self._wheels))
         self._owner = self._api.add_frame("/owner", show_axes=False, visible=False)
         self._add_mesh("/owner/body", shapes.person(STATURE_M))
         self._goal = self._api.add_icosphere("/goal", radius=0.35, color=GOAL_RGB, opacity=0.7, visible=False)
@@ -138,6 +146,11 @@ class Scene:
             wxyz=wxyz_of(mount.q_frd_from_rdf),
         )
 
+    @property
+    def drives(self) -> bool:
+        """Whether the vehicle has wheels."""
+        return len(self._wheels) > 0
+
     def show(self, moment: Moment) -> None:
         """Moves what moves."""
         self._vehicle.position = moment.pos_ned
@@ -146,6 +159,7 @@ class Scene:
         for handle, spin, speed in zip(self._blades, self._spins, speeds, strict=True):
             if speed > 1.0:
                 handle.wxyz = wxyz_of(quat_of(2.0 * np.pi * BLADE_TURNS_PER_S * spin * moment.time_s, 0.0))
+        self._turn_wheels(moment)
         if moment.has_owner:
             self._owner.position = moment.owner_ned
             self._owner.wxyz = wxyz_of(quat_of(float(moment.row["owner"]["heading_rad"]), 0.0))
@@ -156,6 +170,16 @@ class Scene:
         if has_goal:
             self._goal.position = moment.goal_ned
         self._goal.visible = has_goal
+
+    def _turn_wheels(self, moment: Moment) -> None:
+        """By what they have turned since the moment shown before; not after a jump in time."""
+        passed_s = 0.0 if self._shown_s is None else moment.time_s - self._shown_s
+        self._shown_s = moment.time_s
+        if abs(passed_s) < JUMP_S:
+            self._turned_rad += passed_s * moment.row["motor_speed"][: len(self._wheels)]
+        for handle, turned_rad, is_steered in zip(self._wheels, self._turned_rad, self._is_steered, strict=True):
+            steering_rad = float(moment.row["steering_rad"]) if is_steered else 0.0
+            handle.wxyz = wxyz_of(shapes.wheel_attitude(float(turned_rad), steering_rad))
 
     def extend_trails(self, moment: Moment) -> None:
         """Appends where everybody is; `show` leads on from there."""
@@ -228,8 +252,10 @@ def wxyz_of(q_xyzw: tuple[float, float, float, float]) -> tuple[float, float, fl
     return w, x, y, z
 
 
-def chase_of(moment: Moment) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """A place behind and above the vehicle, and where to look from there [m], ned."""
+def chase_of(moment: Moment, *, drives: bool = False) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """A place behind and above the vehicle, nearer to what drives, and where to look from there [m], ned."""
     yaw = yaw_of(moment.q_ned_from_frd)
     ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0], np.float32)
-    return moment.pos_ned - 5.0 * ahead - np.array([0.0, 0.0, 2.2], np.float32), moment.pos_ned + 2.0 * ahead
+    behind_m, above_m = (2.6, 1.1) if drives else (5.0, 2.2)
+    place_ned = moment.pos_ned - behind_m * ahead - np.array([0.0, 0.0, above_m], np.float32)
+    return place_ned, moment.pos_ned + 2.0 * ahead

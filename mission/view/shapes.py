@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from common.airframe import Airframe
 from common.airframes.multirotor import MultirotorAirframe
+from common.airframes.rover import RoverAirframe
+from common.attitude import Quat, quat_of
 from sim.world.walls import WALL_THICKNESS_M
 from sim.world.world import WorldMap
 
@@ -27,6 +29,8 @@ CONCRETE = (168, 164, 158)
 JACKET, TROUSERS, SKIN = (24, 74, 196), (52, 58, 74), (222, 184, 152)
 BOX_M, NOSE_M = (0.5, 0.3, 0.15), (0.1, 0.15, 0.1)  # of a vehicle whose shape is not known
 FRAME, BLADE = (48, 52, 60), (30, 32, 36)
+TYRE, SPOKE, MARK = (34, 34, 38), (150, 156, 164), (236, 236, 240)
+WHEEL_SIDES, SPOKES = 14, 4
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -137,13 +141,27 @@ class VehicleShape(NamedTuple):
     spins: Sequence[int]
     """Of each hub: +1 counter-clockwise seen from above, -1 clockwise."""
     blade_radius_m: float
+    wheels: Sequence[Mesh] = ()
+    """Each round its hub, the axle along y; in the order of their speeds in the truth."""
+    wheel_hubs: Floats = np.zeros((0, 3), np.float32)
+    """[m] (wheels, 3)"""
+    is_steered: Sequence[bool] = ()
+    """Of each wheel."""
+
+    @property
+    def drives(self) -> bool:
+        return len(self.wheels) > 0
 
 
 def vehicle(airframe: Airframe) -> VehicleShape:
     """The shape of a vehicle; a plain box where its class's is not known."""
+    no_blade, no_hubs = box((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), BLADE), np.zeros((0, 3), np.float32)
+    if isinstance(airframe, RoverAirframe):
+        hubs, steered = wheel_hubs_frd(airframe), (not airframe.is_skid,) * 2 + (False,) * 2
+        return VehicleShape(rover(airframe), no_blade, no_hubs, (), 0.0, (wheel(airframe),) * len(hubs), hubs, steered)
     if not isinstance(airframe, MultirotorAirframe):
         body = joined([box((0.0, 0.0, 0.0), BOX_M, FRAME), box((0.5 * BOX_M[0], 0.0, 0.0), NOSE_M, JACKET)])
-        return VehicleShape(body, box((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), BLADE), np.zeros((0, 3), np.float32), (), 0.0)
+        return VehicleShape(body, no_blade, no_hubs, (), 0.0)
     spins = [rotor.spin for rotor in airframe.rotors]
     return VehicleShape(multirotor(airframe), blade(airframe), hubs_frd(airframe), spins, blade_radius_m(airframe))
 
@@ -178,6 +196,67 @@ def blade_radius_m(airframe: MultirotorAirframe) -> float:
     hubs = hubs_frd(airframe)
     gaps = np.linalg.norm(hubs[:, None] - hubs[None, :], axis=2)
     return 0.45 * float(gaps[gaps > 0.0].min())
+
+
+def rover(airframe: RoverAirframe) -> Mesh:
+    """The vehicle without its wheels, in frd: a hull between them, a bumper at each end, a lid, a nose."""
+    hull = airframe.hull
+    length_m, middle_m = hull.front_m + hull.rear_m, 0.5 * (hull.front_m - hull.rear_m)
+    between_m = airframe.wheels.track_m - tread_m(airframe) - 0.02
+    deck_m = -0.35 * hull.top_m  # above it the lid, down being positive
+    tall_m = hull.bottom_m - deck_m
+    centre_z_m = 0.5 * (hull.bottom_m + deck_m)
+    bumper = (0.05 * length_m, 2.0 * hull.half_width_m, 0.4 * tall_m)
+    lid_m = hull.top_m + deck_m
+    return joined(
+        [
+            box((middle_m, 0.0, centre_z_m), (0.96 * length_m, between_m, tall_m), FRAME),
+            box((hull.front_m - 0.5 * bumper[0], 0.0, centre_z_m), bumper, JACKET),
+            box((-hull.rear_m + 0.5 * bumper[0], 0.0, centre_z_m), bumper, FRAME),
+            box((middle_m - 0.1 * length_m, 0.0, deck_m - 0.5 * lid_m), (0.5 * length_m, between_m, lid_m), CONCRETE),
+            box((middle_m + 0.28 * length_m, 0.0, deck_m - 0.01), (0.16 * length_m, 0.4 * between_m, 0.02), JACKET),
+        ]
+    )
+
+
+def wheel(airframe: RoverAirframe) -> Mesh:
+    """One wheel round its hub, the axle along y: a tyre with light spokes on both sides, one of them brighter."""
+    radius_m, half_m = airframe.wheels.radius_m, 0.5 * tread_m(airframe)
+    angle = np.arange(WHEEL_SIDES) * 2.0 * np.pi / WHEEL_SIDES
+    ring = np.column_stack([radius_m * np.cos(angle), np.zeros(WHEEL_SIDES), radius_m * np.sin(angle)])
+    side = np.array([0.0, half_m, 0.0])
+    here, there = np.arange(WHEEL_SIDES), (np.arange(WHEEL_SIDES) + 1) % WHEEL_SIDES
+    tread = np.concatenate(
+        [np.stack([here, here + WHEEL_SIDES, there], 1), np.stack([there, here + WHEEL_SIDES, there + WHEEL_SIDES], 1)]
+    )
+    left, right = np.full(WHEEL_SIDES, 2 * WHEEL_SIDES), np.full(WHEEL_SIDES, 2 * WHEEL_SIDES + 1)
+    caps = [np.stack([left, here, there], 1), np.stack([right, there + WHEEL_SIDES, here + WHEEL_SIDES], 1)]
+    vertices = np.concatenate([ring - side, ring + side, [-side, side]]).astype(np.float32)
+    parts = [painted(vertices, np.concatenate([tread, *caps]).astype(np.uint32), TYRE)]
+    for k in range(SPOKES):
+        turn = 2.0 * np.pi * k / SPOKES
+        spoke = box((0.4 * radius_m, 0.0, 0.0), (0.72 * radius_m, 2.1 * half_m, 0.2 * radius_m), SPOKE if k else MARK)
+        cos, sin = np.cos(turn), np.sin(turn)
+        about_y = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]], np.float32)
+        parts.append(Mesh((spoke.vertices @ about_y).astype(np.float32), spoke.faces, spoke.colours))
+    return joined(parts)
+
+
+def tread_m(airframe: RoverAirframe) -> float:
+    """How wide a tyre is: the hull's box has the wheels in it."""
+    return 2.0 * max(airframe.hull.half_width_m - 0.5 * airframe.wheels.track_m, 0.01)
+
+
+def wheel_hubs_frd(airframe: RoverAirframe) -> Floats:
+    """Places of the wheels [m], (4, 3): front left, front right, rear left, rear right."""
+    wheels = airframe.wheels
+    ends, sides = (wheels.front_x_m, -wheels.rear_x_m), (-0.5 * wheels.track_m, 0.5 * wheels.track_m)
+    return np.array([(x, y, wheels.hub_z_m) for x in ends for y in sides], np.float32)
+
+
+def wheel_attitude(turned_rad: float, steering_rad: float) -> Quat:
+    """Of a wheel that has rolled forwards by an angle and is steered to the right; q_frd_from_wheel."""
+    return quat_of(steering_rad, -turned_rad)
 
 
 def person(stature_m: float) -> Mesh:

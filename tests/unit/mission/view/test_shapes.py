@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from common.airframe import load_airframe
+from common.attitude import rotated
 from mission.view import shapes
 from sim.world.batch import grown_world
 from sim.world.driving_worlds import COURSE
@@ -99,3 +100,26 @@ def test_every_box_is_drawn_where_it_stands():
     lengths = np.hypot(*(corners[:, :, :2] - world.boxes.middle(500)[:, None]).transpose(2, 0, 1)).max(axis=1)
     np.testing.assert_allclose(lengths, np.hypot(rows["half_length"], rows["half_width"]), atol=1e-4)
     assert shapes.boxes(WORLD) is None
+
+
+@pytest.mark.parametrize("name", ["rover", "rover-skid"])
+def test_a_rover_has_its_wheels_at_their_hubs_inside_its_hull(name):
+    airframe = load_airframe(name)
+    shape = shapes.vehicle(airframe)
+    wheels, hull = airframe.wheels, airframe.hull
+    assert shape.wheel_hubs[1] == pytest.approx((wheels.front_x_m, 0.5 * wheels.track_m, wheels.hub_z_m))  # front right
+    assert list(shape.is_steered) == [not airframe.is_skid] * 2 + [False] * 2
+    for mesh, hub in zip(shape.wheels, shape.wheel_hubs, strict=True):
+        assert volume(mesh) > 0.0
+        assert np.ptp(mesh.vertices[:, 0]) == pytest.approx(2.0 * wheels.radius_m, rel=0.05)
+        assert np.abs(mesh.vertices + hub)[:, 1].max() <= hull.half_width_m + 0.01
+    low, high = shape.body.vertices.min(axis=0), shape.body.vertices.max(axis=0)
+    assert (low[0], high[0]) == pytest.approx((-hull.rear_m, hull.front_m), abs=0.03)
+    assert (low[2], high[2]) == pytest.approx((-hull.top_m, hull.bottom_m), abs=0.03)
+
+
+def test_a_wheel_that_rolls_forwards_has_its_top_move_ahead_and_points_where_it_is_steered():
+    top_frd = np.array((0.0, 0.0, -1.0))
+    assert rotated(shapes.wheel_attitude(0.1, 0.0), top_frd)[0] == pytest.approx(np.sin(0.1))
+    axle_frd = rotated(shapes.wheel_attitude(2.0, 0.3), (0.0, 1.0, 0.0))
+    assert axle_frd == pytest.approx((-np.sin(0.3), np.cos(0.3), 0.0), abs=1e-6)  # to the right: its left end is ahead
