@@ -105,6 +105,7 @@ class Flight:
         self.texts, self.troubles = Texts(lambda: self.time_us), Troubles(lambda: self.time_us)
         self.airframe: Airframe = load_airframe(config.airframe)
         vehicle, _ = class_of(self.airframe)
+        self.drives = vehicle.ground is None  # and stays on the ground
         self.world: WorldMap = flight_world(config)
         self.rig = flight_rig(config, self.airframe, self.world, make_rig)
         self.params = flight_parameters(config, self.airframe)

@@ -77,16 +77,16 @@ def _finish(
     with files.writing("flight.png") as path:
         from mission.log.flight_plots import plot_flight  # matplotlib: nobody waits for it before the flight
 
-        plot_flight(history, flight.world, path_ned, title, path)
+        plot_flight(history, flight.world, path_ned, title, path, flight.drives)
     if summary.armed_s > 0.0:
-        console.print(_summary_table(summary))
+        console.print(_summary_table(summary, drives=flight.drives))
     else:
         print_line(console, f"result: {summary.result}\nsimulated: {summary.simulated_s:.1f} s, never armed")
     print_line(console, f"{'what could be written' if files.missing else 'logs, summary and picture'}: {folder}")
     return 0 if (summary.is_success or running is None) and not files.missing else 1
 
 
-def _summary_table(summary: Summary) -> Table:
+def _summary_table(summary: Summary, *, drives: bool) -> Table:
     table = Table("figure", "value", title="flight", title_justify="left")
     rows = [
         ("result", summary.result),
@@ -94,7 +94,7 @@ def _summary_table(summary: Summary) -> Table:
         ("power-on to ready", f"{summary.ready_s:.1f} s"),
         ("cross-track, 95 %", f"{summary.cross_track_p95_m:.2f} m"),
         (
-            "landing error, true / by estimate",
+            f"{'parking' if drives else 'landing'} error, true / by estimate",
             f"{summary.landing_error_true_m:.2f} / {summary.landing_error_est_m:.2f} m",
         ),
         ("estimator error RMS, horizontal axis / vertical", f"{summary.pos_h_rms_m:.2f} / {summary.pos_v_rms_m:.2f} m"),

@@ -1,16 +1,37 @@
 """Topics of what the control law commands."""
 
+from collections.abc import Sequence
 from math import nan
 
 import numpy as np
 
+from autopilot.interface.outputs import Output, OutputKind
 from mission.log.euler_angles import wxyz
-from mission.log.topic import SAMPLED, Batch, Columns, Topic, axes
+from mission.log.topic import SAMPLED, Batch, Columns, Rows, Topic, axes
+
+MOTORS, SERVOS = 12, 8  # in PX4's topics
 
 
 def _motors(batch: Batch) -> Columns:
     command = batch.actuators["command"]
-    control = np.full((len(command), 12), nan, dtype=np.float32)
+    if not _servos(batch.outputs):  # nothing but motors, as many as there is room for
+        return _controls(batch, command, MOTORS)
+    return _controls(
+        batch, command[:, [i for i in range(len(batch.outputs)) if i not in _servos(batch.outputs)]], MOTORS
+    )
+
+
+def _servo_commands(batch: Batch) -> Columns:
+    return _controls(batch, batch.actuators["command"][:, _servos(batch.outputs)], SERVOS)
+
+
+def _servos(outputs: Sequence[Output]) -> list[int]:
+    return [i for i, output in enumerate(outputs) if output.kind is OutputKind.SERVO]
+
+
+def _controls(batch: Batch, command: Rows, room: int) -> Columns:
+    """PX4's fields: NaN where there is no output."""
+    control = np.full((len(command), room), nan, dtype=np.float32)
     control[:, : command.shape[1]] = command
     return {"timestamp": batch.time_us, "timestamp_sample": batch.time_us, "control": control}
 
@@ -41,6 +62,13 @@ def _local_setpoint(batch: Batch) -> Columns:
         "yaw": actuators["traj_yaw"],
         "yawspeed": actuators["traj_yaw_rate"],
     }
+
+
+def servo_topic(outputs: Sequence[Output]) -> Topic | None:
+    """PX4's topic of servos, of vehicles that have some."""
+    if not _servos(outputs):
+        return None
+    return Topic("actuator_servos", {**SAMPLED, "control": f"float[{SERVOS}]"}, _servo_commands)
 
 
 CONTROL_TOPICS = (

@@ -24,16 +24,28 @@ DRAWN_MAX = 60_000  # frames, 20 minutes: more are no more to see, and take memo
 
 
 def plot_flight(
-    history: History, world: WorldMap, path_ned: Sequence[tuple[int, Rows]], title: str, target: Path
+    history: History,
+    world: WorldMap,
+    path_ned: Sequence[tuple[int, Rows]],
+    title: str,
+    target: Path,
+    drives: bool = False,
 ) -> None:
-    """Writes the plots of a flight as PNG; of a long one every few frames are drawn."""
+    """Writes the plots of a flight as PNG; of a long one every few frames are drawn.
+
+    Of what drives the speed is shown, not the height, which is the ground's.
+    """
     every = -(-len(history.time_us) // DRAWN_MAX)
     history = History(*(getattr(history, name)[::every] for name in History.__dataclass_fields__))
     figure = Figure(figsize=(12, 8), layout="constrained")
     figure.suptitle(title)
     grid = figure.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
     _track(figure.add_subplot(grid[:2, 0]), history, world, path_ned)
-    _profile(figure.add_subplot(grid[2, 0]), history, world)
+    beneath = figure.add_subplot(grid[2, 0])
+    if drives:
+        _speed(beneath, history)
+    else:
+        _profile(beneath, history, world)
     time_s = history.time_us * 1e-6
     pos_error = history.pos_ned_est.astype(float) - history.pos_ned_true
     vel_error = history.vel_ned_est.astype(float) - history.vel_ned_true
@@ -73,6 +85,17 @@ def _profile(axes: Axes, history: History, world: WorldMap) -> None:
     ground = world.height(history.pos_ned_true[:, 0].astype(float), history.pos_ned_true[:, 1].astype(float))
     axes.fill_between(time_s, ground, min(0.0, float(ground.min())) - 1.0, color="#2b8a3e", alpha=0.4, label="ground")
     axes.set(xlabel="time [s]", ylabel="height above home [m]")
+    _legend_above(axes)
+
+
+def _speed(axes: Axes, history: History) -> None:
+    time_s = history.time_us * 1e-6
+    for rows, colour, width, name in (
+        (history.vel_ned_true, TRUE_COLOUR, 1.5, "true"),
+        (history.vel_ned_est, ESTIMATE_COLOUR, 1.0, "estimate"),
+    ):
+        axes.plot(time_s, np.linalg.norm(rows, axis=1), color=colour, lw=width, label=name)
+    axes.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0.0, None))
     _legend_above(axes)
 
 

@@ -19,8 +19,10 @@ from autopilot.interface.platform import LogListener
 from autopilot.interface.vehicle_state import Severity
 from common.airframe import Airframe
 from common.params import Parameter
+from mission.log.control_topics import servo_topic
 from mission.log.flight_log import STATUS_DTYPE, FlightLog
 from mission.log.kept_frames import FrameChoice, KeptRows
+from mission.log.motion_topics import STEERING_TOPIC
 from mission.log.replay_topic import REPLAY_TOPIC, SHOWN
 from mission.log.topic import Batch
 from sim.rig import Rig
@@ -133,7 +135,12 @@ class Recorder:
     def _new_log(self) -> FlightLog:
         params, before = self._controller.params, self._samples_before
         modes = self._controller.modes
-        return FlightLog(self._path, self._airframe, params, modes, self._imu_limits, before, self._on_trouble)
+        log = FlightLog(self._path, self._airframe, params, modes, self._imu_limits, before, self._on_trouble)
+        servos = servo_topic(self._controller.state.outputs)
+        if servos is not None:
+            log.add(servos, {})
+            log.add(STEERING_TOPIC, {})
+        return log
 
     def keep_for_replay(self, take: Callable[[Rows], None], info: Mapping[str, Sequence[str]]) -> None:
         """The log, if there is one, shall also hold what a replay shows; before the first frame.
@@ -228,6 +235,7 @@ class Recorder:
             truth=self._truth.copies[:count],
             vehicle=status,
             origin=self._controller.state.origin,
+            outputs=self._controller.state.outputs,
             shown=None if self._take_shown is None else self._shown[:count],
             begins=tuple(begin for begin in self._begins if begin < count),
         )

@@ -22,6 +22,7 @@ from sim.world.world import WorldMap
 Rows = npt.NDArray[Any]
 LEG_MIN_M = 1.0  # horizontally; a shorter way is a climb or a descent
 CLEARANCE_EVERY_FRAMES = 10
+LEVEL = np.array([1.0, 1.0, 0.0])  # what drives keeps to a line on the map: the ground has the height
 CMD_RETURN_TO_LAUNCH, CMD_LAND, CMD_TAKEOFF = 20, 21, 22
 PLACES = (16, 17, 18, 19, 31, 82, CMD_LAND, CMD_TAKEOFF)  # mission commands that lead to a place
 NOT_STRAIGHT = (18, 31, 82)  # of these, turns, changes of height, splines: no line to keep to
@@ -36,8 +37,8 @@ class Summary:
     simulated_s: float
     armed_s: float
     ready_s: float  # power-on to ready to arm
-    cross_track_p95_m: float  # truth to the planned path, in mode MISSION
-    landing_error_true_m: float  # horizontal, to the planned landing point
+    cross_track_p95_m: float  # truth to the planned path, in mode MISSION; of what drives, horizontal
+    landing_error_true_m: float  # horizontal, to the planned landing point, or to where what drives shall park
     landing_error_est_m: float
     pos_h_rms_m: float  # estimator error per horizontal axis, while armed
     pos_v_rms_m: float
@@ -203,7 +204,10 @@ def summarise(
     """
     armed = history.is_armed
     in_mission = armed & (history.mode == Mode.MISSION)
-    cross = cross_track_m(history.pos_ned_true[in_mission], history.mission_seq[in_mission], path_ned, curved)
+    drives = flight.drives
+    line_ned = [(seq, point * LEVEL) for seq, point in path_ned] if drives else path_ned
+    way_ned = history.pos_ned_true[in_mission] * (LEVEL if drives else 1.0)
+    cross = cross_track_m(way_ned, history.mission_seq[in_mission], line_ned, curved)
     errors = estimator_errors(history, armed)
     result, is_success = _result(flight, running)
     end_true, end_est = history.pos_ned_true[-1], history.pos_ned_est[-1]

@@ -104,9 +104,7 @@ def _global_position(batch: Batch) -> Columns:
     }
 
 
-STEERING_TOPIC = Topic(
-    "steering_groundtruth", {**SAMPLED, "angle": "float"}, _steering_true, parameter="RA_MAX_STR_ANG"
-)
+STEERING_TOPIC = Topic("steering_groundtruth", {**SAMPLED, "angle": "float"}, _steering_true)
 MOTION_TOPICS = (
     Topic("vehicle_attitude", {**SAMPLED, "q": "float[4]"}, _attitude),
     Topic("vehicle_attitude_groundtruth", {**SAMPLED, "q": "float[4]"}, _attitude_true),
@@ -125,5 +123,4 @@ MOTION_TOPICS = (
         },
         _global_position,
     ),
-    STEERING_TOPIC,
 )

@@ -1,12 +1,13 @@
 """What a topic of the flight log is: PX4's name and fields, filled from a batch of rows of the kernel structs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from autopilot.interface.outputs import Output
 from common.geodesy import GeoPoint, geodetic_from_ned
 
 Rows = npt.NDArray[Any]
@@ -28,6 +29,7 @@ class Batch:
     vehicle: Rows  # STATUS_DTYPE of mission.log.flight_log
     origin: GeoPoint
     shown: Rows | None = None  # SHOWN of mission.log.replay_topic, in flights that are to be replayed
+    outputs: Sequence[Output] = ()  # what the commands are for
     begins: tuple[int, ...] = (0,)  # the log gets the frames in pieces: where each of them begins
 
     def only(self, frames: Rows | slice, samples_before: Rows) -> "Batch":

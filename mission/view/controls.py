@@ -19,6 +19,7 @@ from mission.view.browser_inputs import within
 CLIMB_M = 5.0  # above the ground, when a click finds the vehicle standing
 FAR_M = 2000.0  # of a click's ray
 LEAST_HEIGHT_M = 2.0
+DRIVEN_WITHIN_M = 1.0  # a click's place is reached
 HEIGHT_MAX_M = 60.0
 WIND_MAX_M_S = 20.0
 SPEEDS = {"1/4 x": 0.25, "1/2 x": 0.5, "1 x": 1.0, "2 x": 2.0, "5 x": 5.0, "max": None}
@@ -51,7 +52,8 @@ class Controls:
         self._running: Running | None = None
         self.is_paused = False
         self.follows = True
-        self.lines: tuple[str, ...] = ("click on the ground to fly there",)
+        self._drives = flight.drives
+        self.lines: tuple[str, ...] = (f"click on the ground to {'drive' if self._drives else 'fly'} there",)
         self._add_commands(server.gui, has_plan=has_plan)
         self._add_pace(server.gui, speed)
         self._add_trouble(server.gui)
@@ -85,13 +87,17 @@ class Controls:
 
     def _add_commands(self, gui: viser.GuiApi, *, has_plan: bool) -> None:
         with gui.add_folder("Vehicle"):
-            self._height = gui.add_slider(
-                "Height of gotos", min=LEAST_HEIGHT_M, max=HEIGHT_MAX_M, step=0.5, initial_value=CLIMB_M
-            )
-            for name, script in (("Take off", self._take_off), ("Hold", _hold), ("Return", _return), ("Land", _land)):
-                self._add_command(gui, name, script)
+            if not self._drives:
+                self._height = gui.add_slider(
+                    "Height of gotos", min=LEAST_HEIGHT_M, max=HEIGHT_MAX_M, step=0.5, initial_value=CLIMB_M
+                )
+                self._add_command(gui, "Take off", self._take_off)
+            self._add_command(gui, "Hold", _hold)
+            self._add_command(gui, "Return", _return)
+            if not self._drives:
+                self._add_command(gui, "Land", _land)
             if has_plan:
-                self._add_command(gui, "Fly the mission", self._fly_mission)
+                self._add_command(gui, "Drive the mission" if self._drives else "Fly the mission", self._fly_mission)
             if self._flight.owner is not None:
                 self._add_command(gui, "Follow", self._follow)
             self._add_button(gui, "Restart", self._restart)
@@ -195,6 +201,12 @@ class Controls:
             await take_off(drone)
         await drone.let_companion_fly()
 
+    async def _drive_to(self, drone: Drone, north_m: float, east_m: float, up_m: float) -> None:
+        if not drone.is_armed:
+            await self._get_ready(drone)
+            await drone.arm()
+        await drone.goto_ned(north_m, east_m, -up_m, acceptance_m=DRIVEN_WITHIN_M)
+
     async def _fly_to(self, drone: Drone, north_m: float, east_m: float, up_m: float) -> None:
         if not drone.is_armed or drone.is_landed:
             await self._take_off(drone)
@@ -214,7 +226,8 @@ class Controls:
             return
         up = float(world.height(north, east))
         name = f"go to {north:.0f} m north, {east:.0f} m east ({hypot(north, east):.0f} m from home)"
-        self._do(lambda: self._start(name, lambda drone: self._fly_to(drone, north, east, up)))
+        go = self._drive_to if self._drives else self._fly_to
+        self._do(lambda: self._start(name, lambda drone: go(drone, north, east, up)))
 
 
 async def _hold(drone: Drone) -> None:

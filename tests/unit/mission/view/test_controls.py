@@ -1,5 +1,8 @@
 """The live page's buttons, clicked without a browser; tests/system/page/test_live_page.py clicks in one."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from autopilot.interface.vehicle_state import Mode
@@ -129,4 +132,19 @@ def test_a_restart_ends_what_a_button_began(page):
     said_after(flight, view, 12.0)
     assert flight.controller.state.is_ready_to_arm
     assert not flight.controller.state.is_armed
+    flight.close()
+
+
+def test_what_stays_on_the_ground_is_offered_neither_take_off_nor_landing_and_drives_where_one_clicks(page):
+    flight = Flight(FlightConfig(world=PLAIN, airframe="rover"))
+    view = LiveView(flight, page, path_ned=[(0.0, 0.0, 0.0), (5.0, 0.0, 0.0)])
+    labels = set(buttons(page))
+    assert {"Hold", "Return", "Drive the mission", "Restart"} <= labels
+    assert not {"Take off", "Land", "Fly the mission", "Height of gotos"} & labels
+    ray = SimpleNamespace(ray_origin=(10.0, 4.0, -20.0), ray_direction=(0.0, 0.0, 1.0))
+    view._controls._clicked(ray)
+    said_after(flight, view, 30.0, lambda: view._controls.lines[-1].endswith("done"))
+    assert view._controls.lines[-1].startswith("go to 10 m north, 4 m east")
+    assert view._controls.lines[-1].endswith("done")
+    assert np.hypot(*(flight.rig.rows["truth"][0]["pos_ned"][:2] - (10.0, 4.0))) < 1.5
     flight.close()

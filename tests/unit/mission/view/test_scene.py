@@ -5,6 +5,7 @@ import pytest
 
 from common.airframe import load_airframe
 from mission.simulator.flight_rig import flight_world
+from mission.view import shapes
 from mission.view.page import PageServer
 from mission.view.scene import PLAN_M, TRAIL_M, Scene
 from tests.unit.mission.view.rows import CONFIG, hovering
@@ -38,3 +39,15 @@ def test_a_trail_ends_where_its_vehicle_is_also_between_its_points(server):
 def test_a_plan_is_wider_than_the_track_that_covers_it(server):
     Scene(server, flight_world(CONFIG), load_airframe("x500"), path_ned=[(0.0, 0.0, -5.0), (5.0, 0.0, -5.0)])
     assert nodes(server)["/plan"].thickness == PLAN_M > 2.0 * TRAIL_M
+
+
+def test_wheels_turn_by_what_they_have_rolled_and_only_front_ones_are_steered(server):
+    scene = Scene(server, flight_world(CONFIG), load_airframe("rover"))
+    recording = hovering(1.0)
+    recording.rows["motor_speed"][:, :4] = 10.0
+    recording.rows["steering_rad"] = 0.3
+    for index in range(11):  # 0.2 s
+        scene.show(recording.moment(index))
+    front, rear = (np.roll(nodes(server)[f"/vehicle/wheel{i}"].wxyz, -1) for i in (1, 3))
+    assert tuple(rear) == pytest.approx(shapes.wheel_attitude(2.0, 0.0), abs=1e-4)
+    assert tuple(front) == pytest.approx(shapes.wheel_attitude(2.0, 0.3), abs=1e-4)

@@ -4,6 +4,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot.interface.outputs import Output, OutputKind
 from autopilot.interface.vehicle_state import LandedState, Mode
 from autopilot.mavlink.telemetry.telemetry_rates import STREAMS
 from autopilot.mavlink.transport.links import LinkRole
@@ -339,3 +340,16 @@ def test_data_stream_request_sets_a_group():
     assert "ATTITUDE" not in names
     assert "GLOBAL_POSITION_INT" not in names
     assert "HEARTBEAT" in names
+
+
+def test_outputs_that_go_both_ways_are_pulses_round_1500_us():
+    rig = Rig()
+    signed = [Output("steering", OutputKind.SERVO, True), Output("motor", OutputKind.MOTOR, True)]
+    command = (-1.0, 0.5, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0)
+    actuators = record(Actuators, "Actuators", command=command)
+    rig.update(outputs=(*signed, Output("brake", OutputKind.SERVO)), actuators=actuators)
+    servos = request(rig, "SERVO_OUTPUT_RAW")
+    assert (servos.servo1_raw, servos.servo2_raw, servos.servo3_raw) == (1000, 1750, 1250)
+    rig.update(actuators=record(Actuators, "Actuators", command=(0.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    servos = request(rig, "SERVO_OUTPUT_RAW")
+    assert (servos.servo1_raw, servos.servo2_raw, servos.servo3_raw) == (1500, 1000, 1000)
