@@ -199,24 +199,33 @@ def blade_radius_m(airframe: MultirotorAirframe) -> float:
 
 
 def rover(airframe: RoverAirframe) -> Mesh:
-    """The vehicle without its wheels, in frd: a hull between them, a bumper at each end, a lid, a nose."""
+    """The vehicle without its wheels, in frd: a hull between them, a lid, a bumper at each end, the front one blue."""
     hull = airframe.hull
     length_m, middle_m = hull.front_m + hull.rear_m, 0.5 * (hull.front_m - hull.rear_m)
     between_m = airframe.wheels.track_m - tread_m(airframe) - 0.02
     deck_m = -0.35 * hull.top_m  # above it the lid, down being positive
     tall_m = hull.bottom_m - deck_m
     centre_z_m = 0.5 * (hull.bottom_m + deck_m)
-    bumper = (0.05 * length_m, 2.0 * hull.half_width_m, 0.4 * tall_m)
+    bumper = (0.04 * length_m, 2.0 * hull.half_width_m, 0.4 * tall_m)
     lid_m = hull.top_m + deck_m
-    return joined(
+    body = joined(
         [
-            box((middle_m, 0.0, centre_z_m), (0.96 * length_m, between_m, tall_m), FRAME),
+            box((middle_m, 0.0, centre_z_m), (0.92 * length_m, between_m, tall_m), FRAME),
             box((hull.front_m - 0.5 * bumper[0], 0.0, centre_z_m), bumper, JACKET),
             box((-hull.rear_m + 0.5 * bumper[0], 0.0, centre_z_m), bumper, FRAME),
             box((middle_m - 0.1 * length_m, 0.0, deck_m - 0.5 * lid_m), (0.5 * length_m, between_m, lid_m), CONCRETE),
-            box((middle_m + 0.28 * length_m, 0.0, deck_m - 0.01), (0.16 * length_m, 0.4 * between_m, 0.02), JACKET),
         ]
     )
+    return divided(divided(body))
+
+
+def divided(mesh: Mesh) -> Mesh:
+    """The same with four triangles for each: small ones can be painted in the order of their distance."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    corners = np.stack([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], axis=1).reshape(-1, 3)
+    colours = np.repeat(mesh.colours[mesh.faces[:, 0]], 12, axis=0)
+    return Mesh(corners.astype(np.float32), np.arange(len(corners), dtype=np.uint32).reshape(-1, 3), colours)
 
 
 def wheel(airframe: RoverAirframe) -> Mesh:
