@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from autopilot.vehicles.default_class import DEFAULT_CLASS
 from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import Airframe
+from common.kernels import TICK_US
 from mission.flight import Flight
 from mission.log.replay_topic import ACTIONS, MOTORS, OWNER
 from sim.bodies.vehicles import class_of
@@ -60,6 +61,11 @@ class Moment:
     @property
     def time_s(self) -> float:
         return float(self.row["time_s"])
+
+    @property
+    def tick(self) -> int:
+        """Of the simulator, by which boxes move."""
+        return round(self.time_s * 1e6 / TICK_US)
 
     @property
     def pos_ned(self) -> Row:

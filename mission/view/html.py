@@ -62,7 +62,8 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
         **_trees(world),
         "vehicle": _mesh(shape.body),
         "blade": _mesh(shape.blade),
-        "boxes": None if (boxes := shapes.boxes(world)) is None else _mesh(boxes),
+        "boxes": None if (boxes := shapes.boxes(world, movers=False)) is None else _mesh(boxes),
+        "movers": _movers(recording, world),
         "wheel": _mesh(shape.wheels[0]) if shape.drives else None,
         "wheel_hubs": _array(shape.wheel_hubs),
         "is_steered": list(shape.is_steered),
@@ -111,6 +112,18 @@ def _track(rows: NDArray[Any]) -> Json:
         "owner_ned": _array(rows["owner"]["pos_ned"]),
         "owner_heading_rad": _array(rows["owner"]["heading_rad"]),
     }
+
+
+def _movers(recording: Recording, world: WorldMap) -> list[Json]:
+    """Boxes that run to and fro, and where they are [m] at each moment."""
+    ticks = [recording.moment(i).tick for i in range(len(recording))]
+    movers = shapes.moving_boxes(world)
+    places = np.array([world.boxes.middle(tick) for tick in ticks]) if movers else None
+    return [
+        {"mesh": _mesh(mesh), "place": _array(places[:, i].astype(np.float32))}
+        for i, mesh in movers
+        if places is not None
+    ]
 
 
 def _plots(recording: Recording) -> list[Json]:

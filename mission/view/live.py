@@ -134,6 +134,9 @@ class LiveView:
             self._scene.forget_trails()
         self._scene.extend_trails(moment)
         self._scene.show(moment)
+        obstacles = self._flight.controller.state.obstacles
+        if obstacles is not None and obstacles.body_m:
+            self._scene.draw_rays(moment, obstacles.body_m)
         self._move_cameras(moment)
         if self._is_due("status", STATUS_S):
             self._show_texts(moment)

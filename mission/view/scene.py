@@ -28,6 +28,7 @@ TRAIL_LIFT_M = 0.1  # of what walks on the ground, which would hide its trail
 TRAIL_POINTS = 600
 TRAIL_PERIOD_S = 0.25
 BLADE_TURNS_PER_S = 2.7  # shown; at their true speed blades would stand still or seem to turn backwards
+RAY_RGB, RAY_M = (240, 200, 60), 0.02
 JUMP_S = 1.0  # wheels do not catch up with more
 SKY_RGB = (190, 212, 232)
 
@@ -68,8 +69,11 @@ class Scene:
         self._api.configure_default_lights(cast_shadow=False)  # shadows would cost a weak machine half its frames
         self._api.configure_fog(0.4 * world.config.size_m, 1.4 * world.config.size_m, color=SKY_RGB)
         self._api.set_background_image(np.full((2, 2, 3), SKY_RGB, np.uint8))
+        self._world = world
+        self._movers: list[tuple[int, viser.FrameHandle]] = []
         self._add_world(world)
         self._shown_s: float | None = None
+        self._rays: Any = None  # lines, once there have been some
         self._wheels: list[viser.FrameHandle] = []
         self._vehicle = self._api.add_frame("/vehicle", axes_length=0.4, axes_radius=0.008)
         shape = shapes.vehicle(airframe)
@@ -110,9 +114,12 @@ class Scene:
         ring = shapes.walls(world)
         if ring is not None:
             self._add_mesh("/world/walls", ring)
-        boxes = shapes.boxes(world)
+        boxes = shapes.boxes(world, movers=False)
         if boxes is not None:
             self._add_mesh("/world/boxes", boxes)
+        for i, mesh in shapes.moving_boxes(world):
+            self._movers.append((i, self._api.add_frame(f"/world/mover{i}", show_axes=False)))
+            self._add_mesh(f"/world/mover{i}/box", mesh)
         forest = shapes.trees(world)
         count = len(forest.trunk_ned)
         if count == 0:
@@ -160,6 +167,10 @@ class Scene:
             if speed > 1.0:
                 handle.wxyz = wxyz_of(quat_of(2.0 * np.pi * BLADE_TURNS_PER_S * spin * moment.time_s, 0.0))
         self._turn_wheels(moment)
+        if self._movers:
+            places = self._world.boxes.middle(moment.tick)
+            for i, handle in self._movers:
+                handle.position = (places[i][0], places[i][1], 0.0)
         if moment.has_owner:
             self._owner.position = moment.owner_ned
             self._owner.wxyz = wxyz_of(quat_of(float(moment.row["owner"]["heading_rad"]), 0.0))
@@ -170,6 +181,22 @@ class Scene:
         if has_goal:
             self._goal.position = moment.goal_ned
         self._goal.visible = has_goal
+
+    def draw_rays(self, moment: Moment, ranges_m: Sequence[float]) -> None:
+        """What a ring of range finders sees, clockwise from the nose; rays that meet nothing are left out."""
+        ranges = np.array(ranges_m, np.float32)
+        bearing = yaw_of(moment.q_ned_from_frd) + 2.0 * np.pi * np.arange(len(ranges)) / max(len(ranges), 1)
+        meets = np.isfinite(ranges)
+        level = np.stack([np.cos(bearing), np.sin(bearing), np.zeros(len(ranges))], axis=1)
+        ends = moment.pos_ned + (ranges[meets, None] * level[meets]).astype(np.float32)
+        starts = np.broadcast_to(moment.pos_ned, ends.shape)
+        lines = np.stack([starts, ends], axis=1).astype(np.float32)
+        if self._rays is not None:
+            self._rays.visible = len(lines) > 0
+        if len(lines) and self._rays is None:
+            self._rays = self._api.add_line_segments("/rays", lines, RAY_RGB, thickness=RAY_M)
+        elif len(lines):
+            self._rays.points = lines
 
     def _turn_wheels(self, moment: Moment) -> None:
         """By what they have turned since the moment shown before; not after a jump in time."""

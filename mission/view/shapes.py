@@ -6,7 +6,8 @@ from outside, and colours with the light already in them where nobody lights the
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ BOX_M, NOSE_M = (0.5, 0.3, 0.15), (0.1, 0.15, 0.1)  # of a vehicle whose shape i
 FRAME, BLADE = (48, 52, 60), (30, 32, 36)
 TYRE, SPOKE, MARK = (34, 34, 38), (150, 156, 164), (236, 236, 240)
 WHEEL_SIDES, SPOKES = 14, 4
+BOX_TOP = (8, 9)  # of a box's faces
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -113,21 +115,31 @@ def walls(world: WorldMap) -> Mesh | None:
     return joined(boxes)
 
 
-def boxes(world: WorldMap, tick: int = 0) -> Mesh | None:
-    """The boxes that stand in the world, as they are at a tick, if there are any."""
+def boxes(world: WorldMap, tick: int = 0, *, movers: bool = True) -> Mesh | None:
+    """The boxes in the world, as they are at a tick, with those that move or without; None if there are none."""
     rows = world.boxes.rows
-    if rows.size == 0:
-        return None
-    meshes = []
-    for row, (north, east) in zip(rows, world.boxes.middle(tick), strict=True):
-        size = (2.0 * float(row["half_length"]), 2.0 * float(row["half_width"]), float(row["high"] - row["low"]))
-        colour = CONCRETE if row["period_ticks"] == 0 else JACKET
-        mesh = box((0.0, 0.0, -0.5 * float(row["high"] + row["low"])), size, colour)
-        cos, sin = float(row["cos_yaw"]), float(row["sin_yaw"])
-        turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]], np.float32)
-        place = np.array([north, east, 0.0], np.float32)
-        meshes.append(Mesh((mesh.vertices @ turn + place).astype(np.float32), mesh.faces, mesh.colours))
-    return joined(meshes)
+    meshes = [
+        Mesh(mesh.vertices + np.array([north, east, 0.0], np.float32), mesh.faces, mesh.colours)
+        for row, (north, east) in zip(rows, world.boxes.middle(tick), strict=True)
+        if movers or row["period_ticks"] == 0
+        for mesh in [_box_round_middle(row)]
+    ]
+    return joined(meshes) if meshes else None
+
+
+def moving_boxes(world: WorldMap) -> list[tuple[int, Mesh]]:
+    """Those that run to and fro: which of the world's boxes, and its shape round its middle on the map."""
+    rows = world.boxes.rows
+    return [(i, _box_round_middle(rows[i])) for i in range(len(rows)) if rows[i]["period_ticks"] > 0]
+
+
+def _box_round_middle(row: Any) -> Mesh:
+    size = (2.0 * float(row["half_length"]), 2.0 * float(row["half_width"]), float(row["high"] - row["low"]))
+    colour = CONCRETE if row["period_ticks"] == 0 else JACKET
+    mesh = box((0.0, 0.0, -0.5 * float(row["high"] + row["low"])), size, colour)
+    cos, sin = float(row["cos_yaw"]), float(row["sin_yaw"])
+    turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]], np.float32)
+    return Mesh((mesh.vertices @ turn).astype(np.float32), mesh.faces, mesh.colours)
 
 
 class VehicleShape(NamedTuple):
@@ -207,15 +219,19 @@ def rover(airframe: RoverAirframe) -> Mesh:
     tall_m = hull.bottom_m - deck_m
     centre_z_m = 0.5 * (hull.bottom_m + deck_m)
     bumper = (0.04 * length_m, 2.0 * hull.half_width_m, 0.4 * tall_m)
-    lid_m = hull.top_m + deck_m
-    body = joined(
-        [
-            box((middle_m, 0.0, centre_z_m), (0.92 * length_m, between_m, tall_m), FRAME),
-            box((hull.front_m - 0.5 * bumper[0], 0.0, centre_z_m), bumper, JACKET),
-            box((-hull.rear_m + 0.5 * bumper[0], 0.0, centre_z_m), bumper, FRAME),
-            box((middle_m - 0.1 * length_m, 0.0, deck_m - 0.5 * lid_m), (0.5 * length_m, between_m, lid_m), CONCRETE),
-        ]
-    )
+    lid_m, ends_m = hull.top_m + deck_m, (-0.46, -0.35, 0.15, 0.46)  # of the length: the lid is on the middle part
+    parts = [
+        box((hull.front_m - 0.5 * bumper[0], 0.0, centre_z_m), bumper, JACKET),
+        box((-hull.rear_m + 0.5 * bumper[0], 0.0, centre_z_m), bumper, FRAME),
+    ]
+    for low, high in pairwise(ends_m):
+        middle_x_m, part_m = middle_m + 0.5 * (low + high) * length_m, (high - low) * length_m
+        part = box((middle_x_m, 0.0, centre_z_m), (part_m, between_m, tall_m), FRAME)
+        if low == ends_m[1]:
+            part = Mesh(part.vertices, np.delete(part.faces, BOX_TOP, axis=0), part.colours)  # nothing shows through
+            parts.append(box((middle_x_m, 0.0, deck_m - 0.5 * lid_m), (part_m, between_m, lid_m), CONCRETE))
+        parts.append(part)
+    body = joined(parts)
     return divided(divided(body))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from autopilot.interface.vehicle_state import Mode
 from mission.simulator.flight_rig import flight_world
 from mission.view import film as film_file
 from mission.view.film import write_film
@@ -84,3 +85,13 @@ def test_a_terminal_gets_a_bar_with_the_total(world, tmp_path):
     out = io.StringIO()
     write_film(hovering(0.4), world, tmp_path / "a.mp4", Console(file=out, width=80, force_terminal=True))
     assert "10/10" in out.getvalue()
+
+
+def test_of_what_drives_no_height_is_told_and_its_mode_has_its_classs_title():
+    recording = hovering(1.0, mode=Mode.POSITION)
+    config = recording.config.model_copy(update={"airframe": "rover", "owner": None})
+    driven = dataclasses.replace(recording, config=config)
+    driven.rows["owner"] = np.zeros(1, driven.rows["owner"].dtype)
+    assert caption(driven.moment(0), drives=True) == "0:10.0   Position   0.0 m/s"
+    assert "Land" not in driven.modes.values()
+    assert "Land" in recording.modes.values()
