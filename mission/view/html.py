@@ -73,7 +73,7 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
         "spins": list(shape.spins),
         "path_ned": _array(recording.path_ned) if len(recording.path_ned) > 1 else None,
         "track": _track(rows),
-        "plots": _plots(recording),
+        "plots": _plots(recording, drives=shape.drives),
         "onboard": _onboard(recording, world),
     }
 
@@ -126,13 +126,15 @@ def _movers(recording: Recording, world: WorldMap) -> list[Json]:
     ]
 
 
-def _plots(recording: Recording) -> list[Json]:
+def _plots(recording: Recording, *, drives: bool) -> list[Json]:
     rows = recording.rows
     plots: list[tuple[str, tuple[str, ...], list[NDArray[Any]]]] = [
         ("height above ground [m]", ("height",), [rows["height_m"]]),
         ("speed [m/s]", ("speed",), [np.linalg.norm(rows["vel_ned"], axis=1)]),
         ("battery [%]", ("battery",), [100.0 * rows["battery"]]),
     ]
+    if drives:
+        del plots[0]
     if recording.has_owner:
         plots.insert(0, ("distance to owner [m]", ("distance",), [distances_m(rows)]))
         plots.append(("action", ACTION_NAMES, list(rows["action"].T)))

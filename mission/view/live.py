@@ -71,7 +71,7 @@ class LiveView:
         self._pending: Future[RawFrame] | None = None
         self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned)
         moment = self._moment()
-        self._panel = Panel(server, has_owner=moment.has_owner)
+        self._panel = Panel(server, has_owner=moment.has_owner, drives=self._scene.drives)
         self._controls = Controls(flight, server, self._add_task, speed, has_plan=len(path_ned) > 0)
         self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
         self._next_point_s = 0.0

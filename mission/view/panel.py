@@ -41,10 +41,11 @@ class Panel:
     Args:
         server: of the page.
         has_owner: whether somebody is followed; without, there is no distance and no action to plot.
+        drives: the vehicle stays on the ground; its height is not told.
     """
 
-    def __init__(self, server: viser.ViserServer, *, has_owner: bool) -> None:
-        self._gui = server.gui
+    def __init__(self, server: viser.ViserServer, *, has_owner: bool, drives: bool = False) -> None:
+        self._gui, self._drives = server.gui, drives
         self._image: viser.GuiImageHandle | None = None
         panel = self._gui.add_panel()
         with panel.add_tab("Flight"):
@@ -56,7 +57,8 @@ class Panel:
             self._plots = [
                 Plot(self._gui, title, names, read)
                 for title, (names, read) in PLOTS.items()
-                if has_owner or not (title.startswith("distance") or len(names) == ACTIONS)
+                if (has_owner or not (title.startswith("distance") or len(names) == ACTIONS))
+                and not (drives and title.startswith("height"))
             ]
         panel.dock_left()
         panel.expand()  # on a phone it would be closed
@@ -67,7 +69,7 @@ class Panel:
         armed = "armed" if moment.row["is_armed"] else "disarmed"
         rows = [
             f"**{moment.mode_name}**, {armed}, {moment.time_s:.1f} s",
-            f"height {moment.row['height_m']:.1f} m, speed {moment.speed_m_s:.1f} m/s, "
+            ("" if self._drives else f"height {moment.row['height_m']:.1f} m, ") + f"speed {moment.speed_m_s:.1f} m/s, "
             f"battery {100.0 * moment.row['battery']:.0f} %",
         ]
         if moment.has_owner:

@@ -91,7 +91,7 @@ class ReplayView:
         mount = Mount(MOUNT_FRD, camera_mount(), HFOV_DEG, 1, 1)
         airframe = load_airframe(recording.config.airframe)
         self._scene = Scene(server, world, airframe, mount=mount, path_ned=recording.path_ned.tolist())
-        self._panel = Panel(server, has_owner=recording.has_owner)
+        self._panel = Panel(server, has_owner=recording.has_owner, drives=self._scene.drives)
         self._eye = onboard_eye(world)
         for row in recording.every(round(PLOT_PERIOD_S * 1e6 / FRAME_US)).rows:
             self._panel.note_row(row)

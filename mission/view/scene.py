@@ -169,8 +169,8 @@ class Scene:
         self._turn_wheels(moment)
         if self._movers:
             places = self._world.boxes.middle(moment.tick)
-            for i, handle in self._movers:
-                handle.position = (places[i][0], places[i][1], 0.0)
+            for i, mover in self._movers:
+                mover.position = (places[i][0], places[i][1], 0.0)
         if moment.has_owner:
             self._owner.position = moment.owner_ned
             self._owner.wxyz = wxyz_of(quat_of(float(moment.row["owner"]["heading_rad"]), 0.0))
@@ -204,9 +204,9 @@ class Scene:
         self._shown_s = moment.time_s
         if abs(passed_s) < JUMP_S:
             self._turned_rad += passed_s * moment.row["motor_speed"][: len(self._wheels)]
-        for handle, turned_rad, is_steered in zip(self._wheels, self._turned_rad, self._is_steered, strict=True):
+        for wheel, turned_rad, is_steered in zip(self._wheels, self._turned_rad, self._is_steered, strict=True):
             steering_rad = float(moment.row["steering_rad"]) if is_steered else 0.0
-            handle.wxyz = wxyz_of(shapes.wheel_attitude(float(turned_rad), steering_rad))
+            wheel.wxyz = wxyz_of(shapes.wheel_attitude(float(turned_rad), steering_rad))
 
     def extend_trails(self, moment: Moment) -> None:
         """Appends where everybody is; `show` leads on from there."""

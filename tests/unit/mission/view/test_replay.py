@@ -1,5 +1,6 @@
 """`honeyguide replay`: the HTML file, the film, and what is refused."""
 
+import dataclasses
 import json
 import re
 from base64 import b64decode
@@ -63,3 +64,18 @@ def test_a_folder_without_a_run_is_refused(tmp_path):
     result = run(tmp_path)
     assert result.exit_code == 2
     assert "holds no run" in result.stderr
+
+
+def test_the_html_of_a_drive_has_wheels_no_height_and_the_modes_of_its_class():
+    flown = hovering(2.0)
+    config = flown.config.model_copy(update={"airframe": "rover", "owner": None})
+    flown.rows["motor_speed"][:, :4] = 10.0
+    driven = dataclasses.replace(flown, config=config)
+    data = page_data(driven, flight_world(config), "rover")
+    assert data["wheel"] is not None
+    assert data["is_steered"] == [True, True, False, False]
+    assert [plot["title"] for plot in data["plots"]] == ["speed [m/s]", "battery [%]"]
+    assert "Takeoff" not in data["modes"].values()
+    turned = np.frombuffer(b64decode(data["track"]["turned_rad"]["data"]), "<f4").reshape(-1, 8)
+    assert turned[-1, 0] == pytest.approx(10.0 * (flown.rows["time_s"][-1] - flown.rows["time_s"][0]), rel=1e-3)
+    assert page_data(flown, flight_world(CONFIG), "x500")["wheel"] is None
