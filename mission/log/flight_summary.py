@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from autopilot.interface.vehicle_state import Mode
 from common.geodesy import GeoPoint, ned_from_geodetic
-from common.kernels import FRAME_US
+from common.kernels import FRAME_US, TICK_US
 from mission.log.flight_recorder import History
 from mission.plan.plan_file import Plan
 from sim.world.world import WorldMap
@@ -127,9 +127,14 @@ def segment_distance_m(points: Rows, start: Rows, end: Rows) -> Rows:
 
 
 def clearance_min_m(history: History, world: WorldMap) -> float:
-    """Least distance to a tree or wall [m] while armed, sampled at 5 Hz; infinite in an empty world."""
-    points = history.pos_ned_true[history.is_armed][::CLEARANCE_EVERY_FRAMES]
-    return float(np.min(world.obstacle_distance(points.astype(float)))) if len(points) else float("nan")
+    """Least distance to a tree, wall or box [m] while armed, sampled at 5 Hz; infinite in an empty world."""
+    points = history.pos_ned_true[history.is_armed][::CLEARANCE_EVERY_FRAMES].astype(float)
+    if len(points) == 0:
+        return float("nan")
+    if not world.boxes.rows["period_ticks"].any():
+        return float(np.min(world.obstacle_distance(points)))
+    ticks = history.time_us[history.is_armed][::CLEARANCE_EVERY_FRAMES] // TICK_US
+    return min(float(world.obstacle_distance(point, int(tick))) for point, tick in zip(points, ticks, strict=True))
 
 
 def _rms(errors: Rows) -> Any:

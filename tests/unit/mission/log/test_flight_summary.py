@@ -20,6 +20,8 @@ from mission.log.flight_summary import (
     summarise,
 )
 from mission.plan.plan_file import DEFAULT_PLAN, Plan, PlanItem, read_plan
+from sim.world.batch import grown_world
+from sim.world.driving_worlds import COURSE
 from sim.world.world import WorldConfig, build_world
 
 
@@ -205,3 +207,17 @@ def test_json_has_null_for_what_is_not_known(flight):
     assert figures["cross_track_p95_m"] is None
     assert figures["simulated_s"] == pytest.approx(0.2)
     assert figures["innovations_in_band"]["gnss_pos"] is None
+
+
+def test_clearance_to_a_box_that_moves_is_to_where_it_was_then():
+    world = grown_world(COURSE.model_copy(update={"trees_per_ha": 0.0}), 3)
+    mover = int(np.flatnonzero(world.boxes.rows["period_ticks"])[0])
+    frames = np.arange(1, 1001)
+    nearest_m = []
+    for frame in (1, 501):  # it moves away from one, towards the other
+        history = history_of(1000, is_armed=frames == frame)
+        tick = 5 * frame
+        there = np.array([*world.boxes.middle(tick)[mover], -float(world.boxes.rows[mover]["low"]) - 0.1])
+        history.pos_ned_true[:] = there
+        nearest_m.append(clearance_min_m(history, world))
+    assert max(nearest_m) < 0.0  # inside the box, both times
