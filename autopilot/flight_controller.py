@@ -335,7 +335,7 @@ class FlightController:
     def _carry_out(self, request: ModeRequest) -> Reply:
         """Judges a request, hands it to the mode that carries it out, and enters that."""
         mode = self.navigator.mode_for(request)
-        if mode not in self.modes:
+        if mode is None:
             return Reply(Verdict.UNSUPPORTED, "no mode of this vehicle does that")
         is_flown = mode is self.state.mode
         if request.in_air and not self.navigator.may_go(mode):

@@ -15,7 +15,7 @@ from autopilot.interface.item_lists import MissionItem
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight, FlightConfig
 from mission.log.flight_recorder import History
-from mission.script import Drone, ScriptError
+from mission.script import Drone, Script, ScriptError
 from sim.faults import set_fault
 from sim.world.world import WorldConfig
 
@@ -66,6 +66,19 @@ def drive_items(config: FlightConfig, corners: Sequence[Place], speed_m_s: float
     return items
 
 
+def driven(flight: Flight, script: Script, seconds: float) -> tuple[Any, History]:
+    """Runs a script to its end: its result, and the history.
+
+    Raises:
+        ScriptError: it failed, or did not end in time.
+    """
+    running = flight.fly(script, seconds=seconds)
+    history = flight.close()
+    if running.error is not None:
+        raise running.error
+    return running.result, history
+
+
 def square_trial(config: FlightConfig, speed_m_s: float, stop_s: float = 0.0) -> MissionFigures:
     """A square of 50 m, from power-on until it has stood at its end for 5 s.
 
@@ -83,10 +96,7 @@ def square_trial(config: FlightConfig, speed_m_s: float, stop_s: float = 0.0) ->
         await drone.wait_mission_finished(len(items) - 1)
         await drone.sleep(5.0)
 
-    running = flight.fly(script, seconds=90.0 + 300.0 / speed_m_s + 10.0 * stop_s)
-    history = flight.close()
-    if running.error is not None:
-        raise running.error
+    _, history = driven(flight, script, 90.0 + 300.0 / speed_m_s + 10.0 * stop_s)
     return _judged(history)
 
 
@@ -94,7 +104,7 @@ def _judged(history: History) -> MissionFigures:
     here, truth = history.pos_ned_est[:, :2].astype(float), history.pos_ned_true[:, :2].astype(float)
     speed = np.hypot(*history.vel_ned_true[:, :2].astype(float).T)
     across: list[float] = []
-    overshoot, miss, miss_true = 0.0, 0.0, 0.0
+    overshoot = 0.0
     start = np.zeros(2)
     came_from: Rows | None = None
     for i_leg, corner in enumerate(SQUARE):
@@ -112,8 +122,7 @@ def _judged(history: History) -> MissionFigures:
         start, came_from = end, ahead
     still = speed < 0.05
     last = history.is_armed & still & (history.mission_seq == len(SQUARE))
-    miss = max(miss, float(np.hypot(*(here[last][-1] - start))))
-    miss_true = max(miss_true, float(np.hypot(*(truth[last][-1] - start))))
+    miss, miss_true = (float(np.hypot(*(place[last][-1] - start))) for place in (here, truth))
     return MissionFigures(float(np.percentile(across, 95.0)), overshoot, miss, miss_true, float(speed.max()))
 
 
@@ -130,11 +139,8 @@ def return_trial(config: FlightConfig, from_m: Place = (40.0, 30.0)) -> tuple[fl
         await drone.wait_disarmed()
         return begin_us
 
-    running = flight.fly(script, seconds=200.0)
-    history = flight.close()
-    if running.error is not None:
-        raise running.error
-    here = history.pos_ned_est[history.time_us >= running.result, :2].astype(float)
+    begin_us, history = driven(flight, script, 200.0)
+    here = history.pos_ned_est[history.time_us >= begin_us, :2].astype(float)
     home = history.pos_ned_est[0, :2].astype(float)
     way = home - here[0]
     ahead = way / np.hypot(*way)
@@ -152,10 +158,7 @@ def hold_trial(config: FlightConfig, place: Place = (30.0, 30.0)) -> float:
         await drone.start_offboard()
         await drone.sleep(70.0)
 
-    running = flight.fly(script, seconds=120.0)
-    history = flight.close()
-    if running.error is not None:
-        raise running.error
+    _, history = driven(flight, script, 120.0)
     late = history.time_us >= history.time_us[-1] - 10_000_000
     return float(np.hypot(*(history.pos_ned_est[late, :2].astype(float) - place).T).max())
 
@@ -173,10 +176,7 @@ def speed_trial(config: FlightConfig, speed_m_s: float, course_rad: float = 0.5 
         await drone.start_offboard()
         await drone.sleep(18.0)
 
-    running = flight.fly(script, seconds=60.0)
-    history = flight.close()
-    if running.error is not None:
-        raise running.error
+    _, history = driven(flight, script, 60.0)
     late = history.time_us >= history.time_us[-1] - 10_000_000
     speed = np.linalg.norm(history.vel_ned_true[late].astype(float), axis=1)  # along the slope
     x, y, z, w = history.q_true[late].astype(float).T
@@ -204,10 +204,7 @@ def loss_trial(config: FlightConfig, speed_m_s: float = 3.0, lost_s: float = 30.
         if flight.controller.state.mode.name != "MISSION":
             raise ScriptError(f"it has left its mission: {drone.texts[-2:]}")
 
-    running = flight.fly(script, seconds=120.0)
-    history = flight.close()
-    if running.error is not None:
-        raise running.error
+    _, history = driven(flight, script, 120.0)
     lost = history.time_us >= history.time_us[-1] - int(lost_s * 1e6)
     error = (history.pos_ned_est - history.pos_ned_true)[lost, :2].astype(float)
     way = float(np.hypot(*history.vel_ned_true[lost, :2].astype(float).T).sum() * 0.02)

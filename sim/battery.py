@@ -53,6 +53,32 @@ def battery_current(model: BatteryModel, open_circuit_v: float, power_w: float) 
     return 2.0 * power / wp.max(open_circuit_v + root, 0.01)  # 0 for a pack without voltage
 
 
+@wp.struct
+class Discharge:
+    """A pack after a while of a load."""
+
+    charge_c: float  # [C] left
+    rounding_c: float  # [C] what rounding has added to it, to be taken off (Kahan's sum)
+    voltage_v: float
+    current_a: float
+
+
+@wp.func
+def discharged(model: BatteryModel, charge_c: float, rounding_c: float, power_w: float, dt: float) -> Discharge:
+    """The pack after dt [s] of a load [W].
+
+    A tick takes 0.05 C from 18,000 C, where float32 is 0.002 C apart: without compensation 2 % would be lost.
+    """
+    after = Discharge()
+    open_v = open_circuit_voltage(model, charge_c)
+    after.current_a = battery_current(model, open_v, power_w)
+    after.voltage_v = open_v - model.resistance_ohm * after.current_a
+    taken_c = after.current_a * dt + rounding_c
+    after.charge_c = charge_c - taken_c
+    after.rounding_c = (after.charge_c - charge_c) + taken_c
+    return after
+
+
 def battery_model(airframe: Airframe) -> BatteryModel:
     """Battery constants of an airframe."""
     data = airframe.battery

@@ -13,7 +13,7 @@ from autopilot.interface.vehicle_state import LandedState, Mode, Reply, Severity
 from common.params import Parameter, ParameterTable
 
 _LOW_THROTTLE = -0.8  # of thrust modes, for arming (PX4)
-_MIDDLE_THROTTLE = 0.2  # of climb rate modes, for arming (PX4)
+_MIDDLE_THROTTLE = 0.2  # where the stick rests in the middle, for arming (PX4)
 _CORNER = 0.9  # of the yaw stick, for the arming gesture
 _CENTRE = 0.1  # of the other two
 _SWITCH_POSITIONS = 6
@@ -78,7 +78,7 @@ class Pilot:
         if not self._is_flown(mode) or not self.is_heard:
             return ""  # without sticks the mode itself is refused, or needs none
         throttle = self._state.sticks.throttle
-        if self._modes[mode].is_climb_rate:
+        if self._modes[mode].rests_in_middle:
             return "throttle above the middle" if throttle > _MIDDLE_THROTTLE else ""
         return "throttle is not low" if throttle > _LOW_THROTTLE else ""
 

@@ -159,7 +159,7 @@ class ModeSpec:
     carries_out: tuple[Action, ...] = ()  # the failsafe actions that lead to it
     exception: int = 0  # its bit of COM_DLL_EXCEPT and COM_RCL_EXCEPT
     override: int = 0  # its bit of COM_RC_OVERRIDE
-    is_climb_rate: bool = False  # the throttle stick is a climb rate: armed with the stick in the middle
+    rests_in_middle: bool = False  # the throttle stick: armed with it there, rather than down
 
     @property
     def is_offboard(self) -> bool:

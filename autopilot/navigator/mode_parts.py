@@ -25,3 +25,8 @@ class ModeParts:
 def of_context(make: Callable[[NavContext], FlightMode]) -> Callable[[ModeParts], FlightMode]:
     """The builder of a mode that needs nothing but the context."""
     return lambda parts: make(parts.context)
+
+
+def mission_mode(parts: ModeParts) -> FlightMode:
+    """Mode Mission is the stored mission itself."""
+    return parts.mission

@@ -231,12 +231,14 @@ class Navigator:
 
     # ---- what clients ask for ----
 
-    def mode_for(self, request: ModeRequest) -> Mode:
+    def mode_for(self, request: ModeRequest) -> Mode | None:
         """The mode that carries out a request: the present one, the one it names, or the first that takes it."""
         able = [mode for mode, spec in self._specs.items() if type(request) in spec.takes]
         if request.stays and self.context.state.mode in able:
             return self.context.state.mode
-        return request.mode if request.mode in able or not able else able[0]
+        if request.mode in able:
+            return request.mode
+        return able[0] if able else None
 
     def may_go(self, mode: Mode) -> bool:
         """Whether the vehicle can be sent somewhere by a mode: it is in the air, or about to be."""
@@ -246,8 +248,6 @@ class Navigator:
 
     def take(self, mode: Mode, request: ModeRequest) -> Reply:
         """Hands a request to the mode that carries it out; the caller enters that."""
-        if type(request) not in self._specs[mode].takes:
-            return Reply(Verdict.UNSUPPORTED, "no mode of this vehicle does that")
         return self.modes[mode].take(request)
 
     def begin_request(self, mode: Mode) -> None:

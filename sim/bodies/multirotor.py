@@ -11,7 +11,7 @@ import warp as wp
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S, vec8
 from common.rotation import quat_from_yaw
-from sim.battery import battery_current, open_circuit_voltage
+from sim.battery import discharged
 from sim.bodies.contact import (
     ContactForce,
     ContactModel,
@@ -22,13 +22,13 @@ from sim.bodies.contact import (
     obstacle_force,
 )
 from sim.bodies.multirotor_model import MultirotorModel
+from sim.bodies.rigid_body import hull_drag, lag_gain, turned_by
 from sim.truth import Truth
 from sim.world.world import World
 
 wp.set_module_options({"enable_backward": False})
 
 _GRAVITY_NED = wp.constant(wp.vec3(0.0, 0.0, GRAVITY_M_S2))
-_SEA_LEVEL_DENSITY_KG_M3 = wp.constant(1.225)  # ISO 2533 standard atmosphere
 _DENSITY_LAPSE_PER_M = wp.constant(9.6e-5)  # ISO 2533: relative change of density per metre near sea level
 _SUBSTEP_S = wp.constant(TICK_S / SUBSTEPS)
 _SUBSTEP_COUNT = wp.constant(SUBSTEPS)
@@ -112,12 +112,6 @@ def density_ratio(model: MultirotorModel, down_m: float) -> float:
 
 
 @wp.func
-def lag_gain(time_constant_s: float, dt: float) -> float:
-    """Fraction of the way to its target a first-order lag goes in dt: the bilinear form of 1 - exp(-dt / tau)."""
-    return 2.0 * dt / (2.0 * time_constant_s + dt)
-
-
-@wp.func
 def add_rotor(
     model: MultirotorModel,
     inputs: StepInputs,
@@ -174,28 +168,10 @@ def rotor_wrench(
 
 
 @wp.func
-def body_drag(model: MultirotorModel, air_vel_frd: wp.vec3, density: float) -> wp.vec3:
-    """Force [N] on the hull: -½ rho (c_d A) |v| v along each axis."""
-    pressure = -0.5 * _SEA_LEVEL_DENSITY_KG_M3 * density * wp.length(air_vel_frd)
-    return pressure * wp.cw_mul(model.drag_area_frd, air_vel_frd)
-
-
-@wp.func
 def angular_accel(model: MultirotorModel, omega_frd: wp.vec3, torque_frd: wp.vec3, momentum_z: float) -> wp.vec3:
     """Euler's equation with the rotors' momentum: I dw/dt = torque - w x (I w + h) [rad/s²]."""
     momentum = wp.cw_mul(model.inertia_frd, omega_frd) + wp.vec3(0.0, 0.0, momentum_z)
     return wp.cw_mul(torque_frd - wp.cross(omega_frd, momentum), model.inertia_inv_frd)
-
-
-@wp.func
-def turned_by(q_ned_from_frd: wp.quat, rotvec_frd: wp.vec3) -> wp.quat:
-    """Attitude after a body rotation vector of less than 0.1 rad: series of the exponential, exact to float32."""
-    square = wp.dot(rotvec_frd, rotvec_frd)
-    half_sinc = 0.5 - square / 48.0
-    turn = wp.quat(
-        half_sinc * rotvec_frd[0], half_sinc * rotvec_frd[1], half_sinc * rotvec_frd[2], 1.0 - 0.125 * square
-    )
-    return wp.normalize(q_ned_from_frd * turn)
 
 
 @wp.func
@@ -227,7 +203,7 @@ def _substep(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> Bod
     omega = body.omega_frd
     air_vel_frd = r_frd_from_ned * (body.vel_ned - inputs.wind_ned)
     wrench = rotor_wrench(model, inputs, body.rotor_speed, air_vel_frd, omega)
-    force_frd = wrench.force_frd + body_drag(model, air_vel_frd, inputs.density_ratio)
+    force_frd = wrench.force_frd + hull_drag(model.drag_area_frd, air_vel_frd, inputs.density_ratio)
     angular_drag = inputs.density_ratio * model.angular_drag_n_m_s2
     torque_frd = wrench.torque_frd - angular_drag * wp.cw_mul(wp.abs(omega), omega)
     if around.is_near_ground + around.is_near_obstacle > 0:
@@ -279,14 +255,11 @@ def drain_battery(model: MultirotorModel, body: BodyState, density: float, dt: f
         w = body.rotor_speed[r]
         cubes += w * w * w
     power_w = model.battery.avionics_w + density * model.torque_n_m_s2 * cubes / model.battery.motor_efficiency
-    open_v = open_circuit_voltage(model.battery, body.battery_charge_c)
-    body.battery_current_a = battery_current(model.battery, open_v, power_w)
-    body.battery_voltage_v = open_v - model.battery.resistance_ohm * body.battery_current_a
-    # A tick takes 0.05 C from 18,000 C, where float32 is 0.002 C apart: without compensation 2 % would be lost.
-    taken_c = body.battery_current_a * dt + body.battery_rounding_c
-    left_c = body.battery_charge_c - taken_c
-    body.battery_rounding_c = (left_c - body.battery_charge_c) + taken_c
-    body.battery_charge_c = left_c
+    after = discharged(model.battery, body.battery_charge_c, body.battery_rounding_c, power_w, dt)
+    body.battery_charge_c = after.charge_c
+    body.battery_rounding_c = after.rounding_c
+    body.battery_voltage_v = after.voltage_v
+    body.battery_current_a = after.current_a
     return body
 
 

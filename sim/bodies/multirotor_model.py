@@ -7,6 +7,7 @@ from common.geodesy import DEFAULT_HOME
 from common.kernels import vec8
 from sim.battery import BatteryModel, battery_model
 from sim.bodies.contact import ContactModel, contact_model
+from sim.bodies.rigid_body import density_ratio_at
 
 wp.set_module_options({"enable_backward": False})
 
@@ -69,7 +70,7 @@ def multirotor_model(airframe: MultirotorAirframe, home_alt_amsl_m: float = DEFA
     model.spin_up_time_s = rotor.spin_up_time_s
     model.spin_down_time_s = rotor.spin_down_time_s
     model.rotor_inertia_kg_m2 = rotor.inertia_kg_m2
-    model.home_density_ratio = (1.0 - 2.25577e-5 * home_alt_amsl_m) ** 4.25588  # ISO 2533, troposphere
+    model.home_density_ratio = density_ratio_at(home_alt_amsl_m)
     model.battery = battery_model(airframe)
     model.contact = contact_model(airframe)
     return model

@@ -12,9 +12,9 @@ import warp as wp
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S, vec8
 from common.rotation import quat_from_yaw
-from sim.battery import battery_current, open_circuit_voltage
+from sim.battery import discharged
 from sim.bodies.body import Body
-from sim.bodies.multirotor import turned_by
+from sim.bodies.rigid_body import hull_drag, turned_by
 from sim.bodies.rover_hull import HullContact, hull_contact, is_near_obstacle, look_at_hull
 from sim.bodies.rover_model import RoverModel, rover_model
 from sim.bodies.rover_wheels import WheelStep, steered_frd, wheel_step
@@ -24,7 +24,6 @@ from sim.world.world import World, ground_height, ground_normal_ned
 wp.set_module_options({"enable_backward": False})
 
 _GRAVITY_NED = wp.constant(wp.vec3(0.0, 0.0, GRAVITY_M_S2))
-_SEA_LEVEL_DENSITY_KG_M3 = wp.constant(1.225)  # ISO 2533 standard atmosphere
 _SUBSTEP_S = wp.constant(TICK_S / SUBSTEPS)
 _SUBSTEP_COUNT = wp.constant(SUBSTEPS)
 _TICK_S = wp.constant(TICK_S)
@@ -152,8 +151,7 @@ def _substep(model: RoverModel, body: RoverState, inputs: DriveInputs, hull: Hul
     normal_frd = to_frd * inputs.normal_ned
     vel_frd = to_frd * body.vel_ned
     air_vel_frd = to_frd * (body.vel_ned - inputs.wind_ned)
-    pressure = -0.5 * _SEA_LEVEL_DENSITY_KG_M3 * inputs.density_ratio * wp.length(air_vel_frd)
-    force_frd = pressure * wp.cw_mul(model.drag_area_frd, air_vel_frd)
+    force_frd = hull_drag(model.drag_area_frd, air_vel_frd, inputs.density_ratio)
     torque_frd = wp.vec3()
     nose = wp.vec3(1.0, 0.0, 0.0)
     speeds = body.wheel_speed
@@ -211,13 +209,11 @@ def drain_battery(model: RoverModel, body: RoverState, dt: float) -> RoverState:
         heating_m_s = body.drive_n[k] / wp.max(model.is_driven[k] * model.motor_n_s_m, _NO_MOTOR_N_S_M)
         taken_w = body.drive_n[k] * (model.radius_m * body.wheel_speed[k] + heating_m_s)
         power_w += wp.max(taken_w, 0.0) / model.battery.motor_efficiency
-    open_v = open_circuit_voltage(model.battery, body.battery_charge_c)
-    body.battery_current_a = battery_current(model.battery, open_v, power_w)
-    body.battery_voltage_v = open_v - model.battery.resistance_ohm * body.battery_current_a
-    taken_c = body.battery_current_a * dt + body.battery_rounding_c
-    left_c = body.battery_charge_c - taken_c
-    body.battery_rounding_c = (left_c - body.battery_charge_c) + taken_c
-    body.battery_charge_c = left_c
+    after = discharged(model.battery, body.battery_charge_c, body.battery_rounding_c, power_w, dt)
+    body.battery_charge_c = after.charge_c
+    body.battery_rounding_c = after.rounding_c
+    body.battery_voltage_v = after.voltage_v
+    body.battery_current_a = after.current_a
     return body
 
 

@@ -6,6 +6,7 @@ from common.airframes.rover import RoverAirframe
 from common.geodesy import DEFAULT_HOME, GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S
 from sim.battery import BatteryModel, battery_model
+from sim.bodies.rigid_body import density_ratio_at, lag_gain
 from sim.bodies.tyre import Tyre, tyre_of
 
 wp.set_module_options({"enable_backward": False})
@@ -62,11 +63,6 @@ class RoverModel:
     battery: BatteryModel
 
 
-def _gain(lag_s: float, step_s: float) -> float:
-    """Fraction of the way that a first-order lag goes in a step: the bilinear form of 1 - exp(-dt / tau)."""
-    return 2.0 * step_s / (2.0 * lag_s + step_s)
-
-
 def rover_model(airframe: RoverAirframe, home_alt_amsl_m: float = DEFAULT_HOME.alt_m) -> RoverModel:
     """Constants of an airframe whose home lies home_alt_amsl_m above sea level."""
     body, wheels, tyres, drive, hull = airframe.body, airframe.wheels, airframe.tyres, airframe.drive, airframe.hull
@@ -96,13 +92,13 @@ def rover_model(airframe: RoverAirframe, home_alt_amsl_m: float = DEFAULT_HOME.a
     model.half_track_m = half_m
     model.steering_max_rad = airframe.steering.max_angle_rad
     model.steering_rate_rad_s = airframe.steering.rate_rad_s
-    model.steering_gain = _gain(airframe.steering.lag_s, TICK_S)
+    model.steering_gain = lag_gain(airframe.steering.lag_s, TICK_S)
     is_rear = drive.driven == "rear"
     model.is_driven = wp.vec4(0.0, 0.0, 0.5, 0.5) if is_rear else wp.vec4(0.25, 0.25, 0.25, 0.25)
     model.motor_speed_m_s = drive.max_speed_m_s
     model.motor_n_s_m = drive.stall_force_n / drive.max_speed_m_s
     model.motor_max_n = drive.max_force_n
-    model.motor_gain = _gain(drive.lag_s, step_s)
+    model.motor_gain = lag_gain(drive.lag_s, step_s)
     front = airframe.brake.front_fraction
     model.brake_max_n = 0.5 * airframe.brake.max_force_n * wp.vec2(front, 1.0 - front)
     model.hull_front_m, model.hull_rear_m = hull.front_m, hull.rear_m
@@ -114,6 +110,6 @@ def rover_model(airframe: RoverAirframe, home_alt_amsl_m: float = DEFAULT_HOME.a
     model.scrape_n_m = body.mass_kg * _SCRAPE_RATE_RAD_S**2 / 2.0
     model.scrape_n_s_m = 2.0 * 0.5 * body.mass_kg * _SCRAPE_RATE_RAD_S / 2.0
     model.crash_speed_m_s = hull.crash_speed_m_s
-    model.home_density_ratio = (1.0 - 2.25577e-5 * home_alt_amsl_m) ** 4.25588  # ISO 2533, troposphere
+    model.home_density_ratio = density_ratio_at(home_alt_amsl_m)
     model.battery = battery_model(airframe)
     return model

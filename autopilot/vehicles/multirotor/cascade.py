@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from autopilot.control.battery_voltage import voltage_step
 from autopilot.ports import (
     SETPOINT_ATTITUDE,
     SETPOINT_IDLE,
@@ -38,8 +39,6 @@ _GRAVITY = wp.constant(GRAVITY_M_S2)
 _TICK_S = wp.constant(TICK_S)
 _FRAME_TICKS = wp.constant(FRAME_TICKS)
 _FRAME_S = wp.constant(TICK_S * FRAME_TICKS)
-_VOLTAGE_TIME_S = wp.constant(0.25)  # slower than the loops that load the battery, faster than it empties
-_VOLTAGE_FRACTION_MIN = wp.constant(0.6)
 _UPRIGHT_MIN = wp.constant(0.3)  # cosine of tilt below which thrust no longer holds height
 _SLACK = wp.constant(1.0e-4)  # fraction of the asked torque below which a remainder is rounding
 
@@ -67,17 +66,6 @@ class ControlState:
     aim: Aim
     collective_n: float  # achieved in the last tick
     actuators: Actuators
-
-
-@wp.func
-def voltage_step(fraction: float, airframe: ControlAirframe, battery: BatterySample) -> float:
-    """Filtered battery voltage over the full one; 1 without a battery sample."""
-    if battery.voltage_v <= 0.0 or airframe.full_voltage_v <= 0.0:
-        return 1.0
-    measured = wp.clamp(battery.voltage_v / airframe.full_voltage_v, _VOLTAGE_FRACTION_MIN, 1.05)
-    if fraction == 0.0:
-        return measured
-    return fraction + (measured - fraction) * _TICK_S / _VOLTAGE_TIME_S
 
 
 @wp.func
@@ -282,7 +270,7 @@ def control_tick(
 
     Inside branches the state is changed field by field: Warp copies a whole struct where a branch assigns it.
     """
-    voltage_fraction = voltage_step(state.voltage_fraction, airframe, battery)
+    voltage_fraction = voltage_step(state.voltage_fraction, airframe.full_voltage_v, battery)
     is_direct = sp.kind == SETPOINT_ATTITUDE or sp.kind == SETPOINT_RATE
     is_idle = sp.is_armed == 0 or sp.kind == SETPOINT_IDLE
     if is_idle or (sp.is_landed == 1 and (not is_direct or sp.thrust <= 0.0)):

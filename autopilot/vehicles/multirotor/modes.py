@@ -13,7 +13,6 @@ from autopilot.interface.failsafe_action import Action
 from autopilot.interface.mode_spec import (
     AUTO_OVERRIDE,
     HOLD_EXCEPTED,
-    MISSION_EXCEPTED,
     OFFBOARD_EXCEPTED,
     OFFBOARD_OVERRIDE,
     DialectMode,
@@ -26,7 +25,7 @@ from autopilot.interface.mode_spec import (
     px4_mode,
 )
 from autopilot.interface.vehicle_state import Mode
-from autopilot.navigator.mode_parts import ModeParts, of_context
+from autopilot.navigator.mode_parts import ModeParts, mission_mode, of_context
 from autopilot.navigator.modes.brake import Brake
 from autopilot.navigator.modes.follow import Follow
 from autopilot.navigator.modes.guided import Guided
@@ -38,12 +37,9 @@ from autopilot.navigator.modes.rtl_destination import Destinations
 from autopilot.navigator.modes.smart_return import SmartReturn
 from autopilot.navigator.modes.takeoff import Takeoff
 from autopilot.navigator.modes.termination import Termination
+from autopilot.vehicles import px4_modes
 from autopilot.vehicles.multirotor.orbit import Orbit
 from autopilot.vehicles.multirotor.stick_modes import Acro, Altitude, Position, Stabilized
-
-
-def _mission(parts: ModeParts) -> FlightMode:
-    return parts.mission
 
 
 def _hold(parts: ModeParts) -> FlightMode:
@@ -66,23 +62,7 @@ def _smart_return(parts: ModeParts) -> FlightMode:
 _stabilized = of_context(Stabilized)
 
 MULTIROTOR_MODES = mode_table(
-    ModeSpec(
-        mode=Mode.POSITION,
-        build=of_context(Position),
-        needs_position=True,
-        needs_sticks=True,
-        may_arm=True,
-        on_ground=True,
-        disarmed=Disarmed.SAME,
-        px4=px4_mode(Px4Main.POSCTL, 0, "Position"),
-        ardupilot=DialectMode(16, "PosHold"),
-        standard=StandardMode.POSITION_HOLD,
-        nav_state=2,
-        shell_name="posctl",
-        switch=2,
-        aux_function=69,
-        is_climb_rate=True,
-    ),
+    px4_modes.POSITION(build=of_context(Position), ardupilot=DialectMode(16, "PosHold"), aux_function=69),
     ModeSpec(
         mode=Mode.ALTITUDE,
         build=of_context(Altitude),
@@ -99,60 +79,11 @@ MULTIROTOR_MODES = mode_table(
         switch=1,
         aux_function=70,
         carries_out=(Action.ALTITUDE,),
-        is_climb_rate=True,
+        rests_in_middle=True,
     ),
-    ModeSpec(
-        mode=Mode.HOLD,
-        build=_hold,
-        needs_position=True,
-        may_arm=True,
-        on_ground=True,
-        takes=(GoTo,),
-        px4=px4_mode(Px4Main.AUTO, 3, "Hold"),
-        ardupilot=DialectMode(5, "Loiter"),
-        nav_state=4,
-        shell_name="auto:loiter",
-        switch=4,
-        aux_function=56,
-        carries_out=(Action.HOLD,),
-        exception=HOLD_EXCEPTED,
-        override=AUTO_OVERRIDE,
-        is_climb_rate=True,
-    ),
-    ModeSpec(
-        mode=Mode.MISSION,
-        build=_mission,
-        needs_position=True,
-        needs_home=True,
-        may_arm=True,
-        on_ground=True,
-        px4=px4_mode(Px4Main.AUTO, 4, "Mission"),
-        ardupilot=DialectMode(3, "Auto"),
-        standard=StandardMode.MISSION,
-        nav_state=3,
-        shell_name="auto:mission",
-        switch=3,
-        aux_function=16,
-        exception=MISSION_EXCEPTED,
-        override=AUTO_OVERRIDE,
-    ),
-    ModeSpec(
-        mode=Mode.RETURN,
-        build=_return,
-        needs_position=True,
-        needs_home=True,
-        px4=px4_mode(Px4Main.AUTO, 5, "Return"),
-        ardupilot=DialectMode(6, "RTL"),
-        standard=StandardMode.SAFE_RECOVERY,
-        nav_state=5,
-        shell_name="auto:rtl",
-        switch=5,
-        aux_function=4,
-        strength=Action.RETURN,
-        carries_out=(Action.RETURN,),
-        exception=HOLD_EXCEPTED,
-        override=AUTO_OVERRIDE,
-    ),
+    px4_modes.HOLD(build=_hold, needs_position=True, ardupilot=DialectMode(5, "Loiter"), aux_function=56),
+    px4_modes.MISSION(build=mission_mode, ardupilot=DialectMode(3, "Auto")),
+    px4_modes.RETURN(build=_return, ardupilot=DialectMode(6, "RTL")),
     ModeSpec(
         mode=Mode.LAND,
         build=of_context(Land),
@@ -200,21 +131,8 @@ MULTIROTOR_MODES = mode_table(
         exception=HOLD_EXCEPTED,
         override=AUTO_OVERRIDE,
     ),
-    ModeSpec(
-        mode=Mode.OFFBOARD,
-        build=of_context(Offboard),
-        needs_position=True,  # though not for setpoints of attitude or rate
-        may_arm=True,
-        on_ground=True,
-        disarmed=Disarmed.HOLD,
-        takes=(OffboardSetpoint,),
-        px4=px4_mode(Px4Main.OFFBOARD, 0, "Offboard"),
-        ardupilot=Mode.GUIDED,
-        is_advanced=True,
-        nav_state=14,
-        switch=7,
-        exception=OFFBOARD_EXCEPTED,
-        override=OFFBOARD_OVERRIDE,
+    px4_modes.OFFBOARD(  # its position is not needed for setpoints of attitude or rate
+        build=of_context(Offboard), ardupilot=Mode.GUIDED
     ),
     ModeSpec(
         mode=Mode.FOLLOW,
@@ -243,48 +161,9 @@ MULTIROTOR_MODES = mode_table(
         aux_function=72,
         exception=HOLD_EXCEPTED,
     ),
-    ModeSpec(
-        mode=Mode.STABILIZED,
-        build=_stabilized,
-        needs_sticks=True,
-        may_arm=True,
-        on_ground=True,
-        disarmed=Disarmed.SAME,
-        px4=px4_mode(Px4Main.STABILIZED, 0, "Stabilized"),
-        ardupilot=DialectMode(0, "Stabilize"),
-        is_advanced=True,
-        nav_state=15,
-        switch=8,
-        aux_function=68,
-    ),
-    ModeSpec(
-        mode=Mode.MANUAL,
-        build=_stabilized,
-        needs_sticks=True,
-        may_arm=True,
-        on_ground=True,
-        disarmed=Disarmed.SAME,
-        px4=px4_mode(Px4Main.MANUAL, 0, "Manual"),
-        ardupilot=Mode.STABILIZED,
-        is_advanced=True,
-        nav_state=0,
-        shell_name="manual",
-        switch=0,
-    ),
-    ModeSpec(
-        mode=Mode.ACRO,
-        build=of_context(Acro),
-        needs_sticks=True,
-        may_arm=True,
-        on_ground=True,
-        disarmed=Disarmed.SAME,
-        px4=px4_mode(Px4Main.ACRO, 0, "Acro"),
-        ardupilot=DialectMode(1, "Acro"),
-        is_advanced=True,
-        nav_state=10,
-        switch=6,
-        aux_function=52,
-    ),
+    px4_modes.STABILIZED(build=_stabilized, ardupilot=DialectMode(0, "Stabilize"), aux_function=68),
+    px4_modes.MANUAL(build=_stabilized, ardupilot=Mode.STABILIZED),
+    px4_modes.ACRO(build=of_context(Acro), ardupilot=DialectMode(1, "Acro")),
     ModeSpec(
         mode=Mode.TERMINATION,
         build=of_context(Termination),

@@ -2,9 +2,8 @@
 
 from math import hypot
 
-from autopilot.interface.client_requests import GoTo
 from autopilot.interface.mode_spec import FlightMode
-from autopilot.interface.vehicle_state import Mode, Reply, Severity, Verdict
+from autopilot.interface.vehicle_state import Mode, Severity
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.fence.fence import Fence
 from autopilot.navigator.modes.hold import Hold
@@ -23,11 +22,6 @@ class RoverHold(Hold):
     def __init__(self, context: NavContext) -> None:
         super().__init__(context, steered=Position(context))
         self._is_blind = False
-
-    def take(self, request: GoTo) -> Reply:
-        if not self._context.state.is_armed:
-            return Reply(Verdict.TEMPORARILY_REJECTED, "not armed")
-        return super().take(request)
 
     def frame(self) -> None:
         context = self._context

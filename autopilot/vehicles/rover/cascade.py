@@ -5,6 +5,7 @@ The yaw rate is filtered at each tick of 250 Hz; the loops run each fifth: a rov
 
 import warp as wp
 
+from autopilot.control.battery_voltage import voltage_step
 from autopilot.control.pid import low_pass_fraction
 from autopilot.ports import (
     SETPOINT_DRIVE,
@@ -30,8 +31,6 @@ wp.set_module_options({"enable_backward": False})
 _TICK_S = wp.constant(TICK_S)
 _FRAME_TICKS = wp.constant(FRAME_TICKS)
 _FRAME_S = wp.constant(TICK_S * FRAME_TICKS)
-_VOLTAGE_TIME_S = wp.constant(0.25)  # slower than the motor that loads the battery, faster than it empties
-_VOLTAGE_FRACTION_MIN = wp.constant(0.5)
 YAW_RATE_CUTOFF_HZ = wp.constant(15.0)  # below the shaking of wheels and motor
 
 
@@ -47,17 +46,6 @@ class RoverControlState:
     speed: SpeedState
     steering: SteeringState
     actuators: Actuators
-
-
-@wp.func
-def voltage_step(fraction: float, airframe: RoverControlAirframe, battery: BatterySample) -> float:
-    """Filtered battery voltage over the full one; 1 without a battery sample."""
-    if battery.voltage_v <= 0.0 or airframe.full_voltage_v <= 0.0:
-        return 1.0
-    seen = wp.clamp(battery.voltage_v / airframe.full_voltage_v, _VOLTAGE_FRACTION_MIN, 1.05)
-    if fraction == 0.0:
-        return seen
-    return fraction + (seen - fraction) * _TICK_S / _VOLTAGE_TIME_S
 
 
 @wp.func
@@ -227,7 +215,7 @@ def rover_control_tick(
 ) -> RoverControlState:
     """The law's state, with `actuators`, after one 4 ms tick."""
     now = state
-    now.voltage_fraction = voltage_step(state.voltage_fraction, airframe, battery)
+    now.voltage_fraction = voltage_step(state.voltage_fraction, airframe.full_voltage_v, battery)
     turning = wp.quat_rotate(est.q_ned_from_frd, est.omega_frd)[2]
     now.yaw_rate = state.yaw_rate + (turning - state.yaw_rate) * low_pass_fraction(YAW_RATE_CUTOFF_HZ, _TICK_S)
     if sp.is_armed == 0:

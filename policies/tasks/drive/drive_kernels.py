@@ -16,13 +16,17 @@ from common.rng import draw_tick
 from common.rotation import wrap_pi, yaw_from_quat
 from policies.tasks.drive.drive_params import DriveParams
 from policies.tasks.drive.goals import course_goal, spot_goal, way_left_m, way_out
-from policies.tasks.drive.observe import drive_command, own_drive, write_frame
+from policies.tasks.drive.observe import DriveCommand, drive_command, own_drive, write_frame
 from policies.tasks.drive.reward import drive_outcome, drive_reward
 from policies.tasks.episode import StepBuffers, close_step, open_frame
-from policies.tasks.flight.episode_draws import WIND_STREAM, draw_angle
 from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight
 from policies.tasks.flight.flight_params import FlightParams
-from policies.tasks.flight.flown_vehicle import NOISE_LEVELS_PER_UNIT, vehicle_estimate
+from policies.tasks.flight.flown_vehicle import (
+    free_setpoint,
+    sensors_of_episode,
+    vehicle_estimate,
+    wind_of_episode,
+)
 from sim.advance import rig_arrays, rig_kernels
 from sim.bodies.rover import ROVER_BODY
 from sim.bodies.rover_model import RoverModel
@@ -35,7 +39,6 @@ wp.set_module_options({"enable_backward": False})
 
 RoverArrays: TypeAlias = Any if TYPE_CHECKING else rig_arrays(ROVER_BODY, ROVER_LAW)
 _forget_impacts = rig_kernels(ROVER_BODY, ROVER_LAW).forget_impacts
-_LEVELS = wp.constant(float(NOISE_LEVELS_PER_UNIT))
 _HALF_WIDTH_M = wp.constant(0.22)  # of the hull
 _END_M = wp.constant(0.15)  # from its middle to those of the circles at its ends
 _ROOM_MAX_M = wp.constant(1.0)
@@ -71,25 +74,11 @@ class DriveState:
 
 
 @wp.func
-def drive_setpoint(speed: float, yaw_rate: float) -> Setpoint:
+def drive_setpoint(command: DriveCommand) -> Setpoint:
     """As of an offboard client's velocity along the nose and yaw rate."""
-    free = wp.vec3(wp.nan, wp.nan, wp.nan)
-    setpoint = Setpoint()
-    setpoint.kind = SETPOINT_DRIVE
-    setpoint.is_armed = 1
-    setpoint.pos_ned = free
-    setpoint.vel_ned = free
-    setpoint.accel_ned = free
-    setpoint.yaw = wp.nan
-    setpoint.yaw_rate = yaw_rate
-    setpoint.path_start_ned = free
-    setpoint.cruise_speed = wp.nan
-    setpoint.climb_speed = wp.nan
-    setpoint.descend_speed = wp.nan
-    setpoint.omega_frd = free
-    setpoint.thrust = wp.nan
-    setpoint.speed = speed
-    setpoint.steering = wp.nan
+    setpoint = free_setpoint(SETPOINT_DRIVE)
+    setpoint.speed = command.speed
+    setpoint.yaw_rate = command.yaw_rate
     return setpoint
 
 
@@ -138,8 +127,7 @@ def show_frame(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state:
 @wp.kernel(enable_backward=False)
 def act(buffers: StepBuffers, rig: RoverArrays) -> None:
     i = wp.tid()
-    command = drive_command(action_of(buffers, i))
-    rig.autopilot.setpoint[i] = drive_setpoint(command.speed, command.yaw_rate)
+    rig.autopilot.setpoint[i] = drive_setpoint(drive_command(action_of(buffers, i)))
 
 
 @wp.kernel(enable_backward=False)
@@ -164,7 +152,7 @@ def judge(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: Driv
     state.left_m[i] = left_m
     state.measures[i, 0] = distance_m
     state.measures[i, 1] = turn_rad
-    state.measures[i, 2] = wp.length(truth.vel_ned)
+    state.measures[i, 2] = speed_m_s
     state.measures[i, 3] = room_m
     state.measures[i, 4] = left_m
     state.measures[i, 5] = time_s
@@ -206,15 +194,8 @@ def vary_rover(rig: RoverArrays, state: DriveState, start: Start, seed: int, i: 
     model.tyre.tail = model.tyre.tail * params.friction_scale
     model.rolling_resistance = model.rolling_resistance * params.rolling_scale
     rig.model[i] = model
-    level = int(wp.round(flight.sensor_noise * _LEVELS))
-    rig.sensor_model[i] = start.makes.sensors[wp.min(level, start.makes.sensors.shape[0] - 1)]
-    towards = draw_angle(seed, i, episode, WIND_STREAM)
-    wind = rig.wind_model[i]
-    wind.along_ned = wp.vec3(wp.cos(towards), wp.sin(towards), 0.0)
-    wind.mean_ned = wind.along_ned * flight.wind_m_s
-    wind.gust_m_s = flight.wind_gust_m_s
-    wind.turbulence_w_std = 0.1 * flight.wind_m_s * flight.wind_turbulence  # MIL-F-8785C: a tenth of W20
-    rig.wind_model[i] = wind
+    rig.sensor_model[i] = sensors_of_episode(start.makes, flight)
+    rig.wind_model[i] = wind_of_episode(rig.wind_model[i], flight, seed, i, episode)
     rig.wind[i] = WindState()
     _forget_impacts(rig, i)
 

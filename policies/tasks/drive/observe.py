@@ -10,6 +10,7 @@ import warp as wp
 
 from autopilot.ports import Estimate
 from common.rotation import wrap_pi, yaw_from_quat
+from policies.tasks.flight.own_state import level_from_ned
 from policies.tasks.layout import Element
 
 wp.set_module_options({"enable_backward": False})
@@ -73,14 +74,6 @@ def drive_command(action: wp.vec2) -> DriveCommand:
 
 
 @wp.func
-def turned(north: float, east: float, yaw: float) -> wp.vec2:
-    """A level vector along a heading and to its right."""
-    cos = wp.cos(yaw)
-    sin = wp.sin(yaw)
-    return wp.vec2(cos * north + sin * east, cos * east - sin * north)
-
-
-@wp.func
 def write_frame(
     own: OwnDrive,
     last_action: wp.vec2,
@@ -110,8 +103,8 @@ def write_frame(
     north = goal[0] - own.pos_ned[0]
     east = goal[1] - own.pos_ned[1]
     distance = wp.sqrt(north * north + east * east)
-    to_goal = turned(north, east, own.yaw)
-    of_goal = turned(-north, -east, goal[2])
+    to_goal = level_from_ned(wp.vec3(north, east, 0.0), own.yaw)
+    of_goal = level_from_ned(wp.vec3(-north, -east, 0.0), goal[2])
     turn = wrap_pi(goal[2] - own.yaw)
     g = at + OWN_SIZE
     out[i, g] = wp.clamp(to_goal[0] / _NEAR_M, -1.0, 1.0)

@@ -15,7 +15,7 @@ from sim.advance import RigArrays, forget_impacts
 from sim.bodies.body import DEFAULT_BODY
 from sim.sensors.sensors import SensorModel
 from sim.truth import true_estimate
-from sim.wind import WindState
+from sim.wind import WindModel, WindState
 
 wp.set_module_options({"enable_backward": False})
 
@@ -32,6 +32,24 @@ class Makes:
 
 
 @wp.func
+def sensors_of_episode(makes: Makes, params: FlightParams) -> SensorModel:
+    """The sensors with the noise of an episode."""
+    level = int(wp.round(params.sensor_noise * _LEVELS))
+    return makes.sensors[wp.min(level, makes.sensors.shape[0] - 1)]
+
+
+@wp.func
+def wind_of_episode(wind: WindModel, params: FlightParams, seed: int, i: int, episode: int) -> WindModel:
+    """The air of an episode, from a direction that is drawn."""
+    towards = draw_angle(seed, i, episode, WIND_STREAM)
+    wind.along_ned = wp.vec3(wp.cos(towards), wp.sin(towards), 0.0)
+    wind.mean_ned = wind.along_ned * params.wind_m_s
+    wind.gust_m_s = params.wind_gust_m_s
+    wind.turbulence_w_std = 0.1 * params.wind_m_s * params.wind_turbulence  # MIL-F-8785C: a tenth of W20
+    return wind
+
+
+@wp.func
 def vary_vehicle(rig: RigArrays, makes: Makes, params: FlightParams, seed: int, i: int, episode: int) -> None:
     """Gives row i the air, the sensors, the mass and the motors of its episode."""
     model = makes.body[0]
@@ -41,36 +59,41 @@ def vary_vehicle(rig: RigArrays, makes: Makes, params: FlightParams, seed: int, 
     model.inertia_inv_frd = model.inertia_inv_frd / params.mass_scale
     model.thrust_n_s2 = model.thrust_n_s2 * params.motor_scale
     rig.model[i] = model
-    level = int(wp.round(params.sensor_noise * _LEVELS))
-    rig.sensor_model[i] = makes.sensors[wp.min(level, makes.sensors.shape[0] - 1)]
-    towards = draw_angle(seed, i, episode, WIND_STREAM)
-    wind = rig.wind_model[i]
-    wind.along_ned = wp.vec3(wp.cos(towards), wp.sin(towards), 0.0)
-    wind.mean_ned = wind.along_ned * params.wind_m_s
-    wind.gust_m_s = params.wind_gust_m_s
-    wind.turbulence_w_std = 0.1 * params.wind_m_s * params.wind_turbulence  # MIL-F-8785C: a tenth of W20
-    rig.wind_model[i] = wind
+    rig.sensor_model[i] = sensors_of_episode(makes, params)
+    rig.wind_model[i] = wind_of_episode(rig.wind_model[i], params, seed, i, episode)
     rig.wind[i] = WindState()
     forget_impacts(rig, i)  # that of standing on the ground before the hover
 
 
 @wp.func
-def velocity_setpoint(command: Command) -> Setpoint:
-    """As an offboard client's SET_POSITION_TARGET_LOCAL_NED with velocity and yaw rate."""
+def free_setpoint(kind: int) -> Setpoint:
+    """Of an armed vehicle, nothing asked for."""
     free = wp.vec3(wp.nan, wp.nan, wp.nan)
     setpoint = Setpoint()
-    setpoint.kind = SETPOINT_TRAJECTORY
+    setpoint.kind = kind
     setpoint.is_armed = 1
     setpoint.pos_ned = free
-    setpoint.vel_ned = command.vel_ned
+    setpoint.vel_ned = free
     setpoint.accel_ned = free
     setpoint.yaw = wp.nan
-    setpoint.yaw_rate = command.yaw_rate
+    setpoint.yaw_rate = wp.nan
     setpoint.path_start_ned = free
     setpoint.cruise_speed = wp.nan
     setpoint.climb_speed = wp.nan
     setpoint.descend_speed = wp.nan
     setpoint.omega_frd = free
+    setpoint.thrust = wp.nan
+    setpoint.speed = wp.nan
+    setpoint.steering = wp.nan
+    return setpoint
+
+
+@wp.func
+def velocity_setpoint(command: Command) -> Setpoint:
+    """As an offboard client's SET_POSITION_TARGET_LOCAL_NED with velocity and yaw rate."""
+    setpoint = free_setpoint(SETPOINT_TRAJECTORY)
+    setpoint.vel_ned = command.vel_ned
+    setpoint.yaw_rate = command.yaw_rate
     return setpoint
 
 
