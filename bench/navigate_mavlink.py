@@ -25,7 +25,7 @@ from mission.script import take_off
 from mission.simulator.flight_rig import TURBULENCE
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
-from policies.companion.navigation_pilot import NavigationPilot
+from policies.companion.vector_pilot import NavigationPilot
 from policies.companion.vehicle_link import COMPONENT
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy

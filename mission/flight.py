@@ -35,10 +35,11 @@ from mission.host_troubles import Troubles
 from mission.log.flight_recorder import History, Recorder
 from mission.log.stored_logs import FlightLogs, RunLog
 from mission.script import Drone, Script
+from mission.simulator.base_station import BaseStation
 from mission.simulator.failure_injection import RigInjector
 from mission.simulator.flight_rig import GUST_FRACTION, flight_rig, flight_wind, flight_world
 from mission.simulator.host_ports import host_ports
-from mission.simulator.onboard_devices import Surroundings
+from mission.simulator.onboard_devices import Surroundings, ring_of
 from mission.simulator.scanner_device import ScannerDevice
 from mission.simulator.simulator_params import PREFIX as SIMULATOR_PREFIX
 from mission.simulator.simulator_params import TURBULENCE_FRACTION, SimulatorParameters
@@ -48,7 +49,6 @@ from sim.bodies.vehicles import class_of
 from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.rtk import RtkReceiver
-from sim.sensors.ring import RingSensor
 from sim.sensors.scanner import Scanner
 from sim.turntable import Turntable
 from sim.video_rig import VideoRig
@@ -124,9 +124,8 @@ class Flight:
         self.onboard: OnboardCamera | None = None
         if config.owner is not None:
             links = [*links, *self._carry_camera(config.owner)]
-        self._scanner: ScannerDevice | None = None
-        if config.is_forest:
-            links = [*links, self._carry_scanner()]
+        self._components = self._carry_components()
+        links = [*links, *(component.vehicle_end for component in self._components)]
         self.computers: list[Computer] = []
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog", self.troubles.note)
         script_end, client_end = memory_pair(LinkRole.ONBOARD)
@@ -177,7 +176,8 @@ class Flight:
 
     def _surround(self, receiver: RtkReceiver) -> Surroundings:
         config = self.config
-        ring = RingSensor(self.rig, self.world, config.noise, config.seed) if config.has_lidar else None
+        make_ring = ring_of(drives=self.drives)
+        ring = make_ring(self.rig, self.world, config.noise, config.seed) if config.has_lidar else None
         return Surroundings(self.controller, self.rig, receiver, config.traffic_count, ring, config.home, config.seed)
 
     def _make_servers(
@@ -224,12 +224,13 @@ class Flight:
         self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)
         return [self.owner.vehicle_end]
 
-    def _carry_scanner(self) -> Link:
-        """Brings the scanner on board; its link."""
-        self._scanner = ScannerDevice(
-            Scanner(self.rig, self.world, self.config.noise, self.config.seed), int(self.params[SYSID_PARAMETER])
-        )
-        return self._scanner.vehicle_end
+    def _carry_components(self) -> Sequence[ScannerDevice | BaseStation]:
+        """Brings in what has a link of its own to the vehicle."""
+        config, system_id = self.config, int(self.params[SYSID_PARAMETER])
+        base = [BaseStation(system_id)] if config.has_base else []
+        if not config.is_forest:
+            return base
+        return [ScannerDevice(Scanner(self.rig, self.world, config.noise, config.seed), system_id), *base]
 
     def _start_stream(self, stream: StreamServer) -> CameraRig:
         """Gives the live picture something to show; what renders it."""
@@ -272,8 +273,8 @@ class Flight:
         if self.owner is not None:
             is_followed = self.controller.modes[self.controller.state.mode].is_offboard
             self.owner.frame(self.time_us, is_followed=is_followed)
-        if self._scanner is not None:
-            self._scanner.frame(self.time_us)
+        for component in self._components:
+            component.frame(self.time_us)
         self.controller.frame(self.time_us)
         self.drone.frame(self.time_us)
         if self.onboard is not None:

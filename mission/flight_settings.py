@@ -39,6 +39,7 @@ class FlightSettings(BaseModel):
     """In PX4's they always send them."""
     traffic_count: int = option(0, "Other aircraft that are heard by ADS-B.", "--traffic", ge=0, le=50)
     has_lidar: bool = option(False, "Carry a ring of range finders that looks round.", "--lidar")
+    has_base: bool = option(False, "A base station beside home sends the GNSS receiver corrections.", "--rtk")
 
 
 class FlightOptions(FlightSettings):

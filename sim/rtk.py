@@ -1,6 +1,6 @@
 """RTK: a receiver that gets corrections of a base station is accurate to centimetres, until they stop.
 
-In: corrections, and the time. Out: the error model of the vehicle's receiver, changed on its live row.
+In: corrections, and the time. Out: the error model of the vehicle's receiver and its error now, changed on live rows.
 """
 
 from typing import Any
@@ -32,6 +32,7 @@ class RtkReceiver:
 
     def __init__(self, rig: Rig, i_vehicle: int = 0) -> None:
         self._row: Any = rig.rows["sensor_model"][i_vehicle]["gnss"]
+        self._state: Any = rig.rows["sensors"][i_vehicle]["gnss"]
         self._plain = self._row.copy()
         self._until_us = -1  # -1: no corrections
 
@@ -41,6 +42,7 @@ class RtkReceiver:
             row = self._row
             for name in ("pos_std_ned", "correlated_std_ned"):
                 row[name] = self._plain[name] * _ERROR_FRACTION
+            self._state["correlated_ned"] *= _ERROR_FRACTION
             row["pos_h_std"] = row["pos_v_std"] = _REPORTED_STD_M
             row["fix_type"] = _FIXED
         self._until_us = time_us + HOLD_US
@@ -51,3 +53,4 @@ class RtkReceiver:
             self._until_us = -1
             for name in self._plain.dtype.names:
                 self._row[name] = self._plain[name]
+            self._state["correlated_ned"] /= _ERROR_FRACTION

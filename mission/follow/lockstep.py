@@ -10,10 +10,11 @@ from pathlib import Path
 from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
 from mission.flight import Flight, FlightConfig
 from policies.companion.companion import Companion
+from policies.companion.driving import Driving
 from policies.companion.following import Following, Pilot
 from policies.companion.image_client import MemoryCamera
 from policies.companion.navigating import Navigating
-from policies.companion.navigation_pilot import NavigationPilot
+from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
 
 
 def flight_with_companion(
@@ -66,5 +67,29 @@ def flight_with_navigator(
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
     flight = Flight(config, links=[vehicle_end, *links], folder=folder)
     companion = Companion(companion_end, Navigating(pilot, is_ordered_by_goto=is_reported), is_reported=is_reported)
+    flight.computers.append(companion)
+    return flight, companion
+
+
+def flight_with_driver(
+    config: FlightConfig,
+    pilot: DrivingPilot,
+    *,
+    is_reported: bool = True,
+    links: Sequence[Link | LinkSource] = (),
+    folder: Path | None = None,
+) -> tuple[Flight, Companion]:
+    """A rover's flight, and the companion on board that drives to each goto, and along the plan.
+
+    Args:
+        config: of a rover with a ring of range finders.
+        pilot: who drives.
+        is_reported: False: it waits for the pilot to choose Offboard.
+        links: of ground stations.
+        folder: of the logs.
+    """
+    vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
+    flight = Flight(config, links=[vehicle_end, *links], folder=folder)
+    companion = Companion(companion_end, Driving(pilot, is_ordered_by_goto=is_reported), is_reported=is_reported)
     flight.computers.append(companion)
     return flight, companion

@@ -6,11 +6,17 @@ from common.records import row_reader
 from sim.devices import Gripper, Winch
 from sim.rig import Rig
 from sim.rtk import RtkReceiver
+from sim.sensors.ground_ring import GroundRing
 from sim.sensors.ring import RingSensor
 from sim.simulated_traffic import SimulatedTraffic
 
 TRAFFIC_PERIOD_US = 1_000_000
 RING_PERIOD_US = 100_000
+
+
+def ring_of(*, drives: bool) -> type[RingSensor] | type[GroundRing]:
+    """The ring of range finders that such a vehicle carries."""
+    return GroundRing if drives else RingSensor
 
 
 class Surroundings:
@@ -32,7 +38,7 @@ class Surroundings:
         rig: Rig,
         receiver: RtkReceiver,
         traffic_count: int,
-        ring: RingSensor | None,
+        ring: RingSensor | GroundRing | None,
         home: GeoPoint,
         seed: int,
     ) -> None:

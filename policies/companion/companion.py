@@ -54,7 +54,7 @@ class Companion:
         self.decision_count = 0
         self.trouble = ""  # why it does not fly
         self._wall_s = wall_s
-        self._action: Floats = np.zeros(4, dtype=np.float32)
+        self._action: Floats = np.zeros(skill.action_size, dtype=np.float32)
         self._setpoint = STILL
         self._is_undecided = False  # the last action was no number
         self._setpoint_due_us = 0
@@ -86,7 +86,7 @@ class Companion:
         has_decided = has_sensed and not blindness and self._decide(time_us) and orders.sending is Sending.POLICY
         if orders.sending is not Sending.NOTHING and (has_decided or time_us >= self._setpoint_due_us):
             self._setpoint_due_us = time_us + SETPOINT_US
-            vehicle.send_setpoint(*self._setpoint)
+            vehicle.send_setpoint(*self._setpoint, is_along_nose=skill.drives)
         if has_decided and begun_s is not None and self._wall_s is not None:
             self.latencies_s.append(self._wall_s() - begun_s)
         if has_sensed:  # only now: the setpoint does not wait for it
@@ -94,7 +94,7 @@ class Companion:
 
     @property
     def action(self) -> Floats:
-        """What was chosen last, shape (4,); zeros while it does not fly."""
+        """What was chosen last, shape (actions,); zeros while it does not fly."""
         return self._action.copy()
 
     def close(self) -> None:
@@ -132,7 +132,7 @@ class Companion:
         return Situation(
             time_us=time_us,
             is_offboard=own.mode in (Mode.OFFBOARD, Mode.GUIDED),
-            is_airborne=own.is_armed and not own.is_on_ground,
+            is_airborne=own.is_under_way,
             is_holding=own.mode is Mode.HOLD or (self._is_sent_in_guided and own.mode is Mode.GUIDED),
             mode_name=own.mode_name,
             trouble=self.trouble,

@@ -52,6 +52,7 @@ class Following:
     """
 
     ready, flying, drives = "ready to follow", "following", False
+    action_size = 4
 
     def __init__(self, camera: ImageSource, pilot: Pilot) -> None:
         self.seen: Floats = np.zeros(0, dtype=np.float32)

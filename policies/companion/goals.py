@@ -5,8 +5,9 @@ In: a DO_REPOSITION sent to the companion itself; the place that the vehicle say
 the next goal in the vehicle's ned frame. A goto comes before the plan, and is over when it has been reached.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import dist, isfinite, isnan, nan
+from math import dist, isfinite, isnan, nan, radians
 from typing import Any
 
 from autopilot.interface.item_lists import MissionItem
@@ -19,14 +20,15 @@ from common.geodesy import ned_from_geodetic
 from policies.companion.plan_download import PlanDownload
 from policies.companion.vehicle_link import COMPONENT, VehicleLink
 
+YAW_MAX_RAD = 7.0  # a full turn, either way
 FAR_M = 1000.0  # guess: farther is a mistake
-NEAR_M = 10.0  # a place nearer than this that the vehicle holds is where it stopped, not where it was sent; guess
+NEAR_M = 10.0  # of what flies 5 m/s; guess
 MOVED_M = 1.0  # a place that the vehicle goes to has changed if it is so far from the last
 _DO_REPOSITION, _NAV_WAYPOINT = 192, 16
 _ACCEPTED, _TEMPORARILY_REJECTED, _DENIED = 0, 1, 2  # MAV_RESULT
 _ABOVE_SEA, _ABOVE_HOME = frozenset({0, 5}), frozenset({3, 6})  # MAV_FRAME
 _GOTO_MODES = (Mode.HOLD, Mode.GUIDED)
-_FREE_POSITION = 0b111  # type_mask
+_FREE_POSITION, _FREE_YAW = 0b111, 1 << 10  # type_mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +37,7 @@ class Goal:
 
     pos_ned: Vector  # [m]; down is NaN where the height does not matter
     name: str  # for the pilot: "goto", "waypoint 2 of 5"
+    yaw: float = nan  # [rad] heading there; NaN: any
     is_last: bool = True  # nothing comes after it
 
 
@@ -44,10 +47,20 @@ class Goals:
     Args:
         vehicle: whose links it hears.
         is_ordered_by_goto: the vehicle's own goto is an order to fly there; otherwise only a place to fly to.
+        near_m: a place nearer than this that the vehicle holds is where it stopped, not where it was sent.
+        refusal: why a goto cannot be gone to; "" if it can.
     """
 
-    def __init__(self, vehicle: VehicleLink, *, is_ordered_by_goto: bool) -> None:
+    def __init__(
+        self,
+        vehicle: VehicleLink,
+        *,
+        is_ordered_by_goto: bool,
+        near_m: float = NEAR_M,
+        refusal: Callable[[Goal], str] = lambda _: "",
+    ) -> None:
         self._is_ordered_by_goto = is_ordered_by_goto
+        self._near_m, self._refusal = near_m, refusal
         self._is_ordered = False
         self._goto: Goal | None = None
         self._target_ned: Vector = (nan, nan, nan)  # that the vehicle went to when it was last heard
@@ -114,8 +127,9 @@ class Goals:
         if isinstance(target_ned, str) or dist(target_ned, self._target_ned) < MOVED_M:
             return
         self._target_ned = target_ned
-        if has_heard and dist(target_ned[:2], own.pos_ned[:2]) > NEAR_M:
-            refusal = self._take(target_ned, is_ordered=self._is_ordered_by_goto)
+        if has_heard and dist(target_ned[:2], own.pos_ned[:2]) > self._near_m:
+            yaw = nan if fields.type_mask & _FREE_YAW else fields.yaw
+            refusal = self._take(target_ned, yaw, is_ordered=self._is_ordered_by_goto)
             if refusal:
                 vehicle.say(f"Companion: goto refused: {refusal}", Severity.WARNING)
 
@@ -124,41 +138,55 @@ class Goals:
             lat_deg, lon_deg = degrees_from_e7(fields.x), degrees_from_e7(fields.y)
             is_given = INT32_MAX not in (fields.x, fields.y)
             alt_m = self._alt_amsl_m(fields.frame, fields.z)
-            self._goto_received(sysid, compid, lat_deg if is_given else nan, lon_deg if is_given else nan, alt_m)
+            place = (lat_deg if is_given else nan, lon_deg if is_given else nan, alt_m)
+            self._goto_received(sysid, compid, place, fields.param4)
 
     def _command_long(self, sysid: int, compid: int, fields: Any, _: int) -> None:
         if self._is_goto_to_us(fields):
-            self._goto_received(sysid, compid, fields.param5, fields.param6, fields.param7)
+            self._goto_received(sysid, compid, (fields.param5, fields.param6, fields.param7), fields.param4)
 
     def _is_goto_to_us(self, fields: Any) -> bool:
         is_to_us = (fields.target_system, fields.target_component) == (self._vehicle.system_id, COMPONENT)
         return is_to_us and bool(fields.command == _DO_REPOSITION)
 
-    def _goto_received(self, sysid: int, compid: int, lat_deg: float, lon_deg: float, alt_m: float) -> None:
-        """A goto to the companion itself: always an order."""
+    def _goto_received(self, sysid: int, compid: int, place: Vector, yaw: float) -> None:
+        """A goto to the companion itself: always an order.
+
+        Args:
+            sysid: of who sent it.
+            compid: its component.
+            place: latitude, longitude [deg], altitude [m].
+            yaw: heading there [rad]; NaN: any.
+        """
         vehicle = self._vehicle
         own = vehicle.own
+        lat_deg, lon_deg, alt_m = place
         result, reason = _DENIED, "there is no such place"
         if is_within(POSITION_MAX_M, alt_m) and is_position(lat_deg, lon_deg) and isfinite(lat_deg + lon_deg):
             target_ned = self._ned_of(lat_deg, lon_deg, alt_m)
             if isinstance(target_ned, str):
                 result, reason = _TEMPORARILY_REJECTED, target_ned
-            elif not own.is_armed or own.is_on_ground:
-                result, reason = _TEMPORARILY_REJECTED, "the vehicle is not in the air"
+            elif not own.is_under_way:
+                why = "armed" if own.is_ground_vehicle else "in the air"
+                result, reason = _TEMPORARILY_REJECTED, f"the vehicle is not {why}"
             else:
-                reason = self._take(target_ned, is_ordered=True)
+                reason = self._take(target_ned, yaw, is_ordered=True)
                 result = _DENIED if reason else _ACCEPTED
         if result != _ACCEPTED:
             vehicle.say(f"Companion: goto refused: {reason}", Severity.WARNING)
         vehicle.send("COMMAND_ACK", command=_DO_REPOSITION, result=result, target_system=sysid, target_component=compid)
 
-    def _take(self, target_ned: Vector, *, is_ordered: bool) -> str:
+    def _take(self, target_ned: Vector, yaw: float, *, is_ordered: bool) -> str:
         """Makes a place the goal; why not, "" if it is."""
         vehicle = self._vehicle
         away_m = dist(target_ned[:2], vehicle.own.pos_ned[:2])
         if away_m > FAR_M:
             return f"it is {away_m / 1000.0:.1f} km away, {FAR_M / 1000.0:.1f} km allowed"
-        self._goto, self.done = Goal(target_ned, "goto"), ""
+        goal = Goal(target_ned, "goto", yaw=yaw if is_known(YAW_MAX_RAD, yaw) else nan)
+        refusal = self._refusal(goal)
+        if refusal:
+            return refusal
+        self._goto, self.done = goal, ""
         self._is_ordered = is_ordered
         return ""
 
@@ -189,6 +217,7 @@ class Goals:
                 continue
             place = self._ned_of(item.x, item.y, self._alt_amsl_m(item.frame, item.z))
             if not isinstance(place, str):
-                places.append(place)
-        names = [f"waypoint {k + 1} of {len(places)}" for k in range(len(places))]
-        return [Goal(place, name, name == names[-1]) for place, name in zip(places, names, strict=True)]
+                yaw_deg = nan if is_ardupilot else item.params[3]  # to ArduPilot's waypoints it is nothing
+                places.append((place, radians(yaw_deg) if is_known(360.0, yaw_deg) else nan))
+        last = len(places) - 1
+        return [Goal(place, f"waypoint {k + 1} of {last + 1}", yaw, k == last) for k, (place, yaw) in enumerate(places)]

@@ -1,14 +1,14 @@
 """The skill that a policy is for: what a user names, checked and loaded before anything is sent."""
 
+from policies.companion.driving import Driving
 from policies.companion.following import Following
 from policies.companion.image_client import StreamCamera
 from policies.companion.names import SCRIPTED
 from policies.companion.names import TASK as FOLLOW
 from policies.companion.navigating import Navigating
-from policies.companion.navigation_pilot import TASK as NAVIGATE
-from policies.companion.navigation_pilot import NavigationPilot
 from policies.companion.pilot import LearnedPilot, PilotError, load_pilot
 from policies.companion.skill import Skill
+from policies.companion.vector_pilot import DRIVE, NAVIGATE, DrivingPilot, NavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy
 
@@ -19,7 +19,7 @@ def load_skill(name: str, camera: str, *, is_ordered_by_goto: bool) -> Skill:
     Args:
         name: of the policy.
         camera: where images come from, for a skill that needs them.
-        is_ordered_by_goto: a goto to the vehicle is an order to navigate there.
+        is_ordered_by_goto: a goto to the vehicle is an order to navigate or drive there.
 
     Raises:
         PilotError: no such policy, damaged, or made for another task, preset or layout.
@@ -36,4 +36,6 @@ def load_skill(name: str, camera: str, *, is_ordered_by_goto: bool) -> Skill:
         return Following(StreamCamera(camera), LearnedPilot(policy, str(path)))
     if card.task == NAVIGATE:
         return Navigating(NavigationPilot(policy, str(path)), is_ordered_by_goto=is_ordered_by_goto)
-    raise PilotError(f"{path}: made for {card.task}; a companion flies policies of {FOLLOW} and {NAVIGATE}")
+    if card.task == DRIVE:
+        return Driving(DrivingPilot(policy, str(path)), is_ordered_by_goto=is_ordered_by_goto)
+    raise PilotError(f"{path}: made for {card.task}; a companion flies policies of {FOLLOW}, {NAVIGATE} and {DRIVE}")

@@ -15,10 +15,10 @@ from common.attitude import Vector
 from common.range_sectors import RANGES
 from common.warp_start import start_warp
 from policies.companion.goals import Goals
-from policies.companion.navigation_pilot import NavigationPilot
 from policies.companion.observation import CommandKernel, write_own_row
 from policies.companion.ranges import Ranges
 from policies.companion.skill import Floats, Velocity
+from policies.companion.vector_pilot import NavigationPilot
 from policies.companion.vehicle_link import Own, VehicleLink
 from policies.tasks.flight.own_state import OwnState
 from policies.tasks.navigate.observe import observe_rows
@@ -40,6 +40,7 @@ class Navigating:
     """
 
     ready, flying, drives = "ready to navigate", "navigating", False
+    action_size = 4
     goals: Goals  # this and the next from `attach` on
     ranges: Ranges
     _vehicle: VehicleLink

@@ -5,6 +5,7 @@ training. A tilted beam is a DISTANCE_SENSOR of orientation MAV_SENSOR_ROTATION_
 looks; it counts for the elevation of the layout that it is nearest to once it is levelled.
 """
 
+from functools import lru_cache
 from math import asin, atan2, cos, degrees, isfinite, isnan, sin
 from typing import Any
 
@@ -13,20 +14,13 @@ import numpy as np
 from autopilot.mavlink.wire.convert import UINT16_MAX, quat_from_wxyz
 from autopilot.mavlink.wire.number_bounds import is_known
 from common.attitude import rotated, yaw_of
-from common.range_sectors import (
-    BEAM_ELEVATIONS_DEG,
-    FIRST_EDGE_DEG,
-    RANGE_M,
-    RANGES,
-    SECTOR_DEG,
-    SECTORS,
-)
+from common.range_sectors import SCANNER, RangeLayout
 from policies.companion.skill import Floats
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
 
 SCAN_HZ = 20.0  # that the vehicle is asked for
 OLD_US = 500_000  # guess, as of images: five scans missed
-UNKNOWN_MAX = 6  # sectors; guess: an eighth, six times what training has lost
+UNKNOWN_MAX = 1 / 8  # of the sectors; guess: six times what training has lost
 _NORTH_FRAMES, _BODY_FRAMES = frozenset({0, 1}), frozenset({8, 12})  # MAV_FRAME
 _CUSTOM_ROTATION = 100  # MAV_SENSOR_ROTATION_CUSTOM
 _ELEVATION_OFF_DEG, _BEARING_OFF_DEG = 6.0, 20.0  # guess: the attitude is a frame older than the beam
@@ -38,13 +32,17 @@ class Ranges:
 
     Args:
         vehicle: whose links it hears.
+        layout: of what the policy takes.
+        scan_hz: how often the vehicle is asked to tell them; more often than it scans: each scan is told sooner.
     """
 
-    def __init__(self, vehicle: VehicleLink) -> None:
-        self.ranges_m: Floats = np.full(RANGES, RANGE_M, dtype=np.float32)
+    def __init__(self, vehicle: VehicleLink, layout: RangeLayout = SCANNER, scan_hz: float = SCAN_HZ) -> None:
+        beam_count = len(layout.beam_elevations_deg)
+        self.ranges_m: Floats = np.full(layout.sectors + beam_count, layout.range_m, dtype=np.float32)
         self.scan_us = NEVER_US  # when the newest sectors came in
-        self._beam_us = [NEVER_US] * len(BEAM_ELEVATIONS_DEG)
-        self._unknown_count = SECTORS
+        self._layout = layout
+        self._beam_us = [NEVER_US] * beam_count
+        self._unknown_count = layout.sectors
         self._stamp = -1  # the sender's time of the newest sectors
         self._is_new = False
         self._own = vehicle.own
@@ -58,8 +56,9 @@ class Ranges:
             if sysid == system_id:
                 self._beam_reported(fields, time_us)
 
-        vehicle.listen("OBSTACLE_DISTANCE", sectors, SCAN_HZ)
-        vehicle.listen("DISTANCE_SENSOR", beam)
+        vehicle.listen("OBSTACLE_DISTANCE", sectors, scan_hz)
+        if beam_count:
+            vehicle.listen("DISTANCE_SENSOR", beam)
 
     def take_new(self) -> bool:
         """Whether new sectors have come in since the last call."""
@@ -70,7 +69,7 @@ class Ranges:
         """Why nothing can be decided on them; "" if it can."""
         if time_us - self.scan_us > OLD_US:
             return "no ranges all round"
-        if self._unknown_count > UNKNOWN_MAX:
+        if self._unknown_count > UNKNOWN_MAX * self._layout.sectors:
             return "the range finder does not look round far enough"
         if any(time_us - beam_us > OLD_US for beam_us in self._beam_us):
             return "no ranges of the tilted beams"
@@ -85,16 +84,18 @@ class Ranges:
             first_deg -= degrees(yaw_of(self._own.q_ned_from_frd))
         elif fields.frame not in _BODY_FRAMES:
             return
-        nearest = np.full(SECTORS, np.inf, dtype=np.float32)
+        layout = self._layout
+        nearest = np.full(layout.sectors, np.inf, dtype=np.float32)
         for i, distance_cm in enumerate(fields.distances):
             if distance_cm == UINT16_MAX:
                 continue
-            distance_m = RANGE_M if distance_cm > fields.max_distance else min(distance_cm * 0.01, RANGE_M)
-            for k in _sectors_of(first_deg + i * increment_deg, abs(increment_deg)):
+            is_met = distance_cm <= fields.max_distance
+            distance_m = min(distance_cm * 0.01, layout.range_m) if is_met else layout.range_m
+            for k in _sectors_of(layout, first_deg + i * increment_deg, abs(increment_deg)):
                 nearest[k] = min(nearest[k], distance_m)
         is_unknown = np.isinf(nearest)
         self._unknown_count = int(is_unknown.sum())
-        self.ranges_m[:SECTORS] = np.where(is_unknown, RANGE_M, nearest)
+        self.ranges_m[: layout.sectors] = np.where(is_unknown, layout.range_m, nearest)
         self._stamp, self.scan_us, self._is_new = fields.time_usec, time_us, True
 
     def _beam_reported(self, fields: Any, time_us: int) -> None:
@@ -108,20 +109,24 @@ class Ranges:
         if abs(degrees(atan2(sin(off_rad), cos(off_rad)))) > _BEARING_OFF_DEG:
             return
         elevation_deg = degrees(asin(-down))
-        k = min(range(len(BEAM_ELEVATIONS_DEG)), key=lambda k: abs(BEAM_ELEVATIONS_DEG[k] - elevation_deg))
-        if abs(BEAM_ELEVATIONS_DEG[k] - elevation_deg) > _ELEVATION_OFF_DEG:
+        layout = self._layout
+        off_deg = [abs(beam_deg - elevation_deg) for beam_deg in layout.beam_elevations_deg]
+        k = min(range(len(off_deg)), key=off_deg.__getitem__)
+        if off_deg[k] > _ELEVATION_OFF_DEG:
             return
         is_inside = fields.min_distance <= fields.current_distance <= fields.max_distance
-        self.ranges_m[SECTORS + k] = min(fields.current_distance * 0.01, RANGE_M) if is_inside else RANGE_M
+        range_m = min(fields.current_distance * 0.01, layout.range_m) if is_inside else layout.range_m
+        self.ranges_m[layout.sectors + k] = range_m
         self._beam_us[k] = time_us
 
 
-def _sectors_of(middle_deg: float, width_deg: float) -> list[int]:
+@lru_cache(maxsize=256)
+def _sectors_of(layout: RangeLayout, middle_deg: float, width_deg: float) -> tuple[int, ...]:
     """The sectors that a bin reaches into."""
     found = []
-    for k in range(SECTORS):
-        sector_deg = FIRST_EDGE_DEG + (k + 0.5) * SECTOR_DEG
+    for k in range(layout.sectors):
+        sector_deg = layout.first_edge_deg + (k + 0.5) * layout.sector_deg
         apart_deg = abs((middle_deg - sector_deg + 180.0) % 360.0 - 180.0)
-        if apart_deg < 0.5 * (width_deg + SECTOR_DEG) - _OVERLAP_DEG:
+        if apart_deg < 0.5 * (width_deg + layout.sector_deg) - _OVERLAP_DEG:
             found.append(k)
-    return found
+    return tuple(found)

@@ -1,4 +1,4 @@
-"""What a companion can do with one kind of policy: to follow somebody, to navigate to a goal.
+"""What a companion can do with one kind of policy: to follow somebody, to navigate to a goal, to drive into a pose.
 
 The companion itself (companion.py) knows the link, who flies and when setpoints are due. A skill knows its sensors, its
 task, and who decides.
@@ -14,7 +14,7 @@ from policies.companion.vehicle_link import Own, VehicleLink
 
 Floats = NDArray[np.float32]
 Velocity = tuple[Vector, float]
-"""A velocity in ned [m/s] and a yaw rate [rad/s]."""
+"""A velocity [m/s], of what drives ahead, right and down, else in ned; and a yaw rate [rad/s]."""
 
 
 class Skill(Protocol):
@@ -23,6 +23,7 @@ class Skill(Protocol):
     ready: str  # what a pilot is told when it could fly: "ready to follow"
     flying: str  # and while it does: "following"
     drives: bool  # ground vehicles, and flies none
+    action_size: int
     seen: Floats  # the vector that was decided on last
 
     def attach(self, vehicle: VehicleLink) -> None:

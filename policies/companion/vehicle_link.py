@@ -43,7 +43,7 @@ _COMMAND_SET_MODE, _COMMAND_SET_INTERVAL = 176, 511
 _CUSTOM_MODE = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _GROUND_VEHICLES = (10, 11)  # MAV_TYPE: rover, boat
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-_LOCAL_NED = 1
+_LOCAL_NED, _BODY_NED = 1, 8  # MAV_FRAME
 _VELOCITY_AND_YAW_RATE = 0b0101_1100_0111  # type_mask: position, acceleration and yaw are free
 _HAS_POSITION, _HAS_VELOCITY = 1, 2  # FOLLOW_TARGET.est_capabilities
 _LOOKS_DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
@@ -75,6 +75,11 @@ class Own:
     mode: Mode | None = None
     mode_name: str = "unknown"
     origin: GeoPoint | None = None  # of the local frame
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether it can be flown or driven: what drives can as soon as it is armed."""
+        return self.is_armed and (self.is_ground_vehicle or not self.is_on_ground)
 
 
 @dataclass(slots=True)
@@ -159,17 +164,23 @@ class VehicleLink:
         """A message to the autopilot."""
         self._client.ask(name, **fields)
 
-    def send_setpoint(self, vel_ned: Vector, yaw_rate: float) -> None:
-        """A velocity [m/s] and a yaw rate [rad/s], flown in Offboard."""
-        north, east, down = vel_ned
+    def send_setpoint(self, velocity: Vector, yaw_rate: float, *, is_along_nose: bool = False) -> None:
+        """A velocity [m/s] and a yaw rate [rad/s], flown in Offboard.
+
+        Args:
+            velocity: in ned, or ahead, right and down.
+            yaw_rate: clockwise from above.
+            is_along_nose: it is ahead, right and down.
+        """
+        x, y, z = velocity
         self._client.ask(
             "SET_POSITION_TARGET_LOCAL_NED",
             time_boot_ms=max(self.own.boot_us, 0) // 1000 & 0xFFFFFFFF,
-            coordinate_frame=_LOCAL_NED,
+            coordinate_frame=_BODY_NED if is_along_nose else _LOCAL_NED,
             type_mask=_VELOCITY_AND_YAW_RATE,
-            vx=north,
-            vy=east,
-            vz=down,
+            vx=x,
+            vy=y,
+            vz=z,
             yaw_rate=yaw_rate,
         )
 

@@ -8,15 +8,19 @@ is cast against the rays that can meet it alone.
 """
 
 import math
+from typing import Any
 
 import warp as wp
 
-from common.rng import draw_key
+from common.rng import draw_key, draw_tick
+from common.rotation import yaw_from_quat
+from sim.rig import Rig
+from sim.truth import Truth
 from sim.world.boxes import Box, box_middle, in_box_axes
 from sim.world.growing import bucket_of
 from sim.world.trees import Forest, Tree
 from sim.world.walls import slab
-from sim.world.world import World
+from sim.world.world import World, WorldMap, world_at
 
 wp.set_module_options({"enable_backward": False})
 
@@ -148,3 +152,42 @@ def ring_ranges(
             ranges_m[i, k] = wp.clamp(ranges_m[i, k] + noise * _STD_M * error, 0.0, RING_MAX_M)
         if wp.randf(state) < noise * _MISSES:
             ranges_m[i, k] = RING_MAX_M
+
+
+@wp.kernel(enable_backward=False)
+def ring_rows(
+    world: World,
+    truth: wp.array(dtype=Truth),
+    ticks: wp.array(dtype=wp.int64),
+    i_vehicle: int,
+    noise: float,
+    seed: int,
+    ranges_m: wp.array2d(dtype=float),
+) -> None:
+    """What the ring of one vehicle tells, shape (1, SECTORS)."""
+    row = truth[i_vehicle]
+    tick = draw_tick(ticks[i_vehicle])
+    place = wp.vec2(row.pos_ned[0], row.pos_ned[1])
+    heading = yaw_from_quat(row.q_ned_from_frd)
+    ring_ranges(world_at(world, tick), place, heading, noise, seed, tick, ranges_m, wp.tid())
+
+
+class GroundRing:
+    """The ring on one vehicle, fixed to its hull: the first sector's middle is at the nose.
+
+    Args:
+        rig: where the vehicle is.
+        world: what it sees.
+        noise: scale of its errors.
+        seed: of its errors.
+        i_vehicle: the vehicle.
+    """
+
+    def __init__(self, rig: Rig, world: WorldMap, noise: float, seed: int, i_vehicle: int = 0) -> None:
+        self.ranges = wp.zeros((1, SECTORS), dtype=float, device="cpu")
+        self._inputs: list[Any] = [world.kernel, rig.arrays.truth, rig.arrays.tick, i_vehicle, noise, seed]
+
+    def measure(self, yaw_rad: float) -> list[float]:  # noqa: ARG002  (of rings that are turned by the estimate)
+        """Distances [m] clockwise from the nose, inf where nothing is within reach."""
+        wp.launch(ring_rows, 1, inputs=self._inputs, outputs=[self.ranges], device="cpu")
+        return [float(m) if m < RING_MAX_M else math.inf for m in self.ranges.numpy()[0]]

@@ -86,7 +86,7 @@ def test_the_companion_imports_nothing_of_the_simulator():
         "for name in ('scripted', 'FollowMe', 'Navigate'):\n"
         "    load_skill(name, 'tcp://127.0.0.1:1', is_ordered_by_goto=True)\n"
     )
-    assert "policies.companion.navigation_pilot" in modules
+    assert "policies.companion.vector_pilot" in modules
     assert not of_package(modules, "sim")
 
 

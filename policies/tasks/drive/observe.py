@@ -127,7 +127,7 @@ def write_frame(
 
 @wp.kernel(enable_backward=False)
 def observe_rows(
-    own: wp.array(dtype=OwnDrive),
+    estimates: wp.array(dtype=Estimate),
     actions: wp.array(dtype=wp.vec2),
     goals: wp.array(dtype=wp.vec3),
     ranges_m: wp.array2d(dtype=float),
@@ -135,7 +135,14 @@ def observe_rows(
 ) -> None:
     """One frame of every row, shape (rows, elements)."""
     i = wp.tid()
-    write_frame(own[i], actions[i], goals[i], ranges_m, out, i, 0)
+    write_frame(own_drive(estimates[i]), actions[i], goals[i], ranges_m, out, i, 0)
+
+
+@wp.kernel(enable_backward=False)
+def command_rows(actions: wp.array(dtype=wp.vec2), out: wp.array(dtype=DriveCommand)) -> None:
+    """What every row's action asks for."""
+    i = wp.tid()
+    out[i] = drive_command(actions[i])
 
 
 ACTIONS = (

@@ -7,7 +7,7 @@ from common.geodesy import geodetic_from_ned
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_navigator
 from mission.script import take_off
-from policies.companion.navigation_pilot import NavigationPilot
+from policies.companion.vector_pilot import NavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.pretrained.pretrained_policies import pretrained
 from sim.world.forest_world import FOREST

@@ -125,7 +125,7 @@ def test_the_companion_sees_what_training_sees():
     own = wp.zeros(1, dtype=OwnState)
     wp.launch(read_own, 1, [flight.rig.arrays, own])
     out = wp.zeros((1, len(frame_elements(has_rays=True))), dtype=float)
-    scanner = flight._scanner._scanner
+    scanner = flight._components[0]._scanner
     goals, actions = wp.array([goal_ned], dtype=wp.vec3), wp.array([action], dtype=wp.vec4)
     wp.launch(observe_rows, 1, [1, own, actions, goals, scanner._ranges, out])
     newest = companion.skill.seen[-len(out.numpy()[0]) :]

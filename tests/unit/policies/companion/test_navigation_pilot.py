@@ -5,8 +5,8 @@ import pytest
 
 from policies.companion.load_skill import load_skill
 from policies.companion.navigating import Navigating
-from policies.companion.navigation_pilot import TASK, NavigationPilot
 from policies.companion.pilot import PilotError
+from policies.companion.vector_pilot import NAVIGATE, NavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.flight.own_state import ACTIONS
@@ -21,7 +21,7 @@ CAMERA = "tcp://127.0.0.1:1"
 
 def layout(**changes):
     fields = {"version": LAYOUT_VERSION, "frame": frame_elements(has_rays=True), "stack": RAY_STACK} | changes
-    return Layout(TASK, fields["version"], fields["frame"], ACTIONS, stack=fields["stack"])
+    return Layout(NAVIGATE, fields["version"], fields["frame"], ACTIONS, stack=fields["stack"])
 
 
 def loaded(path):
@@ -33,12 +33,12 @@ def test_the_shipped_policy_navigates():
 
 
 def test_what_the_task_shows_is_what_the_pilot_takes(tmp_path):
-    path = policy_file(tmp_path, task=TASK, layout=_layout(NavigateSettings(stack=3)))
+    path = policy_file(tmp_path, task=NAVIGATE, layout=_layout(NavigateSettings(stack=3)))
     assert isinstance(loaded(path), Navigating)
 
 
 def test_a_pilot_that_is_reset_decides_as_at_the_start():
-    path = pretrained(TASK)
+    path = pretrained(NAVIGATE)
     pilot = NavigationPilot(load_policy(path)[0], str(path))
     vector = np.full(pilot.stack * pilot.frame_size, 0.1, np.float32)
     first = pilot.act(vector)
@@ -56,7 +56,7 @@ def test_a_pilot_that_is_reset_decides_as_at_the_start():
     ],
 )
 def test_a_policy_of_another_layout_is_refused_in_one_sentence(tmp_path, changes, sentence):
-    path = policy_file(tmp_path, task=TASK, layout=layout(**changes))
+    path = policy_file(tmp_path, task=NAVIGATE, layout=layout(**changes))
     with pytest.raises(PilotError, match=sentence) as refusal:
         loaded(path)
     assert str(path) in str(refusal.value)
@@ -64,11 +64,11 @@ def test_a_policy_of_another_layout_is_refused_in_one_sentence(tmp_path, changes
 
 
 def test_a_policy_on_depth_images_is_refused(tmp_path):
-    path = policy_file(tmp_path, task=TASK, layout=_layout(NavigateSettings(observation="depth")))
+    path = policy_file(tmp_path, task=NAVIGATE, layout=_layout(NavigateSettings(observation="depth")))
     with pytest.raises(PilotError, match="made for another task or preset"):
         loaded(path)
 
 
 def test_a_policy_of_another_task_is_refused(tmp_path):
-    with pytest.raises(PilotError, match="made for Parking1; a companion flies policies of FollowMe and Navigate"):
+    with pytest.raises(PilotError, match="made for Parking1; a companion flies policies of FollowMe, Navigate and"):
         loaded(policy_file(tmp_path, task="Parking1"))

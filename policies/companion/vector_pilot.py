@@ -1,4 +1,7 @@
-"""Who navigates a companion: a policy file of Navigate, checked against the task it was made for."""
+"""Who navigates or drives a companion: policy files of tasks that show a vector, checked against their task."""
+
+from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -7,29 +10,30 @@ from policies.companion.pilot import PilotError
 from policies.companion.skill import Floats
 from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
+from policies.tasks.drive import observe as drive
 from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.layout import Layout, LayoutError
-from policies.tasks.navigate.observe import LAYOUT_VERSION, frame_elements
+from policies.tasks.navigate import observe as navigate
 
-TASK = "Navigate"
+NAVIGATE, DRIVE = "Navigate", "Drive"
 
 
-class NavigationPilot:
-    """A trained policy: its most probable action.
+class VectorPilot:
+    """A trained policy: its most probable action. A subclass says of which task.
 
     Args:
-        policy: made for Navigate, on ranges.
+        policy: made for the task.
         source: where it came from, for the message.
 
     Raises:
         PilotError: it was made for something else.
     """
 
-    frame_size = len(frame_elements(has_rays=True))
+    task: ClassVar[Layout]  # of one frame; a policy may take several
 
     def __init__(self, policy: Policy, source: str) -> None:
         layout = policy.layout
-        here = Layout(TASK, LAYOUT_VERSION, frame_elements(has_rays=True), ACTIONS, stack=layout.stack)
+        here = replace(self.task, stack=layout.stack)
         try:
             here.require(layout, source)
         except LayoutError as error:
@@ -47,9 +51,22 @@ class NavigationPilot:
         self._memory = self._policy.start_memory(1)
 
     def act(self, vector: Floats) -> Floats:
-        """The action for an observation: four numbers in [-1, 1]."""
+        """The action for an observation: numbers in [-1, 1]."""
         with torch.inference_mode():
             observation = Observation(torch.from_numpy(vector)[None], self._image)
             actions, self._memory = self._policy.act(observation, self._memory, None)
             bounded: Floats = self._policy.bounded(actions)[0].numpy()
         return bounded
+
+
+class NavigationPilot(VectorPilot):
+    """Made for Navigate, on ranges."""
+
+    task = Layout(NAVIGATE, navigate.LAYOUT_VERSION, navigate.frame_elements(has_rays=True), ACTIONS)
+    frame_size = task.frame_size
+
+
+class DrivingPilot(VectorPilot):
+    """Made for Drive: to reach a pose, or to park."""
+
+    task = Layout(DRIVE, drive.LAYOUT_VERSION, drive.FRAME, drive.ACTIONS)

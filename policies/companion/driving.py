@@ -1,0 +1,240 @@
+"""To drive a rover into a pose: telemetry and ranges all round in, speed along the nose and yaw rate out.
+
+A decision for each new scan (10 Hz), by a policy of Drive. It drives while it has a goal: the heading there is the
+goto's or the waypoint's, or where none was given the way there. Where something stands in the goal it does not go.
+"""
+
+from math import atan2, cos, dist, hypot, isfinite, pi, sin
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from autopilot.ports import Estimate
+from common.attitude import yaw_of
+from common.range_sectors import GROUND_RING
+from common.warp_start import start_warp
+from policies.companion.goals import Goal, Goals
+from policies.companion.ranges import Ranges
+from policies.companion.skill import Floats, Velocity
+from policies.companion.vector_pilot import DrivingPilot
+from policies.companion.vehicle_link import Own, VehicleLink
+from policies.tasks.drive.observe import FRAME, DriveCommand, command_rows, observe_rows
+
+ARRIVED_M, ALIGNED_RAD, STANDING_M_S = 0.25, 0.14, 0.25  # by the estimate: training's last lesson
+SHOWN_M = 25.0  # training's farthest goals are 30 m away: of one farther off a place on the way is shown
+NEAR_M = 4.0  # guess: it stops in less
+SCAN_HZ = 50.0
+DECISION_US, DECISION_EARLY_US = 100_000, 10_000
+HULL_M = (0.3, 0.15)  # half of a rover's length and width, and no more: what is seen in there is in the way
+SEEN_FOR = 30  # decisions in a row: what only comes by is gone by then; guess
+NO_GOAL = "no goal"
+TAKEN = "something stands there"
+
+Pose = tuple[float, float, float]
+"""North, east [m] and heading [rad]."""
+
+
+class Driving:
+    """One vehicle's skill to drive.
+
+    Args:
+        pilot: who decides.
+        is_ordered_by_goto: a goto to the vehicle is an order to drive there.
+    """
+
+    ready, flying, drives = "ready to drive", "driving", True
+    action_size = 2
+    goals: Goals  # this and the next from `attach` on
+    ranges: Ranges
+    _vehicle: VehicleLink
+
+    def __init__(self, pilot: DrivingPilot, *, is_ordered_by_goto: bool = False) -> None:
+        self.seen: Floats = np.zeros(0, dtype=np.float32)
+        self._is_ordered_by_goto = is_ordered_by_goto
+        self._pilot = pilot
+        self._observer = DriveObserver(pilot.stack)
+        self._decided_us = -DECISION_US
+        self._goal: Goal | None = None  # that the heading is of
+        self._heading = 0.0  # there [rad]
+        self._taken_count = 0  # decisions in a row with something in the goal
+
+    def attach(self, vehicle: VehicleLink) -> None:
+        self._vehicle = vehicle
+        self.goals = Goals(
+            vehicle, is_ordered_by_goto=self._is_ordered_by_goto, near_m=NEAR_M, refusal=self._refusal_of
+        )
+        self.ranges = Ranges(vehicle, GROUND_RING, SCAN_HZ)
+
+    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:  # noqa: ARG002  (others need it)
+        self.goals.frame(time_us)
+        return self.ranges.take_new()
+
+    def is_ordered(self) -> bool:
+        return self.goals.is_ordered()
+
+    def blindness(self, own: Own, time_us: int) -> str:  # noqa: ARG002
+        return self.ranges.trouble(time_us)
+
+    def loss(self, own: Own) -> str:  # noqa: ARG002
+        if self.goals.goal is None:
+            return self.goals.done or NO_GOAL
+        return TAKEN if self._taken_count >= SEEN_FOR else ""
+
+    def begin(self, own: Own) -> None:  # noqa: ARG002
+        self._forget()
+        self._taken_count = 0
+        self._decided_us = -DECISION_US
+
+    def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
+        if is_flying:
+            self._note_arrival(own)
+        pose = self.goal_pose(own)
+        if pose is None or time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
+            return None
+        self._decided_us = time_us
+        self._taken_count = self._taken_count + 1 if is_taken(pose, own, self.ranges.ranges_m) else 0
+        vector = self._observer.vector(own, _shown(pose, own), self.ranges.ranges_m, last_action)
+        self.seen = vector.copy()
+        action = self._pilot.act(vector)
+        if not is_flying or not np.isfinite(action).all():
+            self._forget()
+        return action
+
+    def setpoint(self, action: Floats, own: Own) -> Velocity:  # noqa: ARG002
+        """What an action asks for, along the nose."""
+        speed, yaw_rate = self._observer.command(action)
+        return (speed, 0.0, 0.0), yaw_rate
+
+    def conclude(self, own: Own) -> None:
+        """Has nothing left to do."""
+
+    def goal_pose(self, own: Own) -> Pose | None:
+        """Where it drives; None: nowhere."""
+        goal = self.goals.goal
+        if goal is None:
+            return None
+        if goal is not self._goal:
+            self._goal, self._heading = goal, _heading_of(goal, own)
+            self._taken_count = 0
+        return goal.pos_ned[0], goal.pos_ned[1], self._heading
+
+    def hint(self, trouble: str) -> str:  # noqa: ARG002
+        return ""
+
+    def figures(self, own: Own, time_us: int) -> str:
+        pose = self.goal_pose(own)
+        goal = f"goal {dist(pose[:2], own.pos_ned[:2]):.1f} m" if pose is not None else NO_GOAL
+        return f"{goal} | scan {(time_us - self.ranges.scan_us) * 1e-3:.0f} ms"
+
+    def close(self) -> None:
+        """Has nothing to give back."""
+
+    def _forget(self) -> None:
+        self._pilot.reset()
+        self._observer.reset()
+
+    def _refusal_of(self, goal: Goal) -> str:
+        """Why a goto cannot be driven to."""
+        own = self._vehicle.own
+        pose = (goal.pos_ned[0], goal.pos_ned[1], _heading_of(goal, own))
+        return TAKEN if is_taken(pose, own, self.ranges.ranges_m) else ""
+
+    def _note_arrival(self, own: Own) -> None:
+        """Goes on to the next goal if it stands in this one."""
+        pose = self.goal_pose(own)
+        if pose is None or not is_in(pose, own):
+            return
+        reached = self.goals.reached()
+        if reached is not None and not reached.is_last:
+            self._vehicle.say(f"Companion: {reached.name} reached")
+            self._forget()
+
+
+def is_in(pose: Pose, own: Own) -> bool:
+    """Whether a vehicle stands in a pose, by its estimate."""
+    turn = (pose[2] - yaw_of(own.q_ned_from_frd) + pi) % (2.0 * pi) - pi
+    is_there = dist(pose[:2], own.pos_ned[:2]) < ARRIVED_M
+    return is_there and abs(turn) < ALIGNED_RAD and hypot(*own.vel_ned) < STANDING_M_S
+
+
+def is_taken(pose: Pose, own: Own, ranges_m: Floats) -> bool:
+    """Whether a range ends where the hull would be in a pose; what is not seen is free."""
+    yaw = yaw_of(own.q_ned_from_frd)
+    bearing = yaw + np.radians(GROUND_RING.sector_deg) * np.arange(GROUND_RING.sectors)
+    north = own.pos_ned[0] + ranges_m * np.cos(bearing) - pose[0]
+    east = own.pos_ned[1] + ranges_m * np.sin(bearing) - pose[1]
+    ahead = north * cos(pose[2]) + east * sin(pose[2])
+    right = east * cos(pose[2]) - north * sin(pose[2])
+    is_inside = (np.abs(ahead) < HULL_M[0]) & (np.abs(right) < HULL_M[1])
+    return bool((is_inside & (ranges_m < GROUND_RING.range_m)).any())
+
+
+def _heading_of(goal: Goal, own: Own) -> float:
+    """The heading at a goal [rad]: as it was asked for, or that of the way there."""
+    if isfinite(goal.yaw):
+        return goal.yaw
+    return atan2(goal.pos_ned[1] - own.pos_ned[1], goal.pos_ned[0] - own.pos_ned[0])
+
+
+def _shown(pose: Pose, own: Own) -> Pose:
+    """The goal, or a pose on the way to it that is no farther than in training."""
+    north, east = pose[0] - own.pos_ned[0], pose[1] - own.pos_ned[1]
+    away_m = hypot(north, east)
+    if away_m <= SHOWN_M:
+        return pose
+    fraction = SHOWN_M / away_m
+    return own.pos_ned[0] + fraction * north, own.pos_ned[1] + fraction * east, atan2(east, north)
+
+
+class DriveObserver:
+    """One vehicle's observations and commands, by the kernel functions of training.
+
+    Args:
+        stack: frames in an observation.
+    """
+
+    def __init__(self, stack: int) -> None:
+        start_warp()
+        estimate, action, goal = wp.zeros(1, dtype=Estimate), wp.zeros(1, dtype=wp.vec2), wp.zeros(1, dtype=wp.vec3)
+        ranges, out = wp.zeros((1, GROUND_RING.sectors), dtype=float), wp.zeros((1, len(FRAME)), dtype=float)
+        command = wp.zeros(1, dtype=DriveCommand)
+        self._estimate: NDArray[Any] = estimate.numpy()  # live views, as of the others
+        self._action: Floats = action.numpy()
+        self._goal: Floats = goal.numpy()
+        self._ranges: Floats = ranges.numpy()
+        self._out: Floats = out.numpy()
+        self._command: NDArray[Any] = command.numpy()
+        self._frames: Floats = np.zeros((stack, len(FRAME)), dtype=np.float32)
+        self._observe = wp.launch(observe_rows, 1, [estimate, action, goal, ranges, out], record_cmd=True)
+        self._ask = wp.launch(command_rows, 1, [action, command], record_cmd=True)
+
+    def reset(self) -> None:
+        """As at an episode's start."""
+        self._frames[:] = 0.0
+
+    def vector(self, own: Own, goal: Pose, ranges_m: Floats, last_action: Floats) -> Floats:
+        """The observation as of now: the last frames, oldest first.
+
+        Args:
+            own: telemetry.
+            goal: where to go.
+            ranges_m: of the ring's sectors.
+            last_action: in [-1, 1], shape (2,).
+        """
+        row = self._estimate[0]
+        row["pos_ned"], row["vel_ned"] = own.pos_ned, own.vel_ned
+        row["q_ned_from_frd"], row["omega_frd"] = own.q_ned_from_frd, own.omega_frd
+        self._action[0], self._goal[0], self._ranges[0] = last_action, goal, ranges_m
+        self._observe.launch()
+        self._frames[:-1] = self._frames[1:]
+        self._frames[-1] = self._out[0]
+        return self._frames.ravel()
+
+    def command(self, action: Floats) -> tuple[float, float]:
+        """Speed along the nose [m/s] and yaw rate [rad/s] of an action in [-1, 1], shape (2,)."""
+        self._action[0] = action
+        self._ask.launch()
+        row = self._command[0]
+        return float(row["speed"]), float(row["yaw_rate"])

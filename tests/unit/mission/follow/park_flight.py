@@ -1,0 +1,74 @@
+"""Rig of the tests of driving by a policy: a rover in a car park, in lockstep, its place known to centimetres."""
+
+from math import atan2, degrees, hypot, pi
+
+from autopilot.mavlink.wire.convert import degrees_e7
+from common.geodesy import geodetic_from_ned
+from mission.flight import FlightConfig
+from mission.follow.lockstep import flight_with_driver
+from policies.companion.vector_pilot import DrivingPilot
+from policies.learn.export.policy_file import load_policy
+from policies.pretrained.pretrained_policies import pretrained
+from sim.world.driving_worlds import CAR_PARK
+
+COMPANION = 191
+DO_REPOSITION = 192
+LOT = CAR_PARK.model_copy(update={"seed": 6, "mover_count": 0})
+
+
+def shipped_pilot(name="drive-park"):
+    path = pretrained(name)
+    return DrivingPilot(load_policy(path)[0], str(path))
+
+
+def standing(*, is_reported=True, pilot=None, folder=None, links=(), **changed):
+    """A rover that is armed and holds, and its companion."""
+    config = {"airframe": "rover", "has_lidar": True, "has_base": True, "world": LOT, "seed": 6}
+    config["parameters"] = {"HG_RO_OFFB_BODY": 1.0}
+    options = {"is_reported": is_reported, "folder": folder, "links": links}
+    flight, companion = flight_with_driver(FlightConfig(**config | changed), pilot or shipped_pilot(), **options)
+
+    async def arm(drone):
+        await drone.wait_ready()
+        await drone.arm()
+
+    flight.fly(arm, seconds=40.0)
+    advance(flight, 1.0)
+    return flight, companion
+
+
+def advance(flight, seconds, is_enough=lambda: False):
+    """Drives on for a time, or until it is enough."""
+    end_us = flight.time_us + round(seconds * 1e6)
+    flight.run(lambda _: is_enough() or flight.time_us >= end_us)
+
+
+def send_goto(flight, pose, component=COMPANION):
+    """Asks for a pose: north, east [m] and heading [rad]."""
+    lat_deg, lon_deg, alt_amsl_m = geodetic_from_ned(pose[0], pose[1], 0.0, flight.config.home)
+    flight.drone.send(
+        "COMMAND_INT",
+        target_system=1,
+        target_component=component,
+        command=DO_REPOSITION,
+        frame=0,
+        param1=-1.0,
+        param2=1.0,
+        param4=pose[2],
+        x=degrees_e7(lat_deg),
+        y=degrees_e7(lon_deg),
+        z=alt_amsl_m,
+    )
+
+
+def miss(flight, pose):
+    """How far [m] and by which angle [deg] the vehicle truly is off a pose."""
+    truth = flight.rig.rows["truth"][0]
+    x, y, z, w = (float(value) for value in truth["q_ned_from_frd"])
+    yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    north, east = (float(value) for value in truth["pos_ned"][:2])
+    return hypot(pose[0] - north, pose[1] - east), abs(degrees((pose[2] - yaw + pi) % (2.0 * pi) - pi))
+
+
+def impact_m_s(flight):
+    return float(flight.rig.rows["truth"][0]["impact_speed"])

@@ -1,0 +1,99 @@
+"""A companion drives a rover into poses: whole drives in lockstep, over MAVLink's bytes."""
+
+from math import nan, pi
+
+import numpy as np
+import pytest
+import warp as wp
+
+from autopilot.interface.vehicle_state import Mode
+from autopilot.ports import Estimate
+from policies.companion.engagement import Phase
+from policies.tasks.drive.observe import FRAME, OWN_SIZE, observe_rows
+from sim.world.world import WorldConfig
+from tests.unit.mission.follow.follow_flight import lose
+from tests.unit.mission.follow.park_flight import advance, impact_m_s, miss, send_goto, shipped_pilot, standing
+
+PLAIN = WorldConfig(hill_height_m=0.0, trees_per_ha=0.0)
+GOAL = (6.0, 3.0, 0.5)
+
+
+def driven(goal=GOAL, seconds=40.0, **changed):
+    """A drive to a goal on a plain, after it has been handed back."""
+    flight, companion = standing(pilot=shipped_pilot("drive-reach"), world=PLAIN, **changed)
+    send_goto(flight, goal)
+    advance(flight, 1.0)
+    assert companion.phase is Phase.FLYING, (companion.trouble, flight.drone.texts)
+    advance(flight, seconds, lambda: companion.phase is Phase.WAITING)
+    return flight, companion
+
+
+def test_a_goto_to_the_companion_is_driven_into_its_pose_and_handed_back_to_hold():
+    flight, _ = driven()
+    distance_m, turn_deg = miss(flight, GOAL)
+    assert (distance_m < 0.3, turn_deg < 10.0) == (True, True), (distance_m, turn_deg)
+    assert flight.controller.state.mode is Mode.HOLD
+    assert "Companion: hold: goto reached" in flight.drone.texts
+
+
+def test_a_goto_without_a_heading_ends_as_the_way_there_led():
+    flight, _ = driven((6.0, 3.0, nan))
+    distance_m, turn_deg = miss(flight, (6.0, 3.0, np.arctan2(3.0, 6.0)))
+    assert (distance_m < 0.3, turn_deg < 10.0) == (True, True), (distance_m, turn_deg)
+
+
+def test_the_companion_sees_what_training_sees():
+    flight, companion = standing(is_reported=False, noise=0.0)
+    send_goto(flight, goal := (5.0, 1.0, pi / 3.0))
+    advance(flight, 2.0)
+    assert companion.phase is Phase.FLYING
+    while True:  # up to a frame with a decision
+        count, action = companion.decision_count, companion.action
+        flight.frame()
+        if companion.decision_count > count:
+            break
+    estimate = wp.array(flight.rig.rows["autopilot.ekf.rows"]["estimate"].copy(), dtype=Estimate)
+    out = wp.zeros((1, len(FRAME)), dtype=float)
+    goals, actions = wp.array([goal], dtype=wp.vec3), wp.array([action], dtype=wp.vec2)
+    wp.launch(observe_rows, 1, [estimate, actions, goals, flight._surroundings._ring.ranges, out])
+    newest, task = companion.skill.seen[-len(FRAME) :], out.numpy()[0]
+    assert (task[-36:] > 0.1).sum() > 3  # cars and walls
+    assert newest[:OWN_SIZE] == pytest.approx(task[:OWN_SIZE], abs=1e-6)
+    assert newest == pytest.approx(task, abs=5e-3)  # centimetres of ranges and of latitudes
+
+
+def test_a_goal_in_which_something_is_seen_is_refused_with_the_reason():
+    flight, companion = standing()
+    box = flight.world.boxes.rows[np.hypot(*flight.world.boxes.middle().T).argmin()]
+    send_goto(flight, (float(box["north"]), float(box["east"]), 0.0))
+    advance(flight, 0.5)
+    assert "Companion: goto refused: something stands there" in flight.drone.texts
+    assert companion.skill.goals.goal is None
+    assert flight.controller.state.mode is Mode.HOLD
+
+
+def test_a_goto_to_a_rover_that_is_not_armed_is_refused():
+    flight, companion = standing()
+    flight.fly(lambda drone: drone.disarm(), seconds=5.0)
+    send_goto(flight, GOAL)
+    advance(flight, 0.5)
+    assert "Companion: goto refused: the vehicle is not armed" in flight.drone.texts
+    assert companion.skill.goals.goal is None
+
+
+def test_a_ring_that_falls_silent_ends_in_hold_at_a_standstill():
+    flight, companion = standing(pilot=shipped_pilot("drive-reach"), world=PLAIN)
+    send_goto(flight, (25.0, 0.0, 0.0))
+    advance(flight, 3.0)
+    assert companion.phase is Phase.FLYING
+    lose(companion, "OBSTACLE_DISTANCE")
+    advance(flight, 3.0)
+    assert flight.controller.state.mode is Mode.HOLD
+    assert "Companion: hold: no ranges all round" in flight.drone.texts
+    assert np.linalg.norm(flight.rig.rows["truth"][0]["vel_ned"]) < 0.05
+
+
+def test_the_rover_reverses_where_the_policy_asks_it_to():
+    flight, _ = driven((-2.0, 0.0, 0.0))
+    assert miss(flight, (-2.0, 0.0, 0.0))[0] < 0.3
+    assert impact_m_s(flight) == 0.0
