@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive
+.PHONY: help setup fly mission park train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -27,6 +27,9 @@ fly: $(STAMP) ## Let the drone follow somebody through hills and trees; flags: m
 
 mission: $(STAMP) ## Fly the default mission; flags: make mission ARGS="--once --speed max --wind 5"
 	@$(BIN)/honeyguide fly $(ARGS)
+
+park: $(STAMP) ## Let a rover park by a learned policy while you watch; flags: make park ARGS="--world-seed 4 --reverse"
+	@$(BIN)/honeyguide park --view $(ARGS)
 
 train-demo: $(STAMP) ## Train Parking1 from nothing while you watch, then look at what it learnt; flags: ARGS="--seed 7"
 	@$(BIN)/honeyguide train Parking1 --run-id train-demo --force $(ARGS)

@@ -79,16 +79,16 @@ def trained(preset: str) -> tuple[Path, float]:
     return path, result.progress.elapsed_s
 
 
-def judged(policy: Policy, preset: str) -> Drives:
+def judged(policy: Policy, preset: str, count: int = EPISODES) -> Drives:
     """Every environment plays its first episode."""
     settings = {"preset": preset, "has_estimator": True, "split": "test"}
-    task = build_task("Drive", EPISODES, task_settings("Drive", settings))
+    task = build_task("Drive", count, task_settings("Drive", settings))
     if not isinstance(task, Drive):
         raise TypeError(task)
     task.layout.require(policy.layout, "the policy")
     task.reset(SEED)
-    outcomes, times_s = np.zeros(EPISODES, dtype=np.int32), np.zeros(EPISODES, dtype=np.float32)
-    tensors, memory = TaskTensors(task), policy.start_memory(EPISODES)
+    outcomes, times_s = np.zeros(count, dtype=np.int32), np.zeros(count, dtype=np.float32)
+    tensors, memory = TaskTensors(task), policy.start_memory(count)
     with few_threads(), torch.inference_mode():
         for _ in range(LONGEST):
             actions, memory = policy.act(tensors.observation, memory, None)

@@ -15,6 +15,7 @@ from mission.console.late_command import LateCommand
 from mission.console.name_checks import check_file
 from mission.console.terminal import loading
 from mission.follow import follow_commands
+from mission.park import park_command
 from mission.train import task_commands, training_commands
 from mission.view import replay_command
 
@@ -128,6 +129,7 @@ for _command in (task_commands.demonstrate, task_commands.play, task_commands.dr
     app.command()(_command)
 app.command(cls=LateCommand)(follow_commands.follow)
 app.command()(follow_commands.companion)
+app.command(cls=LateCommand)(park_command.park)
 app.command()(replay_command.replay)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)
 app.command(name="eval")(training_commands.evaluate)

@@ -211,13 +211,33 @@ class Client:
         return await self._command(ask, command, name or f"command {command}", timeout_s)
 
     async def command_int(
-        self, command: int, frame: int, params: Sequence[float], x: int, y: int, z: float, *, name: str = ""
+        self,
+        command: int,
+        frame: int,
+        params: Sequence[float],
+        x: int,
+        y: int,
+        z: float,
+        *,
+        name: str = "",
+        component: int = AUTOPILOT_COMPONENT,
     ) -> Any:
-        """As `command`, with a position: x and y are 1e7 degrees (or 1e4 metres in local frames)."""
+        """As `command`, with a position: x and y are 1e7 degrees (or 1e4 metres in local frames).
+
+        `component` may be another one of the vehicle than its autopilot.
+        """
         fields: dict[str, Any] = {f"param{k + 1}": float(value) for k, value in enumerate(params)}
 
         def ask(_: int) -> None:
-            self.ask("COMMAND_INT", command=command, frame=frame, x=x, y=y, z=z, **fields)
+            place = {"frame": frame, "x": x, "y": y, "z": z}
+            self.send(
+                "COMMAND_INT",
+                target_system=self.system_id,
+                target_component=component,
+                command=command,
+                **place,
+                **fields,
+            )
 
         return await self._command(ask, command, name or f"command {command}", COMMAND_TIMEOUT_S)
 

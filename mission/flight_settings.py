@@ -110,3 +110,23 @@ FOLLOWED_WITH = (
     "hill_height_m", "airframe", "dialect", "parameters", "has_view", "view_port", "has_film", "gcs_port", "api_port",
     "host", "run_folder",
 )  # fmt: skip
+
+
+class ParkOptions(FlightOptions):
+    """The options of `honeyguide park`, as given: those of `fly` that `PARKED_WITH` names, some told otherwise."""
+
+    policy: str = option("drive-park", "A policy of Drive: a file, a run's folder, or one that ships.")
+    spot: int | None = option(None, "The spot to park in, from 1.", shown="a free one, drawn by --seed", ge=1)
+    is_reverse: bool = option(False, "Nose to the aisle: it reverses into the spot.", "--reverse")
+    is_idle: bool = option(False, "Park nowhere by itself: wait for clicks on the page, and for gotos.", "--idle")
+    airframe: str = option("rover", "Airframe name or TOML file; the policies were trained on rover.")
+    world_kind: WorldKind = "car-park"
+    has_lidar: bool = True
+    has_base: bool = True
+
+
+PARKED_WITH = (
+    "policy", "spot", "is_reverse", "is_idle", "speed", "seconds", "seed", "wind_m_s", "wind_from_deg", "noise",
+    "world_seed", "airframe", "dialect", "parameters", "has_view", "view_port", "gcs_port", "api_port", "host",
+    "run_folder",
+)  # fmt: skip

@@ -160,12 +160,12 @@ class Drone(Client):
             alt_amsl_m,
             name="goto",
         )
-        target = ned_from_geodetic(lat_deg, lon_deg, alt_amsl_m, self._origin())
+        target = ned_from_geodetic(lat_deg, lon_deg, alt_amsl_m, self.origin)
         await self.until(lambda: self._way_left_m(target) < acceptance_m, timeout_s, "goto")
 
     async def goto_ned(self, north_m: float, east_m: float, down_m: float, **options: Any) -> None:
         """`goto` for a place in the vehicle's local frame."""
-        await self.goto(*geodetic_from_ned(north_m, east_m, down_m, self._origin()), **options)
+        await self.goto(*geodetic_from_ned(north_m, east_m, down_m, self.origin), **options)
 
     async def hold(self) -> None:
         await self._set_mode(MAIN_AUTO, AUTO_LOITER, "hold")
@@ -303,7 +303,8 @@ class Drone(Client):
         message = self.latest("HOME_POSITION")
         return nan if message is None else message.z - self.pos_ned[2]
 
-    def _origin(self) -> GeoPoint:
+    @property
+    def origin(self) -> GeoPoint:
         """Of the local frame, from the home position, which is known in both frames."""
         message = self.latest("HOME_POSITION")
         if message is None:

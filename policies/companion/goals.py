@@ -20,7 +20,7 @@ from common.geodesy import ned_from_geodetic
 from policies.companion.plan_download import PlanDownload
 from policies.companion.vehicle_link import COMPONENT, VehicleLink
 
-YAW_MAX_RAD = 7.0  # a full turn, either way
+YAW_MAX_RAD = 100.0  # some turn too often
 FAR_M = 1000.0  # guess: farther is a mistake
 NEAR_M = 10.0  # of what flies 5 m/s; guess
 MOVED_M = 1.0  # a place that the vehicle goes to has changed if it is so far from the last

@@ -1,0 +1,177 @@
+"""`python -m bench.drive_mavlink [SCENES] [park|reach] [POLICY]`: how well are Drive's policies driven over MAVLink?
+
+One rover at a time, in lockstep: the whole flight controller, the messages of its ring of range finders, a companion
+computer with the policy, a goto sent to it. The scenes are those of the batch: held-out worlds, goals, headings at the
+start, wind, noise, masses, motors and tyres are drawn by the task, which then plays the same scenes itself. Out: both
+rates side by side, in the table of drives over MAVLink of docs/results/drive.md.
+"""
+
+import sys
+from collections import Counter
+from dataclasses import dataclass
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from bench.drive import AIMS, PAGE_FILE, SEED, Drives, judged
+from bench.row import machine
+from common.files import write_whole
+from mission.flight import Flight, FlightConfig
+from mission.follow.lockstep import flight_with_driver
+from mission.park.park_session import REVERSES
+from mission.park.parking import Arrival, Pose, drive, get_ready
+from mission.script import Drone, ScriptError
+from policies.companion.vector_pilot import DrivingPilot
+from policies.learn.export.policy_file import load_policy
+from policies.learn.export.policy_path import find_policy
+from policies.learn.networks.policy import Policy
+from policies.tasks.catalogue import build_task, task_settings
+from policies.tasks.drive.drive import Drive
+from policies.tasks.episode import Outcome
+from policies.tasks.intervals import rate
+from sim.world.world import WorldMap
+
+SCENES = 300
+READY_S, ALL_S = 60.0, 240.0
+HEADING = "## Over MAVLink"
+SECTION = f"""\
+{HEADING}
+
+The same policies, driven by their [companion](../how-to/companion.md): a goto is sent to it, estimate and ranges come
+to it as messages, its setpoints go to mode Offboard. {{scenes}} scenes of each kind, one rover at a time, in lockstep;
+the batch plays the same scenes beside it. There is success when it has been handed back in mode Hold, and 2 s later
+stands in the pose as above, by the truth. Made by `python -m bench.drive_mavlink`.
+
+| policy | over MAVLink | batch, same scenes | touched | not there | time to the goal |
+|---|---|---|---|---|---|
+{{rows}}
+
+Measured on {{machine}}.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What the task has drawn for one episode; rows of the rig as NumPy values."""
+
+    world: WorldMap
+    goal: Pose
+    noise: float
+    seed: int
+    rows: dict[str, Any]
+
+
+def scenes_of(preset: str, count: int) -> list[Scene]:
+    """The scenes of the batch's first episodes."""
+    settings = task_settings("Drive", {"preset": preset, "has_estimator": True, "split": "test"})
+    task = build_task("Drive", count, settings)
+    if not isinstance(task, Drive):
+        raise TypeError(task)
+    task.reset(SEED)
+    goals, noise = task.driving.goals.numpy(), task.driving.flight.numpy()["sensor_noise"]
+    seeds = task.noise_seeds.numpy()
+    names = ("model", "wind_model", "body", "truth")
+    return [
+        Scene(
+            world=task.worlds.map(i),
+            goal=(float(goals[i][0]), float(goals[i][1]), float(goals[i][2])),
+            noise=round(4.0 * float(noise[i])) / 4.0,
+            seed=int(seeds[i]),
+            rows={name: task.rig.rows[name][i].copy() for name in names},
+        )
+        for i in range(count)
+    ]
+
+
+def driven(scene: Scene, pilot: DrivingPilot) -> Arrival:
+    """One drive over MAVLink."""
+    config = FlightConfig(
+        airframe="rover",
+        has_lidar=True,
+        has_base=True,
+        world=scene.world.config,
+        seed=scene.seed,
+        noise=scene.noise,
+        parameters=REVERSES,
+    )
+    flight, companion = flight_with_driver(config, pilot)
+    try:
+        check_world(flight, scene)
+        for name in ("model", "body", "truth"):  # as the episode's vehicle stands there
+            flight.rig.rows[name][0] = scene.rows[name]
+        flight.rig.rows["wind_model"][0] = scene.rows["wind_model"]
+        ready = flight.fly(get_ready, seconds=READY_S)
+        if ready.error is not None:
+            return Arrival("missed", nan, nan, nan, str(ready.error))
+
+        async def script(drone: Drone) -> Arrival:
+            return await drive(drone, flight, companion, scene.goal)
+
+        running = flight.fly(script, seconds=ALL_S)
+        if isinstance(running.error, ScriptError):
+            return Arrival("missed", nan, nan, nan, str(running.error))
+        result: Arrival = running.result
+        return result
+    finally:
+        flight.close()
+
+
+def check_world(flight: Flight, scene: Scene) -> None:
+    """Refuses a world that has not grown as the batch's has."""
+    same = np.array_equal(flight.world.heights, scene.world.heights)
+    same &= np.array_equal(flight.world.boxes.rows, scene.world.boxes.rows)
+    same &= np.array_equal(flight.world.trees, scene.world.trees)
+    if not same:
+        raise RuntimeError("the world of the flight is not the batch's")
+
+
+def row(preset: str, arrivals: list[Arrival], drives: Drives) -> str:
+    """A line of the table."""
+
+    def percent(is_it: Any) -> str:
+        fraction = rate(np.asarray(is_it))
+        return f"{100 * fraction.value:.1f} % ({100 * fraction.low:.1f} to {100 * fraction.high:.1f})"
+
+    outcomes = np.array([arrival.outcome for arrival in arrivals])
+    times = [arrival.seconds for arrival in arrivals if arrival.is_there]
+    cells = [preset, percent(outcomes == "there"), percent(drives.outcomes == Outcome.SUCCESS)]
+    cells += [percent(outcomes == "touched"), percent(outcomes == "missed"), f"{np.mean(times or nan):.1f} s"]
+    return "| " + " | ".join(cells) + " |"
+
+
+def measured(preset: str, policy: Policy, source: str, count: int) -> str:
+    """A line of the table, with what went wrong printed."""
+    drives = judged(policy, preset, count)
+    pilot = DrivingPilot(policy, source)
+    arrivals = []
+    for i, scene in enumerate(scenes_of(preset, count)):
+        arrivals.append(driven(scene, pilot))
+        if not arrivals[-1].is_there:
+            print(i, arrivals[-1], Outcome(int(drives.outcomes[i])).name, flush=True)
+    batch = drives.outcomes == Outcome.SUCCESS
+    both = Counter((arrival.is_there, bool(is_good)) for arrival, is_good in zip(arrivals, batch, strict=True))
+    print(f"{preset}: over MAVLink and in the batch {both[True, True]}, over MAVLink alone {both[True, False]}, "
+          f"in the batch alone {both[False, True]}, neither {both[False, False]}")  # fmt: skip
+    return row(preset, arrivals, drives)
+
+
+def main(arguments: list[str]) -> int:
+    count = next((int(text) for text in arguments if text.isdigit()), SCENES)
+    presets = [preset for preset in AIMS if preset in arguments] or list(AIMS)
+    named = [text for text in arguments if not text.isdigit() and text not in AIMS]
+    lines = []
+    for preset in presets:
+        path = find_policy(named[0] if named else f"drive-{preset}")
+        lines.append(measured(preset, load_policy(path)[0], str(path), count))
+        print(lines[-1], flush=True)
+    if not named and len(lines) == len(AIMS) and PAGE_FILE.is_file():
+        page = PAGE_FILE.read_text()
+        section = SECTION.format(scenes=count, rows="\n".join(lines), machine=machine())
+        before = page[: page.find(HEADING)] if HEADING in page else f"{page}\n"
+        write_whole(PAGE_FILE, f"{before}{section}".encode())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,1 @@
+"""A rover that parks by a learned policy, over MAVLink."""
