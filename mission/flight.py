@@ -82,6 +82,7 @@ class Flight:
         has_camera_thread: photos are rendered while the flight goes on, which is then no longer the same each time.
         state: what outlives the flight; None: it begins with defaults and nothing is kept.
         make_rig: takes the arguments of `Rig`; `sim.stepped.SteppedRig` flies with the engine and the board of others.
+        world: the ground; None: as the configuration says.
     """
 
     def __init__(
@@ -96,6 +97,7 @@ class Flight:
         video: RtpVideo | None = None,
         has_camera_thread: bool = False,
         make_rig: Callable[..., Rig] = Rig,
+        world: WorldMap | None = None,
     ) -> None:
         self.config, self.stream, self.video = config, stream, video
         self.time_us = 0
@@ -106,7 +108,7 @@ class Flight:
         self.airframe: Airframe = load_airframe(config.airframe)
         vehicle, _ = class_of(self.airframe)
         self.drives = vehicle.ground is None  # and stays on the ground
-        self.world: WorldMap = flight_world(config)
+        self.world = flight_world(config) if world is None else world
         self.rig = flight_rig(config, self.airframe, self.world, make_rig)
         self.params = flight_parameters(config, self.airframe)
         self.persistence = None if state is None else self._restore_parameters(state)
@@ -138,7 +140,8 @@ class Flight:
         self._stream_rig = None if stream is None else self._start_stream(stream)
         self.simulator_params = SimulatorParameters(self)
         self._video_rig = None if video is None else self._start_video(video)
-        self._flight_logs = None if state is None else self._shelve_logs(state)
+        shelf = None if state is None else state.folder / "logs"
+        self._flight_logs = shelf and FlightLogs(shelf, self.recorder, self.params, self.troubles.note)
         self._lend_logs(log)
 
     def _restore_parameters(self, state: StateFolder) -> Persistence:
@@ -199,9 +202,6 @@ class Flight:
             server.signer.on_trouble = self.troubles.note
             controller.attach(server)
         return servers
-
-    def _shelve_logs(self, state: StateFolder) -> FlightLogs:
-        return FlightLogs(state.folder / "logs", self.recorder, self.params, self.troubles.note)
 
     def _lend_logs(self, log: Path | None) -> None:
         """Gives the flight controller the logs, and what it remembers of earlier flights."""

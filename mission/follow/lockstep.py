@@ -15,6 +15,7 @@ from policies.companion.following import Following, Pilot
 from policies.companion.image_client import MemoryCamera
 from policies.companion.navigating import Navigating
 from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
+from sim.world.world import WorldMap
 
 
 def flight_with_companion(
@@ -78,6 +79,7 @@ def flight_with_driver(
     is_reported: bool = True,
     links: Sequence[Link | LinkSource] = (),
     folder: Path | None = None,
+    world: WorldMap | None = None,
 ) -> tuple[Flight, Companion]:
     """A rover's flight, and the companion on board that drives to each goto, and along the plan.
 
@@ -87,9 +89,10 @@ def flight_with_driver(
         is_reported: False: it waits for the pilot to choose Offboard.
         links: of ground stations.
         folder: of the logs.
+        world: the ground; None: as the configuration says.
     """
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
-    flight = Flight(config, links=[vehicle_end, *links], folder=folder)
+    flight = Flight(config, links=[vehicle_end, *links], folder=folder, world=world)
     companion = Companion(companion_end, Driving(pilot, is_ordered_by_goto=is_reported), is_reported=is_reported)
     flight.computers.append(companion)
     return flight, companion

@@ -4,7 +4,7 @@ A decision for each new scan (10 Hz), by a policy of Drive. It drives while it h
 goto's or the waypoint's, or where none was given the way there. Where something stands in the goal it does not go.
 """
 
-from math import atan2, cos, dist, hypot, isfinite, pi, sin
+from math import atan2, cos, dist, hypot, inf, isfinite, pi, remainder, sin
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,8 @@ from policies.companion.vehicle_link import Own, VehicleLink
 from policies.tasks.drive.observe import FRAME, DriveCommand, command_rows, observe_rows
 
 ARRIVED_M, ALIGNED_RAD, STANDING_M_S = 0.25, 0.14, 0.25  # by the estimate: training's last lesson
+STILL_M_S = 0.05
+STUCK_FOR = 300  # decisions in a row without moving; guess
 SHOWN_M = 25.0  # training's farthest goals are 30 m away: of one farther off a place on the way is shown
 NEAR_M = 4.0  # guess: it stops in less
 SCAN_HZ = 50.0
@@ -30,7 +32,7 @@ DECISION_US, DECISION_EARLY_US = 100_000, 10_000
 HULL_M = (0.3, 0.15)  # half of a rover's length and width, and no more: what is seen in there is in the way
 SEEN_FOR = 30  # decisions in a row: what only comes by is gone by then; guess
 NO_GOAL = "no goal"
-TAKEN = "something stands there"
+TAKEN, STUCK = "something stands there", "stuck"
 
 Pose = tuple[float, float, float]
 """North, east [m] and heading [rad]."""
@@ -59,6 +61,8 @@ class Driving:
         self._goal: Goal | None = None  # that the heading is of
         self._heading = 0.0  # there [rad]
         self._taken_count = 0  # decisions in a row with something in the goal
+        self._still_count = 0  # decisions in a row without moving
+        self._off = inf  # how far it is off the goal, since it has been there; inf: it has not
 
     def attach(self, vehicle: VehicleLink) -> None:
         self._vehicle = vehicle
@@ -80,11 +84,14 @@ class Driving:
     def loss(self, own: Own) -> str:  # noqa: ARG002
         if self.goals.goal is None:
             return self.goals.done or NO_GOAL
+        if self._still_count >= STUCK_FOR:
+            return STUCK
         return TAKEN if self._taken_count >= SEEN_FOR else ""
 
     def begin(self, own: Own) -> None:  # noqa: ARG002
         self._forget()
-        self._taken_count = 0
+        self._taken_count = self._still_count = 0
+        self._off = inf
         self._decided_us = -DECISION_US
 
     def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
@@ -94,6 +101,8 @@ class Driving:
         if pose is None or time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
             return None
         self._decided_us = time_us
+        is_still = is_flying and hypot(*own.vel_ned) < STILL_M_S
+        self._still_count = self._still_count + 1 if is_still else 0
         self._taken_count = self._taken_count + 1 if is_taken(pose, own, self.ranges.ranges_m) else 0
         vector = self._observer.vector(own, _shown(pose, own), self.ranges.ranges_m, last_action)
         self.seen = vector.copy()
@@ -142,21 +151,28 @@ class Driving:
         return TAKEN if is_taken(pose, own, self.ranges.ranges_m) else ""
 
     def _note_arrival(self, own: Own) -> None:
-        """Goes on to the next goal if it stands in this one."""
+        """Goes on to the next goal if it stands in this one, as near to its middle as it comes."""
         pose = self.goal_pose(own)
-        if pose is None or not is_in(pose, own):
+        if pose is None:
             return
+        off, was_off = how_far_off(pose, own), self._off
+        is_in = off < 1.0 and hypot(*own.vel_ned) < STANDING_M_S
+        if not isfinite(was_off) and not is_in:
+            return
+        self._off = off
+        if off < was_off and hypot(*own.vel_ned) > STILL_M_S:
+            return
+        self._off = inf
         reached = self.goals.reached()
         if reached is not None and not reached.is_last:
             self._vehicle.say(f"Companion: {reached.name} reached")
             self._forget()
 
 
-def is_in(pose: Pose, own: Own) -> bool:
-    """Whether a vehicle stands in a pose, by its estimate."""
-    turn = (pose[2] - yaw_of(own.q_ned_from_frd) + pi) % (2.0 * pi) - pi
-    is_there = dist(pose[:2], own.pos_ned[:2]) < ARRIVED_M
-    return is_there and abs(turn) < ALIGNED_RAD and hypot(*own.vel_ned) < STANDING_M_S
+def how_far_off(pose: Pose, own: Own) -> float:
+    """How far off a pose a vehicle is by its estimate, below 1 if it is there."""
+    turn = remainder(pose[2] - yaw_of(own.q_ned_from_frd), 2.0 * pi)
+    return max(dist(pose[:2], own.pos_ned[:2]) / ARRIVED_M, abs(turn) / ALIGNED_RAD)
 
 
 def is_taken(pose: Pose, own: Own, ranges_m: Floats) -> bool:

@@ -97,3 +97,13 @@ def test_the_rover_reverses_where_the_policy_asks_it_to():
     flight, _ = driven((-2.0, 0.0, 0.0))
     assert miss(flight, (-2.0, 0.0, 0.0))[0] < 0.3
     assert impact_m_s(flight) == 0.0
+
+
+def test_a_rover_that_gets_nowhere_gives_up_and_says_so(monkeypatch):
+    flight, companion = standing(pilot=shipped_pilot("drive-reach"), world=PLAIN)
+    send_goto(flight, (10.0, 0.0, 0.0))
+    advance(flight, 1.0)
+    monkeypatch.setattr(companion.skill._pilot, "act", lambda _: np.zeros(2, np.float32))
+    advance(flight, 40.0, lambda: companion.phase is Phase.WAITING)
+    assert "Companion: hold: stuck" in flight.drone.texts
+    assert flight.controller.state.mode is Mode.HOLD
