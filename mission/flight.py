@@ -140,8 +140,9 @@ class Flight:
         self._stream_rig = None if stream is None else self._start_stream(stream)
         self.simulator_params = SimulatorParameters(self)
         self._video_rig = None if video is None else self._start_video(video)
-        logs = None if state is None else state.folder / "logs"
-        self._flight_logs = logs and FlightLogs(logs, self.recorder, self.params, self.troubles.note)
+        self._flight_logs: FlightLogs | None = None
+        if state is not None:
+            self._flight_logs = FlightLogs(state.folder / "logs", self.recorder, self.params, self.troubles.note)
         self._lend_logs(log)
 
     def _restore_parameters(self, state: StateFolder) -> Persistence:

@@ -69,7 +69,7 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
             import mission.follow.owner_device  # noqa: F401  (their kernels are loaded with the others)
 
         has_camera = speed is not None or stream is not None or page is not None
-        load_kernels(say, has_camera=has_camera, has_owner=options.owner is not None, has_forest=config.is_forest)
+        load_kernels(say, config, has_camera=has_camera)
         say("building the world")
         flight = Flight(
             config,

@@ -1,13 +1,16 @@
 """The kernels of a flight, loaded before it begins: what the cache lacks is compiled, and no flight stops for it."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import warp as wp
 
+from common.airframe import load_airframe
 from common.warp_start import start_warp
 from mission.console.terminal import Say
+from mission.flight_config import FlightConfig
 from sim.advance import advance_kernel, rig_kernels
-from sim.bodies.body import DEFAULT_BODY, DEFAULT_LAW
+from sim.bodies.vehicles import class_of
 
 _ALWAYS = ("autopilot.estimator.ekf",)
 _CAMERA = ("sim.sensors.camera",)
@@ -26,32 +29,42 @@ _OWNER = (
     "policies.tasks.flight.own_state",
 )
 _FOREST = ("sim.world.hills", "sim.world.growing", "sim.sensors.scanner")
+_BOXES = ("sim.world.hills", "sim.world.growing", "sim.world.building")
+_RING = {True: ("sim.sensors.ground_ring",), False: ("sim.sensors.ring",)}  # of what drives, of what flies
+PARKING = ("policies.tasks.drive.observe", "mission.park.spots")
 
 
-def flight_kernels() -> tuple[Any, ...]:
+def flight_kernels(airframe: str) -> tuple[Any, ...]:
     """Those that are in modules of their own."""
-    vehicle = DEFAULT_BODY, DEFAULT_LAW
-    kernels = rig_kernels(*vehicle)
-    return kernels.place, kernels.power_on, kernels.forget_all_impacts, advance_kernel(*vehicle, has_estimator=True)
+    vehicle, body = class_of(load_airframe(airframe))
+    kernels = rig_kernels(body, vehicle.law)
+    advance = advance_kernel(body, vehicle.law, has_estimator=True)
+    return kernels.place, kernels.power_on, kernels.forget_all_impacts, advance
 
 
-def load_kernels(say: Say, *, has_camera: bool, has_owner: bool, has_forest: bool = False) -> None:
+def load_kernels(say: Say, config: FlightConfig, *, has_camera: bool, others: Sequence[str] = ()) -> None:
     """Loads the kernels of a flight one after the other, and says which.
 
     Args:
         say: is told how far it is.
+        config: of the flight. With an owner those of the policy that follows too; their packages must have been
+            imported.
         has_camera: those of the camera's pictures too, which a flight in lockstep loads when it takes the first.
-        has_owner: those of the owner and of the policy that follows too; their packages must have been imported.
-        has_forest: those of growing a forest and of the scanner.
+        others: modules besides, which have been imported.
     """
     start_warp()
+    drives = class_of(load_airframe(config.airframe)).vehicle.ground is None
     names = (
         *_ALWAYS,
         *(_CAMERA if has_camera else ()),
-        *(_OWNER if has_owner else ()),
-        *(_FOREST if has_forest else ()),
+        *(_OWNER if config.owner is not None else ()),
+        *(_FOREST if config.is_forest else ()),
+        *(_BOXES if config.world.has_boxes else ()),
+        *(_RING[drives] if config.has_lidar else ()),
+        *others,
     )
-    modules = [wp.get_module(name) for name in names] + [kernel.module for kernel in flight_kernels()]
+    kernels = flight_kernels(config.airframe)
+    modules = [wp.get_module(name) for name in dict.fromkeys(names)] + [kernel.module for kernel in kernels]
     for number, module in enumerate(modules, 1):
         say(f"loading kernels, compiled the first time: {number} of {len(modules)}")
         wp.load_module(module, device="cpu")

@@ -69,7 +69,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     page = open_page(options.view_port) if options.has_view else None
     folder = held.enter_context(run_folder(options.run_folder))
     with busy(console, "loading kernels") as say:
-        load_kernels(say, has_camera=page is not None, has_owner=True)
+        load_kernels(say, config, has_camera=page is not None)
         say("building the world")
         flight, companion = flight_with_companion(config, pilot, links=links, folder=folder, wall_s=wall_time_s)
     watch = watch_of(flight, companion, options.seconds)

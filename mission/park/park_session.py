@@ -26,7 +26,7 @@ from mission.flight_options import flight_config
 from mission.flight_session import FlightSession
 from mission.flight_settings import ParkOptions
 from mission.follow.lockstep import flight_with_driver
-from mission.kernel_loading import load_kernels
+from mission.kernel_loading import PARKING, load_kernels
 from mission.park.parking import Arrival, Pose, drive, get_ready
 from mission.park.spots import Spot, spots_of
 from mission.run_folder import run_folder
@@ -71,7 +71,7 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     config = park_config(options)
     pilot = _pilot(options.policy)
     with busy(console, "loading kernels") as say:
-        load_kernels(say, has_camera=options.has_view, has_owner=False)
+        load_kernels(say, config, has_camera=options.has_view, others=PARKING)
         spot = chosen_spot(spots_of(flight_world(config)), options)
     try:
         links = [] if speed is None else open_links(options, speed)
