@@ -20,8 +20,9 @@ from common.files import write_whole
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_driver
 from mission.park.park_session import REVERSES
-from mission.park.parking import Arrival, Pose, drive, get_ready
+from mission.park.parking import Arrival, drive, get_ready
 from mission.script import Drone, ScriptError
+from mission.view.pose_goals import Pose
 from policies.companion.vector_pilot import DrivingPilot
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy

@@ -25,6 +25,7 @@ from mission.view.replay_file import keep_for_replay
 
 if TYPE_CHECKING:
     from mission.view.page import PageServer
+    from mission.view.pose_goals import PoseGoals
 
 
 class FlightSession:
@@ -39,6 +40,7 @@ class FlightSession:
         path_ned: [m] (n, 3) of its plan.
         action: what a policy on board chose last.
         score: lines about it on the live page.
+        goals: where the page can send its companion.
     """
 
     def __init__(
@@ -52,6 +54,7 @@ class FlightSession:
         path_ned: Sequence[Any] = (),
         action: Callable[[], Any] = lambda: None,
         score: Callable[[], tuple[str, ...]] = tuple,
+        goals: "PoseGoals | None" = None,
     ) -> None:
         self.files = OwnFiles(folder, console)
         self._flight, self._speed, self._folder, self._console = flight, speed, folder, console
@@ -60,7 +63,7 @@ class FlightSession:
         if page is not None:
             from mission.view.live import LiveView
 
-            self._view = LiveView(flight, page, speed=speed, path_ned=path_ned, action=action, score=score)
+            self._view = LiveView(flight, page, speed=speed, path_ned=path_ned, action=action, score=score, goals=goals)
 
     def fly(
         self, is_over: Callable[[Flight], bool], running: Running | None, watchers: Sequence[Callable[[], None]] = ()

@@ -27,12 +27,15 @@ from mission.flight_session import FlightSession
 from mission.flight_settings import ParkOptions
 from mission.follow.lockstep import flight_with_driver
 from mission.kernel_loading import PARKING, load_kernels
-from mission.park.parking import Arrival, Pose, drive, get_ready
+from mission.park.parking import Arrival, drive, get_ready
 from mission.park.spots import Spot, spots_of
 from mission.run_folder import run_folder
-from mission.script import Drone
+from mission.script import Drone, ScriptError
 from mission.simulator.flight_rig import flight_world
+from mission.view.pose_goals import Pose, PoseGoals
 from policies.companion.companion import Companion
+from policies.companion.driving import Driving
+from policies.companion.engagement import Phase
 from policies.companion.pilot import PilotError
 from policies.companion.vector_pilot import DrivingPilot
 from policies.learn.export.policy_file import load_policy
@@ -87,7 +90,8 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
         if spot is not None:
             arrivals.append(await drive(drone, flight, companion, pose_in(spot, is_reverse=options.is_reverse)))
 
-    session = FlightSession(flight, speed, page, folder, console, score=lambda: (_state(companion),))
+    goals = _goals(flight, companion, is_reverse=options.is_reverse)
+    session = FlightSession(flight, speed, page, folder, console, score=lambda: (_state(companion),), goals=goals)
     running = flight.drone.start(script(flight.drone))
     where = "lockstep, without network links" if speed is None else f"ground stations on UDP {options.gcs_port}"
     aim = f"drives into spot {spot.number}" if spot is not None else "waits for a goto"
@@ -159,16 +163,39 @@ def _pilot(name: str) -> DrivingPilot:
         raise UserError(str(error)) from error
 
 
+def _goals(flight: Flight, companion: Companion, *, is_reverse: bool) -> PoseGoals:
+    """The free spots, for the page."""
+
+    def now() -> Pose | None:
+        skill = companion.skill
+        return skill.goal_pose(companion.vehicle.own) if isinstance(skill, Driving) else None
+
+    async def go(drone: Drone, pose: Pose) -> None:
+        arrival = await drive(drone, flight, companion, pose)
+        if not arrival.is_there:
+            raise ScriptError(_outcome(arrival))
+
+    free = [spot for spot in spots_of(flight.world) if spot.is_free]
+    named = tuple((f"spot {spot.number}", pose_in(spot, is_reverse=is_reverse)) for spot in free)
+    return PoseGoals(named, go, now)
+
+
+def _outcome(arrival: Arrival) -> str:
+    """How a drive ended, in words."""
+    result = {"there": "parked", "touched": "touched something", "missed": "not in its spot"}[arrival.outcome]
+    return f"{result}: {arrival.why}" if arrival.why else result
+
+
 def _state(companion: Companion) -> str:
     trouble = f" ({companion.trouble})" if companion.trouble else ""
-    return f"companion: {companion.phase.value}{trouble}"
+    state = companion.skill.flying if companion.phase is Phase.FLYING else companion.phase.value
+    return f"companion: {state}{trouble}"
 
 
 def _table(spot: Spot, arrival: Arrival) -> Table:
     table = Table("figure", "value", title="parking", title_justify="left")
-    result = {"there": "parked", "touched": "touched something", "missed": "not in its spot"}[arrival.outcome]
     rows = [
-        ("result", f"{result}: {arrival.why}" if arrival.why else result),
+        ("result", _outcome(arrival)),
         ("spot", str(spot.number)),
         ("off its middle", f"{arrival.distance_m:.2f} m"),
         ("off its heading", f"{arrival.turn_deg:.1f} deg"),

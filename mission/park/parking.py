@@ -6,6 +6,7 @@ from math import atan2, degrees, hypot, pi, remainder
 from common.geodesy import geodetic_from_ned
 from mission.flight import Flight
 from mission.script import CMD_REPOSITION, FRAME_GLOBAL, Drone, ScriptTimeout
+from mission.view.pose_goals import Pose
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
 from policies.companion.vehicle_link import COMPONENT
@@ -14,9 +15,6 @@ REACH_M, ALIGN_DEG, STOP_M_S = 0.3, 10.0, 0.3  # that count as there, as of the 
 FIXED = 5  # GPS_FIX_TYPE: RTK, float or fixed
 FIX_S, ENGAGE_S, REST_S = 30.0, 3.0, 2.0
 DRIVE_S = 120.0  # and no longer
-
-Pose = tuple[float, float, float]
-"""North, east [m] and heading [rad]; NaN: any."""
 
 
 @dataclass(frozen=True, slots=True)

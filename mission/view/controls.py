@@ -5,16 +5,19 @@ client over MAVLink, as any ground station's would; wind and motors are the simu
 """
 
 from collections.abc import Callable, Coroutine
-from math import hypot, isnan
+from math import hypot, isnan, nan
 from typing import Any
 
 import viser
 
 from autopilot.interface.failure_requests import Failure, Unit
+from autopilot.interface.vehicle_state import Mode
 from mission.client import Running
 from mission.flight import Flight
 from mission.script import Drone, ScriptError, take_off
 from mission.view.browser_inputs import within
+from mission.view.flight_snapshot import mode_titles
+from mission.view.pose_goals import Pose, PoseGoals
 
 CLIMB_M = 5.0  # above the ground, when a click finds the vehicle standing
 FAR_M = 2000.0  # of a click's ray
@@ -36,6 +39,7 @@ class Controls:
         do: hands a task to the flight's thread.
         speed: at which the flight begins.
         has_plan: the vehicle has a mission, or is about to get one.
+        goals: where its companion can be sent; a click on the ground is for it then.
     """
 
     def __init__(
@@ -46,14 +50,17 @@ class Controls:
         speed: float | None,
         *,
         has_plan: bool = False,
+        goals: PoseGoals | None = None,
     ) -> None:
-        self._flight, self._do = flight, do
+        self._flight, self._do, self._goals = flight, do, goals
         self._buttons: list[viser.GuiButtonHandle] = []
         self._running: Running | None = None
         self.is_paused = False
         self.follows = True
         self._drives = flight.drives
         self.lines: tuple[str, ...] = (f"click on the ground to {'drive' if self._drives else 'fly'} there",)
+        if goals is not None:
+            self._add_goals(server.gui, goals)
         self._add_commands(server.gui, has_plan=has_plan)
         self._add_pace(server.gui, speed)
         self._add_trouble(server.gui)
@@ -101,6 +108,24 @@ class Controls:
             if self._flight.owner is not None:
                 self._add_command(gui, "Follow", self._follow)
             self._add_button(gui, "Restart", self._restart)
+            if self._drives:
+                self._add_modes(gui)
+
+    def _add_goals(self, gui: viser.GuiApi, goals: PoseGoals) -> None:
+        with gui.add_folder("The policy drives to"):
+            for name, pose in goals.named:
+                self._add_command(gui, name, lambda drone, pose=pose: self._go(drone, goals, pose))  # type: ignore[misc]
+
+    def _add_modes(self, gui: viser.GuiApi) -> None:
+        """A chooser of all modes, as ground stations have one."""
+        modes = {name: Mode(number) for number, name in mode_titles(self._flight.airframe).items()}
+        chooser = gui.add_dropdown("Mode", tuple(modes), initial_value=next(iter(modes)))
+
+        @chooser.on_update
+        def _(_: Any) -> None:
+            if chooser.value in modes:
+                name, mode = chooser.value, modes[chooser.value]
+                self._do(lambda: self._start(f"mode {name}", lambda drone: drone.choose_mode(mode)))
 
     def _add_command(self, gui: viser.GuiApi, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
         self._add_button(gui, name, lambda: self._start(name, script))
@@ -201,11 +226,20 @@ class Controls:
             await take_off(drone)
         await drone.let_companion_fly()
 
+    async def _go(self, drone: Drone, goals: PoseGoals, pose: Pose) -> None:
+        if not drone.is_armed:
+            await self._get_ready(drone)
+            await drone.arm()
+        await goals.go(drone, pose)
+
     async def _drive_to(self, drone: Drone, north_m: float, east_m: float, up_m: float) -> None:
         if not drone.is_armed:
             await self._get_ready(drone)
             await drone.arm()
-        await drone.goto_ned(north_m, east_m, -up_m, acceptance_m=DRIVEN_WITHIN_M)
+        if self._goals is not None:
+            await self._goals.go(drone, (north_m, east_m, nan))
+        else:
+            await drone.goto_ned(north_m, east_m, -up_m, acceptance_m=DRIVEN_WITHIN_M)
 
     async def _fly_to(self, drone: Drone, north_m: float, east_m: float, up_m: float) -> None:
         if not drone.is_armed or drone.is_landed:

@@ -21,7 +21,8 @@ from mission.flight import Flight
 from mission.view.controls import Controls
 from mission.view.flight_snapshot import Moment, Row, moment_of
 from mission.view.panel import PLOT_PERIOD_S, Panel
-from mission.view.scene import Mount, Scene, chase_of, wxyz_of
+from mission.view.pose_goals import PoseGoals
+from mission.view.scene import Mount, Scene, chase_of, overview_of, wxyz_of
 from sim.camera_rig import MOUNT_FRD, CameraRig
 
 UPDATE_S = 1.0 / 15.0
@@ -47,6 +48,7 @@ class LiveView:
         path_ned: [m] (n, 3) way that it is to fly; empty without a plan.
         action: what a policy on board chose last.
         score: lines of text about how well it goes.
+        goals: where its companion can be sent.
     """
 
     def __init__(
@@ -58,8 +60,10 @@ class LiveView:
         path_ned: Sequence[Sequence[float]] = (),
         action: Callable[[], Row | None] = lambda: None,
         score: Callable[[], tuple[str, ...]] = tuple,
+        goals: PoseGoals | None = None,
     ) -> None:
         self._flight, self._server, self._action, self._score = flight, server, action, score
+        self._goals = goals
         self._todo: Queue[Callable[[], None]] = Queue(TASKS_MAX)
         self._camera = flight.controller.camera
         self._pixels: NDArray[np.uint8] | None = None  # newest image of the camera that a policy sees through
@@ -72,7 +76,9 @@ class LiveView:
         self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned)
         moment = self._moment()
         self._panel = Panel(server, has_owner=moment.has_owner, drives=self._scene.drives)
-        self._controls = Controls(flight, server, self._add_task, speed, has_plan=len(path_ned) > 0)
+        self._controls = Controls(flight, server, self._add_task, speed, has_plan=len(path_ned) > 0, goals=goals)
+        for name, pose in () if goals is None else goals.named:
+            self._scene.mark(name, pose)
         self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
         self._next_point_s = 0.0
         self._text_count = 0  # of those that are shown
@@ -134,6 +140,8 @@ class LiveView:
             self._scene.forget_trails()
         self._scene.extend_trails(moment)
         self._scene.show(moment)
+        if self._goals is not None:
+            self._scene.show_pose(self._goals.now())
         obstacles = self._flight.controller.state.obstacles
         if obstacles is not None and obstacles.body_m:
             self._scene.draw_rays(moment, obstacles.body_m)
@@ -179,7 +187,11 @@ class LiveView:
             self._scene.frustum.image = rgb
 
     def _place_camera(self, client: viser.ClientHandle) -> None:
-        eye_ned, target_ned = chase_of(self._moment(), drives=self._scene.drives)
+        moment = self._moment()
+        if self._goals is not None and self._goals.named:
+            eye_ned, target_ned = overview_of(moment, [pose[:2] for _, pose in self._goals.named])
+        else:
+            eye_ned, target_ned = chase_of(moment, drives=self._scene.drives)
         client.camera.up_direction = (0.0, 0.0, -1.0)
         client.camera.position = eye_ned
         client.camera.look_at = target_ned

@@ -18,6 +18,7 @@ from common.airframe import Airframe
 from common.attitude import quat_of, yaw_of
 from mission.view import shapes
 from mission.view.flight_snapshot import Moment
+from mission.view.pose_goals import Pose
 from sim.world.world import WorldMap
 
 VEHICLE_RGB, OWNER_RGB, GOAL_RGB, PLAN_RGB = (40, 110, 220), (232, 120, 32), (220, 40, 90), (250, 250, 250)
@@ -29,6 +30,11 @@ TRAIL_POINTS = 600
 TRAIL_PERIOD_S = 0.25
 BLADE_TURNS_PER_S = 2.7  # shown; at their true speed blades would stand still or seem to turn backwards
 RAY_RGB, RAY_M = (240, 200, 60), 0.02
+MARK_M = 0.6  # above the ground
+ARROW = np.array(
+    [[(-0.35, 0.0, 0.0), (0.35, 0.0, 0.0)], [(0.35, 0.0, 0.0), (0.1, -0.2, 0.0)], [(0.35, 0.0, 0.0), (0.1, 0.2, 0.0)]],
+    np.float32,
+)
 JUMP_S = 1.0  # wheels do not catch up with more
 SKY_RGB = (190, 212, 232)
 
@@ -73,6 +79,7 @@ class Scene:
         self._movers: list[tuple[int, viser.FrameHandle]] = []
         self._add_world(world)
         self._shown_s: float | None = None
+        self._pose: viser.FrameHandle | None = None  # that the vehicle shall stand in
         self._rays: Any = None  # lines, once there have been some
         self._wheels: list[viser.FrameHandle] = []
         self._vehicle = self._api.add_frame("/vehicle", axes_length=0.4, axes_radius=0.008)
@@ -198,6 +205,24 @@ class Scene:
         elif len(lines):
             self._rays.points = lines
 
+    def mark(self, name: str, pose: Pose) -> None:
+        """Writes a name over a place on the ground."""
+        self._api.add_label(f"/places/{name}", name, position=self._over_ground(pose, MARK_M))
+
+    def show_pose(self, pose: Pose | None) -> None:
+        """An arrow on the ground where the vehicle shall stand, the way its nose shall show."""
+        if pose is not None and self._pose is None:
+            self._pose = self._api.add_frame("/pose", show_axes=False)
+            self._api.add_line_segments("/pose/arrow", ARROW, GOAL_RGB, thickness=TRAIL_M)
+        if self._pose is not None:
+            self._pose.visible = pose is not None
+            if pose is not None:
+                self._pose.position = self._over_ground(pose, TRAIL_LIFT_M)
+                self._pose.wxyz = wxyz_of(quat_of(pose[2], 0.0))
+
+    def _over_ground(self, pose: Pose, above_m: float) -> tuple[float, float, float]:
+        return pose[0], pose[1], -float(self._world.height(pose[0], pose[1])) - above_m
+
     def _turn_wheels(self, moment: Moment) -> None:
         """By what they have turned since the moment shown before; not after a jump in time."""
         passed_s = 0.0 if self._shown_s is None else moment.time_s - self._shown_s
@@ -286,3 +311,13 @@ def chase_of(moment: Moment, *, drives: bool = False) -> tuple[NDArray[np.float3
     behind_m, above_m = (2.6, 1.1) if drives else (5.0, 2.2)
     place_ned = moment.pos_ned - behind_m * ahead - np.array([0.0, 0.0, above_m], np.float32)
     return place_ned, moment.pos_ned + 2.0 * ahead
+
+
+def overview_of(
+    moment: Moment, places: Sequence[tuple[float, float]]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """A place above and behind the vehicle, seen from places that matter, and where to look from there [m], ned."""
+    away = np.mean(np.array(places), axis=0) - moment.pos_ned[:2]
+    ahead = np.array([*away, 0.0]) / max(float(np.linalg.norm(away)), 1.0)
+    place_ned = moment.pos_ned - 3.5 * ahead - np.array([0.0, 0.0, 4.5])
+    return place_ned.astype(np.float32), moment.pos_ned

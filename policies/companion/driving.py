@@ -155,12 +155,12 @@ class Driving:
         pose = self.goal_pose(own)
         if pose is None:
             return
-        off, was_off = how_far_off(pose, own), self._off
-        is_in = off < 1.0 and hypot(*own.vel_ned) < STANDING_M_S
+        off, was_off, speed = how_far_off(pose, own), self._off, hypot(*own.vel_ned)
+        is_in = off < 1.0 and speed < STANDING_M_S
         if not isfinite(was_off) and not is_in:
             return
         self._off = off
-        if off < was_off and hypot(*own.vel_ned) > STILL_M_S:
+        if is_in and off < was_off and speed > STILL_M_S:
             return
         self._off = inf
         reached = self.goals.reached()
