@@ -137,6 +137,7 @@ class FlightController:
         self.params = params
         self.modes = vehicle.modes
         self.ardupilot = vehicle.ardupilot
+        self.leaves_ground = vehicle.ground is not None
         self.host = host or Host()
         self._last_resort = vehicle.last_resort
         self._ports = ports
@@ -219,7 +220,7 @@ class FlightController:
 
     def follow_ardupilot(self) -> None:
         """From now on pilots and modes are treated as ArduPilot treats them."""
-        self.sticks.follow_ardupilot()
+        self.sticks.follow_ardupilot(rests_in_middle=not self.leaves_ground)
         self.commander.follow_ardupilot()
 
     def attach(self, server: Server) -> None:
@@ -339,8 +340,7 @@ class FlightController:
             return Reply(Verdict.UNSUPPORTED, "no mode of this vehicle does that")
         is_flown = mode is self.state.mode
         if request.in_air and not self.navigator.may_go(mode):
-            is_driver = self.navigator.context.craft.ground is None
-            return Reply(Verdict.TEMPORARILY_REJECTED, "not armed" if is_driver else "not in the air")
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not in the air" if self.leaves_ground else "not armed")
         reason = self.commander.request_refusal(mode)
         if reason:
             return Reply(Verdict.TEMPORARILY_REJECTED, reason)

@@ -78,7 +78,7 @@ class Pilot:
         if not self._is_flown(mode) or not self.is_heard:
             return ""  # without sticks the mode itself is refused, or needs none
         throttle = self._state.sticks.throttle
-        if self._modes[mode].rests_in_middle:
+        if self._modes[mode].rests_in_middle or self._sticks.rests_in_middle:
             return "throttle above the middle" if throttle > _MIDDLE_THROTTLE else ""
         return "throttle is not low" if throttle > _LOW_THROTTLE else ""
 

@@ -4,8 +4,8 @@ In: joystick positions (MANUAL_CONTROL) and overridden radio channels (RC_CHANNE
 one `StickInput`, which the stick modes fly and telemetry shows. Nothing is computed until a message comes: whether the
 sticks are heard is one comparison with the time of this frame.
 
-With `has_radio` a simulated radio lies beside the vehicle, as in ArduPilot's SITL: sticks in the middle, throttle down.
-It has what no client overrides, and everything again once the overrides are released or time out.
+With `has_radio` a simulated radio lies beside the vehicle, as in ArduPilot's SITL: sticks in the middle, the throttle
+where it rests. It has what no client overrides, and everything again once the overrides are released or time out.
 """
 
 from collections.abc import Sequence
@@ -73,7 +73,7 @@ class Sticks:
     __slots__ = (
         "_calibration", "_first", "_heard_us", "_in_mode", "_loss_us", "_map", "_override_us", "_overrides",
         "_params", "_radio", "_sender", "_speeds", "has_radio", "input", "is_cut", "is_forward_low",
-        "takes_every_source", "takes_over",
+        "rests_in_middle", "takes_every_source", "takes_over",
     )  # fmt: skip
 
     def __init__(self, params: ParameterTable) -> None:
@@ -82,6 +82,7 @@ class Sticks:
         self.is_forward_low = False  # a pitch stick pushed forward is a short pulse (ArduPilot), not a long one (PX4)
         self.takes_every_source = False  # whatever COM_RC_IN_MODE says: ArduPilot has no such setting
         self.takes_over = True  # moving them may leave auto modes, as COM_RC_OVERRIDE says; not in ArduPilot
+        self.rests_in_middle = False  # the simulated radio's throttle, which is low otherwise
         self.has_radio = False  # a simulated one, whose sticks nobody touches
         self._overrides = [_RELEASED] * CHANNELS  # [us] by the sender in control
         self._params = params
@@ -92,8 +93,14 @@ class Sticks:
         self._load()
         params.on_change(self._on_parameter)
 
-    def follow_ardupilot(self) -> None:
-        """From now on the sticks are read as ArduPilot reads them."""
+    def follow_ardupilot(self, *, rests_in_middle: bool = False) -> None:
+        """From now on the sticks are read as ArduPilot reads them.
+
+        Args:
+            rests_in_middle: the throttle nobody touches is in the middle, where it stands still, and not low.
+        """
+        self.rests_in_middle = rests_in_middle
+        self._load()
         self.is_forward_low = True
         self.takes_every_source = True
         self.takes_over = False
@@ -296,7 +303,8 @@ class Sticks:
         names = ("RC_MAP_ROLL", "RC_MAP_PITCH", "RC_MAP_YAW", "RC_MAP_THROTTLE")
         self._map = tuple(int(params[name]) for name in names)
         self._radio = list(_RADIO_US)
-        for stick, pulse_us in zip(self._map, (_RADIO_MIDDLE_US,) * 3 + (_RADIO_LOW_US,), strict=True):
+        rest_us = _RADIO_MIDDLE_US if self.rests_in_middle else _RADIO_LOW_US
+        for stick, pulse_us in zip(self._map, (_RADIO_MIDDLE_US,) * 3 + (rest_us,), strict=True):
             if stick:
                 self._radio[stick - 1] = pulse_us
         self._calibration = [

@@ -118,6 +118,7 @@ class Vehicle(Protocol):
     gimbal: GimbalControl | None
     modes: ModeTable
     ardupilot: ArduPilotVehicle
+    leaves_ground: bool
 
     @property
     def lists(self) -> ItemLists:

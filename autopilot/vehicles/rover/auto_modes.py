@@ -1,4 +1,4 @@
-"""The modes in which a rover drives by itself, where they differ from those of vehicles that fly: Hold and Return."""
+"""The modes in which a rover drives by itself, where they differ from those of what flies: Hold and the ways back."""
 
 from math import hypot
 
@@ -8,6 +8,7 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.fence.fence import Fence
 from autopilot.navigator.modes.hold import Hold
 from autopilot.navigator.modes.rtl_destination import Destinations
+from autopilot.navigator.paths.breadcrumbs import Breadcrumbs
 from autopilot.navigator.paths.waypoint_path import WaypointPath
 from autopilot.vehicles.rover.stick_modes import Position
 
@@ -33,6 +34,15 @@ class RoverHold(Hold):
             self._is_blind = False
             self.start()
         super().frame()
+
+
+class RoverLoiter(RoverHold):
+    """Mode Loiter of ArduPilot: as Hold, and places that clients ask for are Hold's."""
+
+    __slots__ = ()
+
+    def forget(self) -> None:
+        """Nothing has been asked of it: the place that waits is Hold's."""
 
 
 class RoverReturn(FlightMode):
@@ -70,5 +80,40 @@ class RoverReturn(FlightMode):
     def frame(self) -> None:
         context = self._context
         if self._path.frame():  # its last setpoint ends at the destination
+            vel_north, vel_east, _ = context.state.estimate.vel_ned
+            context.has_ended = hypot(vel_north, vel_east) < _STANDING_M_S and context.number("RTL_LAND_DELAY") >= 0.0
+
+
+class RoverSmartReturn(FlightMode):
+    """Mode Smart return: drives back along the way it came, without its loops, and stands where it was armed.
+
+    What has been driven back is forgotten, so that a pilot who takes over and drives elsewhere returns from there.
+    """
+
+    __slots__ = ("_context", "_crumbs", "_path")
+
+    def __init__(self, context: NavContext, crumbs: Breadcrumbs) -> None:
+        self._context = context
+        self._crumbs = crumbs
+        self._path = WaypointPath(context)
+
+    def refusal(self) -> str:
+        return self._crumbs.refusal()
+
+    def start(self) -> None:
+        self._context.use_return_speed()
+        here = self._context.stop_point()
+        self._crumbs.points.append(here)
+        self._crumbs.tidy()
+        self._path.start(here, self._crumbs.points[-2::-1] or self._crumbs.points[:1])
+
+    def leave(self, following: Mode) -> None:  # noqa: ARG002
+        self._path.stop()
+
+    def frame(self) -> None:
+        is_done = self._path.frame()
+        del self._crumbs.points[max(self._path.left, 1) :]
+        context = self._context
+        if is_done:
             vel_north, vel_east, _ = context.state.estimate.vel_ned
             context.has_ended = hypot(vel_north, vel_east) < _STANDING_M_S and context.number("RTL_LAND_DELAY") >= 0.0

@@ -5,6 +5,7 @@ from autopilot.interface.vehicle_state import Mode
 from autopilot.navigator.mode_parts import ModeParts, mission_mode, of_context
 from autopilot.navigator.modes.rtl_destination import Destinations
 from autopilot.vehicles import px4_modes
+from autopilot.vehicles.rover.ardupilot_modes import ARDUPILOT_MODES
 from autopilot.vehicles.rover.auto_modes import RoverHold, RoverReturn
 from autopilot.vehicles.rover.offboard import RoverOffboard
 from autopilot.vehicles.rover.stick_modes import Acro, Manual, Position, Stabilized
@@ -20,10 +21,11 @@ ROVER_MODES = mode_table(
     px4_modes.HOLD(build=of_context(RoverHold), ardupilot=DialectMode(4, "Hold"), aux_function=74),
     px4_modes.MISSION(build=mission_mode, ardupilot=DialectMode(10, "Auto")),
     px4_modes.RETURN(build=_return, on_ground=True, ardupilot=DialectMode(11, "RTL")),
-    px4_modes.OFFBOARD(build=of_context(RoverOffboard), ardupilot=DialectMode(15, "Guided")),
+    px4_modes.OFFBOARD(build=of_context(RoverOffboard), ardupilot=Mode.GUIDED),
     px4_modes.STABILIZED(build=of_context(Stabilized), ardupilot=Mode.POSITION, rests_in_middle=True),
     px4_modes.MANUAL(
         build=of_context(Manual), ardupilot=DialectMode(0, "Manual"), aux_function=51, rests_in_middle=True
     ),
     px4_modes.ACRO(build=of_context(Acro), ardupilot=DialectMode(1, "Acro"), rests_in_middle=True),
+    *ARDUPILOT_MODES,
 )

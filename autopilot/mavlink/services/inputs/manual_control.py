@@ -37,7 +37,8 @@ class ManualService(Service):
         """Taken as the pilot's sticks, if COM_RC_IN_MODE lets a joystick fly and no other sender is in control."""
         if fields.target not in (0, self._endpoint.sysid):
             return
-        axes = (_axis(fields.y), _axis(fields.x), _axis(fields.r), _throttle(fields.z))
+        throttle = _axis if self._sticks.rests_in_middle else _throttle
+        axes = (_axis(fields.y), _axis(fields.x), _axis(fields.r), throttle(fields.z))
         who = (sender.sysid, sender.compid)
         self._tell(self._sticks.joystick_moved(who, self._endpoint.time_us, axes, fields.buttons))
 

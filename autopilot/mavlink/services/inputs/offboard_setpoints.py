@@ -65,6 +65,7 @@ class OffboardService(Service):
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
+        self._drives = not endpoint.vehicle.leaves_ground  # it has reverse, and may turn where it stands
 
     def messages(self) -> Mapping[str, Handler]:
         return {
@@ -95,7 +96,7 @@ class OffboardService(Service):
     def attitude_received(self, _: Sender, fields: Any) -> None:
         """Takes an attitude or body rates with a thrust; flown in mode Offboard."""
         try:
-            setpoint = attitude_setpoint(fields, self._endpoint.time_us)
+            setpoint = attitude_setpoint(fields, self._endpoint.time_us, drives=self._drives)
         except RefusedSetpointError as refusal:
             self._endpoint.text_once(Severity.WARNING, f"Offboard: {refusal}")
             return
@@ -156,7 +157,8 @@ class OffboardService(Service):
         require_within("acceleration", ACCEL_MAX_M_S2, *accel)
         require_within("heading", ANGLE_MAX_RAD, yaw)
         require_within("yaw rate", RATE_MAX_RAD_S, yaw_rate)
-        if not any(isfinite(element) for element in (*pos, *vel, *accel)):
+        turns = (yaw, yaw_rate) if self._drives else ()
+        if not any(isfinite(element) for element in (*pos, *vel, *accel, *turns)):
             raise RefusedSetpointError("position, velocity and acceleration are all ignored")
         return OffboardSetpoint(
             self._endpoint.time_us,
@@ -206,8 +208,13 @@ def turned(triple: Triple, yaw_rad: float) -> Triple:
     return (cos_yaw * forward - sin_yaw * right, sin_yaw * forward + cos_yaw * right, down)
 
 
-def attitude_setpoint(fields: Any, time_us: int) -> OffboardSetpoint:
+def attitude_setpoint(fields: Any, time_us: int, *, drives: bool = False) -> OffboardSetpoint:
     """The setpoint in a SET_ATTITUDE_TARGET.
+
+    Args:
+        fields: of the message.
+        time_us: now.
+        drives: a vehicle on the ground: a negative thrust is backwards, and without an attitude a yaw rate is enough.
 
     Raises:
         RefusedSetpointError: thrust is missing, or neither the attitude nor all three body rates are given.
@@ -217,10 +224,12 @@ def attitude_setpoint(fields: Any, time_us: int) -> OffboardSetpoint:
         raise RefusedSetpointError("a thrust vector is not supported")
     if mask & THROTTLE_BIT or not isfinite(fields.thrust):
         raise RefusedSetpointError("an attitude needs a thrust")
-    thrust = min(max(fields.thrust, 0.0), 1.0)
+    thrust = min(max(fields.thrust, -1.0 if drives else 0.0), 1.0)
     given = (fields.body_roll_rate, fields.body_pitch_rate, fields.body_yaw_rate)
     rates = [nan if mask & bit else rate for rate, bit in zip(given, BODY_RATE_BITS, strict=True)]
     require_within("body rate", RATE_MAX_RAD_S, *rates)
+    if drives and mask & ATTITUDE_BIT:
+        rates[:2] = (0.0, 0.0)
     if mask & ATTITUDE_BIT:
         if any(isnan(rate) for rate in rates):
             raise RefusedSetpointError("without an attitude all three body rates are needed")

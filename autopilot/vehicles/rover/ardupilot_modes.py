@@ -1,0 +1,73 @@
+"""The modes of ArduPilot's Rover that PX4 has not: one row each; a PX4 client sees the nearest of its own."""
+
+from autopilot.interface.client_requests import GoTo, OffboardSetpoint
+from autopilot.interface.failsafe_action import Action
+from autopilot.interface.mode_spec import (
+    AUTO_OVERRIDE,
+    HOLD_EXCEPTED,
+    OFFBOARD_EXCEPTED,
+    OFFBOARD_OVERRIDE,
+    DialectMode,
+    Disarmed,
+    FlightMode,
+    ModeSpec,
+    further_mode,
+)
+from autopilot.interface.vehicle_state import Mode
+from autopilot.navigator.mode_parts import ModeParts, of_context
+from autopilot.vehicles.rover.auto_modes import RoverLoiter, RoverSmartReturn
+from autopilot.vehicles.rover.guided import RoverGuided
+
+LOITER = further_mode(32, "LOITER")
+
+
+def _smart_return(parts: ModeParts) -> FlightMode:
+    return RoverSmartReturn(parts.context, parts.crumbs)
+
+
+ARDUPILOT_MODES = (
+    ModeSpec(
+        mode=LOITER,
+        build=of_context(RoverLoiter),
+        needs_position=True,
+        may_arm=True,
+        on_ground=True,
+        px4=Mode.HOLD,
+        ardupilot=DialectMode(5, "Loiter"),
+        nav_state=4,
+        aux_function=56,
+        exception=HOLD_EXCEPTED,
+        override=AUTO_OVERRIDE,
+    ),
+    ModeSpec(
+        mode=Mode.SMART_RETURN,
+        build=_smart_return,
+        needs_position=True,
+        needs_home=True,
+        on_ground=True,
+        px4=Mode.RETURN,
+        ardupilot=DialectMode(12, "Smart RTL"),
+        nav_state=5,
+        aux_function=42,
+        strength=Action.RETURN,
+        carries_out=(Action.SMART_RETURN,),
+        exception=HOLD_EXCEPTED,
+        override=AUTO_OVERRIDE,
+    ),
+    ModeSpec(
+        mode=Mode.GUIDED,
+        build=of_context(RoverGuided),
+        needs_position=True,
+        may_arm=True,
+        on_ground=True,
+        disarmed=Disarmed.SAME,
+        takes=(GoTo, OffboardSetpoint),
+        px4=Mode.OFFBOARD,
+        ardupilot=DialectMode(15, "Guided"),
+        is_advanced=True,
+        nav_state=14,
+        aux_function=55,
+        exception=OFFBOARD_EXCEPTED,
+        override=OFFBOARD_OVERRIDE,
+    ),
+)

@@ -1,0 +1,200 @@
+"""A rover in ArduPilot's dialect as ArduPilot's own Rover tests judge it: the published tolerance or a tighter one.
+
+Each test quotes what is published. Speeds are scaled where those of ArduPilot's simulated car are above RO_SPEED_LIM.
+"""
+
+from math import cos, degrees, hypot, sin
+
+import numpy as np
+import pytest
+
+from autopilot.ports import POSITION_VALID
+from tests.system.published.published_rules import CMD_ARM, Station
+
+MANUAL, HOLD, LOITER, RTL, SMART_RTL, GUIDED = 0, 4, 5, 11, 12, 15  # ROVER_MODE
+CHANGE_SPEED = 178
+FREE = dict.fromkeys(("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"), 0.0)
+POSITION, VELOCITY, VELOCITY_YAW_RATE, YAW, YAW_RATE = 3580, 3559, 1511, 2559, 1535  # type masks
+ATTITUDE, TURN = 0b111, 0b1000_0011  # of SET_ATTITUDE_TARGET: by attitude, by yaw rate
+
+
+class Rover(Station):
+    """A ground station with a rover, armed in a mode by `armed`."""
+
+    def __init__(self, airframe="rover", **arguments):
+        super().__init__(config={"airframe": airframe}, **arguments)
+
+    async def armed(self, mode=GUIDED):
+        await self.client.until(lambda: self.flown.state.estimate.flags & POSITION_VALID, 60.0, "a position")
+        await self.mode(mode)
+        await self.client.until(lambda: self.flown.state.is_ready_to_arm, 60.0, "ready")
+        await self.client.command(CMD_ARM, 1.0, name="arm")
+
+    async def target(self, mask, seconds=0.0, frame=1, **fields):
+        for _ in range(max(round(seconds * 4.0), 1)):
+            self.client.send("SET_POSITION_TARGET_LOCAL_NED", time_boot_ms=0, target_system=1, target_component=1,
+                             coordinate_frame=frame, type_mask=mask, **(FREE | fields))  # fmt: skip
+            await self.client.sleep(0.25)
+
+    async def attitude(self, mask, thrust, seconds, yaw=0.0, yaw_rate=0.0):
+        for _ in range(round(seconds * 4.0)):
+            self.client.send("SET_ATTITUDE_TARGET", time_boot_ms=0, target_system=1, target_component=1, type_mask=mask,
+                             q=[cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)], body_roll_rate=0.0, body_pitch_rate=0.0,
+                             body_yaw_rate=yaw_rate, thrust=thrust)  # fmt: skip
+            await self.client.sleep(0.25)
+
+    async def there(self, north, east, within_m=1.5, seconds=60.0):
+        await self.client.until(lambda: self.away(north, east) < within_m, seconds, f"at {north}, {east}")
+
+    def away(self, north, east):
+        return hypot(self.flown.pos[0] - north, self.flown.pos[1] - east)
+
+    @property
+    def speed(self):
+        """Along the nose."""
+        yaw = self.flown.state.yaw_rad
+        return cos(yaw) * self.flown.vel[0] + sin(yaw) * self.flown.vel[1]
+
+    def said(self, words):
+        return any(words in text for text in self.client.texts)
+
+    def turned_deg(self, yaw):
+        return (degrees(self.flown.state.yaw_rad - yaw) + 180.0) % 360.0 - 180.0
+
+
+def test_local_position_target():
+    """ArduPilot: "SET_POSITION_TARGET_LOCAL_NED: (30, 30) within 3 m for 5 s, inside 60 s"."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        await rover.target(POSITION, x=30.0, y=30.0)
+        await rover.there(30.0, 30.0, 1.0)
+        await client.sleep(3.0)
+        begin_s = rover.flown.now_s
+        await client.sleep(5.0)
+        assert np.hypot(*(rover.flown.since(begin_s)[:, 1:3] - 30.0).T).max() < 0.8
+
+    rover.run(script)
+
+
+def test_velocities_turns_and_reverse():
+    """ArduPilot's masks: velocity, velocity and yaw rate (backwards by its sign), yaw rate alone stands."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        await rover.target(VELOCITY, 8.0, vx=0.0, vy=2.0)
+        assert rover.flown.vel[1] == pytest.approx(2.0, abs=0.2)
+        await rover.target(VELOCITY_YAW_RATE, 6.0, frame=8, vx=-1.5)
+        assert rover.speed == pytest.approx(-1.5, abs=0.2)
+        await rover.target(YAW_RATE, 4.0, yaw_rate=0.3)
+        assert abs(rover.speed) < 0.15
+        await rover.target(VELOCITY_YAW_RATE, 3.0, frame=8, vx=1.5, yaw_rate=0.3)
+        await client.sleep(6.0)
+        assert rover.said("target not received last 3secs, stopping")
+        assert abs(rover.speed) < 0.1
+
+    rover.run(script)
+
+
+def test_a_skid_steer_turns_on_the_spot_by_yaw_alone():
+    """ArduPilot: "SkidSteer headings"."""
+    rover = Rover("rover-skid")
+
+    async def script(client):
+        await rover.armed()
+        here = rover.flown.pos
+        for yaw in (1.5, -2.0):
+            await rover.target(YAW, 8.0, yaw=yaw)
+            assert abs(rover.turned_deg(yaw)) < 5.0
+        assert rover.away(*here[:2]) < 1.0
+
+    rover.run(script)
+
+
+def test_attitude_targets_hold_headings():
+    """ArduPilot: "SET_ATTITUDE_TARGET: speed > 5 within 10 s; headings 0, 290, 70, 180, 0 held"; speed scaled."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        for heading_deg in (0.0, 290.0, 70.0, 180.0, 0.0):
+            await rover.attitude(ATTITUDE, 0.6, 10.0, yaw=np.radians(heading_deg))
+            assert rover.speed == pytest.approx(3.0, abs=0.3)
+            assert abs(rover.turned_deg(np.radians(heading_deg))) < 5.0
+        await rover.attitude(TURN, -0.4, 6.0)
+        assert rover.speed == pytest.approx(-2.0, abs=0.3)
+
+    rover.run(script)
+
+
+def test_the_speed_of_a_goto_is_changed():
+    """ArduPilot: "DO_CHANGE_SPEED: 3, 7, 12, 4 m/s +-0.5 for 5 s"; scaled to 1, 3, 4.5, 2 m/s."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        await rover.target(POSITION, x=0.0, y=150.0)
+        for speed in (1.0, 3.0, 4.5, 2.0):
+            await client.command(CHANGE_SPEED, 1.0, speed, -1.0, name="speed")
+            await client.sleep(6.0)
+            begin_s = rover.flown.now_s
+            await client.sleep(5.0)
+            speeds = np.hypot(*rover.flown.since(begin_s)[:, 4:6].T)
+            assert abs(speeds - speed).max() < 0.5
+
+    rover.run(script)
+
+
+def test_it_returns_and_stops_at_home():
+    """ArduPilot: "DriveRTL: stops <= 6.5 m from home"."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        await rover.target(POSITION, x=30.0, y=0.0)
+        await rover.there(30.0, 0.0)
+        await rover.mode(RTL)
+        await rover.there(0.0, 0.0, 1.0)
+        await client.sleep(5.0)
+        assert rover.away(0.0, 0.0) < 1.0
+
+    rover.run(script)
+
+
+def test_a_smart_return_goes_back_over_the_corner():
+    """ArduPilot: "SmartRTL: corner <= 5 m, home 3 to 7 m"."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        for place in ((25.0, 0.0), (25.0, 25.0)):
+            await rover.target(POSITION, x=place[0], y=place[1])
+            await rover.there(*place)
+        await rover.mode(SMART_RTL)
+        await rover.there(25.0, 0.0, 3.0)
+        await rover.there(0.0, 0.0, 2.5)
+
+    rover.run(script)
+
+
+def test_manual_control_steers_by_y_and_drives_by_z():
+    """ArduPilot: "MANUAL_CONTROL"; and a throttle nobody touches stands still."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed(MANUAL)
+        await client.sleep(3.0)
+        assert abs(rover.speed) < 0.05
+        for _ in range(40):
+            client.send("MANUAL_CONTROL", target=1, x=0, y=400, z=300, r=0, buttons=0)
+            await client.sleep(0.1)
+        assert rover.speed > 1.0
+        assert abs(rover.turned_deg(0.0)) > 20.0
+        for mode in (LOITER, HOLD):
+            await rover.mode(mode)
+            await client.sleep(5.0)
+            assert abs(rover.speed) < 0.1
+
+    rover.run(script)
