@@ -48,6 +48,8 @@ class ArduPilotVehicle:
     """As ArduPilot's releases have it: Copter, Rover; MAVLink names its modes in the enumeration of that name."""
     version: tuple[int, int, int]
     """Of ArduPilot's release that clients shall take it for."""
+    switch_prefix: str = "FLTMODE"
+    """Of the parameters that name the modes of a switch."""
     aliases: Sequence[Alias] = ()
     """Its parameters under ArduPilot's names, besides those of all vehicles."""
     constants: Sequence[Constant] = ()

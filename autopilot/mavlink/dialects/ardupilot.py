@@ -45,7 +45,7 @@ class ArduPilotDialect:
         self._numbers = ModeNumbers(modes, lambda spec: spec.ardupilot)
         self.constants: Sequence[Constant] = sorted((*CONSTANTS, *vehicle.constants), key=lambda each: each.name)
         self.modes: Sequence[ModeRow] = sorted(self._numbers.rows, key=lambda row: self._numbers.number_of(row.mode))
-        self.aliases: Sequence[Alias] = (*ALIASES, *switch_aliases(modes), *vehicle.aliases)
+        self.aliases: Sequence[Alias] = (*ALIASES, *switch_aliases(modes, vehicle.switch_prefix), *vehicle.aliases)
 
     def of_vehicle(self, modes: ModeTable, ardupilot: ArduPilotVehicle) -> Self:
         is_same = modes is self.mode_table and ardupilot == self._vehicle

@@ -12,14 +12,10 @@ from autopilot.interface.mode_spec import DialectMode, ModeTable
 from autopilot.interface.vehicle_state import Mode
 
 # Failsafe actions. Ours are PX4's: 0 none, 1 hold, 2 return, 3 land; for the fence 1 warn, 2 hold, 3 return, 5 land.
-_THROTTLE_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 3, 7: 4, 1: 7}
-_STATION_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 7: 3, 3: 5, 1: 7}
 _FENCE_ACTIONS: Mapping[int, int] = {1: 0, 0: 0, 2: 4, 3: 1, 5: 2, 6: 3}
 _BATTERY_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 2}
 # Positions from outside: none, by MAVLink; the heading stays the compass's unless EKF2_EV_CTRL itself says otherwise.
 _VISION_TYPES: Mapping[int, int] = {0: 0, 7: 1} | dict.fromkeys(range(1, 16), 1)
-# Estimator failures: nothing, land. Ours has more.
-_ESTIMATOR_ACTIONS: Mapping[int, int] = {0: 0, 3: 1}
 # Logs: while armed, or always.
 _LOG_MODES: Mapping[int, int] = {0: 0, 1: 1, 2: 1, -1: 0}
 
@@ -34,17 +30,11 @@ ALIASES: tuple[Alias, ...] = (
     Alias("FENCE_MARGIN", "GF_MARGIN", REAL32),
     Alias("FENCE_RADIUS", "GF_MAX_HOR_DIST", REAL32),
     Alias("FENCE_TYPE", "GF_TYPES", INT8),
-    Alias("FLTMODE_CH", "RC_MAP_FLTMODE", INT8),
-    Alias("FS_CRASH_CHECK", "CBRK_FLIGHTTERM", INT8, numbers={0: 1, 121212: 0}),
-    Alias("FS_EKF_ACTION", "COM_EST_FAIL_ACT", INT8, numbers=_ESTIMATOR_ACTIONS),
-    Alias("FS_GCS_ENABLE", "NAV_DLL_ACT", INT8, numbers=_STATION_ACTIONS),
     Alias("FS_GCS_TIMEOUT", "COM_DL_LOSS_T", REAL32),
-    Alias("FS_THR_ENABLE", "NAV_RCL_ACT", INT8, numbers=_THROTTLE_ACTIONS),
     Alias("LOG_DISARMED", "SDLOG_MODE", INT8, numbers=_LOG_MODES),
     *(Alias(f"RC{i}_REVERSED", f"RC{i}_REV", INT8, numbers={1: 0, -1: 1}) for i in range(1, 9)),
     *(Alias(f"RCMAP_{stick}", f"RC_MAP_{stick}", INT8) for stick in ("ROLL", "PITCH", "THROTTLE", "YAW")),
     Alias("RC_FS_TIMEOUT", "COM_RC_LOSS_T", REAL32),
-    Alias("RTL_SPEED", "RTL_RETURN_SPD", INT16, CM),
     Alias("SIM_GPS_DISABLE", "SIM_GPS1_ENABLE", INT8, numbers={1: 0, 0: 1}),
     *(Alias(name.replace("SR0", "SR1"), name, INT16) for name in STREAM_GROUPS),
     Alias("SYSID_THISMAV", "MAV_SYS_ID", INT16),
@@ -56,7 +46,7 @@ ALIASES: tuple[Alias, ...] = (
 )
 
 
-def switch_aliases(modes: ModeTable) -> Sequence[Alias]:
+def switch_aliases(modes: ModeTable, prefix: str) -> Sequence[Alias]:
     """The modes of a switch: PX4's COM_FLTMODE numbers to ArduPilot's mode numbers; none for a vehicle without any."""
     numbers = {
         spec.switch: spec.ardupilot.number
@@ -69,7 +59,7 @@ def switch_aliases(modes: ModeTable) -> Sequence[Alias]:
     if not numbers:
         return []
     numbers = dict(sorted(numbers.items(), key=lambda item: item[1]))
-    return [Alias(f"FLTMODE{i}", f"COM_FLTMODE{i}", INT8, numbers=numbers) for i in range(1, 7)]
+    return [Alias(f"{prefix}{i}", f"COM_FLTMODE{i}", INT8, numbers=numbers) for i in range(1, 7)]
 
 
 _AXES = "XYZ"

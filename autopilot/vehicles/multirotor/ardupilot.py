@@ -6,6 +6,12 @@ from autopilot.interface.ardupilot_vehicle import CM, INT8, INT16, INT32, REAL32
 
 MS = 1000.0  # per second
 
+# Failsafe actions. Ours are PX4's: 0 none, 1 hold, 2 return, 3 land.
+_THROTTLE_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 3: 3, 7: 4, 1: 7}
+_STATION_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 7: 3, 3: 5, 1: 7}
+# Estimator failures: nothing, land. Ours has more.
+_ESTIMATOR_ACTIONS: Mapping[int, int] = {0: 0, 3: 1}
+
 # Functions of outputs 5 to 8: motors, where the airframe has so many.
 _SIX, _EIGHT = 6001, 8001
 # Heading on mission legs: towards the next waypoint, along the way.
@@ -39,7 +45,12 @@ COPTER = ArduPilotVehicle(
         Alias("ATC_RATE_Y_MAX", "MC_YAWRATE_MAX", REAL32),
         Alias("ATC_SLEW_YAW", "MPC_YAWRAUTO_MAX", REAL32, 100.0),
         Alias("CIRCLE_RADIUS", "NAV_LOITER_RAD", REAL32, CM),
+        Alias("FLTMODE_CH", "RC_MAP_FLTMODE", INT8),
         Alias("FRAME_CLASS", "SYS_AUTOSTART", INT8, numbers={4001: 1, 6001: 2, 8001: 3}),
+        Alias("FS_CRASH_CHECK", "CBRK_FLIGHTTERM", INT8, numbers={0: 1, 121212: 0}),
+        Alias("FS_EKF_ACTION", "COM_EST_FAIL_ACT", INT8, numbers=_ESTIMATOR_ACTIONS),
+        Alias("FS_GCS_ENABLE", "NAV_DLL_ACT", INT8, numbers=_STATION_ACTIONS),
+        Alias("FS_THR_ENABLE", "NAV_RCL_ACT", INT8, numbers=_THROTTLE_ACTIONS),
         Alias("LAND_SPEED", "MPC_LAND_SPEED", INT16, CM),
         Alias("LOIT_SPEED", "MPC_XY_VEL_MAX", REAL32, CM),
         Alias("MOT_THST_HOVER", "MPC_THR_HOVER", REAL32),
@@ -52,6 +63,7 @@ COPTER = ArduPilotVehicle(
         Alias("RTL_ALT", "RTL_RETURN_ALT", INT32, CM),
         Alias("RTL_ALT_FINAL", "RTL_DESCEND_ALT", INT16, CM),
         Alias("RTL_LOIT_TIME", "RTL_LAND_DELAY", INT32, MS),
+        Alias("RTL_SPEED", "RTL_RETURN_SPD", INT16, CM),
         *(
             Alias(f"SERVO{i}_FUNCTION", "SYS_AUTOSTART", INT16, numbers={4001: 0, _SIX: 32 + i, _EIGHT: 32 + i})
             for i in (5, 6)

@@ -6,12 +6,16 @@ from autopilot.interface.ardupilot_vehicle import INT8, INT16, REAL32, Alias, Ar
 
 _THROTTLE, _THROTTLE_LEFT, _THROTTLE_RIGHT, _STEERING = 70, 73, 74, 26
 _CAR, _SIDES = 5, 6  # CA_AIRFRAME
-# FS_ACTION: nothing, return, hold, smart return; by NAV_RCL_ACT.
-_ACTIONS: Mapping[int, int] = {0: 0, 1: 2, 2: 1}
+# Failsafe actions. Ours are PX4's: 0 none, 1 hold, 2 return, 5 terminate, 7 smart return. FS_ACTION is one for all, and
+# goes by NAV_RCL_ACT; the others say whether there is any.
+_ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 1: 2, 7: 3, 5: 5}
+_IS_ACTIVE: Mapping[int, int] = {0: 0, 1: 1, 2: 1, 5: 1, 6: 1, 7: 1}
+_ESTIMATOR_ACTIONS: Mapping[int, int] = {0: 0, 1: 1}
 _LAW = "ArduPilot's default; see RO_SPEED_P, RO_SPEED_I"
 
 APM_ROVER = ArduPilotVehicle(
     name="Rover",
+    switch_prefix="MODE",
     version=(4, 7, 0),  # newer than any release: no station asks for an update
     aliases=(
         Alias("ATC_ACCEL_MAX", "RO_ACCEL_LIM", REAL32),
@@ -23,9 +27,13 @@ APM_ROVER = ArduPilotVehicle(
         Alias("ATC_TURN_MAX_G", "HG_RO_LAT_ACC", REAL32, 1.0 / 9.80665),
         Alias("CRUISE_SPEED", "RO_SPEED_LIM", REAL32),
         Alias("FS_ACTION", "NAV_RCL_ACT", INT8, numbers=_ACTIONS),
+        Alias("FS_EKF_ACTION", "COM_EST_FAIL_ACT", INT8, numbers=_ESTIMATOR_ACTIONS),
+        Alias("FS_GCS_ENABLE", "NAV_DLL_ACT", INT8, numbers=_IS_ACTIVE),
+        Alias("FS_THR_ENABLE", "NAV_RCL_ACT", INT8, numbers=_IS_ACTIVE),
         Alias("FS_TIMEOUT", "COM_RC_LOSS_T", REAL32),
         Alias("LOIT_RADIUS", "HG_RO_HOLD_RAD", REAL32),
         Alias("MODE_CH", "RC_MAP_FLTMODE", INT8),
+        Alias("RTL_SPEED", "RTL_RETURN_SPD", REAL32),
         *(
             Alias(f"SERVO{i}_FUNCTION", "CA_AIRFRAME", INT16, numbers={_CAR: car, _SIDES: sides})
             for i, car, sides in ((1, _STEERING, _THROTTLE_LEFT), (3, _THROTTLE, _THROTTLE_RIGHT))
