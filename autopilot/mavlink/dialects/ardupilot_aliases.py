@@ -7,7 +7,7 @@ to be read only. Names that are ArduPilot's and ours alike (RC1_MIN) are in neit
 from collections.abc import Mapping, Sequence
 
 from autopilot.ardupilot_only_params import STREAM_GROUPS
-from autopilot.interface.ardupilot_vehicle import CM, INT8, INT16, INT32, REAL32, Alias, Constant
+from autopilot.interface.ardupilot_vehicle import INT8, INT16, INT32, REAL32, Alias, Constant
 from autopilot.interface.mode_spec import DialectMode, ModeTable
 from autopilot.interface.vehicle_state import Mode
 
