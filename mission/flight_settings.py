@@ -127,6 +127,6 @@ class ParkOptions(FlightOptions):
 
 PARKED_WITH = (
     "policy", "spot", "is_reverse", "is_idle", "speed", "seconds", "seed", "wind_m_s", "wind_from_deg", "noise",
-    "world_seed", "airframe", "dialect", "parameters", "has_view", "view_port", "gcs_port", "api_port", "host",
+    "world_seed", "airframe", "parameters", "has_view", "view_port", "gcs_port", "api_port", "host",
     "run_folder",
 )  # fmt: skip

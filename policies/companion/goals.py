@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from math import dist, isfinite, isnan, nan, radians
 from typing import Any
 
-from autopilot.interface.item_lists import MissionItem
+from autopilot.interface.item_lists import ItemRefusal, MissionItem
 from autopilot.interface.vehicle_state import Mode, Severity
 from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT
 from autopilot.mavlink.wire.convert import INT32_MAX, degrees_from_e7, is_position
 from autopilot.mavlink.wire.number_bounds import POSITION_MAX_M, is_known, is_within
+from autopilot.navigator.fence.fence_items import fence_shapes
+from autopilot.navigator.fence.fence_region import region_of
 from common.attitude import Vector
 from common.geodesy import ned_from_geodetic
 from policies.companion.plan_download import PlanDownload
@@ -183,12 +185,20 @@ class Goals:
         if away_m > FAR_M:
             return f"it is {away_m / 1000.0:.1f} km away, {FAR_M / 1000.0:.1f} km allowed"
         goal = Goal(target_ned, "goto", yaw=yaw if is_known(YAW_MAX_RAD, yaw) else nan)
-        refusal = self._refusal(goal)
+        refusal = self._fence_refusal(target_ned) or self._refusal(goal)
         if refusal:
             return refusal
         self._goto, self.done = goal, ""
         self._is_ordered = is_ordered
         return ""
+
+    def _fence_refusal(self, target_ned: Vector) -> str:
+        """Why the vehicle's fence forbids a place."""
+        origin = self._vehicle.own.origin
+        shapes = fence_shapes(self._plan.fence)
+        if origin is None or isinstance(shapes, ItemRefusal):
+            return ""
+        return "it is outside the fence" if region_of(shapes, origin).clearance(*target_ned[:2]) < 0.0 else ""
 
     # ---- where places are ----
 

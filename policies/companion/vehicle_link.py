@@ -18,6 +18,7 @@ from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.wire.codec import decode, message_id
 from autopilot.mavlink.wire.convert import degrees_from_e7, quat_from_wxyz
 from autopilot.mavlink.wire.number_bounds import POSITION_MAX_M, RATE_MAX_RAD_S, SPEED_MAX_M_S, is_known
+from autopilot.vehicles.rover.vehicle import ROVER
 from common.attitude import Quat, Vector
 from common.geodesy import GeoPoint, ned_from_geodetic
 from policies.companion.engagement import Wish
@@ -53,6 +54,9 @@ _IDS = {
 }  # fmt: skip
 _NAMES = {msg_id: name for name, msg_id in _IDS.items()}
 _DIALECTS: dict[int, Dialect] = {int(PX4.autopilot): PX4, int(ARDUPILOT.autopilot): ARDUPILOT}
+_GROUND_DIALECTS: dict[int, Dialect] = {
+    number: dialect.of_vehicle(ROVER.modes, ROVER.ardupilot) for number, dialect in _DIALECTS.items()
+}
 
 
 @dataclass(slots=True)
@@ -154,7 +158,7 @@ class VehicleLink:
 
     @property
     def is_ardupilot(self) -> bool:
-        return self._dialect is ARDUPILOT
+        return self._dialect.autopilot == ARDUPILOT.autopilot
 
     def send(self, name: str, **fields: Any) -> None:
         """A message to everybody, or to whom its fields name."""
@@ -186,8 +190,9 @@ class VehicleLink:
 
     def ask_for(self, wish: Wish) -> None:
         """Asks the vehicle for a mode."""
-        is_px4 = self._dialect is PX4
-        mode = Mode.HOLD if wish is Wish.HOLD else Mode.OFFBOARD if is_px4 else Mode.GUIDED
+        is_px4 = not self.is_ardupilot
+        guided = Mode.GUIDED if Mode.GUIDED in self._dialect.mode_table else Mode.OFFBOARD
+        mode = Mode.HOLD if wish is Wish.HOLD else Mode.OFFBOARD if is_px4 else guided
         self._asked_for = mode
         number = self._dialect.custom_mode(mode)
         if is_px4:
@@ -249,9 +254,10 @@ class VehicleLink:
 
     def _heartbeat_reported(self, fields: Any, time_us: int) -> None:
         own = self.own
-        self._dialect = _DIALECTS.get(fields.autopilot, PX4)
         own.heartbeat_us = time_us
         own.is_ground_vehicle = fields.type in _GROUND_VEHICLES
+        dialects = _GROUND_DIALECTS if own.is_ground_vehicle else _DIALECTS
+        self._dialect = dialects.get(fields.autopilot, dialects[int(PX4.autopilot)])
         own.is_armed = bool(fields.base_mode & _ARMED)
         try:
             self._enter(self._dialect.mode_from_custom(fields.custom_mode))

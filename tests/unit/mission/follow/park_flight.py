@@ -43,22 +43,25 @@ def advance(flight, seconds, is_enough=lambda: False):
     flight.run(lambda _: is_enough() or flight.time_us >= end_us)
 
 
-def send_goto(flight, pose, component=COMPANION):
-    """Asks for a pose: north, east [m] and heading [rad]."""
+def goto_fields(flight, pose, component=COMPANION):
     lat_deg, lon_deg, alt_amsl_m = geodetic_from_ned(pose[0], pose[1], 0.0, flight.config.home)
-    flight.drone.send(
-        "COMMAND_INT",
-        target_system=1,
-        target_component=component,
-        command=DO_REPOSITION,
-        frame=0,
-        param1=-1.0,
-        param2=1.0,
-        param4=pose[2],
-        x=degrees_e7(lat_deg),
-        y=degrees_e7(lon_deg),
-        z=alt_amsl_m,
-    )
+    return {
+        "target_system": 1,
+        "target_component": component,
+        "command": DO_REPOSITION,
+        "frame": 0,
+        "param1": -1.0,
+        "param2": 1.0,
+        "param4": pose[2],
+        "x": degrees_e7(lat_deg),
+        "y": degrees_e7(lon_deg),
+        "z": alt_amsl_m,
+    }
+
+
+def send_goto(flight, pose):
+    """Asks the companion for a pose: north, east [m] and heading [rad]."""
+    flight.drone.send("COMMAND_INT", **goto_fields(flight, pose))
 
 
 def miss(flight, pose):

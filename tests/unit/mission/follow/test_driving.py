@@ -6,13 +6,26 @@ import numpy as np
 import pytest
 import warp as wp
 
+from autopilot.interface.item_lists import MissionItem
 from autopilot.interface.vehicle_state import Mode
+from autopilot.mavlink.client_end import ClientEnd
+from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.ports import Estimate
+from common.geodesy import geodetic_from_ned
+from mission.plan.plan_lists import FENCE_LIST
 from policies.companion.engagement import Phase
 from policies.tasks.drive.observe import FRAME, OWN_SIZE, observe_rows
 from sim.world.world import WorldConfig
 from tests.unit.mission.follow.follow_flight import lose
-from tests.unit.mission.follow.park_flight import advance, impact_m_s, miss, send_goto, shipped_pilot, standing
+from tests.unit.mission.follow.park_flight import (
+    advance,
+    goto_fields,
+    impact_m_s,
+    miss,
+    send_goto,
+    shipped_pilot,
+    standing,
+)
 
 PLAIN = WorldConfig(hill_height_m=0.0, trees_per_ha=0.0)
 GOAL = (6.0, 3.0, 0.5)
@@ -69,6 +82,34 @@ def test_a_goal_in_which_something_is_seen_is_refused_with_the_reason():
     advance(flight, 0.5)
     assert "Companion: goto refused: something stands there" in flight.drone.texts
     assert companion.skill.goals.goal is None
+    assert flight.controller.state.mode is Mode.HOLD
+
+
+def test_a_goal_outside_the_fence_is_refused_with_the_reason():
+    flight, companion = standing()
+    corners = [geodetic_from_ned(north, east, 0.0, flight.config.home) for north, east in ((-9, -9), (-9, 9), (9, 0))]
+    items = [MissionItem(k, 0, 5001, (3.0, 0.0, 0.0, 0.0), *corner[:2], 0.0) for k, corner in enumerate(corners)]
+    flight.fly(lambda drone: drone.upload(items, FENCE_LIST), seconds=5.0)
+    advance(flight, 6.0)
+    send_goto(flight, (8.0, 8.0, 0.0))
+    advance(flight, 0.5)
+    assert "Companion: goto refused: it is outside the fence" in flight.drone.texts
+    assert companion.skill.goals.goal is None
+
+
+def test_in_guided_of_ardupilots_rover_it_drives_and_is_handed_back_to_hold():
+    vehicle_end, our_end = memory_pair(LinkRole.ONBOARD)
+    station = ClientEnd(our_end, 255, 190)
+    reacher = shipped_pilot("drive-reach")
+    flight, companion = standing(pilot=reacher, world=PLAIN, dialect="ardupilot", links=[vehicle_end])
+    station.command(176, 1.0, 4.0)  # Hold
+    advance(flight, 1.0)
+    station.send("COMMAND_INT", **goto_fields(flight, GOAL))
+    advance(flight, 1.0)
+    assert (companion.phase, companion.vehicle.is_ardupilot) == (Phase.FLYING, True)
+    advance(flight, 40.0, lambda: companion.phase is Phase.WAITING)
+    distance_m, turn_deg = miss(flight, GOAL)
+    assert (distance_m < 0.3, turn_deg < 10.0) == (True, True), (distance_m, turn_deg)
     assert flight.controller.state.mode is Mode.HOLD
 
 

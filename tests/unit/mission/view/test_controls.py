@@ -7,13 +7,16 @@ import pytest
 
 from autopilot.interface.vehicle_state import Mode
 from mission.flight import Flight, FlightConfig
+from mission.park.parking import ask
 from mission.plan.plan_file import DEFAULT_PLAN, moved_plan, read_plan
 from mission.script import fly_plan
 from mission.view.live import LiveView
 from mission.view.page import PageServer
+from mission.view.pose_goals import PoseGoals
 from policies.companion.engagement import Phase
 from sim.world.world import WorldConfig
 from tests.unit.mission.follow.follow_flight import advance, following
+from tests.unit.mission.follow.park_flight import shipped_pilot, standing
 
 PLAIN = WorldConfig(size_m=64.0, trees_per_ha=0.0)
 
@@ -148,3 +151,33 @@ def test_what_stays_on_the_ground_is_offered_neither_take_off_nor_landing_and_dr
     assert view._controls.lines[-1].endswith("done")
     assert np.hypot(*(flight.rig.rows["truth"][0]["pos_ned"][:2] - (10.0, 4.0))) < 1.5
     flight.close()
+
+
+def test_buttons_of_spots_and_clicks_send_the_companion_of_a_rover_there(page):
+    flight, companion = standing(pilot=shipped_pilot("drive-reach"), world=PLAIN)
+    asked = []
+
+    async def go(drone, pose):
+        asked.append(pose)
+        await ask(drone, pose)
+
+    goals = PoseGoals((("spot 3", (6.0, 3.0, 0.5)),), go, lambda: companion.skill.goal_pose(companion.vehicle.own))
+    view = LiveView(flight, page, goals=goals)
+    buttons(page)["spot 3"]()
+    assert "spot 3: done" in said_after(flight, view, 1.0)
+    assert companion.phase is Phase.FLYING
+    view._controls._clicked(SimpleNamespace(ray_origin=(4.0, -2.0, -5.0), ray_direction=(0.0, 0.0, 1.0)))
+    said_after(flight, view, 1.0)
+    assert asked[0] == (6.0, 3.0, 0.5)
+    assert asked[1][:2] == pytest.approx((4.0, -2.0))
+    assert companion.skill.goals.goal.pos_ned[:2] == pytest.approx((4.0, -2.0), abs=0.02)
+
+
+def test_the_mode_of_a_rover_can_be_chosen(page):
+    flight, _ = standing(pilot=shipped_pilot("drive-reach"), world=PLAIN)
+    view = LiveView(flight, page)
+    chooser = next(h for h in page.gui._gui_input_handle_from_uuid.values() if h.label == "Mode")
+    assert {"Hold", "Mission", "Return", "Offboard"} < set(chooser.options)
+    chooser.value = "Return"
+    said_after(flight, view, 0.5)
+    assert flight.controller.state.mode is Mode.RETURN
