@@ -34,6 +34,7 @@ FENCE_BREACHED = 1 << 18
 TRAFFIC_NEAR = 1 << 20
 ACCEL_DOUBTED = 1 << 21
 COMPASS_FAULTY = 1 << 22
+STUCK = 1 << 23  # it drives, and does not get on
 
 TERMINATION_BREAKER = 121212  # CBRK_FLIGHTTERM: the failure detector may not stop the motors
 
@@ -127,6 +128,7 @@ def _sticks_lost(params: ParameterTable, flown: ModeSpec) -> Action:
 RULES: tuple[Rule, ...] = (
     Rule(ATTITUDE_LOST, _control_lost, Severity.EMERGENCY, "Attitude lost"),
     Rule(CRASHED, _control_lost, Severity.EMERGENCY, "Crash detected"),
+    Rule(STUCK, by("HG_RO_CRASH_ACT", LINK_ACTIONS), Severity.EMERGENCY, "Crash detected: it does not get on"),
     Rule(MOTOR_FAILED, by("COM_ACT_FAIL_ACT", MOTOR_ACTIONS), Severity.EMERGENCY, "Motor failure"),
     Rule(POSITION_LOST, _position_lost, Severity.CRITICAL, "Position lost", "Position is valid again"),
     Rule(HEIGHT_LOST, always(Action.LAND), Severity.CRITICAL, "Height lost", "Height is valid again"),

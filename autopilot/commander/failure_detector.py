@@ -25,6 +25,7 @@ from autopilot.commander.failsafe import (
     OFFBOARD_LOST,
     POSITION_LOST,
     STATION_LOST,
+    STUCK,
     TRAFFIC_NEAR,
     WIND_HIGH,
     WIND_STRONG,
@@ -132,8 +133,11 @@ class FailureWatch:
         mode = state.mode
         is_flying = state.landed_state is not LandedState.ON_GROUND
         failures = self._attitude.update(state, dt_s)
-        if self._motors is not None and self._motors.has_failure():
-            failures |= MOTOR_FAILED
+        if self._motors is not None:
+            if self._motors.has_failure():
+                failures |= MOTOR_FAILED
+            if self._motors.is_stuck:
+                failures |= STUCK
         if is_flying and self._battery.is_silent:
             failures |= BATTERY_SILENT
         if is_flying and state.fence.breached:

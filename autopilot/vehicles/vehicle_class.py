@@ -51,7 +51,10 @@ class GroundDetector(Protocol):
 
 
 class DriveWatch(Protocol):
-    """Says whether a motor has failed."""
+    """Says whether a motor has failed, or moves nothing."""
+
+    is_stuck: bool
+    """The vehicle drives, and does not get on."""
 
     def reset(self) -> None:
         """The vehicle has just been armed."""
@@ -167,7 +170,7 @@ class VehicleClass:
     arming_checks: Sequence[ArmingCheck] = ()
     """Its own, besides those of all vehicles (autopilot.commander.arming)."""
     drive_watch: Callable[[DriveParts], DriveWatch] | None = None
-    """None: nobody looks whether a motor has failed."""
+    """None: nobody looks whether a motor has failed or the vehicle is stuck."""
 
     def __post_init__(self) -> None:
         if self.ground is None:

@@ -62,6 +62,8 @@ class MotorWatch:
         "failed",
     )  # fmt: skip
 
+    is_stuck = False
+
     def __init__(
         self,
         state: VehicleState,

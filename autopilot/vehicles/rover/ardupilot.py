@@ -10,6 +10,7 @@ _CAR, _SIDES = 5, 6  # CA_AIRFRAME
 # goes by NAV_RCL_ACT; the others say whether there is any.
 _ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 1: 2, 7: 3, 5: 5}
 _IS_ACTIVE: Mapping[int, int] = {0: 0, 1: 1, 2: 1, 5: 1, 6: 1, 7: 1}
+_CRASH_ACTIONS: Mapping[int, int] = {0: 0, 1: 1, 6: 2}
 _ESTIMATOR_ACTIONS: Mapping[int, int] = {0: 0, 1: 1}
 _LAW = "ArduPilot's default; see RO_SPEED_P, RO_SPEED_I"
 
@@ -27,6 +28,7 @@ APM_ROVER = ArduPilotVehicle(
         Alias("ATC_TURN_MAX_G", "HG_RO_LAT_ACC", REAL32, 1.0 / 9.80665),
         Alias("CRUISE_SPEED", "RO_SPEED_LIM", REAL32),
         Alias("FS_ACTION", "NAV_RCL_ACT", INT8, numbers=_ACTIONS),
+        Alias("FS_CRASH_CHECK", "HG_RO_CRASH_ACT", INT8, numbers=_CRASH_ACTIONS),
         Alias("FS_EKF_ACTION", "COM_EST_FAIL_ACT", INT8, numbers=_ESTIMATOR_ACTIONS),
         Alias("FS_GCS_ENABLE", "NAV_DLL_ACT", INT8, numbers=_IS_ACTIVE),
         Alias("FS_THR_ENABLE", "NAV_RCL_ACT", INT8, numbers=_IS_ACTIVE),

@@ -11,7 +11,8 @@ from autopilot.vehicles.rover.defaults import rover_defaults
 from autopilot.vehicles.rover.law import ROVER_LAW
 from autopilot.vehicles.rover.modes import ROVER_MODES
 from autopilot.vehicles.rover.params import ROVER_PARAMETERS
-from autopilot.vehicles.vehicle_class import MotionLimits, Turning, VehicleClass
+from autopilot.vehicles.rover.stuck_watch import STUCK_PARAMETERS, StuckWatch
+from autopilot.vehicles.vehicle_class import DriveParts, MotionLimits, Turning, VehicleClass
 from common.airframes.rover import RoverAirframe
 from common.geodesy import GRAVITY_M_S2
 from common.params import ParameterTable
@@ -31,6 +32,10 @@ def _outputs(airframe: RoverAirframe) -> Sequence[Output]:
 
 def _motors(airframe: RoverAirframe) -> Sequence[int]:
     return [i for i, output in enumerate(_outputs(airframe)) if output.kind is OutputKind.MOTOR]
+
+
+def _stuck_watch(parts: DriveParts) -> StuckWatch:
+    return StuckWatch(parts.state, parts.params, ROVER_MODES, tuple(_motors(parts.airframe)))
 
 
 def _standing_height_m(airframe: RoverAirframe) -> float:
@@ -56,7 +61,7 @@ def _can_drive(_: VehicleState, params: ParameterTable) -> str:
 ROVER = VehicleClass(
     name="rover",
     law=ROVER_LAW,
-    parameters=(*ROVER_PARAMETERS, *WHEEL_PARAMETERS),
+    parameters=(*ROVER_PARAMETERS, *WHEEL_PARAMETERS, *STUCK_PARAMETERS),
     defaults=rover_defaults,
     modes=ROVER_MODES,
     last_resort=Mode.HOLD,
@@ -77,4 +82,5 @@ ROVER = VehicleClass(
     motors=_motors,
     standing_height_m=_standing_height_m,
     arming_checks=(_can_drive,),
+    drive_watch=_stuck_watch,
 )
