@@ -9,7 +9,7 @@ from autopilot.interface.vehicle_state import Mode, VehicleState
 from autopilot.vehicles.rover.ardupilot import APM_ROVER
 from autopilot.vehicles.rover.defaults import rover_defaults
 from autopilot.vehicles.rover.law import ROVER_LAW
-from autopilot.vehicles.rover.modes import ROVER_MODES
+from autopilot.vehicles.rover.modes.table import ROVER_MODES
 from autopilot.vehicles.rover.params import ROVER_PARAMETERS
 from autopilot.vehicles.rover.stuck_watch import STUCK_PARAMETERS, StuckWatch
 from autopilot.vehicles.vehicle_class import DriveParts, MotionLimits, Turning, VehicleClass

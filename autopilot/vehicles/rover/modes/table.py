@@ -5,10 +5,10 @@ from autopilot.interface.vehicle_state import Mode
 from autopilot.navigator.mode_parts import ModeParts, mission_mode, of_context
 from autopilot.navigator.modes.rtl_destination import Destinations
 from autopilot.vehicles import px4_modes
-from autopilot.vehicles.rover.ardupilot_modes import ARDUPILOT_MODES
-from autopilot.vehicles.rover.auto_modes import RoverHold, RoverReturn
-from autopilot.vehicles.rover.offboard import RoverOffboard
-from autopilot.vehicles.rover.stick_modes import Acro, Manual, Position, Stabilized
+from autopilot.vehicles.rover.modes.ardupilot_rows import ARDUPILOT_MODES
+from autopilot.vehicles.rover.modes.auto import RoverHold, RoverReturn
+from autopilot.vehicles.rover.modes.offboard import RoverOffboard
+from autopilot.vehicles.rover.modes.sticks import Acro, Manual, Position, Stabilized
 
 
 def _return(parts: ModeParts) -> FlightMode:

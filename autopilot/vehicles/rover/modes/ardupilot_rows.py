@@ -15,8 +15,8 @@ from autopilot.interface.mode_spec import (
 )
 from autopilot.interface.vehicle_state import Mode
 from autopilot.navigator.mode_parts import ModeParts, of_context
-from autopilot.vehicles.rover.auto_modes import RoverLoiter, RoverSmartReturn
-from autopilot.vehicles.rover.guided import RoverGuided
+from autopilot.vehicles.rover.modes.auto import RoverLoiter, RoverSmartReturn
+from autopilot.vehicles.rover.modes.guided import RoverGuided
 
 LOITER = further_mode(32, "LOITER")
 

@@ -10,7 +10,7 @@ from autopilot.navigator.modes.hold import Hold
 from autopilot.navigator.modes.rtl_destination import Destinations
 from autopilot.navigator.paths.breadcrumbs import Breadcrumbs
 from autopilot.navigator.paths.waypoint_path import WaypointPath
-from autopilot.vehicles.rover.stick_modes import Position
+from autopilot.vehicles.rover.modes.sticks import Position
 
 _STANDING_M_S = 0.1
 
