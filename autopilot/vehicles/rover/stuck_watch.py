@@ -51,9 +51,7 @@ class StuckWatch:
         """Looks whether it gets on; of its motors nobody tells."""
         state = self._state
         command = state.actuators.command
-        throttle = sum(command[motor] for motor in self._motors) / len(
-            self._motors
-        )  # not what turns it
+        throttle = sum(command[motor] for motor in self._motors) / len(self._motors)  # not what turns it
         north, east, _ = state.estimate.vel_ned
         moves = hypot(north, east) > _SLOW_M_S or abs(state.estimate.omega_frd[2]) > _TURNING_RAD_S
         if abs(throttle) < _THROTTLE_MIN or moves or self._modes[state.mode].needs_sticks:
