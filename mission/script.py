@@ -15,8 +15,6 @@ from collections.abc import Callable, Coroutine
 from math import dist, isnan, nan
 from typing import Any
 
-from autopilot.interface.vehicle_state import Mode
-from autopilot.mavlink.dialects.px4 import PX4
 from common.geodesy import GeoPoint, geodetic_from_ned, ned_from_geodetic
 from mission.client import Client, CommandRefused, ScriptError, ScriptTimeout
 from mission.plan.plan_file import Plan
@@ -289,10 +287,9 @@ class Drone(Client):
         }
         self._offboard = lambda time_ms: self.ask("SET_POSITION_TARGET_LOCAL_NED", time_boot_ms=time_ms, **fields)
 
-    async def choose_mode(self, mode: Mode) -> None:
-        """Switches to any mode; the vehicle says if it cannot."""
-        custom = PX4.custom_mode(mode)
-        await self._set_mode(custom >> 16 & 0xFF, custom >> 24 & 0xFF, mode.name.lower())
+    async def choose_mode(self, custom_mode: int, name: str) -> None:
+        """Switches to a mode by PX4's number, that of a heartbeat; the vehicle says if it cannot."""
+        await self._set_mode(custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF, name)
 
     # -- helpers ----------------------------------------------------------------------------------------------------
 

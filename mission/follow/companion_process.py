@@ -38,6 +38,7 @@ class CompanionOptions:
     camera: str
     is_reported: bool
     seconds: float | None
+    is_by_sticks: bool = False
 
 
 def run_companion(options: CompanionOptions, console: Console) -> str:
@@ -52,7 +53,10 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         link = open_client_link(options.link)
     except (PilotError, CameraUrlError, LinkError) as error:
         raise CompanionError(str(error)) from error
-    companion = Companion(link, skill, is_reported=options.is_reported, wall_s=wall_time_s)
+    if options.is_by_sticks and not skill.drives:
+        raise CompanionError(f"--by-sticks: {options.policy} flies, and only what drives is driven by sticks")
+    by_sticks = options.is_by_sticks
+    companion = Companion(link, skill, is_reported=options.is_reported, is_by_sticks=by_sticks, wall_s=wall_time_s)
     _shower(console)(f"{options.policy} flies; vehicle: {options.link}, pictures: {options.camera}; Ctrl-C ends it")
     try:
         _loop(companion, options, console)

@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 def companion(
     policy: Annotated[
-        str, typer.Option(help="A policy of FollowMe or Navigate: a file or a run's folder; or 'scripted', a follower.")
+        str,
+        typer.Option(
+            help="A policy of FollowMe, Navigate or Drive: a file or a run's folder; or 'scripted', a follower."
+        ),
     ],
     link: Annotated[
         str,
@@ -29,7 +32,15 @@ def companion(
     ),
     engage: Annotated[
         bool,
-        typer.Option("--engage", help="Take control once, as soon as everything is there; to navigate, at each goto."),
+        typer.Option(
+            "--engage", help="Take control once, as soon as everything is there; to navigate or drive, at each goto."
+        ),
+    ] = False,
+    by_sticks: Annotated[
+        bool,
+        typer.Option(
+            "--by-sticks", help="Drive by MANUAL_CONTROL in mode Position: stock PX4's Offboard does not reverse."
+        ),
     ] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this much wall clock time.")] = None,
 ) -> None:
@@ -41,7 +52,7 @@ def companion(
             from mission.follow.companion_process import CompanionError, CompanionOptions, run_companion
 
         try:
-            typer.echo(run_companion(CompanionOptions(policy, link, camera, engage, seconds), Console()))
+            typer.echo(run_companion(CompanionOptions(policy, link, camera, engage, seconds, by_sticks), Console()))
         except CompanionError as error:
             refuse(str(error))
 

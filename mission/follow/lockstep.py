@@ -77,6 +77,7 @@ def flight_with_driver(
     pilot: DrivingPilot,
     *,
     is_reported: bool = True,
+    is_by_sticks: bool = False,
     links: Sequence[Link | LinkSource] = (),
     folder: Path | None = None,
     world: WorldMap | None = None,
@@ -87,12 +88,14 @@ def flight_with_driver(
         config: of a rover with a ring of range finders.
         pilot: who drives.
         is_reported: False: it waits for the pilot to choose Offboard.
+        is_by_sticks: it drives by MANUAL_CONTROL, and not in Offboard.
         links: of ground stations.
         folder: of the logs.
         world: the ground; None: as the configuration says.
     """
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
     flight = Flight(config, links=[vehicle_end, *links], folder=folder, world=world)
-    companion = Companion(companion_end, Driving(pilot, is_ordered_by_goto=is_reported), is_reported=is_reported)
+    skill = Driving(pilot, is_ordered_by_goto=is_reported)
+    companion = Companion(companion_end, skill, is_reported=is_reported, is_by_sticks=is_by_sticks)
     flight.computers.append(companion)
     return flight, companion

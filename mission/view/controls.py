@@ -11,13 +11,13 @@ from typing import Any
 import viser
 
 from autopilot.interface.failure_requests import Failure, Unit
-from autopilot.interface.vehicle_state import Mode
+from autopilot.mavlink.dialects.px4 import PX4
 from mission.client import Running
 from mission.flight import Flight
 from mission.script import Drone, ScriptError, take_off
 from mission.view.browser_inputs import within
-from mission.view.flight_snapshot import mode_titles
 from mission.view.pose_goals import Pose, PoseGoals
+from sim.bodies.vehicles import class_of
 
 CLIMB_M = 5.0  # above the ground, when a click finds the vehicle standing
 FAR_M = 2000.0  # of a click's ray
@@ -118,14 +118,16 @@ class Controls:
 
     def _add_modes(self, gui: viser.GuiApi) -> None:
         """A chooser of all modes, as ground stations have one."""
-        modes = {name: Mode(number) for number, name in mode_titles(self._flight.airframe).items()}
-        chooser = gui.add_dropdown("Mode", tuple(modes), initial_value=next(iter(modes)))
+        vehicle = class_of(self._flight.airframe).vehicle
+        dialect = PX4.of_vehicle(vehicle.modes, vehicle.ardupilot)  # the script's, whatever ground stations hear
+        numbers = {row.name: dialect.custom_mode(row.mode) for row in dialect.modes if row.is_selectable}
+        chooser = gui.add_dropdown("Mode", tuple(numbers), initial_value="Hold")
 
         @chooser.on_update
         def _(_: Any) -> None:
-            if chooser.value in modes:
-                name, mode = chooser.value, modes[chooser.value]
-                self._do(lambda: self._start(f"mode {name}", lambda drone: drone.choose_mode(mode)))
+            if chooser.value in numbers:
+                name, number = chooser.value, numbers[chooser.value]
+                self._do(lambda: self._start(f"mode {name}", lambda drone: drone.choose_mode(number, name)))
 
     def _add_command(self, gui: viser.GuiApi, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
         self._add_button(gui, name, lambda: self._start(name, script))

@@ -16,6 +16,7 @@ from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.client_end import ByteLink
 from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
 from policies.companion.skill import Floats, Skill, Velocity
+from policies.companion.stick_control import StickControl
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
 
 SETPOINT_US = 50_000
@@ -35,6 +36,7 @@ class Companion:
         link: bytes to and from the vehicle.
         skill: what it can do, and who decides.
         is_told: engage as soon as everything is there; otherwise the pilot chooses Offboard.
+        is_by_sticks: what drives is driven by MANUAL_CONTROL in mode Position, and not in Offboard.
         wall_s: a clock in seconds that the latency is measured with; none: it is not measured.
     """
 
@@ -44,9 +46,11 @@ class Companion:
         skill: Skill,
         *,
         is_reported: bool = False,
+        is_by_sticks: bool = False,
         wall_s: Callable[[], float] | None = None,
     ) -> None:
-        self.vehicle = VehicleLink(link)
+        self.vehicle = VehicleLink(link, is_by_sticks=is_by_sticks)
+        self._sticks = StickControl(self.vehicle) if is_by_sticks else None
         self.skill = skill
         skill.attach(self.vehicle)
         self.engagement = Engagement(is_reported=is_reported, ready=skill.ready, flying=skill.flying)
@@ -70,6 +74,8 @@ class Companion:
         vehicle, skill = self.vehicle, self.skill
         vehicle.receive(time_us)
         vehicle.keep_alive(time_us)
+        if self._sticks is not None:
+            self._sticks.frame(time_us)
         has_sensed = skill.receive(vehicle, time_us)
         begun_s = self._wall_s() if self._wall_s is not None and has_sensed else None
         if skill.is_ordered():
@@ -80,13 +86,16 @@ class Companion:
         orders = self.engagement.step(self._situation(time_us))
         if orders.text:
             vehicle.say(orders.text)
-        if orders.wish is not Wish.NONE:
+        if orders.wish is Wish.HOLD and self._sticks is not None:
+            self._sticks.hold(time_us)
+        elif orders.wish is not Wish.NONE:
             vehicle.ask_for(orders.wish)
         self._switch(orders.sending)
         has_decided = has_sensed and not blindness and self._decide(time_us) and orders.sending is Sending.POLICY
-        if orders.sending is not Sending.NOTHING and (has_decided or time_us >= self._setpoint_due_us):
+        is_sending = orders.sending is not Sending.NOTHING or self._sticks is not None
+        if is_sending and (has_decided or time_us >= self._setpoint_due_us):
             self._setpoint_due_us = time_us + SETPOINT_US
-            vehicle.send_setpoint(*self._setpoint, is_along_nose=skill.drives)
+            self._send()
         if has_decided and begun_s is not None and self._wall_s is not None:
             self.latencies_s.append(self._wall_s() - begun_s)
         if has_sensed:  # only now: the setpoint does not wait for it
@@ -101,6 +110,13 @@ class Companion:
         """Stops sending; the vehicle notices."""
         self.skill.close()
         self.vehicle.close()
+
+    def _send(self) -> None:
+        """Sends the setpoint as the vehicle is driven."""
+        if self._sticks is not None:
+            self._sticks.send(self._setpoint)
+        else:
+            self.vehicle.send_setpoint(*self._setpoint, is_along_nose=self.skill.drives)
 
     def _switch(self, sending: Sending) -> None:
         """Takes over, or lets go."""
@@ -131,7 +147,7 @@ class Companion:
         own = self.vehicle.own
         return Situation(
             time_us=time_us,
-            is_offboard=own.mode in (Mode.OFFBOARD, Mode.GUIDED),
+            is_offboard=self.vehicle.is_flown,
             is_airborne=own.is_under_way,
             is_holding=own.mode is Mode.HOLD or (self._is_sent_in_guided and own.mode is Mode.GUIDED),
             mode_name=own.mode_name,
@@ -149,7 +165,8 @@ class Companion:
         is_placed = isfinite(own.pos_ned[0])
         if not is_placed or time_us - min(own.attitude_us, own.position_us) > TELEMETRY_OLD_US:
             return "no attitude or position from the vehicle"
-        return self.skill.blindness(own, time_us)
+        blindness = self.skill.blindness(own, time_us)
+        return blindness or (self._sticks.trouble if self._sticks is not None else "")
 
     @property
     def phase(self) -> Phase:

@@ -103,9 +103,11 @@ class VehicleLink:
     Args:
         link: bytes to and from the vehicle.
         system_id: of the vehicle.
+        is_by_sticks: it is not flown in Offboard or Guided, but driven in mode Position.
     """
 
-    def __init__(self, link: ByteLink, *, system_id: int = 1) -> None:
+    def __init__(self, link: ByteLink, *, system_id: int = 1, is_by_sticks: bool = False) -> None:
+        self._is_by_sticks = is_by_sticks
         self.own = Own()
         self.clock = VehicleClock()
         self.owner = Owner()
@@ -160,6 +162,19 @@ class VehicleLink:
     def is_ardupilot(self) -> bool:
         return self._dialect.autopilot == ARDUPILOT.autopilot
 
+    @property
+    def is_flown(self) -> bool:
+        """Whether it is in a mode that follows what is sent."""
+        ours = (Mode.POSITION,) if self._is_by_sticks else (Mode.OFFBOARD, Mode.GUIDED)
+        return self.own.mode in ours
+
+    @property
+    def _flown_mode(self) -> Mode:
+        """The mode in which it follows what is sent."""
+        if self._is_by_sticks:
+            return Mode.POSITION
+        return Mode.GUIDED if self.is_ardupilot and Mode.GUIDED in self._dialect.mode_table else Mode.OFFBOARD
+
     def send(self, name: str, **fields: Any) -> None:
         """A message to everybody, or to whom its fields name."""
         self._client.send(name, **fields)
@@ -191,8 +206,7 @@ class VehicleLink:
     def ask_for(self, wish: Wish) -> None:
         """Asks the vehicle for a mode."""
         is_px4 = not self.is_ardupilot
-        guided = Mode.GUIDED if Mode.GUIDED in self._dialect.mode_table else Mode.OFFBOARD
-        mode = Mode.HOLD if wish is Wish.HOLD else Mode.OFFBOARD if is_px4 else guided
+        mode = Mode.HOLD if wish is Wish.HOLD else self._flown_mode
         self._asked_for = mode
         number = self._dialect.custom_mode(mode)
         if is_px4:

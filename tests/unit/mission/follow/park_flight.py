@@ -21,11 +21,11 @@ def shipped_pilot(name="drive-park"):
     return DrivingPilot(load_policy(path)[0], str(path))
 
 
-def standing(*, is_reported=True, pilot=None, folder=None, links=(), **changed):
+def standing(*, is_reported=True, is_by_sticks=False, pilot=None, folder=None, links=(), **changed):
     """A rover that is armed and holds, and its companion."""
     config = {"airframe": "rover", "has_lidar": True, "has_base": True, "world": LOT, "seed": 6}
     config["parameters"] = {"HG_RO_OFFB_BODY": 1.0}
-    options = {"is_reported": is_reported, "folder": folder, "links": links}
+    options = {"is_reported": is_reported, "is_by_sticks": is_by_sticks, "folder": folder, "links": links}
     flight, companion = flight_with_driver(FlightConfig(**config | changed), pilot or shipped_pilot(), **options)
 
     async def arm(drone):

@@ -148,3 +148,18 @@ def test_a_rover_that_gets_nowhere_gives_up_and_says_so(monkeypatch):
     advance(flight, 40.0, lambda: companion.phase is Phase.WAITING)
     assert "Companion: hold: stuck" in flight.drone.texts
     assert flight.controller.state.mode is Mode.HOLD
+
+
+def test_by_sticks_it_drives_backwards_too_as_a_stock_px4_needs_it():
+    reacher = shipped_pilot("drive-reach")
+    flight, companion = standing(pilot=reacher, world=PLAIN, parameters={}, is_by_sticks=True)
+    for goal in ((-2.0, 0.0, 0.0), GOAL):
+        send_goto(flight, goal)
+        advance(flight, 1.0)
+        assert companion.phase is Phase.FLYING, (companion.trouble, flight.drone.texts)
+        assert flight.controller.state.mode is Mode.POSITION
+        advance(flight, 40.0, lambda: companion.phase is Phase.WAITING)
+        distance_m, turn_deg = miss(flight, goal)
+        assert (distance_m < 0.3, turn_deg < 10.0) == (True, True), (distance_m, turn_deg)
+    advance(flight, 5.0)
+    assert flight.controller.state.mode is Mode.HOLD  # sticks that fell silent would be a failsafe
