@@ -39,8 +39,8 @@ class StickControl:
     def trouble(self) -> str:
         """Why nothing can be driven by sticks; "" if it can."""
         numbers = self._numbers
-        is_told = all(number is not None for number in numbers.values())
-        return "" if is_told and (numbers[SPEED] or 0.0) > 0.0 and (numbers[YAW_RATE] or 0.0) > 0.0 else UNKNOWN
+        has_all = all(number is not None for number in numbers.values())
+        return "" if has_all and (numbers[SPEED] or 0.0) > 0.0 and (numbers[YAW_RATE] or 0.0) > 0.0 else UNKNOWN
 
     def frame(self, time_us: int) -> None:
         """Asks for what is due, and for what is not known yet."""

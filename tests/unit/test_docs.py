@@ -172,6 +172,13 @@ def test_command_works(page, line, tmp_path, monkeypatch):
         assert result.exit_code in {0, 1}, result.output  # 1: a script may fail to follow
         assert (tmp_path / "flight" / "summary.json").exists()
         return
+    park_arguments = [] if line == "make park" else flight_arguments(line, "park", "park")
+    if park_arguments is not None:
+        shortened = ["--speed", "max", "--run-folder", str(tmp_path / "flight")]
+        result = CliRunner().invoke(app, ["park", *park_arguments, *shortened])
+        assert result.exit_code in {0, 1}, result.output  # 1: a policy may fail to park
+        assert (tmp_path / "flight" / "summary.json").exists()
+        return
     arguments = flight_arguments(line, "mission", "fly")
     assert arguments is not None, f"{page}: nobody runs this: {line}"
     monkeypatch.chdir(ROOT)
@@ -237,6 +244,7 @@ SECTIONS_OF_COMMANDS = {  # the page, and the heading under which its options ar
     "follow": ("docs/how-to/follow-me.md", "Options of follow"),
     "replay": ("docs/how-to/flying.md", "Looking at a run again"),
     "companion": ("docs/how-to/companion.md", "The companion computer"),
+    "park": ("docs/how-to/rover.md", "Park it"),
     "play": ("docs/how-to/demonstrations.md", "Watch"),
     "drive": ("docs/how-to/demonstrations.md", "Drive"),
     "demonstrate": ("docs/how-to/demonstrations.md", "Record"),
