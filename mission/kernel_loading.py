@@ -31,7 +31,7 @@ _OWNER = (
 _FOREST = ("sim.world.hills", "sim.world.growing", "sim.sensors.scanner")
 _BOXES = ("sim.world.hills", "sim.world.growing", "sim.world.building")
 _RING = {True: ("sim.sensors.ground_ring",), False: ("sim.sensors.ring",)}  # of what drives, of what flies
-PARKING = ("policies.tasks.drive.observe", "mission.park.spots")
+PARKING = ("policies.tasks.drive.observe", "sim.world.spots")
 
 
 def flight_kernels(airframe: str) -> tuple[Any, ...]:

@@ -28,7 +28,6 @@ from mission.flight_settings import ParkOptions
 from mission.follow.lockstep import flight_with_driver
 from mission.kernel_loading import PARKING, load_kernels
 from mission.park.parking import Arrival, drive, get_ready
-from mission.park.spots import Spot, spots_of
 from mission.run_folder import run_folder
 from mission.script import Drone, ScriptError
 from mission.simulator.flight_rig import flight_world
@@ -41,6 +40,7 @@ from policies.companion.vector_pilot import DrivingPilot
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy
 from sim.bodies.vehicles import class_of
+from sim.world.spots import Spot, spots_of
 
 REVERSES = {"HG_RO_OFFB_BODY": 1.0}  # stock PX4's Offboard does not
 

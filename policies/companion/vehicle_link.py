@@ -160,7 +160,7 @@ class VehicleLink:
 
     @property
     def is_ardupilot(self) -> bool:
-        return self._dialect.autopilot == ARDUPILOT.autopilot
+        return int(self._dialect.autopilot) == int(ARDUPILOT.autopilot)
 
     @property
     def is_flown(self) -> bool:

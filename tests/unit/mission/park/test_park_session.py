@@ -6,9 +6,6 @@ import pytest
 from typer.testing import CliRunner
 
 from mission.cli import app
-from mission.park.spots import spots_of
-from sim.world.batch import grown_world
-from sim.world.driving_worlds import CAR_PARK
 
 
 def run(*arguments):
@@ -50,16 +47,3 @@ def test_what_cannot_be_driven_is_refused_in_one_sentence(arguments, sentence, t
     assert sentence in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
     assert not folder.exists()
-
-
-def test_the_spots_of_a_car_park_are_numbered_and_each_row_has_a_free_one():
-    for seed in range(5):
-        spots = spots_of(grown_world(CAR_PARK.model_copy(update={"seed": seed}), seed))
-        assert [spot.number for spot in spots] == list(range(1, 11))
-        assert any(spot.is_free for spot in spots[:5])
-        assert any(spot.is_free for spot in spots[5:])
-        assert not all(spot.is_free for spot in spots)
-
-
-def test_a_world_that_is_no_car_park_has_no_spots():
-    assert spots_of(grown_world(CAR_PARK.model_copy(update={"spot_count": 0}), 1)) == []
