@@ -27,6 +27,7 @@ from autopilot.interface.client_requests import (
     Request,
     SetCurrentItem,
     SetHome,
+    SetReverse,
     StartMission,
 )
 from autopilot.interface.failure_requests import Failure, FailureInjector, Unit, failure_request, injection_refusal
@@ -330,6 +331,8 @@ class FlightController:
                 return self.navigator.mission.set_current(request.seq, is_reset=request.is_reset)
             case ChangeSpeed():
                 return self.navigator.change_speed(request.speed_m_s, request.kind)
+            case SetReverse():
+                return self._set_reverse(request)
             case SetHome():
                 return self.commander.set_home(request.lat_deg, request.lon_deg, request.alt_amsl_m)
 
@@ -351,6 +354,12 @@ class FlightController:
         self.commander.change_mode(mode)
         if is_flown:
             self.navigator.begin_request(mode)
+        return ACCEPTED
+
+    def _set_reverse(self, request: SetReverse) -> Reply:
+        if self.leaves_ground:
+            return Reply(Verdict.UNSUPPORTED, "it does not drive")
+        self._setpoint.set_reversed(request.is_reversed)
         return ACCEPTED
 
     def _change_mode(self, mode: Mode) -> Reply:

@@ -105,6 +105,13 @@ class ChangeSpeed:
 
 
 @dataclass(frozen=True, slots=True)
+class SetReverse:
+    """Ways are driven backwards from now on, or forwards again, until the mode changes."""
+
+    is_reversed: bool
+
+
+@dataclass(frozen=True, slots=True)
 class SetHome:
     """Another home; NaN: here."""
 
@@ -153,7 +160,7 @@ class LandingTargetReport(Report):
     pos_ned: tuple[float, float, float]  # [m]
 
 
-Request = ModeRequest | Report | ChangeMode | StartMission | SetCurrentItem | ChangeSpeed | SetHome
+Request = ModeRequest | Report | ChangeMode | StartMission | SetCurrentItem | ChangeSpeed | SetReverse | SetHome
 
 
 class CalibrationKind(Enum):

@@ -24,6 +24,7 @@ from autopilot.mavlink.services.actions.aux_functions import AuxFunctions
 from autopilot.mavlink.services.actions.calibration_commands import CalibrationService
 from autopilot.mavlink.services.actions.compass_calibration import CompassService
 from autopilot.mavlink.services.actions.device_commands import DeviceService
+from autopilot.mavlink.services.actions.drive_commands import DriveCommands
 from autopilot.mavlink.services.actions.fence_switch import FenceService
 from autopilot.mavlink.services.actions.flight_commands import FlightCommands
 from autopilot.mavlink.services.actions.goto_commands import GotoService
@@ -137,6 +138,7 @@ class MavlinkServer:
             FlightCommands(endpoint, self._events),
             parameters,
             MissionCommands(endpoint),
+            DriveCommands(endpoint),
             ModeService(endpoint),
             self._events,
             goto,

@@ -5,7 +5,7 @@ only if something changed. The control part limits and smooths what is asked her
 """
 
 import struct
-from math import cos, nan, sin
+from math import cos, isfinite, nan, sin
 from typing import Any
 
 import numpy as np
@@ -44,8 +44,9 @@ class SetpointPort:
 
     __slots__ = (
         "_buffer", "_is_changed", "_motor_test", "_pack_into", "_press_speed", "_settling", "accel_ned", "climb_speed",
-        "cruise_speed", "descend_speed", "exit_speed", "is_armed", "is_landed", "kind", "omega_frd", "pass_radius",
-        "path_start_ned", "pos_ned", "q_ned_from_frd", "speed", "steering", "thrust", "vel_ned", "yaw", "yaw_rate",
+        "cruise_speed", "descend_speed", "exit_speed", "is_armed", "is_landed", "is_reversed", "kind", "omega_frd",
+        "pass_radius", "path_start_ned", "pos_ned", "q_ned_from_frd", "speed", "steering", "thrust",
+        "vel_ned", "yaw", "yaw_rate",
     )  # fmt: skip
 
     def __init__(self, row: np.ndarray[Any, Any]) -> None:
@@ -58,6 +59,7 @@ class SetpointPort:
         self._motor_test: tuple[float, ...] = (0.0,) * MAX_MOTORS
         self.is_armed = False
         self.is_landed = True
+        self.is_reversed = False  # ways are driven backwards, by what can
         self._settling: tuple[float, float] | None = None  # thrust [0..1] and heading [rad]
         self._press_speed = 0.0  # [m/s]
         self.kind: int = SETPOINT_IDLE
@@ -314,8 +316,8 @@ class SetpointPort:
         flags = (kind, self.is_armed, self.is_landed)
         values = (
             *pos_ned, *vel_ned, *self.accel_ned, self.yaw,
-            yaw_rate, *path_start_ned, self.cruise_speed, self.climb_speed, self.descend_speed, self.exit_speed,
-            self.pass_radius,
+            yaw_rate, *path_start_ned, self._cruise_speed_written(), self.climb_speed, self.descend_speed,
+            self.exit_speed, self.pass_radius,
             *q_ned_from_frd, *self.omega_frd, thrust, self.speed, self.steering,
             *self._motor_test,
         )  # fmt: skip
@@ -325,6 +327,17 @@ class SetpointPort:
             OverflowError
         ):  # beyond single precision; who asks has failed to bound it, and is flown as far as it goes
             self._pack_into(self._buffer, 0, *flags, *(min(max(value, -_LARGEST), _LARGEST) for value in values))
+
+    def _cruise_speed_written(self) -> float:
+        """[m/s] as the law takes it: negative is backwards."""
+        if not self.is_reversed:
+            return self.cruise_speed
+        return -abs(self.cruise_speed) if isfinite(self.cruise_speed) else -_LARGEST
+
+    def set_reversed(self, is_reversed: bool) -> None:
+        """Whether ways are driven backwards from now on, by what can."""
+        self.is_reversed = is_reversed
+        self._is_changed = True
 
     def _free_all(self) -> None:
         self._is_changed = True

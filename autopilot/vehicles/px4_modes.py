@@ -5,7 +5,7 @@ A class completes each with its builder, its ArduPilot mode, and what else is it
 
 from functools import partial
 
-from autopilot.interface.client_requests import GoTo, OffboardSetpoint
+from autopilot.interface.client_requests import GoTo, OffboardSetpoint, OrbitRequest, TargetReport
 from autopilot.interface.failsafe_action import Action
 from autopilot.interface.mode_spec import (
     AUTO_OVERRIDE,
@@ -121,4 +121,27 @@ OFFBOARD = partial(
     switch=7,
     exception=OFFBOARD_EXCEPTED,
     override=OFFBOARD_OVERRIDE,
+)
+FOLLOW = partial(
+    ModeSpec,
+    mode=Mode.FOLLOW,
+    needs_position=True,
+    takes=(TargetReport,),
+    px4=px4_mode(Px4Main.AUTO, 8, "Follow Me"),
+    nav_state=19,
+    shell_name="auto:follow",
+    switch=12,
+    aux_function=57,
+    exception=HOLD_EXCEPTED,
+)
+ORBIT = partial(
+    ModeSpec,
+    mode=Mode.ORBIT,
+    needs_position=True,
+    takes=(OrbitRequest,),
+    px4=px4_mode(Px4Main.POSCTL, 1, "Orbit", is_selectable=False),
+    standard=StandardMode.ORBIT,
+    nav_state=21,
+    aux_function=72,
+    exception=HOLD_EXCEPTED,
 )

@@ -100,7 +100,7 @@ class Follow(FlightMode):
         self._is_waiting = True
         self._bearing = nan
         self._speed_round = 0.0
-        context.fly_to(context.stop_point(), context.state.yaw_rad)
+        self._hold_still()
         context.announcer.statustext(Severity.NOTICE, "Follow: no target, waiting")
 
     def _track(self, target: TargetFilter, now_us: int, dt_s: float) -> None:
@@ -126,7 +126,15 @@ class Follow(FlightMode):
         )
         offset = (position[0] - here[0], position[1] - here[1])
         yaw = atan2(offset[1], offset[0]) if hypot(*offset) > 0.5 else context.state.yaw_rad
-        context.setpoint.track(pos_ned, vel_ned, yaw)
+        self._fly(pos_ned, vel_ned, yaw)
+
+    def _fly(self, pos_ned: Vector, vel_ned: Vector, yaw: float) -> None:
+        """Keeps to a moving place, the nose to the target."""
+        self._context.setpoint.track(pos_ned, vel_ned, yaw)
+
+    def _hold_still(self) -> None:
+        context = self._context
+        context.fly_to(context.stop_point(), context.state.yaw_rad)
 
     def _ask(self) -> None:
         """What is asked for is what the parameters say."""

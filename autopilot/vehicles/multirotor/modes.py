@@ -5,9 +5,7 @@ from autopilot.interface.client_requests import (
     LandAt,
     LandingTargetReport,
     OffboardSetpoint,
-    OrbitRequest,
     TakeOff,
-    TargetReport,
 )
 from autopilot.interface.failsafe_action import Action
 from autopilot.interface.mode_spec import (
@@ -134,33 +132,8 @@ MULTIROTOR_MODES = mode_table(
     px4_modes.OFFBOARD(  # its position is not needed for setpoints of attitude or rate
         build=of_context(Offboard), ardupilot=Mode.GUIDED
     ),
-    ModeSpec(
-        mode=Mode.FOLLOW,
-        build=of_context(Follow),
-        needs_position=True,
-        on_takeoff=True,
-        takes=(TargetReport,),
-        px4=px4_mode(Px4Main.AUTO, 8, "Follow Me"),
-        ardupilot=DialectMode(23, "Follow"),
-        nav_state=19,
-        shell_name="auto:follow",
-        switch=12,
-        aux_function=57,
-        exception=HOLD_EXCEPTED,
-    ),
-    ModeSpec(
-        mode=Mode.ORBIT,
-        build=of_context(Orbit),
-        needs_position=True,
-        on_takeoff=True,
-        takes=(OrbitRequest,),
-        px4=px4_mode(Px4Main.POSCTL, 1, "Orbit", is_selectable=False),
-        ardupilot=DialectMode(7, "Circle"),
-        standard=StandardMode.ORBIT,
-        nav_state=21,
-        aux_function=72,
-        exception=HOLD_EXCEPTED,
-    ),
+    px4_modes.FOLLOW(build=of_context(Follow), on_takeoff=True, ardupilot=DialectMode(23, "Follow")),
+    px4_modes.ORBIT(build=of_context(Orbit), on_takeoff=True, ardupilot=DialectMode(7, "Circle")),
     px4_modes.STABILIZED(build=_stabilized, ardupilot=DialectMode(0, "Stabilize"), aux_function=68),
     px4_modes.MANUAL(build=_stabilized, ardupilot=Mode.STABILIZED),
     px4_modes.ACRO(build=of_context(Acro), ardupilot=DialectMode(1, "Acro")),

@@ -26,7 +26,12 @@ APM_ROVER = ArduPilotVehicle(
         Alias("ATC_STR_ANG_P", "RO_YAW_P", REAL32),
         Alias("ATC_STR_RAT_MAX", "RO_YAW_RATE_LIM", REAL32),
         Alias("ATC_TURN_MAX_G", "HG_RO_LAT_ACC", REAL32, 1.0 / 9.80665),
+        Alias("CIRC_DIR", "HG_RO_CIRC_DIR", INT8),
+        Alias("CIRC_RADIUS", "HG_RO_CIRC_RAD", REAL32),
+        Alias("CIRC_SPEED", "HG_RO_CIRC_SPD", REAL32),
         Alias("CRUISE_SPEED", "RO_SPEED_LIM", REAL32),
+        Alias("DOCK_SPEED", "HG_RO_DOCK_SPD", REAL32),
+        Alias("DOCK_STOP_DIST", "HG_RO_DOCK_STP", REAL32),
         Alias("FS_ACTION", "NAV_RCL_ACT", INT8, numbers=_ACTIONS),
         Alias("FS_CRASH_CHECK", "HG_RO_CRASH_ACT", INT8, numbers=_CRASH_ACTIONS),
         Alias("FS_EKF_ACTION", "COM_EST_FAIL_ACT", INT8, numbers=_ESTIMATOR_ACTIONS),
@@ -36,6 +41,7 @@ APM_ROVER = ArduPilotVehicle(
         Alias("LOIT_RADIUS", "HG_RO_HOLD_RAD", REAL32),
         Alias("MODE_CH", "RC_MAP_FLTMODE", INT8),
         Alias("RTL_SPEED", "RTL_RETURN_SPD", REAL32),
+        Alias("SIMPLE_TYPE", "HG_RO_SIMPLE", INT8),
         *(
             Alias(f"SERVO{i}_FUNCTION", "CA_AIRFRAME", INT16, numbers={_CAR: car, _SIDES: sides})
             for i, car, sides in ((1, _STEERING, _THROTTLE_LEFT), (3, _THROTTLE, _THROTTLE_RIGHT))

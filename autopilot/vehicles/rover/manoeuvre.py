@@ -35,7 +35,8 @@ class PathState:
     start_ned: wp.vec2  # [m] where the line to it begins
     has_place: int
     phase: int  # autopilot.vehicles.rover.path
-    direction: float  # 1 forward, -1 backwards
+    asked_direction: float  # 1 forward, -1 backwards
+    direction: float  # in which it drives now
     is_backing: int  # away from the place, to get it ahead
     attempts: int  # changes of direction
     crab: float  # [rad] from the nose to where the rear axle goes

@@ -35,6 +35,12 @@ _ARC = wp.constant(1.3)  # of the tightest turn: the radius of a turn that begin
 
 
 @wp.func
+def asked_direction(sp: Setpoint) -> float:
+    """-1 where the way is to be driven backwards, else 1."""
+    return wp.where(sp.cruise_speed < 0.0, -1.0, 1.0)
+
+
+@wp.func
 def begin_way(
     params: RoverParams, airframe: RoverControlAirframe, state: PathState, here: Measured, sp: Setpoint
 ) -> PathState:
@@ -43,7 +49,8 @@ def begin_way(
     now.pos_ned = wp.vec2(sp.pos_ned[0], sp.pos_ned[1])
     now.has_place = 1
     now.crab = state.crab
-    now.direction = wp.where(sp.cruise_speed < 0.0, -1.0, 1.0)
+    now.asked_direction = asked_direction(sp)
+    now.direction = now.asked_direction
     now.start_ned = here.axle_ned
     distance = wp.length(now.pos_ned - here.pos_ned)
     if wp.isfinite(sp.path_start_ned[0]) and wp.isfinite(sp.path_start_ned[1]):
@@ -172,7 +179,8 @@ def follow_path(
     """
     now = state
     place = wp.vec2(sp.pos_ned[0], sp.pos_ned[1])
-    if state.has_place == 0 or wp.length(place - state.pos_ned) > _SAME_M:
+    is_same_way = state.has_place == 1 and state.asked_direction == asked_direction(sp)
+    if not is_same_way or wp.length(place - state.pos_ned) > _SAME_M:
         now = begin_way(params, airframe, state, here, sp)
     now.crab = crab_step(now, here, dt_s)
     way_m = way_left(now, here)

@@ -9,6 +9,7 @@ from autopilot.interface.vehicle_state import Mode, VehicleState
 from autopilot.vehicles.rover.ardupilot import APM_ROVER
 from autopilot.vehicles.rover.defaults import rover_defaults
 from autopilot.vehicles.rover.law import ROVER_LAW
+from autopilot.vehicles.rover.modes.params import MODE_PARAMETERS
 from autopilot.vehicles.rover.modes.table import ROVER_MODES
 from autopilot.vehicles.rover.params import ROVER_PARAMETERS
 from autopilot.vehicles.rover.stuck_watch import STUCK_PARAMETERS, StuckWatch
@@ -61,7 +62,7 @@ def _can_drive(_: VehicleState, params: ParameterTable) -> str:
 ROVER = VehicleClass(
     name="rover",
     law=ROVER_LAW,
-    parameters=(*ROVER_PARAMETERS, *WHEEL_PARAMETERS, *STUCK_PARAMETERS),
+    parameters=(*ROVER_PARAMETERS, *WHEEL_PARAMETERS, *STUCK_PARAMETERS, *MODE_PARAMETERS),
     defaults=rover_defaults,
     modes=ROVER_MODES,
     last_resort=Mode.HOLD,

@@ -9,10 +9,23 @@ import numpy as np
 import pytest
 
 from autopilot.ports import POSITION_VALID
-from tests.system.published.published_rules import CMD_ARM, Station
+from common.geodesy import geodetic_from_ned
+from mission.script import ScriptError
+from tests.system.published.published_rules import CMD_ARM, E7, Station
 
-MANUAL, HOLD, LOITER, RTL, SMART_RTL, GUIDED = 0, 4, 5, 11, 12, 15  # ROVER_MODE
-CHANGE_SPEED = 178
+MANUAL, HOLD, LOITER, FOLLOW, SIMPLE, DOCK, CIRCLE, RTL, SMART_RTL, GUIDED = (
+    0,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+    11,
+    12,
+    15,
+)  # ROVER_MODE
+CHANGE_SPEED, SET_REVERSE, SET_YAW_SPEED = 178, 194, 213
 FREE = dict.fromkeys(("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"), 0.0)
 POSITION, VELOCITY, VELOCITY_YAW_RATE, YAW, YAW_RATE = 3580, 3559, 1511, 2559, 1535  # type masks
 ATTITUDE, TURN = 0b111, 0b1000_0011  # of SET_ATTITUDE_TARGET: by attitude, by yaw rate
@@ -196,5 +209,127 @@ def test_manual_control_steers_by_y_and_drives_by_z():
             await rover.mode(mode)
             await client.sleep(5.0)
             assert abs(rover.speed) < 0.1
+
+    rover.run(script)
+
+
+def test_a_way_is_driven_backwards_and_forwards_again():
+    """ArduPilot: "DO_SET_REVERSE: heading 0 and 180 while driving to the north"."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        await rover.target(POSITION, x=300.0, y=0.0)
+        for is_reversed, yaw in ((0.0, 0.0), (1.0, np.pi), (0.0, 0.0)):
+            await client.command(SET_REVERSE, is_reversed, name="reverse")
+            await client.until(lambda yaw=yaw: abs(rover.turned_deg(yaw)) < 5.0, 20.0, "turned")
+            await client.sleep(5.0)
+            assert abs(rover.turned_deg(yaw)) < 5.0
+            assert rover.flown.vel[0] > 2.0
+
+    rover.run(script)
+
+
+def test_a_heading_with_a_speed():
+    """ArduPilot: "NAV_SET_YAW_SPEED: +-0.5 m/s, +-0.5 deg"."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        for heading_deg, fraction, is_relative in ((0.0, 0.4, 0.0), (90.0, 0.4, 0.0), (0.0, -0.3, 1.0)):
+            yaw = rover.flown.state.yaw_rad if is_relative else np.radians(heading_deg)
+            for _ in range(16):
+                await client.command(SET_YAW_SPEED, heading_deg, fraction, is_relative, name="yaw and speed")
+                await client.sleep(0.5)
+            assert rover.speed == pytest.approx(fraction * 5.0, abs=0.2)
+            if not is_relative:
+                assert abs(rover.turned_deg(yaw)) < 2.0
+
+    rover.run(script)
+
+
+@pytest.mark.parametrize("direction", [0, 1])
+def test_a_circle_ahead_is_driven_with_its_radius_and_speed(direction):
+    """ArduPilot publishes no test of it; ours: the radius within 0.5 m, the speed within 0.2 m/s."""
+    rover = Rover(HG_RO_CIRC_RAD=8.0, HG_RO_CIRC_SPD=2.0, HG_RO_CIRC_DIR=direction)
+
+    async def script(client):
+        await rover.armed()
+        centre = (8.0, 0.0)
+        await rover.mode(CIRCLE)
+        await client.sleep(15.0)
+        begin_s = rover.flown.now_s
+        await client.sleep(30.0)
+        rows = rover.flown.since(begin_s)
+        arm, vel = rows[:, 1:3] - centre, rows[:, 4:6]
+        assert abs(np.hypot(*arm.T) - 8.0).max() < 0.5
+        assert abs(np.hypot(*vel.T) - 2.0).max() < 0.2
+        turning = arm[:, 0] * vel[:, 1] - arm[:, 1] * vel[:, 0]
+        assert (turning > 0.0).all() if direction == 0 else (turning < 0.0).all()
+
+    rover.run(script)
+
+
+def test_dock_stops_before_its_target():
+    """ArduPilot: "AutoDock: stops 0.5 m off target"; and without a target the mode is refused."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        with pytest.raises(ScriptError, match="no docking target in sight"):
+            await rover.mode(DOCK)
+        client.start(sight(client))
+        await client.sleep(1.0)
+        await rover.mode(DOCK)
+        await client.until(lambda: rover.said("Docked"), 40.0, "docked")
+        await client.sleep(3.0)
+        assert 0.2 < rover.away(6.0, 4.0) < 0.5
+        assert abs(rover.speed) < 0.05
+
+    async def sight(client):
+        while True:
+            client.send("LANDING_TARGET", time_usec=0, target_num=0, frame=1, angle_x=0.0, angle_y=0.0, distance=0.0,
+                        size_x=0.0, size_y=0.0, x=6.0, y=4.0, z=0.0, q=[1.0, 0.0, 0.0, 0.0], type=0,
+                        position_valid=1)  # fmt: skip
+            await client.sleep(0.1)
+
+    rover.run(script)
+
+
+def test_simple_drives_where_the_sticks_point():
+    """ArduPilot publishes no test of it: the stick's direction counts from the heading at which the mode was chosen."""
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed(SIMPLE)
+        for y, z, heading_deg in ((0, 400, 0.0), (400, 0, 90.0), (0, -400, 180.0)):
+            for _ in range(80):
+                client.send("MANUAL_CONTROL", target=1, x=0, y=y, z=z, r=0, buttons=0)
+                await client.sleep(0.1)
+            assert abs(rover.turned_deg(np.radians(heading_deg))) < 5.0
+            assert rover.speed == pytest.approx(2.0, abs=0.4)
+
+    rover.run(script)
+
+
+@pytest.mark.parametrize("velocity", [(1.5, 0.0), (0.0, 0.0)])
+def test_it_follows_another_vehicle_at_a_distance(velocity):
+    """ArduPilot publishes no test of it: it keeps FLW_TGT_DST behind, and stands where the target stands."""
+    rover = Rover(FLW_TGT_DST=5.0)
+
+    async def script(client):
+        await rover.armed()
+        place = np.array((12.0, 3.0))
+        await rover.mode(FOLLOW)
+        for _ in range(300):
+            place += 0.1 * np.array(velocity)
+            lat_deg, lon_deg, alt_m = geodetic_from_ned(*place, 0.0, rover.flown.state.origin)
+            where = {"lat": round(lat_deg * E7), "lon": round(lon_deg * E7), "alt": alt_m, "vel": [*velocity, 0.0]}
+            none = dict.fromkeys(("acc", "rates", "position_cov"), [0.0] * 3)
+            client.send("FOLLOW_TARGET", timestamp=0, est_capabilities=3, attitude_q=[1.0, 0.0, 0.0, 0.0], custom_state=0,
+                        **where, **none)  # fmt: skip
+            await client.sleep(0.1)
+        assert hypot(*(rover.flown.pos[:2] - place)) == pytest.approx(5.0, abs=1.0)
+        assert rover.speed == pytest.approx(hypot(*velocity), abs=0.25)
 
     rover.run(script)

@@ -1,10 +1,10 @@
-"""The modes in which a pilot drives by sticks: Manual, Acro, Stabilized, Position.
+"""The modes in which a pilot drives by sticks: Manual, Acro, Stabilized, Position, and ArduPilot's Simple.
 
 In: `state.sticks`, each frame: the roll stick steers, the throttle stick drives, its middle stands (PX4's rovers). Out:
 steering or a yaw rate, and a throttle or a speed. Nothing is remembered but the heading that is held.
 """
 
-from math import copysign, nan, radians
+from math import atan2, copysign, hypot, nan, radians
 
 from autopilot.inputs.sticks import without_centre
 from autopilot.interface.mode_spec import FlightMode
@@ -99,3 +99,27 @@ class Position(StickMode):
             context.setpoint.drive(speed=speed, yaw=yaw)
         else:
             context.setpoint.drive(speed=speed, yaw_rate=self._yaw_rate(speed))
+
+
+class Simple(StickMode):
+    """Mode Simple: the sticks point where to drive, by the heading at which the mode was chosen, or by north."""
+
+    __slots__ = ("_ahead",)
+
+    def __init__(self, context: NavContext) -> None:
+        super().__init__(context)
+        self._ahead = 0.0  # [rad] of the throttle stick pushed forward
+
+    def start(self) -> None:
+        super().start()
+        self._ahead = 0.0 if self._context.number("HG_RO_SIMPLE") else self._context.state.yaw_rad
+
+    def frame(self) -> None:
+        context = self._context
+        forward, right = self._throttle, self._steering
+        size = min(hypot(forward, right), 1.0)
+        if size < _STILL:
+            context.setpoint.drive(speed=0.0, yaw_rate=0.0)
+        else:
+            speed = size * max(context.number("RO_SPEED_LIM"), 0.0)
+            context.setpoint.drive(speed=speed, yaw=self._ahead + atan2(right, forward))
