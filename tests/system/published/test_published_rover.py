@@ -326,8 +326,8 @@ def test_it_follows_another_vehicle_at_a_distance(velocity):
             lat_deg, lon_deg, alt_m = geodetic_from_ned(*place, 0.0, rover.flown.state.origin)
             where = {"lat": round(lat_deg * E7), "lon": round(lon_deg * E7), "alt": alt_m, "vel": [*velocity, 0.0]}
             none = dict.fromkeys(("acc", "rates", "position_cov"), [0.0] * 3)
-            client.send("FOLLOW_TARGET", timestamp=0, est_capabilities=3, attitude_q=[1.0, 0.0, 0.0, 0.0], custom_state=0,
-                        **where, **none)  # fmt: skip
+            rest = {"timestamp": 0, "est_capabilities": 3, "attitude_q": [1.0, 0.0, 0.0, 0.0], "custom_state": 0}
+            client.send("FOLLOW_TARGET", **where, **none, **rest)
             await client.sleep(0.1)
         assert hypot(*(rover.flown.pos[:2] - place)) == pytest.approx(5.0, abs=1.0)
         assert rover.speed == pytest.approx(hypot(*velocity), abs=0.25)
