@@ -128,7 +128,7 @@ def _sticks_lost(params: ParameterTable, flown: ModeSpec) -> Action:
 RULES: tuple[Rule, ...] = (
     Rule(ATTITUDE_LOST, _control_lost, Severity.EMERGENCY, "Attitude lost"),
     Rule(CRASHED, _control_lost, Severity.EMERGENCY, "Crash detected"),
-    Rule(STUCK, by("HG_RO_CRASH_ACT", LINK_ACTIONS), Severity.EMERGENCY, "Crash detected, not moving"),
+    Rule(STUCK, by("HG_RO_CRASH_ACT", LINK_ACTIONS), Severity.EMERGENCY, "Stuck, it does not move"),
     Rule(MOTOR_FAILED, by("COM_ACT_FAIL_ACT", MOTOR_ACTIONS), Severity.EMERGENCY, "Motor failure"),
     Rule(POSITION_LOST, _position_lost, Severity.CRITICAL, "Position lost", "Position is valid again"),
     Rule(HEIGHT_LOST, always(Action.LAND), Severity.CRITICAL, "Height lost", "Height is valid again"),

@@ -11,7 +11,7 @@ WALLED = WorldConfig(
     trees_per_ha=0.0, size_m=50.0, has_walls=True, wall_height_m=2.0, clearing_radius_m=5.0, clearing_blend_m=10.0
 )
 BEHIND_THE_WALL = (60.0, 0.0, 0.0)
-SAID = "Crash detected, not moving"
+SAID = "Stuck, it does not move"
 
 
 def driven_at_a_wall(airframe="rover", action=1):
