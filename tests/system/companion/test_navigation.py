@@ -16,14 +16,15 @@ from tests.unit.mission.follow.forest_flight import AUTOPILOT, config, miss_m, p
 
 
 class Scene:
-    """A flight through forest in this process, in real time, and a companion in another."""
+    """A flight in this process, in real time, and a companion with a policy in another."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, config, *policy):
         port = free_ports()[1]
         links = [UdpPort(NOBODY_PORT, LinkRole.ONBOARD, local_port=port)]
-        self.flight = Flight(config(wind_m_s=3.0), links=links)
+        self.flight = Flight(config, links=links)
         self._output = (folder / "companion.txt").open("w+")
-        command = [HONEYGUIDE, "companion", "--policy", "navigate", "--engage", "--link", f"udpout://127.0.0.1:{port}"]
+        link = f"udpout://127.0.0.1:{port}"
+        command = [HONEYGUIDE, "companion", "--policy", *policy, "--engage", "--link", link]
         self.companion = subprocess.Popen(command, stdout=self._output, stderr=subprocess.STDOUT, cwd=ROOT)
 
     def wait_for(self, is_enough, seconds):
@@ -32,6 +33,13 @@ class Scene:
         self.flight.run(lambda f: is_enough() or f.time_us >= end_us, speed=1.0)
         self._output.seek(0)
         assert is_enough(), (self.flight.controller.state.mode, self.flight.drone.texts, self._output.read())
+
+    def wait_for_companion(self):
+        """Until what it has asked for has begun to come in."""
+        heard = self.flight.server._endpoint
+        self.wait_for(lambda: any(channel.heard.has(1, COMPONENT) for channel in heard.channels), STARTED_S)
+        hearing_us = self.flight.time_us + 1_500_000
+        self.wait_for(lambda: self.flight.time_us >= hearing_us, 2.0)
 
     def has_said(self, text):
         return any(text in said for said in self.flight.drone.texts)
@@ -46,7 +54,7 @@ class Scene:
 
 @pytest.fixture
 def scene(tmp_path):
-    scene = Scene(tmp_path)
+    scene = Scene(tmp_path, config(wind_m_s=3.0), "navigate")
     yield scene
     scene.close()
 
@@ -56,10 +64,7 @@ def test_a_goto_is_flown_through_the_forest_over_udp(scene):
     heard = flight.controller.state
     running = flight.drone.start(take_off(flight.drone))
     scene.wait_for(lambda: running.is_done and heard.mode is Mode.HOLD, STARTED_S)
-    channels = flight.server._endpoint.channels
-    scene.wait_for(lambda: any(channel.heard.has(1, COMPONENT) for channel in channels), STARTED_S)
-    hearing_us = flight.time_us + 1_500_000  # what it has asked for has begun to come in
-    scene.wait_for(lambda: flight.time_us >= hearing_us, 2.0)
+    scene.wait_for_companion()
     goal_ned = place(flight, 30.0, 10.0)
     flight.rig.forget_impacts()
     send_goto(flight, goal_ned, AUTOPILOT)

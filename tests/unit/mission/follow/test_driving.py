@@ -12,7 +12,10 @@ from autopilot.mavlink.client_end import ClientEnd
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.ports import Estimate
 from common.geodesy import geodetic_from_ned
+from mission.flight import FlightConfig
+from mission.follow.lockstep import flight_with_driver
 from mission.plan.plan_lists import FENCE_LIST
+from policies.companion.companion import MISFIT
 from policies.companion.engagement import Phase
 from policies.tasks.drive.observe import FRAME, OWN_SIZE, observe_rows
 from sim.world.world import WorldConfig
@@ -163,3 +166,10 @@ def test_by_sticks_it_drives_backwards_too_as_a_stock_px4_needs_it():
         assert (distance_m < 0.3, turn_deg < 10.0) == (True, True), (distance_m, turn_deg)
     advance(flight, 5.0)
     assert flight.controller.state.mode is Mode.HOLD  # sticks that fell silent would be a failsafe
+
+
+def test_a_drone_is_not_driven():
+    flight, companion = flight_with_driver(FlightConfig(has_lidar=True, world=PLAIN), shipped_pilot())
+    advance(flight, 3.0)
+    assert companion.trouble == MISFIT
+    assert companion.decision_count == 0
