@@ -44,7 +44,6 @@ reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow
 
 reproduce-drive: $(STAMP) ## Train and judge the policies of docs/results/drive.md (half an hour); only judge: ARGS="judge"
 	@$(BIN)/python -m bench.drive $(ARGS)
-	@$(BIN)/python -m bench.drive_mavlink
 
 # loadfile keeps a test file's kernels in one process, so that each is compiled once. Bytecode is kept, also where the
 # environment says otherwise: tests start the command a hundred times, and their own files take longest to prepare.

@@ -1,8 +1,8 @@
-"""`python -m bench.drive [judge]`: trains Drive's policies from nothing, and judges them. Writes docs/results/drive.md.
+"""`python -m bench.drive [judge] [batch]`: trains Drive's policies, and judges them. Writes docs/results/drive.md.
 
 In: the recipes `drive-park` and `drive-reach`; with `judge` the policies that ship. Held-out worlds with estimator,
 wind, noise and varied vehicles, as many episodes each. Out: the policies in `results/drive/`, and a table with 95 %
-intervals.
+intervals; then, unless `batch` is asked for alone, the same over MAVLink (`drive_mavlink.py`).
 """
 
 import sys
@@ -116,7 +116,7 @@ def row(preset: str, drives: Drives, took_s: float | None) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    lines = []
+    lines, policies = [], {}
     for preset in AIMS:
         try:
             path, took_s = (find_policy(f"drive-{preset}"), None) if "judge" in arguments else trained(preset)
@@ -124,11 +124,16 @@ def main(arguments: list[str]) -> int:
             print(error)
             continue
         policy, _ = load_policy(path)
+        policies[preset] = path
         lines.append(row(preset, judged(policy, preset), took_s))
         print(lines[-1], flush=True)
     if lines:
         page = PAGE.format(episodes=EPISODES, rows="\n".join(lines), machine=machine())
         write_whole(PAGE_FILE, page.encode())
+    if lines and "batch" not in arguments:
+        from bench.drive_mavlink import SCENES, write_section  # which judges by this module
+
+        write_section(policies, SCENES)
     return 0
 
 

@@ -10,6 +10,7 @@ import sys
 from collections import Counter
 from dataclasses import dataclass
 from math import nan
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -147,20 +148,28 @@ def measured(preset: str, policy: Policy, source: str, count: int) -> str:
     return row(preset, arrivals, drives)
 
 
+def write_section(policies: dict[str, Path], scenes: int) -> None:
+    """Measures the policies, by preset, and writes that into the page."""
+    lines = []
+    for preset, path in policies.items():
+        lines.append(measured(preset, load_policy(path)[0], str(path), scenes))
+        print(lines[-1], flush=True)
+    page = PAGE_FILE.read_text()
+    section = SECTION.format(scenes=scenes, rows="\n".join(lines), machine=machine())
+    before = page[: page.find(HEADING)] if HEADING in page else f"{page}\n"
+    write_whole(PAGE_FILE, f"{before}{section}".encode())
+
+
 def main(arguments: list[str]) -> int:
     count = next((int(text) for text in arguments if text.isdigit()), SCENES)
     presets = [preset for preset in AIMS if preset in arguments] or list(AIMS)
     named = [text for text in arguments if not text.isdigit() and text not in AIMS]
-    lines = []
+    if not named and len(presets) == len(AIMS) and PAGE_FILE.is_file():
+        write_section({preset: find_policy(f"drive-{preset}") for preset in presets}, count)
+        return 0
     for preset in presets:
         path = find_policy(named[0] if named else f"drive-{preset}")
-        lines.append(measured(preset, load_policy(path)[0], str(path), count))
-        print(lines[-1], flush=True)
-    if not named and len(lines) == len(AIMS) and PAGE_FILE.is_file():
-        page = PAGE_FILE.read_text()
-        section = SECTION.format(scenes=count, rows="\n".join(lines), machine=machine())
-        before = page[: page.find(HEADING)] if HEADING in page else f"{page}\n"
-        write_whole(PAGE_FILE, f"{before}{section}".encode())
+        print(measured(preset, load_policy(path)[0], str(path), count), flush=True)
     return 0
 
 

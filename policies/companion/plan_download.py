@@ -83,7 +83,9 @@ class PlanDownload:
     def _finish(self) -> None:
         items, self._coming, self._awaited = tuple(self._coming), [], 0
         if self._list == _MISSION:
-            self.items, self._is_next_due = items, True
+            self._is_next_due = True
+            if repr(items) != repr(self.items):  # NaN, which is not itself, is the same again
+                self.items = items
         else:
             self.fence = items
         self._vehicle.ask("MISSION_ACK", type=0, mission_type=self._list)

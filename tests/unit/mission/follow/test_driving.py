@@ -173,3 +173,20 @@ def test_a_drone_is_not_driven():
     advance(flight, 3.0)
     assert companion.trouble == MISFIT
     assert companion.decision_count == 0
+
+
+def test_waypoints_of_the_plan_are_driven_one_after_the_other_to_the_last():
+    flight, companion = standing(pilot=shipped_pilot("drive-reach"), world=PLAIN, is_reported=False)
+    places = [(8.0, 0.0), (8.0, 8.0), (0.0, 8.0)]
+    corners = [geodetic_from_ned(*place, 0.0, flight.config.home) for place in places]
+    items = [MissionItem(k, 0, 16, (0.0, 0.0, 0.0, nan), *corner) for k, corner in enumerate(corners)]
+    flight.fly(lambda drone: drone.upload(items), seconds=5.0)
+    advance(flight, 7.0)
+    assert [goal.pos_ned[:2] for goal in companion.skill.goals._waypoints] == [
+        pytest.approx(p, abs=0.02) for p in places
+    ]
+    companion.engagement.engage()
+    advance(flight, 120.0, lambda: companion.phase is Phase.RELEASED)
+    assert flight.drone.texts.count("Companion: waypoint 1 of 3 reached") == 1
+    assert "Companion: hold: waypoint 3 of 3 reached" in flight.drone.texts
+    assert miss(flight, (*places[-1], nan))[0] < 0.3
