@@ -50,14 +50,15 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     """
     try:
         skill = load_skill(options.policy, options.camera, is_ordered_by_goto=options.is_reported)
+        if options.is_by_sticks and not skill.drives:
+            raise CompanionError(f"--by-sticks: {options.policy} flies, and only what drives is driven by sticks")
         link = open_client_link(options.link)
     except (PilotError, CameraUrlError, LinkError) as error:
         raise CompanionError(str(error)) from error
-    if options.is_by_sticks and not skill.drives:
-        raise CompanionError(f"--by-sticks: {options.policy} flies, and only what drives is driven by sticks")
     by_sticks = options.is_by_sticks
     companion = Companion(link, skill, is_reported=options.is_reported, is_by_sticks=by_sticks, wall_s=wall_time_s)
-    _shower(console)(f"{options.policy} flies; vehicle: {options.link}, pictures: {options.camera}; Ctrl-C ends it")
+    does, pictures = ("drives", "") if skill.drives else ("flies", f", pictures: {options.camera}")
+    _shower(console)(f"{options.policy} {does}; vehicle: {options.link}{pictures}; Ctrl-C ends it")
     try:
         _loop(companion, options, console)
     except KeyboardInterrupt:

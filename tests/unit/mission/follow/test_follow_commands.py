@@ -79,3 +79,8 @@ def test_a_camera_that_is_not_there_is_named():
         companion.frame(time_us)
     assert trouble_text(companion) == "no new pictures: nobody there"
     companion.close()
+
+
+def test_what_flies_is_not_driven_by_sticks():
+    result = refused("--policy", "navigate", "--by-sticks")
+    assert "--by-sticks: navigate flies, and only what drives is driven by sticks" in result
