@@ -57,8 +57,8 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         raise CompanionError(str(error)) from error
     by_sticks = options.is_by_sticks
     companion = Companion(link, skill, is_reported=options.is_reported, is_by_sticks=by_sticks, wall_s=wall_time_s)
-    does, pictures = ("drives", "") if skill.drives else ("flies", f", pictures: {options.camera}")
-    _shower(console)(f"{options.policy} {does}; vehicle: {options.link}{pictures}; Ctrl-C ends it")
+    does, images = ("drives", "") if skill.drives else ("flies", f", pictures: {options.camera}")
+    _shower(console)(f"{options.policy} {does}; vehicle: {options.link}{images}; Ctrl-C ends it")
     try:
         _loop(companion, options, console)
     except KeyboardInterrupt:
