@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.airframe import load_airframe
+from mission.view.box_painter import BoxPainter
 from mission.view.chase_camera import STRIDE, Floats, camera_path, looking
 from mission.view.flight_snapshot import Moment
 from mission.view.replay_file import Recording
@@ -67,6 +68,7 @@ class Studio:
     def __init__(self, recording: Recording, world: WorldMap) -> None:
         self._chase = Eye(world, WIDTH, HEIGHT, HFOV_DEG, range_m=RANGE_M)
         self._onboard = onboard_eye(world)
+        self._boxes = BoxPainter(world)
         self._model = VehicleModel(load_airframe(recording.config.airframe))
 
     def image(self, moment: Moment, place: Floats, target: Floats, turned: Floats) -> Image:
@@ -75,9 +77,12 @@ class Studio:
         q_ned_from_rdf = looking(place, target)
         self._chase.look(place, q_ned_from_rdf, row["owner"])
         image: Image = self._chase.rgb.copy()
+        self._boxes.draw(image, self._chase, moment.tick, place, q_ned_from_rdf)
         self._model.draw(image, self._chase, row, place, q_ned_from_rdf, turned)
-        self._onboard.look_from(row)
-        inset = cv2.resize(self._onboard.rgb, (INSET, INSET), interpolation=cv2.INTER_NEAREST)
+        place_on_board, q_on_board = self._onboard.look_from(row)
+        seen: Image = self._onboard.rgb.copy()
+        self._boxes.draw(seen, self._onboard, moment.tick, place_on_board, q_on_board)
+        inset = cv2.resize(seen, (INSET, INSET), interpolation=cv2.INTER_NEAREST)
         image[MARGIN : MARGIN + INSET, -MARGIN - INSET : -MARGIN] = inset
         corner = (WIDTH - MARGIN - INSET - 1, MARGIN - 1)
         cv2.rectangle(image, corner, (WIDTH - MARGIN, MARGIN + INSET), (255, 255, 255), 1)

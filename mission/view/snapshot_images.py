@@ -48,11 +48,13 @@ class Eye:
         self._person[0] = owner
         self.camera.render()
 
-    def look_from(self, row: Any) -> None:
-        """Takes the image that the vehicle's onboard camera takes at a recorded moment."""
+    def look_from(self, row: Any) -> tuple[Any, Quat]:
+        """Takes the image that the onboard camera takes at a recorded moment; from where, and how it looks."""
         x, y, z, w = (float(value) for value in row["q_ned_from_frd"])
         q = (x, y, z, w)
-        self.look(row["pos_ned"] + np.array(rotated(q, MOUNT_FRD)), product(q, camera_mount()), row["owner"])
+        place, q_ned_from_rdf = row["pos_ned"] + np.array(rotated(q, MOUNT_FRD)), product(q, camera_mount())
+        self.look(place, q_ned_from_rdf, row["owner"])
+        return place, q_ned_from_rdf
 
 
 def onboard_eye(world: WorldMap, size: int = IMAGE_SIZE) -> Eye:
