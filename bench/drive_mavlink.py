@@ -1,9 +1,9 @@
-"""`python -m bench.drive_mavlink [SCENES] [park|reach] [POLICY]`: how well are Drive's policies driven over MAVLink?
+"""`python -m bench.drive_mavlink [SCENES] [park|reach] [sticks] [POLICY]`: Drive's policies over MAVLink.
 
 One rover at a time, in lockstep: the whole flight controller, the messages of its ring of range finders, a companion
 computer with the policy, a goto sent to it. The scenes are those of the batch: held-out worlds, goals, headings at the
-start, wind, noise, masses, motors and tyres are drawn by the task, which then plays the same scenes itself. Out: both
-rates side by side, in the table of drives over MAVLink of docs/results/drive.md.
+start, wind, noise, masses, motors and tyres are drawn by the task, which then plays the same scenes itself. In: how
+many scenes, of what, by sticks or setpoints, which policy. Out: both rates side by side, in the table of drives over MAVLink of docs/results/drive.md.
 """
 
 import sys
@@ -86,7 +86,7 @@ def scenes_of(preset: str, count: int) -> list[Scene]:
     ]
 
 
-def driven(scene: Scene, pilot: DrivingPilot) -> Arrival:
+def driven(scene: Scene, pilot: DrivingPilot, *, is_by_sticks: bool = False) -> Arrival:
     """One drive over MAVLink."""
     config = FlightConfig(
         airframe="rover",
@@ -97,7 +97,7 @@ def driven(scene: Scene, pilot: DrivingPilot) -> Arrival:
         noise=scene.noise,
         parameters=REVERSES,
     )
-    flight, companion = flight_with_driver(config, pilot, world=scene.world)
+    flight, companion = flight_with_driver(config, pilot, is_by_sticks=is_by_sticks, world=scene.world)
     try:
         for name in ("model", "body", "truth"):  # as the episode's vehicle stands there
             flight.rig.rows[name][0] = scene.rows[name]
@@ -132,13 +132,13 @@ def row(preset: str, arrivals: list[Arrival], drives: Drives) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def measured(preset: str, policy: Policy, source: str, count: int) -> str:
+def measured(preset: str, policy: Policy, source: str, count: int, *, is_by_sticks: bool = False) -> str:
     """A line of the table, with what went wrong printed."""
     drives = judged(policy, preset, count)
     pilot = DrivingPilot(policy, source)
     arrivals = []
     for i, scene in enumerate(scenes_of(preset, count)):
-        arrivals.append(driven(scene, pilot))
+        arrivals.append(driven(scene, pilot, is_by_sticks=is_by_sticks))
         if not arrivals[-1].is_there:
             print(i, arrivals[-1], Outcome(int(drives.outcomes[i])).name, flush=True)
     batch = drives.outcomes == Outcome.SUCCESS
@@ -163,13 +163,14 @@ def write_section(policies: dict[str, Path], scenes: int) -> None:
 def main(arguments: list[str]) -> int:
     count = next((int(text) for text in arguments if text.isdigit()), SCENES)
     presets = [preset for preset in AIMS if preset in arguments] or list(AIMS)
-    named = [text for text in arguments if not text.isdigit() and text not in AIMS]
-    if not named and len(presets) == len(AIMS) and PAGE_FILE.is_file():
+    named = [text for text in arguments if not text.isdigit() and text not in (*AIMS, "sticks")]
+    is_by_sticks = "sticks" in arguments
+    if not is_by_sticks and not named and len(presets) == len(AIMS) and PAGE_FILE.is_file():
         write_section({preset: find_policy(f"drive-{preset}") for preset in presets}, count)
         return 0
     for preset in presets:
         path = find_policy(named[0] if named else f"drive-{preset}")
-        print(measured(preset, load_policy(path)[0], str(path), count), flush=True)
+        print(measured(preset, load_policy(path)[0], str(path), count, is_by_sticks=is_by_sticks), flush=True)
     return 0
 
 
