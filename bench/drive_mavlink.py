@@ -3,7 +3,8 @@
 One rover at a time, in lockstep: the whole flight controller, the messages of its ring of range finders, a companion
 computer with the policy, a goto sent to it. The scenes are those of the batch: held-out worlds, goals, headings at the
 start, wind, noise, masses, motors and tyres are drawn by the task, which then plays the same scenes itself. In: how
-many scenes, of what, by sticks or setpoints, which policy. Out: both rates side by side, in the table of drives over MAVLink of docs/results/drive.md.
+many scenes, of what, by sticks or setpoints, which policy. Out: both rates side by side; of the policies that ship, in
+docs/results/drive.md.
 """
 
 import sys
