@@ -16,6 +16,7 @@ from autopilot.commander.commander import Commander
 from autopilot.commander.sensor_calibration import Calibrator, Turntable
 from autopilot.commander.stick_commands import Pilot
 from autopilot.inputs.external_position import ExternalPositions
+from autopilot.inputs.obstacle_stop import ObstacleStop
 from autopilot.inputs.obstacles import Obstacles
 from autopilot.inputs.sticks import Sticks
 from autopilot.inputs.traffic import Traffic
@@ -174,6 +175,7 @@ class FlightController:
         self.commander.connect(self.navigator)
         self.fence, self.rally = self.navigator.fence, self.navigator.rally
         self.lists = self._item_lists()
+        self._obstacle_stop = self._make_obstacle_stop(vehicle, airframe)
         self.guidance = Guidance(self.commander, self.navigator, self.payload)
         self.motor_test = MotorTest(state, self._setpoint, self._relay, vehicle.motors(airframe))
         self.calibration = Calibrator(state, params, self._relay, turntable)
@@ -194,6 +196,11 @@ class FlightController:
             vehicle.last_resort,
             vehicle.arming_checks,
         )
+
+    def _make_obstacle_stop(self, vehicle: VehicleClass, airframe: Airframe) -> ObstacleStop | None:
+        if vehicle.lane is None:
+            return None
+        return ObstacleStop(self.state, self.obstacles, self._setpoint, self._relay, vehicle.lane(airframe))
 
     def _make_navigator(self, vehicle: VehicleClass, airframe: Airframe) -> Navigator:
         context = NavContext(self.state, self.params, self._relay, self._setpoint, vehicle.craft(airframe))
@@ -243,6 +250,8 @@ class FlightController:
         wish = self.navigator.frame()
         if wish is not None:
             self._follow_wish(wish)
+        if self._obstacle_stop is not None:
+            self._obstacle_stop.frame()
         self._setpoint.write()
         if self.camera is not None and time_us >= self.camera.due_us:
             self.camera.frame()

@@ -160,6 +160,8 @@ class Setpoint:
     thrust: float  # [0..1] fraction of the maximum thrust; SETPOINT_DRIVE: throttle [-1..1] where `speed` is NaN
     speed: float  # [m/s] SETPOINT_DRIVE: along the nose, negative backwards
     steering: float  # [-1..1] SETPOINT_DRIVE: to the right, where `yaw` and `yaw_rate` are NaN
+    ahead_max: float  # [m/s] speed along the nose that leaves room to stop, for what drives; 0: any, negative: none
+    back_max: float  # [m/s] and backwards
     motor_test: vec8  # [0..1] commands of the motors while the vehicle is disarmed, not otherwise
 
 

@@ -1,8 +1,8 @@
 """What is round the vehicle, by a ring of range finders, and how fast it may go towards it (collision prevention).
 
 In: distances by bearing, from a sensor on board or from a client (OBSTACLE_DISTANCE). Out: a pilot's velocity, limited
-in mode Position so that the vehicle can stop before CP_DIST. PX4's collision prevention, without its guidance of the
-direction.
+in mode Position so that the vehicle can stop before CP_DIST; for a rover the speed in its lane, in all modes. PX4's
+collision prevention, without its guidance of the direction.
 """
 
 from collections.abc import Sequence
@@ -13,10 +13,13 @@ from common.params import Parameter, ParameterTable
 BINS = 72
 FRESH_US = 500_000  # older distances say nothing (PX4: RANGE_STREAM_TIMEOUT)
 _BIN_RAD = 2.0 * pi / BINS
+_BESIDE_M = 0.1  # room beside a hull; guess
+_AHEAD = cos(_BIN_RAD)
 _PX4 = "PX4 1.15 default"
 
 OBSTACLE_PARAMETERS: list[Parameter] = [
-    Parameter("CP_DIST", -1.0, -1.0, 15.0, "m", "distance kept to obstacles in mode Position, negative: no limit",
+    Parameter("CP_DIST", -1.0, -1.0, 15.0, "m",
+              "distance kept to obstacles in mode Position, by a rover in all that hold a speed, negative: no limit",
               _PX4),
     Parameter("CP_DELAY", 0.4, 0.0, 1.0, "s", "delay of sensor and vehicle that the limit allows for", _PX4),
     Parameter("CP_GO_NO_DATA", 0, 0, 1, "", "move where no distance is known: 0 no, 1 yes", _PX4),
@@ -95,6 +98,31 @@ class Obstacles:
                 north -= excess * unit_north
                 east -= excess * unit_east
         return north, east
+
+    def room_along(self, heading_rad: float, end_m: float, half_width_m: float, now_us: int) -> float:
+        """Speed [m/s] from which it stops `keep_m` before what is in its lane along a heading; -1: none, inf: any.
+
+        Args:
+            heading_rad: of the lane, clockwise from north.
+            end_m: from where the distances are measured to the end of the vehicle.
+            half_width_m: of the vehicle.
+            now_us: now.
+        """
+        way_m, is_known = inf, False
+        for i in range(BINS):
+            if now_us - self._seen_us[i] > FRESH_US:
+                continue
+            angle = i * _BIN_RAD - heading_rad
+            along = cos(angle)
+            if along <= 0.0:
+                continue
+            is_known = is_known or along > _AHEAD
+            distance_m = self._distance_m[i]
+            if isfinite(distance_m) and abs(distance_m * sin(angle)) < half_width_m + _BESIDE_M:
+                way_m = min(way_m, distance_m * along)
+        if not is_known and not self._params["CP_GO_NO_DATA"]:
+            return -1.0
+        return (self._speed_towards(way_m - end_m) or -1.0) if isfinite(way_m) else inf
 
     def _knows_ahead(self, north: float, east: float, speed: float, now_us: int) -> bool:
         index = max(range(BINS), key=lambda i: (north * cos(i * _BIN_RAD) + east * sin(i * _BIN_RAD)) / speed)

@@ -27,11 +27,11 @@ FREE: Vector = (nan, nan, nan)
 _NOT_HOLDING_M_S = 0.01
 _LARGEST = 1.0e9  # its square is within single precision
 _LEVEL_NORTH = (0.0, 0.0, 0.0, 1.0)
-_LAYOUT = f"<3i{29 + MAX_MOTORS}f"  # kind, is_armed, is_landed, then the floats of autopilot.ports.Setpoint
+_LAYOUT = f"<3i{31 + MAX_MOTORS}f"  # kind, is_armed, is_landed, then the floats of autopilot.ports.Setpoint
 _FIELDS = (
     "kind", "is_armed", "is_landed", "pos_ned", "vel_ned", "accel_ned", "yaw", "yaw_rate", "path_start_ned",
     "cruise_speed", "climb_speed", "descend_speed", "exit_speed", "pass_radius", "q_ned_from_frd", "omega_frd",
-    "thrust", "speed", "steering", "motor_test",
+    "thrust", "speed", "steering", "ahead_max", "back_max", "motor_test",
 )  # fmt: skip
 
 
@@ -43,9 +43,9 @@ class SetpointPort:
     """
 
     __slots__ = (
-        "_buffer", "_is_changed", "_motor_test", "_pack_into", "_press_speed", "_settling", "accel_ned", "climb_speed",
-        "cruise_speed", "descend_speed", "exit_speed", "is_armed", "is_landed", "is_reversed", "kind", "omega_frd",
-        "pass_radius", "path_start_ned", "pos_ned", "q_ned_from_frd", "speed", "steering", "thrust",
+        "_buffer", "_is_changed", "_motor_test", "_pack_into", "_press_speed", "_room", "_settling", "accel_ned",
+        "climb_speed", "cruise_speed", "descend_speed", "exit_speed", "is_armed", "is_landed", "is_reversed", "kind",
+        "omega_frd", "pass_radius", "path_start_ned", "pos_ned", "q_ned_from_frd", "speed", "steering", "thrust",
         "vel_ned", "yaw", "yaw_rate",
     )  # fmt: skip
 
@@ -59,6 +59,7 @@ class SetpointPort:
         self._motor_test: tuple[float, ...] = (0.0,) * MAX_MOTORS
         self.is_armed = False
         self.is_landed = True
+        self._room = (0.0, 0.0)  # [m/s] ahead, back
         self.is_reversed = False  # ways are driven backwards, by what can
         self._settling: tuple[float, float] | None = None  # thrust [0..1] and heading [rad]
         self._press_speed = 0.0  # [m/s]
@@ -75,6 +76,12 @@ class SetpointPort:
         if is_armed is not self.is_armed or is_landed is not self.is_landed:
             self.is_armed = is_armed
             self.is_landed = is_landed
+            self._is_changed = True
+
+    def leave_room(self, ahead_max: float, back_max: float) -> None:
+        """Bounds the speeds along the nose and backwards [m/s]; 0: any, negative: none."""
+        if (ahead_max, back_max) != self._room:
+            self._room = (ahead_max, back_max)
             self._is_changed = True
 
     def idle(self) -> None:
@@ -319,7 +326,7 @@ class SetpointPort:
             yaw_rate, *path_start_ned, self._cruise_speed_written(), self.climb_speed, self.descend_speed,
             self.exit_speed, self.pass_radius,
             *q_ned_from_frd, *self.omega_frd, thrust, self.speed, self.steering,
-            *self._motor_test,
+            *self._room, *self._motor_test,
         )  # fmt: skip
         try:
             self._pack_into(self._buffer, 0, *flags, *values)

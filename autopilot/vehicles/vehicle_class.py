@@ -137,6 +137,15 @@ class Craft:
     yaw_mode_param: str  # empty if the class has none
 
 
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """The room that a vehicle takes on its way, from where its distances are measured."""
+
+    front_m: float
+    rear_m: float
+    half_width_m: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleClass:
     """One class of vehicles; its functions get the airframe that `common/airframes/NAME.py` makes of a file."""
@@ -169,6 +178,8 @@ class VehicleClass:
     the waypoint."""
     arming_checks: Sequence[ArmingCheck] = ()
     """Its own, besides those of all vehicles (autopilot.commander.arming)."""
+    lane: Callable[[Any], Lane] | None = None
+    """Of what stops before obstacles in its lane, in every mode (CP_DIST); None: modes see to that themselves."""
     drive_watch: Callable[[DriveParts], DriveWatch] | None = None
     """None: nobody looks whether a motor has failed or the vehicle is stuck."""
 

@@ -107,6 +107,16 @@ def ask(
 
 
 @wp.func
+def with_room(sp: Setpoint, speed: float) -> float:
+    """A speed along the nose [m/s], no faster than what stands in the way allows."""
+    if sp.ahead_max != 0.0:
+        speed = wp.min(speed, wp.max(sp.ahead_max, 0.0))
+    if sp.back_max != 0.0:
+        speed = wp.max(speed, -wp.max(sp.back_max, 0.0))
+    return speed
+
+
+@wp.func
 def mixed(airframe: RoverControlAirframe, steering: float, throttle: float, brake: float) -> vec8:
     """The commands of the outputs; of a skid-steer rover the sides, the turn kept where both would be too fast."""
     command = vec8()
@@ -169,6 +179,7 @@ def loops(
         now.speed = open_throttle(params, sp.thrust, here.speed, airframe.is_skid == 0 or not is_turned)
         goal = wp.where(wp.abs(sp.thrust) > 0.0, sp.thrust, here.speed)
     else:
+        goal = with_room(sp, goal)
         may_park = airframe.is_skid == 0 or asked.is_stop == 1
         now.speed = follow_speed(params, airframe, now.speed, here, goal, now.voltage_fraction, may_park, _FRAME_S)
     now.steering = steering_step(params, airframe, now.steering, here, sp, asked, goal)

@@ -13,7 +13,7 @@ from autopilot.vehicles.rover.modes.params import MODE_PARAMETERS
 from autopilot.vehicles.rover.modes.table import ROVER_MODES
 from autopilot.vehicles.rover.params import ROVER_PARAMETERS
 from autopilot.vehicles.rover.stuck_watch import STUCK_PARAMETERS, StuckWatch
-from autopilot.vehicles.vehicle_class import DriveParts, MotionLimits, Turning, VehicleClass
+from autopilot.vehicles.vehicle_class import DriveParts, Lane, MotionLimits, Turning, VehicleClass
 from common.airframes.rover import RoverAirframe
 from common.geodesy import GRAVITY_M_S2
 from common.params import ParameterTable
@@ -33,6 +33,10 @@ def _outputs(airframe: RoverAirframe) -> Sequence[Output]:
 
 def _motors(airframe: RoverAirframe) -> Sequence[int]:
     return [i for i, output in enumerate(_outputs(airframe)) if output.kind is OutputKind.MOTOR]
+
+
+def _lane(airframe: RoverAirframe) -> Lane:
+    return Lane(airframe.hull.front_m, airframe.hull.rear_m, airframe.hull.half_width_m)
 
 
 def _stuck_watch(parts: DriveParts) -> StuckWatch:
@@ -83,5 +87,6 @@ ROVER = VehicleClass(
     motors=_motors,
     standing_height_m=_standing_height_m,
     arming_checks=(_can_drive,),
+    lane=_lane,
     drive_watch=_stuck_watch,
 )

@@ -1,0 +1,66 @@
+"""A rover stops before what its ring of range finders sees in its lane, whatever mode drives it, and says so once."""
+
+import numpy as np
+import pytest
+
+from mission.flight import Flight, FlightConfig
+from mission.script import ScriptError
+from sim.world.world import WorldConfig
+from tests.system.published.published_rules import Sticks
+
+WALL_M = 25.0
+WALLED = WorldConfig(trees_per_ha=0.0, hill_height_m=0.0, size_m=2 * WALL_M, has_walls=True, wall_height_m=2.0)
+KEEP_M = 1.0
+SET_MODE, POSCTL = 176, 3.0
+
+
+def driven(script, **parameters):
+    flight = Flight(FlightConfig(airframe="rover", world=WALLED, has_lidar=True, parameters=parameters))
+
+    async def whole(drone):
+        await drone.wait_ready()
+        await drone.arm()
+        await script(drone)
+        return list(drone.texts)
+
+    running = flight.fly(whole, seconds=120.0)
+    history = flight.close()
+    if running.error is not None:
+        raise running.error
+    return running.result, history
+
+
+async def behind_the_wall(drone):
+    with pytest.raises(ScriptError):
+        await drone.goto_ned(60.0, 0.0, 0.0, timeout_s=30.0)
+
+
+def test_a_goto_behind_a_wall_ends_before_the_wall():
+    texts, history = driven(behind_the_wall, CP_DIST=KEEP_M)
+    front_m = history.pos_ned_true[:, 0].max() + 0.4
+    assert WALL_M - KEEP_M - 0.8 < front_m < WALL_M - KEEP_M + 0.3
+    assert np.hypot(*history.vel_ned_true[-100:, :2].T).max() < 0.1
+    assert texts.count("Obstacle ahead: stopped") == 1
+    assert not any("Stuck" in text for text in texts)
+
+
+def test_a_pilot_is_stopped_forwards_and_backs_away():
+    farthest = []
+
+    async def script(drone):
+        sticks = Sticks(drone)
+        await drone.sleep(0.5)
+        await drone.command(SET_MODE, 1.0, POSCTL)
+        for z, seconds in ((900, 15.0), (200, 5.0)):
+            await sticks.hold(seconds, z=z)
+            farthest.append(drone.pos_ned[0])
+
+    driven(script, CP_DIST=KEEP_M)
+    assert WALL_M - KEEP_M - 1.2 < farthest[0] < WALL_M - KEEP_M
+    assert farthest[1] < farthest[0] - 3.0
+
+
+def test_without_the_parameter_nothing_stops_it():
+    texts, history = driven(behind_the_wall)
+    assert history.pos_ned_true[:, 0].max() > WALL_M - 1.0
+    assert "Obstacle ahead: stopped" not in texts
