@@ -175,7 +175,8 @@ class FlightController:
         self.commander.connect(self.navigator)
         self.fence, self.rally = self.navigator.fence, self.navigator.rally
         self.lists = self._item_lists()
-        self._obstacle_stop = self._make_obstacle_stop(vehicle, airframe)
+        lane = None if vehicle.lane is None else vehicle.lane(airframe)
+        self._obstacle_stop = lane and ObstacleStop(state, self.obstacles, self._setpoint, self._relay, lane)
         self.guidance = Guidance(self.commander, self.navigator, self.payload)
         self.motor_test = MotorTest(state, self._setpoint, self._relay, vehicle.motors(airframe))
         self.calibration = Calibrator(state, params, self._relay, turntable)
@@ -196,11 +197,6 @@ class FlightController:
             vehicle.last_resort,
             vehicle.arming_checks,
         )
-
-    def _make_obstacle_stop(self, vehicle: VehicleClass, airframe: Airframe) -> ObstacleStop | None:
-        if vehicle.lane is None:
-            return None
-        return ObstacleStop(self.state, self.obstacles, self._setpoint, self._relay, vehicle.lane(airframe))
 
     def _make_navigator(self, vehicle: VehicleClass, airframe: Airframe) -> Navigator:
         context = NavContext(self.state, self.params, self._relay, self._setpoint, vehicle.craft(airframe))
@@ -341,7 +337,7 @@ class FlightController:
             case ChangeSpeed():
                 return self.navigator.change_speed(request.speed_m_s, request.kind)
             case SetReverse():
-                return self._set_reverse(request)
+                return self.navigator.set_reversed(is_reversed=request.is_reversed)
             case SetHome():
                 return self.commander.set_home(request.lat_deg, request.lon_deg, request.alt_amsl_m)
 
@@ -363,12 +359,6 @@ class FlightController:
         self.commander.change_mode(mode)
         if is_flown:
             self.navigator.begin_request(mode)
-        return ACCEPTED
-
-    def _set_reverse(self, request: SetReverse) -> Reply:
-        if self.leaves_ground:
-            return Reply(Verdict.UNSUPPORTED, "it does not drive")
-        self._setpoint.set_reversed(request.is_reversed)
         return ACCEPTED
 
     def _change_mode(self, mode: Mode) -> Reply:

@@ -25,7 +25,7 @@ class ObstacleStop:
         lane: the room that it takes.
     """
 
-    __slots__ = ("_announcer", "_is_told", "_lane", "_obstacles", "_setpoint", "_state")
+    __slots__ = ("_announcer", "_is_reported", "_lane", "_obstacles", "_setpoint", "_state")
 
     def __init__(
         self, state: VehicleState, obstacles: Obstacles, setpoint: SetpointPort, announcer: Announcer, lane: Lane
@@ -35,7 +35,7 @@ class ObstacleStop:
         self._setpoint = setpoint
         self._announcer = announcer
         self._lane = lane
-        self._is_told = False
+        self._is_reported = False
 
     def frame(self) -> None:
         """Renews the bounds."""
@@ -47,8 +47,8 @@ class ObstacleStop:
         ahead = obstacles.room_along(yaw, lane.front_m, lane.half_width_m, now_us)
         back = obstacles.room_along(yaw + pi, lane.rear_m, lane.half_width_m, now_us)
         self._setpoint.leave_room(*(0.0 if speed == inf else speed for speed in (ahead, back)))
-        if ahead < 0.0 and state.is_armed and not self._is_told:
-            self._is_told = True
+        if ahead < 0.0 and state.is_armed and not self._is_reported:
+            self._is_reported = True
             self._announcer.statustext(Severity.NOTICE, "Obstacle ahead: stopped")
         elif ahead > _FREE_M_S:
-            self._is_told = False
+            self._is_reported = False

@@ -262,6 +262,13 @@ class Navigator:
             flown.take(report)
         return ACCEPTED
 
+    def set_reversed(self, *, is_reversed: bool) -> Reply:
+        """Whether ways are driven backwards, until the mode changes."""
+        if self.context.craft.ground is not None:
+            return Reply(Verdict.UNSUPPORTED, "it does not drive")
+        self.context.setpoint.set_reversed(is_reversed=is_reversed)
+        return ACCEPTED
+
     def change_speed(self, speed_m_s: float, kind: int) -> Reply:
         """A speed from now on (SPEED_TYPE), NaN: the default; the control part bounds it by its limits."""
         if speed_m_s <= 0.0 or speed_m_s > 100.0:
