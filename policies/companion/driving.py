@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT
 from autopilot.ports import Estimate
 from common.attitude import yaw_of
 from common.range_sectors import GROUND_RING
@@ -19,7 +20,7 @@ from policies.companion.goals import Goal, Goals
 from policies.companion.ranges import Ranges
 from policies.companion.skill import Floats, Velocity
 from policies.companion.vector_pilot import DrivingPilot
-from policies.companion.vehicle_link import Own, VehicleLink
+from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
 from policies.tasks.drive.observe import FRAME, DriveCommand, command_rows, observe_rows
 
 ARRIVED_M, ALIGNED_RAD, STANDING_M_S = 0.25, 0.14, 0.25  # by the estimate: training's last lesson
@@ -31,6 +32,9 @@ SCAN_HZ = 50.0
 DECISION_US, DECISION_EARLY_US = 100_000, 10_000
 HULL_M = (0.3, 0.15)  # half of a rover's length and width, and no more: what is seen in there is in the way
 SEEN_FOR = 30  # decisions in a row: what only comes by is gone by then; guess
+REVERSES = "HG_RO_OFFB_BODY"  # parameter, not 0: Offboard may reverse and takes a yaw rate
+ASK_US = 2_000_000
+NO_REVERSE = f"Offboard does not reverse: set {REVERSES} to 1, or drive by sticks"
 NO_GOAL = "no goal"
 TAKEN, STUCK = "something stands there", "stuck"
 
@@ -58,6 +62,8 @@ class Driving:
         self._pilot = pilot
         self._observer = DriveObserver(pilot.stack)
         self._decided_us = -DECISION_US
+        self._reverses = False  # Offboard, as the vehicle has said
+        self._asked_us = NEVER_US
         self._goal: Goal | None = None  # that the heading is of
         self._heading = 0.0  # there [rad]
         self._taken_count = 0  # decisions in a row with something in the goal
@@ -70,16 +76,21 @@ class Driving:
             vehicle, is_ordered_by_goto=self._is_ordered_by_goto, near_m=NEAR_M, refusal=self._refusal_of
         )
         self.ranges = Ranges(vehicle, GROUND_RING, SCAN_HZ)
+        if not vehicle.is_by_sticks:
+            vehicle.listen("PARAM_VALUE", self._parameter_reported)
 
-    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:  # noqa: ARG002  (others need it)
+    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self.goals.frame(time_us)
+        if self._needs_reverse and vehicle.own.heartbeat_us != NEVER_US and time_us - self._asked_us > ASK_US:
+            self._asked_us = time_us
+            vehicle.ask("PARAM_REQUEST_READ", param_id=REVERSES, param_index=-1)
         return self.ranges.take_new()
 
     def is_ordered(self) -> bool:
         return self.goals.is_ordered()
 
     def blindness(self, own: Own, time_us: int) -> str:  # noqa: ARG002
-        return self.ranges.trouble(time_us)
+        return self.ranges.trouble(time_us) or (NO_REVERSE if self._needs_reverse and not self._reverses else "")
 
     def loss(self, own: Own) -> str:  # noqa: ARG002
         if self.goals.goal is None:
@@ -139,6 +150,16 @@ class Driving:
 
     def close(self) -> None:
         """Has nothing to give back."""
+
+    @property
+    def _needs_reverse(self) -> bool:
+        """Whether it is driven in PX4's Offboard, whose velocities are courses where nothing else is set."""
+        return not (self._vehicle.is_by_sticks or self._vehicle.is_ardupilot)
+
+    def _parameter_reported(self, sysid: int, compid: int, fields: Any, _: int) -> None:
+        is_vehicle = (sysid, compid) == (self._vehicle.system_id, AUTOPILOT_COMPONENT)
+        if is_vehicle and fields.param_id == REVERSES:
+            self._reverses = fields.param_value != 0
 
     def _forget(self) -> None:
         self._pilot.reset()

@@ -107,7 +107,7 @@ class VehicleLink:
     """
 
     def __init__(self, link: ByteLink, *, system_id: int = 1, is_by_sticks: bool = False) -> None:
-        self._is_by_sticks = is_by_sticks
+        self.is_by_sticks = is_by_sticks
         self.own = Own()
         self.clock = VehicleClock()
         self.owner = Owner()
@@ -165,13 +165,13 @@ class VehicleLink:
     @property
     def is_flown(self) -> bool:
         """Whether it is in a mode that follows what is sent."""
-        ours = (Mode.POSITION,) if self._is_by_sticks else (Mode.OFFBOARD, Mode.GUIDED)
+        ours = (Mode.POSITION,) if self.is_by_sticks else (Mode.OFFBOARD, Mode.GUIDED)
         return self.own.mode in ours
 
     @property
     def _flown_mode(self) -> Mode:
         """The mode in which it follows what is sent."""
-        if self._is_by_sticks:
+        if self.is_by_sticks:
             return Mode.POSITION
         return Mode.GUIDED if self.is_ardupilot and Mode.GUIDED in self._dialect.mode_table else Mode.OFFBOARD
 

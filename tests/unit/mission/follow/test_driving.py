@@ -190,3 +190,14 @@ def test_waypoints_of_the_plan_are_driven_one_after_the_other_to_the_last():
     assert flight.drone.texts.count("Companion: waypoint 1 of 3 reached") == 1
     assert "Companion: hold: waypoint 3 of 3 reached" in flight.drone.texts
     assert miss(flight, (*places[-1], nan))[0] < 0.3
+
+
+def test_where_offboard_does_not_reverse_it_says_so_and_does_not_drive():
+    flight, companion = standing(pilot=shipped_pilot("drive-reach"), world=PLAIN, parameters={})
+    send_goto(flight, GOAL)
+    advance(flight, 3.0)
+    assert companion.trouble == "Offboard does not reverse: set HG_RO_OFFB_BODY to 1, or drive by sticks"
+    assert flight.controller.state.mode is Mode.HOLD
+    flight.fly(lambda drone: drone.set_parameter("HG_RO_OFFB_BODY", 1), seconds=5.0)
+    advance(flight, 5.0)
+    assert "Companion: driving" in flight.drone.texts
