@@ -127,7 +127,8 @@ class Station:
     def __init__(self, **arguments):
         vehicle_end, client_end = memory_pair(LinkRole.GROUND)
         config = {"dialect": "ardupilot", **arguments.pop("config", {})}
-        self.flown = Flown(config=config, links=[vehicle_end], **arguments)
+        links = [vehicle_end, *arguments.pop("links", ())]
+        self.flown = Flown(config=config, links=links, **arguments)
         self.client = Client(client_end)
 
     def run(self, script, seconds=600.0):

@@ -13,18 +13,8 @@ from common.geodesy import geodetic_from_ned
 from mission.script import ScriptError
 from tests.system.published.published_rules import CMD_ARM, E7, Station
 
-MANUAL, HOLD, LOITER, FOLLOW, SIMPLE, DOCK, CIRCLE, RTL, SMART_RTL, GUIDED = (
-    0,
-    4,
-    5,
-    6,
-    7,
-    8,
-    9,
-    11,
-    12,
-    15,
-)  # ROVER_MODE
+MANUAL, HOLD, LOITER, FOLLOW, SIMPLE, DOCK, CIRCLE = 0, 4, 5, 6, 7, 8, 9  # ROVER_MODE
+AUTO, RTL, SMART_RTL, GUIDED = 10, 11, 12, 15
 CHANGE_SPEED, SET_REVERSE, SET_YAW_SPEED = 178, 194, 213
 FREE = dict.fromkeys(("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"), 0.0)
 POSITION, VELOCITY, VELOCITY_YAW_RATE, YAW, YAW_RATE = 3580, 3559, 1511, 2559, 1535  # type masks
