@@ -36,9 +36,9 @@ def free_port():
 
 
 class Console:
-    """MAVProxy connected to a waiting vehicle; a context manager."""
+    """MAVProxy connected to a waiting vehicle, made with further arguments; a context manager."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, *further):
         self.folder = folder
         port = free_port()
         honeyguide = ROOT / ".venv" / "bin" / "honeyguide"
@@ -53,6 +53,7 @@ class Console:
             port,
             "--api-port",
             port + 1,
+            *further,
         ]
         output = folder / "vehicle.txt"
         self._output = output.open("w")
