@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission park train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive
+.PHONY: help setup fly mission park train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive reproduce-navigate
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -41,6 +41,11 @@ reproduce-cars: $(STAMP) ## Train every row of docs/results/cars.md from scratch
 
 reproduce-follow: $(STAMP) ## Train and judge every stage of docs/results/follow.md (hours); flags: ARGS="student"
 	@$(BIN)/python -m bench.follow $(ARGS)
+
+reproduce-navigate: $(STAMP) ## Train Navigate's policy from nothing, in two legs, and judge it (half an hour)
+	@$(BIN)/honeyguide train navigate --run-id navigate --force
+	@$(BIN)/honeyguide train navigate-careful --force
+	@$(BIN)/python -m bench.navigate results/navigate-careful/Navigate.pt
 
 reproduce-drive: $(STAMP) ## Train and judge the policies of docs/results/drive.md (half an hour); only judge: ARGS="judge"
 	@$(BIN)/python -m bench.drive $(ARGS)

@@ -176,7 +176,8 @@ class FlightController:
         self.fence, self.rally = self.navigator.fence, self.navigator.rally
         self.lists = self._item_lists()
         lane = None if vehicle.lane is None else vehicle.lane(airframe)
-        self._obstacle_stop = lane and ObstacleStop(state, self.obstacles, self._setpoint, self._relay, lane)
+        stop = None if lane is None else ObstacleStop(state, self.obstacles, self._setpoint, self._relay, lane)
+        self._obstacle_stop = stop
         self.guidance = Guidance(self.commander, self.navigator, self.payload)
         self.motor_test = MotorTest(state, self._setpoint, self._relay, vehicle.motors(airframe))
         self.calibration = Calibrator(state, params, self._relay, turntable)
