@@ -341,7 +341,7 @@ class SetpointPort:
             return self.cruise_speed
         return -abs(self.cruise_speed) if isfinite(self.cruise_speed) else -_LARGEST
 
-    def set_reversed(self, *, is_reversed: bool) -> None:
+    def set_reversed(self, is_reversed: bool) -> None:
         """Whether ways are driven backwards from now on, by what can."""
         self.is_reversed = is_reversed
         self._is_changed = True

@@ -6,7 +6,6 @@ prepare   numbers and seeds of the new episode           (then worlds grow and v
 place     air, sensors, mass and tyres, the goal, the first vector
 """
 
-import math
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import warp as wp
@@ -17,7 +16,7 @@ from common.rng import draw_tick
 from common.rotation import wrap_pi, yaw_from_quat
 from policies.tasks.drive.drive_params import DriveParams
 from policies.tasks.drive.goals import course_goal, spot_goal, way_left_m, way_out
-from policies.tasks.drive.observe import SECTORS, DriveCommand, drive_command, own_drive, write_frame
+from policies.tasks.drive.observe import DriveCommand, drive_command, own_drive, write_frame
 from policies.tasks.drive.reward import drive_outcome, drive_reward
 from policies.tasks.episode import StepBuffers, close_step, open_frame
 from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight
@@ -43,12 +42,6 @@ _forget_impacts = rig_kernels(ROVER_BODY, ROVER_LAW).forget_impacts
 _HALF_WIDTH_M = wp.constant(0.22)  # of the hull
 _END_M = wp.constant(0.15)  # from its middle to those of the circles at its ends
 _ROOM_MAX_M = wp.constant(1.0)
-_NOSE = wp.constant(wp.vec3(1.0, 0.0, 0.0))
-_FAR_M = wp.constant(10.0)
-_BESIDE_M = wp.constant(0.1)  # of its lane, beside the hull
-_END_OF_HULL_M = wp.constant(0.4)  # from its middle
-_SLOW_M_S = wp.constant(0.1)
-_SECTOR_RAD = wp.constant(2.0 * math.pi / SECTORS)
 
 MEASURES = ("distance_m", "heading_error_rad", "speed_m_s", "room_m", "way_left_m", "time_s", "start_way_m")
 """After each decision, the simulator's truth: distance and heading from the goal's, speed, room round the hull (at most
@@ -119,18 +112,6 @@ def room_round(world: World, truth: Truth) -> float:
 
 
 @wp.func
-def time_ahead(ranges_m: wp.array2d(dtype=float), i: int, speed: float) -> float:
-    """Time [s] until the hull of row i would be at the nearest thing in its lane, at a speed along the nose."""
-    way_m = float(_FAR_M)
-    for k in range(SECTORS):
-        angle = float(k) * _SECTOR_RAD
-        along = ranges_m[i, k] * wp.cos(angle) * wp.sign(speed)
-        if along > 0.0 and wp.abs(ranges_m[i, k] * wp.sin(angle)) < _HALF_WIDTH_M + _BESIDE_M:
-            way_m = wp.min(way_m, along - _END_OF_HULL_M)
-    return wp.max(way_m, 0.0) / wp.max(wp.abs(speed), _SLOW_M_S)
-
-
-@wp.func
 def show_frame(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: DriveState, i: int) -> None:
     """The newest frame of the observation."""
     truth = rig.truth[i]
@@ -167,8 +148,7 @@ def judge(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: Driv
     outcome = drive_outcome(params, truth, distance_m, turn_rad, left_m, state.start_left_m[i], time_s)
     speed_m_s = wp.length(truth.vel_ned)
     progress_m = state.left_m[i] - left_m
-    ahead_s = time_ahead(state.ranges_m, i, wp.dot(truth.vel_ned, wp.quat_rotate(truth.q_ned_from_frd, _NOSE)))
-    reward = drive_reward(params, progress_m, speed_m_s, room_m, ahead_s, outcome, action, last_action)
+    reward = drive_reward(params, progress_m, speed_m_s, room_m, outcome, action, last_action)
     state.left_m[i] = left_m
     state.measures[i, 0] = distance_m
     state.measures[i, 1] = turn_rad

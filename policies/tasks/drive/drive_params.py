@@ -31,8 +31,6 @@ class DriveParams:
     idle_cost: float
     clearance_m: float
     clearance_cost: float
-    ahead_s: float
-    ahead_cost: float
     jerk_cost: float
     hit_cost: float
 
@@ -59,8 +57,6 @@ DRIVE_PARAMS = (
     TaskParam("idle_cost", 0.05, 0.0, 10.0, "1", "per decision of standing elsewhere", "tuned"),
     TaskParam("clearance_m", 0.15, 0.0, 1.0, "m", "room round the hull below which there is a cost", "tuned"),
     TaskParam("clearance_cost", 0.1, 0.0, 10.0, "1", "per decision for no room at all", "tuned"),
-    TaskParam("ahead_s", 1.0, 0.0, 5.0, "s", "time to what stands in its lane below which there is a cost", "tuned"),
-    TaskParam("ahead_cost", 0.3, 0.0, 10.0, "1", "per decision for no time at all", "tuned"),
     TaskParam("jerk_cost", 0.002, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),
     TaskParam("hit_cost", 5.0, 0.0, 1000.0, "1", "of touching anything or tipping over, which ends it", "tuned"),
 )

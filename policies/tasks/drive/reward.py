@@ -42,28 +42,14 @@ def drive_reward(
     progress_m: float,
     speed_m_s: float,
     room_m: float,
-    ahead_s: float,
     outcome: int,
     action: wp.vec2,
     last_action: wp.vec2,
 ) -> float:
-    """Of one decision.
-
-    Args:
-        p: what is paid.
-        progress_m: by which the way is shorter.
-        speed_m_s: of the vehicle.
-        room_m: round the hull.
-        ahead_s: until it would be at what stands in its lane.
-        outcome: how the episode stands.
-        action: of the decision.
-        last_action: of the one before.
-    """
+    """Of one decision that made the way shorter by `progress_m` and left `room_m` round the hull, at a speed."""
     change = action - last_action
     tight = wp.clamp(1.0 - room_m / wp.max(p.clearance_m, 1.0e-3), 0.0, 1.0)
     reward = p.progress_reward * progress_m - p.time_cost
-    near = wp.clamp(1.0 - ahead_s / wp.max(p.ahead_s, 1.0e-3), 0.0, 1.0)
-    reward -= p.ahead_cost * near * near
     reward -= p.clearance_cost * tight * tight + p.jerk_cost * wp.dot(change, change)
     if speed_m_s < _IDLE_M_S and outcome != SUCCESS:
         reward -= p.idle_cost  # or a greedy policy waits for ever where it does not know what to do
