@@ -11,8 +11,6 @@ from autopilot.interface.failsafe_action import Action
 from autopilot.interface.mode_spec import (
     AUTO_OVERRIDE,
     HOLD_EXCEPTED,
-    OFFBOARD_EXCEPTED,
-    OFFBOARD_OVERRIDE,
     DialectMode,
     Disarmed,
     FlightMode,
@@ -35,7 +33,7 @@ from autopilot.navigator.modes.rtl_destination import Destinations
 from autopilot.navigator.modes.smart_return import SmartReturn
 from autopilot.navigator.modes.takeoff import Takeoff
 from autopilot.navigator.modes.termination import Termination
-from autopilot.vehicles import px4_modes
+from autopilot.vehicles import ardupilot_modes, px4_modes
 from autopilot.vehicles.multirotor.orbit import Orbit
 from autopilot.vehicles.multirotor.stick_modes import Acro, Altitude, Position, Stabilized
 
@@ -159,34 +157,8 @@ MULTIROTOR_MODES = mode_table(
         aux_function=33,
         exception=HOLD_EXCEPTED,
     ),
-    ModeSpec(
-        mode=Mode.SMART_RETURN,
-        build=_smart_return,
-        needs_position=True,
-        needs_home=True,
-        px4=Mode.RETURN,
-        ardupilot=DialectMode(21, "Smart RTL"),
-        nav_state=5,
-        aux_function=42,
-        strength=Action.RETURN,
-        carries_out=(Action.SMART_RETURN,),
-        exception=HOLD_EXCEPTED,
-        override=AUTO_OVERRIDE,
-    ),
-    ModeSpec(
-        mode=Mode.GUIDED,
-        build=of_context(Guided),
-        needs_position=True,
-        may_arm=True,
-        on_ground=True,
-        disarmed=Disarmed.SAME,
-        takes=(TakeOff, GoTo, OffboardSetpoint),
-        px4=Mode.OFFBOARD,
-        ardupilot=DialectMode(4, "Guided"),
-        is_advanced=True,
-        nav_state=14,
-        aux_function=55,
-        exception=OFFBOARD_EXCEPTED,
-        override=OFFBOARD_OVERRIDE,
+    ardupilot_modes.SMART_RETURN(build=_smart_return, ardupilot=DialectMode(21, "Smart RTL")),
+    ardupilot_modes.GUIDED(
+        build=of_context(Guided), takes=(TakeOff, GoTo, OffboardSetpoint), ardupilot=DialectMode(4, "Guided")
     ),
 )

@@ -1,12 +1,9 @@
 """The modes of ArduPilot's Rover that PX4 has not: one row each; a PX4 client sees the nearest of its own."""
 
 from autopilot.interface.client_requests import GoTo, LandingTargetReport, OffboardSetpoint
-from autopilot.interface.failsafe_action import Action
 from autopilot.interface.mode_spec import (
     AUTO_OVERRIDE,
     HOLD_EXCEPTED,
-    OFFBOARD_EXCEPTED,
-    OFFBOARD_OVERRIDE,
     DialectMode,
     Disarmed,
     FlightMode,
@@ -15,6 +12,7 @@ from autopilot.interface.mode_spec import (
 )
 from autopilot.interface.vehicle_state import Mode
 from autopilot.navigator.mode_parts import ModeParts, of_context
+from autopilot.vehicles import ardupilot_modes
 from autopilot.vehicles.rover.modes.auto import RoverLoiter, RoverSmartReturn
 from autopilot.vehicles.rover.modes.dock import RoverDock
 from autopilot.vehicles.rover.modes.guided import RoverGuided
@@ -69,35 +67,8 @@ ARDUPILOT_MODES = (
         exception=HOLD_EXCEPTED,
         override=AUTO_OVERRIDE,
     ),
-    ModeSpec(
-        mode=Mode.SMART_RETURN,
-        build=_smart_return,
-        needs_position=True,
-        needs_home=True,
-        on_ground=True,
-        px4=Mode.RETURN,
-        ardupilot=DialectMode(12, "Smart RTL"),
-        nav_state=5,
-        aux_function=42,
-        strength=Action.RETURN,
-        carries_out=(Action.SMART_RETURN,),
-        exception=HOLD_EXCEPTED,
-        override=AUTO_OVERRIDE,
-    ),
-    ModeSpec(
-        mode=Mode.GUIDED,
-        build=of_context(RoverGuided),
-        needs_position=True,
-        may_arm=True,
-        on_ground=True,
-        disarmed=Disarmed.SAME,
-        takes=(GoTo, OffboardSetpoint),
-        px4=Mode.OFFBOARD,
-        ardupilot=DialectMode(15, "Guided"),
-        is_advanced=True,
-        nav_state=14,
-        aux_function=55,
-        exception=OFFBOARD_EXCEPTED,
-        override=OFFBOARD_OVERRIDE,
+    ardupilot_modes.SMART_RETURN(build=_smart_return, on_ground=True, ardupilot=DialectMode(12, "Smart RTL")),
+    ardupilot_modes.GUIDED(
+        build=of_context(RoverGuided), takes=(GoTo, OffboardSetpoint), ardupilot=DialectMode(15, "Guided")
     ),
 )
