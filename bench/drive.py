@@ -44,7 +44,8 @@ Policies of a rover ([drive.md](../explanation/drive.md)) in held-out worlds, {e
 estimator, with sensor noise, wind and gusts, and masses, motors and tyres that differ. Success is to stand within 0.3 m
 and 10 degrees of the goal, slower than 0.3 m/s, without having touched anything. Actions are the most probable ones;
 rates have Wilson's 95 % interval, times the bootstrap's. Made by `make reproduce-drive`, which trains each from nothing
-by its recipe (`honeyguide train drive-park`, `drive-reach`) and judges what comes of it.
+by its recipe (`honeyguide train drive-park`, `drive-reach`) and judges what comes of it; without a time of training the
+policies that ship are judged, of which [drive.md](../explanation/drive.md#how-well) tells how they were trained.
 
 | policy | aim | success | touched | out of time | other | time to the goal | trained in |
 |---|---|---|---|---|---|---|---|
