@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[3]
 PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 # Where what an extra brings is imported, when its commands are run.
 OF_EXTRAS = (
-    *("policies.", "mission.view.", "mission.train.", "mission.follow."),
+    *("policies.", "mission.view.", "mission.train.", "mission.follow.", "mission.park.park_session"),
     *("autopilot.tuning", "autopilot.control.margins", "autopilot.estimator.derive"),
     *("autopilot.vehicles.multirotor.tuning", "autopilot.vehicles.rover.tuning"),
 )
