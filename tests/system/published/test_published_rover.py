@@ -233,7 +233,7 @@ def test_a_heading_with_a_speed():
                 await client.sleep(0.5)
             assert rover.speed == pytest.approx(fraction * 5.0, abs=0.2)
             if not is_relative:
-                assert abs(rover.turned_deg(yaw)) < 2.0
+                assert abs(rover.turned_deg(yaw)) < 0.5
 
     rover.run(script)
 
