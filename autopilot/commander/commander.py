@@ -72,7 +72,8 @@ class Commander:
         self.guard = Guard(self)
         self.home = Home(state, announcer)
         self._battery = battery
-        self._watch = FailureWatch(state, params, battery, self.station, motors, modes)
+        leans = detector is not None
+        self._watch = FailureWatch(state, params, battery, self.station, motors, modes, leans=leans)
         self._phases: GroundPhases = Driving(self) if detector is None else TakeoffAndLanding(self, detector)
         self._pilot = pilot
         self._flying: Flying

@@ -2,6 +2,7 @@
 
 In: estimate and attitude setpoint, each frame while armed. Out: what is lost, as bits of `failsafe`. A vehicle that is
 told to lean that far, or flown by body rates (its attitude setpoint is its attitude), is not judged by its attitude.
+What stays on the ground is never told to lean: it lies as the ground does, or it has tipped over.
 """
 
 from math import cos, radians
@@ -24,15 +25,17 @@ class AttitudeWatch:
 
     Args:
         params: FD_*.
+        leans: whether its attitude setpoint says how it shall lean; not of what stays on the ground.
     """
 
     __slots__ = (
-        "_error_s", "_fail_cos", "_params", "_pitch_max", "_pitch_s", "_pitch_time_s", "_roll_max", "_roll_s",
+        "_error_s", "_fail_cos", "_leans", "_params", "_pitch_max", "_pitch_s", "_pitch_time_s", "_roll_max", "_roll_s",
         "_roll_time_s",
     )  # fmt: skip
 
-    def __init__(self, params: ParameterTable) -> None:
+    def __init__(self, params: ParameterTable, *, leans: bool = True) -> None:
         self._params = params
+        self._leans = leans
         self._load()
         self.reset()
         params.on_change(self._on_parameter)
@@ -51,7 +54,7 @@ class AttitudeWatch:
             self._roll_s = self._pitch_s = self._error_s = 0.0
             return 0
         wanted = _down_axis(state.actuators.q_sp_ned_from_frd)
-        is_asked_for = wanted[2] < self._fail_cos
+        is_asked_for = self._leans and wanted[2] < self._fail_cos
         error_cos = sum(a * b for a, b in zip(_down_axis(estimate.q_ned_from_frd), wanted, strict=True))
         self._error_s = self._error_s + dt_s if error_cos < _LEAN_ERROR_COS else 0.0
         self._roll_s = self._roll_s + dt_s if roll > self._roll_max and not is_asked_for else 0.0

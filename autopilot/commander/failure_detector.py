@@ -77,6 +77,8 @@ class FailureWatch:
         battery: the charge estimator.
         station: when a ground station was heard.
         motors: the motor watch, if there is one.
+        modes: those that the vehicle has.
+        leans: whether it is told how to lean.
     """
 
     __slots__ = (
@@ -94,6 +96,8 @@ class FailureWatch:
         station: StationLink,
         motors: DriveWatch | None,
         modes: ModeTable,
+        *,
+        leans: bool,
     ) -> None:
         self._state = state
         self._params = params
@@ -101,7 +105,7 @@ class FailureWatch:
         self._station = station
         self._motors = motors
         self._modes = modes
-        self._attitude = AttitudeWatch(params)
+        self._attitude = AttitudeWatch(params, leans=leans)
         self._voltage = VoltageLimits(params)
         self._wind_speed = 0.0  # [m/s] low-passed
         self.reset()

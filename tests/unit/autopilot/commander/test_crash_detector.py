@@ -34,11 +34,11 @@ def vehicle(roll=0.0, pitch=0.0, wanted=(0.0, 0.0, 0.0, 1.0), age_us=0, flags=TI
     )
 
 
-def seconds_until(failure, state, limit_s=20.0, **params):
+def seconds_until(failure, state, limit_s=20.0, *, leans=True, **params):
     table = ParameterTable(COMMANDER_PARAMETERS)
     for name, value in params.items():
         table.set(name, value)
-    watch = AttitudeWatch(table)
+    watch = AttitudeWatch(table, leans=leans)
     for i in range(round(limit_s / DT_S)):
         if watch.update(state, DT_S) == failure:
             return (i + 1) * DT_S
@@ -67,6 +67,16 @@ def test_lean_that_control_does_not_undo_is_a_crash_after_two_seconds():
 )
 def test_lean_that_is_asked_for_is_none(state):
     assert seconds_until(CRASHED, state) is None
+
+
+@pytest.mark.parametrize("roll", [65.0, -170.0])
+def test_what_stays_on_the_ground_has_tipped_over_whatever_its_setpoint_is(roll):
+    state = vehicle(roll=roll, wanted=rolled(roll))
+    assert seconds_until(CRASHED, state, leans=False) == pytest.approx(0.3, abs=0.03)
+
+
+def test_what_stays_on_the_ground_may_stand_on_a_steep_slope():
+    assert seconds_until(CRASHED, vehicle(pitch=45.0, wanted=pitched(45.0)), leans=False) is None
 
 
 def test_short_overshoot_is_none():
