@@ -49,6 +49,7 @@ class ObstacleStop:
         self._setpoint.leave_room(*(0.0 if speed == inf else speed for speed in (ahead, back)))
         if ahead < 0.0 and state.is_armed and not self._is_reported:
             self._is_reported = True
-            self._announcer.statustext(Severity.NOTICE, "Obstacle ahead: stopped")
+            what = "Obstacle" if obstacles.knows_along(yaw, state.time_us) else "No distances"
+            self._announcer.statustext(Severity.NOTICE, f"{what} ahead: stopped")
         elif ahead > _FREE_M_S:
             self._is_reported = False

@@ -6,7 +6,7 @@ collision prevention, without its guidance of the direction.
 """
 
 from collections.abc import Sequence
-from math import cos, inf, isfinite, nan, pi, sin, sqrt
+from math import cos, floor, inf, isfinite, nan, pi, sin, sqrt
 
 from common.params import Parameter, ParameterTable
 
@@ -14,7 +14,6 @@ BINS = 72
 FRESH_US = 500_000  # older distances say nothing (PX4: RANGE_STREAM_TIMEOUT)
 _BIN_RAD = 2.0 * pi / BINS
 _BESIDE_M = 0.1  # room beside a hull; guess
-_AHEAD = cos(_BIN_RAD)
 _PX4 = "PX4 1.15 default"
 
 OBSTACLE_PARAMETERS: list[Parameter] = [
@@ -108,7 +107,7 @@ class Obstacles:
             half_width_m: of the vehicle.
             now_us: now.
         """
-        way_m, is_known = inf, False
+        way_m = inf
         for i in range(BINS):
             if now_us - self._seen_us[i] > FRESH_US:
                 continue
@@ -116,13 +115,17 @@ class Obstacles:
             along = cos(angle)
             if along <= 0.0:
                 continue
-            is_known = is_known or along > _AHEAD
             distance_m = self._distance_m[i]
             if isfinite(distance_m) and abs(distance_m * sin(angle)) < half_width_m + _BESIDE_M:
                 way_m = min(way_m, distance_m * along)
-        if not is_known and not self._params["CP_GO_NO_DATA"]:
+        if not self._params["CP_GO_NO_DATA"] and not self.knows_along(heading_rad, now_us):
             return -1.0
         return (self._speed_towards(way_m - end_m) or -1.0) if isfinite(way_m) else inf
+
+    def knows_along(self, heading_rad: float, now_us: int) -> bool:
+        """Whether there are distances of late straight along a heading."""
+        before = floor(heading_rad / _BIN_RAD)
+        return any(now_us - self._seen_us[i % BINS] <= FRESH_US for i in (before, before + 1))
 
     def _knows_ahead(self, north: float, east: float, speed: float, now_us: int) -> bool:
         index = max(range(BINS), key=lambda i: (north * cos(i * _BIN_RAD) + east * sin(i * _BIN_RAD)) / speed)

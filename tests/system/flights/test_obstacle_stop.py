@@ -14,8 +14,8 @@ KEEP_M = 1.0
 SET_MODE, POSCTL = 176, 3.0
 
 
-def driven(script, **parameters):
-    flight = Flight(FlightConfig(airframe="rover", world=WALLED, has_lidar=True, parameters=parameters))
+def driven(script, *, has_lidar=True, **parameters):
+    flight = Flight(FlightConfig(airframe="rover", world=WALLED, has_lidar=has_lidar, parameters=parameters))
 
     async def whole(drone):
         await drone.wait_ready()
@@ -64,3 +64,10 @@ def test_without_the_parameter_nothing_stops_it():
     texts, history = driven(behind_the_wall)
     assert history.pos_ned_true[:, 0].max() > WALL_M - 1.0
     assert "Obstacle ahead: stopped" not in texts
+
+
+def test_without_a_sensor_it_does_not_move_and_says_why():
+    texts, history = driven(behind_the_wall, has_lidar=False, CP_DIST=KEEP_M)
+    assert abs(history.pos_ned_true[:, 0]).max() < 1.0
+    assert texts.count("No distances ahead: stopped") == 1
+    assert not any("Obstacle" in text for text in texts)
