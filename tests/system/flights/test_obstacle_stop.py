@@ -71,3 +71,38 @@ def test_without_a_sensor_it_does_not_move_and_says_why():
     assert abs(history.pos_ned_true[:, 0]).max() < 1.0
     assert texts.count("No distances ahead: stopped") == 1
     assert not any("Obstacle" in text for text in texts)
+
+
+def test_backwards_it_stops_before_what_is_behind_it():
+    async def script(drone):
+        drone.offboard_velocity(-2.0, 0.0, 0.0, yaw_rad=0.0)
+        await drone.start_offboard()
+        await drone.sleep(25.0)
+
+    _, history = driven(script, CP_DIST=KEEP_M, HG_RO_OFFB_BODY=1)
+    rear_m = -history.pos_ned_true[:, 0].min() + 0.3
+    assert WALL_M - KEEP_M - 1.0 < rear_m < WALL_M - KEEP_M + 0.3
+    assert np.hypot(*history.vel_ned_true[-100:, :2].T).max() < 0.1
+
+
+def test_it_drives_on_when_a_client_reports_the_way_free_again():
+    places = []
+
+    async def script(drone):
+        def report(distance_cm):
+            drone.send("OBSTACLE_DISTANCE", time_usec=0, sensor_type=0, distances=[distance_cm] * 72, increment=5,
+                       min_distance=10, max_distance=1000, increment_f=0.0, angle_offset=0.0, frame=12)  # fmt: skip
+
+        drone.offboard_velocity(1.0, 0.0, 0.0)
+        report(1001)
+        await drone.start_offboard()
+        for distance_cm in (1001, 60, 1001):
+            for _ in range(50):
+                report(distance_cm)
+                await drone.sleep(0.1)
+            places.append(drone.pos_ned[0])
+
+    texts, _ = driven(script, has_lidar=False, CP_DIST=KEEP_M)
+    assert texts.count("Obstacle ahead: stopped") == 1
+    assert places[1] < places[0] + 1.0
+    assert places[2] > places[1] + 3.0

@@ -6,7 +6,10 @@ import pytest
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import encode
+from mission.plan.plan_file import PlanItem
+from mission.plan.plan_lists import EXCLUSION_VERTEX, FENCE_LIST, RALLY_LIST, RALLY_POINT
 from tests.system.published.published_rules import CMD_SET_MODE, Flown, Sticks
+from tests.system.published.test_published_fences import least_clearance, place, polygon
 
 INJECT, GNSS, BATTERY, OFF = 420, 4.0, 100.0, 1.0
 GCS = 6  # MAV_TYPE
@@ -199,3 +202,21 @@ def test_without_a_position(action, mode, outcome):
         await rover.answers(drone, mode, f"Position lost{outcome}")
 
     rover.run(script)
+
+
+def test_it_returns_to_the_nearest_rally_point_round_what_its_fence_excludes():
+    rover = Rover(RTL_TYPE=3)
+    block = ((15.0, -8.0), (15.0, 8.0), (25.0, 8.0), (25.0, -8.0))
+
+    async def script(drone):
+        await drone.upload(polygon(block, EXCLUSION_VERTEX), FENCE_LIST)
+        await drone.upload([PlanItem(0, 3, RALLY_POINT, (0.0, 0.0, 0.0, 0.0), *place(10.0, 3.0), 0.0)], RALLY_LIST)
+        await drone.goto_ned(40.0, 0.0, 0.0)
+        await drone.return_home()
+        await drone.wait_disarmed(60.0)
+
+    rover.run(script)
+    track = np.array(rover.rows)[:, 1:4]
+    assert np.hypot(track[-1, 0] - 10.0, track[-1, 1] - 3.0) < 1.0
+    assert least_clearance(rover, track) > 0.0
+    assert rover.said("rally")
