@@ -140,7 +140,7 @@ class FailureWatch:
         if self._motors is not None:
             if self._motors.has_failure():
                 failures |= MOTOR_FAILED
-            if self._motors.is_stuck:
+            if self._motors.is_stuck():
                 failures |= STUCK
         if is_flying and self._battery.is_silent:
             failures |= BATTERY_SILENT

@@ -8,11 +8,14 @@ collision prevention, without its guidance of the direction.
 from collections.abc import Sequence
 from math import cos, floor, inf, isfinite, nan, pi, sin, sqrt
 
+from autopilot.vehicles.planned_limits import planned_accel
+from common.attitude import wrapped
 from common.params import Parameter, ParameterTable
 
 BINS = 72
 FRESH_US = 500_000  # older distances say nothing (PX4: RANGE_STREAM_TIMEOUT)
 _BIN_RAD = 2.0 * pi / BINS
+_SPREAD_RAD = 0.5 * _BIN_RAD  # to either side of a bearing, where what is at the distance may be
 _BESIDE_M = 0.1  # room beside a hull; guess
 _PX4 = "PX4 1.15 default"
 
@@ -36,6 +39,7 @@ class Obstacles:
     __slots__ = (
         "_accel",
         "_accel_name",
+        "_bearing_rad",
         "_delay_s",
         "_distance_m",
         "_params",
@@ -49,6 +53,7 @@ class Obstacles:
         self._params = params
         self._accel_name = accel
         self._distance_m = [nan] * BINS
+        self._bearing_rad = [i * _BIN_RAD for i in range(BINS)]  # of what is at that distance
         self._seen_us = [-FRESH_US - 1] * BINS
         self.body_m: Sequence[float] = ()  # [m] of the sensor on board, clockwise from the nose; inf: nothing there
         self.sensed_us = 0  # when it measured
@@ -74,13 +79,15 @@ class Obstacles:
             first_rad: bearing of the first one, clockwise from north.
             increment_rad: between two; may be negative.
         """
-        nearest: dict[int, float] = {}
+        nearest: dict[int, tuple[float, float]] = {}
         for i, distance_m in enumerate(distances_m):
             if distance_m == distance_m:
-                index = round((first_rad + i * increment_rad) / _BIN_RAD) % BINS
-                nearest[index] = min(distance_m, nearest.get(index, inf))
-        for index, distance_m in nearest.items():
+                bearing = first_rad + i * increment_rad
+                index = round(bearing / _BIN_RAD) % BINS
+                nearest[index] = min((distance_m, bearing), nearest.get(index, (inf, bearing)))
+        for index, (distance_m, bearing) in nearest.items():
             self._distance_m[index] = distance_m
+            self._bearing_rad[index] = bearing
             self._seen_us[index] = time_us
 
     def limited(self, north: float, east: float, now_us: int) -> tuple[float, float]:
@@ -99,7 +106,7 @@ class Obstacles:
         return north, east
 
     def room_along(self, heading_rad: float, end_m: float, half_width_m: float, now_us: int) -> float:
-        """Speed [m/s] from which it stops `keep_m` before what is in its lane along a heading; -1: none, inf: any.
+        """Speed [m/s] from which it stops `keep_m` before what is in its lane along a heading; inf: any.
 
         Args:
             heading_rad: of the lane, clockwise from north.
@@ -111,16 +118,16 @@ class Obstacles:
         for i in range(BINS):
             if now_us - self._seen_us[i] > FRESH_US:
                 continue
-            angle = i * _BIN_RAD - heading_rad
-            along = cos(angle)
-            if along <= 0.0:
+            angle = abs(wrapped(self._bearing_rad[i] - heading_rad))
+            if angle >= 0.5 * pi:
                 continue
             distance_m = self._distance_m[i]
-            if isfinite(distance_m) and abs(distance_m * sin(angle)) < half_width_m + _BESIDE_M:
-                way_m = min(way_m, distance_m * along)
+            beside_m = distance_m * sin(max(angle - _SPREAD_RAD, 0.0))
+            if isfinite(distance_m) and beside_m < half_width_m + _BESIDE_M:
+                way_m = min(way_m, distance_m * cos(angle))
         if not self._params["CP_GO_NO_DATA"] and not self.knows_along(heading_rad, now_us):
-            return -1.0
-        return (self._speed_towards(way_m - end_m) or -1.0) if isfinite(way_m) else inf
+            return 0.0
+        return self._speed_towards(way_m - end_m) if isfinite(way_m) else inf
 
     def knows_along(self, heading_rad: float, now_us: int) -> bool:
         """Whether there are distances of late straight along a heading."""
@@ -142,7 +149,7 @@ class Obstacles:
     def _load(self) -> None:
         self.keep_m = float(self._params["CP_DIST"])
         self._delay_s = float(self._params["CP_DELAY"])
-        self._accel = float(self._params[self._accel_name])
+        self._accel = planned_accel(float(self._params[self._accel_name]))
 
     def _on_parameter(self, parameter: Parameter) -> None:
         if parameter.name.startswith("CP_") or parameter.name == self._accel_name:

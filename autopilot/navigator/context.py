@@ -9,6 +9,7 @@ from autopilot.interface.vehicle_state import LandedState, Mode, VehicleState
 from autopilot.navigator.heading import Heading
 from autopilot.navigator.setpoint import SetpointPort, Vector
 from autopilot.ports import HEIGHT_VALID, TERRAIN_VALID
+from autopilot.vehicles.planned_limits import planned_accel, planned_jerk
 from autopilot.vehicles.vehicle_class import Craft, GroundHandling, VerticalLimits
 from common.geodesy import geodetic_from_ned, ned_from_geodetic
 from common.params import Parameter, ParameterTable
@@ -172,10 +173,10 @@ class NavContext:
         vel_north, vel_east, vel_down = estimate.vel_ned
         numbers = self._numbers
         limits = self.craft.limits
-        jerk = numbers[limits.jerk]
+        jerk = planned_jerk(numbers[limits.jerk])
         speed = hypot(vel_north, vel_east)
         if speed > 0.1:  # below that it is noise
-            reach = braking_distance(speed, numbers[limits.accel_hor], jerk) / speed
+            reach = braking_distance(speed, planned_accel(numbers[limits.accel_hor]), jerk) / speed
             north += vel_north * reach
             east += vel_east * reach
         vertical = limits.vertical

@@ -124,7 +124,8 @@ class Navigator:
         """Changes to a mode: at once in flight, when armed otherwise."""
         self._active.leave(mode)
         self._forget_requests(mode)
-        self.context.setpoint.is_reversed = False
+        if self.modes[mode] is not self._active:
+            self.context.setpoint.is_reversed = False  # DO_SET_REVERSE is for the mode flown
         is_low = self.is_taking_off and not is_high(self.context)
         was_climbing = self._is_in_takeoff or self._climb is not None
         self._active = self.context.flown = self.modes[mode]

@@ -5,7 +5,7 @@ only if something changed. The control part limits and smooths what is asked her
 """
 
 import struct
-from math import cos, isfinite, nan, sin
+from math import cos, inf, isfinite, nan, sin
 from typing import Any
 
 import numpy as np
@@ -59,7 +59,7 @@ class SetpointPort:
         self._motor_test: tuple[float, ...] = (0.0,) * MAX_MOTORS
         self.is_armed = False
         self.is_landed = True
-        self._room = (0.0, 0.0)  # [m/s] ahead, back
+        self._room = (0.0, 0.0)  # ahead, back, as the law takes them
         self.is_reversed = False  # ways are driven backwards, by what can
         self._settling: tuple[float, float] | None = None  # thrust [0..1] and heading [rad]
         self._press_speed = 0.0  # [m/s]
@@ -79,10 +79,16 @@ class SetpointPort:
             self._is_changed = True
 
     def leave_room(self, ahead_max: float, back_max: float) -> None:
-        """Bounds the speeds along the nose and backwards [m/s]; 0: any, negative: none."""
-        if (ahead_max, back_max) != self._room:
-            self._room = (ahead_max, back_max)
+        """Bounds the speeds along the nose and backwards [m/s]; inf: any."""
+        room = (_room_written(ahead_max), _room_written(back_max))
+        if room != self._room:
+            self._room = room
             self._is_changed = True
+
+    @property
+    def is_backing(self) -> bool:
+        """Whether it is asked to go backwards: by its speed, or on its way."""
+        return self.is_reversed or self.speed < 0.0
 
     def idle(self) -> None:
         """Asks for nothing: motors at idle when armed."""
@@ -353,3 +359,8 @@ class SetpointPort:
         self.yaw = self.yaw_rate = self.cruise_speed = self.climb_speed = self.descend_speed = self.thrust = nan
         self.speed = self.steering = nan
         self.exit_speed = self.pass_radius = 0.0
+
+
+def _room_written(speed: float) -> float:
+    """A bound [m/s] as the law takes it: 0 is any, so that rows of zeros bound nothing; negative is none."""
+    return 0.0 if speed == inf else speed or -1.0

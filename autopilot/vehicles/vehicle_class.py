@@ -53,13 +53,13 @@ class GroundDetector(Protocol):
 class DriveWatch(Protocol):
     """Says whether a motor has failed, or moves nothing."""
 
-    is_stuck: bool
-    """The vehicle drives, and does not get on."""
-
     def reset(self) -> None:
         """The vehicle has just been armed."""
 
     def has_failure(self) -> bool: ...
+
+    def is_stuck(self) -> bool:
+        """Whether the vehicle drives and does not get on; asked each frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +135,7 @@ class Craft:
     limits: MotionLimits
     ground: GroundHandling | None  # None: it never leaves the ground
     yaw_mode_param: str  # empty if the class has none
+    front_m: float  # of its front before its centre; 0 for what flies
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,4 +193,11 @@ class VehicleClass:
     def craft(self, airframe: Airframe) -> Craft:
         """A vehicle of the class, as the navigator knows it."""
         lift_thrust = 0.0 if self.ground is None else self.ground.lift_thrust(airframe)
-        return Craft(lift_thrust, self.standing_height_m(airframe), self.limits, self.ground, self.yaw_mode_param)
+        return Craft(
+            lift_thrust,
+            self.standing_height_m(airframe),
+            self.limits,
+            self.ground,
+            self.yaw_mode_param,
+            0.0 if self.lane is None else self.lane(airframe).front_m,
+        )

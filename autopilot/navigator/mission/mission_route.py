@@ -19,6 +19,7 @@ from autopilot.navigator.mission.item_commands import (
 )
 from autopilot.navigator.paths.spline import Pace, between
 from autopilot.navigator.setpoint import Vector
+from autopilot.vehicles.planned_limits import planned_accel, planned_jerk
 
 CORNER_ACCEL_FRACTION = (
     0.5  # of `limits.accel_hor`, used to turn from one leg to the next; the rest keeps to the line: guess
@@ -152,7 +153,7 @@ class Route:
             climb,
             descend,
             corner_accel(context),
-            number(limits.jerk_auto),
+            planned_jerk(number(limits.jerk_auto)),
             number(limits.path_error),
         )
 
@@ -191,7 +192,7 @@ def corner_accel(context: NavContext) -> float:
     limits = context.craft.limits
     if limits.accel_across:
         return context.number(limits.accel_across)
-    return CORNER_ACCEL_FRACTION * context.number(limits.accel_hor)
+    return CORNER_ACCEL_FRACTION * planned_accel(context.number(limits.accel_hor))
 
 
 def turn_begin(context: NavContext, tan_half: float, radius: float) -> float:

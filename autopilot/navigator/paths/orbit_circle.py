@@ -3,8 +3,9 @@
 The turns of a mission are a way with an end (autopilot.navigator.paths.spline).
 """
 
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import atan2, cos, hypot, isfinite, pi, sin, sqrt
 
+from autopilot.interface.client_requests import OrbitRequest
 from autopilot.navigator.setpoint import Vector
 from common.attitude import wrapped
 
@@ -62,6 +63,27 @@ class Circle:
         step = self.speed_m_s * dt_s / self.radius_m
         self.turned_rad += step
         self.angle = wrapped(self.angle + self.direction * step)
+
+
+def orbit_refusal(request: OrbitRequest, radius_m: float, bounds_m: tuple[float, float], fastest: float) -> str:
+    """Why a circle of a radius [m] cannot be gone round as asked; empty if it can.
+
+    Args:
+        request: what a client asks for.
+        radius_m: of the circle, either way round.
+        bounds_m: least and greatest radius.
+        fastest: [m/s] with which the circle can be gone round.
+    """
+    least, most = bounds_m
+    if not least <= abs(radius_m) <= most:
+        return f"a radius of {abs(radius_m):.1f} m is not between {least:g} and {most:g}"
+    if isfinite(request.lat_deg) != isfinite(request.lon_deg):
+        return "needs both latitude and longitude"
+    if abs(request.speed_m_s) > fastest:
+        return f"{abs(request.speed_m_s):.1f} m/s is too fast for this circle: {fastest:.1f} m/s at most"
+    if request.speed_m_s == 0.0:
+        return "an orbit needs a speed"
+    return "the number of turns cannot be negative" if request.turns_rad < 0.0 else ""
 
 
 def speed_limit(radius_m: float, accel_max: float) -> float:

@@ -62,8 +62,6 @@ class MotorWatch:
         "failed",
     )  # fmt: skip
 
-    is_stuck = False
-
     def __init__(
         self,
         state: VehicleState,
@@ -99,6 +97,10 @@ class MotorWatch:
             if state.landed_state is not LandedState.ON_GROUND:
                 self._judge(self._read_speeds())
         return bool(self.failed)
+
+    def is_stuck(self) -> bool:
+        """Nothing holds it in the air."""
+        return False
 
     def _judge(self, speeds: Sequence[float]) -> None:
         now_us = self._state.time_us

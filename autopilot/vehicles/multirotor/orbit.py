@@ -13,7 +13,7 @@ from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, OrbitStatus, Reply, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.goto import ground_d
-from autopilot.navigator.paths.orbit_circle import Circle, speed_limit
+from autopilot.navigator.paths.orbit_circle import Circle, orbit_refusal, speed_limit
 from autopilot.navigator.setpoint import Vector
 from autopilot.vehicles.multirotor.stick_modes import speed_down_of, yaw_rate_of
 from common.geodesy import GeoPoint
@@ -56,17 +56,9 @@ class Orbit(FlightMode):
     def take(self, request: OrbitRequest) -> Reply:
         """Chooses the next orbit."""
         radius_m = self._radius_of(request)
-        if not _RADIUS_MIN_M <= abs(radius_m) <= _RADIUS_MAX_M:
-            return _denied(f"a radius of {abs(radius_m):.1f} m is not between {_RADIUS_MIN_M:g} and {_RADIUS_MAX_M:g}")
-        if isfinite(request.lat_deg) != isfinite(request.lon_deg):
-            return _denied("needs both latitude and longitude")
-        fastest = self._fastest(radius_m)
-        if abs(request.speed_m_s) > fastest:
-            return _denied(f"{abs(request.speed_m_s):.1f} m/s is too fast for this circle: {fastest:.1f} m/s at most")
-        if request.speed_m_s == 0.0:
-            return _denied("an orbit needs a speed")
-        if request.turns_rad < 0.0:
-            return _denied("the number of turns cannot be negative")
+        refusal = orbit_refusal(request, radius_m, (_RADIUS_MIN_M, _RADIUS_MAX_M), self._fastest(radius_m))
+        if refusal:
+            return _denied(refusal)
         if isfinite(request.alt_amsl_m) and self._context.down_of(request.alt_amsl_m) > self._lowest_d():
             return _denied(f"an orbit is flown {_LOWEST_M:g} m above the ground or higher")
         self._request = request

@@ -7,7 +7,7 @@ from autopilot.interface.ardupilot_vehicle import INT8, INT16, REAL32, Alias, Ar
 _THROTTLE, _THROTTLE_LEFT, _THROTTLE_RIGHT, _STEERING = 70, 73, 74, 26
 _CAR, _SIDES = 5, 6  # CA_AIRFRAME
 # Failsafe actions. Ours are PX4's: 0 none, 1 hold, 2 return, 5 terminate, 7 smart return. FS_ACTION is one for all, and
-# goes by NAV_RCL_ACT; the others say whether there is any.
+# goes by NAV_RCL_ACT; the others say whether there is any: switched off and on again, FS_THR_ENABLE makes it Hold.
 _ACTIONS: Mapping[int, int] = {0: 0, 2: 1, 1: 2, 7: 3, 5: 5}
 _IS_ACTIVE: Mapping[int, int] = {0: 0, 1: 1, 2: 1, 5: 1, 6: 1, 7: 1}
 _CRASH_ACTIONS: Mapping[int, int] = {0: 0, 1: 1, 6: 2}

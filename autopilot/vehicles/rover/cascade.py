@@ -180,7 +180,9 @@ def loops(
         goal = wp.where(wp.abs(sp.thrust) > 0.0, sp.thrust, here.speed)
     else:
         goal = with_room(sp, goal)
-        may_park = airframe.is_skid == 0 or asked.is_stop == 1
+        is_straight = wp.abs(asked.yaw_rate) < params.still_yaw_rate
+        is_stopped = asked.is_stop == 1 or (goal == 0.0 and asked.speed != 0.0 and is_straight)
+        may_park = airframe.is_skid == 0 or is_stopped
         now.speed = follow_speed(params, airframe, now.speed, here, goal, now.voltage_fraction, may_park, _FRAME_S)
     now.steering = steering_step(params, airframe, now.steering, here, sp, asked, goal)
     actuators = Actuators()

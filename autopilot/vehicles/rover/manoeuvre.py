@@ -6,6 +6,7 @@ by driving the other way first, the end that leads towards the place turning to 
 
 import warp as wp
 
+from autopilot.vehicles.planned_limits import GRIP_M_S2
 from autopilot.vehicles.rover.control_airframe import RoverControlAirframe
 from autopilot.vehicles.rover.motion import Asked, Measured, right_of
 from autopilot.vehicles.rover.params import RoverParams
@@ -14,6 +15,7 @@ from autopilot.vehicles.rover.steering import tightest
 wp.set_module_options({"enable_backward": False})
 
 ARRIVED_M = wp.constant(0.04)  # way left at which a place counts as reached
+_GRIP_M_S2 = wp.constant(GRIP_M_S2)
 _NEAR_M = wp.constant(2.0)
 _LEAST_CURVATURE = wp.constant(0.1)  # [1/m] bounds a division
 _NEAR_TURNS = wp.constant(3.0)  # of the tightest radius
@@ -54,7 +56,7 @@ def near_m(params: RoverParams, airframe: RoverControlAirframe) -> float:
 @wp.func
 def speed_to_stop(params: RoverParams, way_m: float, end_speed: float) -> float:
     """[m/s] from which the speed at the end of the way can be reached."""
-    decel = 0.8 * wp.where(params.decel_limit > 0.0, params.decel_limit, 4.0)
+    decel = 0.8 * wp.where(params.decel_limit > 0.0, params.decel_limit, _GRIP_M_S2)
     reaction = decel * _REACTION_S
     left = wp.max(way_m, 0.0)
     braking = wp.sqrt(reaction * reaction + end_speed * end_speed + 2.0 * decel * left) - reaction

@@ -1,7 +1,8 @@
 """The crash check: does the rover move when it drives? ArduPilot's, with its numbers, each frame while armed.
 
-In: what the motors are told, and the estimate. Out: `is_stuck`, which the failsafe HG_RO_CRASH_ACT answers. A pilot who
-drives by throttle is not judged: he sees what stands in the way. Tipping over is PX4's failure detector's (FD_FAIL_R).
+In: what the motors are told, and the estimate. Out: whether it is stuck, which the failsafe HG_RO_CRASH_ACT answers. A
+pilot who drives by throttle is not judged: he sees what stands in the way. Tipping over is PX4's failure detector's
+(FD_FAIL_R).
 """
 
 from math import hypot
@@ -32,7 +33,7 @@ class StuckWatch:
         motors: outputs that drive it.
     """
 
-    __slots__ = ("_modes", "_motors", "_moved_us", "_params", "_state", "is_stuck")
+    __slots__ = ("_modes", "_motors", "_moved_us", "_params", "_state")
 
     def __init__(self, state: VehicleState, params: ParameterTable, modes: ModeTable, motors: tuple[int, ...]) -> None:
         self._state = state
@@ -40,15 +41,17 @@ class StuckWatch:
         self._modes = modes
         self._motors = motors
         self._moved_us = 0
-        self.is_stuck = False
 
     def reset(self) -> None:
         """The vehicle has just been armed."""
         self._moved_us = self._state.time_us
-        self.is_stuck = False
 
     def has_failure(self) -> bool:
-        """Looks whether it gets on; of its motors nobody tells."""
+        """Of its motors nobody tells."""
+        return False
+
+    def is_stuck(self) -> bool:
+        """Whether it has not got on for a while, as of this frame."""
         state = self._state
         command = state.actuators.command
         throttle = sum(command[motor] for motor in self._motors) / len(self._motors)  # not what turns it
@@ -56,5 +59,4 @@ class StuckWatch:
         moves = hypot(north, east) > _SLOW_M_S or abs(state.estimate.omega_frd[2]) > _TURNING_RAD_S
         if abs(throttle) < _THROTTLE_MIN or moves or self._modes[state.mode].needs_sticks:
             self._moved_us = state.time_us
-        self.is_stuck = state.time_us - self._moved_us > _PATIENCE_US
-        return False
+        return state.time_us - self._moved_us > _PATIENCE_US

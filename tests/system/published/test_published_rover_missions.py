@@ -14,7 +14,7 @@ from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import encode
 from common.geodesy import geodetic_from_ned
 from mission.plan.plan_file import PlanItem
-from tests.system.published.test_published_rover import AUTO, CHANGE_SPEED, HOLD, MANUAL, POSITION, RTL, Rover
+from tests.system.published.rover_station import AUTO, CHANGE_SPEED, HOLD, MANUAL, POSITION, RTL, Rover
 
 GCS = 6  # MAV_TYPE
 HOME_FRAME, WAYPOINT, EXCLUSION = 3, 16, 5002

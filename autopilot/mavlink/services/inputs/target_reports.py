@@ -153,14 +153,15 @@ class TargetService(Service):
     # Orbit
 
     def _orbit(self, command: Command) -> Reply:
-        """Flies round a point until another mode is chosen, or for a number of turns.
+        """Goes round a point until another mode is chosen, or for a number of turns.
 
         Params: p1 radius [m], positive is clockwise, NaN: the usual one; p2 speed [m/s], negative turns the other way,
-        NaN: 5 or what the circle allows; p3 heading: 0 to the centre, 1 as it was, 2 free, 3 along the circle, 4 by the
-        yaw stick, 5 as before; p4 turns [rad], 0 or NaN: for ever; p5, p6 centre, NaN: here, or the present centre; p7
-        altitude above sea level, in frames relative to home too (PX4), NaN: as it is.
-        Refused: TEMPORARILY_REJECTED on the ground or without a position; DENIED for a radius or speed that cannot be
-        flown, and for a heading that is none of these.
+        NaN: 5 or what the circle allows, of a rover its own; p3 heading: 0 to the centre, 1 as it was, 2 free, 3 along
+        the circle, 4 by the yaw stick, 5 as before, of a rover always 3; p4 turns [rad], 0 or NaN: for ever; p5, p6
+        centre, NaN: here, or the present centre, of a rover a radius ahead; p7 altitude above sea level, in frames
+        relative to home too (PX4), NaN: as it is.
+        Refused: TEMPORARILY_REJECTED for what flies and is on the ground, and without a position; DENIED for a radius
+        or speed that it cannot keep, and for a heading that is none of these.
         """
         if not is_position(command.x, command.y):
             return denied("there is no such latitude and longitude")

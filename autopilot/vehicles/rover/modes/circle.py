@@ -9,6 +9,7 @@ from autopilot.interface.client_requests import OrbitRequest
 from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, OrbitStatus, Reply, Verdict
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.paths.orbit_circle import orbit_refusal
 from common.attitude import wrapped
 from common.geodesy import GeoPoint
 
@@ -45,18 +46,10 @@ class RoverOrbit(FlightMode):
     def take(self, request: OrbitRequest) -> Reply:
         """Chooses the next circle."""
         radius_m = abs(self._radius_of(request))
-        least = self._least_radius_m()
-        if not least <= radius_m <= _RADIUS_MAX_M:
-            return _denied(f"a radius of {radius_m:.1f} m is not between {least:.1f} and {_RADIUS_MAX_M:g}")
-        if isfinite(request.lat_deg) != isfinite(request.lon_deg):
-            return _denied("needs both latitude and longitude")
-        fastest = self._fastest(radius_m)
-        if abs(request.speed_m_s) > fastest:
-            return _denied(f"{abs(request.speed_m_s):.1f} m/s is too fast for this circle: {fastest:.1f} m/s at most")
-        if request.speed_m_s == 0.0:
-            return _denied("an orbit needs a speed")
-        if request.turns_rad < 0.0:
-            return _denied("the number of turns cannot be negative")
+        bounds_m = (self._least_radius_m(), _RADIUS_MAX_M)
+        refusal = orbit_refusal(request, radius_m, bounds_m, self._fastest(radius_m))
+        if refusal:
+            return Reply(Verdict.DENIED, refusal)
         self._request = request
         return ACCEPTED
 
@@ -70,12 +63,13 @@ class RoverOrbit(FlightMode):
         context, number = self._context, self._context.number
         request, self._request = self._request or OrbitRequest(), None
         radius_m = self._radius_of(request)
+        self._radius_m = max(abs(radius_m), self._least_radius_m())
         speed = request.speed_m_s
         if not isfinite(speed):
             speed = number("HG_RO_CIRC_SPD") or number(context.craft.limits.cruise_speed)
-            speed = min(speed, self._fastest(abs(radius_m)))
+            speed = min(speed, self._fastest(self._radius_m))
         self._direction = 1.0 if radius_m * speed > 0.0 else -1.0
-        self._radius_m, self._speed = abs(radius_m), abs(speed)
+        self._speed = abs(speed)
         self._turns = request.turns_rad if isfinite(request.turns_rad) else 0.0
         self._turned, self._bearing = 0.0, nan
         if isfinite(request.lat_deg):
@@ -126,8 +120,4 @@ class RoverOrbit(FlightMode):
         number, limits = self._context.number, self._context.craft.limits
         turning = radians(number(limits.yaw_rate))
         by_grip = sqrt(_GRIP * number(limits.accel_across) * radius_m)
-        return float(min(by_grip, number(limits.speed_max), turning * radius_m if turning > 0.0 else by_grip))
-
-
-def _denied(reason: str) -> Reply:
-    return Reply(Verdict.DENIED, reason)
+        return float(min(by_grip, number(limits.speed_max), turning * radius_m))

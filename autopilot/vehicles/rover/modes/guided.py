@@ -17,17 +17,21 @@ from autopilot.navigator.setpoint import Vector
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_RATE
 from common.attitude import yaw_of
 
+NO_WAY = "there is no way to the target inside the fence"
+
 
 class RoverGuided(FlightMode):
     """Mode Guided."""
 
-    __slots__ = ("_context", "_is_active", "_next", "_path", "_received_us", "_setpoint")
+    __slots__ = ("_context", "_goal", "_is_active", "_next", "_path", "_received_us", "_refused", "_setpoint")
 
     begins_anew = False
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
         self._path = WaypointPath(context)  # around what the fence excludes
+        self._goal: Vector | None = None  # [m] where it goes, or has gone
+        self._refused: Vector | None = None  # [m] place of a stream that cannot be gone to, which is said once
         self._next: Vector | None = None  # [m] asked for before the mode was entered
         self._setpoint: OffboardSetpoint | None = None  # that must be renewed
         self._received_us = 0
@@ -39,12 +43,10 @@ class RoverGuided(FlightMode):
         """Stops, or goes where a client has just asked it to go."""
         self._is_active = True
         target, self._next = self._next, None
-        if target is None:
-            self._setpoint = None
-            self._path.stop()
+        self._setpoint = self._refused = None
+        if target is None or not self._go(target):
+            self._stop_going()
             self._stand()
-        else:
-            self._go(target)
 
     def leave(self, following: Mode) -> None:
         if following is not Mode.GUIDED:
@@ -71,11 +73,20 @@ class RoverGuided(FlightMode):
     def _stand(self) -> None:
         self._context.setpoint.drive(speed=0.0, yaw_rate=0.0)
 
-    def _go(self, target: Vector) -> None:
+    def _go(self, target: Vector) -> bool:
+        """Sets out for a place; whether there is a way."""
         context = self._context
-        self._setpoint = None
         here = context.stop_point()
-        self._path.start(here, context.find_path(here, target) or [target])
+        points = context.find_path(here, target)
+        if points is None:
+            return False
+        self._setpoint, self._goal = None, target
+        self._path.start(here, points)
+        return True
+
+    def _stop_going(self) -> None:
+        self._goal = None
+        self._path.stop()
 
     def _drive(self, setpoint: OffboardSetpoint) -> None:
         context = self._context
@@ -119,15 +130,22 @@ class RoverGuided(FlightMode):
         north, east, down = setpoint.pos_ned
         if isfinite(north) and isfinite(east):
             down = down if isfinite(down) else self._context.state.estimate.pos_ned[2]
-            refusal = self._context.fence_refusal((north, east, down))
-            if refusal:
-                self._context.announcer.statustext(Severity.WARNING, f"Guided: {refusal}")
-                return
-            self._go((north, east, down))
+            self._head_for((north, east, down))
             return
-        self._path.stop()
-        self._setpoint = setpoint
+        self._stop_going()
+        self._setpoint, self._refused = setpoint, None
         self._received_us = self._context.state.time_us
+
+    def _head_for(self, target: Vector) -> None:
+        """A client's stream asks for a place: the same again changes nothing, what cannot be gone to neither."""
+        if any(place is not None and place[:2] == target[:2] for place in (self._goal, self._refused)):
+            return
+        refusal = self._context.fence_refusal(target)
+        if not refusal and not self._go(target):
+            refusal = NO_WAY
+        self._refused = target if refusal else None
+        if refusal:
+            self._context.announcer.statustext(Severity.WARNING, f"Guided: {refusal}")
 
     def _go_to(self, request: GoTo) -> Reply:
         """Goes to a position; what is NaN stays as it is."""
@@ -144,7 +162,7 @@ class RoverGuided(FlightMode):
                 return chosen
             target = chosen[0]
             if context.find_path(here, target) is None:
-                return Reply(Verdict.DENIED, "there is no way to the target inside the fence")
+                return Reply(Verdict.DENIED, NO_WAY)
         if isfinite(request.speed_m_s) and request.speed_m_s > 0.0:
             context.cruise_speed = request.speed_m_s
         if self._is_active:

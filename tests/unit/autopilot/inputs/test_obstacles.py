@@ -1,11 +1,12 @@
 """Collision prevention: velocities that let the vehicle stop before what is round it."""
 
-from math import cos, hypot, inf, nan, pi, radians, sin
+from math import atan2, cos, hypot, inf, isfinite, nan, pi, radians, sin
 
 import pytest
 
 from autopilot.inputs.obstacles import BINS, FRESH_US, Obstacles
 from autopilot.params import parameter_table
+from autopilot.vehicles.rover.vehicle import ROVER
 
 ALL_ROUND = 2.0 * pi / BINS
 
@@ -57,3 +58,38 @@ def test_nearest_of_a_bin_counts_and_directions_may_run_backwards():
     found = obstacles([nan] * BINS, CP_GO_NO_DATA=1)
     found.reported(0, [9.0, 4.0, 2.0], radians(90.0), radians(-0.5))  # three rays in the bin to the east
     assert found.limited(0.0, 5.0, 0) == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("distance_m", [2.5, 4.0, 8.0])
+@pytest.mark.parametrize("beside_m", [-0.3, 0.0, 0.3])
+def test_a_post_in_the_lane_is_seen_from_every_heading(distance_m, beside_m):
+    """Of a scanner that tells the nearest of sectors of 5 degrees, fixed to the hull."""
+    for yaw_deg in range(0, 360, 7):
+        yaw = radians(yaw_deg)
+        ahead_m = (distance_m**2 - beside_m**2) ** 0.5
+        off_nose = atan2(beside_m, ahead_m)
+        sectors = [inf] * BINS
+        sectors[round(off_nose / ALL_ROUND) % BINS] = distance_m
+        found = obstacles([nan] * BINS)
+        found.reported(0, sectors, yaw, ALL_ROUND)
+        room = found.room_along(yaw, 0.4, 0.25, 0)
+        assert room < 3.0 * (distance_m - 0.4) ** 0.5 + 0.1
+        assert isfinite(room)
+
+
+def test_what_stands_beside_the_lane_does_not_stop_it():
+    for yaw_deg in range(0, 360, 7):
+        sectors = [0.8 / max(abs(sin(i * ALL_ROUND)), 1e-9) for i in range(BINS)]  # walls on both sides
+        found = obstacles([nan] * BINS, CP_DIST=0.5)
+        found.reported(0, [min(d, 10.0) if d < 10.0 else inf for d in sectors], radians(yaw_deg), ALL_ROUND)
+        assert found.room_along(radians(yaw_deg), 0.4, 0.25, 0) > 2.0
+
+
+@pytest.mark.parametrize("none", [-1.0, 0.0])
+def test_no_limit_of_braking_is_what_wheels_hold(none):
+    table = parameter_table(vehicle=ROVER)
+    table.set("CP_DIST", 1.0)
+    table.set("RO_DECEL_LIM", none)
+    found = Obstacles(table, "RO_DECEL_LIM")
+    found.reported(0, [4.0] * BINS, 0.0, ALL_ROUND)
+    assert 2.0 < found.room_along(0.0, 0.4, 0.25, 0) < 5.0

@@ -3,40 +3,16 @@
 import numpy as np
 import pytest
 
-from mission.flight import Flight, FlightConfig
-from mission.script import ScriptError
 from sim.world.world import WorldConfig
 from tests.system.published.published_rules import Sticks
+from tests.system.rover.walled import WALL_M, driven, to_behind_the_wall
 
-WALL_M = 25.0
-WALLED = WorldConfig(trees_per_ha=0.0, hill_height_m=0.0, size_m=2 * WALL_M, has_walls=True, wall_height_m=2.0)
 KEEP_M = 1.0
 SET_MODE, POSCTL = 176, 3.0
 
 
-def driven(script, *, has_lidar=True, **parameters):
-    flight = Flight(FlightConfig(airframe="rover", world=WALLED, has_lidar=has_lidar, parameters=parameters))
-
-    async def whole(drone):
-        await drone.wait_ready()
-        await drone.arm()
-        await script(drone)
-        return list(drone.texts)
-
-    running = flight.fly(whole, seconds=120.0)
-    history = flight.close()
-    if running.error is not None:
-        raise running.error
-    return running.result, history
-
-
-async def behind_the_wall(drone):
-    with pytest.raises(ScriptError):
-        await drone.goto_ned(60.0, 0.0, 0.0, timeout_s=30.0)
-
-
 def test_a_goto_behind_a_wall_ends_before_the_wall():
-    texts, history = driven(behind_the_wall, CP_DIST=KEEP_M)
+    texts, history = driven(to_behind_the_wall, CP_DIST=KEEP_M)
     front_m = history.pos_ned_true[:, 0].max() + 0.4
     assert WALL_M - KEEP_M - 0.8 < front_m < WALL_M - KEEP_M + 0.3
     assert np.hypot(*history.vel_ned_true[-100:, :2].T).max() < 0.1
@@ -61,13 +37,13 @@ def test_a_pilot_is_stopped_forwards_and_backs_away():
 
 
 def test_without_the_parameter_nothing_stops_it():
-    texts, history = driven(behind_the_wall)
+    texts, history = driven(to_behind_the_wall)
     assert history.pos_ned_true[:, 0].max() > WALL_M - 1.0
     assert "Obstacle ahead: stopped" not in texts
 
 
 def test_without_a_sensor_it_does_not_move_and_says_why():
-    texts, history = driven(behind_the_wall, has_lidar=False, CP_DIST=KEEP_M)
+    texts, history = driven(to_behind_the_wall, has_lidar=False, CP_DIST=KEEP_M)
     assert abs(history.pos_ned_true[:, 0]).max() < 1.0
     assert texts.count("No distances ahead: stopped") == 1
     assert not any("Obstacle" in text for text in texts)
@@ -79,7 +55,8 @@ def test_backwards_it_stops_before_what_is_behind_it():
         await drone.start_offboard()
         await drone.sleep(25.0)
 
-    _, history = driven(script, CP_DIST=KEEP_M, HG_RO_OFFB_BODY=1)
+    texts, history = driven(script, CP_DIST=KEEP_M, HG_RO_OFFB_BODY=1)
+    assert texts.count("Obstacle behind: stopped") == 1
     rear_m = -history.pos_ned_true[:, 0].min() + 0.3
     assert WALL_M - KEEP_M - 1.0 < rear_m < WALL_M - KEEP_M + 0.3
     assert np.hypot(*history.vel_ned_true[-100:, :2].T).max() < 0.1
@@ -106,3 +83,15 @@ def test_it_drives_on_when_a_client_reports_the_way_free_again():
     assert texts.count("Obstacle ahead: stopped") == 1
     assert places[1] < places[0] + 1.0
     assert places[2] > places[1] + 3.0
+
+
+@pytest.mark.parametrize("airframe", ["rover", "rover-skid"])
+def test_stopped_on_a_slope_it_stands_and_is_not_called_stuck(airframe):
+    hills = WorldConfig(
+        trees_per_ha=0.0, size_m=2 * WALL_M, hill_height_m=4.0, clearing_radius_m=2.0, clearing_blend_m=4.0,
+        has_walls=True, wall_height_m=6.0,
+    )  # fmt: skip
+    texts, history = driven(to_behind_the_wall, airframe=airframe, world=hills, CP_DIST=KEEP_M)
+    assert texts.count("Obstacle ahead: stopped") == 1
+    assert not any("Stuck" in text for text in texts)
+    assert np.hypot(*history.vel_ned_true[-100:, :2].T).max() < 0.1

@@ -1,0 +1,195 @@
+"""What clients ask of a rover beside what ArduPilot's tests ask: places beside it, reverse, ways that do not exist."""
+
+from dataclasses import replace
+from math import hypot
+
+import numpy as np
+import pytest
+
+from common.attitude import wrapped
+from tests.system.published.published_rules import Flown
+from tests.system.published.rover_station import (
+    CIRCLE,
+    DOCK,
+    FOLLOW,
+    HOLD,
+    POSITION,
+    SET_REVERSE,
+    VELOCITY,
+    Rover,
+)
+from tests.system.published.test_published_fences import polygon
+from tests.system.published.test_published_rover import FRONT_M
+
+EXCLUSION, FENCE = 5002, 1
+NO_WAY = "Guided: there is no way to the target inside the fence"
+RING = [
+    ((10.0, -20.0), (10.0, 20.0), (13.0, 20.0), (13.0, -20.0)),
+    ((30.0, -20.0), (30.0, 20.0), (33.0, 20.0), (33.0, -20.0)),
+    ((9.0, -23.0), (9.0, -18.0), (34.0, -18.0), (34.0, -23.0)),
+    ((9.0, 18.0), (9.0, 23.0), (34.0, 23.0), (34.0, 18.0)),
+]
+
+
+@pytest.mark.parametrize("target", [(0.5, 1.3), (-0.2, -1.0), (-3.0, 0.5), (-12.0, 4.0)])
+@pytest.mark.parametrize("airframe", ["rover", "rover-skid"])
+def test_a_dock_beside_or_behind_it_is_come_to_with_the_front(airframe, target):
+    rover = Rover(airframe, HG_RO_DOCK_STP=0.0)
+
+    async def script(client):
+        await rover.armed()
+        start = rover.flown.pos
+        dock = (start[0] + target[0], start[1] + target[1])
+        client.start(rover.shows_dock(*target))
+        await client.sleep(1.0)
+        await rover.mode(DOCK)
+        await client.until(lambda: rover.said("Docked"), 60.0, "docked")
+        await client.sleep(3.0)
+        off_deg = rover.turned_deg(np.arctan2(dock[1] - rover.flown.pos[1], dock[0] - rover.flown.pos[0]))
+        assert abs(off_deg) < 60.0
+        assert rover.away(*dock) - FRONT_M < 0.3
+        assert abs(rover.speed) < 0.05
+
+    rover.run(script)
+
+
+def test_a_dock_lost_from_sight_is_waited_for():
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        seen = client.start(rover.shows_dock(30.0, 0.0))
+        await client.sleep(1.0)
+        await rover.mode(DOCK)
+        await client.sleep(4.0)
+        assert rover.speed == pytest.approx(0.5, abs=0.1)
+        seen.cancel()
+        await client.until(lambda: rover.said("Dock: target lost, waiting"), 10.0, "lost")
+        await client.sleep(3.0)
+        assert abs(rover.speed) < 0.05
+        client.start(rover.shows_dock(30.0, 0.0))
+        await client.sleep(5.0)
+        assert rover.speed == pytest.approx(0.5, abs=0.1)
+
+    rover.run(script)
+
+
+@pytest.mark.parametrize("beside", [(0.0, 3.0), (-1.5, -0.8), (6.0, 0.0)])
+def test_a_place_beside_somebody_who_stands_is_gone_to_and_kept(beside):
+    rover = Rover(FLW_TGT_DST=2.0)
+
+    async def script(client):
+        await rover.armed()
+        somebody = rover.flown.pos[:2] + np.array(beside)
+        await rover.mode(FOLLOW)
+        for k in range(600):
+            rover.tell_target(somebody, (0.0, 0.0))
+            await client.sleep(0.1)
+            if k == 400:
+                begin_s = rover.flown.now_s
+        rows = rover.flown.since(begin_s)
+        assert hypot(*(rover.flown.pos[:2] - somebody)) == pytest.approx(2.0, abs=0.6)
+        assert np.hypot(*rows[:, 4:6].T).max() < 0.15
+
+    rover.run(script)
+
+
+def test_it_backs_away_from_somebody_who_comes_nearer_without_turning_round():
+    rover = Rover(FLW_TGT_DST=4.0, FLW_TGT_FA=0.0)
+
+    async def script(client):
+        await rover.armed()
+        somebody = rover.flown.pos[:2] + np.array((4.0, 0.0))
+        await rover.mode(FOLLOW)
+        for _ in range(150):
+            somebody -= np.array((0.08, 0.0))
+            rover.tell_target(somebody, (-0.8, 0.0))
+            await client.sleep(0.1)
+        assert rover.speed == pytest.approx(-0.8, abs=0.25)
+        assert abs(rover.turned_deg(0.0)) < 45.0
+
+    rover.run(script)
+
+
+def test_reverse_stays_where_a_place_is_asked_for_in_hold():
+    flown = Flown(config={"airframe": "rover"})
+
+    async def script(drone):
+        await drone.wait_ready()
+        await drone.arm()
+        await drone.command(SET_REVERSE, 1.0, name="reverse")
+        yaw = flown.state.yaw_rad
+        await drone.goto_ned(-20.0, 0.0, 0.0, timeout_s=30.0)
+        assert abs(wrapped(flown.state.yaw_rad - yaw)) < 0.3
+        assert flown.home_distance_m > 19.0
+
+    flown.run(script, 120.0)
+
+
+def test_a_streamed_place_without_a_way_is_refused_once_and_not_driven_to():
+    rover = Rover()
+
+    async def script(client):
+        fence = [item for corners in RING for item in polygon(corners, EXCLUSION)]
+        await client.upload([replace(item, seq=i) for i, item in enumerate(fence)], FENCE)
+        await client.set_parameter("FENCE_ENABLE", 1)
+        await rover.armed()
+        await rover.target(POSITION, 10.0, x=21.0, y=0.0)
+        assert client.texts.count(NO_WAY) == 1
+        assert hypot(*rover.flown.pos[:2]) < 2.0
+        await rover.target(VELOCITY, 3.0, vx=0.0, vy=1.0)
+        await rover.target(POSITION, 1.0, x=21.0, y=0.0)
+        assert client.texts.count(NO_WAY) == 2
+
+    rover.run(script)
+
+
+def test_a_streamed_place_is_planned_once():
+    rover = Rover()
+
+    async def script(client):
+        await rover.armed()
+        context = rover.flown.flight.controller.navigator.context
+        find_path, asked = context.find_path, []
+        context.find_path = lambda start, goal: asked.append(goal) or find_path(start, goal)
+        await rover.target(POSITION, 20.0, x=20.0, y=10.0)
+        assert len(asked) == 1
+        assert rover.away(20.0, 10.0) < 1.0
+
+    rover.run(script)
+
+
+def test_a_circle_smaller_than_it_can_turn_is_made_larger():
+    rover = Rover(HG_RO_CIRC_RAD=0.5, HG_RO_CIRC_SPD=0.5)
+
+    async def script(client):
+        await rover.armed()
+        await rover.mode(CIRCLE)
+        await client.sleep(10.0)
+        begin_s = rover.flown.now_s
+        await client.sleep(25.0)
+        track = rover.flown.since(begin_s)[:, 1:3]
+        sizes = track.max(axis=0) - track.min(axis=0)
+        assert (sizes > 1.6).all()
+        assert (sizes < 4.0).all()
+
+    rover.run(script)
+
+
+@pytest.mark.parametrize("none", [-1.0, 0.0])
+def test_no_limits_of_braking_and_jerk_are_no_trouble(none):
+    """PX4's -1: it goes, stops where it was to, and keeps its distance to what is in its way."""
+    rover = Rover(RO_DECEL_LIM=none, RO_JERK_LIM=none, RO_ACCEL_LIM=none)
+
+    async def script(client):
+        await rover.armed()
+        await rover.target(POSITION, x=25.0, y=10.0)
+        await rover.there(25.0, 10.0, 0.5)
+        await client.sleep(2.0)
+        assert rover.away(25.0, 10.0) < 0.8
+        await rover.target(VELOCITY, 4.0, vx=3.0)
+        await rover.mode(HOLD)
+        await client.sleep(3.0)
+        assert abs(rover.speed) < 0.1
+
+    rover.run(script)
