@@ -8,6 +8,7 @@ import http
 import json
 import logging
 import secrets
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -69,6 +70,7 @@ class PageServer(viser.ViserServer):
         with socket() as probe:  # viser would take the next port in silence
             probe.bind((LOOPBACK, port))
         rich.get_console().quiet = True  # viser prints through it that it starts and stops
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection")  # a viewer may leave in mid-frame
         self._token = new_token()
         with _guarded(self._token) as opened:
             super().__init__(host=LOOPBACK, port=port, label=title, verbose=False)
