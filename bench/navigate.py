@@ -87,9 +87,9 @@ class Flights:
         return bootstrap(len(speeds), lambda rows: float(speeds[rows].mean()) if len(rows) else float("nan"))
 
 
-def build(settings: dict[str, str], trees_per_ha: float, episodes: int) -> Navigate:
+def build(settings: dict[str, str], trees_per_ha: float, episodes: int, name: str = "Navigate") -> Navigate:
     """Held-out environments of one density."""
-    task = build_task("Navigate", episodes, task_settings("Navigate", settings | {"split": "test"}))
+    task = build_task(name, episodes, task_settings(name, settings | {"split": "test"}))
     if not isinstance(task, Navigate):
         raise TypeError(task)
     task.set_params({"trees_per_ha": trees_per_ha})

@@ -87,26 +87,28 @@ def cross(pilot: NavigationPilot, trees_per_ha: float, seed: int) -> Crossing:
     flight, companion = flight_with_navigator(config, pilot)
     try:
         flight.fly(take_off, seconds=_TAKEOFF_S)
-        _advance(flight, _SETTLE_S)
+        advance(flight, _SETTLE_S)
         flight.rig.set_air(wind_model(wind_m_s, rng.uniform(0.0, 360.0), TURBULENCE, gust_m_s))
         _vary_vehicle(flight, mass_scale=rng.uniform(0.9, 1.15), motor_scale=rng.uniform(0.93, 1.07))
         bearing, away_m = rng.uniform(-pi, pi), rng.uniform(GOAL_MIN_M, GOAL_MAX_M)
         north, east = away_m * cos(bearing), away_m * sin(bearing)
         goal_ned = (north, east, -float(flight.world.height(north, east)) - GOAL_HEIGHT_M)
         flight.rig.forget_impacts()
-        _send_goto(flight, goal_ned)
-        return _judged(flight, companion, goal_ned, seed)
+        send_goto(flight, goal_ned)
+        return judged(flight, companion, goal_ned, seed)
     finally:
         flight.close()
 
 
-def _judged(flight: Flight, companion: Companion, goal_ned: Vector, seed: int) -> Crossing:
+def judged(
+    flight: Flight, companion: Companion, goal_ned: Vector, seed: int, slowest_m_s: float = SLOWEST_M_S
+) -> Crossing:
     """Flies to the goal, or to wherever it ends, and waits a little after it has been handed back."""
     truth = flight.rig.rows["truth"][0]
     begun_us, way_m, speed = flight.time_us, 0.0, nan
     last_ned = _place(truth)
     nearest_m = dist(last_ned, goal_ned)
-    over_us = begun_us + round(nearest_m / SLOWEST_M_S * 1e6)
+    over_us = begun_us + round(nearest_m / slowest_m_s * 1e6)
     has_flown = is_back = False
     outcome = ""
     while not outcome and flight.time_us < over_us:
@@ -144,7 +146,7 @@ def _vary_vehicle(flight: Flight, mass_scale: float, motor_scale: float) -> None
     model["thrust_n_s2"] *= motor_scale
 
 
-def _send_goto(flight: Flight, goal_ned: Vector) -> None:
+def send_goto(flight: Flight, goal_ned: Vector) -> None:
     lat_deg, lon_deg, alt_amsl_m = geodetic_from_ned(*goal_ned, flight.config.home)
     flight.drone.send(
         "COMMAND_INT",
@@ -160,7 +162,7 @@ def _send_goto(flight: Flight, goal_ned: Vector) -> None:
     )
 
 
-def _advance(flight: Flight, seconds: float) -> None:
+def advance(flight: Flight, seconds: float) -> None:
     end_us = flight.time_us + round(seconds * 1e6)
     flight.run(lambda _: flight.time_us >= end_us)
 
@@ -182,6 +184,16 @@ def row(trees_per_ha: float, crossings: Sequence[Crossing]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
+def told(trees_per_ha: float, crossings: Sequence[Crossing]) -> str:
+    """A line of the table, printed below what did not arrive."""
+    for crossing in crossings:
+        if crossing.outcome != "arrived":
+            print(crossing, flush=True)
+    line = row(trees_per_ha, crossings)
+    print(line, flush=True)
+    return line
+
+
 def main(arguments: list[str]) -> int:
     path = Path(arguments[0]) if arguments else find_policy("navigate")
     pilot = NavigationPilot(load_policy(path)[0], str(path))
@@ -190,11 +202,7 @@ def main(arguments: list[str]) -> int:
     lines = []
     for k, trees_per_ha in enumerate(densities):
         crossings = [cross(pilot, trees_per_ha, FIRST_SEED + 2 * (i + k * FLIGHTS)) for i in range(count)]
-        for crossing in crossings:
-            if crossing.outcome != "arrived":
-                print(crossing, flush=True)
-        lines.append(row(trees_per_ha, crossings))
-        print(lines[-1], flush=True)
+        lines.append(told(trees_per_ha, crossings))
     page = PAGE.read_text()
     section = SECTION.format(flights=count, rows="\n".join(lines), machine=machine())
     before = page[: page.find(FLOWN)] if FLOWN in page else f"{page}\n"

@@ -13,11 +13,12 @@ from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, flight_
 from mission.flight_settings import FlightOptions, FlightSettings, Pace
 from mission.flight_state_folder import stored_home
 from sim.world.driving_worlds import CAR_PARK, COURSE
-from sim.world.forest_world import FOREST
+from sim.world.forest_world import FOREST, WALLED_FOREST
 from sim.world.world import WorldConfig
 
 FIELD_TREES_PER_HA = 60.0  # where an owner walks, if nothing else is asked for
 FOREST_TREES_PER_HA = 400.0
+FORESTS = {"forest": FOREST, "walled-forest": WALLED_FOREST}
 
 
 def check_parameters(options: FlightOptions) -> None:
@@ -43,7 +44,7 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
             parameters=dict(parameter_of(text) for text in options.parameters),
             owner=None if options.owner is None else OwnerConfig(pace=cast(Pace, options.owner)),
             world=_world(options),
-            is_forest=options.world_kind == "forest",
+            is_forest=options.world_kind in FORESTS,
         )
     except ValidationError as error:
         raise UserError(first_fault(error)) from error
@@ -59,8 +60,8 @@ def _world(options: FlightOptions) -> WorldConfig:
 
         trees = FIELD_TREES_PER_HA if options.trees_per_ha is None else options.trees_per_ha
         return FOLLOW_WORLD.model_copy(update={"seed": options.world_seed, "trees_per_ha": trees})
-    if options.world_kind == "forest":
-        return FOREST.model_copy(update={"trees_per_ha": FOREST_TREES_PER_HA} | given)
+    if options.world_kind in FORESTS:
+        return FORESTS[options.world_kind].model_copy(update={"trees_per_ha": FOREST_TREES_PER_HA} | given)
     if options.world_kind != "hills":
         driven = {"course": COURSE, "car-park": CAR_PARK}[options.world_kind]
         return driven.model_copy(update={"seed": options.world_seed})

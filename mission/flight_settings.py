@@ -14,7 +14,7 @@ from common.geodesy import DEFAULT_HOME
 from mission.console.model_command import option
 
 Pace = Literal["walk", "run"]
-WorldKind = Literal["hills", "forest", "course", "car-park"]
+WorldKind = Literal["hills", "forest", "walled-forest", "course", "car-park"]
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
 
 
@@ -60,7 +60,9 @@ class FlightOptions(FlightSettings):
     )
     has_walls: bool = option(False, "Walls along the edges of the map.", "--walls")
     world_kind: WorldKind = option(
-        "hills", "hills, forest (to navigate through), course (walls, trees, movers) or car-park.", "--world"
+        "hills",
+        "hills, forest, walled-forest (for a rover), course (walls, trees, movers) or car-park.",
+        "--world",
     )
     """The last two are to be driven in: of the options about the world they take its seed alone."""
     host: str = option("127.0.0.1", "Address ground stations are sent to.")

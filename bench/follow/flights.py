@@ -19,8 +19,8 @@ from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion
 from mission.script import take_off
 from policies.companion.engagement import Phase
-from policies.companion.following import Pilot
 from policies.companion.pilot import load_pilot
+from policies.companion.skills.following import Pilot
 from policies.tasks.follow_me.track import Track
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 

@@ -13,8 +13,8 @@ from mission.flight_config import OwnerConfig
 from mission.follow.lockstep import flight_with_companion
 from mission.script import take_off
 from policies.companion.engagement import Phase
-from policies.companion.following import Pilot
 from policies.companion.pilot import LAYOUT_VERSION, SCRIPTED, TASK, load_pilot
+from policies.companion.skills.following import Pilot
 from policies.learn.config.network import NetworkSettings
 from policies.learn.export.policy_file import PolicyCard, save_policy
 from policies.learn.networks.policy import Policy

@@ -31,6 +31,7 @@ training configurations set or randomise the numbers by name under `environment_
 | [Hover](#hover) | hold a drone at a point by body rates and thrust; 1 per decision at the point |
 | [Drive](#drive) | drive a rover to a pose on hills, or into a spot of a car park: [more](../explanation/drive.md) |
 | [Navigate](#navigate) | fly a drone through forest to a goal, at speed: [more](../explanation/navigate.md) |
+| [NavigateRover](#navigaterover) | drive one between trees and walls: [more](../explanation/navigate.md#on-wheels) |
 
 The linked pages say what the presets are made of, how rewards are paid, and which spots are held out for tests. Every
 reward is among the numbers. In the tables of observations `#` stands for a number, an element times its scale is the

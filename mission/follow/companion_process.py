@@ -18,8 +18,8 @@ from common.clock import Pacer, wall_time_s
 from mission.console.terminal import print_line
 from policies.companion.companion import MISFIT, Companion
 from policies.companion.image_client import CameraUrlError
-from policies.companion.load_skill import load_skill
 from policies.companion.pilot import PilotError
+from policies.companion.skills.load_skill import load_skill
 
 POLL_US = 2_000
 PROGRESS_US = 500_000
@@ -52,6 +52,8 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         skill = load_skill(options.policy, options.camera, is_ordered_by_goto=options.is_reported)
         if options.is_by_sticks and not skill.drives:
             raise CompanionError(f"--by-sticks: {options.policy} flies, and only what drives is driven by sticks")
+        if options.is_by_sticks and not skill.is_along_nose:
+            raise CompanionError(f"--by-sticks: {options.policy} asks for courses, and sticks for turns")
         link = open_client_link(options.link)
     except (PilotError, CameraUrlError, LinkError) as error:
         raise CompanionError(str(error)) from error

@@ -34,9 +34,9 @@ from mission.view.film import write_film
 from mission.view.replay_file import RecordingError, load_recording
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
-from policies.companion.following import Pilot
 from policies.companion.names import SCRIPTED, TASK
 from policies.companion.pilot import PilotError, load_pilot
+from policies.companion.skills.following import Pilot
 from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.scorecard import Scorecard, lines, named_lines, scorecard
 

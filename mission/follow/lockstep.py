@@ -10,10 +10,10 @@ from pathlib import Path
 from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
 from mission.flight import Flight, FlightConfig
 from policies.companion.companion import Companion
-from policies.companion.driving import Driving
-from policies.companion.following import Following, Pilot
 from policies.companion.image_client import MemoryCamera
-from policies.companion.navigating import Navigating
+from policies.companion.skills.driving import Driving
+from policies.companion.skills.following import Following, Pilot
+from policies.companion.skills.navigating import Navigating
 from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
 from sim.world.world import WorldMap
 

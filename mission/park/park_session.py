@@ -33,9 +33,9 @@ from mission.script import Drone, ScriptError
 from mission.simulator.flight_rig import flight_world
 from mission.view.pose_goals import Pose, PoseGoals
 from policies.companion.companion import Companion
-from policies.companion.driving import Driving
 from policies.companion.engagement import Phase
 from policies.companion.pilot import PilotError
+from policies.companion.skills.driving import Driving
 from policies.companion.vector_pilot import DrivingPilot
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy

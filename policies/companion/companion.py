@@ -15,7 +15,7 @@ import numpy as np
 from autopilot.interface.vehicle_state import Mode
 from autopilot.mavlink.client_end import ByteLink
 from policies.companion.engagement import Engagement, Phase, Sending, Situation, Wish
-from policies.companion.skill import Floats, Skill, Velocity
+from policies.companion.skills.skill import Floats, Skill, Velocity
 from policies.companion.stick_control import StickControl
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
 
@@ -116,7 +116,7 @@ class Companion:
         if self._sticks is not None:
             self._sticks.send(self._setpoint)
         else:
-            self.vehicle.send_setpoint(*self._setpoint, is_along_nose=self.skill.drives)
+            self.vehicle.send_setpoint(*self._setpoint, is_along_nose=self.skill.is_along_nose)
 
     def _switch(self, sending: Sending) -> None:
         """Takes over, or lets go."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector
 from policies.companion.belief import owner_belief
-from policies.companion.following import Pilot
 from policies.companion.names import SCRIPTED, TASK
+from policies.companion.skills.following import Pilot
 from policies.experts.follower import ScriptedFollower
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy

@@ -15,7 +15,7 @@ from autopilot.mavlink.wire.convert import UINT16_MAX, quat_from_wxyz
 from autopilot.mavlink.wire.number_bounds import is_known
 from common.attitude import rotated, yaw_of
 from common.range_sectors import SCANNER, RangeLayout
-from policies.companion.skill import Floats
+from policies.companion.skills.skill import Floats
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
 
 SCAN_HZ = 20.0  # that the vehicle is asked for

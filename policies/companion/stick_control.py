@@ -11,7 +11,7 @@ from typing import Any
 from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT
 from autopilot.mavlink.wire.number_bounds import PARAMETER_MAX, is_known
 from policies.companion.engagement import Wish
-from policies.companion.skill import Velocity
+from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
 
 SPEED, YAW_RATE, SPEED_DEAD, YAW_DEAD = "RO_SPEED_LIM", "RO_YAW_RATE_LIM", "MAN_DEADZONE", "RO_YAW_STICK_DZ"
@@ -44,6 +44,8 @@ class StickControl:
 
     def frame(self, time_us: int) -> None:
         """Asks for what is due, and for what is not known yet."""
+        if not self._vehicle.is_flown:
+            self._hold_due_us = None  # somebody else has chosen a mode meanwhile
         if self._hold_due_us is not None and time_us >= self._hold_due_us:
             self._hold_due_us = None
             self._vehicle.ask_for(Wish.HOLD)

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from policies.companion.pilot import PilotError
-from policies.companion.skill import Floats
+from policies.companion.skills.skill import Floats
 from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
 from policies.tasks.drive import observe as drive
@@ -15,7 +15,7 @@ from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.layout import Layout, LayoutError
 from policies.tasks.navigate import observe as navigate
 
-NAVIGATE, DRIVE = "Navigate", "Drive"
+NAVIGATE, NAVIGATE_ROVER, DRIVE = "Navigate", "NavigateRover", "Drive"
 
 
 class VectorPilot:
@@ -64,6 +64,18 @@ class NavigationPilot(VectorPilot):
 
     task = Layout(NAVIGATE, navigate.LAYOUT_VERSION, navigate.frame_elements(has_rays=True), ACTIONS)
     frame_size = task.frame_size
+    drives: ClassVar = False
+    shown_m: ClassVar = 85.0  # the farthest goal of training
+    arrived_m: ClassVar = 2.5  # by the estimate, inside of training's radius: the estimate may be off
+
+
+class RoverNavigationPilot(NavigationPilot):
+    """Made for NavigateRover, on ranges."""
+
+    task = replace(NavigationPilot.task, task=NAVIGATE_ROVER)
+    drives: ClassVar = True
+    shown_m: ClassVar = 45.0
+    arrived_m: ClassVar = 2.0
 
 
 class DrivingPilot(VectorPilot):

@@ -7,7 +7,7 @@ Any autopilot with PX4's or ArduPilot's modes will do.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isnan, nan
+from math import isfinite, isnan, nan
 from typing import Any
 
 from autopilot.interface.vehicle_state import LandedState, Mode, Severity
@@ -46,6 +46,7 @@ _GROUND_VEHICLES = (10, 11)  # MAV_TYPE: rover, boat
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _LOCAL_NED, _BODY_NED = 1, 8  # MAV_FRAME
 _VELOCITY_AND_YAW_RATE = 0b0101_1100_0111  # type_mask: position, acceleration and yaw are free
+_VELOCITY = 0b1101_1100_0111  # the yaw rate, too
 _HAS_POSITION, _HAS_VELOCITY = 1, 2  # FOLLOW_TARGET.est_capabilities
 _LOOKS_DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
 _IDS = {
@@ -188,7 +189,7 @@ class VehicleLink:
 
         Args:
             velocity: in ned, or ahead, right and down.
-            yaw_rate: clockwise from above.
+            yaw_rate: clockwise from above; NaN: none.
             is_along_nose: it is ahead, right and down.
         """
         x, y, z = velocity
@@ -196,11 +197,11 @@ class VehicleLink:
             "SET_POSITION_TARGET_LOCAL_NED",
             time_boot_ms=max(self.own.boot_us, 0) // 1000 & 0xFFFFFFFF,
             coordinate_frame=_BODY_NED if is_along_nose else _LOCAL_NED,
-            type_mask=_VELOCITY_AND_YAW_RATE,
+            type_mask=_VELOCITY_AND_YAW_RATE if isfinite(yaw_rate) else _VELOCITY,
             vx=x,
             vy=y,
             vz=z,
-            yaw_rate=yaw_rate,
+            yaw_rate=yaw_rate if isfinite(yaw_rate) else 0.0,
         )
 
     def ask_for(self, wish: Wish) -> None:

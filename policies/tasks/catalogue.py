@@ -49,6 +49,7 @@ CATALOGUE: dict[str, Entry] = {
     "Hover": Entry("hover.hover:HoverSettings", "hover.hover:Hover"),
     "Drive": Entry("drive.settings:DriveSettings", "drive.drive:Drive"),
     "Navigate": Entry("navigate.settings:NavigateSettings", "navigate.navigate:Navigate"),
+    "NavigateRover": Entry("navigate.settings:NavigateSettings", "navigate.navigate:NavigateRover"),
 }
 
 

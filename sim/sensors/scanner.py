@@ -17,11 +17,13 @@ from common.attitude import Quat
 from common.kernels import TICK_US
 from common.range_sectors import BEAM_ELEVATIONS_DEG, FIRST_EDGE_DEG, RANGE_M, RANGES, SECTOR_DEG, SECTORS
 from common.rng import draw_key
-from common.rotation import quat_from_yaw, yaw_from_quat
+from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
 from sim.rig import Rig
+from sim.world.boxes import Box, box_middle, in_box_axes
 from sim.world.growing import bucket_of
 from sim.world.trees import Forest, Tree
-from sim.world.world import World, WorldMap, ray_hit
+from sim.world.walls import slab
+from sim.world.world import World, WorldMap, ray_hit, world_at
 
 wp.set_module_options({"enable_backward": False})
 
@@ -32,6 +34,7 @@ _RANGES = wp.constant(RANGES)
 _SECTOR_RAD = wp.constant(math.radians(SECTOR_DEG))
 _FIRST_RAD = wp.constant(math.radians(FIRST_EDGE_DEG))
 _ELEVATIONS = wp.constant(wp.vec4(*(math.radians(angle) for angle in BEAM_ELEVATIONS_DEG)))
+_BOX_RAYS = wp.constant(3)  # of a sector that looks for boxes
 _STREAM = wp.constant(202)  # of the rig's seeds
 _STD_FRACTION = wp.constant(0.02)  # of the range, for a noise of 1; Intel D435: below 2 % up to 2 m
 _MISSES = wp.constant(0.01)  # fraction of sectors without a return, for a noise of 1; guess
@@ -121,6 +124,33 @@ def add_forest(
 
 
 @wp.func
+def add_box(
+    box: Box, tick: int, pos_ned: wp.vec3, heading: float, rise: wp.vec2, ranges_m: wp.array2d(dtype=float), i: int
+) -> None:
+    """Shortens the ranges of the sectors that a box reaches into: three rays each."""
+    middle = box_middle(box, tick)
+    off = wp.vec2(middle[0] - pos_ned[0], middle[1] - pos_ned[1])
+    distance = wp.length(off)
+    radius = wp.sqrt(box.half_length * box.half_length + box.half_width * box.half_width)
+    height = -pos_ned[2] + rise[0] * off[0] + rise[1] * off[1]
+    if distance - radius > _RANGE_M or height - BAND_M > box.high or height + BAND_M < box.low:
+        return
+    start = in_box_axes(box, -off[0], -off[1])
+    half = wp.where(distance > radius, wp.asin(radius / wp.max(distance, radius)), wp.pi)
+    bearing = wp.atan2(off[1], off[0]) - heading
+    for ray in range(_BOX_RAYS * _SECTORS):
+        angle = _FIRST_RAD + (float(ray) + 0.5) * _SECTOR_RAD / float(_BOX_RAYS)
+        if wp.abs(wrap_pi(angle - bearing)) <= half:
+            rate = in_box_axes(box, wp.cos(heading + angle), wp.sin(heading + angle))
+            lengthwise = slab(start[0], rate[0], -box.half_length, box.half_length)
+            across = slab(start[1], rate[1], -box.half_width, box.half_width)
+            entry = wp.max(0.0, wp.max(lengthwise[0], across[0]))
+            if entry <= wp.min(lengthwise[1], across[1]):
+                k = ray // _BOX_RAYS
+                ranges_m[i, k] = wp.min(ranges_m[i, k], entry)
+
+
+@wp.func
 def scan_ranges(
     world: World,
     pos_ned: wp.vec3,
@@ -134,12 +164,12 @@ def scan_ranges(
     """The ranges of scanner i [m], `RANGE_M` for no return.
 
     Args:
-        world: what is seen.
+        world: what is seen, its movers where they are at `tick`.
         pos_ned: where it is [m].
         q_ned_from_level: how it is levelled (`ned_from_levelled`).
         noise: factor on its errors.
         seed: of its errors.
-        tick: of its errors.
+        tick: now, and of its errors.
         ranges_m: of all scanners, shape (scanners, RANGES).
         i: the scanner.
     """
@@ -148,11 +178,14 @@ def scan_ranges(
     down = wp.quat_rotate(q_ned_from_level, wp.vec3(0.0, 0.0, 1.0))
     rise = wp.vec2(down[0], down[1]) / wp.max(down[2], _UPRIGHT)
     nose = wp.quat_rotate(q_ned_from_level, wp.vec3(1.0, 0.0, 0.0))
-    add_forest(world.forest, pos_ned, wp.atan2(nose[1], nose[0]), rise, ranges_m, i)
+    heading = wp.atan2(nose[1], nose[0])
+    add_forest(world.forest, pos_ned, heading, rise, ranges_m, i)
+    for i_box in range(world.boxes.box_count):
+        add_box(world.boxes.boxes[i_box], tick, pos_ned, heading, rise, ranges_m, i)
     for k in range(_SECTORS, _RANGES):
         up = _ELEVATIONS[k - _SECTORS]
         dir_ned = wp.quat_rotate(q_ned_from_level, wp.vec3(wp.cos(up), 0.0, -wp.sin(up)))
-        ranges_m[i, k] = ray_hit(world, pos_ned, dir_ned, _RANGE_M)
+        ranges_m[i, k] = ray_hit(world_at(world, tick), pos_ned, dir_ned, _RANGE_M)
     state = draw_key(seed, 0, tick, _STREAM)
     for k in range(_RANGES):
         error = _UNIFORM_HALF * (2.0 * wp.randf(state) - 1.0)

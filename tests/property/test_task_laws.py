@@ -25,7 +25,7 @@ TASKS = [
     )
 ]
 every_task = pytest.mark.parametrize(("name", "preset"), TASKS)
-FLOWN = {"FollowMe", "Hover", "Navigate", "Drive"}  # the noise of a rig's sensors is keyed by the row
+FLOWN = {"FollowMe", "Hover", "Navigate", "NavigateRover", "Drive"}  # the noise of a rig's sensors is keyed by the row
 SMALL = {"FollowMe": {"image_size": 16}}  # the laws hold for any size; large pictures take most of the time
 seeds = st.integers(0, 2**31 - 1)
 STRUCTS = {

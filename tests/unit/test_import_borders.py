@@ -106,5 +106,5 @@ def test_tasks_are_registered_with_gymnasium_before_their_kernels_are_imported()
 
 
 def test_policies_are_there_without_gymnasium():
-    modules = loaded("import sys\nsys.modules['gymnasium'] = None\nimport policies.companion.following")
+    modules = loaded("import sys\nsys.modules['gymnasium'] = None\nimport policies.companion.skills.following")
     assert "policies.tasks.follow_me.observe" in modules

@@ -6,12 +6,9 @@ prepare   numbers and seeds of the new episode           (then worlds grow and v
 place     air, sensors, mass and tyres, the goal, the first vector
 """
 
-from typing import TYPE_CHECKING, Any, TypeAlias
-
 import warp as wp
 
 from autopilot.ports import SETPOINT_DRIVE, Setpoint
-from autopilot.vehicles.rover.law import ROVER_LAW
 from common.rng import draw_tick
 from common.rotation import wrap_pi, yaw_from_quat
 from policies.tasks.drive.drive_params import DriveParams
@@ -19,26 +16,17 @@ from policies.tasks.drive.goals import course_goal, spot_goal, way_left_m, way_o
 from policies.tasks.drive.observe import DriveCommand, drive_command, own_drive, write_frame
 from policies.tasks.drive.reward import drive_outcome, drive_reward
 from policies.tasks.episode import StepBuffers, close_step, open_frame
+from policies.tasks.flight.driven_vehicle import RoverArrays, vary_rover
 from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight
 from policies.tasks.flight.flight_params import FlightParams
-from policies.tasks.flight.flown_vehicle import (
-    free_setpoint,
-    sensors_of_episode,
-    vehicle_estimate,
-    wind_of_episode,
-)
-from sim.advance import rig_arrays, rig_kernels
-from sim.bodies.rover import ROVER_BODY
+from policies.tasks.flight.flown_vehicle import free_setpoint, vehicle_estimate
 from sim.bodies.rover_model import RoverModel
 from sim.sensors.ground_ring import ring_ranges
 from sim.truth import Truth
-from sim.wind import WindState
 from sim.world.world import World, obstacle_contact, world_at
 
 wp.set_module_options({"enable_backward": False})
 
-RoverArrays: TypeAlias = Any if TYPE_CHECKING else rig_arrays(ROVER_BODY, ROVER_LAW)
-_forget_impacts = rig_kernels(ROVER_BODY, ROVER_LAW).forget_impacts
 _HALF_WIDTH_M = wp.constant(0.22)  # of the hull
 _END_M = wp.constant(0.15)  # from its middle to those of the circles at its ends
 _ROOM_MAX_M = wp.constant(1.0)
@@ -178,28 +166,6 @@ def prepare(buffers: StepBuffers, state: DriveState, start: Start) -> None:
         start.world_params[i] = world
 
 
-@wp.func
-def vary_rover(rig: RoverArrays, state: DriveState, start: Start, seed: int, i: int, episode: int) -> None:
-    """Gives row i the air, the sensors, the mass, the motors and the tyres of its episode."""
-    flight = state.flight[i]
-    params = state.params[i]
-    model = state.model[0]
-    model.mass_kg = model.mass_kg * flight.mass_scale
-    model.mass_inv = model.mass_inv / flight.mass_scale
-    model.inertia_frd = model.inertia_frd * flight.mass_scale
-    model.inertia_inv_frd = model.inertia_inv_frd / flight.mass_scale
-    model.motor_n_s_m = model.motor_n_s_m * flight.motor_scale
-    model.motor_max_n = model.motor_max_n * flight.motor_scale
-    model.tyre.peak = model.tyre.peak * params.friction_scale
-    model.tyre.tail = model.tyre.tail * params.friction_scale
-    model.rolling_resistance = model.rolling_resistance * params.rolling_scale
-    rig.model[i] = model
-    rig.sensor_model[i] = sensors_of_episode(start.makes, flight)
-    rig.wind_model[i] = wind_of_episode(rig.wind_model[i], flight, seed, i, episode)
-    rig.wind[i] = WindState()
-    _forget_impacts(rig, i)
-
-
 @wp.kernel(enable_backward=False)
 def place(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: DriveState, start: Start) -> None:
     i = wp.tid()
@@ -208,7 +174,8 @@ def place(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: Driv
     seed = buffers.seed[0]
     episode = buffers.episodes[i] - 1
     params = state.params[i]
-    vary_rover(rig, state, start, seed, i, episode)
+    friction, rolling = params.friction_scale, params.rolling_scale
+    vary_rover(rig, state.model, start.makes, state.flight[i], friction, rolling, seed, i, episode)
     world = world_now(rig, i)
     goal = course_goal(world, params.goal_min_m, params.goal_max_m, seed, i, episode)
     out = float(0.0)

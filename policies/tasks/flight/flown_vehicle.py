@@ -106,7 +106,7 @@ def vehicle_estimate(rig: Any, i: int, has_estimator: int) -> Estimate:
 
 
 @wp.func
-def own_state(rig: RigArrays, i: int, has_estimator: int) -> OwnState:
+def own_state(rig: Any, i: int, has_estimator: int) -> OwnState:
     """What a policy is told of its vehicle."""
     estimate = vehicle_estimate(rig, i, has_estimator)
     own = OwnState()

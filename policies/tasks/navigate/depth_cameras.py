@@ -14,7 +14,6 @@ from policies.tasks.flight.rig_task import worker_count
 from policies.tasks.follow_me.observe import HFOV_DEG, depth_byte
 from policies.tasks.follow_me.owner_visibility import lens_of
 from policies.tasks.navigate.navigate_params import NavigateParams
-from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.fast_camera.fast_camera import QuickCamera
 from sim.sensors.fast_camera.optics import Optics, sensor_noise
@@ -25,7 +24,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel(enable_backward=False)
 def aim(
-    rig: RigArrays,
+    rig: Any,
     params: wp.array(dtype=NavigateParams),
     rows: wp.array(dtype=wp.bool),
     lenses: wp.array(dtype=Lens),

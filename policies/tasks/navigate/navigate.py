@@ -1,10 +1,11 @@
-"""Navigate: a drone reaches a goal 60 to 85 m away through forest, below its crowns and at speed.
+"""Navigate: a drone reaches a goal 60 to 85 m away through forest, below its crowns and at speed; a rover a nearer one.
 
 In: an action, 10 Hz: velocity and yaw rate for the flight controller. Out: what the vehicle knows of itself, where the
 goal is by its estimate, and what its rangefinder or its depth camera sees. The simulator and the flight controller are
 those of every flight.
 """
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,6 +16,7 @@ from common.kernels import TICK_S
 from common.range_sectors import RANGES
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS, FlightParams
 from policies.tasks.flight.own_state import ACTIONS, Command
+from policies.tasks.flight.standing_bank import standing_bank
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
 from policies.tasks.layout import ImageElement, Layout
 from policies.tasks.navigate.depth_cameras import DepthEyes
@@ -29,29 +31,37 @@ from policies.tasks.navigate.navigate_kernels import (
     prepare,
     show,
 )
-from policies.tasks.navigate.navigate_params import IMPROVED, PARAMS, NavigateParams
+from policies.tasks.navigate.navigate_params import IMPROVED, PARAMS, ROVER, NavigateParams
 from policies.tasks.navigate.navigate_top_view import draw
 from policies.tasks.navigate.observe import DEPTH_CHANNELS, LAYOUT_VERSION, RAY_STACK, frame_elements
 from policies.tasks.navigate.scan import scan
 from policies.tasks.navigate.settings import NavigateSettings
-from policies.tasks.task_params import typed_rows
-from sim.world.forest_world import FOREST, TREES_PER_HA_MAX
+from policies.tasks.task_params import Sampler, typed_rows
+from sim.sensors.sensors import sensor_model
+from sim.world.forest_world import FOREST, TREES_PER_HA_MAX, WALLED_FOREST
+from sim.world.world import WorldConfig
+
+ROVER_AIRFRAME = "rover"
 
 
 class Navigate(FlightTask):
     """The task. Layout version 2; in version 1 ranges were levelled by the truth."""
 
     params: ClassVar = PARAMS
+    name: ClassVar = "Navigate"
+    world: ClassVar[WorldConfig] = FOREST
+    number_defaults: ClassVar[Mapping[str, float | Sampler]] = IMPROVED
 
     def __init__(self, settings: NavigateSettings, env_count: int, device: str = "cpu") -> None:
         super().__init__(
-            _layout(settings),
+            _layout(self.name, settings),
             env_count,
-            FOREST,
+            self.world,
             trees_per_ha_max=TREES_PER_HA_MAX,
             has_estimator=settings.has_estimator,
-            number_defaults=IMPROVED,
+            number_defaults=self.number_defaults,
             device=device,
+            **self._vehicle(settings.has_estimator, device),
         )
         self.settings = settings
         self._delay_ticks = round(settings.delay_ms / (1000.0 * TICK_S))
@@ -61,6 +71,10 @@ class Navigate(FlightTask):
         if self.layout.image is not None:
             self._eyes = DepthEyes(self.buffers, self.rig.arrays, self.navigation.params, self.worlds)
         self._record_all()
+
+    def _vehicle(self, has_estimator: bool, device: str) -> dict[str, Any]:  # noqa: ARG002
+        """What the rig is made from, where it is not the drone."""
+        return {}
 
     def step(self) -> None:
         """One decision of all environments, with the actions that lie in the buffers."""
@@ -142,15 +156,27 @@ class Navigate(FlightTask):
         self._scan = record(scan, rig, state.params, state.is_all, rules.has_estimator, state.ranges_m)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, state, start)
-        self._place = record(place, buffers, rig, state, start)
+        self._place = record(place, buffers, rig, wp.clone(self.rig.models[:1]), state, start)
         self._show = record(show, buffers, rules, rig, state, start)
 
 
-def _layout(settings: NavigateSettings) -> Layout:
+class NavigateRover(Navigate):
+    """The same task, of a rover between trees and walls: with the velocity of an action it drives, forwards."""
+
+    name: ClassVar = "NavigateRover"
+    world: ClassVar = WALLED_FOREST
+    number_defaults: ClassVar = ROVER
+
+    def _vehicle(self, has_estimator: bool, device: str) -> dict[str, Any]:
+        bank = standing_bank(ROVER_AIRFRAME, sensor_model, has_estimator, device)
+        return {"airframe_name": ROVER_AIRFRAME, "bank": bank}
+
+
+def _layout(name: str, settings: NavigateSettings) -> Layout:
     has_rays = settings.observation == "rays"
     size = settings.image_size
     return Layout(
-        "Navigate",
+        name,
         LAYOUT_VERSION,
         frame_elements(has_rays=has_rays),
         continuous=ACTIONS,

@@ -8,24 +8,21 @@ place     wind, sensors and mass, the goal               (then ranges or depths 
 show      the first vector
 """
 
+from typing import Any
+
 import warp as wp
 
 from policies.tasks.episode import StepBuffers, close_step, open_frame
 from policies.tasks.flight.episode_draws import draw_angle
 from policies.tasks.flight.episode_start import Start, ask_for_world, begin_flight, continuous_action
 from policies.tasks.flight.flight_params import FlightParams
-from policies.tasks.flight.flown_vehicle import (
-    own_state,
-    vary_vehicle,
-    vehicle_estimate,
-    velocity_setpoint,
-)
+from policies.tasks.flight.flown_vehicle import vehicle_estimate, velocity_setpoint
 from policies.tasks.flight.own_state import Command, action_command
 from policies.tasks.navigate.navigate_params import NavigateParams
 from policies.tasks.navigate.observe import write_frame
 from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
-from sim.advance import RigArrays
-from sim.truth import Truth, has_touched
+from policies.tasks.navigate.vehicles import goal_shown, own, touches, vary
+from sim.truth import Truth
 from sim.world.world import World, ground_height, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
@@ -65,14 +62,14 @@ class NavigateState:
 
 
 @wp.kernel(enable_backward=False)
-def act(buffers: StepBuffers, rules: Rules, rig: RigArrays, commands: wp.array(dtype=Command)) -> None:
+def act(buffers: StepBuffers, rules: Rules, rig: Any, commands: wp.array(dtype=Command)) -> None:
     i = wp.tid()
     estimate = vehicle_estimate(rig, i, rules.has_estimator)
     commands[i] = action_command(continuous_action(buffers, i), estimate.q_ned_from_frd)
 
 
 @wp.kernel(enable_backward=False)
-def command(rig: RigArrays, commands: wp.array(dtype=Command)) -> None:
+def command(rig: Any, commands: wp.array(dtype=Command)) -> None:
     i = wp.tid()
     rig.autopilot.setpoint[i] = velocity_setpoint(commands[i])
 
@@ -84,15 +81,16 @@ def room_beside(world: World, truth: Truth) -> float:
 
 
 @wp.func
-def observe(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, i: int) -> None:
+def observe(buffers: StepBuffers, rules: Rules, rig: Any, state: NavigateState, i: int) -> None:
     """The newest frame of the observation."""
     at = open_frame(buffers, i)
-    own = own_state(rig, i, rules.has_estimator)
-    write_frame(rules.has_rays, own, state.actions[i], state.goals_ned[i], state.ranges_m, buffers.observations, i, at)
+    shown = own(rig, i, rules.has_estimator)
+    goal_ned = goal_shown(rig, shown, state.goals_ned[i])
+    write_frame(rules.has_rays, shown, state.actions[i], goal_ned, state.ranges_m, buffers.observations, i, at)
 
 
 @wp.kernel(enable_backward=False)
-def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
+def judge(buffers: StepBuffers, rules: Rules, rig: Any, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     params = state.params[i]
     truth = rig.truth[i]
@@ -108,7 +106,7 @@ def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateSta
     time_s = float(buffers.steps[i] + 1) * rules.decision_s
     room_m = room_beside(rig.worlds[rig.i_world[i]], truth)
     outcome = navigate_outcome(
-        params, distance_m, has_touched(truth), truth.height_agl_m, time_s, state.start_distance_m[i]
+        params, distance_m, touches(rig, i), truth.height_agl_m, time_s, state.start_distance_m[i]
     )
     reward = navigate_reward(params, truth, progress_m, rules.decision_s, room_m, outcome, action, last_action)
     state.measures[i, 0] = distance_m
@@ -135,14 +133,14 @@ def prepare(buffers: StepBuffers, state: NavigateState, start: Start) -> None:
 
 
 @wp.kernel(enable_backward=False)
-def place(buffers: StepBuffers, rig: RigArrays, state: NavigateState, start: Start) -> None:
+def place(buffers: StepBuffers, rig: Any, models: Any, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     if not start.is_starting[i]:
         return
     seed = buffers.seed[0]
     episode = buffers.episodes[i] - 1
     params = state.params[i]
-    vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
+    vary(rig, models, start.makes, state.flight[i], seed, i, episode)
     pos_ned = rig.truth[i].pos_ned
     bearing = draw_angle(seed, i, episode, _BEARING_STREAM)
     fraction = draw_angle(seed, i, episode, _DISTANCE_STREAM) / (2.0 * wp.pi) + 0.5
@@ -158,7 +156,7 @@ def place(buffers: StepBuffers, rig: RigArrays, state: NavigateState, start: Sta
 
 
 @wp.kernel(enable_backward=False)
-def show(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: NavigateState, start: Start) -> None:
+def show(buffers: StepBuffers, rules: Rules, rig: Any, state: NavigateState, start: Start) -> None:
     i = wp.tid()
     if start.is_starting[i]:
         observe(buffers, rules, rig, state, i)

@@ -49,7 +49,7 @@ NAVIGATE_PARAMS = (
     ),
     TaskParam("goal_min_m", 60.0, 10.0, GOAL_MAX_M, "m", "the goal is at least this far away", "guess"),
     TaskParam("goal_max_m", 85.0, 10.0, GOAL_MAX_M, "m", "and at most this far", "guess"),
-    TaskParam("goal_height_m", 2.0, 1.0, 10.0, "m", "of the goal above the ground, and the height to fly at", "guess"),
+    TaskParam("goal_height_m", 2.0, 0.0, 10.0, "m", "of the goal above the ground, and the height to fly at", "guess"),
     TaskParam("goal_radius_m", 3.0, 0.5, 20.0, "m", "nearer is arrived", "guess: twice what GNSS is off"),
     TaskParam("slowest_m_s", 3.0, 0.5, 20.0, "m/s", "time is up for who is slower, in a straight line", "guess"),
     TaskParam("ceiling_m", 4.0, 2.0, 100.0, "m", "higher above the ground counts as over the forest", "guess"),
@@ -77,4 +77,15 @@ IMPROVED: dict[str, float | Sampler] = {
     "mass_scale": Sampler(intervals=((0.9, 1.15),)),
     "motor_scale": Sampler(intervals=((0.93, 1.07),)),
     "hill_height_m": Sampler(intervals=((0.0, 6.0),)),
+}
+ROVER: dict[str, float | Sampler] = {
+    **IMPROVED,
+    "hill_height_m": Sampler(intervals=((0.0, 3.0),)),
+    "trees_per_ha": 400.0,
+    "goal_min_m": 30.0,
+    "goal_max_m": 45.0,
+    "goal_height_m": 0.0,
+    "slowest_m_s": 1.0,
+    "speed_m_s": 4.0,
+    "clearance_m": 0.8,
 }

@@ -3,12 +3,13 @@
 They are levelled by what each vehicle's flight controller estimates, as in flight.
 """
 
+from typing import Any
+
 import warp as wp
 
 from common.rng import draw_tick
 from policies.tasks.flight.flown_vehicle import vehicle_estimate
 from policies.tasks.navigate.navigate_params import NavigateParams
-from sim.advance import RigArrays
 from sim.sensors.scanner import ned_from_levelled, scan_ranges
 
 wp.set_module_options({"enable_backward": False})
@@ -16,7 +17,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel(enable_backward=False)
 def scan(
-    rig: RigArrays,
+    rig: Any,
     params: wp.array(dtype=NavigateParams),
     rows: wp.array(dtype=wp.bool),
     has_estimator: int,

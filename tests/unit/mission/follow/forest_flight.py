@@ -1,9 +1,7 @@
 """Rig of the tests of navigating: flights in a sparse forest, in lockstep."""
 
-from math import dist, nan
+from math import dist
 
-from autopilot.mavlink.wire.convert import degrees_e7
-from common.geodesy import geodetic_from_ned
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_navigator
 from mission.script import take_off
@@ -11,10 +9,9 @@ from policies.companion.vector_pilot import NavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.pretrained.pretrained_policies import pretrained
 from sim.world.forest_world import FOREST
+from tests.unit.mission.follow.goto_flight import advance, goto_fields
 
 AUTOPILOT, COMPANION = 1, 191
-DO_REPOSITION = 192
-CHANGE_MODE = 1.0
 SPARSE = FOREST.model_copy(update={"seed": 3, "trees_per_ha": 100.0})
 
 
@@ -36,31 +33,9 @@ def hovering(folder=None, *, is_reported=True, links=(), **changed):
     return flight, companion
 
 
-def advance(flight, seconds, is_enough=lambda: False):
-    """Flies on for a time, or until it is enough."""
-    end_us = flight.time_us + round(seconds * 1e6)
-    flight.run(lambda _: is_enough() or flight.time_us >= end_us)
-
-
 def place(flight, north, east):
     """2 m above the ground, in ned [m]."""
     return north, east, -float(flight.world.height(north, east)) - 2.0
-
-
-def goto_fields(flight, goal_ned, component):
-    lat_deg, lon_deg, alt_amsl_m = geodetic_from_ned(*goal_ned, flight.config.home)
-    return {
-        "target_system": 1,
-        "target_component": component,
-        "command": DO_REPOSITION,
-        "frame": 0,
-        "param1": -1.0,
-        "param2": CHANGE_MODE,
-        "param4": nan,
-        "x": degrees_e7(lat_deg),
-        "y": degrees_e7(lon_deg),
-        "z": alt_amsl_m,
-    }
 
 
 def send_goto(flight, goal_ned, component):

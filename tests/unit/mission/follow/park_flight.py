@@ -2,17 +2,15 @@
 
 from math import atan2, degrees, hypot, pi
 
-from autopilot.mavlink.wire.convert import degrees_e7
-from common.geodesy import geodetic_from_ned
 from mission.flight import FlightConfig
 from mission.follow.lockstep import flight_with_driver
 from policies.companion.vector_pilot import DrivingPilot
 from policies.learn.export.policy_file import load_policy
 from policies.pretrained.pretrained_policies import pretrained
 from sim.world.driving_worlds import CAR_PARK
+from tests.unit.mission.follow.goto_flight import advance, goto_fields
 
 COMPANION = 191
-DO_REPOSITION = 192
 LOT = CAR_PARK.model_copy(update={"seed": 6, "mover_count": 0})
 
 
@@ -37,31 +35,14 @@ def standing(*, is_reported=True, is_by_sticks=False, pilot=None, folder=None, l
     return flight, companion
 
 
-def advance(flight, seconds, is_enough=lambda: False):
-    """Drives on for a time, or until it is enough."""
-    end_us = flight.time_us + round(seconds * 1e6)
-    flight.run(lambda _: is_enough() or flight.time_us >= end_us)
-
-
-def goto_fields(flight, pose, component=COMPANION):
-    lat_deg, lon_deg, alt_amsl_m = geodetic_from_ned(pose[0], pose[1], 0.0, flight.config.home)
-    return {
-        "target_system": 1,
-        "target_component": component,
-        "command": DO_REPOSITION,
-        "frame": 0,
-        "param1": -1.0,
-        "param2": 1.0,
-        "param4": pose[2],
-        "x": degrees_e7(lat_deg),
-        "y": degrees_e7(lon_deg),
-        "z": alt_amsl_m,
-    }
+def pose_fields(flight, pose):
+    """Of a COMMAND_INT that asks the companion for a pose: north, east [m] and heading [rad]."""
+    return goto_fields(flight, (pose[0], pose[1], 0.0), COMPANION, pose[2])
 
 
 def send_goto(flight, pose):
     """Asks the companion for a pose: north, east [m] and heading [rad]."""
-    flight.drone.send("COMMAND_INT", **goto_fields(flight, pose))
+    flight.drone.send("COMMAND_INT", **pose_fields(flight, pose))
 
 
 def miss(flight, pose):

@@ -22,9 +22,9 @@ from sim.world.world import WorldConfig
 from tests.unit.mission.follow.follow_flight import lose
 from tests.unit.mission.follow.park_flight import (
     advance,
-    goto_fields,
     impact_m_s,
     miss,
+    pose_fields,
     send_goto,
     shipped_pilot,
     standing,
@@ -107,7 +107,7 @@ def test_in_guided_of_ardupilots_rover_it_drives_and_is_handed_back_to_hold():
     flight, companion = standing(pilot=reacher, world=PLAIN, dialect="ardupilot", links=[vehicle_end])
     station.command(176, 1.0, 4.0)  # Hold
     advance(flight, 1.0)
-    station.send("COMMAND_INT", **goto_fields(flight, GOAL))
+    station.send("COMMAND_INT", **pose_fields(flight, GOAL))
     advance(flight, 1.0)
     assert (companion.phase, companion.vehicle.is_ardupilot) == (Phase.FLYING, True)
     advance(flight, 40.0, lambda: companion.phase is Phase.WAITING)

@@ -10,9 +10,9 @@ from autopilot.mavlink.wire.codec import encode
 from mission.cli import app
 from mission.follow.companion_process import trouble_text
 from policies.companion.companion import Companion
-from policies.companion.following import Following
 from policies.companion.image_client import StreamCamera
 from policies.companion.pilot import load_pilot
+from policies.companion.skills.following import Following
 from tests.system.vehicle import free_ports
 from tests.unit.policies.companion.test_pilot import policy_file
 
@@ -84,3 +84,8 @@ def test_a_camera_that_is_not_there_is_named():
 def test_what_flies_is_not_driven_by_sticks():
     result = refused("--policy", "navigate", "--by-sticks")
     assert "--by-sticks: navigate flies, and only what drives is driven by sticks" in result
+
+
+def test_what_asks_for_courses_is_not_driven_by_sticks():
+    result = refused("--policy", "navigate-rover", "--by-sticks")
+    assert "--by-sticks: navigate-rover asks for courses, and sticks for turns" in result

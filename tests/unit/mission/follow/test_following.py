@@ -16,8 +16,8 @@ from mission.follow.owner_device import PHONE_SYSTEM
 from mission.script import take_off
 from policies.companion.companion import TELEMETRY_OLD_US
 from policies.companion.engagement import Phase
-from policies.companion.following import IMAGE_OLD_US, OWNER_LOST_S
 from policies.companion.observation import REPORT_LAG_S
+from policies.companion.skills.following import IMAGE_OLD_US, OWNER_LOST_S
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.flight.flown_vehicle import own_state
 from policies.tasks.flight.hover_bank import hover_bank

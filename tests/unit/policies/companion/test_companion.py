@@ -10,7 +10,7 @@ from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from common.image_stream import ImageFrame
 from policies.companion.companion import MISFIT, NO_DECISION, Companion
 from policies.companion.engagement import Phase
-from policies.companion.following import IMAGE_OLD_US, LENS, NO_IMAGES, Following
+from policies.companion.skills.following import IMAGE_OLD_US, LENS, NO_IMAGES, Following
 from policies.experts.follower import ScriptedFollower
 
 FRAME_US = 20_000

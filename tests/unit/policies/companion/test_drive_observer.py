@@ -6,8 +6,8 @@ import pytest
 from autopilot.mavlink.client_end import ClientEnd
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from common.range_sectors import GROUND_RING
-from policies.companion.driving import DriveObserver, how_far_off, is_taken
 from policies.companion.ranges import Ranges
+from policies.companion.skills.driving import DriveObserver, how_far_off, is_taken
 from policies.companion.vehicle_link import Own, VehicleLink
 from policies.tasks.catalogue import build_task, task_settings
 from policies.tasks.drive.observe import FRAME, OWN_SIZE

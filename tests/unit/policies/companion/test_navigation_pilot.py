@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from policies.companion.load_skill import load_skill
-from policies.companion.navigating import Navigating
 from policies.companion.pilot import PilotError
+from policies.companion.skills.load_skill import load_skill
+from policies.companion.skills.navigating import Navigating
 from policies.companion.vector_pilot import NAVIGATE, NavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.pretrained.pretrained_policies import pretrained
@@ -32,8 +32,13 @@ def test_the_shipped_policy_navigates():
     assert isinstance(loaded("navigate"), Navigating)
 
 
+def test_the_shipped_policy_of_rovers_drives_and_the_drones_flies():
+    assert loaded("navigate-rover").drives
+    assert not loaded("navigate").drives
+
+
 def test_what_the_task_shows_is_what_the_pilot_takes(tmp_path):
-    path = policy_file(tmp_path, task=NAVIGATE, layout=_layout(NavigateSettings(stack=3)))
+    path = policy_file(tmp_path, task=NAVIGATE, layout=_layout(NAVIGATE, NavigateSettings(stack=3)))
     assert isinstance(loaded(path), Navigating)
 
 
@@ -64,11 +69,11 @@ def test_a_policy_of_another_layout_is_refused_in_one_sentence(tmp_path, changes
 
 
 def test_a_policy_on_depth_images_is_refused(tmp_path):
-    path = policy_file(tmp_path, task=NAVIGATE, layout=_layout(NavigateSettings(observation="depth")))
+    path = policy_file(tmp_path, task=NAVIGATE, layout=_layout(NAVIGATE, NavigateSettings(observation="depth")))
     with pytest.raises(PilotError, match="made for another task or preset"):
         loaded(path)
 
 
 def test_a_policy_of_another_task_is_refused(tmp_path):
-    with pytest.raises(PilotError, match="made for Parking1; a companion flies policies of FollowMe, Navigate and"):
+    with pytest.raises(PilotError, match="made for Parking1; a companion flies policies of FollowMe, Navigate, "):
         loaded(policy_file(tmp_path, task="Parking1"))

@@ -6,9 +6,9 @@ import warp as wp
 
 from common.attitude import product, quat_of
 from common.range_sectors import BEAM_ELEVATIONS_DEG, RANGE_M, RANGES, SECTORS
-from sim.sensors.scanner import scan_once
+from sim.sensors.scanner import BAND_M, scan_once
 from sim.world.batch import grown_world
-from sim.world.forest_world import FOREST
+from sim.world.forest_world import FOREST, WALLED_FOREST
 from sim.world.world import WorldConfig, build_world
 
 LEVEL = quat_of(0.0, 0.0)
@@ -71,3 +71,28 @@ def test_noise_is_two_percent_and_now_and_then_nothing(forest):
     exact, noisy = scanned(forest), scanned(forest, noise=1.0)
     hit = (exact < RANGE_M) & (noisy < RANGE_M)
     assert 0.005 < np.std(noisy[hit] / exact[hit]) < 0.04
+
+
+def test_walls_are_seen_where_they_stand():
+    """Of a grown world without trees: as far as a ray is, cast here, from the scanner's middle to each box."""
+    walls = grown_world(WALLED_FOREST.model_copy(update={"trees_per_ha": 0.0, "hill_height_m": 0.0}), 7)
+    seen = 0
+    for north, east in ((0.0, 0.0), (12.0, -20.0), (-25.0, 8.0), (30.0, 30.0), (-10.0, -35.0), (20.0, 5.0)):
+        height = 0.3
+        ranges_m = scanned(walls, pos_ned=(north, east, -height))[:SECTORS]
+        rays = np.radians(-120.0 + 5.0 * (np.arange(3 * SECTORS) + 0.5) / 3.0)
+        expected = np.full(len(rays), RANGE_M)
+        for box in walls.boxes.rows:
+            if height - BAND_M > box["high"]:
+                continue
+            axes = np.array([[box["cos_yaw"], box["sin_yaw"]], [-box["sin_yaw"], box["cos_yaw"]]])
+            start = axes @ np.array((north - box["north"], east - box["east"]))
+            along = np.array((np.cos(rays), np.sin(rays)))
+            half = np.array((box["half_length"], box["half_width"]))
+            ends = (np.array((-half, half))[:, :, None] - start[:, None]) / (axes @ along)
+            entry, leaving = ends.min(axis=0).max(axis=0), ends.max(axis=0).min(axis=0)
+            is_met = (entry <= leaving) & (leaving > 0.0)
+            expected[is_met] = np.minimum(expected[is_met], np.maximum(entry[is_met], 0.0))
+        assert ranges_m == pytest.approx(np.minimum(expected.reshape(SECTORS, 3).min(axis=1), RANGE_M), abs=1e-3)
+        seen += int((ranges_m < RANGE_M).sum())
+    assert seen > 20

@@ -14,7 +14,7 @@ from common.image_stream import ImageFrame
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer
 from policies.companion.owner_watch import OwnerWatch
-from policies.companion.skill import Floats, Velocity
+from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vehicle_link import Own, Owner, VehicleLink
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG
 
@@ -52,6 +52,7 @@ class Following:
     """
 
     ready, flying, drives = "ready to follow", "following", False
+    is_along_nose = False
     action_size = 4
 
     def __init__(self, camera: ImageSource, pilot: Pilot) -> None:

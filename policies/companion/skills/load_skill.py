@@ -1,14 +1,21 @@
 """The skill that a policy is for: what a user names, checked and loaded before anything is sent."""
 
-from policies.companion.driving import Driving
-from policies.companion.following import Following
 from policies.companion.image_client import StreamCamera
 from policies.companion.names import SCRIPTED
 from policies.companion.names import TASK as FOLLOW
-from policies.companion.navigating import Navigating
 from policies.companion.pilot import LearnedPilot, PilotError, load_pilot
-from policies.companion.skill import Skill
-from policies.companion.vector_pilot import DRIVE, NAVIGATE, DrivingPilot, NavigationPilot
+from policies.companion.skills.driving import Driving
+from policies.companion.skills.following import Following
+from policies.companion.skills.navigating import Navigating
+from policies.companion.skills.skill import Skill
+from policies.companion.vector_pilot import (
+    DRIVE,
+    NAVIGATE,
+    NAVIGATE_ROVER,
+    DrivingPilot,
+    NavigationPilot,
+    RoverNavigationPilot,
+)
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy
 
@@ -36,6 +43,9 @@ def load_skill(name: str, camera: str, *, is_ordered_by_goto: bool) -> Skill:
         return Following(StreamCamera(camera), LearnedPilot(policy, str(path)))
     if card.task == NAVIGATE:
         return Navigating(NavigationPilot(policy, str(path)), is_ordered_by_goto=is_ordered_by_goto)
+    if card.task == NAVIGATE_ROVER:
+        return Navigating(RoverNavigationPilot(policy, str(path)), is_ordered_by_goto=is_ordered_by_goto)
     if card.task == DRIVE:
         return Driving(DrivingPilot(policy, str(path)), is_ordered_by_goto=is_ordered_by_goto)
-    raise PilotError(f"{path}: made for {card.task}; a companion flies policies of {FOLLOW}, {NAVIGATE} and {DRIVE}")
+    known = f"{FOLLOW}, {NAVIGATE}, {NAVIGATE_ROVER} and {DRIVE}"
+    raise PilotError(f"{path}: made for {card.task}; a companion flies policies of {known}")

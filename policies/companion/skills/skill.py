@@ -14,7 +14,7 @@ from policies.companion.vehicle_link import Own, VehicleLink
 
 Floats = NDArray[np.float32]
 Velocity = tuple[Vector, float]
-"""A velocity [m/s], of what drives ahead, right and down, else in ned; and a yaw rate [rad/s]."""
+"""A velocity [m/s] in ned, or ahead, right and down; and a yaw rate [rad/s], NaN: none is asked for."""
 
 
 class Skill(Protocol):
@@ -23,6 +23,7 @@ class Skill(Protocol):
     ready: str  # what a pilot is told when it could fly: "ready to follow"
     flying: str  # and while it does: "following"
     drives: bool  # ground vehicles, and flies none
+    is_along_nose: bool  # its velocities are ahead, right and down
     action_size: int
     seen: Floats  # the vector that was decided on last
 

@@ -1,6 +1,6 @@
 """To drive a rover into a pose: telemetry and ranges all round in, speed along the nose and yaw rate out.
 
-A decision for each new scan (10 Hz), by a policy of Drive. It drives while it has a goal: the heading there is the
+It drives while it has a goal: the heading there is the
 goto's or the waypoint's, or where none was given the way there. Where something stands in the goal it does not go.
 """
 
@@ -18,7 +18,8 @@ from common.range_sectors import GROUND_RING
 from common.warp_start import start_warp
 from policies.companion.goals import Goal, Goals
 from policies.companion.ranges import Ranges
-from policies.companion.skill import Floats, Velocity
+from policies.companion.skills.goal_skill import GoalSkill
+from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vector_pilot import DrivingPilot
 from policies.companion.vehicle_link import NEVER_US, Own, VehicleLink
 from policies.tasks.drive.observe import FRAME, DriveCommand, command_rows, observe_rows
@@ -29,20 +30,18 @@ STUCK_FOR = 300  # decisions in a row without moving; guess
 SHOWN_M = 25.0  # training's farthest goals are 30 m away: of one farther off a place on the way is shown
 NEAR_M = 4.0  # guess: it stops in less
 SCAN_HZ = 50.0
-DECISION_US, DECISION_EARLY_US = 100_000, 10_000
 HULL_M = (0.3, 0.15)  # half of a rover's length and width, and no more: what is seen in there is in the way
 SEEN_FOR = 30  # decisions in a row: what only comes by is gone by then; guess
 REVERSES = "HG_RO_OFFB_BODY"  # parameter, not 0: Offboard may reverse and takes a yaw rate
 ASK_US = 2_000_000
 NO_REVERSE = f"Offboard does not reverse: set {REVERSES} to 1, or drive by sticks"
-NO_GOAL = "no goal"
 TAKEN, STUCK = "something stands there", "stuck"
 
 Pose = tuple[float, float, float]
 """North, east [m] and heading [rad]."""
 
 
-class Driving:
+class Driving(GoalSkill):
     """One vehicle's skill to drive.
 
     Args:
@@ -51,17 +50,12 @@ class Driving:
     """
 
     ready, flying, drives = "ready to drive", "driving", True
+    is_along_nose = True
     action_size = 2
-    goals: Goals  # this and the next from `attach` on
-    ranges: Ranges
-    _vehicle: VehicleLink
 
     def __init__(self, pilot: DrivingPilot, *, is_ordered_by_goto: bool = False) -> None:
-        self.seen: Floats = np.zeros(0, dtype=np.float32)
-        self._is_ordered_by_goto = is_ordered_by_goto
-        self._pilot = pilot
         self._observer = DriveObserver(pilot.stack)
-        self._decided_us = -DECISION_US
+        super().__init__(pilot, self._observer, is_ordered_by_goto=is_ordered_by_goto)
         self._reverses = False  # Offboard, as the vehicle has said
         self._asked_us = NEVER_US
         self._goal: Goal | None = None  # that the heading is of
@@ -80,55 +74,41 @@ class Driving:
             vehicle.listen("PARAM_VALUE", self._parameter_reported)
 
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
-        self.goals.frame(time_us)
         if self._needs_reverse and vehicle.own.heartbeat_us != NEVER_US and time_us - self._asked_us > ASK_US:
             self._asked_us = time_us
             vehicle.ask("PARAM_REQUEST_READ", param_id=REVERSES, param_index=-1)
-        return self.ranges.take_new()
+        return super().receive(vehicle, time_us)
 
-    def is_ordered(self) -> bool:
-        return self.goals.is_ordered()
+    def blindness(self, own: Own, time_us: int) -> str:
+        return super().blindness(own, time_us) or (NO_REVERSE if self._needs_reverse and not self._reverses else "")
 
-    def blindness(self, own: Own, time_us: int) -> str:  # noqa: ARG002
-        return self.ranges.trouble(time_us) or (NO_REVERSE if self._needs_reverse and not self._reverses else "")
-
-    def loss(self, own: Own) -> str:  # noqa: ARG002
-        if self.goals.goal is None:
-            return self.goals.done or NO_GOAL
-        if self._still_count >= STUCK_FOR:
-            return STUCK
+    def loss(self, own: Own) -> str:
+        trouble = super().loss(own)
+        if trouble or self._still_count >= STUCK_FOR:
+            return trouble or STUCK
         return TAKEN if self._taken_count >= SEEN_FOR else ""
 
-    def begin(self, own: Own) -> None:  # noqa: ARG002
-        self._forget()
+    def begin(self, own: Own) -> None:
+        super().begin(own)
         self._taken_count = self._still_count = 0
         self._off = inf
-        self._decided_us = -DECISION_US
 
     def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
         if is_flying:
             self._note_arrival(own)
         pose = self.goal_pose(own)
-        if pose is None or time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
+        if pose is None or not self._is_due(time_us):
             return None
-        self._decided_us = time_us
         is_still = is_flying and hypot(*own.vel_ned) < STILL_M_S
         self._still_count = self._still_count + 1 if is_still else 0
         self._taken_count = self._taken_count + 1 if is_taken(pose, own, self.ranges.ranges_m) else 0
         vector = self._observer.vector(own, _shown(pose, own), self.ranges.ranges_m, last_action)
-        self.seen = vector.copy()
-        action = self._pilot.act(vector)
-        if not is_flying or not np.isfinite(action).all():
-            self._forget()
-        return action
+        return self._act(vector, is_flying=is_flying)
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:  # noqa: ARG002
         """What an action asks for, along the nose."""
         speed, yaw_rate = self._observer.command(action)
         return (speed, 0.0, 0.0), yaw_rate
-
-    def conclude(self, own: Own) -> None:
-        """Has nothing left to do."""
 
     def goal_pose(self, own: Own) -> Pose | None:
         """Where it drives; None: nowhere."""
@@ -140,16 +120,9 @@ class Driving:
             self._taken_count = 0
         return goal.pos_ned[0], goal.pos_ned[1], self._heading
 
-    def hint(self, trouble: str) -> str:  # noqa: ARG002
-        return ""
-
     def figures(self, own: Own, time_us: int) -> str:
         pose = self.goal_pose(own)
-        goal = f"goal {dist(pose[:2], own.pos_ned[:2]):.1f} m" if pose is not None else NO_GOAL
-        return f"{goal} | scan {(time_us - self.ranges.scan_us) * 1e-3:.0f} ms"
-
-    def close(self) -> None:
-        """Has nothing to give back."""
+        return self._figures(None if pose is None else dist(pose[:2], own.pos_ned[:2]), time_us)
 
     @property
     def _needs_reverse(self) -> bool:
@@ -160,10 +133,6 @@ class Driving:
         is_vehicle = (sysid, compid) == (self._vehicle.system_id, AUTOPILOT_COMPONENT)
         if is_vehicle and fields.param_id == REVERSES:
             self._reverses = fields.param_value != 0
-
-    def _forget(self) -> None:
-        self._pilot.reset()
-        self._observer.reset()
 
     def _refusal_of(self, goal: Goal) -> str:
         """Why a goto cannot be driven to."""
@@ -184,9 +153,7 @@ class Driving:
         if is_in and off < was_off and speed > STILL_M_S:
             return
         self._off = inf
-        reached = self.goals.reached()
-        if reached is not None and not reached.is_last:
-            self._vehicle.say(f"Companion: {reached.name} reached")
+        if self._go_on():
             self._forget()
 
 

@@ -1,10 +1,10 @@
-"""To navigate to a goal through forest: ranges or depth images in, the actions of a policy of Navigate out.
+"""To navigate to a goal through forest: ranges in, the actions of a policy of Navigate or NavigateRover out.
 
-A decision for each new scan or image (10 Hz). It flies while it has a goal; on the last metres it is slowed down, so
-that whoever gets the vehicle back gets it nearly at rest, and not at speed among trees.
+It flies or drives while it has a goal; on the last metres it is slowed down, so that whoever gets the vehicle back gets
+it nearly at rest, and not at speed among trees. A rover is asked for velocities alone: its heading is theirs.
 """
 
-from math import dist, hypot, isfinite, sqrt
+from math import dist, hypot, isfinite, nan, sqrt
 from typing import Any
 
 import numpy as np
@@ -17,21 +17,18 @@ from common.warp_start import start_warp
 from policies.companion.goals import Goals
 from policies.companion.observation import CommandKernel, write_own_row
 from policies.companion.ranges import Ranges
-from policies.companion.skill import Floats, Velocity
+from policies.companion.skills.goal_skill import GoalSkill
+from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vector_pilot import NavigationPilot
 from policies.companion.vehicle_link import Own, VehicleLink
 from policies.tasks.flight.own_state import OwnState
 from policies.tasks.navigate.observe import observe_rows
 
-ARRIVED_M = 2.5  # by the estimate, half a metre inside of training's radius: the estimate may be off
-SHOWN_M = 85.0  # the farthest goal of training: of one farther off its direction is shown
 BRAKE_M_S2 = 3.0  # guess: half of what the vehicle can
 END_M_S = 1.0  # speed at which it is handed back; guess
-DECISION_US, DECISION_EARLY_US = 100_000, 10_000
-NO_GOAL = "no goal"
 
 
-class Navigating:
+class Navigating(GoalSkill):
     """One vehicle's skill to navigate.
 
     Args:
@@ -39,57 +36,31 @@ class Navigating:
         is_ordered_by_goto: a goto to the vehicle is an order to fly there.
     """
 
-    ready, flying, drives = "ready to navigate", "navigating", False
+    ready, flying = "ready to navigate", "navigating"
+    is_along_nose = False
     action_size = 4
-    goals: Goals  # this and the next from `attach` on
-    ranges: Ranges
-    _vehicle: VehicleLink
 
     def __init__(self, pilot: NavigationPilot, *, is_ordered_by_goto: bool = False) -> None:
-        self.seen: Floats = np.zeros(0, dtype=np.float32)
-        self._is_ordered_by_goto = is_ordered_by_goto
-        self._pilot = pilot
-        self._observer = NavigationObserver(pilot.stack)
+        self._observer = NavigationObserver(pilot.stack, drives=pilot.drives)
+        self.drives = pilot.drives
+        self._shown_m, self._arrived_m = pilot.shown_m, pilot.arrived_m
+        super().__init__(pilot, self._observer, is_ordered_by_goto=is_ordered_by_goto)
         self._command = CommandKernel()
-        self._decided_us = -DECISION_US
 
     def attach(self, vehicle: VehicleLink) -> None:
         self._vehicle = vehicle
         self.goals = Goals(vehicle, is_ordered_by_goto=self._is_ordered_by_goto)
         self.ranges = Ranges(vehicle)
 
-    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:  # noqa: ARG002  (others need it)
-        self.goals.frame(time_us)
-        return self.ranges.take_new()
-
-    def is_ordered(self) -> bool:
-        return self.goals.is_ordered()
-
-    def blindness(self, own: Own, time_us: int) -> str:  # noqa: ARG002
-        return self.ranges.trouble(time_us)
-
-    def loss(self, own: Own) -> str:  # noqa: ARG002
-        return "" if self.goals.goal is not None else self.goals.done or NO_GOAL
-
-    def begin(self, own: Own) -> None:  # noqa: ARG002
-        self._pilot.reset()
-        self._observer.reset()
-        self._decided_us = -DECISION_US
-
     def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
         if is_flying:
             self._note_arrival(own)
         goal_ned = self.goal_ned(own)
-        if goal_ned is None or time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
+        if goal_ned is None or not self._is_due(time_us):
             return None
-        self._decided_us = time_us
-        vector = self._observer.vector(own, _shown(goal_ned, own), self.ranges.ranges_m, last_action, time_us)
-        self.seen = vector.copy()
-        action = self._pilot.act(vector)
-        if not is_flying or not np.isfinite(action).all():
-            self._pilot.reset()
-            self._observer.reset()
-        return action
+        shown_ned = _shown(goal_ned, own, self._shown_m)
+        vector = self._observer.vector(own, shown_ned, self.ranges.ranges_m, last_action, time_us)
+        return self._act(vector, is_flying=is_flying)
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:
         """What an action asks for, slower before the last goal."""
@@ -97,10 +68,9 @@ class Navigating:
         limit = self._speed_limit(own)
         speed = hypot(north, east)
         slower = limit / speed if speed > limit else 1.0
+        if self.drives:
+            return (slower * north, slower * east, 0.0), nan
         return (slower * north, slower * east, down), yaw_rate
-
-    def conclude(self, own: Own) -> None:
-        """Has nothing left to do."""
 
     def goal_ned(self, own: Own) -> Vector | None:
         """[m] Where it goes; None: nowhere."""
@@ -108,42 +78,33 @@ class Navigating:
         if goal is None:
             return None
         north, east, down = goal.pos_ned
-        return north, east, down if isfinite(down) else own.pos_ned[2]
-
-    def hint(self, trouble: str) -> str:  # noqa: ARG002
-        return ""
+        return north, east, down if isfinite(down) and not self.drives else own.pos_ned[2]
 
     def figures(self, own: Own, time_us: int) -> str:
         goal_ned = self.goal_ned(own)
-        goal = f"goal {dist(goal_ned, own.pos_ned):.1f} m" if goal_ned is not None else NO_GOAL
-        return f"{goal} | scan {(time_us - self.ranges.scan_us) * 1e-3:.0f} ms"
-
-    def close(self) -> None:
-        """Has nothing to give back."""
+        return self._figures(None if goal_ned is None else dist(goal_ned, own.pos_ned), time_us)
 
     def _note_arrival(self, own: Own) -> None:
         """Goes on to the next goal if this one has been reached."""
         goal_ned = self.goal_ned(own)
-        if goal_ned is not None and dist(goal_ned[:2], own.pos_ned[:2]) < ARRIVED_M:
-            reached = self.goals.reached()
-            if reached is not None and not reached.is_last:
-                self._vehicle.say(f"Companion: {reached.name} reached")
+        if goal_ned is not None and dist(goal_ned[:2], own.pos_ned[:2]) < self._arrived_m:
+            self._go_on()
 
     def _speed_limit(self, own: Own) -> float:
         """Level speed [m/s] from which it can still brake before the last goal."""
         goal, goal_ned = self.goals.goal, self.goal_ned(own)
         if goal is None or goal_ned is None or not goal.is_last:
             return float("inf")
-        room_m = max(dist(goal_ned[:2], own.pos_ned[:2]) - ARRIVED_M, 0.0)
+        room_m = max(dist(goal_ned[:2], own.pos_ned[:2]) - self._arrived_m, 0.0)
         return sqrt(END_M_S**2 + 2.0 * BRAKE_M_S2 * room_m)
 
 
-def _shown(goal_ned: Vector, own: Own) -> Vector:
+def _shown(goal_ned: Vector, own: Own, shown_m: float) -> Vector:
     """The goal, or a place on the way to it that is no farther than in training."""
     away_m = dist(goal_ned[:2], own.pos_ned[:2])
-    if away_m <= SHOWN_M:
+    if away_m <= shown_m:
         return goal_ned
-    fraction = SHOWN_M / away_m
+    fraction = shown_m / away_m
     north, east = (here + fraction * (there - here) for there, here in zip(goal_ned[:2], own.pos_ned[:2], strict=True))
     return north, east, goal_ned[2]
 
@@ -153,10 +114,12 @@ class NavigationObserver:
 
     Args:
         stack: frames in an observation.
+        drives: it is on the ground, without a range finder that looks down.
     """
 
-    def __init__(self, stack: int) -> None:
+    def __init__(self, stack: int, *, drives: bool = False) -> None:
         start_warp()
+        self._drives = drives
         own, action, goal = wp.zeros(1, dtype=OwnState), wp.zeros(1, dtype=wp.vec4), wp.zeros(1, dtype=wp.vec3)
         ranges, out = wp.zeros((1, RANGES), dtype=float), wp.zeros((1, NavigationPilot.frame_size), dtype=float)
         self._own: NDArray[Any] = own.numpy()  # live views, as of the others
@@ -182,6 +145,8 @@ class NavigationObserver:
             time_us: the companion's own clock.
         """
         write_own_row(self._own[0], own, time_us)
+        if self._drives:
+            self._own[0]["is_height_valid"] = 0
         self._action[0], self._goal[0], self._ranges[0] = last_action, goal_ned, ranges_m
         self._observe.launch()
         self._frames[:-1] = self._frames[1:]

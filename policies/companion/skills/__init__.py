@@ -1,0 +1,1 @@
+"""What a companion can do with one kind of policy each."""

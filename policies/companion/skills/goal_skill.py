@@ -1,0 +1,105 @@
+"""What the skills that go to goals share: gotos and the plan, a ring of ranges, a policy that decides on each scan.
+
+A decision for each new scan (10 Hz), while there is a goal. What is shown of it and how it is reached is the skill's.
+"""
+
+from typing import Protocol
+
+import numpy as np
+
+from policies.companion.goals import Goals
+from policies.companion.ranges import Ranges
+from policies.companion.skills.skill import Floats
+from policies.companion.vector_pilot import VectorPilot
+from policies.companion.vehicle_link import Own, VehicleLink
+
+DECISION_US, DECISION_EARLY_US = 100_000, 10_000
+NO_GOAL = "no goal"
+
+
+class FrameStack(Protocol):
+    """Whoever keeps the last frames of an observation."""
+
+    def reset(self) -> None:
+        """As at an episode's start."""
+        ...
+
+
+class GoalSkill:
+    """One vehicle's skill to go to goals.
+
+    Args:
+        pilot: who decides.
+        frames: what it is shown.
+        is_ordered_by_goto: a goto to the vehicle is an order to go there.
+    """
+
+    goals: Goals  # this and the next two from `attach` on
+    ranges: Ranges
+    _vehicle: VehicleLink
+
+    def __init__(self, pilot: VectorPilot, frames: FrameStack, *, is_ordered_by_goto: bool) -> None:
+        self.seen: Floats = np.zeros(0, dtype=np.float32)
+        self._is_ordered_by_goto = is_ordered_by_goto
+        self._pilot = pilot
+        self._stack = frames
+        self._decided_us = -DECISION_US
+
+    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:  # noqa: ARG002  (others need it)
+        self.goals.frame(time_us)
+        return self.ranges.take_new()
+
+    def is_ordered(self) -> bool:
+        return self.goals.is_ordered()
+
+    def blindness(self, own: Own, time_us: int) -> str:  # noqa: ARG002
+        return self.ranges.trouble(time_us)
+
+    def loss(self, own: Own) -> str:  # noqa: ARG002
+        return "" if self.goals.goal is not None else self.goals.done or NO_GOAL
+
+    def begin(self, own: Own) -> None:  # noqa: ARG002
+        self._forget()
+        self._decided_us = -DECISION_US
+
+    def conclude(self, own: Own) -> None:
+        """Has nothing left to do."""
+
+    def hint(self, trouble: str) -> str:  # noqa: ARG002
+        return ""
+
+    def close(self) -> None:
+        """Has nothing to give back."""
+
+    def _is_due(self, time_us: int) -> bool:
+        """Whether a decision is due, which is then taken."""
+        if time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
+            return False
+        self._decided_us = time_us
+        return True
+
+    def _act(self, vector: Floats, *, is_flying: bool) -> Floats:
+        """The action on an observation."""
+        self.seen = vector.copy()
+        action = self._pilot.act(vector)
+        if not is_flying or not np.isfinite(action).all():
+            self._forget()
+        return action
+
+    def _forget(self) -> None:
+        """An episode begins."""
+        self._pilot.reset()
+        self._stack.reset()
+
+    def _go_on(self) -> bool:
+        """The goal is reached: goes on to the next; whether there is one."""
+        reached = self.goals.reached()
+        if reached is None or reached.is_last:
+            return False
+        self._vehicle.say(f"Companion: {reached.name} reached")
+        return True
+
+    def _figures(self, left_m: float | None, time_us: int) -> str:
+        """How far it is to the goal [m], None without one, and how old the scan is."""
+        goal = NO_GOAL if left_m is None else f"goal {left_m:.1f} m"
+        return f"{goal} | scan {(time_us - self.ranges.scan_us) * 1e-3:.0f} ms"

@@ -1,0 +1,68 @@
+"""NavigateRover: the same task on wheels, between trees and walls."""
+
+import numpy as np
+import pytest
+
+from common.range_sectors import SECTORS
+from policies.tasks.catalogue import build_task, task_settings
+from policies.tasks.episode import Outcome
+from policies.tasks.navigate.navigate_kernels import MEASURES
+
+QUICK = {"has_estimator": "false"}
+GOAL_AT, GOAL_BELOW, HEIGHT_VALID = 12, 16, 7  # elements of a frame
+
+
+def task_of(count, params=None, name="NavigateRover"):
+    task = build_task(name, count, task_settings(name, QUICK))
+    task.set_params(params or {})
+    task.reset(5)
+    return task
+
+
+def newest(task):
+    return task.buffers.observations.numpy()[:, -task.layout.frame_size :]
+
+
+def drive(task, fraction, decisions):
+    """Drives at the goal with a fraction of the greatest action; the outcome of each row, and its measures."""
+    outcomes = np.zeros(task.env_count, dtype=int)
+    measures = np.zeros((task.env_count, len(MEASURES)))
+    for _ in range(decisions):
+        action = np.zeros((task.env_count, 4), dtype=np.float32)
+        action[:, :2] = fraction * newest(task)[:, GOAL_AT : GOAL_AT + 2]
+        task.buffers.continuous.assign(action)
+        task.step()
+        ended = (outcomes == Outcome.RUNNING) & (task.buffers.outcomes.numpy() != Outcome.RUNNING)
+        outcomes[ended] = task.buffers.outcomes.numpy()[ended]
+        measures[ended] = task.measures.numpy()[ended]
+    return outcomes, measures
+
+
+def test_what_it_sees_and_does_has_the_drones_layout():
+    rover, drone = task_of(1).layout, task_of(1, name="Navigate").layout
+    assert (rover.frame, rover.continuous, rover.stack) == (drone.frame, drone.continuous, drone.stack)
+    assert rover.task != drone.task  # so that neither is given the other's policy
+
+
+def test_on_open_ground_whoever_drives_at_the_goal_arrives():
+    task = task_of(16, {"trees_per_ha": 0.0})
+    task.worlds.params.numpy()["wall_count"][:] = 0  # live
+    task.reset(6)
+    outcomes, measures = drive(task, 0.5, 250)
+    assert (outcomes == Outcome.SUCCESS).all()
+    speeds = measures[:, MEASURES.index("path_m")] / measures[:, MEASURES.index("time_s")]
+    assert (speeds > 2.5).all()
+
+
+def test_walls_and_trees_are_seen_and_end_a_drive_that_does_not_mind_them():
+    task = task_of(64)
+    assert (newest(task)[:, -SECTORS - 4 : -4] > 0.0).any(axis=1).mean() > 0.9
+    outcomes, _ = drive(task, 0.5, 150)
+    assert 0.3 < (outcomes == Outcome.HIT_OBSTACLE).mean() < 0.95
+
+
+def test_neither_its_height_nor_the_goals_is_shown():
+    task = task_of(16)
+    drive(task, 0.3, 5)
+    assert (newest(task)[:, HEIGHT_VALID] == 0.0).all()
+    assert newest(task)[:, GOAL_BELOW] == pytest.approx(0.0, abs=1e-6)
