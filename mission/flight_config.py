@@ -44,7 +44,7 @@ class FlightConfig(FlightSettings):
     boot_unix_us: int = Field(default=SIMULATED_EPOCH_US, ge=0)
     """The date of power-on, as Unix time, in lockstep; a flight that is paced by the wall clock takes the wall's."""
     is_forest: bool = False
-    """The world is grown as in training of Navigate, and the vehicle carries the scanner that its policies see by."""
+    """The vehicle carries the scanner that policies of Navigate see by; the world is grown as in their training."""
     owner: OwnerConfig | None = None
     """Who walks through the world with a phone, to be followed; the vehicle then carries a camera for its companion."""
 

@@ -12,6 +12,7 @@ from mission.console.option_checks import UserError, home_of, parameter_of
 from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, flight_parameters
 from mission.flight_settings import FlightOptions, FlightSettings, Pace
 from mission.flight_state_folder import stored_home
+from sim.bodies.vehicles import class_of
 from sim.world.driving_worlds import CAR_PARK, COURSE
 from sim.world.forest_world import FOREST, WALLED_FOREST
 from sim.world.world import WorldConfig
@@ -44,10 +45,15 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
             parameters=dict(parameter_of(text) for text in options.parameters),
             owner=None if options.owner is None else OwnerConfig(pace=cast(Pace, options.owner)),
             world=_world(options),
-            is_forest=options.world_kind in FORESTS,
+            is_forest=options.world_kind in FORESTS or (options.owner is not None and _drives(options.airframe)),
         )
     except ValidationError as error:
         raise UserError(first_fault(error)) from error
+
+
+def _drives(airframe: str) -> bool:
+    """Whether a vehicle stays on the ground: who follows on wheels sees by the scanner, too."""
+    return class_of(load_airframe(airframe)).vehicle.ground is None
 
 
 def _world(options: FlightOptions) -> WorldConfig:

@@ -96,14 +96,16 @@ class FollowOptions(FlightOptions):
     is_idle: bool = True
     has_walls: bool = True
     policy: str | None = option(
-        None, "A policy of FollowMe, or 'scripted'.", shown="the shipped one, or else 'scripted'"
+        None,
+        "A policy of FollowMe, or 'scripted'; for a rover of NavigateRover.",
+        shown="the shipped one, or else 'scripted'",
     )
     owner: str = option("walk", "How the owner moves: walk (to 2 m/s) or run (to 5 m/s).")
     seconds: float = option(60.0, "How long to follow; then it lands.", ge=1.0)
     seed: int = option(0, "Seed of the owner's path, noise, turbulence.", ge=0, le=2**31 - 1)
     trees_per_ha: float = option(100.0, "Trees per hectare.", "--trees", ge=0.0, le=1000.0)
     hill_height_m: float = option(8.0, "Height of the hills [m]; trained on 8.", "--hills", ge=0.0, le=300.0)
-    airframe: str = option("x500", "Airframe name or TOML file; the policy was trained on x500.")
+    airframe: str = option("x500", "Airframe name or TOML file; policies were trained on x500 and rover.")
     has_film: bool = option(True, "Film it afterwards: chase and onboard view.", "--mp4/--no-mp4")
 
 

@@ -39,6 +39,7 @@ class CompanionOptions:
     is_reported: bool
     seconds: float | None
     is_by_sticks: bool = False
+    follows: bool = False
 
 
 def run_companion(options: CompanionOptions, console: Console) -> str:
@@ -49,7 +50,9 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
             the vehicle that was found, and no setpoint has been.
     """
     try:
-        skill = load_skill(options.policy, options.camera, is_ordered_by_goto=options.is_reported)
+        skill = load_skill(
+            options.policy, options.camera, is_ordered_by_goto=options.is_reported, follows=options.follows
+        )
         if options.is_by_sticks and not skill.drives:
             raise CompanionError(f"--by-sticks: {options.policy} flies, and only what drives is driven by sticks")
         if options.is_by_sticks and not skill.is_along_nose:
@@ -59,7 +62,8 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
         raise CompanionError(str(error)) from error
     by_sticks = options.is_by_sticks
     companion = Companion(link, skill, is_reported=options.is_reported, is_by_sticks=by_sticks, wall_s=wall_time_s)
-    does, images = ("drives", "") if skill.drives else ("flies", f", pictures: {options.camera}")
+    does = "drives" if skill.drives else "flies"
+    images = f", pictures: {options.camera}" if skill.camera is not None else ""
     _shower(console)(f"{options.policy} {does}; vehicle: {options.link}{images}; Ctrl-C ends it")
     try:
         _loop(companion, options, console)

@@ -42,6 +42,9 @@ def companion(
             "--by-sticks", help="Drive by MANUAL_CONTROL in mode Position: stock PX4's Offboard does not reverse."
         ),
     ] = False,
+    follow: Annotated[
+        bool, typer.Option("--follow", help="Go after the owner by a policy of Navigate, which else goes to gotos.")
+    ] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this much wall clock time.")] = None,
 ) -> None:
     """Fly a policy as a companion computer does: over MAVLink and the camera's stream, in its own process."""
@@ -52,7 +55,8 @@ def companion(
             from mission.follow.companion_process import CompanionError, CompanionOptions, run_companion
 
         try:
-            typer.echo(run_companion(CompanionOptions(policy, link, camera, engage, seconds, by_sticks), Console()))
+            options = CompanionOptions(policy, link, camera, engage, seconds, by_sticks, follow)
+            typer.echo(run_companion(options, Console()))
         except CompanionError as error:
             refuse(str(error))
 

@@ -1,7 +1,8 @@
-"""`honeyguide follow`: an owner walks, the drone follows by a policy; live progress, scorecard, run folder, film.
+"""`honeyguide follow`: an owner walks, a drone or a rover follows by a policy; progress, scorecard, run folder, film.
 
-The vehicle takes off, its companion on board engages, and after the time asked for it lands. The companion speaks
-MAVLink over a link in memory, so that everything but ground stations and the live page is the same each time.
+The vehicle takes off if it flies, its companion on board engages, and after the time asked for it lands, or stops. The
+companion speaks MAVLink over a link in memory, so that everything but ground stations and the live page is the same
+each time.
 """
 
 import json
@@ -35,12 +36,17 @@ from mission.view.replay_file import RecordingError, load_recording
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
 from policies.companion.names import SCRIPTED, TASK
-from policies.companion.pilot import PilotError, load_pilot
+from policies.companion.pilot import PilotError
 from policies.companion.skills.following import Pilot
+from policies.companion.skills.load_skill import load_follower
+from policies.companion.vector_pilot import NavigationPilot
 from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.scorecard import Scorecard, lines, named_lines, scorecard
+from sim.bodies.vehicles import class_of
 
 ENGAGE_S = 20.0  # after the take-off, until it follows
+STOP_S = 3.0  # of what drives, until it stands
+ROVER_POLICY = "navigate-rover"
 FILM = "flight.mp4"
 SHOWN = ("in_band", "in_view", "distance_median_m", "collision")  # figures of the scorecard on the live page
 
@@ -59,8 +65,8 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     """The flight, with what must be held until its end."""
     console = Console()
     speed = speed_of(options.speed)
-    config = follow_config(options)
-    pilot, name = chosen_pilot(options.policy)
+    pilot, name = chosen_pilot(options)
+    config = follow_config(options, has_scanner=isinstance(pilot, NavigationPilot))
     try:
         flight_parameters(config, load_airframe(config.airframe))
         links = [] if speed is None else open_links(options, speed)
@@ -115,13 +121,22 @@ def filmed(flight: Flight, folder: Path, console: Console) -> bool:
     return True
 
 
-def chosen_pilot(policy: str | None) -> tuple[Pilot, str]:
-    """Who flies, and how it is called."""
-    name = policy or (TASK if pretrained(TASK) is not None else SCRIPTED)
+def chosen_pilot(options: FollowOptions) -> tuple[Pilot | NavigationPilot, str]:
+    """Who flies or drives, and how it is called.
+
+    Raises:
+        UserError: no such policy, or none for this vehicle.
+    """
+    drives = class_of(load_airframe(options.airframe)).vehicle.ground is None
+    shipped = ROVER_POLICY if drives else TASK if pretrained(TASK) is not None else SCRIPTED
+    name = options.policy or shipped
     try:
-        return load_pilot(name), "a script" if name == SCRIPTED else f"the policy {name}"
+        pilot = load_follower(name)
     except PilotError as error:
         raise UserError(str(error)) from error
+    if drives != (isinstance(pilot, NavigationPilot) and pilot.drives):
+        raise UserError(f"--policy {name}: it was made for another kind of vehicle than --airframe {options.airframe}")
+    return pilot, "a script" if name == SCRIPTED else f"the policy {name}"
 
 
 def watch_of(flight: Flight, companion: Companion, seconds: float) -> FollowWatch:
@@ -139,11 +154,22 @@ def watch_of(flight: Flight, companion: Companion, seconds: float) -> FollowWatc
 
 
 async def follow(drone: Drone, companion: Companion, seconds: float) -> None:
-    """Takes off, lets the companion follow for so long, and lands, unless it is down by then."""
-    await take_off(drone)
+    """Takes off if it flies, lets the companion follow for so long, and lands or stops, unless it is down by then."""
+    drives = companion.skill.drives
+    if drives:
+        await drone.wait_ready()
+        await drone.arm()
+    else:
+        await take_off(drone)
     await drone.until(lambda: companion.phase is Phase.FLYING, ENGAGE_S, "the companion's taking over")
     await drone.sleep(seconds)
-    if drone.is_armed:
+    if not drone.is_armed:
+        return
+    if drives:
+        await drone.hold()
+        await drone.sleep(STOP_S)
+        await drone.disarm()
+    else:
         await drone.land()
 
 

@@ -14,24 +14,25 @@ from policies.companion.image_client import MemoryCamera
 from policies.companion.skills.driving import Driving
 from policies.companion.skills.following import Following, Pilot
 from policies.companion.skills.navigating import Navigating
+from policies.companion.skills.skill import Skill
 from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
 from sim.world.world import WorldMap
 
 
 def flight_with_companion(
     config: FlightConfig,
-    pilot: Pilot,
+    pilot: Pilot | NavigationPilot,
     *,
     is_reported: bool = True,
     links: Sequence[Link | LinkSource] = (),
     folder: Path | None = None,
     wall_s: Callable[[], float] | None = None,
 ) -> tuple[Flight, Companion]:
-    """A flight, and the companion on board that follows, which engages as soon as the vehicle hovers.
+    """A flight, and the companion on board that follows, which engages as soon as the vehicle hovers or is armed.
 
     Args:
-        config: with an owner.
-        pilot: who flies.
+        config: with an owner; with the scanner where a pilot navigates.
+        pilot: who flies or drives, by what it sees of the owner or by what stands on the way to them.
         is_reported: False: it waits for the pilot to choose Offboard.
         links: of ground stations.
         folder: of the logs.
@@ -43,7 +44,8 @@ def flight_with_companion(
         raise ValueError("a companion needs a flight with an owner")
     camera = MemoryCamera()
     flight.onboard.add_sink(camera.publish)
-    companion = Companion(companion_end, Following(camera, pilot), is_reported=is_reported, wall_s=wall_s)
+    skill: Skill = Navigating(pilot, camera=camera) if isinstance(pilot, NavigationPilot) else Following(camera, pilot)
+    companion = Companion(companion_end, skill, is_reported=is_reported, wall_s=wall_s)
     flight.computers.append(companion)
     return flight, companion
 

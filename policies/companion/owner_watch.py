@@ -49,6 +49,11 @@ class OwnerWatch:
             self._tracker.see(now_us, sighting_of(seen_hfrd, own))
         self._track = self._tracker.at(now_us)
 
+    @property
+    def track(self) -> OwnerTrack | None:
+        """As of the newest update; None before the first."""
+        return self._track
+
     def silence_s(self, vehicle_us: int) -> float:
         """Since the owner was last seen or heard of.
 

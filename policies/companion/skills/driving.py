@@ -52,6 +52,7 @@ class Driving(GoalSkill):
     ready, flying, drives = "ready to drive", "driving", True
     is_along_nose = True
     action_size = 2
+    camera = None
 
     def __init__(self, pilot: DrivingPilot, *, is_ordered_by_goto: bool = False) -> None:
         self._observer = DriveObserver(pilot.stack)

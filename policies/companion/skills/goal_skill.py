@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from policies.companion.goals import Goals
+from policies.companion.owner_goal import OwnerGoal
 from policies.companion.ranges import Ranges
 from policies.companion.skills.skill import Floats
 from policies.companion.vector_pilot import VectorPilot
@@ -34,7 +35,7 @@ class GoalSkill:
         is_ordered_by_goto: a goto to the vehicle is an order to go there.
     """
 
-    goals: Goals  # this and the next two from `attach` on
+    goals: Goals | OwnerGoal  # this and the next two from `attach` on
     ranges: Ranges
     _vehicle: VehicleLink
 

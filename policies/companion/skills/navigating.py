@@ -1,7 +1,8 @@
 """To navigate to a goal through forest: ranges in, the actions of a policy of Navigate or NavigateRover out.
 
 It flies or drives while it has a goal; on the last metres it is slowed down, so that whoever gets the vehicle back gets
-it nearly at rest, and not at speed among trees. A rover is asked for velocities alone: its heading is theirs.
+it nearly at rest, and not at speed among trees. A rover is asked for velocities alone: its heading is theirs. The goal
+may be somebody with a phone, and then it goes after them for as long as it hears of them.
 """
 
 from math import dist, hypot, isfinite, nan, sqrt
@@ -15,7 +16,9 @@ from common.attitude import Vector
 from common.range_sectors import RANGES
 from common.warp_start import start_warp
 from policies.companion.goals import Goals
+from policies.companion.image_client import ImageSource
 from policies.companion.observation import CommandKernel, write_own_row
+from policies.companion.owner_goal import OwnerGoal
 from policies.companion.ranges import Ranges
 from policies.companion.skills.goal_skill import GoalSkill
 from policies.companion.skills.skill import Floats, Velocity
@@ -34,13 +37,18 @@ class Navigating(GoalSkill):
     Args:
         pilot: who decides.
         is_ordered_by_goto: a goto to the vehicle is an order to fly there.
+        camera: to follow the owner by, in place of gotos and plans; None: it does not.
     """
 
-    ready, flying = "ready to navigate", "navigating"
     is_along_nose = False
     action_size = 4
 
-    def __init__(self, pilot: NavigationPilot, *, is_ordered_by_goto: bool = False) -> None:
+    def __init__(
+        self, pilot: NavigationPilot, *, is_ordered_by_goto: bool = False, camera: ImageSource | None = None
+    ) -> None:
+        does = ("ready to navigate", "navigating") if camera is None else ("ready to follow", "following")
+        self.ready, self.flying = does
+        self.camera: ImageSource | None = camera
         self._observer = NavigationObserver(pilot.stack, drives=pilot.drives)
         self.drives = pilot.drives
         self._shown_m, self._arrived_m = pilot.shown_m, pilot.arrived_m
@@ -49,7 +57,11 @@ class Navigating(GoalSkill):
 
     def attach(self, vehicle: VehicleLink) -> None:
         self._vehicle = vehicle
-        self.goals = Goals(vehicle, is_ordered_by_goto=self._is_ordered_by_goto)
+        self.goals = (
+            Goals(vehicle, is_ordered_by_goto=self._is_ordered_by_goto)
+            if self.camera is None
+            else OwnerGoal(vehicle, self.camera)
+        )
         self.ranges = Ranges(vehicle)
 
     def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
@@ -84,6 +96,10 @@ class Navigating(GoalSkill):
         goal_ned = self.goal_ned(own)
         return self._figures(None if goal_ned is None else dist(goal_ned, own.pos_ned), time_us)
 
+    def close(self) -> None:
+        if self.camera is not None:
+            self.camera.close()
+
     def _note_arrival(self, own: Own) -> None:
         """Goes on to the next goal if this one has been reached."""
         goal_ned = self.goal_ned(own)
@@ -91,7 +107,9 @@ class Navigating(GoalSkill):
             self._go_on()
 
     def _speed_limit(self, own: Own) -> float:
-        """Level speed [m/s] from which it can still brake before the last goal."""
+        """Level speed [m/s] at which it stays behind the owner, or can still brake before the last goal."""
+        if isinstance(self.goals, OwnerGoal):
+            return self.goals.speed_max_m_s
         goal, goal_ned = self.goals.goal, self.goal_ned(own)
         if goal is None or goal_ned is None or not goal.is_last:
             return float("inf")

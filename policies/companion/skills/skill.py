@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import Vector
+from policies.companion.image_client import ImageSource
 from policies.companion.vehicle_link import Own, VehicleLink
 
 Floats = NDArray[np.float32]
@@ -26,6 +27,11 @@ class Skill(Protocol):
     is_along_nose: bool  # its velocities are ahead, right and down
     action_size: int
     seen: Floats  # the vector that was decided on last
+
+    @property
+    def camera(self) -> ImageSource | None:
+        """What it sees by; None: by ranges alone."""
+        ...
 
     def attach(self, vehicle: VehicleLink) -> None:
         """Says what it has to hear; once, before anything is received."""

@@ -6,29 +6,45 @@ The batch task has the same in its own measures.
 import warp as wp
 
 from policies.tasks.follow_me.owner_visibility import see
-from sim.advance import RigArrays
-from sim.truth import has_touched
+from sim.truth import Truth, has_touched
 from sim.world.people import Person
+from sim.world.world import World
 
 wp.set_module_options({"enable_backward": False})
+
+_STANDING_M_S = wp.constant(0.1)  # guess
 
 COLUMNS = ("distance_m", "bearing_rad", "is_in_view", "is_collided")
 
 
 @wp.kernel(enable_backward=False)
-def measure_rows(rig: RigArrays, people: wp.array(dtype=Person), touch_m: float, out: wp.array2d(dtype=float)) -> None:
+def measure_rows(
+    worlds: wp.array(dtype=World),
+    i_world: wp.array(dtype=wp.int32),
+    truths: wp.array(dtype=Truth),
+    people: wp.array(dtype=Person),
+    drives: int,
+    touch_m: float,
+    out: wp.array2d(dtype=float),
+) -> None:
     """The row of `COLUMNS` of each vehicle.
 
     Args:
-        rig: the vehicles, their impacts forgotten when they began to follow.
+        worlds: where they are.
+        i_world: the world of each.
+        truths: the vehicles, their impacts forgotten when they began to follow.
         people: the owner of each.
+        drives: 1 if they stand on the ground, and may touch it; who walks into one that stands has not been run into.
         touch_m: nearer to any part of the owner is a collision.
         out: shape (vehicles, columns).
     """
     i = wp.tid()
-    truth = rig.truth[i]
-    sight = see(rig.worlds[rig.i_world[i]], truth, people[i])
+    truth = truths[i]
+    if drives == 1:
+        truth.is_on_ground = 0
+    is_standing = drives == 1 and wp.length(truth.vel_ned) < _STANDING_M_S
+    sight = see(worlds[i_world[i]], truth, people[i])
     out[i, 0] = sight.distance_m
     out[i, 1] = sight.bearing_rad
     out[i, 2] = float(sight.is_in_view)
-    out[i, 3] = wp.where(has_touched(truth) or sight.reach_m < touch_m, 1.0, 0.0)
+    out[i, 3] = wp.where(has_touched(truth) or (sight.reach_m < touch_m and not is_standing), 1.0, 0.0)

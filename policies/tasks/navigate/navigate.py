@@ -151,7 +151,7 @@ class Navigate(FlightTask):
 
         record = self.record
         commands = wp.zeros(self.env_count, dtype=Command, device=self.device)  # of the running decision
-        self._act = record(act, buffers, rules, rig, commands)
+        self._act = record(act, buffers, rules, rig, state, commands)
         self._command = record(command, rig, commands)
         self._scan = record(scan, rig, state.params, state.is_all, rules.has_estimator, state.ranges_m)
         self._judge = record(judge, buffers, rules, rig, state, start)

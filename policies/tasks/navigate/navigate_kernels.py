@@ -22,12 +22,14 @@ from policies.tasks.navigate.navigate_params import NavigateParams
 from policies.tasks.navigate.observe import write_frame
 from policies.tasks.navigate.reward import navigate_outcome, navigate_reward
 from policies.tasks.navigate.vehicles import goal_shown, own, touches, vary
+from policies.tasks.navigate.walking_goal import follow_speed, walk_vel
 from sim.truth import Truth
 from sim.world.world import World, ground_height, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
 
 _ROOM_MAX_M = wp.constant(2.0)  # the largest radius that contact is asked with
+_EDGE_M = wp.constant(5.0)  # a goal walks no nearer to the edge of the map
 _BEARING_STREAM = wp.constant(6)
 _DISTANCE_STREAM = wp.constant(7)
 
@@ -61,11 +63,25 @@ class NavigateState:
     is_all: wp.array(dtype=wp.bool)  # every row
 
 
+@wp.func
+def goal_vel(buffers: StepBuffers, rules: Rules, state: NavigateState, i: int) -> wp.vec3:
+    """Velocity of a goal that walks [m/s]."""
+    time_s = float(buffers.steps[i]) * rules.decision_s
+    return walk_vel(state.params[i].walk_m_s, buffers.seed[0], i, buffers.episodes[i] - 1, time_s)
+
+
 @wp.kernel(enable_backward=False)
-def act(buffers: StepBuffers, rules: Rules, rig: Any, commands: wp.array(dtype=Command)) -> None:
+def act(buffers: StepBuffers, rules: Rules, rig: Any, state: NavigateState, commands: wp.array(dtype=Command)) -> None:
     i = wp.tid()
     estimate = vehicle_estimate(rig, i, rules.has_estimator)
-    commands[i] = action_command(continuous_action(buffers, i), estimate.q_ned_from_frd)
+    asked = action_command(continuous_action(buffers, i), estimate.q_ned_from_frd)
+    kept_m = state.params[i].kept_m
+    if kept_m > 0.0:
+        limit = follow_speed(state.goals_ned[i] - rig.truth[i].pos_ned, goal_vel(buffers, rules, state, i), kept_m)
+        speed = wp.sqrt(asked.vel_ned[0] * asked.vel_ned[0] + asked.vel_ned[1] * asked.vel_ned[1])
+        slower = wp.min(limit / wp.max(speed, 1.0e-3), 1.0)
+        asked.vel_ned = wp.vec3(slower * asked.vel_ned[0], slower * asked.vel_ned[1], asked.vel_ned[2])
+    commands[i] = asked
 
 
 @wp.kernel(enable_backward=False)
@@ -109,6 +125,12 @@ def judge(buffers: StepBuffers, rules: Rules, rig: Any, state: NavigateState, st
         params, distance_m, touches(rig, i), truth.height_agl_m, time_s, state.start_distance_m[i]
     )
     reward = navigate_reward(params, truth, progress_m, rules.decision_s, room_m, outcome, action, last_action)
+    if params.kept_m > 0.0:
+        half = rig.worlds[rig.i_world[i]].terrain.half_size_m - _EDGE_M
+        step_ned = rules.decision_s * goal_vel(buffers, rules, state, i)
+        north = wp.clamp(goal_ned[0] + step_ned[0], -half, half)
+        east = wp.clamp(goal_ned[1] + step_ned[1], -half, half)
+        state.goals_ned[i] = wp.vec3(north, east, goal_ned[2])
     state.measures[i, 0] = distance_m
     state.measures[i, 1] = wp.length(truth.vel_ned)
     state.measures[i, 2] = room_m

@@ -39,6 +39,8 @@ class NavigateParams:
     heading_cost: float
     jerk_cost: float
     turn_cost: float
+    kept_m: float
+    walk_m_s: float
 
 
 NAVIGATE_PARAMS = (
@@ -66,6 +68,8 @@ NAVIGATE_PARAMS = (
     TaskParam("heading_cost", 0.03, 0.0, 10.0, "1", "per decision of flying backwards; half of it sideways", "tuned"),
     TaskParam("jerk_cost", 0.005, 0.0, 10.0, "1", "per decision for the squared change of the action", "tuned"),
     TaskParam("turn_cost", 0.001, 0.0, 10.0, "1", "per decision for the squared yaw rate asked for", "tuned"),
+    TaskParam("kept_m", 0.0, -10.0, 10.0, "m", "above 0 the goal walks, and is followed so far behind", "ours"),
+    TaskParam("walk_m_s", 1.8, 0.0, 5.0, "m/s", "how fast it walks at most", "guess"),
 )
 PARAMS = (*FLIGHT_PARAMS, *NAVIGATE_PARAMS)
 

@@ -14,6 +14,7 @@ from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
 
+_FOLLOWED_M = wp.constant(5.0)  # no farther behind than it was to stay is followed; guess
 _MOVING_M_S = wp.constant(1.0)  # below it there is no course to look along
 
 
@@ -26,9 +27,11 @@ def navigate_outcome(
         return HIT_OBSTACLE
     if height_m > n.ceiling_m:
         return LOST
-    if distance_m < n.goal_radius_m:
+    if n.kept_m <= 0.0 and distance_m < n.goal_radius_m:
         return SUCCESS
     if time_s * n.slowest_m_s >= start_distance_m:
+        if n.kept_m > 0.0 and distance_m < n.kept_m + _FOLLOWED_M:
+            return SUCCESS
         return TIMEOUT
     return RUNNING
 
