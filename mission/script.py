@@ -69,6 +69,12 @@ class Drone(Client):
         return heartbeat is not None and bool(heartbeat.base_mode & 128)
 
     @property
+    def drives(self) -> bool:
+        """It stays on the ground."""
+        heartbeat = self.latest("HEARTBEAT")
+        return heartbeat is not None and bool(heartbeat.type == GROUND_ROVER)
+
+    @property
     def px4_mode(self) -> tuple[int, int]:
         """Main and sub mode of the last heartbeat."""
         heartbeat = self.latest("HEARTBEAT")
@@ -298,8 +304,7 @@ class Drone(Client):
         await self.until(lambda: self.px4_mode == (main, sub), 3.0, f"mode {name}")
 
     def _way_left_m(self, target_ned: tuple[float, float, float]) -> float:
-        heartbeat = self.latest("HEARTBEAT")
-        axes = 2 if heartbeat is not None and heartbeat.type == GROUND_ROVER else 3
+        axes = 2 if self.drives else 3
         return dist(self.pos_ned[:axes], target_ned[:axes])
 
     def _height_m(self) -> float:
@@ -352,6 +357,15 @@ async def take_off(drone: Drone) -> None:
     await drone.takeoff(TAKEOFF_M)
 
 
+async def set_out(drone: Drone) -> None:
+    """Armed, and up to where a companion takes over, of what flies."""
+    if drone.drives:
+        await drone.wait_ready()
+        await drone.arm()
+    else:
+        await take_off(drone)
+
+
 Script = Callable[[Drone], Coroutine[Any, Any, Any]]
 
-__all__ = ["Drone", "Script", "ScriptError", "ScriptTimeout", "fly_plan", "take_off"]
+__all__ = ["Drone", "Script", "ScriptError", "ScriptTimeout", "fly_plan", "set_out", "take_off"]

@@ -17,10 +17,11 @@ from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
 from mission.follow.follow_scoring import FollowWatch
 from mission.follow.lockstep import flight_with_companion
-from mission.script import take_off
+from mission.script import set_out
 from policies.companion.engagement import Phase
 from policies.companion.pilot import load_pilot
 from policies.companion.skills.following import Pilot
+from policies.companion.vector_pilot import NavigationPilot
 from policies.tasks.follow_me.track import Track
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
@@ -32,22 +33,32 @@ _ENGAGE_S = 5.0
 _WINDS_M_S = (0.0, 1.5, 3.0, 4.5, 6.0)  # the range of training, by seed
 
 
-def fly(pilot: Pilot, cell: Cell, seed: int, seconds: float = SECONDS) -> Track:
-    """One flight; one that never began to follow did not follow at all.
+def fly(
+    pilot: Pilot | NavigationPilot, cell: Cell, seed: int, seconds: float = SECONDS, airframe: str = "x500"
+) -> Track:
+    """One flight or drive; one that never began to follow did not follow at all.
 
     Args:
-        pilot: who flies.
+        pilot: who flies or drives.
         cell: how many trees, and how fast an owner.
         seed: of the world, the owner, the phone, wind and noise.
         seconds: how long it is to follow.
+        airframe: what follows.
     """
     pilot.reset()
     world = FOLLOW_WORLD.model_copy(update={"trees_per_ha": cell.trees_per_ha, "seed": seed})
     owner = OwnerConfig(pace="walk" if cell.owner_speed_max < 3.0 else "run")
-    config = FlightConfig(owner=owner, world=world, seed=seed, wind_m_s=_WINDS_M_S[seed % len(_WINDS_M_S)])
+    config = FlightConfig(
+        airframe=airframe,
+        owner=owner,
+        world=world,
+        is_forest=isinstance(pilot, NavigationPilot),
+        seed=seed,
+        wind_m_s=_WINDS_M_S[seed % len(_WINDS_M_S)],
+    )
     flight, companion = flight_with_companion(config, pilot)
     try:
-        flight.fly(take_off, seconds=_TAKEOFF_S)
+        flight.fly(set_out, seconds=_TAKEOFF_S)
         end_us = flight.time_us + round(_ENGAGE_S * 1e6)
         flight.run(lambda _: companion.phase is Phase.FLYING or flight.time_us >= end_us)
         if companion.phase is not Phase.FLYING:

@@ -30,7 +30,7 @@ from mission.follow.follow_scoring import FollowWatch, taken_over
 from mission.follow.lockstep import flight_with_companion
 from mission.kernel_loading import load_kernels
 from mission.run_folder import OwnFiles, run_folder
-from mission.script import Drone, take_off
+from mission.script import Drone, set_out
 from mission.view.film import write_film
 from mission.view.replay_file import RecordingError, load_recording
 from policies.companion.companion import Companion
@@ -46,7 +46,7 @@ from sim.bodies.vehicles import class_of
 
 ENGAGE_S = 20.0  # after the take-off, until it follows
 STOP_S = 3.0  # of what drives, until it stands
-ROVER_POLICY = "navigate-rover"
+ROVER_POLICY = "follow-rover"
 FILM = "flight.mp4"
 SHOWN = ("in_band", "in_view", "distance_median_m", "collision")  # figures of the scorecard on the live page
 
@@ -155,17 +155,12 @@ def watch_of(flight: Flight, companion: Companion, seconds: float) -> FollowWatc
 
 async def follow(drone: Drone, companion: Companion, seconds: float) -> None:
     """Takes off if it flies, lets the companion follow for so long, and lands or stops, unless it is down by then."""
-    drives = companion.skill.drives
-    if drives:
-        await drone.wait_ready()
-        await drone.arm()
-    else:
-        await take_off(drone)
+    await set_out(drone)
     await drone.until(lambda: companion.phase is Phase.FLYING, ENGAGE_S, "the companion's taking over")
     await drone.sleep(seconds)
     if not drone.is_armed:
         return
-    if drives:
+    if drone.drives:
         await drone.hold()
         await drone.sleep(STOP_S)
         await drone.disarm()

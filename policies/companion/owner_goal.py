@@ -15,7 +15,7 @@ from policies.companion.owner_watch import OwnerWatch
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
 from policies.shirt_detector import chest_hfrd
 
-KEPT_M = 2.0  # on the level, from an owner whose place is known
+KEPT_M = 1.5  # on the level, from an owner whose place is known
 DEVIATIONS = 2.0  # that it keeps away farther, of the error of their place
 CLOSING_HZ = 0.5  # speed at which it closes up, per metre that it is behind; guess
 IMAGE_OLD_US = 300_000  # guess: three images missed; then it goes by the phone alone

@@ -89,3 +89,16 @@ def test_what_flies_is_not_driven_by_sticks():
 def test_what_asks_for_courses_is_not_driven_by_sticks():
     result = refused("--policy", "navigate-rover", "--by-sticks")
     assert "--by-sticks: navigate-rover asks for courses, and sticks for turns" in result
+
+
+def test_what_drives_into_poses_follows_nobody():
+    assert "made for Drive, and does not follow anybody" in refused("--policy", "drive-park", "--follow")
+
+
+def test_who_follows_by_a_policy_of_navigate_looks_through_the_camera():
+    result = CliRunner().invoke(
+        app,
+        ["companion", "--policy", "navigate-rover", "--follow", "--seconds", "0.2", "--camera", "tcp://127.0.0.1:9"],
+    )
+    assert result.exit_code == 0
+    assert "navigate-rover drives; vehicle: udpout://127.0.0.1:14580, pictures: tcp://127.0.0.1:9" in result.stdout

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from rich.console import Console
 from typer.testing import CliRunner
@@ -34,6 +35,19 @@ def test_it_follows_lands_and_writes_scorecard_and_recording(tmp_path):
     assert {"flight.ulg", "flight.tlog"} <= {path.name for path in folder.iterdir()}
 
 
+def test_a_rover_follows_on_wheels_and_stops(tmp_path):
+    folder = tmp_path / "run"
+    result = run("--airframe", "rover", "--speed", "max", "--seconds", "20", "--no-mp4", "--run-folder", str(folder))
+    assert result.exit_code == 0, result.output
+    assert "follow-rover follows an owner" in result.output
+    summary = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)
+    assert summary["collision"] == 0.0
+    assert 1.5 < summary["distance_median_m"] < 4.0
+    recording = load_recording(folder)
+    assert np.ptp(recording.rows["pos_ned"][:, :2], axis=0).max() > 3.0
+    assert not recording.rows["is_armed"][-1]
+
+
 def test_a_film_shows_every_second_frame(tmp_path):
     import av
 
@@ -51,6 +65,16 @@ def test_a_film_shows_every_second_frame(tmp_path):
         (("--owner", "swim"), "--owner swim: must be walk or run"),
         (("--policy", "nobody"), "nobody: no such policy"),
         (("--speed", "-1"), "--speed -1: must be a number above 0"),
+        (("--airframe", "rover", "--policy", "follow-me"), "follow-me: it was made for another kind of vehicle"),
+        (("--airframe", "rover", "--policy", "scripted"), "scripted: it was made for another kind of vehicle"),
+        (
+            ("--policy", "navigate-rover"),
+            "made for another kind of vehicle than --airframe x500",
+        ),
+        (
+            ("--policy", "drive-park"),
+            "drive-park.pt: made for Drive; those follow who were made for FollowMe",
+        ),
     ],
 )
 def test_wrong_arguments_are_refused_with_one_sentence(arguments, sentence, tmp_path):

@@ -66,3 +66,30 @@ def test_neither_its_height_nor_the_goals_is_shown():
     drive(task, 0.3, 5)
     assert (newest(task)[:, HEIGHT_VALID] == 0.0).all()
     assert newest(task)[:, GOAL_BELOW] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_goal_that_walks_is_followed_and_not_driven_into():
+    """Whoever drives at it is held back behind it, and has done well if it is there when time is up."""
+    task = task_of(16, {"trees_per_ha": 0.0, "kept_m": 3.0, "walk_m_s": 1.8})
+    task.worlds.params.numpy()["wall_count"][:] = 0  # live
+    task.reset(6)
+    speeds, outcomes = [], np.zeros(16, dtype=int)
+    while (outcomes == Outcome.RUNNING).any():
+        action = np.zeros((16, 4), dtype=np.float32)
+        action[:, :2] = newest(task)[:, GOAL_AT : GOAL_AT + 2]
+        task.buffers.continuous.assign(action)
+        task.step()
+        ended = (outcomes == Outcome.RUNNING) & (task.buffers.outcomes.numpy() != Outcome.RUNNING)
+        outcomes[ended] = task.buffers.outcomes.numpy()[ended]
+        distance_m, speed_m_s = task.measures.numpy()[outcomes == Outcome.RUNNING, :2].T
+        speeds += [*speed_m_s[distance_m < 1.5]]  # a goal that turns back comes so near
+    assert (outcomes == Outcome.SUCCESS).all()
+    assert np.mean(speeds) < 0.3
+
+
+@pytest.mark.parametrize("kept_m", [0.0, -1.0])
+def test_a_goal_that_is_not_followed_stands(kept_m):
+    task = task_of(8, {"trees_per_ha": 0.0, "kept_m": kept_m, "walk_m_s": 5.0})
+    goals = task.navigation.goals_ned.numpy().copy()
+    drive(task, 0.1, 20)
+    assert (task.navigation.goals_ned.numpy() == goals).all()

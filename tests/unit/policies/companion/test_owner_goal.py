@@ -1,0 +1,113 @@
+"""After an owner: what a companion's goal is by camera and phone, and how fast it may be there."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from common.image_stream import ImageFrame
+from policies.companion.owner_goal import CLOSING_HZ, KEPT_M, SILENT_S, OwnerGoal
+from policies.companion.vehicle_link import Own, Owner
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_CHANNELS, IMAGE_SIZE, TILT_DEG
+
+STEP_US = 20_000
+BLANK = np.full((IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), 128, np.uint8)
+
+
+class Camera:
+    """Hands over what was put into it, once."""
+
+    trouble = ""
+
+    def __init__(self):
+        self.image = None
+
+    def take(self, _):
+        image, self.image = self.image, None
+        return image
+
+    def close(self):
+        pass
+
+
+class Scene:
+    """A vehicle at home, and an owner whose phone reports without errors."""
+
+    def __init__(self):
+        self.vehicle = SimpleNamespace(
+            own=Own(pos_ned=(0.0, 0.0, 0.0), vel_ned=(0.0, 0.0, 0.0), boot_us=0),
+            owner=Owner(),
+            clock=SimpleNamespace(pictured=lambda _: None),
+        )
+        self.camera = Camera()
+        self.goal = OwnerGoal(self.vehicle, self.camera)
+
+    def pass_by(self, seconds, start_ned=None, vel_ned=(0.0, 0.0, 0.0), pixels=None):
+        """Time passes; the phone reports twice a second if it is there, and the camera shows pixels ten times."""
+        own, owner = self.vehicle.own, self.vehicle.owner
+        for step in range(round(seconds * 1e6) // STEP_US):
+            own.boot_us += STEP_US
+            if start_ned is not None and step % 25 == 0:
+                moved = [place + rate * step * STEP_US * 1e-6 for place, rate in zip(start_ned, vel_ned, strict=True)]
+                owner.pos_ned, owner.vel_ned, owner.std_m = tuple(moved), vel_ned, 0.3
+                owner.count += 1
+            if pixels is not None and step % 5 == 0:
+                lens = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
+                self.camera.image = ImageFrame(own.boot_us, step, pixels, *lens)
+            self.goal.frame(own.boot_us)
+
+
+def shirt(column, row, depth):
+    """An image with a blue shirt."""
+    pixels = BLANK.copy()
+    pixels[row : row + 6, column : column + 4] = (30, 60, 200, depth)
+    return pixels
+
+
+def test_without_a_word_of_the_owner_there_is_no_goal_and_no_speed():
+    scene = Scene()
+    scene.pass_by(1.0)
+    assert scene.goal.goal is None
+    assert scene.goal.done == "owner lost"
+    assert scene.goal.speed_max_m_s == 0.0
+
+
+@pytest.mark.parametrize("pixels", [None, BLANK])
+def test_the_goal_is_where_the_phone_says_with_a_camera_that_shows_nobody_or_without(pixels):
+    scene = Scene()
+    scene.pass_by(6.0, (20.0, 5.0, -1.0), pixels=pixels)
+    assert scene.goal.goal.pos_ned[:2] == pytest.approx((20.0, 5.0), abs=0.5)
+    scene.pass_by(SILENT_S + 2.0, pixels=pixels)
+    assert scene.goal.goal is None
+
+
+def test_who_is_seen_is_kept_nearer_to_than_who_is_only_heard_of():
+    """By a phone alone the owner may be metres off: it stays back as far."""
+    heard, seen = Scene(), Scene()
+    place = (6.0, 0.0, -1.0)
+    heard.pass_by(10.0, place)
+    seen.pass_by(10.0, place, pixels=shirt(30, 20, 100))
+    limits = []
+    for scene in (heard, seen):
+        north = scene.goal.goal.pos_ned[0]
+        scene.vehicle.own.pos_ned = (north - KEPT_M - 1.0, scene.goal.goal.pos_ned[1], 0.0)
+        limits.append(scene.goal.speed_max_m_s)
+    assert limits[0] == 0.0
+    assert limits[1] > 0.2
+
+
+def test_it_is_as_fast_as_the_owner_who_leaves_and_closes_up():
+    scene = Scene()
+    scene.pass_by(10.0, (20.0, 0.0, -1.0), (1.5, 0.0, 0.0))
+    away_m = scene.goal.goal.pos_ned[0]
+    assert away_m == pytest.approx(35.0, abs=2.0)
+    faster = scene.goal.speed_max_m_s - 1.5
+    assert 0.5 * CLOSING_HZ * (away_m - KEPT_M) < faster < CLOSING_HZ * (away_m - KEPT_M)
+
+
+def test_after_a_restart_of_the_vehicle_it_looks_anew():
+    scene = Scene()
+    scene.pass_by(10.0, (20.0, 0.0, -1.0), pixels=BLANK)
+    scene.vehicle.own.boot_us = 0
+    scene.pass_by(5.0, (5.0, 0.0, -1.0), pixels=BLANK)
+    assert scene.goal.goal.pos_ned[0] == pytest.approx(5.0, abs=0.5)
