@@ -48,8 +48,8 @@ class ObstacleStop:
         ahead = obstacles.room_along(yaw, lane.front_m, lane.half_width_m, now_us)
         back = obstacles.room_along(yaw + pi, lane.rear_m, lane.half_width_m, now_us)
         self._setpoint.leave_room(ahead, back)
-        self._tell(_AHEAD, ahead, is_on_the_way=True, has_ranges=obstacles.knows_along(yaw, now_us))
         is_backing = self._setpoint.is_backing
+        self._tell(_AHEAD, ahead, is_on_the_way=not is_backing, has_ranges=obstacles.knows_along(yaw, now_us))
         self._tell(_BEHIND, back, is_on_the_way=is_backing, has_ranges=obstacles.knows_along(yaw + pi, now_us))
 
     def _tell(self, where: str, room: float, *, is_on_the_way: bool, has_ranges: bool) -> None:

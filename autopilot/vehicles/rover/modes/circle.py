@@ -53,6 +53,9 @@ class RoverOrbit(FlightMode):
         self._request = request
         return ACCEPTED
 
+    def refusal(self) -> str:
+        return "" if self._fastest(self._least_radius_m()) > 0.0 else "no circle within the limits of speed and turns"
+
     def forget(self) -> None:
         self._request = None
 
@@ -68,7 +71,7 @@ class RoverOrbit(FlightMode):
         if not isfinite(speed):
             speed = number("HG_RO_CIRC_SPD") or number(context.craft.limits.cruise_speed)
             speed = min(speed, self._fastest(self._radius_m))
-        self._direction = 1.0 if radius_m * speed > 0.0 else -1.0
+        self._direction = 1.0 if (radius_m < 0.0) == (speed < 0.0) else -1.0
         self._speed = abs(speed)
         self._turns = request.turns_rad if isfinite(request.turns_rad) else 0.0
         self._turned, self._bearing = 0.0, nan

@@ -1,8 +1,8 @@
 """Follow me on wheels: the place beside the target is navigator's, the way there is a rover's."""
 
-from math import atan2, cos, hypot, pi
+from math import atan2, cos, dist, hypot, pi
 
-from autopilot.navigator.context import NavContext, distance
+from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.follow import Follow
 from autopilot.navigator.setpoint import Vector
 from common.attitude import wrapped
@@ -37,7 +37,7 @@ class RoverFollow(Follow):
 
     def _go_beside(self, pos_ned: Vector) -> None:
         """To a place that stands: as to any, and no more once it is there."""
-        if self._place is None or distance(self._place, pos_ned) > _SAME_PLACE_M:
+        if self._place is None or dist(self._place[:2], pos_ned[:2]) > _SAME_PLACE_M:
             self._place = pos_ned
             self._context.fly_to(pos_ned, self._context.state.yaw_rad)
 

@@ -5,6 +5,7 @@ it stops. A yaw or a yaw rate beside a velocity is followed, and the velocity is
 or backwards, as it points. A yaw or a yaw rate alone turns on the spot what can turn there.
 """
 
+from itertools import pairwise
 from math import cos, hypot, isfinite, nan, sin
 
 from autopilot.interface.client_requests import GoTo, OffboardSetpoint
@@ -17,13 +18,16 @@ from autopilot.navigator.setpoint import Vector
 from autopilot.ports import SETPOINT_ATTITUDE, SETPOINT_RATE
 from common.attitude import yaw_of
 
+_LOOK_US = 1_000_000  # how often the way of a stream is looked at anew
 NO_WAY = "there is no way to the target inside the fence"
 
 
 class RoverGuided(FlightMode):
     """Mode Guided."""
 
-    __slots__ = ("_context", "_goal", "_is_active", "_next", "_path", "_received_us", "_refused", "_setpoint")
+    __slots__ = (
+        "_context", "_goal", "_is_active", "_looked_us", "_next", "_path", "_received_us", "_refused", "_setpoint",
+    )  # fmt: skip
 
     begins_anew = False
 
@@ -35,6 +39,7 @@ class RoverGuided(FlightMode):
         self._next: Vector | None = None  # [m] asked for before the mode was entered
         self._setpoint: OffboardSetpoint | None = None  # that must be renewed
         self._received_us = 0
+        self._looked_us = 0  # whether the way of a stream is still free
         self._is_active = False
 
     # ---- the mode ----
@@ -137,15 +142,27 @@ class RoverGuided(FlightMode):
         self._received_us = self._context.state.time_us
 
     def _head_for(self, target: Vector) -> None:
-        """A client's stream asks for a place: the same again changes nothing, what cannot be gone to neither."""
-        if any(place is not None and place[:2] == target[:2] for place in (self._goal, self._refused)):
+        """A client's stream asks for a place: the same again changes nothing, unless the fence has changed."""
+        now_us = self._context.state.time_us
+        is_again = _is_at(self._goal, target) or _is_at(self._refused, target)
+        if is_again and now_us - self._looked_us < _LOOK_US:
             return
+        self._looked_us = now_us
         refusal = self._context.fence_refusal(target)
-        if not refusal and not self._go(target):
+        if not refusal and not (_is_at(self._goal, target) and self._is_way_free()) and not self._go(target):
             refusal = NO_WAY
-        self._refused = target if refusal else None
         if refusal:
-            self._context.announcer.statustext(Severity.WARNING, f"Guided: {refusal}")
+            self._stop_going()
+            self._stand()
+            if not _is_at(self._refused, target):
+                self._context.announcer.statustext(Severity.WARNING, f"Guided: {refusal}")
+        self._refused = target if refusal else None
+
+    def _is_way_free(self) -> bool:
+        """Whether nothing excluded lies on what is left of the way."""
+        context = self._context
+        points = [context.state.estimate.pos_ned, *self._path.points[len(self._path.points) - self._path.left :]]
+        return all(len(context.find_path(a, b) or ()) == 1 for a, b in pairwise(points))
 
     def _go_to(self, request: GoTo) -> Reply:
         """Goes to a position; what is NaN stays as it is."""
@@ -170,3 +187,8 @@ class RoverGuided(FlightMode):
         else:
             self._next = target
         return ACCEPTED
+
+
+def _is_at(place: Vector | None, target: Vector) -> bool:
+    """Whether a place is another, heights apart."""
+    return place is not None and place[:2] == target[:2]
