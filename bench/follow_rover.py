@@ -1,8 +1,8 @@
-"""`python -m bench.follow_rover [POLICY]`: how well does a rover follow somebody through hills and trees?
+"""`python -m bench.follow_rover [POLICY [DRIVES]]`: how well does a rover follow somebody through hills and trees?
 
 In: the policy that ships, or a policy file. Drives over MAVLink in lockstep, one rover at a time, by a companion with
-camera, phone and scanner, as those of `bench.follow.flights`: held-out worlds, wind, noise. Writes
-docs/results/follow-rover.md.
+camera, phone and scanner, as those of `bench.follow.flights`: held-out worlds, wind, noise. Prints the rows; those of
+the policy that ships go into docs/results/follow-rover.md.
 """
 
 import sys
@@ -49,6 +49,8 @@ def main(arguments: list[str]) -> int:
         tracks = [fly(pilot, cell, FIRST_SEED + 2 * (k * count + i), airframe="rover") for i in range(count)]
         rows.append(row(cell.trees_per_ha, cell.owner_speed_max, scorecard(tracks)))
         print(rows[-1], flush=True)
+    if arguments:
+        return 0
     page = PAGE.format(
         drives=count,
         seconds=SECONDS,

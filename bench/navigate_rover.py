@@ -1,8 +1,8 @@
-"""`python -m bench.navigate_rover [POLICY]`: how well does a rover get through between trees and walls?
+"""`python -m bench.navigate_rover [POLICY [DRIVES]]`: how well does a rover get through between trees and walls?
 
 In: the policy that ships, or a policy file. Held-out worlds of two densities, with estimator, wind, noise and varied
-vehicles: in the batch, and over MAVLink, one rover at a time, in lockstep, by a companion and its messages. Writes
-docs/results/navigate-rover.md.
+vehicles: in the batch, and over MAVLink, one rover at a time, in lockstep, by a companion and its messages. Prints
+the rows; those of the policy that ships go into docs/results/navigate-rover.md.
 """
 
 import sys
@@ -22,7 +22,7 @@ from mission.simulator.flight_rig import TURBULENCE
 from policies.companion.vector_pilot import RoverNavigationPilot
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
-from policies.tasks.navigate.navigate_params import ROVER
+from policies.tasks.navigate.navigate_params import ROVER_GOALS_M
 from sim.wind import wind_model
 from sim.world.forest_world import WALLED_FOREST
 
@@ -77,7 +77,7 @@ def drive(pilot: RoverNavigationPilot, trees_per_ha: float, seed: int) -> Crossi
         flight.fly(arm, seconds=60.0)
         advance(flight, 1.0)
         flight.rig.set_air(wind_model(wind_m_s, rng.uniform(0.0, 360.0), TURBULENCE, gust_m_s))
-        bearing, away_m = rng.uniform(-pi, pi), rng.uniform(float(ROVER["goal_min_m"]), float(ROVER["goal_max_m"]))  # type: ignore[arg-type]
+        bearing, away_m = rng.uniform(-pi, pi), rng.uniform(ROVER_GOALS_M["goal_min_m"], ROVER_GOALS_M["goal_max_m"])
         north, east = away_m * cos(bearing), away_m * sin(bearing)
         goal_ned = (north, east, -float(flight.world.height(north, east)))
         flight.rig.forget_impacts()
@@ -102,6 +102,9 @@ def main(arguments: list[str]) -> int:
     for k, trees_per_ha in enumerate(DENSITIES):
         drives = [drive(pilot, trees_per_ha, FIRST_SEED + 2 * (i + k * DRIVES)) for i in range(count)]
         link.append(told(trees_per_ha, drives))
+        print(link[-1], flush=True)
+    if arguments:
+        return 0
     tables = {"batch": "\n".join(batch), "link": "\n".join(link)}
     page = PAGE.format(walls=WALLED_FOREST.wall_count, episodes=EPISODES, drives=count, machine=machine(), **tables)
     write_whole(PAGE_FILE, page.encode())

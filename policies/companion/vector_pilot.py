@@ -65,8 +65,9 @@ class NavigationPilot(VectorPilot):
     task = Layout(NAVIGATE, navigate.LAYOUT_VERSION, navigate.frame_elements(has_rays=True), ACTIONS)
     frame_size = task.frame_size
     drives: ClassVar = False
-    shown_m: ClassVar = 85.0  # the farthest goal of training
+    shown_m: ClassVar = navigate.GOAL_MAX_M
     arrived_m: ClassVar = 2.5  # by the estimate, inside of training's radius: the estimate may be off
+    brake_m_s2: ClassVar = 3.0  # guess: half of what the vehicle can
 
 
 class RoverNavigationPilot(NavigationPilot):
@@ -74,8 +75,9 @@ class RoverNavigationPilot(NavigationPilot):
 
     task = replace(NavigationPilot.task, task=NAVIGATE_ROVER)
     drives: ClassVar = True
-    shown_m: ClassVar = 45.0
+    shown_m: ClassVar = navigate.ROVER_GOAL_MAX_M
     arrived_m: ClassVar = 2.0
+    brake_m_s2: ClassVar = 0.8  # guess: of 2.5 that it can, for it is late by its jerk limit and the link
 
 
 class DrivingPilot(VectorPilot):

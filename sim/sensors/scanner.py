@@ -127,7 +127,7 @@ def add_forest(
 def add_box(
     box: Box, tick: int, pos_ned: wp.vec3, heading: float, rise: wp.vec2, ranges_m: wp.array2d(dtype=float), i: int
 ) -> None:
-    """Shortens the ranges of the sectors that a box reaches into: three rays each."""
+    """Shortens the ranges of the sectors that a box reaches into: three rays each, and its corners, however thin."""
     middle = box_middle(box, tick)
     off = wp.vec2(middle[0] - pos_ned[0], middle[1] - pos_ned[1])
     distance = wp.length(off)
@@ -148,6 +148,14 @@ def add_box(
             if entry <= wp.min(lengthwise[1], across[1]):
                 k = ray // _BOX_RAYS
                 ranges_m[i, k] = wp.min(ranges_m[i, k], entry)
+    for corner in range(4):
+        ahead = wp.where(corner < 2, box.half_length, -box.half_length)
+        right = wp.where(corner % 2 == 0, box.half_width, -box.half_width)
+        north = off[0] + box.cos_yaw * ahead - box.sin_yaw * right
+        east = off[1] + box.sin_yaw * ahead + box.cos_yaw * right
+        k = int(wp.floor((wrap_pi(wp.atan2(east, north) - heading) - _FIRST_RAD) / _SECTOR_RAD))
+        if k >= 0 and k < _SECTORS:
+            ranges_m[i, k] = wp.min(ranges_m[i, k], wp.sqrt(north * north + east * east))
 
 
 @wp.func

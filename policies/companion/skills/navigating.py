@@ -27,7 +27,6 @@ from policies.companion.vehicle_link import Own, VehicleLink
 from policies.tasks.flight.own_state import OwnState
 from policies.tasks.navigate.observe import observe_rows
 
-BRAKE_M_S2 = 3.0  # guess: half of what the vehicle can
 END_M_S = 1.0  # speed at which it is handed back; guess
 
 
@@ -51,7 +50,7 @@ class Navigating(GoalSkill):
         self.camera: ImageSource | None = camera
         self._observer = NavigationObserver(pilot.stack, drives=pilot.drives)
         self.drives = pilot.drives
-        self._shown_m, self._arrived_m = pilot.shown_m, pilot.arrived_m
+        self._shown_m, self._arrived_m, self._brake_m_s2 = pilot.shown_m, pilot.arrived_m, pilot.brake_m_s2
         super().__init__(pilot, self._observer, is_ordered_by_goto=is_ordered_by_goto)
         self._command = CommandKernel()
 
@@ -114,7 +113,7 @@ class Navigating(GoalSkill):
         if goal is None or goal_ned is None or not goal.is_last:
             return float("inf")
         room_m = max(dist(goal_ned[:2], own.pos_ned[:2]) - self._arrived_m, 0.0)
-        return sqrt(END_M_S**2 + 2.0 * BRAKE_M_S2 * room_m)
+        return sqrt(END_M_S**2 + 2.0 * self._brake_m_s2 * room_m)
 
 
 def _shown(goal_ned: Vector, own: Own, shown_m: float) -> Vector:

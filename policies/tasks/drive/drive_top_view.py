@@ -4,11 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from policies.tasks.drive.observe import RANGE_M, SECTORS
-from policies.tasks.navigate.navigate_top_view import plant
-from policies.tasks.top_view import GOAL, GOOD, INK, OBSTACLE, VEHICLE, Canvas, Rgb
+from policies.tasks.navigate.navigate_top_view import build, plant
+from policies.tasks.top_view import GOAL, GOOD, INK, VEHICLE, Canvas
 from sim.world.world import WorldMap
 
-MOVER: Rgb = (201, 141, 52)
 LENGTH_M, WIDTH_M = 0.74, 0.44  # of the hull
 _LEAST_HALF_M = 8.0
 
@@ -28,10 +27,7 @@ def draw(
     canvas = Canvas((east - half_m, east + half_m), (north - half_m, north + half_m), height_px)
     canvas.grid(2.0)
     plant(canvas, world.trees, north, east, half_m)
-    for row, (box_north, box_east) in zip(world.boxes.rows, world.boxes.middle(tick), strict=True):
-        size = (2.0 * float(row["half_length"]), 2.0 * float(row["half_width"]))
-        angle = np.pi / 2 - float(np.arctan2(row["sin_yaw"], row["cos_yaw"]))
-        canvas.box((float(box_east), float(box_north)), size, angle, MOVER if row["period_ticks"] else OBSTACLE)
+    build(canvas, world, tick)
     at = (float(pose[1]), float(pose[0]))
     for k in range(SECTORS):
         if ranges_m[k] < RANGE_M:

@@ -31,12 +31,12 @@ from policies.tasks.navigate.navigate_kernels import (
     prepare,
     show,
 )
-from policies.tasks.navigate.navigate_params import IMPROVED, PARAMS, ROVER, NavigateParams
+from policies.tasks.navigate.navigate_params import IMPROVED, PARAMS, ROVER, ROVER_PARAMS, NavigateParams
 from policies.tasks.navigate.navigate_top_view import draw
 from policies.tasks.navigate.observe import DEPTH_CHANNELS, LAYOUT_VERSION, RAY_STACK, frame_elements
 from policies.tasks.navigate.scan import scan
 from policies.tasks.navigate.settings import NavigateSettings
-from policies.tasks.task_params import Sampler, typed_rows
+from policies.tasks.task_params import Sampler, TaskParam, typed_rows
 from sim.sensors.sensors import sensor_model
 from sim.world.forest_world import FOREST, TREES_PER_HA_MAX, WALLED_FOREST
 from sim.world.world import WorldConfig
@@ -47,7 +47,7 @@ ROVER_AIRFRAME = "rover"
 class Navigate(FlightTask):
     """The task. Layout version 2; in version 1 ranges were levelled by the truth."""
 
-    params: ClassVar = PARAMS
+    params: ClassVar[tuple[TaskParam, ...]] = PARAMS
     name: ClassVar = "Navigate"
     world: ClassVar[WorldConfig] = FOREST
     number_defaults: ClassVar[Mapping[str, float | Sampler]] = IMPROVED
@@ -163,6 +163,7 @@ class Navigate(FlightTask):
 class NavigateRover(Navigate):
     """The same task, of a rover between trees and walls: with the velocity of an action it drives, forwards."""
 
+    params: ClassVar = ROVER_PARAMS
     name: ClassVar = "NavigateRover"
     world: ClassVar = WALLED_FOREST
     number_defaults: ClassVar = ROVER

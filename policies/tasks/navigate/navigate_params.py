@@ -3,13 +3,15 @@
 The numbers of the air and the vehicle come first (`FLIGHT_PARAMS`); all can be set or randomised by name.
 """
 
+from dataclasses import replace
+
 import warp as wp
 
 from policies.tasks.flight.flight_params import FLIGHT_PARAMS
+from policies.tasks.navigate.observe import GOAL_MAX_M, ROVER_GOAL_MAX_M
 from policies.tasks.task_params import Sampler, TaskParam
 from sim.world.forest_world import TREES_PER_HA_MAX
 
-GOAL_MAX_M = 85.0  # trees stand up to 91 m from home
 _WANTED = "the requirement: 600 trees/ha at 5 m/s"
 
 
@@ -49,6 +51,7 @@ NAVIGATE_PARAMS = (
     TaskParam(
         "episodes_per_world", 1.0, 1.0, 1000.0, "1", "episodes flown in a forest, each to a goal of its own", "tuned"
     ),
+    # trees stand up to 91 m from home
     TaskParam("goal_min_m", 60.0, 10.0, GOAL_MAX_M, "m", "the goal is at least this far away", "guess"),
     TaskParam("goal_max_m", 85.0, 10.0, GOAL_MAX_M, "m", "and at most this far", "guess"),
     TaskParam("goal_height_m", 2.0, 0.0, 10.0, "m", "of the goal above the ground, and the height to fly at", "guess"),
@@ -72,6 +75,13 @@ NAVIGATE_PARAMS = (
     TaskParam("walk_m_s", 1.8, 0.0, 5.0, "m/s", "how fast it walks at most", "guess"),
 )
 PARAMS = (*FLIGHT_PARAMS, *NAVIGATE_PARAMS)
+ROVER_GOALS_M = {"goal_min_m": 30.0, "goal_max_m": ROVER_GOAL_MAX_M}  # trees and walls stand up to 51 m from home
+ROVER_PARAMS = tuple(
+    replace(number, default=ROVER_GOALS_M[number.name], maximum=ROVER_GOAL_MAX_M)
+    if number.name in ROVER_GOALS_M
+    else number
+    for number in PARAMS
+)
 
 # What a day outside may bring.
 IMPROVED: dict[str, float | Sampler] = {
@@ -86,8 +96,6 @@ ROVER: dict[str, float | Sampler] = {
     **IMPROVED,
     "hill_height_m": Sampler(intervals=((0.0, 3.0),)),
     "trees_per_ha": 400.0,
-    "goal_min_m": 30.0,
-    "goal_max_m": 45.0,
     "goal_height_m": 0.0,
     "slowest_m_s": 1.0,
     "speed_m_s": 4.0,

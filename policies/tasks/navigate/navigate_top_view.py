@@ -1,4 +1,4 @@
-"""Navigate from above: trees, the goal, the drone and what its rangefinder tells."""
+"""Navigate from above: trees, walls, the goal, the vehicle and what its rangefinder tells."""
 
 from typing import Any
 
@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.range_sectors import FIRST_EDGE_DEG, RANGE_M, SECTOR_DEG, SECTORS
-from policies.tasks.top_view import GOAL, GOOD, INK, VEHICLE, Canvas, Rgb
+from policies.tasks.top_view import GOAL, GOOD, INK, OBSTACLE, VEHICLE, Canvas, Rgb
 from sim.world.world import WorldMap
 
 CROWN: Rgb = (206, 216, 190)
 TRUNK: Rgb = (112, 88, 62)
+MOVER: Rgb = (201, 141, 52)
 _HALF_M = 20.0
 
 
@@ -28,6 +29,7 @@ def draw(
     canvas = Canvas((east - _HALF_M, east + _HALF_M), (north - _HALF_M, north + _HALF_M), height_px)
     canvas.grid(5.0)
     plant(canvas, world.trees, north, east, _HALF_M)
+    build(canvas, world, 0)
     for k in range(SECTORS):
         if ranges_m[k] < RANGE_M:
             bearing = yaw + np.radians(FIRST_EDGE_DEG + (k + 0.5) * SECTOR_DEG)
@@ -51,3 +53,11 @@ def plant(canvas: Canvas, trees: NDArray[np.void], north: float, east: float, ha
         canvas.disc((float(tree["east"]), float(tree["north"])), float(tree["crown_radius"]), CROWN)
     for tree in near:
         canvas.disc((float(tree["east"]), float(tree["north"])), float(tree["trunk_radius"]), TRUNK)
+
+
+def build(canvas: Canvas, world: WorldMap, tick: int) -> None:
+    """Draws the boxes, those that move where they are at a tick."""
+    for row, (north, east) in zip(world.boxes.rows, world.boxes.middle(tick), strict=True):
+        size = (2.0 * float(row["half_length"]), 2.0 * float(row["half_width"]))
+        angle = np.pi / 2 - float(np.arctan2(row["sin_yaw"], row["cos_yaw"]))
+        canvas.box((float(east), float(north)), size, angle, MOVER if row["period_ticks"] else OBSTACLE)

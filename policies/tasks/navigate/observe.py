@@ -14,6 +14,7 @@ from policies.tasks.layout import Element
 wp.set_module_options({"enable_backward": False})
 
 LAYOUT_VERSION = 2  # 1: ranges were levelled by the truth
+GOAL_MAX_M, ROVER_GOAL_MAX_M = 85.0, 45.0  # the farthest goals of training
 GOAL_SIZE = wp.constant(5)  # floats of `write_goal`
 RAY_STACK = 2  # frames in a stack of an observation with ranges
 DEPTH_CHANNELS = ("nearness",)  # of the image of an observation without

@@ -2,6 +2,7 @@
 
 from math import isnan
 
+import numpy as np
 import pytest
 
 from autopilot.interface.vehicle_state import Mode
@@ -49,7 +50,9 @@ def test_a_goto_is_driven_to_between_trees_and_walls_and_handed_back(component, 
     advance(flight, 1.0)
     assert companion.phase is Phase.FLYING
     assert isnan(companion.skill.setpoint(companion.action, companion.vehicle.own)[1])  # its heading is its course
-    advance(flight, 60.0, lambda: companion.phase is Phase.WAITING)
+    advance(flight, 60.0, lambda: companion.phase is not Phase.FLYING)
+    assert np.linalg.norm(flight.rig.rows["truth"][0]["vel_ned"]) < 1.6  # handed back nearly at rest
+    advance(flight, 10.0, lambda: companion.phase is Phase.WAITING)
     advance(flight, 3.0)
     assert flight.controller.state.mode is Mode.HOLD
     assert miss_m(flight, goal_ned) < 4.0

@@ -73,26 +73,49 @@ def test_noise_is_two_percent_and_now_and_then_nothing(forest):
     assert 0.005 < np.std(noisy[hit] / exact[hit]) < 0.04
 
 
-def test_walls_are_seen_where_they_stand():
-    """Of a grown world without trees: as far as a ray is, cast here, from the scanner's middle to each box."""
+def cast(boxes, north, east, height, angles):
+    """Distances [m] to boxes along level rays, inf for none."""
+    nearest = np.full(len(angles), np.inf)
+    for box in boxes:
+        if height - BAND_M > box["high"]:
+            continue
+        axes = np.array([[box["cos_yaw"], box["sin_yaw"]], [-box["sin_yaw"], box["cos_yaw"]]])
+        start = axes @ np.array((north - box["north"], east - box["east"]))
+        along = np.array((np.cos(angles), np.sin(angles)))
+        half = np.array((box["half_length"], box["half_width"]))
+        ends = (np.array((-half, half))[:, :, None] - start[:, None]) / (axes @ along)
+        entry, leaving = ends.min(axis=0).max(axis=0), ends.max(axis=0).min(axis=0)
+        is_met = (entry <= leaving) & (leaving > 0.0)
+        nearest[is_met] = np.minimum(nearest[is_met], np.maximum(entry[is_met], 0.0))
+    return nearest
+
+
+def test_no_wall_is_missed_that_fine_rays_meet_and_none_seen_where_none_stands():
+    """Of a grown world without trees: against a hundred rays a sector, cast here. A thin wall shows its end as well."""
     walls = grown_world(WALLED_FOREST.model_copy(update={"trees_per_ha": 0.0, "hill_height_m": 0.0}), 7)
-    seen = 0
-    for north, east in ((0.0, 0.0), (12.0, -20.0), (-25.0, 8.0), (30.0, 30.0), (-10.0, -35.0), (20.0, 5.0)):
-        height = 0.3
+    height, rng = 0.3, np.random.default_rng(3)
+    fine = np.radians(-120.0 + 5.0 * (np.arange(100 * SECTORS) + 0.5) / 100.0)
+    seen = missed = invented = 0
+    for north, east in rng.uniform(-45.0, 45.0, (40, 2)):
         ranges_m = scanned(walls, pos_ned=(north, east, -height))[:SECTORS]
-        rays = np.radians(-120.0 + 5.0 * (np.arange(3 * SECTORS) + 0.5) / 3.0)
-        expected = np.full(len(rays), RANGE_M)
-        for box in walls.boxes.rows:
-            if height - BAND_M > box["high"]:
-                continue
-            axes = np.array([[box["cos_yaw"], box["sin_yaw"]], [-box["sin_yaw"], box["cos_yaw"]]])
-            start = axes @ np.array((north - box["north"], east - box["east"]))
-            along = np.array((np.cos(rays), np.sin(rays)))
-            half = np.array((box["half_length"], box["half_width"]))
-            ends = (np.array((-half, half))[:, :, None] - start[:, None]) / (axes @ along)
-            entry, leaving = ends.min(axis=0).max(axis=0), ends.max(axis=0).min(axis=0)
-            is_met = (entry <= leaving) & (leaving > 0.0)
-            expected[is_met] = np.minimum(expected[is_met], np.maximum(entry[is_met], 0.0))
-        assert ranges_m == pytest.approx(np.minimum(expected.reshape(SECTORS, 3).min(axis=1), RANGE_M), abs=1e-3)
-        seen += int((ranges_m < RANGE_M).sum())
-    assert seen > 20
+        nearest = cast(walls.boxes.rows, north, east, height, fine).reshape(SECTORS, 100).min(axis=1)
+        is_there, is_shown = nearest < RANGE_M - 0.5, ranges_m < RANGE_M
+        missed += int((is_there & ~is_shown).sum())
+        invented += int((is_shown & ~np.isfinite(nearest)).sum())
+        seen += int(is_shown.sum())
+    assert seen > 200
+    assert missed <= 0.005 * seen  # slivers whose corner is out of reach
+    assert invented <= 0.01 * seen  # between two of the fine rays
+
+
+def test_walls_are_as_far_as_they_are():
+    walls = grown_world(WALLED_FOREST.model_copy(update={"trees_per_ha": 0.0, "hill_height_m": 0.0}), 7)
+    height = 0.3
+    rays = np.radians(-120.0 + 5.0 * (np.arange(3 * SECTORS) + 0.5) / 3.0)
+    for north, east in ((0.0, 0.0), (12.0, -20.0), (-25.0, 8.0), (30.0, 30.0), (-10.0, -35.0), (20.0, 5.0)):
+        ranges_m = scanned(walls, pos_ned=(north, east, -height))[:SECTORS]
+        expected = np.minimum(
+            cast(walls.boxes.rows, north, east, height, rays).reshape(SECTORS, 3).min(axis=1), RANGE_M
+        )
+        assert (ranges_m < expected + 1e-3).all()
+        assert np.median(np.abs(ranges_m - expected)) < 1e-3

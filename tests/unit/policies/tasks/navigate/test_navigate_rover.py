@@ -54,11 +54,17 @@ def test_on_open_ground_whoever_drives_at_the_goal_arrives():
     assert (speeds > 2.5).all()
 
 
-def test_walls_and_trees_are_seen_and_end_a_drive_that_does_not_mind_them():
-    task = task_of(64)
-    assert (newest(task)[:, -SECTORS - 4 : -4] > 0.0).any(axis=1).mean() > 0.9
+@pytest.mark.parametrize(("trees_per_ha", "least"), [(400.0, 0.4), (0.0, 0.1)])
+def test_trees_and_walls_are_seen_and_end_a_drive_that_does_not_mind_them(trees_per_ha, least):
+    task = task_of(64, {"trees_per_ha": trees_per_ha})
+    assert (newest(task)[:, -SECTORS - 4 : -4] > 0.0).any(axis=1).mean() > 0.5
     outcomes, _ = drive(task, 0.5, 150)
-    assert 0.3 < (outcomes == Outcome.HIT_OBSTACLE).mean() < 0.95
+    assert least < (outcomes == Outcome.HIT_OBSTACLE).mean() < 0.95
+
+
+def test_goals_are_no_farther_than_where_something_stands():
+    with pytest.raises(ValueError, match="goal_max_m"):
+        task_of(1, {"goal_max_m": 85.0})
 
 
 def test_neither_its_height_nor_the_goals_is_shown():
