@@ -102,7 +102,6 @@ def main(arguments: list[str]) -> int:
     for k, trees_per_ha in enumerate(DENSITIES):
         drives = [drive(pilot, trees_per_ha, FIRST_SEED + 2 * (i + k * DRIVES)) for i in range(count)]
         link.append(told(trees_per_ha, drives))
-        print(link[-1], flush=True)
     if arguments:
         return 0
     tables = {"batch": "\n".join(batch), "link": "\n".join(link)}

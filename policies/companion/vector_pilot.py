@@ -67,7 +67,6 @@ class NavigationPilot(VectorPilot):
     drives: ClassVar = False
     shown_m: ClassVar = navigate.GOAL_MAX_M
     arrived_m: ClassVar = 2.5  # by the estimate, inside of training's radius: the estimate may be off
-    brake_m_s2: ClassVar = 3.0  # guess: half of what the vehicle can
 
 
 class RoverNavigationPilot(NavigationPilot):
@@ -77,7 +76,6 @@ class RoverNavigationPilot(NavigationPilot):
     drives: ClassVar = True
     shown_m: ClassVar = navigate.ROVER_GOAL_MAX_M
     arrived_m: ClassVar = 2.0
-    brake_m_s2: ClassVar = 0.8  # guess: of 2.5 that it can, for it is late by its jerk limit and the link
 
 
 class DrivingPilot(VectorPilot):

@@ -1,8 +1,9 @@
 """To navigate to a goal through forest: ranges in, the actions of a policy of Navigate or NavigateRover out.
 
 It flies or drives while it has a goal; on the last metres it is slowed down, so that whoever gets the vehicle back gets
-it nearly at rest, and not at speed among trees. A rover is asked for velocities alone: its heading is theirs. The goal
-may be somebody with a phone, and then it goes after them for as long as it hears of them.
+it nearly at rest, and not at speed among trees; a rover, which brakes less, at half its speed, and Hold stops it
+within a metre. A rover is asked for velocities alone: its heading is theirs. The goal may be somebody with a phone, and
+then it goes after them for as long as it hears of them.
 """
 
 from math import dist, hypot, isfinite, nan, sqrt
@@ -27,6 +28,9 @@ from policies.companion.vehicle_link import Own, VehicleLink
 from policies.tasks.flight.own_state import OwnState
 from policies.tasks.navigate.observe import observe_rows
 
+BRAKE_M_S2 = (
+    3.0  # guess: half of what a drone can; more than a rover does, but a policy drives worst where it is slowed
+)
 END_M_S = 1.0  # speed at which it is handed back; guess
 
 
@@ -50,7 +54,7 @@ class Navigating(GoalSkill):
         self.camera: ImageSource | None = camera
         self._observer = NavigationObserver(pilot.stack, drives=pilot.drives)
         self.drives = pilot.drives
-        self._shown_m, self._arrived_m, self._brake_m_s2 = pilot.shown_m, pilot.arrived_m, pilot.brake_m_s2
+        self._shown_m, self._arrived_m = pilot.shown_m, pilot.arrived_m
         super().__init__(pilot, self._observer, is_ordered_by_goto=is_ordered_by_goto)
         self._command = CommandKernel()
 
@@ -113,7 +117,7 @@ class Navigating(GoalSkill):
         if goal is None or goal_ned is None or not goal.is_last:
             return float("inf")
         room_m = max(dist(goal_ned[:2], own.pos_ned[:2]) - self._arrived_m, 0.0)
-        return sqrt(END_M_S**2 + 2.0 * self._brake_m_s2 * room_m)
+        return sqrt(END_M_S**2 + 2.0 * BRAKE_M_S2 * room_m)
 
 
 def _shown(goal_ned: Vector, own: Own, shown_m: float) -> Vector:
