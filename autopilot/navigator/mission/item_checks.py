@@ -28,6 +28,7 @@ _PAYLOAD_COMMANDS = frozenset(
 ) | {42_600}
 
 _OFF_GROUND = frozenset((Command.TAKEOFF, Command.LAND))
+_ON_GROUND = frozenset((Command.SET_REVERSE,))
 
 _Problem = tuple[Result, str]
 _Check = Callable[[MissionItem, Sequence[MissionItem]], _Problem | None]
@@ -50,6 +51,8 @@ def refuse_items(
         problem = _sequence_problem(i_item, item) or _item_problem(item, items, takes)
         if problem is None and not leaves_ground and item.command in _OFF_GROUND:
             problem = Result.UNSUPPORTED, f"command {item.command} is for vehicles that leave the ground"
+        if problem is None and leaves_ground and item.command in _ON_GROUND:
+            problem = Result.UNSUPPORTED, f"command {item.command} is for vehicles that drive"
         if problem is not None:
             return ItemRefusal(i_item, int(problem[0]), problem[1])
     return None
@@ -296,6 +299,12 @@ def _check_fence(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None
     return None
 
 
+def _check_reverse(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None:
+    if item.params[0] in (0.0, 1.0):
+        return None
+    return Result.PARAM1, f"parameter 1 is {item.params[0]}, not 0 (forwards) or 1 (backwards)"
+
+
 def _check_roi(item: MissionItem, _: Sequence[MissionItem]) -> _Problem | None:
     if item.command in ROI_AS_ASKED and item.params[0] in (ROI_BY_INDEX, ROI_OF_TARGET):
         return (
@@ -338,5 +347,6 @@ _CHECKS: dict[int, _Check] = {
     Command.ROI: _check_roi,
     Command.NAV_ROI: _check_roi,
     Command.FENCE_ENABLE: _check_fence,
+    Command.SET_REVERSE: _check_reverse,
 }
 SUPPORTED_COMMANDS = frozenset(_CHECKS)

@@ -34,6 +34,7 @@ class Command(IntEnum):
     SET_HOME = 179
     RETURN_PATH_START = 188
     LAND_START = 189
+    SET_REVERSE = 194
     ROI_LOCATION = 195
     ROI_NEXT_OFFSET = 196
     ROI_NONE = 197

@@ -135,6 +135,8 @@ class Actions:
                 self._set_home(nan, nan, nan)
             else:
                 self._set_home(item.x, item.y, item.z)
+        elif command == Command.SET_REVERSE:
+            self._context.setpoint.set_reversed(is_reversed=item.params[0] == 1.0)
         elif command == Command.FENCE_ENABLE and self.fence is not None:
             self._switch_fence(item, self.fence)
         elif command in _ROI_COMMANDS:
