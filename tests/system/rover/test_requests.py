@@ -6,7 +6,10 @@ from math import hypot
 import numpy as np
 import pytest
 
+from autopilot.interface.vehicle_state import Mode
 from common.attitude import wrapped
+from common.geodesy import geodetic_from_ned
+from mission.client import CommandRefused
 from tests.system.published.published_rules import Flown
 from tests.system.published.rover_station import (
     CIRCLE,
@@ -265,3 +268,45 @@ def test_no_limits_of_braking_and_jerk_are_no_trouble(none):
         assert abs(rover.speed) < 0.1
 
     rover.run(script)
+
+
+ORBIT = 34
+
+
+@pytest.mark.parametrize("airframe", ["rover", "rover-skid"])
+@pytest.mark.parametrize("radius_m", [6.0, -6.0])
+def test_an_orbit_of_so_many_turns_is_driven_and_then_held(airframe, radius_m):
+    """DO_ORBIT in PX4's dialect: negative is counter-clockwise, parameter 4 is the angle in all."""
+    flown = Flown(config={"airframe": airframe})
+    centre, ends = (10.0, 0.0), []
+
+    async def script(drone):
+        await drone.wait_ready()
+        await drone.arm()
+        lat_deg, lon_deg, alt_m = geodetic_from_ned(*centre, 0.0, drone.origin)
+        place = round(lat_deg * 1e7), round(lon_deg * 1e7), alt_m
+        await drone.command_int(ORBIT, 0, (radius_m, 1.5, 3.0, 4.0 * np.pi), *place, name="orbit")
+        await drone.until(lambda: flown.state.mode is Mode.HOLD, 120.0, "held")
+        await drone.sleep(3.0)
+        ends.append(abs(flown.state.estimate.vel_ned[0]))
+
+    flown.run(script, 200.0)
+    rows = np.array(flown.rows)
+    off = rows[:, 1:3] - centre
+    is_round = np.abs(np.hypot(*off.T) - abs(radius_m)) < 0.7
+    bearing = np.unwrap(np.arctan2(off[is_round, 1], off[is_round, 0]))
+    assert np.sign(radius_m) * (bearing[-1] - bearing[0]) == pytest.approx(4.0 * np.pi, abs=1.0)
+    assert ends[0] < 0.1
+
+
+@pytest.mark.parametrize(("radius_m", "speed"), [(0.3, 1.0), (5.0, 40.0), (2000.0, 1.0)])
+def test_a_circle_that_cannot_be_driven_is_refused(radius_m, speed):
+    flown = Flown(config={"airframe": "rover"})
+
+    async def script(drone):
+        await drone.wait_ready()
+        await drone.arm()
+        with pytest.raises(CommandRefused):
+            await drone.command_int(ORBIT, 0, (radius_m, speed, 3.0, 0.0), 0, 0, 0.0, name="orbit")
+
+    flown.run(script, 60.0)
