@@ -78,7 +78,7 @@ class Rig:
         self.vehicle_count = vehicle_count
         self.device = device
         self.arrays: Any = self._kernels.Arrays()
-        self._world = world  # holds the arrays that the kernels' structs point into
+        self.world = world  # holds the arrays that the kernels' structs point into
         self.arrays.worlds, self.arrays.i_world = self._worlds(world)
         self.arrays.tick = wp.zeros(vehicle_count, dtype=wp.int64, device=device)
         self.arrays.seed = wp.full(vehicle_count, seed, dtype=int, device=device)

@@ -109,7 +109,8 @@ class SteppedRig(Rig):
         count, device = self.vehicle_count, self.device
         self._samples = wp.zeros(count, dtype=Samples, device=device)
         self._board_commands = wp.zeros(count, dtype=vec8, device=device)
-        self._commands = wp.zeros(count, dtype=vec8, device=device)
+        self._motor_commands = wp.zeros(count, dtype=vec8, device=device)
+        self._launches: list[Any] = []
         self._wind_ned = wp.zeros(count, dtype=wp.vec3, device=device)
         self._engine, self._board = self._make_engine(self), self._make_board(self)
 
@@ -120,7 +121,8 @@ class SteppedRig(Rig):
     def power_on(self, marks: Any) -> None:
         super().power_on(marks)
         self._board.boot(marks)
-        self._launch(forget_commands, [marks, self._board_commands])
+        inputs = [marks, self._board_commands]
+        wp.launch(forget_commands, self.vehicle_count, inputs, device=self.device)
 
     def prepare(self, tick_count: int) -> list[Any]:  # noqa: ARG002  (any number of ticks is the same launches)
         return []
@@ -132,13 +134,22 @@ class SteppedRig(Rig):
         self.rows.fetch()
 
     def _tick(self) -> None:
-        a, air = self.arrays, [self._board_commands, self.arrays.seed, self.arrays.tick, self.arrays.wind]
-        where = [a.worlds, a.i_world]
-        self._launch(blow, [*where, a.wind_model, a.truth, a.faults, *air, self._wind_ned, self._commands])
-        self._engine.step(self._commands, self._wind_ned)
-        self._launch(sense_all, [*where, a.sensor_model, a.faults, a.truth, a.seed, a.tick, a.sensors, self._samples])
-        self._board.exchange(self._samples, a.truth, self._board_commands)
-        self._launch(count_on, [a.tick])
+        blown, sensed, counted = self._launches or self._record_tick()
+        blown.launch()
+        self._engine.step(self._motor_commands, self._wind_ned)
+        sensed.launch()
+        self._board.exchange(self._samples, self.arrays.truth, self._board_commands)
+        counted.launch()
 
-    def _launch(self, kernel: Any, inputs: list[Any]) -> None:
-        wp.launch(kernel, dim=self.vehicle_count, inputs=inputs, device=self.device)
+    def _record_tick(self) -> list[Any]:
+        """The launches of a tick but engine and board, made once: to pack their arguments takes as long as they do."""
+        a, where = self.arrays, [self.arrays.worlds, self.arrays.i_world]
+        air = [self._board_commands, a.seed, a.tick, a.wind, self._wind_ned, self._motor_commands]
+        inputs = {
+            blow: [*where, a.wind_model, a.truth, a.faults, *air],
+            sense_all: [*where, a.sensor_model, a.faults, a.truth, a.seed, a.tick, a.sensors, self._samples],
+            count_on: [a.tick],
+        }
+        dim, device = self.vehicle_count, self.device
+        self._launches = [wp.launch(k, dim, of, device=device, record_cmd=True) for k, of in inputs.items()]
+        return self._launches

@@ -190,6 +190,18 @@ def _contact(
 
 
 @wp.func
+def air_wrench(model: MultirotorModel, body: BodyState, inputs: StepInputs, r_frd_from_ned: wp.mat33) -> RotorWrench:
+    """What rotors and air do to the body over a step; the speeds of the rotors at its end."""
+    omega = body.omega_frd
+    air_vel_frd = r_frd_from_ned * (body.vel_ned - inputs.wind_ned)
+    wrench = rotor_wrench(model, inputs, body.rotor_speed, air_vel_frd, omega)
+    wrench.force_frd += hull_drag(model.drag_area_frd, air_vel_frd, inputs.density_ratio)
+    angular_drag = inputs.density_ratio * model.angular_drag_n_m_s2
+    wrench.torque_frd -= angular_drag * wp.cw_mul(wp.abs(omega), omega)
+    return wrench
+
+
+@wp.func
 def _substep(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> BodyState:
     """One step of motion.
 
@@ -201,11 +213,9 @@ def _substep(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> Bod
     r_ned_from_frd = wp.quat_to_matrix(body.q_ned_from_frd)
     r_frd_from_ned = wp.transpose(r_ned_from_frd)
     omega = body.omega_frd
-    air_vel_frd = r_frd_from_ned * (body.vel_ned - inputs.wind_ned)
-    wrench = rotor_wrench(model, inputs, body.rotor_speed, air_vel_frd, omega)
-    force_frd = wrench.force_frd + hull_drag(model.drag_area_frd, air_vel_frd, inputs.density_ratio)
-    angular_drag = inputs.density_ratio * model.angular_drag_n_m_s2
-    torque_frd = wrench.torque_frd - angular_drag * wp.cw_mul(wp.abs(omega), omega)
+    wrench = air_wrench(model, body, inputs, r_frd_from_ned)
+    force_frd = wrench.force_frd
+    torque_frd = wrench.torque_frd
     if around.is_near_ground + around.is_near_obstacle > 0:
         contact = _contact(model.contact, body, around, r_ned_from_frd, dt)
         force_frd += r_frd_from_ned * contact.force_ned

@@ -49,12 +49,16 @@ class NativeEngine:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._kernel = _step_kernel(rig.body)
+        self._launch: Any = None
+        self._given: tuple[Any, Any] | None = None  # that it was recorded with
 
     def boot(self, is_chosen: Any) -> None:
         self._rig.place(is_chosen)
 
     def step(self, commands: Any, wind_ned: Any) -> None:
-        arrays = self._rig.arrays
-        places = [arrays.model, arrays.body, arrays.worlds, arrays.i_world]
-        rows = [*places, commands, wind_ned, arrays.tick, arrays.truth]
-        wp.launch(self._kernel, dim=self._rig.vehicle_count, inputs=rows, device=self._rig.device)
+        if self._given != (commands, wind_ned):
+            a, rig = self._rig.arrays, self._rig
+            rows = [a.model, a.body, a.worlds, a.i_world, commands, wind_ned, a.tick, a.truth]
+            self._launch = wp.launch(self._kernel, rig.vehicle_count, rows, device=rig.device, record_cmd=True)
+            self._given = commands, wind_ned
+        self._launch.launch()
