@@ -1,13 +1,14 @@
 """`python -m bench.drive [judge] [batch]`: trains Drive's policies, and judges them. Writes docs/results/drive.md.
 
-In: the recipes `drive-park` and `drive-reach`; with `judge` the policies that ship. Held-out worlds with estimator,
-wind, noise and varied vehicles, as many episodes each. Out: the policies in `results/drive/`, and a table with 95 %
+In: the recipes `drive-park`, `drive-park-careful` and `drive-reach`; with `judge` the policies that ship. Held-out
+worlds with estimator, wind, noise and varied vehicles, as many episodes each. Out: the policies in `results/drive/`, and a table with 95 %
 intervals; then, unless `batch` is asked for alone, the same over MAVLink (`drive_mavlink.py`).
 """
 
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -30,6 +31,7 @@ from policies.tasks.drive.drive_kernels import MEASURES
 from policies.tasks.episode import Outcome
 from policies.tasks.intervals import bootstrap, rate
 
+LEGS = {"park": ("drive-park", "drive-park-careful"), "reach": ("drive-reach",)}
 AIMS = {"park": "97 %", "reach": "95 %"}
 EPISODES = 1000  # side by side: each environment plays one
 SEED = 1_000_003  # no training run is given it
@@ -44,8 +46,9 @@ Policies of a rover ([drive.md](../explanation/drive.md)) in held-out worlds, {e
 estimator, with sensor noise, wind and gusts, and masses, motors and tyres that differ. Success is to stand within 0.3 m
 and 10 degrees of the goal, slower than 0.3 m/s, without having touched anything. Actions are the most probable ones;
 rates have Wilson's 95 % interval, times the bootstrap's. Made by `make reproduce-drive`, which trains each from nothing
-by its recipe (`honeyguide train drive-park`, `drive-reach`) and judges what comes of it; without a time of training the
-policies that ship are judged, of which [drive.md](../explanation/drive.md#how-well) tells how they were trained.
+by its recipes (`honeyguide train drive-park`, then `drive-park-careful`; `drive-reach`) and judges what comes of it;
+without a time of training the policies that ship are judged, of which
+[drive.md](../explanation/drive.md#how-well) tells how they were trained.
 
 | policy | aim | success | touched | out of time | other | time to the goal | trained in |
 |---|---|---|---|---|---|---|---|
@@ -64,20 +67,24 @@ class Drives:
 
 
 def trained(preset: str) -> tuple[Path, float]:
-    """A policy trained anew, and how long that took [s]."""
-    config = load_config(recipe(f"drive-{preset}")).config
-    changes = {
-        "env_settings.seed": TRAINING_SEED,
-        "checkpoint_settings.run_id": preset,
-        "checkpoint_settings.results_dir": str(FOLDER),
-        "checkpoint_settings.force": True,
-    }
-    config = changed(config, changes)
-    build_task("Drive", 1, settings_of("Drive", config.env_settings.env_args)).reset(0)  # compiles, not on the clock
-    result = train(config, Curve(config.behavior.max_steps))
-    path = FOLDER / f"drive-{preset}.pt"
-    save_policy(path, *load_policy(result.policy), is_half=True)
-    return path, result.progress.elapsed_s
+    """A policy trained anew, leg after leg, and how long that took [s]."""
+    path, took_s = FOLDER / f"drive-{preset}.pt", 0.0
+    for leg, name in enumerate(LEGS[preset]):
+        config = load_config(recipe(name)).config
+        changes: dict[str, Any] = {
+            "env_settings.seed": TRAINING_SEED,
+            "checkpoint_settings.run_id": name,
+            "checkpoint_settings.results_dir": str(FOLDER),
+            "checkpoint_settings.force": True,
+        }
+        if leg > 0:
+            changes["behavior.init_path"] = str(path)
+        config = changed(config, changes)
+        build_task("Drive", 1, settings_of("Drive", config.env_settings.env_args)).reset(0)  # compiles, off the clock
+        result = train(config, Curve(config.behavior.max_steps))
+        save_policy(path, *load_policy(result.policy), is_half=True)
+        took_s += result.progress.elapsed_s
+    return path, took_s
 
 
 def judged(policy: Policy, preset: str, count: int = EPISODES) -> Drives:

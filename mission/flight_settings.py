@@ -14,6 +14,7 @@ from common.geodesy import DEFAULT_HOME
 from mission.console.model_command import option
 
 Pace = Literal["walk", "run"]
+EngineName = Literal["native", "pybullet"]
 WorldKind = Literal["hills", "forest", "walled-forest", "course", "car-park"]
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
 
@@ -38,6 +39,8 @@ class FlightSettings(BaseModel):
     )
     """In PX4's they always send them."""
     traffic_count: int = option(0, "Other aircraft that are heard by ADS-B.", "--traffic", ge=0, le=50)
+    engine: EngineName = option("native", "Who moves the body: native or pybullet (multirotors).")
+    """Rotors, air, sensors and flight controller are ours with each."""
     has_lidar: bool = option(False, "Carry a ring of range finders that looks round.", "--lidar")
     has_base: bool = option(False, "A base station beside home sends the GNSS receiver corrections.", "--rtk")
 
@@ -111,8 +114,8 @@ class FollowOptions(FlightOptions):
 
 FOLLOWED_WITH = (
     "policy", "owner", "seconds", "speed", "seed", "wind_m_s", "wind_from_deg", "noise", "world_seed", "trees_per_ha",
-    "hill_height_m", "airframe", "dialect", "parameters", "has_view", "view_port", "has_film", "gcs_port", "api_port",
-    "host", "run_folder",
+    "hill_height_m", "airframe", "dialect", "engine", "parameters", "has_view", "view_port", "has_film", "gcs_port",
+    "api_port", "host", "run_folder",
 )  # fmt: skip
 
 

@@ -3,9 +3,11 @@
 Warp, which the world and the vehicle are made of, takes longer to import than all else.
 """
 
+from importlib.util import find_spec
 from typing import get_args
 
 from common.airframe import AirframeError, load_airframe
+from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from mission.flight_settings import FlightOptions, Pace
 from mission.plan.plan_file import PlanError, read_plan
@@ -71,9 +73,15 @@ def check_vehicle(options: FlightOptions) -> None:
     for text in options.parameters:
         parameter_of(text)
     try:
-        load_airframe(options.airframe)
+        airframe = load_airframe(options.airframe)
     except AirframeError as error:
         raise UserError(str(error)) from error
+    if options.engine == "native":
+        return
+    if not isinstance(airframe, MultirotorAirframe):
+        raise UserError(f"--engine {options.engine}: it moves multirotors, and {options.airframe} is none")
+    if find_spec(options.engine) is None:
+        raise UserError(f"--engine {options.engine}: comes with the extra 'engines' (docs/start/installing.md)")
 
 
 def parameter_of(text: str) -> tuple[str, float]:

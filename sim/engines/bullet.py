@@ -7,6 +7,7 @@ Trees and boxes are put there as a vehicle comes near.
 """
 
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 import pybullet
@@ -144,10 +145,12 @@ class BulletEngine:
         self._rig = rig
         self._native = NativeEngine(rig)  # for what is held in hands
         self._client = pybullet.connect(pybullet.DIRECT)
+        finalize(self, pybullet.disconnect, self._client)
         pybullet.setGravity(*_UP_M_S2, physicsClientId=self._client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=TICK_S / SUBSTEPS,
             numSubSteps=0,
+            solverResidualThreshold=0.0,  # or what stands creeps
             deterministicOverlappingPairs=1,
             physicsClientId=self._client,
         )
@@ -172,8 +175,8 @@ class BulletEngine:
         if self._states["is_held"].any():
             self._native.step(commands, wind_ned)
             return
-        for i in np.flatnonzero(self._states[_POSE] != self._left):  # somebody has put it elsewhere
-            self._take_over(int(i))
+        for moved in np.flatnonzero(self._states[_POSE] != self._left):  # somebody has put it elsewhere
+            self._take_over(int(moved))
         begun, pushed, taken, concluded = self._launches or self._record(commands, wind_ned)
         self._world.furnish(self._states["pos_ned"], int(self._rig.arrays.tick.numpy()[0]))
         begun.launch()
@@ -191,10 +194,6 @@ class BulletEngine:
                     self._touch(i, body, before[i].astype(float))
         concluded.launch()
         self._left = self._states[_POSE].copy()
-
-    def close(self) -> None:
-        """Gives Bullet's world back."""
-        pybullet.disconnect(self._client)
 
     def _record(self, commands: Any, wind_ned: Any) -> list[Any]:
         a, rows = self._rig.arrays, self._bullet_rows
