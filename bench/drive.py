@@ -1,8 +1,8 @@
 """`python -m bench.drive [judge] [batch]`: trains Drive's policies, and judges them. Writes docs/results/drive.md.
 
 In: the recipes `drive-park`, `drive-park-careful` and `drive-reach`; with `judge` the policies that ship. Held-out
-worlds with estimator, wind, noise and varied vehicles, as many episodes each. Out: the policies in `results/drive/`, and a table with 95 %
-intervals; then, unless `batch` is asked for alone, the same over MAVLink (`drive_mavlink.py`).
+worlds with estimator, wind, noise and varied vehicles, as many episodes each. Out: the policies in `results/drive/`,
+and a table with 95 % intervals; then, unless `batch` is asked for alone, the same over MAVLink (`drive_mavlink.py`).
 """
 
 import sys

@@ -40,7 +40,6 @@ from mission.simulator.failure_injection import RigInjector
 from mission.simulator.flight_rig import GUST_FRACTION, flight_rig, flight_wind, flight_world
 from mission.simulator.host_ports import host_ports
 from mission.simulator.onboard_devices import Surroundings, ring_of
-from mission.simulator.rig_choice import rig_with
 from mission.simulator.scanner_device import ScannerDevice
 from mission.simulator.simulator_params import PREFIX as SIMULATOR_PREFIX
 from mission.simulator.simulator_params import TURBULENCE_FRACTION, SimulatorParameters
@@ -82,8 +81,7 @@ class Flight:
         video: sends it to ground stations.
         has_camera_thread: photos are rendered while the flight goes on, which is then no longer the same each time.
         state: what outlives the flight; None: it begins with defaults and nothing is kept.
-        make_rig: takes the arguments of `Rig`; `sim.stepped.SteppedRig` flies with the engine and the board of others;
-            None: with the engine of the configuration.
+        make_rig: takes the arguments of `Rig`, as `sim.stepped.SteppedRig`; None: as the configuration says.
         world: the ground; None: as the configuration says.
     """
 
@@ -111,7 +109,7 @@ class Flight:
         vehicle, _ = class_of(self.airframe)
         self.drives = vehicle.ground is None  # and stays on the ground
         self.world = flight_world(config) if world is None else world
-        self.rig = flight_rig(config, self.airframe, self.world, make_rig or rig_with(config.engine))
+        self.rig = flight_rig(config, self.airframe, self.world, make_rig)
         self.params = flight_parameters(config, self.airframe)
         self.persistence = None if state is None else self._restore_parameters(state)
         self._has_new_parameters = True

@@ -39,8 +39,8 @@ class FlightSettings(BaseModel):
     )
     """In PX4's they always send them."""
     traffic_count: int = option(0, "Other aircraft that are heard by ADS-B.", "--traffic", ge=0, le=50)
-    engine: EngineName = option("native", "Who moves the body: native or pybullet (multirotors).")
-    """Rotors, air, sensors and flight controller are ours with each."""
+    engine: EngineName = option("native", "Who moves the body: native or pybullet.")
+    """Air, sensors and flight controller are ours with each."""
     has_lidar: bool = option(False, "Carry a ring of range finders that looks round.", "--lidar")
     has_base: bool = option(False, "A base station beside home sends the GNSS receiver corrections.", "--rtk")
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from common.airframe import Airframe
 from common.kernels import FRAME_TICKS
 from mission.flight_config import FlightConfig
+from mission.simulator.rig_choice import rig_with
 from sim.bodies.vehicles import class_of
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
@@ -28,10 +29,19 @@ def flight_wind(speed_m_s: float, from_deg: float) -> WindModel:
     return wind_model(speed_m_s, from_deg, TURBULENCE, GUST_FRACTION * speed_m_s)
 
 
-def flight_rig(config: FlightConfig, airframe: Airframe, world: WorldMap, make_rig: Callable[..., Rig]) -> Rig:
-    """The vehicle of a flight with its sensors, ready to advance by frames; `make_rig` takes the arguments of `Rig`."""
+def flight_rig(
+    config: FlightConfig, airframe: Airframe, world: WorldMap, make_rig: Callable[..., Rig] | None = None
+) -> Rig:
+    """The vehicle of a flight with its sensors, ready to advance by frames.
+
+    Args:
+        config: of the flight.
+        airframe: the vehicle.
+        world: the ground.
+        make_rig: takes the arguments of `Rig`; None: with the engine of the configuration.
+    """
     vehicle, body = class_of(airframe)
-    rig = make_rig(
+    rig = (make_rig or rig_with(config.engine))(
         airframe,
         world,
         sensor_model(noise_scale=config.noise, home=config.home),
