@@ -24,6 +24,7 @@ SCRIPTS = {
     "python_share": "bench.flying.python_share",
     "batch": "bench.flying.batch",
     "threads": "bench.flying.threads",
+    "engines": "bench.flying.engines",
     "scaling": "bench.flying.scaling",
     "worlds": "bench.flying.worlds",
     "hover": "bench.learning.hover",

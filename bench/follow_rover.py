@@ -21,7 +21,7 @@ PAGE_FILE = Path(__file__).parent.parent / "docs" / "results" / "follow-rover.md
 PAGE = """\
 # A rover follows somebody
 
-`honeyguide follow --airframe rover`: the policy that ships (`policies/pretrained/follow-rover.pt`) drives a rover
+`honeyguide follow --airframe rover`: the policy that ships (`navigate-rover-follow`) drives a rover
 after its owner, by its [companion](../how-to/companion.md), over MAVLink: {drives} drives of {seconds:.0f} s of each
 kind, in hills and among trees that it was not trained in, with estimator, sensor noise, wind and a phone that is off
 by metres. The figures are those of the [drone](follow.md); who walks into a rover that stands has not been run into.
@@ -42,7 +42,7 @@ def row(trees_per_ha: float, owner_m_s: float, card: Scorecard) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    pilot = load_follower(arguments[0] if arguments else "follow-rover")
+    pilot = load_follower(arguments[0] if arguments else "navigate-rover-follow")
     count = int(arguments[1]) if len(arguments) > 1 else DRIVES
     rows = []
     for k, cell in enumerate(CELLS):

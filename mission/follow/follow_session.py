@@ -46,7 +46,7 @@ from sim.bodies.vehicles import class_of
 
 ENGAGE_S = 20.0  # after the take-off, until it follows
 STOP_S = 3.0  # of what drives, until it stands
-ROVER_POLICY = "follow-rover"
+ROVER_POLICY = "navigate-rover-follow"
 FILM = "flight.mp4"
 SHOWN = ("in_band", "in_view", "distance_median_m", "collision")  # figures of the scorecard on the live page
 

@@ -40,7 +40,8 @@ class OwnerGoal:
         """Takes in what the camera sees, and what the phone has said."""
         own, owner, known_us = self._vehicle.own, self._vehicle.owner, self._known_us
         image = self._camera.take(time_us)
-        if image is not None and not 0 <= known_us - image.time_us < IMAGE_OLD_US:  # later, or before a restart
+        is_new = image is not None and own.boot_us - image.time_us < IMAGE_OLD_US
+        if image is not None and is_new and not 0 <= known_us - image.time_us < IMAGE_OLD_US:
             self._vehicle.clock.pictured(image.time_us)
             down = rotated(inverse(own.q_ned_from_frd), (0.0, 0.0, 1.0))
             self._watch.update(image.time_us, own, owner, chest_hfrd(image.pixels, down[:2]))

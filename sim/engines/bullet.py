@@ -10,7 +10,6 @@ from typing import Any
 from weakref import finalize
 
 import numpy as np
-import pybullet
 import warp as wp
 from numpy.typing import NDArray
 
@@ -21,6 +20,7 @@ from sim.bodies.multirotor import BodyState, air_wrench, density_ratio, drain_ba
 from sim.bodies.multirotor_model import MultirotorModel
 from sim.engines.bullet_world import BulletWorld
 from sim.engines.native import NativeEngine
+from sim.engines.quiet_bullet import pybullet
 from sim.rig import Rig
 from sim.truth import Truth
 from sim.world.world import World, WorldMap, ground_height, world_at
@@ -32,6 +32,7 @@ _FOOT_M = 0.01  # radius of the balls that stand for feet
 _DISC_M = 0.04  # thickness of the disc that holds the rotors; guess
 _LOW_M = 3.0  # over ground: nearer it may be touched
 _FRICTION = 0.7  # of feet, as the native engine's; the ground's is 1, Bullet takes the product
+_VEHICLES = 1 << 6  # group of collisions: they pass through each other, as with the native engine
 _FLU = np.array([1.0, -1.0, -1.0])  # frd from flu, and ned from nwu
 _POSE = ["pos_ned", "vel_ned", "q_ned_from_frd", "omega_frd"]
 _UP_M_S2 = np.array([0.0, 0.0, -GRAVITY_M_S2])
@@ -116,11 +117,18 @@ def conclude(
     i_world: wp.array(dtype=int),
     truths: wp.array(dtype=Truth),
 ) -> None:
-    """The tick is over: battery, height, truth."""
+    """The tick is over: battery, height, truth. What is under ground, or out of the map, has crashed and lies there."""
     i = wp.tid()
     model = models[i]
     body = states[i]
     body.height_agl_m = -body.pos_ned[2] - ground_height(worlds[i_world[i]], body.pos_ned[0], body.pos_ned[1])
+    if body.height_agl_m < 0.0:  # too fast for the ground, which has no thickness
+        body.impact_speed = wp.max(body.impact_speed, wp.length(body.vel_ned))
+        body.is_crashed = 1
+        body.pos_ned = body.pos_ned + wp.vec3(0.0, 0.0, body.height_agl_m)
+        body.height_agl_m = 0.0
+        body.vel_ned = wp.vec3()
+        body.omega_frd = wp.vec3()
     body = drain_battery(model, body, density_ratio(model, body.pos_ned[2]), TICK_S)
     states[i] = body
     truths[i] = truth_of(body)
@@ -157,17 +165,21 @@ class BulletEngine:
         self._world = BulletWorld(rig.world, self._client)
         self._states: NDArray[Any] = rig.arrays.body.numpy()  # live
         models = rig.arrays.model.numpy()
+        self._damping = damping
         self._bodies = [self._make_body(model, damping) for model in models]
         self._crash_m_s = [float(model["contact"]["crash_speed_m_s"]) for model in models]
         self._feet_m = [float(model["contact"]["leg_frd"][2]) - 3.0 * _FOOT_M for model in models]
         rows: Any = wp.zeros(rig.vehicle_count, dtype=BulletRow)
         self._bullet_rows, self._rows = rows, rows.numpy()  # live
         self._launches: list[Any] = []
+        self._given: tuple[Any, Any] | None = None  # that they were recorded with
         self._left = self._states[_POSE].copy()  # as the last step has left the rows
 
     def boot(self, is_chosen: Any) -> None:
         self._rig.place(is_chosen)
-        for i in np.flatnonzero(is_chosen.numpy()):
+        for i in np.flatnonzero(is_chosen.numpy()):  # anew: contacts of before count for nothing
+            pybullet.removeBody(self._bodies[i], physicsClientId=self._client)
+            self._bodies[i] = self._make_body(self._rig.arrays.model.numpy()[i], self._damping)
             self._take_over(int(i))
         self._left = self._states[_POSE].copy()
 
@@ -177,7 +189,9 @@ class BulletEngine:
             return
         for moved in np.flatnonzero(self._states[_POSE] != self._left):  # somebody has put it elsewhere
             self._take_over(int(moved))
-        begun, pushed, taken, concluded = self._launches or self._record(commands, wind_ned)
+        if self._given != (commands, wind_ned):
+            self._record(commands, wind_ned)
+        begun, pushed, taken, concluded = self._launches
         self._world.furnish(self._states["pos_ned"], int(self._rig.arrays.tick.numpy()[0]))
         begun.launch()
         for _ in range(SUBSTEPS):
@@ -187,15 +201,16 @@ class BulletEngine:
             pybullet.stepSimulation(physicsClientId=self._client)
             for body, row in zip(self._bodies, self._rows, strict=True):
                 self._read(body, row)
-            before = self._states["vel_ned"].copy()
+            before = self._states[_POSE].copy()
             taken.launch()
             for i, body in enumerate(self._bodies):
                 if self._states[i]["height_agl_m"] < _LOW_M or self._world.is_near:
-                    self._touch(i, body, before[i].astype(float))
-        concluded.launch()
+                    self._touch(i, body, before[i])
         self._left = self._states[_POSE].copy()
+        concluded.launch()
 
-    def _record(self, commands: Any, wind_ned: Any) -> list[Any]:
+    def _record(self, commands: Any, wind_ned: Any) -> None:
+        self._given = commands, wind_ned
         a, rows = self._rig.arrays, self._bullet_rows
         where = [a.model, a.body, a.worlds, a.i_world]
         inputs = {
@@ -206,7 +221,6 @@ class BulletEngine:
         }
         count = self._rig.vehicle_count
         self._launches = [wp.launch(kernel, count, of, record_cmd=True) for kernel, of in inputs.items()]
-        return self._launches
 
     def _make_body(self, model: Any, damping: float) -> int:
         """A vehicle: balls for its feet, a disc for its rotors."""
@@ -221,6 +235,7 @@ class BulletEngine:
             physicsClientId=self._client,
         )
         body: int = pybullet.createMultiBody(float(model["mass_kg"]), shape, physicsClientId=self._client)
+        pybullet.setCollisionFilterGroupMask(body, -1, _VEHICLES, ~_VEHICLES, physicsClientId=self._client)
         pybullet.changeDynamics(
             body,
             -1,
@@ -255,8 +270,8 @@ class BulletEngine:
         row["pos"], row["q"] = pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
         row["vel"], row["omega"] = pybullet.getBaseVelocity(body, physicsClientId=self._client)
 
-    def _touch(self, i: int, body: int, vel_ned: NDArray[np.float64]) -> None:
-        """Looks at what a body touches that moved at a velocity: feet on the ground, impacts, a rotor that strikes."""
+    def _touch(self, i: int, body: int, before: Any) -> None:
+        """Looks at what a body touches, and how it moved before: feet on the ground, impacts, a rotor that strikes."""
         contacts = pybullet.getContactPoints(body, physicsClientId=self._client)
         if not contacts:
             return
@@ -268,7 +283,7 @@ class BulletEngine:
                 continue
             arm_frd = turn.T @ (_FLU * place - row["pos_ned"])
             is_foot = arm_frd[2] > self._feet_m[i]
-            closing = -float((_FLU * normal) @ (vel_ned + turn @ np.cross(row["omega_frd"], arm_frd)))
+            closing = -float((_FLU * normal) @ (before["vel_ned"] + turn @ np.cross(before["omega_frd"], arm_frd)))
             row["impact_speed"] = max(float(row["impact_speed"]), closing)
             if is_foot:
                 row["is_on_ground"] = 1

@@ -4,9 +4,9 @@ from math import atan2, cos, sin
 from typing import Any
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from sim.engines.quiet_bullet import pybullet
 from sim.world.world import WorldMap
 
 REACH_M = 15.0  # from a vehicle, to which trees and boxes are there

@@ -22,7 +22,7 @@ PLACES = {
         *("autopilot/control/margins.py", "autopilot/estimator/derive.py"),
         *("autopilot/vehicles/multirotor/tuning.py", "autopilot/vehicles/rover/tuning.py"),
     ),
-    "engines": ("sim/engines/bullet.py", "sim/engines/bullet_world.py"),
+    "engines": ("sim/engines/quiet_bullet.py",),
     "gym": ("policies/__init__.py", "policies/tasks"),
     "learn": (
         *("policies/companion", "policies/experts", "policies/learn", "policies/tracker.py"),

@@ -101,6 +101,31 @@ def test_who_falls_from_high_has_crashed():
     assert row["impact_speed"] > 8.0
 
 
+@pytest.mark.parametrize("speed", [0.0, 28.0, 60.0])
+def test_nothing_falls_through_the_ground(speed):
+    for k in range(6):
+        rig = rig_on(PLAIN)
+        drop(rig, 3.1 * k - 8.0, 1.7 * k, 60.0 if speed == 0.0 else 5.0 + 0.11 * k)
+        rig.arrays.body.numpy()["vel_ned"][0] = (0.0, 0.0, speed)
+        row = run(rig, 6.0 if speed == 0.0 else 1.0)
+        assert row["is_crashed"] == 1
+        assert row["impact_speed"] > 5.0
+        assert row["height_agl_m"] >= 0.0
+        assert np.linalg.norm(row["vel_ned"]) < 3.0
+
+
+def test_a_landing_aslant_is_as_hard_as_with_the_native_engine():
+    speeds = []
+    for engine in (NativeEngine, None):
+        rig = rig_on(PLAIN, engine=engine)
+        drop(rig, 0.0, 0.0, 0.6)
+        body = rig.arrays.body.numpy()
+        body["q_ned_from_frd"][0] = (np.sin(np.radians(2.5)), 0.0, 0.0, np.cos(np.radians(2.5)))
+        body["vel_ned"][0] = (0.0, 0.0, 2.3)
+        speeds.append(float(run(rig, 1.0)["impact_speed"]))
+    assert speeds[1] == pytest.approx(speeds[0], rel=0.15)
+
+
 def test_a_trunk_stops_it():
     """Thrown at a trunk it comes no farther, and has struck it as fast as it was."""
     rig = rig_on(WorldConfig(trees_per_ha=150.0, hill_height_m=0.0, size_m=100.0, clearing_radius_m=2.0))

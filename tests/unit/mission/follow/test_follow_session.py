@@ -39,7 +39,7 @@ def test_a_rover_follows_on_wheels_and_stops(tmp_path):
     folder = tmp_path / "run"
     result = run("--airframe", "rover", "--speed", "max", "--seconds", "20", "--no-mp4", "--run-folder", str(folder))
     assert result.exit_code == 0, result.output
-    assert "follow-rover follows an owner" in result.output
+    assert "navigate-rover-follow follows an owner" in result.output
     summary = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)
     assert summary["collision"] == 0.0
     assert 1.5 < summary["distance_median_m"] < 4.0

@@ -42,7 +42,7 @@ class Scene:
         self.camera = Camera()
         self.goal = OwnerGoal(self.vehicle, self.camera)
 
-    def pass_by(self, seconds, start_ned=None, vel_ned=(0.0, 0.0, 0.0), pixels=None):
+    def pass_by(self, seconds, start_ned=None, vel_ned=(0.0, 0.0, 0.0), pixels=None, late_us=0):
         """Time passes; the phone reports twice a second if it is there, and the camera shows pixels ten times."""
         own, owner = self.vehicle.own, self.vehicle.owner
         for step in range(round(seconds * 1e6) // STEP_US):
@@ -53,7 +53,7 @@ class Scene:
                 owner.count += 1
             if pixels is not None and step % 5 == 0:
                 lens = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
-                self.camera.image = ImageFrame(own.boot_us, step, pixels, *lens)
+                self.camera.image = ImageFrame(own.boot_us - late_us, step, pixels, *lens)
             self.goal.frame(own.boot_us)
 
 
@@ -111,3 +111,13 @@ def test_after_a_restart_of_the_vehicle_it_looks_anew():
     scene.vehicle.own.boot_us = 0
     scene.pass_by(5.0, (5.0, 0.0, -1.0), pixels=BLANK)
     assert scene.goal.goal.pos_ned[0] == pytest.approx(5.0, abs=0.5)
+
+
+@pytest.mark.parametrize("late_us", [100_000, 280_000, 320_000, 400_000, 600_000])
+def test_old_images_do_not_make_it_forget_what_the_phone_says(late_us):
+    scene = Scene()
+    scene.pass_by(10.0, (20.0, 5.0, -1.0), pixels=BLANK, late_us=late_us)
+    for _ in range(50):
+        scene.pass_by(0.1, (20.0, 5.0, -1.0), pixels=BLANK, late_us=late_us)
+        assert scene.goal.goal is not None
+    assert scene.goal.goal.pos_ned[:2] == pytest.approx((20.0, 5.0), abs=0.7)
