@@ -1,5 +1,7 @@
 """The navigator: one object per vehicle that turns the flight mode into setpoints, at 50 Hz."""
 
+from math import hypot
+
 from autopilot.interface.client_requests import ModeRequest, Report
 from autopilot.interface.mode_spec import FlightMode, ModeTable
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
@@ -13,6 +15,7 @@ from autopilot.navigator.paths.breadcrumbs import Breadcrumbs
 from autopilot.navigator.takeoff_intent import Ask, standing_d, vertical_ask
 from autopilot.ports import TERRAIN_VALID
 
+_STANDING_M_S = 0.1
 _WAITS_US = 2_000_000  # a take-off that is interrupted on the ground, for a position to go to; guess
 _SETTLE_THRUST = (
     0.06  # fraction of the maximum, under which a vehicle settles on its feet; below LandingDetector's; guess
@@ -33,6 +36,7 @@ class Navigator:
         "_climb",
         "_is_rising",
         "_listeners",
+        "_reverse_ends",
         "_specs",
         "_takeoff",
         "_takeoff_us",
@@ -63,6 +67,7 @@ class Navigator:
         self._takeoff = next((flown for flown in built.values() if isinstance(flown, Takeoff)), None)
         self._active = context.flown = self.modes[context.state.mode]
         self._climb: Climb | None = None  # of a take-off, which is finished before the active mode goes elsewhere
+        self._reverse_ends = False  # once it stands: DO_SET_REVERSE was for the mode before
         self._is_rising = False  # a take-off has begun, and the vehicle has not been high since
         self._takeoff_us = 0  # when mode Takeoff was last flown
         self.ask = Ask.STAY  # of the setpoint flown
@@ -125,7 +130,8 @@ class Navigator:
         self._active.leave(mode)
         self._forget_requests(mode)
         if self.modes[mode] is not self._active:
-            self.context.setpoint.is_reversed = False  # DO_SET_REVERSE is for the mode flown
+            self._reverse_ends = mode is Mode.HOLD and self.context.setpoint.is_reversed
+            self.context.setpoint.is_reversed = self._reverse_ends  # DO_SET_REVERSE is for the mode flown
         is_low = self.is_taking_off and not is_high(self.context)
         was_climbing = self._is_in_takeoff or self._climb is not None
         self._active = self.context.flown = self.modes[mode]
@@ -177,6 +183,8 @@ class Navigator:
             self._watch_takeoff()
             if self._climb is None or self._has_climbed(self._climb):
                 self._active.frame()
+            if self._reverse_ends and hypot(*state.estimate.vel_ned[:2]) < _STANDING_M_S:
+                self.set_reversed(is_reversed=False)
             if context.heading.is_active or context.yaw_mode:
                 context.heading.frame()
             wish = context.wish
@@ -267,6 +275,7 @@ class Navigator:
         """Whether ways are driven backwards, until the mode changes."""
         if self.context.craft.ground is not None:
             return Reply(Verdict.UNSUPPORTED, "it does not drive")
+        self._reverse_ends = False
         self.context.setpoint.set_reversed(is_reversed=is_reversed)
         return ACCEPTED
 

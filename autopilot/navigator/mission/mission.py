@@ -282,6 +282,8 @@ class Mission(FlightMode):
         context = self._context
         context.heading.end_turn()
         self._is_flying = False
+        if not is_joined:
+            self._face_as_planned(index)
         for _ in range(len(self.items) + 1):  # a chain longer than that repeats itself
             if index >= self._route.end:
                 self._complete()
@@ -300,6 +302,12 @@ class Mission(FlightMode):
         context.announcer.statustext(Severity.ERROR, f"Mission {item_name(self._index)} jumps in a circle")
         context.state.mission_state = MissionState.PAUSED  # not complete: not every item was done
         self._hold()
+
+    def _face_as_planned(self, index: int) -> None:
+        """Whoever joins a plan drives as the last DO_SET_REVERSE before says: backwards, or not."""
+        said = [item.params[0] for item in self.items[:index] if item.command == Command.SET_REVERSE]
+        if said:
+            self._context.setpoint.set_reversed(is_reversed=said[-1] == 1.0)
 
     def _begin_nav(self, item: MissionItem, *, is_joined: bool) -> None:
         context = self._context

@@ -64,6 +64,41 @@ def test_legs_after_an_item_that_says_so_are_driven_backwards(airframe):
     assert np.hypot(marks[0][0], marks[0][1] - 15.0) < 1.5
 
 
+@pytest.mark.parametrize("airframe", ["rover", "rover-skid"])
+def test_a_pause_on_a_leg_backwards_stops_it_straight_and_it_goes_on_backwards(airframe):
+    headings, speeds = [], []
+
+    async def script(drone):
+        def note():
+            attitude = drone.latest("ATTITUDE")
+            headings.append(attitude.yaw)
+            speeds.append(drone.latest("LOCAL_POSITION_NED").vy * np.sin(attitude.yaw))
+
+        await drone.upload(plan(drone.origin, (5.0, 0.0), [SET_REVERSE, 1.0], (5.0, 30.0)))
+        await drone.start_mission()
+        await drone.until(lambda: drone.pos_ned[1] > 8.0, 60.0, "on the leg")
+        note()
+        await drone.hold()
+        for _ in range(40):
+            await drone.sleep(0.1)
+            note()
+        await drone.start_mission(drone.latest("MISSION_CURRENT").seq)
+        await drone.sleep(3.0)
+        note()
+        await drone.hold()
+        await drone.sleep(4.0)
+        await drone.goto_ned(drone.pos_ned[0], drone.pos_ned[1] - 12.0, 0.0)
+
+    _, history = driven(script, airframe=airframe, world=OPEN)
+    turned = [abs(wrapped(yaw - headings[0])) for yaw in headings]
+    assert max(turned) < 0.26
+    assert speeds[0] < -0.5
+    assert speeds[-1] < -0.5
+    velocity, yaw = history.vel_ned_true[:, :2], yaws(history)
+    along = np.cos(yaw) * velocity[:, 0] + np.sin(yaw) * velocity[:, 1]
+    assert along[-400:].max() > 0.5  # what it was sent to in Hold is driven forwards again
+
+
 def test_to_drive_backwards_is_refused_where_it_means_nothing():
     async def script(drone):
         with pytest.raises(MissionRefused, match=r"parameter 1 is 2\.0, not 0"):

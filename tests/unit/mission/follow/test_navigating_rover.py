@@ -44,7 +44,7 @@ def standing(seed, **parameters):
 @pytest.mark.parametrize("reverses", [0.0, 1.0])
 @pytest.mark.parametrize("component", [AUTOPILOT, COMPANION])
 def test_a_goto_is_driven_to_between_trees_and_walls_and_handed_back(component, reverses):
-    flight, companion = standing(7, HG_RO_OFFB_BODY=reverses)
+    flight, companion = standing(9, HG_RO_OFFB_BODY=reverses)
     goal_ned = (32.0, 18.0, -float(flight.world.height(32.0, 18.0)))
     flight.drone.send("COMMAND_INT", **goto_fields(flight, goal_ned, component))
     advance(flight, 1.0)
