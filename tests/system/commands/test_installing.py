@@ -15,6 +15,7 @@ PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 # Where what an extra brings is imported, when its commands are run.
 OF_EXTRAS = (
     *("policies.", "mission.view.", "mission.train.", "mission.follow.", "mission.park.park_session"),
+    *("sim.engines.bullet", "sim.engines.quiet_bullet"),
     *("autopilot.tuning", "autopilot.control.margins", "autopilot.estimator.derive"),
     *("autopilot.vehicles.multirotor.tuning", "autopilot.vehicles.rover.tuning"),
 )
@@ -57,6 +58,9 @@ def test_a_bare_environment_flies_and_imports_all_but_what_extras_bring(tmp_path
     assert flight.returncode == 1, flight.stderr  # it ended before its mission
     assert "mission not finished" in flight.stdout
     assert (tmp_path / "flight" / "flight.ulg").stat().st_size > 100_000
+    refused = run(python.with_name("honeyguide"), "fly", "--engine", "pybullet")
+    assert refused.returncode == 2, refused.stderr
+    assert "the extra 'engines'" in refused.stderr
     for needs_extra in (("companion", "--policy", "scripted"), ("train", "Parking1"), ("play", "Parking1")):
         refused = run(python.with_name("honeyguide"), *needs_extra)
         assert refused.returncode == 2, refused.stderr
