@@ -106,8 +106,8 @@ class Flight:
         self._pacer = Pacer(None)
         self.texts, self.troubles = Texts(lambda: self.time_us), Troubles(lambda: self.time_us)
         self.airframe: Airframe = load_airframe(config.airframe)
-        vehicle, _ = class_of(self.airframe)
-        self.drives = vehicle.ground is None  # and stays on the ground
+        simulated = class_of(self.airframe)
+        vehicle, self.drives = simulated.vehicle, simulated.drives
         self.world = flight_world(config) if world is None else world
         self.rig = flight_rig(config, self.airframe, self.world, make_rig)
         self.params = flight_parameters(config, self.airframe)

@@ -45,15 +45,15 @@ def flight_config(options: FlightOptions, state: StateFolder | None) -> FlightCo
             parameters=dict(parameter_of(text) for text in options.parameters),
             owner=None if options.owner is None else OwnerConfig(pace=cast(Pace, options.owner)),
             world=_world(options),
-            is_forest=options.world_kind in FORESTS or (options.owner is not None and _drives(options.airframe)),
+            is_forest=options.world_kind in FORESTS or _follows_on_wheels(options),
         )
     except ValidationError as error:
         raise UserError(first_fault(error)) from error
 
 
-def _drives(airframe: str) -> bool:
-    """Whether a vehicle stays on the ground: who follows on wheels sees by the scanner, too."""
-    return class_of(load_airframe(airframe)).vehicle.ground is None
+def _follows_on_wheels(options: FlightOptions) -> bool:
+    """Who follows on wheels sees by the scanner, too."""
+    return options.owner is not None and class_of(load_airframe(options.airframe)).drives
 
 
 def _world(options: FlightOptions) -> WorldConfig:

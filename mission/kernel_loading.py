@@ -53,7 +53,7 @@ def load_kernels(say: Say, config: FlightConfig, *, has_camera: bool, others: Se
         others: modules besides, which have been imported.
     """
     start_warp()
-    drives = class_of(load_airframe(config.airframe)).vehicle.ground is None
+    drives = class_of(load_airframe(config.airframe)).drives
     names = (
         *_ALWAYS,
         *(_CAMERA if has_camera else ()),

@@ -127,7 +127,7 @@ def chosen_pilot(options: FollowOptions) -> tuple[Pilot | NavigationPilot, str]:
     Raises:
         UserError: no such policy, or none for this vehicle.
     """
-    drives = class_of(load_airframe(options.airframe)).vehicle.ground is None
+    drives = class_of(load_airframe(options.airframe)).drives
     shipped = ROVER_POLICY if drives else TASK if pretrained(TASK) is not None else SCRIPTED
     name = options.policy or shipped
     try:

@@ -62,7 +62,7 @@ def park_config(options: ParkOptions) -> FlightConfig:
         UserError: its vehicle has no wheels.
     """
     config = flight_config(options, None)
-    if class_of(load_airframe(config.airframe)).vehicle.ground is not None:
+    if not class_of(load_airframe(config.airframe)).drives:
         raise UserError(f"--airframe {config.airframe}: a drone does not park")
     return config.model_copy(update={"parameters": REVERSES | config.parameters})
 

@@ -14,10 +14,10 @@ from policies.companion.image_client import ImageSource
 from policies.companion.owner_watch import OwnerWatch
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
 from policies.shirt_detector import chest_hfrd
+from policies.tasks.navigate.walking_goal import CLOSING_HZ
 
 KEPT_M = 1.5  # on the level, from an owner whose place is known
 DEVIATIONS = 2.0  # that it keeps away farther, of the error of their place
-CLOSING_HZ = 0.5  # speed at which it closes up, per metre that it is behind; guess
 IMAGE_OLD_US = 300_000  # guess: three images missed; then it goes by the phone alone
 SILENT_S = 5.0  # neither seen nor heard of: lost
 LOST = "owner lost"
@@ -82,4 +82,4 @@ class OwnerGoal:
         if away_m < kept_m:
             return 0.0
         leaving = ((north - pos_ned[0]) * track.vel_ned[0] + (east - pos_ned[1]) * track.vel_ned[1]) / away_m
-        return max(float(leaving), 0.0) + CLOSING_HZ * (away_m - kept_m)
+        return max(float(leaving), 0.0) + float(CLOSING_HZ) * (away_m - kept_m)

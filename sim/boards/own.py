@@ -5,6 +5,7 @@ from typing import Any
 import warp as wp
 
 from autopilot.advance import autopilot_kernel
+from sim.recorded_launches import RecordedLaunches
 from sim.rig import Rig
 
 
@@ -18,16 +19,15 @@ class OwnBoard:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._kernel = autopilot_kernel(rig.law)
-        self._launch: Any = None
-        self._given: tuple[Any, Any] | None = None  # that it was recorded with
+        self._launches = RecordedLaunches(self._record)
 
     def boot(self, is_chosen: Any) -> None:
         """Its rows are the rig's, which has powered them on."""
 
     def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (it is not told the truth)
-        if self._given != (samples, commands):
-            rig = self._rig
-            inputs = [rig.arrays.autopilot, samples, rig.arrays.tick, commands]
-            self._launch = wp.launch(self._kernel, rig.vehicle_count, inputs, device=rig.device, record_cmd=True)
-            self._given = samples, commands
-        self._launch.launch()
+        self._launches.of(samples, commands)[0].launch()
+
+    def _record(self, samples: Any, commands: Any) -> list[Any]:
+        rig = self._rig
+        inputs = [rig.arrays.autopilot, samples, rig.arrays.tick, commands]
+        return [wp.launch(self._kernel, rig.vehicle_count, inputs, device=rig.device, record_cmd=True)]

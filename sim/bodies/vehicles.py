@@ -19,6 +19,11 @@ class SimulatedClass(NamedTuple):
     vehicle: VehicleClass
     body: Body
 
+    @property
+    def drives(self) -> bool:
+        """Its vehicles stay on the ground."""
+        return self.vehicle.ground is None
+
 
 VEHICLES = [
     SimulatedClass(MULTIROTOR, MULTIROTOR_BODY),

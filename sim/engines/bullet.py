@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from common.attitude import inverse, rotated
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S, vec8
 from common.rng import draw_tick
@@ -21,6 +22,7 @@ from sim.bodies.multirotor_model import MultirotorModel
 from sim.engines.bullet_world import BulletWorld
 from sim.engines.native import NativeEngine
 from sim.engines.quiet_bullet import pybullet
+from sim.recorded_launches import RecordedLaunches
 from sim.rig import Rig
 from sim.truth import Truth
 from sim.world.world import World, WorldMap, ground_height, world_at
@@ -171,8 +173,7 @@ class BulletEngine:
         self._feet_m = [float(model["contact"]["leg_frd"][2]) - 3.0 * _FOOT_M for model in models]
         rows: Any = wp.zeros(rig.vehicle_count, dtype=BulletRow)
         self._bullet_rows, self._rows = rows, rows.numpy()  # live
-        self._launches: list[Any] = []
-        self._given: tuple[Any, Any] | None = None  # that they were recorded with
+        self._launches = RecordedLaunches(self._record)
         self._left = self._states[_POSE].copy()  # as the last step has left the rows
 
     def boot(self, is_chosen: Any) -> None:
@@ -189,9 +190,7 @@ class BulletEngine:
             return
         for moved in np.flatnonzero(self._states[_POSE] != self._left):  # somebody has put it elsewhere
             self._take_over(int(moved))
-        if self._given != (commands, wind_ned):
-            self._record(commands, wind_ned)
-        begun, pushed, taken, concluded = self._launches
+        begun, pushed, taken, concluded = self._launches.of(commands, wind_ned)
         self._world.furnish(self._states["pos_ned"], int(self._rig.arrays.tick.numpy()[0]))
         begun.launch()
         for _ in range(SUBSTEPS):
@@ -209,8 +208,7 @@ class BulletEngine:
         self._left = self._states[_POSE].copy()
         concluded.launch()
 
-    def _record(self, commands: Any, wind_ned: Any) -> None:
-        self._given = commands, wind_ned
+    def _record(self, commands: Any, wind_ned: Any) -> list[Any]:
         a, rows = self._rig.arrays, self._bullet_rows
         where = [a.model, a.body, a.worlds, a.i_world]
         inputs = {
@@ -220,7 +218,7 @@ class BulletEngine:
             conclude: [*where, a.truth],
         }
         count = self._rig.vehicle_count
-        self._launches = [wp.launch(kernel, count, of, record_cmd=True) for kernel, of in inputs.items()]
+        return [wp.launch(kernel, count, of, record_cmd=True) for kernel, of in inputs.items()]
 
     def _make_body(self, model: Any, damping: float) -> int:
         """A vehicle: balls for its feet, a disc for its rotors."""
@@ -253,11 +251,11 @@ class BulletEngine:
         """Puts Bullet's body where the row has it."""
         row = self._states[i]
         x, y, z, w = (float(value) for value in row["q_ned_from_frd"])
-        turn = _matrix(row["q_ned_from_frd"])
+        omega_ned = rotated(row["q_ned_from_frd"].tolist(), row["omega_frd"].tolist())
         body, client = self._bodies[i], self._client
         place = (_FLU * row["pos_ned"]).tolist()
         pybullet.resetBasePositionAndOrientation(body, place, [x, -y, -z, w], physicsClientId=client)
-        vel, omega = _FLU * row["vel_ned"], _FLU * (turn @ row["omega_frd"])
+        vel, omega = _FLU * row["vel_ned"], _FLU * omega_ned
         pybullet.resetBaseVelocity(body, vel.tolist(), omega.tolist(), physicsClientId=client)
 
     def _push(self, body: int, row: Any) -> None:
@@ -276,29 +274,18 @@ class BulletEngine:
         if not contacts:
             return
         row = self._states[i]
-        turn = _matrix(row["q_ned_from_frd"])
+        q = row["q_ned_from_frd"].tolist()
         for contact in contacts:
             other, place, normal, force = contact[2], contact[5], contact[7], contact[9]
             if force <= 0.0:
                 continue
-            arm_frd = turn.T @ (_FLU * place - row["pos_ned"])
+            arm_frd = rotated(inverse(q), (_FLU * place - row["pos_ned"]).tolist())
             is_foot = arm_frd[2] > self._feet_m[i]
-            closing = -float((_FLU * normal) @ (before["vel_ned"] + turn @ np.cross(before["omega_frd"], arm_frd)))
+            spun = rotated(q, np.cross(before["omega_frd"], arm_frd).tolist())
+            closing = -float((_FLU * normal) @ (before["vel_ned"] + spun))
             row["impact_speed"] = max(float(row["impact_speed"]), closing)
             if is_foot:
                 row["is_on_ground"] = 1
             is_strike = other == self._world.ground and not is_foot
             if is_strike or closing > self._crash_m_s[i]:
                 row["is_crashed"] = 1
-
-
-def _matrix(q: Any) -> NDArray[np.float64]:
-    """Rotation matrix of a quaternion x, y, z, w."""
-    x, y, z, w = (float(value) for value in q)
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )

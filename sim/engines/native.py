@@ -8,6 +8,7 @@ import warp as wp
 from common.kernels import vec8
 from common.rng import draw_tick
 from sim.bodies.body import Body
+from sim.recorded_launches import RecordedLaunches
 from sim.rig import Rig
 from sim.truth import Truth
 from sim.world.world import World, world_at
@@ -49,16 +50,15 @@ class NativeEngine:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._kernel = _step_kernel(rig.body)
-        self._launch: Any = None
-        self._given: tuple[Any, Any] | None = None  # that it was recorded with
+        self._launches = RecordedLaunches(self._record)
 
     def boot(self, is_chosen: Any) -> None:
         self._rig.place(is_chosen)
 
     def step(self, commands: Any, wind_ned: Any) -> None:
-        if self._given != (commands, wind_ned):
-            a, rig = self._rig.arrays, self._rig
-            rows = [a.model, a.body, a.worlds, a.i_world, commands, wind_ned, a.tick, a.truth]
-            self._launch = wp.launch(self._kernel, rig.vehicle_count, rows, device=rig.device, record_cmd=True)
-            self._given = commands, wind_ned
-        self._launch.launch()
+        self._launches.of(commands, wind_ned)[0].launch()
+
+    def _record(self, commands: Any, wind_ned: Any) -> list[Any]:
+        a, rig = self._rig.arrays, self._rig
+        rows = [a.model, a.body, a.worlds, a.i_world, commands, wind_ned, a.tick, a.truth]
+        return [wp.launch(self._kernel, rig.vehicle_count, rows, device=rig.device, record_cmd=True)]

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from common.image_stream import ImageFrame
-from policies.companion.owner_goal import CLOSING_HZ, KEPT_M, SILENT_S, OwnerGoal
+from policies.companion.owner_goal import KEPT_M, SILENT_S, OwnerGoal
 from policies.companion.vehicle_link import Own, Owner
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_CHANNELS, IMAGE_SIZE, TILT_DEG
+from policies.tasks.navigate.walking_goal import CLOSING_HZ
 
 STEP_US = 20_000
 BLANK = np.full((IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), 128, np.uint8)
