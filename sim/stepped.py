@@ -10,7 +10,7 @@ from typing import Any
 import warp as wp
 
 from autopilot.ports import Samples
-from common.kernels import TICK_S, vec8
+from common.kernels import SUBSTEPS, TICK_S, vec8
 from common.rng import draw_tick
 from sim.boards.board import Board
 from sim.boards.own import OwnBoard
@@ -48,6 +48,15 @@ def blow(
     wind = wind_step(models[i], winds[i], truths[i].vel_ned, height, seeds[i], i, count, TICK_S)
     winds[i] = wind
     wind_ned[i] = wind.wind_ned
+    commands[i] = weakened(board_commands[i], faults[i].motor_loss)
+
+
+@wp.kernel(enable_backward=False)
+def weaken(
+    faults: wp.array(dtype=Faults), board_commands: wp.array(dtype=vec8), commands: wp.array(dtype=vec8)
+) -> None:
+    """What motors get of commands that have come between two ticks."""
+    i = wp.tid()
     commands[i] = weakened(board_commands[i], faults[i].motor_loss)
 
 
@@ -134,12 +143,22 @@ class SteppedRig(Rig):
         self.rows.fetch()
 
     def _tick(self) -> None:
-        blown, sensed, counted = self._launches or self._record_tick()
+        blown, weakened_again, sensed, counted = self._launches or self._record_tick()
         blown.launch()
-        self._engine.step(self._motor_commands, self._wind_ned)
-        sensed.launch()
-        self._board.exchange(self._samples, self.arrays.truth, self._board_commands)
+        if self._board.is_fast:
+            for _ in range(SUBSTEPS):
+                self._engine.substep(self._motor_commands, self._wind_ned)
+                self._exchange()
+                weakened_again.launch()
+            sensed.launch()
+        else:
+            self._engine.step(self._motor_commands, self._wind_ned)
+            sensed.launch()
+            self._exchange()
         counted.launch()
+
+    def _exchange(self) -> None:
+        self._board.exchange(self._samples, self.arrays.truth, self._board_commands)
 
     def _record_tick(self) -> list[Any]:
         """The launches of a tick but engine and board, made once: to pack their arguments takes as long as they do."""
@@ -147,6 +166,7 @@ class SteppedRig(Rig):
         air = [self._board_commands, a.seed, a.tick, a.wind, self._wind_ned, self._motor_commands]
         inputs = {
             blow: [*where, a.wind_model, a.truth, a.faults, *air],
+            weaken: [a.faults, self._board_commands, self._motor_commands],
             sense_all: [*where, a.sensor_model, a.faults, a.truth, a.seed, a.tick, a.sensors, self._samples],
             count_on: [a.tick],
         }

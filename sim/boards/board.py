@@ -6,6 +6,9 @@ from typing import Any, Protocol
 class Board(Protocol):
     """Flies every vehicle of a rig; made for it."""
 
+    is_fast: bool
+    """It exchanges after each millisecond, with the samples of the tick before and the truth of that millisecond."""
+
     def boot(self, is_chosen: Any) -> None:
         """Powers flight controllers off and on.
 

@@ -16,6 +16,8 @@ class OwnBoard:
         rig: whose vehicles it flies; its setpoints and parameters are the rig's.
     """
 
+    is_fast = False
+
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._kernel = autopilot_kernel(rig.law)

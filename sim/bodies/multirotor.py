@@ -274,13 +274,13 @@ def drain_battery(model: MultirotorModel, body: BodyState, density: float, dt: f
 
 
 @wp.func
-def held_tick(body: BodyState) -> BodyState:
-    """A tick of a vehicle that is held in its place and turned at omega_frd, rotors stopped."""
+def held_tick(body: BodyState, dt: float) -> BodyState:
+    """A step of dt [s] of a vehicle that is held in its place and turned at omega_frd, rotors stopped."""
     out = body
     out.vel_ned = wp.vec3()
     out.gyro_frd = body.omega_frd
     out.accel_frd = wp.quat_rotate_inv(body.q_ned_from_frd, -_GRAVITY_NED)
-    out.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.omega_frd * TICK_S)
+    out.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.omega_frd * dt)
     return out
 
 
@@ -288,7 +288,7 @@ def held_tick(body: BodyState) -> BodyState:
 def body_tick(model: MultirotorModel, body: BodyState, command: vec8, wind_ned: wp.vec3, world: World) -> BodyState:
     """One tick: four substeps, accel_frd and gyro_frd as means over them, then the battery."""
     if body.is_held == 1:
-        return held_tick(body)
+        return held_tick(body, TICK_S)
     inputs = step_inputs(model, body, command, wind_ned, world, _SUBSTEP_S)
     body.height_agl_m = inputs.around.height_agl_m
     body.is_on_ground = 0
@@ -302,6 +302,18 @@ def body_tick(model: MultirotorModel, body: BodyState, command: vec8, wind_ned: 
     body.accel_frd = accel_sum / float(_SUBSTEP_COUNT)
     body.gyro_frd = gyro_sum / float(_SUBSTEP_COUNT)
     return drain_battery(model, body, inputs.density_ratio, TICK_S)
+
+
+@wp.func
+def body_substep(model: MultirotorModel, body: BodyState, command: vec8, wind_ned: wp.vec3, world: World) -> BodyState:
+    """One substep alone, for whoever flies it at 1,000 Hz: accel_frd and gyro_frd are its means."""
+    if body.is_held == 1:
+        return held_tick(body, _SUBSTEP_S)
+    inputs = step_inputs(model, body, command, wind_ned, world, _SUBSTEP_S)
+    body.height_agl_m = inputs.around.height_agl_m
+    body.is_on_ground = 0
+    body = _substep(model, body, inputs)
+    return drain_battery(model, body, inputs.density_ratio, _SUBSTEP_S)
 
 
 @wp.func

@@ -20,3 +20,6 @@ class Engine(Protocol):
             commands: of the motors [0..1], array of vec8, (vehicles,); what faults take away is taken away.
             wind_ned: [m/s] at each vehicle, array of vec3, (vehicles,).
         """
+
+    def substep(self, commands: Any, wind_ned: Any) -> None:
+        """As `step`, a millisecond: for boards that exchange at 1,000 Hz, of bodies that have a `substep`."""

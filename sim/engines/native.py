@@ -17,8 +17,9 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def _step_kernel(body: Body) -> Any:
-    model_type, state_type, body_tick, truth_of = body.Model, body.State, body.tick, body.truth
+def _step_kernel(body: Body, advance: Any) -> Any:
+    """The kernel that moves bodies by one `advance`, their tick or their substep."""
+    model_type, state_type, truth_of = body.Model, body.State, body.truth
 
     @wp.kernel(enable_backward=False, module="unique")
     def step(
@@ -33,7 +34,7 @@ def _step_kernel(body: Body) -> Any:
     ) -> None:
         i = wp.tid()
         world = world_at(worlds[i_world[i]], draw_tick(ticks[i]))
-        state = body_tick(models[i], states[i], commands[i], wind_ned[i], world)
+        state = advance(models[i], states[i], commands[i], wind_ned[i], world)
         states[i] = state
         truths[i] = truth_of(state)
 
@@ -49,8 +50,8 @@ class NativeEngine:
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
-        self._kernel = _step_kernel(rig.body)
-        self._launches = RecordedLaunches(self._record)
+        self._launches = RecordedLaunches(lambda *arrays: self._record(rig.body.tick, *arrays))
+        self._sublaunches = RecordedLaunches(lambda *arrays: self._record(rig.body.substep, *arrays))
 
     def boot(self, is_chosen: Any) -> None:
         self._rig.place(is_chosen)
@@ -58,7 +59,10 @@ class NativeEngine:
     def step(self, commands: Any, wind_ned: Any) -> None:
         self._launches.of(commands, wind_ned)[0].launch()
 
-    def _record(self, commands: Any, wind_ned: Any) -> list[Any]:
+    def substep(self, commands: Any, wind_ned: Any) -> None:
+        self._sublaunches.of(commands, wind_ned)[0].launch()
+
+    def _record(self, advance: Any, commands: Any, wind_ned: Any) -> list[Any]:
         a, rig = self._rig.arrays, self._rig
         rows = [a.model, a.body, a.worlds, a.i_world, commands, wind_ned, a.tick, a.truth]
-        return [wp.launch(self._kernel, rig.vehicle_count, rows, device=rig.device, record_cmd=True)]
+        return [wp.launch(_step_kernel(rig.body, advance), rig.vehicle_count, rows, device=rig.device, record_cmd=True)]

@@ -1,0 +1,197 @@
+"""ArduPilot's SITL as a board, by its JSON interface: in lockstep, with all that goes wrong on the way.
+
+SITL sends its servos to our UDP port and waits; we move the body by a step and answer with its state, from which SITL
+makes its own sensors but the IMU, which is ours. Its main loop asks for 400 Hz of a copter, so that multirotors are
+exchanged each millisecond. Who has to be answered how: sim/boards/json_wire.py and `FrameCounter`.
+"""
+
+import socket
+from enum import Enum, auto
+from typing import Any
+
+from common.clock import wall_time_s
+from common.kernels import SUBSTEPS, TICK_US
+from sim.boards.channels import Channel, commands_of
+from sim.boards.fast_imu import FastImu
+from sim.boards.json_wire import ServoPacket, servo_packet, state_text
+from sim.boards.outside import POLL_S, OnWait, PeerError
+from sim.rig import Rig
+
+PORT = 9002  # of the first instance; the next ones are 10 further each
+RESEND_S = 0.5  # what comes again sooner was on its way when we answered; SITL asks again after 1 s
+DATAGRAM_MAX = 4096
+ROUNDING_NS = 1  # a step: SITL cuts its length to whole microseconds, and would lose one of most
+
+
+class Verdict(Enum):
+    """What a servo packet is."""
+
+    FIRST = auto()
+    """Of an autopilot that has just started."""
+    NEXT = auto()
+    AGAIN = auto()
+    """Of the frame that was answered last."""
+    FOREIGN = auto()
+    """Of another autopilot than that which flies here."""
+
+
+class FrameCounter:
+    """Tells by the numbers of frames, and by who sends them, what a servo packet is."""
+
+    def __init__(self) -> None:
+        self.lost_count = 0
+        self._last = -1
+        self._sender: Any = None
+        self._heard_s = 0.0
+
+    def judge(self, packet: ServoPacket, sender: Any, now_s: float) -> Verdict:
+        """What a packet is that has come in at a time of the wall clock [s]."""
+        silent_s = now_s - self._heard_s
+        if sender != self._sender:
+            if self._sender is not None and silent_s < RESEND_S:
+                return Verdict.FOREIGN
+            is_first = True
+        else:
+            is_first = packet.count < self._last
+        self._heard_s = now_s
+        if not is_first and packet.count == self._last:
+            return Verdict.AGAIN
+        if not is_first:
+            self.lost_count += packet.count - self._last - 1
+        self._last, self._sender = packet.count, sender
+        return Verdict.FIRST if is_first else Verdict.NEXT
+
+
+class ArduPilotBoard:
+    """See sim/boards/board.py.
+
+    Args:
+        rig: of one vehicle, on the CPU, whose body it flies.
+        channels: which of its channels moves which actuator.
+        on_wait: what is done while it is silent.
+        port: where it sends its servos to; 0: any free one.
+        address: of this machine.
+
+    Raises:
+        PeerError: the port is taken.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        *,
+        channels: list[Channel | None],
+        on_wait: OnWait,
+        port: int = PORT,
+        address: str = "127.0.0.1",
+    ) -> None:
+        if rig.vehicle_count != 1:
+            raise ValueError("an autopilot of others flies one vehicle")
+        self.is_fast = rig.body.substep is not None
+        self.restart_count = 0
+        self.exchange_count = 0
+        self.again_count = 0
+        self.rubbish_count = 0
+        self.foreign_count = 0
+        self._channels, self._on_wait = channels, on_wait
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind((address, port))
+        except OSError as error:
+            self._socket.close()
+            raise PeerError(f"UDP port {port} for ArduPilot is in use ({error.strerror})") from error
+        self._socket.settimeout(POLL_S)
+        self.local_port: int = self._socket.getsockname()[1]
+        step_us = TICK_US // SUBSTEPS if self.is_fast else TICK_US
+        self._step_ns = 1000 * step_us + ROUNDING_NS
+        self._time_ns = 0
+        self._counter = FrameCounter()
+        self._sender: Any = None
+        self._answer, self._answered_s = b"", 0.0
+        self._truth = rig.arrays.truth.numpy()  # live
+        self._imu = FastImu(rig) if self.is_fast else None
+
+    @property
+    def lost_count(self) -> int:
+        """Servo packets that never came."""
+        return self._counter.lost_count
+
+    @property
+    def is_there(self) -> bool:
+        """It has been heard."""
+        return self._sender is not None
+
+    def boot(self, is_chosen: Any) -> None:
+        """It is powered by whoever starts it."""
+
+    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
+        if self._sender is None:
+            self._take(commands)
+        self._time_ns += self._step_ns
+        self._answer = state_text(self._time_ns, *self._felt(samples), self._truth[0])
+        self._send()
+        self._take(commands)
+        self.exchange_count += 1
+
+    def _felt(self, samples: Any) -> tuple[list[float], list[float]]:
+        """Rate [rad/s] and specific force [m/s²] since the last exchange."""
+        if self._imu is None:
+            sample = samples.numpy()[0]["imu"]
+        else:
+            self._imu.read()
+            sample = self._imu.samples[0]
+        return sample["gyro_frd"].tolist(), sample["accel_frd"].tolist()
+
+    def _send(self) -> None:
+        self._answered_s = wall_time_s()
+        try:
+            self._socket.sendto(self._answer, self._sender)
+        except OSError:  # it is gone; it says so by its silence
+            return
+
+    def _take(self, commands: Any) -> None:
+        """Waits for the next servos, as long as `on_wait` lets it."""
+        row = commands.numpy()[0]
+        while True:
+            packet, sender = self._next_packet()
+            verdict = self._counter.judge(packet, sender, wall_time_s())
+            if verdict is Verdict.FOREIGN:
+                self.foreign_count += 1
+            elif verdict is Verdict.AGAIN:
+                self._answer_again()
+            else:
+                if verdict is Verdict.FIRST:
+                    self._begin()
+                self._sender = sender
+                row[: len(self._channels)] = commands_of(self._channels, packet.pulses_us)
+                return
+
+    def _begin(self) -> None:
+        """An autopilot has started: its clock begins, and what it flies shall stand where it boots."""
+        if self._sender is not None:
+            self.restart_count += 1
+        self._time_ns = 0
+
+    def _answer_again(self) -> None:
+        """Our answer was lost, or late: then it has read it by now, and would be a frame behind with two."""
+        if self._answer and wall_time_s() - self._answered_s >= RESEND_S:
+            self.again_count += 1
+            self._send()
+
+    def _next_packet(self) -> tuple[ServoPacket, Any]:
+        begun_s = wall_time_s()
+        while True:
+            try:
+                data, sender = self._socket.recvfrom(DATAGRAM_MAX)
+            except TimeoutError:
+                self._on_wait(wall_time_s() - begun_s)
+                continue
+            except ConnectionError:  # an earlier answer found nobody
+                continue
+            packet = servo_packet(data)
+            if packet is not None:
+                return packet, sender
+            self.rubbish_count += 1
+
+    def close(self) -> None:
+        self._socket.close()

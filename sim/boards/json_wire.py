@@ -1,0 +1,67 @@
+"""ArduPilot's JSON interface on the wire: its servo packets, and the states that answer them.
+
+Facts: libraries/SITL/SIM_JSON.{h,cpp} and libraries/SITL/examples/JSON/readme.md of ArduPilot. Its parser looks for
+keys by `strstr` and reads numbers by `sscanf`: a compact object with fixed order, one per datagram, between newlines.
+"""
+
+from math import isfinite
+from struct import Struct
+from typing import Any, NamedTuple
+
+_SERVO_16, _MAGIC_16 = Struct("<HHI16H"), 18458
+_SERVO_32, _MAGIC_32 = Struct("<HHI32H"), 29569  # SERVO_32_ENABLE
+_FORMAT = (
+    '\n{"timestamp":%d.%09d,'
+    '"imu":{"gyro":[%.9g,%.9g,%.9g],"accel_body":[%.9g,%.9g,%.9g]},'
+    '"position":[%.9g,%.9g,%.9g],'
+    '"quaternion":[%.9g,%.9g,%.9g,%.9g],'
+    '"velocity":[%.9g,%.9g,%.9g]%s}\n'
+)
+_NS_PER_S = 1_000_000_000
+
+
+class ServoPacket(NamedTuple):
+    """What the autopilot wants of its servos."""
+
+    rate_hz: int
+    """A wish for the length of a step; ours is fixed."""
+    count: int
+    """Of frames: one more each time our answer has been read; the same again: it was lost; less: it has restarted."""
+    pulses_us: tuple[int, ...]
+    """16 or 32 channels; 0: no pulse."""
+
+
+def servo_packet(data: bytes) -> ServoPacket | None:
+    """The packet in a datagram; None: it is none."""
+    for layout, magic in ((_SERVO_16, _MAGIC_16), (_SERVO_32, _MAGIC_32)):
+        if len(data) == layout.size:
+            found, rate_hz, count, *pulses_us = layout.unpack(data)
+            if found == magic:
+                return ServoPacket(rate_hz, count, tuple(pulses_us))
+    return None
+
+
+def state_text(time_ns: int, gyro_frd: Any, accel_frd: Any, truth: Any, extras: str = "") -> bytes:
+    """The answer to a servo packet.
+
+    Args:
+        time_ns: of the physics [ns], from the autopilot's start on, never back.
+        gyro_frd: [rad/s] what the IMU felt since the last one.
+        accel_frd: [m/s²] likewise, specific force.
+        truth: a row of `Truth`.
+        extras: further keys as text that begins with a comma, or nothing.
+
+    Raises:
+        ValueError: a number is none; ArduPilot would take it, and its estimator would never recover.
+    """
+    x, y, z, w = truth["q_ned_from_frd"].tolist()
+    pos_ned, vel_ned = truth["pos_ned"].tolist(), truth["vel_ned"].tolist()
+    numbers = (*gyro_frd, *accel_frd, *pos_ned, w, x, y, z, *vel_ned)
+    if not isfinite(sum(numbers)):
+        raise ValueError("the body's state is not a number")
+    return (_FORMAT % (*divmod(time_ns, _NS_PER_S), *numbers, extras)).encode()
+
+
+def range_keys(ranges_m: Any) -> str:
+    """Of up to six range finders [m], as `extras` of `state_text`."""
+    return "".join(f',"rng_{k}":{range_m:.4g}' for k, range_m in enumerate(ranges_m, 1))
