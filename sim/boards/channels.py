@@ -58,6 +58,11 @@ def pulse_channels(vehicle: VehicleClass, airframe: Airframe) -> list[Channel | 
     return found
 
 
+def control_channels(vehicle: VehicleClass, airframe: Airframe) -> list[Channel | None]:
+    """PX4's actuator controls, [0..1] of motors and [-1..1] of what is signed: output functions in our order."""
+    return [Channel(k, 0.0, 1.0) for k in range(len(vehicle.outputs(airframe)))]
+
+
 def commands_of(channels: Sequence[Channel | None], values: Sequence[float]) -> list[float]:
     """The commands [-1..1] of the actuators.
 
