@@ -60,6 +60,11 @@ def quat_of(yaw_rad: float, pitch_rad: float) -> Quat:
     )
 
 
+def quat_of_roll_pitch_yaw(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quat:
+    """The attitude of Euler angles ZYX; the inverse of `roll_pitch_yaw_of`."""
+    return product(quat_of(yaw_rad, pitch_rad), (sin(0.5 * roll_rad), 0.0, 0.0, cos(0.5 * roll_rad)))
+
+
 def wrapped(angle_rad: float) -> float:
     """The angle [rad] shifted by turns into [-pi, pi)."""
     return (angle_rad + pi) % (2.0 * pi) - pi

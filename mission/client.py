@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from autopilot.mavlink.client_end import AUTOPILOT_COMPONENT, IN_PROGRESS, ByteLink, ClientEnd, frame_of
 from autopilot.mavlink.wire.codec import Frame, Message, decode, message_id
-from mission.client_fields import item_fields, parameter_from_wire, parameter_to_wire, plan_item
+from mission.client_fields import PARAMETER_IS_REAL, item_fields, parameter_from_wire, parameter_to_wire, plan_item
 from mission.plan.plan_file import PlanItem
 
 CLIENT_SYSTEM_ID = 245
@@ -118,6 +118,9 @@ class Client:
         link: bytes to and from the vehicle.
         system_id: of the vehicle.
     """
+
+    sends_parameters_as_floats = False
+    """ArduPilot's way; PX4's: an integer's bits travel in the float."""
 
     def __init__(self, link: ByteLink, *, system_id: int = 1) -> None:
         self.time_us = 0
@@ -303,14 +306,21 @@ class Client:
             self.ask(
                 "PARAM_SET",
                 param_id=name,
-                param_value=parameter_to_wire(value, current.param_type),
+                param_value=parameter_to_wire(value, self._type_of(current)),
                 param_type=current.param_type,
             )
-            return parameter_from_wire(await self._parameter_named(inbox, name))
+            return self._value_of(await self._parameter_named(inbox, name))
 
     async def get_parameter(self, name: str) -> float:
         """The value of a parameter."""
-        return parameter_from_wire(await self._read_parameter(name))
+        return self._value_of(await self._read_parameter(name))
+
+    def _type_of(self, message: Any) -> int:
+        """Of the bits in a PARAM_VALUE."""
+        return PARAMETER_IS_REAL if self.sends_parameters_as_floats else int(message.param_type)
+
+    def _value_of(self, message: Any) -> float:
+        return parameter_from_wire(message, is_real=self.sends_parameters_as_floats)
 
     async def _read_parameter(self, name: str) -> Any:
         with self.subscribe("PARAM_VALUE") as inbox:

@@ -6,7 +6,7 @@ from typing import Any
 
 from mission.plan.plan_file import PlanItem
 
-PARAMETER_IS_INTEGER = 6  # MAV_PARAM_TYPE_INT32
+PARAMETER_IS_INTEGER, PARAMETER_IS_REAL = 6, 9  # MAV_PARAM_TYPE_INT32, _REAL32
 
 
 def parameter_to_wire(value: float, param_type: int) -> int:
@@ -15,10 +15,16 @@ def parameter_to_wire(value: float, param_type: int) -> int:
     return int.from_bytes(bits, "little")
 
 
-def parameter_from_wire(message: Any) -> float:
-    """The value in the fields of a PARAM_VALUE of PX4's encoding."""
+def parameter_from_wire(message: Any, *, is_real: bool = False) -> float:
+    """The value in the fields of a PARAM_VALUE of PX4's encoding.
+
+    Args:
+        message: the fields.
+        is_real: it comes as a float whatever its type, as ArduPilot sends it.
+    """
     bits = message.param_value.to_bytes(4, "little")
-    return float(struct.unpack("<i" if message.param_type == PARAMETER_IS_INTEGER else "<f", bits)[0])
+    layout = "<i" if message.param_type == PARAMETER_IS_INTEGER and not is_real else "<f"
+    return float(struct.unpack(layout, bits)[0])
 
 
 def item_fields(item: PlanItem) -> dict[str, Any]:

@@ -5,9 +5,9 @@ the scripting client, then the recorder. With the memory link alone it is a pure
 """
 
 from collections.abc import Callable, Sequence
-from math import isnan, nan
+from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Self
 
 from autopilot.flight_controller import FlightController
 from autopilot.interface.platform import Host
@@ -21,23 +21,21 @@ from autopilot.mavlink.wire.signing import SigningConfig
 from autopilot.payload.camera.storage import MediaFolder
 from autopilot.persistence import Persistence
 from autopilot.vehicles.vehicle_class import VehicleClass
-from common.airframe import Airframe, load_airframe
-from common.clock import Pacer, wall_unix_us
+from common.airframe import load_airframe
+from common.clock import wall_unix_us
 from common.folder import ConfinedFolder
 from common.kernels import FRAME_TICKS, FRAME_US, TICK_US
 from common.params import Parameter
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
-from mission.client import Running
-from mission.console.status_texts import Texts
+from mission.flight_base import Computer, FlightBase
 from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
-from mission.host_troubles import Troubles
 from mission.log.flight_recorder import History, Recorder
 from mission.log.stored_logs import FlightLogs, RunLog
-from mission.script import Drone, Script
+from mission.script import Drone
 from mission.simulator.base_station import BaseStation
 from mission.simulator.failure_injection import RigInjector
-from mission.simulator.flight_rig import GUST_FRACTION, flight_rig, flight_wind, flight_world
+from mission.simulator.flight_rig import flight_rig, flight_world
 from mission.simulator.host_ports import host_ports
 from mission.simulator.onboard_devices import Surroundings, ring_of
 from mission.simulator.scanner_device import ScannerDevice
@@ -54,22 +52,12 @@ from sim.turntable import Turntable
 from sim.video_rig import VideoRig
 from sim.world.world import WorldMap
 
-if TYPE_CHECKING:
-    from mission.follow.onboard_camera import OnboardCamera
-    from mission.follow.owner_device import FollowedOwner
-
-__all__ = ["Flight", "FlightConfig", "flight_parameters"]
+__all__ = ["Computer", "Flight", "FlightConfig", "flight_parameters"]
 
 DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (PX4, ARDUPILOT)}
 
 
-class Computer(Protocol):
-    """A companion computer on board, in lockstep with the flight."""
-
-    def frame(self, time_us: int) -> None: ...
-
-
-class Flight:
+class Flight(FlightBase):
     """A vehicle in the air, or about to be.
 
     Args:
@@ -99,13 +87,8 @@ class Flight:
         make_rig: Callable[..., Rig] | None = None,
         world: WorldMap | None = None,
     ) -> None:
-        self.config, self.stream, self.video = config, stream, video
-        self.time_us = 0
-        self.ready_s = nan  # power-on to ready to arm
-        self.restart_count = 0
-        self._pacer = Pacer(None)
-        self.texts, self.troubles = Texts(lambda: self.time_us), Troubles(lambda: self.time_us)
-        self.airframe: Airframe = load_airframe(config.airframe)
+        super().__init__(config, load_airframe(config.airframe))
+        self.stream, self.video = stream, video
         simulated = class_of(self.airframe)
         vehicle, self.drives = simulated.vehicle, simulated.drives
         self.world = flight_world(config) if world is None else world
@@ -122,13 +105,10 @@ class Flight:
         receiver = RtkReceiver(self.rig)
         self.controller = self._make_controller(vehicle, receiver)
         self._surroundings = self._surround(receiver)
-        self.owner: FollowedOwner | None = None
-        self.onboard: OnboardCamera | None = None
         if config.owner is not None:
             links = [*links, *self._carry_camera(config.owner)]
         self._components = self._carry_components()
         links = [*links, *(component.vehicle_end for component in self._components)]
-        self.computers: list[Computer] = []
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog", self.troubles.note)
         script_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._servers = self._make_servers(script_end, links, signing)
@@ -314,50 +294,23 @@ class Flight:
         speed: float | None = None,
         on_frame: Callable[[Self], None] | None = None,
     ) -> None:
-        """Advances until `is_over(self)`.
-
-        Args:
-            is_over: asked after each frame.
-            speed: simulated seconds per second; None runs as fast as possible.
-            on_frame: called after each frame, for progress displays.
-        """
-        self.change_speed(speed)
         if speed is not None and self.time_us == 0:
             self.host.boot_unix_us = wall_unix_us()
-        while not is_over(self):
-            self._pacer.wait_until(self.time_us)
-            self.frame()
-            if on_frame is not None:
-                on_frame(self)
+        super().run(is_over, speed=speed, on_frame=on_frame)
 
     def change_speed(self, speed: float | None) -> None:
-        """Simulated seconds per second from the next frame on, while it runs; None: as fast as possible."""
-        self._pacer = Pacer(speed)
-        self.recorder.is_live = speed is not None
+        super().change_speed(speed)
         self.simulator_params.tell(SIM_SPEEDUP=speed or 0.0)
 
     def set_wind(self, speed_m_s: float, from_deg: float) -> None:
-        """From the next frame on the mean blows so, with turbulence and gusts to match."""
-        self.set_air(speed_m_s, from_deg, TURBULENCE_FRACTION * speed_m_s)
+        super().set_wind(speed_m_s, from_deg)
         self.simulator_params.tell(
             SIM_WIND_SPD=speed_m_s, SIM_WIND_DIR=from_deg, SIM_WIND_TURB=TURBULENCE_FRACTION * speed_m_s
         )
 
-    def set_air(self, speed_m_s: float, from_deg: float, turbulence_m_s: float) -> None:
-        """From the next frame on the mean blows so; the vertical wind deviates so much, and gusts go with it."""
-        air = flight_wind(speed_m_s, from_deg)
-        air.turbulence_w_std = turbulence_m_s
-        air.gust_m_s = GUST_FRACTION / TURBULENCE_FRACTION * turbulence_m_s
-        self.rig.set_air(air)
-
     def cut_sticks(self, *, is_cut: bool) -> None:
         """The radio link of the sticks is lost, or is back."""
         self.controller.sticks.is_cut = is_cut
-
-    @property
-    def is_crashed(self) -> bool:
-        """The truth: it struck something too fast, or a turning blade struck the ground."""
-        return bool(self.rig.rows["truth"]["is_crashed"][0])
 
     def restart(self) -> None:
         """Puts the vehicle back on its pad, whole and with a full battery, and restarts its flight controller.
@@ -371,16 +324,8 @@ class Flight:
         self.restart_count += 1
         self.texts.statustext(Severity.NOTICE, "Simulator: the vehicle is back on its pad, restarted")
 
-    def fly(self, script: Script, *, seconds: float = 3600.0) -> Running:
-        """Runs a script to its end in lockstep, for at most `seconds` of simulated time."""
-        running = self.drone.start(script(self.drone))
-        end_us = self.time_us + int(seconds * 1e6)
-        self.run(lambda _: running.is_done or self.time_us >= end_us)
-        running.cancel()
-        return running
-
     def close(self) -> History:
-        """Completes the logs, closes the links and returns the history; a state folder stays the caller's to close."""
+        """As of every flight; a state folder stays the caller's to close."""
         for output in (self.stream, self.video):
             if output is not None:
                 output.close()

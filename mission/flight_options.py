@@ -25,10 +25,14 @@ FORESTS = {"forest": FOREST, "walled-forest": WALLED_FOREST}
 def check_parameters(options: FlightOptions) -> None:
     """Refuses parameters that the vehicle does not have, or values that they cannot have, before kernels are loaded.
 
+    Those of an outside autopilot are its own to judge.
+
     Raises:
         UserError: the options describe no flight.
     """
     config = flight_config(options, None)
+    if options.board != "own":
+        return
     try:
         flight_parameters(config, load_airframe(config.airframe))
     except (AirframeError, ParameterError) as error:

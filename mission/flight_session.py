@@ -18,7 +18,7 @@ from common.files import write_to_nowhere
 from mission.client import Running
 from mission.console.progress_line import TABLE_PERIOD_S, Progress
 from mission.console.terminal import LINE_PERIOD_S, print_line
-from mission.flight import Flight
+from mission.flight_base import FlightBase
 from mission.log.flight_recorder import History
 from mission.run_folder import OwnFiles
 from mission.view.replay_file import keep_for_replay
@@ -45,7 +45,7 @@ class FlightSession:
 
     def __init__(
         self,
-        flight: Flight,
+        flight: FlightBase,
         speed: float | None,
         page: "PageServer | None",
         folder: Path,
@@ -66,7 +66,10 @@ class FlightSession:
             self._view = LiveView(flight, page, speed=speed, path_ned=path_ned, action=action, score=score, goals=goals)
 
     def fly(
-        self, is_over: Callable[[Flight], bool], running: Running | None, watchers: Sequence[Callable[[], None]] = ()
+        self,
+        is_over: Callable[[FlightBase], bool],
+        running: Running | None,
+        watchers: Sequence[Callable[[], None]] = (),
     ) -> History:
         """Advances the flight to its end and closes its logs.
 
@@ -90,7 +93,7 @@ class FlightSession:
             self._view.close()
 
     def _advance(
-        self, is_over: Callable[[Flight], bool], watchers: Sequence[Callable[[], None]], progress: Progress
+        self, is_over: Callable[[FlightBase], bool], watchers: Sequence[Callable[[], None]], progress: Progress
     ) -> None:
         """Until the flight is over or the user stops it; shows a line of figures."""
         gc.freeze()  # what is loaded by now stays: to look through it takes 0.2 s, in the middle of a flight
@@ -99,7 +102,7 @@ class FlightSession:
             with _signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
                 reported = 0
 
-                def on_frame(_: Flight) -> None:
+                def on_frame(_: FlightBase) -> None:
                     nonlocal reported
                     for watch in watchers:
                         watch()

@@ -15,6 +15,7 @@ from mission.console.model_command import option
 
 Pace = Literal["walk", "run"]
 EngineName = Literal["native", "pybullet"]
+BoardName = Literal["own", "ardupilot", "px4"]
 WorldKind = Literal["hills", "forest", "walled-forest", "course", "car-park"]
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
 
@@ -48,6 +49,11 @@ class FlightSettings(BaseModel):
 class FlightOptions(FlightSettings):
     """The options of `honeyguide fly`, as given: the settings, what several of which make, and the session's own."""
 
+    board: BoardName = option("own", "Who flies: own, or another program: ardupilot or px4 (docs/boards.md).")
+    command: str | None = option(
+        None, "Starts that program: {folder}, {params}, {home} and {instance} are filled in.", shown="wait for it"
+    )
+    instance: int = option(0, "Its number, from which its ports follow.", ge=0, le=99)
     plan: Path | None = option(None, "A QGroundControl .plan or QGC WPL 110 file. Default: a tour of the hills.")
     is_idle: bool = option(False, "Fly no plan: wait for a ground station.", "--idle")
     once: bool = option(False, "End with the mission; exit code 0 only if it succeeded.")

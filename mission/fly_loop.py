@@ -11,7 +11,7 @@ from rich.table import Table
 from common.files import write_whole
 from mission.client import Running
 from mission.console.terminal import print_line
-from mission.flight import Flight
+from mission.flight_base import FlightBase
 from mission.flight_session import FlightSession
 from mission.flight_settings import FlightOptions
 from mission.log.flight_recorder import History
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def fly_to_the_end(
-    flight: Flight,
+    flight: FlightBase,
     plan: Plan | None,
     options: FlightOptions,
     speed: float | None,
@@ -43,12 +43,12 @@ def fly_to_the_end(
     return exit_code
 
 
-def _end(options: FlightOptions, speed: float | None, running: Running | None) -> Callable[[Flight], bool]:
+def _end(options: FlightOptions, speed: float | None, running: Running | None) -> Callable[[FlightBase], bool]:
     """What is asked after each frame: whether the flight is over."""
     end_us = int(options.seconds * 1e6) if options.seconds is not None else None
     ends_with_script = options.once or (speed is None and end_us is None)
 
-    def is_over(flight: Flight) -> bool:
+    def is_over(flight: FlightBase) -> bool:
         if end_us is not None and flight.time_us >= end_us:
             return True
         return ends_with_script and (running is None or running.is_done)
@@ -57,7 +57,7 @@ def _end(options: FlightOptions, speed: float | None, running: Running | None) -
 
 
 def _finish(
-    flight: Flight,
+    flight: FlightBase,
     history: History,
     running: Running | None,
     plan: Plan | None,
@@ -68,8 +68,8 @@ def _finish(
 ) -> int:
     """Writes the rest of the run folder and prints the summary; returns the exit code."""
     if len(history.time_us) == 0:
-        console.print("the flight ended before its first frame")
-        return 0 if running is None else 1
+        print_line(console, flight.end_reason or "the flight ended before its first frame")
+        return 0 if running is None and not flight.end_reason else 1
     summary = summarise(flight, history, running, path_ned, curved_items(plan) if plan else frozenset())
     with files.writing("summary.json") as path:
         write_whole(path, (json.dumps(summary.as_json(), indent=2) + "\n").encode())
@@ -83,7 +83,7 @@ def _finish(
     else:
         print_line(console, f"result: {summary.result}\nsimulated: {summary.simulated_s:.1f} s, never armed")
     print_line(console, f"{'what could be written' if files.missing else 'logs, summary and picture'}: {folder}")
-    return 0 if (summary.is_success or running is None) and not files.missing else 1
+    return 0 if (summary.is_success or (running is None and not flight.end_reason)) and not files.missing else 1
 
 
 def _summary_table(summary: Summary, *, drives: bool) -> Table:

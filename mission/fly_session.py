@@ -35,6 +35,13 @@ def fly_session(options: FlightOptions) -> int:
     """
     speed = speed_of(options.speed)
     with ExitStack() as held:
+        if options.board != "own":
+            from mission.boards.board_session import fly_board
+
+            home = flight_config(options, None).home
+            return fly_board(
+                options, speed, None if options.is_idle else _plan(options.plan, options.airframe, home), held
+            )
         if options.state is None:
             return _fly(options, speed, None, held)
         try:

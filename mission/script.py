@@ -166,6 +166,11 @@ class Drone(Client):
             alt_amsl_m,
             name="goto",
         )
+        await self._until_there(lat_deg, lon_deg, alt_amsl_m, acceptance_m, timeout_s)
+
+    async def _until_there(
+        self, lat_deg: float, lon_deg: float, alt_amsl_m: float, acceptance_m: float, timeout_s: float
+    ) -> None:
         target = ned_from_geodetic(lat_deg, lon_deg, alt_amsl_m, self.origin)
         await self.until(lambda: self._way_left_m(target) < acceptance_m, timeout_s, "goto")
 

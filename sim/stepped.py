@@ -123,6 +123,11 @@ class SteppedRig(Rig):
         self._wind_ned = wp.zeros(count, dtype=wp.vec3, device=device)
         self._engine, self._board = self._make_engine(self), self._make_board(self)
 
+    @property
+    def board_commands(self) -> Any:
+        """What the board wants of the actuators, array of vec8, (vehicles,)."""
+        return self._board_commands
+
     def boot_marked(self, marks: Any) -> None:
         self._engine.boot(marks)
         self.power_on(marks)

@@ -7,7 +7,7 @@ from rich.table import Table
 
 from common.clock import wall_time_s
 from mission.client import Running
-from mission.flight import Flight
+from mission.flight_base import FlightBase
 
 TABLE_PERIOD_S = 0.2
 # Heading and least width of each column: none moves when a mode's name or a sign changes.
@@ -26,7 +26,7 @@ COLUMNS_AFTER = (
 class Progress:
     """The line of figures shown while flying; at most 80 columns wide."""
 
-    def __init__(self, flight: Flight, running: Running | None) -> None:
+    def __init__(self, flight: FlightBase, running: Running | None) -> None:
         self._flight = flight
         self._running = running
         self._frames = 0

@@ -21,6 +21,7 @@ from mission.connections import open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight
+from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig
 from mission.flight_options import flight_config
 from mission.flight_session import FlightSession
@@ -109,11 +110,11 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
     return 0 if is_good and not session.files.missing else 1
 
 
-def _end(options: ParkOptions, running: Running) -> Callable[[Flight], bool]:
+def _end(options: ParkOptions, running: Running) -> Callable[[FlightBase], bool]:
     """What is asked after each frame: whether the drive is over."""
     end_us = None if options.seconds is None else int(options.seconds * 1e6)
 
-    def is_over(flight: Flight) -> bool:
+    def is_over(flight: FlightBase) -> bool:
         is_late = end_us is not None and flight.time_us >= end_us
         return is_late or (running.is_done and not options.is_idle)
 

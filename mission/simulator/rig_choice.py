@@ -4,8 +4,23 @@ from collections.abc import Callable
 from functools import partial
 
 from mission.flight_settings import EngineName
+from sim.engines.engine import Engine
+from sim.engines.native import NativeEngine
 from sim.rig import Rig
 from sim.stepped import SteppedRig
+
+
+def engine_named(engine: EngineName) -> Callable[[Rig], Engine]:
+    """What makes the engine.
+
+    Raises:
+        ModuleNotFoundError: it is not installed.
+    """
+    if engine == "native":
+        return NativeEngine
+    from sim.engines.bullet import BulletEngine
+
+    return BulletEngine
 
 
 def rig_with(engine: EngineName) -> Callable[..., Rig]:
@@ -14,8 +29,4 @@ def rig_with(engine: EngineName) -> Callable[..., Rig]:
     Raises:
         ModuleNotFoundError: the engine is not installed.
     """
-    if engine == "native":
-        return Rig
-    from sim.engines.bullet import BulletEngine
-
-    return partial(SteppedRig, engine=BulletEngine)
+    return Rig if engine == "native" else partial(SteppedRig, engine=engine_named(engine))

@@ -13,7 +13,7 @@ import viser
 from autopilot.interface.failure_requests import Failure, Unit
 from autopilot.mavlink.dialects.px4 import PX4
 from mission.client import Running
-from mission.flight import Flight
+from mission.flight_base import FlightBase
 from mission.script import Drone, ScriptError, take_off
 from mission.view.browser_inputs import within
 from mission.view.pose_goals import Pose, PoseGoals
@@ -44,7 +44,7 @@ class Controls:
 
     def __init__(
         self,
-        flight: Flight,
+        flight: FlightBase,
         server: viser.ViserServer,
         do: Callable[[Callable[[], None]], None],
         speed: float | None,

@@ -16,7 +16,7 @@ from autopilot.vehicles.default_class import DEFAULT_CLASS
 from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import Airframe
 from common.kernels import TICK_US
-from mission.flight import Flight
+from mission.flight_base import FlightBase
 from mission.log.replay_topic import ACTIONS, MOTORS, OWNER
 from sim.bodies.vehicles import class_of
 from sim.world.people import CHEST_M
@@ -120,7 +120,7 @@ def distances_m(rows: Any) -> Any:
     return np.linalg.norm(off, axis=-1)
 
 
-def moment_of(flight: Flight, action: Row | None = None) -> Moment:
+def moment_of(flight: FlightBase, action: Row | None = None) -> Moment:
     """The present instant of a flight, and what a policy on board chose last."""
     truth: Any = flight.rig.rows["truth"][0]
     state = flight.controller.state

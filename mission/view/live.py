@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from autopilot.payload.camera.ports import RawFrame
 from common.clock import wall_sleep_s, wall_time_s
 from common.image_stream import ImageFrame
-from mission.flight import Flight
+from mission.flight_base import FlightBase
 from mission.view.controls import Controls
 from mission.view.flight_snapshot import Moment, Row, moment_of
 from mission.view.panel import PLOT_PERIOD_S, Panel
@@ -53,7 +53,7 @@ class LiveView:
 
     def __init__(
         self,
-        flight: Flight,
+        flight: FlightBase,
         server: viser.ViserServer,
         *,
         speed: float | None = None,

@@ -18,7 +18,8 @@ from pyulog import ULog
 
 from common.airframe import load_airframe
 from mission.console.name_checks import LOG_FILE
-from mission.flight import Flight, FlightConfig
+from mission.flight_base import FlightBase
+from mission.flight_config import FlightConfig
 from mission.log.motion_topics import STEERING_TOPIC
 from mission.log.replay_topic import OWNER, REPLAY_TOPIC
 from mission.log.ulog_file import UlogDamage, read_topics
@@ -62,7 +63,7 @@ class Recording:
 
 
 def keep_for_replay(
-    flight: Flight, path_ned: Sequence[Any] = (), action: Callable[[], Row | None] = lambda: None
+    flight: FlightBase, path_ned: Sequence[Any] = (), action: Callable[[], Row | None] = lambda: None
 ) -> None:
     """Lets the log of a flight that has not begun hold what its replay needs.
 

@@ -52,13 +52,13 @@ class FrameCounter:
                 return Verdict.FOREIGN
             is_first = True
         else:
-            is_first = packet.count < self._last
+            is_first = packet.frame_count < self._last
         self._heard_s = now_s
-        if not is_first and packet.count == self._last:
+        if not is_first and packet.frame_count == self._last:
             return Verdict.AGAIN
         if not is_first:
-            self.lost_count += packet.count - self._last - 1
-        self._last, self._sender = packet.count, sender
+            self.lost_count += packet.frame_count - self._last - 1
+        self._last, self._sender = packet.frame_count, sender
         return Verdict.FIRST if is_first else Verdict.NEXT
 
 

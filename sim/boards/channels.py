@@ -13,7 +13,7 @@ _PULSE_LOW_US, _PULSE_NEUTRAL_US, _PULSE_HIGH_US = 1000.0, 1500.0, 2000.0
 class Channel(NamedTuple):
     """One actuator's source; its command is (value - zero) / full."""
 
-    index: int
+    number: int
     """Of the channel, from 0."""
     zero: float
     full: float
@@ -72,7 +72,7 @@ def commands_of(channels: Sequence[Channel | None], values: Sequence[float]) -> 
     """
     commands = []
     for channel in channels:
-        value = 0.0 if channel is None else values[channel.index]
+        value = 0.0 if channel is None else values[channel.number]
         if channel is None or (value == 0.0 and channel.zero > 0.0):
             commands.append(0.0)
         else:

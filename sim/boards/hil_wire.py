@@ -62,7 +62,7 @@ class HilWriter:
 
     def gnss(self, time_us: int, sample: Any) -> bytes:
         """HIL_GPS of a new sample; `eph` and `epv` are taken for accuracies [cm]."""
-        lat_deg, lon_deg, alt_m = geodetic_from_ned(*sample["pos_ned"].tolist(), self._home)
+        lat_deg, lon_deg, alt_m = self._position(sample["pos_ned"])
         vn, ve, vd = (round(100.0 * part) for part in sample["vel_ned"].tolist())
         course_cdeg = round(atan2(ve, vn) % (2.0 * pi) * 18000.0 / pi) % 36000
         return self._frame(
@@ -87,7 +87,7 @@ class HilWriter:
     def truth(self, time_us: int, truth: Any) -> bytes:
         """HIL_STATE_QUATERNION, for PX4's log of the truth alone."""
         x, y, z, w = truth["q_ned_from_frd"].tolist()
-        lat_deg, lon_deg, alt_m = geodetic_from_ned(*truth["pos_ned"].tolist(), self._home)
+        lat_deg, lon_deg, alt_m = self._position(truth["pos_ned"])
         return self._frame(
             HIL_STATE,
             time_us,
@@ -101,6 +101,10 @@ class HilWriter:
             0,
             *(_short(_G_MILLI * part) for part in truth["accel_frd"].tolist()),
         )
+
+    def _position(self, pos_ned: Any) -> tuple[float, float, float]:
+        north, east, down = pos_ned.tolist()
+        return geodetic_from_ned(north, east, down, self._home)
 
     def _frame(self, kind: MessageType, *values: Any) -> bytes:
         self._seq = self._seq + 1 & 0xFF

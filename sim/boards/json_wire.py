@@ -25,7 +25,7 @@ class ServoPacket(NamedTuple):
 
     rate_hz: int
     """A wish for the length of a step; ours is fixed."""
-    count: int
+    frame_count: int
     """Of frames: one more each time our answer has been read; the same again: it was lost; less: it has restarted."""
     pulses_us: tuple[int, ...]
     """16 or 32 channels; 0: no pulse."""

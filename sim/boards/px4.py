@@ -160,7 +160,8 @@ class Px4Board:
 
     def _receive(self, row: Any, wait_s: float) -> bool:
         """Reads what comes in within a time; returns whether this tick has been answered."""
-        assert self._peer is not None
+        if self._peer is None:
+            return False
         self._peer.settimeout(wait_s)
         try:
             data = self._peer.recv(READ_MAX)
@@ -185,7 +186,7 @@ class Px4Board:
             self._periods.append(passed)
         self._answered_us = time_us
         self.is_armed = bool(fields.mode & SAFETY_ARMED)
-        controls = [value if value == value else 0.0 for value in fields.controls]  # noqa: PLR0124  (NaN: off)
+        controls = [value if value == value else 0.0 for value in fields.controls]
         row[: len(self._channels)] = commands_of(self._channels, controls)
 
     def _lose(self) -> None:

@@ -208,6 +208,9 @@ class BulletEngine:
         self._left = self._states[_POSE].copy()
         concluded.launch()
 
+    def substep(self, commands: Any, wind_ned: Any) -> None:  # noqa: ARG002
+        raise ValueError("the engine pybullet moves by ticks: its vehicles are flown at 250 Hz")
+
     def _record(self, commands: Any, wind_ned: Any) -> list[Any]:
         a, rows = self._rig.arrays, self._bullet_rows
         where = [a.model, a.body, a.worlds, a.i_world]

@@ -5,7 +5,10 @@ need them. Everything not addressed to us alone goes on, of unknown kinds too: t
 the addressee has been heard. Nothing goes back where it came from.
 """
 
-from autopilot.mavlink.channel import Channel, Endpoint
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
+from typing import Any, Protocol
+
 from autopilot.mavlink.wire.codec import Frame, known_type
 
 LOOP_US = 500_000  # guess: a frame that comes back sooner, over another link, has gone round a loop
@@ -15,14 +18,37 @@ RECENT_MAX = 256  # frames remembered against loops
 _NEVER_FORWARDED = {known_type(name).msg_id for name in ("SETUP_SIGNING", "RADIO_STATUS", "RADIO")}
 
 
+class Port(Protocol):
+    """One link of a network."""
+
+    heard: Any
+    """Notes who is there: autopilot.mavlink.channel.Heard."""
+
+    def pass_on(self, frame: bytes) -> None: ...
+
+
+class Network(Protocol):
+    """What is joined: a vehicle's endpoint (autopilot.mavlink.channel.Endpoint), or a hub."""
+
+    sysid: int
+    time_us: int
+    sent_count: int
+
+    @property
+    def compids(self) -> AbstractSet[int]: ...
+
+    @property
+    def channels(self) -> Sequence[Port]: ...
+
+
 class Router:
     """Passes frames on between the channels of an endpoint."""
 
-    def __init__(self, endpoint: Endpoint) -> None:
+    def __init__(self, endpoint: Network) -> None:
         self._endpoint = endpoint
-        self._recent: dict[bytes, tuple[Channel, int]] = {}  # frame -> where it came in, and when; oldest first
+        self._recent: dict[bytes, tuple[Port, int]] = {}  # frame -> where it came in, and when; oldest first
 
-    def route(self, channel: Channel, frame: Frame, target_system: int, target_component: int) -> None:
+    def route(self, channel: Port, frame: Frame, target_system: int, target_component: int) -> None:
         """Passes a frame on that has come in on `channel` from somebody else, and remembers who is there.
 
         Args:
@@ -45,7 +71,7 @@ class Router:
                 other.pass_on(frame.raw)
                 endpoint.sent_count += 1
 
-    def _has_gone_round(self, channel: Channel, frame: Frame) -> bool:
+    def _has_gone_round(self, channel: Port, frame: Frame) -> bool:
         """Whether the same bytes came in on another channel a moment ago."""
         recent, now_us = self._recent, self._endpoint.time_us
         before = recent.get(frame.raw)

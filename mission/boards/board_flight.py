@@ -1,0 +1,163 @@
+"""A flight whose flight controller is another program: our world, body, sensors and camera, its estimator and control.
+
+Each frame is 20 ms of simulated time, as of every flight; the autopilot takes its steps within them, and while it is
+silent simulated time stands still. Its MAVLink and everybody else's are joined by a hub: the flight's own script, the
+owner's phone, and the ground stations, unless it has ports of its own for those.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import isnan
+from pathlib import Path
+from typing import cast
+
+from autopilot.interface.outputs import OutputKind
+from autopilot.mavlink.hub import Hub
+from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
+from autopilot.mavlink.wire.codec import Frame, known_type
+from common.airframe import load_airframe
+from common.kernels import FRAME_TICKS, FRAME_US
+from common.tlog import TlogWriter
+from mission.boards.outside_controller import OutsideController
+from mission.boards.peers import OutsideBoard, Peer
+from mission.flight_base import FlightBase
+from mission.flight_config import FlightConfig, OwnerConfig
+from mission.log.flight_recorder import History, Recorder
+from mission.simulator.failure_injection import RigInjector
+from mission.simulator.flight_rig import flight_rig, flight_world
+from mission.simulator.rig_choice import engine_named
+from sim.boards.outside import OnWait, PeerError
+from sim.bodies.vehicles import class_of
+from sim.rig import Rig
+from sim.stepped import SteppedRig
+
+_SETPOINT_ID = known_type("SET_POSITION_TARGET_LOCAL_NED").msg_id
+_FOLLOWS_US = 1_000_000  # a companion that has sent no setpoint for so long does not follow
+
+
+class BoardFlight(FlightBase):
+    """A vehicle that an outside autopilot flies.
+
+    Args:
+        config: what it is made from; its parameters are the autopilot's.
+        peer: which autopilot.
+        on_wait: what is done while it is silent, besides passing messages on.
+        instance: its number, from which its ports follow.
+        links: for ground stations, of an autopilot that has no ports of its own for them.
+        folder: where `flight.ulg` and `flight.tlog` are written; None writes nothing.
+
+    Raises:
+        PeerError: a port is taken.
+    """
+
+    def __init__(
+        self,
+        config: FlightConfig,
+        peer: Peer,
+        on_wait: OnWait,
+        *,
+        instance: int = 0,
+        links: Sequence[Link | LinkSource] = (),
+        folder: Path | None = None,
+    ) -> None:
+        super().__init__(config, load_airframe(config.airframe))
+        self.peer, self._on_wait = peer, on_wait
+        simulated = class_of(self.airframe)
+        vehicle, self.drives = simulated.vehicle, simulated.drives
+        self.world = flight_world(config)
+        self.board, self.rig = self._make_rig(instance)
+        motors = [output for output in vehicle.outputs(self.airframe) if output.kind is OutputKind.MOTOR]
+        self.injector = RigInjector(self.rig, self.airframe, config.noise, len(motors))
+        script_end, client_end = memory_pair(LinkRole.ONBOARD)
+        links = [peer.open_link(instance), script_end, *links]
+        if config.owner is not None:
+            links = [*links, self._carry_camera(config.owner)]
+        self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog", self.troubles.note)
+        self._hub = Hub(links, self._heard)
+        self._script_end = script_end
+        self._setpoint_us = -_FOLLOWS_US
+        self.drone = peer.drone(client_end, system_id=instance + 1)
+        self.controller = OutsideController(
+            self.rig, vehicle, self.airframe, self.drone, peer.dialect, config.home, self.texts
+        )
+        log = None if folder is None else folder / "flight.ulg"
+        self.recorder = Recorder(log, self.rig, self.controller, self.airframe, self.troubles.note)
+
+    def _make_rig(self, instance: int) -> tuple[OutsideBoard, SteppedRig]:
+        made: list[OutsideBoard] = []
+
+        def make_board(rig: Rig) -> OutsideBoard:
+            made.append(self.peer.make_board(rig, self.airframe, self.config.home, instance, self._wait))
+            return made[0]
+
+        make_rig: Callable[..., SteppedRig] = partial(
+            SteppedRig, engine=engine_named(self.config.engine), board=make_board
+        )
+        rig = flight_rig(self.config, self.airframe, self.world, make_rig)
+        return made[0], cast(SteppedRig, rig)
+
+    def _carry_camera(self, owner: OwnerConfig) -> Link:
+        """Brings the owner and the onboard camera in; the phone's link."""
+        from mission.follow.onboard_camera import OnboardCamera  # what a policy sees is defined beside the policies
+        from mission.follow.owner_device import FollowedOwner
+
+        self.owner = FollowedOwner(owner, self.world, self.config.seed, self.config.home)
+        self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)
+        return self.owner.vehicle_end
+
+    def _wait(self, silent_s: float) -> None:
+        """The autopilot is silent; what it says otherwise, and what is said to it, goes on."""
+        self._hub.frame(self.time_us)
+        self.drone.frame(self.time_us)
+        self._on_wait(silent_s)
+
+    def _heard(self, time_us: int, frame: Frame, link: Link) -> None:
+        if frame.kind.msg_id == _SETPOINT_ID and link is not self._script_end:
+            self._setpoint_us = time_us
+        if self._tlog is not None:
+            self._tlog.frame(time_us, frame.raw)
+
+    def frame(self) -> None:
+        self.injector.frame(self.time_us)
+        try:
+            self._on_wait(0.0)
+            self.rig.advance(FRAME_TICKS)
+        except PeerError as error:
+            self.end_reason = str(error)
+            return
+        self.time_us += FRAME_US
+        if self.board.restart_count != self.restart_count:
+            self._stand_up_again()
+        if self.owner is not None:
+            is_offboard = self.controller.modes[self.controller.state.mode].is_offboard
+            has_setpoints = self.time_us - self._setpoint_us < _FOLLOWS_US or self.peer.has_station_ports
+            self.owner.frame(self.time_us, is_followed=is_offboard and has_setpoints)
+        self._hub.frame(self.time_us)
+        self.drone.frame(self.time_us)
+        self.controller.frame(self.time_us)
+        if self.onboard is not None:
+            self.onboard.frame(self.time_us)
+        for computer in self.computers:
+            computer.frame(self.time_us)
+        self.recorder.frame(self.time_us)
+        self.troubles.tell(self.texts)
+        if isnan(self.ready_s) and self.controller.state.is_ready_to_arm:
+            self.ready_s = self.time_us * 1e-6
+
+    def _stand_up_again(self) -> None:
+        """The autopilot has restarted: so does what it flies."""
+        self.restart_count = self.board.restart_count
+        self.restart()
+        self.troubles.note(f"{self.peer.name} has restarted; the vehicle is back on its pad")
+
+    def restart(self) -> None:
+        """Puts the vehicle back on its pad; restarting the autopilot is up to who has started it."""
+        self.injector.repair()
+        self.rig.boot()
+
+    def close(self) -> History:
+        self.board.close()
+        self._hub.close()
+        if self._tlog is not None:
+            self._tlog.close()
+        return self.recorder.close()

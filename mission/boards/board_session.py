@@ -1,0 +1,142 @@
+"""`honeyguide fly --board`: an outside autopilot started or waited for, its console shown, and the flight.
+
+Ports and folder are opened before the program is started, and it is ended with the flight.
+"""
+
+from contextlib import ExitStack
+from pathlib import Path
+
+from rich.console import Console
+
+from common.airframe import load_airframe
+from common.geodesy import GeoPoint
+from mission.boards.process import PeerProcess
+from mission.connections import open_images, open_links, open_page
+from mission.console.option_checks import UserError
+from mission.console.terminal import loading, print_line
+from mission.flight_options import flight_config
+from mission.flight_settings import FlightOptions
+from mission.plan.plan_file import Plan
+from mission.run_folder import run_folder
+from sim.boards.outside import PeerError
+
+PATIENCE_S = 120.0  # of wall clock time, that an autopilot may be silent
+TOLD_S = 2.0  # of silence, after which it is said what is waited for
+PACE_MAX = 20.0  # guess: how much faster than real time a flight in lockstep is at most, for time-outs of links
+_OURS_ALONE = {
+    "dialect": "--dialect", "announces_components": "--announce-components", "traffic_count": "--traffic",
+    "has_lidar": "--lidar", "has_base": "--rtk", "stream_port": "--stream-port", "video_port": "--video-port",
+    "state": "--state", "has_to_sign": "--require-signing",
+}  # fmt: skip
+
+
+def check_board(options: FlightOptions) -> None:
+    """Refuses options that only our own flight controller has, or that its place leaves without meaning.
+
+    Raises:
+        UserError: there is one.
+    """
+    for name, flag in _OURS_ALONE.items():
+        if getattr(options, name) != FlightOptions.model_fields[name].default:
+            raise UserError(f"{flag} and --board {options.board}: choose one; the first is our own flight controller's")
+    if options.board == "px4" and options.noise == 0.0:
+        raise UserError("--noise 0 and --board px4: it takes sensors that never change for broken; use --noise 0.1")
+
+
+class Watch:
+    """Looks after the program while the flight goes on, and while it waits.
+
+    Args:
+        name: of the autopilot.
+        console: where its console is shown.
+    """
+
+    def __init__(self, name: str, console: Console) -> None:
+        self._name, self._console = name, console
+        self.hint = ""  # what it has to do to be heard
+        self.process: PeerProcess | None = None
+        self._is_told = False
+
+    def __call__(self, silent_s: float) -> None:
+        if self.process is not None:
+            for line in self.process.lines():
+                print_line(self._console, f"{self._name} | {line}")
+            self.process.check()
+        if silent_s < TOLD_S:
+            self._is_told = self._is_told and silent_s > 0.0
+        elif not self._is_told:
+            self._is_told = True
+            print_line(self._console, f"waiting for {self._name}: {self.hint}")
+        if silent_s > PATIENCE_S:
+            raise PeerError(f"{self._name} has been silent for {PATIENCE_S:g} s: {self.hint}")
+
+    def close(self) -> None:
+        if self.process is not None:
+            self.process.close(lambda text: print_line(self._console, text))
+
+
+def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, held: ExitStack) -> int:
+    """Flies what the options say and returns the exit code.
+
+    Raises:
+        UserError: an option, port, folder or the program is wrong.
+    """
+    check_board(options)
+    console = Console()
+    config = flight_config(options, None)
+    links = [] if options.board == "px4" else open_links(options, speed or PACE_MAX)
+    images = open_images(options)
+    page = open_page(options.view_port) if options.has_view else None
+    folder = held.enter_context(run_folder(options.run_folder))
+    with loading(console) as say:
+        from mission.boards.board_flight import BoardFlight
+        from mission.boards.peers import PEERS
+        from mission.fly_loop import fly_to_the_end
+        from mission.kernel_loading import load_kernels
+
+        if options.owner is not None:
+            import mission.follow.onboard_camera
+            import mission.follow.owner_device  # noqa: F401  (their kernels are loaded with the others)
+
+        load_kernels(say, config, has_camera=page is not None)
+        say("building the world")
+        peer = PEERS[options.board]
+        watch = Watch(peer.name, console)
+        try:
+            flight = BoardFlight(config, peer, watch, instance=options.instance, links=links, folder=folder)
+        except (PeerError, ValueError) as error:
+            raise UserError(str(error)) from error
+    watch.hint = peer.waits_for.format(port=flight.board.local_port)
+    if images is not None and flight.onboard is not None:
+        flight.onboard.add_sink(images.publish)
+        flight.computers.append(images)
+    print_line(console, f"logs: {folder}")
+    if page is not None:
+        print_line(console, f"live page: {page.url}")
+    try:
+        own = folder / options.board
+        own.mkdir(exist_ok=True)
+        environment = peer.prepare(config, load_airframe(config.airframe), own)
+        if options.command is not None:
+            command = filled_in(options.command, own, config.home, options.instance)
+            watch.process = PeerProcess(command, own, environment, own / "console.log")
+        return fly_to_the_end(flight, plan, options, speed, page, folder, console)
+    except PeerError as error:
+        raise UserError(str(error)) from error
+    finally:
+        watch.close()
+        if images is not None:
+            images.close()
+
+
+def filled_in(command: str, folder: Path, home: GeoPoint, instance: int) -> str:
+    """A command with its names filled in."""
+    values = {
+        "folder": str(folder),
+        "params": str(folder / "vehicle.parm"),
+        "home": f"{home.lat_deg:.7f},{home.lon_deg:.7f},{home.alt_m:.2f},0",
+        "instance": str(instance),
+    }
+    for name, value in values.items():
+        command = command.replace(f"{{{name}}}", value)
+    return command

@@ -1,0 +1,105 @@
+"""The outside autopilots that can fly here: how each is reached, what it is told of the vehicle, who speaks its way."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from autopilot.mavlink.dialects import Dialect
+from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
+from autopilot.mavlink.dialects.px4 import PX4
+from autopilot.mavlink.transport.client_links import open_client_link
+from autopilot.mavlink.transport.links import Link, LinkRole, UdpLink
+from common.airframe import Airframe
+from common.geodesy import GeoPoint
+from mission.boards.vehicle_params import ardupilot_params, px4_params
+from mission.flight_config import FlightConfig
+from mission.script import Drone
+from mission.script_ardupilot import ArduPilotDrone
+from sim.boards.ardupilot import PORT as JSON_PORT
+from sim.boards.ardupilot import ArduPilotBoard
+from sim.boards.channels import control_channels, pulse_channels
+from sim.boards.outside import OnWait
+from sim.boards.px4 import PORT as HIL_PORT
+from sim.boards.px4 import Px4Board
+from sim.bodies.vehicles import class_of
+from sim.rig import Rig
+
+OutsideBoard = ArduPilotBoard | Px4Board
+MakeBoard = Callable[[Rig, Airframe, GeoPoint, int, OnWait], OutsideBoard]
+
+_ARDUPILOT_TCP, _ARDUPILOT_STEP = 5760, 10
+_PX4_PAYLOAD, _PX4_PAYLOAD_OWN = 14030, 14280  # its third link, for what is on board: stations have the others
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """One kind of autopilot."""
+
+    name: str
+    dialect: Dialect
+    drone: type[Drone]
+    """Who speaks its way."""
+    make_board: MakeBoard
+    """From the rig, its airframe, its home, the number of the instance, and what is done while it is silent."""
+    open_link: Callable[[int], Link]
+    """To the MAVLink port of an instance that is ours."""
+    has_station_ports: bool
+    """It speaks to ground stations itself, where they listen; else we link them through."""
+    prepare: Callable[[FlightConfig, Airframe, Path], Mapping[str, str]]
+    """Writes what it is told of the vehicle into a folder; returns what is added to its environment."""
+    waits_for: str
+    """What it has to do to be heard; `{port}` is where."""
+
+
+def _ardupilot_board(rig: Rig, airframe: Airframe, _: GeoPoint, instance: int, on_wait: OnWait) -> ArduPilotBoard:
+    channels = pulse_channels(class_of(airframe).vehicle, airframe)
+    return ArduPilotBoard(rig, channels=channels, on_wait=on_wait, port=JSON_PORT + _ARDUPILOT_STEP * instance)
+
+
+def _px4_board(rig: Rig, airframe: Airframe, home: GeoPoint, instance: int, on_wait: OnWait) -> Px4Board:
+    channels = control_channels(class_of(airframe).vehicle, airframe)
+    return Px4Board(rig, channels=channels, home=home, on_wait=on_wait, port=HIL_PORT + instance)
+
+
+def _ardupilot_link(instance: int) -> Link:
+    return open_client_link(f"tcp://127.0.0.1:{_ARDUPILOT_TCP + _ARDUPILOT_STEP * instance}", LinkRole.ONBOARD)
+
+
+def _px4_link(instance: int) -> Link:
+    return UdpLink(_PX4_PAYLOAD_OWN + instance, LinkRole.ONBOARD, local_port=_PX4_PAYLOAD + instance)
+
+
+def _prepare_ardupilot(config: FlightConfig, airframe: Airframe, folder: Path) -> Mapping[str, str]:
+    values = ardupilot_params(airframe) | config.parameters
+    text = "".join(f"{name} {value:g}\n" for name, value in values.items())
+    (folder / "vehicle.parm").write_text(text)
+    return {}
+
+
+def _prepare_px4(config: FlightConfig, airframe: Airframe, folder: Path) -> Mapping[str, str]:  # noqa: ARG001
+    values = px4_params(airframe) | config.parameters
+    return {"PX4_SIM_MODEL": "none_iris"} | {f"PX4_PARAM_{name}": f"{value:g}" for name, value in values.items()}
+
+
+PEERS: Mapping[str, Peer] = {
+    "ardupilot": Peer(
+        name="ArduPilot",
+        dialect=ARDUPILOT,
+        drone=ArduPilotDrone,
+        make_board=_ardupilot_board,
+        open_link=_ardupilot_link,
+        has_station_ports=False,
+        prepare=_prepare_ardupilot,
+        waits_for="start it with --model JSON; its servos are expected at UDP port {port}",
+    ),
+    "px4": Peer(
+        name="PX4",
+        dialect=PX4,
+        drone=Drone,
+        make_board=_px4_board,
+        open_link=_px4_link,
+        has_station_ports=True,
+        prepare=_prepare_px4,
+        waits_for="start it with PX4_SIM_MODEL=none_iris; it is expected at TCP port {port}",
+    ),
+}

@@ -1,0 +1,70 @@
+"""What an outside autopilot has to know of our vehicle: its own parameters, from the airframe file."""
+
+from common.airframe import Airframe
+from common.airframes.multirotor import MultirotorAirframe
+from common.airframes.rover import RoverAirframe
+from common.geodesy import GRAVITY_M_S2
+
+_FRAMES = {4: 1, 6: 2, 8: 3}  # ArduPilot's FRAME_CLASS by the number of motors
+_FRAME_X = 1
+_CRUISE_M_S = 2.0  # guess: half of what a rover of ours does on rough ground
+
+
+def ardupilot_params(airframe: Airframe) -> dict[str, float]:
+    """By ArduPilot's names."""
+    quiet = {f"SIM_{sensor}{k}_RND": 0.0 for sensor in ("ACC", "GYR") for k in (1, 2)}  # the IMU's noise is ours
+    downward = {"RNGFND1_TYPE": 100.0, "RNGFND1_ORIENT": 25.0}
+    if isinstance(airframe, MultirotorAirframe):
+        return quiet | downward | _ardupilot_copter(airframe)
+    if isinstance(airframe, RoverAirframe):
+        return quiet | _ardupilot_rover(airframe)
+    return quiet
+
+
+def _ardupilot_copter(airframe: MultirotorAirframe) -> dict[str, float]:
+    idle = airframe.rotor_model.idle_command
+    return {
+        "FRAME_CLASS": float(_FRAMES[len(airframe.rotors)]),
+        "FRAME_TYPE": float(_FRAME_X),
+        "MOT_THST_EXPO": _curve(airframe),
+        "MOT_SPIN_MIN": idle,
+        "MOT_SPIN_ARM": 0.7 * idle,
+        "MOT_THST_HOVER": _hover_fraction(airframe),
+        "AUTO_OPTIONS": 3.0,  # armed in AUTO, and off the ground without a throttle stick: there is none
+    }
+
+
+def _ardupilot_rover(airframe: RoverAirframe) -> dict[str, float]:
+    top_m_s = airframe.drive.max_speed_m_s
+    params = {"CRUISE_SPEED": _CRUISE_M_S, "CRUISE_THROTTLE": 100.0 * _CRUISE_M_S / top_m_s, "WP_SPEED": _CRUISE_M_S}
+    if airframe.is_skid:
+        params |= {"SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0}
+    return params
+
+
+def px4_params(airframe: Airframe) -> dict[str, float]:
+    """By PX4's names."""
+    if not isinstance(airframe, MultirotorAirframe):
+        return {}
+    params: dict[str, float] = {
+        "CA_ROTOR_COUNT": float(len(airframe.rotors)),
+        "THR_MDL_FAC": _curve(airframe),
+        "MPC_THR_HOVER": _hover_fraction(airframe),
+    }
+    for k, rotor in enumerate(airframe.rotors):
+        params[f"CA_ROTOR{k}_PX"], params[f"CA_ROTOR{k}_PY"] = rotor.x_m, rotor.y_m
+        params[f"CA_ROTOR{k}_KM"] = 0.05 * rotor.spin  # PX4's default size
+        params[f"PWM_MAIN_FUNC{k + 1}"] = 101.0 + k
+    return params
+
+
+def _curve(airframe: MultirotorAirframe) -> float:
+    """Of thrust over command: 0 linear, 1 quadratic, as both of them count it."""
+    return float(airframe.rotor_model.command_curve)
+
+
+def _hover_fraction(airframe: MultirotorAirframe) -> float:
+    """Thrust in hover over the largest."""
+    rotors = airframe.rotor_model
+    largest_n = len(airframe.rotors) * rotors.thrust_n_s2 * rotors.max_speed_rad_s**2
+    return round(float(airframe.body.mass_kg * GRAVITY_M_S2 / largest_n), 3)

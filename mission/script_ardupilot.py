@@ -1,0 +1,144 @@
+"""The scripting client of a real ArduPilot: the same actions as `Drone`, by its modes and its ways.
+
+Our own vehicle speaks PX4's to scripts whatever ground stations hear; this is for ArduPilot itself, at the other end of
+a board or of a network. Scripts need not know which they have.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isnan
+
+from autopilot.mavlink.wire.codec import Message
+from mission.client import CommandRefused
+from mission.plan.plan_file import PlanItem
+from mission.script import (
+    AUTO_LAND,
+    AUTO_LOITER,
+    AUTO_MISSION,
+    AUTO_RTL,
+    CMD_ARM_DISARM,
+    CMD_MISSION_START,
+    CMD_REPOSITION,
+    CMD_SET_MODE,
+    CMD_TAKEOFF,
+    FORCE_MAGIC,
+    FRAME_GLOBAL,
+    MAIN_AUTO,
+    MAIN_OFFBOARD,
+    Drone,
+)
+
+CMD_DO_JUMP = 177
+CUSTOM_MODE = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+CHANGE_MODE = 1.0  # MAV_DO_REPOSITION_FLAGS
+# Its numbers of PX4's modes, of what flies and of what drives; its plane's
+_COPTER = {
+    (MAIN_OFFBOARD, 0): 4,  # GUIDED
+    (MAIN_AUTO, AUTO_LOITER): 4,  # GUIDED holds, too, and needs no throttle stick in the middle as LOITER does
+    (MAIN_AUTO, AUTO_MISSION): 3,
+    (MAIN_AUTO, AUTO_RTL): 6,
+    (MAIN_AUTO, AUTO_LAND): 9,
+}
+_ROVER = {
+    (MAIN_OFFBOARD, 0): 15,
+    (MAIN_AUTO, AUTO_LOITER): 4,  # HOLD
+    (MAIN_AUTO, AUTO_MISSION): 10,
+    (MAIN_AUTO, AUTO_RTL): 11,
+}
+_PLANE = {
+    (MAIN_OFFBOARD, 0): 15,
+    (MAIN_AUTO, AUTO_LOITER): 12,
+    (MAIN_AUTO, AUTO_MISSION): 10,
+    (MAIN_AUTO, AUTO_RTL): 11,
+}
+_FIXED_WING = 1  # MAV_TYPE
+_HOME_ITEM = PlanItem(0, 16, FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+
+
+class ArduPilotDrone(Drone):
+    """See `Drone`."""
+
+    sends_parameters_as_floats = True
+
+    @property
+    def _modes(self) -> dict[tuple[int, int], int]:
+        if self.drives:
+            return _ROVER
+        heartbeat = self.latest("HEARTBEAT")
+        return _PLANE if heartbeat is not None and heartbeat.type == _FIXED_WING else _COPTER
+
+    @property
+    def px4_mode(self) -> tuple[int, int]:
+        """PX4's main and sub mode that is nearest to its own; (0, 0): none is."""
+        heartbeat = self.latest("HEARTBEAT")
+        for mode, number in reversed(self._modes.items()):
+            if heartbeat is not None and heartbeat.custom_mode == number:
+                return mode
+        return 0, 0
+
+    async def arm(self, *, force: bool = False) -> None:
+        if not self.is_armed and not self.drives:
+            await self._set_mode(MAIN_OFFBOARD, 0, "guided")  # it is not armed in LAND or RTL
+        await self.command(CMD_ARM_DISARM, 1.0, FORCE_MAGIC if force else 0.0, name="arm")
+        await self.until(lambda: self.is_armed, 5.0, "armed")
+
+    async def takeoff(self, height_m: float, timeout_s: float = 60.0) -> None:
+        await self._set_mode(MAIN_OFFBOARD, 0, "guided")
+        await self.command(CMD_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m, name="takeoff")
+        await self.until(lambda: abs(self._height_m() - height_m) < 0.3, timeout_s, f"takeoff to {height_m:g} m")
+
+    async def goto(
+        self,
+        lat_deg: float,
+        lon_deg: float,
+        alt_amsl_m: float,
+        *,
+        yaw_rad: float = float("nan"),
+        speed_m_s: float = -1.0,
+        acceptance_m: float = 1.0,
+        timeout_s: float = 120.0,
+    ) -> None:
+        params = (speed_m_s, CHANGE_MODE, 0.0, 0.0 if isnan(yaw_rad) else yaw_rad)
+        place = round(lat_deg * 1e7), round(lon_deg * 1e7), alt_amsl_m
+        await self.command_int(CMD_REPOSITION, FRAME_GLOBAL, params, *place, name="goto")
+        await self._until_there(lat_deg, lon_deg, alt_amsl_m, acceptance_m, timeout_s)
+
+    async def land(self, timeout_s: float = 120.0) -> None:
+        await self._set_mode(MAIN_AUTO, AUTO_LAND, "land")
+        await self.wait_disarmed(timeout_s)
+
+    async def start_mission(self, first: int = 0) -> None:
+        self.reached.clear()
+        if not self.is_armed:
+            await self.arm()
+        await self._set_mode(MAIN_AUTO, AUTO_MISSION, "mission")
+        await self.command(CMD_MISSION_START, float(first), 0.0, name="start mission")
+
+    @property
+    def is_mission_complete(self) -> bool:
+        current = self.latest("MISSION_CURRENT")
+        return super().is_mission_complete or (current is not None and 0 < current.total <= current.seq)
+
+    async def upload(self, items: Sequence[PlanItem], mission_type: int = 0) -> None:
+        """Item 0 of ArduPilot's missions is home: those of a plan follow it."""
+        if mission_type == 0:
+            items = [_HOME_ITEM, *(_one_later(item) for item in items)]
+        await super().upload(items, mission_type)
+
+    def _note(self, message: Message) -> None:
+        super()._note(message)
+        if message.name != "STATUSTEXT":
+            self.reached[-1] -= 1
+
+    async def _set_mode(self, main: int, sub: int, name: str) -> None:
+        number = self._modes.get((main, sub))
+        if number is None:
+            raise CommandRefused(name, 2, "ArduPilot has no such mode for this vehicle")
+        await self.command(CMD_SET_MODE, CUSTOM_MODE, float(number), name=name)
+        await self.until(lambda: self.latest("HEARTBEAT").custom_mode == number, 3.0, f"mode {name}")
+
+
+def _one_later(item: PlanItem) -> PlanItem:
+    """The item behind home, where jumps lead one further, too."""
+    params = (item.params[0] + 1.0, *item.params[1:]) if item.command == CMD_DO_JUMP else item.params
+    return replace(item, seq=item.seq + 1, params=params)
