@@ -10,7 +10,7 @@ import socket
 import sys
 from collections.abc import Callable, Sequence
 from struct import Struct
-from time import perf_counter, sleep
+from time import perf_counter
 from typing import NamedTuple
 
 MAGIC_16, MAGIC_32 = 18458, 29569
@@ -83,13 +83,18 @@ class ArduPilotStandIn:
         port: of the physics.
         control: the pulses [us] of the next frame, from the state of the last; None: 1000 each.
         channel_count: 16 or 32.
+        resend_s: after so much silence it asks again.
     """
 
     def __init__(
-        self, port: int, control: Callable[[State | None], Sequence[int]] | None = None, channel_count: int = 16
+        self,
+        port: int,
+        control: Callable[[State | None], Sequence[int]] | None = None,
+        channel_count: int = 16,
+        resend_s: float = RESEND_S,
     ) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.settimeout(RESEND_S)
+        self.socket.settimeout(resend_s)
         self._physics = ("127.0.0.1", port)
         self._control = control or (lambda _: [1000] * channel_count)
         self._layout = Struct(f"<HHI{channel_count}H")
@@ -97,28 +102,32 @@ class ArduPilotStandIn:
         self.frame_count = 0
         self.resent_count = 0
         self.unreadable_count = 0
-        self.late_count = 0
         self.is_reset_seen = False
         self.time_us = 0  # its clock
         self.state: State | None = None
 
     def packet(self) -> bytes:
         pulses = list(self._control(self.state))
-        pulses += [0] * (16 - len(pulses) if self._magic == MAGIC_16 else 32 - len(pulses))
+        pulses += [0] * ((16 if self._magic == MAGIC_16 else 32) - len(pulses))
         return self._layout.pack(self._magic, 1200, self.frame_count, *pulses)
 
-    def frame(self) -> None:
-        """One frame, however often it must be asked for."""
-        packet = self.packet()
-        self.socket.sendto(packet, self._physics)
+    def send(self) -> None:
+        """Asks, and does not wait."""
+        self.socket.sendto(self.packet(), self._physics)
+
+    def ask(self) -> bytes:
+        """Asks, as often as it takes, and returns the answer."""
+        self.send()
         while True:
             try:
-                answer = self.socket.recv(65_535)
-                break
+                return self.socket.recv(65_535)
             except TimeoutError:
                 self.resent_count += 1
-                self.socket.sendto(packet, self._physics)
-        self.take(answer)
+                self.send()
+
+    def frame(self) -> None:
+        """One frame."""
+        self.take(self.ask())
 
     def take(self, answer: bytes) -> None:
         """Reads an answer, and counts the frame if that could be read."""
@@ -147,7 +156,6 @@ def main(port: int, seconds: float) -> None:
     end_s = perf_counter() + seconds
     while perf_counter() < end_s:
         sitl.frame()
-    sleep(0.0)
     print(sitl.frame_count, sitl.time_us, sitl.resent_count, sitl.unreadable_count)
 
 

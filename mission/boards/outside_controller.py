@@ -13,7 +13,7 @@ import numpy as np
 from autopilot.interface.vehicle_state import LandedState, Mode, Severity, VehicleState
 from autopilot.mavlink.dialects import Dialect, UnknownModeError
 from autopilot.mavlink.wire.codec import message_id
-from autopilot.mavlink.wire.convert import degrees_from_e7
+from autopilot.mavlink.wire.convert import UINT16_MAX, degrees_from_e7
 from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import Airframe
 from common.attitude import quat_of_roll_pitch_yaw
@@ -152,7 +152,8 @@ class OutsideController:
         if landed is not None:
             state.landed_state = LandedState(landed.landed_state or LandedState.ON_GROUND)
         if mission is not None:
-            state.mission_current, state.mission_count = mission.seq, mission.total
+            state.mission_current = mission.seq
+            state.mission_count = 0 if mission.total == UINT16_MAX else mission.total
             state.mission_state = mission.mission_state
 
     def _mode(self, custom_mode: int) -> Mode:

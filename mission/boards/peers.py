@@ -15,6 +15,7 @@ from mission.boards.vehicle_params import ardupilot_params, px4_params
 from mission.flight_config import FlightConfig
 from mission.script import Drone
 from mission.script_ardupilot import ArduPilotDrone
+from mission.script_px4 import Px4Drone
 from sim.boards.ardupilot import PORT as JSON_PORT
 from sim.boards.ardupilot import ArduPilotBoard
 from sim.boards.channels import control_channels, pulse_channels
@@ -95,7 +96,7 @@ PEERS: Mapping[str, Peer] = {
     "px4": Peer(
         name="PX4",
         dialect=PX4,
-        drone=Drone,
+        drone=Px4Drone,
         make_board=_px4_board,
         open_link=_px4_link,
         has_station_ports=True,

@@ -32,7 +32,7 @@ class Px4Board:
         rig: of one vehicle, on the CPU, whose body it flies.
         channels: which of its actuator controls moves which actuator.
         home: origin of ned.
-        on_wait: what is done while it is silent.
+        on_wait: what is done while it is not connected; who is may be silent: a rover is, while it is not armed.
         port: where it connects to; 0: any free one.
         address: of this machine.
 
@@ -81,7 +81,6 @@ class Px4Board:
         self._reader = FrameReader()
         self._time_us = 0
         self._answered_us = 0  # which sample it has answered last
-        self._heard_s = wall_time_s()
         self._periods: deque[int] = deque(maxlen=4)  # [ticks] between its last answers; empty: it does not answer
 
     @property
@@ -154,9 +153,6 @@ class Px4Board:
             self.unanswered_count += bool(self._periods)
             if self._time_us - self._answered_us >= TICK_US * PERIOD_TICKS_MAX:
                 self._periods.clear()
-            silent_s = wall_time_s() - self._heard_s
-            if silent_s > POLL_S:
-                self._on_wait(silent_s)
 
     def _receive(self, row: Any, wait_s: float) -> bool:
         """Reads what comes in within a time; returns whether this tick has been answered."""
@@ -172,7 +168,6 @@ class Px4Board:
         if not data:
             self._lose()
             return False
-        self._heard_s = wall_time_s()
         for frame in self._reader.feed(data):
             if frame.kind.msg_id == ACTUATORS_ID:
                 self._take(frame.kind.unpack(frame.payload), row)
