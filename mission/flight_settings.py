@@ -120,8 +120,8 @@ class FollowOptions(FlightOptions):
 
 FOLLOWED_WITH = (
     "policy", "owner", "seconds", "speed", "seed", "wind_m_s", "wind_from_deg", "noise", "world_seed", "trees_per_ha",
-    "hill_height_m", "airframe", "dialect", "engine", "parameters", "has_view", "view_port", "has_film", "gcs_port",
-    "api_port", "host", "run_folder",
+    "hill_height_m", "airframe", "dialect", "engine", "board", "command", "instance", "parameters", "has_view",
+    "view_port", "has_film", "gcs_port", "api_port", "host", "run_folder",
 )  # fmt: skip
 
 

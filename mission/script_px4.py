@@ -1,14 +1,24 @@
 """The scripting client of a real PX4: what differs from our own vehicle, which speaks its language."""
 
+from math import nan
+
 from mission.client import CommandRefused
-from mission.script import Drone
+from mission.script import CMD_TAKEOFF, MAIN_AUTO, Drone
 
 TAKES_IN_S = 3.0  # guess: until its navigator has read a mission that has been acknowledged
 RETRY_S = 0.2
+TAKING_OFF = (MAIN_AUTO, 2)  # main and sub mode
 
 
 class Px4Drone(Drone):
     """See `Drone`."""
+
+    async def takeoff(self, height_m: float, timeout_s: float = 60.0) -> None:
+        """It is there when it leaves its take-off, within NAV_MC_ALT_RAD of the height."""
+        alt_amsl_m = self.home.alt_m + height_m
+        await self.command(CMD_TAKEOFF, nan, 0.0, 0.0, nan, nan, nan, alt_amsl_m, name="takeoff")
+        await self.until(lambda: self.px4_mode == TAKING_OFF, 3.0, "mode takeoff")
+        await self.until(lambda: self.px4_mode != TAKING_OFF, timeout_s, f"takeoff to {height_m:g} m")
 
     async def start_mission(self, first: int = 0) -> None:
         end_us = self.time_us + int(TAKES_IN_S * 1e6)

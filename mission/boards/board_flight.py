@@ -43,7 +43,8 @@ class BoardFlight(FlightBase):
         peer: which autopilot.
         on_wait: what is done while it is silent, besides passing messages on.
         instance: its number, from which its ports follow.
-        links: for ground stations, of an autopilot that has no ports of its own for them.
+        links: of who is joined with the flight: ground stations, where the autopilot has no ports of its own for them.
+        has_companion: one of them is a companion on board.
         folder: where `flight.ulg` and `flight.tlog` are written; None writes nothing.
 
     Raises:
@@ -58,6 +59,7 @@ class BoardFlight(FlightBase):
         *,
         instance: int = 0,
         links: Sequence[Link | LinkSource] = (),
+        has_companion: bool = False,
         folder: Path | None = None,
     ) -> None:
         super().__init__(config, load_airframe(config.airframe))
@@ -69,12 +71,14 @@ class BoardFlight(FlightBase):
         motors = [output for output in vehicle.outputs(self.airframe) if output.kind is OutputKind.MOTOR]
         self.injector = RigInjector(self.rig, self.airframe, config.noise, len(motors))
         script_end, client_end = memory_pair(LinkRole.ONBOARD)
-        links = [peer.open_link(instance), script_end, *links]
+        link = peer.open_companion_link(instance) if has_companion else peer.open_link(instance)
+        links = [link, script_end, *links]
         if config.owner is not None:
             links = [*links, self._carry_camera(config.owner)]
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog", self.troubles.note)
         self._hub = Hub(links, self._heard)
         self._script_end = script_end
+        self._is_companion_elsewhere = peer.has_station_ports and not has_companion
         self._setpoint_us = -_FOLLOWS_US
         self.drone = peer.drone(client_end, system_id=instance + 1)
         self.controller = OutsideController(
@@ -130,7 +134,7 @@ class BoardFlight(FlightBase):
             self._stand_up_again()
         if self.owner is not None:
             is_offboard = self.controller.modes[self.controller.state.mode].is_offboard
-            has_setpoints = self.time_us - self._setpoint_us < _FOLLOWS_US or self.peer.has_station_ports
+            has_setpoints = self.time_us - self._setpoint_us < _FOLLOWS_US or self._is_companion_elsewhere
             self.owner.frame(self.time_us, is_followed=is_offboard and has_setpoints)
         self._hub.frame(self.time_us)
         self.drone.frame(self.time_us)

@@ -3,22 +3,28 @@
 Ports and folder are opened before the program is started, and it is ended with the flight.
 """
 
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from autopilot.mavlink.transport.links import LinkSource
 from common.airframe import load_airframe
 from common.geodesy import GeoPoint
 from mission.boards.process import PeerProcess
 from mission.connections import open_images, open_links, open_page
 from mission.console.option_checks import UserError
 from mission.console.terminal import loading, print_line
+from mission.flight_config import FlightConfig
 from mission.flight_options import flight_config
 from mission.flight_settings import FlightOptions
 from mission.plan.plan_file import Plan
 from mission.run_folder import run_folder
 from sim.boards.outside import PeerError
+
+if TYPE_CHECKING:
+    from mission.boards.board_flight import BoardFlight
 
 PATIENCE_S = 120.0  # of wall clock time, that an autopilot may be silent
 TOLD_S = 2.0  # of silence, after which it is said what is waited for
@@ -75,6 +81,57 @@ class Watch:
             self.process.close(lambda text: print_line(self._console, text))
 
 
+class PeerRun:
+    """An outside autopilot for the length of a flight.
+
+    Args:
+        options: of the flight.
+        folder: of the run.
+        console: where its console is shown.
+    """
+
+    def __init__(self, options: FlightOptions, folder: Path, console: Console) -> None:
+        from mission.boards.peers import PEERS
+
+        self._options, self._folder = options, folder
+        self._peer = PEERS[options.board]
+        self._watch = Watch(self._peer.name, console)
+
+    def make_flight(self, config: FlightConfig, **parts: Any) -> "BoardFlight":
+        """The flight, with its port open; `parts` as of `BoardFlight`.
+
+        Raises:
+            UserError: the port is taken, or the autopilot cannot fly such a vehicle.
+        """
+        from mission.boards.board_flight import BoardFlight
+
+        try:
+            flight = BoardFlight(config, self._peer, self._watch, instance=self._options.instance, **parts)
+        except (PeerError, ValueError) as error:
+            raise UserError(str(error)) from error
+        self._watch.hint = self._peer.waits_for.format(port=flight.board.local_port)
+        return flight
+
+    def start(self, config: FlightConfig) -> None:
+        """Writes what the autopilot is told of the vehicle, and starts its program if there is a command.
+
+        Raises:
+            UserError: it cannot be started.
+        """
+        own, command = self._folder / self._options.board, self._options.command
+        own.mkdir(exist_ok=True)
+        environment = self._peer.prepare(config, load_airframe(config.airframe), own)
+        if command is not None:
+            command = filled_in(command, own, config.home, self._options.instance)
+            try:
+                self._watch.process = PeerProcess(command, own, environment, own / "console.log")
+            except PeerError as error:
+                raise UserError(str(error)) from error
+
+    def close(self) -> None:
+        self._watch.close()
+
+
 def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, held: ExitStack) -> int:
     """Flies what the options say and returns the exit code.
 
@@ -84,13 +141,11 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
     check_board(options)
     console = Console()
     config = flight_config(options, None)
-    links = [] if options.board == "px4" else open_links(options, speed or PACE_MAX)
+    links = station_links(options, speed)
     images = open_images(options)
     page = open_page(options.view_port) if options.has_view else None
     folder = held.enter_context(run_folder(options.run_folder))
     with loading(console) as say:
-        from mission.boards.board_flight import BoardFlight
-        from mission.boards.peers import PEERS
         from mission.fly_loop import fly_to_the_end
         from mission.kernel_loading import load_kernels
 
@@ -100,33 +155,22 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
 
         load_kernels(say, config, has_camera=page is not None)
         say("building the world")
-        peer = PEERS[options.board]
-        watch = Watch(peer.name, console)
-        try:
-            flight = BoardFlight(config, peer, watch, instance=options.instance, links=links, folder=folder)
-        except (PeerError, ValueError) as error:
-            raise UserError(str(error)) from error
-    watch.hint = peer.waits_for.format(port=flight.board.local_port)
+        run = held.enter_context(closing(PeerRun(options, folder, console)))
+        flight = run.make_flight(config, links=links, folder=folder)
     if images is not None and flight.onboard is not None:
         flight.onboard.add_sink(images.publish)
         flight.computers.append(images)
+        held.callback(images.close)
     print_line(console, f"logs: {folder}")
     if page is not None:
         print_line(console, f"live page: {page.url}")
-    try:
-        own = folder / options.board
-        own.mkdir(exist_ok=True)
-        environment = peer.prepare(config, load_airframe(config.airframe), own)
-        if options.command is not None:
-            command = filled_in(options.command, own, config.home, options.instance)
-            watch.process = PeerProcess(command, own, environment, own / "console.log")
-        return fly_to_the_end(flight, plan, options, speed, page, folder, console)
-    except PeerError as error:
-        raise UserError(str(error)) from error
-    finally:
-        watch.close()
-        if images is not None:
-            images.close()
+    run.start(config)
+    return fly_to_the_end(flight, plan, options, speed, page, folder, console)
+
+
+def station_links(options: FlightOptions, speed: float | None) -> list[LinkSource]:
+    """For ground stations and companions, of an autopilot that does not speak to them itself."""
+    return [] if options.board == "px4" else open_links(options, speed or PACE_MAX)
 
 
 def filled_in(command: str, folder: Path, home: GeoPoint, instance: int) -> str:

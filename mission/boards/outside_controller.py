@@ -102,7 +102,7 @@ class OutsideController:
             state.health = self._ports.read_health()
         self._read_state(time_us)
         for text in self._drone.texts[self._text_count :]:
-            self._texts.statustext(Severity.INFO, text)
+            self._texts.statustext(Severity.INFO, text.rstrip())
         self._text_count = len(self._drone.texts)
 
     def _ask(self, time_us: int) -> None:

@@ -8,7 +8,7 @@ from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.client_links import open_client_link
-from autopilot.mavlink.transport.links import Link, LinkRole, UdpLink
+from autopilot.mavlink.transport.links import OFFBOARD_PORT, Link, LinkRole, UdpLink
 from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from mission.boards.vehicle_params import ardupilot_params, px4_params
@@ -29,7 +29,8 @@ OutsideBoard = ArduPilotBoard | Px4Board
 MakeBoard = Callable[[Rig, Airframe, GeoPoint, int, OnWait], OutsideBoard]
 
 _ARDUPILOT_TCP, _ARDUPILOT_STEP = 5760, 10
-_PX4_PAYLOAD, _PX4_PAYLOAD_OWN = 14030, 14280  # its third link, for what is on board: stations have the others
+_PX4_PAYLOAD, _PX4_PAYLOAD_OWN = 14030, 14280  # its third link, slow, for what is on board
+_PX4_OFFBOARD_OWN = 14580
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,9 @@ class Peer:
     make_board: MakeBoard
     """From the rig, its airframe, its home, the number of the instance, and what is done while it is silent."""
     open_link: Callable[[int], Link]
-    """To the MAVLink port of an instance that is ours."""
+    """To the MAVLink port of an instance that is the flight's own."""
+    open_companion_link: Callable[[int], Link]
+    """To the one that a companion is fed by; where it is the same, the companion is joined with the flight."""
     has_station_ports: bool
     """It speaks to ground stations itself, where they listen; else we link them through."""
     prepare: Callable[[FlightConfig, Airframe, Path], Mapping[str, str]]
@@ -70,6 +73,10 @@ def _px4_link(instance: int) -> Link:
     return UdpLink(_PX4_PAYLOAD_OWN + instance, LinkRole.ONBOARD, local_port=_PX4_PAYLOAD + instance)
 
 
+def _px4_offboard_link(instance: int) -> Link:
+    return UdpLink(_PX4_OFFBOARD_OWN + instance, LinkRole.ONBOARD, local_port=OFFBOARD_PORT + instance)
+
+
 def _prepare_ardupilot(config: FlightConfig, airframe: Airframe, folder: Path) -> Mapping[str, str]:
     values = ardupilot_params(airframe) | config.parameters
     text = "".join(f"{name} {value:g}\n" for name, value in values.items())
@@ -89,6 +96,7 @@ PEERS: Mapping[str, Peer] = {
         drone=ArduPilotDrone,
         make_board=_ardupilot_board,
         open_link=_ardupilot_link,
+        open_companion_link=_ardupilot_link,
         has_station_ports=False,
         prepare=_prepare_ardupilot,
         waits_for="start it with --model JSON; its servos are expected at UDP port {port}",
@@ -99,6 +107,7 @@ PEERS: Mapping[str, Peer] = {
         drone=Px4Drone,
         make_board=_px4_board,
         open_link=_px4_link,
+        open_companion_link=_px4_offboard_link,
         has_station_ports=True,
         prepare=_prepare_px4,
         waits_for="start it with PX4_SIM_MODEL=none_iris; it is expected at TCP port {port}",

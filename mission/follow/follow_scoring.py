@@ -14,7 +14,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from autopilot.interface.vehicle_state import Mode
-from mission.flight import Flight
+from mission.flight_base import FlightBase
 from policies.companion.engagement import Phase
 from policies.tasks.follow_me.measuring import COLUMNS, measure_rows
 from policies.tasks.follow_me.observe import DECISION_S, HFOV_DEG, IMAGE_SIZE
@@ -28,7 +28,7 @@ _SAMPLE_US = round(DECISION_S * 1e6)
 _BEFORE = (Mode.TAKEOFF, Mode.HOLD)  # on the way to being followed
 
 
-def taken_over(flight: Flight, phase: Phase, *, has_begun: bool, is_put_back: bool) -> str:
+def taken_over(flight: FlightBase, phase: Phase, *, has_begun: bool, is_put_back: bool) -> str:
     """Why it is a person who has the vehicle now; "" if the policy has it, or has given it up by itself.
 
     Args:
@@ -64,7 +64,7 @@ class FollowWatch:
 
     def __init__(
         self,
-        flight: Flight,
+        flight: FlightBase,
         is_following: Callable[[], bool],
         planned_s: float,
         taken: Callable[[bool], str] = lambda _: "",

@@ -6,7 +6,9 @@ each time.
 """
 
 import json
-from contextlib import ExitStack
+from collections.abc import Callable
+from contextlib import ExitStack, closing
+from functools import partial
 from math import isfinite
 from pathlib import Path
 
@@ -18,10 +20,12 @@ from common.airframe import AirframeError, load_airframe
 from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
+from mission.boards.board_session import PeerRun, check_board, station_links
 from mission.connections import open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight, flight_parameters
+from mission.flight_base import FlightBase
 from mission.flight_session import FlightSession
 from mission.flight_settings import FollowOptions
 from mission.follow.companion_process import latency_text
@@ -68,8 +72,12 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     pilot, name = chosen_pilot(options)
     config = follow_config(options, has_scanner=isinstance(pilot, NavigationPilot))
     try:
-        flight_parameters(config, load_airframe(config.airframe))
-        links = [] if speed is None else open_links(options, speed)
+        if options.board == "own":
+            flight_parameters(config, load_airframe(config.airframe))
+            links = [] if speed is None else open_links(options, speed)
+        else:
+            check_board(options)
+            links = station_links(options, speed)
     except (AirframeError, ParameterError, LinkError) as error:
         raise UserError(str(error)) from error
     page = open_page(options.view_port) if options.has_view else None
@@ -77,7 +85,14 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     with busy(console, "loading kernels") as say:
         load_kernels(say, config, has_camera=page is not None)
         say("building the world")
-        flight, companion = flight_with_companion(config, pilot, links=links, folder=folder, wall_s=wall_time_s)
+        make_flight: Callable[..., FlightBase] = Flight
+        peer_run = None
+        if options.board != "own":
+            peer_run = held.enter_context(closing(PeerRun(options, folder, console)))
+            make_flight = partial(peer_run.make_flight, has_companion=True)
+        flight, companion = flight_with_companion(
+            config, pilot, links=links, folder=folder, wall_s=wall_time_s, make_flight=make_flight
+        )
     watch = watch_of(flight, companion, options.seconds)
     session = FlightSession(
         flight,
@@ -94,6 +109,8 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     print_line(console, f"logs: {folder}")
     if page is not None:
         print_line(console, f"live page: {page.url}")
+    if peer_run is not None:
+        peer_run.start(config)
     session.fly(lambda _: running.is_done, running, [watch.frame])
     is_stopped = not running.is_done
     running.cancel()
@@ -110,7 +127,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     return exit_code
 
 
-def filmed(flight: Flight, folder: Path, console: Console) -> bool:
+def filmed(flight: FlightBase, folder: Path, console: Console) -> bool:
     """Whether the film could be made: from the log, which a full disk ends."""
     try:
         recording = load_recording(folder)
@@ -139,7 +156,7 @@ def chosen_pilot(options: FollowOptions) -> tuple[Pilot | NavigationPilot, str]:
     return pilot, "a script" if name == SCRIPTED else f"the policy {name}"
 
 
-def watch_of(flight: Flight, companion: Companion, seconds: float) -> FollowWatch:
+def watch_of(flight: FlightBase, companion: Companion, seconds: float) -> FollowWatch:
     """What judges a flight by what its companion flies of it."""
     restarts_over = 0  # those after which it has followed again
 

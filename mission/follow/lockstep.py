@@ -6,9 +6,11 @@ over a link in memory and gets the camera's pictures from memory, and is otherwi
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
 from mission.flight import Flight, FlightConfig
+from mission.flight_base import FlightBase
 from policies.companion.companion import Companion
 from policies.companion.image_client import MemoryCamera
 from policies.companion.skills.driving import Driving
@@ -27,7 +29,8 @@ def flight_with_companion(
     links: Sequence[Link | LinkSource] = (),
     folder: Path | None = None,
     wall_s: Callable[[], float] | None = None,
-) -> tuple[Flight, Companion]:
+    make_flight: Callable[..., FlightBase] = Flight,
+) -> tuple[Any, Companion]:
     """A flight, and the companion on board that follows, which engages as soon as the vehicle hovers or is armed.
 
     Args:
@@ -37,9 +40,10 @@ def flight_with_companion(
         links: of ground stations.
         folder: of the logs.
         wall_s: a clock that the companion's latency is measured with.
+        make_flight: takes the configuration, links and a folder.
     """
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
-    flight = Flight(config, links=[vehicle_end, *links], folder=folder)
+    flight = make_flight(config, links=[vehicle_end, *links], folder=folder)
     if flight.onboard is None:
         raise ValueError("a companion needs a flight with an owner")
     camera = MemoryCamera()

@@ -13,7 +13,7 @@ from common.clock import wall_time_s
 from common.kernels import SUBSTEPS, TICK_US
 from sim.boards.channels import Channel, commands_of
 from sim.boards.fast_imu import FastImu
-from sim.boards.json_wire import ServoPacket, servo_packet, state_text
+from sim.boards.json_wire import ServoPacket, range_key, servo_packet, state_text
 from sim.boards.outside import POLL_S, OnWait, PeerError
 from sim.rig import Rig
 
@@ -128,16 +128,15 @@ class ArduPilotBoard:
         if self._sender is None:
             self._take(commands)
         self._time_ns += self._step_ns
-        self._answer = state_text(self._time_ns, *self._felt(samples), self._truth[0])
+        row = samples.numpy()[0]
+        self._answer = state_text(self._time_ns, *self._felt(row["imu"]), self._truth[0], range_key(row["range"]))
         self._send()
         self._take(commands)
         self.exchange_count += 1
 
-    def _felt(self, samples: Any) -> tuple[list[float], list[float]]:
-        """Rate [rad/s] and specific force [m/s²] since the last exchange."""
-        if self._imu is None:
-            sample = samples.numpy()[0]["imu"]
-        else:
+    def _felt(self, sample: Any) -> tuple[list[float], list[float]]:
+        """Rate [rad/s] and specific force [m/s²] since the last exchange, of the IMU at 250 Hz or the faster one."""
+        if self._imu is not None:
             self._imu.read()
             sample = self._imu.samples[0]
         return sample["gyro_frd"].tolist(), sample["accel_frd"].tolist()

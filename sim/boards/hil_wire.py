@@ -7,11 +7,14 @@ the time of HIL_SENSOR of id 0.
 from math import atan2, hypot, pi
 from typing import Any
 
+from autopilot.mavlink.telemetry.sensors import COVARIANCE_UNKNOWN, LASER, LOOKS_DOWN, pressure_altitude_m
 from autopilot.mavlink.wire.codec import MessageType, frame_bytes, known_type
 from common.geodesy import GeoPoint, geodetic_from_ned
+from sim.sensors.range import MAX_DISTANCE_M, MIN_DISTANCE_M
 
 SYSTEM_ID, COMPONENT_ID = 1, 200  # guess: of a simulator; PX4 does not ask
 HIL_SENSOR, HIL_GPS = known_type("HIL_SENSOR"), known_type("HIL_GPS")
+DISTANCE = known_type("DISTANCE_SENSOR")
 HIL_STATE = known_type("HIL_STATE_QUATERNION")
 ACTUATORS_ID = known_type("HIL_ACTUATOR_CONTROLS").msg_id
 SAFETY_ARMED = 128  # MAV_MODE_FLAG, in `mode` of HIL_ACTUATOR_CONTROLS
@@ -19,6 +22,7 @@ SAFETY_ARMED = 128  # MAV_MODE_FLAG, in `mode` of HIL_ACTUATOR_CONTROLS
 # HIL_SENSOR.fields_updated: all bits of a group, or PX4 leaves the group out
 ACCEL, GYRO, MAG, BARO = 0x7, 0x38, 0x1C0, 0x1A00
 _PA_PER_HPA = 100.0
+_MIN_CM, _MAX_CM = round(100.0 * MIN_DISTANCE_M), round(100.0 * MAX_DISTANCE_M)
 _UNKNOWN_YAW = 0
 _G_MILLI = 1000.0 / 9.80665
 
@@ -84,6 +88,13 @@ class HilWriter:
             _UNKNOWN_YAW,
         )
 
+    def distance(self, time_us: int, sample: Any) -> bytes:
+        """DISTANCE_SENSOR of a new sample of the range finder that looks down."""
+        distance_cm = round(100.0 * float(sample["distance_m"])) if sample["is_valid"] else _MAX_CM + 1
+        return self._frame(
+            DISTANCE, time_us // 1000, _MIN_CM, _MAX_CM, distance_cm, LASER, 0, LOOKS_DOWN, COVARIANCE_UNKNOWN
+        )
+
     def truth(self, time_us: int, truth: Any) -> bytes:
         """HIL_STATE_QUATERNION, for PX4's log of the truth alone."""
         x, y, z, w = truth["q_ned_from_frd"].tolist()
@@ -109,12 +120,6 @@ class HilWriter:
     def _frame(self, kind: MessageType, *values: Any) -> bytes:
         self._seq = self._seq + 1 & 0xFF
         return frame_bytes(kind, kind.pack(*values), self._seq, SYSTEM_ID, COMPONENT_ID)
-
-
-def pressure_altitude_m(pressure_pa: float) -> float:
-    """Altitude in the standard atmosphere (ISO 2533) of a pressure [Pa]."""
-    ratio = max(pressure_pa, 1.0) / 101_325.0
-    return float(44_330.8 * (1.0 - ratio**0.190263))
 
 
 def _centi(value_m: Any) -> int:

@@ -62,6 +62,6 @@ def state_text(time_ns: int, gyro_frd: Any, accel_frd: Any, truth: Any, extras: 
     return (_FORMAT % (*divmod(time_ns, _NS_PER_S), *numbers, extras)).encode()
 
 
-def range_keys(ranges_m: Any) -> str:
-    """Of up to six range finders [m], as `extras` of `state_text`."""
-    return "".join(f',"rng_{k}":{range_m:.4g}' for k, range_m in enumerate(ranges_m, 1))
+def range_key(sample: Any) -> str:
+    """Of the range finder that looks down, as `extras` of `state_text`; where it sees nothing there is none."""
+    return f',"rng_1":{float(sample["distance_m"]):.4g}' if sample["is_valid"] else ""

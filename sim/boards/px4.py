@@ -71,7 +71,7 @@ class Px4Board:
         self.local_port: int = self._server.getsockname()[1]
         self._writer = HilWriter(home)
         self._truth = rig.arrays.truth.numpy()[0]  # live
-        self._sent_us = dict.fromkeys(("mag", "baro", "gnss"), 0)  # times of the samples sent last
+        self._sent_us = dict.fromkeys(("mag", "baro", "gnss", "range"), 0)  # times of the samples sent last
         self._peer: socket.socket | None = None
         self._was_there = False
         self._begin()
@@ -122,6 +122,8 @@ class Px4Board:
     def _send(self, samples: Any) -> None:
         is_new = {name: self._is_new(name, samples[name]) for name in self._sent_us}
         data = self._writer.gnss(self._time_us, samples["gnss"]) if is_new["gnss"] else b""
+        if is_new["range"]:
+            data += self._writer.distance(self._time_us, samples["range"])
         if self._time_us // TICK_US % TRUTH_TICKS == 0:
             data += self._writer.truth(self._time_us, self._truth)
         data += self._writer.sensors(self._time_us, samples, has_mag=is_new["mag"], has_baro=is_new["baro"])

@@ -36,7 +36,7 @@ _BIT_PATTERN_FIELDS = {("PARAM_VALUE", "param_value"), ("PARAM_SET", "param_valu
 # Declared as text, but it holds the bytes of a number.
 _BYTES_FIELDS = {(name, "param_value") for name in ("PARAM_EXT_VALUE", "PARAM_EXT_SET", "PARAM_EXT_ACK")}
 
-_PRINTABLE = dict.fromkeys([*range(32), 127], "?")
+_PRINTABLE = dict.fromkeys([*range(32), 127], "?") | {ord("\t"): " "}
 
 _layouts: dict[int, "MessageType"] = {}  # of the messages that have been asked for
 _IDS_BY_NAME: dict[str, int] = {item.msgname: item.id for item in DEFINITIONS.values()}
