@@ -61,6 +61,9 @@ SENSOR_PREARM = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK
 class Drone(Client):
     """The vehicle, as a script sees it: its own telemetry, and actions that return when they are done."""
 
+    needs: tuple[str, ...] = ()
+    """Messages that it has to be sent besides those that every autopilot sends, or is asked for."""
+
     # -- what it tells ----------------------------------------------------------------------------------------------
 
     @property

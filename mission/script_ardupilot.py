@@ -28,7 +28,7 @@ from mission.script import (
     Drone,
 )
 
-CMD_DO_JUMP = 177
+CMD_WAYPOINT, CMD_DO_JUMP = 16, 177
 CUSTOM_MODE = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 CHANGE_MODE = 1.0  # MAV_DO_REPOSITION_FLAGS
 # Its numbers of PX4's modes, of what flies and of what drives; its plane's
@@ -52,13 +52,20 @@ _PLANE = {
     (MAIN_AUTO, AUTO_RTL): 11,
 }
 _FIXED_WING = 1  # MAV_TYPE
-_HOME_ITEM = PlanItem(0, 16, FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+_POSITION, _CONSTANT_POSITION = 16 | 512, 128  # EKF_STATUS_FLAGS: horizontal, absolute, estimated or predicted; none
 
 
 class ArduPilotDrone(Drone):
     """See `Drone`."""
 
     sends_parameters_as_floats = True
+    needs = ("EKF_STATUS_REPORT",)
+
+    @property
+    def is_ready(self) -> bool:
+        report = self.latest("EKF_STATUS_REPORT")
+        knows_place = report is not None and report.flags & _POSITION and not report.flags & _CONSTANT_POSITION
+        return super().is_ready and bool(knows_place)
 
     @property
     def _modes(self) -> dict[tuple[int, int], int]:
@@ -122,7 +129,9 @@ class ArduPilotDrone(Drone):
     async def upload(self, items: Sequence[PlanItem], mission_type: int = 0) -> None:
         """Item 0 of ArduPilot's missions is home: those of a plan follow it."""
         if mission_type == 0:
-            items = [_HOME_ITEM, *(_one_later(item) for item in items)]
+            home = self.home
+            first = PlanItem(0, FRAME_GLOBAL, CMD_WAYPOINT, (0.0,) * 4, home.lat_deg, home.lon_deg, home.alt_m)
+            items = [first, *(_one_later(_whole(item)) for item in items)]
         await super().upload(items, mission_type)
 
     def _note(self, message: Message) -> None:
@@ -142,3 +151,8 @@ def _one_later(item: PlanItem) -> PlanItem:
     """The item behind home, where jumps lead one further, too."""
     params = (item.params[0] + 1.0, *item.params[1:]) if item.command == CMD_DO_JUMP else item.params
     return replace(item, seq=item.seq + 1, params=params)
+
+
+def _whole(item: PlanItem) -> PlanItem:
+    """Without NaN, which it refuses: 0 is its word for what is not given."""
+    return replace(item, params=tuple(0.0 if isnan(value) else value for value in item.params))

@@ -78,7 +78,7 @@ class Watch:
 
     def close(self) -> None:
         if self.process is not None:
-            self.process.close(lambda text: print_line(self._console, text))
+            self.process.close()
 
 
 class PeerRun:

@@ -34,6 +34,7 @@ RATES_HZ = {
     "MISSION_CURRENT": 2.0,
 }
 """What is asked for, and how often [Hz]."""
+NEEDED_HZ = 2.0  # of what else the client needs
 ASK_AGAIN_US = 5_000_000  # what has not come for so long
 _SET_MESSAGE_INTERVAL = 511
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
@@ -109,7 +110,7 @@ class OutsideController:
         """For what has not come for a while; before its first heartbeat for nothing."""
         if self._drone.latest("HEARTBEAT") is None:
             return
-        for name, rate_hz in RATES_HZ.items():
+        for name, rate_hz in {**RATES_HZ, **dict.fromkeys(self._drone.needs, NEEDED_HZ)}.items():
             newest = self._drone.latest(name)
             before, since_us = self._heard.get(name, (None, time_us - ASK_AGAIN_US))
             if newest is not before:

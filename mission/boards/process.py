@@ -3,13 +3,14 @@
 import os
 import shlex
 import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, cast
 
 from sim.boards.outside import PeerError
 
-END_S = 3.0  # of wall clock time, that it is given to end by itself
+END_S = 1.0  # of wall clock time, that it is given to end by itself; SITL does not while it waits for physics
 LINE_MAX = 400  # characters of a line that are shown
 READ_MAX = 65_536
 
@@ -65,14 +66,12 @@ class PeerProcess:
         if code is not None:
             raise PeerError(f"{self._name} has ended with exit code {code}; its console is in {self._log.name}")
 
-    def close(self, say: Callable[[str], None] = lambda _: None) -> None:
+    def close(self) -> None:
         """Ends it, and what it has started."""
         if self._process.poll() is None:
             self._signal(15)
-            try:
+            with suppress(subprocess.TimeoutExpired):
                 self._process.wait(END_S)
-            except subprocess.TimeoutExpired:
-                say(f"{self._name} does not end; it is killed")
         self._signal(9)
         self._process.wait()
         self._stream.close()
