@@ -34,7 +34,7 @@ CHANGE_MODE = 1.0  # MAV_DO_REPOSITION_FLAGS
 # Its numbers of PX4's modes, of what flies and of what drives; its plane's
 _COPTER = {
     (MAIN_OFFBOARD, 0): 4,  # GUIDED
-    (MAIN_AUTO, AUTO_LOITER): 4,  # GUIDED holds, too, and needs no throttle stick in the middle as LOITER does
+    (MAIN_AUTO, AUTO_LOITER): 17,  # BRAKE: LOITER would sink without a throttle stick in the middle
     (MAIN_AUTO, AUTO_MISSION): 3,
     (MAIN_AUTO, AUTO_RTL): 6,
     (MAIN_AUTO, AUTO_LAND): 9,
@@ -78,7 +78,7 @@ class ArduPilotDrone(Drone):
     def px4_mode(self) -> tuple[int, int]:
         """PX4's main and sub mode that is nearest to its own; (0, 0): none is."""
         heartbeat = self.latest("HEARTBEAT")
-        for mode, number in reversed(self._modes.items()):
+        for mode, number in self._modes.items():
             if heartbeat is not None and heartbeat.custom_mode == number:
                 return mode
         return 0, 0
@@ -93,6 +93,7 @@ class ArduPilotDrone(Drone):
         await self._set_mode(MAIN_OFFBOARD, 0, "guided")
         await self.command(CMD_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m, name="takeoff")
         await self.until(lambda: abs(self._height_m() - height_m) < 0.3, timeout_s, f"takeoff to {height_m:g} m")
+        await self.hold()
 
     async def goto(
         self,

@@ -7,7 +7,7 @@ owner's phone, and the ground stations, unless it has ports of its own for those
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from math import isnan
+from math import hypot, isnan
 from pathlib import Path
 from typing import cast
 
@@ -32,7 +32,8 @@ from sim.rig import Rig
 from sim.stepped import SteppedRig
 
 _SETPOINT_ID = known_type("SET_POSITION_TARGET_LOCAL_NED").msg_id
-_FOLLOWS_US = 1_000_000  # a companion that has sent no setpoint for so long does not follow
+_MOVES_M_S = 0.1  # guess: a companion that waits asks for no speed
+_FOLLOWS_US = 1_000_000  # and one that has asked for none for so long does not follow
 
 
 class BoardFlight(FlightBase):
@@ -117,7 +118,9 @@ class BoardFlight(FlightBase):
 
     def _heard(self, time_us: int, frame: Frame, link: Link) -> None:
         if frame.kind.msg_id == _SETPOINT_ID and link is not self._script_end:
-            self._setpoint_us = time_us
+            setpoint = frame.kind.unpack(frame.payload)
+            if hypot(setpoint.vx, setpoint.vy) > _MOVES_M_S:
+                self._setpoint_us = time_us
         if self._tlog is not None:
             self._tlog.frame(time_us, frame.raw)
 

@@ -31,6 +31,10 @@ def _ardupilot_copter(airframe: MultirotorAirframe) -> dict[str, float]:
         "MOT_SPIN_ARM": 0.7 * idle,
         "MOT_THST_HOVER": _hover_fraction(airframe),
         "AUTO_OPTIONS": 3.0,  # armed in AUTO, and off the ground without a throttle stick: there is none
+        # Velocities of a companion are followed as such and quickly, as our own controller does
+        "GUID_OPTIONS": 16.0,  # no position is held that they would lead to
+        "WPNAV_ACCEL": 400.0,  # [cm/s²] MPC_ACC_HOR
+        "PSC_JERK_XY": 20.0,  # [m/s³] MPC_JERK_MAX
     }
 
 

@@ -149,7 +149,7 @@ class Companion:
             time_us=time_us,
             is_offboard=self.vehicle.is_flown,
             is_airborne=own.is_under_way,
-            is_holding=own.mode is Mode.HOLD or (self._is_sent_in_guided and own.mode is Mode.GUIDED),
+            is_holding=own.mode in (Mode.HOLD, Mode.BRAKE) or (self._is_sent_in_guided and own.mode is Mode.GUIDED),
             mode_name=own.mode_name,
             trouble=self.trouble,
             is_refused=self.vehicle.take_refusal(),

@@ -176,6 +176,11 @@ class VehicleLink:
             return Mode.POSITION
         return Mode.GUIDED if self.is_ardupilot and Mode.GUIDED in self._dialect.mode_table else Mode.OFFBOARD
 
+    @property
+    def _hold_mode(self) -> Mode:
+        """Where it waits: an ArduPilot that flies sinks in Loiter, unless somebody holds its throttle stick."""
+        return Mode.BRAKE if self.is_ardupilot and Mode.BRAKE in self._dialect.mode_table else Mode.HOLD
+
     def send(self, name: str, **fields: Any) -> None:
         """A message to everybody, or to whom its fields name."""
         self._client.send(name, **fields)
@@ -207,7 +212,7 @@ class VehicleLink:
     def ask_for(self, wish: Wish) -> None:
         """Asks the vehicle for a mode."""
         is_px4 = not self.is_ardupilot
-        mode = Mode.HOLD if wish is Wish.HOLD else self._flown_mode
+        mode = self._hold_mode if wish is Wish.HOLD else self._flown_mode
         self._asked_for = mode
         number = self._dialect.custom_mode(mode)
         if is_px4:
