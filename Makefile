@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 PACKAGES := common autopilot sim policies mission
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly mission park train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive reproduce-navigate reproduce-navigate-rover
+.PHONY: help setup fly mission park train-demo reproduce-cars test test-all test-bare test-hostile test-mavproxy test-ardupilot test-px4 test-betaflight test-mavsdk3 test-dronekit golden fuzz mutants check tune bench soak format lock clean reproduce-follow reproduce-drive reproduce-navigate reproduce-navigate-rover
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
@@ -90,6 +90,12 @@ $(MAVPROXY)/.installed: tests/mavproxy/requirements.txt
 
 test-mavproxy: $(STAMP) $(MAVPROXY)/.installed ## Fly with MAVProxy, in an environment of its own (.venv-mavproxy)
 	$(MAVPROXY)/bin/python -m pytest -q -p no:cacheprovider tests/mavproxy $(ARGS)
+
+test-ardupilot: $(STAMP) ## Let ArduPilot's own binaries fly and drive here: SITL=FOLDER of its source, built
+	SITL=$(SITL) $(BIN)/python -m pytest -q -p no:cacheprovider tests/boards/test_ardupilot.py $(ARGS)
+
+test-px4: $(STAMP) ## Let PX4's own binary fly here: PX4=FOLDER of its build px4_sitl_default
+	PX4=$(PX4) $(BIN)/python -m pytest -q -p no:cacheprovider tests/boards/test_px4.py $(ARGS)
 
 MAVSDK3 := .venv-mavsdk3
 

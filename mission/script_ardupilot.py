@@ -122,10 +122,13 @@ class ArduPilotDrone(Drone):
         await self._set_mode(MAIN_AUTO, AUTO_MISSION, "mission")
         await self.command(CMD_MISSION_START, float(first), 0.0, name="start mission")
 
-    @property
-    def is_mission_complete(self) -> bool:
-        current = self.latest("MISSION_CURRENT")
-        return super().is_mission_complete or (current is not None and 0 < current.total <= current.seq)
+    async def wait_disarmed(self, timeout_s: float = 120.0) -> None:
+        """A rover stays armed where its mission ends: it is disarmed there."""
+        if not self.drives:
+            return await super().wait_disarmed(timeout_s)
+        await self.until(lambda: not self.is_armed or self.is_mission_complete, timeout_s, "mission complete")
+        if self.is_armed:
+            await self.disarm()
 
     async def upload(self, items: Sequence[PlanItem], mission_type: int = 0) -> None:
         """Item 0 of ArduPilot's missions is home: those of a plan follow it."""
@@ -150,10 +153,12 @@ class ArduPilotDrone(Drone):
 
 def _one_later(item: PlanItem) -> PlanItem:
     """The item behind home, where jumps lead one further, too."""
-    params = (item.params[0] + 1.0, *item.params[1:]) if item.command == CMD_DO_JUMP else item.params
+    target, repeat, p3, p4 = item.params
+    params = (target + 1.0, repeat, p3, p4) if item.command == CMD_DO_JUMP else item.params
     return replace(item, seq=item.seq + 1, params=params)
 
 
 def _whole(item: PlanItem) -> PlanItem:
     """Without NaN, which it refuses: 0 is its word for what is not given."""
-    return replace(item, params=tuple(0.0 if isnan(value) else value for value in item.params))
+    p1, p2, p3, p4 = (0.0 if isnan(value) else value for value in item.params)
+    return replace(item, params=(p1, p2, p3, p4))

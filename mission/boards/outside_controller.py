@@ -153,7 +153,7 @@ class OutsideController:
         if landed is not None:
             state.landed_state = LandedState(landed.landed_state or LandedState.ON_GROUND)
         if mission is not None:
-            state.mission_current = mission.seq
+            state.mission_current = max(mission.seq - self._dialect.first_seq, 0)
             state.mission_count = 0 if mission.total == UINT16_MAX else mission.total
             state.mission_state = mission.mission_state
 
