@@ -14,7 +14,7 @@ class Hull(NamedTuple):
     crash_m_s: float
     """A blow faster than this along the contact's normal ends it."""
     feet_from_m: float | None
-    """What touches below this, along frd z [m], is a foot, and the ground must not touch the rest; None: it has none."""
+    """What touches below this, along frd z [m], is a foot; the ground must not touch the rest. None: it has no feet."""
 
 
 class BulletBody(NamedTuple):

@@ -4,7 +4,6 @@ Bullet moves a body by the velocity that it has after a step (semi-implicit Eule
 after. So Bullet's pose is kept half a step ahead of ours, where the mean of two of ours lies; then both are the same.
 """
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -59,25 +58,108 @@ def flipped_turn(q: wp.quat) -> wp.quat:
     return wp.quat(q[0], -q[1], -q[2], q[3])
 
 
-@cache
+@wp.func
+def row_of(state: Any) -> BulletRow:
+    """Where and how Bullet has to have a body."""
+    row = BulletRow()
+    row.pos = flipped(state.pos_ned + _AHEAD_S * state.vel_ned)
+    row.q = flipped_turn(turned_by(state.q_ned_from_frd, _AHEAD_S * state.omega_frd))
+    row.vel = flipped(state.vel_ned)
+    row.omega = flipped(wp.quat_rotate(state.q_ned_from_frd, state.omega_frd))
+    return row
+
+
+@wp.func
+def moved(state: Any, row: BulletRow) -> Any:
+    """What Bullet has made of a body: its motion, and what the IMU felt of the tick so far."""
+    part_of_tick = 1.0 / float(SUBSTEPS)
+    vel_ned = flipped(row.vel)
+    felt_ned = (vel_ned - state.vel_ned) / _SUBSTEP_S - wp.vec3(0.0, 0.0, GRAVITY_M_S2)
+    ahead_q = flipped_turn(row.q)
+    omega_frd = wp.quat_rotate_inv(ahead_q, flipped(row.omega))
+    state.accel_frd += part_of_tick * wp.quat_rotate_inv(state.q_ned_from_frd, felt_ned)
+    state.gyro_frd += (0.5 * part_of_tick) * (state.omega_frd + omega_frd)
+    state.pos_ned = flipped(row.pos) - _AHEAD_S * vel_ned
+    state.vel_ned = vel_ned
+    state.q_ned_from_frd = turned_by(ahead_q, -_AHEAD_S * omega_frd)
+    state.omega_frd = omega_frd
+    return state
+
+
+@wp.func
+def at_tick_start(state: Any, ground_m: float) -> Any:
+    """Nothing is felt of the tick yet."""
+    state.height_agl_m = -state.pos_ned[2] - ground_m
+    state.accel_frd = wp.vec3()
+    state.gyro_frd = wp.vec3()
+    state.is_on_ground = 0
+    return state
+
+
+@wp.func
+def above_ground(state: Any, ground_m: float) -> Any:
+    """What is under ground, which has no thickness, or out of the map, has crashed and lies there."""
+    under_m = state.pos_ned[2] + ground_m
+    if under_m > 0.0:
+        state.impact_speed = wp.max(state.impact_speed, wp.length(state.vel_ned))
+        state.is_crashed = 1
+        state.pos_ned = state.pos_ned - wp.vec3(0.0, 0.0, under_m)
+        state.height_agl_m = 0.0
+        state.vel_ned = wp.vec3()
+        state.omega_frd = wp.vec3()
+    return state
+
+
 def bullet_kernels(body: Body, part: BulletBody) -> BulletKernels:
-    """Those of a class of bodies."""
-    model_type, state_type, inputs_type = body.Model, body.State, part.Inputs
-    body_tick, truth_of = body.tick, body.truth
-    part_begin, part_wrench, part_end = part.begin, part.wrench, part.end
-    kernel: Callable[..., Any] = wp.kernel(enable_backward=False, module="unique")
+    """Those of a class of bodies. One that is held in hands has its tick at the beginning, and Bullet no part in it."""
+    put, take = _motion_kernels(body.State)
+    begin, end = _tick_kernels(body, part)
+    return BulletKernels(put, begin, _push_kernel(body, part), take, end)
 
-    @kernel
+
+@cache
+def _motion_kernels(state_type: type) -> tuple[Any, Any]:
+    @wp.kernel(enable_backward=False, module="unique")
     def put(states: wp.array(dtype=state_type), rows: wp.array(dtype=BulletRow)) -> None:
-        """Where Bullet has to have the body."""
         i = wp.tid()
-        state = states[i]
-        rows[i].pos = flipped(state.pos_ned + _AHEAD_S * state.vel_ned)
-        rows[i].q = flipped_turn(turned_by(state.q_ned_from_frd, _AHEAD_S * state.omega_frd))
-        rows[i].vel = flipped(state.vel_ned)
-        rows[i].omega = flipped(wp.quat_rotate(state.q_ned_from_frd, state.omega_frd))
+        rows[i] = row_of(states[i])
 
-    @kernel
+    @wp.kernel(enable_backward=False, module="unique")
+    def take(states: wp.array(dtype=state_type), rows: wp.array(dtype=BulletRow)) -> None:
+        i = wp.tid()
+        if states[i].is_held == 0:
+            states[i] = moved(states[i], rows[i])
+
+    return put, take
+
+
+@cache
+def _push_kernel(body: Body, part: BulletBody) -> Any:
+    model_type, state_type, inputs_type, wrench = body.Model, body.State, part.Inputs, part.wrench
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def push(
+        models: wp.array(dtype=model_type),
+        states: wp.array(dtype=state_type),
+        all_inputs: wp.array(dtype=inputs_type),
+        rows: wp.array(dtype=BulletRow),
+    ) -> None:
+        i = wp.tid()
+        if states[i].is_held == 0:
+            pushed, force_frd, torque_frd = wrench(models[i], states[i], all_inputs[i])
+            states[i] = pushed
+            rows[i].force_flu = flipped(force_frd)
+            rows[i].torque_flu = flipped(torque_frd)
+
+    return push
+
+
+@cache
+def _tick_kernels(body: Body, part: BulletBody) -> tuple[Any, Any]:
+    model_type, state_type, inputs_type = body.Model, body.State, part.Inputs
+    body_tick, truth_of, part_begin, part_end = body.tick, body.truth, part.begin, part.end
+
+    @wp.kernel(enable_backward=False, module="unique")
     def begin(
         models: wp.array(dtype=model_type),
         states: wp.array(dtype=state_type),
@@ -88,58 +170,18 @@ def bullet_kernels(body: Body, part: BulletBody) -> BulletKernels:
         ticks: wp.array(dtype=wp.int64),
         all_inputs: wp.array(dtype=inputs_type),
     ) -> None:
-        """A tick begins, and nothing is felt of it yet; for one that is held in hands, it is over."""
         i = wp.tid()
         world = world_at(worlds[i_world[i]], draw_tick(ticks[i]))
         state = states[i]
         if state.is_held == 1:
             states[i] = body_tick(models[i], state, commands[i], wind_ned[i], world)
         else:
-            state.height_agl_m = -state.pos_ned[2] - ground_height(world, state.pos_ned[0], state.pos_ned[1])
-            state.accel_frd = wp.vec3()
-            state.gyro_frd = wp.vec3()
-            state.is_on_ground = 0
+            state = at_tick_start(state, ground_height(world, state.pos_ned[0], state.pos_ned[1]))
             begun, inputs = part_begin(models[i], state, commands[i], wind_ned[i], world)
             states[i] = begun
             all_inputs[i] = inputs
 
-    @kernel
-    def push(
-        models: wp.array(dtype=model_type),
-        states: wp.array(dtype=state_type),
-        all_inputs: wp.array(dtype=inputs_type),
-        rows: wp.array(dtype=BulletRow),
-    ) -> None:
-        """Force and torque over the next millisecond."""
-        i = wp.tid()
-        if states[i].is_held == 0:
-            pushed, force_frd, torque_frd = part_wrench(models[i], states[i], all_inputs[i])
-            states[i] = pushed
-            rows[i].force_flu = flipped(force_frd)
-            rows[i].torque_flu = flipped(torque_frd)
-
-    @kernel
-    def take(states: wp.array(dtype=state_type), rows: wp.array(dtype=BulletRow)) -> None:
-        """What Bullet has made of it: motion, and what the IMU felt of the tick so far."""
-        i = wp.tid()
-        state = states[i]
-        row = rows[i]
-        if state.is_held == 1:
-            return
-        part_of_tick = 1.0 / float(SUBSTEPS)
-        vel_ned = flipped(row.vel)
-        felt_ned = (vel_ned - state.vel_ned) / _SUBSTEP_S - wp.vec3(0.0, 0.0, GRAVITY_M_S2)
-        ahead_q = flipped_turn(row.q)  # and the middle between our attitudes before and after
-        omega_frd = wp.quat_rotate_inv(ahead_q, flipped(row.omega))
-        state.accel_frd += part_of_tick * wp.quat_rotate_inv(state.q_ned_from_frd, felt_ned)
-        state.gyro_frd += (0.5 * part_of_tick) * (state.omega_frd + omega_frd)
-        state.pos_ned = flipped(row.pos) - _AHEAD_S * vel_ned
-        state.vel_ned = vel_ned
-        state.q_ned_from_frd = turned_by(ahead_q, -_AHEAD_S * omega_frd)
-        state.omega_frd = omega_frd
-        states[i] = state
-
-    @kernel
+    @wp.kernel(enable_backward=False, module="unique")
     def end(
         models: wp.array(dtype=model_type),
         states: wp.array(dtype=state_type),
@@ -148,20 +190,11 @@ def bullet_kernels(body: Body, part: BulletBody) -> BulletKernels:
         all_inputs: wp.array(dtype=inputs_type),
         truths: wp.array(dtype=Truth),
     ) -> None:
-        """The tick is over. What is under ground, which has no thickness, or out of the map, has crashed and lies."""
         i = wp.tid()
         state = states[i]
         if state.is_held == 0:
-            under_m = state.pos_ned[2] + ground_height(worlds[i_world[i]], state.pos_ned[0], state.pos_ned[1])
-            if under_m > 0.0:
-                state.impact_speed = wp.max(state.impact_speed, wp.length(state.vel_ned))
-                state.is_crashed = 1
-                state.pos_ned = state.pos_ned - wp.vec3(0.0, 0.0, under_m)
-                state.height_agl_m = 0.0
-                state.vel_ned = wp.vec3()
-                state.omega_frd = wp.vec3()
-            state = part_end(models[i], state, all_inputs[i])
-            states[i] = state
-        truths[i] = truth_of(state)
+            ground_m = ground_height(worlds[i_world[i]], state.pos_ned[0], state.pos_ned[1])
+            states[i] = part_end(models[i], above_ground(state, ground_m), all_inputs[i])
+        truths[i] = truth_of(states[i])
 
-    return BulletKernels(put, begin, push, take, end)
+    return begin, end

@@ -8,13 +8,13 @@ from typing import Any
 
 import warp as wp
 
+from common.kernels import SUBSTEPS, TICK_S, vec8
 from sim.bodies.contact import ground_contact
 from sim.bodies.multirotor import BodyState, StepInputs, air_wrench, angular_accel, drain_battery, step_inputs
 from sim.bodies.multirotor_model import MultirotorModel
 from sim.engines.bullet_body import BulletBody, Hull
 from sim.engines.quiet_bullet import pybullet
 from sim.world.world import World
-from common.kernels import SUBSTEPS, TICK_S, vec8
 
 wp.set_module_options({"enable_backward": False})
 
@@ -33,9 +33,7 @@ def _begin(
 
 
 @wp.func
-def _wrench(
-    model: MultirotorModel, body: BodyState, inputs: StepInputs
-) -> tuple[BodyState, wp.vec3, wp.vec3]:
+def _wrench(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> tuple[BodyState, wp.vec3, wp.vec3]:
     """With the gyroscopic torque of the rotors, of which Bullet does not know, and all of it as in mid-step."""
     rot = wp.quat_to_matrix(body.q_ned_from_frd)
     wrench = air_wrench(model, body, inputs, wp.transpose(rot))

@@ -75,9 +75,7 @@ class BulletVehicle:
             return
         q, feet_m = state["q_ned_from_frd"].tolist(), self._hull.feet_from_m
         for contact in contacts:
-            is_first = contact[1] == self._body
-            other, place, force = contact[2] if is_first else contact[1], contact[5], contact[9]
-            normal = np.array(contact[7]) if is_first else -np.array(contact[7])  # towards this one
+            other, place, normal, force = contact[2], contact[5], contact[7], contact[9]  # this one is always the first
             if force <= 0.0:
                 continue
             arm_frd = rotated(inverse(q), (_FLU * place - state["pos_ned"]).tolist())

@@ -21,7 +21,7 @@ from tests.unit.sim.engine_rig import PLAIN, STEEP, put, rig_on, run, with_boxes
 from tests.unit.sim.sled import SLED_BODY, SLED_LAW
 
 pytest.importorskip("pybullet")
-from sim.engines.bullet import BulletEngine  # noqa: E402
+from sim.engines.bullet import BulletEngine
 
 FOREST = WorldConfig(trees_per_ha=150.0, hill_height_m=0.0, size_m=100.0, clearing_radius_m=2.0)
 
