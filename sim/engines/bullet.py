@@ -38,8 +38,8 @@ class BulletEngine:
     Args:
         rig: whose vehicles it moves, on the CPU, in one world.
         damping: of linear and angular velocity [1/s]; Bullet's own default is 0.04, which no air explains.
-        has_contacts: the vehicles touch each other, and are put apart before the first step; otherwise they pass through
-            each other, as with the native engine.
+        has_contacts: the vehicles touch each other, and are put apart before the first step; otherwise they pass
+            through each other, as with the native engine.
 
     Raises:
         ValueError: the rig has vehicles of another class, or a world for each.
