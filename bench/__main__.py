@@ -25,6 +25,7 @@ SCRIPTS = {
     "batch": "bench.flying.batch",
     "threads": "bench.flying.threads",
     "engines": "bench.flying.engines",
+    "missions": "bench.flying.engine_missions",
     "scaling": "bench.flying.scaling",
     "worlds": "bench.flying.worlds",
     "hover": "bench.learning.hover",

@@ -1,4 +1,4 @@
-"""What does an engine take for a millisecond of one multirotor in the air, its own part of the loop alone?"""
+"""What does an engine take for a millisecond of a multirotor in the air or a rover, its own part of the loop alone?"""
 
 import time
 from collections.abc import Callable
@@ -9,6 +9,7 @@ from bench.row import Row, require
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
 from common.kernels import SUBSTEPS
+from sim.bodies.vehicles import class_of
 from sim.engines.bullet import BulletEngine
 from sim.engines.engine import Engine
 from sim.engines.native import NativeEngine
@@ -40,31 +41,58 @@ class Timed:
 def measure() -> list[Row]:
     rows = []
     for name, make in (("native, by single launches", NativeEngine), ("pybullet", BulletEngine)):
-        took_us = min(step_us(make) for _ in range(ROUNDS))
-        rows.append(Row(f"engine {name}: a millisecond of one multirotor", took_us, "us", "lower", TARGET_US, COMMAND))
+        for vehicle, step_us in (("multirotor", flying_us), ("rover", driving_us)):
+            took_us = min(step_us(make) for _ in range(ROUNDS))
+            row_name = f"engine {name}: a millisecond of one {vehicle}"
+            rows.append(Row(row_name, took_us, "us", "lower", TARGET_US, COMMAND))
     return rows
 
 
-def step_us(make: Callable[[Rig], Engine]) -> float:
+def flying_us(make: Callable[[Rig], Engine]) -> float:
     """CPU time of a step [µs], of a vehicle that flies high over trees."""
+    rig, timed = timed_rig(make, "x500")
+    rig.arrays.body.numpy()["pos_ned"][0] = (0.0, 0.0, -HIGH_M)
+    took_us = step_us(rig, timed)
+    height_m = -float(rig.truth_row()["pos_ned"][2])
+    require(bool(np.isfinite(height_m)) and height_m < HIGH_M, "it did not fall")
+    return took_us
+
+
+def driving_us(make: Callable[[Rig], Engine]) -> float:
+    """CPU time of a step [µs], of a rover that rolls on the ground."""
+    rig, timed = timed_rig(make, "rover")
+    rig.advance(100)
+    rig.arrays.body.numpy()["vel_ned"][0] = (4.0, 0.0, 0.0)
+    took_us = step_us(rig, timed)
+    require(float(rig.truth_row()["pos_ned"][0]) > 1.0, "it did not roll")
+    return took_us
+
+
+def timed_rig(make: Callable[[Rig], Engine], airframe: str) -> tuple[SteppedRig, Timed]:
+    """A vehicle at home, and its engine."""
     made: list[Timed] = []
 
     def timed(rig: Rig) -> Timed:
         made.append(Timed(make(rig)))
         return made[0]
 
+    vehicle, body = class_of(load_airframe(airframe))
     rig = SteppedRig(
-        load_airframe("x500"),
+        load_airframe(airframe),
         build_world(),
         sensor_model(home=DEFAULT_HOME),
         wind_model(5.0),
         home=DEFAULT_HOME,
         engine=timed,
+        body=body,
+        law=vehicle.law,
     )
-    rig.arrays.body.numpy()["pos_ned"][0] = (0.0, 0.0, -HIGH_M)
+    return rig, made[0]
+
+
+def step_us(rig: SteppedRig, timed: Timed) -> float:
+    """CPU time of a step [µs] from now on."""
     rig.advance(10)
-    made[0].cpu_s = 0.0
+    timed.cpu_s = 0.0
     rig.advance(TICKS)
-    height_m = -float(rig.truth_row()["pos_ned"][2])
-    require(bool(np.isfinite(height_m)) and height_m < HIGH_M, "it did not fall")
-    return made[0].cpu_s / (TICKS * SUBSTEPS) * 1e6
+    return timed.cpu_s / (TICKS * SUBSTEPS) * 1e6

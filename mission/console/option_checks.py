@@ -7,7 +7,6 @@ from importlib.util import find_spec
 from typing import get_args
 
 from common.airframe import AirframeError, load_airframe
-from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from mission.flight_settings import FlightOptions, Pace
 from mission.plan.plan_file import PlanError, read_plan
@@ -73,14 +72,10 @@ def check_vehicle(options: FlightOptions) -> None:
     for text in options.parameters:
         parameter_of(text)
     try:
-        airframe = load_airframe(options.airframe)
+        load_airframe(options.airframe)
     except AirframeError as error:
         raise UserError(str(error)) from error
-    if options.engine == "native":
-        return
-    if not isinstance(airframe, MultirotorAirframe):
-        raise UserError(f"--engine {options.engine}: it moves multirotors, and {options.airframe} is none")
-    if find_spec(options.engine) is None:
+    if options.engine != "native" and find_spec(options.engine) is None:
         raise UserError(f"--engine {options.engine}: comes with the extra 'engines' (docs/start/installing.md)")
 
 

@@ -123,6 +123,14 @@ def servo_step(model: RoverModel, angle: float, asked: float) -> float:
 
 
 @wp.func
+def steered(model: RoverModel, body: RoverState, command: vec8) -> float:
+    """The steering angle after a tick [rad]; a rover that steers by its sides has none."""
+    if model.is_skid == 1 or body.is_crashed == 1:
+        return body.steering_rad
+    return servo_step(model, body.steering_rad, model.steering_max_rad * wp.clamp(command[0], -1.0, 1.0))
+
+
+@wp.func
 def motor_target_n(model: RoverModel, inputs: DriveInputs, wheel_speed: wp.vec4, wheel: int) -> float:
     """Force [N] that a motor gives at a tread: by the speed that is missing, within its current limit.
 
@@ -144,9 +152,13 @@ def angular_accel(model: RoverModel, omega_frd: wp.vec3, torque_frd: wp.vec3) ->
 
 
 @wp.func
-def _substep(model: RoverModel, body: RoverState, inputs: DriveInputs, hull: HullContact) -> RoverState:
-    dt = _SUBSTEP_S
-    rot = wp.quat_to_matrix(body.q_ned_from_frd)
+def drive_wrench(
+    model: RoverModel, body: RoverState, inputs: DriveInputs, rot: wp.mat33
+) -> tuple[RoverState, wp.vec3, wp.vec3]:
+    """Its wheels a substep later, and what they and the air do to the body: force [N] and torque [N m], frd.
+
+    `rot`: its attitude, ned from frd.
+    """
     to_frd = wp.transpose(rot)
     normal_frd = to_frd * inputs.normal_ned
     vel_frd = to_frd * body.vel_ned
@@ -182,6 +194,15 @@ def _substep(model: RoverModel, body: RoverState, inputs: DriveInputs, hull: Hul
         is_touching += step.is_touching
     if is_touching > 0:
         body.is_on_ground = 1
+    return body, force_frd, torque_frd
+
+
+@wp.func
+def _substep(model: RoverModel, body: RoverState, inputs: DriveInputs, hull: HullContact) -> RoverState:
+    dt = _SUBSTEP_S
+    rot = wp.quat_to_matrix(body.q_ned_from_frd)
+    vel_frd = wp.transpose(rot) * body.vel_ned
+    body, force_frd, torque_frd = drive_wrench(model, body, inputs, rot)
     if hull.is_near == 1:
         touch = hull_contact(model, hull, body.pos_ned, vel_frd, rot, body.omega_frd)
         force_frd += touch.force_frd
@@ -231,14 +252,21 @@ def held_tick(body: RoverState) -> RoverState:
 
 
 @wp.func
+def end_tick(model: RoverModel, body: RoverState, normal_ned: wp.vec3) -> RoverState:
+    """Treads, whether it has tipped over on ground of this normal, battery."""
+    body.tread_m_s = model.radius_m * wp.vec2(body.wheel_speed[2], body.wheel_speed[3])
+    up = wp.quat_rotate(body.q_ned_from_frd, wp.vec3(0.0, 0.0, -1.0))
+    if wp.dot(up, normal_ned) < _UPRIGHT:
+        body.is_crashed = 1
+    return drain_battery(model, body, TICK_S)
+
+
+@wp.func
 def rover_tick(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.vec3, world: World) -> RoverState:
     """One tick: four substeps, accel_frd and gyro_frd as means over them, then the battery."""
     if body.is_held == 1:
         return held_tick(body)
-    if model.is_skid == 0:
-        asked = model.steering_max_rad * wp.clamp(command[0], -1.0, 1.0)
-        if body.is_crashed == 0:
-            body.steering_rad = servo_step(model, body.steering_rad, asked)
+    body.steering_rad = steered(model, body, command)
     inputs = drive_inputs(model, body, command, wind_ned, world)
     hull = look_at_hull(
         model, world, body.pos_ned, body.q_ned_from_frd, inputs.normal_ned, inputs.ground_offset_m,
@@ -255,11 +283,7 @@ def rover_tick(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.
         gyro_sum += body.gyro_frd
     body.accel_frd = accel_sum / float(_SUBSTEP_COUNT)
     body.gyro_frd = gyro_sum / float(_SUBSTEP_COUNT)
-    body.tread_m_s = model.radius_m * wp.vec2(body.wheel_speed[2], body.wheel_speed[3])
-    up = wp.quat_rotate(body.q_ned_from_frd, wp.vec3(0.0, 0.0, -1.0))
-    if wp.dot(up, inputs.normal_ned) < _UPRIGHT:
-        body.is_crashed = 1
-    return drain_battery(model, body, TICK_S)
+    return end_tick(model, body, inputs.normal_ned)
 
 
 @wp.func

@@ -32,8 +32,8 @@ def test_the_flight_is_one_worth_comparing(reference):
 @pytest.mark.parametrize("name", ["native", "pybullet"])
 def test_an_engine_flies_as_the_equations_say(name, reference):
     off_m, off_deg = apart(flown(engines()[name]), reference)
-    assert off_m < 5e-3
-    assert off_deg < 0.2
+    assert off_m < 1.5e-3  # half a step of 1 ms, as plain semi-implicit Euler is off, makes 1.9 mm and 0.066 deg
+    assert off_deg < 0.02
 
 
 def test_bullets_own_damping_is_no_air(reference):

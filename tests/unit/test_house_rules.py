@@ -30,8 +30,8 @@ SPEAK_OF_ROTORS = {
     "autopilot/vehicles/default_class.py": "names the class of airframe files that name none",
     "mission/plan/plan_file.py": "MAVLink's name of a vehicle type, in QGroundControl's files",
     "mission/view/shapes.py": "the shape of a multirotor",
-    "mission/console/option_checks.py": "which engine moves what",
-    "sim/engines/bullet.py": "Bullet moves multirotors alone",
+    "sim/engines/bullet.py": "which classes Bullet moves",
+    "sim/engines/bullet_multirotor.py": "a multirotor for Bullet",
 }
 """Files outside of the multirotor's folders that speak of rotors, and why."""
 
