@@ -5,7 +5,7 @@ the sensors, the board. With our own engine and board both rigs agree bit for bi
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import warp as wp
 
@@ -14,7 +14,7 @@ from common.kernels import SUBSTEPS, TICK_S, vec8
 from common.rng import draw_tick
 from sim.boards.board import Board
 from sim.boards.own import OwnBoard
-from sim.engines.engine import Engine
+from sim.engines.engine import Engine, FastEngine
 from sim.engines.native import NativeEngine
 from sim.faults import weakened
 from sim.rig import Rig
@@ -122,6 +122,9 @@ class SteppedRig(Rig):
         self._launches: list[Any] = []
         self._wind_ned = wp.zeros(count, dtype=wp.vec3, device=device)
         self._engine, self._board = self._make_engine(self), self._make_board(self)
+        if self._board.is_fast and not hasattr(self._engine, "substep"):
+            raise ValueError("this autopilot flies such a vehicle at 1,000 Hz, for which there is the native engine")
+        self._fast_engine = cast(FastEngine, self._engine)
 
     @property
     def board_commands(self) -> Any:
@@ -152,7 +155,7 @@ class SteppedRig(Rig):
         blown.launch()
         if self._board.is_fast:
             for _ in range(SUBSTEPS):
-                self._engine.substep(self._motor_commands, self._wind_ned)
+                self._fast_engine.substep(self._motor_commands, self._wind_ned)
                 self._exchange()
                 weakened_again.launch()
             sensed.launch()

@@ -112,9 +112,6 @@ class BulletEngine:
         model, hull = self._rig.arrays.model.numpy()[i], self._hulls[i]
         return BulletVehicle(self._client, hull, model, damping=self._damping, has_contacts=self._has_contacts)
 
-    def substep(self, commands: Any, wind_ned: Any) -> None:  # noqa: ARG002
-        raise ValueError("the engine pybullet moves by ticks: its vehicles are flown at 250 Hz")
-
     def _record(self, commands: Any, wind_ned: Any) -> list[Any]:
         a, rows, inputs = self._rig.arrays, self._bullet_rows, self._inputs
         where = [a.model, a.body, a.worlds, a.i_world]

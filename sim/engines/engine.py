@@ -21,5 +21,9 @@ class Engine(Protocol):
             wind_ned: [m/s] at each vehicle, array of vec3, (vehicles,).
         """
 
+
+class FastEngine(Engine, Protocol):
+    """One that can be stopped after each millisecond: for boards that exchange at 1,000 Hz."""
+
     def substep(self, commands: Any, wind_ned: Any) -> None:
-        """As `step`, a millisecond: for boards that exchange at 1,000 Hz, of bodies that have a `substep`."""
+        """As `step`, a millisecond of bodies that have a `substep`."""
