@@ -12,6 +12,7 @@ from sim.bodies.multirotor import (
     truth_of,
 )
 from sim.bodies.multirotor_model import MultirotorModel, multirotor_model
+from sim.world.neighbours import Outline, ball_outline
 
 
 class Body(NamedTuple):
@@ -34,6 +35,8 @@ class Body(NamedTuple):
     """`@wp.func (Model) -> float`: of the centre of gravity over the ground [m]."""
     model: Callable[[Any, float], Any]
     """Makes a `Model` from the airframe file and the altitude of home [m]."""
+    outline: Callable[[Any], Outline] = ball_outline
+    """What other vehicles meet of one, from a row of its `Model`."""
 
 
 MULTIROTOR_BODY = Body(MultirotorModel, BodyState, body_tick, truth_of, body_at_rest, standing_height, multirotor_model)
