@@ -1,0 +1,123 @@
+"""Which vehicles a fleet has, where they boot, and the configuration of each.
+
+In: text as `10` or `x500:5,rover:5`, a base configuration, the world. Out: one `FlightConfig` per vehicle, with which it
+flies the same alone: numbered from 1 in MAV_SYS_ID, a seed of its own, side by side from home on.
+"""
+
+from collections.abc import Iterator, Sequence
+
+from autopilot.mavlink.server import SYSID_PARAMETER
+from common.airframe import load_airframe
+from common.geodesy import GeoPoint, geodetic_from_ned
+from mission.flight_config import FlightConfig
+from sim.bodies.vehicles import class_of
+from sim.world.world import WorldMap
+
+VEHICLES_MAX = 100
+SPACING_M = 5.0
+SEED_MAX = 2**31 - 1
+_FREE_M = 1.0  # to trees, walls and boxes, beyond half the spacing at most; guess
+_LEVEL = 0.99  # of the ground's normal: 8 deg, on which every class stands
+_RINGS_MAX = 100
+
+
+class RosterError(ValueError):
+    """A fleet that cannot be made; the message is one sentence."""
+
+
+def airframes_of(text: str, airframe: str) -> list[str]:
+    """The airframe of each vehicle.
+
+    Args:
+        text: a number of vehicles, or `AIRFRAME:NUMBER,...`.
+        airframe: of all of them, where the text is a number.
+
+    Raises:
+        RosterError: it is neither, or too many or none.
+    """
+    airframes: list[str] = []
+    for part in text.split(","):
+        name, _, number = part.rpartition(":")
+        if not number.isdecimal():
+            name, number = part, "1"
+        if part.isdecimal() and "," in text:
+            raise RosterError(f"--vehicles {text}: must be a number, or AIRFRAME:NUMBER,AIRFRAME:NUMBER,...")
+        airframes += [name.strip() or airframe] * min(int(number), VEHICLES_MAX + 1)
+    if not 0 < len(airframes) <= VEHICLES_MAX:
+        raise RosterError(f"--vehicles {text}: must be 1 to {VEHICLES_MAX} vehicles")
+    return airframes
+
+
+def fleet_configs(
+    base: FlightConfig, airframes: Sequence[str], world: WorldMap, spacing_m: float = SPACING_M
+) -> list[FlightConfig]:
+    """The configuration of each vehicle of a fleet.
+
+    Args:
+        base: what they have in common; the first boots at its home.
+        airframes: of each.
+        world: the ground.
+        spacing_m: between neighbours.
+
+    Raises:
+        RosterError: there is no room for so many.
+        ParameterError, AirframeError: as of any flight.
+    """
+    places = free_places(world, len(airframes), spacing_m)
+    return [
+        base.model_copy(
+            update={
+                "airframe": airframe,
+                "seed": (base.seed + i) % (SEED_MAX + 1),
+                "start_ne_m": place,
+                "parameters": _own_parameters(base, airframe) | {SYSID_PARAMETER: float(i + 1)},
+            }
+        )
+        for i, (airframe, place) in enumerate(zip(airframes, places, strict=True))
+    ]
+
+
+def _own_parameters(base: FlightConfig, airframe: str) -> dict[str, float]:
+    """Those of the given ones that its class of vehicles has; a name that no vehicle has is refused with the first."""
+    if class_of(load_airframe(airframe)) == class_of(load_airframe(base.airframe)):
+        return base.parameters
+    from mission.flight_config import flight_parameters
+
+    known = flight_parameters(base.model_copy(update={"airframe": airframe, "parameters": {}}), load_airframe(airframe))
+    return {name: value for name, value in base.parameters.items() if name in known}
+
+
+def free_places(world: WorldMap, count: int, spacing_m: float) -> list[tuple[float, float]]:
+    """Where vehicles boot, north and east of home [m]: home first, then the nearest points of a grid on free ground.
+
+    Raises:
+        RosterError: the world has too few.
+    """
+    free: list[tuple[float, float]] = [(0.0, 0.0)]
+    for north, east in _grid(spacing_m, 0.5 * world.config.size_m):
+        if len(free) == count:
+            break
+        height = float(world.height(north, east))
+        gap_m = float(world.obstacle_distance([north, east, -height - 0.3]))
+        if gap_m > _FREE_M and -float(world.normal_ned(north, east)[2]) > _LEVEL:
+            free.append((north, east))
+    if len(free) < count:
+        raise RosterError(f"--vehicles: the world has free ground for {len(free)} vehicles {spacing_m:g} m apart")
+    return free[:count]
+
+
+def _grid(spacing_m: float, half_size_m: float) -> Iterator[tuple[float, float]]:
+    """Points of a square grid round home, without home: ring by ring, the nearest of a ring first."""
+    for ring in range(1, _RINGS_MAX):
+        if ring * spacing_m >= half_size_m:
+            return
+        steps = range(-ring, ring + 1)
+        around = [(i, j) for i in steps for j in steps if max(abs(i), abs(j)) == ring]
+        for i, j in sorted(around, key=lambda at: (at[0] ** 2 + at[1] ** 2, -at[1], at[0])):
+            yield i * spacing_m, j * spacing_m
+
+
+def start_of(config: FlightConfig) -> GeoPoint:
+    """Where a vehicle boots; the altitude is home's."""
+    lat_deg, lon_deg, _ = geodetic_from_ned(*config.start_ne_m, 0.0, config.home)
+    return GeoPoint(lat_deg, lon_deg, config.home.alt_m)
