@@ -136,8 +136,7 @@ class Flight:
         self.recorder = Recorder(log, self.rig, self.controller, self.airframe, self.troubles.note)
         self.controller.attach(self.recorder)
         self.simulator_params = SimulatorParameters(self)
-        people = None if self.owner is None else self.owner.people
-        self._cameras.start(self.controller.camera, people, self.troubles.note)
+        self._start_cameras()
         self._flight_logs: FlightLogs | None = None
         if state is not None:
             self._flight_logs = FlightLogs(state.folder / "logs", self.recorder, self.params, self.troubles.note)
@@ -232,6 +231,10 @@ class Flight:
         if not config.is_forest:
             return base
         return [ScannerDevice(Scanner(self.rig, self.world, config.noise, config.seed), system_id), *base]
+
+    def _start_cameras(self) -> None:
+        people = None if self.owner is None else self.owner.people
+        self._cameras.start(self.controller.camera, people, self.troubles.note)
 
     def _parameter_changed(self, _: Parameter) -> None:
         self._has_new_parameters = True

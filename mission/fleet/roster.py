@@ -1,6 +1,6 @@
-"""Which vehicles a fleet has, where they boot, and the configuration of each.
+"""Where the vehicles of a fleet boot, and the configuration of each.
 
-In: text as `10` or `x500:5,rover:5`, a base configuration, the world. Out: one `FlightConfig` per vehicle, with which it
+In: their airframes, a base configuration, the world. Out: one `FlightConfig` per vehicle, with which it
 flies the same alone: numbered from 1 in MAV_SYS_ID, a seed of its own, side by side from home on.
 """
 
@@ -9,43 +9,16 @@ from collections.abc import Iterator, Sequence
 from autopilot.mavlink.server import SYSID_PARAMETER
 from common.airframe import load_airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
-from mission.flight_config import FlightConfig
+from mission.console.option_checks import UserError
+from mission.flight_config import FlightConfig, flight_parameters
 from sim.bodies.vehicles import class_of
 from sim.world.world import WorldMap
 
-VEHICLES_MAX = 100
 SPACING_M = 5.0
 SEED_MAX = 2**31 - 1
 _FREE_M = 1.0  # to trees, walls and boxes, beyond half the spacing at most; guess
 _LEVEL = 0.99  # of the ground's normal: 8 deg, on which every class stands
 _RINGS_MAX = 100
-
-
-class RosterError(ValueError):
-    """A fleet that cannot be made; the message is one sentence."""
-
-
-def airframes_of(text: str, airframe: str) -> list[str]:
-    """The airframe of each vehicle.
-
-    Args:
-        text: a number of vehicles, or `AIRFRAME:NUMBER,...`.
-        airframe: of all of them, where the text is a number.
-
-    Raises:
-        RosterError: it is neither, or too many or none.
-    """
-    airframes: list[str] = []
-    for part in text.split(","):
-        name, _, number = part.rpartition(":")
-        if not number.isdecimal():
-            name, number = part, "1"
-        if part.isdecimal() and "," in text:
-            raise RosterError(f"--vehicles {text}: must be a number, or AIRFRAME:NUMBER,AIRFRAME:NUMBER,...")
-        airframes += [name.strip() or airframe] * min(int(number), VEHICLES_MAX + 1)
-    if not 0 < len(airframes) <= VEHICLES_MAX:
-        raise RosterError(f"--vehicles {text}: must be 1 to {VEHICLES_MAX} vehicles")
-    return airframes
 
 
 def fleet_configs(
@@ -60,7 +33,7 @@ def fleet_configs(
         spacing_m: between neighbours.
 
     Raises:
-        RosterError: there is no room for so many.
+        UserError: there is no room for so many.
         ParameterError, AirframeError: as of any flight.
     """
     places = free_places(world, len(airframes), spacing_m)
@@ -81,8 +54,6 @@ def _own_parameters(base: FlightConfig, airframe: str) -> dict[str, float]:
     """Those of the given ones that its class of vehicles has; a name that no vehicle has is refused with the first."""
     if class_of(load_airframe(airframe)) == class_of(load_airframe(base.airframe)):
         return base.parameters
-    from mission.flight_config import flight_parameters
-
     known = flight_parameters(base.model_copy(update={"airframe": airframe, "parameters": {}}), load_airframe(airframe))
     return {name: value for name, value in base.parameters.items() if name in known}
 
@@ -91,7 +62,7 @@ def free_places(world: WorldMap, count: int, spacing_m: float) -> list[tuple[flo
     """Where vehicles boot, north and east of home [m]: home first, then the nearest points of a grid on free ground.
 
     Raises:
-        RosterError: the world has too few.
+        UserError: the world has too few.
     """
     free: list[tuple[float, float]] = [(0.0, 0.0)]
     for north, east in _grid(spacing_m, 0.5 * world.config.size_m):
@@ -102,7 +73,7 @@ def free_places(world: WorldMap, count: int, spacing_m: float) -> list[tuple[flo
         if gap_m > _FREE_M and -float(world.normal_ned(north, east)[2]) > _LEVEL:
             free.append((north, east))
     if len(free) < count:
-        raise RosterError(f"--vehicles: the world has free ground for {len(free)} vehicles {spacing_m:g} m apart")
+        raise UserError(f"--vehicles: the world has free ground for {len(free)} vehicles {spacing_m:g} m apart")
     return free[:count]
 
 

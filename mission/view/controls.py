@@ -38,6 +38,7 @@ class Controls:
         server: of the page.
         do: hands a task to the flight's thread.
         speed: at which the flight begins.
+        change_speed: sets it.
         has_plan: the vehicle has a mission, or is about to get one.
         goals: where its companion can be sent; a click on the ground is for it then.
     """
@@ -48,11 +49,13 @@ class Controls:
         server: viser.ViserServer,
         do: Callable[[Callable[[], None]], None],
         speed: float | None,
+        change_speed: Callable[[float | None], None],
         *,
         has_plan: bool = False,
         goals: PoseGoals | None = None,
     ) -> None:
         self._flight, self._do, self._goals = flight, do, goals
+        self._change_speed = change_speed
         self._buttons: list[viser.GuiButtonHandle] = []
         self._running: Running | None = None
         self.is_paused = False
@@ -81,7 +84,7 @@ class Controls:
         def _(_: Any) -> None:
             if speed.value in SPEEDS:
                 chosen = SPEEDS[speed.value]
-                self._do(lambda: self._flight.change_speed(chosen))
+                self._do(lambda: self._change_speed(chosen))
 
         @follow.on_update
         def _(_: Any) -> None:

@@ -22,7 +22,8 @@ from mission.view.controls import Controls
 from mission.view.flight_snapshot import Moment, Row, moment_of
 from mission.view.panel import PLOT_PERIOD_S, Panel
 from mission.view.pose_goals import PoseGoals
-from mission.view.scene import Mount, Scene, chase_of, overview_of, wxyz_of
+from mission.view.scene import Mount, Scene, chase_of, overview_of
+from mission.view.vehicle_nodes import wxyz_of
 from sim.camera_rig import MOUNT_FRD, CameraRig
 
 UPDATE_S = 1.0 / 15.0
@@ -49,6 +50,8 @@ class LiveView:
         action: what a policy on board chose last.
         score: lines of text about how well it goes.
         goals: where its companion can be sent.
+        others: other flights in its world, which are shown as well.
+        change_speed: sets the pace; None: the flight's own.
     """
 
     def __init__(
@@ -61,9 +64,11 @@ class LiveView:
         action: Callable[[], Row | None] = lambda: None,
         score: Callable[[], tuple[str, ...]] = tuple,
         goals: PoseGoals | None = None,
+        others: Sequence[Flight] = (),
+        change_speed: Callable[[float | None], None] | None = None,
     ) -> None:
         self._flight, self._server, self._action, self._score = flight, server, action, score
-        self._goals = goals
+        self._goals, self._others = goals, others
         self._todo: Queue[Callable[[], None]] = Queue(TASKS_MAX)
         self._camera = flight.controller.camera
         self._pixels: NDArray[np.uint8] | None = None  # newest image of the camera that a policy sees through
@@ -73,10 +78,13 @@ class LiveView:
             mount = Mount(MOUNT_FRD, flight.onboard.view.q_frd_from_rdf, flight.onboard.view.hfov_deg, 1, 1)
         self._camera_rig = CameraRig(flight.rig, flight.world, has_thread=True)
         self._pending: Future[RawFrame] | None = None
-        self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned)
+        airframes = [other.airframe for other in others]
+        self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned, others=airframes)
         moment = self._moment()
         self._panel = Panel(server, has_owner=moment.has_owner, drives=self._scene.drives)
-        self._controls = Controls(flight, server, self._add_task, speed, has_plan=len(path_ned) > 0, goals=goals)
+        pace = change_speed or flight.change_speed
+        has_plan = len(path_ned) > 0
+        self._controls = Controls(flight, server, self._add_task, speed, pace, has_plan=has_plan, goals=goals)
         for name, pose in () if goals is None else goals.named:
             self._scene.mark(name, pose)
         self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
@@ -104,7 +112,7 @@ class LiveView:
         """The flight is over: the page shows its last moment and this text, and clicks do nothing any more."""
         self._controls.disable()
         moment = self._moment()
-        self._scene.show(moment)
+        self._scene.show(moment, [moment_of(other) for other in self._others])
         self._show_texts(moment, text)
         self._panel.draw_plots()
         self._server.flush()
@@ -138,8 +146,9 @@ class LiveView:
         if self._flight.restart_count != self._restart_count:
             self._restart_count = self._flight.restart_count
             self._scene.forget_trails()
-        self._scene.extend_trails(moment)
-        self._scene.show(moment)
+        others = [moment_of(other) for other in self._others]
+        self._scene.extend_trails(moment, others)
+        self._scene.show(moment, others)
         if self._goals is not None:
             self._scene.show_pose(self._goals.now())
         obstacles = self._flight.controller.state.obstacles

@@ -164,15 +164,15 @@ def first_hit(w: World, skyline: Skyline, origin_ned: wp.vec3, dir_ned: wp.vec3,
 
 
 @wp.func
-def neighbour_hit(all: Neighbours, tick: int, origin_ned: wp.vec3, dir_ned: wp.vec3, known: Hit) -> Hit:
+def neighbour_hit(others: Neighbours, tick: int, origin_ned: wp.vec3, dir_ned: wp.vec3, known: Hit) -> Hit:
     """The nearer of a known hit and the other vehicles."""
     hit = Hit()
     hit.t = known.t
     hit.kind = known.kind
     hit.i_tree = known.i_tree
-    for i in range(all.count):
-        if i != all.i_own:
-            t = neighbour_ray_hit(all.rows[i], tick, origin_ned, dir_ned, hit.t)
+    for i in range(others.count):
+        if i != others.i_own:
+            t = neighbour_ray_hit(others.rows[i], tick, origin_ned, dir_ned, hit.t)
             if t < hit.t:
                 hit.t = t
                 hit.kind = VEHICLE

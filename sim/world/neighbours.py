@@ -112,36 +112,34 @@ def neighbour_ray_hit(one: Neighbour, tick: int, origin_ned: wp.vec3, dir_ned: w
 
 
 @wp.func
-def neighbours_contact(all: Neighbours, tick: int, pos_ned: wp.vec3, radius: float) -> wp.vec4:
+def neighbours_contact(others: Neighbours, tick: int, pos_ned: wp.vec3, radius: float) -> wp.vec4:
     """Deepest contact of a sphere with the others: unit push-out normal (ned), penetration [m]; 0 for none."""
     deepest = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    for i in range(all.count):
-        if i != all.i_own:
-            contact = neighbour_contact(all.rows[i], tick, pos_ned, radius)
+    for i in range(others.count):
+        if i != others.i_own:
+            contact = neighbour_contact(others.rows[i], tick, pos_ned, radius)
             if contact[3] > deepest[3]:
                 deepest = contact
     return deepest
 
 
 @wp.func
-def neighbours_ray_hit(
-    all: Neighbours, tick: int, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float
-) -> float:
+def neighbours_ray_hit(others: Neighbours, tick: int, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float) -> float:
     """Distance [m] along a ray to the first of the others, `max_m` if none; 0 from inside one."""
     nearest = float(max_m)
-    for i in range(all.count):
-        if i != all.i_own:
-            nearest = wp.min(nearest, neighbour_ray_hit(all.rows[i], tick, origin_ned, dir_ned, nearest))
+    for i in range(others.count):
+        if i != others.i_own:
+            nearest = wp.min(nearest, neighbour_ray_hit(others.rows[i], tick, origin_ned, dir_ned, nearest))
     return nearest
 
 
 @wp.func
-def neighbour_touched(all: Neighbours, tick: int, pos_ned: wp.vec3, radius: float, depth_m: float) -> int:
+def neighbour_touched(others: Neighbours, tick: int, pos_ned: wp.vec3, radius: float, depth_m: float) -> int:
     """Which of the others a sphere touches so deeply: it is what the world's deepest contact is with; -1: none."""
     touched = int(-1)
-    for i in range(all.count):
-        if i != all.i_own and touched < 0:
-            if neighbour_contact(all.rows[i], tick, pos_ned, radius)[3] >= depth_m:
+    for i in range(others.count):
+        if i != others.i_own and touched < 0:
+            if neighbour_contact(others.rows[i], tick, pos_ned, radius)[3] >= depth_m:
                 touched = i
     return touched
 
@@ -224,7 +222,7 @@ class NeighbourTable:
     def near(self) -> set[int]:
         """The vehicles that another may touch before a frame of 20 ms is over."""
         pos_ned = self._rows["pos_ned"].astype(np.float64)
-        reach = np.sqrt((self._rows["half_length"] ** 2 + self._rows["half_width"] ** 2 + self._rows["half_height"] ** 2))
+        reach = np.sqrt(self._rows["half_length"] ** 2 + self._rows["half_width"] ** 2 + self._rows["half_height"] ** 2)
         gap = np.linalg.norm(pos_ned[:, None] - pos_ned[None], axis=-1) - reach[:, None] - reach[None]
         np.fill_diagonal(gap, np.inf)
         return set(np.flatnonzero((gap < NEAR_M).any(axis=1)).tolist())
