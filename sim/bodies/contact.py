@@ -58,6 +58,7 @@ class Surroundings:
     obstacle_depth_m: float  # negative: gap between hull sphere and obstacle, at most the margin
     is_near_obstacle: int
     obstacle_vel_ned: wp.vec3  # [m/s] of another vehicle; all else stands as far as contact goes
+    obstacle_shift_ned: wp.vec3  # [m] how far it has gone since it was looked up
     obstacle_rigidity: float  # fraction of a rigid obstacle's push: less where the other hull yields too
 
 
@@ -185,7 +186,7 @@ def obstacle_force(
 ) -> ContactForce:
     """Adds the push of a trunk, crown, wall or other vehicle on the hull sphere, frictionless, to a contact."""
     normal = around.obstacle_normal_ned
-    depth = around.obstacle_depth_m - wp.dot(normal, pos_ned - around.origin_ned)
+    depth = around.obstacle_depth_m - wp.dot(normal, pos_ned - around.origin_ned - around.obstacle_shift_ned)
     if depth > 0.0:
         normal_speed = wp.dot(normal, vel_ned - around.obstacle_vel_ned)
         push = 4.0 * (model.normal_n_m * depth - model.normal_n_s_m * normal_speed)  # as all four feet together

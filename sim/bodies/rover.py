@@ -254,6 +254,7 @@ def rover_tick(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.
     substeps = int(_SUBSTEP_COUNT)  # a dynamic loop, as the multirotor's
     for _step in range(substeps):
         body = _substep(model, body, inputs, hull)
+        hull.other_shift_ned += _SUBSTEP_S * hull.other_vel_ned
         accel_sum += body.accel_frd
         gyro_sum += body.gyro_frd
     body.accel_frd = accel_sum / float(_SUBSTEP_COUNT)

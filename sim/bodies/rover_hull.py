@@ -44,6 +44,7 @@ class HullContact:
     offset_m: Vec10  # of each plane along its normal: a ball's centre below it touches
     slid_m: Vec10  # of each ball along its side, from where `outline_frd` has it
     other_vel_ned: wp.vec3  # [m/s] of another vehicle that is near
+    other_shift_ned: wp.vec3  # [m] how far it has gone since it was looked up
     other_rigidity: float  # fraction of a rigid obstacle's push: less where the other hull yields too
 
 
@@ -212,7 +213,7 @@ def hull_contact(
             normal_ned = wp.vec3(hull.normal_x[point], hull.normal_y[point], hull.normal_z[point])
             arm_frd = outline_frd(model, point) + hull.slid_m[point] * slide_frd(point)
             centre_ned = pos_ned + rot * arm_frd
-            depth_m = hull.offset_m[point] - wp.dot(normal_ned, centre_ned)
+            depth_m = hull.offset_m[point] - wp.dot(normal_ned, centre_ned - hull.other_shift_ned)
             if depth_m > 0.0 and wp.length_sq(normal_ned) > 0.5:
                 normal_frd = to_frd * normal_ned
                 arm_frd -= ball_radius(model, point) * normal_frd
