@@ -4,6 +4,7 @@ The vehicle may fly at any multiple of real time: waits and time-outs of the scr
 The wall clock only paces the polling and notices a vehicle that has gone silent.
 """
 
+from autopilot.mavlink.client_end import ByteLink
 from autopilot.mavlink.transport.links import LinkRole, UdpLink
 from common.clock import Pacer, wall_time_s
 from mission.client import Running, ScriptError
@@ -34,7 +35,8 @@ def fly_over_udp(
         LinkError: the port is in use.
         ScriptError: no vehicle is there, or it has gone silent.
     """
-    vehicle = RemoteVehicle(port=port, vehicle_port=vehicle_port, host=host, silence_s=silence_s)
+    link = UdpLink(vehicle_port, LinkRole.ONBOARD, host, local_port=port)
+    vehicle = RemoteVehicle(link, f"UDP port {port}", silence_s=silence_s)
     running = vehicle.drone.start(script(vehicle.drone))
     pacer, polled_us = Pacer(1.0), 0
     try:
@@ -52,22 +54,15 @@ class RemoteVehicle:
     """A vehicle in another process, and its clock.
 
     Args:
-        port: where the vehicle sends to.
-        vehicle_port: the vehicle's own end.
-        host: where the vehicle is.
-        system_id: the vehicle's.
+        link: to it.
+        place: where it is looked for, in words.
+        system_id: its own.
         silence_s: wall clock seconds without a message after which it is given up.
-
-    Raises:
-        LinkError: the port is in use.
     """
 
-    def __init__(
-        self, *, port: int, vehicle_port: int, host: str, system_id: int = 1, silence_s: float = SILENCE_S
-    ) -> None:
-        self._link = UdpLink(vehicle_port, LinkRole.ONBOARD, host, local_port=port)
-        self.drone = Drone(self._link, system_id=system_id)
-        self._port, self._silence_s = port, silence_s
+    def __init__(self, link: ByteLink, place: str, *, system_id: int = 1, silence_s: float = SILENCE_S) -> None:
+        self._link, self._place, self._silence_s = link, place, silence_s
+        self.drone = Drone(link, system_id=system_id)
         self._time_us = 0  # simulated
         self._reported_us, self._boot_us = 0, 0  # the vehicle's clock, and when that began
         self._heard_s = wall_time_s()
@@ -86,8 +81,8 @@ class RemoteVehicle:
             self._reported_us, self._heard_s = attitude.time_boot_ms * 1000, wall_time_s()
             self._time_us = self._boot_us + self._reported_us
         elif wall_time_s() - self._heard_s > self._silence_s:
-            raise ScriptError(f"UDP port {self._port}: no vehicle has been heard for {self._silence_s:g} s")
+            raise ScriptError(f"{self._place}: no vehicle has been heard for {self._silence_s:g} s")
 
     def close(self) -> None:
-        """Closes the port."""
+        """Closes the link."""
         self._link.close()

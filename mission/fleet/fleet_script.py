@@ -19,6 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
+from autopilot.mavlink.transport.links import LinkError, LinkRole, UdpLink
 from common.clock import Pacer
 from mission.client import ScriptError
 from mission.connections import API_PORT_STEP, API_PORTS
@@ -182,10 +183,9 @@ class Remote:
         try:
             for i in range(count):
                 port = api_port + i
-                self._vehicles.append(
-                    RemoteVehicle(port=port, vehicle_port=port + API_PORT_STEP, host=host, system_id=i + 1)
-                )
-        except Exception:
+                link = UdpLink(port + API_PORT_STEP, LinkRole.ONBOARD, host, local_port=port)
+                self._vehicles.append(RemoteVehicle(link, f"UDP port {port}", system_id=i + 1))
+        except LinkError:
             self.close()
             raise
         self.drones = [vehicle.drone for vehicle in self._vehicles]
