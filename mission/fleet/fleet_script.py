@@ -37,7 +37,8 @@ T = TypeVar("T")
 class Vehicles(Protocol):
     """The vehicles that a fleet is made of, wherever they are."""
 
-    drones: Sequence[Drone]
+    @property
+    def drones(self) -> Sequence[Drone]: ...
 
     def frame(self) -> None:
         """Lets some time pass."""
@@ -158,7 +159,7 @@ class Simulated:
 
     def __init__(self, flights: FleetFlight) -> None:
         self.flights = flights
-        self.drones = [flight.drone for flight in flights.flights]
+        self.drones: Sequence[Drone] = [flight.drone for flight in flights.flights]
 
     def frame(self) -> None:
         """20 ms of simulated time."""
@@ -188,7 +189,7 @@ class Remote:
         except LinkError:
             self.close()
             raise
-        self.drones = [vehicle.drone for vehicle in self._vehicles]
+        self.drones: Sequence[Drone] = [vehicle.drone for vehicle in self._vehicles]
         self._pacer, self._polled_us = Pacer(1.0), 0
 
     def frame(self) -> None:
