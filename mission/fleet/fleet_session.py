@@ -4,9 +4,9 @@ Light to import: a port that is taken is told before anything heavy is loaded.
 """
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
@@ -25,8 +25,11 @@ from mission.run_folder import OwnFiles, run_folder
 if TYPE_CHECKING:
     from mission.client import Running
     from mission.fleet.fleet_flight import FleetFlight
+    from mission.flight import Flight
     from mission.flight_config import FlightConfig
+    from mission.log.flight_recorder import History
     from mission.log.flight_summary import Summary
+    from mission.view.live import LiveView
     from mission.view.page import PageServer
 
 
@@ -111,6 +114,32 @@ def _plan(options: FlightOptions, config: "FlightConfig") -> Plan:
     return replace(aside, fence=plan.fence, rally=plan.rally)
 
 
+@dataclass(frozen=True, slots=True)
+class _Vehicle:
+    """One vehicle, what it is to fly, and the script that flies it."""
+
+    flight: "Flight"
+    plan: Plan | None
+    path_ned: list[tuple[int, Any]]
+    running: "Running | None"
+
+
+def _begin(fleet: "FleetFlight", options: FlightOptions) -> list[_Vehicle]:
+    """Starts the plans; none where ground stations are waited for."""
+    from mission.log.flight_summary import planned_path
+    from mission.script import fly_plan
+    from mission.view.replay_file import keep_for_replay
+
+    begun = []
+    for flight in fleet.flights:
+        plan = None if options.is_idle else _plan(options, flight.config)
+        path_ned = [] if plan is None else planned_path(plan, flight.config.home, flight.config.start_ne_m)
+        keep_for_replay(flight, [point for _, point in path_ned])
+        running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
+        begun.append(_Vehicle(flight, plan, path_ned, running))
+    return begun
+
+
 def _fly(
     fleet: "FleetFlight",
     options: FlightOptions,
@@ -123,29 +152,10 @@ def _fly(
     from mission.fleet.fleet_table import FleetProgress, print_end
     from mission.flight_session import run_shown
     from mission.fly_loop import end_of
-    from mission.log.flight_summary import planned_path
-    from mission.script import fly_plan
-    from mission.view.replay_file import keep_for_replay
 
-    plans = [None if options.is_idle else _plan(options, flight.config) for flight in fleet.flights]
-    paths = [
-        [] if plan is None else planned_path(plan, flight.config.home, flight.config.start_ne_m)
-        for flight, plan in zip(fleet.flights, plans, strict=True)
-    ]
-    running: list[Running | None] = []
-    for flight, plan, path_ned in zip(fleet.flights, plans, paths, strict=True):
-        keep_for_replay(flight, [point for _, point in path_ned])
-        running.append(None if plan is None else flight.drone.start(fly_plan(flight.drone, plan)))
-    view = None
-    if page is not None:
-        from mission.view.live import LiveView
-
-        first = [point for _, point in paths[0]]
-        others = fleet.flights[1:]
-        view = LiveView(
-            fleet.flights[0], page, speed=speed, path_ned=first, others=others, change_speed=fleet.change_speed
-        )
-    is_over = end_of(options, speed, [each for each in running if each is not None])
+    vehicles = _begin(fleet, options)
+    view = None if page is None else _view(fleet, page, speed, [point for _, point in vehicles[0].path_ned])
+    is_over = end_of(options, speed, [each.running for each in vehicles if each.running is not None])
     progress = FleetProgress(fleet)
     run_shown(
         lambda on_frame: fleet.run(is_over, speed=speed, on_frame=on_frame),
@@ -156,23 +166,36 @@ def _fly(
     )
     if view is not None:
         view.end(f"flight ended: logs in {folder}")
-    histories = fleet.close()
-    summaries: list[Summary] = []
-    missing: list[str] = []
-    from mission.fly_loop import write_results
-
-    for i, (flight, history) in enumerate(zip(fleet.flights, histories, strict=True)):
-        files = OwnFiles(folder / f"vehicle-{i + 1}", console)
-        for trouble in flight.troubles.take():
-            print_line(console, f"vehicle {i + 1}: {trouble}")
-        if len(history.time_us):
-            summaries.append(write_results(flight, history, running[i], plans[i], paths[i], files))
-        missing += files.missing
+    summaries, is_whole = _write(vehicles, fleet.close(), folder, console)
     if view is not None:
         view.close()
-    files = OwnFiles(folder, console)
-    with files.writing("summary.json") as path:
-        write_whole(path, (json.dumps([summary.as_json() for summary in summaries], indent=2) + "\n").encode())
     print_end(fleet, summaries, folder, console)
-    has_succeeded = len(summaries) == len(fleet.flights) and all(summary.is_success for summary in summaries)
-    return 0 if (has_succeeded or options.is_idle) and not (missing or files.missing) else 1
+    has_succeeded = len(summaries) == len(vehicles) and all(summary.is_success for summary in summaries)
+    return 0 if (has_succeeded or options.is_idle) and is_whole else 1
+
+
+def _view(fleet: "FleetFlight", page: "PageServer", speed: float | None, path_ned: list[Any]) -> "LiveView":
+    """The live page: all vehicles, and the controls of the first."""
+    from mission.view.live import LiveView
+
+    first, *others = fleet.flights
+    return LiveView(first, page, speed=speed, path_ned=path_ned, others=others, change_speed=fleet.change_speed)
+
+
+def _write(
+    vehicles: list[_Vehicle], histories: list["History"], folder: Path, console: Console
+) -> tuple[list["Summary"], bool]:
+    """Writes each vehicle's results and the list of all summaries; these, and whether all could be written."""
+    from mission.fly_loop import write_results
+
+    summaries: list[Summary] = []
+    files = [OwnFiles(folder / f"vehicle-{i}", console) for i in range(1, len(vehicles) + 1)]
+    for i, (each, history) in enumerate(zip(vehicles, histories, strict=True)):
+        for trouble in each.flight.troubles.take():
+            print_line(console, f"vehicle {i + 1}: {trouble}")
+        if len(history.time_us):
+            summaries.append(write_results(each.flight, history, each.running, each.plan, each.path_ned, files[i]))
+    files.append(OwnFiles(folder, console))
+    with files[-1].writing("summary.json") as path:
+        write_whole(path, (json.dumps([summary.as_json() for summary in summaries], indent=2) + "\n").encode())
+    return summaries, not any(each.missing for each in files)

@@ -52,7 +52,7 @@ class FleetProgress:
         self._frames = 0
         self._shown_wall_s = wall_time_s()
         self._shown_us = 0
-        self._told = [0] * len(fleet.flights)  # texts of each
+        self._reported = [0] * len(fleet.flights)  # texts of each
 
     def is_due(self, period_s: float) -> bool:
         """Whether so much wall clock time has gone by since it was last shown; asked every frame."""
@@ -63,8 +63,8 @@ class FleetProgress:
         """What vehicles have said since this was last asked, each with its number."""
         lines = []
         for i, flight in enumerate(self._fleet.flights):
-            lines += [f"{i + 1:3d} {text}" for text in flight.texts.since(self._told[i])]
-            self._told[i] = flight.texts.count
+            lines += [f"{i + 1:3d} {text}" for text in flight.texts.since(self._reported[i])]
+            self._reported[i] = flight.texts.count
         return lines
 
     def line(self) -> str:

@@ -14,7 +14,7 @@ from mission.flight_config import FlightConfig, flight_parameters
 from sim.bodies.vehicles import class_of
 from sim.world.world import WorldMap
 
-SPACING_M = 5.0
+SPACING_M = 10.0  # less, and rovers on the default mission run over who has landed
 SEED_MAX = 2**31 - 1
 _FREE_M = 1.0  # to trees, walls and boxes, beyond half the spacing at most; guess
 _LEVEL = 0.99  # of the ground's normal: 8 deg, on which every class stands

@@ -35,10 +35,10 @@ class Transponders:
         if time_us < self._next_us:
             return
         self._next_us = time_us + PERIOD_US
-        told = [self._aircraft(i) for i in range(len(self._flights))]
+        reports = [self._aircraft(i) for i in range(len(self._flights))]
         for i, flight in enumerate(self._flights):
-            for j, (there_ned, aircraft) in enumerate(told):
-                here_ned, _ = told[i]
+            for j, (there_ned, aircraft) in enumerate(reports):
+                here_ned, _ = reports[i]
                 if i != j and aircraft is not None and _distance_m(here_ned, there_ned) < HEARD_WITHIN_M:
                     flight.controller.traffic.report(aircraft)
 
