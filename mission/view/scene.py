@@ -210,7 +210,7 @@ class Scene:
 
     def forget_trails(self) -> None:
         """Somebody has been put elsewhere."""
-        for trail in (self._vehicle.trail, self._owner_trail):
+        for trail in (self._vehicle.trail, self._owner_trail, *(nodes.trail for nodes in self._others)):
             trail.forget()
 
     def draw_trails(self, rows: NDArray[Any], others: Sequence[NDArray[Any]] = ()) -> None:
