@@ -66,16 +66,16 @@ def _fly(options: "FlightOptions") -> int:
 
     try:
         check_options(options)
-        from mission.fleet.fleet_options import check_fleet
-        from mission.flight_options import check_parameters
-
-        check_fleet(options)
-
-        check_parameters(options)
         if options.vehicles is not None:
+            from mission.fleet.fleet_options import check_fleet
+
+            check_fleet(options)
             from mission.fleet.fleet_session import fly_fleet
 
             return fly_fleet(options)
+        from mission.flight_options import check_parameters
+
+        check_parameters(options)
         from mission.fly_session import fly_session
 
         return fly_session(options)

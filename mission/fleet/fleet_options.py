@@ -35,10 +35,8 @@ def check_fleet(options: FlightOptions) -> None:
     """Refuses options that several vehicles cannot share, or airframes that are none.
 
     Raises:
-        UserError: of several vehicles, if any are asked for.
+        UserError: of such.
     """
-    if options.vehicles is None:
-        return
     alone = {
         "--owner": options.owner is not None,
         "--state": options.state is not None,
@@ -50,7 +48,7 @@ def check_fleet(options: FlightOptions) -> None:
         if is_given:
             raise UserError(f"--vehicles and {name}: choose one, it is for a single vehicle")
     try:
-        for airframe in dict.fromkeys(airframes_of(options.vehicles, options.airframe)):
+        for airframe in dict.fromkeys(airframes_of(options.vehicles or "1", options.airframe)):
             load_airframe(airframe)
     except AirframeError as error:
         raise UserError(f"--vehicles {options.vehicles}: {error}") from error

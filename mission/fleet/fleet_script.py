@@ -27,7 +27,7 @@ from mission.fleet.fleet_flight import FleetFlight
 from mission.fleet.fleet_options import airframes_of
 from mission.fleet.roster import SPACING_M, fleet_configs
 from mission.flight_config import FlightConfig
-from mission.over_udp import POLL_US, RemoteVehicle
+from mission.over_udp import POLL_US, SILENCE_S, RemoteVehicle
 from mission.script import Drone
 from mission.simulator.flight_rig import flight_world
 
@@ -73,8 +73,16 @@ class Fleet:
         self._vehicles: Vehicles = Simulated(FleetFlight(configs, world, folder=folder))
 
     @classmethod
-    def over_udp(cls, count: int, *, api_port: int = 14540, host: str = "127.0.0.1") -> Self:
+    def over_udp(
+        cls, count: int, *, api_port: int = 14540, host: str = "127.0.0.1", silence_s: float = SILENCE_S
+    ) -> Self:
         """The vehicles of another process, at most ten; 1 sends to the first port, 2 to the next.
+
+        Args:
+            count: how many.
+            api_port: where the first one sends to.
+            host: where they are.
+            silence_s: wall clock seconds without a message after which one is given up.
 
         Raises:
             ScriptError: there are more.
@@ -83,7 +91,7 @@ class Fleet:
         if not 0 < count <= API_PORTS:
             raise ScriptError(f"a fleet over UDP has 1 to {API_PORTS} vehicles: the others have no port of their own")
         fleet = cls.__new__(cls)
-        fleet._vehicles = Remote(count, api_port, host)
+        fleet._vehicles = Remote(count, api_port, host, silence_s)
         return fleet
 
     @property
@@ -177,15 +185,16 @@ class Remote:
         count: how many.
         api_port: where the first one sends to.
         host: where they are.
+        silence_s: wall clock seconds without a message after which one is given up.
     """
 
-    def __init__(self, count: int, api_port: int, host: str) -> None:
+    def __init__(self, count: int, api_port: int, host: str, silence_s: float) -> None:
         self._vehicles: list[RemoteVehicle] = []
         try:
             for i in range(count):
                 port = api_port + i
                 link = UdpLink(port + API_PORT_STEP, LinkRole.ONBOARD, host, local_port=port)
-                self._vehicles.append(RemoteVehicle(link, f"UDP port {port}", system_id=i + 1))
+                self._vehicles.append(RemoteVehicle(link, f"UDP port {port}", system_id=i + 1, silence_s=silence_s))
         except LinkError:
             self.close()
             raise

@@ -13,10 +13,12 @@ from rich.console import Console
 from autopilot.mavlink.transport.links import LinkSource
 from common.airframe import load_airframe
 from common.files import write_whole
+from common.params import ParameterError
 from mission.connections import open_links, open_page, signing_config
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import Say, loading, print_line
 from mission.fleet.fleet_options import airframes_of
+from mission.fleet.roster import check_fleet_parameters, fleet_configs, start_of
 from mission.flight_options import flight_config
 from mission.flight_settings import FlightOptions
 from mission.plan.plan_file import Plan, PlanError, default_plan, moved_plan, read_plan
@@ -41,6 +43,10 @@ def fly_fleet(options: FlightOptions) -> int:
     """
     speed, console = speed_of(options.speed), Console()
     airframes = airframes_of(options.vehicles or "1", options.airframe)
+    try:
+        check_fleet_parameters(flight_config(options, None), airframes)
+    except ParameterError as error:
+        raise UserError(str(error)) from error
     links = [] if speed is None else _open_all(options, speed, len(airframes))
     page = open_page(options.view_port) if options.has_view else None
     with run_folder(options.run_folder) as folder:
@@ -77,7 +83,6 @@ def _make_fleet(
 ) -> "FleetFlight":
     """World and vehicles, their kernels loaded."""
     from mission.fleet.fleet_flight import FleetFlight
-    from mission.fleet.roster import fleet_configs
     from mission.kernel_loading import load_kernels
     from mission.simulator.flight_rig import flight_world
 
@@ -100,8 +105,6 @@ def _make_fleet(
 
 def _plan(options: FlightOptions, config: "FlightConfig") -> Plan:
     """The user's plan, or the default one of the vehicle's class, as far aside as the vehicle boots from home."""
-    from mission.fleet.roster import start_of
-
     try:
         if options.plan is None:
             return moved_plan(read_plan(default_plan(load_airframe(config.airframe).vehicle)), start_of(config))

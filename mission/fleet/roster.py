@@ -11,7 +11,6 @@ from common.airframe import load_airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
 from mission.console.option_checks import UserError
 from mission.flight_config import FlightConfig, flight_parameters
-from sim.bodies.vehicles import class_of
 from sim.world.world import WorldMap
 
 SPACING_M = 10.0  # less, and rovers on the default mission run over who has landed
@@ -50,12 +49,25 @@ def fleet_configs(
     ]
 
 
+def check_fleet_parameters(base: FlightConfig, airframes: Sequence[str]) -> None:
+    """Refuses parameters that no vehicle of a fleet has, or values that they cannot have.
+
+    Raises:
+        ParameterError: of the first such.
+    """
+    known: set[str] = set()
+    for airframe in dict.fromkeys(airframes):
+        own = _own_parameters(base, airframe)
+        flight_parameters(base.model_copy(update={"parameters": own}), load_airframe(airframe))
+        known |= own.keys()
+    unknown = {name: value for name, value in base.parameters.items() if name not in known}
+    flight_parameters(base.model_copy(update={"parameters": unknown}), load_airframe(airframes[0]))
+
+
 def _own_parameters(base: FlightConfig, airframe: str) -> dict[str, float]:
-    """Those of the given ones that its class of vehicles has; a name that no vehicle has is refused with the first."""
-    if class_of(load_airframe(airframe)) == class_of(load_airframe(base.airframe)):
-        return base.parameters
-    known = flight_parameters(base.model_copy(update={"airframe": airframe, "parameters": {}}), load_airframe(airframe))
-    return {name: value for name, value in base.parameters.items() if name in known}
+    """Those of the given ones that a vehicle has."""
+    has = flight_parameters(base.model_copy(update={"parameters": {}}), load_airframe(airframe))
+    return {name: value for name, value in base.parameters.items() if name in has}
 
 
 def free_places(world: WorldMap, count: int, spacing_m: float) -> list[tuple[float, float]]:
