@@ -21,6 +21,7 @@ SCRIPTS = {
     "flights": "bench.flying.flights",
     "drives": "bench.flying.drives",
     "flight": "bench.flying.flight",
+    "vehicles": "bench.flying.vehicles",
     "python_share": "bench.flying.python_share",
     "batch": "bench.flying.batch",
     "threads": "bench.flying.threads",

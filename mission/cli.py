@@ -66,6 +66,13 @@ def _fly(options: "FlightOptions") -> int:
 
     try:
         check_options(options)
+        if options.vehicles is not None:
+            from mission.fleet.fleet_options import check_fleet
+
+            check_fleet(options)
+            from mission.fleet.fleet_session import fly_fleet
+
+            return fly_fleet(options)
         from mission.flight_options import check_parameters
 
         check_parameters(options)

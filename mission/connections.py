@@ -18,28 +18,31 @@ if TYPE_CHECKING:
     from mission.view.page import PageServer
 GROUND_PORT_STEP = 18570 - 14550  # from a client's port to the vehicle's own: PX4's where the client's is PX4's
 API_PORT_STEP = 14580 - 14540
+TCP_PORT_STEP = 10  # ArduPilot's, from one vehicle to the next; PX4's UDP ports are one apart
+API_PORTS = 10  # vehicles beyond share the last one, as PX4's do
 PORT_MAX = 65535
 
 
-def open_links(options: FlightOptions, speed: float) -> list[LinkSource]:
-    _check_ports(options)
+def open_links(options: FlightOptions, speed: float, i_vehicle: int = 0) -> list[LinkSource]:
+    """The ports of a vehicle: of several, all send to one ground station's, and each to an API port of its own."""
+    _check_ports(options, i_vehicle)
     links: list[LinkSource] = []
     pace = max(speed, 1.0)  # clients' heartbeats follow the wall clock
     silence_us, give_way_us = int(SILENCE_US * pace), int(GIVE_WAY_US * pace)
     try:
         bind = options.bind or address_towards(options.host)
-        for role, port, step in (
-            (LinkRole.GROUND, options.gcs_port, GROUND_PORT_STEP),
-            (LinkRole.ONBOARD, options.api_port, API_PORT_STEP),
+        for role, port, local_port in (
+            (LinkRole.GROUND, options.gcs_port, options.gcs_port + GROUND_PORT_STEP + i_vehicle),
+            (LinkRole.ONBOARD, api_port_of(options, i_vehicle), options.api_port + API_PORT_STEP + i_vehicle),
         ):
             links.append(
                 UdpPort(
                     port, role, options.host,
-                    local_port=port + step, bind=bind, silence_us=silence_us, give_way_us=give_way_us,
+                    local_port=local_port, bind=bind, silence_us=silence_us, give_way_us=give_way_us,
                 )
             )  # fmt: skip
         if options.tcp_port is not None:
-            links.append(TcpPort(options.tcp_port, bind=bind, give_way_us=give_way_us))
+            links.append(TcpPort(options.tcp_port + TCP_PORT_STEP * i_vehicle, bind=bind, give_way_us=give_way_us))
     except LinkError as error:
         for link in links:
             link.close()
@@ -50,13 +53,19 @@ def open_links(options: FlightOptions, speed: float) -> list[LinkSource]:
     return links
 
 
-def _check_ports(options: FlightOptions) -> None:
+def api_port_of(options: FlightOptions, i_vehicle: int) -> int:
+    """Where a vehicle's API client listens."""
+    return options.api_port + min(i_vehicle, API_PORTS - 1)
+
+
+def _check_ports(options: FlightOptions, i_vehicle: int) -> None:
     """The clients' two ports and the vehicle's own two must exist and be four."""
     gcs_port, api_port = options.gcs_port, options.api_port
     for name, port, step in (("gcs", gcs_port, GROUND_PORT_STEP), ("api", api_port, API_PORT_STEP)):
-        if port + step > PORT_MAX:
+        if port + step + i_vehicle > PORT_MAX:
             raise UserError(
-                f"--{name}-port {port}: must be at most {PORT_MAX - step}: the vehicle's own is {step} above"
+                f"--{name}-port {port}: must be at most {PORT_MAX - step - i_vehicle}: "
+                f"the vehicle's own is {step + i_vehicle} above"
             )
     own = (gcs_port + GROUND_PORT_STEP, api_port + API_PORT_STEP)
     if len({gcs_port, api_port, *own}) < 4:

@@ -35,6 +35,7 @@ from mission.log.stored_logs import FlightLogs, RunLog
 from mission.script import Drone
 from mission.simulator.base_station import BaseStation
 from mission.simulator.failure_injection import RigInjector
+from mission.simulator.flight_cameras import FlightCameras
 from mission.simulator.flight_rig import flight_rig, flight_world
 from mission.simulator.host_ports import host_ports
 from mission.simulator.onboard_devices import Surroundings, ring_of
@@ -44,12 +45,10 @@ from mission.simulator.simulator_params import TURBULENCE_FRACTION, SimulatorPar
 from mission.video.mjpeg_server import StreamServer
 from mission.video.rtp_video import RtpVideo
 from sim.bodies.vehicles import class_of
-from sim.camera_rig import CameraRig
 from sim.rig import Rig
 from sim.rtk import RtkReceiver
 from sim.sensors.scanner import Scanner
 from sim.turntable import Turntable
-from sim.video_rig import VideoRig
 from sim.world.world import WorldMap
 
 __all__ = ["Computer", "Flight", "FlightConfig", "flight_parameters"]
@@ -88,7 +87,6 @@ class Flight(FlightBase):
         world: WorldMap | None = None,
     ) -> None:
         super().__init__(config, load_airframe(config.airframe))
-        self.stream, self.video = stream, video
         simulated = class_of(self.airframe)
         vehicle, self.drives = simulated.vehicle, simulated.drives
         self.world = flight_world(config) if world is None else world
@@ -99,9 +97,8 @@ class Flight(FlightBase):
         self._load_parameters()
         self.params.on_change(self._parameter_changed)
         self.injector = RigInjector(self.rig, self.airframe, config.noise, len(vehicle.motors(self.airframe)))
-        self._camera_rig = CameraRig(self.rig, self.world, has_thread=has_camera_thread)
-        self._camera_rig.prepare()
-        self.host = self._make_host(folder, state)
+        self._cameras = FlightCameras(self.rig, self.world, stream, video, has_thread=has_camera_thread)
+        self.host = self._make_host(folder, state, stream, video)
         receiver = RtkReceiver(self.rig)
         self.controller = self._make_controller(vehicle, receiver)
         self._surroundings = self._surround(receiver)
@@ -113,13 +110,12 @@ class Flight(FlightBase):
         script_end, client_end = memory_pair(LinkRole.ONBOARD)
         self._servers = self._make_servers(script_end, links, signing)
         self.server = self._servers[0]
-        self.drone = Drone(client_end)
+        self.drone = Drone(client_end, system_id=int(self.params[SYSID_PARAMETER]))
         log = None if folder is None else folder / "flight.ulg"
         self.recorder = Recorder(log, self.rig, self.controller, self.airframe, self.troubles.note)
         self.controller.attach(self.recorder)
-        self._stream_rig = None if stream is None else self._start_stream(stream)
         self.simulator_params = SimulatorParameters(self)
-        self._video_rig = None if video is None else self._start_video(video)
+        self._start_cameras()
         self._flight_logs: FlightLogs | None = None
         if state is not None:
             self._flight_logs = FlightLogs(state.folder / "logs", self.recorder, self.params, self.troubles.note)
@@ -130,15 +126,17 @@ class Flight(FlightBase):
         passing = {name for name in self.params if name.startswith(SIMULATOR_PREFIX)}
         return Persistence(state, self.params, self.config.parameters, passing)
 
-    def _make_host(self, folder: Path | None, state: StateFolder | None) -> Host:
+    def _make_host(
+        self, folder: Path | None, state: StateFolder | None, stream: StreamServer | None, video: RtpVideo | None
+    ) -> Host:
         root = folder if state is None else state.folder
         return Host(
             files=None if root is None else ConfinedFolder(root / "files"),
             storage=state,
-            frames=self._camera_rig,
+            frames=self._cameras.photos,
             media=None if folder is None else MediaFolder(folder / "media"),
-            stream=self.stream,
-            video=self.video,
+            stream=stream,
+            video=video,
             boot_unix_us=self.config.boot_unix_us,
         )
 
@@ -213,20 +211,9 @@ class Flight(FlightBase):
             return base
         return [ScannerDevice(Scanner(self.rig, self.world, config.noise, config.seed), system_id), *base]
 
-    def _start_stream(self, stream: StreamServer) -> CameraRig:
-        """Gives the live picture something to show; what renders it."""
-        rig = CameraRig(self.rig, self.world, has_thread=True)
-        if self.controller.camera is not None:
-            stream.start(self.controller.camera, rig)
-        return rig
-
-    def _start_video(self, video: RtpVideo) -> VideoRig:
-        """Gives the video something to show; what renders it."""
-        rig = VideoRig(self.rig, self.world, None if self.owner is None else self.owner.people)
-        if self.controller.camera is not None:
-            video.start(self.controller.camera, rig)
-        video.on_trouble = self.troubles.note
-        return rig
+    def _start_cameras(self) -> None:
+        people = None if self.owner is None else self.owner.people
+        self._cameras.start(self.controller.camera, people, self.troubles.note)
 
     def _parameter_changed(self, _: Parameter) -> None:
         self._has_new_parameters = True
@@ -243,12 +230,17 @@ class Flight(FlightBase):
 
     def frame(self) -> None:
         """Advances by 20 ms."""
+        self.begin_frame()
+        self.advance()
+        self.end_frame()
+
+    def begin_frame(self) -> None:
+        """What is done before the ticks of a frame."""
         self._load_parameters()
         self.injector.frame(self.time_us)
-        if self._needs_ticks():
-            self._advance_by_ticks()
-        else:
-            self.rig.advance(FRAME_TICKS)
+
+    def end_frame(self) -> None:
+        """What is done after the ticks of a frame."""
         self.time_us += FRAME_US
         self._surroundings.frame(self.time_us)
         if self.owner is not None:
@@ -262,10 +254,7 @@ class Flight(FlightBase):
             self.onboard.frame(self.time_us)
         for computer in self.computers:
             computer.frame(self.time_us)
-        if self.stream is not None:
-            self.stream.frame()
-        if self.video is not None:
-            self.video.frame()
+        self._cameras.frame()
         if self._flight_logs is not None:
             self._flight_logs.frame(is_armed=self.controller.state.is_armed)
         if self.persistence is not None:
@@ -280,12 +269,19 @@ class Flight(FlightBase):
                 return True
         return False
 
-    def _advance_by_ticks(self) -> None:
-        """The same frame in single ticks, each of which is shown to the flight controller's servers."""
-        for tick in range(1, FRAME_TICKS):
-            self.rig.advance(1)
-            self.controller.note_tick(self.time_us + tick * TICK_US)
+    def advance(self) -> None:
+        """The ticks of a frame."""
+        if self._needs_ticks():
+            for tick in range(FRAME_TICKS):
+                self.advance_tick(tick)
+        else:
+            self.rig.advance(FRAME_TICKS)
+
+    def advance_tick(self, tick: int) -> None:
+        """One tick of a frame, the first is 0; it is shown to the flight controller's servers if a client wants it."""
         self.rig.advance(1)
+        if tick + 1 < FRAME_TICKS and self._needs_ticks():
+            self.controller.note_tick(self.time_us + (tick + 1) * TICK_US)
 
     def run(
         self,
@@ -326,14 +322,7 @@ class Flight(FlightBase):
 
     def close(self) -> History:
         """As of every flight; a state folder stays the caller's to close."""
-        for output in (self.stream, self.video):
-            if output is not None:
-                output.close()
-        if self.controller.camera is not None:
-            self.controller.camera.close()
-        for rig in (self._camera_rig, self._stream_rig, self._video_rig):
-            if rig is not None:
-                rig.close()
+        self._cameras.close(self.controller.camera)
         if self.persistence is not None:
             self.persistence.write()
         if self._flight_logs is not None:

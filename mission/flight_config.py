@@ -36,7 +36,9 @@ class FlightConfig(FlightSettings):
     """What a flight is made from: the settings, and what several options together make."""
 
     home: GeoPoint = DEFAULT_HOME
-    """Where the vehicle boots."""
+    """The origin of the local frame."""
+    start_ne_m: tuple[float, float] = (0.0, 0.0)
+    """Where the vehicle boots, north and east of it [m]."""
     parameters: dict[str, float] = Field(default_factory=dict)
     """Values of the flight controller's parameters that differ from their defaults, by name."""
     world: WorldConfig = WorldConfig()

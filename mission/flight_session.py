@@ -9,10 +9,11 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 
 from rich.console import Console
 from rich.live import Live
+from rich.table import Table
 
 from common.files import write_to_nowhere
 from mission.client import Running
@@ -96,29 +97,68 @@ class FlightSession:
         self, is_over: Callable[[FlightBase], bool], watchers: Sequence[Callable[[], None]], progress: Progress
     ) -> None:
         """Until the flight is over or the user stops it; shows a line of figures."""
-        gc.freeze()  # what is loaded by now stays: to look through it takes 0.2 s, in the middle of a flight
-        flight, console = self._flight, self._console
-        try:
-            with _signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
-                reported = 0
+        flight = self._flight
+        reported = 0
 
-                def on_frame(_: FlightBase) -> None:
-                    nonlocal reported
-                    for watch in watchers:
-                        watch()
-                    for text in flight.texts.since(reported):
-                        print_line(console, str(text))
-                    reported = flight.texts.count
-                    if console.is_terminal and progress.is_due(TABLE_PERIOD_S):
-                        live.update(progress.table(), refresh=True)
-                    elif not console.is_terminal and progress.is_due(LINE_PERIOD_S):
-                        print_line(console, progress.line())
+        def new_texts() -> list[str]:
+            nonlocal reported
+            texts = [str(text) for text in flight.texts.since(reported)]
+            reported = flight.texts.count
+            return texts
 
-                flight.run(is_over, speed=self._speed, on_frame=on_frame)
-        except KeyboardInterrupt:
-            console.print("stopped by the user")
-        except SystemExit:  # rich's: who read what is printed has gone, which is as a terminal that was closed
-            write_to_nowhere(1)
+        def run(on_frame: Callable[[FlightBase], None]) -> None:
+            flight.run(is_over, speed=self._speed, on_frame=on_frame)
+
+        run_shown(run, watchers, new_texts, progress, self._console)
+
+
+class Shown(Protocol):
+    """Figures that are shown while flying."""
+
+    def is_due(self, period_s: float) -> bool:
+        """Whether so much wall clock time has gone by since they were last shown; asked every frame."""
+
+    def line(self) -> str:
+        """Where there is no terminal."""
+
+    def table(self) -> Table: ...
+
+
+def run_shown(
+    run: Callable[[Callable[[Any], None]], None],
+    watchers: Sequence[Callable[[], None]],
+    new_texts: Callable[[], list[str]],
+    progress: Shown,
+    console: Console,
+) -> None:
+    """Runs a flight, or several, to the end or until the user stops it, and shows how it goes.
+
+    Args:
+        run: advances to the end; calls what it is given after each frame.
+        watchers: called after each frame.
+        new_texts: what vehicles have said since it was last asked.
+        progress: the figures.
+        console: where they are shown.
+    """
+    gc.freeze()  # what is loaded by now stays: to look through it takes 0.2 s, in the middle of a flight
+    try:
+        with _signals_interrupt(), Live(console=console, transient=True, auto_refresh=False) as live:
+
+            def on_frame(_: object) -> None:
+                for watch in watchers:
+                    watch()
+                for text in new_texts():
+                    print_line(console, text)
+                if console.is_terminal and progress.is_due(TABLE_PERIOD_S):
+                    live.update(progress.table(), refresh=True)
+                elif not console.is_terminal and progress.is_due(LINE_PERIOD_S):
+                    print_line(console, progress.line())
+
+            run(on_frame)
+    except KeyboardInterrupt:
+        console.print("stopped by the user")
+    except SystemExit:  # rich's: who read what is printed has gone, which is as a terminal that was closed
+        write_to_nowhere(1)
 
 
 @contextmanager

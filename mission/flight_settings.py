@@ -95,6 +95,11 @@ class FlightOptions(FlightSettings):
     parameters: tuple[str, ...] = option(
         (), "Sets a parameter of the flight controller: NAME=VALUE. Repeatable.", "--param"
     )
+    vehicles: str | None = option(
+        None, "Fly several in one world: a number, or AIRFRAME:NUMBER,AIRFRAME:NUMBER,...", shown="one"
+    )
+    spacing_m: float = option(10.0, "Of several, how far apart they boot [m].", "--spacing", ge=1.0, le=1000.0)
+    has_transponders: bool = option(False, "Several hear each other by ADS-B.", "--adsb")
     run_folder: Path | None = option(None, "Where logs go. Default: runs/DATE.")
     state: Path | None = option(None, "Folder for what outlives the run: parameters, mission, fence, files, logs.")
 

@@ -1,7 +1,7 @@
 """A flight of `honeyguide fly`, from its plan to its run folder: summary, logs, picture."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,24 +34,24 @@ def fly_to_the_end(
     console: Console,
 ) -> int:
     """Flies the plan, or waits for ground stations; writes the run folder and returns the exit code."""
-    path_ned = [] if plan is None else planned_path(plan, flight.config.home)
+    path_ned = [] if plan is None else planned_path(plan, flight.config.home, flight.config.start_ne_m)
     running = None if plan is None else flight.drone.start(fly_plan(flight.drone, plan))
     session = FlightSession(flight, speed, page, folder, console, path_ned=[point for _, point in path_ned])
-    history = session.fly(_end(options, speed, running), running)
+    history = session.fly(end_of(options, speed, [] if running is None else [running]), running)
     exit_code = _finish(flight, history, running, plan, path_ned, folder, session.files, console)
     session.close()
     return exit_code
 
 
-def _end(options: FlightOptions, speed: float | None, running: Running | None) -> Callable[[FlightBase], bool]:
-    """What is asked after each frame: whether the flight is over."""
+def end_of(options: FlightOptions, speed: float | None, running: Sequence[Running]) -> Callable[[Any], bool]:
+    """What is asked after each frame: whether the flight, or all of a fleet, is over."""
     end_us = int(options.seconds * 1e6) if options.seconds is not None else None
     ends_with_script = options.once or (speed is None and end_us is None)
 
-    def is_over(flight: FlightBase) -> bool:
+    def is_over(flight: Any) -> bool:
         if end_us is not None and flight.time_us >= end_us:
             return True
-        return ends_with_script and (running is None or running.is_done)
+        return ends_with_script and all(each.is_done for each in running)
 
     return is_over
 
@@ -70,6 +70,24 @@ def _finish(
     if len(history.time_us) == 0:
         print_line(console, flight.end_reason or "the flight ended before its first frame")
         return 0 if running is None and not flight.end_reason else 1
+    summary = write_results(flight, history, running, plan, path_ned, files)
+    if summary.armed_s > 0.0:
+        console.print(_summary_table(summary, drives=flight.drives))
+    else:
+        print_line(console, f"result: {summary.result}\nsimulated: {summary.simulated_s:.1f} s, never armed")
+    print_line(console, f"{'what could be written' if files.missing else 'logs, summary and picture'}: {folder}")
+    return 0 if (summary.is_success or (running is None and not flight.end_reason)) and not files.missing else 1
+
+
+def write_results(
+    flight: FlightBase,
+    history: History,
+    running: Running | None,
+    plan: Plan | None,
+    path_ned: list[tuple[int, Any]],
+    files: OwnFiles,
+) -> Summary:
+    """Judges a flight that had a frame; writes its summary and its picture."""
     summary = summarise(flight, history, running, path_ned, curved_items(plan) if plan else frozenset())
     with files.writing("summary.json") as path:
         write_whole(path, (json.dumps(summary.as_json(), indent=2) + "\n").encode())
@@ -78,12 +96,7 @@ def _finish(
         from mission.log.flight_plots import plot_flight  # matplotlib: nobody waits for it before the flight
 
         plot_flight(history, flight.world, path_ned, title, path, flight.drives)
-    if summary.armed_s > 0.0:
-        console.print(_summary_table(summary, drives=flight.drives))
-    else:
-        print_line(console, f"result: {summary.result}\nsimulated: {summary.simulated_s:.1f} s, never armed")
-    print_line(console, f"{'what could be written' if files.missing else 'logs, summary and picture'}: {folder}")
-    return 0 if (summary.is_success or (running is None and not flight.end_reason)) and not files.missing else 1
+    return summary
 
 
 def _summary_table(summary: Summary, *, drives: bool) -> Table:

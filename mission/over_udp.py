@@ -4,6 +4,7 @@ The vehicle may fly at any multiple of real time: waits and time-outs of the scr
 The wall clock only paces the polling and notices a vehicle that has gone silent.
 """
 
+from autopilot.mavlink.client_end import ByteLink
 from autopilot.mavlink.transport.links import LinkRole, UdpLink
 from common.clock import Pacer, wall_time_s
 from mission.client import Running, ScriptError
@@ -35,28 +36,53 @@ def fly_over_udp(
         ScriptError: no vehicle is there, or it has gone silent.
     """
     link = UdpLink(vehicle_port, LinkRole.ONBOARD, host, local_port=port)
-    try:
-        return _run(Drone(link), script, f"UDP port {port}", silence_s)
-    finally:
-        link.close()
-
-
-def _run(drone: Drone, script: Script, place: str, silence_s: float) -> Running:
-    running = drone.start(script(drone))
+    vehicle = RemoteVehicle(link, f"UDP port {port}", silence_s=silence_s)
+    running = vehicle.drone.start(script(vehicle.drone))
     pacer, polled_us = Pacer(1.0), 0
-    time_us, reported_us, boot_us = 0, 0, 0  # simulated time; the vehicle's clock, and when that began
-    heard_s = wall_time_s()
-    while not running.is_done:
-        drone.frame(time_us)
-        attitude = drone.latest("ATTITUDE")
-        if attitude is not None and attitude.time_boot_ms * 1000 != reported_us:
-            if attitude.time_boot_ms * 1000 < reported_us:  # restarted: the script's time goes on
-                boot_us = time_us
-            reported_us, heard_s = attitude.time_boot_ms * 1000, wall_time_s()
-            time_us = boot_us + reported_us
-        elif wall_time_s() - heard_s > silence_s:
-            running.cancel()
-            raise ScriptError(f"{place}: no vehicle has been heard for {silence_s:g} s")
-        polled_us += POLL_US
-        pacer.wait_until(polled_us)
-    return running
+    try:
+        while not running.is_done:
+            vehicle.poll()
+            polled_us += POLL_US
+            pacer.wait_until(polled_us)
+        return running
+    finally:
+        running.cancel()
+        vehicle.close()
+
+
+class RemoteVehicle:
+    """A vehicle in another process, and its clock.
+
+    Args:
+        link: to it.
+        place: where it is looked for, in words.
+        system_id: its own.
+        silence_s: wall clock seconds without a message after which it is given up.
+    """
+
+    def __init__(self, link: ByteLink, place: str, *, system_id: int = 1, silence_s: float = SILENCE_S) -> None:
+        self._link, self._place, self._silence_s = link, place, silence_s
+        self.drone = Drone(link, system_id=system_id)
+        self._time_us = 0  # simulated
+        self._reported_us, self._boot_us = 0, 0  # the vehicle's clock, and when that began
+        self._heard_s = wall_time_s()
+
+    def poll(self) -> None:
+        """Takes in what has arrived, and runs the drone's scripts on.
+
+        Raises:
+            ScriptError: the vehicle has gone silent.
+        """
+        self.drone.frame(self._time_us)
+        attitude = self.drone.latest("ATTITUDE")
+        if attitude is not None and attitude.time_boot_ms * 1000 != self._reported_us:
+            if attitude.time_boot_ms * 1000 < self._reported_us:  # restarted: the script's time goes on
+                self._boot_us = self._time_us
+            self._reported_us, self._heard_s = attitude.time_boot_ms * 1000, wall_time_s()
+            self._time_us = self._boot_us + self._reported_us
+        elif wall_time_s() - self._heard_s > self._silence_s:
+            raise ScriptError(f"{self._place}: no vehicle has been heard for {self._silence_s:g} s")
+
+    def close(self) -> None:
+        """Closes the link."""
+        self._link.close()

@@ -125,7 +125,8 @@ class ArduPilotDrone(Drone):
     async def wait_disarmed(self, timeout_s: float = 120.0) -> None:
         """A rover stays armed where its mission ends: it is disarmed there."""
         if not self.drives:
-            return await super().wait_disarmed(timeout_s)
+            await super().wait_disarmed(timeout_s)
+            return
         await self.until(lambda: not self.is_armed or self.is_mission_complete, timeout_s, "mission complete")
         if self.is_armed:
             await self.disarm()

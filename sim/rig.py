@@ -41,10 +41,10 @@ class Rig:
 
     Args:
         airframe: the vehicle.
-        world: the ground they fly over, its origin the home they boot at; of a batch, vehicle i is in world i.
+        world: the ground they fly over, its origin the home; of a batch, vehicle i is in world i.
         sensor_model: noise and delays of the sensors.
         wind_model: the air.
-        home: where the vehicles boot; the origin of ned.
+        home: the origin of ned.
         vehicle_count: rows of every array.
         seed: seeds all noise; vehicle i draws from the stream (seed, i).
         has_estimator: False gives the controller the true state (training only).
@@ -53,6 +53,7 @@ class Rig:
         has_mirrors: the host sees copies of the rows, as those of a GPU.
         body: what is moved.
         law: what flies it.
+        start_ne_m: north and east of where the vehicles boot [m].
     """
 
     def __init__(
@@ -71,8 +72,10 @@ class Rig:
         has_mirrors: bool = False,
         body: Body = DEFAULT_BODY,
         law: ControlLaw = DEFAULT_LAW,
+        start_ne_m: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         start_warp()
+        self._start_ne_m = wp.vec2(*start_ne_m)
         self.body, self.law = body, law
         self._kernels = rig_kernels(body, law)
         self.vehicle_count = vehicle_count
@@ -145,7 +148,7 @@ class Rig:
         return commands
 
     def boot(self, chosen: Rows | None = None) -> None:
-        """Powers vehicles on, on the ground at home; `chosen` marks them, shape (vehicles,), None for all."""
+        """Powers vehicles on, on the ground where they boot; `chosen` marks them, shape (vehicles,), None for all."""
         mask = np.ones(self.vehicle_count, dtype=np.int32) if chosen is None else chosen.astype(np.int32)
         marks = wp.array(mask, dtype=int, device=self.device)
         self.boot_marked(marks)
@@ -160,8 +163,9 @@ class Rig:
         self.power_on(marks)
 
     def place(self, marks: Any) -> None:
-        """Puts marked vehicles on the ground at home, at rest and with a full battery."""
-        wp.launch(self._kernels.place, dim=self.vehicle_count, inputs=[self.arrays, marks], device=self.device)
+        """Puts marked vehicles on the ground where they boot, at rest and with a full battery."""
+        inputs = [self.arrays, marks, self._start_ne_m]
+        wp.launch(self._kernels.place, dim=self.vehicle_count, inputs=inputs, device=self.device)
 
     def power_on(self, marks: Any) -> None:
         """Powers the sensors and flight controllers of marked vehicles off and on, wherever they are."""

@@ -17,8 +17,14 @@ def check_file(path: Path) -> None:
 
 def check_run(folder: Path) -> None:
     """Refuses a folder that holds no run to be shown."""
-    if not any(folder.glob("flight*.ulg")):
+    if not any(folder.glob("flight*.ulg")) and not vehicle_folders(folder):
         refuse(f"{folder}: holds no run that can be shown: {LOG_FILE} is missing")
+
+
+def vehicle_folders(folder: Path) -> list[Path]:
+    """Those of the vehicles of a run that had several, in their order."""
+    found = [path.parent for path in folder.glob("vehicle-*/flight.ulg") if path.parent.name[8:].isdecimal()]
+    return sorted(found, key=lambda path: int(path.name[8:]))
 
 
 def check_task(name: str) -> None:

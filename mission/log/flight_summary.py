@@ -158,11 +158,12 @@ def _rotation_error_ned(q_est: Rows, q_true: Rows) -> Rows:
     return result
 
 
-def planned_path(plan: Plan, home: GeoPoint) -> list[tuple[int, Any]]:
-    """(seq, ned point) of each item with a position, behind the take-off point."""
-    path: list[tuple[int, Any]] = [(-1, np.zeros(3))]
+def planned_path(plan: Plan, home: GeoPoint, start_ne_m: tuple[float, float] = (0.0, 0.0)) -> list[tuple[int, Any]]:
+    """(seq, ned point) of each item with a position, behind the take-off point, to which a return leads."""
+    start_ned = np.array([*start_ne_m, 0.0])
+    path: list[tuple[int, Any]] = [(-1, start_ned)]
     for item in plan.items:
-        ned = item_ned(item, home, path[-1][1])
+        ned = start_ned if item.command == CMD_RETURN_TO_LAUNCH else item_ned(item, home, path[-1][1])
         if ned is not None:
             path.append((item.seq, ned))
     return path
@@ -175,8 +176,6 @@ def curved_items(plan: Plan) -> frozenset[int]:
 
 def item_ned(item: Any, origin: GeoPoint, previous: Any) -> Any:
     """Where an item leads [m], or None for items that are no place."""
-    if item.command == CMD_RETURN_TO_LAUNCH:
-        return np.zeros(3)
     if item.command not in PLACES:
         return None
     alt_amsl_m = item.z + (origin.alt_m if item.frame in (3, 6) else 0.0)

@@ -50,6 +50,7 @@ def flight_rig(
         seed=config.seed,
         body=body,
         law=vehicle.law,
+        start_ne_m=config.start_ne_m,
     )
     rig.prepare(FRAME_TICKS)
     return rig

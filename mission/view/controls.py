@@ -4,7 +4,7 @@ In: clicks, on viser's threads. Out: tasks for the flight's thread. Vehicle comm
 client over MAVLink, as any ground station's would; wind and motors are the simulator's own.
 """
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from math import hypot, isnan, nan
 from typing import Any
 
@@ -31,15 +31,20 @@ _LINES = 3  # what happened last: one thing soon follows another
 
 
 class Controls:
-    """Buttons and sliders of one flight.
+    """Buttons and sliders of one flight, or of the one of several that is chosen.
 
     Args:
         flight: what they act on.
         server: of the page.
         do: hands a task to the flight's thread.
         speed: at which the flight begins.
+        change_speed: sets it.
         has_plan: the vehicle has a mission, or is about to get one.
         goals: where its companion can be sent; a click on the ground is for it then.
+        others: other flights in its world.
+
+    Attributes:
+        flight: what they act on now.
     """
 
     def __init__(
@@ -48,20 +53,26 @@ class Controls:
         server: viser.ViserServer,
         do: Callable[[Callable[[], None]], None],
         speed: float | None,
+        change_speed: Callable[[float | None], None],
         *,
         has_plan: bool = False,
         goals: PoseGoals | None = None,
+        others: Sequence[FlightBase] = (),
     ) -> None:
-        self._flight, self._do, self._goals = flight, do, goals
+        self.flight, self._do, self._goals = flight, do, goals
+        self._flights = (flight, *others)
+        self._change_speed = change_speed
         self._buttons: list[viser.GuiButtonHandle] = []
-        self._running: Running | None = None
+        self._running: dict[int, Running] = {}  # by the vehicle's number
         self.is_paused = False
         self.follows = True
-        self._drives = flight.drives
-        self.lines: tuple[str, ...] = (f"click on the ground to {'drive' if self._drives else 'fly'} there",)
+        drives = all(each.drives for each in self._flights)
+        self.lines: tuple[str, ...] = (f"click on the ground to {'drive' if drives else 'fly'} there",)
+        if others:
+            self._add_vehicles(server.gui)
         if goals is not None:
             self._add_goals(server.gui, goals)
-        self._add_commands(server.gui, has_plan=has_plan)
+        self._add_commands(server.gui, has_plan=has_plan, drives=drives)
         self._add_pace(server.gui, speed)
         self._add_trouble(server.gui)
         server.scene.on_click()(self._clicked)
@@ -81,7 +92,7 @@ class Controls:
         def _(_: Any) -> None:
             if speed.value in SPEEDS:
                 chosen = SPEEDS[speed.value]
-                self._do(lambda: self._flight.change_speed(chosen))
+                self._do(lambda: self._change_speed(chosen))
 
         @follow.on_update
         def _(_: Any) -> None:
@@ -92,23 +103,33 @@ class Controls:
         for button in self._buttons:
             button.disabled = True
 
-    def _add_commands(self, gui: viser.GuiApi, *, has_plan: bool) -> None:
+    def _add_vehicles(self, gui: viser.GuiApi) -> None:
+        """A chooser of whom everything else is for."""
+        flights = {f"{each.drone.system_id} {each.airframe.name}": each for each in self._flights}
+        chooser = gui.add_dropdown("Vehicle", tuple(flights))
+
+        @chooser.on_update
+        def _(_: Any) -> None:
+            if chooser.value in flights:
+                self.flight = flights[chooser.value]
+
+    def _add_commands(self, gui: viser.GuiApi, *, has_plan: bool, drives: bool) -> None:
         with gui.add_folder("Vehicle"):
-            if not self._drives:
+            if not drives:
                 self._height = gui.add_slider(
                     "Height of gotos", min=LEAST_HEIGHT_M, max=HEIGHT_MAX_M, step=0.5, initial_value=CLIMB_M
                 )
                 self._add_command(gui, "Take off", self._take_off)
             self._add_command(gui, "Hold", _hold)
             self._add_command(gui, "Return", _return)
-            if not self._drives:
+            if not drives:
                 self._add_command(gui, "Land", _land)
             if has_plan:
-                self._add_command(gui, "Drive the mission" if self._drives else "Fly the mission", self._fly_mission)
-            if self._flight.owner is not None:
+                self._add_command(gui, "Drive the mission" if drives else "Fly the mission", self._fly_mission)
+            if self.flight.owner is not None:
                 self._add_command(gui, "Follow", self._follow)
             self._add_button(gui, "Restart", self._restart)
-            if self._drives:
+            if drives:
                 self._add_modes(gui)
 
     def _add_goals(self, gui: viser.GuiApi, goals: PoseGoals) -> None:
@@ -118,7 +139,7 @@ class Controls:
 
     def _add_modes(self, gui: viser.GuiApi) -> None:
         """A chooser of all modes, as ground stations have one."""
-        vehicle = class_of(self._flight.airframe).vehicle
+        vehicle = class_of(self.flight.airframe).vehicle
         dialect = PX4.of_vehicle(vehicle.modes, vehicle.ardupilot)  # the script's, whatever ground stations hear
         numbers = {row.name: dialect.custom_mode(row.mode) for row in dialect.modes if row.is_selectable}
         chooser = gui.add_dropdown("Mode", tuple(numbers), initial_value="Hold")
@@ -138,11 +159,11 @@ class Controls:
         self._buttons.append(button)
 
     def _add_trouble(self, gui: viser.GuiApi) -> None:
-        config = self._flight.config
+        config = self.flight.config
         with gui.add_folder("Trouble"):
             wind = gui.add_slider("Wind [m/s]", min=0.0, max=WIND_MAX_M_S, step=0.5, initial_value=config.wind_m_s)
             wind_from = gui.add_slider("from [deg]", min=0.0, max=360.0, step=5.0, initial_value=config.wind_from_deg)
-            numbers = tuple(str(i + 1) for i in range(self._flight.controller.state.motor_count))
+            numbers = tuple(str(i + 1) for i in range(self.flight.controller.state.motor_count))
             motor = gui.add_dropdown("Motor", numbers)
             kill = gui.add_button("Kill the motor", color="red")
             repair = gui.add_button("Repair all motors")
@@ -150,7 +171,7 @@ class Controls:
 
         def blow(_: Any) -> None:
             speed_m_s, from_deg = within(wind.value, 0.0, WIND_MAX_M_S), within(wind_from.value, 0.0, 360.0)
-            self._do(lambda: self._flight.set_wind(speed_m_s, from_deg))
+            self._do(lambda: self._blow(speed_m_s, from_deg))
 
         wind.on_update(blow)
         wind_from.on_update(blow)
@@ -167,20 +188,27 @@ class Controls:
 
     # On the flight's thread
 
+    def _blow(self, speed_m_s: float, from_deg: float) -> None:
+        for flight in self._flights:
+            flight.set_wind(speed_m_s, from_deg)
+
     def _break(self, motor: int, failure: Failure, text: str) -> None:
-        self._flight.injector.inject(Unit.MOTOR, failure, motor)
+        self.flight.injector.inject(Unit.MOTOR, failure, motor)
         self._say(text)
 
     def _start(self, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
         """Runs a script; the one that a click has started before is given up."""
-        if self._running is not None:
-            self._running.cancel()
-        self._running = self._flight.drone.start(self._reported(name, script))
+        drone = self.flight.drone
+        if drone.system_id in self._running:
+            self._running[drone.system_id].cancel()
+        self._running[drone.system_id] = drone.start(self._reported(drone, name, script))
 
-    async def _reported(self, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
+    async def _reported(self, drone: Drone, name: str, script: Callable[[Drone], Coroutine[Any, Any, None]]) -> None:
+        if len(self._flights) > 1:
+            name = f"vehicle {drone.system_id}: {name}"
         self._say(f"{name} …")
         try:
-            await script(self._flight.drone)
+            await script(drone)
         except ScriptError as error:
             self._say(f"{name}: {error}")
         else:
@@ -194,19 +222,19 @@ class Controls:
         return within(self._height.value, LEAST_HEIGHT_M, HEIGHT_MAX_M)
 
     def _restart(self) -> None:
-        if self._running is not None:
-            self._running.cancel()
-        self._flight.restart()
+        if running := self._running.get(self.flight.drone.system_id):
+            running.cancel()
+        self.flight.restart()
         self._say("Restart: back on the pad")
 
     async def _get_ready(self, drone: Drone) -> None:
         """Says at once why the vehicle cannot be armed; waits only while that may end by itself."""
-        state, commander = self._flight.controller.state, self._flight.controller.commander
+        state, commander = self.flight.controller.state, self.flight.controller.commander
         reasons = commander.check_arming()
         if not reasons or drone.is_armed:
             return
         why = f"cannot be armed: {', '.join(reasons)}"
-        if self._flight.is_crashed or state.time_us - state.boot_us > SETTLES_S * 1e6:
+        if self.flight.is_crashed or state.time_us - state.boot_us > SETTLES_S * 1e6:
             raise ScriptError(why)
         self._say(f"waits: {why}")
         await drone.wait_ready(SETTLES_S)
@@ -250,7 +278,7 @@ class Controls:
 
     def _clicked(self, event: viser.SceneClickEvent) -> None:
         """On a thread of viser's."""
-        world = self._flight.world
+        world = self.flight.world
         distance_m = world.ray_hit(event.ray_origin, event.ray_direction, FAR_M)
         if isnan(distance_m) or distance_m >= FAR_M:
             return
@@ -262,7 +290,7 @@ class Controls:
             return
         up = float(world.height(north, east))
         name = f"go to {north:.0f} m north, {east:.0f} m east ({hypot(north, east):.0f} m from home)"
-        go = self._drive_to if self._drives else self._fly_to
+        go = self._drive_to if self.flight.drives else self._fly_to
         self._do(lambda: self._start(name, lambda drone: go(drone, north, east, up)))
 
 

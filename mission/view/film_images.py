@@ -6,7 +6,7 @@ many at a time as there are cores: the camera's kernels and OpenCV let other thr
 
 import os
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from common.airframe import load_airframe
 from mission.view.box_painter import BoxPainter
 from mission.view.chase_camera import STRIDE, Floats, camera_path, looking
-from mission.view.flight_snapshot import Moment
+from mission.view.flight_snapshot import Moment, Row
 from mission.view.replay_file import Recording
 from mission.view.snapshot_images import Eye, onboard_eye
 from mission.view.vehicle_model import VehicleModel, turned_rad
@@ -36,7 +36,7 @@ def film(recording: Recording, world: WorldMap) -> Iterator[Image]:
     """The images, RGB, (HEIGHT, WIDTH, 3), one each `chase.IMAGE_S`."""
     recording = recording.every(STRIDE)
     places, targets = camera_path(recording, world)
-    turned = turned_rad(recording.rows)
+    turned = [turned_rad(each.rows) for each in (recording, *recording.others)]
     cores = len(os.sched_getaffinity(0))
     studios: SimpleQueue[Studio] = SimpleQueue()
     for _ in range(cores):
@@ -45,7 +45,8 @@ def film(recording: Recording, world: WorldMap) -> Iterator[Image]:
     def taken(i: int) -> Image:
         studio = studios.get()
         try:
-            return studio.image(recording.moment(i), places[i], targets[i], turned[i])
+            others = [other.rows[i] for other in recording.others]
+            return studio.image(recording.moment(i), others, places[i], targets[i], [each[i] for each in turned])
         finally:
             studios.put(studio)
 
@@ -69,16 +70,29 @@ class Studio:
         self._chase = Eye(world, WIDTH, HEIGHT, HFOV_DEG, range_m=RANGE_M)
         self._onboard = onboard_eye(world)
         self._boxes = BoxPainter(world)
-        self._model = VehicleModel(load_airframe(recording.config.airframe))
+        airframes = [load_airframe(each.config.airframe) for each in (recording, *recording.others)]
+        self._model, *self._others = [VehicleModel(airframe) for airframe in airframes]
 
-    def image(self, moment: Moment, place: Floats, target: Floats, turned: Floats) -> Image:
-        """A recorded moment, seen from a place [m] towards a target; `turned` [rad] are the wheels."""
+    def image(
+        self, moment: Moment, others: Sequence[Row], place: Floats, target: Floats, turned: Sequence[Floats]
+    ) -> Image:
+        """A recorded moment, seen from a place [m] towards a target.
+
+        Args:
+            moment: of the vehicle.
+            others: rows of other vehicles, which are not in the onboard image.
+            place: of the camera [m], ned.
+            target: where it looks [m], ned.
+            turned: the wheels of the vehicle and of the others [rad].
+        """
         row = moment.row
         q_ned_from_rdf = looking(place, target)
         self._chase.look(place, q_ned_from_rdf, row["owner"])
         image: Image = self._chase.rgb.copy()
         self._boxes.draw(image, self._chase, moment.tick, place, q_ned_from_rdf)
-        self._model.draw(image, self._chase, row, place, q_ned_from_rdf, turned)
+        for model, other, wheels in zip(self._others, others, turned[1:], strict=True):
+            model.draw(image, self._chase, other, place, q_ned_from_rdf, wheels)
+        self._model.draw(image, self._chase, row, place, q_ned_from_rdf, turned[0])
         place_on_board, q_on_board = self._onboard.look_from(row)
         seen: Image = self._onboard.rgb.copy()
         self._boxes.draw(seen, self._onboard, moment.tick, place_on_board, q_on_board)

@@ -64,6 +64,7 @@ def page_data(recording: Recording, world: WorldMap, title: str) -> Json:
         "blade": _mesh(shape.blade),
         "boxes": None if (boxes := shapes.boxes(world, movers=False)) is None else _mesh(boxes),
         "movers": _movers(recording, world),
+        "others": [_other(other) for other in recording.others],
         "wheel": _mesh(shape.wheels[0]) if shape.drives else None,
         "wheel_hubs": _array(shape.wheel_hubs),
         "is_steered": list(shape.is_steered),
@@ -124,6 +125,19 @@ def _movers(recording: Recording, world: WorldMap) -> list[Json]:
         for i, mesh in movers
         if places is not None
     ]
+
+
+def _other(recording: Recording) -> Json:
+    """Another vehicle in one piece, and where it is at each moment."""
+    shape = shapes.vehicle(load_airframe(recording.config.airframe))
+    turning = [(shape.blade, hub - (0.0, 0.0, 0.03)) for hub in shape.hubs]
+    turning += zip(shape.wheels, shape.wheel_hubs, strict=True)
+    parts = [shapes.Mesh((mesh.vertices + hub).astype(np.float32), mesh.faces, mesh.colours) for mesh, hub in turning]
+    return {
+        "mesh": _mesh(shapes.joined([shape.body, *parts])),
+        "place": _array(recording.rows["pos_ned"]),
+        "attitude": _array(recording.rows["q_ned_from_frd"]),
+    }
 
 
 def _plots(recording: Recording, *, drives: bool) -> list[Json]:

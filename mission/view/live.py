@@ -22,7 +22,8 @@ from mission.view.controls import Controls
 from mission.view.flight_snapshot import Moment, Row, moment_of
 from mission.view.panel import PLOT_PERIOD_S, Panel
 from mission.view.pose_goals import PoseGoals
-from mission.view.scene import Mount, Scene, chase_of, overview_of, wxyz_of
+from mission.view.scene import Mount, Scene, chase_of, overview_of
+from mission.view.vehicle_nodes import wxyz_of
 from sim.camera_rig import MOUNT_FRD, CameraRig
 
 UPDATE_S = 1.0 / 15.0
@@ -49,6 +50,8 @@ class LiveView:
         action: what a policy on board chose last.
         score: lines of text about how well it goes.
         goals: where its companion can be sent.
+        others: other flights in its world, shown as well; who looks can choose whom status and controls are of.
+        change_speed: sets the pace; None: the flight's own.
     """
 
     def __init__(
@@ -61,9 +64,11 @@ class LiveView:
         action: Callable[[], Row | None] = lambda: None,
         score: Callable[[], tuple[str, ...]] = tuple,
         goals: PoseGoals | None = None,
+        others: Sequence[FlightBase] = (),
+        change_speed: Callable[[float | None], None] | None = None,
     ) -> None:
         self._flight, self._server, self._action, self._score = flight, server, action, score
-        self._goals = goals
+        self._goals, self._others = goals, others
         self._todo: Queue[Callable[[], None]] = Queue(TASKS_MAX)
         self._camera = flight.controller.camera
         self._pixels: NDArray[np.uint8] | None = None  # newest image of the camera that a policy sees through
@@ -73,10 +78,16 @@ class LiveView:
             mount = Mount(MOUNT_FRD, flight.onboard.view.q_frd_from_rdf, flight.onboard.view.hfov_deg, 1, 1)
         self._camera_rig = CameraRig(flight.rig, flight.world, has_thread=True)
         self._pending: Future[RawFrame] | None = None
-        self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned)
+        airframes = [other.airframe for other in others]
+        self._scene = Scene(server, flight.world, flight.airframe, mount=mount, path_ned=path_ned, others=airframes)
         moment = self._moment()
         self._panel = Panel(server, has_owner=moment.has_owner, drives=self._scene.drives)
-        self._controls = Controls(flight, server, self._add_task, speed, has_plan=len(path_ned) > 0, goals=goals)
+        pace = change_speed or flight.change_speed
+        has_plan = len(path_ned) > 0
+        self._controls = Controls(
+            flight, server, self._add_task, speed, pace, has_plan=has_plan, goals=goals, others=others
+        )
+        self._chosen = flight
         for name, pose in () if goals is None else goals.named:
             self._scene.mark(name, pose)
         self._next_s = dict.fromkeys(("update", "status", "plots", "picture"), 0.0)
@@ -93,19 +104,22 @@ class LiveView:
             self._do_what_was_clicked()
         if self._flight.time_us * 1e-6 >= self._next_point_s:
             self._next_point_s = self._flight.time_us * 1e-6 + PLOT_PERIOD_S
-            self._panel.note(self._moment())
+            self._panel.note(self._chosen_moment())
         if self._is_due("update", UPDATE_S) and self._server.get_clients():
             self._update()
 
     def _moment(self) -> Moment:
         return moment_of(self._flight, self._action())
 
+    def _chosen_moment(self) -> Moment:
+        return self._moment() if self._chosen is self._flight else moment_of(self._chosen)
+
     def end(self, text: str) -> None:
         """The flight is over: the page shows its last moment and this text, and clicks do nothing any more."""
         self._controls.disable()
         moment = self._moment()
-        self._scene.show(moment)
-        self._show_texts(moment, text)
+        self._scene.show(moment, [moment_of(other) for other in self._others])
+        self._show_texts(self._chosen_moment(), text)
         self._panel.draw_plots()
         self._server.flush()
 
@@ -135,30 +149,35 @@ class LiveView:
 
     def _update(self) -> None:
         moment = self._moment()
-        if self._flight.restart_count != self._restart_count:
-            self._restart_count = self._flight.restart_count
+        restart_count = sum(flight.restart_count for flight in (self._flight, *self._others))
+        if restart_count != self._restart_count:
+            self._restart_count = restart_count
             self._scene.forget_trails()
-        self._scene.extend_trails(moment)
-        self._scene.show(moment)
+        others = [moment_of(other) for other in self._others]
+        self._scene.extend_trails(moment, others)
+        self._scene.show(moment, others)
         if self._goals is not None:
             self._scene.show_pose(self._goals.now())
-        obstacles = self._flight.controller.state.obstacles
+        if self._controls.flight is not self._chosen:
+            self._chosen, self._text_count = self._controls.flight, 0
+        chosen = self._chosen_moment()
+        obstacles = self._chosen.controller.state.obstacles
         if obstacles is not None and obstacles.body_m:
-            self._scene.draw_rays(moment, obstacles.body_m)
-        self._move_cameras(moment)
+            self._scene.draw_rays(chosen, obstacles.body_m)
+        self._move_cameras(chosen)
         if self._is_due("status", STATUS_S):
-            self._show_texts(moment)
+            self._show_texts(chosen)
         if self._is_due("plots", PLOTS_S):
             self._panel.draw_plots()
         if self._is_due("picture", IMAGE_S):
             self._renew_image()
 
     def _show_texts(self, moment: Moment, *more: str) -> None:
-        crash = ("the vehicle has crashed: Restart puts it back on its pad",) if self._flight.is_crashed else ()
+        crash = ("the vehicle has crashed: Restart puts it back on its pad",) if self._chosen.is_crashed else ()
         self._panel.show_status(moment, (*more, *crash, *self._score(), *self._controls.lines))
-        if self._flight.texts.count > self._text_count:
-            self._text_count = self._flight.texts.count
-            self._panel.show_texts(self._flight.texts.since(0))
+        if self._chosen.texts.count > self._text_count:
+            self._text_count = self._chosen.texts.count
+            self._panel.show_texts(self._chosen.texts.since(0))
 
     def _seen(self, frame: ImageFrame) -> None:
         self._pixels = frame.pixels[..., :3]

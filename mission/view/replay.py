@@ -80,7 +80,8 @@ def title_of(recording: Recording) -> str:
     config = recording.config
     name = load_airframe(config.airframe).name
     owner = "" if config.owner is None else f", the owner {config.owner.pace}s"
-    return f"{name}, wind {config.wind_m_s:g} m/s, seed {config.seed}{owner}"
+    others = f" and {len(recording.others)} more" if recording.others else ""
+    return f"{name}{others}, wind {config.wind_m_s:g} m/s, seed {config.seed}{owner}"
 
 
 class ReplayView:
@@ -90,7 +91,8 @@ class ReplayView:
         self._recording, self._server = recording, server
         mount = Mount(MOUNT_FRD, camera_mount(), HFOV_DEG, 1, 1)
         airframe = load_airframe(recording.config.airframe)
-        self._scene = Scene(server, world, airframe, mount=mount, path_ned=recording.path_ned.tolist())
+        others = [load_airframe(other.config.airframe) for other in recording.others]
+        self._scene = Scene(server, world, airframe, mount=mount, path_ned=recording.path_ned.tolist(), others=others)
         self._panel = Panel(server, has_owner=recording.has_owner, drives=self._scene.drives)
         self._eye = onboard_eye(world)
         for row in recording.every(round(PLOT_PERIOD_S * 1e6 / FRAME_US)).rows:
@@ -124,7 +126,8 @@ class ReplayView:
             if abs(index - self._shown) > 2 * TRAIL_FRAMES:
                 self._draw_trails(index)
             self._shown = index
-            self._scene.show(self._recording.moment(index))
+            others = [other.moment(index) for other in self._recording.others]
+            self._scene.show(self._recording.moment(index), others)
 
     def _show_slow(self, index: int) -> None:
         moment = self._recording.moment(index)
@@ -134,7 +137,9 @@ class ReplayView:
         self._panel.show_image(self._eye.rgb.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1))
 
     def _draw_trails(self, index: int) -> None:
-        self._scene.draw_trails(self._recording.rows[: index + 1 : TRAIL_FRAMES])
+        past = slice(0, index + 1, TRAIL_FRAMES)
+        others = [other.rows[past] for other in self._recording.others]
+        self._scene.draw_trails(self._recording.rows[past], others)
 
     def _place_camera(self, client: viser.ClientHandle) -> None:
         eye_ned, target_ned = chase_of(self._recording.moment(max(self._shown, 0)), drives=self._scene.drives)

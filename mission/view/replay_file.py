@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pyulog import ULog
 
 from common.airframe import load_airframe
-from mission.console.name_checks import LOG_FILE
+from mission.console.name_checks import LOG_FILE, vehicle_folders
 from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig
 from mission.log.motion_topics import STEERING_TOPIC
@@ -41,6 +41,7 @@ class Recording:
     config: FlightConfig
     rows: NDArray[Any]  # of MOMENT, (moments,)
     path_ned: NDArray[np.float32]  # [m] (n, 3) of its plan; empty without one
+    others: tuple["Recording", ...] = ()  # of other vehicles in its world, at the same moments
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -59,7 +60,13 @@ class Recording:
 
     def every(self, frames: int) -> "Recording":
         """The same with fewer moments."""
-        return Recording(self.config, self.rows[::frames], self.path_ned)
+        others = tuple(other.every(frames) for other in self.others)
+        return Recording(self.config, self.rows[::frames], self.path_ned, others)
+
+    def at(self, time_s: NDArray[np.float64]) -> "Recording":
+        """The same at other moments, each the last one that it has till then."""
+        found = np.searchsorted(self.rows["time_s"], time_s, side="right") - 1
+        return Recording(self.config, self.rows[np.maximum(found, 0)], self.path_ned)
 
 
 def keep_for_replay(
@@ -91,11 +98,21 @@ def _pieces(text: str) -> list[str]:
 
 
 def load_recording(folder: Path) -> Recording:
-    """The recording of a run.
+    """The recording of a run; of several vehicles that of the first, with the others.
 
     Raises:
         RecordingError: there is none, or it cannot be read.
     """
+    vehicles = vehicle_folders(folder)
+    if not vehicles:
+        return _load_one(folder)
+    first, *others = (_load_one(vehicle) for vehicle in vehicles)
+    times: NDArray[np.float64] = first.rows["time_s"]
+    return Recording(first.config, first.rows, first.path_ned, tuple(other.at(times) for other in others))
+
+
+def _load_one(folder: Path) -> Recording:
+    """The recording of one vehicle; as `load_recording`."""
     parts = sorted((path for path in folder.glob("flight*.ulg") if _part_number(path)), key=_part_number)
     if not parts:
         raise RecordingError(f"{folder}: holds no run that can be shown: {LOG_FILE} is missing")

@@ -4,13 +4,12 @@ In: a world once, then moments. Out: nodes of viser's scene; only what moves is 
 nothing after a browser has loaded it.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan, radians, tan
 from typing import Any
 
 import numpy as np
-import trimesh
 import viser
 from numpy.typing import NDArray
 
@@ -19,23 +18,21 @@ from common.attitude import quat_of, yaw_of
 from mission.view import shapes
 from mission.view.flight_snapshot import Moment
 from mission.view.pose_goals import Pose
+from mission.view.vehicle_nodes import TRAIL_M, Trail, VehicleNodes, add_mesh, segments, wxyz_of
 from sim.world.world import WorldMap
 
 VEHICLE_RGB, OWNER_RGB, GOAL_RGB, PLAN_RGB = (40, 110, 220), (232, 120, 32), (220, 40, 90), (250, 250, 250)
 STATURE_M = 1.75
 ARRIVED_M = 1.0  # a goal nearer than this is not shown: it would hide the vehicle
-PLAN_M, TRAIL_M = 0.25, 0.05  # how thick they are: a plan is seen on both sides of the trail that covers it
+PLAN_M = 0.25  # how thick it is: it is seen on both sides of the trail that covers it
+OTHERS_RGB = ((30, 150, 140), (150, 80, 190), (190, 140, 30), (110, 120, 130), (200, 80, 130), (90, 150, 50))
 TRAIL_LIFT_M = 0.1  # of what walks on the ground, which would hide its trail
-TRAIL_POINTS = 600
-TRAIL_PERIOD_S = 0.25
-BLADE_TURNS_PER_S = 2.7  # shown; at their true speed blades would stand still or seem to turn backwards
 RAY_RGB, RAY_M = (240, 200, 60), 0.02
 MARK_M = 0.6  # above the ground
 ARROW = np.array(
     [[(-0.35, 0.0, 0.0), (0.35, 0.0, 0.0)], [(0.35, 0.0, 0.0), (0.1, -0.2, 0.0)], [(0.35, 0.0, 0.0), (0.1, 0.2, 0.0)]],
     np.float32,
 )
-JUMP_S = 1.0  # wheels do not catch up with more
 SKY_RGB = (190, 212, 232)
 
 
@@ -59,6 +56,7 @@ class Scene:
         airframe: of the vehicle.
         mount: of its camera; None: it has none.
         path_ned: [m] (n, 3) way that it is to fly; empty without a plan.
+        others: airframes of the other vehicles.
     """
 
     def __init__(
@@ -69,6 +67,7 @@ class Scene:
         *,
         mount: Mount | None = None,
         path_ned: Sequence[Sequence[float]] = (),
+        others: Sequence[Airframe] = (),
     ) -> None:
         self._api = server.scene
         self._api.set_up_direction("-z")
@@ -78,55 +77,33 @@ class Scene:
         self._world = world
         self._movers: list[tuple[int, viser.FrameHandle]] = []
         self._add_world(world)
-        self._shown_s: float | None = None
         self._pose: viser.FrameHandle | None = None  # that the vehicle shall stand in
         self._rays: Any = None  # lines, once there have been some
-        self._wheels: list[viser.FrameHandle] = []
-        self._vehicle = self._api.add_frame("/vehicle", axes_length=0.4, axes_radius=0.008)
-        shape = shapes.vehicle(airframe)
-        blade = shape.blade
-        self._add_mesh("/vehicle/frame", shape.body)
-        self._blades = [
-            self._api.add_mesh_simple(
-                f"/vehicle/blade{i}", blade.vertices, blade.faces, color=shapes.BLADE, position=hub - (0, 0, 0.03)
-            )
-            for i, hub in enumerate(shape.hubs)
+        self._vehicle = VehicleNodes(self._api, "vehicle", airframe, VEHICLE_RGB)
+        self._others = [
+            VehicleNodes(self._api, f"vehicle{k}", other, OTHERS_RGB[k % len(OTHERS_RGB)])
+            for k, other in enumerate(others, 2)
         ]
-        self._spins = shape.spins
-        for i, (mesh, hub) in enumerate(zip(shape.wheels, shape.wheel_hubs, strict=True)):
-            self._add_mesh(f"/vehicle/wheel{i}/mesh", mesh)
-            self._wheels.append(self._api.add_frame(f"/vehicle/wheel{i}", show_axes=False, position=hub))
-        self._is_steered = shape.is_steered
-        self._turned_rad = np.zeros(len(self._wheels))
         self._owner = self._api.add_frame("/owner", show_axes=False, visible=False)
-        self._add_mesh("/owner/body", shapes.person(STATURE_M))
+        add_mesh(self._api, "/owner/body", shapes.person(STATURE_M))
         self._goal = self._api.add_icosphere("/goal", radius=0.35, color=GOAL_RGB, opacity=0.7, visible=False)
         self.frustum = None if mount is None else self._frustum(mount)
-        self._trails = {
-            "vehicle": Trail(self._api, "/trails/vehicle", VEHICLE_RGB),
-            "owner": Trail(self._api, "/trails/owner", OWNER_RGB),
-        }
+        self._owner_trail = Trail(self._api, "/trails/owner", OWNER_RGB)
         if len(path_ned) > 1:
             plan = np.array(path_ned, np.float32)
-            self._api.add_line_segments("/plan", _segments(plan), PLAN_RGB, thickness=PLAN_M)
-
-    def _add_mesh(self, name: str, mesh: shapes.Mesh) -> None:
-        linear = (255.0 * (mesh.colours / 255.0) ** 2.2).astype(np.uint8)  # glTF's vertex colours are linear light
-        self._api.add_mesh_trimesh(
-            name, trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=linear, process=False)
-        )
+            self._api.add_line_segments("/plan", segments(plan), PLAN_RGB, thickness=PLAN_M)
 
     def _add_world(self, world: WorldMap) -> None:
-        self._add_mesh("/world/ground", shapes.ground(world))
+        add_mesh(self._api, "/world/ground", shapes.ground(world))
         ring = shapes.walls(world)
         if ring is not None:
-            self._add_mesh("/world/walls", ring)
+            add_mesh(self._api, "/world/walls", ring)
         boxes = shapes.boxes(world, movers=False)
         if boxes is not None:
-            self._add_mesh("/world/boxes", boxes)
+            add_mesh(self._api, "/world/boxes", boxes)
         for i, mesh in shapes.moving_boxes(world):
             self._movers.append((i, self._api.add_frame(f"/world/mover{i}", show_axes=False)))
-            self._add_mesh(f"/world/mover{i}/box", mesh)
+            add_mesh(self._api, f"/world/mover{i}/box", mesh)
         forest = shapes.trees(world)
         count = len(forest.trunk_ned)
         if count == 0:
@@ -163,17 +140,18 @@ class Scene:
     @property
     def drives(self) -> bool:
         """Whether the vehicle has wheels."""
-        return len(self._wheels) > 0
+        return self._vehicle.drives
 
-    def show(self, moment: Moment) -> None:
-        """Moves what moves."""
-        self._vehicle.position = moment.pos_ned
-        self._vehicle.wxyz = wxyz_of(moment.q_ned_from_frd)
-        speeds = moment.row["motor_speed"][: len(self._blades)]
-        for handle, spin, speed in zip(self._blades, self._spins, speeds, strict=True):
-            if speed > 1.0:
-                handle.wxyz = wxyz_of(quat_of(2.0 * np.pi * BLADE_TURNS_PER_S * spin * moment.time_s, 0.0))
-        self._turn_wheels(moment)
+    def show(self, moment: Moment, others: Sequence[Moment] = ()) -> None:
+        """Moves what moves.
+
+        Args:
+            moment: of the vehicle.
+            others: of the other vehicles.
+        """
+        self._vehicle.show(moment)
+        for nodes, other in zip(self._others, others, strict=False):
+            nodes.show(other)
         if self._movers:
             places = self._world.boxes.middle(moment.tick)
             for i, mover in self._movers:
@@ -181,8 +159,7 @@ class Scene:
         if moment.has_owner:
             self._owner.position = moment.owner_ned
             self._owner.wxyz = wxyz_of(quat_of(float(moment.row["owner"]["heading_rad"]), 0.0))
-            self._trails["owner"].lead_to(_lifted(moment.owner_ned))
-        self._trails["vehicle"].lead_to(moment.pos_ned)
+            self._owner_trail.lead_to(_lifted(moment.owner_ned))
         self._owner.visible = moment.has_owner
         has_goal = bool(np.linalg.norm(moment.goal_ned - moment.pos_ned) > ARRIVED_M)  # False for NaN
         if has_goal:
@@ -223,85 +200,30 @@ class Scene:
     def _over_ground(self, pose: Pose, above_m: float) -> tuple[float, float, float]:
         return pose[0], pose[1], -float(self._world.height(pose[0], pose[1])) - above_m
 
-    def _turn_wheels(self, moment: Moment) -> None:
-        """By what they have turned since the moment shown before; not after a jump in time."""
-        passed_s = 0.0 if self._shown_s is None else moment.time_s - self._shown_s
-        self._shown_s = moment.time_s
-        if abs(passed_s) < JUMP_S:
-            self._turned_rad += passed_s * moment.row["motor_speed"][: len(self._wheels)]
-        for wheel, turned_rad, is_steered in zip(self._wheels, self._turned_rad, self._is_steered, strict=True):
-            steering_rad = float(moment.row["steering_rad"]) if is_steered else 0.0
-            wheel.wxyz = wxyz_of(shapes.wheel_attitude(float(turned_rad), steering_rad))
-
-    def extend_trails(self, moment: Moment) -> None:
+    def extend_trails(self, moment: Moment, others: Sequence[Moment] = ()) -> None:
         """Appends where everybody is; `show` leads on from there."""
-        self._trails["vehicle"].extend(moment.time_s, moment.pos_ned)
+        self._vehicle.trail.extend(moment.time_s, moment.pos_ned)
+        for nodes, other in zip(self._others, others, strict=False):
+            nodes.trail.extend(other.time_s, other.pos_ned)
         if moment.has_owner:
-            self._trails["owner"].extend(moment.time_s, _lifted(moment.owner_ned))
+            self._owner_trail.extend(moment.time_s, _lifted(moment.owner_ned))
 
     def forget_trails(self) -> None:
         """Somebody has been put elsewhere."""
-        for trail in self._trails.values():
+        for trail in (self._vehicle.trail, self._owner_trail, *(nodes.trail for nodes in self._others)):
             trail.forget()
 
-    def draw_trails(self, rows: NDArray[Any]) -> None:
-        """Draws them anew from rows of a recording that may have jumped."""
-        self._trails["vehicle"].draw(rows["pos_ned"])
+    def draw_trails(self, rows: NDArray[Any], others: Sequence[NDArray[Any]] = ()) -> None:
+        """Draws them anew from rows of recordings that may have jumped."""
+        self._vehicle.trail.draw(rows["pos_ned"])
+        for nodes, other in zip(self._others, others, strict=False):
+            nodes.trail.draw(other["pos_ned"])
         if len(rows) and Moment(rows[0]).has_owner:
-            self._trails["owner"].draw(_lifted(rows["owner"]["pos_ned"]))
-
-
-class Trail:
-    """Where something has been, as a line that forgets its beginning."""
-
-    def __init__(self, api: viser.SceneApi, name: str, rgb: tuple[int, int, int]) -> None:
-        self._api, self._name, self._rgb = api, name, rgb
-        self._points: list[NDArray[np.float32]] = []
-        self._lines: dict[str, Any] = {}
-        self._next_s = 0.0
-
-    def extend(self, time_s: float, point_ned: NDArray[np.float32]) -> None:
-        """Appends a place when it is time for one."""
-        if time_s >= self._next_s:
-            self._next_s = time_s + TRAIL_PERIOD_S
-            self.draw([*self._points[-TRAIL_POINTS:], point_ned])
-
-    def draw(self, points_ned: Iterable[NDArray[np.float32]]) -> None:
-        """Draws the line through these places; a single one draws none."""
-        self._points = [np.array(point, np.float32) for point in points_ned]
-        if len(self._points) > 1:
-            self._draw_line(self._name, np.array(self._points))
-
-    def lead_to(self, point_ned: NDArray[np.float32]) -> None:
-        """From its newest place to where something is now: a trail does not lag."""
-        if self._points:
-            self._draw_line(f"{self._name}/head", np.array([self._points[-1], point_ned], np.float32))
-
-    def forget(self) -> None:
-        """Begins anew from the next place on."""
-        self._points = []
-
-    def _draw_line(self, name: str, points_ned: NDArray[np.float32]) -> None:
-        if np.isnan(points_ned).any():
-            return
-        if name in self._lines:
-            self._lines[name].points = _segments(points_ned)
-        else:
-            self._lines[name] = self._api.add_line_segments(name, _segments(points_ned), self._rgb, thickness=TRAIL_M)
+            self._owner_trail.draw(_lifted(rows["owner"]["pos_ned"]))
 
 
 def _lifted(points_ned: NDArray[np.float32]) -> NDArray[np.float32]:
     return points_ned - np.array([0.0, 0.0, TRAIL_LIFT_M], np.float32)
-
-
-def _segments(points: NDArray[np.floating]) -> NDArray[np.float32]:
-    return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
-
-
-def wxyz_of(q_xyzw: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    """Warp's order as viser's."""
-    x, y, z, w = q_xyzw
-    return w, x, y, z
 
 
 def chase_of(moment: Moment, *, drives: bool = False) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -13,6 +13,7 @@ from sim.bodies.multirotor import (
     truth_of,
 )
 from sim.bodies.multirotor_model import MultirotorModel, multirotor_model
+from sim.world.neighbours import Outline, ball_outline
 
 
 class Body(NamedTuple):
@@ -37,6 +38,8 @@ class Body(NamedTuple):
     """Makes a `Model` from the airframe file and the altitude of home [m]."""
     substep: Any = None
     """As `tick`, a millisecond of it, for boards that fly it at 1,000 Hz; None: 250 Hz are enough for it."""
+    outline: Callable[[Any], Outline] = ball_outline
+    """What other vehicles meet of one, from a row of its `Model`."""
 
 
 MULTIROTOR_BODY = Body(

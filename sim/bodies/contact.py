@@ -13,6 +13,7 @@ import warp as wp
 from common.airframes.multirotor import MultirotorAirframe
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import vec8
+from sim.world.neighbours import neighbour_touched
 from sim.world.world import World, ground_height, ground_normal_ned, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
@@ -56,6 +57,9 @@ class Surroundings:
     obstacle_normal_ned: wp.vec3  # from the obstacle to the vehicle
     obstacle_depth_m: float  # negative: gap between hull sphere and obstacle, at most the margin
     is_near_obstacle: int
+    obstacle_vel_ned: wp.vec3  # [m/s] of another vehicle; all else stands as far as contact goes
+    obstacle_shift_ned: wp.vec3  # [m] how far it has gone since it was looked up
+    obstacle_rigidity: float  # fraction of a rigid obstacle's push: less where the other hull yields too
 
 
 @wp.struct
@@ -94,6 +98,13 @@ def look_around(world: World, model: ContactModel, pos_ned: wp.vec3) -> Surround
         around.is_near_obstacle = 1
         around.obstacle_normal_ned = wp.vec3(touch[0], touch[1], touch[2])
         around.obstacle_depth_m = touch[3] - _OBSTACLE_MARGIN_M
+        around.obstacle_rigidity = 1.0
+        seen_m = model.hull_radius_m + _OBSTACLE_MARGIN_M
+        other = neighbour_touched(world.neighbours, world.boxes.tick, pos_ned, seen_m, touch[3])
+        if other >= 0:
+            stiffness_n_m = world.neighbours.rows[other].stiffness_n_m
+            around.obstacle_vel_ned = world.neighbours.rows[other].vel_ned
+            around.obstacle_rigidity = stiffness_n_m / (stiffness_n_m + 4.0 * model.normal_n_m)  # springs in series
     return around
 
 
@@ -173,13 +184,13 @@ def ground_contact(
 def obstacle_force(
     model: ContactModel, around: Surroundings, contact: ContactForce, pos_ned: wp.vec3, vel_ned: wp.vec3
 ) -> ContactForce:
-    """Adds the push of a trunk, crown or wall on the hull sphere, frictionless, to a contact."""
+    """Adds the push of a trunk, crown, wall or other vehicle on the hull sphere, frictionless, to a contact."""
     normal = around.obstacle_normal_ned
-    depth = around.obstacle_depth_m - wp.dot(normal, pos_ned - around.origin_ned)
+    depth = around.obstacle_depth_m - wp.dot(normal, pos_ned - around.origin_ned - around.obstacle_shift_ned)
     if depth > 0.0:
-        normal_speed = wp.dot(normal, vel_ned)
+        normal_speed = wp.dot(normal, vel_ned - around.obstacle_vel_ned)
         push = 4.0 * (model.normal_n_m * depth - model.normal_n_s_m * normal_speed)  # as all four feet together
-        contact.force_ned += normal * wp.max(push, 0.0)
+        contact.force_ned += normal * (around.obstacle_rigidity * wp.max(push, 0.0))
         contact.impact_speed_m_s = wp.max(contact.impact_speed_m_s, -normal_speed)
     return contact
 

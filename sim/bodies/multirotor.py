@@ -297,6 +297,7 @@ def body_tick(model: MultirotorModel, body: BodyState, command: vec8, wind_ned: 
     substeps = int(_SUBSTEP_COUNT)  # a dynamic loop: unrolled it is a tenth slower
     for _step in range(substeps):
         body = _substep(model, body, inputs)
+        inputs.around.obstacle_shift_ned += inputs.dt * inputs.around.obstacle_vel_ned
         accel_sum += body.accel_frd
         gyro_sum += body.gyro_frd
     body.accel_frd = accel_sum / float(_SUBSTEP_COUNT)

@@ -7,6 +7,8 @@ both axles half each. Left out: unsprung masses, momentum of the wheels, camber,
 below its grid, wheels on top of kerbs and other boxes (the hull stops at them).
 """
 
+from typing import Any
+
 import warp as wp
 
 from common.geodesy import GRAVITY_M_S2
@@ -19,6 +21,7 @@ from sim.bodies.rover_hull import HullContact, hull_contact, is_near_obstacle, l
 from sim.bodies.rover_model import RoverModel, rover_model
 from sim.bodies.rover_wheels import WheelStep, steered_frd, wheel_step
 from sim.truth import Truth
+from sim.world.neighbours import Outline
 from sim.world.world import World, ground_height, ground_normal_ned
 
 wp.set_module_options({"enable_backward": False})
@@ -279,6 +282,7 @@ def rover_tick(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.
     substeps = int(_SUBSTEP_COUNT)  # a dynamic loop, as the multirotor's
     for _step in range(substeps):
         body = _substep(model, body, inputs, hull)
+        hull.other_shift_ned += _SUBSTEP_S * hull.other_vel_ned
         accel_sum += body.accel_frd
         gyro_sum += body.gyro_frd
     body.accel_frd = accel_sum / float(_SUBSTEP_COUNT)
@@ -328,4 +332,15 @@ def rover_standing_height(model: RoverModel) -> float:
     return model.standing_m
 
 
-ROVER_BODY = Body(RoverModel, RoverState, rover_tick, rover_truth, rover_at_rest, rover_standing_height, rover_model)
+def rover_outline(model: Any) -> Outline:
+    """The box of its hull, upright, from a row of its `RoverModel`."""
+    front_m, rear_m = float(model["hull_front_m"]), float(model["hull_rear_m"])
+    top_m, bottom_m = float(model["hull_top_m"]), float(model["hull_bottom_m"])
+    half_size_m = (0.5 * (front_m + rear_m), float(model["hull_half_width_m"]), 0.5 * (top_m + bottom_m))
+    middle_m = 0.5 * (front_m - rear_m), 0.5 * (top_m - bottom_m)
+    return Outline(half_size_m, False, float(model["scrape_n_m"]), *middle_m)
+
+
+ROVER_BODY = Body(
+    RoverModel, RoverState, rover_tick, rover_truth, rover_at_rest, rover_standing_height, rover_model, rover_outline
+)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import warp as wp
 
 from sim.bodies.rover_model import RoverModel
+from sim.world.neighbours import neighbour_touched
 from sim.world.world import World, ground_height, obstacle_contact
 
 wp.set_module_options({"enable_backward": False})
@@ -42,6 +43,9 @@ class HullContact:
     normal_z: Vec10
     offset_m: Vec10  # of each plane along its normal: a ball's centre below it touches
     slid_m: Vec10  # of each ball along its side, from where `outline_frd` has it
+    other_vel_ned: wp.vec3  # [m/s] of another vehicle that is near
+    other_shift_ned: wp.vec3  # [m] how far it has gone since it was looked up
+    other_rigidity: float  # fraction of a rigid obstacle's push: less where the other hull yields too
 
 
 @wp.struct
@@ -135,6 +139,13 @@ def look_at_hull(
         hull.is_near_ground = 1
     hull.is_near = wp.max(hull.is_near_ground, is_near)
     if is_near == 1:
+        hull.other_rigidity = 1.0
+        reach_m = model.hull_reach_m + _MARGIN_M
+        other = neighbour_touched(world.neighbours, world.boxes.tick, pos_ned, reach_m, 0.0)
+        if other >= 0:  # whatever else is touched in this tick is taken to move and to yield as it does
+            stiffness_n_m = world.neighbours.rows[other].stiffness_n_m
+            hull.other_vel_ned = world.neighbours.rows[other].vel_ned
+            hull.other_rigidity = stiffness_n_m / (stiffness_n_m + model.scrape_n_m)  # springs in series
         for point in range(int(_POINTS)):
             centre_ned = pos_ned + wp.quat_rotate(q_ned_from_frd, outline_frd(model, point))
             most_m = most_slide(model, point)
@@ -163,11 +174,12 @@ def add_point(
     normal_frd: wp.vec3,
     vel_frd: wp.vec3,
     omega_frd: wp.vec3,
+    rigidity: float,
 ) -> HullForce:
     """Adds the push and the friction at one point that lies `depth_m` deep."""
     vel_point = vel_frd + wp.cross(omega_frd, arm_frd)
     normal_speed = wp.dot(vel_point, normal_frd)
-    push = wp.max(model.scrape_n_m * depth_m - model.scrape_n_s_m * normal_speed, 0.0)
+    push = rigidity * wp.max(model.scrape_n_m * depth_m - model.scrape_n_s_m * normal_speed, 0.0)
     slide = vel_point - normal_speed * normal_frd
     drag = _FRICTION * push / wp.max(wp.length(slide), _STICKING_M_S)
     force = push * normal_frd - drag * slide
@@ -194,15 +206,17 @@ def hull_contact(
             arm_frd = wp.vec3(x, y, z)
             depth_m = -height_m - wp.dot(normal_frd, arm_frd)
             if depth_m > 0.0:
-                total = add_point(model, total, depth_m, arm_frd, normal_frd, vel_frd, omega_frd)
+                total = add_point(model, total, depth_m, arm_frd, normal_frd, vel_frd, omega_frd, 1.0)
     if hull.is_near_obstacle == 1:
+        past_frd = vel_frd - to_frd * hull.other_vel_ned
         for point in range(int(_POINTS)):
             normal_ned = wp.vec3(hull.normal_x[point], hull.normal_y[point], hull.normal_z[point])
             arm_frd = outline_frd(model, point) + hull.slid_m[point] * slide_frd(point)
             centre_ned = pos_ned + rot * arm_frd
-            depth_m = hull.offset_m[point] - wp.dot(normal_ned, centre_ned)
+            depth_m = hull.offset_m[point] - wp.dot(normal_ned, centre_ned - hull.other_shift_ned)
             if depth_m > 0.0 and wp.length_sq(normal_ned) > 0.5:
                 normal_frd = to_frd * normal_ned
                 arm_frd -= ball_radius(model, point) * normal_frd
-                total = add_point(model, total, depth_m, arm_frd, normal_frd, vel_frd, omega_frd)
+                rigidity = hull.other_rigidity
+                total = add_point(model, total, depth_m, arm_frd, normal_frd, past_frd, omega_frd, rigidity)
     return total

@@ -18,9 +18,10 @@ from sim.rig import Rig
 from sim.truth import Truth
 from sim.world.boxes import Box, box_middle, in_box_axes
 from sim.world.growing import bucket_of
+from sim.world.neighbours import neighbour_box
 from sim.world.trees import Forest, Tree
 from sim.world.walls import slab
-from sim.world.world import World, WorldMap, world_at
+from sim.world.world import World, WorldMap, ground_height, world_at
 
 wp.set_module_options({"enable_backward": False})
 
@@ -31,6 +32,7 @@ _SECTORS = wp.constant(SECTORS)
 _PER_SECTOR = wp.constant(RAYS_PER_SECTOR)
 _RAYS = wp.constant(SECTORS * RAYS_PER_SECTOR)
 _RAY_RAD = wp.constant(2.0 * math.pi / (SECTORS * RAYS_PER_SECTOR))
+_LOW_M = wp.constant(1.0)  # another vehicle that flies higher does not stand on the ground
 _STREAM = wp.constant(203)  # of the rig's seeds
 _STD_M = wp.constant(0.02)  # for a noise of 1; Slamtec RPLIDAR S2 data sheet: 3 cm
 _MISSES = wp.constant(0.01)  # fraction of sectors without a return, for a noise of 1; guess
@@ -136,6 +138,11 @@ def ring_ranges(
     boxes = world.boxes
     for i_box in range(boxes.box_count):
         add_box(boxes.boxes[i_box], boxes.tick, place, heading, ranges_m, i)
+    for k in range(world.neighbours.count):
+        if k != world.neighbours.i_own:
+            box = neighbour_box(world.neighbours.rows[k], boxes.tick)
+            if box.low - ground_height(world, box.north, box.east) < _LOW_M:
+                add_box(box, 0, place, heading, ranges_m, i)
     add_trunks(world.forest, place, heading, ranges_m, i)
     if world.walls.is_built == 1:
         inner = world.walls.half_size_m

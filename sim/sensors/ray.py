@@ -1,4 +1,4 @@
-"""What a camera ray meets first: ground, a trunk, a crown, a wall, or the sky.
+"""What a camera ray meets first: ground, a trunk, a crown, a wall, another vehicle, or the sky.
 
 Exact for the world's shapes inside the map, like `sim.world.world.ray_hit`, and quicker by the skyline. Beyond the map
 the ground is taken as it continues from the edge. Asked for every pixel, and once more for its shadow.
@@ -7,6 +7,7 @@ the ground is taken as it continues from the edge. Asked for every pixel, and on
 import warp as wp
 
 from sim.sensors.skyline import BLOCK_BUCKETS, Skyline
+from sim.world.neighbours import Neighbours, neighbour_ray_hit
 from sim.world.terrain import terrain_height, terrain_ray_hit
 from sim.world.trees import Forest, Tree, tree_ray_hit
 from sim.world.walls import walls_ray_hit
@@ -20,6 +21,7 @@ TRUNK = wp.constant(2)
 CROWN = wp.constant(3)
 WALL = wp.constant(4)
 PERSON = wp.constant(5)  # drawn by the fast camera only
+VEHICLE = wp.constant(6)
 
 RAY_MAX_M = wp.constant(4000.0)  # beyond it fog hides everything
 _NEVER = wp.constant(1.0e30)
@@ -33,8 +35,8 @@ class Hit:
     """The first thing a ray meets."""
 
     t: float  # [m] along the unit ray
-    kind: int  # SKY, GROUND, TRUNK, CROWN or WALL
-    i_tree: int
+    kind: int  # SKY, GROUND, TRUNK, CROWN, WALL or VEHICLE
+    i_tree: int  # or which vehicle
 
 
 @wp.func
@@ -156,6 +158,25 @@ def first_hit(w: World, skyline: Skyline, origin_ned: wp.vec3, dir_ned: wp.vec3,
         t = t_exit
     if hit.kind == SKY:
         hit = beyond_map(w, origin_ned, dir_ned, hit)
+    if w.neighbours.count > 0:
+        hit = neighbour_hit(w.neighbours, w.boxes.tick, origin_ned, dir_ned, hit)
+    return hit
+
+
+@wp.func
+def neighbour_hit(others: Neighbours, tick: int, origin_ned: wp.vec3, dir_ned: wp.vec3, known: Hit) -> Hit:
+    """The nearer of a known hit and the other vehicles."""
+    hit = Hit()
+    hit.t = known.t
+    hit.kind = known.kind
+    hit.i_tree = known.i_tree
+    for i in range(others.count):
+        if i != others.i_own:
+            t = neighbour_ray_hit(others.rows[i], tick, origin_ned, dir_ned, hit.t)
+            if t < hit.t:
+                hit.t = t
+                hit.kind = VEHICLE
+                hit.i_tree = i
     return hit
 
 

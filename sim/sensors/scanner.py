@@ -21,6 +21,7 @@ from common.rotation import quat_from_yaw, wrap_pi, yaw_from_quat
 from sim.rig import Rig
 from sim.world.boxes import Box, box_middle, in_box_axes
 from sim.world.growing import bucket_of
+from sim.world.neighbours import neighbour_box
 from sim.world.trees import Forest, Tree
 from sim.world.walls import slab
 from sim.world.world import World, WorldMap, ray_hit, world_at
@@ -190,6 +191,9 @@ def scan_ranges(
     add_forest(world.forest, pos_ned, heading, rise, ranges_m, i)
     for i_box in range(world.boxes.box_count):
         add_box(world.boxes.boxes[i_box], tick, pos_ned, heading, rise, ranges_m, i)
+    for k in range(world.neighbours.count):
+        if k != world.neighbours.i_own:
+            add_box(neighbour_box(world.neighbours.rows[k], tick), 0, pos_ned, heading, rise, ranges_m, i)
     for k in range(_SECTORS, _RANGES):
         up = _ELEVATIONS[k - _SECTORS]
         dir_ned = wp.quat_rotate(q_ned_from_level, wp.vec3(wp.cos(up), 0.0, -wp.sin(up)))

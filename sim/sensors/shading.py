@@ -8,7 +8,8 @@ from math import cos, radians, sin
 
 import warp as wp
 
-from sim.sensors.ray import CROWN, GROUND, TRUNK, WALL, Hit, smooth_normal_ned
+from sim.sensors.ray import CROWN, GROUND, TRUNK, VEHICLE, WALL, Hit, smooth_normal_ned
+from sim.world.neighbours import neighbour_contact
 from sim.world.trees import Tree
 from sim.world.world import World
 
@@ -31,6 +32,7 @@ _EARTH = wp.constant(wp.vec3(0.170, 0.135, 0.070))
 _ROCK = wp.constant(wp.vec3(0.230, 0.215, 0.195))
 _BARK = wp.constant(wp.vec3(0.115, 0.080, 0.055))
 _CONCRETE = wp.constant(wp.vec3(0.380, 0.370, 0.350))
+_HULL = wp.constant(wp.vec3(0.05, 0.05, 0.06))  # carbon fibre
 _PAINT = wp.constant(wp.vec3(0.75, 0.75, 0.72))
 _SEED = wp.constant(wp.uint32(11))
 
@@ -157,6 +159,9 @@ def surface_normal_ned(w: World, hit: Hit, point_ned: wp.vec3) -> wp.vec3:
                 normal = wp.vec3(0.0, -wp.sign(point_ned[1]), 0.0)
             if wp.max(wp.abs(point_ned[0]), wp.abs(point_ned[1])) > inner + 0.25:
                 normal = -normal
+    elif hit.kind == VEHICLE:
+        push = neighbour_contact(w.neighbours.rows[hit.i_tree], w.boxes.tick, point_ned, 1.0)
+        normal = wp.vec3(push[0], push[1], push[2])
     return normal
 
 
@@ -178,6 +183,8 @@ def surface_albedo(w: World, hit: Hit, point_ned: wp.vec3, normal_ned: wp.vec3, 
     elif hit.kind == WALL:
         stain = detail(point_ned[0] + point_ned[1], point_ned[2], 3.0, footprint_m)
         albedo = _CONCRETE * (1.0 + 0.15 * stain)
+    elif hit.kind == VEHICLE:
+        albedo = _HULL
     return albedo
 
 

@@ -5,7 +5,7 @@ struct that every kernel gets. Body contact asks at 1 kHz, sensors at their own 
 World frame ned with its origin at home; ground heights are metres up from the home plane: the ground is at d = -height.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from common.warp_start import start_warp
 from sim.world.boxes import Boxes, BoxesMap, boxes_contact, boxes_ray_hit, no_boxes
+from sim.world.neighbours import Neighbours, neighbours_contact, neighbours_ray_hit
 from sim.world.terrain import (
     FloatArray,
     Terrain,
@@ -40,6 +41,7 @@ class World:
     forest: Forest
     walls: Walls
     boxes: Boxes
+    neighbours: Neighbours  # other vehicles; as many for each vehicle as it is not alone
 
 
 @wp.func
@@ -64,7 +66,9 @@ def ground_normal_ned(w: World, north: float, east: float) -> wp.vec3:
 
 @wp.func
 def ray_hit(w: World, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float) -> float:
-    """Distance [m] along a ray to the first ground, trunk, crown, wall or box; `max_m` if none, 0 from inside.
+    """Distance [m] along a ray to the first ground, trunk, crown, wall, box or other vehicle; `max_m` if none.
+
+    From inside one it is 0.
 
     Args:
         w: the world.
@@ -75,12 +79,13 @@ def ray_hit(w: World, origin_ned: wp.vec3, dir_ned: wp.vec3, max_m: float) -> fl
     ground = terrain_ray_hit(w.terrain, origin_ned, dir_ned, max_m)
     forest = forest_ray_hit(w.forest, origin_ned, dir_ned, ground)
     wall = walls_ray_hit(w.walls, origin_ned, dir_ned, forest)
-    return boxes_ray_hit(w.boxes, origin_ned, dir_ned, wall)
+    box = boxes_ray_hit(w.boxes, origin_ned, dir_ned, wall)
+    return neighbours_ray_hit(w.neighbours, w.boxes.tick, origin_ned, dir_ned, box)
 
 
 @wp.func
 def obstacle_contact(w: World, pos_ned: wp.vec3, radius: float) -> wp.vec4:
-    """Deepest contact of a sphere with a trunk, crown, wall or box; the ground is not an obstacle.
+    """Deepest contact of a sphere with a trunk, crown, wall, box or other vehicle; the ground is no obstacle.
 
     Args:
         w: the world.
@@ -97,6 +102,9 @@ def obstacle_contact(w: World, pos_ned: wp.vec3, radius: float) -> wp.vec4:
     box = boxes_contact(w.boxes, pos_ned, radius)
     if box[3] > contact[3]:
         contact = box
+    neighbour = neighbours_contact(w.neighbours, w.boxes.tick, pos_ned, radius)
+    if neighbour[3] > contact[3]:
+        contact = neighbour
     return contact
 
 
@@ -219,6 +227,15 @@ class WorldMap:
         """
         pos = np.asarray(pos_ned, np.float64)
         return np.minimum(self.obstacle_distance(pos), -pos[..., 2] - self.height(pos[..., 0], pos[..., 1]))
+
+
+def shared_world(world: WorldMap, neighbours: Neighbours) -> WorldMap:
+    """The same world as one of several vehicles reads it: with the others in it."""
+    kernel = World()
+    for part in ("terrain", "forest", "walls", "boxes"):
+        setattr(kernel, part, getattr(world.kernel, part))
+    kernel.neighbours = neighbours
+    return replace(world, kernel=kernel)
 
 
 def build_world(config: WorldConfig | None = None, device: str = "cpu") -> WorldMap:

@@ -75,10 +75,10 @@ def _kill(binary: str) -> None:
     """Kills the newest process of a binary."""
     for folder in sorted(Path("/proc").glob("[0-9]*"), key=lambda path: -int(path.name)):
         try:
-            program = os.readlink(folder / "exe")
+            program = (folder / "exe").readlink()
         except OSError:
             continue
-        if Path(program).name == binary:
+        if program.name == binary:
             os.kill(int(folder.name), signal.SIGKILL)
             return
     raise LookupError(binary)

@@ -67,8 +67,8 @@ class QuickCamera:
         optics: array of `sim.sensors.fast_camera.optics.Optics`, likewise; shape (0,) without optics.
         rgb: uint8, (count, height, width, 3).
         depth_m: float32, (count, height, width), along the optical axis; `sim.sensors.camera.SKY_DEPTH_M` for the sky.
-        kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON of `sim.sensors.ray`. From inside a
-            tree or person all pixels are that, at depth 0.
+        kind: uint8, (count, height, width): SKY, GROUND, TRUNK, CROWN, WALL, PERSON, VEHICLE of `sim.sensors.ray`. From
+            inside a tree or person all pixels are that, at depth 0.
         i_world: array of int, shape (count,).
     """
 

@@ -10,7 +10,7 @@ from sim.sensors.fast_camera.camera_view import View, face_length, level_directi
 from sim.sensors.fast_camera.columns import Columns
 from sim.sensors.fast_camera.figure import list_person
 from sim.sensors.fast_camera.ground import Ground, surface
-from sim.sensors.fast_camera.solids import NEVER, Sights, list_forest
+from sim.sensors.fast_camera.solids import NEVER, Sights, list_forest, list_neighbours
 from sim.sensors.ray import SKY
 from sim.sensors.shading import SUN_NED
 from sim.world.people import Person
@@ -147,5 +147,6 @@ def prepare_views(
     view.has_wall = w.walls.is_built != 0 and out_most < ground.half_size_m and out_most + range_m > ground.half_size_m
     if people:
         view = list_person(sights, i_camera, view, people[i_camera], size[0], size[1])
+    view = list_neighbours(sights, i_camera, view, w.neighbours, size[0], size[1])
     view = list_forest(sights, i_camera, view, w.forest, range_m, size[0], size[1])
     views[i_camera] = view

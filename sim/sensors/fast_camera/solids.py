@@ -1,18 +1,20 @@
 """Round things in front of a camera: trunks, crowns and limbs are all capsules, kept in the camera's own frame.
 
 A trunk's round ends are under ground and inside the crown, so the capsule is the world's cylinder where it can be seen.
-In: the camera, the world's trees, a person. Out: the list of what may be in the image, with boxes in pixels.
+In: the camera, the world's trees, other vehicles. Out: the list of what may be in the image, with boxes in pixels.
 """
 
 import warp as wp
 
 from sim.sensors.fast_camera.camera_view import View
-from sim.sensors.ray import CROWN, SKY, TRUNK
+from sim.sensors.ray import CROWN, SKY, TRUNK, VEHICLE
+from sim.world.neighbours import Neighbours
 from sim.world.trees import Forest, Tree
 
 wp.set_module_options({"enable_backward": False})
 
 NEVER = wp.constant(1.0e30)
+HULL_COLOUR = wp.constant(wp.vec3(0.05, 0.05, 0.06))  # as `sim.sensors.shading`
 _EDGE_RAY = wp.constant(1.0e-7)  # a ray along the axis meets an end
 
 
@@ -194,6 +196,24 @@ def list_tree(sights: Sights, i_camera: int, view: View, tree: Tree, i_tree: int
         view.inside = TRUNK
     view = list_solid(sights, i_camera, view, crown, width, height)
     return list_solid(sights, i_camera, view, trunk, width, height)
+
+
+@wp.func
+def list_neighbours(sights: Sights, i_camera: int, view: View, others: Neighbours, width: int, height: int) -> View:
+    """The camera with the other vehicles on its list: balls, and capsules as long as a box."""
+    for i in range(others.count):
+        if i != others.i_own:
+            other = others.rows[i]
+            radius = wp.sqrt(other.half_width * other.half_height)
+            half_m = wp.max(other.half_length - radius, 0.0)
+            along_ned = wp.vec3(half_m * other.cos_yaw, half_m * other.sin_yaw, 0.0)
+            rear = to_rdf(view, other.pos_ned - along_ned)
+            front = to_rdf(view, other.pos_ned + along_ned)
+            hull = make_solid(rear, front, radius, VEHICLE, HULL_COLOUR, 0.0)
+            if view.inside == SKY and is_in_solid(hull):
+                view.inside = VEHICLE
+            view = list_solid(sights, i_camera, view, hull, width, height)
+    return view
 
 
 @wp.func

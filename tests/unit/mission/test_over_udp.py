@@ -2,8 +2,7 @@
 
 from autopilot.mavlink.transport.links import LinkRole
 from autopilot.mavlink.wire.codec import encode
-from mission.over_udp import _run
-from mission.script import Drone
+from mission.over_udp import RemoteVehicle
 
 STEP_MS = 100
 
@@ -33,6 +32,9 @@ def test_a_restart_of_the_vehicle_does_not_turn_the_scripts_time_back():
             await drone.sleep(1.0)
             times_s.append(drone.time_us * 1e-6)
 
-    _run(Drone(RestartingVehicle(2_500)), script, "here", 10.0)
+    vehicle = RemoteVehicle(RestartingVehicle(2_500), "here")
+    running = vehicle.drone.start(script(vehicle.drone))
+    while not running.is_done:
+        vehicle.poll()
     assert times_s == sorted(times_s)
     assert times_s[-1] < 4.6

@@ -1,0 +1,102 @@
+"""Which vehicles a fleet has, where they boot, which ports they have, and what a script is told."""
+
+import asyncio
+from math import dist
+
+import pytest
+
+from common.params import ParameterError
+from mission.client import ScriptError
+from mission.connections import open_links
+from mission.console.option_checks import UserError
+from mission.fleet.fleet_options import airframes_of
+from mission.fleet.fleet_script import Fleet
+from mission.fleet.roster import check_fleet_parameters, fleet_configs, free_places, start_of
+from mission.flight_config import FlightConfig
+from mission.flight_settings import FlightOptions
+from sim.world.world import WorldConfig, build_world
+from tests.system.vehicle import free_ports
+
+FLAT = WorldConfig(size_m=100.0, hill_height_m=0.0, trees_per_ha=0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "airframes"),
+    [
+        ("3", ["f450"] * 3),
+        ("x500:2,rover:1", ["x500", "x500", "rover"]),
+        ("dir/my:own.toml:1", ["dir/my:own.toml"]),
+        ("100", ["f450"] * 100),
+    ],
+)
+def test_the_airframes_are_those_that_the_text_says(text, airframes):
+    assert airframes_of(text, "f450") == airframes
+
+
+@pytest.mark.parametrize("text", ["", "x500", "0", "101", "x500:2,3", "x500:-1", "x500:", "9999999999999"])
+def test_what_says_no_vehicles_is_refused_in_a_sentence(text):
+    with pytest.raises(UserError, match=r"^--vehicles .*: must be"):
+        airframes_of(text, "x500")
+
+
+def test_vehicles_stand_apart_on_free_level_ground_the_first_at_home():
+    world = build_world(WorldConfig(size_m=300.0, hill_height_m=60.0, trees_per_ha=300.0, clearing_radius_m=10.0))
+    places = free_places(world, 30, 6.0)
+    assert places[0] == (0.0, 0.0)
+    assert min(dist(a, b) for i, a in enumerate(places) for b in places[:i]) == pytest.approx(6.0)
+    for north, east in places:
+        assert world.obstacle_distance([north, east, -float(world.height(north, east)) - 0.3]) > 1.0
+        assert -world.normal_ned(north, east)[2] > 0.99
+
+
+def test_a_world_without_room_says_for_how_many_it_has():
+    with pytest.raises(UserError, match="free ground for 9 vehicles 40 m apart"):
+        free_places(build_world(FLAT), 10, 40.0)
+
+
+def test_each_has_an_id_a_seed_and_a_place_of_its_own_and_the_parameters_that_it_knows():
+    base = FlightConfig(seed=2**31 - 1, parameters={"MPC_XY_CRUISE": 3.0})
+    configs = fleet_configs(base, ["x500", "rover", "x500"], build_world(FLAT))
+    assert [config.parameters["MAV_SYS_ID"] for config in configs] == [1, 2, 3]
+    assert [config.seed for config in configs] == [2**31 - 1, 0, 1]
+    assert ["MPC_XY_CRUISE" in config.parameters for config in configs] == [True, False, True]
+    assert start_of(configs[0]).lat_deg == pytest.approx(base.home.lat_deg, abs=1e-9)
+    assert [config.start_ne_m for config in configs] == [(0.0, 0.0), (0.0, 10.0), (-10.0, 0.0)]
+
+
+def test_a_parameter_must_be_one_of_some_vehicle():
+    check_fleet_parameters(FlightConfig(parameters={"MPC_XY_CRUISE": 3.0, "RO_SPEED_LIM": 2.0}), ["rover", "x500"])
+    for parameters in ({"MPC_XY_CRUISE": 3.0}, {"NONE_SUCH": 1.0}, {"RO_SPEED_LIM": -5.0}):
+        with pytest.raises(ParameterError, match=next(iter(parameters))):
+            check_fleet_parameters(FlightConfig(parameters=parameters), ["rover"])
+
+
+def test_ports_are_numbered_as_the_simulators_of_px4_and_ardupilot_do():
+    gcs, api = free_ports()
+    tcp = gcs + 2000
+    options = FlightOptions(gcs_port=gcs, api_port=api, tcp_port=tcp)
+    for i in (0, 1, 12):
+        ground, offboard, connected = links = open_links(options, 1.0, i)
+        assert ground.links[0].address[1] == gcs
+        assert ground.local_port == gcs + 4020 + i
+        assert offboard.links[0].address[1] == api + min(i, 9)
+        assert offboard.local_port == api + 40 + i
+        assert connected.local_port == tcp + 10 * i
+        for link in links:
+            link.close()
+
+
+def test_vehicles_that_are_not_there_end_the_script_with_a_sentence():
+    _, api = free_ports()
+
+    async def script():
+        async with Fleet.over_udp(2, api_port=api, silence_s=0.2) as fleet:
+            await fleet.each(lambda drone: drone.wait_ready())
+
+    with pytest.raises(ScriptError, match=rf"UDP port {api}: no vehicle has been heard for 0\.2 s"):
+        asyncio.run(script())
+
+
+def test_more_than_ten_have_no_port_of_their_own():
+    with pytest.raises(ScriptError, match="1 to 10 vehicles"):
+        Fleet.over_udp(11)
