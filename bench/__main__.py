@@ -27,6 +27,7 @@ SCRIPTS = {
     "threads": "bench.flying.threads",
     "engines": "bench.flying.engines",
     "missions": "bench.flying.engine_missions",
+    "links": "bench.flying.links",
     "scaling": "bench.flying.scaling",
     "worlds": "bench.flying.worlds",
     "hover": "bench.learning.hover",

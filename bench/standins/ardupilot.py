@@ -10,7 +10,6 @@ import socket
 import sys
 from collections.abc import Callable, Sequence
 from struct import Struct
-from time import perf_counter
 from typing import NamedTuple
 
 MAGIC_16, MAGIC_32 = 18458, 29569
@@ -151,12 +150,15 @@ class ArduPilotStandIn:
 
 
 def main(port: int, seconds: float) -> None:
-    """Answers at once for some seconds, then prints its frames and its clock."""
+    """Answers at once for some simulated seconds, then tells what it has counted."""
     sitl = ArduPilotStandIn(port)
-    end_s = perf_counter() + seconds
-    while perf_counter() < end_s:
+    first = sitl.frame_count
+    sitl.frame()
+    step_us = round(sitl.state.timestamp * 1e6) if sitl.state is not None else 0
+    while sitl.frame_count * step_us < seconds * 1e6:
         sitl.frame()
-    print(sitl.frame_count, sitl.time_us, sitl.resent_count, sitl.unreadable_count)
+    faults = sitl.unreadable_count + sitl.resent_count + sitl.is_reset_seen
+    print(f"faults={faults} exchanged_us={(sitl.frame_count - first) * step_us} clock_us={sitl.time_us}")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,108 @@
+"""How fast is a flight by an outside autopilot that answers at once, and is anything lost in ten simulated minutes?"""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from bench.row import Row, require
+from common.airframe import load_airframe
+from common.geodesy import DEFAULT_HOME
+from common.kernels import FRAME_TICKS, FRAME_US
+from sim.boards.ardupilot import ArduPilotBoard
+from sim.boards.channels import control_channels, pulse_channels
+from sim.boards.outside import PeerError, wait_for
+from sim.boards.px4 import Px4Board
+from sim.bodies.vehicles import class_of
+from sim.rig import Rig
+from sim.sensors.sensors import sensor_model
+from sim.stepped import SteppedRig
+from sim.wind import wind_model
+from sim.world.world import build_world
+
+COMMAND = "python -m bench links"
+SIMULATED_S = 600.0
+PATIENCE_S = 1.0
+LAG_PPM = 1.0
+COPTER_TARGET, ROVER_TARGET, PX4_TARGET = 8.0, 20.0, 5.0
+
+
+def measure() -> list[Row]:
+    rows = []
+    for name, airframe, make, target in (
+        ("ArduPilot JSON, copter at 1 ms", "x500", _ardupilot, COPTER_TARGET),
+        ("ArduPilot JSON, rover at 4 ms", "rover", _ardupilot, ROVER_TARGET),
+        ("PX4 HIL, copter at 4 ms", "x500", _px4, PX4_TARGET),
+    ):
+        speed = _pace(airframe, make)
+        rows.append(Row(f"{name}: ten minutes with a peer that answers at once", speed, "x", "higher", target, COMMAND))
+    return rows
+
+
+def _ardupilot(rig: Rig, airframe: Any) -> ArduPilotBoard:
+    channels = pulse_channels(class_of(airframe).vehicle, airframe)
+    return ArduPilotBoard(rig, channels=channels, on_wait=wait_for(PATIENCE_S, "the stand-in"), port=0)
+
+
+def _px4(rig: Rig, airframe: Any) -> Px4Board:
+    channels = control_channels(class_of(airframe).vehicle, airframe)
+    wait = wait_for(PATIENCE_S, "the stand-in")
+    return Px4Board(rig, channels=channels, home=DEFAULT_HOME, on_wait=wait, port=0)
+
+
+def _pace(name: str, make: Callable[[Rig, Any], ArduPilotBoard | Px4Board]) -> float:
+    """Simulated over wall clock seconds, with the stand-in in a process of its own."""
+    airframe = load_airframe(name)
+    simulated = class_of(airframe)
+    made: list[ArduPilotBoard | Px4Board] = []
+
+    def make_board(rig: Rig) -> ArduPilotBoard | Px4Board:
+        made.append(make(rig, airframe))
+        return made[0]
+
+    rig = SteppedRig(
+        airframe,
+        build_world(),
+        sensor_model(home=DEFAULT_HOME),
+        wind_model(0.0),
+        home=DEFAULT_HOME,
+        body=simulated.body,
+        law=simulated.vehicle.law,
+        board=make_board,
+    )
+    board = made[0]
+    kind = "ardupilot" if isinstance(board, ArduPilotBoard) else "px4"
+    command = [sys.executable, "-m", f"bench.standins.{kind}", str(board.local_port), str(SIMULATED_S)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as peer:
+        speed = _fly(rig)
+        with suppress(PeerError):
+            rig.advance(100_000)  # until it has left
+        board.close()
+        report = "" if peer.stdout is None else peer.stdout.read()
+    _check(report, board)
+    return speed
+
+
+def _fly(rig: SteppedRig) -> float:
+    rig.advance(FRAME_TICKS)
+    frames = int(SIMULATED_S * 1e6) // FRAME_US - 2
+    begun_s = time.perf_counter()
+    for _ in range(frames):
+        rig.advance(FRAME_TICKS)
+    return frames * FRAME_US * 1e-6 / (time.perf_counter() - begun_s)
+
+
+def _check(report: str, board: ArduPilotBoard | Px4Board) -> None:
+    """Nothing was lost, and the clocks agree."""
+    told = dict(part.split("=") for part in report.split())
+    require(told["faults"] == "0", f"the stand-in finds fault: {report}")
+    require(board.rubbish_count == 0, "rubbish came")
+    exchanged_us = int(told["exchanged_us"])
+    lag_ppm = abs(exchanged_us - int(told["clock_us"])) / exchanged_us * 1e6
+    require(lag_ppm < LAG_PPM, f"its clock is off by {lag_ppm:.2f} ppm")
+    if isinstance(board, ArduPilotBoard):
+        require(board.lost_count == 0 and board.again_count == 0, "packets were lost")
+    else:
+        require(board.unanswered_count <= 1, f"{board.unanswered_count} ticks were not answered in time")
