@@ -115,8 +115,24 @@ class ArduPilotDrone(Drone):
         await self._set_mode(MAIN_AUTO, AUTO_LAND, "land")
         await self.wait_disarmed(timeout_s)
 
+    _farthest = 0  # item that it has gone for, since its mission began
+
+    def frame(self, time_us: int) -> None:
+        super().frame(time_us)
+        current = self.latest("MISSION_CURRENT")
+        if current is not None and self.is_armed:
+            self._farthest = max(self._farthest, current.seq)
+
+    @property
+    def is_mission_complete(self) -> bool:
+        """As it says; a copter that has landed by its last item begins anew, and says nothing."""
+        current = self.latest("MISSION_CURRENT")
+        has_ended = current is not None and 0 < current.total <= self._farthest and not self.is_armed
+        return super().is_mission_complete or has_ended
+
     async def start_mission(self, first: int = 0) -> None:
         self.reached.clear()
+        self._farthest = 0
         if not self.is_armed:
             await self.arm()
         await self._set_mode(MAIN_AUTO, AUTO_MISSION, "mission")

@@ -342,5 +342,12 @@ def rover_outline(model: Any) -> Outline:
 
 
 ROVER_BODY = Body(
-    RoverModel, RoverState, rover_tick, rover_truth, rover_at_rest, rover_standing_height, rover_model, rover_outline
+    RoverModel,
+    RoverState,
+    rover_tick,
+    rover_truth,
+    rover_at_rest,
+    rover_standing_height,
+    rover_model,
+    outline=rover_outline,
 )
