@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 from common.airframe import Airframe
 from common.clock import Pacer
 from mission.client import Running
+from mission.console.host_troubles import Troubles
 from mission.console.status_texts import Texts
 from mission.flight_config import FlightConfig
-from mission.host_troubles import Troubles
 from mission.log.flight_recorder import History, Recorder
 from mission.script import Drone, Script
 from mission.simulator.failure_injection import RigInjector

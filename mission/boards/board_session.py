@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from mission.boards.board_flight import BoardFlight
 
 PATIENCE_S = 120.0  # of wall clock time, that an autopilot may be silent
-TOLD_S = 2.0  # of silence, after which it is said what is waited for
+REPORTED_S = 2.0  # of silence, after which it is said what is waited for
 PACE_MAX = 20.0  # guess: how much faster than real time a flight in lockstep is at most, for time-outs of links
 _OURS_ALONE = {
     "dialect": "--dialect", "announces_components": "--announce-components", "traffic_count": "--traffic",
@@ -61,17 +61,17 @@ class Watch:
         self._name, self._console = name, console
         self.hint = ""  # what it has to do to be heard
         self.process: PeerProcess | None = None
-        self._is_told = False
+        self._is_reported = False
 
     def __call__(self, silent_s: float) -> None:
         if self.process is not None:
             for line in self.process.lines():
                 print_line(self._console, f"{self._name} | {line}")
             self.process.check()
-        if silent_s < TOLD_S:
-            self._is_told = self._is_told and silent_s > 0.0
-        elif not self._is_told:
-            self._is_told = True
+        if silent_s < REPORTED_S:
+            self._is_reported = self._is_reported and silent_s > 0.0
+        elif not self._is_reported:
+            self._is_reported = True
             print_line(self._console, f"waiting for {self._name}: {self.hint}")
         if silent_s > PATIENCE_S:
             raise PeerError(f"{self._name} has been silent for {PATIENCE_S:g} s: {self.hint}")

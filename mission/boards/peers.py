@@ -11,11 +11,11 @@ from autopilot.mavlink.transport.client_links import open_client_link
 from autopilot.mavlink.transport.links import OFFBOARD_PORT, Link, LinkRole, UdpLink
 from common.airframe import Airframe
 from common.geodesy import GeoPoint
+from mission.boards.ardupilot_drone import ArduPilotDrone
+from mission.boards.px4_drone import Px4Drone
 from mission.boards.vehicle_params import ardupilot_params, px4_params
 from mission.flight_config import FlightConfig
 from mission.script import Drone
-from mission.script_ardupilot import ArduPilotDrone
-from mission.script_px4 import Px4Drone
 from sim.boards.ardupilot import PORT as JSON_PORT
 from sim.boards.ardupilot import ArduPilotBoard
 from sim.boards.channels import control_channels, pulse_channels

@@ -1,7 +1,7 @@
 """ArduPilot's SITL as a board, by its JSON interface: in lockstep, with all that goes wrong on the way.
 
 SITL sends its servos to our UDP port and waits; we move the body by a step and answer with its state, from which SITL
-makes its own sensors but the IMU, which is ours. Its main loop asks for 400 Hz of a copter, so that multirotors are
+makes its own sensors but the IMU, which is ours. Its main loop asks for 400 Hz of a copter, so that copters are
 exchanged each millisecond. Who has to be answered how: sim/boards/json_wire.py and `FrameCounter`.
 """
 

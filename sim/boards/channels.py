@@ -35,7 +35,7 @@ _ARDUPILOT_SURFACES = {
 def pulse_channels(vehicle: VehicleClass, airframe: Airframe) -> list[Channel | None]:
     """ArduPilot's pulses [us] for each element of `Actuators.command`; None: nothing moves it.
 
-    Motors of multirotors have its numbers for a frame in X, which are PX4's and those of our airframe files.
+    The motors of copters have its numbers for a frame in X, which are PX4's and those of our airframe files.
 
     Raises:
         ValueError: it has no channel for an actuator that the vehicle cannot do without.

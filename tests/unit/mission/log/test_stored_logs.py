@@ -8,8 +8,8 @@ from pyulog import ULog
 
 from autopilot.params import parameter_table
 from common.state_folder import StateFolder
+from mission.console.host_troubles import REPORTED_MAX, SILENCE_US, Troubles
 from mission.flight import Flight, FlightConfig
-from mission.host_troubles import REPORTED_MAX, SILENCE_US, Troubles
 from mission.log.stored_logs import LOGS_KEPT_MAX, FlightLogs
 from sim.world.world import WorldConfig
 

@@ -14,7 +14,7 @@ class Px4Drone(Drone):
     """See `Drone`."""
 
     async def takeoff(self, height_m: float, timeout_s: float = 60.0) -> None:
-        """It is there when it leaves its take-off, within NAV_MC_ALT_RAD of the height."""
+        """It is there when it leaves its take-off, within its own tolerance of the height."""
         alt_amsl_m = self.home.alt_m + height_m
         await self.command(CMD_TAKEOFF, nan, 0.0, 0.0, nan, nan, nan, alt_amsl_m, name="takeoff")
         await self.until(lambda: self.px4_mode == TAKING_OFF, 3.0, "mode takeoff")
