@@ -11,6 +11,7 @@ from common.geodesy import DEFAULT_HOME
 from common.kernels import SUBSTEPS
 from sim.engines.bullet import BulletEngine
 from sim.engines.engine import Engine
+from sim.engines.jsbsim_engine import JsbsimEngine
 from sim.engines.native import NativeEngine
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
@@ -22,6 +23,7 @@ COMMAND = "python -m bench engines"
 TICKS, ROUNDS = 700, 5  # it falls 35 m
 HIGH_M = 60.0
 TARGET_US = 25.0
+ENGINES = (("native, by single launches", NativeEngine), ("pybullet", BulletEngine), ("jsbsim", JsbsimEngine))
 
 
 class Timed:
@@ -39,7 +41,7 @@ class Timed:
 
 def measure() -> list[Row]:
     rows = []
-    for name, make in (("native, by single launches", NativeEngine), ("pybullet", BulletEngine)):
+    for name, make in ENGINES:
         took_us = min(step_us(make) for _ in range(ROUNDS))
         rows.append(Row(f"engine {name}: a millisecond of one multirotor", took_us, "us", "lower", TARGET_US, COMMAND))
     return rows

@@ -16,6 +16,10 @@ def rig_with(engine: EngineName) -> Callable[..., Rig]:
     """
     if engine == "native":
         return Rig
+    if engine == "jsbsim":
+        from sim.engines.jsbsim_engine import JsbsimEngine
+
+        return partial(SteppedRig, engine=JsbsimEngine)
     from sim.engines.bullet import BulletEngine
 
     return partial(SteppedRig, engine=BulletEngine)

@@ -32,6 +32,7 @@ SPEAK_OF_ROTORS = {
     "mission/view/shapes.py": "the shape of a multirotor",
     "mission/console/option_checks.py": "which engine moves what",
     "sim/engines/bullet.py": "Bullet moves multirotors alone",
+    "sim/engines/jsbsim_engine.py": "JSBSim moves multirotors",
 }
 """Files outside of the multirotor's folders that speak of rotors, and why."""
 
