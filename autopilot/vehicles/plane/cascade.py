@@ -75,8 +75,6 @@ def way_of(params: PlaneParams, sp: Setpoint, here: Measured) -> Way:
     way = Way()
     way.height = -sp.pos_ned[2]
     way.climb = finite_or(-sp.vel_ned[2], 0.0)
-    if wp.isfinite(way.height):
-        way.climb = 0.0
     place = wp.vec2(sp.pos_ned[0], sp.pos_ned[1])
     start = wp.vec2(sp.path_start_ned[0], sp.path_start_ned[1])
     if wp.isfinite(place[0]) and wp.isfinite(place[1]):

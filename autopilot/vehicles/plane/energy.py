@@ -15,6 +15,7 @@ wp.set_module_options({"enable_backward": False})
 
 _GRAVITY = wp.constant(GRAVITY_M_S2)
 _ACCEL_CUTOFF_HZ = wp.constant(0.5)
+_OBSERVER_RAD_S = wp.constant(0.7)  # guess: gusts pass, turns do not
 _ENERGY_CUTOFF_HZ = wp.constant(0.5)
 _PITCH_I_MOST = wp.constant(0.35)  # [rad] guess
 _SLOWEST_M_S = wp.constant(3.0)
@@ -25,7 +26,9 @@ _SLOW_PART = wp.constant(0.1)  # below the least airspeed, by which the airspeed
 class EnergyState:
     is_started: int
     climb_sp: float  # [m/s] slewed
-    accel: float  # [m/s²] along the nose, filtered
+    speed: float  # [m/s] airspeed, filtered
+    accel: float  # [m/s²] its change
+    accel_bias: float  # [m/s²] by which it differs from that along the nose
     energy_rate: float  # [m²/s³] of all energy, filtered
     throttle_i: float
     pitch_i: float  # [rad]
@@ -63,17 +66,34 @@ def slowness(params: PlaneParams, here: Measured) -> float:
 
 
 @wp.func
+def observe_speed(state: EnergyState, here: Measured, dt: float) -> EnergyState:
+    """Airspeed and its change, by the accelerometer along the nose and the pitot tube: a second-order observer.
+
+    In a turn some of the lift is along the nose; the observer takes that off.
+    """
+    now = state
+    error = here.airspeed - state.speed
+    now.accel_bias += _OBSERVER_RAD_S * _OBSERVER_RAD_S * error * dt
+    change = here.accel + now.accel_bias + 2.0 * _OBSERVER_RAD_S * error
+    now.speed += change * dt
+    now.accel += low_pass_fraction(_ACCEL_CUTOFF_HZ, dt) * (here.accel + now.accel_bias - now.accel)
+    return now
+
+
+@wp.func
 def energy_step(params: PlaneParams, state: EnergyState, here: Measured, goal: EnergyGoal, dt: float) -> EnergyState:
     """The state with throttle and pitch a frame later."""
     now = state
-    speed = wp.max(here.airspeed, _SLOWEST_M_S)
     if state.is_started == 0:
         now = EnergyState()
         now.is_started = 1
         now.climb_sp = here.climb
         now.pitch = here.pitch
-        now.pitch_i = wp.clamp(here.pitch - params.pitch_offset - here.climb / speed, -_PITCH_I_MOST, _PITCH_I_MOST)
-    now.accel += low_pass_fraction(_ACCEL_CUTOFF_HZ, dt) * (here.accel - now.accel)
+        path = here.climb / wp.max(here.airspeed, _SLOWEST_M_S)
+        now.pitch_i = wp.clamp(here.pitch - params.pitch_offset - path, -_PITCH_I_MOST, _PITCH_I_MOST)
+        now.speed = here.airspeed
+    now = observe_speed(now, here, dt)
+    speed = wp.max(now.speed, _SLOWEST_M_S)
     step = params.vertical_accel * dt
     now.climb_sp += wp.clamp(climb_to(params, here, goal) - now.climb_sp, -step, step)
     most, least = params.climb_max * _GRAVITY, -params.sink_min * _GRAVITY
