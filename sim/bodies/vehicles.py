@@ -26,6 +26,11 @@ class SimulatedClass(NamedTuple):
         """Its vehicles stay on the ground."""
         return self.vehicle.ground is None
 
+    @property
+    def needs_runway(self) -> bool:
+        """Its vehicles leave the ground and come back to it on wheels."""
+        return self.vehicle.ground is not None and not self.vehicle.ground.settles
+
 
 VEHICLES = [
     SimulatedClass(MULTIROTOR, MULTIROTOR_BODY),
