@@ -21,6 +21,7 @@ from autopilot.vehicles.plane.modes.departure import Departure
 
 _AHEAD_M = 500.0  # of a way without an end
 _LOITERS = frozenset((Command.LOITER_UNLIMITED, Command.LOITER_TIME, Command.LOITER_TURNS, Command.LOITER_TO_ALT))
+_BANKING_S = 0.8  # until it has banked, of a sharp turn; guess
 _LINED_UP_M = 150.0  # way to a landing from which a straight one has a direction; guess
 
 
@@ -153,8 +154,10 @@ class PlaneLeg(Leg):
         turn = bearing(self._goal, following) - bearing(self._start, self._goal)
         half = 0.5 * abs((turn + pi) % (2.0 * pi) - pi)
         vel_n, vel_e, _ = context.state.estimate.vel_ned
-        turning_m = (vel_n * vel_n + vel_e * vel_e) / context.number("HG_FW_ACC")
-        return max(radius, min(turning_m * tan(min(half, 0.45 * pi)), turning_m, 0.4 * self._length))
+        speed = hypot(vel_n, vel_e)
+        turning_m = speed * speed / context.number("HG_FW_ACC")
+        begin_m = turning_m * min(tan(min(half, 0.45 * pi)), 1.0) + min(half, 1.0) * _BANKING_S * speed
+        return max(radius, min(begin_m, 0.4 * self._length))
 
     def _change_height(self, item: MissionItem) -> None:
         """Straight on over ground until the height is reached."""

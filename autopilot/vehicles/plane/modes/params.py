@@ -20,8 +20,8 @@ MODE_PARAMETERS = [
     Parameter("LNDFW_VEL_Z_MAX", 1.0, 0.1, 20.0, "m/s", "largest vertical speed of a landed plane", _PX4),
     Parameter("LNDFW_AIRSPD_MAX", 6.0, 2.0, 30.0, "m/s", "largest airspeed of a landed plane", _PX4),
     Parameter("LNDFW_TRIG_TIME", 2.0, 0.1, 10.0, "s", "time for which a plane must look landed", _PX4),
-    Parameter("HG_FW_ACC", 5.0, 1.0, 20.0, "m/s^2", "acceleration across with which ways are planned",
-              "guess: a bank of 27 deg"),
+    Parameter("HG_FW_ACC", 9.0, 1.0, 20.0, "m/s^2", "acceleration across with which ways are planned",
+              "guess: a bank of 43 deg"),
     Parameter("HG_FW_JERK", 10.0, 1.0, 100.0, "m/s^3", "its change", "guess"),
     Parameter("HG_FW_ERR", 20.0, 1.0, 500.0, "m", "by which it may lag behind what it tracks", "guess"),
 ]  # fmt: skip
