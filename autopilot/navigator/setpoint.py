@@ -185,7 +185,9 @@ class SetpointPort:
         self.q_ned_from_frd = (0.0, 0.0, sin(0.5 * yaw), cos(0.5 * yaw))
         self.thrust = thrust
 
-    def glide(self, pos_ned: Vector, path_start_ned: Vector, speed_down: float, *, airspeed: float, throttle: float) -> None:
+    def glide(
+        self, pos_ned: Vector, path_start_ned: Vector, speed_down: float, *, airspeed: float, throttle: float
+    ) -> None:
         """Asks a plane for a line, at the height of its end [m] that moves down [m/s]; NaN throttle: as needed."""
         self.fly_to(pos_ned, nan, path_start_ned=path_start_ned, cruise_speed=airspeed)
         self.vel_ned = (nan, nan, speed_down)

@@ -81,7 +81,9 @@ def plane_inputs(model: PlaneModel, body: PlaneState, command: vec8, wind_ned: w
     inputs.surface = body.surface
     inputs.steering = body.steering_rad
     if body.is_crashed == 0:
-        asked = wp.vec3(wp.clamp(command[0], -1.0, 1.0), -wp.clamp(command[1], -1.0, 1.0), -wp.clamp(command[3], -1.0, 1.0))
+        asked = wp.vec3(
+            wp.clamp(command[0], -1.0, 1.0), -wp.clamp(command[1], -1.0, 1.0), -wp.clamp(command[3], -1.0, 1.0)
+        )
         inputs.surface = wp.cw_mul(model.surface_max, asked)
         inputs.steering = model.steering_max * wp.clamp(command[4], -1.0, 1.0)
         inputs.voltage_v = body.battery_voltage_v * wp.clamp(command[2], 0.0, 1.0)

@@ -90,7 +90,9 @@ def _set_air(model: PlaneModel, airframe: PlaneAirframe) -> None:
     model.area_m2, model.span_m, model.chord_m = wing.area_m2, wing.span_m, wing.chord_m
     model.stall_angle, model.stall_sharpness = wing.stall_angle_rad, wing.stall_sharpness
     model.induced = 1.0 / (math.pi * wing.efficiency * airframe.aspect_ratio)
-    model.lift = vec8(lift.c_l_0, lift.c_l_alpha, lift.c_l_q, lift.c_l_elevator, lift.c_d_p, lift.c_d_elevator, 0.0, 0.0)
+    model.lift = vec8(
+        lift.c_l_0, lift.c_l_alpha, lift.c_l_q, lift.c_l_elevator, lift.c_d_p, lift.c_d_elevator, 0.0, 0.0
+    )
     model.pitch = wp.vec4(lift.c_m_0, lift.c_m_alpha, lift.c_m_q, lift.c_m_elevator)
     for name, row in (("y", "side"), ("roll", "roll"), ("yaw", "yaw")):
         values = [getattr(side, f"c_{name}_{of}") for of in ("beta", "p", "r", "aileron", "rudder")]

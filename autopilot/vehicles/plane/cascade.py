@@ -157,7 +157,9 @@ def steered(params: PlaneParams, state: PlaneControlState, sp: Setpoint, here: M
 
 
 @wp.func
-def outer(params: PlaneParams, state: PlaneControlState, sp: Setpoint, est: Estimate, here: Measured) -> PlaneControlState:
+def outer(
+    params: PlaneParams, state: PlaneControlState, sp: Setpoint, est: Estimate, here: Measured
+) -> PlaneControlState:
     """The state with the outer loops advanced by a frame: bank, pitch and throttle asked for."""
     now = state
     if sp.kind != state.kind or state.was_armed == 0:

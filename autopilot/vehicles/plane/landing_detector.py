@@ -33,7 +33,11 @@ class PlaneLandingDetector:
         number = self._params
         north, east, down = estimate.vel_ned
         is_slow = hypot(north, east) < number["LNDFW_VEL_XY_MAX"] and abs(down) < number["LNDFW_VEL_Z_MAX"]
-        if estimate.flags & AIRSPEED_VALID and estimate.airspeed > number["LNDFW_AIRSPD_MAX"] and hypot(north, east) > 1.0:
+        if (
+            estimate.flags & AIRSPEED_VALID
+            and estimate.airspeed > number["LNDFW_AIRSPD_MAX"]
+            and hypot(north, east) > 1.0
+        ):
             is_slow = False
         self._time_s = self._time_s + dt_s if is_slow and thrust < _IDLE_THRUST else 0.0
         self.is_landed = self._time_s >= float(number["LNDFW_TRIG_TIME"])

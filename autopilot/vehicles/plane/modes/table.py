@@ -90,9 +90,7 @@ PLANE_MODES = mode_table(
         exception=HOLD_EXCEPTED,
         override=AUTO_OVERRIDE,
     ),
-    px4_modes.OFFBOARD(
-        build=of_context(PlaneOffboard), ardupilot=DialectMode(15, "Guided")
-    ),
+    px4_modes.OFFBOARD(build=of_context(PlaneOffboard), ardupilot=DialectMode(15, "Guided")),
     px4_modes.STABILIZED(build=of_context(Stabilized), ardupilot=DialectMode(5, "FBWA")),
     px4_modes.MANUAL(build=of_context(Manual), ardupilot=DialectMode(0, "Manual"), aux_function=51),
     px4_modes.ACRO(build=of_context(Acro), ardupilot=DialectMode(4, "Acro")),
