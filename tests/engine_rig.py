@@ -21,7 +21,7 @@ SLOPES = [(0.0, 0.0), (20.0, -15.0), (-31.0, 12.0)]  # of 6 to 9 degrees
 
 
 class Idle:
-    """A board that asks for the same all the time."""
+    """A board that asks for the same all the time, of all motors or of each."""
 
     def __init__(self, command=0.0):
         self._command = np.full(8, command, np.float32)
@@ -36,7 +36,7 @@ class Idle:
 def rig_on(world, engine, command=0.0, airframe="x500", vehicle_count=1, wind_m_s=0.0):
     vehicle, body = class_of(load_airframe(airframe))
     return SteppedRig(
-        load_airframe(airframe), build_world(world), sensor_model(0.0, DEFAULT_HOME), wind_model(wind_m_s),
+        load_airframe(airframe), build_world(world), sensor_model(0.0, DEFAULT_HOME), wind_model(wind_m_s, 0.0),
         home=DEFAULT_HOME, engine=engine, board=lambda _: Idle(command), body=body, law=vehicle.law,
         vehicle_count=vehicle_count,
     )  # fmt: skip

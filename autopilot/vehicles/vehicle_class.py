@@ -26,6 +26,8 @@ ArmingCheck = Callable[[VehicleState, ParameterTable], str]
 class GroundDetector(Protocol):
     """Says whether the vehicle stands on the ground."""
 
+    lift_timeout_s: float
+    """A take-off that has not left the ground by then has failed."""
     has_contact: bool
     """The ground carries it, perhaps not for long."""
     has_struck: bool

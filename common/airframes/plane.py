@@ -142,6 +142,8 @@ class PlaneAirframe(Airframe):
     propeller: Propeller
     gear: Gear
     hull: Hull
+    jsbsim_aircraft: str = ""
+    """The aircraft of JSBSim that this is, which `--engine jsbsim` moves; "": of none."""
 
     @property
     def aspect_ratio(self) -> float:

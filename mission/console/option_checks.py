@@ -6,8 +6,9 @@ Warp, which the world and the vehicle are made of, takes longer to import than a
 from importlib.util import find_spec
 from typing import get_args
 
-from common.airframe import AirframeError, load_airframe
+from common.airframe import Airframe, AirframeError, load_airframe
 from common.airframes.multirotor import MultirotorAirframe
+from common.airframes.plane import PlaneAirframe
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from mission.flight_settings import FlightOptions, Pace
 from mission.plan.plan_file import PlanError, read_plan
@@ -76,9 +77,17 @@ def check_vehicle(options: FlightOptions) -> None:
         airframe = load_airframe(options.airframe)
     except AirframeError as error:
         raise UserError(str(error)) from error
+    check_engine(options, airframe)
+
+
+def check_engine(options: FlightOptions, airframe: Airframe) -> None:
+    """Refuses an engine that does not move the airframe, or is not installed."""
+    of_jsbsim = airframe.jsbsim_aircraft if isinstance(airframe, PlaneAirframe) else ""
     if options.engine == "native":
+        if of_jsbsim:
+            raise UserError(f"--airframe {options.airframe}: it is JSBSim's {of_jsbsim}; add --engine jsbsim")
         return
-    if not isinstance(airframe, MultirotorAirframe):
+    if not isinstance(airframe, MultirotorAirframe) and not (of_jsbsim and options.engine == "jsbsim"):
         raise UserError(f"--engine {options.engine}: it moves multirotors, and {options.airframe} is none")
     if find_spec(options.engine) is None:
         raise UserError(f"--engine {options.engine}: comes with the extra 'engines' (docs/start/installing.md)")

@@ -3,19 +3,25 @@
 from collections.abc import Callable
 from functools import partial
 
+from common.airframe import Airframe
+from common.airframes.plane import PlaneAirframe
 from mission.flight_settings import EngineName
 from sim.rig import Rig
 from sim.stepped import SteppedRig
 
 
-def rig_with(engine: EngineName) -> Callable[..., Rig]:
-    """What makes the rig: it takes the arguments of `Rig`.
+def rig_with(engine: EngineName, airframe: Airframe) -> Callable[..., Rig]:
+    """What makes the rig of an airframe: it takes the arguments of `Rig`.
 
     Raises:
         ModuleNotFoundError: the engine is not installed.
     """
     if engine == "native":
         return Rig
+    if engine == "jsbsim" and isinstance(airframe, PlaneAirframe):
+        from sim.engines.jsbsim_plane_engine import JsbsimPlaneEngine
+
+        return partial(SteppedRig, engine=partial(JsbsimPlaneEngine, aircraft=airframe.jsbsim_aircraft))
     if engine == "jsbsim":
         from sim.engines.jsbsim_engine import JsbsimEngine
 

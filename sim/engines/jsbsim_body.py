@@ -1,20 +1,17 @@
 """A rigid body in JSBSim that only forces from outside move: an aircraft file with a mass and nothing else.
 
 JSBSim knows the forces of a step only after it has moved by those of the one before: each step it runs twice, first in
-place so that it takes up the forces of now, then by the step. Its planet is so large that it is flat.
+place so that it takes up the forces of now, then by the step.
 """
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from common.attitude import roll_pitch_yaw_of
-from common.geodesy import GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S
+from sim.engines.jsbsim_planet import MOTION, PLANET, put_at
 from sim.engines.quiet_jsbsim import jsbsim
 
-FT_M, LBF_N = 0.3048, 4.4482216152605  # exact, NIST SP 811; JSBSim speaks of feet and pounds
-_PLANET_M = 1.0e9  # radius: a kilometre from home, down is a microradian aslant, and a double still tells 0.1 um
 _EULER, _ADAMS_BASHFORTH_2 = 1, 3
 _INTEGRATORS = {
     "rate/translational": _EULER,  # by forces that are those of mid-step already
@@ -24,20 +21,10 @@ _INTEGRATORS = {
 }
 _FORCES = [f"external_reactions/f{axis}/magnitude" for axis in "xyz"]
 _FORCES += [f"external_reactions/m{axis}/magnitude-lbsft" for axis in "xyz"]
-_MOTION = [f"position/from-start-neu-{axis}-ft" for axis in "neu"]
-_MOTION += [f"velocities/v-{axis}-fps" for axis in ("north", "east", "down")]
-_MOTION += [f"attitude/{angle}-rad" for angle in ("phi", "theta", "psi")]
-_MOTION += [f"velocities/{axis}-rad_sec" for axis in "pqr"]
 _DIRECTIONS = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 _AIRCRAFT = """<?xml version="1.0"?>
 <fdm_config name="body" version="2.0" release="BETA">
-  <planet name="flat">
-    <semimajor_axis unit="M">{radius}</semimajor_axis>
-    <semiminor_axis unit="M">{radius}</semiminor_axis>
-    <rotation_rate unit="RAD/SEC">0</rotation_rate>
-    <GM unit="M3/SEC2">{gm}</GM>
-    <J2>0</J2>
-  </planet>
+  {planet}
   <metrics>
     <wingarea unit="M2">1</wingarea> <wingspan unit="M">1</wingspan> <chord unit="M">1</chord>
     <location name="AERORP" unit="M"> <x>0</x> <y>0</y> <z>0</z> </location>
@@ -79,24 +66,13 @@ class JsbsimBody:
             self._sim[f"simulation/integrator/{name}"] = integrator
         properties: Any = self._sim.get_property_manager()
         self._forces = [properties.get_node(name) for name in _FORCES]
-        self._motion = [properties.get_node(name) for name in _MOTION]
+        self._motion = [properties.get_node(name) for name in MOTION]
         self._is_put = False  # somewhere else, since its last step
 
     def put(self, row: Any) -> tuple[float, float, float]:
         """Puts it where a row of `BodyState` has it; returns where JSBSim's north and east then count from [m]."""
-        north_m, east_m, down_m = row["pos_ned"].tolist()
-        north_fps, east_fps, down_fps = (row["vel_ned"] / FT_M).tolist()
-        roll, pitch, yaw = roll_pitch_yaw_of(row["q_ned_from_frd"].tolist())
-        p, q, r = row["omega_frd"].tolist()
-        for name, value in {
-            "lat-gc-rad": 0.0, "long-gc-rad": 0.0, "h-sl-ft": -down_m / FT_M,
-            "vn-fps": north_fps, "ve-fps": east_fps, "vd-fps": down_fps,
-            "phi-rad": roll, "theta-rad": pitch, "psi-rad": yaw,
-            "p-rad_sec": p, "q-rad_sec": q, "r-rad_sec": r,
-        }.items():  # fmt: skip
-            self._sim[f"ic/{name}"] = value
         self._is_put = True
-        return north_m, east_m, 0.0
+        return put_at(self._sim, row, 0.0)
 
     def moved(self, wrench: list[float]) -> list[float]:
         """Moves it by a millisecond.
@@ -125,5 +101,4 @@ class JsbsimBody:
 def _aircraft(mass_kg: float, inertia_kg_m2: list[float]) -> str:
     """The file: inertia about forward, right and down [kg m²]."""
     forces = [_FORCE.format(axis=axis, x=x, y=y, z=z) for axis, (x, y, z) in _DIRECTIONS.items()]
-    gm = GRAVITY_M_S2 * _PLANET_M**2
-    return _AIRCRAFT.format(radius=_PLANET_M, gm=gm, inertia=inertia_kg_m2, mass=mass_kg, forces="".join(forces))
+    return _AIRCRAFT.format(planet=PLANET, inertia=inertia_kg_m2, mass=mass_kg, forces="".join(forces))

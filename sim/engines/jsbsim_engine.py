@@ -23,7 +23,8 @@ from sim.bodies.multirotor import (
     truth_of,
 )
 from sim.bodies.multirotor_model import MultirotorModel
-from sim.engines.jsbsim_body import FT_M, LBF_N, JsbsimBody
+from sim.engines.jsbsim_body import JsbsimBody
+from sim.engines.jsbsim_planet import FT_M, LBF_N
 from sim.engines.native import NativeEngine
 from sim.recorded_launches import RecordedLaunches
 from sim.rig import Rig

@@ -8,10 +8,13 @@ from math import degrees
 
 from autopilot.vehicles.plane.trim import level_flight, stall_speed_m_s
 from common.airframes.plane import PlaneAirframe
+from common.geodesy import GRAVITY_M_S2
 
 _AUTOSTART = 2_100  # PX4's standard plane
 _DENSITY_KG_M3 = 1.225  # ISO 2533
 _MIN_OVER_STALL, _TRIM_OVER_STALL, _MAX_OVER_STALL = 1.2, 1.5, 2.2  # of airspeeds; guess
+_TURN_SLOPE = 0.6  # tangent of the bank on a circle in a calm: guess
+_PERIOD_M_S2 = 2.2  # trim over the period of the way back to a line: a large plane banks no faster; guess
 _RATE_BANDWIDTH_RAD_S = 8.0  # of roll and pitch rate, in part by the wing's own damping; below the servos' 25: guess
 
 
@@ -58,7 +61,8 @@ def plane_defaults(airframe: PlaneAirframe) -> dict[str, int | float]:
         "RTL_DESCEND_ALT": 40.0,
         "COM_DISARM_LAND": 2.0,
         "NAV_ACC_RAD": 10.0,
-        "NAV_LOITER_RAD": 80.0,
+        "NAV_LOITER_RAD": max(80.0, _round(trim**2 / (GRAVITY_M_S2 * _TURN_SLOPE), -1)),
+        "NPFG_PERIOD": max(10.0, _round(trim / _PERIOD_M_S2)),
         "FW_AIRSPD_STALL": _round(stall, 1),
         "FW_AIRSPD_MIN": _round(_MIN_OVER_STALL * stall, 1),
         "FW_AIRSPD_TRIM": trim,

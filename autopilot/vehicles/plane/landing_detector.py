@@ -16,6 +16,8 @@ class PlaneLandingDetector:
         params: LNDFW_*.
     """
 
+    lift_timeout_s = 60.0  # a Cessna rolls for 15 s, from a high field for longer; guess
+
     __slots__ = ("_params", "_time_s", "has_contact", "has_struck", "is_landed")
 
     def __init__(self, params: ParameterTable) -> None:
