@@ -19,6 +19,7 @@ SETPOINT_ATTITUDE = wp.constant(2)  # attitude (yaw by rate where yaw_rate is fi
 SETPOINT_RATE = wp.constant(3)  # body rates and thrust
 SETPOINT_LEAN = wp.constant(4)  # roll and pitch as an attitude; yaw rate, height or climb rate by the trajectory
 SETPOINT_DRIVE = wp.constant(5)  # along the nose: speed, or throttle; and heading, yaw rate or steering
+SETPOINT_STICKS = wp.constant(6)  # of a plane: ailerons, elevator and rudder as omega_frd has them, and throttle
 
 # What the commander says of the vehicle
 CONTACT_UNKNOWN = wp.constant(0)  # nobody says, as in a replay
@@ -37,6 +38,7 @@ DEAD_RECKONING = wp.constant(128)
 EXTERNAL_POSITION = wp.constant(256)  # a client's horizontal position is being fused
 ACCEL_DOUBTED = wp.constant(512)
 MAG_DISTURBED = wp.constant(1024)  # the field is not that of the position
+AIRSPEED_VALID = wp.constant(4096)
 MAG_FAULTY = wp.constant(2048)  # heading was reset against the magnetometer, which does not agree yet
 
 # ExternalSample.holds: the bits of EKF2_EV_CTRL
@@ -118,6 +120,14 @@ class WheelSample:
 
 
 @wp.struct
+class AirspeedSample:
+    """Of a pitot tube along the nose."""
+
+    time_us: wp.int64  # 0: the vehicle has none
+    pressure_pa: float  # dynamic: total less static
+
+
+@wp.struct
 class BatterySample:
     time_us: wp.int64
     voltage_v: float
@@ -134,6 +144,7 @@ class Samples:
     mag: MagSample
     range: RangeSample
     wheels: WheelSample
+    airspeed: AirspeedSample
     battery: BatterySample
 
 
@@ -154,9 +165,10 @@ class Setpoint:
     climb_speed: float  # [m/s] up, NaN: the class's own
     descend_speed: float  # [m/s] down, NaN: the class's own
     exit_speed: float  # [m/s] speed with which pos_ned may be passed, 0: stop there
-    pass_radius: float  # [m] from pos_ned, where exit_speed shall be reached: a vehicle on wheels turns from there on
+    pass_radius: float  # [m] from pos_ned, where exit_speed shall be reached: a vehicle on wheels turns from there on;
+    # of a plane the radius of its circle round pos_ned, where it is on no line: negative to the left, 0 the class's own
     q_ned_from_frd: wp.quat  # SETPOINT_ATTITUDE; SETPOINT_LEAN: its heading is not used
-    omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE
+    omega_frd: wp.vec3  # [rad/s] SETPOINT_RATE; SETPOINT_STICKS: [-1..1] roll right, pitch up, yaw right
     thrust: float  # [0..1] fraction of the maximum thrust; SETPOINT_DRIVE: throttle [-1..1] where `speed` is NaN
     speed: float  # [m/s] SETPOINT_DRIVE: along the nose, negative backwards
     steering: float  # [-1..1] SETPOINT_DRIVE: to the right, where `yaw` and `yaw_rate` are NaN
@@ -191,6 +203,7 @@ class Estimate:
     accel_bias_frd: wp.vec3  # [m/s²]
     wind_ned: wp.vec3  # [m/s] air over ground, down component 0
     terrain_d: float  # [m] ned down coordinate of the ground below
+    airspeed: float  # [m/s] as indicated by the pitot tube, where AIRSPEED_VALID
     pos_h_std: float  # [m]
     pos_v_std: float  # [m]
     vel_std: float  # [m/s]

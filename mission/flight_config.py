@@ -16,6 +16,8 @@ from mission.simulator.simulator_params import simulator_parameters
 from sim.bodies.vehicles import class_of
 from sim.world.world import WorldConfig
 
+# For what needs a runway: level where it takes off and lands, and no trees where it flies.
+AIRFIELD = WorldConfig(clearing_radius_m=150.0, treeless_radius_m=500.0)
 TREELESS_M = 80.0  # round home, of the command line's worlds: clients' examples fly to 60 m from it, lower than trees
 
 

@@ -9,7 +9,7 @@ from common.params import ParameterError
 from common.state_folder import StateFolder
 from mission.console.model_command import first_fault
 from mission.console.option_checks import UserError, home_of, parameter_of
-from mission.flight_config import TREELESS_M, FlightConfig, OwnerConfig, flight_parameters
+from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfig, flight_parameters
 from mission.flight_settings import FlightOptions, FlightSettings, Pace
 from mission.flight_state_folder import stored_home
 from sim.bodies.vehicles import class_of
@@ -75,4 +75,6 @@ def _world(options: FlightOptions) -> WorldConfig:
     if options.world_kind != "hills":
         driven = {"course": COURSE, "car-park": CAR_PARK}[options.world_kind]
         return driven.model_copy(update={"seed": options.world_seed})
+    if class_of(load_airframe(options.airframe)).needs_runway:
+        return AIRFIELD.model_copy(update=given | {"has_walls": options.has_walls})
     return WorldConfig(**given, has_walls=options.has_walls, treeless_radius_m=TREELESS_M)

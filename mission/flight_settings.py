@@ -14,7 +14,7 @@ from common.geodesy import DEFAULT_HOME
 from mission.console.model_command import option
 
 Pace = Literal["walk", "run"]
-EngineName = Literal["native", "pybullet"]
+EngineName = Literal["native", "pybullet", "jsbsim"]
 BoardName = Literal["own", "ardupilot", "px4"]
 WorldKind = Literal["hills", "forest", "walled-forest", "course", "car-park"]
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
@@ -40,7 +40,7 @@ class FlightSettings(BaseModel):
     )
     """In PX4's they always send them."""
     traffic_count: int = option(0, "Other aircraft that are heard by ADS-B.", "--traffic", ge=0, le=50)
-    engine: EngineName = option("native", "Who moves the body: native or pybullet.")
+    engine: EngineName = option("native", "Who moves the body: native, pybullet or jsbsim.")
     """Air, sensors and flight controller are ours with each."""
     has_lidar: bool = option(False, "Carry a ring of range finders that looks round.", "--lidar")
     has_base: bool = option(False, "A base station beside home sends the GNSS receiver corrections.", "--rtk")

@@ -33,6 +33,9 @@ RANGE_WHITE = wp.constant(42)
 
 CAMERA = wp.constant(43)
 
+PITOT_WHITE = wp.constant(24)
+PITOT_OFFSET = wp.constant(25)
+
 BATTERY_VOLTAGE = wp.constant(45)
 BATTERY_CURRENT = wp.constant(46)
 

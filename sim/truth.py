@@ -6,12 +6,14 @@ charge of a battery, the slip of a foot) is its own.
 
 import warp as wp
 
+from autopilot.estimator.airspeed import with_airspeed
 from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
     TILT_ALIGNED,
     VELOCITY_VALID,
     YAW_ALIGNED,
+    AirspeedSample,
     BatterySample,
     Estimate,
 )
@@ -35,6 +37,8 @@ class Truth:
     has_wheels: int  # 0: it stands on feet, and has no encoders
     wheel_speed_m_s: wp.vec2  # of the treads, left and right, where the encoders are; positive forward
     steering_rad: float  # angle of the steered wheels to the right, of a bicycle between them
+    has_pitot: int  # 0: it measures no airspeed
+    pitot_pa: float  # dynamic pressure along the nose
     height_agl_m: float  # of the centre of gravity over the ground below
     battery_voltage_v: float
     battery_current_a: float
@@ -55,6 +59,11 @@ def true_estimate(truth: Truth, tick: wp.int64) -> Estimate:
     estimate.vel_ned = truth.vel_ned
     estimate.pos_ned = truth.pos_ned
     estimate.accel_ned = wp.quat_rotate(truth.q_ned_from_frd, truth.accel_frd) + wp.vec3(0.0, 0.0, GRAVITY_M_S2)
+    if truth.has_pitot == 1:
+        sample = AirspeedSample()
+        sample.time_us = estimate.time_us
+        sample.pressure_pa = truth.pitot_pa
+        estimate = with_airspeed(estimate, sample)
     return estimate
 
 

@@ -19,7 +19,6 @@ from common.params import Parameter, ParameterTable
 
 FRAME_LONGEST_S = 0.1  # longer gaps do not count as landed time
 _AIRBORNE_M = 0.5  # height over the take-off place from which the vehicle is in the air
-_LIFT_TIMEOUT_US = 10_000_000  # a take-off that has not left the ground by then has failed
 _ON_ITS_SIDE_RAD = 0.25 * pi  # lean from which a vehicle on the ground has not landed but crashed, as for arming
 _FALLEN_US = 10_000_000  # after its motors stopped in the air a vehicle is down, whatever the estimate says; guess
 _OFF_GROUND_M = 0.15  # a lower hover is not told from standing; guess
@@ -186,7 +185,7 @@ class TakeoffAndLanding:
         risen_m = self.lift_d - state.estimate.pos_ned[2]
         if risen_m > _AIRBORNE_M or flying.is_landing or is_put_down:
             self._has_flown = True
-        elif state.time_us - self._lift_since_us > _LIFT_TIMEOUT_US:
+        elif state.time_us - self._lift_since_us > 1e6 * self._detector.lift_timeout_s:
             is_hovering = needs_sticks or flying.ask is not Ask.UP
             if is_hovering and risen_m > _OFF_GROUND_M:  # it shall not go higher
                 self._has_flown = True

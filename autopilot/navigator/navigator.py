@@ -193,7 +193,7 @@ class Navigator:
             setpoint.idle()
             setpoint.as_asked()
             self.ask = Ask.STAY
-        elif context.craft.ground is not None:
+        elif context.craft.ground is not None and context.craft.ground.settles:
             self._respect_ground()
         state.goal_ned, state.path_start_ned = setpoint.pos_ned, setpoint.path_start_ned
         may_turn = state.is_armed and state.mode is not Mode.TERMINATION

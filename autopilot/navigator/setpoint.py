@@ -17,6 +17,7 @@ from autopilot.ports import (
     SETPOINT_IDLE,
     SETPOINT_LEAN,
     SETPOINT_RATE,
+    SETPOINT_STICKS,
     SETPOINT_TRAJECTORY,
 )
 from common.kernels import MAX_MOTORS
@@ -184,6 +185,14 @@ class SetpointPort:
         self.q_ned_from_frd = (0.0, 0.0, sin(0.5 * yaw), cos(0.5 * yaw))
         self.thrust = thrust
 
+    def glide(
+        self, pos_ned: Vector, path_start_ned: Vector, speed_down: float, *, airspeed: float, throttle: float
+    ) -> None:
+        """Asks a plane for a line, at the height of its end [m] that moves down [m/s]; NaN throttle: as needed."""
+        self.fly_to(pos_ned, nan, path_start_ned=path_start_ned, cruise_speed=airspeed)
+        self.vel_ned = (nan, nan, speed_down)
+        self.thrust = throttle
+
     # ---- what a pilot asks for: called each frame, written only if something changed ----
 
     def move(self, vel_ned: Vector, yaw_rate: float) -> None:
@@ -234,6 +243,13 @@ class SetpointPort:
         self.kind = SETPOINT_RATE
         self.omega_frd = omega_frd
         self.thrust = thrust
+
+    def move_surfaces(self, roll: float, pitch: float, yaw: float, throttle: float) -> None:
+        """Asks a plane for ailerons, elevator and rudder [-1..1], and a throttle [0..1]."""
+        self._free_all()
+        self.kind = SETPOINT_STICKS
+        self.omega_frd = (roll, pitch, yaw)
+        self.thrust = throttle
 
     def drive(
         self,

@@ -26,6 +26,8 @@ ArmingCheck = Callable[[VehicleState, ParameterTable], str]
 class GroundDetector(Protocol):
     """Says whether the vehicle stands on the ground."""
 
+    lift_timeout_s: float
+    """A take-off that has not left the ground by then has failed."""
     has_contact: bool
     """The ground carries it, perhaps not for long."""
     has_struck: bool
@@ -124,6 +126,7 @@ class GroundHandling:
     slowing_height: str  # [m] above ground, from which a descent slows down
     slow_height: str  # [m] at which it has slowed down to `land_speed`
     crawl_height: str  # [m] from which it crawls
+    settles: bool = True  # where it touches the ground it lets itself down; else its modes see to that
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +139,7 @@ class Craft:
     ground: GroundHandling | None  # None: it never leaves the ground
     yaw_mode_param: str  # empty if the class has none
     front_m: float  # of its front before its centre; 0 for what flies
+    leg: Callable[..., Any] | None = None  # see `VehicleClass.leg`
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +185,8 @@ class VehicleClass:
     """Its own, besides those of all vehicles (autopilot.commander.arming)."""
     lane: Callable[[Any], Lane] | None = None
     """Of what stops before obstacles in its lane, in every mode (CP_DIST); None: modes see to that themselves."""
+    leg: Callable[..., Any] | None = None
+    """Makes what flies a mission's items (autopilot.navigator.mission.mission_legs.Leg), of what cannot stop; None: that."""
     drive_watch: Callable[[DriveParts], DriveWatch] | None = None
     """None: nobody looks whether a motor has failed or the vehicle is stuck."""
 
@@ -200,4 +206,5 @@ class VehicleClass:
             self.ground,
             self.yaw_mode_param,
             0.0 if self.lane is None else self.lane(airframe).front_m,
+            self.leg,
         )

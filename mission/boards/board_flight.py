@@ -96,7 +96,7 @@ class BoardFlight(FlightBase):
             return made[0]
 
         make_rig: Callable[..., SteppedRig] = partial(
-            SteppedRig, engine=engine_named(self.config.engine), board=make_board
+            SteppedRig, engine=engine_named(self.config.engine, self.airframe), board=make_board
         )
         rig = flight_rig(self.config, self.airframe, self.world, make_rig)
         return made[0], cast(SteppedRig, rig)

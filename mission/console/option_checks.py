@@ -6,7 +6,10 @@ Warp, which the world and the vehicle are made of, takes longer to import than a
 from importlib.util import find_spec
 from typing import get_args
 
-from common.airframe import AirframeError, load_airframe
+from common.airframe import Airframe, AirframeError, load_airframe
+from common.airframes.multirotor import MultirotorAirframe
+from common.airframes.plane import PlaneAirframe
+from common.airframes.rover import RoverAirframe
 from common.geodesy import DEFAULT_HOME, GeoPoint
 from mission.flight_settings import FlightOptions, Pace
 from mission.plan.plan_file import PlanError, read_plan
@@ -72,10 +75,24 @@ def check_vehicle(options: FlightOptions) -> None:
     for text in options.parameters:
         parameter_of(text)
     try:
-        load_airframe(options.airframe)
+        airframe = load_airframe(options.airframe)
     except AirframeError as error:
         raise UserError(str(error)) from error
-    if options.engine != "native" and find_spec(options.engine) is None:
+    check_engine(options, airframe)
+
+
+def check_engine(options: FlightOptions, airframe: Airframe) -> None:
+    """Refuses an engine that does not move the airframe, or is not installed."""
+    aircraft = airframe.jsbsim_aircraft if isinstance(airframe, PlaneAirframe) else ""
+    if options.engine == "native":
+        if aircraft:
+            raise UserError(f"--airframe {options.airframe}: it is JSBSim's {aircraft}; add --engine jsbsim")
+        return
+    is_moved = isinstance(airframe, MultirotorAirframe)
+    is_moved |= isinstance(airframe, RoverAirframe) if options.engine == "pybullet" else bool(aircraft)
+    if not is_moved:
+        raise UserError(f"--engine {options.engine}: it does not move {options.airframe}")
+    if find_spec(options.engine) is None:
         raise UserError(f"--engine {options.engine}: comes with the extra 'engines' (docs/start/installing.md)")
 
 

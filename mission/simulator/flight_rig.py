@@ -41,7 +41,7 @@ def flight_rig(
         make_rig: takes the arguments of `Rig`; None: with the engine of the configuration.
     """
     vehicle, body = class_of(airframe)
-    rig = (make_rig or rig_with(config.engine))(
+    rig = (make_rig or rig_with(config.engine, airframe))(
         airframe,
         world,
         sensor_model(noise_scale=config.noise, home=config.home),

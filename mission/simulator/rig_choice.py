@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from functools import partial
 
+from common.airframe import Airframe
+from common.airframes.plane import PlaneAirframe
 from mission.flight_settings import EngineName
 from sim.engines.engine import Engine
 from sim.engines.native import NativeEngine
@@ -10,23 +12,31 @@ from sim.rig import Rig
 from sim.stepped import SteppedRig
 
 
-def engine_named(engine: EngineName) -> Callable[[Rig], Engine]:
-    """What makes the engine.
+def engine_named(engine: EngineName, airframe: Airframe) -> Callable[[Rig], Engine]:
+    """What makes the engine that moves an airframe.
 
     Raises:
         ModuleNotFoundError: it is not installed.
     """
     if engine == "native":
         return NativeEngine
+    if engine == "jsbsim" and isinstance(airframe, PlaneAirframe):
+        from sim.engines.jsbsim_plane_engine import JsbsimPlaneEngine
+
+        return partial(JsbsimPlaneEngine, aircraft=airframe.jsbsim_aircraft)
+    if engine == "jsbsim":
+        from sim.engines.jsbsim_engine import JsbsimEngine
+
+        return JsbsimEngine
     from sim.engines.bullet import BulletEngine
 
     return BulletEngine
 
 
-def rig_with(engine: EngineName) -> Callable[..., Rig]:
-    """What makes the rig: it takes the arguments of `Rig`.
+def rig_with(engine: EngineName, airframe: Airframe) -> Callable[..., Rig]:
+    """What makes the rig of an airframe: it takes the arguments of `Rig`.
 
     Raises:
         ModuleNotFoundError: the engine is not installed.
     """
-    return Rig if engine == "native" else partial(SteppedRig, engine=engine_named(engine))
+    return Rig if engine == "native" else partial(SteppedRig, engine=engine_named(engine, airframe))

@@ -175,10 +175,10 @@ def angular_accel(model: MultirotorModel, omega_frd: wp.vec3, torque_frd: wp.vec
 
 
 @wp.func
-def _contact(
+def contact_near(
     model: ContactModel, body: BodyState, around: Surroundings, r_ned_from_frd: wp.mat33, dt: float
 ) -> ContactForce:
-    """Force of whatever is near."""
+    """Force of whatever is near over a step; nothing is near: none."""
     contact = ContactForce()
     if around.is_near_ground == 1:
         contact = ground_contact(
@@ -187,6 +187,17 @@ def _contact(
     if around.is_near_obstacle == 1:
         contact = obstacle_force(model, around, contact, body.pos_ned, body.vel_ned)
     return contact
+
+
+@wp.func
+def touched(model: ContactModel, body: BodyState, contact: ContactForce) -> BodyState:
+    """A body that remembers what it touches: feet, impacts, a crash."""
+    body.foot_slip = contact.foot_slip
+    body.is_on_ground = contact.is_on_ground
+    body.impact_speed = wp.max(body.impact_speed, contact.impact_speed_m_s)
+    if contact.impact_speed_m_s > model.crash_speed_m_s or contact.is_rotor_strike == 1:
+        body.is_crashed = 1
+    return body
 
 
 @wp.func
@@ -217,14 +228,10 @@ def _substep(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> Bod
     force_frd = wrench.force_frd
     torque_frd = wrench.torque_frd
     if around.is_near_ground + around.is_near_obstacle > 0:
-        contact = _contact(model.contact, body, around, r_ned_from_frd, dt)
+        contact = contact_near(model.contact, body, around, r_ned_from_frd, dt)
         force_frd += r_frd_from_ned * contact.force_ned
         torque_frd += contact.torque_frd
-        body.foot_slip = contact.foot_slip
-        body.is_on_ground = contact.is_on_ground
-        body.impact_speed = wp.max(body.impact_speed, contact.impact_speed_m_s)
-        if contact.impact_speed_m_s > model.contact.crash_speed_m_s or contact.is_rotor_strike == 1:
-            body.is_crashed = 1
+        body = touched(model.contact, body, contact)
     body.rotor_speed = wrench.speed
     body.accel_frd = force_frd * model.mass_inv
     middle_accel_frd = body.accel_frd + wp.cross((0.5 * dt) * omega, body.accel_frd)  # the body turns meanwhile

@@ -6,10 +6,12 @@ This list is the one position outside of its own folders where a class is named;
 from typing import NamedTuple
 
 from autopilot.vehicles.multirotor.vehicle import MULTIROTOR
+from autopilot.vehicles.plane.vehicle import PLANE
 from autopilot.vehicles.rover.vehicle import ROVER
 from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import Airframe, AirframeError
 from sim.bodies.body import MULTIROTOR_BODY, Body
+from sim.bodies.plane import PLANE_BODY
 from sim.bodies.rover import ROVER_BODY
 
 
@@ -24,10 +26,16 @@ class SimulatedClass(NamedTuple):
         """Its vehicles stay on the ground."""
         return self.vehicle.ground is None
 
+    @property
+    def needs_runway(self) -> bool:
+        """Its vehicles leave the ground and come back to it on wheels."""
+        return self.vehicle.ground is not None and not self.vehicle.ground.settles
+
 
 VEHICLES = [
     SimulatedClass(MULTIROTOR, MULTIROTOR_BODY),
     SimulatedClass(ROVER, ROVER_BODY),
+    SimulatedClass(PLANE, PLANE_BODY),
 ]
 
 

@@ -14,6 +14,7 @@ from common.geomagnetic import field_ned_gauss
 from common.kernels import vec8
 from common.rng import draw_tick
 from sim.faults import SensorFault
+from sim.sensors.airspeed import PitotModel, PitotState, pitot_boot, pitot_model, sense_pitot
 from sim.sensors.baro import BaroModel, BaroState, baro_boot, baro_model, sense_baro
 from sim.sensors.gnss import GnssModel, GnssState, gnss_boot, gnss_model, sense_gnss
 from sim.sensors.imu import ImuModel, ImuState, imu_boot, imu_model, sense_imu
@@ -38,6 +39,7 @@ class SensorModel:
     mag: MagModel
     range: RangeModel
     wheels: WheelModel
+    pitot: PitotModel
     battery: BatteryMonitorModel
 
 
@@ -52,6 +54,7 @@ class Faults:
     mag: SensorFault
     range: SensorFault
     wheels: SensorFault
+    airspeed: SensorFault
     battery: SensorFault
     motor_loss: vec8  # [0..1] fraction of its command that each motor loses
 
@@ -66,6 +69,7 @@ class SensorState:
     baro: BaroState
     mag: MagState
     wheels: WheelState
+    pitot: PitotState
     samples: Samples  # what the drivers have delivered so far
 
 
@@ -90,6 +94,7 @@ def sensor_model(noise_scale: float = 1.0, home: GeoPoint = DEFAULT_HOME) -> Any
     model.mag = mag_model(field_ned_gauss(home.lat_deg, home.lon_deg, home.alt_m), noise_scale)
     model.range = range_model(noise_scale)
     model.wheels = wheel_model(noise_scale)
+    model.pitot = pitot_model(noise_scale)
     model.battery = battery_monitor_model(noise_scale)
     return model
 
@@ -104,6 +109,7 @@ def sensors_boot(model: SensorModel, seed: int, i: int, tick: wp.int64) -> Senso
     state.baro = baro_boot(model.baro, seed, i, draw_tick(tick))
     state.mag = mag_boot(model.mag, seed, i, draw_tick(tick))
     state.wheels = wheels_boot(model.wheels, seed, i, draw_tick(tick))
+    state.pitot = pitot_boot(model.pitot, seed, i, draw_tick(tick))
     state.samples.gnss.fix_type = 1
     return state
 
@@ -149,5 +155,8 @@ def sense(
     wheels, wheels_now = sense_wheels(model.wheels, out.wheels, out.samples.wheels, faults.wheels, truth, seed, i, tick)
     out.wheels = wheels
     out.samples.wheels = wheels_now
+    out.samples.airspeed = sense_pitot(
+        model.pitot, out.pitot, out.samples.airspeed, faults.airspeed, truth, seed, i, tick
+    )
     out.samples.battery = sense_battery(model.battery, out.samples.battery, faults.battery, truth, seed, i, tick)
     return out

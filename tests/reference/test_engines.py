@@ -10,6 +10,7 @@ from sim.engines.native import NativeEngine
 from tests.reference.engine_flight import apart, flown, integrated
 
 pytest.importorskip("pybullet")
+pytest.importorskip("jsbsim")
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +20,14 @@ def reference():
 
 def engines():
     from sim.engines.bullet import BulletEngine
+    from sim.engines.jsbsim_engine import JsbsimEngine
 
-    return {"native": NativeEngine, "pybullet": BulletEngine, "damped": partial(BulletEngine, damping=0.04)}
+    return {
+        "native": NativeEngine,
+        "pybullet": BulletEngine,
+        "jsbsim": JsbsimEngine,
+        "damped": partial(BulletEngine, damping=0.04),
+    }
 
 
 def test_the_flight_is_one_worth_comparing(reference):
@@ -29,7 +36,7 @@ def test_the_flight_is_one_worth_comparing(reference):
     assert tilt.max() > 20.0
 
 
-@pytest.mark.parametrize("name", ["native", "pybullet"])
+@pytest.mark.parametrize("name", ["native", "pybullet", "jsbsim"])
 def test_an_engine_flies_as_the_equations_say(name, reference):
     off_m, off_deg = apart(flown(engines()[name]), reference)
     assert off_m < 1.5e-3  # half a step of 1 ms, as plain semi-implicit Euler is off, makes 1.9 mm and 0.066 deg

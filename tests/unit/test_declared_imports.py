@@ -22,7 +22,7 @@ PLACES = {
         *("autopilot/control/margins.py", "autopilot/estimator/derive.py"),
         *("autopilot/vehicles/multirotor/tuning.py", "autopilot/vehicles/rover/tuning.py"),
     ),
-    "engines": ("sim/engines/quiet_bullet.py",),
+    "engines": ("sim/engines/quiet_bullet.py", "sim/engines/quiet_jsbsim.py"),
     "gym": ("policies/__init__.py", "policies/tasks"),
     "learn": (
         *("policies/companion", "policies/experts", "policies/learn", "policies/tracker.py"),

@@ -31,8 +31,10 @@ SPEAK_OF_ROTORS = {
     "mission/boards/vehicle_params.py": "what an outside autopilot has to know of a multirotor",
     "mission/plan/plan_file.py": "MAVLink's name of a vehicle type, in QGroundControl's files",
     "mission/view/shapes.py": "the shape of a multirotor",
+    "mission/console/option_checks.py": "which engine moves what",
     "sim/engines/bullet.py": "which classes Bullet moves",
     "sim/engines/bullet_multirotor.py": "a multirotor for Bullet",
+    "sim/engines/jsbsim_engine.py": "JSBSim moves multirotors",
 }
 """Files outside of the multirotor's folders that speak of rotors, and why."""
 

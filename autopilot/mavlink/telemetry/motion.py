@@ -12,7 +12,15 @@ from autopilot.mavlink.wire.convert import (
     u16,
     wxyz_from_quat,
 )
-from autopilot.ports import HEIGHT_VALID, POSITION_VALID, TERRAIN_VALID, VELOCITY_VALID, WIND_VALID, YAW_ALIGNED
+from autopilot.ports import (
+    AIRSPEED_VALID,
+    HEIGHT_VALID,
+    POSITION_VALID,
+    TERRAIN_VALID,
+    VELOCITY_VALID,
+    WIND_VALID,
+    YAW_ALIGNED,
+)
 from common.geodesy import geodetic_from_ned
 
 _attitude = known_type("ATTITUDE").pack
@@ -89,12 +97,14 @@ def height_above_home(state: VehicleState) -> float:
 
 
 def vfr_hud(state: VehicleState) -> bytes:
-    """Speed through the air (0 if the wind is not known) and over ground, heading, altitude, climb rate, throttle."""
+    """Speed through the air (measured, or by the wind; else 0) and over ground, heading, altitude, climb rate, throttle."""
     estimate = state.estimate
     north, east, down = estimate.vel_ned
     ground_speed = hypot(north, east)
     air_speed = 0.0  # as autopilots without an airspeed sensor send it: not every display can draw a NaN
-    if estimate.flags & WIND_VALID:
+    if estimate.flags & AIRSPEED_VALID:
+        air_speed = max(estimate.airspeed, 0.0)
+    elif estimate.flags & WIND_VALID:
         wind_north, wind_east, _ = estimate.wind_ned
         air_speed = hypot(north - wind_north, east - wind_east, down)
     return _vfr_hud(

@@ -62,7 +62,7 @@ class Mission(FlightMode):
         self._payload = payload
         self._route = Route(context)
         self.precision = PrecisionLand(context)
-        self._leg = Leg(context, self._route, self.precision)
+        self._leg: Leg = (context.craft.leg or Leg)(context, self._route, self.precision)
         self._actions = Actions(context, self._route, self._leg, payload, set_home)
         self._index = 0
         self._is_flying = False

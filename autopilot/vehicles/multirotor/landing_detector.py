@@ -51,6 +51,8 @@ class LandingDetector:
         standing_height_m: of the vehicle's centre over level ground, NaN: not known, and a touch is felt later.
     """
 
+    lift_timeout_s = 10.0  # guess
+
     __slots__ = (
         "_contact_thrust", "_fall_count", "_hover_thrust", "_landed_thrust", "_params", "_rate_max_sq",
         "_speed_xy_max_sq", "_speed_z_max", "_stage_s", "_still_s", "_time_s", "_touch_height", "_touch_s",

@@ -15,7 +15,7 @@ PIP = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
 # Where what an extra brings is imported, when its commands are run.
 OF_EXTRAS = (
     *("policies.", "mission.view.", "mission.train.", "mission.follow.", "mission.park.park_session"),
-    *("sim.engines.bullet", "sim.engines.quiet_bullet"),
+    *("sim.engines.bullet", "sim.engines.jsbsim_", "sim.engines.quiet_"),
     *("autopilot.tuning", "autopilot.control.margins", "autopilot.estimator.derive"),
     *("autopilot.vehicles.multirotor.tuning", "autopilot.vehicles.rover.tuning"),
 )

@@ -1,0 +1,52 @@
+"""Landing detection of a plane: slow over ground, in height and through the air for a while, as PX4's (LNDFW_*)."""
+
+from math import hypot
+from typing import Any
+
+from autopilot.ports import AIRSPEED_VALID
+from common.params import ParameterTable
+
+_IDLE_THRUST = 0.1  # more throttle is flown with; guess
+
+
+class PlaneLandingDetector:
+    """Landing detection of one plane; its modes see to it that it stays on its wheels meanwhile.
+
+    Args:
+        params: LNDFW_*.
+    """
+
+    lift_timeout_s = 60.0  # a Cessna rolls for 15 s, from a high field for longer; guess
+
+    __slots__ = ("_params", "_time_s", "has_contact", "has_struck", "is_landed")
+
+    def __init__(self, params: ParameterTable) -> None:
+        self._params = params
+        self._time_s = 0.0
+        self.has_contact = self.has_struck = self.is_landed = False
+
+    def reset(self) -> None:
+        """The vehicle is on the ground and about to leave it."""
+        self._time_s = 0.0
+        self.has_contact = self.has_struck = self.is_landed = False
+
+    def update(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:  # noqa: ARG002
+        """Takes one frame and returns whether the vehicle stands on the ground."""
+        number = self._params
+        north, east, down = estimate.vel_ned
+        is_slow = hypot(north, east) < number["LNDFW_VEL_XY_MAX"] and abs(down) < number["LNDFW_VEL_Z_MAX"]
+        if (
+            estimate.flags & AIRSPEED_VALID
+            and estimate.airspeed > number["LNDFW_AIRSPD_MAX"]
+            and hypot(north, east) > 1.0
+        ):
+            is_slow = False
+        self._time_s = self._time_s + dt_s if is_slow and thrust < _IDLE_THRUST else 0.0
+        self.is_landed = self._time_s >= float(number["LNDFW_TRIG_TIME"])
+        self.has_contact = self.is_landed
+        return self.is_landed
+
+    @property
+    def is_down(self) -> bool:
+        """It lies still, its motor off."""
+        return self.is_landed

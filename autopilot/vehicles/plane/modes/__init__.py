@@ -1,0 +1,1 @@
+"""Flight modes of the plane."""

@@ -1,0 +1,191 @@
+"""Landing: down a circle to the height of the approach, down the glide slope, flare, and a stop on the wheels.
+
+In: where to touch down and, perhaps, from where. Out: setpoints until the plane stands. Without a direction it lands
+against the wind as it is felt at the beginning, in a calm along the heading of the take-off. The slope is PX4's
+FW_LND_ANG, the flare FW_LND_FL_*.
+"""
+
+from enum import IntEnum
+from math import atan2, cos, hypot, isfinite, nan, pi, radians, sin, tan
+
+from autopilot.interface.client_requests import LandAt
+from autopilot.interface.mode_spec import FlightMode
+from autopilot.interface.vehicle_state import ACCEPTED, Reply, Verdict
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.setpoint import Vector
+from autopilot.ports import AIRSPEED_VALID
+from autopilot.vehicles.plane.modes.departure import airspeed_of
+
+_ENTRY_M = 30.0  # height over the touchdown of the beginning of the slope; guess: over trees
+_LEAD_S = 5.0  # of level flight before the slope; guess
+_CALM_M_S = 1.5  # a weaker wind has no direction; guess
+_ALIGNED_RAD = radians(20.0)
+_NEAR_PART = 0.5  # of the circle's radius, from the entry at which it may be left
+_LONG_FLARE_US = 8_000_000  # guess
+_DOWN_M_S = 0.2  # sinks no faster once it stands on its wheels
+_TOUCH_M = 0.4  # height of the wheels, as measured, below which that is a touchdown; guess
+_FLARE_WAY_S = 1.2  # of flight in a flare: the slope aims that much short; guess
+
+
+class _Phase(IntEnum):
+    CIRCLE = 0
+    SLOPE = 1
+    FLARE = 2
+    ROLL = 3
+
+
+class Approach:
+    """One landing."""
+
+    __slots__ = ("_along", "_centre", "_context", "_entry", "_flare_us", "_phase", "_target", "_yaw")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._phase = _Phase.CIRCLE
+        self._target: Vector = (0.0, 0.0, 0.0)  # [m] where the wheels shall touch; down of the ground
+        self._yaw = 0.0  # [rad] of the approach
+        self._along = (1.0, 0.0)
+        self._entry: Vector = (0.0, 0.0, 0.0)
+        self._centre: Vector = (0.0, 0.0, 0.0)
+        self._flare_us = 0
+
+    def start(self, target: Vector, yaw: float = nan, *, is_lined_up: bool = False) -> None:
+        """Begins a landing.
+
+        Args:
+            target: [m] the touchdown, its down coordinate that of a plane that stands there.
+            yaw: [rad] direction of the approach; NaN: against the wind.
+            is_lined_up: it comes along that direction, low and far enough for the slope.
+        """
+        self._target = target
+        self._yaw = yaw if isfinite(yaw) else self._upwind()
+        self._along = (cos(self._yaw), sin(self._yaw))
+        number = self._context.number
+        away_m = _ENTRY_M / tan(radians(number("FW_LND_ANG"))) + _LEAD_S * number("FW_AIRSPD_TRIM")
+        north, east = self._along
+        self._entry = (target[0] - north * away_m, target[1] - east * away_m, target[2] - _ENTRY_M)
+        radius = self._radius()
+        self._centre = (self._entry[0] - east * radius, self._entry[1] + north * radius, self._entry[2])
+        self._phase = _Phase.SLOPE if is_lined_up else _Phase.CIRCLE
+        if self._phase is _Phase.CIRCLE:
+            self._context.setpoint.fly_to(self._centre, nan, pass_radius=radius)
+
+    def frame(self) -> None:
+        """Flies on, until the landing detector ends it."""
+        context = self._context
+        if context.is_on_ground:
+            return
+        if self._phase is _Phase.CIRCLE:
+            if self._may_leave():
+                self._phase = _Phase.SLOPE
+            return
+        context.is_landing = True
+        if self._phase is _Phase.SLOPE:
+            self._slide()
+        elif self._phase is _Phase.FLARE:
+            self._flare()
+        else:
+            context.setpoint.drive(throttle=-1.0, yaw=self._yaw)
+
+    def _may_leave(self) -> bool:
+        """Whether it passes the entry, low and in the direction of the slope."""
+        context = self._context
+        (north, east, down), (vel_n, vel_e, _) = context.state.estimate.pos_ned, context.state.estimate.vel_ned
+        off = hypot(north - self._entry[0], east - self._entry[1])
+        turn = abs((atan2(vel_e, vel_n) - self._yaw + pi) % (2.0 * pi) - pi)
+        is_low = abs(down - self._entry[2]) < context.number("NAV_FW_ALTL_RAD")
+        return is_low and turn < _ALIGNED_RAD and off < _NEAR_PART * self._radius()
+
+    def _slide(self) -> None:
+        context = self._context
+        north, east, _ = context.state.estimate.pos_ned
+        vel_n, vel_e, sink = context.state.estimate.vel_ned
+        slope = tan(radians(context.number("FW_LND_ANG")))
+        aim_m = _FLARE_WAY_S * self._landing_m_s()
+        left_m = (self._target[0] - north) * self._along[0] + (self._target[1] - east) * self._along[1] - aim_m
+        speed = vel_n * self._along[0] + vel_e * self._along[1]
+        down = self._target[2] - max(left_m, 0.0) * slope
+        is_above = down < self._entry[2]
+        self._glide(max(down, self._entry[2]), 0.0 if is_above else slope * max(speed, 0.0), nan)
+        begin_m = max(context.number("FW_LND_FLALT"), context.number("FW_LND_FL_TIME") * sink)
+        if self._height() < begin_m:
+            self._phase = _Phase.FLARE
+            self._flare_us = context.state.time_us
+
+    def _flare(self) -> None:
+        context = self._context
+        self._glide(nan, context.number("FW_LND_FL_SINK"), context.number("FW_THR_IDLE"))
+        flared_us = context.state.time_us - self._flare_us
+        is_down = context.state.estimate.vel_ned[2] < _DOWN_M_S and self._height() < _TOUCH_M
+        if (is_down and flared_us > 1_000_000) or flared_us > _LONG_FLARE_US:
+            self._phase = _Phase.ROLL
+
+    def _glide(self, down: float, sink: float, throttle: float) -> None:
+        target = (self._target[0], self._target[1], down)
+        start = (self._entry[0], self._entry[1], nan)
+        self._context.setpoint.glide(target, start, sink, airspeed=self._landing_m_s(), throttle=throttle)
+
+    def _height(self) -> float:
+        """[m] of the wheels over the ground: measured, or by the height of the touchdown."""
+        context = self._context
+        height, is_measured = context.height_above_ground()
+        if is_measured:
+            return height - context.craft.standing_height_m
+        return self._target[2] - context.state.estimate.pos_ned[2]  # type: ignore[no-any-return]
+
+    def _landing_m_s(self) -> float:
+        asked = self._context.number("FW_LND_AIRSPD")
+        return asked if asked > 0.0 else self._context.number("FW_AIRSPD_MIN")
+
+    def _radius(self) -> float:
+        return self._context.number("NAV_LOITER_RAD")
+
+    def _upwind(self) -> float:
+        """[rad] Where the wind comes from, felt as the difference of the speeds; in a calm as it took off."""
+        state = self._context.state
+        vel_n, vel_e, _ = state.estimate.vel_ned
+        if not state.estimate.flags & AIRSPEED_VALID:
+            return state.home_yaw_rad
+        speed = airspeed_of(self._context) * cos(state.pitch_rad)
+        north, east = vel_n - speed * cos(state.yaw_rad), vel_e - speed * sin(state.yaw_rad)
+        return atan2(-east, -north) if hypot(north, east) > _CALM_M_S else state.home_yaw_rad
+
+
+class PlaneLand(FlightMode):
+    """Mode Land: at a place if one was asked for, else where it last stood; against the wind."""
+
+    __slots__ = ("_approach", "_context", "_place", "_yaw")
+
+    is_below_floor = True
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._approach = Approach(context)
+        self._place: Vector | None = None
+        self._yaw = nan
+
+    def take(self, request: LandAt) -> Reply:
+        """Sets place and direction of the next landing."""
+        lat_deg, lon_deg = request.lat_deg, request.lon_deg
+        if isfinite(lat_deg) != isfinite(lon_deg) or abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+            return Reply(Verdict.DENIED, "there is no such latitude and longitude")
+        self._place = None
+        if isfinite(lat_deg) and not (lat_deg == 0.0 and lon_deg == 0.0):
+            place = self._context.pos_ned_of(lat_deg, lon_deg, self._context.state.position.alt_m)
+            refusal = self._context.fence_refusal(place)
+            if refusal:
+                return Reply(Verdict.DENIED, f"landing place is {refusal}")
+            self._place = place
+        self._yaw = request.yaw_rad
+        return ACCEPTED
+
+    def forget(self) -> None:
+        self._place, self._yaw = None, nan
+
+    def start(self) -> None:
+        ground = self._context.state.stand_ned or self._context.state.home_ned
+        place = self._place or ground
+        self._approach.start((place[0], place[1], ground[2]), self._yaw)
+
+    def frame(self) -> None:
+        self._approach.frame()

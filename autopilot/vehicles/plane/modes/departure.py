@@ -1,0 +1,125 @@
+"""Take-off from a runway: along the heading that it stands at, until the airspeed carries it, then a climb straight on.
+
+PX4's runway take-off (RWTO_*). The first metres of the climb are flown with the wings nearly level: the line leads on.
+"""
+
+from enum import IntEnum
+from math import cos, inf, isfinite, nan, sin
+
+from autopilot.interface.client_requests import TakeOff
+from autopilot.interface.mode_spec import FlightMode
+from autopilot.interface.vehicle_state import ACCEPTED, Reply, Verdict
+from autopilot.navigator.context import NavContext
+from autopilot.navigator.modes.takeoff import takeoff_refusal
+from autopilot.navigator.setpoint import Vector
+from autopilot.ports import AIRSPEED_VALID
+
+_FAR_M = 10_000.0  # of the line along the runway
+_REACHED_M = 2.0  # below the height asked for, at which a take-off ends; guess
+
+
+class _Phase(IntEnum):
+    STAND = 0
+    RUN = 1
+    CLIMB = 2
+
+
+def airspeed_of(context: NavContext) -> float:
+    """[m/s] measured; without a tube the speed over ground."""
+    estimate = context.state.estimate
+    if estimate.flags & AIRSPEED_VALID:
+        return float(estimate.airspeed)
+    north, east, _ = estimate.vel_ned
+    return float((north * north + east * east) ** 0.5)
+
+
+class Departure:
+    """One take-off; in the air it is a climb straight on."""
+
+    __slots__ = ("_context", "_far", "_phase", "_run_us", "_start", "_target_d", "_yaw")
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._phase = _Phase.STAND
+        self._target_d = 0.0  # [m]
+        self._yaw = 0.0  # [rad]
+        self._run_us = 0
+        self._start: Vector = (0.0, 0.0, 0.0)
+        self._far: Vector = (0.0, 0.0, 0.0)
+
+    def start(self, target_d: float) -> None:
+        """Prepares a take-off to the down coordinate `target_d` [m]."""
+        self._target_d = target_d
+        self._phase = _Phase.STAND
+
+    def frame(self) -> bool:
+        """Flies on; true once the height is reached."""
+        context = self._context
+        if context.is_on_ground:
+            context.wants_lift = True
+            return False
+        state = context.state
+        if self._phase is _Phase.STAND:
+            self._begin()
+        if self._phase is _Phase.RUN:
+            ramp = (state.time_us - self._run_us) * 1e-6 / context.number("RWTO_RAMP_TIME")
+            context.setpoint.drive(throttle=min(ramp, 1.0) * context.number("RWTO_MAX_THR"), yaw=self._yaw)
+            if airspeed_of(context) < self._rotation_m_s():
+                return False
+            self._phase = _Phase.CLIMB
+            context.setpoint.fly_to(self._far, nan, path_start_ned=self._start)
+        return bool(state.estimate.pos_ned[2] < self._target_d + _REACHED_M)
+
+    def _begin(self) -> None:
+        state = self._context.state
+        north, east, down = state.estimate.pos_ned
+        is_low = state.stand_ned is None or down > state.stand_ned[2] - 1.0
+        self._phase = _Phase.RUN if is_low else _Phase.CLIMB
+        self._yaw, self._run_us = state.yaw_rad, state.time_us
+        self._start = (north, east, nan)
+        self._far = (north + _FAR_M * cos(self._yaw), east + _FAR_M * sin(self._yaw), min(self._target_d, down) - 1.0)
+        if self._phase is _Phase.CLIMB:
+            self._context.setpoint.fly_to(self._far, nan, path_start_ned=self._start)
+
+    def _rotation_m_s(self) -> float:
+        asked = self._context.number("RWTO_ROT_AIRSPD")
+        return asked if asked > 0.0 else self._context.number("FW_AIRSPD_MIN")
+
+
+class PlaneTakeoff(FlightMode):
+    """Mode Takeoff: a runway take-off to MIS_TAKEOFF_ALT or what was asked for, then Hold."""
+
+    __slots__ = ("_alt_amsl_m", "_context", "_departure")
+
+    finishes_takeoff = is_below_floor = True
+
+    def __init__(self, context: NavContext) -> None:
+        self._context = context
+        self._departure = Departure(context)
+        self._alt_amsl_m = nan
+
+    def take(self, request: TakeOff) -> Reply:
+        """Sets the height of the next take-off; NaN: MIS_TAKEOFF_ALT above home."""
+        refusal = takeoff_refusal(self._context, request.alt_amsl_m)
+        if refusal:
+            return Reply(Verdict.DENIED, refusal)
+        self._alt_amsl_m = request.alt_amsl_m
+        return ACCEPTED
+
+    def forget(self) -> None:
+        self._alt_amsl_m = nan
+
+    def may_go(self, *, is_taking_off: bool) -> bool:  # noqa: ARG002
+        return self._context.state.is_armed
+
+    def start(self) -> None:
+        context = self._context
+        base_m = (context.state.home or context.state.position).alt_m
+        lowest_m = base_m + context.number("MIS_TAKEOFF_ALT")
+        asked_m = self._alt_amsl_m if isfinite(self._alt_amsl_m) else -inf
+        self._departure.start(context.down_of(max(asked_m, lowest_m)))
+
+    def frame(self) -> None:
+        if self._departure.frame():
+            context = self._context
+            context.hold_next(context.state.estimate.pos_ned, context.state.yaw_rad)
