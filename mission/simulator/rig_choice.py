@@ -14,14 +14,18 @@ def rig_with(engine: EngineName, airframe: Airframe) -> Callable[..., Rig]:
     """What makes the rig of an airframe: it takes the arguments of `Rig`.
 
     Raises:
+        ValueError: the native engine does not move it.
         ModuleNotFoundError: the engine is not installed.
     """
+    aircraft = airframe.jsbsim_aircraft if isinstance(airframe, PlaneAirframe) else ""
     if engine == "native":
+        if aircraft:
+            raise ValueError(f"{airframe.name} is JSBSim's {aircraft}: the engine jsbsim moves it")
         return Rig
     if engine == "jsbsim" and isinstance(airframe, PlaneAirframe):
         from sim.engines.jsbsim_plane_engine import JsbsimPlaneEngine
 
-        return partial(SteppedRig, engine=partial(JsbsimPlaneEngine, aircraft=airframe.jsbsim_aircraft))
+        return partial(SteppedRig, engine=partial(JsbsimPlaneEngine, aircraft=aircraft))
     if engine == "jsbsim":
         from sim.engines.jsbsim_engine import JsbsimEngine
 
