@@ -1,7 +1,8 @@
-"""What does an engine take for a millisecond of one multirotor in the air, its own part of the loop alone?"""
+"""What does an engine take for a millisecond of one vehicle in the air, its own part of the loop alone?"""
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -9,9 +10,11 @@ from bench.row import Row, require
 from common.airframe import load_airframe
 from common.geodesy import DEFAULT_HOME
 from common.kernels import SUBSTEPS
+from sim.bodies.vehicles import class_of
 from sim.engines.bullet import BulletEngine
 from sim.engines.engine import Engine
 from sim.engines.jsbsim_engine import JsbsimEngine
+from sim.engines.jsbsim_plane_engine import JsbsimPlaneEngine
 from sim.engines.native import NativeEngine
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
@@ -44,10 +47,12 @@ def measure() -> list[Row]:
     for name, make in ENGINES:
         took_us = min(step_us(make) for _ in range(ROUNDS))
         rows.append(Row(f"engine {name}: a millisecond of one multirotor", took_us, "us", "lower", TARGET_US, COMMAND))
+    took_us = min(step_us(partial(JsbsimPlaneEngine, aircraft="c172p"), "c172") for _ in range(ROUNDS))
+    rows.append(Row("engine jsbsim: a millisecond of its Cessna", took_us, "us", "lower", TARGET_US, COMMAND))
     return rows
 
 
-def step_us(make: Callable[[Rig], Engine]) -> float:
+def step_us(make: Callable[[Rig], Engine], airframe: str = "x500") -> float:
     """CPU time of a step [µs], of a vehicle that flies high over trees."""
     made: list[Timed] = []
 
@@ -55,13 +60,16 @@ def step_us(make: Callable[[Rig], Engine]) -> float:
         made.append(Timed(make(rig)))
         return made[0]
 
+    vehicle, body = class_of(load_airframe(airframe))
     rig = SteppedRig(
-        load_airframe("x500"),
+        load_airframe(airframe),
         build_world(),
         sensor_model(home=DEFAULT_HOME),
         wind_model(5.0),
         home=DEFAULT_HOME,
         engine=timed,
+        body=body,
+        law=vehicle.law,
     )
     rig.arrays.body.numpy()["pos_ned"][0] = (0.0, 0.0, -HIGH_M)
     rig.advance(10)
