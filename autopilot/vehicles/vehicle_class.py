@@ -186,7 +186,7 @@ class VehicleClass:
     lane: Callable[[Any], Lane] | None = None
     """Of what stops before obstacles in its lane, in every mode (CP_DIST); None: modes see to that themselves."""
     leg: Callable[..., Any] | None = None
-    """Makes what flies a mission's items (autopilot.navigator.mission.mission_legs.Leg), of what cannot stop; None: that."""
+    """Makes what flies a mission's items, of what cannot stop; None: autopilot.navigator.mission.mission_legs.Leg."""
     drive_watch: Callable[[DriveParts], DriveWatch] | None = None
     """None: nobody looks whether a motor has failed or the vehicle is stuck."""
 

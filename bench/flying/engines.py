@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from sim.bodies.vehicles import class_of
 from sim.engines.bullet import BulletEngine
 from sim.engines.engine import Engine
 from sim.engines.jsbsim_engine import JsbsimEngine
+from sim.engines.jsbsim_plane_engine import JsbsimPlaneEngine
 from sim.engines.native import NativeEngine
 from sim.rig import Rig
 from sim.sensors.sensors import sensor_model
@@ -49,12 +51,14 @@ def measure() -> list[Row]:
             took_us = min(step_us(make) for _ in range(ROUNDS))
             row_name = f"engine {name}: a millisecond of one {vehicle}"
             rows.append(Row(row_name, took_us, "us", "lower", TARGET_US, COMMAND))
+    took_us = min(flying_us(partial(JsbsimPlaneEngine, aircraft="c172p"), "c172") for _ in range(ROUNDS))
+    rows.append(Row("engine jsbsim: a millisecond of its Cessna", took_us, "us", "lower", TARGET_US, COMMAND))
     return rows
 
 
-def flying_us(make: Callable[[Rig], Engine]) -> float:
+def flying_us(make: Callable[[Rig], Engine], airframe: str = "x500") -> float:
     """CPU time of a step [µs], of a vehicle that flies high over trees."""
-    rig, timed = timed_rig(make, "x500")
+    rig, timed = timed_rig(make, airframe)
     rig.arrays.body.numpy()["pos_ned"][0] = (0.0, 0.0, -HIGH_M)
     took_us = step_us(rig, timed)
     height_m = -float(rig.truth_row()["pos_ned"][2])

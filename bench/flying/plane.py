@@ -68,7 +68,7 @@ def fly_circuit(seed: int, wind_m_s: float = 3.0, wind_from_deg: float = 270.0) 
             truth = flight.rig.rows["truth"][0]
             if 2 <= leg <= len(CORNERS) and flight.time_us * 1e-6 - since_s > SETTLED_S and state.mode is Mode.MISSION:
                 _judge(flight, out, truth, leg)
-            if leg == len(CORNERS) + 1 and truth["is_on_ground"] and not out.touchdown_m == out.touchdown_m:
+            if leg == len(CORNERS) + 1 and truth["is_on_ground"] and out.touchdown_m != out.touchdown_m:
                 out.touchdown_m = hypot(*truth["pos_ned"][:2])
                 out.sink_m_s = float(truth["impact_speed"])
         out.rest_m = hypot(*flight.rig.rows["truth"][0]["pos_ned"][:2])

@@ -48,7 +48,7 @@ nothing can only be read.
 """
 
 
-OTHER_AIRFRAMES = ("rover",)  # one of each class of vehicles besides the multirotor
+OTHER_AIRFRAMES = ("rover", "plane")  # one of each class of vehicles besides the multirotor
 OTHER_HEADER = """## {title}: control, flight modes, detectors
 
 In the place of the multirotor's. Defaults are those of the {airframe}.

@@ -37,6 +37,9 @@ def rig_with(engine: EngineName, airframe: Airframe) -> Callable[..., Rig]:
     """What makes the rig of an airframe: it takes the arguments of `Rig`.
 
     Raises:
+        ValueError: the native engine does not move it.
         ModuleNotFoundError: the engine is not installed.
     """
+    if engine == "native" and isinstance(airframe, PlaneAirframe) and airframe.jsbsim_aircraft:
+        raise ValueError(f"{airframe.name} is JSBSim's {airframe.jsbsim_aircraft}: the engine jsbsim moves it")
     return Rig if engine == "native" else partial(SteppedRig, engine=engine_named(engine, airframe))

@@ -97,7 +97,7 @@ def height_above_home(state: VehicleState) -> float:
 
 
 def vfr_hud(state: VehicleState) -> bytes:
-    """Speed through the air (measured, or by the wind; else 0) and over ground, heading, altitude, climb rate, throttle."""
+    """Speed through the air (measured or by the wind, else 0), over ground, heading, altitude, climb rate, throttle."""
     estimate = state.estimate
     north, east, down = estimate.vel_ned
     ground_speed = hypot(north, east)

@@ -1,7 +1,7 @@
 """Bank and pitch to body rates, and rates to surfaces, 250 Hz: PX4's fixed-wing loops.
 
-A surface's torque grows with the square of the airspeed and the damping with the airspeed: what is asked of a surface is
-scaled back accordingly, by the airspeed at which the gains hold (FW_AIRSPD_TRIM).
+A surface's torque grows with the square of the airspeed and the damping with the airspeed: what is asked of it is
+scaled back, by the airspeed at which the gains hold (FW_AIRSPD_TRIM).
 """
 
 import warp as wp

@@ -101,13 +101,13 @@ def way_of(params: PlaneParams, sp: Setpoint, here: Measured) -> Way:
 
 @wp.func
 def roll_of(q: wp.quat) -> float:
-    """[rad]"""
+    """Bank [rad] of an attitude."""
     return wp.atan2(2.0 * (q[3] * q[0] + q[1] * q[2]), 1.0 - 2.0 * (q[0] * q[0] + q[1] * q[1]))
 
 
 @wp.func
 def pitch_of(q: wp.quat) -> float:
-    """[rad]"""
+    """Pitch [rad] of an attitude."""
     return wp.asin(wp.clamp(2.0 * (q[3] * q[1] - q[2] * q[0]), -1.0, 1.0))
 
 
@@ -186,9 +186,7 @@ def outer(
 
 
 @wp.func
-def commanded(
-    params: PlaneParams, state: PlaneControlState, sp: Setpoint, est: Estimate, here: Measured
-) -> PlaneControlState:
+def commanded(params: PlaneParams, state: PlaneControlState, sp: Setpoint, here: Measured) -> PlaneControlState:
     """The state with the outputs of this tick."""
     now = state
     rate_sp = body_rates(params, here, now.asked)
@@ -259,7 +257,7 @@ def plane_control_tick(
     here = measured(params, est)
     if tick % _FRAME_TICKS == 0 or sp.kind != state.kind or state.was_armed == 0:
         now = outer(params, now, sp, est, here)
-    now = commanded(params, now, sp, est, here)
+    now = commanded(params, now, sp, here)
     now.kind = sp.kind
     now.was_armed = 1
     return now

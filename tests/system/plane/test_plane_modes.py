@@ -1,4 +1,4 @@
-"""A plane's modes over MAVLink: it takes off from a runway, circles, goes to places, flies plans, comes back and lands."""
+"""A plane's modes over MAVLink: it takes off, circles, goes to places, flies plans, comes back and lands."""
 
 from math import atan2, hypot, nan, pi, radians
 

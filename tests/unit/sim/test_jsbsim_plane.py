@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from common.geodesy import DEFAULT_HOME
 from common.kernels import TICK_S
 from mission.cli import app
+from mission.flight import Flight, FlightConfig
 from sim.bodies.rigid_body import density_ratio_at
 from tests.engine_rig import PLAIN, STEEP, drop, rig_on, run
 
@@ -95,6 +96,8 @@ def test_the_same_twice_is_the_same_bits():
 
 
 def test_what_is_no_plane_or_unknown_is_refused():
+    with pytest.raises(ValueError, match="the engine jsbsim moves it"):
+        Flight(FlightConfig(airframe="c172"))
     with pytest.raises(ValueError, match="is a plane"):
         rig_on(PLAIN, CESSNA)
     with pytest.raises(ValueError, match="no aircraft 'kite'"):

@@ -131,7 +131,7 @@ class Approach:
         height, is_measured = context.height_above_ground()
         if is_measured:
             return height - context.craft.standing_height_m
-        return self._target[2] - context.state.estimate.pos_ned[2]  # type: ignore[no-any-return]
+        return self._target[2] - context.state.estimate.pos_ned[2]
 
     def _landing_m_s(self) -> float:
         asked = self._context.number("FW_LND_AIRSPD")

@@ -12,6 +12,7 @@ from autopilot.navigator.modes.rtl_destination import Destination, Destinations
 from autopilot.navigator.setpoint import Vector
 from autopilot.vehicles.plane.modes.approach import Approach
 
+_BANKED = (0.1305, 0.0, 0.0, 0.9914)  # 15 deg to the right: PX4's FW_GPSF_R
 _ROUND_PART = 1.5  # of the circle's radius, within which a plane counts as there
 
 
@@ -89,7 +90,13 @@ class PlaneHold(FlightMode):
             context.setpoint.lean(_BANKED, 0.0, nan)
 
 
-_BANKED = (0.1305, 0.0, 0.0, 0.9914)  # 15 deg to the right: PX4's FW_GPSF_R
+class PlaneCircle(PlaneHold):
+    """Mode Circle of ArduPilot: as Hold, and places that clients ask for are Hold's."""
+
+    __slots__ = ()
+
+    def forget(self) -> None:
+        """Nothing has been asked of it: the place that waits is Hold's."""
 
 
 class PlaneReturn(FlightMode):

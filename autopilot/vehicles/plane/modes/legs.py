@@ -113,9 +113,9 @@ class PlaneLeg(Leg):
         elif command == Command.CONTINUE_AND_CHANGE_ALT:
             self._change_height(item)
         elif command in (Command.DELAY, Command.TAKEOFF):
-            self._circle(item, context.state.estimate.pos_ned)
+            self._go_round(item, context.state.estimate.pos_ned)
         elif command in _LOITERS:
-            self._circle(item, self._route.position_of(item))
+            self._go_round(item, self._route.position_of(item))
         else:
             self._line(self._route.position_of(item))
 
@@ -139,7 +139,7 @@ class PlaneLeg(Leg):
         if left_m > self._turn_begin(item) and ahead > 0.0:
             return
         if hold_time_s(item) > 0.0 or abs(here[2] - goal[2]) > self._context.alt_radius():
-            self._circle(item, goal)
+            self._go_round(item, goal)
         else:
             self._is_done = True
 
@@ -178,7 +178,7 @@ class PlaneLeg(Leg):
         radius = item.params[1] if item.command == Command.LOITER_TO_ALT else item.params[2]
         return radius if isfinite(radius) else 0.0
 
-    def _circle(self, item: MissionItem, centre: Vector) -> None:
+    def _go_round(self, item: MissionItem, centre: Vector) -> None:
         self._phase = _Stage.CIRCLE
         self.target = self._goal = centre
         self._since_us = 0

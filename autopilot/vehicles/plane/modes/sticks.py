@@ -1,4 +1,4 @@
-"""The modes in which a pilot flies by sticks: Manual, Stabilized, Acro, Altitude and Position, as PX4's planes have them.
+"""The modes that a pilot flies by sticks: Manual, Stabilized, Acro, Altitude and Position, as PX4's planes have them.
 
 In: `state.sticks`, each frame. On the ground the throttle stick decides: above its lowest quarter the plane rolls. Out:
 surfaces, attitudes, rates, a bank and a climb rate, or a line over ground.

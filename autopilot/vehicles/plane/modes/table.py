@@ -21,7 +21,7 @@ from autopilot.navigator.modes.rtl_destination import Destinations
 from autopilot.navigator.modes.termination import Termination
 from autopilot.vehicles import px4_modes
 from autopilot.vehicles.plane.modes.approach import PlaneLand
-from autopilot.vehicles.plane.modes.auto import PlaneHold, PlaneReturn
+from autopilot.vehicles.plane.modes.auto import PlaneCircle, PlaneHold, PlaneReturn
 from autopilot.vehicles.plane.modes.departure import PlaneTakeoff
 from autopilot.vehicles.plane.modes.offboard import PlaneOffboard
 from autopilot.vehicles.plane.modes.sticks import Acro, Altitude, Manual, Position, Stabilized
@@ -96,7 +96,7 @@ PLANE_MODES = mode_table(
     px4_modes.ACRO(build=of_context(Acro), ardupilot=DialectMode(4, "Acro")),
     ModeSpec(
         mode=CIRCLE,
-        build=of_context(PlaneHold),
+        build=of_context(PlaneCircle),
         px4=Mode.HOLD,
         ardupilot=DialectMode(1, "Circle"),
         nav_state=4,
