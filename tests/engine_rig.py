@@ -23,6 +23,8 @@ SLOPES = [(0.0, 0.0), (20.0, -15.0), (-31.0, 12.0)]  # of 6 to 9 degrees
 class Idle:
     """A board that asks for the same all the time, of all motors or of each."""
 
+    is_fast = False
+
     def __init__(self, command=0.0):
         self._command = np.full(8, command, np.float32)
 

@@ -24,7 +24,7 @@ from sim.world.world import build_world
 
 COMMAND = "python -m bench links"
 SIMULATED_S = 600.0
-PATIENCE_S = 1.0
+PATIENCE_S = 10.0  # of wall clock time; the stand-in takes a second to start
 LAG_PPM = 1.0
 COPTER_TARGET, ROVER_TARGET, PX4_TARGET = 8.0, 20.0, 5.0
 
@@ -76,11 +76,14 @@ def _pace(name: str, make: Callable[[Rig, Any], ArduPilotBoard | Px4Board]) -> f
     kind = "ardupilot" if isinstance(board, ArduPilotBoard) else "px4"
     command = [sys.executable, "-m", f"bench.standins.{kind}", str(board.local_port), str(SIMULATED_S)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as peer:
-        speed = _fly(rig)
-        with suppress(PeerError):
-            rig.advance(100_000)  # until it has left
-        board.close()
-        report = "" if peer.stdout is None else peer.stdout.read()
+        try:
+            speed = _fly(rig)
+            with suppress(PeerError):
+                rig.advance(100_000)  # until it has left
+            report = peer.communicate(timeout=PATIENCE_S)[0]
+        finally:
+            peer.kill()
+            board.close()
     _check(report, board)
     return speed
 

@@ -7,6 +7,7 @@ a board or of a network. Scripts need not know which they have.
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isnan
+from typing import Any
 
 from autopilot.mavlink.wire.codec import Message
 from mission.client import CommandRefused
@@ -116,11 +117,12 @@ class ArduPilotDrone(Drone):
         await self.wait_disarmed(timeout_s)
 
     _farthest = 0  # item that it has gone for, since its mission began
+    _stale: Any = None  # of the mission before
 
     def frame(self, time_us: int) -> None:
         super().frame(time_us)
         current = self.latest("MISSION_CURRENT")
-        if current is not None and self.is_armed:
+        if current is not None and current is not self._stale and self.is_armed:
             self._farthest = max(self._farthest, current.seq)
 
     @property
@@ -132,7 +134,7 @@ class ArduPilotDrone(Drone):
 
     async def start_mission(self, first: int = 0) -> None:
         self.reached.clear()
-        self._farthest = 0
+        self._farthest, self._stale = 0, self.latest("MISSION_CURRENT")
         if not self.is_armed:
             await self.arm()
         await self._set_mode(MAIN_AUTO, AUTO_MISSION, "mission")

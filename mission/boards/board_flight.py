@@ -65,6 +65,8 @@ class BoardFlight(FlightBase):
     ) -> None:
         super().__init__(config, load_airframe(config.airframe))
         self.peer, self._on_wait = peer, on_wait
+        self.on_close: Callable[[], None] = lambda: None
+        """Ends the autopilot's program."""
         simulated = class_of(self.airframe)
         vehicle, self.drives = simulated.vehicle, simulated.drives
         self.world = flight_world(config)
@@ -154,15 +156,16 @@ class BoardFlight(FlightBase):
     def _stand_up_again(self) -> None:
         """The autopilot has restarted: so does what it flies."""
         self.restart_count = self.board.restart_count
-        self.restart()
+        self.injector.repair()
+        self.rig.boot()
         self.troubles.note(f"{self.peer.name} has restarted; the vehicle is back on its pad")
 
     def restart(self) -> None:
-        """Puts the vehicle back on its pad; restarting the autopilot is up to who has started it."""
-        self.injector.repair()
-        self.rig.boot()
+        """Is up to who has started the autopilot: under one that goes on, the vehicle is not put elsewhere."""
+        self.troubles.note(f"restart {self.peer.name} itself: its vehicle then stands on its pad again")
 
     def close(self) -> History:
+        self.on_close()
         self.board.close()
         self._hub.close()
         if self._tlog is not None:

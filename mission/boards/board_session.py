@@ -105,8 +105,12 @@ class PeerRun:
         """
         from mission.boards.board_flight import BoardFlight
 
+        airframe = load_airframe(config.airframe)
+        if airframe.vehicle not in self._peer.vehicles:
+            raise UserError(f"--board {self._options.board}: it flies no {airframe.vehicle} here")
         try:
             flight = BoardFlight(config, self._peer, self._watch, instance=self._options.instance, **parts)
+            flight.on_close = self.close
         except (PeerError, ValueError) as error:
             raise UserError(str(error)) from error
         self._watch.hint = self._peer.waits_for.format(port=flight.board.local_port)
@@ -120,7 +124,7 @@ class PeerRun:
         """
         own, command = self._folder / self._options.board, self._options.command
         own.mkdir(exist_ok=True)
-        environment = self._peer.prepare(config, load_airframe(config.airframe), own)
+        environment = self._peer.prepare(config, load_airframe(config.airframe), own, self._options.instance)
         if command is not None:
             command = filled_in(command, own, config.home, self._options.instance)
             try:
@@ -170,7 +174,7 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
 
 def station_links(options: FlightOptions, speed: float | None) -> list[LinkSource]:
     """For ground stations and companions, of an autopilot that does not speak to them itself."""
-    return [] if options.board == "px4" else open_links(options, speed or PACE_MAX)
+    return [] if options.board == "px4" else open_links(options, speed or PACE_MAX, options.instance)
 
 
 def filled_in(command: str, folder: Path, home: GeoPoint, instance: int) -> str:

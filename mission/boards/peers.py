@@ -49,8 +49,10 @@ class Peer:
     """To the one that a companion is fed by; where it is the same, the companion is joined with the flight."""
     has_station_ports: bool
     """It speaks to ground stations itself, where they listen; else we link them through."""
-    prepare: Callable[[FlightConfig, Airframe, Path], Mapping[str, str]]
-    """Writes what it is told of the vehicle into a folder; returns what is added to its environment."""
+    prepare: Callable[[FlightConfig, Airframe, Path, int], Mapping[str, str]]
+    """Writes what an instance is told of the vehicle into a folder; returns what is added to its environment."""
+    vehicles: tuple[str, ...]
+    """The classes of airframes that it flies here."""
     waits_for: str
     """What it has to do to be heard; `{port}` is where."""
 
@@ -77,14 +79,15 @@ def _px4_offboard_link(instance: int) -> Link:
     return UdpLink(_PX4_OFFBOARD_OWN + instance, LinkRole.ONBOARD, local_port=OFFBOARD_PORT + instance)
 
 
-def _prepare_ardupilot(config: FlightConfig, airframe: Airframe, folder: Path) -> Mapping[str, str]:
-    values = ardupilot_params(airframe) | config.parameters
+def _prepare_ardupilot(config: FlightConfig, airframe: Airframe, folder: Path, instance: int) -> Mapping[str, str]:
+    numbers = dict.fromkeys(("MAV_SYSID", "SYSID_THISMAV"), instance + 1.0)  # as it is called since 4.7, and before
+    values = numbers | ardupilot_params(airframe) | config.parameters
     text = "".join(f"{name} {value:g}\n" for name, value in values.items())
     (folder / "vehicle.parm").write_text(text)
     return {}
 
 
-def _prepare_px4(config: FlightConfig, airframe: Airframe, folder: Path) -> Mapping[str, str]:  # noqa: ARG001
+def _prepare_px4(config: FlightConfig, airframe: Airframe, _: Path, __: int) -> Mapping[str, str]:
     values = px4_params(airframe) | config.parameters
     return {"PX4_SIM_MODEL": "none_iris"} | {f"PX4_PARAM_{name}": f"{value:g}" for name, value in values.items()}
 
@@ -99,6 +102,7 @@ PEERS: Mapping[str, Peer] = {
         open_companion_link=_ardupilot_link,
         has_station_ports=False,
         prepare=_prepare_ardupilot,
+        vehicles=("multirotor", "rover"),
         waits_for="start it with --model JSON; its servos are expected at UDP port {port}",
     ),
     "px4": Peer(
@@ -110,6 +114,7 @@ PEERS: Mapping[str, Peer] = {
         open_companion_link=_px4_offboard_link,
         has_station_ports=True,
         prepare=_prepare_px4,
+        vehicles=("multirotor",),
         waits_for="start it with PX4_SIM_MODEL=none_iris; it is expected at TCP port {port}",
     ),
 }

@@ -1,7 +1,9 @@
 """The program of an outside autopilot: started, listened to, and ended with the flight."""
 
+import ctypes
 import os
 import shlex
+import signal
 import subprocess
 from collections.abc import Mapping
 from contextlib import suppress
@@ -13,6 +15,12 @@ from sim.boards.outside import PeerError
 END_S = 1.0  # of wall clock time, that it is given to end by itself; SITL does not while it waits for physics
 LINE_MAX = 400  # characters of a line that are shown
 READ_MAX = 65_536
+_PR_SET_PDEATHSIG = 1
+
+
+def _end_with_us() -> None:
+    """In the child: it is killed when we are."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 class PeerProcess:
@@ -29,6 +37,7 @@ class PeerProcess:
     """
 
     def __init__(self, command: str, folder: Path, environment: Mapping[str, str], log: Path) -> None:
+        self._log = log.open("wb")
         try:
             words = shlex.split(command)
             self._process = subprocess.Popen(  # noqa: S603  (what the user has asked for)
@@ -39,12 +48,13 @@ class PeerProcess:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
+                preexec_fn=_end_with_us,  # noqa: PLW1509  (no thread of ours holds a lock that the child needs)
             )
         except (OSError, ValueError, IndexError) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error)
+            self._log.close()
             raise PeerError(f"--command {command}: {reason or 'cannot be started'}") from error
         self._name = words[0]
-        self._log = log.open("wb")
         self._rest = b""
         self._stream = cast(IO[bytes], self._process.stdout)
         os.set_blocking(self._stream.fileno(), False)
@@ -55,8 +65,9 @@ class PeerProcess:
             data = os.read(self._stream.fileno(), READ_MAX)
         except BlockingIOError:
             return []
-        self._log.write(data)
-        self._log.flush()
+        with suppress(OSError):  # a full disk
+            self._log.write(data)
+            self._log.flush()
         *whole, self._rest = (self._rest + data).split(b"\n")
         return [line.decode(errors="replace").rstrip()[:LINE_MAX] for line in whole if line.strip()]
 
@@ -67,7 +78,9 @@ class PeerProcess:
             raise PeerError(f"{self._name} has ended with exit code {code}; its console is in {self._log.name}")
 
     def close(self) -> None:
-        """Ends it, and what it has started."""
+        """Ends it, and what it has started; once is enough."""
+        if self._stream.closed:
+            return
         if self._process.poll() is None:
             self._signal(15)
             with suppress(subprocess.TimeoutExpired):

@@ -14,6 +14,7 @@ def ardupilot_params(airframe: Airframe) -> dict[str, float]:
     """By ArduPilot's names."""
     quiet = {f"SIM_{sensor}{k}_RND": 0.0 for sensor in ("ACC", "GYR") for k in (1, 2)}  # the IMU's noise is ours
     downward = {"RNGFND1_TYPE": 100.0, "RNGFND1_ORIENT": 25.0}
+    downward |= {"RNGFND1_MAX_CM": 4000.0, "RNGFND1_MAX": 40.0}  # as it was called, and is called since 4.7
     if isinstance(airframe, MultirotorAirframe):
         return quiet | downward | _ardupilot_copter(airframe)
     if isinstance(airframe, RoverAirframe):
@@ -23,6 +24,8 @@ def ardupilot_params(airframe: Airframe) -> dict[str, float]:
 
 def _ardupilot_copter(airframe: MultirotorAirframe) -> dict[str, float]:
     idle = airframe.rotor_model.idle_command
+    if len(airframe.rotors) not in _FRAMES:
+        raise ValueError(f"ArduPilot flies frames in X of {', '.join(map(str, _FRAMES))} motors here")
     return {
         "FRAME_CLASS": float(_FRAMES[len(airframe.rotors)]),
         "FRAME_TYPE": float(_FRAME_X),

@@ -42,18 +42,12 @@ class FrameCounter:
         self.lost_count = 0
         self._last = -1
         self._sender: Any = None
-        self._heard_s = 0.0
 
-    def judge(self, packet: ServoPacket, sender: Any, now_s: float) -> Verdict:
-        """What a packet is that has come in at a time of the wall clock [s]."""
-        silent_s = now_s - self._heard_s
-        if sender != self._sender:
-            if self._sender is not None and silent_s < RESEND_S:
-                return Verdict.FOREIGN
-            is_first = True
-        else:
-            is_first = packet.frame_count < self._last
-        self._heard_s = now_s
+    def judge(self, packet: ServoPacket, sender: Any, silent_s: float) -> Verdict:
+        """What a packet is, after so long [s] without one from who flies here, though it was waited for."""
+        if self._sender is not None and sender != self._sender and silent_s < RESEND_S:
+            return Verdict.FOREIGN
+        is_first = sender != self._sender or packet.frame_count < self._last
         if not is_first and packet.frame_count == self._last:
             return Verdict.AGAIN
         if not is_first:
@@ -108,6 +102,7 @@ class ArduPilotBoard:
         self._counter = FrameCounter()
         self._sender: Any = None
         self._answer, self._answered_s = b"", 0.0
+        self._silent_s = 0.0  # of waiting, since it was heard
         self._truth = rig.arrays.truth.numpy()  # live
         self._imu = FastImu(rig) if self.is_fast else None
 
@@ -151,19 +146,31 @@ class ArduPilotBoard:
     def _take(self, commands: Any) -> None:
         """Waits for the next servos, as long as `on_wait` lets it."""
         row = commands.numpy()[0]
+        begun_s = looked_s = wall_time_s()
         while True:
-            packet, sender = self._next_packet()
-            verdict = self._counter.judge(packet, sender, wall_time_s())
-            if verdict is Verdict.FOREIGN:
-                self.foreign_count += 1
-            elif verdict is Verdict.AGAIN:
-                self._answer_again()
-            else:
-                if verdict is Verdict.FIRST:
-                    self._begin()
-                self._sender = sender
-                row[: len(self._channels)] = commands_of(self._channels, packet.pulses_us)
+            received = self._receive()
+            now_s = wall_time_s()
+            if now_s - looked_s >= POLL_S:
+                looked_s = now_s
+                self._on_wait(now_s - begun_s)
+            if received is not None and self._is_taken(*received, row):
                 return
+
+    def _is_taken(self, packet: ServoPacket, sender: Any, row: Any) -> bool:
+        """Whether the packet has brought the next servos."""
+        verdict = self._counter.judge(packet, sender, self._silent_s)
+        if verdict is Verdict.FOREIGN:
+            self.foreign_count += 1
+            return False
+        self._silent_s = 0.0
+        if verdict is Verdict.AGAIN:
+            self._answer_again()
+            return False
+        if verdict is Verdict.FIRST:
+            self._begin()
+        self._sender = sender
+        row[: len(self._channels)] = commands_of(self._channels, packet.pulses_us)
+        return True
 
     def _begin(self) -> None:
         """An autopilot has started: its clock begins, and what it flies shall stand where it boots."""
@@ -177,20 +184,18 @@ class ArduPilotBoard:
             self.again_count += 1
             self._send()
 
-    def _next_packet(self) -> tuple[ServoPacket, Any]:
-        begun_s = wall_time_s()
-        while True:
-            try:
-                data, sender = self._socket.recvfrom(DATAGRAM_MAX)
-            except TimeoutError:
-                self._on_wait(wall_time_s() - begun_s)
-                continue
-            except ConnectionError:  # an earlier answer found nobody
-                continue
-            packet = servo_packet(data)
-            if packet is not None:
-                return packet, sender
-            self.rubbish_count += 1
+    def _receive(self) -> tuple[ServoPacket, Any] | None:
+        """The next packet and who sent it; None: nothing in time, or rubbish."""
+        try:
+            data, sender = self._socket.recvfrom(DATAGRAM_MAX)
+        except TimeoutError:
+            self._silent_s += POLL_S
+            return None
+        except ConnectionError:  # an earlier answer found nobody
+            return None
+        packet = servo_packet(data)
+        self.rubbish_count += packet is None
+        return None if packet is None else (packet, sender)
 
     def close(self) -> None:
         self._socket.close()

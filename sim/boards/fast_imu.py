@@ -7,13 +7,14 @@ import warp as wp
 from autopilot.ports import ImuSample
 from common.kernels import SUBSTEPS, TICK_S
 from sim.rig import Rig
-from sim.sensors.imu import ImuState, imu_sample, imu_vibration
+from sim.sensors.imu import ImuState, imu_period, imu_sample, imu_vibration
 from sim.sensors.sensors import Faults, SensorModel, SensorState
 from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
 
 _SUBSTEP_S = wp.constant(TICK_S / SUBSTEPS)
+_SUBSTEPS = wp.constant(SUBSTEPS)
 _ROOT = wp.constant(SUBSTEPS**0.5)  # of a noise density, at so many times the rate
 
 
@@ -37,6 +38,10 @@ def feel(
     model.accel_std *= _ROOT
     model.gyro_broadband *= _ROOT
     model.accel_broadband *= _ROOT
+    fault = faults[i]
+    period = imu_period(fault.gyro, fault.accel)
+    if period == 0 or (period > 1 and count % wp.int64(period * _SUBSTEPS) != wp.int64(0)):
+        return  # off, or slowed: the last one is read again
     now = imu_vibration(tones[i], truths[i].motor_speed, _SUBSTEP_S)
     bias = sensors[i].imu
     now.gyro_bias_frd = bias.gyro_bias_frd
@@ -45,7 +50,6 @@ def feel(
     now.accel_drift_frd = bias.accel_drift_frd
     tones[i] = now
     truth = truths[i]
-    fault = faults[i]
     felt[i] = imu_sample(
         model, now, felt[i], truth.gyro_frd, truth.accel_frd, fault.gyro, fault.accel, seeds[i], i, count
     )

@@ -8,6 +8,9 @@ from math import isfinite
 from struct import Struct
 from typing import Any, NamedTuple
 
+from sim.boards.outside import PeerError
+from sim.sensors.range import MAX_DISTANCE_M
+
 _SERVO_16, _MAGIC_16 = Struct("<HHI16H"), 18458
 _SERVO_32, _MAGIC_32 = Struct("<HHI32H"), 29569  # SERVO_32_ENABLE
 _FORMAT = (
@@ -52,16 +55,17 @@ def state_text(time_ns: int, gyro_frd: Any, accel_frd: Any, truth: Any, extras: 
         extras: further keys as text that begins with a comma, or nothing.
 
     Raises:
-        ValueError: a number is none; ArduPilot would take it, and its estimator would never recover.
+        PeerError: a number is none; ArduPilot would take it, and its estimator would never recover.
     """
     x, y, z, w = truth["q_ned_from_frd"].tolist()
     pos_ned, vel_ned = truth["pos_ned"].tolist(), truth["vel_ned"].tolist()
     numbers = (*gyro_frd, *accel_frd, *pos_ned, w, x, y, z, *vel_ned)
     if not isfinite(sum(numbers)):
-        raise ValueError("the body's state is not a number")
+        raise PeerError("the body's state is not a number")
     return (_FORMAT % (*divmod(time_ns, _NS_PER_S), *numbers, extras)).encode()
 
 
 def range_key(sample: Any) -> str:
-    """Of the range finder that looks down, as `extras` of `state_text`; where it sees nothing there is none."""
-    return f',"rng_1":{float(sample["distance_m"]):.4g}' if sample["is_valid"] else ""
+    """Of the range finder that looks down, as `extras` of `state_text`; beyond its reach where it sees nothing."""
+    distance_m = float(sample["distance_m"]) if sample["is_valid"] else MAX_DISTANCE_M + 1.0
+    return f',"rng_1":{distance_m:.4g}'

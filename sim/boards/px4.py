@@ -1,8 +1,9 @@
 """PX4's SITL as a board, by MAVLink's HIL messages over TCP: we are the server, and its clock is ours.
 
 After each tick of 4 ms we send what the sensors have, and wait for its actuators. It answers when a control module has
-run: a copter to every sample of the gyro, a rover at 100 Hz and only while armed. So we wait as long as it has been
-answering lately, and at most 20 ms of wall clock time; while it does not answer at all, time runs at the wall's pace.
+run: a copter to every sample of the gyro, a rover at 100 Hz and only while armed. So who has answered each tick is
+waited for, a second at most; who answers seldom, as long as that has lately taken; and while it does not answer at all,
+time runs at the wall's pace.
 """
 
 import socket
@@ -19,7 +20,8 @@ from sim.boards.outside import POLL_S, OnWait, PeerError
 from sim.rig import Rig
 
 PORT = 4560  # of the first instance; the next ones are 1 further each
-ANSWER_S = 0.02  # of wall clock time, that an answer which is due is waited for
+STEADY_S = 1.0  # of wall clock time, that who answers each tick is waited for: then it says "poll timeout" itself
+ANSWER_S = 0.02  # and who answers seldom
 PERIOD_TICKS_MAX = 5  # guess: beyond it the answers are no lockstep
 READ_MAX = 65_536
 TRUTH_TICKS = 2  # it asks for the truth at 200 Hz, for its log; 125 Hz do
@@ -129,7 +131,7 @@ class Px4Board:
         data += self._writer.sensors(self._time_us, samples, has_mag=is_new["mag"], has_baro=is_new["baro"])
         try:
             if self._peer is not None:
-                self._peer.settimeout(POLL_S)
+                self._peer.settimeout(STEADY_S)
                 self._peer.sendall(data)
         except OSError:
             self._lose()
@@ -143,14 +145,18 @@ class Px4Board:
 
     def _listen(self, row: Any, begun_s: float) -> None:
         """Takes its actuators: those that answer this tick, if that is due; else what has come in."""
-        limit_s = ANSWER_S if self._periods else TICK_S
+        limit_s = TICK_S
+        if self._periods:
+            limit_s = STEADY_S if max(self._periods) == 1 else ANSWER_S
         is_due = self._time_us - self._answered_us >= TICK_US * max(self._periods, default=0)
         while self._peer is not None:
             left_s = limit_s - (wall_time_s() - begun_s) if is_due else 0.0
-            if self._receive(row, max(left_s, 0.0)):
+            if self._receive(row, min(max(left_s, 0.0), POLL_S)):
                 return
             if left_s <= 0.0:
                 break
+            if self._periods:
+                self._on_wait(wall_time_s() - begun_s)
         if is_due:
             self.unanswered_count += bool(self._periods)
             if self._time_us - self._answered_us >= TICK_US * PERIOD_TICKS_MAX:

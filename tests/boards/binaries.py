@@ -65,20 +65,24 @@ def killed_in_flight(board: str, command: str, folder: Path, binary: str) -> Flo
     for line in process.stdout:
         lines.append(line)
         if "rming motors" in line or "Armed by" in line:
-            _kill(binary)
+            _kill(binary, process.pid)
             break
-    rest, _ = process.communicate(timeout=PATIENCE_S)
+    try:
+        rest, _ = process.communicate(timeout=PATIENCE_S)
+    finally:
+        process.kill()
     return Flown(process.returncode, "".join(lines) + rest, {})
 
 
-def _kill(binary: str) -> None:
-    """Kills the newest process of a binary."""
-    for folder in sorted(Path("/proc").glob("[0-9]*"), key=lambda path: -int(path.name)):
+def _kill(binary: str, parent: int) -> None:
+    """Kills the process of a binary that has this parent."""
+    for folder in Path("/proc").glob("[0-9]*"):
         try:
             program = (folder / "exe").readlink()
+            of = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
         except OSError:
             continue
-        if program.name == binary:
+        if program.name == binary and of == parent:
             os.kill(int(folder.name), signal.SIGKILL)
             return
     raise LookupError(binary)

@@ -72,6 +72,8 @@ class Law:
 class TruthBoard:
     """A board that knows the truth, and flies the law by it."""
 
+    is_fast = False
+
     def __init__(self, law, states):
         self._law, self._states = law, states
         self.ticks = 0

@@ -26,6 +26,8 @@ class Sequence:
         commands: of the first channels; one for all time, or pairs of the time [s] until which it holds and it.
     """
 
+    is_fast = False
+
     def __init__(self, commands):
         self._commands = commands if isinstance(commands, list) else [(np.inf, commands)]
         self._ticks = 0

@@ -129,4 +129,4 @@ def test_what_it_does_not_move_is_refused():
         rig_on(PLAIN, JsbsimEngine, airframe="rover")
     result = CliRunner().invoke(app, ["fly", "--engine", "jsbsim", "--airframe", "rover"])
     assert result.exit_code == 2
-    assert "--engine jsbsim: it moves multirotors, and rover is none" in result.stderr
+    assert "--engine jsbsim: it does not move rover" in result.stderr

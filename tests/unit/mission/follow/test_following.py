@@ -166,7 +166,7 @@ def test_who_flies_by_sight_alone_is_ready_when_it_believes_to_see_the_owner(tmp
         assert companion.skill.owner_distance_m(companion.vehicle.own) == pytest.approx(3.5, abs=0.1)  # as believed
 
 
-def test_in_the_ardupilot_dialect_it_flies_in_guided_and_hands_back_by_loiter():
+def test_in_the_ardupilot_dialect_it_flies_in_guided_and_hands_back_by_brake():
     ardupilot = config().model_copy(update={"dialect": "ardupilot"})
     flight, companion = flight_with_companion(ardupilot, ScriptedFollower())
     flight.fly(take_off, seconds=40.0)
@@ -175,7 +175,7 @@ def test_in_the_ardupilot_dialect_it_flies_in_guided_and_hands_back_by_loiter():
     assert flight.owner.is_walking
     flight.onboard._sinks.clear()
     advance(flight, 1.0)
-    assert (companion.phase, flight.controller.state.mode) == (Phase.RELEASED, Mode.HOLD)
+    assert (companion.phase, flight.controller.state.mode) == (Phase.RELEASED, Mode.BRAKE)
 
 
 def test_pictures_of_another_lens_end_in_hold():

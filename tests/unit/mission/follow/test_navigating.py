@@ -161,7 +161,7 @@ def test_in_the_ardupilot_dialect_a_goto_is_flown_in_guided(component):
     advance(flight, 1.0)
     assert (companion.phase, mode(flight)) == (Phase.FLYING, Mode.GUIDED)
     advance(flight, 20.0, lambda: companion.phase is Phase.RELEASED)
-    assert mode(flight) is Mode.HOLD
+    assert mode(flight) is Mode.BRAKE
 
 
 def test_two_flights_to_a_goal_write_the_same_bytes(tmp_path):

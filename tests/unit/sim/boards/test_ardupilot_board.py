@@ -37,7 +37,7 @@ def test_the_strict_parser_reads_what_was_written(truth):
 def test_a_number_that_is_none_is_never_sent(truth):
     broken = truth.copy()
     broken["vel_ned"][1] = np.nan
-    with pytest.raises(ValueError, match="not a number"):
+    with pytest.raises(PeerError, match="not a number"):
         state_text(0, [0.0] * 3, [0.0] * 3, broken)
 
 
