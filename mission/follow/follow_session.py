@@ -113,12 +113,11 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         peer_run.start(config)
     session.fly(lambda _: running.is_done, running, [watch.frame])
     is_stopped = not running.is_done and not flight.end_reason
-    if flight.end_reason:
-        print_line(console, f"result: {flight.end_reason}")
     running.cancel()
-    if running.error is not None:
-        print_line(console, f"result: {running.error}")
-    is_down = running.error is None and not flight.is_crashed and not flight.end_reason
+    trouble = flight.end_reason or running.error
+    if trouble:
+        print_line(console, f"result: {trouble}")
+    is_down = not trouble and not flight.is_crashed
     exit_code = finish(watch, session.files, console, is_down=is_down, is_stopped=is_stopped)
     if flight.is_crashed:
         print_line(console, "the vehicle crashed" + (f" ({', '.join(watch.takeovers)})" if watch.takeovers else ""))
