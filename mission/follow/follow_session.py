@@ -15,7 +15,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from autopilot.mavlink.transport.links import LinkError
+from autopilot.mavlink.transport.links import LinkError, LinkSource
 from common.airframe import AirframeError, load_airframe
 from common.clock import wall_time_s
 from common.files import write_whole
@@ -26,6 +26,7 @@ from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
 from mission.flight import Flight, flight_parameters
 from mission.flight_base import FlightBase
+from mission.flight_config import FlightConfig
 from mission.flight_session import FlightSession
 from mission.flight_settings import FollowOptions
 from mission.follow.companion_process import latency_text
@@ -71,15 +72,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     speed = speed_of(options.speed)
     pilot, name = chosen_pilot(options)
     config = follow_config(options, has_scanner=isinstance(pilot, NavigationPilot))
-    try:
-        if options.board == "own":
-            flight_parameters(config, load_airframe(config.airframe))
-            links = [] if speed is None else open_links(options, speed)
-        else:
-            check_board(options)
-            links = station_links(options, speed)
-    except (AirframeError, ParameterError, LinkError) as error:
-        raise UserError(str(error)) from error
+    links = _links(options, config, speed)
     page = open_page(options.view_port) if options.has_view else None
     folder = held.enter_context(run_folder(options.run_folder))
     with busy(console, "loading kernels") as say:
@@ -126,6 +119,22 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     print_line(console, f"{'logs, scorecard and film' if has_film else 'logs and scorecard'}: {folder}")
     session.close()
     return exit_code
+
+
+def _links(options: FollowOptions, config: FlightConfig, speed: float | None) -> list[LinkSource]:
+    """Of ground stations.
+
+    Raises:
+        UserError: a parameter, the airframe or a port is wrong.
+    """
+    if options.board != "own":
+        check_board(options)
+        return station_links(options, speed)
+    try:
+        flight_parameters(config, load_airframe(config.airframe))
+        return [] if speed is None else open_links(options, speed)
+    except (AirframeError, ParameterError, LinkError) as error:
+        raise UserError(str(error)) from error
 
 
 def filmed(flight: FlightBase, folder: Path, console: Console) -> bool:
