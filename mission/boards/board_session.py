@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 PATIENCE_S = 120.0  # of wall clock time, that an autopilot may be silent
 REPORTED_S = 2.0  # of silence, after which it is said what is waited for
 PACE_MAX = 20.0  # guess: how much faster than real time a flight in lockstep is at most, for time-outs of links
+FLOWN = {"ardupilot": ("multirotor", "rover"), "px4": ("multirotor",)}
+FAST = ("ardupilot", "multirotor")
+"""Classes of airframes that each flies here, and who exchanges each millisecond."""
 _OURS_ALONE = {
     "dialect": "--dialect", "announces_components": "--announce-components", "traffic_count": "--traffic",
     "has_lidar": "--lidar", "has_base": "--rtk", "stream_port": "--stream-port", "video_port": "--video-port",
@@ -45,6 +48,11 @@ def check_board(options: FlightOptions) -> None:
     for name, flag in _OURS_ALONE.items():
         if getattr(options, name) != FlightOptions.model_fields[name].default:
             raise UserError(f"{flag} and --board {options.board}: choose one; the first is our own flight controller's")
+    vehicle = load_airframe(options.airframe).vehicle
+    if vehicle not in FLOWN[options.board]:
+        raise UserError(f"--board {options.board}: it flies no {vehicle} here")
+    if (options.board, vehicle) == FAST and options.engine != "native":
+        raise UserError(f"--board {options.board} and --engine {options.engine}: only the native one gives it 1,000 Hz")
     if options.board == "px4" and options.noise == 0.0:
         raise UserError("--noise 0 and --board px4: it takes sensors that never change for broken; use --noise 0.1")
 
@@ -105,9 +113,6 @@ class PeerRun:
         """
         from mission.boards.board_flight import BoardFlight
 
-        airframe = load_airframe(config.airframe)
-        if airframe.vehicle not in self._peer.vehicles:
-            raise UserError(f"--board {self._options.board}: it flies no {airframe.vehicle} here")
         try:
             flight = BoardFlight(config, self._peer, self._watch, instance=self._options.instance, **parts)
             flight.on_close = self.close
@@ -116,12 +121,13 @@ class PeerRun:
         self._watch.hint = self._peer.waits_for.format(port=flight.board.local_port)
         return flight
 
-    def start(self, config: FlightConfig) -> None:
+    def start(self, flight: "BoardFlight") -> None:
         """Writes what the autopilot is told of the vehicle, and starts its program if there is a command.
 
         Raises:
-            UserError: it cannot be started.
+            UserError: it cannot be started; the flight is closed.
         """
+        config = flight.config
         own, command = self._folder / self._options.board, self._options.command
         own.mkdir(exist_ok=True)
         environment = self._peer.prepare(config, load_airframe(config.airframe), own, self._options.instance)
@@ -130,6 +136,7 @@ class PeerRun:
             try:
                 self._watch.process = PeerProcess(command, own, environment, own / "console.log")
             except PeerError as error:
+                flight.close()
                 raise UserError(str(error)) from error
 
     def close(self) -> None:
@@ -168,7 +175,7 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
     print_line(console, f"logs: {folder}")
     if page is not None:
         print_line(console, f"live page: {page.url}")
-    run.start(config)
+    run.start(flight)
     return fly_to_the_end(flight, plan, options, speed, page, folder, console)
 
 

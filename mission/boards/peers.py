@@ -51,8 +51,6 @@ class Peer:
     """It speaks to ground stations itself, where they listen; else we link them through."""
     prepare: Callable[[FlightConfig, Airframe, Path, int], Mapping[str, str]]
     """Writes what an instance is told of the vehicle into a folder; returns what is added to its environment."""
-    vehicles: tuple[str, ...]
-    """The classes of airframes that it flies here."""
     waits_for: str
     """What it has to do to be heard; `{port}` is where."""
 
@@ -102,7 +100,6 @@ PEERS: Mapping[str, Peer] = {
         open_companion_link=_ardupilot_link,
         has_station_ports=False,
         prepare=_prepare_ardupilot,
-        vehicles=("multirotor", "rover"),
         waits_for="start it with --model JSON; its servos are expected at UDP port {port}",
     ),
     "px4": Peer(
@@ -114,7 +111,6 @@ PEERS: Mapping[str, Peer] = {
         open_companion_link=_px4_offboard_link,
         has_station_ports=True,
         prepare=_prepare_px4,
-        vehicles=("multirotor",),
         waits_for="start it with PX4_SIM_MODEL=none_iris; it is expected at TCP port {port}",
     ),
 }

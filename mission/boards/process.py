@@ -71,17 +71,21 @@ class PeerProcess:
         *whole, self._rest = (self._rest + data).split(b"\n")
         return [line.decode(errors="replace").rstrip()[:LINE_MAX] for line in whole if line.strip()]
 
+    @property
+    def has_ended(self) -> bool:
+        return self._process.poll() is not None
+
     def check(self) -> None:
         """Raises PeerError if it has ended."""
-        code = self._process.poll()
-        if code is not None:
+        if self.has_ended:
+            code = self._process.returncode
             raise PeerError(f"{self._name} has ended with exit code {code}; its console is in {self._log.name}")
 
     def close(self) -> None:
         """Ends it, and what it has started; once is enough."""
         if self._stream.closed:
             return
-        if self._process.poll() is None:
+        if not self.has_ended:
             self._signal(15)
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(END_S)

@@ -103,7 +103,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
     if page is not None:
         print_line(console, f"live page: {page.url}")
     if peer_run is not None:
-        peer_run.start(config)
+        peer_run.start(flight)
     session.fly(lambda _: running.is_done, running, [watch.frame])
     is_stopped = not running.is_done and not flight.end_reason
     running.cancel()
