@@ -108,8 +108,8 @@ def test_what_is_no_plane_or_unknown_is_refused():
     ("engine", "airframe", "says"),
     [
         ("native", "c172", "it is JSBSim's c172p; add --engine jsbsim"),
-        ("pybullet", "c172", "it moves multirotors, and c172 is none"),
-        ("jsbsim", "plane", "it moves multirotors, and plane is none"),
+        ("pybullet", "c172", "it does not move c172"),
+        ("jsbsim", "plane", "it does not move plane"),
     ],
 )
 def test_the_command_line_says_which_engine_moves_what(engine, airframe, says):
