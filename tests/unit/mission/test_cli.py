@@ -77,7 +77,10 @@ def test_missing_plan_is_refused(fly, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "pattern"),
     [
-        (("--airframe", "zeppelin"), r"unknown airframe 'zeppelin'; known: c172, f450, f550, plane, rover, rover-skid, x500"),
+        (
+            ("--airframe", "zeppelin"),
+            r"unknown airframe 'zeppelin'; known: c172, f450, f550, plane, rover, rover-skid, x500",
+        ),
         (("--airframe", "/dev/null/x.toml"), r"unknown airframe"),
         (("--speed", "0"), r"--speed 0: must be a number above 0, or 'max'"),
         (("--speed", "fast"), r"--speed fast: must be"),
