@@ -55,7 +55,8 @@ def stored_bytes(i_world: int) -> bytes:
 def test_hills_are_bounded_and_the_clearing_is_level_and_free_of_trees(seed, numbers):
     world = grow(0, seed, numbers)
     assert np.isfinite(world.heights).all()
-    assert np.abs(world.heights).max() <= numbers["hill_height_m"]
+    rounding = 1.0 + 1e-6  # heights are single precision
+    assert np.abs(world.heights).max() <= rounding * numbers["hill_height_m"]
     angle, fraction = np.meshgrid(np.linspace(0.0, 6.3, 30), np.linspace(0.0, 1.0, 10))
     north, east = (fraction * numbers["clearing_radius_m"] * turn(angle) for turn in (np.cos, np.sin))
     is_inside = np.maximum(np.abs(north), np.abs(east)) <= 80.0
