@@ -51,12 +51,12 @@ def with_boxes(*rows):
     return WorldMap(PLAIN, bare.terrain, bare.forest, bare.walls, kernel, placed)
 
 
-def rig_on(world, engine, commands=0.0, airframe="x500", vehicle_count=1):
+def rig_on(world, engine, commands=0.0, airframe="x500", vehicle_count=1, wind_m_s=0.0):
     """A rig of an airframe in a world that is made or configured."""
     vehicle, body = class_of(load_airframe(airframe))
     return SteppedRig(
         load_airframe(airframe), world if isinstance(world, WorldMap) else build_world(world),
-        sensor_model(0.0, DEFAULT_HOME), wind_model(0.0), home=DEFAULT_HOME, engine=engine,
+        sensor_model(0.0, DEFAULT_HOME), wind_model(wind_m_s, 0.0), home=DEFAULT_HOME, engine=engine,
         board=lambda _: Sequence(commands), body=body, law=vehicle.law, vehicle_count=vehicle_count,
     )  # fmt: skip
 

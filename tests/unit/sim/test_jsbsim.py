@@ -5,12 +5,38 @@ import pytest
 from typer.testing import CliRunner
 
 from mission.cli import app
+from mission.flight import Flight, FlightConfig
 from sim.engines.native import NativeEngine
 from sim.world.world import WorldConfig
-from tests.engine_rig import PLAIN, SLOPES, STEEP, drop, rig_on, run, short_flight
+from tests.unit.sim.engine_rig import PLAIN, STEEP, put, rig_on, run
 
 pytest.importorskip("jsbsim")
 from sim.engines.jsbsim_engine import JsbsimEngine
+
+SLOPES = [(0.0, 0.0), (20.0, -15.0), (-31.0, 12.0)]  # of 6 to 9 degrees
+
+
+def short_flight(engine):
+    """Modes and places [m] of each frame of a take-off, a goto and a landing, without sensor noise."""
+    flight = Flight(FlightConfig(engine=engine, noise=0.0, world=PLAIN))
+    modes, places = [], []
+
+    async def script(drone):
+        await drone.wait_ready()
+        await drone.arm()
+        await drone.takeoff(6.0)
+        await drone.goto_ned(8.0, 3.0, -7.0)
+        await drone.land()
+
+    running = flight.drone.start(script(flight.drone))
+    while not running.is_done:
+        flight.frame()
+        modes.append(int(flight.controller.state.mode))
+        places.append(flight.rig.truth_row()["pos_ned"].copy())
+    assert running.error is None
+    flight.close()
+    return np.array(modes), np.array(places)
+
 
 BOTH = (NativeEngine, JsbsimEngine)
 
@@ -20,7 +46,7 @@ def test_it_stands_on_a_slope_where_the_native_engine_does_and_does_not_creep(pl
     rests = []
     for engine in BOTH:
         rig = rig_on(STEEP, engine)
-        drop(rig, *place, 0.25)
+        put(rig, *place, 0.25)
         rests.append(run(rig, 4.0).copy())
         later = run(rig, 30.0)
         assert np.linalg.norm(later["pos_ned"] - rests[-1]["pos_ned"]) < 1e-3
@@ -34,8 +60,8 @@ def test_it_tumbles_falls_and_crashes_as_with_the_native_engine():
     """Thrown spinning about all axes, from high: Euler's equations, drag and the rotors' momentum, then the ground."""
     rows = []
     for engine in BOTH:
-        rig = rig_on(PLAIN, engine, command=0.3)
-        drop(rig, 0.0, 0.0, 30.0)
+        rig = rig_on(PLAIN, engine, commands=0.3)
+        put(rig, 0.0, 0.0, 30.0)
         body = rig.arrays.body.numpy()
         body["omega_frd"][0], body["vel_ned"][0] = (4.0, -3.0, 6.0), (5.0, -2.0, 1.0)
         rows.append([run(rig, 0.8).copy(), run(rig, 4.0).copy()])
@@ -52,7 +78,7 @@ def test_a_tree_stops_it():
     """Thrown at a trunk it comes no farther, and has struck it as fast as it was."""
     rig = rig_on(WorldConfig(trees_per_ha=150.0, hill_height_m=0.0, size_m=100.0, clearing_radius_m=2.0), JsbsimEngine)
     tree = rig.world.trees[0]
-    drop(rig, float(tree["north"]) - 2.0, float(tree["east"]), 1.5)
+    put(rig, float(tree["north"]) - 2.0, float(tree["east"]), 1.5)
     rig.arrays.body.numpy()["vel_ned"][0] = (6.0, 0.0, -1.0)
     row = run(rig, 0.5)
     reach_m = float(tree["trunk_radius"]) + float(rig.arrays.model.numpy()["contact"]["hull_radius_m"][0])
@@ -63,7 +89,7 @@ def test_a_tree_stops_it():
 def test_far_from_home_down_is_down():
     """The planet is flat enough: who stands a kilometre from home leans on nothing."""
     rig = rig_on(PLAIN, JsbsimEngine)
-    drop(rig, 0.0, 0.0, 50.0)
+    put(rig, 0.0, 0.0, 50.0)
     rig.arrays.body.numpy()["vel_ned"][0] = (60.0, -40.0, -20.0)
     native = rig_on(PLAIN, NativeEngine)
     native.restore(rig.snapshot())
@@ -75,8 +101,8 @@ def test_far_from_home_down_is_down():
 
 def test_each_vehicle_goes_its_own_way_and_boots_alone():
     rig = rig_on(PLAIN, JsbsimEngine, vehicle_count=2)
-    drop(rig, 3.0, 4.0, 20.0, i=0)
-    drop(rig, -5.0, 6.0, 10.0, i=1)
+    put(rig, 3.0, 4.0, 20.0, i_vehicle=0)
+    put(rig, -5.0, 6.0, 10.0, i_vehicle=1)
     run(rig, 0.5)
     places = rig.arrays.truth.numpy()["pos_ned"]
     assert places[0] == pytest.approx([3.0, 4.0, -18.78], abs=0.02)
@@ -90,8 +116,8 @@ def test_each_vehicle_goes_its_own_way_and_boots_alone():
 def test_the_same_twice_is_the_same_bits_and_a_snapshot_puts_it_back():
     ends = []
     for _ in range(2):
-        rig = rig_on(STEEP, JsbsimEngine, command=0.75)
-        drop(rig, 5.0, 5.0, 2.0)
+        rig = rig_on(STEEP, JsbsimEngine, commands=0.75)
+        put(rig, 5.0, 5.0, 2.0)
         run(rig, 0.1)
         before = rig.snapshot()
         for _ in range(2):
@@ -104,7 +130,7 @@ def test_the_same_twice_is_the_same_bits_and_a_snapshot_puts_it_back():
 
 def test_what_is_held_in_hands_stays_there_and_goes_on_afterwards():
     rig = rig_on(PLAIN, JsbsimEngine)
-    drop(rig, 1.0, 2.0, 1.0)
+    put(rig, 1.0, 2.0, 1.0)
     body = rig.arrays.body.numpy()
     body["is_held"], body["omega_frd"][0] = 1, (1.0, 0.0, 0.0)
     row = run(rig, 0.5).copy()

@@ -12,7 +12,7 @@ from common.kernels import TICK_S
 from mission.cli import app
 from mission.flight import Flight, FlightConfig
 from sim.bodies.rigid_body import density_ratio_at
-from tests.engine_rig import PLAIN, STEEP, drop, rig_on, run
+from tests.unit.sim.engine_rig import PLAIN, STEEP, put, rig_on, run
 
 pytest.importorskip("jsbsim")
 from sim.engines.jsbsim_plane_engine import JsbsimPlaneEngine
@@ -23,14 +23,14 @@ HOME_DENSITY = 1.225 * density_ratio_at(DEFAULT_HOME.alt_m)
 
 
 def plane_on(world, wind_m_s=0.0, aileron=0.0, elevator=0.0, throttle=0.0, rudder=0.0, brake=0.0):
-    command = [aileron, elevator, throttle, rudder, 0.0, brake, 0.0, 0.0]
-    return rig_on(world, CESSNA, command=command, airframe="c172", wind_m_s=wind_m_s)
+    command = (aileron, elevator, throttle, rudder, 0.0, brake)
+    return rig_on(world, CESSNA, commands=command, airframe="c172", wind_m_s=wind_m_s)
 
 
 def fly(speed=40.0, seconds=1.0, **controls):
     """In the air, level; the rows of truth of each tick."""
     rig = plane_on(PLAIN, **controls)
-    drop(rig, 0.0, 0.0, 300.0)
+    put(rig, 0.0, 0.0, 300.0)
     rig.arrays.body.numpy()["vel_ned"][0] = (speed, 0.0, 0.0)
     return np.array([run(rig, TICK_S).copy() for _ in range(round(seconds / TICK_S))])
 
@@ -38,7 +38,7 @@ def fly(speed=40.0, seconds=1.0, **controls):
 def test_it_stands_on_its_wheels_where_the_ground_is():
     rig = plane_on(STEEP, brake=1.0)
     for place in ((0.0, 0.0), (20.0, -15.0)):
-        drop(rig, *place, STANDING_M)
+        put(rig, *place, STANDING_M)
         rest = run(rig, 10.0).copy()
         later = run(rig, 5.0)
         assert later["height_agl_m"] == pytest.approx(STANDING_M, abs=0.02)
@@ -84,7 +84,7 @@ def test_standing_in_the_wind_the_pitot_tube_measures_it(wind_m_s):
 @pytest.mark.parametrize(("sink", "is_crashed"), [(1.0, 0), (5.0, 1)])
 def test_a_hard_landing_is_a_crash(sink, is_crashed):
     rig = plane_on(PLAIN)
-    drop(rig, 0.0, 0.0, STANDING_M + 0.4)
+    put(rig, 0.0, 0.0, STANDING_M + 0.4)
     rig.arrays.body.numpy()["vel_ned"][0] = (30.0, 0.0, sink)
     row = run(rig, 1.0)
     assert row["is_crashed"] == is_crashed
