@@ -200,7 +200,7 @@ class Flight(FlightBase):
         from mission.follow.owner_device import FollowedOwner
 
         self.owner = FollowedOwner(config, self.world, self.config.seed, self.config.home)
-        self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)
+        self.onboard = OnboardCamera(self.rig, self.world, self.owner.cast, self.config.noise, self.config.seed)
         return [self.owner.vehicle_end]
 
     def _carry_components(self) -> Sequence[ScannerDevice | BaseStation]:
@@ -212,8 +212,8 @@ class Flight(FlightBase):
         return [ScannerDevice(Scanner(self.rig, self.world, config.noise, config.seed), system_id), *base]
 
     def _start_cameras(self) -> None:
-        people = None if self.owner is None else self.owner.people
-        self._cameras.start(self.controller.camera, people, self.troubles.note)
+        cast = None if self.owner is None else self.owner.cast.rows
+        self._cameras.start(self.controller.camera, cast, self.troubles.note)
 
     def _parameter_changed(self, _: Parameter) -> None:
         self._has_new_parameters = True

@@ -30,8 +30,9 @@ class OwnerConfig(BaseModel):
     """`walk`: up to 2 m/s; `run`: up to 5 m/s."""
     start_m: float = Field(default=3.0, ge=1.0, le=50.0)
     """How far north of home they wait."""
-    phone_error: float = Field(default=1.0, ge=0.0, le=10.0)
-    """Scales the errors of the phone's position."""
+    numbers: dict[str, float] = Field(default_factory=dict)
+    """Of FollowMe, by name, that hold for a flight too: how the owner and others walk and look, the phone, the camera,
+    what happens to pictures on their way. The others are at the task's defaults."""
 
 
 class FlightConfig(FlightSettings):

@@ -46,6 +46,9 @@ WHEEL_RIGHT_WHITE = wp.constant(44)
 
 OWNER_BODY = wp.constant(50)
 OWNER_PLAN = wp.constant(51)
+CLOTHES = wp.constant(52)
+BYSTANDER = wp.constant(53)
+DEPTH_HOLES = wp.constant(54)
 
 PHONE_POSITION = wp.constant(55)
 PHONE_VELOCITY = wp.constant(56)

@@ -26,12 +26,13 @@ class VideoRig:
     Args:
         rig: where the truth is.
         world: what is seen.
-        people: who is seen: an array of one `Person`; None: nobody.
+        people: who is seen: an array of `Person`, shape (1, people); None: nobody.
+        clothes: likewise.
     """
 
-    def __init__(self, rig: Rig, world: WorldMap, people: Any = None) -> None:
+    def __init__(self, rig: Rig, world: WorldMap, people: Any = None, clothes: Any = None) -> None:
         self._mount = CameraRig(rig, world)
-        self._world, self._people = world, people
+        self._world, self._seen = world, {"people": people, "clothes": clothes}
         self._camera: QuickCamera | None = None  # made for the first image, on its thread
         self._pool = ThreadPoolExecutor(1, "video_rig")
 
@@ -45,7 +46,7 @@ class VideoRig:
             from sim.sensors.fast_camera.fast_camera import QuickCamera  # no flight waits for it that nobody watches
 
             camera = self._camera = QuickCamera(
-                self._world, 1, width=view.width, height=view.height, people=self._people, range_m=RANGE_M
+                self._world, 1, width=view.width, height=view.height, **self._seen, range_m=RANGE_M
             )
         lens: Any = camera.lenses.numpy()[0]
         lens["pos_ned"], lens["q_ned_from_rdf"] = pose.pos_ned, pose.q_ned_from_rdf

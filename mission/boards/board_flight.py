@@ -109,7 +109,7 @@ class BoardFlight(FlightBase):
         from mission.follow.owner_device import FollowedOwner
 
         self.owner = FollowedOwner(owner, self.world, self.config.seed, self.config.home)
-        self.onboard = OnboardCamera(self.rig, self.world, self.owner.people, self.config.noise)
+        self.onboard = OnboardCamera(self.rig, self.world, self.owner.cast, self.config.noise, self.config.seed)
         return self.owner.vehicle_end
 
     def _wait(self, silent_s: float) -> None:

@@ -77,8 +77,9 @@ class FollowWatch:
         self._taken = taken
         self._out = wp.zeros((1, len(COLUMNS)), dtype=float)
         self._row: NDArray[np.float32] = self._out.numpy()[0]  # live
-        rig, people, touch_m = flight.rig.arrays, flight.owner.people, Ranges().collision_m
-        self._inputs = [rig.worlds, rig.i_world, rig.truth, people, int(flight.drives), touch_m, self._out]
+        rig, cast, touch_m = flight.rig.arrays, flight.owner.cast.rows, Ranges().collision_m
+        who = [cast.params, cast.people, cast.bystanders, cast.drawn]
+        self._inputs = [rig.worlds, rig.i_world, rig.truth, *who, int(flight.drives), touch_m, self._out]
         self._rows: list[NDArray[np.float32]] = []
         self._start_us = -1  # of the flight, when it began to follow; -1: not yet
         self._frame_us = 0  # when the last frame was

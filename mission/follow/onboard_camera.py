@@ -1,18 +1,18 @@
 """The onboard camera of a follow-me flight: what the policy sees, ten times a second, with the time it was taken.
 
-In: the true pose of the vehicle, and the owner. Out: pictures of 64 x 64 pixels, colour and depth with noise and
+In: the true pose of the vehicle, and the people. Out: pictures of 64 x 64 pixels, colour and depth with noise and
 packed as in training, to whoever asked for them: a companion in the same process, or a server of streams.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from autopilot.payload.camera.ports import View
 from common.image_stream import ImageFrame
+from mission.follow.late_camera import LateCamera, Sink
+from policies.tasks.follow_me.flown_cast import FlownCast
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import (
     DEPTH_HALF_M,
@@ -20,18 +20,25 @@ from policies.tasks.follow_me.observe import (
     IMAGE_CHANNELS,
     IMAGE_SIZE,
     TILT_DEG,
-    camera_mount,
     pack_images,
 )
+from policies.tasks.follow_me.owner_visibility import lens_of
 from policies.tasks.follow_me.task_cameras import set_optics
-from sim.camera_rig import CameraRig
 from sim.rig import Rig
+from sim.sensors.camera import Lens
 from sim.sensors.fast_camera.fast_camera import QuickCamera
+from sim.truth import Truth
 from sim.world.world import WorldMap
+
+wp.set_module_options({"enable_backward": False})
 
 PERIOD_US = 100_000
 
-Sink = Callable[[ImageFrame], None]
+
+@wp.kernel(enable_backward=False)
+def _aim(truths: wp.array(dtype=Truth), params: wp.array(dtype=FollowParams), lenses: wp.array(dtype=Lens)) -> None:
+    i = wp.tid()
+    lenses[i] = lens_of(truths[i], params[i])
 
 
 class OnboardCamera:
@@ -40,49 +47,46 @@ class OnboardCamera:
     Args:
         rig: where the truth is.
         world: what is seen.
-        people: who is seen: an array of one `Person`.
+        cast: who is seen, and the numbers of camera and light.
         noise: of the pictures; 1 is training's.
+        seed: of what happens to pictures on their way.
     """
 
-    def __init__(self, rig: Rig, world: WorldMap, people: Any, noise: float = 1.0) -> None:
-        self._eye = CameraRig(rig, world)
-        self.view = View(IMAGE_SIZE, IMAGE_SIZE, HFOV_DEG, camera_mount())
-        self._camera = QuickCamera(
-            world, 1, width=IMAGE_SIZE, height=IMAGE_SIZE, hfov_deg=HFOV_DEG, people=people, has_optics=True
-        )
-        self._lens: NDArray[Any] = self._camera.lenses.numpy()  # live
+    def __init__(self, rig: Rig, world: WorldMap, cast: FlownCast, noise: float = 1.0, seed: int = 0) -> None:
+        rows = cast.rows
+        size: dict[str, Any] = {"width": IMAGE_SIZE, "height": IMAGE_SIZE, "hfov_deg": HFOV_DEG}
+        self._camera = QuickCamera(world, 1, **size, people=rows.drawn, clothes=rows.clothes, has_optics=True)
         images: Any = wp.zeros((1, IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS)), dtype=wp.uint8)
-        params: Any = wp.zeros(1, dtype=FollowParams)
-        params.numpy()["camera_noise"] = noise
+        params: Any = wp.clone(rows.params)
+        params.numpy()["camera_noise"] *= noise
         everyone: Any = wp.full(1, value=True, dtype=wp.bool)
+        aim = [rig.arrays.truth, params, self._camera.lenses]
+        self._aim = wp.launch(_aim, 1, aim, record_cmd=True)
         optics = [rig.arrays, params, everyone, self._camera.optics]
         self._set_optics = wp.launch(set_optics, 1, optics, record_cmd=True)
         inputs = [self._camera.rgb, self._camera.depth_m, everyone, images]
         self._pack = wp.launch(pack_images, (1, IMAGE_SIZE), inputs, record_cmd=True)
+        self._kept = (params, everyone)  # recorded launches do not
         self._images: NDArray[np.uint8] = images.numpy()
-        self._sinks: list[Sink] = []
+        self.way = LateCamera(params, seed)
         self._sequence = 0
         self._due_us = 0
 
     def add_sink(self, sink: Sink) -> None:
-        """Somebody who gets every picture from now on."""
-        self._sinks.append(sink)
+        """Somebody who gets every picture from now on, when it comes."""
+        self.way.add_sink(sink)
 
     def frame(self, time_us: int) -> None:
-        """Takes a picture if one is due."""
-        if time_us < self._due_us:
-            return
-        self._due_us = max(self._due_us + PERIOD_US, time_us)
-        taken = self.take(time_us)
-        for sink in self._sinks:
-            sink(taken)
+        """Takes a picture if one is due, and hands on what has come."""
+        if time_us >= self._due_us:
+            self._due_us = max(self._due_us + PERIOD_US, time_us)
+            self.way.publish(self.take(time_us))
+        self.way.frame(time_us)
 
     def take(self, time_us: int) -> ImageFrame:
         """A picture of this moment."""
-        pose = self._eye.pose(self.view)
-        self._lens["pos_ned"] = pose.pos_ned
-        self._lens["q_ned_from_rdf"] = pose.q_ned_from_rdf
-        self._set_optics.launch()
+        for launch in (self._aim, self._set_optics):
+            launch.launch()
         self._camera.render()
         self._pack.launch()
         self._sequence += 1

@@ -1,6 +1,6 @@
 """The owner of a flight: a person who walks through its world, and their phone, a MAVLink client of its own.
 
-In: the time, and whether the vehicle follows yet. Out: `people`, which cameras draw, and FOLLOW_TARGET twice a second
+In: the time, and whether the vehicle follows yet. Out: `cast`, which cameras draw, and FOLLOW_TARGET twice a second
 with a phone's lag and error. Nobody walks off before the drone is there: until it follows, the owner stands.
 """
 
@@ -17,8 +17,8 @@ from common.geodesy import GeoPoint, geodetic_from_ned
 from common.kernels import TICK_US
 from mission.flight_config import OwnerConfig
 from mission.flight_settings import Pace
-from policies.tasks.follow_me.world import STOP_FRACTION
-from sim.sensors.phone import CORRELATED_STD_M, POSITION_STD_M, VERTICAL_FACTOR, phone_model
+from policies.tasks.follow_me.flown_cast import FlownCast, walk_and_phone
+from sim.sensors.phone import CORRELATED_STD_M, POSITION_STD_M, VERTICAL_FACTOR
 from sim.walking_owner import Owner
 from sim.world.people import CHEST_M, RUN_SPEED_M_S, WALK_SPEED_M_S, person_model
 from sim.world.world import WorldMap
@@ -45,27 +45,29 @@ class FollowedOwner:
         still.speed_min = 0.0
         still.plan_min_s, still.plan_max_s = _SETS_OFF_S  # who then follows need not wait for a long plan to end
         self._home = home
-        self._walking: Any = person_model(SPEEDS_M_S[config.pace])
-        self._walking.stop_fraction = STOP_FRACTION
+        numbers: dict[str, float] = {"owner_speed_max": SPEEDS_M_S[config.pace], **config.numbers}
+        self._walking, phone = walk_and_phone(numbers)
         towards_home_rad = np.pi
         self._owner = Owner(
             world,
             [[config.start_m, 0.0, towards_home_rad]],
             seed,
             model=still,
-            phone=phone_model(config.phone_error),
+            phone=phone,
         )
+        self.cast = FlownCast(world, self._owner.people, self._walking, numbers, seed)
         self._person: NDArray[Any] = self._owner.people.numpy()  # live, as the next
         self._phone: NDArray[Any] = self._owner.phones.numpy()
-        horizontal = config.phone_error**2 * (CORRELATED_STD_M**2 + POSITION_STD_M**2)
+        horizontal = numbers.get("phone_error", 1.0) ** 2 * (CORRELATED_STD_M**2 + POSITION_STD_M**2)
         self._pos_var = (horizontal, horizontal, VERTICAL_FACTOR**2 * horizontal)
         self.vehicle_end, self._link = memory_pair(LinkRole.GROUND)
         self._client = ClientEnd(self._link, PHONE_SYSTEM, PHONE_COMPONENT, mav_type=GROUND_STATION)
         self.is_walking = False
+        self._since_us = 0  # when they set off
 
     @property
     def people(self) -> Any:
-        """What cameras draw: an array of one `Person`."""
+        """Where they truly are: an array of one `Person`."""
         return self._owner.people
 
     @property
@@ -89,8 +91,10 @@ class FollowedOwner:
         """
         if is_followed and not self.is_walking:
             self.is_walking = True
+            self._since_us = time_us
             self._owner.change_model(self._walking)
         has_report = self._owner.step_to(time_us // TICK_US)
+        self.cast.step(time_us // TICK_US, (time_us - self._since_us) * 1e-6 if self.is_walking else -1.0)
         self._link.receive()  # a phone hears the vehicle's telemetry too; ours does not care
         self._client.keep_alive(time_us)
         if has_report:

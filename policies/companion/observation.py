@@ -70,16 +70,19 @@ class Observer:
     def __init__(self, kind: int) -> None:
         start_warp()
         own, report = wp.zeros(1, dtype=OwnState), wp.zeros(1, dtype=OwnerReport)
-        action = wp.zeros(1, dtype=wp.vec4)
+        action, age = wp.zeros(1, dtype=wp.vec4), wp.zeros(1, dtype=float)
         out = wp.zeros((1, len(vector_elements(kind))), dtype=float)
         self._own: NDArray[Any] = own.numpy()  # live views, as of the others
         self._report: NDArray[Any] = report.numpy()
         self._action: Floats = action.numpy()
+        self._age_s: Floats = age.numpy()
         self._out: Floats = out.numpy()
-        self._observe = wp.launch(observe_rows, 1, [kind, own, report, action, out], record_cmd=True)
+        self._observe = wp.launch(observe_rows, 1, [kind, own, report, action, age, out], record_cmd=True)
         self._command = CommandKernel()
 
-    def vector(self, own: Own, owner: Owner, last_action: Floats, time_us: int) -> Floats:
+    def vector(
+        self, own: Own, owner: Owner, last_action: Floats, time_us: int, picture_age_s: float = 0.0
+    ) -> Floats:
         """The observation as of now.
 
         Args:
@@ -87,7 +90,9 @@ class Observer:
             owner: the phone's last report.
             last_action: in [-1, 1], shape (4,).
             time_us: the companion's own clock.
+            picture_age_s: since the newest picture was taken.
         """
+        self._age_s[0] = picture_age_s
         write_own_row(self._own[0], own, time_us)
         self._write_report(owner, time_us)
         self._action[0] = last_action

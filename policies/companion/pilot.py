@@ -20,10 +20,15 @@ from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
 from policies.shirt_detector import chest_hfrd
 from policies.tasks.flight.own_state import ACTIONS
-from policies.tasks.follow_me.observe import EGO, EGO_BLIND, IMAGE_CHANNELS, IMAGE_SIZE, vector_elements
+from policies.tasks.follow_me.observe import (
+    EGO,
+    EGO_BLIND,
+    IMAGE_CHANNELS,
+    IMAGE_SIZE,
+    LAYOUT_VERSION,
+    vector_elements,
+)
 from policies.tasks.layout import ImageElement, Layout, LayoutError
-
-LAYOUT_VERSION = 1
 
 Floats = NDArray[np.float32]
 

@@ -1,6 +1,7 @@
 """To follow somebody: images of the onboard camera and the reports of a phone in, the actions of a pilot out.
 
-A decision for each new image (10 Hz). Where the owner is lost, it does not fly.
+A decision ten times a second: on each new image, and where none comes in time on the last once more, which is older
+then. Where the owner is lost, it does not fly.
 """
 
 from math import isclose
@@ -20,6 +21,7 @@ from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, 
 
 DECISION_US = 100_000
 DECISION_EARLY_US = 10_000  # an image may come this much earlier than the decision period asks
+DECISION_LATE_US = 50_000  # and is waited for this much longer
 IMAGE_OLD_US = 500_000  # guess: five images missed, 3 m at full speed
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
 NO_IMAGES = "no new pictures"
@@ -64,8 +66,10 @@ class Following:
         self._owner = Owner()
         self._image: ImageFrame | None = None  # the newest
         self._image_us = -1  # when it came in, on our clock; -1: never
-        self._decided_us = 0  # when the image that was decided on was taken, on the vehicle's clock
+        self._decided_us = -DECISION_US  # when was decided last, on our clock
+        self._is_new = False  # there is an image that was not decided on
         self._has_looked = False  # at the newest image
+        self._is_tracked = False  # the tracker has been told of it
 
     def attach(self, vehicle: VehicleLink) -> None:
         """Hears nothing that the link does not know of by itself."""
@@ -73,11 +77,13 @@ class Following:
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self._owner = vehicle.owner
         image = self.camera.take(time_us)
-        if image is None:
-            return False
-        self._image, self._image_us, self._has_looked = image, time_us, False
-        vehicle.clock.pictured(image.time_us)
-        return True
+        if image is not None:
+            self._image, self._image_us, self._is_new = image, time_us, True
+            self._has_looked = self._is_tracked = False
+            vehicle.clock.pictured(image.time_us)
+        since_us = time_us - self._decided_us
+        wait_us = DECISION_US + (-DECISION_EARLY_US if self._is_new else DECISION_LATE_US)
+        return self._image is not None and since_us >= wait_us
 
     def is_ordered(self) -> bool:
         return False
@@ -98,18 +104,18 @@ class Following:
 
     def begin(self, own: Own) -> None:  # noqa: ARG002  (others need it)
         self._pilot.reset()
-        self._decided_us = -DECISION_US
 
     def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:  # noqa: ARG002
-        """Lets the pilot see the newest image, if one is due.
+        """Lets the pilot see the newest image.
 
         Who does not fly looks too: the owner must have been seen before anybody flies by sight.
         """
         image = self._image
-        if image is None or 0 <= image.time_us - self._decided_us < DECISION_US - DECISION_EARLY_US:
-            return None  # a clock that has gone back is that of a vehicle that has restarted
-        self._decided_us = image.time_us
-        vector = self._observer.vector(own, self._owner, last_action, time_us)
+        if image is None:
+            return None
+        self._decided_us, self._is_new = time_us, False
+        age_s = max(own.boot_us - image.time_us, time_us - self._image_us, 0) * 1e-6
+        vector = self._observer.vector(own, self._owner, last_action, time_us, age_s)
         self.seen = vector.copy()
         action = self._pilot.act(vector, image.pixels)
         self._has_looked = bool(np.isfinite(action).all())
@@ -122,7 +128,8 @@ class Following:
 
     def conclude(self, own: Own) -> None:
         """Tracks the owner: by the newest image, and by the phone."""
-        if self._image is not None:
+        if self._image is not None and not self._is_tracked:
+            self._is_tracked = True
             seen_hfrd = self._pilot.owner_hfrd if self._has_looked else None
             self._watch.update(self._image.time_us, own, self._owner, seen_hfrd)
 

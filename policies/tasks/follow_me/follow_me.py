@@ -17,7 +17,9 @@ from policies.tasks.flight.hover_bank import LOW_M
 from policies.tasks.flight.own_state import ACTIONS
 from policies.tasks.flight.ranges import RANGES, measure_ranges
 from policies.tasks.flight.task import DECISION_TICKS, FlightTask
+from policies.tasks.follow_me.cast import PEOPLE_MAX
 from policies.tasks.follow_me.follow_me_kernels import (
+    ACT_TICKS,
     MEASURES,
     FollowState,
     Rules,
@@ -31,8 +33,9 @@ from policies.tasks.follow_me.follow_me_kernels import (
 )
 from policies.tasks.follow_me.follow_me_params import DOCUMENTED, IMPROVED, PARAMS, TREES_PER_HA_MAX, FollowParams
 from policies.tasks.follow_me.follow_me_top_view import draw
-from policies.tasks.follow_me.observe import BRANCHES, DOCUMENT, EGO, EGO_BLIND, IMAGE_CHANNELS, vector_elements
+from policies.tasks.follow_me.observe import BRANCHES, DOCUMENT, EGO, EGO_BLIND, IMAGE_CHANNELS, LAYOUT_VERSION, vector_elements
 from policies.tasks.follow_me.owner_visibility import Sight
+from policies.tasks.follow_me.picture_way import make_way
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.follow_me.task_cameras import Eyes
@@ -41,6 +44,7 @@ from policies.tasks.layout import ImageElement, Layout
 from policies.tasks.task_params import Sampler, typed_rows
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_model
+from sim.world.clothes import Clothes, usual_clothes
 from sim.world.people import RUN_SPEED_M_S, WALK_SPEED_M_S, Person, PersonModel, person_model
 
 _OWNERS: dict[str, float | Sampler] = {
@@ -53,7 +57,7 @@ _VECTORS = {"as-documented": int(DOCUMENT), "improved": int(EGO), "vision-only":
 
 
 class FollowMe(FlightTask):
-    """The task. Layout version 1."""
+    """The task. See `LAYOUT_VERSION`."""
 
     params: ClassVar = PARAMS
 
@@ -74,14 +78,17 @@ class FollowMe(FlightTask):
         self.measures = self.follow.measures
         self._eyes: Eyes | None = None
         if self.layout.image is not None:
-            self._eyes = Eyes(self.buffers, self.rig.arrays, self.follow.params, self.worlds, self.follow.people)
-            self.follow.lenses = self._eyes.lenses
+            state, way = self.follow, make_way(self._zeros, self.layout.image_shape, env_count)
+            seen = [state.drawn, state.clothes, way, state.path_seeds]
+            self._eyes = Eyes(self.buffers, self.rig.arrays, state.params, self.worlds, *seen)
+            state.lenses, state.picture_ages_s = self._eyes.lenses, way.age_s
         self._record_all(_rules(settings, self.layout), self.start(is_test=settings.split == "test"))
 
     def step(self) -> None:
         """One decision of all environments, with the actions that lie in the buffers."""
-        self._act.launch()
-        self.rig.advance(DECISION_TICKS)
+        for act_part in self._acts:
+            act_part.launch()
+            self.rig.advance(ACT_TICKS)
         self._walk.launch()
         self._look_all.launch()
         if self._sees_truth:
@@ -141,6 +148,12 @@ class FollowMe(FlightTask):
         state.params = typed_rows(self.buffers.params, FollowParams, first=len(FLIGHT_PARAMS))
         state.actions = self._zeros("last_actions", n, wp.vec4)
         state.people = self._zeros("people", n, Person)
+        others = PEOPLE_MAX - 1
+        state.bystanders = self._zeros("bystanders", (n, others), Person)
+        state.drawn = self._zeros("drawn", (n, PEOPLE_MAX), Person)
+        state.clothes = self._zeros("clothes", (n, PEOPLE_MAX), Clothes)
+        state.usual_clothes = wp.array([usual_clothes()], dtype=Clothes, device=self.device)
+        state.picture_ages_s = wp.zeros(n, dtype=float, device=self.device)
         state.person_models = self._zeros("person_models", n, PersonModel)
         state.phones = self._zeros("phones", n, PhoneState)
         state.phone_models = self._zeros("phone_models", n, PhoneModel)
@@ -160,8 +173,9 @@ class FollowMe(FlightTask):
         buffers, rig, state = self.buffers, self.rig.arrays, self.follow
 
         record = self.record
-        self._act = record(act, buffers, rules, rig)
-        self._walk = record(walk, rules, rig, state)
+        parts = range(DECISION_TICKS // ACT_TICKS)
+        self._acts = [record(act, buffers, rules, rig, state, part) for part in parts]
+        self._walk = record(walk, buffers, rules, rig, state)
         self._look_all = record(look, rig, state, state.is_all)
         self._measure_all = record(measure_ranges, rig, state.is_all, state.nearness)
         self._judge = record(judge, buffers, rules, rig, state, start)
@@ -178,7 +192,7 @@ def _layout(settings: FollowSettings) -> Layout:
     channels = IMAGE_CHANNELS[:3] if is_documented else IMAGE_CHANNELS
     return Layout(
         "FollowMe",
-        1,
+        LAYOUT_VERSION,
         vector_elements(_VECTORS[settings.preset]) if is_camera else PRIVILEGED_ELEMENTS,
         continuous=() if is_documented else ACTIONS,
         branches=BRANCHES if is_documented else (),

@@ -1,7 +1,7 @@
 """FollowMe's kernels, one thread per environment, in the order of a decision.
 
 act       actions to setpoints                           (then the rig advances)
-walk      the owner and their phone, over the same time
+walk      the owner, their phone and others, over the same time
 look      where the owner truly is from there            (then ranges and images are taken)
 judge     the vector, the reward, the end                (rows that end start anew:)
 prepare   numbers and seeds of the new episode           (then worlds grow and vehicles take their hovers)
@@ -24,6 +24,16 @@ from policies.tasks.flight.flown_vehicle import (
     velocity_setpoint,
 )
 from policies.tasks.flight.own_state import action_command
+from policies.tasks.follow_me.cast import (
+    BYSTANDERS_MAX,
+    bystander_start,
+    bystander_step,
+    clothes_of,
+    drawn_owner,
+    owner_of,
+    owner_start,
+    phone_of,
+)
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, document_action, write_vector
 from policies.tasks.follow_me.owner_visibility import Sight, lens_of, reach_from, see
@@ -33,18 +43,20 @@ from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_start, phone_step
 from sim.truth import has_touched
-from sim.world.people import PERSON_DT_S, PERSON_TICKS, Person, PersonModel, person_start, person_step
+from sim.world.clothes import Clothes
+from sim.world.people import PERSON_DT_S, PERSON_TICKS, Person, PersonModel, person_step
 
 wp.set_module_options({"enable_backward": False})
 
+ACT_TICKS = 5  # parts of a decision, at each of which setpoints may arrive
 _STEP_S = wp.constant(PERSON_DT_S)
 _STEP_TICKS = wp.constant(PERSON_TICKS)
 _TICKS_PER_S = wp.constant(1.0 / TICK_S)
+_PART_S = wp.constant(ACT_TICKS * TICK_S)
 _PRIVILEGED = wp.constant(-1)
 _DISTANCE_STREAM = wp.constant(6)
 _BEARING_STREAM = wp.constant(7)
 _HEADING_STREAM = wp.constant(8)
-_LAG_MAX_PERIODS = wp.constant(3)  # fewer than a phone has room for
 
 MEASURES = (
     "distance_m", "bearing_rad", "is_in_view", "is_collided", "is_in_band", "room_m", "owner_speed_m_s", "speed_m_s",
@@ -73,7 +85,10 @@ class FollowState:
     flight: wp.array(dtype=FlightParams)
     params: wp.array(dtype=FollowParams)
     actions: wp.array(dtype=wp.vec4)  # the last
-    people: wp.array(dtype=Person)
+    people: wp.array(dtype=Person)  # the owners
+    bystanders: wp.array2d(dtype=Person)  # (envs, others)
+    drawn: wp.array2d(dtype=Person)  # (envs, people): all as cameras can see them
+    clothes: wp.array2d(dtype=Clothes)
     person_models: wp.array(dtype=PersonModel)
     phones: wp.array(dtype=PhoneState)
     phone_models: wp.array(dtype=PhoneModel)
@@ -86,6 +101,8 @@ class FollowState:
     measures: wp.array2d(dtype=float)  # (envs, MEASURES)
     is_all: wp.array(dtype=wp.bool)  # every row
     usual_person: wp.array(dtype=PersonModel)  # (1,), before an episode's parameters
+    usual_clothes: wp.array(dtype=Clothes)  # (1,)
+    picture_ages_s: wp.array(dtype=float)
     usual_phone: wp.array(dtype=PhoneModel)  # (1,)
 
 
@@ -98,15 +115,18 @@ def chosen_action(buffers: StepBuffers, rules: Rules, i: int) -> wp.vec4:
 
 
 @wp.kernel(enable_backward=False)
-def act(buffers: StepBuffers, rules: Rules, rig: RigArrays) -> None:
+def act(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, part: int) -> None:
+    """Gives the flight controller the actions that reach it in this part of the decision."""
     i = wp.tid()
+    if int(wp.round(state.params[i].setpoint_lag_s / _PART_S)) != part:
+        return
     estimate = vehicle_estimate(rig, i, rules.has_estimator)
     command = action_command(chosen_action(buffers, rules, i), estimate.q_ned_from_frd)
     rig.autopilot.setpoint[i] = velocity_setpoint(command)
 
 
 @wp.kernel(enable_backward=False)
-def walk(rules: Rules, rig: RigArrays, state: FollowState) -> None:
+def walk(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState) -> None:
     i = wp.tid()
     world = rig.worlds[rig.i_world[i]]
     model = state.person_models[i]
@@ -118,13 +138,27 @@ def walk(rules: Rules, rig: RigArrays, state: FollowState) -> None:
     reach_m = float(wp.inf)
     end = draw_tick(rig.tick[i])
     for tick in range(end - rules.decision_ticks, end, _STEP_TICKS):
+        place_ned = truth.pos_ned - float(end - tick - _STEP_TICKS) / _TICKS_PER_S * truth.vel_ned
+        for k in range(BYSTANDERS_MAX):
+            other = bystander_step(world, model, state.bystanders[i, k], person, seed, i, k + 1, tick)
+            state.bystanders[i, k] = other
+            if other.stature_m > 0.0:
+                reach_m = wp.min(reach_m, reach_from(place_ned, other))
         person = person_step(world, model, person, seed, i, tick, _STEP_S)
         phone = phone_step(phone_model, phone, person, seed, i, tick + _STEP_TICKS)
-        since_s = float(end - tick - _STEP_TICKS) / _TICKS_PER_S
-        reach_m = wp.min(reach_m, reach_from(truth.pos_ned - since_s * truth.vel_ned, person))
+        reach_m = wp.min(reach_m, reach_from(place_ned, person))
     state.reaches_m[i] = reach_m
     state.people[i] = person
     state.phones[i] = phone
+    draw_people(state, i, float((buffers.steps[i] + 1) * rules.decision_ticks) / _TICKS_PER_S)
+
+
+@wp.func
+def draw_people(state: FollowState, i: int, since_s: float) -> None:
+    """Puts a row's people before its camera."""
+    state.drawn[i, 0] = drawn_owner(state.people[i], state.params[i], state.path_seeds[i], i, since_s)
+    for k in range(BYSTANDERS_MAX):
+        state.drawn[i, k + 1] = state.bystanders[i, k]
 
 
 @wp.kernel(enable_backward=False)
@@ -132,8 +166,10 @@ def look(rig: RigArrays, state: FollowState, rows: wp.array(dtype=wp.bool)) -> N
     i = wp.tid()
     if rows[i]:
         truth = rig.truth[i]
-        state.sights[i] = see(rig.worlds[rig.i_world[i]], truth, state.people[i])
-        state.lenses[i] = lens_of(truth, state.params[i].exposure)
+        params = state.params[i]
+        is_hidden = state.drawn[i, 0].stature_m <= 0.0
+        state.sights[i] = see(rig.worlds[rig.i_world[i]], truth, params, state.people[i], is_hidden)
+        state.lenses[i] = lens_of(truth, params)
 
 
 @wp.func
@@ -160,7 +196,8 @@ def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: Follo
     else:
         own = own_state(rig, i, rules.has_estimator)
         report = owner_report(state.phones[i], draw_tick(rig.tick[i]))
-        write_vector(rules.vector, own, report, action, buffers.observations, i, at)
+        age_s = state.picture_ages_s[i]
+        write_vector(rules.vector, own, report, action, age_s, buffers.observations, i, at)
     if rules.has_privileged == 1:
         write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, buffers.privileged, i, 0)
 
@@ -219,29 +256,6 @@ def prepare(buffers: StepBuffers, rules: Rules, state: FollowState, start: Start
 
 
 @wp.func
-def person_of(model: PersonModel, n: FollowParams) -> PersonModel:
-    """The owner of an episode."""
-    model.speed_max = n.owner_speed_max
-    model.speed_min = wp.min(model.speed_min, n.owner_speed_max)
-    model.stop_fraction = n.owner_stop_share
-    model.graze_fraction = n.owner_graze_share
-    return model
-
-
-@wp.func
-def phone_of(model: PhoneModel, n: FollowParams) -> PhoneModel:
-    """Their phone."""
-    model.period_ticks = wp.max(int(wp.round(n.phone_period_s * _TICKS_PER_S)), 1)
-    lag_ticks = int(wp.round(n.phone_lag_s * _TICKS_PER_S))
-    model.lag_ticks = wp.min(lag_ticks, _LAG_MAX_PERIODS * model.period_ticks)
-    model.pos_std_ned = n.phone_error * model.pos_std_ned
-    model.correlated_std_ned = n.phone_error * model.correlated_std_ned
-    model.vel_std = n.phone_error * model.vel_std
-    model.dropouts_per_tick = n.phone_dropouts_per_min / (60.0 * _TICKS_PER_S)
-    return model
-
-
-@wp.func
 def phone_that_has_reported(model: PhoneModel, person: Person, seed: int, i: int, tick: int) -> PhoneState:
     """The phone of an owner who has been standing there for some time."""
     since = tick - 2 * model.period_ticks - model.lag_ticks
@@ -260,7 +274,7 @@ def place(buffers: StepBuffers, rig: RigArrays, state: FollowState, start: Start
     episode = buffers.episodes[i] - 1
     params = state.params[i]
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)
-    state.person_models[i] = person_of(state.usual_person[0], params)
+    state.person_models[i] = owner_of(state.usual_person[0], params)
     state.phone_models[i] = phone_of(state.usual_phone[0], params)
     # ahead, some way to one side, looking anywhere
     truth = rig.truth[i]
@@ -275,9 +289,16 @@ def place(buffers: StepBuffers, rig: RigArrays, state: FollowState, start: Start
     path_seed = state.path_seeds[i]
     tick = draw_tick(rig.tick[i])
     world = rig.worlds[rig.i_world[i]]
-    person = person_start(world, state.person_models[i], north, east, heading, path_seed, i, tick)
+    place_and_heading = wp.vec3(north, east, heading)
+    person = owner_start(world, state.person_models[i], params, place_and_heading, path_seed, i, tick)
     phone_model = state.phone_models[i]
     state.people[i] = person
+    for k in range(BYSTANDERS_MAX):
+        model = state.person_models[i]
+        state.bystanders[i, k] = bystander_start(world, model, params, person, path_seed, i, k + 1, tick)
+        state.clothes[i, k + 1] = clothes_of(params, state.usual_clothes[0], path_seed, i, k + 1)
+    state.clothes[i, 0] = clothes_of(params, state.usual_clothes[0], path_seed, i, 0)
+    draw_people(state, i, 0.0)
     state.phones[i] = phone_that_has_reported(phone_model, person, path_seed, i, tick)
 
 

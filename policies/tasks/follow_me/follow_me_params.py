@@ -23,6 +23,15 @@ class FollowParams:
     owner_speed_max: float
     owner_stop_share: float
     owner_graze_share: float
+    owner_course_std_deg: float
+    owner_size: float
+    owner_crouch_share: float
+    owner_hides_per_min: float
+    owner_hide_s: float
+    owner_clothes_share: float
+    owner_hue: float
+    bystanders: float
+    bystander_likeness: float
     start_distance_min_m: float
     start_distance_max_m: float
     start_bearing_deg: float
@@ -30,8 +39,20 @@ class FollowParams:
     phone_lag_s: float
     phone_error: float
     phone_dropouts_per_min: float
+    phone_dropout_scale: float
     camera_noise: float
     exposure: float
+    light: float
+    shutter_s: float
+    depth_max_m: float
+    depth_holes: float
+    lens_scale: float
+    lens_tilt_deg: float
+    picture_lag_s: float
+    picture_jitter_s: float
+    picture_loss: float
+    picture_freezes_per_min: float
+    setpoint_lag_s: float
     decision_limit: float
     near_m: float
     far_m: float
@@ -67,6 +88,17 @@ FOLLOW_PARAMS = (
     TaskParam(
         "owner_graze_share", 0.3, 0.0, 1.0, "1", "share of the owner's plans that lead closely past a tree", "guess"
     ),
+    TaskParam(
+        "owner_course_std_deg", 51.6, 0.0, 180.0, "deg", "change of the owner's course from plan to plan", "guess"
+    ),
+    TaskParam("owner_size", 1.0, 0.6, 1.2, "1", "factor on the owner's stature; children: 0.7", "guess"),
+    TaskParam("owner_crouch_share", 0.0, 0.0, 1.0, "1", "of the times they stand, that they crouch", "guess"),
+    TaskParam("owner_hides_per_min", 0.0, 0.0, 20.0, "1/min", "how often nothing of the owner can be seen", "guess"),
+    TaskParam("owner_hide_s", 3.0, 0.0, 1e4, "s", "for how long; from 1000 on: for good", "guess"),
+    TaskParam("owner_clothes_share", 0.0, 0.0, 1.0, "1", "of owners who wear anything, not the usual blue", "guess"),
+    TaskParam("owner_hue", -1.0, -1.0, 1.0, "1", "of the other owners' shirts, 0: red; below 0: the usual", "guess"),
+    TaskParam("bystanders", 0.0, 0.0, 3.0, "1", "other people who cross the owner's way, rounded", "guess"),
+    TaskParam("bystander_likeness", 0.0, 0.0, 1.0, "1", "share of them in the owner's clothes", "guess"),
     TaskParam("start_distance_min_m", 2.0, 1.0, 20.0, "m", "the owner starts at least this far away", "guess"),
     TaskParam("start_distance_max_m", 4.0, 1.0, 20.0, "m", "and at most this far", "guess"),
     TaskParam("start_bearing_deg", 30.0, 0.0, 180.0, "deg", "and at most this far to either side of the nose", "guess"),
@@ -74,8 +106,20 @@ FOLLOW_PARAMS = (
     TaskParam("phone_lag_s", 0.3, 0.0, 1.0, "s", "age of a report on its arrival", "guess"),
     TaskParam("phone_error", 1.0, 0.0, 4.0, "1", "factor on the phone's errors; 1: 1.5 m, drifting", "guess"),
     TaskParam("phone_dropouts_per_min", 1.0, 0.0, 20.0, "1/min", "how often the phone is silent for 2 to 6 s", "guess"),
+    TaskParam("phone_dropout_scale", 1.0, 0.0, 1e4, "1", "factor on these times; 1e4: for good", "guess"),
     TaskParam("camera_noise", 1.0, 0.0, 4.0, "1", "factor on the noise of the picture", "guess"),
     TaskParam("exposure", 1.0, 0.25, 4.0, "1", "factor on the light of the picture", "guess"),
+    TaskParam("light", 1.0, 0.005, 1.0, "1", "of day; what is missing is amplified, and noise with it", "guess"),
+    TaskParam("shutter_s", 0.0, 0.0, 0.05, "s", "in which what moves is smeared", "guess: up to 1/30 s at dusk"),
+    TaskParam("depth_max_m", 0.0, 0.0, 100.0, "m", "beyond it no depth is measured; 0: everywhere", "D435: 10 m"),
+    TaskParam("depth_holes", 0.0, 0.0, 1.0, "1", "fraction of the picture without depth, in patches", "guess"),
+    TaskParam("lens_scale", 1.0, 0.9, 1.1, "1", "factor on the width of what the lens shows", "guess"),
+    TaskParam("lens_tilt_deg", 0.0, -5.0, 5.0, "deg", "of the camera's mount, up, unknown to the policy", "guess"),
+    TaskParam("picture_lag_s", 0.0, 0.0, 0.5, "s", "from shutter to policy; in training in steps of 0.1 s", "guess"),
+    TaskParam("picture_jitter_s", 0.0, 0.0, 0.3, "s", "at most this much more, of each picture anew", "guess"),
+    TaskParam("picture_loss", 0.0, 0.0, 0.9, "1", "fraction of pictures that never come", "guess"),
+    TaskParam("picture_freezes_per_min", 0.0, 0.0, 20.0, "1/min", "times of 0.4 to 1.2 s without pictures", "guess"),
+    TaskParam("setpoint_lag_s", 0.0, 0.0, 0.08, "s", "from policy to flight controller, in steps of 20 ms", "guess"),
     TaskParam("decision_limit", 600.0, 1.0, 1e6, "1", "decisions of an episode; 600 are 60 s", "guess"),
     TaskParam("near_m", 1.0, 0.0, 20.0, "m", "to the owner's chest: nearer is too near", _EVT),
     TaskParam("far_m", 3.0, 0.0, 100.0, "m", "farther is not following", _EVT + " and " + _DOCUMENT),

@@ -9,6 +9,7 @@ import warp as wp
 
 from common.rotation import yaw_from_quat
 from policies.tasks.flight.own_state import level_from_ned
+from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount
 from sim.camera_rig import MOUNT_FRD
 from sim.sensors.camera import Lens
@@ -22,6 +23,8 @@ LENS_FRD = wp.constant(wp.vec3(*MOUNT_FRD))
 Q_FRD_FROM_RDF = wp.constant(wp.quat(*camera_mount()))
 HALF_WIDTH = wp.constant(math.tan(math.radians(0.5 * HFOV_DEG)))
 ROOM_MAX_M = wp.constant(2.0)  # the largest radius that contact is asked with
+GAIN_MAX = wp.constant(16.0)  # guess: four stops; darker than that pictures are dark
+_RADIANS = wp.constant(math.pi / 180.0)
 _HEAD_FRACTION = wp.constant(0.93)  # of the stature: the eyes
 _LEG_FRACTION = wp.constant(0.25)
 
@@ -41,13 +44,22 @@ class Sight:
 
 
 @wp.func
-def lens_of(truth: Truth, exposure: float) -> Lens:
-    """The policy's camera on a vehicle; `exposure` is a factor on all light."""
+def light_gain(n: FollowParams) -> float:
+    """What a camera amplifies the light of an episode by: as far as it can, to that of day."""
+    return wp.min(1.0 / n.light, GAIN_MAX)
+
+
+@wp.func
+def lens_of(truth: Truth, n: FollowParams) -> Lens:
+    """The policy's camera on a vehicle, in the light of an episode."""
+    tilt = wp.quat_from_axis_angle(wp.vec3(1.0, 0.0, 0.0), n.lens_tilt_deg * _RADIANS)
     lens = Lens()
     lens.pos_ned = truth.pos_ned + wp.quat_rotate(truth.q_ned_from_frd, LENS_FRD)
     lens.q_ned_from_rdf = truth.q_ned_from_frd * Q_FRD_FROM_RDF
-    lens.half_width = HALF_WIDTH
-    lens.exposure = exposure
+    if n.lens_tilt_deg != 0.0:
+        lens.q_ned_from_rdf = lens.q_ned_from_rdf * tilt
+    lens.half_width = HALF_WIDTH * n.lens_scale
+    lens.exposure = n.exposure * n.light * light_gain(n)
     lens.balance = wp.vec3(1.0, 1.0, 1.0)
     return lens
 
@@ -76,8 +88,8 @@ def reach_from(pos_ned: wp.vec3, person: Person) -> float:
 
 
 @wp.func
-def see(w: World, truth: Truth, person: Person) -> Sight:
-    """How a vehicle and its owner stand to each other."""
+def see(w: World, truth: Truth, n: FollowParams, person: Person, is_hidden: bool) -> Sight:
+    """How a vehicle and its owner stand to each other; one who is hidden is in no picture."""
     sight = Sight()
     chest = chest_ned(person)
     head = person.pos_ned - wp.vec3(0.0, 0.0, _HEAD_FRACTION * person.stature_m)
@@ -89,7 +101,9 @@ def see(w: World, truth: Truth, person: Person) -> Sight:
     sight.bearing_rad = wp.atan2(sight.position_hfrd[1], sight.position_hfrd[0])
     sight.reach_m = reach_from(truth.pos_ned, person)
     sight.room_m = room_around(w, truth)
-    lens = lens_of(truth, 1.0)
+    lens = lens_of(truth, n)
+    if is_hidden:
+        return sight
     is_chest_free = is_line_free(w, lens.pos_ned, chest)
     is_head_free = is_chest_free or is_line_free(w, lens.pos_ned, head)
     sight.is_free = int(is_chest_free or is_head_free)

@@ -1,7 +1,7 @@
 """The images of a batch of follow-me drones: rendered with their cameras' noise, packed as the observation's image.
 
-In: the lenses that `look` has placed, the worlds, the owners. Out: `buffers.images`. As a policy's companion gets them,
-but for their way over the network.
+In: the lenses that `look` has placed, the worlds, the people. Out: `buffers.images`, as a policy's companion gets them:
+each as late as its episode has it.
 """
 
 from typing import Any
@@ -12,6 +12,8 @@ from common.rng import draw_tick
 from policies.tasks.flight.rig_task import worker_count
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import HFOV_DEG, pack_images
+from policies.tasks.follow_me.owner_visibility import lens_of, light_gain
+from policies.tasks.follow_me.picture_way import Way, carry, note
 from sim.advance import RigArrays
 from sim.sensors.fast_camera.fast_camera import QuickCamera
 from sim.sensors.fast_camera.optics import Optics, sensor_noise
@@ -27,10 +29,24 @@ def set_optics(
     rows: wp.array(dtype=wp.bool),
     optics: wp.array(dtype=Optics),
 ) -> None:
-    """Gives the cameras of the chosen rows the noise of their episodes."""
+    """Gives the cameras of the chosen rows the noise, the smear and the depth of their episodes."""
     i = wp.tid()
     if rows[i]:
-        optics[i] = sensor_noise(optics[i], params[i].camera_noise, rig.seed[i], draw_tick(rig.tick[i]))
+        n = params[i]
+        gain = light_gain(n)
+        out = sensor_noise(optics[i], n.camera_noise, rig.seed[i], draw_tick(rig.tick[i]))
+        out.read_std = out.read_std * gain
+        out.shot_std = out.shot_std * wp.sqrt(gain)
+        out.depth_max_m = n.depth_max_m
+        out.depth_holes = n.depth_holes
+        out.shutter_s = n.shutter_s
+        if n.shutter_s > 0.0:
+            truth = rig.truth[i]
+            q_ned_from_rdf = lens_of(truth, n).q_ned_from_rdf
+            out.vel_rdf = wp.quat_rotate_inv(q_ned_from_rdf, truth.vel_ned)
+            rate_ned = wp.quat_rotate(truth.q_ned_from_frd, truth.omega_frd)
+            out.rate_rdf = wp.quat_rotate_inv(q_ned_from_rdf, rate_ned)
+        optics[i] = out
 
 
 class Eyes:
@@ -41,10 +57,15 @@ class Eyes:
         rig: the vehicles.
         params: of the running episodes.
         worlds: what is seen; camera i looks at world i.
-        people: the owners; camera i sees person i.
+        people: shape (envs, people); camera i sees those of row i.
+        clothes: likewise.
+        way: of the pictures.
+        seeds: of the episodes.
     """
 
-    def __init__(self, buffers: Any, rig: Any, params: Any, worlds: WorldBatch, people: Any) -> None:
+    def __init__(
+        self, buffers: Any, rig: Any, params: Any, worlds: WorldBatch, people: Any, clothes: Any, way: Way, seeds: Any
+    ) -> None:
         count, height, width, _ = buffers.images.shape
         device = worlds.device
         self._camera = QuickCamera(
@@ -54,6 +75,7 @@ class Eyes:
             height=height,
             hfov_deg=HFOV_DEG,
             people=people,
+            clothes=clothes,
             has_optics=True,
             threads=worker_count(device),
             device=device,
@@ -63,22 +85,30 @@ class Eyes:
         self._everyone = everyone
         set_inputs = [rig, params, everyone, camera.optics]
         self._set_optics = wp.launch(set_optics, count, set_inputs, device=device, record_cmd=True)
-        inputs = [camera.rgb, camera.depth_m, everyone, buffers.images]
-        self._pack = wp.launch(pack_images, (count, height), inputs, device=device, record_cmd=True)
+        fresh = wp.zeros_like(buffers.images)
+        size = (count, height)
+        pack_inputs = [camera.rgb, camera.depth_m, everyone, fresh]
+        self._pack = wp.launch(pack_images, size, pack_inputs, device=device, record_cmd=True)
+        note_inputs = [params, seeds, 0, everyone, way]
+        self._note = wp.launch(note, count, note_inputs, device=device, record_cmd=True)
+        carry_inputs = [everyone, way, fresh, buffers.images]
+        self._carry = wp.launch(carry, size, carry_inputs, device=device, record_cmd=True)
 
     @property
     def lenses(self) -> Any:
         """To be placed before images are taken."""
         return self._camera.lenses
 
-    def take(self, rows: Any = None) -> None:
-        """Takes the images of the chosen rows, or of all."""
-        chosen = self._everyone if rows is None else rows
+    def take(self, starting: Any = None) -> None:
+        """Takes pictures of all, or the first ones of the rows whose episodes are starting, and shows what has come."""
+        chosen = self._everyone if starting is None else starting
+        self._note.set_param_at_index(2, int(starting is not None))
         self._set_optics.set_param_at_index(2, chosen)
         self._set_optics.launch()
         self._camera.render(chosen)
-        self._pack.set_param_at_index(2, chosen)
-        self._pack.launch()
+        for launch, index in ((self._pack, 2), (self._note, 3), (self._carry, 0)):
+            launch.set_param_at_index(index, chosen)
+            launch.launch()
 
     def refresh(self, worlds: Any = None) -> None:
         """Tells that the chosen worlds have changed, or all."""

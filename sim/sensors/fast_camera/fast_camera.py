@@ -22,6 +22,8 @@ from sim.sensors.fast_camera.prepare import prepare_views
 from sim.sensors.fast_camera.rows import Outputs, draw_rows
 from sim.sensors.fast_camera.solids import Sights, Solid
 from sim.workers import Workers
+from sim.world.clothes import Clothes, usual_clothes
+from sim.world.people import Person
 from sim.world.trees import CROWN_RADIUS_FRACTION
 from sim.world.world import World, WorldConfig, WorldMap
 
@@ -55,7 +57,9 @@ class QuickCamera:
         width: of each image [pixels].
         height: of each image [pixels].
         hfov_deg: horizontal field of view the lenses begin with.
-        people: array of `Person`, shape (count,): row i is seen by camera i alone, stature 0 is nobody; None for none.
+        people: array of `Person`, shape (count,) or (count, people): row i is seen by camera i alone, stature 0 is
+            nobody; None for none.
+        clothes: array of `Clothes` of the same shape; None: the usual ones for all.
         i_world: the world of each camera; None: the only one, or camera i looks at world i.
         range_m: fog hides what is farther; farther ground and trees are not drawn.
         has_optics: whether `optics` spoil the images; they are perfect otherwise.
@@ -81,6 +85,7 @@ class QuickCamera:
         height: int = 64,
         hfov_deg: float = 90.0,
         people: Any = None,
+        clothes: Any = None,
         i_world: Any = None,
         range_m: float = RANGE_M,
         has_optics: bool = False,
@@ -109,10 +114,17 @@ class QuickCamera:
         outputs.width, outputs.height = width, height
         views = wp.zeros(count, dtype=View, device=device)
         columns = _columns(count, width, range_m, device)
-        sights = _sights(count, config, range_m, device)
+        people = _in_rows(people, count, Person, device)
+        if clothes is None:
+            usual = [usual_clothes()] * (count * people.shape[1])
+            clothes = wp.array(usual, dtype=Clothes, device=device) if usual else None
+        clothes = _in_rows(clothes, count, Clothes, device)
+        self._who = (people, clothes)
+        sights = _sights(count, config, range_m, people.shape[1], device)
         size, paints = wp.vec2i(width, height), make_paints(device)
         chosen = self._everyone
-        seen = [self._worlds, self.i_world, self.lenses, people, chosen, ground, range_m, size, views, columns, sights]
+        places = [self._worlds, self.i_world, self.lenses, *self._who, chosen]
+        seen = [*places, ground, range_m, size, views, columns, sights]
         drawn = [ground, paints, views, chosen, columns, sights, range_m, outputs]
         images = [array.flatten() for array in (*perfect, self.rgb, self.depth_m)]
         passes: list[_Pass] = [
@@ -202,9 +214,16 @@ def _columns(count: int, width: int, range_m: float, device: str) -> Any:
     return columns
 
 
-def _sights(count: int, config: WorldConfig, range_m: float, device: str) -> Any:
+def _in_rows(rows: Any, count: int, kind: Any, device: str) -> Any:
+    """An array of structs, (count, people): of one for each camera, of several or of none."""
+    if rows is None:
+        return wp.zeros((count, 0), dtype=kind, device=device)
+    return rows.reshape((count, -1))
+
+
+def _sights(count: int, config: WorldConfig, range_m: float, people: int, device: str) -> Any:
     sights = Sights()
-    room = sights.room = _solids_room(config, range_m)
+    room = sights.room = _solids_room(config, range_m) + _LIMBS * people
     sights.crown_max_m = CROWN_RADIUS_FRACTION[1] * config.tree_height_max_m
     sights.solids = wp.zeros(count * room, dtype=Solid, device=device)
     sights.boxes = wp.zeros(count * room, dtype=wp.vec4i, device=device)
@@ -212,6 +231,6 @@ def _sights(count: int, config: WorldConfig, range_m: float, device: str) -> Any
 
 
 def _solids_room(config: WorldConfig, range_m: float) -> int:
-    """How many solids a camera can list: two per tree in a third of the circle of its range, and a person."""
+    """How many solids a camera can list: two per tree in a third of the circle of its range, and the vehicles."""
     area_ha = min(pi * range_m**2 / 3.0, config.size_m**2) * 1.0e-4
-    return _LIMBS + 32 + ceil(2.0 * _CROWDED * config.trees_per_ha * area_ha)
+    return 32 + ceil(2.0 * _CROWDED * config.trees_per_ha * area_ha)

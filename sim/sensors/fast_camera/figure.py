@@ -1,7 +1,7 @@
 """A person as a camera sees them: ten limbs, a torso and a head, walking or running by the phase of their gait.
 
 Proportions are those of Drillis and Contini (1966, in Winter, Biomechanics and Motor Control of Human Movement, 2009,
-fig. 4.1), as fractions of the stature; thicknesses, swings and colours are guesses by eye. The shirt is blue.
+fig. 4.1), as fractions of the stature; thicknesses and swings are guesses by eye.
 """
 
 import warp as wp
@@ -9,6 +9,7 @@ import warp as wp
 from sim.sensors.fast_camera.camera_view import View
 from sim.sensors.fast_camera.solids import Sights, is_in_solid, list_solid, make_solid, to_rdf
 from sim.sensors.ray import PERSON, SKY
+from sim.world.clothes import Clothes
 from sim.world.people import Person
 
 wp.set_module_options({"enable_backward": False})
@@ -23,11 +24,6 @@ _FOREARM = wp.constant(0.200)
 _HIP_HALF = wp.constant(0.055)  # off the middle: of the thighs' axes
 _SHOULDER_HALF = wp.constant(0.118)
 
-_SHIRT = wp.constant(wp.vec3(0.030, 0.090, 0.550))
-_TROUSERS = wp.constant(wp.vec3(0.060, 0.060, 0.075))
-_SKIN = wp.constant(wp.vec3(0.480, 0.290, 0.200))
-_SHOES = wp.constant(wp.vec3(0.320, 0.300, 0.280))
-_HAIR = wp.constant(wp.vec3(0.060, 0.035, 0.020))
 
 
 @wp.func
@@ -52,9 +48,12 @@ def list_limb(
 
 
 @wp.func
-def list_side(sights: Sights, i_camera: int, view: View, person: Person, side: float, size: wp.vec2i) -> View:
+def list_side(
+    sights: Sights, i_camera: int, view: View, person: Person, clothes: Clothes, side: float, size: wp.vec2i
+) -> View:
     """The camera with one leg and one arm on its list: those on the right for side 1, on the left for -1."""
     s = person.stature_m
+    girth = clothes.girth * s
     phase = person.gait_phase + wp.where(side > 0.0, 3.14159265, 0.0)  # the left foot lands at 0
     pace = wp.length(person.vel_ned)
     swing = wp.min(1.0, 2.0 * pace) * wp.min(0.22 + 0.10 * pace, 0.65)
@@ -73,9 +72,9 @@ def list_side(sights: Sights, i_camera: int, view: View, person: Person, side: f
     knee_ned = body_point(person, knee_forward, off, knee_up)
     heel = body_point(person, heel_forward, off, heel_up)
     toe = body_point(person, heel_forward + 0.085, off, heel_up - 0.004)
-    view = list_limb(sights, i_camera, view, hip, knee_ned, 0.048 * s, _TROUSERS, size)
-    view = list_limb(sights, i_camera, view, knee_ned, heel, 0.032 * s, _TROUSERS, size)
-    view = list_limb(sights, i_camera, view, heel, toe, 0.022 * s, _SHOES, size)
+    view = list_limb(sights, i_camera, view, hip, knee_ned, 0.048 * girth, clothes.trousers, size)
+    view = list_limb(sights, i_camera, view, knee_ned, heel, 0.032 * girth, clothes.trousers, size)
+    view = list_limb(sights, i_camera, view, heel, toe, 0.022 * girth, clothes.shoes, size)
     arm = -0.9 * swing * wp.cos(phase)
     elbow = arm + 0.2 + 1.2 * is_fast
     shoulder_up = _SHOULDER - drop - 0.01
@@ -87,16 +86,19 @@ def list_side(sights: Sights, i_camera: int, view: View, person: Person, side: f
     shoulder = body_point(person, lean, wide, shoulder_up)
     elbow_ned = body_point(person, elbow_forward, 1.12 * wide, elbow_up)
     wrist = body_point(person, wrist_forward, 1.08 * wide, wrist_up)
-    view = list_limb(sights, i_camera, view, shoulder, elbow_ned, 0.030 * s, _SHIRT, size)
-    return list_limb(sights, i_camera, view, elbow_ned, wrist, 0.023 * s, _SKIN, size)
+    view = list_limb(sights, i_camera, view, shoulder, elbow_ned, 0.030 * girth, clothes.shirt, size)
+    return list_limb(sights, i_camera, view, elbow_ned, wrist, 0.023 * girth, clothes.skin, size)
 
 
 @wp.func
-def list_person(sights: Sights, i_camera: int, view: View, person: Person, width: int, height: int) -> View:
+def list_person(
+    sights: Sights, i_camera: int, view: View, person: Person, clothes: Clothes, width: int, height: int
+) -> View:
     """The camera with a person on its list; a stature of 0 means nobody."""
     s = person.stature_m
     if s <= 0.0:
         return view
+    girth = clothes.girth * s
     size = wp.vec2i(width, height)
     pace = wp.length(person.vel_ned)
     lean = 0.06 * wp.clamp(pace - 1.8, 0.0, 1.0)
@@ -105,15 +107,15 @@ def list_person(sights: Sights, i_camera: int, view: View, person: Person, width
         off = (2.0 * float(k) - 1.0) * 0.045
         low = body_point(person, 0.0, off, _HIP + 0.03)
         high = body_point(person, lean, 1.25 * off, _SHOULDER - 0.065)
-        view = list_limb(sights, i_camera, view, low, high, 0.070 * s, _SHIRT, size)
+        view = list_limb(sights, i_camera, view, low, high, 0.070 * girth, clothes.shirt, size)
     neck = body_point(person, lean, 0.0, _SHOULDER)
     chin = body_point(person, lean + 0.008, 0.0, _HEAD - 0.02)
     crown = body_point(person, lean + 0.004, 0.0, _HEAD + 0.015)
     hair = body_point(person, lean - 0.016, 0.0, _HEAD + 0.018)
-    view = list_limb(sights, i_camera, view, neck, chin, 0.032 * s, _SKIN, size)
-    view = list_limb(sights, i_camera, view, chin, crown, 0.048 * s, _SKIN, size)
-    view = list_limb(sights, i_camera, view, hair, hair, 0.052 * s, _HAIR, size)
-    view = list_limb(sights, i_camera, view, waist, waist, 0.072 * s, _TROUSERS, size)
+    view = list_limb(sights, i_camera, view, neck, chin, 0.032 * girth, clothes.skin, size)
+    view = list_limb(sights, i_camera, view, chin, crown, 0.048 * girth, clothes.skin, size)
+    view = list_limb(sights, i_camera, view, hair, hair, 0.052 * girth, clothes.hair, size)
+    view = list_limb(sights, i_camera, view, waist, waist, 0.072 * girth, clothes.trousers, size)
     for k in range(2):
-        view = list_side(sights, i_camera, view, person, 2.0 * float(k) - 1.0, size)
+        view = list_side(sights, i_camera, view, person, clothes, 2.0 * float(k) - 1.0, size)
     return view

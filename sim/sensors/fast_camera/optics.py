@@ -7,8 +7,8 @@ on. Exposure and white balance belong to the `Lens`. Draws are named by a camera
 import warp as wp
 
 from common.rng import draw_key
-from sim.rng_streams import CAMERA
-from sim.sensors.camera import Lens
+from sim.rng_streams import CAMERA, DEPTH_HOLES
+from sim.sensors.camera import SKY_DEPTH_M, Lens
 from sim.sensors.fast_camera.flags import FAST
 from sim.sensors.ray import RAY_MAX_M
 
@@ -20,6 +20,8 @@ _DEPTH_STD_FRACTION = wp.constant(0.02)  # Intel D435: below 2 % up to 2 m
 _UNIFORM_WIDTH = wp.constant(3.4641016)  # of a uniform draw of unit variance
 _TAPS_MAX = wp.constant(6)  # places that a smeared pixel is the mean of
 _SMEAR_MAX = wp.constant(16.0)  # [pixels]
+_HOLE_PIXELS = wp.constant(6)  # width and height of a hole in the depth; guess
+_HOLE_TICKS = wp.constant(50)  # and for how long it stays; guess
 _STILL_SQUARED = wp.constant(0.01)  # [pixels²] a smear that nobody sees
 
 
@@ -30,6 +32,8 @@ class Optics:
     read_std: float  # [levels] noise of a black pixel
     shot_std: float  # [levels] more noise of a white one, growing with the root of the level
     depth_std_fraction: float  # error of a pixel's depth as a fraction of it
+    depth_max_m: float  # what is farther returns no depth; 0: nothing is too far
+    depth_holes: float  # fraction of the picture without depth, in patches that come and go
     shutter_s: float  # time in which what moves is smeared; 0 smears nothing
     vel_rdf: wp.vec3  # [m/s] of the camera, while the shutter is open
     rate_rdf: wp.vec3  # [rad/s]
@@ -51,7 +55,20 @@ def sensor_noise(optics: Optics, scale: float, seed: int, tick: int) -> Optics:
 @wp.func
 def is_perfect(optics: Optics) -> bool:
     """Whether the camera neither errs nor smears."""
-    return optics.read_std + optics.shot_std + optics.depth_std_fraction + optics.shutter_s == 0.0
+    noise = optics.read_std + optics.shot_std + optics.depth_std_fraction
+    return noise + optics.shutter_s + optics.depth_max_m + optics.depth_holes == 0.0
+
+
+@wp.func
+def has_depth(optics: Optics, depth_m: float, row: int, column: int) -> bool:
+    """Whether a pixel's depth is measured: it is near enough, and in no hole."""
+    if optics.depth_max_m > 0.0 and depth_m > optics.depth_max_m:
+        return False
+    if optics.depth_holes <= 0.0:
+        return True
+    patch = 1024 * (row / _HOLE_PIXELS) + column / _HOLE_PIXELS
+    state = draw_key(optics.seed, patch, optics.tick / _HOLE_TICKS, DEPTH_HOLES)
+    return wp.randf(state) >= optics.depth_holes
 
 
 @wp.func
@@ -150,4 +167,6 @@ def expose(
             rgb[3 * k + c] = wp.uint8(wp.clamp(level + 0.5, 0.0, 255.0))
         if depth < RAY_MAX_M:
             depth = depth * (1.0 + optics.depth_std_fraction * even(bits, 3))
+            if not has_depth(optics, depth, row, column):
+                depth = SKY_DEPTH_M
         depth_m[k] = depth

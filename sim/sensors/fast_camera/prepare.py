@@ -13,6 +13,7 @@ from sim.sensors.fast_camera.ground import Ground, surface
 from sim.sensors.fast_camera.solids import NEVER, Sights, list_forest, list_neighbours
 from sim.sensors.ray import SKY
 from sim.sensors.shading import SUN_NED
+from sim.world.clothes import Clothes
 from sim.world.people import Person
 from sim.world.world import World
 
@@ -110,7 +111,8 @@ def prepare_views(
     worlds: wp.array[World],
     i_world: wp.array[int],
     lenses: wp.array[Lens],
-    people: wp.array[Person],
+    people: wp.array2d(dtype=Person),
+    clothes: wp.array2d(dtype=Clothes),
     is_chosen: wp.array[wp.bool],
     ground: Ground,
     range_m: float,
@@ -145,8 +147,8 @@ def prepare_views(
     out_most = wp.max(wp.abs(view.pos_ned[0]), wp.abs(view.pos_ned[1]))
     view.wall_top = w.walls.top_m
     view.has_wall = w.walls.is_built != 0 and out_most < ground.half_size_m and out_most + range_m > ground.half_size_m
-    if people:
-        view = list_person(sights, i_camera, view, people[i_camera], size[0], size[1])
+    for k in range(people.shape[1]):
+        view = list_person(sights, i_camera, view, people[i_camera, k], clothes[i_camera, k], size[0], size[1])
     view = list_neighbours(sights, i_camera, view, w.neighbours, size[0], size[1])
     view = list_forest(sights, i_camera, view, w.forest, range_m, size[0], size[1])
     views[i_camera] = view

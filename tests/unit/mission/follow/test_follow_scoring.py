@@ -28,7 +28,7 @@ def run(flight, watch, seconds=SECONDS, on_frame=lambda: None):
 
 def watched_flight(planned_s=SECONDS, **config):
     """A flight that follows, and a watch that has just begun."""
-    flight, companion = following(phone_error=0.0, **config)
+    flight, companion = following(numbers={"phone_error": 0.0}, **config)
     watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, planned_s)
     watch.frame()
     return flight, watch

@@ -15,7 +15,7 @@ class Judged:
     """A flight that follows, and the watch that judges it from now on."""
 
     def __init__(self, planned_s):
-        self.flight, self.companion = following(phone_error=0.0)
+        self.flight, self.companion = following(numbers={"phone_error": 0.0})
         self.watch = watch_of(self.flight, self.companion, planned_s)
         self.watch.frame()
 

@@ -56,7 +56,7 @@ def test_the_owner_waits_until_the_vehicle_follows():
 
 
 def test_a_scripted_follower_with_a_good_phone_stays_in_the_band():
-    flight, _ = following(phone_error=0.0)
+    flight, _ = following(numbers={"phone_error": 0.0})
     distances = []
     flight.run(lambda f: distances.append(distance_m(f)) or len(distances) >= 1000)
     inside = np.mean((np.array(distances) >= 1.0) & (np.array(distances) <= 3.2))
@@ -79,7 +79,7 @@ def test_the_companion_sees_what_training_sees(flown):
     row["age_s"], row["is_known"] = (flight.time_us - int(fix["time_us"])) * 1e-6, 1
     out = wp.zeros((1, len(vector_elements(int(EGO)))), dtype=float)
     actions = wp.array([action], dtype=wp.vec4)
-    wp.launch(observe_rows, 1, [int(EGO), own, report, actions, out])
+    wp.launch(observe_rows, 1, [int(EGO), own, report, actions, wp.zeros(1, dtype=float), out])
     # a frame of 20 ms of the report's way, centimetres of the range finder and of latitudes
     assert companion.skill.seen == pytest.approx(out.numpy()[0], abs=0.025)
     exact = [k for k, element in enumerate(vector_elements(int(EGO))) if "owner" not in element.name]
@@ -104,7 +104,7 @@ def test_the_phone_is_heard_through_the_vehicle_with_its_lag(flown):
 
 def test_a_ground_station_hears_the_phone_too():
     vehicle_end, station_end = memory_pair(LinkRole.GROUND)
-    flight, _ = flight_with_companion(config(phone_error=0.0), ScriptedFollower(), links=[vehicle_end])
+    flight, _ = flight_with_companion(config(numbers={"phone_error": 0.0}), ScriptedFollower(), links=[vehicle_end])
     advance(flight, 6.0)
     reader = FrameReader()
     messages = [decode(frame) for data in station_end.receive() for frame in reader.feed(data)]
@@ -117,7 +117,7 @@ def test_a_ground_station_hears_the_phone_too():
 
 def test_pictures_that_stop_end_in_hold_within_the_stated_time():
     flight, companion = following()
-    flight.onboard._sinks.clear()
+    flight.onboard.way.sinks.clear()
     stopped_us = flight.time_us
     advance(flight, 3.0, lambda: flight.controller.state.mode is Mode.HOLD)
     assert flight.controller.state.mode is Mode.HOLD
@@ -173,14 +173,14 @@ def test_in_the_ardupilot_dialect_it_flies_in_guided_and_hands_back_by_brake():
     advance(flight, 5.0)
     assert (companion.phase, flight.controller.state.mode) == (Phase.FLYING, Mode.GUIDED)
     assert flight.owner.is_walking
-    flight.onboard._sinks.clear()
+    flight.onboard.way.sinks.clear()
     advance(flight, 1.0)
     assert (companion.phase, flight.controller.state.mode) == (Phase.RELEASED, Mode.BRAKE)
 
 
 def test_pictures_of_another_lens_end_in_hold():
     flight, companion = following()
-    flight.onboard._sinks.clear()
+    flight.onboard.way.sinks.clear()
     flight.onboard.add_sink(lambda frame: companion.skill.camera.publish(replace(frame, hfov_deg=60.0)))
     advance(flight, 1.0, lambda: flight.controller.state.mode is Mode.HOLD)
     assert flight.controller.state.mode is Mode.HOLD

@@ -40,6 +40,6 @@ def test_who_waited_sets_off_within_two_seconds_as_in_training(plain, seed):
 
 def test_they_stop_and_pass_trees_as_often_as_in_training(plain):
     model = owner_of(plain, 0)._walking
-    assert model.stop_fraction == pytest.approx(DEFAULTS["owner_stop_share"])
-    assert model.graze_fraction == pytest.approx(DEFAULTS["owner_graze_share"])
-    assert model.speed_max == pytest.approx(DEFAULTS["owner_speed_max"])
+    assert model.stop_fraction == pytest.approx(DEFAULTS["owner_stop_share"], rel=1e-5)
+    assert model.graze_fraction == pytest.approx(DEFAULTS["owner_graze_share"], rel=1e-5)
+    assert model.speed_max == pytest.approx(DEFAULTS["owner_speed_max"], rel=1e-5)

@@ -133,7 +133,7 @@ def test_vector_is_what_a_companion_makes_of_estimate_and_report() -> None:
     out = wp.zeros((1, len(vector_elements(int(EGO)))), dtype=float)
     rows: list[Any] = [wp.array([own], dtype=OwnState), wp.array([report], dtype=OwnerReport)]
     action = wp.array(task.buffers.continuous.numpy(), dtype=wp.vec4)
-    wp.launch(observe_rows, 1, [int(EGO), *rows, action, out])
+    wp.launch(observe_rows, 1, [int(EGO), *rows, action, wp.zeros(1, dtype=float), out])
     np.testing.assert_allclose(task.buffers.observations.numpy()[0], out.numpy()[0], rtol=1e-5, atol=1e-6)
 
 

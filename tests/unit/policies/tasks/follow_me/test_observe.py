@@ -46,7 +46,7 @@ def _vector(kind: int, own: Any, report: Any) -> dict[str, float]:
     out = wp.zeros((1, len(vector_elements(kind))), dtype=float)
     action = wp.array([wp.vec4(0.1, 0.2, 0.3, 0.4)], dtype=wp.vec4)
     rows = [wp.array([own], dtype=OwnState), wp.array([report], dtype=OwnerReport)]
-    wp.launch(observe_rows, dim=1, inputs=[kind, *rows, action], outputs=[out])
+    wp.launch(observe_rows, dim=1, inputs=[kind, *rows, action, wp.array([0.2], dtype=float)], outputs=[out])
     elements = vector_elements(kind)
     return {e.name: float(x) * e.scale for e, x in zip(elements, out.numpy()[0], strict=True)}
 
