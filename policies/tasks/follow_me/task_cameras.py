@@ -37,6 +37,7 @@ def set_optics(
         out = sensor_noise(optics[i], n.camera_noise, rig.seed[i], draw_tick(rig.tick[i]))
         out.read_std = out.read_std * gain
         out.shot_std = out.shot_std * wp.sqrt(gain)
+        out.has_depth_limit = 1
         out.depth_max_m = n.depth_max_m
         out.depth_holes = n.depth_holes
         out.shutter_s = n.shutter_s

@@ -32,7 +32,8 @@ class Optics:
     read_std: float  # [levels] noise of a black pixel
     shot_std: float  # [levels] more noise of a white one, growing with the root of the level
     depth_std_fraction: float  # error of a pixel's depth as a fraction of it
-    depth_max_m: float  # what is farther returns no depth; 0: nothing is too far
+    has_depth_limit: int  # what is farther than the next returns no depth
+    depth_max_m: float
     depth_holes: float  # fraction of the picture without depth, in patches that come and go
     shutter_s: float  # time in which what moves is smeared; 0 smears nothing
     vel_rdf: wp.vec3  # [m/s] of the camera, while the shutter is open
@@ -56,13 +57,13 @@ def sensor_noise(optics: Optics, scale: float, seed: int, tick: int) -> Optics:
 def is_perfect(optics: Optics) -> bool:
     """Whether the camera neither errs nor smears."""
     noise = optics.read_std + optics.shot_std + optics.depth_std_fraction
-    return noise + optics.shutter_s + optics.depth_max_m + optics.depth_holes == 0.0
+    return noise + optics.shutter_s + optics.depth_holes == 0.0 and optics.has_depth_limit == 0
 
 
 @wp.func
 def has_depth(optics: Optics, depth_m: float, row: int, column: int) -> bool:
     """Whether a pixel's depth is measured: it is near enough, and in no hole."""
-    if optics.depth_max_m > 0.0 and depth_m > optics.depth_max_m:
+    if optics.has_depth_limit == 1 and depth_m > optics.depth_max_m:
         return False
     if optics.depth_holes <= 0.0:
         return True
