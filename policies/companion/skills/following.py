@@ -20,7 +20,7 @@ from policies.companion.vehicle_link import Own, Owner, VehicleLink
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG
 
 DECISION_US = 100_000
-DECISION_EARLY_US = 10_000  # an image may come this much earlier than the decision period asks
+DECISION_EARLY_US = 50_000  # an image may come this much earlier than the decision period asks
 DECISION_LATE_US = 50_000  # and is waited for this much longer
 IMAGE_OLD_US = 500_000  # guess: five images missed, 3 m at full speed
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen

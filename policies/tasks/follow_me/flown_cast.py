@@ -83,7 +83,7 @@ def _struct(kind: Any, rows: Any) -> Any:
     row, value = rows.numpy()[0], kind()
     for name in kind.vars:
         field = row[name]
-        setattr(value, name, type(getattr(value, name))(field if field.ndim == 0 else field.tolist()))
+        setattr(value, name, field.item() if field.ndim == 0 else wp.vec3(*field.tolist()))
     return value
 
 
