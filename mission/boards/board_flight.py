@@ -108,7 +108,7 @@ class BoardFlight(FlightBase):
         from mission.follow.onboard_camera import OnboardCamera  # what a policy sees is defined beside the policies
         from mission.follow.owner_device import FollowedOwner
 
-        self.owner = FollowedOwner(owner, self.world, self.config.seed, self.config.home)
+        self.owner = FollowedOwner(owner, self.world, self.rig.arrays.truth, self.config.seed, self.config.home)
         self.onboard = OnboardCamera(self.rig, self.world, self.owner.cast, self.config.noise, self.config.seed)
         return self.owner.vehicle_end
 

@@ -36,11 +36,12 @@ class FollowedOwner:
     Args:
         config: who.
         world: where they walk.
+        truths: the vehicles, array of `Truth`; other people give way to the first.
         seed: of their path and of the phone's errors.
         home: origin of ned.
     """
 
-    def __init__(self, config: OwnerConfig, world: WorldMap, seed: int, home: GeoPoint) -> None:
+    def __init__(self, config: OwnerConfig, world: WorldMap, truths: Any, seed: int, home: GeoPoint) -> None:
         still = person_model(0.0)
         still.speed_min = 0.0
         still.plan_min_s, still.plan_max_s = _SETS_OFF_S  # who then follows need not wait for a long plan to end
@@ -55,7 +56,7 @@ class FollowedOwner:
             model=still,
             phone=phone,
         )
-        self.cast = FlownCast(world, self._owner.people, self._walking, numbers, seed)
+        self.cast = FlownCast(world, truths, self._owner.people, self._walking, numbers, seed)
         self._person: NDArray[Any] = self._owner.people.numpy()  # live, as the next
         self._phone: NDArray[Any] = self._owner.phones.numpy()
         horizontal = numbers.get("phone_error", 1.0) ** 2 * (CORRELATED_STD_M**2 + POSITION_STD_M**2)

@@ -12,8 +12,9 @@ from policies.tasks.follow_me.follow_me_params import FollowParams
 from sim.rng_streams import BYSTANDER
 from sim.sensors.phone import PhoneModel
 from sim.world.clothes import Clothes, any_clothes, hue_colour
-from sim.world.people import PERSON_DT_S, Person, PersonModel, person_start, person_step
-from sim.world.world import World
+from sim.world.footways import clear_of_trunks
+from sim.world.people import PERSON_DT_S, Person, PersonModel, person_start, person_step, within_map
+from sim.world.world import World, ground_height
 
 wp.set_module_options({"enable_backward": False})
 
@@ -30,6 +31,8 @@ _FOR_GOOD_S = wp.constant(1000.0)
 _SEED_STEP = wp.constant(7919)  # between the walks of one row's people
 _NEAR_M, _FAR_M = wp.constant(2.0), wp.constant(7.0)  # from the owner, where bystanders start; guess
 _PASS_M = wp.constant(1.5)  # how far beside the owner they aim; guess
+_GIVES_WAY_M = wp.constant(1.3)  # to a vehicle; guess
+_DODGE_M_S = wp.constant(2.5)  # how fast they step aside; guess
 _WALKS_M_S = wp.constant(2.0)  # bystanders do not run
 _CROUCHED = wp.constant(0.55)  # of the stature; guess
 _STANDS_M_S = wp.constant(0.1)
@@ -116,9 +119,17 @@ def bystander_start(
 
 @wp.func
 def bystander_step(
-    w: World, model: PersonModel, person: Person, owner: Person, seed: int, i: int, k: int, tick: int
+    w: World,
+    model: PersonModel,
+    person: Person,
+    owner: Person,
+    vehicle_ned: wp.vec3,
+    seed: int,
+    i: int,
+    k: int,
+    tick: int,
 ) -> Person:
-    """Person k after a step: with each new plan they set out to pass the owner closely."""
+    """Person k after a step: with each new plan they set out to pass the owner closely; they give way to the vehicle."""
     if person.stature_m <= 0.0:
         return person
     model.speed_max = wp.min(model.speed_max, _WALKS_M_S)
@@ -131,7 +142,22 @@ def bystander_step(
         far_m = wp.max(wp.length(wp.vec2(way[0], way[1])), 0.1)
         out.course_rad = wp.atan2(way[1], way[0]) + wp.atan2(aside, far_m)
         out.bend_rad_s = 0.0
-    return out
+    return given_way(w, out, vehicle_ned)
+
+
+@wp.func
+def given_way(w: World, person: Person, vehicle_ned: wp.vec3) -> Person:
+    """The person, out of the way of a vehicle that is closer than they like: who sees one coming does not wait for it."""
+    away = wp.vec2(person.pos_ned[0] - vehicle_ned[0], person.pos_ned[1] - vehicle_ned[1])
+    far_m = wp.max(wp.length(away), 0.01)
+    low = person.pos_ned[2] - vehicle_ned[2] < person.stature_m + _GIVES_WAY_M
+    if far_m < _GIVES_WAY_M and low:
+        step_m = wp.min(_GIVES_WAY_M - far_m, _DODGE_M_S * _STEP_S)
+        north = person.pos_ned[0] + step_m * away[0] / far_m
+        east = person.pos_ned[1] + step_m * away[1] / far_m
+        position = clear_of_trunks(w.forest, within_map(w, north, east))
+        person.pos_ned = wp.vec3(position[0], position[1], -ground_height(w, position[0], position[1]))
+    return person
 
 
 @wp.func

@@ -21,6 +21,7 @@ from policies.tasks.follow_me.cast import (
 )
 from policies.tasks.follow_me.follow_me_params import FOLLOW_PARAMS, FollowParams
 from sim.sensors.phone import PhoneModel, phone_model
+from sim.truth import Truth
 from sim.world.clothes import Clothes, usual_clothes
 from sim.world.people import PERSON_TICKS, Person, PersonModel, person_model
 from sim.world.world import World, WorldMap
@@ -52,12 +53,22 @@ def _begin(world: World, model: PersonModel, usual: Clothes, seed: int, rows: Ca
 
 
 @wp.kernel(enable_backward=False)
-def _step(world: World, model: PersonModel, seed: int, tick: int, since_s: float, rows: CastRows) -> None:
+def _step(
+    world: World,
+    model: PersonModel,
+    truths: wp.array(dtype=Truth),
+    seed: int,
+    tick: int,
+    since_s: float,
+    rows: CastRows,
+) -> None:
     owner = rows.people[0]
+    vehicle_ned = truths[0].pos_ned
+    then = tick - PERSON_TICKS
     for k in range(BYSTANDERS_MAX):
         if since_s >= 0.0:
-            other = bystander_step(world, model, rows.bystanders[0, k], owner, seed, 0, k + 1, tick - PERSON_TICKS)
-            rows.bystanders[0, k] = other
+            person = rows.bystanders[0, k]
+            rows.bystanders[0, k] = bystander_step(world, model, person, owner, vehicle_ned, seed, 0, k + 1, then)
         rows.drawn[0, k + 1] = rows.bystanders[0, k]
     rows.drawn[0, 0] = drawn_owner(owner, rows.params[0], seed, 0, wp.max(since_s, 0.0))
 
@@ -92,13 +103,17 @@ class FlownCast:
 
     Args:
         world: where they walk.
+        truths: the vehicles: array of `Truth`; people give way to the first.
         people: the owner: array of one `Person`, which somebody else steps.
         model: how all of them walk.
         numbers: of FollowMe, by name; the others are at their defaults.
         seed: of the walks and clothes.
     """
 
-    def __init__(self, world: WorldMap, people: Any, model: Any, numbers: Mapping[str, float], seed: int) -> None:
+    def __init__(
+        self, world: WorldMap, truths: Any, people: Any, model: Any, numbers: Mapping[str, float], seed: int
+    ) -> None:
+        self._truths = truths
         self._world, self._model, self._seed = world, model, seed
         self.rows: Any = CastRows()
         self.rows.params = params_row(numbers)
@@ -110,7 +125,8 @@ class FlownCast:
 
     def step(self, tick: int, since_s: float) -> None:
         """Moves on to a tick, PERSON_TICKS after the last; `since_s` after the owner has set off, below 0: not yet."""
-        wp.launch(_step, 1, [self._world.kernel, self._model, self._seed, tick, since_s, self.rows])
+        seed, rows = self._seed, self.rows
+        wp.launch(_step, 1, [self._world.kernel, self._model, self._truths, seed, tick, since_s, rows])
 
 
 def params_row(numbers: Mapping[str, float]) -> Any:

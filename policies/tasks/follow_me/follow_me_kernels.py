@@ -140,7 +140,7 @@ def walk(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState)
     for tick in range(end - rules.decision_ticks, end, _STEP_TICKS):
         place_ned = truth.pos_ned - float(end - tick - _STEP_TICKS) / _TICKS_PER_S * truth.vel_ned
         for k in range(BYSTANDERS_MAX):
-            other = bystander_step(world, model, state.bystanders[i, k], person, seed, i, k + 1, tick)
+            other = bystander_step(world, model, state.bystanders[i, k], person, place_ned, seed, i, k + 1, tick)
             state.bystanders[i, k] = other
             if other.stature_m > 0.0:
                 reach_m = wp.min(reach_m, reach_from(place_ned, other))

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from common.geodesy import DEFAULT_HOME
 from common.kernels import FRAME_US
 from mission.flight_config import OwnerConfig
 from mission.follow.owner_device import FollowedOwner
 from policies.tasks.follow_me.follow_me_params import PARAMS
+from sim.truth import Truth
 from sim.world.world import WorldConfig, build_world
 
 WAITED_S = 20.0
@@ -20,7 +22,7 @@ def plain():
 
 
 def owner_of(world, seed):
-    return FollowedOwner(OwnerConfig(), world, seed, DEFAULT_HOME)
+    return FollowedOwner(OwnerConfig(), world, wp.zeros(1, dtype=Truth), seed, DEFAULT_HOME)
 
 
 @pytest.mark.parametrize("seed", range(8))

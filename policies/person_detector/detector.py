@@ -1,0 +1,126 @@
+"""The person detector: a picture in, people out, each with a probability, a direction and a range.
+
+It is trained on pictures alone, by no policy and with no reward, and knows nothing of what a policy believes. A cell of
+its map of 16 x 16 is a person if the middle of somebody's chest is in it.
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from common.attitude import Vector, rotated
+from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount
+from sim.camera_rig import MOUNT_FRD
+
+CELLS = 16  # of the map, in rows and columns
+STRIDE = 4  # pixels of a cell
+RANGE_M = (0.4, 16.0)  # that it tells apart
+WEIGHTS = Path(__file__).parent / "weights.pt"
+_HALF_WIDTH = np.tan(np.radians(0.5 * HFOV_DEG))
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """Somebody in a picture."""
+
+    probability: float
+    """That somebody is there: calibrated on worlds that it was not trained in."""
+    chest_hfrd: Vector
+    """[m] The middle of their chest from the vehicle: ahead, right, down; level."""
+    pixel: tuple[float, float]
+    """Column and row of it."""
+
+
+class DetectorNetwork(nn.Module):
+    """Of bytes (pictures, height, width, 4): logits and log ranges, (pictures, CELLS, CELLS) each."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(
+            nn.Conv2d(4, 16, 5, stride=2, padding=2),
+            nn.SiLU(),
+            nn.Conv2d(16, 32, 3, stride=2, padding=1),
+            nn.SiLU(),
+            nn.Conv2d(32, 32, 3, padding=1),
+            nn.SiLU(),
+            nn.Conv2d(32, 32, 3, padding=2, dilation=2),
+            nn.SiLU(),
+            nn.Conv2d(32, 32, 3, padding=4, dilation=4),
+            nn.SiLU(),
+            nn.Conv2d(32, 32, 3, padding=1),
+            nn.SiLU(),
+            nn.Conv2d(32, 2, 1),
+        )
+        self.register_buffer("temperature", torch.ones(()))
+
+    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        levels = pictures.permute(0, 3, 1, 2).float() * (1.0 / 255.0)
+        out = self.layers(levels)
+        return out[:, 0] / cast(Tensor, self.temperature), out[:, 1]
+
+
+class PersonDetector:
+    """The detector as it flies: one picture at a time.
+
+    Args:
+        network: trained; None: the one that ships.
+        least: probability below which nobody is reported.
+    """
+
+    def __init__(self, network: DetectorNetwork | None = None, least: float = 0.2) -> None:
+        self._network = (network or shipped()).eval()
+        self._least = least
+
+    def find(self, pixels: NDArray[np.uint8], down_frd: tuple[float, float]) -> list[Detection]:
+        """Who is in a picture, the most probable first.
+
+        Args:
+            pixels: of the policy's camera, (height, width, 4).
+            down_frd: the first two elements of the unit vector down in the body frame: how the vehicle leans.
+        """
+        with torch.inference_mode():
+            logits, log_ranges = self._network(torch.from_numpy(pixels)[None])
+        scores = torch.sigmoid(logits[0]).numpy()
+        ranges = log_ranges[0].exp().numpy()
+        found = []
+        for row, column in peaks(scores, self._least):
+            at = (STRIDE * (column + 0.5), STRIDE * (row + 0.5))
+            chest = _chest_hfrd(at, float(np.clip(ranges[row, column], *RANGE_M)), pixels.shape[1], down_frd)
+            found.append(Detection(float(scores[row, column]), chest, at))
+        return sorted(found, key=lambda detection: -detection.probability)
+
+
+def peaks(scores: NDArray[np.float32], least: float) -> list[tuple[int, int]]:
+    """Row and column of cells that are at least so probable, and than which none beside them is more."""
+    padded = np.pad(scores, 1)
+    size = scores.shape[0]
+    beside = np.stack([padded[r : r + size, c : c + size] for r in range(3) for c in range(3)]).max(0)
+    rows, columns = np.nonzero((scores >= least) & (scores >= beside))
+    return list(zip(rows.tolist(), columns.tolist(), strict=True))
+
+
+def _chest_hfrd(at: tuple[float, float], range_m: float, width: int, down_frd: tuple[float, float]) -> Vector:
+    """The place that a pixel and a range show, from the vehicle's middle, level."""
+    per_pixel = 2.0 * float(_HALF_WIDTH) / width
+    ray = np.array([(at[0] - 0.5 * width) * per_pixel, (at[1] - 0.5 * width) * per_pixel, 1.0])
+    ray *= range_m / np.linalg.norm(ray)
+    position = np.array(rotated(camera_mount(), (float(ray[0]), float(ray[1]), float(ray[2])))) + np.array(MOUNT_FRD)
+    down_x, down_y = down_frd
+    down = np.array([down_x, down_y, sqrt(max(1.0 - down_x**2 - down_y**2, 0.0))])
+    ahead = np.array([1.0, 0.0, 0.0]) - down_x * down
+    ahead /= np.linalg.norm(ahead)
+    return float(position @ ahead), float(position @ np.cross(down, ahead)), float(position @ down)
+
+
+def shipped() -> DetectorNetwork:
+    """The network that ships."""
+    network = DetectorNetwork()
+    weights = torch.load(WEIGHTS, weights_only=True)
+    network.load_state_dict({name: value.float() for name, value in weights.items()})
+    return network

@@ -1,0 +1,228 @@
+"""Pictures to train and judge the person detector by: people, or nobody, before the cameras of low-flying vehicles.
+
+In: a seed. Out: pictures as a companion gets them, and for each cell of the detector's map whether a person's chest is
+in it, how far away, and whether it counts. Worlds are those of following: even seeds train, odd seeds judge.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from policies.person_detector.detector import CELLS, RANGE_M, STRIDE
+from policies.tasks.follow_me.cast import PEOPLE_MAX
+from policies.tasks.follow_me.observe import HFOV_DEG, IMAGE_SIZE, camera_mount, pack_images
+from policies.tasks.follow_me.owner_visibility import GAIN_MAX
+from policies.tasks.follow_me.world import FOLLOW_WORLD
+from sim.sensors.fast_camera.fast_camera import QuickCamera
+from sim.sensors.ray import PERSON
+from sim.world.batch import WorldBatch
+from sim.world.clothes import Clothes, any_clothes, usual_clothes
+from sim.world.people import CHEST_M, Person
+from sim.world.world import World, ground_height
+
+wp.set_module_options({"enable_backward": False})
+
+WORLDS = 64
+_ROUNDS = 16  # of pictures in the same worlds
+_NOBODY = 0.3  # share of pictures
+_EMPTY, _SOMEBODY, _UNSURE = 0, 1, 2
+_SPREAD_M = 90.0  # from the middle of the world, where pictures are taken
+_POINTS_LEAST = 2  # of chest, head and knees that must be seen
+_BODY_M = 0.35  # beside somebody's middle, where they hide others
+
+
+@dataclass(frozen=True, slots=True)
+class Scenes:
+    """So many pictures."""
+
+    pictures: NDArray[np.uint8]  # (pictures, height, width, 4)
+    cells: NDArray[np.int8]  # (pictures, CELLS, CELLS): 0 nobody, 1 somebody, 2 does not count
+    ranges_m: NDArray[np.float32]  # likewise, of whom is there
+
+    @property
+    def has_person(self) -> NDArray[np.bool_]:
+        """Of each picture, whether somebody is clearly in it."""
+        return np.asarray((self.cells == _SOMEBODY).any(axis=(1, 2)))
+
+    @property
+    def is_empty(self) -> NDArray[np.bool_]:
+        """Of each picture, whether nothing of anybody is in it."""
+        return np.asarray((self.cells == _EMPTY).all(axis=(1, 2)))
+
+
+@wp.kernel(enable_backward=False)
+def _dress(seed: int, is_usual: wp.array2d(dtype=int), usual: Clothes, clothes: wp.array2d(dtype=Clothes)) -> None:
+    i, k = wp.tid()
+    clothes[i, k] = any_clothes(seed, i, k)
+    if is_usual[i, k] == 1:
+        clothes[i, k] = usual
+
+
+@wp.kernel(enable_backward=False)
+def _heights(worlds: wp.array[World], points: wp.array2d(dtype=wp.vec2), out: wp.array2d(dtype=float)) -> None:
+    i, k = wp.tid()
+    out[i, k] = ground_height(worlds[i], points[i, k][0], points[i, k][1])
+
+
+def scenes(count: int, seed: int, *, is_test: bool = False) -> Scenes:
+    """At least so many pictures; of worlds that no other split has."""
+    rng = np.random.default_rng([seed, int(is_test)])
+    worlds = WorldBatch(FOLLOW_WORLD, WORLDS, trees_per_ha_max=300.0)
+    people = wp.zeros((WORLDS, PEOPLE_MAX), dtype=Person)
+    clothes = wp.zeros((WORLDS, PEOPLE_MAX), dtype=Clothes)
+    size: dict[str, Any] = {"width": IMAGE_SIZE, "height": IMAGE_SIZE, "hfov_deg": HFOV_DEG, "has_optics": True}
+    camera = QuickCamera(worlds, WORLDS, **size, people=people, clothes=clothes)
+    everyone, packed = wp.full(WORLDS, value=True, dtype=wp.bool), wp.zeros((WORLDS, 64, 64, 4), dtype=wp.uint8)
+    parts = []
+    for turn in range(-(-count // WORLDS)):
+        if turn % _ROUNDS == 0:
+            _grow(worlds, rng, is_test=is_test)
+            camera.refresh()
+        _place(worlds, camera, people, clothes, rng)
+        camera.render()
+        wp.launch(pack_images, (WORLDS, IMAGE_SIZE), [camera.rgb, camera.depth_m, everyone, packed])
+        parts.append((packed.numpy().copy(), *_labels(camera, people.numpy())))
+    pictures, cells, ranges_m = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Scenes(pictures, cells, ranges_m)
+
+
+def _grow(worlds: WorldBatch, rng: np.random.Generator, *, is_test: bool) -> None:
+    params: Any = worlds.params.numpy()
+    params["hill_height_m"] = rng.uniform(2.0, 12.0, WORLDS)
+    params["trees_per_ha"] = rng.uniform(30.0, 250.0, WORLDS)
+    seeds = 2 * rng.integers(2**29, size=WORLDS) + int(is_test)
+    worlds.grow(wp.full(WORLDS, value=True, dtype=wp.bool), wp.array(seeds, dtype=int))
+
+
+def _place(worlds: WorldBatch, camera: QuickCamera, people: Any, clothes: Any, rng: np.random.Generator) -> None:
+    """Puts vehicles into their worlds, people before them, and the light and the lens on."""
+    n, k = WORLDS, PEOPLE_MAX
+    where = rng.uniform(-_SPREAD_M, _SPREAD_M, (n, 2))
+    yaw = rng.uniform(-np.pi, np.pi, n)
+    far_m = 0.7 + 13.0 * rng.random((n, k)) ** 2
+    aside = yaw[:, None] + rng.uniform(-0.8, 0.8, (n, k))
+    feet = where[:, None] + far_m[..., None] * np.stack([np.cos(aside), np.sin(aside)], -1)
+    points = np.concatenate([where[:, None], feet], axis=1).astype(np.float32)
+    heights = wp.zeros((n, k + 1), dtype=float)
+    wp.launch(_heights, (n, k + 1), [worlds.kernels, wp.array(points, dtype=wp.vec2), heights])
+    ground = heights.numpy()
+    row: Any = people.numpy()
+    row["pos_ned"] = np.concatenate([feet, -ground[:, 1:, None]], -1)
+    row["stature_m"] = rng.uniform(1.0, 1.95, (n, k)) * np.where(rng.random((n, k)) < 0.1, 0.6, 1.0)
+    row["stature_m"][np.arange(k)[None] >= rng.integers(1, k + 1, n)[:, None]] = 0.0
+    row["stature_m"][rng.random(n) < _NOBODY] = 0.0
+    row["heading_rad"] = rng.uniform(-np.pi, np.pi, (n, k))
+    row["gait_phase"] = rng.uniform(0.0, 2.0 * np.pi, (n, k))
+    row["vel_ned"] = 0.0
+    row["vel_ned"][..., 0] = rng.uniform(0.0, 5.0, (n, k)) * (rng.random((n, k)) < 0.8)
+    is_usual = wp.array((rng.random((n, k)) < 0.15).astype(np.int32), dtype=int)
+    wp.launch(_dress, (n, k), [int(rng.integers(2**31)), is_usual, usual_clothes(), clothes])
+    _aim(camera, rng, where, -ground[:, 0] - rng.uniform(0.6, 4.0, n), yaw)
+
+
+def _aim(
+    camera: QuickCamera, rng: np.random.Generator, where: Any, down: NDArray[np.float64], yaw: NDArray[np.float64]
+) -> None:
+    n = WORLDS
+    lens: Any = camera.lenses.numpy()
+    lens["pos_ned"] = np.concatenate([where, down[:, None]], -1)
+    lean = [rng.normal(0.0, 0.15, n), rng.normal(-0.05, 0.2, n)]  # roll and pitch [rad]
+    lens["q_ned_from_rdf"] = _times(_euler(*lean, yaw), np.array(camera_mount()))
+    lens["half_width"] = rng.uniform(0.97, 1.03, n) * np.tan(np.radians(0.5 * HFOV_DEG))
+    light = np.where(rng.random(n) < 0.3, rng.uniform(0.01, 0.06, n), 1.0)
+    gain = np.minimum(1.0 / light, float(GAIN_MAX))
+    lens["exposure"] = rng.uniform(0.5, 1.8, n) * light * gain
+    optics: Any = camera.optics.numpy()
+    noise = rng.uniform(0.3, 2.0, n)
+    optics["read_std"], optics["shot_std"] = 2.5 * noise * gain, 4.5 * noise * np.sqrt(gain)
+    optics["depth_std_fraction"] = 0.02 * noise
+    optics["has_depth_limit"] = 1
+    optics["depth_max_m"] = rng.choice([0.0, 4.0, 8.0, 1000.0], n, p=[0.2, 0.1, 0.2, 0.5])
+    optics["depth_holes"] = rng.uniform(0.0, 0.4, n) * (rng.random(n) < 0.5)
+    optics["shutter_s"] = rng.uniform(0.0, 0.033, n)
+    optics["vel_rdf"] = rng.normal(0.0, 2.0, (n, 3))
+    optics["rate_rdf"] = rng.normal(0.0, 0.6, (n, 3))
+    optics["seed"], optics["tick"] = rng.integers(2**30, size=n), rng.integers(2**30, size=n)
+
+
+def _labels(camera: QuickCamera, people: Any) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
+    """Of each picture: whose chest is seen in which cell, and where some of a person is seen that counts for nothing."""
+    kind = camera.kind.numpy()
+    lens: Any = camera.lenses.numpy()
+    n = len(kind)
+    cells = np.zeros((n, CELLS, CELLS), np.int8)
+    by_cell = (kind == PERSON).reshape(n, CELLS, STRIDE, CELLS, STRIDE).any(axis=(2, 4))
+    cells[by_cell] = _UNSURE
+    ranges_m = np.zeros((n, CELLS, CELLS), np.float32)
+    for i in range(n):
+        nearer: list[Any] = []
+        there = [person for person in people[i] if person["stature_m"] > 0.0]
+        for person in sorted(there, key=lambda p, eye=lens[i]["pos_ned"]: float(np.linalg.norm(p["pos_ned"] - eye))):
+            _label(cells[i], ranges_m[i], kind[i], lens[i], person, nearer)
+    return cells, ranges_m
+
+
+def _label(
+    cells: NDArray[np.int8], ranges_m: NDArray[np.float32], kind: Any, lens: Any, person: Any, nearer: list[Any]
+) -> None:
+    """Of one person; whoever stands behind a nearer one counts for nothing."""
+    stature_m = float(person["stature_m"])
+    chest_m = float(CHEST_M) / 1.75 * stature_m
+    points = []
+    for up in (chest_m, 0.93 * stature_m, 0.3 * stature_m):
+        offset = person["pos_ned"] - np.array([0.0, 0.0, up]) - lens["pos_ned"]
+        ray = _back(lens["q_ned_from_rdf"], offset)
+        points.append(_seen(ray, kind, float(lens["half_width"])))
+        if up == chest_m:
+            is_behind = any(abs(ray[0] / max(ray[2], 0.1) - x) < _BODY_M / z for x, z in nearer)
+            nearer.append((ray[0] / max(ray[2], 0.1), max(ray[2], 0.1)))
+    chest = points[0]
+    if is_behind or chest is None or not chest[2] or sum(p is not None and p[2] for p in points) < _POINTS_LEAST:
+        return
+    row, column, _, range_m = chest
+    if RANGE_M[0] < range_m < 12.0:
+        cell = row // STRIDE, column // STRIDE
+        cells[cell] = _SOMEBODY
+        ranges_m[cell] = range_m
+
+
+def _seen(ray: Any, kind: Any, half_width: float) -> tuple[int, int, bool, float] | None:
+    """Row, column, whether a person is seen there, and range [m]; None: it is not in the picture."""
+    if ray[2] < 0.3:
+        return None
+    size = kind.shape[0]
+    column, row = (int(np.floor(0.5 * size * (1.0 + ray[axis] / (ray[2] * half_width)))) for axis in (0, 1))
+    if not (0 <= row < size and 0 <= column < size):
+        return None
+    near = np.s_[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+    is_there = bool((kind[near] == PERSON).any())
+    return row, column, is_there, float(np.linalg.norm(ray))
+
+
+def _euler(roll: Any, pitch: Any, yaw: Any) -> NDArray[np.float64]:
+    """Quaternions (x, y, z, w) of rotations about down, right, ahead."""
+    half = [0.5 * np.asarray(angle) for angle in (roll, pitch, yaw)]
+    (sr, sp, sy), (cr, cp, cy) = ([f(h) for h in half] for f in (np.sin, np.cos))
+    columns = [
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    ]
+    return np.stack(columns, -1)
+
+
+def _times(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Products of quaternions, rows of p with q."""
+    vector = p[:, 3:] * q[:3] + q[3] * p[:, :3] + np.cross(p[:, :3], q[:3])
+    return np.concatenate([vector, (p[:, 3] * q[3] - p[:, :3] @ q[:3])[:, None]], -1)
+
+
+def _back(q: Any, v: Any) -> Any:
+    """A vector rotated by the inverse of a quaternion (x, y, z, w)."""
+    u = -np.asarray(q[:3], float)
+    t = 2.0 * np.cross(u, v)
+    return v + q[3] * t + np.cross(u, t)
