@@ -132,11 +132,11 @@ def _aim(
     lean = [rng.normal(0.0, 0.15, n), rng.normal(-0.05, 0.2, n)]  # roll and pitch [rad]
     lens["q_ned_from_rdf"] = _times(_euler(*lean, yaw), np.array(camera_mount()))
     lens["half_width"] = rng.uniform(0.97, 1.03, n) * np.tan(np.radians(0.5 * HFOV_DEG))
-    light = np.where(rng.random(n) < 0.3, rng.uniform(0.01, 0.06, n), 1.0)
+    light = np.where(rng.random(n) < 0.3, rng.uniform(0.06, 0.3, n), 1.0)
     gain = np.minimum(1.0 / light, float(GAIN_MAX))
     lens["exposure"] = rng.uniform(0.5, 1.8, n) * light * gain
     optics: Any = camera.optics.numpy()
-    noise = rng.uniform(0.3, 2.0, n)
+    noise = rng.uniform(0.3, 1.5, n)
     optics["read_std"], optics["shot_std"] = 2.5 * noise * gain, 4.5 * noise * np.sqrt(gain)
     optics["depth_std_fraction"] = 0.02 * noise
     optics["has_depth_limit"] = 1

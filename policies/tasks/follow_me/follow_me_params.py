@@ -109,7 +109,7 @@ FOLLOW_PARAMS = (
     TaskParam("phone_dropout_scale", 1.0, 0.0, 1e4, "1", "factor on these times; 1e4: for good", "guess"),
     TaskParam("camera_noise", 1.0, 0.0, 4.0, "1", "factor on the noise of the picture", "guess"),
     TaskParam("exposure", 1.0, 0.25, 4.0, "1", "factor on the light of the picture", "guess"),
-    TaskParam("light", 1.0, 0.005, 1.0, "1", "of day; what is missing is amplified, and noise with it", "guess"),
+    TaskParam("light", 1.0, 0.005, 1.0, "1", "of what the longest exposure needs; what is missing is amplified, and noise with it", "guess"),
     TaskParam("shutter_s", 0.0, 0.0, 0.05, "s", "in which what moves is smeared", "guess: up to 1/30 s at dusk"),
     TaskParam("depth_max_m", 1000.0, 0.0, 1000.0, "m", "beyond it no depth is measured; 0: nowhere", "D435: 10 m"),
     TaskParam("depth_holes", 0.0, 0.0, 1.0, "1", "fraction of the picture without depth, in patches", "guess"),
@@ -193,7 +193,7 @@ IMPROVED: dict[str, float | Sampler] = {
     "phone_dropouts_per_min": Sampler(intervals=((0.0, 2.0),)),
     "phone_dropout_scale": Sampler(intervals=((1.0, 2.0), (999.0, 1000.0))),  # the second half for good
     "exposure": Sampler(intervals=((0.6, 1.6),)),
-    "light": Sampler(intervals=((0.02, 0.06), (0.96, 1.0))),  # dusk, or day
+    "light": Sampler(intervals=((0.08, 0.25), (0.83, 1.0))),  # dusk, or day
     "shutter_s": Sampler(intervals=((0.0, 0.033),)),
     "depth_max_m": Sampler(intervals=((0.0, 1.5), (5.0, 12.0), (990.0, 1000.0))),  # none, a real camera's, all
     "depth_holes": Sampler(intervals=((0.0, 0.25),)),

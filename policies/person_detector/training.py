@@ -1,0 +1,130 @@
+"""`python -m policies.person_detector.training`: trains the person detector from nothing and judges it on other worlds.
+
+Pictures are rendered, labels come from the renderer; no policy, no flight, no reward. Focal loss (Lin et al. 2017) for
+who is in which cell, an absolute error of the logarithm for how far away, then one temperature (Guo et al. 2017) that
+makes probabilities true on validation worlds. The judgement is on worlds of a further seed.
+"""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+import typer
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+from torch import Tensor
+
+from policies.person_detector.detector import WEIGHTS, DetectorNetwork
+from policies.person_detector.scenes import Scenes, scenes
+from policies.tasks.intervals import rate
+
+BATCH = 128
+RATE = 2e-3
+SURE = 0.5  # probability from which somebody counts as seen
+_FOCUS = 2.0
+_RANGE_WEIGHT = 0.1
+_TEMPERATURES = np.linspace(0.4, 2.5, 43)
+
+
+def train(pictures: int, epochs: int, seed: int, console: Console) -> DetectorNetwork:
+    """A network trained on so many pictures, calibrated on others."""
+    torch.manual_seed(seed)
+    console.print(f"rendering {pictures} pictures")
+    there = scenes(pictures, seed)
+    network = DetectorNetwork()
+    optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=1e-4)
+    steps = epochs * (len(there.pictures) // BATCH)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, RATE, total_steps=steps)
+    order = np.random.default_rng(seed)
+    for _ in track(range(steps), "training", console=console):
+        rows = order.integers(len(there.pictures), size=BATCH)
+        loss = _loss(network, there, rows, is_mirrored=bool(order.random() < 0.5))
+        optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        optimizer.step()
+        schedule.step()
+    _calibrate(network.eval(), scenes(max(pictures // 10, 640), seed + 1000))
+    return network
+
+
+def _loss(network: DetectorNetwork, there: Scenes, rows: NDArray[np.int64], *, is_mirrored: bool) -> Tensor:
+    pictures, cells = torch.from_numpy(there.pictures[rows]), torch.from_numpy(there.cells[rows])
+    ranges_m = torch.from_numpy(there.ranges_m[rows])
+    if is_mirrored:
+        pictures, cells, ranges_m = pictures.flip(2), cells.flip(2), ranges_m.flip(2)
+    logits, log_ranges = network(pictures)
+    counts = cells != 2  # noqa: PLR2004  (what does not count)
+    target = (cells == 1).float()
+    plain = F.binary_cross_entropy_with_logits(logits, target, reduction="none")
+    weight = (1.0 - torch.exp(-plain)) ** _FOCUS
+    is_there = cells == 1
+    found = (weight * plain)[counts].sum() / max(int(is_there.sum()), 1)
+    off = (log_ranges[is_there] - ranges_m[is_there].log()).abs().mean() if is_there.any() else log_ranges.sum() * 0.0
+    return found + _RANGE_WEIGHT * off
+
+
+def _calibrate(network: DetectorNetwork, there: Scenes) -> None:
+    """Sets the temperature at which the probability of the best cell tells how often somebody is there."""
+    logits = _best_logits(network, there)
+    counts = there.has_person | there.is_empty
+    truth, best = there.has_person[counts].astype(float), logits[counts]
+
+    def surprise(temperature: float) -> float:
+        probability = np.clip(1.0 / (1.0 + np.exp(-best / temperature)), 1e-6, 1.0 - 1e-6)
+        return float(-(truth * np.log(probability) + (1.0 - truth) * np.log(1.0 - probability)).mean())
+
+    network.temperature.fill_(min(_TEMPERATURES, key=surprise))  # type: ignore[operator]
+
+
+def _best_logits(network: DetectorNetwork, there: Scenes) -> NDArray[np.float64]:
+    with torch.inference_mode():
+        parts = [network(torch.from_numpy(part))[0].amax(dim=(1, 2)) for part in np.array_split(there.pictures, 32)]
+    return torch.cat(parts).double().numpy()
+
+
+def judge(network: DetectorNetwork, there: Scenes) -> dict[str, Any]:
+    """How often it sees who is there, and somebody where nobody is; how true its probabilities are."""
+    probability = 1.0 / (1.0 + np.exp(-_best_logits(network, there)))
+    seen, ghosts = rate(probability[there.has_person] >= SURE), rate(probability[there.is_empty] >= SURE)
+    counts = there.has_person | there.is_empty
+    bins = np.digitize(probability[counts], np.linspace(0.1, 0.9, 9))
+    gaps = [
+        (bins == k).mean() * abs(there.has_person[counts][bins == k].mean() - probability[counts][bins == k].mean())
+        for k in range(10)
+        if (bins == k).any()
+    ]
+    return {"seen": seen, "ghosts": ghosts, "calibration error": float(sum(gaps)), "range": _range_error(network, there)}
+
+
+def _range_error(network: DetectorNetwork, there: Scenes) -> float:
+    """Median error of the range as a fraction of it, where somebody is."""
+    with torch.inference_mode():
+        parts = [network(torch.from_numpy(part))[1] for part in np.array_split(there.pictures, 32)]
+    is_there = there.cells == 1
+    ratio = torch.cat(parts).exp().numpy()[is_there] / there.ranges_m[is_there]
+    return float(np.median(np.abs(ratio - 1.0)))
+
+
+def main(
+    pictures: Annotated[int, typer.Option(min=640)] = 30_000,
+    epochs: Annotated[int, typer.Option(min=1)] = 12,
+    seed: int = 1,
+    out: Path = WEIGHTS,
+    judged: Annotated[bool, typer.Option("--judge", help="Train nothing: judge the one that ships.")] = False,
+) -> None:
+    from policies.person_detector.detector import shipped
+
+    console = Console(highlight=False)
+    network = shipped().eval() if judged else train(pictures, epochs, seed, console)
+    if not judged:
+        torch.save({name: value.half() for name, value in network.state_dict().items()}, out)
+    found = judge(network, scenes(6400, 7, is_test=True))
+    for name, value in found.items():
+        console.print(f"{name}: {value}")
+
+
+if __name__ == "__main__":
+    typer.run(main)
