@@ -14,7 +14,8 @@ from mission.flight_base import FlightBase
 from policies.companion.companion import Companion
 from policies.companion.image_client import MemoryCamera
 from policies.companion.skills.driving import Driving
-from policies.companion.skills.following import Following, Pilot
+from policies.companion.guard.settings import GuardSettings
+from policies.companion.skills.following import Following, Pilot, guard_of
 from policies.companion.skills.navigating import Navigating
 from policies.companion.skills.skill import Skill
 from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
@@ -30,6 +31,7 @@ def flight_with_companion(
     folder: Path | None = None,
     wall_s: Callable[[], float] | None = None,
     make_flight: Callable[..., FlightBase] = Flight,
+    guard: GuardSettings | None = None,
 ) -> tuple[Any, Companion]:
     """A flight, and the companion on board that follows, which engages as soon as the vehicle hovers or is armed.
 
@@ -41,6 +43,7 @@ def flight_with_companion(
         folder: of the logs.
         wall_s: a clock that the companion's latency is measured with.
         make_flight: takes the configuration, links and a folder.
+        guard: of a pilot that follows by sight; None: as it ships.
     """
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
     flight = make_flight(config, links=[vehicle_end, *links], folder=folder)
@@ -48,7 +51,11 @@ def flight_with_companion(
         raise ValueError("a companion needs a flight with an owner")
     camera = MemoryCamera()
     flight.onboard.add_sink(camera.publish)
-    skill: Skill = Navigating(pilot, camera=camera) if isinstance(pilot, NavigationPilot) else Following(camera, pilot)
+    skill: Skill
+    if isinstance(pilot, NavigationPilot):
+        skill = Navigating(pilot, camera=camera)
+    else:
+        skill = Following(camera, pilot, guard_of(pilot, guard or GuardSettings()))
     companion = Companion(companion_end, skill, is_reported=is_reported, wall_s=wall_s)
     flight.computers.append(companion)
     return flight, companion

@@ -7,7 +7,7 @@ images and reports.
 
 from math import asin, atan2, inf, isfinite, sqrt
 
-from common.attitude import Vector, product, quat_of, yaw_of
+from common.attitude import Quat, Vector, product, quat_of, yaw_of
 from policies.companion.observation import REPORT_LAG_S
 from policies.companion.vehicle_link import Own, Owner
 from policies.tracker import OwnerTrack, OwnerTracker, PhoneReport, Sighting
@@ -37,17 +37,30 @@ class OwnerWatch:
             owner: the phone's newest report.
             seen_hfrd: [m] where it showed the owner's chest, from the vehicle; None: nowhere.
         """
-        if not isfinite(own.pos_ned[0]):  # directions from nowhere
-            return
+        if isfinite(own.pos_ned[0]):  # no directions from nowhere
+            self.take(now_us, now_us, owner, None if seen_hfrd is None else sighting_of(seen_hfrd, own))
+
+    def take(self, picture_us: int, now_us: int, owner: Owner, sighting: Sighting | None) -> bool:
+        """Takes in a picture that is older than now, and the report that came since the last one.
+
+        Args:
+            picture_us: when it was taken, on the vehicle's clock.
+            now_us: on that clock.
+            owner: the phone's newest report.
+            sighting: the owner in it; None: nowhere.
+
+        Returns:
+            Whether the sighting is plausible.
+        """
         if self._track is not None and now_us < self._track.time_us:  # the vehicle has restarted: another frame, too
             self._tracker = OwnerTracker()
         if self._hears and owner.count != self._reports:
             self._reports = owner.count
             valid_us = now_us - round(REPORT_LAG_S * 1e6)
             self._tracker.hear(now_us, PhoneReport(valid_us, owner.pos_ned, owner.vel_ned))
-        if seen_hfrd is not None:
-            self._tracker.see(now_us, sighting_of(seen_hfrd, own))
+        is_plausible = sighting is not None and self._tracker.see(picture_us, sighting)
         self._track = self._tracker.at(now_us)
+        return is_plausible
 
     @property
     def track(self) -> OwnerTrack | None:
@@ -73,9 +86,14 @@ class OwnerWatch:
 
 
 def sighting_of(seen_hfrd: Vector, own: Own) -> Sighting:
-    """A position ahead, right and down of the vehicle [m] as the tracker takes it: seen by a level eye inside it."""
+    """A position ahead, right and down of the vehicle [m] as the tracker takes it."""
+    return sighting_from(seen_hfrd, own.pos_ned, own.q_ned_from_frd)
+
+
+def sighting_from(seen_hfrd: Vector, pos_ned: Vector, q_ned_from_frd: Quat) -> Sighting:
+    """The same from a pose of the vehicle: seen by a level eye inside it."""
     ahead, right, down = seen_hfrd
     range_m = sqrt(ahead**2 + right**2 + down**2)
     elevation_rad = asin(-down / max(range_m, 1.0e-6))
-    q_ned_from_rdf = product(quat_of(yaw_of(own.q_ned_from_frd), 0.0), _AHEAD)
-    return Sighting(atan2(right, ahead), elevation_rad, range_m, own.pos_ned, q_ned_from_rdf)
+    q_ned_from_rdf = product(quat_of(yaw_of(q_ned_from_frd), 0.0), _AHEAD)
+    return Sighting(atan2(right, ahead), elevation_rad, range_m, pos_ned, q_ned_from_rdf)

@@ -21,6 +21,7 @@ from sim.camera_rig import MOUNT_FRD
 CELLS = 16  # of the map, in rows and columns
 STRIDE = 4  # pixels of a cell
 RANGE_M = (0.4, 16.0)  # that it tells apart
+_NO_RETURN = 255.0
 WEIGHTS = Path(__file__).parent / "weights.pt"
 _HALF_WIDTH = np.tan(np.radians(0.5 * HFOV_DEG))
 
@@ -37,32 +38,38 @@ class Detection:
     """Column and row of it."""
 
 
+def _block(inputs: int, outputs: int, *, stride: int = 1, dilation: int = 1, size: int = 3) -> list[nn.Module]:
+    padding = dilation * (size // 2)
+    convolution = nn.Conv2d(inputs, outputs, size, stride=stride, padding=padding, dilation=dilation, bias=False)
+    return [convolution, nn.BatchNorm2d(outputs), nn.SiLU()]
+
+
 class DetectorNetwork(nn.Module):
-    """Of bytes (pictures, height, width, 4): logits and log ranges, (pictures, CELLS, CELLS) each."""
+    """Of bytes (pictures, height, width, 4): logits of a chest, log ranges and logits of any limb, each (pictures,
+    CELLS, CELLS)."""
 
     def __init__(self) -> None:
         super().__init__()
         self.layers = nn.Sequential(
-            nn.Conv2d(4, 16, 5, stride=2, padding=2),
-            nn.SiLU(),
-            nn.Conv2d(16, 32, 3, stride=2, padding=1),
-            nn.SiLU(),
-            nn.Conv2d(32, 32, 3, padding=1),
-            nn.SiLU(),
-            nn.Conv2d(32, 32, 3, padding=2, dilation=2),
-            nn.SiLU(),
-            nn.Conv2d(32, 32, 3, padding=4, dilation=4),
-            nn.SiLU(),
-            nn.Conv2d(32, 32, 3, padding=1),
-            nn.SiLU(),
-            nn.Conv2d(32, 2, 1),
+            *_block(5, 24, stride=2, size=5),
+            *_block(24, 32, stride=2),
+            *_block(32, 48),
+            *_block(48, 48, dilation=2),
+            *_block(48, 48, dilation=4),
+            *_block(48, 48),
+            nn.Conv2d(48, 3, 1),
         )
-        self.register_buffer("temperature", torch.ones(()))
+        self.register_buffer("calibration", torch.tensor([1.0, 0.0]))  # of logits: factor and offset
 
-    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        levels = pictures.permute(0, 3, 1, 2).float() * (1.0 / 255.0)
-        out = self.layers(levels)
-        return out[:, 0] / cast(Tensor, self.temperature), out[:, 1]
+    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        levels = pictures.permute(0, 3, 1, 2).float()
+        colours, depth = levels[:, :3], levels[:, 3:]
+        colours = colours - colours.mean(dim=(1, 2, 3), keepdim=True)
+        colours = colours / (colours.std(dim=(1, 2, 3), keepdim=True) + 1.0)
+        is_return = (depth < _NO_RETURN).float()
+        out = self.layers(torch.cat((colours, is_return * depth * (2.0 / 255.0), is_return), dim=1))
+        factor, offset = cast(Tensor, self.calibration)
+        return factor * out[:, 0] + offset, out[:, 1], out[:, 2]
 
 
 class PersonDetector:
@@ -85,7 +92,7 @@ class PersonDetector:
             down_frd: the first two elements of the unit vector down in the body frame: how the vehicle leans.
         """
         with torch.inference_mode():
-            logits, log_ranges = self._network(torch.from_numpy(pixels)[None])
+            logits, log_ranges, _ = self._network(torch.from_numpy(pixels)[None])
         scores = torch.sigmoid(logits[0]).numpy()
         ranges = log_ranges[0].exp().numpy()
         found = []

@@ -1,8 +1,8 @@
 """`python -m policies.person_detector.training`: trains the person detector from nothing and judges it on other worlds.
 
 Pictures are rendered, labels come from the renderer; no policy, no flight, no reward. Focal loss (Lin et al. 2017) for
-who is in which cell, an absolute error of the logarithm for how far away, then one temperature (Guo et al. 2017) that
-makes probabilities true on validation worlds. The judgement is on worlds of a further seed.
+who is in which cell, an absolute error of the logarithm for how far away, then a straight line through the logits (Platt
+1999) that makes probabilities true on validation worlds. The judgement is on worlds of a further seed.
 """
 
 from pathlib import Path
@@ -26,7 +26,6 @@ RATE = 2e-3
 SURE = 0.5  # probability from which somebody counts as seen
 _FOCUS = 2.0
 _RANGE_WEIGHT = 0.1
-_TEMPERATURES = np.linspace(0.4, 2.5, 43)
 
 
 def train(pictures: int, epochs: int, seed: int, console: Console) -> DetectorNetwork:
@@ -55,7 +54,7 @@ def _loss(network: DetectorNetwork, there: Scenes, rows: NDArray[np.int64], *, i
     ranges_m = torch.from_numpy(there.ranges_m[rows])
     if is_mirrored:
         pictures, cells, ranges_m = pictures.flip(2), cells.flip(2), ranges_m.flip(2)
-    logits, log_ranges = network(pictures)
+    logits, log_ranges, limb_logits = network(pictures)
     counts = cells != 2  # noqa: PLR2004  (what does not count)
     target = (cells == 1).float()
     plain = F.binary_cross_entropy_with_logits(logits, target, reduction="none")
@@ -63,20 +62,25 @@ def _loss(network: DetectorNetwork, there: Scenes, rows: NDArray[np.int64], *, i
     is_there = cells == 1
     found = (weight * plain)[counts].sum() / max(int(is_there.sum()), 1)
     off = (log_ranges[is_there] - ranges_m[is_there].log()).abs().mean() if is_there.any() else log_ranges.sum() * 0.0
-    return found + _RANGE_WEIGHT * off
+    limbs = F.binary_cross_entropy_with_logits(limb_logits, (cells > 0).float())
+    return found + _RANGE_WEIGHT * off + limbs
 
 
 def _calibrate(network: DetectorNetwork, there: Scenes) -> None:
-    """Sets the temperature at which the probability of the best cell tells how often somebody is there."""
-    logits = _best_logits(network, there)
+    """Sets the line at which the probability of the best cell tells how often somebody is there."""
     counts = there.has_person | there.is_empty
-    truth, best = there.has_person[counts].astype(float), logits[counts]
+    best, truth = torch.from_numpy(_best_logits(network, there)[counts]), torch.from_numpy(there.has_person[counts])
+    line = torch.tensor([1.0, 0.0], dtype=torch.float64, requires_grad=True)
+    optimizer = torch.optim.LBFGS([line], max_iter=100)
 
-    def surprise(temperature: float) -> float:
-        probability = np.clip(1.0 / (1.0 + np.exp(-best / temperature)), 1e-6, 1.0 - 1e-6)
-        return float(-(truth * np.log(probability) + (1.0 - truth) * np.log(1.0 - probability)).mean())
+    def surprise() -> Tensor:
+        optimizer.zero_grad()
+        loss = F.binary_cross_entropy_with_logits(line[0] * best + line[1], truth.double())
+        loss.backward()  # type: ignore[no-untyped-call]
+        return loss
 
-    network.temperature.fill_(min(_TEMPERATURES, key=surprise))  # type: ignore[operator]
+    optimizer.step(surprise)  # type: ignore[no-untyped-call]
+    network.calibration.copy_(line.detach().float())  # type: ignore[operator]
 
 
 def _best_logits(network: DetectorNetwork, there: Scenes) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """To follow somebody: images of the onboard camera and the reports of a phone in, the actions of a pilot out.
 
 A decision ten times a second: on each new image, and where none comes in time on the last once more, which is older
-then. Where the owner is lost, it does not fly.
+then. A guard that does not believe the pilot bounds what it asks for. Where the owner is lost for good, it does not fly.
 """
 
 from math import isclose
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector
 from common.image_stream import ImageFrame
+from policies.companion.guard.guard import Guard, Stance
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer
 from policies.companion.owner_watch import OwnerWatch
@@ -23,9 +25,11 @@ DECISION_US = 100_000
 DECISION_EARLY_US = 50_000  # an image may come this much earlier than the decision period asks
 DECISION_LATE_US = 50_000  # and is waited for this much longer
 IMAGE_OLD_US = 500_000  # guess: five images missed, 3 m at full speed
+GUARDED_OLD_US = 2_500_000  # the guard stands still before
 OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not seen
 NO_IMAGES = "no new pictures"
 LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
+STANDING = (Stance.STOP, Stance.SEARCH, Stance.BLIND)
 LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
 
 
@@ -45,24 +49,34 @@ class Pilot(Protocol):
         ...
 
 
+def guard_of(pilot: Pilot, settings: GuardSettings) -> Guard | None:
+    """The guard over a pilot; None if it is switched off."""
+    return Guard(settings, hears=pilot.kind != EGO_BLIND) if settings.is_on else None
+
+
 class Following:
     """One vehicle's skill to follow.
 
     Args:
         camera: the onboard camera.
         pilot: who decides.
+        guard: who bounds it; None: nobody does, and the pilot's word for the owner counts.
     """
 
     ready, flying, drives = "ready to follow", "following", False
     is_along_nose = False
     action_size = 4
 
-    def __init__(self, camera: ImageSource, pilot: Pilot) -> None:
+    def __init__(self, camera: ImageSource, pilot: Pilot, guard: Guard | None = None) -> None:
         self.seen: Floats = np.zeros(0, dtype=np.float32)
         self.camera = camera
         self._pilot = pilot
         self._observer = Observer(pilot.kind)
-        self._watch = OwnerWatch(hears=pilot.kind != EGO_BLIND)
+        self.guard = guard
+        self._watch = OwnerWatch(hears=pilot.kind != EGO_BLIND) if guard is None else guard.watch
+        self._vehicle: VehicleLink | None = None
+        self._stance = Stance.FREE  # as told
+        self._is_flying = False
         self._owner = Owner()
         self._image: ImageFrame | None = None  # the newest
         self._image_us = -1  # when it came in, on our clock; -1: never
@@ -72,7 +86,8 @@ class Following:
         self._is_tracked = False  # the tracker has been told of it
 
     def attach(self, vehicle: VehicleLink) -> None:
-        """Hears nothing that the link does not know of by itself."""
+        """Hears nothing that the link does not know of by itself; tells the pilot what the guard does."""
+        self._vehicle = vehicle
 
     def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self._owner = vehicle.owner
@@ -81,6 +96,8 @@ class Following:
             self._image, self._image_us, self._is_new = image, time_us, True
             self._has_looked = self._is_tracked = False
             vehicle.clock.pictured(image.time_us)
+        if self.guard is not None:
+            self.guard.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
         since_us = time_us - self._decided_us
         wait_us = DECISION_US + (-DECISION_EARLY_US if self._is_new else DECISION_LATE_US)
         return self._image is not None and since_us >= wait_us
@@ -90,7 +107,8 @@ class Following:
 
     def blindness(self, own: Own, time_us: int) -> str:
         image = self._image
-        if image is None or max(time_us - self._image_us, own.boot_us - image.time_us) > IMAGE_OLD_US:
+        old_us = GUARDED_OLD_US if self.guard is not None and self._is_flying else IMAGE_OLD_US
+        if image is None or max(time_us - self._image_us, own.boot_us - image.time_us) > old_us:
             return NO_IMAGES  # none came in, or what came in was old
         if image.pixels.shape != self._pilot.image_shape:
             return "pictures of another size"
@@ -99,18 +117,26 @@ class Following:
             return "pictures of another lens"
         return ""
 
+    def _is_fit(self, image: ImageFrame | None) -> bool:
+        """Whether there is a picture, of the size that the pilot needs."""
+        return image is not None and image.pixels.shape == self._pilot.image_shape
+
     def loss(self, own: Own) -> str:
+        if self.guard is not None and self._is_flying:
+            return "owner lost" if self.guard.silence_s(own) > self.guard.settings.lost_s else ""
         return "owner lost" if self._watch.silence_s(own.boot_us) > OWNER_LOST_S else ""
 
     def begin(self, own: Own) -> None:  # noqa: ARG002  (others need it)
         self._pilot.reset()
+        if self.guard is not None:
+            self.guard.reset()
 
-    def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:  # noqa: ARG002
+    def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
         """Lets the pilot see the newest image.
 
         Who does not fly looks too: the owner must have been seen before anybody flies by sight.
         """
-        image = self._image
+        image, self._is_flying = self._image, is_flying
         if image is None:
             return None
         self._decided_us, self._is_new = time_us, False
@@ -124,11 +150,21 @@ class Following:
         return action
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:
-        return self._observer.setpoint(action, own)
+        wanted = self._observer.setpoint(action, own)
+        if self.guard is None:
+            return wanted
+        allowed = self.guard.filtered(wanted, own)
+        if self.guard.stance is not self._stance:
+            if self._vehicle is not None:
+                self._vehicle.say(f"Companion: {self.guard.stance.value}")
+            if self._stance in STANDING and self.guard.stance is Stance.FREE:
+                self._pilot.reset()  # what it remembers is from before
+            self._stance = self.guard.stance
+        return allowed
 
     def conclude(self, own: Own) -> None:
-        """Tracks the owner: by the newest image, and by the phone."""
-        if self._image is not None and not self._is_tracked:
+        """Tracks the owner: by the newest image, and by the phone; with a guard that has been done."""
+        if self.guard is None and self._image is not None and not self._is_tracked:
             self._is_tracked = True
             seen_hfrd = self._pilot.owner_hfrd if self._has_looked else None
             self._watch.update(self._image.time_us, own, self._owner, seen_hfrd)

@@ -1,0 +1,54 @@
+"""The conditions of the benchmark of following: what differs from the standard flight, and what must come of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from mission.flight_settings import Pace
+
+_HIDES = {"owner_hides_per_min": 1.0}
+_SILENT = {"phone_dropouts_per_min": 20.0, "phone_dropout_scale": 1e4}
+_FOR_GOOD_S = 1e4
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """One row of the table."""
+
+    name: str
+    title: str
+    pace: Pace
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    """Of FollowMe, that differ from the standard."""
+    least_in_band: float | None = None
+    """[1] of the time; None: the owner cannot be followed all the time."""
+    least_m: float | None = None
+    """[m] never nearer to the owner's chest while they are hidden; None: not asked for."""
+
+
+CONDITIONS = (
+    Condition("walk", "standard, walking", "walk", {}, 0.98),
+    Condition("run", "standard, running", "run", {}, 0.95),
+    Condition("late-100", "pictures 100 ms late", "run", {"picture_lag_s": 0.1}, 0.95),
+    Condition("late-200", "pictures 200 ms late", "run", {"picture_lag_s": 0.2}, 0.92),
+    Condition("late-300", "pictures 300 ms late", "run", {"picture_lag_s": 0.3}, 0.85),
+    Condition("gone-3", "owner not to be seen for 3 s", "walk", {**_HIDES, "owner_hide_s": 3.0}, None, 1.5),
+    Condition("gone-8", "owner not to be seen for 8 s", "walk", {**_HIDES, "owner_hide_s": 8.0}, None, 1.5),
+    Condition("gone", "owner gone for good", "walk", {**_HIDES, "owner_hide_s": _FOR_GOOD_S}, None, 1.5),
+    Condition(
+        "gone-silent", "and the phone silent", "walk", {**_HIDES, "owner_hide_s": _FOR_GOOD_S, **_SILENT}, None, 1.5
+    ),
+    Condition("gone-run", "owner gone for good, running", "run", {**_HIDES, "owner_hide_s": _FOR_GOOD_S}, None, 1.5),
+    Condition("crossed", "three others cross the way", "walk", {"bystanders": 3.0}, 0.95),
+    Condition(
+        "twins", "three others in the owner's clothes", "walk", {"bystanders": 3.0, "bystander_likeness": 1.0}, 0.95
+    ),
+    Condition("no-depth", "no depth", "walk", {"depth_max_m": 0.0}, 0.9),
+    Condition("holes", "depth to 6 m, with holes", "walk", {"depth_max_m": 6.0, "depth_holes": 0.25}, 0.9),
+    Condition("phone", "the phone four times as wrong", "walk", {"phone_error": 4.0}, 0.9),
+    Condition("red", "red clothes", "walk", {"owner_hue": 0.0}, 0.9),
+    Condition("clothes", "any clothes, any size", "walk", {"owner_clothes_share": 1.0, "owner_size": 0.85}, 0.9),
+    Condition("dusk", "dusk", "walk", {"light": 0.12}, 0.9),
+    Condition("blur", "pictures blurred by 33 ms", "walk", {"shutter_s": 0.033}, 0.9),
+)
+"""In the order of the table."""
+BY_NAME = {condition.name: condition for condition in CONDITIONS}

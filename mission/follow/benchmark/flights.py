@@ -1,0 +1,128 @@
+"""One flight of the benchmark, over MAVLink in lockstep: the whole autopilot, a companion, the truth watched over.
+
+In: a policy, a condition, a seed. Out: an `Outcome`, plain numbers. Worlds, owners, wind and noise come from the seed;
+those of the benchmark are odd, as those of all tests: training has the even ones.
+"""
+
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+
+from mission.flight_config import FlightConfig, OwnerConfig
+from mission.follow.benchmark.conditions import Condition
+from mission.follow.follow_scoring import FollowWatch
+from mission.follow.lockstep import flight_with_companion
+from mission.script import set_out
+from policies.companion.engagement import Phase
+from policies.companion.guard.settings import GuardSettings
+from policies.companion.skills.following import Following, Pilot
+from policies.tasks.follow_me.track import Ranges
+from policies.tasks.follow_me.world import FOLLOW_WORLD
+
+SECONDS = 60.0
+FIRST_SEED = 3_000_003  # odd; no training and no tuning is given those from here on
+VALIDATION_SEED = 2_000_003  # choices are made on these
+TREES_PER_HA = (50.0, 100.0, 200.0)
+WINDS_M_S = (0.0, 2.0, 4.0, 6.0, 8.0)
+STANDS_M_S = 0.5
+HOLD_S = 5.0  # after the last sight, until it must stand
+BACK_S = 10.0  # after they are back, until it must follow
+_SUSTAINED_S = 1.0
+_TAKEOFF_S, _ENGAGE_S = 40.0, 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a flight."""
+
+    seed: int
+    in_band: float  # of the planned time
+    is_collided: bool
+    nearest_m: float  # to the owner's chest
+    nearest_hidden_m: float  # while they were hidden; NaN: they never were
+    has_stood: bool | None  # five seconds after the last sight; None: never out of sight for so long
+    has_resumed: bool | None  # ten seconds after the owner was back; None: never
+    interventions_per_min: float
+    accel_rms: float  # [m/s²] of the vehicle, level, samples 0.1 s apart
+    yaw_rate_rms: float  # [deg/s]
+    ended_s: float
+    trouble: str  # why the companion gave up
+
+
+def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, seconds: float = SECONDS) -> Outcome:
+    """One flight; one that never began to follow did not follow at all."""
+    pilot.reset()
+    k = seed // 2
+    world = FOLLOW_WORLD.model_copy(update={"trees_per_ha": TREES_PER_HA[k % 3], "seed": seed})
+    owner = OwnerConfig(pace=condition.pace, numbers=dict(condition.numbers))
+    config = FlightConfig(owner=owner, world=world, seed=seed, wind_m_s=WINDS_M_S[k % 5])
+    flight, companion = flight_with_companion(config, pilot, guard=guard)
+    rows: list[tuple[float, ...]] = []
+
+    def look() -> None:
+        watch.frame()
+        if watch.sample_count > len(rows):
+            truth = flight.rig.rows["truth"][0]
+            is_hidden = float(flight.owner.cast.rows.drawn.numpy()[0, 0]["stature_m"] <= 0.0)
+            rows.append((is_hidden, *truth["vel_ned"][:2].tolist(), float(truth["omega_frd"][2])))
+
+    try:
+        flight.fly(set_out, seconds=_TAKEOFF_S)
+        end_us = flight.time_us + round(_ENGAGE_S * 1e6)
+        flight.run(lambda _: companion.phase is Phase.FLYING or flight.time_us >= end_us)
+        watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, seconds)
+        watch.begin()
+        flight.run(lambda _: watch.is_over, on_frame=lambda _: look())
+    finally:
+        flight.close()
+    track = watch.track()
+    assert track is not None  # one sample at least
+    is_hidden, north, east, yaw_rate = np.array(rows).T
+    distance, speed = track.distance_m[: len(rows)], np.hypot(north, east)
+    bounds = Ranges()
+    is_in_band = (distance >= bounds.near_m) & (distance <= bounds.far_m)
+    skill = companion.skill
+    held = skill.guard if isinstance(skill, Following) else None
+    changes = sum(held.interventions.values()) if held is not None else 0
+    accel = np.hypot(np.diff(north), np.diff(east)) / track.interval_s
+    hidden = is_hidden > 0.0
+    return Outcome(
+        seed=seed,
+        in_band=float(is_in_band.sum() / track.planned_count),
+        is_collided=bool(track.is_collided.any()),
+        nearest_m=float(track.distance_m.min()),
+        nearest_hidden_m=float(distance[hidden].min()) if hidden.any() else nan,
+        has_stood=_has_stood(hidden, speed, track.interval_s),
+        has_resumed=_has_resumed(hidden, is_in_band, track.interval_s),
+        interventions_per_min=60.0 * changes / max(len(rows) * track.interval_s, 1.0),
+        accel_rms=float(np.sqrt(np.mean(accel**2))) if len(accel) else 0.0,
+        yaw_rate_rms=float(np.degrees(np.sqrt(np.mean(yaw_rate**2)))),
+        ended_s=float(track.time_s[-1]),
+        trouble=companion.trouble,
+    )
+
+
+def _spans(is_true: np.ndarray) -> list[tuple[int, int]]:  # type: ignore[type-arg]
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], is_true, [False])).astype(np.int8)))
+    return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
+
+
+def _has_stood(hidden: np.ndarray, speed: np.ndarray, interval_s: float) -> bool | None:  # type: ignore[type-arg]
+    """Whether it stood five seconds after the last sight of each hiding that was so long."""
+    due = round(HOLD_S / interval_s)
+    spans = [first for first, end in _spans(hidden) if end - first > due]
+    if not spans:
+        return None
+    return all(speed[max(first + due - 5, 0) : first + due + 1].min() < STANDS_M_S for first in spans)
+
+
+def _has_resumed(hidden: np.ndarray, is_in_band: np.ndarray, interval_s: float) -> bool | None:  # type: ignore[type-arg]
+    """Whether it was in the band for a second within ten of each return that was followed for so long."""
+    due, length = round(BACK_S / interval_s), round(_SUSTAINED_S / interval_s)
+    ends = [end for _, end in _spans(hidden) if end + due <= len(hidden)]
+    if not ends:
+        return None
+    return all(
+        any(is_in_band[k : k + length].all() for k in range(end, end + due - length + 1)) for end in ends
+    )

@@ -1,0 +1,1 @@
+"""The second one in charge: it does not learn, and does not believe the policy."""

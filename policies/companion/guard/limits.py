@@ -1,0 +1,79 @@
+"""How fast it may go: towards the owner, towards what is solid or unseen, up and down. Pure functions."""
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from policies.companion.guard.settings import GuardSettings
+
+Floats = NDArray[np.float64]
+
+
+def stopping_speed(free_m: float, delay_s: float, brake: float) -> float:
+    """The speed [m/s] from which it stands within a way [m], after a delay [s], braking at so much [m/s²]."""
+    if free_m <= 0.0:
+        return 0.0
+    return brake * (sqrt(delay_s * delay_s + 2.0 * free_m / brake) - delay_s)
+
+
+def kept_off(velocity: Floats, way: Floats, other_vel: Floats, delay_s: float, std_m: float, s: GuardSettings) -> Floats:
+    """A level velocity without what would bring it too near to somebody.
+
+    Args:
+        velocity: wanted [m/s], north and east.
+        way: from here to them [m].
+        other_vel: their velocity [m/s]; of one who goes away only half is trusted, for they may stop.
+        delay_s: until it answers.
+        std_m: of where they are.
+        s: of the guard.
+    """
+    far_m = float(np.hypot(*way))
+    if far_m < 1e-3:
+        return np.zeros(2)
+    unit = way / far_m
+    leaving = float(other_vel @ unit)
+    trusted = leaving if leaving < 0.0 else max(leaving - _STOPS_M_S * delay_s - _DOUBT_M_S, 0.0)
+    room_m = far_m - s.owner_m - min(std_m, _STD_MAX_M)
+    if room_m > 0.0:
+        most = trusted + stopping_speed(room_m, delay_s, s.owner_brake)
+    else:
+        most = max(trusted + _BACK_GAIN * room_m, -_BACK_MAX_M_S)
+    closing = float(velocity @ unit)
+    return velocity - max(closing - most, 0.0) * unit
+
+
+def within_room(velocity: Floats, units: Floats, clear_m: Floats, delay_s: float, s: GuardSettings) -> Floats:
+    """The level velocity nearest to the wanted one that can be stopped within the free way in its direction.
+
+    Args:
+        velocity: wanted [m/s], north and east.
+        units: directions, (directions, 2).
+        clear_m: free way in each.
+        delay_s: until it answers.
+        s: of the guard.
+    """
+    wanted = float(np.hypot(*velocity))
+    if wanted < 1e-6:
+        return velocity
+    most = np.array([stopping_speed(m - s.solid_m, delay_s, s.brake) for m in clear_m])
+    most = np.maximum(most, s.unseen_speed * (clear_m > 0.0))
+    k = np.argmax(units @ velocity)
+    if most[k] >= wanted:
+        return velocity
+    along = np.clip(units @ velocity, 0.0, most)
+    off = np.hypot(*(along[:, None] * units - velocity).T)
+    best = int(np.argmin(off))
+    return np.asarray(along[best] * units[best])
+
+
+def faded(age_s: float, from_s: float, to_s: float) -> float:
+    """1 until one age, 0 from another on."""
+    return float(np.clip((to_s - age_s) / (to_s - from_s), 0.0, 1.0))
+
+
+_STOPS_M_S = 4.0  # how fast a person stops [m/s²]; guess
+_DOUBT_M_S = 0.3  # of the speed that the tracker says
+_STD_MAX_M = 1.0  # more doubt is the business of stances
+_BACK_GAIN = 1.5  # [1/s]
+_BACK_MAX_M_S = 2.0

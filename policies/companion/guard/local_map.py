@@ -1,0 +1,141 @@
+"""What stands round the vehicle at its height, from the depth of the last pictures: a level grid that moves along.
+
+In: depth pictures, with the pose each was taken at. Out: how far the way is free in a direction. What has not been seen
+is not free.
+"""
+
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.attitude import Vector, rotated
+from policies.companion.guard.poses import Pose
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, camera_mount
+
+CELL_M = 0.25
+CELLS = 96  # of a side: 12 m to each
+DIRECTIONS = 36
+REACH_M = 10.0  # farther nothing is asked for
+_ABOVE_M, _BELOW_M = 0.7, 0.4  # of the slice that the vehicle flies through; guess: its own height twice
+_NO_RETURN_M = 4.0  # so far a column without any return is taken to be free, if others have some; guess
+_HOLD_US = 6_000_000  # for so long what was seen counts
+_OWNER_M = 0.7  # round the owner, who is no part of the map
+_ALIVE = 0.05  # fraction of pixels with depth below which there is none
+_UNSEEN = -(10**15)
+_OWN_M = 0.75  # where the vehicle itself is, nothing else is
+_HALF_WIDTH_M = 0.4  # of the vehicle's way
+
+Floats = NDArray[np.float64]
+
+
+class LocalMap:
+    """The grid of one vehicle, in ned."""
+
+    def __init__(self) -> None:
+        self._free_us = np.full((CELLS, CELLS), _UNSEEN, np.int64)
+        self._solid_us = np.full((CELLS, CELLS), _UNSEEN, np.int64)
+        self._corner = (0, 0)  # cell indices of the grid's first cell
+        self.has_depth = False
+        """The last picture had depth."""
+        self._rays_frd = _rays()
+        near = np.arange(-_OWN_M, _OWN_M + CELL_M, CELL_M)
+        self._own = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _OWN_M])
+        along = np.arange(CELL_M, REACH_M, CELL_M)
+        aside = np.array([-_HALF_WIDTH_M, 0.0, _HALF_WIDTH_M])
+        angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
+        self.units = np.stack([np.cos(angles), np.sin(angles)], -1)
+        """Directions asked about, north and east."""
+        across = np.stack([-self.units[:, 1], self.units[:, 0]], -1)
+        self._probes = along[None, :, None, None] * self.units[:, None, None] + aside[:, None] * across[:, None, None]
+        self._along = along
+
+    def see(self, pixels: NDArray[np.uint8], pose: Pose, owner_ned: Vector | None, now_us: int) -> None:
+        """Takes in a picture.
+
+        Args:
+            pixels: (height, width, 4), the last channel depth.
+            pose: of the vehicle when it was taken.
+            owner_ned: [m] who is left out.
+            now_us: the vehicle's clock.
+        """
+        byte = pixels[..., 3].astype(np.float64)
+        is_return = byte < 255.0
+        self.has_depth = bool(is_return.mean() > _ALIVE)
+        self._follow(pose.pos_ned)
+        if not self.has_depth:
+            return
+        depth_m = float(DEPTH_HALF_M) * (byte + 0.5) / np.maximum(255.0 - byte, 1.0)
+        rotation = np.array([rotated(pose.q_ned_from_frd, axis) for axis in np.eye(3).tolist()]).T
+        rays_ned = self._rays_frd @ rotation.T  # of depth 1
+        points = rays_ned * depth_m[..., None]
+        is_level = (points[..., 2] > -_ABOVE_M) & (points[..., 2] < _BELOW_M)
+        is_solid = is_return & is_level
+        if owner_ned is not None:
+            off = points[..., :2] + np.array(pose.pos_ned[:2]) - np.array(owner_ned[:2])
+            is_solid &= np.hypot(off[..., 0], off[..., 1]) > _OWNER_M
+        here = np.array(pose.pos_ned[:2])
+        level_m = np.hypot(points[..., 0], points[..., 1])
+        self._carve(here, rays_ned, np.where(is_solid, level_m, np.inf).min(0), is_return & is_level, now_us)
+        rows, columns = self._cells(points[..., :2][is_solid & (level_m < REACH_M)] + here)
+        self._solid_us[rows, columns] = now_us
+
+    def _carve(self, here: Floats, rays_ned: Floats, solid_m: Floats, is_seen: NDArray[np.bool_], now_us: int) -> None:
+        """Notes as free what lies before the first solid thing of each column."""
+        level = rays_ned[IMAGE_SIZE // 2, :, :2]
+        units = level / np.hypot(level[:, 0], level[:, 1])[:, None]
+        free_m = np.where(np.isfinite(solid_m), solid_m - CELL_M, _NO_RETURN_M)
+        far = ~np.isfinite(solid_m) & is_seen.any(0)  # only the owner, or the ground that rises
+        free_m = np.where(far, REACH_M, free_m)
+        steps = np.arange(0.0, REACH_M, 0.8 * CELL_M)
+        points = here + units[:, None] * steps[None, :, None]
+        for seen in (points[steps[None] < free_m[:, None]], here + self._own):
+            rows, columns = self._cells(seen)
+            self._free_us[rows, columns] = now_us
+
+    def clear_m(self, pos_ned: Vector, now_us: int) -> Floats:
+        """How far the way of the vehicle is free in each of `units` [m], shape (DIRECTIONS,)."""
+        self._follow(pos_ned)
+        points = self._probes + np.array(pos_ned[:2])
+        rows, columns = self._cells(points.reshape(-1, 2))
+        then = now_us - _HOLD_US
+        free, solid = self._free_us[rows, columns], self._solid_us[rows, columns]
+        is_free = ((free > then) & (free > solid)).reshape(points.shape[:-1]).all(-1)
+        first = np.where(is_free.all(1), len(self._along), is_free.argmin(1))
+        return np.asarray(first * CELL_M)
+
+    def _cells(self, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        cells = np.floor(points / CELL_M).astype(np.int64)
+        return cells[:, 0] % CELLS, cells[:, 1] % CELLS
+
+    def _follow(self, pos_ned: Vector) -> None:
+        """Forgets what has come to lie outside."""
+        corner = tuple(int(np.floor(x / CELL_M)) - CELLS // 2 for x in pos_ned[:2])
+        for axis in (0, 1):
+            moved = corner[axis] - self._corner[axis]
+            if not moved:
+                continue
+            start = self._corner[axis] + (CELLS if moved > 0 else moved)
+            lines = np.arange(start, start + abs(moved))[:CELLS] % CELLS
+            for grid in (self._free_us, self._solid_us):
+                np.moveaxis(grid, axis, 0)[lines] = _UNSEEN
+        self._corner = (corner[0], corner[1])
+
+    def nearest_m(self, pos_ned: Vector) -> float:
+        """To the nearest cell that is known to be solid [m]; infinite without one."""
+        rows, columns = np.nonzero(self._solid_us > self._free_us)
+        if not len(rows):
+            return float("inf")
+        at = [(self._corner[k] + (line - self._corner[k]) % CELLS + 0.5) * CELL_M for k, line in ((0, rows), (1, columns))]
+        return float(np.hypot(at[0] - pos_ned[0], at[1] - pos_ned[1]).min())
+
+
+def _rays() -> Floats:
+    """Of each pixel, body frame, of depth 1 along the optical axis: (height, width, 3)."""
+    half = np.tan(np.radians(0.5 * HFOV_DEG))
+    steps = (np.arange(IMAGE_SIZE) + 0.5 - 0.5 * IMAGE_SIZE) * (2.0 * half / IMAGE_SIZE)
+    right, down = np.meshgrid(steps, steps)
+    rdf = np.stack([right, down, np.ones_like(right)], -1).reshape(-1, 3)
+    turned = [rotated(camera_mount(), (float(x), float(y), float(z))) for x, y, z in rdf]
+    return np.array(turned).reshape(IMAGE_SIZE, IMAGE_SIZE, 3)
+

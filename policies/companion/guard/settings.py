@@ -1,0 +1,49 @@
+"""The numbers of the guard; each can be set. Sources: measured on the x500 in flight, or guesses."""
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class GuardSettings(BaseModel):
+    """What the guard allows."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    is_on: bool = True
+    sure: float = Field(default=0.5, gt=0.0, lt=1.0)
+    """Probability from which the detector's word counts."""
+    slow_s: float = Field(default=0.7, gt=0.0)
+    """Without a sight of the owner for so long it becomes slower ..."""
+    stop_s: float = Field(default=2.0, gt=0.0)
+    """... until it stands."""
+    search_s: float = Field(default=5.0, gt=0.0)
+    """After so long it searches: towards the phone, if that is heard; otherwise it turns round where it is."""
+    lost_s: float = Field(default=60.0, gt=0.0)
+    """After so long control goes back, in Hold."""
+    search_speed: float = Field(default=2.0, gt=0.0)
+    """[m/s] towards the phone."""
+    search_stand_off_m: float = Field(default=5.0, gt=0.0)
+    """It comes no nearer to where the phone says."""
+    search_yaw_rate: float = Field(default=0.6, gt=0.0)
+    """[rad/s]"""
+    picture_slow_s: float = Field(default=0.35, gt=0.0)
+    """From this age of the picture on it becomes slower ..."""
+    picture_stop_s: float = Field(default=0.8, gt=0.0)
+    """... until it stands."""
+    owner_m: float = Field(default=1.1, gt=0.0)
+    """To the middle of the owner: it comes no nearer."""
+    owner_brake: float = Field(default=4.0, gt=0.0)
+    """[m/s²] with which it is taken to brake before the owner ..."""
+    brake: float = Field(default=4.0, gt=0.0)
+    """... and before what does not move."""
+    reaction_s: float = Field(default=0.25, ge=0.0)
+    """From a setpoint to the motion, besides the age of the picture; measured."""
+    solid_m: float = Field(default=0.5, gt=0.0)
+    """From the vehicle's middle to anything solid."""
+    unseen_speed: float = Field(default=0.6, ge=0.0)
+    """[m/s] to where nothing is known."""
+    no_depth_speed: float = Field(default=2.5, ge=0.0)
+    """[m/s] without depth."""
+    height_min_m: float = Field(default=1.0, ge=0.0)
+    """Above the ground: below it climbs."""
+    height_max_m: float = Field(default=4.0, gt=0.0)
+    """Above the ground: higher it does not climb; crowns begin there."""
