@@ -5,7 +5,7 @@ its map of 16 x 16 is a person if the middle of somebody's chest is in it.
 """
 
 from dataclasses import dataclass
-from math import sqrt
+from math import exp, log, sqrt
 from pathlib import Path
 from typing import cast
 
@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from common.attitude import Vector, rotated
-from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, camera_mount
 from sim.camera_rig import MOUNT_FRD
 
 CELLS = 16  # of the map, in rows and columns
 STRIDE = 4  # pixels of a cell
 RANGE_M = (0.4, 16.0)  # that it tells apart
 _NO_RETURN = 255.0
+_APART = 2  # cells between two people
+_AGREES = 0.45  # of the logarithms of two ranges
 WEIGHTS = Path(__file__).parent / "weights.pt"
 _HALF_WIDTH = np.tan(np.radians(0.5 * HFOV_DEG))
 
@@ -82,7 +84,7 @@ class PersonDetector:
 
     def __init__(self, network: DetectorNetwork | None = None, least: float = 0.2) -> None:
         self._network = (network or shipped()).eval()
-        self._least = least
+        self._least = log(least / (1.0 - least))
 
     def find(self, pixels: NDArray[np.uint8], down_frd: tuple[float, float]) -> list[Detection]:
         """Who is in a picture, the most probable first.
@@ -93,23 +95,39 @@ class PersonDetector:
         """
         with torch.inference_mode():
             logits, log_ranges, _ = self._network(torch.from_numpy(pixels)[None])
-        scores = torch.sigmoid(logits[0]).numpy()
+        scores = logits[0].numpy()
         ranges = log_ranges[0].exp().numpy()
         found = []
         for row, column in peaks(scores, self._least):
-            at = (STRIDE * (column + 0.5), STRIDE * (row + 0.5))
-            chest = _chest_hfrd(at, float(np.clip(ranges[row, column], *RANGE_M)), pixels.shape[1], down_frd)
-            found.append(Detection(float(scores[row, column]), chest, at))
+            range_m = _checked_range(float(np.clip(ranges[row, column], *RANGE_M)), pixels[..., 3], row, column)
+            if range_m is not None:
+                at = (STRIDE * (column + 0.5), STRIDE * (row + 0.5))
+                chest = _chest_hfrd(at, range_m, pixels.shape[1], down_frd)
+                found.append(Detection(1.0 / (1.0 + exp(-float(scores[row, column]))), chest, at))
         return sorted(found, key=lambda detection: -detection.probability)
 
 
 def peaks(scores: NDArray[np.float32], least: float) -> list[tuple[int, int]]:
-    """Row and column of cells that are at least so probable, and than which none beside them is more."""
-    padded = np.pad(scores, 1)
-    size = scores.shape[0]
-    beside = np.stack([padded[r : r + size, c : c + size] for r in range(3) for c in range(3)]).max(0)
+    """Row and column of cells that score at least so much, and than which none within two cells scores more."""
+    padded = np.pad(scores, _APART, constant_values=-np.inf)
+    size, span = scores.shape[0], 2 * _APART + 1
+    beside = np.stack([padded[r : r + size, c : c + size] for r in range(span) for c in range(span)]).max(0)
     rows, columns = np.nonzero((scores >= least) & (scores >= beside))
     return list(zip(rows.tolist(), columns.tolist(), strict=True))
+
+
+def _checked_range(range_m: float, depth: NDArray[np.uint8], row: int, column: int) -> float | None:
+    """The range that depth shows, if it agrees with what the colours say; None: it does not, and nobody is there."""
+    first_row, first_column = STRIDE * row, STRIDE * column
+    byte = depth[first_row : first_row + STRIDE, first_column : first_column + STRIDE].astype(np.float64)
+    returns = byte[byte < _NO_RETURN]
+    if len(returns) < STRIDE:
+        return range_m
+    along_m = float(DEPTH_HALF_M) * (returns + 0.5) / (_NO_RETURN - returns)
+    steps = (np.array([first_row, first_column]) + 0.5 * STRIDE - 0.5 * depth.shape[0]) * (2.0 / depth.shape[0])
+    shown_m = along_m * sqrt(1.0 + float((steps * _HALF_WIDTH) @ (steps * _HALF_WIDTH)))
+    nearest = shown_m[np.argmin(np.abs(np.log(shown_m / range_m)))]
+    return float(nearest) if abs(log(nearest / range_m)) < _AGREES else None
 
 
 def _chest_hfrd(at: tuple[float, float], range_m: float, width: int, down_frd: tuple[float, float]) -> Vector:

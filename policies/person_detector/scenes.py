@@ -30,6 +30,7 @@ _ROUNDS = 16  # of pictures in the same worlds
 _NOBODY = 0.3  # share of pictures
 _EMPTY, _SOMEBODY, _UNSURE = 0, 1, 2
 _SPREAD_M = 90.0  # from the middle of the world, where pictures are taken
+_AT_HOME, _HOME_M = 0.2, 6.0  # share of pictures taken near the pad, on which somebody may be thought to stand
 _POINTS_LEAST = 2  # of chest, head and knees that must be seen
 _BODY_M = 0.35  # beside somebody's middle, where they hide others
 
@@ -100,7 +101,8 @@ def _grow(worlds: WorldBatch, rng: np.random.Generator, *, is_test: bool) -> Non
 def _place(worlds: WorldBatch, camera: QuickCamera, people: Any, clothes: Any, rng: np.random.Generator) -> None:
     """Puts vehicles into their worlds, people before them, and the light and the lens on."""
     n, k = WORLDS, PEOPLE_MAX
-    where = rng.uniform(-_SPREAD_M, _SPREAD_M, (n, 2))
+    spread_m = np.where(rng.random(n) < _AT_HOME, _HOME_M, _SPREAD_M)[:, None]
+    where = spread_m * rng.uniform(-1.0, 1.0, (n, 2))
     yaw = rng.uniform(-np.pi, np.pi, n)
     far_m = 0.7 + 13.0 * rng.random((n, k)) ** 2
     aside = yaw[:, None] + rng.uniform(-0.8, 0.8, (n, k))

@@ -68,6 +68,8 @@ class Guard:
         self._heard_us = -(10**12)  # on the vehicle's clock
         self._reports = 0
         self._bearing_rad = 0.0  # in ned, where the owner was seen last
+        self._way = np.zeros(2)  # unit, to where the owner is now
+        self._is_pressed = self._is_too_near = False
 
     def reset(self) -> None:
         """It takes over."""
@@ -122,7 +124,7 @@ class Guard:
             level, down = scale * level, scale * down
             self.interventions[self.stance.value] += 1
         delay_s = s.reaction_s + age_s
-        level = self._past_owner(level, own, delay_s)
+        level = self._past_owner(level, own, s.reaction_s)
         level = self._past_solids(level, own, delay_s)
         down = self._within_heights(down, own)
         return (float(level[0]), float(level[1]), float(down)), yaw_rate
@@ -138,8 +140,10 @@ class Guard:
         return Stance.SLOW if silence_s > s.slow_s or age_s > s.picture_slow_s else Stance.FREE
 
     def _searched(self, own: Own, is_searching: bool) -> tuple[np.ndarray, float, float]:  # type: ignore[type-arg]
-        """Towards the phone, no nearer than a stand-off; without one a turn on the spot."""
+        """Up, out of people's way; towards the phone, no nearer than a stand-off; without one a turn on the spot."""
         s = self.settings
+        down = -_CLIMB_M_S * float(np.clip(2.0 * (s.search_height_m - own.range_m), -0.5, 1.0))
+        down = down if isfinite(own.range_m) else 0.0
         track = self._watch.track
         has_phone = own.boot_us - self._heard_us < _PHONE_OLD_S * 1e6 and track is not None and track.is_known
         if has_phone and track is not None:
@@ -147,12 +151,12 @@ class Guard:
             far_m = float(np.hypot(*way))
             yaw_rate = self._facing(atan2(way[1], way[0]), own)
             if not is_searching or far_m < 0.1:
-                return np.zeros(2), 0.0, yaw_rate
+                return np.zeros(2), down, yaw_rate
             speed = min(stopping_speed(far_m - s.search_stand_off_m, s.reaction_s, 1.0), s.search_speed)
-            return speed * way / far_m, 0.0, yaw_rate
+            return speed * way / far_m, down, yaw_rate
         if is_searching:
-            return np.zeros(2), 0.0, s.search_yaw_rate
-        return np.zeros(2), 0.0, self._facing(self._bearing_rad, own)
+            return np.zeros(2), down, s.search_yaw_rate
+        return np.zeros(2), down, self._facing(self._bearing_rad, own)
 
     def _facing(self, bearing_rad: float, own: Own) -> float:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
@@ -160,13 +164,20 @@ class Guard:
 
     def _past_owner(self, level: np.ndarray, own: Own, delay_s: float) -> np.ndarray:  # type: ignore[type-arg]
         track = self._watch.track
+        self._is_pressed = self._is_too_near = False
         if track is None or not track.is_known:
             return level
         ahead_s = max(own.boot_us - track.time_us, 0) * 1e-6
         place = track.pos_ned + ahead_s * track.vel_ned
-        std_m = float(np.sqrt(max(np.linalg.eigvalsh(track.pos_cov[:2, :2]))))
         way = np.array(place[:2]) - np.array(own.pos_ned[:2])
-        kept = kept_off(level, way, np.array(track.vel_ned[:2]), delay_s, std_m, self.settings)
+        vel = np.array(track.vel_ned[:2])
+        far_m = float(np.hypot(*way))
+        self._way = way / max(far_m, 1e-3)
+        own_vel = np.array(own.vel_ned[:2])
+        coming_m_s = float((own_vel - vel) @ self._way)
+        self._is_pressed = far_m - delay_s * max(coming_m_s, 0.0) < self.settings.pressed_m
+        self._is_too_near = far_m - delay_s * max(coming_m_s, 0.0) < self.settings.owner_m
+        kept = kept_off(level, way, own_vel, vel, delay_s, self.settings)
         self._count("near the owner", level, kept)
         return kept
 
@@ -177,13 +188,18 @@ class Guard:
             kept = level * min(1.0, s.no_depth_speed / max(speed, 1e-6))
             self._count("no depth", level, kept)
             return np.asarray(kept)
-        clear_m = self._map.clear_m(own.pos_ned, own.boot_us)
-        kept = within_room(level, self._map.units, clear_m, delay_s, s)
+        free_m, known_m = self._map.clear_m(own.pos_ned, own.boot_us)
+        if self._is_pressed:  # back into what is not seen rather than wait for who comes
+            free_m = np.where(self._map.units @ self._way < 0.0, known_m, free_m)
+        kept = within_room(level, self._map.units, free_m, known_m, delay_s, s)
         self._count("near something", level, kept)
         return kept
 
     def _within_heights(self, down: float, own: Own) -> float:
         s = self.settings
+        if self._is_too_near and not own.range_m > s.height_max_m:
+            self.interventions["over the owner"] += 1
+            return -s.escape_climb
         if not isfinite(own.range_m):
             return max(down, 0.0)
         if own.range_m < s.height_min_m:

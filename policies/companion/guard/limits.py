@@ -17,15 +17,17 @@ def stopping_speed(free_m: float, delay_s: float, brake: float) -> float:
     return brake * (sqrt(delay_s * delay_s + 2.0 * free_m / brake) - delay_s)
 
 
-def kept_off(velocity: Floats, way: Floats, other_vel: Floats, delay_s: float, std_m: float, s: GuardSettings) -> Floats:
+def kept_off(
+    velocity: Floats, way: Floats, own_vel: Floats, other_vel: Floats, delay_s: float, s: GuardSettings
+) -> Floats:
     """A level velocity without what would bring it too near to somebody.
 
     Args:
         velocity: wanted [m/s], north and east.
         way: from here to them [m].
-        other_vel: their velocity [m/s]; of one who goes away only half is trusted, for they may stop.
+        own_vel: [m/s] of now, which it has until it answers.
+        other_vel: [m/s] theirs; who goes away may stop meanwhile.
         delay_s: until it answers.
-        std_m: of where they are.
         s: of the guard.
     """
     far_m = float(np.hypot(*way))
@@ -33,31 +35,36 @@ def kept_off(velocity: Floats, way: Floats, other_vel: Floats, delay_s: float, s
         return np.zeros(2)
     unit = way / far_m
     leaving = float(other_vel @ unit)
-    trusted = leaving if leaving < 0.0 else max(leaving - _STOPS_M_S * delay_s - _DOUBT_M_S, 0.0)
-    room_m = far_m - s.owner_m - min(std_m, _STD_MAX_M)
+    trusted = leaving if leaving < 0.0 else max(leaving - _STOPS_M_S2 * delay_s - _DOUBT_M_S, 0.0)
+    room_m = far_m - s.owner_m - delay_s * max(float(own_vel @ unit) - leaving, 0.0)
     if room_m > 0.0:
-        most = trusted + stopping_speed(room_m, delay_s, s.owner_brake)
+        most = trusted + stopping_speed(room_m, 0.0, s.owner_brake)
     else:
         most = max(trusted + _BACK_GAIN * room_m, -_BACK_MAX_M_S)
     closing = float(velocity @ unit)
     return velocity - max(closing - most, 0.0) * unit
 
 
-def within_room(velocity: Floats, units: Floats, clear_m: Floats, delay_s: float, s: GuardSettings) -> Floats:
+def within_room(
+    velocity: Floats, units: Floats, free_m: Floats, known_m: Floats, delay_s: float, s: GuardSettings
+) -> Floats:
     """The level velocity nearest to the wanted one that can be stopped within the free way in its direction.
 
     Args:
         velocity: wanted [m/s], north and east.
         units: directions, (directions, 2).
-        clear_m: free way in each.
+        free_m: free way in each.
+        known_m: way without anything that is known to be solid: slowly it may go where it has not looked.
         delay_s: until it answers.
         s: of the guard.
     """
     wanted = float(np.hypot(*velocity))
     if wanted < 1e-6:
         return velocity
-    most = np.array([stopping_speed(m - s.solid_m, delay_s, s.brake) for m in clear_m])
-    most = np.maximum(most, s.unseen_speed * (clear_m > 0.0))
+    most, creeping = (
+        np.array([stopping_speed(m - s.solid_m, delay_s, s.brake) for m in room_m]) for room_m in (free_m, known_m)
+    )
+    most = np.maximum(most, np.minimum(creeping, s.unseen_speed))
     k = np.argmax(units @ velocity)
     if most[k] >= wanted:
         return velocity
@@ -72,8 +79,7 @@ def faded(age_s: float, from_s: float, to_s: float) -> float:
     return float(np.clip((to_s - age_s) / (to_s - from_s), 0.0, 1.0))
 
 
-_STOPS_M_S = 4.0  # how fast a person stops [m/s²]; guess
-_DOUBT_M_S = 0.3  # of the speed that the tracker says
-_STD_MAX_M = 1.0  # more doubt is the business of stances
-_BACK_GAIN = 1.5  # [1/s]
-_BACK_MAX_M_S = 2.0
+_STOPS_M_S2 = 4.0  # how fast a person stops; guess
+_DOUBT_M_S = 0.4  # of the speed that the tracker says; guess
+_BACK_GAIN = 3.0  # [1/s]
+_BACK_MAX_M_S = 4.0

@@ -93,16 +93,21 @@ class LocalMap:
             rows, columns = self._cells(seen)
             self._free_us[rows, columns] = now_us
 
-    def clear_m(self, pos_ned: Vector, now_us: int) -> Floats:
-        """How far the way of the vehicle is free in each of `units` [m], shape (DIRECTIONS,)."""
+    def clear_m(self, pos_ned: Vector, now_us: int) -> tuple[Floats, Floats]:
+        """How far the way of the vehicle is free in each of `units`, and how far nothing solid is known in it [m].
+
+        Shapes (DIRECTIONS,) each.
+        """
         self._follow(pos_ned)
         points = self._probes + np.array(pos_ned[:2])
         rows, columns = self._cells(points.reshape(-1, 2))
         then = now_us - _HOLD_US
         free, solid = self._free_us[rows, columns], self._solid_us[rows, columns]
-        is_free = ((free > then) & (free > solid)).reshape(points.shape[:-1]).all(-1)
-        first = np.where(is_free.all(1), len(self._along), is_free.argmin(1))
-        return np.asarray(first * CELL_M)
+        is_solid = (solid > then) & (solid >= free)
+        is_free = (free > then) & ~is_solid
+        ways = (way.reshape(points.shape[:-1]).all(-1) for way in (is_free, ~is_solid))
+        free_m, known_m = (np.where(way.all(1), len(self._along), way.argmin(1)) * CELL_M for way in ways)
+        return free_m, known_m
 
     def _cells(self, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         cells = np.floor(points / CELL_M).astype(np.int64)

@@ -9,7 +9,7 @@ class GuardSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     is_on: bool = True
-    sure: float = Field(default=0.5, gt=0.0, lt=1.0)
+    sure: float = Field(default=0.7, gt=0.0, lt=1.0)
     """Probability from which the detector's word counts."""
     slow_s: float = Field(default=0.7, gt=0.0)
     """Without a sight of the owner for so long it becomes slower ..."""
@@ -23,6 +23,8 @@ class GuardSettings(BaseModel):
     """[m/s] towards the phone."""
     search_stand_off_m: float = Field(default=5.0, gt=0.0)
     """It comes no nearer to where the phone says."""
+    search_height_m: float = Field(default=2.6, gt=0.0)
+    """Above the ground, where it waits and searches: over people, under crowns."""
     search_yaw_rate: float = Field(default=0.6, gt=0.0)
     """[rad/s]"""
     picture_slow_s: float = Field(default=0.35, gt=0.0)
@@ -31,11 +33,15 @@ class GuardSettings(BaseModel):
     """... until it stands."""
     owner_m: float = Field(default=1.1, gt=0.0)
     """To the middle of the owner: it comes no nearer."""
-    owner_brake: float = Field(default=4.0, gt=0.0)
+    pressed_m: float = Field(default=2.0, gt=0.0)
+    """Nearer than this it may go back to where it has not looked; nearer than `owner_m` it climbs as well."""
+    escape_climb: float = Field(default=1.5, ge=0.0)
+    """[m/s]"""
+    owner_brake: float = Field(default=2.0, gt=0.0)
     """[m/s²] with which it is taken to brake before the owner ..."""
     brake: float = Field(default=4.0, gt=0.0)
     """... and before what does not move."""
-    reaction_s: float = Field(default=0.25, ge=0.0)
+    reaction_s: float = Field(default=0.35, ge=0.0)
     """From a setpoint to the motion, besides the age of the picture; measured."""
     solid_m: float = Field(default=0.5, gt=0.0)
     """From the vehicle's middle to anything solid."""
