@@ -136,6 +136,7 @@ for _command in (task_commands.demonstrate, task_commands.play, task_commands.dr
     app.command()(_command)
 app.command(cls=LateCommand)(follow_commands.follow)
 app.command()(follow_commands.companion)
+app.command()(follow_commands.benchmark)
 app.command(cls=LateCommand)(park_command.park)
 app.command()(replay_command.replay)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)

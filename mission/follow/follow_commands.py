@@ -1,6 +1,7 @@
 """The commands that follow somebody: `honeyguide follow`, and the companion computer alone, `companion`."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -59,6 +60,40 @@ def companion(
             typer.echo(run_companion(options, Console()))
         except CompanionError as error:
             refuse(str(error))
+
+
+def benchmark(
+    task: Annotated[str, typer.Argument(help="What is judged: follow.")],
+    policy: Annotated[
+        str, typer.Option(help="A policy of FollowMe: a name, file or run; an .onnx file; module:Class; or 'scripted'.")
+    ] = "follow-me",
+    condition: Annotated[list[str] | None, typer.Option(help="One of the conditions; repeatable. Default: all.")] = None,
+    flights: Annotated[int, typer.Option(min=1, help="Of each condition.")] = 60,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes at a time.")] = 2,
+    guard: Annotated[bool, typer.Option("--guard/--no-guard", help="The guard bounds the policy.")] = True,
+    out: Annotated[Path | None, typer.Option(help="Folder for table.md and flights.json.")] = None,
+) -> None:
+    """Fly a policy through standard and harder conditions, over MAVLink, and show how often it follows and hits."""
+    with learn_extra():
+        from mission.follow.benchmark.conditions import BY_NAME
+
+        unknown = [name for name in condition or () if name not in BY_NAME]
+        if task != "follow":
+            refuse(f"benchmark {task}: there is only follow")
+        if unknown:
+            refuse(f"--condition {unknown[0]}: there are {', '.join(BY_NAME)}")
+        with loading(Console()):
+            from mission.follow.benchmark.session import BenchmarkOptions, benchmark_session, misses
+            from policies.companion.pilot import PilotError
+        options = BenchmarkOptions(policy, tuple(condition or ()), flights, jobs, has_guard=guard, out=out)
+        try:
+            outcomes = benchmark_session(options)
+        except PilotError as error:
+            refuse(str(error))
+        found = misses(outcomes)
+        for text in found:
+            typer.echo(f"miss: {text}")
+        raise typer.Exit(1 if found else 0)
 
 
 def follow() -> Callable[..., None]:

@@ -171,37 +171,14 @@ DOCUMENTED: dict[str, float | Sampler] = {
     "lost_m": 1e6,
     "unseen_limit_s": 1e6,
 }
-# What a day outside may bring, and what cameras, phones and links do to it.
+# What a day outside may bring.
 IMPROVED: dict[str, float | Sampler] = {
-    "wind_m_s": Sampler(intervals=((0.0, 10.0),)),
-    "wind_gust_m_s": Sampler(intervals=((0.0, 4.0),)),
+    "wind_m_s": Sampler(intervals=((0.0, 6.0),)),
+    "wind_gust_m_s": Sampler(intervals=((0.0, 3.0),)),
     "sensor_noise": Sampler(intervals=((0.5, 1.5),)),
     "mass_scale": Sampler(intervals=((0.9, 1.15),)),
     "motor_scale": Sampler(intervals=((0.93, 1.07),)),
     "hill_height_m": Sampler(intervals=((2.0, 12.0),)),
+    "exposure": Sampler(intervals=((0.7, 1.4),)),
     "trees_per_ha": Sampler(intervals=((30.0, 200.0),)),
-    "owner_course_std_deg": Sampler(intervals=((30.0, 120.0),)),
-    "owner_size": Sampler(intervals=((0.7, 1.1),)),
-    "owner_crouch_share": 0.3,
-    "owner_hides_per_min": Sampler(intervals=((0.0, 1.0),)),
-    "owner_hide_s": Sampler(intervals=((1.0, 4.0),)),
-    "owner_clothes_share": 0.8,
-    "bystanders": Sampler(intervals=((0.0, 0.4), (0.6, 1.0), (1.8, 2.0), (2.9, 3.0))),  # mostly none or one
-    "bystander_likeness": 0.2,
-    "phone_error": Sampler(intervals=((0.5, 1.5), (1.5, 2.0), (3.5, 4.0))),
-    "phone_lag_s": Sampler(intervals=((0.1, 0.8),)),
-    "phone_dropouts_per_min": Sampler(intervals=((0.0, 2.0),)),
-    "phone_dropout_scale": Sampler(intervals=((1.0, 2.0), (999.0, 1000.0))),  # the second half for good
-    "exposure": Sampler(intervals=((0.6, 1.6),)),
-    "light": Sampler(intervals=((0.08, 0.25), (0.83, 1.0))),  # dusk, or day
-    "shutter_s": Sampler(intervals=((0.0, 0.033),)),
-    "depth_max_m": Sampler(intervals=((0.0, 1.5), (5.0, 12.0), (990.0, 1000.0))),  # none, a real camera's, all
-    "depth_holes": Sampler(intervals=((0.0, 0.25),)),
-    "lens_scale": Sampler(intervals=((0.97, 1.03),)),
-    "lens_tilt_deg": Sampler(intervals=((-2.0, 2.0),)),
-    "picture_lag_s": Sampler(intervals=((0.0, 0.34),)),
-    "picture_jitter_s": Sampler(intervals=((0.0, 0.1),)),
-    "picture_loss": Sampler(intervals=((0.0, 0.15),)),
-    "picture_freezes_per_min": Sampler(intervals=((0.0, 2.0),)),
-    "setpoint_lag_s": Sampler(intervals=((0.0, 0.08),)),
 }
