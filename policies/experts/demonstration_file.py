@@ -22,7 +22,7 @@ import gymnasium
 
 from common.files import part_path
 from policies.experts.episode_recording import Episode
-from policies.tasks.gym import action_space, observation_space
+from policies.tasks.gym_arrays import action_space, observation_space
 from policies.tasks.layout import Layout
 from policies.tasks.task import TaskSettings
 

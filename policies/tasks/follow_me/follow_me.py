@@ -56,6 +56,7 @@ class FollowMe(FlightTask):
     """The task. Layout version 1."""
 
     params: ClassVar = PARAMS
+    settings_class: ClassVar = FollowSettings
 
     def __init__(self, settings: FollowSettings, env_count: int, device: str = "cpu") -> None:
         is_documented = settings.preset == "as-documented"
@@ -78,8 +79,8 @@ class FollowMe(FlightTask):
             self.follow.lenses = self._eyes.lenses
         self._record_all(_rules(settings, self.layout), self.start(is_test=settings.split == "test"))
 
-    def step(self) -> None:
-        """One decision of all environments, with the actions that lie in the buffers."""
+    def _launch_step(self) -> None:
+        """What `step` does of the task's own."""
         self._act.launch()
         self.rig.advance(DECISION_TICKS)
         self._walk.launch()
