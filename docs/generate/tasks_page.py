@@ -50,6 +50,7 @@ OUTCOMES = {
     Outcome.FELL: "ended under the floor",
     Outcome.HIT_OTHER: "rolled over, struck an edge, or came too near a person",
     Outcome.LOST: "lost whom it followed, or left the forest upwards, the ball it hovers in, or the way to its goal",
+    Outcome.ENDED: "was ended by an environment of Gymnasium, which does not say how",
 }
 
 

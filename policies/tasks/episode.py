@@ -33,6 +33,7 @@ class Outcome(IntEnum):
     FELL = 5
     HIT_OTHER = 6  # rolled over, struck an edge, came too near a person
     LOST = 7  # what was to be followed
+    ENDED = 8  # by an outside environment, which does not say how
 
 
 RUNNING = wp.constant(int(Outcome.RUNNING))

@@ -241,7 +241,7 @@ class Task:
 
     def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """One environment seen from above, RGB, shape (height, width, 3)."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{self.layout.task}: draws no view of itself: it has no method top_view")
 
 
 def _row_seeds(seeds: Sequence[int]) -> list[int]:
