@@ -9,7 +9,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from math import ceil, sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +27,6 @@ from policies.tasks.catalogue import build_task, is_task_name, settings_of, task
 from policies.tasks.episode import Outcome
 from policies.tasks.layout import LayoutError
 from policies.tasks.task import Scores, Task
-
-if TYPE_CHECKING:
-    from policies.learn.export.policy_file import PolicyCard
 
 
 class PlayError(ValueError):
@@ -113,9 +109,9 @@ def _with_policy(options: PlayOptions, name: str) -> tuple[Task, Expert, str]:
     try:
         path = find_policy(name)
         policy, card = load_policy(path)
+        task_name = options.what if is_task else card.trusted_task(path, f"play {card.task} --policy {name}")
     except CheckpointError as error:
         raise PlayError(str(error) if is_task else f"{error}; the tasks are {', '.join(task_names())}") from None
-    task_name = options.what if is_task else _named(card, path)
     is_own = task_name == card.task
     settings = settings_of(task_name, options.env_args, card.settings if is_own else {})
     task = build_task(task_name, options.envs, settings)
@@ -123,13 +119,6 @@ def _with_policy(options: PlayOptions, name: str) -> tuple[Task, Expert, str]:
     if is_own:
         task.set_params(card.samplers())
     return task, PolicyDriver(policy), str(path)
-
-
-def _named(card: "PolicyCard", path: Path) -> str:
-    try:
-        return card.trusted_task(path)
-    except CheckpointError as error:
-        raise PlayError(f"{error}: honeyguide play {card.task} --policy {path}") from None
 
 
 def _shown(task: Task, driver: Expert, options: PlayOptions, show: Callable[[NDArray[np.uint8]], bool]) -> Scores:

@@ -109,7 +109,9 @@ def chosen_config(request: TrainingRequest) -> Loaded:
             f"{name}: names no task in env_settings.env_path: give --env, one of {', '.join(task_names())}, "
             "module:Class for your own, or --gym ID"
         )
-    if given.env is not None and given.env not in CATALOGUE:  # what it lacks is told without naming a line of a recipe
+    if is_own or (
+        given.env is not None and given.env.startswith(GYM)
+    ):  # what it lacks is told without naming a line of a recipe
         build_task(settings.env_path, 1, settings_of(settings.env_path, settings.env_args))
     return loaded
 
@@ -135,7 +137,7 @@ def evaluate_policy(
     """
     path = find_policy(name)
     policy, card = load_policy(path)
-    task_name = task or card.trusted_task(path)
+    task_name = task or card.trusted_task(path, f"--task {card.task}")
     own, params = (card.settings, card.samplers()) if task_name == card.task else ({}, {})
     settings = settings_of(task_name, pairs, {**own, "split": "test"})
     episodes, seed = episodes_and_seed

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _EnvArgs = Annotated[
     list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as preset=improved. Repeatable.")
 ]
+_TASK_OR_CONFIG = typer.Argument(
+    help="A task or recipe by name, module:Class of a task of yours, or an ML-Agents .yaml file."
+)
 _NO_EFFECT = "Accepted for ML-Agents' command lines; no effect."
 _OLD = "Old name"
 _POLICY = typer.Argument(help="A policy file (.pt), a run's folder, or the name of a run in results/.")
@@ -28,10 +31,7 @@ _POLICY = typer.Argument(help="A policy file (.pt), a run's folder, or the name 
 
 def train(
     context: typer.Context,
-    task_or_config: Annotated[
-        str | None,
-        typer.Argument(help="A task or recipe by name, module:Class of a task of yours, or an ML-Agents .yaml file."),
-    ] = None,
+    task_or_config: Annotated[str | None, _TASK_OR_CONFIG] = None,
     env: Annotated[str | None, typer.Option(help="The task, if the .yaml file or the recipe names none.")] = None,
     gym: Annotated[str | None, typer.Option(help="An environment of Gymnasium instead of a task: its ID.")] = None,
     run_id: Annotated[str | None, typer.Option(help="Name of the run. Default: the recipe's, or ppo.")] = None,
@@ -112,7 +112,9 @@ def _command_line(options: Mapping[str, Any], further: Sequence[str]) -> "Comman
 
 def evaluate(
     policy: Annotated[str, _POLICY],
-    task: Annotated[str | None, typer.Option(help="Another task of the same layout. Default: the policy's.")] = None,
+    task: Annotated[
+        str | None, typer.Option(help="Another task of the same layout. Default: the policy's, unless it is yours.")
+    ] = None,
     env_args: _EnvArgs = None,
     episodes: Annotated[int, typer.Option(min=1, max=10_000_000, help="How many are played.")] = 1000,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of the episodes.")] = 0,

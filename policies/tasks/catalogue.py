@@ -40,7 +40,7 @@ class Entry:
     task_at: "str | type[Task] | Callable[[Any, int, str], Task]"
     """Its class, or where that is defined in this folder."""
     max_episode_steps: int = 1000
-    """Decisions after which Gymnasium cuts an episode: no fewer than the task's own limit in any preset that has one."""
+    """Decisions after which Gymnasium cuts an episode: no fewer than any preset's own limit, if it has one."""
 
 
 CATALOGUE: dict[str, Entry] = {
@@ -77,10 +77,10 @@ def task_class(name: "str | type[Task]") -> "type[Task]":
 
 def _gym_class(name: str) -> "type[Task]":
     try:
-        from policies.tasks.gym_task import gym_class  # noqa: PLC0415  (Gymnasium is an extra)
+        gym_class = resolve_name("policies.tasks.gym_task:gym_class")
     except ModuleNotFoundError as error:
         raise UnknownTask(f"{name}: {error.name} is not installed: pip install 'honeyguide[gym]'") from None
-    return gym_class(name.removeprefix(GYM))
+    return cast("type[Task]", gym_class(name.removeprefix(GYM)))
 
 
 def _package_entries() -> dict[str, EntryPoint]:

@@ -3,10 +3,10 @@
     env = gymnasium.make("policies:honeyguide/RollerBall-v0", preset="as-coded", numbers={"mass_kg": 2.0})
     envs = gymnasium.make_vec("policies:honeyguide/RollerBall-v0", num_envs=1024, autoreset_mode="NextStep")
 
-Keyword arguments are the task's settings, and: `numbers`, its parameters; `has_privileged`, whether observations show what
-critics alone may see. An observation is a vector, or a dict of `image`, `vector` and `privileged` where there is more.
-`info["outcome"]` names how an episode ended. Arrays that are returned are copies; whoever wants none takes a `Task` and
-its buffers.
+Keyword arguments are the task's settings, and: `numbers`, its parameters; `has_privileged`, whether observations show
+what critics alone may see. An observation is a vector, or a dict of `image`, `vector` and `privileged` where there is
+more. `info["outcome"]` names how an episode ended. Arrays that are returned are copies; whoever wants none takes a
+`Task` and its buffers.
 """
 
 from collections.abc import Mapping, Sequence
@@ -57,8 +57,8 @@ class TaskEnv(gymnasium.Env[Observation, Any]):
             NumberError: a number that the task has not, or out of its bounds.
             UnknownTask: no such task, setting or value, or nothing privileged in it.
         """
-        self._arguments = {"task": task, "render_mode": render_mode, "numbers": numbers, **settings}
-        self._arguments["has_privileged"] = has_privileged
+        self._arguments = {"task": task, "render_mode": render_mode, **settings}
+        self._arguments |= {"numbers": numbers, "has_privileged": has_privileged}
         self.task = _built(task, 1, numbers, settings)
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.task.decision_s))}
@@ -152,7 +152,13 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
             NumberError: a number that the task has not, or out of its bounds.
             UnknownTask: no such task, setting or value, or nothing privileged in it.
         """
-        self._arguments = {"task": task, "num_envs": num_envs, "render_mode": render_mode, "numbers": numbers, **settings}
+        self._arguments = {
+            "task": task,
+            "num_envs": num_envs,
+            "render_mode": render_mode,
+            "numbers": numbers,
+            **settings,
+        }
         self._arguments |= {"autoreset_mode": autoreset_mode, "max_episode_steps": max_episode_steps}
         self._arguments["has_privileged"] = has_privileged
         self.task = _built(task, num_envs, numbers, settings)
@@ -185,23 +191,28 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
         """
         super().reset(seed=seed if isinstance(seed, int) else None, options=options)
         mask = _reset_mask(options, self.num_envs)
-        if mask is not None and not self._arrays.is_begun:
-            raise ResetNeeded("reset: reset_mask: no episode is running: reset all environments first")
         chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else mask
-        if seed is None and mask is not None:
-            fresh = chosen & ~self._is_ended
-            if fresh.any():
-                self.task.begin(fresh)
-        elif isinstance(seed, int) and mask is not None:
-            self._arrays.reset(_drawn_seeds([seed + i for i in range(self.num_envs)], self.np_random), chosen)
-        elif seed is None or isinstance(seed, int):
+        if not self._arrays.is_begun and not chosen.all():
+            raise ResetNeeded("reset: reset_mask: no episode is running: reset all environments first")
+        if mask is None and (seed is None or isinstance(seed, int)):
             self._arrays.reset(_drawn_seed(self.np_random))
-        elif len(seed) != self.num_envs:
-            raise ValueError(f"reset: seed: there are {len(seed)} for {self.num_envs} environments")
         else:
-            self._arrays.reset(_drawn_seeds(seed, self.np_random), chosen)
+            self._begin(chosen, [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed)
         self._is_ended &= ~chosen
         return self._arrays.last_seen(self._is_ended), {}
+
+    def _begin(self, is_chosen: NDArray[np.bool_], seeds: Sequence[int | None] | None) -> None:
+        """Begins the chosen rows: by their seeds, or with their next episodes."""
+        given = [None] * self.num_envs if seeds is None else list(seeds)
+        if len(given) != self.num_envs:
+            raise ValueError(f"reset: seed: there are {len(given)} for {self.num_envs} environments")
+        is_anew = is_chosen & np.array([seed is not None or not self._arrays.is_begun for seed in given])
+        generators = [self.np_random if seed is None else np_random(seed)[0] for seed in given]
+        if is_anew.any():
+            self._arrays.reset([_drawn_seed(generator) for generator in generators], is_anew)
+        is_next = is_chosen & ~is_anew & ~self._is_ended  # what has ended has begun its next episode by itself
+        if is_next.any():
+            self.task.begin(is_next)
 
     def step(self, actions: Array) -> tuple[Observation, Array, Array, Array, dict[str, Any]]:
         """One decision each.
@@ -212,8 +223,11 @@ class TaskVectorEnv(VectorEnv[Observation, Array, Array]):
         """
         arrays, held = self._arrays, self._is_ended
         if not arrays.is_begun or (held.any() and self.autoreset_mode is AutoresetMode.DISABLED):
-            raise ResetNeeded(f"step: no episode is running in {self.num_envs if not arrays.is_begun else int(held.sum())} "
-                              "of the environments: call reset() first, with reset_mask in its options for these alone")
+            count = int(held.sum()) if arrays.is_begun else self.num_envs
+            raise ResetNeeded(
+                f"step: no episode is running in {count} of the environments: call reset() first, "
+                "with reset_mask in its options for these alone"
+            )
         arrays.act(actions, held)
         if held.any():
             self.task.step_others(held)
@@ -279,11 +293,6 @@ def _go_on(env: TaskEnv | TaskVectorEnv, state: Mapping[str, Any]) -> None:
 
 def _drawn_seed(generator: np.random.Generator) -> int:
     return int(generator.integers(2**31))
-
-
-def _drawn_seeds(seeds: Sequence[int | None], generator: np.random.Generator) -> list[int]:
-    """The task's seeds of environments with seeds of their own: those of a single environment with that seed."""
-    return [_drawn_seed(generator if seed is None else np_random(seed)[0]) for seed in seeds]
 
 
 def _reset_mask(options: Mapping[str, Any] | None, env_count: int) -> NDArray[np.bool_] | None:

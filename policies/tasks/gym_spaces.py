@@ -1,8 +1,8 @@
 """Spaces of Gymnasium's environments as a layout: what becomes a float, what the image, and what an action.
 
-In: the spaces of one environment, and what a batch of them shows. Out: elements, and arrays of floats and bytes; the way
-back for actions. Vectors, counts and flags become floats in the order of Gymnasium's `flatten` (keys sorted, counts as
-one-hot); one image of bytes may stand beside them.
+In: the spaces of one environment, and what a batch of them shows. Out: elements, and arrays of floats and bytes; the
+way back for actions. Vectors, counts and flags become floats in the order of Gymnasium's `flatten` (keys sorted, counts
+as one-hot); one image of bytes may stand beside them.
 """
 
 from collections.abc import Iterator
@@ -62,8 +62,9 @@ class ObservationReader:
         self.elements = tuple(element for leaf in self._floats for element in _elements(leaf))
         if len(self.elements) > MAX_FLOATS:
             raise UnfitSpace(f"its observation has {len(self.elements)} floats; {MAX_FLOATS} at most can be seen")
-        self.is_channel_first = self._image is not None and _is_channel_first(self._image.space.shape or ())
-        self.image = _image_element(self._image.space.shape or (), is_channel_first=self.is_channel_first) if self._image else None
+        shape = (self._image.space.shape if self._image is not None else None) or ()
+        self._is_channel_first = len(shape) == 3 and shape[-1] > max(_COLOURS)
+        self.image = _image_element(shape, is_channel_first=self._is_channel_first) if shape else None
 
     def floats(self, observations: Any) -> Array:
         """Shape (rows, elements), float32."""
@@ -75,7 +76,7 @@ class ObservationReader:
         if self._image is None or self.image is None:
             raise ValueError("there is no image")
         pixels = self._image.of(observations)
-        pixels = np.moveaxis(pixels, 1, -1) if self.is_channel_first else pixels
+        pixels = np.moveaxis(pixels, 1, -1) if self._is_channel_first else pixels
         return pixels.reshape(len(pixels), *self.image.shape)
 
 
@@ -87,8 +88,8 @@ def _leaves(space: Space[Any], keys: tuple[Any, ...]) -> Iterator[_Leaf]:
         yield _Leaf(keys, space)
     else:
         raise UnfitSpace(
-            f"its observation space is {type(space).__name__}; a Box, a Discrete, a MultiDiscrete, a MultiBinary, or a Dict "
-            "or Tuple of these can be seen"
+            f"its observation space is {type(space).__name__}; a Box, a Discrete, a MultiDiscrete, a MultiBinary, "
+            "or a Dict or Tuple of these can be seen"
         )
 
 
@@ -96,10 +97,6 @@ def _is_image(space: Space[Any]) -> bool:
     shape = space.shape or ()
     is_bytes = isinstance(space, Box) and space.dtype == np.uint8
     return is_bytes and (len(shape) == 2 or (len(shape) == 3 and min(shape[0], shape[-1]) <= max(_COLOURS)))
-
-
-def _is_channel_first(shape: tuple[int, ...]) -> bool:
-    return len(shape) == 3 and shape[-1] > max(_COLOURS)
 
 
 def _image_element(shape: tuple[int, ...], *, is_channel_first: bool) -> ImageElement:
@@ -152,8 +149,8 @@ class ActionWriter:
             self.branches = tuple(_branch(f"action_{k}", int(size)) for k, size in enumerate(sizes))
         else:
             raise UnfitSpace(
-                f"its action space is {_words(space)}; a Box of floats, a Discrete, a MultiDiscrete or a MultiBinary can be "
-                "acted in"
+                f"its action space is {_words(space)}; a Box of floats, a Discrete, a MultiDiscrete or a MultiBinary "
+                "can be acted in"
             )
 
     def actions(self, continuous: Array, branches: Array) -> Array:

@@ -101,7 +101,9 @@ class Reshaping:
             frames = observations[:, size - task.layout.frame_size : size - len(task.added)]
             added = np.asarray(task.observe(frames))
             if added.shape != (len(frames), len(task.added)):
-                raise ValueError(f"observe: must return an array of shape {(len(frames), len(task.added))}, not {added.shape}")
+                raise ValueError(
+                    f"observe: must return an array of shape {(len(frames), len(task.added))}, not {added.shape}"
+                )
             observations[:, size - len(task.added) :] = added
         return observations
 

@@ -144,10 +144,12 @@ class Task:
         """
         chosen = np.ones(self.env_count, dtype=np.bool_) if is_chosen is None else is_chosen
         seeds = [seed] * self.env_count if isinstance(seed, int) else _row_seeds(seed)
-        anew = dict.fromkeys(("episodes", "scores", "rewards", "outcomes", "is_terminated", "is_truncated"), 0)
-        for name, values in (anew | {"seed": np.array([each % 2**32 for each in seeds], np.uint32).view(np.int32)}).items():
+        values: dict[str, Any] = {"seed": np.array([each % 2**32 for each in seeds], np.uint32).view(np.int32)[chosen]}
+        for name in ("episodes", "scores", "rewards", "outcomes", "is_terminated", "is_truncated"):
+            values[name] = 0
+        for name, value in values.items():
             rows = self._arrays[name].numpy().copy()
-            rows[chosen] = values if np.isscalar(values) else values[chosen]
+            rows[chosen] = value
             self._arrays[name].assign(rows)
         self.begin(chosen)
 
@@ -195,7 +197,7 @@ class Task:
         Args:
             frames: what the task shows without them, shape (rows, elements).
         """
-        raise NotImplementedError(f"{type(self).__name__}: elements are added, and no method observe gives their values")
+        raise NotImplementedError(f"{type(self).__name__}: elements are added, but there is no method observe")
 
     def outcome(self, decision: Decision) -> Array:
         """How each episode stands, shape (envs,): `Outcome` numbers. An end of the task's own stays an end."""
@@ -245,8 +247,10 @@ class Task:
 
 
 def _row_seeds(seeds: Sequence[int]) -> list[int]:
-    """Seeds for the rows, with which each draws what row 0 draws with its own: `draw_key` begins with Warp's
-    rand_init(seed, row) = pcg(seed + pcg(row))."""
+    """Seeds for the rows, with which each draws what row 0 draws with its own.
+
+    `draw_key` begins with Warp's rand_init(seed, row) = pcg(seed + pcg(row)).
+    """
     return [seed + _pcg(0) - _pcg(i) for i, seed in enumerate(seeds)]
 
 

@@ -35,15 +35,15 @@ class PolicyCard:
     figures: dict[str, float] = field(default_factory=dict)  # "success_rate", "training_reward", …
     numbers: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the task, in the last lesson
 
-    def trusted_task(self, path: Path) -> str:
-        """The task, unless building it would run code that nobody but the file has named.
+    def trusted_task(self, path: Path, how: str) -> str:
+        """The task, unless building it would run code that nobody but the file has named; `how` says how to name it.
 
         Raises:
             CheckpointError: it would.
         """
         if runs_code(self.task):
             raise CheckpointError(
-                f"{path}: is of {self.task}, whose module is not imported because a file says so: name it yourself"
+                f"{path}: is of {self.task}, whose code is not run because a file names it: name it yourself, as {how}"
             )
         return self.task
 

@@ -188,7 +188,7 @@ def test_a_pickle_goes_on_where_it_was(make):
 
 def test_made_environments_are_pickled_with_their_wrappers():
     env = gymnasium.make("honeyguide/RollerBall-v0", numbers={"mass_kg": 2.0})
-    observation, _ = env.reset(seed=1)
+    env.reset(seed=1)
     twin = pickle.loads(pickle.dumps(env))
     assert twin.spec.id == env.spec.id
     push = np.array([0.1, 0.2], dtype=np.float32)
