@@ -13,6 +13,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from pkgutil import resolve_name
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, cast
 
 from pydantic import ValidationError
@@ -89,23 +90,36 @@ def _package_entries() -> dict[str, EntryPoint]:
 
 
 def _loaded(name: str, value: str) -> object:
-    """What lies at `module:Class`; modules in the working directory are found, as by `python -m`."""
+    """What lies at `module:Class`."""
     module, _, attribute = value.partition(":")
+    found: object = import_users_module(name, module)
+    for part in attribute.split("."):
+        if not hasattr(found, part):
+            raise UnknownTask(f"{name}: {module} has no {attribute or 'class without a name'}")
+        found = getattr(found, part)
+    return found
+
+
+def import_users_module(name: str, module: str) -> ModuleType:
+    """A module that the user has named; those in the working directory are found, as by `python -m`.
+
+    Args:
+        name: of the task, for messages.
+        module: its name.
+
+    Raises:
+        UnknownTask: it is not there, or something that it imports.
+    """
     if str(Path.cwd()) not in sys.path:
         sys.path.append(str(Path.cwd()))
     try:
-        found: object = import_module(module)
+        return import_module(module)
     except ModuleNotFoundError as error:
         if error.name is None or not f"{module}.".startswith(f"{error.name}."):
             raise UnknownTask(f"{name}: {module} imports {error.name}, which is not there") from None
         raise UnknownTask(f"{name}: there is no module {module}") from None
     except (TypeError, ValueError):  # of a name like "" or ".a"
         raise UnknownTask(f"{name}: {module or 'nothing'} cannot be the name of a module") from None
-    for part in attribute.split("."):
-        if not hasattr(found, part):
-            raise UnknownTask(f"{name}: {module} has no {attribute or 'class without a name'}")
-        found = getattr(found, part)
-    return found
 
 
 def _checked(name: str, found: object) -> "type[Task]":

@@ -16,7 +16,7 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, Vecto
 from numpy.typing import NDArray
 from pydantic import ConfigDict, model_validator
 
-from policies.tasks.catalogue import GYM, UnknownTask
+from policies.tasks.catalogue import GYM, UnknownTask, import_users_module
 from policies.tasks.episode import Outcome
 from policies.tasks.gym_spaces import ActionWriter, ObservationReader, UnfitSpace
 from policies.tasks.layout import Layout
@@ -187,10 +187,12 @@ def gym_class(env_id: str) -> type[GymTask]:
 
 
 def _spec(env_id: str) -> EnvSpec:
+    """What is registered of an ID; of `module:ID` by importing the module."""
+    module, _, own_id = env_id.rpartition(":")
+    if module:
+        import_users_module(f"{GYM}{env_id}", module)
     try:
-        return gymnasium.spec(env_id)
-    except ModuleNotFoundError as error:
-        raise UnknownTask(f"{GYM}{env_id}: there is no module {error.name}") from None
+        return gymnasium.spec(own_id)
     except gymnasium.error.Error as error:
         raise UnknownTask(f"{GYM}{env_id}: {_one_line(error)}") from None
 

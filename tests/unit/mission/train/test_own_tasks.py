@@ -37,6 +37,31 @@ class GentleBall(RollerBall):
 class NoTask:
     pass
 """
+LIGHTS = """
+import gymnasium
+import numpy as np
+
+
+class Lights(gymnasium.Env):
+    observation_space = gymnasium.spaces.Box(0, 255, (32, 32, 3), np.uint8)
+    action_space = gymnasium.spaces.Discrete(2)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.steps = 0
+        return self.seen(), {}
+
+    def step(self, action):
+        reward, self.steps = float(action == self.is_on), self.steps + 1
+        return self.seen(), reward, False, self.steps == 10, {}
+
+    def seen(self):
+        self.is_on = int(self.np_random.integers(2))
+        return np.full((32, 32, 3), 200 if self.is_on else 20, np.uint8)
+
+
+gymnasium.register("Lights-v0", entry_point=Lights)
+"""
 FEW = {"hyperparameters": {"batch_size": 128, "buffer_size": 512}, "network_settings": {"hidden_units": 16}}
 
 
@@ -50,8 +75,9 @@ def own_module(tmp_path, monkeypatch):
     sys.modules.pop("own_tasks", None)
 
 
-def config(max_steps=1000, **settings):
+def config(max_steps=1000, network=None, **settings):
     behavior = {"trainer_type": "ppo", **FEW, "max_steps": max_steps, "summary_freq": 512}
+    behavior["network_settings"] = FEW["network_settings"] | (network or {})
     block = {"behaviors": {"Own": behavior}, "env_settings": {"num_areas": 8, **settings}}
     Path("few.yaml").write_text(yaml.safe_dump(block), encoding="utf-8")
     return "few.yaml"
@@ -121,6 +147,18 @@ def test_an_environment_of_gymnasium_is_trained_judged_shown_and_exported():
     inputs = {"obs_0": np.zeros((1, 4), np.float32), "action_masks": np.ones((1, 2), np.float32)}
     outputs = network.run(["deterministic_discrete_actions"], inputs)
     assert outputs[0].ravel()[0] in {0, 1}
+
+
+def test_an_environment_that_shows_an_image_alone_is_learned():
+    Path("lights.py").write_text(LIGHTS, encoding="utf-8")
+    network = {"vis_encode_type": "compact", "normalize": True}
+    trained(config(6000, network), "--gym", "lights:Lights-v0", "--run-id", "lights")
+    result = honeyguide("eval", "lights", "--task", "gym:lights:Lights-v0", "--episodes", "10")
+    assert result.exit_code == 0, result.output
+    assert re.search(r"mean reward\W+10\.0", result.output)  # the button of every light
+    result = honeyguide("eval", "lights")
+    assert result.exit_code == 2
+    assert "name it yourself, as --task gym:lights:Lights-v0" in result.stderr
 
 
 def test_its_arguments_are_settings_that_the_policy_remembers():

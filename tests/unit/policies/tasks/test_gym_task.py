@@ -202,7 +202,7 @@ def test_a_vector_environment_without_a_single_one_is_taken_if_it_waits_for_rese
     ("name", "says"),
     [
         ("gym:Nope-v1", "gym:Nope-v1: Environment `Nope` doesn't exist"),
-        ("gym:nope:Nope-v1", "gym:nope:Nope-v1: "),
+        ("gym:nope:Nope-v1", "gym:nope:Nope-v1: there is no module nope"),
         ("Nope", "Nope: no such task; there are RollerBall.* module:Class for your own"),
         ("nope:Nope", "nope:Nope: there is no module nope"),
         ("policies.tasks.roller_ball:Nope", "policies.tasks.roller_ball has no Nope"),
