@@ -18,7 +18,7 @@ class Hull(NamedTuple):
 
 
 class BulletBody(NamedTuple):
-    """A class of bodies. The kernel functions leave out motion; the world that they get has no obstacles but vehicles."""
+    """A class of bodies. The kernel functions leave out motion; of obstacles their world has other vehicles alone."""
 
     Inputs: type
     """Kernel struct of what stays the same over the substeps of a tick."""

@@ -1,8 +1,8 @@
 """A multirotor for Bullet: our rotors, air, legs and battery; rotor discs and what is above the legs are Bullet's.
 
 The ground pushes at feet and rotor tips as in the native engine, by springs with dampers. The balls that stand for feet
-touch what is not ground, and ground only when the legs have yielded far. So do other vehicles push at its hull, of which
-Bullet does not know.
+touch what is not ground, and ground only when the legs have yielded far. Other vehicles, of which Bullet does not know,
+push at its hull by springs, too.
 """
 
 from typing import Any
