@@ -60,17 +60,23 @@ def api_port_of(options: FlightOptions, i_vehicle: int) -> int:
 
 def _check_ports(options: FlightOptions, i_vehicle: int) -> None:
     """The clients' two ports and the vehicle's own two must exist and be four."""
-    gcs_port, api_port = options.gcs_port, options.api_port
+    gcs_port, api_port, nth = options.gcs_port, options.api_port, f" {i_vehicle + 1}" if i_vehicle else ""
     for name, port, step in (("gcs", gcs_port, GROUND_PORT_STEP), ("api", api_port, API_PORT_STEP)):
         if port + step + i_vehicle > PORT_MAX:
             raise UserError(
                 f"--{name}-port {port}: must be at most {PORT_MAX - step - i_vehicle}: "
                 f"the vehicle's own is {step + i_vehicle} above"
             )
-    own = (gcs_port + GROUND_PORT_STEP, api_port + API_PORT_STEP)
-    if len({gcs_port, api_port, *own}) < 4:
+    tcp_port = 0 if options.tcp_port is None else options.tcp_port + TCP_PORT_STEP * i_vehicle
+    if tcp_port > PORT_MAX:
         raise UserError(
-            f"--gcs-port {gcs_port} and --api-port {api_port}: must differ, also from the vehicle's own ports "
+            f"--tcp-port {options.tcp_port}: must be at most {PORT_MAX - TCP_PORT_STEP * i_vehicle}: "
+            f"that of vehicle{nth} is {TCP_PORT_STEP * i_vehicle} above"
+        )
+    own = (gcs_port + GROUND_PORT_STEP + i_vehicle, api_port + API_PORT_STEP + i_vehicle)
+    if len({gcs_port, api_port_of(options, i_vehicle), *own}) < 4:
+        raise UserError(
+            f"--gcs-port {gcs_port} and --api-port {api_port}: must differ, also from the own ports of vehicle{nth}, "
             f"{own[0]} and {own[1]}"
         )
 

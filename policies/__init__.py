@@ -7,10 +7,11 @@ try:
 except ModuleNotFoundError:  # it comes with the extra `gym`; a policy flies without it
     pass
 else:
-    for _name in CATALOGUE:
+    for _name, _entry in CATALOGUE.items():
         gymnasium.register(
             id=f"honeyguide/{_name}-v0",
             entry_point="policies.tasks.gym:TaskEnv",
             vector_entry_point="policies.tasks.gym:TaskVectorEnv",
+            max_episode_steps=_entry.max_episode_steps,
             kwargs={"task": _name},
         )

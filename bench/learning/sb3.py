@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
-from policies.tasks.gym import TaskVectorEnv, action_space, observation_space
+from policies.tasks.gym import TaskVectorEnv
+from policies.tasks.gym_arrays import action_space, observation_space
 
 
 class BatchVecEnv(VecEnv):  # type: ignore[misc]  # its package has no types

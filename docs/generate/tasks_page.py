@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from policies.tasks.catalogue import CATALOGUE, build_task, task_settings
+from policies.tasks.catalogue import CATALOGUE, build_task, settings_class, task_settings
 from policies.tasks.episode import Outcome
 from policies.tasks.layout import Branch, Element, Layout
 from policies.tasks.task import Task
@@ -50,6 +50,7 @@ OUTCOMES = {
     Outcome.FELL: "ended under the floor",
     Outcome.HIT_OTHER: "rolled over, struck an edge, or came too near a person",
     Outcome.LOST: "lost whom it followed, or left the forest upwards, the ball it hovers in, or the way to its goal",
+    Outcome.ENDED: "was ended by an environment of Gymnasium, which does not say how",
 }
 
 
@@ -72,7 +73,7 @@ def _section(name: str) -> str:
 
 def _presets(name: str) -> list[str]:
     """The presets that a task has."""
-    return _choices_of(CATALOGUE[name].settings.model_json_schema()["properties"]["preset"])
+    return _choices_of(settings_class(name).model_json_schema()["properties"]["preset"])
 
 
 def _preset_table(presets: dict[str, Task]) -> str:
@@ -100,7 +101,7 @@ def _choices(branch: Branch) -> str:
 
 def _settings_table(name: str) -> str:
     rows = ["| setting | default | values | meaning |", "|---|---|---|---|"]
-    for key, schema in CATALOGUE[name].settings.model_json_schema()["properties"].items():
+    for key, schema in settings_class(name).model_json_schema()["properties"].items():
         default = str(schema["default"]).lower() if schema["default"] not in {"", "auto"} else "as the preset"
         rows.append(f"| `{key}` | {default} | {_values(schema)} | {_one_line(schema.get('description', ''))} |")
     return "\n".join(rows) + "\n"

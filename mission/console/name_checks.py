@@ -41,9 +41,10 @@ def check_recipe(name: str) -> None:
     """Refuses what is neither a configuration file nor a recipe."""
     from policies.learn.config.recipes import recipe
     from policies.learn.config.yaml_locations import ConfigError
+    from policies.tasks.catalogue import is_task_name
 
     try:
-        if not (name.endswith((".yaml", ".yml")) or Path(name).is_file()):
+        if not (name.endswith((".yaml", ".yml")) or Path(name).is_file() or is_task_name(name)):
             recipe(name)
     except ConfigError as error:
         refuse(str(error))
@@ -62,10 +63,10 @@ def check_policy(name: str) -> None:
 def check_task_or_policy(name: str) -> None:
     """Refuses what is neither."""
     from policies.learn.export.policy_path import CheckpointError, find_policy
-    from policies.tasks.catalogue import CATALOGUE
+    from policies.tasks.catalogue import is_task_name, task_names
 
     try:
-        if name not in CATALOGUE:
+        if not is_task_name(name):
             find_policy(name)
     except CheckpointError as error:
-        refuse(f"{error}; the tasks are {', '.join(CATALOGUE)}")
+        refuse(f"{error}; the tasks are {', '.join(task_names())}")

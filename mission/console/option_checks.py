@@ -45,6 +45,14 @@ def check_end(options: FlightOptions, speed: float | None) -> None:
         raise UserError("--idle --speed max: nobody can connect, so give --seconds to say when it ends")
 
 
+def check_alone(options: FlightOptions) -> None:
+    """Refuses what only several vehicles have, where there is one."""
+    if options.vehicles is None:
+        for flag, name in (("--adsb", "has_transponders"), ("--spacing", "spacing_m")):
+            if getattr(options, name) != FlightOptions.model_fields[name].default:
+                raise UserError(f"{flag}: is for several vehicles; add --vehicles")
+
+
 def check_owner(options: FlightOptions) -> None:
     """Refuses an owner who does not move as owners do."""
     if options.owner not in (None, *get_args(Pace)):
@@ -60,6 +68,7 @@ def check_options(options: FlightOptions) -> None:
         UserError: an option, the plan or the airframe is wrong.
     """
     check_end(options, speed_of(options.speed))
+    check_alone(options)
     try:
         if options.plan is not None:
             read_plan(options.plan)

@@ -4,7 +4,7 @@ In: the options. Out: the airframe of each vehicle.
 """
 
 from common.airframe import AirframeError, load_airframe
-from mission.console.option_checks import UserError
+from mission.console.option_checks import UserError, check_engine
 from mission.flight_settings import FlightOptions
 
 VEHICLES_MAX = 100
@@ -32,7 +32,7 @@ def airframes_of(text: str, airframe: str) -> list[str]:
 
 
 def check_fleet(options: FlightOptions) -> None:
-    """Refuses options that several vehicles cannot share, or airframes that are none.
+    """Refuses options that several vehicles cannot share, and airframes that are none or that the engine does not move.
 
     Raises:
         UserError: of such.
@@ -42,13 +42,12 @@ def check_fleet(options: FlightOptions) -> None:
         "--state": options.state is not None,
         "--stream-port": options.stream_port != 0,
         "--video-port": bool(options.video_port),
-        f"--engine {options.engine}": options.engine != "native",
     }
     for name, is_given in alone.items():
         if is_given:
             raise UserError(f"--vehicles and {name}: choose one, it is for a single vehicle")
     try:
         for airframe in dict.fromkeys(airframes_of(options.vehicles or "1", options.airframe)):
-            load_airframe(airframe)
+            check_engine(options.model_copy(update={"airframe": airframe}), load_airframe(airframe))
     except AirframeError as error:
         raise UserError(f"--vehicles {options.vehicles}: {error}") from error

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from mission.log.flight_summary import Summary
     from mission.view.live import LiveView
     from mission.view.page import PageServer
+    from sim.world.world import WorldMap
 
 
 def fly_fleet(options: FlightOptions) -> int:
@@ -43,15 +44,18 @@ def fly_fleet(options: FlightOptions) -> int:
     """
     speed, console = speed_of(options.speed), Console()
     airframes = airframes_of(options.vehicles or "1", options.airframe)
+    base = flight_config(options.model_copy(update={"airframe": _needing_most(airframes)}), None)
     try:
-        check_fleet_parameters(flight_config(options, None), airframes)
+        check_fleet_parameters(base, airframes)
     except ParameterError as error:
         raise UserError(str(error)) from error
     links = [] if speed is None else _open_all(options, speed, len(airframes))
     page = open_page(options.view_port) if options.has_view else None
+    with loading(console) as say:
+        world, configs = _place(options, base, airframes, say)
     with run_folder(options.run_folder) as folder:
         with loading(console) as say:
-            fleet = _make_fleet(options, airframes, links, speed, folder, say)
+            fleet = _make_fleet(options, world, configs, links, speed, folder, say)
         from mission.fleet.fleet_table import print_start
 
         print_start(fleet, options, speed, folder, console)
@@ -73,30 +77,45 @@ def _open_all(options: FlightOptions, speed: float, count: int) -> list[list[Lin
     return opened
 
 
+def _needing_most(airframes: list[str]) -> str:
+    """Of several airframes, the one that the world is made for: the first that needs a runway, if there is one."""
+    from sim.bodies.vehicles import class_of
+
+    return next((name for name in airframes if class_of(load_airframe(name)).needs_runway), airframes[0])
+
+
+def _place(
+    options: FlightOptions, base: "FlightConfig", airframes: list[str], say: Say
+) -> tuple["WorldMap", list["FlightConfig"]]:
+    """The world, and the configuration of each vehicle, which knows its place in it."""
+    from mission.simulator.flight_rig import flight_world
+
+    say("building the world")
+    world = flight_world(base)
+    return world, fleet_configs(base, airframes, world, options.spacing_m)
+
+
 def _make_fleet(
     options: FlightOptions,
-    airframes: list[str],
+    world: "WorldMap",
+    configs: list["FlightConfig"],
     links: list[list[LinkSource]],
     speed: float | None,
     folder: Path,
     say: Say,
 ) -> "FleetFlight":
-    """World and vehicles, their kernels loaded."""
+    """The vehicles, their kernels loaded."""
     from mission.fleet.fleet_flight import FleetFlight
     from mission.kernel_loading import load_kernels
-    from mission.simulator.flight_rig import flight_world
 
-    base = flight_config(options, None)
     has_camera = speed is not None or options.has_view
-    for airframe in dict.fromkeys(airframes):
-        load_kernels(say, base.model_copy(update={"airframe": airframe}), has_camera=has_camera)
-    say("building the world")
-    world = flight_world(base)
+    for config in {config.airframe: config for config in configs}.values():
+        load_kernels(say, config, has_camera=has_camera)
     return FleetFlight(
-        fleet_configs(base, airframes, world, options.spacing_m),
+        configs,
         world,
         links=links,
-        signing=[signing_config(options, speed, None) for _ in airframes],
+        signing=[signing_config(options, speed, None) for _ in configs],
         folder=folder,
         has_transponders=options.has_transponders,
         has_camera_threads=speed is not None,

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from autopilot.mavlink.server import SYSID_PARAMETER
 from common.airframe import load_airframe
 from common.geodesy import GeoPoint, geodetic_from_ned
+from common.params import ParameterError
 from mission.console.option_checks import UserError
 from mission.flight_config import FlightConfig, flight_parameters
 from sim.world.world import WorldMap
@@ -65,7 +66,13 @@ def check_fleet_parameters(base: FlightConfig, airframes: Sequence[str]) -> None
 
 
 def _own_parameters(base: FlightConfig, airframe: str) -> dict[str, float]:
-    """Those of the given ones that a vehicle has."""
+    """Those of the given ones that a vehicle has.
+
+    Raises:
+        ParameterError: the number of the vehicle is one of them.
+    """
+    if SYSID_PARAMETER in base.parameters:
+        raise ParameterError(f"{SYSID_PARAMETER}: several vehicles are numbered from 1, leave it out")
     has = flight_parameters(base.model_copy(update={"parameters": {}}), load_airframe(airframe))
     return {name: value for name, value in base.parameters.items() if name in has}
 

@@ -23,7 +23,7 @@ from policies.experts.catalogue import build_expert
 from policies.experts.expert import Expert, RandomDriver
 from policies.learn.export.policy_path import CheckpointError, find_policy
 from policies.pretrained.pretrained_policies import pretrained
-from policies.tasks.catalogue import CATALOGUE, build_task, settings_of
+from policies.tasks.catalogue import build_task, is_task_name, settings_of, task_names
 from policies.tasks.episode import Outcome
 from policies.tasks.layout import LayoutError
 from policies.tasks.task import Scores, Task
@@ -60,6 +60,7 @@ def play_task(options: PlayOptions, console: Console) -> str:
         VideoError: the film cannot be written.
     """
     task, driver, who = _cast(options)
+    _check_view(task)
     with ExitStack() as stack:
         if options.mp4 is not None:
             say = stack.enter_context(busy(console, f"filming {options.episodes} episodes of {task.layout.task}"))
@@ -73,9 +74,18 @@ def play_task(options: PlayOptions, console: Console) -> str:
         return f"{who}: {in_words(_shown(task, driver, options, _showing(window, task.decision_s)))}"
 
 
+def _check_view(task: Task) -> None:
+    """Refuses a task that nothing can be seen of, before a window or a film is begun."""
+    try:
+        task.reset(0)
+        task.top_view(0)
+    except NotImplementedError as error:
+        raise PlayError(str(error)) from None
+
+
 def _cast(options: PlayOptions) -> tuple[Task, Expert, str]:
     """The task, whoever drives it, and what they are called."""
-    is_task = options.what in CATALOGUE
+    is_task = is_task_name(options.what)
     if is_task and options.is_random:
         return task_of(options.what, options.env_args, options.envs)[0], RandomDriver(options.seed), "chance"
     if not is_task or options.policy is not None:
@@ -95,13 +105,13 @@ def _with_policy(options: PlayOptions, name: str) -> tuple[Task, Expert, str]:
     from policies.learn.export.policy_driver import PolicyDriver
     from policies.learn.export.policy_file import load_policy
 
-    is_task = options.what in CATALOGUE
+    is_task = is_task_name(options.what)
     try:
         path = find_policy(name)
         policy, card = load_policy(path)
+        task_name = options.what if is_task else card.trusted_task(path, f"play {card.task} --policy {name}")
     except CheckpointError as error:
-        raise PlayError(str(error) if is_task else f"{error}; the tasks are {', '.join(CATALOGUE)}") from None
-    task_name = options.what if is_task else card.task
+        raise PlayError(str(error) if is_task else f"{error}; the tasks are {', '.join(task_names())}") from None
     is_own = task_name == card.task
     settings = settings_of(task_name, options.env_args, card.settings if is_own else {})
     task = build_task(task_name, options.envs, settings)

@@ -11,7 +11,8 @@ from mission.console.name_checks import check_task, check_task_or_policy
 from mission.console.terminal import loading
 
 _TASK = typer.Argument(
-    help="A task's name: RollerBall, ReachTarget, Parking1, Parking2, FollowMe, Hover, Drive, Navigate."
+    help="A task's name: RollerBall, ReachTarget, Parking1, Parking2, FollowMe, Hover, Drive, Navigate; "
+    "or module:Class of your own."
 )
 _EnvArgs = Annotated[
     list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as preset=improved. Repeatable.")

@@ -29,7 +29,16 @@ from policies.learn.rollout.demonstrations import DemonstrationError
 from policies.learn.trainer import Progress as TrainingProgress
 from policies.learn.trainer import Result, train
 from policies.learn.training_run_folder import RunError, RunFolder
-from policies.tasks.catalogue import CATALOGUE, UnknownTask, settings_of
+from policies.tasks.catalogue import (
+    CATALOGUE,
+    GYM,
+    UnknownTask,
+    build_task,
+    file_stem,
+    is_task_name,
+    settings_of,
+    task_names,
+)
 from policies.tasks.layout import LayoutError
 from policies.tasks.task_params import NumberError
 
@@ -45,7 +54,7 @@ _ENDS = {"max_steps": "all steps done", "success_target": "success target reache
 class TrainingRequest:
     """What `honeyguide train` is given."""
 
-    task_or_config: str
+    task_or_config: str | None
     given: CommandLine
     behavior: str | None
     is_strict: bool
@@ -76,9 +85,14 @@ def chosen_config(request: TrainingRequest) -> Loaded:
     Raises:
         ConfigError: no such recipe, or something wrong in the file or in a flag.
     """
-    name, given = request.task_or_config, request.given
+    name, given = request.task_or_config or request.given.env or "", request.given
+    if not name:
+        raise ConfigError("give a task, a recipe, a .yaml file, or --gym")
     is_file = name.endswith((".yaml", ".yml")) or Path(name).is_file()
-    path = Path(name) if is_file else recipe(name)
+    is_own = not is_file and name not in CATALOGUE and is_task_name(name)
+    if is_own and given.env is None:
+        given = replace(given, env=name)
+    path = Path(name) if is_file else recipe(_recipe_of(name) if is_own else name)
     loaded = load_config(
         path,
         request.behavior,
@@ -87,11 +101,24 @@ def chosen_config(request: TrainingRequest) -> Loaded:
         sampler_path=given.sampler,
     )
     if not is_file and given.run_id is None and "run_id" not in loaded.config.checkpoint_settings.model_fields_set:
-        given = replace(given, run_id=path.stem)
+        given = replace(given, run_id=file_stem(name) if is_own else path.stem)
     loaded = with_command_line(loaded, given)
-    if not loaded.config.env_settings.env_path:
-        raise ConfigError(f"{name}: names no task in env_settings.env_path: give --env, one of {', '.join(CATALOGUE)}")
+    settings = loaded.config.env_settings
+    if not settings.env_path:
+        raise ConfigError(
+            f"{name}: names no task in env_settings.env_path: give --env, one of {', '.join(task_names())}, "
+            "module:Class for your own, or --gym ID"
+        )
+    if is_own or (
+        given.env is not None and given.env.startswith(GYM)
+    ):  # what it lacks is told without naming a line of a recipe
+        build_task(settings.env_path, 1, settings_of(settings.env_path, settings.env_args))
     return loaded
+
+
+def _recipe_of(name: str) -> str:
+    """The recipe for a task that has none of its own."""
+    return "gym" if name.startswith(GYM) else "own"
 
 
 def evaluate_policy(
@@ -110,7 +137,7 @@ def evaluate_policy(
     """
     path = find_policy(name)
     policy, card = load_policy(path)
-    task_name = task or card.task
+    task_name = task or card.trusted_task(path, f"--task {card.task}")
     own, params = (card.settings, card.samplers()) if task_name == card.task else ({}, {})
     settings = settings_of(task_name, pairs, {**own, "split": "test"})
     episodes, seed = episodes_and_seed
@@ -216,16 +243,19 @@ def _watched(console: Console, max_steps: int) -> Iterator[_Watcher]:
 
 def _figures(progress: TrainingProgress) -> str:
     parts = [f"{progress.steps_per_s:,.0f} steps/s"]
-    if progress.mean_reward is not None and progress.success_rate is not None:
-        parts += [f"reward {progress.mean_reward:.3f}", f"success {100.0 * progress.success_rate:.1f} %"]
+    if progress.mean_reward is not None:
+        parts.append(f"reward {progress.mean_reward:.3f}")
+    if progress.success_rate is not None:
+        parts.append(f"success {100.0 * progress.success_rate:.1f} %")
     return ", ".join([*parts, f"{timedelta(seconds=round(progress.left_s))} left"])
 
 
 def _summary(result: Result) -> str:
     progress = result.progress
     lines = [f"{_ENDS[result.end]}: {progress.steps:,} steps in {timedelta(seconds=round(progress.elapsed_s))}"]
-    if progress.success_rate is not None:
-        lines.append(f"training: success {100.0 * progress.success_rate:.1f} %, reward {progress.mean_reward:.3f}")
+    if progress.mean_reward is not None:
+        success = f"success {100.0 * progress.success_rate:.1f} %, " if progress.success_rate is not None else ""
+        lines.append(f"training: {success}reward {progress.mean_reward:.3f}")
     if result.judged is not None:
         lines.append(f"judged: success {_rate(result.judged)} of {result.judged.episodes} episodes it did not train on")
     return "\n".join([*lines, f"policy: {result.policy}, {result.network}"])
@@ -239,9 +269,11 @@ def _rate(evaluation: Evaluation) -> str:
 def _evaluation_table(evaluation: Evaluation) -> Table:
     table = Table("figure", "value")
     table.add_row("episodes", str(evaluation.episodes))
-    table.add_row("success rate", _rate(evaluation))
+    if evaluation.says_success:
+        table.add_row("success rate", _rate(evaluation))
     for outcome, count in evaluation.outcomes.items():
-        table.add_row(outcome.replace("_", " "), str(count))
+        if count:
+            table.add_row(outcome.replace("_", " "), str(count))
     table.add_row("mean reward", f"{evaluation.mean_return:.4f}")
     table.add_row("mean length", f"{evaluation.mean_length:.1f} decisions")
     return table

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _EnvArgs = Annotated[
     list[str] | None, typer.Option(help="A setting of the task: KEY=VALUE, as preset=improved. Repeatable.")
 ]
+_TASK_OR_CONFIG = typer.Argument(
+    help="A task or recipe by name, module:Class of a task of yours, or an ML-Agents .yaml file."
+)
 _NO_EFFECT = "Accepted for ML-Agents' command lines; no effect."
 _OLD = "Old name"
 _POLICY = typer.Argument(help="A policy file (.pt), a run's folder, or the name of a run in results/.")
@@ -28,8 +31,9 @@ _POLICY = typer.Argument(help="A policy file (.pt), a run's folder, or the name 
 
 def train(
     context: typer.Context,
-    task_or_config: Annotated[str, typer.Argument(help="A task or recipe by name, or an ML-Agents .yaml file.")],
-    env: Annotated[str | None, typer.Option(help="The task, if the .yaml file names none.")] = None,
+    task_or_config: Annotated[str | None, _TASK_OR_CONFIG] = None,
+    env: Annotated[str | None, typer.Option(help="The task, if the .yaml file or the recipe names none.")] = None,
+    gym: Annotated[str | None, typer.Option(help="An environment of Gymnasium instead of a task: its ID.")] = None,
     run_id: Annotated[str | None, typer.Option(help="Name of the run. Default: the recipe's, or ppo.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the run where it stopped.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a run of this name.")] = False,
@@ -76,7 +80,8 @@ def train(
     """Train a policy on a task, by one of our recipes or by an ML-Agents configuration."""
     options = locals()  # all that was given: nothing else has a name yet
     with learn_extra():
-        check_recipe(task_or_config)
+        if task_or_config is not None:
+            check_recipe(task_or_config)
         with loading(Console()):
             from mission.train.training import USER_ERRORS, TrainingRequest, train_run
         given = _command_line(options, context.args)
@@ -95,17 +100,21 @@ def _command_line(options: Mapping[str, Any], further: Sequence[str]) -> "Comman
     """
     from policies.learn.config.command_line import CommandLine
 
-    env_args = options["env_args"]
+    env_args, gym, env = options["env_args"], options["gym"], options["env"]
+    if gym is not None and env is not None:
+        refuse("--gym: not with --env, which names the task already")
     if further and env_args is None:
         refuse(f"{further[0]}: not expected; settings of the task go after --env-args")
     pairs = (*env_args, *further) if env_args is not None else None  # ML-Agents takes all that follow
     flags = {flag.name: options[flag.name] for flag in fields(CommandLine)}
-    return CommandLine(**flags | {"env_args": pairs})
+    return CommandLine(**flags | {"env_args": pairs, "env": env if gym is None else f"gym:{gym}"})
 
 
 def evaluate(
     policy: Annotated[str, _POLICY],
-    task: Annotated[str | None, typer.Option(help="Another task of the same layout. Default: the policy's.")] = None,
+    task: Annotated[
+        str | None, typer.Option(help="Another task of the same layout. Default: the policy's, unless it is yours.")
+    ] = None,
     env_args: _EnvArgs = None,
     episodes: Annotated[int, typer.Option(min=1, max=10_000_000, help="How many are played.")] = 1000,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of the episodes.")] = 0,

@@ -162,8 +162,7 @@ class LiveView:
             self._chosen, self._text_count = self._controls.flight, 0
         chosen = self._chosen_moment()
         obstacles = self._chosen.controller.state.obstacles
-        if obstacles is not None and obstacles.body_m:
-            self._scene.draw_rays(chosen, obstacles.body_m)
+        self._scene.draw_rays(chosen, () if obstacles is None else obstacles.body_m or ())
         self._move_cameras(chosen)
         if self._is_due("status", STATUS_S):
             self._show_texts(chosen)

@@ -6,7 +6,7 @@ vehicle disarmed for long there is a moment each second (`mission.log.kept_frame
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from math import nan
 from pathlib import Path
@@ -64,9 +64,11 @@ class Recording:
         return Recording(self.config, self.rows[::frames], self.path_ned, others)
 
     def at(self, time_s: NDArray[np.float64]) -> "Recording":
-        """The same at other moments, each the last one that it has till then."""
+        """The same at other moments, at each as it was last till then."""
         found = np.searchsorted(self.rows["time_s"], time_s, side="right") - 1
-        return Recording(self.config, self.rows[np.maximum(found, 0)], self.path_ned)
+        rows = self.rows[np.maximum(found, 0)]
+        rows["time_s"] = time_s
+        return Recording(self.config, rows, self.path_ned)
 
 
 def keep_for_replay(
@@ -106,9 +108,10 @@ def load_recording(folder: Path) -> Recording:
     vehicles = vehicle_folders(folder)
     if not vehicles:
         return _load_one(folder)
-    first, *others = (_load_one(vehicle) for vehicle in vehicles)
-    times: NDArray[np.float64] = first.rows["time_s"]
-    return Recording(first.config, first.rows, first.path_ned, tuple(other.at(times) for other in others))
+    found = [_load_one(vehicle) for vehicle in vehicles]
+    times = np.unique(np.concatenate([each.rows["time_s"] for each in found]))  # one that waits has few moments
+    first, *others = (each.at(times) for each in found)
+    return replace(first, others=tuple(others))
 
 
 def _load_one(folder: Path) -> Recording:

@@ -22,7 +22,7 @@ import gymnasium
 
 from common.files import part_path
 from policies.experts.episode_recording import Episode
-from policies.tasks.gym import action_space, observation_space
+from policies.tasks.gym_arrays import action_space, observation_space
 from policies.tasks.layout import Layout
 from policies.tasks.task import TaskSettings
 
@@ -105,8 +105,9 @@ def _write(folder: Path, origin: Origin, episodes: Sequence[Episode]) -> None:
 
     layout = origin.layout
     settings = origin.settings.model_dump(mode="json")
-    spec = copy.deepcopy(gymnasium.spec(f"honeyguide/{layout.task}-v0"))  # the registry's own must stay as it is
-    spec.kwargs = {**spec.kwargs, **settings}
+    spec = copy.deepcopy(gymnasium.registry.get(f"honeyguide/{layout.task}-v0"))  # the registry's own must stay
+    if spec is not None:  # a task of the user's own has none
+        spec.kwargs = {**spec.kwargs, **settings}
     storage = MinariStorage.new(folder, observation_space(layout), action_space(layout), spec)
     storage.update_episodes(
         EpisodeBuffer(

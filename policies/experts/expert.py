@@ -40,13 +40,13 @@ class NewEpisodes:
 
     def __init__(self) -> None:
         self._seen: NDArray[Any] = np.zeros(0, dtype=np.int32)
-        self._seed = -1
+        self._seeds: NDArray[Any] = np.zeros(0, dtype=np.int32)
 
     def rows(self, task: Task) -> NDArray[np.intp]:
         """The rows that are in another episode than at the last call; at the first, all of them."""
         episodes: NDArray[Any] = task.buffers.episodes.numpy()
-        seed = int(task.buffers.seed.numpy()[0])
-        is_other = seed != self._seed or len(self._seen) != len(episodes)
+        seeds: NDArray[Any] = task.buffers.seed.numpy()
+        is_other = not np.array_equal(seeds, self._seeds)
         rows = np.arange(len(episodes)) if is_other else np.flatnonzero(episodes != self._seen)
-        self._seen, self._seed = episodes.copy(), seed
+        self._seen, self._seeds = episodes.copy(), seeds.copy()
         return rows

@@ -5,7 +5,7 @@ many episodes each environment plays is decided before the first one begins.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -31,6 +31,7 @@ class Evaluation:
     outcomes: dict[str, int]  # episodes by name of the outcome, in lower case
     mean_return: float
     mean_length: float  # [decisions]
+    says_success: bool = True  # whether the task does; else none of its episodes is one
 
     @property
     def episodes(self) -> int:
@@ -85,7 +86,8 @@ def evaluate(
     generator = None if is_greedy else torch.Generator(device).manual_seed(seed)
     with few_threads(has_images=task.layout.image is not None):
         tally = _Tally(_quota(episodes, task.env_count), longest)
-        return _play(policy, task, tally, generator, progress)
+        evaluation = _play(policy, task, tally, generator, progress)
+    return replace(evaluation, says_success=task.says_success)
 
 
 def _quota(episodes: int, env_count: int) -> NDArray[np.int64]:

@@ -46,6 +46,7 @@ class Progress:
     steps_per_s: float
     elapsed_s: float  # of training, also before it was resumed
     scores: Scores  # of the last episodes
+    says_success: bool = True  # whether the task does
 
     @property
     def left_s(self) -> float:
@@ -55,7 +56,7 @@ class Progress:
     @property
     def success_rate(self) -> float | None:
         count = self.scores.episode_count
-        return self.scores.count(Outcome.SUCCESS) / count if count else None
+        return self.scores.count(Outcome.SUCCESS) / count if count and self.says_success else None
 
     @property
     def mean_reward(self) -> float | None:
@@ -270,8 +271,10 @@ class Training:
     def _card(self) -> PolicyCard:
         progress = self._progress()
         figures: dict[str, float] = {}
-        if progress.success_rate is not None and progress.mean_reward is not None:
-            figures = {"training_success_rate": progress.success_rate, "training_reward": progress.mean_reward}
+        if progress.mean_reward is not None:
+            figures["training_reward"] = progress.mean_reward
+        if progress.success_rate is not None:
+            figures["training_success_rate"] = progress.success_rate
         if self._judged is not None:
             low, high = self._judged.interval
             figures |= {"success_rate": self._judged.success_rate, "success_low": low, "success_high": high}
@@ -284,7 +287,7 @@ class Training:
         (then_s, then_steps), steps = self._moments[0], self.learner.steps
         rate = (steps - then_steps) / max(self._moments[-1][0] - then_s, 1e-9)
         elapsed_s = self._elapsed_before_s + now_s - self._begin_s
-        return Progress(steps, self.behavior.max_steps, rate, elapsed_s, self.recent.scores)
+        return Progress(steps, self.behavior.max_steps, rate, elapsed_s, self.recent.scores, self.task.says_success)
 
     def _set_params(self) -> None:
         try:

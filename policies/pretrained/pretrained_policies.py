@@ -8,5 +8,7 @@ from policies.tasks.catalogue import file_stem
 
 def pretrained(name: str) -> Path | None:
     """The policy of a task (`ReachTarget`) or of that name (`reach-target`); None if none ships."""
+    if ":" in name:  # a task of one's own may be called as ours is
+        return None
     path = Path(str(files("policies.pretrained"))) / f"{file_stem(name)}.pt"
     return path if path.is_file() else None

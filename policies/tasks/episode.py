@@ -33,6 +33,7 @@ class Outcome(IntEnum):
     FELL = 5
     HIT_OTHER = 6  # rolled over, struck an edge, came too near a person
     LOST = 7  # what was to be followed
+    ENDED = 8  # by an outside environment, which does not say how
 
 
 RUNNING = wp.constant(int(Outcome.RUNNING))
@@ -70,7 +71,7 @@ class StepBuffers:
     returns: wp.array(dtype=float)  # sum of its rewards
     episodes: wp.array(dtype=int)  # episodes begun; keys the draws
     scores: wp.array2d(dtype=float)  # of ended episodes since they were last taken, (envs, SCORE_COLUMNS)
-    seed: wp.array(dtype=int)  # (1,)
+    seed: wp.array(dtype=int)  # of the draws, with the row and the episode
     samplers: wp.array2d(dtype=float)  # what numbers are drawn from
     params: wp.array2d(dtype=float)  # of the running episode, (envs, numbers)
     frame_size: int
@@ -126,7 +127,7 @@ def begin_episode(buffers: StepBuffers, i: int) -> int:
     buffers.returns[i] = 0.0
     for k in range(buffers.observations.shape[1]):
         buffers.observations[i, k] = 0.0
-    draw_params(buffers.samplers, buffers.params, buffers.seed[0], i, episode)
+    draw_params(buffers.samplers, buffers.params, buffers.seed[i], i, episode)
     return episode
 
 

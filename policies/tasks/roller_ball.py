@@ -92,7 +92,7 @@ def place(buffers: StepBuffers, state: RollerBallState, i: int, is_ball_lost: bo
     if is_ball_lost:
         state.pos[i] = wp.vec3(0.0, 0.5, 0.0)
         state.vel[i] = wp.vec3(0.0, 0.0, 0.0)
-    rng = draw_key(buffers.seed[0], i, episode, _PLACE_STREAM)
+    rng = draw_key(buffers.seed[i], i, episode, _PLACE_STREAM)
     half = state.params[i].half_spawn_m
     x = half * (2.0 * wp.randf(rng) - 1.0)
     z = half * (2.0 * wp.randf(rng) - 1.0)

@@ -5,11 +5,13 @@ A task is a subclass that declares a layout and numbers, makes its own arrays wi
     begin(buffers, is_chosen, state…)   starts an episode in the chosen rows
     step(buffers, state…)               one decision of every row; rows whose episode ends begin the next
 
-The learner sees arrays only: actions in; observations, rewards and ends out. Nothing here knows torch or Gymnasium.
+A subclass of a task that exists need write no kernel: `added` with `observe`, `outcome` and `reward` change what it
+shows, how it ends and what it pays. The learner sees arrays only: actions in; observations, rewards and ends out.
+Nothing here knows torch or Gymnasium.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -20,7 +22,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from common.records import assign_rows
 from policies.tasks.episode import OUTCOME_COUNT, SCORE_COLUMNS, Outcome, StepBuffers, keep_last_image_rows
 from policies.tasks.goals import PositionGoal
-from policies.tasks.layout import Layout
+from policies.tasks.layout import Element, Layout
+from policies.tasks.reshaping import Array, Decision, Reshaping
 from policies.tasks.task_params import Sampler, TaskParam, TaskParamTable
 
 Preset = Literal["as-documented", "as-coded", "improved"]
@@ -72,11 +75,18 @@ class Task:
     """Simulated time between two decisions [s]."""
     goal: PositionGoal | None = None
     """How observations tell of the goal, for hindsight replay; none: they tell too little."""
+    settings_class: ClassVar[type[TaskSettings]] = TaskSettings
+    """What users may choose of it."""
+    added: ClassVar[tuple[Element, ...]] = ()
+    """Elements that a subclass adds to each frame, at its end; `observe` gives their values."""
+    says_success: bool = True
+    """Whether an episode that went well ends as `SUCCESS`; of some outside environments nobody knows."""
 
     def __init__(
         self, layout: Layout, env_count: int, *, number_defaults: Mapping[str, float | Sampler], device: str = "cpu"
     ) -> None:
-        self.layout = layout
+        self.layout = replace(layout, frame=(*layout.frame, *self.added))
+        layout = self.layout
         self.env_count = env_count
         self.device = device
         self._arrays: dict[str, Any] = {}
@@ -100,7 +110,7 @@ class Task:
         buffers.returns = self._zeros("returns", env_count, float)
         buffers.episodes = self._zeros("episodes", env_count, int)
         buffers.scores = self._zeros("scores", (env_count, SCORE_COLUMNS), float)
-        buffers.seed = self._zeros("seed", 1, int)
+        buffers.seed = self._zeros("seed", env_count, int)
         buffers.params = self._zeros("numbers", (env_count, len(self.param_table.names)), float)
         buffers.samplers = self.param_table.array
         buffers.frame_size = layout.frame_size
@@ -108,6 +118,9 @@ class Task:
         self._is_chosen = wp.zeros(env_count, dtype=wp.bool, device=device)
         self._begin: Any = None
         self._step: Any = None
+        methods = ("observe", "outcome", "reward")
+        is_reshaped = self.added or any(getattr(type(self), name) is not getattr(Task, name) for name in methods)
+        self._reshaping = Reshaping(self) if is_reshaped else None
 
     def _zeros(self, name: str, shape: Any, dtype: Any) -> Any:
         """An array of the task's state: saved and restored by name."""
@@ -121,21 +134,78 @@ class Task:
         self._begin = wp.launch(begin, self.env_count, chosen, device=self.device, record_cmd=True)
         self._step = wp.launch(step, self.env_count, [self.buffers, *state], device=self.device, record_cmd=True)
 
-    def reset(self, seed: int) -> None:
-        """Starts all environments anew. The same seed gives the same episodes, whatever ran before."""
-        self.buffers.seed.fill_(seed % 2**31)
+    def reset(self, seed: int | Sequence[int], is_chosen: NDArray[np.bool_] | None = None) -> None:
+        """Starts environments anew. The same seed gives the same episodes, whatever ran before.
+
+        Args:
+            seed: of all rows, which differ; or one of each row, which then goes through the episodes of a batch of one
+                with that seed (of what flies, the noise of the sensors is still the row's own).
+            is_chosen: which rows, shape (envs,); all of them by default.
+        """
+        chosen = np.ones(self.env_count, dtype=np.bool_) if is_chosen is None else is_chosen
+        seeds = [seed] * self.env_count if isinstance(seed, int) else _row_seeds(seed)
+        values: dict[str, Any] = {"seed": np.array([each % 2**32 for each in seeds], np.uint32).view(np.int32)[chosen]}
         for name in ("episodes", "scores", "rewards", "outcomes", "is_terminated", "is_truncated"):
-            self._arrays[name].zero_()
-        self.begin(np.ones(self.env_count, dtype=np.bool_))
+            values[name] = 0
+        for name, value in values.items():
+            rows = self._arrays[name].numpy().copy()
+            rows[chosen] = value
+            self._arrays[name].assign(rows)
+        self.begin(chosen)
 
     def begin(self, is_chosen: NDArray[np.bool_]) -> None:
         """Starts an episode in the chosen rows, shape (envs,); the others are not touched."""
-        self._is_chosen.assign(is_chosen)
-        self._begin.launch()
+        self._launch_begin(is_chosen)
+        if self._reshaping is not None:
+            self._reshaping.begin()
 
     def step(self) -> None:
         """One decision of all environments, with the actions that lie in the buffers."""
+        if self._reshaping is None:
+            self._launch_step()
+            return
+        self._reshaping.note()
+        self._launch_step()
+        self._reshaping.step()
+
+    def step_others(self, is_held: NDArray[np.bool_]) -> None:
+        """One decision of all rows but the held ones, shape (envs,), which stay as they are: at an episode's start."""
+        kept = {
+            name: array.numpy()[is_held].copy()
+            for name, array in self._arrays.items()
+            if array.size and array.shape[0] == self.env_count
+        }
+        self.step()
+        for name, rows in kept.items():
+            all_rows = self._arrays[name].numpy()  # live on a CPU
+            all_rows[is_held] = rows
+            if self.device != "cpu":
+                self._arrays[name].assign(all_rows)
+
+    def _launch_begin(self, is_chosen: NDArray[np.bool_]) -> None:
+        """What `begin` does of the task's own."""
+        self._is_chosen.assign(is_chosen)
+        self._begin.launch()
+
+    def _launch_step(self) -> None:
+        """What `step` does of the task's own."""
         self._step.launch()
+
+    def observe(self, frames: Array) -> Array:
+        """The values of the `added` elements, shape (rows, added).
+
+        Args:
+            frames: what the task shows without them, shape (rows, elements).
+        """
+        raise NotImplementedError(f"{type(self).__name__}: elements are added, but there is no method observe")
+
+    def outcome(self, decision: Decision) -> Array:
+        """How each episode stands, shape (envs,): `Outcome` numbers. An end of the task's own stays an end."""
+        return decision.outcomes
+
+    def reward(self, decision: Decision) -> Array:
+        """What each decision is paid, shape (envs,); it is asked after `outcome`."""
+        return decision.rewards
 
     def keep_last_images(self) -> None:
         """Keeps the images of the episodes that just ended; to be called before those of the next ones are drawn."""
@@ -173,4 +243,19 @@ class Task:
 
     def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:
         """One environment seen from above, RGB, shape (height, width, 3)."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{self.layout.task}: draws no view of itself: it has no method top_view")
+
+
+def _row_seeds(seeds: Sequence[int]) -> list[int]:
+    """Seeds for the rows, with which each draws what row 0 draws with its own.
+
+    `draw_key` begins with Warp's rand_init(seed, row) = pcg(seed + pcg(row)).
+    """
+    return [seed + _pcg(0) - _pcg(i) for i, seed in enumerate(seeds)]
+
+
+def _pcg(state: int) -> int:
+    """Warp's `rand_pcg` (native/rand.h), after O'Neill 2014's PCG RXS-M-XS; 32 bits."""
+    b = (state * 747796405 + 2891336453) % 2**32
+    c = ((b >> ((b >> 28) + 4)) ^ b) * 277803737 % 2**32
+    return (c >> 22) ^ c

@@ -7,6 +7,7 @@ exchanged each millisecond. Who has to be answered how: sim/boards/json_wire.py 
 
 import socket
 from enum import Enum, auto
+from struct import Struct
 from typing import Any
 
 from common.clock import wall_time_s
@@ -20,6 +21,7 @@ from sim.rig import Rig
 PORT = 9002  # of the first instance; the next ones are 10 further each
 RESEND_S = 0.5  # what comes again sooner was on its way when we answered; SITL asks again after 1 s
 DATAGRAM_MAX = 4096
+_WAIT = Struct("ll").pack(int(POLL_S), round(POLL_S % 1.0 * 1e6))  # seconds and microseconds, as of struct timeval
 ROUNDING_NS = 1  # a step: SITL cuts its length to whole microseconds, and would lose one of most
 
 
@@ -94,7 +96,8 @@ class ArduPilotBoard:
         except OSError as error:
             self._socket.close()
             raise PeerError(f"UDP port {port} for ArduPilot is in use ({error.strerror})") from error
-        self._socket.settimeout(POLL_S)
+        # the kernel waits: Python's own time-outs take a call more for each packet
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _WAIT)
         self.local_port: int = self._socket.getsockname()[1]
         step_us = TICK_US // SUBSTEPS if self.is_fast else TICK_US
         self._step_ns = 1000 * step_us + ROUNDING_NS
@@ -188,7 +191,7 @@ class ArduPilotBoard:
         """The next packet and who sent it; None: nothing in time, or rubbish."""
         try:
             data, sender = self._socket.recvfrom(DATAGRAM_MAX)
-        except TimeoutError:
+        except BlockingIOError:  # nothing in time
             self._silent_s += POLL_S
             return None
         except ConnectionError:  # an earlier answer found nobody

@@ -9,8 +9,8 @@ from sim.bodies.multirotor import (
     body_at_rest,
     body_substep,
     body_tick,
+    body_truth,
     standing_height,
-    truth_of,
 )
 from sim.bodies.multirotor_model import MultirotorModel, multirotor_model
 from sim.world.neighbours import Outline, ball_outline
@@ -46,7 +46,7 @@ MULTIROTOR_BODY = Body(
     MultirotorModel,
     BodyState,
     body_tick,
-    truth_of,
+    body_truth,
     body_at_rest,
     standing_height,
     multirotor_model,

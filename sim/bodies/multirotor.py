@@ -10,7 +10,6 @@ import warp as wp
 
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S, vec8
-from common.rotation import quat_from_yaw
 from sim.battery import discharged
 from sim.bodies.contact import (
     ContactForce,
@@ -22,7 +21,7 @@ from sim.bodies.contact import (
     obstacle_force,
 )
 from sim.bodies.multirotor_model import MultirotorModel
-from sim.bodies.rigid_body import hull_drag, lag_gain, turned_by
+from sim.bodies.rigid_body import held, hull_drag, lag_gain, rested, truth_of, turned_by
 from sim.truth import Truth
 from sim.world.world import World
 
@@ -283,12 +282,9 @@ def drain_battery(model: MultirotorModel, body: BodyState, density: float, dt: f
 @wp.func
 def held_tick(body: BodyState, dt: float) -> BodyState:
     """A step of dt [s] of a vehicle that is held in its place and turned at omega_frd, rotors stopped."""
-    out = body
-    out.vel_ned = wp.vec3()
-    out.gyro_frd = body.omega_frd
-    out.accel_frd = wp.quat_rotate_inv(body.q_ned_from_frd, -_GRAVITY_NED)
-    out.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.omega_frd * dt)
-    return out
+    body = held(body, dt)
+    body.rotor_speed = vec8()
+    return body
 
 
 @wp.func
@@ -325,35 +321,17 @@ def body_substep(model: MultirotorModel, body: BodyState, command: vec8, wind_ne
 
 
 @wp.func
-def truth_of(body: BodyState) -> Truth:
+def body_truth(body: BodyState) -> Truth:
     """What others may read of the body."""
-    truth = Truth()
-    truth.pos_ned = body.pos_ned
-    truth.vel_ned = body.vel_ned
-    truth.q_ned_from_frd = body.q_ned_from_frd
-    truth.omega_frd = body.omega_frd
-    truth.accel_frd = body.accel_frd
-    truth.gyro_frd = body.gyro_frd
+    truth = truth_of(body)
     truth.motor_speed = body.rotor_speed
-    truth.height_agl_m = body.height_agl_m
-    truth.battery_voltage_v = body.battery_voltage_v
-    truth.battery_current_a = body.battery_current_a
-    truth.is_on_ground = body.is_on_ground
-    truth.is_crashed = body.is_crashed
-    truth.impact_speed = body.impact_speed
     return truth
 
 
 @wp.func
 def body_at_rest(model: MultirotorModel, pos_ned: wp.vec3, yaw_rad: float) -> BodyState:
     """A vehicle level and still at pos_ned, rotors stopped, battery full."""
-    body = BodyState()
-    body.pos_ned = pos_ned
-    body.q_ned_from_frd = quat_from_yaw(yaw_rad)
-    body.accel_frd = -_GRAVITY_NED
-    body.battery_charge_c = model.battery.capacity_c
-    body.battery_voltage_v = model.battery.full_v
-    return body
+    return rested(BodyState(), model.battery, pos_ned, yaw_rad)
 
 
 @wp.func

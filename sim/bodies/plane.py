@@ -9,14 +9,13 @@ import warp as wp
 
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S, vec8
-from common.rotation import quat_from_yaw
 from sim.battery import discharged
 from sim.bodies.body import Body
 from sim.bodies.contact import ContactForce, Surroundings, look_around, obstacle_force
 from sim.bodies.plane_air import SEA_LEVEL_DENSITY_KG_M3, air_force, propeller_step
 from sim.bodies.plane_gear import touch_ground
 from sim.bodies.plane_model import PlaneModel, plane_model
-from sim.bodies.rigid_body import turned_by
+from sim.bodies.rigid_body import held, rested, truth_of, turned_by
 from sim.truth import Truth
 from sim.world.world import World
 
@@ -24,6 +23,7 @@ wp.set_module_options({"enable_backward": False})
 
 _GRAVITY_NED = wp.constant(wp.vec3(0.0, 0.0, GRAVITY_M_S2))
 _DENSITY_LAPSE_PER_M = wp.constant(9.6e-5)  # ISO 2533: relative change of density per metre near sea level
+_TICK_S = wp.constant(TICK_S)
 _SUBSTEP_S = wp.constant(TICK_S / SUBSTEPS)
 _SUBSTEP_COUNT = wp.constant(SUBSTEPS)
 
@@ -164,11 +164,7 @@ def _substep(model: PlaneModel, body: PlaneState, inputs: PlaneInputs) -> PlaneS
 @wp.func
 def held_tick(body: PlaneState) -> PlaneState:
     """A tick of a vehicle that is held in its place and turned at omega_frd, its motor stopped."""
-    out = body
-    out.vel_ned = wp.vec3()
-    out.gyro_frd = body.omega_frd
-    out.accel_frd = wp.quat_rotate_inv(body.q_ned_from_frd, -_GRAVITY_NED)
-    out.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.omega_frd * TICK_S)
+    out = held(body, _TICK_S)
     out.propeller_rad_s = 0.0
     out.pitot_pa = 0.0
     return out
@@ -205,36 +201,18 @@ def plane_tick(model: PlaneModel, body: PlaneState, command: vec8, wind_ned: wp.
 @wp.func
 def plane_truth(body: PlaneState) -> Truth:
     """What others may read of the body."""
-    truth = Truth()
-    truth.pos_ned = body.pos_ned
-    truth.vel_ned = body.vel_ned
-    truth.q_ned_from_frd = body.q_ned_from_frd
-    truth.omega_frd = body.omega_frd
-    truth.accel_frd = body.accel_frd
-    truth.gyro_frd = body.gyro_frd
+    truth = truth_of(body)
     truth.motor_speed[2] = body.propeller_rad_s
     truth.has_pitot = 1
     truth.pitot_pa = body.pitot_pa
     truth.steering_rad = body.steering_rad
-    truth.height_agl_m = body.height_agl_m
-    truth.battery_voltage_v = body.battery_voltage_v
-    truth.battery_current_a = body.battery_current_a
-    truth.is_on_ground = body.is_on_ground
-    truth.is_crashed = body.is_crashed
-    truth.impact_speed = body.impact_speed
     return truth
 
 
 @wp.func
 def plane_at_rest(model: PlaneModel, pos_ned: wp.vec3, yaw_rad: float) -> PlaneState:
     """A plane level and still at pos_ned, battery full."""
-    body = PlaneState()
-    body.pos_ned = pos_ned
-    body.q_ned_from_frd = quat_from_yaw(yaw_rad)
-    body.accel_frd = -_GRAVITY_NED
-    body.battery_charge_c = model.battery.capacity_c
-    body.battery_voltage_v = model.battery.full_v
-    return body
+    return rested(PlaneState(), model.battery, pos_ned, yaw_rad)
 
 
 @wp.func

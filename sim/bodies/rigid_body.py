@@ -1,10 +1,21 @@
-"""What the rigid bodies of all classes share: attitude after a turn, air, first-order lags."""
+"""What the rigid bodies of all classes share: rest, truth, being held, attitude after a turn, air, first-order lags.
+
+A `State` of a class has what all have under the names of `Truth`, and the charge of its battery.
+"""
+
+from typing import Any
 
 import warp as wp
+
+from common.geodesy import GRAVITY_M_S2
+from common.rotation import quat_from_yaw
+from sim.battery import BatteryModel
+from sim.truth import Truth
 
 wp.set_module_options({"enable_backward": False})
 
 _SEA_LEVEL_DENSITY_KG_M3 = wp.constant(1.225)  # ISO 2533 standard atmosphere
+_GRAVITY_NED = wp.constant(wp.vec3(0.0, 0.0, GRAVITY_M_S2))
 
 
 @wp.func
@@ -16,6 +27,46 @@ def turned_by(q_ned_from_frd: wp.quat, rotvec_frd: wp.vec3) -> wp.quat:
         half_sinc * rotvec_frd[0], half_sinc * rotvec_frd[1], half_sinc * rotvec_frd[2], 1.0 - 0.125 * square
     )
     return wp.normalize(q_ned_from_frd * turn)
+
+
+@wp.func
+def rested(state: Any, battery: BatteryModel, pos_ned: wp.vec3, yaw_rad: float) -> Any:
+    """A new `State` level and still at pos_ned, its battery full."""
+    state.pos_ned = pos_ned
+    state.q_ned_from_frd = quat_from_yaw(yaw_rad)
+    state.accel_frd = -_GRAVITY_NED
+    state.battery_charge_c = battery.capacity_c
+    state.battery_voltage_v = battery.full_v
+    return state
+
+
+@wp.func
+def held(state: Any, dt: float) -> Any:
+    """A `State` after dt [s] in somebody's hands, in its place and turned at omega_frd."""
+    state.vel_ned = wp.vec3()
+    state.gyro_frd = state.omega_frd
+    state.accel_frd = wp.quat_rotate_inv(state.q_ned_from_frd, -_GRAVITY_NED)
+    state.q_ned_from_frd = turned_by(state.q_ned_from_frd, state.omega_frd * dt)
+    return state
+
+
+@wp.func
+def truth_of(state: Any) -> Truth:
+    """What others may read of a `State`, but for motors, wheels and pitot tube."""
+    truth = Truth()
+    truth.pos_ned = state.pos_ned
+    truth.vel_ned = state.vel_ned
+    truth.q_ned_from_frd = state.q_ned_from_frd
+    truth.omega_frd = state.omega_frd
+    truth.accel_frd = state.accel_frd
+    truth.gyro_frd = state.gyro_frd
+    truth.height_agl_m = state.height_agl_m
+    truth.battery_voltage_v = state.battery_voltage_v
+    truth.battery_current_a = state.battery_current_a
+    truth.is_on_ground = state.is_on_ground
+    truth.is_crashed = state.is_crashed
+    truth.impact_speed = state.impact_speed
+    return truth
 
 
 @wp.func

@@ -13,10 +13,9 @@ import warp as wp
 
 from common.geodesy import GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S, vec8
-from common.rotation import quat_from_yaw
 from sim.battery import discharged
 from sim.bodies.body import Body
-from sim.bodies.rigid_body import hull_drag, turned_by
+from sim.bodies.rigid_body import held, hull_drag, rested, truth_of, turned_by
 from sim.bodies.rover_hull import HullContact, hull_contact, is_near_obstacle, look_at_hull
 from sim.bodies.rover_model import RoverModel, rover_model
 from sim.bodies.rover_wheels import WheelStep, steered_frd, wheel_step
@@ -201,18 +200,26 @@ def drive_wrench(
 
 
 @wp.func
+def hull_wrench(
+    model: RoverModel, body: RoverState, hull: HullContact, rot: wp.mat33
+) -> tuple[RoverState, wp.vec3, wp.vec3]:
+    """A body that remembers what its hull touches, and what that does to it: force [N] and torque [N m], frd."""
+    touch = hull_contact(model, hull, body.pos_ned, wp.transpose(rot) * body.vel_ned, rot, body.omega_frd)
+    body.impact_speed = wp.max(body.impact_speed, touch.impact_speed_m_s)
+    if touch.impact_speed_m_s > model.crash_speed_m_s:
+        body.is_crashed = 1
+    return body, touch.force_frd, touch.torque_frd
+
+
+@wp.func
 def _substep(model: RoverModel, body: RoverState, inputs: DriveInputs, hull: HullContact) -> RoverState:
     dt = _SUBSTEP_S
     rot = wp.quat_to_matrix(body.q_ned_from_frd)
-    vel_frd = wp.transpose(rot) * body.vel_ned
     body, force_frd, torque_frd = drive_wrench(model, body, inputs, rot)
     if hull.is_near == 1:
-        touch = hull_contact(model, hull, body.pos_ned, vel_frd, rot, body.omega_frd)
-        force_frd += touch.force_frd
-        torque_frd += touch.torque_frd
-        body.impact_speed = wp.max(body.impact_speed, touch.impact_speed_m_s)
-        if touch.impact_speed_m_s > model.crash_speed_m_s:
-            body.is_crashed = 1
+        body, push_frd, turn_frd = hull_wrench(model, body, hull, rot)
+        force_frd += push_frd
+        torque_frd += turn_frd
     omega = body.omega_frd
     body.accel_frd = force_frd * model.mass_inv
     middle_accel_frd = body.accel_frd + wp.cross((0.5 * dt) * omega, body.accel_frd)  # the body turns meanwhile
@@ -244,11 +251,7 @@ def drain_battery(model: RoverModel, body: RoverState, dt: float) -> RoverState:
 @wp.func
 def held_tick(body: RoverState) -> RoverState:
     """A tick of a vehicle that is held in its place and turned at omega_frd, wheels stopped."""
-    out = body
-    out.vel_ned = wp.vec3()
-    out.gyro_frd = body.omega_frd
-    out.accel_frd = wp.quat_rotate_inv(body.q_ned_from_frd, -_GRAVITY_NED)
-    out.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.omega_frd * TICK_S)
+    out = held(body, _TICK_S)
     out.wheel_speed = wp.vec4()
     out.tread_m_s = wp.vec2()
     return out
@@ -293,37 +296,19 @@ def rover_tick(model: RoverModel, body: RoverState, command: vec8, wind_ned: wp.
 @wp.func
 def rover_truth(body: RoverState) -> Truth:
     """What others may read of the body."""
-    truth = Truth()
-    truth.pos_ned = body.pos_ned
-    truth.vel_ned = body.vel_ned
-    truth.q_ned_from_frd = body.q_ned_from_frd
-    truth.omega_frd = body.omega_frd
-    truth.accel_frd = body.accel_frd
-    truth.gyro_frd = body.gyro_frd
+    truth = truth_of(body)
     for k in range(_WHEELS):
         truth.motor_speed[k] = body.wheel_speed[k]
     truth.has_wheels = 1
     truth.wheel_speed_m_s = body.tread_m_s
     truth.steering_rad = body.steering_rad
-    truth.height_agl_m = body.height_agl_m
-    truth.battery_voltage_v = body.battery_voltage_v
-    truth.battery_current_a = body.battery_current_a
-    truth.is_on_ground = body.is_on_ground
-    truth.is_crashed = body.is_crashed
-    truth.impact_speed = body.impact_speed
     return truth
 
 
 @wp.func
 def rover_at_rest(model: RoverModel, pos_ned: wp.vec3, yaw_rad: float) -> RoverState:
     """A rover level and still at pos_ned, battery full."""
-    body = RoverState()
-    body.pos_ned = pos_ned
-    body.q_ned_from_frd = quat_from_yaw(yaw_rad)
-    body.accel_frd = -_GRAVITY_NED
-    body.battery_charge_c = model.battery.capacity_c
-    body.battery_voltage_v = model.battery.full_v
-    return body
+    return rested(RoverState(), model.battery, pos_ned, yaw_rad)
 
 
 @wp.func

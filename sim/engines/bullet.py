@@ -22,14 +22,21 @@ from sim.engines.bullet_multirotor import BULLET_MULTIROTOR
 from sim.engines.bullet_rover import BULLET_ROVER
 from sim.engines.bullet_vehicle import BulletVehicle
 from sim.engines.bullet_world import BulletWorld
+from sim.engines.left_poses import LeftPoses
 from sim.engines.quiet_bullet import pybullet
 from sim.recorded_launches import RecordedLaunches
 from sim.rig import Rig
-from sim.world.world import WorldMap
+from sim.world.world import World, WorldMap
 
 _PARTS = {MULTIROTOR_BODY: BULLET_MULTIROTOR, ROVER_BODY: BULLET_ROVER}
 _LOW_M = 3.0  # over ground: nearer it may be touched
-_POSE = ["pos_ned", "vel_ned", "q_ned_from_frd", "omega_frd"]
+
+
+def _bare(world: WorldMap) -> World:
+    """Its ground and the other vehicles in it: all else that is solid is Bullet's."""
+    bare = World()
+    bare.terrain, bare.neighbours = world.kernel.terrain, world.kernel.neighbours
+    return bare
 
 
 class BulletEngine:
@@ -39,7 +46,7 @@ class BulletEngine:
         rig: whose vehicles it moves, on the CPU, in one world.
         damping: of linear and angular velocity [1/s]; Bullet's own default is 0.04, which no air explains.
         has_contacts: the vehicles touch each other, and are put apart before the first step; otherwise they pass
-            through each other, as with the native engine.
+            through each other, as with the native engine. (Those of other rigs in its world they touch as there.)
 
     Raises:
         ValueError: the rig has vehicles of another class, or a world for each.
@@ -63,6 +70,7 @@ class BulletEngine:
             physicsClientId=self._client,
         )
         self._world = BulletWorld(rig.world, self._client)
+        self._bare_worlds: Any = wp.array([_bare(rig.world)], dtype=World)
         self._states: NDArray[Any] = rig.arrays.body.numpy()  # live
         self._hulls = [self._part.hull(model, self._client) for model in rig.arrays.model.numpy()]
         self._vehicles = [self._make_vehicle(i) for i in range(rig.vehicle_count)]
@@ -70,22 +78,22 @@ class BulletEngine:
         self._bullet_rows, self._rows = rows, rows.numpy()  # live
         self._inputs = wp.zeros(rig.vehicle_count, dtype=self._part.Inputs)
         self._launches = RecordedLaunches(self._record)
-        self._left = self._states[_POSE].copy()  # as the last step has left them
+        self._left = LeftPoses(self._states)
 
     def boot(self, is_chosen: Any) -> None:
         self._rig.place(is_chosen)
         for i in np.flatnonzero(is_chosen.numpy()):
             self._vehicles[i].remove()
             self._vehicles[i] = self._make_vehicle(int(i))
-            self._left["pos_ned"][i] = np.nan  # it is to be put where it is
+        self._left.forget(is_chosen.numpy())
 
     def step(self, commands: Any, wind_ned: Any) -> None:
         put, begin, push, take, end = self._launches.of(commands, wind_ned)
         is_held = self._states["is_held"] != 0
-        is_moved = (self._states[_POSE] != self._left) | is_held  # somebody has put it elsewhere
-        if is_moved.any():
+        moved_rows = self._left.moved()
+        if moved_rows:
             put.launch()
-            for moved in np.flatnonzero(is_moved):
+            for moved in moved_rows:
                 self._vehicles[moved].put(self._rows[moved])
         self._world.furnish(self._states["pos_ned"], int(self._rig.arrays.tick.numpy()[0]))
         begin.launch()
@@ -96,17 +104,18 @@ class BulletEngine:
             pybullet.stepSimulation(physicsClientId=self._client)
             for vehicle, row in zip(self._vehicles, self._rows, strict=True):
                 vehicle.read(row)
-            before = self._states[_POSE].copy()
+            before = self._left.now()
             take.launch()
             self._touch(before, is_held)
-        self._left = self._states[_POSE].copy()
+        self._left.leave()
         end.launch()
 
     def _touch(self, before: Any, is_held: NDArray[Any]) -> None:
         may_touch = self._world.is_near or self._has_contacts
+        motions = {vehicle.body: row for vehicle, row in zip(self._vehicles, before, strict=True)}
         for i, vehicle in enumerate(self._vehicles):
             if not is_held[i] and (may_touch or self._states[i]["height_agl_m"] < _LOW_M):
-                vehicle.touch(self._states[i], before[i], self._world.ground)
+                vehicle.touch(self._states[i], motions, self._world.ground)
 
     def _make_vehicle(self, i: int) -> BulletVehicle:
         model, hull = self._rig.arrays.model.numpy()[i], self._hulls[i]
@@ -114,7 +123,7 @@ class BulletEngine:
 
     def _record(self, commands: Any, wind_ned: Any) -> list[Any]:
         a, rows, inputs = self._rig.arrays, self._bullet_rows, self._inputs
-        where = [a.model, a.body, a.worlds, a.i_world]
+        where = [a.model, a.body, self._bare_worlds, a.i_world]
         kernels = bullet_kernels(self._rig.body, self._part)
         given = [
             [a.body, rows],

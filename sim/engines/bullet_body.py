@@ -18,14 +18,14 @@ class Hull(NamedTuple):
 
 
 class BulletBody(NamedTuple):
-    """A class of bodies. The kernel functions leave out what Bullet does: obstacles, and motion."""
+    """A class of bodies. The kernel functions leave out motion; of obstacles their world has other vehicles alone."""
 
     Inputs: type
     """Kernel struct of what stays the same over the substeps of a tick."""
     begin: Any
     """`@wp.func (Model, State, command: vec8, wind_ned: vec3, World) -> (State, Inputs)`, every 4 ms."""
     wrench: Any
-    """`@wp.func (Model, State, Inputs) -> (State, force_frd [N], torque_frd [N m])`, every millisecond."""
+    """`@wp.func (Model, State, Inputs) -> (State, Inputs, force_frd [N], torque_frd [N m])`, every millisecond."""
     end: Any
     """`@wp.func (Model, State, Inputs) -> State`: battery and what else is judged once a tick."""
     hull: Callable[[Any, int], Hull]

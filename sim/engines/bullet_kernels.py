@@ -75,9 +75,10 @@ def moved(state: Any, row: BulletRow) -> Any:
     part_of_tick = 1.0 / float(SUBSTEPS)
     vel_ned = flipped(row.vel)
     felt_ned = (vel_ned - state.vel_ned) / _SUBSTEP_S - wp.vec3(0.0, 0.0, GRAVITY_M_S2)
+    middle_q = turned_by(state.q_ned_from_frd, _AHEAD_S * state.omega_frd)  # along which it was pushed
     ahead_q = flipped_turn(row.q)
     omega_frd = wp.quat_rotate_inv(ahead_q, flipped(row.omega))
-    state.accel_frd += part_of_tick * wp.quat_rotate_inv(state.q_ned_from_frd, felt_ned)
+    state.accel_frd += part_of_tick * wp.quat_rotate_inv(middle_q, felt_ned)
     state.gyro_frd += (0.5 * part_of_tick) * (state.omega_frd + omega_frd)
     state.pos_ned = flipped(row.pos) - _AHEAD_S * vel_ned
     state.vel_ned = vel_ned
@@ -146,8 +147,9 @@ def _push_kernel(body: Body, part: BulletBody) -> Any:
     ) -> None:
         i = wp.tid()
         if states[i].is_held == 0:
-            pushed, force_frd, torque_frd = wrench(models[i], states[i], all_inputs[i])
+            pushed, inputs, force_frd, torque_frd = wrench(models[i], states[i], all_inputs[i])
             states[i] = pushed
+            all_inputs[i] = inputs
             rows[i].force_flu = flipped(force_frd)
             rows[i].torque_flu = flipped(torque_frd)
 

@@ -1,7 +1,8 @@
 """A multirotor for Bullet: our rotors, air, legs and battery; rotor discs and what is above the legs are Bullet's.
 
 The ground pushes at feet and rotor tips as in the native engine, by springs with dampers. The balls that stand for feet
-touch what is not ground, and ground only when the legs have yielded far.
+touch what is not ground, and ground only when the legs have yielded far. Other vehicles, of which Bullet does not know,
+push at its hull by springs, too.
 """
 
 from typing import Any
@@ -9,10 +10,10 @@ from typing import Any
 import warp as wp
 
 from common.kernels import SUBSTEPS, TICK_S, vec8
-from sim.bodies.contact import ground_contact
-from sim.bodies.multirotor import BodyState, StepInputs, air_wrench, angular_accel, drain_battery, step_inputs
+from sim.bodies.multirotor import BodyState, StepInputs, air_wrench, contact_near, drain_battery, step_inputs, touched
 from sim.bodies.multirotor_model import MultirotorModel
 from sim.engines.bullet_body import BulletBody, Hull
+from sim.engines.midstep import midstep_torque
 from sim.engines.quiet_bullet import pybullet
 from sim.world.world import World
 
@@ -33,30 +34,23 @@ def _begin(
 
 
 @wp.func
-def _wrench(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> tuple[BodyState, wp.vec3, wp.vec3]:
-    """With the gyroscopic torque of the rotors, of which Bullet does not know, and all of it as in mid-step."""
+def _wrench(
+    model: MultirotorModel, body: BodyState, inputs: StepInputs
+) -> tuple[BodyState, StepInputs, wp.vec3, wp.vec3]:
+    """With the gyroscopic torque of the rotors, of which Bullet does not know, and all torque as in mid-step."""
     rot = wp.quat_to_matrix(body.q_ned_from_frd)
     wrench = air_wrench(model, body, inputs, wp.transpose(rot))
     force_frd = wrench.force_frd
     torque_frd = wrench.torque_frd
     body.rotor_speed = wrench.speed
-    if inputs.around.is_near_ground == 1:
-        contact = ground_contact(
-            model.contact, inputs.around, body.pos_ned, body.vel_ned, rot, body.omega_frd, body.foot_slip, _SUBSTEP_S
-        )
+    if inputs.around.is_near_ground + inputs.around.is_near_obstacle > 0:
+        contact = contact_near(model.contact, body, inputs.around, rot, _SUBSTEP_S)
         force_frd += wp.transpose(rot) * contact.force_ned
         torque_frd += contact.torque_frd
-        body.foot_slip = contact.foot_slip
-        body.is_on_ground = contact.is_on_ground
-        body.impact_speed = wp.max(body.impact_speed, contact.impact_speed_m_s)
-        if contact.impact_speed_m_s > model.contact.crash_speed_m_s or contact.is_rotor_strike == 1:
-            body.is_crashed = 1
-    omega = body.omega_frd
-    middle = omega + (0.5 * _SUBSTEP_S) * angular_accel(model, omega, torque_frd, wrench.momentum_z)
-    momentum = wp.cw_mul(model.inertia_frd, middle) + wp.vec3(0.0, 0.0, wrench.momentum_z)
-    torque_frd -= wp.cross(middle, momentum)
-    torque_frd += wp.cross(omega, wp.cw_mul(model.inertia_frd, omega))  # which Bullet takes off
-    return body, force_frd, torque_frd
+        body = touched(model.contact, body, contact)
+        inputs.around.obstacle_shift_ned += _SUBSTEP_S * inputs.around.obstacle_vel_ned
+    torque_frd = midstep_torque(model, body.omega_frd, torque_frd, wrench.momentum_z, _SUBSTEP_S)
+    return body, inputs, force_frd, torque_frd
 
 
 @wp.func

@@ -16,16 +16,18 @@ from sim.bodies.multirotor import (
     BodyState,
     StepInputs,
     air_wrench,
+    body_tick,
+    body_truth,
     contact_near,
     drain_battery,
     step_inputs,
     touched,
-    truth_of,
 )
 from sim.bodies.multirotor_model import MultirotorModel
 from sim.engines.jsbsim_body import JsbsimBody
 from sim.engines.jsbsim_planet import FT_M, LBF_N
-from sim.engines.native import NativeEngine
+from sim.engines.left_poses import LeftPoses
+from sim.engines.midstep import midstep_torque
 from sim.recorded_launches import RecordedLaunches
 from sim.rig import Rig
 from sim.truth import Truth
@@ -38,7 +40,6 @@ _FT = wp.constant(FT_M)
 _LBF = wp.constant(LBF_N)
 vec6 = wp.types.vector(length=6, dtype=wp.float32)
 vec12 = wp.types.vector(length=12, dtype=wp.float32)
-_POSE = ["pos_ned", "vel_ned", "q_ned_from_frd", "omega_frd"]
 
 
 @wp.kernel(enable_backward=False)
@@ -52,9 +53,12 @@ def begin(
     ticks: wp.array(dtype=wp.int64),
     inputs: wp.array(dtype=StepInputs),
 ) -> None:
-    """What acts over the tick; nothing is felt yet of it."""
+    """What acts over the tick; nothing is felt yet of it. One that is held in hands has its tick here."""
     i = wp.tid()
     world = world_at(worlds[i_world[i]], draw_tick(ticks[i]))
+    if states[i].is_held == 1:
+        states[i] = body_tick(models[i], states[i], commands[i], wind_ned[i], world)
+        return
     inputs[i] = step_inputs(models[i], states[i], commands[i], wind_ned[i], world, _SUBSTEP_S)
     states[i].height_agl_m = inputs[i].around.height_agl_m
     states[i].accel_frd = wp.vec3()
@@ -69,8 +73,10 @@ def push(
     inputs: wp.array(dtype=StepInputs),
     wrenches: wp.array(dtype=vec6),
 ) -> None:
-    """Force [lbf] and moment [lbf ft] along frd now, the rotors' gyroscopic one included; turns the rotors."""
+    """Force [lbf] and moment [lbf ft] along frd in mid-step, the rotors' gyroscopic one included; turns the rotors."""
     i = wp.tid()
+    if states[i].is_held == 1:
+        return
     model = models[i]
     body = states[i]
     around = inputs[i].around
@@ -78,7 +84,7 @@ def push(
     r_frd_from_ned = wp.transpose(r_ned_from_frd)
     wrench = air_wrench(model, body, inputs[i], r_frd_from_ned)
     force = wrench.force_frd
-    torque = wrench.torque_frd - wp.cross(body.omega_frd, wp.vec3(0.0, 0.0, wrench.momentum_z))
+    torque = wrench.torque_frd
     if around.is_near_ground + around.is_near_obstacle > 0:
         contact = contact_near(model.contact, body, around, r_ned_from_frd, _SUBSTEP_S)
         force += r_frd_from_ned * contact.force_ned
@@ -87,7 +93,9 @@ def push(
     body.rotor_speed = wrench.speed
     body.accel_frd += (model.mass_inv / float(SUBSTEPS)) * force
     states[i] = body
+    inputs[i].around.obstacle_shift_ned += _SUBSTEP_S * around.obstacle_vel_ned
     force += wp.cross((0.5 * _SUBSTEP_S) * body.omega_frd, force)  # the body turns meanwhile
+    torque = midstep_torque(model, body.omega_frd, torque, wrench.momentum_z, _SUBSTEP_S)
     force = force / _LBF
     torque = torque / (_LBF * _FT)
     wrenches[i] = vec6(force[0], force[1], force[2], torque[0], torque[1], torque[2])
@@ -99,6 +107,8 @@ def take(
 ) -> None:
     """What JSBSim has made of it, and what the gyroscopes felt of the tick so far."""
     i = wp.tid()
+    if states[i].is_held == 1:
+        return
     body = states[i]
     m = motions[i]
     body.pos_ned = origins_ned[i] + _FT * wp.vec3(m[0], m[1], -m[2])
@@ -122,8 +132,9 @@ def conclude(
 ) -> None:
     """The tick is over: battery and truth."""
     i = wp.tid()
-    states[i] = drain_battery(models[i], states[i], inputs[i].density_ratio, TICK_S)
-    truths[i] = truth_of(states[i])
+    if states[i].is_held == 0:
+        states[i] = drain_battery(models[i], states[i], inputs[i].density_ratio, TICK_S)
+    truths[i] = body_truth(states[i])
 
 
 class JsbsimEngine:
@@ -140,7 +151,6 @@ class JsbsimEngine:
         if rig.body.State is not BodyState:
             raise ValueError("the engine jsbsim moves multirotors; other vehicles have the native one")
         self._rig = rig
-        self._native = NativeEngine(rig)  # for what is held in hands
         self._states: Any = rig.arrays.body.numpy()  # live
         self._bodies = [JsbsimBody(model) for model in rig.arrays.model.numpy()]
         self._inputs: Any = wp.zeros(rig.vehicle_count, dtype=StepInputs)
@@ -148,27 +158,26 @@ class JsbsimEngine:
         self._motions: Any = wp.zeros(rig.vehicle_count, dtype=vec12)
         self._origins_ned: Any = wp.zeros(rig.vehicle_count, dtype=wp.vec3)
         self._launches = RecordedLaunches(self._record)
-        self._left = self._states[_POSE].copy()  # as the last step has left the rows
+        self._left = LeftPoses(self._states)
 
     def boot(self, is_chosen: Any) -> None:
         self._rig.place(is_chosen)
+        self._left.forget(is_chosen.numpy())
 
     def step(self, commands: Any, wind_ned: Any) -> None:
-        if self._states["is_held"].any():
-            self._native.step(commands, wind_ned)
-            return
-        for moved in np.flatnonzero(self._states[_POSE] != self._left):  # somebody has put it elsewhere
+        for moved in self._left.moved():
             self._origins_ned.numpy()[moved] = self._bodies[moved].put(self._states[moved])
         begun, pushed, taken, concluded = self._launches.of(commands, wind_ned)
         begun.launch()
+        free = np.flatnonzero(self._states["is_held"] == 0)
         wrenches, motions = self._wrenches.numpy(), self._motions.numpy()
         for _ in range(SUBSTEPS):
             pushed.launch()
-            for i, body in enumerate(self._bodies):
-                motions[i] = body.moved(wrenches[i].tolist())
+            for i in free:
+                motions[i] = self._bodies[i].moved(wrenches[i].tolist())
             taken.launch()
         concluded.launch()
-        self._left = self._states[_POSE].copy()
+        self._left.leave()
 
     def _record(self, commands: Any, wind_ned: Any) -> list[Any]:
         a = self._rig.arrays

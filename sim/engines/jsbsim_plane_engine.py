@@ -8,17 +8,24 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from sim.bodies.plane import PlaneState, plane_truth
+from sim.bodies.plane import PlaneState, held_tick, plane_truth
 from sim.engines.jsbsim_aircraft import JsbsimAircraft
-from sim.engines.native import NativeEngine
+from sim.engines.left_poses import LeftPoses
 from sim.rig import Rig
 from sim.truth import Truth
 from sim.world.world import World, WorldMap, ground_height
 
 wp.set_module_options({"enable_backward": False})
 
-_POSE = ["pos_ned", "vel_ned", "q_ned_from_frd", "omega_frd"]
 _HARD_M_S = 3.05  # 14 CFR 23.473: gear is designed for a descent of at most 10 ft/s
+
+
+@wp.kernel(enable_backward=False)
+def hold(states: wp.array(dtype=PlaneState)) -> None:
+    """The tick of those that are held in hands."""
+    i = wp.tid()
+    if states[i].is_held == 1:
+        states[i] = held_tick(states[i])
 
 
 @wp.kernel(enable_backward=False)
@@ -52,26 +59,27 @@ class JsbsimPlaneEngine:
         if not isinstance(rig.world, WorldMap):
             raise ValueError("the engine jsbsim has one world for all planes")
         self._rig, self._world = rig, rig.world
-        self._native = NativeEngine(rig)  # for what is held in hands
         self._states: Any = rig.arrays.body.numpy()  # live
-        ratios = rig.arrays.model.numpy()["home_density_ratio"]
-        self._aircraft = [JsbsimAircraft(aircraft, _altitude_m(float(ratio))) for ratio in ratios]
-        self._left = self._states[_POSE].copy()  # as the last step has left the rows
+        self._name = aircraft
+        self._aircraft = [self._make(i) for i in range(rig.vehicle_count)]
+        self._left = LeftPoses(self._states)
 
     def boot(self, is_chosen: Any) -> None:
         self._rig.place(is_chosen)
+        for i in np.flatnonzero(is_chosen.numpy()):
+            self._aircraft[i] = self._make(int(i))  # engine, gear and tank of before count for nothing
+        self._left.forget(is_chosen.numpy())
 
     def step(self, commands: Any, wind_ned: Any) -> None:
-        if self._states["is_held"].any():
-            self._native.step(commands, wind_ned)
-            return
-        for moved in np.flatnonzero(self._states[_POSE] != self._left):  # somebody has put it elsewhere
+        for moved in self._left.moved():
             row = self._states[moved]
             row["height_agl_m"] = -row["pos_ned"][2] - self._world.height(*row["pos_ned"][:2].tolist())
             self._aircraft[moved].put(row)
         asked, wind = commands.numpy(), wind_ned.numpy()
         for i, aircraft in enumerate(self._aircraft):
             row = self._states[i]
+            if row["is_held"]:
+                continue
             if row["is_crashed"]:
                 aircraft.stop()
             was_on_ground, sank_m_s = row["is_on_ground"], float(row["vel_ned"][2])
@@ -79,9 +87,14 @@ class JsbsimPlaneEngine:
             if row["is_on_ground"] and not was_on_ground:
                 row["impact_speed"] = max(float(row["impact_speed"]), sank_m_s)
                 row["is_crashed"] |= sank_m_s > _HARD_M_S
-        self._left = self._states[_POSE].copy()
-        a = self._rig.arrays
-        wp.launch(conclude, self._rig.vehicle_count, [a.body, a.worlds, a.i_world, a.truth])
+        a, count = self._rig.arrays, self._rig.vehicle_count
+        wp.launch(hold, count, [a.body])
+        self._left.leave()
+        wp.launch(conclude, count, [a.body, a.worlds, a.i_world, a.truth])
+
+    def _make(self, i: int) -> JsbsimAircraft:
+        ratio = self._rig.arrays.model.numpy()["home_density_ratio"][i]
+        return JsbsimAircraft(self._name, _altitude_m(float(ratio)))
 
 
 def _altitude_m(density_ratio: float) -> float:

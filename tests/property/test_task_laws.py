@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from policies.tasks.catalogue import CATALOGUE, build_task, task_settings
+from policies.tasks.catalogue import CATALOGUE, build_task, settings_class, task_settings
 from policies.tasks.parking.level1 import Parking1
 from policies.tasks.parking.level2 import Parking2
 from policies.tasks.parking.parking_params import CarParams, Level1Params, Level2Params
@@ -19,9 +19,9 @@ from policies.tasks.task_params import Sampler
 FEW = settings(max_examples=5, deadline=None)  # the first example compiles a kernel
 TASKS = [
     (name, preset)
-    for name, entry in CATALOGUE.items()
+    for name in CATALOGUE
     for preset in (
-        ("as-coded",) if name == "RollerBall" else get_args(entry.settings.model_fields["preset"].annotation)
+        ("as-coded",) if name == "RollerBall" else get_args(settings_class(name).model_fields["preset"].annotation)
     )
 ]
 every_task = pytest.mark.parametrize(("name", "preset"), TASKS)

@@ -54,7 +54,7 @@ def observe(buffers: StepBuffers, state: SliderState, i: int):
 def place(buffers: StepBuffers, state: SliderState, i: int):
     """Begins an episode: the cart in the middle, the mark elsewhere."""
     episode = begin_episode(buffers, i)
-    rng = draw_key(buffers.seed[0], i, episode, _PLACE_STREAM)
+    rng = draw_key(buffers.seed[i], i, episode, _PLACE_STREAM)
     state.pos[i] = 0.0
     state.vel[i] = 0.0
     state.mark[i] = state.params[i].half_rail_m * (2.0 * wp.randf(rng) - 1.0)

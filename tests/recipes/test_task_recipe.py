@@ -8,7 +8,6 @@ from policies.learn.export.policy_file import load_policy
 from policies.tasks.catalogue import CATALOGUE, Entry, build_task
 from policies.tasks.episode import Outcome
 from policies.tasks.gym import TaskEnv, TaskVectorEnv
-from policies.tasks.task import TaskSettings
 from tests.recipes.slider import Slider
 from tests.unit.mission.train.training_run import RUN, train, write_config
 
@@ -16,7 +15,7 @@ from tests.unit.mission.train.training_run import RUN, train, write_config
 @pytest.fixture(autouse=True)
 def named(monkeypatch, tmp_path):
     """The one line of the catalogue."""
-    monkeypatch.setitem(CATALOGUE, "Slider", Entry(TaskSettings, Slider))
+    monkeypatch.setitem(CATALOGUE, "Slider", Entry(Slider))
     monkeypatch.chdir(tmp_path)
 
 

@@ -36,6 +36,7 @@ SPEAK_OF_ROTORS = {
     "sim/engines/bullet.py": "which classes Bullet moves",
     "sim/engines/bullet_multirotor.py": "a multirotor for Bullet",
     "sim/engines/jsbsim_engine.py": "JSBSim moves multirotors",
+    "sim/engines/midstep.py": "multirotors, whose rotors these engines do not know",
 }
 """Files outside of the multirotor's folders that speak of rotors, and why."""
 

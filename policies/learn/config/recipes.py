@@ -23,7 +23,10 @@ def recipe(name: str) -> Path:
     """
     stem = name if name in recipe_names() else file_stem(name)
     if stem not in recipe_names():
-        raise ConfigError(f"{name}: there is no recipe of this name; there are {', '.join(recipe_names())}")
+        raise ConfigError(
+            f"{name}: there is no recipe of this name; there are {', '.join(recipe_names())}; "
+            "module:Class is a task of your own"
+        )
     return _folder() / f"{stem}.yaml"
 
 

@@ -16,6 +16,7 @@ from policies.learn.checkpoint import load, save
 from policies.learn.config.network import NetworkSettings
 from policies.learn.export.policy_path import CheckpointError
 from policies.learn.networks.policy import Policy
+from policies.tasks.catalogue import runs_code
 from policies.tasks.layout import Layout
 from policies.tasks.task_params import Sampler
 
@@ -33,6 +34,18 @@ class PolicyCard:
     steps: int
     figures: dict[str, float] = field(default_factory=dict)  # "success_rate", "training_reward", …
     numbers: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the task, in the last lesson
+
+    def trusted_task(self, path: Path, how: str) -> str:
+        """The task, unless building it would run code that nobody but the file has named; `how` says how to name it.
+
+        Raises:
+            CheckpointError: it would.
+        """
+        if runs_code(self.task):
+            raise CheckpointError(
+                f"{path}: is of {self.task}, whose code is not run because a file names it: name it yourself, as {how}"
+            )
+        return self.task
 
     def samplers(self) -> dict[str, Sampler]:
         """What the task's numbers are drawn from, where they are not the settings' own."""

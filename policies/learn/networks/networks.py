@@ -48,7 +48,7 @@ class Body(nn.Module):
         super().__init__()
         width = settings.hidden_units
         self.is_privileged = is_privileged
-        self.normalizer = Normalizer(inputs) if settings.normalize else None
+        self.normalizer = Normalizer(inputs) if settings.normalize and inputs else None
         self.encoder = ImageEncoder(settings.vis_encode_type, image.shape, width, generator) if image else None
         self.goal_indices = list(goal_indices)
         count = max(settings.num_layers, 1) - bool(self.goal_indices)

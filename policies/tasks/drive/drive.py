@@ -34,6 +34,7 @@ class Drive(FlightTask):
     """The task."""
 
     params: ClassVar = PARAMS
+    settings_class: ClassVar = DriveSettings
 
     def __init__(self, settings: DriveSettings, env_count: int, device: str = "cpu") -> None:
         world = WORLDS[settings.preset]
@@ -63,8 +64,8 @@ class Drive(FlightTask):
         self._prepare = self.record(prepare, buffers, state, start)
         self._place = self.record(place, buffers, rules, rig, state, start)
 
-    def step(self) -> None:
-        """One decision of all environments, with the actions that lie in the buffers."""
+    def _launch_step(self) -> None:
+        """What `step` does of the task's own."""
         self._act.launch()
         self.rig.advance(DECISION_TICKS)
         self._judge.launch()

@@ -171,7 +171,7 @@ def place(buffers: StepBuffers, rules: DriveRules, rig: RoverArrays, state: Driv
     i = wp.tid()
     if not start.is_starting[i]:
         return
-    seed = buffers.seed[0]
+    seed = buffers.seed[i]
     episode = buffers.episodes[i] - 1
     params = state.params[i]
     friction, rolling = params.friction_scale, params.rolling_scale

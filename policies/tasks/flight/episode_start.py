@@ -28,7 +28,7 @@ class Start:
 @wp.func
 def begin_flight(buffers: StepBuffers, start: Start, i: int) -> int:
     """Begins a row's episode, draws its noise and its hover, and returns its index."""
-    seed = buffers.seed[0]
+    seed = buffers.seed[i]
     episode = begin_episode(buffers, i)
     start.noise_seeds[i] = draw_seed(seed, i, episode, NOISE_STREAM, start.is_test)
     start.hovers[i] = draw_index(seed, i, episode, HOVER_STREAM, start.hover_count)
@@ -41,7 +41,7 @@ def ask_for_world(
 ) -> None:
     """Has a world grown for a row's episode."""
     start.is_growing[i] = True
-    start.world_seeds[i] = draw_seed(buffers.seed[0], i, episode, WORLD_STREAM, start.is_test)
+    start.world_seeds[i] = draw_seed(buffers.seed[i], i, episode, WORLD_STREAM, start.is_test)
     world = start.world_params[i]
     world.hill_height_m = hill_height_m
     world.trees_per_ha = trees_per_ha

@@ -81,10 +81,15 @@ class RigTask(Task):
         """A launch of one thread per environment, recorded."""
         return wp.launch(kernel, self.env_count, list(inputs), device=self.device, record_cmd=True)
 
-    def begin(self, is_chosen: NDArray[np.bool_]) -> None:
-        """Starts an episode in the chosen rows, shape (envs,); the others are not touched."""
+    def _launch_begin(self, is_chosen: NDArray[np.bool_]) -> None:
+        """What `begin` does of the task's own."""
         self.is_starting.assign(is_chosen)
         self._begin_rows()
+
+    def step_others(self, is_held: NDArray[np.bool_]) -> None:
+        """As every task's, but the held rows begin another episode: a rig steps its vehicles together."""
+        self.step()
+        self.begin(is_held)
 
     def _begin_rows(self) -> None:
         """Starts the episodes of the rows that are starting."""

@@ -60,6 +60,7 @@ class FollowMe(FlightTask):
     """The task. See `LAYOUT_VERSION`."""
 
     params: ClassVar = PARAMS
+    settings_class: ClassVar = FollowSettings
 
     def __init__(self, settings: FollowSettings, env_count: int, device: str = "cpu") -> None:
         is_documented = settings.preset == "as-documented"
@@ -84,8 +85,8 @@ class FollowMe(FlightTask):
             state.lenses, state.picture_ages_s = self._eyes.lenses, way.age_s
         self._record_all(_rules(settings, self.layout), self.start(is_test=settings.split == "test"))
 
-    def step(self) -> None:
-        """One decision of all environments, with the actions that lie in the buffers."""
+    def _launch_step(self) -> None:
+        """What `step` does of the task's own."""
         for act_part in self._acts:
             act_part.launch()
             self.rig.advance(ACT_TICKS)

@@ -250,7 +250,7 @@ def prepare(buffers: StepBuffers, rules: Rules, state: FollowState, start: Start
     params = state.params[i]
     state.actions[i] = wp.vec4()
     state.unseen_s[i] = 0.0
-    state.path_seeds[i] = draw_seed(buffers.seed[0], i, episode, PATH_STREAM, start.is_test)
+    state.path_seeds[i] = draw_seed(buffers.seed[i], i, episode, PATH_STREAM, start.is_test)
     if rules.is_kept == 0 or episode == 0:
         ask_for_world(buffers, start, i, episode, params.hill_height_m, params.trees_per_ha)
 
@@ -270,7 +270,7 @@ def place(buffers: StepBuffers, rig: RigArrays, state: FollowState, start: Start
     i = wp.tid()
     if not start.is_starting[i]:
         return
-    seed = buffers.seed[0]
+    seed = buffers.seed[i]
     episode = buffers.episodes[i] - 1
     params = state.params[i]
     vary_vehicle(rig, start.makes, state.flight[i], seed, i, episode)

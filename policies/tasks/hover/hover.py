@@ -60,6 +60,7 @@ class Hover(RigTask):
     """The task. Layout version 1."""
 
     params: ClassVar = PARAMS
+    settings_class: ClassVar = HoverSettings
     decision_s = FRAME_TICKS * TICK_S
 
     def __init__(self, settings: HoverSettings, env_count: int, device: str = "cpu") -> None:
@@ -85,8 +86,8 @@ class Hover(RigTask):
         self._prepare = self.record(prepare, buffers, state, start)
         self._place = self.record(place, buffers, rig, state, start)
 
-    def step(self) -> None:
-        """One decision of all environments, with the actions that lie in the buffers."""
+    def _launch_step(self) -> None:
+        """What `step` does of the task's own."""
         self._act.launch()
         self.rig.advance(FRAME_TICKS)
         self._judge.launch()

@@ -126,5 +126,5 @@ def prepare(buffers: StepBuffers, state: HoverState, start: Start) -> None:
 def place(buffers: StepBuffers, rig: RigArrays, state: HoverState, start: Start) -> None:
     i = wp.tid()
     if start.is_starting[i]:
-        vary_vehicle(rig, start.makes, state.flight[i], buffers.seed[0], i, buffers.episodes[i] - 1)
+        vary_vehicle(rig, start.makes, state.flight[i], buffers.seed[i], i, buffers.episodes[i] - 1)
         write_frame(buffers, rig, state, i)

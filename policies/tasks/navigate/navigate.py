@@ -48,6 +48,7 @@ class Navigate(FlightTask):
     """The task. Layout version 2; in version 1 ranges were levelled by the truth."""
 
     params: ClassVar[tuple[TaskParam, ...]] = PARAMS
+    settings_class: ClassVar = NavigateSettings
     name: ClassVar = "Navigate"
     world: ClassVar[WorldConfig] = FOREST
     number_defaults: ClassVar[Mapping[str, float | Sampler]] = IMPROVED
@@ -76,8 +77,8 @@ class Navigate(FlightTask):
         """What the rig is made from, where it is not the drone."""
         return {}
 
-    def step(self) -> None:
-        """One decision of all environments, with the actions that lie in the buffers."""
+    def _launch_step(self) -> None:
+        """What `step` does of the task's own."""
         self._act.launch()
         if self._delay_ticks > 0:
             self.rig.advance(self._delay_ticks)

@@ -67,7 +67,7 @@ class NavigateState:
 def goal_vel(buffers: StepBuffers, rules: Rules, state: NavigateState, i: int) -> wp.vec3:
     """Velocity of a goal that walks [m/s]."""
     time_s = float(buffers.steps[i]) * rules.decision_s
-    return walk_vel(state.params[i].walk_m_s, buffers.seed[0], i, buffers.episodes[i] - 1, time_s)
+    return walk_vel(state.params[i].walk_m_s, buffers.seed[i], i, buffers.episodes[i] - 1, time_s)
 
 
 @wp.kernel(enable_backward=False)
@@ -159,7 +159,7 @@ def place(buffers: StepBuffers, rig: Any, models: Any, state: NavigateState, sta
     i = wp.tid()
     if not start.is_starting[i]:
         return
-    seed = buffers.seed[0]
+    seed = buffers.seed[i]
     episode = buffers.episodes[i] - 1
     params = state.params[i]
     vary(rig, models, start.makes, state.flight[i], seed, i, episode)

@@ -153,7 +153,7 @@ def place_blocks(
         others = Scene()
         for k in range(BLOCK_COUNT):
             others.obstacle_count = k
-            others.obstacles[k] = draw_block(others, buffers.seed[0], i, episode, _BLOCK_STREAM + k)
+            others.obstacles[k] = draw_block(others, buffers.seed[i], i, episode, _BLOCK_STREAM + k)
         for k in range(BLOCK_COUNT):
             blocks.poses[i, k] = others.obstacles[k]
     else:
@@ -175,11 +175,11 @@ def place_goal(
     scene = scene_of(cars, blocks, i)
     position = wp.vec2()
     if rules.are_goals_anywhere:
-        position = draw_goal(positions.cells, scene, buffers.seed[0], i, episode, _GOAL_STREAM)
+        position = draw_goal(positions.cells, scene, buffers.seed[i], i, episode, _GOAL_STREAM)
     elif rules.is_reset_coded and episode == 0:
         position = positions.marker
     else:
-        rng = draw_key(buffers.seed[0], i, episode, _GOAL_STREAM)
+        rng = draw_key(buffers.seed[i], i, episode, _GOAL_STREAM)
         position = positions.spots[wp.randi(rng, 0, _SPOT_COUNT)]
     cars.goal[i] = pose_at(position, wp.radians(cars.params[i].goal_yaw_deg))
 
@@ -197,8 +197,8 @@ def place_car(
     """The start pose; the velocity is not touched."""
     if rules.are_starts_anywhere:
         range_m = cars.params[i].start_range_m
-        cars.pos[i] = draw_start(scene_of(cars, blocks, i), 0, range_m, buffers.seed[0], i, episode, _START_STREAM)
-        rng = draw_key(buffers.seed[0], i, episode, _YAW_STREAM)
+        cars.pos[i] = draw_start(scene_of(cars, blocks, i), 0, range_m, buffers.seed[i], i, episode, _START_STREAM)
+        rng = draw_key(buffers.seed[i], i, episode, _YAW_STREAM)
         cars.yaw[i] = wp.pi * (2.0 * wp.randf(rng) - 1.0)
     else:
         cars.pos[i] = position_of(positions.start)
@@ -282,6 +282,7 @@ class Parking1(ParkingTask):
     """The task. Layout version 1."""
 
     params: ClassVar = (*CAR_PARAMS, *LEVEL1_PARAMS)
+    settings_class: ClassVar = ParkingSettings
 
     def __init__(self, settings: ParkingSettings, env_count: int, device: str = "cpu") -> None:
         choices = chosen(settings, PRESETS[settings.preset])

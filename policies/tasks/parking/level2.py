@@ -182,7 +182,7 @@ def place_movers(
     for k in range(_MOVER_COUNT):
         mover = positions.movers[k]
         if rules.are_obstacles_anywhere:
-            mover = draw_mover(k // PER_STOREY, k % 2 == 1, buffers.seed[0], i, episode, _MOVER_STREAM + k)
+            mover = draw_mover(k // PER_STOREY, k % 2 == 1, buffers.seed[i], i, episode, _MOVER_STREAM + k)
         movers.poses[i, k] = mover
     for storey in range(2):
         movers.touching[i, storey] = 0
@@ -193,7 +193,7 @@ def place_goal(
     buffers: StepBuffers, rules: Rules, positions: Level2Positions, cars: CarState, movers: Movers, i: int, episode: int
 ) -> None:
     """A new goal, on storey 2 with its chance."""
-    seed = buffers.seed[0]
+    seed = buffers.seed[i]
     fraction = movers.params[i].storey_2_share
     storey = wp.where(wp.randf(draw_key(seed, i, episode, _STOREY_STREAM)) < fraction, 1, 0)
     position = wp.vec2()
@@ -218,7 +218,7 @@ def place_car(
 ) -> None:
     """The start pose; the velocity is not touched."""
     if rules.are_starts_anywhere:
-        seed = buffers.seed[0]
+        seed = buffers.seed[i]
         storey = storey_of(cars.goal[i][0])
         if wp.randf(draw_key(seed, i, episode, _START_STOREY_STREAM)) < movers.params[i].start_elsewhere_share:
             storey = 1 - storey
@@ -310,6 +310,7 @@ class Parking2(ParkingTask):
     """The task. Layout version 1."""
 
     params: ClassVar = (*CAR_PARAMS, *LEVEL2_PARAMS)
+    settings_class: ClassVar = Parking2Settings
 
     def __init__(self, settings: Parking2Settings, env_count: int, device: str = "cpu") -> None:
         choices = chosen(settings, PRESETS[settings.preset])

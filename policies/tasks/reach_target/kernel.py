@@ -178,7 +178,7 @@ def is_test_square(x: float, z: float) -> bool:
 @wp.func
 def draw_target(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: int, episode: int, count: int) -> None:
     """Places the target of an episode, number `count`."""
-    rng = draw_key(buffers.seed[0], i, episode, _TARGET_STREAM + count)
+    rng = draw_key(buffers.seed[i], i, episode, _TARGET_STREAM + count)
     half = state.params[i].half_spawn_m
     x = wp.randf(rng, -half, half)
     z = wp.randf(rng, -half, half)
@@ -197,7 +197,7 @@ def draw_target(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: i
 def place_car(buffers: StepBuffers, state: ReachState, rules: ReachRules, i: int, episode: int) -> None:
     """Sets the car down: in the middle as published, with a whole number of degrees, or anywhere; at rest."""
     n = state.params[i]
-    rng = draw_key(buffers.seed[0], i, episode, _YAW_STREAM)
+    rng = draw_key(buffers.seed[i], i, episode, _YAW_STREAM)
     motion = Motion()
     yaw = float(wp.randi(rng, -180, 180)) * _RAD
     x = float(0.0)

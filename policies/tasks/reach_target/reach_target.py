@@ -59,6 +59,7 @@ class ReachTarget(Task):
     """The task. Layout version 1."""
 
     params: ClassVar = PARAMS
+    settings_class: ClassVar = ReachSettings
     decision_s = STEPS * STEP_S
 
     def __init__(self, settings: ReachSettings, env_count: int, device: str = "cpu") -> None:

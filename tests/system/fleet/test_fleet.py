@@ -112,7 +112,11 @@ def test_one_that_fails_is_named_and_the_others_go_on():
     assert driven > -1.0
 
 
-def test_two_that_fly_to_one_place_strike_each_other():
+@pytest.mark.parametrize("engine", ["native", "pybullet", "jsbsim"])
+def test_two_that_fly_to_one_place_strike_each_other(engine):
+    if engine != "native":
+        pytest.importorskip(engine)
+
     async def script(fleet):
         first, second = fleet
         await fleet.each(lambda drone: drone.wait_ready())
@@ -125,7 +129,7 @@ def test_two_that_fly_to_one_place_strike_each_other():
         await first.until(lambda: truths[0]["impact_speed"][0] > 1.0, 20.0, "a blow")
         return [float(truth["impact_speed"][0]) for truth in truths]
 
-    impacts = fly(script, 2, config=BASE.model_copy(update={"wind_m_s": 0.0, "noise": 0.0}))
+    impacts = fly(script, 2, config=BASE.model_copy(update={"wind_m_s": 0.0, "noise": 0.0, "engine": engine}))
     assert impacts[0] > 2.0
     assert impacts[0] == pytest.approx(impacts[1], rel=0.1)
 

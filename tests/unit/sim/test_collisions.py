@@ -1,5 +1,7 @@
 """Vehicles of one world that meet: momentum, impacts, rays and images, against closed forms."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from sim.sensors.ground_ring import GroundRing
 from sim.sensors.ray import VEHICLE
 from sim.sensors.ring import RAYS, RingSensor
 from sim.sensors.sensors import sensor_model
+from sim.stepped import SteppedRig
 from sim.wind import wind_model
 from sim.world.neighbours import NeighbourTable
 from sim.world.world import WorldConfig, build_world, shared_world
@@ -21,11 +24,26 @@ HIGH_M = 40.0
 AHEAD = (0.5, 0.5, 0.5, 0.5)  # a camera that looks north
 
 
+def stepped_by(engine):
+    """What makes a rig with an engine, by its name."""
+    if engine == "native":
+        return Rig
+    if engine == "pybullet":
+        pytest.importorskip("pybullet")
+        from sim.engines.bullet import BulletEngine
+
+        return partial(SteppedRig, engine=BulletEngine)
+    pytest.importorskip("jsbsim")
+    from sim.engines.jsbsim_engine import JsbsimEngine
+
+    return partial(SteppedRig, engine=JsbsimEngine)
+
+
 class Met:
     """Vehicles of one world, written after each tick; the first boots at home, the others north of it."""
 
-    def __init__(self, names, apart_m=3.0, order=None):
-        self.names, self.order = names, order or range(len(names))
+    def __init__(self, names, apart_m=3.0, order=None, engine="native"):
+        self.names, self.order, self.make_rig = names, order or range(len(names)), stepped_by(engine)
         self.world = build_world(WorldConfig(size_m=100.0, hill_height_m=0.0, trees_per_ha=0.0))
         self.table = NeighbourTable(len(names))
         self.worlds = [shared_world(self.world, self.table.seen_by(i)) for i in range(len(names))]
@@ -36,7 +54,7 @@ class Met:
         vehicle, body = class_of(airframe)
         model, air = sensor_model(noise_scale=0.0, home=DEFAULT_HOME), wind_model(0.0, 0.0, 0.0, 0.0)
         classes = {"body": body, "law": vehicle.law}
-        rig = Rig(
+        rig = self.make_rig(
             airframe, self.worlds[i], model, air, home=DEFAULT_HOME, seed=i, start_ne_m=(apart_m * i, 0.0), **classes
         )
         self.table.join(i, rig.rows["truth"], rig.rows["tick"], body.outline(rig.rows["model"][0]))
@@ -63,9 +81,10 @@ class Met:
         return sum(mass * self.truth(i)["vel_ned"].astype(float) for i, mass in enumerate(masses))
 
 
+@pytest.mark.parametrize("engine", ["native", "pybullet", "jsbsim"])
 @pytest.mark.parametrize("names", [("x500", "x500"), ("x500", "f450"), ("f550", "x500")])
-def test_a_collision_in_the_air_keeps_the_momentum_and_both_feel_the_same_blow(names):
-    met = Met(names)
+def test_a_collision_in_the_air_keeps_the_momentum_and_both_feel_the_same_blow(names, engine):
+    met = Met(names, engine=engine)
     met.put(0, (0.0, 0.0, -HIGH_M), (2.0, 0.0, 0.0))
     met.put(1, (1.5, 0.0, -HIGH_M), (-1.0, 0.0, 0.0))
     before = met.momentum()
@@ -86,8 +105,9 @@ def test_a_fast_collision_crashes_both_even_the_one_that_stood():
     assert met.truth(0)["is_crashed"] == met.truth(1)["is_crashed"] == 1
 
 
-def test_rovers_push_each_other():
-    met = Met(("rover", "rover"))
+@pytest.mark.parametrize("engine", ["native", "pybullet"])
+def test_rovers_push_each_other(engine):
+    met = Met(("rover", "rover"), engine=engine)
     met.advance(50)
     down = float(met.truth(0)["pos_ned"][2])
     met.put(0, (2.2, 0.0, down), (2.5, 0.0, 0.0))

@@ -4,16 +4,19 @@ import asyncio
 from math import dist
 
 import pytest
+from typer.testing import CliRunner
 
 from common.params import ParameterError
+from mission.cli import app
 from mission.client import ScriptError
 from mission.connections import open_links
 from mission.console.option_checks import UserError
 from mission.fleet.fleet_options import airframes_of
 from mission.fleet.fleet_script import Fleet
 from mission.fleet.roster import check_fleet_parameters, fleet_configs, free_places, start_of
-from mission.flight_config import FlightConfig
+from mission.flight_config import AIRFIELD, FlightConfig
 from mission.flight_settings import FlightOptions
+from mission.view.replay_file import load_recording
 from sim.world.world import WorldConfig, build_world
 from tests.system.vehicle import free_ports
 
@@ -84,6 +87,35 @@ def test_ports_are_numbered_as_the_simulators_of_px4_and_ardupilot_do():
         assert connected.local_port == tcp + 10 * i
         for link in links:
             link.close()
+
+
+@pytest.mark.parametrize(
+    ("ports", "i_vehicle", "sentence"),
+    [
+        ({"gcs_port": 14550, "api_port": 14500}, 10, "own ports of vehicle 11, 18580 and 14550"),
+        ({"tcp_port": 65530}, 1, "--tcp-port 65530: must be at most 65525: that of vehicle 2 is 10 above"),
+        ({"gcs_port": 61515}, 1, "--gcs-port 61515: must be at most 61514"),
+    ],
+)
+def test_a_vehicle_whose_port_is_no_port_or_a_clients_is_refused(ports, i_vehicle, sentence):
+    for link in open_links(FlightOptions(**ports), 1.0, 0):
+        link.close()
+    with pytest.raises(UserError, match=sentence):
+        open_links(FlightOptions(**ports), 1.0, i_vehicle)
+
+
+def test_the_number_of_a_vehicle_is_no_ones_to_give():
+    with pytest.raises(ParameterError, match="MAV_SYS_ID: several vehicles are numbered from 1"):
+        Fleet(2, FlightConfig(world=FLAT, parameters={"MAV_SYS_ID": 7.0}))
+
+
+def test_the_world_has_a_runway_if_any_of_them_needs_one(tmp_path):
+    arguments = ["--vehicles", "x500:1,plane:1", "--speed", "max", "--seconds", "0.5", "--idle"]
+    done = CliRunner().invoke(app, ["fly", *arguments, "--run-folder", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    recording = load_recording(tmp_path)
+    for each in (recording, *recording.others):
+        assert each.config.world.clearing_radius_m == AIRFIELD.clearing_radius_m
 
 
 def test_vehicles_that_are_not_there_end_the_script_with_a_sentence():

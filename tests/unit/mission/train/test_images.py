@@ -10,7 +10,6 @@ from policies.learn import checkpoint
 from policies.learn.export.policy_driver import PolicyDriver
 from policies.learn.export.policy_file import load_policy
 from policies.tasks.catalogue import CATALOGUE, Entry
-from policies.tasks.task import TaskSettings
 from tests.unit.mission.train.training_run import RUN, honeyguide, train, write_config
 from tests.unit.policies.learn.squares import Squares
 
@@ -20,7 +19,7 @@ NETWORK = {"hidden_units": 8, "num_layers": 1, "vis_encode_type": "compact"}
 @pytest.fixture(autouse=True)
 def named(monkeypatch):
     """The task in the catalogue."""
-    monkeypatch.setitem(CATALOGUE, "Squares", Entry(TaskSettings, lambda _settings, count, _device: Squares(count)))
+    monkeypatch.setitem(CATALOGUE, "Squares", Entry(lambda _settings, count, _device: Squares(count)))
 
 
 def configured(**behavior):

@@ -1,16 +1,20 @@
 """The page of several vehicles, clicked without a browser: all are shown, and who is chosen is commanded."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mission.fleet.fleet_flight import FleetFlight
 from mission.fleet.roster import fleet_configs
+from mission.flight import Flight
 from mission.flight_config import FlightConfig
 from mission.simulator.flight_rig import flight_world
 from mission.view.live import LiveView
 from mission.view.page import PageServer
 from mission.view.replay_file import keep_for_replay, load_recording
 from sim.world.world import WorldConfig
+from tests.unit.mission.view.rows import hovering, write_log
 
 PLAIN = FlightConfig(world=WorldConfig(size_m=64.0, trees_per_ha=0.0))
 MIXED = ("x500", "rover", "x500")
@@ -82,3 +86,32 @@ def test_a_replay_of_a_run_has_all_vehicles_at_the_same_moments(tmp_path):
         np.testing.assert_allclose(each.rows["pos_ned"][-1], end, atol=1e-6)
         np.testing.assert_array_equal(each.rows["time_s"], recording.rows["time_s"])
     assert [len(other) for other in recording.every(5).others] == [len(recording.every(5))] * 2
+
+
+def test_a_replay_has_every_moment_of_each_even_if_the_first_one_waits(tmp_path):
+    """Of a vehicle that is left disarmed there is a row each second: the others' moments stay."""
+    flown = hovering(4.0)
+    flown.rows["pos_ned"][:, 0] = np.arange(len(flown))
+    for name, rows in (("vehicle-1", flown.rows[::50]), ("vehicle-2", flown.rows)):
+        (tmp_path / name).mkdir()
+        write_log(replace(flown, rows=rows), tmp_path / name / "flight.ulg")
+    recording = load_recording(tmp_path)
+    (second,) = recording.others
+    np.testing.assert_array_equal(second.rows["pos_ned"], flown.rows["pos_ned"])
+    np.testing.assert_allclose(recording.rows["time_s"], flown.rows["time_s"])
+    assert recording.rows["pos_ned"][75, 0] == 50.0  # where it was last known to be
+
+
+def test_the_rays_of_one_are_not_left_when_another_is_chosen(page):
+    flights = [Flight(PLAIN.model_copy(update={"has_lidar": has, "airframe": "rover"})) for has in (True, False)]
+    view = LiveView(flights[0], page, others=flights[1:])
+    for flight in flights:
+        flight.frame()
+    view._scene.draw_rays(view._moment(), (2.0, 3.0))
+    assert page.scene._handle_from_node_name["/rays"].visible
+    handle(page, "Vehicle").value = "2 rover"
+    view._do_what_was_clicked()
+    view._update()
+    assert not page.scene._handle_from_node_name["/rays"].visible
+    for flight in flights:
+        flight.close()

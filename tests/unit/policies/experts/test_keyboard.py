@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 
 from policies.experts.keyboard import Control, KeyboardDriver, NoKeys
-from policies.tasks.catalogue import CATALOGUE, build_task
+from policies.tasks.catalogue import CATALOGUE, build_task, settings_class
 from policies.tasks.layout import Branch, Element, Layout
 
 
 @pytest.mark.parametrize(
     ("name", "preset"),
-    [(n, p) for n, entry in CATALOGUE.items() for p in get_args(entry.settings.model_fields["preset"].annotation)],
+    [(n, p) for n in CATALOGUE for p in get_args(settings_class(n).model_fields["preset"].annotation)],
 )
 def test_every_task_can_be_driven(name, preset):
-    entry = CATALOGUE[name]
-    task = build_task(name, 2, entry.settings(preset=preset))
+    task = build_task(name, 2, settings_class(name)(preset=preset))
     driver = KeyboardDriver(task.layout)
     actions = set()
     for control in Control:

@@ -49,7 +49,7 @@ def show(buffers: StepBuffers, state: GlimpsesState, i: int, step: int):
 @wp.func
 def start(buffers: StepBuffers, state: GlimpsesState, i: int):
     episode = begin_episode(buffers, i)
-    state.place[i] = wp.randf(draw_key(buffers.seed[0], i, episode, 1), -0.8, 0.8)
+    state.place[i] = wp.randf(draw_key(buffers.seed[i], i, episode, 1), -0.8, 0.8)
     show(buffers, state, i, 0)
 
 

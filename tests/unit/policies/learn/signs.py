@@ -26,7 +26,7 @@ class SignsState:
 def show(buffers: StepBuffers, state: SignsState, i: int):
     """A new episode of one decision, and its sign."""
     episode = begin_episode(buffers, i)
-    rng = draw_key(buffers.seed[0], i, episode, 1)
+    rng = draw_key(buffers.seed[i], i, episode, 1)
     state.sign[i] = wp.vec3(float(wp.randi(rng, 0, 3)), float(wp.randi(rng, 0, 2)), wp.randf(rng, -0.8, 0.8))
     at = open_frame(buffers, i)
     for k in range(3):

@@ -30,7 +30,7 @@ class SquaresState:
 @wp.func
 def show(buffers: StepBuffers, state: SquaresState, i: int):
     """Puts the square somewhere, and shows it."""
-    key = draw_key(buffers.seed[0], i, 100 * buffers.episodes[i] + buffers.steps[i], 1)
+    key = draw_key(buffers.seed[i], i, 100 * buffers.episodes[i] + buffers.steps[i], 1)
     state.place[i] = wp.randf(key, -0.75, 0.75)
     state.side[i] = wp.where(wp.randf(key) < 0.5, 1.0, -1.0)
     buffers.observations[i, open_frame(buffers, i)] = state.side[i]

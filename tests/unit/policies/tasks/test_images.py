@@ -7,7 +7,6 @@ import pytest
 from policies.tasks.catalogue import CATALOGUE, Entry
 from policies.tasks.gym import TaskEnv, TaskVectorEnv
 from policies.tasks.layout import Element, ImageElement, Layout, LayoutError
-from policies.tasks.task import TaskSettings
 from tests.unit.policies.learn.squares import SIDE, Squares
 
 LAYOUT = Squares(1).layout
@@ -16,7 +15,7 @@ LAYOUT = Squares(1).layout
 @pytest.fixture
 def named(monkeypatch):
     """The task in the catalogue."""
-    monkeypatch.setitem(CATALOGUE, "Squares", Entry(TaskSettings, lambda _settings, count, _device: Squares(count)))
+    monkeypatch.setitem(CATALOGUE, "Squares", Entry(lambda _settings, count, _device: Squares(count)))
 
 
 def test_an_image_survives_the_layouts_record():

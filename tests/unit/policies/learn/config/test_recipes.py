@@ -5,12 +5,17 @@ from policies.learn.config.recipes import recipe, recipe_names
 from policies.learn.config.yaml_locations import ConfigError
 from policies.tasks.catalogue import CATALOGUE, task_settings
 
+FOR_ANY = {"gym", "gym-sac", "own"}  # task, that the command names
+
 
 @pytest.mark.parametrize("name", recipe_names())
 def test_every_recipe_loads_without_a_warning_for_a_task_that_exists(name):
     loaded = load_config(recipe(name))
     assert loaded.warnings == ()
     env = loaded.config.env_settings
+    if name in FOR_ANY:
+        assert env.env_path is None
+        return
     assert env.env_path in CATALOGUE
     task_settings(env.env_path, dict(argument.split("=", 1) for argument in env.env_args))
 

@@ -1,0 +1,232 @@
+"""Environments of Gymnasium as a task: what was not written for Warp, for the same learners and commands.
+
+In: actions in the task's buffers. Out: what a vector environment of Gymnasium makes of them, written where the kernels
+of other tasks write theirs. Episodes are begun here (`AutoresetMode.DISABLED` with `reset_mask`), so that what they saw
+last is kept. An environment's own state cannot be saved: a run that is resumed begins its episodes anew.
+"""
+
+import ast
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import gymnasium
+import numpy as np
+from gymnasium.envs.registration import EnvSpec, load_env_creator
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
+from numpy.typing import NDArray
+from pydantic import ConfigDict, model_validator
+
+from policies.tasks.catalogue import GYM, UnknownTask, import_users_module
+from policies.tasks.episode import Outcome
+from policies.tasks.gym_spaces import ActionWriter, ObservationReader, UnfitSpace
+from policies.tasks.layout import Layout
+from policies.tasks.reshaping import Rows
+from policies.tasks.task import Task, TaskSettings
+
+_SUCCESS_KEYS = ("is_success", "success")  # of an info: Stable-Baselines3 and Gymnasium-Robotics; Meta-World
+_IMAGES_PER_S = 30  # of environments that do not say (guess)
+
+
+class GymSettings(TaskSettings):
+    """What a user may choose of an environment: all else that is given goes to `gymnasium.make`."""
+
+    model_config = ConfigDict(extra="allow")
+
+    preset: Literal[""] = ""  # type: ignore[assignment]  # there are none
+    """There are none."""
+    vectorization: Literal["sync", "async"] = "sync"
+    """Whether environments are stepped one after the other, or each in a process of its own."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _values_of_text(cls, values: Any) -> Any:
+        """Arguments of the environment that are given as text: numbers, flags and lists as Python writes them."""
+        own = cls.model_fields
+        return {key: value if key in own else _literal(value) for key, value in dict(values).items()}
+
+
+def _literal(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    if value in {"true", "false"}:
+        return value == "true"
+    try:
+        return ast.literal_eval(value)
+    except (ValueError, SyntaxError):
+        return value
+
+
+class GymTask(Task):
+    """Environments of one ID; a subclass that names its `env_id` may change what they show, pay, and how they end."""
+
+    env_id: ClassVar[str]
+    """As `gymnasium.make` takes it."""
+    params: ClassVar = ()
+    settings_class: ClassVar = GymSettings
+    says_success = False  # until an info does
+
+    def __init__(self, settings: GymSettings, env_count: int, device: str = "cpu") -> None:
+        """Makes the environments.
+
+        Raises:
+            UnknownTask: they cannot be made, or no policy here can see them or act in them.
+        """
+        name = f"{GYM}{self.env_id}"
+        spec = _spec(self.env_id)
+        self.envs: VectorEnv[Any, Any, Any] = _made(spec, env_count, settings)
+        try:
+            self._reader = ObservationReader(self.envs.single_observation_space)
+            self._writer = ActionWriter(self.envs.single_action_space)
+        except UnfitSpace as error:
+            raise UnknownTask(f"{name}: {error}") from None
+        self.decision_s = 1.0 / (self.envs.metadata.get("render_fps") or _IMAGES_PER_S)
+        reader, writer = self._reader, self._writer
+        layout = Layout(
+            name, 1, reader.elements, writer.continuous, writer.branches, settings.stack or 1, image=reader.image
+        )
+        super().__init__(layout, env_count, number_defaults={}, device=device)
+        self._seeds: list[int | None] = [None] * env_count
+
+    def reset(self, seed: int | Sequence[int], is_chosen: NDArray[np.bool_] | None = None) -> None:
+        """Starts environments anew; of a single seed each has the next one."""
+        seeds = [seed + i for i in range(self.env_count)] if isinstance(seed, int) else seed
+        self._seeds = [each % 2**31 for each in seeds]
+        super().reset(seed, is_chosen)
+
+    def _launch_begin(self, is_chosen: NDArray[np.bool_]) -> None:
+        """Resets the chosen environments and shows their first frames."""
+        rows = Rows(self)
+        self._begin_rows(rows, np.asarray(is_chosen, dtype=np.bool_))
+        rows.write()
+
+    def _launch_step(self) -> None:
+        """Steps them all; those that end begin their next episode."""
+        rows = Rows(self)
+        actions = self._writer.actions(rows.of("continuous"), rows.of("branches"))
+        observations, rewards, is_terminated, is_truncated, info = self.envs.step(actions)
+        rows.of("rewards")[:] = rewards
+        rows.of("returns")[:] += rows.of("rewards")
+        rows.of("steps")[:] += 1
+        every = np.ones(self.env_count, dtype=np.bool_)
+        self._show(rows, every, observations)
+        outcomes = self._outcomes(is_terminated, is_truncated, info)
+        for name in ("outcomes", "is_terminated", "is_truncated"):
+            rows.of(name)[:] = 0
+        is_over = outcomes != Outcome.RUNNING
+        if is_over.any():
+            rows.end(is_over, outcomes)
+            rows.of("is_terminated")[:] = is_terminated
+            rows.of("is_truncated")[:] = is_truncated & ~is_terminated
+            self._begin_rows(rows, is_over)
+        rows.write()
+
+    def _outcomes(self, is_terminated: Any, is_truncated: Any, info: Mapping[str, Any]) -> NDArray[np.int32]:
+        """How each episode stands, shape (envs,)."""
+        outcomes = np.where(is_terminated, Outcome.ENDED, np.where(is_truncated, Outcome.TIMEOUT, Outcome.RUNNING))
+        for key in _SUCCESS_KEYS:
+            if key in info:
+                self.says_success = True
+                is_success = np.asarray(info[key], dtype=np.bool_) & info.get(f"_{key}", True)
+                outcomes[is_success & (outcomes != Outcome.RUNNING)] = Outcome.SUCCESS
+        return outcomes.astype(np.int32)
+
+    def _begin_rows(self, rows: Rows, is_chosen: NDArray[np.bool_]) -> None:
+        if not is_chosen.any():
+            return
+        seeds = [seed if chosen else None for seed, chosen in zip(self._seeds, is_chosen, strict=True)]
+        self._seeds = [None if chosen else seed for seed, chosen in zip(self._seeds, is_chosen, strict=True)]
+        # VectorEnv's annotation knows no lists of seeds; its environments do
+        observations, _ = self.envs.reset(seed=seeds, options={"reset_mask": is_chosen})  # type: ignore[arg-type]
+        for name in ("steps", "returns", "observations"):
+            rows.of(name)[is_chosen] = 0
+        rows.of("episodes")[is_chosen] += 1
+        self._show(rows, is_chosen, observations)
+
+    def _show(self, rows: Rows, is_chosen: NDArray[np.bool_], observations: Any) -> None:
+        """Writes the newest frames of the chosen rows; the older ones move on."""
+        if self._reader.elements:
+            own, size = len(self._reader.elements), self.layout.frame_size
+            shown = rows.of("observations")
+            older = shown[is_chosen, size:]
+            shown[is_chosen, : older.shape[1]] = older
+            first = shown.shape[1] - size
+            frames = self._reader.floats(observations)[is_chosen]
+            if not np.isfinite(frames).all():
+                raise ValueError(f"{self.layout.task}: an observation holds a number that is not finite")
+            shown[is_chosen, first : first + own] = frames
+        if self._reader.image is not None:
+            rows.of("images")[is_chosen] = self._reader.images(observations)[is_chosen]
+
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Restores the arrays; the environments begin new episodes, seeded by how many there have been."""
+        super().load_state(state)
+        pairs = zip(self.buffers.seed.numpy(), self.buffers.episodes.numpy(), strict=True)
+        self._seeds = [
+            int(np.random.SeedSequence([int(seed) % 2**32, int(episode), i]).generate_state(1)[0] >> 1)
+            for i, (seed, episode) in enumerate(pairs)
+        ]
+        self.begin(np.ones(self.env_count, dtype=np.bool_))
+
+    def top_view(self, i_env: int, height_px: int = 480) -> NDArray[np.uint8]:  # noqa: ARG002
+        """What the environment renders, RGB; of any height."""
+        envs = self.envs.envs[i_env : i_env + 1] if isinstance(self.envs, SyncVectorEnv) else None
+        images = [env.render() for env in envs] if envs is not None else self.envs.render()
+        if images is None or images[0] is None:
+            raise NotImplementedError(f"{self.layout.task} renders no rgb_array")
+        return np.asarray(images[0 if envs is not None else i_env], dtype=np.uint8)
+
+
+def gym_class(env_id: str) -> type[GymTask]:
+    """The task of an ID of Gymnasium's.
+
+    Raises:
+        UnknownTask: nothing of that ID is registered.
+    """
+    _spec(env_id)
+    return type("GymTask", (GymTask,), {"env_id": env_id})
+
+
+def _spec(env_id: str) -> EnvSpec:
+    """What is registered of an ID; of `module:ID` by importing the module."""
+    module, _, own_id = env_id.rpartition(":")
+    if module:
+        import_users_module(f"{GYM}{env_id}", module)
+    try:
+        return gymnasium.spec(own_id)
+    except gymnasium.error.Error as error:
+        raise UnknownTask(f"{GYM}{env_id}: {_one_line(error)}") from None
+
+
+def _made(spec: EnvSpec, env_count: int, settings: GymSettings) -> VectorEnv[Any, Any, Any]:
+    name = f"{GYM}{spec.id}"
+    arguments = dict(settings.model_extra or {})
+    if spec.entry_point is None:
+        envs: VectorEnv[Any, Any, Any] = _called(name, lambda: gymnasium.make_vec(spec, env_count, **arguments))
+        if envs.metadata.get("autoreset_mode") is not AutoresetMode.DISABLED:
+            raise UnknownTask(
+                f"{name}: is a vector environment that begins episodes by itself; autoreset_mode Disabled is needed"
+            )
+        return envs
+    if "render_mode" not in arguments and "rgb_array" in _render_modes(name, spec):
+        arguments["render_mode"] = "rgb_array"
+    makers = [lambda: gymnasium.make(spec, **arguments)] * env_count
+    kind = SyncVectorEnv if settings.vectorization == "sync" else AsyncVectorEnv
+    return _called(name, lambda: kind(makers, autoreset_mode=AutoresetMode.DISABLED))
+
+
+def _render_modes(name: str, spec: EnvSpec) -> Sequence[str]:
+    at = spec.entry_point
+    creator = _called(name, lambda: load_env_creator(at)) if isinstance(at, str) else at
+    return getattr(creator, "metadata", {}).get("render_modes", ())
+
+
+def _called(name: str, make: Any) -> Any:
+    """What Gymnasium makes; what it or the environment's constructor will not take is told in one sentence."""
+    try:
+        return make()
+    except (gymnasium.error.Error, ImportError, TypeError, ValueError, AssertionError) as error:
+        raise UnknownTask(f"{name}: cannot be made: {_one_line(error)}") from None
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()).rstrip(".")
