@@ -65,9 +65,9 @@ def companion(
 def benchmark(
     task: Annotated[str, typer.Argument(help="What is judged: follow.")],
     policy: Annotated[
-        str, typer.Option(help="A policy of FollowMe: a name, file or run; an .onnx file; module:Class; or 'scripted'.")
+        str, typer.Option(help="A policy of FollowMe: name, file or run; .onnx file; module:Class; 'scripted'.")
     ] = "follow-me",
-    condition: Annotated[list[str] | None, typer.Option(help="One of the conditions; repeatable. Default: all.")] = None,
+    condition: Annotated[list[str] | None, typer.Option(help="One of them; repeatable. Default: all.")] = None,
     flights: Annotated[int, typer.Option(min=1, help="Of each condition.")] = 60,
     jobs: Annotated[int, typer.Option(min=1, help="Processes at a time.")] = 2,
     guard: Annotated[bool, typer.Option("--guard/--no-guard", help="The guard bounds the policy.")] = True,

@@ -12,9 +12,9 @@ from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory
 from mission.flight import Flight, FlightConfig
 from mission.flight_base import FlightBase
 from policies.companion.companion import Companion
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import MemoryCamera
 from policies.companion.skills.driving import Driving
-from policies.companion.guard.settings import GuardSettings
 from policies.companion.skills.following import Following, Pilot, guard_of
 from policies.companion.skills.navigating import Navigating
 from policies.companion.skills.skill import Skill

@@ -13,32 +13,21 @@ from numpy.typing import NDArray
 from common.image_stream import ImageFrame
 from mission.follow.late_camera import LateCamera, Sink
 from policies.tasks.follow_me.flown_cast import FlownCast
-from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import (
     DEPTH_HALF_M,
     HFOV_DEG,
     IMAGE_CHANNELS,
     IMAGE_SIZE,
     TILT_DEG,
+    camera_mount,
     pack_images,
 )
-from policies.tasks.follow_me.owner_visibility import lens_of
-from policies.tasks.follow_me.task_cameras import set_optics
+from policies.tasks.follow_me.task_cameras import aim_lenses, set_optics
 from sim.rig import Rig
-from sim.sensors.camera import Lens
 from sim.sensors.fast_camera.fast_camera import QuickCamera
-from sim.truth import Truth
 from sim.world.world import WorldMap
 
-wp.set_module_options({"enable_backward": False})
-
 PERIOD_US = 100_000
-
-
-@wp.kernel(enable_backward=False)
-def _aim(truths: wp.array(dtype=Truth), params: wp.array(dtype=FollowParams), lenses: wp.array(dtype=Lens)) -> None:
-    i = wp.tid()
-    lenses[i] = lens_of(truths[i], params[i])
 
 
 class OnboardCamera:
@@ -52,6 +41,8 @@ class OnboardCamera:
         seed: of what happens to pictures on their way.
     """
 
+    q_frd_from_rdf, hfov_deg = camera_mount(), HFOV_DEG
+
     def __init__(self, rig: Rig, world: WorldMap, cast: FlownCast, noise: float = 1.0, seed: int = 0) -> None:
         rows = cast.rows
         size: dict[str, Any] = {"width": IMAGE_SIZE, "height": IMAGE_SIZE, "hfov_deg": HFOV_DEG}
@@ -61,7 +52,7 @@ class OnboardCamera:
         params.numpy()["camera_noise"] *= noise
         everyone: Any = wp.full(1, value=True, dtype=wp.bool)
         aim = [rig.arrays.truth, params, self._camera.lenses]
-        self._aim = wp.launch(_aim, 1, aim, record_cmd=True)
+        self._aim = wp.launch(aim_lenses, 1, aim, record_cmd=True)
         optics = [rig.arrays, params, everyone, self._camera.optics]
         self._set_optics = wp.launch(set_optics, 1, optics, record_cmd=True)
         inputs = [self._camera.rgb, self._camera.depth_m, everyone, images]

@@ -31,12 +31,12 @@ class FlightCameras:
         self.photos.prepare()
         self._rigs: list[CameraRig | VideoRig] = [self.photos]
 
-    def start(self, camera: Camera | None, people: Any, on_trouble: Callable[[str], None]) -> None:
+    def start(self, camera: Camera | None, cast: Any, on_trouble: Callable[[str], None]) -> None:
         """Gives live picture and video something to show.
 
         Args:
             camera: the vehicle's.
-            people: who is seen: an array of one `Person`; None: nobody.
+            cast: who is seen, with `drawn` people and their `clothes`; None: nobody.
             on_trouble: is told why there is no video.
         """
         if self._stream is not None:
@@ -45,7 +45,8 @@ class FlightCameras:
             if camera is not None:
                 self._stream.start(camera, stream_rig)
         if self._video is not None:
-            video_rig = VideoRig(self._rig, self._world, people)
+            seen = (None, None) if cast is None else (cast.drawn, cast.clothes)
+            video_rig = VideoRig(self._rig, self._world, *seen)
             self._rigs.append(video_rig)
             if camera is not None:
                 self._video.start(camera, video_rig)

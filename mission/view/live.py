@@ -75,7 +75,7 @@ class LiveView:
         mount = None if self._camera is None else Mount(MOUNT_FRD, RDF_IN_FRD, PHOTO_HFOV_DEG, *IMAGE_SIZE)
         if flight.onboard is not None:
             flight.onboard.add_sink(self._seen)
-            mount = Mount(MOUNT_FRD, flight.onboard.view.q_frd_from_rdf, flight.onboard.view.hfov_deg, 1, 1)
+            mount = Mount(MOUNT_FRD, flight.onboard.q_frd_from_rdf, flight.onboard.hfov_deg, 1, 1)
         self._camera_rig = CameraRig(flight.rig, flight.world, has_thread=True)
         self._pending: Future[RawFrame] | None = None
         airframes = [other.airframe for other in others]

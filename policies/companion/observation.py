@@ -80,9 +80,7 @@ class Observer:
         self._observe = wp.launch(observe_rows, 1, [kind, own, report, action, age, out], record_cmd=True)
         self._command = CommandKernel()
 
-    def vector(
-        self, own: Own, owner: Owner, last_action: Floats, time_us: int, picture_age_s: float = 0.0
-    ) -> Floats:
+    def vector(self, own: Own, owner: Owner, last_action: Floats, time_us: int, picture_age_s: float = 0.0) -> Floats:
         """The observation as of now.
 
         Args:

@@ -16,7 +16,6 @@ from torch import Tensor, nn
 
 from common.attitude import Vector, rotated
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, camera_mount
-from sim.camera_rig import MOUNT_FRD
 
 CELLS = 16  # of the map, in rows and columns
 STRIDE = 4  # pixels of a cell
@@ -47,8 +46,7 @@ def _block(inputs: int, outputs: int, *, stride: int = 1, dilation: int = 1, siz
 
 
 class DetectorNetwork(nn.Module):
-    """Of bytes (pictures, height, width, 4): logits of a chest, log ranges and logits of any limb, each (pictures,
-    CELLS, CELLS)."""
+    """Pictures (n, height, width, 4) in; logits of a chest, log ranges, logits of any limb out, (n, CELLS, CELLS)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -135,7 +133,9 @@ def _chest_hfrd(at: tuple[float, float], range_m: float, width: int, down_frd: t
     per_pixel = 2.0 * float(_HALF_WIDTH) / width
     ray = np.array([(at[0] - 0.5 * width) * per_pixel, (at[1] - 0.5 * width) * per_pixel, 1.0])
     ray *= range_m / np.linalg.norm(ray)
-    position = np.array(rotated(camera_mount(), (float(ray[0]), float(ray[1]), float(ray[2])))) + np.array(MOUNT_FRD)
+    position = np.array(
+        rotated(camera_mount(), (float(ray[0]), float(ray[1]), float(ray[2])))
+    )  # of the lens, a decimetre off
     down_x, down_y = down_frd
     down = np.array([down_x, down_y, sqrt(max(1.0 - down_x**2 - down_y**2, 0.0))])
     ahead = np.array([1.0, 0.0, 0.0]) - down_x * down

@@ -132,7 +132,7 @@ def _aim(
     lens: Any = camera.lenses.numpy()
     lens["pos_ned"] = np.concatenate([where, down[:, None]], -1)
     lean = [rng.normal(0.0, 0.15, n), rng.normal(-0.05, 0.2, n)]  # roll and pitch [rad]
-    lens["q_ned_from_rdf"] = _times(_euler(*lean, yaw), np.array(camera_mount()))
+    lens["q_ned_from_rdf"] = _times(_euler(lean[0], lean[1], yaw), np.array(camera_mount()))
     lens["half_width"] = rng.uniform(0.97, 1.03, n) * np.tan(np.radians(0.5 * HFOV_DEG))
     light = np.where(rng.random(n) < 0.3, rng.uniform(0.06, 0.3, n), 1.0)
     gain = np.minimum(1.0 / light, float(GAIN_MAX))
@@ -151,7 +151,7 @@ def _aim(
 
 
 def _labels(camera: QuickCamera, people: Any) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
-    """Of each picture: whose chest is seen in which cell, and where some of a person is seen that counts for nothing."""
+    """Of each picture: whose chest is in which cell; where else somebody is seen, nothing counts."""
     kind = camera.kind.numpy()
     lens: Any = camera.lenses.numpy()
     n = len(kind)
@@ -161,8 +161,11 @@ def _labels(camera: QuickCamera, people: Any) -> tuple[NDArray[np.int8], NDArray
     ranges_m = np.zeros((n, CELLS, CELLS), np.float32)
     for i in range(n):
         nearer: list[Any] = []
+        eye = lens[i]["pos_ned"]
         there = [person for person in people[i] if person["stature_m"] > 0.0]
-        for person in sorted(there, key=lambda p, eye=lens[i]["pos_ned"]: float(np.linalg.norm(p["pos_ned"] - eye))):
+        far_m = [float(np.linalg.norm(person["pos_ned"] - eye)) for person in there]
+        for k in np.argsort(far_m):
+            person = there[k]
             _label(cells[i], ranges_m[i], kind[i], lens[i], person, nearer)
     return cells, ranges_m
 

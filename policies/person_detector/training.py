@@ -1,8 +1,8 @@
 """`python -m policies.person_detector.training`: trains the person detector from nothing and judges it on other worlds.
 
 Pictures are rendered, labels come from the renderer; no policy, no flight, no reward. Focal loss (Lin et al. 2017) for
-who is in which cell, an absolute error of the logarithm for how far away, then a straight line through the logits (Platt
-1999) that makes probabilities true on validation worlds. The judgement is on worlds of a further seed.
+who is in which cell, an absolute error of the logarithm for how far away, then a line through the logits (Platt 1999)
+that makes probabilities true on validation worlds. The judgement is on worlds of a further seed.
 """
 
 from pathlib import Path
@@ -10,14 +10,14 @@ from typing import Annotated, Any
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 from torch import Tensor
+from torch.nn import functional
 
-from policies.person_detector.detector import WEIGHTS, DetectorNetwork
+from policies.person_detector.detector import WEIGHTS, DetectorNetwork, shipped
 from policies.person_detector.scenes import Scenes, scenes
 from policies.tasks.intervals import rate
 
@@ -55,15 +55,16 @@ def _loss(network: DetectorNetwork, there: Scenes, rows: NDArray[np.int64], *, i
     if is_mirrored:
         pictures, cells, ranges_m = pictures.flip(2), cells.flip(2), ranges_m.flip(2)
     logits, log_ranges, limb_logits = network(pictures)
-    counts = cells != 2  # noqa: PLR2004  (what does not count)
+    counts = cells != 2
     target = (cells == 1).float()
-    plain = F.binary_cross_entropy_with_logits(logits, target, reduction="none")
+    plain = functional.binary_cross_entropy_with_logits(logits, target, reduction="none")
     weight = (1.0 - torch.exp(-plain)) ** _FOCUS
     is_there = cells == 1
     found = (weight * plain)[counts].sum() / max(int(is_there.sum()), 1)
     off = (log_ranges[is_there] - ranges_m[is_there].log()).abs().mean() if is_there.any() else log_ranges.sum() * 0.0
-    limbs = F.binary_cross_entropy_with_logits(limb_logits, (cells > 0).float())
-    return found + _RANGE_WEIGHT * off + limbs
+    limbs = functional.binary_cross_entropy_with_logits(limb_logits, (cells > 0).float())
+    loss: Tensor = found + _RANGE_WEIGHT * off + limbs
+    return loss
 
 
 def _calibrate(network: DetectorNetwork, there: Scenes) -> None:
@@ -75,7 +76,7 @@ def _calibrate(network: DetectorNetwork, there: Scenes) -> None:
 
     def surprise() -> Tensor:
         optimizer.zero_grad()
-        loss = F.binary_cross_entropy_with_logits(line[0] * best + line[1], truth.double())
+        loss = functional.binary_cross_entropy_with_logits(line[0] * best + line[1], truth.double())
         loss.backward()  # type: ignore[no-untyped-call]
         return loss
 
@@ -100,7 +101,12 @@ def judge(network: DetectorNetwork, there: Scenes) -> dict[str, Any]:
         for k in range(10)
         if (bins == k).any()
     ]
-    return {"seen": seen, "ghosts": ghosts, "calibration error": float(sum(gaps)), "range": _range_error(network, there)}
+    return {
+        "seen": seen,
+        "ghosts": ghosts,
+        "calibration error": float(sum(gaps)),
+        "range": _range_error(network, there),
+    }
 
 
 def _range_error(network: DetectorNetwork, there: Scenes) -> float:
@@ -119,8 +125,6 @@ def main(
     out: Path = WEIGHTS,
     judged: Annotated[bool, typer.Option("--judge", help="Train nothing: judge the one that ships.")] = False,
 ) -> None:
-    from policies.person_detector.detector import shipped
-
     console = Console(highlight=False)
     network = shipped().eval() if judged else train(pictures, epochs, seed, console)
     if not judged:

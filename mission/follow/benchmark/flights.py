@@ -6,8 +6,10 @@ those of the benchmark are odd, as those of all tests: training has the even one
 
 from dataclasses import dataclass
 from math import nan
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.benchmark.conditions import Condition
@@ -20,6 +22,7 @@ from policies.companion.skills.following import Following, Pilot
 from policies.tasks.follow_me.track import Ranges
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
+Array = NDArray[Any]
 SECONDS = 60.0
 FIRST_SEED = 3_000_003  # odd; no training and no tuning is given those from here on
 VALIDATION_SEED = 2_000_003  # choices are made on these
@@ -77,7 +80,8 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
     finally:
         flight.close()
     track = watch.track()
-    assert track is not None  # one sample at least
+    if track is None:
+        raise ValueError("a flight of no time has no outcome")
     is_hidden, north, east, yaw_rate = np.array(rows).T
     distance, speed = track.distance_m[: len(rows)], np.hypot(north, east)
     bounds = Ranges()
@@ -103,12 +107,12 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
     )
 
 
-def _spans(is_true: np.ndarray) -> list[tuple[int, int]]:  # type: ignore[type-arg]
+def _spans(is_true: Array) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate(([False], is_true, [False])).astype(np.int8)))
     return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
 
 
-def _has_stood(hidden: np.ndarray, speed: np.ndarray, interval_s: float) -> bool | None:  # type: ignore[type-arg]
+def _has_stood(hidden: Array, speed: Array, interval_s: float) -> bool | None:
     """Whether it stood five seconds after the last sight of each hiding that was so long."""
     due = round(HOLD_S / interval_s)
     spans = [first for first, end in _spans(hidden) if end - first > due]
@@ -117,12 +121,10 @@ def _has_stood(hidden: np.ndarray, speed: np.ndarray, interval_s: float) -> bool
     return all(speed[max(first + due - 5, 0) : first + due + 1].min() < STANDS_M_S for first in spans)
 
 
-def _has_resumed(hidden: np.ndarray, is_in_band: np.ndarray, interval_s: float) -> bool | None:  # type: ignore[type-arg]
+def _has_resumed(hidden: Array, is_in_band: Array, interval_s: float) -> bool | None:
     """Whether it was in the band for a second within ten of each return that was followed for so long."""
     due, length = round(BACK_S / interval_s), round(_SUSTAINED_S / interval_s)
     ends = [end for _, end in _spans(hidden) if end + due <= len(hidden)]
     if not ends:
         return None
-    return all(
-        any(is_in_band[k : k + length].all() for k in range(end, end + due - length + 1)) for end in ends
-    )
+    return all(any(is_in_band[k : k + length].all() for k in range(end, end + due - length + 1)) for end in ends)

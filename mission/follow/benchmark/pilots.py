@@ -69,8 +69,8 @@ class OnnxPilot:
             raise PilotError(f"{path}: {str(error).splitlines()[0]}") from error
         shapes = {put.name: put.shape for put in self._session.get_inputs()}
         sizes = {len(vector_elements(int(kind))): int(kind) for kind in (EGO, EGO_BLIND)}
-        vectors = [name for name, shape in shapes.items() if len(shape) == 2 and shape[1] in sizes]  # noqa: PLR2004
-        images = [name for name, shape in shapes.items() if len(shape) == 4]  # noqa: PLR2004
+        vectors = [name for name, shape in shapes.items() if len(shape) == 2 and shape[1] in sizes]
+        images = [name for name, shape in shapes.items() if len(shape) == 4]
         if not vectors or not images:
             raise PilotError(f"{path}: takes {shapes}; a pilot of FollowMe takes a vector and a picture")
         self._vector, self._image = vectors[0], images[0]

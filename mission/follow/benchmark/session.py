@@ -67,7 +67,7 @@ def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Outcome]]:
     rows = [row(BY_NAME[name], outcomes[name]) for name in names]
     console.print(_shown(rows))
     if options.out is not None:
-        _write(options, rows, outcomes)
+        _write(options.out, options, rows, outcomes)
         console.print(f"table and flights: {options.out}")
     return outcomes
 
@@ -110,11 +110,10 @@ def _shown(rows: Sequence[tuple[str, ...]]) -> Table:
 
 
 def _write(
-    options: BenchmarkOptions, rows: Sequence[tuple[str, ...]], outcomes: dict[str, list[Outcome]]
+    out: Path, options: BenchmarkOptions, rows: Sequence[tuple[str, ...]], outcomes: dict[str, list[Outcome]]
 ) -> None:
-    assert options.out is not None
-    options.out.mkdir(parents=True, exist_ok=True)
-    write_whole(options.out / "table.md", markdown(rows).encode())
+    out.mkdir(parents=True, exist_ok=True)
+    write_whole(out / "table.md", markdown(rows).encode())
     flown = {name: [asdict(outcome) for outcome in found] for name, found in outcomes.items()}
     record = {"policy": options.policy, "has_guard": options.has_guard, "seed": options.seed, "flights": flown}
-    write_whole(options.out / "flights.json", (json.dumps(record, indent=1) + "\n").encode())
+    write_whole(out / "flights.json", (json.dumps(record, indent=1) + "\n").encode())

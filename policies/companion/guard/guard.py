@@ -10,6 +10,7 @@ from enum import Enum
 from math import atan2, inf, isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.attitude import Vector, rotated, wrapped, yaw_of
 from common.image_stream import ImageFrame
@@ -22,6 +23,7 @@ from policies.companion.skills.skill import Velocity
 from policies.companion.vehicle_link import Own, Owner
 from policies.person_detector.detector import Detection, PersonDetector
 
+Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
 _YAW_MAX = 1.5  # [rad/s]
 _TOLD_M_S = 0.3  # less than this off what was wanted is no intervention
@@ -51,9 +53,7 @@ class Guard:
         detector: of people; None: the one that ships.
     """
 
-    def __init__(
-        self, settings: GuardSettings, *, hears: bool = True, detector: PersonDetector | None = None
-    ) -> None:
+    def __init__(self, settings: GuardSettings, *, hears: bool = True, detector: PersonDetector | None = None) -> None:
         self.settings = settings
         self.stance = Stance.FREE
         self.interventions: Counter[str] = Counter()
@@ -101,7 +101,7 @@ class Guard:
             self._bearing_rad = atan2(east - pose.pos_ned[1], north - pose.pos_ned[0])
         track = self._watch.track
         owner_ned = tuple(track.pos_ned.tolist()) if track is not None and self.silence_s(own) < _PHONE_OLD_S else None
-        self._map.see(image.pixels, pose, owner_ned, own.boot_us)  # type: ignore[arg-type]
+        self._map.see(image.pixels, pose, owner_ned, own.boot_us)
 
     def silence_s(self, own: Own) -> float:
         """Since the owner was seen."""
@@ -139,7 +139,7 @@ class Guard:
             return Stance.STOP
         return Stance.SLOW if silence_s > s.slow_s or age_s > s.picture_slow_s else Stance.FREE
 
-    def _searched(self, own: Own, is_searching: bool) -> tuple[np.ndarray, float, float]:  # type: ignore[type-arg]
+    def _searched(self, own: Own, is_searching: bool) -> tuple[Floats, float, float]:
         """Up, out of people's way; towards the phone, no nearer than a stand-off; without one a turn on the spot."""
         s = self.settings
         down = -_CLIMB_M_S * float(np.clip(2.0 * (s.search_height_m - own.range_m), -0.5, 1.0))
@@ -162,7 +162,7 @@ class Guard:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
         return float(np.clip(_FACE_GAIN * error, -_YAW_MAX, _YAW_MAX))
 
-    def _past_owner(self, level: np.ndarray, own: Own, delay_s: float) -> np.ndarray:  # type: ignore[type-arg]
+    def _past_owner(self, level: Floats, own: Own, delay_s: float) -> Floats:
         track = self._watch.track
         self._is_pressed = self._is_too_near = False
         if track is None or not track.is_known:
@@ -181,7 +181,7 @@ class Guard:
         self._count("near the owner", level, kept)
         return kept
 
-    def _past_solids(self, level: np.ndarray, own: Own, delay_s: float) -> np.ndarray:  # type: ignore[type-arg]
+    def _past_solids(self, level: Floats, own: Own, delay_s: float) -> Floats:
         s = self.settings
         if not self._map.has_depth:
             speed = float(np.hypot(*level))
@@ -208,7 +208,7 @@ class Guard:
             return max(down, 0.0)
         return min(down, stopping_speed(own.range_m - s.height_min_m, s.reaction_s, _CLIMB_M_S))
 
-    def _count(self, why: str, wanted: np.ndarray, kept: np.ndarray) -> None:  # type: ignore[type-arg]
+    def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
         if float(np.hypot(*(wanted - kept))) > _TOLD_M_S:
             self.interventions[why] += 1
 

@@ -48,7 +48,6 @@ class LocalMap:
         """Directions asked about, north and east."""
         across = np.stack([-self.units[:, 1], self.units[:, 0]], -1)
         self._probes = along[None, :, None, None] * self.units[:, None, None] + aside[:, None] * across[:, None, None]
-        self._along = along
 
     def see(self, pixels: NDArray[np.uint8], pose: Pose, owner_ned: Vector | None, now_us: int) -> None:
         """Takes in a picture.
@@ -105,9 +104,13 @@ class LocalMap:
         free, solid = self._free_us[rows, columns], self._solid_us[rows, columns]
         is_solid = (solid > then) & (solid >= free)
         is_free = (free > then) & ~is_solid
-        ways = (way.reshape(points.shape[:-1]).all(-1) for way in (is_free, ~is_solid))
-        free_m, known_m = (np.where(way.all(1), len(self._along), way.argmin(1)) * CELL_M for way in ways)
-        return free_m, known_m
+        return self._length_m(is_free), self._length_m(~is_solid)
+
+    def _length_m(self, is_open: NDArray[np.bool_]) -> Floats:
+        """How far each direction is open at all its probes [m]."""
+        whole = np.all(is_open.reshape(self._probes.shape[:-1]), axis=-1)
+        first = np.where(np.all(whole, axis=1), whole.shape[1], np.argmin(whole, axis=1))
+        return np.asarray(first * CELL_M)
 
     def _cells(self, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         cells = np.floor(points / CELL_M).astype(np.int64)
@@ -126,14 +129,6 @@ class LocalMap:
                 np.moveaxis(grid, axis, 0)[lines] = _UNSEEN
         self._corner = (corner[0], corner[1])
 
-    def nearest_m(self, pos_ned: Vector) -> float:
-        """To the nearest cell that is known to be solid [m]; infinite without one."""
-        rows, columns = np.nonzero(self._solid_us > self._free_us)
-        if not len(rows):
-            return float("inf")
-        at = [(self._corner[k] + (line - self._corner[k]) % CELLS + 0.5) * CELL_M for k, line in ((0, rows), (1, columns))]
-        return float(np.hypot(at[0] - pos_ned[0], at[1] - pos_ned[1]).min())
-
 
 def _rays() -> Floats:
     """Of each pixel, body frame, of depth 1 along the optical axis: (height, width, 3)."""
@@ -143,4 +138,3 @@ def _rays() -> Floats:
     rdf = np.stack([right, down, np.ones_like(right)], -1).reshape(-1, 3)
     turned = [rotated(camera_mount(), (float(x), float(y), float(z))) for x, y, z in rdf]
     return np.array(turned).reshape(IMAGE_SIZE, IMAGE_SIZE, 3)
-

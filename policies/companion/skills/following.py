@@ -1,7 +1,7 @@
 """To follow somebody: images of the onboard camera and the reports of a phone in, the actions of a pilot out.
 
 A decision ten times a second: on each new image, and where none comes in time on the last once more, which is older
-then. A guard that does not believe the pilot bounds what it asks for. Where the owner is lost for good, it does not fly.
+then. A guard that does not believe the pilot bounds what it asks for. Where the owner is lost, it does not fly.
 """
 
 from math import isclose

@@ -93,9 +93,7 @@ def clothes_of(n: FollowParams, usual: Clothes, seed: int, i: int, k: int) -> Cl
 
 
 @wp.func
-def owner_start(
-    w: World, model: PersonModel, n: FollowParams, place: wp.vec3, seed: int, i: int, tick: int
-) -> Person:
+def owner_start(w: World, model: PersonModel, n: FollowParams, place: wp.vec3, seed: int, i: int, tick: int) -> Person:
     """The owner at a place: north [m], east [m], heading [rad]."""
     person = person_start(w, model, place[0], place[1], place[2], seed, i, tick)
     person.stature_m = n.owner_size * person.stature_m
@@ -129,7 +127,7 @@ def bystander_step(
     k: int,
     tick: int,
 ) -> Person:
-    """Person k after a step: with each new plan they set out to pass the owner closely; they give way to the vehicle."""
+    """Person k after a step: each plan is to pass the owner closely; they give way to the vehicle."""
     if person.stature_m <= 0.0:
         return person
     model.speed_max = wp.min(model.speed_max, _WALKS_M_S)
@@ -147,7 +145,7 @@ def bystander_step(
 
 @wp.func
 def given_way(w: World, person: Person, vehicle_ned: wp.vec3) -> Person:
-    """The person, out of the way of a vehicle that is closer than they like: who sees one coming does not wait for it."""
+    """The person, out of the way of a vehicle that is nearer than they like."""
     away = wp.vec2(person.pos_ned[0] - vehicle_ned[0], person.pos_ned[1] - vehicle_ned[1])
     far_m = wp.max(wp.length(away), 0.01)
     low = person.pos_ned[2] - vehicle_ned[2] < person.stature_m + _GIVES_WAY_M

@@ -1,7 +1,7 @@
 """The people of one flight beside its owner, and how cameras see them all; by the functions of training.
 
-In: the owner, step by step, and the numbers of the following. Out: arrays of one row, which cameras draw and a scorecard
-measures.
+In: the owner, step by step, and the numbers of the following. Out: arrays of one row, which cameras draw and a
+scorecard measures.
 """
 
 from collections.abc import Mapping

@@ -33,7 +33,15 @@ from policies.tasks.follow_me.follow_me_kernels import (
 )
 from policies.tasks.follow_me.follow_me_params import DOCUMENTED, IMPROVED, PARAMS, TREES_PER_HA_MAX, FollowParams
 from policies.tasks.follow_me.follow_me_top_view import draw
-from policies.tasks.follow_me.observe import BRANCHES, DOCUMENT, EGO, EGO_BLIND, IMAGE_CHANNELS, LAYOUT_VERSION, vector_elements
+from policies.tasks.follow_me.observe import (
+    BRANCHES,
+    DOCUMENT,
+    EGO,
+    EGO_BLIND,
+    IMAGE_CHANNELS,
+    LAYOUT_VERSION,
+    vector_elements,
+)
 from policies.tasks.follow_me.owner_visibility import Sight
 from policies.tasks.follow_me.picture_way import make_way
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS

@@ -1,4 +1,4 @@
-"""The way of a batch's pictures to their policies: late, by as much as each picture's delay, lost, or stuck for a while.
+"""The way of a batch's pictures to their policies: each late by its own delay, lost, or stuck for a while.
 
 In: the picture of each decision, packed. Out: the newest that has come, in `buffers.images`, and how old it is. Flights
 do the same with whole pictures (mission/follow/late_camera.py).

@@ -15,11 +15,22 @@ from policies.tasks.follow_me.observe import HFOV_DEG, pack_images
 from policies.tasks.follow_me.owner_visibility import lens_of, light_gain
 from policies.tasks.follow_me.picture_way import Way, carry, note
 from sim.advance import RigArrays
+from sim.sensors.camera import Lens
 from sim.sensors.fast_camera.fast_camera import QuickCamera
 from sim.sensors.fast_camera.optics import Optics, sensor_noise
+from sim.truth import Truth
 from sim.world.batch import WorldBatch
 
 wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel(enable_backward=False)
+def aim_lenses(
+    truths: wp.array(dtype=Truth), params: wp.array(dtype=FollowParams), lenses: wp.array(dtype=Lens)
+) -> None:
+    """Places the lens of every vehicle: for flights, which look when a picture is due."""
+    i = wp.tid()
+    lenses[i] = lens_of(truths[i], params[i])
 
 
 @wp.kernel(enable_backward=False)

@@ -25,7 +25,6 @@ _HIP_HALF = wp.constant(0.055)  # off the middle: of the thighs' axes
 _SHOULDER_HALF = wp.constant(0.118)
 
 
-
 @wp.func
 def body_point(person: Person, forward: float, right: float, up: float) -> wp.vec3:
     """A position on the body in ned [m], given in fractions of the stature from the feet."""
