@@ -133,9 +133,7 @@ def _chest_hfrd(at: tuple[float, float], range_m: float, width: int, down_frd: t
     per_pixel = 2.0 * float(_HALF_WIDTH) / width
     ray = np.array([(at[0] - 0.5 * width) * per_pixel, (at[1] - 0.5 * width) * per_pixel, 1.0])
     ray *= range_m / np.linalg.norm(ray)
-    position = np.array(
-        rotated(camera_mount(), (float(ray[0]), float(ray[1]), float(ray[2])))
-    )  # of the lens, a decimetre off
+    position = np.array(rotated(camera_mount(), (float(ray[0]), float(ray[1]), float(ray[2]))))
     down_x, down_y = down_frd
     down = np.array([down_x, down_y, sqrt(max(1.0 - down_x**2 - down_y**2, 0.0))])
     ahead = np.array([1.0, 0.0, 0.0]) - down_x * down
