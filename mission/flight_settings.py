@@ -120,13 +120,14 @@ class FollowOptions(FlightOptions):
     trees_per_ha: float = option(100.0, "Trees per hectare.", "--trees", ge=0.0, le=1000.0)
     hill_height_m: float = option(8.0, "Height of the hills [m]; trained on 8.", "--hills", ge=0.0, le=300.0)
     airframe: str = option("x500", "Airframe name or TOML file; policies were trained on x500 and rover.")
+    has_guard: bool = option(True, "A guard that does not believe the policy bounds it.", "--guard/--no-guard")
     has_film: bool = option(True, "Film it afterwards: chase and onboard view.", "--mp4/--no-mp4")
 
 
 FOLLOWED_WITH = (
     "policy", "owner", "seconds", "speed", "seed", "wind_m_s", "wind_from_deg", "noise", "world_seed", "trees_per_ha",
-    "hill_height_m", "airframe", "dialect", "engine", "board", "command", "instance", "parameters", "has_view",
-    "view_port", "has_film", "gcs_port", "api_port", "host", "run_folder",
+    "hill_height_m", "airframe", "dialect", "engine", "board", "command", "instance", "parameters", "has_guard",
+    "has_view", "view_port", "has_film", "gcs_port", "api_port", "host", "run_folder",
 )  # fmt: skip
 
 

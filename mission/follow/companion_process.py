@@ -17,6 +17,7 @@ from autopilot.mavlink.transport.links import LinkError
 from common.clock import Pacer, wall_time_s
 from mission.console.terminal import print_line
 from policies.companion.companion import MISFIT, Companion
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import CameraUrlError
 from policies.companion.pilot import PilotError
 from policies.companion.skills.load_skill import load_skill
@@ -40,6 +41,7 @@ class CompanionOptions:
     seconds: float | None
     is_by_sticks: bool = False
     follows: bool = False
+    has_guard: bool = True
 
 
 def run_companion(options: CompanionOptions, console: Console) -> str:
@@ -51,7 +53,11 @@ def run_companion(options: CompanionOptions, console: Console) -> str:
     """
     try:
         skill = load_skill(
-            options.policy, options.camera, is_ordered_by_goto=options.is_reported, follows=options.follows
+            options.policy,
+            options.camera,
+            is_ordered_by_goto=options.is_reported,
+            follows=options.follows,
+            guard=GuardSettings(is_on=options.has_guard),
         )
         if options.is_by_sticks and not skill.drives:
             raise CompanionError(f"--by-sticks: {options.policy} flies, and only what drives is driven by sticks")

@@ -46,6 +46,9 @@ def companion(
     follow: Annotated[
         bool, typer.Option("--follow", help="Go after the owner by a policy of Navigate, which else goes to gotos.")
     ] = False,
+    guard: Annotated[
+        bool, typer.Option("--guard/--no-guard", help="A guard that does not believe a policy of FollowMe bounds it.")
+    ] = True,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this much wall clock time.")] = None,
 ) -> None:
     """Fly a policy as a companion computer does: over MAVLink and the camera's stream, in its own process."""
@@ -56,7 +59,7 @@ def companion(
             from mission.follow.companion_process import CompanionError, CompanionOptions, run_companion
 
         try:
-            options = CompanionOptions(policy, link, camera, engage, seconds, by_sticks, follow)
+            options = CompanionOptions(policy, link, camera, engage, seconds, by_sticks, follow, guard)
             typer.echo(run_companion(options, Console()))
         except CompanionError as error:
             refuse(str(error))

@@ -40,6 +40,7 @@ from mission.view.film import write_film
 from mission.view.replay_file import RecordingError, load_recording
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.names import SCRIPTED, TASK
 from policies.companion.pilot import PilotError
 from policies.companion.skills.following import Pilot
@@ -84,7 +85,13 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
             peer_run = held.enter_context(closing(PeerRun(options, folder, console)))
             make_flight = partial(peer_run.make_flight, has_companion=True)
         flight, companion = flight_with_companion(
-            config, pilot, links=links, folder=folder, wall_s=wall_time_s, make_flight=make_flight
+            config,
+            pilot,
+            links=links,
+            folder=folder,
+            wall_s=wall_time_s,
+            make_flight=make_flight,
+            guard=GuardSettings(is_on=options.has_guard),
         )
     watch = watch_of(flight, companion, options.seconds)
     session = FlightSession(

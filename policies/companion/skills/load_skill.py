@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import StreamCamera
 from policies.companion.names import SCRIPTED
 from policies.companion.names import TASK as FOLLOW
 from policies.companion.pilot import LearnedPilot, PilotError, load_pilot
 from policies.companion.skills.driving import Driving
-from policies.companion.skills.following import Following, Pilot
+from policies.companion.skills.following import Following, Pilot, guard_of
 from policies.companion.skills.navigating import Navigating
 from policies.companion.skills.skill import Skill
 from policies.companion.vector_pilot import (
@@ -42,7 +43,9 @@ def load_follower(name: str) -> Pilot | NavigationPilot:
     raise PilotError(f"{path}: made for {task}; those follow who were made for {FOLLOW}, {known}")
 
 
-def load_skill(name: str, camera: str, *, is_ordered_by_goto: bool, follows: bool = False) -> Skill:
+def load_skill(
+    name: str, camera: str, *, is_ordered_by_goto: bool, follows: bool = False, guard: GuardSettings | None = None
+) -> Skill:
     """What a policy can do: `scripted`, or a policy as `honeyguide play` takes it.
 
     Args:
@@ -50,16 +53,17 @@ def load_skill(name: str, camera: str, *, is_ordered_by_goto: bool, follows: boo
         camera: where images come from, for a skill that needs them.
         is_ordered_by_goto: a goto to the vehicle is an order to navigate or drive there.
         follows: a policy of Navigate goes after the owner, not to gotos.
+        guard: of who follows by sight; None: as it ships.
 
     Raises:
         PilotError: no such policy, damaged, or made for another task, preset or layout.
         CameraUrlError: no such address.
     """
     if name == SCRIPTED:
-        return Following(StreamCamera(camera), load_pilot(name))
+        return _following(camera, load_pilot(name), guard)
     path, policy, task = _loaded(name)
     if task == FOLLOW:
-        return Following(StreamCamera(camera), LearnedPilot(policy, str(path)))
+        return _following(camera, LearnedPilot(policy, str(path)), guard)
     if task in _NAVIGATORS:
         eye = StreamCamera(camera) if follows else None
         return Navigating(_NAVIGATORS[task](policy, str(path)), is_ordered_by_goto=is_ordered_by_goto, camera=eye)
@@ -69,6 +73,10 @@ def load_skill(name: str, camera: str, *, is_ordered_by_goto: bool, follows: boo
         return Driving(DrivingPilot(policy, str(path)), is_ordered_by_goto=is_ordered_by_goto)
     known = ", ".join((FOLLOW, *_NAVIGATORS))
     raise PilotError(f"{path}: made for {task}; a companion flies policies of {known} and {DRIVE}")
+
+
+def _following(camera: str, pilot: Pilot, guard: GuardSettings | None) -> Following:
+    return Following(StreamCamera(camera), pilot, guard_of(pilot, guard or GuardSettings()))
 
 
 def _loaded(name: str) -> tuple[Path, Policy, str]:

@@ -109,7 +109,7 @@ def test_pictures_that_end_hand_control_back(scene):
     scene.engaged()
     scene.images.close()
     ended_us = scene.flight.time_us
-    scene.flight.onboard._sinks.clear()
+    scene.flight.onboard.way.sinks.clear()
     scene.flight.computers.clear()
     scene.wait_for(lambda: scene.mode is Mode.HOLD, 5.0)
     assert scene.flight.time_us - ended_us < 1_500_000

@@ -6,6 +6,7 @@ from mission.flight_config import OwnerConfig
 from mission.follow.lockstep import flight_with_companion
 from mission.script import take_off
 from policies.companion.engagement import Phase
+from policies.companion.guard.settings import GuardSettings
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
@@ -14,9 +15,11 @@ def config(pace="walk", seed=3, **owner):
     return FlightConfig(owner=OwnerConfig(pace=pace, **owner), world=FOLLOW_WORLD, seed=seed)
 
 
-def following(folder=None, *, pace="walk", seed=3, pilot=None, **owner):
+def following(folder=None, *, pace="walk", seed=3, pilot=None, has_guard=True, **owner):
     """A flight that follows, and its companion."""
-    flight, companion = flight_with_companion(config(pace, seed, **owner), pilot or ScriptedFollower(), folder=folder)
+    guard = GuardSettings(is_on=has_guard)
+    made = config(pace, seed, **owner)
+    flight, companion = flight_with_companion(made, pilot or ScriptedFollower(), folder=folder, guard=guard)
     flight.fly(take_off, seconds=40.0)
     advance(flight, 5.0, lambda: companion.phase is Phase.FLYING)
     assert companion.phase is Phase.FLYING, (companion.phase, companion.trouble, flight.drone.texts)

@@ -16,8 +16,10 @@ from mission.follow.owner_device import PHONE_SYSTEM
 from mission.script import take_off
 from policies.companion.companion import TELEMETRY_OLD_US
 from policies.companion.engagement import Phase
+from policies.companion.guard.guard import Stance
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.observation import REPORT_LAG_S
-from policies.companion.skills.following import IMAGE_OLD_US, OWNER_LOST_S
+from policies.companion.skills.following import GUARDED_OLD_US, OWNER_LOST_S
 from policies.experts.follower import ScriptedFollower
 from policies.tasks.flight.flown_vehicle import own_state
 from policies.tasks.flight.hover_bank import hover_bank
@@ -121,7 +123,7 @@ def test_pictures_that_stop_end_in_hold_within_the_stated_time():
     stopped_us = flight.time_us
     advance(flight, 3.0, lambda: flight.controller.state.mode is Mode.HOLD)
     assert flight.controller.state.mode is Mode.HOLD
-    assert flight.time_us - stopped_us <= IMAGE_OLD_US + 200_000
+    assert flight.time_us - stopped_us <= GUARDED_OLD_US + 200_000
     advance(flight, 0.2)
     assert any("hold: no new pictures" in text for text in flight.drone.texts)
     assert companion.phase is Phase.RELEASED
@@ -136,15 +138,46 @@ def test_telemetry_that_stops_ends_in_hold_within_the_stated_time():
     assert flight.time_us - stopped_us <= TELEMETRY_OLD_US + 200_000
 
 
-def test_an_owner_lost_for_five_seconds_ends_in_hold():
-    flight, companion = following()
+def hide(flight):
+    """From now on nobody is to be seen."""
+    flight.owner.cast.rows.params.numpy()["owner_hides_per_min"] = 60.0
+    flight.owner.cast.rows.params.numpy()["owner_hide_s"] = 1e4
+
+
+def test_an_owner_lost_for_five_seconds_ends_in_hold_where_there_is_no_guard():
+    flight, companion = following(has_guard=False)
     lose(companion, "FOLLOW_TARGET")
-    flight.owner._person["stature_m"] = 0.0  # nobody to be seen
+    hide(flight)
     lost_us = flight.time_us
     advance(flight, 8.0, lambda: flight.controller.state.mode is Mode.HOLD)
     assert flight.controller.state.mode is Mode.HOLD
-    assert flight.time_us - lost_us == pytest.approx(OWNER_LOST_S * 1e6, abs=300_000)
+    assert flight.time_us - lost_us == pytest.approx(OWNER_LOST_S * 1e6, abs=1_300_000)  # hidden within a second
     assert companion.trouble == "owner lost"
+
+
+def test_under_the_guard_it_stands_within_five_seconds_of_the_last_sight_and_says_so():
+    flight, companion = following()
+    hide(flight)
+    advance(flight, 6.0)
+    start = tuple(map(float, flight.rig.rows["truth"][0]["pos_ned"][:2]))
+    lose(companion, "FOLLOW_TARGET")
+    advance(flight, 10.0)
+    assert companion.phase is Phase.FLYING
+    assert dist(start, tuple(map(float, flight.rig.rows["truth"][0]["pos_ned"][:2]))) < 2.0
+    assert any("holding: the owner is not seen" in text for text in flight.drone.texts)
+    assert any("searching the owner" in text for text in flight.drone.texts)
+
+
+def test_under_the_guard_an_owner_who_is_back_is_followed_again():
+    flight, companion = following()
+    hide(flight)
+    advance(flight, 7.0)
+    assert companion.skill.guard.stance is Stance.SEARCH
+    flight.owner.cast.rows.params.numpy()["owner_hides_per_min"] = 0.0
+    advance(flight, 15.0, lambda: companion.skill.guard.stance is Stance.FREE)
+    assert companion.skill.guard.stance is Stance.FREE
+    advance(flight, 5.0)
+    assert distance_m(flight) < 4.0
 
 
 def test_an_owner_who_is_only_seen_is_not_lost():
@@ -157,7 +190,8 @@ def test_an_owner_who_is_only_seen_is_not_lost():
 @pytest.mark.parametrize(("in_view", "phase"), [(5.0, Phase.READY), (-5.0, Phase.WAITING)])
 def test_who_flies_by_sight_alone_is_ready_when_it_believes_to_see_the_owner(tmp_path, in_view, phase):
     pilot = believer(tmp_path, "vision-only", in_view=in_view)
-    flight, companion = flight_with_companion(config(), pilot, is_reported=False)
+    guard = GuardSettings(is_on=False)
+    flight, companion = flight_with_companion(config(), pilot, is_reported=False, guard=guard)
     advance(flight, 4.0)
     assert companion.phase is phase
     assert companion.decision_count == 0
@@ -174,7 +208,7 @@ def test_in_the_ardupilot_dialect_it_flies_in_guided_and_hands_back_by_brake():
     assert (companion.phase, flight.controller.state.mode) == (Phase.FLYING, Mode.GUIDED)
     assert flight.owner.is_walking
     flight.onboard.way.sinks.clear()
-    advance(flight, 1.0)
+    advance(flight, GUARDED_OLD_US * 1e-6 + 0.5)
     assert (companion.phase, flight.controller.state.mode) == (Phase.RELEASED, Mode.BRAKE)
 
 

@@ -55,7 +55,7 @@ def test_after_the_pilot_has_taken_over_a_button_follows_again(page):
 def test_a_companion_that_is_not_ready_is_told_on_the_page(page):
     flight, companion = following()
     view = LiveView(flight, page)
-    flight.onboard._sinks.clear()  # no pictures from now on
+    flight.onboard.way.sinks.clear()  # no pictures from now on
     advance(flight, 3.0)
     buttons(page)["Follow"]()
     end_us = flight.time_us + 10_000_000
