@@ -76,8 +76,8 @@ def _check_ports(options: FlightOptions, i_vehicle: int) -> None:
     own = (gcs_port + GROUND_PORT_STEP + i_vehicle, api_port + API_PORT_STEP + i_vehicle)
     if len({gcs_port, api_port_of(options, i_vehicle), *own}) < 4:
         raise UserError(
-            f"--gcs-port {gcs_port} and --api-port {api_port}: must differ, also from the own ports of vehicle{nth}, "
-            f"{own[0]} and {own[1]}"
+            f"--gcs-port {gcs_port} and --api-port {api_port}: must differ, also from vehicle{nth}'s own "
+            f"ports {own[0]} and {own[1]}"
         )
 
 

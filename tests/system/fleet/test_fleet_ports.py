@@ -108,7 +108,7 @@ def test_a_script_flies_all_over_their_api_ports(vehicles):
         (("--vehicles", "x500:2,rover:1", "--engine", "jsbsim"), "--engine jsbsim: it does not move rover"),
         (("--vehicles", "c172:2"), "--airframe c172: it is JSBSim's c172p; add --engine jsbsim"),
         (("--vehicles", "2", "--param", "MAV_SYS_ID=7"), "MAV_SYS_ID: several vehicles are numbered from 1"),
-        (("--vehicles", "100", "--spacing", "400"), "--vehicles: the world has free ground for 9 vehicles 400 m apart"),
+        (("--vehicles", "100", "--spacing", "400"), "--vehicles: the world has free ground for 8 vehicles 400 m apart"),
         (("--adsb",), "--adsb: is for several vehicles; add --vehicles"),
         (("--spacing", "20"), "--spacing: is for several vehicles; add --vehicles"),
         (("--vehicles", "2", "--owner", "walk"), "--vehicles and --owner: choose one"),
