@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 
 from common.image_stream import ImageFrame
-from policies.tasks.follow_me.picture_way import delay_rows
+from policies.tasks.follow_me.image_way import delay_rows
 
 Sink = Callable[[ImageFrame], None]
 

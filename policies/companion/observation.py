@@ -80,7 +80,7 @@ class Observer:
         self._observe = wp.launch(observe_rows, 1, [kind, own, report, action, age, out], record_cmd=True)
         self._command = CommandKernel()
 
-    def vector(self, own: Own, owner: Owner, last_action: Floats, time_us: int, picture_age_s: float = 0.0) -> Floats:
+    def vector(self, own: Own, owner: Owner, last_action: Floats, time_us: int, image_age_s: float = 0.0) -> Floats:
         """The observation as of now.
 
         Args:
@@ -88,9 +88,9 @@ class Observer:
             owner: the phone's last report.
             last_action: in [-1, 1], shape (4,).
             time_us: the companion's own clock.
-            picture_age_s: since the newest picture was taken.
+            image_age_s: since the newest picture was taken.
         """
-        self._age_s[0] = picture_age_s
+        self._age_s[0] = image_age_s
         write_own_row(self._own[0], own, time_us)
         self._write_report(owner, time_us)
         self._action[0] = last_action

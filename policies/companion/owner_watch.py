@@ -40,11 +40,11 @@ class OwnerWatch:
         if isfinite(own.pos_ned[0]):  # no directions from nowhere
             self.take(now_us, now_us, owner, None if seen_hfrd is None else sighting_of(seen_hfrd, own))
 
-    def take(self, picture_us: int, now_us: int, owner: Owner, sighting: Sighting | None) -> bool:
+    def take(self, image_us: int, now_us: int, owner: Owner, sighting: Sighting | None) -> bool:
         """Takes in a picture that is older than now, and the report that came since the last one.
 
         Args:
-            picture_us: when it was taken, on the vehicle's clock.
+            image_us: when it was taken, on the vehicle's clock.
             now_us: on that clock.
             owner: the phone's newest report.
             sighting: the owner in it; None: nowhere.
@@ -58,7 +58,7 @@ class OwnerWatch:
             self._reports = owner.count
             valid_us = now_us - round(REPORT_LAG_S * 1e6)
             self._tracker.hear(now_us, PhoneReport(valid_us, owner.pos_ned, owner.vel_ned))
-        is_plausible = sighting is not None and self._tracker.see(picture_us, sighting)
+        is_plausible = sighting is not None and self._tracker.see(image_us, sighting)
         self._track = self._tracker.at(now_us)
         return is_plausible
 

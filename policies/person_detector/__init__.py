@@ -1,1 +1,1 @@
-"""People in pictures, found by a network of its own: what the guard believes instead of the policy."""
+"""People in images, found by a network of its own: what the guard believes instead of the policy."""

@@ -1,6 +1,6 @@
-"""The person detector: a picture in, people out, each with a probability, a direction and a range.
+"""The person detector: a image in, people out, each with a probability, a direction and a range.
 
-It is trained on pictures alone, by no policy and with no reward, and knows nothing of what a policy believes. A cell of
+It is trained on images alone, by no policy and with no reward, and knows nothing of what a policy believes. A cell of
 its map of 16 x 16 is a person if the middle of somebody's chest is in it.
 """
 
@@ -29,7 +29,7 @@ _HALF_WIDTH = np.tan(np.radians(0.5 * HFOV_DEG))
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """Somebody in a picture."""
+    """Somebody in a image."""
 
     probability: float
     """That somebody is there: calibrated on worlds that it was not trained in."""
@@ -46,7 +46,7 @@ def _block(inputs: int, outputs: int, *, stride: int = 1, dilation: int = 1, siz
 
 
 class DetectorNetwork(nn.Module):
-    """Pictures (n, height, width, 4) in; logits of a chest, log ranges, logits of any limb out, (n, CELLS, CELLS)."""
+    """Images (n, height, width, 4) in; logits of a chest, log ranges, logits of any limb out, (n, CELLS, CELLS)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -61,8 +61,8 @@ class DetectorNetwork(nn.Module):
         )
         self.register_buffer("calibration", torch.tensor([1.0, 0.0]))  # of logits: factor and offset
 
-    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        levels = pictures.permute(0, 3, 1, 2).float()
+    def forward(self, images: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        levels = images.permute(0, 3, 1, 2).float()
         colours, depth = levels[:, :3], levels[:, 3:]
         colours = colours - colours.mean(dim=(1, 2, 3), keepdim=True)
         colours = colours / (colours.std(dim=(1, 2, 3), keepdim=True) + 1.0)
@@ -73,7 +73,7 @@ class DetectorNetwork(nn.Module):
 
 
 class PersonDetector:
-    """The detector as it flies: one picture at a time.
+    """The detector as it flies: one image at a time.
 
     Args:
         network: trained; None: the one that ships.
@@ -85,7 +85,7 @@ class PersonDetector:
         self._least = log(least / (1.0 - least))
 
     def find(self, pixels: NDArray[np.uint8], down_frd: tuple[float, float]) -> list[Detection]:
-        """Who is in a picture, the most probable first.
+        """Who is in a image, the most probable first.
 
         Args:
             pixels: of the policy's camera, (height, width, 4).

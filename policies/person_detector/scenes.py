@@ -1,6 +1,6 @@
-"""Pictures to train and judge the person detector by: people, or nobody, before the cameras of low-flying vehicles.
+"""Images to train and judge the person detector by: people, or nobody, before the cameras of low-flying vehicles.
 
-In: a seed. Out: pictures as a companion gets them, and for each cell of the detector's map whether a person's chest is
+In: a seed. Out: images as a companion gets them, and for each cell of the detector's map whether a person's chest is
 in it, how far away, and whether it counts. Worlds are those of following: even seeds train, odd seeds judge.
 """
 
@@ -26,31 +26,31 @@ from sim.world.world import World, ground_height
 wp.set_module_options({"enable_backward": False})
 
 WORLDS = 64
-_ROUNDS = 16  # of pictures in the same worlds
-_NOBODY = 0.3  # share of pictures
+_ROUNDS = 16  # of images in the same worlds
+_NOBODY = 0.3  # share of images
 _EMPTY, _SOMEBODY, _UNSURE = 0, 1, 2
-_SPREAD_M = 90.0  # from the middle of the world, where pictures are taken
-_AT_HOME, _HOME_M = 0.2, 6.0  # share of pictures taken near the pad, on which somebody may be thought to stand
+_SPREAD_M = 90.0  # from the middle of the world, where images are taken
+_AT_HOME, _HOME_M = 0.2, 6.0  # share of images taken near the pad, on which somebody may be thought to stand
 _POINTS_LEAST = 2  # of chest, head and knees that must be seen
 _BODY_M = 0.35  # beside somebody's middle, where they hide others
 
 
 @dataclass(frozen=True, slots=True)
 class Scenes:
-    """So many pictures."""
+    """So many images."""
 
-    pictures: NDArray[np.uint8]  # (pictures, height, width, 4)
-    cells: NDArray[np.int8]  # (pictures, CELLS, CELLS): 0 nobody, 1 somebody, 2 does not count
+    images: NDArray[np.uint8]  # (images, height, width, 4)
+    cells: NDArray[np.int8]  # (images, CELLS, CELLS): 0 nobody, 1 somebody, 2 does not count
     ranges_m: NDArray[np.float32]  # likewise, of whom is there
 
     @property
     def has_person(self) -> NDArray[np.bool_]:
-        """Of each picture, whether somebody is clearly in it."""
+        """Of each image, whether somebody is clearly in it."""
         return np.asarray((self.cells == _SOMEBODY).any(axis=(1, 2)))
 
     @property
     def is_empty(self) -> NDArray[np.bool_]:
-        """Of each picture, whether nothing of anybody is in it."""
+        """Of each image, whether nothing of anybody is in it."""
         return np.asarray((self.cells == _EMPTY).all(axis=(1, 2)))
 
 
@@ -69,7 +69,7 @@ def _heights(worlds: wp.array[World], points: wp.array2d(dtype=wp.vec2), out: wp
 
 
 def scenes(count: int, seed: int, *, is_test: bool = False) -> Scenes:
-    """At least so many pictures; of worlds that no other split has."""
+    """At least so many images; of worlds that no other split has."""
     rng = np.random.default_rng([seed, int(is_test)])
     worlds = WorldBatch(FOLLOW_WORLD, WORLDS, trees_per_ha_max=300.0)
     people = wp.zeros((WORLDS, PEOPLE_MAX), dtype=Person)
@@ -86,8 +86,8 @@ def scenes(count: int, seed: int, *, is_test: bool = False) -> Scenes:
         camera.render()
         wp.launch(pack_images, (WORLDS, IMAGE_SIZE), [camera.rgb, camera.depth_m, everyone, packed])
         parts.append((packed.numpy().copy(), *_labels(camera, people.numpy())))
-    pictures, cells, ranges_m = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Scenes(pictures, cells, ranges_m)
+    images, cells, ranges_m = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Scenes(images, cells, ranges_m)
 
 
 def _grow(worlds: WorldBatch, rng: np.random.Generator, *, is_test: bool) -> None:
@@ -151,7 +151,7 @@ def _aim(
 
 
 def _labels(camera: QuickCamera, people: Any) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
-    """Of each picture: whose chest is in which cell; where else somebody is seen, nothing counts."""
+    """Of each image: whose chest is in which cell; where else somebody is seen, nothing counts."""
     kind = camera.kind.numpy()
     lens: Any = camera.lenses.numpy()
     n = len(kind)
@@ -195,7 +195,7 @@ def _label(
 
 
 def _seen(ray: Any, kind: Any, half_width: float) -> tuple[int, int, bool, float] | None:
-    """Row, column, whether a person is seen there, and range [m]; None: it is not in the picture."""
+    """Row, column, whether a person is seen there, and range [m]; None: it is not in the image."""
     if ray[2] < 0.3:
         return None
     size = kind.shape[0]

@@ -1,6 +1,6 @@
 """`python -m policies.person_detector.training`: trains the person detector from nothing and judges it on other worlds.
 
-Pictures are rendered, labels come from the renderer; no policy, no flight, no reward. Focal loss (Lin et al. 2017) for
+Images are rendered, labels come from the renderer; no policy, no flight, no reward. Focal loss (Lin et al. 2017) for
 who is in which cell, an absolute error of the logarithm for how far away, then a line through the logits (Platt 1999)
 that makes probabilities true on validation worlds. The judgement is on worlds of a further seed.
 """
@@ -28,33 +28,33 @@ _FOCUS = 2.0
 _RANGE_WEIGHT = 0.1
 
 
-def train(pictures: int, epochs: int, seed: int, console: Console) -> DetectorNetwork:
-    """A network trained on so many pictures, calibrated on others."""
+def train(images: int, epochs: int, seed: int, console: Console) -> DetectorNetwork:
+    """A network trained on so many images, calibrated on others."""
     torch.manual_seed(seed)
-    console.print(f"rendering {pictures} pictures")
-    there = scenes(pictures, seed)
+    console.print(f"rendering {images} images")
+    there = scenes(images, seed)
     network = DetectorNetwork()
     optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=1e-4)
-    steps = epochs * (len(there.pictures) // BATCH)
+    steps = epochs * (len(there.images) // BATCH)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, RATE, total_steps=steps)
     order = np.random.default_rng(seed)
     for _ in track(range(steps), "training", console=console):
-        rows = order.integers(len(there.pictures), size=BATCH)
+        rows = order.integers(len(there.images), size=BATCH)
         loss = _loss(network, there, rows, is_mirrored=bool(order.random() < 0.5))
         optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         optimizer.step()
         schedule.step()
-    _calibrate(network.eval(), scenes(max(pictures // 10, 640), seed + 1000))
+    _calibrate(network.eval(), scenes(max(images // 10, 640), seed + 1000))
     return network
 
 
 def _loss(network: DetectorNetwork, there: Scenes, rows: NDArray[np.int64], *, is_mirrored: bool) -> Tensor:
-    pictures, cells = torch.from_numpy(there.pictures[rows]), torch.from_numpy(there.cells[rows])
+    images, cells = torch.from_numpy(there.images[rows]), torch.from_numpy(there.cells[rows])
     ranges_m = torch.from_numpy(there.ranges_m[rows])
     if is_mirrored:
-        pictures, cells, ranges_m = pictures.flip(2), cells.flip(2), ranges_m.flip(2)
-    logits, log_ranges, limb_logits = network(pictures)
+        images, cells, ranges_m = images.flip(2), cells.flip(2), ranges_m.flip(2)
+    logits, log_ranges, limb_logits = network(images)
     counts = cells != 2
     target = (cells == 1).float()
     plain = functional.binary_cross_entropy_with_logits(logits, target, reduction="none")
@@ -86,7 +86,7 @@ def _calibrate(network: DetectorNetwork, there: Scenes) -> None:
 
 def _best_logits(network: DetectorNetwork, there: Scenes) -> NDArray[np.float64]:
     with torch.inference_mode():
-        parts = [network(torch.from_numpy(part))[0].amax(dim=(1, 2)) for part in np.array_split(there.pictures, 32)]
+        parts = [network(torch.from_numpy(part))[0].amax(dim=(1, 2)) for part in np.array_split(there.images, 32)]
     return torch.cat(parts).double().numpy()
 
 
@@ -112,21 +112,21 @@ def judge(network: DetectorNetwork, there: Scenes) -> dict[str, Any]:
 def _range_error(network: DetectorNetwork, there: Scenes) -> float:
     """Median error of the range as a fraction of it, where somebody is."""
     with torch.inference_mode():
-        parts = [network(torch.from_numpy(part))[1] for part in np.array_split(there.pictures, 32)]
+        parts = [network(torch.from_numpy(part))[1] for part in np.array_split(there.images, 32)]
     is_there = there.cells == 1
     ratio = torch.cat(parts).exp().numpy()[is_there] / there.ranges_m[is_there]
     return float(np.median(np.abs(ratio - 1.0)))
 
 
 def main(
-    pictures: Annotated[int, typer.Option(min=640)] = 30_000,
+    images: Annotated[int, typer.Option(min=640)] = 30_000,
     epochs: Annotated[int, typer.Option(min=1)] = 12,
     seed: int = 1,
     out: Path = WEIGHTS,
     judged: Annotated[bool, typer.Option("--judge", help="Train nothing: judge the one that ships.")] = False,
 ) -> None:
     console = Console(highlight=False)
-    network = shipped().eval() if judged else train(pictures, epochs, seed, console)
+    network = shipped().eval() if judged else train(images, epochs, seed, console)
     if not judged:
         torch.save({name: value.half() for name, value in network.state_dict().items()}, out)
     found = judge(network, scenes(6400, 7, is_test=True))

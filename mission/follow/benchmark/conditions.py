@@ -28,9 +28,9 @@ class Condition:
 CONDITIONS = (
     Condition("walk", "standard, walking", "walk", {}, 0.98),
     Condition("run", "standard, running", "run", {}, 0.95),
-    Condition("late-100", "pictures 100 ms late", "run", {"picture_lag_s": 0.1}, 0.95),
-    Condition("late-200", "pictures 200 ms late", "run", {"picture_lag_s": 0.2}, 0.92),
-    Condition("late-300", "pictures 300 ms late", "run", {"picture_lag_s": 0.3}, 0.85),
+    Condition("late-100", "pictures 100 ms late", "run", {"image_lag_s": 0.1}, 0.95),
+    Condition("late-200", "pictures 200 ms late", "run", {"image_lag_s": 0.2}, 0.92),
+    Condition("late-300", "pictures 300 ms late", "run", {"image_lag_s": 0.3}, 0.85),
     Condition("gone-3", "owner not to be seen for 3 s", "walk", {**_HIDES, "owner_hide_s": 3.0}, None, 1.5),
     Condition("gone-8", "owner not to be seen for 8 s", "walk", {**_HIDES, "owner_hide_s": 8.0}, None, 1.5),
     Condition("gone", "owner gone for good", "walk", {**_HIDES, "owner_hide_s": _FOR_GOOD_S}, None, 1.5),
@@ -46,7 +46,7 @@ CONDITIONS = (
     Condition("holes", "depth to 6 m, with holes", "walk", {"depth_max_m": 6.0, "depth_holes": 0.25}, 0.9),
     Condition("phone", "the phone four times as wrong", "walk", {"phone_error": 4.0}, 0.9),
     Condition("red", "red clothes", "walk", {"owner_hue": 0.0}, 0.9),
-    Condition("clothes", "any clothes, any size", "walk", {"owner_clothes_share": 1.0, "owner_size": 0.85}, 0.9),
+    Condition("clothes", "any clothes, any size", "walk", {"owner_clothes_fraction": 1.0, "owner_size": 0.85}, 0.9),
     Condition("dusk", "dusk", "walk", {"light": 0.12}, 0.9),
     Condition("blur", "pictures blurred by 33 ms", "walk", {"shutter_s": 0.033}, 0.9),
 )

@@ -28,15 +28,15 @@ def row(condition: Condition, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
         written(bootstrap(len(band), lambda rows: float(band[rows].mean())), "%"),
         written(rate(np.array([not outcome.is_collided for outcome in outcomes])), "%"),
         f"{nearest_m:.2f} m",
-        written(_share([outcome.has_stood for outcome in outcomes]), "%"),
-        written(_share([outcome.has_resumed for outcome in outcomes]), "%"),
+        written(_fraction([outcome.has_stood for outcome in outcomes]), "%"),
+        written(_fraction([outcome.has_resumed for outcome in outcomes]), "%"),
         f"{np.mean([outcome.interventions_per_min for outcome in outcomes]):.0f}",
         f"{np.mean([outcome.accel_rms for outcome in outcomes]):.2f} m/s²",
         f"{np.mean([outcome.yaw_rate_rms for outcome in outcomes]):.0f} deg/s",
     )
 
 
-def _share(truths: Sequence[bool | None]) -> Interval:
+def _fraction(truths: Sequence[bool | None]) -> Interval:
     return rate(np.array([truth for truth in truths if truth is not None], dtype=np.bool_))
 
 

@@ -26,7 +26,7 @@ from policies.person_detector.detector import Detection, PersonDetector
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
 _YAW_MAX = 1.5  # [rad/s]
-_TOLD_M_S = 0.3  # less than this off what was wanted is no intervention
+_COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 _CLIMB_M_S = 1.0
 _PHONE_OLD_S = 3.0
 _GATE_M = 3.0  # from where the tracker expects the owner; who is farther off is somebody else
@@ -64,7 +64,7 @@ class Guard:
         self._poses = PoseHistory()
         self._map = LocalMap()
         self._seen_us: int | None = None  # when the newest picture with the owner was taken, the vehicle's clock
-        self._picture_us = 0  # when the newest picture was taken
+        self._image_us = 0  # when the newest picture was taken
         self._heard_us = -(10**12)  # on the vehicle's clock
         self._reports = 0
         self._bearing_rad = 0.0  # in ned, where the owner was seen last
@@ -90,7 +90,7 @@ class Guard:
         pose = self._poses.at(image.time_us)
         if pose is None:
             return
-        self._picture_us = image.time_us
+        self._image_us = image.time_us
         down = rotated((*(-x for x in pose.q_ned_from_frd[:3]), pose.q_ned_from_frd[3]), (0.0, 0.0, 1.0))
         seen = self._owner_among(self._detector.find(image.pixels, (down[0], down[1])), pose, own)
         sighting = None if seen is None else sighting_from(seen.chest_hfrd, pose.pos_ned, pose.q_ned_from_frd)
@@ -111,7 +111,7 @@ class Guard:
         """What is flown of a velocity in ned and a yaw rate that a policy asks for."""
         s, (velocity, yaw_rate) = self.settings, wanted
         self.decisions += 1
-        age_s = max(own.boot_us - self._picture_us, 0) * 1e-6
+        age_s = max(own.boot_us - self._image_us, 0) * 1e-6
         silence_s = self.silence_s(own)
         self.stance = self._stance(silence_s, age_s)
         level = np.array(velocity[:2])
@@ -120,7 +120,7 @@ class Guard:
             level, down, yaw_rate = self._searched(own, self.stance is Stance.SEARCH)
             self.interventions[self.stance.value] += 1
         elif self.stance is not Stance.FREE:
-            scale = faded(silence_s, s.slow_s, s.stop_s) * faded(age_s, s.picture_slow_s, s.picture_stop_s)
+            scale = faded(silence_s, s.slow_s, s.stop_s) * faded(age_s, s.image_slow_s, s.image_stop_s)
             level, down = scale * level, scale * down
             self.interventions[self.stance.value] += 1
         delay_s = s.reaction_s + age_s
@@ -131,13 +131,13 @@ class Guard:
 
     def _stance(self, silence_s: float, age_s: float) -> Stance:
         s = self.settings
-        if age_s > s.picture_stop_s:
+        if age_s > s.image_stop_s:
             return Stance.BLIND
         if silence_s > s.search_s or (self.stance is Stance.SEARCH and silence_s > s.slow_s):
             return Stance.SEARCH
         if silence_s > s.stop_s:
             return Stance.STOP
-        return Stance.SLOW if silence_s > s.slow_s or age_s > s.picture_slow_s else Stance.FREE
+        return Stance.SLOW if silence_s > s.slow_s or age_s > s.image_slow_s else Stance.FREE
 
     def _searched(self, own: Own, is_searching: bool) -> tuple[Floats, float, float]:
         """Up, out of people's way; towards the phone, no nearer than a stand-off; without one a turn on the spot."""
@@ -209,7 +209,7 @@ class Guard:
         return min(down, stopping_speed(own.range_m - s.height_min_m, s.reaction_s, _CLIMB_M_S))
 
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
-        if float(np.hypot(*(wanted - kept))) > _TOLD_M_S:
+        if float(np.hypot(*(wanted - kept))) > _COUNTED_M_S:
             self.interventions[why] += 1
 
     def _owner_among(self, found: list[Detection], pose: Pose, own: Own) -> Detection | None:

@@ -27,9 +27,9 @@ class GuardSettings(BaseModel):
     """Above the ground, where it waits and searches: over people, under crowns."""
     search_yaw_rate: float = Field(default=0.6, gt=0.0)
     """[rad/s]"""
-    picture_slow_s: float = Field(default=0.35, gt=0.0)
+    image_slow_s: float = Field(default=0.35, gt=0.0)
     """From this age of the picture on it becomes slower ..."""
-    picture_stop_s: float = Field(default=0.8, gt=0.0)
+    image_stop_s: float = Field(default=0.8, gt=0.0)
     """... until it stands."""
     owner_m: float = Field(default=1.1, gt=0.0)
     """To the middle of the owner: it comes no nearer."""

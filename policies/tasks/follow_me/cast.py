@@ -83,9 +83,9 @@ def is_hidden(n: FollowParams, seed: int, i: int, since_s: float) -> bool:
 def clothes_of(n: FollowParams, usual: Clothes, seed: int, i: int, k: int) -> Clothes:
     """What person k of a row wears: the owner the usual, a given colour, or anything; others anything, or the same."""
     state = draw_key(seed, i, k, _CLOTHES_STREAM)
-    share = wp.where(k == 0, n.owner_clothes_share, 1.0 - n.bystander_likeness)
-    who = wp.where(wp.randf(state) < share, k, 0)
-    if who == 0 and wp.randf(draw_key(seed, i, 0, _CLOTHES_STREAM)) >= n.owner_clothes_share:
+    fraction = wp.where(k == 0, n.owner_clothes_fraction, 1.0 - n.bystander_likeness)
+    who = wp.where(wp.randf(state) < fraction, k, 0)
+    if who == 0 and wp.randf(draw_key(seed, i, 0, _CLOTHES_STREAM)) >= n.owner_clothes_fraction:
         if n.owner_hue >= 0.0:
             usual.shirt = hue_colour(n.owner_hue, 0.95, _BRIGHT)
         return usual
@@ -163,8 +163,8 @@ def drawn_owner(person: Person, n: FollowParams, seed: int, i: int, since_s: flo
     """The owner as a camera can see them: crouched where they stand still, at times; or hidden."""
     if is_hidden(n, seed, i, since_s):
         person.stature_m = 0.0
-    elif wp.length(person.vel_ned) < _STANDS_M_S and n.owner_crouch_share > 0.0:
+    elif wp.length(person.vel_ned) < _STANDS_M_S and n.owner_crouch_fraction > 0.0:
         plan = int(since_s / 4.0)
-        if wp.randf(draw_key(seed, i, plan, _CROUCH_STREAM)) < n.owner_crouch_share:
+        if wp.randf(draw_key(seed, i, plan, _CROUCH_STREAM)) < n.owner_crouch_fraction:
             person.stature_m = _CROUCHED * person.stature_m
     return person

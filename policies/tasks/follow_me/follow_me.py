@@ -33,6 +33,7 @@ from policies.tasks.follow_me.follow_me_kernels import (
 )
 from policies.tasks.follow_me.follow_me_params import DOCUMENTED, IMPROVED, PARAMS, TREES_PER_HA_MAX, FollowParams
 from policies.tasks.follow_me.follow_me_top_view import draw
+from policies.tasks.follow_me.image_way import make_way
 from policies.tasks.follow_me.observe import (
     BRANCHES,
     DOCUMENT,
@@ -43,7 +44,6 @@ from policies.tasks.follow_me.observe import (
     vector_elements,
 )
 from policies.tasks.follow_me.owner_visibility import Sight
-from policies.tasks.follow_me.picture_way import make_way
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.follow_me.task_cameras import Eyes
@@ -90,7 +90,7 @@ class FollowMe(FlightTask):
             state, way = self.follow, make_way(self._zeros, self.layout.image_shape, env_count)
             seen = [state.drawn, state.clothes, way, state.path_seeds]
             self._eyes = Eyes(self.buffers, self.rig.arrays, state.params, self.worlds, *seen)
-            state.lenses, state.picture_ages_s = self._eyes.lenses, way.age_s
+            state.lenses, state.image_ages_s = self._eyes.lenses, way.age_s
         self._record_all(_rules(settings, self.layout), self.start(is_test=settings.split == "test"))
 
     def _launch_step(self) -> None:
@@ -162,7 +162,7 @@ class FollowMe(FlightTask):
         state.drawn = self._zeros("drawn", (n, PEOPLE_MAX), Person)
         state.clothes = self._zeros("clothes", (n, PEOPLE_MAX), Clothes)
         state.usual_clothes = wp.array([usual_clothes()], dtype=Clothes, device=self.device)
-        state.picture_ages_s = wp.zeros(n, dtype=float, device=self.device)
+        state.image_ages_s = wp.zeros(n, dtype=float, device=self.device)
         state.person_models = self._zeros("person_models", n, PersonModel)
         state.phones = self._zeros("phones", n, PhoneState)
         state.phone_models = self._zeros("phone_models", n, PhoneModel)

@@ -102,7 +102,7 @@ class FollowState:
     is_all: wp.array(dtype=wp.bool)  # every row
     usual_person: wp.array(dtype=PersonModel)  # (1,), before an episode's parameters
     usual_clothes: wp.array(dtype=Clothes)  # (1,)
-    picture_ages_s: wp.array(dtype=float)
+    image_ages_s: wp.array(dtype=float)
     usual_phone: wp.array(dtype=PhoneModel)  # (1,)
 
 
@@ -196,7 +196,7 @@ def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: Follo
     else:
         own = own_state(rig, i, rules.has_estimator)
         report = owner_report(state.phones[i], draw_tick(rig.tick[i]))
-        age_s = state.picture_ages_s[i]
+        age_s = state.image_ages_s[i]
         write_vector(rules.vector, own, report, action, age_s, buffers.observations, i, at)
     if rules.has_privileged == 1:
         write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, buffers.privileged, i, 0)

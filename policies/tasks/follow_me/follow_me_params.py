@@ -25,10 +25,10 @@ class FollowParams:
     owner_graze_share: float
     owner_course_std_deg: float
     owner_size: float
-    owner_crouch_share: float
+    owner_crouch_fraction: float
     owner_hides_per_min: float
     owner_hide_s: float
-    owner_clothes_share: float
+    owner_clothes_fraction: float
     owner_hue: float
     bystanders: float
     bystander_likeness: float
@@ -48,10 +48,10 @@ class FollowParams:
     depth_holes: float
     lens_scale: float
     lens_tilt_deg: float
-    picture_lag_s: float
-    picture_jitter_s: float
-    picture_loss: float
-    picture_freezes_per_min: float
+    image_lag_s: float
+    image_jitter_s: float
+    image_loss: float
+    image_freezes_per_min: float
     setpoint_lag_s: float
     decision_limit: float
     near_m: float
@@ -92,10 +92,10 @@ FOLLOW_PARAMS = (
         "owner_course_std_deg", 51.6, 0.0, 180.0, "deg", "change of the owner's course from plan to plan", "guess"
     ),
     TaskParam("owner_size", 1.0, 0.6, 1.2, "1", "factor on the owner's stature; children: 0.7", "guess"),
-    TaskParam("owner_crouch_share", 0.0, 0.0, 1.0, "1", "of the times they stand, that they crouch", "guess"),
+    TaskParam("owner_crouch_fraction", 0.0, 0.0, 1.0, "1", "of the times they stand, that they crouch", "guess"),
     TaskParam("owner_hides_per_min", 0.0, 0.0, 20.0, "1/min", "how often nothing of the owner can be seen", "guess"),
     TaskParam("owner_hide_s", 3.0, 0.0, 1e4, "s", "for how long; from 1000 on: for good", "guess"),
-    TaskParam("owner_clothes_share", 0.0, 0.0, 1.0, "1", "of owners who wear anything, not the usual blue", "guess"),
+    TaskParam("owner_clothes_fraction", 0.0, 0.0, 1.0, "1", "of owners who wear anything, not the usual blue", "guess"),
     TaskParam("owner_hue", -1.0, -1.0, 1.0, "1", "of the other owners' shirts, 0: red; below 0: the usual", "guess"),
     TaskParam("bystanders", 0.0, 0.0, 3.0, "1", "other people who cross the owner's way, rounded", "guess"),
     TaskParam("bystander_likeness", 0.0, 0.0, 1.0, "1", "share of them in the owner's clothes", "guess"),
@@ -123,10 +123,10 @@ FOLLOW_PARAMS = (
     TaskParam("depth_holes", 0.0, 0.0, 1.0, "1", "fraction of the picture without depth, in patches", "guess"),
     TaskParam("lens_scale", 1.0, 0.9, 1.1, "1", "factor on the width of what the lens shows", "guess"),
     TaskParam("lens_tilt_deg", 0.0, -5.0, 5.0, "deg", "of the camera's mount, up, unknown to the policy", "guess"),
-    TaskParam("picture_lag_s", 0.0, 0.0, 0.5, "s", "from shutter to policy; in training in steps of 0.1 s", "guess"),
-    TaskParam("picture_jitter_s", 0.0, 0.0, 0.3, "s", "at most this much more, of each picture anew", "guess"),
-    TaskParam("picture_loss", 0.0, 0.0, 0.9, "1", "fraction of pictures that never come", "guess"),
-    TaskParam("picture_freezes_per_min", 0.0, 0.0, 20.0, "1/min", "times of 0.4 to 1.2 s without pictures", "guess"),
+    TaskParam("image_lag_s", 0.0, 0.0, 0.5, "s", "from shutter to policy; in training in steps of 0.1 s", "guess"),
+    TaskParam("image_jitter_s", 0.0, 0.0, 0.3, "s", "at most this much more, of each picture anew", "guess"),
+    TaskParam("image_loss", 0.0, 0.0, 0.9, "1", "fraction of pictures that never come", "guess"),
+    TaskParam("image_freezes_per_min", 0.0, 0.0, 20.0, "1/min", "times of 0.4 to 1.2 s without pictures", "guess"),
     TaskParam("setpoint_lag_s", 0.0, 0.0, 0.08, "s", "from policy to flight controller, in steps of 20 ms", "guess"),
     TaskParam("decision_limit", 600.0, 1.0, 1e6, "1", "decisions of an episode; 600 are 60 s", "guess"),
     TaskParam("near_m", 1.0, 0.0, 20.0, "m", "to the owner's chest: nearer is too near", _EVT),

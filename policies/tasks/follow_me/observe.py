@@ -41,7 +41,7 @@ DOCUMENT_YAW_RATE_RAD_S = wp.constant(1.0)  # unpublished; guess
 
 _POSITION_SCALE = wp.constant(5.0)  # [m]
 _POSITION_MAX = wp.constant(4.0)  # an owner reported farther than this many scales away is shown at that distance
-PICTURE_OLD_S = wp.constant(0.5)  # an older picture is shown as one of this age
+IMAGE_SHOWN_OLD_S = wp.constant(0.5)  # an older picture is shown as one of this age
 REPORT_OLD_S = wp.constant(5.0)  # a report older than this tells nothing; guess
 DEPTH_HALF_M = wp.constant(4.0)  # this far away the depth channel is at half of its range
 _SKY_M = wp.constant(1000.0)  # depths from here on are the sky's
@@ -112,7 +112,7 @@ def write_vector(
     own: OwnState,
     report: OwnerReport,
     last_action: wp.vec4,
-    picture_age_s: float,
+    image_age_s: float,
     out: wp.array2d(dtype=float),
     i: int,
     at: int,
@@ -122,7 +122,7 @@ def write_vector(
         _write_document(own, report, out, i, at)
         return
     write_own(own, last_action, out, i, at)
-    out[i, at + OWN_SIZE] = wp.min(picture_age_s, PICTURE_OLD_S) / PICTURE_OLD_S
+    out[i, at + OWN_SIZE] = wp.min(image_age_s, IMAGE_SHOWN_OLD_S) / IMAGE_SHOWN_OLD_S
     if kind == EGO:
         _write_owner(own, report, out, i, at + OWN_SIZE + 1)
 
@@ -133,12 +133,12 @@ def observe_rows(
     own: wp.array(dtype=OwnState),
     report: wp.array(dtype=OwnerReport),
     last_actions: wp.array(dtype=wp.vec4),
-    picture_ages_s: wp.array(dtype=float),
+    image_ages_s: wp.array(dtype=float),
     out: wp.array2d(dtype=float),
 ) -> None:
     """The vector of every row: what a companion launches for its one."""
     i = wp.tid()
-    write_vector(kind, own[i], report[i], last_actions[i], picture_ages_s[i], out, i, 0)
+    write_vector(kind, own[i], report[i], last_actions[i], image_ages_s[i], out, i, 0)
 
 
 @wp.func
@@ -187,7 +187,7 @@ def vector_elements(kind: int) -> tuple[Element, ...]:
             *(Element(f"drone_{axis}", "m") for axis in ("east", "up", "north")),
             Element("distance", "m"),
         )
-    own = (*OWN_ELEMENTS, Element("picture_age", "s", float(PICTURE_OLD_S)))
+    own = (*OWN_ELEMENTS, Element("image_age", "s", float(IMAGE_SHOWN_OLD_S)))
     if kind == int(EGO_BLIND):
         return own
     return (

@@ -11,9 +11,9 @@ import warp as wp
 from common.rng import draw_tick
 from policies.tasks.flight.rig_task import worker_count
 from policies.tasks.follow_me.follow_me_params import FollowParams
+from policies.tasks.follow_me.image_way import Way, carry, note
 from policies.tasks.follow_me.observe import HFOV_DEG, pack_images
 from policies.tasks.follow_me.owner_visibility import lens_of, light_gain
-from policies.tasks.follow_me.picture_way import Way, carry, note
 from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.fast_camera.fast_camera import QuickCamera

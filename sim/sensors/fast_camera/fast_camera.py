@@ -114,21 +114,15 @@ class QuickCamera:
         outputs.width, outputs.height = width, height
         views = wp.zeros(count, dtype=View, device=device)
         columns = _columns(count, width, range_m, device)
-        people = _in_rows(people, count, Person, device)
-        if clothes is None:
-            usual = [usual_clothes()] * (count * people.shape[1])
-            clothes = wp.array(usual, dtype=Clothes, device=device) if usual else None
-        clothes = _in_rows(clothes, count, Clothes, device)
-        self._who = (people, clothes)
-        sights = _sights(count, config, range_m, people.shape[1], device)
+        self._who = _people(people, clothes, count, device)
+        sights = _sights(count, config, range_m, self._who[0].shape[1], device)
         size, paints = wp.vec2i(width, height), make_paints(device)
         chosen = self._everyone
-        places = [self._worlds, self.i_world, self.lenses, *self._who, chosen]
-        seen = [*places, ground, range_m, size, views, columns, sights]
+        seen = [self._worlds, self.i_world, self.lenses, *self._who, chosen, ground, range_m, size, views]
         drawn = [ground, paints, views, chosen, columns, sights, range_m, outputs]
         images = [array.flatten() for array in (*perfect, self.rgb, self.depth_m)]
         passes: list[_Pass] = [
-            (prepare_views, (), seen),
+            (prepare_views, (), [*seen, columns, sights]),
             (lay_columns, (columns.room,), [ground, views, chosen, columns]),
             (draw_rows, (height,), drawn),
         ]
@@ -212,6 +206,15 @@ def _columns(count: int, width: int, range_m: float, device: str) -> Any:
     columns.slopes = wp.zeros(count * columns.room * columns.samples, dtype=wp.float32, device=device)
     columns.distances = wp.zeros(count * columns.samples, dtype=wp.float32, device=device)
     return columns
+
+
+def _people(people: Any, clothes: Any, count: int, device: str) -> tuple[Any, Any]:
+    """Who is seen, and what they wear, (count, people) each."""
+    people = _in_rows(people, count, Person, device)
+    if clothes is None and people.shape[1]:
+        usual = [usual_clothes()] * (count * people.shape[1])
+        clothes = wp.array(usual, dtype=Clothes, device=device)
+    return people, _in_rows(clothes, count, Clothes, device)
 
 
 def _in_rows(rows: Any, count: int, kind: Any, device: str) -> Any:

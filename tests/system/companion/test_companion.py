@@ -112,7 +112,7 @@ def test_pictures_that_end_hand_control_back(scene):
     scene.flight.onboard.way.sinks.clear()
     scene.flight.computers.clear()
     scene.wait_for(lambda: scene.mode is Mode.HOLD, 5.0)
-    assert scene.flight.time_us - ended_us < 1_500_000
+    assert scene.flight.time_us - ended_us < 3_500_000  # it stands after 0.8 s, and gives up after 2.5
     scene.wait_for(lambda: any("hold: no new pictures" in text for text in scene.flight.drone.texts), 1.0)
 
 

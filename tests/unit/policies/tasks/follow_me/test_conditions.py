@@ -16,7 +16,7 @@ def _task(count: int, numbers: dict[str, float], **settings: str) -> FollowMe:
 
 
 def test_pictures_are_shown_as_late_as_they_come_and_the_vector_tells_their_age() -> None:
-    prompt, late = _task(2, {}, image_size="16"), _task(2, {"picture_lag_s": 0.2}, image_size="16")
+    prompt, late = _task(2, {}, image_size="16"), _task(2, {"image_lag_s": 0.2}, image_size="16")
     taken = [prompt.buffers.images.numpy().copy()]
     for k in range(5):
         prompt.step()
@@ -26,8 +26,8 @@ def test_pictures_are_shown_as_late_as_they_come_and_the_vector_tells_their_age(
             assert (late.buffers.images.numpy() == taken[k - 1]).all()
     names = [element.name for element in late.layout.frame]
     age = (
-        late.buffers.observations.numpy()[:, names.index("picture_age")]
-        * late.layout.frame[names.index("picture_age")].scale
+        late.buffers.observations.numpy()[:, names.index("image_age")]
+        * late.layout.frame[names.index("image_age")].scale
     )
     assert age == pytest.approx([0.2, 0.2])
 
@@ -52,7 +52,7 @@ def test_so_many_others_are_there_as_are_asked_for() -> None:
 
 def test_clothes_are_the_usual_unless_asked_for_otherwise() -> None:
     usual = _task(16, {}, observation="state", has_estimator="false").follow.clothes.numpy()[:, 0]["shirt"]
-    others = _task(16, {"owner_clothes_share": 1.0}, observation="state", has_estimator="false")
+    others = _task(16, {"owner_clothes_fraction": 1.0}, observation="state", has_estimator="false")
     red = _task(4, {"owner_hue": 0.0}, observation="state", has_estimator="false").follow.clothes.numpy()[:, 0]["shirt"]
     assert (usual == usual[0]).all()
     assert len({tuple(row) for row in others.follow.clothes.numpy()[:, 0]["shirt"].tolist()}) == 16

@@ -36,10 +36,10 @@ class Way:
 @wp.func
 def delay_s(n: FollowParams, seed: int, i: int, k: int) -> float:
     """Of picture k of a row, counted from the episode's start; below 0: it never comes."""
-    if wp.randf(draw_key(seed, i, k, _LOSS_STREAM)) < n.picture_loss:
+    if wp.randf(draw_key(seed, i, k, _LOSS_STREAM)) < n.image_loss:
         return -1.0
-    if n.picture_freezes_per_min > 0.0:
-        span_s = 60.0 / n.picture_freezes_per_min
+    if n.image_freezes_per_min > 0.0:
+        span_s = 60.0 / n.image_freezes_per_min
         since_s = _DECISION_S * float(k)
         span = int(since_s / span_s)
         state = draw_key(seed, i, span, _FREEZE_STREAM)
@@ -47,7 +47,7 @@ def delay_s(n: FollowParams, seed: int, i: int, k: int) -> float:
         begin_s = span_s * float(span) + wp.max(span_s - length_s, 0.0) * wp.randf(state)
         if since_s >= begin_s and since_s < begin_s + length_s:
             return -1.0
-    return n.picture_lag_s + n.picture_jitter_s * wp.randf(draw_key(seed, i, k, _DELAY_STREAM))
+    return n.image_lag_s + n.image_jitter_s * wp.randf(draw_key(seed, i, k, _DELAY_STREAM))
 
 
 @wp.kernel(enable_backward=False)
@@ -126,9 +126,9 @@ def make_way(zeros: Callable[[str, Any, Any], Any], image_shape: tuple[int, ...]
     """
     kept = int(_KEPT)
     way = Way()
-    way.count = zeros("picture_counts", count, int)
-    way.due = zeros("pictures_due", (count, kept), int)
-    way.shown = zeros("pictures_shown", count, int)
-    way.age_s = zeros("picture_ages", count, float)
-    way.kept = zeros("pictures_kept", (count, kept * image_shape[0], *image_shape[1:]), wp.uint8)
+    way.count = zeros("image_counts", count, int)
+    way.due = zeros("images_due", (count, kept), int)
+    way.shown = zeros("images_shown", count, int)
+    way.age_s = zeros("image_ages", count, float)
+    way.kept = zeros("images_kept", (count, kept * image_shape[0], *image_shape[1:]), wp.uint8)
     return way

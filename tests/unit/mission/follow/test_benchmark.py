@@ -1,0 +1,99 @@
+"""`honeyguide benchmark follow`: any policy flies through a condition, and what came of it is shown and written."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from mission.cli import app
+from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS
+from mission.follow.benchmark.flights import Outcome, _has_resumed, _has_stood, fly
+from mission.follow.benchmark.pilots import any_pilot
+from mission.follow.benchmark.session import misses
+from policies.companion.guard.settings import GuardSettings
+from policies.companion.pilot import PilotError
+from policies.tasks.follow_me.flown_cast import params_row
+from policies.tasks.follow_me.observe import EGO
+
+
+class FullSpeedAhead:
+    """Flies at whoever is ahead."""
+
+    kind, image_shape = int(EGO), (64, 64, 4)
+
+    def reset(self):
+        pass
+
+    def act(self, vector, image):  # noqa: ARG002
+        return np.array([1.0, 0.0, 0.2, 0.0], np.float32)
+
+
+def honeyguide(*words):
+    return CliRunner().invoke(app, ["benchmark", *words])
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("swim",), "benchmark swim: there is only follow"),
+        (("follow", "--condition", "rain"), "--condition rain: there are walk, run,"),
+        (("follow", "--policy", "nowhere.onnx", "--condition", "walk"), "nowhere.onnx"),
+        (("follow", "--policy", "json:loads", "--condition", "walk"), "no class that can be made without arguments"),
+        (
+            ("follow", "--policy", "builtins:dict", "--condition", "walk"),
+            "a pilot has kind, image_shape,",
+        ),
+    ],
+)
+def test_what_is_wrong_is_refused_in_a_sentence(words, sentence):
+    result = honeyguide(*words)
+    assert result.exit_code == 2
+    assert sentence in result.stderr
+
+
+def test_every_condition_is_of_numbers_that_there_are():
+    for condition in CONDITIONS:
+        params_row(condition.numbers)
+
+
+def test_a_flight_is_shown_and_written(tmp_path):
+    out = tmp_path / "out"
+    words = ("--policy", "scripted", "--condition", "walk", "--flights", "1", "--jobs", "1", "--out", str(out))
+    result = honeyguide("follow", *words)
+    assert result.exit_code in {0, 1}, result.output
+    record = json.loads((out / "flights.json").read_text())
+    (outcome,) = record["flights"]["walk"]
+    assert 0.0 <= outcome["in_band"] <= 1.0
+    assert "standard, walking" in (out / "table.md").read_text()
+
+
+def test_the_guard_keeps_a_policy_that_flies_at_its_owner_off_them():
+    outcome = fly(FullSpeedAhead(), BY_NAME["walk"], 2_000_003, GuardSettings(), seconds=20.0)
+    assert not outcome.is_collided
+    assert outcome.interventions_per_min > 100.0
+
+
+def test_a_class_of_ones_own_flies():
+    assert any_pilot(f"{__name__}:FullSpeedAhead").owner_hfrd is None
+    with pytest.raises(PilotError):
+        any_pilot("no.such.module:Class")
+
+
+def test_standing_and_following_again_are_counted_from_what_was_seen():
+    hidden = np.zeros(300, dtype=bool)
+    hidden[50:130] = True
+    slow, fast = np.where(np.arange(300) < 80, 3.0, 0.1), np.full(300, 3.0)
+    assert _has_stood(hidden, slow, 0.1)
+    assert not _has_stood(hidden, fast, 0.1)
+    assert _has_stood(np.zeros(300, dtype=bool), fast, 0.1) is None
+    back = np.arange(300) > 180
+    assert _has_resumed(hidden, back, 0.1)
+    assert not _has_resumed(hidden, np.arange(300) > 250, 0.1)
+
+
+def test_what_fell_short_is_named():
+    good = Outcome(1, 0.99, False, 1.5, float("nan"), None, None, 0.0, 1.0, 10.0, 60.0, "")
+    bad = Outcome(3, 0.5, True, 0.4, float("nan"), None, None, 0.0, 1.0, 10.0, 20.0, "")
+    assert misses({"walk": [good]}) == []
+    assert len(misses({"walk": [good, bad]})) == 2
