@@ -25,6 +25,8 @@ _OWNER = (
     "sim.sensors.fast_camera.ground",
     "sim.sensors.fast_camera.light",
     "policies.tasks.follow_me.task_cameras",
+    "policies.tasks.follow_me.flown_cast",
+    "policies.tasks.follow_me.image_way",
     "policies.tasks.follow_me.observe",
     "policies.tasks.flight.own_state",
 )

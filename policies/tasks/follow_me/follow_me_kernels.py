@@ -36,7 +36,7 @@ from policies.tasks.follow_me.cast import (
 )
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, document_action, write_vector
-from policies.tasks.follow_me.owner_visibility import Sight, lens_of, reach_from, see
+from policies.tasks.follow_me.owner_visibility import Sight, lens_in, reach_from, see
 from policies.tasks.follow_me.privileged import write_privileged
 from policies.tasks.follow_me.reward import document_reward, follow_outcome, follow_reward, is_in_band
 from sim.advance import RigArrays
@@ -169,7 +169,7 @@ def look(rig: RigArrays, state: FollowState, rows: wp.array(dtype=wp.bool)) -> N
         params = state.params[i]
         is_hidden = state.drawn[i, 0].stature_m <= 0.0
         state.sights[i] = see(rig.worlds[rig.i_world[i]], truth, params, state.people[i], is_hidden)
-        state.lenses[i] = lens_of(truth, params)
+        state.lenses[i] = lens_in(truth, params)
 
 
 @wp.func

@@ -109,6 +109,9 @@ def carry(
     for x in range(fresh.shape[2]):
         for c in range(fresh.shape[3]):
             level = fresh[i, y, x, c]
+            if newest == 0:
+                for slot in range(_KEPT):  # nothing is left of the episode before
+                    way.kept[i, slot * height + y, x, c] = level
             way.kept[i, (newest % _KEPT) * height + y, x, c] = level
             if shown == newest:
                 images[i, y, x, c] = level

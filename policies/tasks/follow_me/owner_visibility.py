@@ -50,16 +50,24 @@ def light_gain(n: FollowParams) -> float:
 
 
 @wp.func
-def lens_of(truth: Truth, n: FollowParams) -> Lens:
-    """The policy's camera on a vehicle, in the light of an episode."""
-    tilt = wp.quat_from_axis_angle(wp.vec3(1.0, 0.0, 0.0), n.lens_tilt_deg * _RADIANS)
+def lens_in(truth: Truth, n: FollowParams) -> Lens:
+    """The policy's camera on a vehicle, as an episode has it: its light, its lens, its mount."""
+    lens = lens_of(truth, n.exposure * n.light * light_gain(n))
+    if n.lens_tilt_deg != 0.0:
+        tilt = wp.quat_from_axis_angle(wp.vec3(1.0, 0.0, 0.0), n.lens_tilt_deg * _RADIANS)
+        lens.q_ned_from_rdf = lens.q_ned_from_rdf * tilt
+    lens.half_width = HALF_WIDTH * n.lens_scale
+    return lens
+
+
+@wp.func
+def lens_of(truth: Truth, exposure: float) -> Lens:
+    """The policy's camera on a vehicle; `exposure` is a factor on all light."""
     lens = Lens()
     lens.pos_ned = truth.pos_ned + wp.quat_rotate(truth.q_ned_from_frd, LENS_FRD)
     lens.q_ned_from_rdf = truth.q_ned_from_frd * Q_FRD_FROM_RDF
-    if n.lens_tilt_deg != 0.0:
-        lens.q_ned_from_rdf = lens.q_ned_from_rdf * tilt
-    lens.half_width = HALF_WIDTH * n.lens_scale
-    lens.exposure = n.exposure * n.light * light_gain(n)
+    lens.half_width = HALF_WIDTH
+    lens.exposure = exposure
     lens.balance = wp.vec3(1.0, 1.0, 1.0)
     return lens
 
@@ -101,7 +109,7 @@ def see(w: World, truth: Truth, n: FollowParams, person: Person, is_hidden: bool
     sight.bearing_rad = wp.atan2(sight.position_hfrd[1], sight.position_hfrd[0])
     sight.reach_m = reach_from(truth.pos_ned, person)
     sight.room_m = room_around(w, truth)
-    lens = lens_of(truth, n)
+    lens = lens_in(truth, n)
     if is_hidden:
         return sight
     is_chest_free = is_line_free(w, lens.pos_ned, chest)

@@ -13,7 +13,7 @@ from policies.tasks.flight.rig_task import worker_count
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.image_way import Way, carry, note
 from policies.tasks.follow_me.observe import HFOV_DEG, pack_images
-from policies.tasks.follow_me.owner_visibility import lens_of, light_gain
+from policies.tasks.follow_me.owner_visibility import lens_in, light_gain
 from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.fast_camera.fast_camera import QuickCamera
@@ -30,7 +30,7 @@ def aim_lenses(
 ) -> None:
     """Places the lens of every vehicle: for flights, which look when a picture is due."""
     i = wp.tid()
-    lenses[i] = lens_of(truths[i], params[i])
+    lenses[i] = lens_in(truths[i], params[i])
 
 
 @wp.kernel(enable_backward=False)
@@ -54,7 +54,7 @@ def set_optics(
         out.shutter_s = n.shutter_s
         if n.shutter_s > 0.0:
             truth = rig.truth[i]
-            q_ned_from_rdf = lens_of(truth, n).q_ned_from_rdf
+            q_ned_from_rdf = lens_in(truth, n).q_ned_from_rdf
             out.vel_rdf = wp.quat_rotate_inv(q_ned_from_rdf, truth.vel_ned)
             rate_ned = wp.quat_rotate(truth.q_ned_from_frd, truth.omega_frd)
             out.rate_rdf = wp.quat_rotate_inv(q_ned_from_rdf, rate_ned)

@@ -92,7 +92,7 @@ def test_ports_are_numbered_as_the_simulators_of_px4_and_ardupilot_do():
 @pytest.mark.parametrize(
     ("ports", "i_vehicle", "sentence"),
     [
-        ({"gcs_port": 14550, "api_port": 14500}, 10, "own ports of vehicle 11, 18580 and 14550"),
+        ({"gcs_port": 14550, "api_port": 14500}, 10, "vehicle 11's own ports 18580 and 14550"),
         ({"tcp_port": 65530}, 1, "--tcp-port 65530: must be at most 65525: that of vehicle 2 is 10 above"),
         ({"gcs_port": 61515}, 1, "--gcs-port 61515: must be at most 61514"),
     ],
