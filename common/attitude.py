@@ -4,7 +4,7 @@ Unit Hamilton quaternions (x, y, z, w), active: `q_dst_from_src` rotates a vecto
 """
 
 from collections.abc import Sequence
-from math import asin, atan2, cos, pi, sin
+from math import asin, atan2, cos, pi, sin, sqrt
 
 Vector = tuple[float, float, float]
 Quat = tuple[float, float, float, float]  # x, y, z, w
@@ -51,6 +51,21 @@ def roll_pitch_yaw_of(q_ned_from_frd: Sequence[float]) -> Vector:
         asin(1.0 if sine > 1.0 else -1.0 if sine < -1.0 else sine),
         atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
     )
+
+
+def levelled(v_frd: Sequence[float], down_frd: Sequence[float]) -> Vector:
+    """A vector of a leaning body as ahead, right and down of it, level.
+
+    Args:
+        v_frd: body frame.
+        down_frd: the first two elements of the unit vector down in it.
+    """
+    x, y, z = v_frd
+    lean_x, lean_y = down_frd
+    upright = sqrt(max(1.0 - lean_x * lean_x - lean_y * lean_y, 0.0))
+    level = sqrt(1.0 - lean_x * lean_x)  # length of the body's x axis without what points down
+    down = lean_x * x + lean_y * y + upright * z
+    return (x - lean_x * down) / level, (upright * y - lean_y * z) / level, down
 
 
 def quat_of(yaw_rad: float, pitch_rad: float) -> Quat:

@@ -5,12 +5,12 @@ follower and policies that say nothing of the owner. What is blue and has a dept
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, hypot, radians, sin, sqrt, tan
+from math import atan2, cos, hypot, radians, sin, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common.attitude import Vector, rotated
+from common.attitude import Vector, levelled, rotated
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, camera_mount
 
 BLUE_OVER_RED, BLUE_OVER_GREEN = 1.6, 1.3  # ratios of sRGB values; measured on the shirt, near and far, sun and shade
@@ -73,9 +73,6 @@ def chest_hfrd(pixels: NDArray[np.uint8], down_frd: tuple[float, float]) -> Vect
     sight = find_owner(pixels, HFOV_DEG, float(DEPTH_HALF_M))
     if sight is None:
         return None
-    position = np.array(rotated(camera_mount(), sight.position_rdf))  # from the lens, a decimetre off the middle
-    down_x, down_y = down_frd
-    down = np.array([down_x, down_y, sqrt(max(1.0 - down_x**2 - down_y**2, 0.0))])
-    ahead = np.array([1.0, 0.0, 0.0]) - down_x * down
-    ahead /= np.linalg.norm(ahead)
-    return float(position @ ahead), float(position @ np.cross(down, ahead)), float(position @ down) + SHIRT_OVER_CHEST_M
+    position = rotated(camera_mount(), sight.position_rdf)  # from the lens, a decimetre off the middle
+    ahead, right, down = levelled(position, down_frd)
+    return ahead, right, down + SHIRT_OVER_CHEST_M

@@ -15,10 +15,8 @@ from bench.follow.run import policy_path, result_path
 from bench.follow.stages import CELLS, Cell
 from mission.flight import FlightConfig
 from mission.flight_config import OwnerConfig
-from mission.follow.follow_scoring import FollowWatch
-from mission.follow.lockstep import flight_with_companion
-from mission.script import set_out
-from policies.companion.engagement import Phase
+from mission.follow.lockstep import flight_with_companion, follow_for
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import load_pilot
 from policies.companion.skills.following import Pilot
 from policies.companion.vector_pilot import NavigationPilot
@@ -28,8 +26,6 @@ from policies.tasks.follow_me.world import FOLLOW_WORLD
 FLIGHTS = 20  # of each cell
 SECONDS = 60.0
 FIRST_SEED = 1_000_003  # no training is given it, and no tuning
-_TAKEOFF_S = 40.0
-_ENGAGE_S = 5.0
 _WINDS_M_S = (0.0, 1.5, 3.0, 4.5, 6.0)  # the range of training, by seed
 
 
@@ -56,18 +52,11 @@ def fly(
         seed=seed,
         wind_m_s=_WINDS_M_S[seed % len(_WINDS_M_S)],
     )
-    flight, companion = flight_with_companion(config, pilot)
-    try:
-        flight.fly(set_out, seconds=_TAKEOFF_S)
-        end_us = flight.time_us + round(_ENGAGE_S * 1e6)
-        flight.run(lambda _: companion.phase is Phase.FLYING or flight.time_us >= end_us)
-        if companion.phase is not Phase.FLYING:
-            print(f"{cell}, seed {seed}: never followed: {companion.trouble}", flush=True)
-        watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, seconds)
-        watch.begin()
-        flight.run(lambda _: watch.is_over, on_frame=lambda _: watch.frame())
-    finally:
-        flight.close()
+    alone = GuardSettings(is_on=False)  # the page is about policies
+    flight, companion = flight_with_companion(config, pilot, guard=alone)
+    watch = follow_for(flight, companion, seconds)
+    if not companion.decision_count:
+        print(f"{cell}, seed {seed}: never followed: {companion.trouble}", flush=True)
     track = watch.track()
     assert track is not None  # one sample at least
     return replace(track, trees_per_ha=cell.trees_per_ha, owner_speed_max=cell.owner_speed_max)

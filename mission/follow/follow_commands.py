@@ -10,6 +10,7 @@ from rich.console import Console
 from mission.console.command_refusal import learn_extra, refuse
 from mission.console.name_checks import check_policy
 from mission.console.terminal import loading
+from mission.follow.benchmark.conditions import BY_NAME, FIRST_SEED
 
 if TYPE_CHECKING:
     from mission.flight_settings import FollowOptions
@@ -73,13 +74,12 @@ def benchmark(
     condition: Annotated[list[str] | None, typer.Option(help="One of them; repeatable. Default: all.")] = None,
     flights: Annotated[int, typer.Option(min=1, help="Of each condition.")] = 60,
     jobs: Annotated[int, typer.Option(min=1, help="Processes at a time.")] = 2,
+    seed: Annotated[int, typer.Option(min=1, help="Of the first flight; each next is 2 more.")] = FIRST_SEED,
     guard: Annotated[bool, typer.Option("--guard/--no-guard", help="The guard bounds the policy.")] = True,
     out: Annotated[Path | None, typer.Option(help="Folder for table.md and flights.json.")] = None,
 ) -> None:
     """Fly a policy through standard and harder conditions, over MAVLink, and show how often it follows and hits."""
     with learn_extra():
-        from mission.follow.benchmark.conditions import BY_NAME
-
         unknown = [name for name in condition or () if name not in BY_NAME]
         if task != "follow":
             refuse(f"benchmark {task}: there is only follow")
@@ -88,7 +88,7 @@ def benchmark(
         with loading(Console()):
             from mission.follow.benchmark.session import BenchmarkOptions, benchmark_session, misses
             from policies.companion.pilot import PilotError
-        options = BenchmarkOptions(policy, tuple(condition or ()), flights, jobs, has_guard=guard, out=out)
+        options = BenchmarkOptions(policy, tuple(condition or ()), flights, jobs, seed, guard, out)
         try:
             outcomes = benchmark_session(options)
         except PilotError as error:

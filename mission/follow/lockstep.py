@@ -11,7 +11,10 @@ from typing import Any
 from autopilot.mavlink.transport.links import Link, LinkRole, LinkSource, memory_pair
 from mission.flight import Flight, FlightConfig
 from mission.flight_base import FlightBase
+from mission.follow.follow_scoring import FollowWatch
+from mission.script import set_out
 from policies.companion.companion import Companion
+from policies.companion.engagement import Phase
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import MemoryCamera
 from policies.companion.skills.driving import Driving
@@ -20,6 +23,8 @@ from policies.companion.skills.navigating import Navigating
 from policies.companion.skills.skill import Skill
 from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
 from sim.world.world import WorldMap
+
+_SET_OUT_S, _ENGAGE_S = 40.0, 5.0  # at most, until it hovers, and until it follows
 
 
 def flight_with_companion(
@@ -59,6 +64,37 @@ def flight_with_companion(
     companion = Companion(companion_end, skill, is_reported=is_reported, wall_s=wall_s)
     flight.computers.append(companion)
     return flight, companion
+
+
+def follow_for(
+    flight: FlightBase,
+    companion: Companion,
+    seconds: float,
+    on_frame: Callable[[FollowWatch], None] = lambda _: None,
+) -> FollowWatch:
+    """Sets out, follows for so long, closes the flight; what was followed. One that never begins follows nobody.
+
+    Args:
+        flight: with an owner.
+        companion: on board.
+        seconds: of following.
+        on_frame: called after each frame of it.
+    """
+    try:
+        flight.fly(set_out, seconds=_SET_OUT_S)
+        end_us = flight.time_us + round(_ENGAGE_S * 1e6)
+        flight.run(lambda _: companion.phase is Phase.FLYING or flight.time_us >= end_us)
+        watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, seconds)
+        watch.begin()
+
+        def look(_: FlightBase) -> None:
+            watch.frame()
+            on_frame(watch)
+
+        flight.run(lambda _: watch.is_over, on_frame=look)
+    finally:
+        flight.close()
+    return watch
 
 
 def flight_with_navigator(

@@ -14,8 +14,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from common.attitude import Vector, rotated
-from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, camera_mount
+from common.attitude import Vector, levelled, rotated
+from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount, depth_of
 
 CELLS = 16  # of the map, in rows and columns
 STRIDE = 4  # pixels of a cell
@@ -121,9 +121,8 @@ def _checked_range(range_m: float, depth: NDArray[np.uint8], row: int, column: i
     returns = byte[byte < _NO_RETURN]
     if len(returns) < STRIDE:
         return range_m
-    along_m = float(DEPTH_HALF_M) * (returns + 0.5) / (_NO_RETURN - returns)
     steps = (np.array([first_row, first_column]) + 0.5 * STRIDE - 0.5 * depth.shape[0]) * (2.0 / depth.shape[0])
-    shown_m = along_m * sqrt(1.0 + float((steps * _HALF_WIDTH) @ (steps * _HALF_WIDTH)))
+    shown_m = depth_of(returns) * sqrt(1.0 + float((steps * _HALF_WIDTH) @ (steps * _HALF_WIDTH)))
     nearest = shown_m[np.argmin(np.abs(np.log(shown_m / range_m)))]
     return float(nearest) if abs(log(nearest / range_m)) < _AGREES else None
 
@@ -133,12 +132,7 @@ def _chest_hfrd(at: tuple[float, float], range_m: float, width: int, down_frd: t
     per_pixel = 2.0 * float(_HALF_WIDTH) / width
     ray = np.array([(at[0] - 0.5 * width) * per_pixel, (at[1] - 0.5 * width) * per_pixel, 1.0])
     ray *= range_m / np.linalg.norm(ray)
-    position = np.array(rotated(camera_mount(), (float(ray[0]), float(ray[1]), float(ray[2]))))
-    down_x, down_y = down_frd
-    down = np.array([down_x, down_y, sqrt(max(1.0 - down_x**2 - down_y**2, 0.0))])
-    ahead = np.array([1.0, 0.0, 0.0]) - down_x * down
-    ahead /= np.linalg.norm(ahead)
-    return float(position @ ahead), float(position @ np.cross(down, ahead)), float(position @ down)
+    return levelled(rotated(camera_mount(), ray.tolist()), down_frd)  # of the lens, a decimetre off the middle
 
 
 def shipped() -> DetectorNetwork:

@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from common.attitude import inverse, product, quat_of_roll_pitch_yaw, rotated
 from policies.person_detector.detector import CELLS, RANGE_M, STRIDE
 from policies.tasks.follow_me.cast import PEOPLE_MAX
 from policies.tasks.follow_me.observe import HFOV_DEG, IMAGE_SIZE, camera_mount, pack_images
@@ -132,7 +133,9 @@ def _aim(
     lens: Any = camera.lenses.numpy()
     lens["pos_ned"] = np.concatenate([where, down[:, None]], -1)
     lean = [rng.normal(0.0, 0.15, n), rng.normal(-0.05, 0.2, n)]  # roll and pitch [rad]
-    lens["q_ned_from_rdf"] = _times(_euler(lean[0], lean[1], yaw), np.array(camera_mount()))
+    mount = camera_mount()
+    poses = [quat_of_roll_pitch_yaw(*angles) for angles in zip(*lean, yaw, strict=True)]
+    lens["q_ned_from_rdf"] = [product(pose, mount) for pose in poses]
     lens["half_width"] = rng.uniform(0.97, 1.03, n) * np.tan(np.radians(0.5 * HFOV_DEG))
     light = np.where(rng.random(n) < 0.3, rng.uniform(0.06, 0.3, n), 1.0)
     gain = np.minimum(1.0 / light, float(GAIN_MAX))
@@ -179,7 +182,7 @@ def _label(
     points = []
     for up in (chest_m, 0.93 * stature_m, 0.3 * stature_m):
         offset = person["pos_ned"] - np.array([0.0, 0.0, up]) - lens["pos_ned"]
-        ray = _back(lens["q_ned_from_rdf"], offset)
+        ray = rotated(inverse(lens["q_ned_from_rdf"].tolist()), offset.tolist())
         points.append(_seen(ray, kind, float(lens["half_width"])))
         if up == chest_m:
             is_behind = any(abs(ray[0] / max(ray[2], 0.1) - x) < _BODY_M / z for x, z in nearer)
@@ -205,29 +208,3 @@ def _seen(ray: Any, kind: Any, half_width: float) -> tuple[int, int, bool, float
     near = np.s_[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
     is_there = bool((kind[near] == PERSON).any())
     return row, column, is_there, float(np.linalg.norm(ray))
-
-
-def _euler(roll: Any, pitch: Any, yaw: Any) -> NDArray[np.float64]:
-    """Quaternions (x, y, z, w) of rotations about down, right, ahead."""
-    half = [0.5 * np.asarray(angle) for angle in (roll, pitch, yaw)]
-    (sr, sp, sy), (cr, cp, cy) = ([f(h) for h in half] for f in (np.sin, np.cos))
-    columns = [
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    ]
-    return np.stack(columns, -1)
-
-
-def _times(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Products of quaternions, rows of p with q."""
-    vector = p[:, 3:] * q[:3] + q[3] * p[:, :3] + np.cross(p[:, :3], q[:3])
-    return np.concatenate([vector, (p[:, 3] * q[3] - p[:, :3] @ q[:3])[:, None]], -1)
-
-
-def _back(q: Any, v: Any) -> Any:
-    """A vector rotated by the inverse of a quaternion (x, y, z, w)."""
-    u = -np.asarray(q[:3], float)
-    t = 2.0 * np.cross(u, v)
-    return v + q[3] * t + np.cross(u, t)

@@ -119,8 +119,8 @@ def _range_error(network: DetectorNetwork, there: Scenes) -> float:
 
 
 def main(
-    images: Annotated[int, typer.Option(min=640)] = 30_000,
-    epochs: Annotated[int, typer.Option(min=1)] = 12,
+    images: Annotated[int, typer.Option(min=640)] = 24_000,
+    epochs: Annotated[int, typer.Option(min=1)] = 14,
     seed: int = 1,
     out: Path = WEIGHTS,
     judged: Annotated[bool, typer.Option("--judge", help="Train nothing: judge the one that ships.")] = False,

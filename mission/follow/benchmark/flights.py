@@ -14,25 +14,20 @@ from numpy.typing import NDArray
 from mission.flight_config import FlightConfig, OwnerConfig
 from mission.follow.benchmark.conditions import Condition
 from mission.follow.follow_scoring import FollowWatch
-from mission.follow.lockstep import flight_with_companion
-from mission.script import set_out
-from policies.companion.engagement import Phase
+from mission.follow.lockstep import flight_with_companion, follow_for
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.skills.following import Following, Pilot
-from policies.tasks.follow_me.track import Ranges
+from policies.tasks.follow_me.track import Ranges, spans
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 
 Array = NDArray[Any]
 SECONDS = 60.0
-FIRST_SEED = 3_000_003  # odd; no training and no tuning is given those from here on
-VALIDATION_SEED = 2_000_003  # choices are made on these
 TREES_PER_HA = (50.0, 100.0, 200.0)
 WINDS_M_S = (0.0, 2.0, 4.0, 6.0, 8.0)
 STANDS_M_S = 0.5
 HOLD_S = 5.0  # after the last sight, until it must stand
 BACK_S = 10.0  # after they are back, until it must follow
 _SUSTAINED_S = 1.0
-_TAKEOFF_S, _ENGAGE_S = 40.0, 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,22 +58,13 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
     flight, companion = flight_with_companion(config, pilot, guard=guard)
     rows: list[tuple[float, ...]] = []
 
-    def look() -> None:
-        watch.frame()
+    def look(watch: FollowWatch) -> None:
         if watch.sample_count > len(rows):
             truth = flight.rig.rows["truth"][0]
             is_hidden = float(flight.owner.cast.rows.drawn.numpy()[0, 0]["stature_m"] <= 0.0)
             rows.append((is_hidden, *truth["vel_ned"][:2].tolist(), float(truth["omega_frd"][2])))
 
-    try:
-        flight.fly(set_out, seconds=_TAKEOFF_S)
-        end_us = flight.time_us + round(_ENGAGE_S * 1e6)
-        flight.run(lambda _: companion.phase is Phase.FLYING or flight.time_us >= end_us)
-        watch = FollowWatch(flight, lambda: companion.phase is Phase.FLYING, seconds)
-        watch.begin()
-        flight.run(lambda _: watch.is_over, on_frame=lambda _: look())
-    finally:
-        flight.close()
+    watch = follow_for(flight, companion, seconds, look)
     track = watch.track()
     if track is None:
         raise ValueError("a flight of no time has no outcome")
@@ -107,24 +93,19 @@ def fly(pilot: Pilot, condition: Condition, seed: int, guard: GuardSettings, sec
     )
 
 
-def _spans(is_true: Array) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], is_true, [False])).astype(np.int8)))
-    return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
-
-
 def _has_stood(hidden: Array, speed: Array, interval_s: float) -> bool | None:
     """Whether it stood five seconds after the last sight of each hiding that was so long."""
     due = round(HOLD_S / interval_s)
-    spans = [first for first, end in _spans(hidden) if end - first > due]
-    if not spans:
+    begun = [first for first, end in spans(hidden) if end - first > due]
+    if not begun:
         return None
-    return all(speed[max(first + due - 5, 0) : first + due + 1].min() < STANDS_M_S for first in spans)
+    return all(speed[max(first + due - 5, 0) : first + due + 1].min() < STANDS_M_S for first in begun)
 
 
 def _has_resumed(hidden: Array, is_in_band: Array, interval_s: float) -> bool | None:
     """Whether it was in the band for a second within ten of each return that was followed for so long."""
     due, length = round(BACK_S / interval_s), round(_SUSTAINED_S / interval_s)
-    ends = [end for _, end in _spans(hidden) if end + due <= len(hidden)]
+    ends = [end for _, end in spans(hidden) if end + due <= len(hidden)]
     if not ends:
         return None
     return all(any(is_in_band[k : k + length].all() for k in range(end, end + due - length + 1)) for end in ends)

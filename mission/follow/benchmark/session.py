@@ -13,8 +13,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from common.files import write_whole
-from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS, Condition
-from mission.follow.benchmark.flights import FIRST_SEED, Outcome, fly
+from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS, FIRST_SEED, Condition
+from mission.follow.benchmark.flights import Outcome, fly
 from mission.follow.benchmark.pilots import any_pilot
 from mission.follow.benchmark.table import COLUMNS, markdown, row
 from policies.companion.guard.settings import GuardSettings

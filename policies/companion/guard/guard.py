@@ -12,7 +12,7 @@ from math import atan2, inf, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from common.attitude import Vector, rotated, wrapped, yaw_of
+from common.attitude import Vector, inverse, quat_of, rotated, wrapped, yaw_of
 from common.image_stream import ImageFrame
 from policies.companion.guard.limits import faded, kept_off, stopping_speed, within_room
 from policies.companion.guard.local_map import LocalMap
@@ -31,7 +31,6 @@ _CLIMB_M_S = 1.0
 _PHONE_OLD_S = 3.0
 _GATE_M = 3.0  # from where the tracker expects the owner; who is farther off is somebody else
 _GATE_M_S = 2.5  # and wider by so much with each second without a sight
-_HEARD_STD_M = 3.0
 
 
 class Stance(Enum):
@@ -58,15 +57,19 @@ class Guard:
         self.stance = Stance.FREE
         self.interventions: Counter[str] = Counter()
         """How many decisions were changed, by the reason."""
-        self.decisions = 0
         self._detector = detector or PersonDetector()
         self._watch = OwnerWatch(hears=hears)
+        self._reports = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        """The vehicle's clock and frame begin anew."""
+        self._boot_us = 0  # the newest, of the vehicle's clock
         self._poses = PoseHistory()
         self._map = LocalMap()
         self._seen_us: int | None = None  # when the newest picture with the owner was taken, the vehicle's clock
         self._image_us = 0  # when the newest picture was taken
-        self._heard_us = -(10**12)  # on the vehicle's clock
-        self._reports = 0
+        self._heard_us: int | None = None  # on the vehicle's clock
         self._bearing_rad = 0.0  # in ned, where the owner was seen last
         self._way = np.zeros(2)  # unit, to where the owner is now
         self._is_pressed = self._is_too_near = False
@@ -82,6 +85,9 @@ class Guard:
 
     def sense(self, own: Own, owner: Owner, image: ImageFrame | None) -> None:
         """Takes in telemetry, the phone's reports, and a new picture if there is one."""
+        if own.boot_us < self._boot_us:  # it has restarted: what was seen before was at no time that it knows
+            self._forget()
+        self._boot_us = own.boot_us
         self._poses.note(own)
         if owner.count != self._reports:
             self._reports, self._heard_us = owner.count, own.boot_us
@@ -91,7 +97,7 @@ class Guard:
         if pose is None:
             return
         self._image_us = image.time_us
-        down = rotated((*(-x for x in pose.q_ned_from_frd[:3]), pose.q_ned_from_frd[3]), (0.0, 0.0, 1.0))
+        down = rotated(inverse(pose.q_ned_from_frd), (0.0, 0.0, 1.0))
         seen = self._owner_among(self._detector.find(image.pixels, (down[0], down[1])), pose, own)
         sighting = None if seen is None else sighting_from(seen.chest_hfrd, pose.pos_ned, pose.q_ned_from_frd)
         is_taken = self._watch.take(image.time_us, own.boot_us, owner, sighting)
@@ -110,7 +116,6 @@ class Guard:
     def filtered(self, wanted: Velocity, own: Own) -> Velocity:
         """What is flown of a velocity in ned and a yaw rate that a policy asks for."""
         s, (velocity, yaw_rate) = self.settings, wanted
-        self.decisions += 1
         age_s = max(own.boot_us - self._image_us, 0) * 1e-6
         silence_s = self.silence_s(own)
         self.stance = self._stance(silence_s, age_s)
@@ -145,8 +150,8 @@ class Guard:
         down = -_CLIMB_M_S * float(np.clip(2.0 * (s.search_height_m - own.range_m), -0.5, 1.0))
         down = down if isfinite(own.range_m) else 0.0
         track = self._watch.track
-        has_phone = own.boot_us - self._heard_us < _PHONE_OLD_S * 1e6 and track is not None and track.is_known
-        if has_phone and track is not None:
+        is_heard = self._heard_us is not None and own.boot_us - self._heard_us < _PHONE_OLD_S * 1e6
+        if is_heard and track is not None and track.is_known:
             way = np.array(track.pos_ned[:2]) - np.array(own.pos_ned[:2])
             far_m = float(np.hypot(*way))
             yaw_rate = self._facing(atan2(way[1], way[0]), own)
@@ -231,13 +236,7 @@ class Guard:
         return best if off_m(best) < gate_m else None
 
 
-def _ned_of(chest_hfrd: Vector, pose: Pose) -> Vector:
+def _ned_of(chest_hfrd: Vector, pose: Pose) -> Floats:
     """A place ahead, right and down of the vehicle at a pose."""
-    yaw = yaw_of(pose.q_ned_from_frd)
-    ahead, right, down = chest_hfrd
-    north, east, deep = pose.pos_ned
-    return (
-        north + ahead * float(np.cos(yaw)) - right * float(np.sin(yaw)),
-        east + ahead * float(np.sin(yaw)) + right * float(np.cos(yaw)),
-        deep + down,
-    )
+    level = quat_of(yaw_of(pose.q_ned_from_frd), 0.0)
+    return np.asarray(np.array(pose.pos_ned) + np.array(rotated(level, chest_hfrd)))

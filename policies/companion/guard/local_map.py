@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector, rotated
 from policies.companion.guard.poses import Pose
-from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, camera_mount
+from policies.tasks.follow_me.observe import HFOV_DEG, IMAGE_SIZE, camera_mount, depth_of
 
 CELL_M = 0.25
 CELLS = 96  # of a side: 12 m to each
@@ -64,7 +64,7 @@ class LocalMap:
         self._follow(pose.pos_ned)
         if not self.has_depth:
             return
-        depth_m = float(DEPTH_HALF_M) * (byte + 0.5) / np.maximum(255.0 - byte, 1.0)
+        depth_m = depth_of(np.minimum(byte, 254.0))
         rotation = np.array([rotated(pose.q_ned_from_frd, axis) for axis in np.eye(3).tolist()]).T
         rays_ned = self._rays_frd @ rotation.T  # of depth 1
         points = rays_ned * depth_m[..., None]

@@ -30,8 +30,6 @@ class PoseHistory:
         is_known = isfinite(own.pos_ned[0]) and own.boot_us >= 0
         if not is_known or (self._poses and own.boot_us == self._poses[-1].time_us):
             return
-        if self._poses and own.boot_us < self._poses[-1].time_us:  # the vehicle has restarted
-            self._poses.clear()
         self._poses.append(Pose(own.boot_us, own.pos_ned, own.q_ned_from_frd))
 
     def at(self, time_us: int) -> Pose | None:

@@ -8,7 +8,9 @@ what came over MAVLink. Nothing here knows the simulator.
 
 import math
 
+import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from common.rotation import yaw_from_quat
 from policies.tasks.flight.own_state import (
@@ -147,6 +149,11 @@ def depth_byte(depth_m: float) -> wp.uint8:
     if depth_m >= _SKY_M:
         return wp.uint8(255)
     return wp.uint8(wp.floor(255.0 * depth_m / (depth_m + DEPTH_HALF_M)))
+
+
+def depth_of(byte: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The depth [m] that bytes below 255 of the depth channel stand for: they were rounded down."""
+    return float(DEPTH_HALF_M) * (byte + 0.5) / (255.0 - byte)
 
 
 @wp.kernel(enable_backward=False)

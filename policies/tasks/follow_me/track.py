@@ -81,15 +81,20 @@ class Loss:
     is_reacquired: bool  # ended while the episode went on
 
 
+def spans(is_true: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First index and end of each time that something was true without a break."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], is_true, [False])).astype(np.int8)))
+    return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
+
+
 def losses(track: Track, ranges: Ranges) -> list[Loss]:
     """Every loss that lasted long enough to count, in order."""
     is_lost = ~track.is_in_view | (track.distance_m > ranges.lost_m)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], is_lost, [False])).astype(np.int8)))
     found = []
-    for first, end in edges.reshape(-1, 2):
+    for first, end in spans(is_lost):
         is_reacquired = end < len(is_lost)
         end_s = track.time_s[end] if is_reacquired else track.time_s[-1] + track.interval_s
         length_s = float(end_s - track.time_s[first])
         if length_s >= ranges.loss_s:
-            found.append(Loss(float(track.time_s[first]), length_s, bool(is_reacquired)))
+            found.append(Loss(float(track.time_s[first]), length_s, is_reacquired))
     return found

@@ -13,6 +13,7 @@ from mission.follow.benchmark.pilots import any_pilot
 from mission.follow.benchmark.session import misses
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import PilotError
+from policies.pretrained.pretrained_policies import pretrained
 from policies.tasks.follow_me.flown_cast import params_row
 from policies.tasks.follow_me.observe import EGO
 
@@ -97,3 +98,15 @@ def test_what_fell_short_is_named():
     bad = Outcome(3, 0.5, True, 0.4, float("nan"), None, None, 0.0, 1.0, 10.0, 20.0, "")
     assert misses({"walk": [good]}) == []
     assert len(misses({"walk": [good, bad]})) == 2
+
+
+def test_an_exported_policy_chooses_what_the_policy_itself_does(tmp_path):
+    """By onnxruntime, with its memory, over some seconds of images that differ."""
+    exported = CliRunner().invoke(app, ["export", str(pretrained("FollowMe")), str(tmp_path / "policy.onnx")])
+    assert exported.exit_code == 0, exported.output
+    own, theirs = any_pilot("follow-me"), any_pilot(str(tmp_path / "policy.onnx"))
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        vector = rng.normal(0.0, 0.5, 21).astype(np.float32)
+        image = rng.integers(0, 256, (64, 64, 4)).astype(np.uint8)
+        assert theirs.act(vector, image) == pytest.approx(own.act(vector, image), abs=1e-3)

@@ -1,0 +1,68 @@
+"""The guard over time: what it remembers, and what it must not after a restart."""
+
+import numpy as np
+import pytest
+
+from common.image_stream import ImageFrame
+from policies.companion.guard.guard import Guard, Stance
+from policies.companion.guard.settings import GuardSettings
+from policies.companion.vehicle_link import Own, Owner
+from policies.person_detector.detector import Detection
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
+
+
+class Sees:
+    """A detector that sees somebody three metres ahead, or nobody."""
+
+    is_there = True
+
+    def find(self, pixels: object, down_frd: object) -> list[Detection]:  # noqa: ARG002
+        return [Detection(0.99, (3.0, 0.0, 0.6), (32.0, 32.0))] if self.is_there else []
+
+
+def flown(guard: Guard, own: Own, seconds: float) -> list[float]:
+    """Speeds ahead that come of 3 m/s wanted, ten times a second; the vehicle does not move."""
+    speeds = []
+    for _ in range(round(seconds * 10)):
+        own.boot_us += 100_000
+        pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 200, np.uint8)
+        image = ImageFrame(own.boot_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
+        guard.sense(own, Owner(), image)
+        speeds.append(guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][0])
+    return speeds
+
+
+@pytest.fixture
+def scene() -> tuple[Guard, Own, Sees]:
+    sees = Sees()
+    own = Own(boot_us=0, pos_ned=(0.0, 0.0, -1.6), vel_ned=(0.0, 0.0, 0.0), range_m=1.6)
+    return Guard(GuardSettings(), detector=sees), own, sees  # type: ignore[arg-type]
+
+
+def test_it_lets_fly_towards_somebody_far_enough_and_stops_when_they_are_gone(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    assert min(flown(guard, own, 1.0)[5:]) > 1.5
+    sees.is_there = False
+    speeds = flown(guard, own, 6.0)
+    assert all(abs(speed) < 1e-6 for speed in speeds[21:])
+    assert guard.stance is Stance.SEARCH
+
+
+def test_what_was_seen_before_a_restart_is_not_taken_for_a_sight_of_now(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    own.boot_us = 100_000_000
+    flown(guard, own, 1.0)
+    own.boot_us, sees.is_there = 0, False  # the vehicle's clock begins anew
+    assert all(abs(speed) < 1e-6 for speed in flown(guard, own, 1.0))
+    assert guard.silence_s(own) == float("inf")
+
+
+def test_images_that_stop_stop_the_vehicle(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, _ = scene
+    flown(guard, own, 1.0)
+    for _ in range(10):
+        own.boot_us += 100_000
+        guard.sense(own, Owner(), None)
+        velocity, _ = guard.filtered(((3.0, 0.0, 0.0), 0.0), own)
+    assert velocity[:2] == (0.0, 0.0)
+    assert guard.stance is Stance.BLIND
