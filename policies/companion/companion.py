@@ -76,8 +76,8 @@ class Companion:
         vehicle.keep_alive(time_us)
         if self._sticks is not None:
             self._sticks.frame(time_us)
+        begun_s = self._wall_s() if self._wall_s is not None else None  # a guard looks at the image as it comes in
         has_sensed = skill.receive(vehicle, time_us)
-        begun_s = self._wall_s() if self._wall_s is not None and has_sensed else None
         if skill.is_ordered():
             self.engagement.engage()
             self._is_sent_in_guided = vehicle.own.mode is Mode.GUIDED
