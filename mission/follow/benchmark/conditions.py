@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from mission.flight_settings import Pace
+if TYPE_CHECKING:
+    from mission.flight_settings import Pace  # no command waits for the options of another
 
 FIRST_SEED = 3_000_003  # odd, as of all tests; no training and no tuning is given those from here on
 _HIDES = {"owner_hides_per_min": 1.0}
@@ -17,7 +19,7 @@ class Condition:
 
     name: str
     title: str
-    pace: Pace
+    pace: "Pace"
     numbers: Mapping[str, float] = field(default_factory=dict)
     """Of FollowMe, that differ from the standard."""
     least_in_band: float | None = None

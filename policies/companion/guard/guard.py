@@ -64,7 +64,7 @@ class Guard:
 
     def _forget(self) -> None:
         """The vehicle's clock and frame begin anew."""
-        self._boot_us = 0  # the newest, of the vehicle's clock
+        self._boot_us = self._begun_us = 0  # the newest, of the vehicle's clock; and when the policy took over
         self._poses = PoseHistory()
         self._map = LocalMap()
         self._seen_us: int | None = None  # when the newest picture with the owner was taken, the vehicle's clock
@@ -74,9 +74,15 @@ class Guard:
         self._way = np.zeros(2)  # unit, to where the owner is now
         self._is_pressed = self._is_too_near = False
 
-    def reset(self) -> None:
-        """It takes over."""
+    def begin(self, own: Own) -> None:
+        """The policy takes over."""
         self.stance = Stance.FREE
+        self._begun_us = own.boot_us
+
+    def is_lost(self, own: Own) -> bool:
+        """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""
+        searched_s = max(own.boot_us - self._begun_us, 0) * 1e-6
+        return min(self.silence_s(own), searched_s) > self.settings.lost_s
 
     @property
     def watch(self) -> OwnerWatch:

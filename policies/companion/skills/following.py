@@ -123,13 +123,13 @@ class Following:
 
     def loss(self, own: Own) -> str:
         if self.guard is not None and self._is_flying:
-            return "owner lost" if self.guard.silence_s(own) > self.guard.settings.lost_s else ""
+            return "owner lost" if self.guard.is_lost(own) else ""
         return "owner lost" if self._watch.silence_s(own.boot_us) > OWNER_LOST_S else ""
 
-    def begin(self, own: Own) -> None:  # noqa: ARG002  (others need it)
+    def begin(self, own: Own) -> None:
         self._pilot.reset()
         if self.guard is not None:
-            self.guard.reset()
+            self.guard.begin(own)
 
     def decide(self, own: Own, last_action: Floats, time_us: int, *, is_flying: bool) -> Floats | None:
         """Lets the pilot see the newest image.

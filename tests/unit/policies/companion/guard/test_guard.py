@@ -66,3 +66,14 @@ def test_images_that_stop_stop_the_vehicle(scene: tuple[Guard, Own, Sees]) -> No
         velocity, _ = guard.filtered(((3.0, 0.0, 0.0), 0.0), own)
     assert velocity[:2] == (0.0, 0.0)
     assert guard.stance is Stance.BLIND
+
+
+def test_an_owner_who_was_never_seen_is_looked_for_before_it_is_the_end(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    own.boot_us, sees.is_there = 500_000_000, False
+    guard.begin(own)
+    flown(guard, own, 5.0)
+    assert guard.stance is Stance.SEARCH
+    assert not guard.is_lost(own)
+    flown(guard, own, GuardSettings().lost_s)
+    assert guard.is_lost(own)
