@@ -22,6 +22,7 @@ from autopilot.vehicles.plane.modes.departure import Departure
 _AHEAD_M = 500.0  # of a way without an end
 _LOITERS = frozenset((Command.LOITER_UNLIMITED, Command.LOITER_TIME, Command.LOITER_TURNS, Command.LOITER_TO_ALT))
 _BANKING_S = 0.8  # until it has banked, of a sharp turn; guess
+_TURNED_ROOM, _STRAIGHT_ROOM = 0.4, 0.9  # part of a line that the turn at its end may take; guess
 _LINED_UP_M = 150.0  # way to a landing from which a straight one has a direction; guess
 
 
@@ -46,6 +47,7 @@ class PlaneLeg(Leg):
         self._turned_rad = 0.0
         self._bearing = nan
         self._length = 0.0  # [m] of the line
+        self._begins_straight = False  # the line goes on from a take-off, without a turn
 
     def stop(self) -> None:
         """Another mode took over; the leg is remembered, so that it can be gone on with."""
@@ -108,6 +110,7 @@ class PlaneLeg(Leg):
 
     def _fly_item(self, item: MissionItem) -> None:
         context, command = self._context, item.command
+        self._begins_straight = self._phase is _Stage.DEPART
         if command == Command.LAND:
             self._land(item)
         elif command == Command.CONTINUE_AND_CHANGE_ALT:
@@ -157,7 +160,8 @@ class PlaneLeg(Leg):
         speed = hypot(vel_n, vel_e)
         turning_m = speed * speed / context.number("HG_FW_ACC")
         begin_m = turning_m * min(tan(min(half, 0.45 * pi)), 1.0) + min(half, 1.0) * _BANKING_S * speed
-        return max(radius, min(begin_m, 0.4 * self._length))
+        room = _STRAIGHT_ROOM if self._begins_straight else _TURNED_ROOM
+        return max(radius, min(begin_m, room * self._length))
 
     def _change_height(self, item: MissionItem) -> None:
         """Straight on over ground until the height is reached."""
