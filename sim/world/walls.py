@@ -76,13 +76,17 @@ def wall_contact(walls: Walls, i_wall: int, pos_ned: wp.vec3, radius: float) -> 
     if off > 0.0:
         normal = (off_out * outward + off_side * along + wp.vec3(0.0, 0.0, -off_up)) / off
         return wp.vec4(normal[0], normal[1], normal[2], radius - off)
-    # centre inside the wall: out through the nearest of inner face, outer face and top
-    nearest = wp.min(wp.min(out - inner, outer - out), walls.top_m - height)
+    # centre inside the wall: out through the nearest of inner face, outer face, end and top
+    across = wp.min(out - inner, outer - out)
+    end = outer - wp.abs(side)
+    nearest = wp.min(wp.min(across, end), walls.top_m - height)
     normal = wp.vec3(0.0, 0.0, -1.0)
     if nearest == out - inner:
         normal = -outward
     elif nearest == outer - out:
         normal = outward
+    elif nearest == end:
+        normal = wp.sign(side) * along
     return wp.vec4(normal[0], normal[1], normal[2], radius + nearest)
 
 
@@ -156,10 +160,7 @@ class WallsMap:
         low, high = self._boxes_ned()
         position = (pos_ned * np.array([1.0, 1.0, -1.0]))[:, None, :]
         outside = np.maximum(np.maximum(low - position, position - high), 0.0)
-        # across its thickness and up: the ends of a wall lie in its neighbours
-        faces = np.minimum(position - low, high - position)
-        across = np.where(np.arange(WALL_COUNT) < 2, faces[:, :, 0], faces[:, :, 1])
-        inside = np.maximum(np.minimum(across, faces[:, :, 2]), 0.0)
+        inside = np.maximum(np.minimum(position - low, high - position).min(axis=-1), 0.0)
         off = np.sqrt((outside**2).sum(axis=-1))
         return np.asarray(np.where(off > 0.0, off, -inside).min(axis=1))
 

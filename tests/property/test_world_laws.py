@@ -3,7 +3,7 @@
 from functools import cache
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from sim.world.poisson import poisson_disc
@@ -88,6 +88,7 @@ def test_normal_is_unit_up_and_perpendicular_to_the_surface(north, east):
 
 
 @given(north=around_map, east=around_map, height=heights, dir_ned=directions())
+@example(north=101.0, east=100.75, height=1.0, dir_ned=np.array([-0.5, -0.5, 0.0]) * 2.0**0.5)  # a wall's end
 @FEW
 def test_ray_ends_on_a_surface_and_meets_nothing_before(north, east, height, dir_ned):
     world = small_world()
