@@ -112,7 +112,9 @@ class Guard:
             north, east, _ = _ned_of(seen.chest_hfrd, pose)
             self._bearing_rad = atan2(east - pose.pos_ned[1], north - pose.pos_ned[0])
         track = self._watch.track
-        owner_ned = tuple(track.pos_ned.tolist()) if track is not None and self.silence_s(own) < _PHONE_OLD_S else None
+        owner_ned = None
+        if track is not None and self.silence_s(own) < _PHONE_OLD_S:  # where they were when it was taken
+            owner_ned = tuple((track.pos_ned + (image.time_us - track.time_us) * 1e-6 * track.vel_ned).tolist())
         self._map.see(image.pixels, pose, owner_ned, own.boot_us)
 
     def silence_s(self, own: Own) -> float:
