@@ -77,3 +77,18 @@ def test_an_owner_who_was_never_seen_is_looked_for_before_it_is_the_end(scene: t
     assert not guard.is_lost(own)
     flown(guard, own, GuardSettings().lost_s)
     assert guard.is_lost(own)
+
+
+def test_an_owner_who_runs_is_no_obstacle_in_late_images(scene: tuple[Guard, Own, Sees]) -> None:
+    guard, own, sees = scene
+    late_us, speed = 300_000, 4.0
+    for _ in range(8):
+        own.boot_us += 100_000
+        taken_us = max(own.boot_us - late_us, 100_000)
+        far_m = 2.0 + speed * taken_us * 1e-6
+        sees.find = lambda *_, far_m=far_m: [Detection(0.99, (far_m, 0.0, 0.0), (32.0, 32.0))]  # type: ignore[method-assign]
+        pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 212, np.uint8)  # all else is 20 m away
+        pixels[:, 30:34, 3] = int(255.0 * far_m / (far_m + float(DEPTH_HALF_M)))  # their body
+        guard.sense(own, Owner(), ImageFrame(taken_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M)))
+    known_m = guard._map.clear_m(own.pos_ned, own.boot_us)[1]
+    assert known_m[0] > 9.0  # to the north, where they run
