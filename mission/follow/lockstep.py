@@ -18,7 +18,7 @@ from policies.companion.engagement import Phase
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import MemoryCamera
 from policies.companion.skills.driving import Driving
-from policies.companion.skills.following import Following, Pilot, guard_of
+from policies.companion.skills.following import Following, Pilot
 from policies.companion.skills.navigating import Navigating
 from policies.companion.skills.skill import Skill
 from policies.companion.vector_pilot import DrivingPilot, NavigationPilot
@@ -60,7 +60,7 @@ def flight_with_companion(
     if isinstance(pilot, NavigationPilot):
         skill = Navigating(pilot, camera=camera)
     else:
-        skill = Following(camera, pilot, guard_of(pilot, guard or GuardSettings()))
+        skill = Following(camera, pilot, guard or GuardSettings())
     companion = Companion(companion_end, skill, is_reported=is_reported, wall_s=wall_s)
     flight.computers.append(companion)
     return flight, companion

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from common.attitude import Vector
 from policies.companion.belief import owner_belief
 from policies.companion.names import SCRIPTED, TASK
-from policies.companion.skills.following import Pilot
+from policies.companion.skills.following import TRACKED, Pilot
 from policies.experts.follower import ScriptedFollower
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import CheckpointError, find_policy
@@ -28,6 +28,7 @@ from policies.tasks.follow_me.observe import (
     LAYOUT_VERSION,
     vector_elements,
 )
+from policies.tasks.follow_me.tracked import ACCELERATIONS, TRACKED_ELEMENTS
 from policies.tasks.layout import ImageElement, Layout, LayoutError
 
 Floats = NDArray[np.float32]
@@ -88,6 +89,53 @@ class LearnedPilot:
         return bounded
 
 
+class TrackedPilot:
+    """A trained policy that looks at no image: senses tell it of the owner, and its actions are accelerations.
+
+    Args:
+        policy: made for FollowMe with `observation=tracked`.
+        source: where it came from, for the message.
+
+    Raises:
+        PilotError: it was made for something else.
+    """
+
+    image_shape = (IMAGE_SIZE, IMAGE_SIZE, len(IMAGE_CHANNELS))  # of the senses
+    kind = TRACKED
+
+    def __init__(self, policy: Policy, source: str) -> None:
+        try:
+            Layout(TASK, LAYOUT_VERSION, TRACKED_ELEMENTS, ACCELERATIONS).require(policy.layout, source)
+        except LayoutError as error:
+            raise PilotError(str(error)) from error
+        self._policy = policy
+        self._memory = policy.start_memory(1)
+        self.owner_hfrd: Vector | None = None
+        torch.set_num_threads(1)
+        self.act(np.zeros(policy.layout.observation_size, np.float32), np.zeros(self.image_shape, np.uint8))
+        self.reset()
+
+    def reset(self) -> None:
+        self._memory = self._policy.start_memory(1)
+
+    def act(self, vector: Floats, image: NDArray[np.uint8]) -> Floats:  # noqa: ARG002  (others look at it)
+        with torch.inference_mode():
+            observation = Observation(torch.from_numpy(vector)[None], None)
+            actions, self._memory = self._policy.act(observation, self._memory)
+            bounded: Floats = self._policy.bounded(actions)[0].numpy()
+        return bounded
+
+
+def follower_of(policy: Policy, source: str) -> Pilot:
+    """The pilot of a policy of FollowMe: by images, or by what senses tell.
+
+    Raises:
+        PilotError: it was made for something else.
+    """
+    is_tracked = policy.layout.continuous[:1] == ACCELERATIONS[:1]
+    return TrackedPilot(policy, source) if is_tracked else LearnedPilot(policy, source)
+
+
 def load_pilot(name: str) -> Pilot:
     """The pilot that a user means: `scripted`, or a policy as `honeyguide play` takes it.
 
@@ -103,4 +151,4 @@ def load_pilot(name: str) -> Pilot:
         raise PilotError(str(error)) from error
     if card.task != TASK:
         raise PilotError(f"{path}: made for {card.task}; a companion flies policies of {TASK}")
-    return LearnedPilot(policy, str(path))
+    return follower_of(policy, str(path))

@@ -1,36 +1,29 @@
 """The guard under a policy that follows: what it wants is flown as far as evidence that is not the policy's allows.
 
-In: pictures, telemetry, the phone's reports, and the velocity that the policy asks for. Out: the velocity that is
-flown, the stance, and what was done how often. The owner is where a detector of its own sees them and a tracker
-expects them; what is solid, where depth shows it. Graded: slower, stop, search, and at last the end.
+In: senses that are not the policy's (policies/companion/senses), telemetry, and the velocity that the policy asks for.
+Out: the velocity that is flown, the stance, and what was done how often. Graded: slower, stop, search, and at last the
+end.
 """
 
 from collections import Counter
 from enum import Enum
-from math import atan2, inf, isfinite
+from math import atan2, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common.attitude import Vector, inverse, quat_of, rotated, wrapped, yaw_of
-from common.image_stream import ImageFrame
+from common.attitude import wrapped, yaw_of
 from policies.companion.guard.limits import faded, kept_off, stopping_speed, within_room
-from policies.companion.guard.local_map import LocalMap
-from policies.companion.guard.poses import Pose, PoseHistory
 from policies.companion.guard.settings import GuardSettings
-from policies.companion.owner_watch import OwnerWatch, sighting_from
+from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
-from policies.companion.vehicle_link import Own, Owner
-from policies.person_detector.detector import Detection, PersonDetector
+from policies.companion.vehicle_link import Own
 
 Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
 _YAW_MAX = 1.5  # [rad/s]
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 _CLIMB_M_S = 1.0
-_PHONE_OLD_S = 3.0
-_GATE_M = 3.0  # from where the tracker expects the owner; who is farther off is somebody else
-_GATE_M_S = 2.5  # and wider by so much with each second without a sight
 
 
 class Stance(Enum):
@@ -48,29 +41,16 @@ class Guard:
 
     Args:
         settings: what it allows.
-        hears: the phone counts.
-        detector: of people; None: the one that ships.
+        senses: what it goes by; fed by somebody else.
     """
 
-    def __init__(self, settings: GuardSettings, *, hears: bool = True, detector: PersonDetector | None = None) -> None:
+    def __init__(self, settings: GuardSettings, senses: Senses) -> None:
         self.settings = settings
+        self.senses = senses
         self.stance = Stance.FREE
         self.interventions: Counter[str] = Counter()
         """How many decisions were changed, by the reason."""
-        self._detector = detector or PersonDetector()
-        self._watch = OwnerWatch(hears=hears)
-        self._reports = 0
-        self._forget()
-
-    def _forget(self) -> None:
-        """The vehicle's clock and frame begin anew."""
-        self._boot_us = self._begun_us = 0  # the newest, of the vehicle's clock; and when the policy took over
-        self._poses = PoseHistory()
-        self._map = LocalMap()
-        self._seen_us: int | None = None  # when the newest picture with the owner was taken, the vehicle's clock
-        self._image_us = 0  # when the newest picture was taken
-        self._heard_us: int | None = None  # on the vehicle's clock
-        self._bearing_rad = 0.0  # in ned, where the owner was seen last
+        self._begun_us = 0  # when the policy took over, on the vehicle's clock
         self._way = np.zeros(2)  # unit, to where the owner is now
         self._is_pressed = self._is_too_near = False
 
@@ -82,50 +62,13 @@ class Guard:
     def is_lost(self, own: Own) -> bool:
         """Whether the owner was not seen for so long that it is the end; who has just begun may look for them first."""
         searched_s = max(own.boot_us - self._begun_us, 0) * 1e-6
-        return min(self.silence_s(own), searched_s) > self.settings.lost_s
-
-    @property
-    def watch(self) -> OwnerWatch:
-        """Where the owner is."""
-        return self._watch
-
-    def sense(self, own: Own, owner: Owner, image: ImageFrame | None) -> None:
-        """Takes in telemetry, the phone's reports, and a new picture if there is one."""
-        if own.boot_us < self._boot_us:  # it has restarted: what was seen before was at no time that it knows
-            self._forget()
-        self._boot_us = own.boot_us
-        self._poses.note(own)
-        if owner.count != self._reports:
-            self._reports, self._heard_us = owner.count, own.boot_us
-        if image is None or not isfinite(own.pos_ned[0]):
-            return
-        pose = self._poses.at(image.time_us)
-        if pose is None:
-            return
-        self._image_us = image.time_us
-        down = rotated(inverse(pose.q_ned_from_frd), (0.0, 0.0, 1.0))
-        seen = self._owner_among(self._detector.find(image.pixels, (down[0], down[1])), pose, own)
-        sighting = None if seen is None else sighting_from(seen.chest_hfrd, pose.pos_ned, pose.q_ned_from_frd)
-        is_taken = self._watch.take(image.time_us, own.boot_us, owner, sighting)
-        if seen is not None and is_taken:
-            self._seen_us = image.time_us
-            north, east, _ = _ned_of(seen.chest_hfrd, pose)
-            self._bearing_rad = atan2(east - pose.pos_ned[1], north - pose.pos_ned[0])
-        track = self._watch.track
-        owner_ned = None
-        if track is not None and self.silence_s(own) < _PHONE_OLD_S:  # where they were when it was taken
-            owner_ned = tuple((track.pos_ned + (image.time_us - track.time_us) * 1e-6 * track.vel_ned).tolist())
-        self._map.see(image.pixels, pose, owner_ned, own.boot_us)
-
-    def silence_s(self, own: Own) -> float:
-        """Since the owner was seen."""
-        return inf if self._seen_us is None else max(own.boot_us - self._seen_us, 0) * 1e-6
+        return min(self.senses.silence_s(own), searched_s) > self.settings.lost_s
 
     def filtered(self, wanted: Velocity, own: Own) -> Velocity:
         """What is flown of a velocity in ned and a yaw rate that a policy asks for."""
         s, (velocity, yaw_rate) = self.settings, wanted
-        age_s = max(own.boot_us - self._image_us, 0) * 1e-6
-        silence_s = self.silence_s(own)
+        age_s = max(own.boot_us - self.senses.image_us, 0) * 1e-6
+        silence_s = self.senses.silence_s(own)
         self.stance = self._stance(silence_s, age_s)
         level = np.array(velocity[:2])
         down = velocity[2]
@@ -157,9 +100,8 @@ class Guard:
         s = self.settings
         down = -_CLIMB_M_S * float(np.clip(2.0 * (s.search_height_m - own.range_m), -0.5, 1.0))
         down = down if isfinite(own.range_m) else 0.0
-        track = self._watch.track
-        is_heard = self._heard_us is not None and own.boot_us - self._heard_us < _PHONE_OLD_S * 1e6
-        if is_heard and track is not None and track.is_known:
+        track = self.senses.watch.track
+        if self.senses.is_heard and track is not None and track.is_known:
             way = np.array(track.pos_ned[:2]) - np.array(own.pos_ned[:2])
             far_m = float(np.hypot(*way))
             yaw_rate = self._facing(atan2(way[1], way[0]), own)
@@ -169,21 +111,19 @@ class Guard:
             return speed * way / far_m, down, yaw_rate
         if is_searching:
             return np.zeros(2), down, s.search_yaw_rate
-        return np.zeros(2), down, self._facing(self._bearing_rad, own)
+        return np.zeros(2), down, self._facing(self.senses.bearing_rad, own)
 
     def _facing(self, bearing_rad: float, own: Own) -> float:
         error = wrapped(bearing_rad - yaw_of(own.q_ned_from_frd))
         return float(np.clip(_FACE_GAIN * error, -_YAW_MAX, _YAW_MAX))
 
     def _past_owner(self, level: Floats, own: Own, delay_s: float) -> Floats:
-        track = self._watch.track
+        known = self.senses.owner_now(own)
         self._is_pressed = self._is_too_near = False
-        if track is None or not track.is_known:
+        if known is None:
             return level
-        ahead_s = max(own.boot_us - track.time_us, 0) * 1e-6
-        place = track.pos_ned + ahead_s * track.vel_ned
-        way = np.array(place[:2]) - np.array(own.pos_ned[:2])
-        vel = np.array(track.vel_ned[:2])
+        way = known[0][:2] - np.array(own.pos_ned[:2])
+        vel = known[1][:2]
         far_m = float(np.hypot(*way))
         self._way = way / max(far_m, 1e-3)
         own_vel = np.array(own.vel_ned[:2])
@@ -196,15 +136,15 @@ class Guard:
 
     def _past_solids(self, level: Floats, own: Own, delay_s: float) -> Floats:
         s = self.settings
-        if not self._map.has_depth:
+        if not self.senses.map.has_depth:
             speed = float(np.hypot(*level))
             kept = level * min(1.0, s.no_depth_speed / max(speed, 1e-6))
             self._count("no depth", level, kept)
             return np.asarray(kept)
-        free_m, known_m = self._map.clear_m(own.pos_ned, own.boot_us)
+        free_m, known_m = self.senses.map.clear_m(own.pos_ned, own.boot_us)
         if self._is_pressed:  # back into what is not seen rather than wait for who comes
-            free_m = np.where(self._map.units @ self._way < 0.0, known_m, free_m)
-        kept = within_room(level, self._map.units, free_m, known_m, delay_s, s)
+            free_m = np.where(self.senses.map.units @ self._way < 0.0, known_m, free_m)
+        kept = within_room(level, self.senses.map.units, free_m, known_m, delay_s, s)
         self._count("near something", level, kept)
         return kept
 
@@ -224,27 +164,3 @@ class Guard:
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
         if float(np.hypot(*(wanted - kept))) > _COUNTED_M_S:
             self.interventions[why] += 1
-
-    def _owner_among(self, found: list[Detection], pose: Pose, own: Own) -> Detection | None:
-        """Who of them is the owner: the one nearest to where they are expected, if any is near enough."""
-        sure = [detection for detection in found if detection.probability >= self.settings.sure]
-        track = self._watch.track
-        if not sure:
-            return None
-        if track is None or not track.is_known:
-            return min(sure, key=lambda detection: np.hypot(*detection.chest_hfrd[:2]))
-        expected = track.pos_ned + (pose.time_us - track.time_us) * 1e-6 * track.vel_ned
-
-        def off_m(detection: Detection) -> float:
-            place = _ned_of(detection.chest_hfrd, pose)
-            return float(np.hypot(place[0] - expected[0], place[1] - expected[1]))
-
-        best = min(sure, key=off_m)
-        gate_m = _GATE_M + _GATE_M_S * min(self.silence_s(own), 10.0)
-        return best if off_m(best) < gate_m else None
-
-
-def _ned_of(chest_hfrd: Vector, pose: Pose) -> Floats:
-    """A place ahead, right and down of the vehicle at a pose."""
-    level = quat_of(yaw_of(pose.q_ned_from_frd), 0.0)
-    return np.asarray(np.array(pose.pos_ned) + np.array(rotated(level, chest_hfrd)))

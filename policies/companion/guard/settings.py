@@ -9,8 +9,6 @@ class GuardSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     is_on: bool = True
-    sure: float = Field(default=0.7, gt=0.0, lt=1.0)
-    """Probability from which the detector's word counts."""
     slow_s: float = Field(default=0.7, gt=0.0)
     """Without a sight of the owner for so long it becomes slower ..."""
     stop_s: float = Field(default=2.0, gt=0.0)
@@ -27,7 +25,7 @@ class GuardSettings(BaseModel):
     """Above the ground, where it waits and searches: over people, under crowns."""
     search_yaw_rate: float = Field(default=0.6, gt=0.0)
     """[rad/s]"""
-    image_slow_s: float = Field(default=0.35, gt=0.0)
+    image_slow_s: float = Field(default=0.55, gt=0.0)
     """From this age of the picture on it becomes slower ..."""
     image_stop_s: float = Field(default=0.8, gt=0.0)
     """... until it stands."""

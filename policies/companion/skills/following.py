@@ -17,7 +17,9 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import Observer
 from policies.companion.owner_watch import OwnerWatch
+from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Floats, Velocity
+from policies.companion.tracked_observer import TrackedObserver
 from policies.companion.vehicle_link import Own, Owner, VehicleLink
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, EGO_BLIND, HFOV_DEG, TILT_DEG
 
@@ -30,13 +32,14 @@ OWNER_LOST_S = 5.0  # neither seen nor heard of; by a pilot without ears: not se
 NO_IMAGES = "no new pictures"
 LENS = (HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))  # of the images that policies are trained on
 STANDING = (Stance.STOP, Stance.SEARCH, Stance.BLIND)
+TRACKED = 3  # the vector of policies.tasks.follow_me.tracked
 LENS_TOLERANCE = 0.02  # guess: a fifth of a degree of tilt, two of the field of view
 
 
 class Pilot(Protocol):
     """Whoever follows: a trained policy, or a script that sees the same."""
 
-    kind: int  # of its vector: EGO or EGO_BLIND
+    kind: int  # of its vector: EGO, EGO_BLIND or TRACKED
     image_shape: tuple[int, int, int]  # (height, width, channels) of the image it needs
     owner_hfrd: Vector | None  # [m] where the last image showed the owner's chest, from the vehicle; None: nowhere
 
@@ -49,31 +52,33 @@ class Pilot(Protocol):
         ...
 
 
-def guard_of(pilot: Pilot, settings: GuardSettings) -> Guard | None:
-    """The guard over a pilot; None if it is switched off."""
-    return Guard(settings, hears=pilot.kind != EGO_BLIND) if settings.is_on else None
-
-
 class Following:
     """One vehicle's skill to follow.
 
     Args:
         camera: the onboard camera.
         pilot: who decides.
-        guard: who bounds it; None: nobody does, and the pilot's word for the owner counts.
+        guard: who bounds it; without, the pilot's word for the owner counts.
+        hears: the phone counts; None: it does unless the pilot is told nothing of it.
     """
 
     ready, flying, drives = "ready to follow", "following", False
     is_along_nose = False
     action_size = 4
 
-    def __init__(self, camera: ImageSource, pilot: Pilot, guard: Guard | None = None) -> None:
+    def __init__(
+        self, camera: ImageSource, pilot: Pilot, guard: GuardSettings | None = None, *, hears: bool | None = None
+    ) -> None:
         self.seen: Floats = np.zeros(0, dtype=np.float32)
         self.camera = camera
         self._pilot = pilot
-        self._observer = Observer(pilot.kind)
-        self.guard = guard
-        self._watch = OwnerWatch(hears=pilot.kind != EGO_BLIND) if guard is None else guard.watch
+        is_tracked, is_guarded = pilot.kind == TRACKED, guard is not None and guard.is_on
+        hears = pilot.kind != EGO_BLIND if hears is None else hears
+        self._senses = Senses(hears=hears) if is_tracked or is_guarded else None
+        self.guard = Guard(guard, self._senses) if guard is not None and is_guarded and self._senses is not None else None
+        self._watch = OwnerWatch(hears=hears) if self._senses is None else self._senses.watch
+        self._tracked = TrackedObserver(self._senses) if is_tracked and self._senses is not None else None
+        self._observer = None if is_tracked else Observer(pilot.kind)
         self._vehicle: VehicleLink | None = None
         self._stance = Stance.FREE  # as told
         self._is_flying = False
@@ -96,8 +101,8 @@ class Following:
             self._image, self._image_us, self._is_new = image, time_us, True
             self._has_looked = self._is_tracked = False
             vehicle.clock.pictured(image.time_us)
-        if self.guard is not None:
-            self.guard.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
+        if self._senses is not None:
+            self._senses.sense(vehicle.own, self._owner, image if self._is_fit(image) else None)
         since_us = time_us - self._decided_us
         wait_us = DECISION_US + (-DECISION_EARLY_US if self._is_new else DECISION_LATE_US)
         return self._image is not None and since_us >= wait_us
@@ -128,6 +133,8 @@ class Following:
 
     def begin(self, own: Own) -> None:
         self._pilot.reset()
+        if self._tracked is not None:
+            self._tracked.begin(own)
         if self.guard is not None:
             self.guard.begin(own)
 
@@ -141,7 +148,10 @@ class Following:
             return None
         self._decided_us, self._is_new = time_us, False
         age_s = max(own.boot_us - image.time_us, time_us - self._image_us, 0) * 1e-6
-        vector = self._observer.vector(own, self._owner, last_action, time_us, age_s)
+        if self._tracked is not None:
+            vector = self._tracked.vector(own, time_us, age_s)
+        elif self._observer is not None:
+            vector = self._observer.vector(own, self._owner, last_action, time_us, age_s)
         self.seen = vector.copy()
         action = self._pilot.act(vector, image.pixels)
         self._has_looked = bool(np.isfinite(action).all())
@@ -150,7 +160,17 @@ class Following:
         return action
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:
-        wanted = self._observer.setpoint(action, own)
+        if self._tracked is not None:
+            wanted = self._tracked.setpoint(action, own)
+            allowed = self._guarded(wanted, own)
+            self._tracked.flown(*allowed)
+            return allowed
+        if self._observer is None:
+            raise RuntimeError("somebody has to make a setpoint of an action")
+        return self._guarded(self._observer.setpoint(action, own), own)
+
+    def _guarded(self, wanted: Velocity, own: Own) -> Velocity:
+        """What the guard lets be flown."""
         if self.guard is None:
             return wanted
         allowed = self.guard.filtered(wanted, own)
@@ -163,8 +183,8 @@ class Following:
         return allowed
 
     def conclude(self, own: Own) -> None:
-        """Tracks the owner: by the newest image, and by the phone; with a guard that has been done."""
-        if self.guard is None and self._image is not None and not self._is_tracked:
+        """Tracks the owner: by the newest image, and by the phone; with senses that has been done."""
+        if self._senses is None and self._image is not None and not self._is_tracked:
             self._is_tracked = True
             seen_hfrd = self._pilot.owner_hfrd if self._has_looked else None
             self._watch.update(self._image.time_us, own, self._owner, seen_hfrd)

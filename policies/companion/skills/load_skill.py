@@ -6,9 +6,9 @@ from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import StreamCamera
 from policies.companion.names import SCRIPTED
 from policies.companion.names import TASK as FOLLOW
-from policies.companion.pilot import LearnedPilot, PilotError, load_pilot
+from policies.companion.pilot import PilotError, follower_of, load_pilot
 from policies.companion.skills.driving import Driving
-from policies.companion.skills.following import Following, Pilot, guard_of
+from policies.companion.skills.following import Following, Pilot
 from policies.companion.skills.navigating import Navigating
 from policies.companion.skills.skill import Skill
 from policies.companion.vector_pilot import (
@@ -36,7 +36,7 @@ def load_follower(name: str) -> Pilot | NavigationPilot:
         return load_pilot(name)
     path, policy, task = _loaded(name)
     if task == FOLLOW:
-        return LearnedPilot(policy, str(path))
+        return follower_of(policy, str(path))
     if task in _NAVIGATORS:
         return _NAVIGATORS[task](policy, str(path))
     known = ", ".join(_NAVIGATORS)
@@ -63,7 +63,7 @@ def load_skill(
         return _following(camera, load_pilot(name), guard)
     path, policy, task = _loaded(name)
     if task == FOLLOW:
-        return _following(camera, LearnedPilot(policy, str(path)), guard)
+        return _following(camera, follower_of(policy, str(path)), guard)
     if task in _NAVIGATORS:
         eye = StreamCamera(camera) if follows else None
         return Navigating(_NAVIGATORS[task](policy, str(path)), is_ordered_by_goto=is_ordered_by_goto, camera=eye)
@@ -76,7 +76,7 @@ def load_skill(
 
 
 def _following(camera: str, pilot: Pilot, guard: GuardSettings | None) -> Following:
-    return Following(StreamCamera(camera), pilot, guard_of(pilot, guard or GuardSettings()))
+    return Following(StreamCamera(camera), pilot, guard or GuardSettings())
 
 
 def _loaded(name: str) -> tuple[Path, Policy, str]:

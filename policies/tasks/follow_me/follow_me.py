@@ -21,6 +21,7 @@ from policies.tasks.follow_me.cast import PEOPLE_MAX
 from policies.tasks.follow_me.follow_me_kernels import (
     ACT_TICKS,
     MEASURES,
+    TRACKED,
     FollowState,
     Rules,
     act,
@@ -31,9 +32,16 @@ from policies.tasks.follow_me.follow_me_kernels import (
     show,
     walk,
 )
-from policies.tasks.follow_me.follow_me_params import DOCUMENTED, IMPROVED, PARAMS, TREES_PER_HA_MAX, FollowParams
+from policies.tasks.follow_me.follow_me_params import (
+    DOCUMENTED,
+    IMPROVED,
+    PARAMS,
+    SEEN_BY_TRACKER,
+    TREES_PER_HA_MAX,
+    FollowParams,
+)
 from policies.tasks.follow_me.follow_me_top_view import draw
-from policies.tasks.follow_me.image_way import make_way
+from policies.tasks.follow_me.image_way import make_way, note
 from policies.tasks.follow_me.observe import (
     BRANCHES,
     DOCUMENT,
@@ -46,7 +54,9 @@ from policies.tasks.follow_me.observe import (
 from policies.tasks.follow_me.owner_visibility import Sight
 from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
+from policies.tasks.follow_me.sight_model import make_tracked, sense
 from policies.tasks.follow_me.task_cameras import Eyes
+from policies.tasks.follow_me.tracked import ACCELERATIONS, TRACKED_ELEMENTS
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 from policies.tasks.layout import ImageElement, Layout
 from policies.tasks.task_params import Sampler, typed_rows
@@ -78,7 +88,7 @@ class FollowMe(FlightTask):
             FOLLOW_WORLD,
             trees_per_ha_max=TREES_PER_HA_MAX,
             has_estimator=settings.has_estimator,
-            number_defaults=(DOCUMENTED if is_documented else IMPROVED) | {"owner_speed_max": _OWNERS[settings.owner]},
+            number_defaults=_numbers(settings) | {"owner_speed_max": _OWNERS[settings.owner]},
             device=device,
             hover_heights_m=LOW_M if is_documented else _TAKEOVER_M,
         )
@@ -91,6 +101,10 @@ class FollowMe(FlightTask):
             seen = [state.drawn, state.clothes, way, state.path_seeds]
             self._eyes = Eyes(self.buffers, self.rig.arrays, state.params, self.worlds, *seen)
             state.lenses, state.image_ages_s = self._eyes.lenses, way.age_s
+        state = self.follow
+        state.tracked, self._sight_way = make_tracked(self._zeros, env_count if self._is_tracked else 1)
+        if self._is_tracked:
+            state.image_ages_s = self._sight_way.age_s
         self._record_all(_rules(settings, self.layout), self.start(is_test=settings.split == "test"))
 
     def _launch_step(self) -> None:
@@ -104,6 +118,8 @@ class FollowMe(FlightTask):
             self._measure_all.launch()
         if self._eyes is not None:
             self._eyes.take()
+        if self._is_tracked:
+            self._sense(self.follow.is_all)
         self._judge.launch()
         self.keep_last_images()
         self._begin_rows()
@@ -119,6 +135,8 @@ class FollowMe(FlightTask):
         if self._eyes is not None:
             self._eyes.refresh(self.is_growing)
             self._eyes.take(self.is_starting)
+        if self._is_tracked:
+            self._sense(self.is_starting, is_first=True)
         self._show.launch()
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
@@ -126,6 +144,17 @@ class FollowMe(FlightTask):
         super().load_state(state)
         if self._eyes is not None:
             self._eyes.refresh()
+
+    def _sense(self, rows: Any, *, is_first: bool = False) -> None:
+        """Draws the sights of new pictures, of the chosen rows, and takes in those that have come."""
+        for launch, first, chosen in ((self._note, 2, 3), (self._sense_rows, 9, 10)):
+            launch.set_param_at_index(first, int(is_first))
+            launch.set_param_at_index(chosen, rows)
+            launch.launch()
+
+    @property
+    def _is_tracked(self) -> bool:
+        return self.settings.observation == "tracked"
 
     @property
     def _sees_truth(self) -> bool:
@@ -187,6 +216,11 @@ class FollowMe(FlightTask):
         self._walk = record(walk, buffers, rules, rig, state)
         self._look_all = record(look, rig, state, state.is_all)
         self._measure_all = record(measure_ranges, rig, state.is_all, state.nearness)
+        if self._is_tracked:
+            seen = [state.params, state.sights, state.drawn, state.nearness, state.path_seeds]
+            way, everyone = self._sight_way, state.is_all
+            self._note = record(note, state.params, state.path_seeds, 0, everyone, way)
+            self._sense_rows = record(sense, rig, rules.has_estimator, *seen, way, state.tracked, 0, everyone)
         self._judge = record(judge, buffers, rules, rig, state, start)
         self._prepare = record(prepare, buffers, rules, state, start)
         self._place = record(place, buffers, rig, state, start)
@@ -195,7 +229,24 @@ class FollowMe(FlightTask):
         self._show = record(show, buffers, rules, rig, state, start)
 
 
+def _numbers(settings: FollowSettings) -> dict[str, float | Sampler]:
+    """What the numbers of an episode are drawn from, but for the owner's speed."""
+    if settings.observation == "tracked":
+        return IMPROVED | SEEN_BY_TRACKER
+    return DOCUMENTED if settings.preset == "as-documented" else IMPROVED
+
+
 def _layout(settings: FollowSettings) -> Layout:
+    if settings.observation == "tracked":
+        stack = settings.stack or 1
+        return Layout(
+            "FollowMe",
+            LAYOUT_VERSION,
+            TRACKED_ELEMENTS,
+            continuous=ACCELERATIONS,
+            stack=stack,
+            privileged=PRIVILEGED_ELEMENTS,
+        )
     is_camera = settings.observation == "camera"
     is_documented = settings.preset == "as-documented"
     channels = IMAGE_CHANNELS[:3] if is_documented else IMAGE_CHANNELS
@@ -213,7 +264,8 @@ def _layout(settings: FollowSettings) -> Layout:
 
 def _rules(settings: FollowSettings, layout: Layout) -> Any:
     rules = Rules()
-    rules.vector = _VECTORS[settings.preset] if settings.observation == "camera" else -1
+    vectors = {"camera": _VECTORS[settings.preset], "tracked": int(TRACKED), "state": -1}
+    rules.vector = vectors[settings.observation]
     rules.is_documented = int(settings.preset == "as-documented")
     rules.has_estimator = int(settings.has_estimator)
     rules.has_privileged = int(bool(layout.privileged))

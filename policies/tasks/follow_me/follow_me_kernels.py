@@ -2,7 +2,7 @@
 
 act       actions to setpoints                           (then the rig advances)
 walk      the owner, their phone and others, over the same time
-look      where the owner truly is from there            (then ranges and images are taken)
+look      where the owner truly is from there            (then ranges and images are taken, or sights drawn)
 judge     the vector, the reward, the end                (rows that end start anew:)
 prepare   numbers and seeds of the new episode           (then worlds grow and vehicles take their hovers)
 place     wind, sensors and mass, the owner, their phone (then look, ranges and images again)
@@ -23,7 +23,7 @@ from policies.tasks.flight.flown_vehicle import (
     vehicle_estimate,
     velocity_setpoint,
 )
-from policies.tasks.flight.own_state import action_command
+from policies.tasks.flight.own_state import Command, action_command
 from policies.tasks.follow_me.cast import (
     BYSTANDERS_MAX,
     bystander_start,
@@ -39,6 +39,8 @@ from policies.tasks.follow_me.observe import REPORT_OLD_S, OwnerReport, document
 from policies.tasks.follow_me.owner_visibility import Sight, lens_in, reach_from, see
 from policies.tasks.follow_me.privileged import write_privileged
 from policies.tasks.follow_me.reward import document_reward, follow_outcome, follow_reward, is_in_band
+from policies.tasks.follow_me.sight_model import Tracked
+from policies.tasks.follow_me.tracked import command_fractions, next_command, write_tracked
 from sim.advance import RigArrays
 from sim.sensors.camera import Lens
 from sim.sensors.phone import PhoneModel, PhoneState, phone_start, phone_step
@@ -54,6 +56,7 @@ _STEP_TICKS = wp.constant(PERSON_TICKS)
 _TICKS_PER_S = wp.constant(1.0 / TICK_S)
 _PART_S = wp.constant(ACT_TICKS * TICK_S)
 _PRIVILEGED = wp.constant(-1)
+TRACKED = wp.constant(3)  # beside the vectors of observe.py
 _DISTANCE_STREAM = wp.constant(6)
 _BEARING_STREAM = wp.constant(7)
 _HEADING_STREAM = wp.constant(8)
@@ -70,7 +73,7 @@ the band, room to obstacles (at most 2 m), and both speeds."""
 class Rules:
     """What the settings choose; the same for all rows."""
 
-    vector: int  # EGO, EGO_BLIND or DOCUMENT; -1: the truth
+    vector: int  # EGO, EGO_BLIND, DOCUMENT or TRACKED; -1: the truth
     is_documented: int
     has_estimator: int
     has_privileged: int
@@ -104,6 +107,7 @@ class FollowState:
     usual_clothes: wp.array(dtype=Clothes)  # (1,)
     image_ages_s: wp.array(dtype=float)
     usual_phone: wp.array(dtype=PhoneModel)  # (1,)
+    tracked: Tracked
 
 
 @wp.func
@@ -121,7 +125,15 @@ def act(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, 
     if int(wp.round(state.params[i].setpoint_lag_s / _PART_S)) != part:
         return
     estimate = vehicle_estimate(rig, i, rules.has_estimator)
-    command = action_command(chosen_action(buffers, rules, i), estimate.q_ned_from_frd)
+    action = chosen_action(buffers, rules, i)
+    command = Command()
+    if rules.vector == TRACKED:
+        last = state.tracked.commands[i]
+        command = next_command(last, action, estimate.q_ned_from_frd)
+        state.tracked.before[i] = last
+        state.tracked.commands[i] = command
+    else:
+        command = action_command(action, estimate.q_ned_from_frd)
     rig.autopilot.setpoint[i] = velocity_setpoint(command)
 
 
@@ -193,6 +205,11 @@ def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: Follo
     action = state.actions[i]
     if rules.vector == _PRIVILEGED:
         write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, buffers.observations, i, at)
+    elif rules.vector == TRACKED:
+        own = own_state(rig, i, rules.has_estimator)
+        t, age_s = state.tracked, state.image_ages_s[i]
+        out = buffers.observations
+        write_tracked(own, action, age_s, t.filters[i], t.has_depth[i], t.nearness, out, i, at)
     else:
         own = own_state(rig, i, rules.has_estimator)
         report = owner_report(state.phones[i], draw_tick(rig.tick[i]))
@@ -223,6 +240,10 @@ def judge(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState
     sight = state.sights[i]
     last_action = state.actions[i]
     action = chosen_action(buffers, rules, i)
+    if rules.vector == TRACKED:  # what is asked for, as of all others
+        q_ned_from_frd = vehicle_estimate(rig, i, rules.has_estimator).q_ned_from_frd
+        last_action = command_fractions(state.tracked.before[i], q_ned_from_frd)
+        action = command_fractions(state.tracked.commands[i], q_ned_from_frd)
     state.actions[i] = action
     state.unseen_s[i] = wp.where(
         sight.is_in_view == 1, 0.0, state.unseen_s[i] + float(rules.decision_ticks) / _TICKS_PER_S

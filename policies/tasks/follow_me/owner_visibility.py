@@ -11,7 +11,7 @@ from common.rotation import yaw_from_quat
 from policies.tasks.flight.own_state import level_from_ned
 from policies.tasks.follow_me.follow_me_params import FollowParams
 from policies.tasks.follow_me.observe import HFOV_DEG, camera_mount
-from sim.camera_rig import MOUNT_FRD
+from policies.tasks.follow_me.observe import LENS_FRD as MOUNT_FRD
 from sim.sensors.camera import Lens
 from sim.truth import Truth
 from sim.world.people import Person, chest_ned, is_line_free

@@ -7,7 +7,7 @@ from pydantic import Field
 from policies.tasks.task import TaskSettings
 
 FollowPreset = Literal["as-documented", "improved", "vision-only"]
-Observation = Literal["camera", "state"]
+Observation = Literal["camera", "tracked", "state"]
 OwnerClass = Literal["walks", "runs", "any"]
 Terrain = Literal["fresh", "kept"]
 
@@ -18,7 +18,8 @@ class FollowSettings(TaskSettings):
     preset: FollowPreset = "improved"  # type: ignore[assignment]  # tasks have presets of their own
     """`as-documented` (the text), `improved` (ours) or `vision-only` (ours, without any word of where the owner is)."""
     observation: Observation = "camera"
-    """`camera`: what a policy can know in flight; `state`: the truth, for teachers."""
+    """`camera`: what a policy can know in flight; `tracked`: the same, but of detector, filter and map instead of an
+    image, which are drawn from a model of them; `state`: the truth, for teachers."""
     owner: OwnerClass = "walks"
     """The owner's fastest: `walks` up to 2 m/s, `runs` up to 5 m/s, or `any` between 1 and 6 m/s, drawn per episode,
     five in eight above 4 m/s."""

@@ -6,6 +6,7 @@ import pytest
 from common.image_stream import ImageFrame
 from policies.companion.guard.guard import Guard, Stance
 from policies.companion.guard.settings import GuardSettings
+from policies.companion.senses.senses import Senses
 from policies.companion.vehicle_link import Own, Owner
 from policies.person_detector.detector import Detection
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
@@ -27,7 +28,7 @@ def flown(guard: Guard, own: Own, seconds: float) -> list[float]:
         own.boot_us += 100_000
         pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 200, np.uint8)
         image = ImageFrame(own.boot_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
-        guard.sense(own, Owner(), image)
+        guard.senses.sense(own, Owner(), image)
         speeds.append(guard.filtered(((3.0, 0.0, 0.0), 0.0), own)[0][0])
     return speeds
 
@@ -36,7 +37,7 @@ def flown(guard: Guard, own: Own, seconds: float) -> list[float]:
 def scene() -> tuple[Guard, Own, Sees]:
     sees = Sees()
     own = Own(boot_us=0, pos_ned=(0.0, 0.0, -1.6), vel_ned=(0.0, 0.0, 0.0), range_m=1.6)
-    return Guard(GuardSettings(), detector=sees), own, sees  # type: ignore[arg-type]
+    return Guard(GuardSettings(), Senses(detector=sees)), own, sees  # type: ignore[arg-type]
 
 
 def test_it_lets_fly_towards_somebody_far_enough_and_stops_when_they_are_gone(scene: tuple[Guard, Own, Sees]) -> None:
@@ -54,7 +55,7 @@ def test_what_was_seen_before_a_restart_is_not_taken_for_a_sight_of_now(scene: t
     flown(guard, own, 1.0)
     own.boot_us, sees.is_there = 0, False  # the vehicle's clock begins anew
     assert all(abs(speed) < 1e-6 for speed in flown(guard, own, 1.0))
-    assert guard.silence_s(own) == float("inf")
+    assert guard.senses.silence_s(own) == float("inf")
 
 
 def test_images_that_stop_stop_the_vehicle(scene: tuple[Guard, Own, Sees]) -> None:
@@ -62,7 +63,7 @@ def test_images_that_stop_stop_the_vehicle(scene: tuple[Guard, Own, Sees]) -> No
     flown(guard, own, 1.0)
     for _ in range(10):
         own.boot_us += 100_000
-        guard.sense(own, Owner(), None)
+        guard.senses.sense(own, Owner(), None)
         velocity, _ = guard.filtered(((3.0, 0.0, 0.0), 0.0), own)
     assert velocity[:2] == (0.0, 0.0)
     assert guard.stance is Stance.BLIND
@@ -89,6 +90,6 @@ def test_an_owner_who_runs_is_no_obstacle_in_late_images(scene: tuple[Guard, Own
         sees.find = lambda *_, far_m=far_m: [Detection(0.99, (far_m, 0.0, 0.0), (32.0, 32.0))]  # type: ignore[method-assign]
         pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 212, np.uint8)  # all else is 20 m away
         pixels[:, 30:34, 3] = int(255.0 * far_m / (far_m + float(DEPTH_HALF_M)))  # their body
-        guard.sense(own, Owner(), ImageFrame(taken_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M)))
-    known_m = guard._map.clear_m(own.pos_ned, own.boot_us)[1]
+        guard.senses.sense(own, Owner(), ImageFrame(taken_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M)))
+    known_m = guard.senses.map.clear_m(own.pos_ned, own.boot_us)[1]
     assert known_m[0] > 9.0  # to the north, where they run

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import Vector, rotated
-from policies.companion.guard.poses import Pose
+from policies.companion.senses.poses import Pose
+from policies.tasks.follow_me.tracked import SECTORS
 from policies.tasks.follow_me.observe import HFOV_DEG, IMAGE_SIZE, camera_mount, depth_of
 
 CELL_M = 0.25
@@ -23,7 +24,8 @@ _HOLD_US = 6_000_000  # for so long what was seen counts
 _OWNER_M = 0.7  # round the owner, who is no part of the map
 _ALIVE = 0.05  # fraction of pixels with depth below which there is none
 _UNSEEN = -(10**15)
-_OWN_M = 0.75  # where the vehicle itself is, nothing else is
+_OWN_M = 0.75  # so near nothing is seen: what is not known to be solid is taken to be free,
+_HULL_M = 0.35  # and where the vehicle itself is, nothing else is
 _HALF_WIDTH_M = 0.4  # of the vehicle's way
 
 Floats = NDArray[np.float64]
@@ -41,6 +43,7 @@ class LocalMap:
         self._rays_frd = _rays()
         near = np.arange(-_OWN_M, _OWN_M + CELL_M, CELL_M)
         self._own = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _OWN_M])
+        self._hull = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _HULL_M])
         along = np.arange(CELL_M, REACH_M, CELL_M)
         aside = np.array([-_HALF_WIDTH_M, 0.0, _HALF_WIDTH_M])
         angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
@@ -88,9 +91,12 @@ class LocalMap:
         free_m = np.where(far, REACH_M, free_m)
         steps = np.arange(0.0, REACH_M, 0.8 * CELL_M)
         points = here + units[:, None] * steps[None, :, None]
-        for seen in (points[steps[None] < free_m[:, None]], here + self._own):
+        for seen in (points[steps[None] < free_m[:, None]], here + self._hull):
             rows, columns = self._cells(seen)
             self._free_us[rows, columns] = now_us
+        rows, columns = self._cells(here + self._own)
+        is_solid = self._solid_us[rows, columns] > now_us - _HOLD_US
+        self._free_us[rows[~is_solid], columns[~is_solid]] = now_us
 
     def clear_m(self, pos_ned: Vector, now_us: int) -> tuple[Floats, Floats]:
         """How far the way of the vehicle is free in each of `units`, and how far nothing solid is known in it [m].
@@ -105,6 +111,24 @@ class LocalMap:
         is_solid = (solid > then) & (solid >= free)
         is_free = (free > then) & ~is_solid
         return self._length_m(is_free), self._length_m(~is_solid)
+
+    def nearest_m(self, pos_ned: Vector, yaw_rad: float, now_us: int) -> Floats:
+        """How near anything known to be solid is in each of SECTORS sectors from the heading clockwise [m]."""
+        self._follow(pos_ned)
+        solid = (self._solid_us > now_us - _HOLD_US) & (self._solid_us >= self._free_us)
+        rows, columns = np.nonzero(solid)
+        out = np.full(SECTORS, np.inf)
+        if not len(rows):
+            return out
+        at = np.stack([rows, columns], -1)
+        corner = np.array(self._corner)
+        at = corner + (at - corner) % CELLS  # whole cells, of the world
+        off = (at + 0.5) * CELL_M - np.array(pos_ned[:2])
+        far_m = np.hypot(off[:, 0], off[:, 1])
+        sector_rad = 2.0 * np.pi / SECTORS
+        sectors = np.round((np.arctan2(off[:, 1], off[:, 0]) - yaw_rad) / sector_rad).astype(np.int64) % SECTORS
+        np.minimum.at(out, sectors, np.maximum(far_m - 0.5 * CELL_M, 0.0))
+        return out
 
     def _length_m(self, is_open: NDArray[np.bool_]) -> Floats:
         """How far each direction is open at all its probes [m]."""

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from policies.companion.guard.local_map import CELL_M, LocalMap
-from policies.companion.guard.poses import Pose
+from policies.companion.senses.local_map import CELL_M, LocalMap
+from policies.companion.senses.poses import Pose
 from policies.tasks.follow_me.observe import DEPTH_HALF_M, IMAGE_SIZE
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)

@@ -1,0 +1,166 @@
+"""Who is seen, where, and what stands around: the senses of a guard, and of policies that look at no image.
+
+In: images, telemetry, the phone's reports. Out: the owner's place and velocity by sights alone, the track of sights and
+phone together, since when the owner has not been seen, and a level map of what is solid. The owner is whom the
+detector sees where they are expected; after a while without them, only who is there in several images in a row.
+"""
+
+from math import atan2, inf, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.attitude import Vector, inverse, quat_of, rotated, yaw_of
+from common.image_stream import ImageFrame
+from policies.companion.owner_watch import OwnerWatch, sighting_from
+from policies.companion.senses.local_map import LocalMap
+from policies.companion.senses.poses import Pose, PoseHistory
+from policies.companion.senses.seen_owner import SeenOwner
+from policies.companion.vehicle_link import Own, Owner
+from policies.person_detector.detector import Detection, PersonDetector
+
+Floats = NDArray[np.float64]
+PHONE_OLD_S = 3.0
+_SURE = 0.7  # probability from which the detector's word counts
+_GATE_M = 1.0  # from where the owner is expected by sights; who is farther off is somebody else,
+_GATE_M_S = 2.5  # and wider by so much with each second without a sight,
+_GATE_MAX_M = 8.0
+_PHONE_GATE_M = 4.0  # at least, where they are expected by phone alone
+_COLOUR_GATE = 0.4  # and by this fraction of the range without depth
+_GONE_S = 1.0  # after so long without a sight
+_IN_A_ROW = 4  # as many images must show them, one beside the other
+_BESIDE_M = 1.0
+
+
+class Senses:
+    """Of one vehicle.
+
+    Args:
+        hears: the phone counts.
+        detector: of people; None: the one that ships.
+    """
+
+    def __init__(self, *, hears: bool = True, detector: PersonDetector | None = None) -> None:
+        self._detector = detector or PersonDetector()
+        self.watch = OwnerWatch(hears=hears)
+        """Where the owner is, by sights and phone."""
+        self._reports = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        """The vehicle's clock and frame begin anew."""
+        self._boot_us = 0
+        self._poses = PoseHistory()
+        self.map = LocalMap()
+        self.seen = SeenOwner()
+        self.seen_us: int | None = None
+        """When the newest image with the owner was taken, on the vehicle's clock."""
+        self.image_us = 0
+        """When the newest image was taken."""
+        self.heard_us: int | None = None
+        self.bearing_rad = 0.0
+        """In ned, where the owner was seen last."""
+        self._row: list[Floats] = []  # where who may be the owner was in the last images
+
+    def sense(self, own: Own, owner: Owner, image: ImageFrame | None) -> None:
+        """Takes in telemetry, the phone's reports, and a new image if there is one."""
+        if own.boot_us < self._boot_us:  # it has restarted: what was seen before was at no time that it knows
+            self._forget()
+        self._boot_us = own.boot_us
+        self._poses.note(own)
+        if owner.count != self._reports:
+            self._reports, self.heard_us = owner.count, own.boot_us
+        if image is None or not isfinite(own.pos_ned[0]):
+            return
+        pose = self._poses.at(image.time_us)
+        if pose is None:
+            return
+        self.image_us = image.time_us
+        down = rotated(inverse(pose.q_ned_from_frd), (0.0, 0.0, 1.0))
+        found = self._detector.find(image.pixels, (down[0], down[1]))
+        found = [detection for detection in found if detection.probability >= _SURE]
+        seen = self._owner_among(found, pose, own)
+        sighting = None if seen is None else sighting_from(seen.chest_hfrd, pose.pos_ned, pose.q_ned_from_frd)
+        self.watch.take(image.time_us, own.boot_us, owner, sighting)
+        if seen is not None:
+            self.seen_us = image.time_us
+            place = ned_of(seen.chest_hfrd, pose)
+            self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
+            self.seen.see(place, pose, has_depth=seen.has_depth)
+        self.map.see(image.pixels, pose, self._owner_then(image.time_us, own), own.boot_us)
+
+    def silence_s(self, own: Own) -> float:
+        """Since the owner was seen."""
+        return inf if self.seen_us is None else max(own.boot_us - self.seen_us, 0) * 1e-6
+
+    @property
+    def is_heard(self) -> bool:
+        """The phone has spoken not long ago."""
+        return self.heard_us is not None and self._boot_us - self.heard_us < PHONE_OLD_S * 1e6
+
+    def owner_now(self, own: Own) -> tuple[Floats, Floats] | None:
+        """Place [m] and velocity [m/s] of the owner, ned: by sights, or if those are old by the phone too."""
+        if self.silence_s(own) < _GONE_S:
+            place, level = self.seen.now(own.boot_us)
+            return place, np.array([*level, 0.0])
+        track = self.watch.track
+        if track is None or not track.is_known:
+            return None
+        return track.pos_ned + max(own.boot_us - track.time_us, 0) * 1e-6 * track.vel_ned, track.vel_ned
+
+    def _owner_then(self, time_us: int, own: Own) -> Vector | None:
+        """Where the owner was when an image was taken; None: nobody knows."""
+        if self.silence_s(own) < _GONE_S:
+            place, _ = self.seen.now(time_us)
+            return float(place[0]), float(place[1]), float(place[2])
+        track = self.watch.track
+        if track is None or self.silence_s(own) >= PHONE_OLD_S:
+            return None
+        north, east, down = track.pos_ned + (time_us - track.time_us) * 1e-6 * track.vel_ned
+        return float(north), float(east), float(down)
+
+    def _owner_among(self, found: list[Detection], pose: Pose, own: Own) -> Detection | None:
+        """Who of them is the owner: the one nearest to where they are expected, if any is near enough."""
+        if not found:
+            self._row = []
+            return None
+        silence_s = max(pose.time_us - self.seen_us, 0) * 1e-6 if self.seen_us is not None else inf
+        is_gone = silence_s > _GONE_S
+        expected, gate_m = self._expected(pose.time_us, own, silence_s)
+        places = [ned_of(detection.chest_hfrd, pose) for detection in found]
+        if expected is None:
+            off_m = [float(np.hypot(*detection.chest_hfrd[:2])) for detection in found]
+        else:
+            off_m = [float(np.hypot(*(place - expected)[:2])) for place in places]
+        best = int(np.argmin(off_m))
+        if not found[best].has_depth:
+            gate_m += _COLOUR_GATE * float(np.hypot(*found[best].chest_hfrd[:2]))
+        if expected is not None and off_m[best] > gate_m:
+            self._row = []
+            return None
+        return found[best] if not is_gone or self._is_there_to_stay(places[best]) else None
+
+    def _expected(self, time_us: int, own: Own, silence_s: float) -> tuple[Floats | None, float]:
+        """Where the owner is expected in an image, and how far off they may be."""
+        gate_m = min(_GATE_M + _GATE_M_S * silence_s, _GATE_MAX_M)
+        if silence_s < _GONE_S:
+            return self.seen.now(time_us)[0], gate_m
+        track = self.watch.track
+        if track is None or not track.is_known:
+            return None, gate_m
+        doubt_m = 2.5 * float(np.sqrt(max(np.trace(track.pos_cov[:2, :2]), 0.0)))
+        expected = track.pos_ned + (time_us - track.time_us) * 1e-6 * track.vel_ned
+        return expected, max(gate_m, _PHONE_GATE_M, min(doubt_m, 3.0 * _PHONE_GATE_M))
+
+    def _is_there_to_stay(self, place: Floats) -> bool:
+        """Whether somebody was there in enough images in a row, this one included."""
+        if self._row and float(np.hypot(*(place - self._row[-1])[:2])) > _BESIDE_M:
+            self._row = []
+        self._row = [*self._row[-(_IN_A_ROW - 1) :], place]
+        return len(self._row) >= _IN_A_ROW
+
+
+def ned_of(chest_hfrd: Vector, pose: Pose) -> Floats:
+    """A place ahead, right and down of the vehicle at a pose."""
+    level = quat_of(yaw_of(pose.q_ned_from_frd), 0.0)
+    return np.asarray(np.array(pose.pos_ned) + np.array(rotated(level, chest_hfrd)))
