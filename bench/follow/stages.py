@@ -78,6 +78,22 @@ STAGES: dict[str, Stage] = {
             targets=(0.85, None),
         ),
         Stage(
+            "tracked-student",
+            "Tracked, first: what detector, filter and map say, no image, DAgger",
+            "follow-me-tracked-student",
+            teacher="teacher",
+            ships=False,
+        ),
+        Stage(
+            "tracked",
+            "Tracked: that student goes on by PPO",
+            "follow-me-tracked",
+            start="tracked-student",
+            flies=True,
+            limit_s=3600.0,
+            targets=(0.98, 0.95),
+        ),
+        Stage(
             "document",
             "As documented: pixels and seven numbers, plain PPO",
             "follow-me-document",

@@ -28,7 +28,7 @@ from policies.tasks.follow_me.observe import (
     LAYOUT_VERSION,
     vector_elements,
 )
-from policies.tasks.follow_me.tracked import ACCELERATIONS, TRACKED_ELEMENTS
+from policies.tasks.follow_me.tracked import TRACKED_ELEMENTS
 from policies.tasks.layout import ImageElement, Layout, LayoutError
 
 Floats = NDArray[np.float32]
@@ -90,7 +90,7 @@ class LearnedPilot:
 
 
 class TrackedPilot:
-    """A trained policy that looks at no image: senses tell it of the owner, and its actions are accelerations.
+    """A trained policy that looks at no image: senses tell it of the owner.
 
     Args:
         policy: made for FollowMe with `observation=tracked`.
@@ -105,7 +105,7 @@ class TrackedPilot:
 
     def __init__(self, policy: Policy, source: str) -> None:
         try:
-            Layout(TASK, LAYOUT_VERSION, TRACKED_ELEMENTS, ACCELERATIONS).require(policy.layout, source)
+            Layout(TASK, LAYOUT_VERSION, TRACKED_ELEMENTS, ACTIONS).require(policy.layout, source)
         except LayoutError as error:
             raise PilotError(str(error)) from error
         self._policy = policy
@@ -132,7 +132,7 @@ def follower_of(policy: Policy, source: str) -> Pilot:
     Raises:
         PilotError: it was made for something else.
     """
-    is_tracked = policy.layout.continuous[:1] == ACCELERATIONS[:1]
+    is_tracked = TRACKED_ELEMENTS[-1] in policy.layout.frame
     return TrackedPilot(policy, source) if is_tracked else LearnedPilot(policy, source)
 
 

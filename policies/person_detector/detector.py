@@ -153,9 +153,7 @@ def _middle(scores: NDArray[np.float32], row: int, column: int) -> tuple[float, 
     )
 
 
-def _on_body(
-    depth: NDArray[np.uint8], range_m: float, at: tuple[float, float]
-) -> tuple[tuple[float, float], float]:
+def _on_body(depth: NDArray[np.uint8], range_m: float, at: tuple[float, float]) -> tuple[tuple[float, float], float]:
     """Where the body that depth shows about a pixel has its middle, and its range: of all pixels of that depth."""
     column, row = round(at[0]), round(at[1])
     columns = slice(max(column - _BODY_PX[0], 0), column + _BODY_PX[0])

@@ -31,6 +31,7 @@ class Condition:
 CONDITIONS = (
     Condition("walk", "standard, walking", "walk", {}, 0.98),
     Condition("run", "standard, running", "run", {}, 0.95),
+    Condition("silent", "the phone silent, running", "run", _SILENT, 0.95),
     Condition("late-100", "pictures 100 ms late", "run", {"image_lag_s": 0.1}, 0.95),
     Condition("late-200", "pictures 200 ms late", "run", {"image_lag_s": 0.2}, 0.92),
     Condition("late-300", "pictures 300 ms late", "run", {"image_lag_s": 0.3}, 0.85),

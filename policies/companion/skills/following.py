@@ -75,7 +75,9 @@ class Following:
         is_tracked, is_guarded = pilot.kind == TRACKED, guard is not None and guard.is_on
         hears = pilot.kind != EGO_BLIND if hears is None else hears
         self._senses = Senses(hears=hears) if is_tracked or is_guarded else None
-        self.guard = Guard(guard, self._senses) if guard is not None and is_guarded and self._senses is not None else None
+        self.guard = (
+            Guard(guard, self._senses) if guard is not None and is_guarded and self._senses is not None else None
+        )
         self._watch = OwnerWatch(hears=hears) if self._senses is None else self._senses.watch
         self._tracked = TrackedObserver(self._senses) if is_tracked and self._senses is not None else None
         self._observer = None if is_tracked else Observer(pilot.kind)

@@ -56,7 +56,7 @@ from policies.tasks.follow_me.privileged import PRIVILEGED_ELEMENTS
 from policies.tasks.follow_me.settings import FollowSettings
 from policies.tasks.follow_me.sight_model import make_tracked, sense
 from policies.tasks.follow_me.task_cameras import Eyes
-from policies.tasks.follow_me.tracked import ACCELERATIONS, TRACKED_ELEMENTS
+from policies.tasks.follow_me.tracked import TRACKED_ELEMENTS
 from policies.tasks.follow_me.world import FOLLOW_WORLD
 from policies.tasks.layout import ImageElement, Layout
 from policies.tasks.task_params import Sampler, typed_rows
@@ -243,7 +243,7 @@ def _layout(settings: FollowSettings) -> Layout:
             "FollowMe",
             LAYOUT_VERSION,
             TRACKED_ELEMENTS,
-            continuous=ACCELERATIONS,
+            continuous=ACTIONS,
             stack=stack,
             privileged=PRIVILEGED_ELEMENTS,
         )

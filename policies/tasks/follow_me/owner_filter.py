@@ -121,7 +121,7 @@ def place_now(f: OwnerFilter) -> wp.vec3:
 
 @wp.func
 def velocity_now(f: OwnerFilter) -> wp.vec2:
-    """[m/s]"""
+    """How fast they are by now [m/s]."""
     return slowing(f.age_s) * f.vel_ned
 
 

@@ -175,7 +175,6 @@ def sense(
     own = own_state(rig, i, has_estimator)
     yaw = yaw_from_quat(own.q_ned_from_frd)
     k = way.count[i] - 1
-    slot = k % KEPT
     if is_first == 1:
         tracked.filters[i] = OwnerFilter()
         tracked.commands[i] = Command()

@@ -1,7 +1,7 @@
 """What a policy that looks at no image sees and says: one source for training and for flight.
 
 In: the vehicle's own state, the filter of the owner, how near solid things are all round. Out: the observation's
-vector, and the velocity that an action asks for. An action is an acceleration: velocities asked for are continuous,
+vector, and the velocity that an action leads to: what is asked for goes towards it, not faster than a vehicle can,
 whatever a policy says.
 """
 
@@ -17,8 +17,8 @@ from policies.tasks.flight.own_state import (
     YAW_RATE_MAX_RAD_S,
     Command,
     OwnState,
+    action_command,
     level_from_ned,
-    ned_from_level,
     write_own,
 )
 from policies.tasks.follow_me.observe import DECISION_S, IMAGE_SHOWN_OLD_S
@@ -29,9 +29,8 @@ wp.set_module_options({"enable_backward": False})
 
 SECTORS = 24  # round the vehicle, from its heading clockwise
 REACH_M = wp.constant(8.0)  # what is farther away is not told
-ACCEL_MAX_M_S2 = wp.constant(6.0)  # of the level velocity asked for, each axis
-CLIMB_ACCEL_MAX_M_S2 = wp.constant(4.0)
-YAW_ACCEL_MAX_RAD_S2 = wp.constant(6.0)
+APPROACH = wp.constant(0.4)  # of the way to what an action says, a decision: some 0.2 s
+ACCEL_MAX_M_S2 = wp.constant(6.0)  # of the level velocity asked for
 _DT_S = wp.constant(DECISION_S)
 _SECTORS = wp.constant(SECTORS)
 _POSITION_SCALE = wp.constant(3.0)  # [m]
@@ -41,12 +40,6 @@ _AGE_SCALE = wp.constant(1.0)  # [s]
 _AGE_MAX = wp.constant(3.0)
 _OWNER_SIZE = wp.constant(16)
 
-ACCELERATIONS = (
-    Element("forward_accel_sp", "m/s²", float(ACCEL_MAX_M_S2)),
-    Element("right_accel_sp", "m/s²", float(ACCEL_MAX_M_S2)),
-    Element("down_accel_sp", "m/s²", float(CLIMB_ACCEL_MAX_M_S2)),
-    Element("yaw_accel_sp", "rad/s²", float(YAW_ACCEL_MAX_RAD_S2)),
-)
 TRACKED_ELEMENTS = (
     *OWN_ELEMENTS,
     Element("image_age", "s", float(IMAGE_SHOWN_OLD_S)),
@@ -67,23 +60,15 @@ TRACKED_ELEMENTS = (
 
 
 @wp.func
-def within(v: wp.vec3, longest: float) -> wp.vec3:
-    """A vector, no longer level than so much."""
-    level = wp.sqrt(v[0] * v[0] + v[1] * v[1])
-    if level > longest:
-        return wp.vec3(v[0] * longest / level, v[1] * longest / level, v[2])
-    return v
-
-
-@wp.func
 def next_command(last: Command, action: wp.vec4, q_ned_from_frd: wp.quat) -> Command:
-    """What is asked for after a decision: the last, and what its acceleration adds."""
-    added = wp.vec3(ACCEL_MAX_M_S2 * action[0], ACCEL_MAX_M_S2 * action[1], CLIMB_ACCEL_MAX_M_S2 * action[2])
+    """What is asked for after a decision: the last, and some of the way to what the action says."""
+    said = action_command(action, q_ned_from_frd)
+    step = APPROACH * (said.vel_ned - last.vel_ned)
+    longest = _DT_S * ACCEL_MAX_M_S2
+    step = step * wp.min(1.0, longest / wp.max(wp.sqrt(step[0] * step[0] + step[1] * step[1]), 1.0e-6))
     out = Command()
-    out.vel_ned = within(last.vel_ned + _DT_S * ned_from_level(added, yaw_from_quat(q_ned_from_frd)), SPEED_MAX_M_S)
-    out.vel_ned[2] = wp.clamp(out.vel_ned[2], -CLIMB_MAX_M_S, CLIMB_MAX_M_S)
-    yaw_rate = last.yaw_rate + _DT_S * YAW_ACCEL_MAX_RAD_S2 * action[3]
-    out.yaw_rate = wp.clamp(yaw_rate, -YAW_RATE_MAX_RAD_S, YAW_RATE_MAX_RAD_S)
+    out.vel_ned = last.vel_ned + step
+    out.yaw_rate = last.yaw_rate + APPROACH * (said.yaw_rate - last.yaw_rate)
     return out
 
 

@@ -60,3 +60,22 @@ def test_what_was_seen_is_remembered_on_the_way_and_forgotten_in_time() -> None:
     assert (seen.clear_m(on_the_way, 60_000_000)[0] == 0.0).all()
     far_away = (HERE[0] + 200.0, *HERE[1:])
     assert (seen.clear_m(far_away, 1_000_000)[0] == 0.0).all()
+
+
+def test_a_trunk_beside_the_vehicle_stays_on_the_map() -> None:
+    seen = LocalMap()
+    seen.see(picture(2.0), POSE, None, 0)
+    beside = (HERE[0] + 1.5, *HERE[1:])  # half a metre before it
+    seen.see(picture(9.0), Pose(100_000, beside, (0.0, 0.0, 1.0, 0.0)), None, 100_000)  # and looks back
+    assert seen.clear_m(beside, 200_000)[1][NORTH] <= 1.0
+
+
+def test_what_is_solid_is_told_by_sectors_from_the_heading() -> None:
+    seen = LocalMap()
+    assert np.isinf(seen.nearest_m(HERE, 0.0, 0)).all()
+    seen.see(picture(5.0), POSE, None, 0)
+    near_m = seen.nearest_m(HERE, 0.0, 0)
+    assert near_m[0] == pytest.approx(5.0, abs=2 * CELL_M)
+    assert np.isinf(near_m[12])
+    turned = seen.nearest_m(HERE, np.pi / 2, 0)  # it is to the left now
+    assert turned[18] == pytest.approx(5.0, abs=2 * CELL_M)

@@ -1,0 +1,73 @@
+"""Whom the senses take for the owner."""
+
+import numpy as np
+import pytest
+
+from common.image_stream import ImageFrame
+from policies.companion.senses.senses import Senses
+from policies.companion.vehicle_link import Own, Owner
+from policies.person_detector.detector import Detection
+from policies.tasks.follow_me.observe import DEPTH_HALF_M, HFOV_DEG, IMAGE_SIZE, TILT_DEG
+
+
+class Shows:
+    """A detector that sees somebody at each of some places ahead and right of the vehicle."""
+
+    places: tuple[tuple[float, float], ...] = ()
+
+    def find(self, pixels: object, down_frd: object) -> list[Detection]:  # noqa: ARG002
+        return [Detection(0.99, (x, y, 0.6), (32.0, 32.0)) for x, y in self.places]
+
+
+class Scene:
+    def __init__(self) -> None:
+        self.shows = Shows()
+        self.senses = Senses(detector=self.shows)  # type: ignore[arg-type]
+        self.own = Own(boot_us=0, pos_ned=(0.0, 0.0, -1.6), vel_ned=(0.0, 0.0, 0.0), range_m=1.6)
+
+    def look(self, *places: tuple[float, float], times: int = 1) -> None:
+        self.shows.places = places
+        for _ in range(times):
+            self.own.boot_us += 100_000
+            pixels = np.full((IMAGE_SIZE, IMAGE_SIZE, 4), 200, np.uint8)
+            frame = ImageFrame(self.own.boot_us, 0, pixels, HFOV_DEG, TILT_DEG, float(DEPTH_HALF_M))
+            self.senses.sense(self.own, Owner(), frame)
+
+    @property
+    def silence_s(self) -> float:
+        return self.senses.silence_s(self.own)
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return Scene()
+
+
+def test_who_is_seen_first_must_be_there_in_four_images_in_a_row(scene: Scene) -> None:
+    scene.look((3.0, 0.0), times=3)
+    assert scene.silence_s == float("inf")
+    scene.look((3.0, 0.0))
+    assert scene.silence_s == 0.0
+
+
+def test_a_single_ghost_does_not_bring_the_owner_back(scene: Scene) -> None:
+    scene.look((3.0, 0.0), times=10)
+    scene.look(times=15)
+    scene.look((3.5, 0.5))
+    scene.look(times=3)
+    scene.look((2.5, 0.0))
+    assert scene.silence_s > 1.9
+    scene.look((2.5, 0.0), times=4)
+    assert scene.silence_s == 0.0
+
+
+def test_who_stands_beside_the_owner_is_somebody_else(scene: Scene) -> None:
+    scene.look((3.0, 0.0), times=10)
+    scene.look((3.0, 0.0), (2.0, 0.3), times=10)
+    assert scene.senses.seen.now(scene.own.boot_us)[0][0] == pytest.approx(3.0, abs=0.05)
+
+
+def test_who_is_left_when_the_owner_is_gone_is_not_the_owner(scene: Scene) -> None:
+    scene.look((3.0, 0.0), times=10)
+    scene.look((1.5, 0.3), times=2)
+    assert scene.silence_s > 0.1

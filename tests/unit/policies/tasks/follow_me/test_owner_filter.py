@@ -1,0 +1,66 @@
+"""The owner's filter: laws of what it makes of sights."""
+
+import numpy as np
+import pytest
+
+from policies.companion.senses.poses import Pose
+from policies.companion.senses.seen_owner import SeenOwner
+
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+
+
+def pose(k: int) -> Pose:
+    return Pose(100_000 * k, (0.0, 0.0, -1.6), LEVEL)
+
+
+def walked(vel: tuple[float, float], count: int, std_m: float = 0.0) -> SeenOwner:
+    rng, owner = np.random.default_rng(0), SeenOwner()
+    for k in range(1, count + 1):
+        place = np.array([2.0 + 0.1 * k * vel[0], 0.1 * k * vel[1], -1.0])
+        place[:2] += std_m * rng.normal(size=2)
+        owner.see(place, pose(k), has_depth=True)
+    return owner
+
+
+def test_who_keeps_going_is_where_they_go() -> None:
+    place, vel = walked((1.5, -0.5), 40).now(4_000_000)
+    assert vel == pytest.approx([1.5, -0.5], abs=0.02)
+    assert place == pytest.approx([8.0, -2.0, -1.0], abs=0.02)
+
+
+def test_what_is_late_is_carried_on() -> None:
+    place, _ = walked((2.0, 0.0), 40).now(4_300_000)
+    assert place[0] == pytest.approx(10.0 + 0.6, abs=0.05)
+
+
+def test_noise_is_filtered() -> None:
+    _, vel = walked((1.0, 0.0), 60, std_m=0.05).now(6_000_000)
+    assert vel == pytest.approx([1.0, 0.0], abs=0.35)
+
+
+def test_who_has_not_been_seen_for_long_is_believed_to_slow_down() -> None:
+    owner = walked((2.0, 0.0), 40)
+    _, soon = owner.now(4_300_000)
+    _, late = owner.now(8_000_000)
+    assert soon[0] == pytest.approx(2.0, abs=0.05)
+    assert late[0] < 0.3
+
+
+def test_who_comes_back_after_long_is_somebody_new() -> None:
+    owner = walked((2.0, 0.0), 40)
+    owner.see(np.array([0.0, 5.0, -1.0]), pose(100), has_depth=True)
+    place, vel = owner.now(10_000_000)
+    assert place == pytest.approx([0.0, 5.0, -1.0])
+    assert vel == pytest.approx([0.0, 0.0])
+
+
+def test_a_range_by_colours_alone_counts_less_than_its_direction() -> None:
+    owner = SeenOwner()
+    for k in range(1, 20):
+        owner.see(np.array([2.0, 0.0, -1.0]), pose(k), has_depth=True)
+    owner.see(np.array([2.6, 0.0, -1.0]), pose(20), has_depth=False)
+    along = owner.now(2_000_000)[0][0] - 2.0
+    owner.see(np.array([2.0, 0.6, -1.0]), pose(21), has_depth=False)
+    aside = owner.now(2_100_000)[0][1]
+    assert 0.0 < along < 0.1
+    assert aside > 2.0 * along
