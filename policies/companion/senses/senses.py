@@ -79,7 +79,7 @@ class Senses:
         down = rotated(inverse(pose.q_ned_from_frd), (0.0, 0.0, 1.0))
         found = self._detector.find(image.pixels, (down[0], down[1]))
         found = [detection for detection in found if detection.probability >= _SURE]
-        seen = self._owner_among(found, pose, own)
+        seen = self._owner_among(found, pose)
         sighting = None if seen is None else sighting_from(seen.chest_hfrd, pose.pos_ned, pose.q_ned_from_frd)
         self.watch.take(image.time_us, own.boot_us, owner, sighting)
         if seen is not None:
@@ -119,14 +119,14 @@ class Senses:
         north, east, down = track.pos_ned + (time_us - track.time_us) * 1e-6 * track.vel_ned
         return float(north), float(east), float(down)
 
-    def _owner_among(self, found: list[Detection], pose: Pose, own: Own) -> Detection | None:
+    def _owner_among(self, found: list[Detection], pose: Pose) -> Detection | None:
         """Who of them is the owner: the one nearest to where they are expected, if any is near enough."""
         if not found:
             self._row = []
             return None
         silence_s = max(pose.time_us - self.seen_us, 0) * 1e-6 if self.seen_us is not None else inf
         is_gone = silence_s > _GONE_S
-        expected, gate_m = self._expected(pose.time_us, own, silence_s)
+        expected, gate_m = self._expected(pose.time_us, silence_s)
         places = [ned_of(detection.chest_hfrd, pose) for detection in found]
         if expected is None:
             off_m = [float(np.hypot(*detection.chest_hfrd[:2])) for detection in found]
@@ -140,7 +140,7 @@ class Senses:
             return None
         return found[best] if not is_gone or self._is_there_to_stay(places[best]) else None
 
-    def _expected(self, time_us: int, own: Own, silence_s: float) -> tuple[Floats | None, float]:
+    def _expected(self, time_us: int, silence_s: float) -> tuple[Floats | None, float]:
         """Where the owner is expected in an image, and how far off they may be."""
         gate_m = min(_GATE_M + _GATE_M_S * silence_s, _GATE_MAX_M)
         if silence_s < _GONE_S:

@@ -56,6 +56,12 @@ def predicted(f: OwnerFilter, dt_s: float) -> OwnerFilter:
 
 
 @wp.func
+def even(m: wp.mat22) -> wp.mat22:
+    """The symmetric part: rounding errors of the other would grow."""
+    return 0.5 * (m + wp.transpose(m))
+
+
+@wp.func
 def begun(pos_ned: wp.vec3, obs_var: wp.mat22, age_s: float) -> OwnerFilter:
     """Of somebody new."""
     f = OwnerFilter()
@@ -96,9 +102,9 @@ def seen(f: OwnerFilter, pos_ned: wp.vec3, eye_ned: wp.vec3, has_depth: int, age
     down = DOWN_GAIN * (pos_ned[2] - f.pos_ned[2])
     f.pos_ned = f.pos_ned + wp.vec3(pos_step[0], pos_step[1], down)
     f.vel_ned = f.vel_ned + vel_gain * innov
-    f.vel_var = f.vel_var - vel_gain * f.cross_var
+    f.vel_var = even(f.vel_var - vel_gain * f.cross_var)
     f.cross_var = f.cross_var - pos_gain * f.cross_var
-    f.pos_var = f.pos_var - pos_gain * f.pos_var
+    f.pos_var = even(f.pos_var - pos_gain * f.pos_var)
     f.innov_ned = innov
     f.age_s = age_s
     return f
