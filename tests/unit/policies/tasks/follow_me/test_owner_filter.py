@@ -64,3 +64,14 @@ def test_a_range_by_colours_alone_counts_less_than_its_direction() -> None:
     aside = owner.now(2_100_000)[0][1]
     assert 0.0 < along < 0.1
     assert aside > 2.0 * along
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_wild_sights_do_not_make_it_diverge(seed: int) -> None:
+    rng, owner, place, time_us = np.random.default_rng(seed), SeenOwner(), np.array([2.0, 0.0, -1.0]), 0
+    for _ in range(300):
+        time_us += int(rng.choice([0, 100_000, 300_000, 2_500_000]))
+        place = place + rng.normal(0.0, 0.3, 3)
+        eye = place + rng.normal(0.0, rng.choice([0.01, 1.0, 5.0]), 3)
+        owner.see(place, Pose(time_us, tuple(eye), LEVEL), has_depth=bool(rng.random() < 0.6))
+        assert np.abs(owner.now(time_us)[1]).max() < 50.0
