@@ -1,4 +1,4 @@
-"""The owner's place and velocity by sights, by the very filter that policies are trained with: one row of it."""
+"""Somebody's place and velocity by sights, the owner's first of all, by the very filter that policies are trained with."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 
 class SeenOwner:
-    """The filter of one vehicle."""
+    """Of one person: one row of the filter."""
 
     def __init__(self) -> None:
         start_warp()
@@ -29,24 +29,25 @@ class SeenOwner:
         )  # fmt: skip
         self._see = wp.launch(see_rows, 1, [self.filters, place, eye, has_depth, age_s], record_cmd=True)
         self._now = wp.launch(now_rows, 1, [asked, out, velocity], record_cmd=True)
-        self._time_us = 0  # of the newest sight
+        self.time_us = 0
+        """Of the newest sight."""
 
     def see(self, place_ned: Floats, pose: Pose, *, has_depth: bool) -> None:
         """An image, newer than the last, shows the owner's chest at a place [m]."""
-        self._row["age_s"] = max(pose.time_us - self._time_us, 0) * 1e-6
-        self._time_us = pose.time_us
+        self._row["age_s"] = max(pose.time_us - self.time_us, 0) * 1e-6
+        self.time_us = pose.time_us
         self._place[0], self._eye[0] = place_ned, pose.pos_ned
         self._has_depth[0], self._age_s[0] = int(has_depth), 0.0
         self._see.launch()
 
     def at(self, time_us: int) -> Any:
         """The filter as of a time: array of one, which is kept and changes."""
-        self._row["age_s"] = max(time_us - self._time_us, 0) * 1e-6
+        self._row["age_s"] = max(time_us - self.time_us, 0) * 1e-6
         return self.filters
 
     def now(self, time_us: int) -> tuple[Floats, Floats]:
         """Place [m], ned, and level velocity [m/s] at a time."""
         self._asked[:] = self._row
-        self._asked["age_s"] = (time_us - self._time_us) * 1e-6
+        self._asked["age_s"] = (time_us - self.time_us) * 1e-6
         self._now.launch()
         return self._out[0].astype(np.float64), self._velocity[0].astype(np.float64)

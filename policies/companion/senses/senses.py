@@ -14,6 +14,7 @@ from common.attitude import Vector, inverse, quat_of, rotated, yaw_of
 from common.image_stream import ImageFrame
 from policies.companion.owner_watch import OwnerWatch, sighting_from
 from policies.companion.senses.local_map import LocalMap
+from policies.companion.senses.other_people import OtherPeople
 from policies.companion.senses.poses import Pose, PoseHistory
 from policies.companion.senses.seen_owner import SeenOwner
 from policies.companion.vehicle_link import Own, Owner
@@ -28,6 +29,7 @@ _GATE_MAX_M = 8.0
 _PHONE_GATE_M = 4.0  # at least, where they are expected by phone alone
 _COLOUR_GATE = 0.4  # and by this fraction of the range without depth
 _GONE_S = 1.0  # after so long without a sight
+_STRANGE_S = 4.0  # and after so long anybody may be them
 _IN_A_ROW = 4  # as many images must show them, one beside the other
 _BESIDE_M = 1.0
 
@@ -61,6 +63,7 @@ class Senses:
         self.bearing_rad = 0.0
         """In ned, where the owner was seen last."""
         self._row: list[Floats] = []  # where who may be the owner was in the last images
+        self._others = OtherPeople()
 
     def sense(self, own: Own, owner: Owner, image: ImageFrame | None) -> None:
         """Takes in telemetry, the phone's reports, and a new image if there is one."""
@@ -121,13 +124,30 @@ class Senses:
 
     def _owner_among(self, found: list[Detection], pose: Pose) -> Detection | None:
         """Who of them is the owner: the one nearest to where they are expected, if any is near enough."""
-        if not found:
-            self._row = []
-            return None
         silence_s = max(pose.time_us - self.seen_us, 0) * 1e-6 if self.seen_us is not None else inf
         is_gone = silence_s > _GONE_S
         expected, gate_m = self._expected(pose.time_us, silence_s)
         places = [ned_of(detection.chest_hfrd, pose) for detection in found]
+        if silence_s > _STRANGE_S:
+            self._others = OtherPeople()
+        kept = self._others.left(places, None if is_gone else expected, pose, self.seen_us if is_gone else None)
+        found, places = [found[k] for k in kept], [places[k] for k in kept]
+        if not found:
+            self._row = []
+            return None
+        best = self._nearest(found, places, expected, gate_m)
+        strangers = [place for k, place in enumerate(places) if k != best]
+        self._others.meet(strangers, None if best is None else places[best], pose)
+        if best is None:
+            self._row = []
+            return None
+        return found[best] if not is_gone or self._is_there_to_stay(places[best]) else None
+
+    @staticmethod
+    def _nearest(
+        found: list[Detection], places: list[Floats], expected: Floats | None, gate_m: float
+    ) -> int | None:
+        """Who is nearest to where the owner is expected, if near enough; if nobody knows that, to the vehicle."""
         if expected is None:
             off_m = [float(np.hypot(*detection.chest_hfrd[:2])) for detection in found]
         else:
@@ -135,10 +155,7 @@ class Senses:
         best = int(np.argmin(off_m))
         if not found[best].has_depth:
             gate_m += _COLOUR_GATE * float(np.hypot(*found[best].chest_hfrd[:2]))
-        if expected is not None and off_m[best] > gate_m:
-            self._row = []
-            return None
-        return found[best] if not is_gone or self._is_there_to_stay(places[best]) else None
+        return best if expected is None or off_m[best] <= gate_m else None
 
     def _expected(self, time_us: int, silence_s: float) -> tuple[Floats | None, float]:
         """Where the owner is expected in an image, and how far off they may be."""

@@ -19,6 +19,7 @@ from policies.learn.algorithms.gae import advantages, cut_at_horizon
 from policies.learn.algorithms.learner import Companion, Iteration, load_if_fitting, means
 from policies.learn.algorithms.schedule import BETA_FLOOR, EPSILON_FLOOR, RATE_FLOOR, scheduled
 from policies.learn.config.behavior import Behavior, PpoHyperparameters
+from policies.learn.networks.action_distributions import CLIP
 from policies.learn.networks.networks import Body, Critic, policy_body, privileged_body
 from policies.learn.networks.observations import Observation
 from policies.learn.networks.policy import Policy
@@ -301,8 +302,11 @@ class Ppo:
         )
 
     def take_critics(self, state: Mapping[str, Any]) -> None:
-        """Starts from another run's critic if it fits."""
+        """Starts from another run's critic if it fits, and explores around its policy no more than is asked for."""
         load_if_fitting(self.critic, state.get("critic", {}))
+        deviation, log_sigma = self.hyperparameters.start_deviation, self.policy.heads.log_sigma
+        if deviation is not None and isinstance(log_sigma, nn.Parameter):
+            log_sigma.data.clamp_(max=math.log(CLIP * deviation))
 
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Goes on bit for bit from a state of the same settings."""

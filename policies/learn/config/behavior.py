@@ -73,6 +73,9 @@ class PpoHyperparameters(HyperparametersBase):
     critic_warm_up: NotNegativeWhole = own_key(0)
     """Decisions at the start in which the critic learns alone, so that it does not lead a trained policy astray; its
     values are not clipped then."""
+    start_deviation: PositiveOrNone = own_key(None)
+    """Most that continuous actions, which are in -1 to 1, deviate at the start of a run that goes on from the networks of
+    another; none: as there."""
     perception_strength: NotNegative = own_key(0.1)
     """Weight of the beliefs that `network_settings` names, if it names any."""
     target_kl: PositiveOrNone = own_key(None)

@@ -71,3 +71,20 @@ def test_who_is_left_when_the_owner_is_gone_is_not_the_owner(scene: Scene) -> No
     scene.look((3.0, 0.0), times=10)
     scene.look((1.5, 0.3), times=2)
     assert scene.silence_s > 0.1
+
+
+def test_who_crosses_before_the_owner_and_hides_them_is_not_taken_for_them(scene: Scene) -> None:
+    scene.look((3.0, 0.0), times=10)
+    for k in range(30):
+        aside = -2.0 + 0.14 * k
+        others = [(2.3, aside)]
+        scene.look(*(others if abs(aside) < 0.3 else [(3.0, 0.0), *others]))
+    place = scene.senses.seen.now(scene.own.boot_us)[0]
+    assert place[:2] == pytest.approx([3.0, 0.0], abs=0.1)
+
+
+def test_an_owner_who_comes_back_elsewhere_is_nobody_else(scene: Scene) -> None:
+    scene.look((3.0, 0.0), times=10)
+    scene.look(times=12)
+    scene.look((5.0, 2.0), times=30)
+    assert scene.silence_s == 0.0

@@ -1,0 +1,77 @@
+"""People who are not the owner, followed from image to image so that they are not taken for them.
+
+In: the places where somebody is seen, and where the owner is expected. Out: those that are not known to be somebody
+else's. Who is seen is first matched with whom is expected nearest, the owner among them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from policies.companion.senses.poses import Pose
+from policies.companion.senses.seen_owner import SeenOwner
+
+Floats = NDArray[np.float64]
+_MAX = 6
+_NEAR_M = 1.0  # from where they are expected
+_FORGOTTEN_US = 1_500_000
+_APART_M = 0.6  # nearer to somebody, a second one is a part of them
+_FAVOUR_M = 0.25  # so much farther off the owner is still the likelier
+_TOGETHER_US = 300_000  # who was there so long before the owner went is not the owner
+_OWNER = -1
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """One of them."""
+
+    person: SeenOwner
+    met_us: int  # when they were first seen
+
+
+class OtherPeople:
+    """Those round one vehicle."""
+
+    def __init__(self) -> None:
+        self._known: list[_Known] = []
+
+    def left(self, places: list[Floats], owner: Floats | None, pose: Pose, gone_us: int | None = None) -> list[int]:
+        """Indices of the places that are nobody's whom it knows, the owner's among them; the others are taken in.
+
+        Args:
+            places: [m] where somebody is seen, ned.
+            owner: [m] where the owner is expected; None: nobody knows.
+            pose: when and from where they were seen.
+            gone_us: when the owner was seen last, if they are gone: who was met since may be the owner.
+        """
+        if gone_us is not None:
+            self._known = [one for one in self._known if one.met_us < gone_us - _TOGETHER_US]
+        self._known = [one for one in self._known if pose.time_us - one.person.time_us < _FORGOTTEN_US]
+        expected = {k: one.person.now(pose.time_us)[0] for k, one in enumerate(self._known)}
+        if owner is not None:
+            expected[_OWNER] = owner
+        pairs = sorted(
+            (float(np.hypot(*(place - where)[:2])) - (_FAVOUR_M if who == _OWNER else 0.0), k, who)
+            for k, place in enumerate(places)
+            for who, where in expected.items()
+        )
+        taken: dict[int, int] = {}  # place: who
+        for off_m, k, who in pairs:
+            if off_m < _NEAR_M and k not in taken and who not in taken.values():
+                taken[k] = who
+        for k, who in taken.items():
+            if who != _OWNER:
+                self._known[who].person.see(places[k], pose, has_depth=True)
+        return [k for k in range(len(places)) if taken.get(k, _OWNER) == _OWNER]
+
+    def meet(self, places: list[Floats], owner: Floats | None, pose: Pose) -> None:
+        """Somebody new is at each of these places, but for what may be a part of the owner or of who is known."""
+        known = [one.person.now(pose.time_us)[0] for one in self._known]
+        for place in places[: _MAX - len(self._known)]:
+            beside = [*known, *([owner] if owner is not None else [])]
+            if any(float(np.hypot(*(place - other)[:2])) < _APART_M for other in beside):
+                continue
+            one = _Known(SeenOwner(), pose.time_us)
+            one.person.see(place, pose, has_depth=True)
+            self._known.append(one)
