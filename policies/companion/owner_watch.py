@@ -62,6 +62,10 @@ class OwnerWatch:
         self._track = self._tracker.at(now_us)
         return is_plausible
 
+    def forget(self) -> None:
+        """Who was tracked was somebody else."""
+        self._tracker = OwnerTracker()
+
     @property
     def track(self) -> OwnerTrack | None:
         """As of the newest update; None before the first."""

@@ -18,11 +18,12 @@ _NEAR_M = 1.0  # from where they are expected
 _FORGOTTEN_US = 1_500_000
 _APART_M = 0.6  # nearer to somebody, a second one is a part of them
 _FAVOUR_M = 0.25  # so much farther off the owner is still the likelier
+_LATELY_US = 600_000
 _TOGETHER_US = 300_000  # who was there so long before the owner went is not the owner
 _OWNER = -1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Known:
     """One of them."""
 
@@ -35,6 +36,8 @@ class OtherPeople:
 
     def __init__(self) -> None:
         self._known: list[_Known] = []
+        self.met_us: int | None = None
+        """When somebody was met last."""
 
     def left(self, places: list[Floats], owner: Floats | None, pose: Pose, gone_us: int | None = None) -> list[int]:
         """Indices of the places that are nobody's whom it knows, the owner's among them; the others are taken in.
@@ -65,6 +68,23 @@ class OtherPeople:
                 self._known[who].person.see(places[k], pose, has_depth=True)
         return [k for k in range(len(places)) if taken.get(k, _OWNER) == _OWNER]
 
+    def forget(self) -> None:
+        """Anybody may be the owner from now on."""
+        self._known = []
+
+    def places(self, time_us: int) -> list[Floats]:
+        """Where they are [m], of those who were seen lately, in order."""
+        return [one.person.now(time_us)[0] for one in self._lately(time_us)]
+
+    def exchange(self, index: int, owner: SeenOwner, time_us: int) -> SeenOwner:
+        """One of those places is the owner, who was taken for the owner is another; the owner."""
+        one = self._lately(time_us)[index]
+        self._known[self._known.index(one)] = _Known(owner, time_us)
+        return one.person
+
+    def _lately(self, time_us: int) -> list[_Known]:
+        return [one for one in self._known if time_us - one.person.time_us < _LATELY_US]
+
     def meet(self, places: list[Floats], owner: Floats | None, pose: Pose) -> None:
         """Somebody new is at each of these places, but for what may be a part of the owner or of who is known."""
         known = [one.person.now(pose.time_us)[0] for one in self._known]
@@ -75,3 +95,4 @@ class OtherPeople:
             one = _Known(SeenOwner(), pose.time_us)
             one.person.see(place, pose, has_depth=True)
             self._known.append(one)
+            self.met_us = pose.time_us

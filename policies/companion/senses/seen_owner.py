@@ -1,4 +1,4 @@
-"""Somebody's place and velocity by sights, the owner's first of all, by the very filter that policies are trained with."""
+"""Somebody's place and velocity by sights, the owner's first of all, by the filter that policies are trained with."""
 
 from typing import Any
 

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from common.attitude import Vector, inverse, quat_of, rotated, yaw_of
 from common.image_stream import ImageFrame
+from policies.companion.observation import REPORT_LAG_S
 from policies.companion.owner_watch import OwnerWatch, sighting_from
 from policies.companion.senses.local_map import LocalMap
 from policies.companion.senses.other_people import OtherPeople
+from policies.companion.senses.phone_check import PhoneCheck, Word
 from policies.companion.senses.poses import Pose, PoseHistory
 from policies.companion.senses.seen_owner import SeenOwner
 from policies.companion.vehicle_link import Own, Owner
@@ -29,6 +31,8 @@ _GATE_MAX_M = 8.0
 _PHONE_GATE_M = 4.0  # at least, where they are expected by phone alone
 _COLOUR_GATE = 0.4  # and by this fraction of the range without depth
 _GONE_S = 1.0  # after so long without a sight
+_DOUBTED_US = 2_000_000  # for so long at least who turned out to be another was not the owner
+_MET_US = 20_000_000  # so long ago somebody else was there not long ago
 _STRANGE_S = 4.0  # and after so long anybody may be them
 _IN_A_ROW = 4  # as many images must show them, one beside the other
 _BESIDE_M = 1.0
@@ -44,6 +48,7 @@ class Senses:
 
     def __init__(self, *, hears: bool = True, detector: PersonDetector | None = None) -> None:
         self._detector = detector or PersonDetector()
+        self._hears = hears
         self.watch = OwnerWatch(hears=hears)
         """Where the owner is, by sights and phone."""
         self._reports = 0
@@ -64,6 +69,8 @@ class Senses:
         """In ned, where the owner was seen last."""
         self._row: list[Floats] = []  # where who may be the owner was in the last images
         self._others = OtherPeople()
+        self._phone = PhoneCheck()
+        self._phone_ned: Floats | None = None  # where it puts the owner, its error taken off
 
     def sense(self, own: Own, owner: Owner, image: ImageFrame | None) -> None:
         """Takes in telemetry, the phone's reports, and a new image if there is one."""
@@ -73,6 +80,7 @@ class Senses:
         self._poses.note(own)
         if owner.count != self._reports:
             self._reports, self.heard_us = owner.count, own.boot_us
+            self._check(own, owner)
         if image is None or not isfinite(own.pos_ned[0]):
             return
         pose = self._poses.at(image.time_us)
@@ -91,6 +99,27 @@ class Senses:
             self.bearing_rad = atan2(place[1] - pose.pos_ned[1], place[0] - pose.pos_ned[0])
             self.seen.see(place, pose, has_depth=seen.has_depth)
         self.map.see(image.pixels, pose, self._owner_then(image.time_us, own), own.boot_us)
+
+    def _check(self, own: Own, owner: Owner) -> None:
+        """Asks a new report whether the owner is whom it takes for them."""
+        if not self._hears or not isfinite(own.pos_ned[0]):
+            return
+        phone = np.array(owner.pos_ned) + REPORT_LAG_S * np.array(owner.vel_ned)
+        expected = self._phone.owner(phone)
+        self._phone_ned = None if expected is None else np.array([*expected, phone[2]])
+        if self.silence_s(own) > _GONE_S:
+            return
+        met_us = self._others.met_us
+        has_met_others = met_us is not None and own.boot_us - met_us < _MET_US
+        seen, others = self.seen.now(own.boot_us)[0], self._others.places(own.boot_us)
+        word, index = self._phone.hear(phone, seen, others, has_met_others=has_met_others)
+        if word is Word.ANOTHER:
+            self.seen = self._others.exchange(index, self.seen, own.boot_us)
+            self.seen_us = self.seen.time_us
+        elif word is Word.NOBODY:
+            self.seen_us, self.seen = own.boot_us - _DOUBTED_US, SeenOwner()
+        if word is not Word.AGREES:
+            self.watch.forget()
 
     def silence_s(self, own: Own) -> float:
         """Since the owner was seen."""
@@ -128,8 +157,8 @@ class Senses:
         is_gone = silence_s > _GONE_S
         expected, gate_m = self._expected(pose.time_us, silence_s)
         places = [ned_of(detection.chest_hfrd, pose) for detection in found]
-        if silence_s > _STRANGE_S:
-            self._others = OtherPeople()
+        if isfinite(silence_s) and silence_s > _STRANGE_S:
+            self._others.forget()
         kept = self._others.left(places, None if is_gone else expected, pose, self.seen_us if is_gone else None)
         found, places = [found[k] for k in kept], [places[k] for k in kept]
         if not found:
@@ -144,9 +173,7 @@ class Senses:
         return found[best] if not is_gone or self._is_there_to_stay(places[best]) else None
 
     @staticmethod
-    def _nearest(
-        found: list[Detection], places: list[Floats], expected: Floats | None, gate_m: float
-    ) -> int | None:
+    def _nearest(found: list[Detection], places: list[Floats], expected: Floats | None, gate_m: float) -> int | None:
         """Who is nearest to where the owner is expected, if near enough; if nobody knows that, to the vehicle."""
         if expected is None:
             off_m = [float(np.hypot(*detection.chest_hfrd[:2])) for detection in found]
@@ -163,6 +190,8 @@ class Senses:
         if silence_s < _GONE_S:
             return self.seen.now(time_us)[0], gate_m
         track = self.watch.track
+        if self._phone_ned is not None and self.is_heard and self._others.met_us is not None:
+            return self._phone_ned, max(gate_m if isfinite(silence_s) else 0.0, _PHONE_GATE_M)
         if track is None or not track.is_known:
             return None, gate_m
         doubt_m = 2.5 * float(np.sqrt(max(np.trace(track.pos_cov[:2, :2]), 0.0)))

@@ -74,8 +74,8 @@ class PpoHyperparameters(HyperparametersBase):
     """Decisions at the start in which the critic learns alone, so that it does not lead a trained policy astray; its
     values are not clipped then."""
     start_deviation: PositiveOrNone = own_key(None)
-    """Most that continuous actions, which are in -1 to 1, deviate at the start of a run that goes on from the networks of
-    another; none: as there."""
+    """Most that continuous actions, which are in -1 to 1, deviate at the start of a run from networks of another; none:
+    as there."""
     perception_strength: NotNegative = own_key(0.1)
     """Weight of the beliefs that `network_settings` names, if it names any."""
     target_kl: PositiveOrNone = own_key(None)
