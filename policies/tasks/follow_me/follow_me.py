@@ -102,8 +102,9 @@ class FollowMe(FlightTask):
             self._eyes = Eyes(self.buffers, self.rig.arrays, state.params, self.worlds, *seen)
             state.lenses, state.image_ages_s = self._eyes.lenses, way.age_s
         state = self.follow
-        state.tracked, self._sight_way = make_tracked(self._zeros, env_count if self._is_tracked else 1)
+        state.tracked = make_tracked(self._zeros, env_count if self._is_tracked else 1)
         if self._is_tracked:
+            self._sight_way = make_way(self._zeros, (1, 1, 1), env_count)  # of images that nobody takes
             state.image_ages_s = self._sight_way.age_s
         self._record_all(_rules(settings, self.layout), self.start(is_test=settings.split == "test"))
 

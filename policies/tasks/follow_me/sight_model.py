@@ -15,7 +15,7 @@ from common.rotation import yaw_from_quat
 from policies.tasks.flight.flown_vehicle import own_state
 from policies.tasks.flight.own_state import Command, ned_from_level
 from policies.tasks.follow_me.follow_me_params import FollowParams
-from policies.tasks.follow_me.image_way import Way, make_way
+from policies.tasks.follow_me.image_way import Way
 from policies.tasks.follow_me.owner_filter import OwnerFilter, seen, waited
 from policies.tasks.follow_me.owner_visibility import Sight
 from policies.tasks.follow_me.tracked import REACH_M, SECTORS
@@ -67,8 +67,8 @@ class Tracked:
     has_depth: wp.array(dtype=int)
 
 
-def make_tracked(zeros: Callable[[str, Any, Any], Any], count: int) -> tuple[Any, Any]:
-    """The arrays, of so many rows, and the way of their pictures."""
+def make_tracked(zeros: Callable[[str, Any, Any], Any], count: int) -> Any:
+    """The arrays, of so many rows."""
     tracked, kept = Tracked(), int(KEPT)
     tracked.commands = zeros("commands", count, Command)
     tracked.before = zeros("commands_before", count, Command)
@@ -81,7 +81,7 @@ def make_tracked(zeros: Callable[[str, Any, Any], Any], count: int) -> tuple[Any
     tracked.travelled_m = zeros("travelled", count, float)
     tracked.nearness = zeros("mapped_nearness", (count, SECTORS), float)
     tracked.has_depth = zeros("has_depth", count, int)
-    return tracked, make_way(zeros, (1, 1, 1), count)
+    return tracked
 
 
 @wp.func
