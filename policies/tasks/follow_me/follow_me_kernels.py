@@ -124,16 +124,7 @@ def act(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, 
     i = wp.tid()
     if int(wp.round(state.params[i].setpoint_lag_s / _PART_S)) != part:
         return
-    estimate = vehicle_estimate(rig, i, rules.has_estimator)
-    action = chosen_action(buffers, rules, i)
-    command = Command()
-    if rules.vector == TRACKED:
-        last = state.tracked.commands[i]
-        command = next_command(last, action, estimate.q_ned_from_frd)
-        state.tracked.before[i] = last
-        state.tracked.commands[i] = command
-    else:
-        command = action_command(action, estimate.q_ned_from_frd)
+    command = asked(buffers, rules, rig, state, i)
     rig.autopilot.setpoint[i] = velocity_setpoint(command)
 
 
@@ -198,6 +189,38 @@ def owner_report(phone: PhoneState, tick: int) -> OwnerReport:
 
 
 @wp.func
+def write_tracked_frame(
+    buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, i: int, at: int
+) -> None:
+    """The newest frame of what a policy without images is told."""
+    own = own_state(rig, i, rules.has_estimator)
+    write_tracked(
+        own,
+        state.actions[i],
+        state.image_ages_s[i],
+        state.tracked.filters[i],
+        state.tracked.has_depth[i],
+        state.tracked.nearness,
+        buffers.observations,
+        i,
+        at,
+    )
+
+
+@wp.func
+def asked(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, i: int) -> Command:
+    """What the action in the buffers asks for; kept, if the next goes on from it."""
+    action = chosen_action(buffers, rules, i)
+    q_ned_from_frd = vehicle_estimate(rig, i, rules.has_estimator).q_ned_from_frd
+    if rules.vector != TRACKED:
+        return action_command(action, q_ned_from_frd)
+    command = next_command(state.tracked.commands[i], action, q_ned_from_frd)
+    state.tracked.before[i] = state.tracked.commands[i]
+    state.tracked.commands[i] = command
+    return command
+
+
+@wp.func
 def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: FollowState, i: int) -> None:
     """The newest frame of the observation, and what the critic sees."""
     at = open_frame(buffers, i)
@@ -206,10 +229,7 @@ def write_frame(buffers: StepBuffers, rules: Rules, rig: RigArrays, state: Follo
     if rules.vector == _PRIVILEGED:
         write_privileged(truth, state.sights[i], state.unseen_s[i], action, state.nearness, buffers.observations, i, at)
     elif rules.vector == TRACKED:
-        own = own_state(rig, i, rules.has_estimator)
-        t, age_s = state.tracked, state.image_ages_s[i]
-        out = buffers.observations
-        write_tracked(own, action, age_s, t.filters[i], t.has_depth[i], t.nearness, out, i, at)
+        write_tracked_frame(buffers, rules, rig, state, i, at)
     else:
         own = own_state(rig, i, rules.has_estimator)
         report = owner_report(state.phones[i], draw_tick(rig.tick[i]))
