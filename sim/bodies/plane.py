@@ -15,7 +15,7 @@ from sim.bodies.contact import ContactForce, Surroundings, look_around, obstacle
 from sim.bodies.plane_air import SEA_LEVEL_DENSITY_KG_M3, air_force, propeller_step
 from sim.bodies.plane_gear import touch_ground
 from sim.bodies.plane_model import PlaneModel, plane_model
-from sim.bodies.rigid_body import held, rested, truth_of, turned_by
+from sim.bodies.rigid_body import held, moved, rested, truth_of
 from sim.truth import Truth
 from sim.world.world import World
 
@@ -36,6 +36,9 @@ class PlaneState:
     vel_ned: wp.vec3  # [m/s]
     q_ned_from_frd: wp.quat
     omega_frd: wp.vec3  # [rad/s]
+    pos_rounding_ned: wp.vec3  # [m] what rounding has added to pos_ned, to be taken off (Kahan's sum)
+    vel_rounding_ned: wp.vec3  # [m/s] the same of vel_ned
+    q_rounding: wp.quat  # the same of q_ned_from_frd
     surface: wp.vec3  # [rad] aileron, elevator, rudder; trailing edges down and to the left
     steering_rad: float  # of the nose wheel, to the right
     propeller_rad_s: float
@@ -152,13 +155,10 @@ def _substep(model: PlaneModel, body: PlaneState, inputs: PlaneInputs) -> PlaneS
     body.accel_frd = force_frd * model.mass_inv
     middle_accel_frd = body.accel_frd + wp.cross((0.5 * dt) * omega, body.accel_frd)  # the body turns meanwhile
     accel_ned = rot * middle_accel_frd + _GRAVITY_NED
-    body.pos_ned = body.pos_ned + dt * (body.vel_ned + (0.5 * dt) * accel_ned)
-    body.vel_ned = body.vel_ned + dt * accel_ned
     middle = omega + (0.5 * dt) * turning(model, omega, torque_frd)
     body.omega_frd = omega + dt * turning(model, middle, torque_frd)
     body.gyro_frd = 0.5 * (omega + body.omega_frd)
-    body.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.gyro_frd * dt)
-    return body
+    return moved(body, accel_ned, dt)
 
 
 @wp.func
