@@ -202,19 +202,9 @@ def check_ports(board: str, instance: int) -> None:
         ) from error
 
 
-def station_links(
-    options: FlightOptions, speed: float | None, board: str = "", instance: int | None = None
-) -> list[LinkSource]:
-    """For ground stations and companions, of an autopilot that does not speak to them itself.
-
-    Args:
-        options: of the flight.
-        speed: simulated seconds per second; None: as fast as possible.
-        board: of one of several vehicles; empty: the options'.
-        instance: its number, likewise.
-    """
-    number = options.instance if instance is None else instance
-    return [] if (board or options.board) == "px4" else open_links(options, speed or PACE_MAX, number)
+def station_links(options: FlightOptions, speed: float | None) -> list[LinkSource]:
+    """For ground stations and companions, of an autopilot that does not speak to them itself."""
+    return [] if options.board == "px4" else open_links(options, speed or PACE_MAX, options.instance)
 
 
 def filled_in(command: str, folder: Path, config: FlightConfig, instance: int) -> str:

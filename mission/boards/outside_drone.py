@@ -24,7 +24,7 @@ class OutsideDrone(Drone):
         if self.frame_origin is None:
             return super().pos_ned
         place = self.latest("GLOBAL_POSITION_INT")
-        if place is None:
+        if place is None or place.lat == place.lon == 0:  # or it does not know yet
             return nan, nan, nan
         return ned_from_geodetic(place.lat * 1e-7, place.lon * 1e-7, place.alt * 1e-3, self.frame_origin)
 

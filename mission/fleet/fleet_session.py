@@ -80,7 +80,8 @@ def _open_all(
         own: list[LinkSource] = []
         if member.board != "own":
             check_ports(member.board, i)
-            own = station_links(options.model_copy(update={"tcp_port": None}), speed, member.board, i)
+            alone = {"board": member.board, "instance": i, "tcp_port": None}  # it has TCP ports of its own there
+            own = station_links(options.model_copy(update=alone), speed)
         elif speed is not None:
             own = open_links(options, speed, i)
         for link in own:
