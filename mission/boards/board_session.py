@@ -6,7 +6,7 @@ Ports and folder are opened before the program is started, and it is ended with 
 from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from rich.console import Console
 
@@ -66,6 +66,24 @@ class Watch:
     def close(self) -> None:
         if self.process is not None:
             self.process.close()
+
+
+class BoardRun(Protocol):
+    """The program of others that flies one of several vehicles."""
+
+    def make_flight(self, config: FlightConfig, **parts: Any) -> "FlightBase":
+        """The flight, with its port open; of `parts` there are `links`, `folder` and `world`.
+
+        Raises:
+            UserError: the port is taken, or it cannot fly such a vehicle.
+        """
+
+    def launch(self, flight: "FlightBase") -> None:
+        """Starts the program, if we are to; it ends with the flight.
+
+        Raises:
+            UserError: it cannot be started.
+        """
 
 
 class PeerRun:

@@ -3,19 +3,19 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from mission.boards.board_session import PeerRun
+from mission.boards.board_session import BoardRun, PeerRun
 from mission.console.terminal import Say
 from mission.fleet.fleet_options import Member
 
 
-def peer_runs(
+def board_runs(
     members: Sequence[Member],
     commands: Mapping[str, str],
     folder: Path,
     say: Say,
     *,
     shows_consoles: bool = True,
-) -> list[PeerRun | None]:
+) -> list[BoardRun | None]:
     """The program of each vehicle; None: our own flight controller flies it.
 
     Args:
@@ -26,7 +26,7 @@ def peer_runs(
         shows_consoles: as it says.
     """
 
-    def run_of(i: int, member: Member) -> PeerRun | None:
+    def run_of(i: int, member: Member) -> BoardRun | None:
         if member.board == "own":
             return None
         own, whose = folder / f"vehicle-{i + 1}", f" of vehicle {i + 1}"

@@ -15,7 +15,7 @@ from autopilot.mavlink.transport.links import Link, LinkSource
 from autopilot.mavlink.wire.signing import SigningConfig
 from common.clock import Pacer, wall_unix_us
 from common.kernels import FRAME_TICKS, FRAME_US
-from mission.boards.board_session import PeerRun
+from mission.boards.board_session import BoardRun
 from mission.fleet.transponders import Transponders
 from mission.flight import Flight
 from mission.flight_base import FlightBase, advance_together
@@ -48,7 +48,7 @@ class FleetFlight:
         configs: Sequence[FlightConfig],
         world: WorldMap,
         *,
-        boards: Sequence[PeerRun | None] = (),
+        boards: Sequence[BoardRun | None] = (),
         links: Sequence[Sequence[Link | LinkSource]] = (),
         signing: Sequence[SigningConfig | None] = (),
         folder: Path | None = None,

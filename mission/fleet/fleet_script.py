@@ -26,7 +26,7 @@ from common.clock import Pacer
 from mission.boards.board_options import commands_of
 from mission.client import ScriptError
 from mission.connections import API_PORT_STEP, API_PORTS
-from mission.fleet.fleet_boards import peer_runs
+from mission.fleet.fleet_boards import board_runs
 from mission.fleet.fleet_flight import FleetFlight
 from mission.fleet.fleet_options import boards_of, check_members, members_of
 from mission.fleet.roster import SPACING_M, fleet_configs
@@ -87,7 +87,7 @@ class Fleet:
             flights = FleetFlight(
                 fleet_configs(config, members, world, spacing_m),
                 world,
-                boards=peer_runs(members, started, run, _say, shows_consoles=False),
+                boards=board_runs(members, started, run, _say, shows_consoles=False),
                 folder=folder,
                 has_transponders=has_transponders,
             )

@@ -21,7 +21,7 @@ from mission.boards.board_session import check_ports, station_links
 from mission.connections import open_links, open_page, signing_config
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import Say, loading, print_line
-from mission.fleet.fleet_boards import peer_runs
+from mission.fleet.fleet_boards import board_runs
 from mission.fleet.fleet_options import Member, boards_of, members_of
 from mission.fleet.roster import check_fleet_parameters, fleet_configs
 from mission.flight_config import start_of
@@ -131,7 +131,7 @@ def _make_fleet(
     return FleetFlight(
         configs,
         world,
-        boards=peer_runs(members, commands, folder, partial(print_line, console)),
+        boards=board_runs(members, commands, folder, partial(print_line, console)),
         links=links,
         signing=[signing_config(options, speed, None) for _ in configs],
         folder=folder,

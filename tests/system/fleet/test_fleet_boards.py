@@ -20,7 +20,7 @@ from mission.boards.px4_drone import Px4Drone
 from mission.cli import app
 from mission.client import ScriptError
 from mission.connections import open_links
-from mission.fleet.fleet_boards import peer_runs
+from mission.fleet.fleet_boards import board_runs
 from mission.fleet.fleet_flight import FleetFlight
 from mission.fleet.fleet_options import Member
 from mission.fleet.fleet_script import Fleet
@@ -153,7 +153,7 @@ def test_one_whose_program_ends_falls_and_the_others_fly_on(tmp_path):
 
 def fleet_of(members, world, folder, commands, **options):
     """A fleet that no script advances."""
-    boards = peer_runs(members, commands, folder, print, shows_consoles=False)
+    boards = board_runs(members, commands, folder, print, shows_consoles=False)
     return FleetFlight(fleet_configs(BASE, members, world), world, boards=boards, folder=folder, **options)
 
 
