@@ -75,6 +75,7 @@ class Px4Board:
         self._truth = rig.arrays.truth.numpy()[0]  # live
         self._sent_us = dict.fromkeys(("mag", "baro", "gnss", "range"), 0)  # times of the samples sent last
         self._peer: socket.socket | None = None
+        self._given_s = 0.0  # when samples were sent last
         self._was_there = False
         self._begin()
 
@@ -98,15 +99,18 @@ class Px4Board:
     def boot(self, is_chosen: Any) -> None:
         """It is powered by whoever starts it."""
 
-    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
-        row = commands.numpy()[0]
+    def give(self, samples: Any, truth: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
         if self._peer is None:
             self._accept()
-            row[:] = 0.0
         self._time_us += TICK_US
-        begun_s = wall_time_s()
+        self._given_s = wall_time_s()
         self._send(samples.numpy()[0])
-        self._listen(row, begun_s)
+
+    def take(self, commands: Any) -> None:
+        row = commands.numpy()[0]
+        if self._answered_us == 0:  # who has just connected commands nothing
+            row[:] = 0.0
+        self._listen(row, self._given_s)
         self.exchange_count += 1
 
     def _accept(self) -> None:
