@@ -26,6 +26,8 @@ class Px4StandIn:
         port: of the simulator.
         control: its 16 actuator controls, asked at each answer; None: zeros.
         is_rover: it answers at 100 Hz, and while armed only.
+        is_armed: else its controls are zeros.
+        system_id: the instance plus 1.
     """
 
     def __init__(
@@ -35,11 +37,12 @@ class Px4StandIn:
         *,
         is_rover: bool = False,
         is_armed: bool = True,
+        system_id: int = 1,
     ) -> None:
         self.socket = socket.create_connection(("127.0.0.1", port))
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.socket.settimeout(SILENCE_S)
-        self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._mav = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=1)
         self._mav.robust_parsing = True
         self._control = control or (lambda _: [0.0] * 16)
         self.is_rover, self.is_armed = is_rover, is_armed

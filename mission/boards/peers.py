@@ -31,6 +31,7 @@ MakeBoard = Callable[[Rig, Airframe, GeoPoint, int, OnWait], OutsideBoard]
 _ARDUPILOT_TCP, _ARDUPILOT_STEP = 5760, 10
 _PX4_PAYLOAD, _PX4_PAYLOAD_OWN = 14030, 14280  # its third link, slow, for what is on board
 _PX4_OFFBOARD_OWN = 14580
+_PX4_OFFBOARD_LAST = 9  # further instances speak to the port of this one
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,8 @@ def _px4_link(instance: int) -> Link:
 
 
 def _px4_offboard_link(instance: int) -> Link:
-    return UdpLink(_PX4_OFFBOARD_OWN + instance, LinkRole.ONBOARD, local_port=OFFBOARD_PORT + instance)
+    local_port = OFFBOARD_PORT + min(instance, _PX4_OFFBOARD_LAST)
+    return UdpLink(_PX4_OFFBOARD_OWN + instance, LinkRole.ONBOARD, local_port=local_port)
 
 
 def _prepare_ardupilot(config: FlightConfig, airframe: Airframe, folder: Path, instance: int) -> Mapping[str, str]:
