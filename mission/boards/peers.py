@@ -13,7 +13,8 @@ from common.airframe import Airframe
 from common.geodesy import GeoPoint
 from mission.boards.ardupilot_drone import ArduPilotDrone
 from mission.boards.px4_drone import Px4Drone
-from mission.boards.vehicle_params import ardupilot_params, px4_params
+from mission.boards.px4_params import px4_environment, px4_model
+from mission.boards.vehicle_params import ardupilot_params
 from mission.flight_config import FlightConfig
 from mission.script import Drone
 from sim.boards.ardupilot import PORT as JSON_PORT
@@ -52,8 +53,10 @@ class Peer:
     """It speaks to ground stations itself, where they listen; else we link them through."""
     prepare: Callable[[FlightConfig, Airframe, Path, int], Mapping[str, str]]
     """Writes what an instance is told of the vehicle into a folder; returns what is added to its environment."""
+    model: Callable[[Airframe], str]
+    """What it is told to be where it is started."""
     waits_for: str
-    """What it has to do to be heard; `{port}` is where."""
+    """What it has to do to be heard; `{port}` is where, `{model}` what it is told to be."""
 
 
 def _ardupilot_board(rig: Rig, airframe: Airframe, _: GeoPoint, instance: int, on_wait: OnWait) -> ArduPilotBoard:
@@ -88,8 +91,7 @@ def _prepare_ardupilot(config: FlightConfig, airframe: Airframe, folder: Path, i
 
 
 def _prepare_px4(config: FlightConfig, airframe: Airframe, _: Path, __: int) -> Mapping[str, str]:
-    values = px4_params(airframe) | config.parameters
-    return {"PX4_SIM_MODEL": "none_iris"} | {f"PX4_PARAM_{name}": f"{value:g}" for name, value in values.items()}
+    return px4_environment(airframe, config.parameters)
 
 
 PEERS: Mapping[str, Peer] = {
@@ -102,7 +104,8 @@ PEERS: Mapping[str, Peer] = {
         open_companion_link=_ardupilot_link,
         has_station_ports=False,
         prepare=_prepare_ardupilot,
-        waits_for="start it with --model JSON; its servos are expected at UDP port {port}",
+        model=lambda _: "JSON",
+        waits_for="start it with --model {model}; its servos are expected at UDP port {port}",
     ),
     "px4": Peer(
         name="PX4",
@@ -113,6 +116,7 @@ PEERS: Mapping[str, Peer] = {
         open_companion_link=_px4_offboard_link,
         has_station_ports=True,
         prepare=_prepare_px4,
-        waits_for="start it with PX4_SIM_MODEL=none_iris; it is expected at TCP port {port}",
+        model=px4_model,
+        waits_for="start it with PX4_SIM_MODEL={model}; it is expected at TCP port {port}",
     ),
 }
