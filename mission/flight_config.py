@@ -9,7 +9,7 @@ from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
 from autopilot.params import parameter_table
 from common.airframe import Airframe
 from common.clock import SIMULATED_EPOCH_US
-from common.geodesy import DEFAULT_HOME, GeoPoint
+from common.geodesy import DEFAULT_HOME, GeoPoint, geodetic_from_ned
 from common.params import ParameterTable
 from mission.flight_settings import FlightSettings, Pace
 from mission.simulator.simulator_params import simulator_parameters
@@ -52,6 +52,12 @@ class FlightConfig(FlightSettings):
     """The vehicle carries the scanner that policies of Navigate see by; the world is grown as in their training."""
     owner: OwnerConfig | None = None
     """Who walks through the world with a phone, to be followed; the vehicle then carries a camera for its companion."""
+
+
+def start_of(config: FlightConfig) -> GeoPoint:
+    """Where a vehicle boots; the altitude is home's."""
+    lat_deg, lon_deg, _ = geodetic_from_ned(*config.start_ne_m, 0.0, config.home)
+    return GeoPoint(lat_deg, lon_deg, config.home.alt_m)
 
 
 def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTable:

@@ -50,8 +50,11 @@ class FlightOptions(FlightSettings):
     """The options of `honeyguide fly`, as given: the settings, what several of which make, and the session's own."""
 
     board: BoardName = option("own", "Who flies: own, or another program: ardupilot or px4 (docs/boards.md).")
-    command: str | None = option(
-        None, "Starts that program: {folder}, {params}, {home} and {instance} are filled in.", shown="wait for it"
+    command: tuple[str, ...] = option(
+        (),
+        "Starts that program: {folder}, {params}, {home}, {instance} and {vehicle} are filled in. Of several "
+        "vehicles with several programs: BOARD=COMMAND, repeated.",
+        shown="wait for it",
     )
     instance: int = option(0, "Its number, from which its ports follow.", ge=0, le=99)
     plan: Path | None = option(None, "A QGroundControl .plan or QGC WPL 110 file. Default: a tour of the hills.")

@@ -1,5 +1,6 @@
 """The outside autopilots that can fly here: how each is reached, what it is told of the vehicle, who speaks its way."""
 
+import socket
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,9 +9,8 @@ from autopilot.mavlink.dialects import Dialect
 from autopilot.mavlink.dialects.ardupilot import ARDUPILOT
 from autopilot.mavlink.dialects.px4 import PX4
 from autopilot.mavlink.transport.client_links import open_client_link
-from autopilot.mavlink.transport.links import OFFBOARD_PORT, Link, LinkRole, UdpLink
+from autopilot.mavlink.transport.links import LOOPBACK, OFFBOARD_PORT, Link, LinkRole, UdpLink, bound_socket
 from common.airframe import Airframe
-from common.geodesy import GeoPoint
 from mission.boards.ardupilot_drone import ArduPilotDrone
 from mission.boards.px4_drone import Px4Drone
 from mission.boards.px4_params import px4_environment, px4_model
@@ -27,7 +27,7 @@ from sim.bodies.vehicles import class_of
 from sim.rig import Rig
 
 OutsideBoard = ArduPilotBoard | Px4Board
-MakeBoard = Callable[[Rig, Airframe, GeoPoint, int, OnWait], OutsideBoard]
+MakeBoard = Callable[[Rig, Airframe, FlightConfig, int, OnWait], OutsideBoard]
 
 _ARDUPILOT_TCP, _ARDUPILOT_STEP = 5760, 10
 _PX4_PAYLOAD, _PX4_PAYLOAD_OWN = 14030, 14280  # its third link, slow, for what is on board
@@ -44,7 +44,13 @@ class Peer:
     drone: type[Drone]
     """Who speaks its way."""
     make_board: MakeBoard
-    """From the rig, its airframe, its home, the number of the instance, and what is done while it is silent."""
+    """From the rig, its airframe, the flight's configuration, the number of the instance, and what is done while it is
+    silent."""
+    protocol: str
+    """Of the exchange: UDP or TCP."""
+    port: int
+    """Of the exchange with the first instance; the next ones are `port_step` further each."""
+    port_step: int
     open_link: Callable[[int], Link]
     """To the MAVLink port of an instance that is the flight's own."""
     open_companion_link: Callable[[int], Link]
@@ -58,15 +64,31 @@ class Peer:
     waits_for: str
     """What it has to do to be heard; `{port}` is where, `{model}` what it is told to be."""
 
+    def check_ports(self, instance: int) -> None:
+        """Refuses ports that are taken, while nothing is built yet.
 
-def _ardupilot_board(rig: Rig, airframe: Airframe, _: GeoPoint, instance: int, on_wait: OnWait) -> ArduPilotBoard:
-    channels = pulse_channels(class_of(airframe).vehicle, airframe)
-    return ArduPilotBoard(rig, channels=channels, on_wait=on_wait, port=JSON_PORT + _ARDUPILOT_STEP * instance)
+        Raises:
+            LinkError: of one that is.
+        """
+        kind = socket.SOCK_STREAM if self.protocol == "TCP" else socket.SOCK_DGRAM
+        bound_socket(kind, LOOPBACK, self.port_of(instance)).close()
+        self.open_link(instance).close()
+
+    def port_of(self, instance: int) -> int:
+        """Where an instance exchanges sensors and actuators with us."""
+        return self.port + self.port_step * instance
 
 
-def _px4_board(rig: Rig, airframe: Airframe, home: GeoPoint, instance: int, on_wait: OnWait) -> Px4Board:
+def _ardupilot_board(
+    rig: Rig, airframe: Airframe, config: FlightConfig, instance: int, on_wait: OnWait
+) -> ArduPilotBoard:
+    channels, port = pulse_channels(class_of(airframe).vehicle, airframe), JSON_PORT + _ARDUPILOT_STEP * instance
+    return ArduPilotBoard(rig, channels=channels, on_wait=on_wait, port=port, start_ne_m=config.start_ne_m)
+
+
+def _px4_board(rig: Rig, airframe: Airframe, config: FlightConfig, instance: int, on_wait: OnWait) -> Px4Board:
     channels = control_channels(class_of(airframe).vehicle, airframe)
-    return Px4Board(rig, channels=channels, home=home, on_wait=on_wait, port=HIL_PORT + instance)
+    return Px4Board(rig, channels=channels, home=config.home, on_wait=on_wait, port=HIL_PORT + instance)
 
 
 def _ardupilot_link(instance: int) -> Link:
@@ -100,6 +122,9 @@ PEERS: Mapping[str, Peer] = {
         dialect=ARDUPILOT,
         drone=ArduPilotDrone,
         make_board=_ardupilot_board,
+        protocol="UDP",
+        port=JSON_PORT,
+        port_step=_ARDUPILOT_STEP,
         open_link=_ardupilot_link,
         open_companion_link=_ardupilot_link,
         has_station_ports=False,
@@ -112,6 +137,9 @@ PEERS: Mapping[str, Peer] = {
         dialect=PX4,
         drone=Px4Drone,
         make_board=_px4_board,
+        protocol="TCP",
+        port=HIL_PORT,
+        port_step=1,
         open_link=_px4_link,
         open_companion_link=_px4_offboard_link,
         has_station_ports=True,

@@ -20,7 +20,8 @@ from common.airframe import AirframeError, load_airframe
 from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
-from mission.boards.board_session import PeerRun, check_board, station_links
+from mission.boards.board_options import check_board
+from mission.boards.board_session import PeerRun, station_links
 from mission.connections import open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
@@ -82,7 +83,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         make_flight: Callable[..., FlightBase] = Flight
         peer_run = None
         if options.board != "own":
-            peer_run = held.enter_context(closing(PeerRun(options, folder, console)))
+            peer_run = held.enter_context(closing(PeerRun.of(options, folder, console)))
             make_flight = partial(peer_run.make_flight, has_companion=True)
         flight, companion = flight_with_companion(
             config,

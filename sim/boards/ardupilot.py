@@ -11,7 +11,7 @@ from struct import Struct
 from typing import Any
 
 from common.clock import wall_time_s
-from common.kernels import SUBSTEPS, TICK_US
+from common.kernels import MAX_MOTORS, SUBSTEPS, TICK_US
 from sim.boards.channels import Channel, commands_of
 from sim.boards.fast_imu import FastImu
 from sim.boards.json_wire import ServoPacket, range_key, servo_packet, state_text
@@ -66,6 +66,7 @@ class ArduPilotBoard:
         channels: which of its channels moves which actuator.
         on_wait: what is done while it is silent.
         port: where it sends its servos to; 0: any free one.
+        start_ne_m: where its vehicle boots [m], which is its home: its positions count from there.
         address: of this machine.
 
     Raises:
@@ -79,6 +80,7 @@ class ArduPilotBoard:
         channels: list[Channel | None],
         on_wait: OnWait,
         port: int = PORT,
+        start_ne_m: tuple[float, float] = (0.0, 0.0),
         address: str = "127.0.0.1",
     ) -> None:
         if rig.vehicle_count != 1:
@@ -89,7 +91,7 @@ class ArduPilotBoard:
         self.again_count = 0
         self.rubbish_count = 0
         self.foreign_count = 0
-        self._channels, self._on_wait = channels, on_wait
+        self._channels, self._on_wait, self._start_ne_m = channels, on_wait, start_ne_m
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((address, port))
@@ -122,14 +124,17 @@ class ArduPilotBoard:
     def boot(self, is_chosen: Any) -> None:
         """It is powered by whoever starts it."""
 
-    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
+    def give(self, samples: Any, truth: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
         if self._sender is None:
-            self._take(commands)
+            self._await([0.0] * MAX_MOTORS)  # which only begins the exchange
         self._time_ns += self._step_ns
         row = samples.numpy()[0]
-        self._answer = state_text(self._time_ns, *self._felt(row["imu"]), self._truth[0], range_key(row["range"]))
+        felt, extras = self._felt(row["imu"]), range_key(row["range"])
+        self._answer = state_text(self._time_ns, *felt, self._truth[0], extras, self._start_ne_m)
         self._send()
-        self._take(commands)
+
+    def take(self, commands: Any) -> None:
+        self._await(commands.numpy()[0])
         self.exchange_count += 1
 
     def _felt(self, sample: Any) -> tuple[list[float], list[float]]:
@@ -146,9 +151,8 @@ class ArduPilotBoard:
         except OSError:  # it is gone; it says so by its silence
             return
 
-    def _take(self, commands: Any) -> None:
+    def _await(self, row: Any) -> None:
         """Waits for the next servos, as long as `on_wait` lets it."""
-        row = commands.numpy()[0]
         begun_s = looked_s = wall_time_s()
         while True:
             received = self._receive()

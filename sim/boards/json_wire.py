@@ -44,7 +44,14 @@ def servo_packet(data: bytes) -> ServoPacket | None:
     return None
 
 
-def state_text(time_ns: int, gyro_frd: Any, accel_frd: Any, truth: Any, extras: str = "") -> bytes:
+def state_text(
+    time_ns: int,
+    gyro_frd: Any,
+    accel_frd: Any,
+    truth: Any,
+    extras: str = "",
+    start_ne_m: tuple[float, float] = (0.0, 0.0),
+) -> bytes:
     """The answer to a servo packet.
 
     Args:
@@ -53,12 +60,14 @@ def state_text(time_ns: int, gyro_frd: Any, accel_frd: Any, truth: Any, extras: 
         accel_frd: [m/s²] likewise, specific force.
         truth: a row of `Truth`.
         extras: further keys as text that begins with a comma, or nothing.
+        start_ne_m: where its home is [m]: positions count from there.
 
     Raises:
         PeerError: a number is none; ArduPilot would take it, and its estimator would never recover.
     """
     x, y, z, w = truth["q_ned_from_frd"].tolist()
-    pos_ned, vel_ned = truth["pos_ned"].tolist(), truth["vel_ned"].tolist()
+    (north, east, down), vel_ned = truth["pos_ned"].tolist(), truth["vel_ned"].tolist()
+    pos_ned = (north - start_ne_m[0], east - start_ne_m[1], down)
     numbers = (*gyro_frd, *accel_frd, *pos_ned, w, x, y, z, *vel_ned)
     if not isfinite(sum(numbers)):
         raise PeerError("the body's state is not a number")

@@ -10,12 +10,10 @@ import socket
 from collections import deque
 from typing import Any
 
-import numpy as np
-
 from autopilot.mavlink.wire.codec import FrameReader
 from common.clock import wall_time_s
 from common.geodesy import GeoPoint
-from common.kernels import MAX_MOTORS, TICK_S, TICK_US
+from common.kernels import TICK_S, TICK_US
 from sim.boards.channels import Channel, commands_of
 from sim.boards.hil_wire import ACTUATORS_ID, SAFETY_ARMED, HilWriter
 from sim.boards.outside import POLL_S, OnWait, PeerError
@@ -63,7 +61,6 @@ class Px4Board:
         self.unanswered_count = 0
         self.is_armed = False
         self._channels, self._on_wait = channels, on_wait
-        self._commands = np.zeros(MAX_MOTORS, dtype=np.float32)
         self._server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         self._server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -78,14 +75,13 @@ class Px4Board:
         self._truth = rig.arrays.truth.numpy()[0]  # live
         self._sent_us = dict.fromkeys(("mag", "baro", "gnss", "range"), 0)  # times of the samples sent last
         self._peer: socket.socket | None = None
+        self._given_s = 0.0  # when samples were sent last
         self._was_there = False
         self._begin()
 
     def _begin(self) -> None:
         """What is known of a PX4 that has just connected."""
         self._reader = FrameReader()
-        self._commands[:] = 0.0
-        self._sent_s = 0.0  # wall clock time
         self._time_us = 0
         self._answered_us = 0  # which sample it has answered last
         self._periods: deque[int] = deque(maxlen=4)  # [ticks] between its last answers; empty: it does not answer
@@ -100,26 +96,21 @@ class Px4Board:
         """Bytes that were no message."""
         return self._reader.bad_byte_count
 
-    def boot(self, is_chosen: Any) -> None:  # noqa: ARG002  (there is one)
-        """It is powered by whoever starts it; until it answers again, nothing moves."""
-        self._commands[:] = 0.0
+    def boot(self, is_chosen: Any) -> None:
+        """It is powered by whoever starts it."""
 
-    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
-        self.send(samples)
-        self.take(commands)
-
-    def send(self, samples: Any) -> None:
-        """The first half of an exchange: what its sensors have; others may be given theirs before it is waited for."""
+    def give(self, samples: Any, truth: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
         if self._peer is None:
             self._accept()
         self._time_us += TICK_US
-        self._sent_s = wall_time_s()
+        self._given_s = wall_time_s()
         self._send(samples.numpy()[0])
 
     def take(self, commands: Any) -> None:
-        """The second half: its answer, waited for as long as is due."""
-        self._listen()
-        commands.numpy()[0][:] = self._commands
+        row = commands.numpy()[0]
+        if self._answered_us == 0:  # who has just connected commands nothing
+            row[:] = 0.0
+        self._listen(row, self._given_s)
         self.exchange_count += 1
 
     def _accept(self) -> None:
@@ -156,26 +147,26 @@ class Px4Board:
         self._sent_us[name] = time_us
         return True
 
-    def _listen(self) -> None:
+    def _listen(self, row: Any, begun_s: float) -> None:
         """Takes its actuators: those that answer this tick, if that is due; else what has come in."""
         limit_s = TICK_S
         if self._periods:
             limit_s = STEADY_S if max(self._periods) == 1 else ANSWER_S
         is_due = self._time_us - self._answered_us >= TICK_US * max(self._periods, default=0)
         while self._peer is not None:
-            left_s = limit_s - (wall_time_s() - self._sent_s) if is_due else 0.0
-            if self._receive(min(max(left_s, 0.0), POLL_S)):
+            left_s = limit_s - (wall_time_s() - begun_s) if is_due else 0.0
+            if self._receive(row, min(max(left_s, 0.0), POLL_S)):
                 return
             if left_s <= 0.0:
                 break
             if self._periods:
-                self._on_wait(wall_time_s() - self._sent_s)
+                self._on_wait(wall_time_s() - begun_s)
         if is_due:
             self.unanswered_count += bool(self._periods)
             if self._time_us - self._answered_us >= TICK_US * PERIOD_TICKS_MAX:
                 self._periods.clear()
 
-    def _receive(self, wait_s: float) -> bool:
+    def _receive(self, row: Any, wait_s: float) -> bool:
         """Reads what comes in within a time; returns whether this tick has been answered."""
         if self._peer is None:
             return False
@@ -191,10 +182,10 @@ class Px4Board:
             return False
         for frame in self._reader.feed(data):
             if frame.kind.msg_id == ACTUATORS_ID:
-                self._take(frame.kind.unpack(frame.payload))
+                self._take(frame.kind.unpack(frame.payload), row)
         return self._answered_us >= self._time_us
 
-    def _take(self, fields: Any) -> None:
+    def _take(self, fields: Any, row: Any) -> None:
         """One HIL_ACTUATOR_CONTROLS."""
         time_us = min(int(fields.time_usec), self._time_us)
         passed = (time_us - self._answered_us) // TICK_US
@@ -203,7 +194,7 @@ class Px4Board:
         self._answered_us = time_us
         self.is_armed = bool(fields.mode & SAFETY_ARMED)
         controls = [value if value == value else 0.0 for value in fields.controls]
-        self._commands[: len(self._channels)] = commands_of(self._channels, controls)
+        row[: len(self._channels)] = commands_of(self._channels, controls)
 
     def _lose(self) -> None:
         """It has gone; it may come again."""
