@@ -249,6 +249,11 @@ class Carrier:
         except OSError:  # nobody there, or slow
             return
 
+    def close(self) -> None:
+        self._socket.close()
+        if self._peer is not None:
+            self._peer.close()
+
 
 def fly_px4(instance: int, patience_s: float = 60.0) -> None:
     """A copter, until the simulator has gone."""

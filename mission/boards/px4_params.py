@@ -1,4 +1,4 @@
-"""What PX4 has to know of our vehicle: which of its airframes comes nearest, and its parameters, from the airframe file.
+"""What PX4 has to know of our vehicle: the nearest of its airframes, and parameters, from the airframe file.
 
 Our own rover's and plane's control laws have PX4's parameters, in name and meaning: what they are set to by the
 airframe, PX4 is set to as well. Where its unit differs, or where it has what ours has not, that is said here.
