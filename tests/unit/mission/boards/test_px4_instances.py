@@ -6,13 +6,8 @@ import pytest
 
 from autopilot.mavlink.transport.links import LinkRole, UdpLink
 from autopilot.mavlink.wire.codec import FrameReader
-from bench.standins.pilots import COPTER, PX4_LOITER, Carrier, Motion, Pilot, Voice
-from bench.standins.px4 import Px4StandIn
-from common.geodesy import DEFAULT_HOME
-from mission.boards.board_flight import BoardFlight
-from mission.boards.peers import PEERS
-from mission.flight_config import FlightConfig
-from sim.boards.outside import PeerError, wait_for
+from sim.boards.outside import PeerError
+from tests.unit.mission.boards.px4_pilot import Px4, flight_of
 from tests.unit.sim.boards.flown_by import running
 
 STARTS_NE_M = {7: (0.0, 0.0), 8: (20.0, 0.0), 9: (0.0, -30.0)}  # of instances whose ports no other test uses
@@ -20,45 +15,14 @@ ARMED = (7, 9)
 FRAMES = 60
 
 
-class Px4:
-    """An instance that holds its motors at a command of its own, until the simulator has gone."""
-
-    def __init__(self, instance):
-        self.instance, self.pilot = instance, Pilot(COPTER, PX4_LOITER)
-        home = (DEFAULT_HOME.lat_deg, DEFAULT_HOME.lon_deg, DEFAULT_HOME.alt_m)
-        self.voice = Voice(self.pilot, instance + 1, home, is_ardupilot=False)
-        self.links = [Carrier(14280 + instance, 14030 + instance), Carrier(14580 + instance, 14540 + instance)]
-        self.exchange = None
-
-    def work(self):
-        with closing(Px4StandIn(4560 + self.instance, self.control)) as self.exchange:
-            while self.exchange.step():
-                pass
-        for link in self.links:
-            link.close()
-
-    def control(self, exchange):
-        truth = exchange.truth
-        if truth is not None:
-            place = self.voice._there(truth.lat * 1e-7, truth.lon * 1e-7, truth.alt * 1e-3)
-            self.pilot.motion = Motion(place, (0.0, 0.0, 0.0), tuple(truth.attitude_quaternion), (0.0, 0.0, 0.0))
-            self.voice.frame(exchange.time_us, self.links)
-        return [0.01 * self.instance] * 4
-
-
-def flight(instance):
-    config = FlightConfig(start_ne_m=STARTS_NE_M[instance])
-    return BoardFlight(config, PEERS["px4"], wait_for(5.0, "PX4"), instance=instance)
-
-
 @pytest.fixture(scope="module")
 def three():
     px4s, flights, companions = {}, {}, {}
     with ExitStack() as held:
-        for i in STARTS_NE_M:
-            px4s[i] = Px4(i)
+        for i, start_ne_m in STARTS_NE_M.items():
+            px4s[i] = Px4(i, control=lambda i=i: [0.01 * i] * 4)
             companions[i] = held.enter_context(closing(UdpLink(14580 + i, LinkRole.ONBOARD, local_port=14540 + i)))
-            flights[i] = flight(i)
+            flights[i] = flight_of(i, start_ne_m=start_ne_m)
             held.enter_context(running(px4s[i].work))
             held.callback(flights[i].close)
         for count in range(FRAMES):
@@ -100,4 +64,4 @@ def test_a_companion_hears_the_one_of_its_port(three):
 
 def test_an_instance_that_flies_already_is_refused_with_its_port(three):
     with pytest.raises(PeerError, match="TCP port 4568 for PX4 is in use"):
-        flight(8)
+        flight_of(8)
