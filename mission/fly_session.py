@@ -12,6 +12,7 @@ from common.airframe import load_airframe
 from common.files import write_whole
 from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
+from mission.boards.board_options import commands_of
 from mission.connections import open_images, open_links, open_page, open_stream, open_video, signing_config
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import loading, print_line
@@ -42,6 +43,7 @@ def fly_session(options: FlightOptions) -> int:
             return fly_board(
                 options, speed, None if options.is_idle else _plan(options.plan, options.airframe, home), held
             )
+        commands_of(options.command, [])
         if options.state is None:
             return _fly(options, speed, None, held)
         try:

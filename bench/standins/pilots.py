@@ -1,21 +1,23 @@
 """Stand-ins of PX4 and ArduPilot that fly: they exchange as strictly as the plain ones, and speak MAVLink.
 
-As programs, with the original's ports: `python -m bench.standins.pilots px4 INSTANCE`, `... ardupilot INSTANCE HOME
-VEHICLE`. They know the truth, hold places by it, arm, take off, go, land, and say so; fences, missions and parameters
-they do not know. What they find wrong with the exchange they print as `fault: ...`.
+As programs, with the original's ports: `python -m bench.standins.pilots px4 INSTANCE [SECONDS]`, which ends after so
+many of simulated time, or `ardupilot INSTANCE HOME VEHICLE`. They know the truth, hold places by it, arm, take off, go,
+land, and say so; fences, missions and parameters they do not know. What they find wrong with the exchange they print
+as `fault: ...`.
 """
 
 import os
 import socket
 import sys
 from collections.abc import Callable
-from math import atan2, cos, hypot, radians, sin
+from math import atan2, cos, hypot, inf, radians, sin
 from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bench.standins.ardupilot import ArduPilotStandIn, State
 from bench.standins.px4 import Px4StandIn
+from common.clock import wall_sleep_s
 
 VOICE_US = 50_000  # between its messages
 SLOW = 10  # of them, between those that change seldom
@@ -121,7 +123,6 @@ class Voice:
         self.mav = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=1)
         self._parsers: dict[int, Any] = {}
         self._next_us, self._count = 0, 0
-        self.heard: dict[str, int] = {}
 
     def frame(self, time_us: int, links: list["Carrier"]) -> None:
         """Takes in what has come and says what is due."""
@@ -175,13 +176,13 @@ class Voice:
         east = pos_ned[1] / EARTH_M / radians(1.0) / cos(radians(lat))
         return round((lat + north) * 1e7), round((lon + east) * 1e7), round((alt - pos_ned[2]) * 1000.0)
 
-    def _there(self, lat: float, lon: float, alt_amsl_m: float) -> tuple[float, float, float]:
+    def there(self, lat: float, lon: float, alt_amsl_m: float) -> tuple[float, float, float]:
+        """A place [m], ned from where it booted."""
         north, east = radians(lat - self.home[0]), radians(lon - self.home[1]) * cos(radians(self.home[0]))
         return north * EARTH_M, east * EARTH_M, self.home[2] - alt_amsl_m
 
     def _answers(self, message: Any) -> list[Any]:
         kind = message.get_type()
-        self.heard[kind] = self.heard.get(kind, 0) + 1
         if kind == "ADSB_VEHICLE":
             return [mavlink.MAVLink_statustext_message(6, f"heard {message.callsign}".encode())]
         if kind not in ("COMMAND_LONG", "COMMAND_INT") or message.target_system != self.mav.srcSystem:
@@ -204,7 +205,7 @@ class Voice:
         elif message.command == mavlink.MAV_CMD_NAV_LAND:
             pilot.is_landing, pilot.mode = True, PX4_LAND
         elif message.command == mavlink.MAV_CMD_DO_REPOSITION and kind == "COMMAND_INT":
-            pilot.target_ned = self._there(message.x * 1e-7, message.y * 1e-7, message.z)
+            pilot.target_ned = self.there(message.x * 1e-7, message.y * 1e-7, message.z)
         else:
             return message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
         return True
@@ -255,8 +256,8 @@ class Carrier:
             self._peer.close()
 
 
-def fly_px4(instance: int, patience_s: float = 60.0) -> None:
-    """A copter, until the simulator has gone."""
+def fly_px4(instance: int, seconds: float) -> None:
+    """A copter, for so long, or until the simulator has gone."""
     pilot = Pilot(COPTER, PX4_LOITER)
     voice: Voice | None = None
     links = [Carrier(14280 + instance, 14030 + instance), Carrier(18570 + instance, 14550)]
@@ -271,7 +272,7 @@ def fly_px4(instance: int, patience_s: float = 60.0) -> None:
             voice = voice or Voice(pilot, instance + 1, place, is_ardupilot=False)
             velocity = (truth.vx * 1e-2, truth.vy * 1e-2, truth.vz * 1e-2)
             gyro = (sensor.xgyro, sensor.ygyro, sensor.zgyro)
-            pilot.motion = Motion(voice._there(*place), velocity, tuple(truth.attitude_quaternion), gyro)
+            pilot.motion = Motion(voice.there(*place), velocity, tuple(truth.attitude_quaternion), gyro)
             voice.climb_is_over()
             voice.frame(px4.time_us, links)
         for fault in px4.faults[seen:]:
@@ -279,21 +280,18 @@ def fly_px4(instance: int, patience_s: float = 60.0) -> None:
         seen = len(px4.faults)
         return pilot.commands(0.004)
 
-    px4 = _connected(lambda: Px4StandIn(4560 + instance, control), patience_s)
-    while px4.step():
+    px4 = _connected(lambda: Px4StandIn(4560 + instance, control))
+    while px4.time_us < seconds * 1e6 and px4.step():
         pass
 
 
-def _connected(connect: Callable[[], Px4StandIn], patience_s: float) -> Px4StandIn:
+def _connected(connect: Callable[[], Px4StandIn]) -> Px4StandIn:
     """As the original, which tries until somebody is there."""
-    from time import sleep
-
-    for _ in range(int(patience_s / 0.1)):
+    while True:
         try:
             return connect()
         except ConnectionError:
-            sleep(0.1)
-    raise SystemExit("nobody to connect to")
+            wall_sleep_s(0.1)
 
 
 def fly_ardupilot(instance: int, home: str, vehicle: str) -> None:
@@ -332,7 +330,7 @@ def fly_ardupilot(instance: int, home: str, vehicle: str) -> None:
 
 def main(kind: str, instance: str, *rest: str) -> None:
     if kind == "px4":
-        fly_px4(int(instance))
+        fly_px4(int(instance), float(rest[0]) if rest else inf)
     else:
         fly_ardupilot(int(instance), *rest)
 

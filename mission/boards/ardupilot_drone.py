@@ -10,6 +10,7 @@ from math import isnan
 from typing import Any
 
 from autopilot.mavlink.wire.codec import Message
+from mission.boards.outside_drone import OutsideDrone
 from mission.client import CommandRefused
 from mission.plan.plan_file import PlanItem
 from mission.script import (
@@ -26,7 +27,6 @@ from mission.script import (
     FRAME_GLOBAL,
     MAIN_AUTO,
     MAIN_OFFBOARD,
-    Drone,
 )
 
 CMD_WAYPOINT, CMD_DO_JUMP = 16, 177
@@ -56,7 +56,7 @@ _FIXED_WING = 1  # MAV_TYPE
 _POSITION, _CONSTANT_POSITION = 16 | 512, 128  # EKF_STATUS_FLAGS: horizontal, absolute, estimated or predicted; none
 
 
-class ArduPilotDrone(Drone):
+class ArduPilotDrone(OutsideDrone):
     """See `Drone`."""
 
     sends_parameters_as_floats = True

@@ -24,6 +24,7 @@ from mission.boards.peers import OutsideBoard, Peer
 from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig
 from mission.log.flight_recorder import History, Recorder
+from mission.script import Drone
 from mission.simulator.failure_injection import RigInjector
 from mission.simulator.flight_rig import flight_rig, flight_world
 from mission.simulator.rig_choice import engine_named
@@ -88,7 +89,9 @@ class BoardFlight(FlightBase):
         self._script_end = script_end
         self._is_companion_elsewhere = peer.has_station_ports and not has_companion
         self._setpoint_us = -_FOLLOWS_US
-        self.drone = peer.drone(client_end, system_id=instance + 1)
+        drone = peer.drone(client_end, system_id=instance + 1)
+        drone.frame_origin = config.home  # the autopilot's own local frame begins where it boots
+        self.drone: Drone = drone
         self.controller = OutsideController(
             self.rig, vehicle, self.airframe, self.drone, peer.dialect, config.home, self.texts
         )

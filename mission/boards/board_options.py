@@ -68,12 +68,14 @@ def commands_of(given: Sequence[str], boards: Sequence[str]) -> dict[str, str]:
     commands: dict[str, str] = {}
     for text in given:
         board, _, command = text.partition("=")
+        if not boards:
+            raise UserError(f"--command {text}: no program of others flies here; add --board")
         if board not in _OUTSIDE:
             if len(boards) > 1:
                 raise UserError(f"--command {text}: say whose it is: {' or '.join(f'{b}=COMMAND' for b in boards)}")
-            board, command = next(iter(boards), ""), text
+            board, command = boards[0], text
         if board not in boards:
-            raise UserError(f"--command {text}: {board or 'no other program'} flies nothing here; see --board")
+            raise UserError(f"--command {text}: {board} flies nothing here")
         if board in commands:
             raise UserError(f"--command {text}: {board} has one already")
         commands[board] = command

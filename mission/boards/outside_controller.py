@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from autopilot.interface.aircraft import Aircraft
 from autopilot.interface.vehicle_state import LandedState, Mode, Severity, VehicleState
 from autopilot.mavlink.dialects import Dialect, UnknownModeError
+from autopilot.mavlink.wire.adsb_messages import fields_of
 from autopilot.mavlink.wire.codec import message_id
 from autopilot.mavlink.wire.convert import UINT16_MAX, degrees_from_e7
 from autopilot.vehicles.vehicle_class import VehicleClass
@@ -84,6 +86,14 @@ class OutsideController:
     @property
     def commander(self) -> "OutsideController":
         return self
+
+    @property
+    def traffic(self) -> "OutsideController":
+        return self
+
+    def report(self, aircraft: Aircraft) -> None:
+        """A receiver on board has heard another aircraft."""
+        self._drone.send("ADSB_VEHICLE", **fields_of(aircraft))
 
     def check_arming(self) -> Sequence[str]:
         """Why it cannot be armed; it says so itself when it is asked to."""

@@ -12,11 +12,11 @@ from autopilot.mavlink.transport.client_links import open_client_link
 from autopilot.mavlink.transport.links import LOOPBACK, OFFBOARD_PORT, Link, LinkRole, UdpLink, bound_socket
 from common.airframe import Airframe
 from mission.boards.ardupilot_drone import ArduPilotDrone
+from mission.boards.outside_drone import OutsideDrone
 from mission.boards.px4_drone import Px4Drone
 from mission.boards.px4_params import px4_environment, px4_model
 from mission.boards.vehicle_params import ardupilot_params
 from mission.flight_config import FlightConfig
-from mission.script import Drone
 from sim.boards.ardupilot import PORT as JSON_PORT
 from sim.boards.ardupilot import ArduPilotBoard
 from sim.boards.channels import control_channels, pulse_channels
@@ -41,7 +41,7 @@ class Peer:
 
     name: str
     dialect: Dialect
-    drone: type[Drone]
+    drone: type[OutsideDrone]
     """Who speaks its way."""
     make_board: MakeBoard
     """From the rig, its airframe, the flight's configuration, the number of the instance, and what is done while it is

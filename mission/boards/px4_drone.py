@@ -2,15 +2,16 @@
 
 from math import nan
 
+from mission.boards.outside_drone import OutsideDrone
 from mission.client import CommandRefused
-from mission.script import CMD_TAKEOFF, MAIN_AUTO, Drone
+from mission.script import CMD_TAKEOFF, MAIN_AUTO
 
 TAKES_IN_S = 3.0  # guess: until its navigator has read a mission that has been acknowledged
 RETRY_S = 0.2
 TAKING_OFF = (MAIN_AUTO, 2)  # main and sub mode
 
 
-class Px4Drone(Drone):
+class Px4Drone(OutsideDrone):
     """See `Drone`."""
 
     async def takeoff(self, height_m: float, timeout_s: float = 60.0) -> None:

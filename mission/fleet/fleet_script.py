@@ -28,7 +28,7 @@ from mission.client import ScriptError
 from mission.connections import API_PORT_STEP, API_PORTS
 from mission.fleet.fleet_boards import peer_runs
 from mission.fleet.fleet_flight import FleetFlight
-from mission.fleet.fleet_options import Member, boards_of, check_members, members_of
+from mission.fleet.fleet_options import boards_of, check_members, members_of
 from mission.fleet.roster import SPACING_M, fleet_configs
 from mission.flight_config import FlightConfig
 from mission.over_udp import POLL_US, SILENCE_S, RemoteVehicle
@@ -59,6 +59,7 @@ class Fleet:
         config: what the flights have in common.
         spacing_m: how far apart they boot.
         folder: where their logs are written; None writes nothing.
+        has_transponders: they hear each other by ADS-B.
         commands: what starts the program of others that flies some of them, as `--command`; of several kinds by their
             names. None: they are waited for.
 
@@ -73,13 +74,24 @@ class Fleet:
         *,
         spacing_m: float = SPACING_M,
         folder: Path | None = None,
+        has_transponders: bool = False,
         commands: str | Mapping[str, str] | None = None,
     ) -> None:
         config = config or FlightConfig()
         members = members_of(str(vehicles), config.airframe)
         check_members(config, members)
+        started = commands_of(_by_board(commands), boards_of(members))
         with ExitStack() as held:
-            self._vehicles: Vehicles = Simulated(_flights(members, config, spacing_m, folder, commands, held), held)
+            run = folder or Path(held.enter_context(TemporaryDirectory()))
+            world = flight_world(config)
+            flights = FleetFlight(
+                fleet_configs(config, members, world, spacing_m),
+                world,
+                boards=peer_runs(members, started, run, _say, shows_consoles=False),
+                folder=folder,
+                has_transponders=has_transponders,
+            )
+            self._vehicles: Vehicles = Simulated(flights, held.pop_all())
 
     @classmethod
     def over_udp(
@@ -167,24 +179,11 @@ class Fleet:
             self._script.cancel()
 
 
-def _flights(
-    members: Sequence[Member],
-    config: FlightConfig,
-    spacing_m: float,
-    folder: Path | None,
-    commands: str | Mapping[str, str] | None,
-    held: ExitStack,
-) -> FleetFlight:
-    """The flights; `held` ends what they need until they are over."""
-    given = [commands] if isinstance(commands, str) else [f"{board}={text}" for board, text in (commands or {}).items()]
-    kinds = boards_of(members)
-    started = commands_of(given, kinds)
-    run = folder or Path(held.enter_context(TemporaryDirectory()) if kinds else "")
-    world = flight_world(config)
-    configs = fleet_configs(config, members, world, spacing_m)
-    return FleetFlight(
-        configs, world, boards=peer_runs(members, started, run, _say, shows_consoles=False), folder=folder
-    )
+def _by_board(commands: str | Mapping[str, str] | None) -> list[str]:
+    """As `--command` says it."""
+    if isinstance(commands, str):
+        return [commands]
+    return [f"{board}={command}" for board, command in (commands or {}).items()]
 
 
 def _say(text: str) -> None:
@@ -201,7 +200,7 @@ class Simulated:
     """
 
     def __init__(self, flights: FleetFlight, held: ExitStack) -> None:
-        self.flights, self._held = flights, held.pop_all()
+        self.flights, self._held = flights, held
         self.drones: Sequence[Drone] = [flight.drone for flight in flights.flights]
 
     def frame(self) -> None:
