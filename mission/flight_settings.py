@@ -99,7 +99,7 @@ class FlightOptions(FlightSettings):
         (), "Sets a parameter of the flight controller: NAME=VALUE. Repeatable.", "--param"
     )
     vehicles: str | None = option(
-        None, "Fly several in one world: a number, or AIRFRAME:NUMBER,AIRFRAME:NUMBER,...", shown="one"
+        None, "Fly several in one world: a number, or AIRFRAME[@BOARD]:NUMBER,AIRFRAME[@BOARD]:NUMBER,...", shown="one"
     )
     spacing_m: float = option(10.0, "Of several, how far apart they boot [m].", "--spacing", ge=1.0, le=1000.0)
     has_transponders: bool = option(False, "Several hear each other by ADS-B.", "--adsb")

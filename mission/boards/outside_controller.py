@@ -148,6 +148,9 @@ class OutsideController:
 
     def _read_state(self, time_us: int) -> None:
         state, drone = self.state, self._drone
+        if drone.lost:
+            state.is_armed = state.is_ready_to_arm = False
+            return
         heartbeat, status, mission = (drone.latest(name) for name in ("HEARTBEAT", "SYS_STATUS", "MISSION_CURRENT"))
         if heartbeat is not None:
             is_armed = bool(heartbeat.base_mode & _ARMED)

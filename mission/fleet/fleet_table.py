@@ -110,7 +110,7 @@ class FleetProgress:
             table.add_row(
                 str(flight.drone.system_id),
                 flight.airframe.name,
-                "crashed" if flight.is_crashed else state.mode.name,
+                "lost" if flight.end_reason else "crashed" if flight.is_crashed else state.mode.name,
                 "yes" if state.is_armed else "no",
                 f"{min(state.mission_current + 1, count)} of {count}" if count else "none",
                 f"{north:.1f}",

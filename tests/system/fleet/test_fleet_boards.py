@@ -31,6 +31,7 @@ from mission.flight_settings import FlightOptions
 from mission.plan.plan_file import default_plan, moved_plan, read_plan
 from mission.script import Drone, fly_plan
 from mission.simulator.flight_rig import flight_world
+from mission.view.replay_file import load_recording
 from sim.sensors.ring import RAYS, RingSensor
 from sim.world.world import WorldConfig
 
@@ -136,12 +137,14 @@ def test_one_whose_program_ends_falls_and_the_others_fly_on(tmp_path):
             await fleet.each(lambda drone: drone.goto_ned(30.0, 10.0 * drone.system_id, -4.0, speed_m_s=2.0))
         await fleet[0].land()
         flights = fleet.flights.flights
-        return str(lost.value), [flight.end_reason for flight in flights], true_places(fleet)
+        armed = [flight.controller.state.is_armed for flight in flights]
+        return str(lost.value), [flight.end_reason for flight in flights], true_places(fleet), armed
 
-    reason, reasons, true = fly(script, "x500:1,x500@px4:1", tmp_path, commands=f"{PX4} 12")
+    reason, reasons, true, armed = fly(script, "x500:1,x500@px4:1", tmp_path, commands=f"{PX4} 12")
     assert "vehicle 1" not in reason
     assert reasons[0] == ""
     assert "has ended" in reasons[1]
+    assert armed == [False, False]
     assert dist(true[0][:2], (30.0, 10.0)) < 2.0
     assert true[1][0] < 25.0  # on its way
     ground_m = flight_world(BASE).height(*true[1][:2])
@@ -275,6 +278,10 @@ def test_a_program_that_ends_is_the_exit_code_and_in_the_summary(tmp_path):
     assert ours["result"] == "no mission"
     assert theirs["result"].startswith("failed: ")
     assert ours["simulated_s"] == theirs["simulated_s"] == 5.0
+    recording = load_recording(tmp_path / "run")
+    assert [each.config.start_ne_m for each in (recording, *recording.others)] == [(0.0, 0.0), (0.0, 10.0)]
+    for each in (recording, *recording.others):
+        assert each.rows["pos_ned"][-1][:2] == pytest.approx(each.config.start_ne_m, abs=0.5)
 
 
 def test_one_that_never_comes_is_given_up_and_the_others_fly(tmp_path, monkeypatch):
