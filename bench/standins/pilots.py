@@ -250,6 +250,11 @@ class Carrier:
         except OSError:  # nobody there, or slow
             return
 
+    def close(self) -> None:
+        self._socket.close()
+        if self._peer is not None:
+            self._peer.close()
+
 
 def fly_px4(instance: int, seconds: float) -> None:
     """A copter, for so long, or until the simulator has gone."""

@@ -135,7 +135,8 @@ class PeerRun:
             flight.on_close = self.close
         except (PeerError, LinkError, ValueError) as error:
             raise UserError(str(error)) from error
-        self._watch.hint = self._peer.waits_for.format(port=flight.board.local_port)
+        model = self._peer.model(flight.airframe)
+        self._watch.hint = self._peer.waits_for.format(port=flight.board.local_port, model=model)
         return flight
 
     def start(self, flight: "FlightBase") -> None:

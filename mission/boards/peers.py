@@ -14,7 +14,8 @@ from common.airframe import Airframe
 from mission.boards.ardupilot_drone import ArduPilotDrone
 from mission.boards.outside_drone import OutsideDrone
 from mission.boards.px4_drone import Px4Drone
-from mission.boards.vehicle_params import ardupilot_params, px4_params
+from mission.boards.px4_params import px4_environment, px4_model
+from mission.boards.vehicle_params import ardupilot_params
 from mission.flight_config import FlightConfig
 from sim.boards.ardupilot import PORT as JSON_PORT
 from sim.boards.ardupilot import ArduPilotBoard
@@ -31,6 +32,7 @@ MakeBoard = Callable[[Rig, Airframe, FlightConfig, int, OnWait], OutsideBoard]
 _ARDUPILOT_TCP, _ARDUPILOT_STEP = 5760, 10
 _PX4_PAYLOAD, _PX4_PAYLOAD_OWN = 14030, 14280  # its third link, slow, for what is on board
 _PX4_OFFBOARD_OWN = 14580
+_PX4_OFFBOARD_LAST = 9  # further instances speak to the port of this one
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +59,10 @@ class Peer:
     """It speaks to ground stations itself, where they listen; else we link them through."""
     prepare: Callable[[FlightConfig, Airframe, Path, int], Mapping[str, str]]
     """Writes what an instance is told of the vehicle into a folder; returns what is added to its environment."""
+    model: Callable[[Airframe], str]
+    """What it is told to be where it is started."""
     waits_for: str
-    """What it has to do to be heard; `{port}` is where."""
+    """What it has to do to be heard; `{port}` is where, `{model}` what it is told to be."""
 
     def check_ports(self, instance: int) -> None:
         """Refuses ports that are taken, while nothing is built yet.
@@ -96,7 +100,8 @@ def _px4_link(instance: int) -> Link:
 
 
 def _px4_offboard_link(instance: int) -> Link:
-    return UdpLink(_PX4_OFFBOARD_OWN + instance, LinkRole.ONBOARD, local_port=OFFBOARD_PORT + instance)
+    local_port = OFFBOARD_PORT + min(instance, _PX4_OFFBOARD_LAST)
+    return UdpLink(_PX4_OFFBOARD_OWN + instance, LinkRole.ONBOARD, local_port=local_port)
 
 
 def _prepare_ardupilot(config: FlightConfig, airframe: Airframe, folder: Path, instance: int) -> Mapping[str, str]:
@@ -108,8 +113,7 @@ def _prepare_ardupilot(config: FlightConfig, airframe: Airframe, folder: Path, i
 
 
 def _prepare_px4(config: FlightConfig, airframe: Airframe, _: Path, __: int) -> Mapping[str, str]:
-    values = px4_params(airframe) | config.parameters
-    return {"PX4_SIM_MODEL": "none_iris"} | {f"PX4_PARAM_{name}": f"{value:g}" for name, value in values.items()}
+    return px4_environment(airframe, config.parameters)
 
 
 PEERS: Mapping[str, Peer] = {
@@ -125,7 +129,8 @@ PEERS: Mapping[str, Peer] = {
         open_companion_link=_ardupilot_link,
         has_station_ports=False,
         prepare=_prepare_ardupilot,
-        waits_for="start it with --model JSON; its servos are expected at UDP port {port}",
+        model=lambda _: "JSON",
+        waits_for="start it with --model {model}; its servos are expected at UDP port {port}",
     ),
     "px4": Peer(
         name="PX4",
@@ -139,6 +144,7 @@ PEERS: Mapping[str, Peer] = {
         open_companion_link=_px4_offboard_link,
         has_station_ports=True,
         prepare=_prepare_px4,
-        waits_for="start it with PX4_SIM_MODEL=none_iris; it is expected at TCP port {port}",
+        model=px4_model,
+        waits_for="start it with PX4_SIM_MODEL={model}; it is expected at TCP port {port}",
     ),
 }

@@ -59,8 +59,12 @@ def pulse_channels(vehicle: VehicleClass, airframe: Airframe) -> list[Channel | 
 
 
 def control_channels(vehicle: VehicleClass, airframe: Airframe) -> list[Channel | None]:
-    """PX4's actuator controls, [0..1] of motors and [-1..1] of what is signed: output functions in our order."""
-    return [Channel(k, 0.0, 1.0) for k in range(len(vehicle.outputs(airframe)))]
+    """PX4's actuator controls, [0..1] of motors and [-1..1] of what is signed: output functions in our order.
+
+    It has no brakes.
+    """
+    outputs = vehicle.outputs(airframe)
+    return [None if output.name == "brake" else Channel(k, 0.0, 1.0) for k, output in enumerate(outputs)]
 
 
 def commands_of(channels: Sequence[Channel | None], values: Sequence[float]) -> list[float]:

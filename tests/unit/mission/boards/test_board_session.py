@@ -21,7 +21,6 @@ def fly(*options):
     [
         (("--board", "px4", "--dialect", "ardupilot"), "--dialect and --board px4"),
         (("--board", "px4", "--noise", "0"), "--noise 0 and --board px4"),
-        (("--board", "px4", "--airframe", "rover"), "--board px4: it flies no rover here"),
         (("--board", "ardupilot", "--engine", "pybullet"), "only the native one"),
         (("--board", "ardupilot", "--command", "/no/such/program"), "--command /no/such/program"),
     ],
