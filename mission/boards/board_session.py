@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 PATIENCE_S = 120.0  # of wall clock time, that an autopilot may be silent
 REPORTED_S = 2.0  # of silence, after which it is said what is waited for
 PACE_MAX = 20.0  # guess: how much faster than real time a flight in lockstep is at most, for time-outs of links
-FLOWN = {"ardupilot": ("multirotor", "rover"), "px4": ("multirotor",)}
+FLOWN = {"ardupilot": ("multirotor", "rover", "plane"), "px4": ("multirotor",)}
 FAST = ("ardupilot", "multirotor")
 """Classes of airframes that each flies here, and who exchanges each millisecond."""
 _OURS_ALONE = {

@@ -55,9 +55,10 @@ class Peer:
     """What it has to do to be heard; `{port}` is where."""
 
 
-def _ardupilot_board(rig: Rig, airframe: Airframe, _: GeoPoint, instance: int, on_wait: OnWait) -> ArduPilotBoard:
+def _ardupilot_board(rig: Rig, airframe: Airframe, home: GeoPoint, instance: int, on_wait: OnWait) -> ArduPilotBoard:
     channels = pulse_channels(class_of(airframe).vehicle, airframe)
-    return ArduPilotBoard(rig, channels=channels, on_wait=on_wait, port=JSON_PORT + _ARDUPILOT_STEP * instance)
+    port = JSON_PORT + _ARDUPILOT_STEP * instance
+    return ArduPilotBoard(rig, channels=channels, home=home, on_wait=on_wait, port=port)
 
 
 def _px4_board(rig: Rig, airframe: Airframe, home: GeoPoint, instance: int, on_wait: OnWait) -> Px4Board:

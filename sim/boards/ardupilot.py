@@ -1,8 +1,8 @@
 """ArduPilot's SITL as a board, by its JSON interface: in lockstep, with all that goes wrong on the way.
 
 SITL sends its servos to our UDP port and waits; we move the body by a step and answer with its state, from which SITL
-makes its own sensors but the IMU, which is ours. Its main loop asks for 400 Hz of a copter, so that copters are
-exchanged each millisecond. Who has to be answered how: sim/boards/json_wire.py and `FrameCounter`.
+makes its own sensors but IMU, pitot tube and range finder, which are ours. Its main loop asks for 400 Hz of a copter,
+so that copters are exchanged each millisecond. Who has to be answered how: sim/boards/json_wire.py and `FrameCounter`.
 """
 
 import socket
@@ -11,10 +11,11 @@ from struct import Struct
 from typing import Any
 
 from common.clock import wall_time_s
+from common.geodesy import GeoPoint
 from common.kernels import SUBSTEPS, TICK_US
 from sim.boards.channels import Channel, commands_of
 from sim.boards.fast_imu import FastImu
-from sim.boards.json_wire import ServoPacket, range_key, servo_packet, state_text
+from sim.boards.json_wire import ServoPacket, airspeed_key, range_key, servo_packet, state_text
 from sim.boards.outside import POLL_S, OnWait, PeerError
 from sim.rig import Rig
 
@@ -64,6 +65,7 @@ class ArduPilotBoard:
     Args:
         rig: of one vehicle, on the CPU, whose body it flies.
         channels: which of its channels moves which actuator.
+        home: origin of ned.
         on_wait: what is done while it is silent.
         port: where it sends its servos to; 0: any free one.
         address: of this machine.
@@ -77,6 +79,7 @@ class ArduPilotBoard:
         rig: Rig,
         *,
         channels: list[Channel | None],
+        home: GeoPoint,
         on_wait: OnWait,
         port: int = PORT,
         address: str = "127.0.0.1",
@@ -89,7 +92,7 @@ class ArduPilotBoard:
         self.again_count = 0
         self.rubbish_count = 0
         self.foreign_count = 0
-        self._channels, self._on_wait = channels, on_wait
+        self._channels, self._home, self._on_wait = channels, home, on_wait
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((address, port))
@@ -126,8 +129,9 @@ class ArduPilotBoard:
         if self._sender is None:
             self._take(commands)
         self._time_ns += self._step_ns
-        row = samples.numpy()[0]
-        self._answer = state_text(self._time_ns, *self._felt(row["imu"]), self._truth[0], range_key(row["range"]))
+        row, truth_row = samples.numpy()[0], self._truth[0]
+        extras = airspeed_key(row["airspeed"], self._home.alt_m - truth_row["pos_ned"][2]) + range_key(row["range"])
+        self._answer = state_text(self._time_ns, *self._felt(row["imu"]), truth_row, extras)
         self._send()
         self._take(commands)
         self.exchange_count += 1
