@@ -22,7 +22,7 @@ _DISARMED_S = 3.0  # after it has stopped: guess
 
 def plane_params(airframe: PlaneAirframe) -> dict[str, float]:
     """By ArduPilot's names."""
-    ours = {each.name: float(each.default) for each in PLANE.parameters} | PLANE.defaults(airframe)
+    ours: dict[str, float] = {**{each.name: each.default for each in PLANE.parameters}, **PLANE.defaults(airframe)}
     return {
         **{alias.name: alias.shown(ours[alias.of]) for alias in APM_PLANE.aliases if alias.name not in _OTHER_MEANING},
         **_servos(),
