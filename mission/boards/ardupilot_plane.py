@@ -1,7 +1,7 @@
-"""What ArduPilot has to know of a plane: the gains, speeds and limits of our own flight controller, in its units.
+"""What ArduPilot has to know of a plane: the speeds and limits of our own flight controller, and gains of its own.
 
-Both scale their gains by the airspeed and count surfaces by fractions; ArduPilot's are of 45 degrees. It has no brakes:
-they are its flaps, which it sets at the approach.
+Its rate loops are led by their feed-forward, which has to be that of the steady rate. It has no brakes: they are its
+flaps, which it sets at the approach.
 """
 
 from math import radians, sin, tan
@@ -15,7 +15,11 @@ _FIRST_PULSE, _LAST_PULSE, _MIDDLE_PULSE = 1000.0, 2000.0, 1500.0
 _SURFACES, _BRAKE = (1, 2, 4, 5), 6  # servos, counted from 1
 _GROUND_STEERING, _AUTOMATIC_FLAPS = 26.0, 3.0  # SERVOn_FUNCTION
 _PITCH_MAX_DEG = 15.0  # TECS_PITCH_MAX's default
-_OTHER_MEANING = ("WP_RADIUS",)  # ArduPilot's is where it may begin to turn, ours where a place counts as reached
+_DENSITY_KG_M3 = 1.225  # ISO 2533
+# Its radius is where it may begin to turn, ours where a place counts as reached; its bank is slower than our way to a line
+_ITS_OWN = ("WP_RADIUS", "NAVL1_PERIOD", "NAVL1_DAMPING")
+_P_PER_FF, _I_PER_FF = 0.2, 0.6  # guess; its AutoTune ends between
+_SHOWS_TRUE_PITCH = 256.0  # FLIGHT_OPTIONS: without PTCH_TRIM_DEG off it
 _STEERED_M = 5.0  # height up to which the nose wheel steers: guess
 _DISARMED_S = 3.0  # after it has stopped: guess
 
@@ -24,13 +28,14 @@ def plane_params(airframe: PlaneAirframe) -> dict[str, float]:
     """By ArduPilot's names."""
     ours: dict[str, float] = {**{each.name: each.default for each in PLANE.parameters}, **PLANE.defaults(airframe)}
     return {
-        **{alias.name: alias.shown(ours[alias.of]) for alias in APM_PLANE.aliases if alias.name not in _OTHER_MEANING},
+        **{alias.name: alias.shown(ours[alias.of]) for alias in APM_PLANE.aliases if alias.name not in _ITS_OWN},
         **_servos(),
-        **_rates(ours),
+        **_rates(airframe, ours),
         **_ground(airframe, ours),
         **_energy(ours),
         "ARSPD_USE": 1.0,
         "SIM_ARSPD_RND": 0.0,  # the tube's noise is ours
+        "FLIGHT_OPTIONS": _SHOWS_TRUE_PITCH,
         "PTCH_TRIM_DEG": ours["FW_PSP_OFF"],
         "KFF_RDDRMIX": _rudder_per_aileron(airframe),
         "RTL_ALTITUDE": ours["RTL_RETURN_ALT"],
@@ -46,8 +51,9 @@ def _servos() -> dict[str, float]:
     return params
 
 
-def _rates(ours: dict[str, float]) -> dict[str, float]:
-    """Roll and pitch, by our loops' gains: commands per rad/s at the airspeed of trim."""
+def _rates(airframe: PlaneAirframe, ours: dict[str, float]) -> dict[str, float]:
+    """Roll and pitch, of commands per rad/s at the airspeed of trim."""
+    leads = {"RLL": ours["FW_RR_FF"], "PTCH": _elevator_per_rate(airframe, ours["FW_AIRSPD_TRIM"])}
     params = {
         "SCALING_SPEED": ours["FW_AIRSPD_TRIM"],
         "RLL2SRV_TCONST": ours["FW_R_TC"],
@@ -56,11 +62,19 @@ def _rates(ours: dict[str, float]) -> dict[str, float]:
         "PTCH2SRV_RMAX_UP": ours["FW_P_RMAX_POS"],
         "PTCH2SRV_RMAX_DN": ours["FW_P_RMAX_NEG"],
     }
-    for name, of in (("RLL", "FW_RR"), ("PTCH", "FW_PR")):
-        for gain in ("FF", "P", "I"):
-            params[f"{name}_RATE_{gain}"] = _FULL_RAD * ours[f"{of}_{gain}"]
-        params[f"{name}_RATE_D"] = 0.0
+    for name, lead in leads.items():
+        for gain, part in (("FF", 1.0), ("P", _P_PER_FF), ("I", _I_PER_FF), ("D", 0.0)):
+            params[f"{name}_RATE_{gain}"] = _FULL_RAD * part * lead
     return params
+
+
+def _elevator_per_rate(airframe: PlaneAirframe, airspeed_m_s: float) -> float:
+    """[s/rad] Of a steady pitch rate: for the angle of attack that bends the path, and against the damping."""
+    wing, lift = airframe.wing, airframe.lift
+    push_n = 0.5 * _DENSITY_KG_M3 * airspeed_m_s**2 * wing.area_m2
+    alpha_s = airframe.body.mass_kg * airspeed_m_s / (push_n * lift.c_l_alpha)
+    moment = -lift.c_m_alpha * alpha_s - lift.c_m_q * wing.chord_m / (2.0 * airspeed_m_s)
+    return moment / (-lift.c_m_elevator * airframe.surfaces.elevator_max_rad)
 
 
 def _ground(airframe: PlaneAirframe, ours: dict[str, float]) -> dict[str, float]:

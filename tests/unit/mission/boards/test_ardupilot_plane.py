@@ -7,8 +7,9 @@ import pytest
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.codec import FrameReader, decode, encode
 from autopilot.vehicles.plane.defaults import plane_defaults
+from autopilot.vehicles.plane.trim import level_flight
 from common.airframe import load_airframe
-from common.geodesy import DEFAULT_HOME, ned_from_geodetic
+from common.geodesy import DEFAULT_HOME, GRAVITY_M_S2, ned_from_geodetic
 from mission.boards.ardupilot_drone import ArduPilotDrone
 from mission.boards.plane_landing import landing_items
 from mission.boards.vehicle_params import ardupilot_params
@@ -27,14 +28,19 @@ def params():
     return ardupilot_params(load_airframe("plane"))
 
 
-def test_its_gains_ask_of_the_surfaces_what_ours_do(params):
+def test_its_feed_forward_is_the_surface_of_a_steady_rate(params):
     """Its rate loop: degrees of a surface, at SCALING_SPEED = the airspeed."""
-    ours = plane_defaults(load_airframe("plane"))
-    rate_rad_s = 0.7
-    for name, of in (("RLL", "FW_RR"), ("PTCH", "FW_PR")):
-        for gain in ("FF", "P"):
-            surface_deg = degrees(params[f"{name}_RATE_{gain}"] * rate_rad_s)
-            assert surface_deg / FULL_DEG == pytest.approx(ours[f"{of}_{gain}"] * rate_rad_s)
+    airframe = load_airframe("plane")
+    ours = plane_defaults(airframe)
+    ailerons = degrees(params["RLL_RATE_FF"] * 0.7) / FULL_DEG
+    assert ailerons == pytest.approx(ours["FW_RR_FF"] * 0.7)
+    # what trim has to give for a circle of a loop, as for so much more weight, and the damping of that rate
+    trim_m_s, rate_rad_s = ours["FW_AIRSPD_TRIM"], 0.1
+    heavier = airframe.body.mass_kg * (1.0 + trim_m_s * rate_rad_s / GRAVITY_M_S2)
+    loop = airframe.model_copy(update={"body": airframe.body.model_copy(update={"mass_kg": heavier})})
+    pulled = level_flight(loop, trim_m_s).elevator - level_flight(airframe, trim_m_s).elevator
+    elevator = degrees(params["PTCH_RATE_FF"] * rate_rad_s) / FULL_DEG
+    assert elevator == pytest.approx(pulled + ours["FW_PR_FF"] * rate_rad_s, rel=0.1)
 
 
 def test_its_speeds_and_limits_are_those_of_the_airframe(params):
