@@ -16,7 +16,7 @@ _SURFACES, _BRAKE = (1, 2, 4, 5), 6  # servos, counted from 1
 _GROUND_STEERING, _AUTOMATIC_FLAPS = 26.0, 3.0  # SERVOn_FUNCTION
 _PITCH_MAX_DEG = 15.0  # TECS_PITCH_MAX's default
 _DENSITY_KG_M3 = 1.225  # ISO 2533
-# Its radius is where it may begin to turn, ours where a place counts as reached; its bank is slower than our way to a line
+# Where it may begin to turn, and not as ours where a place counts as reached; a way to a line as slow as its bank
 _ITS_OWN = ("WP_RADIUS", "NAVL1_PERIOD", "NAVL1_DAMPING")
 _P_PER_FF, _I_PER_FF = 0.2, 0.6  # guess; its AutoTune ends between
 _SHOWS_TRUE_PITCH = 256.0  # FLIGHT_OPTIONS: without PTCH_TRIM_DEG off it
