@@ -44,7 +44,8 @@ def measure() -> list[Row]:
 
 def _ardupilot(rig: Rig, airframe: Any) -> ArduPilotBoard:
     channels = pulse_channels(class_of(airframe).vehicle, airframe)
-    return ArduPilotBoard(rig, channels=channels, on_wait=wait_for(PATIENCE_S, "the stand-in"), port=0)
+    wait = wait_for(PATIENCE_S, "the stand-in")
+    return ArduPilotBoard(rig, channels=channels, home=DEFAULT_HOME, on_wait=wait, port=0)
 
 
 def _px4(rig: Rig, airframe: Any) -> Px4Board:

@@ -8,7 +8,7 @@ from mission.console.option_checks import UserError
 from mission.flight_settings import BoardName, FlightOptions, FlightSettings
 
 _OUTSIDE = tuple(name for name in get_args(BoardName) if name != "own")
-FLOWN = {"ardupilot": ("multirotor", "rover"), "px4": ("multirotor", "rover", "plane")}
+FLOWN = {"ardupilot": ("multirotor", "rover", "plane"), "px4": ("multirotor", "rover", "plane")}
 FAST = ("ardupilot", "multirotor")
 """Classes of airframes that each flies here, and who exchanges each millisecond."""
 _OURS_ALONE = {

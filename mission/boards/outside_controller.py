@@ -140,7 +140,7 @@ class OutsideController:
             self.state.roll_rad, self.state.pitch_rad, self.state.yaw_rad = attitude.roll, attitude.pitch, attitude.yaw
         elif not np.any(estimate["q_ned_from_frd"]):
             estimate["q_ned_from_frd"][3] = 1.0
-        if place is not None:
+        if place is not None and (place.lat or place.lon):  # 0, 0: it has no place yet
             lat_deg, lon_deg = degrees_from_e7(place.lat), degrees_from_e7(place.lon)
             estimate["pos_ned"] = ned_from_geodetic(lat_deg, lon_deg, _MILLI * place.alt, self._home)
             estimate["vel_ned"] = (_CENTI * place.vx, _CENTI * place.vy, _CENTI * place.vz)

@@ -83,7 +83,9 @@ def _ardupilot_board(
     rig: Rig, airframe: Airframe, config: FlightConfig, instance: int, on_wait: OnWait
 ) -> ArduPilotBoard:
     channels, port = pulse_channels(class_of(airframe).vehicle, airframe), JSON_PORT + _ARDUPILOT_STEP * instance
-    return ArduPilotBoard(rig, channels=channels, on_wait=on_wait, port=port, start_ne_m=config.start_ne_m)
+    return ArduPilotBoard(
+        rig, channels=channels, home=config.home, on_wait=on_wait, port=port, start_ne_m=config.start_ne_m
+    )
 
 
 def _px4_board(rig: Rig, airframe: Airframe, config: FlightConfig, instance: int, on_wait: OnWait) -> Px4Board:

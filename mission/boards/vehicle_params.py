@@ -2,8 +2,10 @@
 
 from common.airframe import Airframe
 from common.airframes.multirotor import MultirotorAirframe
+from common.airframes.plane import PlaneAirframe
 from common.airframes.rover import RoverAirframe
 from common.geodesy import GRAVITY_M_S2
+from mission.boards.ardupilot_plane import plane_params
 
 _FRAMES = {4: 1, 6: 2, 8: 3}  # ArduPilot's FRAME_CLASS by the number of motors
 _FRAME_X = 1
@@ -19,6 +21,8 @@ def ardupilot_params(airframe: Airframe) -> dict[str, float]:
         return quiet | downward | _ardupilot_copter(airframe)
     if isinstance(airframe, RoverAirframe):
         return quiet | _ardupilot_rover(airframe)
+    if isinstance(airframe, PlaneAirframe):
+        return quiet | downward | plane_params(airframe)
     return quiet
 
 

@@ -1,8 +1,8 @@
 """ArduPilot's SITL as a board, by its JSON interface: in lockstep, with all that goes wrong on the way.
 
 SITL sends its servos to our UDP port and waits; we move the body by a step and answer with its state, from which SITL
-makes its own sensors but the IMU, which is ours. Its main loop asks for 400 Hz of a copter, so that copters are
-exchanged each millisecond. Who has to be answered how: sim/boards/json_wire.py and `FrameCounter`.
+makes its own sensors but IMU, pitot tube and range finder, which are ours. Its main loop asks for 400 Hz of a copter,
+so that copters are exchanged each millisecond. Who has to be answered how: sim/boards/json_wire.py and `FrameCounter`.
 """
 
 import socket
@@ -11,10 +11,11 @@ from struct import Struct
 from typing import Any
 
 from common.clock import wall_time_s
+from common.geodesy import GeoPoint
 from common.kernels import MAX_MOTORS, SUBSTEPS, TICK_US
 from sim.boards.channels import Channel, commands_of
 from sim.boards.fast_imu import FastImu
-from sim.boards.json_wire import ServoPacket, range_key, servo_packet, state_text
+from sim.boards.json_wire import ServoPacket, airspeed_key, range_key, servo_packet, state_text
 from sim.boards.outside import POLL_S, OnWait, PeerError
 from sim.rig import Rig
 
@@ -64,6 +65,7 @@ class ArduPilotBoard:
     Args:
         rig: of one vehicle, on the CPU, whose body it flies.
         channels: which of its channels moves which actuator.
+        home: origin of ned.
         on_wait: what is done while it is silent.
         port: where it sends its servos to; 0: any free one.
         start_ne_m: where its vehicle boots [m], which is its home: its positions count from there.
@@ -78,6 +80,7 @@ class ArduPilotBoard:
         rig: Rig,
         *,
         channels: list[Channel | None],
+        home: GeoPoint,
         on_wait: OnWait,
         port: int = PORT,
         start_ne_m: tuple[float, float] = (0.0, 0.0),
@@ -91,7 +94,8 @@ class ArduPilotBoard:
         self.again_count = 0
         self.rubbish_count = 0
         self.foreign_count = 0
-        self._channels, self._on_wait, self._start_ne_m = channels, on_wait, start_ne_m
+        self._channels, self._home, self._start_ne_m = channels, home, start_ne_m
+        self._on_wait = on_wait
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((address, port))
@@ -128,9 +132,10 @@ class ArduPilotBoard:
         if self._sender is None:
             self._await([0.0] * MAX_MOTORS)  # which only begins the exchange
         self._time_ns += self._step_ns
-        row = samples.numpy()[0]
-        felt, extras = self._felt(row["imu"]), range_key(row["range"])
-        self._answer = state_text(self._time_ns, *felt, self._truth[0], extras, self._start_ne_m)
+        row, truth_row = samples.numpy()[0], self._truth[0]
+        felt = self._felt(row["imu"])
+        extras = airspeed_key(row["airspeed"], self._home.alt_m - truth_row["pos_ned"][2]) + range_key(row["range"])
+        self._answer = state_text(self._time_ns, *felt, truth_row, extras, self._start_ne_m)
         self._send()
 
     def take(self, commands: Any) -> None:
