@@ -31,7 +31,7 @@ def check_parameters(options: FlightOptions) -> None:
         UserError: the options describe no flight.
     """
     config = flight_config(options, None)
-    if options.board != "own":
+    if options.board not in ("own", "betaflight"):
         return
     try:
         flight_parameters(config, load_airframe(config.airframe))

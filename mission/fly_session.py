@@ -3,6 +3,7 @@
 Light to import: what is wrong is told, and a port that is taken, before anything heavy is loaded.
 """
 
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from common.airframe import load_airframe
 from common.files import write_whole
 from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
+from mission.boards.board_session import BETAFLIGHT, check_board
 from mission.connections import open_images, open_links, open_page, open_stream, open_video, signing_config
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import loading, print_line
@@ -35,7 +37,7 @@ def fly_session(options: FlightOptions) -> int:
     """
     speed = speed_of(options.speed)
     with ExitStack() as held:
-        if options.board != "own":
+        if options.board not in ("own", BETAFLIGHT):
             from mission.boards.board_session import fly_board
 
             home = flight_config(options, None).home
@@ -54,6 +56,8 @@ def fly_session(options: FlightOptions) -> int:
 def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None, held: ExitStack) -> int:
     """The flight, with what must be held until its end."""
     console = Console()
+    if options.board == BETAFLIGHT:
+        check_board(options)
     config = flight_config(options, state)
     plan = None if options.is_idle else _plan(options.plan, options.airframe, config.home)
     signing = signing_config(options, speed, state)
@@ -78,7 +82,14 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
         has_camera = speed is not None or stream is not None or page is not None
         load_kernels(say, config, has_camera=has_camera)
         say("building the world")
-        flight = Flight(
+        make_flight: Callable[..., Flight] = Flight
+        run = None
+        if options.board == BETAFLIGHT:
+            from mission.boards.betaflight_run import BetaflightRun
+
+            run = held.enter_context(closing(BetaflightRun(options, folder, console)))
+            make_flight = run.make_flight
+        flight = make_flight(
             config,
             links=links,
             folder=folder,
@@ -97,6 +108,8 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     _print_start(options, speed, folder, console)
     if page is not None:
         print_line(console, f"live page: {page.url}")
+    if run is not None:
+        run.start(flight)
     try:
         return fly_to_the_end(flight, plan, options, speed, page, folder, console)
     finally:

@@ -24,14 +24,17 @@ from mission.run_folder import run_folder
 from sim.boards.outside import PeerError
 
 if TYPE_CHECKING:
+    from mission.boards.betaflight_run import BetaflightRun
     from mission.boards.board_flight import BoardFlight
 
 PATIENCE_S = 120.0  # of wall clock time, that an autopilot may be silent
 REPORTED_S = 2.0  # of silence, after which it is said what is waited for
 PACE_MAX = 20.0  # guess: how much faster than real time a flight in lockstep is at most, for time-outs of links
-FLOWN = {"ardupilot": ("multirotor", "rover"), "px4": ("multirotor",)}
-FAST = ("ardupilot", "multirotor")
+FLOWN = {"ardupilot": ("multirotor", "rover"), "px4": ("multirotor",), "betaflight": ("multirotor",)}
+FAST = (("ardupilot", "multirotor"), ("betaflight", "multirotor"))
 """Classes of airframes that each flies here, and who exchanges each millisecond."""
+BETAFLIGHT = "betaflight"
+"""Flies under our own flight controller, which then has all that it ever has."""
 _OURS_ALONE = {
     "dialect": "--dialect", "announces_components": "--announce-components", "traffic_count": "--traffic",
     "has_lidar": "--lidar", "has_base": "--rtk", "stream_port": "--stream-port", "video_port": "--video-port",
@@ -45,16 +48,18 @@ def check_board(options: FlightOptions) -> None:
     Raises:
         UserError: there is one.
     """
-    for name, flag in _OURS_ALONE.items():
+    for name, flag in () if options.board == BETAFLIGHT else _OURS_ALONE.items():
         if getattr(options, name) != FlightOptions.model_fields[name].default:
             raise UserError(f"{flag} and --board {options.board}: choose one; the first is our own flight controller's")
     vehicle = load_airframe(options.airframe).vehicle
     if vehicle not in FLOWN[options.board]:
         raise UserError(f"--board {options.board}: it flies no {vehicle} here")
-    if (options.board, vehicle) == FAST and options.engine != "native":
+    if (options.board, vehicle) in FAST and options.engine != "native":
         raise UserError(f"--board {options.board} and --engine {options.engine}: only the native one gives it 1,000 Hz")
     if options.board == "px4" and options.noise == 0.0:
         raise UserError("--noise 0 and --board px4: it takes sensors that never change for broken; use --noise 0.1")
+    if options.board == BETAFLIGHT and options.instance != 0:
+        raise UserError("--instance and --board betaflight: choose one; its ports are always the same")
 
 
 class Watch:
@@ -63,10 +68,11 @@ class Watch:
     Args:
         name: of the autopilot.
         console: where its console is shown.
+        hidden: how lines of it begin that are not shown.
     """
 
-    def __init__(self, name: str, console: Console) -> None:
-        self._name, self._console = name, console
+    def __init__(self, name: str, console: Console, hidden: tuple[str, ...] = ()) -> None:
+        self._name, self._console, self._hidden = name, console, hidden
         self.hint = ""  # what it has to do to be heard
         self.process: PeerProcess | None = None
         self._is_reported = False
@@ -74,6 +80,8 @@ class Watch:
     def __call__(self, silent_s: float) -> None:
         if self.process is not None:
             for line in self.process.lines():
+                if line.startswith(self._hidden):
+                    continue
                 print_line(self._console, f"{self._name} | {line}")
             self.process.check()
         if silent_s < REPORTED_S:
@@ -141,6 +149,15 @@ class PeerRun:
 
     def close(self) -> None:
         self._watch.close()
+
+
+def run_of(options: FlightOptions, folder: Path, console: Console) -> "PeerRun | BetaflightRun":
+    """The autopilot that the options name, for the length of a flight."""
+    if options.board == BETAFLIGHT:
+        from mission.boards.betaflight_run import BetaflightRun
+
+        return BetaflightRun(options, folder, console)
+    return PeerRun(options, folder, console)
 
 
 def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, held: ExitStack) -> int:

@@ -20,7 +20,7 @@ from common.airframe import AirframeError, load_airframe
 from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
-from mission.boards.board_session import PeerRun, check_board, station_links
+from mission.boards.board_session import check_board, run_of, station_links
 from mission.connections import open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
@@ -82,7 +82,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         make_flight: Callable[..., FlightBase] = Flight
         peer_run = None
         if options.board != "own":
-            peer_run = held.enter_context(closing(PeerRun(options, folder, console)))
+            peer_run = held.enter_context(closing(run_of(options, folder, console)))
             make_flight = partial(peer_run.make_flight, has_companion=True)
         flight, companion = flight_with_companion(
             config,
@@ -136,6 +136,7 @@ def _links(options: FollowOptions, config: FlightConfig, speed: float | None) ->
     """
     if options.board != "own":
         check_board(options)
+    if options.board not in ("own", "betaflight"):
         return station_links(options, speed)
     try:
         flight_parameters(config, load_airframe(config.airframe))
