@@ -28,6 +28,7 @@ _PROGRAMS = "firmware/obj/betaflight_*_SITL"
 _BOX_ARM, _BOX_ANGLE, _BOX_AIRMODE = 0, 1, 28
 _SWITCHED_ON = "1700 2100"  # [us]
 _IDLE_MAX = 0.2
+_FAILSAFE_DELAY = 200  # [0.1 s] of its clock, which may leap; a radio link that is lost is our flight controller's
 PROMPT, ERROR = b"\r\n# ", "###"
 REACHED_S, ANSWER_S, LINE_S = 20.0, 1.0, 5.0  # of wall clock time
 _READ_S = 0.1
@@ -67,10 +68,12 @@ def settings(airframe: MultirotorAirframe) -> list[str]:
         "small_angle": 180,  # armed on any slope: our flight controller judges that
         "auto_disarm_delay": 0,
         "runaway_takeoff_prevention": "OFF",
+        "failsafe_delay": _FAILSAFE_DELAY,
     }
     return [
         *(f"aux {k} {box} {channel} {_SWITCHED_ON} 0 0" for k, (box, channel) in enumerate(switches)),
         "feature -AIRMODE",
+        *(f"rxfail {channel} h" for channel in range(4)),
         *(f"set {name} = {value}" for name, value in values.items()),
     ]
 

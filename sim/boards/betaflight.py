@@ -27,7 +27,7 @@ from sim.rig import Rig
 MOTORS_PORT, STATE_PORT, STICKS_PORT = 9001, 9003, 9004
 VARIANT, VERSION = b"BTFL", (4, 6)
 SETTLE_ANSWERS = 100  # before the first sticks: those that come before its receiver is made are its last
-ANSWER_S = 0.01  # of wall clock time; then the state is sent again
+ANSWER_S = 0.004  # of wall clock time; then the state is sent again
 SILENT_S = 0.5  # without an answer it may have gone; a state that comes while it starts would end it
 WAITING_PACE_S = 1e-3  # between states while it settles
 ARMS_US = 2_000_000  # of simulated time, in which it arms
@@ -180,22 +180,24 @@ class BetaflightBoard:
 
     def _await(self) -> None:
         """Waits until it is there, and has settled."""
-        begun_s = looked_s = wall_time_s()
-        count, sender = 0, None
+        begun_s = heard_s = looked_s = wall_time_s()
+        count, is_reached, sender = 0, False, None
         while count < SETTLE_ANSWERS:
             now_s = wall_time_s()
             if now_s - looked_s >= POLL_S:
                 looked_s = now_s
                 self._on_wait(now_s - begun_s)
-            if sender is None and not self._is_reached():
-                wall_sleep_s(POLL_S)
+            if not is_reached:
+                is_reached, heard_s = self._is_reached(), wall_time_s()
+                wall_sleep_s(WAITING_PACE_S if is_reached else POLL_S)
                 continue
             self._send_state(RUNNING)
             received = self._receive()
             if received is not None:
-                count, begun_s = count + 1, now_s
-                sender = received[1]
+                begun_s = heard_s = now_s
+                count, sender = count + 1, received[1]
                 wall_sleep_s(WAITING_PACE_S)
+            is_reached = now_s - heard_s < SILENT_S
         self._sender, self._commands, self._unarmed_us = sender, [0.0] * MOTOR_COUNT, 0
 
     def _is_reached(self) -> bool:
