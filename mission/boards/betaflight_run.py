@@ -1,6 +1,7 @@
 """Betaflight for the length of a flight: its program found, set up, started, watched, and ended with the flight."""
 
 import socket
+from collections.abc import Callable
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -20,12 +21,16 @@ from mission.console.terminal import print_line
 from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig
 from mission.flight_settings import FlightOptions
-from sim.boards.outside import PeerError
+from sim.boards import betaflight_msp as msp
+from sim.boards.outside import POLL_S, PeerError
 
 if TYPE_CHECKING:
     from mission.boards.betaflight_flight import BetaflightFlight
 
 SETUP = "setup.txt"
+TRIES = 5
+STARTS_S = 4.0  # of wall clock time, in which it answers; it takes half a second
+ANSWER_S = 1.0
 ENDS_S = 10.0  # of wall clock time, in which it saves and ends
 _PORTS = (9003, 9004)
 _HIDDEN = ("[FLASH_ProgramWord]",)  # a line for each word that it saves
@@ -78,8 +83,8 @@ class BetaflightRun:
         start = partial(PeerProcess, command, own, {})
         try:
             check_ports_free()
-            self._set_up(start(own / "setup.log"))
-            self._watch.process = start(own / "console.log")
+            self._set_up(started(partial(start, own / "setup.log")))
+            self._watch.process = started(partial(start, own / "console.log"))
         except PeerError as error:
             flight.close()
             raise UserError(str(error)) from error
@@ -106,6 +111,28 @@ class BetaflightRun:
 
     def close(self) -> None:
         self._watch.close()
+
+
+def started(start: Callable[[], PeerProcess]) -> PeerProcess:
+    """A program that answers: its server may be lost in a race of its threads when it starts, and then never does.
+
+    Raises:
+        PeerError: it has ended, or does not answer.
+    """
+    for _ in range(TRIES):
+        process = start()
+        end_s = wall_time_s() + STARTS_S
+        try:
+            while wall_time_s() < end_s:
+                if msp.ask(msp.FC_VERSION, answer_s=ANSWER_S) is not None:
+                    return process
+                process.check()
+                wall_sleep_s(POLL_S)
+        except PeerError:
+            process.close()
+            raise
+        process.close()
+    raise PeerError(f"Betaflight does not answer at TCP port {msp.PORT}, though it was started {TRIES} times")
 
 
 def check_ports_free() -> None:

@@ -20,6 +20,7 @@ from sim.boards.betaflight_sticks import (
     AUX_ARM,
     MIN_CHECK_US,
     RATE_LIMIT_DEG_S,
+    hover_us,
 )
 from sim.boards.outside import PeerError
 
@@ -28,7 +29,6 @@ _PROGRAMS = "firmware/obj/betaflight_*_SITL"
 _BOX_ARM, _BOX_ANGLE, _BOX_AIRMODE = 0, 1, 28
 _SWITCHED_ON = "1700 2100"  # [us]
 _IDLE_MAX = 0.2
-_FAILSAFE_DELAY = 200  # [0.1 s] of its clock, which may leap; a radio link that is lost is our flight controller's
 PROMPT, ERROR = b"\r\n# ", "###"
 REACHED_S, ANSWER_S, LINE_S = 20.0, 1.0, 5.0  # of wall clock time
 _READ_S = 0.1
@@ -68,7 +68,13 @@ def settings(airframe: MultirotorAirframe) -> list[str]:
         "small_angle": 180,  # armed on any slope: our flight controller judges that
         "auto_disarm_delay": 0,
         "runaway_takeoff_prevention": "OFF",
-        "failsafe_delay": _FAILSAFE_DELAY,
+        # Its clock may leap, and its link seems lost for a moment: it flies on. Lost links are ours to judge.
+        "failsafe_delay": 200,
+        "failsafe_procedure": "AUTO-LAND",
+        "failsafe_throttle": hover_us(airframe),
+        "failsafe_throttle_low_delay": 300,
+        "failsafe_landing_time": 250,
+        "failsafe_recovery_delay": 1,
     }
     return [
         *(f"aux {k} {box} {channel} {_SWITCHED_ON} 0 0" for k, (box, channel) in enumerate(switches)),

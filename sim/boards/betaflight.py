@@ -15,7 +15,7 @@ import warp as wp
 
 from common.airframes.multirotor import MultirotorAirframe
 from common.clock import wall_sleep_s, wall_time_s
-from common.kernels import SUBSTEPS, vec8
+from common.kernels import SUBSTEPS, TICK_US, vec8
 from sim.boards import betaflight_msp as msp
 from sim.boards.betaflight_sticks import AT_REST_US, Sticks
 from sim.boards.betaflight_wire import MOTOR_COUNT, PeerClock, motor_commands, state_packet, sticks_packet
@@ -31,6 +31,7 @@ ANSWER_S = 0.004  # of wall clock time; then the state is sent again
 SILENT_S = 0.5  # without an answer it may have gone; a state that comes while it starts would end it
 WAITING_PACE_S = 1e-3  # between states while it settles
 ARMS_US = 2_000_000  # of simulated time, in which it arms
+STOPS_US = 100_000  # for which armed motors that have turned stand
 RUNNING, STOPPED = 1.0, 0.0  # rates of its clock
 _WAIT = Struct("ll").pack(0, round(ANSWER_S * 1e6))  # as of struct timeval
 _READ_MAX = 256
@@ -89,6 +90,7 @@ class BetaflightBoard:
         self._sender: Any = None
         self._is_to_disarm = False  # it has started while our flight controller was armed
         self._unarmed_us = 0  # for how long it has been asked to arm in vain
+        self._is_turning = False  # its motors have turned since it was asked to arm
         self._substep = 0
         self._attitude: list[float] = [0.0, 0.0, 0.0, 1.0]
         self._pressure_pa = 0.0
@@ -131,14 +133,19 @@ class BetaflightBoard:
         self._send(self._sticks_at, sticks_packet(wall_time_s(), channels_us))
 
     def _check_armed(self, is_armed: bool) -> None:
-        if not is_armed or any(self._commands):
-            self._unarmed_us = 0
+        """Ends the flight if it does not arm, or has disarmed by itself."""
+        is_turning = any(self._commands)
+        if is_turning or not is_armed:
+            self._is_turning, self._unarmed_us = is_turning and is_armed, 0
             return
-        self._unarmed_us += 4_000
-        if self._unarmed_us > ARMS_US:
-            self._send_state(RUNNING)
-            reasons = msp.arming_reasons(msp.ask(msp.STATUS_EX, self._address, self._msp_port) or b"")
-            raise PeerError(f"Betaflight does not arm ({' '.join(reasons) or 'it gives no reason'}): see its set-up")
+        self._unarmed_us += TICK_US
+        if self._unarmed_us < (STOPS_US if self._is_turning else ARMS_US):
+            return
+        self._send_state(RUNNING)
+        reasons = msp.arming_reasons(msp.ask(msp.STATUS_EX, self._address, self._msp_port) or b"")
+        told = " ".join(reasons) or "it gives no reason"
+        what = "has disarmed by itself" if self._is_turning else "does not arm"
+        raise PeerError(f"Betaflight {what} ({told})")
 
     def _fly(self) -> None:
         """One state, and the loop that answers it."""
@@ -198,7 +205,8 @@ class BetaflightBoard:
                 count, sender = count + 1, received[1]
                 wall_sleep_s(WAITING_PACE_S)
             is_reached = now_s - heard_s < SILENT_S
-        self._sender, self._commands, self._unarmed_us = sender, [0.0] * MOTOR_COUNT, 0
+        self._sender, self._commands = sender, [0.0] * MOTOR_COUNT
+        self._unarmed_us, self._is_turning = 0, False
 
     def _is_reached(self) -> bool:
         """Whether one runs that has started up and is of the right version."""

@@ -10,6 +10,7 @@ from typing import Any
 from autopilot.ports import SETPOINT_IDLE, SETPOINT_RATE
 from common.airframes.multirotor import MultirotorAirframe
 from common.attitude import inverse, product, quat_of, rotated, yaw_of
+from common.geodesy import GRAVITY_M_S2
 
 ANGLE_LIMIT_DEG = 60.0
 """Lean at full stick, in angle mode."""
@@ -26,6 +27,13 @@ AT_REST_US = (MIDDLE_US, MIDDLE_US, LOW_US, MIDDLE_US, *(LOW_US,) * 4, *(MIDDLE_
 _DOWN = (0.0, 0.0, 1.0)
 
 
+def hover_us(airframe: MultirotorAirframe) -> int:
+    """The throttle that carries it."""
+    rotors = airframe.rotor_model
+    largest_n = len(airframe.rotors) * rotors.thrust_n_s2 * rotors.max_speed_rad_s**2
+    return Sticks(airframe).throttle_us(airframe.body.mass_kg * GRAVITY_M_S2 / largest_n)
+
+
 class Sticks:
     """The hand at the sticks.
 
@@ -37,9 +45,7 @@ class Sticks:
         self._curve = airframe.rotor_model.command_curve
         self._idle = airframe.rotor_model.idle_command
 
-    def channels_us(
-        self, setpoint: Any, control: Any, q_ned_from_frd: Any, *, is_low: bool = False
-    ) -> tuple[int, ...]:
+    def channels_us(self, setpoint: Any, control: Any, q_ned_from_frd: Any, *, is_low: bool = False) -> tuple[int, ...]:
         """The 16 channels: roll, pitch, throttle, yaw, then switches.
 
         Args:

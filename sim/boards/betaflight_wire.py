@@ -73,7 +73,7 @@ class PeerClock:
     stamps over that of their arrivals. So stamps that grow by a fraction of what the wall's clock does set that rate.
     """
 
-    STEP_MAX_S = 2e-3  # two that arrive together, though they were sent apart, make it run the faster the larger it is
+    STEP_MAX_S = 1e-3  # two that arrive together, though they were sent apart, make it run the faster the larger it is
     STEP_MIN_S = 1e-9  # a stamp that stands changes nothing
 
     def __init__(self) -> None:
