@@ -33,6 +33,8 @@ NAMES = set(
     "failsafe_throttle_low_delay failsafe_landing_time failsafe_recovery_delay".split()
 )
 EEPROM = "eeprom.bin"
+PORTS = (9001, 9003, 9004, 5761)
+"""Of motors, states, sticks, and its first UART."""
 
 
 class State(NamedTuple):
@@ -321,24 +323,26 @@ def _udp(port: int) -> socket.socket:
     return made
 
 
-def program(motors_port: int, state_port: int, sticks_port: int, msp_port: int) -> None:
-    """As the original in its folder: until it is told to save, or killed."""
+def program(loops: int | None) -> None:
+    """As the original in its folder: until it is told to save, or killed; or for so many loops, once it is set up."""
     eeprom = Path(EEPROM)
-    flown = BetaflightStandIn(motors_port, state_port, sticks_port, msp_port, is_set_up=eeprom.exists())
+    is_set_up = eeprom.exists()
+    flown = BetaflightStandIn(*PORTS, is_set_up=is_set_up)
     while not flown.command_line.is_saved.is_set():
         flown.step(0.1)
+        if is_set_up and loops is not None and flown.loop_count >= loops:
+            sys.exit(3)
     eeprom.write_text("\n".join(flown.command_line.lines))
-    for line in range(3):
-        print(f"[FLASH_ProgramWord]{line:#x}")
+    for word in range(3):
+        print(f"[FLASH_ProgramWord]{word:#x}")
     flown.close()
 
 
-def main(motors_port: int, state_port: int, sticks_port: int, msp_port: int, seconds: float) -> None:
+def measured(motors_port: int, state_port: int, sticks_port: int, msp_port: int, seconds: float) -> None:
     """Answers at once for some simulated seconds, then tells what it has counted."""
     flown = BetaflightStandIn(motors_port, state_port, sticks_port, msp_port)
-    flown.run(SETTLES_LOOPS + 50)
-    flown.loop_count = 0
-    while flown.loop_count < seconds / LOOP_S and flown.step(5.0):
+    loops = round(seconds / LOOP_S)
+    while flown.loop_count < loops and flown.step(5.0):
         pass
     flown.close()
     exchanged_us = round(flown.loop_count * LOOP_S * 1e6)
@@ -346,8 +350,7 @@ def main(motors_port: int, state_port: int, sticks_port: int, msp_port: int, sec
 
 
 if __name__ == "__main__":
-    PORTS = [int(text) for text in sys.argv[1:5]] if len(sys.argv) > 4 else [9001, 9003, 9004, 5761]
-    if len(sys.argv) > 5:
-        main(*PORTS, float(sys.argv[5]))
+    if len(sys.argv) > 3:
+        measured(*map(int, sys.argv[1:5]), float(sys.argv[5]))
     else:
-        program(*PORTS)
+        program(int(sys.argv[2]) if len(sys.argv) > 2 else None)
