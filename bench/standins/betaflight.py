@@ -341,7 +341,7 @@ def program(loops: int | None) -> None:
 def measured(motors_port: int, state_port: int, sticks_port: int, msp_port: int, seconds: float) -> None:
     """Answers at once for some simulated seconds, then tells what it has counted."""
     flown = BetaflightStandIn(motors_port, state_port, sticks_port, msp_port)
-    loops = round(seconds / LOOP_S)
+    loops = round(1.05 * seconds / LOOP_S) + 4 * SETTLES_LOOPS  # it settles, and some states come twice
     while flown.loop_count < loops and flown.step(5.0):
         pass
     flown.close()

@@ -81,6 +81,8 @@ class BetaflightBoard:
             raise PeerError(f"UDP port {ports[0]} for Betaflight is in use ({error.strerror})") from error
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _WAIT)
         self.local_port: int = self._socket.getsockname()[1]
+        self.ports = (self.local_port, *ports[1:], msp_port)
+        """Of motors, states, sticks, and questions."""
         self._own, self._imu, self._sticks = OwnBoard(rig), FastImu(rig), Sticks(airframe)
         self._own_commands = wp.zeros(1, dtype=vec8)  # what our own cascade would do: not flown
         autopilot = rig.arrays.autopilot

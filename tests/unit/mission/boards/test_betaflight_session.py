@@ -1,4 +1,4 @@
-"""`honeyguide fly --board betaflight`: what it refuses, its set-up, and a flight by a stand-in from its first start on."""
+"""`honeyguide fly --board betaflight`: what it refuses, its set-up, and a flight by a stand-in from its first start."""
 
 import json
 import socket
