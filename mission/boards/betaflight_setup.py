@@ -8,8 +8,11 @@ import socket
 from collections.abc import Callable
 from contextlib import suppress
 from importlib.util import find_spec
+from math import degrees, sqrt
 from pathlib import Path
 
+from autopilot.vehicles.multirotor.control_airframe import effectiveness
+from autopilot.vehicles.multirotor.defaults import hover_thrust
 from common.airframes.multirotor import MultirotorAirframe
 from common.clock import wall_sleep_s, wall_time_s
 from sim.boards.betaflight_msp import PORT
@@ -29,6 +32,9 @@ _PROGRAMS = "firmware/obj/betaflight_*_SITL"
 _BOX_ARM, _BOX_ANGLE, _BOX_AIRMODE = 0, 1, 28
 _SWITCHED_ON = "1700 2100"  # [us]
 _IDLE_MAX = 0.2
+_TILT_P, _YAWRATE_P = 8.0, 10.0  # [1/s] of our own controller: MC_ROLL_P, MC_YAWRATE_P_ACC
+_GAIN_MAX = 250
+_P_SCALE = 0.032029  # of its gains: of the mix in thousandths, per deg/s
 PROMPT, ERROR = b"\r\n# ", "###"
 REACHED_S, ANSWER_S, LINE_S = 20.0, 1.0, 5.0  # of wall clock time
 _READ_S = 0.1
@@ -58,6 +64,8 @@ def settings(airframe: MultirotorAirframe) -> list[str]:
         "motor_idle": round(1e4 * idle),
         "min_check": MIN_CHECK_US,
         "angle_limit": round(ANGLE_LIMIT_DEG),
+        "angle_p_gain": round(10.0 * _TILT_P),
+        "p_yaw": yaw_gain(airframe),
         "rates_type": "ACTUAL",
         **{f"{axis}_expo": 0 for axis in ("roll", "pitch", "yaw")},
         **{f"{axis}_rc_rate": round(0.1 * RATE_LIMIT_DEG_S) for axis in ("roll", "pitch", "yaw")},
@@ -82,6 +90,22 @@ def settings(airframe: MultirotorAirframe) -> list[str]:
         *(f"rxfail {channel} h" for channel in range(4)),
         *(f"set {name} = {value}" for name, value in values.items()),
     ]
+
+
+def yaw_gain(airframe: MultirotorAirframe) -> int:
+    """Its P of yaw that turns a vehicle with such arms and rotors as quickly as ours does; its own is for smaller ones.
+
+    Roll and pitch stay its own: theirs is 34 1/s on the x500, ours 25 1/s.
+    """
+    rotor = airframe.rotor_model
+    speed = sqrt(hover_thrust(airframe))
+    straight = 1.0 - rotor.command_curve
+    root = 2.0 * speed / (straight + sqrt(straight * straight + 4.0 * rotor.command_curve * speed))
+    slope = rotor.command_curve + 0.5 * straight / root  # of the speed over the command
+    thrust_slope_n = 2.0 * rotor.thrust_n_s2 * rotor.max_speed_rad_s**2 * speed * slope
+    torque_n_m = float(abs(effectiveness(airframe)[2]).sum()) * thrust_slope_n * (1.0 - rotor.idle_command)
+    per_gain = degrees(1e-3 * _P_SCALE) * torque_n_m / airframe.body.inertia_zz_kg_m2
+    return min(round(_YAWRATE_P / per_gain), _GAIN_MAX)
 
 
 class CommandLine:

@@ -8,9 +8,9 @@ from math import asin, atan2, degrees, sqrt
 from typing import Any
 
 from autopilot.ports import SETPOINT_IDLE, SETPOINT_RATE
+from autopilot.vehicles.multirotor.defaults import hover_thrust
 from common.airframes.multirotor import MultirotorAirframe
 from common.attitude import inverse, product, quat_of, rotated, yaw_of
-from common.geodesy import GRAVITY_M_S2
 
 ANGLE_LIMIT_DEG = 60.0
 """Lean at full stick, in angle mode."""
@@ -29,9 +29,7 @@ _DOWN = (0.0, 0.0, 1.0)
 
 def hover_us(airframe: MultirotorAirframe) -> int:
     """The throttle that carries it."""
-    rotors = airframe.rotor_model
-    largest_n = len(airframe.rotors) * rotors.thrust_n_s2 * rotors.max_speed_rad_s**2
-    return Sticks(airframe).throttle_us(airframe.body.mass_kg * GRAVITY_M_S2 / largest_n)
+    return Sticks(airframe).throttle_us(hover_thrust(airframe))
 
 
 class Sticks:

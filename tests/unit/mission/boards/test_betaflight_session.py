@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from bench.standins.betaflight import BetaflightStandIn
 from common.airframe import load_airframe
 from mission.boards import betaflight_run
-from mission.boards.betaflight_setup import CommandLine, settings
+from mission.boards.betaflight_setup import CommandLine, settings, yaw_gain
 from mission.cli import app
 from sim.boards.outside import PeerError
 
@@ -100,6 +100,12 @@ def test_every_setting_is_known_to_it(name):
             command_line.say("set no_such = 1")
         command_line.save()
         assert peer.command_line.is_saved.wait(1.0)
+
+
+def test_yaw_is_as_quick_as_ours():
+    gains = [yaw_gain(load_airframe(name)) for name in ("x500", "f450")]
+    assert gains[0] == 250  # 268 would be the same as ours: 10 1/s of 0.03 kg m², by 0.61 N m for all of the mix
+    assert 45 < gains[1] <= 250  # 45 is its own
 
 
 def test_motors_that_idle_too_fast_are_refused():
