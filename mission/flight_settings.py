@@ -15,8 +15,10 @@ from mission.console.model_command import option
 
 Pace = Literal["walk", "run"]
 EngineName = Literal["native", "pybullet", "jsbsim"]
-BoardName = Literal["own", "ardupilot", "px4"]
+BoardName = Literal["own", "ardupilot", "px4", "betaflight"]
 WorldKind = Literal["hills", "forest", "walled-forest", "course", "car-park"]
+OURS: tuple[BoardName, ...] = ("own", "betaflight")
+"""Under these it is our own flight controller that flies, with its options, parameters and links."""
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
 
 
@@ -49,7 +51,9 @@ class FlightSettings(BaseModel):
 class FlightOptions(FlightSettings):
     """The options of `honeyguide fly`, as given: the settings, what several of which make, and the session's own."""
 
-    board: BoardName = option("own", "Who flies: own, or another program: ardupilot or px4 (docs/boards.md).")
+    board: BoardName = option(
+        "own", "Who flies: own, or another program: ardupilot, px4 or betaflight (docs/boards.md)."
+    )
     command: tuple[str, ...] = option(
         (),
         "Starts that program: {folder}, {params}, {home}, {instance} and {vehicle} are filled in. Of several "

@@ -5,11 +5,15 @@ from typing import get_args
 
 from common.airframe import load_airframe
 from mission.console.option_checks import UserError
-from mission.flight_settings import BoardName, FlightOptions, FlightSettings
+from mission.flight_settings import OURS, BoardName, FlightOptions, FlightSettings
 
 _OUTSIDE = tuple(name for name in get_args(BoardName) if name != "own")
-FLOWN = {"ardupilot": ("multirotor", "rover", "plane"), "px4": ("multirotor", "rover", "plane")}
-FAST = ("ardupilot", "multirotor")
+FLOWN = {
+    "ardupilot": ("multirotor", "rover", "plane"),
+    "px4": ("multirotor", "rover", "plane"),
+    "betaflight": ("multirotor",),
+}
+FAST = (("ardupilot", "multirotor"), ("betaflight", "multirotor"))
 """Classes of airframes that each flies here, and who exchanges each millisecond."""
 _OURS_ALONE = {
     "dialect": "--dialect", "announces_components": "--announce-components", "traffic_count": "--traffic",
@@ -35,7 +39,10 @@ def check_board(options: FlightOptions) -> None:
     Raises:
         UserError: there is one.
     """
-    check_ours(options, options.board)
+    if options.board not in OURS:
+        check_ours(options, options.board)
+    elif options.instance != 0:
+        raise UserError(f"--instance and --board {options.board}: choose one; its ports are always the same")
     check_flown(options, options.airframe, options.board)
     commands_of(options.command, [options.board])
 
@@ -49,7 +56,7 @@ def check_flown(settings: FlightSettings, airframe: str, board: BoardName) -> No
     vehicle = load_airframe(airframe).vehicle
     if vehicle not in FLOWN[board]:
         raise UserError(f"--board {board}: it flies no {vehicle} here")
-    if (board, vehicle) == FAST and settings.engine != "native":
+    if (board, vehicle) in FAST and settings.engine != "native":
         raise UserError(f"--board {board} and --engine {settings.engine}: only the native one gives it 1,000 Hz")
     if board == "px4" and settings.noise == 0.0:
         raise UserError("--noise 0 and --board px4: it takes sensors that never change for broken; use --noise 0.1")

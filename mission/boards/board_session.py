@@ -26,6 +26,7 @@ from sim.boards.outside import PeerError
 from sim.bodies.vehicles import class_of
 
 if TYPE_CHECKING:
+    from mission.boards.betaflight_run import BetaflightRun
     from mission.boards.board_flight import BoardFlight
     from mission.flight_base import FlightBase
 
@@ -41,10 +42,11 @@ class Watch:
         name: of the autopilot.
         say: shows a line.
         shows_console: what the program says is shown, too.
+        hidden: how lines of it begin that are never shown.
     """
 
-    def __init__(self, name: str, say: Say, *, shows_console: bool = True) -> None:
-        self._name, self._say, self._shows_console = name, say, shows_console
+    def __init__(self, name: str, say: Say, *, shows_console: bool = True, hidden: tuple[str, ...] = ()) -> None:
+        self._name, self._say, self._shows_console, self._hidden = name, say, shows_console, hidden
         self.hint = ""  # what it has to do to be heard
         self.process: PeerProcess | None = None
         self._is_reported = False
@@ -52,7 +54,7 @@ class Watch:
     def __call__(self, silent_s: float) -> None:
         if self.process is not None:
             for line in self.process.lines():
-                if self._shows_console:
+                if self._shows_console and not line.startswith(self._hidden):
                     self._say(f"{self._name} | {line}")
             self.process.check()
         if silent_s < REPORTED_S:
@@ -165,6 +167,15 @@ class PeerRun:
 
     def close(self) -> None:
         self._watch.close()
+
+
+def run_of(options: FlightOptions, folder: Path, console: Console) -> "PeerRun | BetaflightRun":
+    """The autopilot that the options name, for the length of a flight."""
+    if options.board == "betaflight":
+        from mission.boards.betaflight_run import BetaflightRun
+
+        return BetaflightRun.of(options, folder, console)
+    return PeerRun.of(options, folder, console)
 
 
 def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, held: ExitStack) -> int:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from mission.boards.betaflight_run import BetaflightRun
 from mission.boards.board_session import BoardRun, PeerRun
 from mission.console.terminal import Say
 from mission.fleet.fleet_options import Member
@@ -31,6 +32,7 @@ def board_runs(
             return None
         own, whose = folder / f"vehicle-{i + 1}", f" of vehicle {i + 1}"
         command = commands.get(member.board)
-        return PeerRun(member.board, command, own, say, instance=i, whose=whose, shows_console=shows_consoles)
+        run = BetaflightRun if member.board == "betaflight" else PeerRun
+        return run(member.board, command, own, say, instance=i, whose=whose, shows_console=shows_consoles)
 
     return [run_of(i, member) for i, member in enumerate(members)]

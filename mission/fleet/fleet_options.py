@@ -9,7 +9,7 @@ from typing import NamedTuple, cast, get_args
 from common.airframe import AirframeError, load_airframe
 from mission.boards.board_options import check_flown, check_ours, commands_of
 from mission.console.option_checks import UserError, check_engine
-from mission.flight_settings import BoardName, FlightOptions, FlightSettings
+from mission.flight_settings import OURS, BoardName, FlightOptions, FlightSettings
 
 VEHICLES_MAX = 100
 
@@ -74,7 +74,7 @@ def check_fleet(options: FlightOptions) -> None:
     check_members(options, members)
     boards = boards_of(members)
     commands_of(options.command, boards)
-    if all(member.board != "own" for member in members):
+    if not any(member.board in OURS for member in members):
         check_ours(options, boards[0])
 
 
@@ -91,3 +91,5 @@ def check_members(settings: FlightSettings, members: Sequence[Member]) -> None:
                 check_flown(settings, airframe, board)
     except AirframeError as error:
         raise UserError(f"--vehicles: {error}") from error
+    if sum(member.board == "betaflight" for member in members) > 1:
+        raise UserError("--vehicles: one Betaflight at most; its ports are always the same")

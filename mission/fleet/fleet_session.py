@@ -26,7 +26,7 @@ from mission.fleet.fleet_options import Member, boards_of, members_of
 from mission.fleet.roster import check_fleet_parameters, fleet_configs
 from mission.flight_config import start_of
 from mission.flight_options import flight_config
-from mission.flight_settings import FlightOptions
+from mission.flight_settings import OURS, FlightOptions
 from mission.plan.plan_file import Plan, PlanError, default_plan, moved_plan, read_plan
 from mission.run_folder import OwnFiles, run_folder
 
@@ -78,7 +78,7 @@ def _open_all(
     links: list[list[LinkSource]] = []
     for i, member in enumerate(members):
         own: list[LinkSource] = []
-        if member.board != "own":
+        if member.board not in OURS:
             check_ports(member.board, i)
             alone = {"board": member.board, "instance": i, "tcp_port": None}  # it has TCP ports of its own there
             own = station_links(options.model_copy(update=alone), speed)

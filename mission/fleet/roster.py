@@ -12,6 +12,7 @@ from common.params import ParameterError
 from mission.console.option_checks import UserError
 from mission.fleet.fleet_options import Member
 from mission.flight_config import FlightConfig, flight_parameters
+from mission.flight_settings import OURS
 from sim.world.world import WorldMap
 
 SPACING_M = 10.0  # less, and rovers on the default mission run over who has landed
@@ -59,7 +60,7 @@ def check_fleet_parameters(base: FlightConfig, members: Sequence[Member]) -> Non
     known: set[str] = set()
     for member in dict.fromkeys(members):
         own = _own_parameters(base, member, 1)
-        if member.board == "own":
+        if member.board in OURS:
             flight_parameters(base.model_copy(update={"parameters": own}), load_airframe(member.airframe))
         known |= own.keys()
     unknown = {name: value for name, value in base.parameters.items() if name not in known}
@@ -74,7 +75,7 @@ def _own_parameters(base: FlightConfig, member: Member, number: int) -> dict[str
     """
     if SYSID_PARAMETER in base.parameters:
         raise ParameterError(f"{SYSID_PARAMETER}: several vehicles are numbered from 1, leave it out")
-    if member.board != "own":
+    if member.board not in OURS:
         return base.parameters
     has = flight_parameters(base.model_copy(update={"parameters": {}}), load_airframe(member.airframe))
     return {name: value for name, value in base.parameters.items() if name in has} | {SYSID_PARAMETER: float(number)}

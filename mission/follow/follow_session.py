@@ -21,7 +21,7 @@ from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
 from mission.boards.board_options import check_board
-from mission.boards.board_session import PeerRun, station_links
+from mission.boards.board_session import run_of, station_links
 from mission.connections import open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
@@ -29,7 +29,7 @@ from mission.flight import Flight, flight_parameters
 from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig
 from mission.flight_session import FlightSession
-from mission.flight_settings import FollowOptions
+from mission.flight_settings import OURS, FollowOptions
 from mission.follow.companion_process import latency_text
 from mission.follow.follow_options import follow_config
 from mission.follow.follow_scoring import FollowWatch, taken_over
@@ -83,7 +83,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         make_flight: Callable[..., FlightBase] = Flight
         peer_run = None
         if options.board != "own":
-            peer_run = held.enter_context(closing(PeerRun.of(options, folder, console)))
+            peer_run = held.enter_context(closing(run_of(options, folder, console)))
             make_flight = partial(peer_run.make_flight, has_companion=True)
         flight, companion = flight_with_companion(
             config,
@@ -137,6 +137,7 @@ def _links(options: FollowOptions, config: FlightConfig, speed: float | None) ->
     """
     if options.board != "own":
         check_board(options)
+    if options.board not in OURS:
         return station_links(options, speed)
     try:
         flight_parameters(config, load_airframe(config.airframe))

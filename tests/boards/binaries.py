@@ -1,6 +1,6 @@
 """Real autopilots at their boards: where their binaries are, and flights by the command line, as a user would fly them.
 
-None comes with the project: `make test-ardupilot SITL=FOLDER`, `make test-px4 PX4=FOLDER`.
+None comes with the project: `make test-ardupilot SITL=FOLDER`, `make test-px4 PX4=FOLDER`, `make test-betaflight`.
 """
 
 import json
@@ -66,7 +66,7 @@ def killed_in_flight(board: str, command: str, folder: Path, binary: str) -> Flo
     lines = []
     for line in process.stdout:
         lines.append(line)
-        if "rming motors" in line or "Armed by" in line:
+        if any(told in line for told in ("rming motors", "Armed by", "s  Armed")):
             _kill(binary, process.pid)
             break
     try:
