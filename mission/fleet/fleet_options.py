@@ -42,6 +42,7 @@ def check_fleet(options: FlightOptions) -> None:
         "--state": options.state is not None,
         "--stream-port": options.stream_port != 0,
         "--video-port": bool(options.video_port),
+        "--board betaflight": options.board == "betaflight",
     }
     for name, is_given in alone.items():
         if is_given:
