@@ -37,6 +37,7 @@ def fly(*options):
         (("--airframe", "f550"), "4 motors in X here; f550 has others"),
         (("--engine", "pybullet"), "only the native one"),
         (("--instance", "1"), "--instance and --board betaflight"),
+        (("--vehicles", "2"), "--vehicles and --board betaflight"),
         (("--command", "/no/such/program"), "--command /no/such/program"),
         (("--command", f"{sys.executable} -c pass"), "has ended with exit code 0"),
         (("--param", "NO_SUCH=1"), "NO_SUCH"),
