@@ -174,7 +174,7 @@ class Navigator:
         """Renews the setpoint and returns the mode that shall follow, if the present one is done."""
         context = self.context
         state = context.state
-        context.wants_lift = False
+        context.wants_lift = state.awaits_launch = False
         context.is_landing = context.has_ended = False
         setpoint = context.setpoint
         wish: Mode | None = None

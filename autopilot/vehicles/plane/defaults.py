@@ -7,7 +7,7 @@ allow; trim is level flight at FW_AIRSPD_TRIM.
 from math import degrees
 
 from autopilot.vehicles.plane.trim import level_flight, stall_speed_m_s
-from common.airframes.plane import PlaneAirframe
+from common.airframes.plane import PlaneAirframe, Throw
 from common.geodesy import GRAVITY_M_S2
 
 _AUTOSTART = 2_100  # PX4's standard plane
@@ -15,6 +15,8 @@ _DENSITY_KG_M3 = 1.225  # ISO 2533
 _MIN_OVER_STALL, _TRIM_OVER_STALL, _MAX_OVER_STALL = 1.2, 1.5, 2.2  # of airspeeds; guess
 _TURN_SLOPE = 0.6  # tangent of the bank on a circle in a calm: guess
 _PERIOD_M_S2 = 2.2  # trim over the period of the way back to a line: a large plane banks no faster; guess
+_THROW_FELT = 0.5  # part of a throw's acceleration that is one; guess
+_THROWN_WITHIN_S = 30.0  # armed in the hand, else it is disarmed; guess
 _RATE_BANDWIDTH_RAD_S = 8.0  # of roll and pitch rate, in part by the wing's own damping; below the servos' 25: guess
 
 
@@ -52,7 +54,7 @@ def plane_defaults(airframe: PlaneAirframe) -> dict[str, int | float]:
         "BAT1_V_CHARGED": battery.full_cell_v,
         "BAT1_V_EMPTY": battery.empty_cell_v,
         "EKF2_DRAG_CTRL": 0,  # the pitot tube tells of the air
-        "EKF2_MIN_RNG": _round(airframe.gear.height_m),
+        "EKF2_MIN_RNG": _round(airframe.standing_height_m),
         "EKF2_BCOEF_X": _round(body.mass_kg / body.drag_area_x_m2),
         "EKF2_BCOEF_Y": _round(body.mass_kg / body.drag_area_y_m2),
         "SYS_AUTOSTART": _AUTOSTART,
@@ -73,4 +75,13 @@ def plane_defaults(airframe: PlaneAirframe) -> dict[str, int | float]:
         "FW_T_CLMB_MAX": _round(level.climb_max_m_s, 1),
         "FW_T_SINK_MIN": _round(level.sink_min_m_s, 2),
         **_rate_gains(airframe, trim),
+        **({} if airframe.throw is None else _launch(airframe.throw)),
+    }
+
+
+def _launch(throw: Throw) -> dict[str, int | float]:
+    return {
+        "FW_LAUN_DETCN_ON": 1,
+        "FW_LAUN_AC_THLD": _round(_THROW_FELT * throw.acceleration_m_s2, 1),
+        "COM_DISARM_PRFLT": _THROWN_WITHIN_S,
     }

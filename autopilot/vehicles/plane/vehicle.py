@@ -37,7 +37,7 @@ def _outputs(_: PlaneAirframe) -> Sequence[Output]:
 
 
 def _standing_height_m(airframe: PlaneAirframe) -> float:
-    return airframe.gear.height_m
+    return airframe.standing_height_m
 
 
 def _measures_airspeed(state: VehicleState, _: ParameterTable) -> str:
