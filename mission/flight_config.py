@@ -19,7 +19,9 @@ from sim.world.world import WorldConfig
 
 # For what needs a runway: level where it takes off and lands, and no trees where it flies.
 AIRFIELD = WorldConfig(clearing_radius_m=150.0, treeless_radius_m=500.0)
-CATAPULT = Throw.model_construct(speed_m_s=0.0, elevation_rad=0.26, stroke_s=0.5, height_m=1.5)  # guess; of a file without
+CATAPULT = Throw.model_construct(
+    speed_m_s=0.0, elevation_rad=0.26, stroke_s=0.5, height_m=1.5
+)  # guess; of a file without
 TREELESS_M = 80.0  # round home, of the command line's worlds: clients' examples fly to 60 m from it, lower than trees
 
 

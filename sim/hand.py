@@ -48,6 +48,11 @@ class Hand:
     def is_holding(self) -> bool:
         return self._phase is not _Phase.FREE
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether it is held still, to be thrown."""
+        return self._phase is _Phase.HOLDS
+
     def take(self) -> None:
         """Takes the plane from the ground to where it is thrown from, at once: before the flight."""
         self._body["pos_ned"][0, 2] -= self._throw.height_m

@@ -1,4 +1,4 @@
-"""The sections of a plane's airframe file: a wing, a tail, one propeller in front or behind, three wheels or a belly."""
+"""The sections of a plane's airframe file: wing, tail, one propeller in front or behind, three wheels or a belly."""
 
 from math import sqrt
 from typing import Annotated, Self

@@ -2,7 +2,8 @@
 
 A wheel grips by a spring across it and along it (a bristle), so that a plane that stands does not creep: across it up
 to the tyre's friction, along it up to its rolling resistance or its brake. The spring across relaxes as it rolls.
-Wing tips, nose, tail and belly have Coulomb friction. Left out: the momentum of the wheels, terrain curvature under the plane.
+Wing tips, nose, tail and belly have Coulomb friction. Left out: the momentum of the wheels, terrain curvature under
+the plane.
 """
 
 import warp as wp

@@ -15,6 +15,8 @@ _DENSITY_KG_M3 = 1.225  # ISO 2533
 _MIN_OVER_STALL, _TRIM_OVER_STALL, _MAX_OVER_STALL = 1.2, 1.5, 2.2  # of airspeeds; guess
 _TURN_SLOPE = 0.6  # tangent of the bank on a circle in a calm: guess
 _PERIOD_M_S2 = 2.2  # trim over the period of the way back to a line: a large plane banks no faster; guess
+_SLOPE_DEG = 5.0  # PX4's
+_SLOPE_OF_GLIDE = 0.8  # of the angle at which it glides; guess: gusts from both sides can be answered
 _THROW_FELT = 0.5  # part of a throw's acceleration that is one; guess
 _THROWN_WITHIN_S = 30.0  # armed in the hand, else it is disarmed; guess
 _RATE_BANDWIDTH_RAD_S = 8.0  # of roll and pitch rate, in part by the wing's own damping; below the servos' 25: guess
@@ -72,6 +74,7 @@ def plane_defaults(airframe: PlaneAirframe) -> dict[str, int | float]:
         "FW_PSP_OFF": _round(degrees(level.alpha_rad), 1),
         "TRIM_PITCH": _round(level.elevator),
         "FW_THR_TRIM": _round(level.throttle, 2),
+        "FW_LND_ANG": _round(min(_SLOPE_DEG, _slope_least_deg(airframe, _MIN_OVER_STALL * stall)), 1),
         "FW_T_CLMB_MAX": _round(level.climb_max_m_s, 1),
         "FW_T_SINK_MIN": _round(level.sink_min_m_s, 2),
         **_rate_gains(airframe, trim),
@@ -79,9 +82,15 @@ def plane_defaults(airframe: PlaneAirframe) -> dict[str, int | float]:
     }
 
 
+def _slope_least_deg(airframe: PlaneAirframe, airspeed_m_s: float) -> float:
+    """A glide slope that needs some throttle: a steeper one, without flaps, would make a good glider too fast."""
+    return degrees(_SLOPE_OF_GLIDE * level_flight(airframe, airspeed_m_s).sink_min_m_s / airspeed_m_s)
+
+
 def _launch(throw: Throw) -> dict[str, int | float]:
     return {
         "FW_LAUN_DETCN_ON": 1,
         "FW_LAUN_AC_THLD": _round(_THROW_FELT * throw.acceleration_m_s2, 1),
+        "FW_LAUN_MOT_DEL": throw.stroke_s,  # out of the hand
         "COM_DISARM_PRFLT": _THROWN_WITHIN_S,
     }
