@@ -33,6 +33,7 @@ class Circuit:
     airspeed_m_s: list[float] = field(default_factory=list)
     cross_m: list[float] = field(default_factory=list)
     touchdown_m: float = float("nan")  # from the place asked for
+    along_m: float = float("nan")  # the same, beyond it on the way of the landing
     sink_m_s: float = float("nan")  # at the touchdown
     rest_m: float = float("nan")
     is_landed: bool = False
@@ -70,6 +71,7 @@ def fly_circuit(seed: int, wind_m_s: float = 3.0, wind_from_deg: float = 270.0) 
                 _judge(flight, out, truth, leg)
             if leg == len(CORNERS) + 1 and truth["is_on_ground"] and out.touchdown_m != out.touchdown_m:
                 out.touchdown_m = hypot(*truth["pos_ned"][:2])
+                out.along_m = float(truth["pos_ned"][:2] @ truth["vel_ned"][:2] / hypot(*truth["vel_ned"][:2]))
                 out.sink_m_s = float(truth["impact_speed"])
         out.rest_m = hypot(*flight.rig.rows["truth"][0]["pos_ned"][:2])
         out.is_landed = state.landed_state is LandedState.ON_GROUND and not flight.is_crashed

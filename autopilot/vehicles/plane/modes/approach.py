@@ -13,7 +13,7 @@ from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, Reply, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
-from autopilot.ports import AIRSPEED_VALID
+from autopilot.ports import AIRSPEED_VALID, TERRAIN_VALID
 from autopilot.vehicles.plane.modes.departure import airspeed_of
 
 _ENTRY_M = 30.0  # height over the touchdown of the beginning of the slope; guess: over trees
@@ -24,7 +24,8 @@ _NEAR_PART = 0.5  # of the circle's radius, from the entry at which it may be le
 _LONG_FLARE_US = 8_000_000  # guess
 _DOWN_M_S = 0.2  # sinks no faster once it stands on its wheels
 _TOUCH_M = 0.4  # height of the wheels, as measured, below which that is a touchdown; guess
-_FLARE_WAY_S = 1.2  # of flight in a flare: the slope aims that much short; guess
+_GROUND_SEEN_M = 150.0  # way from the touchdown on which the ground below is more and more believed; guess
+_ROUGH_M = 3.0  # ground farther from where the touchdown was said to be is not believed to be that; guess
 
 
 class _Phase(IntEnum):
@@ -101,24 +102,53 @@ class Approach:
         north, east, _ = context.state.estimate.pos_ned
         vel_n, vel_e, sink = context.state.estimate.vel_ned
         slope = tan(radians(context.number("FW_LND_ANG")))
-        aim_m = _FLARE_WAY_S * self._landing_m_s()
-        left_m = (self._target[0] - north) * self._along[0] + (self._target[1] - east) * self._along[1] - aim_m
-        speed = vel_n * self._along[0] + vel_e * self._along[1]
-        down = self._target[2] - max(left_m, 0.0) * slope
+        left_m = self._left_m(north, east)
+        speed = max(vel_n * self._along[0] + vel_e * self._along[1], 0.0)
+        aim_m = left_m - self._flare_gain_m(speed, slope)
+        down = self._ground_d(left_m) - max(aim_m, 0.0) * slope
         is_above = down < self._entry[2]
-        self._glide(max(down, self._entry[2]), 0.0 if is_above else slope * max(speed, 0.0), nan)
-        begin_m = max(context.number("FW_LND_FLALT"), context.number("FW_LND_FL_TIME") * sink)
-        if self._height() < begin_m:
+        self._glide(max(down, self._entry[2]), 0.0 if is_above else slope * speed, nan)
+        if self._height() < self._flare_begin_m(sink):
             self._phase = _Phase.FLARE
             self._flare_us = context.state.time_us
 
     def _flare(self) -> None:
+        """Down a parabola that touches the ground with FW_LND_FL_SINK at the touchdown, and beyond it just so."""
         context = self._context
-        self._glide(nan, context.number("FW_LND_FL_SINK"), context.number("FW_THR_IDLE"))
+        north, east, _ = context.state.estimate.pos_ned
+        vel_n, vel_e, _ = context.state.estimate.vel_ned
+        speed = vel_n * self._along[0] + vel_e * self._along[1]
+        least, height = context.number("FW_LND_FL_SINK"), max(self._height(), 0.0)
+        left_s = max(self._left_m(north, east) / max(speed, 1.0), 0.1)
+        most = least + height / context.number("FW_LND_FL_TIME")  # can still be caught
+        sink = min(max(2.0 * height / left_s - least, least), most)
+        self._glide(nan, sink, context.number("FW_THR_IDLE"))
         flared_us = context.state.time_us - self._flare_us
         is_down = context.state.estimate.vel_ned[2] < _DOWN_M_S and self._height() < _TOUCH_M
         if (is_down and flared_us > 1_000_000) or flared_us > _LONG_FLARE_US:
             self._phase = _Phase.ROLL
+
+    def _left_m(self, north: float, east: float) -> float:
+        """[m] To go to the touchdown, along the approach."""
+        return (self._target[0] - north) * self._along[0] + (self._target[1] - east) * self._along[1]
+
+    def _flare_begin_m(self, sink: float) -> float:
+        number = self._context.number
+        return max(number("FW_LND_FLALT"), number("FW_LND_FL_TIME") * sink)
+
+    def _flare_gain_m(self, speed: float, slope: float) -> float:
+        """[m] By which the parabola of the flare leads farther than the slope that it ends."""
+        sink = slope * speed
+        begin_m = self._flare_begin_m(sink)
+        return begin_m * (2.0 * speed / (sink + self._context.number("FW_LND_FL_SINK")) - 1.0 / slope)
+
+    def _ground_d(self, left_m: float) -> float:
+        """[m] Of a plane that stands at the touchdown: as was said, and nearer to it as the ground is measured."""
+        estimate, said_d = self._context.state.estimate, self._target[2]
+        if not estimate.flags & TERRAIN_VALID:
+            return said_d
+        off_m = estimate.terrain_d - self._context.craft.standing_height_m - said_d
+        return said_d + (off_m * min(max(1.0 - left_m / _GROUND_SEEN_M, 0.0), 1.0) if abs(off_m) < _ROUGH_M else 0.0)
 
     def _glide(self, down: float, sink: float, throttle: float) -> None:
         target = (self._target[0], self._target[1], down)

@@ -74,7 +74,7 @@ class Departure:
             return False
         if self._phase is not _Phase.CLIMB:
             self._phase = _Phase.CLIMB
-            context.setpoint.fly_to(self._far, nan, path_start_ned=self._start)
+            self._climb()
         return bool(state.estimate.pos_ned[2] < self._target_d + _REACHED_M)
 
     def _runs_fast(self) -> bool:
@@ -103,9 +103,14 @@ class Departure:
             self._phase = _Phase.RUN if is_low else _Phase.CLIMB
         self._yaw, self._run_us = state.yaw_rad, state.time_us
         self._start = (north, east, nan)
-        self._far = (north + _FAR_M * cos(self._yaw), east + _FAR_M * sin(self._yaw), min(self._target_d, down) - 1.0)
+        self._far = (north + _FAR_M * cos(self._yaw), east + _FAR_M * sin(self._yaw), nan)
         if self._phase is _Phase.CLIMB:
-            self._context.setpoint.fly_to(self._far, nan, path_start_ned=self._start)
+            self._climb()
+
+    def _climb(self) -> None:
+        """As steeply as it can, as PX4's; straight on."""
+        most = self._context.number("FW_T_CLMB_MAX")
+        self._context.setpoint.glide(self._far, self._start, -most, airspeed=nan, throttle=nan)
 
     def _rotation_m_s(self) -> float:
         asked = self._context.number("RWTO_ROT_AIRSPD")
