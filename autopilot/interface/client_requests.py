@@ -160,7 +160,16 @@ class LandingTargetReport(Report):
     pos_ned: tuple[float, float, float]  # [m]
 
 
-Request = ModeRequest | Report | ChangeMode | StartMission | SetCurrentItem | ChangeSpeed | SetReverse | SetHome
+@dataclass(frozen=True, slots=True)
+class GoAround:
+    """A landing is given up: up, and round until something else is asked for."""
+
+    height_m: float = nan  # above the touchdown
+
+
+Request = (
+    GoAround | ModeRequest | Report | ChangeMode | StartMission | SetCurrentItem | ChangeSpeed | SetReverse | SetHome
+)
 
 
 class CalibrationKind(Enum):

@@ -265,6 +265,13 @@ class Navigator:
         if self.modes[mode].begins_anew:
             self.enter(mode)
 
+    def go_around(self, height_m: float) -> Reply:
+        """Gives up the landing being flown, of what cannot stop in the air."""
+        ground = self.context.craft.ground
+        if ground is None or ground.settles:
+            return Reply(Verdict.UNSUPPORTED, "only a plane goes round")
+        return self._active.go_around(height_m)
+
     def report(self, report: Report) -> Reply:
         """Hands what a client tells to the modes that take it, flown or not."""
         for flown in self._listeners.get(type(report), ()):

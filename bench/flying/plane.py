@@ -22,6 +22,7 @@ CORNERS = ((450.0, 0.0), (450.0, 350.0), (-450.0, 350.0), (-450.0, 0.0))  # [m] 
 HEIGHT_M = 35.0
 SETTLED_S = 10.0  # after the turn to a leg: a period of the guidance, NPFG_PERIOD
 LONGEST_S = 300.0
+SEEDS = range(1, 6)
 
 
 @dataclass
@@ -109,7 +110,7 @@ def _judge(flight: Flight, out: Circuit, truth: Any, leg: int) -> None:
 def main() -> None:
     """Prints the table: 95 % of the absolute errors."""
     print("seed  course  cross  height  airspeed  touchdown  sink  rest  landed")
-    for seed in range(1, 6):
+    for seed in SEEDS:
         c = fly_circuit(seed)
         parts = (np.percentile(x or [float("nan")], 95) for x in (c.course_deg, c.cross_m, c.height_m, c.airspeed_m_s))
         course, cross, height, airspeed = parts

@@ -8,6 +8,7 @@ from enum import IntEnum
 from math import hypot, isfinite, nan, pi, radians, tan
 
 from autopilot.interface.item_lists import MissionItem
+from autopilot.interface.vehicle_state import Reply
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission.item_commands import WAYPOINTS, Command, hold_time_s, is_here
 from autopilot.navigator.mission.mission_legs import Leg
@@ -51,6 +52,9 @@ class PlaneLeg(Leg):
     def stop(self) -> None:
         """Another mode took over; the leg is remembered, so that it can be gone on with."""
         self._phase = _Stage.IDLE
+
+    def go_around(self, height_m: float) -> Reply:
+        return self._approach.go_around(height_m) if self._phase is _Stage.LAND else super().go_around(height_m)
 
     def forget(self) -> None:
         """The next leg begins where the vehicle is."""
