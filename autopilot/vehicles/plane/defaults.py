@@ -74,6 +74,7 @@ def plane_defaults(airframe: PlaneAirframe) -> dict[str, int | float]:
         "NAV_ACC_RAD": 10.0,
         "NAV_LOITER_RAD": max(80.0, _round(trim**2 / (GRAVITY_M_S2 * _TURN_SLOPE), -1)),
         "NPFG_PERIOD": max(10.0, _round(trim / _PERIOD_M_S2)),
+        "ASPD_FS_INNOV": _round(min(max(trim - stall, 3.0), 5.0), 1),  # PX4's 5, for what flies fast enough
         "FW_AIRSPD_STALL": _round(stall, 1),
         "FW_AIRSPD_MIN": _round(_MIN_OVER_STALL * stall, 1),
         "FW_AIRSPD_TRIM": trim,
