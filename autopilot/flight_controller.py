@@ -23,7 +23,6 @@ from autopilot.inputs.traffic import Traffic
 from autopilot.interface.client_requests import (
     ChangeMode,
     ChangeSpeed,
-    GoAround,
     ModeRequest,
     Report,
     Request,
@@ -338,8 +337,6 @@ class FlightController:
                 return self.navigator.mission.set_current(request.seq, is_reset=request.is_reset)
             case ChangeSpeed():
                 return self.navigator.change_speed(request.speed_m_s, request.kind)
-            case GoAround():
-                return self.navigator.go_around(request.height_m)
             case SetReverse():
                 return self.navigator.set_reversed(is_reversed=request.is_reversed)
             case SetHome():

@@ -8,9 +8,9 @@ from typing import Any
 
 import warp as wp
 
+from autopilot.estimator.airspeed_params import airspeed_fields
 from autopilot.estimator.calibration_params import CALIBRATION_PARAMETERS
 from autopilot.estimator.mag_params import MAG_PARAMETERS
-from autopilot.estimator.airspeed_params import airspeed_fields
 from autopilot.estimator.wheel_params import wheel_fields
 from common.params import Parameter, ParameterTable
 

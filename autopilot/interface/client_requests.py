@@ -160,16 +160,7 @@ class LandingTargetReport(Report):
     pos_ned: tuple[float, float, float]  # [m]
 
 
-@dataclass(frozen=True, slots=True)
-class GoAround:
-    """A landing is given up: up, and round until something else is asked for."""
-
-    height_m: float = nan  # above the touchdown
-
-
-Request = (
-    GoAround | ModeRequest | Report | ChangeMode | StartMission | SetCurrentItem | ChangeSpeed | SetReverse | SetHome
-)
+Request = ModeRequest | Report | ChangeMode | StartMission | SetCurrentItem | ChangeSpeed | SetReverse | SetHome
 
 
 class CalibrationKind(Enum):

@@ -62,7 +62,7 @@ class FlightMode:
 
     def go_around(self, _height_m: float, /) -> Reply:
         """Gives a landing up and climbs to a height above the touchdown [m], NaN: the usual one; or says why not."""
-        return Reply(Verdict.TEMPORARILY_REJECTED, "it is not landing")
+        return Reply(Verdict.TEMPORARILY_REJECTED, "not landing")
 
     def forget(self) -> None:
         """What clients have asked of it does not wait for the next time it is entered."""

@@ -265,11 +265,14 @@ class Navigator:
         if self.modes[mode].begins_anew:
             self.enter(mode)
 
-    def go_around(self, height_m: float) -> Reply:
-        """Gives up the landing being flown, of what cannot stop in the air."""
+    @property
+    def goes_round(self) -> bool:
+        """Whether a landing that is given up leads round by the mode's own way: of what cannot stop in the air."""
         ground = self.context.craft.ground
-        if ground is None or ground.settles:
-            return Reply(Verdict.UNSUPPORTED, "only a plane goes round")
+        return ground is not None and not ground.settles
+
+    def go_around(self, height_m: float) -> Reply:
+        """Gives up the landing being flown, of what goes round."""
         return self._active.go_around(height_m)
 
     def report(self, report: Report) -> Reply:

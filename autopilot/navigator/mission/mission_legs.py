@@ -68,7 +68,7 @@ class Leg:
 
     def go_around(self, height_m: float) -> Reply:  # noqa: ARG002
         """Gives up a landing, of what cannot stop in the air."""
-        return Reply(Verdict.TEMPORARILY_REJECTED, "it is not landing")
+        return Reply(Verdict.TEMPORARILY_REJECTED, "not landing")
 
     def forget(self) -> None:
         """The next leg begins where the vehicle is."""

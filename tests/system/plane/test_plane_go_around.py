@@ -80,7 +80,7 @@ def test_a_hopeless_landing_is_given_up_and_tried_again():
         await drone.until(lambda: flight.controller.state.landed_state is LandedState.LANDING, 300.0, "on the slope")
         await drone.until(lambda: -drone.pos_ned[2] < 5.0, 300.0, "low")
         flight.set_wind(18.0, 90.0)  # a gust front from the side
-        await drone.until(lambda: any("given up" in text for text in drone.texts), 30.0, "given up")
+        await drone.until(lambda: any("trying again" in text for text in drone.texts), 30.0, "given up")
         flight.set_wind(0.0, 90.0)
         await drone.wait_disarmed(300.0)
         assert radius_m(drone) < 80.0

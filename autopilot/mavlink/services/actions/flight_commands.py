@@ -9,7 +9,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot.interface.client_requests import ChangeMode, GoAround, LandAt, SetHome, TakeOff
+from autopilot.interface.client_requests import ChangeMode, LandAt, SetHome, TakeOff
 from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Severity, Verdict
 from autopilot.mavlink.channel import Endpoint, Sender
 from autopilot.mavlink.dialects import UnknownModeError
@@ -38,7 +38,6 @@ class FlightCommands(Service):
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_NAV_TAKEOFF: self._takeoff,
             mavlink.MAV_CMD_NAV_LAND: self._land,
-            mavlink.MAV_CMD_DO_GO_AROUND: self._go_around,
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,
             mavlink.MAV_CMD_NAV_LOITER_UNLIM: self._hold,
             mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
@@ -84,17 +83,6 @@ class FlightCommands(Service):
         if not is_position(lat_deg, lon_deg):
             return denied("there is no such latitude and longitude")
         return self._endpoint.vehicle.request(LandAt(lat_deg, lon_deg, radians(command.p4)))
-
-    def _go_around(self, command: Command) -> Reply:
-        """Gives a landing up: climbs straight on, then circles the place of the touchdown.
-
-        Params: p1 height above it [m], NaN or 0: MIS_LND_ABRT_ALT.
-        Refused: TEMPORARILY_REJECTED where it is not landing, or already on its wheels; UNSUPPORTED but by planes;
-        DENIED for a height below 0.
-        """
-        if command.p1 < 0.0:
-            return denied("the height is below the ground")
-        return self._endpoint.vehicle.request(GoAround(command.p1 or nan))
 
     def _return(self, _: Command) -> Reply:
         """Returns home, or to where RTL_TYPE says, and lands.

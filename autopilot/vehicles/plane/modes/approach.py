@@ -148,7 +148,7 @@ class Approach:
         if reason and self._retries:
             self._retries -= 1
             self._tries_again = True
-            self._give_up(context.number("MIS_LND_ABRT_ALT"), f"Landing given up: {reason}, trying again")
+            self._give_up(context.number("MIS_LND_ABRT_ALT"), f"Landing aborted: {reason}, trying again")
         elif self._height() < self._flare_begin_m(sink):
             self._phase = _Phase.FLARE
             self._flare_us = context.state.time_us
@@ -200,14 +200,14 @@ class Approach:
     # ---- going round ----
 
     def go_around(self, height_m: float) -> Reply:
-        """Gives the landing up, for a client: to a height above the touchdown [m], NaN: MIS_LND_ABRT_ALT."""
+        """Gives the landing up, for a client: to a height above the touchdown [m], at least MIS_LND_ABRT_ALT."""
         if self._context.is_on_ground or self._phase is _Phase.ROLL:
-            return Reply(Verdict.TEMPORARILY_REJECTED, "it is on the ground")
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not landing: it is on the ground")
         if self._phase is _Phase.WAIT:
-            return Reply(Verdict.TEMPORARILY_REJECTED, "it goes round already")
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not landing: it goes round already")
         self._tries_again = False
         usual_m = self._context.number("MIS_LND_ABRT_ALT")
-        self._give_up(height_m if isfinite(height_m) else usual_m, "Landing given up")
+        self._give_up(max(height_m, usual_m) if isfinite(height_m) else usual_m, "Landing aborted: going round")
         return ACCEPTED
 
     def _hopeless(self, left_m: float) -> str:
