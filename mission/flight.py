@@ -21,6 +21,7 @@ from autopilot.payload.camera.storage import MediaFolder
 from autopilot.persistence import Persistence
 from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import load_airframe
+from common.airframes.plane import PlaneAirframe
 from common.clock import wall_unix_us
 from common.folder import ConfinedFolder
 from common.kernels import FRAME_TICKS, FRAME_US, TICK_US
@@ -28,7 +29,7 @@ from common.params import Parameter
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
 from mission.flight_base import Computer, FlightBase
-from mission.flight_config import FlightConfig, flight_parameters
+from mission.flight_config import FlightConfig, as_launched, flight_parameters
 from mission.log.flight_recorder import History, Recorder
 from mission.log.stored_logs import FlightLogs, RunLog
 from mission.script import Drone
@@ -44,6 +45,7 @@ from mission.simulator.simulator_params import TURBULENCE_FRACTION, SimulatorPar
 from mission.video.mjpeg_server import StreamServer
 from mission.video.rtp_video import RtpVideo
 from sim.bodies.vehicles import class_of
+from sim.hand import Hand
 from sim.rig import Rig
 from sim.rtk import RtkReceiver
 from sim.sensors.scanner import Scanner
@@ -85,11 +87,12 @@ class Flight(FlightBase):
         make_rig: Callable[..., Rig] | None = None,
         world: WorldMap | None = None,
     ) -> None:
-        super().__init__(config, load_airframe(config.airframe))
+        super().__init__(config, as_launched(config, load_airframe(config.airframe)))
         simulated = class_of(self.airframe)
         vehicle, self.drives = simulated.vehicle, simulated.drives
         self.world = flight_world(config) if world is None else world
         self.rig = flight_rig(config, self.airframe, self.world, make_rig)
+        self.hand = self._hold_in_hand()
         self.params = flight_parameters(config, self.airframe)
         self.persistence = None if state is None else self._restore_parameters(state)
         self._has_new_parameters = True
@@ -119,6 +122,15 @@ class Flight(FlightBase):
         if state is not None:
             self._flight_logs = FlightLogs(state.folder / "logs", self.recorder, self.params, self.troubles.note)
         self._lend_logs(log)
+
+    def _hold_in_hand(self) -> Hand | None:
+        """Puts a plane that is thrown into the hand that does."""
+        throw = self.airframe.throw if isinstance(self.airframe, PlaneAirframe) else None
+        if throw is None:
+            return None
+        hand = Hand(self.rig.rows["body"], throw)
+        hand.take()
+        return hand
 
     def _restore_parameters(self, state: StateFolder) -> Persistence:
         """What an earlier flight has set, but the simulator's and what this flight was given."""
@@ -221,6 +233,9 @@ class Flight(FlightBase):
     def begin_frame(self) -> None:
         self._load_parameters()
         self.injector.frame(self.time_us)
+        if self.hand is not None:
+            state = self.controller.state
+            self.hand.frame(is_awaited=state.awaits_launch, is_armed=state.is_armed)
 
     def end_frame(self) -> None:
         self.time_us += FRAME_US
@@ -297,6 +312,8 @@ class Flight(FlightBase):
         self.controller.commander.disarm(force=True)
         self.injector.repair()
         self.rig.boot()
+        if self.hand is not None:
+            self.hand.take()
         self.controller.reboot()
         self.restart_count += 1
         self.texts.statustext(Severity.NOTICE, "Simulator: the vehicle is back on its pad, restarted")

@@ -18,6 +18,7 @@ from mission.script import Drone, Script
 from mission.simulator.failure_injection import RigInjector
 from mission.simulator.flight_rig import GUST_FRACTION, flight_wind
 from mission.simulator.simulator_params import TURBULENCE_FRACTION
+from sim.hand import Hand
 from sim.rig import Rig
 from sim.world.world import WorldMap
 
@@ -51,6 +52,8 @@ class FlightBase(ABC):
     """The flight's own scripting client."""
     recorder: Recorder
     injector: RigInjector
+    hand: Hand | None
+    """Who throws it; None: it is not thrown."""
 
     def __init__(self, config: FlightConfig, airframe: Airframe) -> None:
         self.config, self.airframe = config, airframe
@@ -60,6 +63,7 @@ class FlightBase(ABC):
         self.end_reason = ""  # why it cannot go on
         self._pacer = Pacer(None)
         self.texts, self.troubles = Texts(lambda: self.time_us), Troubles(lambda: self.time_us)
+        self.hand = None
         self.owner: FollowedOwner | None = None
         self.onboard: OnboardCamera | None = None
         self.computers: list[Computer] = []

@@ -44,6 +44,14 @@ class FlightSettings(BaseModel):
     traffic_count: int = option(0, "Other aircraft that are heard by ADS-B.", "--traffic", ge=0, le=50)
     engine: EngineName = option("native", "Who moves the body: native, pybullet or jsbsim.")
     """Air, sensors and flight controller are ours with each."""
+    throw_m_s: float | None = option(
+        None,
+        "A plane: thrown at this speed [m/s]. Default: from the runway, or as its file has it.",
+        "--throw",
+        shown="as its file has it",
+        ge=1.0,
+        le=60.0,
+    )
     has_lidar: bool = option(False, "Carry a ring of range finders that looks round.", "--lidar")
     has_base: bool = option(False, "A base station beside home sends the GNSS receiver corrections.", "--rtk")
 

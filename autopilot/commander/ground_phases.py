@@ -147,7 +147,8 @@ class TakeoffAndLanding:
         is_done = self._has_flown or not self._commander.modes[state.mode].may_arm
         limit_us = self._disarm_landed_us if is_done else self._disarm_preflight_us
         if 0 <= limit_us <= now_us - self._landed_since_us:
-            self._commander.stop_motors("Disarmed after landing" if is_done else "Disarmed: no take-off")
+            text = "Disarmed: not thrown" if state.awaits_launch else "Disarmed: no take-off"
+            self._commander.stop_motors("Disarmed after landing" if is_done else text)
 
     def _fly(self, flying: Flying, dt_s: float) -> None:
         """Off the ground: landed state, landing detection."""
