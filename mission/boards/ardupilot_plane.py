@@ -80,6 +80,8 @@ def _elevator_per_rate(airframe: PlaneAirframe, airspeed_m_s: float) -> float:
 def _ground(airframe: PlaneAirframe, ours: dict[str, float]) -> dict[str, float]:
     """Run, rotation, flare and roll."""
     gear = airframe.gear
+    if gear is None:
+        raise ValueError("ArduPilot's plane takes off from a runway here")
     return {
         "GROUND_STEER_ALT": _STEERED_M,
         # the diameter of its tightest turn, as ArduPilot wants it

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import get_args
 
 from common.airframe import load_airframe
+from common.airframes.plane import PlaneAirframe
 from mission.console.option_checks import UserError
 from mission.flight_settings import OURS, BoardName, FlightOptions, FlightSettings
 
@@ -53,9 +54,12 @@ def check_flown(settings: FlightSettings, airframe: str, board: BoardName) -> No
     Raises:
         UserError: of such.
     """
-    vehicle = load_airframe(airframe).vehicle
+    body = load_airframe(airframe)
+    vehicle = body.vehicle
     if vehicle not in FLOWN[board]:
         raise UserError(f"--board {board}: it flies no {vehicle} here")
+    if isinstance(body, PlaneAirframe) and (body.throw is not None or settings.throw_m_s is not None):
+        raise UserError(f"--board {board}: it takes off from a runway here, nobody throws it")
     if (board, vehicle) in FAST and settings.engine != "native":
         raise UserError(f"--board {board} and --engine {settings.engine}: only the native one gives it 1,000 Hz")
     if board == "px4" and settings.noise == 0.0:
