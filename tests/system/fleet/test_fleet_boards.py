@@ -322,7 +322,8 @@ def test_a_port_that_is_taken_is_told_and_nothing_is_left_open(kind, port, sente
     ("options", "sentence"),
     [
         (("--vehicles", "x500@px5:1"), "unknown board 'px5'; known: own, ardupilot, px4"),
-        (("--vehicles", "rover@px4:1,x500:1"), "--board px4: it flies no rover here"),
+        (("--vehicles", "rover@betaflight:1,x500:1"), "--board betaflight: it flies no rover here"),
+        (("--vehicles", "x500@betaflight:2"), "one Betaflight at most"),
         (("--vehicles", "x500@ardupilot:1,x500:1", "--engine", "pybullet"), "--board ardupilot and --engine pybullet"),
         (("--vehicles", "x500@px4:1,x500:1", "--noise", "0"), "--noise 0 and --board px4"),
         (("--vehicles", "2", "--board", "px4", "--lidar"), "--lidar and --board px4"),
