@@ -1,5 +1,6 @@
 """`honeyguide fly --board betaflight`: what it refuses, its set-up, and a flight by a stand-in from its first start."""
 
+import asyncio
 import json
 import socket
 import sys
@@ -14,9 +15,14 @@ from common.airframe import load_airframe
 from mission.boards import betaflight_run
 from mission.boards.betaflight_setup import CommandLine, packaged_program, settings, yaw_gain
 from mission.cli import app
+from mission.client import ScriptError
+from mission.fleet.fleet_script import Fleet
+from mission.flight_config import FlightConfig
 from sim.boards.outside import PeerError
+from sim.world.world import WorldConfig
 
 ROOT = Path(__file__).parents[4]
+BASE = FlightConfig(world=WorldConfig(size_m=200.0, trees_per_ha=0.0))
 STAND_IN = f"{sys.executable} -m bench.standins.betaflight"
 PLAN = """QGC WPL 110
 0	1	0	16	0	0	0	0	47.397742	8.545594	488	1
@@ -37,7 +43,7 @@ def fly(*options):
         (("--airframe", "f550"), "4 motors in X here; f550 has others"),
         (("--engine", "pybullet"), "only the native one"),
         (("--instance", "1"), "--instance and --board betaflight"),
-        (("--vehicles", "2"), "--vehicles and --board betaflight"),
+        (("--vehicles", "2"), "one Betaflight at most"),
         (("--command", "/no/such/program"), "--command /no/such/program"),
         (("--command", f"{sys.executable} -c pass"), "has ended with exit code 0"),
         (("--param", "NO_SUCH=1"), "NO_SUCH"),
@@ -90,6 +96,26 @@ def test_a_program_that_ends_in_flight_ends_the_flight_with_a_sentence_and_its_l
     assert result.exit_code == 1
     assert "has ended with exit code 3" in result.stdout
     assert (folder / "flight.ulg").stat().st_size > 1000
+
+
+def test_it_flies_one_of_several_and_the_others_fly_on_without_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+
+    async def script():
+        async with Fleet("x500@betaflight:1,x500:1", BASE, folder=tmp_path, commands=f"{STAND_IN} --loops 25000") as fleet:
+            first, second = fleet
+            await fleet.each(lambda drone: drone.wait_ready())
+            await fleet.each(lambda drone: drone.arm())
+            await fleet.each(lambda drone: drone.takeoff(4.0))
+            heights_m = [-drone.pos_ned[2] for drone in fleet]
+            with pytest.raises(ScriptError, match="Betaflight of vehicle 1 has ended"):
+                await first.sleep(60.0)
+            await second.land()
+            return heights_m, [drone.system_id for drone in fleet]
+
+    heights_m, ids = asyncio.run(script())
+    assert heights_m == pytest.approx([4.0, 4.0], abs=0.5)
+    assert ids == [1, 2]
 
 
 @pytest.mark.parametrize("name", ["x500", "f450"])
