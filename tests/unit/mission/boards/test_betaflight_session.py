@@ -102,7 +102,8 @@ def test_it_flies_one_of_several_and_the_others_fly_on_without_it(tmp_path, monk
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
 
     async def script():
-        async with Fleet("x500@betaflight:1,x500:1", BASE, folder=tmp_path, commands=f"{STAND_IN} --loops 25000") as fleet:
+        command = f"{STAND_IN} --loops 25000"
+        async with Fleet("x500@betaflight:1,x500:1", BASE, folder=tmp_path, commands=command) as fleet:
             first, second = fleet
             await fleet.each(lambda drone: drone.wait_ready())
             await fleet.each(lambda drone: drone.arm())
