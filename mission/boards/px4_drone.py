@@ -1,14 +1,18 @@
 """The scripting client of a real PX4: what differs from our own vehicle, which speaks its language."""
 
-from math import nan
+from collections.abc import Sequence
+from dataclasses import replace
+from math import nan, pi
 
 from mission.boards.outside_drone import OutsideDrone
 from mission.client import CommandRefused
+from mission.plan.plan_file import PlanItem
 from mission.script import CMD_TAKEOFF, MAIN_AUTO
 
 TAKES_IN_S = 3.0  # guess: until its navigator has read a mission that has been acknowledged
 RETRY_S = 0.2
 TAKING_OFF = (MAIN_AUTO, 2)  # main and sub mode
+CMD_LOITER_TURNS, CMD_LOITER_TIME = 18, 19
 
 
 class Px4Drone(OutsideDrone):
@@ -21,6 +25,13 @@ class Px4Drone(OutsideDrone):
         await self.until(lambda: self.px4_mode == TAKING_OFF, 3.0, "mode takeoff")
         await self.until(lambda: self.px4_mode != TAKING_OFF, timeout_s, f"takeoff to {height_m:g} m")
 
+    async def upload(self, items: Sequence[PlanItem], mission_type: int = 0) -> None:
+        """It counts no turns: a plane circles as long as they take."""
+        if any(item.command == CMD_LOITER_TURNS for item in items):
+            airspeed_m_s = await self.get_parameter("FW_AIRSPD_TRIM")
+            items = [_timed(item, airspeed_m_s) if item.command == CMD_LOITER_TURNS else item for item in items]
+        await super().upload(items, mission_type)
+
     async def start_mission(self, first: int = 0) -> None:
         end_us = self.time_us + int(TAKES_IN_S * 1e6)
         while True:
@@ -30,3 +41,10 @@ class Px4Drone(OutsideDrone):
                 if self.time_us >= end_us:
                     raise
             await self.sleep(RETRY_S)
+
+
+def _timed(item: PlanItem, airspeed_m_s: float) -> PlanItem:
+    """Turns as the time that they take."""
+    turns, _, radius_m, leaves = item.params
+    seconds = turns * 2.0 * pi * abs(radius_m) / airspeed_m_s
+    return replace(item, command=CMD_LOITER_TIME, params=(seconds, 0.0, radius_m, leaves))

@@ -7,6 +7,7 @@ airframe, PX4 is set to as well. Where its unit differs, or where it has what ou
 from collections.abc import Mapping
 
 from autopilot.params import parameter_table
+from autopilot.vehicles.rover.control_airframe import motor_time_s, rover_control_airframe
 from common.airframe import Airframe
 from common.airframes.multirotor import MultirotorAirframe
 from common.airframes.plane import PlaneAirframe
@@ -19,6 +20,8 @@ _ROVER_NAMES = ("RO_", "RA_", "RD_", "PP_", "NAV_ACC_RAD", "CA_R_REV")
 _PLANE_NAMES = ("FW_", "TRIM_PITCH", "NPFG_", "RWTO_PSP", "NAV_ACC_RAD", "NAV_LOITER_RAD", "MIS_TAKEOFF_ALT")
 _OUTPUTS = 9  # as many as its airframes set
 _CRUISE_M_S = 2.0  # guess: of the gain of the yaw rate
+_SLOWED_INTEGRAL = 0.1  # guess: behind the limit of its throttle's rate it winds up
+_LAG = 3.0  # of the speed behind its setpoint, over the motor's: guess, with what limits the throttle's rate
 _AILERON, _ELEVATOR, _RUDDER = 15, 3, 4  # CA_SV_CSn_TYPE: one channel for both ailerons
 
 
@@ -62,11 +65,15 @@ def _rover(airframe: RoverAirframe) -> dict[str, float]:
     params = _ours(airframe, _ROVER_NAMES)
     top_m_s = params["RO_MAX_THR_SPEED"]
     # It adds throttle for an error of speed, where ours adds speed, and for one of the yaw rate what steers
-    for name in ("RO_SPEED_P", "RO_SPEED_I"):
-        params[name] /= top_m_s
+    params["RO_SPEED_P"] /= top_m_s
+    params["RO_SPEED_I"] *= _SLOWED_INTEGRAL / top_m_s
     steer = 0.5 * airframe.wheels.track_m / top_m_s if airframe.is_skid else airframe.wheel_base_m / _CRUISE_M_S
     for name in ("RO_YAW_RATE_P", "RO_YAW_RATE_I"):
         params[name] *= steer
+    # It brakes by the motor alone, along v²/2a + v·lag = distance, where lag is 2 a over the jerk
+    decel = min(params["RO_DECEL_LIM"], rover_control_airframe(airframe).motor_decel)
+    jerk = 2.0 * decel / (_LAG * motor_time_s(airframe))
+    params |= {"RO_DECEL_LIM": round(decel, 2), "RO_JERK_LIM": round(min(params["RO_JERK_LIM"], jerk), 1)}
     functions = [MOTOR + 1, MOTOR] if airframe.is_skid else [SERVO, MOTOR]  # its first motor is the right one
     return params | {"SIM_GZ_EN": 0.0} | _outputs(functions)
 
@@ -77,6 +84,7 @@ def _plane(airframe: PlaneAirframe) -> dict[str, float]:
         surfaces[f"CA_SV_CS{k}_TYPE"] = float(kind)
         surfaces |= {f"CA_SV_CS{k}_TRQ_{each}": float(each == axis) for each in "RPY"}
     runway = {"RWTO_TKOFF": 1.0, "FW_W_EN": 1.0, "SYS_HAS_NUM_ASPD": 1.0}
+    runway["NAV_DLL_ACT"] = 0.0  # of its airframe, which would not arm without a ground station
     functions = [SERVO, SERVO + 1, MOTOR, SERVO + 2, NOSE_WHEEL]
     ours = _ours(airframe, _PLANE_NAMES)
     del ours["FW_WR_D"]  # which is ours alone
