@@ -53,6 +53,7 @@ class BetaflightFlight(Flight):
         if self._plug.loss and not self.end_reason:
             self.end_reason = self.drone.lost = self._plug.loss
             self.texts.statustext(Severity.EMERGENCY, self.end_reason)
+            self.controller.commander.disarm(force=True)
             self.on_close()
             self.board.close()
         if self.board.restart_count != self._board_restart_count:

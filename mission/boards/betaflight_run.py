@@ -41,6 +41,8 @@ HINT = "it is asked at TCP port 5761, and its motors are expected at UDP port {p
 class BetaflightRun:
     """See `PeerRun`; without a command it is the program of the package, if that is installed."""
 
+    is_ours = True
+
     def __init__(
         self,
         board: str,

@@ -73,8 +73,11 @@ class Watch:
 class BoardRun(Protocol):
     """The program of others that flies one of several vehicles."""
 
+    is_ours: bool
+    """Our own flight controller flies by it, and takes what that takes."""
+
     def make_flight(self, config: FlightConfig, **parts: Any) -> "FlightBase":
-        """The flight, with its port open; of `parts` there are `links`, `folder` and `world`.
+        """The flight, with its port open; of `parts` there are `links`, `folder`, `world`, and what is ours alone.
 
         Raises:
             UserError: the port is taken, or it cannot fly such a vehicle.
@@ -100,6 +103,8 @@ class PeerRun:
         whose: what else is to be said where there are several.
         shows_console: its console is shown.
     """
+
+    is_ours = False
 
     def __init__(
         self,
@@ -157,13 +162,13 @@ class PeerRun:
         """
         own, instance = self._folder, self._instance
         own.mkdir(parents=True, exist_ok=True)
-        environment = self._peer.prepare(flight.config, flight.airframe, own, instance)
-        if self._command is not None:
-            command = filled_in(self._command, own, flight.config, instance)
-            try:
+        try:
+            environment = self._peer.prepare(flight.config, flight.airframe, own, instance)
+            if self._command is not None:
+                command = filled_in(self._command, own, flight.config, instance)
                 self._watch.process = PeerProcess(command, own, environment, own / "console.log")
-            except PeerError as error:
-                raise UserError(str(error)) from error
+        except (PeerError, ValueError) as error:
+            raise UserError(str(error)) from error
 
     def close(self) -> None:
         self._watch.close()
@@ -246,7 +251,7 @@ def filled_in(command: str, folder: Path, config: FlightConfig, instance: int) -
         config: of the vehicle.
         instance: its number.
     """
-    start = start_of(config)
+    start, folder = start_of(config), folder.absolute()  # it runs there
     values = {
         "folder": str(folder),
         "params": str(folder / "vehicle.parm"),

@@ -15,7 +15,7 @@ from mission.boards.ardupilot_drone import ArduPilotDrone
 from mission.boards.outside_drone import OutsideDrone
 from mission.boards.px4_drone import Px4Drone
 from mission.boards.px4_params import px4_environment, px4_model
-from mission.boards.vehicle_params import ardupilot_params
+from mission.boards.vehicle_params import ardupilot_params, check_id_free, value_text
 from mission.flight_config import FlightConfig
 from sim.boards.ardupilot import PORT as JSON_PORT
 from sim.boards.ardupilot import ArduPilotBoard
@@ -107,9 +107,10 @@ def _px4_offboard_link(instance: int) -> Link:
 
 
 def _prepare_ardupilot(config: FlightConfig, airframe: Airframe, folder: Path, instance: int) -> Mapping[str, str]:
+    check_id_free(config.parameters)
     numbers = dict.fromkeys(("MAV_SYSID", "SYSID_THISMAV"), instance + 1.0)  # as it is called since 4.7, and before
     values = numbers | ardupilot_params(airframe) | config.parameters
-    text = "".join(f"{name} {value:g}\n" for name, value in values.items())
+    text = "".join(f"{name} {value_text(value)}\n" for name, value in values.items())
     (folder / "vehicle.parm").write_text(text)
     return {}
 

@@ -12,7 +12,7 @@ from common.airframe import Airframe
 from common.airframes.multirotor import MultirotorAirframe
 from common.airframes.plane import PlaneAirframe
 from common.airframes.rover import RoverAirframe
-from mission.boards.vehicle_params import hover_fraction, thrust_curve
+from mission.boards.vehicle_params import check_id_free, hover_fraction, thrust_curve, value_text
 from sim.bodies.vehicles import class_of
 
 MOTOR, SERVO, NOSE_WHEEL = 101, 201, 440  # of PWM_MAIN_FUNCn
@@ -34,10 +34,11 @@ def px4_model(airframe: Airframe) -> str:
 
 def px4_environment(airframe: Airframe, parameters: Mapping[str, float]) -> dict[str, str]:
     """What its start script reads; `parameters` are those that the user has given."""
+    check_id_free(parameters)
     values = px4_params(airframe) | dict(parameters)
     # Not the simulator that some of the airframes are for
     chosen = {"PX4_SIM_MODEL": px4_model(airframe), "PX4_SIMULATOR": "mavlink"}
-    return chosen | {f"PX4_PARAM_{name}": f"{value:g}" for name, value in values.items()}
+    return chosen | {f"PX4_PARAM_{name}": value_text(value) for name, value in values.items()}
 
 
 def px4_params(airframe: Airframe) -> dict[str, float]:

@@ -1,5 +1,7 @@
 """What ArduPilot has to know of our vehicle: its own parameters, from the airframe file."""
 
+from collections.abc import Mapping
+
 from common.airframe import Airframe
 from common.airframes.multirotor import MultirotorAirframe
 from common.airframes.plane import PlaneAirframe
@@ -10,6 +12,26 @@ from mission.boards.ardupilot_plane import plane_params
 _FRAMES = {4: 1, 6: 2, 8: 3}  # ArduPilot's FRAME_CLASS by the number of motors
 _FRAME_X = 1
 _CRUISE_M_S = 2.0  # guess: half of what a rover of ours does on rough ground
+
+
+IDS = ("MAV_SYSID", "SYSID_THISMAV", "MAV_SYS_ID")
+"""Names of a vehicle's number: ArduPilot's since 4.7 and before, and PX4's."""
+
+
+def check_id_free(parameters: Mapping[str, float]) -> None:
+    """Refuses a number of the vehicle that is not its instance's: nobody would hear it.
+
+    Raises:
+        ValueError: one is given.
+    """
+    for name in IDS:
+        if name in parameters:
+            raise ValueError(f"--param {name}: the number of the vehicle follows from its instance, leave it out")
+
+
+def value_text(value: float) -> str:
+    """As a program reads it: all digits of an integer, and of what single precision holds."""
+    return f"{int(value)}" if value == int(value) else f"{value:.9g}"
 
 
 def ardupilot_params(airframe: Airframe) -> dict[str, float]:

@@ -71,11 +71,10 @@ class FleetFlight:
                     "folder": own_folder,
                     "world": shared_world(world, self._neighbours.seen_by(i)),
                 }
-                if board is None:
-                    own = signing[i] if signing else None
-                    flight: FlightBase = Flight(config, signing=own, has_camera_thread=has_camera_threads, **parts)
-                else:
-                    flight = board.make_flight(config, **parts)
+                if board is None or board.is_ours:
+                    parts["signing"] = signing[i] if signing else None
+                    parts["has_camera_thread"] = has_camera_threads
+                flight: FlightBase = Flight(config, **parts) if board is None else board.make_flight(config, **parts)
                 made.callback(flight.close)
                 self._join(i, flight)
                 self.flights.append(flight)

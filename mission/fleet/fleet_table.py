@@ -55,6 +55,8 @@ def print_start(
 def _flown_by(member: Member, i_vehicle: int) -> str:
     if member.board == "own":
         return "own"
+    if member.board == "betaflight":
+        return "own by Betaflight"
     peer = PEERS[member.board]
     return f"{peer.name}, {peer.protocol} {peer.port_of(i_vehicle)}"
 

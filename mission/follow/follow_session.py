@@ -20,7 +20,7 @@ from common.airframe import AirframeError, load_airframe
 from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
-from mission.boards.board_options import check_board
+from mission.boards.board_options import check_board, commands_of
 from mission.boards.board_session import run_of, station_links
 from mission.connections import open_links, open_page
 from mission.console.option_checks import UserError, speed_of
@@ -135,7 +135,9 @@ def _links(options: FollowOptions, config: FlightConfig, speed: float | None) ->
     Raises:
         UserError: a parameter, the airframe or a port is wrong.
     """
-    if options.board != "own":
+    if options.board == "own":
+        commands_of(options.command, [])
+    else:
         check_board(options)
     if options.board not in OURS:
         return station_links(options, speed)

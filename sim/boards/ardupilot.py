@@ -20,7 +20,7 @@ from sim.boards.outside import POLL_S, OnWait, PeerError
 from sim.rig import Rig
 
 PORT = 9002  # of the first instance; the next ones are 10 further each
-RESEND_S = 0.5  # what comes again sooner was on its way when we answered; SITL asks again after 1 s
+RESEND_S = 0.5  # of silence; what comes again sooner was on its way when we answered; SITL asks again after 1 s
 DATAGRAM_MAX = 4096
 _WAIT = Struct("ll").pack(int(POLL_S), round(POLL_S % 1.0 * 1e6))  # seconds and microseconds, as of struct timeval
 ROUNDING_NS = 1  # a step: SITL cuts its length to whole microseconds, and would lose one of most
@@ -110,7 +110,7 @@ class ArduPilotBoard:
         self._time_ns = 0
         self._counter = FrameCounter()
         self._sender: Any = None
-        self._answer, self._answered_s = b"", 0.0
+        self._answer = b""
         self._silent_s = 0.0  # of waiting, since it was heard
         self._truth = rig.arrays.truth.numpy()  # live
         self._imu = FastImu(rig) if self.is_fast else None
@@ -150,7 +150,6 @@ class ArduPilotBoard:
         return sample["gyro_frd"].tolist(), sample["accel_frd"].tolist()
 
     def _send(self) -> None:
-        self._answered_s = wall_time_s()
         try:
             self._socket.sendto(self._answer, self._sender)
         except OSError:  # it is gone; it says so by its silence
@@ -158,25 +157,27 @@ class ArduPilotBoard:
 
     def _await(self, row: Any) -> None:
         """Waits for the next servos, as long as `on_wait` lets it."""
-        begun_s = looked_s = wall_time_s()
+        begun_s = looked_s = heard_s = wall_time_s()
         while True:
             received = self._receive()
             now_s = wall_time_s()
             if now_s - looked_s >= POLL_S:
                 looked_s = now_s
                 self._on_wait(now_s - begun_s)
-            if received is not None and self._is_taken(*received, row):
-                return
+            if received is not None:
+                waited_s, heard_s = now_s - heard_s, now_s
+                if self._is_taken(*received, row, waited_s):
+                    return
 
-    def _is_taken(self, packet: ServoPacket, sender: Any, row: Any) -> bool:
-        """Whether the packet has brought the next servos."""
+    def _is_taken(self, packet: ServoPacket, sender: Any, row: Any, waited_s: float) -> bool:
+        """Whether the packet, which was waited for so long, has brought the next servos."""
         verdict = self._counter.judge(packet, sender, self._silent_s)
         if verdict is Verdict.FOREIGN:
             self.foreign_count += 1
             return False
         self._silent_s = 0.0
         if verdict is Verdict.AGAIN:
-            self._answer_again()
+            self._answer_again(waited_s)
             return False
         if verdict is Verdict.FIRST:
             self._begin()
@@ -190,9 +191,12 @@ class ArduPilotBoard:
             self.restart_count += 1
         self._time_ns = 0
 
-    def _answer_again(self) -> None:
-        """Our answer was lost, or late: then it has read it by now, and would be a frame behind with two."""
-        if self._answer and wall_time_s() - self._answered_s >= RESEND_S:
+    def _answer_again(self, waited_s: float) -> None:
+        """Our answer was lost, or late: then it has read it by now, and would be a frame behind with two.
+
+        It was late if what asks again was there before it was waited for: others have held up the exchange.
+        """
+        if self._answer and waited_s >= RESEND_S:
             self.again_count += 1
             self._send()
 

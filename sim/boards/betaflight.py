@@ -247,4 +247,5 @@ class BetaflightBoard:
         return None if commands is None else (commands, sender)
 
     def close(self) -> None:
+        self._control["actuators"]["command"][:MOTOR_COUNT] = 0.0  # nobody turns them any more
         self._socket.close()

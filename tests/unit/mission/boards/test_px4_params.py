@@ -36,6 +36,17 @@ def test_names_fit_and_numbers_are_numbers(name):
         assert abs(value) < 1e6
 
 
+def test_every_digit_of_a_parameter_arrives():
+    told = px4_environment(load_airframe("x500"), {"COM_FLIGHT_UUID": 1048574.0, "MPC_XY_P": 0.95})
+    assert told["PX4_PARAM_COM_FLIGHT_UUID"] == "1048574"
+    assert told["PX4_PARAM_MPC_XY_P"] == "0.95"
+
+
+def test_a_number_of_ones_own_is_refused():
+    with pytest.raises(ValueError, match="MAV_SYS_ID"):
+        px4_environment(load_airframe("x500"), {"MAV_SYS_ID": 7.0})
+
+
 def test_a_car_is_told_its_geometry_and_its_gains_in_px4s_units():
     airframe, found = load_airframe("rover"), params("rover")
     assert found["RA_WHEEL_BASE"] == airframe.wheel_base_m

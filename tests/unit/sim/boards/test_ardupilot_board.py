@@ -138,6 +138,30 @@ def test_a_question_that_crossed_the_answer_is_not_answered_twice(sitl_at):
         assert sitl.time_us == 20_000  # with two answers to one question each would be read a frame late
 
 
+def test_what_asked_again_while_others_held_us_up_is_not_answered_twice(monkeypatch, sitl_at):
+    """As in a fleet: between an answer and the next waiting another's exchange may take long."""
+    monkeypatch.setattr(ardupilot, "RESEND_S", 0.02)
+    with rig_of(ArduPilotBoard, patience_s=0.5) as (rig, board):
+        sitl = sitl_at(board.local_port)
+        give = board.give
+
+        def slowly(samples, truth):
+            give(samples, truth)
+            wall_sleep_s(0.05)
+
+        monkeypatch.setattr(board, "give", slowly)
+
+        def impatient():
+            for _ in range(10):
+                sitl.send()
+                wall_sleep_s(0.01)
+                sitl.frame()
+
+        fly(rig, impatient)
+        assert board.again_count == 0
+        assert sitl.time_us == 10_000  # none is read a frame late
+
+
 def test_rubbish_and_others_change_nothing(sitl_at):
     with rig_of(ArduPilotBoard, patience_s=0.3) as (rig, board), closing(UdpLink(board.local_port)) as other:
         sitl, stranger = sitl_at(board.local_port), sitl_at(board.local_port, lambda _: [2000] * 16)
