@@ -1,10 +1,11 @@
 """The scripting client of a real PX4: what differs from our own vehicle, which speaks its language."""
 
 from math import nan
+from typing import Any
 
-from mission.boards.outside_drone import OutsideDrone
+from mission.boards.outside_drone import FRAME_GLOBAL_INT, OutsideDrone
 from mission.client import CommandRefused
-from mission.script import CMD_TAKEOFF, MAIN_AUTO
+from mission.script import CMD_TAKEOFF, FRAME_GLOBAL, MAIN_AUTO
 
 TAKES_IN_S = 3.0  # guess: until its navigator has read a mission that has been acknowledged
 RETRY_S = 0.2
@@ -20,6 +21,12 @@ class Px4Drone(OutsideDrone):
         await self.command(CMD_TAKEOFF, nan, 0.0, 0.0, nan, nan, nan, alt_amsl_m, name="takeoff")
         await self.until(lambda: self.px4_mode == TAKING_OFF, 3.0, "mode takeoff")
         await self.until(lambda: self.px4_mode != TAKING_OFF, timeout_s, f"takeoff to {height_m:g} m")
+
+    async def command_int(self, command: int, frame: int, *fields: Any, **options: Any) -> Any:
+        """It takes places in GLOBAL_INT, and in no other frame."""
+        return await super().command_int(
+            command, FRAME_GLOBAL_INT if frame == FRAME_GLOBAL else frame, *fields, **options
+        )
 
     async def start_mission(self, first: int = 0) -> None:
         end_us = self.time_us + int(TAKES_IN_S * 1e6)
