@@ -25,6 +25,7 @@ EARTH_M = 6_371_000.0
 HOVER = 0.5  # guess, of full thrust; what is wrong with it is integrated
 G = 9.80665
 COPTER, ROVER = 2, 10  # MAV_TYPE
+PX4_FRAME = 5  # MAV_FRAME_GLOBAL_INT: it takes no command with a place in any other
 ARDUPILOT_LAND, PX4_LAND, PX4_TAKEOFF, PX4_LOITER = 9, 4 << 16 | 6 << 24, 4 << 16 | 2 << 24, 4 << 16 | 3 << 24
 
 
@@ -187,7 +188,10 @@ class Voice:
             return [mavlink.MAVLink_statustext_message(6, f"heard {message.callsign}".encode())]
         if kind not in ("COMMAND_LONG", "COMMAND_INT") or message.target_system != self.mav.srcSystem:
             return []
-        result = 0 if self._obeys(message, kind) else 3
+        is_strange = not self._is_ardupilot and kind == "COMMAND_INT" and message.frame != PX4_FRAME
+        result = (
+            mavlink.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME if is_strange else 0 if self._obeys(message, kind) else 3
+        )
         return [mavlink.MAVLink_command_ack_message(message.command, result)]
 
     def _obeys(self, message: Any, kind: str) -> bool:

@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from math import nan, pi
+from typing import Any
 
-from mission.boards.outside_drone import OutsideDrone
+from mission.boards.outside_drone import FRAME_GLOBAL_INT, OutsideDrone
 from mission.client import CommandRefused
 from mission.plan.plan_file import PlanItem
-from mission.script import CMD_TAKEOFF, MAIN_AUTO
+from mission.script import CMD_TAKEOFF, FRAME_GLOBAL, MAIN_AUTO
 
 TAKES_IN_S = 3.0  # guess: until its navigator has read a mission that has been acknowledged
 RETRY_S = 0.2
@@ -31,6 +32,12 @@ class Px4Drone(OutsideDrone):
             airspeed_m_s = await self.get_parameter("FW_AIRSPD_TRIM")
             items = [_timed(item, airspeed_m_s) if item.command == CMD_LOITER_TURNS else item for item in items]
         await super().upload(items, mission_type)
+
+    async def command_int(self, command: int, frame: int, *fields: Any, **options: Any) -> Any:
+        """It takes places in GLOBAL_INT, and in no other frame."""
+        return await super().command_int(
+            command, FRAME_GLOBAL_INT if frame == FRAME_GLOBAL else frame, *fields, **options
+        )
 
     async def start_mission(self, first: int = 0) -> None:
         end_us = self.time_us + int(TAKES_IN_S * 1e6)
