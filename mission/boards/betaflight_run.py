@@ -2,7 +2,7 @@
 
 import socket
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
@@ -13,7 +13,7 @@ from common.airframe import load_airframe
 from common.airframes.multirotor import MultirotorAirframe
 from common.clock import wall_sleep_s, wall_time_s
 from common.files import write_whole
-from mission.boards.betaflight_setup import CommandLine, packaged_program, settings
+from mission.boards.betaflight_setup import CommandLine, UnansweredError, packaged_program, settings
 from mission.boards.board_options import commands_of
 from mission.boards.board_session import Watch, filled_in
 from mission.boards.process import PeerProcess
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 SETUP = "setup.txt"
 TRIES = 5
 STARTS_S = 4.0  # of wall clock time, in which it answers; it takes half a second
-ANSWER_S = 1.0
 ENDS_S = 10.0  # of wall clock time, in which it saves and ends
 _PORTS = (9003, 9004)
 _HIDDEN = ("[FLASH_ProgramWord]",)  # a line for each word that it saves
@@ -75,7 +74,7 @@ class BetaflightRun:
 
         try:
             self._lines = settings(cast(MultirotorAirframe, load_airframe(config.airframe)))
-            flight = BetaflightFlight(config, self._watch, **parts)
+            flight = self._flight = BetaflightFlight(config, self._watch, **parts)
             flight.on_close = self.close
         except (PeerError, ValueError) as error:
             raise UserError(str(error)) from error
@@ -105,14 +104,15 @@ class BetaflightRun:
         start = partial(PeerProcess, command, own, {})
         try:
             check_ports_free()
-            self._set_up(started(partial(start, own / "setup.log")))
-            self._watch.process = started(partial(start, own / "console.log"))
+            self._say("Betaflight is being set up")
+            tried(lambda: self._set_up(started(partial(start, own / "setup.log"))))
+            self._watch.process = tried(lambda: started(partial(start, own / "console.log")))
+            self._flight.board.is_ours = True
         except PeerError as error:
             raise UserError(str(error)) from error
 
-    def _set_up(self, process: PeerProcess) -> None:
+    def _set_up(self, process: PeerProcess) -> PeerProcess:
         """Tells a program its settings, and waits until it has ended."""
-        self._say("Betaflight is being set up")
 
         def check() -> None:
             process.lines()
@@ -126,34 +126,41 @@ class BetaflightRun:
             end_s = wall_time_s() + ENDS_S
             while not process.has_ended:
                 if wall_time_s() >= end_s:
-                    raise PeerError("Betaflight does not end after it has been told to save its settings")
+                    raise UnansweredError("Betaflight does not end after it has been told to save its settings")
                 process.lines()
                 wall_sleep_s(0.01)
+        return process
 
     def close(self) -> None:
         self._watch.close()
 
 
+def tried(start: Callable[[], PeerProcess]) -> PeerProcess:
+    """What a start gives, as often as it takes."""
+    for _ in range(TRIES - 1):
+        with suppress(UnansweredError):
+            return start()
+    return start()
+
+
 def started(start: Callable[[], PeerProcess]) -> PeerProcess:
-    """A program that answers: its server may be lost in a race of its threads when it starts, and then never does.
+    """A program that answers.
 
     Raises:
-        PeerError: it has ended, or does not answer.
+        PeerError: it has ended, does not answer, or is another version.
     """
-    for _ in range(TRIES):
-        process = start()
-        end_s = wall_time_s() + STARTS_S
-        try:
-            while wall_time_s() < end_s:
-                if msp.ask(msp.FC_VERSION, answer_s=ANSWER_S) is not None:
-                    return process
-                process.check()
-                wall_sleep_s(POLL_S)
-        except PeerError:
-            process.close()
-            raise
+    process = start()
+    end_s = wall_time_s() + STARTS_S
+    try:
+        while not msp.is_reached():
+            process.check()
+            if wall_time_s() >= end_s:
+                raise UnansweredError(f"Betaflight does not answer at TCP port {msp.PORT}")
+            wall_sleep_s(POLL_S)
+    except PeerError:
         process.close()
-    raise PeerError(f"Betaflight does not answer at TCP port {msp.PORT}, though it was started {TRIES} times")
+        raise
+    return process
 
 
 def check_ports_free() -> None:

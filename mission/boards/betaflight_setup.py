@@ -36,7 +36,7 @@ _TILT_P, _YAWRATE_P = 8.0, 10.0  # [1/s] of our own controller: MC_ROLL_P, MC_YA
 _GAIN_MAX = 250
 _P_SCALE = 0.032029  # of its gains: of the mix in thousandths, per deg/s
 PROMPT, ERROR = b"\r\n# ", "###"
-REACHED_S, ANSWER_S, LINE_S = 20.0, 1.0, 5.0  # of wall clock time
+REACHED_S, ANSWER_S, LINE_S = 5.0, 1.0, 5.0  # of wall clock time
 _READ_S = 0.1
 _READ_MAX = 4096
 
@@ -108,6 +108,10 @@ def yaw_gain(airframe: MultirotorAirframe) -> int:
     return min(round(_YAWRATE_P / per_gain), _GAIN_MAX)
 
 
+class UnansweredError(PeerError):
+    """Its server may be lost in a race of its threads: another start helps."""
+
+
 class CommandLine:
     """Betaflight's command line, of one that has just been started.
 
@@ -129,7 +133,7 @@ class CommandLine:
                 return socket.create_connection(("127.0.0.1", port), timeout=_READ_S)
             except OSError as error:
                 if wall_time_s() >= end_s:
-                    raise PeerError(f"Betaflight's command line cannot be reached at TCP port {port}") from error
+                    raise UnansweredError(f"Betaflight's command line cannot be reached at TCP port {port}") from error
             wall_sleep_s(_READ_S)
 
     def _enter(self) -> None:
@@ -138,7 +142,7 @@ class CommandLine:
             self._send("#")
             if self._until_prompt(ANSWER_S) is not None:
                 return
-        raise PeerError("Betaflight does not open its command line")
+        raise UnansweredError("Betaflight does not open its command line")
 
     def say(self, line: str) -> str:
         """What it answers to a line.
@@ -149,7 +153,7 @@ class CommandLine:
         self._send(line + "\n")
         answer = self._until_prompt(LINE_S)
         if answer is None:
-            raise PeerError(f"Betaflight does not answer '{line}' on its command line")
+            raise UnansweredError(f"Betaflight does not answer '{line}' on its command line")
         if ERROR in answer:
             reason = answer[answer.index(ERROR) :].strip("# \r\n")
             raise PeerError(f"Betaflight does not take '{line}': {reason.splitlines()[0]}")
@@ -165,7 +169,7 @@ class CommandLine:
             self._peer.sendall(text.encode())
         except OSError as error:
             self._check()
-            raise PeerError("Betaflight has closed its command line") from error
+            raise UnansweredError("Betaflight has closed its command line") from error
 
     def _until_prompt(self, limit_s: float) -> str | None:
         received, end_s = b"", wall_time_s() + limit_s

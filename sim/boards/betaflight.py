@@ -25,7 +25,6 @@ from sim.boards.own import OwnBoard
 from sim.rig import Rig
 
 MOTORS_PORT, STATE_PORT, STICKS_PORT = 9001, 9003, 9004
-VARIANT, VERSION = b"BTFL", (4, 6)
 SETTLE_ANSWERS = 100  # before the first sticks: those that come before its receiver is made are its last
 ANSWER_S = 0.004  # of wall clock time; then the state is sent again
 SILENT_S = 0.5  # without an answer it may have gone; a state that comes while it starts would end it
@@ -83,6 +82,8 @@ class BetaflightBoard:
         self.local_port: int = self._socket.getsockname()[1]
         self.ports = (self.local_port, *ports[1:], msp_port)
         """Of motors, states, sticks, and questions."""
+        self.is_ours = False
+        """Its program has been started, asked and is watched by who made the board: it is not another one suddenly."""
         self._own, self._imu, self._sticks = OwnBoard(rig), FastImu(rig), Sticks(airframe)
         self._own_commands = wp.zeros(1, dtype=vec8)  # what our own cascade would do: not flown
         autopilot = rig.arrays.autopilot
@@ -149,7 +150,8 @@ class BetaflightBoard:
         if self._unarmed_us < (STOPS_US if self._is_turning else ARMS_US):
             return
         self._send_state(RUNNING)
-        reasons = msp.arming_reasons(msp.ask(msp.STATUS_EX, self._address, self._msp_port) or b"")
+        answers = msp.ask(msp.STATUS_EX, address=self._address, port=self._msp_port)
+        reasons = msp.arming_reasons(answers[0]) if answers else []
         told = " ".join(reasons) or "it gives no reason"
         what = "has disarmed by itself" if self._is_turning else "does not arm"
         raise PeerError(f"Betaflight {what} ({told})")
@@ -214,15 +216,8 @@ class BetaflightBoard:
         self._unarmed_us, self._is_turning = 0, False
 
     def _is_reached(self) -> bool:
-        """Whether one runs that has started up and is of the right version."""
-        variant = msp.ask(msp.FC_VARIANT, self._address, self._msp_port)
-        version = msp.ask(msp.FC_VERSION, self._address, self._msp_port)
-        if variant is None or version is None or len(version) < 2:
-            return False
-        if variant != VARIANT or tuple(version[:2]) != VERSION:
-            told = f"{variant.decode(errors='replace')} {'.'.join(map(str, version))}"
-            raise PeerError(f"the autopilot at TCP {self._msp_port} is {told}, and not Betaflight 4.6")
-        return True
+        """Whether states may be sent: one that comes while it starts would end it."""
+        return self.is_ours or msp.is_reached(self._address, self._msp_port)
 
     def _send_state(self, rate: float) -> None:
         felt = self._imu.samples[0]

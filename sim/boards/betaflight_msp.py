@@ -6,8 +6,11 @@ Facts: src/main/msp of Betaflight 4.6. It takes one client at a time, and answer
 import socket
 from struct import unpack_from
 
+from sim.boards.outside import PeerError
+
 PORT = 5761
 FC_VARIANT, FC_VERSION, STATUS_EX = 2, 3, 150
+VARIANT, VERSION = b"BTFL", (4, 6)
 _ANSWER_S = 1.0
 _READ_MAX = 4096
 _ARMING_AT = 15  # of STATUS_EX: the count of bytes of further flight modes, which stand before its reasons
@@ -18,22 +21,46 @@ _REASONS = (
 ).split()
 
 
-def ask(code: int, address: str = "127.0.0.1", port: int = PORT, answer_s: float = _ANSWER_S) -> bytes | None:
-    """What it answers; None: it does not, or not in time."""
+def ask(*codes: int, address: str = "127.0.0.1", port: int = PORT, answer_s: float = _ANSWER_S) -> list[bytes] | None:
+    """What it answers to each; None: it does not, or not in time. By one connection: each is a risk to its server."""
+    answers: list[bytes] = []
     try:
         with socket.create_connection((address, port), timeout=answer_s) as peer:
-            peer.sendall(bytes((*b"$M<", 0, code, code)))
-            received = b""
-            while True:
-                data = peer.recv(_READ_MAX)
-                if not data:
+            for code in codes:
+                peer.sendall(bytes((*b"$M<", 0, code, code)))
+                answer = _received(peer, code)
+                if answer is None:
                     return None
-                received = (received + data)[-_READ_MAX:]
-                answer = payload_of(received, code)
-                if answer is not None:
-                    return answer
+                answers.append(answer)
     except OSError:
         return None
+    return answers
+
+
+def is_reached(address: str = "127.0.0.1", port: int = PORT) -> bool:
+    """Whether one runs that has started up.
+
+    Raises:
+        PeerError: it is another version.
+    """
+    answers = ask(FC_VARIANT, FC_VERSION, address=address, port=port)
+    if answers is None:
+        return False
+    variant, version = answers
+    if variant != VARIANT or tuple(version[:2]) != VERSION:
+        told = f"{variant.decode(errors='replace')} {'.'.join(map(str, version))}"
+        raise PeerError(f"the autopilot at TCP port {port} is {told}, and not Betaflight 4.6")
+    return True
+
+
+def _received(peer: socket.socket, code: int) -> bytes | None:
+    received = b""
+    while data := peer.recv(_READ_MAX):
+        received = (received + data)[-_READ_MAX:]
+        answer = payload_of(received, code)
+        if answer is not None:
+            return answer
+    return None
 
 
 def payload_of(received: bytes, code: int) -> bytes | None:

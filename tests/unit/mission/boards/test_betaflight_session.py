@@ -13,11 +13,13 @@ from typer.testing import CliRunner
 from bench.standins.betaflight import BetaflightStandIn
 from common.airframe import load_airframe
 from mission.boards import betaflight_run
+from mission.boards.betaflight_run import started, tried
 from mission.boards.betaflight_setup import CommandLine, packaged_program, settings, yaw_gain
 from mission.cli import app
 from mission.client import ScriptError
 from mission.fleet.fleet_script import Fleet
 from mission.flight_config import FlightConfig
+from sim.boards.betaflight_msp import is_reached
 from sim.boards.outside import PeerError
 from sim.world.world import WorldConfig
 
@@ -69,6 +71,31 @@ def test_a_program_that_does_not_answer_is_given_up(tmp_path, monkeypatch):
     result = fly("--command", "sleep 60", "--run-folder", str(tmp_path / "run"))
     assert result.exit_code == 2
     assert "does not answer at TCP port 5761" in result.stderr
+
+
+def test_a_program_whose_server_is_lost_is_started_again(monkeypatch):
+    monkeypatch.setattr(betaflight_run, "STARTS_S", 0.2)
+    starts = []
+
+    def start():
+        starts.append(Program())
+        return starts[-1]
+
+    class Program:
+        is_closed = False
+
+        def check(self):
+            pass
+
+        def close(self):
+            self.is_closed = True
+
+    with closing(BetaflightStandIn()) as peer:
+        monkeypatch.setattr(
+            betaflight_run.msp, "is_reached", lambda: len(starts) > 2 and is_reached(port=peer.msp_port)
+        )
+        assert tried(lambda: started(start)) is starts[2]
+    assert [program.is_closed for program in starts] == [True, True, False]
 
 
 def test_it_is_set_up_and_flies_a_mission(tmp_path, monkeypatch):

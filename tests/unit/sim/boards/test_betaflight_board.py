@@ -177,6 +177,13 @@ def test_a_restart_is_noticed_and_it_is_not_armed_before_we_are_disarmed(monkeyp
             assert np.all(rig.board_commands.numpy()[0][:4] == 0.0)
 
 
+def test_a_program_of_ours_is_flown_though_its_server_is_lost():
+    with flown() as (peer, rig, board):
+        peer.command_line.is_mute = board.is_ours = True
+        fly(rig, 10, peer)
+        assert board.exchange_count == 40
+
+
 @pytest.mark.parametrize(("version", "told"), [((26, 6, 0), "26.6.0"), ((4, 5, 1), "4.5.1")])
 def test_another_version_is_refused_before_it_gets_a_state(version, told):
     with flown(version=version) as (peer, rig, _):
@@ -191,8 +198,7 @@ def test_another_number_of_motors_is_refused():
 
 
 @pytest.mark.parametrize("is_mute", [True, False])
-def test_who_never_comes_or_never_flies_is_given_up_with_a_sentence(is_mute, monkeypatch):
-    monkeypatch.setattr(betaflight.msp, "_ANSWER_S", 0.05)
+def test_who_never_comes_or_never_flies_is_given_up_with_a_sentence(is_mute):
     with flown(patience_s=0.15) as (peer, rig, _):
         peer.command_line.is_mute = is_mute
         with pytest.raises(PeerError, match="has been silent"):
