@@ -21,6 +21,7 @@ _ROLL_INTEGRAL_RAD_S = 1.5  # at which the integral takes over: sideslip and tur
 _PITCH_BANDWIDTH_RAD_S = 12.0  # of pitch rate; guess: at FW_AIRSPD_MIN 50 deg of phase are left
 _HOLD_OF_STIFFNESS = 1.0  # of the torque by which the integral holds a pitch rate; guess, with the one above
 _THROW_FELT = 0.5  # part of a throw's acceleration that is one; guess
+_THROW_LEAST_M_S2 = 11.0  # above gravity, which is felt along a nose that is held up
 _THROWN_WITHIN_S = 30.0  # armed in the hand, else it is disarmed; guess
 _ROLL_BANDWIDTH_RAD_S = 8.0  # of roll rate, in part by the wing's own damping; below the servos' 25: guess
 
@@ -108,7 +109,7 @@ def _slope_least_deg(airframe: PlaneAirframe, airspeed_m_s: float) -> float:
 def _launch(throw: Throw) -> dict[str, int | float]:
     return {
         "FW_LAUN_DETCN_ON": 1,
-        "FW_LAUN_AC_THLD": _round(_THROW_FELT * throw.acceleration_m_s2, 1),
+        "FW_LAUN_AC_THLD": max(_round(_THROW_FELT * throw.acceleration_m_s2, 1), _THROW_LEAST_M_S2),
         "FW_LAUN_MOT_DEL": throw.stroke_s,  # out of the hand
         "COM_DISARM_PRFLT": _THROWN_WITHIN_S,
     }
