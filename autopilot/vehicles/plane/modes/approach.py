@@ -187,7 +187,8 @@ class Approach:
         """[m] By which the parabola of the flare leads farther than the slope that it ends, until it is followed."""
         sink = slope * speed
         begin_m = max(self._flare_begin_m(sink) - _PATH_LAG_S * sink, 0.0)
-        return begin_m * (2.0 * speed / (sink + self._context.number("FW_LND_FL_SINK")) - 1.0 / slope)
+        both = sink + self._context.number("FW_LND_FL_SINK")
+        return begin_m * (2.0 * speed / both - 1.0 / slope) if both > 0.0 else 0.0  # it stands in the wind
 
     def _ground_d(self, left_m: float) -> float:
         """[m] Of a plane that stands at the touchdown: as was said, and nearer to it as the ground is measured."""
