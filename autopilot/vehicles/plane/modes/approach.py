@@ -13,7 +13,7 @@ from math import atan2, cos, hypot, isfinite, nan, pi, radians, sin, sqrt, tan
 
 from autopilot.interface.client_requests import LandAt
 from autopilot.interface.mode_spec import FlightMode
-from autopilot.interface.vehicle_state import ACCEPTED, Reply, Severity, Verdict
+from autopilot.interface.vehicle_state import ACCEPTED, BatteryLevel, Reply, Severity, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import Vector
 from autopilot.ports import AIRSPEED_VALID, TERRAIN_VALID
@@ -29,10 +29,12 @@ _FAR_M = 10_000.0
 _REACHED_M = 2.0  # below the height to which it goes round; guess
 _JUDGED_M = 40.0  # before the touchdown, and as far beyond it, a landing that fails is given up; guess
 _RETRIES = 2  # then it takes what it gets; guess
+_CLIMB_US, _CLIMBS_M = 8_000_000, 2.0  # what it must have risen by then to go on climbing; guess
 _LONG_FLARE_US = 8_000_000  # guess
 _DOWN_M_S = 0.2  # sinks no faster once it stands on its wheels
 _TOUCH_M = 0.4  # height of the wheels, as measured, below which that is a touchdown; guess
 _GROUND_SEEN_M = 150.0  # way from the touchdown on which the ground below is more and more believed; guess
+_EMPTY = (BatteryLevel.EMERGENCY, BatteryLevel.FAILED)  # no charge is left to go round with
 _ROUGH_M = 3.0  # ground farther from where the touchdown was said to be is not believed to be that; guess
 
 
@@ -52,11 +54,13 @@ class Approach:
         "_along",
         "_begin",
         "_centre",
+        "_climb_us",
         "_context",
         "_entry",
         "_far",
         "_flare_us",
         "_has_seen_ground",
+        "_low_d",
         "_phase",
         "_retries",
         "_target",
@@ -76,6 +80,8 @@ class Approach:
         self._flare_us = 0
         self._begin = (1.0, 0.0, 0.0)  # of the flare: height [m], sink [m/s], throttle
         self._up_d = 0.0  # [m] to which it climbs where it goes round
+        self._climb_us = 0  # when the climb began
+        self._low_d = 0.0  # [m] where
         self._far: Vector = (0.0, 0.0, 0.0)
         self._retries = 0  # left, where it gives up by itself
         self._tries_again = False
@@ -215,7 +221,9 @@ class Approach:
         """Why no flare should begin; empty if it may. Judged on the last metres of the slope."""
         context = self._context
         north, east, _ = context.state.estimate.pos_ned
-        if left_m > _JUDGED_M:
+        has_ground = bool(context.state.estimate.flags & TERRAIN_VALID)
+        self._has_seen_ground |= has_ground
+        if left_m > _JUDGED_M or context.state.battery_level in _EMPTY:
             return ""
         across_m = (east - self._target[1]) * self._along[0] - (north - self._target[0]) * self._along[1]
         most_m, bits = context.number("HG_FW_LND_OFF"), int(context.number("FW_LND_ABORT"))
@@ -223,9 +231,7 @@ class Approach:
             return f"{abs(across_m):.0f} m beside it"
         if left_m < -_JUDGED_M:
             return "too high"
-        if context.state.estimate.flags & TERRAIN_VALID:
-            self._has_seen_ground = True
-        elif bits & (2 if self._has_seen_ground else 1):
+        if not has_ground and bits & (2 if self._has_seen_ground else 1):
             return "no height over ground is measured"
         return ""
 
@@ -235,13 +241,21 @@ class Approach:
         self._phase = _Phase.CLIMB
         north, east, down = context.state.estimate.pos_ned
         self._up_d = min(self._target[2] - height_m, down)
+        self._climb_us, self._low_d = context.state.time_us, down
         self._far = (north + _FAR_M * self._along[0], east + _FAR_M * self._along[1], nan)
         climb = context.number("FW_T_CLMB_MAX")
         context.setpoint.glide(self._far, (north, east, nan), -climb, airspeed=nan, throttle=nan)
 
     def _go_round(self) -> None:
         """Straight up; then round the touchdown, or down for the next try."""
-        if self._phase is _Phase.WAIT or self._context.state.estimate.pos_ned[2] > self._up_d + _REACHED_M:
+        state = self._context.state
+        down = state.estimate.pos_ned[2]
+        if self._phase is _Phase.WAIT:
+            return
+        if down > self._up_d + _REACHED_M:
+            if state.time_us - self._climb_us > _CLIMB_US and down > self._low_d - _CLIMBS_M:
+                self._context.announcer.statustext(Severity.CRITICAL, "It does not climb: landing ahead")
+                self._phase, self._retries = _Phase.SLOPE, 0
             return
         if self._tries_again:
             left = self._retries

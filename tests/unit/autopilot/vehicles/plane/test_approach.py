@@ -1,10 +1,8 @@
 """A plane's landing, frame by frame: when it is given up, and by whom."""
 
-from math import nan, radians, tan
-
 import pytest
 
-from autopilot.interface.vehicle_state import LandedState, VehicleState, Verdict
+from autopilot.interface.vehicle_state import BatteryLevel, LandedState, VehicleState
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import all_parameters
@@ -52,3 +50,38 @@ class Landing:
 def test_a_plane_that_stands_in_the_wind_flies_on():
     landing = Landing(FW_LND_FL_SINK=0.0)
     landing.frame(-100.0, 10.0, vel_ned=(-1.0, 0.0, 0.0))
+
+
+def test_a_landing_beside_the_runway_is_tried_again_twice():
+    landing = Landing()
+    for _ in range(3):
+        landing.frame(-20.0, 10.0, east=200.0)
+        landing.frame(-20.0, 60.0, east=200.0)  # up, and round for the next try
+        landing.approach._phase = type(landing.approach._phase).SLOPE
+    assert len([text for _, text in landing.recorder.texts if "trying again" in text]) == 2
+
+
+def test_nobody_goes_round_by_himself_without_charge():
+    landing = Landing()
+    landing.state.battery_level = BatteryLevel.EMERGENCY
+    landing.frame(-20.0, 10.0, east=200.0)
+    assert not landing.recorder.texts
+
+
+@pytest.mark.parametrize(
+    ("bits", "is_seen", "is_given_up"), [(1, False, True), (1, True, False), (2, True, True), (2, False, False)]
+)
+def test_a_landing_without_a_measured_height_is_given_up_if_asked(bits, is_seen, is_given_up):
+    landing = Landing(FW_LND_ABORT=bits)
+    landing.frame(-300.0, 30.0, flags=VALID | (TERRAIN_VALID if is_seen else 0))
+    landing.frame(-20.0, 10.0)
+    assert landing.recorder.has_text("no height over ground") == is_given_up
+
+
+def test_what_does_not_climb_lands_ahead():
+    landing = Landing()
+    landing.frame(-20.0, 10.0, east=200.0)
+    for k in range(450):
+        landing.frame(k * 0.4, 10.0 - 0.01 * k, east=200.0)
+    assert landing.recorder.has_text("does not climb")
+    assert landing.context.is_landing
