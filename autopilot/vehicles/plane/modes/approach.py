@@ -15,6 +15,7 @@ from autopilot.interface.client_requests import LandAt
 from autopilot.interface.mode_spec import FlightMode
 from autopilot.interface.vehicle_state import ACCEPTED, BatteryLevel, Reply, Severity, Verdict
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.modes.goto import target_refusal
 from autopilot.navigator.setpoint import Vector
 from autopilot.ports import AIRSPEED_VALID, TERRAIN_VALID
 from autopilot.vehicles.plane.modes.departure import airspeed_of
@@ -34,7 +35,6 @@ _LONG_FLARE_US = 8_000_000  # guess
 _DOWN_M_S = 0.2  # sinks no faster once it stands on its wheels
 _TOUCH_M = 0.4  # height of the wheels, as measured, below which that is a touchdown; guess
 _GROUND_SEEN_M = 150.0  # way from the touchdown on which the ground below is more and more believed; guess
-_EMPTY = (BatteryLevel.EMERGENCY, BatteryLevel.FAILED)  # no charge is left to go round with
 _ROUGH_M = 3.0  # ground farther from where the touchdown was said to be is not believed to be that; guess
 
 
@@ -212,9 +212,15 @@ class Approach:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not landing: it is on the ground")
         if self._phase is _Phase.WAIT:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not landing: it goes round already")
-        self._tries_again = False
+        if self._phase is _Phase.CIRCLE:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not landing: it is not on the slope yet")
         usual_m = self._context.number("MIS_LND_ABRT_ALT")
-        self._give_up(max(height_m, usual_m) if isfinite(height_m) else usual_m, "Landing aborted: going round")
+        up_m = max(height_m, usual_m) if isfinite(height_m) else usual_m
+        refusal = target_refusal(self._context, (self._target[0], self._target[1], self._target[2] - up_m))
+        if refusal is not ACCEPTED:
+            return refusal
+        self._tries_again = False
+        self._give_up(up_m, "Landing aborted: going round")
         return ACCEPTED
 
     def _hopeless(self, left_m: float) -> str:
@@ -223,7 +229,7 @@ class Approach:
         north, east, _ = context.state.estimate.pos_ned
         has_ground = bool(context.state.estimate.flags & TERRAIN_VALID)
         self._has_seen_ground |= has_ground
-        if left_m > _JUDGED_M or context.state.battery_level in _EMPTY:
+        if left_m > _JUDGED_M or context.state.battery_level is BatteryLevel.EMERGENCY:
             return ""
         across_m = (east - self._target[1]) * self._along[0] - (north - self._target[0]) * self._along[1]
         most_m, bits = context.number("HG_FW_LND_OFF"), int(context.number("FW_LND_ABORT"))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from autopilot.interface.vehicle_state import BatteryLevel, LandedState, VehicleState
+from autopilot.interface.vehicle_state import BatteryLevel, LandedState, VehicleState, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import all_parameters
@@ -85,3 +85,19 @@ def test_what_does_not_climb_lands_ahead():
         landing.frame(k * 0.4, 10.0 - 0.01 * k, east=200.0)
     assert landing.recorder.has_text("does not climb")
     assert landing.context.is_landing
+
+
+def test_a_client_may_send_it_round_from_the_slope_alone():
+    landing = Landing()
+    landing.approach.start((0.0, 0.0, 0.0), 0.0)
+    assert landing.approach.go_around(50.0).verdict is Verdict.TEMPORARILY_REJECTED  # it circles down to the slope
+    landing.approach.start((0.0, 0.0, 0.0), 0.0, is_lined_up=True)
+    assert landing.approach.go_around(50.0).verdict is Verdict.ACCEPTED
+
+
+def test_going_round_keeps_to_the_fence_and_to_heights_that_there_are():
+    landing = Landing()
+    assert landing.approach.go_around(1e6).verdict is Verdict.DENIED
+    landing.context.position_refusal = lambda pos_ned: "above the fence" if pos_ned[2] < -100.0 else ""
+    assert landing.approach.go_around(150.0).reason == "target is above the fence"
+    assert landing.approach.go_around(50.0).verdict is Verdict.ACCEPTED
