@@ -101,7 +101,10 @@ class Guidance:
         """
         context = self._navigator.context
         if self._navigator.goes_round:
-            return self._navigator.go_around(height_m)
+            reply = self._navigator.go_around(height_m)
+            if reply.verdict is Verdict.ACCEPTED:
+                self._commander.guard.release()  # a pilot has taken over: a later failsafe may lead it down again
+            return reply
         if not self._state.is_flying or not context.is_landing:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not landing")
         reason = self._commander.refusal(Mode.HOLD)

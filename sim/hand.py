@@ -107,6 +107,7 @@ class Hand:
             self._move((ahead * north, ahead * east, -throw.acceleration_m_s2 * up))
         else:
             self._phase, self._frames = _Phase.FREE, 0
+            self._body["hand_accel_ned"][0] = 0.0
             self._body["is_held"][0] = 0
 
     def _lies(self) -> bool:

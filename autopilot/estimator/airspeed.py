@@ -10,14 +10,22 @@ import warp as wp
 from autopilot.estimator.airspeed_params import CHECK_INNOVATION, CHECK_MISSING, CHECK_STUCK
 from autopilot.estimator.params import EstimatorParams
 from autopilot.estimator.state import AirspeedCheck
-from autopilot.ports import AIRSPEED_VALID, VELOCITY_VALID, AirspeedSample, Estimate
+from autopilot.ports import (
+    AIRSPEED_VALID,
+    CONTACT_GROUND,
+    CONTACT_NONE,
+    CONTACT_UNKNOWN,
+    VELOCITY_VALID,
+    AirspeedSample,
+    Estimate,
+)
 
 wp.set_module_options({"enable_backward": False})
 
 SEA_LEVEL_DENSITY_KG_M3 = wp.constant(1.225)  # ISO 2533
 _SILENT_US = wp.constant(1_000_000)  # guess
 _STUCK_US = wp.constant(2_000_000)  # PX4's
-_MOVING_M_S = wp.constant(5.0)  # over ground; slower, the value may well stay the same
+_MOVING_M_S = wp.constant(5.0)  # over ground; slower, the motion tells little of the tube
 _WIND_SAMPLES = wp.constant(3000.0)  # of the mean: a minute; guess: turns in it tell the tube's error from the wind
 _WIND_LEAST = wp.constant(250.0)  # of samples, before the wind is known; guess
 
@@ -29,8 +37,15 @@ def airspeed_of(pressure_pa: float) -> float:
 
 
 @wp.func
+def true_airspeed_of(pressure_pa: float, height_m: float) -> float:
+    """[m/s] through the standard atmosphere (ISO 2533) at a height over sea level; of the motion, not of the wing."""
+    density_ratio = wp.pow(wp.clamp(1.0 - 2.25577e-5 * height_m, 0.1, 2.0), 4.25588)
+    return airspeed_of(pressure_pa) / wp.sqrt(density_ratio)
+
+
+@wp.func
 def is_contradicted(params: EstimatorParams, check: AirspeedCheck, estimate: Estimate, speed: float) -> bool:
-    """Whether an airspeed [m/s] differs from that of the motion in the known wind."""
+    """Whether a true airspeed [m/s] differs from that of the motion in the known wind."""
     if check.wind_count < _WIND_LEAST:
         return False
     through = estimate.vel_ned - wp.vec3(check.wind_ne[0], check.wind_ne[1], 0.0)
@@ -49,23 +64,46 @@ def wind_learned(check: AirspeedCheck, estimate: Estimate, speed: float) -> Airs
 
 
 @wp.func
-def checked(params: EstimatorParams, check: AirspeedCheck, estimate: Estimate, sample: AirspeedSample) -> AirspeedCheck:
-    """The check after a tick of the IMU."""
+def checked(
+    params: EstimatorParams,
+    check: AirspeedCheck,
+    estimate: Estimate,
+    sample: AirspeedSample,
+    contact: int,
+    height_m: float,
+) -> AirspeedCheck:
+    """The check after a tick of the IMU; on the ground a value may well stay the same, and tells nothing of the wind.
+
+    Args:
+        params: ASPD_*.
+        check: as of the last tick.
+        estimate: of the motion.
+        sample: the newest.
+        contact: CONTACT_*: what the commander says.
+        height_m: over sea level, in the standard atmosphere.
+    """
     out = check
     now_us = estimate.time_us
-    if sample.time_us != check.sample_us:
-        speed = airspeed_of(sample.pressure_pa)
-        vel = wp.vec2(estimate.vel_ned[0], estimate.vel_ned[1])
-        is_moving = (estimate.flags & VELOCITY_VALID) != 0 and wp.length(vel) > _MOVING_M_S
-        if sample.pressure_pa != check.pressure_pa or not is_moving:
+    vel = wp.vec2(estimate.vel_ned[0], estimate.vel_ned[1])
+    is_moving = (estimate.flags & VELOCITY_VALID) != 0 and wp.length(vel) > _MOVING_M_S
+    is_flying = contact == CONTACT_NONE or (contact == CONTACT_UNKNOWN and is_moving)
+    if not is_flying:
+        out.changed_us = now_us
+        out.is_contradicted = 0
+    if contact == CONTACT_GROUND:
+        out.wind_count = 0.0
+    if sample.time_us != check.sample_us and wp.isfinite(sample.pressure_pa):
+        speed = true_airspeed_of(sample.pressure_pa, height_m)
+        if sample.pressure_pa != check.pressure_pa:
             out.changed_us = now_us
         out.sample_us = sample.time_us
         out.pressure_pa = sample.pressure_pa
-        out.is_contradicted = 0
-        if is_moving and is_contradicted(params, check, estimate, speed):
-            out.is_contradicted = 1
-        elif is_moving and check.is_failed == 0:
-            out = wind_learned(out, estimate, speed)
+        if is_flying and is_moving:  # else it stays as it was judged last
+            out.is_contradicted = 0
+            if is_contradicted(params, check, estimate, speed):
+                out.is_contradicted = 1
+            elif check.is_failed == 0:
+                out = wind_learned(out, estimate, speed)
     is_silent = now_us - out.sample_us > wp.int64(_SILENT_US) and (params.airspeed_checks & CHECK_MISSING) != 0
     is_stuck = now_us - out.changed_us > wp.int64(_STUCK_US) and (params.airspeed_checks & CHECK_STUCK) != 0
     is_off = out.is_contradicted == 1 and (params.airspeed_checks & CHECK_INNOVATION) != 0
@@ -77,7 +115,7 @@ def checked(params: EstimatorParams, check: AirspeedCheck, estimate: Estimate, s
             out.is_failed = 1
     else:
         out.doubted_us = wp.int64(0)
-        if check.passed_us == wp.int64(0):
+        if check.passed_us == wp.int64(0) or (is_flying and not is_moving):  # in the air unjudged is not passed
             out.passed_us = now_us
         is_over = now_us - out.passed_us > wp.int64(params.airspeed_start_s * 1.0e6)
         if params.airspeed_start_s >= 0.0 and is_over:

@@ -17,9 +17,11 @@ _TURN_SLOPE = 0.6  # tangent of the bank on a circle in a calm: guess
 _PERIOD_M_S2 = 2.2  # trim over the period of the way back to a line: a large plane banks no faster; guess
 _SLOPE_DEG = 5.0  # PX4's
 _SLOPE_OF_GLIDE = 0.8  # of the angle at which it glides; guess: gusts from both sides can be answered
+_ROLL_INTEGRAL_RAD_S = 1.5  # at which the integral takes over: sideslip and turns roll it; guess: below FW_R_TC's
 _PITCH_BANDWIDTH_RAD_S = 12.0  # of pitch rate; guess: at FW_AIRSPD_MIN 50 deg of phase are left
 _HOLD_OF_STIFFNESS = 1.0  # of the torque by which the integral holds a pitch rate; guess, with the one above
 _THROW_FELT = 0.5  # part of a throw's acceleration that is one; guess
+_THROW_LEAST_M_S2 = 11.0  # above gravity, which is felt along a nose that is held up
 _THROWN_WITHIN_S = 30.0  # armed in the hand, else it is disarmed; guess
 _ROLL_BANDWIDTH_RAD_S = 8.0  # of roll rate, in part by the wing's own damping; below the servos' 25: guess
 
@@ -45,6 +47,7 @@ def _rate_gains(airframe: PlaneAirframe, trim_m_s: float) -> dict[str, float]:
     return {
         "FW_RR_FF": _round(roll_damping / roll_power),
         "FW_RR_P": _round(max(_ROLL_BANDWIDTH_RAD_S - roll_damping, 1.0) / roll_power),
+        "FW_RR_I": _round(_ROLL_INTEGRAL_RAD_S * roll_damping / roll_power),
         "FW_PR_FF": _round(pitch_damping / pitch_power),
         "FW_PR_P": _round(max(_PITCH_BANDWIDTH_RAD_S - pitch_damping, 1.0) / pitch_power),
         "FW_PR_I": _round(_HOLD_OF_STIFFNESS * pitch_stiffness / pitch_power),
@@ -71,6 +74,7 @@ def plane_defaults(airframe: PlaneAirframe) -> dict[str, int | float]:
         "RTL_RETURN_ALT": 60.0,
         "RTL_DESCEND_ALT": 40.0,
         "COM_DISARM_LAND": 2.0,
+        "FD_FAIL_R": 75.0,  # PX4's 60 is what a gust makes of FW_R_LIM; guess
         "NAV_ACC_RAD": 10.0,
         "NAV_LOITER_RAD": max(80.0, _round(trim**2 / (GRAVITY_M_S2 * _TURN_SLOPE), -1)),
         "NPFG_PERIOD": max(10.0, _round(trim / _PERIOD_M_S2)),
@@ -105,7 +109,7 @@ def _slope_least_deg(airframe: PlaneAirframe, airspeed_m_s: float) -> float:
 def _launch(throw: Throw) -> dict[str, int | float]:
     return {
         "FW_LAUN_DETCN_ON": 1,
-        "FW_LAUN_AC_THLD": _round(_THROW_FELT * throw.acceleration_m_s2, 1),
+        "FW_LAUN_AC_THLD": max(_round(_THROW_FELT * throw.acceleration_m_s2, 1), _THROW_LEAST_M_S2),
         "FW_LAUN_MOT_DEL": throw.stroke_s,  # out of the hand
         "COM_DISARM_PRFLT": _THROWN_WITHIN_S,
     }

@@ -94,6 +94,20 @@ def test_what_is_no_throw_starts_no_motor(parameters, why):
     thrown(script, parameters=parameters)
 
 
+def test_a_throw_that_does_not_carry_stops_the_motor():
+    async def script(drone, flight):
+        await take_off(drone)
+        await drone.wait_disarmed(30.0)
+        assert any("Launch failed" in text for text in drone.texts)
+        assert -drone.pos_ned[2] < 1.0
+        flight.hand.frame = lambda **_: None
+        await take_off(drone)
+        await drone.sleep(3.0)
+        assert flight.controller.state.awaits_launch  # the next take-off waits for the next throw
+
+    thrown(script, seconds=60.0, throw_m_s=3.0, parameters={"FW_LAUN_AC_THLD": 1.0}, seed=46)
+
+
 def test_a_throw_on_its_side_is_ignored():
     async def script(drone, flight):
         await take_off(drone)

@@ -9,6 +9,7 @@ from common.airframe import load_airframe
 from common.geodesy import GRAVITY_M_S2
 from sim.bodies.plane_model import plane_model
 from sim.hand import Hand
+from sim.turntable import Turntable
 from tests.unit.sim.plane_fleet import PlaneFleet
 
 GLIDER = load_airframe("easyglider")
@@ -88,6 +89,18 @@ def test_it_is_picked_up_where_it_lies_if_it_is_not_armed():
     assert lies[2] - up[2] == pytest.approx(THROW.height_m, rel=0.06)
     assert fleet.state["vel_ned"][0] == pytest.approx((0.0, 0.0, 0.0))
     assert fleet.state["q_ned_from_frd"][0, :2] == pytest.approx((0.0, 0.0), abs=1e-2)
+
+
+def test_who_holds_it_after_a_throw_holds_it_still():
+    fleet, hand = in_hand()
+    hand.throw()
+    frames(fleet, hand, 1.0)
+    assert not hand.is_holding
+    fleet.state["vel_ned"] = 0.0
+    before = fleet.state["pos_ned"].copy()
+    Turntable(fleet.state).show(0.0, 0.0)  # as a calibration does
+    fleet.fly(0.5)
+    assert fleet.state["pos_ned"] == pytest.approx(before)
 
 
 def test_wreckage_is_left_where_it_is():

@@ -13,8 +13,9 @@ from math import atan2, cos, hypot, isfinite, nan, pi, radians, sin, sqrt, tan
 
 from autopilot.interface.client_requests import LandAt
 from autopilot.interface.mode_spec import FlightMode
-from autopilot.interface.vehicle_state import ACCEPTED, Reply, Severity, Verdict
+from autopilot.interface.vehicle_state import ACCEPTED, BatteryLevel, Reply, Severity, Verdict
 from autopilot.navigator.context import NavContext
+from autopilot.navigator.modes.goto import target_refusal
 from autopilot.navigator.setpoint import Vector
 from autopilot.ports import AIRSPEED_VALID, TERRAIN_VALID
 from autopilot.vehicles.plane.modes.departure import airspeed_of
@@ -29,6 +30,7 @@ _FAR_M = 10_000.0
 _REACHED_M = 2.0  # below the height to which it goes round; guess
 _JUDGED_M = 40.0  # before the touchdown, and as far beyond it, a landing that fails is given up; guess
 _RETRIES = 2  # then it takes what it gets; guess
+_CLIMB_US, _CLIMBS_M = 8_000_000, 2.0  # what it must have risen by then to go on climbing; guess
 _LONG_FLARE_US = 8_000_000  # guess
 _DOWN_M_S = 0.2  # sinks no faster once it stands on its wheels
 _TOUCH_M = 0.4  # height of the wheels, as measured, below which that is a touchdown; guess
@@ -52,11 +54,13 @@ class Approach:
         "_along",
         "_begin",
         "_centre",
+        "_climb_us",
         "_context",
         "_entry",
         "_far",
         "_flare_us",
         "_has_seen_ground",
+        "_low_d",
         "_phase",
         "_retries",
         "_target",
@@ -76,6 +80,8 @@ class Approach:
         self._flare_us = 0
         self._begin = (1.0, 0.0, 0.0)  # of the flare: height [m], sink [m/s], throttle
         self._up_d = 0.0  # [m] to which it climbs where it goes round
+        self._climb_us = 0  # when the climb began
+        self._low_d = 0.0  # [m] where
         self._far: Vector = (0.0, 0.0, 0.0)
         self._retries = 0  # left, where it gives up by itself
         self._tries_again = False
@@ -187,7 +193,8 @@ class Approach:
         """[m] By which the parabola of the flare leads farther than the slope that it ends, until it is followed."""
         sink = slope * speed
         begin_m = max(self._flare_begin_m(sink) - _PATH_LAG_S * sink, 0.0)
-        return begin_m * (2.0 * speed / (sink + self._context.number("FW_LND_FL_SINK")) - 1.0 / slope)
+        both = sink + self._context.number("FW_LND_FL_SINK")
+        return begin_m * (2.0 * speed / both - 1.0 / slope) if both > 0.0 else 0.0  # it stands in the wind
 
     def _ground_d(self, left_m: float) -> float:
         """[m] Of a plane that stands at the touchdown: as was said, and nearer to it as the ground is measured."""
@@ -205,16 +212,24 @@ class Approach:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not landing: it is on the ground")
         if self._phase is _Phase.WAIT:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not landing: it goes round already")
-        self._tries_again = False
+        if self._phase is _Phase.CIRCLE:
+            return Reply(Verdict.TEMPORARILY_REJECTED, "not landing: it is not on the slope yet")
         usual_m = self._context.number("MIS_LND_ABRT_ALT")
-        self._give_up(max(height_m, usual_m) if isfinite(height_m) else usual_m, "Landing aborted: going round")
+        up_m = max(height_m, usual_m) if isfinite(height_m) else usual_m
+        refusal = target_refusal(self._context, (self._target[0], self._target[1], self._target[2] - up_m))
+        if refusal is not ACCEPTED:
+            return refusal
+        self._tries_again = False
+        self._give_up(up_m, "Landing aborted: going round")
         return ACCEPTED
 
     def _hopeless(self, left_m: float) -> str:
         """Why no flare should begin; empty if it may. Judged on the last metres of the slope."""
         context = self._context
         north, east, _ = context.state.estimate.pos_ned
-        if left_m > _JUDGED_M:
+        has_ground = bool(context.state.estimate.flags & TERRAIN_VALID)
+        self._has_seen_ground |= has_ground
+        if left_m > _JUDGED_M or context.state.battery_level is BatteryLevel.EMERGENCY:
             return ""
         across_m = (east - self._target[1]) * self._along[0] - (north - self._target[0]) * self._along[1]
         most_m, bits = context.number("HG_FW_LND_OFF"), int(context.number("FW_LND_ABORT"))
@@ -222,9 +237,7 @@ class Approach:
             return f"{abs(across_m):.0f} m beside it"
         if left_m < -_JUDGED_M:
             return "too high"
-        if context.state.estimate.flags & TERRAIN_VALID:
-            self._has_seen_ground = True
-        elif bits & (2 if self._has_seen_ground else 1):
+        if not has_ground and bits & (2 if self._has_seen_ground else 1):
             return "no height over ground is measured"
         return ""
 
@@ -234,13 +247,21 @@ class Approach:
         self._phase = _Phase.CLIMB
         north, east, down = context.state.estimate.pos_ned
         self._up_d = min(self._target[2] - height_m, down)
+        self._climb_us, self._low_d = context.state.time_us, down
         self._far = (north + _FAR_M * self._along[0], east + _FAR_M * self._along[1], nan)
         climb = context.number("FW_T_CLMB_MAX")
         context.setpoint.glide(self._far, (north, east, nan), -climb, airspeed=nan, throttle=nan)
 
     def _go_round(self) -> None:
         """Straight up; then round the touchdown, or down for the next try."""
-        if self._phase is _Phase.WAIT or self._context.state.estimate.pos_ned[2] > self._up_d + _REACHED_M:
+        state = self._context.state
+        down = state.estimate.pos_ned[2]
+        if self._phase is _Phase.WAIT:
+            return
+        if down > self._up_d + _REACHED_M:
+            if state.time_us - self._climb_us > _CLIMB_US and down > self._low_d - _CLIMBS_M:
+                self._context.announcer.statustext(Severity.CRITICAL, "It does not climb: landing ahead")
+                self._phase, self._retries = _Phase.SLOPE, 0
             return
         if self._tries_again:
             left = self._retries

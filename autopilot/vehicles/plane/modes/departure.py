@@ -63,6 +63,9 @@ class Departure:
         context = self._context
         state = context.state
         if context.is_on_ground:
+            if self._phase is not _Phase.STAND:  # back on the ground: another throw, another run
+                self._phase = _Phase.STAND
+                self._launch.start()
             context.wants_lift = not self._launch.is_used or self._launch.frame()
             state.awaits_launch = not context.wants_lift
             return False
