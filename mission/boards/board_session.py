@@ -26,7 +26,6 @@ from sim.boards.outside import PeerError
 from sim.bodies.vehicles import class_of
 
 if TYPE_CHECKING:
-    from mission.boards.betaflight_run import BetaflightRun
     from mission.boards.board_flight import BoardFlight
     from mission.flight_base import FlightBase
 
@@ -172,15 +171,6 @@ class PeerRun:
 
     def close(self) -> None:
         self._watch.close()
-
-
-def run_of(options: FlightOptions, folder: Path, console: Console) -> "PeerRun | BetaflightRun":
-    """The autopilot that the options name, for the length of a flight."""
-    if options.board == "betaflight":
-        from mission.boards.betaflight_run import BetaflightRun
-
-        return BetaflightRun.of(options, folder, console)
-    return PeerRun.of(options, folder, console)
 
 
 def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, held: ExitStack) -> int:

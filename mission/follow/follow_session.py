@@ -21,7 +21,8 @@ from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
 from mission.boards.board_options import check_board, commands_of
-from mission.boards.board_session import run_of, station_links
+from mission.boards.board_runs import run_of
+from mission.boards.board_session import station_links
 from mission.connections import open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
