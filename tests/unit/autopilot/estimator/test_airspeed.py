@@ -97,7 +97,7 @@ def test_a_pressure_that_is_no_number_has_not_arrived():
     assert tube.fly(2.0, 10.0, pressure(24.0))["is_failed"] == 1
 
 
-def test_a_sound_tube_is_believed_at_a_high_field_in_turns():
+def test_no_wind_is_learnt_from_thin_air():
     tube = Tube(height_m=3000.0)
     thin = pressure(30.0, density=0.9093)  # ISO 2533
     told = tube.fly(60.0, 30.0, thin)
