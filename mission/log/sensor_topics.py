@@ -92,6 +92,7 @@ def _validated(batch: Batch) -> Columns:
     by_motion = np.where(check["wind_count"] > 0.0, np.linalg.norm(through, axis=1), np.nan)
     ratio = _true_over_indicated(batch)
     return {
+        "timestamp": batch.time_us,
         "indicated_airspeed_m_s": told,
         "calibrated_airspeed_m_s": told,
         "true_airspeed_m_s": told * ratio,
