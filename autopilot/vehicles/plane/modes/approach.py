@@ -28,7 +28,7 @@ _NEAR_PART = 0.5  # of the circle's radius, from the entry at which it may be le
 _PATH_LAG_S = 0.7  # of the sink behind what a flare asks for; guess: a rounded-out flare was that much late
 _FAR_M = 10_000.0
 _REACHED_M = 2.0  # below the height to which it goes round; guess
-_JUDGED_M = 40.0  # before the touchdown, and as far beyond it, a landing that fails is given up; guess
+_MISSED_M = 40.0  # beyond the touchdown, where no flare begins any more; guess
 _RETRIES = 2  # then it takes what it gets; guess
 _CLIMB_US, _CLIMBS_M = 8_000_000, 2.0  # what it must have risen by then to go on climbing; guess
 _LONG_FLARE_US = 8_000_000  # guess
@@ -150,12 +150,15 @@ class Approach:
         down = self._ground_d(left_m) - max(aim_m, 0.0) * slope
         is_above = down < self._entry[2]
         self._glide(max(down, self._entry[2]), 0.0 if is_above else slope * speed, nan)
-        reason = self._hopeless(left_m)
+        if context.state.estimate.flags & TERRAIN_VALID:
+            self._has_seen_ground = True
+        is_low = self._height() < self._flare_begin_m(sink)
+        reason = self._hopeless(left_m) if is_low or left_m < -_MISSED_M else ""
         if reason and self._retries:
             self._retries -= 1
             self._tries_again = True
             self._give_up(context.number("MIS_LND_ABRT_ALT"), f"Landing aborted: {reason}, trying again")
-        elif self._height() < self._flare_begin_m(sink):
+        elif is_low:
             self._phase = _Phase.FLARE
             self._flare_us = context.state.time_us
             self._begin = (max(self._height(), 0.1), slope * speed, context.state.actuators.thrust_sp)
@@ -224,20 +227,18 @@ class Approach:
         return ACCEPTED
 
     def _hopeless(self, left_m: float) -> str:
-        """Why no flare should begin; empty if it may. Judged on the last metres of the slope."""
+        """Why no flare should begin; empty if it may."""
         context = self._context
         north, east, _ = context.state.estimate.pos_ned
-        has_ground = bool(context.state.estimate.flags & TERRAIN_VALID)
-        self._has_seen_ground |= has_ground
-        if left_m > _JUDGED_M or context.state.battery_level is BatteryLevel.EMERGENCY:
+        if context.state.battery_level is BatteryLevel.EMERGENCY:
             return ""
         across_m = (east - self._target[1]) * self._along[0] - (north - self._target[0]) * self._along[1]
         most_m, bits = context.number("HG_FW_LND_OFF"), int(context.number("FW_LND_ABORT"))
         if most_m and abs(across_m) > most_m:
             return f"{abs(across_m):.0f} m beside it"
-        if left_m < -_JUDGED_M:
-            return "too high"
-        if not has_ground and bits & (2 if self._has_seen_ground else 1):
+        if left_m < -_MISSED_M:
+            return "too far"
+        if not context.state.estimate.flags & TERRAIN_VALID and bits & (2 if self._has_seen_ground else 1):
             return "no height over ground is measured"
         return ""
 
