@@ -13,11 +13,23 @@ from mission.script import CMD_TAKEOFF, FRAME_GLOBAL, MAIN_AUTO
 TAKES_IN_S = 3.0  # guess: until its navigator has read a mission that has been acknowledged
 RETRY_S = 0.2
 TAKING_OFF = (MAIN_AUTO, 2)  # main and sub mode
+MAIN_MANUAL = 1
+FIXED_WING = 1  # MAV_TYPE
+FORGETS_IN_S = 1.5  # its TECS forgets what it has not been asked for a second
 CMD_LOITER_TURNS, CMD_LOITER_TIME = 18, 19
 
 
 class Px4Drone(OutsideDrone):
     """See `Drone`."""
+
+    async def wait_ready(self, timeout_s: float = 60.0) -> None:
+        """A plane's reference of height begins at sea level, and climbs at 3 m/s to where it is; so it is forgotten."""
+        await super().wait_ready(timeout_s)
+        heartbeat = self.latest("HEARTBEAT")
+        if heartbeat is not None and heartbeat.type == FIXED_WING and not self.is_armed:
+            await self._set_mode(MAIN_MANUAL, 0, "manual")  # which holds no height
+            await self.sleep(FORGETS_IN_S)
+            await self.hold()
 
     async def takeoff(self, height_m: float, timeout_s: float = 60.0) -> None:
         """It is there when it leaves its take-off, within its own tolerance of the height."""
