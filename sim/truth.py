@@ -6,7 +6,8 @@ charge of a battery, the slip of a foot) is its own.
 
 import warp as wp
 
-from autopilot.estimator.airspeed import AirspeedCheck, with_airspeed
+from autopilot.estimator.airspeed import with_airspeed
+from autopilot.estimator.state import AirspeedCheck
 from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
