@@ -4,6 +4,7 @@
 down.
 """
 
+import sys
 from dataclasses import dataclass, field
 from math import atan2, cos, degrees, hypot, pi, sin
 from typing import Any
@@ -22,6 +23,7 @@ CORNERS = ((450.0, 0.0), (450.0, 350.0), (-450.0, 350.0), (-450.0, 0.0))  # [m] 
 HEIGHT_M = 35.0
 SETTLED_S = 10.0  # after the turn to a leg: a period of the guidance, NPFG_PERIOD
 LONGEST_S = 300.0
+SEEDS = range(1, 6)
 
 
 @dataclass
@@ -33,6 +35,7 @@ class Circuit:
     airspeed_m_s: list[float] = field(default_factory=list)
     cross_m: list[float] = field(default_factory=list)
     touchdown_m: float = float("nan")  # from the place asked for
+    along_m: float = float("nan")  # the same, beyond it on the way of the landing
     sink_m_s: float = float("nan")  # at the touchdown
     rest_m: float = float("nan")
     is_landed: bool = False
@@ -70,6 +73,7 @@ def fly_circuit(seed: int, wind_m_s: float = 3.0, wind_from_deg: float = 270.0) 
                 _judge(flight, out, truth, leg)
             if leg == len(CORNERS) + 1 and truth["is_on_ground"] and out.touchdown_m != out.touchdown_m:
                 out.touchdown_m = hypot(*truth["pos_ned"][:2])
+                out.along_m = float(truth["pos_ned"][:2] @ truth["vel_ned"][:2] / hypot(*truth["vel_ned"][:2]))
                 out.sink_m_s = float(truth["impact_speed"])
         out.rest_m = hypot(*flight.rig.rows["truth"][0]["pos_ned"][:2])
         out.is_landed = state.landed_state is LandedState.ON_GROUND and not flight.is_crashed
@@ -105,9 +109,11 @@ def _judge(flight: Flight, out: Circuit, truth: Any, leg: int) -> None:
 
 
 def main() -> None:
-    """Prints the table: 95 % of the absolute errors."""
+    """Prints the table, of seeds 1 to 5 or of those that are given, `FIRST LAST`: 95 % of the absolute errors."""
+    given = [int(word) for word in sys.argv[1:]]
+    seeds = range(given[0], given[-1] + 1) if given else SEEDS
     print("seed  course  cross  height  airspeed  touchdown  sink  rest  landed")
-    for seed in range(1, 6):
+    for seed in seeds:
         c = fly_circuit(seed)
         parts = (np.percentile(x or [float("nan")], 95) for x in (c.course_deg, c.cross_m, c.height_m, c.airspeed_m_s))
         course, cross, height, airspeed = parts

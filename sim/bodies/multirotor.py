@@ -196,6 +196,9 @@ def touched(model: ContactModel, body: BodyState, contact: ContactForce) -> Body
     """A body that remembers what it touches: feet, impacts, a crash."""
     body.foot_slip = contact.foot_slip
     body.is_on_ground = contact.is_on_ground
+    if contact.is_on_ground == 1:  # what stands is held still by what rounding takes
+        body.pos_rounding_ned = wp.vec3()
+        body.vel_rounding_ned = wp.vec3()
     body.impact_speed = wp.max(body.impact_speed, contact.impact_speed_m_s)
     if contact.impact_speed_m_s > model.crash_speed_m_s or contact.is_rotor_strike == 1:
         body.is_crashed = 1

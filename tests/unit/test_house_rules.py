@@ -28,7 +28,7 @@ SPEAK_OF_ROTORS = {
     "common/airframe.py": "names the class of airframe files that name none",
     "autopilot/tuning.py": "names the classes whose gains are designed",
     "autopilot/vehicles/default_class.py": "names the class of airframe files that name none",
-    "mission/boards/board_session.py": "names the classes that each autopilot flies",
+    "mission/boards/board_options.py": "names the classes that each autopilot flies",
     "mission/boards/vehicle_params.py": "what an outside autopilot has to know of a multirotor",
     "mission/plan/plan_file.py": "MAVLink's name of a vehicle type, in QGroundControl's files",
     "mission/view/shapes.py": "the shape of a multirotor",

@@ -7,6 +7,7 @@ from enum import IntEnum
 from math import cos, hypot, isfinite, nan, pi, radians, sin
 
 from autopilot.interface.item_lists import MissionItem
+from autopilot.interface.vehicle_state import Reply, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission.item_commands import WAYPOINTS, Command, hold_time_s, is_here, passes_through
 from autopilot.navigator.mission.mission_route import Route, distance_to_line
@@ -64,6 +65,10 @@ class Leg:
     def stop(self) -> None:
         """Another mode took over; the leg is remembered, so that it can be gone on with."""
         self._stage = _Stage.IDLE
+
+    def go_around(self, height_m: float) -> Reply:  # noqa: ARG002
+        """Gives up a landing, of what cannot stop in the air."""
+        return Reply(Verdict.TEMPORARILY_REJECTED, "not landing")
 
     def forget(self) -> None:
         """The next leg begins where the vehicle is."""

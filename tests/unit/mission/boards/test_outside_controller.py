@@ -76,6 +76,13 @@ def test_its_estimate_is_on_the_axes_at_home(px4):
     assert np.allclose(px4.rig.rows["autopilot.ekf.rows"][0]["estimate"]["pos_ned"], PLACE_NED, atol=0.02)
 
 
+def test_a_place_that_it_does_not_know_yet_is_none():
+    peer = Autopilot(ARDUPILOT, ArduPilotDrone)
+    peer.say("GLOBAL_POSITION_INT", lat=0, lon=0)
+    peer.frame()
+    assert peer.shown.state.estimate.pos_ned == pytest.approx((0.0, 0.0, 0.0))
+
+
 def test_mode_arming_battery_and_texts(px4):
     px4.say("HEARTBEAT", type=2, autopilot=12, base_mode=128 | 1, custom_mode=4 << 16 | 4 << 24)
     px4.say("SYS_STATUS", battery_remaining=51)
