@@ -129,7 +129,7 @@ def test_it_flies_one_of_several_and_the_others_fly_on_without_it(tmp_path, monk
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
 
     async def script():
-        command = f"{STAND_IN} --loops 25000"
+        command = f"{STAND_IN} --loops 18000"
         async with Fleet("x500@betaflight:1,x500:1", BASE, folder=tmp_path, commands=command) as fleet:
             first, second = fleet
             await fleet.each(lambda drone: drone.wait_ready())
@@ -137,7 +137,7 @@ def test_it_flies_one_of_several_and_the_others_fly_on_without_it(tmp_path, monk
             await fleet.each(lambda drone: drone.takeoff(4.0))
             heights_m = [-drone.pos_ned[2] for drone in fleet]
             with pytest.raises(ScriptError, match="Betaflight of vehicle 1 has ended"):
-                await first.goto_ned(60.0, 0.0, -4.0)
+                await first.goto_ned(90.0, 0.0, -4.0)
             await second.land()
             return heights_m, [drone.system_id for drone in fleet]
 
