@@ -136,7 +136,7 @@ def test_it_flies_one_of_several_and_the_others_fly_on_without_it(tmp_path, monk
             await fleet.each(lambda drone: drone.arm())
             await fleet.each(lambda drone: drone.takeoff(4.0))
             heights_m = [-drone.pos_ned[2] for drone in fleet]
-            with pytest.raises(ScriptError, match="Betaflight of vehicle 1 has ended"):
+            with pytest.raises(ScriptError, match="has ended with exit code 3"):
                 await first.goto_ned(90.0, 0.0, -4.0)
             await second.land()
             return heights_m, [drone.system_id for drone in fleet]
