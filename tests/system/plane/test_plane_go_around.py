@@ -85,4 +85,4 @@ def test_a_hopeless_landing_is_given_up_and_tried_again():
         await drone.wait_disarmed(300.0)
         assert radius_m(drone) < 80.0
 
-    flown(script, seconds=900.0, seed=63, parameters={"HG_FW_LND_OFF": 2.0})
+    flown(script, seconds=900.0, seed=63, parameters={"HG_FW_LND_OFF": 3.0})
