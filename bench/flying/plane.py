@@ -1,7 +1,7 @@
 """How well a plane flies: a circuit of four waypoints in wind, and a landing, seed by seed.
 
-`python -m bench.flying.plane [--seeds FIRST-LAST]` prints a row per seed: errors along the legs once each has settled, and where it touched
-down.
+`python -m bench.flying.plane [--seeds FIRST-LAST]` prints a row per seed: errors along the legs once each has settled,
+and where it touched down.
 """
 
 from argparse import ArgumentParser
