@@ -1,10 +1,10 @@
 """How well a plane flies: a circuit of four waypoints in wind, and a landing, seed by seed.
 
-`python -m bench.flying.plane` prints a row per seed: errors along the legs once each has settled, and where it touched
-down.
+`python -m bench.flying.plane [--seeds FIRST-LAST]` prints a row per seed: errors along the legs once each has settled,
+and where it touched down.
 """
 
-import sys
+from argparse import ArgumentParser
 from dataclasses import dataclass, field
 from math import atan2, cos, degrees, hypot, pi, sin
 from typing import Any
@@ -23,7 +23,6 @@ CORNERS = ((450.0, 0.0), (450.0, 350.0), (-450.0, 350.0), (-450.0, 0.0))  # [m] 
 HEIGHT_M = 35.0
 SETTLED_S = 10.0  # after the turn to a leg: a period of the guidance, NPFG_PERIOD
 LONGEST_S = 300.0
-SEEDS = range(1, 6)
 
 
 @dataclass
@@ -109,11 +108,12 @@ def _judge(flight: Flight, out: Circuit, truth: Any, leg: int) -> None:
 
 
 def main() -> None:
-    """Prints the table, of seeds 1 to 5 or of those that are given, `FIRST LAST`: 95 % of the absolute errors."""
-    given = [int(word) for word in sys.argv[1:]]
-    seeds = range(given[0], given[-1] + 1) if given else SEEDS
+    """Prints the table: 95 % of the absolute errors."""
+    parser = ArgumentParser(description=main.__doc__)
+    parser.add_argument("--seeds", default="1-5", help="first and last")
+    first, last = map(int, parser.parse_args().seeds.split("-"))
     print("seed  course  cross  height  airspeed  touchdown  sink  rest  landed")
-    for seed in seeds:
+    for seed in range(first, last + 1):
         c = fly_circuit(seed)
         parts = (np.percentile(x or [float("nan")], 95) for x in (c.course_deg, c.cross_m, c.height_m, c.airspeed_m_s))
         course, cross, height, airspeed = parts

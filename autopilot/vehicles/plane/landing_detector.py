@@ -1,4 +1,7 @@
-"""Landing detection of a plane: slow over ground, in height and through the air for a while, as PX4's (LNDFW_*)."""
+"""Landing detection of a plane: slow over ground, in height and through the air for a while, as PX4's (LNDFW_*).
+
+One whose motor runs is landed, too, where it does not move at all: it lies in a field.
+"""
 
 from math import hypot
 from typing import Any
@@ -7,6 +10,8 @@ from autopilot.ports import AIRSPEED_VALID
 from common.params import ParameterTable
 
 _IDLE_THRUST = 0.1  # more throttle is flown with; guess
+_STILL_M_S = 1.0  # slower, for longer, nothing flies; guess
+_STILL_S = 10.0
 
 
 class PlaneLandingDetector:
@@ -18,16 +23,16 @@ class PlaneLandingDetector:
 
     lift_timeout_s = 60.0  # a Cessna rolls for 15 s, from a high field for longer; guess
 
-    __slots__ = ("_params", "_time_s", "has_contact", "has_struck", "is_landed")
+    __slots__ = ("_params", "_still_s", "_time_s", "has_contact", "has_struck", "is_landed")
 
     def __init__(self, params: ParameterTable) -> None:
         self._params = params
-        self._time_s = 0.0
+        self._time_s = self._still_s = 0.0
         self.has_contact = self.has_struck = self.is_landed = False
 
     def reset(self) -> None:
         """The vehicle is on the ground and about to leave it."""
-        self._time_s = 0.0
+        self._time_s = self._still_s = 0.0
         self.has_contact = self.has_struck = self.is_landed = False
 
     def update(self, estimate: Any, thrust: float, descent_sp: float, dt_s: float) -> bool:  # noqa: ARG002
@@ -42,7 +47,8 @@ class PlaneLandingDetector:
         ):
             is_slow = False
         self._time_s = self._time_s + dt_s if is_slow and thrust < _IDLE_THRUST else 0.0
-        self.is_landed = self._time_s >= float(number["LNDFW_TRIG_TIME"])
+        self._still_s = self._still_s + dt_s if is_slow and hypot(north, east) < _STILL_M_S else 0.0
+        self.is_landed = self._time_s >= float(number["LNDFW_TRIG_TIME"]) or self._still_s >= _STILL_S
         self.has_contact = self.is_landed
         return self.is_landed
 
