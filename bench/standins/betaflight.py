@@ -27,8 +27,8 @@ SETTLES_LOOPS = 50  # until its receiver is there
 RXLOSS, THROTTLE, CALIB, ARM_SWITCH = 1 << 2, 1 << 7, 1 << 12, 1 << 28
 ANGLE_LIMIT_RAD, RATE_LIMIT_RAD_S = radians(60.0), radians(400.0)
 NAMES = set(
-    "pid_process_denom motor_idle min_check angle_limit angle_p_gain p_yaw rates_type roll_expo pitch_expo yaw_expo "
-    "roll_rc_rate pitch_rc_rate yaw_rc_rate roll_srate pitch_srate yaw_srate rc_smoothing throttle_boost "
+    "pid_process_denom motor_idle min_check angle_limit angle_p_gain p_yaw f_yaw rates_type roll_expo pitch_expo "
+    "yaw_expo roll_rc_rate pitch_rc_rate yaw_rc_rate roll_srate pitch_srate yaw_srate rc_smoothing throttle_boost "
     "pwr_on_arm_grace small_angle auto_disarm_delay runaway_takeoff_prevention failsafe_delay failsafe_procedure "
     "failsafe_throttle failsafe_throttle_low_delay failsafe_landing_time failsafe_recovery_delay".split()
 )

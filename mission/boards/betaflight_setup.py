@@ -66,6 +66,7 @@ def settings(airframe: MultirotorAirframe) -> list[str]:
         "angle_limit": round(ANGLE_LIMIT_DEG),
         "angle_p_gain": round(10.0 * _TILT_P),
         "p_yaw": yaw_gain(airframe),
+        "f_yaw": 0,  # our yaw rates come in steps
         "rates_type": "ACTUAL",
         **{f"{axis}_expo": 0 for axis in ("roll", "pitch", "yaw")},
         **{f"{axis}_rc_rate": round(0.1 * RATE_LIMIT_DEG_S) for axis in ("roll", "pitch", "yaw")},
