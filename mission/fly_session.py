@@ -36,6 +36,8 @@ def fly_session(options: FlightOptions) -> int:
         UserError: an option, file, port or folder is wrong; nothing has been written.
     """
     speed = speed_of(options.speed)
+    if options.board == BETAFLIGHT:
+        check_board(options)
     with ExitStack() as held:
         if options.board not in ("own", BETAFLIGHT):
             from mission.boards.board_session import fly_board
@@ -56,8 +58,6 @@ def fly_session(options: FlightOptions) -> int:
 def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None, held: ExitStack) -> int:
     """The flight, with what must be held until its end."""
     console = Console()
-    if options.board == BETAFLIGHT:
-        check_board(options)
     config = flight_config(options, state)
     plan = None if options.is_idle else _plan(options.plan, options.airframe, config.home)
     signing = signing_config(options, speed, state)

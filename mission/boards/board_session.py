@@ -11,8 +11,8 @@ from rich.console import Console
 
 from autopilot.mavlink.transport.links import LinkSource
 from common.airframe import load_airframe
-from common.geodesy import GeoPoint
 from mission.boards.process import PeerProcess
+from mission.boards.watch import Watch, filled_in
 from mission.connections import open_images, open_links, open_page
 from mission.console.option_checks import UserError
 from mission.console.terminal import loading, print_line
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from mission.boards.betaflight_run import BetaflightRun
     from mission.boards.board_flight import BoardFlight
 
-PATIENCE_S = 120.0  # of wall clock time, that an autopilot may be silent
-REPORTED_S = 2.0  # of silence, after which it is said what is waited for
 PACE_MAX = 20.0  # guess: how much faster than real time a flight in lockstep is at most, for time-outs of links
 FLOWN = {"ardupilot": ("multirotor", "rover"), "px4": ("multirotor",), "betaflight": ("multirotor",)}
 FAST = (("ardupilot", "multirotor"), ("betaflight", "multirotor"))
@@ -60,41 +58,6 @@ def check_board(options: FlightOptions) -> None:
         raise UserError("--noise 0 and --board px4: it takes sensors that never change for broken; use --noise 0.1")
     if options.board == BETAFLIGHT and options.instance != 0:
         raise UserError("--instance and --board betaflight: choose one; its ports are always the same")
-
-
-class Watch:
-    """Looks after the program while the flight goes on, and while it waits.
-
-    Args:
-        name: of the autopilot.
-        console: where its console is shown.
-        hidden: how lines of it begin that are not shown.
-    """
-
-    def __init__(self, name: str, console: Console, hidden: tuple[str, ...] = ()) -> None:
-        self._name, self._console, self._hidden = name, console, hidden
-        self.hint = ""  # what it has to do to be heard
-        self.process: PeerProcess | None = None
-        self._is_reported = False
-
-    def __call__(self, silent_s: float) -> None:
-        if self.process is not None:
-            for line in self.process.lines():
-                if line.startswith(self._hidden):
-                    continue
-                print_line(self._console, f"{self._name} | {line}")
-            self.process.check()
-        if silent_s < REPORTED_S:
-            self._is_reported = self._is_reported and silent_s > 0.0
-        elif not self._is_reported:
-            self._is_reported = True
-            print_line(self._console, f"waiting for {self._name}: {self.hint}")
-        if silent_s > PATIENCE_S:
-            raise PeerError(f"{self._name} has been silent for {PATIENCE_S:g} s: {self.hint}")
-
-    def close(self) -> None:
-        if self.process is not None:
-            self.process.close()
 
 
 class PeerRun:
@@ -199,16 +162,3 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
 def station_links(options: FlightOptions, speed: float | None) -> list[LinkSource]:
     """For ground stations and companions, of an autopilot that does not speak to them itself."""
     return [] if options.board == "px4" else open_links(options, speed or PACE_MAX, options.instance)
-
-
-def filled_in(command: str, folder: Path, home: GeoPoint, instance: int) -> str:
-    """A command with its names filled in."""
-    values = {
-        "folder": str(folder),
-        "params": str(folder / "vehicle.parm"),
-        "home": f"{home.lat_deg:.7f},{home.lon_deg:.7f},{home.alt_m:.2f},0",
-        "instance": str(instance),
-    }
-    for name, value in values.items():
-        command = command.replace(f"{{{name}}}", value)
-    return command
