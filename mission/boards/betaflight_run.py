@@ -15,8 +15,8 @@ from common.clock import wall_sleep_s, wall_time_s
 from common.files import write_whole
 from mission.boards.betaflight_setup import CommandLine, UnansweredError, packaged_program, settings
 from mission.boards.board_options import commands_of
-from mission.boards.board_session import Watch, filled_in
 from mission.boards.process import PeerProcess
+from mission.boards.watch import Watch, filled_in
 from mission.console.option_checks import UserError
 from mission.console.terminal import Say, print_line
 from mission.flight_base import FlightBase

@@ -152,9 +152,9 @@ class BetaflightBoard:
         self._send_state(RUNNING)
         answers = msp.ask(msp.STATUS_EX, address=self._address, port=self._msp_port)
         reasons = msp.arming_reasons(answers[0]) if answers else []
-        told = " ".join(reasons) or "it gives no reason"
+        reported = " ".join(reasons) or "it gives no reason"
         what = "has disarmed by itself" if self._is_turning else "does not arm"
-        raise PeerError(f"Betaflight {what} ({told})")
+        raise PeerError(f"Betaflight {what} ({reported})")
 
     def _hear(self) -> None:
         """The loop that answers a state."""

@@ -48,8 +48,8 @@ def is_reached(address: str = "127.0.0.1", port: int = PORT) -> bool:
         return False
     variant, version = answers
     if variant != VARIANT or tuple(version[:2]) != VERSION:
-        told = f"{variant.decode(errors='replace')} {'.'.join(map(str, version))}"
-        raise PeerError(f"the autopilot at TCP port {port} is {told}, and not Betaflight 4.6")
+        reported = f"{variant.decode(errors='replace')} {'.'.join(map(str, version))}"
+        raise PeerError(f"the autopilot at TCP port {port} is {reported}, and not Betaflight 4.6")
     return True
 
 

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from typer.testing import CliRunner
 
 from bench.standins.px4 import Px4StandIn
-from mission.boards import board_session
+from mission.boards import watch
 from mission.boards.ardupilot_drone import ArduPilotDrone
 from mission.boards.px4_drone import Px4Drone
 from mission.cli import app
@@ -285,7 +285,7 @@ def test_a_program_that_ends_is_the_exit_code_and_in_the_summary(tmp_path):
 
 
 def test_one_that_never_comes_is_given_up_and_the_others_fly(tmp_path, monkeypatch):
-    monkeypatch.setattr(board_session, "PATIENCE_S", 2.5)
+    monkeypatch.setattr(watch, "PATIENCE_S", 2.5)
     done = command_line("--vehicles", "x500:1,rover@ardupilot:1", "--idle", "--seconds", "1", folder=tmp_path / "run")
     assert done.exit_code == 1, done.output
     assert (
