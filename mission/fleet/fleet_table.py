@@ -48,7 +48,8 @@ def print_start(
         table.add_row(*row)
     console.print(table)
     if speed is None:
-        print_line(console, "flying: lockstep, without network links")
+        whose = ", our own" if has_boards else ","
+        print_line(console, f"flying: lockstep{whose} without network links")
     print_line(console, f"logs: {folder}")
 
 
