@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 HONEYGUIDE = Path(sys.executable).parent / "honeyguide"
-PATIENCE_S = 400.0
+PATIENCE_S = 1200.0  # of wall clock time, on a loaded machine
 
 
 class Flown(NamedTuple):
