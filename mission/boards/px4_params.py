@@ -84,11 +84,13 @@ def _plane(airframe: PlaneAirframe) -> dict[str, float]:
     for k, (kind, axis) in enumerate(((_AILERON, "R"), (_ELEVATOR, "P"), (_RUDDER, "Y"))):
         surfaces[f"CA_SV_CS{k}_TYPE"] = float(kind)
         surfaces |= {f"CA_SV_CS{k}_TRQ_{each}": float(each == axis) for each in "RPY"}
-    runway = {"RWTO_TKOFF": 1.0, "FW_W_EN": 1.0, "SYS_HAS_NUM_ASPD": 1.0}
+    runway = {"RWTO_TKOFF": 1.0, "SYS_HAS_NUM_ASPD": 1.0}
     runway["NAV_DLL_ACT"] = 0.0  # of its airframe, which would not arm without a ground station
     functions = [SERVO, SERVO + 1, MOTOR, SERVO + 2, NOSE_WHEEL]
     ours = _ours(airframe, _PLANE_NAMES)
-    del ours["FW_WR_D"]  # which is ours alone
+    del ours["FW_WR_P"], ours["FW_WR_D"]
+    ours["FW_W_EN"] = 0.0  # landed, its nose wheel would turn to the heading with which the approach began
+    ours["FW_T_HRATE_FF"] = 1.0  # else it glides metres above its slope
     return ours | surfaces | runway | _outputs(functions)
 
 
