@@ -12,15 +12,17 @@ from common.airframes.plane import PlaneAirframe
 
 _FULL_RAD = radians(45.0)  # ArduPilot's angle of a surface at its end
 _FIRST_PULSE, _LAST_PULSE, _MIDDLE_PULSE = 1000.0, 2000.0, 1500.0
-_SURFACES, _BRAKE = (1, 2, 4, 5), 6  # servos, counted from 1
-_GROUND_STEERING, _AUTOMATIC_FLAPS = 26.0, 3.0  # SERVOn_FUNCTION
+_SURFACES, _BRAKE = (1, 2, 4), 5  # servos, counted from 1
+_AUTOMATIC_FLAPS = 3.0  # SERVOn_FUNCTION
 _PITCH_MAX_DEG = 15.0  # TECS_PITCH_MAX's default
 _DENSITY_KG_M3 = 1.225  # ISO 2533
 # Where it may begin to turn, and not as ours where a place counts as reached; a way to a line as slow as its bank
 _ITS_OWN = ("WP_RADIUS", "NAVL1_PERIOD", "NAVL1_DAMPING")
 _P_PER_FF, _I_PER_FF = 0.2, 0.6  # guess; its AutoTune ends between
 _SHOWS_TRUE_PITCH = 256.0  # FLIGHT_OPTIONS: without PTCH_TRIM_DEG off it
-_STEERED_M = 5.0  # height up to which the nose wheel steers: guess
+_STEERED_M = 5.0  # height up to which nose wheel and rudder hold the course: guess
+_RUDDER_GAIN = 2.5  # over the diameter of its tightest turn, which would do for the wheel alone: guess
+_CLIMB_BANK_DEG = 15.0  # of the first metres of a climb: with less it cannot hold its course in a crosswind
 _DISARMED_S = 3.0  # after it has stopped: guess
 
 
@@ -44,7 +46,7 @@ def plane_params(airframe: PlaneAirframe) -> dict[str, float]:
 
 
 def _servos() -> dict[str, float]:
-    params = {f"SERVO{_SURFACES[-1]}_FUNCTION": _GROUND_STEERING, f"SERVO{_BRAKE}_FUNCTION": _AUTOMATIC_FLAPS}
+    params = {f"SERVO{_BRAKE}_FUNCTION": _AUTOMATIC_FLAPS}
     for k in range(1, _BRAKE + 1):
         params |= {f"SERVO{k}_MIN": _FIRST_PULSE, f"SERVO{k}_MAX": _LAST_PULSE}
         params[f"SERVO{k}_TRIM"] = _MIDDLE_PULSE if k in _SURFACES else _FIRST_PULSE
@@ -84,8 +86,8 @@ def _ground(airframe: PlaneAirframe, ours: dict[str, float]) -> dict[str, float]
         raise ValueError("ArduPilot's plane takes off from a runway here")
     return {
         "GROUND_STEER_ALT": _STEERED_M,
-        # the diameter of its tightest turn, as ArduPilot wants it
-        "STEER2SRV_P": 2.0 * (gear.nose_x_m + gear.main_x_m) / tan(gear.steering_max_rad),
+        "STEER2SRV_P": _RUDDER_GAIN * 2.0 * (gear.nose_x_m + gear.main_x_m) / tan(gear.steering_max_rad),
+        "LEVEL_ROLL_LIMIT": _CLIMB_BANK_DEG,
         "TKOFF_ALT": ours["MIS_TAKEOFF_ALT"],
         "TKOFF_ROTATE_SPD": ours["FW_AIRSPD_MIN"],
         "TKOFF_GND_PITCH": -ours["FW_PSP_OFF"],  # level on its wheels: PTCH_TRIM_DEG is added

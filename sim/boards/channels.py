@@ -28,8 +28,8 @@ _ARDUPILOT_CHANNELS = {
     "ailerons": 0,
     "elevator": 1,
     "rudder": 3,
-    "nose wheel": 4,  # SERVO5_FUNCTION 26, ground steering
-    "brake": 5,  # SERVO6_FUNCTION 3, flaps: it has no brakes, and sets those at the approach
+    "nose wheel": 3,  # turned by the rudder's servo: it steers by the rudder, too, if it has no channel for the wheel
+    "brake": 4,  # SERVO5_FUNCTION 3, flaps: it has no brakes, and sets those at the approach
 }
 
 

@@ -253,7 +253,7 @@ def roll_pitch_yaw(quaternion):
 def take_off(state):
     """A plain law that runs along the runway to the north, rotates and climbs: each channel has to have its sign."""
     if state is None or state.airspeed is None:
-        return [1500, 1500, 1000, 1500, 1500, 1000]
+        return [1500, 1500, 1000, 1500, 1000]
     roll, pitch, yaw = roll_pitch_yaw(state.quaternion)
     p, q, r = state.gyro
     climb = 0.09 + 0.02 * (HIGH_M + state.position[2]) + 0.06 * state.velocity[2]
@@ -266,7 +266,7 @@ def take_off(state):
     return [
         *(1500 + round(500.0 * float(np.clip(part, -1.0, 1.0))) for part in (ailerons, elevator)),
         1000 + round(1000.0 * float(np.clip(throttle, 0.0, 1.0))),
-        *(1500 + round(500.0 * float(np.clip(part, -1.0, 1.0))) for part in (rudder, rudder)),
+        1500 + round(500.0 * float(np.clip(rudder, -1.0, 1.0))),
         1000,
     ]
 
@@ -302,12 +302,12 @@ def test_more_pulse_turns_a_plane_right_and_up(channel, pulse_us, index, axis, s
         assert sitl.state.gyro[index] > before + 0.05, axis
 
 
-def test_brake_and_nose_wheel_are_told_a_channel_of_their_own(sitl_at):
+def test_the_nose_wheel_turns_with_the_rudder_and_the_brake_has_a_channel(sitl_at):
     with rig_of(ArduPilotBoard, "plane", patience_s=0.3) as (rig, board):
-        sitl = sitl_at(board.local_port, lambda _: [1500, 1500, 1000, 1500, 2000, 1750])
+        sitl = sitl_at(board.local_port, lambda _: [1500, 1500, 1000, 2000, 1750])
         fly(rig, frames(sitl, 5))
         commands = rig.board_commands.numpy()[0]
-        assert commands[:6] == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0, 0.75])
+        assert commands[:6] == pytest.approx([0.0, 0.0, 0.0, 1.0, 1.0, 0.75])
 
 
 def test_a_copter_sends_no_airspeed(sitl_at):
