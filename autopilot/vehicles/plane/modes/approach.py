@@ -19,6 +19,7 @@ from autopilot.navigator.modes.goto import target_refusal
 from autopilot.navigator.setpoint import Vector
 from autopilot.ports import AIRSPEED_VALID, TERRAIN_VALID
 from autopilot.vehicles.plane.modes.departure import airspeed_of
+from common.kernels import FRAME_US
 
 _ENTRY_M = 30.0  # height over the touchdown of the beginning of the slope; guess: over trees
 _LEAD_S = 5.0  # of level flight before the slope; guess
@@ -31,6 +32,8 @@ _REACHED_M = 2.0  # below the height to which it goes round; guess
 _MISSED_M = 40.0  # beyond the touchdown, where no flare begins any more; guess
 _RETRIES = 2  # then it takes what it gets; guess
 _CLIMB_US, _CLIMBS_M = 8_000_000, 2.0  # what it must have risen by then to go on climbing; guess
+_FRAME_S = FRAME_US * 1e-6
+_THROTTLE_TAU_S = 3.0  # over which the throttle of the slope is averaged; guess: longer than a gust
 _LONG_FLARE_US = 8_000_000  # guess
 _DOWN_M_S = 0.2  # sinks no faster once it stands on its wheels
 _TOUCH_M = 0.4  # height of the wheels, as measured, below which that is a touchdown; guess
@@ -64,6 +67,7 @@ class Approach:
         "_phase",
         "_retries",
         "_target",
+        "_throttle",
         "_tries_again",
         "_up_d",
         "_yaw",
@@ -83,6 +87,7 @@ class Approach:
         self._climb_us = 0  # when the climb began
         self._low_d = 0.0  # [m] where
         self._far: Vector = (0.0, 0.0, 0.0)
+        self._throttle = nan  # on the slope, without what single gusts ask for
         self._retries = 0  # left, where it gives up by itself
         self._tries_again = False
         self._has_seen_ground = False
@@ -107,6 +112,7 @@ class Approach:
         self._centre = (self._entry[0] - east * radius, self._entry[1] + north * radius, self._entry[2])
         self._phase = _Phase.SLOPE if is_lined_up else _Phase.CIRCLE
         self._has_seen_ground = False
+        self._throttle = nan
         if self._phase is _Phase.CIRCLE:
             self._circle(self._centre)
 
@@ -152,6 +158,9 @@ class Approach:
         self._glide(max(down, self._entry[2]), 0.0 if is_above else slope * speed, nan)
         if context.state.estimate.flags & TERRAIN_VALID:
             self._has_seen_ground = True
+        throttle = context.state.actuators.thrust_sp
+        before = self._throttle if isfinite(self._throttle) else throttle
+        self._throttle = before + (throttle - before) * _FRAME_S / _THROTTLE_TAU_S
         is_low = self._height() < self._flare_begin_m(sink)
         reason = self._hopeless(left_m) if is_low or left_m < -_MISSED_M else ""
         if reason and self._retries:
@@ -161,12 +170,13 @@ class Approach:
         elif is_low:
             self._phase = _Phase.FLARE
             self._flare_us = context.state.time_us
-            self._begin = (max(self._height(), 0.1), slope * speed, context.state.actuators.thrust_sp)
+            self._begin = (max(self._height(), 0.1), slope * speed, self._throttle)
 
     def _flare(self) -> None:
         """Down a parabola that touches the ground with FW_LND_FL_SINK, at the touchdown if that is not nearer.
 
-        The throttle is closed on the way: what is left of the speed carries it that far.
+        The throttle is closed on the way, as the height falls, and no later than in the time that the parabola takes:
+        what is left of the speed carries it that far.
         """
         context = self._context
         north, east, _ = context.state.estimate.pos_ned
@@ -178,10 +188,13 @@ class Approach:
         left_s = max(self._left_m(north, east) / max(speed, 1.0), 0.1)
         most = least + max(begin_sink - least, 0.0) * sqrt(part)
         sink = min(max(2.0 * part * begin_m / left_s - least, least), most)
-        self._glide(nan, sink, idle + max(throttle - idle, 0.0) * part)
         flared_us = context.state.time_us - self._flare_us
+        due_us = 2e6 * begin_m / max(begin_sink + least, 0.1)
+        is_open = min(part, max(1.0 - flared_us / due_us, 0.0))
+        self._glide(nan, sink, idle + max(throttle - idle, 0.0) * is_open)
         is_down = context.state.estimate.vel_ned[2] < _DOWN_M_S and self._height() < _TOUCH_M
-        if (is_down and flared_us > 1_000_000) or flared_us > _LONG_FLARE_US:
+        is_long = flared_us > _LONG_FLARE_US and self._height() < begin_m
+        if (is_down and flared_us > 1_000_000) or is_long:
             self._phase = _Phase.ROLL
 
     def _left_m(self, north: float, east: float) -> float:

@@ -6,7 +6,7 @@ from autopilot.interface.vehicle_state import BatteryLevel, LandedState, Vehicle
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.setpoint import SetpointPort
 from autopilot.params import all_parameters
-from autopilot.ports import AIRSPEED_VALID, HEIGHT_VALID, TERRAIN_VALID, Estimate, Setpoint
+from autopilot.ports import AIRSPEED_VALID, HEIGHT_VALID, TERRAIN_VALID, Actuators, Estimate, Setpoint
 from autopilot.vehicles.plane.modes.approach import Approach
 from autopilot.vehicles.plane.vehicle import PLANE
 from common.airframe import load_airframe
@@ -31,6 +31,7 @@ class Landing:
         self.table = table
         self._estimate = rows_of(Estimate)
         self._read = row_reader(self._estimate, 0, "Estimate")
+        self.state.actuators = row_reader(rows_of(Actuators), 0, "Actuators")()
         self.put(-500.0, 30.0)
         self.approach = Approach(self.context)
         self.approach.start((0.0, 0.0, 0.0), 0.0, is_lined_up=True)
@@ -55,7 +56,7 @@ def test_a_plane_that_stands_in_the_wind_flies_on():
 def test_a_landing_beside_the_runway_is_tried_again_twice():
     landing = Landing()
     for _ in range(3):
-        landing.frame(-20.0, 10.0, east=200.0)
+        landing.frame(-20.0, 1.5, east=200.0)
         landing.frame(-20.0, 60.0, east=200.0)  # up, and round for the next try
         landing.approach._phase = type(landing.approach._phase).SLOPE
     assert len([text for _, text in landing.recorder.texts if "trying again" in text]) == 2
@@ -64,7 +65,7 @@ def test_a_landing_beside_the_runway_is_tried_again_twice():
 def test_nobody_goes_round_by_himself_without_charge():
     landing = Landing()
     landing.state.battery_level = BatteryLevel.EMERGENCY
-    landing.frame(-20.0, 10.0, east=200.0)
+    landing.frame(-20.0, 1.5, east=200.0)
     assert not landing.recorder.texts
 
 
@@ -74,15 +75,15 @@ def test_nobody_goes_round_by_himself_without_charge():
 def test_a_landing_without_a_measured_height_is_given_up_if_asked(bits, is_seen, is_given_up):
     landing = Landing(FW_LND_ABORT=bits)
     landing.frame(-300.0, 30.0, flags=VALID | (TERRAIN_VALID if is_seen else 0))
-    landing.frame(-20.0, 10.0)
+    landing.frame(-20.0, 1.5)
     assert landing.recorder.has_text("no height over ground") == is_given_up
 
 
 def test_what_does_not_climb_lands_ahead():
     landing = Landing()
-    landing.frame(-20.0, 10.0, east=200.0)
+    landing.frame(-20.0, 1.5, east=200.0)
     for k in range(450):
-        landing.frame(k * 0.4, 10.0 - 0.01 * k, east=200.0)
+        landing.frame(k * 0.4, 1.5 - 0.001 * k, east=200.0)
     assert landing.recorder.has_text("does not climb")
     assert landing.context.is_landing
 
@@ -101,3 +102,18 @@ def test_going_round_keeps_to_the_fence_and_to_heights_that_there_are():
     landing.context.position_refusal = lambda pos_ned: "above the fence" if pos_ned[2] < -100.0 else ""
     assert landing.approach.go_around(150.0).reason == "target is above the fence"
     assert landing.approach.go_around(50.0).verdict is Verdict.ACCEPTED
+
+
+def test_a_flare_closes_the_throttle_in_its_time_also_where_it_does_not_sink():
+    landing = Landing()
+    for k in range(100):
+        landing.state.actuators = landing.state.actuators._replace(
+            thrust_sp=0.2 if k < 99 else 0.9
+        )  # a gust at the end
+        landing.frame(-200.0 + 0.4 * k, 10.0)
+    throttles = []
+    for _ in range(300):
+        landing.frame(-60.0, 1.0)
+        throttles.append(float(landing.context.setpoint.thrust))
+    assert throttles[1] < 0.3
+    assert throttles[-1] == landing.table["FW_THR_IDLE"]
