@@ -176,16 +176,72 @@ def solve_cruise(
 
 
 @wp.func
+def braked_at(decel: float, limits: AxisLimits) -> AxisLimits:
+    """The limits with another deceleration [m/s²]."""
+    gentler = limits
+    gentler.accel_negative = decel
+    return gentler
+
+
+@wp.func
+def solve_decel(distance: float, vel: float, accel: float, vel_exit: float, limits: AxisLimits) -> float:
+    """The deceleration [m/s²], at most the limit, at which ramping to the exit velocity covers `distance`.
+
+    Given that the limit falls short of it. The distance is nearly linear in the inverse of the deceleration.
+    """
+    u_low = 1.0 / limits.accel_negative
+    f_low = ramp_distance(vel, accel, vel_exit, limits) - distance
+    u_high = u_low
+    f_high = f_low
+    for _step in range(_SOLVER_STEPS):
+        if f_high >= 0.0:
+            break
+        u_low = u_high
+        f_low = f_high
+        u_high = 2.0 * u_high
+        f_high = ramp_distance(vel, accel, vel_exit, braked_at(1.0 / u_high, limits)) - distance
+    tolerance = 1.0e-5 + 1.0e-6 * wp.abs(distance)
+    side = int(0)
+    best = float(u_low)
+    for _step in range(_SOLVER_STEPS):
+        if f_high - f_low < 1.0e-9:
+            break
+        best = u_low - f_low * (u_high - u_low) / (f_high - f_low)
+        error = ramp_distance(vel, accel, vel_exit, braked_at(1.0 / best, limits)) - distance
+        if wp.abs(error) < tolerance:
+            break
+        if error < 0.0:  # Illinois, as above
+            u_low = best
+            f_low = error
+            if side < 0:
+                f_high = 0.5 * f_high
+            side = -1
+        else:
+            u_high = best
+            f_high = error
+            if side > 0:
+                f_low = 0.5 * f_low
+            side = 1
+    return 1.0 / best
+
+
+@wp.func
 def approach(
     distance: float, vel: float, accel: float, slowest: float, vel_exit: float, limits: AxisLimits, dt_s: float
 ) -> Motion:
-    """One step of the way forward to `distance`, given that ramping to `slowest` at once would not pass it."""
+    """One step of the way forward to `distance`, given that ramping to `slowest` at once would not pass it.
+
+    Where it brakes already, and could not let go of the brake for a while, it brakes more gently to the end. To brake
+    hard and creep what is left would be a jolt, and as great a one for a rounding as for a millimetre.
+    """
     top = limits.speed_positive
     base = wp.clamp(released_speed(vel, accel, limits.jerk), slowest, top)
     cruise = float(top)
     keep_s = float(0.0)
+    braking = limits
     if distance_via(base, vel, accel, vel_exit, limits) > distance:
-        cruise = solve_cruise(slowest, base, distance, vel, accel, vel_exit, limits)
+        cruise = slowest
+        braking = braked_at(solve_decel(distance, vel, accel, slowest, limits), limits)
     else:
         beyond = distance - distance_via(top, vel, accel, vel_exit, limits)
         if beyond >= 0.0:
@@ -196,7 +252,7 @@ def approach(
     motion.vel = vel
     motion.accel = accel
     motion.time_left_s = dt_s
-    motion = play_ramp(motion, ramp_to(vel, accel, cruise, limits))
+    motion = play_ramp(motion, ramp_to(vel, accel, cruise, braking))
     motion = play(motion, 0.0, keep_s)
     motion = play_ramp(motion, ramp_to(cruise, 0.0, wp.min(cruise, vel_exit), limits))
     if motion.time_left_s > 0.0:  # arrived within the step: exactly

@@ -85,7 +85,7 @@ def _airspeed(batch: Batch) -> Columns:
 
 def _validated(batch: Batch) -> Columns:
     is_valid = (batch.estimate["flags"] & int(AIRSPEED_VALID)) != 0
-    told = np.where(is_valid, batch.estimate["airspeed"], np.nan)
+    indicated = np.where(is_valid, batch.estimate["airspeed"], np.nan)
     check = batch.health["airspeed"]
     through = batch.estimate["vel_ned"].astype(float)
     through[:, :2] -= check["wind_ne"]
@@ -93,9 +93,9 @@ def _validated(batch: Batch) -> Columns:
     ratio = _true_over_indicated(batch)
     return {
         "timestamp": batch.time_us,
-        "indicated_airspeed_m_s": told,
-        "calibrated_airspeed_m_s": told,
-        "true_airspeed_m_s": told * ratio,
+        "indicated_airspeed_m_s": indicated,
+        "calibrated_airspeed_m_s": indicated,
+        "true_airspeed_m_s": indicated * ratio,
         "calibrated_ground_minus_wind_m_s": by_motion / ratio,
         "true_ground_minus_wind_m_s": by_motion,
         "airspeed_sensor_measurement_valid": is_valid,

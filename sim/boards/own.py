@@ -5,7 +5,7 @@ from typing import Any
 import warp as wp
 
 from autopilot.advance import autopilot_kernel
-from sim.recorded_launches import RecordedLaunches
+from sim.launches import RecordedLaunches
 from sim.rig import Rig
 
 

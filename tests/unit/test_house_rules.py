@@ -32,6 +32,7 @@ SPEAK_OF_ROTORS = {
     "mission/boards/betaflight_flight.py": "Betaflight flies multirotors alone",
     "mission/boards/betaflight_run.py": "the same",
     "mission/boards/betaflight_setup.py": "what it has to know of one",
+    "mission/boards/px4_params.py": "what PX4 has to know of a multirotor",
     "mission/boards/vehicle_params.py": "what an outside autopilot has to know of a multirotor",
     "mission/plan/plan_file.py": "MAVLink's name of a vehicle type, in QGroundControl's files",
     "mission/view/shapes.py": "the shape of a multirotor",

@@ -14,7 +14,7 @@ _ROLL_MAX_RAD, _PITCH_MAX_RAD = radians(35.0), radians(50.0)  # of a plane that 
 class LaunchDetector:
     """Detects one throw."""
 
-    __slots__ = ("_context", "_is_told", "_since_us", "is_thrown")
+    __slots__ = ("_context", "_is_reported", "_since_us", "is_thrown")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
@@ -23,7 +23,7 @@ class LaunchDetector:
     def start(self) -> None:
         """Waits for a throw, the next one."""
         self._since_us = 0  # when the acceleration began; 0: it is not felt
-        self._is_told = False
+        self._is_reported = False
         self.is_thrown = False
 
     @property
@@ -36,8 +36,8 @@ class LaunchDetector:
         context = self._context
         if self.is_thrown:
             return True
-        if not self._is_told:
-            self._is_told = True
+        if not self._is_reported:
+            self._is_reported = True
             context.announcer.statustext(Severity.NOTICE, "Launch: waiting for the throw")
         state = context.state
         if not state.samples.imu.accel_frd[0] > context.number("FW_LAUN_AC_THLD"):

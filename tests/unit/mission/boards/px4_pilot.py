@@ -40,7 +40,7 @@ class Px4:
     def _look(self, exchange):
         truth, sensor = exchange.truth, exchange.sensor
         if truth is not None and sensor is not None:
-            place = self.voice._there(truth.lat * 1e-7, truth.lon * 1e-7, truth.alt * 1e-3)
+            place = self.voice.there(truth.lat * 1e-7, truth.lon * 1e-7, truth.alt * 1e-3)
             velocity = (truth.vx * 1e-2, truth.vy * 1e-2, truth.vz * 1e-2)
             gyro = (sensor.xgyro, sensor.ygyro, sensor.zgyro)
             self.pilot.motion = Motion(place, velocity, tuple(truth.attitude_quaternion), gyro)
