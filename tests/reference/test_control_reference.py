@@ -63,6 +63,23 @@ def test_cruise_speed_is_the_root_of_the_distance_covered(distance: float) -> No
     assert peak == pytest.approx(min(speed, 5.0), abs=0.05)
 
 
+@pytest.mark.parametrize("spare", [1e-5, 1e-3, 0.02, 0.2])
+@pytest.mark.parametrize(("vel", "accel"), [(3.0, -3.0), (1.0, -2.0), (2.0, 1.5), (0.3, -0.5)])
+def test_who_has_to_brake_brakes_once(vel: float, accel: float, spare: float) -> None:
+    """However much farther the goal is than the shortest stop."""
+    row = limits()
+    distance = ramp_distance(vel, accel, 0.0, row) + spare
+    moved, braking = 0.0, []
+    for _ in range(300):
+        motion = step_to_position(distance - moved, vel, accel, 0.0, row, 0.02)
+        moved, vel, accel = moved + motion.moved, motion.vel, motion.accel
+        braking.append(-accel)
+    assert moved == pytest.approx(distance, abs=1e-6)
+    hardest = int(np.argmax(braking))
+    assert max(braking) < row.accel_negative + 1e-3
+    assert max(np.diff(braking[hardest:])) < 0.05  # once it has let go of the brake it does not brake harder again
+
+
 def test_attitude_error_agrees_with_rotation_vectors() -> None:
     for here, there in zip(Rotation.random(200, random_state=1), Rotation.random(200, random_state=2), strict=True):
         error = np.array(attitude_error(wp.quat(*here.as_quat()), wp.quat(*there.as_quat())))
