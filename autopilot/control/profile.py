@@ -178,8 +178,12 @@ def solve_cruise(
 @wp.func
 def braked_at(decel: float, limits: AxisLimits) -> AxisLimits:
     """The limits with another deceleration [m/s²]."""
-    gentler = limits
+    gentler = AxisLimits()
+    gentler.speed_positive = limits.speed_positive
+    gentler.speed_negative = limits.speed_negative
+    gentler.accel_positive = limits.accel_positive
     gentler.accel_negative = decel
+    gentler.jerk = limits.jerk
     return gentler
 
 
@@ -187,7 +191,8 @@ def braked_at(decel: float, limits: AxisLimits) -> AxisLimits:
 def solve_decel(distance: float, vel: float, accel: float, vel_exit: float, limits: AxisLimits) -> float:
     """The deceleration [m/s²], at most the limit, at which ramping to the exit velocity covers `distance`.
 
-    Given that the limit falls short of it. The distance is nearly linear in the inverse of the deceleration.
+    Given that the limit falls short of it. Above the peak that is reached the distance does not depend on it, below it
+    is nearly linear in its inverse. What is not found in time falls short, and is found a frame later.
     """
     u_low = 1.0 / limits.accel_negative
     f_low = ramp_distance(vel, accel, vel_exit, limits) - distance
@@ -202,14 +207,13 @@ def solve_decel(distance: float, vel: float, accel: float, vel_exit: float, limi
         f_high = ramp_distance(vel, accel, vel_exit, braked_at(1.0 / u_high, limits)) - distance
     tolerance = 1.0e-5 + 1.0e-6 * wp.abs(distance)
     side = int(0)
-    best = float(u_low)
     for _step in range(_SOLVER_STEPS):
         if f_high - f_low < 1.0e-9:
             break
         best = u_low - f_low * (u_high - u_low) / (f_high - f_low)
         error = ramp_distance(vel, accel, vel_exit, braked_at(1.0 / best, limits)) - distance
         if wp.abs(error) < tolerance:
-            break
+            return 1.0 / best
         if error < 0.0:  # Illinois, as above
             u_low = best
             f_low = error
@@ -222,7 +226,7 @@ def solve_decel(distance: float, vel: float, accel: float, vel_exit: float, limi
             if side > 0:
                 f_low = 0.5 * f_low
             side = 1
-    return 1.0 / best
+    return 1.0 / u_low
 
 
 @wp.func
@@ -235,13 +239,17 @@ def approach(
     hard and creep what is left would be a jolt, and as great a one for a rounding as for a millimetre.
     """
     top = limits.speed_positive
-    base = wp.clamp(released_speed(vel, accel, limits.jerk), slowest, top)
+    released = released_speed(vel, accel, limits.jerk)
+    base = wp.clamp(released, slowest, top)
     cruise = float(top)
     keep_s = float(0.0)
     braking = limits
     if distance_via(base, vel, accel, vel_exit, limits) > distance:
-        cruise = slowest
-        braking = braked_at(solve_decel(distance, vel, accel, slowest, limits), limits)
+        if released > top:  # first to a speed that is allowed
+            cruise = solve_cruise(slowest, base, distance, vel, accel, vel_exit, limits)
+        else:
+            cruise = slowest
+            braking = braked_at(solve_decel(distance, vel, accel, slowest, limits), limits)
     else:
         beyond = distance - distance_via(top, vel, accel, vel_exit, limits)
         if beyond >= 0.0:

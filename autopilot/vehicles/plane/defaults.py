@@ -87,8 +87,8 @@ def plane_defaults(airframe: PlaneAirframe) -> dict[str, int | float]:
         "HG_FW_PSP_LIFT": _round(degrees(_weight_coefficient(airframe, trim) / airframe.lift.c_l_alpha), 1),
         "TRIM_PITCH": _round(level.elevator),
         "FW_THR_TRIM": _round(level.throttle, 2),
-        # PX4's 2.5, for what sinks at that pitch as it slows down
-        "FW_LND_FL_PMIN": min(2.5, _round(degrees(level.alpha_rad), 1)),
+        # PX4's 2.5, or less for a glider, which would float at that
+        "FW_LND_FL_PMIN": max(-5.0, min(2.5, _round(degrees(level.alpha_rad), 1))),
         "FW_LND_ANG": _round(min(_SLOPE_DEG, _slope_least_deg(airframe, _MIN_OVER_STALL * stall)), 1),
         "FW_T_CLMB_MAX": _round(level.climb_max_m_s, 1),
         "FW_T_SINK_MIN": _round(level.sink_min_m_s, 2),

@@ -164,13 +164,12 @@ class Approach:
         is_low = self._height() < self._flare_begin_m(sink)
         reason = self._hopeless(left_m) if is_low or left_m < -_MISSED_M else ""
         if reason and self._retries:
-            self._retries -= 1
-            self._tries_again = True
-            self._give_up(context.number("MIS_LND_ABRT_ALT"), f"Landing aborted: {reason}, trying again")
+            self._try_again(reason)
         elif is_low:
             self._phase = _Phase.FLARE
             self._flare_us = context.state.time_us
-            self._begin = (max(self._height(), 0.1), slope * speed, self._throttle)
+            kept = max(throttle, self._throttle) if self._is_slow() else self._throttle
+            self._begin = (max(self._height(), 0.1), slope * speed, kept)
 
     def _flare(self) -> None:
         """Down a parabola that touches the ground with FW_LND_FL_SINK, at the touchdown if that is not nearer.
@@ -193,9 +192,22 @@ class Approach:
         is_open = min(part, max(1.0 - flared_us / due_us, 0.0))
         self._glide(nan, sink, idle + max(throttle - idle, 0.0) * is_open)
         is_down = context.state.estimate.vel_ned[2] < _DOWN_M_S and self._height() < _TOUCH_M
-        is_long = flared_us > _LONG_FLARE_US and self._height() < begin_m
-        if (is_down and flared_us > 1_000_000) or is_long:
+        is_long = flared_us > (_LONG_FLARE_US if self._height() < begin_m else 2 * _LONG_FLARE_US)
+        if flared_us > due_us and self._height() > 2.0 * begin_m and self._retries and self._has_charge():
+            self._try_again("too high")
+        elif (is_down and flared_us > 1_000_000) or is_long:
             self._phase = _Phase.ROLL
+
+    def _is_slow(self) -> bool:
+        """Whether it nears the stall, and needs the throttle that it has now."""
+        context = self._context
+        is_known = bool(context.state.estimate.flags & AIRSPEED_VALID)
+        return is_known and 2.0 * airspeed_of(context) < context.number("FW_AIRSPD_MIN") + context.number(
+            "FW_AIRSPD_STALL"
+        )
+
+    def _has_charge(self) -> bool:
+        return self._context.state.battery_level is not BatteryLevel.EMERGENCY
 
     def _left_m(self, north: float, east: float) -> float:
         """[m] To go to the touchdown, along the approach."""
@@ -243,7 +255,7 @@ class Approach:
         """Why no flare should begin; empty if it may."""
         context = self._context
         north, east, _ = context.state.estimate.pos_ned
-        if context.state.battery_level is BatteryLevel.EMERGENCY:
+        if not self._has_charge():
             return ""
         across_m = (east - self._target[1]) * self._along[0] - (north - self._target[0]) * self._along[1]
         most_m, bits = context.number("HG_FW_LND_OFF"), int(context.number("FW_LND_ABORT"))
@@ -254,6 +266,11 @@ class Approach:
         if not context.state.estimate.flags & TERRAIN_VALID and bits & (2 if self._has_seen_ground else 1):
             return "no height over ground is measured"
         return ""
+
+    def _try_again(self, reason: str) -> None:
+        self._retries -= 1
+        self._tries_again = True
+        self._give_up(self._context.number("MIS_LND_ABRT_ALT"), f"Landing aborted: {reason}, trying again")
 
     def _give_up(self, height_m: float, text: str) -> None:
         context = self._context
@@ -275,7 +292,7 @@ class Approach:
         if down > self._up_d + _REACHED_M:
             if state.time_us - self._climb_us > _CLIMB_US and down > self._low_d - _CLIMBS_M:
                 self._context.announcer.statustext(Severity.CRITICAL, "It does not climb: landing ahead")
-                self._phase, self._retries = _Phase.SLOPE, 0
+                self._phase, self._retries, self._throttle = _Phase.SLOPE, 0, nan
             return
         if self._tries_again:
             left = self._retries

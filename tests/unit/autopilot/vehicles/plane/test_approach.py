@@ -36,10 +36,11 @@ class Landing:
         self.approach = Approach(self.context)
         self.approach.start((0.0, 0.0, 0.0), 0.0, is_lined_up=True)
 
-    def put(self, north, height, *, east=0.0, vel_ned=(20.0, 0.0, 1.0), flags=VALID):
+    def put(self, north, height, *, east=0.0, vel_ned=(20.0, 0.0, 1.0), flags=VALID, airspeed=20.0):
         """Puts it there for a frame later."""
         row = self._estimate[0]
         row["pos_ned"], row["vel_ned"], row["flags"] = (north, east, -height), vel_ned, flags
+        row["airspeed"] = airspeed
         self.state.time_us += 20_000
         self.state.estimate = self._read()
 
@@ -117,3 +118,23 @@ def test_a_flare_closes_the_throttle_in_its_time_also_where_it_does_not_sink():
         throttles.append(float(landing.context.setpoint.thrust))
     assert throttles[1] < 0.3
     assert throttles[-1] == landing.table["FW_THR_IDLE"]
+
+
+def test_a_flare_that_does_not_come_down_is_tried_again():
+    landing = Landing()
+    landing.frame(-60.0, 1.5)
+    for _ in range(300):
+        landing.frame(-60.0, 6.0)
+    assert landing.recorder.has_text("too high, trying again")
+
+
+def test_one_near_its_stall_keeps_its_throttle_into_the_flare():
+    landing = Landing()
+    stall = landing.table["FW_AIRSPD_STALL"]
+    landing.state.actuators = landing.state.actuators._replace(thrust_sp=0.2)
+    for k in range(100):
+        landing.frame(-200.0 + 0.4 * k, 10.0)
+    landing.state.actuators = landing.state.actuators._replace(thrust_sp=0.9)
+    landing.frame(-60.0, 1.0, airspeed=stall)
+    landing.frame(-60.0, 1.0, airspeed=stall)
+    assert landing.context.setpoint.thrust > 0.8
