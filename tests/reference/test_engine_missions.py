@@ -11,7 +11,7 @@ pytest.importorskip("jsbsim")
 flown = cache(mission)
 
 
-@pytest.mark.parametrize("noise", [0.0, 1.0])
+@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
 @pytest.mark.parametrize(("engine", "airframe"), [("pybullet", "x500"), ("jsbsim", "x500"), ("pybullet", "rover")])
 def test_a_mission_is_the_same_mission(engine, airframe, noise):
     """Never 5 cm or a degree apart, and every mode in the same frame."""
