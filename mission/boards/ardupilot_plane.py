@@ -85,6 +85,7 @@ def _ground(airframe: PlaneAirframe, ours: dict[str, float]) -> dict[str, float]
     if gear is None:
         raise ValueError("ArduPilot's plane takes off from a runway here")
     return {
+        "TKOFF_THR_MINACC": 0.0,  # it waits for no throw
         "GROUND_STEER_ALT": _STEERED_M,
         "STEER2SRV_P": _RUDDER_GAIN * 2.0 * (gear.nose_x_m + gear.main_x_m) / tan(gear.steering_max_rad),
         "LEVEL_ROLL_LIMIT": _CLIMB_BANK_DEG,

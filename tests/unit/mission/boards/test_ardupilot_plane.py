@@ -197,3 +197,7 @@ def test_it_lands_by_a_mission_against_the_wind_or_as_it_took_off(plane, wind, c
 def test_a_mission_is_flown_in_auto(plane):
     plane.run(plane.drone.start_mission())
     assert (plane.mode, plane.is_armed) == (AUTO, True)
+
+
+def test_it_rolls_without_waiting_for_a_throw(params):
+    assert params["TKOFF_THR_MINACC"] == 0.0
