@@ -140,38 +140,57 @@ def distance_via(vel_cruise: float, vel: float, accel: float, vel_exit: float, l
     )
 
 
+@wp.struct
+class Bracket:
+    """Of a root: what falls short of a distance, what goes too far, and by how much [m]."""
+
+    low: float
+    f_low: float
+    high: float
+    f_high: float
+    side: int  # on which the last try lay: -1, 1; 0 before
+
+
+@wp.func
+def narrowed(bracket: Bracket, tried: float, error: float) -> Bracket:
+    """The bracket with a try for one of its ends; the weight of an end that stays is halved (Illinois)."""
+    now = bracket
+    if error < 0.0:
+        now.low = tried
+        now.f_low = error
+        if bracket.side < 0:
+            now.f_high = 0.5 * bracket.f_high
+        now.side = -1
+    else:
+        now.high = tried
+        now.f_high = error
+        if bracket.side > 0:
+            now.f_low = 0.5 * bracket.f_low
+        now.side = 1
+    return now
+
+
 @wp.func
 def solve_cruise(
     low: float, high: float, distance: float, vel: float, accel: float, vel_exit: float, limits: AxisLimits
 ) -> float:
     """The cruise velocity between `low` (falls short) and `high` (goes too far) that covers `distance`."""
-    v_low = low
-    v_high = high
-    f_low = distance_via(low, vel, accel, vel_exit, limits) - distance
-    f_high = distance_via(high, vel, accel, vel_exit, limits) - distance
+    ends = Bracket()
+    ends.low = low
+    ends.high = high
+    ends.f_low = distance_via(low, vel, accel, vel_exit, limits) - distance
+    ends.f_high = distance_via(high, vel, accel, vel_exit, limits) - distance
     tolerance = 1.0e-5 + 1.0e-6 * wp.abs(distance)
-    side = int(0)
     best = float(low)
     for _step in range(_SOLVER_STEPS):
-        if f_high - f_low > 1.0e-9:
-            best = v_low - f_low * (v_high - v_low) / (f_high - f_low)
+        if ends.f_high - ends.f_low > 1.0e-9:
+            best = ends.low - ends.f_low * (ends.high - ends.low) / (ends.f_high - ends.f_low)
         else:
-            best = 0.5 * (v_low + v_high)
+            best = 0.5 * (ends.low + ends.high)
         error = distance_via(best, vel, accel, vel_exit, limits) - distance
         if wp.abs(error) < tolerance:
             break
-        if error < 0.0:  # Illinois: halve the weight of an end that stays
-            v_low = best
-            f_low = error
-            if side < 0:
-                f_high = 0.5 * f_high
-            side = -1
-        else:
-            v_high = best
-            f_high = error
-            if side > 0:
-                f_low = 0.5 * f_low
-            side = 1
+        ends = narrowed(ends, best, error)
     return best
 
 
@@ -194,39 +213,28 @@ def solve_decel(distance: float, vel: float, accel: float, vel_exit: float, limi
     Given that the limit falls short of it. Above the peak that is reached the distance does not depend on it, below it
     is nearly linear in its inverse. What is not found in time falls short, and is found a frame later.
     """
-    u_low = 1.0 / limits.accel_negative
-    f_low = ramp_distance(vel, accel, vel_exit, limits) - distance
-    u_high = u_low
-    f_high = f_low
+    ends = Bracket()
+    ends.low = 1.0 / limits.accel_negative
+    ends.f_low = ramp_distance(vel, accel, vel_exit, limits) - distance
+    ends.high = ends.low
+    ends.f_high = ends.f_low
     for _step in range(_SOLVER_STEPS):
-        if f_high >= 0.0:
+        if ends.f_high >= 0.0:
             break
-        u_low = u_high
-        f_low = f_high
-        u_high = 2.0 * u_high
-        f_high = ramp_distance(vel, accel, vel_exit, braked_at(1.0 / u_high, limits)) - distance
+        ends.low = ends.high
+        ends.f_low = ends.f_high
+        ends.high = 2.0 * ends.high
+        ends.f_high = ramp_distance(vel, accel, vel_exit, braked_at(1.0 / ends.high, limits)) - distance
     tolerance = 1.0e-5 + 1.0e-6 * wp.abs(distance)
-    side = int(0)
     for _step in range(_SOLVER_STEPS):
-        if f_high - f_low < 1.0e-9:
+        if ends.f_high - ends.f_low < 1.0e-9:
             break
-        best = u_low - f_low * (u_high - u_low) / (f_high - f_low)
+        best = ends.low - ends.f_low * (ends.high - ends.low) / (ends.f_high - ends.f_low)
         error = ramp_distance(vel, accel, vel_exit, braked_at(1.0 / best, limits)) - distance
         if wp.abs(error) < tolerance:
             return 1.0 / best
-        if error < 0.0:  # Illinois, as above
-            u_low = best
-            f_low = error
-            if side < 0:
-                f_high = 0.5 * f_high
-            side = -1
-        else:
-            u_high = best
-            f_high = error
-            if side > 0:
-                f_low = 0.5 * f_low
-            side = 1
-    return 1.0 / u_low
+        ends = narrowed(ends, best, error)
+    return 1.0 / ends.low
 
 
 @wp.func
