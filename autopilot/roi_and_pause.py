@@ -96,9 +96,15 @@ class Guidance:
         """Climbs away from a landing and holds.
 
         Args:
-            height_m: above home, at least MIS_TAKEOFF_ALT; NaN or 0: that.
+            height_m: above home, at least MIS_TAKEOFF_ALT; NaN or 0: that. A plane goes round instead, to this height
+                above the touchdown, at least MIS_LND_ABRT_ALT.
         """
         context = self._navigator.context
+        if self._navigator.goes_round:
+            reply = self._navigator.go_around(height_m)
+            if reply.verdict is Verdict.ACCEPTED:
+                self._commander.guard.release()  # a pilot has taken over: a later failsafe may lead it down again
+            return reply
         if not self._state.is_flying or not context.is_landing:
             return Reply(Verdict.TEMPORARILY_REJECTED, "not landing")
         reason = self._commander.refusal(Mode.HOLD)

@@ -124,6 +124,8 @@ class Client:
 
     def __init__(self, link: ByteLink, *, system_id: int = 1) -> None:
         self.time_us = 0
+        self.lost = ""
+        """Why the vehicle will not answer any more."""
         self.texts: list[str] = []
         self.reached: list[int] = []  # items of the present mission
         self._text_id = 0  # of the last text
@@ -164,9 +166,12 @@ class Client:
 
         Raises:
             ScriptTimeout: it did not hold within `timeout_s` of the vehicle's time.
+            ScriptError: the vehicle is lost.
         """
         deadline_us = self.time_us + int(timeout_s * 1e6)
         while not condition():
+            if self.lost:
+                raise ScriptError(self.lost)
             if self.time_us >= deadline_us:
                 raise ScriptTimeout(f"{what}: nothing within {timeout_s:g} s")
             await next_frame()

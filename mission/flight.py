@@ -4,8 +4,7 @@ Each frame is 20 ms of simulated time: five ticks of the kernels, then the Pytho
 the scripting client, then the recorder. With the memory link alone it is a pure function of its configuration.
 """
 
-from collections.abc import Callable, Sequence
-from math import isnan
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -22,6 +21,7 @@ from autopilot.payload.camera.storage import MediaFolder
 from autopilot.persistence import Persistence
 from autopilot.vehicles.vehicle_class import VehicleClass
 from common.airframe import load_airframe
+from common.airframes.plane import PlaneAirframe
 from common.clock import wall_unix_us
 from common.folder import ConfinedFolder
 from common.kernels import FRAME_TICKS, FRAME_US, TICK_US
@@ -29,7 +29,7 @@ from common.params import Parameter
 from common.state_folder import StateFolder
 from common.tlog import TlogWriter
 from mission.flight_base import Computer, FlightBase
-from mission.flight_config import FlightConfig, OwnerConfig, flight_parameters
+from mission.flight_config import FlightConfig, as_launched, flight_parameters
 from mission.log.flight_recorder import History, Recorder
 from mission.log.stored_logs import FlightLogs, RunLog
 from mission.script import Drone
@@ -45,6 +45,7 @@ from mission.simulator.simulator_params import TURBULENCE_FRACTION, SimulatorPar
 from mission.video.mjpeg_server import StreamServer
 from mission.video.rtp_video import RtpVideo
 from sim.bodies.vehicles import class_of
+from sim.hand import Hand
 from sim.rig import Rig
 from sim.rtk import RtkReceiver
 from sim.sensors.scanner import Scanner
@@ -86,11 +87,12 @@ class Flight(FlightBase):
         make_rig: Callable[..., Rig] | None = None,
         world: WorldMap | None = None,
     ) -> None:
-        super().__init__(config, load_airframe(config.airframe))
+        super().__init__(config, as_launched(config, load_airframe(config.airframe)))
         simulated = class_of(self.airframe)
         vehicle, self.drives = simulated.vehicle, simulated.drives
         self.world = flight_world(config) if world is None else world
         self.rig = flight_rig(config, self.airframe, self.world, make_rig)
+        self.hand = self._hold_in_hand()
         self.params = flight_parameters(config, self.airframe)
         self.persistence = None if state is None else self._restore_parameters(state)
         self._has_new_parameters = True
@@ -103,7 +105,7 @@ class Flight(FlightBase):
         self.controller = self._make_controller(vehicle, receiver)
         self._surroundings = self._surround(receiver)
         if config.owner is not None:
-            links = [*links, *self._carry_camera(config.owner)]
+            links = [*links, self._carry_camera(config.owner)]
         self._components = self._carry_components()
         links = [*links, *(component.vehicle_end for component in self._components)]
         self._tlog = None if folder is None else TlogWriter(folder / "flight.tlog", self.troubles.note)
@@ -120,6 +122,15 @@ class Flight(FlightBase):
         if state is not None:
             self._flight_logs = FlightLogs(state.folder / "logs", self.recorder, self.params, self.troubles.note)
         self._lend_logs(log)
+
+    def _hold_in_hand(self) -> Hand | None:
+        """Puts a plane that is thrown into the hand that does."""
+        throw = self.airframe.throw if isinstance(self.airframe, PlaneAirframe) else None
+        if throw is None:
+            return None
+        hand = Hand(self.rig.rows["body"], throw)
+        hand.take()
+        return hand
 
     def _restore_parameters(self, state: StateFolder) -> Persistence:
         """What an earlier flight has set, but the simulator's and what this flight was given."""
@@ -194,15 +205,6 @@ class Flight(FlightBase):
             self.persistence.keep_home(self.controller.commander.home)
             self.persistence.on_trouble = self.troubles.note
 
-    def _carry_camera(self, config: OwnerConfig) -> Sequence[Link]:
-        """Brings the owner and the onboard camera in; the phone's link."""
-        from mission.follow.onboard_camera import OnboardCamera  # what a policy sees is defined beside the policies
-        from mission.follow.owner_device import FollowedOwner
-
-        self.owner = FollowedOwner(config, self.world, self.rig.arrays.truth, self.config.seed, self.config.home)
-        self.onboard = OnboardCamera(self.rig, self.world, self.owner.cast, self.config.noise, self.config.seed)
-        return [self.owner.vehicle_end]
-
     def _carry_components(self) -> Sequence[ScannerDevice | BaseStation]:
         """Brings in what has a link of its own to the vehicle."""
         config, system_id = self.config, int(self.params[SYSID_PARAMETER])
@@ -228,19 +230,14 @@ class Flight(FlightBase):
         self._load_parameters()
         self.rig.reboot()
 
-    def frame(self) -> None:
-        """Advances by 20 ms."""
-        self.begin_frame()
-        self.advance()
-        self.end_frame()
-
     def begin_frame(self) -> None:
-        """What is done before the ticks of a frame."""
         self._load_parameters()
         self.injector.frame(self.time_us)
+        if self.hand is not None:
+            state = self.controller.state
+            self.hand.frame(is_awaited=state.awaits_launch, is_armed=state.is_armed)
 
     def end_frame(self) -> None:
-        """What is done after the ticks of a frame."""
         self.time_us += FRAME_US
         self._surroundings.frame(self.time_us)
         if self.owner is not None:
@@ -260,8 +257,7 @@ class Flight(FlightBase):
         if self.persistence is not None:
             self.persistence.frame(self.time_us)
         self.troubles.tell(self.controller.commander.announcer)
-        if isnan(self.ready_s) and self.controller.state.is_ready_to_arm:
-            self.ready_s = self.time_us * 1e-6
+        self._note_ready()
 
     def _needs_ticks(self) -> bool:
         for server in self._servers:  # noqa: SIM110  (any() would make a generator in each frame)
@@ -269,16 +265,16 @@ class Flight(FlightBase):
                 return True
         return False
 
-    def advance(self) -> None:
-        """The ticks of a frame."""
-        if self._needs_ticks():
-            for tick in range(FRAME_TICKS):
-                self.advance_tick(tick)
+    def advancing(self, ticks: range) -> Iterator[None]:
+        if len(ticks) < FRAME_TICKS or self._needs_ticks():
+            for tick in ticks:
+                self._advance_tick(tick)
         else:
             self.rig.advance(FRAME_TICKS)
+        return iter(())
 
-    def advance_tick(self, tick: int) -> None:
-        """One tick of a frame, the first is 0; it is shown to the flight controller's servers if a client wants it."""
+    def _advance_tick(self, tick: int) -> None:
+        """One tick of a frame; it is shown to the flight controller's servers if a client wants it."""
         self.rig.advance(1)
         if tick + 1 < FRAME_TICKS and self._needs_ticks():
             self.controller.note_tick(self.time_us + (tick + 1) * TICK_US)
@@ -316,6 +312,8 @@ class Flight(FlightBase):
         self.controller.commander.disarm(force=True)
         self.injector.repair()
         self.rig.boot()
+        if self.hand is not None:
+            self.hand.take()
         self.controller.reboot()
         self.restart_count += 1
         self.texts.statustext(Severity.NOTICE, "Simulator: the vehicle is back on its pad, restarted")

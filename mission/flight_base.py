@@ -1,21 +1,24 @@
 """What every flight is to those who run, show and judge it, whoever flies it: our flight controller or another's."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from math import nan
+from collections.abc import Callable, Iterator, Sequence
+from math import isnan, nan
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
+from autopilot.mavlink.transport.links import Link
 from common.airframe import Airframe
 from common.clock import Pacer
+from common.kernels import FRAME_TICKS
 from mission.client import Running
 from mission.console.host_troubles import Troubles
 from mission.console.status_texts import Texts
-from mission.flight_config import FlightConfig
+from mission.flight_config import FlightConfig, OwnerConfig
 from mission.log.flight_recorder import History, Recorder
 from mission.script import Drone, Script
 from mission.simulator.failure_injection import RigInjector
 from mission.simulator.flight_rig import GUST_FRACTION, flight_wind
 from mission.simulator.simulator_params import TURBULENCE_FRACTION
+from sim.hand import Hand
 from sim.rig import Rig
 from sim.world.world import WorldMap
 
@@ -49,6 +52,8 @@ class FlightBase(ABC):
     """The flight's own scripting client."""
     recorder: Recorder
     injector: RigInjector
+    hand: Hand | None
+    """Who throws it; None: it is not thrown."""
 
     def __init__(self, config: FlightConfig, airframe: Airframe) -> None:
         self.config, self.airframe = config, airframe
@@ -58,13 +63,28 @@ class FlightBase(ABC):
         self.end_reason = ""  # why it cannot go on
         self._pacer = Pacer(None)
         self.texts, self.troubles = Texts(lambda: self.time_us), Troubles(lambda: self.time_us)
+        self.hand = None
         self.owner: FollowedOwner | None = None
         self.onboard: OnboardCamera | None = None
         self.computers: list[Computer] = []
 
-    @abstractmethod
     def frame(self) -> None:
         """Advances by 20 ms."""
+        self.begin_frame()
+        advance_together([self], range(FRAME_TICKS))
+        self.end_frame()
+
+    @abstractmethod
+    def begin_frame(self) -> None:
+        """What is done before the ticks of a frame."""
+
+    @abstractmethod
+    def advancing(self, ticks: range) -> Iterator[None]:
+        """Advances by ticks of a frame, of which the first is 0; pauses where another program computes meanwhile."""
+
+    @abstractmethod
+    def end_frame(self) -> None:
+        """What is done after the ticks of a frame."""
 
     @abstractmethod
     def restart(self) -> None:
@@ -100,6 +120,19 @@ class FlightBase(ABC):
             if on_frame is not None:
                 on_frame(self)
 
+    def _carry_camera(self, config: OwnerConfig) -> Link:
+        """Brings the owner and the onboard camera in; the phone's link."""
+        from mission.follow.onboard_camera import OnboardCamera  # what a policy sees is defined beside the policies
+        from mission.follow.owner_device import FollowedOwner
+
+        self.owner = FollowedOwner(config, self.world, self.rig.arrays.truth, self.config.seed, self.config.home)
+        self.onboard = OnboardCamera(self.rig, self.world, self.owner.cast, self.config.noise, self.config.seed)
+        return self.owner.vehicle_end
+
+    def _note_ready(self) -> None:
+        if isnan(self.ready_s) and self.controller.state.is_ready_to_arm:
+            self.ready_s = self.time_us * 1e-6
+
     def change_speed(self, speed: float | None) -> None:
         """Simulated seconds per second from the next frame on, while it runs; None: as fast as possible."""
         self._pacer = Pacer(speed)
@@ -123,3 +156,13 @@ class FlightBase(ABC):
         self.run(lambda _: running.is_done or self.time_us >= end_us)
         running.cancel()
         return running
+
+
+def advance_together(flights: Sequence[FlightBase], ticks: range) -> None:
+    """Advances flights by the same ticks of a frame; while one waits for another program, the others go on."""
+    under_way = [flight.advancing(ticks) for flight in flights]
+    while under_way:
+        under_way = [each for each in under_way if next(each, _OVER) is not _OVER]
+
+
+_OVER = object()

@@ -7,9 +7,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from autopilot.ardupilot_only_params import ARDUPILOT_PARAMETERS
 from autopilot.params import parameter_table
-from common.airframe import Airframe
+from common.airframe import Airframe, AirframeError
+from common.airframes.plane import PlaneAirframe, Throw
 from common.clock import SIMULATED_EPOCH_US
-from common.geodesy import DEFAULT_HOME, GeoPoint
+from common.geodesy import DEFAULT_HOME, GeoPoint, geodetic_from_ned
 from common.params import ParameterTable
 from mission.flight_settings import FlightSettings, Pace
 from mission.simulator.simulator_params import simulator_parameters
@@ -18,6 +19,9 @@ from sim.world.world import WorldConfig
 
 # For what needs a runway: level where it takes off and lands, and no trees where it flies.
 AIRFIELD = WorldConfig(clearing_radius_m=150.0, treeless_radius_m=500.0)
+CATAPULT = Throw.model_construct(
+    speed_m_s=0.0, elevation_rad=0.26, stroke_s=0.5, height_m=1.5
+)  # guess; of a file without
 TREELESS_M = 80.0  # round home, of the command line's worlds: clients' examples fly to 60 m from it, lower than trees
 
 
@@ -54,6 +58,26 @@ class FlightConfig(FlightSettings):
     """Who walks through the world with a phone, to be followed; the vehicle then carries a camera for its companion."""
 
 
+def start_of(config: FlightConfig) -> GeoPoint:
+    """Where a vehicle boots; the altitude is home's."""
+    lat_deg, lon_deg, _ = geodetic_from_ned(*config.start_ne_m, 0.0, config.home)
+    return GeoPoint(lat_deg, lon_deg, config.home.alt_m)
+
+
+def as_launched(config: FlightConfig, airframe: Airframe) -> Airframe:
+    """The airframe, thrown as the configuration says.
+
+    Raises:
+        AirframeError: it is no plane.
+    """
+    if config.throw_m_s is None:
+        return airframe
+    if not isinstance(airframe, PlaneAirframe):
+        raise AirframeError(f"airframe '{airframe.name}': only a plane can be thrown")
+    throw = airframe.throw or CATAPULT
+    return airframe.model_copy(update={"throw": throw.model_copy(update={"speed_m_s": config.throw_m_s})})
+
+
 def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTable:
     """The flight controller's parameters: the defaults of the airframe, and what the configuration says.
 
@@ -61,6 +85,7 @@ def flight_parameters(config: FlightConfig, airframe: Airframe) -> ParameterTabl
         ParameterError: an unknown name, or a value out of bounds.
         AirframeError: an airframe of no known class of vehicles.
     """
+    airframe = as_launched(config, airframe)
     own = []
     if config.dialect == "ardupilot":
         simulated = simulator_parameters(airframe, config.home, config.wind_m_s, config.wind_from_deg)

@@ -10,7 +10,7 @@ from common.state_folder import StateFolder
 from mission.console.model_command import first_fault
 from mission.console.option_checks import UserError, home_of, parameter_of
 from mission.flight_config import AIRFIELD, TREELESS_M, FlightConfig, OwnerConfig, flight_parameters
-from mission.flight_settings import FlightOptions, FlightSettings, Pace
+from mission.flight_settings import OURS, FlightOptions, FlightSettings, Pace
 from mission.flight_state_folder import stored_home
 from sim.bodies.vehicles import class_of
 from sim.world.driving_worlds import CAR_PARK, COURSE
@@ -31,7 +31,7 @@ def check_parameters(options: FlightOptions) -> None:
         UserError: the options describe no flight.
     """
     config = flight_config(options, None)
-    if options.board != "own":
+    if options.board not in OURS:
         return
     try:
         flight_parameters(config, load_airframe(config.airframe))

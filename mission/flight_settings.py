@@ -15,8 +15,10 @@ from mission.console.model_command import option
 
 Pace = Literal["walk", "run"]
 EngineName = Literal["native", "pybullet", "jsbsim"]
-BoardName = Literal["own", "ardupilot", "px4"]
+BoardName = Literal["own", "ardupilot", "px4", "betaflight"]
 WorldKind = Literal["hills", "forest", "walled-forest", "course", "car-park"]
+OURS: tuple[BoardName, ...] = ("own", "betaflight")
+"""Under these it is our own flight controller that flies, with its options, parameters and links."""
 _HOME = f"{DEFAULT_HOME.lat_deg},{DEFAULT_HOME.lon_deg},{DEFAULT_HOME.alt_m:g}"
 
 
@@ -42,6 +44,14 @@ class FlightSettings(BaseModel):
     traffic_count: int = option(0, "Other aircraft that are heard by ADS-B.", "--traffic", ge=0, le=50)
     engine: EngineName = option("native", "Who moves the body: native, pybullet or jsbsim.")
     """Air, sensors and flight controller are ours with each."""
+    throw_m_s: float | None = option(
+        None,
+        "A plane: thrown at this speed [m/s]. Default: from the runway, or as its file has it.",
+        "--throw",
+        shown="as its file has it",
+        ge=1.0,
+        le=60.0,
+    )
     has_lidar: bool = option(False, "Carry a ring of range finders that looks round.", "--lidar")
     has_base: bool = option(False, "A base station beside home sends the GNSS receiver corrections.", "--rtk")
 
@@ -49,9 +59,14 @@ class FlightSettings(BaseModel):
 class FlightOptions(FlightSettings):
     """The options of `honeyguide fly`, as given: the settings, what several of which make, and the session's own."""
 
-    board: BoardName = option("own", "Who flies: own, or another program: ardupilot or px4 (docs/boards.md).")
-    command: str | None = option(
-        None, "Starts that program: {folder}, {params}, {home} and {instance} are filled in.", shown="wait for it"
+    board: BoardName = option(
+        "own", "Who flies: own, or another program: ardupilot, px4 or betaflight (docs/boards.md)."
+    )
+    command: tuple[str, ...] = option(
+        (),
+        "Starts that program: {folder}, {params}, {home}, {instance} and {vehicle} are filled in. Of several "
+        "vehicles with several programs: BOARD=COMMAND, repeated.",
+        shown="wait for it",
     )
     instance: int = option(0, "Its number, from which its ports follow.", ge=0, le=99)
     plan: Path | None = option(None, "A QGroundControl .plan or QGC WPL 110 file. Default: a tour of the hills.")
@@ -96,7 +111,7 @@ class FlightOptions(FlightSettings):
         (), "Sets a parameter of the flight controller: NAME=VALUE. Repeatable.", "--param"
     )
     vehicles: str | None = option(
-        None, "Fly several in one world: a number, or AIRFRAME:NUMBER,AIRFRAME:NUMBER,...", shown="one"
+        None, "Fly several in one world: a number, or AIRFRAME[@BOARD]:NUMBER,AIRFRAME[@BOARD]:NUMBER,...", shown="one"
     )
     spacing_m: float = option(10.0, "Of several, how far apart they boot [m].", "--spacing", ge=1.0, le=1000.0)
     has_transponders: bool = option(False, "Several hear each other by ADS-B.", "--adsb")

@@ -3,6 +3,7 @@
 Light to import: what is wrong is told, and a port that is taken, before anything heavy is loaded.
 """
 
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -12,11 +13,12 @@ from common.airframe import load_airframe
 from common.files import write_whole
 from common.geodesy import GeoPoint
 from common.state_folder import StateFolder
+from mission.boards.board_options import check_board, commands_of
 from mission.connections import open_images, open_links, open_page, open_stream, open_video, signing_config
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import loading, print_line
 from mission.flight_options import flight_config
-from mission.flight_settings import FlightOptions
+from mission.flight_settings import OURS, FlightOptions
 from mission.flight_state_folder import StateError, keep_home, open_state
 from mission.net_guard import LOOPBACK
 from mission.plan.plan_file import Plan, PlanError, default_plan, moved_plan, read_plan
@@ -35,13 +37,17 @@ def fly_session(options: FlightOptions) -> int:
     """
     speed = speed_of(options.speed)
     with ExitStack() as held:
-        if options.board != "own":
+        if options.board not in OURS:
             from mission.boards.board_session import fly_board
 
             home = flight_config(options, None).home
             return fly_board(
                 options, speed, None if options.is_idle else _plan(options.plan, options.airframe, home), held
             )
+        if options.board == "own":
+            commands_of(options.command, [])
+        else:
+            check_board(options)
         if options.state is None:
             return _fly(options, speed, None, held)
         try:
@@ -78,7 +84,14 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
         has_camera = speed is not None or stream is not None or page is not None
         load_kernels(say, config, has_camera=has_camera)
         say("building the world")
-        flight = Flight(
+        make_flight: Callable[..., Flight] = Flight
+        run = None
+        if options.board != "own":
+            from mission.boards.betaflight_run import BetaflightRun
+
+            run = held.enter_context(closing(BetaflightRun.of(options, folder, console)))
+            make_flight = run.make_flight
+        flight = make_flight(
             config,
             links=links,
             folder=folder,
@@ -97,6 +110,8 @@ def _fly(options: FlightOptions, speed: float | None, state: StateFolder | None,
     _print_start(options, speed, folder, console)
     if page is not None:
         print_line(console, f"live page: {page.url}")
+    if run is not None:
+        run.start(flight)
     try:
         return fly_to_the_end(flight, plan, options, speed, page, folder, console)
     finally:

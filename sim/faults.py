@@ -41,6 +41,7 @@ BIAS_UNITS: dict[str, str] = {
     "gyro": "rad/s",
     "accel": "m/s²",
     **{sensor.name: sensor.bias_unit for sensor in FUSED_SENSORS},
+    "airspeed": "Pa",
     "battery": "V",
 }
 """Sensors that can fail, with the unit in which a bias is given."""

@@ -23,11 +23,11 @@ from common.records import assign_rows
 from common.warp_start import start_warp
 from sim.advance import advance_kernel, rig_kernels
 from sim.bodies.body import DEFAULT_BODY, DEFAULT_LAW, Body
+from sim.launches import Workers
 from sim.rows import HostRows
 from sim.sensors.sensors import Faults, SensorModel, SensorState
 from sim.truth import Truth
 from sim.wind import WindModel, WindState
-from sim.workers import Workers
 from sim.world.batch import WorldBatch
 from sim.world.world import World, WorldMap
 

@@ -4,7 +4,7 @@ What sim/advance.py fuses into one launch is here four: the air and the commands
 the sensors, the board. With our own engine and board both rigs agree bit for bit; it is there for those of others.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, cast
 
 import warp as wp
@@ -145,28 +145,35 @@ class SteppedRig(Rig):
         return []
 
     def advance(self, tick_count: int) -> None:
+        for _ in self.advancing(tick_count):
+            pass
+
+    def advancing(self, tick_count: int) -> Iterator[None]:
+        """As `advance`, with a pause each time the board has been given its samples: others can go on meanwhile."""
         self.rows.send()
         for _ in range(tick_count):
-            self._tick()
+            yield from self._tick()
         self.rows.fetch()
 
-    def _tick(self) -> None:
+    def _tick(self) -> Iterator[None]:
         blown, weakened_again, sensed, counted = self._launches or self._record_tick()
         blown.launch()
         if self._board.is_fast:
             for _ in range(SUBSTEPS):
                 self._fast_engine.substep(self._motor_commands, self._wind_ned)
-                self._exchange()
+                yield from self._exchange()
                 weakened_again.launch()
             sensed.launch()
         else:
             self._engine.step(self._motor_commands, self._wind_ned)
             sensed.launch()
-            self._exchange()
+            yield from self._exchange()
         counted.launch()
 
-    def _exchange(self) -> None:
-        self._board.exchange(self._samples, self.arrays.truth, self._board_commands)
+    def _exchange(self) -> Iterator[None]:
+        self._board.give(self._samples, self.arrays.truth)
+        yield
+        self._board.take(self._board_commands)
 
     def _record_tick(self) -> list[Any]:
         """The launches of a tick but engine and board, made once: to pack their arguments takes as long as they do."""

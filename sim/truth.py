@@ -7,6 +7,7 @@ charge of a battery, the slip of a foot) is its own.
 import warp as wp
 
 from autopilot.estimator.airspeed import with_airspeed
+from autopilot.estimator.state import AirspeedCheck
 from autopilot.ports import (
     HEIGHT_VALID,
     POSITION_VALID,
@@ -63,7 +64,7 @@ def true_estimate(truth: Truth, tick: wp.int64) -> Estimate:
         sample = AirspeedSample()
         sample.time_us = estimate.time_us
         sample.pressure_pa = truth.pitot_pa
-        estimate = with_airspeed(estimate, sample)
+        estimate = with_airspeed(estimate, AirspeedCheck(), sample)
     return estimate
 
 

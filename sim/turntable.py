@@ -27,6 +27,11 @@ class Turntable:
     def __init__(self, body: np.ndarray[Any, Any]) -> None:
         self._body = body
 
+    @property
+    def is_level(self) -> bool:
+        """Whether nothing is left to turn where it is shown level."""
+        return hypot(*_body_turn(self._attitude(), _lean(0.0, 0.0))[:2]) < 1e-3
+
     def show(self, roll_rad: float, pitch_rad: float) -> None:
         """Turns the vehicle towards an attitude; it keeps the heading it has when level."""
         x, y, z = _body_turn(self._attitude(), _lean(roll_rad, pitch_rad))

@@ -19,7 +19,7 @@ from autopilot.commander.stick_commands import Pilot
 from autopilot.interface.mode_spec import Disarmed, ModeTable
 from autopilot.interface.vehicle_interface import Announcer
 from autopilot.interface.vehicle_state import ACCEPTED, LandedState, Mode, Reply, Severity, VehicleState, Verdict
-from autopilot.ports import HEIGHT_VALID, MAG_DISTURBED, POSITION_VALID, VELOCITY_VALID
+from autopilot.ports import AIRSPEED_VALID, HEIGHT_VALID, MAG_DISTURBED, POSITION_VALID, VELOCITY_VALID
 from autopilot.vehicles.vehicle_class import ArmingCheck, DriveWatch, GroundDetector
 from common.params import Parameter, ParameterTable
 
@@ -81,6 +81,7 @@ class Commander:
         self._next_check_us = 0
         self._next_text_us = _FIRST_TEXT_US
         self._reset_count = 0  # of the estimate
+        self._has_airspeed = False
         self._is_ardupilot = False
         self._load()
         params.on_change(self._on_parameter)
@@ -110,6 +111,8 @@ class Commander:
         self._phases.frame(self._flying, dt_s)
         if state.estimate.reset_count != self._reset_count:
             self._tell_reset()
+        if bool(state.estimate.flags & AIRSPEED_VALID) is not self._has_airspeed:
+            self._tell_airspeed()
         self._pilot.frame(self)
         if state.is_armed:
             self._watch_failures(min(dt_s, FRAME_LONGEST_S))
@@ -313,6 +316,13 @@ class Commander:
         if abs(estimate.yaw_reset) > _RESET_REPORTED_RAD:
             text = f"Estimator: heading reset by {degrees(estimate.yaw_reset):.0f} deg"
             self.announcer.statustext(Severity.NOTICE, text)
+
+    def _tell_airspeed(self) -> None:
+        """The pitot tube has failed, or has come back."""
+        self._has_airspeed = not self._has_airspeed
+        if self.state.is_flying:
+            text = "Airspeed sensor: used again" if self._has_airspeed else "Airspeed sensor failed: flown without"
+            self.announcer.statustext(Severity.NOTICE if self._has_airspeed else Severity.CRITICAL, text)
 
     def _watch_failures(self, dt_s: float) -> None:
         if self.state.mode is Mode.TERMINATION:

@@ -21,6 +21,7 @@ FRAME_LONGEST_S = 0.1  # longer gaps do not count as landed time
 _AIRBORNE_M = 0.5  # height over the take-off place from which the vehicle is in the air
 _ON_ITS_SIDE_RAD = 0.25 * pi  # lean from which a vehicle on the ground has not landed but crashed, as for arming
 _FALLEN_US = 10_000_000  # after its motors stopped in the air a vehicle is down, whatever the estimate says; guess
+_FLIES_M = 5.0  # height over the hand from which a throw has carried; guess
 _OFF_GROUND_M = 0.15  # a lower hover is not told from standing; guess
 
 
@@ -108,6 +109,8 @@ class TakeoffAndLanding:
         self._landed_since_us = 0
         self._lift_since_us = 0
         self._has_flown = False  # since arming
+        self._is_awaited = False  # it was to be thrown, as of the last frame
+        self._is_launched = False  # it has been thrown, and has not risen yet
         self.lift_d = 0.0
         self.unpowered_us = 0
         self._load()
@@ -116,7 +119,7 @@ class TakeoffAndLanding:
     def armed(self) -> None:
         self._landed_since_us = self._state.time_us
         self._lift_since_us = 0
-        self._has_flown = False
+        self._has_flown = self._is_awaited = self._is_launched = False
 
     def may_disarm(self) -> bool:
         return self._state.landed_state is LandedState.ON_GROUND
@@ -140,18 +143,25 @@ class TakeoffAndLanding:
                 state.has_ground_contact = False
                 self._lift_since_us = now_us
                 self.lift_d = state.estimate.pos_ned[2]
+                self._is_launched, self._is_awaited = self._is_awaited, False
             return
+        self._is_awaited = state.awaits_launch
         if state.mode is Mode.TERMINATION:
             self._commander.stop_motors("Disarmed after termination")
             return
         is_done = self._has_flown or not self._commander.modes[state.mode].may_arm
         limit_us = self._disarm_landed_us if is_done else self._disarm_preflight_us
         if 0 <= limit_us <= now_us - self._landed_since_us:
-            self._commander.stop_motors("Disarmed after landing" if is_done else "Disarmed: no take-off")
+            text = "Disarmed: not thrown" if state.awaits_launch else "Disarmed: no take-off"
+            self._commander.stop_motors("Disarmed after landing" if is_done else text)
 
     def _fly(self, flying: Flying, dt_s: float) -> None:
         """Off the ground: landed state, landing detection."""
         state = self._state
+        self._is_launched &= state.is_armed and self.lift_d - state.estimate.pos_ned[2] < _FLIES_M
+        if self._is_launched and self._detector.update(state.estimate, 0.0, 0.0, min(dt_s, FRAME_LONGEST_S)):
+            self._fail_lift("Launch failed: on the ground again")  # a detector would wait until its motor stands
+            return
         if state.landed_state is LandedState.TAKEOFF and not self._has_flown:
             if state.is_armed:
                 self._lift(flying)
@@ -162,7 +172,9 @@ class TakeoffAndLanding:
         is_powered = state.is_armed and state.mode is not Mode.TERMINATION
         thrust = state.actuators.thrust_sp if is_powered else 0.0
         descent_sp = state.actuators.traj_vel_ned[2] if ask is Ask.DOWN else 0.0
-        is_landed = self._detector.update(state.estimate, thrust, descent_sp, min(dt_s, FRAME_LONGEST_S))
+        is_landed = not self._is_launched and self._detector.update(
+            state.estimate, thrust, descent_sp, min(dt_s, FRAME_LONGEST_S)
+        )
         if ask is Ask.UP and self._detector.has_contact:
             self._detector.reset()  # off again
             is_landed = False
@@ -190,9 +202,12 @@ class TakeoffAndLanding:
             if is_hovering and risen_m > _OFF_GROUND_M:  # it shall not go higher
                 self._has_flown = True
                 return
-            self._commander.announcer.statustext(Severity.CRITICAL, "Takeoff failed: still on the ground")
-            self._touch_down()
-            self._commander.stop_motors("Disarmed: no take-off")
+            self._fail_lift("Takeoff failed: still on the ground")
+
+    def _fail_lift(self, text: str) -> None:
+        self._commander.announcer.statustext(Severity.CRITICAL, text)
+        self._touch_down()
+        self._commander.stop_motors("Disarmed: no take-off")
 
     def _touch_down(self) -> None:
         self._state.landed_state = LandedState.ON_GROUND

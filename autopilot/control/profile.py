@@ -140,52 +140,124 @@ def distance_via(vel_cruise: float, vel: float, accel: float, vel_exit: float, l
     )
 
 
+@wp.struct
+class Bracket:
+    """Of a root: what falls short of a distance, what goes too far, and by how much [m]."""
+
+    low: float
+    f_low: float
+    high: float
+    f_high: float
+    side: int  # on which the last try lay: -1, 1; 0 before
+
+
+@wp.func
+def narrowed(bracket: Bracket, tried: float, error: float) -> Bracket:
+    """The bracket with a try for one of its ends; the weight of an end that stays is halved (Illinois)."""
+    now = bracket
+    if error < 0.0:
+        now.low = tried
+        now.f_low = error
+        if bracket.side < 0:
+            now.f_high = 0.5 * bracket.f_high
+        now.side = -1
+    else:
+        now.high = tried
+        now.f_high = error
+        if bracket.side > 0:
+            now.f_low = 0.5 * bracket.f_low
+        now.side = 1
+    return now
+
+
 @wp.func
 def solve_cruise(
     low: float, high: float, distance: float, vel: float, accel: float, vel_exit: float, limits: AxisLimits
 ) -> float:
     """The cruise velocity between `low` (falls short) and `high` (goes too far) that covers `distance`."""
-    v_low = low
-    v_high = high
-    f_low = distance_via(low, vel, accel, vel_exit, limits) - distance
-    f_high = distance_via(high, vel, accel, vel_exit, limits) - distance
+    ends = Bracket()
+    ends.low = low
+    ends.high = high
+    ends.f_low = distance_via(low, vel, accel, vel_exit, limits) - distance
+    ends.f_high = distance_via(high, vel, accel, vel_exit, limits) - distance
     tolerance = 1.0e-5 + 1.0e-6 * wp.abs(distance)
-    side = int(0)
     best = float(low)
     for _step in range(_SOLVER_STEPS):
-        if f_high - f_low > 1.0e-9:
-            best = v_low - f_low * (v_high - v_low) / (f_high - f_low)
+        if ends.f_high - ends.f_low > 1.0e-9:
+            best = ends.low - ends.f_low * (ends.high - ends.low) / (ends.f_high - ends.f_low)
         else:
-            best = 0.5 * (v_low + v_high)
+            best = 0.5 * (ends.low + ends.high)
         error = distance_via(best, vel, accel, vel_exit, limits) - distance
         if wp.abs(error) < tolerance:
             break
-        if error < 0.0:  # Illinois: halve the weight of an end that stays
-            v_low = best
-            f_low = error
-            if side < 0:
-                f_high = 0.5 * f_high
-            side = -1
-        else:
-            v_high = best
-            f_high = error
-            if side > 0:
-                f_low = 0.5 * f_low
-            side = 1
+        ends = narrowed(ends, best, error)
     return best
+
+
+@wp.func
+def braked_at(decel: float, limits: AxisLimits) -> AxisLimits:
+    """The limits with another deceleration [m/s²]."""
+    gentler = AxisLimits()
+    gentler.speed_positive = limits.speed_positive
+    gentler.speed_negative = limits.speed_negative
+    gentler.accel_positive = limits.accel_positive
+    gentler.accel_negative = decel
+    gentler.jerk = limits.jerk
+    return gentler
+
+
+@wp.func
+def solve_decel(distance: float, vel: float, accel: float, vel_exit: float, limits: AxisLimits) -> float:
+    """The deceleration [m/s²], at most the limit, at which ramping to the exit velocity covers `distance`.
+
+    Given that the limit falls short of it. Above the peak that is reached the distance does not depend on it, below it
+    is nearly linear in its inverse. What is not found in time falls short, and is found a frame later.
+    """
+    ends = Bracket()
+    ends.low = 1.0 / limits.accel_negative
+    ends.f_low = ramp_distance(vel, accel, vel_exit, limits) - distance
+    ends.high = ends.low
+    ends.f_high = ends.f_low
+    for _step in range(_SOLVER_STEPS):
+        if ends.f_high >= 0.0:
+            break
+        ends.low = ends.high
+        ends.f_low = ends.f_high
+        ends.high = 2.0 * ends.high
+        ends.f_high = ramp_distance(vel, accel, vel_exit, braked_at(1.0 / ends.high, limits)) - distance
+    tolerance = 1.0e-5 + 1.0e-6 * wp.abs(distance)
+    for _step in range(_SOLVER_STEPS):
+        if ends.f_high - ends.f_low < 1.0e-9:
+            break
+        best = ends.low - ends.f_low * (ends.high - ends.low) / (ends.f_high - ends.f_low)
+        error = ramp_distance(vel, accel, vel_exit, braked_at(1.0 / best, limits)) - distance
+        if wp.abs(error) < tolerance:
+            return 1.0 / best
+        ends = narrowed(ends, best, error)
+    return 1.0 / ends.low
 
 
 @wp.func
 def approach(
     distance: float, vel: float, accel: float, slowest: float, vel_exit: float, limits: AxisLimits, dt_s: float
 ) -> Motion:
-    """One step of the way forward to `distance`, given that ramping to `slowest` at once would not pass it."""
+    """One step of the way forward to `distance`, given that ramping to `slowest` at once would not pass it.
+
+    Where it brakes already, and could not let go of the brake for a while, it brakes more gently to the end. To brake
+    hard and creep what is left would be a jolt, and as great a one for a rounding as for a millimetre.
+    """
     top = limits.speed_positive
-    base = wp.clamp(released_speed(vel, accel, limits.jerk), slowest, top)
+    released = released_speed(vel, accel, limits.jerk)
+    base = wp.clamp(released, slowest, top)
     cruise = float(top)
     keep_s = float(0.0)
+    braking = limits
     if distance_via(base, vel, accel, vel_exit, limits) > distance:
-        cruise = solve_cruise(slowest, base, distance, vel, accel, vel_exit, limits)
+        if released > top:  # first to a speed that is allowed
+            cruise = solve_cruise(slowest, base, distance, vel, accel, vel_exit, limits)
+        else:
+            cruise = slowest
+            braking = braked_at(solve_decel(distance, vel, accel, slowest, limits), limits)
     else:
         beyond = distance - distance_via(top, vel, accel, vel_exit, limits)
         if beyond >= 0.0:
@@ -196,7 +268,7 @@ def approach(
     motion.vel = vel
     motion.accel = accel
     motion.time_left_s = dt_s
-    motion = play_ramp(motion, ramp_to(vel, accel, cruise, limits))
+    motion = play_ramp(motion, ramp_to(vel, accel, cruise, braking))
     motion = play(motion, 0.0, keep_s)
     motion = play_ramp(motion, ramp_to(cruise, 0.0, wp.min(cruise, vel_exit), limits))
     if motion.time_left_s > 0.0:  # arrived within the step: exactly

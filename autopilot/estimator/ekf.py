@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from autopilot.estimator.airspeed import with_airspeed
+from autopilot.estimator.airspeed import checked, with_airspeed
 from autopilot.estimator.align import aligned_nominal, average, is_aligned
 from autopilot.estimator.calibration import calibrated
 from autopilot.estimator.delay import (
@@ -239,7 +239,11 @@ def estimator_step(ekf: Ekf, i: int, samples: Samples, contact: int) -> None:
     else:
         ekf.rows[i].estimate = raw_estimate(imu)
     if samples.airspeed.time_us != wp.int64(0):
-        ekf.rows[i].estimate = with_airspeed(ekf.rows[i].estimate, samples.airspeed)
+        height_m = ekf.rows[i].origin_baro_height - ekf.rows[i].estimate.pos_ned[2]
+        ekf.rows[i].airspeed = checked(
+            params, ekf.rows[i].airspeed, ekf.rows[i].estimate, samples.airspeed, contact, height_m
+        )
+        ekf.rows[i].estimate = with_airspeed(ekf.rows[i].estimate, ekf.rows[i].airspeed, samples.airspeed)
 
 
 @wp.func

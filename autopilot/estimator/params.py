@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from autopilot.estimator.airspeed_params import airspeed_fields
 from autopilot.estimator.calibration_params import CALIBRATION_PARAMETERS
 from autopilot.estimator.mag_params import MAG_PARAMETERS
 from autopilot.estimator.wheel_params import wheel_fields
@@ -105,6 +106,10 @@ class EstimatorParams:
     external_ctrl: int
     external_pos_gate: float
     external_vel_gate: float
+    airspeed_checks: int
+    airspeed_innov: float  # [m/s]
+    airspeed_stop_s: float
+    airspeed_start_s: float
     wheel_ctrl: int
     wheel_noise: float
     wheel_scale_std: float
@@ -340,7 +345,7 @@ ESTIMATOR_PARAMETERS: list[Parameter] = [
 
 def estimator_fields(table: ParameterTable) -> dict[str, float]:
     """Fields of `EstimatorParams` and their values in SI."""
-    fields = table.fields(ESTIMATOR_PARAMETERS) | wheel_fields(table)
+    fields = table.fields(ESTIMATOR_PARAMETERS) | wheel_fields(table) | airspeed_fields(table)
     fields["predict_s"] *= 1.0e-6
     return fields
 

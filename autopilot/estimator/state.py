@@ -231,6 +231,21 @@ class YawEstimator:
 
 
 @wp.struct
+class AirspeedCheck:
+    """Is the pitot tube to be believed?"""
+
+    sample_us: wp.int64  # of the newest sample
+    pressure_pa: float
+    changed_us: wp.int64  # when its value last changed, or the vehicle stood
+    wind_ne: wp.vec2  # [m/s] mean, of a tube that is believed
+    wind_count: float  # samples in it
+    is_contradicted: int  # by the motion over ground
+    doubted_us: wp.int64  # since when; 0: it is not
+    passed_us: wp.int64  # since when it is not; 0: it is
+    is_failed: int
+
+
+@wp.struct
 class EstimatorState:
     """The estimator of one vehicle, without its covariance and rings."""
 
@@ -268,6 +283,7 @@ class EstimatorState:
     external_height: Aid  # down [m]
     external_vel: Aid  # north, east, down [m/s]
     external_yaw: Aid  # [rad]
+    airspeed: AirspeedCheck
     external_reset_count: int  # of the last external sample used
     doubted_time_us: wp.int64  # when the accelerometer last contradicted GNSS and barometer, 0: never
     climb_innov_lpf: float  # [m/s] of the GNSS velocity, down

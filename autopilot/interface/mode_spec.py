@@ -12,7 +12,7 @@ from typing import Any
 
 from autopilot.interface.client_requests import ModeRequest, Report
 from autopilot.interface.failsafe_action import Action
-from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply
+from autopilot.interface.vehicle_state import ACCEPTED, Mode, Reply, Verdict
 
 # COM_DLL_EXCEPT and COM_RCL_EXCEPT: the bit that lets a mode go on without a ground station, or without sticks (PX4).
 MISSION_EXCEPTED, HOLD_EXCEPTED, OFFBOARD_EXCEPTED = 1, 2, 4
@@ -59,6 +59,10 @@ class FlightMode:
     def stream_age_us(self) -> int:
         """For how long the setpoints that it lives on have been silent; 0: it lives on none."""
         return 0
+
+    def go_around(self, _height_m: float, /) -> Reply:
+        """Gives a landing up and climbs to a height above the touchdown [m], NaN: the usual one; or says why not."""
+        return Reply(Verdict.TEMPORARILY_REJECTED, "not landing")
 
     def forget(self) -> None:
         """What clients have asked of it does not wait for the next time it is entered."""

@@ -170,6 +170,7 @@ class VehicleState:
     is_ready_to_arm: bool = False
     is_failsafe: bool = False
     is_calibrating: bool = False
+    awaits_launch: bool = False  # armed and to be thrown: its motor stands until it feels that
     armed_since_us: int = 0
     goal_ned: tuple[float, float, float] = (nan, nan, nan)  # [m] place flown to; NaN: free
     path_start_ned: tuple[float, float, float] = (nan, nan, nan)  # [m] of the straight way there; NaN: none

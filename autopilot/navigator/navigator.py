@@ -174,7 +174,7 @@ class Navigator:
         """Renews the setpoint and returns the mode that shall follow, if the present one is done."""
         context = self.context
         state = context.state
-        context.wants_lift = False
+        context.wants_lift = state.awaits_launch = False
         context.is_landing = context.has_ended = False
         setpoint = context.setpoint
         wish: Mode | None = None
@@ -264,6 +264,16 @@ class Navigator:
         """Begins what the present mode has just been asked for."""
         if self.modes[mode].begins_anew:
             self.enter(mode)
+
+    @property
+    def goes_round(self) -> bool:
+        """Whether a landing that is given up leads round by the mode's own way: of what cannot stop in the air."""
+        ground = self.context.craft.ground
+        return ground is not None and not ground.settles
+
+    def go_around(self, height_m: float) -> Reply:
+        """Gives up the landing being flown, of what goes round."""
+        return self._active.go_around(height_m)
 
     def report(self, report: Report) -> Reply:
         """Hands what a client tells to the modes that take it, flown or not."""

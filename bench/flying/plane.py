@@ -1,9 +1,10 @@
 """How well a plane flies: a circuit of four waypoints in wind, and a landing, seed by seed.
 
-`python -m bench.flying.plane` prints a row per seed: errors along the legs once each has settled, and where it touched
-down.
+`python -m bench.flying.plane [--airframe NAME] [--seeds FIRST-LAST]` prints a row per seed: errors along the legs
+once each has settled, and where it touched down.
 """
 
+from argparse import ArgumentParser
 from dataclasses import dataclass, field
 from math import atan2, cos, degrees, hypot, pi, sin
 from typing import Any
@@ -21,7 +22,7 @@ from mission.flight_config import AIRFIELD
 CORNERS = ((450.0, 0.0), (450.0, 350.0), (-450.0, 350.0), (-450.0, 0.0))  # [m] north, east
 HEIGHT_M = 35.0
 SETTLED_S = 10.0  # after the turn to a leg: a period of the guidance, NPFG_PERIOD
-LONGEST_S = 300.0
+LONGEST_S = 600.0
 
 
 @dataclass
@@ -33,6 +34,7 @@ class Circuit:
     airspeed_m_s: list[float] = field(default_factory=list)
     cross_m: list[float] = field(default_factory=list)
     touchdown_m: float = float("nan")  # from the place asked for
+    along_m: float = float("nan")  # the same, beyond it on the way of the landing
     sink_m_s: float = float("nan")  # at the touchdown
     rest_m: float = float("nan")
     is_landed: bool = False
@@ -52,10 +54,10 @@ def circuit_items() -> list[MissionItem]:
     return items
 
 
-def fly_circuit(seed: int, wind_m_s: float = 3.0, wind_from_deg: float = 270.0) -> Circuit:
+def fly_circuit(seed: int, wind_m_s: float = 3.0, wind_from_deg: float = 270.0, airframe: str = "plane") -> Circuit:
     """Flies it once, in turbulence that goes with the wind."""
     flight = Flight(
-        FlightConfig(airframe="plane", world=AIRFIELD, seed=seed, wind_m_s=wind_m_s, wind_from_deg=wind_from_deg)
+        FlightConfig(airframe=airframe, world=AIRFIELD, seed=seed, wind_m_s=wind_m_s, wind_from_deg=wind_from_deg)
     )
     out, since_s, leg = Circuit(), 0.0, -1
     try:
@@ -70,6 +72,7 @@ def fly_circuit(seed: int, wind_m_s: float = 3.0, wind_from_deg: float = 270.0) 
                 _judge(flight, out, truth, leg)
             if leg == len(CORNERS) + 1 and truth["is_on_ground"] and out.touchdown_m != out.touchdown_m:
                 out.touchdown_m = hypot(*truth["pos_ned"][:2])
+                out.along_m = float(truth["pos_ned"][:2] @ truth["vel_ned"][:2] / hypot(*truth["vel_ned"][:2]))
                 out.sink_m_s = float(truth["impact_speed"])
         out.rest_m = hypot(*flight.rig.rows["truth"][0]["pos_ned"][:2])
         out.is_landed = state.landed_state is LandedState.ON_GROUND and not flight.is_crashed
@@ -106,9 +109,14 @@ def _judge(flight: Flight, out: Circuit, truth: Any, leg: int) -> None:
 
 def main() -> None:
     """Prints the table: 95 % of the absolute errors."""
+    parser = ArgumentParser(description=main.__doc__)
+    parser.add_argument("--seeds", default="1-5", help="first and last")
+    parser.add_argument("--airframe", default="plane")
+    given = parser.parse_args()
+    first, last = map(int, given.seeds.split("-"))
     print("seed  course  cross  height  airspeed  touchdown  sink  rest  landed")
-    for seed in range(1, 6):
-        c = fly_circuit(seed)
+    for seed in range(first, last + 1):
+        c = fly_circuit(seed, airframe=given.airframe)
         parts = (np.percentile(x or [float("nan")], 95) for x in (c.course_deg, c.cross_m, c.height_m, c.airspeed_m_s))
         course, cross, height, airspeed = parts
         print(

@@ -11,15 +11,16 @@ from tempfile import TemporaryDirectory
 from bench.row import Row, require
 from common.airframe import load_airframe
 from mission.fleet.fleet_flight import FleetFlight
-from mission.fleet.roster import fleet_configs, start_of
-from mission.flight_config import TREELESS_M, FlightConfig
+from mission.fleet.fleet_options import Member
+from mission.fleet.roster import fleet_configs
+from mission.flight_config import TREELESS_M, FlightConfig, start_of
 from mission.plan.plan_file import default_plan, moved_plan, read_plan
 from mission.script import fly_plan
 from mission.simulator.flight_rig import flight_world
 from sim.world.world import WorldConfig
 
 CONFIG = FlightConfig(wind_m_s=5.0, world=WorldConfig(treeless_radius_m=TREELESS_M))  # as the command line's
-AIRFRAMES = ["x500"] * 5 + ["rover"] * 5
+MEMBERS = [Member("x500")] * 5 + [Member("rover")] * 5
 COMMAND = "python -m bench vehicles"
 RUNS = 3  # the first one loads kernels
 
@@ -34,7 +35,7 @@ def _rate() -> float:
     """Simulated seconds of the world per CPU second, until the last mission is done."""
     world = flight_world(CONFIG)
     with TemporaryDirectory() as folder:
-        fleet = FleetFlight(fleet_configs(CONFIG, AIRFRAMES, world), world, folder=Path(folder))
+        fleet = FleetFlight(fleet_configs(CONFIG, MEMBERS, world), world, folder=Path(folder))
         running = []
         for flight in fleet.flights:
             plan = read_plan(default_plan(load_airframe(flight.config.airframe).vehicle))

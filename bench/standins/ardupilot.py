@@ -22,6 +22,7 @@ _SCALAR = re.compile(_NUMBER)
 _REQUIRED = ((b"", b"timestamp", 1), (b"imu", b"gyro", 3), (b"imu", b"accel_body", 3))
 _REQUIRED_TOO = ((b"", b"position", 3), (b"", b"velocity", 3))
 _EITHER = ((b"", b"attitude", 3), (b"", b"quaternion", 4))
+_MAY_BE = (b"airspeed", b"rng_1")
 
 
 class State(NamedTuple):
@@ -33,6 +34,9 @@ class State(NamedTuple):
     position: tuple[float, ...]
     velocity: tuple[float, ...]
     quaternion: tuple[float, ...]
+    airspeed: float | None
+    """[m/s] true; None: it takes the speed over the ground."""
+    rng_1: float | None
 
 
 class Unreadable(ValueError):
@@ -52,6 +56,7 @@ def parse(datagram: bytes) -> State:
             found[key] = _look_up(text, section, key, count)
     if b"quaternion" not in found:
         raise Unreadable("quaternion")
+    may_be = (_look_up(text, b"", key, 1)[0] if key in text else None for key in _MAY_BE)
     return State(
         found[b"timestamp"][0],
         found[b"gyro"],
@@ -59,6 +64,7 @@ def parse(datagram: bytes) -> State:
         found[b"position"],
         found[b"velocity"],
         found[b"quaternion"],
+        *may_be,
     )
 
 

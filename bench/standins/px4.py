@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from pymavlink.dialects.v20 import common as mavlink
 
-ACCEL, GYRO, MAG, BARO = 0x7, 0x38, 0x1C0, 0x1A00
+ACCEL, GYRO, MAG, BARO, AIRSPEED = 0x7, 0x38, 0x1C0, 0x1A00, 0x400
 ARMED, LOCKSTEP = 128, 1
 SILENCE_S = 1.0  # of wall clock time: then it prints "poll timeout"
 ROVER_PERIOD_US = 10_000
@@ -26,6 +26,8 @@ class Px4StandIn:
         port: of the simulator.
         control: its 16 actuator controls, asked at each answer; None: zeros.
         is_rover: it answers at 100 Hz, and while armed only.
+        is_armed: else its controls are zeros.
+        system_id: the instance plus 1.
     """
 
     def __init__(
@@ -35,20 +37,22 @@ class Px4StandIn:
         *,
         is_rover: bool = False,
         is_armed: bool = True,
+        system_id: int = 1,
     ) -> None:
         self.socket = socket.create_connection(("127.0.0.1", port))
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.socket.settimeout(SILENCE_S)
-        self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._mav = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=1)
         self._mav.robust_parsing = True
         self._control = control or (lambda _: [0.0] * 16)
         self.is_rover, self.is_armed = is_rover, is_armed
         self.time_us = 0
         self._answered_us = 0
         self.sensor: mavlink.MAVLink_hil_sensor_message | None = None
+        self.pressure_pa = 0.0  # of the pitot tube
         self.gps: mavlink.MAVLink_hil_gps_message | None = None
         self.truth: mavlink.MAVLink_hil_state_quaternion_message | None = None
-        self.counts = {"sensor": 0, "mag": 0, "baro": 0, "gps": 0, "truth": 0, "answers": 0}
+        self.counts = {"sensor": 0, "mag": 0, "baro": 0, "airspeed": 0, "gps": 0, "truth": 0, "answers": 0}
         self.faults: list[str] = []
         self.timeout_count = 0
         self._last_values: dict[str, tuple[float, ...]] = {}
@@ -101,12 +105,15 @@ class Px4StandIn:
             "gyro": (GYRO, (message.xgyro, message.ygyro, message.zgyro)),
             "mag": (MAG, (message.xmag, message.ymag, message.zmag)),
             "baro": (BARO, (message.abs_pressure, message.pressure_alt)),
+            "airspeed": (AIRSPEED, (message.diff_pressure,)),
         }
         for name, (bits, values) in groups.items():
             updated = message.fields_updated & bits
             if updated not in (0, bits):
                 self.faults.append(f"{name}: half a group")
             if updated == bits:
+                if name == "airspeed":
+                    self.pressure_pa = 100.0 * message.diff_pressure  # it is in hPa
                 if name in self.counts:
                     self.counts[name] += 1
                 same = self._same.get(name, 0) + 1 if self._last_values.get(name) == values else 0

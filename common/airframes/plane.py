@@ -1,4 +1,4 @@
-"""The sections of a plane's airframe file: a wing, a tail, one propeller in front or behind, three wheels."""
+"""The sections of a plane's airframe file: wing, tail, one propeller in front or behind, three wheels or a belly."""
 
 from math import sqrt
 from typing import Annotated, Self
@@ -117,6 +117,33 @@ class Gear(Section):
     """Force over load, at most, across a wheel."""
 
 
+class Belly(Section):
+    """What a plane without wheels stands and lands on: two points of its keel."""
+
+    front_x_m: Positive
+    """Ahead of the centre of gravity."""
+    rear_x_m: Positive
+    """Behind it."""
+    depth_m: Positive
+    """Of the keel below the centre of gravity."""
+
+
+class Throw(Section):
+    """How it is thrown out of the hand, or by a catapult: accelerated evenly along its nose and a little upwards."""
+
+    speed_m_s: Positive
+    """At which it leaves the hand."""
+    elevation_rad: Annotated[float, Field(ge=0.0, lt=1.2), SOURCED]
+    stroke_s: Positive
+    """Time over which the hand accelerates it."""
+    height_m: Positive
+    """Of the hand over the ground."""
+
+    @property
+    def acceleration_m_s2(self) -> float:
+        return self.speed_m_s / self.stroke_s
+
+
 class Hull(Section):
     """What scrapes over the ground besides the wheels: wing tips, nose and tail."""
 
@@ -140,7 +167,11 @@ class PlaneAirframe(Airframe):
     side: Side
     surfaces: Surfaces
     propeller: Propeller
-    gear: Gear
+    gear: Gear | None = None
+    belly: Belly | None = None
+    """Of one without gear."""
+    throw: Throw | None = None
+    """None: it rolls on a runway."""
     hull: Hull
     jsbsim_aircraft: str = ""
     """The aircraft of JSBSim that this is, which `--engine jsbsim` moves; "": of none."""
@@ -148,6 +179,19 @@ class PlaneAirframe(Airframe):
     @property
     def aspect_ratio(self) -> float:
         return self.wing.span_m**2 / self.wing.area_m2
+
+    @property
+    def standing_height_m(self) -> float:
+        """Of the centre of gravity over level ground, without load."""
+        return self.gear.height_m if self.gear is not None else self.belly.depth_m if self.belly is not None else 0.0
+
+    @model_validator(mode="after")
+    def _stands_on_something(self) -> Self:
+        if (self.gear is None) is (self.belly is None):
+            raise ValueError("a plane has either a [gear] or a [belly]")
+        if self.gear is None and self.throw is None:
+            raise ValueError("a plane without [gear] needs a [throw]: it leaves no runway")
+        return self
 
     @model_validator(mode="after")
     def _is_stable(self) -> Self:

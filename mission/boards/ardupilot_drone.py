@@ -6,11 +6,14 @@ a board or of a network. Scripts need not know which they have.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isnan
+from math import hypot, isnan, radians
 from typing import Any
 
-from autopilot.mavlink.wire.codec import Message
-from mission.client import CommandRefused
+from autopilot.mavlink.wire.codec import Message, message_id
+from common.geodesy import ned_from_geodetic
+from mission.boards.outside_drone import OutsideDrone
+from mission.boards.plane_landing import landing_items
+from mission.client import CommandRefused, ScriptTimeout
 from mission.plan.plan_file import PlanItem
 from mission.script import (
     AUTO_LAND,
@@ -26,10 +29,10 @@ from mission.script import (
     FRAME_GLOBAL,
     MAIN_AUTO,
     MAIN_OFFBOARD,
-    Drone,
 )
 
-CMD_WAYPOINT, CMD_DO_JUMP = 16, 177
+CMD_WAYPOINT, CMD_DO_JUMP, CMD_SET_MESSAGE_INTERVAL = 16, 177, 511
+AUTO_TAKEOFF = 2
 CUSTOM_MODE = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 CHANGE_MODE = 1.0  # MAV_DO_REPOSITION_FLAGS
 # Its numbers of PX4's modes, of what flies and of what drives; its plane's
@@ -48,15 +51,21 @@ _ROVER = {
 }
 _PLANE = {
     (MAIN_OFFBOARD, 0): 15,
+    (MAIN_AUTO, AUTO_TAKEOFF): 13,
     (MAIN_AUTO, AUTO_LOITER): 12,
     (MAIN_AUTO, AUTO_MISSION): 10,
     (MAIN_AUTO, AUTO_RTL): 11,
 }
 _FIXED_WING = 1  # MAV_TYPE
+_LEVELS_OFF_M = 5.0  # below the height of a plane's take-off, that it takes its time for: guess
+_CIRCLED = 1.3  # of its circle's radius, within which a plane is where it was sent: guess
+_CIRCLED_M = 10.0  # and of height: guess
+_WIND_S, _CALM_M_S = 3.0, 1.5  # how long its estimate is waited for; a weaker wind has no direction: guess
+_LANDING_S = 600.0  # that a plane may take: it comes back first, and lands against the wind
 _POSITION, _CONSTANT_POSITION = 16 | 512, 128  # EKF_STATUS_FLAGS: horizontal, absolute, estimated or predicted; none
 
 
-class ArduPilotDrone(Drone):
+class ArduPilotDrone(OutsideDrone):
     """See `Drone`."""
 
     sends_parameters_as_floats = True
@@ -69,11 +78,15 @@ class ArduPilotDrone(Drone):
         return super().is_ready and bool(knows_place)
 
     @property
+    def is_plane(self) -> bool:
+        heartbeat = self.latest("HEARTBEAT")
+        return heartbeat is not None and bool(heartbeat.type == _FIXED_WING)
+
+    @property
     def _modes(self) -> dict[tuple[int, int], int]:
         if self.drives:
             return _ROVER
-        heartbeat = self.latest("HEARTBEAT")
-        return _PLANE if heartbeat is not None and heartbeat.type == _FIXED_WING else _COPTER
+        return _PLANE if self.is_plane else _COPTER
 
     @property
     def px4_mode(self) -> tuple[int, int]:
@@ -87,13 +100,25 @@ class ArduPilotDrone(Drone):
     async def arm(self, *, force: bool = False) -> None:
         if not self.is_armed and not self.drives:
             await self._set_mode(MAIN_OFFBOARD, 0, "guided")  # it is not armed in LAND or RTL
+        attitude = self.latest("ATTITUDE")
+        self._runway_rad = 0.0 if attitude is None else attitude.yaw
         await self.command(CMD_ARM_DISARM, 1.0, FORCE_MAGIC if force else 0.0, name="arm")
         await self.until(lambda: self.is_armed, 5.0, "armed")
 
     async def takeoff(self, height_m: float, timeout_s: float = 60.0) -> None:
+        if self.is_plane:
+            await self._run_and_climb(height_m, timeout_s)
+            return
         await self._set_mode(MAIN_OFFBOARD, 0, "guided")
         await self.command(CMD_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m, name="takeoff")
         await self.until(lambda: abs(self._height_m() - height_m) < 0.3, timeout_s, f"takeoff to {height_m:g} m")
+        await self.hold()
+
+    async def _run_and_climb(self, height_m: float, timeout_s: float) -> None:
+        """A plane's take-off, along the runway that it stands on; it circles there."""
+        await self.set_parameter("TKOFF_ALT", height_m)
+        await self._set_mode(MAIN_AUTO, AUTO_TAKEOFF, "takeoff")
+        await self.until(lambda: self._height_m() > height_m - _LEVELS_OFF_M, timeout_s, f"takeoff to {height_m:g} m")
         await self.hold()
 
     async def goto(
@@ -110,12 +135,46 @@ class ArduPilotDrone(Drone):
         params = (speed_m_s, CHANGE_MODE, 0.0, 0.0 if isnan(yaw_rad) else yaw_rad)
         place = round(lat_deg * 1e7), round(lon_deg * 1e7), alt_amsl_m
         await self.command_int(CMD_REPOSITION, FRAME_GLOBAL, params, *place, name="goto")
-        await self._until_there(lat_deg, lon_deg, alt_amsl_m, acceptance_m, timeout_s)
+        if self.is_plane:
+            await self._until_circled(lat_deg, lon_deg, alt_amsl_m, timeout_s)
+        else:
+            await self._until_there(lat_deg, lon_deg, alt_amsl_m, acceptance_m, timeout_s)
+
+    async def _until_circled(self, lat_deg: float, lon_deg: float, alt_amsl_m: float, timeout_s: float) -> None:
+        """A plane goes round the place, at its height."""
+        radius_m = abs(await self.get_parameter("WP_LOITER_RAD"))
+        north_m, east_m, down_m = ned_from_geodetic(lat_deg, lon_deg, alt_amsl_m, self.origin)
+
+        def is_there() -> bool:
+            north, east, down = self.pos_ned
+            return hypot(north - north_m, east - east_m) < _CIRCLED * radius_m and abs(down - down_m) < _CIRCLED_M
+
+        await self.until(is_there, timeout_s, "goto")
 
     async def land(self, timeout_s: float = 120.0) -> None:
+        if self.is_plane:
+            await self._land_by_mission(max(timeout_s, _LANDING_S))
+            return
         await self._set_mode(MAIN_AUTO, AUTO_LAND, "land")
         await self.wait_disarmed(timeout_s)
 
+    async def _land_by_mission(self, timeout_s: float) -> None:
+        """A plane lands where it took off, against the wind; the mission that it had is lost."""
+        await self.upload(landing_items(self.home, await self._landing_rad()))
+        await self.start_mission()
+        await self.wait_disarmed(timeout_s)
+
+    async def _landing_rad(self) -> float:
+        """Where the wind comes from, by its estimate; in a calm the direction in which it took off."""
+        await self.command(CMD_SET_MESSAGE_INTERVAL, float(message_id("WIND")), 1e6, name="wind")
+        try:
+            await self.until(lambda: self.latest("WIND") is not None, _WIND_S, "wind")
+        except ScriptTimeout:
+            return self._runway_rad
+        wind = self.latest("WIND")
+        return radians(wind.direction) if wind.speed > _CALM_M_S else self._runway_rad
+
+    _runway_rad = 0.0  # its heading when it was armed
     _farthest = 0  # item that it has gone for, since its mission began
     _stale: Any = None  # of the mission before
 

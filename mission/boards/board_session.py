@@ -4,18 +4,19 @@ Ports and folder are opened before the program is started, and it is ended with 
 """
 
 from contextlib import ExitStack, closing
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from rich.console import Console
 
-from autopilot.mavlink.transport.links import LinkSource
-from common.airframe import load_airframe
-from common.geodesy import GeoPoint
+from autopilot.mavlink.transport.links import LinkError, LinkSource
+from mission.boards.board_options import check_board, commands_of
 from mission.boards.process import PeerProcess
+from mission.boards.watch import Watch, filled_in
 from mission.connections import open_images, open_links, open_page
 from mission.console.option_checks import UserError
-from mission.console.terminal import loading, print_line
+from mission.console.terminal import Say, loading, print_line
 from mission.flight_config import FlightConfig
 from mission.flight_options import flight_config
 from mission.flight_settings import FlightOptions
@@ -25,85 +26,69 @@ from sim.boards.outside import PeerError
 
 if TYPE_CHECKING:
     from mission.boards.board_flight import BoardFlight
+    from mission.flight_base import FlightBase
 
-PATIENCE_S = 120.0  # of wall clock time, that an autopilot may be silent
-REPORTED_S = 2.0  # of silence, after which it is said what is waited for
 PACE_MAX = 20.0  # guess: how much faster than real time a flight in lockstep is at most, for time-outs of links
-FLOWN = {"ardupilot": ("multirotor", "rover"), "px4": ("multirotor",)}
-FAST = ("ardupilot", "multirotor")
-"""Classes of airframes that each flies here, and who exchanges each millisecond."""
-_OURS_ALONE = {
-    "dialect": "--dialect", "announces_components": "--announce-components", "traffic_count": "--traffic",
-    "has_lidar": "--lidar", "has_base": "--rtk", "stream_port": "--stream-port", "video_port": "--video-port",
-    "state": "--state", "has_to_sign": "--require-signing",
-}  # fmt: skip
 
 
-def check_board(options: FlightOptions) -> None:
-    """Refuses options that only our own flight controller has, or that its place leaves without meaning.
+class BoardRun(Protocol):
+    """The program of others that flies one of several vehicles."""
 
-    Raises:
-        UserError: there is one.
-    """
-    for name, flag in _OURS_ALONE.items():
-        if getattr(options, name) != FlightOptions.model_fields[name].default:
-            raise UserError(f"{flag} and --board {options.board}: choose one; the first is our own flight controller's")
-    vehicle = load_airframe(options.airframe).vehicle
-    if vehicle not in FLOWN[options.board]:
-        raise UserError(f"--board {options.board}: it flies no {vehicle} here")
-    if (options.board, vehicle) == FAST and options.engine != "native":
-        raise UserError(f"--board {options.board} and --engine {options.engine}: only the native one gives it 1,000 Hz")
-    if options.board == "px4" and options.noise == 0.0:
-        raise UserError("--noise 0 and --board px4: it takes sensors that never change for broken; use --noise 0.1")
+    is_ours: bool
+    """Our own flight controller flies by it, and takes what that takes."""
 
+    def make_flight(self, config: FlightConfig, **parts: Any) -> "FlightBase":
+        """The flight, with its port open; of `parts` there are `links`, `folder`, `world`, and what is ours alone.
 
-class Watch:
-    """Looks after the program while the flight goes on, and while it waits.
+        Raises:
+            UserError: the port is taken, or it cannot fly such a vehicle.
+        """
 
-    Args:
-        name: of the autopilot.
-        console: where its console is shown.
-    """
+    def launch(self, flight: "FlightBase") -> None:
+        """Starts the program, if we are to; it ends with the flight.
 
-    def __init__(self, name: str, console: Console) -> None:
-        self._name, self._console = name, console
-        self.hint = ""  # what it has to do to be heard
-        self.process: PeerProcess | None = None
-        self._is_reported = False
-
-    def __call__(self, silent_s: float) -> None:
-        if self.process is not None:
-            for line in self.process.lines():
-                print_line(self._console, f"{self._name} | {line}")
-            self.process.check()
-        if silent_s < REPORTED_S:
-            self._is_reported = self._is_reported and silent_s > 0.0
-        elif not self._is_reported:
-            self._is_reported = True
-            print_line(self._console, f"waiting for {self._name}: {self.hint}")
-        if silent_s > PATIENCE_S:
-            raise PeerError(f"{self._name} has been silent for {PATIENCE_S:g} s: {self.hint}")
-
-    def close(self) -> None:
-        if self.process is not None:
-            self.process.close()
+        Raises:
+            UserError: it cannot be started.
+        """
 
 
 class PeerRun:
     """An outside autopilot for the length of a flight.
 
     Args:
-        options: of the flight.
-        folder: of the run.
-        console: where its console is shown.
+        board: which.
+        command: starts it; None: whoever else does.
+        folder: of the flight, in which it gets one of its own.
+        say: shows a line of its console, or about it.
+        instance: its number.
+        whose: what else is to be said where there are several.
+        shows_console: its console is shown.
     """
 
-    def __init__(self, options: FlightOptions, folder: Path, console: Console) -> None:
+    is_ours = False
+
+    def __init__(
+        self,
+        board: str,
+        command: str | None,
+        folder: Path,
+        say: Say,
+        *,
+        instance: int = 0,
+        whose: str = "",
+        shows_console: bool = True,
+    ) -> None:
         from mission.boards.peers import PEERS
 
-        self._options, self._folder = options, folder
-        self._peer = PEERS[options.board]
-        self._watch = Watch(self._peer.name, console)
+        self._command, self._folder, self._instance = command, folder / board, instance
+        self._peer = PEERS[board]
+        self._watch = Watch(self._peer.name + whose, say, shows_console=shows_console)
+
+    @classmethod
+    def of(cls, options: FlightOptions, folder: Path, console: Console) -> Self:
+        """That of a single flight."""
+        command = commands_of(options.command, [options.board]).get(options.board)
+        return cls(options.board, command, folder, partial(print_line, console), instance=options.instance)
 
     def make_flight(self, config: FlightConfig, **parts: Any) -> "BoardFlight":
         """The flight, with its port open; `parts` as of `BoardFlight`.
@@ -114,30 +99,37 @@ class PeerRun:
         from mission.boards.board_flight import BoardFlight
 
         try:
-            flight = BoardFlight(config, self._peer, self._watch, instance=self._options.instance, **parts)
+            flight = BoardFlight(config, self._peer, self._watch, instance=self._instance, **parts)
             flight.on_close = self.close
-        except (PeerError, ValueError) as error:
+        except (PeerError, LinkError, ValueError) as error:
             raise UserError(str(error)) from error
-        self._watch.hint = self._peer.waits_for.format(port=flight.board.local_port)
+        model = self._peer.model(flight.airframe)
+        self._watch.hint = self._peer.waits_for.format(port=flight.board.local_port, model=model)
         return flight
 
-    def start(self, flight: "BoardFlight") -> None:
+    def start(self, flight: "FlightBase") -> None:
+        """As `launch`, but closes the flight if there is none."""
+        try:
+            self.launch(flight)
+        except UserError:
+            flight.close()
+            raise
+
+    def launch(self, flight: "FlightBase") -> None:
         """Writes what the autopilot is told of the vehicle, and starts its program if there is a command.
 
         Raises:
-            UserError: it cannot be started; the flight is closed.
+            UserError: it cannot be started.
         """
-        config = flight.config
-        own, command = self._folder / self._options.board, self._options.command
-        own.mkdir(exist_ok=True)
-        environment = self._peer.prepare(config, load_airframe(config.airframe), own, self._options.instance)
-        if command is not None:
-            command = filled_in(command, own, config.home, self._options.instance)
-            try:
+        own, instance = self._folder, self._instance
+        own.mkdir(parents=True, exist_ok=True)
+        try:
+            environment = self._peer.prepare(flight.config, flight.airframe, own, instance)
+            if self._command is not None:
+                command = filled_in(self._command, own, flight.config, instance)
                 self._watch.process = PeerProcess(command, own, environment, own / "console.log")
-            except PeerError as error:
-                flight.close()
-                raise UserError(str(error)) from error
+        except (PeerError, ValueError) as error:
+            raise UserError(str(error)) from error
 
     def close(self) -> None:
         self._watch.close()
@@ -152,6 +144,7 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
     check_board(options)
     console = Console()
     config = flight_config(options, None)
+    check_ports(options.board, options.instance)
     links = station_links(options, speed)
     images = open_images(options)
     page = open_page(options.view_port) if options.has_view else None
@@ -166,7 +159,7 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
 
         load_kernels(say, config, has_camera=page is not None)
         say("building the world")
-        run = held.enter_context(closing(PeerRun(options, folder, console)))
+        run = held.enter_context(closing(PeerRun.of(options, folder, console)))
         flight = run.make_flight(config, links=links, folder=folder)
     if images is not None and flight.onboard is not None:
         flight.onboard.add_sink(images.publish)
@@ -179,19 +172,23 @@ def fly_board(options: FlightOptions, speed: float | None, plan: Plan | None, he
     return fly_to_the_end(flight, plan, options, speed, page, folder, console)
 
 
+def check_ports(board: str, instance: int) -> None:
+    """Refuses an instance one of whose ports is taken.
+
+    Raises:
+        UserError: of such.
+    """
+    from mission.boards.peers import PEERS
+
+    try:
+        PEERS[board].check_ports(instance)
+    except LinkError as error:
+        trouble = str(error).removeprefix("MAVLink: ").rstrip(".")
+        raise UserError(
+            f"{PEERS[board].name}, instance {instance}: {trouble}; another flight may be running"
+        ) from error
+
+
 def station_links(options: FlightOptions, speed: float | None) -> list[LinkSource]:
     """For ground stations and companions, of an autopilot that does not speak to them itself."""
     return [] if options.board == "px4" else open_links(options, speed or PACE_MAX, options.instance)
-
-
-def filled_in(command: str, folder: Path, home: GeoPoint, instance: int) -> str:
-    """A command with its names filled in."""
-    values = {
-        "folder": str(folder),
-        "params": str(folder / "vehicle.parm"),
-        "home": f"{home.lat_deg:.7f},{home.lon_deg:.7f},{home.alt_m:.2f},0",
-        "instance": str(instance),
-    }
-    for name, value in values.items():
-        command = command.replace(f"{{{name}}}", value)
-    return command

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from autopilot.interface.aircraft import Aircraft
 from autopilot.interface.vehicle_state import LandedState, Mode, Severity, VehicleState
 from autopilot.mavlink.dialects import Dialect, UnknownModeError
+from autopilot.mavlink.wire.adsb_messages import fields_of
 from autopilot.mavlink.wire.codec import message_id
 from autopilot.mavlink.wire.convert import UINT16_MAX, degrees_from_e7
 from autopilot.vehicles.vehicle_class import VehicleClass
@@ -85,6 +87,14 @@ class OutsideController:
     def commander(self) -> "OutsideController":
         return self
 
+    @property
+    def traffic(self) -> "OutsideController":
+        return self
+
+    def report(self, aircraft: Aircraft) -> None:
+        """A receiver on board has heard another aircraft."""
+        self._drone.send("ADSB_VEHICLE", **fields_of(aircraft))
+
     def check_arming(self) -> Sequence[str]:
         """Why it cannot be armed; it says so itself when it is asked to."""
         return () if self.state.is_ready_to_arm else ("the autopilot does not say that it is ready",)
@@ -130,7 +140,7 @@ class OutsideController:
             self.state.roll_rad, self.state.pitch_rad, self.state.yaw_rad = attitude.roll, attitude.pitch, attitude.yaw
         elif not np.any(estimate["q_ned_from_frd"]):
             estimate["q_ned_from_frd"][3] = 1.0
-        if place is not None:
+        if place is not None and (place.lat or place.lon):  # 0, 0: it has no place yet
             lat_deg, lon_deg = degrees_from_e7(place.lat), degrees_from_e7(place.lon)
             estimate["pos_ned"] = ned_from_geodetic(lat_deg, lon_deg, _MILLI * place.alt, self._home)
             estimate["vel_ned"] = (_CENTI * place.vx, _CENTI * place.vy, _CENTI * place.vz)
@@ -138,6 +148,9 @@ class OutsideController:
 
     def _read_state(self, time_us: int) -> None:
         state, drone = self.state, self._drone
+        if drone.lost:
+            state.is_armed = state.is_ready_to_arm = False
+            return
         heartbeat, status, mission = (drone.latest(name) for name in ("HEARTBEAT", "SYS_STATUS", "MISSION_CURRENT"))
         if heartbeat is not None:
             is_armed = bool(heartbeat.base_mode & _ARMED)

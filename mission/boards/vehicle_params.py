@@ -1,13 +1,37 @@
-"""What an outside autopilot has to know of our vehicle: its own parameters, from the airframe file."""
+"""What ArduPilot has to know of our vehicle: its own parameters, from the airframe file."""
+
+from collections.abc import Mapping
 
 from common.airframe import Airframe
 from common.airframes.multirotor import MultirotorAirframe
+from common.airframes.plane import PlaneAirframe
 from common.airframes.rover import RoverAirframe
 from common.geodesy import GRAVITY_M_S2
+from mission.boards.ardupilot_plane import plane_params
 
 _FRAMES = {4: 1, 6: 2, 8: 3}  # ArduPilot's FRAME_CLASS by the number of motors
 _FRAME_X = 1
 _CRUISE_M_S = 2.0  # guess: half of what a rover of ours does on rough ground
+
+
+IDS = ("MAV_SYSID", "SYSID_THISMAV", "MAV_SYS_ID")
+"""Names of a vehicle's number: ArduPilot's since 4.7 and before, and PX4's."""
+
+
+def check_id_free(parameters: Mapping[str, float]) -> None:
+    """Refuses a number of the vehicle that is not its instance's: nobody would hear it.
+
+    Raises:
+        ValueError: one is given.
+    """
+    for name in IDS:
+        if name in parameters:
+            raise ValueError(f"--param {name}: the number of the vehicle follows from its instance, leave it out")
+
+
+def value_text(value: float) -> str:
+    """As a program reads it: all digits of an integer, and of what single precision holds."""
+    return f"{int(value)}" if value == int(value) else f"{value:.9g}"
 
 
 def ardupilot_params(airframe: Airframe) -> dict[str, float]:
@@ -19,6 +43,8 @@ def ardupilot_params(airframe: Airframe) -> dict[str, float]:
         return quiet | downward | _ardupilot_copter(airframe)
     if isinstance(airframe, RoverAirframe):
         return quiet | _ardupilot_rover(airframe)
+    if isinstance(airframe, PlaneAirframe):
+        return quiet | downward | plane_params(airframe)
     return quiet
 
 
@@ -29,10 +55,10 @@ def _ardupilot_copter(airframe: MultirotorAirframe) -> dict[str, float]:
     return {
         "FRAME_CLASS": float(_FRAMES[len(airframe.rotors)]),
         "FRAME_TYPE": float(_FRAME_X),
-        "MOT_THST_EXPO": _curve(airframe),
+        "MOT_THST_EXPO": thrust_curve(airframe),
         "MOT_SPIN_MIN": idle,
         "MOT_SPIN_ARM": 0.7 * idle,
-        "MOT_THST_HOVER": _hover_fraction(airframe),
+        "MOT_THST_HOVER": hover_fraction(airframe),
         "AUTO_OPTIONS": 3.0,  # armed in AUTO, and off the ground without a throttle stick: there is none
         # Velocities of a companion are followed as such and quickly, as our own controller does
         "GUID_OPTIONS": 16.0,  # no position is held that they would lead to
@@ -49,28 +75,12 @@ def _ardupilot_rover(airframe: RoverAirframe) -> dict[str, float]:
     return params
 
 
-def px4_params(airframe: Airframe) -> dict[str, float]:
-    """By PX4's names."""
-    if not isinstance(airframe, MultirotorAirframe):
-        return {}
-    params: dict[str, float] = {
-        "CA_ROTOR_COUNT": float(len(airframe.rotors)),
-        "THR_MDL_FAC": _curve(airframe),
-        "MPC_THR_HOVER": _hover_fraction(airframe),
-    }
-    for k, rotor in enumerate(airframe.rotors):
-        params[f"CA_ROTOR{k}_PX"], params[f"CA_ROTOR{k}_PY"] = rotor.x_m, rotor.y_m
-        params[f"CA_ROTOR{k}_KM"] = 0.05 * rotor.spin  # PX4's default size
-        params[f"PWM_MAIN_FUNC{k + 1}"] = 101.0 + k
-    return params
-
-
-def _curve(airframe: MultirotorAirframe) -> float:
+def thrust_curve(airframe: MultirotorAirframe) -> float:
     """Of thrust over command: 0 linear, 1 quadratic, as both of them count it."""
     return float(airframe.rotor_model.command_curve)
 
 
-def _hover_fraction(airframe: MultirotorAirframe) -> float:
+def hover_fraction(airframe: MultirotorAirframe) -> float:
     """Thrust in hover over the largest."""
     rotors = airframe.rotor_model
     largest_n = len(airframe.rotors) * rotors.thrust_n_s2 * rotors.max_speed_rad_s**2

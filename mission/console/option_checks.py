@@ -11,7 +11,7 @@ from common.airframes.multirotor import MultirotorAirframe
 from common.airframes.plane import PlaneAirframe
 from common.airframes.rover import RoverAirframe
 from common.geodesy import DEFAULT_HOME, GeoPoint
-from mission.flight_settings import FlightOptions, Pace
+from mission.flight_settings import FlightOptions, FlightSettings, Pace
 from mission.plan.plan_file import PlanError, read_plan
 
 HOME_MOST = (89.0, 180.0, 6000.0)  # latitude and longitude [deg], altitude [m]: highest airfields
@@ -90,7 +90,7 @@ def check_vehicle(options: FlightOptions) -> None:
     check_engine(options, airframe)
 
 
-def check_engine(options: FlightOptions, airframe: Airframe) -> None:
+def check_engine(options: FlightSettings, airframe: Airframe) -> None:
     """Refuses an engine that does not move the airframe, or is not installed."""
     aircraft = airframe.jsbsim_aircraft if isinstance(airframe, PlaneAirframe) else ""
     if options.engine == "native":

@@ -13,18 +13,22 @@ script gives the same flights. Over UDP the vehicles are another process's, on t
 """
 
 import asyncio
-from collections.abc import Callable, Coroutine, Iterator, Sequence
-from contextlib import suppress
+import sys
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
 from autopilot.mavlink.transport.links import LinkError, LinkRole, UdpLink
 from common.clock import Pacer
+from mission.boards.board_options import commands_of
 from mission.client import ScriptError
 from mission.connections import API_PORT_STEP, API_PORTS
+from mission.fleet.fleet_boards import board_runs
 from mission.fleet.fleet_flight import FleetFlight
-from mission.fleet.fleet_options import airframes_of
+from mission.fleet.fleet_options import boards_of, check_members, members_of
 from mission.fleet.roster import SPACING_M, fleet_configs
 from mission.flight_config import FlightConfig
 from mission.over_udp import POLL_US, SILENCE_S, RemoteVehicle
@@ -50,13 +54,17 @@ class Fleet:
     """Several vehicles, each a `Drone`; an asynchronous context manager, inside which time passes.
 
     Args:
-        vehicles: `AIRFRAME:NUMBER,...`, or how many there are of the configuration's airframe; simulated in lockstep.
+        vehicles: `AIRFRAME[@BOARD]:NUMBER,...`, or how many there are of the configuration's airframe; simulated in
+            lockstep.
         config: what the flights have in common.
         spacing_m: how far apart they boot.
         folder: where their logs are written; None writes nothing.
+        has_transponders: they hear each other by ADS-B.
+        commands: what starts the program of others that flies some of them, as `--command`; of several kinds by their
+            names. None: they are waited for.
 
     Raises:
-        UserError: there are no such vehicles, or no room for them.
+        UserError: there are no such vehicles, no room for them, or no program for them.
     """
 
     def __init__(
@@ -66,11 +74,24 @@ class Fleet:
         *,
         spacing_m: float = SPACING_M,
         folder: Path | None = None,
+        has_transponders: bool = False,
+        commands: str | Mapping[str, str] | None = None,
     ) -> None:
         config = config or FlightConfig()
-        world = flight_world(config)
-        configs = fleet_configs(config, airframes_of(str(vehicles), config.airframe), world, spacing_m)
-        self._vehicles: Vehicles = Simulated(FleetFlight(configs, world, folder=folder))
+        members = members_of(str(vehicles), config.airframe)
+        check_members(config, members)
+        started = commands_of(_by_board(commands), boards_of(members))
+        with ExitStack() as held:
+            run = folder or Path(held.enter_context(TemporaryDirectory()))
+            world = flight_world(config)
+            flights = FleetFlight(
+                fleet_configs(config, members, world, spacing_m),
+                world,
+                boards=board_runs(members, started, run, _say, shows_consoles=False),
+                folder=folder,
+                has_transponders=has_transponders,
+            )
+            self._vehicles: Vehicles = Simulated(flights, held.pop_all())
 
     @classmethod
     def over_udp(
@@ -158,15 +179,28 @@ class Fleet:
             self._script.cancel()
 
 
+def _by_board(commands: str | Mapping[str, str] | None) -> list[str]:
+    """As `--command` says it."""
+    if isinstance(commands, str):
+        return [commands]
+    return [f"{board}={command}" for board, command in (commands or {}).items()]
+
+
+def _say(text: str) -> None:
+    """Whom a script waits for; their consoles are in the folder."""
+    print(text, file=sys.stderr)
+
+
 class Simulated:
     """Vehicles in this process.
 
     Args:
         flights: which.
+        held: what is closed after them.
     """
 
-    def __init__(self, flights: FleetFlight) -> None:
-        self.flights = flights
+    def __init__(self, flights: FleetFlight, held: ExitStack) -> None:
+        self.flights, self._held = flights, held
         self.drones: Sequence[Drone] = [flight.drone for flight in flights.flights]
 
     def frame(self) -> None:
@@ -175,7 +209,8 @@ class Simulated:
 
     def close(self) -> None:
         """Completes their logs."""
-        self.flights.close()
+        with self._held:
+            self.flights.close()
 
 
 class Remote:

@@ -4,7 +4,9 @@ Light to import: a port that is taken is told before anything heavy is loaded.
 """
 
 import json
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,20 +16,24 @@ from autopilot.mavlink.transport.links import LinkSource
 from common.airframe import load_airframe
 from common.files import write_whole
 from common.params import ParameterError
+from mission.boards.board_options import commands_of
+from mission.boards.board_session import check_ports, station_links
 from mission.connections import open_links, open_page, signing_config
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import Say, loading, print_line
-from mission.fleet.fleet_options import airframes_of
-from mission.fleet.roster import check_fleet_parameters, fleet_configs, start_of
+from mission.fleet.fleet_boards import board_runs
+from mission.fleet.fleet_options import Member, boards_of, members_of
+from mission.fleet.roster import check_fleet_parameters, fleet_configs
+from mission.flight_config import start_of
 from mission.flight_options import flight_config
-from mission.flight_settings import FlightOptions
+from mission.flight_settings import OURS, FlightOptions
 from mission.plan.plan_file import Plan, PlanError, default_plan, moved_plan, read_plan
 from mission.run_folder import OwnFiles, run_folder
 
 if TYPE_CHECKING:
     from mission.client import Running
     from mission.fleet.fleet_flight import FleetFlight
-    from mission.flight import Flight
+    from mission.flight_base import FlightBase
     from mission.flight_config import FlightConfig
     from mission.log.flight_recorder import History
     from mission.log.flight_summary import Summary
@@ -43,66 +49,76 @@ def fly_fleet(options: FlightOptions) -> int:
         UserError: an option, file, port or folder is wrong; nothing has been written.
     """
     speed, console = speed_of(options.speed), Console()
-    airframes = airframes_of(options.vehicles or "1", options.airframe)
-    base = flight_config(options.model_copy(update={"airframe": _needing_most(airframes)}), None)
+    members = members_of(options.vehicles or "1", options.airframe, options.board)
+    base = flight_config(options.model_copy(update={"airframe": _needing_most(members)}), None)
     try:
-        check_fleet_parameters(base, airframes)
+        check_fleet_parameters(base, members)
     except ParameterError as error:
         raise UserError(str(error)) from error
-    links = [] if speed is None else _open_all(options, speed, len(airframes))
-    page = open_page(options.view_port) if options.has_view else None
-    with loading(console) as say:
-        world, configs = _place(options, base, airframes, say)
-    with run_folder(options.run_folder) as folder:
+    with ExitStack() as opened:  # what is open closes if it does not come to the flight, which then closes it itself
+        links = _open_all(options, speed, members, opened)
+        page = open_page(options.view_port) if options.has_view else None
         with loading(console) as say:
-            fleet = _make_fleet(options, world, configs, links, speed, folder, say)
+            world, configs = _place(options, base, members, say)
+        folder = opened.enter_context(run_folder(options.run_folder))
+        with loading(console) as say:
+            fleet = _make_fleet(options, members, world, configs, links, speed, folder, say, console)
         from mission.fleet.fleet_table import print_start
 
-        print_start(fleet, options, speed, folder, console)
+        print_start(fleet, members, options, speed, folder, console)
         if page is not None:
             print_line(console, f"live page: {page.url}")
         return _fly(fleet, options, speed, page, folder, console)
 
 
-def _open_all(options: FlightOptions, speed: float, count: int) -> list[list[LinkSource]]:
-    """The ports of each vehicle; none is left open if one cannot be."""
-    opened: list[list[LinkSource]] = []
-    try:
-        opened.extend(open_links(options, speed, i) for i in range(count))
-    except UserError:
-        for links in opened:
-            for link in links:
-                link.close()
-        raise
-    return opened
+def _open_all(
+    options: FlightOptions, speed: float | None, members: list[Member], opened: ExitStack
+) -> list[list[LinkSource]]:
+    """The ports of each vehicle; those of programs of others are looked at only, until they are needed."""
+    links: list[list[LinkSource]] = []
+    for i, member in enumerate(members):
+        own: list[LinkSource] = []
+        if member.board not in OURS:
+            check_ports(member.board, i)
+            alone = {"board": member.board, "instance": i, "tcp_port": None}  # it has TCP ports of its own there
+            own = station_links(options.model_copy(update=alone), speed)
+        elif speed is not None:
+            own = open_links(options, speed, i)
+        for link in own:
+            opened.callback(link.close)
+        links.append(own)
+    return links
 
 
-def _needing_most(airframes: list[str]) -> str:
+def _needing_most(members: list[Member]) -> str:
     """Of several airframes, the one that the world is made for: the first that needs a runway, if there is one."""
     from sim.bodies.vehicles import class_of
 
+    airframes = [member.airframe for member in members]
     return next((name for name in airframes if class_of(load_airframe(name)).needs_runway), airframes[0])
 
 
 def _place(
-    options: FlightOptions, base: "FlightConfig", airframes: list[str], say: Say
+    options: FlightOptions, base: "FlightConfig", members: list[Member], say: Say
 ) -> tuple["WorldMap", list["FlightConfig"]]:
     """The world, and the configuration of each vehicle, which knows its place in it."""
     from mission.simulator.flight_rig import flight_world
 
     say("building the world")
     world = flight_world(base)
-    return world, fleet_configs(base, airframes, world, options.spacing_m)
+    return world, fleet_configs(base, members, world, options.spacing_m)
 
 
 def _make_fleet(
     options: FlightOptions,
+    members: list[Member],
     world: "WorldMap",
     configs: list["FlightConfig"],
     links: list[list[LinkSource]],
     speed: float | None,
     folder: Path,
     say: Say,
+    console: Console,
 ) -> "FleetFlight":
     """The vehicles, their kernels loaded."""
     from mission.fleet.fleet_flight import FleetFlight
@@ -111,9 +127,11 @@ def _make_fleet(
     has_camera = speed is not None or options.has_view
     for config in {config.airframe: config for config in configs}.values():
         load_kernels(say, config, has_camera=has_camera)
+    commands = commands_of(options.command, boards_of(members))
     return FleetFlight(
         configs,
         world,
+        boards=board_runs(members, commands, folder, partial(print_line, console)),
         links=links,
         signing=[signing_config(options, speed, None) for _ in configs],
         folder=folder,
@@ -140,7 +158,7 @@ def _plan(options: FlightOptions, config: "FlightConfig") -> Plan:
 class _Vehicle:
     """One vehicle, what it is to fly, and the script that flies it."""
 
-    flight: "Flight"
+    flight: "FlightBase"
     plan: Plan | None
     path_ned: list[tuple[int, Any]]
     running: "Running | None"
@@ -193,7 +211,8 @@ def _fly(
         view.close()
     print_end(fleet, summaries, folder, console)
     has_succeeded = len(summaries) == len(vehicles) and all(summary.is_success for summary in summaries)
-    return 0 if (has_succeeded or options.is_idle) and is_whole else 1
+    is_lost = any(flight.end_reason for flight in fleet.flights)
+    return 0 if (has_succeeded or (options.is_idle and not is_lost)) and is_whole else 1
 
 
 def _view(fleet: "FleetFlight", page: "PageServer", speed: float | None, path_ned: list[Any]) -> "LiveView":

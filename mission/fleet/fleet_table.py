@@ -8,18 +8,28 @@ from rich.console import Console
 from rich.table import Table
 
 from common.clock import wall_time_s
+from mission.boards.peers import PEERS
 from mission.connections import API_PORT_STEP, GROUND_PORT_STEP, TCP_PORT_STEP, api_port_of
 from mission.console.terminal import print_line
 from mission.fleet.fleet_flight import FleetFlight
+from mission.fleet.fleet_options import Member
 from mission.flight_settings import FlightOptions
 from mission.log.flight_summary import Summary
 
 
 def print_start(
-    fleet: FleetFlight, options: FlightOptions, speed: float | None, folder: Path, console: Console
+    fleet: FleetFlight,
+    members: Sequence[Member],
+    options: FlightOptions,
+    speed: float | None,
+    folder: Path,
+    console: Console,
 ) -> None:
     """Which vehicles there are, where they stand, and their ports."""
     table = Table("id", "airframe", "north, east", title="vehicles", title_justify="left")
+    has_boards = any(member.board != "own" for member in members)
+    if has_boards:
+        table.add_column("flown by, at")
     if speed is not None:
         table.add_column("ground station, from")
         table.add_column("offboard API, from")
@@ -28,6 +38,8 @@ def print_start(
     for i, flight in enumerate(fleet.flights):
         north, east = flight.config.start_ne_m
         row = [str(flight.drone.system_id), flight.airframe.name, f"{north:g}, {east:g} m"]
+        if has_boards:
+            row.append(_flown_by(members[i], i))
         if speed is not None:
             row.append(f"UDP {options.gcs_port}, {options.gcs_port + GROUND_PORT_STEP + i}")
             row.append(f"UDP {api_port_of(options, i)}, {options.api_port + API_PORT_STEP + i}")
@@ -36,8 +48,18 @@ def print_start(
         table.add_row(*row)
     console.print(table)
     if speed is None:
-        print_line(console, "flying: lockstep, without network links")
+        whose = ", our own" if has_boards else ","
+        print_line(console, f"flying: lockstep{whose} without network links")
     print_line(console, f"logs: {folder}")
+
+
+def _flown_by(member: Member, i_vehicle: int) -> str:
+    if member.board == "own":
+        return "own"
+    if member.board == "betaflight":
+        return "own by Betaflight"
+    peer = PEERS[member.board]
+    return f"{peer.name}, {peer.protocol} {peer.port_of(i_vehicle)}"
 
 
 class FleetProgress:
@@ -91,7 +113,7 @@ class FleetProgress:
             table.add_row(
                 str(flight.drone.system_id),
                 flight.airframe.name,
-                "crashed" if flight.is_crashed else state.mode.name,
+                "lost" if flight.end_reason else "crashed" if flight.is_crashed else state.mode.name,
                 "yes" if state.is_armed else "no",
                 f"{min(state.mission_current + 1, count)} of {count}" if count else "none",
                 f"{north:.1f}",

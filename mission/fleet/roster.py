@@ -1,6 +1,6 @@
 """Where the vehicles of a fleet boot, and the configuration of each.
 
-In: their airframes, a base configuration, the world. Out: one `FlightConfig` per vehicle, with which it
+In: which they are, a base configuration, the world. Out: one `FlightConfig` per vehicle, with which it
 flies the same alone: numbered from 1 in MAV_SYS_ID, a seed of its own, side by side from home on.
 """
 
@@ -8,10 +8,11 @@ from collections.abc import Iterator, Sequence
 
 from autopilot.mavlink.server import SYSID_PARAMETER
 from common.airframe import load_airframe
-from common.geodesy import GeoPoint, geodetic_from_ned
 from common.params import ParameterError
 from mission.console.option_checks import UserError
+from mission.fleet.fleet_options import Member
 from mission.flight_config import FlightConfig, flight_parameters
+from mission.flight_settings import OURS
 from sim.world.world import WorldMap
 
 SPACING_M = 10.0  # less, and rovers on the default mission run over who has landed
@@ -22,13 +23,13 @@ _RINGS_MAX = 100
 
 
 def fleet_configs(
-    base: FlightConfig, airframes: Sequence[str], world: WorldMap, spacing_m: float = SPACING_M
+    base: FlightConfig, members: Sequence[Member], world: WorldMap, spacing_m: float = SPACING_M
 ) -> list[FlightConfig]:
     """The configuration of each vehicle of a fleet.
 
     Args:
         base: what they have in common; the first boots at its home.
-        airframes: of each.
+        members: which they are.
         world: the ground.
         spacing_m: between neighbours.
 
@@ -36,45 +37,48 @@ def fleet_configs(
         UserError: there is no room for so many.
         ParameterError, AirframeError: as of any flight.
     """
-    places = free_places(world, len(airframes), spacing_m)
+    places = free_places(world, len(members), spacing_m)
     return [
         base.model_copy(
             update={
-                "airframe": airframe,
+                "airframe": member.airframe,
                 "seed": (base.seed + i) % (SEED_MAX + 1),
                 "start_ne_m": place,
-                "parameters": _own_parameters(base, airframe) | {SYSID_PARAMETER: float(i + 1)},
+                "parameters": _own_parameters(base, member, i + 1),
             }
         )
-        for i, (airframe, place) in enumerate(zip(airframes, places, strict=True))
+        for i, (member, place) in enumerate(zip(members, places, strict=True))
     ]
 
 
-def check_fleet_parameters(base: FlightConfig, airframes: Sequence[str]) -> None:
-    """Refuses parameters that no vehicle of a fleet has, or values that they cannot have.
+def check_fleet_parameters(base: FlightConfig, members: Sequence[Member]) -> None:
+    """Refuses parameters that no vehicle of a fleet has, or values that they cannot have; others' are theirs to judge.
 
     Raises:
         ParameterError: of the first such.
     """
     known: set[str] = set()
-    for airframe in dict.fromkeys(airframes):
-        own = _own_parameters(base, airframe)
-        flight_parameters(base.model_copy(update={"parameters": own}), load_airframe(airframe))
+    for member in dict.fromkeys(members):
+        own = _own_parameters(base, member, 1)
+        if member.board in OURS:
+            flight_parameters(base.model_copy(update={"parameters": own}), load_airframe(member.airframe))
         known |= own.keys()
     unknown = {name: value for name, value in base.parameters.items() if name not in known}
-    flight_parameters(base.model_copy(update={"parameters": unknown}), load_airframe(airframes[0]))
+    flight_parameters(base.model_copy(update={"parameters": unknown}), load_airframe(members[0].airframe))
 
 
-def _own_parameters(base: FlightConfig, airframe: str) -> dict[str, float]:
-    """Those of the given ones that a vehicle has.
+def _own_parameters(base: FlightConfig, member: Member, number: int) -> dict[str, float]:
+    """Those of the given ones that a vehicle has, and its number; another program's are all, it knows its number.
 
     Raises:
         ParameterError: the number of the vehicle is one of them.
     """
     if SYSID_PARAMETER in base.parameters:
         raise ParameterError(f"{SYSID_PARAMETER}: several vehicles are numbered from 1, leave it out")
-    has = flight_parameters(base.model_copy(update={"parameters": {}}), load_airframe(airframe))
-    return {name: value for name, value in base.parameters.items() if name in has}
+    if member.board not in OURS:
+        return base.parameters
+    has = flight_parameters(base.model_copy(update={"parameters": {}}), load_airframe(member.airframe))
+    return {name: value for name, value in base.parameters.items() if name in has} | {SYSID_PARAMETER: float(number)}
 
 
 def free_places(world: WorldMap, count: int, spacing_m: float) -> list[tuple[float, float]]:
@@ -105,9 +109,3 @@ def _grid(spacing_m: float, half_size_m: float) -> Iterator[tuple[float, float]]
         around = [(i, j) for i in steps for j in steps if max(abs(i), abs(j)) == ring]
         for i, j in sorted(around, key=lambda at: (at[0] ** 2 + at[1] ** 2, -at[1], at[0])):
             yield i * spacing_m, j * spacing_m
-
-
-def start_of(config: FlightConfig) -> GeoPoint:
-    """Where a vehicle boots; the altitude is home's."""
-    lat_deg, lon_deg, _ = geodetic_from_ned(*config.start_ne_m, 0.0, config.home)
-    return GeoPoint(lat_deg, lon_deg, config.home.alt_m)

@@ -8,7 +8,7 @@ from math import atan2, hypot, tau
 
 from autopilot.interface.aircraft import Aircraft
 from common.geodesy import geodetic_from_ned
-from mission.flight import Flight
+from mission.flight_base import FlightBase
 from sim.simulated_traffic import HEARD_WITHIN_M
 
 PERIOD_US = 1_000_000
@@ -25,7 +25,7 @@ class Transponders:
         flights: of the fleet.
     """
 
-    def __init__(self, flights: Sequence[Flight]) -> None:
+    def __init__(self, flights: Sequence[FlightBase]) -> None:
         self._flights = flights
         self._samples = [flight.rig.rows["sensors"]["samples"] for flight in flights]
         self._next_us = PERIOD_US

@@ -20,7 +20,9 @@ from common.airframe import AirframeError, load_airframe
 from common.clock import wall_time_s
 from common.files import write_whole
 from common.params import ParameterError
-from mission.boards.board_session import PeerRun, check_board, station_links
+from mission.boards.board_options import check_board, commands_of
+from mission.boards.board_runs import run_of
+from mission.boards.board_session import station_links
 from mission.connections import open_links, open_page
 from mission.console.option_checks import UserError, speed_of
 from mission.console.terminal import busy, print_line
@@ -28,7 +30,7 @@ from mission.flight import Flight, flight_parameters
 from mission.flight_base import FlightBase
 from mission.flight_config import FlightConfig
 from mission.flight_session import FlightSession
-from mission.flight_settings import FollowOptions
+from mission.flight_settings import OURS, FollowOptions
 from mission.follow.companion_process import latency_text
 from mission.follow.follow_options import follow_config
 from mission.follow.follow_scoring import FollowWatch, taken_over
@@ -82,7 +84,7 @@ def _follow(options: FollowOptions, held: ExitStack) -> int:
         make_flight: Callable[..., FlightBase] = Flight
         peer_run = None
         if options.board != "own":
-            peer_run = held.enter_context(closing(PeerRun(options, folder, console)))
+            peer_run = held.enter_context(closing(run_of(options, folder, console)))
             make_flight = partial(peer_run.make_flight, has_companion=True)
         flight, companion = flight_with_companion(
             config,
@@ -134,8 +136,11 @@ def _links(options: FollowOptions, config: FlightConfig, speed: float | None) ->
     Raises:
         UserError: a parameter, the airframe or a port is wrong.
     """
-    if options.board != "own":
+    if options.board == "own":
+        commands_of(options.command, [])
+    else:
         check_board(options)
+    if options.board not in OURS:
         return station_links(options, speed)
     try:
         flight_parameters(config, load_airframe(config.airframe))

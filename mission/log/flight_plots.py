@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 Rows = npt.NDArray[Any]
 TRUE_COLOUR = "#0b7285"
 ESTIMATE_COLOUR = "#e8590c"
+AIRSPEED_COLOUR = "#862e9c"
 PLAN_COLOUR = "#495057"
 DRAWN_MAX = 60_000  # frames, 20 minutes: more are no more to see, and take memory
 
@@ -44,6 +45,9 @@ def plot_flight(
     beneath = figure.add_subplot(grid[2, 0])
     if drives:
         _speed(beneath, history)
+    elif np.isfinite(history.airspeed).any():
+        _profile(beneath, history, world)
+        _airspeed(beneath.twinx(), history)
     else:
         _profile(beneath, history, world)
     time_s = history.time_us * 1e-6
@@ -97,6 +101,13 @@ def _speed(axes: Axes, history: History) -> None:
         axes.plot(time_s, np.linalg.norm(rows, axis=1), color=colour, lw=width, label=name)
     axes.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0.0, None))
     _legend_above(axes)
+
+
+def _airspeed(axes: Axes, history: History) -> None:
+    """Over the height: where there is none, the line is broken."""
+    axes.plot(history.time_us * 1e-6, history.airspeed, color=AIRSPEED_COLOUR, lw=0.8, label="airspeed")
+    axes.set(ylabel="airspeed [m/s]", ylim=(0.0, None))
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, fontsize=8, frameon=False)
 
 
 def _errors(

@@ -17,6 +17,7 @@ from autopilot.estimator.sensors import sensors_of
 from autopilot.flight_controller import FlightController
 from autopilot.interface.platform import LogListener
 from autopilot.interface.vehicle_state import Severity
+from autopilot.ports import AIRSPEED_VALID
 from common.airframe import Airframe
 from common.params import Parameter
 from mission.log.control_topics import servo_topic
@@ -48,6 +49,7 @@ HISTORY = np.dtype(
         ("mode", "i4"),
         ("mission_seq", "i4"),
         ("battery_remaining", "f8"),
+        ("airspeed", "f4"),
     ]
 )
 
@@ -67,6 +69,8 @@ class History:
     mode: Rows
     mission_seq: Rows
     battery_remaining: Rows
+    airspeed: Rows
+    """[m/s] indicated, as it is believed; NaN: none."""
 
 
 class _RawRow:
@@ -339,4 +343,5 @@ def _history(batch: Batch) -> Rows:
     rows["mode"] = status["mode"]
     rows["mission_seq"] = status["mission_current"]
     rows["battery_remaining"] = status["battery_remaining"]
+    rows["airspeed"] = np.where(estimate["flags"] & int(AIRSPEED_VALID), estimate["airspeed"], np.nan)
     return rows

@@ -238,10 +238,10 @@ def summarise(
 
 
 def _result(flight: Any, running: Any) -> tuple[str, bool]:
+    if flight.end_reason:
+        return f"failed: {flight.end_reason}{' (crashed)' if flight.is_crashed else ''}", False
     if flight.is_crashed:
         return "crashed", False
-    if flight.end_reason:
-        return f"failed: {flight.end_reason}", False
     if running is None:
         return "no mission", True
     if running.error is not None:

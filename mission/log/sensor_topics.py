@@ -5,11 +5,15 @@ from functools import partial
 
 import numpy as np
 
+from autopilot.estimator.airspeed_params import AIRSPEED_PARAMETERS
 from autopilot.estimator.sensor_spec import SensorSpec
 from autopilot.estimator.sensors import FUSED_SENSORS
-from mission.log.topic import Batch, Columns, Topic, axes, fresh, geodetic, is_fresh
+from autopilot.ports import AIRSPEED_VALID
+from mission.log.topic import Batch, Columns, Rows, Topic, axes, fresh, geodetic, is_fresh
+from sim.bodies.rigid_body import density_ratio_at
 from sim.sensors.range import MAX_DISTANCE_M, MIN_DISTANCE_M
 
+SEA_LEVEL_DENSITY_KG_M3 = 1.225  # ISO 2533
 FIX_3D = 3  # fix_type
 LASER = 0  # distance_sensor.type
 FACING_DOWN = 25  # distance_sensor.orientation
@@ -67,6 +71,72 @@ def _sampled(batch: Batch, sensor: str, holds: Mapping[str, str]) -> Columns:
     return {"timestamp": rows["time_us"], **{field: rows[part] for field, part in holds.items()}}
 
 
+def _airspeed(batch: Batch) -> Columns:
+    sample = fresh(batch, "airspeed")
+    indicated = _speed_of(sample["pressure_pa"])
+    return {
+        "timestamp": batch.time_us[is_fresh(batch, "airspeed")],
+        "timestamp_sample": sample["time_us"],
+        "indicated_airspeed_m_s": indicated,
+        "true_airspeed_m_s": indicated * _true_over_indicated(batch)[is_fresh(batch, "airspeed")],
+        "confidence": np.ones(len(sample)),
+    }
+
+
+def _validated(batch: Batch) -> Columns:
+    is_valid = (batch.estimate["flags"] & int(AIRSPEED_VALID)) != 0
+    indicated = np.where(is_valid, batch.estimate["airspeed"], np.nan)
+    check = batch.health["airspeed"]
+    through = batch.estimate["vel_ned"].astype(float)
+    through[:, :2] -= check["wind_ne"]
+    by_motion = np.where(check["wind_count"] > 0.0, np.linalg.norm(through, axis=1), np.nan)
+    ratio = _true_over_indicated(batch)
+    return {
+        "timestamp": batch.time_us,
+        "indicated_airspeed_m_s": indicated,
+        "calibrated_airspeed_m_s": indicated,
+        "true_airspeed_m_s": indicated * ratio,
+        "calibrated_ground_minus_wind_m_s": by_motion / ratio,
+        "true_ground_minus_wind_m_s": by_motion,
+        "airspeed_sensor_measurement_valid": is_valid,
+        "selected_airspeed_index": np.where(is_valid, 1, -1),
+    }
+
+
+def _speed_of(pressure_pa: Rows) -> Rows:
+    return np.sign(pressure_pa) * np.sqrt(2.0 * np.abs(pressure_pa) / SEA_LEVEL_DENSITY_KG_M3)
+
+
+def _true_over_indicated(batch: Batch) -> Rows:
+    """By the standard atmosphere at the height flown."""
+    alt_m = batch.origin.alt_m - batch.estimate["pos_ned"][:, 2].astype(float)
+    return 1.0 / np.sqrt([density_ratio_at(each) for each in alt_m])
+
+
+_AIRSPEED = Topic(
+    "airspeed",
+    {
+        "timestamp_sample": "uint64_t",
+        **dict.fromkeys("indicated_airspeed_m_s true_airspeed_m_s confidence".split(), "float"),
+    },
+    _airspeed,
+    partial(is_fresh, sensor="airspeed"),
+    AIRSPEED_PARAMETERS[0].name,
+)
+_VALIDATED = Topic(
+    "airspeed_validated",
+    {
+        **dict.fromkeys(
+            "indicated_airspeed_m_s calibrated_airspeed_m_s true_airspeed_m_s calibrated_ground_minus_wind_m_s "
+            "true_ground_minus_wind_m_s".split(),
+            "float",
+        ),
+        "airspeed_sensor_measurement_valid": "bool",
+        "selected_airspeed_index": "int8_t",
+    },
+    _validated,
+    parameter=AIRSPEED_PARAMETERS[0].name,
+)
 _OWN_TOPICS = {
     "gnss": Topic(
         "vehicle_gps_position",
@@ -107,4 +177,4 @@ def _topic(sensor: SensorSpec) -> Topic:
     return Topic(sensor.topic.name, dict(sensor.topic.fields), columns, is_new, sensor.parameter)
 
 
-SENSOR_TOPICS = (*(_topic(sensor) for sensor in FUSED_SENSORS), _BATTERY)
+SENSOR_TOPICS = (*(_topic(sensor) for sensor in FUSED_SENSORS), _AIRSPEED, _VALIDATED, _BATTERY)

@@ -26,12 +26,14 @@ SENSORS = {
     Unit.GYRO: "gyro",
     Unit.ACCELEROMETER: "accel",
     **{Unit(sensor.failure_unit): sensor.name for sensor in FUSED_SENSORS if sensor.failure_unit is not None},
+    Unit.AIRSPEED: "airspeed",
     Unit.BATTERY: "battery",
 }
 WRONG = {
     "gyro": 0.3,  # rad/s
     "accel": 2.0,  # m/s²
     **{sensor.name: sensor.wrong_bias for sensor in FUSED_SENSORS},
+    "airspeed": -150.0,  # Pa
     "battery": -1.5,  # V
 }
 """By how much a wrong sensor is wrong, on each axis; guesses: far beyond any gate."""
@@ -57,6 +59,7 @@ class RigInjector:
         self._faults = rig.rows["faults"][i_vehicle]
         body = rig.rows["body"][i_vehicle : i_vehicle + 1]
         self._charge: Any = body["battery_charge_c"] if "battery_charge_c" in body.dtype.names else None  # [C]
+        self._has_pitot = bool(rig.rows["truth"][i_vehicle]["has_pitot"])
         self._battery = battery_model(airframe)
         self._capacity_c = 3.6 * airframe.battery.capacity_mah
         self._motor_count = motor_count
@@ -74,7 +77,7 @@ class RigInjector:
             motors = range(self._motor_count) if instance == 0 else (instance - 1,)
             replies = [self._inject_motor(motor, failure) for motor in motors]
             return replies[0]
-        if unit not in SENSORS:
+        if unit not in SENSORS or (unit is Unit.AIRSPEED and not self._has_pitot):
             return Reply(Verdict.UNSUPPORTED, f"there is no {unit.name.lower().replace('_', ' ')} that could fail")
         if instance not in (0, 1):
             return Reply(Verdict.DENIED, "there is only one of it")

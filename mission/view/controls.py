@@ -129,8 +129,15 @@ class Controls:
             if self.flight.owner is not None:
                 self._add_command(gui, "Follow", self._follow)
             self._add_button(gui, "Restart", self._restart)
+            if any(each.hand is not None for each in self._flights):
+                self._add_button(gui, "Throw", self._throw)
             if drives:
                 self._add_modes(gui)
+
+    def _throw(self) -> None:
+        hand = self.flight.hand
+        is_thrown = hand is not None and hand.throw()
+        self._say("thrown" if is_thrown else "nobody holds it")
 
     def _add_goals(self, gui: viser.GuiApi, goals: PoseGoals) -> None:
         with gui.add_folder("The policy drives to"):

@@ -14,18 +14,35 @@ from numpy.typing import NDArray
 
 from common.airframe import Airframe
 from common.airframes.multirotor import MultirotorAirframe
+from common.airframes.plane import PlaneAirframe
 from common.airframes.rover import RoverAirframe
 from common.attitude import Quat, quat_of
+from mission.view.vehicle_shapes.mesh import (
+    BARK,
+    LEAVES,
+    Floats,
+    Mesh,
+    ball,
+    beam,
+    box,
+    divided,
+    joined,
+    painted,
+    trunk,
+)  # fmt: skip
+from mission.view.vehicle_shapes.plane import plane
 from sim.world.walls import WALL_THICKNESS_M
 from sim.world.world import WorldMap
 
-Floats = NDArray[np.float32]
+__all__ = [
+    "BARK", "BLADE", "FRAME", "SUN_NED", "Mesh", "Trees", "VehicleShape", "ball", "beam", "blade_radius_m", "box",
+    "boxes", "ground", "hubs_frd", "joined", "moving_boxes", "multirotor", "person", "trees", "trunk", "vehicle",
+    "walls", "wheel_attitude",
+]  # fmt: skip
+
 SUN_NED = np.array([-0.60, 0.51, -0.62], np.float32)  # where the light comes from: as in the cameras' images, nearly
 GRASS, MEADOW, EARTH = (np.array(rgb, np.float32) for rgb in ((92, 122, 58), (140, 150, 82), (150, 130, 96)))  # sRGB
-SIDES = 7  # of a trunk: few triangles, and round enough
 
-BARK = (104, 82, 62)
-LEAVES = ((58, 98, 44), (94, 132, 62))  # darkest and lightest
 CONCRETE = (168, 164, 158)
 JACKET, TROUSERS, SKIN = (24, 74, 196), (52, 58, 74), (222, 184, 152)
 BOX_M, NOSE_M = (0.5, 0.3, 0.15), (0.1, 0.15, 0.1)  # of a vehicle whose shape is not known
@@ -33,15 +50,6 @@ FRAME, BLADE = (48, 52, 60), (30, 32, 36)
 TYRE, SPOKE, MARK = (34, 34, 38), (150, 156, 164), (236, 236, 240)
 WHEEL_SIDES, SPOKES = 14, 4
 BOX_TOP = (8, 9)  # of a box's faces
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Mesh:
-    """Triangles."""
-
-    vertices: Floats  # (n, 3)
-    faces: NDArray[np.uint32]  # (m, 3)
-    colours: NDArray[np.uint8]  # (n, 3)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -171,6 +179,8 @@ def vehicle(airframe: Airframe) -> VehicleShape:
     if isinstance(airframe, RoverAirframe):
         hubs, steered = wheel_hubs_frd(airframe), (not airframe.is_skid,) * 2 + (False,) * 2
         return VehicleShape(rover(airframe), no_blade, no_hubs, (), 0.0, (wheel(airframe),) * len(hubs), hubs, steered)
+    if isinstance(airframe, PlaneAirframe):
+        return VehicleShape(plane(airframe), no_blade, no_hubs, (), 0.0)
     if not isinstance(airframe, MultirotorAirframe):
         body = joined([box((0.0, 0.0, 0.0), BOX_M, FRAME), box((0.5 * BOX_M[0], 0.0, 0.0), NOSE_M, JACKET)])
         return VehicleShape(body, no_blade, no_hubs, (), 0.0)
@@ -235,15 +245,6 @@ def rover(airframe: RoverAirframe) -> Mesh:
     return divided(divided(body))
 
 
-def divided(mesh: Mesh) -> Mesh:
-    """The same with four triangles for each: small ones can be painted in the order of their distance."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-    corners = np.stack([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], axis=1).reshape(-1, 3)
-    colours = np.repeat(mesh.colours[mesh.faces[:, 0]], 12, axis=0)
-    return Mesh(corners.astype(np.float32), np.arange(len(corners), dtype=np.uint32).reshape(-1, 3), colours)
-
-
 def wheel(airframe: RoverAirframe) -> Mesh:
     """One wheel round its hub, the axle along y: a tyre with light spokes on both sides, one of them brighter."""
     radius_m, half_m = airframe.wheels.radius_m, 0.5 * tread_m(airframe)
@@ -294,79 +295,3 @@ def person(stature_m: float) -> Mesh:
     radius = np.array([0.075, 0.07, 0.09], np.float32) * h
     parts.append(painted(head.vertices * radius + np.array([0.0, 0.0, -0.92 * h], np.float32), head.faces, SKIN))
     return joined(parts)
-
-
-def box(
-    centre: tuple[float, float, float] | Floats, size: tuple[float, float, float], rgb: tuple[int, int, int]
-) -> Mesh:
-    """A box along the axes; no two sides share a vertex, so that its edges stay sharp."""
-    vertices: list[NDArray[np.float64]] = []
-    faces: list[int] = []
-    for axis in range(3):
-        for sign in (-1.0, 1.0):
-            outward = np.zeros(3)
-            outward[axis] = sign
-            right, up = np.roll(np.abs(outward), 1), np.roll(np.abs(outward), 2)
-            first = len(vertices)
-            vertices += [outward - right - up, outward + right - up, outward + right + up, outward - right + up]
-            order = (0, 1, 2, 0, 2, 3) if sign > 0.0 else (0, 2, 1, 0, 3, 2)
-            faces += [first + k for k in order]
-    corners = np.array(centre) + 0.5 * np.array(vertices) * np.array(size)
-    return painted(corners.astype(np.float32), np.array(faces, np.uint32).reshape(-1, 3), rgb)
-
-
-def beam(start: tuple[float, float, float], end: Floats, width_m: float, rgb: tuple[int, int, int]) -> Mesh:
-    """A box from one place to another."""
-    along = np.asarray(end, np.float32) - np.array(start, np.float32)
-    length = float(np.linalg.norm(along))
-    x = along / length
-    y = np.cross((0.0, 0.0, 1.0), x)
-    y /= np.linalg.norm(y)
-    level = box((0.5 * length, 0.0, 0.0), (length, width_m, width_m), rgb)
-    turned = level.vertices @ np.stack([x, y, np.cross(x, y)]).astype(np.float32)
-    return Mesh(turned + np.array(start, np.float32), level.faces, level.colours)
-
-
-def trunk() -> Mesh:
-    """The side of a cylinder of radius 1 from z = -1 to 1."""
-    angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
-    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    vertices = np.concatenate([np.column_stack([ring, np.full(SIDES, z)]) for z in (-1.0, 1.0)])
-    here, there = np.arange(SIDES), (np.arange(SIDES) + 1) % SIDES
-    faces = np.concatenate(
-        [np.stack([here, there, there + SIDES], axis=1), np.stack([here, there + SIDES, here + SIDES], axis=1)]
-    )
-    return painted(vertices.astype(np.float32), faces.astype(np.uint32), BARK)
-
-
-def ball() -> Mesh:
-    """An octahedron whose faces have been divided once and pushed out to radius 1: 32 triangles."""
-    corners = [np.array(c, float) for c in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1))]
-    coarse = [(x, y, z) for x in (0, 3) for y in (1, 4) for z in (2, 5)]
-    vertices: list[NDArray[np.float64]] = []
-    faces: list[tuple[int, int, int]] = []
-    for x, y, z in coarse:
-        a, b, c = (corners[i] for i in (x, y, z))
-        if np.dot(np.cross(b - a, c - a), a + b + c) < 0.0:
-            b, c = c, b
-        middles = [m / np.linalg.norm(m) for m in (a + b, b + c, c + a)]
-        first = len(vertices)
-        vertices += [a, b, c, *middles]
-        faces += [(first + i, first + j, first + k) for i, j, k in ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))]
-    unique, index = np.unique(np.round(np.array(vertices), 6), axis=0, return_inverse=True)
-    return painted(unique.astype(np.float32), index.reshape(-1)[np.array(faces)].astype(np.uint32), LEAVES[0])
-
-
-def painted(vertices: Floats, faces: NDArray[np.uint32], rgb: tuple[int, int, int]) -> Mesh:
-    """In one colour."""
-    return Mesh(vertices, faces, np.broadcast_to(np.array(rgb, np.uint8), (len(vertices), 3)).copy())
-
-
-def joined(parts: list[Mesh]) -> Mesh:
-    """Several meshes as one."""
-    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]]).astype(np.uint32)
-    return Mesh(
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
-        np.concatenate([part.colours for part in parts]),
-    )

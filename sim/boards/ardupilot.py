@@ -1,8 +1,8 @@
 """ArduPilot's SITL as a board, by its JSON interface: in lockstep, with all that goes wrong on the way.
 
 SITL sends its servos to our UDP port and waits; we move the body by a step and answer with its state, from which SITL
-makes its own sensors but the IMU, which is ours. Its main loop asks for 400 Hz of a copter, so that copters are
-exchanged each millisecond. Who has to be answered how: sim/boards/json_wire.py and `FrameCounter`.
+makes its own sensors but IMU, pitot tube and range finder, which are ours. Its main loop asks for 400 Hz of a copter,
+so that copters are exchanged each millisecond. Who has to be answered how: sim/boards/json_wire.py and `FrameCounter`.
 """
 
 import socket
@@ -11,15 +11,16 @@ from struct import Struct
 from typing import Any
 
 from common.clock import wall_time_s
-from common.kernels import SUBSTEPS, TICK_US
+from common.geodesy import GeoPoint
+from common.kernels import MAX_MOTORS, SUBSTEPS, TICK_US
 from sim.boards.channels import Channel, commands_of
 from sim.boards.fast_imu import FastImu
-from sim.boards.json_wire import ServoPacket, range_key, servo_packet, state_text
+from sim.boards.json_wire import ServoPacket, airspeed_key, range_key, servo_packet, state_text
 from sim.boards.outside import POLL_S, OnWait, PeerError
 from sim.rig import Rig
 
 PORT = 9002  # of the first instance; the next ones are 10 further each
-RESEND_S = 0.5  # what comes again sooner was on its way when we answered; SITL asks again after 1 s
+RESEND_S = 0.5  # of silence; what comes again sooner was on its way when we answered; SITL asks again after 1 s
 DATAGRAM_MAX = 4096
 _WAIT = Struct("ll").pack(int(POLL_S), round(POLL_S % 1.0 * 1e6))  # seconds and microseconds, as of struct timeval
 ROUNDING_NS = 1  # a step: SITL cuts its length to whole microseconds, and would lose one of most
@@ -64,8 +65,10 @@ class ArduPilotBoard:
     Args:
         rig: of one vehicle, on the CPU, whose body it flies.
         channels: which of its channels moves which actuator.
+        home: origin of ned.
         on_wait: what is done while it is silent.
         port: where it sends its servos to; 0: any free one.
+        start_ne_m: where its vehicle boots [m], which is its home: its positions count from there.
         address: of this machine.
 
     Raises:
@@ -77,8 +80,10 @@ class ArduPilotBoard:
         rig: Rig,
         *,
         channels: list[Channel | None],
+        home: GeoPoint,
         on_wait: OnWait,
         port: int = PORT,
+        start_ne_m: tuple[float, float] = (0.0, 0.0),
         address: str = "127.0.0.1",
     ) -> None:
         if rig.vehicle_count != 1:
@@ -89,7 +94,8 @@ class ArduPilotBoard:
         self.again_count = 0
         self.rubbish_count = 0
         self.foreign_count = 0
-        self._channels, self._on_wait = channels, on_wait
+        self._channels, self._home, self._start_ne_m = channels, home, start_ne_m
+        self._on_wait = on_wait
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((address, port))
@@ -104,7 +110,7 @@ class ArduPilotBoard:
         self._time_ns = 0
         self._counter = FrameCounter()
         self._sender: Any = None
-        self._answer, self._answered_s = b"", 0.0
+        self._answer = b""
         self._silent_s = 0.0  # of waiting, since it was heard
         self._truth = rig.arrays.truth.numpy()  # live
         self._imu = FastImu(rig) if self.is_fast else None
@@ -122,14 +128,18 @@ class ArduPilotBoard:
     def boot(self, is_chosen: Any) -> None:
         """It is powered by whoever starts it."""
 
-    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
+    def give(self, samples: Any, truth: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
         if self._sender is None:
-            self._take(commands)
+            self._await([0.0] * MAX_MOTORS)  # which only begins the exchange
         self._time_ns += self._step_ns
-        row = samples.numpy()[0]
-        self._answer = state_text(self._time_ns, *self._felt(row["imu"]), self._truth[0], range_key(row["range"]))
+        row, truth_row = samples.numpy()[0], self._truth[0]
+        felt = self._felt(row["imu"])
+        extras = airspeed_key(row["airspeed"], self._home.alt_m - truth_row["pos_ned"][2]) + range_key(row["range"])
+        self._answer = state_text(self._time_ns, *felt, truth_row, extras, self._start_ne_m)
         self._send()
-        self._take(commands)
+
+    def take(self, commands: Any) -> None:
+        self._await(commands.numpy()[0])
         self.exchange_count += 1
 
     def _felt(self, sample: Any) -> tuple[list[float], list[float]]:
@@ -140,34 +150,34 @@ class ArduPilotBoard:
         return sample["gyro_frd"].tolist(), sample["accel_frd"].tolist()
 
     def _send(self) -> None:
-        self._answered_s = wall_time_s()
         try:
             self._socket.sendto(self._answer, self._sender)
         except OSError:  # it is gone; it says so by its silence
             return
 
-    def _take(self, commands: Any) -> None:
+    def _await(self, row: Any) -> None:
         """Waits for the next servos, as long as `on_wait` lets it."""
-        row = commands.numpy()[0]
-        begun_s = looked_s = wall_time_s()
+        begun_s = looked_s = heard_s = wall_time_s()
         while True:
             received = self._receive()
             now_s = wall_time_s()
             if now_s - looked_s >= POLL_S:
                 looked_s = now_s
                 self._on_wait(now_s - begun_s)
-            if received is not None and self._is_taken(*received, row):
-                return
+            if received is not None:
+                waited_s, heard_s = now_s - heard_s, now_s
+                if self._is_taken(*received, row, waited_s):
+                    return
 
-    def _is_taken(self, packet: ServoPacket, sender: Any, row: Any) -> bool:
-        """Whether the packet has brought the next servos."""
+    def _is_taken(self, packet: ServoPacket, sender: Any, row: Any, waited_s: float) -> bool:
+        """Whether the packet, which was waited for so long, has brought the next servos."""
         verdict = self._counter.judge(packet, sender, self._silent_s)
         if verdict is Verdict.FOREIGN:
             self.foreign_count += 1
             return False
         self._silent_s = 0.0
         if verdict is Verdict.AGAIN:
-            self._answer_again()
+            self._answer_again(waited_s)
             return False
         if verdict is Verdict.FIRST:
             self._begin()
@@ -181,9 +191,12 @@ class ArduPilotBoard:
             self.restart_count += 1
         self._time_ns = 0
 
-    def _answer_again(self) -> None:
-        """Our answer was lost, or late: then it has read it by now, and would be a frame behind with two."""
-        if self._answer and wall_time_s() - self._answered_s >= RESEND_S:
+    def _answer_again(self, waited_s: float) -> None:
+        """Our answer was lost, or late: then it has read it by now, and would be a frame behind with two.
+
+        It was late if what asks again was there before it was waited for: others have held up the exchange.
+        """
+        if self._answer and waited_s >= RESEND_S:
             self.again_count += 1
             self._send()
 

@@ -16,11 +16,17 @@ class Board(Protocol):
             is_chosen: array of int, (vehicles,); not 0: this one.
         """
 
-    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:
-        """Gives each flight controller what its sensors have delivered, and takes its commands, once per tick of 4 ms.
+    def give(self, samples: Any, truth: Any) -> None:
+        """Gives each flight controller what its sensors have delivered, once per tick of 4 ms.
 
         Args:
             samples: array of `Samples`, (vehicles,).
             truth: array of `Truth`, (vehicles,): for simulators that an outside autopilot brings along; not ours.
+        """
+
+    def take(self, commands: Any) -> None:
+        """Takes its commands, after each `give`; other rigs may have gone on in between, while it computed.
+
+        Args:
             commands: array of vec8, (vehicles,), to be written: [0..1] of the motors.
         """

@@ -19,16 +19,17 @@ class Channel(NamedTuple):
     full: float
 
 
-# ArduPilot's functions of a rover's and a plane's first four channels, as its defaults have them
-_ARDUPILOT_SURFACES = {
+# ArduPilot's functions of a rover's and a plane's first four channels, as its defaults have them; the rest are told it
+_ARDUPILOT_CHANNELS = {
     "steering": 0,
     "motor": 2,
     "left motors": 0,  # SERVO1_FUNCTION 73, throttle left
     "right motors": 2,  # SERVO3_FUNCTION 74, throttle right
-    "aileron": 0,
+    "ailerons": 0,
     "elevator": 1,
-    "throttle": 2,
     "rudder": 3,
+    "nose wheel": 3,  # turned by the rudder's servo: it steers by the rudder, too, if it has no channel for the wheel
+    "brake": 4,  # SERVO5_FUNCTION 3, flaps: it has no brakes, and sets those at the approach
 }
 
 
@@ -46,7 +47,7 @@ def pulse_channels(vehicle: VehicleClass, airframe: Airframe) -> list[Channel | 
         return [Channel(k, _PULSE_LOW_US, span) for k in range(len(outputs))]
     found: list[Channel | None] = []
     for output in outputs:
-        index = _ARDUPILOT_SURFACES.get(output.name)
+        index = _ARDUPILOT_CHANNELS.get(output.name)
         if index is None:
             if output.kind is OutputKind.MOTOR:
                 raise ValueError(f"ArduPilot has no channel for '{output.name}' of {airframe.name}")
@@ -59,8 +60,12 @@ def pulse_channels(vehicle: VehicleClass, airframe: Airframe) -> list[Channel | 
 
 
 def control_channels(vehicle: VehicleClass, airframe: Airframe) -> list[Channel | None]:
-    """PX4's actuator controls, [0..1] of motors and [-1..1] of what is signed: output functions in our order."""
-    return [Channel(k, 0.0, 1.0) for k in range(len(vehicle.outputs(airframe)))]
+    """PX4's actuator controls, [0..1] of motors and [-1..1] of what is signed: output functions in our order.
+
+    It has no brakes.
+    """
+    outputs = vehicle.outputs(airframe)
+    return [None if output.name == "brake" else Channel(k, 0.0, 1.0) for k, output in enumerate(outputs)]
 
 
 def commands_of(channels: Sequence[Channel | None], values: Sequence[float]) -> list[float]:

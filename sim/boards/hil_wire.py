@@ -20,7 +20,7 @@ ACTUATORS_ID = known_type("HIL_ACTUATOR_CONTROLS").msg_id
 SAFETY_ARMED = 128  # MAV_MODE_FLAG, in `mode` of HIL_ACTUATOR_CONTROLS
 
 # HIL_SENSOR.fields_updated: all bits of a group, or PX4 leaves the group out
-ACCEL, GYRO, MAG, BARO = 0x7, 0x38, 0x1C0, 0x1A00
+ACCEL, GYRO, MAG, BARO, AIRSPEED = 0x7, 0x38, 0x1C0, 0x1A00, 0x400
 _PA_PER_HPA = 100.0
 _MIN_CM, _MAX_CM = round(100.0 * MIN_DISTANCE_M), round(100.0 * MAX_DISTANCE_M)
 _UNKNOWN_YAW = 0
@@ -38,17 +38,19 @@ class HilWriter:
         self._home = home
         self._seq = 0
 
-    def sensors(self, time_us: int, samples: Any, *, has_mag: bool, has_baro: bool) -> bytes:
+    def sensors(self, time_us: int, samples: Any, *, has_mag: bool, has_baro: bool, has_airspeed: bool) -> bytes:
         """HIL_SENSOR of a tick.
 
         Args:
             time_us: PX4's clock will be this.
-            samples: a row of `Samples`; magnetometer and barometer count only if they are new.
+            samples: a row of `Samples`; magnetometer, barometer and pitot tube count only if they are new.
             has_mag: that of the magnetometer is.
             has_baro: that of the barometer is.
+            has_airspeed: that of the pitot tube is.
         """
         imu, mag, baro = samples["imu"], samples["mag"], samples["baro"]
         updated = ACCEL | GYRO | (MAG if has_mag else 0) | (BARO if has_baro else 0)
+        updated |= AIRSPEED if has_airspeed else 0
         pressure_pa = float(baro["pressure_pa"])
         return self._frame(
             HIL_SENSOR,
@@ -57,7 +59,7 @@ class HilWriter:
             *imu["gyro_frd"].tolist(),
             *mag["field_frd_gauss"].tolist(),
             pressure_pa / _PA_PER_HPA,
-            0.0,
+            float(samples["airspeed"]["pressure_pa"]) / _PA_PER_HPA if has_airspeed else 0.0,
             pressure_altitude_m(pressure_pa) if has_baro else 0.0,
             float(baro["temperature_c"]),
             updated,

@@ -5,7 +5,7 @@ from typing import Any
 import warp as wp
 
 from autopilot.advance import autopilot_kernel
-from sim.recorded_launches import RecordedLaunches
+from sim.launches import RecordedLaunches
 from sim.rig import Rig
 
 
@@ -26,8 +26,11 @@ class OwnBoard:
     def boot(self, is_chosen: Any) -> None:
         """Its rows are the rig's, which has powered them on."""
 
-    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (it is not told the truth)
-        self._launches.of(samples, commands)[0].launch()
+    def give(self, samples: Any, truth: Any) -> None:  # noqa: ARG002  (it is not told the truth)
+        self._samples = samples
+
+    def take(self, commands: Any) -> None:
+        self._launches.of(self._samples, commands)[0].launch()
 
     def _record(self, samples: Any, commands: Any) -> list[Any]:
         rig = self._rig

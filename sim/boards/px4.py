@@ -73,8 +73,9 @@ class Px4Board:
         self.local_port: int = self._server.getsockname()[1]
         self._writer = HilWriter(home)
         self._truth = rig.arrays.truth.numpy()[0]  # live
-        self._sent_us = dict.fromkeys(("mag", "baro", "gnss", "range"), 0)  # times of the samples sent last
+        self._sent_us = dict.fromkeys(("mag", "baro", "gnss", "range", "airspeed"), 0)  # times of the samples sent last
         self._peer: socket.socket | None = None
+        self._given_s = 0.0  # when samples were sent last
         self._was_there = False
         self._begin()
 
@@ -98,15 +99,18 @@ class Px4Board:
     def boot(self, is_chosen: Any) -> None:
         """It is powered by whoever starts it."""
 
-    def exchange(self, samples: Any, truth: Any, commands: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
-        row = commands.numpy()[0]
+    def give(self, samples: Any, truth: Any) -> None:  # noqa: ARG002  (the rig's, as when made)
         if self._peer is None:
             self._accept()
-            row[:] = 0.0
         self._time_us += TICK_US
-        begun_s = wall_time_s()
+        self._given_s = wall_time_s()
         self._send(samples.numpy()[0])
-        self._listen(row, begun_s)
+
+    def take(self, commands: Any) -> None:
+        row = commands.numpy()[0]
+        if self._answered_us == 0:  # who has just connected commands nothing
+            row[:] = 0.0
+        self._listen(row, self._given_s)
         self.exchange_count += 1
 
     def _accept(self) -> None:
@@ -128,7 +132,8 @@ class Px4Board:
             data += self._writer.distance(self._time_us, samples["range"])
         if self._time_us // TICK_US % TRUTH_TICKS == 0:
             data += self._writer.truth(self._time_us, self._truth)
-        data += self._writer.sensors(self._time_us, samples, has_mag=is_new["mag"], has_baro=is_new["baro"])
+        has = {f"has_{name}": is_new[name] for name in ("mag", "baro", "airspeed")}
+        data += self._writer.sensors(self._time_us, samples, **has)
         try:
             if self._peer is not None:
                 self._peer.settimeout(STEADY_S)

@@ -21,7 +21,7 @@ from sim.bodies.contact import (
     obstacle_force,
 )
 from sim.bodies.multirotor_model import MultirotorModel
-from sim.bodies.rigid_body import held, hull_drag, lag_gain, rested, truth_of, turned_by
+from sim.bodies.rigid_body import held, hull_drag, lag_gain, moved, rested, truth_of
 from sim.truth import Truth
 from sim.world.world import World
 
@@ -42,6 +42,9 @@ class BodyState:
     vel_ned: wp.vec3  # [m/s]
     q_ned_from_frd: wp.quat
     omega_frd: wp.vec3  # [rad/s]
+    pos_rounding_ned: wp.vec3  # [m] what rounding has added to pos_ned, to be taken off (Kahan's sum)
+    vel_rounding_ned: wp.vec3  # [m/s] the same of vel_ned
+    q_rounding: wp.quat  # the same of q_ned_from_frd
     rotor_speed: vec8  # [rad/s], not negative
     accel_frd: wp.vec3  # [m/s²] specific force, mean over the last tick
     gyro_frd: wp.vec3  # [rad/s] mean over the last tick
@@ -193,6 +196,9 @@ def touched(model: ContactModel, body: BodyState, contact: ContactForce) -> Body
     """A body that remembers what it touches: feet, impacts, a crash."""
     body.foot_slip = contact.foot_slip
     body.is_on_ground = contact.is_on_ground
+    if contact.is_on_ground == 1:  # what stands is held still by what rounding takes
+        body.pos_rounding_ned = wp.vec3()
+        body.vel_rounding_ned = wp.vec3()
     body.impact_speed = wp.max(body.impact_speed, contact.impact_speed_m_s)
     if contact.impact_speed_m_s > model.crash_speed_m_s or contact.is_rotor_strike == 1:
         body.is_crashed = 1
@@ -235,13 +241,10 @@ def _substep(model: MultirotorModel, body: BodyState, inputs: StepInputs) -> Bod
     body.accel_frd = force_frd * model.mass_inv
     middle_accel_frd = body.accel_frd + wp.cross((0.5 * dt) * omega, body.accel_frd)  # the body turns meanwhile
     accel_ned = r_ned_from_frd * middle_accel_frd + _GRAVITY_NED
-    body.pos_ned = body.pos_ned + dt * (body.vel_ned + (0.5 * dt) * accel_ned)
-    body.vel_ned = body.vel_ned + dt * accel_ned
     middle = omega + (0.5 * dt) * angular_accel(model, omega, torque_frd, wrench.momentum_z)
     body.omega_frd = omega + dt * angular_accel(model, middle, torque_frd, wrench.momentum_z)
     body.gyro_frd = 0.5 * (omega + body.omega_frd)
-    body.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.gyro_frd * dt)
-    return body
+    return moved(body, accel_ned, dt)
 
 
 @wp.func

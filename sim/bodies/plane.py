@@ -15,7 +15,7 @@ from sim.bodies.contact import ContactForce, Surroundings, look_around, obstacle
 from sim.bodies.plane_air import SEA_LEVEL_DENSITY_KG_M3, air_force, propeller_step
 from sim.bodies.plane_gear import touch_ground
 from sim.bodies.plane_model import PlaneModel, plane_model
-from sim.bodies.rigid_body import held, rested, truth_of, turned_by
+from sim.bodies.rigid_body import held, moved, rested, truth_of
 from sim.truth import Truth
 from sim.world.world import World
 
@@ -36,6 +36,9 @@ class PlaneState:
     vel_ned: wp.vec3  # [m/s]
     q_ned_from_frd: wp.quat
     omega_frd: wp.vec3  # [rad/s]
+    pos_rounding_ned: wp.vec3  # [m] what rounding has added to pos_ned, to be taken off (Kahan's sum)
+    vel_rounding_ned: wp.vec3  # [m/s] the same of vel_ned
+    q_rounding: wp.quat  # the same of q_ned_from_frd
     surface: wp.vec3  # [rad] aileron, elevator, rudder; trailing edges down and to the left
     steering_rad: float  # of the nose wheel, to the right
     propeller_rad_s: float
@@ -51,10 +54,11 @@ class PlaneState:
     battery_rounding_c: float  # [C] what rounding has added to it, to be taken off (Kahan's sum)
     battery_voltage_v: float
     battery_current_a: float
-    is_on_ground: int  # a wheel touches
+    is_on_ground: int  # a wheel touches, or the belly
     is_crashed: int  # for good: struck something too fast
     impact_speed: float  # [m/s] largest speed along a contact normal so far
-    is_held: int  # in somebody's hands: stays in its place and turns with omega_frd alone
+    is_held: int  # in somebody's hands: turns with omega_frd alone, and moves as they do
+    hand_accel_ned: wp.vec3  # [m/s²] of those hands; zero: they rest
 
 
 @wp.struct
@@ -152,32 +156,43 @@ def _substep(model: PlaneModel, body: PlaneState, inputs: PlaneInputs) -> PlaneS
     body.accel_frd = force_frd * model.mass_inv
     middle_accel_frd = body.accel_frd + wp.cross((0.5 * dt) * omega, body.accel_frd)  # the body turns meanwhile
     accel_ned = rot * middle_accel_frd + _GRAVITY_NED
-    body.pos_ned = body.pos_ned + dt * (body.vel_ned + (0.5 * dt) * accel_ned)
-    body.vel_ned = body.vel_ned + dt * accel_ned
     middle = omega + (0.5 * dt) * turning(model, omega, torque_frd)
     body.omega_frd = omega + dt * turning(model, middle, torque_frd)
     body.gyro_frd = 0.5 * (omega + body.omega_frd)
-    body.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.gyro_frd * dt)
-    return body
+    return moved(body, accel_ned, dt)
 
 
 @wp.func
 def held_tick(body: PlaneState) -> PlaneState:
-    """A tick of a vehicle that is held in its place and turned at omega_frd, its motor stopped."""
+    """A tick in somebody's hands, its motor stopped: turned at omega_frd, in its place, lifted or thrown."""
     out = held(body, _TICK_S)
     out.propeller_rad_s = 0.0
     out.pitot_pa = 0.0
+    accel = body.hand_accel_ned
+    if wp.length_sq(accel) > 0.0:
+        out.vel_ned = body.vel_ned + _TICK_S * accel
+        out.pos_ned = body.pos_ned + (0.5 * _TICK_S) * (body.vel_ned + out.vel_ned)
+        out.accel_frd = wp.quat_rotate_inv(body.q_ned_from_frd, accel - _GRAVITY_NED)
     return out
+
+
+@wp.func
+def pitot_pressure(body: PlaneState, wind_ned: wp.vec3, density: float) -> float:
+    """[Pa] Along the nose; negative from behind."""
+    ahead_m_s = wp.quat_rotate_inv(body.q_ned_from_frd, body.vel_ned - wind_ned)[0]
+    return 0.5 * density * wp.max(ahead_m_s, 0.0) * ahead_m_s
 
 
 @wp.func
 def plane_tick(model: PlaneModel, body: PlaneState, command: vec8, wind_ned: wp.vec3, world: World) -> PlaneState:
     """One tick: four substeps, accel_frd and gyro_frd as means over them, then pitot tube and battery."""
-    if body.is_held == 1:
-        return held_tick(body)
     inputs = plane_inputs(model, body, command, wind_ned, world)
     body.height_agl_m = inputs.around.height_agl_m
     body.is_on_ground = 0
+    if body.is_held == 1:
+        body = held_tick(body)
+        body.pitot_pa = pitot_pressure(body, wind_ned, inputs.density)
+        return body
     accel_sum = wp.vec3()
     gyro_sum = wp.vec3()
     substeps = int(_SUBSTEP_COUNT)  # a dynamic loop, as the multirotor's
@@ -187,8 +202,7 @@ def plane_tick(model: PlaneModel, body: PlaneState, command: vec8, wind_ned: wp.
         gyro_sum += body.gyro_frd
     body.accel_frd = accel_sum / float(_SUBSTEP_COUNT)
     body.gyro_frd = gyro_sum / float(_SUBSTEP_COUNT)
-    ahead_m_s = wp.quat_rotate_inv(body.q_ned_from_frd, body.vel_ned - wind_ned)[0]
-    body.pitot_pa = 0.5 * inputs.density * wp.max(ahead_m_s, 0.0) * ahead_m_s
+    body.pitot_pa = pitot_pressure(body, wind_ned, inputs.density)
     power_w = model.battery.avionics_w + body.power_w / model.battery.motor_efficiency
     after = discharged(model.battery, body.battery_charge_c, body.battery_rounding_c, power_w, TICK_S)
     body.battery_charge_c = after.charge_c
@@ -217,7 +231,7 @@ def plane_at_rest(model: PlaneModel, pos_ned: wp.vec3, yaw_rad: float) -> PlaneS
 
 @wp.func
 def plane_standing_height(model: PlaneModel) -> float:
-    """Of the centre of gravity over the ground [m] that its wheels stand on."""
+    """Of the centre of gravity over the ground [m] that its wheels or belly stand on."""
     return model.standing_m
 
 

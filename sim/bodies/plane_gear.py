@@ -1,22 +1,21 @@
-"""A plane on the ground: three wheels on springs, and what scrapes; each 1 ms.
+"""A plane on the ground: three wheels on springs or a belly, and what scrapes; each 1 ms.
 
 A wheel grips by a spring across it and along it (a bristle), so that a plane that stands does not creep: across it up
 to the tyre's friction, along it up to its rolling resistance or its brake. The spring across relaxes as it rolls.
-Wing tips, nose and tail have Coulomb friction. Left out: the momentum of the wheels, terrain curvature under the plane.
+Wing tips, nose, tail and belly have Coulomb friction. Left out: the momentum of the wheels, terrain curvature under
+the plane.
 """
 
 import warp as wp
 
 from sim.bodies.contact import Surroundings, limit_length
-from sim.bodies.plane_model import WHEELS, PlaneModel
+from sim.bodies.plane_model import HULL_POINTS, PlaneModel
 
 wp.set_module_options({"enable_backward": False})
 
-_WHEELS = wp.constant(WHEELS)
-_POINTS = wp.constant(4)
+_HULL_POINTS = wp.constant(HULL_POINTS)
 _RELAXATION_M = wp.constant(0.1)  # guess: way on which the force across a wheel builds up
 _SCRAPE_FRICTION = wp.constant(0.5)  # guess: foam and glass fibre on grass
-_SCRAPE_N_S_M = wp.constant(200.0)  # guess: friction of a point that hardly moves, over its speed
 
 
 @wp.struct
@@ -28,7 +27,7 @@ class GearForce:
     along_m: wp.vec3  # bristles of the wheels after the step
     across_m: wp.vec3
     impact_speed_m_s: float
-    is_on_ground: int  # a wheel touches
+    is_on_ground: int  # a wheel touches, or the belly
     speed_m_s: wp.vec2  # of the treads, left and right
 
 
@@ -128,7 +127,7 @@ def touch_ground(
     normal = around.normal_ned
     ground_ned = around.origin_ned + wp.vec3(0.0, 0.0, around.height_agl_m)
     height = wp.dot(normal, pos_ned - ground_ned)
-    for wheel in range(_WHEELS):
+    for wheel in range(model.wheel_count):
         arm_frd = wp.vec3(model.wheel_x[wheel], model.wheel_y[wheel], model.wheel_z)
         depth = -height - wp.dot(normal, rot * arm_frd)
         if depth > 0.0:
@@ -148,8 +147,8 @@ def scraped(
     rot: wp.mat33,
     omega_frd: wp.vec3,
 ) -> GearForce:
-    """Adds wing tips, nose and tail."""
-    for point in range(_POINTS):
+    """Adds wing tips, nose, tail and belly."""
+    for point in range(model.point_count):
         arm_frd = wp.vec3(model.point_x[point], model.point_y[point], model.point_z[point])
         depth = -height - wp.dot(normal, rot * arm_frd)
         if depth > 0.0:
@@ -157,8 +156,10 @@ def scraped(
             normal_speed = wp.dot(normal, vel)
             load = wp.max(model.scrape_n_m * depth - model.scrape_n_s_m * normal_speed, 0.0)
             sliding = vel - normal * normal_speed
-            force = load * normal - limit_length(sliding * _SCRAPE_N_S_M, _SCRAPE_FRICTION * load)
+            force = load * normal - limit_length(sliding * model.slide_n_s_m, _SCRAPE_FRICTION * load)
             out.force_ned += force
             out.torque_frd += wp.cross(arm_frd, wp.transpose(rot) * force)
             out.impact_speed_m_s = wp.max(out.impact_speed_m_s, -normal_speed)
+            if point >= _HULL_POINTS:
+                out.is_on_ground = 1
     return out

@@ -4,7 +4,7 @@ import math
 
 import warp as wp
 
-from common.airframes.plane import PlaneAirframe
+from common.airframes.plane import Gear, PlaneAirframe
 from common.geodesy import DEFAULT_HOME, GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S, vec8
 from sim.battery import BatteryModel, battery_model
@@ -14,9 +14,11 @@ from sim.bodies.rigid_body import density_ratio_at, lag_gain
 wp.set_module_options({"enable_backward": False})
 
 WHEELS = 3  # nose, left, right
+HULL_POINTS = 4  # that scrape on every plane: wing tips, nose, tail
 _NORMAL_RATE_RAD_S = 32.0  # guess: it bounces at 5 Hz on its gear
 _TANGENT_RATE_RAD_S = 90.0  # guess: as stiff as 1 ms steps allow with room
 _SCRAPE_RATE_RAD_S = 60.0  # guess: of a wing tip that touches
+_SLIDE_RATE_S = 18.0  # guess: friction of a point that hardly moves, over its speed and the mass
 _DAMPING_RATIO = 0.7  # guess: a landing does not bounce
 
 
@@ -58,11 +60,14 @@ class PlaneModel:
     rolling_resistance: float
     brake_friction: float
     side_friction: float
-    point_x: wp.vec4  # [m] what scrapes: left and right wing tip, nose, tail, frd
-    point_y: wp.vec4
-    point_z: wp.vec4
+    wheel_count: int  # 0: it stands on its belly
+    point_x: vec8  # [m] what scrapes: left and right wing tip, nose, tail, two points of a belly, frd
+    point_y: vec8
+    point_z: vec8
+    point_count: int
     scrape_n_m: float
     scrape_n_s_m: float
+    slide_n_s_m: float
     contact: ContactModel  # of each wheel, and the hull sphere
     standing_m: float  # centre of gravity over the ground at rest
     home_density_ratio: float  # air density at home over that at sea level
@@ -71,15 +76,15 @@ class PlaneModel:
 
 def _contact(airframe: PlaneAirframe) -> ContactModel:
     """Springs of a wheel, and the sphere that meets obstacles."""
-    body, gear = airframe.body, airframe.gear
+    body, height_m = airframe.body, airframe.standing_height_m
     model = ContactModel()
-    model.reach_m = max(0.5 * airframe.wing.span_m, airframe.hull.tail_x_m, airframe.hull.nose_x_m, gear.height_m)
+    model.reach_m = max(0.5 * airframe.wing.span_m, airframe.hull.tail_x_m, airframe.hull.nose_x_m, height_m)
     model.hull_radius_m = airframe.hull.radius_m
     model.crash_speed_m_s = airframe.hull.crash_speed_m_s
     model.normal_n_m = body.mass_kg * _NORMAL_RATE_RAD_S**2 / WHEELS
     model.normal_n_s_m = 2.0 * _DAMPING_RATIO * body.mass_kg * _NORMAL_RATE_RAD_S / WHEELS
     inertia_kg_m2 = min(body.inertia_xx_kg_m2, body.inertia_yy_kg_m2)
-    wheel_mass_kg = 1.0 / (1.0 / body.mass_kg + gear.height_m**2 / inertia_kg_m2)  # a push there also turns it
+    wheel_mass_kg = 1.0 / (1.0 / body.mass_kg + height_m**2 / inertia_kg_m2)  # a push there also turns it
     model.tangent_n_m = wheel_mass_kg * _TANGENT_RATE_RAD_S**2 / WHEELS
     model.tangent_n_s_m = 2.0 * _DAMPING_RATIO * wheel_mass_kg * _TANGENT_RATE_RAD_S / WHEELS
     return model
@@ -113,23 +118,36 @@ def _set_propeller(model: PlaneModel, airframe: PlaneAirframe) -> None:
     model.motor_gain = lag_gain(data.lag_s, TICK_S / SUBSTEPS)
 
 
-def _set_ground(model: PlaneModel, airframe: PlaneAirframe) -> None:
-    gear, hull, mass_kg = airframe.gear, airframe.hull, airframe.body.mass_kg
-    half_m, tip_m = 0.5 * gear.track_m, 0.5 * airframe.wing.span_m
+def _set_gear(model: PlaneModel, gear: Gear, mass_kg: float) -> None:
+    half_m = 0.5 * gear.track_m
+    model.wheel_count = WHEELS
     model.wheel_x = wp.vec3(gear.nose_x_m, -gear.main_x_m, -gear.main_x_m)
     model.wheel_y = wp.vec3(0.0, -half_m, half_m)
     model.wheel_z = gear.height_m
     model.steering_max = gear.steering_max_rad
     model.rolling_resistance, model.brake_friction = gear.rolling_resistance, gear.brake_friction
     model.side_friction = gear.side_friction
-    model.point_x = wp.vec4(0.0, 0.0, hull.nose_x_m, -hull.tail_x_m)
-    model.point_y = wp.vec4(-tip_m, tip_m, 0.0, 0.0)
-    model.point_z = wp.vec4(hull.tip_z_m, hull.tip_z_m, 0.0, hull.tail_z_m)
-    model.scrape_n_m = 0.25 * mass_kg * _SCRAPE_RATE_RAD_S**2
-    model.scrape_n_s_m = 0.25 * _DAMPING_RATIO * mass_kg * _SCRAPE_RATE_RAD_S
-    model.contact = _contact(airframe)
     # At rest each wheel bears what the lever arms give it; the centre sinks as all three together.
     model.standing_m = gear.height_m - mass_kg * GRAVITY_M_S2 / (WHEELS * model.contact.normal_n_m)
+
+
+def _set_ground(model: PlaneModel, airframe: PlaneAirframe) -> None:
+    hull, mass_kg, tip_m = airframe.hull, airframe.body.mass_kg, 0.5 * airframe.wing.span_m
+    points = [(0.0, -tip_m, hull.tip_z_m), (0.0, tip_m, hull.tip_z_m), (hull.nose_x_m, 0.0, 0.0)]
+    points.append((-hull.tail_x_m, 0.0, hull.tail_z_m))
+    model.scrape_n_m = 0.25 * mass_kg * _SCRAPE_RATE_RAD_S**2
+    model.scrape_n_s_m = 0.25 * _DAMPING_RATIO * mass_kg * _SCRAPE_RATE_RAD_S
+    model.slide_n_s_m = mass_kg * _SLIDE_RATE_S
+    model.contact = _contact(airframe)
+    if airframe.gear is not None:
+        _set_gear(model, airframe.gear, mass_kg)
+    belly = airframe.belly
+    if belly is not None:
+        points += [(belly.front_x_m, 0.0, belly.depth_m), (-belly.rear_x_m, 0.0, belly.depth_m)]
+        model.standing_m = belly.depth_m - mass_kg * GRAVITY_M_S2 / (2.0 * model.scrape_n_m)
+    model.point_count = len(points)
+    points += [(0.0, 0.0, 0.0)] * (8 - len(points))
+    model.point_x, model.point_y, model.point_z = (vec8(*axis) for axis in zip(*points, strict=True))
 
 
 def plane_model(airframe: PlaneAirframe, home_alt_amsl_m: float = DEFAULT_HOME.alt_m) -> PlaneModel:

@@ -19,14 +19,40 @@ _GRAVITY_NED = wp.constant(wp.vec3(0.0, 0.0, GRAVITY_M_S2))
 
 
 @wp.func
-def turned_by(q_ned_from_frd: wp.quat, rotvec_frd: wp.vec3) -> wp.quat:
-    """Attitude after a body rotation vector of less than 0.1 rad: series of the exponential, exact to float32."""
+def turn_less_one(rotvec_frd: wp.vec3) -> wp.quat:
+    """The rotation by a vector of less than 0.1 rad, less that by none: series of the exponential, exact to float32."""
     square = wp.dot(rotvec_frd, rotvec_frd)
     half_sinc = 0.5 - square / 48.0
-    turn = wp.quat(
-        half_sinc * rotvec_frd[0], half_sinc * rotvec_frd[1], half_sinc * rotvec_frd[2], 1.0 - 0.125 * square
-    )
-    return wp.normalize(q_ned_from_frd * turn)
+    return wp.quat(half_sinc * rotvec_frd[0], half_sinc * rotvec_frd[1], half_sinc * rotvec_frd[2], -0.125 * square)
+
+
+@wp.func
+def turned_by(q_ned_from_frd: wp.quat, rotvec_frd: wp.vec3) -> wp.quat:
+    """Attitude after a body rotation vector of less than 0.1 rad."""
+    return wp.normalize(q_ned_from_frd + q_ned_from_frd * turn_less_one(rotvec_frd))
+
+
+@wp.func
+def moved(state: Any, accel_ned: wp.vec3, dt: float) -> Any:
+    """A `State` after dt [s] of an acceleration and of its mean rate `gyro_frd`.
+
+    Position, velocity and attitude are Kahan's sums: what single precision has added to each is taken off in the next
+    step. A step is so small beside where the vehicle is that its rounding would move it by centimetres in minutes.
+    """
+    shift_ned = dt * (state.vel_ned + (0.5 * dt) * accel_ned) - state.pos_rounding_ned
+    pos_ned = state.pos_ned + shift_ned
+    state.pos_rounding_ned = (pos_ned - state.pos_ned) - shift_ned
+    state.pos_ned = pos_ned
+    gain_ned = dt * accel_ned - state.vel_rounding_ned
+    vel_ned = state.vel_ned + gain_ned
+    state.vel_rounding_ned = (vel_ned - state.vel_ned) - gain_ned
+    state.vel_ned = vel_ned
+    q = state.q_ned_from_frd
+    change = q * turn_less_one(dt * state.gyro_frd) + (0.5 * (1.0 - wp.dot(q, q))) * q - state.q_rounding
+    q_ned_from_frd = q + change
+    state.q_rounding = (q_ned_from_frd - q) - change
+    state.q_ned_from_frd = q_ned_from_frd
+    return state
 
 
 @wp.func

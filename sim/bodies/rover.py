@@ -15,7 +15,7 @@ from common.geodesy import GRAVITY_M_S2
 from common.kernels import SUBSTEPS, TICK_S, vec8
 from sim.battery import discharged
 from sim.bodies.body import Body
-from sim.bodies.rigid_body import held, hull_drag, rested, truth_of, turned_by
+from sim.bodies.rigid_body import held, hull_drag, moved, rested, truth_of
 from sim.bodies.rover_hull import HullContact, hull_contact, is_near_obstacle, look_at_hull
 from sim.bodies.rover_model import RoverModel, rover_model
 from sim.bodies.rover_wheels import WheelStep, steered_frd, wheel_step
@@ -43,6 +43,9 @@ class RoverState:
     vel_ned: wp.vec3  # [m/s]
     q_ned_from_frd: wp.quat
     omega_frd: wp.vec3  # [rad/s]
+    pos_rounding_ned: wp.vec3  # [m] what rounding has added to pos_ned, to be taken off (Kahan's sum)
+    vel_rounding_ned: wp.vec3  # [m/s] the same of vel_ned
+    q_rounding: wp.quat  # the same of q_ned_from_frd
     wheel_speed: wp.vec4  # [rad/s] positive forward
     deflection_x: wp.vec4  # [m] of each tyre along its wheel, forward
     deflection_y: wp.vec4  # [m] across it, to the right
@@ -224,12 +227,9 @@ def _substep(model: RoverModel, body: RoverState, inputs: DriveInputs, hull: Hul
     body.accel_frd = force_frd * model.mass_inv
     middle_accel_frd = body.accel_frd + wp.cross((0.5 * dt) * omega, body.accel_frd)  # the body turns meanwhile
     accel_ned = rot * middle_accel_frd + _GRAVITY_NED
-    body.pos_ned = body.pos_ned + dt * (body.vel_ned + (0.5 * dt) * accel_ned)
-    body.vel_ned = body.vel_ned + dt * accel_ned
     body.omega_frd = omega + dt * angular_accel(model, omega, torque_frd)
     body.gyro_frd = 0.5 * (omega + body.omega_frd)
-    body.q_ned_from_frd = turned_by(body.q_ned_from_frd, body.gyro_frd * dt)
-    return body
+    return moved(body, accel_ned, dt)
 
 
 @wp.func

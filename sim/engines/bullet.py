@@ -24,7 +24,7 @@ from sim.engines.bullet_vehicle import BulletVehicle
 from sim.engines.bullet_world import BulletWorld
 from sim.engines.left_poses import LeftPoses
 from sim.engines.quiet_bullet import pybullet
-from sim.recorded_launches import RecordedLaunches
+from sim.launches import RecordedLaunches
 from sim.rig import Rig
 from sim.world.world import World, WorldMap
 

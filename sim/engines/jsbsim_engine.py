@@ -28,7 +28,7 @@ from sim.engines.jsbsim_body import JsbsimBody
 from sim.engines.jsbsim_planet import FT_M, LBF_N
 from sim.engines.left_poses import LeftPoses
 from sim.engines.midstep import midstep_torque
-from sim.recorded_launches import RecordedLaunches
+from sim.launches import RecordedLaunches
 from sim.rig import Rig
 from sim.truth import Truth
 from sim.world.world import World, world_at

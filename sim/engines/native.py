@@ -8,7 +8,7 @@ import warp as wp
 from common.kernels import vec8
 from common.rng import draw_tick
 from sim.bodies.body import Body
-from sim.recorded_launches import RecordedLaunches
+from sim.launches import RecordedLaunches
 from sim.rig import Rig
 from sim.truth import Truth
 from sim.world.world import World, world_at

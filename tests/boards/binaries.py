@@ -1,6 +1,6 @@
 """Real autopilots at their boards: where their binaries are, and flights by the command line, as a user would fly them.
 
-None comes with the project: `make test-ardupilot SITL=FOLDER`, `make test-px4 PX4=FOLDER`.
+None comes with the project: `make test-ardupilot SITL=FOLDER`, `make test-px4 PX4=FOLDER`, `make test-betaflight`.
 """
 
 import json
@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 HONEYGUIDE = Path(sys.executable).parent / "honeyguide"
-PATIENCE_S = 400.0
+PATIENCE_S = 1200.0  # of wall clock time, also on a machine that does other things
+DEFAULTS = {"plane": "models"}  # where its file of defaults is, of what has it in a folder of its own
 
 
 class Flown(NamedTuple):
@@ -26,7 +27,8 @@ class Flown(NamedTuple):
 
 def ardupilot_command(folder: Path, binary: str) -> str:
     """Of a source folder that has been built."""
-    defaults = folder / "Tools" / "autotest" / "default_params" / f"{binary.removeprefix('ardu')}.parm"
+    vehicle = binary.removeprefix("ardu")
+    defaults = folder / "Tools" / "autotest" / DEFAULTS.get(vehicle, "default_params") / f"{vehicle}.parm"
     return (
         f"{folder / 'build' / 'sitl' / 'bin' / binary} --model JSON --speedup 100 -I{{instance}} --home {{home}} "
         f"--defaults {defaults},{{params}}"
@@ -64,7 +66,7 @@ def killed_in_flight(board: str, command: str, folder: Path, binary: str) -> Flo
     lines = []
     for line in process.stdout:
         lines.append(line)
-        if "rming motors" in line or "Armed by" in line:
+        if any(told in line for told in ("rming motors", "Armed by", "s  Armed")):
             _kill(binary, process.pid)
             break
     try:

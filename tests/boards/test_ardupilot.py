@@ -9,7 +9,7 @@ from tests.boards.binaries import ardupilot_command, flown, killed_in_flight
 
 SITL = os.environ.get("SITL", "")
 pytestmark = pytest.mark.skipif(not SITL, reason="SITL=FOLDER of ArduPilot's source, built for the board sitl")
-COPTER, ROVER = (ardupilot_command(Path(SITL), binary) for binary in ("arducopter", "ardurover"))
+COPTER, ROVER, PLANE = (ardupilot_command(Path(SITL), name) for name in ("arducopter", "ardurover", "arduplane"))
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -35,6 +35,21 @@ def test_a_rover_drives_its_tour(tmp_path):
     assert run.summary["result"] == "mission completed"
     assert run.summary["landing_error_true_m"] < 1.0
     assert run.summary["cross_track_p95_m"] < 2.0
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_plane_flies_its_circuit(tmp_path, seed):
+    options = ("--airframe", "plane", "--once", "--speed", "max", "--seed", str(seed))
+    run = flown("fly", "ardupilot", PLANE, tmp_path / "run", *options)
+    assert run.exit_code == 0, run.output
+    assert run.summary["result"] == "mission completed"
+
+
+def test_a_plane_flies_it_in_wind(tmp_path):
+    options = ("--airframe", "plane", "--once", "--speed", "max", "--wind", "5")
+    run = flown("fly", "ardupilot", PLANE, tmp_path / "run", *options)
+    assert run.exit_code == 0, run.output
+    assert run.summary["result"] == "mission completed"
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -1,6 +1,7 @@
 """PX4's own binary flies our bodies in our worlds: `make test-px4 PX4=FOLDER`."""
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,37 @@ def test_it_flies_with_bullets_body(tmp_path):
     pytest.importorskip("pybullet")
     run = flown("fly", "px4", COMMAND, tmp_path / "run", "--once", "--speed", "max", "--engine", "pybullet")
     assert run.summary["result"] == "mission completed", run.output
+
+
+def test_three_fly_it_at_once_each_by_its_own_ports(tmp_path):
+    def fly(i):
+        options = ("--once", "--speed", "max", "--seed", str(i), "--instance", str(i))
+        return flown("fly", "px4", COMMAND, tmp_path / f"run{i}", *options)
+
+    with ThreadPoolExecutor() as pool:
+        runs = list(pool.map(fly, range(3)))
+    for i, run in enumerate(runs):
+        assert run.exit_code == 0, run.output
+        assert run.summary["result"] == "mission completed"
+        assert run.summary["landing_error_true_m"] < 2.0
+        assert (tmp_path / f"run{i}" / "px4" / "log").is_dir()
+
+
+@pytest.mark.parametrize("airframe", ["rover", "rover-skid"])
+def test_a_rover_drives_its_tour(tmp_path, airframe):
+    run = flown("fly", "px4", COMMAND, tmp_path / "run", "--airframe", airframe, "--once", "--speed", "max")
+    assert run.exit_code == 0, run.output
+    assert run.summary["result"] == "mission completed"
+    assert run.summary["landing_error_true_m"] < 2.0
+    assert run.summary["cross_track_p95_m"] < 2.0
+
+
+@pytest.mark.parametrize("wind_m_s", [0, 5])
+def test_a_plane_flies_its_tour_and_lands(tmp_path, wind_m_s):
+    options = ("--airframe", "plane", "--once", "--speed", "max", "--wind", str(wind_m_s))
+    run = flown("fly", "px4", COMMAND, tmp_path / "run", *options)
+    assert run.exit_code == 0, run.output
+    assert run.summary["result"] == "mission completed"
 
 
 @pytest.mark.parametrize("seed", range(3))

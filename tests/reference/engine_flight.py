@@ -81,8 +81,11 @@ class TruthBoard:
     def boot(self, is_chosen):
         """Has nothing to forget."""
 
-    def exchange(self, samples, truth, commands):  # noqa: ARG002
-        row = truth.numpy()[0]
+    def give(self, samples, truth):  # noqa: ARG002
+        self._truth = truth
+
+    def take(self, commands):
+        row = self._truth.numpy()[0]
         self._states.append(np.concatenate([row["pos_ned"], row["q_ned_from_frd"]]).astype(float))
         self.ticks += 1
         names = ("pos_ned", "vel_ned", "q_ned_from_frd", "omega_frd")

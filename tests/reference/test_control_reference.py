@@ -63,6 +63,35 @@ def test_cruise_speed_is_the_root_of_the_distance_covered(distance: float) -> No
     assert peak == pytest.approx(min(speed, 5.0), abs=0.05)
 
 
+@wp.kernel
+def way_to(distance: float, vel: float, accel: float, row: AxisLimits, way: wp.array[wp.vec3]):
+    """Position, velocity and acceleration of each step, 20 ms apart."""
+    moved = float(0.0)
+    for k in range(way.shape[0]):
+        motion = step_to_position(distance - moved, vel, accel, 0.0, row, 0.02)
+        moved = moved + motion.moved
+        vel = motion.vel
+        accel = motion.accel
+        way[k] = wp.vec3(moved, vel, accel)
+
+
+@pytest.mark.parametrize("spare", [1e-4, 1e-3, 0.02, 0.2])
+@pytest.mark.parametrize(("vel", "accel"), [(3.0, -3.0), (1.0, -2.0), (2.0, 1.5), (4.9, -1.0), (0.3, -0.5)])
+def test_who_has_to_brake_brakes_once(vel: float, accel: float, spare: float) -> None:
+    """However much farther the goal is than the shortest stop."""
+    row = limits()
+    distance = ramp_distance(vel, accel, 0.0, row) + spare
+    way = wp.zeros(300, dtype=wp.vec3, device="cpu")
+    wp.launch(way_to, dim=1, inputs=[distance, vel, accel, row, way], device="cpu")
+    moved, speed, change = way.numpy().astype(float).T
+    assert moved[-1] == pytest.approx(distance, abs=1e-4)
+    assert max(moved) < distance + 1e-4
+    assert max(np.abs(np.diff(moved))) < 0.02 * max(vel, *speed) + 1e-4
+    hardest = int(np.argmin(change))
+    assert min(change) > -row.accel_negative - 1e-3
+    assert min(np.diff(change[hardest:])) > -0.05  # once it has let go of the brake it does not brake harder again
+
+
 def test_attitude_error_agrees_with_rotation_vectors() -> None:
     for here, there in zip(Rotation.random(200, random_state=1), Rotation.random(200, random_state=2), strict=True):
         error = np.array(attitude_error(wp.quat(*here.as_quat()), wp.quat(*there.as_quat())))

@@ -269,6 +269,9 @@ class Mission(FlightMode):
         self._actions.clear()
         self._leg.stop()
 
+    def go_around(self, height_m: float) -> Reply:
+        return self._leg.go_around(height_m) if self._is_flying else super().go_around(height_m)
+
     def frame(self) -> None:
         if not self._is_flying:
             return

@@ -7,13 +7,14 @@ from enum import IntEnum
 from math import cos, hypot, isfinite, nan, pi, radians, sin
 
 from autopilot.interface.item_lists import MissionItem
+from autopilot.interface.vehicle_state import Reply, Verdict
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission.item_commands import WAYPOINTS, Command, hold_time_s, is_here, passes_through
 from autopilot.navigator.mission.mission_route import Route, distance_to_line
 from autopilot.navigator.modes.land import Landing
 from autopilot.navigator.modes.precision_landing import PrecisionLand
 from autopilot.navigator.modes.takeoff import Climb
-from autopilot.navigator.paths.spline import Polyline, Runner, Turns, bearing, between, spline
+from autopilot.navigator.paths.spline import Polyline, Runner, Turns, bearing, between, distinct, spline
 from autopilot.navigator.setpoint import Vector
 
 _ON_PATH_M = 5.0  # a vehicle paused this near its leg goes back to it rather than straight on; guess
@@ -64,6 +65,10 @@ class Leg:
     def stop(self) -> None:
         """Another mode took over; the leg is remembered, so that it can be gone on with."""
         self._stage = _Stage.IDLE
+
+    def go_around(self, height_m: float) -> Reply:  # noqa: ARG002
+        """Gives up a landing, of what cannot stop in the air."""
+        return Reply(Verdict.TEMPORARILY_REJECTED, "not landing")
 
     def forget(self) -> None:
         """The next leg begins where the vehicle is."""
@@ -338,7 +343,7 @@ class Leg:
             ahead = between(here, start)
             if ahead[0] * along[0] + ahead[1] * along[1] > 0.0 and hypot(ahead[0], ahead[1]) > 0.5:
                 points.insert(0, here)  # the waypoint before counted as reached a little early
-        points = _distinct(points)
+        points = distinct(points)
         if len(points) < 2:
             self._is_done = True
             return
@@ -353,7 +358,7 @@ class Leg:
         following = route.next_position(item.seq + 1, target) if passes_through(item) else None
         arrive = _STANDING if following is None else between(start, following)
         pace = route.pace()
-        points = _distinct(spline(start, along, target, arrive))
+        points = distinct(spline(start, along, target, arrive))
         return Polyline(points, pace, pace.cruise if following else 0.0).top_speed(0.0) if len(points) > 1 else 0.0
 
     def _run_curve(self) -> None:
@@ -389,12 +394,3 @@ class Leg:
                 self._wait(hold_time_s(item))
             else:
                 self._is_done = True
-
-
-def _distinct(points: list[Vector]) -> list[Vector]:
-    """The points without repetitions."""
-    kept: list[Vector] = []
-    for point in points:
-        if not kept or hypot(point[0] - kept[-1][0], point[1] - kept[-1][1]) + abs(point[2] - kept[-1][2]) > 1e-3:
-            kept.append(point)
-    return kept

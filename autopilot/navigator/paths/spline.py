@@ -193,6 +193,15 @@ def spline(start: Vector, start_along: Vector, end: Vector, end_along: Vector) -
     return points
 
 
+def distinct(points: list[Vector]) -> list[Vector]:
+    """The points without repetitions."""
+    kept: list[Vector] = []
+    for point in points:
+        if not kept or hypot(point[0] - kept[-1][0], point[1] - kept[-1][1]) + abs(point[2] - kept[-1][2]) > 1e-3:
+            kept.append(point)
+    return kept
+
+
 def bearing(from_ned: Vector, to_ned: Vector) -> float:
     """Direction [rad] from one position to another."""
     return atan2(to_ned[1] - from_ned[1], to_ned[0] - from_ned[0])

@@ -1,6 +1,6 @@
 """What ArduPilot's clients look for on a Plane: its names of our parameters."""
 
-from autopilot.interface.ardupilot_vehicle import REAL32, Alias, ArduPilotVehicle
+from autopilot.interface.ardupilot_vehicle import INT8, REAL32, Alias, ArduPilotVehicle
 
 APM_PLANE = ArduPilotVehicle(
     name="Plane",
@@ -19,6 +19,8 @@ APM_PLANE = ArduPilotVehicle(
         Alias("TECS_SINK_MAX", "FW_T_SINK_MAX", REAL32),
         Alias("TECS_SINK_MIN", "FW_T_SINK_MIN", REAL32),
         Alias("TECS_SPDWEIGHT", "FW_T_SPDWEIGHT", REAL32),
+        Alias("TKOFF_THR_DELAY", "FW_LAUN_MOT_DEL", INT8, scale=10.0),  # theirs is in tenths of a second
+        Alias("TKOFF_THR_MINACC", "FW_LAUN_AC_THLD", REAL32),
         Alias("WP_LOITER_RAD", "NAV_LOITER_RAD", REAL32),
         Alias("WP_RADIUS", "NAV_ACC_RAD", REAL32),
     ),

@@ -66,6 +66,18 @@ def slowness(params: PlaneParams, here: Measured) -> float:
 
 
 @wp.func
+def level_pitch(params: PlaneParams, goal: EnergyGoal, speed: float) -> float:
+    """[rad] Of level flight: lift is that of the trim times load factor, over the square of the airspeed.
+
+    Below the least airspeed the nose is not raised any more for that, but in a flare.
+    """
+    slowest = wp.where(wp.isfinite(goal.throttle), params.airspeed_stall, params.airspeed_min)
+    ratio = params.airspeed_trim / wp.clamp(speed, slowest, params.airspeed_max)
+    load = 1.0 / wp.max(wp.cos(goal.bank), 0.5)
+    return params.pitch_offset + params.pitch_lift * (load * ratio * ratio - 1.0)
+
+
+@wp.func
 def observe_speed(state: EnergyState, here: Measured, dt: float) -> EnergyState:
     """Airspeed and its change, by the accelerometer along the nose and the pitot tube: a second-order observer.
 
@@ -90,7 +102,8 @@ def energy_step(params: PlaneParams, state: EnergyState, here: Measured, goal: E
         now.climb_sp = here.climb
         now.pitch = here.pitch
         path = here.climb / wp.max(here.airspeed, _SLOWEST_M_S)
-        now.pitch_i = wp.clamp(here.pitch - params.pitch_offset - path, -_PITCH_I_MOST, _PITCH_I_MOST)
+        level = level_pitch(params, goal, here.airspeed)
+        now.pitch_i = wp.clamp(here.pitch - level - path, -_PITCH_I_MOST, _PITCH_I_MOST)
         now.speed = here.airspeed
     now = observe_speed(now, here, dt)
     speed = wp.max(now.speed, _SLOWEST_M_S)
@@ -113,7 +126,9 @@ def energy_step(params: PlaneParams, state: EnergyState, here: Measured, goal: E
     balance_sp = on_height * rise_sp - on_speed * speed * accel_sp
     balance = on_height * _GRAVITY * here.climb - on_speed * speed * now.accel
     error = (balance_sp - balance) / (speed * _GRAVITY)  # [rad] of a flight path
-    asked = params.pitch_offset + balance_sp / (speed * _GRAVITY) + params.pitch_damping * error + now.pitch_i
+    asked = (
+        level_pitch(params, goal, speed) + balance_sp / (speed * _GRAVITY) + params.pitch_damping * error + now.pitch_i
+    )
     pitch = wp.clamp(asked, goal.pitch_min, goal.pitch_max)
     if (asked - pitch) * error <= 0.0:
         grown = now.pitch_i + params.pitch_integral * error * dt

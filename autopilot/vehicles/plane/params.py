@@ -37,6 +37,8 @@ class PlaneParams:
     pitch_min: float
     pitch_max: float
     pitch_offset: float  # [rad] of level flight at trim airspeed
+    pitch_lift: float  # [rad] the part of it that lifts
+    airspeed_stall: float  # [m/s]
     throttle_min: float
     throttle_max: float
     throttle_trim: float
@@ -73,7 +75,8 @@ PLANE_PARAMETERS: list[Parameter] = [
     Parameter("FW_AIRSPD_MIN", 10.0, 0.5, 200.0, "m/s", "least airspeed", _AIRFRAME, "airspeed_min"),
     Parameter("FW_AIRSPD_TRIM", 15.0, 0.5, 200.0, "m/s", "airspeed of cruise", _AIRFRAME, "airspeed_trim"),
     Parameter("FW_AIRSPD_MAX", 20.0, 0.5, 200.0, "m/s", "greatest airspeed", _AIRFRAME, "airspeed_max"),
-    Parameter("FW_AIRSPD_STALL", 7.0, 0.5, 200.0, "m/s", "airspeed at which it stalls", _AIRFRAME),
+    Parameter("FW_AIRSPD_STALL", 7.0, 0.5, 200.0, "m/s", "airspeed at which it stalls", _AIRFRAME,
+              "airspeed_stall"),
     Parameter("FW_R_TC", 0.4, 0.2, 1.0, "s", "time in which a bank error is to go", _PX4, "roll_time"),
     Parameter("FW_P_TC", 0.4, 0.2, 1.0, "s", "time in which a pitch error is to go", _PX4, "pitch_time"),
     Parameter("FW_R_RMAX", 70.0, 0.0, 180.0, "deg/s", "greatest roll rate", _PX4, "roll_rate_max"),
@@ -99,6 +102,8 @@ PLANE_PARAMETERS: list[Parameter] = [
     Parameter("FW_P_LIM_MAX", 30.0, 0.0, 60.0, "deg", "greatest pitch", _PX4, "pitch_max"),
     Parameter("FW_PSP_OFF", 0.0, -90.0, 90.0, "deg", "pitch of level flight at FW_AIRSPD_TRIM", _AIRFRAME,
               "pitch_offset"),
+    Parameter("HG_FW_PSP_LIFT", 5.0, 0.0, 30.0, "deg", "the part of FW_PSP_OFF that lifts: more when slower; ours",
+              _AIRFRAME, "pitch_lift"),
     Parameter("FW_MAN_R_MAX", 45.0, 0.0, 90.0, "deg", "bank at full stick", _PX4),
     Parameter("FW_MAN_P_MAX", 30.0, 0.0, 90.0, "deg", "pitch at full stick", _PX4),
     Parameter("FW_ACRO_X_MAX", 90.0, 10.0, 720.0, "deg/s", "roll rate at full stick in Acro", _PX4),

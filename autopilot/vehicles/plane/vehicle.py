@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from autopilot.estimator.airspeed_params import AIRSPEED_PARAMETERS
 from autopilot.interface.outputs import Output, OutputKind
 from autopilot.interface.vehicle_state import Mode, VehicleState
 from autopilot.ports import AIRSPEED_VALID
@@ -37,7 +38,7 @@ def _outputs(_: PlaneAirframe) -> Sequence[Output]:
 
 
 def _standing_height_m(airframe: PlaneAirframe) -> float:
-    return airframe.gear.height_m
+    return airframe.standing_height_m
 
 
 def _measures_airspeed(state: VehicleState, _: ParameterTable) -> str:
@@ -47,7 +48,7 @@ def _measures_airspeed(state: VehicleState, _: ParameterTable) -> str:
 PLANE = VehicleClass(
     name="plane",
     law=PLANE_LAW,
-    parameters=(*PLANE_PARAMETERS, *MODE_PARAMETERS),
+    parameters=(*PLANE_PARAMETERS, *MODE_PARAMETERS, *AIRSPEED_PARAMETERS),
     defaults=plane_defaults,
     modes=PLANE_MODES,
     last_resort=Mode.HOLD,

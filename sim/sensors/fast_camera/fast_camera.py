@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 import warp as wp
 
+from sim.launches import Workers
 from sim.sensors.camera import Lens
 from sim.sensors.fast_camera.camera_view import View
 from sim.sensors.fast_camera.colours import make_paints
@@ -21,7 +22,6 @@ from sim.sensors.fast_camera.optics import Optics, expose
 from sim.sensors.fast_camera.prepare import prepare_views
 from sim.sensors.fast_camera.rows import Outputs, draw_rows
 from sim.sensors.fast_camera.solids import Sights, Solid
-from sim.workers import Workers
 from sim.world.clothes import Clothes, usual_clothes
 from sim.world.people import Person
 from sim.world.trees import CROWN_RADIUS_FRACTION

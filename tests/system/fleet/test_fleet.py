@@ -8,17 +8,18 @@ import pytest
 from common.airframe import load_airframe
 from mission.client import ScriptError
 from mission.fleet.fleet_flight import FleetFlight
+from mission.fleet.fleet_options import Member
 from mission.fleet.fleet_script import Fleet
-from mission.fleet.roster import fleet_configs, start_of
+from mission.fleet.roster import fleet_configs
 from mission.flight import Flight
-from mission.flight_config import FlightConfig
+from mission.flight_config import FlightConfig, start_of
 from mission.plan.plan_file import default_plan, moved_plan, read_plan
 from mission.script import fly_plan
 from mission.simulator.flight_rig import flight_world
 from sim.world.world import WorldConfig
 
 BASE = FlightConfig(wind_m_s=3.0, world=WorldConfig(size_m=300.0, trees_per_ha=20.0))
-MIXED = ("x500", "rover", "x500", "rover-skid")
+MIXED = [Member(name) for name in ("x500", "rover", "x500", "rover-skid")]
 LOGS = ("flight.ulg", "flight.tlog")
 
 

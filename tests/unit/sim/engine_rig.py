@@ -35,8 +35,10 @@ class Sequence:
     def boot(self, is_chosen):
         pass
 
-    def exchange(self, samples, truth, commands):  # noqa: ARG002
+    def give(self, samples, truth):  # noqa: ARG002
         self._ticks += 1
+
+    def take(self, commands):
         asked = next(command for until_s, command in self._commands if self._ticks * TICK_S <= until_s)
         rows = commands.numpy()
         rows[:] = asked if np.isscalar(asked) else np.resize([*asked, *np.zeros(8 - len(asked))], 8)

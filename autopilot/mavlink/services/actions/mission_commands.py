@@ -118,9 +118,10 @@ class MissionCommands(Service):
         return self._endpoint.vehicle.guidance.fly_return_path()
 
     def _go_around(self, command: Command) -> Reply:
-        """Climbs away from a landing and holds.
+        """Climbs away from a landing and holds; a plane goes round: it circles the touchdown until it is asked to land.
 
-        Params: p1 height above home [m], at least MIS_TAKEOFF_ALT; 0 or NaN: that.
+        Params: p1 height above home [m], at least MIS_TAKEOFF_ALT; 0 or NaN: that. Of a plane above the touchdown, at
+        least MIS_LND_ABRT_ALT.
         Refused: TEMPORARILY_REJECTED unless the vehicle is on its last descent, or without a position.
         """
         return self._endpoint.vehicle.guidance.abort_landing(command.p1)

@@ -138,6 +138,12 @@ class PlaneReturn(FlightMode):
         elif is_round(context, self._centre):
             self._arrive()
 
+    def go_around(self, height_m: float) -> Reply:
+        if not self._is_landing:
+            return super().go_around(height_m)
+        is_mission = self._destination.landing_item is not None
+        return self._mission.go_around(height_m) if is_mission else self._approach.go_around(height_m)
+
     def _arrive(self) -> None:
         context, destination = self._context, self._destination
         if destination.landing_item is not None:

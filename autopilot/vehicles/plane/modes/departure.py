@@ -1,10 +1,12 @@
-"""Take-off from a runway: along the heading that it stands at, until the airspeed carries it, then a climb straight on.
+"""Take-off from a runway or out of the hand, then a climb straight on.
 
-PX4's runway take-off (RWTO_*). The first metres of the climb are flown with the wings nearly level: the line leads on.
+PX4's runway take-off (RWTO_*): along the heading that it stands at, until the airspeed carries it. With launch
+detection (FW_LAUN_*): the motor stands until the plane feels that it was thrown, and FW_LAUN_MOT_DEL longer. The first
+metres of the climb are flown with the wings nearly level: the line leads on.
 """
 
 from enum import IntEnum
-from math import cos, inf, isfinite, nan, sin
+from math import cos, inf, isfinite, nan, radians, sin
 
 from autopilot.interface.client_requests import TakeOff
 from autopilot.interface.mode_spec import FlightMode
@@ -13,6 +15,7 @@ from autopilot.navigator.context import NavContext
 from autopilot.navigator.modes.takeoff import takeoff_refusal
 from autopilot.navigator.setpoint import Vector
 from autopilot.ports import AIRSPEED_VALID
+from autopilot.vehicles.plane.modes.launch import LaunchDetector
 
 _FAR_M = 10_000.0  # of the line along the runway
 _REACHED_M = 2.0  # below the height asked for, at which a take-off ends; guess
@@ -21,7 +24,8 @@ _REACHED_M = 2.0  # below the height asked for, at which a take-off ends; guess
 class _Phase(IntEnum):
     STAND = 0
     RUN = 1
-    CLIMB = 2
+    THROWN = 2  # the motor is yet to start
+    CLIMB = 3
 
 
 def airspeed_of(context: NavContext) -> float:
@@ -36,10 +40,11 @@ def airspeed_of(context: NavContext) -> float:
 class Departure:
     """One take-off; in the air it is a climb straight on."""
 
-    __slots__ = ("_context", "_far", "_phase", "_run_us", "_start", "_target_d", "_yaw")
+    __slots__ = ("_context", "_far", "_launch", "_phase", "_run_us", "_start", "_target_d", "_yaw")
 
     def __init__(self, context: NavContext) -> None:
         self._context = context
+        self._launch = LaunchDetector(context)
         self._phase = _Phase.STAND
         self._target_d = 0.0  # [m]
         self._yaw = 0.0  # [rad]
@@ -51,35 +56,64 @@ class Departure:
         """Prepares a take-off to the down coordinate `target_d` [m]."""
         self._target_d = target_d
         self._phase = _Phase.STAND
+        self._launch.start()
 
     def frame(self) -> bool:
         """Flies on; true once the height is reached."""
         context = self._context
-        if context.is_on_ground:
-            context.wants_lift = True
-            return False
         state = context.state
+        if context.is_on_ground:
+            if self._phase is not _Phase.STAND:  # back on the ground: another throw, another run
+                self._phase = _Phase.STAND
+                self._launch.start()
+            context.wants_lift = not self._launch.is_used or self._launch.frame()
+            state.awaits_launch = not context.wants_lift
+            return False
         if self._phase is _Phase.STAND:
             self._begin()
-        if self._phase is _Phase.RUN:
-            ramp = (state.time_us - self._run_us) * 1e-6 / context.number("RWTO_RAMP_TIME")
-            context.setpoint.drive(throttle=min(ramp, 1.0) * context.number("RWTO_MAX_THR"), yaw=self._yaw)
-            if airspeed_of(context) < self._rotation_m_s():
-                return False
+        if (self._phase is _Phase.RUN and not self._runs_fast()) or (
+            self._phase is _Phase.THROWN and not self._starts_motor()
+        ):
+            return False
+        if self._phase is not _Phase.CLIMB:
             self._phase = _Phase.CLIMB
-            context.setpoint.fly_to(self._far, nan, path_start_ned=self._start)
+            self._climb()
         return bool(state.estimate.pos_ned[2] < self._target_d + _REACHED_M)
+
+    def _runs_fast(self) -> bool:
+        """Rolls on; whether the airspeed carries it."""
+        context = self._context
+        ramp = (context.state.time_us - self._run_us) * 1e-6 / context.number("RWTO_RAMP_TIME")
+        context.setpoint.drive(throttle=min(ramp, 1.0) * context.number("RWTO_MAX_THR"), yaw=self._yaw)
+        return airspeed_of(context) >= self._rotation_m_s()
+
+    def _starts_motor(self) -> bool:
+        """Flies on level, nose up; whether the motor may start by now."""
+        context = self._context
+        if context.state.time_us - self._run_us >= 1e6 * context.number("FW_LAUN_MOT_DEL"):
+            return True
+        half = 0.5 * radians(context.number("FW_TKO_PITCH_MIN"))
+        context.setpoint.tilt((0.0, sin(half), 0.0, cos(half)), 0.0, 0.0)
+        return False
 
     def _begin(self) -> None:
         state = self._context.state
         north, east, down = state.estimate.pos_ned
         is_low = state.stand_ned is None or down > state.stand_ned[2] - 1.0
-        self._phase = _Phase.RUN if is_low else _Phase.CLIMB
+        if self._launch.is_thrown:
+            self._phase = _Phase.THROWN
+        else:
+            self._phase = _Phase.RUN if is_low else _Phase.CLIMB
         self._yaw, self._run_us = state.yaw_rad, state.time_us
         self._start = (north, east, nan)
-        self._far = (north + _FAR_M * cos(self._yaw), east + _FAR_M * sin(self._yaw), min(self._target_d, down) - 1.0)
+        self._far = (north + _FAR_M * cos(self._yaw), east + _FAR_M * sin(self._yaw), nan)
         if self._phase is _Phase.CLIMB:
-            self._context.setpoint.fly_to(self._far, nan, path_start_ned=self._start)
+            self._climb()
+
+    def _climb(self) -> None:
+        """As steeply as it can, as PX4's; straight on."""
+        most = self._context.number("FW_T_CLMB_MAX")
+        self._context.setpoint.glide(self._far, self._start, -most, airspeed=nan, throttle=nan)
 
     def _rotation_m_s(self) -> float:
         asked = self._context.number("RWTO_ROT_AIRSPD")
@@ -87,7 +121,7 @@ class Departure:
 
 
 class PlaneTakeoff(FlightMode):
-    """Mode Takeoff: a runway take-off to MIS_TAKEOFF_ALT or what was asked for, then Hold."""
+    """Mode Takeoff: a take-off to MIS_TAKEOFF_ALT or what was asked for, then Hold."""
 
     __slots__ = ("_alt_amsl_m", "_context", "_departure")
 

@@ -8,6 +8,7 @@ from enum import IntEnum
 from math import hypot, isfinite, nan, pi, radians, tan
 
 from autopilot.interface.item_lists import MissionItem
+from autopilot.interface.vehicle_state import Reply
 from autopilot.navigator.context import NavContext
 from autopilot.navigator.mission.item_commands import WAYPOINTS, Command, hold_time_s, is_here
 from autopilot.navigator.mission.mission_legs import Leg
@@ -22,7 +23,6 @@ from autopilot.vehicles.plane.modes.departure import Departure
 _AHEAD_M = 500.0  # of a way without an end
 _LOITERS = frozenset((Command.LOITER_UNLIMITED, Command.LOITER_TIME, Command.LOITER_TURNS, Command.LOITER_TO_ALT))
 _BANKING_S = 0.8  # until it has banked, of a sharp turn; guess
-_TURNED_ROOM, _STRAIGHT_ROOM = 0.4, 0.9  # part of a line that the turn at its end may take; guess
 _LINED_UP_M = 150.0  # way to a landing from which a straight one has a direction; guess
 
 
@@ -47,11 +47,14 @@ class PlaneLeg(Leg):
         self._turned_rad = 0.0
         self._bearing = nan
         self._length = 0.0  # [m] of the line
-        self._begins_straight = False  # the line goes on from a take-off, without a turn
+        self._turned_m = 0.0  # of the line, that the turn at its beginning has taken
 
     def stop(self) -> None:
         """Another mode took over; the leg is remembered, so that it can be gone on with."""
         self._phase = _Stage.IDLE
+
+    def go_around(self, height_m: float) -> Reply:
+        return self._approach.go_around(height_m) if self._phase is _Stage.LAND else super().go_around(height_m)
 
     def forget(self) -> None:
         """The next leg begins where the vehicle is."""
@@ -61,6 +64,8 @@ class PlaneLeg(Leg):
         """Begins an item, from the place of the one before or from where the plane is."""
         context = self._context
         start = self.target if is_joined else None
+        if start is None:
+            self._turned_m = 0.0
         self._item, self._is_done, self._since_us = item, False, 0
         self._start = start or context.state.estimate.pos_ned
         if item.command == Command.LAND and context.is_on_ground:
@@ -110,7 +115,8 @@ class PlaneLeg(Leg):
 
     def _fly_item(self, item: MissionItem) -> None:
         context, command = self._context, item.command
-        self._begins_straight = self._phase is _Stage.DEPART
+        if self._phase is not _Stage.LINE:
+            self._turned_m = 0.0
         if command == Command.LAND:
             self._land(item)
         elif command == Command.CONTINUE_AND_CHANGE_ALT:
@@ -139,15 +145,20 @@ class PlaneLeg(Leg):
         here, goal = self._context.state.estimate.pos_ned, self._goal
         left_m = hypot(goal[0] - here[0], goal[1] - here[1])
         ahead = (goal[0] - here[0]) * (goal[0] - self._start[0]) + (goal[1] - here[1]) * (goal[1] - self._start[1])
-        if left_m > self._turn_begin(item) and ahead > 0.0:
+        begin_m = self._turn_begin(item)
+        if left_m > begin_m and ahead > 0.0:
             return
+        self._turned_m = begin_m
         if hold_time_s(item) > 0.0 or abs(here[2] - goal[2]) > self._context.alt_radius():
             self._go_round(item, goal)
         else:
             self._is_done = True
 
     def _turn_begin(self, item: MissionItem) -> float:
-        """[m] before a waypoint, at which the turn begins: that of a circle flown with HG_FW_ACC that touches both."""
+        """[m] before a waypoint, at which the turn begins: that of a circle flown with HG_FW_ACC that touches both.
+
+        It takes as much of the following line, and no more than the turn before has left of this one.
+        """
         context = self._context
         asked_m = max(item.params[1], abs(item.params[2])) if item.command in WAYPOINTS else 0.0
         radius = asked_m if asked_m > 0.0 else context.number("NAV_ACC_RAD")
@@ -160,8 +171,8 @@ class PlaneLeg(Leg):
         speed = hypot(vel_n, vel_e)
         turning_m = speed * speed / context.number("HG_FW_ACC")
         begin_m = turning_m * min(tan(min(half, 0.45 * pi)), 1.0) + min(half, 1.0) * _BANKING_S * speed
-        room = _STRAIGHT_ROOM if self._begins_straight else _TURNED_ROOM
-        return max(radius, min(begin_m, room * self._length))
+        following_m = hypot(following[0] - self._goal[0], following[1] - self._goal[1])
+        return max(radius, min(begin_m, self._length - self._turned_m, following_m))
 
     def _change_height(self, item: MissionItem) -> None:
         """Straight on over ground until the height is reached."""

@@ -21,15 +21,23 @@ def fly(*options):
     [
         (("--board", "px4", "--dialect", "ardupilot"), "--dialect and --board px4"),
         (("--board", "px4", "--noise", "0"), "--noise 0 and --board px4"),
-        (("--board", "px4", "--airframe", "rover"), "--board px4: it flies no rover here"),
         (("--board", "ardupilot", "--engine", "pybullet"), "only the native one"),
         (("--board", "ardupilot", "--command", "/no/such/program"), "--command /no/such/program"),
+        (("--board", "ardupilot", "--param", "SYSID_THISMAV=7"), "--param SYSID_THISMAV: the number of the vehicle"),
+        (("--board", "px4", "--airframe", "easyglider"), "nobody throws it"),
     ],
 )
 def test_what_cannot_be_flown_is_refused_with_a_sentence(options, sentence, tmp_path):
     result = fly(*options, "--instance", "50", "--run-folder", str(tmp_path / "run"))
     assert result.exit_code == 2
     assert sentence in result.stderr
+
+
+def test_a_program_finds_its_files_from_where_it_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    options = ("--idle", "--speed", "max", "--seconds", "60", "--instance", "50", "--run-folder", "run")
+    result = fly("--board", "ardupilot", *options, "--command", "cat {params}")
+    assert "ArduPilot | MAV_SYSID 51" in result.stdout
 
 
 def test_a_program_that_ends_ends_the_flight_with_a_sentence_and_its_logs(tmp_path, monkeypatch):

@@ -1,5 +1,7 @@
 """What an outside autopilot tells of itself stands where our flight controller's state and estimate would."""
 
+from math import pi
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,13 @@ def test_its_estimate_is_on_the_axes_at_home(px4):
     assert np.allclose(px4.rig.rows["autopilot.ekf.rows"][0]["estimate"]["pos_ned"], PLACE_NED, atol=0.02)
 
 
+def test_a_place_that_it_does_not_know_yet_is_none():
+    peer = Autopilot(ARDUPILOT, ArduPilotDrone)
+    peer.say("GLOBAL_POSITION_INT", lat=0, lon=0)
+    peer.frame()
+    assert peer.shown.state.estimate.pos_ned == pytest.approx((0.0, 0.0, 0.0))
+
+
 def test_mode_arming_battery_and_texts(px4):
     px4.say("HEARTBEAT", type=2, autopilot=12, base_mode=128 | 1, custom_mode=4 << 16 | 4 << 24)
     px4.say("SYS_STATUS", battery_remaining=51)
@@ -122,3 +131,43 @@ def test_an_ardupilots_mission_begins_with_home(ardupilot):
     assert [(item.seq, item.command) for item in sent[1:]] == [(0, 16), (1, 22), (2, 177)]
     assert sent[2].param4 == 0.0  # NaN is refused there
     assert sent[3].param1 == 1.0  # the jump leads to the same item
+
+
+def test_a_px4_that_counts_no_turns_circles_as_long_as_they_take():
+    autopilot = Autopilot(PX4, Px4Drone)
+    autopilot.say("HEARTBEAT", type=1, autopilot=12, base_mode=1, custom_mode=4 << 16 | 3 << 24)
+    autopilot.frame()
+    item = MissionItem(0, 3, 18, (2.0, 0.0, 80.0, 1.0), 47.4, 8.5, 60.0)
+    running = autopilot.drone.start(autopilot.drone.upload([item]))
+    autopilot.frame()
+    assert [m.fields.param_id for m in autopilot.asked() if m.name == "PARAM_REQUEST_READ"] == ["FW_AIRSPD_TRIM"]
+    autopilot.say("PARAM_VALUE", param_id="FW_AIRSPD_TRIM", param_value=0x41A00000, param_type=9)  # 20.0
+    autopilot.frame()
+    autopilot.say("MISSION_REQUEST_INT", seq=0)
+    autopilot.frame()
+    sent = next(m.fields for m in autopilot.asked() if m.name == "MISSION_ITEM_INT")
+    assert (sent.command, sent.param3, sent.param4) == (19, 80.0, 1.0)
+    assert sent.param1 == pytest.approx(2.0 * 2.0 * pi * 80.0 / 20.0)
+    autopilot.say("MISSION_ACK", type=0)
+    autopilot.frame()
+    assert running.is_done
+
+
+@pytest.mark.parametrize(("mav_type", "modes"), [(1, [1, 4]), (2, [])])
+def test_a_plane_of_px4_passes_through_a_mode_that_holds_no_height_before_it_is_ready(mav_type, modes):
+    autopilot = Autopilot(PX4, Px4Drone)
+    custom_mode, chosen = 4 << 16 | 3 << 24, []
+    running = autopilot.drone.start(autopilot.drone.wait_ready())
+    for _ in range(200):
+        autopilot.say("HEARTBEAT", type=mav_type, autopilot=12, base_mode=1, custom_mode=custom_mode)
+        autopilot.say("SYS_STATUS", onboard_control_sensors_health=1 << 28)
+        autopilot.say("HOME_POSITION", latitude=474000000, longitude=85000000)
+        autopilot.frame()
+        for message in autopilot.asked():
+            if message.name == "COMMAND_LONG" and message.fields.command == 176:
+                chosen.append(int(message.fields.param2))
+                custom_mode = chosen[-1] << 16 | int(message.fields.param3) << 24
+                autopilot.say("COMMAND_ACK", command=176, result=0)
+    assert running.is_done
+    assert running.error is None
+    assert chosen == modes

@@ -11,10 +11,10 @@ from mission.cli import app
 from mission.client import ScriptError
 from mission.connections import open_links
 from mission.console.option_checks import UserError
-from mission.fleet.fleet_options import airframes_of
+from mission.fleet.fleet_options import Member, members_of
 from mission.fleet.fleet_script import Fleet
-from mission.fleet.roster import check_fleet_parameters, fleet_configs, free_places, start_of
-from mission.flight_config import AIRFIELD, FlightConfig
+from mission.fleet.roster import check_fleet_parameters, fleet_configs, free_places
+from mission.flight_config import AIRFIELD, FlightConfig, start_of
 from mission.flight_settings import FlightOptions
 from mission.view.replay_file import load_recording
 from sim.world.world import WorldConfig, build_world
@@ -23,23 +23,33 @@ from tests.system.vehicle import free_ports
 FLAT = WorldConfig(size_m=100.0, hill_height_m=0.0, trees_per_ha=0.0)
 
 
+def members(*airframes):
+    return [Member(name) for name in airframes]
+
+
 @pytest.mark.parametrize(
-    ("text", "airframes"),
+    ("text", "members"),
     [
-        ("3", ["f450"] * 3),
-        ("x500:2,rover:1", ["x500", "x500", "rover"]),
-        ("dir/my:own.toml:1", ["dir/my:own.toml"]),
-        ("100", ["f450"] * 100),
+        ("3", [("f450", "own")] * 3),
+        ("x500:2,rover:1", [("x500", "own"), ("x500", "own"), ("rover", "own")]),
+        ("x500@px4:1,rover@ardupilot:1,x500:1", [("x500", "px4"), ("rover", "ardupilot"), ("x500", "own")]),
+        ("dir/my:own.toml:1", [("dir/my:own.toml", "own")]),
+        ("100", [("f450", "own")] * 100),
     ],
 )
-def test_the_airframes_are_those_that_the_text_says(text, airframes):
-    assert airframes_of(text, "f450") == airframes
+def test_the_vehicles_are_those_that_the_text_says(text, members):
+    assert members_of(text, "f450") == members
+
+
+def test_a_board_that_is_given_once_flies_those_of_which_the_text_names_none():
+    assert members_of("2", "f450", "px4") == [Member("f450", "px4")] * 2
+    assert members_of("x500:1,x500@own:1", "f450", "px4") == [Member("x500", "px4"), Member("x500", "own")]
 
 
 @pytest.mark.parametrize("text", ["", "x500", "0", "101", "x500:2,3", "x500:-1", "x500:", "9999999999999"])
 def test_what_says_no_vehicles_is_refused_in_a_sentence(text):
     with pytest.raises(UserError, match=r"^--vehicles .*: must be"):
-        airframes_of(text, "x500")
+        members_of(text, "x500")
 
 
 def test_vehicles_stand_apart_on_free_level_ground_the_first_at_home():
@@ -59,7 +69,7 @@ def test_a_world_without_room_says_for_how_many_it_has():
 
 def test_each_has_an_id_a_seed_and_a_place_of_its_own_and_the_parameters_that_it_knows():
     base = FlightConfig(seed=2**31 - 1, parameters={"MPC_XY_CRUISE": 3.0})
-    configs = fleet_configs(base, ["x500", "rover", "x500"], build_world(FLAT))
+    configs = fleet_configs(base, members("x500", "rover", "x500"), build_world(FLAT))
     assert [config.parameters["MAV_SYS_ID"] for config in configs] == [1, 2, 3]
     assert [config.seed for config in configs] == [2**31 - 1, 0, 1]
     assert ["MPC_XY_CRUISE" in config.parameters for config in configs] == [True, False, True]
@@ -68,10 +78,12 @@ def test_each_has_an_id_a_seed_and_a_place_of_its_own_and_the_parameters_that_it
 
 
 def test_a_parameter_must_be_one_of_some_vehicle():
-    check_fleet_parameters(FlightConfig(parameters={"MPC_XY_CRUISE": 3.0, "RO_SPEED_LIM": 2.0}), ["rover", "x500"])
+    check_fleet_parameters(
+        FlightConfig(parameters={"MPC_XY_CRUISE": 3.0, "RO_SPEED_LIM": 2.0}), members("rover", "x500")
+    )
     for parameters in ({"MPC_XY_CRUISE": 3.0}, {"NONE_SUCH": 1.0}, {"RO_SPEED_LIM": -5.0}):
         with pytest.raises(ParameterError, match=next(iter(parameters))):
-            check_fleet_parameters(FlightConfig(parameters=parameters), ["rover"])
+            check_fleet_parameters(FlightConfig(parameters=parameters), members("rover"))
 
 
 def test_ports_are_numbered_as_the_simulators_of_px4_and_ardupilot_do():

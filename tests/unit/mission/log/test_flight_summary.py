@@ -40,6 +40,7 @@ def history_of(frames, **changes):
         "mode": np.full(frames, int(Mode.MISSION)),
         "mission_seq": np.zeros(frames, int),
         "battery_remaining": np.ones(frames),
+        "airspeed": np.full(frames, np.nan),
     }
     return History(**fields | changes)
 

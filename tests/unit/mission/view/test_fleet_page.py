@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mission.fleet.fleet_flight import FleetFlight
+from mission.fleet.fleet_options import Member
 from mission.fleet.roster import fleet_configs
 from mission.flight import Flight
 from mission.flight_config import FlightConfig
@@ -38,7 +39,7 @@ def click(server, label):
 
 def fleet_of(airframes, folder=None):
     world = flight_world(PLAIN)
-    return FleetFlight(fleet_configs(PLAIN, airframes, world), world, folder=folder)
+    return FleetFlight(fleet_configs(PLAIN, [Member(name) for name in airframes], world), world, folder=folder)
 
 
 def test_who_is_chosen_is_commanded(page):

@@ -123,3 +123,23 @@ def test_a_wheel_that_rolls_forwards_has_its_top_move_ahead_and_points_where_it_
     assert rotated(shapes.wheel_attitude(0.1, 0.0), top_frd)[0] == pytest.approx(np.sin(0.1))
     axle_frd = rotated(shapes.wheel_attitude(2.0, 0.3), (0.0, 1.0, 0.0))
     assert axle_frd == pytest.approx((-np.sin(0.3), np.cos(0.3), 0.0), abs=1e-6)  # to the right: its left end is ahead
+
+
+@pytest.mark.parametrize("name", ["plane", "easyglider", "c172"])
+def test_a_plane_is_closed_and_as_large_as_its_file_says(name):
+    airframe = load_airframe(name)
+    body = shapes.vehicle(airframe).body
+    low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
+    assert volume(body) > 0.0
+    assert high[1] - low[1] == pytest.approx(airframe.wing.span_m, rel=1e-3)
+    assert high[0] == pytest.approx(airframe.hull.nose_x_m, abs=0.05)
+    assert -low[0] == pytest.approx(airframe.hull.tail_x_m, rel=0.2)
+    assert high[2] == pytest.approx(airframe.standing_height_m, rel=0.15)
+    assert low[2] < airframe.hull.tail_z_m  # the fin is up
+
+
+def test_the_red_wing_tip_is_the_left_one():
+    body = shapes.vehicle(load_airframe("easyglider")).body
+    is_red = (body.colours[:, 0] > 150) & (body.colours[:, 1] < 100)
+    assert (body.vertices[is_red][:, 1] < 0.0).all()
+    assert is_red.any()

@@ -5,10 +5,13 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import common as mavlink
 
+from autopilot.ports import Samples
 from bench.standins.px4 import Px4StandIn
 from common.clock import wall_sleep_s, wall_time_s
 from common.geodesy import DEFAULT_HOME
+from sim.boards.hil_wire import HilWriter
 from sim.boards.outside import PeerError
 from sim.boards.px4 import Px4Board
 from tests.unit.sim.boards.flown_by import rig_of, running
@@ -69,6 +72,36 @@ def test_what_it_reads_is_what_the_vehicle_feels():
         assert gps.fix_type >= 3
         assert gps.satellites_visible >= 6
         assert gps.alt == pytest.approx(truth.alt, abs=500)
+
+
+def test_the_pitot_tube_of_a_plane_is_read_in_hectopascals():
+    samples = np.zeros(1, dtype=Samples.numpy_dtype())[0]
+    samples["airspeed"]["pressure_pa"] = 278.0  # of 21.3 m/s at sea level
+    wire = mavlink.MAVLink(None)
+    for has_airspeed, expected in ((True, (2.78, 0x400)), (False, (0.0, 0))):
+        frame = HilWriter(DEFAULT_HOME).sensors(4_000, samples, has_mag=False, has_baro=True, has_airspeed=has_airspeed)
+        message = wire.parse_buffer(frame)[0]
+        assert (message.diff_pressure, message.fields_updated & 0x400) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("name", "count"), [("plane", 50), ("x500", 0)])
+def test_a_pitot_tube_is_read_where_there_is_one(name, count):
+    with rig_of(Px4Board, name, patience_s=0.3) as (rig, board):
+        made = []
+        fly(rig, connected(board, made, 1_000_000))
+        assert made[0].faults == []
+        assert made[0].counts["airspeed"] == pytest.approx(count, abs=2)
+        assert abs(made[0].pressure_pa) < 15.0  # it stands
+
+
+@pytest.mark.parametrize(
+    ("name", "moved"),
+    [("rover", [0.1, 0.2, 0.0]), ("rover-skid", [0.1, 0.2, 0.0]), ("plane", [0.1, 0.2, 0.3, 0.4, 0.5, 0.0])],
+)
+def test_its_controls_move_what_we_have_in_our_order_but_brakes(name, moved):
+    with rig_of(Px4Board, name, patience_s=0.3) as (rig, board):
+        fly(rig, connected(board, [], 100_000, control=lambda _: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]))
+        assert rig.board_commands.numpy()[0][: len(moved)] == pytest.approx(moved)
 
 
 def test_its_controls_reach_the_motors_of_their_numbers():

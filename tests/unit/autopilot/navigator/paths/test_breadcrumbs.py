@@ -7,22 +7,27 @@ import pytest
 
 from autopilot.navigator.paths.breadcrumbs import with_steps, without_loops, without_straights
 
-FRAME_S = 0.02
+COUNTED = 200_000  # takes Python half a frame of 20 ms on a machine that is fast enough to fly: a measure of this one
 
 
 def tidied(points, accuracy_m=2.0):
     return without_straights(without_loops(with_steps(points, accuracy_m), accuracy_m), 0.5 * accuracy_m)
 
 
+def cost_s(work):
+    start_s = thread_time()
+    work()
+    return thread_time() - start_s
+
+
 @pytest.mark.parametrize("step_m", [3.0, 30.0, 4000.0])
 def test_longest_track_is_tidied_within_a_frame(step_m):
     track = np.cumsum(np.random.default_rng(1).normal(0.0, step_m, (300, 3)), axis=0)
-    costs_s = []
+    costs_s, frames_s = [], []
     for _ in range(5):
-        start_s = thread_time()
-        tidied(track)
-        costs_s.append(thread_time() - start_s)
-    assert min(costs_s) < FRAME_S
+        costs_s.append(cost_s(lambda: tidied(track)))
+        frames_s.append(2.0 * cost_s(lambda: sum(k * k for k in range(COUNTED))))
+    assert min(costs_s) < min(frames_s)
 
 
 def test_steps_between_are_even_and_end_where_the_track_ends():

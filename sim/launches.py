@@ -1,4 +1,4 @@
-"""Rows of a batch split into chunks of nearly equal size, each gone through by a thread of its own.
+"""How kernels are launched: recorded once and made again, or by several threads for the rows of a batch.
 
 Warp runs a kernel on one core of a CPU; launches of separate rows from separate threads use the others.
 """
@@ -6,10 +6,32 @@ Warp runs a kernel on one core of a CPU; launches of separate rows from separate
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from typing import Any
+
+
+class RecordedLaunches:
+    """Launches of one maker, made again while they are given the same arrays.
+
+    To pack the arguments of a launch takes as long as a small launch itself.
+
+    Args:
+        record: makes the launches for some arrays.
+    """
+
+    def __init__(self, record: Callable[..., list[Any]]) -> None:
+        self._record = record
+        self._given: tuple[Any, ...] | None = None
+        self._launches: list[Any] = []
+
+    def of(self, *arrays: Any) -> list[Any]:
+        """The launches for these arrays, made anew only if they are others than the last."""
+        if self._given != arrays:
+            self._given, self._launches = arrays, self._record(*arrays)
+        return self._launches
 
 
 class Workers:
-    """Threads for the rows of a batch; one chunk needs none.
+    """Threads for the rows of a batch, split into chunks of nearly equal size; one chunk needs none.
 
     Args:
         row_count: rows of the batch.

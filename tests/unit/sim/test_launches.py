@@ -1,6 +1,6 @@
 import pytest
 
-from sim.workers import Workers
+from sim.launches import Workers
 
 
 @pytest.mark.parametrize(("row_count", "threads"), [(1, 1), (7, 2), (64, 3), (2, 16)])
