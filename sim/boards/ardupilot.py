@@ -16,6 +16,7 @@ from common.kernels import MAX_MOTORS, SUBSTEPS, TICK_US
 from sim.boards.channels import Channel, commands_of
 from sim.boards.fast_imu import FastImu
 from sim.boards.json_wire import ServoPacket, airspeed_key, range_key, servo_packet, state_text
+from sim.boards.live_rows import LiveRows
 from sim.boards.outside import POLL_S, OnWait, PeerError
 from sim.rig import Rig
 
@@ -113,6 +114,7 @@ class ArduPilotBoard:
         self._answer = b""
         self._silent_s = 0.0  # of waiting, since it was heard
         self._truth = rig.arrays.truth.numpy()  # live
+        self._sample_rows, self._command_rows = LiveRows(), LiveRows()
         self._imu = FastImu(rig) if self.is_fast else None
 
     @property
@@ -132,14 +134,14 @@ class ArduPilotBoard:
         if self._sender is None:
             self._await([0.0] * MAX_MOTORS)  # which only begins the exchange
         self._time_ns += self._step_ns
-        row, truth_row = samples.numpy()[0], self._truth[0]
+        row, truth_row = self._sample_rows.of(samples)[0], self._truth[0]
         felt = self._felt(row["imu"])
         extras = airspeed_key(row["airspeed"], self._home.alt_m - truth_row["pos_ned"][2]) + range_key(row["range"])
         self._answer = state_text(self._time_ns, *felt, truth_row, extras, self._start_ne_m)
         self._send()
 
     def take(self, commands: Any) -> None:
-        self._await(commands.numpy()[0])
+        self._await(self._command_rows.of(commands)[0])
         self.exchange_count += 1
 
     def _felt(self, sample: Any) -> tuple[list[float], list[float]]:

@@ -20,6 +20,7 @@ from sim.boards import betaflight_msp as msp
 from sim.boards.betaflight_sticks import AT_REST_US, Sticks
 from sim.boards.betaflight_wire import MOTOR_COUNT, PeerClock, motor_commands, state_packet, sticks_packet
 from sim.boards.fast_imu import FastImu
+from sim.boards.live_rows import LiveRows
 from sim.boards.outside import POLL_S, OnWait, PeerError
 from sim.boards.own import OwnBoard
 from sim.rig import Rig
@@ -90,6 +91,7 @@ class BetaflightBoard:
         self._setpoint, self._control = autopilot.setpoint.numpy()[0], autopilot.control.numpy()[0]  # live
         self._estimate = autopilot.ekf.rows.numpy()[0]["estimate"]
         self._clock = PeerClock()
+        self._sample_rows, self._command_rows = LiveRows(), LiveRows()
         self._sender: Any = None
         self._is_to_disarm = False  # it has started while our flight controller was armed
         self._unarmed_us = 0  # for how long it has been asked to arm in vain
@@ -115,7 +117,7 @@ class BetaflightBoard:
         if self._sender is None:
             self._await()
         if self._substep == 0:
-            self._move_sticks(samples.numpy()[0])
+            self._move_sticks(self._sample_rows.of(samples)[0])
         self._substep = (self._substep + 1) % SUBSTEPS
         self._drain()
         self._send_state(RUNNING)
@@ -123,7 +125,7 @@ class BetaflightBoard:
     def take(self, commands: Any) -> None:
         self._hear()
         self.exchange_count += 1
-        commands.numpy()[0][:MOTOR_COUNT] = self._commands
+        self._command_rows.of(commands)[0][:MOTOR_COUNT] = self._commands
         self._control["actuators"]["command"][:MOTOR_COUNT] = self._commands  # who reads what was flown reads it there
 
     def _move_sticks(self, samples: Any) -> None:

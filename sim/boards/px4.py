@@ -16,6 +16,7 @@ from common.geodesy import GeoPoint
 from common.kernels import TICK_S, TICK_US
 from sim.boards.channels import Channel, commands_of
 from sim.boards.hil_wire import ACTUATORS_ID, SAFETY_ARMED, HilWriter
+from sim.boards.live_rows import LiveRows
 from sim.boards.outside import POLL_S, OnWait, PeerError
 from sim.rig import Rig
 
@@ -73,6 +74,7 @@ class Px4Board:
         self.local_port: int = self._server.getsockname()[1]
         self._writer = HilWriter(home)
         self._truth = rig.arrays.truth.numpy()[0]  # live
+        self._sample_rows, self._command_rows = LiveRows(), LiveRows()
         self._sent_us = dict.fromkeys(("mag", "baro", "gnss", "range", "airspeed"), 0)  # times of the samples sent last
         self._peer: socket.socket | None = None
         self._given_s = 0.0  # when samples were sent last
@@ -104,10 +106,10 @@ class Px4Board:
             self._accept()
         self._time_us += TICK_US
         self._given_s = wall_time_s()
-        self._send(samples.numpy()[0])
+        self._send(self._sample_rows.of(samples)[0])
 
     def take(self, commands: Any) -> None:
-        row = commands.numpy()[0]
+        row = self._command_rows.of(commands)[0]
         if self._answered_us == 0:  # who has just connected commands nothing
             row[:] = 0.0
         self._listen(row, self._given_s)

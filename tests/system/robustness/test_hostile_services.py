@@ -1,6 +1,6 @@
 """A hostile client per service: whatever it asks for, no frame of the flight takes longer than a frame lasts.
 
-Time is the processor time of the flight's thread, so that a loaded machine does not matter.
+Time is the processor time of the flight's thread, so that a loaded machine does not matter; a slow one is given longer.
 """
 
 import gc
@@ -10,7 +10,6 @@ import tty
 from contextlib import ExitStack, suppress
 from itertools import count, cycle
 from struct import Struct
-from time import thread_time
 from types import SimpleNamespace
 
 import numpy as np
@@ -29,8 +28,8 @@ from mission.flight import Flight, FlightConfig
 from mission.follow.image_server import ImageServer
 from mission.log.stored_logs import LOGS_KEPT_MAX
 from sim.world.world import WorldConfig
+from tests.machine import cost_s, frame_s
 
-FRAME_MAX_S = 0.020
 FRAMES = 60
 STATIONS = 8
 PER_FRAME = 25  # of each station
@@ -72,9 +71,7 @@ class Attacked:
         while len(times) < 2 * frames or self.has_work():
             if len(times) < frames:
                 disturb()
-            start_s = thread_time()
-            self.flight.frame()
-            times.append(thread_time() - start_s)
+            times.append(cost_s(self.flight.frame))
             for station in self.stations:
                 station.receive()
         return sorted(times)[-2]
@@ -198,11 +195,9 @@ def test_who_first_asks_what_parameters_mean_makes_no_frame_long(attacked):
     for _ in range(10):  # whatever else is done for the first time
         attacked.flight.frame()
     attacked.stations[0].send(encode("COMMAND_LONG", 255, 190, 0, **US, command=512, param1=397.0))
-    start_s = thread_time()
-    attacked.flight.frame()
-    took_s = thread_time() - start_s
+    took_s = cost_s(attacked.flight.frame)
     assert any(frame.kind.name == "COMPONENT_METADATA" for frame in frames_of(attacked.stations[0]))
-    assert took_s < 0.5 * FRAME_MAX_S
+    assert took_s < 0.5 * frame_s()
 
 
 def frames_of(station):
@@ -215,7 +210,7 @@ def test_no_client_makes_a_frame_long(attacked, name):
     messages = ATTACKS[name](attacked.flight.server._endpoint.parameters.names)
     worst_s = attacked.worst_frame_s(lambda: attacked.send(messages))
     print(f"{name}: {1e3 * worst_s:.1f} ms")
-    assert worst_s < FRAME_MAX_S
+    assert worst_s < frame_s()
 
 
 VIRTUAL = {
@@ -238,7 +233,7 @@ def test_no_client_makes_a_frame_long_by_files_that_ardupilot_makes_on_demand(tm
         worst_s[how] = attacked.worst_frame_s(lambda messages=messages: attacked.send(messages))
     attacked.flight.close()
     print(", ".join(f"{how}: {1e3 * worst:.1f} ms" for how, worst in worst_s.items()))
-    assert max(worst_s.values()) < FRAME_MAX_S
+    assert max(worst_s.values()) < frame_s()
 
 
 HELLO = encode("HEARTBEAT", 255, 190, 0, type=6, autopilot=8)
@@ -293,4 +288,4 @@ def test_no_crowd_at_a_port_makes_a_frame_long(kind, tmp_path):
         worst_s = attacked.worst_frame_s(disturb)
         attacked.flight.close()
     print(f"{kind}: {1e3 * worst_s:.1f} ms")
-    assert worst_s < FRAME_MAX_S
+    assert worst_s < frame_s()

@@ -1,23 +1,14 @@
 """The vehicle's own track, made short: within its accuracy, without its loops, and within the time of a frame."""
 
-from time import thread_time
-
 import numpy as np
 import pytest
 
 from autopilot.navigator.paths.breadcrumbs import with_steps, without_loops, without_straights
-
-COUNTED = 200_000  # takes Python half a frame of 20 ms on a machine that is fast enough to fly: a measure of this one
+from tests.machine import cost_s, frame_s
 
 
 def tidied(points, accuracy_m=2.0):
     return without_straights(without_loops(with_steps(points, accuracy_m), accuracy_m), 0.5 * accuracy_m)
-
-
-def cost_s(work):
-    start_s = thread_time()
-    work()
-    return thread_time() - start_s
 
 
 @pytest.mark.parametrize("step_m", [3.0, 30.0, 4000.0])
@@ -26,7 +17,7 @@ def test_longest_track_is_tidied_within_a_frame(step_m):
     costs_s, frames_s = [], []
     for _ in range(5):
         costs_s.append(cost_s(lambda: tidied(track)))
-        frames_s.append(2.0 * cost_s(lambda: sum(k * k for k in range(COUNTED))))
+        frames_s.append(frame_s())
     assert min(costs_s) < min(frames_s)
 
 
