@@ -1,4 +1,4 @@
-"""GNSS lost while it follows: for a moment it goes on by its inertial navigation, then it lands; it is back for more."""
+"""GNSS lost while it follows: for a moment it goes on by inertial navigation, then it lands; later it flies again."""
 
 from types import SimpleNamespace
 
