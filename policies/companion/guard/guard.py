@@ -24,6 +24,7 @@ _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
 _YAW_MAX = 1.5  # [rad/s]
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 _CLIMB_M_S = 1.0
+_SINK_M_S = 0.3  # from above what it may be
 
 
 class Stance(Enum):
@@ -158,7 +159,8 @@ class Guard:
         if own.range_m < s.height_min_m:
             return min(down, -0.5 * _CLIMB_M_S)
         if own.range_m > s.height_max_m:
-            return max(down, 0.0)
+            return max(down, _SINK_M_S)
+        down = max(down, -stopping_speed(s.height_max_m - own.range_m, s.reaction_s, _CLIMB_M_S))
         return min(down, stopping_speed(own.range_m - s.height_min_m, s.reaction_s, _CLIMB_M_S))
 
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
