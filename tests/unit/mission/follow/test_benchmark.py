@@ -95,7 +95,7 @@ def test_standing_and_following_again_are_counted_from_what_was_seen():
 
 def test_what_fell_short_is_named():
     good = Outcome(1, 0.99, False, False, 1.5, float("nan"), None, None, 0.0, 1.0, 10.0, 60.0, "")
-    bad = Outcome(3, 0.5, True, 0.4, float("nan"), None, None, 0.0, 1.0, 10.0, 20.0, "")
+    bad = Outcome(3, 0.5, True, True, 0.4, float("nan"), None, None, 0.0, 1.0, 10.0, 20.0, "")
     assert misses({"walk": [good]}) == []
     assert len(misses({"walk": [good, bad]})) == 2
 
