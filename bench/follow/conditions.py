@@ -1,8 +1,8 @@
-"""`python -m bench.follow.conditions POLICY… [--condition NAME]`: policies without images in harder conditions, in batch.
+"""`python -m bench.follow.conditions POLICY…`: policies without images in harder conditions, judged in batch.
 
 In: policy files of FollowMe with `observation=tracked`. Out: how long they stay in the band, and how smoothly, in
-worlds of the test split, without a guard; sights are drawn from the model that training has. What a policy comes to in flight
-only `honeyguide benchmark follow` tells: this takes a minute a policy, that an hour.
+worlds of the test split, without a guard; sights are drawn from the model that training has. What a policy comes to
+in flight only `honeyguide benchmark follow` tells: this takes a minute a policy, that an hour.
 """
 
 from pathlib import Path
