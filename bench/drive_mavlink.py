@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from bench.drive import AIMS, PAGE_FILE, SEED, Drives, judged
+from bench.drive import AIMS, FLOWN, PAGE_FILE, SEED, Drives, judged
+from bench.page_section import with_section
 from bench.row import machine
 from common.files import write_whole
 from mission.flight import FlightConfig
@@ -39,9 +40,8 @@ from sim.world.world import WorldMap
 SCENES = 300
 READY_S, ALL_S = 60.0, 240.0
 UNGUARDED = GuardSettings(is_on=False)  # the policy alone, as in the batch
-HEADING = "## Over MAVLink"
 SECTION = f"""\
-{HEADING}
+{FLOWN}
 
 The same policies, driven by their [companion](../how-to/companion.md): a goto is sent to it, estimate and ranges come
 to it as messages, its setpoints go to mode Offboard, without the guard. {{scenes}} scenes of each kind, one rover at
@@ -157,10 +157,8 @@ def write_section(policies: dict[str, Path], scenes: int) -> None:
     for preset, path in policies.items():
         lines.append(measured(preset, load_policy(path)[0], str(path), scenes))
         print(lines[-1], flush=True)
-    page = PAGE_FILE.read_text()
     section = SECTION.format(scenes=scenes, rows="\n".join(lines), machine=machine())
-    before = page[: page.find(HEADING)] if HEADING in page else f"{page}\n"
-    write_whole(PAGE_FILE, f"{before}{section}".encode())
+    write_whole(PAGE_FILE, with_section(PAGE_FILE.read_text(), FLOWN, section).encode())
 
 
 def main(arguments: list[str]) -> int:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.navigate import FLOWN
+from bench.page_section import with_section
 from bench.row import machine
 from common.files import write_whole
 from mission.benchmark.goal_flights import Crossing
@@ -84,10 +85,8 @@ def main(arguments: list[str]) -> int:
         forest = Forest(trees_per_ha, 0.0, 0.0, 1.0)
         crossings = [cross(pilot, forest, FIRST_SEED + 2 * (i + k * FLIGHTS), UNGUARDED) for i in range(count)]
         lines.append(told(trees_per_ha, crossings))
-    page = PAGE.read_text()
     section = SECTION.format(flights=count, rows="\n".join(lines), machine=machine())
-    before = page[: page.find(FLOWN)] if FLOWN in page else f"{page}\n"
-    write_whole(PAGE, f"{before}{section}".encode())
+    write_whole(PAGE, with_section(PAGE.read_text(), FLOWN, section).encode())
     return 0
 
 

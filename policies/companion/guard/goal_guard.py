@@ -5,7 +5,7 @@ flown or driven, the stance, and what was done how often. Graded: slower, stop; 
 own map of the last scans and asks no policy.
 """
 
-from collections import Counter, deque
+from collections import Counter
 from enum import Enum
 from math import isfinite, radians, sin
 
@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import rotated, yaw_of
+from common.range_sectors import RangeLayout
 from policies.companion.guard.limits import (
     braking_speed,
     faded,
     stopping_speed,
     way_along_m,
     within_heights,
-    within_room,
 )
+from policies.companion.guard.rollouts import clear_velocity
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.ranges import Ranges
 from policies.companion.senses.local_map import LocalMap
@@ -30,7 +31,7 @@ from policies.companion.vehicle_link import NEVER_US, Own
 
 Floats = NDArray[np.float64]
 HEIGHT_OLD_US = 500_000  # a range to the ground measured longer ago tells nothing of it
-_SCANS = 3  # that what drives goes by: one in a hundred sectors misses what is there
+_MISSED_US = 300_000  # one in a hundred sectors misses what is there: so long what it told before counts
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
 _STEERED = 1.15  # [1/m] no car turns on less: 0.5 m between axles, 30 degrees
 _STANDS_M_S = 0.05
@@ -70,6 +71,7 @@ class GoalGuard:
         """The vehicle's clock and frame begin anew."""
         self._boot_us = 0
         self._map = LocalMap()
+        self._flown = np.zeros(2)  # what was let be flown last
         self._stamp_us = -1
         self.taken_us = NEVER_US
         """When the newest scan was taken, on the vehicle's clock."""
@@ -115,19 +117,19 @@ class GoalGuard:
         self._count(self.stance.value if self.stance is not GoalStance.FREE else "too fast", level, kept)
         return self._bounded(kept, scale * velocity[2], yaw_rate, own, age_s)
 
-    def _bounded(self, level: Floats, down: float, yaw_rate: float, own: Own, age_s: float) -> Velocity:
-        """A velocity as it can be stopped within what is clear, between the ground and the crowns."""
-        s = self.settings
-        free_m, known_m = self._map.clear_m(own.pos_ned, own.boot_us)
-        kept = within_room(level, self._map.units, free_m, known_m, self._delay_s(age_s), s, own.vel_ned)
+    def begin(self, own: Own) -> None:
+        """The policy takes over."""
+        self.stance = GoalStance.FREE
+        self._flown = np.array(own.vel_ned[:2])
+
+    def _bounded(self, level: Floats, down: float, yaw_rate: float, own: Own, age_s: float) -> Velocity:  # noqa: ARG002
+        """The nearest velocity that can be flown and stopped in what is clear, between the ground and the crowns."""
+        kept = clear_velocity(level, self._flown, own, self._map, self.settings)
+        self._flown = kept
         self._count("near something", level, kept)
         if not self._drives:
             down = self._within_heights(down, own)
         return (float(kept[0]), float(kept[1]), float(down)), yaw_rate
-
-    def _delay_s(self, age_s: float) -> float:
-        """From a scan to the motion that follows from it, at the latest."""
-        return age_s + self.settings.reaction_s + self.settings.goal_period_s
 
     def _trust(self, age_s: float, dark_s: float) -> tuple[float, float]:
         """Takes a stance; the fraction [1] that is flown of what is asked for, and the most [m/s]."""
@@ -170,15 +172,31 @@ class NoseGuard(GoalGuard):
 
     def _forget(self) -> None:
         super()._forget()
-        self._scans: deque[Floats] = deque(maxlen=_SCANS)  # what was solid in each, north and east [m]
+        self._points = np.zeros((0, 2))  # what is solid, north and east [m]
+        self._seen_us = np.zeros(0, np.int64)  # when each of them was
 
-    def _scanned(self, ranges: Ranges, pose: Pose, now_us: int) -> None:  # noqa: ARG002  (others need it)
+    def _scanned(self, ranges: Ranges, pose: Pose, now_us: int) -> None:
+        layout = ranges.layout
         bearings, sector_m = sectors_of(ranges)
-        is_return = sector_m < ranges.layout.range_m
-        third = radians(ranges.layout.sector_deg) / 3.0  # a return may be anywhere in its sector
-        angles = yaw_of(pose.q_ned_from_frd) + (bearings[is_return, None] + np.array([-third, 0.0, third]))
+        is_return = sector_m < layout.range_m
+        third = radians(layout.sector_deg) / 3.0  # a return may be anywhere in its sector
+        yaw = yaw_of(pose.q_ned_from_frd)
+        angles = yaw + (bearings[is_return, None] + np.array([-third, 0.0, third]))
         units = np.stack([np.cos(angles), np.sin(angles)], -1).reshape(-1, 2)
-        self._scans.append(np.array(pose.pos_ned[:2]) + np.repeat(sector_m[is_return], 3)[:, None] * units)
+        points = np.array(pose.pos_ned[:2]) + np.repeat(sector_m[is_return], 3)[:, None] * units
+        off = self._points - np.array(pose.pos_ned[:2])
+        sectors = self._sector_of(np.arctan2(off[:, 1], off[:, 0]) - yaw, layout)
+        has_missed = np.ones(layout.sectors, np.bool_)
+        has_missed[np.flatnonzero(ranges.is_known)[is_return]] = False
+        is_kept = has_missed[sectors] & (now_us - self._seen_us < _MISSED_US)
+        self._points = np.concatenate([points, self._points[is_kept]])
+        self._seen_us = np.concatenate([np.full(len(points), now_us), self._seen_us[is_kept]])
+
+    @staticmethod
+    def _sector_of(bearings_rad: Floats, layout: RangeLayout) -> NDArray[np.int64]:
+        """In which sector each of some bearings from the nose lies, of a ring all round."""
+        off_deg = np.degrees(bearings_rad) - layout.first_edge_deg
+        return np.floor(off_deg / layout.sector_deg).astype(np.int64) % layout.sectors
 
     def _bounded(self, level: Floats, down: float, yaw_rate: float, own: Own, age_s: float) -> Velocity:  # noqa: ARG002
         s, speed = self.settings, float(level[0])
@@ -187,16 +205,16 @@ class NoseGuard(GoalGuard):
         curvature = float(np.clip(yaw_rate / speed, -_STEERED, _STEERED))
         way_m = way_along_m(self._round(own), curvature, speed < 0.0, s)
         nose = rotated(own.q_ned_from_frd, (1.0, 0.0, 0.0))
+        delay_s = age_s + s.reaction_s + s.goal_period_s  # from the scan to the motion that follows, at the latest
         own_speed = np.copysign(1.0, speed) * float(np.dot(nose, own.vel_ned))
-        scale = min(1.0, braking_speed(way_m, own_speed, self._delay_s(age_s), s.brake) / abs(speed))
+        scale = min(1.0, braking_speed(way_m, own_speed, delay_s, s.brake) / abs(speed))
         self._count("near something", level, scale * level)
         return (scale * speed, 0.0, 0.0), scale * yaw_rate  # along the same arc
 
     def _round(self, own: Own) -> Floats:
         """What is solid, ahead and right of the vehicle [m]."""
-        points = np.concatenate(list(self._scans)) if self._scans else np.zeros((0, 2))
         yaw = yaw_of(own.q_ned_from_frd)
-        off = points - np.array(own.pos_ned[:2])
+        off = self._points - np.array(own.pos_ned[:2])
         cos, sine = np.cos(yaw), np.sin(yaw)
         return np.stack([off @ (cos, sine), off @ (-sine, cos)], -1)
 

@@ -5,12 +5,11 @@ from math import isfinite, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from common.attitude import Vector
 from policies.companion.guard.settings import GuardSettings
 
 Floats = NDArray[np.float64]
 CLIMB_M_S = 1.0
-_WAY_M, _STEP_M = 5.0, 0.05  # farther along an arc nothing is asked for
+_WAY_M, _STEP_M = 4.0, 0.02  # farther along an arc nothing is asked for
 
 
 def stopping_speed(free_m: float, delay_s: float, brake: float) -> float:
@@ -55,13 +54,7 @@ def kept_off(
 
 
 def within_room(
-    velocity: Floats,
-    units: Floats,
-    free_m: Floats,
-    known_m: Floats,
-    delay_s: float,
-    s: GuardSettings,
-    own_vel: Vector = (0.0, 0.0, 0.0),
+    velocity: Floats, units: Floats, free_m: Floats, known_m: Floats, delay_s: float, s: GuardSettings
 ) -> Floats:
     """The level velocity nearest to the wanted one that can be stopped within the free way in its direction.
 
@@ -72,17 +65,12 @@ def within_room(
         known_m: way without anything that is known to be solid: slowly it may go where it has not looked.
         delay_s: until it answers.
         s: of the guard.
-        own_vel: [m/s] that it has until then; zeros: that is wanted.
     """
     wanted = float(np.hypot(*velocity))
     if wanted < 1e-6:
         return velocity
-    along_own = units @ np.array(own_vel[:2])
     most, creeping = (
-        np.array(
-            [braking_speed(m - s.solid_m, own, delay_s, s.brake) for m, own in zip(room_m, along_own, strict=True)]
-        )
-        for room_m in (free_m, known_m)
+        np.array([stopping_speed(m - s.solid_m, delay_s, s.brake) for m in room_m]) for room_m in (free_m, known_m)
     )
     most = np.maximum(most, np.minimum(creeping, s.unseen_speed))
     k = np.argmax(units @ velocity)

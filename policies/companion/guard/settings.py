@@ -66,12 +66,12 @@ class GuardSettings(BaseModel):
     goal_reaction_s: float = Field(default=0.2, ge=0.0)
     """From a setpoint to the motion of whoever goes to goals, besides the age of the ranges; measured: 0.17 s."""
     goal_period_s: float = Field(default=0.1, ge=0.0)
-    """So long what is allowed is flown, until the next scan."""
+    """So long what is allowed is driven along the nose, until the next scan."""
     drive_brake: float = Field(default=2.5, gt=0.0)
     """[m/s²] with which what drives brakes; measured on the rover."""
     hull_half_length_m: float = Field(default=0.37, gt=0.0)
     """Of what is driven along its nose; those of the rover."""
     hull_half_width_m: float = Field(default=0.22, gt=0.0)
     """Likewise."""
-    hull_room_m: float = Field(default=0.05, ge=0.0)
+    hull_room_m: float = Field(default=0.02, ge=0.0)
     """It comes no nearer to anything with its hull."""

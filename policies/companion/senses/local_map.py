@@ -17,6 +17,7 @@ from policies.tasks.follow_me.tracked import SECTORS
 CELL_M = 0.25
 CELLS = 96  # of a side: 12 m to each
 DIRECTIONS = 36
+ROOM_M = 1.0  # more room about a place is not told
 REACH_M = 10.0  # farther nothing is asked for
 _ABOVE_M, _BELOW_M = 0.7, 0.4  # of the slice that the vehicle flies through; guess: its own height twice
 _NO_RETURN_M = 4.0  # so far a column without any return is taken to be free, if others have some; guess
@@ -141,6 +142,25 @@ class LocalMap:
         is_solid = (solid > then) & (solid >= free)
         is_free = (free > then) & ~is_solid
         return self._length_m(is_free), self._length_m(~is_solid)
+
+    def room(self, points: Floats, pos_ned: Vector, now_us: int) -> tuple[Floats, NDArray[np.bool_]]:
+        """How far the nearest solid cell's middle is from each of some places [m], and where it was seen to be free.
+
+        Farther than ROOM_M is told as that; shapes as of the points, without their last axis.
+        """
+        self._follow(pos_ned)
+        then = now_us - _HOLD_US
+        solid = (self._solid_us > then) & (self._solid_us >= self._free_us)
+        near = np.full((CELLS, CELLS), ROOM_M)
+        reach = int(ROOM_M / CELL_M)
+        for i in range(-reach, reach + 1):
+            for j in range(-reach, reach + 1):
+                if hypot(i, j) * CELL_M < ROOM_M:
+                    near = np.minimum(near, np.where(np.roll(solid, (i, j), (0, 1)), hypot(i, j) * CELL_M, ROOM_M))
+        rows, columns = self._cells(points.reshape(-1, 2))
+        shape = points.shape[:-1]
+        is_seen = (self._free_us > then)[rows, columns]
+        return near[rows, columns].reshape(shape), is_seen.reshape(shape)
 
     def nearest_m(self, pos_ned: Vector, yaw_rad: float, now_us: int) -> Floats:
         """How near anything known to be solid is in each of SECTORS sectors from the heading clockwise [m]."""

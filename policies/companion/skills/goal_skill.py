@@ -77,8 +77,11 @@ class GoalSkill:
     def loss(self, own: Own) -> str:  # noqa: ARG002
         return "" if self.goals.goal is not None else self.goals.done or NO_GOAL
 
-    def begin(self, own: Own) -> None:  # noqa: ARG002
+    def begin(self, own: Own) -> None:
         self._forget()
+        self._stance = GoalStance.FREE
+        if self.guard is not None:
+            self.guard.begin(own)
         self._decided_us = -DECISION_US
 
     def conclude(self, own: Own) -> None:
