@@ -15,6 +15,7 @@ import torch
 from numpy.typing import NDArray
 
 from bench.cars.run import Curve, changed
+from bench.page_section import kept_from
 from bench.row import machine
 from common.files import write_whole
 from policies.learn.config.load import load_config
@@ -33,6 +34,7 @@ from policies.tasks.intervals import bootstrap, rate
 
 LEGS = {"park": ("drive-park", "drive-park-careful"), "reach": ("drive-reach",)}
 AIMS = {"park": "97 %", "reach": "95 %"}
+FLOWN = "## Over MAVLink"  # the section of bench.drive_mavlink
 EPISODES = 1000  # side by side: each environment plays one
 SEED = 1_000_003  # no training run is given it
 TRAINING_SEED = 1
@@ -137,7 +139,7 @@ def main(arguments: list[str]) -> int:
         print(lines[-1], flush=True)
     if lines:
         page = PAGE.format(episodes=EPISODES, rows="\n".join(lines), machine=machine())
-        write_whole(PAGE_FILE, page.encode())
+        write_whole(PAGE_FILE, (page + kept_from(PAGE_FILE.read_text(), FLOWN)).encode())
     if lines and "batch" not in arguments:
         from bench.drive_mavlink import SCENES, write_section  # which judges by this module
 

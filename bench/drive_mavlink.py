@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from bench.drive import AIMS, PAGE_FILE, SEED, Drives, judged
+from bench.drive import AIMS, FLOWN, PAGE_FILE, SEED, Drives, judged
+from bench.page_section import with_section
 from bench.row import machine
 from common.files import write_whole
 from mission.flight import FlightConfig
@@ -25,6 +26,7 @@ from mission.park.park_session import REVERSES
 from mission.park.parking import Arrival, drive, get_ready
 from mission.script import Drone, ScriptError
 from mission.view.pose_goals import Pose
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.vector_pilot import DrivingPilot
 from policies.learn.export.policy_file import load_policy
 from policies.learn.export.policy_path import find_policy
@@ -37,14 +39,14 @@ from sim.world.world import WorldMap
 
 SCENES = 300
 READY_S, ALL_S = 60.0, 240.0
-HEADING = "## Over MAVLink"
+UNGUARDED = GuardSettings(is_on=False)  # the policy alone, as in the batch
 SECTION = f"""\
-{HEADING}
+{FLOWN}
 
 The same policies, driven by their [companion](../how-to/companion.md): a goto is sent to it, estimate and ranges come
-to it as messages, its setpoints go to mode Offboard. {{scenes}} scenes of each kind, one rover at a time, in lockstep;
-the batch plays the same scenes beside it. There is success when it has been handed back in mode Hold, and 2 s later
-stands in the pose as above, by the truth. Made by `python -m bench.drive_mavlink`.
+to it as messages, its setpoints go to mode Offboard, without the guard. {{scenes}} scenes of each kind, one rover at
+a time, in lockstep; the batch plays the same scenes beside it. There is success when it has been handed back in mode
+Hold, and 2 s later stands in the pose as above, by the truth. Made by `python -m bench.drive_mavlink`.
 
 | policy | over MAVLink | batch, same scenes | touched | not there | time to the goal |
 |---|---|---|---|---|---|
@@ -98,7 +100,7 @@ def driven(scene: Scene, pilot: DrivingPilot, *, is_by_sticks: bool = False) -> 
         noise=scene.noise,
         parameters=REVERSES,
     )
-    flight, companion = flight_with_driver(config, pilot, is_by_sticks=is_by_sticks, world=scene.world)
+    flight, companion = flight_with_driver(config, pilot, is_by_sticks=is_by_sticks, world=scene.world, guard=UNGUARDED)
     try:
         for name in ("model", "body", "truth"):  # as the episode's vehicle stands there
             flight.rig.rows[name][0] = scene.rows[name]
@@ -155,10 +157,8 @@ def write_section(policies: dict[str, Path], scenes: int) -> None:
     for preset, path in policies.items():
         lines.append(measured(preset, load_policy(path)[0], str(path), scenes))
         print(lines[-1], flush=True)
-    page = PAGE_FILE.read_text()
     section = SECTION.format(scenes=scenes, rows="\n".join(lines), machine=machine())
-    before = page[: page.find(HEADING)] if HEADING in page else f"{page}\n"
-    write_whole(PAGE_FILE, f"{before}{section}".encode())
+    write_whole(PAGE_FILE, with_section(PAGE_FILE.read_text(), FLOWN, section).encode())
 
 
 def main(arguments: list[str]) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from bench.page_section import kept_from
 from bench.row import machine
 from common.files import write_whole
 from policies.learn.export.policy_file import load_policy
@@ -159,12 +160,6 @@ def top_view(settings: dict[str, str], flights: Flights, trees_per_ha: float) ->
     return np.vstack([np.hstack(tiles[k : k + 3]) for k in range(0, len(tiles) - 2, 3)])
 
 
-def flown_section(page: str) -> str:
-    """What bench.navigate_mavlink has written at the page's end."""
-    at = page.find(FLOWN)
-    return "" if at < 0 else f"\n{page[at:]}"
-
-
 def main(arguments: list[str]) -> int:
     policy, card = load_policy(Path(arguments[0]) if arguments else find_policy("navigate"))
     settings = {key: str(value) for key, value in card.settings.items()} | {"has_estimator": "true"}
@@ -179,7 +174,7 @@ def main(arguments: list[str]) -> int:
     (DOCS / "images").mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(DOCS / "images" / "navigate.jpg"), image[..., ::-1], (cv2.IMWRITE_JPEG_QUALITY, 82))
     page = PAGE.format(episodes=EPISODES, rows="\n".join(lines), machine=machine())
-    write_whole(DOCS / "navigate.md", (page + flown_section((DOCS / "navigate.md").read_text())).encode())
+    write_whole(DOCS / "navigate.md", (page + kept_from((DOCS / "navigate.md").read_text(), FLOWN)).encode())
     return 0
 
 

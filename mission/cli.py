@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from mission.benchmark import benchmark_command
 from mission.console.command_refusal import refuse
 from mission.console.late_command import LateCommand
 from mission.console.name_checks import check_file
@@ -136,7 +137,7 @@ for _command in (task_commands.demonstrate, task_commands.play, task_commands.dr
     app.command()(_command)
 app.command(cls=LateCommand)(follow_commands.follow)
 app.command()(follow_commands.companion)
-app.command()(follow_commands.benchmark)
+app.command()(benchmark_command.benchmark)
 app.command(cls=LateCommand)(park_command.park)
 app.command()(replay_command.replay)
 app.command(context_settings={"allow_extra_args": True})(training_commands.train)

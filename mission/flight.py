@@ -211,7 +211,8 @@ class Flight(FlightBase):
         base = [BaseStation(system_id)] if config.has_base else []
         if not config.is_forest:
             return base
-        return [ScannerDevice(Scanner(self.rig, self.world, config.noise, config.seed), system_id), *base]
+        scanner = Scanner(self.rig, self.world, config.noise, config.seed)
+        return [ScannerDevice(scanner, system_id, round(config.scan_lag_s * 1e6)), *base]
 
     def _start_cameras(self) -> None:
         cast = None if self.owner is None else self.owner.cast.rows

@@ -54,6 +54,8 @@ class FlightConfig(FlightSettings):
     """The date of power-on, as Unix time, in lockstep; a flight that is paced by the wall clock takes the wall's."""
     is_forest: bool = False
     """The vehicle carries the scanner that policies of Navigate see by; the world is grown as in their training."""
+    scan_lag_s: float = Field(default=0.0, ge=0.0, le=1.0)
+    """From what this scanner measures to its messages, besides the frame that they take."""
     owner: OwnerConfig | None = None
     """Who walks through the world with a phone, to be followed; the vehicle then carries a camera for its companion."""
 

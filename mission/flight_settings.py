@@ -154,6 +154,7 @@ class ParkOptions(FlightOptions):
     is_reverse: bool = option(False, "Nose to the aisle: it reverses into the spot.", "--reverse")
     is_idle: bool = option(False, "Park nowhere by itself: wait for clicks on the page, and for gotos.", "--idle")
     airframe: str = option("rover", "Airframe name or TOML file; the policies were trained on rover.")
+    has_guard: bool = option(True, "A guard that does not believe the policy bounds it.", "--guard/--no-guard")
     world_kind: WorldKind = "car-park"
     has_lidar: bool = True
     has_base: bool = True
@@ -161,6 +162,6 @@ class ParkOptions(FlightOptions):
 
 PARKED_WITH = (
     "policy", "spot", "is_reverse", "is_idle", "speed", "seconds", "seed", "wind_m_s", "wind_from_deg", "noise",
-    "world_seed", "airframe", "parameters", "has_view", "view_port", "gcs_port", "api_port", "host",
+    "world_seed", "airframe", "parameters", "has_guard", "has_view", "view_port", "gcs_port", "api_port", "host",
     "run_folder",
 )  # fmt: skip

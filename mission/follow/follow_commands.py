@@ -1,7 +1,6 @@
 """The commands that follow somebody: `honeyguide follow`, and the companion computer alone, `companion`."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,7 +9,6 @@ from rich.console import Console
 from mission.console.command_refusal import learn_extra, refuse
 from mission.console.name_checks import check_policy
 from mission.console.terminal import loading
-from mission.follow.benchmark.conditions import BY_NAME, FIRST_SEED
 
 if TYPE_CHECKING:
     from mission.flight_settings import FollowOptions
@@ -48,7 +46,7 @@ def companion(
         bool, typer.Option("--follow", help="Go after the owner by a policy of Navigate, which else goes to gotos.")
     ] = False,
     guard: Annotated[
-        bool, typer.Option("--guard/--no-guard", help="A guard that does not believe a policy of FollowMe bounds it.")
+        bool, typer.Option("--guard/--no-guard", help="A guard that does not believe the policy bounds it.")
     ] = True,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this much wall clock time.")] = None,
 ) -> None:
@@ -64,39 +62,6 @@ def companion(
             typer.echo(run_companion(options, Console()))
         except CompanionError as error:
             refuse(str(error))
-
-
-def benchmark(
-    task: Annotated[str, typer.Argument(help="What is judged: follow.")],
-    policy: Annotated[
-        str, typer.Option(help="A policy of FollowMe: name, file or run; .onnx file; module:Class; 'scripted'.")
-    ] = "follow-me",
-    condition: Annotated[list[str] | None, typer.Option(help="One of them; repeatable. Default: all.")] = None,
-    flights: Annotated[int, typer.Option(min=1, help="Of each condition.")] = 60,
-    jobs: Annotated[int, typer.Option(min=1, help="Processes at a time.")] = 2,
-    seed: Annotated[int, typer.Option(min=1, help="Of the first flight; each next is 2 more.")] = FIRST_SEED,
-    guard: Annotated[bool, typer.Option("--guard/--no-guard", help="The guard bounds the policy.")] = True,
-    out: Annotated[Path | None, typer.Option(help="Folder for table.md and flights.json.")] = None,
-) -> None:
-    """Fly a policy through standard and harder conditions, over MAVLink, and show how often it follows and hits."""
-    with learn_extra():
-        unknown = [name for name in condition or () if name not in BY_NAME]
-        if task != "follow":
-            refuse(f"benchmark {task}: there is only follow")
-        if unknown:
-            refuse(f"--condition {unknown[0]}: there are {', '.join(BY_NAME)}")
-        with loading(Console()):
-            from mission.follow.benchmark.session import BenchmarkOptions, benchmark_session, misses
-            from policies.companion.pilot import PilotError
-        options = BenchmarkOptions(policy, tuple(condition or ()), flights, jobs, seed, guard, out)
-        try:
-            outcomes = benchmark_session(options)
-        except PilotError as error:
-            refuse(str(error))
-        found = misses(outcomes)
-        for text in found:
-            typer.echo(f"miss: {text}")
-        raise typer.Exit(1 if found else 0)
 
 
 def follow() -> Callable[..., None]:

@@ -48,7 +48,7 @@ def flight_with_companion(
         folder: of the logs.
         wall_s: a clock that the companion's latency is measured with.
         make_flight: takes the configuration, links and a folder.
-        guard: of a pilot that follows by sight; None: as it ships.
+        guard: who bounds the pilot; None: as it ships.
     """
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
     flight = make_flight(config, links=[vehicle_end, *links], folder=folder)
@@ -58,7 +58,7 @@ def flight_with_companion(
     flight.onboard.add_sink(camera.publish)
     skill: Skill
     if isinstance(pilot, NavigationPilot):
-        skill = Navigating(pilot, camera=camera)
+        skill = Navigating(pilot, camera=camera, guard=guard)
     else:
         skill = Following(camera, pilot, guard or GuardSettings())
     companion = Companion(companion_end, skill, is_reported=is_reported, wall_s=wall_s)
@@ -104,6 +104,7 @@ def flight_with_navigator(
     is_reported: bool = True,
     links: Sequence[Link | LinkSource] = (),
     folder: Path | None = None,
+    guard: GuardSettings | None = None,
 ) -> tuple[Flight, Companion]:
     """A flight, and the companion on board that navigates to each goto, and along the plan.
 
@@ -113,10 +114,12 @@ def flight_with_navigator(
         is_reported: False: it waits for the pilot to choose Offboard.
         links: of ground stations.
         folder: of the logs.
+        guard: who bounds the pilot; None: as it ships.
     """
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
     flight = Flight(config, links=[vehicle_end, *links], folder=folder)
-    companion = Companion(companion_end, Navigating(pilot, is_ordered_by_goto=is_reported), is_reported=is_reported)
+    skill = Navigating(pilot, is_ordered_by_goto=is_reported, guard=guard)
+    companion = Companion(companion_end, skill, is_reported=is_reported)
     flight.computers.append(companion)
     return flight, companion
 
@@ -130,6 +133,7 @@ def flight_with_driver(
     links: Sequence[Link | LinkSource] = (),
     folder: Path | None = None,
     world: WorldMap | None = None,
+    guard: GuardSettings | None = None,
 ) -> tuple[Flight, Companion]:
     """A rover's flight, and the companion on board that drives to each goto, and along the plan.
 
@@ -141,10 +145,11 @@ def flight_with_driver(
         links: of ground stations.
         folder: of the logs.
         world: the ground; None: as the configuration says.
+        guard: who bounds the pilot; None: as it ships.
     """
     vehicle_end, companion_end = memory_pair(LinkRole.ONBOARD)
     flight = Flight(config, links=[vehicle_end, *links], folder=folder, world=world)
-    skill = Driving(pilot, is_ordered_by_goto=is_reported)
+    skill = Driving(pilot, is_ordered_by_goto=is_reported, guard=guard)
     companion = Companion(companion_end, skill, is_reported=is_reported, is_by_sticks=is_by_sticks)
     flight.computers.append(companion)
     return flight, companion

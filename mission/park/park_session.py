@@ -35,6 +35,7 @@ from mission.simulator.flight_rig import flight_world
 from mission.view.pose_goals import Pose, PoseGoals
 from policies.companion.companion import Companion
 from policies.companion.engagement import Phase
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import PilotError
 from policies.companion.skills.driving import Driving
 from policies.companion.vector_pilot import DrivingPilot
@@ -83,7 +84,8 @@ def _park(options: ParkOptions, held: ExitStack) -> int:
         raise UserError(str(error)) from error
     page = open_page(options.view_port) if options.has_view else None
     folder = held.enter_context(run_folder(options.run_folder))
-    flight, companion = flight_with_driver(config, pilot, links=links, folder=folder)
+    guard = GuardSettings(is_on=options.has_guard)
+    flight, companion = flight_with_driver(config, pilot, links=links, folder=folder, guard=guard)
     arrivals: list[Arrival] = []
 
     async def script(drone: Drone) -> None:

@@ -4,13 +4,15 @@ In: ranges of the simulated sensor. Out: OBSTACLE_DISTANCE of the sectors, and a
 whose quaternion says where it looks from the body. The vehicle passes them on, as all that is for everybody.
 """
 
+from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import radians
 
 from autopilot.mavlink.client_end import ClientEnd
 from autopilot.mavlink.transport.links import LinkRole, memory_pair
 from autopilot.mavlink.wire.convert import UINT16_MAX, u16, wxyz_from_quat
-from common.attitude import inverse, product, quat_of, yaw_of
+from common.attitude import Quat, inverse, product, quat_of, yaw_of
 from common.range_sectors import BEAM_ELEVATIONS_DEG, FIRST_EDGE_DEG, RANGE_M, SECTOR_DEG, SECTORS
 from sim.sensors.scanner import Scanner
 
@@ -26,16 +28,27 @@ _FIRST_BEAM_ID = 1  # the range finder that looks down is 0
 _COVARIANCE_UNKNOWN = 255
 
 
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What was measured once."""
+
+    time_us: int
+    centimetres: Sequence[int]  # of the sectors and then of the beams
+    q_ned_from_frd: Quat  # that it was levelled by
+
+
 class ScannerDevice:
     """The scanner of one flight.
 
     Args:
         scanner: what it measures with.
         system_id: of the vehicle.
+        lag_us: from a scan to its messages, which say when it was taken.
     """
 
-    def __init__(self, scanner: Scanner, system_id: int) -> None:
-        self._scanner = scanner
+    def __init__(self, scanner: Scanner, system_id: int, lag_us: int = 0) -> None:
+        self._scanner, self._lag_us = scanner, lag_us
+        self._under_way: deque[Scan] = deque()
         self.vehicle_end, self._link = memory_pair(LinkRole.ONBOARD)
         self._client = ClientEnd(self._link, system_id, COMPONENT, vehicle_id=system_id)
         self._due_us = 0
@@ -50,8 +63,11 @@ class ScannerDevice:
                 REACH_CM + 1 if range_m >= RANGE_M else max(u16(100.0 * float(range_m)), LEAST_CM)
                 for range_m in self._scanner.measure(time_us)
             ]
-            self._tell_beams(time_us, centimetres[SECTORS:])
-            self._tell_sectors(time_us, centimetres[:SECTORS])
+            self._under_way.append(Scan(time_us, centimetres, self._scanner.q_ned_from_frd))
+        while self._under_way and time_us >= self._under_way[0].time_us + self._lag_us:
+            scan = self._under_way.popleft()
+            self._tell_beams(scan)
+            self._tell_sectors(scan.time_us, scan.centimetres[:SECTORS])
 
     def _tell_sectors(self, time_us: int, centimetres: Sequence[int]) -> None:
         self._client.send(
@@ -67,8 +83,8 @@ class ScannerDevice:
             frame=BODY_FRD,
         )
 
-    def _tell_beams(self, time_us: int, centimetres: Sequence[int]) -> None:
-        q_ned_from_frd = self._scanner.q_ned_from_frd
+    def _tell_beams(self, scan: Scan) -> None:
+        time_us, centimetres, q_ned_from_frd = scan.time_us, scan.centimetres[SECTORS:], scan.q_ned_from_frd
         heading = yaw_of(q_ned_from_frd)
         for i, (elevation_deg, distance_cm) in enumerate(zip(BEAM_ELEVATIONS_DEG, centimetres, strict=True)):
             q_frd_from_beam = product(inverse(q_ned_from_frd), quat_of(heading, radians(elevation_deg)))

@@ -2,7 +2,8 @@
 
 In: OBSTACLE_DISTANCE and DISTANCE_SENSOR, of whichever component of the vehicle's system. Out: ranges in the order of
 training. A tilted beam is a DISTANCE_SENSOR of orientation MAV_SENSOR_ROTATION_CUSTOM whose quaternion says where it
-looks; it counts for the elevation of the layout that it is nearest to once it is levelled.
+looks; it counts for the elevation of the layout that it is nearest to once it is levelled, by the attitude of when it
+was measured.
 """
 
 from functools import lru_cache
@@ -13,14 +14,16 @@ import numpy as np
 
 from autopilot.mavlink.wire.convert import UINT16_MAX, quat_from_wxyz
 from autopilot.mavlink.wire.number_bounds import is_known
-from common.attitude import rotated, yaw_of
+from common.attitude import Quat, rotated, yaw_of
 from common.range_sectors import SCANNER, RangeLayout
+from policies.companion.senses.poses import PoseHistory
 from policies.companion.skills.skill import Floats
 from policies.companion.vehicle_link import NEVER_US, VehicleLink
 
 SCAN_HZ = 20.0  # that the vehicle is asked for
 OLD_US = 500_000  # guess, as of images: five scans missed
 UNKNOWN_MAX = 1 / 8  # of the sectors; guess: six times what training has lost
+_STAMP_OLD_US = 5_000_000  # the sender's clock is another than the vehicle's if a scan seems older; guess
 _NORTH_FRAMES, _BODY_FRAMES = frozenset({0, 1}), frozenset({8, 12})  # MAV_FRAME
 _CUSTOM_ROTATION = 100  # MAV_SENSOR_ROTATION_CUSTOM
 _ELEVATION_OFF_DEG, _BEARING_OFF_DEG = 6.0, 20.0  # guess: the attitude is a frame older than the beam
@@ -39,13 +42,20 @@ class Ranges:
     def __init__(self, vehicle: VehicleLink, layout: RangeLayout = SCANNER, scan_hz: float = SCAN_HZ) -> None:
         beam_count = len(layout.beam_elevations_deg)
         self.ranges_m: Floats = np.full(layout.sectors + beam_count, layout.range_m, dtype=np.float32)
+        self.is_known = np.ones(layout.sectors, dtype=np.bool_)
+        """Of the sectors: something was told of them, and be it that nothing is there."""
         self.scan_us = NEVER_US  # when the newest sectors came in
-        self._layout = layout
+        self.stamp_us = -1  # the sender's time of them
+        self.taken_us = NEVER_US
+        """When they were measured, on the vehicle's clock."""
+        self.poses = PoseHistory()
+        """Of the vehicle, to say where it was then."""
+        self.layout = layout
         self._beam_us = [NEVER_US] * beam_count
         self._unknown_count = layout.sectors
-        self._stamp = -1  # the sender's time of the newest sectors
         self._is_new = False
-        self._own = vehicle.own
+        self._boot_us = NEVER_US
+        self._own, self._clock = vehicle.own, vehicle.clock
         system_id = vehicle.system_id
 
         def sectors(sysid: int, _: int, fields: Any, time_us: int) -> None:
@@ -60,16 +70,28 @@ class Ranges:
         if beam_count:
             vehicle.listen("DISTANCE_SENSOR", beam)
 
+    def follow(self) -> None:
+        """Remembers where the vehicle is now; at every step."""
+        if self._own.boot_us < self._boot_us:  # it has restarted: what was measured before was at no time that it knows
+            self.poses, self.taken_us = PoseHistory(), NEVER_US
+        self._boot_us = self._own.boot_us
+        self.poses.note(self._own)
+
     def take_new(self) -> bool:
         """Whether new sectors have come in since the last call."""
         is_new, self._is_new = self._is_new, False
         return is_new
 
-    def trouble(self, time_us: int) -> str:
-        """Why nothing can be decided on them; "" if it can."""
-        if time_us - self.scan_us > OLD_US:
+    def trouble(self, time_us: int, old_us: int = OLD_US) -> str:
+        """Why nothing can be decided on them; "" if it can.
+
+        Args:
+            time_us: the companion's own clock.
+            old_us: an age of the sectors that is too old.
+        """
+        if time_us - self.scan_us > old_us:
             return "no ranges all round"
-        if self._unknown_count > UNKNOWN_MAX * self._layout.sectors:
+        if self._unknown_count > UNKNOWN_MAX * self.layout.sectors:
             return "the range finder does not look round far enough"
         if any(time_us - beam_us > OLD_US for beam_us in self._beam_us):
             return "no ranges of the tilted beams"
@@ -78,13 +100,14 @@ class Ranges:
     def _sectors_reported(self, fields: Any, time_us: int) -> None:
         increment_deg = fields.increment if isnan(fields.increment_f) else fields.increment_f or fields.increment
         first_deg = fields.angle_offset
-        if not is_known(360.0, increment_deg, first_deg) or not increment_deg or fields.time_usec == self._stamp:
+        if not is_known(360.0, increment_deg, first_deg) or not increment_deg or fields.time_usec == self.stamp_us:
             return
+        taken_us = self._taken_us(fields.time_usec)
         if fields.frame in _NORTH_FRAMES:
-            first_deg -= degrees(yaw_of(self._own.q_ned_from_frd))
+            first_deg -= degrees(yaw_of(self._attitude_at(taken_us)))
         elif fields.frame not in _BODY_FRAMES:
             return
-        layout = self._layout
+        layout = self.layout
         nearest = np.full(layout.sectors, np.inf, dtype=np.float32)
         for i, distance_cm in enumerate(fields.distances):
             if distance_cm == UINT16_MAX:
@@ -95,21 +118,35 @@ class Ranges:
                 nearest[k] = min(nearest[k], distance_m)
         is_unknown = np.isinf(nearest)
         self._unknown_count = int(is_unknown.sum())
+        self.is_known = ~is_unknown
         self.ranges_m[: layout.sectors] = np.where(is_unknown, layout.range_m, nearest)
-        self._stamp, self.scan_us, self._is_new = fields.time_usec, time_us, True
+        self.stamp_us, self.scan_us, self._is_new = fields.time_usec, time_us, True
+        self.taken_us = taken_us
+
+    def _taken_us(self, stamp_us: int) -> int:
+        """A sender's time on the vehicle's clock: the same, unless it makes no sense there."""
+        boot_us = self._own.boot_us
+        return stamp_us if 0 <= boot_us - stamp_us < _STAMP_OLD_US else boot_us
+
+    def _attitude_at(self, time_us: int) -> Quat:
+        pose = self.poses.at(time_us)
+        own = self._own
+        is_newer = pose is None or abs(own.boot_us - time_us) <= abs(pose.time_us - time_us)
+        return own.q_ned_from_frd if pose is None or is_newer else pose.q_ned_from_frd
 
     def _beam_reported(self, fields: Any, time_us: int) -> None:
         if fields.orientation != _CUSTOM_ROTATION or not is_known(1.1, *fields.quaternion):
             return
         forward = rotated(quat_from_wxyz(tuple(fields.quaternion)), (1.0, 0.0, 0.0))
-        north, east, down = rotated(self._own.q_ned_from_frd, forward)
+        attitude = self._attitude_at(self._taken_us(self._clock.time_us(fields.time_boot_ms)))
+        north, east, down = rotated(attitude, forward)
         if not isfinite(down) or abs(down) > 1.0:
             return
-        off_rad = atan2(east, north) - yaw_of(self._own.q_ned_from_frd)
+        off_rad = atan2(east, north) - yaw_of(attitude)
         if abs(degrees(atan2(sin(off_rad), cos(off_rad)))) > _BEARING_OFF_DEG:
             return
         elevation_deg = degrees(asin(-down))
-        layout = self._layout
+        layout = self.layout
         off_deg = [abs(beam_deg - elevation_deg) for beam_deg in layout.beam_elevations_deg]
         k = min(range(len(off_deg)), key=off_deg.__getitem__)
         if off_deg[k] > _ELEVATION_OFF_DEG:

@@ -26,7 +26,7 @@ PLACES = {
     "gym": ("policies/__init__.py", "policies/tasks"),
     "learn": (
         *("policies/companion", "policies/experts", "policies/learn", "policies/tracker.py"),
-        *("policies/person_detector", "mission/follow/benchmark/pilots.py"),
+        *("policies/person_detector", "mission/benchmark/any_pilot.py"),
         *("mission/train", "mission/video/rtp_video.py", "mission/video/video_file.py"),
     ),
     "dev": ("tests",),

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mission.flight_settings import Pace  # no command waits for the options of another
 
-FIRST_SEED = 3_000_003  # odd, as of all tests; no training and no tuning is given those from here on
 _HIDES = {"owner_hides_per_min": 1.0}
 _SILENT = {"phone_dropouts_per_min": 20.0, "phone_dropout_scale": 1e4}
 _FOR_GOOD_S = 1e4

@@ -1,4 +1,4 @@
-"""The table of a benchmark: a row per condition, with 95 % intervals, for a terminal and for a page."""
+"""The table of the benchmark: a row per condition, with 95 % intervals."""
 
 from collections.abc import Sequence
 from math import isnan
@@ -14,7 +14,6 @@ COLUMNS = (
     "condition", "flights", "in band", "no collision", "nearest", "stood", "resumed", "changed / min", "accel",
     "yaw rate",
 )  # fmt: skip
-HEAD = "| " + " | ".join(COLUMNS) + " |\n|" + "---|" * len(COLUMNS)
 
 
 def row(condition: Condition, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
@@ -38,8 +37,3 @@ def row(condition: Condition, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
 
 def _fraction(truths: Sequence[bool | None]) -> Interval:
     return rate(np.array([truth for truth in truths if truth is not None], dtype=np.bool_))
-
-
-def markdown(rows: Sequence[tuple[str, ...]]) -> str:
-    """The table for a page."""
-    return "\n".join([HEAD, *("| " + " | ".join(cells) + " |" for cells in rows)]) + "\n"

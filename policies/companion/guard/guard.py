@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.attitude import wrapped, yaw_of
-from policies.companion.guard.limits import faded, kept_off, stopping_speed, within_room
+from policies.companion.guard.limits import (
+    CLIMB_M_S,
+    faded,
+    kept_off,
+    stopping_speed,
+    within_heights,
+    within_room,
+)
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.senses.senses import Senses
 from policies.companion.skills.skill import Velocity
@@ -23,8 +30,6 @@ Floats = NDArray[np.float64]
 _FACE_GAIN = 1.5  # [1/s] from a bearing to a yaw rate
 _YAW_MAX = 1.5  # [rad/s]
 _COUNTED_M_S = 0.3  # less than this off what was wanted is no intervention
-_CLIMB_M_S = 1.0
-_SINK_M_S = 0.3  # from above what it may be
 
 
 class Stance(Enum):
@@ -99,7 +104,7 @@ class Guard:
     def _searched(self, own: Own, is_searching: bool) -> tuple[Floats, float, float]:
         """Up, out of people's way; towards the phone, no nearer than a stand-off; without one a turn on the spot."""
         s = self.settings
-        down = -_CLIMB_M_S * float(np.clip(2.0 * (s.search_height_m - own.range_m), -0.5, 1.0))
+        down = -CLIMB_M_S * float(np.clip(2.0 * (s.search_height_m - own.range_m), -0.5, 1.0))
         down = down if isfinite(own.range_m) else 0.0
         track = self.senses.watch.track
         if self.senses.is_heard and track is not None and track.is_known:
@@ -154,14 +159,7 @@ class Guard:
         if self._is_too_near and not own.range_m > s.height_max_m:
             self.interventions["over the owner"] += 1
             return -s.escape_climb
-        if not isfinite(own.range_m):
-            return max(down, 0.0)
-        if own.range_m < s.height_min_m:
-            return min(down, -0.5 * _CLIMB_M_S)
-        if own.range_m > s.height_max_m:
-            return max(down, _SINK_M_S)
-        down = max(down, -stopping_speed(s.height_max_m - own.range_m, s.reaction_s, _CLIMB_M_S))
-        return min(down, stopping_speed(own.range_m - s.height_min_m, s.reaction_s, _CLIMB_M_S))
+        return within_heights(down, own.range_m, s)
 
     def _count(self, why: str, wanted: Floats, kept: Floats) -> None:
         if float(np.hypot(*(wanted - kept))) > _COUNTED_M_S:

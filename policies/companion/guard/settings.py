@@ -51,3 +51,27 @@ class GuardSettings(BaseModel):
     """Above the ground: below it climbs."""
     height_max_m: float = Field(default=4.0, gt=0.0)
     """Above the ground: higher it does not climb; crowns begin there."""
+    speed_max: float = Field(default=7.5, gt=0.0)
+    """[m/s] level, of whoever goes to goals; policies ask for 7."""
+    scan_slow_s: float = Field(default=0.4, gt=0.0)
+    """From this age of the ranges on whoever goes to goals becomes slower ..."""
+    scan_stop_s: float = Field(default=0.7, gt=0.0)
+    """... until it stands."""
+    dark_slow_s: float = Field(default=0.3, gt=0.0)
+    """Without any return in the scans for so long it becomes as slow as without depth ..."""
+    dark_stop_s: float = Field(default=2.0, gt=0.0)
+    """... and after so long it stands, if its beams should see the ground."""
+    crown_m: float = Field(default=0.8, gt=0.0)
+    """It stays so far below what the beams that look up see."""
+    goal_reaction_s: float = Field(default=0.2, ge=0.0)
+    """From a setpoint to the motion of whoever goes to goals, besides the age of the ranges; measured: 0.17 s."""
+    goal_period_s: float = Field(default=0.1, ge=0.0)
+    """So long what is allowed is driven along the nose, until the next scan."""
+    drive_brake: float = Field(default=2.5, gt=0.0)
+    """[m/s²] with which what drives brakes; measured on the rover."""
+    hull_half_length_m: float = Field(default=0.37, gt=0.0)
+    """Of what is driven along its nose; those of the rover."""
+    hull_half_width_m: float = Field(default=0.22, gt=0.0)
+    """Likewise."""
+    hull_room_m: float = Field(default=0.02, ge=0.0)
+    """It comes no nearer to anything with its hull."""

@@ -1,7 +1,7 @@
-"""What stands round the vehicle at its height, from the depth of the last pictures: a level grid that moves along.
+"""What stands round the vehicle at its height, from the last pictures or scans: a level grid that moves along.
 
-In: depth pictures, with the pose each was taken at. Out: how far the way is free in a direction. What has not been seen
-is not free.
+In: depth pictures or sectors of ranges, with the pose each was taken at. Out: how far the way is free in a direction.
+What has not been seen is not free.
 """
 
 from math import hypot
@@ -9,7 +9,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from common.attitude import Vector, rotated
+from common.attitude import Vector, rotated, yaw_of
 from policies.companion.senses.poses import Pose
 from policies.tasks.follow_me.observe import HFOV_DEG, IMAGE_SIZE, camera_mount, depth_of
 from policies.tasks.follow_me.tracked import SECTORS
@@ -17,6 +17,7 @@ from policies.tasks.follow_me.tracked import SECTORS
 CELL_M = 0.25
 CELLS = 96  # of a side: 12 m to each
 DIRECTIONS = 36
+ROOM_M = 1.0  # more room about a place is not told
 REACH_M = 10.0  # farther nothing is asked for
 _ABOVE_M, _BELOW_M = 0.7, 0.4  # of the slice that the vehicle flies through; guess: its own height twice
 _NO_RETURN_M = 4.0  # so far a column without any return is taken to be free, if others have some; guess
@@ -27,6 +28,7 @@ _UNSEEN = -(10**15)
 _OWN_M = 0.75  # so near nothing is seen: what is not known to be solid is taken to be free,
 _HULL_M = 0.35  # and where the vehicle itself is, nothing else is
 _HALF_WIDTH_M = 0.4  # of the vehicle's way
+_RAYS = 5  # of a sector of ranges: a cell apart at the edge of what is asked for
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +41,7 @@ class LocalMap:
         self._solid_us = np.full((CELLS, CELLS), _UNSEEN, np.int64)
         self._corner = (0, 0)  # cell indices of the grid's first cell
         self.has_depth = False
-        """The last picture had depth."""
+        """The last picture had depth, the last scan a return."""
         self._rays_frd = _rays()
         near = np.arange(-_OWN_M, _OWN_M + CELL_M, CELL_M)
         self._own = np.array([(x, y) for x in near for y in near if hypot(x, y) <= _OWN_M])
@@ -88,7 +90,36 @@ class LocalMap:
         units = level / np.hypot(level[:, 0], level[:, 1])[:, None]
         free_m = np.where(np.isfinite(solid_m), solid_m - CELL_M, _NO_RETURN_M)
         far = ~np.isfinite(solid_m) & is_seen.any(0)  # only the owner, or the ground that rises
-        free_m = np.where(far, REACH_M, free_m)
+        self._open(here, units, np.where(far, REACH_M, free_m), now_us)
+
+    def sweep(
+        self, bearings_rad: Floats, width_rad: float, ranges_m: Floats, limit_m: float, pose: Pose, now_us: int
+    ) -> None:
+        """Takes in a scan of sectors, each the nearest return in it.
+
+        Args:
+            bearings_rad: of the sectors' middles, from the nose, clockwise; those that told nothing are left out.
+            width_rad: of a sector.
+            ranges_m: of the same sectors.
+            limit_m: from here on there was no return.
+            pose: of the vehicle then.
+            now_us: the vehicle's clock.
+        """
+        self._follow(pose.pos_ned)
+        here = np.array(pose.pos_ned[:2])
+        fan = ((np.arange(_RAYS) + 0.5) / _RAYS - 0.5) * width_rad
+        angles = (yaw_of(pose.q_ned_from_frd) + bearings_rad[:, None] + fan).ravel()
+        units = np.stack([np.cos(angles), np.sin(angles)], -1)
+        far_m = np.repeat(ranges_m.astype(np.float64), _RAYS)
+        is_return = far_m < limit_m
+        self.has_depth = bool(is_return.any())
+        self._open(here, units, np.where(is_return, far_m - CELL_M, REACH_M), now_us)
+        is_near = is_return & (far_m < REACH_M)
+        rows, columns = self._cells(here + far_m[is_near, None] * units[is_near])
+        self._solid_us[rows, columns] = now_us
+
+    def _open(self, here: Floats, units: Floats, free_m: Floats, now_us: int) -> None:
+        """Notes as free what lies within so much in each direction, and where the vehicle itself is."""
         steps = np.arange(0.0, REACH_M, 0.8 * CELL_M)
         points = here + units[:, None] * steps[None, :, None]
         for seen in (points[steps[None] < free_m[:, None]], here + self._hull):
@@ -111,6 +142,25 @@ class LocalMap:
         is_solid = (solid > then) & (solid >= free)
         is_free = (free > then) & ~is_solid
         return self._length_m(is_free), self._length_m(~is_solid)
+
+    def room(self, points: Floats, pos_ned: Vector, now_us: int) -> tuple[Floats, NDArray[np.bool_]]:
+        """How far the nearest solid cell's middle is from each of some places [m], and where it was seen to be free.
+
+        Farther than ROOM_M is told as that; shapes as of the points, without their last axis.
+        """
+        self._follow(pos_ned)
+        then = now_us - _HOLD_US
+        solid = (self._solid_us > then) & (self._solid_us >= self._free_us)
+        near = np.full((CELLS, CELLS), ROOM_M)
+        reach = int(ROOM_M / CELL_M)
+        for i in range(-reach, reach + 1):
+            for j in range(-reach, reach + 1):
+                if hypot(i, j) * CELL_M < ROOM_M:
+                    near = np.minimum(near, np.where(np.roll(solid, (i, j), (0, 1)), hypot(i, j) * CELL_M, ROOM_M))
+        rows, columns = self._cells(points.reshape(-1, 2))
+        shape = points.shape[:-1]
+        is_seen = (self._free_us > then)[rows, columns]
+        return near[rows, columns].reshape(shape), is_seen.reshape(shape)
 
     def nearest_m(self, pos_ned: Vector, yaw_rad: float, now_us: int) -> Floats:
         """How near anything known to be solid is in each of SECTORS sectors from the heading clockwise [m]."""

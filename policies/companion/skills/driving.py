@@ -17,6 +17,8 @@ from common.attitude import yaw_of
 from common.range_sectors import GROUND_RING
 from common.warp_start import start_warp
 from policies.companion.goals import Goal, Goals
+from policies.companion.guard.goal_guard import NoseGuard
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.ranges import Ranges
 from policies.companion.skills.goal_skill import GoalSkill
 from policies.companion.skills.skill import Floats, Velocity
@@ -47,6 +49,7 @@ class Driving(GoalSkill):
     Args:
         pilot: who decides.
         is_ordered_by_goto: a goto to the vehicle is an order to drive there.
+        guard: who bounds it; None: as it ships.
     """
 
     ready, flying, drives = "ready to drive", "driving", True
@@ -54,9 +57,13 @@ class Driving(GoalSkill):
     action_size = 2
     camera = None
 
-    def __init__(self, pilot: DrivingPilot, *, is_ordered_by_goto: bool = False) -> None:
+    def __init__(
+        self, pilot: DrivingPilot, *, is_ordered_by_goto: bool = False, guard: GuardSettings | None = None
+    ) -> None:
         self._observer = DriveObserver(pilot.stack)
-        super().__init__(pilot, self._observer, is_ordered_by_goto=is_ordered_by_goto)
+        settings = guard or GuardSettings()
+        held = NoseGuard(settings) if settings.is_on else None
+        super().__init__(pilot, self._observer, is_ordered_by_goto=is_ordered_by_goto, guard=held)
         self._reverses = False  # Offboard, as the vehicle has said
         self._asked_us = NEVER_US
         self._goal: Goal | None = None  # that the heading is of
@@ -106,10 +113,10 @@ class Driving(GoalSkill):
         vector = self._observer.vector(own, _shown(pose, own), self.ranges.ranges_m, last_action)
         return self._act(vector, is_flying=is_flying)
 
-    def setpoint(self, action: Floats, own: Own) -> Velocity:  # noqa: ARG002
-        """What an action asks for, along the nose."""
+    def setpoint(self, action: Floats, own: Own) -> Velocity:
+        """What an action asks for, along the nose, as the guard lets it."""
         speed, yaw_rate = self._observer.command(action)
-        return (speed, 0.0, 0.0), yaw_rate
+        return self._guarded(((speed, 0.0, 0.0), yaw_rate), own)
 
     def goal_pose(self, own: Own) -> Pose | None:
         """Where it drives; None: nowhere."""

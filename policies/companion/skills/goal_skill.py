@@ -1,6 +1,8 @@
 """What the skills that go to goals share: gotos and the plan, a ring of ranges, a policy that decides on each scan.
 
-A decision for each new scan (10 Hz), while there is a goal. What is shown of it and how it is reached is the skill's.
+A decision for each new scan (10 Hz), while there is a goal. What is shown of it and how it is reached is the skill's. A
+guard that does not believe the policy bounds what it asks for; where no scan comes, it decides on the last once more,
+which is older then.
 """
 
 from typing import Protocol
@@ -8,13 +10,16 @@ from typing import Protocol
 import numpy as np
 
 from policies.companion.goals import Goals
+from policies.companion.guard.goal_guard import STANDING, GoalGuard, GoalStance
 from policies.companion.owner_goal import OwnerGoal
-from policies.companion.ranges import Ranges
-from policies.companion.skills.skill import Floats
+from policies.companion.ranges import OLD_US, Ranges
+from policies.companion.skills.skill import Floats, Velocity
 from policies.companion.vector_pilot import VectorPilot
 from policies.companion.vehicle_link import Own, VehicleLink
 
 DECISION_US, DECISION_EARLY_US = 100_000, 10_000
+DECISION_LATE_US = 50_000  # a scan is waited for so much longer
+GUARDED_OLD_US = 2_500_000  # the guard stands still before
 NO_GOAL = "no goal"
 
 
@@ -33,34 +38,50 @@ class GoalSkill:
         pilot: who decides.
         frames: what it is shown.
         is_ordered_by_goto: a goto to the vehicle is an order to go there.
+        guard: who bounds it; None: nobody.
     """
 
+    flying: str
     goals: Goals | OwnerGoal  # this and the next two from `attach` on
     ranges: Ranges
     _vehicle: VehicleLink
 
-    def __init__(self, pilot: VectorPilot, frames: FrameStack, *, is_ordered_by_goto: bool) -> None:
+    def __init__(
+        self, pilot: VectorPilot, frames: FrameStack, *, is_ordered_by_goto: bool, guard: GoalGuard | None
+    ) -> None:
         self.seen: Floats = np.zeros(0, dtype=np.float32)
         self._is_ordered_by_goto = is_ordered_by_goto
         self._pilot = pilot
         self._stack = frames
         self._decided_us = -DECISION_US
+        self.guard = guard
+        self._stance = GoalStance.FREE  # as told
+        self._is_flying = False
 
-    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:  # noqa: ARG002  (others need it)
+    def receive(self, vehicle: VehicleLink, time_us: int) -> bool:
         self.goals.frame(time_us)
-        return self.ranges.take_new()
+        self.ranges.follow()
+        is_new = self.ranges.take_new()
+        if self.guard is None:
+            return is_new
+        self.guard.sense(vehicle.own, self.ranges)
+        return is_new or (self._is_flying and time_us - self._decided_us >= DECISION_US + DECISION_LATE_US)
 
     def is_ordered(self) -> bool:
         return self.goals.is_ordered()
 
     def blindness(self, own: Own, time_us: int) -> str:  # noqa: ARG002
-        return self.ranges.trouble(time_us)
+        is_guarded = self.guard is not None and self._is_flying
+        return self.ranges.trouble(time_us, GUARDED_OLD_US if is_guarded else OLD_US)
 
     def loss(self, own: Own) -> str:  # noqa: ARG002
         return "" if self.goals.goal is not None else self.goals.done or NO_GOAL
 
-    def begin(self, own: Own) -> None:  # noqa: ARG002
+    def begin(self, own: Own) -> None:
         self._forget()
+        self._stance = GoalStance.FREE
+        if self.guard is not None:
+            self.guard.begin(own)
         self._decided_us = -DECISION_US
 
     def conclude(self, own: Own) -> None:
@@ -81,11 +102,25 @@ class GoalSkill:
 
     def _act(self, vector: Floats, *, is_flying: bool) -> Floats:
         """The action on an observation."""
+        self._is_flying = is_flying
         self.seen = vector.copy()
         action = self._pilot.act(vector)
         if not is_flying or not np.isfinite(action).all():
             self._forget()
         return action
+
+    def _guarded(self, wanted: Velocity, own: Own) -> Velocity:
+        """What the guard lets be flown; its stance is told as it changes."""
+        if self.guard is None:
+            return wanted
+        allowed = self.guard.filtered(wanted, own)
+        if self.guard.stance is not self._stance:
+            stance = self.guard.stance
+            self._vehicle.say(f"Companion: {self.flying if stance is GoalStance.FREE else stance.value}")
+            if self._stance in STANDING and stance is GoalStance.FREE:
+                self._forget()  # what it remembers is from before
+            self._stance = stance
+        return allowed
 
     def _forget(self) -> None:
         """An episode begins."""

@@ -53,7 +53,7 @@ def load_skill(
         camera: where images come from, for a skill that needs them.
         is_ordered_by_goto: a goto to the vehicle is an order to navigate or drive there.
         follows: a policy of Navigate goes after the owner, not to gotos.
-        guard: of who follows by sight; None: as it ships.
+        guard: who bounds it; None: as it ships.
 
     Raises:
         PilotError: no such policy, damaged, or made for another task, preset or layout.
@@ -66,11 +66,12 @@ def load_skill(
         return _following(camera, follower_of(policy, str(path)), guard)
     if task in _NAVIGATORS:
         eye = StreamCamera(camera) if follows else None
-        return Navigating(_NAVIGATORS[task](policy, str(path)), is_ordered_by_goto=is_ordered_by_goto, camera=eye)
+        pilot = _NAVIGATORS[task](policy, str(path))
+        return Navigating(pilot, is_ordered_by_goto=is_ordered_by_goto, camera=eye, guard=guard)
     if follows:
         raise PilotError(f"{path}: made for {task}, and does not follow anybody")
     if task == DRIVE:
-        return Driving(DrivingPilot(policy, str(path)), is_ordered_by_goto=is_ordered_by_goto)
+        return Driving(DrivingPilot(policy, str(path)), is_ordered_by_goto=is_ordered_by_goto, guard=guard)
     known = ", ".join((FOLLOW, *_NAVIGATORS))
     raise PilotError(f"{path}: made for {task}; a companion flies policies of {known} and {DRIVE}")
 

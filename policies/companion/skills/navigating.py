@@ -17,6 +17,8 @@ from common.attitude import Vector
 from common.range_sectors import RANGES
 from common.warp_start import start_warp
 from policies.companion.goals import Goals
+from policies.companion.guard.goal_guard import GoalGuard
+from policies.companion.guard.settings import GuardSettings
 from policies.companion.image_client import ImageSource
 from policies.companion.observation import CommandKernel, write_own_row
 from policies.companion.owner_goal import OwnerGoal
@@ -41,13 +43,19 @@ class Navigating(GoalSkill):
         pilot: who decides.
         is_ordered_by_goto: a goto to the vehicle is an order to fly there.
         camera: to follow the owner by, in place of gotos and plans; None: it does not.
+        guard: who bounds it; None: as it ships.
     """
 
     is_along_nose = False
     action_size = 4
 
     def __init__(
-        self, pilot: NavigationPilot, *, is_ordered_by_goto: bool = False, camera: ImageSource | None = None
+        self,
+        pilot: NavigationPilot,
+        *,
+        is_ordered_by_goto: bool = False,
+        camera: ImageSource | None = None,
+        guard: GuardSettings | None = None,
     ) -> None:
         does = ("ready to navigate", "navigating") if camera is None else ("ready to follow", "following")
         self.ready, self.flying = does
@@ -55,7 +63,9 @@ class Navigating(GoalSkill):
         self._observer = NavigationObserver(pilot.stack, drives=pilot.drives)
         self.drives = pilot.drives
         self._shown_m, self._arrived_m = pilot.shown_m, pilot.arrived_m
-        super().__init__(pilot, self._observer, is_ordered_by_goto=is_ordered_by_goto)
+        settings = guard or GuardSettings()
+        held = GoalGuard(settings, drives=pilot.drives) if settings.is_on else None
+        super().__init__(pilot, self._observer, is_ordered_by_goto=is_ordered_by_goto, guard=held)
         self._command = CommandKernel()
 
     def attach(self, vehicle: VehicleLink) -> None:
@@ -78,14 +88,14 @@ class Navigating(GoalSkill):
         return self._act(vector, is_flying=is_flying)
 
     def setpoint(self, action: Floats, own: Own) -> Velocity:
-        """What an action asks for, slower before the last goal."""
+        """What an action asks for, slower before the last goal, and as the guard lets it."""
         (north, east, down), yaw_rate = self._command.setpoint(action, own)
         limit = self._speed_limit(own)
         speed = hypot(north, east)
         slower = limit / speed if speed > limit else 1.0
         if self.drives:
-            return (slower * north, slower * east, 0.0), nan
-        return (slower * north, slower * east, down), yaw_rate
+            return self._guarded(((slower * north, slower * east, 0.0), nan), own)
+        return self._guarded(((slower * north, slower * east, down), yaw_rate), own)
 
     def goal_ned(self, own: Own) -> Vector | None:
         """[m] Where it goes; None: nowhere."""

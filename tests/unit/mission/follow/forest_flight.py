@@ -13,6 +13,7 @@ from tests.unit.mission.follow.goto_flight import advance, goto_fields
 
 AUTOPILOT, COMPANION = 1, 191
 SPARSE = FOREST.model_copy(update={"seed": 3, "trees_per_ha": 100.0})
+DENSE = FOREST.model_copy(update={"seed": 3, "trees_per_ha": 600.0})
 
 
 def config(**changed):

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from mission.benchmark.session import misses
 from mission.cli import app
 from mission.follow.benchmark.conditions import BY_NAME, CONDITIONS
 from mission.follow.benchmark.flights import Outcome, _has_resumed, _has_stood, fly
 from mission.follow.benchmark.pilots import any_pilot
-from mission.follow.benchmark.session import misses
 from policies.companion.guard.settings import GuardSettings
 from policies.companion.pilot import PilotError
 from policies.pretrained.pretrained_policies import pretrained
@@ -37,7 +37,7 @@ def honeyguide(*words):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("swim",), "benchmark swim: there is only follow"),
+        (("swim",), "benchmark swim: there are follow, navigate, park"),
         (("follow", "--condition", "rain"), "--condition rain: there are walk, run,"),
         (("follow", "--policy", "nowhere.onnx", "--condition", "walk"), "nowhere.onnx"),
         (("follow", "--policy", "json:loads", "--condition", "walk"), "no class that can be made without arguments"),
@@ -96,8 +96,8 @@ def test_standing_and_following_again_are_counted_from_what_was_seen():
 def test_what_fell_short_is_named():
     good = Outcome(1, 0.99, False, False, 1.5, float("nan"), None, None, 0.0, 1.0, 10.0, 60.0, "")
     bad = Outcome(3, 0.5, True, True, 0.4, float("nan"), None, None, 0.0, 1.0, 10.0, 20.0, "")
-    assert misses({"walk": [good]}) == []
-    assert len(misses({"walk": [good, bad]})) == 2
+    assert misses("follow", {"walk": [good]}) == []
+    assert len(misses("follow", {"walk": [good, bad]})) == 2
 
 
 def test_an_exported_policy_chooses_what_the_policy_itself_does(tmp_path):

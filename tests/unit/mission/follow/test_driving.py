@@ -131,8 +131,9 @@ def test_a_ring_that_falls_silent_ends_in_hold_at_a_standstill():
     advance(flight, 3.0)
     assert companion.phase is Phase.FLYING
     lose(companion, "OBSTACLE_DISTANCE")
-    advance(flight, 3.0)
+    advance(flight, 3.5)
     assert flight.controller.state.mode is Mode.HOLD
+    assert "Companion: holding: old ranges" in flight.drone.texts
     assert "Companion: hold: no ranges all round" in flight.drone.texts
     assert np.linalg.norm(flight.rig.rows["truth"][0]["vel_ned"]) < 0.05
 

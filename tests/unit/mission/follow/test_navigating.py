@@ -18,6 +18,7 @@ from tests.unit.mission.follow.follow_flight import lose
 from tests.unit.mission.follow.forest_flight import (
     AUTOPILOT,
     COMPANION,
+    DENSE,
     advance,
     goto_fields,
     hovering,
@@ -101,12 +102,16 @@ def test_a_goal_too_far_is_refused_with_the_reason(north, sentence):
     assert companion.skill.goals.goal is None
 
 
-def test_a_scanner_that_falls_silent_ends_in_hold():
+def test_a_scanner_that_falls_silent_makes_it_stand_and_ends_in_hold():
     flight, companion = hovering()
     send_goto(flight, place(flight, 45.0, -20.0), COMPANION)
     advance(flight, 2.0)
     assert companion.phase is Phase.FLYING
     lose(companion, "OBSTACLE_DISTANCE")
+    advance(flight, 2.4)
+    assert mode(flight) is Mode.OFFBOARD
+    assert np.linalg.norm(flight.rig.rows["truth"][0]["vel_ned"]) < 0.5
+    assert {"Companion: slower: old ranges", "Companion: holding: old ranges"} <= set(flight.drone.texts)
     advance(flight, 1.0)
     assert mode(flight) is Mode.HOLD
     assert "Companion: hold: no ranges all round" in flight.drone.texts
@@ -176,3 +181,15 @@ def test_two_flights_to_a_goal_write_the_same_bytes(tmp_path):
         first, second = ((tmp_path / name / log).read_bytes() for name in ("first", "second"))
         assert len(first) > 100_000
         assert first == second, log
+
+
+def test_full_speed_into_the_trees_is_stopped_before_them_by_the_guard(monkeypatch):
+    """A policy that wants to go straight on at 7 m/s whatever it sees; every scan is 200 ms late."""
+    flight, companion = hovering(is_reported=False, world=DENSE, scan_lag_s=0.2)
+    monkeypatch.setattr(companion.skill._pilot, "act", lambda _: np.array([1.0, 0.0, 0.0, 0.0], np.float32))
+    flight.rig.forget_impacts()
+    send_goto(flight, place(flight, 80.0, 0.0), COMPANION)
+    advance(flight, 20.0)
+    assert companion.phase is Phase.FLYING
+    assert companion.skill.guard.interventions["near something"] > 50
+    assert float(flight.rig.rows["truth"][0]["impact_speed"]) == 0.0

@@ -122,3 +122,27 @@ def test_numbers_that_say_nothing_are_left_out(fields):
     vehicle.tell("OBSTACLE_DISTANCE", **(message | fields))
     assert not vehicle.ranges.take_new()
     assert (vehicle.ranges.ranges_m == RANGE_M).all()
+
+
+def test_a_sender_with_a_clock_of_its_own_is_taken_to_tell_of_now():
+    vehicle = Vehicle()
+    vehicle.tell("ATTITUDE_QUATERNION", time_boot_ms=9_000, q1=1.0)
+    vehicle.sectors(bins(), -117.5, time_us=8_900_000)
+    assert vehicle.ranges.taken_us == 8_900_001
+    vehicle.sectors(bins(), -117.5, time_us=1_700_000_000_000_000)
+    assert vehicle.ranges.taken_us == 9_000_000
+
+
+def test_a_beam_that_comes_late_is_levelled_by_the_attitude_of_when_it_was_measured():
+    vehicle = Vehicle()
+    level, pitched = wxyz_from_quat(quat_of(0.0, 0.0)), wxyz_from_quat(quat_of(0.0, np.radians(-25.0)))
+    vehicle.tell("LOCAL_POSITION_NED", time_boot_ms=1_000)
+    for time_ms, (q1, q2, q3, q4) in ((1_000, level), (1_200, pitched)):
+        vehicle.tell("ATTITUDE_QUATERNION", time_boot_ms=time_ms, q1=q1, q2=q2, q3=q3, q4=q4)
+        vehicle.ranges.follow()
+    q_frd_from_beam = quat_of(0.0, np.radians(12.0))
+    vehicle.tell(
+        "DISTANCE_SENSOR", compid=196, orientation=100, quaternion=wxyz_from_quat(q_frd_from_beam), time_boot_ms=1_000,
+        current_distance=400, min_distance=20, max_distance=REACH_CM,
+    )  # fmt: skip
+    assert vehicle.ranges.ranges_m[SECTORS:] == pytest.approx([RANGE_M, RANGE_M, 4.0, RANGE_M])

@@ -1,0 +1,71 @@
+"""Whose flights are judged: an ONNX file, or a class of anybody's Python. What fits a task is the task's to say."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+
+from policies.companion.pilot import PilotError
+from policies.companion.skills.skill import Floats
+
+
+def made_by_name(name: str, parts: tuple[str, ...]) -> Any:
+    """What a class makes that is named module:Class, looked for in the working folder too.
+
+    Raises:
+        PilotError: there is none, or what it makes lacks some of the parts.
+    """
+    from pkgutil import resolve_name
+
+    sys.path.insert(0, str(Path.cwd()))
+    try:
+        made = resolve_name(name)()
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        raise PilotError(f"{name}: no class that can be made without arguments: {error}") from error
+    finally:
+        sys.path.pop(0)
+    missing = [part for part in parts if not hasattr(made, part)]
+    if missing:
+        raise PilotError(f"{name}: a pilot has {', '.join(missing)} too")
+    return made
+
+
+class OnnxNetwork:
+    """A policy as `honeyguide export` writes it, or anything of the same inputs and outputs, with its memory.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        PilotError: it cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self._session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+        except Exception as error:  # onnxruntime's own kinds, which it does not name
+            raise PilotError(f"{path}: {str(error).splitlines()[0]}") from error
+        self.shapes: dict[str, list[Any]] = {put.name: put.shape for put in self._session.get_inputs()}
+        self._memory = next((name for name in self.shapes if "recurrent" in name or "memor" in name), None)
+        self._size = self.shapes[self._memory][-1] if self._memory is not None else 0
+        outputs = [put.name for put in self._session.get_outputs()]
+        self._action = next((n for n in outputs if n.startswith("deterministic_continuous")), outputs[0])
+        self._next = next((name for name in outputs if "recurrent" in name or "memor" in name), None)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets what came before."""
+        self._state = np.zeros((1, 1, self._size), np.float32)
+
+    def run(self, fed: dict[str, Any]) -> Floats:
+        """The action, in [-1, 1], on inputs by name."""
+        if self._memory is not None:
+            fed[self._memory] = self._state
+        wanted = [self._action] + ([self._next] if self._next is not None else [])
+        action, *state = self._session.run(wanted, fed)
+        if state:
+            self._state = state[0]
+        bounded: Floats = np.clip(action[0], -1.0, 1.0)
+        return bounded

@@ -1,0 +1,110 @@
+"""`honeyguide benchmark`: flies a policy through every condition of a task, shows the table and writes it."""
+
+import json
+import multiprocessing
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from common.files import write_whole
+from mission.benchmark.benchmark import FIRST_SEED, benchmark_of
+
+
+@dataclass(frozen=True, slots=True)
+class BenchmarkOptions:
+    """What the command is given."""
+
+    task: str
+    policy: str
+    conditions: tuple[str, ...]  # none: all
+    flights: int  # of each
+    jobs: int
+    seed: int = FIRST_SEED  # of the first flight; every second from there on
+    has_guard: bool = True
+    out: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Flight:
+    task: str
+    policy: str
+    condition: str
+    seed: int
+    has_guard: bool
+
+
+def benchmark_session(options: BenchmarkOptions) -> dict[str, list[Any]]:
+    """The outcomes by condition, shown and written.
+
+    Raises:
+        PilotError: no such policy.
+    """
+    benchmark = benchmark_of(options.task)
+    benchmark.load(options.policy)  # refused before anything is flown
+    console = Console()
+    names = options.conditions or tuple(benchmark.titles)
+    outcomes: dict[str, list[Any]] = {name: [] for name in names}
+    flights = [
+        _Flight(options.task, options.policy, name, options.seed + 2 * k, options.has_guard)
+        for name in names
+        for k in range(options.flights)
+    ]
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    spawned = multiprocessing.get_context("spawn")
+    with Progress(*columns, console=console) as progress, ProcessPoolExecutor(options.jobs, spawned) as pool:
+        bar = progress.add_task("flights", total=len(flights))
+        for flight, outcome in zip(flights, pool.map(_flown, flights), strict=True):
+            outcomes[flight.condition].append(outcome)
+            progress.advance(bar)
+    rows = [benchmark.row(name, outcomes[name]) for name in names]
+    console.print(_shown(benchmark.columns, rows))
+    if options.out is not None:
+        _write(options.out, options, markdown(benchmark.columns, rows), outcomes)
+        console.print(f"table and flights: {options.out}")
+    return outcomes
+
+
+def misses(task: str, outcomes: dict[str, list[Any]]) -> list[str]:
+    """What fell short of the conditions' own bounds, a sentence each."""
+    benchmark = benchmark_of(task)
+    return [text for name, flown in outcomes.items() for text in benchmark.misses(name, flown)]
+
+
+@cache
+def _pilot(task: str, name: str) -> Any:
+    return benchmark_of(task).load(name)
+
+
+def _flown(flight: _Flight) -> Any:
+    """In a process of its own."""
+    pilot = _pilot(flight.task, flight.policy)
+    return benchmark_of(flight.task).fly(pilot, flight.condition, flight.seed, flight.has_guard)
+
+
+def _shown(columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:
+    table = Table(*columns)
+    for cells in rows:
+        table.add_row(*cells)
+    return table
+
+
+def markdown(columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
+    """The table for a page."""
+    head = "| " + " | ".join(columns) + " |\n|" + "---|" * len(columns)
+    return "\n".join([head, *("| " + " | ".join(cells) + " |" for cells in rows)]) + "\n"
+
+
+def _write(out: Path, options: BenchmarkOptions, table: str, outcomes: dict[str, list[Any]]) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    write_whole(out / "table.md", table.encode())
+    flown = {name: [asdict(outcome) for outcome in found] for name, found in outcomes.items()}
+    names = ("task", "policy", "has_guard", "seed")
+    record = {name: getattr(options, name) for name in names} | {"flights": flown}
+    write_whole(out / "flights.json", (json.dumps(record, indent=1) + "\n").encode())

@@ -1,0 +1,79 @@
+"""Where each velocity that it could be asked for leads a vehicle: the nearest to the wanted one that stays clear.
+
+A rollout is what it does until it answers, the change to the velocity asked for, and braking to a stand from there, all
+level, by an acceleration that it is taken to have. What is clear is so from the first sample to the last: whoever takes
+one of them can go on taking it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from policies.companion.guard.settings import GuardSettings
+from policies.companion.senses.local_map import LocalMap
+from policies.companion.vehicle_link import Own
+
+Floats = NDArray[np.float64]
+_FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the speed that is wanted
+_TURNS = np.arange(-17, 19) * (np.pi / 18.0)
+_STEP_S, _STEPS = 0.05, 90
+_NEARER_M = 0.1  # who is too near already may come so much nearer on the way out
+_STEADY = 0.3  # how much what was flown last counts beside what is wanted: not left, right and left again
+
+
+def clear_velocity(wanted: Floats, last: Floats, own: Own, around: LocalMap, s: GuardSettings) -> Floats:
+    """The level velocity nearest to the wanted one [m/s] whose rollout is clear; if none is, the longest clear one.
+
+    Args:
+        wanted: north and east [m/s].
+        last: that was asked for last, and is being answered.
+        own: telemetry.
+        around: what is known.
+        s: of the guard.
+    """
+    asked = _candidates(wanted, last)
+    own_vel = np.array(own.vel_ned[:2])
+    points = np.array(own.pos_ned[:2]) + _rolled(asked, own_vel, last, s)
+    near_m, is_seen = around.room(points, own.pos_ned, own.boot_us)
+    here_m = float(near_m[0, 0])
+    is_slow = np.hypot(asked[:, 0], asked[:, 1]) <= s.unseen_speed
+    is_blocked = (near_m < min(s.solid_m, here_m - _NEARER_M)) | ~(is_seen | is_slow[:, None])
+    clear_steps = np.where(is_blocked.any(1), np.argmax(is_blocked, axis=1), _STEPS + 1)
+    cost = np.hypot(*(asked - wanted).T) + _STEADY * np.hypot(*(asked - last).T)
+    cost[0] = 0.0  # what is wanted, if it is clear
+    if (clear_steps > _STEPS).any():
+        cost[clear_steps <= _STEPS] = np.inf
+        return np.asarray(asked[int(np.argmin(cost))])
+    return np.asarray(asked[int(np.argmax(clear_steps - 1e-3 * np.hypot(asked[:, 0], asked[:, 1])))])
+
+
+def _candidates(wanted: Floats, last: Floats) -> Floats:
+    """The wanted velocity, that of before, the wanted one turned and slower, and none; shape (candidates, 2)."""
+    cos, sin = np.cos(_TURNS), np.sin(_TURNS)
+    north, east = wanted
+    turned = np.stack([cos * north - sin * east, sin * north + cos * east], -1)
+    slower = np.concatenate([fraction * turned for fraction in _FRACTIONS])
+    before = last * min(1.0, float(np.hypot(*wanted)) / max(float(np.hypot(*last)), 1e-6))
+    return np.concatenate([wanted[None], before[None], slower, np.zeros((1, 2))])
+
+
+def _rolled(asked: Floats, own: Floats, last: Floats, s: GuardSettings) -> Floats:
+    """Where each candidate leads from here [m], and so far ahead of it; shape (candidates, _STEPS + 1, 2)."""
+    time_s = (np.arange(_STEPS) + 0.5) * _STEP_S
+    answering = own + _changed(last - own, np.minimum(time_s, s.reaction_s), s.brake)  # (_STEPS, 2)
+    then = answering[-1]
+    change = asked - then
+    change_s = np.hypot(change[:, 0], change[:, 1]) / s.brake
+    done = np.clip((time_s[None] - s.reaction_s) / np.maximum(change_s, 1e-3)[:, None], 0.0, 1.0)
+    speed = np.hypot(asked[:, 0], asked[:, 1])
+    unit = asked / np.maximum(speed, 1e-6)[:, None]
+    braked = speed[:, None] - s.brake * np.maximum(time_s[None] - s.reaction_s - change_s[:, None], 0.0)
+    changing = answering[None] + done[..., None] * change[:, None]
+    velocity = np.where((done >= 1.0)[..., None], np.maximum(braked, 0.0)[..., None] * unit[:, None], changing)
+    way = np.cumsum(velocity * _STEP_S, axis=1) + done[..., None] * (s.solid_m * unit)[:, None]
+    return np.concatenate([np.zeros((len(asked), 1, 2)), way], axis=1)
+
+
+def _changed(change: Floats, time_s: Floats, brake: float) -> Floats:
+    """How much of a change of velocity has come after some times."""
+    whole_s = max(float(np.hypot(*change)) / brake, 1e-3)
+    return np.asarray(np.minimum(time_s / whole_s, 1.0)[:, None] * change)
